@@ -1,0 +1,25 @@
+/// Forces on the quadrotor that plant, controller and recorder must agree on. Source: README.md.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "common/model/parameters.hpp"
+
+namespace sls::model {
+
+/// Linear rotor drag on the quadrotor, N: −D Π (v − v_wind), Π projecting onto the plane normal to
+/// the control force `f_Q_W`. Zero without a control force, whose direction Π needs. Eq. (7).
+Eigen::Vector3d calc_rotor_drag(const Eigen::Vector3d& f_Q_W, const Eigen::Vector3d& v_WQ,
+                                const Aerodynamics& air);
+
+/// Attitude a multirotor must take so that its thrust along −z of the body is `f_Q_W`.
+struct CommandedAttitude {
+  double roll = 0.0;   ///< rad, in [−π/2, π/2]
+  double pitch = 0.0;  ///< rad, in (−π, π]
+  double yaw = 0.0;    ///< rad, always 0: a point mass has no heading
+};
+
+/// F = −|F| R(roll, pitch, 0) e₃. Level for a zero force. Eq. (8).
+CommandedAttitude calc_commanded_attitude(const Eigen::Vector3d& f_Q_W);
+
+}  // namespace sls::model

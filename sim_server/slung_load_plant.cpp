@@ -1,0 +1,1 @@
+#include "sim_server/slung_load_plant.hpp"
