@@ -1,1 +1,144 @@
 #include "common/config/scenario.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <system_error>
+
+#include "common/config/numbers.hpp"
+#include "common/config/rigid_links.hpp"
+#include "common/config/scenario_reader.hpp"
+#include "common/config/scenario_writer.hpp"
+#include "common/config/sha256.hpp"
+
+namespace sls::config {
+namespace {
+
+/// The file's bytes; it is refused by its size before anything is read.
+std::string read_file(const std::filesystem::path& file) {
+  namespace fs = std::filesystem;
+  const auto fail = [&](const std::string& expectation, const std::string& found) {
+    throw make_error(file.string(), 0, "", "expected " + expectation + ", got " + found);
+  };
+  std::error_code error;
+  const fs::file_status status = fs::status(file, error);
+  if (!fs::exists(status)) fail("a scenario file", "none (" + error.message() + ")");
+  if (fs::is_directory(status)) fail("a scenario file", "a directory");
+  if (!fs::is_regular_file(status)) fail("a scenario file", "a pipe, socket or device");
+
+  const std::string size_limit = "at most " + std::to_string(kMaxScenarioBytes) + " bytes";
+  const std::uintmax_t size = fs::file_size(file, error);
+  if (error) fail("a scenario file", error.message());
+  if (size > kMaxScenarioBytes) fail(size_limit, std::to_string(size));
+
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) fail("a readable file", std::generic_category().message(errno));
+  std::string text(kMaxScenarioBytes + 1, '\0');  // one more, should it have grown meanwhile
+  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
+  if (stream.bad()) fail("a readable file", std::generic_category().message(errno));
+  text.resize(static_cast<std::size_t>(stream.gcount()));
+  if (text.empty()) fail("a scenario file", "an empty file");
+  return text;
+}
+
+/// Index of the first timed stage that does not end with a control period.
+std::optional<std::size_t> find_stage_off_period(const Scenario& scenario) {
+  for (std::size_t i = 0; i < scenario.mission.size(); ++i) {
+    const auto* timed = std::get_if<LeaveAfter>(&scenario.mission[i].leave);
+    if (timed && timed->duration_ns % scenario.sync.period_ns != 0) return i;
+  }
+  return std::nullopt;
+}
+
+std::string to_stage_path(std::size_t index) { return "mission[" + std::to_string(index) + "]"; }
+
+std::string to_seconds_text(std::int64_t nanoseconds) { return to_text(to_seconds(nanoseconds)); }
+
+std::string to_mismatch(const char* relation, const std::string& of, std::int64_t expected_ns,
+                        std::int64_t got_ns) {
+  return std::string("expected a ") + relation + " of " + of + " (" + to_seconds_text(expected_ns) +
+         "), got " + to_seconds_text(got_ns);
+}
+
+void check_times(const Scenario& scenario, const Places& places) {
+  const std::int64_t step = scenario.plant.step_ns, period = scenario.sync.period_ns;
+  if (period % step != 0 && !places.has("sync.period_s"))
+    throw places.make_error_at("plant.step_s",
+                               to_mismatch("divisor", "sync.period_s", period, step));
+  if (period % step != 0)
+    throw places.make_error_at("sync.period_s",
+                               to_mismatch("multiple", "plant.step_s", step, period));
+  if (const auto index = find_stage_off_period(scenario)) {
+    const auto& leave = std::get<LeaveAfter>(scenario.mission[*index].leave);
+    throw places.make_error_at(to_stage_path(*index) + ".for_s",
+                               to_mismatch("multiple", "sync.period_s", period, leave.duration_ns));
+  }
+  for (std::size_t i = 0; i < scenario.mission.size(); ++i) {
+    const auto* leave = std::get_if<LeaveWithin>(&scenario.mission[i].leave);
+    if (leave && leave->timeout_ns <= leave->after_ns)
+      throw places.make_error_at(to_stage_path(i) + ".until.timeout_s",
+                                 "expected > after_s (" + to_seconds_text(leave->after_ns) +
+                                     "), got " + to_seconds_text(leave->timeout_ns));
+  }
+}
+
+void check_pendulum(const Scenario& scenario, const Places& places) {
+  if (scenario.plant.pendulum != Pendulum::kRigid) return;
+  if (const auto contradiction = find_rigid_contradiction(scenario.vehicle))
+    throw places.make_error_at(contradiction->key, contradiction->message);
+}
+
+}  // namespace
+
+Scenario load_scenario(const std::filesystem::path& file) {
+  return parse_scenario(read_file(file), file.string());
+}
+
+Scenario parse_scenario(const std::string& text, const std::string& place) {
+  if (text.size() > kMaxScenarioBytes)
+    throw make_error(place, 0, "",
+                     "expected at most " + std::to_string(kMaxScenarioBytes) + " bytes, got " +
+                         std::to_string(text.size()));
+  const YamlNode root = parse_yaml(text, place);
+  Places places(place);
+  places.add("", root.line);
+
+  Scenario scenario;
+  read_value(Value{root, "", root.line, places}, scenario);
+  check_times(scenario, places);
+  check_pendulum(scenario, places);
+  scenario.text = text;
+  scenario.sha256 = calc_sha256(text);
+  return scenario;
+}
+
+std::string to_yaml(const Scenario& scenario) {
+  Scenario copy = scenario;  // one description serves reader and writer, so it takes no const
+  std::string text;
+  MapWriter writer(text);
+  describe(writer, copy);
+  return text;
+}
+
+void override_period(Scenario& scenario, double period_s) {
+  const auto fail = [](const std::string& message) { throw ConfigError("--period-s: " + message); };
+  const auto period = to_nanoseconds(period_s);
+  if (!(period_s > 0.0)) fail("expected > 0, got " + to_text(period_s));
+  if (period_s > kMaxSeconds) fail("expected at most 1000000 s, got " + to_text(period_s));
+  if (!period || *period == 0)
+    fail("expected a whole number of nanoseconds, got " + to_text(period_s));
+
+  Scenario changed = scenario;
+  changed.sync.period_ns = *period;
+  changed.plant.step_ns = std::min(scenario.plant.step_ns, *period);
+  if (*period % changed.plant.step_ns != 0)
+    fail(to_mismatch("multiple", "plant.step_s", changed.plant.step_ns, *period));
+  if (const auto index = find_stage_off_period(changed)) {
+    const auto& leave = std::get<LeaveAfter>(changed.mission[*index].leave);
+    fail(to_mismatch("divisor", to_stage_path(*index) + ".for_s", leave.duration_ns, *period));
+  }
+  scenario = std::move(changed);
+}
+
+}  // namespace sls::config

@@ -6,22 +6,15 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <variant>
 #include <vector>
 
+#include "common/config/config_error.hpp"
 #include "common/model/parameters.hpp"
 #include "common/model/state.hpp"
 
 namespace sls::config {
-
-/// A mistake in a configuration file or in what the user asked for. `what()` is one line:
-/// `FILE:LINE: KEY: expected …, got …`. Programs print it and end with exit code 2.
-class ConfigError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
 
 /// A scenario travels whole in `sls/parameters`, whose string is bounded by this.
 inline constexpr std::size_t kMaxScenarioBytes = 32768;
@@ -47,8 +40,8 @@ struct Plant {
   Pendulum pendulum = Pendulum::kIdeal;
   std::int64_t step_ns = 1'000'000;  ///< integration step
   InitialState initial;
-  model::Aerodynamics air;                                   ///< true drag and wind
-  Eigen::Vector3d disturbance_W = Eigen::Vector3d::Zero();  ///< d, constant force on the quadrotor, N
+  model::Aerodynamics air;                                  ///< true drag and wind
+  Eigen::Vector3d disturbance_W = Eigen::Vector3d::Zero();  ///< d, constant, on the quadrotor, N
 };
 
 // --- synchronisation ---------------------------------------------------------------------------
@@ -109,8 +102,8 @@ struct ControllerModel {
 struct Controller {
   std::string law = "qsf";
   Gains gains = LqrWeights{};
-  double force_limit_n = 200.0;   ///< commands beyond are refused by the server
-  bool saturate = false;          ///< the client scales the force to the limit
+  double force_limit_n = 200.0;  ///< commands beyond are refused by the server
+  bool saturate = false;         ///< the client scales the force to the limit
   bool drag_feed_forward = false;
   StateWiring state_wiring = StateWiring::kCorrect;
   ControllerModel model;

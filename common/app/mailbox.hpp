@@ -1,0 +1,58 @@
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <mutex>
+#include <optional>
+#include <utility>
+
+namespace sls::app {
+
+/// A bounded queue from the middleware's threads to the one thread that works. Putting never
+/// blocks: what does not fit is refused and counted, so that nothing is lost silently.
+template <class T>
+class Mailbox {
+ public:
+  explicit Mailbox(std::size_t capacity) : capacity_(capacity) {}
+
+  /// False where the queue was full: `item` is lost and `refused()` counts it.
+  bool put(T item) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (items_.size() >= capacity_) {
+        ++refused_;
+        return false;
+      }
+      items_.push_back(std::move(item));
+    }
+    filled_.notify_one();
+    return true;
+  }
+
+  /// The oldest item, waiting for one until `deadline`; nothing where none came.
+  std::optional<T> take(std::chrono::steady_clock::time_point deadline) {
+    std::unique_lock lock(mutex_);
+    if (!filled_.wait_until(lock, deadline, [this] { return !items_.empty(); }))
+      return std::nullopt;
+    std::optional<T> item(std::move(items_.front()));
+    items_.pop_front();
+    return item;
+  }
+
+  /// Items refused so far.
+  std::uint64_t refused() const {
+    const std::lock_guard lock(mutex_);
+    return refused_;
+  }
+
+ private:
+  const std::size_t capacity_;
+  mutable std::mutex mutex_;
+  std::condition_variable filled_;
+  std::deque<T> items_;
+  std::uint64_t refused_ = 0;
+};
+
+}  // namespace sls::app

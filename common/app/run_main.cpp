@@ -1,0 +1,37 @@
+#include "common/app/run_main.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include "common/app/log.hpp"
+#include "common/app/stop_signal.hpp"
+#include "common/config/config_error.hpp"
+
+namespace sls::app {
+
+int run_main(int argc, char** argv, CLI::App& cli, const CommonOptions& options,
+             const std::string& program, const std::function<void()>& work) {
+  start_log(program, "info");
+  try {
+    cli.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success))
+      return cli.exit(error);  // --help, --version
+    spdlog::error("{} (see --help)", error.what());
+    return kExitBadUsage;
+  }
+  start_log(program, options.log_level);
+  install_stop_signals();
+  int code = kExitDone;
+  try {
+    work();
+  } catch (const config::ConfigError& error) {
+    spdlog::error("{}", error.what());
+    code = kExitBadUsage;
+  } catch (const std::exception& error) {
+    spdlog::error("{}", error.what());
+    code = kExitRunFailed;
+  }
+  return stop_signal() == 0 ? code : 128 + stop_signal();
+}
+
+}  // namespace sls::app

@@ -1,0 +1,29 @@
+/// What every main does around its own work: options, log, signals, exit codes.
+#pragma once
+
+#include <functional>
+#include <stdexcept>
+#include <string>
+
+#include "common/app/options.hpp"
+
+namespace sls::app {
+
+/// Exit codes of all programs. Interrupted: 130 (SIGINT) or 143 (SIGTERM).
+inline constexpr int kExitDone = 0;
+inline constexpr int kExitRunFailed = 1;
+inline constexpr int kExitBadUsage = 2;
+
+/// The run failed: the mission was not finished, a peer was lost, data was lost. Exit code 1.
+class RunError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Parses the command line into `cli`, starts log and signal handling, calls `work` and returns the
+/// exit code of its outcome: 0, config::ConfigError → 2, any other exception → 1, each printed as one
+/// line on stderr; 130 or 143 where a stop signal ended it.
+int run_main(int argc, char** argv, CLI::App& cli, const CommonOptions& options,
+             const std::string& program, const std::function<void()>& work);
+
+}  // namespace sls::app

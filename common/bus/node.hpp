@@ -1,0 +1,137 @@
+/// The only door to Fast DDS: one domain participant configured by a QoS file, typed writers and
+/// readers on it. Nothing of Fast DDS shows through these headers. Traps it avoids: README.md.
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <set>
+#include <stdexcept>
+#include <string>
+
+#include "common/bus/peer.hpp"
+#include "common/bus/topics.hpp"
+
+namespace sls::bus {
+
+/// The middleware refused or broke something while running (exit code 1).
+class BusError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// One DDS participant. Writers and readers must not outlive it.
+class Node {
+ public:
+  /// Joins `domain` (0–232) with the profiles of `qos_file`; `name` shows in discovery.
+  /// @throws config::ConfigError naming the file, and the line where known, if it cannot be read,
+  ///   is malformed, lacks a profile, or holds what Fast DDS refuses; or for the domain.
+  /// @throws BusError if the participant cannot be created.
+  Node(const std::filesystem::path& qos_file, int domain, const std::string& name);
+  ~Node();
+  Node(const Node&) = delete;
+  Node& operator=(const Node&) = delete;
+
+  PeerId id() const;
+
+  struct Impl;
+  Impl& impl() { return *impl_; }
+
+ private:
+  std::unique_ptr<Impl> impl_;
+};
+
+namespace detail {
+
+/// Type-erased halves of Writer and Reader; `make_type` hands over the generated type support.
+template <class Message>
+void* make_type_support();
+
+class AnyWriter {
+ public:
+  AnyWriter(Node& node, const char* topic, const char* profile, void* type_support);
+  ~AnyWriter();
+  bool write(const void* sample);
+  bool wait_for_acknowledgments(std::chrono::milliseconds limit);
+  std::set<PeerId> matched() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+class AnyReader {
+ public:
+  using Take = std::function<void(const PeerId& sender)>;
+  /// `sample` is the buffer every sample is taken into; `take` is called after each, on a thread of
+  /// the middleware.
+  AnyReader(Node& node, const char* topic, const char* profile, void* type_support, void* sample,
+            Take take);
+  ~AnyReader();
+  std::set<PeerId> matched() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace detail
+
+template <class Message>
+class Writer {
+ public:
+  explicit Writer(Node& node)
+      : writer_(node, Topic<Message>::kName,
+                Topic<Message>::kFlow == Flow::kStream ? kStreamWriterProfile
+                                                       : kLatchedWriterProfile,
+                detail::make_type_support<Message>()) {}
+
+  /// Hands `message` to the middleware. Never call this from a reader's handler (README.md, trap 4).
+  /// @throws BusError if it was not taken: the history stayed full for `max_blocking_time`.
+  void write(const Message& message) {
+    if (!writer_.write(&message))
+      throw BusError(std::string(Topic<Message>::kName) +
+                     ": write refused: a reliable reader has not acknowledged for too long");
+  }
+
+  /// Waits until every reliable reader has everything, at most `limit`; false if it ran out.
+  bool wait_for_acknowledgments(std::chrono::milliseconds limit) {
+    return writer_.wait_for_acknowledgments(limit);
+  }
+
+  /// Participants with a reader of this topic that this writer serves.
+  std::set<PeerId> matched() const { return writer_.matched(); }
+
+ private:
+  detail::AnyWriter writer_;
+};
+
+/// Calls `handler(message, sender)` for every sample, on a thread of the middleware: the handler
+/// must be short and must not write.
+template <class Message>
+class Reader {
+ public:
+  using Handler = std::function<void(const Message& message, const PeerId& sender)>;
+
+  Reader(Node& node, const char* profile, Handler handler)
+      : handler_(std::move(handler)),
+        reader_(node, Topic<Message>::kName, profile, detail::make_type_support<Message>(),
+                buffer_.get(), [this](const PeerId& sender) { handler_(*buffer_, sender); }) {}
+
+  /// Participants with a writer of this topic that this reader hears.
+  std::set<PeerId> matched() const { return reader_.matched(); }
+
+ private:
+  std::unique_ptr<Message> buffer_ = std::make_unique<Message>();
+  Handler handler_;
+  detail::AnyReader reader_;  // last: its callbacks use the members above
+};
+
+/// The QoS file used without `--qos`: config/qos/default.xml of this installation.
+std::filesystem::path default_qos_file();
+
+/// "2.9.1": the version of Fast DDS this was built with.
+std::string middleware_version();
+
+}  // namespace sls::bus

@@ -1,0 +1,85 @@
+/// Who is on the domain: controllers and recorders (sls/participant) and servers (sls/parameters,
+/// sls/status). Both classes listen on the middleware's threads and may be asked from any thread.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/bus/node.hpp"
+
+namespace sls::bus {
+
+/// The last announcement of every controller and recorder that is still there.
+class ParticipantDirectory {
+ public:
+  explicit ParticipantDirectory(Node& node);
+
+  struct Entry {
+    PeerId peer;
+    Participant announcement;
+  };
+
+  /// Present participants of `role` that serve run `run_id`.
+  std::vector<Entry> find(ParticipantRole role, std::uint64_t run_id) const;
+
+  /// Changes with every announcement (not with departures: ask again now and then).
+  std::uint64_t version() const { return version_.load(std::memory_order_acquire); }
+
+ private:
+  mutable std::mutex mutex_;
+  std::map<PeerId, Participant> last_;
+  std::atomic<std::uint64_t> version_{0};
+  Reader<Participant> reader_;
+};
+
+/// A server's run as its samples describe it.
+struct Run {
+  PeerId server;
+  Parameters parameters;
+  std::optional<SimStatus> status;  ///< nothing before the claim on its vehicles is settled
+};
+
+/// The last parameters and status of every server that is still there.
+class ServerDirectory {
+ public:
+  /// `on_status`, where given, sees every status sample, on a thread of the middleware.
+  explicit ServerDirectory(Node& node, std::function<void(const SimStatus&)> on_status = {});
+
+  /// Runs of the servers present, other than this node's own.
+  std::vector<Run> runs() const;
+
+  /// The run to join for `vehicle_id`: present, settled, neither finished nor failed; among several
+  /// the one that is furthest, then the lowest run_id.
+  std::optional<Run> find_joinable(std::uint32_t vehicle_id) const;
+
+  /// The last status of run `run_id`, also of a server that has gone.
+  std::optional<SimStatus> find_status(std::uint64_t run_id) const;
+
+  bool is_present(const PeerId& server) const;
+
+ private:
+  const PeerId self_;
+  const std::function<void(const SimStatus&)> on_status_;
+  mutable std::mutex mutex_;
+  std::map<PeerId, Parameters> parameters_;
+  std::map<std::uint64_t, SimStatus> status_;  // by run_id
+  Reader<Parameters> parameters_reader_;
+  Reader<SimStatus> status_reader_;
+};
+
+/// Position of a phase on the way waiting → running → finished/failed.
+int calc_progress(const std::optional<SimStatus>& status);
+
+/// True where `vehicle_id` is among `parameters`' vehicles.
+bool serves_vehicle(const Parameters& parameters, std::uint32_t vehicle_id);
+
+/// This machine's name, at most 64 bytes, for sls/participant.
+std::string host_name();
+
+}  // namespace sls::bus

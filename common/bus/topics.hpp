@@ -1,0 +1,57 @@
+/// The topics of idl/sls.idl: name and QoS profiles of each type. The table in idl/README.md.
+#pragma once
+
+#include <sls.h>  // generated from idl/sls.idl
+
+namespace sls::bus {
+
+/// What a topic is for decides its QoS profiles: config/qos/README.md.
+enum class Flow {
+  kStream,   ///< one sample per control period and vehicle: state, command, reference
+  kLatched,  ///< what a late joiner must know: participant, parameters, status
+};
+
+/// Profile names in a QoS file.
+inline constexpr const char* kParticipantProfile = "sls_participant";
+inline constexpr const char* kStreamWriterProfile = "sls_stream_writer";
+inline constexpr const char* kLoopReaderProfile = "sls_loop_reader";
+inline constexpr const char* kRecorderReaderProfile = "sls_recorder_reader";
+inline constexpr const char* kLatchedWriterProfile = "sls_latched_writer";
+inline constexpr const char* kLatchedReaderProfile = "sls_latched_reader";
+
+/// `kName` and `kFlow` of the topic that carries `Message`.
+template <class Message>
+struct Topic;
+
+template <>
+struct Topic<VehicleState> {
+  static constexpr const char* kName = "sls/state";
+  static constexpr Flow kFlow = Flow::kStream;
+};
+template <>
+struct Topic<ControlCommand> {
+  static constexpr const char* kName = "sls/command";
+  static constexpr Flow kFlow = Flow::kStream;
+};
+template <>
+struct Topic<Reference> {
+  static constexpr const char* kName = "sls/reference";
+  static constexpr Flow kFlow = Flow::kStream;
+};
+template <>
+struct Topic<Participant> {
+  static constexpr const char* kName = "sls/participant";
+  static constexpr Flow kFlow = Flow::kLatched;
+};
+template <>
+struct Topic<Parameters> {
+  static constexpr const char* kName = "sls/parameters";
+  static constexpr Flow kFlow = Flow::kLatched;
+};
+template <>
+struct Topic<SimStatus> {
+  static constexpr const char* kName = "sls/status";
+  static constexpr Flow kFlow = Flow::kLatched;
+};
+
+}  // namespace sls::bus

@@ -1,0 +1,34 @@
+#include "common/config/rigid_links.hpp"
+
+#include "common/config/numbers.hpp"
+#include "common/config/scenario.hpp"
+
+namespace sls::config {
+
+std::optional<RigidContradiction> find_rigid_contradiction(
+    const model::SlungLoadParameters& vehicle) {
+  const auto contradiction = [](const char* key, const std::string& expected, double value) {
+    return RigidContradiction{
+        key,
+        "expected " + expected + " (the rigid pendulum's links bring it), got " + to_text(value)};
+  };
+  const double load_and_rod = kRigidLoad.mass + kRigidRod.mass;
+  if (vehicle.quad_mass != kRigidBaseMass)
+    return contradiction("vehicle.quad_mass_kg", to_text(kRigidBaseMass), vehicle.quad_mass);
+  if (vehicle.load_mass != kRigidLoad.mass && vehicle.load_mass != load_and_rod)
+    return contradiction("vehicle.load_mass_kg",
+                         to_text(kRigidLoad.mass) + " or " + to_text(load_and_rod),
+                         vehicle.load_mass);
+  if (vehicle.rod_length != kRigidLoad.distance)
+    return contradiction("vehicle.rod_length_m", to_text(kRigidLoad.distance), vehicle.rod_length);
+  return std::nullopt;
+}
+
+void check_rigid_vehicle(const model::SlungLoadParameters& vehicle, const std::string& place) {
+  const auto contradiction = find_rigid_contradiction(vehicle);
+  if (!contradiction) return;
+  const std::string prefix = place.empty() ? "" : place + ": ";
+  throw ConfigError(prefix + contradiction->key + ": " + contradiction->message);
+}
+
+}  // namespace sls::config

@@ -1,0 +1,289 @@
+/// Every key of a scenario, once. Reader, writer and the check for unknown keys all go through
+/// these functions, each with its own kind of `Map`; a new key is one new line here.
+///
+///     map.key(presence, "key", field, rule);     one value, map or list of maps
+///     map.choose(choice, {{value, {"key", …}}}); exactly one of several alternatives is there
+///     map.by_default(field, value);              what holds if the file does not say
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "common/config/scenario.hpp"
+
+namespace sls::config {
+
+enum class Presence { kRequired, kOptional };
+inline constexpr Presence kRequired = Presence::kRequired;
+inline constexpr Presence kOptional = Presence::kOptional;
+
+/// What a number must satisfy; `expectation` completes "expected …".
+struct NumberRule {
+  const char* expectation;
+  bool (*holds)(double number);
+};
+inline constexpr double kPi = 3.14159265358979323846;
+inline constexpr NumberRule kFinite{"a finite number", [](double) { return true; }};
+inline constexpr NumberRule kPositive{"> 0", [](double x) { return x > 0.0; }};
+inline constexpr NumberRule kNotNegative{">= 0", [](double x) { return x >= 0.0; }};
+inline constexpr NumberRule kFullTurn{"radians from -pi to pi",
+                                      [](double x) { return -kPi <= x && x <= kPi; }};
+inline constexpr NumberRule kHalfTurn{"radians from -pi/2 to pi/2",
+                                      [](double x) { return -kPi / 2 <= x && x <= kPi / 2; }};
+// Beyond these bounds a wait would overflow a clock.
+inline constexpr NumberRule kWait{"> 0 and at most 1000000 s",
+                                  [](double x) { return x > 0.0 && x <= 1e6; }};
+inline constexpr NumberRule kRate{"from 0.001 to 1000",
+                                  [](double x) { return x >= 1e-3 && x <= 1e3; }};
+inline constexpr NumberRule kFlushInterval{"> 0 and <= 0.2",
+                                           [](double x) { return x > 0.0 && x <= 0.2; }};
+
+/// What a text must satisfy.
+struct TextRule {
+  const char* expectation;
+  bool (*holds)(std::string_view text);
+};
+inline bool is_folder_name(std::string_view text) {
+  constexpr std::string_view kInside =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_.-";
+  return !text.empty() && text.size() <= 64 && text[0] != '.' && text[0] != '-' &&
+         text.find_first_not_of(kInside) == text.npos;
+}
+inline bool is_short_label(std::string_view text) {
+  for (const char c : text)
+    if (c < ' ' || c > '~') return false;
+  return !text.empty() && text.size() <= 32;
+}
+inline constexpr TextRule kFolderName{
+    "1 to 64 letters, digits, '_', '.' or '-', not beginning with '.' or '-'", &is_folder_name};
+inline constexpr TextRule kShortLabel{"1 to 32 printable ASCII characters", &is_short_label};
+inline constexpr TextRule kLaw{"qsf", [](std::string_view text) { return text == "qsf"; }};
+
+/// Bounds of a whole number or of a list's length.
+struct Range {
+  int least;
+  int most;
+};
+inline constexpr Range kControllers{1, 100};
+inline constexpr Range kRecorders{0, 100};
+inline constexpr Range kStages{1, 1000};
+
+template <class Enum>
+struct Name {
+  const char* text;
+  Enum value;
+};
+inline std::array<Name<Pendulum>, 2> names_of(Pendulum) {
+  return {{{"ideal", Pendulum::kIdeal}, {"rigid", Pendulum::kRigid}}};
+}
+inline std::array<Name<SyncMode>, 2> names_of(SyncMode) {
+  return {{{"lockstep", SyncMode::kLockstep}, {"realtime", SyncMode::kRealtime}}};
+}
+inline std::array<Name<StateWiring>, 2> names_of(StateWiring) {
+  return {{{"correct", StateWiring::kCorrect}, {"gazebo_plugin", StateWiring::kGazeboPlugin}}};
+}
+inline std::array<Name<Body>, 2> names_of(Body) {
+  return {{{"load", Body::kLoad}, {"quadrotor", Body::kQuadrotor}}};
+}
+
+/// One alternative of a choice and the keys that belong to it alone.
+template <class Choice>
+struct Alternative {
+  Choice value;
+  std::vector<const char*> keys;
+};
+
+/// The `Type` inside `variant`, which becomes a default one if it holds something else.
+template <class Type, class Variant>
+Type& as(Variant& variant) {
+  if (!std::holds_alternative<Type>(variant)) variant = Type{};
+  return std::get<Type>(variant);
+}
+
+// --- vehicle and plant ---------------------------------------------------------------------------
+
+template <class Map>
+void describe(Map& map, model::SlungLoadParameters& vehicle, Presence presence = kRequired) {
+  map.key(presence, "quad_mass_kg", vehicle.quad_mass, kPositive);
+  map.key(presence, "load_mass_kg", vehicle.load_mass, kPositive);
+  map.key(presence, "rod_length_m", vehicle.rod_length, kPositive);
+  map.key(presence, "gravity_m_s2", vehicle.gravity, kPositive);
+}
+
+template <class Map>
+void describe(Map& map, model::Aerodynamics& air) {
+  map.key(kOptional, "rotor_drag_n_s_m", air.rotor_drag, kNotNegative);
+  map.key(kOptional, "wind_m_s", air.v_wind_W);
+}
+
+template <class Map>
+void describe(Map& map, InitialState& initial) {
+  map.choose(initial.placed,
+             {{Body::kLoad, {"load_position_m"}}, {Body::kQuadrotor, {"quad_position_m"}}});
+  map.key(kRequired, initial.placed == Body::kLoad ? "load_position_m" : "quad_position_m",
+          initial.position);
+  map.key(kOptional, "quad_velocity_m_s", initial.v_WQ);
+  map.key(kOptional, "alpha_rad", initial.rod.alpha, kFullTurn);
+  map.key(kOptional, "beta_rad", initial.rod.beta, kHalfTurn);
+  map.key(kOptional, "alpha_dot_rad_s", initial.rod.alpha_dot, kFinite);
+  map.key(kOptional, "beta_dot_rad_s", initial.rod.beta_dot, kFinite);
+}
+
+template <class Map>
+void describe(Map& map, Plant& plant) {
+  map.key(kOptional, "pendulum", plant.pendulum);
+  map.key(kOptional, "step_s", plant.step_ns, kPositive);
+  map.key(kRequired, "initial", plant.initial);
+  describe(map, plant.air);
+  map.key(kOptional, "disturbance_n", plant.disturbance_W);
+}
+
+// --- synchronisation -----------------------------------------------------------------------------
+
+template <class Map>
+void describe(Map& map, WaitFor& wait_for) {
+  map.key(kOptional, "controllers", wait_for.controllers, kControllers);
+  map.key(kOptional, "recorders", wait_for.recorders, kRecorders);
+  map.key(kOptional, "timeout_s", wait_for.timeout_s, kWait);
+}
+
+template <class Map>
+void describe(Map& map, Sync& sync) {
+  map.key(kOptional, "mode", sync.mode);
+  map.key(kOptional, "period_s", sync.period_ns, kPositive);
+  map.key(kOptional, "real_time_factor", sync.real_time_factor, kRate);
+  map.key(kOptional, "take_over_s", sync.take_over_s, kWait);
+  map.key(kOptional, "wait_for", sync.wait_for);
+}
+
+// --- controller ----------------------------------------------------------------------------------
+
+template <class Map>
+void describe(Map& map, LqrWeights& weights) {
+  map.key(kRequired, "horizontal", weights.horizontal, kPositive);
+  map.key(kRequired, "vertical", weights.vertical, kPositive);
+}
+
+enum class Axis { kHorizontal, kVertical };
+
+template <class Map>
+void describe(Map& map, AxisGains& gains, Axis axis) {
+  map.key(kRequired, "position", gains.position, kNotNegative);
+  map.key(kRequired, "velocity", gains.velocity, kNotNegative);
+  if (axis == Axis::kHorizontal) {
+    map.key(kRequired, "acceleration", gains.acceleration, kNotNegative);
+    map.key(kRequired, "jerk", gains.jerk, kNotNegative);
+  }
+  map.key(kOptional, "integral", gains.integral, kNotNegative);
+}
+
+template <class Map>
+void describe(Map& map, Gains& gains) {
+  bool by_lqr = std::holds_alternative<LqrWeights>(gains);
+  map.choose(by_lqr, {{true, {"lqr"}}, {false, {"horizontal", "vertical"}}});
+  if (by_lqr) {
+    map.key(kRequired, "lqr", as<LqrWeights>(gains));
+  } else {
+    map.key(kRequired, "horizontal", as<NamedGains>(gains).horizontal, Axis::kHorizontal);
+    map.key(kRequired, "vertical", as<NamedGains>(gains).vertical, Axis::kVertical);
+  }
+}
+
+template <class Map>
+void describe(Map& map, ControllerModel& believed) {
+  describe(map, believed.vehicle, kOptional);
+  describe(map, believed.air);
+}
+
+template <class Map>
+void describe(Map& map, Controller& controller) {
+  map.key(kOptional, "law", controller.law, kLaw);
+  map.key(kOptional, "gains", controller.gains);
+  map.key(kOptional, "force_limit_n", controller.force_limit_n, kPositive);
+  map.key(kOptional, "saturate", controller.saturate);
+  map.key(kOptional, "drag_feed_forward", controller.drag_feed_forward);
+  map.key(kOptional, "state_wiring", controller.state_wiring);
+  map.key(kOptional, "model", controller.model);
+}
+
+// --- mission -------------------------------------------------------------------------------------
+
+template <class Map>
+void describe(Map& map, ConstantReference& reference) {
+  map.key(kRequired, "position_m", reference.position);
+}
+
+template <class Map>
+void describe(Map& map, FigureEightReference& reference) {
+  map.key(kRequired, "amplitude_m", reference.amplitude);
+  map.key(kOptional, "offset_m", reference.offset);
+  map.key(kRequired, "period_s", reference.period_s, kPositive);
+}
+
+template <class Map>
+void describe(Map& map, RestToRestReference& reference) {
+  map.key(kRequired, "from_m", reference.from);
+  map.key(kRequired, "to_m", reference.to);
+  map.key(kRequired, "duration_s", reference.duration_s, kPositive);
+}
+
+template <class Map>
+void describe(Map& map, LeaveWithin& leave) {
+  constexpr std::int64_t kPatience = 60'000'000'000, kLongest = 1'000'000'000'000'000;  // ns
+  map.key(kRequired, "within_m", leave.radius_m, kPositive);
+  map.key(kOptional, "after_s", leave.after_ns, kNotNegative);
+  map.key(kOptional, "of", leave.body);
+  map.key(kOptional, "offset_m", leave.offset);
+  map.by_default(leave.timeout_ns, std::min(leave.after_ns + kPatience, kLongest));
+  map.key(kOptional, "timeout_s", leave.timeout_ns, kPositive);
+}
+
+template <class Map>
+void describe(Map& map, Stage& stage) {
+  map.choose(stage.kind, {{"hold", {"hold"}},
+                          {"set_point", {"set_point"}},
+                          {"figure_eight", {"figure_eight"}},
+                          {"rest_to_rest", {"rest_to_rest"}}});
+  if (stage.kind == "figure_eight")
+    map.key(kRequired, "figure_eight", as<FigureEightReference>(stage.reference));
+  else if (stage.kind == "rest_to_rest")
+    map.key(kRequired, "rest_to_rest", as<RestToRestReference>(stage.reference));
+  else if (stage.kind == "hold" || stage.kind == "set_point")
+    map.key(kRequired, stage.kind.c_str(), as<ConstantReference>(stage.reference));
+
+  map.by_default(stage.name, stage.kind);
+  map.key(kOptional, "name", stage.name, kShortLabel);
+
+  bool timed = std::holds_alternative<LeaveAfter>(stage.leave);
+  map.choose(timed, {{true, {"for_s"}}, {false, {"until"}}});
+  if (timed)
+    map.key(kRequired, "for_s", as<LeaveAfter>(stage.leave).duration_ns, kPositive);
+  else
+    map.key(kRequired, "until", as<LeaveWithin>(stage.leave));
+}
+
+// --- the whole -----------------------------------------------------------------------------------
+
+template <class Map>
+void describe(Map& map, Record& record) {
+  map.key(kOptional, "flush_s", record.flush_s, kFlushInterval);
+}
+
+template <class Map>
+void describe(Map& map, Scenario& scenario) {
+  map.key(kRequired, "name", scenario.name, kFolderName);
+  map.key(kRequired, "vehicle", scenario.vehicle);
+  map.key(kRequired, "plant", scenario.plant);
+  map.key(kOptional, "sync", scenario.sync);
+  map.by_default(scenario.controller.model, ControllerModel{scenario.vehicle, scenario.plant.air});
+  map.key(kOptional, "controller", scenario.controller);
+  map.key(kRequired, "mission", scenario.mission, kStages);
+  map.key(kOptional, "record", scenario.record);
+}
+
+}  // namespace sls::config

@@ -1,0 +1,180 @@
+#include "common/config/scenario_reader.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <numeric>
+#include <optional>
+
+#include "common/config/numbers.hpp"
+
+namespace sls::config {
+namespace {
+
+/// Insertions, deletions, replacements and swaps of neighbours that turn `a` into `b`.
+std::size_t calc_edit_distance(const std::string& a, const std::string& b) {
+  std::vector<std::size_t> before_last, last(b.size() + 1), row(b.size() + 1);
+  std::iota(last.begin(), last.end(), 0);
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const bool same = a[i - 1] == b[j - 1];
+      row[j] = std::min({last[j] + 1, row[j - 1] + 1, last[j - 1] + (same ? 0 : 1)});
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
+        row[j] = std::min(row[j], before_last[j - 2] + 1);
+    }
+    before_last = last;
+    last = row;
+  }
+  return last[b.size()];
+}
+
+bool begins_with(const std::string& text, const std::string& beginning) {
+  return text.compare(0, beginning.size(), beginning) == 0;
+}
+
+/// What the user may have meant by `key`: a slip of the fingers or a forgotten unit.
+std::optional<std::string> find_similar(const std::string& key,
+                                        const std::vector<std::string>& known) {
+  constexpr std::size_t kLongestKey = 64;  // beyond, nothing is similar
+  if (key.empty() || key.size() > kLongestKey) return std::nullopt;
+  std::optional<std::string> similar;
+  std::size_t least = std::max<std::size_t>(2, key.size() / 3) + 1;
+  for (const std::string& name : known) {
+    const bool unit_forgotten = key.size() >= 3 && begins_with(name, key);
+    const std::size_t distance = unit_forgotten ? 0 : calc_edit_distance(key, name);
+    if (distance >= least) continue;
+    least = distance;
+    similar = name;
+  }
+  return similar;
+}
+
+std::string join(const std::vector<std::string>& words) {
+  std::string joined;
+  for (const std::string& word : words) joined += (joined.empty() ? "" : ", ") + word;
+  return joined;
+}
+
+std::string join_path(const std::string& path, const std::string& key) {
+  return path.empty() ? key : path + "." + key;
+}
+
+double read_number(const Value& value) {
+  const bool plain = value.node.kind == YamlNode::Kind::kScalar && !value.node.quoted;
+  const auto number = plain ? parse_number(value.node.text) : std::nullopt;
+  if (!number) value.fail_expecting("a number");
+  if (!std::isfinite(*number)) value.fail_expecting("a finite number");
+  return *number;
+}
+
+}  // namespace
+
+ConfigError Places::make_error_at(const std::string& path, const std::string& message) const {
+  std::string place = path;
+  while (lines_.count(place) == 0 && !place.empty()) {
+    const auto end = place.find_last_of(".[");
+    place.resize(end == place.npos ? 0 : end);
+  }
+  const auto found = lines_.find(place);
+  return make_error(file_, found == lines_.end() ? 0 : found->second, path, message);
+}
+
+Value Value::at(const std::string& key, const YamlNode& child, int key_line) const {
+  // yaml-cpp places a map, a list or nothing at what follows it, which may be lines further down.
+  const int child_line = child.kind == YamlNode::Kind::kScalar ? child.line : key_line;
+  const std::string child_path = join_path(path, key);
+  places.add(child_path, child_line);
+  return {child, child_path, child_line, places};
+}
+
+Value Value::at(std::size_t index) const {
+  const YamlNode& child = node.items[index];
+  const int child_line = child.kind == YamlNode::Kind::kNothing ? line : child.line;
+  const std::string child_path = path + "[" + std::to_string(index) + "]";
+  places.add(child_path, child_line);
+  return {child, child_path, child_line, places};
+}
+
+void check_keys(const Value& value, const std::vector<std::string>& known) {
+  if (value.node.kind != YamlNode::Kind::kMap) value.fail_expecting("a map");
+  std::map<std::string, int> seen;
+  for (const YamlNode& key : value.node.keys) {
+    if (key.kind != YamlNode::Kind::kScalar)
+      throw value.places.make_error_at(key.line, value.path,
+                                       "expected a key, got " + to_brief(key));
+    const auto fail = [&](const std::string& message) {
+      throw value.places.make_error_at(key.line, join_path(value.path, to_printable(key.text)),
+                                       message);
+    };
+    const auto [first, is_new] = seen.emplace(key.text, key.line);
+    if (!is_new) fail("duplicate key; it is already on line " + std::to_string(first->second));
+    if (std::find(known.begin(), known.end(), key.text) != known.end()) continue;
+    if (const auto similar = find_similar(key.text, known))
+      fail("unknown key; did you mean '" + *similar + "'?");
+    fail("unknown key; expected one of " + join(known));
+  }
+}
+
+int MapReader::find(const std::string& name) const {
+  const auto& keys = map_.node.keys;
+  const auto found =
+      std::find_if(keys.begin(), keys.end(), [&](const YamlNode& key) { return key.text == name; });
+  return found == keys.end() ? -1 : static_cast<int>(found - keys.begin());
+}
+
+void read_value(const Value& value, double& number, const NumberRule& rule) {
+  number = read_number(value);
+  if (!rule.holds(number)) value.fail_expecting(rule.expectation);
+}
+
+void read_value(const Value& value, std::int64_t& nanoseconds, const NumberRule& rule) {
+  double seconds = 0.0;
+  read_value(value, seconds, rule);
+  if (seconds > kMaxSeconds) value.fail_expecting("at most 1000000 s");
+  const auto whole = to_nanoseconds(seconds);
+  // A tiny positive number rounds to zero nanoseconds.
+  if (!whole || !rule.holds(static_cast<double>(*whole)))
+    value.fail_expecting("a whole number of nanoseconds");
+  nanoseconds = *whole;
+}
+
+void read_value(const Value& value, int& number, const Range& range) {
+  const std::string& text = value.node.text;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  const bool whole = value.node.kind == YamlNode::Kind::kScalar && !value.node.quoted &&
+                     error == std::errc() && end == text.data() + text.size();
+  if (!whole || number < range.least || number > range.most)
+    value.fail_expecting("a whole number from " + std::to_string(range.least) + " to " +
+                         std::to_string(range.most));
+}
+
+void read_value(const Value& value, bool& flag) {
+  const bool plain = value.node.kind == YamlNode::Kind::kScalar && !value.node.quoted;
+  if (!plain || (value.node.text != "true" && value.node.text != "false"))
+    value.fail_expecting("true or false");
+  flag = value.node.text == "true";
+}
+
+void read_value(const Value& value, std::string& text, const TextRule& rule) {
+  if (value.node.kind != YamlNode::Kind::kScalar) value.fail_expecting("text");
+  if (!rule.holds(value.node.text)) value.fail_expecting(rule.expectation);
+  text = value.node.text;
+}
+
+void read_value(const Value& value, Eigen::Vector3d& vector) {
+  if (value.node.kind != YamlNode::Kind::kList || value.node.items.size() != 3)
+    value.fail_expecting("a list of three numbers");
+  for (int i = 0; i < 3; ++i) vector[i] = read_number(value.at(static_cast<std::size_t>(i)));
+}
+
+std::size_t read_list_length(const Value& value, const Range& range) {
+  const std::size_t length = value.node.items.size();
+  if (value.node.kind != YamlNode::Kind::kList || length < static_cast<std::size_t>(range.least) ||
+      length > static_cast<std::size_t>(range.most))
+    value.fail_expecting("a list of " + std::to_string(range.least) + " to " +
+                         std::to_string(range.most) + " stages");
+  return length;
+}
+
+}  // namespace sls::config

@@ -1,0 +1,191 @@
+/// Reads the keys that scenario_keys.hpp describes from a YAML tree, strictly.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <initializer_list>
+#include <map>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "common/config/scenario_keys.hpp"
+#include "common/config/yaml_node.hpp"
+
+namespace sls::config {
+
+/// Where each key that was read stands, so that rules between keys can name a line too.
+class Places {
+ public:
+  explicit Places(std::string file) : file_(std::move(file)) {}
+  void add(const std::string& path, int line) { lines_[path] = line; }
+  bool has(const std::string& path) const { return lines_.count(path) != 0; }
+
+  /// Error at `path`, or at what contains it where the file leaves it out.
+  ConfigError make_error_at(const std::string& path, const std::string& message) const;
+  ConfigError make_error_at(int line, const std::string& path, const std::string& message) const {
+    return make_error(file_, line, path, message);
+  }
+
+ private:
+  std::string file_;
+  std::map<std::string, int> lines_;
+};
+
+/// A node, the path that leads to it and the line that a message about it names.
+struct Value {
+  const YamlNode& node;
+  std::string path;
+  int line;
+  Places& places;
+
+  [[noreturn]] void fail(const std::string& message) const {
+    throw places.make_error_at(line, path, message);
+  }
+  [[noreturn]] void fail_expecting(const std::string& expectation) const {
+    fail("expected " + expectation + ", got " + to_brief(node));
+  }
+  Value at(const std::string& key, const YamlNode& child, int key_line) const;
+  Value at(std::size_t index) const;
+};
+
+/// A `Map` that only learns which keys there are.
+class KeyNames {
+ public:
+  template <class Field, class... Rule>
+  void key(Presence, const char* name, Field&, const Rule&...) {
+    add(name);
+  }
+  template <class Choice>
+  void choose(Choice&, std::initializer_list<Alternative<Choice>> alternatives) {
+    for (const auto& alternative : alternatives)
+      for (const char* name : alternative.keys) add(name);
+  }
+  template <class Field>
+  void by_default(Field&, const Field&) {}
+
+  const std::vector<std::string>& names() const { return names_; }
+
+ private:
+  void add(const std::string& name) {
+    if (std::find(names_.begin(), names_.end(), name) == names_.end()) names_.push_back(name);
+  }
+
+  std::vector<std::string> names_;
+};
+
+/// @throws ConfigError unless `value` is a map with no other keys than `known`, each at most once.
+void check_keys(const Value& value, const std::vector<std::string>& known);
+
+// One per type of field. @throws ConfigError where the node is something else or breaks the rule.
+void read_value(const Value& value, double& number, const NumberRule& rule);
+void read_value(const Value& value, std::int64_t& nanoseconds, const NumberRule& rule);
+void read_value(const Value& value, int& number, const Range& range);
+void read_value(const Value& value, bool& flag);
+void read_value(const Value& value, std::string& text, const TextRule& rule);
+void read_value(const Value& value, Eigen::Vector3d& vector);
+std::size_t read_list_length(const Value& value, const Range& range);
+
+template <class Enum>
+std::string join_names() {
+  std::string joined;
+  for (const auto& name : names_of(Enum{}))
+    joined += (joined.empty() ? "" : " or ") + std::string(name.text);
+  return joined;
+}
+
+/// Completes "missing key; expected …".
+template <class Field>
+std::string to_expectation(const Field&) {
+  if constexpr (std::is_enum_v<Field>) return join_names<Field>();
+  if constexpr (std::is_same_v<Field, bool>) return "true or false";
+  if constexpr (std::is_arithmetic_v<Field>) return "a number";
+  if constexpr (std::is_same_v<Field, std::string>) return "text";
+  if constexpr (std::is_same_v<Field, Eigen::Vector3d>) return "a list of three numbers";
+  if constexpr (std::is_same_v<Field, std::vector<Stage>>) return "a list of stages";
+  return "a map";
+}
+
+/// The `Map` that reads: describe(reader, field) fills `field` from the file.
+class MapReader {
+ public:
+  explicit MapReader(const Value& map) : map_(map) {}
+
+  template <class Field, class... Rule>
+  void key(Presence presence, const char* name, Field& field, const Rule&... rule);
+
+  template <class Choice>
+  void choose(Choice& choice, std::initializer_list<Alternative<Choice>> alternatives);
+
+  template <class Field>
+  void by_default(Field& field, const Field& value) {
+    field = value;
+  }
+
+ private:
+  /// Index of `name` among the keys, or −1.
+  int find(const std::string& name) const;
+
+  const Value& map_;
+};
+
+template <class Element>
+void read_value(const Value& value, std::vector<Element>& list, const Range& range) {
+  list.assign(read_list_length(value, range), Element{});
+  for (std::size_t i = 0; i < list.size(); ++i) read_value(value.at(i), list[i]);
+}
+
+/// Maps, and texts that stand for the value of an enumeration.
+template <class Field, class... Rule>
+void read_value(const Value& value, Field& field, const Rule&... rule) {
+  if constexpr (std::is_enum_v<Field>) {
+    for (const auto& name : names_of(field)) {
+      if (value.node.kind != YamlNode::Kind::kScalar || value.node.text != name.text) continue;
+      field = name.value;
+      return;
+    }
+    value.fail_expecting(join_names<Field>());
+  } else {
+    KeyNames keys;
+    describe(keys, field, rule...);
+    check_keys(value, keys.names());
+    MapReader reader(value);
+    describe(reader, field, rule...);
+  }
+}
+
+template <class Field, class... Rule>
+void MapReader::key(Presence presence, const char* name, Field& field, const Rule&... rule) {
+  const int index = find(name);
+  if (index >= 0) {
+    const auto i = static_cast<std::size_t>(index);
+    const Value value = map_.at(name, map_.node.items[i], map_.node.keys[i].line);
+    read_value(value, field, rule...);
+  } else if (presence == kRequired) {
+    const std::string path = map_.path.empty() ? name : map_.path + "." + name;
+    throw map_.places.make_error_at(map_.line, path,
+                                    "missing key; expected " + to_expectation(field));
+  }
+}
+
+template <class Choice>
+void MapReader::choose(Choice& choice, std::initializer_list<Alternative<Choice>> alternatives) {
+  std::string all, present;
+  int chosen = 0;
+  for (const auto& alternative : alternatives) {
+    std::string together, here;
+    for (const char* name : alternative.keys) {
+      together += (together.empty() ? "" : "+") + std::string(name);
+      if (here.empty() && find(name) >= 0) here = name;
+    }
+    all += (all.empty() ? "" : ", ") + together;
+    if (here.empty()) continue;
+    present += (present.empty() ? "" : " and ") + here;
+    choice = alternative.value;
+    ++chosen;
+  }
+  if (chosen != 1)
+    map_.fail("expected exactly one of " + all + ", got " + (present.empty() ? "none" : present));
+}
+
+}  // namespace sls::config

@@ -1,0 +1,90 @@
+/// Writes the keys that scenario_keys.hpp describes as YAML, every one of them.
+#pragma once
+
+#include <cstdint>
+#include <initializer_list>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "common/config/numbers.hpp"
+#include "common/config/scenario_keys.hpp"
+
+namespace sls::config {
+
+inline std::string to_yaml_value(double number) { return to_text(number); }
+inline std::string to_yaml_value(std::int64_t nanoseconds) {
+  return to_text(to_seconds(nanoseconds));
+}
+inline std::string to_yaml_value(int number) { return std::to_string(number); }
+inline std::string to_yaml_value(bool flag) { return flag ? "true" : "false"; }
+inline std::string to_yaml_value(const std::string& text) {
+  std::string quoted = "\"";
+  for (const char c : text)
+    quoted += (c == '"' || c == '\\') ? std::string("\\") + c : std::string(1, c);
+  return quoted + '"';
+}
+inline std::string to_yaml_value(const Eigen::Vector3d& vector) {
+  return "[" + to_text(vector.x()) + ", " + to_text(vector.y()) + ", " + to_text(vector.z()) + "]";
+}
+template <class Enum, std::enable_if_t<std::is_enum_v<Enum>, int> = 0>
+std::string to_yaml_value(Enum value) {
+  for (const auto& name : names_of(value))
+    if (name.value == value) return name.text;
+  return "";
+}
+
+/// A field that stands on the line of its key.
+template <class Field>
+inline constexpr bool kOnOneLine =
+    std::is_arithmetic_v<Field> || std::is_enum_v<Field> || std::is_same_v<Field, std::string> ||
+    std::is_same_v<Field, Eigen::Vector3d>;
+
+/// The `Map` that writes: describe(writer, field) appends `field` to the text.
+class MapWriter {
+ public:
+  explicit MapWriter(std::string& text, std::string indentation = "")
+      : MapWriter(text, indentation, indentation) {}
+
+  template <class Field, class... Rule>
+  void key(Presence, const char* name, Field& field, const Rule&... rule) {
+    text_ += next_ + name + ":";
+    next_ = indentation_;
+    if constexpr (kOnOneLine<Field>) {
+      text_ += " " + to_yaml_value(field) + "\n";
+    } else {
+      text_ += "\n";
+      write_block(field, rule...);
+    }
+  }
+
+  template <class Choice>
+  void choose(Choice&, std::initializer_list<Alternative<Choice>>) {}
+
+  template <class Field>
+  void by_default(Field&, const Field&) {}
+
+ private:
+  MapWriter(std::string& text, std::string first, std::string indentation)
+      : text_(text), next_(std::move(first)), indentation_(std::move(indentation)) {}
+
+  template <class Struct, class... Rule>
+  void write_block(Struct& fields, const Rule&... rule) {
+    MapWriter writer(text_, indentation_ + "  ");
+    describe(writer, fields, rule...);
+  }
+
+  template <class Element>
+  void write_block(std::vector<Element>& list, const Range&) {
+    for (Element& element : list) {
+      MapWriter writer(text_, indentation_ + "  - ", indentation_ + "    ");
+      describe(writer, element);
+    }
+  }
+
+  std::string& text_;
+  std::string next_;         // what the next line begins with: a list's item begins with a dash
+  std::string indentation_;  // what the lines after it begin with
+};
+
+}  // namespace sls::config

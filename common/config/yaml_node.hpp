@@ -1,0 +1,39 @@
+/// YAML text as a plain tree whose every node knows its line. The only code that sees yaml-cpp.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "common/config/config_error.hpp"
+
+namespace sls::config {
+
+/// What one place in the file holds.
+struct YamlNode {
+  enum class Kind { kNothing, kScalar, kList, kMap };
+
+  Kind kind = Kind::kNothing;
+  int line = 0;                 ///< from 1
+  bool quoted = false;          ///< a scalar in quotes or a block scalar: text, never a number
+  std::string text;             ///< of a scalar
+  std::vector<YamlNode> keys;   ///< of a map, one for each item
+  std::vector<YamlNode> items;  ///< of a list or a map
+};
+
+/// The tree of `text`, which must be UTF-8 and hold one document without anchors, aliases and tags.
+/// Nesting is limited; duplicate keys are kept for the reader to judge.
+/// @throws ConfigError `PLACE:LINE: …`.
+YamlNode parse_yaml(const std::string& text, const std::string& place);
+
+/// What `node` holds, in a few printable characters: `-0.16`, `"abc"`, `a list of 2`, `nothing`.
+std::string to_brief(const YamlNode& node);
+
+/// `text` with what is not printable ASCII escaped, cut after about `most` characters.
+std::string to_printable(const std::string& text, std::size_t most = 40);
+
+/// `PLACE:LINE: PATH: MESSAGE`; a line below 1 and an empty path are left out.
+ConfigError make_error(const std::string& place, int line, const std::string& path,
+                       const std::string& message);
+
+}  // namespace sls::config

@@ -1,0 +1,158 @@
+#include "control_client/client.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <thread>
+
+#include "common/app/run_main.hpp"
+#include "common/app/stop_signal.hpp"
+#include "control_client/messages.hpp"
+
+namespace sls::control {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto kPollTime = 20ms;    // while nothing is in a hurry
+constexpr auto kLingerTime = 10s;   // how long recorders may take to be done
+constexpr auto kReportTime = 5s;    // between two lines about the same wait
+constexpr std::size_t kMailboxSize = 1024;
+
+}  // namespace
+
+Client::Client(bus::Node& node, const config::Scenario& scenario, const std::string& name,
+               std::int32_t strength)
+    : scenario_(scenario),
+      name_(name),
+      strength_(strength),
+      participants_(node),
+      servers_(node),
+      participant_writer_(node),
+      command_writer_(node),
+      reference_writer_(node),
+      states_(kMailboxSize),
+      state_reader_(node, bus::kLoopReaderProfile,
+                    [this](const VehicleState& state, const bus::PeerId&) { states_.put(state); }) {
+}
+
+void Client::run() {
+  join_run();
+  if (app::stop_signal() == 0) serve();
+  announce(false, true);
+  linger();
+}
+
+void Client::join_run() {
+  const double timeout_s = scenario_.sync.wait_for.timeout_s;
+  const auto deadline = Clock::now() + std::chrono::duration_cast<Clock::duration>(
+                                           std::chrono::duration<double>(timeout_s));
+  auto next_report = Clock::now() + kReportTime;
+  while (!(run_ = servers_.find_joinable(vehicle_id_)) && app::stop_signal() == 0) {
+    const auto now = Clock::now();
+    if (now >= deadline)
+      throw app::RunError(
+          fmt::format("no server for vehicle {} within {} s", vehicle_id_, timeout_s));
+    if (now >= next_report) {
+      spdlog::info("waiting for: server of vehicle {} ({:.0f} s left)", vehicle_id_,
+                   std::chrono::duration<double>(deadline - now).count());
+      next_report += kReportTime;
+    }
+    std::this_thread::sleep_for(kPollTime);
+  }
+  if (!run_) return;
+
+  const Parameters& parameters = run_->parameters;
+  if (!(parameters.scenario_sha256() == scenario_.sha256))
+    throw config::ConfigError(fmt::format("scenario '{}': expected the server's, SHA-256 {}, got {}",
+                                          scenario_.name, parameters.scenario_sha256().c_str(),
+                                          scenario_.sha256));
+  scenario_.sync.period_ns = parameters.period_ns();
+  scenario_.plant.step_ns = parameters.step_ns();
+  controller_ = std::make_unique<FlightController>(scenario_);
+  spdlog::info("'{}' joins run {:016x}: {}, period {} s", name_, parameters.run_id(),
+               scenario_.name, scenario_.sync.period_ns * 1e-9);
+}
+
+bool Client::sees_all_endpoints() const {
+  if (state_reader_.matched().count(run_->server) == 0) return false;
+  const auto command_readers = command_writer_.matched();
+  const auto reference_readers = reference_writer_.matched();
+  if (command_readers.count(run_->server) == 0) return false;
+  int recorders = 0;
+  for (const auto& entry : participants_.find(ROLE_RECORDER, run_->parameters.run_id()))
+    if (command_readers.count(entry.peer) > 0 && reference_readers.count(entry.peer) > 0)
+      ++recorders;
+  return recorders >= scenario_.sync.wait_for.recorders;
+}
+
+void Client::serve() {
+  announce(false, false);
+  auto next_look = Clock::now();
+  while (app::stop_signal() == 0) {
+    if (const auto state = states_.take(next_look)) answer(*state);
+    if (Clock::now() < next_look) continue;
+    if (has_finished()) return;
+    if (!ready_ && sees_all_endpoints()) {
+      ready_ = true;
+      announce(true, false);
+    }
+    next_look = Clock::now() + kPollTime;
+  }
+}
+
+void Client::answer(const VehicleState& state) {
+  if (state.run_id() != run_->parameters.run_id() || state.vehicle_id() != vehicle_id_) return;
+  if (last_command_ && last_command_->step() == state.step()) {
+    command_writer_.write(*last_command_);
+    return;
+  }
+  const auto began = Clock::now();
+  const Answer answer = controller_->calc_answer(state.step(), to_model_state(state),
+                                                 to_memory(state.controller()));
+  const auto compute_time = Clock::now() - began;
+  last_command_ = make_command_message(state, answer, name_, strength_, compute_time);
+  command_writer_.write(*last_command_);
+  reference_writer_.write(make_reference_message(state, answer, name_));
+  if (answer.fault != Fault::kNone)
+    spdlog::error("step {}: fault {}", state.step(), to_string(answer.fault));
+}
+
+bool Client::has_finished() {
+  const auto status = servers_.find_status(run_->parameters.run_id());
+  if (status && status->phase() == PHASE_FINISHED) return true;
+  if (status && status->phase() == PHASE_FAILED)
+    throw app::RunError(fmt::format("the run failed: {}", status->reason().c_str()));
+  if (!servers_.is_present(run_->server))
+    throw app::RunError(fmt::format("the server of run {:016x} is gone, expected it to finish",
+                                    run_->parameters.run_id()));
+  return false;
+}
+
+void Client::announce(bool ready, bool done) {
+  if (!run_) return;
+  Participant message;
+  message.run_id(run_->parameters.run_id());
+  message.vehicle_id(vehicle_id_);
+  message.role(ROLE_CONTROLLER);
+  message.name(name_);
+  message.host(bus::host_name());
+  message.strength(strength_);
+  message.scenario_sha256(scenario_.sha256);
+  message.ready(ready);
+  message.done(done);
+  message.last_complete_step(last_command_ ? static_cast<std::int64_t>(last_command_->step()) : -1);
+  participant_writer_.write(message);
+}
+
+void Client::linger() {
+  if (!run_ || app::stop_signal() != 0) return;
+  const auto give_up = Clock::now() + kLingerTime;
+  const auto recorders_done = [this] {
+    for (const auto& entry : participants_.find(ROLE_RECORDER, run_->parameters.run_id()))
+      if (!entry.announcement.done()) return false;
+    return true;
+  };
+  while (!recorders_done() && Clock::now() < give_up) std::this_thread::sleep_for(kPollTime);
+}
+
+}  // namespace sls::control

@@ -1,0 +1,17 @@
+/// The integral of the load position error. Source: README.md, eq. (10).
+#pragma once
+
+#include <Eigen/Core>
+
+namespace sls::control {
+
+inline constexpr double kIntegralLimit = 20.0;  ///< m·s, each axis
+
+/// True when the integral is at its limit and `rate` pushes it further out: it does not move.
+bool is_clamped(double integral, double rate);
+
+/// The integral one period later: a forward Euler step, clamped on each axis.
+Eigen::Vector3d calc_next_integral(const Eigen::Vector3d& integral, const Eigen::Vector3d& rate,
+                                   double period);
+
+}  // namespace sls::control

@@ -1,0 +1,32 @@
+#include "common/app/run_main.hpp"
+#include "common/bus/node.hpp"
+#include "common/config/scenario.hpp"
+#include "control_client/client.hpp"
+
+int main(int argc, char** argv) {
+  using namespace sls;
+  CLI::App cli("Flies a scenario's mission: answers every state sample with a control force.");
+  app::CommonOptions options;
+  options.qos_file = bus::default_qos_file();
+  std::filesystem::path scenario_file;
+  std::string name = "control_client";
+  std::int32_t strength = 0;
+  app::add_common_options(cli, options);
+  cli.add_option("--scenario", scenario_file, "scenario (YAML), the same as the server's")
+      ->type_name("FILE")
+      ->required();
+  cli.add_option("--strength", strength, "among several clients the strongest flies")
+      ->type_name("N");
+  cli.add_option("--name", name, "name in recordings and messages, 1 to 32 bytes")
+      ->type_name("TEXT")
+      ->check([](const std::string& text) {
+        return text.empty() || text.size() > 32 ? "expected 1 to 32 bytes, got '" + text + "'"
+                                                : std::string();
+      });
+
+  return app::run_main(argc, argv, cli, options, "control_client", [&] {
+    const config::Scenario scenario = config::load_scenario(scenario_file);
+    bus::Node node(options.qos_file, options.domain, "control_client");
+    control::Client(node, scenario, name, strength).run();
+  });
+}

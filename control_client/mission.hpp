@@ -1,0 +1,54 @@
+/// The mission: which stage is in force at a step, and what it asks. Source: README.md, "Mission".
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/config/scenario.hpp"
+#include "common/model/reference.hpp"
+#include "common/model/state.hpp"
+#include "control_client/flight_controller.hpp"
+#include "control_client/reference_trajectory.hpp"
+
+namespace sls::control {
+
+/// Where the mission stands at one step.
+struct MissionProgress {
+  std::uint32_t stage = 0;
+  std::uint64_t stage_start_step = 0;
+  MissionPhase phase = MissionPhase::kRunning;
+  model::Reference reference;
+};
+
+class Mission {
+ public:
+  /// @throws config::ConfigError without a stage or without a positive period.
+  Mission(const std::vector<config::Stage>& stages, std::int64_t period_ns);
+
+  /// True if `memory` names a stage that began at `step` or earlier.
+  bool is_possible(std::uint64_t step, const ControllerMemory& memory) const;
+
+  /// Progress at `step`, from the memory accepted one step before. Failed: a stage timed out.
+  /// `memory` must be possible at `step`.
+  MissionProgress calc_progress(std::uint64_t step, const model::SlungLoadState& state,
+                                const ControllerMemory& memory) const;
+
+  const std::string& stage_name(std::uint32_t stage) const { return stages_[stage].name; }
+
+ private:
+  struct FlownStage {
+    std::string name;
+    std::unique_ptr<const ReferenceTrajectory> trajectory;
+    config::LeaveCondition leave;
+  };
+
+  /// Time since `start_step`, whole nanoseconds; the largest number if it does not fit.
+  std::int64_t calc_elapsed_ns(std::uint64_t step, std::uint64_t start_step) const;
+
+  std::vector<FlownStage> stages_;
+  std::int64_t period_ns_;
+};
+
+}  // namespace sls::control

@@ -1,0 +1,20 @@
+#include "control_client/state_wiring.hpp"
+
+#include <cmath>
+
+namespace sls::control {
+
+model::RodAngles calc_wired_angles(const model::RodAngles& rod, config::StateWiring wiring,
+                                   double rod_length) {
+  if (wiring == config::StateWiring::kCorrect) return rod;
+  // Eq. (14): angles exchanged, one sign lost, velocities of the load where rates belong.
+  model::RodAngles slots;
+  slots.alpha = rod.beta;
+  slots.beta = -rod.alpha;
+  slots.alpha_dot = rod_length * rod.alpha_dot -
+                    2.0 * rod_length * std::tan(rod.alpha) * std::tan(rod.beta) * rod.beta_dot;
+  slots.beta_dot = rod_length * rod.beta_dot;
+  return slots;
+}
+
+}  // namespace sls::control

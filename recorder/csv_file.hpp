@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <type_traits>
+
+namespace sls::record {
+
+/// A CSV file that grows row by row. Numbers are written so that they read back to the same double;
+/// rows reach the disk with `flush()`, whole ones only.
+/// Every member @throws std::system_error naming the file when the disk refuses.
+class CsvFile {
+ public:
+  /// Creates `file`, which must not exist, and writes `header` as its first line.
+  CsvFile(const std::filesystem::path& file, std::string_view header);
+  ~CsvFile();
+  CsvFile(const CsvFile&) = delete;
+  CsvFile& operator=(const CsvFile&) = delete;
+
+  void add(double value);
+  void add(std::string_view text);  ///< quoted where it holds a comma, a quote or a line break
+  template <class Integer, std::enable_if_t<std::is_integral_v<Integer>, int> = 0>
+  void add(Integer value) {
+    add_field(std::to_string(value));
+  }
+  /// Each element of an array or vector is a field.
+  template <class Vector>
+  void add_all(const Vector& values) {
+    for (int i = 0; i < static_cast<int>(values.size()); ++i) add(values[i]);
+  }
+  void end_row();
+
+  /// Hands every finished row to the operating system.
+  void flush();
+
+  std::uint64_t rows() const { return rows_; }
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  void add_field(std::string_view text);
+
+  const std::filesystem::path path_;
+  int descriptor_ = -1;
+  std::string buffer_;
+  bool row_begun_ = false;
+  std::uint64_t rows_ = 0;
+};
+
+}  // namespace sls::record

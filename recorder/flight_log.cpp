@@ -1,0 +1,141 @@
+#include "recorder/flight_log.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <variant>
+
+#include "common/bus/convert.hpp"
+#include "common/bus/names.hpp"
+
+namespace sls::record {
+namespace {
+
+std::string format_errors(const ErrorStatistics& statistics) {
+  const Eigen::Vector3d rms = statistics.calc_rms();
+  return fmt::format("{:9.2e} {:9.2e} {:9.2e}  {:9.2e} {:9.2e} {:9.2e}  {:9.2e}", rms.x(), rms.y(),
+                     rms.z(), statistics.max_abs.x(), statistics.max_abs.y(),
+                     statistics.max_abs.z(), statistics.last.norm());
+}
+
+}  // namespace
+
+void ErrorStatistics::add(const Eigen::Vector3d& error) {
+  ++samples;
+  sum_of_squares += error.cwiseAbs2();
+  max_abs = max_abs.cwiseMax(error.cwiseAbs());
+  last = error;
+}
+
+Eigen::Vector3d ErrorStatistics::calc_rms() const {
+  if (samples == 0) return Eigen::Vector3d::Zero();
+  return (sum_of_squares / static_cast<double>(samples)).cwiseSqrt();
+}
+
+FlightLog::FlightLog(const config::Scenario& scenario, const Parameters& parameters)
+    : scenario_(scenario), parameters_(parameters) {}
+
+double FlightLog::to_time(std::uint64_t step) const {
+  return static_cast<double>(step) * static_cast<double>(parameters_.period_ns()) / 1e9;
+}
+
+FlightLog::Stage& FlightLog::find_or_begin_stage(const StepRecord& record) {
+  auto& stages = stages_[record.state->vehicle_id()];
+  const std::uint32_t index = record.reference->stage_index();
+  if (stages.empty() || stages.back().first != index) {
+    Stage stage;
+    stage.name = record.reference->stage_name().to_string();
+    stage.first_step = record.step;
+    stages.emplace_back(index, stage);
+  }
+  return stages.back().second;
+}
+
+/// A stage's last sample, at the end of its last lap, belongs to that lap.
+std::size_t FlightLog::calc_lap(const Stage& stage, std::size_t index, std::uint64_t step) const {
+  const auto& planned = scenario_.mission[index];
+  const auto& eight = std::get<config::FigureEightReference>(planned.reference);
+  const auto lap = static_cast<std::size_t>(to_time(step - stage.first_step) / eight.period_s);
+  const auto* timed = std::get_if<config::LeaveAfter>(&planned.leave);
+  if (!timed) return lap;
+  const auto laps = static_cast<std::size_t>(
+      static_cast<double>(timed->duration_ns) / 1e9 / eight.period_s + 1e-9);
+  return laps == 0 ? lap : std::min(lap, laps - 1);
+}
+
+void FlightLog::add(const StepRecord& record) {
+  if (!record.is_complete()) return;
+  Stage& stage = find_or_begin_stage(record);
+  stage.last_step = record.step;
+  const Eigen::Vector3d error =
+      bus::to_vector(record.state->p_WL_m()) - bus::to_vector(record.reference->position_m());
+  stage.all.add(error);
+  const std::size_t index = record.reference->stage_index();
+  if (index >= scenario_.mission.size() ||
+      !std::holds_alternative<config::FigureEightReference>(scenario_.mission[index].reference))
+    return;
+  const std::size_t lap = calc_lap(stage, index, record.step);
+  if (lap >= stage.laps.size()) stage.laps.resize(lap + 1);
+  stage.laps[lap].add(error);
+}
+
+void FlightLog::add(const SimStatus& status) {
+  const bool is_news = events_.empty() || status.phase() != last_status_.phase() ||
+                       status.reason() != last_status_.reason();
+  last_status_ = status;
+  if (is_news)
+    add_event(fmt::format("{}{}{}", bus::to_string(status.phase()),
+                          status.reason().size() > 0 ? ": " : "", status.reason().c_str()));
+}
+
+void FlightLog::add_event(const std::string& text) {
+  events_.push_back(fmt::format("step {} ({} s): {}", last_status_.step(),
+                                to_time(last_status_.step()), text));
+}
+
+void FlightLog::write(std::ostream& out) const {
+  out << fmt::format("{}: {}\n", scenario_.name, bus::to_string(last_status_.phase()));
+  out << fmt::format("run {:016x}, scenario SHA-256 {}\n\n", parameters_.run_id(),
+                     parameters_.scenario_sha256().c_str());
+  out << fmt::format(
+      "Parameters\n  quadrotor {} kg, load {} kg, rod {} m, gravity {} m/s²\n"
+      "  period {} s, step {} s, {}\n",
+      parameters_.quad_mass_kg(), parameters_.load_mass_kg(), parameters_.rod_length_m(),
+      parameters_.gravity_m_s2(), static_cast<double>(parameters_.period_ns()) / 1e9,
+      static_cast<double>(parameters_.step_ns()) / 1e9, bus::to_string(parameters_.mode()));
+  const double rate = last_status_.real_time_factor() * 1e9 /
+                      static_cast<double>(std::max<std::int64_t>(parameters_.period_ns(), 1));
+  out << fmt::format("  {} steps, {} s simulated, {:.0f} steps/s, {:.1f} × real time\n\n",
+                     last_status_.step(), to_time(last_status_.step()), rate,
+                     last_status_.real_time_factor());
+
+  for (const auto& [vehicle_id, stages] : stages_) {
+    out << fmt::format(
+        "Load position error, vehicle {} (m)\n"
+        "  {:<24} {:>9} {:>9}  {:>9} {:>9} {:>9}  {:>9} {:>9} {:>9}  {:>9}\n",
+        vehicle_id, "stage", "from s", "to s", "rms x", "rms y", "rms z", "max x", "max y", "max z",
+        "at end");
+    for (const auto& [index, stage] : stages) {
+      out << fmt::format("  {:<24} {:>9} {:>9}  {}\n", fmt::format("{} {}", index, stage.name),
+                         to_time(stage.first_step), to_time(stage.last_step),
+                         format_errors(stage.all));
+      for (std::size_t lap = 0; lap < stage.laps.size(); ++lap)
+        out << fmt::format("  {:<24} {:>9} {:>9}  {}\n", fmt::format("    lap {}", lap + 1), "", "",
+                           format_errors(stage.laps[lap]));
+    }
+    out << '\n';
+  }
+
+  const SyncCounters& counters = last_status_.counters();
+  out << fmt::format(
+      "Commands\n  states resent {}, duplicate {}, superseded {}, late {}, take-overs {}\n"
+      "  rejected: not finite {}, force limit {}, run {}, step {}, vehicle {}, client {}, fault {}\n",
+      counters.resent(), counters.duplicate(), counters.superseded(), counters.late(),
+      counters.take_overs(), counters.rejected_not_finite(), counters.rejected_force_limit(),
+      counters.rejected_run(), counters.rejected_step(), counters.rejected_vehicle(),
+      counters.rejected_client(), counters.rejected_fault());
+  out << "\nEvents\n";
+  for (const auto& event : events_) out << "  " << event << '\n';
+}
+
+}  // namespace sls::record

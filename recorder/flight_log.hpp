@@ -1,0 +1,60 @@
+/// The flight for people: stages, tracking errors and events, collected while recording.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <map>
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include "common/bus/topics.hpp"
+#include "common/config/scenario.hpp"
+#include "recorder/step_join.hpp"
+
+namespace sls::record {
+
+/// Load position error over a stretch of a flight, per axis, m.
+struct ErrorStatistics {
+  std::uint64_t samples = 0;
+  Eigen::Vector3d sum_of_squares = Eigen::Vector3d::Zero();
+  Eigen::Vector3d max_abs = Eigen::Vector3d::Zero();
+  Eigen::Vector3d last = Eigen::Vector3d::Zero();
+
+  void add(const Eigen::Vector3d& error);
+  Eigen::Vector3d calc_rms() const;
+};
+
+class FlightLog {
+ public:
+  FlightLog(const config::Scenario& scenario, const Parameters& parameters);
+
+  /// Adds a complete step; the others say nothing about errors.
+  void add(const StepRecord& record);
+  void add(const SimStatus& status);
+  /// A line of the recorder's own, such as what is missing.
+  void add_event(const std::string& text);
+
+  void write(std::ostream& out) const;
+
+ private:
+  struct Stage {
+    std::string name;
+    std::uint64_t first_step = 0;
+    std::uint64_t last_step = 0;
+    ErrorStatistics all;
+    std::vector<ErrorStatistics> laps;  // of a figure eight
+  };
+
+  Stage& find_or_begin_stage(const StepRecord& record);
+  std::size_t calc_lap(const Stage& stage, std::size_t index, std::uint64_t step) const;
+  double to_time(std::uint64_t step) const;
+
+  const config::Scenario scenario_;
+  const Parameters parameters_;
+  std::map<std::uint32_t, std::vector<std::pair<std::uint32_t, Stage>>> stages_;  // by vehicle
+  std::vector<std::string> events_;
+  SimStatus last_status_;
+};
+
+}  // namespace sls::record

@@ -1,0 +1,59 @@
+#include "recorder/recording_folder.hpp"
+
+#include <unistd.h>
+
+#include <array>
+#include <string>
+#include <string_view>
+#include <system_error>
+
+#include "common/config/config_error.hpp"
+
+namespace sls::record {
+namespace {
+
+namespace fs = std::filesystem;
+using config::ConfigError;
+
+constexpr std::array<std::string_view, 9> kRecordingFiles = {
+    "state.csv",  "command.csv",   "reference.csv", "status.csv",        "flight.csv",
+    "flight.txt", "scenario.yaml", "manifest.json", "manifest.json.part"};
+
+bool is_recording_file(const fs::path& file) {
+  for (const auto name : kRecordingFiles)
+    if (file.filename() == name) return true;
+  return false;
+}
+
+}  // namespace
+
+void prepare_recording_folder(const fs::path& folder, bool force) {
+  const std::string place = "--out " + folder.string();
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (!fs::is_directory(folder))
+    throw ConfigError(place + ": expected a folder, or a place for a new one, got: " +
+                      (fs::exists(folder) ? "a file" : error.message()));
+  if (::access(folder.c_str(), W_OK | X_OK) != 0)
+    throw ConfigError(place + ": expected a folder that can be written, got: " +
+                      std::generic_category().message(errno));
+
+  fs::directory_iterator entries(folder, error);
+  if (error) throw ConfigError(place + ": expected a readable folder, got: " + error.message());
+  for (const auto& entry : entries) {
+    if (!force)
+      throw ConfigError(place + ": expected an empty folder, got one with '" +
+                        entry.path().filename().string() + "' in it (--force replaces a recording)");
+    if (!is_recording_file(entry.path()))
+      throw ConfigError(place + ": expected nothing but an earlier recording, got '" +
+                        entry.path().filename().string() + "', which --force does not remove");
+  }
+  for (const auto name : kRecordingFiles) {
+    fs::remove(folder / name, error);
+    if (error)
+      throw ConfigError(place + ": expected to replace '" + std::string(name) +
+                        "', got: " + error.message());
+  }
+}
+
+}  // namespace sls::record

@@ -1,0 +1,233 @@
+#include "sim_server/command_gate.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/bus/names.hpp"
+
+namespace sls::sim {
+namespace {
+
+constexpr std::size_t kRememberedAnswers = 64;  // copies older than that are rejected as wrong steps
+
+bool is_finite(const ControlCommand& command) {
+  const auto all_finite = [](const std::array<double, 3>& vector) {
+    return std::all_of(vector.begin(), vector.end(), [](double x) { return std::isfinite(x); });
+  };
+  return all_finite(command.f_Q_W_n()) && all_finite(command.controller().integral_m_s());
+}
+
+double calc_norm(const std::array<double, 3>& vector) {
+  return std::hypot(vector[0], vector[1], vector[2]);
+}
+
+/// Strongest first; equal strengths in an order that does not depend on who arrived first.
+bool is_stronger(const ReadyClient& a, const ReadyClient& b) {
+  if (a.strength != b.strength) return a.strength > b.strength;
+  if (a.name != b.name) return a.name < b.name;
+  return a.peer < b.peer;
+}
+
+}  // namespace
+
+const char* to_string(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::kAccepted:
+    case Verdict::kHeld:
+    case Verdict::kDuplicate:
+    case Verdict::kSuperseded:
+      return "";
+    case Verdict::kNotFinite:
+      return "a number that is not finite";
+    case Verdict::kForceLimit:
+      return "a force beyond controller.force_limit_n";
+    case Verdict::kOtherRun:
+      return "another run_id";
+    case Verdict::kWrongStep:
+      return "a step that is not awaited";
+    case Verdict::kUnknownVehicle:
+      return "a vehicle_id of no vehicle here";
+    case Verdict::kUnknownClient:
+      return "a sender that is not announced as a ready controller";
+    case Verdict::kFault:
+      return "a fault";
+  }
+  return "";
+}
+
+CommandGate::CommandGate(std::uint64_t run_id, std::uint32_t vehicle_id, double force_limit_n)
+    : run_id_(run_id), vehicle_id_(vehicle_id), force_limit_n_(force_limit_n) {}
+
+void CommandGate::set_clients(const std::vector<ReadyClient>& clients) {
+  std::vector<Client> updated;
+  for (const ReadyClient& identity : clients) {
+    Client client;
+    if (const Client* known = find_client(identity.peer)) client = *known;
+    client.identity = identity;
+    updated.push_back(std::move(client));
+  }
+  std::sort(updated.begin(), updated.end(), [](const Client& a, const Client& b) {
+    return is_stronger(a.identity, b.identity);
+  });
+  clients_ = std::move(updated);
+  settle();
+}
+
+void CommandGate::expect(std::uint64_t step) {
+  if (accepted_) {
+    past_[step_] = {accepted_from_, accepted_->f_Q_W_n()};
+    while (past_.size() > kRememberedAnswers) past_.erase(past_.begin());
+  }
+  step_ = step;
+  accepted_.reset();
+  for (Client& client : clients_) {
+    client.refusal.clear();
+    client.held.reset();
+  }
+}
+
+Verdict CommandGate::offer(const ControlCommand& command, const bus::PeerId& sender) {
+  const Verdict verdict = judge(command, sender);
+  count(verdict);
+  return verdict;
+}
+
+Verdict CommandGate::judge(const ControlCommand& command, const bus::PeerId& sender) {
+  if (command.run_id() != run_id_) return Verdict::kOtherRun;
+  if (command.vehicle_id() != vehicle_id_) return Verdict::kUnknownVehicle;
+
+  Verdict defect = Verdict::kAccepted;
+  if (!is_finite(command))
+    defect = Verdict::kNotFinite;
+  else if (calc_norm(command.f_Q_W_n()) > force_limit_n_)
+    defect = Verdict::kForceLimit;
+  else if (command.fault() != FAULT_NONE || command.mission() == MISSION_FAILED)
+    defect = Verdict::kFault;
+
+  Client* client = find_client(sender);
+  if (command.step() != step_)
+    return defect != Verdict::kAccepted ? defect : judge_past(command, sender);
+  if (defect != Verdict::kAccepted) {
+    if (client && !accepted_) {
+      client->refusal = fmt::format("controller '{}' answered step {} with {}",
+                                    client->identity.name, step_, to_string(defect));
+      if (defect == Verdict::kForceLimit)
+        client->refusal += fmt::format(": {:.6g} N > {:.6g} N", calc_norm(command.f_Q_W_n()),
+                                       force_limit_n_);
+      if (defect == Verdict::kFault)
+        client->refusal += fmt::format(": {}", bus::to_string(command.fault()));
+      settle();
+    }
+    return defect;
+  }
+  if (!client) return Verdict::kUnknownClient;
+  if (accepted_)
+    return accepted_from_ == sender && accepted_->f_Q_W_n() == command.f_Q_W_n()
+               ? Verdict::kDuplicate
+               : Verdict::kSuperseded;
+  client->silent = false;
+  client->held = command;
+  settle();
+  return accepted_ && accepted_from_ == sender ? Verdict::kAccepted : Verdict::kHeld;
+}
+
+Verdict CommandGate::judge_past(const ControlCommand& command, const bus::PeerId& sender) const {
+  const auto past = past_.find(command.step());
+  if (past == past_.end()) return Verdict::kWrongStep;
+  if (past->second.sender == sender)
+    return past->second.force == command.f_Q_W_n() ? Verdict::kDuplicate : Verdict::kWrongStep;
+  const bool is_client = std::any_of(clients_.begin(), clients_.end(), [&](const Client& client) {
+    return client.identity.peer == sender;
+  });
+  return is_client ? Verdict::kSuperseded : Verdict::kWrongStep;
+}
+
+void CommandGate::settle() {
+  if (accepted_) return;
+  const Client* awaited = find_awaited();
+  if (!awaited || !awaited->held) return;
+  accepted_ = awaited->held;
+  accepted_from_ = awaited->identity.peer;
+  for (const Client& client : clients_)
+    if (&client != awaited && client.held) count(Verdict::kSuperseded);
+}
+
+const CommandGate::Client* CommandGate::find_awaited() const {
+  const Client* silent = nullptr;
+  for (const Client& client : clients_) {
+    if (!client.refusal.empty()) continue;
+    if (!client.silent) return &client;
+    if (!silent) silent = &client;
+  }
+  return silent;  // all are silent: the strongest may still come back
+}
+
+std::optional<ReadyClient> CommandGate::awaited_client() const {
+  const Client* awaited = find_awaited();
+  return awaited ? std::optional(awaited->identity) : std::nullopt;
+}
+
+bool CommandGate::pass_over_silent_client() {
+  const Client* awaited = find_awaited();
+  if (!awaited || accepted_) return false;
+  const bool has_next = std::any_of(clients_.begin(), clients_.end(), [&](const Client& client) {
+    return &client != awaited && !client.silent && client.refusal.empty();
+  });
+  if (!has_next) return false;
+  find_client(awaited->identity.peer)->silent = true;
+  ++counters_.take_overs();
+  settle();
+  return true;
+}
+
+std::optional<std::string> CommandGate::refusal() const {
+  if (accepted_ || clients_.empty()) return std::nullopt;
+  for (const Client& client : clients_)
+    if (client.refusal.empty()) return std::nullopt;
+  return clients_.back().refusal;
+}
+
+CommandGate::Client* CommandGate::find_client(const bus::PeerId& peer) {
+  for (Client& client : clients_)
+    if (client.identity.peer == peer) return &client;
+  return nullptr;
+}
+
+void CommandGate::count(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::kAccepted:
+    case Verdict::kHeld:
+      return;
+    case Verdict::kDuplicate:
+      ++counters_.duplicate();
+      return;
+    case Verdict::kSuperseded:
+      ++counters_.superseded();
+      return;
+    case Verdict::kNotFinite:
+      ++counters_.rejected_not_finite();
+      return;
+    case Verdict::kForceLimit:
+      ++counters_.rejected_force_limit();
+      return;
+    case Verdict::kOtherRun:
+      ++counters_.rejected_run();
+      return;
+    case Verdict::kWrongStep:
+      ++counters_.rejected_step();
+      return;
+    case Verdict::kUnknownVehicle:
+      ++counters_.rejected_vehicle();
+      return;
+    case Verdict::kUnknownClient:
+      ++counters_.rejected_client();
+      return;
+    case Verdict::kFault:
+      ++counters_.rejected_fault();
+      return;
+  }
+}
+
+}  // namespace sls::sim

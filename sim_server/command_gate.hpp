@@ -1,0 +1,101 @@
+/// Decides what becomes of every command: the one that flies, or why not. No network here.
+/// Rules: design of the synchroniser in README.md.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/bus/peer.hpp"
+#include "sls.h"
+
+namespace sls::sim {
+
+enum class Verdict {
+  kAccepted,   ///< the answer to the awaited step; it will be applied
+  kHeld,       ///< a valid answer of a client that is not the awaited one: kept for a take-over
+  kDuplicate,  ///< copy of an accepted command
+  kSuperseded,  ///< valid, but a stronger client's answer was taken
+  kNotFinite,
+  kForceLimit,
+  kOtherRun,
+  kWrongStep,
+  kUnknownVehicle,
+  kUnknownClient,
+  kFault,
+};
+
+/// For messages: what is wrong with a rejected command. Empty for the first four verdicts.
+const char* to_string(Verdict verdict);
+
+/// A client that announced itself ready to fly the vehicle.
+struct ReadyClient {
+  bus::PeerId peer;
+  std::string name;
+  std::int32_t strength = 0;
+};
+
+class CommandGate {
+ public:
+  CommandGate(std::uint64_t run_id, std::uint32_t vehicle_id, double force_limit_n);
+
+  /// Puts the clients that may answer in force; what is known of those that stay is kept.
+  void set_clients(const std::vector<ReadyClient>& clients);
+
+  /// Awaits the answers to `step` from now on. Steps are awaited in order.
+  void expect(std::uint64_t step);
+
+  /// Judges one command and counts it.
+  Verdict offer(const ControlCommand& command, const bus::PeerId& sender);
+
+  /// The accepted answer to the awaited step, once there is one.
+  const std::optional<ControlCommand>& accepted() const { return accepted_; }
+
+  /// The client whose answer is awaited: the strongest that is neither silent nor refused.
+  std::optional<ReadyClient> awaited_client() const;
+
+  /// Declares the awaited client silent and awaits the next one's answer, if there is a next one
+  /// (true). It is skipped until it answers an awaited step again.
+  bool pass_over_silent_client();
+
+  /// Why no client is left to answer the awaited step: what the last one sent. Nothing while an
+  /// answer can still come.
+  std::optional<std::string> refusal() const;
+
+  const SyncCounters& counters() const { return counters_; }
+  SyncCounters& counters() { return counters_; }
+
+ private:
+  struct Client {
+    ReadyClient identity;
+    bool silent = false;
+    std::string refusal;                 // why its answer to the awaited step was refused
+    std::optional<ControlCommand> held;  // its valid answer to the awaited step
+  };
+
+  Verdict judge(const ControlCommand& command, const bus::PeerId& sender);
+  Verdict judge_past(const ControlCommand& command, const bus::PeerId& sender) const;
+  void count(Verdict verdict);
+  void settle();
+  Client* find_client(const bus::PeerId& peer);
+  const Client* find_awaited() const;
+
+  const std::uint64_t run_id_;
+  const std::uint32_t vehicle_id_;
+  const double force_limit_n_;
+
+  std::uint64_t step_ = 0;
+  std::vector<Client> clients_;  // strongest first
+  std::optional<ControlCommand> accepted_;
+  bus::PeerId accepted_from_;
+  struct Past {
+    bus::PeerId sender;
+    std::array<double, 3> force;
+  };
+  std::map<std::uint64_t, Past> past_;  // the last accepted answers, to tell copies from others
+  SyncCounters counters_;
+};
+
+}  // namespace sls::sim

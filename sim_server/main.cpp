@@ -1,0 +1,34 @@
+#include "common/app/run_main.hpp"
+#include "common/bus/node.hpp"
+#include "common/config/scenario.hpp"
+#include "sim_server/server.hpp"
+
+int main(int argc, char** argv) {
+  using namespace sls;
+  CLI::App cli("Integrates the plant of a scenario and serves its state on DDS topics.");
+  app::CommonOptions options;
+  options.qos_file = bus::default_qos_file();
+  std::filesystem::path scenario_file;
+  std::optional<double> period_s;
+  std::string mode;
+  app::add_common_options(cli, options);
+  cli.add_option("--scenario", scenario_file, "scenario (YAML)")->type_name("FILE")->required();
+  cli.add_option("--period-s", period_s, "control period in force; default: the scenario's")
+      ->type_name("X");
+  cli.add_option("--mode", mode, "synchronisation in force; default: the scenario's")
+      ->type_name("MODE")
+      ->check(CLI::IsMember({"lockstep", "realtime"}));
+
+  return app::run_main(argc, argv, cli, options, "sim_server", [&] {
+    config::Scenario scenario = config::load_scenario(scenario_file);
+    if (period_s) config::override_period(scenario, *period_s);
+    if (!mode.empty())
+      scenario.sync.mode =
+          mode == "lockstep" ? config::SyncMode::kLockstep : config::SyncMode::kRealtime;
+    if (scenario.sync.mode != config::SyncMode::kLockstep)
+      throw config::ConfigError(
+          "sync.mode: expected lockstep, got realtime: this version flies in lockstep only");
+    bus::Node node(options.qos_file, options.domain, "sim_server");
+    sim::Server(node, scenario).run();
+  });
+}

@@ -1,0 +1,87 @@
+#include "sim_server/roster.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+
+namespace sls::sim {
+namespace {
+
+using Entry = bus::ParticipantDirectory::Entry;
+
+std::string describe(const Entry& entry) {
+  return fmt::format("'{}' on {}", entry.announcement.name().c_str(),
+                     entry.announcement.host().c_str());
+}
+
+/// "controller", "2 controllers (1 ready; 'client' on host: not ready)" …
+std::string name_missing_role(const char* role, int expected, int ready,
+                              const std::string& details) {
+  std::string text = expected == 1 ? role : fmt::format("{} {}s ({} ready)", expected, role, ready);
+  return details.empty() ? text : text + " [" + details + "]";
+}
+
+void append(std::string& list, const std::string& item) {
+  if (!list.empty()) list += ", ";
+  list += item;
+}
+
+}  // namespace
+
+std::vector<ReadyClient> find_ready_clients(const Roster& roster,
+                                            const std::string& scenario_sha256) {
+  std::vector<ReadyClient> clients;
+  for (const Entry& entry : roster.controllers)
+    if (entry.announcement.ready() && entry.announcement.scenario_sha256() == scenario_sha256)
+      clients.push_back({entry.peer, entry.announcement.name().to_string(),
+                         entry.announcement.strength()});
+  return clients;
+}
+
+std::string name_missing(const Roster& roster, const config::WaitFor& expected,
+                         const std::string& scenario_sha256) {
+  std::string missing;
+  const int controllers = static_cast<int>(find_ready_clients(roster, scenario_sha256).size());
+  if (controllers < expected.controllers) {
+    std::string details;
+    for (const Entry& entry : roster.controllers) {
+      if (!(entry.announcement.scenario_sha256() == scenario_sha256))
+        append(details, describe(entry) + " has another scenario");
+      else if (!entry.announcement.ready())
+        append(details, describe(entry) + " is not ready");
+    }
+    append(missing, name_missing_role("controller", expected.controllers, controllers, details));
+  }
+  int recorders = 0;
+  std::string details;
+  for (const Entry& entry : roster.recorders) {
+    if (entry.announcement.ready())
+      ++recorders;
+    else
+      append(details, describe(entry) + " is not ready");
+  }
+  if (recorders < expected.recorders)
+    append(missing, name_missing_role("recorder", expected.recorders, recorders, details));
+  return missing;
+}
+
+std::string name_blocking_recorder(const Roster& roster, int expected, std::uint64_t step) {
+  int ready = 0;
+  for (const Entry& entry : roster.recorders) {
+    if (!entry.announcement.ready()) continue;
+    ++ready;
+    const std::int64_t behind =
+        static_cast<std::int64_t>(step) - 1 - entry.announcement.last_complete_step();
+    if (behind >= kRecorderWindow)
+      return fmt::format("recorder {}: {} steps behind", describe(entry), behind);
+  }
+  return ready < expected ? fmt::format("recorder: {} expected, {} there", expected, ready)
+                          : std::string();
+}
+
+bool are_recorders_done(const Roster& roster) {
+  return std::all_of(roster.recorders.begin(), roster.recorders.end(),
+                     [](const Entry& entry) { return entry.announcement.done(); });
+}
+
+}  // namespace sls::sim

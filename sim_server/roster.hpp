@@ -1,0 +1,40 @@
+/// Who takes part in a run: whom step 0 waits for, whom a step waits for, and how to name them.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/bus/participants.hpp"
+#include "common/config/scenario.hpp"
+#include "sim_server/command_gate.hpp"
+
+namespace sls::sim {
+
+/// The participants of one run at one moment.
+struct Roster {
+  std::vector<bus::ParticipantDirectory::Entry> controllers;
+  std::vector<bus::ParticipantDirectory::Entry> recorders;
+};
+
+/// Controllers that are ready and use the run's scenario, as the command gate wants them.
+std::vector<ReadyClient> find_ready_clients(const Roster& roster,
+                                            const std::string& scenario_sha256);
+
+/// Whom the start still waits for, in words; empty when all expected are ready.
+std::string name_missing(const Roster& roster, const config::WaitFor& expected,
+                         const std::string& scenario_sha256);
+
+/// How far the slowest recorder may be behind the server, in steps. Below the writers' history, so
+/// that nothing can overrun it.
+inline constexpr std::int64_t kRecorderWindow = 2000;
+
+/// Which recorder keeps the server from publishing `step`, in words; empty when none does: fewer
+/// than `expected` are there, or one is more than the window behind.
+std::string name_blocking_recorder(const Roster& roster, int expected, std::uint64_t step);
+
+/// True when every recorder that is there says it is done.
+bool are_recorders_done(const Roster& roster);
+
+}  // namespace sls::sim

@@ -1,0 +1,155 @@
+// Every mistake gives one line with place, key, expectation and what was found.
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <fstream>
+
+#include "tests/common/config/support.hpp"
+
+namespace sls::config::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The message of the ConfigError that loading `file` gives, or "no error".
+std::string find_load_error(const fs::path& file) {
+  try {
+    load_scenario(file);
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+/// A folder of its own for each test, gone afterwards.
+class UnusableFileTest : public testing::Test {
+ protected:
+  UnusableFileTest() {
+    std::string pattern = (fs::temp_directory_path() / "sls-config-XXXXXX").string();
+    if (mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("mkdtemp failed");
+    folder_ = pattern;
+  }
+  ~UnusableFileTest() override {
+    std::error_code ignored;
+    fs::remove_all(folder_, ignored);
+  }
+
+  fs::path write(const std::string& text) const {
+    const fs::path file = folder_ / "scenario.yaml";
+    std::ofstream(file, std::ios::binary) << text;
+    return file;
+  }
+
+  fs::path folder_;
+};
+
+TEST(InvalidScenariosTest, EachFileGivesTheMessageOnItsFirstLine) {
+  const auto files = list_yaml_files("config/invalid");
+  EXPECT_GT(files.size(), 100u);
+  for (const fs::path& file : files) {
+    const std::string text = read_text(file), mark = "# expect: ";
+    ASSERT_EQ(text.compare(0, mark.size(), mark), 0) << file;
+    const auto end_of_line = text.find('\n');
+    const std::string message = text.substr(mark.size(), end_of_line - mark.size());
+    EXPECT_EQ(find_load_error(file), file.string() + ":" + message);
+  }
+}
+
+TEST_F(UnusableFileTest, MissingFile) {
+  const fs::path file = folder_ / "nothing.yaml";
+  EXPECT_EQ(find_load_error(file),
+            file.string() + ": expected a scenario file, got none (No such file or directory)");
+}
+
+TEST_F(UnusableFileTest, DirectoryInsteadOfFile) {
+  EXPECT_EQ(find_load_error(folder_),
+            folder_.string() + ": expected a scenario file, got a directory");
+}
+
+TEST_F(UnusableFileTest, PipeInsteadOfFile) {
+  const fs::path pipe = folder_ / "pipe";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_EQ(find_load_error(pipe),
+            pipe.string() + ": expected a scenario file, got a pipe, socket or device");
+}
+
+TEST_F(UnusableFileTest, EmptyFile) {
+  const fs::path file = write("");
+  EXPECT_EQ(find_load_error(file), file.string() + ": expected a scenario file, got an empty file");
+}
+
+TEST_F(UnusableFileTest, HundredMegabytes) {
+  const fs::path file = write(kMinimalScenario);
+  fs::resize_file(file, 100'000'000);
+  EXPECT_EQ(find_load_error(file), file.string() + ": expected at most 32768 bytes, got 100000000");
+}
+
+TEST_F(UnusableFileTest, OneByteTooManyAndTheLongestThatFits) {
+  const std::string comment(kMaxScenarioBytes - std::string(kMinimalScenario).size(), '#');
+  EXPECT_EQ(find_load_error(write(kMinimalScenario + comment)), "no error");
+  const fs::path file = write(kMinimalScenario + comment + "#");
+  EXPECT_EQ(find_load_error(file), file.string() + ": expected at most 32768 bytes, got 32769");
+}
+
+TEST_F(UnusableFileTest, UnreadableFile) {
+  const fs::path file = write(kMinimalScenario);
+  ASSERT_EQ(chmod(file.c_str(), 0), 0);
+  ASSERT_EQ(chmod(folder_.c_str(), 0755), 0);
+  const bool is_root = geteuid() == 0;
+  constexpr uid_t kNobody = 65534;  // root could read the file all the same
+  if (is_root) {
+    ASSERT_EQ(seteuid(kNobody), 0);
+  }
+  const std::string message = find_load_error(file);
+  if (is_root) {
+    ASSERT_EQ(seteuid(0), 0);
+  }
+  EXPECT_EQ(message, file.string() + ": expected a readable file, got Permission denied");
+}
+
+TEST(InvalidTextTest, NamesTheSenderWhereTextCameOverTheWire) {
+  const std::string text(kMaxScenarioBytes + 1, '#');
+  EXPECT_EQ(find_error(text), "file: expected at most 32768 bytes, got 32769");
+  EXPECT_EQ(find_error(""), "file:1: expected a map, got nothing");
+}
+
+TEST(InvalidTextTest, LineIsTheOneOfTheMistakeAlsoInMapsOverSeveralLines) {
+  const std::string text =
+      replace_once(kMinimalScenario, "  initial: { load_position_m: [0, 0, -0.5] }",
+                   "  initial:\n    load_position_m:\n      - 0\n      - x\n      - 0");
+  EXPECT_EQ(find_error(text),
+            "file:11: plant.initial.load_position_m[1]: expected a number, got x");
+}
+
+TEST(InvalidTextTest, LineIsRightWithCarriageReturns) {
+  std::string text = replace_once(kMinimalScenario, "0.2", "-0.2");
+  for (std::size_t at = 0; (at = text.find('\n', at)) != text.npos; at += 2) text.insert(at, "\r");
+  EXPECT_EQ(find_error(text), "file:4: vehicle.load_mass_kg: expected > 0, got -0.2");
+}
+
+TEST(InvalidTextTest, UnknownKeyComesBeforeMistakesInsideOtherKeys) {
+  const std::string text = replace_once(kMinimalScenario, "mission:", "misson:");
+  EXPECT_EQ(find_error(replace_once(text, "1.5", "-1.5")),
+            "file:9: misson: unknown key; did you mean 'mission'?");
+}
+
+TEST(InvalidTextTest, MoreThanThousandStagesAreRefused) {
+  std::string text = replace_once(kMinimalScenario, "mission:", "record: {}\nmission: [");
+  text.resize(text.find('[') + 1);
+  for (int i = 0; i <= 1000; ++i) text += "{},";
+  EXPECT_EQ(find_error(text + "]"),
+            "file:10: mission: expected a list of 1 to 1000 stages, got a list of 1001");
+}
+
+TEST(InvalidTextTest, EndlessNestingEndsInAnErrorAndNotInAnOverflow) {
+  for (const std::string opening :
+       {"[", "{", "- ", "? ", "{a: ", "[{", "&a [", "!a [", "'", "\""}) {
+    std::string text;
+    while (text.size() + opening.size() <= kMaxScenarioBytes) text += opening;
+    EXPECT_EQ(find_error(text).rfind("file:", 0), 0u) << opening;
+  }
+}
+
+}  // namespace
+}  // namespace sls::config::test

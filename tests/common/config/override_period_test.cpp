@@ -1,0 +1,67 @@
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "tests/common/config/support.hpp"
+
+namespace sls::config::test {
+namespace {
+
+/// 4 ms period, 1 ms step, one stage of 2 s.
+Scenario make_scenario() { return parse_scenario(kMinimalScenario, "file"); }
+
+std::string find_override_error(double period_s) {
+  Scenario scenario = make_scenario();
+  try {
+    override_period(scenario, period_s);
+  } catch (const ConfigError& error) {
+    EXPECT_TRUE(are_equal(scenario, make_scenario())) << "changed in spite of the error";
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(OverridePeriodTest, LongerPeriodKeepsTheStep) {
+  Scenario scenario = make_scenario();
+  override_period(scenario, 0.008);
+  EXPECT_EQ(scenario.sync.period_ns, 8'000'000);
+  EXPECT_EQ(scenario.plant.step_ns, 1'000'000);
+}
+
+TEST(OverridePeriodTest, PeriodBelowTheStepBecomesTheStep) {
+  Scenario scenario = make_scenario();
+  override_period(scenario, 0.0005);
+  EXPECT_EQ(scenario.sync.period_ns, 500'000);
+  EXPECT_EQ(scenario.plant.step_ns, 500'000);
+}
+
+TEST(OverridePeriodTest, ChangesNothingElse) {
+  Scenario scenario = make_scenario();
+  override_period(scenario, 0.001);
+  EXPECT_EQ(scenario.text, make_scenario().text);
+  EXPECT_EQ(scenario.sha256, make_scenario().sha256);
+  scenario.sync.period_ns = 4'000'000;
+  EXPECT_TRUE(are_equal(scenario, make_scenario()));
+}
+
+TEST(OverridePeriodTest, ImpossiblePeriodsNameTheFlag) {
+  EXPECT_EQ(find_override_error(0.0), "--period-s: expected > 0, got 0");
+  EXPECT_EQ(find_override_error(-0.004), "--period-s: expected > 0, got -0.004");
+  EXPECT_EQ(find_override_error(1e-10),
+            "--period-s: expected a whole number of nanoseconds, got 1.0e-10");
+  EXPECT_EQ(find_override_error(1e9), "--period-s: expected at most 1000000 s, got 1000000000");
+  EXPECT_EQ(find_override_error(std::numeric_limits<double>::quiet_NaN()),
+            "--period-s: expected > 0, got nan");
+  EXPECT_EQ(find_override_error(std::numeric_limits<double>::infinity()),
+            "--period-s: expected at most 1000000 s, got inf");
+}
+
+TEST(OverridePeriodTest, PeriodMustFitStepAndStages) {
+  EXPECT_EQ(find_override_error(0.0025),
+            "--period-s: expected a multiple of plant.step_s (0.001), got 0.0025");
+  EXPECT_EQ(find_override_error(0.003),
+            "--period-s: expected a divisor of mission[0].for_s (2), got 0.003");
+}
+
+}  // namespace
+}  // namespace sls::config::test

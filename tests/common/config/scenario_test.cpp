@@ -1,0 +1,206 @@
+// What a file says and what it leaves out.
+#include "common/config/scenario.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/common/config/support.hpp"
+
+namespace sls::config::test {
+namespace {
+
+using Eigen::Vector3d;
+
+// The example of the project's design, section 7, as it stands there.
+constexpr const char* kDesignExample = R"(name: figure_eight
+vehicle: { quad_mass_kg: 1.5, load_mass_kg: 0.2, rod_length_m: 1.0, gravity_m_s2: 9.8 }
+plant:
+  pendulum: ideal                       # or rigid
+  step_s: 0.001
+  initial: { load_position_m: [0, 0, -0.5] }     # or quad_position_m; angles and velocities default to rest
+sync: { mode: lockstep, period_s: 0.004, wait_for: { controllers: 1, recorders: 1, timeout_s: 30 } }
+controller:
+  gains: { lqr: { horizontal: 10, vertical: 5 } }   # or horizontal: { position, velocity, acceleration, jerk, integral }, vertical: …
+  force_limit_n: 200                    # the first step of matlab_setpoint_3 needs 116 N
+  model: {}                             # what the controller believes, where it differs from vehicle
+mission:
+  - figure_eight: { amplitude_m: [1.5, 0.75, 0.5], offset_m: [0, 0, -0.5], period_s: 16 }
+    for_s: 32
+)";
+
+// Every key with a value that is not its default.
+constexpr const char* kEveryKey = R"(
+name: every_key
+vehicle: { quad_mass_kg: 1.6, load_mass_kg: 0.16, rod_length_m: 0.7, gravity_m_s2: 10 }
+plant:
+  pendulum: ideal
+  step_s: 0.0005
+  initial:
+    quad_position_m: [1, 2, -4]
+    quad_velocity_m_s: [0.1, 0.2, 0.3]
+    alpha_rad: 0.4
+    beta_rad: -0.5
+    alpha_dot_rad_s: 0.6
+    beta_dot_rad_s: -0.7
+  rotor_drag_n_s_m: 0.3
+  wind_m_s: [2, -1, 0.5]
+  disturbance_n: [0.1, 0, -0.1]
+sync:
+  mode: realtime
+  period_s: 0.002
+  real_time_factor: 2.5
+  take_over_s: 0.25
+  wait_for: { controllers: 2, recorders: 0, timeout_s: 7.5 }
+controller:
+  law: qsf
+  gains:
+    horizontal: { position: 1, velocity: 2, acceleration: 3, jerk: 4, integral: 5 }
+    vertical: { position: 6, velocity: 7, integral: 8 }
+  force_limit_n: 50
+  saturate: true
+  drag_feed_forward: true
+  state_wiring: gazebo_plugin
+  model:
+    { quad_mass_kg: 1.7, load_mass_kg: 0.17, rod_length_m: 0.8, gravity_m_s2: 9.9,
+      rotor_drag_n_s_m: 0.4, wind_m_s: [3, -2, 1] }
+mission:
+  - hold: { position_m: [0, 0, -1] }
+    for_s: 1
+    name: first
+  - set_point: { position_m: [1, 0, -1] }
+    until: { within_m: 0.3, after_s: 4, of: quadrotor, offset_m: [0, 0, -0.95], timeout_s: 9 }
+  - figure_eight: { amplitude_m: [1, 2, 3], offset_m: [4, 5, 6], period_s: 12 }
+    until: { within_m: 0.4, after_s: 5 }
+  - rest_to_rest: { from_m: [1, 1, 1], to_m: [2, 2, 2], duration_s: 3 }
+    for_s: 4
+record: { flush_s: 0.05 }
+)";
+
+TEST(ScenarioTest, ReadsTheExampleOfTheDesign) {
+  const Scenario scenario = parse_scenario(kDesignExample, "file");
+  EXPECT_EQ(scenario.name, "figure_eight");
+  EXPECT_EQ(scenario.vehicle, (model::SlungLoadParameters{1.5, 0.2, 1.0, 9.8}));
+  EXPECT_EQ(scenario.controller.model.vehicle, scenario.vehicle);
+  EXPECT_EQ(scenario.plant.initial.placed, Body::kLoad);
+  EXPECT_EQ(scenario.plant.initial.position, Vector3d(0, 0, -0.5));
+  EXPECT_EQ(scenario.text, kDesignExample);
+}
+
+TEST(ScenarioTest, ReadsEveryKeyOfThePlant) {
+  const Scenario scenario = parse_scenario(kEveryKey, "file");
+  EXPECT_EQ(scenario.name, "every_key");
+  EXPECT_EQ(scenario.vehicle, (model::SlungLoadParameters{1.6, 0.16, 0.7, 10.0}));
+  const Plant& plant = scenario.plant;
+  EXPECT_EQ(plant.pendulum, Pendulum::kIdeal);
+  EXPECT_EQ(plant.step_ns, 500'000);
+  EXPECT_EQ(plant.initial.placed, Body::kQuadrotor);
+  EXPECT_EQ(plant.initial.position, Vector3d(1, 2, -4));
+  EXPECT_EQ(plant.initial.v_WQ, Vector3d(0.1, 0.2, 0.3));
+  EXPECT_EQ(plant.initial.rod.alpha, 0.4);
+  EXPECT_EQ(plant.initial.rod.beta, -0.5);
+  EXPECT_EQ(plant.initial.rod.alpha_dot, 0.6);
+  EXPECT_EQ(plant.initial.rod.beta_dot, -0.7);
+  EXPECT_EQ(plant.air, (model::Aerodynamics{0.3, Vector3d(2, -1, 0.5)}));
+  EXPECT_EQ(plant.disturbance_W, Vector3d(0.1, 0, -0.1));
+}
+
+TEST(ScenarioTest, ReadsEveryKeyOfSyncAndRecord) {
+  const Scenario scenario = parse_scenario(kEveryKey, "file");
+  EXPECT_EQ(scenario.sync.mode, SyncMode::kRealtime);
+  EXPECT_EQ(scenario.sync.period_ns, 2'000'000);
+  EXPECT_EQ(scenario.sync.real_time_factor, 2.5);
+  EXPECT_EQ(scenario.sync.take_over_s, 0.25);
+  EXPECT_EQ(scenario.sync.wait_for.controllers, 2);
+  EXPECT_EQ(scenario.sync.wait_for.recorders, 0);
+  EXPECT_EQ(scenario.sync.wait_for.timeout_s, 7.5);
+  EXPECT_EQ(scenario.record.flush_s, 0.05);
+}
+
+TEST(ScenarioTest, ReadsEveryKeyOfTheController) {
+  const Controller controller = parse_scenario(kEveryKey, "file").controller;
+  EXPECT_EQ(controller.law, "qsf");
+  const auto& gains = std::get<NamedGains>(controller.gains);
+  EXPECT_EQ(gains.horizontal.position, 1.0);
+  EXPECT_EQ(gains.horizontal.velocity, 2.0);
+  EXPECT_EQ(gains.horizontal.acceleration, 3.0);
+  EXPECT_EQ(gains.horizontal.jerk, 4.0);
+  EXPECT_EQ(gains.horizontal.integral, 5.0);
+  EXPECT_EQ(gains.vertical.position, 6.0);
+  EXPECT_EQ(gains.vertical.velocity, 7.0);
+  EXPECT_EQ(gains.vertical.acceleration, 0.0);
+  EXPECT_EQ(gains.vertical.jerk, 0.0);
+  EXPECT_EQ(gains.vertical.integral, 8.0);
+  EXPECT_EQ(controller.force_limit_n, 50.0);
+  EXPECT_TRUE(controller.saturate);
+  EXPECT_TRUE(controller.drag_feed_forward);
+  EXPECT_EQ(controller.state_wiring, StateWiring::kGazeboPlugin);
+  EXPECT_EQ(controller.model.vehicle, (model::SlungLoadParameters{1.7, 0.17, 0.8, 9.9}));
+  EXPECT_EQ(controller.model.air, (model::Aerodynamics{0.4, Vector3d(3, -2, 1)}));
+}
+
+TEST(ScenarioTest, ReadsEveryKeyOfTheMission) {
+  const auto mission = parse_scenario(kEveryKey, "file").mission;
+  ASSERT_EQ(mission.size(), 4u);
+  EXPECT_EQ(mission[0].kind, "hold");
+  EXPECT_EQ(mission[0].name, "first");
+  EXPECT_EQ(std::get<ConstantReference>(mission[0].reference).position, Vector3d(0, 0, -1));
+  EXPECT_EQ(std::get<LeaveAfter>(mission[0].leave).duration_ns, 1'000'000'000);
+
+  EXPECT_EQ(mission[1].kind, "set_point");
+  EXPECT_EQ(mission[1].name, "set_point");
+  const auto& within = std::get<LeaveWithin>(mission[1].leave);
+  EXPECT_EQ(within.radius_m, 0.3);
+  EXPECT_EQ(within.after_ns, 4'000'000'000);
+  EXPECT_EQ(within.body, Body::kQuadrotor);
+  EXPECT_EQ(within.offset, Vector3d(0, 0, -0.95));
+  EXPECT_EQ(within.timeout_ns, 9'000'000'000);
+
+  const auto& eight = std::get<FigureEightReference>(mission[2].reference);
+  EXPECT_EQ(eight.amplitude, Vector3d(1, 2, 3));
+  EXPECT_EQ(eight.offset, Vector3d(4, 5, 6));
+  EXPECT_EQ(eight.period_s, 12.0);
+  const auto& by_default = std::get<LeaveWithin>(mission[2].leave);
+  EXPECT_EQ(by_default.body, Body::kLoad);
+  EXPECT_EQ(by_default.offset, Vector3d(0, 0, 0));
+  EXPECT_EQ(by_default.timeout_ns, 65'000'000'000);
+
+  const auto& rest = std::get<RestToRestReference>(mission[3].reference);
+  EXPECT_EQ(rest.from, Vector3d(1, 1, 1));
+  EXPECT_EQ(rest.to, Vector3d(2, 2, 2));
+  EXPECT_EQ(rest.duration_s, 3.0);
+}
+
+TEST(ScenarioTest, LeavesTheDefaultsWhereTheFileIsSilent) {
+  const Scenario scenario = parse_scenario(kMinimalScenario, "file");
+  EXPECT_EQ(scenario.plant.pendulum, Pendulum::kIdeal);
+  EXPECT_EQ(scenario.plant.step_ns, 1'000'000);
+  EXPECT_EQ(scenario.plant.air, model::Aerodynamics{});
+  EXPECT_EQ(scenario.sync.mode, SyncMode::kLockstep);
+  EXPECT_EQ(scenario.sync.period_ns, 4'000'000);
+  EXPECT_EQ(scenario.sync.take_over_s, 0.1);
+  EXPECT_EQ(scenario.sync.wait_for.controllers, 1);
+  EXPECT_EQ(scenario.sync.wait_for.recorders, 1);
+  EXPECT_EQ(std::get<LqrWeights>(scenario.controller.gains).horizontal, 10.0);
+  EXPECT_EQ(std::get<LqrWeights>(scenario.controller.gains).vertical, 5.0);
+  EXPECT_EQ(scenario.controller.force_limit_n, 200.0);
+  EXPECT_FALSE(scenario.controller.saturate);
+  EXPECT_EQ(scenario.controller.model.vehicle, scenario.vehicle);
+  EXPECT_EQ(scenario.mission.at(0).name, "hold");
+  EXPECT_EQ(scenario.record.flush_s, 0.2);
+}
+
+TEST(ScenarioTest, ControllerBelievesThePlantsTruthWhereTheFileIsSilent) {
+  std::string text = replace_once(kMinimalScenario, "plant:", "plant:\n  rotor_drag_n_s_m: 0.3");
+  text += "controller: { model: { load_mass_kg: 0.21 } }\n";
+  const Scenario scenario = parse_scenario(text, "file");
+  EXPECT_EQ(scenario.controller.model.vehicle, (model::SlungLoadParameters{1.5, 0.21, 1.0, 9.8}));
+  EXPECT_EQ(scenario.controller.model.air.rotor_drag, 0.3);
+}
+
+TEST(ScenarioTest, ReadsKeysInAnyOrderAndWithAByteOrderMark) {
+  const std::string text = kMinimalScenario, first = "name: minimal\n";
+  const std::string reordered = "\xef\xbb\xbf" + text.substr(first.size()) + first;
+  EXPECT_TRUE(are_equal(parse_scenario(reordered, "file"), parse_scenario(text, "file")));
+}
+
+}  // namespace
+}  // namespace sls::config::test

@@ -1,0 +1,39 @@
+#include "common/config/sha256.hpp"
+
+#include <gtest/gtest.h>
+
+#include "common/config/scenario.hpp"
+#include "tests/common/config/support.hpp"
+
+namespace sls::config {
+namespace {
+
+// Source: NIST, FIPS 180-2 appendix B and the example values published with it.
+TEST(Sha256Test, AgreesWithPublishedVectors) {
+  EXPECT_EQ(calc_sha256(""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
+  EXPECT_EQ(calc_sha256("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+  EXPECT_EQ(calc_sha256("abcdbcdecdefdefgefghfghighijhijkijkljklmklmnlmnomnopnopq"),
+            "248d6a61d20638b8e5c026930c3e6039a33ce45964ff2167f6ecedd419db06c1");
+  EXPECT_EQ(calc_sha256(std::string(1'000'000, 'a')),
+            "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
+}
+
+TEST(Sha256Test, ScenarioCarriesTheHashOfItsFilesBytes) {
+  for (const auto& file : test::list_yaml_files("config/scenarios")) {
+    const Scenario scenario = load_scenario(file);
+    EXPECT_EQ(scenario.text, test::read_text(file));
+    EXPECT_EQ(scenario.sha256, calc_file_sha256(file));
+  }
+}
+
+TEST(Sha256Test, MissingFileIsNamed) {
+  try {
+    calc_file_sha256("/nowhere/nothing.yaml");
+    FAIL() << "no error";
+  } catch (const std::system_error& error) {
+    EXPECT_NE(std::string(error.what()).find("/nowhere/nothing.yaml"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace sls::config

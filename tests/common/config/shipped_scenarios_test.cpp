@@ -1,0 +1,255 @@
+// The shipped scenarios hold what the project's design, section 7, says; the values are written out
+// here once more, so that neither can change alone.
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "tests/common/config/support.hpp"
+
+namespace sls::config::test {
+namespace {
+
+using Eigen::Vector3d;
+using model::SlungLoadParameters;
+
+constexpr std::int64_t kSecond = 1'000'000'000;
+const SlungLoadParameters kVehicle{1.5, 0.2, 1.0, 9.8};
+const SlungLoadParameters kMatlabVehicle{1.6, 0.16, 1.0, 10.0};
+const SlungLoadParameters kGazeboVehicle{1.5, 0.201, 1.1, 9.8066};
+
+Scenario load(const std::string& name) {
+  return load_scenario(std::string(SLS_SOURCE_DIR) + "/config/scenarios/" + name + ".yaml");
+}
+
+void expect_lqr(const Gains& gains, double horizontal, double vertical) {
+  ASSERT_TRUE(std::holds_alternative<LqrWeights>(gains));
+  EXPECT_EQ(std::get<LqrWeights>(gains).horizontal, horizontal);
+  EXPECT_EQ(std::get<LqrWeights>(gains).vertical, vertical);
+}
+
+void expect_named(const Gains& gains, const AxisGains& horizontal, const AxisGains& vertical) {
+  NamedGains expected{horizontal, vertical};
+  Scenario a, b;
+  a.controller.gains = gains;
+  b.controller.gains = expected;
+  EXPECT_TRUE(are_equal(a, b));
+}
+
+void expect_start(const Scenario& scenario, Body placed, const Vector3d& position) {
+  const InitialState& initial = scenario.plant.initial;
+  EXPECT_EQ(initial.placed, placed);
+  EXPECT_EQ(initial.position, position);
+  EXPECT_EQ(initial.v_WQ, Vector3d(0, 0, 0));
+  EXPECT_EQ(initial.rod.alpha, 0.0);
+  EXPECT_EQ(initial.rod.beta, 0.0);
+  EXPECT_EQ(initial.rod.alpha_dot, 0.0);
+  EXPECT_EQ(initial.rod.beta_dot, 0.0);
+}
+
+void expect_timed(const Stage& stage, std::int64_t seconds) {
+  ASSERT_TRUE(std::holds_alternative<LeaveAfter>(stage.leave));
+  EXPECT_EQ(std::get<LeaveAfter>(stage.leave).duration_ns, seconds * kSecond);
+}
+
+void expect_constant(const Stage& stage, const std::string& kind, const Vector3d& position) {
+  EXPECT_EQ(stage.kind, kind);
+  ASSERT_TRUE(std::holds_alternative<ConstantReference>(stage.reference));
+  EXPECT_EQ(std::get<ConstantReference>(stage.reference).position, position);
+}
+
+/// y_r = (1.5 sin 2πt/T, 0.75 sin 4πt/T, z + 0.5 sin 2πt/T), T = 16 s.
+void expect_eight(const Stage& stage, double z, std::int64_t seconds) {
+  EXPECT_EQ(stage.kind, "figure_eight");
+  ASSERT_TRUE(std::holds_alternative<FigureEightReference>(stage.reference));
+  const auto& eight = std::get<FigureEightReference>(stage.reference);
+  EXPECT_EQ(eight.amplitude, Vector3d(1.5, 0.75, 0.5));
+  EXPECT_EQ(eight.offset, Vector3d(0, 0, z));
+  EXPECT_EQ(eight.period_s, 16.0);
+  expect_timed(stage, seconds);
+}
+
+void expect_mission(const Scenario& scenario, double z, Body body, const Vector3d& offset) {
+  const auto& mission = scenario.mission;
+  ASSERT_EQ(mission.size(), 6u);
+  expect_constant(mission[0], "hold", {0, 0, -1.5});
+  expect_timed(mission[0], 10);
+  expect_constant(mission[1], "set_point", {1, -1, -2});
+  expect_constant(mission[2], "set_point", {-2, -1, -4});
+  expect_constant(mission[3], "set_point", {1, 2, -3});
+  for (int i = 1; i <= 3; ++i) {
+    const auto* leave = std::get_if<LeaveWithin>(&mission[static_cast<std::size_t>(i)].leave);
+    ASSERT_NE(leave, nullptr);
+    EXPECT_EQ(leave->after_ns, 15 * kSecond);
+    EXPECT_EQ(leave->radius_m, 0.2);
+    EXPECT_EQ(leave->body, body);
+    EXPECT_EQ(leave->offset, offset);
+  }
+  expect_eight(mission[4], z, 32);
+  expect_constant(mission[5], "set_point", {0, 0, -1.5});
+  expect_timed(mission[5], 15);
+}
+
+TEST(ShippedScenariosTest, AreThese) {
+  std::set<std::string> names;
+  for (const auto& file : list_yaml_files("config/scenarios")) names.insert(file.stem().string());
+  EXPECT_EQ(names, (std::set<std::string>{
+                       "figure_eight", "gazebo_correct_wiring", "gazebo_corrected", "gazebo_legacy",
+                       "integral_mass_error", "matlab_figure_eight", "matlab_setpoint_1",
+                       "matlab_setpoint_2", "matlab_setpoint_3", "mission", "rest_to_rest",
+                       "rigid_figure_eight", "rotor_drag", "setpoints", "short"}));
+}
+
+TEST(ShippedScenariosTest, ShareTimingAndBearTheirFilesName) {
+  for (const auto& file : list_yaml_files("config/scenarios")) {
+    SCOPED_TRACE(file);
+    const Scenario scenario = load_scenario(file);
+    EXPECT_EQ(scenario.name, file.stem().string());
+    EXPECT_EQ(scenario.sync.mode, SyncMode::kLockstep);
+    EXPECT_EQ(scenario.sync.period_ns, 4'000'000);
+    EXPECT_EQ(scenario.plant.step_ns, 1'000'000);
+    EXPECT_EQ(scenario.sync.wait_for.controllers, 1);
+    EXPECT_EQ(scenario.sync.wait_for.recorders, 1);
+    EXPECT_EQ(scenario.sync.wait_for.timeout_s, 30.0);
+    EXPECT_EQ(scenario.controller.force_limit_n, 200.0);
+    EXPECT_FALSE(scenario.controller.saturate);
+    EXPECT_EQ(scenario.plant.disturbance_W, Vector3d(0, 0, 0));
+  }
+}
+
+TEST(ShippedScenariosTest, FitAOneMillisecondPeriod) {
+  for (const auto& file : list_yaml_files("config/scenarios")) {
+    Scenario scenario = load_scenario(file);
+    EXPECT_NO_THROW(override_period(scenario, 0.001)) << file;
+  }
+}
+
+TEST(ShippedScenariosTest, ControllerKnowsTheTruthExceptWhereTheTableSaysSo) {
+  const std::set<std::string> mistaken{"gazebo_legacy", "gazebo_correct_wiring",
+                                       "integral_mass_error"};
+  for (const auto& file : list_yaml_files("config/scenarios")) {
+    const Scenario scenario = load_scenario(file);
+    const bool knows = scenario.controller.model.vehicle == scenario.vehicle;
+    EXPECT_EQ(knows, mistaken.count(scenario.name) == 0) << file;
+    EXPECT_EQ(scenario.controller.model.air, scenario.plant.air) << file;
+    const bool miswired = scenario.controller.state_wiring != StateWiring::kCorrect;
+    EXPECT_EQ(miswired, scenario.name == "gazebo_legacy") << file;
+  }
+}
+
+TEST(ShippedScenariosTest, FigureEight) {
+  const Scenario scenario = load("figure_eight");
+  EXPECT_EQ(scenario.vehicle, kVehicle);
+  expect_lqr(scenario.controller.gains, 10, 5);
+  expect_start(scenario, Body::kLoad, {0, 0, -0.5});
+  ASSERT_EQ(scenario.mission.size(), 1u);
+  expect_eight(scenario.mission[0], -0.5, 32);
+}
+
+TEST(ShippedScenariosTest, Setpoints) {
+  const Scenario scenario = load("setpoints");
+  EXPECT_EQ(scenario.vehicle, kVehicle);
+  expect_lqr(scenario.controller.gains, 10, 5);
+  expect_start(scenario, Body::kLoad, {0, 0, -1.5});
+  ASSERT_EQ(scenario.mission.size(), 3u);
+  expect_constant(scenario.mission[0], "set_point", {1, -1, -2});
+  expect_constant(scenario.mission[1], "set_point", {-1, -1, -4});
+  expect_constant(scenario.mission[2], "set_point", {1, 1, -3});
+  for (const Stage& stage : scenario.mission) expect_timed(stage, 15);
+}
+
+TEST(ShippedScenariosTest, Mission) {
+  const Scenario scenario = load("mission");
+  EXPECT_EQ(scenario.vehicle, kVehicle);
+  expect_lqr(scenario.controller.gains, 10, 5);
+  expect_start(scenario, Body::kQuadrotor, {0, 0, 0});
+  expect_mission(scenario, -0.5, Body::kLoad, {0, 0, 0});
+}
+
+TEST(ShippedScenariosTest, MatlabSetPoints) {
+  const Vector3d points[] = {{0, 0, -1.5}, {1, -1, -2}, {-2, -1, -4}, {1, 2, -3}};
+  for (std::size_t i = 1; i <= 3; ++i) {
+    const Scenario scenario = load("matlab_setpoint_" + std::to_string(i));
+    SCOPED_TRACE(scenario.name);
+    EXPECT_EQ(scenario.vehicle, kMatlabVehicle);
+    expect_named(scenario.controller.gains, {34.021, 78.729, 77.326, 31.623, 0},
+                 {8.0089, 7.0711, 0, 0, 0});
+    expect_start(scenario, Body::kLoad, points[i - 1]);
+    ASSERT_EQ(scenario.mission.size(), 1u);
+    expect_constant(scenario.mission[0], "set_point", points[i]);
+    expect_timed(scenario.mission[0], 15);
+  }
+}
+
+TEST(ShippedScenariosTest, MatlabFigureEight) {
+  const Scenario scenario = load("matlab_figure_eight");
+  EXPECT_EQ(scenario.vehicle, kMatlabVehicle);
+  expect_lqr(scenario.controller.gains, 10, 5);
+  expect_start(scenario, Body::kQuadrotor, {1, 2, -4});
+  ASSERT_EQ(scenario.mission.size(), 1u);
+  expect_eight(scenario.mission[0], -0.5, 32);
+}
+
+TEST(ShippedScenariosTest, GazeboLegacyAndItsRepairs) {
+  for (const std::string name : {"gazebo_legacy", "gazebo_correct_wiring", "gazebo_corrected"}) {
+    SCOPED_TRACE(name);
+    const Scenario scenario = load(name);
+    EXPECT_EQ(scenario.vehicle, kGazeboVehicle);
+    EXPECT_EQ(scenario.plant.pendulum, Pendulum::kIdeal);
+    EXPECT_EQ(scenario.controller.model.vehicle,
+              name == "gazebo_corrected" ? kGazeboVehicle : kVehicle);
+    expect_named(scenario.controller.gains, {5.4399, 9.7962, 8.4827, 3.1623, 0},
+                 {3.0777, 2.2361, 0, 0, 0});
+    expect_start(scenario, Body::kQuadrotor, {0, 0, 0});
+    expect_mission(scenario, -0.6, Body::kQuadrotor, {0, 0, -0.95});
+  }
+}
+
+TEST(ShippedScenariosTest, RestToRest) {
+  const Scenario scenario = load("rest_to_rest");
+  EXPECT_EQ(scenario.vehicle, kVehicle);
+  expect_start(scenario, Body::kLoad, {0, 0, -1.5});
+  ASSERT_EQ(scenario.mission.size(), 2u);
+  Vector3d at(0, 0, -1.5);
+  for (const Stage& stage : scenario.mission) {  // each leg begins where the load rests
+    const auto& leg = std::get<RestToRestReference>(stage.reference);
+    EXPECT_EQ(leg.from, at);
+    EXPECT_EQ(leg.duration_s, 8.0);
+    expect_timed(stage, 10);
+    at = leg.to;
+  }
+}
+
+TEST(ShippedScenariosTest, RigidFigureEight) {
+  const Scenario scenario = load("rigid_figure_eight");
+  EXPECT_EQ(scenario.plant.pendulum, Pendulum::kRigid);
+  EXPECT_EQ(scenario.vehicle, (SlungLoadParameters{1.5, 0.201, 1.1, 9.8}));
+  ASSERT_EQ(scenario.mission.size(), 1u);
+  expect_eight(scenario.mission[0], -0.5, 32);
+}
+
+TEST(ShippedScenariosTest, IntegralMassError) {
+  const Scenario scenario = load("integral_mass_error");
+  EXPECT_EQ(scenario.vehicle, kVehicle);
+  EXPECT_EQ(scenario.controller.model.vehicle, (SlungLoadParameters{1.5, 0.21, 1.0, 9.8}));
+  expect_named(scenario.controller.gains, {3.2469, 8.5803, 9.8503, 5.4498, 0.0316},
+               {2.2667, 3.0876, 0, 0, 0.0224});
+}
+
+TEST(ShippedScenariosTest, RotorDrag) {
+  const Scenario scenario = load("rotor_drag");
+  EXPECT_GT(scenario.plant.air.rotor_drag, 0.0);
+  EXPECT_TRUE(scenario.controller.drag_feed_forward);
+  ASSERT_EQ(scenario.mission.size(), 1u);
+  expect_eight(scenario.mission[0], -0.5, 32);
+}
+
+TEST(ShippedScenariosTest, Short) {
+  const Scenario scenario = load("short");
+  EXPECT_EQ(scenario.vehicle, kVehicle);
+  expect_start(scenario, Body::kLoad, {0, 0, -0.5});
+  ASSERT_EQ(scenario.mission.size(), 1u);
+  expect_eight(scenario.mission[0], -0.5, 2);
+}
+
+}  // namespace
+}  // namespace sls::config::test

@@ -1,0 +1,269 @@
+#include "tests/common/config/support.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+
+namespace sls::config::test {
+namespace {
+
+bool are_equal(const InitialState& a, const InitialState& b) {
+  return a.placed == b.placed && a.position == b.position && a.v_WQ == b.v_WQ &&
+         a.rod.alpha == b.rod.alpha && a.rod.beta == b.rod.beta &&
+         a.rod.alpha_dot == b.rod.alpha_dot && a.rod.beta_dot == b.rod.beta_dot;
+}
+
+bool are_equal(const Plant& a, const Plant& b) {
+  return a.pendulum == b.pendulum && a.step_ns == b.step_ns && are_equal(a.initial, b.initial) &&
+         a.air == b.air && a.disturbance_W == b.disturbance_W;
+}
+
+bool are_equal(const Sync& a, const Sync& b) {
+  return a.mode == b.mode && a.period_ns == b.period_ns &&
+         a.real_time_factor == b.real_time_factor && a.take_over_s == b.take_over_s &&
+         a.wait_for.controllers == b.wait_for.controllers &&
+         a.wait_for.recorders == b.wait_for.recorders &&
+         a.wait_for.timeout_s == b.wait_for.timeout_s;
+}
+
+bool are_equal(const AxisGains& a, const AxisGains& b) {
+  return a.position == b.position && a.velocity == b.velocity && a.acceleration == b.acceleration &&
+         a.jerk == b.jerk && a.integral == b.integral;
+}
+
+bool are_equal(const Gains& a, const Gains& b) {
+  if (a.index() != b.index()) return false;
+  if (const auto* weights = std::get_if<LqrWeights>(&a)) {
+    const auto& other = std::get<LqrWeights>(b);
+    return weights->horizontal == other.horizontal && weights->vertical == other.vertical;
+  }
+  const auto &named = std::get<NamedGains>(a), &other = std::get<NamedGains>(b);
+  return are_equal(named.horizontal, other.horizontal) && are_equal(named.vertical, other.vertical);
+}
+
+bool are_equal(const Controller& a, const Controller& b) {
+  return a.law == b.law && are_equal(a.gains, b.gains) && a.force_limit_n == b.force_limit_n &&
+         a.saturate == b.saturate && a.drag_feed_forward == b.drag_feed_forward &&
+         a.state_wiring == b.state_wiring && a.model.vehicle == b.model.vehicle &&
+         a.model.air == b.model.air;
+}
+
+bool are_equal(const StageReference& a, const StageReference& b) {
+  if (a.index() != b.index()) return false;
+  if (const auto* constant = std::get_if<ConstantReference>(&a))
+    return constant->position == std::get<ConstantReference>(b).position;
+  if (const auto* eight = std::get_if<FigureEightReference>(&a)) {
+    const auto& other = std::get<FigureEightReference>(b);
+    return eight->amplitude == other.amplitude && eight->offset == other.offset &&
+           eight->period_s == other.period_s;
+  }
+  const auto &rest = std::get<RestToRestReference>(a), &other = std::get<RestToRestReference>(b);
+  return rest.from == other.from && rest.to == other.to && rest.duration_s == other.duration_s;
+}
+
+bool are_equal(const LeaveCondition& a, const LeaveCondition& b) {
+  if (a.index() != b.index()) return false;
+  if (const auto* timed = std::get_if<LeaveAfter>(&a))
+    return timed->duration_ns == std::get<LeaveAfter>(b).duration_ns;
+  const auto &within = std::get<LeaveWithin>(a), &other = std::get<LeaveWithin>(b);
+  return within.after_ns == other.after_ns && within.radius_m == other.radius_m &&
+         within.body == other.body && within.offset == other.offset &&
+         within.timeout_ns == other.timeout_ns;
+}
+
+bool are_equal(const Stage& a, const Stage& b) {
+  return a.kind == b.kind && a.name == b.name && are_equal(a.reference, b.reference) &&
+         are_equal(a.leave, b.leave);
+}
+
+/// Numbers of every size, most of them with all their digits in use.
+class Dice {
+ public:
+  explicit Dice(std::mt19937_64& random) : random_(random) {}
+
+  int roll(int least, int most) { return std::uniform_int_distribution<int>(least, most)(random_); }
+  bool toss() { return roll(0, 1) == 1; }
+  double between(double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random_);
+  }
+  double positive() { return between(1.0, 10.0) * std::pow(10.0, roll(-12, 12)); }
+  double any() { return roll(0, 5) == 0 ? 0.0 : (toss() ? positive() : -positive()); }
+  Eigen::Vector3d vector() { return {any(), any(), any()}; }
+  std::int64_t nanoseconds(std::int64_t least, std::int64_t most) {
+    return std::uniform_int_distribution<std::int64_t>(least, most)(random_);
+  }
+  std::string text(const std::string& alphabet, int longest) {
+    std::string text;
+    for (int left = roll(1, longest); left > 0; --left)
+      text += alphabet[static_cast<std::size_t>(roll(0, static_cast<int>(alphabet.size()) - 1))];
+    return text;
+  }
+
+ private:
+  std::mt19937_64& random_;
+};
+
+model::SlungLoadParameters make_random_vehicle(Dice& dice) {
+  model::SlungLoadParameters vehicle;
+  vehicle.quad_mass = dice.positive();
+  vehicle.load_mass = dice.positive();
+  vehicle.rod_length = dice.positive();
+  vehicle.gravity = dice.positive();
+  return vehicle;
+}
+
+model::Aerodynamics make_random_air(Dice& dice) {
+  return {dice.toss() ? 0.0 : dice.positive(), dice.vector()};
+}
+
+Plant make_random_plant(Dice& dice) {
+  Plant plant;
+  plant.step_ns = dice.nanoseconds(1, 10'000'000);
+  plant.initial.placed = dice.toss() ? Body::kLoad : Body::kQuadrotor;
+  plant.initial.position = dice.vector();
+  plant.initial.v_WQ = dice.vector();
+  plant.initial.rod = {dice.between(-3.14, 3.14), dice.between(-1.57, 1.57), dice.any(),
+                       dice.any()};
+  plant.air = make_random_air(dice);
+  plant.disturbance_W = dice.vector();
+  return plant;
+}
+
+Sync make_random_sync(Dice& dice, std::int64_t step_ns) {
+  Sync sync;
+  sync.mode = dice.toss() ? SyncMode::kLockstep : SyncMode::kRealtime;
+  sync.period_ns = step_ns * dice.roll(1, 20);
+  sync.real_time_factor = dice.between(0.001, 1000.0);
+  sync.take_over_s = dice.between(1e-3, 10.0);
+  sync.wait_for.controllers = dice.roll(1, 100);
+  sync.wait_for.recorders = dice.roll(0, 100);
+  sync.wait_for.timeout_s = dice.between(1e-3, 1e6);
+  return sync;
+}
+
+Gains make_random_gains(Dice& dice) {
+  if (dice.toss()) return LqrWeights{dice.positive(), dice.positive()};
+  NamedGains gains;
+  gains.horizontal = {dice.positive(), dice.positive(), dice.positive(), dice.positive(),
+                      dice.toss() ? 0.0 : dice.positive()};
+  gains.vertical.position = dice.positive();
+  gains.vertical.velocity = dice.positive();
+  gains.vertical.integral = dice.toss() ? 0.0 : dice.positive();
+  return gains;
+}
+
+Controller make_random_controller(Dice& dice) {
+  Controller controller;
+  controller.gains = make_random_gains(dice);
+  controller.force_limit_n = dice.positive();
+  controller.saturate = dice.toss();
+  controller.drag_feed_forward = dice.toss();
+  controller.state_wiring = dice.toss() ? StateWiring::kCorrect : StateWiring::kGazeboPlugin;
+  controller.model = {make_random_vehicle(dice), make_random_air(dice)};
+  return controller;
+}
+
+Stage make_random_stage(Dice& dice, std::int64_t period_ns) {
+  static const char* const kKinds[] = {"hold", "set_point", "figure_eight", "rest_to_rest"};
+  std::string printable;
+  for (char c = ' '; c <= '~'; ++c) printable += c;
+
+  Stage stage;
+  const int kind = dice.roll(0, 3);
+  stage.kind = kKinds[kind];
+  stage.name = dice.text(printable, 32);
+  if (kind <= 1)
+    stage.reference = ConstantReference{dice.vector()};
+  else if (kind == 2)
+    stage.reference = FigureEightReference{dice.vector(), dice.vector(), dice.positive()};
+  else
+    stage.reference = RestToRestReference{dice.vector(), dice.vector(), dice.positive()};
+  if (dice.toss()) {
+    stage.leave = LeaveAfter{period_ns * dice.nanoseconds(1, 1'000'000)};
+  } else {
+    LeaveWithin leave;
+    leave.after_ns = dice.toss() ? 0 : dice.nanoseconds(1, 400'000'000'000'000);
+    leave.radius_m = dice.positive();
+    leave.body = dice.toss() ? Body::kLoad : Body::kQuadrotor;
+    leave.offset = dice.vector();
+    leave.timeout_ns = leave.after_ns + dice.nanoseconds(1, 400'000'000'000'000);
+    stage.leave = leave;
+  }
+  return stage;
+}
+
+}  // namespace
+
+const char* const kMinimalScenario =
+    "name: minimal\n"
+    "vehicle:\n"
+    "  quad_mass_kg: 1.5\n"
+    "  load_mass_kg: 0.2\n"
+    "  rod_length_m: 1.0\n"
+    "  gravity_m_s2: 9.8\n"
+    "plant:\n"
+    "  initial: { load_position_m: [0, 0, -0.5] }\n"
+    "mission:\n"
+    "  - hold: { position_m: [0, 0, -0.5] }\n"
+    "    for_s: 2\n";
+
+bool are_equal(const Scenario& a, const Scenario& b) {
+  return a.name == b.name && a.vehicle == b.vehicle && are_equal(a.plant, b.plant) &&
+         are_equal(a.sync, b.sync) && are_equal(a.controller, b.controller) &&
+         std::equal(a.mission.begin(), a.mission.end(), b.mission.begin(), b.mission.end(),
+                    [](const Stage& x, const Stage& y) { return are_equal(x, y); }) &&
+         a.record.flush_s == b.record.flush_s;
+}
+
+Scenario make_random_scenario(std::mt19937_64& random) {
+  Dice dice(random);
+  Scenario scenario;
+  scenario.name = "s" + dice.text("abcXYZ019_.-", 63);
+  scenario.vehicle = make_random_vehicle(dice);
+  scenario.plant = make_random_plant(dice);
+  scenario.sync = make_random_sync(dice, scenario.plant.step_ns);
+  scenario.controller = make_random_controller(dice);
+  for (int left = dice.roll(1, 12); left > 0; --left)
+    scenario.mission.push_back(make_random_stage(dice, scenario.sync.period_ns));
+  scenario.record.flush_s = dice.between(1e-6, 0.2);
+  if (dice.roll(0, 4) == 0) {
+    scenario.plant.pendulum = Pendulum::kRigid;
+    scenario.vehicle = {1.5, dice.toss() ? 0.2 : 0.201, 1.1, dice.positive()};
+  }
+  return scenario;
+}
+
+std::string find_error(const std::string& text) {
+  try {
+    parse_scenario(text, "file");
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+std::vector<std::filesystem::path> list_yaml_files(const std::string& folder) {
+  std::vector<std::filesystem::path> files;
+  const std::filesystem::path root = SLS_SOURCE_DIR;
+  for (const auto& entry : std::filesystem::directory_iterator(root / folder))
+    if (entry.path().extension() == ".yaml") files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+std::string read_text(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) throw std::runtime_error("cannot read " + file.string());
+  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+}
+
+std::string replace_once(std::string text, const std::string& from, const std::string& to) {
+  const auto at = text.find(from);
+  if (at == text.npos || text.find(from, at + 1) != text.npos)
+    throw std::logic_error("not there exactly once: " + from);
+  return text.replace(at, from.size(), to);
+}
+
+}  // namespace sls::config::test

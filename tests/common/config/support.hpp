@@ -1,0 +1,33 @@
+/// What several tests of the configuration need.
+#pragma once
+
+#include <filesystem>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "common/config/scenario.hpp"
+
+namespace sls::config::test {
+
+/// Equal in every field but `text` and `sha256`.
+bool are_equal(const Scenario& a, const Scenario& b);
+
+/// A valid scenario; equal generators give equal scenarios.
+Scenario make_random_scenario(std::mt19937_64& random);
+
+/// The message of the ConfigError that `text` (in "file") gives, or "no error".
+std::string find_error(const std::string& text);
+
+/// The YAML files of `folder`, a path from the root of the repository, by name.
+std::vector<std::filesystem::path> list_yaml_files(const std::string& folder);
+
+std::string read_text(const std::filesystem::path& file);
+
+/// A short valid scenario, one key per line, to be spoilt by tests.
+extern const char* const kMinimalScenario;
+
+/// `text` with the one place where it holds `from` changed to `to`.
+std::string replace_once(std::string text, const std::string& from, const std::string& to);
+
+}  // namespace sls::config::test

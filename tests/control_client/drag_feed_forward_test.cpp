@@ -1,0 +1,60 @@
+#include "control_client/drag_feed_forward.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <random>
+
+#include "common/model/forces.hpp"
+
+namespace sls::control {
+namespace {
+
+Eigen::Vector3d draw_vector(std::mt19937& generator, double scale) {
+  std::normal_distribution<double> normal(0.0, scale);
+  const double x = normal(generator), y = normal(generator), z = normal(generator);
+  return {x, y, z};
+}
+
+TEST(DragFeedForwardTest, ForceAndItsDragAddUpToWhatTheLawAskedFor) {
+  std::mt19937 generator(1);
+  for (int i = 0; i < 2000; ++i) {
+    Eigen::Vector3d wanted = draw_vector(generator, 4.0);
+    wanted.z() -= 17.0;
+    const Eigen::Vector3d v = draw_vector(generator, 2.0);
+    const model::Aerodynamics air{0.3, draw_vector(generator, 2.0)};
+    const Eigen::Vector3d force = calc_drag_feed_forward(wanted, v, air);
+    // The iteration stops at a change of 1e-12; rounding adds a few 1e-16.
+    ASSERT_LE((force + model::calc_rotor_drag(force, v, air) - wanted).norm(),
+              1.01e-12 * wanted.norm());
+  }
+}
+
+TEST(DragFeedForwardTest, AgreesWithTheClosedFormInThePlane) {
+  // Wanted force −N e₃, velocity u e₁: F = −|F| (sin θ, 0, cos θ) with, normal to F, the drag
+  // D u cos θ = N sin θ, and along F the strength N cos θ. Hence tan θ = D u / N.
+  const double N = 17.0, D = 0.4, u = 3.0;
+  const double theta = std::atan2(D * u, N);
+  const Eigen::Vector3d force =
+      calc_drag_feed_forward({0.0, 0.0, -N}, {u, 0.0, 0.0}, {D, {0.0, 0.0, 0.0}});
+  const Eigen::Vector3d expected =
+      N * std::cos(theta) * Eigen::Vector3d(std::sin(theta), 0.0, -std::cos(theta));
+  EXPECT_LE((force - expected).norm(), 1e-11);
+}
+
+TEST(DragFeedForwardTest, WithoutDragNothingChanges) {
+  const Eigen::Vector3d wanted(1.0, 2.0, -17.0);
+  EXPECT_EQ(calc_drag_feed_forward(wanted, {3.0, 0.0, 1.0}, {}), wanted);
+  EXPECT_EQ(calc_drag_feed_forward(wanted, {3.0, 0.0, 1.0}, {0.3, {3.0, 0.0, 1.0}}), wanted);
+  EXPECT_EQ(calc_drag_feed_forward({0.0, 0.0, 0.0}, {3.0, 0.0, 1.0}, {0.3, {0.0, 0.0, 0.0}}),
+            Eigen::Vector3d::Zero());
+}
+
+TEST(DragFeedForwardTest, StaysFiniteWhereNoForceCanOutweighTheDrag) {
+  const Eigen::Vector3d force =
+      calc_drag_feed_forward({0.0, 0.0, -0.1}, {30.0, 0.0, 5.0}, {0.5, {0.0, 0.0, 0.0}});
+  EXPECT_TRUE(force.allFinite());
+}
+
+}  // namespace
+}  // namespace sls::control
