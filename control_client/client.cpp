@@ -13,9 +13,9 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto kPollTime = 20ms;    // while nothing is in a hurry
-constexpr auto kLingerTime = 10s;   // how long recorders may take to be done
-constexpr auto kReportTime = 5s;    // between two lines about the same wait
+constexpr auto kPollTime = 20ms;   // while nothing is in a hurry
+constexpr auto kLingerTime = 10s;  // how long recorders may take to be done
+constexpr auto kReportTime = 5s;   // between two lines about the same wait
 constexpr std::size_t kMailboxSize = 1024;
 
 }  // namespace
@@ -37,9 +37,14 @@ Client::Client(bus::Node& node, const config::Scenario& scenario, const std::str
 
 void Client::run() {
   join_run();
-  if (app::stop_signal() == 0) serve();
+  if (app::stop_signal() != 0) return;
+  announce(false, false);
+  serve();
   announce(false, true);
   linger();
+  const auto status = servers_.find_status(run_->parameters.run_id());
+  if (status && status->phase() == PHASE_FAILED)
+    throw app::RunError(fmt::format("the run failed: {}", status->reason().c_str()));
 }
 
 void Client::join_run() {
@@ -63,9 +68,9 @@ void Client::join_run() {
 
   const Parameters& parameters = run_->parameters;
   if (!(parameters.scenario_sha256() == scenario_.sha256))
-    throw config::ConfigError(fmt::format("scenario '{}': expected the server's, SHA-256 {}, got {}",
-                                          scenario_.name, parameters.scenario_sha256().c_str(),
-                                          scenario_.sha256));
+    throw config::ConfigError(
+        fmt::format("scenario '{}': expected the server's, SHA-256 {}, got {}", scenario_.name,
+                    parameters.scenario_sha256().c_str(), scenario_.sha256));
   scenario_.sync.period_ns = parameters.period_ns();
   scenario_.plant.step_ns = parameters.step_ns();
   controller_ = std::make_unique<FlightController>(scenario_);
@@ -86,12 +91,11 @@ bool Client::sees_all_endpoints() const {
 }
 
 void Client::serve() {
-  announce(false, false);
   auto next_look = Clock::now();
   while (app::stop_signal() == 0) {
     if (const auto state = states_.take(next_look)) answer(*state);
     if (Clock::now() < next_look) continue;
-    if (has_finished()) return;
+    if (has_ended()) return;
     if (!ready_ && sees_all_endpoints()) {
       ready_ = true;
       announce(true, false);
@@ -107,8 +111,8 @@ void Client::answer(const VehicleState& state) {
     return;
   }
   const auto began = Clock::now();
-  const Answer answer = controller_->calc_answer(state.step(), to_model_state(state),
-                                                 to_memory(state.controller()));
+  const Answer answer =
+      controller_->calc_answer(state.step(), to_model_state(state), to_memory(state.controller()));
   const auto compute_time = Clock::now() - began;
   last_command_ = make_command_message(state, answer, name_, strength_, compute_time);
   command_writer_.write(*last_command_);
@@ -117,11 +121,9 @@ void Client::answer(const VehicleState& state) {
     spdlog::error("step {}: fault {}", state.step(), to_string(answer.fault));
 }
 
-bool Client::has_finished() {
+bool Client::has_ended() const {
   const auto status = servers_.find_status(run_->parameters.run_id());
-  if (status && status->phase() == PHASE_FINISHED) return true;
-  if (status && status->phase() == PHASE_FAILED)
-    throw app::RunError(fmt::format("the run failed: {}", status->reason().c_str()));
+  if (status && (status->phase() == PHASE_FINISHED || status->phase() == PHASE_FAILED)) return true;
   if (!servers_.is_present(run_->server))
     throw app::RunError(fmt::format("the server of run {:016x} is gone, expected it to finish",
                                     run_->parameters.run_id()));
@@ -129,7 +131,6 @@ bool Client::has_finished() {
 }
 
 void Client::announce(bool ready, bool done) {
-  if (!run_) return;
   Participant message;
   message.run_id(run_->parameters.run_id());
   message.vehicle_id(vehicle_id_);
@@ -145,7 +146,7 @@ void Client::announce(bool ready, bool done) {
 }
 
 void Client::linger() {
-  if (!run_ || app::stop_signal() != 0) return;
+  if (app::stop_signal() != 0) return;
   const auto give_up = Clock::now() + kLingerTime;
   const auto recorders_done = [this] {
     for (const auto& entry : participants_.find(ROLE_RECORDER, run_->parameters.run_id()))

@@ -37,8 +37,9 @@ class Client {
   void answer(const VehicleState& state);
   bool sees_all_endpoints() const;
   void announce(bool ready, bool done);
-  /// Ends serving when the run has ended; throws if it failed or its server is gone.
-  bool has_finished();
+  /// True when the run has ended, well or not.
+  /// @throws app::RunError if it has not, but its server is gone.
+  bool has_ended() const;
 
   config::Scenario scenario_;  // with the period in force once a run is joined
   const std::string name_;

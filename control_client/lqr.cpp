@@ -1,5 +1,6 @@
 #include "control_client/lqr.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <Eigen/QR>
 #include <cmath>
@@ -63,7 +64,13 @@ MatrixXd solve_riccati(const MatrixXd& A, const VectorXd& b, const MatrixXd& Q) 
     const Eigen::RowVectorXd K = b.transpose() * P;
     P = solve_lyapunov(A - b * K, Q + K.transpose() * K);
   }
-  if (!P.allFinite()) throw std::domain_error("the Riccati equation has no finite solution");
+  const VectorXd K = P * b;
+  const MatrixXd residual = A.transpose() * P + P * A - K * K.transpose() + Q;
+  const double size = (P * A).norm() + K.squaredNorm() + Q.norm();
+  if (!(residual.norm() <= 1e-9 * size) ||
+      !((A - b * K.transpose()).eigenvalues().real().maxCoeff() < 0.0)) {
+    throw std::domain_error("the Riccati equation has no stabilising solution");
+  }
   return P;
 }
 

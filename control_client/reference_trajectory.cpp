@@ -7,6 +7,13 @@ namespace {
 
 constexpr double kTwoPi = 6.283185307179586476925286766559;
 
+/// Eq. (13), the polynomial that rises from 0 to 1 on [0, 1]. Its upper half is its lower half
+/// turned about the middle, where nothing cancels.
+double calc_blend(double tau) {
+  if (tau > 0.5) return 1.0 - calc_blend(1.0 - tau);
+  return std::pow(tau, 5) * (126.0 + tau * (-420.0 + tau * (540.0 + tau * (-315.0 + tau * 70.0))));
+}
+
 std::unique_ptr<const ReferenceTrajectory> make(const config::ConstantReference& config) {
   return std::make_unique<Constant>(config);
 }
@@ -51,10 +58,8 @@ model::Reference RestToRest::calc(double time) const {
   const double tau = time / duration;
   const double u = tau * (1.0 - tau), u_dot = 1.0 - 2.0 * tau;
   const Eigen::Vector3d way = config_.to - config_.from;
-  const double blend =
-      std::pow(tau, 5) * (126.0 + tau * (-420.0 + tau * (540.0 + tau * (-315.0 + tau * 70.0))));
   const double rate = 1.0 / duration;
-  reference.position = config_.from + way * blend;
+  reference.position = config_.from + way * calc_blend(tau);
   reference.velocity = way * (rate * 630.0 * std::pow(u, 4));
   reference.acceleration = way * (std::pow(rate, 2) * 2520.0 * std::pow(u, 3) * u_dot);
   reference.jerk = way * (std::pow(rate, 3) * 2520.0 * u * u * (3.0 * u_dot * u_dot - 2.0 * u));

@@ -1,5 +1,6 @@
 #include "common/app/run_main.hpp"
 #include "common/bus/node.hpp"
+#include "common/bus/qos_file.hpp"
 #include "recorder/recorder.hpp"
 #include "recorder/recording_folder.hpp"
 
@@ -10,14 +11,18 @@ int main(int argc, char** argv) {
   options.qos_file = bus::default_qos_file();
   std::filesystem::path folder;
   bool force = false;
+  bool check = false;
   app::add_common_options(cli, options);
   cli.add_option("--out", folder, "folder of the recording, new or empty")
       ->type_name("DIR")
       ->required();
   cli.add_flag("--force", force, "replace the recording that is there");
+  cli.add_flag("--check", check, "only check QoS file and folder, then end");
 
   return app::run_main(argc, argv, cli, options, "recorder", [&] {
+    bus::check_qos_file(options.qos_file);
     record::prepare_recording_folder(folder, force);
+    if (check) return;
     bus::Node node(options.qos_file, options.domain, "recorder");
     record::Recorder(node, folder).run();
   });

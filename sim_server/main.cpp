@@ -1,5 +1,6 @@
 #include "common/app/run_main.hpp"
 #include "common/bus/node.hpp"
+#include "common/bus/qos_file.hpp"
 #include "common/config/scenario.hpp"
 #include "sim_server/server.hpp"
 
@@ -11,6 +12,7 @@ int main(int argc, char** argv) {
   std::filesystem::path scenario_file;
   std::optional<double> period_s;
   std::string mode;
+  bool check = false;
   app::add_common_options(cli, options);
   cli.add_option("--scenario", scenario_file, "scenario (YAML)")->type_name("FILE")->required();
   cli.add_option("--period-s", period_s, "control period in force; default: the scenario's")
@@ -18,6 +20,7 @@ int main(int argc, char** argv) {
   cli.add_option("--mode", mode, "synchronisation in force; default: the scenario's")
       ->type_name("MODE")
       ->check(CLI::IsMember({"lockstep", "realtime"}));
+  cli.add_flag("--check", check, "only check scenario and QoS file, then end");
 
   return app::run_main(argc, argv, cli, options, "sim_server", [&] {
     config::Scenario scenario = config::load_scenario(scenario_file);
@@ -28,6 +31,7 @@ int main(int argc, char** argv) {
     if (scenario.sync.mode != config::SyncMode::kLockstep)
       throw config::ConfigError(
           "sync.mode: expected lockstep, got realtime: this version flies in lockstep only");
+    if (check) return bus::check_qos_file(options.qos_file);
     bus::Node node(options.qos_file, options.domain, "sim_server");
     sim::Server(node, scenario).run();
   });

@@ -3,7 +3,6 @@
 #include <Simbody.h>
 
 #include <Eigen/Geometry>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <stdexcept>
@@ -176,8 +175,9 @@ struct SlungLoadPlant::Multibody {
 
   /// Eq. (2) of README.md: u̇ = M⁻¹ Jᵀ (applied − centrifugal), and q̇ from u.
   Motion calc_rate(const Eigen::Vector3d& f_Q_W) {
+    const SimTK::MobilizedBodyIndex quadrotor_index = quadrotor.getMobilizedBodyIndex();
     const SimTK::MobilizedBodyIndex pendulum_index = pendulum.getMobilizedBodyIndex();
-    body_forces[1][1] = weight_quadrotor + to_simtk(calc_force(f_Q_W));
+    body_forces[quadrotor_index][1] = weight_quadrotor + to_simtk(calc_force(f_Q_W));
     body_forces[pendulum_index] = -matter.getTotalCentrifugalForces(state, pendulum_index);
     matter.addInStationForce(state, pendulum_index, pendulum_centre, weight_pendulum, body_forces);
     matter.multiplyBySystemJacobianTranspose(state, body_forces, generalized_forces);

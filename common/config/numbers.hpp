@@ -10,6 +10,7 @@ namespace sls::config {
 
 /// Longest time a scenario can hold, s: nanoseconds stay exact in a double and far from overflow.
 inline constexpr double kMaxSeconds = 1e6;
+inline constexpr std::int64_t kMaxNanoseconds = 1'000'000'000'000'000;
 
 /// The number that `text` holds as a YAML scalar (1, -2.5, 1e-3, .inf, .nan), or nothing if it is
 /// none. What a double cannot hold comes back as an infinity.

@@ -14,6 +14,7 @@
 #include <variant>
 #include <vector>
 
+#include "common/config/numbers.hpp"
 #include "common/config/scenario.hpp"
 
 namespace sls::config {
@@ -37,7 +38,7 @@ inline constexpr NumberRule kHalfTurn{"radians from -pi/2 to pi/2",
                                       [](double x) { return -kPi / 2 <= x && x <= kPi / 2; }};
 // Beyond these bounds a wait would overflow a clock.
 inline constexpr NumberRule kWait{"> 0 and at most 1000000 s",
-                                  [](double x) { return x > 0.0 && x <= 1e6; }};
+                                  [](double x) { return x > 0.0 && x <= kMaxSeconds; }};
 inline constexpr NumberRule kRate{"from 0.001 to 1000",
                                   [](double x) { return x >= 1e-3 && x <= 1e3; }};
 inline constexpr NumberRule kFlushInterval{"> 0 and <= 0.2",
@@ -234,12 +235,12 @@ void describe(Map& map, RestToRestReference& reference) {
 
 template <class Map>
 void describe(Map& map, LeaveWithin& leave) {
-  constexpr std::int64_t kPatience = 60'000'000'000, kLongest = 1'000'000'000'000'000;  // ns
+  constexpr std::int64_t kPatience = 60'000'000'000;  // ns
   map.key(kRequired, "within_m", leave.radius_m, kPositive);
   map.key(kOptional, "after_s", leave.after_ns, kNotNegative);
   map.key(kOptional, "of", leave.body);
   map.key(kOptional, "offset_m", leave.offset);
-  map.by_default(leave.timeout_ns, std::min(leave.after_ns + kPatience, kLongest));
+  map.by_default(leave.timeout_ns, std::min(leave.after_ns + kPatience, kMaxNanoseconds));
   map.key(kOptional, "timeout_s", leave.timeout_ns, kPositive);
 }
 

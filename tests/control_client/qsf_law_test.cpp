@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <complex>
 #include <limits>
 #include <random>
 #include <vector>
@@ -181,7 +182,6 @@ TEST(QsfLawTest, AgreesWithAnIndependentFormulation) {
   // Rounding alone: 1e-16 times the conditioning of a rod 1.2 rad off on both axes (1 / q_z² = 58)
   // and of s down to g / 20.
   EXPECT_LE(worst, 1e-9);
-  RecordProperty("worst_relative", std::to_string(worst * 1e15) + "e-15");
 }
 
 TEST(QsfLawTest, AgreesWithAnIndependentFormulationWithIntegralsAlsoWhereTheyAreClamped) {
@@ -223,10 +223,14 @@ TEST(QsfLawTest, ErrorObeysTheDesignedLinearEquation) {
   // snap of the load are differences, of order 8, of the load's acceleration along that motion.
   std::mt19937 generator(3);
   const double h = 0.025;
-  const int substeps = 25;
+  const int substeps = 50;
   double worst_vertical = 0.0, worst_horizontal = 0.0;
-  for (int i = 0; i < 200; ++i) {
+  int judged = 0;
+  while (judged < 150) {
+    // Rod and support stay well off the singularities for the 0.2 s that the differences span.
     Case one = draw_case(generator, false);
+    const model::RodAngles rod = one.input().rod;
+    if (std::max(std::abs(rod.alpha), std::abs(rod.beta)) > 0.7) continue;
     one.gains = make_named_gains(config::LqrWeights{});  // moderate: |poles| up to 2.3
     const Vector3d amplitude = draw_vector(generator, 0.5), omega = draw_vector(generator, 1.5);
     const Vector3d centre = one.reference.position;
@@ -240,11 +244,10 @@ TEST(QsfLawTest, ErrorObeysTheDesignedLinearEquation) {
       return oracle::calc_accelerations(state, calc_force(t, state), one.vehicle).a_WL;
     };
     one.reference = calc_wave(centre, amplitude, omega, 0.0);
-    const LawOutput now = calc_qsf(one.input(), one.vehicle, one.gains);
-    if (now.fault != Fault::kNone) continue;
-
     std::array<Vector3d, 9> a;  // at −4h … 4h
     a[4] = calc_acceleration(0.0, one.state);
+    if (a[4].z() > one.vehicle.gravity / 2) continue;
+    ++judged;
     for (const int side : {-1, 1}) {
       oracle::State state = one.state;
       const double step = side * h / substeps;
@@ -285,11 +288,10 @@ TEST(QsfLawTest, ErrorObeysTheDesignedLinearEquation) {
     worst_horizontal = std::max(worst_horizontal, residual.head<2>().norm() / size);
   }
   EXPECT_LE(worst_vertical, 1e-13);  // no differences here: rounding alone
-  // Rounding of an acceleration of some 20 m/s², 4e-15, over h² = 6e-4, of terms of some 10 m/s⁴;
-  // the load's motion is a sum of exponentials up to exp 2.3 t and waves, so that the differences'
-  // truncation (2.3 h)⁸ / 3150 is below that, and so is the integration at h / 25.
+  // Rounding of an acceleration of some 20 m/s², 4e-15, over h² = 6e-4, of terms of some 10 m/s⁴:
+  // 1e-12 and mostly found so. Where the rod turns fast the integration leaves up to 4e-11, and 16
+  // times more at twice its step. Truncation is below: the load moves like exp 2.3 t at most.
   EXPECT_LE(worst_horizontal, 1e-9);
-  std::cout << worst_vertical << " " << worst_horizontal << "\n";
 }
 
 /// Roots of s^n + c[n−1] s^(n−1) + … + c[0].

@@ -50,6 +50,20 @@ inline Eigen::Vector3d calc_shaking_force(double time, const Eigen::Vector3d& p_
   return calc_weight_force(total_mass, gravity) + shake - 2.0 * p_WQ - 2.0 * v_WQ;
 }
 
+/// The oracle flies each of the plant's steps in this many: its truncation error is then 256 times
+/// smaller and what remains is the plant's.
+inline constexpr int kOracleSubsteps = 4;
+
+/// One step of the plant by the oracle, of the ideal load or of the rigid pendulum.
+template <typename Parameters>
+oracle::State fly_oracle(oracle::State state, const Eigen::Vector3d& f_Q_W,
+                         const Parameters& parameters) {
+  for (int i = 0; i < kOracleSubsteps; ++i) {
+    state = rk4_step(state, f_Q_W, kStep / kOracleSubsteps, parameters);
+  }
+  return state;
+}
+
 /// A pendulum with β̈ = −ω² sin β from rest at `amplitude` first hangs vertically at this time, s.
 inline double calc_quarter_period(double omega, double amplitude) {
   return std::comp_ellint_1(std::sin(amplitude / 2.0)) / omega;

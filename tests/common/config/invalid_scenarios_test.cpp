@@ -135,11 +135,12 @@ TEST(InvalidTextTest, UnknownKeyComesBeforeMistakesInsideOtherKeys) {
 }
 
 TEST(InvalidTextTest, MoreThanThousandStagesAreRefused) {
-  std::string text = replace_once(kMinimalScenario, "mission:", "record: {}\nmission: [");
-  text.resize(text.find('[') + 1);
+  std::string text = kMinimalScenario;
+  text.resize(text.find("mission:"));
+  text += "mission: [";
   for (int i = 0; i <= 1000; ++i) text += "{},";
   EXPECT_EQ(find_error(text + "]"),
-            "file:10: mission: expected a list of 1 to 1000 stages, got a list of 1001");
+            "file:9: mission: expected a list of 1 to 1000 stages, got a list of 1001");
 }
 
 TEST(InvalidTextTest, EndlessNestingEndsInAnErrorAndNotInAnOverflow) {
