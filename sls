@@ -2,8 +2,9 @@
 # The launcher: sets up what it needs, builds, flies, tests. `./sls help` lists the subcommands.
 set -euo pipefail
 
-readonly root="$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)"
-readonly build="$root/build"
+root="$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)"
+readonly root
+readonly build="${SLS_BUILD:-$root/build}"
 readonly programs=(sim_server control_client recorder)
 readonly packages=(g++ make cmake libeigen3-dev libsimbody-dev libfastrtps-dev libfastcdr-dev
   fastddsgen default-jre-headless libyaml-cpp-dev libcli11-dev libspdlog-dev nlohmann-json3-dev libgtest-dev libssl-dev
@@ -92,7 +93,8 @@ start() {
 }
 
 signal_all() {
-  ((${#name_of[@]})) && kill "-$1" "${!name_of[@]}" 2>/dev/null || true
+  ((${#name_of[@]})) || return 0
+  kill "-$1" "${!name_of[@]}" 2>/dev/null || true
 }
 
 interrupted=0
@@ -109,7 +111,7 @@ wait_all() {
   while ((${#name_of[@]})); do
     finished='' code=0
     wait -n -p finished "${!name_of[@]}" || code=$?
-    [[ -n $finished ]] || continue  # a signal came; on_signal has passed it on
+    [[ -n ${finished:-} ]] || continue  # a signal came; on_signal has passed it on
     local name=${name_of[$finished]}
     unset "name_of[$finished]"
     ((code == 0 || result != 0)) && continue

@@ -6,6 +6,7 @@
 
 #include "common/app/run_main.hpp"
 #include "common/app/stop_signal.hpp"
+#include "common/app/wait.hpp"
 #include "control_client/messages.hpp"
 
 namespace sls::control {
@@ -49,19 +50,14 @@ void Client::run() {
 
 void Client::join_run() {
   const double timeout_s = scenario_.sync.wait_for.timeout_s;
-  const auto deadline = Clock::now() + std::chrono::duration_cast<Clock::duration>(
-                                           std::chrono::duration<double>(timeout_s));
-  auto next_report = Clock::now() + kReportTime;
+  app::Wait wait(timeout_s);
   while (!(run_ = servers_.find_joinable(vehicle_id_)) && app::stop_signal() == 0) {
-    const auto now = Clock::now();
-    if (now >= deadline)
+    if (wait.is_over())
       throw app::RunError(
           fmt::format("no server for vehicle {} within {} s", vehicle_id_, timeout_s));
-    if (now >= next_report) {
+    if (wait.is_report_due())
       spdlog::info("waiting for: server of vehicle {} ({:.0f} s left)", vehicle_id_,
-                   std::chrono::duration<double>(deadline - now).count());
-      next_report += kReportTime;
-    }
+                   wait.seconds_left());
     std::this_thread::sleep_for(kPollTime);
   }
   if (!run_) return;

@@ -1,5 +1,5 @@
-/// The client: joins a server's run, answers every state sample, ends with the run. One thread works;
-/// the middleware's threads only fill the mailbox.
+/// The client: joins a server's run, answers every state sample, ends with the run. One thread
+/// works; the middleware's threads only fill the mailbox.
 #pragma once
 
 #include <chrono>

@@ -1,3 +1,6 @@
+#include <algorithm>
+#include <cctype>
+
 #include "common/app/run_main.hpp"
 #include "common/bus/node.hpp"
 #include "common/config/scenario.hpp"
@@ -17,12 +20,17 @@ int main(int argc, char** argv) {
       ->required();
   cli.add_option("--strength", strength, "among several clients the strongest flies")
       ->type_name("N");
-  cli.add_option("--name", name, "name in recordings and messages, 1 to 32 bytes")
-      ->type_name("TEXT")
-      ->check([](const std::string& text) {
-        return text.empty() || text.size() > 32 ? "expected 1 to 32 bytes, got '" + text + "'"
-                                                : std::string();
-      });
+  cli.add_option("--name", name, "name in recordings and messages")
+      ->check(CLI::Validator(
+          [](const std::string& text) {
+            const bool is_plain = std::all_of(text.begin(), text.end(), [](unsigned char letter) {
+              return std::isalnum(letter) || letter == '_' || letter == '-' || letter == '.';
+            });
+            return text.empty() || text.size() > 32 || !is_plain
+                       ? "expected 1 to 32 letters, digits, '_', '-' or '.', got '" + text + "'"
+                       : std::string();
+          },
+          "TEXT"));
 
   return app::run_main(argc, argv, cli, options, "control_client", [&] {
     const config::Scenario scenario = config::load_scenario(scenario_file);

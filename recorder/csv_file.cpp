@@ -20,9 +20,10 @@ constexpr std::size_t kFlushBytes = 1 << 18;  // bounds the memory between two t
 }  // namespace
 
 CsvFile::CsvFile(const std::filesystem::path& file, std::string_view header) : path_(file) {
-  descriptor_ = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
+  descriptor_ = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_APPEND | O_CLOEXEC, 0644);
   if (descriptor_ < 0) throw_errno(path_, "cannot create");
   buffer_.append(header).push_back('\n');
+  finished_ = buffer_.size();
 }
 
 CsvFile::~CsvFile() {
@@ -54,31 +55,46 @@ void CsvFile::add_field(std::string_view text) {
 void CsvFile::end_row() {
   buffer_.push_back('\n');
   row_begun_ = false;
+  finished_ = buffer_.size();
   ++rows_;
   if (buffer_.size() >= kFlushBytes) flush();
 }
 
 void CsvFile::flush() {
   std::size_t written = 0;
-  while (written < buffer_.size()) {
-    const ssize_t count =
-        ::write(descriptor_, buffer_.data() + written, buffer_.size() - written);
+  while (written < finished_) {
+    const ssize_t count = ::write(descriptor_, buffer_.data() + written, finished_ - written);
     if (count < 0 && errno == EINTR) continue;
     if (count < 0) {
-      // A row the disk took only in part would look like data: cut the file back to whole rows.
       const int error = errno;
-      const auto last_row = buffer_.rfind('\n', written == 0 ? 0 : written - 1);
-      const off_t surplus = static_cast<off_t>(
-          written - (last_row == std::string::npos || written == 0 ? 0 : last_row + 1));
-      const off_t end = ::lseek(descriptor_, 0, SEEK_END);
-      if (end >= surplus && ::ftruncate(descriptor_, end - surplus) != 0) { /* reported below */
-      }
+      cut_back_to_whole_rows(written);
       errno = error;
       throw_errno(path_, "cannot write");
     }
     written += static_cast<std::size_t>(count);
   }
-  buffer_.clear();
+  forget(finished_);
+}
+
+/// A row the disk took only in part would look like data.
+void CsvFile::cut_back_to_whole_rows(std::size_t written) {
+  std::size_t whole = 0;
+  bool is_quoted = false;
+  for (std::size_t i = 0; i < written; ++i) {
+    if (buffer_[i] == '"') is_quoted = !is_quoted;
+    if (buffer_[i] == '\n' && !is_quoted) whole = i + 1;
+  }
+  const off_t end = ::lseek(descriptor_, 0, SEEK_END);
+  const auto surplus = static_cast<off_t>(written - whole);
+  if (end >= surplus && ::ftruncate(descriptor_, end - surplus) != 0) {
+    // The caller reports the error that led here.
+  }
+  forget(whole);
+}
+
+void CsvFile::forget(std::size_t bytes) {
+  buffer_.erase(0, bytes);
+  finished_ -= bytes;
 }
 
 }  // namespace sls::record

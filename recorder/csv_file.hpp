@@ -40,10 +40,13 @@ class CsvFile {
 
  private:
   void add_field(std::string_view text);
+  void cut_back_to_whole_rows(std::size_t written);
+  void forget(std::size_t bytes);
 
   const std::filesystem::path path_;
   int descriptor_ = -1;
   std::string buffer_;
+  std::size_t finished_ = 0;  // bytes of the buffer that are whole rows
   bool row_begun_ = false;
   std::uint64_t rows_ = 0;
 };

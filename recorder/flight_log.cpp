@@ -3,6 +3,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <cmath>
 #include <variant>
 
 #include "common/bus/convert.hpp"
@@ -55,12 +56,14 @@ FlightLog::Stage& FlightLog::find_or_begin_stage(const StepRecord& record) {
 std::size_t FlightLog::calc_lap(const Stage& stage, std::size_t index, std::uint64_t step) const {
   const auto& planned = scenario_.mission[index];
   const auto& eight = std::get<config::FigureEightReference>(planned.reference);
-  const auto lap = static_cast<std::size_t>(to_time(step - stage.first_step) / eight.period_s);
+  // Whole nanoseconds: quotients of seconds may fall just short of the next lap.
+  const auto lap_ns = std::max<std::int64_t>(std::llround(eight.period_s * 1e9), 1);
+  const auto flown_ns =
+      static_cast<std::int64_t>(step - stage.first_step) * parameters_.period_ns();
+  const std::int64_t lap = std::max<std::int64_t>(flown_ns / lap_ns, 0);
   const auto* timed = std::get_if<config::LeaveAfter>(&planned.leave);
-  if (!timed) return lap;
-  const auto laps = static_cast<std::size_t>(
-      static_cast<double>(timed->duration_ns) / 1e9 / eight.period_s + 1e-9);
-  return laps == 0 ? lap : std::min(lap, laps - 1);
+  const std::int64_t laps = timed ? timed->duration_ns / lap_ns : 0;
+  return static_cast<std::size_t>(laps == 0 ? lap : std::min(lap, laps - 1));
 }
 
 void FlightLog::add(const StepRecord& record) {
@@ -89,8 +92,10 @@ void FlightLog::add(const SimStatus& status) {
 }
 
 void FlightLog::add_event(const std::string& text) {
-  events_.push_back(fmt::format("step {} ({} s): {}", last_status_.step(),
-                                to_time(last_status_.step()), text));
+  std::string line =
+      fmt::format("step {} ({} s): {}", last_status_.step(), to_time(last_status_.step()), text);
+  std::replace(line.begin(), line.end(), '\n', ' ');
+  events_.push_back(std::move(line));
 }
 
 void FlightLog::write(std::ostream& out) const {
@@ -129,7 +134,8 @@ void FlightLog::write(std::ostream& out) const {
   const SyncCounters& counters = last_status_.counters();
   out << fmt::format(
       "Commands\n  states resent {}, duplicate {}, superseded {}, late {}, take-overs {}\n"
-      "  rejected: not finite {}, force limit {}, run {}, step {}, vehicle {}, client {}, fault {}\n",
+      "  rejected: not finite {}, force limit {}, run {}, step {}, vehicle {}, client {}, fault "
+      "{}\n",
       counters.resent(), counters.duplicate(), counters.superseded(), counters.late(),
       counters.take_overs(), counters.rejected_not_finite(), counters.rejected_force_limit(),
       counters.rejected_run(), counters.rejected_step(), counters.rejected_vehicle(),

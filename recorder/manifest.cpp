@@ -3,10 +3,10 @@
 #include <gnu/libc-version.h>
 #include <sys/utsname.h>
 
+#include <spdlog/fmt/fmt.h>
 #include <cerrno>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <spdlog/fmt/fmt.h>
 #include <system_error>
 
 #include "common/app/options.hpp"
@@ -69,31 +69,31 @@ void write_manifest(const std::filesystem::path& folder, const Manifest& manifes
                        {"from", steps.from},
                        {"to", steps.to}});
 
-  const Json json = {
-      {"complete", manifest.complete},
-      {"outcome", manifest.outcome},
-      {"reason", manifest.reason},
-      {"run_id", fmt::format("{:016x}", parameters.run_id())},
-      {"scenario", manifest.scenario_name},
-      {"scenario_sha256", parameters.scenario_sha256().to_string()},
-      {"vehicle_ids", parameters.vehicle_ids()},
-      {"period_s", static_cast<double>(parameters.period_ns()) / 1e9},
-      {"step_s", static_cast<double>(parameters.step_ns()) / 1e9},
-      {"mode", bus::to_string(parameters.mode())},
-      {"last_step", manifest.last_step},
-      {"versions",
-       {{"recorder", app::version()},
-        {"sim_server", parameters.version().to_string()},
-        {"fast_dds", bus::middleware_version()}}},
-      {"machine", describe_machine()},
-      {"files", files},
-      {"missing", missing},
-      {"refused_samples", manifest.refused_samples}};
+  const Json json = {{"complete", manifest.complete},
+                     {"outcome", manifest.outcome},
+                     {"reason", manifest.reason},
+                     {"run_id", fmt::format("{:016x}", parameters.run_id())},
+                     {"scenario", manifest.scenario_name},
+                     {"scenario_sha256", parameters.scenario_sha256().to_string()},
+                     {"vehicle_ids", parameters.vehicle_ids()},
+                     {"period_s", static_cast<double>(parameters.period_ns()) / 1e9},
+                     {"step_s", static_cast<double>(parameters.step_ns()) / 1e9},
+                     {"mode", bus::to_string(parameters.mode())},
+                     {"last_step", manifest.last_step},
+                     {"versions",
+                      {{"recorder", app::version()},
+                       {"sim_server", parameters.version().to_string()},
+                       {"fast_dds", bus::middleware_version()}}},
+                     {"machine", describe_machine()},
+                     {"files", files},
+                     {"missing", missing},
+                     {"refused_samples", manifest.refused_samples}};
 
   const auto target = folder / "manifest.json";
   const auto part = folder / "manifest.json.part";
   std::ofstream stream(part, std::ios::binary | std::ios::trunc);
-  stream << json.dump(2) << '\n';
+  // Texts that came over the wire may be cut within a letter: no reason to have no manifest.
+  stream << json.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';
   stream.close();
   if (!stream) {
     const int error = errno;

@@ -7,6 +7,7 @@
 
 #include "common/app/run_main.hpp"
 #include "common/app/stop_signal.hpp"
+#include "common/app/wait.hpp"
 #include "recorder/recording.hpp"
 
 namespace sls::record {
@@ -14,13 +15,12 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto kPollTime = 20ms;          // between two looks at the run
-constexpr auto kWriteTime = 50ms;         // the writing thread's longest sleep
-constexpr auto kJoinTime = 60s;           // until a run must be found
-constexpr auto kReportTime = 5s;          // between two lines about the same wait
-constexpr auto kCompletionTime = 10s;     // for what is missing after the end of a finished run
-constexpr auto kFailedTime = 1s;          // likewise of a failed one
-constexpr auto kInterruptionTime = 500ms; // likewise after a stop signal
+constexpr auto kPollTime = 20ms;           // between two looks at the run
+constexpr auto kWriteTime = 5ms;           // between two batches of the writing thread
+constexpr double kJoinTimeout = 60;        // until a run must be found
+constexpr auto kCompletionTime = 10s;      // for what is missing after the end of a finished run
+constexpr auto kFailedTime = 1s;           // likewise of a failed one
+constexpr auto kInterruptionTime = 500ms;  // likewise after a stop signal
 constexpr std::size_t kMailboxSize = 65536;
 
 }  // namespace
@@ -31,26 +31,30 @@ Recorder::Recorder(bus::Node& node, const std::filesystem::path& folder)
       participants_(node),
       servers_(node, [this](const SimStatus& status) { samples_.put(status); }),
       participant_writer_(node),
-      state_reader_(node, bus::kRecorderReaderProfile,
-                    [this](const VehicleState& sample, const bus::PeerId&) {
-                      samples_.put(sample);
-                    }),
-      command_reader_(node, bus::kRecorderReaderProfile,
-                      [this](const ControlCommand& sample, const bus::PeerId&) {
-                        samples_.put(sample);
-                      }),
-      reference_reader_(node, bus::kRecorderReaderProfile,
-                        [this](const Reference& sample, const bus::PeerId&) {
-                          samples_.put(sample);
-                        }) {}
+      state_reader_(
+          node, bus::kRecorderReaderProfile,
+          [this](const VehicleState& sample, const bus::PeerId&) { samples_.put(sample); }),
+      command_reader_(
+          node, bus::kRecorderReaderProfile,
+          [this](const ControlCommand& sample, const bus::PeerId&) { samples_.put(sample); }),
+      reference_reader_(
+          node, bus::kRecorderReaderProfile,
+          [this](const Reference& sample, const bus::PeerId&) { samples_.put(sample); }) {}
 
 void Recorder::run() {
   join_run();
   if (!run_) return;  // interrupted
   std::thread writing([this] { write_samples(); });
-  watch();
+  std::exception_ptr watching_error;  // kept until the thread has closed its files
+  try {
+    watch();
+  } catch (...) {
+    watching_error = std::current_exception();
+    interruption_ = "the recorder failed";
+  }
   stop_writing_ = true;
   writing.join();
+  if (watching_error) std::rethrow_exception(watching_error);
   announce(true);
   // The others wait for this announcement before they leave; it must reach them before we do.
   participant_writer_.wait_for_acknowledgments(1s);
@@ -61,18 +65,13 @@ void Recorder::run() {
 
 void Recorder::join_run() {
   announce(false);
-  const auto deadline = Clock::now() + kJoinTime;
-  auto next_report = Clock::now() + kReportTime;
+  app::Wait wait(kJoinTimeout);
   while (!(run_ = servers_.find_joinable(0)) && app::stop_signal() == 0) {
-    const auto now = Clock::now();
-    if (now >= deadline)
+    if (wait.is_over())
       throw app::RunError(fmt::format("{}: nothing recorded: no server within {} s",
-                                      folder_.string(), std::chrono::seconds(kJoinTime).count()));
-    if (now >= next_report) {
-      spdlog::info("waiting for: server ({:.0f} s left)",
-                   std::chrono::duration<double>(deadline - now).count());
-      next_report += kReportTime;
-    }
+                                      folder_.string(), kJoinTimeout));
+    if (wait.is_report_due())
+      spdlog::info("waiting for: server ({:.0f} s left)", wait.seconds_left());
     std::this_thread::sleep_for(kPollTime);
   }
   if (!run_) return;
@@ -102,8 +101,8 @@ void Recorder::watch() {
   while (!has_all_ && !writing_failed_) {
     const auto status = servers_.find_status(run_->parameters.run_id());
     if (app::stop_signal() != 0) {
-      interruption_ = app::stop_signal() == SIGINT ? "interrupted by SIGINT"
-                                                   : "interrupted by SIGTERM";
+      interruption_ =
+          app::stop_signal() == SIGINT ? "interrupted by SIGINT" : "interrupted by SIGTERM";
       end_by(kInterruptionTime);
     } else if (status && status->phase() == PHASE_FINISHED) {
       end_by(kCompletionTime);
@@ -143,13 +142,15 @@ void Recorder::write_samples() {
     Recording recording(folder_, run_->parameters);
     bool is_stopped = false;
     while (!recording.has_all() && !is_stopped) {
-      const auto sample = samples_.take(Clock::now() + kWriteTime);
-      if (sample) std::visit([&](const auto& message) { recording.add(message); }, *sample);
-      is_stopped = !sample && stop_writing_;
+      is_stopped = stop_writing_;  // what is there by now is still taken
+      for (const Sample& sample : samples_.take_all())
+        std::visit([&](const auto& message) { recording.add(message); }, sample);
       recording.flush_if_due();
       last_complete_step_ = recording.last_complete_step();
+      std::this_thread::sleep_for(kWriteTime);
     }
-    if (!recording.finish(is_stopped ? interruption_ : "", samples_.refused()))
+    const std::string interruption = recording.has_all() ? "" : interruption_;
+    if (!recording.finish(interruption, samples_.refused()))
       gaps_ = recording.describe_gaps();
     last_complete_step_ = recording.last_complete_step();
     has_all_ = true;

@@ -79,18 +79,17 @@ bool Recording::is_finished() const { return last_status_.phase() == PHASE_FINIS
 bool Recording::has_ended() const { return is_finished() || last_status_.phase() == PHASE_FAILED; }
 
 void Recording::write(std::uint32_t vehicle_id, const StepRecord& record) {
-  const bool answer_expected = is_finished() || !has_ended() || record.step < last_status_.step();
   if (record.state)
     write_row(states_, *record.state);
   else
     note_missing(vehicle_id, "sls/state", record.step);
   if (record.command)
     write_row(commands_, *record.command);
-  else if (answer_expected)
+  else if (record.is_answer_expected)
     note_missing(vehicle_id, "sls/command", record.step);
   if (record.reference)
     write_row(references_, *record.reference);
-  else if (answer_expected)
+  else if (record.is_answer_expected)
     note_missing(vehicle_id, "sls/reference", record.step);
   if (record.is_complete())
     write_flight_row(flight_, *record.state, *record.command, *record.reference);
@@ -103,9 +102,10 @@ void Recording::note_missing(std::uint32_t vehicle_id, const char* topic, std::u
 
 void Recording::note_missing_range(std::uint32_t vehicle_id, const char* topic, std::uint64_t from,
                                    std::uint64_t to) {
-  const auto last = std::find_if(missing_.rbegin(), missing_.rend(), [&](const MissingSteps& steps) {
-    return steps.vehicle_id == vehicle_id && steps.topic == topic;
-  });
+  const auto last =
+      std::find_if(missing_.rbegin(), missing_.rend(), [&](const MissingSteps& steps) {
+        return steps.vehicle_id == vehicle_id && steps.topic == topic;
+      });
   if (last != missing_.rend() && last->to + 1 == from)
     last->to = to;
   else
@@ -123,9 +123,8 @@ void Recording::flush_if_due() {
 }
 
 bool Recording::has_all() const {
-  return has_ended() && std::all_of(vehicles_.begin(), vehicles_.end(), [](const auto& vehicle) {
-           return vehicle.second.has_ended();
-         });
+  return has_ended() && std::all_of(vehicles_.begin(), vehicles_.end(),
+                                    [](const auto& vehicle) { return vehicle.second.has_ended(); });
 }
 
 std::int64_t Recording::last_complete_step() const {
@@ -135,23 +134,27 @@ std::int64_t Recording::last_complete_step() const {
 }
 
 bool Recording::finish(const std::string& interruption, std::uint64_t refused_samples) {
+  // Of a failed run's last step there may be nothing: it need not have been published.
+  const std::uint64_t end = is_finished() ? last_status_.step() + 1 : last_status_.step();
   for (auto& [id, vehicle] : vehicles_) {
     vehicle.give_up();
     const auto next = static_cast<std::uint64_t>(vehicle.last_step() + 1);
-    if (has_ended() && next <= last_status_.step()) {
+    if (has_ended() && next < end) {
       for (const char* topic : {"sls/state", "sls/command", "sls/reference"})
-        note_missing_range(id, topic, next, last_status_.step());
+        note_missing_range(id, topic, next, end - 1);
     }
   }
+  interruption_ = interruption;
+  refused_samples_ = refused_samples;
   const bool complete = is_finished() && missing_.empty() && refused_samples == 0;
 
   Manifest manifest;
   manifest.parameters = parameters_;
   manifest.scenario_name = scenario_.name;
   manifest.complete = complete;
-  manifest.outcome = has_ended()              ? bus::to_string(last_status_.phase())
+  manifest.outcome = has_ended()            ? bus::to_string(last_status_.phase())
                      : interruption.empty() ? "lost"
-                                              : "interrupted";
+                                            : "interrupted";
   manifest.reason = interruption.empty() ? last_status_.reason().to_string() : interruption;
   manifest.last_step =
       has_ended() ? last_status_.step()
@@ -160,7 +163,7 @@ bool Recording::finish(const std::string& interruption, std::uint64_t refused_sa
   manifest.refused_samples = refused_samples;
 
   if (!interruption.empty()) log_.add_event("recorder: " + interruption);
-  if (!missing_.empty()) log_.add_event("recorder: " + describe_gaps());
+  if (!missing_.empty()) log_.add_event("recorder: " + describe_missing());
   std::ostringstream text;
   log_.write(text);
   write_text(folder_ / "flight.txt", text.str());
@@ -175,9 +178,18 @@ bool Recording::finish(const std::string& interruption, std::uint64_t refused_sa
 }
 
 std::string Recording::describe_gaps() const {
-  if (missing_.empty())
-    return fmt::format("run {}: {}", bus::to_string(last_status_.phase()),
-                       last_status_.reason().c_str());
+  std::string text;
+  const auto append = [&](const std::string& gap) { text += (text.empty() ? "" : "; ") + gap; };
+  if (!interruption_.empty()) append(interruption_);
+  if (has_ended() && !is_finished())
+    append(fmt::format("run failed: {}", last_status_.reason().c_str()));
+  if (!missing_.empty()) append(describe_missing());
+  if (refused_samples_ > 0)
+    append(fmt::format("{} samples lost because the queue was full", refused_samples_));
+  return text.empty() ? "the run has not ended" : text;
+}
+
+std::string Recording::describe_missing() const {
   std::uint64_t steps = 0;
   for (const MissingSteps& gap : missing_) steps += gap.to - gap.from + 1;
   const MissingSteps& first = missing_.front();

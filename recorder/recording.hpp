@@ -1,5 +1,5 @@
-/// One recording on disk: takes the samples of one run and keeps the files. No network here; used by
-/// one thread.
+/// One recording on disk: takes the samples of one run and keeps the files. No network here; used
+/// by one thread.
 #pragma once
 
 #include <chrono>
@@ -45,7 +45,7 @@ class Recording {
   /// recorder stops early; empty where it did not. True if the recording is complete.
   bool finish(const std::string& interruption, std::uint64_t refused_samples);
 
-  /// Why it is not complete, in one line.
+  /// Why it is not complete, in one line; after `finish`.
   std::string describe_gaps() const;
 
  private:
@@ -57,6 +57,7 @@ class Recording {
   bool has_ended() const;
   bool is_finished() const;
   void flush();
+  std::string describe_missing() const;
 
   const std::filesystem::path folder_;
   const Parameters parameters_;
@@ -66,6 +67,8 @@ class Recording {
   std::map<std::uint32_t, StepJoin> vehicles_;
   std::vector<MissingSteps> missing_;
   SimStatus last_status_;
+  std::string interruption_;           // from `finish` on
+  std::uint64_t refused_samples_ = 0;  // likewise
   std::chrono::steady_clock::time_point flush_time_;
 };
 

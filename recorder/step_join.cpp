@@ -1,17 +1,23 @@
 #include "recorder/step_join.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <cstring>
 
 namespace sls::record {
 namespace {
 
-/// No step can be that far ahead: the server keeps within 2,000 of what a recorder holds. It bounds
-/// the memory a wrong sample can take.
+/// A step for which something is missing while so many later states are in has lost it for good;
+/// what came after must not wait in memory for it. Answers can be no further ahead: the server
+/// keeps within 2,000 steps of what a recorder holds, and whoever answers more than it asked is not
+/// heard.
+constexpr std::uint64_t kMaxPending = 16384;
+
+/// No state can be that far ahead either. It bounds the memory a wrong sample can take.
 constexpr std::uint64_t kMaxAhead = 65536;
 
-/// A step for which something is missing while so many later ones are in has lost it for good; what
-/// came after must not wait in memory for it.
-constexpr std::size_t kMaxPending = 16384;
+/// Different answers kept for one step: more than any number of clients that fly one vehicle.
+constexpr std::size_t kMaxAnswers = 32;
 
 template <class Sample>
 const Sample* find_by_client(const std::vector<Sample>& samples, const std::string& client) {
@@ -21,22 +27,41 @@ const Sample* find_by_client(const std::vector<Sample>& samples, const std::stri
   return found == samples.end() ? nullptr : &*found;
 }
 
-/// Adds `sample` unless its client already has one there.
+/// Of one client and alike in what decides whether it is the one that was applied. Anybody can send
+/// under any name, so the name alone does not say that.
+bool are_copies(const ControlCommand& a, const ControlCommand& b) {
+  return a.client_name() == b.client_name() && a.mission() == b.mission() &&
+         std::memcmp(a.f_Q_W_n().data(), b.f_Q_W_n().data(), sizeof a.f_Q_W_n()) == 0;
+}
+bool are_copies(const Reference& a, const Reference& b) {
+  return a.client_name() == b.client_name();
+}
+
+/// True for what the server takes as the end of a mission.
+bool ends_mission(const ControlCommand& command) {
+  const auto& force = command.f_Q_W_n();
+  return command.mission() == MISSION_FINISHED && command.fault() == FAULT_NONE &&
+         std::all_of(force.begin(), force.end(), [](double x) { return std::isfinite(x); });
+}
+
+/// Adds `sample` unless a copy of it is there, or too many others.
 template <class Sample>
-bool add_per_client(std::vector<Sample>& samples, const Sample& sample) {
-  if (find_by_client(samples, sample.client_name().to_string())) return false;
+bool add_answer(std::vector<Sample>& samples, const Sample& sample) {
+  const bool is_known = std::any_of(samples.begin(), samples.end(),
+                                    [&](const Sample& known) { return are_copies(known, sample); });
+  if (is_known || samples.size() >= kMaxAnswers) return false;
   samples.push_back(sample);
   return true;
 }
 
 }  // namespace
 
-StepJoin::Pending* StepJoin::find(std::uint64_t step) {
+StepJoin::Pending* StepJoin::find(std::uint64_t step, std::uint64_t max_ahead) {
   if (step < next_step_) {
     ++dropped_.repeated;
     return nullptr;
   }
-  if (step - next_step_ > kMaxAhead) {
+  if (step - next_step_ >= max_ahead) {
     ++dropped_.out_of_range;
     return nullptr;
   }
@@ -46,7 +71,7 @@ StepJoin::Pending* StepJoin::find(std::uint64_t step) {
 }
 
 void StepJoin::add(const VehicleState& state) {
-  Pending* pending = find(state.step());
+  Pending* pending = find(state.step(), kMaxAhead);
   if (!pending) return;
   if (pending->state) {
     ++dropped_.repeated;
@@ -57,16 +82,16 @@ void StepJoin::add(const VehicleState& state) {
 }
 
 void StepJoin::add(const ControlCommand& command) {
-  Pending* pending = find(command.step());
+  Pending* pending = find(command.step(), kMaxPending);
   if (!pending) return;
-  if (!add_per_client(pending->commands, command)) ++dropped_.repeated;
+  if (!add_answer(pending->commands, command)) ++dropped_.repeated;
   hand_on_complete_steps();
 }
 
 void StepJoin::add(const Reference& reference) {
-  Pending* pending = find(reference.step());
+  Pending* pending = find(reference.step(), kMaxPending);
   if (!pending) return;
-  if (!add_per_client(pending->references, reference)) ++dropped_.repeated;
+  if (!add_answer(pending->references, reference)) ++dropped_.repeated;
   hand_on_complete_steps();
 }
 
@@ -91,21 +116,36 @@ StepRecord StepJoin::make_record(const Pending& pending) const {
   StepRecord record;
   record.step = next_step_;
   record.state = pending.state;
+  record.is_answer_expected =
+      end_ ? end_->is_finished || next_step_ < end_->step : pending_.size() > 1;
   const auto client = find_applied_client(next_step_);
   if (!client) return record;
-  const bool is_end = is_last(next_step_);
-  if (const auto* command = find_by_client(pending.commands, *client)) {
-    // The force that state k + 1 says was applied is the one this client answered, or the row would
-    // be wrong.
-    if (is_end || pending_[1].state->f_Q_W_n() == command->f_Q_W_n()) record.command = *command;
-  } else if (is_end && !end_->is_finished && !pending.commands.empty()) {
-    record.command = pending.commands.front();
-  }
-  if (const auto* reference = find_by_client(pending.references, *client))
+  if (const ControlCommand* command = find_applied_command(pending, *client))
+    record.command = *command;
+  const bool is_any_taken = is_last(next_step_) && !end_->is_finished;
+  if (const auto* reference = find_by_client(
+          pending.references, record.command ? record.command->client_name().to_string() : *client))
     record.reference = *reference;
-  else if (is_end && !end_->is_finished && !pending.references.empty())
+  else if (is_any_taken && !pending.references.empty())
     record.reference = pending.references.front();
   return record;
+}
+
+/// What the client is known to have sent that was applied: the force that state k + 1 says, or the
+/// end of the mission.
+const ControlCommand* StepJoin::find_applied_command(const Pending& pending,
+                                                     const std::string& client) const {
+  const auto& commands = pending.commands;
+  const bool is_end = is_last(next_step_);
+  const auto applied =
+      std::find_if(commands.begin(), commands.end(), [&](const ControlCommand& command) {
+        if (!(command.client_name() == client)) return false;
+        if (is_end) return !end_->is_finished || ends_mission(command);
+        return pending_[1].state->f_Q_W_n() == command.f_Q_W_n();
+      });
+  if (applied != commands.end()) return &*applied;
+  const bool is_any_taken = is_end && !end_->is_finished && !commands.empty();
+  return is_any_taken ? &commands.front() : nullptr;
 }
 
 void StepJoin::hand_on_complete_steps() {

@@ -19,13 +19,14 @@ struct StepRecord {
   std::optional<VehicleState> state;
   std::optional<ControlCommand> command;
   std::optional<Reference> reference;
+  bool is_answer_expected = true;  ///< not so for the last step of a run that failed or was lost
 
   bool is_complete() const { return state && command && reference; }
 };
 
 /// Samples dropped on purpose, by reason.
 struct DroppedSamples {
-  std::uint64_t repeated = 0;      ///< the same sample again: a resent state, a repeated answer
+  std::uint64_t repeated = 0;      ///< a resent state, a repeated answer, one to a step handed on
   std::uint64_t other_client = 0;  ///< answers of clients whose force was not applied
   std::uint64_t out_of_range = 0;  ///< steps that no run could have reached yet
 };
@@ -60,13 +61,15 @@ class StepJoin {
  private:
   struct Pending {
     std::optional<VehicleState> state;
-    std::vector<ControlCommand> commands;    // one per client
-    std::vector<Reference> references;       // one per client
+    std::vector<ControlCommand> commands;  // different ones
+    std::vector<Reference> references;     // one per client
   };
 
-  Pending* find(std::uint64_t step);
+  Pending* find(std::uint64_t step, std::uint64_t max_ahead);
   std::optional<std::string> find_applied_client(std::uint64_t step) const;
   StepRecord make_record(const Pending& pending) const;
+  const ControlCommand* find_applied_command(const Pending& pending,
+                                             const std::string& client) const;
   bool is_last(std::uint64_t step) const;
   void hand_on_complete_steps();
   void hand_on_first();

@@ -4,13 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "common/bus/names.hpp"
 
 namespace sls::sim {
 namespace {
 
-constexpr std::size_t kRememberedAnswers = 64;  // copies older than that are rejected as wrong steps
+constexpr std::size_t kRememberedAnswers =
+    64;  // copies older than that are rejected as wrong steps
 
 bool is_finite(const ControlCommand& command) {
   const auto all_finite = [](const std::array<double, 3>& vector) {
@@ -64,13 +66,13 @@ void CommandGate::set_clients(const std::vector<ReadyClient>& clients) {
   std::vector<Client> updated;
   for (const ReadyClient& identity : clients) {
     Client client;
-    if (const Client* known = find_client(identity.peer)) client = *known;
+    if (Client* known = find_client(identity.peer)) client = std::exchange(*known, {});
     client.identity = identity;
     updated.push_back(std::move(client));
   }
-  std::sort(updated.begin(), updated.end(), [](const Client& a, const Client& b) {
-    return is_stronger(a.identity, b.identity);
-  });
+  drop_held();  // of those that have left
+  std::sort(updated.begin(), updated.end(),
+            [](const Client& a, const Client& b) { return is_stronger(a.identity, b.identity); });
   clients_ = std::move(updated);
   settle();
 }
@@ -82,8 +84,13 @@ void CommandGate::expect(std::uint64_t step) {
   }
   step_ = step;
   accepted_.reset();
+  drop_held();
+  for (Client& client : clients_) client.refusal.clear();
+}
+
+void CommandGate::drop_held() {
   for (Client& client : clients_) {
-    client.refusal.clear();
+    if (client.held) count(Verdict::kSuperseded);
     client.held.reset();
   }
 }
@@ -110,23 +117,26 @@ Verdict CommandGate::judge(const ControlCommand& command, const bus::PeerId& sen
   if (command.step() != step_)
     return defect != Verdict::kAccepted ? defect : judge_past(command, sender);
   if (defect != Verdict::kAccepted) {
-    if (client && !accepted_) {
+    if (client && !accepted_ && !client->held) {
       client->refusal = fmt::format("controller '{}' answered step {} with {}",
                                     client->identity.name, step_, to_string(defect));
       if (defect == Verdict::kForceLimit)
-        client->refusal += fmt::format(": {:.6g} N > {:.6g} N", calc_norm(command.f_Q_W_n()),
-                                       force_limit_n_);
+        client->refusal +=
+            fmt::format(": {:.6g} N > {:.6g} N", calc_norm(command.f_Q_W_n()), force_limit_n_);
       if (defect == Verdict::kFault)
-        client->refusal += fmt::format(": {}", bus::to_string(command.fault()));
+        client->refusal +=
+            fmt::format(": {}", command.fault() == FAULT_NONE ? "mission failed"
+                                                              : bus::to_string(command.fault()));
       settle();
     }
     return defect;
   }
   if (!client) return Verdict::kUnknownClient;
-  if (accepted_)
-    return accepted_from_ == sender && accepted_->f_Q_W_n() == command.f_Q_W_n()
-               ? Verdict::kDuplicate
-               : Verdict::kSuperseded;
+  // A client's first answer counts; what it sends besides is a copy or belongs to no step.
+  const auto& first = accepted_ && accepted_from_ == sender ? accepted_ : client->held;
+  if (first)
+    return first->f_Q_W_n() == command.f_Q_W_n() ? Verdict::kDuplicate : Verdict::kWrongStep;
+  if (accepted_) return Verdict::kSuperseded;
   client->silent = false;
   client->held = command;
   settle();
@@ -148,10 +158,9 @@ void CommandGate::settle() {
   if (accepted_) return;
   const Client* awaited = find_awaited();
   if (!awaited || !awaited->held) return;
-  accepted_ = awaited->held;
   accepted_from_ = awaited->identity.peer;
-  for (const Client& client : clients_)
-    if (&client != awaited && client.held) count(Verdict::kSuperseded);
+  accepted_ = std::exchange(find_client(accepted_from_)->held, std::nullopt);
+  drop_held();
 }
 
 const CommandGate::Client* CommandGate::find_awaited() const {

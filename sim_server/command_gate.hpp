@@ -2,6 +2,7 @@
 /// Rules: design of the synchroniser in README.md.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -14,9 +15,9 @@
 namespace sls::sim {
 
 enum class Verdict {
-  kAccepted,   ///< the answer to the awaited step; it will be applied
-  kHeld,       ///< a valid answer of a client that is not the awaited one: kept for a take-over
-  kDuplicate,  ///< copy of an accepted command
+  kAccepted,    ///< the answer to the awaited step; it will be applied
+  kHeld,        ///< a valid answer of a client that is not the awaited one: kept for a take-over
+  kDuplicate,   ///< copy of an accepted or held command
   kSuperseded,  ///< valid, but a stronger client's answer was taken
   kNotFinite,
   kForceLimit,
@@ -72,13 +73,14 @@ class CommandGate {
     ReadyClient identity;
     bool silent = false;
     std::string refusal;                 // why its answer to the awaited step was refused
-    std::optional<ControlCommand> held;  // its valid answer to the awaited step
+    std::optional<ControlCommand> held;  // its first valid answer to the awaited step
   };
 
   Verdict judge(const ControlCommand& command, const bus::PeerId& sender);
   Verdict judge_past(const ControlCommand& command, const bus::PeerId& sender) const;
   void count(Verdict verdict);
   void settle();
+  void drop_held();
   Client* find_client(const bus::PeerId& peer);
   const Client* find_awaited() const;
 

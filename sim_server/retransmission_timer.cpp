@@ -12,11 +12,16 @@ RetransmissionTimer::Duration RetransmissionTimer::timeout() const {
 }
 
 void RetransmissionTimer::answered(Duration round_trip) {
-  if (resends_ == 0)
+  if (!is_ambiguous_) {
     smoothed_ = smoothed_ == Duration::zero() ? round_trip : (7 * smoothed_ + round_trip) / 8;
-  resends_ = 0;
+    resends_ = 0;
+  }
+  is_ambiguous_ = false;
 }
 
-void RetransmissionTimer::resent() { ++resends_; }
+void RetransmissionTimer::resent() {
+  ++resends_;
+  is_ambiguous_ = true;
+}
 
 }  // namespace sls::sim

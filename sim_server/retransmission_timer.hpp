@@ -5,8 +5,9 @@
 namespace sls::sim {
 
 /// When to send a state again because no answer came: four times the smoothed round trip, doubling
-/// with every resend of the same step up to 100 ms. Only unambiguous round trips count (a step that
-/// was sent once: Karn's rule).
+/// with every resend up to 100 ms. Karn's rules: only unambiguous round trips count, of a step that
+/// was sent once; and until there is one the doubled time stays in force for the steps that follow,
+/// or a link that has become slower than the timeout would never be measured again.
 class RetransmissionTimer {
  public:
   using Duration = std::chrono::nanoseconds;
@@ -28,7 +29,8 @@ class RetransmissionTimer {
 
  private:
   Duration smoothed_{0};
-  int resends_ = 0;  // of the current step
+  int resends_ = 0;            // since the last unambiguous round trip
+  bool is_ambiguous_ = false;  // the current step was sent more than once
 };
 
 }  // namespace sls::sim

@@ -33,8 +33,8 @@ std::vector<ReadyClient> find_ready_clients(const Roster& roster,
   std::vector<ReadyClient> clients;
   for (const Entry& entry : roster.controllers)
     if (entry.announcement.ready() && entry.announcement.scenario_sha256() == scenario_sha256)
-      clients.push_back({entry.peer, entry.announcement.name().to_string(),
-                         entry.announcement.strength()});
+      clients.push_back(
+          {entry.peer, entry.announcement.name().to_string(), entry.announcement.strength()});
   return clients;
 }
 
@@ -70,8 +70,8 @@ std::string name_blocking_recorder(const Roster& roster, int expected, std::uint
   for (const Entry& entry : roster.recorders) {
     if (!entry.announcement.ready()) continue;
     ++ready;
-    const std::int64_t behind =
-        static_cast<std::int64_t>(step) - 1 - entry.announcement.last_complete_step();
+    const std::int64_t last = std::max<std::int64_t>(entry.announcement.last_complete_step(), -1);
+    const std::int64_t behind = static_cast<std::int64_t>(step) - 1 - last;
     if (behind >= kRecorderWindow)
       return fmt::format("recorder {}: {} steps behind", describe(entry), behind);
   }

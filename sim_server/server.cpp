@@ -18,13 +18,11 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto kClaimTime = 1s;        // how long a claim on the vehicles is open to objection
-constexpr auto kLingerTime = 10s;      // how long recorders may take to be done
-constexpr auto kReportTime = 5s;       // between two lines about the same wait
-constexpr auto kFirstReportTime = 1s;  // until a stalled step is reported
-constexpr auto kStatusTime = 500ms;    // between two status samples of a running flight
-constexpr auto kRosterTime = 100ms;    // until a silent departure is looked for
-constexpr auto kPollTime = 20ms;       // while nothing is in a hurry
+constexpr auto kClaimTime = 1s;      // how long a claim on the vehicles is open to objection
+constexpr auto kLingerTime = 10s;    // how long recorders may take to be done
+constexpr auto kStatusTime = 500ms;  // between two status samples of a running flight
+constexpr auto kRosterTime = 100ms;  // until a silent departure is looked for
+constexpr auto kPollTime = 20ms;     // while nothing is in a hurry
 constexpr std::size_t kMailboxSize = 4096;
 
 std::uint64_t make_run_id() {
@@ -96,16 +94,16 @@ void Server::check_claim() const {
     const int others = bus::calc_progress(other.status);
     if (others < 0 || !bus::serves_vehicle(other.parameters, vehicle_id_)) continue;
     if (others > progress || (others == progress && other.parameters.run_id() < run_id_))
-      throw app::RunError(fmt::format(
-          "vehicle {}: expected no other server on this domain, got one (run {:016x})",
-          vehicle_id_, other.parameters.run_id()));
+      throw app::RunError(
+          fmt::format("vehicle {}: expected no other server on this domain, got one (run {:016x})",
+                      vehicle_id_, other.parameters.run_id()));
   }
 }
 
 void Server::check_stop() const {
   if (app::stop_signal() != 0)
-    throw app::RunError(fmt::format("interrupted by {}",
-                                    app::stop_signal() == SIGINT ? "SIGINT" : "SIGTERM"));
+    throw app::RunError(
+        fmt::format("interrupted by {}", app::stop_signal() == SIGINT ? "SIGINT" : "SIGTERM"));
 }
 
 Roster Server::find_roster() const {
@@ -114,26 +112,20 @@ Roster Server::find_roster() const {
 
 void Server::wait_for_participants() {
   const auto& expected = scenario_.sync.wait_for;
-  const auto deadline =
-      Clock::now() + std::chrono::duration_cast<Clock::duration>(
-                         std::chrono::duration<double>(expected.timeout_s));
-  std::string reported;
-  auto next_report = Clock::now() + kFirstReportTime;
+  app::Wait wait(expected.timeout_s);
+  std::string published;
   publish_status(PHASE_WAITING, "participants are not ready");
   while (true) {
     check_stop();
     check_claim();
     const std::string missing = name_missing(find_roster(), expected, scenario_.sha256);
     if (missing.empty()) return;
-    const auto now = Clock::now();
-    if (now >= deadline)
-      throw app::RunError(
-          fmt::format("not ready within {} s: {}", expected.timeout_s, missing));
-    if (now >= next_report) {
-      spdlog::info("waiting for: {} ({:.0f} s left)", missing, to_seconds(deadline - now));
-      if (missing != reported) publish_status(PHASE_WAITING, "missing: " + missing);
-      reported = missing;
-      next_report = now + kReportTime;
+    if (wait.is_over())
+      throw app::RunError(fmt::format("not ready within {} s: {}", expected.timeout_s, missing));
+    if (wait.is_report_due()) {
+      spdlog::info("waiting for: {} ({:.0f} s left)", missing, wait.seconds_left());
+      if (missing != published) publish_status(PHASE_WAITING, "missing: " + missing);
+      published = missing;
     }
     std::this_thread::sleep_for(kPollTime);
   }
@@ -169,54 +161,48 @@ void Server::fly() {
 ControlCommand Server::exchange(const VehicleState& state) {
   gate_.expect(state.step());
   const auto first_sent = Clock::now();
-  const auto give_up = first_sent + std::chrono::duration_cast<Clock::duration>(
-                                        std::chrono::duration<double>(
-                                            scenario_.sync.wait_for.timeout_s));
-  const auto take_over = std::chrono::duration<double>(scenario_.sync.take_over_s);
-  auto silent_since = first_sent;
-  auto next_report = first_sent + kFirstReportTime;
   state_writer_.write(state);
   auto resend_at = first_sent + timer_.timeout();
-
+  std::optional<LateAnswer> late;  // most answers come before the first resend
   while (!gate_.accepted()) {
-    const auto received = commands_.take(resend_at);
-    if (received) judge(*received);
+    if (const auto received = commands_.take(resend_at)) judge(*received);
     if (const auto refusal = gate_.refusal()) throw app::RunError(*refusal);
-    if (gate_.accepted()) break;
+    if (gate_.accepted() || Clock::now() < resend_at) continue;
 
-    // Everything below happens only when the answer is late.
-    const auto now = Clock::now();
-    if (now >= resend_at) {
-      check_stop();
-      state_writer_.write(state);
-      ++gate_.counters().resent();
-      timer_.resent();
-      resend_at = now + timer_.timeout();
-      refresh_clients();
-      publish_status_now_and_then();
-    }
-    const auto awaited = gate_.awaited_client();
-    if (now - silent_since > take_over && awaited && gate_.pass_over_silent_client()) {
-      const auto next = gate_.awaited_client();
-      spdlog::warn("controller '{}' is silent at step {}: '{}' takes over", awaited->name,
-                   state.step(), next->name);
-      silent_since = now;
-    }
-    if (now >= give_up)
-      throw app::RunError(fmt::format(
-          "no answer to step {} within {} s from controller {}", state.step(),
-          scenario_.sync.wait_for.timeout_s, awaited ? "'" + awaited->name + "'" : "(gone)"));
-    if (now >= next_report) {
-      const std::string waiting =
-          awaited ? fmt::format("controller '{}'", awaited->name) : "controller: 1 expected, 0 there";
-      spdlog::warn("step {}: waiting for: {} ({:.0f} s left)", state.step(), waiting,
-                   to_seconds(give_up - now));
-      publish_status(PHASE_RUNNING, "waiting for: " + waiting);
-      next_report = now + kReportTime;
-    }
+    state_writer_.write(state);
+    ++gate_.counters().resent();
+    timer_.resent();
+    resend_at = Clock::now() + timer_.timeout();
+    if (!late) late.emplace(first_sent, scenario_.sync);
+    attend_to_late_answer(state.step(), *late);
   }
   timer_.answered(Clock::now() - first_sent);
   return *gate_.accepted();
+}
+
+void Server::attend_to_late_answer(std::uint64_t step, LateAnswer& late) {
+  check_stop();
+  refresh_clients();
+  publish_status_now_and_then();
+  const auto awaited = gate_.awaited_client();
+  const auto now = Clock::now();
+  if (awaited && now >= late.take_over_at && gate_.pass_over_silent_client()) {
+    spdlog::warn("controller '{}' is silent at step {}: '{}' takes over", awaited->name, step,
+                 gate_.awaited_client()->name);
+    late.take_over_at = now + late.take_over_time;
+  }
+  const std::string waiting =
+      awaited ? fmt::format("controller '{}'", awaited->name) : "controller (gone)";
+  report_stall(step, waiting, late.wait);
+}
+
+void Server::report_stall(std::uint64_t step, const std::string& waiting, app::Wait& wait) {
+  if (wait.is_over())
+    throw app::RunError(fmt::format("step {}: waited {} s for {}", step,
+                                    scenario_.sync.wait_for.timeout_s, waiting));
+  if (!wait.is_report_due()) return;
+  spdlog::warn("step {}: waiting for: {} ({:.0f} s left)", step, waiting, wait.seconds_left());
+  publish_status(PHASE_RUNNING, "waiting for: " + waiting);
 }
 
 void Server::judge(const Received& received) {
@@ -228,27 +214,16 @@ void Server::judge(const Received& received) {
 }
 
 void Server::wait_for_recorders(std::uint64_t step) {
-  const int expected = scenario_.sync.wait_for.recorders;
-  const auto began = Clock::now();
-  const auto give_up = began + std::chrono::duration_cast<Clock::duration>(
-                                   std::chrono::duration<double>(
-                                       scenario_.sync.wait_for.timeout_s));
-  auto next_report = began + kFirstReportTime;
-  if (began - roster_time_ > kRosterTime || participants_.version() != roster_version_)
+  if (Clock::now() - roster_time_ > kRosterTime || participants_.version() != roster_version_)
     refresh_clients();
-  for (std::string blocking = name_blocking_recorder(roster_, expected, step); !blocking.empty();
-       blocking = name_blocking_recorder(roster_, expected, step)) {
+  std::optional<app::Wait> wait;
+  while (true) {
+    const std::string blocking =
+        name_blocking_recorder(roster_, scenario_.sync.wait_for.recorders, step);
+    if (blocking.empty()) return;
     check_stop();
-    const auto now = Clock::now();
-    if (now >= give_up)
-      throw app::RunError(fmt::format("step {}: waited {} s for {}", step,
-                                      scenario_.sync.wait_for.timeout_s, blocking));
-    if (now >= next_report) {
-      spdlog::warn("step {}: waiting for: {} ({:.0f} s left)", step, blocking,
-                   to_seconds(give_up - now));
-      publish_status(PHASE_RUNNING, "waiting for: " + blocking);
-      next_report = now + kReportTime;
-    }
+    if (!wait) wait.emplace(scenario_.sync.wait_for.timeout_s);
+    report_stall(step, blocking, *wait);
     std::this_thread::sleep_for(1ms);
     refresh_clients();
   }

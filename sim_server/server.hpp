@@ -8,6 +8,7 @@
 #include <string>
 
 #include "common/app/mailbox.hpp"
+#include "common/app/wait.hpp"
 #include "common/bus/node.hpp"
 #include "common/bus/participants.hpp"
 #include "common/config/scenario.hpp"
@@ -39,10 +40,25 @@ class Server {
   void fly();
   void linger();
 
+  /// What to do about an answer that has not come by the first resend.
+  struct LateAnswer {
+    LateAnswer(Clock::time_point sent, const config::Sync& sync)
+        : take_over_time(std::chrono::duration_cast<Clock::duration>(
+              std::chrono::duration<double>(sync.take_over_s))),
+          take_over_at(sent + take_over_time),
+          wait(sync.wait_for.timeout_s) {}
+    Clock::duration take_over_time;
+    Clock::time_point take_over_at;
+    app::Wait wait;
+  };
+
   /// Publishes `state` and returns the accepted answer to it.
   ControlCommand exchange(const VehicleState& state);
+  void attend_to_late_answer(std::uint64_t step, LateAnswer& late);
   void judge(const Received& received);
   void wait_for_recorders(std::uint64_t step);
+  /// Says now and then for whom `step` waits; throws when that has taken too long.
+  void report_stall(std::uint64_t step, const std::string& waiting, app::Wait& wait);
 
   Roster find_roster() const;
   void refresh_clients();

@@ -25,8 +25,8 @@ class SeverityPrefix : public spdlog::custom_flag_formatter {
 }  // namespace
 
 void start_log(const std::string& program, const std::string& level) {
-  auto logger = std::make_shared<spdlog::logger>(
-      program, std::make_shared<spdlog::sinks::stderr_sink_mt>());
+  auto logger =
+      std::make_shared<spdlog::logger>(program, std::make_shared<spdlog::sinks::stderr_sink_mt>());
   auto formatter = std::make_unique<spdlog::pattern_formatter>();
   formatter->add_flag<SeverityPrefix>('*').set_pattern("%n: %*%v");
   logger->set_formatter(std::move(formatter));

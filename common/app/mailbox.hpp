@@ -41,6 +41,13 @@ class Mailbox {
     return item;
   }
 
+  /// All items there are, oldest first, without waiting. A thread that can afford to look only now
+  /// and then spares everybody a wake-up per item.
+  std::deque<T> take_all() {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(items_, {});
+  }
+
   /// Items refused so far.
   std::uint64_t refused() const {
     const std::lock_guard lock(mutex_);

@@ -30,6 +30,9 @@ int run_main(int argc, char** argv, CLI::App& cli, const CommonOptions& options,
   } catch (const std::exception& error) {
     spdlog::error("{}", error.what());
     code = kExitRunFailed;
+  } catch (...) {
+    spdlog::error("an exception of unknown type");
+    code = kExitRunFailed;
   }
   return stop_signal() == 0 ? code : 128 + stop_signal();
 }

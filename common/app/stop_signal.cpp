@@ -1,15 +1,19 @@
 #include "common/app/stop_signal.hpp"
 
+#include <atomic>
 #include <csignal>
 #include <initializer_list>
 
 namespace sls::app {
 namespace {
 
-volatile std::sig_atomic_t received = 0;
+// Any thread may run the handler, and others read; sig_atomic_t is for one thread only.
+std::atomic<int> received{0};
+static_assert(std::atomic<int>::is_always_lock_free, "only then a handler may touch it");
 
 extern "C" void remember_signal(int number) {
-  if (received == 0) received = number;
+  int none = 0;
+  received.compare_exchange_strong(none, number);
 }
 
 }  // namespace

@@ -1,5 +1,8 @@
 #include "common/bus/node.hpp"
 
+#include <fastrtps/config.h>
+#include <slsPubSubTypes.h>
+#include <spdlog/spdlog.h>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <fastdds/dds/log/Log.hpp>
@@ -13,9 +16,6 @@
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <fastdds/dds/subscriber/qos/DataReaderQos.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
-#include <fastrtps/config.h>
-#include <slsPubSubTypes.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -36,20 +36,24 @@ using eprosima::fastrtps::types::ReturnCode_t;
 constexpr int kMaxDomain = 232;  // beyond, RTPS port numbers overflow
 
 /// Sends the middleware's warnings and errors to our log on stderr (by itself it prints to stdout,
-/// which is for data) and keeps the last error, so that it can be named in an exception.
+/// which is for data) and keeps the first error since `clear()`, which names the cause where those
+/// that follow only say what failed because of it.
 class LogCollector : public dds::LogConsumer {
  public:
   void Consume(const dds::Log::Entry& entry) override {
     if (entry.kind == dds::Log::Kind::Info) return;
     const std::lock_guard lock(mutex());
-    if (entry.kind == dds::Log::Kind::Error) last_error() = entry.message;
+    if (entry.kind == dds::Log::Kind::Error && first_error().empty()) first_error() = entry.message;
     spdlog::debug("Fast DDS: {}", entry.message);
   }
 
-  static std::string take_last_error() {
+  static void clear() { find_first_error(); }
+
+  /// The first error since the last call of this or of `clear()`.
+  static std::string find_first_error() {
     dds::Log::Flush();
     const std::lock_guard lock(mutex());
-    return std::exchange(last_error(), {});
+    return std::exchange(first_error(), {});
   }
 
  private:
@@ -57,31 +61,35 @@ class LogCollector : public dds::LogConsumer {
     static std::mutex instance;
     return instance;
   }
-  static std::string& last_error() {
-    static std::string instance;
+  static std::string& first_error() {
+    static auto& instance = *new std::string;  // the middleware may still log while we exit
     return instance;
   }
 };
 
-/// Loads a QoS file into the factory, once per process: profiles are global there.
+/// Loads a QoS file into the factory: one for the whole process, because profiles are global there.
 void load_profiles(const std::filesystem::path& file) {
   static std::mutex mutex;
   static std::filesystem::path loaded;
   const std::lock_guard lock(mutex);
-  const auto absolute = std::filesystem::absolute(file);
-  if (absolute == loaded) return;
   check_qos_file(file);
+  const auto absolute = std::filesystem::canonical(file);
+  if (absolute == loaded) return;
+  if (!loaded.empty())  // Fast DDS would go on with the profiles it has, without a word
+    throw ConfigError(file.string() + ": expected the QoS file that this process already uses, " +
+                      loaded.string());
   // Only what the user names with --qos counts, not a stray DEFAULT_FASTRTPS_PROFILES.xml in the
   // working folder or an exported FASTRTPS_DEFAULT_PROFILES_FILE.
   setenv("SKIP_DEFAULT_XML_FILE", "1", 1);
   unsetenv("FASTRTPS_DEFAULT_PROFILES_FILE");
   dds::Log::ClearConsumers();
   dds::Log::RegisterConsumer(std::make_unique<LogCollector>());
+  LogCollector::clear();
   auto* factory = dds::DomainParticipantFactory::get_instance();
   factory->load_profiles();
   if (factory->load_XML_profiles_file(absolute.string()) != ReturnCode_t::RETCODE_OK)
     throw ConfigError(file.string() + ": expected profiles that Fast DDS takes, got: " +
-                      LogCollector::take_last_error());
+                      LogCollector::find_first_error());
   loaded = absolute;
 }
 
@@ -89,8 +97,7 @@ PeerId to_peer(const dds::InstanceHandle_t& handle) {
   eprosima::fastrtps::rtps::GUID_t guid;
   eprosima::fastrtps::rtps::iHandle2GUID(guid, handle);
   PeerId peer;
-  std::copy(std::begin(guid.guidPrefix.value), std::end(guid.guidPrefix.value),
-            peer.bytes.begin());
+  std::copy(std::begin(guid.guidPrefix.value), std::end(guid.guidPrefix.value), peer.bytes.begin());
   return peer;
 }
 
@@ -129,13 +136,14 @@ struct Node::Impl {
         ReturnCode_t::RETCODE_OK)
       throw_unknown_profile(kParticipantProfile);
     qos.name(name.c_str());
+    LogCollector::clear();
     participant = factory->create_participant(static_cast<std::uint32_t>(domain), qos);
     if (participant)
       publisher = participant->create_publisher(dds::PUBLISHER_QOS_DEFAULT),
       subscriber = participant->create_subscriber(dds::SUBSCRIBER_QOS_DEFAULT);
     if (!participant || !publisher || !subscriber)
       throw BusError("domain " + std::to_string(domain) +
-                     ": cannot join: " + LogCollector::take_last_error());
+                     ": cannot join: " + LogCollector::find_first_error());
   }
 
   ~Impl() {
@@ -160,7 +168,7 @@ struct Node::Impl {
       topic = participant->create_topic(name, type.get_type_name(), dds::TOPIC_QOS_DEFAULT);
     if (!topic)
       throw BusError(std::string(name) +
-                     ": cannot create the topic: " + LogCollector::take_last_error());
+                     ": cannot create the topic: " + LogCollector::find_first_error());
     return topic;
   }
 
@@ -197,10 +205,11 @@ AnyWriter::AnyWriter(Node& node, const char* topic, const char* profile, void* t
   dds::DataWriterQos qos;
   if (impl_->publisher->get_datawriter_qos_from_profile(profile, qos) != ReturnCode_t::RETCODE_OK)
     node.impl().throw_unknown_profile(profile);
+  LogCollector::clear();
   impl_->writer = impl_->publisher->create_datawriter(dds_topic, qos, impl_.get());
   if (!impl_->writer)
     throw ConfigError(node.impl().qos_place + ": profile '" + profile + "': expected QoS that " +
-                      topic + " can have, got: " + LogCollector::take_last_error());
+                      topic + " can have, got: " + LogCollector::find_first_error());
 }
 
 AnyWriter::~AnyWriter() {
@@ -216,9 +225,9 @@ bool AnyWriter::write(const void* sample) {
 bool AnyWriter::wait_for_acknowledgments(std::chrono::milliseconds limit) {
   const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(limit);
   const auto rest = std::chrono::nanoseconds(limit - seconds);
-  return impl_->writer->wait_for_acknowledgments(
-             {static_cast<std::int32_t>(seconds.count()),
-              static_cast<std::uint32_t>(rest.count())}) == ReturnCode_t::RETCODE_OK;
+  return impl_->writer->wait_for_acknowledgments({static_cast<std::int32_t>(seconds.count()),
+                                                  static_cast<std::uint32_t>(rest.count())}) ==
+         ReturnCode_t::RETCODE_OK;
 }
 
 std::set<PeerId> AnyWriter::matched() const { return impl_->peers.peers(); }
@@ -249,13 +258,13 @@ AnyReader::AnyReader(Node& node, const char* topic, const char* profile, void* t
   impl_->take = std::move(take);
   impl_->subscriber = node.impl().subscriber;
   dds::DataReaderQos qos;
-  if (impl_->subscriber->get_datareader_qos_from_profile(profile, qos) !=
-      ReturnCode_t::RETCODE_OK)
+  if (impl_->subscriber->get_datareader_qos_from_profile(profile, qos) != ReturnCode_t::RETCODE_OK)
     node.impl().throw_unknown_profile(profile);
+  LogCollector::clear();
   impl_->reader = impl_->subscriber->create_datareader(dds_topic, qos, impl_.get());
   if (!impl_->reader)
     throw ConfigError(node.impl().qos_place + ": profile '" + profile + "': expected QoS that " +
-                      topic + " can have, got: " + LogCollector::take_last_error());
+                      topic + " can have, got: " + LogCollector::find_first_error());
 }
 
 AnyReader::~AnyReader() {
@@ -294,14 +303,14 @@ void* make_type_support<SimStatus>() {
 }  // namespace detail
 
 std::filesystem::path default_qos_file() {
-  // build/bin/PROGRAM of a checkout, or PREFIX/bin/PROGRAM of an installation.
+  // build/bin/PROGRAM of a checkout, PREFIX/bin/PROGRAM of an installation, any other build folder.
   std::error_code error;
   const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
   const auto prefix = program.parent_path().parent_path();
   for (const auto& folder : {prefix.parent_path() / "config", prefix / "share/sls/config"})
     if (std::filesystem::exists(folder / "qos/default.xml", error))
       return folder / "qos/default.xml";
-  return "config/qos/default.xml";
+  return SLS_SOURCE_CONFIG_DIR "/qos/default.xml";
 }
 
 std::string middleware_version() { return FASTRTPS_VERSION_STR; }

@@ -26,7 +26,8 @@ class Node {
  public:
   /// Joins `domain` (0–232) with the profiles of `qos_file`; `name` shows in discovery.
   /// @throws config::ConfigError naming the file, and the line where known, if it cannot be read,
-  ///   is malformed, lacks a profile, or holds what Fast DDS refuses; or for the domain.
+  ///   is malformed, lacks a profile, or holds what Fast DDS refuses; or if it is not the one file
+  ///   that this process uses; or for the domain.
   /// @throws BusError if the participant cannot be created.
   Node(const std::filesystem::path& qos_file, int domain, const std::string& name);
   ~Node();
@@ -82,12 +83,13 @@ template <class Message>
 class Writer {
  public:
   explicit Writer(Node& node)
-      : writer_(node, Topic<Message>::kName,
-                Topic<Message>::kFlow == Flow::kStream ? kStreamWriterProfile
-                                                       : kLatchedWriterProfile,
-                detail::make_type_support<Message>()) {}
+      : writer_(
+            node, Topic<Message>::kName,
+            Topic<Message>::kFlow == Flow::kStream ? kStreamWriterProfile : kLatchedWriterProfile,
+            detail::make_type_support<Message>()) {}
 
-  /// Hands `message` to the middleware. Never call this from a reader's handler (README.md, trap 4).
+  /// Hands `message` to the middleware. Never call this from a reader's handler (README.md, trap
+  /// 4).
   /// @throws BusError if it was not taken: the history stayed full for `max_blocking_time`.
   void write(const Message& message) {
     if (!writer_.write(&message))

@@ -38,8 +38,7 @@ struct Found {
 void collect_profiles(const tinyxml2::XMLElement& element, const std::string& place,
                       std::map<std::string, Found>& found) {
   if (const char* name = element.Attribute("profile_name")) {
-    const auto [earlier, is_new] =
-        found.emplace(name, Found{element.Name(), element.GetLineNum()});
+    const auto [earlier, is_new] = found.emplace(name, Found{element.Name(), element.GetLineNum()});
     if (!is_new)
       throw ConfigError(place + ":" + std::to_string(element.GetLineNum()) + ": profile '" + name +
                         "': expected once, got a second one (the first is on line " +
@@ -56,6 +55,8 @@ std::string read_file(const std::filesystem::path& file) {
     throw ConfigError(file.string() + ": expected a QoS file, got no such file");
   if (std::filesystem::is_directory(status))
     throw ConfigError(file.string() + ": expected a QoS file, got a directory");
+  if (!std::filesystem::is_regular_file(status))  // reading it might never end
+    throw ConfigError(file.string() + ": expected a QoS file, got a pipe, socket or device");
   const auto size = std::filesystem::file_size(file, error);
   if (!error && size > kMaxBytes)
     throw ConfigError(file.string() + ": expected at most " + std::to_string(kMaxBytes) +
@@ -63,9 +64,9 @@ std::string read_file(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   std::ostringstream text;
   if (!stream || !(text << stream.rdbuf()))
-    throw ConfigError(file.string() + ": expected a readable QoS file, got " +
-                      (size == 0 ? std::string("an empty file")
-                                 : std::generic_category().message(errno)));
+    throw ConfigError(
+        file.string() + ": expected a readable QoS file, got " +
+        (size == 0 ? std::string("an empty file") : std::generic_category().message(errno)));
   return text.str();
 }
 

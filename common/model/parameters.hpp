@@ -17,13 +17,13 @@ struct SlungLoadParameters {
 
 /// The air the quadrotor moves through; zero drag switches it off.
 struct Aerodynamics {
-  double rotor_drag = 0.0;                              ///< D, N·s/m, ≥ 0
+  double rotor_drag = 0.0;                             ///< D, N·s/m, ≥ 0
   Eigen::Vector3d v_wind_W = Eigen::Vector3d::Zero();  ///< velocity of the air, m/s
 };
 
 inline bool operator==(const SlungLoadParameters& a, const SlungLoadParameters& b) {
-  return a.quad_mass == b.quad_mass && a.load_mass == b.load_mass &&
-         a.rod_length == b.rod_length && a.gravity == b.gravity;
+  return a.quad_mass == b.quad_mass && a.load_mass == b.load_mass && a.rod_length == b.rod_length &&
+         a.gravity == b.gravity;
 }
 inline bool operator==(const Aerodynamics& a, const Aerodynamics& b) {
   return a.rotor_drag == b.rotor_drag && a.v_wind_W == b.v_wind_W;

@@ -8,8 +8,8 @@ RodDirection to_direction(const RodAngles& angles) {
   const double sin_a = std::sin(angles.alpha), cos_a = std::cos(angles.alpha);
   const double sin_b = std::sin(angles.beta), cos_b = std::cos(angles.beta);
   RodDirection direction;
-  direction.n_W << sin_b, -sin_a * cos_b, cos_a * cos_b;                   // Eq. (1)
-  direction.n_dot_W << cos_b * angles.beta_dot,                            // Eq. (2)
+  direction.n_W << sin_b, -sin_a * cos_b, cos_a * cos_b;  // Eq. (1)
+  direction.n_dot_W << cos_b * angles.beta_dot,           // Eq. (2)
       -cos_a * cos_b * angles.alpha_dot + sin_a * sin_b * angles.beta_dot,
       -sin_a * cos_b * angles.alpha_dot - cos_a * sin_b * angles.beta_dot;
   return direction;
@@ -23,12 +23,12 @@ RodAngles to_angles(const RodDirection& direction) {
   // and stay right when the load is above the quadrotor.
   const double cos_b = std::hypot(n.y(), n.z());
   angles.beta = std::atan2(n.x(), cos_b);
-  angles.alpha = std::atan2(-n.y(), n.z());
+  angles.alpha = std::atan2(0.0 - n.y(), n.z());  // 0 − x: a hanging rod has no −0
   // Eq. (4), with the divisions by cos α and, for β̇, by cos β removed by (2).
   const double sin_a = std::sin(angles.alpha), cos_a = std::cos(angles.alpha);
   const double sin_b = std::sin(angles.beta);
   angles.beta_dot = cos_b * n_dot.x() + sin_b * (sin_a * n_dot.y() - cos_a * n_dot.z());
-  angles.alpha_dot = -(cos_a * n_dot.y() + sin_a * n_dot.z()) / cos_b;
+  angles.alpha_dot = (0.0 - cos_a * n_dot.y() - sin_a * n_dot.z()) / cos_b;
   return angles;
 }
 

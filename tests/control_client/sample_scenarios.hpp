@@ -60,4 +60,41 @@ inline config::Scenario make_matlab_set_point(std::int64_t period_ns) {
   return scenario;
 }
 
+/// `gazebo_legacy`: the published plugin's flight, gains in its (reversed) order.
+inline config::Scenario make_gazebo_legacy(config::StateWiring wiring) {
+  config::Scenario scenario;
+  scenario.name = "gazebo_legacy";
+  scenario.vehicle = {1.5, 0.201, 1.1, 9.8066};
+  scenario.plant.initial.placed = config::Body::kQuadrotor;
+  scenario.controller.model.vehicle = {1.5, 0.2, 1.0, 9.8};
+  scenario.controller.state_wiring = wiring;
+  config::NamedGains gains;
+  gains.vertical.velocity = 2.2361;
+  gains.vertical.position = 3.0777;
+  gains.horizontal.jerk = 3.1623;
+  gains.horizontal.acceleration = 8.4827;
+  gains.horizontal.velocity = 9.7962;
+  gains.horizontal.position = 5.4399;
+  scenario.controller.gains = gains;
+  config::LeaveWithin arrival;
+  arrival.after_ns = 15 * kSecond;
+  arrival.radius_m = 0.2;
+  arrival.body = config::Body::kQuadrotor;
+  arrival.offset << 0.0, 0.0, -0.95;
+  arrival.timeout_ns = 60 * kSecond;
+  const auto make_set_point = [&](const Eigen::Vector3d& position) {
+    config::Stage stage = make_hold(position, 0);
+    stage.kind = stage.name = "set_point";
+    stage.leave = arrival;
+    return stage;
+  };
+  scenario.mission = {make_hold({0.0, 0.0, -1.5}, 10 * kSecond),
+                      make_set_point({1.0, -1.0, -2.0}),
+                      make_set_point({-2.0, -1.0, -4.0}),
+                      make_set_point({1.0, 2.0, -3.0}),
+                      make_figure_eight_stage(-0.6),
+                      make_hold({0.0, 0.0, -1.5}, 15 * kSecond)};
+  return scenario;
+}
+
 }  // namespace sls::control

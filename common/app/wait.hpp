@@ -1,0 +1,42 @@
+#pragma once
+
+#include <chrono>
+
+namespace sls::app {
+
+/// A wait with a deadline: when to give up, and when to say for whom it is.
+class Wait {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  /// Begins now and lasts `timeout_s` seconds.
+  explicit Wait(double timeout_s)
+      : began_(Clock::now()),
+        deadline_(began_ + std::chrono::duration_cast<Clock::duration>(
+                               std::chrono::duration<double>(timeout_s))),
+        next_report_(began_ + kFirstReport) {}
+
+  bool is_over() const { return Clock::now() >= deadline_; }
+
+  /// True once after 1 s and then every 5 s: time for a line about it.
+  bool is_report_due() {
+    const auto now = Clock::now();
+    if (now < next_report_) return false;
+    next_report_ = now + kReportInterval;
+    return true;
+  }
+
+  double seconds_left() const {
+    return std::chrono::duration<double>(deadline_ - Clock::now()).count();
+  }
+
+ private:
+  static constexpr auto kFirstReport = std::chrono::seconds(1);
+  static constexpr auto kReportInterval = std::chrono::seconds(5);
+
+  Clock::time_point began_;
+  Clock::time_point deadline_;
+  Clock::time_point next_report_;
+};
+
+}  // namespace sls::app

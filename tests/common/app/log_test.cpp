@@ -1,0 +1,68 @@
+#include "common/app/log.hpp"
+
+#include <gtest/gtest.h>
+#include <spdlog/spdlog.h>
+
+#include <functional>
+#include <string>
+
+namespace sls::app {
+namespace {
+
+struct Output {
+  std::string out, err;
+};
+
+Output capture(const std::function<void()>& work) {
+  testing::internal::CaptureStdout();
+  testing::internal::CaptureStderr();
+  work();
+  Output output;
+  output.out = testing::internal::GetCapturedStdout();
+  output.err = testing::internal::GetCapturedStderr();
+  return output;
+}
+
+void log_one_of_each() {
+  spdlog::debug("a detail");
+  spdlog::info("waiting for: {} ({} s left)", "recorder", 18);
+  spdlog::warn("slow");
+  spdlog::error("broken");
+}
+
+TEST(LogTest, WritesOneLinePerEventOnStderrAndNothingOnStdout) {
+  start_log("sim_server", "info");
+  const Output output = capture(log_one_of_each);
+  EXPECT_EQ(output.err,
+            "sim_server: waiting for: recorder (18 s left)\n"
+            "sim_server: warning: slow\n"
+            "sim_server: error: broken\n");
+  EXPECT_EQ(output.out, "");
+}
+
+TEST(LogTest, ShowsFromTheLevelOn) {
+  const auto log_at = [](const char* level) {
+    start_log("x", level);
+    return capture(log_one_of_each).err;
+  };
+  EXPECT_EQ(
+      log_at("debug"),
+      "x: a detail\nx: waiting for: recorder (18 s left)\nx: warning: slow\nx: error: broken\n");
+  EXPECT_EQ(log_at("warning"), "x: warning: slow\nx: error: broken\n");
+  EXPECT_EQ(log_at("error"), "x: error: broken\n");
+}
+
+TEST(LogTest, BracesInATextAreNotAFormat) {
+  start_log("x", "info");
+  EXPECT_EQ(capture([] { spdlog::error("{}", "got {} and {1}"); }).err,
+            "x: error: got {} and {1}\n");
+}
+
+TEST(LogTest, ALaterStartReplacesTheEarlier) {
+  start_log("first", "debug");
+  start_log("second", "info");
+  EXPECT_EQ(capture([] { spdlog::info("once"); }).err, "second: once\n");
+}
+
+}  // namespace
+}  // namespace sls::app

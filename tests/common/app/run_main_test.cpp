@@ -1,0 +1,179 @@
+// Exit codes and what each outcome says on stderr and stdout.
+#include "common/app/run_main.hpp"
+
+#include <gtest/gtest.h>
+#include <spdlog/spdlog.h>
+
+#include <csignal>
+#include <cstdlib>
+#include <stdexcept>
+#include <vector>
+
+#include "common/app/stop_signal.hpp"
+#include "common/config/config_error.hpp"
+
+namespace sls::app {
+namespace {
+
+struct Outcome {
+  int code = -1;
+  std::string out, err;
+  bool worked = false;
+  CommonOptions options;
+};
+
+/// Runs a program "program" with `arguments` whose work is `work`.
+Outcome run(
+    std::vector<std::string> arguments, const std::function<void()>& work = [] {}) {
+  Outcome outcome;
+  outcome.options.qos_file = "/somewhere/default.xml";
+  CLI::App cli("Does something.");
+  add_common_options(cli, outcome.options);
+  std::string needed = "value";
+  cli.add_option("--needed", needed, "its own option")->type_name("TEXT");
+  arguments.insert(arguments.begin(), "program");
+  std::vector<char*> argv;
+  for (std::string& argument : arguments) argv.push_back(argument.data());
+  testing::internal::CaptureStdout();
+  testing::internal::CaptureStderr();
+  outcome.code =
+      run_main(static_cast<int>(argv.size()), argv.data(), cli, outcome.options, "program", [&] {
+        outcome.worked = true;
+        work();
+      });
+  outcome.out = testing::internal::GetCapturedStdout();
+  outcome.err = testing::internal::GetCapturedStderr();
+  return outcome;
+}
+
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+bool is_one_line(const std::string& text) {
+  return !text.empty() && text.find('\n') == text.size() - 1;
+}
+
+TEST(RunMainTest, DoneIsZeroAndSaysNothing) {
+  const Outcome outcome = run({});
+  EXPECT_EQ(outcome.code, 0);
+  EXPECT_TRUE(outcome.worked);
+  EXPECT_EQ(outcome.out, "");
+  EXPECT_EQ(outcome.err, "");
+}
+
+TEST(RunMainTest, AConfigurationErrorIsTwo) {
+  const Outcome outcome = run({}, [] { throw config::ConfigError("file.yaml:7: key: bad {}"); });
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_EQ(outcome.err, "program: error: file.yaml:7: key: bad {}\n");
+  EXPECT_EQ(outcome.out, "");
+}
+
+TEST(RunMainTest, AFailedRunIsOne) {
+  const Outcome outcome = run({}, [] { throw RunError("the recorder is gone"); });
+  EXPECT_EQ(outcome.code, 1);
+  EXPECT_EQ(outcome.err, "program: error: the recorder is gone\n");
+}
+
+TEST(RunMainTest, AnyOtherExceptionIsOne) {
+  EXPECT_EQ(run({}, [] { throw std::runtime_error("x"); }).code, 1);
+  EXPECT_EQ(run({}, [] { throw std::bad_alloc(); }).code, 1);
+  EXPECT_EQ(run({}, [] { throw std::system_error(ENOSPC, std::generic_category(), "f"); }).code, 1);
+  const Outcome odd = run({}, [] { throw 42; });
+  EXPECT_EQ(odd.code, 1);
+  EXPECT_TRUE(is_one_line(odd.err)) << odd.err;
+}
+
+TEST(RunMainTest, BadUsageIsTwoWithoutWork) {
+  const std::vector<std::vector<std::string>> bad = {{"--unknown"},
+                                                     {"--domain"},
+                                                     {"--domain", "233"},
+                                                     {"--domain", "-1"},
+                                                     {"--domain", "ten"},
+                                                     {"--log-level", "loud"},
+                                                     {"stray"},
+                                                     {"--domain", "1", "2"},
+                                                     {"--domain", ""},
+                                                     {"--domain", "1.5"},
+                                                     {"--domain", "99999999999999999999"}};
+  for (const auto& arguments : bad) {
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.code, 2) << arguments.back();
+    EXPECT_FALSE(outcome.worked);
+    EXPECT_TRUE(is_one_line(outcome.err)) << outcome.err;
+    EXPECT_TRUE(contains(outcome.err, "program: error: ")) << outcome.err;
+    EXPECT_TRUE(contains(outcome.err, "--help")) << outcome.err;
+    EXPECT_EQ(outcome.out, "");
+  }
+}
+
+TEST(RunMainTest, BadUsageNamesTheFlagAndTheRange) {
+  const Outcome outcome = run({"--domain", "233"});
+  EXPECT_TRUE(contains(outcome.err, "--domain")) << outcome.err;
+  EXPECT_TRUE(contains(outcome.err, "233")) << outcome.err;
+  EXPECT_TRUE(contains(outcome.err, "232")) << outcome.err;
+}
+
+TEST(RunMainTest, OptionsArriveWhereTheyBelong) {
+  const Outcome outcome = run({"--qos", "my.xml", "--domain", "232", "--log-level", "debug"},
+                              [] { spdlog::debug("d"); });
+  EXPECT_EQ(outcome.code, 0);
+  EXPECT_EQ(outcome.options.qos_file, "my.xml");
+  EXPECT_EQ(outcome.options.domain, 232);
+  EXPECT_EQ(outcome.err, "program: d\n");
+}
+
+TEST(RunMainTest, TheLogLevelOfTheUserIsInForce) {
+  const auto log = [] {
+    spdlog::info("i");
+    spdlog::warn("w");
+  };
+  EXPECT_EQ(run({}, log).err, "program: i\nprogram: warning: w\n");
+  EXPECT_EQ(run({"--log-level", "warning"}, log).err, "program: warning: w\n");
+}
+
+TEST(RunMainTest, HelpPrintsEveryFlagWithItsDefaultOnStdout) {
+  const Outcome outcome = run({"--help"});
+  EXPECT_EQ(outcome.code, 0);
+  EXPECT_FALSE(outcome.worked);
+  EXPECT_EQ(outcome.err, "");
+  for (const char* part :
+       {"Does something.", "--qos FILE=/somewhere/default.xml", "--domain N", "[0 - 232]=0",
+        "--log-level LEVEL", "}=info", "--version", "--needed TEXT=value", "its own option"})
+    EXPECT_TRUE(contains(outcome.out, part)) << part << "\n" << outcome.out;
+}
+
+TEST(RunMainTest, VersionGoesToStdout) {
+  const Outcome outcome = run({"--version"});
+  EXPECT_EQ(outcome.code, 0);
+  EXPECT_FALSE(outcome.worked);
+  EXPECT_EQ(outcome.out, version() + "\n");
+  EXPECT_EQ(outcome.err, "");
+  EXPECT_EQ(version().rfind("sls ", 0), 0u);
+}
+
+// The flag of a signal lasts as long as its process, so each of these has one of its own.
+class RunMainDeathTest : public testing::Test {
+ protected:
+  void SetUp() override { GTEST_FLAG_SET(death_test_style, "threadsafe"); }
+};
+
+TEST_F(RunMainDeathTest, InterruptedIs130And143HoweverTheWorkEnds) {
+  const auto end_well = [] {};
+  const auto fail = [] { throw RunError("interrupted"); };
+  for (const auto& [number, code] : {std::pair{SIGINT, 130}, std::pair{SIGTERM, 143}})
+    for (const std::function<void()>& end :
+         {std::function<void()>(end_well), std::function<void()>(fail)})
+      EXPECT_EXIT(
+          {
+            const Outcome outcome = run({}, [&, signal = number] {
+              std::raise(signal);
+              end();
+            });
+            std::exit(outcome.code);
+          },
+          testing::ExitedWithCode(code), "");
+}
+
+}  // namespace
+}  // namespace sls::app

@@ -1,0 +1,47 @@
+#include "common/bus/names.hpp"
+
+#include <gtest/gtest.h>
+
+#include <set>
+#include <string>
+#include <vector>
+
+#include "common/bus/convert.hpp"
+
+namespace sls::bus {
+namespace {
+
+/// Every value has a word of its own; the one after the last has none.
+template <class Enum>
+void expect_words(const std::vector<Enum>& values) {
+  std::set<std::string> words;
+  for (const Enum value : values) words.insert(to_string(value));
+  EXPECT_EQ(words.size(), values.size());
+  EXPECT_EQ(words.count(""), 0u);
+  EXPECT_EQ(words.count("unknown"), 0u);
+  EXPECT_STREQ(to_string(static_cast<Enum>(values.size())), "unknown");
+}
+
+TEST(NamesTest, EveryRunPhaseHasAWord) {
+  expect_words<RunPhase>(
+      {PHASE_WAITING, PHASE_RUNNING, PHASE_PAUSED, PHASE_FINISHED, PHASE_FAILED});
+}
+
+TEST(NamesTest, EveryFaultHasAWord) {
+  expect_words<FaultCode>(
+      {FAULT_NONE, FAULT_FREE_FALL, FAULT_ROD_LEVEL, FAULT_NOT_FINITE, FAULT_STAGE_TIMEOUT});
+}
+
+TEST(NamesTest, EveryModeHasAWord) { expect_words<SyncMode>({MODE_LOCKSTEP, MODE_REALTIME}); }
+
+TEST(NamesTest, EveryRoleHasAWord) {
+  expect_words<ParticipantRole>({ROLE_CONTROLLER, ROLE_RECORDER});
+}
+
+TEST(NamesTest, VectorsKeepTheirOrder) {
+  EXPECT_EQ(to_array({1, 2, 3}), (std::array<double, 3>{1, 2, 3}));
+  EXPECT_EQ(to_vector({1, 2, 3}), Eigen::Vector3d(1, 2, 3));
+}
+
+}  // namespace
+}  // namespace sls::bus

@@ -1,0 +1,191 @@
+// Two nodes on a domain of the test's own: what one writes, the other reads. Profiles are global to
+// a process; every test here uses the shipped default.
+#include "common/bus/node.hpp"
+
+#include <gtest/gtest.h>
+
+#include <mutex>
+#include <vector>
+
+#include "common/config/config_error.hpp"
+#include "tests/common/bus/sample_messages.hpp"
+#include "tests/common/bus/waiting.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace sls::bus {
+namespace {
+
+using test::make_message;
+using test::wait_until;
+
+const std::filesystem::path kQosFile = SLS_SOURCE_DIR "/config/qos/default.xml";
+
+/// A reader that keeps what it hears from `sender`; another build's tests may use the same domain.
+template <class Message>
+class Listener {
+ public:
+  Listener(Node& node, const char* profile, const Node& sender)
+      : sender_(sender.id()),
+        reader_(node, profile, [this](const Message& message, const PeerId& from) {
+          if (from != sender_) return;
+          const std::lock_guard lock(mutex_);
+          messages_.push_back(message);
+        }) {}
+
+  std::size_t count() const {
+    const std::lock_guard lock(mutex_);
+    return messages_.size();
+  }
+  std::vector<Message> messages() const {
+    const std::lock_guard lock(mutex_);
+    return messages_;
+  }
+  bool is_matched() const { return reader_.matched().count(sender_) > 0; }
+
+ private:
+  const PeerId sender_;
+  mutable std::mutex mutex_;
+  std::vector<Message> messages_;
+  Reader<Message> reader_;
+};
+
+template <class Message>
+bool is_matched(const Writer<Message>& writer, const Node& reader_node) {
+  return writer.matched().count(reader_node.id()) > 0;
+}
+
+/// Writes messages in which every field is filled and reads them through each of `profiles`.
+template <class Message>
+void expect_round_trip(int domain, const std::vector<const char*>& profiles) {
+  Node writing(kQosFile, domain, "writing"), reading(kQosFile, domain, "reading");
+  EXPECT_NE(writing.id(), reading.id());
+  Writer<Message> writer(writing);
+  for (const char* profile : profiles) {
+    SCOPED_TRACE(profile);
+    Listener<Message> listener(reading, profile, writing);
+    ASSERT_TRUE(wait_until([&] { return is_matched(writer, reading) && listener.is_matched(); }));
+    const std::size_t earlier = listener.count();  // a late joiner may get what went before
+    const std::vector<Message> sent = {make_message<Message>(1), Message(),
+                                       make_message<Message>(2)};
+    for (const Message& message : sent) writer.write(message);
+    ASSERT_TRUE(wait_until([&] { return listener.count() >= earlier + sent.size(); }));
+    const std::vector<Message> heard = listener.messages();
+    EXPECT_EQ(
+        std::vector<Message>(heard.end() - static_cast<std::ptrdiff_t>(sent.size()), heard.end()),
+        sent);
+    EXPECT_TRUE(writer.wait_for_acknowledgments(std::chrono::seconds(10)));
+  }
+}
+
+TEST(NodeTest, StatesArriveUnchanged) {
+  expect_round_trip<VehicleState>(70, {kLoopReaderProfile, kRecorderReaderProfile});
+}
+TEST(NodeTest, CommandsArriveUnchanged) {
+  expect_round_trip<ControlCommand>(71, {kLoopReaderProfile, kRecorderReaderProfile});
+}
+TEST(NodeTest, ReferencesArriveUnchanged) {
+  expect_round_trip<Reference>(72, {kRecorderReaderProfile});
+}
+TEST(NodeTest, ParticipantsArriveUnchanged) {
+  expect_round_trip<Participant>(73, {kLatchedReaderProfile});
+}
+TEST(NodeTest, ParametersArriveUnchanged) {
+  expect_round_trip<Parameters>(74, {kLatchedReaderProfile});
+}
+TEST(NodeTest, StatusesArriveUnchanged) {
+  expect_round_trip<SimStatus>(75, {kLatchedReaderProfile});
+}
+
+TEST(NodeTest, MatchesComeAndGoOnBothSides) {
+  Node near(kQosFile, 76, "near");
+  Writer<VehicleState> writer(near);
+  Reader<ControlCommand> reader(near, kLoopReaderProfile, [](const auto&, const PeerId&) {});
+  PeerId gone;
+  {
+    Node far(kQosFile, 76, "far");
+    gone = far.id();
+    EXPECT_FALSE(is_matched(writer, far));
+    Listener<VehicleState> far_listener(far, kLoopReaderProfile, near);
+    Writer<ControlCommand> far_writer(far);
+    EXPECT_TRUE(wait_until([&] { return is_matched(writer, far); }));
+    EXPECT_TRUE(wait_until([&] { return reader.matched().count(gone) > 0; }));
+    {
+      Listener<VehicleState> second(far, kRecorderReaderProfile, near);
+      EXPECT_TRUE(wait_until([&] { return second.is_matched(); }));
+    }
+    EXPECT_TRUE(is_matched(writer, far)) << "one of two readers has gone, not the participant";
+  }
+  EXPECT_TRUE(wait_until([&] { return writer.matched().count(gone) == 0; }));
+  EXPECT_TRUE(wait_until([&] { return reader.matched().count(gone) == 0; }));
+}
+
+TEST(NodeTest, ALateRecorderGetsTheStreamFromItsBeginningInOrder) {
+  Node writing(kQosFile, 77, "writing"), reading(kQosFile, 77, "reading");
+  Writer<VehicleState> writer(writing);
+  constexpr std::uint64_t kSamples = 1500;
+  for (std::uint64_t step = 0; step < kSamples / 2; ++step) {
+    VehicleState state;
+    state.step(step);
+    writer.write(state);
+  }
+  Listener<VehicleState> recorder(reading, kRecorderReaderProfile, writing);
+  for (std::uint64_t step = kSamples / 2; step < kSamples; ++step) {
+    VehicleState state;
+    state.step(step);
+    writer.write(state);
+  }
+  ASSERT_TRUE(wait_until([&] { return recorder.count() >= kSamples; }));
+  std::uint64_t next = 0;
+  for (const VehicleState& state : recorder.messages()) ASSERT_EQ(state.step(), next++);
+  EXPECT_EQ(next, kSamples);
+}
+
+TEST(NodeTest, ALateJoinerLearnsWhatIsLatched) {
+  Node writing(kQosFile, 78, "writing");
+  Writer<Parameters> writer(writing);
+  writer.write(make_message<Parameters>(7));
+  Node reading(kQosFile, 78, "reading");
+  Listener<Parameters> listener(reading, kLatchedReaderProfile, writing);
+  ASSERT_TRUE(wait_until([&] { return listener.count() > 0; }));
+  EXPECT_EQ(listener.messages().front(), make_message<Parameters>(7));
+}
+
+// --- errors --------------------------------------------------------------------------------------
+
+std::string find_error(const std::filesystem::path& file, int domain) {
+  try {
+    Node node(file, domain, "test");
+  } catch (const config::ConfigError& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(NodeErrorTest, ADomainOutOfRangeIsRefusedWithItsRange) {
+  for (const int domain : {-1, 233, 100000, -2147483647 - 1}) {
+    const std::string error = find_error(kQosFile, domain);
+    EXPECT_EQ(error, "--domain: expected 0 to 232, got " + std::to_string(domain));
+  }
+}
+
+TEST(NodeErrorTest, AMissingQosFileIsNamed) {
+  EXPECT_EQ(find_error("/nowhere/qos.xml", 79),
+            "/nowhere/qos.xml: expected a QoS file, got no such file");
+}
+
+// Profiles are global to a process: another file would silently not be in force.
+TEST(NodeErrorTest, ASecondQosFileInOneProcessIsRefused) {
+  const sls::test::TemporaryFolder folder;
+  std::filesystem::copy_file(kQosFile, folder / "other.xml");
+  Node first(kQosFile, 79, "first");
+  EXPECT_EQ(find_error(kQosFile, 79), "no error");
+  EXPECT_NE(find_error(folder / "other.xml", 79), "no error");
+}
+
+TEST(NodeTest, TheMiddlewaresVersionIsAVersion) {
+  EXPECT_EQ(middleware_version().find_first_not_of("0123456789."), std::string::npos);
+  EXPECT_EQ(middleware_version().rfind("2.", 0), 0u);
+}
+
+}  // namespace
+}  // namespace sls::bus

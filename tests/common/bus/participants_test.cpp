@@ -1,0 +1,158 @@
+#include "common/bus/participants.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <optional>
+
+#include "tests/common/bus/waiting.hpp"
+
+namespace sls::bus {
+namespace {
+
+using test::wait_until;
+
+// Another build's tests may use the same domain: numbers of this process alone.
+const std::uint64_t kRun = static_cast<std::uint64_t>(::getpid()) * 1000 + 500;
+const std::uint64_t kLowerRun = kRun - 100;
+const std::uint32_t kVehicle = static_cast<std::uint32_t>(::getpid()) * 10 + 4;
+
+const std::filesystem::path kQosFile = SLS_SOURCE_DIR "/config/qos/default.xml";
+
+Participant make_announcement(ParticipantRole role, std::uint64_t run_id, const std::string& name) {
+  Participant message;
+  message.role(role);
+  message.run_id(run_id);
+  message.name(name);
+  return message;
+}
+
+SimStatus make_status(std::uint64_t run_id, RunPhase phase) {
+  SimStatus status;
+  status.run_id(run_id);
+  status.phase(phase);
+  return status;
+}
+
+Parameters make_parameters(std::uint64_t run_id, std::vector<std::uint32_t> vehicle_ids) {
+  Parameters parameters;
+  parameters.run_id(run_id);
+  parameters.vehicle_ids(std::move(vehicle_ids));
+  return parameters;
+}
+
+bool knows(const ServerDirectory& directory, std::uint64_t run_id) {
+  const auto runs = directory.runs();
+  return std::any_of(runs.begin(), runs.end(),
+                     [&](const Run& run) { return run.parameters.run_id() == run_id; });
+}
+
+TEST(ParticipantDirectoryTest, KnowsWhoServesARunUntilTheyLeave) {
+  constexpr int kDomain = 70;
+  Node node(kQosFile, kDomain, "directory");
+  const ParticipantDirectory directory(node);
+  const auto version = directory.version();
+  {
+    Node other(kQosFile, kDomain, "other");
+    Writer<Participant> writer(other);
+    writer.write(make_announcement(ROLE_CONTROLLER, 0, "pilot"));
+    writer.write(make_announcement(ROLE_CONTROLLER, kRun, "pilot"));  // the last one counts
+    ASSERT_TRUE(wait_until([&] { return directory.find(ROLE_CONTROLLER, kRun).size() == 1; }));
+    const auto entry = directory.find(ROLE_CONTROLLER, kRun).front();
+    EXPECT_EQ(entry.peer, other.id());
+    EXPECT_STREQ(entry.announcement.name().c_str(), "pilot");
+    EXPECT_TRUE(directory.find(ROLE_RECORDER, kRun).empty());
+    EXPECT_TRUE(directory.find(ROLE_CONTROLLER, kRun + 1).empty());
+    EXPECT_NE(directory.version(), version);
+  }
+  EXPECT_TRUE(wait_until([&] { return directory.find(ROLE_CONTROLLER, kRun).empty(); }));
+}
+
+TEST(ServerDirectoryTest, FindsTheRunToJoin) {
+  constexpr int kDomain = 71;
+  Node node(kQosFile, kDomain, "directory");
+  std::atomic<int> statuses{0};
+  const ServerDirectory directory(node, [&](const SimStatus& status) {
+    if (status.run_id() == kRun) ++statuses;
+  });
+  Node own_server(kQosFile, kDomain, "server");
+  Writer<Parameters> parameters(own_server);
+  Writer<SimStatus> status(own_server);
+
+  parameters.write(make_parameters(kRun, {kVehicle - 1, kVehicle}));
+  ASSERT_TRUE(wait_until([&] { return knows(directory, kRun); }));
+  EXPECT_EQ(directory.find_joinable(kVehicle), std::nullopt) << "the claim is not settled";
+
+  status.write(make_status(kRun, PHASE_WAITING));
+  ASSERT_TRUE(wait_until([&] { return directory.find_joinable(kVehicle).has_value(); }));
+  EXPECT_EQ(directory.find_joinable(kVehicle)->parameters.run_id(), kRun);
+  EXPECT_EQ(directory.find_joinable(kVehicle)->server, own_server.id());
+  EXPECT_EQ(directory.find_joinable(kVehicle + 1), std::nullopt);
+  EXPECT_TRUE(directory.is_present(own_server.id()));
+  EXPECT_EQ(statuses, 1);
+
+  {  // of two runs the lower run_id, then the one that is further
+    Node second_server(kQosFile, kDomain, "second server");
+    Writer<Parameters> second_parameters(second_server);
+    Writer<SimStatus> second_status(second_server);
+    second_parameters.write(make_parameters(kLowerRun, {kVehicle}));
+    second_status.write(make_status(kLowerRun, PHASE_WAITING));
+    EXPECT_TRUE(wait_until([&] {
+      const auto run = directory.find_joinable(kVehicle);
+      return run && run->parameters.run_id() == kLowerRun;
+    }));
+    status.write(make_status(kRun, PHASE_RUNNING));
+    EXPECT_TRUE(wait_until([&] {
+      const auto run = directory.find_joinable(kVehicle);
+      return run && run->parameters.run_id() == kRun;
+    }));
+    status.write(make_status(kRun, PHASE_FINISHED));
+    EXPECT_TRUE(wait_until([&] {
+      const auto run = directory.find_joinable(kVehicle);
+      return run && run->parameters.run_id() == kLowerRun;
+    }));
+  }
+  EXPECT_TRUE(wait_until([&] { return !directory.find_joinable(kVehicle); }));
+  ASSERT_TRUE(directory.find_status(kLowerRun)) << "also of a server that has gone";
+  EXPECT_EQ(directory.find_status(kLowerRun)->phase(), PHASE_WAITING);
+  EXPECT_EQ(directory.find_status(kLowerRun + 1), std::nullopt);
+}
+
+TEST(ServerDirectoryTest, AServerDoesNotMeetItself) {
+  constexpr int kDomain = 72;
+  Node node(kQosFile, kDomain, "server");
+  const ServerDirectory directory(node);
+  Writer<Parameters> parameters(node);
+  Writer<SimStatus> status(node);
+  parameters.write(make_parameters(kRun, {kVehicle}));
+  status.write(make_status(kRun, PHASE_RUNNING));
+  ASSERT_TRUE(wait_until([&] { return directory.find_status(kRun).has_value(); }));
+  ASSERT_TRUE(wait_until([&] { return directory.is_present(node.id()); }));
+  EXPECT_FALSE(knows(directory, kRun));
+  EXPECT_EQ(directory.find_joinable(kVehicle), std::nullopt);
+}
+
+TEST(ParticipantsTest, ARunningServerIsFurtherThanAWaitingOneAndAnEndedOneIsNoServer) {
+  const auto progress = [](RunPhase phase) { return calc_progress(make_status(1, phase)); };
+  EXPECT_LT(calc_progress(std::nullopt), progress(PHASE_WAITING));
+  EXPECT_LT(progress(PHASE_WAITING), progress(PHASE_RUNNING));
+  EXPECT_EQ(progress(PHASE_RUNNING), progress(PHASE_PAUSED));
+  EXPECT_LT(progress(PHASE_FINISHED), 0);
+  EXPECT_LT(progress(PHASE_FAILED), 0);
+}
+
+TEST(ParticipantsTest, AServerServesTheVehiclesItNames) {
+  EXPECT_TRUE(serves_vehicle(make_parameters(1, {0, 7}), 7));
+  EXPECT_FALSE(serves_vehicle(make_parameters(1, {0, 7}), 1));
+  EXPECT_FALSE(serves_vehicle(make_parameters(1, {}), 0));
+}
+
+TEST(ParticipantsTest, TheHostsNameFitsTheWire) {
+  EXPECT_FALSE(host_name().empty());
+  EXPECT_LE(host_name().size(), 64u);
+}
+
+}  // namespace
+}  // namespace sls::bus

@@ -1,0 +1,237 @@
+// A QoS file is judged before the middleware sees it, and every mistake has a place.
+#include "common/bus/qos_file.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <tinyxml2.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <iostream>
+#include <map>
+#include <vector>
+
+#include "common/bus/node.hpp"
+#include "common/config/config_error.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace sls::bus {
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path kConfig = fs::path(SLS_SOURCE_DIR) / "config";
+
+/// The message of the ConfigError that checking `file` gives, or "no error".
+std::string find_error(const fs::path& file) {
+  try {
+    check_qos_file(file);
+  } catch (const config::ConfigError& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+class QosFileTest : public testing::Test {
+ protected:
+  std::string find_error_in(const std::string& text) {
+    test::write_bytes(folder_ / "qos.xml", text);
+    const std::string error = find_error(folder_ / "qos.xml");
+    EXPECT_EQ(error.find('\n'), std::string::npos) << error;
+    const std::string place = (folder_ / "qos.xml").string();
+    return error.rfind(place, 0) == 0 ? error.substr(place.size()) : error;
+  }
+
+  const sls::test::TemporaryFolder folder_;
+};
+
+TEST_F(QosFileTest, TheShippedFilesPass) {
+  int count = 0;
+  for (const auto& entry : fs::directory_iterator(kConfig / "qos")) {
+    if (entry.path().extension() != ".xml") continue;
+    EXPECT_EQ(find_error(entry.path()), "no error") << entry.path();
+    ++count;
+  }
+  EXPECT_GE(count, 2);
+}
+
+TEST_F(QosFileTest, AMissingFileIsNamed) {
+  EXPECT_EQ(find_error(folder_ / "nothing.xml"),
+            (folder_ / "nothing.xml").string() + ": expected a QoS file, got no such file");
+  EXPECT_NE(find_error(""), "no error");
+}
+
+TEST_F(QosFileTest, ADirectoryIsNamed) {
+  EXPECT_EQ(find_error(folder_.path()),
+            folder_.path().string() + ": expected a QoS file, got a directory");
+}
+
+TEST_F(QosFileTest, AnEmptyFileIsNamed) {
+  const std::string error = find_error_in("");
+  EXPECT_NE(error.find("empty"), std::string::npos) << error;
+}
+
+TEST_F(QosFileTest, AHundredMegabytesAreRefusedUnread) {
+  test::write_bytes(folder_ / "qos.xml", "<dds>");
+  fs::resize_file(folder_ / "qos.xml", 100'000'000);
+  const std::string error = find_error(folder_ / "qos.xml");
+  EXPECT_NE(error.find("100000000"), std::string::npos) << error;
+}
+
+TEST_F(QosFileTest, APipeOrDeviceIsRefusedUnread) {
+  ASSERT_EQ(::mkfifo((folder_ / "pipe").c_str(), 0600), 0);
+  for (const fs::path& file : {folder_ / "pipe", fs::path("/dev/zero")}) {
+    const std::string error = find_error(file);
+    EXPECT_EQ(error.rfind(file.string() + ": expected a QoS file, got ", 0), 0u) << error;
+  }
+}
+
+TEST_F(QosFileTest, AnUnreadableFileIsNamedWithTheCause) {
+  sls::test::write_bytes(folder_ / "qos.xml", "<dds/>");
+  fs::permissions(folder_.path(), fs::perms(0755));
+  fs::permissions(folder_ / "qos.xml", fs::perms::none);
+  EXPECT_EXIT(
+      {
+        if (::geteuid() == 0 && ::setuid(65534) != 0) std::exit(1);  // nobody, in a child
+        std::cerr << find_error(folder_ / "qos.xml") << std::endl;
+        std::exit(2);
+      },
+      testing::ExitedWithCode(2), "qos.xml: expected a readable QoS file, got Permission denied");
+}
+
+TEST_F(QosFileTest, TheDefaultOfThisBuildPasses) {
+  EXPECT_EQ(find_error(default_qos_file()), "no error") << default_qos_file();
+}
+
+TEST_F(QosFileTest, AFileWithoutElementsLacksTheFirstProfile) {
+  const std::string error = find_error_in("<?xml version=\"1.0\"?>\n<dds/>\n");
+  EXPECT_EQ(error.rfind(": profile 'sls_participant': expected a <participant> of this name", 0),
+            0u)
+      << error;
+}
+
+TEST_F(QosFileTest, NotXmlAtAllIsMalformed) {
+  for (const char* text :
+       {"name: figure_eight\n", "\x7f\x45\x4c\x46", "   \n\n", "<!-- only this -->"})
+    EXPECT_NE(find_error_in(text), "no error") << text;
+}
+
+TEST_F(QosFileTest, AbsurdNestingIsMalformedAndNoStackOverflow) {
+  std::string text;
+  for (int i = 0; i < 100000; ++i) text += "<a>";
+  EXPECT_NE(find_error_in(text).find("expected well-formed XML"), std::string::npos);
+}
+
+TEST_F(QosFileTest, EachRequiredProfileIsMissedByName) {
+  const std::string shipped = test::read_bytes(kConfig / "qos/default.xml");
+  for (const char* name : {kParticipantProfile, kStreamWriterProfile, kLoopReaderProfile,
+                           kRecorderReaderProfile, kLatchedWriterProfile, kLatchedReaderProfile}) {
+    std::string text = shipped;
+    const std::string quoted = std::string("\"") + name + "\"";
+    text.replace(text.find(quoted), quoted.size(), "\"misspelt\"");
+    const std::string error = find_error_in(text);
+    EXPECT_NE(error.find(std::string("profile '") + name + "'"), std::string::npos) << error;
+    EXPECT_NE(error.find("misspelt"), std::string::npos) << error << ": what there is instead";
+  }
+}
+
+// --- config/invalid/qos: one file per defect, the message in the comment after the declaration
+// ----
+
+/// What the comment of an invalid file promises: the message after the file's name.
+std::string read_expectation(const fs::path& file) {
+  const std::string text = sls::test::read_bytes(file);
+  const std::string mark = "<!-- expect: ", end = " -->";
+  const auto begin = text.find(mark);
+  if (begin == std::string::npos) return "no expectation in " + file.string();
+  return text.substr(begin + mark.size(), text.find(end, begin) - begin - mark.size());
+}
+
+std::vector<fs::path> list_invalid_files() {
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(kConfig / "invalid/qos"))
+    if (entry.path().extension() == ".xml") files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+/// Uses `file` as a program does and ends the process: 2 and the message where it is refused.
+[[noreturn]] void use_file_and_exit(const fs::path& file) {
+  int code = 0;
+  try {
+    Node node(file, 79, "test_bus");
+    Writer<VehicleState> stream_writer(node);
+    Writer<Parameters> latched_writer(node);
+    Reader<VehicleState> loop_reader(node, kLoopReaderProfile, [](const auto&, const PeerId&) {});
+    Reader<VehicleState> recorder_reader(node, kRecorderReaderProfile,
+                                         [](const auto&, const PeerId&) {});
+    Reader<Parameters> latched_reader(node, kLatchedReaderProfile,
+                                      [](const auto&, const PeerId&) {});
+  } catch (const config::ConfigError& error) {
+    std::cerr << error.what() << std::endl;
+    code = 2;
+  }
+  std::exit(code);
+}
+
+/// `text` as a regular expression of GoogleTest that matches it literally.
+std::string quote(const std::string& text) {
+  std::string quoted;
+  for (const char letter : text) {
+    if (std::string("\\^$.[]|()*+?{}").find(letter) != std::string::npos) quoted += '\\';
+    quoted += letter;
+  }
+  return quoted;
+}
+
+TEST(InvalidQosFilesDeathTest, EachFileGivesTheMessageInItsComment) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");  // profiles are global to a process
+  const auto files = list_invalid_files();
+  EXPECT_GE(files.size(), 8u);
+  for (const fs::path& file : files) {
+    const std::string expected = file.string() + read_expectation(file);
+    const std::string error = find_error(file);
+    if (error != "no error")
+      EXPECT_EQ(error, expected);
+    else  // only the middleware finds it
+      EXPECT_EXIT(use_file_and_exit(file), testing::ExitedWithCode(2), quote(expected));
+  }
+}
+
+// --- transport is a matter of the file, behaviour is not -----------------------------------------
+
+/// Name of each profile of a shipped file → its content without comments, transports left out.
+std::map<std::string, std::string> read_endpoint_profiles(const fs::path& file) {
+  tinyxml2::XMLDocument document;
+  EXPECT_EQ(document.LoadFile(file.c_str()), tinyxml2::XML_SUCCESS) << file;
+  std::map<std::string, std::string> profiles;
+  const auto* list = document.RootElement()->FirstChildElement("profiles");
+  for (auto* element = list->FirstChildElement(); element;
+       element = element->NextSiblingElement()) {
+    const char* name = element->Attribute("profile_name");
+    if (!name || std::string(element->Name()) == "participant") continue;
+    tinyxml2::XMLPrinter printer(nullptr, true);
+    element->Accept(&printer);
+    std::string text = printer.CStr();
+    for (auto begin = text.find("<!--"); begin != std::string::npos; begin = text.find("<!--"))
+      text.erase(begin, text.find("-->", begin) + 3 - begin);
+    profiles[name] = text;
+  }
+  return profiles;
+}
+
+TEST(ShippedQosFilesTest, WritersAndReadersBehaveAlikeOverEveryTransport) {
+  const auto reference = read_endpoint_profiles(kConfig / "qos/default.xml");
+  EXPECT_EQ(reference.size(), 5u);
+  EXPECT_EQ(read_endpoint_profiles(kConfig / "qos/udp.xml"), reference);
+}
+
+TEST(ShippedQosFilesTest, UdpUsesNoSharedMemory) {
+  const std::string text = sls::test::read_bytes(kConfig / "qos/udp.xml");
+  EXPECT_EQ(text.find("<type>SHM"), std::string::npos);
+  EXPECT_NE(text.find("<useBuiltinTransports>false"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace sls::bus

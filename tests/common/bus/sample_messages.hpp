@@ -1,0 +1,14 @@
+/// Messages in which every field has a value of its own, different for each `seed`.
+#pragma once
+
+#include <cstdint>
+
+#include "common/bus/topics.hpp"
+
+namespace sls::bus::test {
+
+/// All strings and sequences as long as their bounds allow.
+template <class Message>
+Message make_message(std::uint64_t seed);
+
+}  // namespace sls::bus::test

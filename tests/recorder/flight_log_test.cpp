@@ -1,0 +1,199 @@
+#include "recorder/flight_log.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+#include <sstream>
+
+#include "common/bus/convert.hpp"
+#include "tests/recorder/synthetic_run.hpp"
+
+namespace sls::record {
+namespace {
+
+using namespace test;
+
+StepRecord make_record(std::uint64_t step) {
+  StepRecord record;
+  record.step = step;
+  record.state = make_state(step);
+  record.command = make_command(step);
+  record.reference = make_reference(step);
+  return record;
+}
+
+Eigen::Vector3d calc_error(std::uint64_t step) {
+  return bus::to_vector(make_state(step).p_WL_m()) -
+         bus::to_vector(make_reference(step).position_m());
+}
+
+/// rms, largest and last error over the steps [from, to], each summed up on its own.
+struct Expected {
+  Eigen::Vector3d rms, max;
+  double at_end = 0;
+};
+Expected calc_expected(std::uint64_t from, std::uint64_t to) {
+  Expected expected;
+  for (int axis = 0; axis < 3; ++axis) {
+    long double sum = 0;
+    expected.max[axis] = 0;
+    for (std::uint64_t step = from; step <= to; ++step) {
+      const double error = calc_error(step)[axis];
+      sum += static_cast<long double>(error) * error;
+      expected.max[axis] = std::max(expected.max[axis], std::abs(error));
+    }
+    expected.rms[axis] =
+        std::sqrt(static_cast<double>(sum / static_cast<long double>(to - from + 1)));
+  }
+  expected.at_end = calc_error(to).norm();
+  return expected;
+}
+
+std::string write(const FlightLog& log) {
+  std::ostringstream out;
+  log.write(out);
+  return out.str();
+}
+
+/// The seven last numbers of the line that begins with `label`.
+std::vector<double> find_numbers(const std::string& text, const std::string& label) {
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    const auto begin = line.find_first_not_of(' ');
+    if (begin == std::string::npos || line.compare(begin, label.size(), label) != 0) continue;
+    std::istringstream words(line.substr(begin + label.size()));
+    std::vector<double> numbers;
+    for (double number; words >> number;) numbers.push_back(number);
+    if (numbers.size() >= 7) return {numbers.end() - 7, numbers.end()};
+  }
+  return {};
+}
+
+void expect_statistics(const std::string& text, const std::string& label,
+                       const Expected& expected) {
+  SCOPED_TRACE(label);
+  const auto numbers = find_numbers(text, label);
+  ASSERT_EQ(numbers.size(), 7u) << text;
+  // Printed with three digits.
+  for (int axis = 0; axis < 3; ++axis) {
+    EXPECT_NEAR(numbers[static_cast<std::size_t>(axis)], expected.rms[axis],
+                6e-3 * expected.rms[axis]);
+    EXPECT_NEAR(numbers[static_cast<std::size_t>(axis) + 3], expected.max[axis],
+                6e-3 * expected.max[axis]);
+  }
+  EXPECT_NEAR(numbers[6], expected.at_end, 6e-3 * expected.at_end);
+}
+
+class FlightLogTest : public testing::Test {
+ protected:
+  FlightLog log_{config::parse_scenario(kScenarioText, "scenario"), make_parameters()};
+};
+
+TEST(ErrorStatisticsTest, AgreesWithADirectSum) {
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> normal;
+  ErrorStatistics statistics;
+  EXPECT_EQ(statistics.calc_rms(), Eigen::Vector3d::Zero().eval());
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero(), max = Eigen::Vector3d::Zero(), last;
+  constexpr int kCount = 1000;
+  for (int i = 0; i < kCount; ++i) {
+    last = {normal(random), -10 + normal(random), 1e-6 * normal(random)};
+    statistics.add(last);
+    for (int axis = 0; axis < 3; ++axis) {
+      sum[axis] += last[axis] * last[axis];
+      max[axis] = std::max(max[axis], std::abs(last[axis]));
+    }
+  }
+  EXPECT_EQ(statistics.samples, static_cast<std::uint64_t>(kCount));
+  EXPECT_EQ(statistics.max_abs, max);
+  EXPECT_EQ(statistics.last, last);
+  for (int axis = 0; axis < 3; ++axis)  // two orders of the same thousand additions
+    EXPECT_NEAR(statistics.calc_rms()[axis], std::sqrt(sum[axis] / kCount),
+                1e-13 * statistics.calc_rms()[axis]);
+}
+
+TEST_F(FlightLogTest, EachStageHasItsErrorsAndTimes) {
+  for (std::uint64_t step = 0; step <= kLastStep; ++step) log_.add(make_record(step));
+  const std::string text = write(log_);
+  expect_statistics(text, "0 hold", calc_expected(0, 99));
+  expect_statistics(text, "1 figure_eight", calc_expected(100, kLastStep));
+  EXPECT_NE(text.find("0     0.396"), std::string::npos) << text;
+  EXPECT_NE(text.find("0.4       1.2"), std::string::npos) << text;
+}
+
+TEST_F(FlightLogTest, LapsOfAFigureEightAreSeparateAndTheLastSampleBelongsToTheLastLap) {
+  for (std::uint64_t step = 0; step <= kLastStep; ++step) log_.add(make_record(step));
+  const std::string text = write(log_);
+  expect_statistics(text, "lap 1", calc_expected(100, 199));
+  expect_statistics(text, "lap 2", calc_expected(200, kLastStep));
+  EXPECT_EQ(text.find("lap 3"), std::string::npos) << text;
+}
+
+// 0.7 / 0.1 is less than 7 in doubles: a lap boundary must not depend on that.
+TEST(FlightLogLapTest, ALapBeginsAtItsFirstSampleWhateverItsPeriod) {
+  std::string text = kScenarioText;
+  const auto replace = [&](const std::string& from, const std::string& to) {
+    text.replace(text.find(from), from.size(), to);
+  };
+  replace("period_s: 0.4 }", "period_s: 0.1 }");
+  replace("for_s: 0.8", "for_s: 1.2");
+  FlightLog log(config::parse_scenario(text, "scenario"), make_parameters());
+  for (std::uint64_t step = 100; step <= 400; ++step) log.add(make_record(step > 300 ? 300 : step));
+  const std::string out = write(log);
+  for (std::uint64_t lap = 0; lap < 8; ++lap)  // 25 steps each
+    expect_statistics(out, "lap " + std::to_string(lap + 1) + " ",
+                      calc_expected(100 + 25 * lap, 124 + 25 * lap));
+}
+
+TEST_F(FlightLogTest, AStageThatIsFlownAgainIsAStageOfItsOwn) {
+  for (const std::uint64_t step : {0u, 1u, 100u, 101u}) log_.add(make_record(step));
+  StepRecord again = make_record(102);
+  again.reference->stage_index(0);
+  again.reference->stage_name("hold");
+  log_.add(again);
+  const std::string text = write(log_);
+  const auto first = text.find("0 hold");
+  EXPECT_NE(text.find("0 hold", first + 1), std::string::npos) << text;
+}
+
+TEST_F(FlightLogTest, IncompleteStepsSayNothingAboutErrors) {
+  for (std::uint64_t step = 0; step < 100; ++step) {
+    StepRecord record = make_record(step);
+    if (step % 3 == 0) record.state.reset();
+    if (step % 3 == 1) record.reference.reset();
+    if (step % 3 == 2) record.command.reset();
+    log_.add(record);
+  }
+  EXPECT_EQ(write(log_).find("0 hold"), std::string::npos);
+}
+
+TEST_F(FlightLogTest, AStageTheScenarioDoesNotHaveIsListedWithoutLaps) {
+  StepRecord record = make_record(0);
+  record.reference->stage_index(4000000000u);
+  log_.add(record);
+  const std::string text = write(log_);
+  EXPECT_NE(text.find("4000000000"), std::string::npos) << text;
+  EXPECT_EQ(text.find("lap 1"), std::string::npos) << text;
+}
+
+TEST_F(FlightLogTest, TellsWhatWasFlownAndWhatHappened) {
+  log_.add(make_status(PHASE_WAITING, 0, "missing: recorder"));
+  log_.add(make_status(PHASE_WAITING, 0, "missing: recorder"));
+  log_.add(make_status(PHASE_RUNNING, 0));
+  log_.add(make_status(PHASE_RUNNING, 50));
+  log_.add(make_status(PHASE_FINISHED, kLastStep, "mission\nfinished"));
+  log_.add_event("recorder: all is well");
+  const std::string text = write(log_);
+  for (const char* part :
+       {"synthetic: finished", "0123456789abcdef", "quadrotor 1.5 kg", "load 0.2 kg", "rod 1 m",
+        "9.8 m/s²", "period 0.004 s", "step 0.001 s", "lockstep", "300 steps", "1.2 s simulated",
+        "states resent 11", "fault 12", "recorder: all is well", "step 300 (1.2 s)",
+        "mission finished"})
+    EXPECT_NE(text.find(part), std::string::npos) << part << "\n" << text;
+  const auto events = text.substr(text.find("Events\n") + 7);
+  EXPECT_EQ(std::count(events.begin(), events.end(), '\n'), 4) << events;
+}
+
+}  // namespace
+}  // namespace sls::record

@@ -1,0 +1,158 @@
+#include "recorder/recording_folder.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <iostream>
+
+#include "common/config/config_error.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace sls::record {
+namespace {
+
+namespace fs = std::filesystem;
+using sls::test::write_bytes;
+
+constexpr const char* kFiles[] = {"state.csv",     "command.csv",   "reference.csv",
+                                  "status.csv",    "flight.csv",    "flight.txt",
+                                  "scenario.yaml", "manifest.json", "manifest.json.part"};
+
+class RecordingFolderTest : public testing::Test {
+ protected:
+  /// The message of the ConfigError, or "no error". Every message is one line and names the place.
+  std::string find_error(const fs::path& folder, bool force = false) {
+    try {
+      prepare_recording_folder(folder, force);
+    } catch (const config::ConfigError& error) {
+      const std::string text = error.what();
+      EXPECT_NE(text.find("--out " + folder.string()), std::string::npos) << text;
+      EXPECT_EQ(text.find('\n'), std::string::npos) << text;
+      return text;
+    }
+    return "no error";
+  }
+
+  void fill(const fs::path& folder) {
+    fs::create_directories(folder);
+    for (const char* name : kFiles) write_bytes(folder / name, "old");
+  }
+
+  const sls::test::TemporaryFolder root_;
+  const fs::path out_ = root_ / "out";
+};
+
+TEST_F(RecordingFolderTest, ANewFolderIsMade) {
+  EXPECT_EQ(find_error(out_), "no error");
+  EXPECT_TRUE(fs::is_directory(out_));
+  EXPECT_TRUE(fs::is_empty(out_));
+}
+
+TEST_F(RecordingFolderTest, FoldersOnTheWayAreMadeToo) {
+  EXPECT_EQ(find_error(out_ / "a/b/c"), "no error");
+  EXPECT_TRUE(fs::is_directory(out_ / "a/b/c"));
+  EXPECT_EQ(find_error(out_ / "with/slash/"), "no error");
+}
+
+TEST_F(RecordingFolderTest, AnEmptyFolderIsTaken) {
+  fs::create_directory(out_);
+  EXPECT_EQ(find_error(out_), "no error");
+  fs::create_directory_symlink(out_, root_ / "link");
+  EXPECT_EQ(find_error(root_ / "link"), "no error");
+}
+
+TEST_F(RecordingFolderTest, AFolderThatIsNotEmptyIsRefusedAndKept) {
+  fill(out_);
+  const std::string error = find_error(out_);
+  EXPECT_NE(error.find("--force"), std::string::npos) << error;
+  for (const char* name : kFiles) EXPECT_EQ(sls::test::read_bytes(out_ / name), "old");
+
+  fs::create_directory(root_ / "other");
+  write_bytes(root_ / "other/thesis.tex", "years of work");
+  EXPECT_NE(find_error(root_ / "other").find("'thesis.tex'"), std::string::npos);
+}
+
+TEST_F(RecordingFolderTest, ForceReplacesARecording) {
+  fill(out_);
+  EXPECT_EQ(find_error(out_, true), "no error");
+  EXPECT_TRUE(fs::is_empty(out_));
+}
+
+TEST_F(RecordingFolderTest, ForceTakesNewAndEmptyFoldersToo) {
+  EXPECT_EQ(find_error(out_, true), "no error");
+  EXPECT_EQ(find_error(out_, true), "no error");
+}
+
+TEST_F(RecordingFolderTest, ForceRefusesForeignFilesAndRemovesNothing) {
+  for (const char* foreign : {"thesis.tex", "state.csv.bak", ".hidden", "STATE.CSV"}) {
+    fs::remove_all(out_);
+    fill(out_);
+    write_bytes(out_ / foreign, "mine");
+    const std::string error = find_error(out_, true);
+    EXPECT_NE(error.find(std::string("'") + foreign + "'"), std::string::npos) << error;
+    for (const char* name : kFiles) EXPECT_TRUE(fs::exists(out_ / name)) << name;
+    EXPECT_TRUE(fs::exists(out_ / foreign));
+  }
+}
+
+TEST_F(RecordingFolderTest, ForceRefusesAFolderThatIsCalledLikeAFileAndRemovesNothing) {
+  for (const bool is_empty : {true, false}) {
+    fs::remove_all(out_);
+    fill(out_);
+    fs::remove(out_ / "status.csv");
+    fs::create_directory(out_ / "status.csv");
+    if (!is_empty) write_bytes(out_ / "status.csv/inside", "x");
+    const std::string error = find_error(out_, true);
+    EXPECT_NE(error.find("'status.csv'"), std::string::npos) << error;
+    EXPECT_TRUE(fs::exists(out_ / "state.csv"));
+    EXPECT_TRUE(fs::is_directory(out_ / "status.csv"));
+  }
+}
+
+TEST_F(RecordingFolderTest, ALinkIsRemovedAndItsTargetKept) {
+  fs::create_directory(out_);
+  write_bytes(root_ / "target", "kept");
+  fs::create_symlink(root_ / "target", out_ / "state.csv");
+  EXPECT_EQ(find_error(out_, true), "no error");
+  EXPECT_TRUE(fs::is_empty(out_));
+  EXPECT_EQ(sls::test::read_bytes(root_ / "target"), "kept");
+}
+
+TEST_F(RecordingFolderTest, AFileInsteadOfAFolderIsRefused) {
+  write_bytes(out_, "a file");
+  for (const bool force : {false, true}) {
+    const std::string error = find_error(out_, force);
+    EXPECT_NE(error.find("a file"), std::string::npos) << error;
+  }
+  EXPECT_EQ(sls::test::read_bytes(out_), "a file");
+}
+
+// Root ignores permission bits, so these are places where nobody can make a folder.
+TEST_F(RecordingFolderTest, APlaceWhereNoFolderCanBeIsRefused) {
+  write_bytes(out_, "a file");
+  EXPECT_NE(find_error(out_ / "below"), "no error");
+  EXPECT_NE(find_error("/proc/sls-recording"), "no error");
+  EXPECT_NE(find_error(""), "no error");
+  EXPECT_NE(find_error(root_ / std::string(300, 'x')), "no error");
+  EXPECT_NE(find_error(root_ / std::string(300, 'x'), true), "no error");
+  fs::create_directory_symlink(root_ / "loop", root_ / "loop");
+  EXPECT_NE(find_error(root_ / "loop"), "no error");
+}
+
+TEST_F(RecordingFolderTest, AFolderThatCannotBeWrittenIsRefused) {
+  fs::create_directory(out_);
+  fs::permissions(out_, fs::perms::owner_read | fs::perms::owner_exec | fs::perms::others_read |
+                            fs::perms::others_exec);
+  fs::permissions(root_.path(), fs::perms(0755));
+  EXPECT_EXIT(
+      {
+        if (::geteuid() == 0 && ::setuid(65534) != 0) std::exit(1);  // nobody, in a child
+        std::cerr << find_error(out_) << std::endl << find_error(out_ / "below") << std::endl;
+        std::exit(2);
+      },
+      testing::ExitedWithCode(2), "can be written.*Permission denied\n.*below.*Permission denied");
+}
+
+}  // namespace
+}  // namespace sls::record

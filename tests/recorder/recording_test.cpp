@@ -1,0 +1,626 @@
+// A whole run through Recording, judged by the files alone (design 9).
+#include "recorder/recording.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "common/bus/convert.hpp"
+#include "common/config/sha256.hpp"
+#include "tests/recorder/csv_table.hpp"
+#include "tests/recorder/file_size_limit.hpp"
+#include "tests/recorder/synthetic_run.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace sls::record {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace test;
+using sls::test::read_bytes;
+using Json = nlohmann::json;
+
+constexpr const char* kCsvFiles[] = {"state.csv", "command.csv", "reference.csv", "status.csv",
+                                     "flight.csv"};
+
+class RecordingTest : public testing::Test {
+ protected:
+  RecordingTest() : recording_(std::make_unique<Recording>(folder_.path(), make_parameters())) {}
+
+  void add_step(std::uint64_t step) {
+    recording_->add(make_state(step));
+    recording_->add(make_command(step));
+    recording_->add(make_reference(step));
+  }
+  void add_steps(std::uint64_t from, std::uint64_t to) {
+    for (std::uint64_t step = from; step <= to; ++step) add_step(step);
+  }
+  void fly_to_the_end() {
+    recording_->add(make_status(PHASE_RUNNING, 0));
+    add_steps(0, kLastStep);
+    recording_->add(make_status(PHASE_FINISHED, kLastStep, "mission finished"));
+  }
+  bool finish(const std::string& interruption = "", std::uint64_t refused = 0) {
+    return recording_->finish(interruption, refused);
+  }
+
+  CsvTable read_table(const std::string& name) {
+    const CsvTable table = parse_csv(read_bytes(folder_ / name));
+    EXPECT_TRUE(table.is_whole) << name;
+    for (const auto& row : table.rows) EXPECT_EQ(row.size(), table.header.size()) << name;
+    return table;
+  }
+  Json read_manifest() { return Json::parse(read_bytes(folder_ / "manifest.json")); }
+  std::string read_header(const std::string& name) {
+    const std::string bytes = read_bytes(folder_ / name);
+    return bytes.substr(0, bytes.find('\n'));
+  }
+
+  const sls::test::TemporaryFolder folder_;
+  std::unique_ptr<Recording> recording_;
+};
+
+// --- a run that finished -------------------------------------------------------------------------
+
+TEST_F(RecordingTest, AWholeRunIsComplete) {
+  EXPECT_FALSE(recording_->has_all());
+  EXPECT_EQ(recording_->last_complete_step(), -1);
+  fly_to_the_end();
+  EXPECT_TRUE(recording_->has_all());
+  EXPECT_EQ(recording_->last_complete_step(), static_cast<std::int64_t>(kLastStep));
+  EXPECT_TRUE(finish());
+  const Json manifest = read_manifest();
+  EXPECT_EQ(manifest.at("complete"), true);
+  EXPECT_EQ(manifest.at("outcome"), "finished");
+  EXPECT_EQ(manifest.at("missing"), Json::array());
+  EXPECT_EQ(manifest.at("refused_samples"), 0);
+  EXPECT_EQ(manifest.at("last_step"), kLastStep);
+}
+
+TEST_F(RecordingTest, ColumnsAreThoseOfTheDesign) {
+  fly_to_the_end();
+  finish();
+  EXPECT_EQ(read_header("state.csv"),
+            "vehicle_id,step,sim_time_s,quad_x_m,quad_y_m,quad_z_m,quad_vx_m_s,quad_vy_m_s,"
+            "quad_vz_m_s,load_x_m,load_y_m,load_z_m,load_vx_m_s,load_vy_m_s,load_vz_m_s,"
+            "alpha_rad,beta_rad,alpha_dot_rad_s,beta_dot_rad_s,force_x_n,force_y_n,force_z_n");
+  EXPECT_EQ(read_header("command.csv"),
+            "vehicle_id,step,controller,force_x_n,force_y_n,force_z_n,compute_us,fault");
+  EXPECT_EQ(read_header("reference.csv")
+                .rfind("vehicle_id,step,sim_time_s,stage,stage_name,ref_x_m,ref_y_m,ref_z_m,", 0),
+            0u);
+  EXPECT_EQ(read_table("reference.csv").header.size(), 5u + 5u * 3u);
+  // Time, desired position, quadrotor position, attitude, velocity, rod, angles, rates, force.
+  const auto flight = read_table("flight.csv").header;
+  ASSERT_EQ(flight.size(), 1u + 3 + 3 + 3 + 3 + 3 + 2 + 2 + 3);
+  EXPECT_EQ(flight[0], "sim_time_s");
+  EXPECT_EQ(flight[1], "ref_x_m");
+  EXPECT_EQ(flight[4], "quad_x_m");
+  EXPECT_EQ(flight[7], "roll_rad");
+  EXPECT_EQ(flight[10], "quad_vx_m_s");
+  EXPECT_EQ(flight[13], "rod_x");
+  EXPECT_EQ(flight[16], "alpha_rad");
+  EXPECT_EQ(flight[18], "alpha_dot_rad_s");
+  EXPECT_EQ(flight[20], "force_x_n");
+}
+
+TEST_F(RecordingTest, EachFileHasARowPerStepInOrder) {
+  fly_to_the_end();
+  finish();
+  for (const char* name : {"state.csv", "command.csv", "reference.csv"}) {
+    const CsvTable table = read_table(name);
+    ASSERT_EQ(table.rows.size(), kLastStep + 1) << name;
+    for (std::uint64_t step = 0; step <= kLastStep; ++step) {
+      ASSERT_EQ(table.text(step, "step"), std::to_string(step)) << name;
+      ASSERT_EQ(table.text(step, "vehicle_id"), "0") << name;
+    }
+  }
+  EXPECT_EQ(read_table("flight.csv").rows.size(), kLastStep + 1);
+  EXPECT_EQ(read_table("status.csv").rows.size(), 2u);
+}
+
+TEST_F(RecordingTest, RowsHoldTheSamplesToTheBit) {
+  fly_to_the_end();
+  finish();
+  const CsvTable states = read_table("state.csv"), commands = read_table("command.csv"),
+                 references = read_table("reference.csv");
+  const auto expect_vector = [](const CsvTable& table, std::size_t row, std::size_t first,
+                                const std::array<double, 3>& values) {
+    for (std::size_t i = 0; i < 3; ++i)
+      ASSERT_EQ(std::stod(table.rows[row][first + i]), values[i]) << table.header[first + i];
+  };
+  for (std::uint64_t step = 0; step <= kLastStep; ++step) {
+    const VehicleState state = make_state(step);
+    EXPECT_EQ(states.number(step, "sim_time_s"), static_cast<double>(4 * step) / 1000.0);
+    expect_vector(states, step, states.find_column("quad_x_m"), state.p_WQ_m());
+    expect_vector(states, step, states.find_column("quad_vx_m_s"), state.v_WQ_m_s());
+    expect_vector(states, step, states.find_column("load_x_m"), state.p_WL_m());
+    expect_vector(states, step, states.find_column("load_vx_m_s"), state.v_WL_m_s());
+    EXPECT_EQ(states.number(step, "alpha_rad"), state.alpha_rad());
+    EXPECT_EQ(states.number(step, "beta_rad"), state.beta_rad());
+    EXPECT_EQ(states.number(step, "alpha_dot_rad_s"), state.alpha_dot_rad_s());
+    EXPECT_EQ(states.number(step, "beta_dot_rad_s"), state.beta_dot_rad_s());
+    expect_vector(states, step, states.find_column("force_x_n"), state.f_Q_W_n());
+
+    const ControlCommand command = make_command(step);
+    EXPECT_EQ(commands.text(step, "controller"), kPilot);
+    expect_vector(commands, step, commands.find_column("force_x_n"), command.f_Q_W_n());
+    EXPECT_EQ(commands.number(step, "compute_us"), static_cast<double>(12345 + step) / 1000.0);
+    EXPECT_EQ(commands.text(step, "fault"), "none");
+
+    const Reference reference = make_reference(step);
+    EXPECT_EQ(references.number(step, "sim_time_s"), static_cast<double>(4 * step) / 1000.0);
+    EXPECT_EQ(references.text(step, "stage"), step < 100 ? "0" : "1");
+    EXPECT_EQ(references.text(step, "stage_name"), step < 100 ? "hold" : "figure_eight");
+    expect_vector(references, step, 5, reference.position_m());
+    expect_vector(references, step, 8, reference.velocity_m_s());
+    expect_vector(references, step, 11, reference.acceleration_m_s2());
+    expect_vector(references, step, 14, reference.jerk_m_s3());
+    expect_vector(references, step, 17, reference.snap_m_s4());
+  }
+}
+
+TEST_F(RecordingTest, StateRowsHoldTheForceBeforeAndCommandRowsTheForceAfter) {
+  fly_to_the_end();
+  finish();
+  const CsvTable states = read_table("state.csv"), commands = read_table("command.csv");
+  for (const char* column : {"force_x_n", "force_y_n", "force_z_n"}) {
+    EXPECT_EQ(states.text(0, column), "0");
+    for (std::uint64_t step = 1; step <= kLastStep; ++step)
+      ASSERT_EQ(states.text(step, column), commands.text(step - 1, column)) << step;
+  }
+}
+
+TEST_F(RecordingTest, FlightRowsJoinTheStepAndTheirAttitudeReproducesTheForce) {
+  fly_to_the_end();
+  finish();
+  const CsvTable flight = read_table("flight.csv"), commands = read_table("command.csv"),
+                 states = read_table("state.csv"), references = read_table("reference.csv");
+  for (std::uint64_t step = 0; step <= kLastStep; ++step) {
+    for (const char* column : {"force_x_n", "force_y_n", "force_z_n"})
+      ASSERT_EQ(flight.text(step, column), commands.text(step, column));
+    for (const char* column : {"ref_x_m", "ref_y_m", "ref_z_m", "sim_time_s"})
+      ASSERT_EQ(flight.text(step, column), references.text(step, column));
+    for (const char* column :
+         {"quad_x_m", "quad_y_m", "quad_z_m", "quad_vx_m_s", "quad_vy_m_s", "quad_vz_m_s",
+          "alpha_rad", "beta_rad", "alpha_dot_rad_s", "beta_dot_rad_s"})
+      ASSERT_EQ(flight.text(step, column), states.text(step, column));
+
+    // F = −|F| R(roll, pitch, 0) e₃ with R = R_y(pitch) R_x(roll), third column written out.
+    const double roll = flight.number(step, "roll_rad"), pitch = flight.number(step, "pitch_rad");
+    EXPECT_EQ(flight.number(step, "yaw_rad"), 0.0);
+    const Eigen::Vector3d force(flight.number(step, "force_x_n"), flight.number(step, "force_y_n"),
+                                flight.number(step, "force_z_n"));
+    const Eigen::Vector3d thrust_axis(std::sin(pitch) * std::cos(roll), -std::sin(roll),
+                                      std::cos(pitch) * std::cos(roll));
+    // Rounding of two angles and four products.
+    EXPECT_LT((force + force.norm() * thrust_axis).norm(), 1e-14 * force.norm());
+
+    // The rod vector: q = (sin β, −sin α cos β, cos α cos β).
+    const double alpha = flight.number(step, "alpha_rad"), beta = flight.number(step, "beta_rad");
+    const Eigen::Vector3d rod(flight.number(step, "rod_x"), flight.number(step, "rod_y"),
+                              flight.number(step, "rod_z"));
+    const Eigen::Vector3d expected(std::sin(beta), -std::sin(alpha) * std::cos(beta),
+                                   std::cos(alpha) * std::cos(beta));
+    EXPECT_LT((rod - expected).norm(), 1e-14);  // difference of positions of about 10 m
+  }
+}
+
+TEST_F(RecordingTest, ForcesOfAStandbyStayOut) {
+  recording_->add(make_status(PHASE_RUNNING, 0));
+  for (std::uint64_t step = 0; step <= kLastStep; ++step) {
+    recording_->add(make_standby_command(step));
+    recording_->add(make_standby_reference(step));
+    add_step(step);
+    add_step(step);
+  }
+  recording_->add(make_status(PHASE_FINISHED, kLastStep));
+  EXPECT_TRUE(finish());
+  const CsvTable commands = read_table("command.csv");
+  ASSERT_EQ(commands.rows.size(), kLastStep + 1);
+  for (const auto& row : commands.rows) EXPECT_EQ(row[2], kPilot);
+  EXPECT_EQ(read_table("reference.csv").rows.size(), kLastStep + 1);
+}
+
+TEST_F(RecordingTest, TheManifestDescribesTheRunTheMachineAndEveryFile) {
+  fly_to_the_end();
+  finish();
+  const Json manifest = read_manifest();
+  EXPECT_EQ(manifest.at("run_id"), "0123456789abcdef");
+  EXPECT_EQ(manifest.at("scenario"), "synthetic");
+  EXPECT_EQ(manifest.at("scenario_sha256"), config::calc_sha256(kScenarioText));
+  EXPECT_EQ(manifest.at("vehicle_ids"), Json({0}));
+  EXPECT_EQ(manifest.at("period_s"), 0.004);
+  EXPECT_EQ(manifest.at("step_s"), 0.001);
+  EXPECT_EQ(manifest.at("mode"), "lockstep");
+  EXPECT_EQ(manifest.at("versions").at("sim_server"), "sls 0.0.test");
+  EXPECT_FALSE(manifest.at("versions").at("recorder").get<std::string>().empty());
+  EXPECT_FALSE(manifest.at("versions").at("fast_dds").get<std::string>().empty());
+  EXPECT_NE(manifest.at("machine").at("libc").get<std::string>().find("glibc"), std::string::npos);
+  EXPECT_TRUE(manifest.at("machine").contains("processor"));
+
+  // Exactly the files that are there, each with the hash of its bytes; CSV files with their rows.
+  std::set<std::string> there, listed;
+  for (const auto& entry : fs::directory_iterator(folder_.path()))
+    there.insert(entry.path().filename());
+  for (const auto& [name, file] : manifest.at("files").items()) {
+    listed.insert(name);
+    EXPECT_EQ(file.at("sha256"), config::calc_file_sha256(folder_ / name)) << name;
+    EXPECT_EQ(file.at("sha256"), config::calc_sha256(read_bytes(folder_ / name))) << name;
+    if (name.find(".csv") != std::string::npos)
+      EXPECT_EQ(file.at("rows"), read_table(name).rows.size()) << name;
+    else
+      EXPECT_FALSE(file.contains("rows")) << name;
+  }
+  listed.insert("manifest.json");
+  EXPECT_EQ(listed, there);
+  for (const char* name : kCsvFiles) EXPECT_EQ(listed.count(name), 1u) << name;
+}
+
+TEST_F(RecordingTest, TheScenarioIsKeptByteForByte) {
+  EXPECT_EQ(read_bytes(folder_ / "scenario.yaml"), kScenarioText);
+  EXPECT_EQ(config::calc_file_sha256(folder_ / "scenario.yaml"),
+            make_parameters().scenario_sha256().to_string());
+}
+
+TEST_F(RecordingTest, FlightTextNamesTheOutcomeAndTheStages) {
+  fly_to_the_end();
+  finish();
+  const std::string text = read_bytes(folder_ / "flight.txt");
+  for (const char* part : {"synthetic: finished", "0 hold", "1 figure_eight", "lap 2", "Events"})
+    EXPECT_NE(text.find(part), std::string::npos) << part;
+}
+
+TEST_F(RecordingTest, StatusRowsKeepReasonsWithCommasQuotesAndLineBreaks) {
+  SimStatus status = make_status(PHASE_PAUSED, 7, "a, \"b\"\nc");
+  SyncCounters& counters = status.counters();
+  counters.resent(1);
+  counters.late(2);
+  counters.duplicate(3);
+  counters.superseded(4);
+  counters.take_overs(5);
+  counters.rejected_not_finite(6);
+  counters.rejected_force_limit(7);
+  counters.rejected_run(8);
+  counters.rejected_step(9);
+  counters.rejected_vehicle(10);
+  counters.rejected_client(11);
+  counters.rejected_fault(12);
+  recording_->add(status);
+  finish();
+  const CsvTable table = read_table("status.csv");
+  ASSERT_EQ(table.rows.size(), 1u);
+  EXPECT_EQ(table.text(0, "phase"), "paused");
+  EXPECT_EQ(table.text(0, "reason"), "a, \"b\"\nc");
+  EXPECT_EQ(table.text(0, "step"), "7");
+  EXPECT_EQ(table.text(0, "controller"), kPilot);
+  int expected = 0;
+  for (const char* column :
+       {"resent", "late", "duplicate", "superseded", "take_overs", "rejected_not_finite",
+        "rejected_force_limit", "rejected_run", "rejected_step", "rejected_vehicle",
+        "rejected_client", "rejected_fault"})
+    EXPECT_EQ(table.text(0, column), std::to_string(++expected)) << column;
+}
+
+// --- what is missing is said ---------------------------------------------------------------------
+
+TEST_F(RecordingTest, OneLostReferenceMakesItIncompleteAndIsListed) {
+  for (std::uint64_t step = 0; step <= kLastStep; ++step) {
+    recording_->add(make_state(step));
+    recording_->add(make_command(step));
+    if (step != 123) recording_->add(make_reference(step));
+  }
+  recording_->add(make_status(PHASE_FINISHED, kLastStep));
+  EXPECT_FALSE(recording_->has_all());
+  EXPECT_EQ(recording_->last_complete_step(), 122);
+  EXPECT_FALSE(finish());
+  const Json manifest = read_manifest();
+  EXPECT_EQ(manifest.at("complete"), false);
+  EXPECT_EQ(manifest.at("outcome"), "finished");
+  EXPECT_EQ(
+      manifest.at("missing"),
+      Json::array({{{"vehicle_id", 0}, {"topic", "sls/reference"}, {"from", 123}, {"to", 123}}}));
+  EXPECT_EQ(read_table("state.csv").rows.size(), kLastStep + 1);
+  EXPECT_EQ(read_table("command.csv").rows.size(), kLastStep + 1);
+  EXPECT_EQ(read_table("reference.csv").rows.size(), kLastStep);
+  EXPECT_EQ(read_table("flight.csv").rows.size(), kLastStep);
+  const std::string gaps = recording_->describe_gaps();
+  EXPECT_NE(gaps.find("sls/reference step 123"), std::string::npos) << gaps;
+  EXPECT_NE(read_bytes(folder_ / "flight.txt").find("sls/reference step 123"), std::string::npos);
+}
+
+TEST_F(RecordingTest, LostStatesAreListedAsOneStretch) {
+  for (std::uint64_t step = 0; step <= kLastStep; ++step) {
+    if (step < 50 || step > 59) recording_->add(make_state(step));
+    recording_->add(make_command(step));
+    recording_->add(make_reference(step));
+  }
+  recording_->add(make_status(PHASE_FINISHED, kLastStep));
+  EXPECT_FALSE(finish());
+  bool is_listed = false;
+  const Json manifest = read_manifest();
+  for (const Json& gap : manifest.at("missing"))
+    if (gap.at("topic") == "sls/state") {
+      EXPECT_EQ(gap.at("from"), 50);
+      EXPECT_EQ(gap.at("to"), 59);
+      is_listed = true;
+    }
+  EXPECT_TRUE(is_listed);
+}
+
+TEST_F(RecordingTest, TheLostEndOfAFinishedRunIsListed) {
+  add_steps(0, 200);
+  recording_->add(make_status(PHASE_FINISHED, kLastStep));
+  EXPECT_FALSE(recording_->has_all());
+  EXPECT_FALSE(finish());
+  std::set<std::string> topics;
+  const Json manifest = read_manifest();
+  for (const Json& gap : manifest.at("missing")) {
+    topics.insert(gap.at("topic").get<std::string>());
+    EXPECT_EQ(gap.at("to"), kLastStep);
+    EXPECT_LE(gap.at("from"), 201);
+    EXPECT_GE(gap.at("from"), 200);
+  }
+  EXPECT_EQ(topics, (std::set<std::string>{"sls/state", "sls/command", "sls/reference"}));
+  EXPECT_EQ(manifest.at("last_step"), kLastStep);
+}
+
+TEST_F(RecordingTest, SamplesTheQueueRefusedMakeItIncomplete) {
+  fly_to_the_end();
+  EXPECT_FALSE(finish("", 3));
+  const Json manifest = read_manifest();
+  EXPECT_EQ(manifest.at("complete"), false);
+  EXPECT_EQ(manifest.at("refused_samples"), 3);
+  const std::string gaps = recording_->describe_gaps();
+  EXPECT_NE(gaps.find("3 samples"), std::string::npos) << gaps;
+  EXPECT_NE(gaps.find("queue"), std::string::npos) << gaps;
+}
+
+// --- runs that did not finish --------------------------------------------------------------------
+
+TEST_F(RecordingTest, AFailedRunIsKeptWithItsCauseAndNeverComplete) {
+  recording_->add(make_status(PHASE_RUNNING, 0));
+  add_steps(0, 149);
+  recording_->add(make_state(150));
+  ControlCommand faulted = make_command(150);
+  faulted.fault(FAULT_FREE_FALL);
+  faulted.mission(MISSION_FAILED);
+  recording_->add(faulted);
+  recording_->add(make_reference(150));
+  recording_->add(make_status(PHASE_FAILED, 150, "controller 'pilot' answered with a fault"));
+  EXPECT_FALSE(finish());
+  const Json manifest = read_manifest();
+  EXPECT_EQ(manifest.at("complete"), false);
+  EXPECT_EQ(manifest.at("outcome"), "failed");
+  EXPECT_EQ(manifest.at("reason"), "controller 'pilot' answered with a fault");
+  EXPECT_EQ(manifest.at("missing"), Json::array());
+  EXPECT_EQ(manifest.at("last_step"), 150);
+  const CsvTable commands = read_table("command.csv");
+  ASSERT_EQ(commands.rows.size(), 151u);
+  EXPECT_EQ(commands.text(150, "fault"), "free_fall");
+  const std::string gaps = recording_->describe_gaps();
+  EXPECT_NE(gaps.find("answered with a fault"), std::string::npos) << gaps;
+}
+
+TEST_F(RecordingTest, AFailedRunsLastStepNeedsNoAnswer) {
+  add_steps(0, 149);
+  recording_->add(make_state(150));
+  recording_->add(make_status(PHASE_FAILED, 150, "no answer to step 150"));
+  EXPECT_FALSE(finish());
+  EXPECT_EQ(read_manifest().at("missing"), Json::array());
+  EXPECT_EQ(read_table("state.csv").rows.size(), 151u);
+  EXPECT_EQ(read_table("command.csv").rows.size(), 150u);
+}
+
+TEST_F(RecordingTest, ARunThatFailedBeforeItBeganMissesNothing) {
+  recording_->add(make_status(PHASE_WAITING, 0, "missing: controller"));
+  recording_->add(make_status(PHASE_FAILED, 0, "not ready within 30 s: controller"));
+  EXPECT_FALSE(finish());
+  EXPECT_EQ(read_manifest().at("missing"), Json::array());
+  EXPECT_EQ(read_manifest().at("outcome"), "failed");
+  const std::string gaps = recording_->describe_gaps();
+  EXPECT_NE(gaps.find("not ready within 30 s"), std::string::npos) << gaps;
+}
+
+TEST_F(RecordingTest, TheReasonOfAFailureComesBeforeWhatIsMissing) {
+  add_steps(0, 20);
+  for (std::uint64_t step = 22; step <= 30; ++step) add_step(step);
+  recording_->add(make_status(PHASE_FAILED, 30, "the recorder was behind"));
+  EXPECT_FALSE(finish());
+  const std::string gaps = recording_->describe_gaps();
+  EXPECT_NE(gaps.find("the recorder was behind"), std::string::npos) << gaps;
+  EXPECT_NE(gaps.find("missing"), std::string::npos) << gaps;
+  EXPECT_EQ(gaps.find('\n'), std::string::npos) << gaps;
+}
+
+TEST_F(RecordingTest, AnInterruptedRunSaysSo) {
+  recording_->add(make_status(PHASE_RUNNING, 0));
+  add_steps(0, 99);
+  EXPECT_FALSE(finish("interrupted by SIGINT"));
+  const Json manifest = read_manifest();
+  EXPECT_EQ(manifest.at("complete"), false);
+  EXPECT_EQ(manifest.at("outcome"), "interrupted");
+  EXPECT_EQ(manifest.at("reason"), "interrupted by SIGINT");
+  EXPECT_EQ(manifest.at("files").at("state.csv").at("rows"), 100);
+  EXPECT_EQ(read_table("state.csv").rows.size(), 100u);
+  EXPECT_EQ(read_table("flight.csv").rows.size(), 99u);
+  const std::string gaps = recording_->describe_gaps();
+  EXPECT_NE(gaps.find("SIGINT"), std::string::npos) << gaps;
+  EXPECT_NE(read_bytes(folder_ / "flight.txt").find("SIGINT"), std::string::npos);
+}
+
+TEST_F(RecordingTest, ARunWithoutASingleSampleIsNotComplete) {
+  EXPECT_FALSE(finish("the server is gone"));
+  EXPECT_EQ(read_manifest().at("complete"), false);
+  for (const char* name : kCsvFiles) EXPECT_TRUE(read_table(name).rows.empty()) << name;
+}
+
+TEST_F(RecordingTest, KilledBeforeTheEndItsFilesParseAndDoNotClaimToBeWhole) {
+  recording_->add(make_status(PHASE_RUNNING, 0));
+  add_steps(0, 149);
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+  while (read_table("state.csv").rows.empty() && std::chrono::steady_clock::now() < deadline)
+    recording_->flush_if_due();  // at least every 0.2 s
+  add_steps(150, 200);
+  recording_.reset();
+  EXPECT_GE(read_table("state.csv").rows.size(), 149u);
+  for (const char* name : kCsvFiles) read_table(name);
+  const Json manifest = read_manifest();
+  EXPECT_EQ(manifest.at("complete"), false);
+  EXPECT_EQ(manifest.at("outcome"), "recording");
+  EXPECT_EQ(manifest.at("run_id"), "0123456789abcdef");
+}
+
+TEST_F(RecordingTest, FromTheFirstMomentThereIsAManifestThatSaysNotComplete) {
+  EXPECT_EQ(read_manifest().at("complete"), false);
+  for (const char* name : kCsvFiles) EXPECT_EQ(read_table(name).rows.size(), 0u) << name;
+  EXPECT_EQ(read_table("state.csv").header.size(), 22u) << "headers are on disk at once";
+}
+
+// --- a full disk ---------------------------------------------------------------------------------
+
+/// What `work` throws as a system_error, or "no error".
+std::string find_system_error(const std::function<void()>& work) {
+  try {
+    work();
+  } catch (const std::system_error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST_F(RecordingTest, AFullDiskEndsTheRecordingAndWhatIsThereDoesNotClaimToBeWhole) {
+  recording_->add(make_status(PHASE_RUNNING, 0));
+  add_steps(0, kLastStep);
+  recording_->add(make_status(PHASE_FINISHED, kLastStep));
+  const std::string error = find_system_error([&] {
+    const FileSizeLimit limit(20000);
+    finish();
+  });
+  EXPECT_NE(error.find((folder_ / "state.csv").string()), std::string::npos) << error;
+  EXPECT_NE(error.find("cannot write"), std::string::npos) << error;
+  recording_.reset();
+  EXPECT_EQ(read_manifest().at("complete"), false);
+  EXPECT_EQ(read_manifest().at("outcome"), "recording");
+  EXPECT_GT(read_table("state.csv").rows.size(), 10u);
+  for (const char* name : kCsvFiles) read_table(name);
+}
+
+TEST_F(RecordingTest, ADiskThatIsFullAtTheVeryEndLeavesTheEarlierManifest) {
+  fly_to_the_end();
+  const std::string error = find_system_error([&] {
+    const FileSizeLimit limit(100);
+    finish();
+  });
+  EXPECT_NE(error.find((folder_ / "flight.txt").string()), std::string::npos) << error;
+  EXPECT_NE(error.find("File too large"), std::string::npos) << error;
+  EXPECT_EQ(read_manifest().at("complete"), false);
+  EXPECT_FALSE(fs::exists(folder_ / "manifest.json.part"));
+}
+
+TEST_F(RecordingTest, AManifestThatDoesNotFitLeavesTheEarlierOneWhole) {
+  const std::string earlier = read_bytes(folder_ / "manifest.json");
+  Manifest manifest;
+  manifest.parameters = make_parameters();
+  manifest.complete = true;
+  const std::string error = find_system_error([&] {
+    const FileSizeLimit limit(100);
+    write_manifest(folder_.path(), manifest);
+  });
+  EXPECT_NE(error.find((folder_ / "manifest.json").string()), std::string::npos) << error;
+  EXPECT_NE(error.find("File too large"), std::string::npos) << error;
+  EXPECT_EQ(read_bytes(folder_ / "manifest.json"), earlier);
+  EXPECT_FALSE(fs::exists(folder_ / "manifest.json.part"));
+}
+
+// --- samples that do not belong here -------------------------------------------------------------
+
+TEST_F(RecordingTest, SamplesOfOtherRunsAndVehiclesAreIgnored) {
+  recording_->add(make_status(PHASE_RUNNING, 0));
+  for (std::uint64_t step = 0; step <= kLastStep; ++step) {
+    VehicleState state = make_state(step);
+    ControlCommand command = make_command(step);
+    Reference reference = make_reference(step);
+    state.run_id(kRunId + 1);
+    command.run_id(kRunId + 1);
+    reference.run_id(0);
+    recording_->add(state);
+    recording_->add(command);
+    recording_->add(reference);
+    state = make_state(step);
+    state.vehicle_id(1);
+    command = make_command(step);
+    command.vehicle_id(4000000000);
+    recording_->add(state);
+    recording_->add(command);
+    add_step(step);
+  }
+  SimStatus other = make_status(PHASE_FAILED, 3, "another run's");
+  other.run_id(kRunId + 1);
+  recording_->add(other);
+  EXPECT_FALSE(recording_->has_all());
+  recording_->add(make_status(PHASE_FINISHED, kLastStep));
+  EXPECT_TRUE(finish());
+  EXPECT_EQ(read_table("state.csv").rows.size(), kLastStep + 1);
+  EXPECT_EQ(read_table("status.csv").rows.size(), 2u);
+}
+
+TEST_F(RecordingTest, TextsCutWithinALetterDoNotCostTheManifest) {
+  add_steps(0, 10);
+  std::string reason(254, 'x');
+  reason += "\xc3\xa4";  // "ä": its second byte does not fit into the 255 of the wire
+  recording_->add(make_status(PHASE_FAILED, 10, reason));
+  EXPECT_FALSE(finish());
+  const Json manifest = read_manifest();
+  EXPECT_EQ(manifest.at("outcome"), "failed");
+  EXPECT_EQ(manifest.at("reason").get<std::string>().substr(0, 254), reason.substr(0, 254));
+}
+
+TEST_F(RecordingTest, EveryVehicleOfTheRunIsWaitedFor) {
+  const sls::test::TemporaryFolder folder;
+  Parameters parameters = make_parameters();
+  parameters.vehicle_ids({0, 7});
+  Recording recording(folder.path(), parameters);
+  recording.add(make_status(PHASE_FINISHED, kLastStep));
+  for (const std::uint32_t id : {0u, 7u}) {
+    EXPECT_FALSE(recording.has_all());
+    EXPECT_EQ(recording.last_complete_step(), -1);
+    for (std::uint64_t step = 0; step <= kLastStep; ++step) {
+      VehicleState state = make_state(step);
+      ControlCommand command = make_command(step);
+      Reference reference = make_reference(step);
+      state.vehicle_id(id);
+      command.vehicle_id(id);
+      reference.vehicle_id(id);
+      recording.add(state);
+      recording.add(command);
+      recording.add(reference);
+    }
+  }
+  EXPECT_TRUE(recording.has_all());
+  EXPECT_TRUE(recording.finish("", 0));
+}
+
+TEST_F(RecordingTest, ASecondRecordingIntoTheSameFolderIsRefusedAndTheFirstKept) {
+  fly_to_the_end();
+  finish();
+  EXPECT_THROW(Recording(folder_.path(), make_parameters()), std::system_error);
+  EXPECT_EQ(read_manifest().at("complete"), true);
+  EXPECT_EQ(read_table("state.csv").rows.size(), kLastStep + 1);
+}
+
+TEST(RecordingErrorTest, AScenarioThatCannotBeReadIsRefusedBeforeAnyFile) {
+  const sls::test::TemporaryFolder folder;
+  Parameters parameters = make_parameters();
+  parameters.scenario_text("name: [");
+  EXPECT_THROW(Recording(folder.path(), parameters), config::ConfigError);
+  EXPECT_TRUE(fs::is_empty(folder.path()));
+}
+
+}  // namespace
+}  // namespace sls::record

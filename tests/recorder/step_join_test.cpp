@@ -1,0 +1,388 @@
+#include "recorder/step_join.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+#include <random>
+#include <variant>
+
+#include "tests/recorder/synthetic_run.hpp"
+
+namespace sls::record {
+namespace {
+
+using namespace test;
+using Sample = std::variant<VehicleState, ControlCommand, Reference>;
+
+class StepJoinTest : public testing::Test {
+ protected:
+  void add(const Sample& sample) {
+    std::visit([&](const auto& message) { join_.add(message); }, sample);
+  }
+  void add_step(std::uint64_t step) {
+    join_.add(make_state(step));
+    join_.add(make_command(step));
+    join_.add(make_reference(step));
+  }
+  void add_steps(std::uint64_t from, std::uint64_t to) {
+    for (std::uint64_t step = from; step <= to; ++step) add_step(step);
+  }
+
+  /// What has come out is steps 0 to `last`, each with the pilot's three samples.
+  void expect_whole_up_to(std::uint64_t last) {
+    ASSERT_EQ(records_.size(), last + 1);
+    for (std::uint64_t step = 0; step <= last; ++step) {
+      const StepRecord& record = records_[step];
+      ASSERT_EQ(record.step, step);
+      ASSERT_TRUE(record.is_complete()) << step;
+      ASSERT_EQ(*record.state, make_state(step));
+      ASSERT_EQ(*record.command, make_command(step));
+      ASSERT_EQ(*record.reference, make_reference(step));
+    }
+    EXPECT_EQ(join_.last_step(), static_cast<std::int64_t>(last));
+  }
+
+  std::vector<StepRecord> records_;
+  StepJoin join_{[this](const StepRecord& record) { records_.push_back(record); }};
+};
+
+TEST_F(StepJoinTest, NothingIsHandedOnBeforeThereIsAnything) {
+  EXPECT_EQ(join_.last_step(), -1);
+  EXPECT_FALSE(join_.has_ended());
+  join_.give_up();
+  EXPECT_TRUE(records_.empty());
+}
+
+TEST_F(StepJoinTest, AStepWaitsForTheNextStateThatSaysWhoseForceWasApplied) {
+  add_step(0);
+  EXPECT_TRUE(records_.empty());
+  join_.add(make_state(1));
+  expect_whole_up_to(0);
+  add_step(1);
+  EXPECT_EQ(records_.size(), 1u);
+}
+
+TEST_F(StepJoinTest, TheEndSettlesTheLastStep) {
+  add_steps(0, kLastStep);
+  EXPECT_EQ(join_.last_step(), static_cast<std::int64_t>(kLastStep) - 1);
+  EXPECT_FALSE(join_.has_ended());
+  join_.set_end(kLastStep, true, kPilot);
+  EXPECT_TRUE(join_.has_ended());
+  expect_whole_up_to(kLastStep);
+}
+
+TEST_F(StepJoinTest, TheEndMayBeKnownFirst) {
+  join_.set_end(kLastStep, true, kPilot);
+  EXPECT_FALSE(join_.has_ended());
+  add_steps(0, kLastStep);
+  EXPECT_TRUE(join_.has_ended());
+  expect_whole_up_to(kLastStep);
+}
+
+TEST_F(StepJoinTest, AMissionMayEndAtStepZero) {
+  ControlCommand only = make_command(0);
+  only.mission(MISSION_FINISHED);
+  join_.add(make_state(0));
+  join_.add(make_reference(0));
+  join_.set_end(0, true, kPilot);
+  EXPECT_FALSE(join_.has_ended());
+  join_.add(only);
+  EXPECT_TRUE(join_.has_ended());
+  ASSERT_EQ(records_.size(), 1u);
+  EXPECT_EQ(*records_[0].command, only);
+}
+
+TEST_F(StepJoinTest, WhatComesAfterTheEndIsNotHandedOn) {
+  join_.set_end(3, false, kPilot);
+  add_steps(0, 20);
+  join_.give_up();
+  EXPECT_EQ(records_.size(), 4u);
+}
+
+TEST_F(StepJoinTest, RepeatedSamplesAreDroppedAndCounted) {
+  for (int i = 0; i < 3; ++i) {
+    add_step(0);
+    add_step(1);
+  }
+  join_.add(make_state(0));
+  join_.set_end(1, false, kPilot);
+  EXPECT_EQ(records_.size(), 2u);
+  EXPECT_GE(join_.dropped().repeated, 2u * 6u);
+  EXPECT_EQ(join_.dropped().out_of_range, 0u);
+}
+
+// --- which client's answer -----------------------------------------------------------------------
+
+TEST_F(StepJoinTest, TheAnswerThatWasAppliedIsRecordedWhoeverWasFirst) {
+  for (std::uint64_t step = 0; step <= kLastStep; ++step) {
+    join_.add(make_standby_reference(step));
+    join_.add(make_standby_command(step));
+    join_.add(make_state(step));
+    join_.add(make_command(step));
+    join_.add(make_reference(step));
+  }
+  join_.set_end(kLastStep, true, kPilot);
+  expect_whole_up_to(kLastStep);
+  EXPECT_EQ(join_.dropped().other_client, kLastStep + 1);
+}
+
+TEST_F(StepJoinTest, AStandbysAnswerAloneIsNotEnough) {
+  join_.add(make_state(0));
+  join_.add(make_standby_command(0));
+  join_.add(make_standby_reference(0));
+  join_.add(make_state(1));
+  EXPECT_TRUE(records_.empty());
+  join_.add(make_command(0));
+  join_.add(make_reference(0));
+  expect_whole_up_to(0);
+}
+
+TEST_F(StepJoinTest, AfterATakeOverTheOtherClientsAnswersAreRecorded) {
+  for (std::uint64_t step = 0; step <= 20; ++step) {
+    VehicleState state = make_state(step);
+    if (step > 10) {
+      state.controller_name("standby");
+      state.f_Q_W_n(make_standby_command(step - 1).f_Q_W_n());
+    }
+    join_.add(state);
+    join_.add(make_command(step));
+    join_.add(make_reference(step));
+    join_.add(make_standby_command(step));
+    join_.add(make_standby_reference(step));
+  }
+  ASSERT_EQ(records_.size(), 20u);
+  for (std::uint64_t step = 0; step < 20; ++step) {
+    const std::string client = step < 10 ? kPilot : "standby";
+    EXPECT_EQ(records_[step].command->client_name().to_string(), client) << step;
+    EXPECT_EQ(records_[step].reference->client_name().to_string(), client) << step;
+  }
+}
+
+TEST_F(StepJoinTest, OfOneNameTheCommandWhoseForceWasAppliedIsRecorded) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (std::uint64_t step = 0; step <= kLastStep; ++step) {
+    // A stranger under the pilot's name: refused by the server, but the recorder hears it too.
+    ControlCommand stranger = make_command(step);
+    stranger.f_Q_W_n({1e9, 0, 0});
+    stranger.mission(MISSION_RUNNING);
+    ControlCommand not_finite = make_command(step);
+    not_finite.f_Q_W_n({nan, nan, nan});
+    for (int i = 0; i < 50; ++i) {
+      join_.add(stranger);
+      join_.add(not_finite);
+    }
+    add_step(step);
+  }
+  // At the end no next state tells the forces apart; only one of them ends the mission.
+  ControlCommand stranger = make_command(kLastStep);
+  stranger.mission(MISSION_FAILED);
+  join_.add(stranger);
+  join_.set_end(kLastStep, true, kPilot);
+  ASSERT_EQ(records_.size(), kLastStep + 1);
+  for (const StepRecord& record : records_) {
+    ASSERT_TRUE(record.command) << record.step;
+    ASSERT_EQ(record.command->f_Q_W_n(), make_command(record.step).f_Q_W_n()) << record.step;
+    ASSERT_NE(record.command->mission(), MISSION_FAILED);
+  }
+}
+
+TEST_F(StepJoinTest, ANamedClientWithAnotherForceIsNotRecorded) {
+  ControlCommand other = make_command(0);
+  other.f_Q_W_n()[2] += 1e-12;
+  join_.add(make_state(0));
+  join_.add(other);
+  join_.add(make_reference(0));
+  join_.add(make_state(1));
+  EXPECT_TRUE(records_.empty());
+  join_.give_up();
+  ASSERT_GE(records_.size(), 1u);
+  EXPECT_FALSE(records_[0].command);
+}
+
+// --- the end of a failed or lost run -------------------------------------------------------------
+
+TEST_F(StepJoinTest, TheLastStepOfAFailedRunNeedsNoAnswer) {
+  add_steps(0, 9);
+  join_.add(make_state(10));
+  join_.set_end(10, false, kPilot);
+  EXPECT_FALSE(join_.has_ended()) << "an answer may still come";
+  join_.give_up();
+  EXPECT_TRUE(join_.has_ended());
+  ASSERT_EQ(records_.size(), 11u);
+  EXPECT_TRUE(records_[10].state);
+  EXPECT_FALSE(records_[10].command);
+  EXPECT_FALSE(records_[10].is_answer_expected);
+  EXPECT_TRUE(records_[9].is_complete());
+}
+
+TEST_F(StepJoinTest, TheRefusedAnswerThatEndedARunIsRecordedOfWhicheverClient) {
+  add_steps(0, 9);
+  join_.add(make_state(10));
+  ControlCommand faulted = make_standby_command(10);
+  faulted.fault(FAULT_FREE_FALL);
+  faulted.mission(MISSION_FAILED);
+  join_.add(faulted);
+  join_.add(make_standby_reference(10));
+  join_.set_end(10, false, kPilot);
+  EXPECT_TRUE(join_.has_ended());
+  ASSERT_EQ(records_.size(), 11u);
+  ASSERT_TRUE(records_[10].is_complete());
+  EXPECT_EQ(*records_[10].command, faulted);
+  EXPECT_EQ(*records_[10].reference, make_standby_reference(10));
+}
+
+TEST_F(StepJoinTest, GivingUpHandsOnWhatThereIsInOrder) {
+  add_steps(0, 20);
+  for (std::uint64_t step = 21; step <= 40; ++step) {
+    if (step % 3 != 0) join_.add(make_state(step));
+    if (step % 4 != 0) join_.add(make_command(step));
+    if (step % 5 != 0) join_.add(make_reference(step));
+  }
+  join_.set_end(40, true, kPilot);
+  join_.give_up();
+  EXPECT_TRUE(join_.has_ended());
+  ASSERT_EQ(records_.size(), 41u);
+  for (std::uint64_t step = 0; step <= 40; ++step) {
+    EXPECT_EQ(records_[step].step, step);
+    EXPECT_TRUE(records_[step].is_answer_expected);
+    EXPECT_EQ(records_[step].state.has_value(), step <= 20 || step % 3 != 0) << step;
+  }
+}
+
+TEST_F(StepJoinTest, OfALostRunTheLastStepsAnswerIsNotExpected) {
+  add_steps(0, 10);
+  join_.give_up();
+  ASSERT_EQ(records_.size(), 11u);
+  EXPECT_TRUE(records_[9].is_answer_expected);
+  EXPECT_FALSE(records_[10].is_answer_expected) << "nobody knows whose was applied";
+  EXPECT_FALSE(records_[10].command);
+}
+
+// --- samples that make no sense ------------------------------------------------------------------
+
+TEST_F(StepJoinTest, AbsurdStepsTakeNoMemoryAndDisturbNothing) {
+  const auto highest = std::numeric_limits<std::uint64_t>::max();
+  for (std::uint64_t step = 0; step <= kLastStep; ++step) {
+    for (const std::uint64_t absurd :
+         {highest, highest - step, std::uint64_t{1} << 63, std::uint64_t{1} << 32, step + 100000}) {
+      ControlCommand command = make_command(0);
+      command.step(absurd);
+      join_.add(command);
+      Reference reference = make_reference(0);
+      reference.step(absurd);
+      join_.add(reference);
+      VehicleState state = make_state(0);
+      state.step(absurd);
+      join_.add(state);
+    }
+    add_step(step);
+  }
+  join_.set_end(kLastStep, true, kPilot);
+  expect_whole_up_to(kLastStep);
+  EXPECT_EQ(join_.dropped().out_of_range, (kLastStep + 1) * 5 * 3);
+}
+
+TEST_F(StepJoinTest, AnswersToStepsThatAreNotYetFlownCostNoStep) {
+  for (const std::uint64_t ahead :
+       {1000u, 10000u, 16383u, 16384u, 16385u, 20000u, 50000u, 65535u}) {
+    ControlCommand command = make_command(0);
+    command.step(ahead);
+    join_.add(command);
+    Reference reference = make_reference(0);
+    reference.step(ahead);
+    join_.add(reference);
+  }
+  EXPECT_TRUE(records_.empty()) << "steps were given up that nobody has flown";
+  add_steps(0, kLastStep);
+  join_.set_end(kLastStep, true, kPilot);
+  expect_whole_up_to(kLastStep);
+}
+
+TEST_F(StepJoinTest, ALostStepIsGivenUpBeforeTheRestFillsTheMemory) {
+  constexpr std::uint64_t kMany = 20000;
+  for (std::uint64_t step = 0; step <= kMany; ++step) {
+    if (step != 5) join_.add(make_state(step));
+    join_.add(make_command(step));
+    join_.add(make_reference(step));
+  }
+  EXPECT_GT(records_.size(), kMany - 100);  // caught up behind the gap
+  EXPECT_FALSE(records_[5].state);
+  EXPECT_FALSE(records_[4].command) << "state 5 would have told whose";
+  for (std::uint64_t step = 6; step < records_.size(); ++step)
+    ASSERT_TRUE(records_[step].is_complete()) << step;
+}
+
+TEST_F(StepJoinTest, ManyDifferentAnswersToOneStepAreBounded) {
+  join_.add(make_command(0));
+  join_.add(make_reference(0));
+  for (int i = 0; i < 100000; ++i) {
+    ControlCommand command = make_command(0);
+    command.client_name("client " + std::to_string(i));
+    join_.add(command);
+    Reference reference = make_reference(0);
+    reference.client_name("client " + std::to_string(i));
+    join_.add(reference);
+  }
+  EXPECT_GT(join_.dropped().repeated, 190000u);
+  join_.add(make_state(0));
+  join_.add(make_state(1));
+  expect_whole_up_to(0);
+}
+
+// --- property ------------------------------------------------------------------------------------
+
+TEST(StepJoinPropertyTest, AnyOrderAndAnyCopiesGiveTheSameRecording) {
+  for (std::uint64_t seed = 0; seed < 30; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937_64 random(seed);
+    const std::uint64_t window = 1 + random() % 40;
+    struct Timed {
+      double time;
+      Sample sample;
+    };
+    std::vector<Timed> samples;
+    const auto add_late = [&](std::uint64_t step, const Sample& sample) {
+      const double delay =
+          static_cast<double>(random() % 1000) / 1000.0 * static_cast<double>(window);
+      samples.push_back({static_cast<double>(step) + delay, sample});
+    };
+    for (std::uint64_t step = 0; step <= kLastStep; ++step) {
+      for (std::uint64_t copies = 1 + random() % 3; copies > 0; --copies) {
+        add_late(step, make_state(step));
+        add_late(step, make_command(step));
+        add_late(step, make_reference(step));
+      }
+      if (random() % 2 == 0) {
+        add_late(step, make_standby_command(step));
+        add_late(step, make_standby_reference(step));
+      }
+    }
+    std::stable_sort(samples.begin(), samples.end(),
+                     [](const Timed& a, const Timed& b) { return a.time < b.time; });
+    const std::size_t end_at = random() % samples.size();
+
+    std::vector<StepRecord> records;
+    std::int64_t last_step = -1;
+    StepJoin join([&](const StepRecord& record) { records.push_back(record); });
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      if (i == end_at) join.set_end(kLastStep, true, kPilot);
+      std::visit([&](const auto& message) { join.add(message); }, samples[i].sample);
+      ASSERT_GE(join.last_step(), last_step);
+      last_step = join.last_step();
+    }
+    ASSERT_TRUE(join.has_ended());
+    join.give_up();
+    ASSERT_EQ(records.size(), kLastStep + 1);
+    for (std::uint64_t step = 0; step <= kLastStep; ++step) {
+      ASSERT_EQ(records[step].step, step);
+      ASSERT_TRUE(records[step].is_complete());
+      ASSERT_EQ(*records[step].state, make_state(step));
+      ASSERT_EQ(*records[step].command, make_command(step));
+      ASSERT_EQ(*records[step].reference, make_reference(step));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace sls::record

@@ -1,0 +1,158 @@
+#include "sim_server/roster.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+namespace sls::sim {
+namespace {
+
+const std::string kScenario(64, 'a');
+const std::string kOtherScenario(64, 'b');
+
+bus::ParticipantDirectory::Entry make_entry(ParticipantRole role, const std::string& name,
+                                            bool ready) {
+  static std::uint8_t number = 0;
+  bus::ParticipantDirectory::Entry entry;
+  entry.peer.bytes.fill(++number);
+  entry.announcement.role(role);
+  entry.announcement.name(name);
+  entry.announcement.host("host-of-" + name);
+  entry.announcement.scenario_sha256(kScenario);
+  entry.announcement.ready(ready);
+  entry.announcement.last_complete_step(-1);
+  return entry;
+}
+
+bus::ParticipantDirectory::Entry make_controller(const std::string& name, bool ready = true) {
+  return make_entry(ROLE_CONTROLLER, name, ready);
+}
+bus::ParticipantDirectory::Entry make_recorder(const std::string& name, bool ready = true) {
+  return make_entry(ROLE_RECORDER, name, ready);
+}
+bus::ParticipantDirectory::Entry make_recorder_at(std::int64_t last_complete_step) {
+  auto entry = make_recorder("tape");
+  entry.announcement.last_complete_step(last_complete_step);
+  return entry;
+}
+
+config::WaitFor make_wait_for(int controllers, int recorders) {
+  config::WaitFor wait_for;
+  wait_for.controllers = controllers;
+  wait_for.recorders = recorders;
+  return wait_for;
+}
+
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+TEST(RosterTest, NobodyIsMissingWhenAllExpectedAreReady) {
+  const Roster roster = {{make_controller("pilot")}, {make_recorder("tape")}};
+  EXPECT_EQ(name_missing(roster, make_wait_for(1, 1), kScenario), "");
+}
+
+TEST(RosterTest, MoreThanExpectedIsFine) {
+  const Roster roster = {{make_controller("a"), make_controller("b", false), make_controller("c")},
+                         {make_recorder("d"), make_recorder("e")}};
+  EXPECT_EQ(name_missing(roster, make_wait_for(2, 1), kScenario), "");
+  EXPECT_EQ(name_missing({}, make_wait_for(0, 0), kScenario), "");
+}
+
+TEST(RosterTest, NamesTheRolesThatAreMissing) {
+  EXPECT_EQ(name_missing({}, make_wait_for(1, 1), kScenario), "controller, recorder");
+  EXPECT_EQ(name_missing({{make_controller("pilot")}, {}}, make_wait_for(1, 1), kScenario),
+            "recorder");
+  EXPECT_EQ(name_missing({{}, {make_recorder("tape")}}, make_wait_for(1, 1), kScenario),
+            "controller");
+}
+
+TEST(RosterTest, CountsWhereSeveralAreExpected) {
+  const Roster roster = {{make_controller("pilot")}, {make_recorder("tape")}};
+  const std::string missing = name_missing(roster, make_wait_for(3, 2), kScenario);
+  EXPECT_TRUE(contains(missing, "3 controllers (1 ready)")) << missing;
+  EXPECT_TRUE(contains(missing, "2 recorders (1 ready)")) << missing;
+}
+
+TEST(RosterTest, NamesWhoIsThereButNotReady) {
+  const Roster roster = {{make_controller("pilot", false)}, {make_recorder("tape", false)}};
+  const std::string missing = name_missing(roster, make_wait_for(1, 1), kScenario);
+  EXPECT_TRUE(contains(missing, "'pilot' on host-of-pilot is not ready")) << missing;
+  EXPECT_TRUE(contains(missing, "'tape' on host-of-tape is not ready")) << missing;
+}
+
+TEST(RosterTest, NamesAControllerWithAnotherScenario) {
+  Roster roster = {{make_controller("pilot")}, {make_recorder("tape")}};
+  roster.controllers[0].announcement.scenario_sha256(kOtherScenario);
+  const std::string missing = name_missing(roster, make_wait_for(1, 1), kScenario);
+  EXPECT_TRUE(contains(missing, "'pilot' on host-of-pilot has another scenario")) << missing;
+  EXPECT_FALSE(contains(missing, "tape")) << missing;
+}
+
+TEST(RosterTest, OnlyReadyControllersWithThisScenarioMayAnswer) {
+  Roster roster = {{make_controller("unready", false), make_controller("pilot"),
+                    make_controller("other"), make_controller("without")},
+                   {}};
+  roster.controllers[1].announcement.strength(-7);
+  roster.controllers[2].announcement.scenario_sha256(kOtherScenario);
+  roster.controllers[3].announcement.scenario_sha256("");
+  const auto clients = find_ready_clients(roster, kScenario);
+  ASSERT_EQ(clients.size(), 1u);
+  EXPECT_EQ(clients[0].name, "pilot");
+  EXPECT_EQ(clients[0].strength, -7);
+  EXPECT_EQ(clients[0].peer, roster.controllers[1].peer);
+}
+
+// The recorder's last complete step stays within 2,000 of the server's, the step being published.
+TEST(RosterTest, ARecorderMayBeTwoThousandStepsBehindAndNoMore) {
+  EXPECT_EQ(name_blocking_recorder({{}, {make_recorder_at(-1)}}, 1, 0), "");
+  EXPECT_EQ(name_blocking_recorder({{}, {make_recorder_at(-1)}}, 1, 1999), "");
+  EXPECT_NE(name_blocking_recorder({{}, {make_recorder_at(-1)}}, 1, 2000), "");
+  EXPECT_EQ(name_blocking_recorder({{}, {make_recorder_at(5000)}}, 1, 7000), "");
+  EXPECT_NE(name_blocking_recorder({{}, {make_recorder_at(5000)}}, 1, 7001), "");
+}
+
+TEST(RosterTest, ABlockingRecorderIsNamedWithHowFarItIsBehind) {
+  const std::string blocking = name_blocking_recorder({{}, {make_recorder_at(999)}}, 1, 3500);
+  EXPECT_TRUE(contains(blocking, "recorder 'tape' on host-of-tape")) << blocking;
+  EXPECT_TRUE(contains(blocking, "2500 steps behind")) << blocking;
+}
+
+TEST(RosterTest, TheSlowestOfSeveralRecordersBlocks) {
+  const Roster roster = {{}, {make_recorder_at(4000), make_recorder_at(1)}};
+  EXPECT_EQ(name_blocking_recorder(roster, 1, 2001), "");
+  EXPECT_NE(name_blocking_recorder(roster, 1, 2002), "");
+}
+
+TEST(RosterTest, ARecorderThatIsGoneStopsTheStepping) {
+  const std::string blocking = name_blocking_recorder({}, 1, 10);
+  EXPECT_TRUE(contains(blocking, "recorder")) << blocking;
+  EXPECT_TRUE(contains(blocking, "1 expected, 0 there")) << blocking;
+  EXPECT_NE(name_blocking_recorder({{}, {make_recorder("tape", false)}}, 1, 10), "");
+  EXPECT_EQ(name_blocking_recorder({}, 0, 10), "");
+}
+
+TEST(RosterTest, ARecorderThatIsNotReadyDoesNotBlockWhereNoneIsExpected) {
+  EXPECT_EQ(name_blocking_recorder({{}, {make_recorder("tape", false)}}, 0, 100000), "");
+}
+
+TEST(RosterTest, AbsurdProgressIsTakenForWhatItCanMean) {
+  const auto lowest = std::numeric_limits<std::int64_t>::min();
+  const auto highest = std::numeric_limits<std::int64_t>::max();
+  EXPECT_NE(name_blocking_recorder({{}, {make_recorder_at(lowest)}}, 1, 2000), "");
+  EXPECT_EQ(name_blocking_recorder({{}, {make_recorder_at(lowest)}}, 1, 0), "");
+  EXPECT_EQ(name_blocking_recorder({{}, {make_recorder_at(highest)}}, 1, 0), "");
+}
+
+TEST(RosterTest, TheServerWaitsForEveryRecorderThatIsThere) {
+  Roster roster = {{}, {make_recorder("a"), make_recorder("b")}};
+  EXPECT_FALSE(are_recorders_done(roster));
+  roster.recorders[0].announcement.done(true);
+  EXPECT_FALSE(are_recorders_done(roster));
+  roster.recorders[1].announcement.done(true);
+  EXPECT_TRUE(are_recorders_done(roster));
+  EXPECT_TRUE(are_recorders_done({}));
+}
+
+}  // namespace
+}  // namespace sls::sim

@@ -1,0 +1,121 @@
+/// Commands that must not fly: sent to a real server during a real flight by a stranger on the
+/// domain. The flight must stay the same to the bit and every one must be counted by its cause.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <mutex>
+
+#include "common/bus/node.hpp"
+#include "common/bus/participants.hpp"
+#include "system/flight.hpp"
+
+namespace sls::testing {
+namespace {
+
+/// A participant nobody invited: sees the states and writes whatever it likes to sls/command.
+class Stranger {
+ public:
+  explicit Stranger(int domain)
+      : node_(qos("default"), domain, "stranger"),
+        servers_(node_),
+        writer_(node_),
+        reader_(node_, bus::kLoopReaderProfile,
+                [this](const VehicleState& state, const bus::PeerId&) {
+                  const std::lock_guard lock(mutex_);
+                  last_ = state;
+                  seen_ = true;
+                }) {}
+
+  bool wait_for_state() {
+    return wait_until([this] { return seen_.load() && !writer_.matched().empty(); });
+  }
+
+  VehicleState last_state() {
+    const std::lock_guard lock(mutex_);
+    return last_;
+  }
+
+  /// A command that would be right but for what the caller changes.
+  ControlCommand make_command(std::uint64_t ahead) {
+    const VehicleState state = last_state();
+    ControlCommand command;
+    command.run_id(state.run_id());
+    command.step(state.step() + ahead);
+    command.f_Q_W_n({0.0, 0.0, -16.66});
+    command.client_name("stranger");
+    command.strength(1000);
+    return command;
+  }
+
+  void write(const ControlCommand& command) { writer_.write(command); }
+
+  SyncCounters counters() {
+    const auto status = servers_.find_status(last_state().run_id());
+    return status ? status->counters() : SyncCounters();
+  }
+
+ private:
+  bus::Node node_;
+  bus::ServerDirectory servers_;
+  bus::Writer<ControlCommand> writer_;
+  std::mutex mutex_;
+  VehicleState last_;
+  std::atomic<bool> seen_{false};
+  bus::Reader<VehicleState> reader_;
+};
+
+TEST(CommandsTest, ABadCommandIsCountedByItsCauseAndNeverDisturbsTheFlight) {
+  Flight undisturbed(scenario("mission"));
+  Flight flight(scenario("mission"));
+  Stranger stranger(flight.domain.number());
+  ASSERT_TRUE(stranger.wait_for_state()) << flight.outputs();
+
+  constexpr int kEach = 20;
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const double infinity = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < kEach; ++i) {
+    for (std::uint64_t ahead : {0, 1, 2}) {  // one of them is the awaited step when it arrives
+      ControlCommand command = stranger.make_command(ahead);
+      command.f_Q_W_n({nan, 0.0, 0.0});
+      stranger.write(command);
+      command.f_Q_W_n({0.0, infinity, 0.0});
+      stranger.write(command);
+      command.f_Q_W_n({0.0, 0.0, -1e6});
+      stranger.write(command);
+      command = stranger.make_command(ahead);
+      command.fault(FAULT_FREE_FALL);
+      command.mission(MISSION_FAILED);
+      stranger.write(command);
+      command = stranger.make_command(ahead);
+      command.run_id(command.run_id() + 1);
+      stranger.write(command);
+      command = stranger.make_command(ahead);
+      command.vehicle_id(7);
+      stranger.write(command);
+      stranger.write(stranger.make_command(ahead));  // nothing wrong but who sends it
+    }
+    ControlCommand command = stranger.make_command(1000000);
+    stranger.write(command);
+  }
+  flight.expect_success();
+  undisturbed.expect_success();
+  EXPECT_TRUE(read_file(undisturbed.recording() / "state.csv") ==
+              read_file(flight.recording() / "state.csv"));
+
+  // The loop's readers are best-effort: under load a few may never have arrived, but not none.
+  const Table status(flight.recording() / "status.csv");
+  const std::size_t last = status.rows() - 1;
+  const auto count = [&](const char* column) { return status.number(last, column); };
+  for (const char* column : {"rejected_not_finite", "rejected_force_limit", "rejected_run",
+                             "rejected_vehicle", "rejected_fault"}) {
+    EXPECT_GT(count(column), 0) << column;
+    EXPECT_LE(count(column), 6 * kEach) << column;
+  }
+  EXPECT_GT(count("rejected_step") + count("rejected_client"), 0);
+  EXPECT_EQ(count("take_overs"), 0);
+}
+
+}  // namespace
+}  // namespace sls::testing

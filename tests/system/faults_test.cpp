@@ -1,0 +1,191 @@
+/// What goes wrong while flying, done for real: processes killed and interrupted, a full disk, a
+/// singular state, a refused command.
+#include <gtest/gtest.h>
+#include <sched.h>
+#include <signal.h>
+#include <sys/mount.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cmath>
+
+#include "system/flight.hpp"
+
+namespace sls::testing {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Every CSV file parses, and its rows are consecutive steps from 0.
+void expect_parsable(const fs::path& recording) {
+  for (const char* name :
+       {"state.csv", "command.csv", "reference.csv", "flight.csv", "status.csv"}) {
+    SCOPED_TRACE(name);
+    const Table table(recording / name);
+    EXPECT_TRUE(table.is_well_formed());
+    const std::string text = read_file(recording / name);
+    ASSERT_FALSE(text.empty());
+    EXPECT_EQ(text.back(), '\n');
+  }
+  const Table states(recording / "state.csv");
+  for (std::size_t row = 0; row < states.rows(); ++row)
+    ASSERT_EQ(states.number(row, "step"), static_cast<double>(row));
+}
+
+/// The short flight with another text in it and quick time limits.
+std::string make_scenario(const TemporaryFolder& folder, const std::string& from,
+                          const std::string& to, const std::string& base = "short") {
+  const std::string file = folder / "scenario.yaml";
+  std::string text = replace_once(read_file(scenario(base)), "timeout_s: 30", "timeout_s: 4");
+  write_file(file, from.empty() ? text : replace_once(text, from, to));
+  return file;
+}
+
+TEST(FaultsTest, InterruptedProgramsCloseTheirFilesAndSayWhichSignal) {
+  for (const int signal : {SIGINT, SIGTERM}) {
+    SCOPED_TRACE(signal);
+    Flight flight(scenario("mission"));
+    ASSERT_TRUE(flight.wait_for_steps(500)) << flight.outputs();
+    for (Process* process : {flight.recorder.get(), flight.server.get(), flight.client.get()})
+      process->send(signal);
+    flight.wait();
+    for (Process* process : {flight.recorder.get(), flight.server.get(), flight.client.get()})
+      EXPECT_EQ(process->wait(), 128 + signal) << flight.outputs();
+    expect_parsable(flight.recording());
+    const auto manifest = read_manifest(flight.recording());
+    EXPECT_FALSE(manifest.at("complete").get<bool>());
+    EXPECT_NE(
+        manifest.at("reason").get<std::string>().find(signal == SIGINT ? "SIGINT" : "SIGTERM"),
+        std::string::npos);
+    EXPECT_TRUE(fs::exists(flight.recording() / "flight.txt"));
+  }
+}
+
+TEST(FaultsTest, KilledRecorderLeavesFilesThatParseAndTheServerNamesIt) {
+  TemporaryFolder folder;
+  Flight flight(make_scenario(folder, "", "", "mission"));
+  ASSERT_TRUE(flight.wait_for_steps(500)) << flight.outputs();
+  flight.recorder->send(SIGKILL);
+  EXPECT_EQ(flight.recorder->wait(), 137);
+  EXPECT_EQ(flight.server->wait(), 1) << flight.outputs();
+  EXPECT_NE(flight.server->output().find("waiting for: recorder"), std::string::npos)
+      << flight.server->output();
+  EXPECT_EQ(flight.client->wait(), 1) << flight.outputs();
+  expect_parsable(flight.recording());
+  EXPECT_FALSE(read_manifest(flight.recording()).at("complete").get<bool>());
+}
+
+TEST(FaultsTest, KilledOnlyClientEndsTheRunAsFailedNamingItsRole) {
+  TemporaryFolder folder;
+  Flight flight(make_scenario(folder, "", "", "mission"));
+  ASSERT_TRUE(flight.wait_for_steps(500)) << flight.outputs();
+  flight.client->send(SIGKILL);
+  EXPECT_EQ(flight.server->wait(), 1) << flight.outputs();
+  EXPECT_NE(flight.server->output().find("waiting for: controller"), std::string::npos)
+      << flight.server->output();
+  EXPECT_NE(flight.server->output().find("s for controller"), std::string::npos);
+  EXPECT_EQ(flight.recorder->wait(), 1) << flight.outputs();
+  expect_parsable(flight.recording());
+  const auto manifest = read_manifest(flight.recording());
+  EXPECT_FALSE(manifest.at("complete").get<bool>());
+  EXPECT_EQ(manifest.at("outcome"), "failed");
+  EXPECT_TRUE(manifest.at("missing").empty()) << manifest.at("missing");
+}
+
+TEST(FaultsTest, KilledServerEndsClientAndRecorderWithItsAbsenceNamed) {
+  Flight flight(scenario("mission"));
+  ASSERT_TRUE(flight.wait_for_steps(500)) << flight.outputs();
+  flight.server->send(SIGKILL);
+  EXPECT_EQ(flight.client->wait(), 1) << flight.outputs();
+  EXPECT_NE(flight.client->output().find("is gone"), std::string::npos) << flight.client->output();
+  EXPECT_EQ(flight.recorder->wait(), 1) << flight.outputs();
+  EXPECT_NE(flight.recorder->output().find("the server is gone"), std::string::npos)
+      << flight.recorder->output();
+  expect_parsable(flight.recording());
+  EXPECT_FALSE(read_manifest(flight.recording()).at("complete").get<bool>());
+}
+
+TEST(FaultsTest, KilledPrimaryIsReplacedByTheStandbyAndTheStatesStayIdentical) {
+  TemporaryFolder folder;
+  const std::string file =
+      make_scenario(folder, "controllers: 1", "controllers: 2", "figure_eight");
+  Flight undisturbed(scenario("figure_eight"));
+  Flight flight(file, {{}, {}, {"--name", "primary", "--strength", "2"}});
+  Process standby(make_command("control_client", flight.domain.number(),
+                               {"--scenario", file, "--name", "standby", "--strength", "1"}));
+  ASSERT_TRUE(flight.wait_for_steps(500)) << flight.outputs() << standby.output();
+  flight.client->send(SIGKILL);
+  EXPECT_EQ(flight.server->wait(), 0) << flight.outputs();
+  EXPECT_EQ(standby.wait(), 0) << standby.output();
+  EXPECT_EQ(flight.recorder->wait(), 0) << flight.outputs();
+  undisturbed.expect_success();
+  EXPECT_TRUE(read_file(undisturbed.recording() / "state.csv") ==
+              read_file(flight.recording() / "state.csv"));
+  const Table commands(flight.recording() / "command.csv");
+  EXPECT_EQ(commands.text(0, "controller"), "primary");
+  EXPECT_EQ(commands.text(commands.rows() - 1, "controller"), "standby");
+}
+
+TEST(FaultsTest, SingularStateEndsTheRunWithItsFaultAndNoNaN) {
+  TemporaryFolder folder;
+  const std::string file = make_scenario(folder, "load_position_m: [0, 0, -0.5]",
+                                         "load_position_m: [0, 0, -0.5], alpha_rad: 1.5707");
+  Flight flight(file);
+  flight.wait();
+  EXPECT_EQ(flight.server->wait(), 1) << flight.outputs();
+  EXPECT_EQ(flight.client->wait(), 1) << flight.outputs();
+  EXPECT_EQ(flight.recorder->wait(), 1) << flight.outputs();
+  EXPECT_NE(flight.server->output().find(
+                "controller 'control_client' answered step 0 with a fault: rod_level"),
+            std::string::npos)
+      << flight.server->output();
+  expect_parsable(flight.recording());
+  const Table commands(flight.recording() / "command.csv");
+  ASSERT_EQ(commands.rows(), 1u);
+  EXPECT_EQ(commands.text(0, "fault"), "rod_level");
+  EXPECT_EQ(commands.number(0, "force_z_n"), 0.0);
+  for (const char* name : {"state.csv", "command.csv", "reference.csv", "flight.csv"})
+    EXPECT_EQ(read_file(flight.recording() / name).find("nan"), std::string::npos) << name;
+}
+
+TEST(FaultsTest, RefusedCommandOfTheOnlyClientEndsTheRunNamingForceAndClient) {
+  TemporaryFolder folder;
+  Flight flight(make_scenario(folder, "force_limit_n: 200", "force_limit_n: 10"));
+  flight.wait();
+  EXPECT_EQ(flight.server->wait(), 1) << flight.outputs();
+  EXPECT_NE(flight.server->output().find("controller 'control_client' answered step 0 with a force "
+                                         "beyond controller.force_limit_n"),
+            std::string::npos)
+      << flight.server->output();
+  EXPECT_FALSE(read_manifest(flight.recording()).at("complete").get<bool>());
+  EXPECT_EQ(read_manifest(flight.recording()).at("outcome"), "failed");
+}
+
+TEST(FaultsTest, FullDiskEndsTheRecordingNamingFileAndCauseAndNothingLooksWhole) {
+  TemporaryFolder folder;
+  fs::create_directory(folder / "disk");
+  const std::string disk = folder / "disk";
+  if (mount("tmpfs", disk.c_str(), "tmpfs", 0, "size=600k") != 0)
+    GTEST_SKIP() << "skipped: a small disk needs the right to mount";
+  struct Unmount {
+    std::string path;
+    ~Unmount() { umount2(path.c_str(), MNT_DETACH); }
+  } unmount{disk};
+  const std::string file = make_scenario(folder, "", "", "figure_eight");
+  OwnDomain domain;
+  Process recorder(make_command("recorder", domain.number(), {"--out", disk + "/recording"}));
+  Process server(make_command("sim_server", domain.number(), {"--scenario", file}));
+  Process client(make_command("control_client", domain.number(), {"--scenario", file}));
+  EXPECT_EQ(recorder.wait(), 1) << recorder.output();
+  EXPECT_NE(recorder.output().find("No space left on device"), std::string::npos)
+      << recorder.output();
+  EXPECT_NE(recorder.output().find(".csv: cannot write"), std::string::npos) << recorder.output();
+  EXPECT_EQ(server.wait(), 1) << server.output();
+  EXPECT_NE(server.output().find("recorder"), std::string::npos) << server.output();
+  EXPECT_EQ(client.wait(), 1) << client.output();
+  expect_parsable(disk + "/recording");
+  EXPECT_FALSE(read_manifest(disk + "/recording").at("complete").get<bool>());
+}
+
+}  // namespace
+}  // namespace sls::testing

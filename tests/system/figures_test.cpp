@@ -1,0 +1,144 @@
+/// The figures the project promises, from recordings of the real programs.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "system/flight.hpp"
+
+namespace sls::testing {
+namespace {
+
+namespace fs = std::filesystem;
+
+TEST(FiguresTest, FigureEightAtOneMillisecondIsTrackedOnTheSecondLapAndLosesNoRow) {
+  Flight flight(scenario("figure_eight"), {{}, {"--period-s", "0.001"}, {}});
+  flight.expect_success();
+  // Zero-order hold alone explains 4.0e-4 m (design, section 7).
+  const TrackingError error = calc_tracking_error(flight.recording(), 16000, 32000);
+  EXPECT_LE(error.max.maxCoeff(), 6e-4);
+  EXPECT_GT(error.max.maxCoeff(), 1e-5) << "the error of a hold cannot vanish";
+  const auto manifest = read_manifest(flight.recording());
+  for (const char* file : {"state.csv", "command.csv", "reference.csv", "flight.csv"})
+    EXPECT_EQ(manifest.at("files").at(file).at("rows"), 32001) << file;
+  EXPECT_TRUE(manifest.at("missing").empty());
+}
+
+TEST(FiguresTest, FigureEightMatchesTheExpectedErrorsOfTheHoldAtFourMilliseconds) {
+  Flight flight(scenario("figure_eight"));
+  flight.expect_success();
+  const TrackingError error = calc_tracking_error(flight.recording(), 4000, 8000);
+  // Design, section 7, two digits: 4.1e-4, 1.1e-3, 1.8e-5.
+  EXPECT_NEAR(error.rms.x(), 4.1e-4, 0.05e-4);
+  EXPECT_NEAR(error.rms.y(), 1.1e-3, 0.05e-3);
+  EXPECT_NEAR(error.rms.z(), 1.8e-5, 0.05e-5);
+}
+
+/// Largest distance of quadrotor and load from the published run, sampled every 20 ms.
+double calc_distance_from_matlab(const fs::path& published, const fs::path& recording,
+                                 double period_s) {
+  const Table matlab(published), states(recording / "state.csv");
+  double distance = 0.0;
+  for (std::size_t row = 0; row < matlab.rows(); ++row) {
+    const auto step = static_cast<std::size_t>(std::llround(matlab.number(row, "Time") / period_s));
+    const Eigen::Vector3d p_WQ(matlab.number(row, "Des_Pos_X"), matlab.number(row, "Des_Pos_Y"),
+                               matlab.number(row, "Des_Pos_Z"));
+    const Eigen::Vector3d p_WL(matlab.number(row, "X"), matlab.number(row, "Y"),
+                               matlab.number(row, "Z"));
+    distance = std::max(distance, (states.position(step, "quad") - p_WQ).cwiseAbs().maxCoeff());
+    distance = std::max(distance, (states.position(step, "load") - p_WL).cwiseAbs().maxCoeff());
+  }
+  return distance;
+}
+
+TEST(FiguresTest, MatlabSetpointConvergesToThePublishedRunWithThePeriod) {
+  const fs::path published = fs::path(SLS_SOURCE_DIR) / "../shared/reference/matlab_setpoint1.csv";
+  if (!fs::exists(published))
+    GTEST_SKIP() << "skipped: the published run " << published << " is not on this machine";
+  Flight at_1_ms(scenario("matlab_setpoint_1"), {{}, {"--period-s", "0.001"}, {}});
+  at_1_ms.expect_success();
+  Flight at_half(scenario("matlab_setpoint_1"), {{}, {"--period-s", "0.0005"}, {}});
+  at_half.expect_success();
+  const double full = calc_distance_from_matlab(published, at_1_ms.recording(), 0.001);
+  const double half = calc_distance_from_matlab(published, at_half.recording(), 0.0005);
+  RecordProperty("distance_at_1_ms_m", std::to_string(full));
+  RecordProperty("distance_at_half_ms_m", std::to_string(half));
+  std::printf("distance from the published run: %.3e m at 1 ms, %.3e m at 0.5 ms\n", full, half);
+  EXPECT_LE(full, 3e-4);
+  // A hold is a delay of half a period: first order. 5 % for the published run's own error.
+  EXPECT_LE(half, 0.525 * full);
+}
+
+TEST(FiguresTest, PublishedGazeboErrorsComeFromTheStateWiring) {
+  const auto fly = [](const char* name) {
+    Flight flight(scenario(name));
+    flight.expect_success();
+    const auto [first, last] = find_stage(flight.recording(), "figure_eight");
+    const TrackingError error =
+        calc_tracking_error(flight.recording(), first + (last - first + 1) / 2, last);
+    std::printf("%-24s rms x %.4g y %.4g z %.4g m\n", name, error.rms.x(), error.rms.y(),
+                error.rms.z());
+    return error;
+  };
+  const TrackingError legacy = fly("gazebo_legacy");
+  EXPECT_NEAR(legacy.rms.x(), 0.211, 0.005);
+  EXPECT_NEAR(legacy.rms.y(), 0.236, 0.03);
+
+  // Design, section 7: "about 120 times (x) and 50 times (y) better"; z keeps 0.10 m because the
+  // controller believes the rod 0.1 m too short. With its model right, too, at least 500 and 200
+  // times better.
+  const TrackingError wired = fly("gazebo_correct_wiring");
+  EXPECT_NEAR(legacy.rms.x() / wired.rms.x(), 120.0, 10.0);
+  EXPECT_NEAR(legacy.rms.y() / wired.rms.y(), 50.0, 5.0);
+  EXPECT_NEAR(wired.rms.z(), 0.10, 0.01);
+  const TrackingError corrected = fly("gazebo_corrected");
+  EXPECT_GE(legacy.rms.x() / corrected.rms.x(), 500.0);
+  EXPECT_GE(legacy.rms.y() / corrected.rms.y(), 200.0);
+  EXPECT_LT(corrected.rms.z(), 1e-4);
+}
+
+TEST(FiguresTest, SameScenarioGivesTheSameBytesTwiceAndOverUdp) {
+  Flight first(scenario("figure_eight")), again(scenario("figure_eight")),
+      udp(scenario("figure_eight"), {qos("udp"), {}, {}});
+  for (Flight* flight : {&first, &again, &udp}) flight->expect_success();
+  const auto deterministic_command = [](const Flight& flight) {
+    const Table commands(flight.recording() / "command.csv");
+    std::string text;
+    for (std::size_t row = 0; row < commands.rows(); ++row)
+      for (const char* column :
+           {"vehicle_id", "step", "force_x_n", "force_y_n", "force_z_n", "fault"})
+        text += commands.text(row, column) + ",";
+    return text;
+  };
+  for (const Flight* other : {&again, &udp}) {
+    for (const char* file : {"state.csv", "reference.csv", "flight.csv", "scenario.yaml"})
+      EXPECT_TRUE(read_file(first.recording() / file) == read_file(other->recording() / file))
+          << file;
+    EXPECT_TRUE(deterministic_command(first) == deterministic_command(*other));
+  }
+  EXPECT_GT(read_file(first.recording() / "state.csv").size(), 1000000u);
+}
+
+/// Every other shipped scenario flies to its end; what its mission promises is judged.
+class ShippedScenarioTest : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(ShippedScenarioTest, FliesToTheEndAndReachesItsLastReference) {
+  Flight flight(scenario(GetParam()));
+  flight.expect_success();
+  const Table states(flight.recording() / "state.csv"),
+      references(flight.recording() / "reference.csv");
+  ASSERT_GT(states.rows(), 0u);
+  ASSERT_EQ(states.rows(), references.rows());
+  const std::size_t last = states.rows() - 1;
+  EXPECT_LT((states.position(last, "load") - references.position(last, "ref")).norm(), 0.05)
+      << "the load is not where the mission ends";
+}
+
+INSTANTIATE_TEST_SUITE_P(All, ShippedScenarioTest,
+                         ::testing::Values("setpoints", "mission", "matlab_setpoint_2",
+                                           "matlab_setpoint_3", "matlab_figure_eight",
+                                           "rest_to_rest", "rigid_figure_eight", "rotor_drag",
+                                           "integral_mass_error"),
+                         [](const auto& instance) { return instance.param; });
+
+}  // namespace
+}  // namespace sls::testing

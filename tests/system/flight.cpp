@@ -1,0 +1,160 @@
+#include "system/flight.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdlib>
+#include <fstream>
+#include <sstream>
+
+namespace sls::testing {
+namespace {
+
+std::vector<std::string> split(const std::string& line) {
+  std::vector<std::string> fields;
+  std::string field;
+  std::istringstream stream(line);
+  while (std::getline(stream, field, ',')) fields.push_back(field);
+  if (!line.empty() && line.back() == ',') fields.emplace_back();
+  return fields;
+}
+
+std::size_t count_lines(const std::filesystem::path& file) {
+  const std::string text = read_file(file);
+  return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
+}
+
+}  // namespace
+
+OwnDomain::OwnDomain() {
+  // A name in the abstract socket namespace is a lock that leaves nothing behind.
+  const bool found = wait_until([this] {
+    for (number_ = 1; number_ <= 60; ++number_) {
+      sockaddr_un address{};
+      address.sun_family = AF_UNIX;
+      const std::string name = "sls-test-domain-" + std::to_string(number_);
+      std::copy(name.begin(), name.end(), address.sun_path + 1);
+      const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + name.size());
+      lock_ = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+      if (lock_ < 0) throw std::runtime_error("socket");
+      if (bind(lock_, reinterpret_cast<const sockaddr*>(&address), size) == 0) return true;
+      close(lock_);
+    }
+    return false;
+  });
+  if (!found) throw std::runtime_error("no free DDS domain among 1 to 60");
+}
+
+OwnDomain::~OwnDomain() { close(lock_); }
+
+std::vector<std::string> make_command(const std::string& name, int domain,
+                                      const std::vector<std::string>& flags,
+                                      const std::string& qos_file) {
+  std::vector<std::string> command = {program(name), "--domain", std::to_string(domain)};
+  if (!qos_file.empty()) command.insert(command.end(), {"--qos", qos_file});
+  command.insert(command.end(), flags.begin(), flags.end());
+  return command;
+}
+
+Flight::Flight(const std::string& scenario_file, const FlightOptions& options)
+    : recording_(folder / "recording") {
+  std::vector<std::string> server_flags = {"--scenario", scenario_file};
+  std::vector<std::string> client_flags = server_flags;
+  server_flags.insert(server_flags.end(), options.server.begin(), options.server.end());
+  client_flags.insert(client_flags.end(), options.client.begin(), options.client.end());
+  const auto start = [&](const char* name, const std::vector<std::string>& flags) {
+    return std::make_unique<Process>(make_command(name, domain.number(), flags, options.qos_file));
+  };
+  recorder = start("recorder", {"--out", recording_.string()});
+  server = start("sim_server", server_flags);
+  client = start("control_client", client_flags);
+}
+
+void Flight::wait() {
+  for (Process* process : {server.get(), client.get(), recorder.get()})
+    EXPECT_TRUE(process->wait().has_value()) << outputs();
+}
+
+void Flight::expect_success() {
+  wait();
+  EXPECT_EQ(server->wait(), 0) << outputs();
+  EXPECT_EQ(client->wait(), 0) << outputs();
+  EXPECT_EQ(recorder->wait(), 0) << outputs();
+  ASSERT_TRUE(std::filesystem::exists(recording_ / "manifest.json")) << outputs();
+  EXPECT_TRUE(read_manifest(recording_).at("complete").get<bool>()) << outputs();
+}
+
+bool Flight::wait_for_steps(std::size_t steps) const {
+  return wait_until([&] { return count_lines(recording_ / "state.csv") > steps; });
+}
+
+std::string Flight::outputs() const {
+  return server->output() + client->output() + recorder->output();
+}
+
+Table::Table(const std::filesystem::path& file) {
+  std::ifstream stream(file);
+  std::string line;
+  std::getline(stream, line);
+  for (const auto& name : split(line)) columns_.emplace(name, columns_.size());
+  while (std::getline(stream, line)) rows_.push_back(split(line));
+}
+
+std::size_t Table::find(const std::string& column) const {
+  const auto found = columns_.find(column);
+  if (found == columns_.end()) throw std::runtime_error("no column " + column);
+  return found->second;
+}
+
+double Table::number(std::size_t row, const std::string& column) const {
+  return std::strtod(text(row, column).c_str(), nullptr);
+}
+
+const std::string& Table::text(std::size_t row, const std::string& column) const {
+  return rows_.at(row).at(find(column));
+}
+
+Eigen::Vector3d Table::position(std::size_t row, const std::string& prefix) const {
+  return {number(row, prefix + "_x_m"), number(row, prefix + "_y_m"), number(row, prefix + "_z_m")};
+}
+
+bool Table::is_well_formed() const {
+  return !columns_.empty() && std::all_of(rows_.begin(), rows_.end(), [this](const auto& row) {
+    return row.size() == columns_.size();
+  });
+}
+
+nlohmann::json read_manifest(const std::filesystem::path& recording) {
+  return nlohmann::json::parse(read_file(recording / "manifest.json"));
+}
+
+TrackingError calc_tracking_error(const std::filesystem::path& recording, std::size_t first,
+                                  std::size_t last) {
+  const Table states(recording / "state.csv"), references(recording / "reference.csv");
+  TrackingError error;
+  for (std::size_t step = first; step <= last; ++step) {
+    const Eigen::Vector3d e = states.position(step, "load") - references.position(step, "ref");
+    error.rms += e.cwiseAbs2();
+    error.max = error.max.cwiseMax(e.cwiseAbs());
+  }
+  error.rms = (error.rms / static_cast<double>(last - first + 1)).cwiseSqrt();
+  return error;
+}
+
+std::pair<std::size_t, std::size_t> find_stage(const std::filesystem::path& recording,
+                                               const std::string& name) {
+  const Table references(recording / "reference.csv");
+  std::size_t first = references.rows(), last = 0;
+  for (std::size_t row = 0; row < references.rows(); ++row)
+    if (references.text(row, "stage_name") == name) {
+      first = std::min(first, row);
+      last = row;
+    }
+  return {first, last};
+}
+
+}  // namespace sls::testing

@@ -1,0 +1,102 @@
+/// A flight of the three real programs in a DDS domain of its own, and its recording.
+#pragma once
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "system/process.hpp"
+
+namespace sls::testing {
+
+/// A DDS domain that no other test of this run uses at the same time (1 to 60): taken by a lock
+/// that the kernel releases with the process.
+class OwnDomain {
+ public:
+  OwnDomain();
+  ~OwnDomain();
+  OwnDomain(const OwnDomain&) = delete;
+  OwnDomain& operator=(const OwnDomain&) = delete;
+  int number() const { return number_; }
+  std::string text() const { return std::to_string(number_); }
+
+ private:
+  int number_ = 0;
+  int lock_ = -1;
+};
+
+struct FlightOptions {
+  std::string qos_file;             ///< default: the programs' own
+  std::vector<std::string> server;  ///< further flags
+  std::vector<std::string> client;
+};
+
+/// Starts recorder, server and client on `scenario_file`.
+class Flight {
+ public:
+  explicit Flight(const std::string& scenario_file, const FlightOptions& options = {});
+
+  /// Waits for all three; fails the test if one does not end.
+  void wait();
+  /// Waits for all three and expects them to end well with a complete recording.
+  void expect_success();
+  /// Waits until at least `steps` rows of state.csv are on the disk.
+  bool wait_for_steps(std::size_t steps) const;
+
+  /// Everything the three have printed, for messages.
+  std::string outputs() const;
+
+  const std::filesystem::path& recording() const { return recording_; }
+
+  TemporaryFolder folder;
+  OwnDomain domain;
+
+ private:
+  std::filesystem::path recording_;
+
+ public:
+  std::unique_ptr<Process> recorder, server, client;
+};
+
+/// The command line of one of the programs in `domain`.
+std::vector<std::string> make_command(const std::string& name, int domain,
+                                      const std::vector<std::string>& flags,
+                                      const std::string& qos_file = {});
+
+/// A CSV file by columns; numbers and text.
+class Table {
+ public:
+  explicit Table(const std::filesystem::path& file);
+  std::size_t rows() const { return rows_.size(); }
+  double number(std::size_t row, const std::string& column) const;
+  const std::string& text(std::size_t row, const std::string& column) const;
+  /// The columns `prefix`_x_m, `prefix`_y_m, `prefix`_z_m.
+  Eigen::Vector3d position(std::size_t row, const std::string& prefix) const;
+  /// True when every row has a value for every column.
+  bool is_well_formed() const;
+
+ private:
+  std::size_t find(const std::string& column) const;
+  std::map<std::string, std::size_t> columns_;
+  std::vector<std::vector<std::string>> rows_;
+};
+
+nlohmann::json read_manifest(const std::filesystem::path& recording);
+
+/// Load minus reference position over the steps [first, last] of a recording.
+struct TrackingError {
+  Eigen::Vector3d rms = Eigen::Vector3d::Zero();
+  Eigen::Vector3d max = Eigen::Vector3d::Zero();
+};
+TrackingError calc_tracking_error(const std::filesystem::path& recording, std::size_t first,
+                                  std::size_t last);
+
+/// First and last step of the stage of that name.
+std::pair<std::size_t, std::size_t> find_stage(const std::filesystem::path& recording,
+                                               const std::string& name);
+
+}  // namespace sls::testing

@@ -1,0 +1,109 @@
+#include "system/process.hpp"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <sstream>
+#include <thread>
+
+namespace sls::testing {
+
+namespace fs = std::filesystem;
+
+bool wait_until(const std::function<bool()>& condition, std::chrono::milliseconds limit) {
+  const auto deadline = std::chrono::steady_clock::now() + limit;
+  while (!condition()) {
+    if (std::chrono::steady_clock::now() >= deadline) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  return true;
+}
+
+TemporaryFolder::TemporaryFolder() {
+  std::string pattern = (fs::temp_directory_path() / "sls-test-XXXXXX").string();
+  if (!mkdtemp(pattern.data())) throw std::runtime_error("mkdtemp " + pattern);
+  path_ = pattern;
+}
+
+TemporaryFolder::~TemporaryFolder() {
+  std::error_code ignored;
+  fs::remove_all(path_, ignored);
+}
+
+Process::Process(const std::vector<std::string>& command,
+                 const std::function<void()>& before_exec) {
+  std::vector<char*> arguments;
+  for (const auto& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
+  arguments.push_back(nullptr);
+  const std::string output_file = folder_ / "output";
+  id_ = fork();
+  if (id_ < 0) throw std::runtime_error("fork");
+  if (id_ == 0) {
+    setpgid(0, 0);  // a signal to the test's terminal is not for it
+    const int output = open(output_file.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0644);
+    dup2(output, STDOUT_FILENO);
+    dup2(output, STDERR_FILENO);
+    if (before_exec) before_exec();
+    execvp(arguments[0], arguments.data());
+    _exit(127);
+  }
+}
+
+Process::~Process() {
+  if (!is_running()) return;
+  kill(-id_, SIGKILL);  // the group: a launcher's children too
+  wait(std::chrono::seconds(10));
+}
+
+std::optional<int> Process::wait(std::chrono::milliseconds limit) {
+  wait_until([this] { return !is_running(); }, limit);
+  return exit_code_;
+}
+
+bool Process::is_running() {
+  if (exit_code_) return false;
+  int status = 0;
+  if (waitpid(id_, &status, WNOHANG) != id_) return true;
+  exit_code_ = WIFSIGNALED(status) ? 128 + WTERMSIG(status) : WEXITSTATUS(status);
+  return false;
+}
+
+void Process::send(int signal) {
+  if (is_running()) kill(id_, signal);
+}
+
+std::string Process::output() const { return read_file(folder_ / "output"); }
+
+std::string read_file(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::ostringstream text;
+  text << stream.rdbuf();
+  return text.str();
+}
+
+void write_file(const fs::path& file, const std::string& text) {
+  std::ofstream(file, std::ios::binary) << text;
+}
+
+std::string replace_once(const std::string& text, const std::string& from, const std::string& to) {
+  const auto first = text.find(from);
+  EXPECT_NE(first, std::string::npos) << "'" << from << "' is not in the text";
+  EXPECT_EQ(text.find(from, first + 1), std::string::npos) << "'" << from << "' is there twice";
+  std::string replaced = text;
+  return first == std::string::npos ? text : replaced.replace(first, from.size(), to);
+}
+
+std::string program(const std::string& name) { return std::string(SLS_PROGRAM_DIR) + "/" + name; }
+std::string scenario(const std::string& name) {
+  return std::string(SLS_SOURCE_DIR) + "/config/scenarios/" + name + ".yaml";
+}
+std::string qos(const std::string& name) {
+  return std::string(SLS_SOURCE_DIR) + "/config/qos/" + name + ".xml";
+}
+
+}  // namespace sls::testing

@@ -1,0 +1,70 @@
+/// Real processes and folders for system tests: started, waited for with a deadline, and never left
+/// behind, whatever the test does.
+#pragma once
+
+#include <sys/types.h>
+
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace sls::testing {
+
+/// Waits until `condition` holds, at most `limit`; what it returned last.
+bool wait_until(const std::function<bool()>& condition,
+                std::chrono::milliseconds limit = std::chrono::seconds(60));
+
+/// A folder below the system's temporary one, removed at the end.
+class TemporaryFolder {
+ public:
+  TemporaryFolder();
+  ~TemporaryFolder();
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  const std::filesystem::path& path() const { return path_; }
+  std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// One process. Its stdout and stderr go to a file, which `output()` reads.
+class Process {
+ public:
+  /// `before_exec` runs in the child before the program starts.
+  explicit Process(const std::vector<std::string>& command,
+                   const std::function<void()>& before_exec = {});
+  ~Process();  // kills what still runs
+  Process(const Process&) = delete;
+  Process& operator=(const Process&) = delete;
+
+  /// The exit code, or 128 + signal; nothing if it still runs after `limit`.
+  std::optional<int> wait(std::chrono::milliseconds limit = std::chrono::seconds(90));
+  bool is_running();
+  void send(int signal);
+  pid_t id() const { return id_; }
+  /// Everything it has printed so far.
+  std::string output() const;
+
+ private:
+  TemporaryFolder folder_;
+  pid_t id_ = -1;
+  std::optional<int> exit_code_;
+};
+
+std::string read_file(const std::filesystem::path& file);
+void write_file(const std::filesystem::path& file, const std::string& text);
+
+/// `text` with its only occurrence of `from` replaced; fails the test where there is not exactly
+/// one.
+std::string replace_once(const std::string& text, const std::string& from, const std::string& to);
+
+/// Path of one of the programs, of a shipped scenario (by name) or QoS file (by name).
+std::string program(const std::string& name);
+std::string scenario(const std::string& name);
+std::string qos(const std::string& name);
+
+}  // namespace sls::testing

@@ -1,0 +1,204 @@
+/// Bad input, given to the real programs: one clear line, the documented exit code, nothing left.
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <regex>
+
+#include "system/flight.hpp"
+
+namespace sls::testing {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Outcome {
+  int exit_code = -1;
+  std::string output;
+};
+
+Outcome run(const std::vector<std::string>& command) {
+  Process process(command);
+  const auto code = process.wait();
+  return {code.value_or(-1), process.output()};
+}
+
+/// One line that begins with the program's name and "error:", and holds `cause`.
+void expect_refused(const std::vector<std::string>& command, int exit_code,
+                    const std::string& cause) {
+  const Outcome outcome = run(command);
+  EXPECT_EQ(outcome.exit_code, exit_code) << outcome.output;
+  EXPECT_EQ(std::count(outcome.output.begin(), outcome.output.end(), '\n'), 1) << outcome.output;
+  EXPECT_TRUE(std::regex_search(outcome.output, std::regex("^[a-z_]+: error: "))) << outcome.output;
+  EXPECT_NE(outcome.output.find(cause), std::string::npos)
+      << "expected '" << cause << "' in: " << outcome.output;
+}
+
+std::vector<std::string> server_with(const std::vector<std::string>& flags) {
+  std::vector<std::string> command = {program("sim_server")};
+  command.insert(command.end(), flags.begin(), flags.end());
+  return command;
+}
+
+TEST(UsageTest, EveryProgramPrintsHelpWithDefaultsAndItsVersion) {
+  for (const char* name : {"sim_server", "control_client", "recorder"}) {
+    const Outcome help = run({program(name), "--help"});
+    EXPECT_EQ(help.exit_code, 0);
+    for (const char* flag : {"--qos", "--domain", "--log-level", "--version", "=info"})
+      EXPECT_NE(help.output.find(flag), std::string::npos) << name << " " << flag << help.output;
+    const Outcome version = run({program(name), "--version"});
+    EXPECT_EQ(version.exit_code, 0);
+    EXPECT_TRUE(std::regex_match(version.output, std::regex("sls \\d+\\.\\d+\\.\\d+\n")));
+  }
+}
+
+TEST(UsageTest, WrongFlagsAreRefused) {
+  expect_refused({program("sim_server")}, 2, "--scenario is required");
+  expect_refused({program("recorder")}, 2, "--out is required");
+  expect_refused(server_with({"--scenario", scenario("short"), "--nonsense"}), 2, "--nonsense");
+  for (const char* name : {"sim_server", "control_client"})
+    for (const char* domain : {"233", "-1", "one"})
+      expect_refused({program(name), "--scenario", scenario("short"), "--domain", domain}, 2,
+                     "--domain");
+  expect_refused(server_with({"--scenario", scenario("short"), "--period-s", "0.0035"}), 2,
+                 "--period-s");
+  expect_refused(server_with({"--scenario", scenario("short"), "--period-s", "nan"}), 2,
+                 "--period-s");
+  expect_refused({program("control_client"), "--scenario", scenario("short"), "--name", "a,b"}, 2,
+                 "--name");
+}
+
+TEST(UsageTest, UnusableScenariosAreRefusedByServerAndClient) {
+  TemporaryFolder folder;
+  write_file(folder / "empty.yaml", "");
+  fs::create_directory(folder / "folder.yaml");
+  write_file(folder / "misspelt.yaml",
+             replace_once(read_file(scenario("short")), "load_mass_kg", "laod_mass_kg"));
+  write_file(folder / "negative.yaml", replace_once(read_file(scenario("short")),
+                                                    "load_mass_kg: 0.2", "load_mass_kg: -0.16"));
+  write_file(folder / "huge.yaml", "");
+  fs::resize_file(folder / "huge.yaml", 100'000'000);
+  for (const char* name : {"sim_server", "control_client"}) {
+    const auto refuse = [&](const std::string& file, const std::string& cause) {
+      expect_refused({program(name), "--scenario", file}, 2, cause);
+    };
+    refuse(folder / "none.yaml", "none.yaml: ");
+    refuse(folder / "empty.yaml", "empty.yaml: ");
+    refuse(folder / "folder.yaml", "folder.yaml: ");
+    refuse(folder / "huge.yaml", "100000000");
+    refuse(folder / "misspelt.yaml", "misspelt.yaml:3: vehicle.laod_mass_kg: unknown key");
+    refuse(folder / "negative.yaml",
+           "negative.yaml:3: vehicle.load_mass_kg: expected > 0, got -0.16");
+  }
+}
+
+TEST(UsageTest, UnusableQosFilesAreRefusedByEveryProgram) {
+  TemporaryFolder folder;
+  const std::string shipped = read_file(qos("default"));
+  write_file(folder / "malformed.xml", shipped.substr(0, shipped.size() / 2));
+  write_file(folder / "misnamed.xml", replace_once(shipped, "\"sls_loop_reader\"", "\"sls_lop\""));
+  write_file(folder / "refused.xml",
+             replace_once(shipped, "<depth>64</depth>", "<depth>many</depth>"));
+  int run_number = 0;
+  for (const char* name : {"sim_server", "control_client", "recorder"}) {
+    const auto refuse = [&](const std::string& file, const std::string& cause) {
+      std::vector<std::string> command = {program(name), "--qos", file};
+      if (std::string(name) == "recorder")
+        command.insert(command.end(),
+                       {"--out", folder / ("recording" + std::to_string(run_number++))});
+      else
+        command.insert(command.end(), {"--scenario", scenario("short")});
+      expect_refused(command, 2, cause);
+    };
+    refuse(folder / "none.xml", "none.xml: ");
+    refuse(folder.path(), "got a directory");
+    refuse(folder / "malformed.xml", "malformed.xml:");
+    refuse(folder / "misnamed.xml", "profile 'sls_loop_reader'");
+    refuse(folder / "refused.xml", "refused.xml: ");
+  }
+}
+
+TEST(UsageTest, RecorderRefusesAFolderThatIsNotEmptyAndReplacesARecordingWithForce) {
+  TemporaryFolder folder;
+  fs::create_directory(folder / "full");
+  write_file(folder / "full/notes.txt", "mine");
+  expect_refused({program("recorder"), "--out", folder / "full"}, 2, "'notes.txt'");
+  expect_refused({program("recorder"), "--out", folder / "full", "--force"}, 2, "'notes.txt'");
+  EXPECT_EQ(read_file(folder / "full/notes.txt"), "mine");
+  expect_refused({program("recorder"), "--out", folder / "full/notes.txt"}, 2, "a file");
+  expect_refused({program("recorder"), "--out", "/proc/sls"}, 2, "--out /proc/sls");
+
+  fs::create_directory(folder / "old");
+  write_file(folder / "old/state.csv", "old");
+  expect_refused({program("recorder"), "--out", folder / "old", "--check"}, 2, "--force");
+  EXPECT_EQ(read_file(folder / "old/state.csv"), "old");
+  EXPECT_EQ(run({program("recorder"), "--out", folder / "old", "--force", "--check"}).exit_code, 0);
+  EXPECT_FALSE(fs::exists(folder / "old/state.csv"));
+}
+
+TEST(UsageTest, ServerNamesWhoIsMissingAtTheStart) {
+  TemporaryFolder folder;
+  write_file(folder / "scenario.yaml",
+             replace_once(read_file(scenario("short")), "timeout_s: 30", "timeout_s: 3"));
+  OwnDomain domain;
+  Process server(
+      make_command("sim_server", domain.number(), {"--scenario", folder / "scenario.yaml"}));
+  EXPECT_EQ(server.wait(), 1);
+  EXPECT_NE(server.output().find("waiting for: controller, recorder"), std::string::npos)
+      << server.output();
+  EXPECT_NE(server.output().find("error: not ready within 3 s: controller, recorder"),
+            std::string::npos)
+      << server.output();
+}
+
+TEST(UsageTest, ClientWithAnotherScenarioIsRefusedWithBothHashes) {
+  TemporaryFolder folder;
+  write_file(folder / "other.yaml", read_file(scenario("short")) + "# another byte\n");
+  OwnDomain domain;
+  Process server(make_command("sim_server", domain.number(), {"--scenario", scenario("short")}));
+  Process client(
+      make_command("control_client", domain.number(), {"--scenario", folder / "other.yaml"}));
+  EXPECT_EQ(client.wait(), 2);
+  const std::regex both("error: .*expected the server's, SHA-256 [0-9a-f]{64}, got [0-9a-f]{64}");
+  EXPECT_TRUE(std::regex_search(client.output(), both)) << client.output();
+  EXPECT_TRUE(server.is_running());
+  server.send(SIGTERM);
+  EXPECT_EQ(server.wait(), 143);
+}
+
+TEST(UsageTest, SecondServerForAVehicleRefusesAndTheFirstFliesOn) {
+  Flight flight(scenario("mission"));
+  ASSERT_TRUE(flight.wait_for_steps(500)) << flight.outputs();
+  Process second(
+      make_command("sim_server", flight.domain.number(), {"--scenario", scenario("mission")}));
+  EXPECT_EQ(second.wait(), 1);
+  EXPECT_NE(second.output().find("vehicle 0: expected no other server on this domain"),
+            std::string::npos)
+      << second.output();
+  flight.expect_success();
+}
+
+TEST(UsageTest, OfTwoServersStartedTogetherOneFlies) {
+  OwnDomain domain;
+  const auto command =
+      make_command("sim_server", domain.number(), {"--scenario", scenario("short")});
+  Process one(command), two(command);
+  ASSERT_TRUE(wait_until([&] { return !one.is_running() || !two.is_running(); }))
+      << one.output() << two.output();
+  Process& loser = one.is_running() ? two : one;
+  Process& winner = one.is_running() ? one : two;
+  EXPECT_EQ(loser.wait(), 1) << loser.output();
+  EXPECT_NE(loser.output().find("vehicle 0: expected no other server"), std::string::npos)
+      << loser.output();
+  TemporaryFolder folder;
+  Process recorder(make_command("recorder", domain.number(), {"--out", folder / "recording"}));
+  Process client(
+      make_command("control_client", domain.number(), {"--scenario", scenario("short")}));
+  EXPECT_EQ(winner.wait(), 0) << winner.output();
+  EXPECT_EQ(client.wait(), 0) << client.output();
+  EXPECT_EQ(recorder.wait(), 0) << recorder.output();
+}
+
+}  // namespace
+}  // namespace sls::testing
