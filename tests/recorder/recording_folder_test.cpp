@@ -147,9 +147,9 @@ TEST_F(RecordingFolderTest, AFolderThatCannotBeWrittenIsRefused) {
   fs::permissions(root_.path(), fs::perms(0755));
   EXPECT_EXIT(
       {
-        if (::geteuid() == 0 && ::setuid(65534) != 0) std::exit(1);  // nobody, in a child
+        if (::geteuid() == 0 && ::setuid(65534) != 0) ::_exit(1);  // nobody, in a child
         std::cerr << find_error(out_) << std::endl << find_error(out_ / "below") << std::endl;
-        std::exit(2);
+        ::_exit(2);
       },
       testing::ExitedWithCode(2), "can be written.*Permission denied\n.*below.*Permission denied");
 }

@@ -9,9 +9,9 @@
 
 #include "common/bus/node.hpp"
 #include "common/bus/participants.hpp"
-#include "system/flight.hpp"
+#include "tests/system/flight.hpp"
 
-namespace sls::testing {
+namespace sls::test {
 namespace {
 
 /// A participant nobody invited: sees the states and writes whatever it likes to sls/command.
@@ -118,4 +118,4 @@ TEST(CommandsTest, ABadCommandIsCountedByItsCauseAndNeverDisturbsTheFlight) {
 }
 
 }  // namespace
-}  // namespace sls::testing
+}  // namespace sls::test

@@ -9,9 +9,9 @@
 
 #include <cmath>
 
-#include "system/flight.hpp"
+#include "tests/system/flight.hpp"
 
-namespace sls::testing {
+namespace sls::test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -37,7 +37,7 @@ std::string make_scenario(const TemporaryFolder& folder, const std::string& from
                           const std::string& to, const std::string& base = "short") {
   const std::string file = folder / "scenario.yaml";
   std::string text = replace_once(read_file(scenario(base)), "timeout_s: 30", "timeout_s: 4");
-  write_file(file, from.empty() ? text : replace_once(text, from, to));
+  write_bytes(file, from.empty() ? text : replace_once(text, from, to));
   return file;
 }
 
@@ -188,4 +188,4 @@ TEST(FaultsTest, FullDiskEndsTheRecordingNamingFileAndCauseAndNothingLooksWhole)
 }
 
 }  // namespace
-}  // namespace sls::testing
+}  // namespace sls::test

@@ -3,9 +3,9 @@
 
 #include <cmath>
 
-#include "system/flight.hpp"
+#include "tests/system/flight.hpp"
 
-namespace sls::testing {
+namespace sls::test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -141,4 +141,4 @@ INSTANTIATE_TEST_SUITE_P(All, ShippedScenarioTest,
                          [](const auto& instance) { return instance.param; });
 
 }  // namespace
-}  // namespace sls::testing
+}  // namespace sls::test

@@ -1,4 +1,4 @@
-#include "system/flight.hpp"
+#include "tests/system/flight.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/socket.h>
@@ -11,7 +11,7 @@
 #include <fstream>
 #include <sstream>
 
-namespace sls::testing {
+namespace sls::test {
 namespace {
 
 std::vector<std::string> split(const std::string& line) {
@@ -157,4 +157,4 @@ std::pair<std::size_t, std::size_t> find_stage(const std::filesystem::path& reco
   return {first, last};
 }
 
-}  // namespace sls::testing
+}  // namespace sls::test

@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "system/process.hpp"
+#include "tests/system/process.hpp"
 
-namespace sls::testing {
+namespace sls::test {
 
 /// A DDS domain that no other test of this run uses at the same time (1 to 60): taken by a lock
 /// that the kernel releases with the process.
@@ -99,4 +99,4 @@ TrackingError calc_tracking_error(const std::filesystem::path& recording, std::s
 std::pair<std::size_t, std::size_t> find_stage(const std::filesystem::path& recording,
                                                const std::string& name);
 
-}  // namespace sls::testing
+}  // namespace sls::test

@@ -3,9 +3,9 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 
-#include "system/flight.hpp"
+#include "tests/system/flight.hpp"
 
-namespace sls::testing {
+namespace sls::test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -67,7 +67,7 @@ TEST_F(LauncherTest, MistakesEndWithTwoAndOneLine) {
   command.insert(command.end(), {"--domain", "300"});
   refuse(command, "--domain");
   fs::create_directory(recording());
-  write_file(recording() + "/notes.txt", "mine");
+  write_bytes(recording() + "/notes.txt", "mine");
   refuse(run_command("short"), "'notes.txt'");
 }
 
@@ -110,4 +110,4 @@ TEST_F(LauncherTest, AProcessThatDiesEndsTheRunWithOne) {
 }
 
 }  // namespace
-}  // namespace sls::testing
+}  // namespace sls::test

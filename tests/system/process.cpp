@@ -1,4 +1,4 @@
-#include "system/process.hpp"
+#include "tests/system/process.hpp"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
@@ -6,14 +6,11 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <cstdlib>
 #include <fstream>
 #include <sstream>
 #include <thread>
 
-namespace sls::testing {
-
-namespace fs = std::filesystem;
+namespace sls::test {
 
 bool wait_until(const std::function<bool()>& condition, std::chrono::milliseconds limit) {
   const auto deadline = std::chrono::steady_clock::now() + limit;
@@ -22,17 +19,6 @@ bool wait_until(const std::function<bool()>& condition, std::chrono::millisecond
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
   return true;
-}
-
-TemporaryFolder::TemporaryFolder() {
-  std::string pattern = (fs::temp_directory_path() / "sls-test-XXXXXX").string();
-  if (!mkdtemp(pattern.data())) throw std::runtime_error("mkdtemp " + pattern);
-  path_ = pattern;
-}
-
-TemporaryFolder::~TemporaryFolder() {
-  std::error_code ignored;
-  fs::remove_all(path_, ignored);
 }
 
 Process::Process(const std::vector<std::string>& command,
@@ -79,15 +65,11 @@ void Process::send(int signal) {
 
 std::string Process::output() const { return read_file(folder_ / "output"); }
 
-std::string read_file(const fs::path& file) {
+std::string read_file(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   std::ostringstream text;
   text << stream.rdbuf();
   return text.str();
-}
-
-void write_file(const fs::path& file, const std::string& text) {
-  std::ofstream(file, std::ios::binary) << text;
 }
 
 std::string replace_once(const std::string& text, const std::string& from, const std::string& to) {
@@ -106,4 +88,4 @@ std::string qos(const std::string& name) {
   return std::string(SLS_SOURCE_DIR) + "/config/qos/" + name + ".xml";
 }
 
-}  // namespace sls::testing
+}  // namespace sls::test

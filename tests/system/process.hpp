@@ -1,5 +1,5 @@
-/// Real processes and folders for system tests: started, waited for with a deadline, and never left
-/// behind, whatever the test does.
+/// Real processes for system tests: started, waited for with a deadline, and never left behind,
+/// whatever the test does.
 #pragma once
 
 #include <sys/types.h>
@@ -11,25 +11,13 @@
 #include <string>
 #include <vector>
 
-namespace sls::testing {
+#include "tests/support/temporary_folder.hpp"
+
+namespace sls::test {
 
 /// Waits until `condition` holds, at most `limit`; what it returned last.
 bool wait_until(const std::function<bool()>& condition,
                 std::chrono::milliseconds limit = std::chrono::seconds(60));
-
-/// A folder below the system's temporary one, removed at the end.
-class TemporaryFolder {
- public:
-  TemporaryFolder();
-  ~TemporaryFolder();
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  const std::filesystem::path& path() const { return path_; }
-  std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
-
- private:
-  std::filesystem::path path_;
-};
 
 /// One process. Its stdout and stderr go to a file, which `output()` reads.
 class Process {
@@ -42,7 +30,7 @@ class Process {
   Process& operator=(const Process&) = delete;
 
   /// The exit code, or 128 + signal; nothing if it still runs after `limit`.
-  std::optional<int> wait(std::chrono::milliseconds limit = std::chrono::seconds(90));
+  std::optional<int> wait(std::chrono::milliseconds limit = std::chrono::seconds(240));
   bool is_running();
   void send(int signal);
   pid_t id() const { return id_; }
@@ -55,8 +43,8 @@ class Process {
   std::optional<int> exit_code_;
 };
 
+/// The bytes of `file`; none where it does not exist (yet).
 std::string read_file(const std::filesystem::path& file);
-void write_file(const std::filesystem::path& file, const std::string& text);
 
 /// `text` with its only occurrence of `from` replaced; fails the test where there is not exactly
 /// one.
@@ -67,4 +55,4 @@ std::string program(const std::string& name);
 std::string scenario(const std::string& name);
 std::string qos(const std::string& name);
 
-}  // namespace sls::testing
+}  // namespace sls::test

@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <regex>
 
-#include "system/flight.hpp"
+#include "tests/system/flight.hpp"
 
-namespace sls::testing {
+namespace sls::test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -71,13 +71,13 @@ TEST(UsageTest, WrongFlagsAreRefused) {
 
 TEST(UsageTest, UnusableScenariosAreRefusedByServerAndClient) {
   TemporaryFolder folder;
-  write_file(folder / "empty.yaml", "");
+  write_bytes(folder / "empty.yaml", "");
   fs::create_directory(folder / "folder.yaml");
-  write_file(folder / "misspelt.yaml",
+  write_bytes(folder / "misspelt.yaml",
              replace_once(read_file(scenario("short")), "load_mass_kg", "laod_mass_kg"));
-  write_file(folder / "negative.yaml", replace_once(read_file(scenario("short")),
+  write_bytes(folder / "negative.yaml", replace_once(read_file(scenario("short")),
                                                     "load_mass_kg: 0.2", "load_mass_kg: -0.16"));
-  write_file(folder / "huge.yaml", "");
+  write_bytes(folder / "huge.yaml", "");
   fs::resize_file(folder / "huge.yaml", 100'000'000);
   for (const char* name : {"sim_server", "control_client"}) {
     const auto refuse = [&](const std::string& file, const std::string& cause) {
@@ -96,9 +96,9 @@ TEST(UsageTest, UnusableScenariosAreRefusedByServerAndClient) {
 TEST(UsageTest, UnusableQosFilesAreRefusedByEveryProgram) {
   TemporaryFolder folder;
   const std::string shipped = read_file(qos("default"));
-  write_file(folder / "malformed.xml", shipped.substr(0, shipped.size() / 2));
-  write_file(folder / "misnamed.xml", replace_once(shipped, "\"sls_loop_reader\"", "\"sls_lop\""));
-  write_file(folder / "refused.xml",
+  write_bytes(folder / "malformed.xml", shipped.substr(0, shipped.size() / 2));
+  write_bytes(folder / "misnamed.xml", replace_once(shipped, "\"sls_loop_reader\"", "\"sls_lop\""));
+  write_bytes(folder / "refused.xml",
              replace_once(shipped, "<depth>64</depth>", "<depth>many</depth>"));
   int run_number = 0;
   for (const char* name : {"sim_server", "control_client", "recorder"}) {
@@ -122,7 +122,7 @@ TEST(UsageTest, UnusableQosFilesAreRefusedByEveryProgram) {
 TEST(UsageTest, RecorderRefusesAFolderThatIsNotEmptyAndReplacesARecordingWithForce) {
   TemporaryFolder folder;
   fs::create_directory(folder / "full");
-  write_file(folder / "full/notes.txt", "mine");
+  write_bytes(folder / "full/notes.txt", "mine");
   expect_refused({program("recorder"), "--out", folder / "full"}, 2, "'notes.txt'");
   expect_refused({program("recorder"), "--out", folder / "full", "--force"}, 2, "'notes.txt'");
   EXPECT_EQ(read_file(folder / "full/notes.txt"), "mine");
@@ -130,7 +130,7 @@ TEST(UsageTest, RecorderRefusesAFolderThatIsNotEmptyAndReplacesARecordingWithFor
   expect_refused({program("recorder"), "--out", "/proc/sls"}, 2, "--out /proc/sls");
 
   fs::create_directory(folder / "old");
-  write_file(folder / "old/state.csv", "old");
+  write_bytes(folder / "old/state.csv", "old");
   expect_refused({program("recorder"), "--out", folder / "old", "--check"}, 2, "--force");
   EXPECT_EQ(read_file(folder / "old/state.csv"), "old");
   EXPECT_EQ(run({program("recorder"), "--out", folder / "old", "--force", "--check"}).exit_code, 0);
@@ -139,7 +139,7 @@ TEST(UsageTest, RecorderRefusesAFolderThatIsNotEmptyAndReplacesARecordingWithFor
 
 TEST(UsageTest, ServerNamesWhoIsMissingAtTheStart) {
   TemporaryFolder folder;
-  write_file(folder / "scenario.yaml",
+  write_bytes(folder / "scenario.yaml",
              replace_once(read_file(scenario("short")), "timeout_s: 30", "timeout_s: 3"));
   OwnDomain domain;
   Process server(
@@ -154,7 +154,7 @@ TEST(UsageTest, ServerNamesWhoIsMissingAtTheStart) {
 
 TEST(UsageTest, ClientWithAnotherScenarioIsRefusedWithBothHashes) {
   TemporaryFolder folder;
-  write_file(folder / "other.yaml", read_file(scenario("short")) + "# another byte\n");
+  write_bytes(folder / "other.yaml", read_file(scenario("short")) + "# another byte\n");
   OwnDomain domain;
   Process server(make_command("sim_server", domain.number(), {"--scenario", scenario("short")}));
   Process client(
@@ -201,4 +201,4 @@ TEST(UsageTest, OfTwoServersStartedTogetherOneFlies) {
 }
 
 }  // namespace
-}  // namespace sls::testing
+}  // namespace sls::test
