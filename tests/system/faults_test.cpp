@@ -65,7 +65,7 @@ TEST(FaultsTest, KilledRecorderLeavesFilesThatParseAndTheServerNamesIt) {
   TemporaryFolder folder;
   Flight flight(make_scenario(folder, "", "", "mission"));
   ASSERT_TRUE(flight.wait_for_steps(500)) << flight.outputs();
-  flight.recorder->send(SIGKILL);
+  flight.recorder->kill();
   EXPECT_EQ(flight.recorder->wait(), 137);
   EXPECT_EQ(flight.server->wait(), 1) << flight.outputs();
   EXPECT_NE(flight.server->output().find("waiting for: recorder"), std::string::npos)
@@ -79,7 +79,7 @@ TEST(FaultsTest, KilledOnlyClientEndsTheRunAsFailedNamingItsRole) {
   TemporaryFolder folder;
   Flight flight(make_scenario(folder, "", "", "mission"));
   ASSERT_TRUE(flight.wait_for_steps(500)) << flight.outputs();
-  flight.client->send(SIGKILL);
+  flight.client->kill();
   EXPECT_EQ(flight.server->wait(), 1) << flight.outputs();
   EXPECT_NE(flight.server->output().find("waiting for: controller"), std::string::npos)
       << flight.server->output();
@@ -95,7 +95,7 @@ TEST(FaultsTest, KilledOnlyClientEndsTheRunAsFailedNamingItsRole) {
 TEST(FaultsTest, KilledServerEndsClientAndRecorderWithItsAbsenceNamed) {
   Flight flight(scenario("mission"));
   ASSERT_TRUE(flight.wait_for_steps(500)) << flight.outputs();
-  flight.server->send(SIGKILL);
+  flight.server->kill();
   EXPECT_EQ(flight.client->wait(), 1) << flight.outputs();
   EXPECT_NE(flight.client->output().find("is gone"), std::string::npos) << flight.client->output();
   EXPECT_EQ(flight.recorder->wait(), 1) << flight.outputs();
@@ -114,7 +114,7 @@ TEST(FaultsTest, KilledPrimaryIsReplacedByTheStandbyAndTheStatesStayIdentical) {
   Process standby(make_command("control_client", flight.domain.number(),
                                {"--scenario", file, "--name", "standby", "--strength", "1"}));
   ASSERT_TRUE(flight.wait_for_steps(500)) << flight.outputs() << standby.output();
-  flight.client->send(SIGKILL);
+  flight.client->kill();
   EXPECT_EQ(flight.server->wait(), 0) << flight.outputs();
   EXPECT_EQ(standby.wait(), 0) << standby.output();
   EXPECT_EQ(flight.recorder->wait(), 0) << flight.outputs();

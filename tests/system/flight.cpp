@@ -49,7 +49,17 @@ OwnDomain::OwnDomain() {
   if (!found) throw std::runtime_error("no free DDS domain among 1 to 60");
 }
 
-OwnDomain::~OwnDomain() { close(lock_); }
+OwnDomain::~OwnDomain() {
+  // The shared-memory ports of a domain outlive processes that were killed. Its ports: 7400 + 250 N.
+  for (int port = 7400 + 250 * number_; port < 7400 + 250 * (number_ + 1); ++port) {
+    const std::string name = "fastrtps_port" + std::to_string(port);
+    for (const std::string& file : {name, name + "_el", name + "_sl", "sem." + name + "_mutex"}) {
+      std::error_code ignored;
+      std::filesystem::remove("/dev/shm/" + file, ignored);
+    }
+  }
+  close(lock_);
+}
 
 std::vector<std::string> make_command(const std::string& name, int domain,
                                       const std::vector<std::string>& flags,

@@ -96,13 +96,12 @@ TEST_F(LauncherTest, AProcessThatDiesEndsTheRunWithOne) {
     return fs::exists(recording() + "/state.csv") &&
            fs::file_size(recording() + "/state.csv") > 100000;
   })) << run.output();
-  // The client is the only child with this command line.
   for (const auto& entry : fs::directory_iterator("/proc")) {
     const std::string command = read_file(entry.path() / "cmdline");
     if (command.find("/control_client") == std::string::npos) continue;
     const auto parent = read_file(entry.path() / "status");
     if (parent.find("PPid:\t" + std::to_string(run.id()) + "\n") == std::string::npos) continue;
-    kill(std::stoi(entry.path().filename().string()), SIGKILL);
+    kill_process(std::stoi(entry.path().filename().string()));
   }
   EXPECT_EQ(run.wait(), 1) << run.output();
   EXPECT_NE(run.output().find("control_client ended with 137"), std::string::npos) << run.output();

@@ -42,7 +42,7 @@ Process::Process(const std::vector<std::string>& command,
 
 Process::~Process() {
   if (!is_running()) return;
-  kill(-id_, SIGKILL);  // the group: a launcher's children too
+  ::kill(-id_, SIGKILL);  // the group: a launcher's children too
   wait(std::chrono::seconds(10));
 }
 
@@ -60,7 +60,27 @@ bool Process::is_running() {
 }
 
 void Process::send(int signal) {
-  if (is_running()) kill(id_, signal);
+  if (is_running()) ::kill(id_, signal);
+}
+
+void Process::kill() {
+  if (is_running()) kill_process(id_);
+}
+
+void kill_process(pid_t id) {
+  namespace fs = std::filesystem;
+  // Fast DDS holds a lock file NAME_el open for its own segment NAME.
+  std::vector<fs::path> own;
+  for (const auto& descriptor : fs::directory_iterator("/proc/" + std::to_string(id) + "/fd")) {
+    std::error_code gone;
+    const fs::path target = fs::read_symlink(descriptor, gone);
+    const std::string name = target.string();
+    const bool is_lock = name.rfind("/dev/shm/fastrtps_", 0) == 0 && name.size() > 3 &&
+                         name.compare(name.size() - 3, 3, "_el") == 0;
+    if (is_lock) own.insert(own.end(), {target, name.substr(0, name.size() - 3)});
+  }
+  ::kill(id, SIGKILL);
+  for (const auto& file : own) fs::remove(file);
 }
 
 std::string Process::output() const { return read_file(folder_ / "output"); }

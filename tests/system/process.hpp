@@ -33,6 +33,8 @@ class Process {
   std::optional<int> wait(std::chrono::milliseconds limit = std::chrono::seconds(240));
   bool is_running();
   void send(int signal);
+  /// SIGKILL, and what it keeps the process from removing is removed.
+  void kill();
   pid_t id() const { return id_; }
   /// Everything it has printed so far.
   std::string output() const;
@@ -42,6 +44,9 @@ class Process {
   pid_t id_ = -1;
   std::optional<int> exit_code_;
 };
+
+/// Ends any process for good, and removes its shared-memory segment, which it can no longer.
+void kill_process(pid_t id);
 
 /// The bytes of `file`; none where it does not exist (yet).
 std::string read_file(const std::filesystem::path& file);
