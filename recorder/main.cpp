@@ -1,8 +1,16 @@
+#include <sys/resource.h>
+
 #include "common/app/run_main.hpp"
 #include "common/bus/node.hpp"
 #include "common/bus/qos_file.hpp"
 #include "recorder/recorder.hpp"
 #include "recorder/recording_folder.hpp"
+
+namespace {
+
+constexpr int kNiceness = 5;
+
+}  // namespace
 
 int main(int argc, char** argv) {
   using namespace sls;
@@ -23,6 +31,9 @@ int main(int argc, char** argv) {
     bus::check_qos_file(options.qos_file);
     record::prepare_recording_folder(folder, force);
     if (check) return;
+    // The loop waits for server and client, not for us: whoever answers a step goes first. Before
+    // any thread starts, as they inherit it. It does no harm where it is refused.
+    setpriority(PRIO_PROCESS, 0, kNiceness);
     bus::Node node(options.qos_file, options.domain, "recorder");
     record::Recorder(node, folder).run();
   });

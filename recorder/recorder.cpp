@@ -150,8 +150,7 @@ void Recorder::write_samples() {
       std::this_thread::sleep_for(kWriteTime);
     }
     const std::string interruption = recording.has_all() ? "" : interruption_;
-    if (!recording.finish(interruption, samples_.refused()))
-      gaps_ = recording.describe_gaps();
+    if (!recording.finish(interruption, samples_.refused())) gaps_ = recording.describe_gaps();
     last_complete_step_ = recording.last_complete_step();
     has_all_ = true;
   } catch (...) {

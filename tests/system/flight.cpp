@@ -50,7 +50,8 @@ OwnDomain::OwnDomain() {
 }
 
 OwnDomain::~OwnDomain() {
-  // The shared-memory ports of a domain outlive processes that were killed. Its ports: 7400 + 250 N.
+  // The shared-memory ports of a domain outlive processes that were killed. Its ports: 7400 + 250
+  // N.
   for (int port = 7400 + 250 * number_; port < 7400 + 250 * (number_ + 1); ++port) {
     const std::string name = "fastrtps_port" + std::to_string(port);
     for (const std::string& file : {name, name + "_el", name + "_sl", "sem." + name + "_mutex"}) {

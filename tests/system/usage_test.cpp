@@ -74,9 +74,9 @@ TEST(UsageTest, UnusableScenariosAreRefusedByServerAndClient) {
   write_bytes(folder / "empty.yaml", "");
   fs::create_directory(folder / "folder.yaml");
   write_bytes(folder / "misspelt.yaml",
-             replace_once(read_file(scenario("short")), "load_mass_kg", "laod_mass_kg"));
+              replace_once(read_file(scenario("short")), "load_mass_kg", "laod_mass_kg"));
   write_bytes(folder / "negative.yaml", replace_once(read_file(scenario("short")),
-                                                    "load_mass_kg: 0.2", "load_mass_kg: -0.16"));
+                                                     "load_mass_kg: 0.2", "load_mass_kg: -0.16"));
   write_bytes(folder / "huge.yaml", "");
   fs::resize_file(folder / "huge.yaml", 100'000'000);
   for (const char* name : {"sim_server", "control_client"}) {
@@ -99,7 +99,7 @@ TEST(UsageTest, UnusableQosFilesAreRefusedByEveryProgram) {
   write_bytes(folder / "malformed.xml", shipped.substr(0, shipped.size() / 2));
   write_bytes(folder / "misnamed.xml", replace_once(shipped, "\"sls_loop_reader\"", "\"sls_lop\""));
   write_bytes(folder / "refused.xml",
-             replace_once(shipped, "<depth>64</depth>", "<depth>many</depth>"));
+              replace_once(shipped, "<depth>64</depth>", "<depth>many</depth>"));
   int run_number = 0;
   for (const char* name : {"sim_server", "control_client", "recorder"}) {
     const auto refuse = [&](const std::string& file, const std::string& cause) {
@@ -140,7 +140,7 @@ TEST(UsageTest, RecorderRefusesAFolderThatIsNotEmptyAndReplacesARecordingWithFor
 TEST(UsageTest, ServerNamesWhoIsMissingAtTheStart) {
   TemporaryFolder folder;
   write_bytes(folder / "scenario.yaml",
-             replace_once(read_file(scenario("short")), "timeout_s: 30", "timeout_s: 3"));
+              replace_once(read_file(scenario("short")), "timeout_s: 30", "timeout_s: 3"));
   OwnDomain domain;
   Process server(
       make_command("sim_server", domain.number(), {"--scenario", folder / "scenario.yaml"}));
