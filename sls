@@ -71,12 +71,19 @@ build_tree() {
     fresh=(--fresh)  # the tree was copied or moved
   fi
   mkdir -p "$folder"
-  say "building (preset $preset; the first time takes minutes; log: ${folder#"$root"/}/build.log)"
+  [[ -f $cache ]] || say "building for the first time, which takes minutes (log: $folder/build.log)"
   if ! { (cd "$root" && cmake --preset "$preset" "${fresh[@]}") &&
     cmake --build "$folder" --parallel "$(nproc)" "${targets[@]}"; } >"$folder/build.log" 2>&1; then
     grep -E -m 20 'error|Error' "$folder/build.log" >&2 || tail -n 20 "$folder/build.log" >&2
     fail "the build failed (whole log: $folder/build.log)"
   fi
+}
+
+# The programs, up to date. A build made elsewhere (SLS_BUILD) is taken as it is.
+build_programs() {
+  [[ -z ${SLS_BUILD:-} ]] || return 0
+  setup
+  build_tree release "$build" "${programs[@]}"
 }
 
 # --- flying ---------------------------------------------------------------------------------------
@@ -208,24 +215,19 @@ print_summary() {
 # --- subcommands ----------------------------------------------------------------------------------
 
 cmd_build() {
-  setup
-  build_tree release "$build" "${programs[@]}"
+  build_programs
   say "programs in build/bin: ${programs[*]}"
 }
 
 cmd_run() {
-  setup
-  [[ -x $build/bin/sim_server && -x $build/bin/control_client && -x $build/bin/recorder ]] ||
-    build_tree release "$build" "${programs[@]}"
+  build_programs
   fly "$@"
   ((result == 0)) && say "recording: $recording"
   exit "$result"
 }
 
 cmd_demo() {
-  setup
-  build_tree release "$build" "${programs[@]}"
-  cd "$root"
+  build_programs
   local scenario=figure_eight
   if (($#)) && [[ $1 != -* ]]; then
     scenario=$1

@@ -2,6 +2,8 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+#include <limits>
 #include <thread>
 
 #include "common/app/run_main.hpp"
@@ -14,10 +16,14 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto kPollTime = 20ms;   // while nothing is in a hurry
-constexpr auto kLingerTime = 10s;  // how long recorders may take to be done
-constexpr auto kReportTime = 5s;   // between two lines about the same wait
+constexpr auto kUsualJoinTime = 3s;          // a server's claim and discovery: no news
+constexpr auto kAcknowledgmentTime = 500ms;  // for the last samples to reach the recorders
+constexpr auto kPollTime = 20ms;             // while nothing is in a hurry
 constexpr std::size_t kMailboxSize = 1024;
+
+/// Steps by which the slowest recorder may be behind while samples are answered at once: the server
+/// keeps it within 2,000, the writers' histories hold 5,000.
+constexpr std::uint64_t kSafeLag = 4000;
 
 }  // namespace
 
@@ -33,8 +39,7 @@ Client::Client(bus::Node& node, const config::Scenario& scenario, const std::str
       reference_writer_(node),
       states_(kMailboxSize),
       state_reader_(node, bus::kLoopReaderProfile,
-                    [this](const VehicleState& state, const bus::PeerId&) { states_.put(state); }) {
-}
+                    [this](const VehicleState& state, const bus::PeerId&) { receive(state); }) {}
 
 void Client::run() {
   join_run();
@@ -42,7 +47,10 @@ void Client::run() {
   announce(false, false);
   serve();
   announce(false, true);
-  linger();
+  command_writer_.wait_for_acknowledgments(kAcknowledgmentTime);
+  reference_writer_.wait_for_acknowledgments(kAcknowledgmentTime);
+  if (app::stop_signal() == 0)
+    bus::wait_for_recorders_to_end(participants_, run_->parameters.run_id());
   const auto status = servers_.find_status(run_->parameters.run_id());
   if (status && status->phase() == PHASE_FAILED)
     throw app::RunError(fmt::format("the run failed: {}", status->reason().c_str()));
@@ -50,7 +58,7 @@ void Client::run() {
 
 void Client::join_run() {
   const double timeout_s = scenario_.sync.wait_for.timeout_s;
-  app::Wait wait(timeout_s);
+  app::Wait wait(timeout_s, kUsualJoinTime);
   while (!(run_ = servers_.find_joinable(vehicle_id_)) && app::stop_signal() == 0) {
     if (wait.is_over())
       throw app::RunError(
@@ -88,10 +96,13 @@ bool Client::sees_all_endpoints() const {
 
 void Client::serve() {
   auto next_look = Clock::now();
+  look_at_recorders();
+  answers_at_once_ = true;
   while (app::stop_signal() == 0) {
     if (const auto state = states_.take(next_look)) answer(*state);
     if (Clock::now() < next_look) continue;
     if (has_ended()) return;
+    look_at_recorders();
     if (!ready_ && sees_all_endpoints()) {
       ready_ = true;
       announce(true, false);
@@ -100,7 +111,30 @@ void Client::serve() {
   }
 }
 
+void Client::look_at_recorders() {
+  std::uint64_t last = std::numeric_limits<std::uint64_t>::max();
+  for (const auto& entry : participants_.find(ROLE_RECORDER, run_->parameters.run_id())) {
+    const auto recorded = std::max<std::int64_t>(entry.announcement.last_complete_step(), 0);
+    last = std::min(last, static_cast<std::uint64_t>(recorded) + kSafeLag);
+  }
+  last_step_at_once_ = last;
+}
+
+void Client::receive(const VehicleState& state) {
+  if (!answers_at_once_ || state.step() > last_step_at_once_) {
+    states_.put(state);
+    return;
+  }
+  try {
+    answer(state);
+  } catch (...) {  // an exception must not reach the middleware
+    const std::lock_guard lock(answer_mutex_);
+    answer_error_ = std::current_exception();
+  }
+}
+
 void Client::answer(const VehicleState& state) {
+  const std::lock_guard lock(answer_mutex_);
   if (state.run_id() != run_->parameters.run_id() || state.vehicle_id() != vehicle_id_) return;
   if (last_command_ && last_command_->step() == state.step()) {
     command_writer_.write(*last_command_);
@@ -117,7 +151,11 @@ void Client::answer(const VehicleState& state) {
     spdlog::error("step {}: fault {}", state.step(), to_string(answer.fault));
 }
 
-bool Client::has_ended() const {
+bool Client::has_ended() {
+  {
+    const std::lock_guard lock(answer_mutex_);
+    if (answer_error_) std::rethrow_exception(answer_error_);
+  }
   const auto status = servers_.find_status(run_->parameters.run_id());
   if (status && (status->phase() == PHASE_FINISHED || status->phase() == PHASE_FAILED)) return true;
   if (!servers_.is_present(run_->server))
@@ -137,19 +175,9 @@ void Client::announce(bool ready, bool done) {
   message.scenario_sha256(scenario_.sha256);
   message.ready(ready);
   message.done(done);
+  const std::lock_guard lock(answer_mutex_);
   message.last_complete_step(last_command_ ? static_cast<std::int64_t>(last_command_->step()) : -1);
   participant_writer_.write(message);
-}
-
-void Client::linger() {
-  if (app::stop_signal() != 0) return;
-  const auto give_up = Clock::now() + kLingerTime;
-  const auto recorders_done = [this] {
-    for (const auto& entry : participants_.find(ROLE_RECORDER, run_->parameters.run_id()))
-      if (!entry.announcement.done()) return false;
-    return true;
-  };
-  while (!recorders_done() && Clock::now() < give_up) std::this_thread::sleep_for(kPollTime);
 }
 
 }  // namespace sls::control

@@ -15,6 +15,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
+constexpr auto kUsualJoinTime = 3s;        // a server's claim and discovery: no news
 constexpr auto kPollTime = 20ms;           // between two looks at the run
 constexpr auto kWriteTime = 5ms;           // between two batches of the writing thread
 constexpr double kJoinTimeout = 60;        // until a run must be found
@@ -65,7 +66,7 @@ void Recorder::run() {
 
 void Recorder::join_run() {
   announce(false);
-  app::Wait wait(kJoinTimeout);
+  app::Wait wait(kJoinTimeout, kUsualJoinTime);
   while (!(run_ = servers_.find_joinable(0)) && app::stop_signal() == 0) {
     if (wait.is_over())
       throw app::RunError(fmt::format("{}: nothing recorded: no server within {} s",

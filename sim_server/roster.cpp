@@ -2,8 +2,6 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include <algorithm>
-
 namespace sls::sim {
 namespace {
 
@@ -77,11 +75,6 @@ std::string name_blocking_recorder(const Roster& roster, int expected, std::uint
   }
   return ready < expected ? fmt::format("recorder: {} expected, {} there", expected, ready)
                           : std::string();
-}
-
-bool are_recorders_done(const Roster& roster) {
-  return std::all_of(roster.recorders.begin(), roster.recorders.end(),
-                     [](const Entry& entry) { return entry.announcement.done(); });
 }
 
 }  // namespace sls::sim

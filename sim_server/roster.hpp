@@ -34,7 +34,4 @@ inline constexpr std::int64_t kRecorderWindow = 2000;
 /// than `expected` are there, or one is more than the window behind.
 std::string name_blocking_recorder(const Roster& roster, int expected, std::uint64_t step);
 
-/// True when every recorder that is there says it is done.
-bool are_recorders_done(const Roster& roster);
-
 }  // namespace sls::sim

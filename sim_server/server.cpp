@@ -19,7 +19,6 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto kClaimTime = 1s;      // how long a claim on the vehicles is open to objection
-constexpr auto kLingerTime = 10s;    // how long recorders may take to be done
 constexpr auto kStatusTime = 500ms;  // between two status samples of a running flight
 constexpr auto kRosterTime = 100ms;  // until a silent departure is looked for
 constexpr auto kPollTime = 20ms;     // while nothing is in a hurry
@@ -237,10 +236,9 @@ void Server::refresh_clients() {
 }
 
 void Server::linger() {
-  const auto give_up = Clock::now() + kLingerTime;
+  state_writer_.wait_for_acknowledgments(1s);
   status_writer_.wait_for_acknowledgments(1s);
-  while (!are_recorders_done(find_roster()) && Clock::now() < give_up)
-    std::this_thread::sleep_for(kPollTime);
+  bus::wait_for_recorders_to_end(participants_, run_id_);
 }
 
 double Server::calc_real_time_factor() const {

@@ -9,16 +9,16 @@ class Wait {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// Begins now and lasts `timeout_s` seconds.
-  explicit Wait(double timeout_s)
+  /// Begins now and lasts `timeout_s` seconds; it is first reported after `quiet_time`.
+  explicit Wait(double timeout_s, Clock::duration quiet_time = std::chrono::seconds(1))
       : began_(Clock::now()),
         deadline_(began_ + std::chrono::duration_cast<Clock::duration>(
                                std::chrono::duration<double>(timeout_s))),
-        next_report_(began_ + kFirstReport) {}
+        next_report_(began_ + quiet_time) {}
 
   bool is_over() const { return Clock::now() >= deadline_; }
 
-  /// True once after 1 s and then every 5 s: time for a line about it.
+  /// True once after the quiet time and then every 5 s: time for a line about it.
   bool is_report_due() {
     const auto now = Clock::now();
     if (now < next_report_) return false;
@@ -31,7 +31,6 @@ class Wait {
   }
 
  private:
-  static constexpr auto kFirstReport = std::chrono::seconds(1);
   static constexpr auto kReportInterval = std::chrono::seconds(5);
 
   Clock::time_point began_;

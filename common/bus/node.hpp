@@ -88,8 +88,8 @@ class Writer {
             Topic<Message>::kFlow == Flow::kStream ? kStreamWriterProfile : kLatchedWriterProfile,
             detail::make_type_support<Message>()) {}
 
-  /// Hands `message` to the middleware. Never call this from a reader's handler (README.md, trap
-  /// 4).
+  /// Hands `message` to the middleware; may block while a history is full, so it has no place in a
+  /// reader's handler (README.md, trap 4).
   /// @throws BusError if it was not taken: the history stayed full for `max_blocking_time`.
   void write(const Message& message) {
     if (!writer_.write(&message))

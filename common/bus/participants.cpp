@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
+#include <thread>
 
 namespace sls::bus {
 
@@ -23,6 +25,21 @@ std::vector<ParticipantDirectory::Entry> ParticipantDirectory::find(ParticipantR
     if (announcement.role() == role && announcement.run_id() == run_id && present.count(peer) > 0)
       found.push_back({peer, announcement});
   return found;
+}
+
+bool are_recorders_done(const std::vector<ParticipantDirectory::Entry>& recorders) {
+  return std::all_of(
+      recorders.begin(), recorders.end(),
+      [](const ParticipantDirectory::Entry& entry) { return entry.announcement.done(); });
+}
+
+void wait_for_recorders_to_end(const ParticipantDirectory& participants, std::uint64_t run_id) {
+  constexpr auto kLongest = std::chrono::seconds(10);
+  constexpr auto kPollTime = std::chrono::milliseconds(20);
+  const auto give_up = std::chrono::steady_clock::now() + kLongest;
+  while (!are_recorders_done(participants.find(ROLE_RECORDER, run_id)) &&
+         std::chrono::steady_clock::now() < give_up)
+    std::this_thread::sleep_for(kPollTime);
 }
 
 ServerDirectory::ServerDirectory(Node& node, std::function<void(const SimStatus&)> on_status)

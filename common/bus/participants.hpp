@@ -38,6 +38,13 @@ class ParticipantDirectory {
   Reader<Participant> reader_;
 };
 
+/// True when every one of `recorders` says it is done.
+bool are_recorders_done(const std::vector<ParticipantDirectory::Entry>& recorders);
+
+/// Waits until the recorders of run `run_id` are done, at most 10 s: until then server and clients
+/// must keep their writers.
+void wait_for_recorders_to_end(const ParticipantDirectory& participants, std::uint64_t run_id);
+
 /// A server's run as its samples describe it.
 struct Run {
   PeerId server;

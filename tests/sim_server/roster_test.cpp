@@ -146,12 +146,12 @@ TEST(RosterTest, AbsurdProgressIsTakenForWhatItCanMean) {
 
 TEST(RosterTest, TheServerWaitsForEveryRecorderThatIsThere) {
   Roster roster = {{}, {make_recorder("a"), make_recorder("b")}};
-  EXPECT_FALSE(are_recorders_done(roster));
+  EXPECT_FALSE(bus::are_recorders_done(roster.recorders));
   roster.recorders[0].announcement.done(true);
-  EXPECT_FALSE(are_recorders_done(roster));
+  EXPECT_FALSE(bus::are_recorders_done(roster.recorders));
   roster.recorders[1].announcement.done(true);
-  EXPECT_TRUE(are_recorders_done(roster));
-  EXPECT_TRUE(are_recorders_done({}));
+  EXPECT_TRUE(bus::are_recorders_done(roster.recorders));
+  EXPECT_TRUE(bus::are_recorders_done({}));
 }
 
 }  // namespace
