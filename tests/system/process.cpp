@@ -1,25 +1,14 @@
 #include "tests/system/process.hpp"
 
 #include <fcntl.h>
-#include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <fstream>
 #include <sstream>
-#include <thread>
 
 namespace sls::test {
-
-bool wait_until(const std::function<bool()>& condition, std::chrono::milliseconds limit) {
-  const auto deadline = std::chrono::steady_clock::now() + limit;
-  while (!condition()) {
-    if (std::chrono::steady_clock::now() >= deadline) return false;
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  }
-  return true;
-}
 
 Process::Process(const std::vector<std::string>& command,
                  const std::function<void()>& before_exec) {
@@ -90,14 +79,6 @@ std::string read_file(const std::filesystem::path& file) {
   std::ostringstream text;
   text << stream.rdbuf();
   return text.str();
-}
-
-std::string replace_once(const std::string& text, const std::string& from, const std::string& to) {
-  const auto first = text.find(from);
-  EXPECT_NE(first, std::string::npos) << "'" << from << "' is not in the text";
-  EXPECT_EQ(text.find(from, first + 1), std::string::npos) << "'" << from << "' is there twice";
-  std::string replaced = text;
-  return first == std::string::npos ? text : replaced.replace(first, from.size(), to);
 }
 
 std::string program(const std::string& name) { return std::string(SLS_PROGRAM_DIR) + "/" + name; }

@@ -12,12 +12,10 @@
 #include <vector>
 
 #include "tests/support/temporary_folder.hpp"
+#include "tests/support/text.hpp"
+#include "tests/support/waiting.hpp"
 
 namespace sls::test {
-
-/// Waits until `condition` holds, at most `limit`; what it returned last.
-bool wait_until(const std::function<bool()>& condition,
-                std::chrono::milliseconds limit = std::chrono::seconds(60));
 
 /// One process. Its stdout and stderr go to a file, which `output()` reads.
 class Process {
@@ -50,10 +48,6 @@ void kill_process(pid_t id);
 
 /// The bytes of `file`; none where it does not exist (yet).
 std::string read_file(const std::filesystem::path& file);
-
-/// `text` with its only occurrence of `from` replaced; fails the test where there is not exactly
-/// one.
-std::string replace_once(const std::string& text, const std::string& from, const std::string& to);
 
 /// Path of one of the programs, of a shipped scenario (by name) or QoS file (by name).
 std::string program(const std::string& name);

@@ -9,14 +9,14 @@
 
 #include "common/config/config_error.hpp"
 #include "tests/common/bus/sample_messages.hpp"
-#include "tests/common/bus/waiting.hpp"
 #include "tests/support/temporary_folder.hpp"
+#include "tests/support/waiting.hpp"
 
 namespace sls::bus {
 namespace {
 
+using sls::test::wait_until;
 using test::make_message;
-using test::wait_until;
 
 const std::filesystem::path kQosFile = SLS_SOURCE_DIR "/config/qos/default.xml";
 

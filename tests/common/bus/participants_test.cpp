@@ -7,12 +7,12 @@
 #include <atomic>
 #include <optional>
 
-#include "tests/common/bus/waiting.hpp"
+#include "tests/support/waiting.hpp"
 
 namespace sls::bus {
 namespace {
 
-using test::wait_until;
+using sls::test::wait_until;
 
 // Another build's tests may use the same domain: numbers of this process alone.
 const std::uint64_t kRun = static_cast<std::uint64_t>(::getpid()) * 1000 + 500;

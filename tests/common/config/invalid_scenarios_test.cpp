@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "tests/common/config/support.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace sls::config::test {
 namespace {
@@ -22,26 +23,16 @@ std::string find_load_error(const fs::path& file) {
   return "no error";
 }
 
-/// A folder of its own for each test, gone afterwards.
 class UnusableFileTest : public testing::Test {
  protected:
-  UnusableFileTest() {
-    std::string pattern = (fs::temp_directory_path() / "sls-config-XXXXXX").string();
-    if (mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("mkdtemp failed");
-    folder_ = pattern;
-  }
-  ~UnusableFileTest() override {
-    std::error_code ignored;
-    fs::remove_all(folder_, ignored);
-  }
-
   fs::path write(const std::string& text) const {
     const fs::path file = folder_ / "scenario.yaml";
     std::ofstream(file, std::ios::binary) << text;
     return file;
   }
 
-  fs::path folder_;
+  const sls::test::TemporaryFolder own_folder_;
+  const fs::path folder_ = own_folder_.path();
 };
 
 TEST(InvalidScenariosTest, EachFileGivesTheMessageOnItsFirstLine) {

@@ -259,11 +259,4 @@ std::string read_text(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
 }
 
-std::string replace_once(std::string text, const std::string& from, const std::string& to) {
-  const auto at = text.find(from);
-  if (at == text.npos || text.find(from, at + 1) != text.npos)
-    throw std::logic_error("not there exactly once: " + from);
-  return text.replace(at, from.size(), to);
-}
-
 }  // namespace sls::config::test

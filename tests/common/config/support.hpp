@@ -7,8 +7,11 @@
 #include <vector>
 
 #include "common/config/scenario.hpp"
+#include "tests/support/text.hpp"
 
 namespace sls::config::test {
+
+using sls::test::replace_once;
 
 /// Equal in every field but `text` and `sha256`.
 bool are_equal(const Scenario& a, const Scenario& b);
@@ -26,8 +29,5 @@ std::string read_text(const std::filesystem::path& file);
 
 /// A short valid scenario, one key per line, to be spoilt by tests.
 extern const char* const kMinimalScenario;
-
-/// `text` with the one place where it holds `from` changed to `to`.
-std::string replace_once(std::string text, const std::string& from, const std::string& to);
 
 }  // namespace sls::config::test

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace sls::test {
+
+/// `text` with the one place where it holds `from` changed to `to`.
+/// @throws std::logic_error if there is not exactly one.
+inline std::string replace_once(std::string text, const std::string& from, const std::string& to) {
+  const auto at = text.find(from);
+  if (at == text.npos || text.find(from, at + 1) != text.npos)
+    throw std::logic_error("not there exactly once: " + from);
+  return text.replace(at, from.size(), to);
+}
+
+}  // namespace sls::test
