@@ -145,8 +145,10 @@ void Client::answer(const VehicleState& state) {
       controller_->calc_answer(state.step(), to_model_state(state), to_memory(state.controller()));
   const auto compute_time = Clock::now() - began;
   last_command_ = make_command_message(state, answer, name_, strength_, compute_time);
-  command_writer_.write(*last_command_);
+  // The reference first: once the command is out the server moves on, and a client that is killed
+  // then must not have kept back what a recorder needs of this step.
   reference_writer_.write(make_reference_message(state, answer, name_));
+  command_writer_.write(*last_command_);
   if (answer.fault != Fault::kNone)
     spdlog::error("step {}: fault {}", state.step(), to_string(answer.fault));
 }

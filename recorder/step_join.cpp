@@ -13,6 +13,11 @@ namespace {
 /// heard.
 constexpr std::uint64_t kMaxPending = 16384;
 
+/// An applied answer that has not come while so many later states are in was kept back by a client
+/// that died; the equal answer of another client, if there is one, stands for it. Well below the
+/// lag at which the server waits for the recorder.
+constexpr std::size_t kMaxPatience = 1000;
+
 /// No state can be that far ahead either. It bounds the memory a wrong sample can take.
 constexpr std::uint64_t kMaxAhead = 65536;
 
@@ -128,7 +133,20 @@ StepRecord StepJoin::make_record(const Pending& pending) const {
     record.reference = *reference;
   else if (is_any_taken && !pending.references.empty())
     record.reference = pending.references.front();
+  const bool is_kept_back = is_giving_up_ || pending_.size() > kMaxPatience;
+  if (!record.is_complete() && is_kept_back && !is_last(next_step_)) find_stand_in(pending, record);
   return record;
+}
+
+/// Fills in the first whole answer, of whichever client, with the force that was applied.
+void StepJoin::find_stand_in(const Pending& pending, StepRecord& record) const {
+  for (const ControlCommand& command : pending.commands) {
+    const auto* reference = find_by_client(pending.references, command.client_name().to_string());
+    if (!reference || !(pending_[1].state->f_Q_W_n() == command.f_Q_W_n())) continue;
+    record.command = command;
+    record.reference = *reference;
+    return;
+  }
 }
 
 /// What the client is known to have sent that was applied: the force that state k + 1 says, or the
@@ -168,6 +186,7 @@ void StepJoin::hand_on_first() {
 }
 
 void StepJoin::give_up() {
+  is_giving_up_ = true;
   while (!pending_.empty() && !has_ended()) hand_on_first();
 }
 

@@ -68,6 +68,7 @@ class StepJoin {
   Pending* find(std::uint64_t step, std::uint64_t max_ahead);
   std::optional<std::string> find_applied_client(std::uint64_t step) const;
   StepRecord make_record(const Pending& pending) const;
+  void find_stand_in(const Pending& pending, StepRecord& record) const;
   const ControlCommand* find_applied_command(const Pending& pending,
                                              const std::string& client) const;
   bool is_last(std::uint64_t step) const;
@@ -83,6 +84,7 @@ class StepJoin {
     std::string controller;
   };
   std::optional<End> end_;
+  bool is_giving_up_ = false;
   DroppedSamples dropped_;
 };
 

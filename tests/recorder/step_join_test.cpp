@@ -187,6 +187,31 @@ TEST_F(StepJoinTest, OfOneNameTheCommandWhoseForceWasAppliedIsRecorded) {
   }
 }
 
+TEST_F(StepJoinTest, TheEqualAnswerOfAStandbyStandsForWhatADyingClientKeptBack) {
+  constexpr std::uint64_t kDeath = 5;  // the pilot's command got out, its reference did not
+  const auto add_flight = [this](std::uint64_t last_step) {
+    for (std::uint64_t step = 0; step <= last_step; ++step) {
+      ControlCommand command = make_command(step);
+      Reference reference = make_reference(step);
+      join_.add(make_state(step));
+      join_.add(command);
+      if (step != kDeath) join_.add(reference);
+      command.client_name("standby");
+      reference.client_name("standby");
+      join_.add(command);
+      join_.add(reference);
+    }
+  };
+  add_flight(kDeath + 100);
+  EXPECT_EQ(records_.size(), kDeath);  // the pilot's may still come
+  join_.give_up();
+  ASSERT_GT(records_.size(), kDeath + 1);
+  EXPECT_TRUE(records_[kDeath].is_complete());
+  EXPECT_EQ(records_[kDeath].command->f_Q_W_n(), make_command(kDeath).f_Q_W_n());
+  EXPECT_STREQ(records_[kDeath].reference->client_name().c_str(), "standby");
+  EXPECT_STREQ(records_[kDeath + 1].reference->client_name().c_str(), kPilot);
+}
+
 TEST_F(StepJoinTest, ANamedClientWithAnotherForceIsNotRecorded) {
   ControlCommand other = make_command(0);
   other.f_Q_W_n()[2] += 1e-12;

@@ -89,7 +89,9 @@ TEST(FaultsTest, KilledOnlyClientEndsTheRunAsFailedNamingItsRole) {
   const auto manifest = read_manifest(flight.recording());
   EXPECT_FALSE(manifest.at("complete").get<bool>());
   EXPECT_EQ(manifest.at("outcome"), "failed");
-  EXPECT_TRUE(manifest.at("missing").empty()) << manifest.at("missing");
+  // Only of the step at which it died may the client have kept something back.
+  for (const auto& gap : manifest.at("missing"))
+    EXPECT_GE(gap.at("from").get<int>() + 1, manifest.at("last_step").get<int>()) << gap;
 }
 
 TEST(FaultsTest, KilledServerEndsClientAndRecorderWithItsAbsenceNamed) {
