@@ -124,7 +124,10 @@ TEST(FaultsTest, KilledPrimaryIsReplacedByTheStandbyAndTheStatesStayIdentical) {
   EXPECT_TRUE(read_file(undisturbed.recording() / "state.csv") ==
               read_file(flight.recording() / "state.csv"));
   const Table commands(flight.recording() / "command.csv");
-  EXPECT_EQ(commands.text(0, "controller"), "primary");
+  std::size_t by_primary = 0;
+  for (std::size_t row = 0; row < commands.rows(); ++row)
+    by_primary += commands.text(row, "controller") == "primary" ? 1 : 0;
+  EXPECT_GT(by_primary, 0u);  // not all up to its end: on a busy machine it may be silent before
   EXPECT_EQ(commands.text(commands.rows() - 1, "controller"), "standby");
 }
 
