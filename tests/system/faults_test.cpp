@@ -1,7 +1,6 @@
 /// What goes wrong while flying, done for real: processes killed and interrupted, a full disk, a
 /// singular state, a refused command.
 #include <gtest/gtest.h>
-#include <sched.h>
 #include <signal.h>
 #include <sys/mount.h>
 #include <sys/stat.h>

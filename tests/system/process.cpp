@@ -10,8 +10,7 @@
 
 namespace sls::test {
 
-Process::Process(const std::vector<std::string>& command,
-                 const std::function<void()>& before_exec) {
+Process::Process(const std::vector<std::string>& command) {
   std::vector<char*> arguments;
   for (const auto& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
   arguments.push_back(nullptr);
@@ -23,7 +22,6 @@ Process::Process(const std::vector<std::string>& command,
     const int output = open(output_file.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0644);
     dup2(output, STDOUT_FILENO);
     dup2(output, STDERR_FILENO);
-    if (before_exec) before_exec();
     execvp(arguments[0], arguments.data());
     _exit(127);
   }

@@ -20,9 +20,7 @@ namespace sls::test {
 /// One process. Its stdout and stderr go to a file, which `output()` reads.
 class Process {
  public:
-  /// `before_exec` runs in the child before the program starts.
-  explicit Process(const std::vector<std::string>& command,
-                   const std::function<void()>& before_exec = {});
+  explicit Process(const std::vector<std::string>& command);
   ~Process();  // kills what still runs
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;

@@ -1,6 +1,5 @@
 /// Bad input, given to the real programs: one clear line, the documented exit code, nothing left.
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
