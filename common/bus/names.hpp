@@ -18,6 +18,8 @@ inline const char* to_string(RunPhase phase) {
       return "finished";
     case PHASE_FAILED:
       return "failed";
+    case PHASE_RESET:
+      return "reset";
   }
   return "unknown";
 }

@@ -8,7 +8,8 @@ namespace sls::bus {
 /// What a topic is for decides its QoS profiles: config/qos/README.md.
 enum class Flow {
   kStream,   ///< one sample per control period and vehicle: state, command, reference
-  kLatched,  ///< what a late joiner must know: participant, parameters, status
+  kLatched,  ///< what a late joiner must know: participant, parameters, status; and control, whose
+             ///< requests carry a run_id, so that none acts on a later run
 };
 
 /// Profile names in a QoS file.
@@ -18,6 +19,9 @@ inline constexpr const char* kLoopReaderProfile = "sls_loop_reader";
 inline constexpr const char* kRecorderReaderProfile = "sls_recorder_reader";
 inline constexpr const char* kLatchedWriterProfile = "sls_latched_writer";
 inline constexpr const char* kLatchedReaderProfile = "sls_latched_reader";
+/// sls/command in real time, with DEADLINE and LIFESPAN; a file without them flies without these.
+inline constexpr const char* kRealtimeCommandWriterProfile = "sls_realtime_command_writer";
+inline constexpr const char* kRealtimeCommandReaderProfile = "sls_realtime_command_reader";
 
 /// `kName` and `kFlow` of the topic that carries `Message`.
 template <class Message>
@@ -51,6 +55,16 @@ struct Topic<Parameters> {
 template <>
 struct Topic<SimStatus> {
   static constexpr const char* kName = "sls/status";
+  static constexpr Flow kFlow = Flow::kLatched;
+};
+template <>
+struct Topic<SimControl> {
+  static constexpr const char* kName = "sls/control";
+  static constexpr Flow kFlow = Flow::kLatched;
+};
+template <>
+struct Topic<SimControlReply> {
+  static constexpr const char* kName = "sls/control_reply";
   static constexpr Flow kFlow = Flow::kLatched;
 };
 

@@ -24,7 +24,7 @@ void expect_words(const std::vector<Enum>& values) {
 
 TEST(NamesTest, EveryRunPhaseHasAWord) {
   expect_words<RunPhase>(
-      {PHASE_WAITING, PHASE_RUNNING, PHASE_PAUSED, PHASE_FINISHED, PHASE_FAILED});
+      {PHASE_WAITING, PHASE_RUNNING, PHASE_PAUSED, PHASE_FINISHED, PHASE_FAILED, PHASE_RESET});
 }
 
 TEST(NamesTest, EveryFaultHasAWord) {
