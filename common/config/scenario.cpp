@@ -15,6 +15,9 @@
 namespace sls::config {
 namespace {
 
+/// A delay keeps that many samples in memory.
+constexpr std::int64_t kMaxDelayPeriods = 100'000;
+
 /// The file's bytes; it is refused by its size before anything is read.
 std::string read_file(const std::filesystem::path& file) {
   namespace fs = std::filesystem;
@@ -51,6 +54,30 @@ std::optional<std::size_t> find_stage_off_period(const Scenario& scenario) {
   return std::nullopt;
 }
 
+/// Why the delays of the faults do not fit the control period, and which fault says so.
+struct DelayMismatch {
+  std::size_t fault = 0;
+  std::int64_t by_ns = 0;
+  bool is_too_long = false;  ///< else: not a whole number of periods
+};
+std::optional<DelayMismatch> find_delay_mismatch(const Scenario& scenario) {
+  std::int64_t periods[] = {0, 0};  // of each channel: delays of one channel add up
+  for (std::size_t i = 0; i < scenario.faults.size(); ++i) {
+    const Fault& fault = scenario.faults[i];
+    const auto* delay = std::get_if<DelayFault>(&fault.effect);
+    if (!delay) continue;
+    if (delay->by_ns % scenario.sync.period_ns != 0) return DelayMismatch{i, delay->by_ns, false};
+    std::int64_t& total = periods[fault.on == FaultChannel::kState ? 0 : 1];
+    total += delay->by_ns / scenario.sync.period_ns;
+    if (total > kMaxDelayPeriods) return DelayMismatch{i, delay->by_ns, true};
+  }
+  return std::nullopt;
+}
+
+std::string to_fault_path(const Scenario& scenario, std::size_t index) {
+  return "faults[" + std::to_string(index) + "]." + scenario.faults[index].kind;
+}
+
 std::string to_stage_path(std::size_t index) { return "mission[" + std::to_string(index) + "]"; }
 
 std::string to_seconds_text(std::int64_t nanoseconds) { return to_text(to_seconds(nanoseconds)); }
@@ -83,6 +110,51 @@ void check_times(const Scenario& scenario, const Places& places) {
   }
 }
 
+std::string to_too_long(std::int64_t period_ns) {
+  return "delays of one channel of at most " + std::to_string(kMaxDelayPeriods) + " periods (" +
+         to_seconds_text(kMaxDelayPeriods * period_ns) + " s)";
+}
+
+/// Nothing where `offset` says something to its channel, else the keys that could.
+std::optional<std::string> find_missing_offset(const SampleOffset& offset, FaultChannel on) {
+  const model::RodAngles& rod = offset.rod;
+  if (on == FaultChannel::kCommand)
+    return offset.force.isZero(0.0) ? std::optional("force_n") : std::nullopt;
+  const bool is_zero = offset.position.isZero(0.0) && offset.velocity.isZero(0.0) &&
+                       rod.alpha == 0.0 && rod.beta == 0.0 && rod.alpha_dot == 0.0 &&
+                       rod.beta_dot == 0.0;
+  return is_zero ? std::optional(
+                       "position_m, velocity_m_s, alpha_rad, beta_rad, "
+                       "alpha_dot_rad_s or beta_dot_rad_s")
+                 : std::nullopt;
+}
+
+void check_faults(const Scenario& scenario, const Places& places) {
+  for (std::size_t i = 0; i < scenario.faults.size(); ++i) {
+    const Fault& fault = scenario.faults[i];
+    const std::string path = to_fault_path(scenario, i);
+    if (fault.to_ns <= fault.from_ns)
+      throw places.make_error_at(path + ".to_s", "expected > from_s (" +
+                                                     to_seconds_text(fault.from_ns) + "), got " +
+                                                     to_seconds_text(fault.to_ns));
+    std::optional<std::string> missing;
+    if (const auto* bias = std::get_if<BiasFault>(&fault.effect))
+      missing = find_missing_offset(bias->offset, fault.on);
+    if (const auto* noise = std::get_if<NoiseFault>(&fault.effect))
+      missing = find_missing_offset(noise->deviation, fault.on);
+    if (missing)
+      throw places.make_error_at(path, "expected " + *missing + " other than 0, got none");
+  }
+  if (const auto mismatch = find_delay_mismatch(scenario)) {
+    const std::int64_t period = scenario.sync.period_ns;
+    throw places.make_error_at(
+        to_fault_path(scenario, mismatch->fault) + ".by_s",
+        mismatch->is_too_long
+            ? "expected " + to_too_long(period) + ", got " + to_seconds_text(mismatch->by_ns)
+            : to_mismatch("multiple", "sync.period_s", period, mismatch->by_ns));
+  }
+}
+
 void check_pendulum(const Scenario& scenario, const Places& places) {
   if (scenario.plant.pendulum != Pendulum::kRigid) return;
   if (const auto contradiction = find_rigid_contradiction(scenario.vehicle))
@@ -107,6 +179,7 @@ Scenario parse_scenario(const std::string& text, const std::string& place) {
   Scenario scenario;
   read_value(Value{root, "", root.line, places}, scenario);
   check_times(scenario, places);
+  check_faults(scenario, places);
   check_pendulum(scenario, places);
   scenario.text = text;
   scenario.sha256 = calc_sha256(text);
@@ -138,7 +211,21 @@ void override_period(Scenario& scenario, double period_s) {
     const auto& leave = std::get<LeaveAfter>(changed.mission[*index].leave);
     fail(to_mismatch("divisor", to_stage_path(*index) + ".for_s", leave.duration_ns, *period));
   }
+  if (const auto mismatch = find_delay_mismatch(changed)) {
+    const std::string key = to_fault_path(changed, mismatch->fault) + ".by_s";
+    if (!mismatch->is_too_long) fail(to_mismatch("divisor", key, mismatch->by_ns, *period));
+    fail(key + ": expected " + to_too_long(*period) + ", got " + to_seconds_text(mismatch->by_ns));
+  }
   scenario = std::move(changed);
+}
+
+void override_real_time_factor(Scenario& scenario, double factor) {
+  if (scenario.sync.mode != SyncMode::kRealtime)
+    throw ConfigError("--rtf: expected --mode realtime with it, got lockstep");
+  if (!kRate.holds(factor))
+    throw ConfigError(std::string("--rtf: expected ") + kRate.expectation + ", got " +
+                      to_text(factor));
+  scenario.sync.real_time_factor = factor;
 }
 
 }  // namespace sls::config

@@ -55,12 +55,104 @@ struct WaitFor {
   double timeout_s = 30.0;
 };
 
+/// What the server does about a vehicle whose controllers stay silent in flight.
+enum class ControllerPolicy {
+  kWait,      ///< lockstep: keeps waiting
+  kHold,      ///< flies on with the last answer, after `max_hold_s` with the fail-safe force
+  kFailsafe,  ///< flies on with the fail-safe force
+  kStop,      ///< ends the run as failed
+};
+
+/// What the server does about an expected recorder that is gone or too far behind.
+enum class RecorderPolicy {
+  kWait,  ///< lockstep: keeps waiting
+  kGoOn,  ///< flies on without it; its recording will have a gap
+  kStop,  ///< ends the run as failed
+};
+
+/// Patience with a participant that is silent or gone. Who is missing is reported within 1 s and
+/// every 5 s whatever the policy.
+template <class Policy>
+struct Absence {
+  Policy policy = Policy::kWait;
+  /// Under `wait`: after which the run fails; else after which the policy acts.
+  double deadline_s = 30.0;
+};
+
+struct WaitPolicies {
+  Absence<ControllerPolicy> controller;
+  Absence<RecorderPolicy> recorder;
+  double server_deadline_s = 30.0;  ///< after which clients and recorders give a silent server up
+};
+
 struct Sync {
   SyncMode mode = SyncMode::kLockstep;
   std::int64_t period_ns = 4'000'000;  ///< control period, a multiple of the plant's step
   double real_time_factor = 1.0;       ///< of `realtime`
   double take_over_s = 0.1;            ///< silence after which the next-strongest client answers
+  double max_hold_s = 0.5;             ///< simulated time a force is held before the fail-safe
   WaitFor wait_for;
+  WaitPolicies wait;
+};
+
+// --- faults ------------------------------------------------------------------------------------
+
+/// Where a fault acts.
+enum class FaultChannel {
+  kState,    ///< between plant and controllers: what they measure
+  kCommand,  ///< between controllers and plant: the force that acts
+};
+
+/// The sample of a channel arrives `by_ns` later.
+struct DelayFault {
+  std::int64_t by_ns = 0;  ///< a multiple of the control period
+};
+
+/// A sample is lost with this probability; the receiver keeps the last one that arrived.
+struct DropFault {
+  double probability = 0.0;
+  std::uint64_t seed = 0;
+};
+
+/// The receiver keeps what arrived last before the fault.
+struct FreezeFault {};
+
+/// A sample is overtaken by its successor with this probability: it arrives one period later, after
+/// that one, and counts until the next arrives.
+struct ReorderFault {
+  double probability = 0.0;
+  std::uint64_t seed = 0;
+};
+
+/// Numbers added to a sample. `state`: all but `force`; `command`: `force` alone.
+struct SampleOffset {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< of quadrotor and load alike, m
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< of quadrotor and load alike, m/s
+  model::RodAngles rod;                                ///< rad, rad/s; the load moves accordingly
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();     ///< N
+};
+
+struct BiasFault {
+  SampleOffset offset;
+};
+
+/// Normally distributed, independent from step to step.
+struct NoiseFault {
+  SampleOffset deviation;  ///< standard deviations, ≥ 0
+  std::uint64_t seed = 0;
+};
+
+using FaultEffect =
+    std::variant<DelayFault, DropFault, FreezeFault, ReorderFault, BiasFault, NoiseFault>;
+
+/// A disturbance in simulation time: for steps whose time is in [from, to).
+struct Fault {
+  std::string kind;  ///< the YAML key: delay, drop, freeze, reorder, bias, noise
+  FaultEffect effect;
+  FaultChannel on = FaultChannel::kState;
+  int vehicle = 0;
+  std::int64_t from_ns = 0;
+  std::int64_t to_ns = 1'000'000'000'000'000;  ///< default: to the end
 };
 
 // --- controller --------------------------------------------------------------------------------
@@ -169,6 +261,7 @@ struct Scenario {
   Sync sync;
   Controller controller;
   std::vector<Stage> mission;
+  std::vector<Fault> faults;  ///< of one channel, in the order in which they act
   Record record;
 
   std::string text;    ///< the file's bytes
@@ -192,5 +285,10 @@ std::optional<std::int64_t> to_nanoseconds(double seconds);
 /// Puts another control period in force: the step becomes the smaller of the file's and `period_s`.
 /// @throws ConfigError as for the key `sync.period_s`, with `place` = "--period-s".
 void override_period(Scenario& scenario, double period_s);
+
+/// Puts another real-time factor in force.
+/// @throws ConfigError as for the key `sync.real_time_factor`, with `place` = "--rtf"; also in
+///   lockstep, which has none.
+void override_real_time_factor(Scenario& scenario, double factor);
 
 }  // namespace sls::config

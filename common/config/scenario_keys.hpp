@@ -3,12 +3,14 @@
 ///
 ///     map.key(presence, "key", field, rule);     one value, map or list of maps
 ///     map.choose(choice, {{value, {"key", …}}}); exactly one of several alternatives is there
+///     map.decide("key", field, describe_others); a required key whose value decides on other keys
 ///     map.by_default(field, value);              what holds if the file does not say
 #pragma once
 
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -32,6 +34,8 @@ inline constexpr double kPi = 3.14159265358979323846;
 inline constexpr NumberRule kFinite{"a finite number", [](double) { return true; }};
 inline constexpr NumberRule kPositive{"> 0", [](double x) { return x > 0.0; }};
 inline constexpr NumberRule kNotNegative{">= 0", [](double x) { return x >= 0.0; }};
+inline constexpr NumberRule kProbability{"from 0 to 1",
+                                         [](double x) { return x >= 0.0 && x <= 1.0; }};
 inline constexpr NumberRule kFullTurn{"radians from -pi to pi",
                                       [](double x) { return -kPi <= x && x <= kPi; }};
 inline constexpr NumberRule kHalfTurn{"radians from -pi/2 to pi/2",
@@ -65,14 +69,31 @@ inline constexpr TextRule kFolderName{
 inline constexpr TextRule kShortLabel{"1 to 32 printable ASCII characters", &is_short_label};
 inline constexpr TextRule kLaw{"qsf", [](std::string_view text) { return text == "qsf"; }};
 
-/// Bounds of a whole number or of a list's length.
+/// Bounds of a whole number.
 struct Range {
   int least;
   int most;
 };
 inline constexpr Range kControllers{1, 100};
 inline constexpr Range kRecorders{0, 100};
-inline constexpr Range kStages{1, 1000};
+inline constexpr Range kVehicles{0, 0};  // a scenario has one
+
+/// Bounds of a number that needs more digits than an int has.
+struct WideRange {
+  std::uint64_t least;
+  std::uint64_t most;
+};
+inline constexpr WideRange kSeeds{0,
+                                  9'223'372'036'854'775'807};  // what readers in any language hold
+
+/// Bounds of a list's length; `elements` names what it holds.
+struct ListRange {
+  int least;
+  int most;
+  const char* elements;
+};
+inline constexpr ListRange kStages{1, 1000, "stages"};
+inline constexpr ListRange kFaults{0, 1000, "faults"};
 
 template <class Enum>
 struct Name {
@@ -84,6 +105,20 @@ inline std::array<Name<Pendulum>, 2> names_of(Pendulum) {
 }
 inline std::array<Name<SyncMode>, 2> names_of(SyncMode) {
   return {{{"lockstep", SyncMode::kLockstep}, {"realtime", SyncMode::kRealtime}}};
+}
+inline std::array<Name<ControllerPolicy>, 4> names_of(ControllerPolicy) {
+  return {{{"wait", ControllerPolicy::kWait},
+           {"hold", ControllerPolicy::kHold},
+           {"failsafe", ControllerPolicy::kFailsafe},
+           {"stop", ControllerPolicy::kStop}}};
+}
+inline std::array<Name<RecorderPolicy>, 3> names_of(RecorderPolicy) {
+  return {{{"wait", RecorderPolicy::kWait},
+           {"go_on", RecorderPolicy::kGoOn},
+           {"stop", RecorderPolicy::kStop}}};
+}
+inline std::array<Name<FaultChannel>, 2> names_of(FaultChannel) {
+  return {{{"state", FaultChannel::kState}, {"command", FaultChannel::kCommand}}};
 }
 inline std::array<Name<StateWiring>, 2> names_of(StateWiring) {
   return {{{"correct", StateWiring::kCorrect}, {"gazebo_plugin", StateWiring::kGazeboPlugin}}};
@@ -153,13 +188,44 @@ void describe(Map& map, WaitFor& wait_for) {
   map.key(kOptional, "timeout_s", wait_for.timeout_s, kWait);
 }
 
+template <class Map, class Policy>
+void describe(Map& map, Absence<Policy>& absence, double patience_s) {
+  constexpr double kPromptly = 1.0;  // s
+  map.key(kOptional, "policy", absence.policy);
+  map.by_default(absence.deadline_s, absence.policy == Policy::kWait ? patience_s : kPromptly);
+  map.key(kOptional, "deadline_s", absence.deadline_s, kWait);
+}
+
+/// Patience with a server, of those who wait for it.
+struct ServerAbsence {
+  double& deadline_s;
+};
+template <class Map>
+void describe(Map& map, ServerAbsence& server) {
+  map.key(kOptional, "deadline_s", server.deadline_s, kWait);
+}
+
+template <class Map>
+void describe(Map& map, WaitPolicies& wait, double patience_s) {
+  ServerAbsence server{wait.server_deadline_s};
+  map.key(kOptional, "controller", wait.controller, patience_s);
+  map.key(kOptional, "recorder", wait.recorder, patience_s);
+  map.key(kOptional, "server", server);
+}
+
 template <class Map>
 void describe(Map& map, Sync& sync) {
   map.key(kOptional, "mode", sync.mode);
   map.key(kOptional, "period_s", sync.period_ns, kPositive);
   map.key(kOptional, "real_time_factor", sync.real_time_factor, kRate);
   map.key(kOptional, "take_over_s", sync.take_over_s, kWait);
+  map.key(kOptional, "max_hold_s", sync.max_hold_s, kNotNegative);
   map.key(kOptional, "wait_for", sync.wait_for);
+  const double patience_s = sync.wait_for.timeout_s;
+  map.by_default(sync.wait.controller.deadline_s, patience_s);
+  map.by_default(sync.wait.recorder.deadline_s, patience_s);
+  map.by_default(sync.wait.server_deadline_s, patience_s);
+  map.key(kOptional, "wait", sync.wait, patience_s);
 }
 
 // --- controller ----------------------------------------------------------------------------------
@@ -268,6 +334,103 @@ void describe(Map& map, Stage& stage) {
     map.key(kRequired, "until", as<LeaveWithin>(stage.leave));
 }
 
+// --- faults --------------------------------------------------------------------------------------
+
+template <class Map>
+void describe_effect(Map& map, DelayFault& delay, FaultChannel) {
+  map.key(kRequired, "by_s", delay.by_ns, kNotNegative);
+}
+
+template <class Map>
+void describe_effect(Map& map, DropFault& drop, FaultChannel) {
+  map.key(kRequired, "probability", drop.probability, kProbability);
+  map.key(kOptional, "seed", drop.seed, kSeeds);
+}
+
+template <class Map>
+void describe_effect(Map&, FreezeFault&, FaultChannel) {}
+
+template <class Map>
+void describe_effect(Map& map, ReorderFault& reorder, FaultChannel) {
+  map.key(kRequired, "probability", reorder.probability, kProbability);
+  map.key(kOptional, "seed", reorder.seed, kSeeds);
+}
+
+/// What the numbers of a bias or a noise must satisfy.
+struct OffsetRules {
+  NumberRule number;
+  NumberRule alpha;
+  NumberRule beta;
+};
+
+template <class Map>
+void describe_offset(Map& map, SampleOffset& offset, FaultChannel on, const OffsetRules& rules) {
+  if (on == FaultChannel::kCommand) {
+    map.key(kOptional, "force_n", offset.force, rules.number);
+    return;
+  }
+  map.key(kOptional, "position_m", offset.position, rules.number);
+  map.key(kOptional, "velocity_m_s", offset.velocity, rules.number);
+  map.key(kOptional, "alpha_rad", offset.rod.alpha, rules.alpha);
+  map.key(kOptional, "beta_rad", offset.rod.beta, rules.beta);
+  map.key(kOptional, "alpha_dot_rad_s", offset.rod.alpha_dot, rules.number);
+  map.key(kOptional, "beta_dot_rad_s", offset.rod.beta_dot, rules.number);
+}
+
+template <class Map>
+void describe_effect(Map& map, BiasFault& bias, FaultChannel on) {
+  describe_offset(map, bias.offset, on, {kFinite, kFullTurn, kHalfTurn});
+}
+
+template <class Map>
+void describe_effect(Map& map, NoiseFault& noise, FaultChannel on) {
+  map.key(kOptional, "seed", noise.seed, kSeeds);
+  describe_offset(map, noise.deviation, on, {kNotNegative, kNotNegative, kNotNegative});
+}
+
+/// The map under a fault's kind: the keys of its effect beside those that every fault has.
+template <class Effect>
+struct FaultBody {
+  Fault& fault;
+  Effect& effect;
+};
+
+template <class Map, class Effect>
+void describe(Map& map, FaultBody<Effect>& body) {
+  map.decide("on", body.fault.on, [&](FaultChannel on) { describe_effect(map, body.effect, on); });
+  map.key(kOptional, "vehicle", body.fault.vehicle, kVehicles);
+  map.key(kOptional, "from_s", body.fault.from_ns, kNotNegative);
+  map.key(kOptional, "to_s", body.fault.to_ns, kPositive);
+}
+
+template <class Effect, class Map>
+void describe_body(Map& map, Fault& fault) {
+  FaultBody<Effect> body{fault, as<Effect>(fault.effect)};
+  map.key(kRequired, fault.kind.c_str(), body);
+}
+
+template <class Map>
+void describe(Map& map, Fault& fault) {
+  map.choose(fault.kind, {{"delay", {"delay"}},
+                          {"drop", {"drop"}},
+                          {"freeze", {"freeze"}},
+                          {"reorder", {"reorder"}},
+                          {"bias", {"bias"}},
+                          {"noise", {"noise"}}});
+  if (fault.kind == "delay")
+    describe_body<DelayFault>(map, fault);
+  else if (fault.kind == "drop")
+    describe_body<DropFault>(map, fault);
+  else if (fault.kind == "freeze")
+    describe_body<FreezeFault>(map, fault);
+  else if (fault.kind == "reorder")
+    describe_body<ReorderFault>(map, fault);
+  else if (fault.kind == "bias")
+    describe_body<BiasFault>(map, fault);
+  else if (fault.kind == "noise")
+    describe_body<NoiseFault>(map, fault);
+}
+
 // --- the whole -----------------------------------------------------------------------------------
 
 template <class Map>
@@ -284,6 +447,7 @@ void describe(Map& map, Scenario& scenario) {
   map.by_default(scenario.controller.model, ControllerModel{scenario.vehicle, scenario.plant.air});
   map.key(kOptional, "controller", scenario.controller);
   map.key(kRequired, "mission", scenario.mission, kStages);
+  map.key(kOptional, "faults", scenario.faults, kFaults);
   map.key(kOptional, "record", scenario.record);
 }
 

@@ -68,6 +68,17 @@ double read_number(const Value& value) {
   return *number;
 }
 
+template <class Number, class Bounds>
+void read_whole_number(const Value& value, Number& number, const Bounds& range) {
+  const std::string& text = value.node.text;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  const bool whole = value.node.kind == YamlNode::Kind::kScalar && !value.node.quoted &&
+                     error == std::errc() && end == text.data() + text.size();
+  if (whole && number >= range.least && number <= range.most) return;
+  const std::string least = std::to_string(range.least), most = std::to_string(range.most);
+  value.fail_expecting(least == most ? least : "a whole number from " + least + " to " + most);
+}
+
 }  // namespace
 
 ConfigError Places::make_error_at(const std::string& path, const std::string& message) const {
@@ -116,8 +127,8 @@ void check_keys(const Value& value, const std::vector<std::string>& known) {
   }
 }
 
-int MapReader::find(const std::string& name) const {
-  const auto& keys = map_.node.keys;
+int find_key(const YamlNode& map, const std::string& name) {
+  const auto& keys = map.keys;
   const auto found =
       std::find_if(keys.begin(), keys.end(), [&](const YamlNode& key) { return key.text == name; });
   return found == keys.end() ? -1 : static_cast<int>(found - keys.begin());
@@ -140,13 +151,11 @@ void read_value(const Value& value, std::int64_t& nanoseconds, const NumberRule&
 }
 
 void read_value(const Value& value, int& number, const Range& range) {
-  const std::string& text = value.node.text;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  const bool whole = value.node.kind == YamlNode::Kind::kScalar && !value.node.quoted &&
-                     error == std::errc() && end == text.data() + text.size();
-  if (!whole || number < range.least || number > range.most)
-    value.fail_expecting("a whole number from " + std::to_string(range.least) + " to " +
-                         std::to_string(range.most));
+  read_whole_number(value, number, range);
+}
+
+void read_value(const Value& value, std::uint64_t& number, const WideRange& range) {
+  read_whole_number(value, number, range);
 }
 
 void read_value(const Value& value, bool& flag) {
@@ -162,18 +171,20 @@ void read_value(const Value& value, std::string& text, const TextRule& rule) {
   text = value.node.text;
 }
 
-void read_value(const Value& value, Eigen::Vector3d& vector) {
+void read_value(const Value& value, Eigen::Vector3d& vector) { read_value(value, vector, kFinite); }
+
+void read_value(const Value& value, Eigen::Vector3d& vector, const NumberRule& of_each) {
   if (value.node.kind != YamlNode::Kind::kList || value.node.items.size() != 3)
     value.fail_expecting("a list of three numbers");
-  for (int i = 0; i < 3; ++i) vector[i] = read_number(value.at(static_cast<std::size_t>(i)));
+  for (int i = 0; i < 3; ++i) read_value(value.at(static_cast<std::size_t>(i)), vector[i], of_each);
 }
 
-std::size_t read_list_length(const Value& value, const Range& range) {
+std::size_t read_list_length(const Value& value, const ListRange& range) {
   const std::size_t length = value.node.items.size();
   if (value.node.kind != YamlNode::Kind::kList || length < static_cast<std::size_t>(range.least) ||
       length > static_cast<std::size_t>(range.most))
     value.fail_expecting("a list of " + std::to_string(range.least) + " to " +
-                         std::to_string(range.most) + " stages");
+                         std::to_string(range.most) + " " + range.elements);
   return length;
 }
 

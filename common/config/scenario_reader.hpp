@@ -52,6 +52,8 @@ struct Value {
 /// A `Map` that only learns which keys there are.
 class KeyNames {
  public:
+  explicit KeyNames(const Value& map) : map_(map) {}
+
   template <class Field, class... Rule>
   void key(Presence, const char* name, Field&, const Rule&...) {
     add(name);
@@ -61,6 +63,9 @@ class KeyNames {
     for (const auto& alternative : alternatives)
       for (const char* name : alternative.keys) add(name);
   }
+  /// The others are those that go with the value in the file; without it, those of any value.
+  template <class Enum, class DescribeOthers>
+  void decide(const char* name, Enum& field, const DescribeOthers& describe_others);
   template <class Field>
   void by_default(Field&, const Field&) {}
 
@@ -71,8 +76,12 @@ class KeyNames {
     if (std::find(names_.begin(), names_.end(), name) == names_.end()) names_.push_back(name);
   }
 
+  const Value& map_;
   std::vector<std::string> names_;
 };
+
+/// Index of `name` among the keys of `map`, or −1.
+int find_key(const YamlNode& map, const std::string& name);
 
 /// @throws ConfigError unless `value` is a map with no other keys than `known`, each at most once.
 void check_keys(const Value& value, const std::vector<std::string>& known);
@@ -81,10 +90,12 @@ void check_keys(const Value& value, const std::vector<std::string>& known);
 void read_value(const Value& value, double& number, const NumberRule& rule);
 void read_value(const Value& value, std::int64_t& nanoseconds, const NumberRule& rule);
 void read_value(const Value& value, int& number, const Range& range);
+void read_value(const Value& value, std::uint64_t& number, const WideRange& range);
 void read_value(const Value& value, bool& flag);
 void read_value(const Value& value, std::string& text, const TextRule& rule);
 void read_value(const Value& value, Eigen::Vector3d& vector);
-std::size_t read_list_length(const Value& value, const Range& range);
+void read_value(const Value& value, Eigen::Vector3d& vector, const NumberRule& of_each);
+std::size_t read_list_length(const Value& value, const ListRange& range);
 
 template <class Enum>
 std::string join_names() {
@@ -117,20 +128,23 @@ class MapReader {
   template <class Choice>
   void choose(Choice& choice, std::initializer_list<Alternative<Choice>> alternatives);
 
+  template <class Enum, class DescribeOthers>
+  void decide(const char* name, Enum& field, const DescribeOthers& describe_others) {
+    key(kRequired, name, field);
+    describe_others(field);
+  }
+
   template <class Field>
   void by_default(Field& field, const Field& value) {
     field = value;
   }
 
  private:
-  /// Index of `name` among the keys, or −1.
-  int find(const std::string& name) const;
-
   const Value& map_;
 };
 
 template <class Element>
-void read_value(const Value& value, std::vector<Element>& list, const Range& range) {
+void read_value(const Value& value, std::vector<Element>& list, const ListRange& range) {
   list.assign(read_list_length(value, range), Element{});
   for (std::size_t i = 0; i < list.size(); ++i) read_value(value.at(i), list[i]);
 }
@@ -146,7 +160,7 @@ void read_value(const Value& value, Field& field, const Rule&... rule) {
     }
     value.fail_expecting(join_names<Field>());
   } else {
-    KeyNames keys;
+    KeyNames keys(value);
     describe(keys, field, rule...);
     check_keys(value, keys.names());
     MapReader reader(value);
@@ -156,7 +170,7 @@ void read_value(const Value& value, Field& field, const Rule&... rule) {
 
 template <class Field, class... Rule>
 void MapReader::key(Presence presence, const char* name, Field& field, const Rule&... rule) {
-  const int index = find(name);
+  const int index = find_key(map_.node, name);
   if (index >= 0) {
     const auto i = static_cast<std::size_t>(index);
     const Value value = map_.at(name, map_.node.items[i], map_.node.keys[i].line);
@@ -176,7 +190,7 @@ void MapReader::choose(Choice& choice, std::initializer_list<Alternative<Choice>
     std::string together, here;
     for (const char* name : alternative.keys) {
       together += (together.empty() ? "" : "+") + std::string(name);
-      if (here.empty() && find(name) >= 0) here = name;
+      if (here.empty() && find_key(map_.node, name) >= 0) here = name;
     }
     all += (all.empty() ? "" : ", ") + together;
     if (here.empty()) continue;
@@ -186,6 +200,17 @@ void MapReader::choose(Choice& choice, std::initializer_list<Alternative<Choice>
   }
   if (chosen != 1)
     map_.fail("expected exactly one of " + all + ", got " + (present.empty() ? "none" : present));
+}
+
+template <class Enum, class DescribeOthers>
+void KeyNames::decide(const char* name, Enum& field, const DescribeOthers& describe_others) {
+  add(name);
+  if (find_key(map_.node, name) >= 0) {
+    MapReader(map_).key(kRequired, name, field);
+    describe_others(field);
+  } else {
+    for (const auto& any : names_of(field)) describe_others(any.value);
+  }
 }
 
 }  // namespace sls::config

@@ -17,6 +17,7 @@ inline std::string to_yaml_value(std::int64_t nanoseconds) {
   return to_text(to_seconds(nanoseconds));
 }
 inline std::string to_yaml_value(int number) { return std::to_string(number); }
+inline std::string to_yaml_value(std::uint64_t number) { return std::to_string(number); }
 inline std::string to_yaml_value(bool flag) { return flag ? "true" : "false"; }
 inline std::string to_yaml_value(const std::string& text) {
   std::string quoted = "\"";
@@ -53,13 +54,18 @@ class MapWriter {
     if constexpr (kOnOneLine<Field>) {
       text_ += " " + to_yaml_value(field) + "\n";
     } else {
-      text_ += "\n";
       write_block(field, rule...);
     }
   }
 
   template <class Choice>
   void choose(Choice&, std::initializer_list<Alternative<Choice>>) {}
+
+  template <class Enum, class DescribeOthers>
+  void decide(const char* name, Enum& field, const DescribeOthers& describe_others) {
+    key(kRequired, name, field);
+    describe_others(field);
+  }
 
   template <class Field>
   void by_default(Field&, const Field&) {}
@@ -70,12 +76,14 @@ class MapWriter {
 
   template <class Struct, class... Rule>
   void write_block(Struct& fields, const Rule&... rule) {
+    text_ += "\n";
     MapWriter writer(text_, indentation_ + "  ");
     describe(writer, fields, rule...);
   }
 
   template <class Element>
-  void write_block(std::vector<Element>& list, const Range&) {
+  void write_block(std::vector<Element>& list, const ListRange&) {
+    text_ += list.empty() ? " []\n" : "\n";
     for (Element& element : list) {
       MapWriter writer(text_, indentation_ + "  - ", indentation_ + "    ");
       describe(writer, element);

@@ -134,6 +134,13 @@ TEST(InvalidTextTest, MoreThanThousandStagesAreRefused) {
             "file:9: mission: expected a list of 1 to 1000 stages, got a list of 1001");
 }
 
+TEST(InvalidTextTest, MoreThanThousandFaultsAreRefused) {
+  std::string text = std::string(kMinimalScenario) + "faults: [";
+  for (int i = 0; i <= 1000; ++i) text += "{},";
+  EXPECT_EQ(find_error(text + "]"),
+            "file:12: faults: expected a list of 0 to 1000 faults, got a list of 1001");
+}
+
 TEST(InvalidTextTest, EndlessNestingEndsInAnErrorAndNotInAnOverflow) {
   for (const std::string opening :
        {"[", "{", "- ", "? ", "{a: ", "[{", "&a [", "!a [", "'", "\""}) {

@@ -63,5 +63,29 @@ TEST(OverridePeriodTest, PeriodMustFitStepAndStages) {
             "--period-s: expected a divisor of mission[0].for_s (2), got 0.003");
 }
 
+TEST(OverridePeriodTest, PeriodMustFitTheDelaysOfFaults) {
+  const auto find_error_at = [](const std::string& by_s, double period_s) -> std::string {
+    Scenario scenario = parse_scenario(std::string(kMinimalScenario) +
+                                           "faults:\n  - freeze: { on: state }\n  - delay: { on: "
+                                           "state, by_s: " +
+                                           by_s + " }\n",
+                                       "file");
+    try {
+      override_period(scenario, period_s);
+    } catch (const ConfigError& error) {
+      EXPECT_EQ(scenario.sync.period_ns, 4'000'000) << "changed in spite of the error";
+      return error.what();
+    }
+    return "no error";
+  };
+  EXPECT_EQ(find_error_at("0.02", 0.002), "no error");
+  EXPECT_EQ(find_error_at("0.02", 0.008),
+            "--period-s: expected a divisor of faults[1].delay.by_s (0.02), got 0.008");
+  // A delay of 200 s is 50,000 periods of 4 ms, but 200,000 of 1 ms.
+  EXPECT_EQ(find_error_at("200", 0.001),
+            "--period-s: faults[1].delay.by_s: expected delays of one channel of at most 100000 "
+            "periods (100 s), got 200");
+}
+
 }  // namespace
 }  // namespace sls::config::test

@@ -49,7 +49,12 @@ sync:
   period_s: 0.002
   real_time_factor: 2.5
   take_over_s: 0.25
+  max_hold_s: 0.75
   wait_for: { controllers: 2, recorders: 0, timeout_s: 7.5 }
+  wait:
+    controller: { policy: hold, deadline_s: 0.5 }
+    recorder: { policy: go_on, deadline_s: 0.6 }
+    server: { deadline_s: 12 }
 controller:
   law: qsf
   gains:
@@ -72,6 +77,19 @@ mission:
     until: { within_m: 0.4, after_s: 5 }
   - rest_to_rest: { from_m: [1, 1, 1], to_m: [2, 2, 2], duration_s: 3 }
     for_s: 4
+faults:
+  - delay: { on: command, vehicle: 0, from_s: 1, to_s: 2, by_s: 0.02 }
+  - drop: { on: state, probability: 0.2, seed: 7, from_s: 4, to_s: 8 }
+  - freeze: { on: state, from_s: 5, to_s: 5.2 }
+  - reorder: { on: command, probability: 0.1, seed: 9223372036854775807 }
+  - bias:
+      { on: state, position_m: [0.1, 0.2, 0.3], velocity_m_s: [0.4, 0.5, 0.6], alpha_rad: 0.02,
+        beta_rad: -0.03, alpha_dot_rad_s: 0.04, beta_dot_rad_s: -0.05 }
+  - bias: { on: command, force_n: [0, 0, 1] }
+  - noise:
+      { on: state, seed: 3, position_m: [0.01, 0.02, 0.03], velocity_m_s: [0.04, 0.05, 0.06],
+        alpha_rad: 0.07, beta_rad: 0.08, alpha_dot_rad_s: 0.09, beta_dot_rad_s: 0.1 }
+  - noise: { force_n: [0.1, 0, 0], on: command }
 record: { flush_s: 0.05 }
 )";
 
@@ -112,6 +130,12 @@ TEST(ScenarioTest, ReadsEveryKeyOfSyncAndRecord) {
   EXPECT_EQ(scenario.sync.wait_for.controllers, 2);
   EXPECT_EQ(scenario.sync.wait_for.recorders, 0);
   EXPECT_EQ(scenario.sync.wait_for.timeout_s, 7.5);
+  EXPECT_EQ(scenario.sync.max_hold_s, 0.75);
+  EXPECT_EQ(scenario.sync.wait.controller.policy, ControllerPolicy::kHold);
+  EXPECT_EQ(scenario.sync.wait.controller.deadline_s, 0.5);
+  EXPECT_EQ(scenario.sync.wait.recorder.policy, RecorderPolicy::kGoOn);
+  EXPECT_EQ(scenario.sync.wait.recorder.deadline_s, 0.6);
+  EXPECT_EQ(scenario.sync.wait.server_deadline_s, 12.0);
   EXPECT_EQ(scenario.record.flush_s, 0.05);
 }
 
@@ -169,6 +193,96 @@ TEST(ScenarioTest, ReadsEveryKeyOfTheMission) {
   EXPECT_EQ(rest.duration_s, 3.0);
 }
 
+TEST(ScenarioTest, ReadsEveryKeyOfTheFaults) {
+  const auto faults = parse_scenario(kEveryKey, "file").faults;
+  ASSERT_EQ(faults.size(), 8u);
+  std::string kinds;
+  for (const Fault& fault : faults)
+    kinds += fault.kind + (fault.on == FaultChannel::kState ? " state, " : " command, ");
+  EXPECT_EQ(kinds,
+            "delay command, drop state, freeze state, reorder command, bias state, bias command, "
+            "noise state, noise command, ");
+  EXPECT_EQ(std::get<DelayFault>(faults[0].effect).by_ns, 20'000'000);
+  EXPECT_EQ(faults[0].vehicle, 0);
+  EXPECT_EQ(faults[0].from_ns, 1'000'000'000);
+  EXPECT_EQ(faults[0].to_ns, 2'000'000'000);
+  EXPECT_EQ(std::get<DropFault>(faults[1].effect).probability, 0.2);
+  EXPECT_EQ(std::get<DropFault>(faults[1].effect).seed, 7u);
+  EXPECT_TRUE(std::holds_alternative<FreezeFault>(faults[2].effect));
+  EXPECT_EQ(faults[2].to_ns, 5'200'000'000);
+  EXPECT_EQ(std::get<ReorderFault>(faults[3].effect).probability, 0.1);
+  EXPECT_EQ(std::get<ReorderFault>(faults[3].effect).seed, 9223372036854775807u);
+
+  const SampleOffset bias = std::get<BiasFault>(faults[4].effect).offset;
+  EXPECT_EQ(bias.position, Vector3d(0.1, 0.2, 0.3));
+  EXPECT_EQ(bias.velocity, Vector3d(0.4, 0.5, 0.6));
+  EXPECT_EQ(bias.rod.alpha, 0.02);
+  EXPECT_EQ(bias.rod.beta, -0.03);
+  EXPECT_EQ(bias.rod.alpha_dot, 0.04);
+  EXPECT_EQ(bias.rod.beta_dot, -0.05);
+  EXPECT_EQ(bias.force, Vector3d(0, 0, 0));
+  EXPECT_EQ(std::get<BiasFault>(faults[5].effect).offset.force, Vector3d(0, 0, 1));
+
+  const NoiseFault noise = std::get<NoiseFault>(faults[6].effect);
+  EXPECT_EQ(noise.seed, 3u);
+  EXPECT_EQ(noise.deviation.position, Vector3d(0.01, 0.02, 0.03));
+  EXPECT_EQ(noise.deviation.velocity, Vector3d(0.04, 0.05, 0.06));
+  EXPECT_EQ(noise.deviation.rod.alpha, 0.07);
+  EXPECT_EQ(noise.deviation.rod.beta, 0.08);
+  EXPECT_EQ(noise.deviation.rod.alpha_dot, 0.09);
+  EXPECT_EQ(noise.deviation.rod.beta_dot, 0.1);
+  EXPECT_EQ(std::get<NoiseFault>(faults[7].effect).deviation.force, Vector3d(0.1, 0, 0));
+  EXPECT_EQ(std::get<NoiseFault>(faults[7].effect).seed, 0u);
+}
+
+TEST(ScenarioTest, AFaultLastsFromStartToEndWhereTheFileIsSilent) {
+  const std::string text = std::string(kMinimalScenario) + "faults: [ { freeze: { on: state } } ]";
+  const Scenario scenario = parse_scenario(text, "file");
+  ASSERT_EQ(scenario.faults.size(), 1u);
+  EXPECT_EQ(scenario.faults[0].from_ns, 0);
+  // Later than any step: no time in a scenario is longer than 1e6 s.
+  EXPECT_EQ(scenario.faults[0].to_ns, 1'000'000'000'000'000);
+  EXPECT_EQ(scenario.faults[0].vehicle, 0);
+}
+
+TEST(ScenarioTest, AnEmptyListOfFaultsIsNoFault) {
+  EXPECT_TRUE(parse_scenario(std::string(kMinimalScenario) + "faults: []", "file").faults.empty());
+}
+
+/// Sync of the minimal scenario with this section.
+Sync parse_sync(const std::string& section) {
+  return parse_scenario(std::string(kMinimalScenario) + "sync: " + section, "file").sync;
+}
+
+TEST(ScenarioTest, PatienceIsTheStartsUnderWaitAndOneSecondUnderOtherPolicies) {
+  const Sync silent = parse_sync("{ wait_for: { timeout_s: 7 } }");
+  EXPECT_EQ(silent.wait.controller.policy, ControllerPolicy::kWait);
+  EXPECT_EQ(silent.wait.controller.deadline_s, 7.0);
+  EXPECT_EQ(silent.wait.recorder.policy, RecorderPolicy::kWait);
+  EXPECT_EQ(silent.wait.recorder.deadline_s, 7.0);
+  EXPECT_EQ(silent.wait.server_deadline_s, 7.0);
+
+  for (const char* policy : {"hold", "failsafe", "stop"}) {
+    const Sync sync = parse_sync("{ wait: { controller: { policy: " + std::string(policy) +
+                                 " } }, wait_for: { timeout_s: 7 } }");
+    EXPECT_EQ(sync.wait.controller.deadline_s, 1.0) << policy;
+    EXPECT_EQ(sync.wait.recorder.deadline_s, 7.0) << policy;
+    EXPECT_EQ(sync.wait.server_deadline_s, 7.0) << policy;
+  }
+  for (const char* policy : {"go_on", "stop"})
+    EXPECT_EQ(parse_sync("{ wait: { recorder: { policy: " + std::string(policy) + " } } }")
+                  .wait.recorder.deadline_s,
+              1.0)
+        << policy;
+
+  const Sync explicit_wait = parse_sync("{ wait: { controller: { policy: wait } } }");
+  EXPECT_EQ(explicit_wait.wait.controller.deadline_s, 30.0);
+  const Sync own = parse_sync("{ wait: { controller: { deadline_s: 3 }, server: {} } }");
+  EXPECT_EQ(own.wait.controller.policy, ControllerPolicy::kWait);
+  EXPECT_EQ(own.wait.controller.deadline_s, 3.0);
+  EXPECT_EQ(own.wait.server_deadline_s, 30.0);
+}
+
 TEST(ScenarioTest, LeavesTheDefaultsWhereTheFileIsSilent) {
   const Scenario scenario = parse_scenario(kMinimalScenario, "file");
   EXPECT_EQ(scenario.plant.pendulum, Pendulum::kIdeal);
@@ -177,6 +291,8 @@ TEST(ScenarioTest, LeavesTheDefaultsWhereTheFileIsSilent) {
   EXPECT_EQ(scenario.sync.mode, SyncMode::kLockstep);
   EXPECT_EQ(scenario.sync.period_ns, 4'000'000);
   EXPECT_EQ(scenario.sync.take_over_s, 0.1);
+  EXPECT_EQ(scenario.sync.max_hold_s, 0.5);
+  EXPECT_TRUE(scenario.faults.empty());
   EXPECT_EQ(scenario.sync.wait_for.controllers, 1);
   EXPECT_EQ(scenario.sync.wait_for.recorders, 1);
   EXPECT_EQ(std::get<LqrWeights>(scenario.controller.gains).horizontal, 10.0);

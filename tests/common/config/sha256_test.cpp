@@ -18,6 +18,17 @@ TEST(Sha256Test, AgreesWithPublishedVectors) {
             "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
 }
 
+TEST(Sha256Test, PiecesGiveTheHashOfTheWhole) {
+  for (const std::size_t piece : {1u, 3u, 64u, 1000u}) {
+    Sha256 hash;
+    const std::string whole(1'000'000, 'a');
+    for (std::size_t at = 0; at < whole.size(); at += piece)
+      hash.add(std::string_view(whole).substr(at, piece));
+    EXPECT_EQ(to_hex(hash.finish()),
+              "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
+  }
+}
+
 TEST(Sha256Test, ScenarioCarriesTheHashOfItsFilesBytes) {
   for (const auto& file : test::list_yaml_files("config/scenarios")) {
     const Scenario scenario = load_scenario(file);

@@ -92,11 +92,12 @@ void expect_mission(const Scenario& scenario, double z, Body body, const Vector3
 TEST(ShippedScenariosTest, AreThese) {
   std::set<std::string> names;
   for (const auto& file : list_yaml_files("config/scenarios")) names.insert(file.stem().string());
-  EXPECT_EQ(names, (std::set<std::string>{
-                       "figure_eight", "gazebo_correct_wiring", "gazebo_corrected", "gazebo_legacy",
-                       "integral_mass_error", "matlab_figure_eight", "matlab_setpoint_1",
-                       "matlab_setpoint_2", "matlab_setpoint_3", "mission", "rest_to_rest",
-                       "rigid_figure_eight", "rotor_drag", "setpoints", "short"}));
+  EXPECT_EQ(names,
+            (std::set<std::string>{"faulty_figure_eight", "figure_eight", "gazebo_correct_wiring",
+                                   "gazebo_corrected", "gazebo_legacy", "integral_mass_error",
+                                   "matlab_figure_eight", "matlab_setpoint_1", "matlab_setpoint_2",
+                                   "matlab_setpoint_3", "mission", "rest_to_rest",
+                                   "rigid_figure_eight", "rotor_drag", "setpoints", "short"}));
 }
 
 TEST(ShippedScenariosTest, ShareTimingAndBearTheirFilesName) {
@@ -241,6 +242,24 @@ TEST(ShippedScenariosTest, RotorDrag) {
   EXPECT_TRUE(scenario.controller.drag_feed_forward);
   ASSERT_EQ(scenario.mission.size(), 1u);
   expect_eight(scenario.mission[0], -0.5, 32);
+}
+
+TEST(ShippedScenariosTest, FaultyFigureEightShowsEveryKindOfFault) {
+  const Scenario scenario = load("faulty_figure_eight");
+  EXPECT_EQ(scenario.vehicle, kVehicle);
+  expect_lqr(scenario.controller.gains, 10, 5);
+  ASSERT_EQ(scenario.mission.size(), 1u);
+  expect_eight(scenario.mission[0], -0.5, 32);
+  std::set<std::string> kinds;
+  for (const Fault& fault : scenario.faults) kinds.insert(fault.kind);
+  EXPECT_EQ(kinds, (std::set<std::string>{"bias", "delay", "drop", "freeze", "noise", "reorder"}));
+}
+
+TEST(ShippedScenariosTest, OnlyTheFaultyOneHasFaults) {
+  for (const auto& file : list_yaml_files("config/scenarios")) {
+    const Scenario scenario = load_scenario(file);
+    EXPECT_EQ(scenario.faults.empty(), scenario.name != "faulty_figure_eight") << file;
+  }
 }
 
 TEST(ShippedScenariosTest, Short) {

@@ -20,12 +20,20 @@ bool are_equal(const Plant& a, const Plant& b) {
          a.air == b.air && a.disturbance_W == b.disturbance_W;
 }
 
+template <class Policy>
+bool are_equal(const Absence<Policy>& a, const Absence<Policy>& b) {
+  return a.policy == b.policy && a.deadline_s == b.deadline_s;
+}
+
 bool are_equal(const Sync& a, const Sync& b) {
   return a.mode == b.mode && a.period_ns == b.period_ns &&
          a.real_time_factor == b.real_time_factor && a.take_over_s == b.take_over_s &&
          a.wait_for.controllers == b.wait_for.controllers &&
          a.wait_for.recorders == b.wait_for.recorders &&
-         a.wait_for.timeout_s == b.wait_for.timeout_s;
+         a.wait_for.timeout_s == b.wait_for.timeout_s && a.max_hold_s == b.max_hold_s &&
+         are_equal(a.wait.controller, b.wait.controller) &&
+         are_equal(a.wait.recorder, b.wait.recorder) &&
+         a.wait.server_deadline_s == b.wait.server_deadline_s;
 }
 
 bool are_equal(const AxisGains& a, const AxisGains& b) {
@@ -76,6 +84,40 @@ bool are_equal(const LeaveCondition& a, const LeaveCondition& b) {
 bool are_equal(const Stage& a, const Stage& b) {
   return a.kind == b.kind && a.name == b.name && are_equal(a.reference, b.reference) &&
          are_equal(a.leave, b.leave);
+}
+
+bool are_equal(const model::RodAngles& a, const model::RodAngles& b) {
+  return a.alpha == b.alpha && a.beta == b.beta && a.alpha_dot == b.alpha_dot &&
+         a.beta_dot == b.beta_dot;
+}
+
+bool are_equal(const SampleOffset& a, const SampleOffset& b) {
+  return a.position == b.position && a.velocity == b.velocity && are_equal(a.rod, b.rod) &&
+         a.force == b.force;
+}
+
+bool are_equal(const DelayFault& a, const DelayFault& b) { return a.by_ns == b.by_ns; }
+bool are_equal(const DropFault& a, const DropFault& b) {
+  return a.probability == b.probability && a.seed == b.seed;
+}
+bool are_equal(const FreezeFault&, const FreezeFault&) { return true; }
+bool are_equal(const ReorderFault& a, const ReorderFault& b) {
+  return a.probability == b.probability && a.seed == b.seed;
+}
+bool are_equal(const BiasFault& a, const BiasFault& b) { return are_equal(a.offset, b.offset); }
+bool are_equal(const NoiseFault& a, const NoiseFault& b) {
+  return are_equal(a.deviation, b.deviation) && a.seed == b.seed;
+}
+
+bool are_equal(const Fault& a, const Fault& b) {
+  if (a.effect.index() != b.effect.index()) return false;
+  const bool same_effect = std::visit(
+      [&](const auto& effect) {
+        return are_equal(effect, std::get<std::decay_t<decltype(effect)>>(b.effect));
+      },
+      a.effect);
+  return same_effect && a.kind == b.kind && a.on == b.on && a.vehicle == b.vehicle &&
+         a.from_ns == b.from_ns && a.to_ns == b.to_ns;
 }
 
 /// Numbers of every size, most of them with all their digits in use.
@@ -140,6 +182,12 @@ Sync make_random_sync(Dice& dice, std::int64_t step_ns) {
   sync.wait_for.controllers = dice.roll(1, 100);
   sync.wait_for.recorders = dice.roll(0, 100);
   sync.wait_for.timeout_s = dice.between(1e-3, 1e6);
+  sync.max_hold_s = dice.toss() ? 0.0 : dice.positive();
+  sync.wait.controller.policy = static_cast<ControllerPolicy>(dice.roll(0, 3));
+  sync.wait.controller.deadline_s = dice.between(1e-3, 1e6);
+  sync.wait.recorder.policy = static_cast<RecorderPolicy>(dice.roll(0, 2));
+  sync.wait.recorder.deadline_s = dice.between(1e-3, 1e6);
+  sync.wait.server_deadline_s = dice.between(1e-3, 1e6);
   return sync;
 }
 
@@ -194,6 +242,41 @@ Stage make_random_stage(Dice& dice, std::int64_t period_ns) {
   return stage;
 }
 
+/// Numbers for the keys that `on` allows, some of them 0; standard deviations where not
+/// `is_signed`.
+SampleOffset make_random_offset(Dice& dice, FaultChannel on, bool is_signed) {
+  const auto number = [&] { return is_signed ? dice.any() : std::abs(dice.any()); };
+  const auto angle = [&] { return is_signed ? dice.between(-1.57, 1.57) : dice.between(0, 1.57); };
+  const auto vector = [&]() -> Eigen::Vector3d { return {dice.positive(), number(), number()}; };
+  SampleOffset offset;
+  if (on == FaultChannel::kCommand) {
+    offset.force = vector();
+    return offset;
+  }
+  if (dice.toss()) offset.velocity = vector();
+  if (dice.toss()) offset.position = vector();
+  offset.rod = {angle(), dice.toss() ? 0.0 : angle(), number(), dice.positive()};
+  return offset;
+}
+
+Fault make_random_fault(Dice& dice, std::int64_t period_ns) {
+  static const char* const kKinds[] = {"delay", "drop", "freeze", "reorder", "bias", "noise"};
+  const auto seed = [&] { return static_cast<std::uint64_t>(dice.nanoseconds(0, INT64_MAX)); };
+  Fault fault;
+  const int kind = dice.roll(0, 5);
+  fault.kind = kKinds[kind];
+  fault.on = dice.toss() ? FaultChannel::kState : FaultChannel::kCommand;
+  if (kind == 0) fault.effect = DelayFault{period_ns * dice.roll(0, 10'000)};
+  if (kind == 1) fault.effect = DropFault{dice.between(0.0, 1.0), seed()};
+  if (kind == 2) fault.effect = FreezeFault{};
+  if (kind == 3) fault.effect = ReorderFault{dice.between(0.0, 1.0), seed()};
+  if (kind == 4) fault.effect = BiasFault{make_random_offset(dice, fault.on, true)};
+  if (kind == 5) fault.effect = NoiseFault{make_random_offset(dice, fault.on, false), seed()};
+  if (dice.toss()) fault.from_ns = dice.nanoseconds(1, 400'000'000'000'000);
+  if (dice.toss()) fault.to_ns = fault.from_ns + dice.nanoseconds(1, 400'000'000'000'000);
+  return fault;
+}
+
 }  // namespace
 
 const char* const kMinimalScenario =
@@ -214,6 +297,8 @@ bool are_equal(const Scenario& a, const Scenario& b) {
          are_equal(a.sync, b.sync) && are_equal(a.controller, b.controller) &&
          std::equal(a.mission.begin(), a.mission.end(), b.mission.begin(), b.mission.end(),
                     [](const Stage& x, const Stage& y) { return are_equal(x, y); }) &&
+         std::equal(a.faults.begin(), a.faults.end(), b.faults.begin(), b.faults.end(),
+                    [](const Fault& x, const Fault& y) { return are_equal(x, y); }) &&
          a.record.flush_s == b.record.flush_s;
 }
 
@@ -227,6 +312,8 @@ Scenario make_random_scenario(std::mt19937_64& random) {
   scenario.controller = make_random_controller(dice);
   for (int left = dice.roll(1, 12); left > 0; --left)
     scenario.mission.push_back(make_random_stage(dice, scenario.sync.period_ns));
+  for (int left = dice.roll(0, 9); left > 0; --left)
+    scenario.faults.push_back(make_random_fault(dice, scenario.sync.period_ns));
   scenario.record.flush_s = dice.between(1e-6, 0.2);
   if (dice.roll(0, 4) == 0) {
     scenario.plant.pendulum = Pendulum::kRigid;

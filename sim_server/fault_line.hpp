@@ -1,0 +1,34 @@
+/// The scenario's faults of one vehicle, in simulation time. A pure function of scenario and steps:
+/// same seed, same bytes, however fast the host runs. Semantics: README.md. No network here.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "common/config/scenario.hpp"
+#include "common/model/state.hpp"
+
+namespace sls::sim {
+
+class FaultLine {
+ public:
+  /// Keeps the faults of `scenario` that concern `vehicle_id`.
+  FaultLine(const config::Scenario& scenario, std::uint32_t vehicle_id);
+  ~FaultLine();
+  FaultLine(FaultLine&&) noexcept;
+
+  /// What the controllers measure at `step`. Call once per step, in order, from step 0.
+  model::SlungLoadState measure(std::uint64_t step, const model::SlungLoadState& truth);
+
+  /// The force (N, in W) that acts on the quadrotor over [step, step + 1) where `f_Q_W` was meant
+  /// to. Call once per step, in order, from step 0.
+  Eigen::Vector3d actuate(std::uint64_t step, const Eigen::Vector3d& f_Q_W);
+
+ private:
+  struct Channels;
+  std::unique_ptr<Channels> channels_;
+};
+
+}  // namespace sls::sim
