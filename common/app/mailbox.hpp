@@ -41,6 +41,12 @@ class Mailbox {
     return item;
   }
 
+  /// Waits until there is an item, or until `deadline`.
+  void wait(std::chrono::steady_clock::time_point deadline) {
+    std::unique_lock lock(mutex_);
+    filled_.wait_until(lock, deadline, [this] { return !items_.empty(); });
+  }
+
   /// All items there are, oldest first, without waiting. A thread that can afford to look only now
   /// and then spares everybody a wake-up per item.
   std::deque<T> take_all() {

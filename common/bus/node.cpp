@@ -18,12 +18,14 @@
 #include <fastdds/dds/topic/Topic.hpp>
 
 #include <algorithm>
+#include <atomic>
 #include <cstdlib>
 #include <map>
 #include <mutex>
 #include <utility>
 
 #include "common/bus/qos_file.hpp"
+#include "common/bus/stale_segments.hpp"
 #include "common/config/config_error.hpp"
 
 namespace sls::bus {
@@ -137,6 +139,12 @@ struct Node::Impl {
       throw_unknown_profile(kParticipantProfile);
     qos.name(name.c_str());
     LogCollector::clear();
+    remove_stale_segments();
+    auto& wire = qos.wire_protocol();
+    if (wire.participant_id < 0)
+      wire.participant_id = choose_participant_id(
+          {wire.port.portBase + wire.port.domainIDGain * domain + wire.port.offsetd1,
+           wire.port.participantIDGain});
     participant = factory->create_participant(static_cast<std::uint32_t>(domain), qos);
     if (participant)
       publisher = participant->create_publisher(dds::PUBLISHER_QOS_DEFAULT),
@@ -181,6 +189,21 @@ struct Node::Impl {
 Node::Node(const std::filesystem::path& qos_file, int domain, const std::string& name)
     : impl_(std::make_unique<Impl>(qos_file, domain, name)) {}
 Node::~Node() = default;
+
+const char* Node::choose_writer_profile(const char* profile, const char* fallback) const {
+  dds::DataWriterQos qos;
+  return impl_->publisher->get_datawriter_qos_from_profile(profile, qos) == ReturnCode_t::RETCODE_OK
+             ? profile
+             : fallback;
+}
+
+const char* Node::choose_reader_profile(const char* profile, const char* fallback) const {
+  dds::DataReaderQos qos;
+  return impl_->subscriber->get_datareader_qos_from_profile(profile, qos) ==
+                 ReturnCode_t::RETCODE_OK
+             ? profile
+             : fallback;
+}
 
 PeerId Node::id() const { return to_peer(impl_->participant->get_instance_handle()); }
 
@@ -242,7 +265,13 @@ struct AnyReader::Impl : dds::DataReaderListener {
                                const dds::SubscriptionMatchedStatus& status) override {
     peers.update(status.last_publication_handle, status.current_count_change);
   }
+  void on_requested_deadline_missed(dds::DataReader*,
+                                    const dds::RequestedDeadlineMissedStatus& status) override {
+    missed_deadlines = status.total_count;
+  }
   MatchedPeers peers;
+  std::atomic<std::uint64_t> missed_deadlines{0};
+  std::optional<std::chrono::nanoseconds> lifespan;
   void* sample = nullptr;
   Take take;
   dds::Subscriber* subscriber = nullptr;
@@ -260,6 +289,9 @@ AnyReader::AnyReader(Node& node, const char* topic, const char* profile, void* t
   dds::DataReaderQos qos;
   if (impl_->subscriber->get_datareader_qos_from_profile(profile, qos) != ReturnCode_t::RETCODE_OK)
     node.impl().throw_unknown_profile(profile);
+  const auto& lifespan = qos.lifespan().duration;
+  if (!(lifespan == eprosima::fastrtps::c_TimeInfinite))
+    impl_->lifespan = std::chrono::nanoseconds(lifespan.to_ns());
   LogCollector::clear();
   impl_->reader = impl_->subscriber->create_datareader(dds_topic, qos, impl_.get());
   if (!impl_->reader)
@@ -274,6 +306,8 @@ AnyReader::~AnyReader() {
 }
 
 std::set<PeerId> AnyReader::matched() const { return impl_->peers.peers(); }
+std::uint64_t AnyReader::missed_deadlines() const { return impl_->missed_deadlines; }
+std::optional<std::chrono::nanoseconds> AnyReader::lifespan() const { return impl_->lifespan; }
 
 template <>
 void* make_type_support<VehicleState>() {
@@ -298,6 +332,14 @@ void* make_type_support<Parameters>() {
 template <>
 void* make_type_support<SimStatus>() {
   return static_cast<dds::TopicDataType*>(new SimStatusPubSubType);
+}
+template <>
+void* make_type_support<SimControl>() {
+  return static_cast<dds::TopicDataType*>(new SimControlPubSubType);
+}
+template <>
+void* make_type_support<SimControlReply>() {
+  return static_cast<dds::TopicDataType*>(new SimControlReplyPubSubType);
 }
 
 }  // namespace detail

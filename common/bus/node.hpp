@@ -3,9 +3,11 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <set>
 #include <stdexcept>
 #include <string>
@@ -35,6 +37,10 @@ class Node {
   Node& operator=(const Node&) = delete;
 
   PeerId id() const;
+
+  /// `profile` if the QoS file has one of that name, else `fallback`.
+  const char* choose_writer_profile(const char* profile, const char* fallback) const;
+  const char* choose_reader_profile(const char* profile, const char* fallback) const;
 
   struct Impl;
   Impl& impl() { return *impl_; }
@@ -71,6 +77,8 @@ class AnyReader {
             Take take);
   ~AnyReader();
   std::set<PeerId> matched() const;
+  std::uint64_t missed_deadlines() const;
+  std::optional<std::chrono::nanoseconds> lifespan() const;
 
  private:
   struct Impl;
@@ -82,11 +90,11 @@ class AnyReader {
 template <class Message>
 class Writer {
  public:
-  explicit Writer(Node& node)
-      : writer_(
-            node, Topic<Message>::kName,
-            Topic<Message>::kFlow == Flow::kStream ? kStreamWriterProfile : kLatchedWriterProfile,
-            detail::make_type_support<Message>()) {}
+  /// With the profile of the topic's flow, or `profile`.
+  explicit Writer(Node& node, const char* profile = Topic<Message>::kFlow == Flow::kStream
+                                                        ? kStreamWriterProfile
+                                                        : kLatchedWriterProfile)
+      : writer_(node, Topic<Message>::kName, profile, detail::make_type_support<Message>()) {}
 
   /// Hands `message` to the middleware; may block while a history is full, so it has no place in a
   /// reader's handler (README.md, trap 4).
@@ -123,6 +131,12 @@ class Reader {
 
   /// Participants with a writer of this topic that this reader hears.
   std::set<PeerId> matched() const { return reader_.matched(); }
+
+  /// Times no sample came for the DEADLINE of the reader's profile.
+  std::uint64_t missed_deadlines() const { return reader_.missed_deadlines(); }
+
+  /// LIFESPAN of the reader's profile; nothing where it is infinite.
+  std::optional<std::chrono::nanoseconds> lifespan() const { return reader_.lifespan(); }
 
  private:
   std::unique_ptr<Message> buffer_ = std::make_unique<Message>();

@@ -1,5 +1,6 @@
 #include "common/bus/participants.hpp"
 
+#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -12,7 +13,7 @@ namespace sls::bus {
 ParticipantDirectory::ParticipantDirectory(Node& node)
     : reader_(node, kLatchedReaderProfile, [this](const Participant& sample, const PeerId& sender) {
         const std::lock_guard lock(mutex_);
-        last_[sender] = sample;
+        last_[sender] = {sample, std::chrono::steady_clock::now()};
         version_.fetch_add(1, std::memory_order_release);
       }) {}
 
@@ -21,10 +22,20 @@ std::vector<ParticipantDirectory::Entry> ParticipantDirectory::find(ParticipantR
   const auto present = reader_.matched();
   const std::lock_guard lock(mutex_);
   std::vector<Entry> found;
-  for (const auto& [peer, announcement] : last_)
+  for (const auto& [peer, heard] : last_) {
+    const Participant& announcement = heard.announcement;
     if (announcement.role() == role && announcement.run_id() == run_id && present.count(peer) > 0)
-      found.push_back({peer, announcement});
+      found.push_back({peer, announcement, heard.time});
+  }
   return found;
+}
+
+int ParticipantDirectory::count_done(ParticipantRole role, std::uint64_t run_id) const {
+  const std::lock_guard lock(mutex_);
+  return static_cast<int>(std::count_if(last_.begin(), last_.end(), [&](const auto& item) {
+    const Participant& announcement = item.second.announcement;
+    return announcement.role() == role && announcement.run_id() == run_id && announcement.done();
+  }));
 }
 
 bool are_recorders_done(const std::vector<ParticipantDirectory::Entry>& recorders) {
@@ -33,13 +44,26 @@ bool are_recorders_done(const std::vector<ParticipantDirectory::Entry>& recorder
       [](const ParticipantDirectory::Entry& entry) { return entry.announcement.done(); });
 }
 
-void wait_for_recorders_to_end(const ParticipantDirectory& participants, std::uint64_t run_id) {
-  constexpr auto kLongest = std::chrono::seconds(10);
+void wait_for_recorders_to_end(const ParticipantDirectory& participants, std::uint64_t run_id,
+                               int expected) {
+  constexpr double kLongest = 10.0;  // s
   constexpr auto kPollTime = std::chrono::milliseconds(20);
-  const auto give_up = std::chrono::steady_clock::now() + kLongest;
-  while (!are_recorders_done(participants.find(ROLE_RECORDER, run_id)) &&
-         std::chrono::steady_clock::now() < give_up)
+  app::Wait wait(kLongest);
+  while (!wait.is_over()) {
+    const auto recorders = participants.find(ROLE_RECORDER, run_id);
+    const int missing = expected - participants.count_done(ROLE_RECORDER, run_id);
+    if (are_recorders_done(recorders) && missing <= 0) return;
+    if (wait.is_report_due()) {
+      std::string names;
+      for (const auto& entry : recorders)
+        if (!entry.announcement.done())
+          names += fmt::format(" '{}' on {}", entry.announcement.name().c_str(),
+                               entry.announcement.host().c_str());
+      spdlog::info("waiting for: recorder{} to finish ({:.0f} s left)",
+                   names.empty() ? " (gone)" : names, wait.seconds_left());
+    }
     std::this_thread::sleep_for(kPollTime);
+  }
 }
 
 ServerDirectory::ServerDirectory(Node& node, std::function<void(const SimStatus&)> on_status)
@@ -53,7 +77,7 @@ ServerDirectory::ServerDirectory(Node& node, std::function<void(const SimStatus&
       status_reader_(node, kLatchedReaderProfile, [this](const SimStatus& sample, const PeerId&) {
         {
           const std::lock_guard lock(mutex_);
-          status_[sample.run_id()] = sample;
+          status_[sample.run_id()] = {sample, std::chrono::steady_clock::now()};
         }
         if (on_status_) on_status_(sample);
       }) {}
@@ -66,7 +90,7 @@ std::vector<Run> ServerDirectory::runs() const {
     if (server == self_ || present.count(server) == 0) continue;
     const auto status = status_.find(parameters.run_id());
     runs.push_back({server, parameters,
-                    status == status_.end() ? std::nullopt : std::optional(status->second)});
+                    status == status_.end() ? std::nullopt : std::optional(status->second.status)});
   }
   return runs;
 }
@@ -87,16 +111,53 @@ std::optional<Run> ServerDirectory::find_joinable(std::uint32_t vehicle_id) cons
 std::optional<SimStatus> ServerDirectory::find_status(std::uint64_t run_id) const {
   const std::lock_guard lock(mutex_);
   const auto status = status_.find(run_id);
-  return status == status_.end() ? std::nullopt : std::optional(status->second);
+  return status == status_.end() ? std::nullopt : std::optional(status->second.status);
+}
+
+std::optional<std::chrono::steady_clock::time_point> ServerDirectory::find_last_heard(
+    std::uint64_t run_id) const {
+  const std::lock_guard lock(mutex_);
+  const auto status = status_.find(run_id);
+  return status == status_.end() ? std::nullopt : std::optional(status->second.time);
 }
 
 bool ServerDirectory::is_present(const PeerId& server) const {
   return parameters_reader_.matched().count(server) > 0;
 }
 
-int calc_progress(const std::optional<SimStatus>& status) {
-  if (!status) return 0;
-  switch (status->phase()) {
+ServerWatch::ServerWatch(const ServerDirectory& servers, const Run& run, double deadline_s)
+    : servers_(servers),
+      server_(run.server),
+      run_id_(run.parameters.run_id()),
+      deadline_s_(deadline_s),
+      heard_(Clock::now()) {}
+
+ServerWatch::Finding ServerWatch::look() {
+  constexpr auto kQuietTime = std::chrono::seconds(1);
+  heard_ = std::max(heard_, servers_.find_last_heard(run_id_).value_or(heard_));
+  if (servers_.is_present(server_) && Clock::now() - heard_ < kQuietTime) {
+    if (is_reported_) spdlog::info("the server of run {:016x} is back", run_id_);
+    wait_.reset();
+    is_reported_ = false;
+    return Finding::kThere;
+  }
+  if (!wait_) wait_.emplace(deadline_s_, Clock::duration::zero());
+  if (wait_->is_over()) return Finding::kLost;
+  if (wait_->is_report_due()) {
+    spdlog::warn("waiting for: {} ({:.0f} s left)", describe(), wait_->seconds_left());
+    is_reported_ = true;
+  }
+  return Finding::kSilent;
+}
+
+std::string ServerWatch::describe() const {
+  const double silence_s = std::chrono::duration<double>(Clock::now() - heard_).count();
+  return fmt::format("server of run {:016x} ({}silent for {:.1f} s)", run_id_,
+                     servers_.is_present(server_) ? "" : "gone, ", silence_s);
+}
+
+int calc_progress(RunPhase phase) {
+  switch (phase) {
     case PHASE_WAITING:
       return 1;
     case PHASE_RUNNING:
@@ -104,9 +165,14 @@ int calc_progress(const std::optional<SimStatus>& status) {
       return 2;
     case PHASE_FINISHED:
     case PHASE_FAILED:
+    case PHASE_RESET:
       break;
   }
   return -1;
+}
+
+int calc_progress(const std::optional<SimStatus>& status) {
+  return status ? calc_progress(status->phase()) : 0;
 }
 
 bool serves_vehicle(const Parameters& parameters, std::uint32_t vehicle_id) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -11,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "common/app/wait.hpp"
 #include "common/bus/node.hpp"
 
 namespace sls::bus {
@@ -23,17 +25,26 @@ class ParticipantDirectory {
   struct Entry {
     PeerId peer;
     Participant announcement;
+    std::chrono::steady_clock::time_point heard;  ///< when it came
   };
 
   /// Present participants of `role` that serve run `run_id`.
   std::vector<Entry> find(ParticipantRole role, std::uint64_t run_id) const;
+
+  /// Participants of `role` that have said they are done with run `run_id`, also those that have
+  /// left since.
+  int count_done(ParticipantRole role, std::uint64_t run_id) const;
 
   /// Changes with every announcement (not with departures: ask again now and then).
   std::uint64_t version() const { return version_.load(std::memory_order_acquire); }
 
  private:
   mutable std::mutex mutex_;
-  std::map<PeerId, Participant> last_;
+  struct Heard {
+    Participant announcement;
+    std::chrono::steady_clock::time_point time;
+  };
+  std::map<PeerId, Heard> last_;
   std::atomic<std::uint64_t> version_{0};
   Reader<Participant> reader_;
 };
@@ -41,9 +52,10 @@ class ParticipantDirectory {
 /// True when every one of `recorders` says it is done.
 bool are_recorders_done(const std::vector<ParticipantDirectory::Entry>& recorders);
 
-/// Waits until the recorders of run `run_id` are done, at most 10 s: until then server and clients
-/// must keep their writers.
-void wait_for_recorders_to_end(const ParticipantDirectory& participants, std::uint64_t run_id);
+/// Waits until the recorders of run `run_id` that are there, and `expected` at least, are done, at
+/// most 10 s: until then server and clients must keep their writers. Says for whom it waits.
+void wait_for_recorders_to_end(const ParticipantDirectory& participants, std::uint64_t run_id,
+                               int expected);
 
 /// A server's run as its samples describe it.
 struct Run {
@@ -70,17 +82,51 @@ class ServerDirectory {
 
   bool is_present(const PeerId& server) const;
 
+  /// When the last status of run `run_id` came; nothing before the first.
+  std::optional<std::chrono::steady_clock::time_point> find_last_heard(std::uint64_t run_id) const;
+
  private:
   const PeerId self_;
   const std::function<void(const SimStatus&)> on_status_;
   mutable std::mutex mutex_;
   std::map<PeerId, Parameters> parameters_;
-  std::map<std::uint64_t, SimStatus> status_;  // by run_id
+  struct HeardStatus {
+    SimStatus status;
+    std::chrono::steady_clock::time_point time;
+  };
+  std::map<std::uint64_t, HeardStatus> status_;  // by run_id
   Reader<Parameters> parameters_reader_;
   Reader<SimStatus> status_reader_;
 };
 
+/// Patience with the server of a run, which publishes a status at least every 0.5 s: says within
+/// 1 s and every 5 s that it is silent, and when it is back.
+class ServerWatch {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  /// Watches `run` from now on; gives its server up after `deadline_s` of silence.
+  ServerWatch(const ServerDirectory& servers, const Run& run, double deadline_s);
+
+  enum class Finding { kThere, kSilent, kLost };
+  Finding look();
+
+  /// For messages: "the server of run … is gone" or "… silent for 3.1 s".
+  std::string describe() const;
+
+ private:
+  const ServerDirectory& servers_;
+  const PeerId server_;
+  const std::uint64_t run_id_;
+  const double deadline_s_;
+  Clock::time_point heard_;
+  std::optional<app::Wait> wait_;  // while it is silent
+  bool is_reported_ = false;
+};
+
 /// Position of a phase on the way waiting → running → finished/failed.
+int calc_progress(RunPhase phase);
+/// The same of a run that may not have a status yet (0).
 int calc_progress(const std::optional<SimStatus>& status);
 
 /// True where `vehicle_id` is among `parameters`' vehicles.

@@ -223,7 +223,7 @@ std::map<std::string, std::string> read_endpoint_profiles(const fs::path& file) 
 
 TEST(ShippedQosFilesTest, WritersAndReadersBehaveAlikeOverEveryTransport) {
   const auto reference = read_endpoint_profiles(kConfig / "qos/default.xml");
-  EXPECT_EQ(reference.size(), 5u);
+  EXPECT_EQ(reference.size(), 7u);
   EXPECT_EQ(read_endpoint_profiles(kConfig / "qos/udp.xml"), reference);
 }
 

@@ -1,0 +1,93 @@
+#include "common/bus/stale_segments.hpp"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <string>
+#include <string_view>
+#include <system_error>
+
+namespace sls::bus {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kPrefix = "fastrtps_", kLock = "_el";
+
+/// A segment is created a moment before its lock is taken.
+constexpr auto kCreationTime = std::chrono::seconds(10);
+
+/// Beyond, the ports of one domain would run into those of the next.
+constexpr int kMaxParticipants = 110;
+
+/// "fastrtps_", sixteen hexadecimal digits, "_el": the lock file of a participant's segment.
+bool is_segment_lock(std::string_view name) {
+  constexpr std::size_t kDigits = 16;
+  if (name.size() != kPrefix.size() + kDigits + kLock.size()) return false;
+  if (name.substr(0, kPrefix.size()) != kPrefix) return false;
+  if (name.substr(name.size() - kLock.size()) != kLock) return false;
+  const auto digits = name.substr(kPrefix.size(), kDigits);
+  return digits.find_first_not_of("0123456789abcdef") == digits.npos;
+}
+
+/// Holds a lock file's lock while it lives, if nobody else does.
+class Lock {
+ public:
+  explicit Lock(const fs::path& file)
+      : descriptor_(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW)),
+        is_held_(descriptor_ >= 0 && ::flock(descriptor_, LOCK_EX | LOCK_NB) == 0) {}
+  ~Lock() {
+    if (descriptor_ >= 0) ::close(descriptor_);
+  }
+  Lock(const Lock&) = delete;
+  Lock& operator=(const Lock&) = delete;
+  bool is_held() const { return is_held_; }
+
+ private:
+  const int descriptor_;
+  const bool is_held_;
+};
+
+enum class PortState { kFree, kInUse, kStale };
+
+PortState find_state(int port, const fs::path& folder) {
+  const fs::path file =
+      folder / (std::string(kPrefix) + "port" + std::to_string(port) + std::string(kLock));
+  std::error_code error;
+  if (!fs::exists(file, error)) return PortState::kFree;
+  return Lock(file).is_held() ? PortState::kStale : PortState::kInUse;
+}
+
+}  // namespace
+
+void remove_stale_segments(const fs::path& folder) {
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    const fs::path file = entry.path();
+    const std::string name = file.filename().string();
+    if (!is_segment_lock(name)) continue;
+    std::error_code ignored;  // gone meanwhile, or of another user
+    const auto changed = fs::last_write_time(file, ignored);
+    if (ignored || fs::file_time_type::clock::now() - changed < kCreationTime) continue;
+    const Lock lock(file);
+    if (!lock.is_held()) continue;
+    fs::remove(folder / name.substr(0, name.size() - kLock.size()), ignored);
+    fs::remove(file, ignored);
+  }
+}
+
+int choose_participant_id(const ParticipantPorts& ports, const fs::path& folder) {
+  bool is_any_stale = false;
+  int first_free = -1;
+  for (int id = 0; id < kMaxParticipants; ++id) {
+    const int port = ports.base + id * ports.gain;
+    const PortState meta = find_state(port, folder), user = find_state(port + 1, folder);
+    if (meta == PortState::kStale || user == PortState::kStale) is_any_stale = true;
+    if (meta == PortState::kFree && user == PortState::kFree && first_free < 0) first_free = id;
+  }
+  return is_any_stale ? first_free : -1;
+}
+
+}  // namespace sls::bus

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <filesystem>
+
+namespace sls::bus {
+
+/// Removes shared-memory segments that killed processes have left: a process that is killed cannot
+/// remove its own (4 MB each, until the machine restarts), and with a full /dev/shm the next one
+/// would crash. Those of living processes are held by a lock and stay; so do those of other users.
+/// Never throws.
+void remove_stale_segments(const std::filesystem::path& folder = "/dev/shm");
+
+/// Port numbers of RTPS participants: those of participant `id` are base + id × gain, and one more.
+struct ParticipantPorts {
+  int base = 7410;
+  int gain = 2;
+};
+
+/// The participant id to ask for, or −1 where any will do.
+///
+/// A killed process leaves the lock files of its ports, and whoever takes such a port over replaces
+/// it without telling those who still have the old one open: they would never hear of each other
+/// (Fast DDS 2.9, #4728). So where there are such files, an id is chosen that has none.
+int choose_participant_id(const ParticipantPorts& ports,
+                          const std::filesystem::path& folder = "/dev/shm");
+
+}  // namespace sls::bus

@@ -1,0 +1,87 @@
+#include "common/bus/stale_segments.hpp"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include "tests/support/temporary_folder.hpp"
+
+namespace sls::bus {
+namespace {
+
+namespace fs = std::filesystem;
+
+class StaleSegmentsTest : public ::testing::Test {
+ protected:
+  void make(const std::string& name, std::chrono::seconds age) const {
+    test::write_bytes(folder_ / name, "x");
+    fs::last_write_time(folder_ / name, fs::file_time_type::clock::now() - age);
+  }
+  bool exists(const std::string& name) const { return fs::exists(folder_ / name); }
+
+  test::TemporaryFolder folder_;
+};
+
+TEST_F(StaleSegmentsTest, ASegmentWhoseLockNobodyHoldsIsRemoved) {
+  make("fastrtps_0123456789abcdef", std::chrono::seconds(60));
+  make("fastrtps_0123456789abcdef_el", std::chrono::seconds(60));
+  remove_stale_segments(folder_.path());
+  EXPECT_FALSE(exists("fastrtps_0123456789abcdef"));
+  EXPECT_FALSE(exists("fastrtps_0123456789abcdef_el"));
+}
+
+TEST_F(StaleSegmentsTest, ASegmentInUseStays) {
+  make("fastrtps_0123456789abcdef", std::chrono::seconds(60));
+  make("fastrtps_0123456789abcdef_el", std::chrono::seconds(60));
+  const fs::path lock = folder_ / "fastrtps_0123456789abcdef_el";
+  const int descriptor = open(lock.c_str(), O_RDONLY);
+  ASSERT_EQ(flock(descriptor, LOCK_EX | LOCK_NB), 0);
+  remove_stale_segments(folder_.path());
+  EXPECT_TRUE(exists("fastrtps_0123456789abcdef"));
+  EXPECT_TRUE(exists("fastrtps_0123456789abcdef_el"));
+  close(descriptor);
+}
+
+TEST_F(StaleSegmentsTest, ASegmentThatIsJustBeingMadeStays) {
+  make("fastrtps_0123456789abcdef_el", std::chrono::seconds(0));
+  remove_stale_segments(folder_.path());
+  EXPECT_TRUE(exists("fastrtps_0123456789abcdef_el"));
+}
+
+TEST_F(StaleSegmentsTest, EverythingElseStays) {
+  const char* names[] = {"fastrtps_port8160_el",
+                         "fastrtps_port8160",
+                         "other_0123456789abcdef_el",
+                         "fastrtps_0123456789abcdeg_el",
+                         "fastrtps_0123456789abcdef0_el",
+                         "fastrtps_0123456789abcdef",
+                         "fastrtps__el",
+                         "sem.fastrtps_port8160_mutex"};
+  for (const char* name : names) make(name, std::chrono::seconds(60));
+  remove_stale_segments(folder_.path());
+  for (const char* name : names) EXPECT_TRUE(exists(name)) << name;
+  remove_stale_segments(folder_ / "no such folder");
+}
+
+TEST_F(StaleSegmentsTest, WithoutStalePortsAnyParticipantIdWillDo) {
+  EXPECT_EQ(choose_participant_id({8160, 2}, folder_.path()), -1);
+  make("fastrtps_port8160", std::chrono::seconds(60));  // of somebody who ended in order
+  EXPECT_EQ(choose_participant_id({8160, 2}, folder_.path()), -1);
+  EXPECT_EQ(choose_participant_id({8160, 2}, folder_ / "no such folder"), -1);
+}
+
+TEST_F(StaleSegmentsTest, PortsOfKilledAndOfLivingProcessesAreAvoided) {
+  make("fastrtps_port8161_el", std::chrono::seconds(60));  // participant 0: killed
+  make("fastrtps_port8162_el", std::chrono::seconds(60));  // participant 1: alive
+  const fs::path lock = folder_ / "fastrtps_port8162_el";
+  const int descriptor = open(lock.c_str(), O_RDONLY);
+  ASSERT_EQ(flock(descriptor, LOCK_EX | LOCK_NB), 0);
+  EXPECT_EQ(choose_participant_id({8160, 2}, folder_.path()), 2);
+  close(descriptor);
+  // Another domain is not concerned.
+  EXPECT_EQ(choose_participant_id({8410, 2}, folder_.path()), -1);
+}
+
+}  // namespace
+}  // namespace sls::bus
