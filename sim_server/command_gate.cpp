@@ -40,6 +40,7 @@ const char* to_string(Verdict verdict) {
     case Verdict::kHeld:
     case Verdict::kDuplicate:
     case Verdict::kSuperseded:
+    case Verdict::kLate:
       return "";
     case Verdict::kNotFinite:
       return "a number that is not finite";
@@ -78,12 +79,14 @@ void CommandGate::set_clients(const std::vector<ReadyClient>& clients) {
 }
 
 void CommandGate::expect(std::uint64_t step) {
-  if (accepted_) {
-    past_[step_] = {accepted_from_, accepted_->f_Q_W_n()};
-    while (past_.size() > kRememberedAnswers) past_.erase(past_.begin());
-  }
+  if (accepted_)
+    past_[step_] = Past{accepted_from_, accepted_->f_Q_W_n()};
+  else if (step > step_)
+    past_[step_] = std::nullopt;
+  while (past_.size() > kRememberedAnswers) past_.erase(past_.begin());
   step_ = step;
   accepted_.reset();
+  take_over_.reset();
   drop_held();
   for (Client& client : clients_) client.refusal.clear();
 }
@@ -136,22 +139,24 @@ Verdict CommandGate::judge(const ControlCommand& command, const bus::PeerId& sen
   const auto& first = accepted_ && accepted_from_ == sender ? accepted_ : client->held;
   if (first)
     return first->f_Q_W_n() == command.f_Q_W_n() ? Verdict::kDuplicate : Verdict::kWrongStep;
-  if (accepted_) return Verdict::kSuperseded;
   client->silent = false;
+  client->misses = 0;
+  if (accepted_) return Verdict::kSuperseded;
   client->held = command;
   settle();
   return accepted_ && accepted_from_ == sender ? Verdict::kAccepted : Verdict::kHeld;
 }
 
-Verdict CommandGate::judge_past(const ControlCommand& command, const bus::PeerId& sender) const {
+Verdict CommandGate::judge_past(const ControlCommand& command, const bus::PeerId& sender) {
   const auto past = past_.find(command.step());
   if (past == past_.end()) return Verdict::kWrongStep;
-  if (past->second.sender == sender)
-    return past->second.force == command.f_Q_W_n() ? Verdict::kDuplicate : Verdict::kWrongStep;
-  const bool is_client = std::any_of(clients_.begin(), clients_.end(), [&](const Client& client) {
-    return client.identity.peer == sender;
-  });
-  return is_client ? Verdict::kSuperseded : Verdict::kWrongStep;
+  std::optional<Past>& first = past->second;
+  if (first && first->sender == sender)
+    return first->force == command.f_Q_W_n() ? Verdict::kDuplicate : Verdict::kWrongStep;
+  if (!find_client(sender)) return Verdict::kWrongStep;
+  if (first) return Verdict::kSuperseded;
+  first = Past{sender, command.f_Q_W_n()};
+  return Verdict::kLate;
 }
 
 void CommandGate::settle() {
@@ -160,7 +165,17 @@ void CommandGate::settle() {
   if (!awaited || !awaited->held) return;
   accepted_from_ = awaited->identity.peer;
   accepted_ = std::exchange(find_client(accepted_from_)->held, std::nullopt);
+  if (flyer_ && flyer_->peer != accepted_from_) {
+    take_over_ = TakeOver{flyer_->name, awaited->identity.name};
+    ++counters_.take_overs();
+  }
+  flyer_ = awaited->identity;
   drop_held();
+}
+
+int CommandGate::count_miss() {
+  const Client* awaited = find_awaited();
+  return awaited ? ++find_client(awaited->identity.peer)->misses : 0;
 }
 
 const CommandGate::Client* CommandGate::find_awaited() const {
@@ -185,8 +200,8 @@ bool CommandGate::pass_over_silent_client() {
     return &client != awaited && !client.silent && client.refusal.empty();
   });
   if (!has_next) return false;
+  if (!flyer_) flyer_ = awaited->identity;  // it was to fly first
   find_client(awaited->identity.peer)->silent = true;
-  ++counters_.take_overs();
   settle();
   return true;
 }
@@ -208,6 +223,7 @@ void CommandGate::count(Verdict verdict) {
   switch (verdict) {
     case Verdict::kAccepted:
     case Verdict::kHeld:
+    case Verdict::kLate:  // the step is counted, not what comes after it
       return;
     case Verdict::kDuplicate:
       ++counters_.duplicate();

@@ -19,6 +19,7 @@ enum class Verdict {
   kHeld,        ///< a valid answer of a client that is not the awaited one: kept for a take-over
   kDuplicate,   ///< copy of an accepted or held command
   kSuperseded,  ///< valid, but a stronger client's answer was taken
+  kLate,        ///< the first valid answer to a step that went by without one
   kNotFinite,
   kForceLimit,
   kOtherRun,
@@ -28,7 +29,7 @@ enum class Verdict {
   kFault,
 };
 
-/// For messages: what is wrong with a rejected command. Empty for the first four verdicts.
+/// For messages: what is wrong with a rejected command. Empty for the first five verdicts.
 const char* to_string(Verdict verdict);
 
 /// A client that announced itself ready to fly the vehicle.
@@ -45,7 +46,8 @@ class CommandGate {
   /// Puts the clients that may answer in force; what is known of those that stay is kept.
   void set_clients(const std::vector<ReadyClient>& clients);
 
-  /// Awaits the answers to `step` from now on. Steps are awaited in order.
+  /// Awaits the answers to `step` from now on. Steps are awaited in order; one that went by without
+  /// an accepted answer (real time, or a vehicle nobody flew) may still get a late one.
   void expect(std::uint64_t step);
 
   /// Judges one command and counts it.
@@ -56,6 +58,17 @@ class CommandGate {
 
   /// The client whose answer is awaited: the strongest that is neither silent nor refused.
   std::optional<ReadyClient> awaited_client() const;
+
+  /// Who accepted the awaited step from whom, where the client is another than that of the last
+  /// accepted answer.
+  struct TakeOver {
+    std::string from;
+    std::string to;
+  };
+  const std::optional<TakeOver>& take_over() const { return take_over_; }
+
+  /// Notes that the awaited client let the awaited step go by; how many in a row by now.
+  int count_miss();
 
   /// Declares the awaited client silent and awaits the next one's answer, if there is a next one
   /// (true). It is skipped until it answers an awaited step again.
@@ -72,12 +85,13 @@ class CommandGate {
   struct Client {
     ReadyClient identity;
     bool silent = false;
+    int misses = 0;                      // steps in a row that it let go by
     std::string refusal;                 // why its answer to the awaited step was refused
     std::optional<ControlCommand> held;  // its first valid answer to the awaited step
   };
 
   Verdict judge(const ControlCommand& command, const bus::PeerId& sender);
-  Verdict judge_past(const ControlCommand& command, const bus::PeerId& sender) const;
+  Verdict judge_past(const ControlCommand& command, const bus::PeerId& sender);
   void count(Verdict verdict);
   void settle();
   void drop_held();
@@ -92,11 +106,14 @@ class CommandGate {
   std::vector<Client> clients_;  // strongest first
   std::optional<ControlCommand> accepted_;
   bus::PeerId accepted_from_;
+  std::optional<ReadyClient> flyer_;  // of the last accepted answer
+  std::optional<TakeOver> take_over_;
   struct Past {
     bus::PeerId sender;
     std::array<double, 3> force;
   };
-  std::map<std::uint64_t, Past> past_;  // the last accepted answers, to tell copies from others
+  // The first answers to the last steps, to tell copies from others; nothing for those without one.
+  std::map<std::uint64_t, std::optional<Past>> past_;
   SyncCounters counters_;
 };
 

@@ -12,6 +12,7 @@ int main(int argc, char** argv) {
   std::filesystem::path scenario_file;
   std::optional<double> period_s;
   std::string mode;
+  std::optional<double> real_time_factor;
   bool check = false;
   app::add_common_options(cli, options);
   cli.add_option("--scenario", scenario_file, "scenario (YAML)")->type_name("FILE")->required();
@@ -20,6 +21,9 @@ int main(int argc, char** argv) {
   cli.add_option("--mode", mode, "synchronisation in force; default: the scenario's")
       ->type_name("MODE")
       ->check(CLI::IsMember({"lockstep", "realtime"}));
+  cli.add_option("--rtf", real_time_factor,
+                 "simulated per wall time of real time; default: the scenario's")
+      ->type_name("X");
   cli.add_flag("--check", check, "only check scenario and QoS file, then end");
 
   return app::run_main(argc, argv, cli, options, "sim_server", [&] {
@@ -28,9 +32,7 @@ int main(int argc, char** argv) {
     if (!mode.empty())
       scenario.sync.mode =
           mode == "lockstep" ? config::SyncMode::kLockstep : config::SyncMode::kRealtime;
-    if (scenario.sync.mode != config::SyncMode::kLockstep)
-      throw config::ConfigError(
-          "sync.mode: expected lockstep, got realtime: this version flies in lockstep only");
+    if (real_time_factor) config::override_real_time_factor(scenario, *real_time_factor);
     if (check) return bus::check_qos_file(options.qos_file);
     bus::Node node(options.qos_file, options.domain, "sim_server");
     sim::Server(node, scenario).run();

@@ -4,14 +4,11 @@
 
 namespace sls::sim {
 
-VehicleState make_state_message(std::uint64_t run_id, std::uint32_t vehicle_id, std::uint64_t step,
-                                std::int64_t period_ns, const model::SlungLoadState& state,
-                                const Applied& applied) {
-  VehicleState message;
-  message.run_id(run_id);
-  message.vehicle_id(vehicle_id);
-  message.step(step);
-  message.sim_time_ns(static_cast<std::int64_t>(step) * period_ns);
+namespace {
+
+/// The fields that VehicleState (measured) and PlantState (true) share.
+template <class Message>
+void fill(Message& message, const model::SlungLoadState& state) {
   message.p_WQ_m(bus::to_array(state.p_WQ));
   message.v_WQ_m_s(bus::to_array(state.v_WQ));
   message.p_WL_m(bus::to_array(state.p_WL));
@@ -20,9 +17,25 @@ VehicleState make_state_message(std::uint64_t run_id, std::uint32_t vehicle_id, 
   message.beta_rad(state.rod.beta);
   message.alpha_dot_rad_s(state.rod.alpha_dot);
   message.beta_dot_rad_s(state.rod.beta_dot);
+}
+
+}  // namespace
+
+VehicleState make_state_message(std::uint64_t run_id, std::uint32_t vehicle_id, std::uint64_t step,
+                                std::int64_t period_ns, const model::SlungLoadState& measured,
+                                const model::SlungLoadState& truth, const Applied& applied) {
+  VehicleState message;
+  message.run_id(run_id);
+  message.vehicle_id(vehicle_id);
+  message.step(step);
+  message.sim_time_ns(static_cast<std::int64_t>(step) * period_ns);
+  fill(message, measured);
+  fill(message.truth(), truth);
   message.f_Q_W_n(bus::to_array(applied.f_Q_W));
+  message.force_origin(applied.origin);
   message.controller_name(applied.controller_name);
   message.controller(applied.memory);
+  message.answer_f_Q_W_n(bus::to_array(applied.answer_f_Q_W));
   return message;
 }
 

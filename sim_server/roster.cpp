@@ -77,4 +77,21 @@ std::string name_blocking_recorder(const Roster& roster, int expected, std::uint
                           : std::string();
 }
 
+std::string name_silent_recorder(const Roster& roster, std::uint64_t step,
+                                 std::chrono::steady_clock::time_point since) {
+  for (const Entry& entry : roster.recorders) {
+    const bool lags = entry.announcement.last_complete_step() + 1 < static_cast<std::int64_t>(step);
+    if (entry.announcement.ready() && lags && entry.heard < since)
+      return fmt::format("recorder {} is silent since step {}", describe(entry),
+                         entry.announcement.last_complete_step());
+  }
+  return "";
+}
+
+std::string find_host(const Roster& roster, const bus::PeerId& peer) {
+  for (const Entry& entry : roster.controllers)
+    if (entry.peer == peer) return entry.announcement.host().to_string();
+  return "?";
+}
+
 }  // namespace sls::sim

@@ -1,6 +1,7 @@
 /// Who takes part in a run: whom step 0 waits for, whom a step waits for, and how to name them.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -33,5 +34,13 @@ inline constexpr std::int64_t kRecorderWindow = 2000;
 /// Which recorder keeps the server from publishing `step`, in words; empty when none does: fewer
 /// than `expected` are there, or one is more than the window behind.
 std::string name_blocking_recorder(const Roster& roster, int expected, std::uint64_t step);
+
+/// Which ready recorder has announced nothing since `since` although it lags behind `step`, in
+/// words; empty when none has.
+std::string name_silent_recorder(const Roster& roster, std::uint64_t step,
+                                 std::chrono::steady_clock::time_point since);
+
+/// The host of the controller `peer`; "?" where it is not in the roster.
+std::string find_host(const Roster& roster, const bus::PeerId& peer);
 
 }  // namespace sls::sim

@@ -400,8 +400,12 @@ TEST_F(CommandGateTest, TheNextClientIsAwaitedWhenTheStrongestIsSilent) {
   EXPECT_FALSE(gate_.accepted());
   EXPECT_TRUE(gate_.pass_over_silent_client());
   EXPECT_EQ(gate_.awaited_client()->name, "weakest");
-  EXPECT_EQ(gate_.counters().take_overs(), 2u);
+  EXPECT_EQ(gate_.counters().take_overs(), 0u) << "nobody has taken over yet";
   EXPECT_EQ(gate_.offer(make_answer(0), kWeakestPeer), Verdict::kAccepted);
+  EXPECT_EQ(gate_.counters().take_overs(), 1u);
+  ASSERT_TRUE(gate_.take_over());
+  EXPECT_EQ(gate_.take_over()->from, "strong");
+  EXPECT_EQ(gate_.take_over()->to, "weakest");
 }
 
 TEST_F(CommandGateTest, WithoutAnotherClientThereIsNoTakeOver) {
@@ -434,9 +438,47 @@ TEST_F(CommandGateTest, TheSilentClientIsSkippedUntilItAnswersAnAwaitedStep) {
   EXPECT_EQ(gate_.offer(make_answer(0), kStrongPeer), Verdict::kSuperseded);
   EXPECT_EQ(gate_.awaited_client()->name, "weak") << "step 0 is not awaited any more";
   EXPECT_EQ(gate_.offer(make_answer(1), kStrongPeer), Verdict::kAccepted);
+  ASSERT_TRUE(gate_.take_over());
+  EXPECT_EQ(gate_.take_over()->from, "weak");
+  EXPECT_EQ(gate_.take_over()->to, "strong");
   gate_.expect(2);
   EXPECT_EQ(gate_.awaited_client()->name, "strong");
-  EXPECT_EQ(gate_.counters().take_overs(), 1u);
+  EXPECT_EQ(gate_.counters().take_overs(), 2u) << "there and back";
+  EXPECT_FALSE(gate_.take_over());
+}
+
+TEST_F(CommandGateTest, TheStrongestIsAwaitedAgainAlsoIfItsAnswerCameSecond) {
+  set_clients({kStrong, kWeak});
+  gate_.pass_over_silent_client();
+  gate_.offer(make_answer(0), kWeakPeer);
+  EXPECT_EQ(gate_.offer(make_answer(0), kStrongPeer), Verdict::kSuperseded);
+  gate_.expect(1);
+  EXPECT_EQ(gate_.awaited_client()->name, "strong");
+}
+
+TEST_F(CommandGateTest, TheFirstAnswerToAStepThatWentByIsLateAndTheOthersAreNot) {
+  set_clients({kStrong, kWeak});
+  gate_.expect(1);
+  gate_.expect(2);
+  EXPECT_EQ(gate_.offer(make_answer(0), kStrongPeer), Verdict::kLate);
+  EXPECT_EQ(gate_.offer(make_answer(0), kStrongPeer), Verdict::kDuplicate);
+  EXPECT_EQ(gate_.offer(make_answer(0), kWeakPeer), Verdict::kSuperseded);
+  EXPECT_EQ(gate_.offer(make_answer(1), make_peer(99)), Verdict::kWrongStep) << "a stranger";
+  EXPECT_EQ(gate_.offer(make_answer(1), kWeakPeer), Verdict::kLate);
+  EXPECT_FALSE(gate_.accepted());
+}
+
+TEST_F(CommandGateTest, MissesAreCountedInARowAndForgottenWithAnAnswer) {
+  set_clients({kStrong});
+  EXPECT_EQ(gate_.count_miss(), 1);
+  gate_.expect(1);
+  EXPECT_EQ(gate_.count_miss(), 2);
+  gate_.expect(2);
+  gate_.offer(make_answer(2), kStrongPeer);
+  gate_.expect(3);
+  EXPECT_EQ(gate_.count_miss(), 1);
+  set_clients({});
+  EXPECT_EQ(gate_.count_miss(), 0) << "nobody is awaited";
 }
 
 TEST_F(CommandGateTest, WhenAllAreSilentAnyOfThemMayComeBack) {

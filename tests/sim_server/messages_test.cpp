@@ -23,10 +23,15 @@ model::SlungLoadState make_distinct_state() {
 TEST(MessagesTest, AStateSampleHoldsTheStateAndWhatWasApplied) {
   Applied applied;
   applied.f_Q_W = {17, 18, 19};
+  applied.answer_f_Q_W = {24, 25, 26};
+  applied.origin = FORCE_HELD;
   applied.controller_name = "pilot";
   applied.memory.stage_index(20);
+  model::SlungLoadState truth = make_distinct_state();
+  truth.p_WQ = {27, 28, 29};
+  truth.rod.beta_dot = 30;
   const VehicleState message =
-      make_state_message(21, 22, 23, 4'000'000, make_distinct_state(), applied);
+      make_state_message(21, 22, 23, 4'000'000, make_distinct_state(), truth, applied);
   EXPECT_EQ(message.run_id(), 21u);
   EXPECT_EQ(message.vehicle_id(), 22u);
   EXPECT_EQ(message.step(), 23u);
@@ -40,27 +45,34 @@ TEST(MessagesTest, AStateSampleHoldsTheStateAndWhatWasApplied) {
   EXPECT_EQ(message.alpha_dot_rad_s(), 0.15);
   EXPECT_EQ(message.beta_dot_rad_s(), 0.16);
   EXPECT_EQ(message.f_Q_W_n(), (Array{17, 18, 19}));
+  EXPECT_EQ(message.force_origin(), FORCE_HELD);
   EXPECT_STREQ(message.controller_name().c_str(), "pilot");
   EXPECT_EQ(message.controller(), applied.memory);
+  EXPECT_EQ(message.answer_f_Q_W_n(), (Array{24, 25, 26}));
+  EXPECT_EQ(message.truth().p_WQ_m(), (Array{27, 28, 29}));
+  EXPECT_EQ(message.truth().v_WL_m_s(), (Array{10, 11, 12}));
+  EXPECT_EQ(message.truth().alpha_rad(), 0.13);
+  EXPECT_EQ(message.truth().beta_dot_rad_s(), 30);
 }
 
 TEST(MessagesTest, AtStepZeroNothingWasApplied) {
-  const VehicleState message = make_state_message(1, 0, 0, 4'000'000, {}, {});
+  const VehicleState message = make_state_message(1, 0, 0, 4'000'000, {}, {}, {});
   EXPECT_EQ(message.sim_time_ns(), 0);
   EXPECT_EQ(message.f_Q_W_n(), (Array{0, 0, 0}));
+  EXPECT_EQ(message.force_origin(), FORCE_NONE);
   EXPECT_EQ(message.controller_name().size(), 0u);
   EXPECT_EQ(message.controller(), ControllerState());
 }
 
 TEST(MessagesTest, SimulationTimeIsWholeNanosecondsOverLongRuns) {
-  const VehicleState message = make_state_message(1, 0, 1'000'000'000'000, 999'983, {}, {});
+  const VehicleState message = make_state_message(1, 0, 1'000'000'000'000, 999'983, {}, {}, {});
   EXPECT_EQ(message.sim_time_ns(), 999'983'000'000'000'000);
 }
 
 TEST(MessagesTest, TheClientReadsTheStateTheServerWrote) {
   const model::SlungLoadState state = make_distinct_state();
   const model::SlungLoadState read =
-      control::to_model_state(make_state_message(1, 0, 5, 1'000'000, state, {}));
+      control::to_model_state(make_state_message(1, 0, 5, 1'000'000, state, {}, {}));
   EXPECT_EQ(read.p_WQ, state.p_WQ);
   EXPECT_EQ(read.v_WQ, state.v_WQ);
   EXPECT_EQ(read.p_WL, state.p_WL);
@@ -110,7 +122,7 @@ control::Answer make_distinct_answer() {
   return answer;
 }
 
-VehicleState make_answered() { return make_state_message(71, 72, 73, 4'000'000, {}, {}); }
+VehicleState make_answered() { return make_state_message(71, 72, 73, 4'000'000, {}, {}, {}); }
 
 TEST(MessagesTest, ACommandAnswersItsStateSample) {
   const ControlCommand message = control::make_command_message(
@@ -172,7 +184,7 @@ TEST(MessagesTest, ControllerMemorySurvivesTheWayThroughCommandAndState) {
   const ControlCommand command = control::make_command_message({}, answer, "pilot", 0, {});
   Applied applied;
   applied.memory = command.controller();
-  const VehicleState next = make_state_message(1, 0, 1, 1'000'000, {}, applied);
+  const VehicleState next = make_state_message(1, 0, 1, 1'000'000, {}, {}, applied);
   const control::ControllerMemory memory = control::to_memory(next.controller());
   EXPECT_EQ(memory.stage, answer.memory.stage);
   EXPECT_EQ(memory.stage_start_step, answer.memory.stage_start_step);

@@ -154,5 +154,23 @@ TEST(RosterTest, TheServerWaitsForEveryRecorderThatIsThere) {
   EXPECT_TRUE(bus::are_recorders_done({}));
 }
 
+TEST(RosterTest, ARecorderThatLagsAndAnnouncesNothingIsNamedAsSilent) {
+  const auto now = std::chrono::steady_clock::now();
+  const auto second = std::chrono::seconds(1);
+  auto recorder = make_recorder_at(100);
+  recorder.heard = now - 2 * second;
+  const Roster roster = {{}, {recorder}};
+  EXPECT_TRUE(contains(name_silent_recorder(roster, 500, now - second), "'tape'"));
+  EXPECT_TRUE(contains(name_silent_recorder(roster, 500, now - second), "step 100"));
+  EXPECT_EQ(name_silent_recorder(roster, 500, now - 3 * second), "") << "heard since";
+  EXPECT_EQ(name_silent_recorder(roster, 101, now - second), "") << "nothing to announce";
+}
+
+TEST(RosterTest, TheHostOfAControllerIsFoundByItsPeer) {
+  const auto pilot = make_controller("pilot");
+  EXPECT_EQ(find_host({{pilot}, {}}, pilot.peer), "host-of-pilot");
+  EXPECT_EQ(find_host({}, pilot.peer), "?");
+}
+
 }  // namespace
 }  // namespace sls::sim

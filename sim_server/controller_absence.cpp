@@ -1,0 +1,39 @@
+#include "sim_server/controller_absence.hpp"
+
+#include <algorithm>
+
+namespace sls::sim {
+namespace {
+
+using config::ControllerPolicy;
+
+}  // namespace
+
+ControllerAbsence::ControllerAbsence(const config::Sync& sync)
+    : sync_(sync),
+      period_wall_s_(static_cast<double>(sync.period_ns) * 1e-9 / sync.real_time_factor) {}
+
+double ControllerAbsence::give_up_s() const {
+  const auto& absence = sync_.wait.controller;
+  if (absence.policy == ControllerPolicy::kWait || absence.policy == ControllerPolicy::kStop)
+    return absence.deadline_s;
+  return std::max(absence.deadline_s, sync_.wait_for.timeout_s);
+}
+
+ControllerAbsence::Action ControllerAbsence::decide(double step_wait_s, double absence_s) const {
+  if (absence_s >= give_up_s()) return Action::kGiveUp;
+  const auto& absence = sync_.wait.controller;
+  const bool is_realtime = sync_.mode == config::SyncMode::kRealtime;
+  if (!is_realtime) {
+    if (absence.policy == ControllerPolicy::kWait || absence.policy == ControllerPolicy::kStop)
+      return Action::kWait;
+    // The first step waits for the deadline; those after it for one period each, so that time goes
+    // on no faster than it does for a client that wants to come back.
+    if (step_wait_s < (is_acting() ? period_wall_s_ : absence.deadline_s)) return Action::kWait;
+    if (absence.policy == ControllerPolicy::kFailsafe) return Action::kFailSafe;
+  }
+  const double held_s = static_cast<double>(steps_without_answer_) * sync_.period_ns * 1e-9;
+  return held_s < sync_.max_hold_s ? Action::kHold : Action::kFailSafe;
+}
+
+}  // namespace sls::sim

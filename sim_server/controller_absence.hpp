@@ -1,0 +1,44 @@
+/// What to do about a vehicle nobody flies at the moment: the policy of `sync.wait.controller`.
+/// Pure: told the times, it decides. Rules: README.md, "Waiting".
+#pragma once
+
+#include <cstdint>
+
+#include "common/config/scenario.hpp"
+
+namespace sls::sim {
+
+class ControllerAbsence {
+ public:
+  explicit ControllerAbsence(const config::Sync& sync);
+
+  enum class Action {
+    kWait,      ///< for the answer
+    kHold,      ///< fly this step with the last answer
+    kFailSafe,  ///< fly this step with the fail-safe force
+    kGiveUp,    ///< end the run as failed
+  };
+
+  /// What to do about a step that has waited `step_wait_s` (wall time) for its answer, the first
+  /// unanswered one having been published `absence_s` ago. In real time, asked when the step's
+  /// period is over, it never says kWait.
+  Action decide(double step_wait_s, double absence_s) const;
+
+  /// A step was flown without an answer of its own.
+  void flown_without_answer() { ++steps_without_answer_; }
+  /// An answer was accepted.
+  void answered() { steps_without_answer_ = 0; }
+
+  /// True while steps are flown without answers.
+  bool is_acting() const { return steps_without_answer_ > 0; }
+
+  /// After so much absence decide() gives up, s.
+  double give_up_s() const;
+
+ private:
+  const config::Sync sync_;
+  const double period_wall_s_;
+  std::uint64_t steps_without_answer_ = 0;
+};
+
+}  // namespace sls::sim

@@ -1,0 +1,87 @@
+/// What an operator's requests do to a run: pause, step, resume, reset, stop, with the semantics of
+/// the ROS simulation interfaces. The loop asks before every step. No network, no clock here.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "sls.h"
+
+namespace sls::sim {
+
+/// What is accepted when: README.md, "Operator control".
+class RunControl {
+ public:
+  /// Controls run `run_id`, which begins unpaused unless `is_paused`.
+  RunControl(std::uint64_t run_id, std::uint32_t vehicle_id, bool is_paused);
+
+  /// Judges `request`, made while the loop is at `step` (published next, or awaiting its answer).
+  /// The reply, except where it comes later: that of an accepted step request, from `stepped` or
+  /// `end`. A repeated request (same operator, same request_id) is answered again and acts once.
+  std::optional<SimControlReply> request(const SimControl& request, std::uint64_t step);
+
+  /// True when the loop must not begin the next step.
+  bool holds() const;
+
+  /// The run is at rest or about to be: what sls/status says. A run that carries out a step request
+  /// is a paused one: its successor after a reset begins paused, too.
+  bool is_paused() const { return is_paused_; }
+
+  /// A step was completed and the loop is now at `step`; the reply to a step request that this
+  /// fulfils, or that a pause ends here.
+  std::optional<SimControlReply> stepped(std::uint64_t step);
+
+  /// Replies to requests still open when the run ends at `step` (accepted: false, with `reason`).
+  /// Requests that come after it are refused.
+  std::vector<SimControlReply> end(std::uint64_t step, const std::string& reason);
+
+  bool is_reset_requested() const { return is_reset_requested_; }
+  bool is_stop_requested() const { return is_stop_requested_; }
+
+  /// For events and reasons, who asked last for what: "paused by anna@host"; empty before.
+  const std::string& last_event() const { return last_event_; }
+
+  /// Events so far.
+  std::uint64_t events() const { return events_; }
+
+  /// Requests whose replies are remembered, for those that are repeated.
+  static constexpr std::size_t kRememberedReplies = 64;
+
+ private:
+  struct Answered {
+    std::string operator_name;
+    SimControlReply reply;
+  };
+  struct StepRequest {
+    std::string operator_name;
+    std::uint64_t request_id = 0;
+    std::uint64_t steps = 0;
+    std::uint64_t done = 0;
+    std::string cut_short_by;  ///< who paused during it; the step after which it ends is its last
+  };
+
+  /// Why `request` is refused in the present state; empty where it is accepted.
+  std::string find_refusal(const SimControl& request) const;
+  void act(const SimControl& request);
+  static StepRequest make_step_request(const SimControl& request);
+  SimControlReply make_reply(std::uint64_t request_id, std::uint64_t step,
+                             const std::string& refusal) const;
+  SimControlReply remember(const std::string& operator_name, SimControlReply reply);
+  SimControlReply close_step_request(std::uint64_t step, const std::string& refusal);
+
+  const std::uint64_t run_id_;
+  const std::uint32_t vehicle_id_;
+  bool is_paused_;
+  bool is_reset_requested_ = false;
+  bool is_stop_requested_ = false;
+  std::optional<std::string> end_reason_;
+  std::optional<StepRequest> stepping_;
+  std::deque<Answered> answered_;  // the last kRememberedReplies
+  std::string last_event_;
+  std::uint64_t events_ = 0;
+};
+
+}  // namespace sls::sim

@@ -1,0 +1,59 @@
+#include "sim_server/status_board.hpp"
+
+#include <spdlog/spdlog.h>
+
+namespace sls::sim {
+
+StatusBoard::StatusBoard(bus::Writer<SimStatus>& writer, std::uint64_t run_id,
+                         std::uint32_t vehicle_id, const config::Sync& sync,
+                         const SyncCounters& counters)
+    : timing(sync),
+      writer_(writer),
+      run_id_(run_id),
+      vehicle_id_(vehicle_id),
+      period_ns_(sync.period_ns),
+      counters_(counters) {}
+
+double StatusBoard::calc_wall_s() const {
+  if (start_time_ == Clock::time_point{}) return 0.0;
+  return std::chrono::duration<double>(Clock::now() - start_time_).count();
+}
+
+double StatusBoard::calc_real_time_factor() const {
+  const double wall_s = calc_wall_s();
+  return wall_s > 0.0 ? static_cast<double>(step) * period_ns_ * 1e-9 / wall_s : 0.0;
+}
+
+void StatusBoard::publish(RunPhase phase, const std::string& reason) {
+  phase_ = phase;
+  publish_time_ = Clock::now();
+  SyncCounters counters = counters_;
+  timing.fill(counters);
+  SimStatus message;
+  message.run_id(run_id_);
+  message.vehicle_id(vehicle_id_);
+  message.sample_index(samples_++);
+  message.phase(phase);
+  message.reason(reason);
+  message.step(step);
+  message.controller_name(controller_name);
+  message.real_time_factor(calc_real_time_factor());
+  message.round_trip_p50_ns(static_cast<std::uint64_t>(round_trips.calc_percentile(50).count()));
+  message.round_trip_p99_ns(static_cast<std::uint64_t>(round_trips.calc_percentile(99).count()));
+  message.timing(timing.label());
+  message.counters(counters);
+  writer_.write(message);
+}
+
+void StatusBoard::announce(const std::string& event) {
+  spdlog::warn("{}", event);
+  publish(phase_, event);
+}
+
+bool StatusBoard::publish_if_due(const std::string& reason) {
+  if (Clock::now() - publish_time_ < kInterval) return false;
+  publish(phase_, reason);
+  return true;
+}
+
+}  // namespace sls::sim

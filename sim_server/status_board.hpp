@@ -1,0 +1,63 @@
+/// What the server says about a run in sls/status and on stderr.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+
+#include "common/bus/node.hpp"
+#include "common/config/scenario.hpp"
+#include "sim_server/round_trips.hpp"
+#include "sim_server/timing_record.hpp"
+
+namespace sls::sim {
+
+class StatusBoard {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  /// Samples of a run are at most this far apart, so that silence says something.
+  static constexpr auto kInterval = std::chrono::milliseconds(400);
+
+  /// `counters` (of the command gate) must outlive this.
+  StatusBoard(bus::Writer<SimStatus>& writer, std::uint64_t run_id, std::uint32_t vehicle_id,
+              const config::Sync& sync, const SyncCounters& counters);
+
+  /// Publishes a sample now.
+  void publish(RunPhase phase, const std::string& reason);
+  /// An event that does not change the phase: said on stderr and published as a reason.
+  void announce(const std::string& event);
+  /// Publishes if the last sample is `kInterval` ago: true.
+  bool publish_if_due(const std::string& reason);
+
+  RunPhase phase() const { return phase_; }
+  /// True once anybody can have heard of the run.
+  bool has_published() const { return samples_ > 0; }
+
+  // What the samples say; the loop keeps it up to date.
+  std::uint64_t step = 0;
+  std::string controller_name;  ///< whose command for `step` was accepted
+  TimingRecord timing;
+  RoundTrips round_trips;
+
+  /// Step 0 is published now.
+  void start_clock() { start_time_ = Clock::now(); }
+  /// Wall time since `start_clock`, less the pauses.
+  double calc_wall_s() const;
+  /// Simulated over wall time.
+  double calc_real_time_factor() const;
+  void add_pause(Clock::duration pause) { start_time_ += pause; }
+
+ private:
+  bus::Writer<SimStatus>& writer_;
+  const std::uint64_t run_id_;
+  const std::uint32_t vehicle_id_;
+  const std::int64_t period_ns_;
+  const SyncCounters& counters_;
+  RunPhase phase_ = PHASE_WAITING;
+  std::uint64_t samples_ = 0;
+  Clock::time_point publish_time_;
+  Clock::time_point start_time_;
+};
+
+}  // namespace sls::sim
