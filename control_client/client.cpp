@@ -16,7 +16,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto kUsualJoinTime = 3s;          // a server's claim and discovery: no news
+constexpr auto kUsualJoinTime = 1500ms;      // a server's claim and discovery: no news
 constexpr auto kAcknowledgmentTime = 500ms;  // for the last samples to reach the recorders
 constexpr auto kPollTime = 20ms;             // while nothing is in a hurry
 constexpr std::size_t kMailboxSize = 1024;
@@ -28,38 +28,34 @@ constexpr std::uint64_t kSafeLag = 4000;
 }  // namespace
 
 Client::Client(bus::Node& node, const config::Scenario& scenario, const std::string& name,
-               std::int32_t strength)
-    : scenario_(scenario),
+               std::int32_t strength, bool follows_servers)
+    : node_(node),
+      scenario_(scenario),
       name_(name),
       strength_(strength),
+      follows_servers_(follows_servers),
       participants_(node),
       servers_(node),
       participant_writer_(node),
-      command_writer_(node),
       reference_writer_(node),
       states_(kMailboxSize),
       state_reader_(node, bus::kLoopReaderProfile,
                     [this](const VehicleState& state, const bus::PeerId&) { receive(state); }) {}
 
 void Client::run() {
-  join_run();
-  if (app::stop_signal() != 0) return;
-  announce(false, false);
-  serve();
-  announce(false, true);
-  command_writer_.wait_for_acknowledgments(kAcknowledgmentTime);
-  reference_writer_.wait_for_acknowledgments(kAcknowledgmentTime);
-  if (app::stop_signal() == 0)
-    bus::wait_for_recorders_to_end(participants_, run_->parameters.run_id());
-  const auto status = servers_.find_status(run_->parameters.run_id());
-  if (status && status->phase() == PHASE_FAILED)
-    throw app::RunError(fmt::format("the run failed: {}", status->reason().c_str()));
+  auto next = find_first_run();
+  while (next) {
+    begin(*next);
+    next = serve();
+  }
+  if (run_) leave();
 }
 
-void Client::join_run() {
+std::optional<bus::Run> Client::find_first_run() {
   const double timeout_s = scenario_.sync.wait_for.timeout_s;
   app::Wait wait(timeout_s, kUsualJoinTime);
-  while (!(run_ = servers_.find_joinable(vehicle_id_)) && app::stop_signal() == 0) {
+  while (app::stop_signal() == 0) {
+    if (auto run = servers_.find_joinable(vehicle_id_)) return run;
     if (wait.is_over())
       throw app::RunError(
           fmt::format("no server for vehicle {} within {} s", vehicle_id_, timeout_s));
@@ -68,23 +64,56 @@ void Client::join_run() {
                    wait.seconds_left());
     std::this_thread::sleep_for(kPollTime);
   }
-  if (!run_) return;
+  return std::nullopt;
+}
 
-  const Parameters& parameters = run_->parameters;
+void Client::begin(const bus::Run& run) {
+  const Parameters& parameters = run.parameters;
   if (!(parameters.scenario_sha256() == scenario_.sha256))
     throw config::ConfigError(
         fmt::format("scenario '{}': expected the server's, SHA-256 {}, got {}", scenario_.name,
                     parameters.scenario_sha256().c_str(), scenario_.sha256));
-  scenario_.sync.period_ns = parameters.period_ns();
-  scenario_.plant.step_ns = parameters.step_ns();
-  controller_ = std::make_unique<FlightController>(scenario_);
+  const char* profile = parameters.mode() == MODE_REALTIME
+                            ? node_.choose_writer_profile(bus::kRealtimeCommandWriterProfile,
+                                                          bus::kStreamWriterProfile)
+                            : bus::kStreamWriterProfile;
+  {
+    const std::lock_guard lock(answer_mutex_);
+    run_ = run;
+    scenario_.sync.period_ns = parameters.period_ns();
+    scenario_.plant.step_ns = parameters.step_ns();
+    controller_ = std::make_unique<FlightController>(scenario_);
+    last_command_.reset();
+    if (profile != command_profile_) {
+      command_writer_.reset();
+      command_writer_ = std::make_unique<bus::Writer<ControlCommand>>(node_, profile);
+      command_profile_ = profile;
+    }
+  }
+  ready_ = false;
+  watch_.emplace(servers_, run, scenario_.sync.wait.server_deadline_s);
   spdlog::info("'{}' joins run {:016x}: {}, period {} s", name_, parameters.run_id(),
                scenario_.name, scenario_.sync.period_ns * 1e-9);
+  announce(false, false);
+}
+
+void Client::leave() {
+  const std::uint64_t run_id = run_->parameters.run_id();
+  const auto status = servers_.find_status(run_id);
+  const bool is_finished = status && status->phase() == PHASE_FINISHED;
+  announce(false, true);
+  command_writer_->wait_for_acknowledgments(kAcknowledgmentTime);
+  reference_writer_.wait_for_acknowledgments(kAcknowledgmentTime);
+  if (app::stop_signal() == 0)
+    bus::wait_for_recorders_to_end(participants_, run_id,
+                                   is_finished ? scenario_.sync.wait_for.recorders : 0);
+  if (status && status->phase() == PHASE_FAILED)
+    throw app::RunError(fmt::format("the run failed: {}", status->reason().c_str()));
 }
 
 bool Client::sees_all_endpoints() const {
   if (state_reader_.matched().count(run_->server) == 0) return false;
-  const auto command_readers = command_writer_.matched();
+  const auto command_readers = command_writer_->matched();
   const auto reference_readers = reference_writer_.matched();
   if (command_readers.count(run_->server) == 0) return false;
   int recorders = 0;
@@ -94,14 +123,16 @@ bool Client::sees_all_endpoints() const {
   return recorders >= scenario_.sync.wait_for.recorders;
 }
 
-void Client::serve() {
+std::optional<bus::Run> Client::serve() {
   auto next_look = Clock::now();
   look_at_recorders();
   answers_at_once_ = true;
   while (app::stop_signal() == 0) {
     if (const auto state = states_.take(next_look)) answer(*state);
     if (Clock::now() < next_look) continue;
-    if (has_ended()) return;
+    rethrow_answer_error();
+    if (has_ended()) return std::nullopt;
+    if (auto next = find_successor()) return next;
     look_at_recorders();
     if (!ready_ && sees_all_endpoints()) {
       ready_ = true;
@@ -109,6 +140,7 @@ void Client::serve() {
     }
     next_look = Clock::now() + kPollTime;
   }
+  return std::nullopt;
 }
 
 void Client::look_at_recorders() {
@@ -137,7 +169,7 @@ void Client::answer(const VehicleState& state) {
   const std::lock_guard lock(answer_mutex_);
   if (state.run_id() != run_->parameters.run_id() || state.vehicle_id() != vehicle_id_) return;
   if (last_command_ && last_command_->step() == state.step()) {
-    command_writer_.write(*last_command_);
+    command_writer_->write(*last_command_);
     return;
   }
   const auto began = Clock::now();
@@ -148,22 +180,38 @@ void Client::answer(const VehicleState& state) {
   // The reference first: once the command is out the server moves on, and a client that is killed
   // then must not have kept back what a recorder needs of this step.
   reference_writer_.write(make_reference_message(state, answer, name_));
-  command_writer_.write(*last_command_);
+  command_writer_->write(*last_command_);
   if (answer.fault != Fault::kNone)
     spdlog::error("step {}: fault {}", state.step(), to_string(answer.fault));
 }
 
-bool Client::has_ended() {
-  {
-    const std::lock_guard lock(answer_mutex_);
-    if (answer_error_) std::rethrow_exception(answer_error_);
-  }
+void Client::rethrow_answer_error() {
+  const std::lock_guard lock(answer_mutex_);
+  if (answer_error_) std::rethrow_exception(answer_error_);
+}
+
+bool Client::has_ended() const {
   const auto status = servers_.find_status(run_->parameters.run_id());
-  if (status && (status->phase() == PHASE_FINISHED || status->phase() == PHASE_FAILED)) return true;
-  if (!servers_.is_present(run_->server))
-    throw app::RunError(fmt::format("the server of run {:016x} is gone, expected it to finish",
-                                    run_->parameters.run_id()));
-  return false;
+  return status && (status->phase() == PHASE_FINISHED || status->phase() == PHASE_FAILED);
+}
+
+std::optional<bus::Run> Client::find_successor() {
+  const auto finding = watch_->look();
+  const auto next = servers_.find_joinable(vehicle_id_);
+  if (next && next->parameters.run_id() != run_->parameters.run_id()) {
+    const bool is_reset = next->server == run_->server;
+    const std::string news =
+        fmt::format("run {:016x} was {} run {:016x}", run_->parameters.run_id(),
+                    is_reset ? "reset to" : "replaced by", next->parameters.run_id());
+    if (is_reset || (follows_servers_ && !servers_.is_present(run_->server))) {
+      spdlog::warn("{}: follows it", news);
+      return next;
+    }
+    if (!servers_.is_present(run_->server)) throw app::RunError(news + " (see --follow)");
+  }
+  if (finding == bus::ServerWatch::Finding::kLost)
+    throw app::RunError(fmt::format("the {}, expected it to finish", watch_->describe()));
+  return std::nullopt;
 }
 
 void Client::announce(bool ready, bool done) {

@@ -26,10 +26,12 @@ namespace sls::control {
 class Client {
  public:
   /// Will fly vehicle 0 of `scenario` under `name`; among several clients the strongest flies.
+  /// When another server replaces the one it flies with, it flies on with that one if
+  /// `follows_servers`.
   Client(bus::Node& node, const config::Scenario& scenario, const std::string& name,
-         std::int32_t strength);
+         std::int32_t strength, bool follows_servers);
 
-  /// Runs from joining to the end of the run.
+  /// Runs from joining to the end of the run, and of those that follow it after a reset.
   /// @throws config::ConfigError if the server flies another scenario.
   /// @throws app::RunError if no server is found, it disappears, or the run fails.
   void run();
@@ -37,8 +39,12 @@ class Client {
  private:
   using Clock = std::chrono::steady_clock;
 
-  void join_run();
-  void serve();
+  /// The run to begin with; nothing after a stop signal.
+  std::optional<bus::Run> find_first_run();
+  void begin(const bus::Run& run);
+  /// Serves until the run has ended (nothing), or another one has taken its place.
+  std::optional<bus::Run> serve();
+  void leave();
 
   /// Called by the middleware for every sample.
   void receive(const VehicleState& state);
@@ -48,20 +54,27 @@ class Client {
   bool sees_all_endpoints() const;
   void announce(bool ready, bool done);
   /// True when the run has ended, well or not.
-  /// @throws app::RunError if it has not, but its server is gone.
-  bool has_ended();
+  bool has_ended() const;
+  /// The run that has taken the place of ours: after a reset, or because the server was replaced.
+  /// @throws app::RunError if the server is gone for too long or was replaced, and not to follow.
+  std::optional<bus::Run> find_successor();
+  void rethrow_answer_error();
 
+  bus::Node& node_;
   config::Scenario scenario_;  // with the period in force once a run is joined
   const std::string name_;
   const std::int32_t strength_;
+  const bool follows_servers_;
   const std::uint32_t vehicle_id_ = 0;
 
   bus::ParticipantDirectory participants_;
   bus::ServerDirectory servers_;
   bus::Writer<Participant> participant_writer_;
-  bus::Writer<ControlCommand> command_writer_;
+  const char* command_profile_ = nullptr;
+  std::unique_ptr<bus::Writer<ControlCommand>> command_writer_;  // its profile depends on the run
   bus::Writer<Reference> reference_writer_;
   std::optional<bus::Run> run_;
+  std::optional<bus::ServerWatch> watch_;
   std::unique_ptr<FlightController> controller_;
   bool ready_ = false;
 

@@ -14,12 +14,15 @@ int main(int argc, char** argv) {
   std::filesystem::path scenario_file;
   std::string name = "control_client";
   std::int32_t strength = 0;
+  bool follows_servers = false;
   app::add_common_options(cli, options);
   cli.add_option("--scenario", scenario_file, "scenario (YAML), the same as the server's")
       ->type_name("FILE")
       ->required();
   cli.add_option("--strength", strength, "among several clients the strongest flies")
       ->type_name("N");
+  cli.add_flag("--follow", follows_servers,
+               "fly on with a server that replaces this one; else end with exit code 1");
   cli.add_option("--name", name, "name in recordings and messages")
       ->check(CLI::Validator(
           [](const std::string& text) {
@@ -35,6 +38,6 @@ int main(int argc, char** argv) {
   return app::run_main(argc, argv, cli, options, "control_client", [&] {
     const config::Scenario scenario = config::load_scenario(scenario_file);
     bus::Node node(options.qos_file, options.domain, "control_client");
-    control::Client(node, scenario, name, strength).run();
+    control::Client(node, scenario, name, strength, follows_servers).run();
   });
 }
