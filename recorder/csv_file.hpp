@@ -36,6 +36,8 @@ class CsvFile {
   void flush();
 
   std::uint64_t rows() const { return rows_; }
+  /// What a flush would hand over.
+  std::size_t pending_bytes() const { return finished_; }
   const std::filesystem::path& path() const { return path_; }
 
  private:

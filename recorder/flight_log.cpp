@@ -40,13 +40,13 @@ double FlightLog::to_time(std::uint64_t step) const {
   return static_cast<double>(step) * static_cast<double>(parameters_.period_ns()) / 1e9;
 }
 
-FlightLog::Stage& FlightLog::find_or_begin_stage(const StepRecord& record) {
-  auto& stages = stages_[record.state->vehicle_id()];
-  const std::uint32_t index = record.reference->stage_index();
+FlightLog::Stage& FlightLog::find_or_begin_stage(const StepRows& rows) {
+  auto& stages = stages_[rows.vehicle_id];
+  const std::uint32_t index = rows.reference->stage;
   if (stages.empty() || stages.back().first != index) {
     Stage stage;
-    stage.name = record.reference->stage_name().to_string();
-    stage.first_step = record.step;
+    stage.name = rows.reference->stage_name;
+    stage.first_step = rows.step;
     stages.emplace_back(index, stage);
   }
   return stages.back().second;
@@ -66,18 +66,18 @@ std::size_t FlightLog::calc_lap(const Stage& stage, std::size_t index, std::uint
   return static_cast<std::size_t>(laps == 0 ? lap : std::min(lap, laps - 1));
 }
 
-void FlightLog::add(const StepRecord& record) {
-  if (!record.is_complete()) return;
-  Stage& stage = find_or_begin_stage(record);
-  stage.last_step = record.step;
+void FlightLog::add(const StepRows& rows) {
+  if (!rows.is_complete()) return;
+  Stage& stage = find_or_begin_stage(rows);
+  stage.last_step = rows.step;
   const Eigen::Vector3d error =
-      bus::to_vector(record.state->p_WL_m()) - bus::to_vector(record.reference->position_m());
+      bus::to_vector(rows.state->p_WL) - bus::to_vector(rows.reference->position());
   stage.all.add(error);
-  const std::size_t index = record.reference->stage_index();
+  const std::size_t index = rows.reference->stage;
   if (index >= scenario_.mission.size() ||
       !std::holds_alternative<config::FigureEightReference>(scenario_.mission[index].reference))
     return;
-  const std::size_t lap = calc_lap(stage, index, record.step);
+  const std::size_t lap = calc_lap(stage, index, rows.step);
   if (lap >= stage.laps.size()) stage.laps.resize(lap + 1);
   stage.laps[lap].add(error);
 }
@@ -110,9 +110,11 @@ void FlightLog::write(std::ostream& out) const {
       static_cast<double>(parameters_.step_ns()) / 1e9, bus::to_string(parameters_.mode()));
   const double rate = last_status_.real_time_factor() * 1e9 /
                       static_cast<double>(std::max<std::int64_t>(parameters_.period_ns(), 1));
-  out << fmt::format("  {} steps, {} s simulated, {:.0f} steps/s, {:.1f} × real time\n\n",
+  out << fmt::format("  {} steps, {} s simulated, {:.0f} steps/s, {:.1f} × real time\n",
                      last_status_.step(), to_time(last_status_.step()), rate,
                      last_status_.real_time_factor());
+  out << fmt::format("  timing: {}\n\n",
+                     last_status_.timing().size() > 0 ? last_status_.timing().c_str() : "unknown");
 
   for (const auto& [vehicle_id, stages] : stages_) {
     out << fmt::format(
@@ -131,17 +133,27 @@ void FlightLog::write(std::ostream& out) const {
     out << '\n';
   }
 
+  write_counters(out);
+  out << "\nEvents\n";
+  for (const auto& event : events_) out << "  " << event << '\n';
+}
+
+void FlightLog::write_counters(std::ostream& out) const {
   const SyncCounters& counters = last_status_.counters();
   out << fmt::format(
       "Commands\n  states resent {}, duplicate {}, superseded {}, late {}, take-overs {}\n"
+      "  stale {}, held {}, fail-safe {}, deadline missed {}, overflow {}, slipped {}\n"
       "  rejected: not finite {}, force limit {}, run {}, step {}, vehicle {}, client {}, fault "
       "{}\n",
       counters.resent(), counters.duplicate(), counters.superseded(), counters.late(),
-      counters.take_overs(), counters.rejected_not_finite(), counters.rejected_force_limit(),
-      counters.rejected_run(), counters.rejected_step(), counters.rejected_vehicle(),
-      counters.rejected_client(), counters.rejected_fault());
-  out << "\nEvents\n";
-  for (const auto& event : events_) out << "  " << event << '\n';
+      counters.take_overs(), counters.stale(), counters.held(), counters.fail_safe(),
+      counters.deadline_missed(), counters.overflow(), counters.slipped(),
+      counters.rejected_not_finite(), counters.rejected_force_limit(), counters.rejected_run(),
+      counters.rejected_step(), counters.rejected_vehicle(), counters.rejected_client(),
+      counters.rejected_fault());
+  out << fmt::format("  round trip p50 {:.1f} µs, p99 {:.1f} µs\n",
+                     static_cast<double>(last_status_.round_trip_p50_ns()) / 1e3,
+                     static_cast<double>(last_status_.round_trip_p99_ns()) / 1e3);
 }
 
 }  // namespace sls::record

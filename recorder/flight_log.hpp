@@ -10,7 +10,7 @@
 
 #include "common/bus/topics.hpp"
 #include "common/config/scenario.hpp"
-#include "recorder/step_join.hpp"
+#include "recorder/rows.hpp"
 
 namespace sls::record {
 
@@ -30,7 +30,7 @@ class FlightLog {
   FlightLog(const config::Scenario& scenario, const Parameters& parameters);
 
   /// Adds a complete step; the others say nothing about errors.
-  void add(const StepRecord& record);
+  void add(const StepRows& rows);
   void add(const SimStatus& status);
   /// A line of the recorder's own, such as what is missing.
   void add_event(const std::string& text);
@@ -46,7 +46,8 @@ class FlightLog {
     std::vector<ErrorStatistics> laps;  // of a figure eight
   };
 
-  Stage& find_or_begin_stage(const StepRecord& record);
+  Stage& find_or_begin_stage(const StepRows& rows);
+  void write_counters(std::ostream& out) const;
   std::size_t calc_lap(const Stage& stage, std::size_t index, std::uint64_t step) const;
   double to_time(std::uint64_t step) const;
 

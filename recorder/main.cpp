@@ -17,24 +17,32 @@ int main(int argc, char** argv) {
   CLI::App cli("Writes every sample of a run to CSV files.");
   app::CommonOptions options;
   options.qos_file = bus::default_qos_file();
-  std::filesystem::path folder;
+  record::RecorderOptions recorder;
   bool force = false;
+  bool resume = false;
   bool check = false;
   app::add_common_options(cli, options);
-  cli.add_option("--out", folder, "folder of the recording, new or empty")
+  cli.add_option("--out", recorder.folder, "folder of the recording, new or empty")
       ->type_name("DIR")
       ->required();
-  cli.add_flag("--force", force, "replace the recording that is there");
+  auto* force_flag = cli.add_flag("--force", force, "replace the recording that is there");
+  cli.add_flag("--resume", resume, "continue the unfinished recording that is there, if one is")
+      ->excludes(force_flag);
+  cli.add_flag("--follow", recorder.follow,
+               "when another server takes the place of ours, record its run into a subfolder");
   cli.add_flag("--check", check, "only check QoS file and folder, then end");
 
   return app::run_main(argc, argv, cli, options, "recorder", [&] {
     bus::check_qos_file(options.qos_file);
-    record::prepare_recording_folder(folder, force);
+    if (resume)
+      recorder.unfinished = record::find_unfinished_recording(recorder.folder);
+    else
+      record::prepare_recording_folder(recorder.folder, force);
     if (check) return;
     // The loop waits for server and client, not for us: whoever answers a step goes first. Before
     // any thread starts, as they inherit it. It does no harm where it is refused.
     setpriority(PRIO_PROCESS, 0, kNiceness);
     bus::Node node(options.qos_file, options.domain, "recorder");
-    record::Recorder(node, folder).run();
+    record::Recorder(node, recorder).run();
   });
 }

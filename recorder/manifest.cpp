@@ -12,6 +12,7 @@
 #include "common/app/options.hpp"
 #include "common/bus/names.hpp"
 #include "common/bus/node.hpp"
+#include "common/config/config_error.hpp"
 #include "common/config/sha256.hpp"
 
 namespace sls::record {
@@ -51,7 +52,40 @@ Json describe_machine() {
           {"kernel", name.release}};
 }
 
+ManifestFile to_manifest(const Json& json) {
+  ManifestFile manifest;
+  manifest.complete = json.at("complete");
+  manifest.outcome = json.at("outcome");
+  manifest.reason = json.at("reason");
+  manifest.run_id = json.at("run_id");
+  manifest.scenario_sha256 = json.at("scenario_sha256");
+  manifest.mode = json.at("mode");
+  manifest.period_s = json.at("period_s");
+  manifest.vehicle_ids = json.at("vehicle_ids").get<std::vector<std::uint32_t>>();
+  // Recordings of earlier versions have neither.
+  if (json.contains("segment")) manifest.first_step = json.at("segment").at("first_step");
+  manifest.certificate = json.value("certificate", "");
+  for (const auto& [name, file] : json.at("files").items()) {
+    ManifestFile::File& entry = manifest.files[name];
+    entry.sha256 = file.at("sha256");
+    if (file.contains("rows")) entry.rows = file.at("rows").get<std::uint64_t>();
+  }
+  for (const Json& steps : json.at("missing"))
+    manifest.missing.push_back(
+        {steps.at("vehicle_id"), steps.at("topic"), steps.at("from"), steps.at("to")});
+  return manifest;
+}
+
 }  // namespace
+
+std::string describe(const std::vector<MissingSteps>& missing) {
+  if (missing.empty()) return "nothing missing";
+  std::uint64_t steps = 0;
+  for (const MissingSteps& gap : missing) steps += gap.to - gap.from + 1;
+  const MissingSteps& first = missing.front();
+  return fmt::format("{} samples missing, first {} step {} of vehicle {}", steps, first.topic,
+                     first.from, first.vehicle_id);
+}
 
 void write_manifest(const std::filesystem::path& folder, const Manifest& manifest) {
   const Parameters& parameters = manifest.parameters;
@@ -69,25 +103,35 @@ void write_manifest(const std::filesystem::path& folder, const Manifest& manifes
                        {"from", steps.from},
                        {"to", steps.to}});
 
-  const Json json = {{"complete", manifest.complete},
-                     {"outcome", manifest.outcome},
-                     {"reason", manifest.reason},
-                     {"run_id", fmt::format("{:016x}", parameters.run_id())},
-                     {"scenario", manifest.scenario_name},
-                     {"scenario_sha256", parameters.scenario_sha256().to_string()},
-                     {"vehicle_ids", parameters.vehicle_ids()},
-                     {"period_s", static_cast<double>(parameters.period_ns()) / 1e9},
-                     {"step_s", static_cast<double>(parameters.step_ns()) / 1e9},
-                     {"mode", bus::to_string(parameters.mode())},
-                     {"last_step", manifest.last_step},
-                     {"versions",
-                      {{"recorder", app::version()},
-                       {"sim_server", parameters.version().to_string()},
-                       {"fast_dds", bus::middleware_version()}}},
-                     {"machine", describe_machine()},
-                     {"files", files},
-                     {"missing", missing},
-                     {"refused_samples", manifest.refused_samples}};
+  const Json json = {
+      {"complete", manifest.complete},
+      {"outcome", manifest.outcome},
+      {"reason", manifest.reason},
+      {"run_id", fmt::format("{:016x}", parameters.run_id())},
+      {"scenario", manifest.scenario_name},
+      {"scenario_sha256", parameters.scenario_sha256().to_string()},
+      {"vehicle_ids", parameters.vehicle_ids()},
+      {"period_s", static_cast<double>(parameters.period_ns()) / 1e9},
+      {"step_s", static_cast<double>(parameters.step_ns()) / 1e9},
+      {"mode", bus::to_string(parameters.mode())},
+      {"timing", manifest.timing},
+      {"certificate", manifest.certificate},
+      {"segment", {{"number", manifest.segment}, {"first_step", manifest.first_step}}},
+      {"last_step", manifest.last_step},
+      {"versions",
+       {{"recorder", app::version()},
+        {"sim_server", parameters.version().to_string()},
+        {"fast_dds", bus::middleware_version()}}},
+      {"machine", describe_machine()},
+      {"files", files},
+      {"missing", missing},
+      {"unanswered_steps", manifest.unanswered_steps},
+      {"rebuilt_commands", manifest.rebuilt_commands},
+      {"refused_samples", manifest.refused_samples},
+      {"dropped",
+       {{"repeated", manifest.dropped.repeated},
+        {"other_client", manifest.dropped.other_client},
+        {"out_of_range", manifest.dropped.out_of_range}}}};
 
   const auto target = folder / "manifest.json";
   const auto part = folder / "manifest.json.part";
@@ -102,6 +146,19 @@ void write_manifest(const std::filesystem::path& folder, const Manifest& manifes
     throw std::system_error(error, std::generic_category(), target.string() + ": cannot write");
   }
   std::filesystem::rename(part, target);
+}
+
+ManifestFile read_manifest(const std::filesystem::path& folder) {
+  const auto path = folder / "manifest.json";
+  std::ifstream stream(path, std::ios::binary);
+  if (!stream)
+    throw config::ConfigError(folder.string() +
+                              ": expected a recording, got no manifest.json that can be read");
+  try {
+    return to_manifest(Json::parse(stream));
+  } catch (const Json::exception& error) {
+    throw config::ConfigError(path.string() + ": expected a manifest, got: " + error.what());
+  }
 }
 
 }  // namespace sls::record

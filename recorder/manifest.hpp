@@ -2,10 +2,13 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "common/bus/topics.hpp"
+#include "recorder/step_join.hpp"
 
 namespace sls::record {
 
@@ -17,28 +20,59 @@ struct MissingSteps {
   std::uint64_t to = 0;  ///< inclusive
 };
 
+/// "3 samples missing, first sls/reference step 123 of vehicle 0".
+std::string describe(const std::vector<MissingSteps>& missing);
+
 struct RecordedFile {
   std::filesystem::path path;
   std::uint64_t rows = 0;
   bool has_rows = true;  ///< a CSV file: `rows` without its header
 };
 
-/// What a recording is and whether it is whole.
+/// What a recording is and whether it is whole. Of a segment after the first, `complete`, `missing`
+/// and `certificate` speak for all segments up to it, the rest for itself.
 struct Manifest {
   Parameters parameters;
   std::string scenario_name;
-  std::string outcome;  ///< recording, finished, failed, interrupted, lost
+  std::string outcome;  ///< recording, finished, failed, reset, interrupted, lost
   std::string reason;
+  std::string timing;  ///< the server's last label
+  std::string certificate;
+  int segment = 1;
+  std::uint64_t first_step = 0;  ///< where the segment takes over from those before
   std::uint64_t last_step = 0;
   std::vector<RecordedFile> files;
   std::vector<MissingSteps> missing;
-  std::uint64_t refused_samples = 0;  ///< lost because the recorder's queue was full
-  bool complete = false;              ///< the mission finished and nothing is missing
+  std::uint64_t unanswered_steps = 0;  ///< flown with a held answer or the fail-safe force
+  std::uint64_t rebuilt_commands = 0;  ///< made from the next state, as their samples were lost
+  std::uint64_t refused_samples = 0;   ///< lost because the recorder's queue was full
+  DroppedSamples dropped;
+  bool complete = false;  ///< the mission finished and nothing is missing
 };
 
 /// Writes `folder`/manifest.json, replacing an earlier one at once: a reader sees the old or the
 /// new one, never half of one.
 /// @throws std::system_error naming the file.
 void write_manifest(const std::filesystem::path& folder, const Manifest& manifest);
+
+/// A manifest as it reads back.
+struct ManifestFile {
+  struct File {
+    std::optional<std::uint64_t> rows;
+    std::string sha256;
+  };
+  bool complete = false;
+  std::string outcome, reason, run_id, scenario_sha256, mode;
+  double period_s = 0;
+  std::vector<std::uint32_t> vehicle_ids;
+  std::uint64_t first_step = 0;
+  std::string certificate;  ///< empty while recording
+  std::map<std::string, File> files;
+  std::vector<MissingSteps> missing;
+};
+
+/// Reads `folder`/manifest.json.
+/// @throws config::ConfigError naming the file if it cannot be read or is no manifest.
+ManifestFile read_manifest(const std::filesystem::path& folder);
 
 }  // namespace sls::record

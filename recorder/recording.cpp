@@ -13,6 +13,10 @@
 namespace sls::record {
 namespace {
 
+constexpr std::size_t kFlushBytes = 1 << 17;  // below that at which a file flushes on its own
+
+constexpr const char* kTopics[] = {StateRow::kTopic, CommandRow::kTopic, ReferenceRow::kTopic};
+
 void write_text(const std::filesystem::path& file, const std::string& text) {
   std::ofstream stream(file, std::ios::binary | std::ios::trunc);
   stream << text;
@@ -21,29 +25,73 @@ void write_text(const std::filesystem::path& file, const std::string& text) {
     throw std::system_error(errno, std::generic_category(), file.string() + ": cannot write");
 }
 
+Segment make_only_segment(const std::filesystem::path& folder) {
+  Segment segment;
+  segment.folder = folder;
+  return segment;
+}
+
+/// A segment goes on with the run of those before it, which has one scenario.
+config::Scenario parse_scenario(const Segment& segment, const Parameters& parameters) {
+  if (segment.earlier &&
+      segment.earlier->manifest().scenario_sha256 != parameters.scenario_sha256().to_string())
+    throw config::ConfigError(fmt::format(
+        "{}: expected scenario {} of the earlier segments, got {}", segment.folder.string(),
+        segment.earlier->manifest().scenario_sha256, parameters.scenario_sha256().c_str()));
+  return config::parse_scenario(parameters.scenario_text().to_string(), "sls/parameters");
+}
+
 }  // namespace
 
 Recording::Recording(const std::filesystem::path& folder, const Parameters& parameters)
-    : folder_(folder),
+    : Recording(make_only_segment(folder), parameters) {}
+
+Recording::Recording(const Segment& segment, const Parameters& parameters)
+    : segment_(segment),
       parameters_(parameters),
-      scenario_(config::parse_scenario(parameters.scenario_text().to_string(), "sls/parameters")),
-      states_(folder / "state.csv", kStateHeader),
-      commands_(folder / "command.csv", kCommandHeader),
-      references_(folder / "reference.csv", kReferenceHeader),
-      statuses_(folder / "status.csv", kStatusHeader),
-      flight_(folder / "flight.csv", kFlightHeader),
+      scenario_(parse_scenario(segment, parameters)),
+      states_(segment.folder / StateRow::kFile, StateRow::kHeader),
+      commands_(segment.folder / CommandRow::kFile, CommandRow::kHeader),
+      references_(segment.folder / ReferenceRow::kFile, ReferenceRow::kHeader),
+      statuses_(segment.folder / "status.csv", kStatusHeader),
+      flight_(segment.folder / "flight.csv", kFlightHeader),
       log_(scenario_, parameters) {
   for (const std::uint32_t id : parameters.vehicle_ids())
-    vehicles_.emplace(id, [this, id](const StepRecord& record) { write(id, record); });
-  write_text(folder / "scenario.yaml", scenario_.text);
+    vehicles_.emplace(id, StepJoin(
+                              [this, id](const StepRecord& record) {
+                                rebuilt_commands_ +=
+                                    record.origin == AnswerOrigin::kRebuilt ? 1 : 0;
+                                write(make_rows(id, record), record.is_answer_expected);
+                              },
+                              segment.first_step,
+                              [this, id](std::uint64_t from, std::uint64_t to) {
+                                note_missing_steps(id, from, to);
+                              }));
+  write_text(segment_.folder / "scenario.yaml", scenario_.text);
   flush();
-  Manifest manifest;
-  manifest.parameters = parameters_;
-  manifest.scenario_name = scenario_.name;
+  read_earlier_segments();
+  Manifest manifest = make_manifest();
   manifest.outcome = "recording";
   manifest.reason = "not finished: the recorder is running, or was killed";
-  write_manifest(folder_, manifest);
+  write_manifest(segment_.folder, manifest);
 }
+
+/// Certificate, log and gaps speak for the whole flight.
+void Recording::read_earlier_segments() {
+  if (!segment_.earlier) return;
+  for (const auto& [id, vehicle] : vehicles_) {
+    std::uint64_t next = 0;
+    StepReader reader(*segment_.earlier, id, segment_.first_step);
+    while (const auto rows = reader.next()) {
+      if (rows->step > next) note_missing_steps(id, next, rows->step - 1);
+      account(*rows, true);
+      next = rows->step + 1;
+    }
+    if (next < segment_.first_step) note_missing_steps(id, next, segment_.first_step - 1);
+  }
+}
+
+// --- samples in ----------------------------------------------------------------------------------
 
 StepJoin* Recording::find_vehicle(std::uint64_t run_id, std::uint32_t vehicle_id) {
   if (run_id != parameters_.run_id()) return nullptr;
@@ -67,6 +115,8 @@ void Recording::add(const Reference& reference) {
 
 void Recording::add(const SimStatus& status) {
   if (status.run_id() != parameters_.run_id()) return;
+  // A server that is discovered again sends its past again.
+  if (last_status_ && status.sample_index() <= last_status_->sample_index()) return;
   last_status_ = status;
   write_row(statuses_, status);
   log_.add(status);
@@ -75,33 +125,43 @@ void Recording::add(const SimStatus& status) {
       vehicle.set_end(status.step(), is_finished(), status.controller_name().to_string());
 }
 
-bool Recording::is_finished() const { return last_status_.phase() == PHASE_FINISHED; }
-bool Recording::has_ended() const { return is_finished() || last_status_.phase() == PHASE_FAILED; }
-
-void Recording::write(std::uint32_t vehicle_id, const StepRecord& record) {
-  if (record.state)
-    write_row(states_, *record.state);
-  else
-    note_missing(vehicle_id, "sls/state", record.step);
-  if (record.command)
-    write_row(commands_, *record.command);
-  else if (record.is_answer_expected)
-    note_missing(vehicle_id, "sls/command", record.step);
-  if (record.reference)
-    write_row(references_, *record.reference);
-  else if (record.is_answer_expected)
-    note_missing(vehicle_id, "sls/reference", record.step);
-  if (record.is_complete())
-    write_flight_row(flight_, *record.state, *record.command, *record.reference);
-  log_.add(record);
+void Recording::pass_time(StepJoin::Duration elapsed) {
+  for (auto& [id, vehicle] : vehicles_) vehicle.pass_time(elapsed);
 }
 
-void Recording::note_missing(std::uint32_t vehicle_id, const char* topic, std::uint64_t step) {
-  note_missing_range(vehicle_id, topic, step, step);
+// --- rows out ------------------------------------------------------------------------------------
+
+void Recording::write(const StepRows& rows, bool is_answer_expected) {
+  if (rows.state) write_row(states_, *rows.state);
+  if (rows.reference) write_row(references_, *rows.reference);
+  if (rows.is_complete()) write_flight_row(flight_, *rows.state, *rows.command, *rows.reference);
+  if (rows.command) {
+    write_row(commands_, *rows.command);
+    unanswered_steps_ += rows.command->is_unanswered() ? 1 : 0;
+  }
+  account(rows, is_answer_expected);
+  for (const CsvFile* file : files())
+    if (file->pending_bytes() >= kFlushBytes) return flush();
 }
 
-void Recording::note_missing_range(std::uint32_t vehicle_id, const char* topic, std::uint64_t from,
-                                   std::uint64_t to) {
+void Recording::account(const StepRows& rows, bool is_answer_expected) {
+  certificate_.add(rows);
+  log_.add(rows);
+  const auto note = [&](const char* topic) {
+    note_missing(rows.vehicle_id, topic, rows.step, rows.step);
+  };
+  if (!rows.state) note(StateRow::kTopic);
+  if (!rows.command && is_answer_expected) note(CommandRow::kTopic);
+  if (!rows.reference && is_answer_expected && !(rows.command && rows.command->is_unanswered()))
+    note(ReferenceRow::kTopic);
+}
+
+void Recording::note_missing_steps(std::uint32_t vehicle_id, std::uint64_t from, std::uint64_t to) {
+  for (const char* topic : kTopics) note_missing(vehicle_id, topic, from, to);
+}
+
+void Recording::note_missing(std::uint32_t vehicle_id, const char* topic, std::uint64_t from,
+                             std::uint64_t to) {
   const auto last =
       std::find_if(missing_.rbegin(), missing_.rend(), [&](const MissingSteps& steps) {
         return steps.vehicle_id == vehicle_id && steps.topic == topic;
@@ -112,14 +172,29 @@ void Recording::note_missing_range(std::uint32_t vehicle_id, const char* topic, 
     missing_.push_back({vehicle_id, topic, from, to});
 }
 
+/// Commands last: where a killed recorder leaves one, the step's other rows are there too.
+std::vector<CsvFile*> Recording::files() {
+  return {&states_, &references_, &flight_, &statuses_, &commands_};
+}
+
 void Recording::flush() {
-  for (CsvFile* file : {&states_, &commands_, &references_, &statuses_, &flight_}) file->flush();
+  for (CsvFile* file : files()) file->flush();
   flush_time_ = std::chrono::steady_clock::now();
 }
 
 void Recording::flush_if_due() {
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - flush_time_;
   if (elapsed.count() >= scenario_.record.flush_s) flush();
+}
+
+// --- how far it is -------------------------------------------------------------------------------
+
+bool Recording::is_finished() const {
+  return last_status_ && last_status_->phase() == PHASE_FINISHED;
+}
+
+bool Recording::has_ended() const {
+  return is_finished() || is_reset() || (last_status_ && last_status_->phase() == PHASE_FAILED);
 }
 
 bool Recording::has_all() const {
@@ -133,48 +208,71 @@ std::int64_t Recording::last_complete_step() const {
   return last;
 }
 
-bool Recording::finish(const std::string& interruption, std::uint64_t refused_samples) {
-  // Of a failed run's last step there may be nothing: it need not have been published.
-  const std::uint64_t end = is_finished() ? last_status_.step() + 1 : last_status_.step();
+std::optional<std::string> Recording::describe_stuck(StepJoin::Duration patience) const {
+  for (const auto& [id, vehicle] : vehicles_)
+    if (const auto stuck = vehicle.describe_stuck(patience))
+      return fmt::format("vehicle {}, {}", id, *stuck);
+  return std::nullopt;
+}
+
+// --- the end -------------------------------------------------------------------------------------
+
+bool Recording::finish(const std::string& interruption, std::uint64_t refused_samples,
+                       const std::string& outcome) {
   for (auto& [id, vehicle] : vehicles_) {
     vehicle.give_up();
+    if (!has_ended()) continue;
+    // Of a failed run's last step there may be nothing: it need not have been published.
+    const std::uint64_t end = last_status_->step() + (is_finished() ? 1 : 0);
     const auto next = static_cast<std::uint64_t>(vehicle.last_step() + 1);
-    if (has_ended() && next < end) {
-      for (const char* topic : {"sls/state", "sls/command", "sls/reference"})
-        note_missing_range(id, topic, next, end - 1);
-    }
+    if (next < end) note_missing_steps(id, next, end - 1);
   }
   interruption_ = interruption;
   refused_samples_ = refused_samples;
-  const bool complete = is_finished() && missing_.empty() && refused_samples == 0;
 
+  Manifest manifest = make_manifest();
+  manifest.complete = is_finished() && missing_.empty() && refused_samples == 0;
+  manifest.outcome = has_ended()            ? bus::to_string(last_status_->phase())
+                     : interruption.empty() ? "lost"
+                                            : outcome;
+  manifest.reason =
+      interruption.empty() && last_status_ ? last_status_->reason().to_string() : interruption;
+  manifest.certificate = certificate_.finish();
+
+  if (!interruption.empty()) log_.add_event("recorder: " + interruption);
+  if (!missing_.empty()) log_.add_event("recorder: " + describe(missing_));
+  std::ostringstream text;
+  log_.write(text);
+  write_text(segment_.folder / "flight.txt", text.str());
+  flush();
+
+  for (const CsvFile* file : files()) manifest.files.push_back({file->path(), file->rows(), true});
+  for (const char* name : {"flight.txt", "scenario.yaml"})
+    manifest.files.push_back({segment_.folder / name, 0, false});
+  write_manifest(segment_.folder, manifest);
+  return manifest.complete;
+}
+
+Manifest Recording::make_manifest() const {
   Manifest manifest;
   manifest.parameters = parameters_;
   manifest.scenario_name = scenario_.name;
-  manifest.complete = complete;
-  manifest.outcome = has_ended()            ? bus::to_string(last_status_.phase())
-                     : interruption.empty() ? "lost"
-                                            : "interrupted";
-  manifest.reason = interruption.empty() ? last_status_.reason().to_string() : interruption;
+  if (last_status_) manifest.timing = last_status_->timing().to_string();
+  manifest.segment = segment_.number;
+  manifest.first_step = segment_.first_step;
   manifest.last_step =
-      has_ended() ? last_status_.step()
+      has_ended() ? last_status_->step()
                   : static_cast<std::uint64_t>(std::max<std::int64_t>(last_complete_step(), 0));
   manifest.missing = missing_;
-  manifest.refused_samples = refused_samples;
-
-  if (!interruption.empty()) log_.add_event("recorder: " + interruption);
-  if (!missing_.empty()) log_.add_event("recorder: " + describe_missing());
-  std::ostringstream text;
-  log_.write(text);
-  write_text(folder_ / "flight.txt", text.str());
-  flush();
-
-  for (const CsvFile* file : {&states_, &commands_, &references_, &statuses_, &flight_})
-    manifest.files.push_back({file->path(), file->rows(), true});
-  for (const char* name : {"flight.txt", "scenario.yaml"})
-    manifest.files.push_back({folder_ / name, 0, false});
-  write_manifest(folder_, manifest);
-  return complete;
+  manifest.unanswered_steps = unanswered_steps_;
+  manifest.rebuilt_commands = rebuilt_commands_;
+  manifest.refused_samples = refused_samples_;
+  for (const auto& [id, vehicle] : vehicles_) {
+    manifest.dropped.repeated += vehicle.dropped().repeated;
+    manifest.dropped.other_client += vehicle.dropped().other_client;
+    manifest.dropped.out_of_range += vehicle.dropped().out_of_range;
+  }
+  return manifest;
 }
 
 std::string Recording::describe_gaps() const {
@@ -182,19 +280,13 @@ std::string Recording::describe_gaps() const {
   const auto append = [&](const std::string& gap) { text += (text.empty() ? "" : "; ") + gap; };
   if (!interruption_.empty()) append(interruption_);
   if (has_ended() && !is_finished())
-    append(fmt::format("run failed: {}", last_status_.reason().c_str()));
-  if (!missing_.empty()) append(describe_missing());
+    append(fmt::format("run {}{}{}", bus::to_string(last_status_->phase()),
+                       last_status_->reason().size() > 0 ? ": " : "",
+                       last_status_->reason().c_str()));
+  if (!missing_.empty()) append(describe(missing_));
   if (refused_samples_ > 0)
     append(fmt::format("{} samples lost because the queue was full", refused_samples_));
   return text.empty() ? "the run has not ended" : text;
-}
-
-std::string Recording::describe_missing() const {
-  std::uint64_t steps = 0;
-  for (const MissingSteps& gap : missing_) steps += gap.to - gap.from + 1;
-  const MissingSteps& first = missing_.front();
-  return fmt::format("{} samples missing, first {} step {} of vehicle {}", steps, first.topic,
-                     first.from, first.vehicle_id);
 }
 
 }  // namespace sls::record

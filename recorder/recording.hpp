@@ -6,24 +6,31 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "common/bus/topics.hpp"
 #include "common/config/scenario.hpp"
+#include "recorder/certificate.hpp"
 #include "recorder/csv_file.hpp"
 #include "recorder/flight_log.hpp"
 #include "recorder/manifest.hpp"
+#include "recorder/recording_folder.hpp"
 #include "recorder/step_join.hpp"
 
 namespace sls::record {
 
 class Recording {
  public:
-  /// Opens the files in `folder` (see prepare_recording_folder) and writes a manifest that says
-  /// "recording", not complete.
-  /// @throws config::ConfigError if the scenario in `parameters` cannot be read.
+  /// Opens the files in the segment's folder, which is ready for them, reads the segments before it
+  /// and writes a manifest that says "recording", not complete.
+  /// @throws config::ConfigError if the scenario in `parameters` cannot be read, or is not that of
+  ///   the earlier segments.
+  /// @throws DamagedError if an earlier segment cannot be read.
   /// Every member @throws std::system_error naming the file when the disk refuses.
+  Recording(const Segment& segment, const Parameters& parameters);
+  /// The same for a recording of one segment.
   Recording(const std::filesystem::path& folder, const Parameters& parameters);
 
   /// Samples of other runs and vehicles are ignored.
@@ -32,41 +39,58 @@ class Recording {
   void add(const Reference& reference);
   void add(const SimStatus& status);
 
+  /// Tells how much time has passed: what dead clients have kept back is not waited for forever.
+  void pass_time(StepJoin::Duration elapsed);
+
+  /// What it waits for although later states have been in for `patience`: in words.
+  std::optional<std::string> describe_stuck(StepJoin::Duration patience) const;
+
   /// Flushes the files if the last time is `record.flush_s` ago.
   void flush_if_due();
 
   /// True when the run has ended and every step of every vehicle is in.
   bool has_all() const;
 
+  /// True when the run was ended by an operator's reset.
+  bool is_reset() const { return last_status_ && last_status_->phase() == PHASE_RESET; }
+
   /// The last step of which, and of all before it, all vehicles' rows are in; −1: none.
   std::int64_t last_complete_step() const;
 
   /// Writes what is pending, flight.txt and the final manifest. `interruption` says why the
-  /// recorder stops early; empty where it did not. True if the recording is complete.
-  bool finish(const std::string& interruption, std::uint64_t refused_samples);
+  /// recorder stops early and `outcome` what that is called; empty where it did not. True if the
+  /// recording is complete.
+  bool finish(const std::string& interruption, std::uint64_t refused_samples,
+              const std::string& outcome = "interrupted");
 
   /// Why it is not complete, in one line; after `finish`.
   std::string describe_gaps() const;
 
  private:
-  void write(std::uint32_t vehicle_id, const StepRecord& record);
-  void note_missing(std::uint32_t vehicle_id, const char* topic, std::uint64_t step);
-  void note_missing_range(std::uint32_t vehicle_id, const char* topic, std::uint64_t from,
-                          std::uint64_t to);
+  void read_earlier_segments();
+  void write(const StepRows& rows, bool is_answer_expected);
+  void account(const StepRows& rows, bool is_answer_expected);
+  void note_missing(std::uint32_t vehicle_id, const char* topic, std::uint64_t from,
+                    std::uint64_t to);
+  void note_missing_steps(std::uint32_t vehicle_id, std::uint64_t from, std::uint64_t to);
   StepJoin* find_vehicle(std::uint64_t run_id, std::uint32_t vehicle_id);
   bool has_ended() const;
   bool is_finished() const;
+  std::vector<CsvFile*> files();
   void flush();
-  std::string describe_missing() const;
+  Manifest make_manifest() const;
 
-  const std::filesystem::path folder_;
+  const Segment segment_;
   const Parameters parameters_;
   const config::Scenario scenario_;
   CsvFile states_, commands_, references_, statuses_, flight_;
   FlightLog log_;
+  Certificate certificate_;
   std::map<std::uint32_t, StepJoin> vehicles_;
   std::vector<MissingSteps> missing_;
-  SimStatus last_status_;
+  std::uint64_t unanswered_steps_ = 0;
+  std::uint64_t rebuilt_commands_ = 0;
+  std::optional<SimStatus> last_status_;
   std::string interruption_;           // from `finish` on
   std::uint64_t refused_samples_ = 0;  // likewise
   std::chrono::steady_clock::time_point flush_time_;

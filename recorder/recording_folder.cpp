@@ -1,12 +1,15 @@
 #include "recorder/recording_folder.hpp"
 
+#include <spdlog/fmt/fmt.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <string>
 #include <string_view>
 #include <system_error>
+#include <vector>
 
 #include "common/config/config_error.hpp"
 
@@ -20,12 +23,64 @@ constexpr std::array<std::string_view, 9> kRecordingFiles = {
     "state.csv",  "command.csv",   "reference.csv", "status.csv",        "flight.csv",
     "flight.txt", "scenario.yaml", "manifest.json", "manifest.json.part"};
 
-bool is_recording_file(const fs::directory_entry& entry) {
+bool is_recording_file(const fs::path& path) {
+  return std::find(kRecordingFiles.begin(), kRecordingFiles.end(), path.filename().string()) !=
+         kRecordingFiles.end();
+}
+
+/// True where `name` is `prefix` and then `digits` alone.
+bool is_numbered(std::string_view name, std::string_view prefix, std::string_view digits) {
+  return name.size() > prefix.size() && name.substr(0, prefix.size()) == prefix &&
+         name.find_first_not_of(digits, prefix.size()) == name.npos;
+}
+
+bool is_recording_subfolder(const fs::path& path) {
+  const std::string name = path.filename().string();
+  const bool is_run = is_numbered(name, "run-", "0123456789abcdef") && name.size() == 4 + 16;
+  return is_run || (is_numbered(name, "segment-", "0123456789") && name[8] != '0');
+}
+
+fs::directory_iterator list(const std::string& place, const fs::path& folder) {
   std::error_code error;
-  if (fs::is_directory(entry.symlink_status(error))) return false;
-  for (const auto name : kRecordingFiles)
-    if (entry.path().filename() == name) return true;
-  return false;
+  fs::directory_iterator entries(folder, error);
+  if (error) throw ConfigError(place + ": expected a readable folder, got: " + error.message());
+  return entries;
+}
+
+/// Everything in `folder`, subfolders after what is in them.
+/// @throws ConfigError if something does not belong to a recording.
+std::vector<fs::path> list_recording(const std::string& place, const fs::path& folder) {
+  std::vector<fs::path> paths;
+  for (const auto& entry : list(place, folder)) {
+    std::error_code error;
+    const bool is_folder = fs::is_directory(entry.symlink_status(error));
+    if (is_folder && is_recording_subfolder(entry.path())) {
+      const auto inside = list_recording(place, entry.path());
+      paths.insert(paths.end(), inside.begin(), inside.end());
+    } else if (is_folder || !is_recording_file(entry.path())) {
+      throw ConfigError(place + ": expected nothing but an earlier recording, got '" +
+                        entry.path().filename().string() + "', which --force does not remove");
+    }
+    paths.push_back(entry.path());
+  }
+  return paths;
+}
+
+void remove_recording(const std::string& place, const fs::path& folder) {
+  for (const fs::path& path : list_recording(place, folder)) {
+    std::error_code error;
+    fs::remove(path, error);
+    if (error)
+      throw ConfigError(place + ": expected to replace '" + path.filename().string() +
+                        "', got: " + error.message());
+  }
+}
+
+/// A recorder that is killed at its very beginning has created files and written nothing yet.
+bool is_without_rows(const fs::path& folder) {
+  std::error_code error;
+  const auto size = fs::file_size(folder / StateRow::kFile, error);
+  return !error && size <= StateRow::kHeader.size() + 1;
 }
 
 }  // namespace
@@ -41,24 +96,37 @@ void prepare_recording_folder(const fs::path& folder, bool force) {
   if (::access(folder.c_str(), W_OK | X_OK) != 0)
     throw ConfigError(place + ": expected a folder that can be written, got: " +
                       std::generic_category().message(errno));
-
-  fs::directory_iterator entries(folder, error);
-  if (error) throw ConfigError(place + ": expected a readable folder, got: " + error.message());
-  for (const auto& entry : entries) {
-    if (!force)
-      throw ConfigError(place + ": expected an empty folder, got one with '" +
-                        entry.path().filename().string() +
-                        "' in it (--force replaces a recording)");
-    if (!is_recording_file(entry))
-      throw ConfigError(place + ": expected nothing but an earlier recording, got '" +
-                        entry.path().filename().string() + "', which --force does not remove");
-  }
-  for (const auto name : kRecordingFiles) {
-    fs::remove(folder / name, error);
-    if (error)
-      throw ConfigError(place + ": expected to replace '" + std::string(name) +
-                        "', got: " + error.message());
-  }
+  if (force) return remove_recording(place, folder);
+  for (const auto& entry : list(place, folder))
+    throw ConfigError(place + ": expected an empty folder, got one with '" +
+                      entry.path().filename().string() +
+                      "' in it (--force replaces a recording, --resume continues one)");
 }
+
+std::optional<RecordedFlight> find_unfinished_recording(const fs::path& folder) {
+  std::error_code error;
+  if (!fs::exists(folder / "manifest.json", error)) {
+    prepare_recording_folder(folder, is_without_rows(folder));
+    return std::nullopt;
+  }
+  RecordedFlight flight = open_recording(folder);
+  if (flight.manifest().complete)
+    throw ConfigError("--out " + folder.string() +
+                      ": expected an unfinished recording to resume, got a complete one");
+  return flight;
+}
+
+Segment make_next_segment(const RecordedFlight& earlier) {
+  Segment segment;
+  segment.number = static_cast<int>(earlier.segments.size()) + 1;
+  segment.folder = earlier.folder / name_segment(segment.number);
+  segment.first_step = find_next_step(earlier);
+  segment.earlier = earlier;
+  // One without a manifest is of a recorder that was killed before it had written anything.
+  prepare_recording_folder(segment.folder, true);
+  return segment;
+}
+
+std::string name_run(std::uint64_t run_id) { return fmt::format("run-{:016x}", run_id); }
 
 }  // namespace sls::record

@@ -1,11 +1,16 @@
 #include "recorder/step_join.hpp"
 
+#include <spdlog/fmt/fmt.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <utility>
 
 namespace sls::record {
 namespace {
+
+using namespace std::chrono_literals;
 
 /// A step for which something is missing while so many later states are in has lost it for good;
 /// what came after must not wait in memory for it. Answers can be no further ahead: the server
@@ -13,16 +18,28 @@ namespace {
 /// heard.
 constexpr std::uint64_t kMaxPending = 16384;
 
-/// An applied answer that has not come while so many later states are in was kept back by a client
-/// that died; the equal answer of another client, if there is one, stands for it. Well below the
-/// lag at which the server waits for the recorder.
+/// An accepted answer that has not come while so many later states are in was kept back by a client
+/// that died, and the answer to a step without one will not come. Well below the lag at which the
+/// server waits for the recorder.
 constexpr std::size_t kMaxPatience = 1000;
+
+/// The same in time, where the server waits for the recorder before so many states are in.
+constexpr auto kMaxStuckTime = 10s;
 
 /// No state can be that far ahead either. It bounds the memory a wrong sample can take.
 constexpr std::uint64_t kMaxAhead = 65536;
 
+/// Answers kept before the first state: more than the histories of several clients hold.
+constexpr std::size_t kMaxEarly = 32768;
+
 /// Different answers kept for one step: more than any number of clients that fly one vehicle.
 constexpr std::size_t kMaxAnswers = 32;
+
+using Force = std::array<double, 3>;
+
+bool are_same_bits(const Force& a, const Force& b) {
+  return std::memcmp(a.data(), b.data(), sizeof a) == 0;
+}
 
 template <class Sample>
 const Sample* find_by_client(const std::vector<Sample>& samples, const std::string& client) {
@@ -32,11 +49,11 @@ const Sample* find_by_client(const std::vector<Sample>& samples, const std::stri
   return found == samples.end() ? nullptr : &*found;
 }
 
-/// Of one client and alike in what decides whether it is the one that was applied. Anybody can send
-/// under any name, so the name alone does not say that.
+/// Of one client and alike in what decides whether it is the one that was accepted. Anybody can
+/// send under any name, so the name alone does not say that.
 bool are_copies(const ControlCommand& a, const ControlCommand& b) {
   return a.client_name() == b.client_name() && a.mission() == b.mission() &&
-         std::memcmp(a.f_Q_W_n().data(), b.f_Q_W_n().data(), sizeof a.f_Q_W_n()) == 0;
+         are_same_bits(a.f_Q_W_n(), b.f_Q_W_n());
 }
 bool are_copies(const Reference& a, const Reference& b) {
   return a.client_name() == b.client_name();
@@ -59,7 +76,37 @@ bool add_answer(std::vector<Sample>& samples, const Sample& sample) {
   return true;
 }
 
+/// The first answer with its reference, of whichever client, of which `is_equal` holds.
+template <class Pending, class IsEqual>
+void find_stand_in(const Pending& pending, IsEqual is_equal, StepRecord& record) {
+  for (const ControlCommand& command : pending.commands) {
+    const auto* reference = find_by_client(pending.references, command.client_name().to_string());
+    if (!reference || !is_equal(command)) continue;
+    record.command = command;
+    record.reference = *reference;
+    return;
+  }
+}
+
+/// The answer to the step before `next`, as far as `next` tells it.
+ControlCommand make_command(const VehicleState& next, const Force& f_Q_W) {
+  ControlCommand command;
+  command.run_id(next.run_id());
+  command.vehicle_id(next.vehicle_id());
+  command.step(next.step() - 1);
+  command.f_Q_W_n(f_Q_W);
+  command.client_name(next.controller_name());
+  command.controller(next.controller());
+  return command;
+}
+
+bool is_unanswered(const VehicleState& next) {
+  return next.force_origin() == FORCE_HELD || next.force_origin() == FORCE_FAIL_SAFE;
+}
+
 }  // namespace
+
+// --- samples in ----------------------------------------------------------------------------------
 
 StepJoin::Pending* StepJoin::find(std::uint64_t step, std::uint64_t max_ahead) {
   if (step < next_step_) {
@@ -75,7 +122,27 @@ StepJoin::Pending* StepJoin::find(std::uint64_t step, std::uint64_t max_ahead) {
   return &pending_[index];
 }
 
+/// Only the first state tells where the flight is: answers that came before it had to wait.
+void StepJoin::begin(std::uint64_t first_state) {
+  has_begun_ = true;
+  if (first_state > next_step_) {
+    if (gap_sink_) gap_sink_(next_step_, first_state - 1);
+    next_step_ = first_state;
+  }
+  for (const auto& command : std::exchange(early_commands_, {})) add(command);
+  for (const auto& reference : std::exchange(early_references_, {})) add(reference);
+}
+
+template <class Sample>
+void StepJoin::keep_early(std::vector<Sample>& early, const Sample& sample) {
+  if (early.size() < kMaxEarly)
+    early.push_back(sample);
+  else
+    ++dropped_.out_of_range;
+}
+
 void StepJoin::add(const VehicleState& state) {
+  if (!has_begun_) begin(state.step());
   Pending* pending = find(state.step(), kMaxAhead);
   if (!pending) return;
   if (pending->state) {
@@ -83,39 +150,83 @@ void StepJoin::add(const VehicleState& state) {
     return;
   }
   pending->state = state;
-  hand_on_complete_steps();
+  pending->state_time = clock_;
+  ++states_pending_;
+  hand_on_settled_steps();
 }
 
 void StepJoin::add(const ControlCommand& command) {
+  if (!has_begun_) return keep_early(early_commands_, command);
   Pending* pending = find(command.step(), kMaxPending);
   if (!pending) return;
   if (!add_answer(pending->commands, command)) ++dropped_.repeated;
-  hand_on_complete_steps();
+  hand_on_settled_steps();
 }
 
 void StepJoin::add(const Reference& reference) {
+  if (!has_begun_) return keep_early(early_references_, reference);
   Pending* pending = find(reference.step(), kMaxPending);
   if (!pending) return;
   if (!add_answer(pending->references, reference)) ++dropped_.repeated;
-  hand_on_complete_steps();
+  hand_on_settled_steps();
 }
 
 void StepJoin::set_end(std::uint64_t last_step, bool is_finished,
                        const std::string& last_controller) {
   end_ = {last_step, is_finished, last_controller};
-  hand_on_complete_steps();
+  hand_on_settled_steps();
 }
+
+// --- how far it is -------------------------------------------------------------------------------
 
 bool StepJoin::has_ended() const { return end_ && next_step_ > end_->step; }
 
 bool StepJoin::is_last(std::uint64_t step) const { return end_ && step == end_->step; }
 
-std::optional<std::string> StepJoin::find_applied_client(std::uint64_t step) const {
-  if (is_last(step)) return end_->controller;
-  const std::size_t index = static_cast<std::size_t>(step - next_step_) + 1;
-  if (index >= pending_.size() || !pending_[index].state) return std::nullopt;
-  return pending_[index].state->controller_name().to_string();
+/// A run that failed or was reset may end before the state of its last step was published: nothing
+/// more will tell of the answer to the step before.
+bool StepJoin::is_last_published() const {
+  return is_giving_up_ && end_ && !end_->is_finished && next_step_ + 1 == end_->step &&
+         !next_state();
 }
+
+const VehicleState* StepJoin::next_state() const {
+  return pending_.size() > 1 && pending_[1].state ? &*pending_[1].state : nullptr;
+}
+
+bool StepJoin::is_stuck(Duration patience) const {
+  for (std::size_t i = 1; i < pending_.size(); ++i)
+    if (pending_[i].state) return clock_ - pending_[i].state_time >= patience;
+  return false;
+}
+
+bool StepJoin::is_late() const {
+  return is_giving_up_ || states_pending_ > kMaxPatience || is_stuck(kMaxStuckTime);
+}
+
+std::optional<std::string> StepJoin::describe_stuck(Duration patience) const {
+  if (pending_.empty() || !is_stuck(patience)) return std::nullopt;
+  const Pending& first = pending_.front();
+  const VehicleState* next = next_state();
+  if (next && is_unanswered(*next)) return std::nullopt;  // what may not come is not missed
+  std::string missing = !first.state                  ? "the state"
+                        : !next                       ? "the next state"
+                        : !make_record(first).command ? "the command"
+                                                      : "the reference";
+  if (first.state && next) missing += fmt::format(" of '{}'", next->controller_name().c_str());
+  return fmt::format("step {}: {}", next_step_, missing);
+}
+
+void StepJoin::pass_time(Duration elapsed) {
+  clock_ += elapsed;
+  hand_on_settled_steps();
+  while (!pending_.empty() && !has_ended() && is_stuck(kMaxStuckTime)) {
+    hand_on_first();
+    hand_on_settled_steps();
+  }
+}
+
+// --- which answer --------------------------------------------------------------------------------
 
 StepRecord StepJoin::make_record(const Pending& pending) const {
   StepRecord record;
@@ -123,69 +234,101 @@ StepRecord StepJoin::make_record(const Pending& pending) const {
   record.state = pending.state;
   record.is_answer_expected =
       end_ ? end_->is_finished || next_step_ < end_->step : pending_.size() > 1;
-  const auto client = find_applied_client(next_step_);
-  if (!client) return record;
-  if (const ControlCommand* command = find_applied_command(pending, *client))
-    record.command = *command;
-  const bool is_any_taken = is_last(next_step_) && !end_->is_finished;
-  if (const auto* reference = find_by_client(
-          pending.references, record.command ? record.command->client_name().to_string() : *client))
-    record.reference = *reference;
-  else if (is_any_taken && !pending.references.empty())
-    record.reference = pending.references.front();
-  const bool is_kept_back = is_giving_up_ || pending_.size() > kMaxPatience;
-  if (!record.is_complete() && is_kept_back && !is_last(next_step_)) find_stand_in(pending, record);
+  if (is_last(next_step_) || is_last_published())
+    settle_last(pending, record);
+  else if (const VehicleState* next = next_state())
+    is_unanswered(*next) ? settle_unanswered(pending, *next, record)
+                         : settle(pending, *next, record);
   return record;
 }
 
-/// Fills in the first whole answer, of whichever client, with the force that was applied.
-void StepJoin::find_stand_in(const Pending& pending, StepRecord& record) const {
-  for (const ControlCommand& command : pending.commands) {
-    const auto* reference = find_by_client(pending.references, command.client_name().to_string());
-    if (!reference || !(pending_[1].state->f_Q_W_n() == command.f_Q_W_n())) continue;
-    record.command = command;
+/// No next state tells the force; the final status names the client, and of a finished run the
+/// accepted answer is one that ends the mission.
+void StepJoin::settle_last(const Pending& pending, StepRecord& record) const {
+  const bool is_any_taken = !end_->is_finished;
+  for (const ControlCommand& command : pending.commands)
+    if (!record.command && command.client_name() == end_->controller &&
+        (is_any_taken || ends_mission(command)))
+      record.command = command;
+  if (!record.command && is_any_taken && !pending.commands.empty())
+    record.command = pending.commands.front();
+
+  const std::string client =
+      record.command ? record.command->client_name().to_string() : end_->controller;
+  if (const Reference* reference = find_by_client(pending.references, client))
     record.reference = *reference;
-    return;
-  }
+  else if (is_any_taken && !pending.references.empty())
+    record.reference = pending.references.front();
 }
 
-/// What the client is known to have sent that was applied: the force that state k + 1 says, or the
-/// end of the mission.
-const ControlCommand* StepJoin::find_applied_command(const Pending& pending,
-                                                     const std::string& client) const {
-  const auto& commands = pending.commands;
-  const bool is_end = is_last(next_step_);
-  const auto applied =
-      std::find_if(commands.begin(), commands.end(), [&](const ControlCommand& command) {
-        if (!(command.client_name() == client)) return false;
-        if (is_end) return !end_->is_finished || ends_mission(command);
-        return pending_[1].state->f_Q_W_n() == command.f_Q_W_n();
-      });
-  if (applied != commands.end()) return &*applied;
-  const bool is_any_taken = is_end && !end_->is_finished && !commands.empty();
-  return is_any_taken ? &commands.front() : nullptr;
+/// The accepted answer is the one of the client that state k + 1 names with the force it says.
+void StepJoin::settle(const Pending& pending, const VehicleState& next, StepRecord& record) const {
+  const std::string client = next.controller_name().to_string();
+  const auto is_accepted = [&](const ControlCommand& command) {
+    return are_same_bits(command.f_Q_W_n(), next.answer_f_Q_W_n());
+  };
+  for (const ControlCommand& command : pending.commands)
+    if (!record.command && command.client_name() == client && is_accepted(command))
+      record.command = command;
+  if (const Reference* reference = find_by_client(pending.references, client))
+    record.reference = *reference;
+  if (record.is_complete() || !is_late()) return;
+
+  // The client died. With its reference, the next state says all; without, an equal answer does.
+  if (!record.reference) find_stand_in(pending, is_accepted, record);
+  if (record.command || next.force_origin() != FORCE_ANSWERED) return;
+  record.command = make_command(next, next.answer_f_Q_W_n());
+  record.origin = AnswerOrigin::kRebuilt;
 }
 
-void StepJoin::hand_on_complete_steps() {
+/// Nobody's answer was in force. What its client would have followed may still come.
+void StepJoin::settle_unanswered(const Pending& pending, const VehicleState& next,
+                                 StepRecord& record) const {
+  const bool is_held = next.force_origin() == FORCE_HELD;
+  record.command = make_command(next, is_held ? next.answer_f_Q_W_n() : next.f_Q_W_n());
+  record.origin = is_held ? AnswerOrigin::kHeld : AnswerOrigin::kFailSafe;
+  const std::string client = next.controller_name().to_string();
+  if (const Reference* reference = find_by_client(pending.references, client))
+    record.reference = *reference;
+  else if (is_late() && !pending.references.empty())
+    record.reference = pending.references.front();
+}
+
+// --- handing on ----------------------------------------------------------------------------------
+
+/// A quick look, because most samples that come settle nothing.
+bool StepJoin::may_be_settled(const Pending& pending) const {
+  if (!pending.state) return false;
+  return (!pending.commands.empty() && !pending.references.empty()) ||
+         (next_state() && (is_unanswered(*next_state()) || is_late()));
+}
+
+bool StepJoin::is_settled(const StepRecord& record) const {
+  return record.is_complete() || (record.state && record.is_unanswered() && is_late());
+}
+
+void StepJoin::hand_on_settled_steps() {
   while (!pending_.empty() && !has_ended()) {
     const Pending& first = pending_.front();
-    const bool is_complete = first.state && !first.commands.empty() && !first.references.empty() &&
-                             make_record(first).is_complete();
-    if (!is_complete && pending_.size() <= kMaxPending) return;
+    const bool is_ready = may_be_settled(first) && is_settled(make_record(first));
+    if (!is_ready && pending_.size() <= kMaxPending) return;
     hand_on_first();
   }
 }
 
 void StepJoin::hand_on_first() {
   const StepRecord record = make_record(pending_.front());
-  const auto& first = pending_.front();
-  dropped_.other_client += first.commands.size() - (record.command ? 1 : 0);
+  const Pending& first = pending_.front();
+  const bool is_taken = record.command && record.origin == AnswerOrigin::kSent;
+  dropped_.other_client += first.commands.size() - (is_taken ? 1 : 0);
+  if (first.state) --states_pending_;
   sink_(record);
   pending_.pop_front();
   ++next_step_;
 }
 
 void StepJoin::give_up() {
+  if (!has_begun_) begin(next_step_);
   is_giving_up_ = true;
   while (!pending_.empty() && !has_ended()) hand_on_first();
 }

@@ -1,6 +1,8 @@
-/// Puts the samples of three topics together, step by step and in order. No files, no network here.
+/// Puts the samples of three topics together, step by step and in order. No files, no network, no
+/// clock here.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <deque>
 #include <functional>
@@ -12,16 +14,28 @@
 
 namespace sls::record {
 
+/// Where the command of a step comes from.
+enum class AnswerOrigin {
+  kSent,     ///< the accepted command, or an equal one of another client
+  kRebuilt,  ///< accepted, but its sample died with its client: made from the next state
+  kHeld,     ///< none was in force, an older answer was held: made from the next state
+  kFailSafe  ///< none was in force, the server's fail-safe was: made from the next state
+};
+
 /// What is recorded of one step of one vehicle. `command` and `reference` are those of the client
-/// whose answer was applied.
+/// whose answer was accepted.
 struct StepRecord {
   std::uint64_t step = 0;
   std::optional<VehicleState> state;
   std::optional<ControlCommand> command;
   std::optional<Reference> reference;
+  AnswerOrigin origin = AnswerOrigin::kSent;  ///< of `command`
   bool is_answer_expected = true;  ///< not so for the last step of a run that failed or was lost
 
   bool is_complete() const { return state && command && reference; }
+  bool is_unanswered() const {
+    return origin == AnswerOrigin::kHeld || origin == AnswerOrigin::kFailSafe;
+  }
 };
 
 /// Samples dropped on purpose, by reason.
@@ -31,13 +45,19 @@ struct DroppedSamples {
   std::uint64_t out_of_range = 0;  ///< steps that no run could have reached yet
 };
 
-/// Which client's answer to step k was applied is known from state k + 1, or for the last step from
-/// the final status. A step is handed on when all before it have been and its three samples are in.
+/// Which client's answer to step k was accepted is known from state k + 1, or for the last step
+/// from the final status. A step is handed on when all before it have been and its three samples
+/// are in; what dying or late clients keep back is not waited for without end (README.md).
 class StepJoin {
  public:
+  using Duration = std::chrono::steady_clock::duration;
   using Sink = std::function<void(const StepRecord&)>;
+  /// Called where steps [from, to] were over before the first state that came.
+  using GapSink = std::function<void(std::uint64_t from, std::uint64_t to)>;
 
-  explicit StepJoin(Sink sink) : sink_(std::move(sink)) {}
+  /// Begins with `first_step`, or with the first state that comes if that is a later one.
+  explicit StepJoin(Sink sink, std::uint64_t first_step = 0, GapSink gap_sink = {})
+      : sink_(std::move(sink)), gap_sink_(std::move(gap_sink)), next_step_(first_step) {}
 
   void add(const VehicleState& state);
   void add(const ControlCommand& command);
@@ -46,6 +66,13 @@ class StepJoin {
   /// The run's last step is `last_step`. A finished run has an answer to it, by
   /// `last_controller`; a failed run's last step may have none, and any client's is recorded.
   void set_end(std::uint64_t last_step, bool is_finished, const std::string& last_controller);
+
+  /// Tells how much time has passed. A step that waits for an answer while later states have been
+  /// in for 10 s has lost it for good, and is handed on as it is.
+  void pass_time(Duration elapsed);
+
+  /// What the first step waits for, where later states have been in for `patience`: in words.
+  std::optional<std::string> describe_stuck(Duration patience) const;
 
   /// True when the end is known and every step up to it has been handed on.
   bool has_ended() const;
@@ -63,21 +90,37 @@ class StepJoin {
     std::optional<VehicleState> state;
     std::vector<ControlCommand> commands;  // different ones
     std::vector<Reference> references;     // one per client
+    Duration state_time{};                 // on the clock of pass_time
   };
 
+  void begin(std::uint64_t first_state);
+  template <class Sample>
+  void keep_early(std::vector<Sample>& early, const Sample& sample);
   Pending* find(std::uint64_t step, std::uint64_t max_ahead);
-  std::optional<std::string> find_applied_client(std::uint64_t step) const;
-  StepRecord make_record(const Pending& pending) const;
-  void find_stand_in(const Pending& pending, StepRecord& record) const;
-  const ControlCommand* find_applied_command(const Pending& pending,
-                                             const std::string& client) const;
+  const VehicleState* next_state() const;
   bool is_last(std::uint64_t step) const;
-  void hand_on_complete_steps();
+  bool is_last_published() const;
+  bool is_stuck(Duration patience) const;
+  bool is_late() const;
+  bool may_be_settled(const Pending& pending) const;
+
+  StepRecord make_record(const Pending& pending) const;
+  void settle_last(const Pending& pending, StepRecord& record) const;
+  void settle(const Pending& pending, const VehicleState& next, StepRecord& record) const;
+  void settle_unanswered(const Pending& pending, const VehicleState& next,
+                         StepRecord& record) const;
+  bool is_settled(const StepRecord& record) const;
+  void hand_on_settled_steps();
   void hand_on_first();
 
   Sink sink_;
-  std::deque<Pending> pending_;  // from next_step_ on
-  std::uint64_t next_step_ = 0;
+  GapSink gap_sink_;
+  bool has_begun_ = false;                      // a state has come
+  std::vector<ControlCommand> early_commands_;  // before that
+  std::vector<Reference> early_references_;     // likewise
+  std::deque<Pending> pending_;                 // from next_step_ on
+  std::size_t states_pending_ = 0;              // among them
+  std::uint64_t next_step_;
   struct End {
     std::uint64_t step;
     bool is_finished;
@@ -85,6 +128,7 @@ class StepJoin {
   };
   std::optional<End> end_;
   bool is_giving_up_ = false;
+  Duration clock_{};
   DroppedSamples dropped_;
 };
 

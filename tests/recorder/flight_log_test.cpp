@@ -14,17 +14,17 @@ namespace {
 
 using namespace test;
 
-StepRecord make_record(std::uint64_t step) {
+StepRows make_rows(std::uint64_t step) {
   StepRecord record;
   record.step = step;
   record.state = make_state(step);
   record.command = make_command(step);
   record.reference = make_reference(step);
-  return record;
+  return record::make_rows(0, record);
 }
 
 Eigen::Vector3d calc_error(std::uint64_t step) {
-  return bus::to_vector(make_state(step).p_WL_m()) -
+  return bus::to_vector(make_state(step).truth().p_WL_m()) -
          bus::to_vector(make_reference(step).position_m());
 }
 
@@ -114,7 +114,7 @@ TEST(ErrorStatisticsTest, AgreesWithADirectSum) {
 }
 
 TEST_F(FlightLogTest, EachStageHasItsErrorsAndTimes) {
-  for (std::uint64_t step = 0; step <= kLastStep; ++step) log_.add(make_record(step));
+  for (std::uint64_t step = 0; step <= kLastStep; ++step) log_.add(make_rows(step));
   const std::string text = write(log_);
   expect_statistics(text, "0 hold", calc_expected(0, 99));
   expect_statistics(text, "1 figure_eight", calc_expected(100, kLastStep));
@@ -123,7 +123,7 @@ TEST_F(FlightLogTest, EachStageHasItsErrorsAndTimes) {
 }
 
 TEST_F(FlightLogTest, LapsOfAFigureEightAreSeparateAndTheLastSampleBelongsToTheLastLap) {
-  for (std::uint64_t step = 0; step <= kLastStep; ++step) log_.add(make_record(step));
+  for (std::uint64_t step = 0; step <= kLastStep; ++step) log_.add(make_rows(step));
   const std::string text = write(log_);
   expect_statistics(text, "lap 1", calc_expected(100, 199));
   expect_statistics(text, "lap 2", calc_expected(200, kLastStep));
@@ -139,7 +139,7 @@ TEST(FlightLogLapTest, ALapBeginsAtItsFirstSampleWhateverItsPeriod) {
   replace("period_s: 0.4 }", "period_s: 0.1 }");
   replace("for_s: 0.8", "for_s: 1.2");
   FlightLog log(config::parse_scenario(text, "scenario"), make_parameters());
-  for (std::uint64_t step = 100; step <= 400; ++step) log.add(make_record(step > 300 ? 300 : step));
+  for (std::uint64_t step = 100; step <= 400; ++step) log.add(make_rows(step > 300 ? 300 : step));
   const std::string out = write(log);
   for (std::uint64_t lap = 0; lap < 8; ++lap)  // 25 steps each
     expect_statistics(out, "lap " + std::to_string(lap + 1) + " ",
@@ -147,10 +147,10 @@ TEST(FlightLogLapTest, ALapBeginsAtItsFirstSampleWhateverItsPeriod) {
 }
 
 TEST_F(FlightLogTest, AStageThatIsFlownAgainIsAStageOfItsOwn) {
-  for (const std::uint64_t step : {0u, 1u, 100u, 101u}) log_.add(make_record(step));
-  StepRecord again = make_record(102);
-  again.reference->stage_index(0);
-  again.reference->stage_name("hold");
+  for (const std::uint64_t step : {0u, 1u, 100u, 101u}) log_.add(make_rows(step));
+  StepRows again = make_rows(102);
+  again.reference->stage = 0;
+  again.reference->stage_name = "hold";
   log_.add(again);
   const std::string text = write(log_);
   const auto first = text.find("0 hold");
@@ -159,19 +159,19 @@ TEST_F(FlightLogTest, AStageThatIsFlownAgainIsAStageOfItsOwn) {
 
 TEST_F(FlightLogTest, IncompleteStepsSayNothingAboutErrors) {
   for (std::uint64_t step = 0; step < 100; ++step) {
-    StepRecord record = make_record(step);
-    if (step % 3 == 0) record.state.reset();
-    if (step % 3 == 1) record.reference.reset();
-    if (step % 3 == 2) record.command.reset();
-    log_.add(record);
+    StepRows rows = make_rows(step);
+    if (step % 3 == 0) rows.state.reset();
+    if (step % 3 == 1) rows.reference.reset();
+    if (step % 3 == 2) rows.command.reset();
+    log_.add(rows);
   }
   EXPECT_EQ(write(log_).find("0 hold"), std::string::npos);
 }
 
 TEST_F(FlightLogTest, AStageTheScenarioDoesNotHaveIsListedWithoutLaps) {
-  StepRecord record = make_record(0);
-  record.reference->stage_index(4000000000u);
-  log_.add(record);
+  StepRows rows = make_rows(0);
+  rows.reference->stage = 4000000000u;
+  log_.add(rows);
   const std::string text = write(log_);
   EXPECT_NE(text.find("4000000000"), std::string::npos) << text;
   EXPECT_EQ(text.find("lap 1"), std::string::npos) << text;
@@ -188,8 +188,8 @@ TEST_F(FlightLogTest, TellsWhatWasFlownAndWhatHappened) {
   for (const char* part :
        {"synthetic: finished", "0123456789abcdef", "quadrotor 1.5 kg", "load 0.2 kg", "rod 1 m",
         "9.8 m/s²", "period 0.004 s", "step 0.001 s", "lockstep", "300 steps", "1.2 s simulated",
-        "states resent 11", "fault 12", "recorder: all is well", "step 300 (1.2 s)",
-        "mission finished"})
+        "states resent 11", "fault 12", "timing: exact", "fail-safe 0", "round trip p50 81.2 µs",
+        "recorder: all is well", "step 300 (1.2 s)", "mission finished"})
     EXPECT_NE(text.find(part), std::string::npos) << part << "\n" << text;
   const auto events = text.substr(text.find("Events\n") + 7);
   EXPECT_EQ(std::count(events.begin(), events.end(), '\n'), 4) << events;

@@ -7,6 +7,7 @@
 #include <iostream>
 
 #include "common/config/config_error.hpp"
+#include "tests/recorder/flights.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace sls::record {
@@ -108,6 +109,79 @@ TEST_F(RecordingFolderTest, ForceRefusesAFolderThatIsCalledLikeAFileAndRemovesNo
     EXPECT_TRUE(fs::exists(out_ / "state.csv"));
     EXPECT_TRUE(fs::is_directory(out_ / "status.csv"));
   }
+}
+
+TEST_F(RecordingFolderTest, ForceReplacesSegmentsAndFurtherRunsToo) {
+  for (const char* subfolder :
+       {"", "segment-2", "run-0123456789abcdef", "run-0123456789abcdef/segment-10"})
+    fill(out_ / subfolder);
+  EXPECT_EQ(find_error(out_, true), "no error");
+  EXPECT_TRUE(fs::is_empty(out_));
+}
+
+TEST_F(RecordingFolderTest, ForceRefusesSubfoldersWithAnythingElseAndRemovesNothing) {
+  for (const char* foreign : {"segment-2/notes.txt", "run-0123456789abcdef/segment-3/notes.txt",
+                              "segment-0/state.csv", "run-1/state.csv", "figures/state.csv"}) {
+    SCOPED_TRACE(foreign);
+    fs::remove_all(out_);
+    for (const char* subfolder : {"", "segment-2", "run-0123456789abcdef"}) fill(out_ / subfolder);
+    fs::create_directories((out_ / foreign).parent_path());
+    write_bytes(out_ / foreign, "mine");
+    EXPECT_NE(find_error(out_, true).find("which --force does not remove"), std::string::npos);
+    for (const char* name : kFiles) {
+      EXPECT_TRUE(fs::exists(out_ / name)) << name;
+      EXPECT_TRUE(fs::exists(out_ / "segment-2" / name)) << name;
+    }
+    EXPECT_TRUE(fs::exists(out_ / foreign));
+  }
+}
+
+// --- what can be resumed -------------------------------------------------------------------------
+
+class ResumeTest : public RecordingFolderTest {
+ protected:
+  std::string find_resume_error() {
+    try {
+      find_unfinished_recording(out_);
+    } catch (const config::ConfigError& error) {
+      EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
+      return error.what();
+    }
+    return "no error";
+  }
+};
+
+TEST_F(ResumeTest, NewAndEmptyFoldersAndOnesWithoutARowAreFresh) {
+  EXPECT_FALSE(find_unfinished_recording(out_));
+  EXPECT_FALSE(find_unfinished_recording(out_));
+  write_bytes(out_ / "state.csv", std::string(StateRow::kHeader) + "\n");
+  write_bytes(out_ / "command.csv", "");
+  EXPECT_FALSE(find_unfinished_recording(out_));
+  EXPECT_TRUE(fs::is_empty(out_));
+}
+
+TEST_F(ResumeTest, AnUnfinishedRecordingIsFound) {
+  fs::create_directory(out_);
+  test::record_until_killed(test::make_segment(out_), 0, 100);
+  const auto flight = find_unfinished_recording(out_);
+  ASSERT_TRUE(flight);
+  EXPECT_EQ(flight->manifest().run_id, "0123456789abcdef");
+  EXPECT_EQ(find_next_step(*flight), 100u);
+}
+
+TEST_F(ResumeTest, ACompleteRecordingIsRefused) {
+  fs::create_directory(out_);
+  test::record_flight(out_);
+  EXPECT_NE(find_resume_error().find("got a complete one"), std::string::npos);
+}
+
+TEST_F(ResumeTest, WhatIsNoRecordingIsRefusedAndKept) {
+  fill(out_);
+  EXPECT_NE(find_resume_error().find("manifest.json"), std::string::npos);
+  fs::remove(out_ / "manifest.json");
+  write_bytes(out_ / "state.csv", std::string(1000, 'x'));
+  EXPECT_NE(find_resume_error().find("expected an empty folder"), std::string::npos);
+  EXPECT_TRUE(fs::exists(out_ / "state.csv"));
 }
 
 TEST_F(RecordingFolderTest, ALinkIsRemovedAndItsTargetKept) {

@@ -135,7 +135,7 @@ TEST_F(RecordingTest, RowsHoldTheSamplesToTheBit) {
       ASSERT_EQ(std::stod(table.rows[row][first + i]), values[i]) << table.header[first + i];
   };
   for (std::uint64_t step = 0; step <= kLastStep; ++step) {
-    const VehicleState state = make_state(step);
+    const PlantState state = make_state(step).truth();
     EXPECT_EQ(states.number(step, "sim_time_s"), static_cast<double>(4 * step) / 1000.0);
     expect_vector(states, step, states.find_column("quad_x_m"), state.p_WQ_m());
     expect_vector(states, step, states.find_column("quad_vx_m_s"), state.v_WQ_m_s());
@@ -145,7 +145,7 @@ TEST_F(RecordingTest, RowsHoldTheSamplesToTheBit) {
     EXPECT_EQ(states.number(step, "beta_rad"), state.beta_rad());
     EXPECT_EQ(states.number(step, "alpha_dot_rad_s"), state.alpha_dot_rad_s());
     EXPECT_EQ(states.number(step, "beta_dot_rad_s"), state.beta_dot_rad_s());
-    expect_vector(states, step, states.find_column("force_x_n"), state.f_Q_W_n());
+    expect_vector(states, step, states.find_column("force_x_n"), make_state(step).f_Q_W_n());
 
     const ControlCommand command = make_command(step);
     EXPECT_EQ(commands.text(step, "controller"), kPilot);
@@ -238,6 +238,10 @@ TEST_F(RecordingTest, TheManifestDescribesTheRunTheMachineAndEveryFile) {
   EXPECT_EQ(manifest.at("period_s"), 0.004);
   EXPECT_EQ(manifest.at("step_s"), 0.001);
   EXPECT_EQ(manifest.at("mode"), "lockstep");
+  EXPECT_EQ(manifest.at("timing"), "exact");
+  EXPECT_EQ(manifest.at("segment"), Json({{"number", 1}, {"first_step", 0}}));
+  EXPECT_EQ(manifest.at("unanswered_steps"), 0);
+  EXPECT_EQ(manifest.at("rebuilt_commands"), 0);
   EXPECT_EQ(manifest.at("versions").at("sim_server"), "sls 0.0.test");
   EXPECT_FALSE(manifest.at("versions").at("recorder").get<std::string>().empty());
   EXPECT_FALSE(manifest.at("versions").at("fast_dds").get<std::string>().empty());
@@ -291,6 +295,12 @@ TEST_F(RecordingTest, StatusRowsKeepReasonsWithCommasQuotesAndLineBreaks) {
   counters.rejected_vehicle(10);
   counters.rejected_client(11);
   counters.rejected_fault(12);
+  counters.stale(13);
+  counters.held(14);
+  counters.fail_safe(15);
+  counters.deadline_missed(16);
+  counters.overflow(17);
+  counters.slipped(18);
   recording_->add(status);
   finish();
   const CsvTable table = read_table("status.csv");
@@ -303,8 +313,12 @@ TEST_F(RecordingTest, StatusRowsKeepReasonsWithCommasQuotesAndLineBreaks) {
   for (const char* column :
        {"resent", "late", "duplicate", "superseded", "take_overs", "rejected_not_finite",
         "rejected_force_limit", "rejected_run", "rejected_step", "rejected_vehicle",
-        "rejected_client", "rejected_fault"})
+        "rejected_client", "rejected_fault", "stale", "held", "fail_safe", "deadline_missed",
+        "overflow", "slipped"})
     EXPECT_EQ(table.text(0, column), std::to_string(++expected)) << column;
+  EXPECT_EQ(table.text(0, "round_trip_p50_us"), "81.25");
+  EXPECT_EQ(table.text(0, "round_trip_p99_us"), "140");
+  EXPECT_EQ(table.text(0, "timing"), "exact");
 }
 
 // --- what is missing is said ---------------------------------------------------------------------
@@ -381,6 +395,81 @@ TEST_F(RecordingTest, SamplesTheQueueRefusedMakeItIncomplete) {
   EXPECT_NE(gaps.find("queue"), std::string::npos) << gaps;
 }
 
+TEST_F(RecordingTest, StepsThatNobodyAnsweredAreRowsAndNotMissing) {
+  for (std::uint64_t step = 0; step <= kLastStep; ++step) {
+    const bool is_after_silence = step > 10 && step <= 20;
+    const ForceOrigin origin = step <= 15 ? FORCE_HELD : FORCE_FAIL_SAFE;
+    recording_->add(is_after_silence ? make_unanswered_state(step, origin) : make_state(step));
+    if (step >= 10 && step < 20) continue;
+    recording_->add(make_command(step));
+    recording_->add(make_reference(step));
+  }
+  recording_->add(make_status(PHASE_FINISHED, kLastStep));
+  EXPECT_FALSE(recording_->has_all()) << "their references may still come";
+  EXPECT_TRUE(finish());
+  const Json manifest = read_manifest();
+  EXPECT_EQ(manifest.at("unanswered_steps"), 10);
+  EXPECT_EQ(manifest.at("missing"), Json::array());
+  const CsvTable commands = read_table("command.csv");
+  ASSERT_EQ(commands.rows.size(), kLastStep + 1);
+  for (std::uint64_t step = 10; step < 20; ++step) {
+    const bool is_held = step + 1 <= 15;
+    const auto next = make_unanswered_state(step + 1, is_held ? FORCE_HELD : FORCE_FAIL_SAFE);
+    EXPECT_EQ(commands.text(step, "fault"), is_held ? "held" : "fail_safe");
+    EXPECT_EQ(commands.text(step, "controller"), kPilot);
+    EXPECT_EQ(commands.text(step, "compute_us"), "0");
+    EXPECT_EQ(commands.number(step, "force_x_n"),
+              is_held ? next.answer_f_Q_W_n()[0] : next.f_Q_W_n()[0]);
+  }
+  EXPECT_EQ(read_table("reference.csv").rows.size(), kLastStep + 1 - 10);
+  EXPECT_EQ(read_table("flight.csv").rows.size(), kLastStep + 1 - 10);
+}
+
+TEST_F(RecordingTest, ALostCommandIsRebuiltAndCounted) {
+  for (std::uint64_t step = 0; step <= kLastStep; ++step) {
+    recording_->add(make_state(step));
+    if (step != 123) recording_->add(make_command(step));
+    recording_->add(make_reference(step));
+  }
+  recording_->add(make_status(PHASE_FINISHED, kLastStep));
+  EXPECT_TRUE(finish());
+  EXPECT_EQ(read_manifest().at("rebuilt_commands"), 1);
+  const CsvTable commands = read_table("command.csv");
+  EXPECT_EQ(commands.number(123, "force_x_n"), make_command(123).f_Q_W_n()[0]);
+  EXPECT_EQ(commands.text(123, "fault"), "none");
+}
+
+TEST_F(RecordingTest, ALateJoinerListsWhatItHasMissed) {
+  add_steps(100, kLastStep);
+  recording_->add(make_status(PHASE_FINISHED, kLastStep));
+  EXPECT_FALSE(finish());
+  const Json manifest = read_manifest();
+  ASSERT_EQ(manifest.at("missing").size(), 3u);
+  for (const Json& gap : manifest.at("missing")) {
+    EXPECT_EQ(gap.at("from"), 0);
+    EXPECT_EQ(gap.at("to"), 99);
+  }
+  EXPECT_EQ(read_table("state.csv").text(0, "step"), "100");
+}
+
+TEST_F(RecordingTest, DroppedSamplesAreCountedInTheManifest) {
+  for (std::uint64_t step = 0; step <= kLastStep; ++step) {
+    add_step(step);
+    recording_->add(make_standby_command(step));
+    recording_->add(make_standby_reference(step));
+  }
+  recording_->add(make_state(3));
+  ControlCommand absurd = make_command(0);
+  absurd.step(1u << 30);
+  recording_->add(absurd);
+  recording_->add(make_status(PHASE_FINISHED, kLastStep));
+  EXPECT_TRUE(finish());
+  const Json dropped = read_manifest().at("dropped");
+  EXPECT_EQ(dropped.at("other_client"), kLastStep + 1);
+  EXPECT_EQ(dropped.at("repeated"), 1);
+  EXPECT_EQ(dropped.at("out_of_range"), 1);
+}
+
 // --- runs that did not finish --------------------------------------------------------------------
 
 TEST_F(RecordingTest, AFailedRunIsKeptWithItsCauseAndNeverComplete) {
@@ -452,6 +541,37 @@ TEST_F(RecordingTest, AnInterruptedRunSaysSo) {
   const std::string gaps = recording_->describe_gaps();
   EXPECT_NE(gaps.find("SIGINT"), std::string::npos) << gaps;
   EXPECT_NE(read_bytes(folder_ / "flight.txt").find("SIGINT"), std::string::npos);
+}
+
+TEST_F(RecordingTest, AResetRunIsKeptAndItsLastStepNeedsNoAnswer) {
+  recording_->add(make_status(PHASE_RUNNING, 0));
+  add_steps(0, 99);
+  recording_->add(make_state(100));
+  recording_->add(make_status(PHASE_RESET, 100, "reset by nina@lab"));
+  EXPECT_FALSE(finish());
+  const Json manifest = read_manifest();
+  EXPECT_EQ(manifest.at("outcome"), "reset");
+  EXPECT_EQ(manifest.at("reason"), "reset by nina@lab");
+  EXPECT_EQ(manifest.at("missing"), Json::array());
+  EXPECT_EQ(manifest.at("complete"), false);
+}
+
+TEST_F(RecordingTest, ALostServersRunSaysSo) {
+  recording_->add(make_status(PHASE_RUNNING, 0));
+  add_steps(0, 99);
+  EXPECT_FALSE(recording_->finish("the server is gone", 0, "lost"));
+  EXPECT_EQ(read_manifest().at("outcome"), "lost");
+  EXPECT_EQ(read_manifest().at("reason"), "the server is gone");
+}
+
+TEST_F(RecordingTest, StatusSamplesThatComeAgainAreOneRow) {
+  const SimStatus first = make_status(PHASE_WAITING, 0, "missing: controller"),
+                  second = make_status(PHASE_RUNNING, 0);
+  for (const SimStatus& status : {first, second, first, second}) recording_->add(status);
+  recording_->add(make_status(PHASE_RUNNING, 10));
+  recording_->add(first);
+  finish();
+  EXPECT_EQ(read_table("status.csv").rows.size(), 3u);
 }
 
 TEST_F(RecordingTest, ARunWithoutASingleSampleIsNotComplete) {

@@ -12,6 +12,7 @@
 namespace sls::record {
 namespace {
 
+using namespace std::chrono_literals;
 using namespace test;
 using Sample = std::variant<VehicleState, ControlCommand, Reference>;
 
@@ -143,7 +144,7 @@ TEST_F(StepJoinTest, AfterATakeOverTheOtherClientsAnswersAreRecorded) {
     VehicleState state = make_state(step);
     if (step > 10) {
       state.controller_name("standby");
-      state.f_Q_W_n(make_standby_command(step - 1).f_Q_W_n());
+      state.answer_f_Q_W_n(make_standby_command(step - 1).f_Q_W_n());
     }
     join_.add(state);
     join_.add(make_command(step));
@@ -222,7 +223,183 @@ TEST_F(StepJoinTest, ANamedClientWithAnotherForceIsNotRecorded) {
   EXPECT_TRUE(records_.empty());
   join_.give_up();
   ASSERT_GE(records_.size(), 1u);
-  EXPECT_FALSE(records_[0].command);
+  EXPECT_EQ(records_[0].command->f_Q_W_n(), make_command(0).f_Q_W_n());
+}
+
+TEST_F(StepJoinTest, TheCommandIsTheOneAnsweredAlsoWhereAFaultAppliedAnother) {
+  for (std::uint64_t step = 0; step <= 20; ++step) {
+    VehicleState state = make_state(step);
+    state.f_Q_W_n({1, 2, 3});
+    join_.add(state);
+    join_.add(make_command(step));
+    join_.add(make_reference(step));
+  }
+  ASSERT_EQ(records_.size(), 20u);
+  for (const StepRecord& record : records_) EXPECT_EQ(*record.command, make_command(record.step));
+}
+
+// --- answers that were lost ----------------------------------------------------------------------
+
+TEST_F(StepJoinTest, ALostCommandIsRebuiltFromTheNextStateAfterSomePatience) {
+  constexpr std::uint64_t kDeath = 5;
+  for (std::uint64_t step = 0; step <= kDeath + 1100; ++step) {
+    join_.add(make_state(step));
+    if (step != kDeath) join_.add(make_command(step));
+    join_.add(make_reference(step));
+    if (step == kDeath + 900) {
+      EXPECT_EQ(records_.size(), kDeath) << "it may still come";
+    }
+  }
+  ASSERT_EQ(records_.size(), kDeath + 1100);
+  const StepRecord& record = records_[kDeath];
+  EXPECT_EQ(record.origin, AnswerOrigin::kRebuilt);
+  EXPECT_EQ(*record.reference, make_reference(kDeath));
+  EXPECT_EQ(record.command->step(), kDeath);
+  EXPECT_EQ(record.command->run_id(), kRunId);
+  EXPECT_EQ(record.command->f_Q_W_n(), make_command(kDeath).f_Q_W_n());
+  EXPECT_STREQ(record.command->client_name().c_str(), kPilot);
+  EXPECT_EQ(record.command->compute_time_ns(), 0u);
+  EXPECT_EQ(record.command->fault(), FAULT_NONE);
+  for (const StepRecord& other : records_)
+    ASSERT_EQ(other.origin == AnswerOrigin::kRebuilt, other.step == kDeath) << other.step;
+}
+
+class LostReferenceTest : public StepJoinTest {
+ protected:
+  /// A flight that stalls: the references of steps 5 to 7 died with their writer, and the server
+  /// has stopped ahead of the recorder.
+  void fly_with_lost_references() {
+    for (std::uint64_t step = 0; step <= 500; ++step) {
+      join_.add(make_state(step));
+      join_.add(make_command(step));
+      if (step < 5 || step > 7) join_.add(make_reference(step));
+    }
+  }
+  void pass(std::chrono::milliseconds time) {
+    for (; time.count() > 0; time -= 100ms) join_.pass_time(100ms);
+  }
+};
+
+TEST_F(LostReferenceTest, StepsStuckForTenSecondsAreGivenUpTogether) {
+  fly_with_lost_references();
+  pass(9900ms);
+  EXPECT_EQ(records_.size(), 5u);
+  pass(200ms);
+  ASSERT_EQ(records_.size(), 500u);
+  for (std::uint64_t step = 0; step < 500; ++step) {
+    EXPECT_EQ(records_[step].reference.has_value(), step < 5 || step > 7) << step;
+    EXPECT_EQ(*records_[step].command, make_command(step));
+    EXPECT_TRUE(records_[step].is_answer_expected);
+  }
+}
+
+TEST_F(LostReferenceTest, ItIsSaidWhatAStuckStepWaitsFor) {
+  fly_with_lost_references();
+  EXPECT_FALSE(join_.describe_stuck(1s));
+  pass(1000ms);
+  EXPECT_EQ(join_.describe_stuck(1s), "step 5: the reference of 'pilot'");
+}
+
+TEST_F(LostReferenceTest, TimeWithoutLaterStatesIsNotWaiting) {
+  join_.add(make_state(0));
+  join_.add(make_command(0));
+  pass(60000ms);  // paused, say
+  join_.add(make_state(1));
+  pass(9900ms);
+  EXPECT_TRUE(records_.empty());
+  EXPECT_FALSE(join_.describe_stuck(10s));
+  join_.add(make_reference(0));
+  expect_whole_up_to(0);
+}
+
+// --- steps that nobody answered in time ----------------------------------------------------------
+
+TEST_F(StepJoinTest, AnUnansweredStepsCommandIsMadeFromTheNextState) {
+  for (const ForceOrigin origin : {FORCE_HELD, FORCE_FAIL_SAFE}) {
+    SCOPED_TRACE(origin);
+    records_.clear();
+    StepJoin join([this](const StepRecord& record) { records_.push_back(record); });
+    join.add(make_state(0));
+    join.add(make_command(0));  // came too late to be in force
+    const VehicleState next = make_unanswered_state(1, origin);
+    join.add(next);
+    EXPECT_TRUE(records_.empty()) << "the reference may still come";
+    join.add(make_reference(0));
+    ASSERT_EQ(records_.size(), 1u);
+    const StepRecord& record = records_[0];
+    EXPECT_EQ(*record.reference, make_reference(0));
+    EXPECT_EQ(record.origin, origin == FORCE_HELD ? AnswerOrigin::kHeld : AnswerOrigin::kFailSafe);
+    EXPECT_EQ(record.command->f_Q_W_n(),
+              origin == FORCE_HELD ? next.answer_f_Q_W_n() : next.f_Q_W_n());
+    EXPECT_EQ(record.command->client_name(), next.controller_name());
+    EXPECT_EQ(record.command->step(), 0u);
+    EXPECT_EQ(record.command->compute_time_ns(), 0u);
+    EXPECT_EQ(join.dropped().other_client, 1u);
+  }
+}
+
+TEST_F(StepJoinTest, AnUnansweredStepTakesAnyReferenceOrNoneAfterSomePatience) {
+  for (std::uint64_t step = 0; step <= 1200; ++step) {
+    join_.add(step == 0 ? make_state(0) : make_unanswered_state(step, FORCE_HELD));
+    if (step % 2 == 0) join_.add(make_standby_reference(step));
+  }
+  ASSERT_GT(records_.size(), 100u);
+  EXPECT_LT(records_.size(), 300u) << "the rest may still come";
+  join_.give_up();
+  ASSERT_EQ(records_.size(), 1201u);
+  for (std::uint64_t step = 0; step < 1200; ++step) {
+    const StepRecord& record = records_[step];
+    ASSERT_TRUE(record.state && record.command) << step;
+    ASSERT_TRUE(record.is_unanswered());
+    ASSERT_EQ(record.reference.has_value(), step % 2 == 0) << step;
+  }
+}
+
+TEST_F(StepJoinTest, AHeldStepThatKeepsNobodyWaitingIsNotCalledStuck) {
+  join_.add(make_state(0));
+  join_.add(make_unanswered_state(1, FORCE_FAIL_SAFE));
+  join_.pass_time(5s);
+  EXPECT_FALSE(join_.describe_stuck(1s));
+  EXPECT_TRUE(records_.empty());
+  join_.pass_time(5s);
+  EXPECT_EQ(records_.size(), 1u);
+}
+
+// --- beginning in mid-flight ---------------------------------------------------------------------
+
+TEST_F(StepJoinTest, ALateJoinerBeginsWithItsFirstStateAndNamesTheGap) {
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> gaps;
+  StepJoin join([this](const StepRecord& record) { records_.push_back(record); }, 100,
+                [&](std::uint64_t from, std::uint64_t to) { gaps.emplace_back(from, to); });
+  EXPECT_EQ(join.last_step(), 99);
+  // Clients' histories may come first, and reach further back.
+  constexpr std::uint64_t kFirst = 50000;
+  for (std::uint64_t step = kFirst - 500; step <= kFirst + 10; ++step) {
+    join.add(make_command(step));
+    join.add(make_reference(step));
+  }
+  EXPECT_TRUE(gaps.empty());
+  for (std::uint64_t step = kFirst; step <= kFirst + 10; ++step) join.add(make_state(step));
+  EXPECT_EQ(gaps, (std::vector<std::pair<std::uint64_t, std::uint64_t>>{{100, kFirst - 1}}));
+  ASSERT_EQ(records_.size(), 10u);
+  for (std::uint64_t i = 0; i < 10; ++i) {
+    EXPECT_EQ(records_[i].step, kFirst + i);
+    EXPECT_TRUE(records_[i].is_complete());
+  }
+}
+
+TEST_F(StepJoinTest, AHistoryThatReachesBackFurtherThanNeededLeavesNoGap) {
+  bool is_gap = false;
+  StepJoin join([this](const StepRecord& record) { records_.push_back(record); }, 100,
+                [&](std::uint64_t, std::uint64_t) { is_gap = true; });
+  for (std::uint64_t step = 40; step <= 120; ++step) {
+    join.add(make_command(step));
+    join.add(make_reference(step));
+    join.add(make_state(step));
+  }
+  EXPECT_FALSE(is_gap);
+  ASSERT_EQ(records_.size(), 20u);
+  EXPECT_EQ(records_[0].step, 100u);
 }
 
 // --- the end of a failed or lost run -------------------------------------------------------------
@@ -257,6 +434,14 @@ TEST_F(StepJoinTest, TheRefusedAnswerThatEndedARunIsRecordedOfWhicheverClient) {
   EXPECT_EQ(*records_[10].reference, make_standby_reference(10));
 }
 
+TEST_F(StepJoinTest, ARunMayEndBeforeTheStateOfItsLastStepWasPublished) {
+  add_steps(0, 9);
+  join_.add(make_standby_command(9));
+  join_.set_end(10, false, kPilot);
+  join_.give_up();
+  expect_whole_up_to(9);
+}
+
 TEST_F(StepJoinTest, GivingUpHandsOnWhatThereIsInOrder) {
   add_steps(0, 20);
   for (std::uint64_t step = 21; step <= 40; ++step) {
@@ -288,6 +473,7 @@ TEST_F(StepJoinTest, OfALostRunTheLastStepsAnswerIsNotExpected) {
 
 TEST_F(StepJoinTest, AbsurdStepsTakeNoMemoryAndDisturbNothing) {
   const auto highest = std::numeric_limits<std::uint64_t>::max();
+  join_.add(make_state(0));  // the first state tells where the flight is
   for (std::uint64_t step = 0; step <= kLastStep; ++step) {
     for (const std::uint64_t absurd :
          {highest, highest - step, std::uint64_t{1} << 63, std::uint64_t{1} << 32, step + 100000}) {
@@ -349,8 +535,8 @@ TEST_F(StepJoinTest, ManyDifferentAnswersToOneStepAreBounded) {
     reference.client_name("client " + std::to_string(i));
     join_.add(reference);
   }
-  EXPECT_GT(join_.dropped().repeated, 190000u);
   join_.add(make_state(0));
+  EXPECT_GT(join_.dropped().repeated + join_.dropped().out_of_range, 190000u);
   join_.add(make_state(1));
   expect_whole_up_to(0);
 }
@@ -390,6 +576,7 @@ TEST(StepJoinPropertyTest, AnyOrderAndAnyCopiesGiveTheSameRecording) {
     std::vector<StepRecord> records;
     std::int64_t last_step = -1;
     StepJoin join([&](const StepRecord& record) { records.push_back(record); });
+    join.add(make_state(0));  // a writer's samples come in order: its first state is the first
     for (std::size_t i = 0; i < samples.size(); ++i) {
       if (i == end_at) join.set_end(kLastStep, true, kPilot);
       std::visit([&](const auto& message) { join.add(message); }, samples[i].sample);

@@ -69,16 +69,28 @@ VehicleState make_state(std::uint64_t step) {
   message.run_id(kRunId);
   message.step(step);
   message.sim_time_ns(static_cast<std::int64_t>(step) * kPeriod);
-  message.p_WQ_m(bus::to_array(state.p_WQ));
-  message.v_WQ_m_s(bus::to_array(state.v_WQ));
-  message.p_WL_m(bus::to_array(state.p_WL));
-  message.v_WL_m_s(bus::to_array(state.v_WL));
-  message.alpha_rad(rod.alpha);
-  message.beta_rad(rod.beta);
-  message.alpha_dot_rad_s(rod.alpha_dot);
-  message.beta_dot_rad_s(rod.beta_dot);
+  PlantState& truth = message.truth();
+  truth.p_WQ_m(bus::to_array(state.p_WQ));
+  truth.v_WQ_m_s(bus::to_array(state.v_WQ));
+  truth.p_WL_m(bus::to_array(state.p_WL));
+  truth.v_WL_m_s(bus::to_array(state.v_WL));
+  truth.alpha_rad(rod.alpha);
+  truth.beta_rad(rod.beta);
+  truth.alpha_dot_rad_s(rod.alpha_dot);
+  truth.beta_dot_rad_s(rod.beta_dot);
+  const Eigen::Vector3d bias(0.1, 0.2, 0.3);  // what is measured is not what is recorded
+  message.p_WQ_m(bus::to_array(state.p_WQ + bias));
+  message.v_WQ_m_s(bus::to_array(state.v_WQ + bias));
+  message.p_WL_m(bus::to_array(state.p_WL + bias));
+  message.v_WL_m_s(bus::to_array(state.v_WL + bias));
+  message.alpha_rad(rod.alpha + 0.1);
+  message.beta_rad(rod.beta + 0.1);
+  message.alpha_dot_rad_s(rod.alpha_dot + 0.1);
+  message.beta_dot_rad_s(rod.beta_dot + 0.1);
   if (step > 0) {
     message.f_Q_W_n(bus::to_array(make_force(step - 1)));
+    message.answer_f_Q_W_n(message.f_Q_W_n());
+    message.force_origin(FORCE_ANSWERED);
     message.controller_name(kPilot);
   }
   return message;
@@ -113,6 +125,14 @@ Reference make_reference(std::uint64_t step) {
   return message;
 }
 
+VehicleState make_unanswered_state(std::uint64_t step, ForceOrigin origin) {
+  VehicleState message = make_state(step);
+  message.force_origin(origin);
+  message.answer_f_Q_W_n(bus::to_array(make_force(step + 1000)));
+  message.f_Q_W_n(bus::to_array(make_force(step + 2000)));
+  return message;
+}
+
 ControlCommand make_standby_command(std::uint64_t step) {
   ControlCommand message = make_command(step);
   message.client_name("standby");
@@ -138,6 +158,9 @@ SimStatus make_status(RunPhase phase, std::uint64_t step, const std::string& rea
   message.step(step);
   message.controller_name(step > 0 || phase == PHASE_FINISHED ? kPilot : "");
   message.real_time_factor(1.5);
+  message.round_trip_p50_ns(81'250);
+  message.round_trip_p99_ns(140'000);
+  message.timing("exact");
   message.counters().resent(11);
   message.counters().rejected_fault(12);
   return message;

@@ -22,6 +22,10 @@ VehicleState make_state(std::uint64_t step);
 ControlCommand make_command(std::uint64_t step);
 Reference make_reference(std::uint64_t step);
 
+/// State of `step` where nobody's answer to the step before was in force but `origin`: the force
+/// answered earlier and the force applied are two others.
+VehicleState make_unanswered_state(std::uint64_t step, ForceOrigin origin);
+
 /// What another client answered to `step`: another force, another reference.
 ControlCommand make_standby_command(std::uint64_t step);
 Reference make_standby_reference(std::uint64_t step);

@@ -1,0 +1,75 @@
+#include "recorder/certificate.hpp"
+
+#include <cmath>
+#include <cstring>
+#include <type_traits>
+
+namespace sls::record {
+namespace {
+
+template <class Integer, std::enable_if_t<std::is_integral_v<Integer>, int> = 0>
+void append(std::string& bytes, Integer value) {
+  for (std::size_t i = 0; i < sizeof value; ++i) {
+    bytes += static_cast<char>(value & 0xff);
+    value = static_cast<Integer>(value >> 8);
+  }
+}
+
+void append(std::string& bytes, std::string_view text) {
+  append(bytes, static_cast<std::uint32_t>(text.size()));
+  bytes += text;
+}
+
+void append(std::string& bytes, double number) {
+  std::uint64_t bits = 0;
+  std::memcpy(&bits, &number, sizeof bits);
+  // What "nan" and "-nan" in a file read back to.
+  if (std::isnan(number)) bits = std::signbit(number) ? 0xfff8000000000000 : 0x7ff8000000000000;
+  append(bytes, bits);
+}
+
+struct Collector {
+  std::string bytes;
+
+  template <class Field>
+  void operator()(const Field& field) {
+    append(bytes, field);
+  }
+  template <class Field>
+  void incidental(const Field&) {}
+};
+
+template <class Row>
+std::string collect(const Row& row) {
+  Collector collector;
+  append(collector.bytes, std::string_view(Row::kTopic));
+  Row::visit(row, collector);
+  return std::move(collector.bytes);
+}
+
+}  // namespace
+
+std::string to_bytes(const StateRow& row) { return collect(row); }
+std::string to_bytes(const CommandRow& row) { return collect(row); }
+std::string to_bytes(const ReferenceRow& row) { return collect(row); }
+
+void Certificate::add(const StepRows& rows) {
+  config::Sha256& vehicle = vehicles_[rows.vehicle_id];
+  if (rows.state) vehicle.add(to_bytes(*rows.state));
+  if (rows.command) vehicle.add(to_bytes(*rows.command));
+  if (rows.reference) vehicle.add(to_bytes(*rows.reference));
+}
+
+std::string Certificate::finish() {
+  config::Sha256 flight;
+  for (auto& [id, vehicle] : vehicles_) {
+    std::string bytes;
+    append(bytes, id);
+    flight.add(bytes);
+    const auto digest = vehicle.finish();
+    flight.add(digest.data(), digest.size());
+  }
+  return config::to_hex(flight.finish());
+}
+
+}  // namespace sls::record

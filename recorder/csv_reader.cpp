@@ -1,0 +1,98 @@
+#include "recorder/csv_reader.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+
+namespace sls::record {
+namespace {
+
+constexpr std::size_t kBlock = 1 << 18;
+constexpr std::size_t kLongestRecord = 1 << 20;  // of a file that is what it should be: hundreds
+
+}  // namespace
+
+CsvReader::CsvReader(const std::filesystem::path& file, std::string_view header)
+    : path_(file.string()), stream_(file, std::ios::binary) {
+  if (!stream_) throw DamagedError(path_ + ": cannot read: " + std::strerror(errno));
+  if (!find_record() || std::string_view(buffer_).substr(begin_, end_ - begin_) != header)
+    throw DamagedError(path_ + ":1: expected the columns " + std::string(header));
+  for (std::size_t from = 0; from <= header.size();) {
+    const std::size_t comma = std::min(header.find(',', from), header.size());
+    columns_.push_back(header.substr(from, comma - from));
+    from = comma + 1;
+  }
+}
+
+std::string CsvReader::place() const { return path_ + ":" + std::to_string(line_) + ": "; }
+
+bool CsvReader::next() {
+  if (!find_record()) return false;
+  split_record();
+  if (fields_.size() != columns_.size())
+    throw DamagedError(place() + "expected " + std::to_string(columns_.size()) + " fields, got " +
+                       std::to_string(fields_.size()));
+  return true;
+}
+
+/// Finds the next line break outside quotes.
+bool CsvReader::find_record() {
+  if (is_at_end_) return false;
+  begin_ = line_ == 0 ? 0 : end_ + 1;
+  line_ = next_line_;
+  bool is_quoted = false;
+  for (std::size_t at = begin_;; ++at) {
+    if (at - begin_ > kLongestRecord) throw DamagedError(place() + "expected a row, got no end");
+    while (at >= buffer_.size()) {
+      const std::size_t length = at - begin_;
+      if (!read_more()) return !(is_at_end_ = true);
+      at = begin_ + length;
+    }
+    const char letter = buffer_[at];
+    if (letter == '"') is_quoted = !is_quoted;
+    if (letter != '\n') continue;
+    ++next_line_;
+    if (is_quoted) continue;
+    end_ = at;
+    return true;
+  }
+}
+
+/// Keeps what there is of the record in work.
+bool CsvReader::read_more() {
+  buffer_.erase(0, begin_);
+  begin_ = 0;
+  const std::size_t size = buffer_.size();
+  buffer_.resize(size + kBlock);
+  stream_.read(buffer_.data() + size, kBlock);
+  if (stream_.bad()) throw DamagedError(path_ + ": cannot read: " + std::strerror(errno));
+  buffer_.resize(size + static_cast<std::size_t>(stream_.gcount()));
+  return buffer_.size() > size;
+}
+
+void CsvReader::split_record() {
+  fields_.clear();
+  unquoted_.clear();
+  const std::string_view record = std::string_view(buffer_).substr(begin_, end_ - begin_);
+  std::size_t at = 0;
+  while (true) {
+    if (at < record.size() && record[at] == '"') {
+      std::string& text = unquoted_.emplace_back();
+      for (++at; at < record.size(); ++at) {
+        if (record[at] == '"' && (++at >= record.size() || record[at] != '"')) break;
+        text += record[at];
+      }
+      fields_.push_back(text);
+    } else {
+      const std::size_t comma = std::min(record.find(',', at), record.size());
+      fields_.push_back(record.substr(at, comma - at));
+      at = comma;
+    }
+    if (at >= record.size()) return;
+    if (record[at] != ',') throw DamagedError(place() + "expected a comma after a quoted field");
+    ++at;
+    if (at == record.size()) return fields_.push_back({});
+  }
+}
+
+}  // namespace sls::record

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <mutex>
+#include <set>
+#include <variant>
+
+#include "common/bus/node.hpp"
+
+namespace sls::record {
+
+/// What the topics bring, sorted by run, on its way from the middleware's threads to the writing
+/// one. The readers live as long as the recorder: new ones would be sent all histories again, of
+/// earlier runs too. Putting never blocks; a run's samples that do not fit are counted.
+class Inbox {
+ public:
+  using Sample = std::variant<VehicleState, ControlCommand, Reference, SimStatus>;
+
+  explicit Inbox(bus::Node& node);
+
+  /// From now on run `run_id` is recorded, what has come of it so far included. States and status
+  /// samples count from its `server` alone: only that knows where the run is.
+  void open(std::uint64_t run_id, const bus::PeerId& server);
+
+  /// All samples of the open run there are, oldest first.
+  std::deque<Sample> take_all();
+
+  /// Samples of the open run that were lost because there was no room.
+  std::uint64_t refused() const;
+
+  /// True where the reader of states hears `server`.
+  bool hears_server(const bus::PeerId& server) const;
+  /// True where the readers of both commands and references hear `client`.
+  bool hears_client(const bus::PeerId& client) const;
+
+ private:
+  struct Received {
+    Sample sample;
+    bus::PeerId sender;
+  };
+  struct Run {
+    std::deque<Received> samples;
+    std::uint64_t refused = 0;
+  };
+  void put(std::uint64_t run_id, Sample sample, const bus::PeerId& sender);
+  bool belongs(const Received& received) const;
+
+  mutable std::mutex mutex_;
+  std::map<std::uint64_t, Run> runs_;  // the open one, and those that may be opened
+  std::set<std::uint64_t> closed_;     // have been open
+  std::uint64_t open_ = 0;
+  bus::PeerId server_;
+  bus::Reader<VehicleState> state_reader_;
+  bus::Reader<ControlCommand> command_reader_;
+  bus::Reader<Reference> reference_reader_;
+  bus::Reader<SimStatus> status_reader_;
+};
+
+}  // namespace sls::record

@@ -1,0 +1,204 @@
+#include "recorder/run_recorder.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <csignal>
+#include <thread>
+#include <utility>
+
+#include "common/app/stop_signal.hpp"
+
+namespace sls::record {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto kPollTime = 20ms;           // between two looks at the run
+constexpr auto kAnnounceTime = 500ms;      // between two announcements at the latest
+constexpr auto kWriteTime = 5ms;           // between two batches of the writing thread
+constexpr auto kStuckTime = 1s;            // until it is said what a step waits for
+constexpr auto kCompletionTime = 10s;      // for what is missing after the end of a finished run
+constexpr auto kFailedTime = 1s;           // likewise of any other
+constexpr auto kInterruptionTime = 500ms;  // likewise after a stop signal
+
+/// While this process was stopped nothing could arrive: that time does not count as waiting.
+constexpr std::chrono::steady_clock::duration kLongestPass = 1s;
+
+}  // namespace
+
+Participant make_announcement(const bus::Run* run, bool ready, bool done, std::int64_t last_step) {
+  Participant message;
+  message.role(ROLE_RECORDER);
+  message.name("recorder");
+  message.host(bus::host_name());
+  if (run) {
+    message.run_id(run->parameters.run_id());
+    message.scenario_sha256(run->parameters.scenario_sha256());
+  }
+  message.ready(ready);
+  message.done(done);
+  message.last_complete_step(last_step);
+  return message;
+}
+
+RunRecorder::RunRecorder(Surroundings& surroundings, const bus::Run& run, const Segment& segment)
+    : surroundings_(surroundings),
+      run_(run),
+      run_id_(run.parameters.run_id()),
+      scenario_(
+          config::parse_scenario(run.parameters.scenario_text().to_string(), "sls/parameters")),
+      recording_(segment, run.parameters),
+      last_complete_step_(recording_.last_complete_step()) {
+  surroundings.inbox.open(run_id_, run.server);
+  spdlog::info("records run {:016x} of '{}' into {}{}", run_id_, scenario_.name,
+               segment.folder.string(),
+               segment.first_step > 0 ? fmt::format(", from step {}", segment.first_step) : "");
+}
+
+RunEnd RunRecorder::run() {
+  announce(false);
+  std::thread writing([this] { write_samples(); });
+  std::exception_ptr watching_error;  // kept until the thread has closed its files
+  try {
+    watch();
+  } catch (...) {
+    watching_error = std::current_exception();
+    interruption_ = "the recorder failed";
+  }
+  stop_writing_ = true;
+  writing.join();
+  if (watching_error) std::rethrow_exception(watching_error);
+  announce(true);
+  if (writing_error_) std::rethrow_exception(writing_error_);
+  end_.is_reset = end_.is_reset || recording_.is_reset();
+  end_.last_step = last_complete_step_;
+  return end_;
+}
+
+// --- watching ------------------------------------------------------------------------------------
+
+void RunRecorder::watch() {
+  bus::ServerWatch server(surroundings_.servers, run_, scenario_.sync.wait.server_deadline_s);
+  while (!has_all_ && !writing_failed_) {
+    look_for_the_end(server);
+    if (give_up_ && give_up_->is_over()) return;
+    if (give_up_ && give_up_->is_report_due())
+      spdlog::info("waiting for: what comes after step {} of run {:016x} ({:.0f} s left)",
+                   last_complete_step_.load(), run_id_, give_up_->seconds_left());
+    announce_news();
+    std::this_thread::sleep_for(kPollTime);
+  }
+}
+
+void RunRecorder::look_for_the_end(bus::ServerWatch& server) {
+  const auto status = surroundings_.servers.find_status(run_id_);
+  if (app::stop_signal() != 0) {
+    interruption_ =
+        app::stop_signal() == SIGINT ? "interrupted by SIGINT" : "interrupted by SIGTERM";
+    end_within(kInterruptionTime);
+  } else if (status && status->phase() == PHASE_FINISHED) {
+    end_within(kCompletionTime);
+  } else if (status && (status->phase() == PHASE_FAILED || status->phase() == PHASE_RESET)) {
+    end_within(kFailedTime);
+  } else if (!give_up_) {
+    const auto finding = server.look();
+    const bool is_present = surroundings_.servers.is_present(run_.server);
+    if (finding == bus::ServerWatch::Finding::kSilent) look_for_the_next_run(is_present);
+    if (finding != bus::ServerWatch::Finding::kLost) return;
+    outcome_ = "lost";
+    interruption_ =
+        fmt::format("the server is {} (given up after {} s)", is_present ? "silent" : "gone",
+                    scenario_.sync.wait.server_deadline_s);
+    end_within(0s);
+  }
+}
+
+/// Another run may be the end of this one: its own server's, or that of a server in its place.
+void RunRecorder::look_for_the_next_run(bool is_server_present) {
+  for (const bus::Run& other : surroundings_.servers.runs()) {
+    const bool is_own_server = other.server == run_.server;
+    const bool is_joinable = other.status && bus::calc_progress(other.status) >= 0 &&
+                             bus::serves_vehicle(other.parameters, run_.parameters.vehicle_id());
+    if (other.parameters.run_id() == run_id_ || !is_joinable) continue;
+    if (!is_own_server && is_server_present) continue;
+    end_.is_reset = is_own_server;
+    if (!is_own_server) end_.replacement = other;
+    outcome_ = is_own_server ? "reset" : "lost";
+    interruption_ =
+        fmt::format("run {:016x} was replaced by run {:016x}", run_id_, other.parameters.run_id());
+    spdlog::warn("{}", interruption_);
+    return end_within(kFailedTime);
+  }
+}
+
+void RunRecorder::end_within(std::chrono::duration<double> limit) {
+  if (!give_up_ || give_up_->seconds_left() > limit.count()) give_up_.emplace(limit.count());
+}
+
+/// Before the flight begins the expected controllers must be heard; in flight, those that are
+/// there.
+bool RunRecorder::sees_all_endpoints() const {
+  if (!surroundings_.inbox.hears_server(run_.server)) return false;
+  const auto controllers = surroundings_.participants.find(ROLE_CONTROLLER, run_id_);
+  const auto heard = std::count_if(controllers.begin(), controllers.end(), [&](const auto& entry) {
+    return surroundings_.inbox.hears_client(entry.peer);
+  });
+  const auto status = surroundings_.servers.find_status(run_id_);
+  const bool is_flying = status && status->phase() != PHASE_WAITING;
+  return heard >= (is_flying ? static_cast<std::ptrdiff_t>(controllers.size())
+                             : scenario_.sync.wait_for.controllers);
+}
+
+void RunRecorder::announce_news() {
+  const bool is_now_ready = !ready_ && sees_all_endpoints();
+  ready_ = ready_ || is_now_ready;
+  if (is_now_ready || last_complete_step_ != announced_step_ ||
+      Clock::now() - announced_time_ >= kAnnounceTime)
+    announce(false);
+}
+
+void RunRecorder::announce(bool done) {
+  announced_step_ = last_complete_step_;
+  announced_time_ = Clock::now();
+  surroundings_.participant_writer.write(
+      make_announcement(&run_, ready_ && !writing_failed_, done, announced_step_));
+}
+
+// --- writing -------------------------------------------------------------------------------------
+
+void RunRecorder::write_samples() {
+  try {
+    bool is_stopped = false;
+    auto time = Clock::now();
+    while (!recording_.has_all() && !is_stopped) {
+      is_stopped = stop_writing_;  // what is there by now is still taken
+      for (const Inbox::Sample& sample : surroundings_.inbox.take_all())
+        std::visit([&](const auto& message) { recording_.add(message); }, sample);
+      const auto earlier = std::exchange(time, Clock::now());
+      recording_.pass_time(std::min(time - earlier, kLongestPass));
+      recording_.flush_if_due();
+      last_complete_step_ = recording_.last_complete_step();
+      report_stuck_step();
+      std::this_thread::sleep_for(kWriteTime);
+    }
+    const bool has_all = recording_.has_all();  // if so, the main thread may still be looking
+    end_.is_complete = recording_.finish(has_all ? "" : interruption_,
+                                         surroundings_.inbox.refused(), has_all ? "" : outcome_);
+    if (!end_.is_complete) end_.gaps = recording_.describe_gaps();
+    last_complete_step_ = recording_.last_complete_step();
+    has_all_ = true;
+  } catch (...) {
+    writing_error_ = std::current_exception();
+    writing_failed_ = true;
+  }
+}
+
+void RunRecorder::report_stuck_step() {
+  const auto step = recording_.describe_stuck(kStuckTime);
+  if (!step) return stuck_.reset();
+  if (!stuck_) stuck_.emplace(0.0, Clock::duration::zero());
+  if (stuck_->is_report_due()) spdlog::warn("waiting for: {}", *step);
+}
+
+}  // namespace sls::record

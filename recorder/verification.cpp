@@ -1,0 +1,208 @@
+#include "recorder/verification.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <set>
+
+#include "recorder/certificate.hpp"
+
+namespace sls::record {
+namespace {
+
+namespace fs = std::filesystem;
+
+// --- one recording -------------------------------------------------------------------------------
+
+/// Hash and rows of a file, in one go.
+ManifestFile::File measure(const fs::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  if (!stream) throw DamagedError(path.string() + ": cannot read, or not there");
+  config::Sha256 hash;
+  std::uint64_t lines = 0;
+  bool is_quoted = false;
+  std::array<char, 1 << 16> block;
+  while (stream.read(block.data(), block.size()) || stream.gcount() > 0) {
+    const std::string_view bytes(block.data(), static_cast<std::size_t>(stream.gcount()));
+    hash.add(bytes);
+    for (const char letter : bytes) {
+      is_quoted = is_quoted != (letter == '"');
+      lines += letter == '\n' && !is_quoted ? 1 : 0;
+    }
+  }
+  if (stream.bad()) throw DamagedError(path.string() + ": cannot read");
+  return {lines > 0 ? lines - 1 : 0, config::to_hex(hash.finish())};
+}
+
+void check_file(const fs::path& path, const ManifestFile::File& expected,
+                std::vector<std::string>& problems) {
+  const ManifestFile::File found = measure(path);
+  if (expected.rows && *expected.rows != *found.rows)
+    problems.push_back(
+        fmt::format("{}: {} rows, manifest: {}", path.string(), *found.rows, *expected.rows));
+  if (expected.sha256 != found.sha256)
+    problems.push_back(
+        fmt::format("{}: SHA-256 {}, manifest: {}", path.string(), found.sha256, expected.sha256));
+}
+
+/// A segment whose recorder was killed lists no files: the segment after it speaks for its rows.
+void check_files(const RecordedSegment& segment, bool is_last, std::vector<std::string>& problems) {
+  if (is_last && segment.manifest.files.empty())
+    problems.push_back((segment.folder / "manifest.json").string() +
+                       ": lists no files: the recorder is running, or was killed");
+  for (const auto& [name, expected] : segment.manifest.files) {
+    try {
+      check_file(segment.folder / name, expected, problems);
+    } catch (const DamagedError& error) {
+      problems.push_back(error.what());
+    }
+  }
+}
+
+void certify(const RecordedFlight& flight, Inspection& inspection) {
+  Certificate certificate;
+  for (const std::uint32_t id : flight.vehicle_ids()) {
+    StepReader reader(flight, id);
+    std::uint64_t steps = 0;
+    for (; const auto rows = reader.next(); ++steps) certificate.add(*rows);
+    inspection.steps = std::max(inspection.steps, steps);
+  }
+  inspection.certificate = certificate.finish();
+}
+
+// --- two recordings ------------------------------------------------------------------------------
+
+/// A row's fields as people read them and as they are compared.
+struct FieldLister {
+  struct Field {
+    std::string text;
+    bool is_incidental = false;
+    bool is_nan = false;
+  };
+  std::vector<Field> fields;
+
+  void operator()(double number) {
+    fields.push_back({fmt::format("{}", number), false, std::isnan(number)});
+  }
+  void operator()(const std::string& text) { fields.push_back({"'" + text + "'"}); }
+  template <class Integer>
+  void operator()(Integer number) {
+    fields.push_back({std::to_string(number)});
+  }
+  template <class Any>
+  void incidental(const Any& any) {
+    (*this)(any);
+    fields.back().is_incidental = true;
+  }
+};
+
+template <class Row>
+std::vector<FieldLister::Field> list_fields(const Row& row) {
+  FieldLister lister;
+  Row::visit(row, lister);
+  return lister.fields;
+}
+
+std::string name_column(std::string_view header, std::size_t index) {
+  for (; index > 0; --index) header.remove_prefix(header.find(',') + 1);
+  return std::string(header.substr(0, header.find(',')));
+}
+
+template <class Row>
+std::optional<std::string> compare_rows(const std::optional<Row>& a, const std::optional<Row>& b,
+                                        const StepRows& step) {
+  if (!a && !b) return std::nullopt;
+  const std::string place =
+      fmt::format("{}, vehicle {}, step {}", Row::kFile, step.vehicle_id, step.step);
+  if (!a || !b) return fmt::format("{}: a row in {} alone", place, a ? "A" : "B");
+  if (to_bytes(*a) == to_bytes(*b)) return std::nullopt;
+  const auto fields_a = list_fields(*a), fields_b = list_fields(*b);
+  for (std::size_t i = 0; i < fields_a.size(); ++i) {
+    if (fields_a[i].is_incidental || fields_a[i].text == fields_b[i].text) continue;
+    const bool are_nan = fields_a[i].is_nan && fields_b[i].is_nan;
+    return fmt::format("{}, {}: {} in A, {} in B{}", place, name_column(Row::kHeader, i),
+                       fields_a[i].text, fields_b[i].text,
+                       are_nan ? " (neither is a number; their signs differ)" : "");
+  }
+  return place + ": the rows differ";  // not reached: shortest digits tell all doubles apart
+}
+
+std::optional<std::string> compare_steps(const StepRows& a, const StepRows& b) {
+  if (auto text = compare_rows(a.state, b.state, a)) return text;
+  if (auto text = compare_rows(a.command, b.command, a)) return text;
+  return compare_rows(a.reference, b.reference, a);
+}
+
+std::optional<Difference> compare_vehicle(const RecordedFlight& a, const RecordedFlight& b,
+                                          std::uint32_t id) {
+  StepReader reader_a(a, id), reader_b(b, id);
+  while (true) {
+    const auto step_a = reader_a.next(), step_b = reader_b.next();
+    if (!step_a && !step_b) return std::nullopt;
+    if (!step_a || !step_b || step_a->step != step_b->step) {
+      const bool is_in_a = step_a && (!step_b || step_a->step < step_b->step);
+      const std::uint64_t step = is_in_a ? step_a->step : step_b->step;
+      return Difference{
+          step, fmt::format("vehicle {}, step {}: in {} alone", id, step, is_in_a ? "A" : "B")};
+    }
+    if (auto text = compare_steps(*step_a, *step_b)) return Difference{step_a->step, *text};
+  }
+}
+
+}  // namespace
+
+Inspection inspect(const RecordedFlight& flight) {
+  Inspection inspection;
+  for (const RecordedSegment& segment : flight.segments)
+    check_files(segment, &segment == &flight.segments.back(), inspection.problems);
+  try {
+    certify(flight, inspection);
+  } catch (const DamagedError& error) {
+    inspection.problems.push_back(error.what());
+    return inspection;
+  }
+  const ManifestFile& manifest = flight.manifest();
+  if (!manifest.files.empty() && inspection.certificate != manifest.certificate)
+    inspection.problems.push_back(fmt::format("{}: certificate of the rows {}, manifest: {}",
+                                              flight.folder.string(), inspection.certificate,
+                                              manifest.certificate));
+  return inspection;
+}
+
+std::optional<Difference> find_first_difference(const RecordedFlight& a, const RecordedFlight& b) {
+  std::set<std::uint32_t> ids;
+  for (const auto* flight : {&a, &b})
+    for (const std::uint32_t id : flight->vehicle_ids()) ids.insert(id);
+  std::optional<Difference> first;
+  for (const std::uint32_t id : ids) {
+    const auto difference = compare_vehicle(a, b, id);
+    if (difference && (!first || difference->step < first->step)) first = difference;
+  }
+  return first;
+}
+
+std::vector<std::string> list_notes(const RecordedFlight& a, const RecordedFlight& b) {
+  std::vector<std::string> notes;
+  const ManifestFile &of_a = a.manifest(), &of_b = b.manifest();
+  const auto compare = [&](const char* what, const auto& in_a, const auto& in_b) {
+    if (!(in_a == in_b)) notes.push_back(fmt::format("{}: {} in A, {} in B", what, in_a, in_b));
+  };
+  compare("scenario's SHA-256", of_a.scenario_sha256, of_b.scenario_sha256);
+  compare("period in force, s", of_a.period_s, of_b.period_s);
+  compare("mode", of_a.mode, of_b.mode);
+  const auto describe_gaps = [&](const char* name, const ManifestFile& manifest) {
+    if (!manifest.missing.empty())
+      notes.push_back(fmt::format("{}: {}", name, describe(manifest.missing)));
+    if (!manifest.complete)
+      notes.push_back(
+          fmt::format("{}: not complete: {}: {}", name, manifest.outcome, manifest.reason));
+  };
+  describe_gaps("A", of_a);
+  describe_gaps("B", of_b);
+  return notes;
+}
+
+}  // namespace sls::record

@@ -1,0 +1,33 @@
+/// `sls verify`: is a recording what its manifest says, and are two recordings of the same flight?
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "recorder/recording_reader.hpp"
+
+namespace sls::record {
+
+/// What re-reading every file of a recording gives.
+struct Inspection {
+  std::uint64_t steps = 0;            ///< of the vehicle that has most
+  std::string certificate;            ///< of the rows; empty where they cannot be read
+  std::vector<std::string> problems;  ///< where a file is not what its manifest says, one line each
+};
+Inspection inspect(const RecordedFlight& flight);
+
+/// The first row or field, in step order, in which the data of two recordings differ.
+struct Difference {
+  std::uint64_t step = 0;
+  std::string text;  ///< file, vehicle, step, column and both values
+};
+/// @throws DamagedError where a row before the first difference cannot be read.
+std::optional<Difference> find_first_difference(const RecordedFlight& a, const RecordedFlight& b);
+
+/// What differs or is missing according to the manifests; none of it need make the data differ.
+std::vector<std::string> list_notes(const RecordedFlight& a, const RecordedFlight& b);
+
+}  // namespace sls::record

@@ -1,0 +1,53 @@
+#include <spdlog/fmt/fmt.h>
+
+#include <iostream>
+
+#include "common/app/run_main.hpp"
+#include "recorder/verification.hpp"
+
+namespace {
+
+using namespace sls;
+using record::RecordedFlight;
+
+void verify_one(const RecordedFlight& flight) {
+  const record::Inspection inspection = record::inspect(flight);
+  for (const std::string& problem : inspection.problems) std::cout << problem << '\n';
+  const auto& manifest = flight.manifest();
+  if (!manifest.complete)
+    std::cout << fmt::format("not complete: {}: {}\n", manifest.outcome, manifest.reason);
+  if (!manifest.missing.empty()) std::cout << describe(manifest.missing) << '\n';
+  if (!inspection.problems.empty())
+    throw app::RunError(flight.folder.string() + ": not what its manifest says");
+  std::cout << fmt::format("as its manifest says: {} steps, certificate {}\n", inspection.steps,
+                           inspection.certificate);
+}
+
+void verify_two(const RecordedFlight& a, const RecordedFlight& b) {
+  const record::Inspection of_a = record::inspect(a), of_b = record::inspect(b);
+  for (const std::string& problem : of_a.problems) std::cout << "A: " << problem << '\n';
+  for (const std::string& problem : of_b.problems) std::cout << "B: " << problem << '\n';
+  for (const std::string& note : record::list_notes(a, b)) std::cout << note << '\n';
+  if (const auto difference = record::find_first_difference(a, b)) {
+    std::cout << "first difference: " << difference->text << '\n';
+    throw app::RunError("A and B differ");
+  }
+  std::cout << fmt::format("equal: {} steps, certificate {}\n", of_a.steps, of_a.certificate);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App cli(
+      "Compares the data of two recordings, or a recording's files with its manifest.\n"
+      "Exit codes: 0 equal, or as the manifest says; 1 not so, or damaged; 2 not a recording.");
+  std::filesystem::path a, b;
+  cli.add_option("A", a, "folder of a recording")->type_name("DIR")->required();
+  cli.add_option("B", b, "folder of another one")->type_name("DIR");
+  cli.set_version_flag("--version", app::version());
+  return app::run_main(argc, argv, cli, {}, "sls_verify", [&] {
+    const RecordedFlight flight = record::open_recording(a);
+    if (b.empty()) return verify_one(flight);
+    verify_two(flight, record::open_recording(b));
+  });
+}

@@ -1,0 +1,182 @@
+// The certificate, against a second implementation that knows only the README and the CSV files.
+#include "recorder/certificate.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "common/config/sha256.hpp"
+#include "tests/recorder/csv_table.hpp"
+#include "tests/recorder/flights.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace sls::record {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace test;
+using sls::test::read_bytes;
+
+/// `size` bytes of `value`, the least significant first.
+std::string little_endian(std::uint64_t value, int size) {
+  std::string bytes;
+  for (int i = 0; i < size; ++i, value /= 256) bytes.push_back(static_cast<char>(value % 256));
+  return bytes;
+}
+std::string length_and(const std::string& text) { return little_endian(text.size(), 4) + text; }
+std::string number(const std::string& text) {
+  const double value = std::strtod(text.c_str(), nullptr);
+  std::uint64_t bits;
+  std::memcpy(&bits, &value, sizeof bits);
+  return little_endian(bits, 8);
+}
+
+std::string from_hex(const std::string& hex) {
+  std::string bytes;
+  for (std::size_t i = 0; i < hex.size(); i += 2)
+    bytes.push_back(static_cast<char>(std::stoi(hex.substr(i, 2), nullptr, 16)));
+  return bytes;
+}
+
+/// What the README says a row adds. Kinds: n a number, i a stage, t a text, - nothing.
+std::string to_certified_bytes(const std::string& topic, const std::string& kinds,
+                               const std::vector<std::string>& row) {
+  std::string bytes = length_and(topic) + little_endian(std::stoul(row.at(0)), 4) +
+                      little_endian(std::stoull(row.at(1)), 8);
+  for (std::size_t i = 2; i < row.size(); ++i) {
+    if (kinds.at(i - 2) == 'n') bytes += number(row[i]);
+    if (kinds.at(i - 2) == 'i') bytes += little_endian(std::stoul(row[i]), 4);
+    if (kinds.at(i - 2) == 't') bytes += length_and(row[i]);
+  }
+  return bytes;
+}
+
+std::string calc_certificate(const fs::path& folder) {
+  // Of each vehicle, by step: state, command, reference.
+  std::map<unsigned long, std::map<unsigned long long, std::map<int, std::string>>> vehicles;
+  const auto add_file = [&](const char* file, int place, const char* topic,
+                            const std::string& kinds) {
+    for (const auto& row : parse_csv(read_bytes(folder / file)).rows)
+      vehicles[std::stoul(row.at(0))][std::stoull(row.at(1))][place] =
+          to_certified_bytes(topic, kinds, row);
+  };
+  add_file("state.csv", 0, "sls/state", std::string(20, 'n'));
+  add_file("command.csv", 1, "sls/command", "-nnn-t");
+  add_file("reference.csv", 2, "sls/reference", "nit" + std::string(15, 'n'));
+  std::string all;
+  for (const auto& [id, steps] : vehicles) {
+    std::string bytes;
+    for (const auto& step : steps)
+      for (const auto& row : step.second) bytes += row.second;
+    all += little_endian(id, 4) + from_hex(config::calc_sha256(bytes));
+  }
+  return config::calc_sha256(all);
+}
+
+std::string read_certificate(const fs::path& folder) {
+  return nlohmann::json::parse(read_bytes(folder / "manifest.json")).at("certificate");
+}
+
+/// The certificate of the synthetic run with something changed.
+std::string certify(const std::function<void(VehicleState&, ControlCommand&, Reference&)>& change) {
+  const sls::test::TemporaryFolder folder;
+  record_flight(folder.path(), change);
+  EXPECT_EQ(read_certificate(folder.path()), calc_certificate(folder.path()));
+  return read_certificate(folder.path());
+}
+
+TEST(CertificateTest, IsRecomputableFromTheFiles) {
+  const sls::test::TemporaryFolder folder;
+  record_flight(folder.path());
+  EXPECT_EQ(read_certificate(folder.path()).size(), 64u);
+  EXPECT_EQ(read_certificate(folder.path()), calc_certificate(folder.path()));
+}
+
+TEST(CertificateTest, CoversEveryVehicle) {
+  const sls::test::TemporaryFolder folder;
+  Parameters parameters = make_parameters();
+  parameters.vehicle_ids({7, 0});
+  Recording recording(folder.path(), parameters);
+  for (std::uint64_t step = 0; step <= kLastStep; ++step)
+    for (const std::uint32_t id : {7u, 0u}) {
+      VehicleState state = make_state(step);
+      ControlCommand command = make_command(step);
+      Reference reference = make_reference(step);
+      state.vehicle_id(id);
+      state.truth().p_WQ_m()[0] += id;
+      command.vehicle_id(id);
+      reference.vehicle_id(id);
+      recording.add(state);
+      recording.add(command);
+      recording.add(reference);
+    }
+  EXPECT_TRUE(finish_flight(recording));
+  EXPECT_EQ(read_certificate(folder.path()), calc_certificate(folder.path()));
+}
+
+TEST(CertificateTest, LeavesOutWhatDiffersBetweenEqualFlights) {
+  const std::string expected = certify({});
+  EXPECT_EQ(certify([](VehicleState& state, ControlCommand& command, Reference& reference) {
+              if (state.step() == kLastStep) return;  // the final status names its client
+              if (state.step() > 0) state.controller_name("other");
+              state.p_WQ_m()[0] += 1;  // measured; the truth is what counts
+              command.client_name("other");
+              command.strength(1);
+              command.compute_time_ns(7);
+              reference.client_name("other");
+            }),
+            expected);
+  const sls::test::TemporaryFolder folder;
+  Parameters parameters = make_parameters();
+  parameters.run_id(5);
+  Recording recording(folder.path(), parameters);
+  for (std::uint64_t step = 0; step <= kLastStep; ++step) {
+    VehicleState state = make_state(step);
+    ControlCommand command = make_command(step);
+    Reference reference = make_reference(step);
+    state.run_id(5);
+    command.run_id(5);
+    reference.run_id(5);
+    recording.add(state);
+    recording.add(command);
+    recording.add(reference);
+  }
+  SimStatus end = make_status(PHASE_FINISHED, kLastStep);
+  end.run_id(5);
+  end.counters().duplicate(99);
+  recording.add(end);
+  EXPECT_TRUE(recording.finish("", 0));
+  EXPECT_EQ(read_certificate(folder.path()), expected);
+}
+
+TEST(CertificateTest, ChangesWithEveryFieldThatIsPartOfTheFlight) {
+  const std::string expected = certify({});
+  const std::vector<std::function<void(VehicleState&, ControlCommand&, Reference&)>> changes = {
+      [](VehicleState& state, auto&, auto&) { state.truth().p_WL_m()[2] += 1e-15; },
+      [](VehicleState& state, auto&, auto&) { state.truth().beta_dot_rad_s(-0.0); },
+      [](VehicleState& state, auto&, auto&) { state.f_Q_W_n()[1] = 17; },
+      [](VehicleState& state, auto&, auto&) { state.sim_time_ns(state.sim_time_ns() + 1); },
+      [](auto&, ControlCommand& command, auto&) { command.fault(FAULT_STAGE_TIMEOUT); },
+      [](auto&, auto&, Reference& reference) { reference.stage_index(2); },
+      [](auto&, auto&, Reference& reference) { reference.stage_name("a, \"b\"\n"); },
+      [](auto&, auto&, Reference& reference) { reference.snap_m_s4()[2] += 1e-12; }};
+  for (std::size_t i = 0; i < changes.size(); ++i)
+    EXPECT_NE(certify([&](VehicleState& state, ControlCommand& command, Reference& reference) {
+                if (state.step() == 123) changes[i](state, command, reference);
+              }),
+              expected)
+        << i;
+}
+
+TEST(CertificateTest, NumbersThatAreNoneReadBackToTheSameCertificate) {
+  certify([](VehicleState& state, ControlCommand&, Reference& reference) {
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    state.truth().p_WQ_m({nan, -nan, std::numeric_limits<double>::infinity()});
+    reference.jerk_m_s3({-0.0, 0.0, -std::numeric_limits<double>::infinity()});
+  });
+}
+
+}  // namespace
+}  // namespace sls::record

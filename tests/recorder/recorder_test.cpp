@@ -1,0 +1,256 @@
+// The recorder over DDS: a made-up server and its client on one node, the recorder on another.
+#include "recorder/recorder.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "common/app/run_main.hpp"
+#include "common/config/sha256.hpp"
+#include "recorder/verification.hpp"
+#include "tests/recorder/flights.hpp"
+#include "tests/support/temporary_folder.hpp"
+#include "tests/support/text.hpp"
+#include "tests/support/waiting.hpp"
+
+namespace sls::record {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace std::chrono_literals;
+using namespace test;
+using sls::test::read_bytes;
+using sls::test::wait_until;
+using Json = nlohmann::json;
+
+const fs::path kQosFile = SLS_SOURCE_DIR "/config/qos/default.xml";
+const int kDomain = 100 + ::getpid() % 100;  // tests of other processes at the same time
+constexpr std::uint64_t kOtherRun = 0xfedcba9876543210;
+
+/// A server of the synthetic run and its only client.
+class FakeFlight {
+ public:
+  explicit FakeFlight(std::uint64_t run_id, double server_deadline_s = 30) {
+    begin_run(run_id, server_deadline_s);
+  }
+
+  void begin_run(std::uint64_t run_id, double server_deadline_s = 30) {
+    run_id_ = run_id;
+    Parameters parameters = make_parameters();
+    parameters.run_id(run_id);
+    if (server_deadline_s != 30) {
+      const std::string text = sls::test::replace_once(
+          kScenarioText, "timeout_s: 30 } }",
+          "timeout_s: 30 }, wait: { server: { deadline_s: " + std::to_string(server_deadline_s) +
+              " } } }");
+      parameters.scenario_text(text);
+      parameters.scenario_sha256(config::calc_sha256(text));
+    }
+    parameters_writer_.write(parameters);
+    Participant pilot;
+    pilot.run_id(run_id);
+    pilot.role(ROLE_CONTROLLER);
+    pilot.name(kPilot);
+    participant_writer_.write(pilot);
+    publish(PHASE_WAITING, 0);
+  }
+
+  bool wait_for_recorder() {
+    return wait_until([this] {
+      publish(PHASE_WAITING, 0);
+      std::this_thread::sleep_for(20ms);
+      const auto recorders = participants_.find(ROLE_RECORDER, run_id_);
+      return !recorders.empty() && recorders.front().announcement.ready();
+    });
+  }
+
+  void fly(std::uint64_t from, std::uint64_t to) {
+    for (std::uint64_t step = from; step <= to; ++step) {
+      write(state_writer_, make_state(step));
+      write(reference_writer_, make_reference(step));
+      write(command_writer_, make_command(step));
+    }
+    publish(PHASE_RUNNING, to);
+  }
+
+  void publish(RunPhase phase, std::uint64_t step) {
+    write(status_writer_, make_status(phase, step));
+  }
+
+  bool is_recorded_up_to(std::int64_t step) {
+    return wait_until([&] {
+      publish(PHASE_RUNNING, 0);
+      const auto recorders = participants_.find(ROLE_RECORDER, run_id_);
+      return !recorders.empty() && recorders.front().announcement.last_complete_step() >= step;
+    });
+  }
+
+ private:
+  template <class Message>
+  void write(bus::Writer<Message>& writer, Message message) {
+    message.run_id(run_id_);
+    writer.write(message);
+  }
+
+  bus::Node node_{kQosFile, kDomain, "server"};
+  std::uint64_t run_id_ = 0;
+  bus::ParticipantDirectory participants_{node_};
+  bus::Writer<Parameters> parameters_writer_{node_};
+  bus::Writer<SimStatus> status_writer_{node_};
+  bus::Writer<VehicleState> state_writer_{node_};
+  bus::Writer<ControlCommand> command_writer_{node_};
+  bus::Writer<Reference> reference_writer_{node_};
+  bus::Writer<Participant> participant_writer_{node_};
+};
+
+class RecorderTest : public testing::Test {
+ protected:
+  RecorderTest() {
+    options_.folder = out_;
+    fs::create_directory(out_);
+  }
+  ~RecorderTest() override { join(); }
+
+  void start() {
+    thread_ = std::thread([this] {
+      try {
+        bus::Node node(kQosFile, kDomain, "recorder");
+        Recorder(node, options_).run();
+      } catch (const std::exception& error) {
+        error_ = error.what();
+      }
+    });
+  }
+  /// Waits for its end; how it ended is in `error_`.
+  void join() {
+    if (thread_.joinable()) thread_.join();
+  }
+
+  Json read_manifest(const fs::path& folder) {
+    return Json::parse(read_bytes(folder / "manifest.json"));
+  }
+  void expect_whole(const fs::path& folder) {
+    const fs::path whole = folder_ / "whole";
+    if (!fs::exists(whole)) {
+      fs::create_directory(whole);
+      record_flight(whole);
+    }
+    const RecordedFlight flight = open_recording(folder);
+    const auto difference = find_first_difference(open_recording(whole), flight);
+    EXPECT_FALSE(difference) << difference->text;
+    EXPECT_TRUE(flight.manifest().complete);
+    EXPECT_TRUE(inspect(flight).problems.empty());
+  }
+
+  const sls::test::TemporaryFolder folder_;
+  const fs::path out_ = folder_ / "out";
+  RecorderOptions options_;
+  std::thread thread_;
+  std::string error_ = "no error";
+};
+
+TEST_F(RecorderTest, RecordsARunToItsEnd) {
+  FakeFlight flight(kRunId);
+  start();
+  ASSERT_TRUE(flight.wait_for_recorder());
+  flight.fly(0, kLastStep);
+  flight.publish(PHASE_FINISHED, kLastStep);
+  join();
+  EXPECT_EQ(error_, "no error");
+  expect_whole(out_);
+}
+
+TEST_F(RecorderTest, AResetsNewRunGoesIntoASubfolder) {
+  FakeFlight flight(kRunId);
+  start();
+  ASSERT_TRUE(flight.wait_for_recorder());
+  flight.fly(0, 100);
+  flight.publish(PHASE_RESET, 100);
+  flight.begin_run(kOtherRun);
+  ASSERT_TRUE(flight.wait_for_recorder());
+  flight.fly(0, kLastStep);
+  flight.publish(PHASE_FINISHED, kLastStep);
+  join();
+  EXPECT_EQ(error_, "no error");
+  EXPECT_EQ(read_manifest(out_).at("outcome"), "reset");
+  EXPECT_EQ(read_manifest(out_).at("missing"), Json::array());
+  expect_whole(out_ / "run-fedcba9876543210");
+}
+
+TEST_F(RecorderTest, ARunThatIsReplacedByAnotherServersEndsTheRecording) {
+  auto flight = std::make_unique<FakeFlight>(kRunId);
+  start();
+  ASSERT_TRUE(flight->wait_for_recorder());
+  flight->fly(0, 100);
+  ASSERT_TRUE(flight->is_recorded_up_to(99));
+  flight.reset();
+  FakeFlight other(kOtherRun);
+  join();
+  EXPECT_NE(error_.find("run 0123456789abcdef was replaced by run fedcba9876543210"),
+            std::string::npos)
+      << error_;
+  EXPECT_EQ(read_manifest(out_).at("outcome"), "lost");
+  EXPECT_EQ(read_manifest(out_).at("missing"), Json::array());
+}
+
+TEST_F(RecorderTest, ARecorderThatFollowsRecordsTheOtherServersRun) {
+  options_.follow = true;
+  auto flight = std::make_unique<FakeFlight>(kRunId);
+  start();
+  ASSERT_TRUE(flight->wait_for_recorder());
+  flight->fly(0, 100);
+  ASSERT_TRUE(flight->is_recorded_up_to(99));
+  flight.reset();
+  FakeFlight other(kOtherRun);
+  ASSERT_TRUE(other.wait_for_recorder());
+  other.fly(0, kLastStep);
+  other.publish(PHASE_FINISHED, kLastStep);
+  join();
+  EXPECT_EQ(error_, "no error");
+  EXPECT_EQ(read_manifest(out_).at("outcome"), "lost");
+  expect_whole(out_ / "run-fedcba9876543210");
+}
+
+TEST_F(RecorderTest, AServerThatStaysAwayIsGivenUp) {
+  auto flight = std::make_unique<FakeFlight>(kRunId, 1.5);
+  start();
+  ASSERT_TRUE(flight->wait_for_recorder());
+  flight->fly(0, 100);
+  ASSERT_TRUE(flight->is_recorded_up_to(99));
+  flight.reset();
+  join();
+  EXPECT_NE(error_.find("the server is gone"), std::string::npos) << error_;
+  EXPECT_EQ(read_manifest(out_).at("outcome"), "lost");
+}
+
+TEST_F(RecorderTest, AKilledRecorderIsResumedInMidFlight) {
+  record_until_killed(make_segment(out_), 0, 100);
+  FakeFlight flight(kRunId);
+  flight.fly(0, 200);  // the histories hold what the next recorder needs
+  options_.unfinished = find_unfinished_recording(out_);
+  start();
+  ASSERT_TRUE(flight.is_recorded_up_to(199));
+  flight.fly(201, kLastStep);
+  flight.publish(PHASE_FINISHED, kLastStep);
+  join();
+  EXPECT_EQ(error_, "no error");
+  expect_whole(out_);
+  EXPECT_EQ(read_manifest(out_ / "segment-2").at("segment").at("first_step"), 100);
+}
+
+TEST_F(RecorderTest, ARecordingOfAnotherRunIsNotResumed) {
+  record_until_killed(make_segment(out_), 0, 100);
+  FakeFlight flight(kOtherRun);
+  options_.unfinished = find_unfinished_recording(out_);
+  start();
+  join();
+  EXPECT_NE(error_.find("run 0123456789abcdef was replaced by run fedcba9876543210"),
+            std::string::npos)
+      << error_;
+  EXPECT_FALSE(fs::exists(out_ / "segment-2"));
+}
+
+}  // namespace
+}  // namespace sls::record

@@ -1,0 +1,216 @@
+// A recorder that is killed and started again, judged by the files.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "common/config/config_error.hpp"
+#include "recorder/verification.hpp"
+#include "tests/recorder/csv_table.hpp"
+#include "tests/recorder/flights.hpp"
+#include "tests/support/temporary_folder.hpp"
+#include "tests/support/text.hpp"
+
+namespace sls::record {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace test;
+using sls::test::read_bytes;
+using sls::test::write_bytes;
+using Json = nlohmann::json;
+
+class SegmentsTest : public testing::Test {
+ protected:
+  SegmentsTest() {
+    fs::create_directory(whole_);
+    record_flight(whole_);
+    fs::create_directory(out_);
+  }
+
+  Segment resume() { return make_next_segment(open_recording(out_)); }
+
+  /// What a recorder gets that starts while the histories reach back to `oldest`.
+  bool record_to_the_end(const Segment& segment, std::uint64_t oldest) {
+    Recording recording(segment, make_parameters());
+    EXPECT_EQ(recording.last_complete_step(), static_cast<std::int64_t>(segment.first_step) - 1);
+    add_steps(recording, oldest, kLastStep);
+    return finish_flight(recording);
+  }
+
+  Json read_manifest(const fs::path& folder) {
+    return Json::parse(read_bytes(folder / "manifest.json"));
+  }
+  std::string find_difference() {
+    const auto difference = find_first_difference(open_recording(whole_), open_recording(out_));
+    return difference ? difference->text : "equal";
+  }
+  void expect_equal_to_the_undisturbed(const fs::path& last_segment) {
+    EXPECT_EQ(find_difference(), "equal");
+    const Json manifest = read_manifest(last_segment);
+    EXPECT_EQ(manifest.at("complete"), true);
+    EXPECT_EQ(manifest.at("missing"), Json::array());
+    EXPECT_EQ(manifest.at("certificate"), read_manifest(whole_).at("certificate"));
+    const Inspection inspection = inspect(open_recording(out_));
+    EXPECT_TRUE(inspection.problems.empty()) << inspection.problems.front();
+  }
+
+  const sls::test::TemporaryFolder folder_;
+  const fs::path whole_ = folder_ / "whole", out_ = folder_ / "out";
+};
+
+TEST_F(SegmentsTest, AResumedRecordingEqualsTheUndisturbedOne) {
+  record_until_killed(make_segment(out_), 0, 150);
+  const Segment segment = resume();
+  EXPECT_EQ(segment.number, 2);
+  EXPECT_EQ(segment.folder, out_ / "segment-2");
+  EXPECT_EQ(segment.first_step, 150u) << "of step 150 the next state has not come";
+  EXPECT_TRUE(record_to_the_end(segment, 20));
+  expect_equal_to_the_undisturbed(segment.folder);
+  EXPECT_EQ(read_manifest(segment.folder).at("segment"),
+            Json({{"number", 2}, {"first_step", 150}}));
+  EXPECT_EQ(read_manifest(out_).at("complete"), false) << "the last segment speaks for all";
+  const auto table = parse_csv(read_bytes(segment.folder / "state.csv"));
+  EXPECT_EQ(table.text(0, "step"), "150");
+}
+
+TEST_F(SegmentsTest, TheLastSegmentsFlightTextIsThatOfTheWholeFlight) {
+  record_until_killed(make_segment(out_), 0, 150);
+  const Segment segment = resume();
+  record_to_the_end(segment, 0);
+  const auto cut = [](const std::string& text) {  // events apart
+    return text.substr(0, text.find("Events"));
+  };
+  EXPECT_EQ(cut(read_bytes(segment.folder / "flight.txt")), cut(read_bytes(whole_ / "flight.txt")));
+}
+
+TEST_F(SegmentsTest, ItMayBeKilledOftenAndAnywhere) {
+  record_until_killed(make_segment(out_), 0, 100);
+  record_until_killed(resume(), 50, 160);
+  {  // killed before it had written its manifest
+    Recording recording(resume(), make_parameters());
+    fs::remove(out_ / "segment-3/manifest.json");
+  }
+  record_until_killed(resume(), 100, 240);
+  const Segment segment = resume();
+  EXPECT_EQ(segment.number, 4);
+  EXPECT_TRUE(record_to_the_end(segment, 200));
+  expect_equal_to_the_undisturbed(out_ / "segment-4");
+}
+
+TEST_F(SegmentsTest, RowsCutAnywhereAreRecordedAgain) {
+  record_until_killed(make_segment(out_), 0, 150);
+  std::map<std::string, std::string> files;
+  for (const char* name : {"state.csv", "command.csv", "reference.csv"})
+    files[name] = read_bytes(out_ / name);
+  for (const auto& [name, bytes] : files)
+    for (const std::size_t surplus : {1u, 30u, 300u, 3000u}) {
+      SCOPED_TRACE(name + " less " + std::to_string(surplus));
+      for (const auto& [file, content] : files) write_bytes(out_ / file, content);
+      write_bytes(out_ / name, bytes.substr(0, bytes.size() - surplus));
+      fs::remove_all(out_ / "segment-2");
+      const Segment segment = resume();
+      EXPECT_LT(segment.first_step, 150u);
+      EXPECT_TRUE(record_to_the_end(segment, 0));
+      expect_equal_to_the_undisturbed(segment.folder);
+    }
+}
+
+TEST_F(SegmentsTest, AnInterruptedRecordingCanBeResumedToo) {
+  {
+    Recording recording(out_, make_parameters());
+    add_steps(recording, 0, 150);
+    recording.finish("interrupted by SIGTERM", 0);
+  }
+  const Segment segment = resume();
+  EXPECT_TRUE(record_to_the_end(segment, 0));
+  expect_equal_to_the_undisturbed(segment.folder);
+}
+
+TEST_F(SegmentsTest, WhatTheHistoriesNoLongerHoldIsNamedAsAGap) {
+  record_until_killed(make_segment(out_), 0, 150);
+  const Segment segment = resume();
+  EXPECT_FALSE(record_to_the_end(segment, 200));
+  const Json manifest = read_manifest(segment.folder);
+  EXPECT_EQ(manifest.at("complete"), false);
+  EXPECT_EQ(manifest.at("outcome"), "finished");
+  ASSERT_EQ(manifest.at("missing").size(), 3u);
+  for (const Json& gap : manifest.at("missing")) {
+    EXPECT_EQ(gap.at("from"), 150);
+    EXPECT_EQ(gap.at("to"), 199);
+  }
+  EXPECT_EQ(find_difference(), "vehicle 0, step 150: in A alone");
+  EXPECT_TRUE(inspect(open_recording(out_)).problems.empty());
+}
+
+TEST_F(SegmentsTest, AnEarlierSegmentsGapKeepsTheWholeFromBeingComplete) {
+  {
+    Recording recording(out_, make_parameters());
+    for (std::uint64_t step = 0; step <= 150; ++step) {
+      recording.add(make_state(step));
+      recording.add(make_command(step));
+      if (step != 50) recording.add(make_reference(step));
+    }
+    for (int i = 0; i < 12; ++i) recording.pass_time(std::chrono::seconds(1));
+    while (fs::file_size(out_ / "command.csv") < 200) recording.flush_if_due();
+  }
+  const Segment segment = resume();
+  EXPECT_EQ(segment.first_step, 150u);
+  EXPECT_FALSE(record_to_the_end(segment, 0));
+  EXPECT_EQ(
+      read_manifest(segment.folder).at("missing"),
+      Json::array({{{"vehicle_id", 0}, {"topic", "sls/reference"}, {"from", 50}, {"to", 50}}}));
+}
+
+TEST_F(SegmentsTest, StepsThatNobodyAnsweredAreWholeWithoutAReference) {
+  const auto add = [](Recording& recording, std::uint64_t from, std::uint64_t to) {
+    for (std::uint64_t step = from; step <= to; ++step) {
+      const bool is_after_silence = step > 40 && step <= 60;
+      recording.add(is_after_silence ? make_unanswered_state(step, FORCE_HELD) : make_state(step));
+      if (step >= 40 && step < 60) continue;
+      recording.add(make_command(step));
+      recording.add(make_reference(step));
+    }
+    for (int i = 0; i < 12; ++i) recording.pass_time(std::chrono::seconds(1));
+  };
+  fs::remove_all(whole_);
+  fs::create_directory(whole_);
+  {
+    Recording recording(whole_, make_parameters());
+    add(recording, 0, kLastStep);
+    EXPECT_TRUE(finish_flight(recording));
+  }
+  {
+    Recording recording(out_, make_parameters());
+    add(recording, 0, 51);
+    while (fs::file_size(out_ / "command.csv") < 200) recording.flush_if_due();
+  }
+  const Segment segment = resume();
+  EXPECT_EQ(segment.first_step, 51u);
+  {
+    Recording recording(segment, make_parameters());
+    add(recording, 0, kLastStep);
+    EXPECT_TRUE(finish_flight(recording));
+  }
+  expect_equal_to_the_undisturbed(segment.folder);
+  EXPECT_EQ(read_manifest(whole_).at("unanswered_steps"), 20);
+  EXPECT_EQ(read_manifest(segment.folder).at("unanswered_steps"), 9);
+}
+
+TEST_F(SegmentsTest, ASegmentOfAnotherScenarioIsRefused) {
+  record_until_killed(make_segment(out_), 0, 150);
+  Parameters parameters = make_parameters();
+  parameters.scenario_sha256(std::string(64, 'f'));
+  EXPECT_THROW(Recording(resume(), parameters), config::ConfigError);
+}
+
+TEST_F(SegmentsTest, SegmentsOfTwoRunsAreNotRead) {
+  record_until_killed(make_segment(out_), 0, 150);
+  record_to_the_end(resume(), 0);
+  const fs::path manifest = out_ / "segment-2/manifest.json";
+  write_bytes(manifest, sls::test::replace_once(read_bytes(manifest), "0123456789abcdef",
+                                                "ffffffffffffffff"));
+  EXPECT_THROW(open_recording(out_), config::ConfigError);
+}
+
+}  // namespace
+}  // namespace sls::record

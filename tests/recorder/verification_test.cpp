@@ -1,0 +1,223 @@
+// Differences are planted in the files themselves, as somebody else would.
+#include "recorder/verification.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <charconv>
+#include <cmath>
+
+#include "common/config/config_error.hpp"
+#include "tests/recorder/flights.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace sls::record {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace test;
+using sls::test::read_bytes;
+using sls::test::write_bytes;
+
+class VerificationTest : public testing::Test {
+ protected:
+  VerificationTest() {
+    for (const auto& folder : {a_, b_}) {
+      fs::create_directory(folder);
+      record_flight(folder);
+    }
+  }
+
+  /// Changes the field in `line` (the header is 1) and `column` (from 0) of a file of B.
+  void change(const std::string& file, std::size_t line, std::size_t column,
+              const std::function<std::string(const std::string&)>& to) {
+    std::string bytes = read_bytes(b_ / file);
+    std::size_t begin = 0;
+    for (std::size_t i = 1; i < line; ++i) begin = bytes.find('\n', begin) + 1;
+    for (std::size_t i = 0; i < column; ++i) begin = bytes.find(',', begin) + 1;
+    const std::size_t end = bytes.find_first_of(",\n", begin);
+    write_bytes(b_ / file, bytes.replace(begin, end - begin, to(bytes.substr(begin, end - begin))));
+  }
+  void remove_line(const std::string& file, std::size_t line) {
+    std::string bytes = read_bytes(b_ / file);
+    std::size_t begin = 0;
+    for (std::size_t i = 1; i < line; ++i) begin = bytes.find('\n', begin) + 1;
+    write_bytes(b_ / file, bytes.erase(begin, bytes.find('\n', begin) + 1 - begin));
+  }
+
+  std::string find_difference() {
+    const auto difference = find_first_difference(open_recording(a_), open_recording(b_));
+    return difference ? difference->text : "equal";
+  }
+  std::string find_problems(const fs::path& folder) {
+    std::string text;
+    for (const auto& problem : inspect(open_recording(folder)).problems) text += problem + '\n';
+    return text;
+  }
+
+  const sls::test::TemporaryFolder folder_;
+  const fs::path a_ = folder_ / "a", b_ = folder_ / "b";
+};
+
+/// The next double, as text.
+std::string to_next(const std::string& text) {
+  double value = 0;
+  std::from_chars(text.data(), text.data() + text.size(), value);
+  value = std::nextafter(value, 1e300);
+  std::array<char, 32> digits;
+  return {digits.data(), std::to_chars(digits.data(), digits.data() + 32, value).ptr};
+}
+
+TEST_F(VerificationTest, EqualRecordingsAreEqualAndAsTheirManifestsSay) {
+  EXPECT_EQ(find_difference(), "equal");
+  const Inspection of_a = inspect(open_recording(a_)), of_b = inspect(open_recording(b_));
+  EXPECT_TRUE(of_a.problems.empty()) << of_a.problems.front();
+  EXPECT_EQ(of_a.steps, kLastStep + 1);
+  EXPECT_EQ(of_a.certificate, of_b.certificate);
+  EXPECT_TRUE(list_notes(open_recording(a_), open_recording(b_)).empty());
+}
+
+TEST_F(VerificationTest, OneBitIsFoundAtItsStepAndColumn) {
+  struct {
+    const char* file;
+    std::size_t column;
+    const char* name;
+  } const cases[] = {{"state.csv", 2, "sim_time_s"},     {"state.csv", 9, "load_x_m"},
+                     {"state.csv", 21, "force_z_n"},     {"command.csv", 4, "force_y_n"},
+                     {"reference.csv", 2, "sim_time_s"}, {"reference.csv", 19, "ref_sz_m_s4"}};
+  for (const auto& planted : cases) {
+    SCOPED_TRACE(planted.name);
+    const std::string before = read_bytes(b_ / planted.file);
+    std::string from, to;
+    change(planted.file, 125, planted.column,
+           [&](const std::string& text) { return to = to_next(from = text); });
+    EXPECT_EQ(find_difference(), std::string(planted.file) + ", vehicle 0, step 123, " +
+                                     planted.name + ": " + from + " in A, " + to + " in B");
+    EXPECT_NE(find_problems(b_).find(planted.file), std::string::npos);
+    EXPECT_NE(find_problems(b_).find("certificate"), std::string::npos);
+    write_bytes(b_ / planted.file, before);
+  }
+  EXPECT_EQ(find_difference(), "equal");
+}
+
+TEST_F(VerificationTest, TheFirstDifferenceInStepOrderIsNamed) {
+  change("state.csv", 200, 5, to_next);
+  change("reference.csv", 102, 5, to_next);
+  change("command.csv", 102, 7, [](auto&) { return "held"; });
+  EXPECT_EQ(find_difference(), "command.csv, vehicle 0, step 100, fault: 'none' in A, 'held' in B");
+}
+
+TEST_F(VerificationTest, ClientNamesComputeTimesAndWaysOfWritingANumberAreNoDifference) {
+  for (std::size_t line = 2; line <= kLastStep + 2; ++line) {
+    change("command.csv", line, 2, [](auto&) { return "standby"; });
+    change("command.csv", line, 6, [](auto&) { return "0"; });
+  }
+  change("state.csv", 2, 2, [](auto&) { return "0.000"; });
+  EXPECT_EQ(find_difference(), "equal");
+  EXPECT_NE(find_problems(b_).find("command.csv: SHA-256"), std::string::npos);
+  EXPECT_EQ(find_problems(b_).find("certificate"), std::string::npos);
+}
+
+TEST_F(VerificationTest, ZerosOfBothSignsAndNumbersThatAreNoneAreToldApart) {
+  change("state.csv", 2, 19, [](auto&) { return "-0"; });
+  EXPECT_EQ(find_difference(), "state.csv, vehicle 0, step 0, force_x_n: 0 in A, -0 in B");
+  change("state.csv", 2, 19, [](auto&) { return "nan"; });
+  EXPECT_EQ(find_difference(), "state.csv, vehicle 0, step 0, force_x_n: 0 in A, nan in B");
+}
+
+TEST_F(VerificationTest, RowsThatOnlyOneHasAreNamed) {
+  remove_line("command.csv", 52);
+  EXPECT_EQ(find_difference(), "command.csv, vehicle 0, step 50: a row in A alone");
+  EXPECT_NE(find_problems(b_).find("command.csv: 300 rows, manifest: 301"), std::string::npos);
+  for (const char* file : {"state.csv", "command.csv", "reference.csv"})
+    for (std::size_t line = 30; line > 20; --line) remove_line(file, line);
+  EXPECT_EQ(find_difference(), "vehicle 0, step 19: in A alone");
+}
+
+TEST_F(VerificationTest, AShorterRecordingDiffersWhereItEnds) {
+  fs::remove_all(b_);
+  fs::create_directory(b_);
+  {
+    Recording recording(b_, make_parameters());
+    add_steps(recording, 0, 200);
+    recording.finish("interrupted by SIGINT", 0);
+  }
+  EXPECT_EQ(find_difference(), "command.csv, vehicle 0, step 200: a row in A alone");
+  EXPECT_EQ(find_problems(b_), "") << "it is what its manifest says";
+  const auto notes = list_notes(open_recording(a_), open_recording(b_));
+  ASSERT_EQ(notes.size(), 1u);
+  EXPECT_EQ(notes[0], "B: not complete: interrupted: interrupted by SIGINT");
+}
+
+TEST_F(VerificationTest, ScenarioPeriodModeAndMissingStepsAreNoted) {
+  fs::remove_all(b_);
+  fs::create_directory(b_);
+  Parameters parameters = make_parameters();
+  parameters.period_ns(2'000'000);
+  parameters.mode(MODE_REALTIME);
+  parameters.scenario_sha256(std::string(64, 'f'));
+  Recording recording(b_, parameters);
+  for (std::uint64_t step = 0; step <= kLastStep; ++step) {
+    recording.add(make_state(step));
+    recording.add(make_command(step));
+    if (step != 7) recording.add(make_reference(step));
+  }
+  finish_flight(recording);
+  std::string text;
+  for (const auto& note : list_notes(open_recording(a_), open_recording(b_))) text += note + '\n';
+  for (const char* part :
+       {"period in force, s: 0.004 in A, 0.002 in B", "mode: lockstep in A, realtime in B",
+        "ffff in B", "B: 1 samples missing, first sls/reference step 7 of vehicle 0"})
+    EXPECT_NE(text.find(part), std::string::npos) << part << '\n' << text;
+  EXPECT_EQ(find_difference(), "reference.csv, vehicle 0, step 7: a row in A alone");
+}
+
+TEST_F(VerificationTest, FilesThatAreNotWhatTheManifestSaysAreNamed) {
+  write_bytes(b_ / "flight.txt", "forged");
+  EXPECT_EQ(find_difference(), "equal");
+  EXPECT_EQ(find_problems(b_).find((b_ / "flight.txt").string() + ": SHA-256"), 0u);
+  fs::remove(b_ / "status.csv");
+  EXPECT_NE(find_problems(b_).find((b_ / "status.csv").string() + ": cannot read"),
+            std::string::npos);
+}
+
+TEST_F(VerificationTest, AMalformedRowIsNamedWithItsLineUnlessADifferenceComesFirst) {
+  change("state.csv", 90, 3, [](auto&) { return "1.2.3"; });
+  const std::string place = (b_ / "state.csv").string() + ":90: quad_x_m: expected a number";
+  EXPECT_NE(find_problems(b_).find(place), std::string::npos) << find_problems(b_);
+  try {
+    find_difference();
+    FAIL() << "no error";
+  } catch (const DamagedError& error) {
+    EXPECT_EQ(error.what(), place + ", got '1.2.3'");
+  }
+  change("command.csv", 50, 3, to_next);
+  EXPECT_EQ(find_difference().find("command.csv, vehicle 0, step 48"), 0u);
+}
+
+TEST_F(VerificationTest, RowsOutOfOrderAreDamage) {
+  change("reference.csv", 12, 1, [](auto&) { return "8"; });
+  EXPECT_NE(find_problems(b_).find("reference.csv:12: step: expected one after 9, got 8"),
+            std::string::npos)
+      << find_problems(b_);
+}
+
+TEST_F(VerificationTest, AKilledRecordingIsReadAndSaidToBeUnfinished) {
+  fs::remove_all(b_);
+  fs::create_directory(b_);
+  record_until_killed(make_segment(b_), 0, 200);
+  EXPECT_EQ(find_difference(), "vehicle 0, step 200: in A alone");
+  EXPECT_NE(find_problems(b_).find("lists no files"), std::string::npos);
+}
+
+TEST_F(VerificationTest, WhatIsNoRecordingIsRefused) {
+  EXPECT_THROW(open_recording(folder_ / "none"), config::ConfigError);
+  EXPECT_THROW(open_recording(folder_.path()), config::ConfigError);
+  for (const char* text : {"", "{", "[]", "{\"complete\": 3}", "null"}) {
+    write_bytes(b_ / "manifest.json", text);
+    EXPECT_THROW(open_recording(b_), config::ConfigError) << text;
+  }
+}
+
+}  // namespace
+}  // namespace sls::record
