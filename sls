@@ -25,6 +25,13 @@ usage: ./sls COMMAND [OPTIONS]
       --qos FILE       QoS profiles (default: config/qos/default.xml)
       --domain N       DDS domain, 0 to 232 (default: 0)
       --period-s X     control period in force (default: the scenario's)
+  ctl COMMAND        talk to the run on this domain: pause, step N, resume, start, reset, stop or
+                     status [--watch] [--json]; with --help: its options
+  delay-margin SCENARIO
+                     the delay of the command at which the controller loses the load, with a table
+      --period-s X     control period in force (default: the scenario's)
+  verify A [B]       compares the data of two recordings: equal, or the first difference; of one, its
+                     files with its manifest
   test               set up, build, run every test
       --sanitize KIND  the unit tests alone, built with a sanitizer: address or thread
   build              set up and build; the programs are in build/bin
@@ -239,6 +246,47 @@ cmd_demo() {
   print_summary
 }
 
+cmd_ctl() {
+  if [[ -z ${SLS_BUILD:-} ]]; then
+    setup
+    build_tree release "$build" sim_ctl
+  fi
+  exec "$build/bin/sim_ctl" "$@"
+}
+
+cmd_delay-margin() {
+  local scenario='' period=()
+  while (($#)); do
+    case $1 in
+      --period-s)
+        (($# >= 2)) || fail "$1: expected a value (see ./sls help)" 2
+        period=(--period-s "$2")
+        shift
+        ;;
+      -*) fail "unknown option '$1' (see ./sls help)" 2 ;;
+      *)
+        [[ -z $scenario ]] || fail "expected one scenario, got '$scenario' and '$1'" 2
+        scenario=$1
+        ;;
+    esac
+    shift
+  done
+  [[ -n $scenario ]] || fail "expected a scenario (see ./sls help)" 2
+  if [[ -z ${SLS_BUILD:-} ]]; then
+    setup
+    build_tree release "$build" delay_margin
+  fi
+  exec "$build/bin/delay_margin" --scenario "$(find_scenario "$scenario")" "${period[@]}"
+}
+
+cmd_verify() {
+  if [[ -z ${SLS_BUILD:-} ]]; then
+    setup
+    build_tree release "$build" sls_verify
+  fi
+  exec "$build/bin/sls_verify" "$@"
+}
+
 cmd_test() {
   local preset=release folder=$build
   if (($#)); then
@@ -258,7 +306,7 @@ cmd_test() {
 command=${1:-help}
 (($#)) && shift
 case $command in
-  demo | run | test | build) "cmd_$command" "$@" ;;
+  demo | run | ctl | delay-margin | verify | test | build) "cmd_$command" "$@" ;;
   clean) rm -rf "$root"/build "$root"/build-* ;;
   help | --help | -h) usage ;;
   *)

@@ -54,20 +54,26 @@ void Process::kill() {
   if (is_running()) kill_process(id_);
 }
 
-void kill_process(pid_t id) {
+std::vector<std::filesystem::path> find_shared_memory(pid_t id) {
   namespace fs = std::filesystem;
-  // Fast DDS holds a lock file NAME_el open for its own segment NAME.
+  // Fast DDS holds a lock file NAME_el open for its own segment NAME. Not so the ports: others have
+  // them open, and whoever is started next takes them over.
+  const std::string prefix = "/dev/shm/fastrtps_", suffix = "_el";
   std::vector<fs::path> own;
   for (const auto& descriptor : fs::directory_iterator("/proc/" + std::to_string(id) + "/fd")) {
     std::error_code gone;
-    const fs::path target = fs::read_symlink(descriptor, gone);
-    const std::string name = target.string();
-    const bool is_lock = name.rfind("/dev/shm/fastrtps_", 0) == 0 && name.size() > 3 &&
-                         name.compare(name.size() - 3, 3, "_el") == 0;
-    if (is_lock) own.insert(own.end(), {target, name.substr(0, name.size() - 3)});
+    const std::string name = fs::read_symlink(descriptor, gone).string();
+    const bool is_lock = name.rfind(prefix, 0) == 0 && name.rfind(prefix + "port", 0) != 0 &&
+                         name.compare(name.size() - suffix.size(), suffix.size(), suffix) == 0;
+    if (is_lock) own.insert(own.end(), {name, name.substr(0, name.size() - suffix.size())});
   }
+  return own;
+}
+
+void kill_process(pid_t id) {
+  const auto own = find_shared_memory(id);
   ::kill(id, SIGKILL);
-  for (const auto& file : own) fs::remove(file);
+  for (const auto& file : own) std::filesystem::remove(file);
 }
 
 std::string Process::output() const { return read_file(folder_ / "output"); }

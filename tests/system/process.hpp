@@ -41,6 +41,9 @@ class Process {
   std::optional<int> exit_code_;
 };
 
+/// The segment in /dev/shm that a process has to itself: left behind when it is killed.
+std::vector<std::filesystem::path> find_shared_memory(pid_t id);
+
 /// Ends any process for good, and removes its shared-memory segment, which it can no longer.
 void kill_process(pid_t id);
 

@@ -1,0 +1,71 @@
+/// LD_PRELOAD library that loses datagrams: of those a process sends over IPv4, SLS_DROP_PERCENT %
+/// never leave it, chosen by a generator seeded with SLS_DROP_SEED. The sender is told they did, as
+/// on a real network. How many it lost is printed when the process ends.
+#include <dlfcn.h>
+#include <sys/socket.h>
+#include <sys/types.h>
+
+#include <atomic>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <mutex>
+#include <random>
+
+namespace {
+
+std::atomic<std::uint64_t> sent{0}, lost{0};
+
+double read_environment(const char* name) {
+  const char* text = std::getenv(name);
+  return text ? std::strtod(text, nullptr) : 0.0;
+}
+
+bool is_lost(int socket) {
+  int type = 0, domain = 0;
+  socklen_t size = sizeof type;
+  if (getsockopt(socket, SOL_SOCKET, SO_TYPE, &type, &size) != 0 || type != SOCK_DGRAM)
+    return false;
+  size = sizeof domain;
+  if (getsockopt(socket, SOL_SOCKET, SO_DOMAIN, &domain, &size) != 0 || domain != AF_INET)
+    return false;
+  static const double probability = read_environment("SLS_DROP_PERCENT") / 100.0;
+  static std::mt19937_64 generator(static_cast<std::uint64_t>(read_environment("SLS_DROP_SEED")));
+  static std::mutex mutex;
+  const std::lock_guard lock(mutex);
+  ++sent;
+  if (std::uniform_real_distribution<double>()(generator) >= probability) return false;
+  ++lost;
+  return true;
+}
+
+template <class Function>
+Function find_original(const char* name) {
+  return reinterpret_cast<Function>(dlsym(RTLD_NEXT, name));
+}
+
+struct Report {
+  ~Report() {
+    std::fprintf(stderr, "drop_shim: lost %llu of %llu datagrams\n",
+                 static_cast<unsigned long long>(lost), static_cast<unsigned long long>(sent));
+  }
+} report;
+
+}  // namespace
+
+extern "C" ssize_t sendmsg(int socket, const msghdr* message, int flags) {
+  static const auto original = find_original<ssize_t (*)(int, const msghdr*, int)>("sendmsg");
+  if (!is_lost(socket)) return original(socket, message, flags);
+  std::size_t bytes = 0;
+  for (std::size_t i = 0; i < message->msg_iovlen; ++i) bytes += message->msg_iov[i].iov_len;
+  return static_cast<ssize_t>(bytes);
+}
+
+extern "C" ssize_t sendto(int socket, const void* data, std::size_t bytes, int flags,
+                          const sockaddr* to, socklen_t size) {
+  static const auto original =
+      find_original<ssize_t (*)(int, const void*, std::size_t, int, const sockaddr*, socklen_t)>(
+          "sendto");
+  if (!is_lost(socket)) return original(socket, data, bytes, flags, to, size);
+  return static_cast<ssize_t>(bytes);
+}

@@ -1,0 +1,151 @@
+/// One scenario, one result: whatever happens around a lockstep flight, its certificate stays the
+/// same. And what a scenario's faults do depends on simulation time alone.
+#include <gtest/gtest.h>
+#include <sched.h>
+#include <signal.h>
+
+#include <thread>
+
+#include "bench/in_process_flight.hpp"
+#include "tests/system/flight.hpp"
+
+namespace sls::test {
+namespace {
+
+std::string read_certificate(const std::filesystem::path& recording) {
+  return read_manifest(recording).at("certificate").get<std::string>();
+}
+
+/// Keeps `count` cores busy while it lives.
+class Load {
+ public:
+  explicit Load(int count) {
+    for (int i = 0; i < count; ++i)
+      burners_.push_back(
+          std::make_unique<Process>(std::vector<std::string>{"sh", "-c", "while :; do :; done"}));
+  }
+
+ private:
+  std::vector<std::unique_ptr<Process>> burners_;
+};
+
+/// Starts what follows on the first core alone while it lives.
+class OneCore {
+ public:
+  OneCore() {
+    sched_getaffinity(0, sizeof before_, &before_);
+    cpu_set_t one;
+    CPU_ZERO(&one);
+    for (int core = 0; core < CPU_SETSIZE; ++core)
+      if (CPU_ISSET(core, &before_)) {
+        CPU_SET(core, &one);
+        break;
+      }
+    sched_setaffinity(0, sizeof one, &one);
+  }
+  ~OneCore() { sched_setaffinity(0, sizeof before_, &before_); }
+
+ private:
+  cpu_set_t before_{};
+};
+
+class OneResultTest : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    Flight flight(scenario("figure_eight"));
+    flight.expect_success();
+    certificate_ = read_certificate(flight.recording());
+    ASSERT_EQ(certificate_.size(), 64u);
+  }
+
+  static void expect_same(Flight& flight) {
+    flight.expect_success();
+    EXPECT_EQ(read_certificate(flight.recording()), certificate_);
+  }
+
+  static std::string certificate_;
+};
+
+std::string OneResultTest::certificate_;
+
+TEST_F(OneResultTest, OverUdp) {
+  Flight flight(scenario("figure_eight"), {qos("udp"), {}, {}});
+  expect_same(flight);
+}
+
+TEST_F(OneResultTest, OnOneCore) {
+  const OneCore one_core;
+  Flight flight(scenario("figure_eight"));
+  expect_same(flight);
+}
+
+TEST_F(OneResultTest, WithEveryCoreBusy) {
+  const Load load(static_cast<int>(std::thread::hardware_concurrency()));
+  Flight flight(scenario("figure_eight"));
+  expect_same(flight);
+}
+
+TEST_F(OneResultTest, WithFivePercentOfAllDatagramsLost) {
+  setenv("LD_PRELOAD", SLS_DROP_SHIM, 1);
+  setenv("SLS_DROP_PERCENT", "5", 1);
+  setenv("SLS_DROP_SEED", "1", 1);
+  Flight flight(scenario("figure_eight"), {qos("udp"), {}, {}});
+  for (const char* name : {"LD_PRELOAD", "SLS_DROP_PERCENT", "SLS_DROP_SEED"}) unsetenv(name);
+  expect_same(flight);
+  const auto at = flight.server->output().find("drop_shim: lost ");
+  ASSERT_NE(at, std::string::npos) << "the shim was not loaded: " << flight.server->output();
+  EXPECT_GT(std::stoi(flight.server->output().substr(at + 16)), 100) << flight.server->output();
+}
+
+TEST_F(OneResultTest, PausedSteppedAndResumed) {
+  Flight flight(scenario("figure_eight"));
+  const auto control = [&](std::vector<std::string> words) {
+    words.insert(words.begin(), {program("sim_ctl"), "--domain", flight.domain.text()});
+    Process process(words);
+    EXPECT_EQ(process.wait(), 0) << process.output() << flight.outputs();
+  };
+  ASSERT_TRUE(flight.wait_for_steps(300)) << flight.outputs();
+  control({"pause"});
+  for (const char* steps : {"1", "1", "250"}) control({"step", steps});
+  control({"resume"});
+  expect_same(flight);
+}
+
+TEST_F(OneResultTest, WithThePrimaryKilled) {
+  TemporaryFolder folder;
+  // The same bytes apart from the number of clients, which is no part of the certificate.
+  const std::string file = folder / "scenario.yaml";
+  write_bytes(
+      file, replace_once(read_file(scenario("figure_eight")), "controllers: 1", "controllers: 2"));
+  Flight flight(file, {{}, {}, {"--name", "primary", "--strength", "2"}});
+  Process standby(make_command("control_client", flight.domain.number(),
+                               {"--scenario", file, "--name", "standby", "--strength", "1"}));
+  ASSERT_TRUE(flight.wait_for_steps(500)) << flight.outputs() << standby.output();
+  flight.client->kill();
+  EXPECT_EQ(flight.server->wait(), 0) << flight.outputs();
+  EXPECT_EQ(standby.wait(), 0) << standby.output();
+  EXPECT_EQ(flight.recorder->wait(), 0) << flight.outputs();
+  EXPECT_EQ(read_certificate(flight.recording()), certificate_);
+}
+
+// --- faults in simulation time -------------------------------------------------------------------
+
+TEST(FaultLineSystemTest, AFaultyFlightRepeatsAndEqualsTheOneInProcess) {
+  Flight first(scenario("faulty_figure_eight")), second(scenario("faulty_figure_eight"));
+  first.expect_success();
+  second.expect_success();
+  EXPECT_EQ(read_certificate(first.recording()), read_certificate(second.recording()));
+  const auto flown = bench::fly(config::load_scenario(scenario("faulty_figure_eight")));
+  const Table states(first.recording() / "state.csv"), commands(first.recording() / "command.csv");
+  ASSERT_EQ(states.rows(), flown.size());
+  for (std::size_t row = 0; row < flown.size(); ++row) {
+    const bench::FlownStep& step = flown[row];
+    ASSERT_EQ(states.position(row, "quad"), step.truth.p_WQ) << row;
+    ASSERT_EQ(states.position(row, "load"), step.truth.p_WL) << row;
+    ASSERT_EQ(states.number(row, "force_z_n"), step.applied_f_Q_W.z()) << row;
+    ASSERT_EQ(commands.number(row, "force_z_n"), step.answer.f_Q_W.z()) << row;
+  }
+}
+
+}  // namespace
+}  // namespace sls::test

@@ -1,0 +1,150 @@
+/// Any process is killed and started again, and nothing else has to be.
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include "tests/system/flight.hpp"
+
+namespace sls::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool holds(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+/// What `sls_verify` says about two recordings, and whether they are equal.
+std::pair<bool, std::string> verify(const fs::path& a, const fs::path& b) {
+  Process process({program("sls_verify"), a.string(), b.string()});
+  const auto code = process.wait();
+  return {code == 0, process.output()};
+}
+
+class RestartTest : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    undisturbed_ = std::make_unique<Flight>(scenario("figure_eight"),
+                                            FlightOptions{{}, {"--period-s", "0.001"}, {}});
+    undisturbed_->expect_success();
+  }
+  static void TearDownTestSuite() { undisturbed_.reset(); }
+
+  std::unique_ptr<Process> start(const char* name, const std::vector<std::string>& flags) const {
+    return std::make_unique<Process>(make_command(name, domain_.number(), flags));
+  }
+  std::unique_ptr<Process> start_server() const {
+    return start("sim_server", {"--scenario", scenario("figure_eight"), "--period-s", "0.001"});
+  }
+  std::unique_ptr<Process> start_client(const std::vector<std::string>& further = {}) const {
+    std::vector<std::string> flags = {"--scenario", scenario("figure_eight")};
+    flags.insert(flags.end(), further.begin(), further.end());
+    return start("control_client", flags);
+  }
+  std::unique_ptr<Process> start_recorder(const std::vector<std::string>& further = {}) const {
+    std::vector<std::string> flags = {"--out", recording()};
+    flags.insert(flags.end(), further.begin(), further.end());
+    return start("recorder", flags);
+  }
+  std::string recording() const { return folder_ / "recording"; }
+  bool wait_for_rows() const {
+    return wait_until([&] { return read_file(recording() + "/state.csv").size() > 100'000; });
+  }
+
+  static std::unique_ptr<Flight> undisturbed_;
+  TemporaryFolder folder_;
+  OwnDomain domain_;
+};
+
+std::unique_ptr<Flight> RestartTest::undisturbed_;
+
+TEST_F(RestartTest, AKilledClientIsReplacedByOneThatServesAtOnce) {
+  const auto recorder = start_recorder(), server = start_server();
+  auto client = start_client();
+  ASSERT_TRUE(wait_for_rows()) << server->output();
+  client->kill();
+  client = start_client();
+  EXPECT_EQ(server->wait(), 0) << server->output();
+  EXPECT_EQ(client->wait(), 0) << client->output();
+  EXPECT_EQ(recorder->wait(), 0) << recorder->output();
+  const auto [equal, said] = verify(recording(), undisturbed_->recording());
+  EXPECT_TRUE(equal) << said;
+}
+
+TEST_F(RestartTest, AKilledRecorderGoesOnInANewSegmentAndTogetherNothingIsMissing) {
+  auto recorder = start_recorder({"--resume"});
+  const auto server = start_server(), client = start_client();
+  ASSERT_TRUE(wait_for_rows()) << server->output();
+  recorder->kill();
+  recorder = start_recorder({"--resume"});
+  EXPECT_EQ(server->wait(), 0) << server->output();
+  EXPECT_EQ(client->wait(), 0) << client->output();
+  EXPECT_EQ(recorder->wait(), 0) << recorder->output();
+  EXPECT_FALSE(read_manifest(recording()).at("complete").get<bool>()) << "the first segment";
+  const auto manifest = read_manifest(recording() + "/segment-2");
+  EXPECT_TRUE(manifest.at("complete").get<bool>()) << manifest;
+  EXPECT_EQ(manifest.at("segment").at("number"), 2);
+  EXPECT_GT(manifest.at("segment").at("first_step").get<int>(), 0);
+  EXPECT_EQ(manifest.at("certificate"), read_manifest(undisturbed_->recording()).at("certificate"));
+  const auto [equal, said] = verify(recording(), undisturbed_->recording());
+  EXPECT_TRUE(equal) << said;
+}
+
+TEST_F(RestartTest, AKilledServerIsReplacedAndThoseWhoFollowFlyTheNewRun) {
+  const auto recorder = start_recorder({"--follow"});
+  auto server = start_server();
+  const auto client = start_client({"--follow"});
+  ASSERT_TRUE(wait_for_rows()) << server->output();
+  server->kill();
+  server = start_server();
+  EXPECT_EQ(server->wait(), 0) << server->output() << client->output() << recorder->output();
+  EXPECT_EQ(client->wait(), 0) << client->output();
+  EXPECT_EQ(recorder->wait(), 0) << recorder->output();
+  EXPECT_TRUE(holds(client->output(), "was replaced by run")) << client->output();
+  EXPECT_TRUE(holds(recorder->output(), "was replaced by run")) << recorder->output();
+  const auto first = read_manifest(recording());
+  EXPECT_FALSE(first.at("complete").get<bool>());
+  fs::path second;
+  for (const auto& entry : fs::directory_iterator(recording()))
+    if (entry.is_directory()) second = entry.path();
+  ASSERT_EQ(second.filename().string().rfind("run-", 0), 0u) << second;
+  EXPECT_NE(read_manifest(second).at("run_id"), first.at("run_id"));
+  const auto [equal, said] = verify(second, undisturbed_->recording());
+  EXPECT_TRUE(equal) << said;
+}
+
+TEST_F(RestartTest, ThoseWhoDoNotFollowEndWhenTheServerIsReplacedAndSayBy) {
+  const auto recorder = start_recorder();
+  auto server = start_server();
+  const auto client = start_client();
+  ASSERT_TRUE(wait_for_rows()) << server->output();
+  server->kill();
+  server = start_server();
+  EXPECT_EQ(client->wait(), 1) << client->output();
+  EXPECT_EQ(recorder->wait(), 1) << recorder->output();
+  EXPECT_TRUE(holds(client->output(), "was replaced by run")) << client->output();
+  EXPECT_TRUE(holds(recorder->output(), "was replaced by run")) << recorder->output();
+}
+
+/// A process that is killed cannot remove its shared memory; the next one must start all the same.
+TEST_F(RestartTest, StaleSharedMemoryStopsNoStart) {
+  std::vector<fs::path> left;
+  for (int i = 0; i < 3; ++i) {
+    const auto server = start_server();
+    ASSERT_TRUE(wait_until([&] { return holds(server->output(), "run "); })) << server->output();
+    const auto own = find_shared_memory(server->id());
+    EXPECT_FALSE(own.empty());
+    left.insert(left.end(), own.begin(), own.end());
+    server->send(SIGKILL);  // without the clean-up of Process::kill
+    EXPECT_EQ(server->wait(), 137);
+  }
+  for (const auto& file : left) EXPECT_TRUE(fs::exists(file)) << file;
+  const auto recorder = start_recorder(), server = start_server();
+  const auto client = start_client();
+  EXPECT_EQ(server->wait(), 0) << server->output();
+  EXPECT_EQ(client->wait(), 0) << client->output();
+  EXPECT_EQ(recorder->wait(), 0) << recorder->output();
+  for (const auto& file : left) fs::remove(file);
+}
+
+}  // namespace
+}  // namespace sls::test

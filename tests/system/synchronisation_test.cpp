@@ -1,0 +1,268 @@
+/// Real time, waiting policies and standby: processes stopped, continued and killed for real.
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include "tests/system/flight.hpp"
+
+namespace sls::test {
+namespace {
+
+/// The short flight (2 s) with `changes` to its text.
+std::string make_scenario(const TemporaryFolder& folder,
+                          const std::vector<std::pair<std::string, std::string>>& changes,
+                          const std::string& base = "short") {
+  std::string text = read_file(scenario(base));
+  for (const auto& [from, to] : changes) text = replace_once(text, from, to);
+  const std::string file = folder / "scenario.yaml";
+  write_bytes(file, text);
+  return file;
+}
+
+bool holds(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+std::string read_timing(const std::filesystem::path& recording) {
+  return read_manifest(recording).at("timing").get<std::string>();
+}
+
+/// Longest stretch of consecutive rows of command.csv that answer no state of their own.
+std::size_t find_longest_gap(const Table& commands) {
+  std::size_t longest = 0, gap = 0;
+  for (std::size_t row = 0; row < commands.rows(); ++row) {
+    const std::string& fault = commands.text(row, "fault");
+    gap = fault == "held" || fault == "fail_safe" ? gap + 1 : 0;
+    longest = std::max(longest, gap);
+  }
+  return longest;
+}
+
+std::size_t count_events(const std::filesystem::path& recording, const std::string& words) {
+  const std::string log = read_file(recording / "status.csv");
+  std::size_t count = 0;
+  for (auto at = log.find(words); at != log.npos; at = log.find(words, at + 1)) ++count;
+  return count;
+}
+
+// --- real time -----------------------------------------------------------------------------------
+
+TEST(RealTimeTest, WithoutLateAnswersTheRecordingIsThatOfLockstep) {
+  TemporaryFolder folder;
+  const std::string file = make_scenario(folder, {{"for_s: 2", "for_s: 0.4"}});
+  Flight lockstep(file);
+  lockstep.expect_success();
+  EXPECT_EQ(read_timing(lockstep.recording()), "exact");
+  // A busy machine may be late; the slower the flight, the less.
+  for (const char* real_time_factor : {"0.2", "0.1", "0.05", "0.02"}) {
+    Flight flight(file, {{}, {"--mode", "realtime", "--rtf", real_time_factor}, {}});
+    flight.expect_success();
+    const auto manifest = read_manifest(flight.recording());
+    EXPECT_EQ(manifest.at("mode"), "realtime");
+    const std::string timing = read_timing(flight.recording());
+    ASSERT_TRUE(holds(timing, "real-time, ")) << timing;
+    if (!holds(timing, "real-time, 0 of 100 late")) continue;
+    EXPECT_EQ(manifest.at("certificate"), read_manifest(lockstep.recording()).at("certificate"));
+    return;
+  }
+  FAIL() << "late even at 200 ms per period";
+}
+
+TEST(RealTimeTest, TakesTheTimeItSays) {
+  Flight flight(scenario("short"), {{}, {"--mode", "realtime", "--rtf", "0.5"}, {}});
+  flight.expect_success();
+  const Table status(flight.recording() / "status.csv");
+  // 2 s of flight take 4 s; the machine can only make it slower.
+  EXPECT_LE(status.number(status.rows() - 1, "real_time_factor"), 0.501);
+}
+
+TEST(RealTimeTest, AStoppedClientIsReplacedByTheFailSafeAndFliesAgainWhenItReturns) {
+  TemporaryFolder folder;
+  const std::string file = make_scenario(folder, {{"for_s: 32", "for_s: 12"}}, "figure_eight");
+  Flight flight(file, {{}, {"--mode", "realtime"}, {}});
+  ASSERT_TRUE(flight.wait_for_steps(500)) << flight.outputs();
+  flight.client->send(SIGSTOP);
+  ASSERT_TRUE(wait_until([&] { return holds(flight.server->output(), "fail-safe force"); }))
+      << flight.outputs();
+  EXPECT_TRUE(holds(flight.server->output(), "controller 'control_client'"));
+  flight.client->send(SIGCONT);
+  flight.expect_success();
+  EXPECT_TRUE(holds(flight.server->output(), "'control_client' answers again"))
+      << flight.server->output();
+  const std::string timing = read_timing(flight.recording());
+  EXPECT_EQ(timing.rfind("degraded: real-time, ", 0), 0u) << timing;
+  // Simulated time held before the fail-safe: max_hold_s, 0.5 s; then the weight alone remains.
+  const Table commands(flight.recording() / "command.csv");
+  std::size_t held = 0, fail_safe = 0;
+  for (std::size_t row = 0; row < commands.rows(); ++row) {
+    held = commands.text(row, "fault") == "held" ? held + 1 : 0;
+    EXPECT_LE(held, 125u) << "row " << row;
+    fail_safe += commands.text(row, "fault") == "fail_safe" ? 1 : 0;
+  }
+  EXPECT_GT(fail_safe, 0u);
+  EXPECT_EQ(commands.rows(), 3001u) << "one row per step";
+  // The load is not lost: within 2 m of its reference at the end.
+  const TrackingError end = calc_tracking_error(flight.recording(), 3000, 3000);
+  EXPECT_LT(end.max.maxCoeff(), 2.0);
+  EXPECT_GE(count_events(flight.recording(), "fail-safe force for want of an answer"), 1u);
+}
+
+TEST(RealTimeTest, ARecorderThatStopsDoesNotStopTheFlight) {
+  TemporaryFolder folder;
+  const std::string file = make_scenario(folder, {{"for_s: 32", "for_s: 8"}}, "figure_eight");
+  Flight flight(file, {{}, {"--mode", "realtime"}, {}});
+  ASSERT_TRUE(flight.wait_for_steps(250)) << flight.outputs();
+  flight.recorder->send(SIGSTOP);
+  ASSERT_TRUE(wait_until([&] { return holds(flight.server->output(), "recorder"); }));
+  // The mission ends while the recorder rests.
+  ASSERT_TRUE(wait_until([&] { return holds(flight.server->output(), "finished:"); }))
+      << flight.outputs();
+  flight.recorder->send(SIGCONT);
+  flight.wait();
+  EXPECT_EQ(flight.server->wait(), 0) << flight.outputs();
+}
+
+TEST(RealTimeTest, ATakeOverLeavesAtMostFivePeriodsWithoutAFreshCommand) {
+  TemporaryFolder folder;
+  const std::string file = make_scenario(
+      folder, {{"controllers: 1", "controllers: 2"}, {"for_s: 32", "for_s: 4"}}, "figure_eight");
+  // A quarter of real time: 16 ms per period, of which the machine itself should lose none.
+  Flight flight(
+      file,
+      {{}, {"--mode", "realtime", "--rtf", "0.25"}, {"--name", "primary", "--strength", "2"}});
+  Process standby(make_command("control_client", flight.domain.number(),
+                               {"--scenario", file, "--name", "standby", "--strength", "1"}));
+  ASSERT_TRUE(flight.wait_for_steps(300)) << flight.outputs() << standby.output();
+  flight.client->kill();
+  EXPECT_EQ(flight.server->wait(), 0) << flight.outputs();
+  EXPECT_EQ(standby.wait(), 0) << standby.output();
+  EXPECT_EQ(flight.recorder->wait(), 0) << flight.outputs();
+  const Table commands(flight.recording() / "command.csv");
+  EXPECT_EQ(commands.text(commands.rows() - 1, "controller"), "standby");
+  EXPECT_LE(find_longest_gap(commands), 5u) << flight.outputs();
+  EXPECT_GE(count_events(flight.recording(), "'standby' takes over from 'primary'"), 1u);
+}
+
+// --- lockstep ------------------------------------------------------------------------------------
+
+TEST(WaitingTest, AStoppedClientIsNamedAndTheRecordingIsThatOfAnUndisturbedFlight) {
+  Flight undisturbed(scenario("figure_eight"));
+  undisturbed.expect_success();
+  Flight flight(scenario("figure_eight"));
+  ASSERT_TRUE(flight.wait_for_steps(500)) << flight.outputs();
+  flight.client->send(SIGSTOP);
+  ASSERT_TRUE(wait_until([&] {
+    return holds(flight.server->output(), "waiting for: controller 'control_client'");
+  })) << flight.outputs();
+  flight.client->send(SIGCONT);
+  flight.expect_success();
+  EXPECT_TRUE(read_file(undisturbed.recording() / "state.csv") ==
+              read_file(flight.recording() / "state.csv"));
+  EXPECT_EQ(read_timing(flight.recording()), "exact");
+  EXPECT_GE(count_events(flight.recording(), "waiting for: controller 'control_client'"), 1u);
+}
+
+TEST(WaitingTest, PolicyHoldFliesOnFromADefiniteStepAndTheClientMayRejoin) {
+  TemporaryFolder folder;
+  const std::string file =
+      make_scenario(folder,
+                    {{"timeout_s: 30 }",
+                      "timeout_s: 30 }, wait: { controller: { policy: hold, deadline_s: 0.5 } }"}},
+                    "figure_eight");
+  Flight flight(file);
+  ASSERT_TRUE(flight.wait_for_steps(500)) << flight.outputs();
+  flight.client->send(SIGSTOP);
+  ASSERT_TRUE(wait_until([&] { return holds(flight.server->output(), "fail-safe force"); }))
+      << flight.outputs();
+  flight.client->send(SIGCONT);
+  flight.expect_success();
+  EXPECT_TRUE(holds(flight.server->output(),
+                    "holds the last force for want of an answer of "
+                    "controller 'control_client'"))
+      << flight.server->output();
+  EXPECT_TRUE(holds(flight.server->output(), "answers again"));
+  EXPECT_EQ(read_timing(flight.recording()).rfind("degraded: ", 0), 0u);
+  const Table commands(flight.recording() / "command.csv"),
+      states(flight.recording() / "state.csv");
+  // 0.5 s of 4 ms periods: 125 steps with the force of the last answer, then the fail-safe.
+  std::size_t first = 0;
+  while (first < commands.rows() && commands.text(first, "fault") != "held") ++first;
+  ASSERT_LT(first + 125, commands.rows());
+  for (std::size_t row = first; row < first + 125; ++row) {
+    EXPECT_EQ(commands.text(row, "fault"), "held");
+    EXPECT_EQ(states.text(row + 1, "force_x_n"), states.text(first, "force_x_n")) << row;
+  }
+  EXPECT_EQ(commands.text(first + 125, "fault"), "fail_safe");
+  EXPECT_EQ(commands.text(first + 125, "controller"), "fail-safe");
+}
+
+TEST(WaitingTest, PolicyStopEndsTheRunNamingTheClient) {
+  TemporaryFolder folder;
+  const std::string file = make_scenario(folder,
+                                         {{"timeout_s: 30 }",
+                                           "timeout_s: 30 }, wait: { controller: { policy: stop, "
+                                           "deadline_s: 1 }, server: { deadline_s: 3 } }"}},
+                                         "figure_eight");
+  Flight flight(file);
+  ASSERT_TRUE(flight.wait_for_steps(500)) << flight.outputs();
+  flight.client->send(SIGSTOP);
+  EXPECT_EQ(flight.server->wait(), 1) << flight.outputs();
+  EXPECT_TRUE(holds(flight.server->output(), "waited 1 s for controller 'control_client'"))
+      << flight.server->output();
+  flight.client->send(SIGCONT);
+  flight.wait();
+  EXPECT_EQ(read_manifest(flight.recording()).at("outcome"), "failed");
+}
+
+TEST(WaitingTest, PolicyGoOnFliesToTheEndWithoutTheRecorder) {
+  TemporaryFolder folder;
+  const std::string file =
+      make_scenario(folder,
+                    {{"timeout_s: 30 }",
+                      "timeout_s: 30 }, wait: { recorder: { policy: go_on, deadline_s: 1 } }"}},
+                    "figure_eight");
+  Flight flight(file, {{}, {"--period-s", "0.001"}, {}});
+  ASSERT_TRUE(flight.wait_for_steps(500)) << flight.outputs();
+  flight.recorder->kill();
+  EXPECT_EQ(flight.server->wait(), 0) << flight.outputs();
+  EXPECT_TRUE(holds(flight.server->output(), "goes on without")) << flight.server->output();
+  EXPECT_EQ(flight.client->wait(), 0) << flight.outputs();
+}
+
+TEST(WaitingTest, AStoppedServerIsNamedByClientAndRecorderAndTheFlightGoesOn) {
+  Flight flight(scenario("figure_eight"), {{}, {"--period-s", "0.001"}, {}});
+  ASSERT_TRUE(flight.wait_for_steps(500)) << flight.outputs();
+  flight.server->send(SIGSTOP);
+  // Longer than the lease of 2 s: it is gone from discovery, and must be found again.
+  for (const Process* process : {flight.client.get(), flight.recorder.get()})
+    EXPECT_TRUE(wait_until([&] { return holds(process->output(), "(gone, silent for"); }) ||
+                holds(process->output(), "waiting for: server of run"))
+        << flight.outputs();
+  flight.server->send(SIGCONT);
+  flight.expect_success();
+  EXPECT_TRUE(holds(flight.client->output(), "is back")) << flight.client->output();
+}
+
+TEST(StandbyTest, TakesOverWithinAQuarterOfASecondWithOneEventForTheSwitch) {
+  TemporaryFolder folder;
+  const std::string file =
+      make_scenario(folder, {{"controllers: 1", "controllers: 2"}}, "figure_eight");
+  Flight flight(file, {{}, {"--period-s", "0.001"}, {"--name", "primary", "--strength", "2"}});
+  Process standby(make_command("control_client", flight.domain.number(),
+                               {"--scenario", file, "--name", "standby", "--strength", "1"}));
+  ASSERT_TRUE(wait_until([&] {
+    return holds(read_file(flight.recording() / "command.csv"), ",primary,");
+  })) << flight.outputs();
+  flight.client->kill();
+  const auto killed = std::chrono::steady_clock::now();
+  ASSERT_TRUE(wait_until([&] {
+    return holds(flight.server->output(), "'standby' takes over from 'primary'");
+  })) << flight.outputs();
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - killed;
+  std::printf("take-over in lockstep: %.0f ms after SIGKILL\n", elapsed.count() * 1e3);
+  EXPECT_EQ(flight.server->wait(), 0) << flight.outputs();
+  EXPECT_EQ(standby.wait(), 0) << standby.output();
+  EXPECT_EQ(flight.recorder->wait(), 0) << flight.outputs();
+}
+
+}  // namespace
+}  // namespace sls::test
