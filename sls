@@ -5,7 +5,8 @@ set -euo pipefail
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)"
 readonly root
 readonly build="${SLS_BUILD:-$root/build}"
-readonly programs=(sim_server control_client recorder)
+readonly flying=(sim_server control_client recorder)
+readonly programs=("${flying[@]}" sim_ctl sls_verify delay_margin)
 readonly packages=(g++ make cmake libeigen3-dev libsimbody-dev libfastrtps-dev libfastcdr-dev
   fastddsgen default-jre-headless libyaml-cpp-dev libcli11-dev libspdlog-dev nlohmann-json3-dev libgtest-dev libssl-dev
   libtinyxml2-dev)
@@ -25,6 +26,8 @@ usage: ./sls COMMAND [OPTIONS]
       --qos FILE       QoS profiles (default: config/qos/default.xml)
       --domain N       DDS domain, 0 to 232 (default: 0)
       --period-s X     control period in force (default: the scenario's)
+      --mode MODE      lockstep or realtime (default: the scenario's)
+      --rtf X          of realtime: simulated over wall time (default: the scenario's)
   ctl COMMAND        talk to the run on this domain: pause, step N, resume, start, reset, stop or
                      status [--watch] [--json]; with --help: its options
   delay-margin SCENARIO
@@ -33,7 +36,12 @@ usage: ./sls COMMAND [OPTIONS]
   verify A [B]       compares the data of two recordings: equal, or the first difference; of one, its
                      files with its manifest
   test               set up, build, run every test
+      --slow           the ones that take minutes, too; they need an idle machine
       --sanitize KIND  the unit tests alone, built with a sanitizer: address or thread
+  chaos              disturb flights at random: stop, continue, kill and restart their processes
+      --trials N       how many flights (default: 10)
+      --seed S         decides process, moment and kind (default: 1)
+      --verbose        print what the processes said
   build              set up and build; the programs are in build/bin
   clean              remove what was built
   help               this text
@@ -86,11 +94,13 @@ build_tree() {
   fi
 }
 
-# The programs, up to date. A build made elsewhere (SLS_BUILD) is taken as it is.
+# build_programs [TARGET…]: what is named, or all programs, up to date. A build made elsewhere
+# (SLS_BUILD) is taken as it is.
 build_programs() {
   [[ -z ${SLS_BUILD:-} ]] || return 0
+  (($#)) || set -- "${programs[@]}"
   setup
-  build_tree release "$build" "${programs[@]}"
+  build_tree release "$build" "$@"
 }
 
 # --- flying ---------------------------------------------------------------------------------------
@@ -146,18 +156,18 @@ find_scenario() {
 
 # fly SCENARIO [OPTIONS]: sets `recording` and `result`.
 fly() {
-  local scenario='' force=() qos=() domain=() period=()
+  local scenario='' force=() qos=() domain=() timing=()
   recording=''
   while (($#)); do
     case $1 in
       --force) force=(--force) ;;
-      --out | --qos | --domain | --period-s)
+      --out | --qos | --domain | --period-s | --mode | --rtf)
         (($# >= 2)) || fail "$1: expected a value (see ./sls help)" 2
         case $1 in
           --out) recording=$2 ;;
           --qos) qos=(--qos "$2") ;;
           --domain) domain=(--domain "$2") ;;
-          --period-s) period=(--period-s "$2") ;;
+          *) timing+=("$1" "$2") ;;
         esac
         shift
         ;;
@@ -177,7 +187,7 @@ fly() {
   fi
 
   # One line about a mistake, before three programs stumble over it.
-  "$build/bin/sim_server" --check --scenario "$file" "${qos[@]}" "${domain[@]}" "${period[@]}" ||
+  "$build/bin/sim_server" --check --scenario "$file" "${qos[@]}" "${domain[@]}" "${timing[@]}" ||
     exit $?
   "$build/bin/recorder" --check --out "$recording" "${force[@]}" "${qos[@]}" "${domain[@]}" ||
     exit $?
@@ -186,7 +196,7 @@ fly() {
   trap 'on_signal 143 TERM' TERM HUP
   trap 'signal_all TERM' EXIT
   start recorder --out "$recording" "${force[@]}" "${qos[@]}" "${domain[@]}"
-  start sim_server --scenario "$file" "${qos[@]}" "${domain[@]}" "${period[@]}"
+  start sim_server --scenario "$file" "${qos[@]}" "${domain[@]}" "${timing[@]}"
   start control_client --scenario "$file" "${qos[@]}" "${domain[@]}"
   wait_all
 }
@@ -227,14 +237,14 @@ cmd_build() {
 }
 
 cmd_run() {
-  build_programs
+  build_programs "${flying[@]}"
   fly "$@"
   ((result == 0)) && say "recording: $recording"
   exit "$result"
 }
 
 cmd_demo() {
-  build_programs
+  build_programs "${flying[@]}"
   local scenario=figure_eight
   if (($#)) && [[ $1 != -* ]]; then
     scenario=$1
@@ -247,10 +257,7 @@ cmd_demo() {
 }
 
 cmd_ctl() {
-  if [[ -z ${SLS_BUILD:-} ]]; then
-    setup
-    build_tree release "$build" sim_ctl
-  fi
+  build_programs sim_ctl
   exec "$build/bin/sim_ctl" "$@"
 }
 
@@ -272,26 +279,27 @@ cmd_delay-margin() {
     shift
   done
   [[ -n $scenario ]] || fail "expected a scenario (see ./sls help)" 2
-  if [[ -z ${SLS_BUILD:-} ]]; then
-    setup
-    build_tree release "$build" delay_margin
-  fi
+  build_programs delay_margin
   exec "$build/bin/delay_margin" --scenario "$(find_scenario "$scenario")" "${period[@]}"
 }
 
 cmd_verify() {
-  if [[ -z ${SLS_BUILD:-} ]]; then
-    setup
-    build_tree release "$build" sls_verify
-  fi
+  build_programs sls_verify
   exec "$build/bin/sls_verify" "$@"
 }
 
+cmd_chaos() {
+  build_programs chaos
+  exec "$build/tests/chaos" "$@"
+}
+
 cmd_test() {
-  local preset=release folder=$build
-  if (($#)); then
+  local preset=release folder=$build without=(--label-exclude slow)
+  if [[ $# == 1 && $1 == --slow ]]; then
+    without=()
+  elif (($#)); then
     [[ $# == 2 && $1 == --sanitize && ($2 == address || $2 == thread) ]] ||
-      fail "test: expected nothing or --sanitize address|thread, got '$*'" 2
+      fail "test: expected nothing, --slow or --sanitize address|thread, got '$*'" 2
     [[ $2 == address ]] && preset=asan || preset=tsan
     folder="$root/build-$preset"
   fi
@@ -300,13 +308,13 @@ cmd_test() {
   cd "$root"
   # Nothing the middleware reads from the environment may reach the tests.
   env -u ROS_DISCOVERY_SERVER -u FASTRTPS_DEFAULT_PROFILES_FILE \
-    ctest --preset "$preset" --parallel "$(nproc)"
+    ctest --preset "$preset" --parallel "$(nproc)" "${without[@]}"
 }
 
 command=${1:-help}
 (($#)) && shift
 case $command in
-  demo | run | ctl | delay-margin | verify | test | build) "cmd_$command" "$@" ;;
+  demo | run | ctl | verify | delay-margin | chaos | test | build) "cmd_$command" "$@" ;;
   clean) rm -rf "$root"/build "$root"/build-* ;;
   help | --help | -h) usage ;;
   *)

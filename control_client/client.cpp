@@ -2,8 +2,6 @@
 
 #include <spdlog/spdlog.h>
 
-#include <algorithm>
-#include <limits>
 #include <thread>
 
 #include "common/app/run_main.hpp"
@@ -19,11 +17,6 @@ using namespace std::chrono_literals;
 constexpr auto kUsualJoinTime = 1500ms;      // a server's claim and discovery: no news
 constexpr auto kAcknowledgmentTime = 500ms;  // for the last samples to reach the recorders
 constexpr auto kPollTime = 20ms;             // while nothing is in a hurry
-constexpr std::size_t kMailboxSize = 1024;
-
-/// Steps by which the slowest recorder may be behind while samples are answered at once: the server
-/// keeps it within 2,000, the writers' histories hold 5,000.
-constexpr std::uint64_t kSafeLag = 4000;
 
 }  // namespace
 
@@ -38,7 +31,6 @@ Client::Client(bus::Node& node, const config::Scenario& scenario, const std::str
       servers_(node),
       participant_writer_(node),
       reference_writer_(node),
-      states_(kMailboxSize),
       state_reader_(node, bus::kLoopReaderProfile,
                     [this](const VehicleState& state, const bus::PeerId&) { receive(state); }) {}
 
@@ -77,6 +69,12 @@ void Client::begin(const bus::Run& run) {
                             ? node_.choose_writer_profile(bus::kRealtimeCommandWriterProfile,
                                                           bus::kStreamWriterProfile)
                             : bus::kStreamWriterProfile;
+  // Made and destroyed outside the lock: the middleware waits for handlers meanwhile, and ours for
+  // the lock.
+  auto writer = profile == command_profile_
+                    ? nullptr
+                    : std::make_unique<bus::Writer<ControlCommand>>(node_, profile);
+  command_profile_ = profile;
   {
     const std::lock_guard lock(answer_mutex_);
     run_ = run;
@@ -84,11 +82,7 @@ void Client::begin(const bus::Run& run) {
     scenario_.plant.step_ns = parameters.step_ns();
     controller_ = std::make_unique<FlightController>(scenario_);
     last_command_.reset();
-    if (profile != command_profile_) {
-      command_writer_.reset();
-      command_writer_ = std::make_unique<bus::Writer<ControlCommand>>(node_, profile);
-      command_profile_ = profile;
-    }
+    if (writer) command_writer_.swap(writer);
   }
   ready_ = false;
   watch_.emplace(servers_, run, scenario_.sync.wait.server_deadline_s);
@@ -124,39 +118,20 @@ bool Client::sees_all_endpoints() const {
 }
 
 std::optional<bus::Run> Client::serve() {
-  auto next_look = Clock::now();
-  look_at_recorders();
-  answers_at_once_ = true;
   while (app::stop_signal() == 0) {
-    if (const auto state = states_.take(next_look)) answer(*state);
-    if (Clock::now() < next_look) continue;
     rethrow_answer_error();
     if (has_ended()) return std::nullopt;
     if (auto next = find_successor()) return next;
-    look_at_recorders();
     if (!ready_ && sees_all_endpoints()) {
       ready_ = true;
       announce(true, false);
     }
-    next_look = Clock::now() + kPollTime;
+    std::this_thread::sleep_for(kPollTime);
   }
   return std::nullopt;
 }
 
-void Client::look_at_recorders() {
-  std::uint64_t last = std::numeric_limits<std::uint64_t>::max();
-  for (const auto& entry : participants_.find(ROLE_RECORDER, run_->parameters.run_id())) {
-    const auto recorded = std::max<std::int64_t>(entry.announcement.last_complete_step(), 0);
-    last = std::min(last, static_cast<std::uint64_t>(recorded) + kSafeLag);
-  }
-  last_step_at_once_ = last;
-}
-
 void Client::receive(const VehicleState& state) {
-  if (!answers_at_once_ || state.step() > last_step_at_once_) {
-    states_.put(state);
-    return;
-  }
   try {
     answer(state);
   } catch (...) {  // an exception must not reach the middleware
@@ -167,7 +142,8 @@ void Client::receive(const VehicleState& state) {
 
 void Client::answer(const VehicleState& state) {
   const std::lock_guard lock(answer_mutex_);
-  if (state.run_id() != run_->parameters.run_id() || state.vehicle_id() != vehicle_id_) return;
+  if (!run_ || state.run_id() != run_->parameters.run_id() || state.vehicle_id() != vehicle_id_)
+    return;
   if (last_command_ && last_command_->step() == state.step()) {
     command_writer_->write(*last_command_);
     return;
@@ -200,14 +176,15 @@ std::optional<bus::Run> Client::find_successor() {
   const auto next = servers_.find_joinable(vehicle_id_);
   if (next && next->parameters.run_id() != run_->parameters.run_id()) {
     const bool is_reset = next->server == run_->server;
+    const bool is_replaced = servers_.is_silent(run_->parameters.run_id());
     const std::string news =
         fmt::format("run {:016x} was {} run {:016x}", run_->parameters.run_id(),
                     is_reset ? "reset to" : "replaced by", next->parameters.run_id());
-    if (is_reset || (follows_servers_ && !servers_.is_present(run_->server))) {
+    if (is_reset || (follows_servers_ && is_replaced)) {
       spdlog::warn("{}: follows it", news);
       return next;
     }
-    if (!servers_.is_present(run_->server)) throw app::RunError(news + " (see --follow)");
+    if (is_replaced) throw app::RunError(news + " (see --follow)");
   }
   if (finding == bus::ServerWatch::Finding::kLost)
     throw app::RunError(fmt::format("the {}, expected it to finish", watch_->describe()));
@@ -225,8 +202,11 @@ void Client::announce(bool ready, bool done) {
   message.scenario_sha256(scenario_.sha256);
   message.ready(ready);
   message.done(done);
-  const std::lock_guard lock(answer_mutex_);
-  message.last_complete_step(last_command_ ? static_cast<std::int64_t>(last_command_->step()) : -1);
+  {
+    const std::lock_guard lock(answer_mutex_);
+    message.last_complete_step(last_command_ ? static_cast<std::int64_t>(last_command_->step())
+                                             : -1);
+  }
   participant_writer_.write(message);
 }
 

@@ -2,11 +2,10 @@
 ///
 /// A sample is answered where it arrives, on the middleware's thread: the step waits for the
 /// answer, and handing the sample to another thread would make the round trip a quarter longer.
-/// Writing there must never block (common/bus/README.md, trap 4). So when the recorders are so far
-/// behind that a history could fill, samples go to the main thread, which may wait.
+/// Writing there must never block (common/bus/README.md, trap 4): the stream writers' profile keeps
+/// the last samples rather than all of them.
 #pragma once
 
-#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <exception>
@@ -15,7 +14,6 @@
 #include <optional>
 #include <string>
 
-#include "common/app/mailbox.hpp"
 #include "common/bus/node.hpp"
 #include "common/bus/participants.hpp"
 #include "common/config/scenario.hpp"
@@ -49,8 +47,6 @@ class Client {
   /// Called by the middleware for every sample.
   void receive(const VehicleState& state);
   void answer(const VehicleState& state);
-  /// Notes how far the recorders are, which decides where samples are answered.
-  void look_at_recorders();
   bool sees_all_endpoints() const;
   void announce(bool ready, bool done);
   /// True when the run has ended, well or not.
@@ -79,12 +75,9 @@ class Client {
   bool ready_ = false;
 
   // Shared between the main thread and the middleware's.
-  std::atomic<bool> answers_at_once_{false};
-  std::atomic<std::uint64_t> last_step_at_once_{0};  // up to which no history can fill
-  std::mutex answer_mutex_;                          // over all that `answer` touches
-  std::optional<ControlCommand> last_command_;       // a repeated sample is answered from here
+  std::mutex answer_mutex_;                     // over all that `answer` touches
+  std::optional<ControlCommand> last_command_;  // a repeated sample is answered from here
   std::exception_ptr answer_error_;
-  app::Mailbox<VehicleState> states_;
   bus::Reader<VehicleState> state_reader_;  // last: its callbacks use the members above
 };
 

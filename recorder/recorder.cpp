@@ -119,7 +119,7 @@ std::optional<bus::Run> Recorder::find_follower(const bus::Run& ended) const {
     if (bus::calc_progress(run.status) < 0 || !bus::serves_vehicle(run.parameters, kVehicle))
       continue;
     if (run.server == ended.server ||
-        (options_.follow && !surroundings_.servers.is_present(ended.server)))
+        (options_.follow && surroundings_.servers.is_silent(ended.parameters.run_id())))
       return run;
   }
   return std::nullopt;

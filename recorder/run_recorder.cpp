@@ -103,25 +103,24 @@ void RunRecorder::look_for_the_end(bus::ServerWatch& server) {
     end_within(kFailedTime);
   } else if (!give_up_) {
     const auto finding = server.look();
-    const bool is_present = surroundings_.servers.is_present(run_.server);
-    if (finding == bus::ServerWatch::Finding::kSilent) look_for_the_next_run(is_present);
+    if (finding == bus::ServerWatch::Finding::kSilent) look_for_the_next_run();
     if (finding != bus::ServerWatch::Finding::kLost) return;
     outcome_ = "lost";
-    interruption_ =
-        fmt::format("the server is {} (given up after {} s)", is_present ? "silent" : "gone",
-                    scenario_.sync.wait.server_deadline_s);
+    interruption_ = fmt::format("the {}, given up after {} s", server.describe(),
+                                scenario_.sync.wait.server_deadline_s);
     end_within(0s);
   }
 }
 
 /// Another run may be the end of this one: its own server's, or that of a server in its place.
-void RunRecorder::look_for_the_next_run(bool is_server_present) {
+void RunRecorder::look_for_the_next_run() {
+  const bool is_server_dead = surroundings_.servers.is_silent(run_id_);
   for (const bus::Run& other : surroundings_.servers.runs()) {
     const bool is_own_server = other.server == run_.server;
     const bool is_joinable = other.status && bus::calc_progress(other.status) >= 0 &&
                              bus::serves_vehicle(other.parameters, run_.parameters.vehicle_id());
     if (other.parameters.run_id() == run_id_ || !is_joinable) continue;
-    if (!is_own_server && is_server_present) continue;
+    if (!is_own_server && !is_server_dead) continue;
     end_.is_reset = is_own_server;
     if (!is_own_server) end_.replacement = other;
     outcome_ = is_own_server ? "reset" : "lost";

@@ -51,7 +51,7 @@ class RunRecorder {
   // On the main thread.
   void watch();
   void look_for_the_end(bus::ServerWatch& server);
-  void look_for_the_next_run(bool is_server_present);
+  void look_for_the_next_run();
   void end_within(std::chrono::duration<double> limit);
   bool sees_all_endpoints() const;
   void announce_news();

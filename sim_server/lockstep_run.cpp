@@ -26,7 +26,10 @@ std::optional<Run::Outcome> LockstepRun::exchange(const VehicleState& state) {
   const auto sent = Clock::now();
   endpoints_.state_writer.write(state);
   auto resend_at = sent + timer_.timeout();
-  auto wake_at = resend_at;
+  // While steps are flown without answers, each is given a period.
+  const auto period = to_duration(static_cast<double>(scenario_.sync.period_ns) * 1e-9 /
+                                  scenario_.sync.real_time_factor);
+  auto wake_at = absence_.is_acting() ? std::min(resend_at, sent + period) : resend_at;
   bool is_late = false;  // most answers come before the first resend
   while (!gate_.accepted()) {
     if (const auto received = endpoints_.commands.take(wake_at)) judge(*received);
@@ -52,9 +55,8 @@ std::optional<Run::Outcome> LockstepRun::exchange(const VehicleState& state) {
     const Action action = absence_.decide(step_wait_s, calc_absence_s());
     attend_to_absence(step, action);
     if (action != Action::kWait) return fly_without_answer(step, action);
-    // While steps are flown without answers, each is given no more than a period.
-    wake_at = absence_.is_acting() ? std::min(resend_at, now + 1ms)
-                                   : std::min(resend_at, std::max(take_over_at_, now + 1ms));
+    wake_at =
+        std::min(resend_at, absence_.is_acting() ? now + 1ms : std::max(take_over_at_, now + 1ms));
   }
   timer_.answered(Clock::now() - sent);
   board_.round_trips.add(Clock::now() - sent);

@@ -2,6 +2,8 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include <algorithm>
+
 namespace sls::sim {
 namespace {
 
@@ -66,7 +68,7 @@ std::string name_missing(const Roster& roster, const config::WaitFor& expected,
 std::string name_blocking_recorder(const Roster& roster, int expected, std::uint64_t step) {
   int ready = 0;
   for (const Entry& entry : roster.recorders) {
-    if (!entry.announcement.ready()) continue;
+    if (!entry.announcement.ready() || entry.is_silent()) continue;
     ++ready;
     const std::int64_t last = std::max<std::int64_t>(entry.announcement.last_complete_step(), -1);
     const std::int64_t behind = static_cast<std::int64_t>(step) - 1 - last;
@@ -79,9 +81,13 @@ std::string name_blocking_recorder(const Roster& roster, int expected, std::uint
 
 std::string name_silent_recorder(const Roster& roster, std::uint64_t step,
                                  std::chrono::steady_clock::time_point since) {
+  const bool is_any_alive = std::any_of(
+      roster.recorders.begin(), roster.recorders.end(),
+      [](const Entry& entry) { return entry.announcement.ready() && !entry.is_silent(); });
   for (const Entry& entry : roster.recorders) {
     const bool lags = entry.announcement.last_complete_step() + 1 < static_cast<std::int64_t>(step);
-    if (entry.announcement.ready() && lags && entry.heard < since)
+    const bool is_replaced = entry.is_silent() && is_any_alive;
+    if (entry.announcement.ready() && lags && entry.heard < since && !is_replaced)
       return fmt::format("recorder {} is silent since step {}", describe(entry),
                          entry.announcement.last_complete_step());
   }

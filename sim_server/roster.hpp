@@ -32,11 +32,11 @@ std::string name_missing(const Roster& roster, const config::WaitFor& expected,
 inline constexpr std::int64_t kRecorderWindow = 2000;
 
 /// Which recorder keeps the server from publishing `step`, in words; empty when none does: fewer
-/// than `expected` are there, or one is more than the window behind.
+/// than `expected` are there and not silent, or one of these is more than the window behind.
 std::string name_blocking_recorder(const Roster& roster, int expected, std::uint64_t step);
 
 /// Which ready recorder has announced nothing since `since` although it lags behind `step`, in
-/// words; empty when none has.
+/// words; empty when none has, or another one is there in the place of one taken for dead.
 std::string name_silent_recorder(const Roster& roster, std::uint64_t step,
                                  std::chrono::steady_clock::time_point since);
 

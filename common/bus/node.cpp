@@ -238,6 +238,10 @@ AnyWriter::AnyWriter(Node& node, const char* topic, const char* profile, void* t
 AnyWriter::~AnyWriter() {
   if (!impl_->writer) return;
   impl_->writer->set_listener(nullptr);
+  // Otherwise a heartbeat to a reader that has died may meet a half-deleted history and never end
+  // (README.md, trap 13).
+  std::size_t removed = 0;
+  impl_->writer->clear_history(&removed);
   impl_->publisher->delete_datawriter(impl_->writer);
 }
 

@@ -39,9 +39,10 @@ int ParticipantDirectory::count_done(ParticipantRole role, std::uint64_t run_id)
 }
 
 bool are_recorders_done(const std::vector<ParticipantDirectory::Entry>& recorders) {
-  return std::all_of(
-      recorders.begin(), recorders.end(),
-      [](const ParticipantDirectory::Entry& entry) { return entry.announcement.done(); });
+  return std::all_of(recorders.begin(), recorders.end(),
+                     [](const ParticipantDirectory::Entry& entry) {
+                       return entry.announcement.done() || entry.is_silent();
+                     });
 }
 
 void wait_for_recorders_to_end(const ParticipantDirectory& participants, std::uint64_t run_id,
@@ -89,6 +90,10 @@ std::vector<Run> ServerDirectory::runs() const {
   for (const auto& [server, parameters] : parameters_) {
     if (server == self_ || present.count(server) == 0) continue;
     const auto status = status_.find(parameters.run_id());
+    const bool is_silent =
+        status != status_.end() && calc_progress(status->second.status.phase()) > 0 &&
+        std::chrono::steady_clock::now() - status->second.time > kSilenceOfTheDead;
+    if (is_silent) continue;
     runs.push_back({server, parameters,
                     status == status_.end() ? std::nullopt : std::optional(status->second.status)});
   }
@@ -114,6 +119,15 @@ std::optional<SimStatus> ServerDirectory::find_status(std::uint64_t run_id) cons
   return status == status_.end() ? std::nullopt : std::optional(status->second.status);
 }
 
+bool ServerDirectory::is_present(const PeerId& server) const {
+  return parameters_reader_.matched().count(server) > 0;
+}
+
+bool ServerDirectory::is_silent(std::uint64_t run_id) const {
+  const auto heard = find_last_heard(run_id);
+  return !heard || std::chrono::steady_clock::now() - *heard > kSilenceOfTheDead;
+}
+
 std::optional<std::chrono::steady_clock::time_point> ServerDirectory::find_last_heard(
     std::uint64_t run_id) const {
   const std::lock_guard lock(mutex_);
@@ -121,13 +135,8 @@ std::optional<std::chrono::steady_clock::time_point> ServerDirectory::find_last_
   return status == status_.end() ? std::nullopt : std::optional(status->second.time);
 }
 
-bool ServerDirectory::is_present(const PeerId& server) const {
-  return parameters_reader_.matched().count(server) > 0;
-}
-
 ServerWatch::ServerWatch(const ServerDirectory& servers, const Run& run, double deadline_s)
     : servers_(servers),
-      server_(run.server),
       run_id_(run.parameters.run_id()),
       deadline_s_(deadline_s),
       heard_(Clock::now()) {}
@@ -135,7 +144,7 @@ ServerWatch::ServerWatch(const ServerDirectory& servers, const Run& run, double 
 ServerWatch::Finding ServerWatch::look() {
   constexpr auto kQuietTime = std::chrono::seconds(1);
   heard_ = std::max(heard_, servers_.find_last_heard(run_id_).value_or(heard_));
-  if (servers_.is_present(server_) && Clock::now() - heard_ < kQuietTime) {
+  if (Clock::now() - heard_ < kQuietTime) {
     if (is_reported_) spdlog::info("the server of run {:016x} is back", run_id_);
     wait_.reset();
     is_reported_ = false;
@@ -152,8 +161,7 @@ ServerWatch::Finding ServerWatch::look() {
 
 std::string ServerWatch::describe() const {
   const double silence_s = std::chrono::duration<double>(Clock::now() - heard_).count();
-  return fmt::format("server of run {:016x} ({}silent for {:.1f} s)", run_id_,
-                     servers_.is_present(server_) ? "" : "gone, ", silence_s);
+  return fmt::format("server of run {:016x} (silent for {:.1f} s)", run_id_, silence_s);
 }
 
 int calc_progress(RunPhase phase) {

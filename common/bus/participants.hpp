@@ -17,6 +17,10 @@
 
 namespace sls::bus {
 
+/// Somebody who announces himself at least every 0.5 s and has not for so long is taken for dead,
+/// until he is heard again. (The middleware's lease is much longer: config/qos/README.md.)
+inline constexpr auto kSilenceOfTheDead = std::chrono::seconds(2);
+
 /// The last announcement of every controller and recorder that is still there.
 class ParticipantDirectory {
  public:
@@ -26,6 +30,8 @@ class ParticipantDirectory {
     PeerId peer;
     Participant announcement;
     std::chrono::steady_clock::time_point heard;  ///< when it came
+
+    bool is_silent() const { return std::chrono::steady_clock::now() - heard > kSilenceOfTheDead; }
   };
 
   /// Present participants of `role` that serve run `run_id`.
@@ -49,7 +55,7 @@ class ParticipantDirectory {
   Reader<Participant> reader_;
 };
 
-/// True when every one of `recorders` says it is done.
+/// True when every one of `recorders` that is not silent says it is done.
 bool are_recorders_done(const std::vector<ParticipantDirectory::Entry>& recorders);
 
 /// Waits until the recorders of run `run_id` that are there, and `expected` at least, are done, at
@@ -70,7 +76,8 @@ class ServerDirectory {
   /// `on_status`, where given, sees every status sample, on a thread of the middleware.
   explicit ServerDirectory(Node& node, std::function<void(const SimStatus&)> on_status = {});
 
-  /// Runs of the servers present, other than this node's own.
+  /// Runs of the servers present, other than this node's own. A server whose run goes on but that
+  /// is silent is not present.
   std::vector<Run> runs() const;
 
   /// The run to join for `vehicle_id`: present, settled, neither finished nor failed; among several
@@ -80,7 +87,11 @@ class ServerDirectory {
   /// The last status of run `run_id`, also of a server that has gone.
   std::optional<SimStatus> find_status(std::uint64_t run_id) const;
 
+  /// True until the server has left, or its lease has run out.
   bool is_present(const PeerId& server) const;
+
+  /// True when nothing was heard of run `run_id` for so long that its server is taken for dead.
+  bool is_silent(std::uint64_t run_id) const;
 
   /// When the last status of run `run_id` came; nothing before the first.
   std::optional<std::chrono::steady_clock::time_point> find_last_heard(std::uint64_t run_id) const;
@@ -111,12 +122,11 @@ class ServerWatch {
   enum class Finding { kThere, kSilent, kLost };
   Finding look();
 
-  /// For messages: "the server of run … is gone" or "… silent for 3.1 s".
+  /// For messages: "server of run … (silent for 3.1 s)".
   std::string describe() const;
 
  private:
   const ServerDirectory& servers_;
-  const PeerId server_;
   const std::uint64_t run_id_;
   const double deadline_s_;
   Clock::time_point heard_;

@@ -21,6 +21,7 @@ bus::ParticipantDirectory::Entry make_entry(ParticipantRole role, const std::str
   entry.announcement.scenario_sha256(kScenario);
   entry.announcement.ready(ready);
   entry.announcement.last_complete_step(-1);
+  entry.heard = std::chrono::steady_clock::now();
   return entry;
 }
 
@@ -152,6 +153,13 @@ TEST(RosterTest, TheServerWaitsForEveryRecorderThatIsThere) {
   roster.recorders[1].announcement.done(true);
   EXPECT_TRUE(bus::are_recorders_done(roster.recorders));
   EXPECT_TRUE(bus::are_recorders_done({}));
+}
+
+TEST(RosterTest, ARecorderThatIsTakenForDeadDoesNotBlockIfAnotherIsThere) {
+  auto dead = make_recorder_at(10);
+  dead.heard -= 2 * bus::kSilenceOfTheDead;
+  EXPECT_EQ(name_blocking_recorder({{}, {dead, make_recorder_at(4999)}}, 1, 5000), "");
+  EXPECT_NE(name_blocking_recorder({{}, {dead}}, 1, 20), "") << "one is expected";
 }
 
 TEST(RosterTest, ARecorderThatLagsAndAnnouncesNothingIsNamedAsSilent) {

@@ -8,6 +8,7 @@
 
 #include "bench/in_process_flight.hpp"
 #include "tests/system/flight.hpp"
+#include "tests/system/load.hpp"
 
 namespace sls::test {
 namespace {
@@ -15,19 +16,6 @@ namespace {
 std::string read_certificate(const std::filesystem::path& recording) {
   return read_manifest(recording).at("certificate").get<std::string>();
 }
-
-/// Keeps `count` cores busy while it lives.
-class Load {
- public:
-  explicit Load(int count) {
-    for (int i = 0; i < count; ++i)
-      burners_.push_back(
-          std::make_unique<Process>(std::vector<std::string>{"sh", "-c", "while :; do :; done"}));
-  }
-
- private:
-  std::vector<std::unique_ptr<Process>> burners_;
-};
 
 /// Starts what follows on the first core alone while it lives.
 class OneCore {
@@ -80,7 +68,7 @@ TEST_F(OneResultTest, OnOneCore) {
 }
 
 TEST_F(OneResultTest, WithEveryCoreBusy) {
-  const Load load(static_cast<int>(std::thread::hardware_concurrency()));
+  const Load load(std::thread::hardware_concurrency());
   Flight flight(scenario("figure_eight"));
   expect_same(flight);
 }

@@ -66,6 +66,23 @@ TEST(UsageTest, WrongFlagsAreRefused) {
                  "--period-s");
   expect_refused({program("control_client"), "--scenario", scenario("short"), "--name", "a,b"}, 2,
                  "--name");
+  expect_refused(server_with({"--scenario", scenario("short"), "--mode", "fast"}), 2, "--mode");
+  expect_refused(server_with({"--scenario", scenario("short"), "--rtf", "2"}), 2,
+                 "--rtf: expected --mode realtime with it");
+  for (const char* factor : {"0", "-1", "nan", "inf", "1001"})
+    expect_refused(
+        server_with({"--scenario", scenario("short"), "--mode", "realtime", "--rtf", factor}), 2,
+        "--rtf");
+}
+
+TEST(UsageTest, OperatorAndVerifierRefuseWhatTheyCannotDo) {
+  TemporaryFolder folder;
+  expect_refused({program("sim_ctl")}, 2, "");
+  expect_refused({program("sim_ctl"), "fly"}, 2, "fly");
+  expect_refused({program("sim_ctl"), "step", "0"}, 2, "0");
+  expect_refused({program("sls_verify")}, 2, "");
+  expect_refused({program("sls_verify"), folder / "none"}, 2, "none");
+  expect_refused({program("sls_verify"), folder.path()}, 2, "manifest.json");
 }
 
 TEST(UsageTest, UnusableScenariosAreRefusedByServerAndClient) {
@@ -98,7 +115,7 @@ TEST(UsageTest, UnusableQosFilesAreRefusedByEveryProgram) {
   write_bytes(folder / "malformed.xml", shipped.substr(0, shipped.size() / 2));
   write_bytes(folder / "misnamed.xml", replace_once(shipped, "\"sls_loop_reader\"", "\"sls_lop\""));
   write_bytes(folder / "refused.xml",
-              replace_once(shipped, "<depth>64</depth>", "<depth>many</depth>"));
+              replace_once(shipped, "<depth>32</depth>", "<depth>many</depth>"));
   int run_number = 0;
   for (const char* name : {"sim_server", "control_client", "recorder"}) {
     const auto refuse = [&](const std::string& file, const std::string& cause) {

@@ -66,8 +66,15 @@ TEST(ParticipantDirectoryTest, KnowsWhoServesARunUntilTheyLeave) {
     EXPECT_TRUE(directory.find(ROLE_RECORDER, kRun).empty());
     EXPECT_TRUE(directory.find(ROLE_CONTROLLER, kRun + 1).empty());
     EXPECT_NE(directory.version(), version);
+    EXPECT_FALSE(entry.is_silent());
+    Participant done = make_announcement(ROLE_CONTROLLER, kRun, "pilot");
+    done.done(true);
+    EXPECT_EQ(directory.count_done(ROLE_CONTROLLER, kRun), 0);
+    writer.write(done);
+    EXPECT_TRUE(wait_until([&] { return directory.count_done(ROLE_CONTROLLER, kRun) == 1; }));
   }
   EXPECT_TRUE(wait_until([&] { return directory.find(ROLE_CONTROLLER, kRun).empty(); }));
+  EXPECT_EQ(directory.count_done(ROLE_CONTROLLER, kRun), 1) << "also after it has left";
 }
 
 TEST(ServerDirectoryTest, FindsTheRunToJoin) {
@@ -99,25 +106,53 @@ TEST(ServerDirectoryTest, FindsTheRunToJoin) {
     Writer<SimStatus> second_status(second_server);
     second_parameters.write(make_parameters(kLowerRun, {kVehicle}));
     second_status.write(make_status(kLowerRun, PHASE_WAITING));
-    EXPECT_TRUE(wait_until([&] {
-      const auto run = directory.find_joinable(kVehicle);
-      return run && run->parameters.run_id() == kLowerRun;
-    }));
-    status.write(make_status(kRun, PHASE_RUNNING));
-    EXPECT_TRUE(wait_until([&] {
-      const auto run = directory.find_joinable(kVehicle);
-      return run && run->parameters.run_id() == kRun;
-    }));
-    status.write(make_status(kRun, PHASE_FINISHED));
-    EXPECT_TRUE(wait_until([&] {
-      const auto run = directory.find_joinable(kVehicle);
-      return run && run->parameters.run_id() == kLowerRun;
-    }));
+    // Both say again and again where they are: who is silent for 2 s is no server to join.
+    const auto is_chosen = [&](std::uint64_t run_id, RunPhase phase) {
+      return wait_until([&] {
+        status.write(make_status(kRun, phase));
+        second_status.write(make_status(kLowerRun, PHASE_WAITING));
+        const auto run = directory.find_joinable(kVehicle);
+        return run && run->parameters.run_id() == run_id;
+      });
+    };
+    EXPECT_TRUE(is_chosen(kLowerRun, PHASE_WAITING));
+    EXPECT_TRUE(is_chosen(kRun, PHASE_RUNNING));
+    EXPECT_TRUE(is_chosen(kLowerRun, PHASE_FINISHED));
   }
   EXPECT_TRUE(wait_until([&] { return !directory.find_joinable(kVehicle); }));
   ASSERT_TRUE(directory.find_status(kLowerRun)) << "also of a server that has gone";
   EXPECT_EQ(directory.find_status(kLowerRun)->phase(), PHASE_WAITING);
   EXPECT_EQ(directory.find_status(kLowerRun + 1), std::nullopt);
+}
+
+TEST(ServerWatchTest, ASilentServerIsNotJoinedIsGivenUpAndMayComeBack) {
+  constexpr int kDomain = 73;
+  Node node(kQosFile, kDomain, "directory");
+  const ServerDirectory directory(node);
+  Node server(kQosFile, kDomain, "server");
+  Writer<Parameters> parameters(server);
+  Writer<SimStatus> status(server);
+  parameters.write(make_parameters(kRun, {kVehicle}));
+  const auto is_there = [&] {
+    status.write(make_status(kRun, PHASE_RUNNING));
+    return directory.find_joinable(kVehicle).has_value();
+  };
+  ASSERT_TRUE(wait_until(is_there));
+  ServerWatch watch(directory, *directory.find_joinable(kVehicle), 1.0);
+  EXPECT_EQ(watch.look(), ServerWatch::Finding::kThere);
+  EXPECT_FALSE(directory.is_silent(kRun));
+  EXPECT_TRUE(wait_until([&] { return watch.look() == ServerWatch::Finding::kSilent; }));
+  EXPECT_TRUE(wait_until([&] { return watch.look() == ServerWatch::Finding::kLost; }));
+  EXPECT_NE(watch.describe().find("silent for "), std::string::npos);
+  EXPECT_TRUE(wait_until([&] { return directory.is_silent(kRun); }));
+  EXPECT_FALSE(directory.find_joinable(kVehicle)) << "somebody else may take its place";
+  EXPECT_TRUE(directory.is_present(server.id())) << "it has not left";
+
+  ASSERT_TRUE(wait_until(is_there));
+  EXPECT_TRUE(wait_until([&] {
+    status.write(make_status(kRun, PHASE_RUNNING));
+    return watch.look() == ServerWatch::Finding::kThere;
+  }));
 }
 
 TEST(ServerDirectoryTest, AServerDoesNotMeetItself) {
