@@ -73,7 +73,7 @@ Disturbance choose(std::mt19937_64& random) {
   disturbance.kind = static_cast<Kind>(random() % 2);
   if (disturbance.role == Role::kPrimary && random() % 3 == 0)
     disturbance.kind = Kind::kKillForGood;
-  disturbance.at = Seconds(draw(0.1, 6.0));
+  disturbance.at = Seconds(draw(0.1, 4.5));  // start, flight of about 3 s, end
   disturbance.duration = Seconds(draw(0.2, 4.0));
   return disturbance;
 }
@@ -267,8 +267,9 @@ int count_orphans() {
 int run_trials(int trials, std::uint64_t seed, bool is_verbose) {
   TemporaryFolder folder;
   const std::string file = folder / "chaos.yaml";
-  write_bytes(
-      file, replace_once(read_file(scenario("figure_eight")), "controllers: 1", "controllers: 2"));
+  const std::string two =
+      replace_once(read_file(scenario("figure_eight")), "controllers: 1", "controllers: 2");
+  write_bytes(file, replace_once(two, "for_s: 32", "for_s: 16"));
   // Undisturbed: the same scenario, both clients.
   FlightOptions options;
   options.server = {"--period-s", "0.001"};
