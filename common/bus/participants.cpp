@@ -139,10 +139,15 @@ ServerWatch::ServerWatch(const ServerDirectory& servers, const Run& run, double 
     : servers_(servers),
       run_id_(run.parameters.run_id()),
       deadline_s_(deadline_s),
-      heard_(Clock::now()) {}
+      heard_(Clock::now()),
+      looked_(heard_) {}
 
 ServerWatch::Finding ServerWatch::look() {
   constexpr auto kQuietTime = std::chrono::seconds(1);
+  constexpr auto kLongestLook = std::chrono::milliseconds(500);
+  const auto now = Clock::now();
+  if (now - looked_ > kLongestLook) heard_ += now - looked_;
+  looked_ = now;
   heard_ = std::max(heard_, servers_.find_last_heard(run_id_).value_or(heard_));
   if (Clock::now() - heard_ < kQuietTime) {
     if (is_reported_) spdlog::info("the server of run {:016x} is back", run_id_);

@@ -120,6 +120,8 @@ class ServerWatch {
   ServerWatch(const ServerDirectory& servers, const Run& run, double deadline_s);
 
   enum class Finding { kThere, kSilent, kLost };
+  /// Call it several times a second: time without a look, in which this process was stopped itself,
+  /// is not held against the server.
   Finding look();
 
   /// For messages: "server of run … (silent for 3.1 s)".
@@ -130,6 +132,7 @@ class ServerWatch {
   const std::uint64_t run_id_;
   const double deadline_s_;
   Clock::time_point heard_;
+  Clock::time_point looked_;
   std::optional<app::Wait> wait_;  // while it is silent
   bool is_reported_ = false;
 };

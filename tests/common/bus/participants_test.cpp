@@ -153,6 +153,10 @@ TEST(ServerWatchTest, ASilentServerIsNotJoinedIsGivenUpAndMayComeBack) {
     status.write(make_status(kRun, PHASE_RUNNING));
     return watch.look() == ServerWatch::Finding::kThere;
   }));
+  // Who does not look for a while, because it was stopped itself, does not blame the server.
+  const auto later = ServerWatch::Clock::now() + std::chrono::milliseconds(1500);
+  ASSERT_TRUE(wait_until([&] { return ServerWatch::Clock::now() > later; }));
+  EXPECT_EQ(watch.look(), ServerWatch::Finding::kThere);
 }
 
 TEST(ServerDirectoryTest, AServerDoesNotMeetItself) {
