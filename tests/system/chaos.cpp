@@ -3,6 +3,7 @@
 /// recording must be that of an undisturbed flight, and whoever kept the others waiting for 2 s
 /// must have been named by then. A seed repeats the choices (not the machine's own timing).
 #include <signal.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -254,13 +255,12 @@ class Trial {
   Result result_;
 };
 
-/// Processes of ours that outlived their trial.
+/// Processes of ours that outlived their trial: all that were started are our children.
 int count_orphans() {
+  const std::string parent = "PPid:\t" + std::to_string(getpid()) + "\n";
   int orphans = 0;
-  for (const auto& entry : fs::directory_iterator("/proc")) {
-    const std::string command = read_file(entry.path() / "cmdline");
-    if (command.find(program("")) == 0 && command.find("sls-test-") != command.npos) ++orphans;
-  }
+  for (const auto& entry : fs::directory_iterator("/proc"))
+    if (read_file(entry.path() / "status").find(parent) != std::string::npos) ++orphans;
   return orphans;
 }
 
