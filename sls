@@ -10,6 +10,7 @@ readonly programs=("${flying[@]}" sim_ctl sls_verify delay_margin)
 readonly packages=(g++ make cmake libeigen3-dev libsimbody-dev libfastrtps-dev libfastcdr-dev
   fastddsgen default-jre-headless libyaml-cpp-dev libcli11-dev libspdlog-dev nlohmann-json3-dev libgtest-dev libssl-dev
   libtinyxml2-dev)
+readonly test_packages=(iproute2 nftables)
 
 say() { echo "sls: $*" >&2; }
 fail() { say "error: $1"; exit "${2:-1}"; }
@@ -52,9 +53,10 @@ EOF
 
 # --- set-up and build -----------------------------------------------------------------------------
 
+# setup [PACKAGE…]: what building and flying need, and the packages named.
 setup() {
   local missing=() package
-  for package in "${packages[@]}"; do
+  for package in "${packages[@]}" "$@"; do
     [[ "$(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null)" == installed ]] ||
       missing+=("$package")
   done
@@ -303,7 +305,7 @@ cmd_test() {
     [[ $2 == address ]] && preset=asan || preset=tsan
     folder="$root/build-$preset"
   fi
-  setup
+  setup "${test_packages[@]}"
   build_tree "$preset" "$folder"
   cd "$root"
   # Nothing the middleware reads from the environment may reach the tests.

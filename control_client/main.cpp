@@ -3,8 +3,15 @@
 
 #include "common/app/run_main.hpp"
 #include "common/bus/node.hpp"
+#include "common/bus/qos_file.hpp"
 #include "common/config/scenario.hpp"
 #include "control_client/client.hpp"
+
+namespace {
+
+constexpr const char* kIdentity = "controller";  // whose keys it uses on a secured domain
+
+}  // namespace
 
 int main(int argc, char** argv) {
   using namespace sls;
@@ -37,7 +44,7 @@ int main(int argc, char** argv) {
 
   return app::run_main(argc, argv, cli, options, "control_client", [&] {
     const config::Scenario scenario = config::load_scenario(scenario_file);
-    bus::Node node(options.qos_file, options.domain, "control_client");
+    bus::Node node(options.qos_file, options.domain, "control_client", kIdentity);
     control::Client(node, scenario, name, strength, follows_servers).run();
   });
 }

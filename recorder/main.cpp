@@ -9,6 +9,7 @@
 namespace {
 
 constexpr int kNiceness = 5;
+constexpr const char* kIdentity = "recorder";  // whose keys it uses on a secured domain
 
 }  // namespace
 
@@ -33,7 +34,7 @@ int main(int argc, char** argv) {
   cli.add_flag("--check", check, "only check QoS file and folder, then end");
 
   return app::run_main(argc, argv, cli, options, "recorder", [&] {
-    bus::check_qos_file(options.qos_file);
+    bus::read_qos_file(options.qos_file, kIdentity);
     if (resume)
       recorder.unfinished = record::find_unfinished_recording(recorder.folder);
     else
@@ -42,7 +43,7 @@ int main(int argc, char** argv) {
     // The loop waits for server and client, not for us: whoever answers a step goes first. Before
     // any thread starts, as they inherit it. It does no harm where it is refused.
     setpriority(PRIO_PROCESS, 0, kNiceness);
-    bus::Node node(options.qos_file, options.domain, "recorder");
+    bus::Node node(options.qos_file, options.domain, "recorder", kIdentity);
     record::Recorder(node, recorder).run();
   });
 }

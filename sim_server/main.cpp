@@ -4,6 +4,12 @@
 #include "common/config/scenario.hpp"
 #include "sim_server/server.hpp"
 
+namespace {
+
+constexpr const char* kIdentity = "server";  // whose keys it uses on a secured domain
+
+}  // namespace
+
 int main(int argc, char** argv) {
   using namespace sls;
   CLI::App cli("Integrates the plant of a scenario and serves its state on DDS topics.");
@@ -33,8 +39,11 @@ int main(int argc, char** argv) {
       scenario.sync.mode =
           mode == "lockstep" ? config::SyncMode::kLockstep : config::SyncMode::kRealtime;
     if (real_time_factor) config::override_real_time_factor(scenario, *real_time_factor);
-    if (check) return bus::check_qos_file(options.qos_file);
-    bus::Node node(options.qos_file, options.domain, "sim_server");
+    if (check) {
+      bus::read_qos_file(options.qos_file, kIdentity);
+      return;
+    }
+    bus::Node node(options.qos_file, options.domain, "sim_server", kIdentity);
     sim::Server(node, scenario).run();
   });
 }

@@ -70,11 +70,11 @@ class LogCollector : public dds::LogConsumer {
 };
 
 /// Loads a QoS file into the factory: one for the whole process, because profiles are global there.
-void load_profiles(const std::filesystem::path& file) {
+void load_profiles(const std::filesystem::path& file, const std::string& identity) {
   static std::mutex mutex;
   static std::filesystem::path loaded;
   const std::lock_guard lock(mutex);
-  check_qos_file(file);
+  const std::string profiles = read_qos_file(file, identity);
   const auto absolute = std::filesystem::canonical(file);
   if (absolute == loaded) return;
   if (!loaded.empty())  // Fast DDS would go on with the profiles it has, without a word
@@ -89,7 +89,8 @@ void load_profiles(const std::filesystem::path& file) {
   LogCollector::clear();
   auto* factory = dds::DomainParticipantFactory::get_instance();
   factory->load_profiles();
-  if (factory->load_XML_profiles_file(absolute.string()) != ReturnCode_t::RETCODE_OK)
+  if (factory->load_XML_profiles_string(profiles.data(), profiles.size()) !=
+      ReturnCode_t::RETCODE_OK)
     throw ConfigError(file.string() + ": expected profiles that Fast DDS takes, got: " +
                       LogCollector::find_first_error());
   loaded = absolute;
@@ -126,12 +127,13 @@ class MatchedPeers {
 }  // namespace
 
 struct Node::Impl {
-  Impl(const std::filesystem::path& qos_file, int domain, const std::string& name)
+  Impl(const std::filesystem::path& qos_file, int domain, const std::string& name,
+       const std::string& identity)
       : qos_place(qos_file.string()) {
     if (domain < 0 || domain > kMaxDomain)
       throw ConfigError("--domain: expected 0 to " + std::to_string(kMaxDomain) + ", got " +
                         std::to_string(domain));
-    load_profiles(qos_file);
+    load_profiles(qos_file, identity);
     auto* factory = dds::DomainParticipantFactory::get_instance();
     dds::DomainParticipantQos qos;
     if (factory->get_participant_qos_from_profile(kParticipantProfile, qos) !=
@@ -186,8 +188,9 @@ struct Node::Impl {
   dds::Subscriber* subscriber = nullptr;
 };
 
-Node::Node(const std::filesystem::path& qos_file, int domain, const std::string& name)
-    : impl_(std::make_unique<Impl>(qos_file, domain, name)) {}
+Node::Node(const std::filesystem::path& qos_file, int domain, const std::string& name,
+           const std::string& identity)
+    : impl_(std::make_unique<Impl>(qos_file, domain, name, identity)) {}
 Node::~Node() = default;
 
 const char* Node::choose_writer_profile(const char* profile, const char* fallback) const {
@@ -347,17 +350,6 @@ void* make_type_support<SimControlReply>() {
 }
 
 }  // namespace detail
-
-std::filesystem::path default_qos_file() {
-  // build/bin/PROGRAM of a checkout, PREFIX/bin/PROGRAM of an installation, any other build folder.
-  std::error_code error;
-  const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
-  const auto prefix = program.parent_path().parent_path();
-  for (const auto& folder : {prefix.parent_path() / "config", prefix / "share/sls/config"})
-    if (std::filesystem::exists(folder / "qos/default.xml", error))
-      return folder / "qos/default.xml";
-  return SLS_SOURCE_CONFIG_DIR "/qos/default.xml";
-}
 
 std::string middleware_version() { return FASTRTPS_VERSION_STR; }
 

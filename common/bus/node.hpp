@@ -26,12 +26,14 @@ class BusError : public std::runtime_error {
 /// One DDS participant. Writers and readers must not outlive it.
 class Node {
  public:
-  /// Joins `domain` (0–232) with the profiles of `qos_file`; `name` shows in discovery.
+  /// Joins `domain` (0–232) with the profiles of `qos_file`; `name` shows in discovery, `identity`
+  /// is whose keys a secured domain sees (server, controller, recorder or operator).
   /// @throws config::ConfigError naming the file, and the line where known, if it cannot be read,
   ///   is malformed, lacks a profile, or holds what Fast DDS refuses; or if it is not the one file
   ///   that this process uses; or for the domain.
   /// @throws BusError if the participant cannot be created.
-  Node(const std::filesystem::path& qos_file, int domain, const std::string& name);
+  Node(const std::filesystem::path& qos_file, int domain, const std::string& name,
+       const std::string& identity = {});
   ~Node();
   Node(const Node&) = delete;
   Node& operator=(const Node&) = delete;
@@ -143,9 +145,6 @@ class Reader {
   Handler handler_;
   detail::AnyReader reader_;  // last: its callbacks use the members above
 };
-
-/// The QoS file used without `--qos`: config/qos/default.xml of this installation.
-std::filesystem::path default_qos_file();
 
 /// "2.9.1": the version of Fast DDS this was built with.
 std::string middleware_version();

@@ -1,13 +1,19 @@
 #include "common/bus/qos_file.hpp"
 
+#include <arpa/inet.h>
+#include <netdb.h>
 #include <tinyxml2.h>
 
+#include <algorithm>
 #include <array>
+#include <cstdlib>
 #include <fstream>
 #include <map>
+#include <memory>
 #include <sstream>
 #include <string>
 #include <system_error>
+#include <vector>
 
 #include "common/bus/topics.hpp"
 #include "common/config/config_error.hpp"
@@ -18,17 +24,24 @@ namespace {
 using config::ConfigError;
 
 constexpr std::uintmax_t kMaxBytes = 1 << 20;
+constexpr const char* kIdentityVariable = "SLS_IDENTITY";
 
-struct Required {
+constexpr const char* kOurs = "sls_";  // what the names of our profiles begin with
+
+struct Profile {
   const char* element;
   const char* name;
+  bool is_required = true;
 };
-constexpr std::array<Required, 6> kRequired = {{{"participant", kParticipantProfile},
-                                                {"data_writer", kStreamWriterProfile},
-                                                {"data_reader", kLoopReaderProfile},
-                                                {"data_reader", kRecorderReaderProfile},
-                                                {"data_writer", kLatchedWriterProfile},
-                                                {"data_reader", kLatchedReaderProfile}}};
+constexpr std::array<Profile, 8> kProfiles = {
+    {{"participant", kParticipantProfile},
+     {"data_writer", kStreamWriterProfile},
+     {"data_reader", kLoopReaderProfile},
+     {"data_reader", kRecorderReaderProfile},
+     {"data_writer", kLatchedWriterProfile},
+     {"data_reader", kLatchedReaderProfile},
+     {"data_writer", kRealtimeCommandWriterProfile, false},
+     {"data_reader", kRealtimeCommandReaderProfile, false}}};
 
 struct Found {
   std::string element;
@@ -37,7 +50,12 @@ struct Found {
 
 void collect_profiles(const tinyxml2::XMLElement& element, const std::string& place,
                       std::map<std::string, Found>& found) {
-  if (const char* name = element.Attribute("profile_name")) {
+  const std::string kind = element.Name();
+  const char* name = element.Attribute("profile_name");
+  if (!name && (kind == "data_writer" || kind == "data_reader"))
+    throw ConfigError(place + ":" + std::to_string(element.GetLineNum()) + ": <" + kind +
+                      ">: expected the attribute profile_name, got none");
+  if (name) {
     const auto [earlier, is_new] = found.emplace(name, Found{element.Name(), element.GetLineNum()});
     if (!is_new)
       throw ConfigError(place + ":" + std::to_string(element.GetLineNum()) + ": profile '" + name +
@@ -76,28 +94,165 @@ std::string join_names(const std::map<std::string, Found>& found) {
   return names.empty() ? "none" : names;
 }
 
-}  // namespace
-
-void check_qos_file(const std::filesystem::path& file) {
-  const std::string place = file.string();
-  const std::string text = read_file(file);
-  tinyxml2::XMLDocument document;
+void parse(const std::string& text, const std::string& place, tinyxml2::XMLDocument& document) {
   if (document.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS)
     throw ConfigError(place + ":" + std::to_string(document.ErrorLineNum()) +
                       ": expected well-formed XML, got " + document.ErrorName());
+}
+
+// --- what depends on the process -----------------------------------------------------------------
+
+/// Value of the variable in `${…}`, which is NAME or NAME:-default.
+std::string find_value(const std::string& expression, const std::string& identity,
+                       const std::string& place) {
+  const auto divider = expression.find(":-");
+  const std::string name = expression.substr(0, divider);
+  if (const char* value = std::getenv(name.c_str()); value && *value) return value;
+  if (name == kIdentityVariable) return identity;
+  if (divider != std::string::npos) return expression.substr(divider + 2);
+  throw ConfigError(place + ": ${" + name +
+                    "}: expected an environment variable of this name, got none");
+}
+
+/// `text` with every `${…}` replaced. What is put in is not looked at again.
+std::string expand(const std::string& text, const std::string& identity, const std::string& place) {
+  std::string expanded;
+  std::size_t from = 0;
+  for (auto begin = text.find("${"); begin != std::string::npos; begin = text.find("${", from)) {
+    const auto end = text.find('}', begin);
+    if (end == std::string::npos)
+      throw ConfigError(place + ": '" + text.substr(begin) +
+                        "': expected '}' behind '${', got none");
+    expanded += text.substr(from, begin - from);
+    expanded += find_value(text.substr(begin + 2, end - begin - 2), identity, place);
+    from = end + 1;
+  }
+  return expanded + text.substr(from);
+}
+
+std::string resolve(const std::string& host, const std::string& place) {
+  in_addr address;
+  if (::inet_pton(AF_INET, host.c_str(), &address) == 1) return host;
+  addrinfo hints = {};
+  hints.ai_family = AF_INET;
+  addrinfo* found = nullptr;
+  const int error = ::getaddrinfo(host.c_str(), nullptr, &hints, &found);
+  if (error != 0)
+    throw ConfigError(place + ": host '" + host +
+                      "': expected a name or an IPv4 address, got: " + ::gai_strerror(error));
+  const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> owner(found, &::freeaddrinfo);
+  std::array<char, INET_ADDRSTRLEN> text;
+  return ::inet_ntop(AF_INET, &reinterpret_cast<sockaddr_in*>(found->ai_addr)->sin_addr,
+                     text.data(), text.size());
+}
+
+std::vector<std::string> split_hosts(const std::string& list) {
+  std::vector<std::string> hosts;
+  std::istringstream stream(list);
+  for (std::string host; std::getline(stream, host, ',');) {
+    const auto begin = host.find_first_not_of(" \t\n"), end = host.find_last_not_of(" \t\n");
+    if (begin != std::string::npos) hosts.push_back(host.substr(begin, end - begin + 1));
+  }
+  return hosts;
+}
+
+/// Puts a locator for each host of its address in the place of `locator`; the last one is returned.
+tinyxml2::XMLElement* expand_locator(tinyxml2::XMLElement& locator, const std::string& place) {
+  const auto* udp = locator.FirstChildElement("udpv4");
+  const auto* address = udp ? udp->FirstChildElement("address") : nullptr;
+  if (!address || !address->GetText()) return &locator;
+  const std::string where = place + ":" + std::to_string(address->GetLineNum());
+  const std::vector<std::string> hosts = split_hosts(address->GetText());
+  auto* last = &locator;
+  for (const std::string& host : hosts) {
+    auto* one = locator.DeepClone(locator.GetDocument())->ToElement();
+    one->FirstChildElement("udpv4")->FirstChildElement("address")->SetText(
+        resolve(host, where).c_str());
+    last = locator.Parent()->InsertAfterChild(last, one)->ToElement();
+  }
+  if (last != &locator) locator.GetDocument()->DeleteNode(&locator);
+  return last;
+}
+
+void complete(tinyxml2::XMLElement& element, const std::string& identity,
+              const std::string& place) {
+  if (element.FirstChild() && element.FirstChild()->ToText())
+    element.SetText(
+        expand(element.GetText(), identity, place + ":" + std::to_string(element.GetLineNum()))
+            .c_str());
+  for (auto* child = element.FirstChildElement(); child; child = child->NextSiblingElement()) {
+    complete(*child, identity, place);
+    if (std::string(child->Name()) == "locator") child = expand_locator(*child, place);
+  }
+}
+
+// --- profiles ------------------------------------------------------------------------------------
+
+/// A profile of ours that is misspelt would be left out without a word.
+void check_names(const std::map<std::string, Found>& found, const std::string& place) {
+  for (const auto& [name, where] : found) {
+    const std::string start =
+        place + ":" + std::to_string(where.line) + ": profile '" + name + "': ";
+    const auto* known = std::find_if(kProfiles.begin(), kProfiles.end(),
+                                     [&](const Profile& profile) { return name == profile.name; });
+    if (known == kProfiles.end()) {
+      if (name.rfind(kOurs, 0) == 0)
+        throw ConfigError(start + "expected one that config/qos/README.md lists, got this name");
+    } else if (where.element != known->element) {
+      throw ConfigError(start + "expected <" + known->element + ">, got <" + where.element + ">");
+    }
+  }
+}
+
+/// Adds the profiles of endpoints.xml that `found` lacks to the profiles of `root`.
+void add_missing_endpoints(tinyxml2::XMLElement& root, std::map<std::string, Found>& found) {
+  const auto file = default_qos_file().parent_path() / "endpoints.xml";
+  tinyxml2::XMLDocument shared;
+  parse(read_file(file), file.string(), shared);
+  auto* profiles = root.FirstChildElement("profiles");
+  if (!profiles) return;  // the participant's profile is missing, too, which will be said
+  const auto* shared_profiles = shared.RootElement()->FirstChildElement("profiles");
+  for (auto* profile = shared_profiles->FirstChildElement(); profile;
+       profile = profile->NextSiblingElement()) {
+    const Found here{profile->Name(), profile->GetLineNum()};
+    if (found.emplace(profile->Attribute("profile_name"), here).second)
+      profiles->InsertEndChild(profile->DeepClone(root.GetDocument()));
+  }
+}
+
+}  // namespace
+
+std::string read_qos_file(const std::filesystem::path& file, const std::string& identity) {
+  const std::string place = file.string();
+  tinyxml2::XMLDocument document;
+  parse(read_file(file), place, document);
 
   std::map<std::string, Found> found;
-  if (const auto* root = document.RootElement()) collect_profiles(*root, place, found);
-  for (const Required& required : kRequired) {
-    const auto profile = found.find(required.name);
-    if (profile == found.end())
-      throw ConfigError(place + ": profile '" + required.name + "': expected a <" +
-                        required.element + "> of this name, got only: " + join_names(found));
-    if (profile->second.element != required.element)
-      throw ConfigError(place + ":" + std::to_string(profile->second.line) + ": profile '" +
-                        required.name + "': expected <" + required.element + ">, got <" +
-                        profile->second.element + ">");
+  if (auto* root = document.RootElement()) {
+    collect_profiles(*root, place, found);
+    complete(*root, identity, place);
   }
+  check_names(found, place);
+  const std::map<std::string, Found> own = found;
+  if (auto* root = document.RootElement()) add_missing_endpoints(*root, found);
+  for (const Profile& profile : kProfiles)
+    if (profile.is_required && found.count(profile.name) == 0)
+      throw ConfigError(place + ": profile '" + profile.name + "': expected a <" + profile.element +
+                        "> of this name, got only: " + join_names(own));
+  tinyxml2::XMLPrinter printer;
+  document.Print(&printer);
+  return printer.CStr();
+}
+
+std::filesystem::path default_qos_file() {
+  // build/bin/PROGRAM of a checkout, PREFIX/bin/PROGRAM of an installation, any other build folder.
+  std::error_code error;
+  const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
+  const auto prefix = program.parent_path().parent_path();
+  for (const auto& folder : {prefix.parent_path() / "config", prefix / "share/sls/config"})
+    if (std::filesystem::exists(folder / "qos/default.xml", error))
+      return folder / "qos/default.xml";
+  return SLS_SOURCE_CONFIG_DIR "/qos/default.xml";
 }
 
 }  // namespace sls::bus

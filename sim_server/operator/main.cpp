@@ -4,6 +4,7 @@
 
 #include "common/app/run_main.hpp"
 #include "common/bus/node.hpp"
+#include "common/bus/qos_file.hpp"
 #include "sim_server/operator/operator_client.hpp"
 #include "sim_server/operator/options.hpp"
 #include "sim_server/operator/screen.hpp"
@@ -12,6 +13,8 @@
 namespace {
 
 using namespace sls;
+
+constexpr const char* kIdentity = "operator";  // whose keys it uses on a secured domain
 
 /// @throws app::RunError with the server's reason where it refuses.
 void request(operation::OperatorClient& client, ControlAction action, std::uint64_t steps) {
@@ -37,7 +40,7 @@ int main(int argc, char** argv) {
   operation::add_options(cli, options);
 
   return app::run_main(argc, argv, cli, options.common, "sim_ctl", [&] {
-    bus::Node node(options.common.qos_file, options.common.domain, "sim_ctl");
+    bus::Node node(options.common.qos_file, options.common.domain, "sim_ctl", kIdentity);
     operation::ClientOptions client_options;
     client_options.domain = options.common.domain;
     client_options.vehicle_id = options.vehicle_id;

@@ -78,7 +78,11 @@ Flight::Flight(const std::string& scenario_file, const FlightOptions& options)
   server_flags.insert(server_flags.end(), options.server.begin(), options.server.end());
   client_flags.insert(client_flags.end(), options.client.begin(), options.client.end());
   const auto start = [&](const char* name, const std::vector<std::string>& flags) {
-    return std::make_unique<Process>(make_command(name, domain.number(), flags, options.qos_file));
+    const auto before = options.before.find(name);
+    auto command = make_command(name, domain.number(), flags, options.qos_file);
+    if (before != options.before.end())
+      command.insert(command.begin(), before->second.begin(), before->second.end());
+    return std::make_unique<Process>(command);
   };
   recorder = start("recorder", {"--out", recording_.string()});
   server = start("sim_server", server_flags);
