@@ -1,7 +1,9 @@
 /// Random disturbances of real flights: in every trial one process of a lockstep flight is stopped
 /// and continued, or killed and restarted, at a random moment. The flight must end well, its
 /// recording must be that of an undisturbed flight, and whoever kept the others waiting for 2 s
-/// must have been named by then. A seed repeats the choices (not the machine's own timing).
+/// must have been named by then. (A client killed for good before the flight began leaves a run
+/// that cannot begin, and must end naming him.) A seed repeats the choices (not the machine's own
+/// timing).
 #include <signal.h>
 #include <unistd.h>
 
@@ -96,6 +98,7 @@ std::string describe(const Disturbance& disturbance) {
 /// What became of a trial; empty `failure`: as it must be.
 struct Result {
   std::string failure;
+  std::string success = "recording equal";
   std::optional<Seconds> named_after;
   bool had_to_be_named = false;
 };
@@ -226,6 +229,14 @@ class Trial {
     return code == 0;
   }
 
+  /// A run that waits for two clients does not begin with one, and says so.
+  bool has_rightly_not_begun() {
+    return disturbance_.kind == Kind::kKillForGood && current(Role::kServer).wait(0s) == 1 &&
+           current(Role::kServer).output().find("not ready within 30 s: 2 controllers (1 ready)") !=
+               std::string::npos &&
+           Table(fs::path(recording()) / "state.csv").rows() == 0;
+  }
+
   void judge_end() {
     // A process restarted just after the run's end finds no run: it is told to go.
     const auto is_over = [&] {
@@ -242,7 +253,9 @@ class Trial {
     for (const auto& process : processes_)
       if (!process.second->wait(15s)) result_.failure = "hang: a process did not end";
     if (!result_.failure.empty()) return;
-    if (!is_equal(answer))
+    if (has_rightly_not_begun())
+      result_.success = "did not begin with one of two clients, and said so";
+    else if (!is_equal(answer))
       result_.failure = "the recording is not that of an undisturbed flight: " + answer;
   }
 
@@ -301,7 +314,7 @@ int run_trials(int trials, std::uint64_t seed, bool is_verbose) {
     }
     had_to_be_named += result.had_to_be_named ? 1 : 0;
     std::printf("ended after %.1f s, %s\n", Seconds(Clock::now() - began).count(),
-                result.failure.empty() ? "recording equal" : result.failure.c_str());
+                result.failure.empty() ? result.success.c_str() : result.failure.c_str());
     if (!result.failure.empty() || is_verbose) std::printf("%s", trial.outputs().c_str());
     std::fflush(stdout);
     failed += result.failure.empty() ? 0 : 1;
