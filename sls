@@ -6,11 +6,13 @@ root="$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)"
 readonly root
 readonly build="${SLS_BUILD:-$root/build}"
 readonly flying=(sim_server control_client recorder)
-readonly programs=("${flying[@]}" sim_ctl sls_verify delay_margin)
+readonly programs=("${flying[@]}" sim_ctl sls_verify delay_margin sls_doctor)
 readonly packages=(g++ make cmake libeigen3-dev libsimbody-dev libfastrtps-dev libfastcdr-dev
   fastddsgen default-jre-headless libyaml-cpp-dev libcli11-dev libspdlog-dev nlohmann-json3-dev libgtest-dev libssl-dev
-  libtinyxml2-dev)
-readonly test_packages=(iproute2 nftables)
+  libtinyxml2-dev openssl)
+readonly fuzz_packages=(clang libclang-rt-14-dev)
+readonly fuzzers=(scenario qos_file csv recording samples)
+readonly test_packages=(iproute2 nftables cyclonedds-dev cyclonedds-tools fastdds-tools libfaketime python3-kubernetes)
 
 say() { echo "sls: $*" >&2; }
 fail() { say "error: $1"; exit "${2:-1}"; }
@@ -34,15 +36,35 @@ usage: ./sls COMMAND [OPTIONS]
   delay-margin SCENARIO
                      the delay of the command at which the controller loses the load, with a table
       --period-s X     control period in force (default: the scenario's)
+  doctor             why data does not flow: moves datagrams and samples over each path, one line per
+                     check; ends 1 where something is wrong
+      --qos FILE       QoS profiles (default: config/qos/default.xml)
+      --domain N       DDS domain, 0 to 232 (default: 0)
+      --peer HOST      another machine, where programs or `./sls doctor --answer` run
+      --json           JSON instead of lines
+      --answer         answer the doctor of another machine, for --for-s seconds (default: 60)
   verify A [B]       compares the data of two recordings: equal, or the first difference; of one, its
                      files with its manifest
   test               set up, build, run every test
       --slow           the ones that take minutes, too; they need an idle machine
-      --sanitize KIND  the unit tests alone, built with a sanitizer: address or thread
+      --sanitize KIND  the unit tests alone, built with a sanitizer: address; or thread, which
+                       runs those with several threads
+  keys DIR           identities and signed permissions for config/qos/secure.xml;
+                     with --help: its options
+  docker-demo [NAME] fly in containers: plain, discovery, standby or secure; with --help: its options
+  discovery-server   run a discovery server for config/qos/discovery_server.xml until it is stopped
+      --listen ADDRESS where (default: every address of this machine)
+      --port N         UDP port (default: 11811)
+  network-table      fly on test hosts with each QoS profile and each disturbance of their network, print
+                     a Markdown table; needs root and minutes. With --help: its options
   chaos              disturb flights at random: stop, continue, kill and restart their processes
       --trials N       how many flights (default: 10)
       --seed S         decides process, moment and kind (default: 1)
       --verbose        print what the processes said
+  fuzz               feed everything that reads files or samples with mutated ones, until one crashes
+      --seconds N      for all targets together (default: 60)
+      --target NAME    this one alone: scenario, qos_file, csv, recording or samples
+  setup              install the packages that building and flying need
   build              set up and build; the programs are in build/bin
   clean              remove what was built
   help               this text
@@ -233,6 +255,8 @@ print_summary() {
 
 # --- subcommands ----------------------------------------------------------------------------------
 
+cmd_setup() { setup; }
+
 cmd_build() {
   build_programs
   say "programs in build/bin: ${programs[*]}"
@@ -290,33 +314,122 @@ cmd_verify() {
   exec "$build/bin/sls_verify" "$@"
 }
 
+cmd_doctor() {
+  build_programs sls_doctor
+  exec "$build/bin/sls_doctor" "$@"
+}
+
+cmd_keys() {
+  command -v openssl >/dev/null || setup
+  exec "$root/config/security/keys.sh" "$@"
+}
+
+cmd_docker-demo() {
+  source "$root/docker/demo.sh"
+  docker_demo "$@"
+}
+
+cmd_discovery-server() {
+  local listen=() port=11811
+  while (($#)); do
+    (($# >= 2)) || fail "$1: expected a value (see ./sls help)" 2
+    case $1 in
+      --listen) listen=(-l "$2") ;;
+      --port) port=$2 ;;
+      *) fail "unknown option '$1' (see ./sls help)" 2 ;;
+    esac
+    shift 2
+  done
+  [[ $port =~ ^[1-9][0-9]{0,4}$ ]] && ((port <= 65535)) || fail "--port: expected 1 to 65535, got '$port'" 2
+  command -v fast-discovery-server >/dev/null || setup fastdds-tools
+  say "discovery server on port $port; clients: SLS_DISCOVERY_SERVER=${listen[1]:-this machine}"
+  # Number 0 has the identity that discovery_server.xml expects.
+  exec fast-discovery-server -i 0 "${listen[@]}" -p "$port"
+}
+
+cmd_network-table() {
+  [[ -n ${SLS_BUILD:-} ]] || setup "${test_packages[@]}"
+  build_programs network_table
+  exec "$build/tests/network_table" "$@"
+}
+
+cmd_fuzz() {
+  local seconds=60 targets=("${fuzzers[@]}") target
+  while (($#)); do
+    (($# >= 2)) || fail "fuzz: $1: expected a value (see ./sls help)" 2
+    case $1 in
+      --seconds)
+        [[ $2 =~ ^[1-9][0-9]{0,5}$ ]] || fail "fuzz: --seconds: expected a whole number, got '$2'" 2
+        seconds=$2
+        ;;
+      --target)
+        [[ " ${fuzzers[*]} " == *" $2 "* ]] ||
+          fail "fuzz: --target: expected one of ${fuzzers[*]}, got '$2'" 2
+        targets=("$2")
+        ;;
+      *) fail "fuzz: unknown option '$1' (see ./sls help)" 2 ;;
+    esac
+    shift 2
+  done
+  setup "${fuzz_packages[@]}"
+  local folder="$root/build-fuzz"
+  build_tree fuzz "$folder" "${targets[@]/%/_fuzzer}"
+  for target in "${targets[@]}"; do
+    run_fuzzer "$folder" "$target" $(((seconds + ${#targets[@]} - 1) / ${#targets[@]}))
+  done
+}
+
+# run_fuzzer FOLDER TARGET SECONDS: what it finds new is kept in FOLDER/corpus, a crash ends us.
+run_fuzzer() {
+  local corpus="$1/corpus/$2" crashes="$1/crashes/$2" log="$1/$2.log" seeds
+  case $2 in
+    scenario) seeds=("$root"/config/scenarios "$root"/config/invalid) ;;
+    qos_file) seeds=("$root"/config/qos "$root"/config/invalid/qos) ;;
+    *) seeds=("$root/tests/fuzz/corpus/$2") ;;
+  esac
+  mkdir -p "$corpus" "$crashes"
+  local scratch
+  scratch="$(mktemp -d)"  # a target that crashes does not tidy up
+  # The libraries from packages are not instrumented, so a container may not be watched in them.
+  if ! TMPDIR=$scratch ASAN_OPTIONS=detect_container_overflow=0 "$1/fuzz/$2_fuzzer" "$corpus" \
+    "${seeds[@]}" -max_total_time="$3" -timeout=10 -rss_limit_mb=1024 -max_len=33000 \
+    -artifact_prefix="$crashes/" >"$log" 2>&1; then
+    rm -rf "$scratch"
+    grep -E 'ERROR|SUMMARY|runtime error|what\(\)' "$log" >&2 || true
+    fail "$2: crashed (log: $log) with the input $(grep -o "$crashes/.*" "$log" | tail -n 1)"
+  fi
+  rm -rf "$scratch"
+  say "$2: $(tail -n 1 "$log")"
+}
+
 cmd_chaos() {
   build_programs chaos
   exec "$build/tests/chaos" "$@"
 }
 
 cmd_test() {
-  local preset=release folder=$build without=(--label-exclude slow)
+  local preset=release folder=$build which=(--label-exclude slow) targets=()
   if [[ $# == 1 && $1 == --slow ]]; then
-    without=()
+    which=()
   elif (($#)); then
     [[ $# == 2 && $1 == --sanitize && ($2 == address || $2 == thread) ]] ||
       fail "test: expected nothing, --slow or --sanitize address|thread, got '$*'" 2
-    [[ $2 == address ]] && preset=asan || preset=tsan
+    preset=asan
+    [[ $2 == thread ]] && preset=tsan which=(--label-regex threaded) targets=(threaded_tests)
     folder="$root/build-$preset"
   fi
   setup "${test_packages[@]}"
-  build_tree "$preset" "$folder"
+  build_tree "$preset" "$folder" "${targets[@]}"
   cd "$root"
   # Nothing the middleware reads from the environment may reach the tests.
   env -u ROS_DISCOVERY_SERVER -u FASTRTPS_DEFAULT_PROFILES_FILE \
-    ctest --preset "$preset" --parallel "$(nproc)" "${without[@]}"
+    ctest --preset "$preset" --parallel "$(nproc)" "${which[@]}"
 }
 
 command=${1:-help}
 (($#)) && shift
 case $command in
-  demo | run | ctl | verify | delay-margin | chaos | test | build) "cmd_$command" "$@" ;;
+  demo | run | doctor | keys | ctl | verify | delay-margin | chaos | fuzz | test | setup | build | docker-demo | discovery-server | network-table) "cmd_$command" "$@" ;;
   clean) rm -rf "$root"/build "$root"/build-* ;;
   help | --help | -h) usage ;;
   *)

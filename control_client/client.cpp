@@ -32,7 +32,9 @@ Client::Client(bus::Node& node, const config::Scenario& scenario, const std::str
       participant_writer_(node),
       reference_writer_(node),
       state_reader_(node, bus::kLoopReaderProfile,
-                    [this](const VehicleState& state, const bus::PeerId&) { receive(state); }) {}
+                    [this](const VehicleState& state, const bus::PeerId& sender) {
+                      receive(state, sender);
+                    }) {}
 
 void Client::run() {
   auto next = find_first_run();
@@ -49,11 +51,11 @@ std::optional<bus::Run> Client::find_first_run() {
   while (app::stop_signal() == 0) {
     if (auto run = servers_.find_joinable(vehicle_id_)) return run;
     if (wait.is_over())
-      throw app::RunError(
-          fmt::format("no server for vehicle {} within {} s", vehicle_id_, timeout_s));
+      throw app::RunError(fmt::format("no server for vehicle {} within {} s{}", vehicle_id_,
+                                      timeout_s, node_.describe_loneliness()));
     if (wait.is_report_due())
-      spdlog::info("waiting for: server of vehicle {} ({:.0f} s left)", vehicle_id_,
-                   wait.seconds_left());
+      spdlog::info("waiting for: server of vehicle {} ({:.0f} s left){}", vehicle_id_,
+                   wait.seconds_left(), node_.describe_loneliness());
     std::this_thread::sleep_for(kPollTime);
   }
   return std::nullopt;
@@ -131,19 +133,21 @@ std::optional<bus::Run> Client::serve() {
   return std::nullopt;
 }
 
-void Client::receive(const VehicleState& state) {
+void Client::receive(const VehicleState& state, const bus::PeerId& sender) {
   try {
-    answer(state);
+    answer(state, sender);
   } catch (...) {  // an exception must not reach the middleware
     const std::lock_guard lock(answer_mutex_);
     answer_error_ = std::current_exception();
   }
 }
 
-void Client::answer(const VehicleState& state) {
+void Client::answer(const VehicleState& state, const bus::PeerId& sender) {
   const std::lock_guard lock(answer_mutex_);
-  if (!run_ || state.run_id() != run_->parameters.run_id() || state.vehicle_id() != vehicle_id_)
-    return;
+  const bool is_ours = run_ && sender == run_->server &&
+                       state.run_id() == run_->parameters.run_id() &&
+                       state.vehicle_id() == vehicle_id_;
+  if (!is_ours) return;
   if (last_command_ && last_command_->step() == state.step()) {
     command_writer_->write(*last_command_);
     return;

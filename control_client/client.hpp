@@ -45,8 +45,9 @@ class Client {
   void leave();
 
   /// Called by the middleware for every sample.
-  void receive(const VehicleState& state);
-  void answer(const VehicleState& state);
+  void receive(const VehicleState& state, const bus::PeerId& sender);
+  /// Answers states of the server whose run is joined; others' are nobody's business here.
+  void answer(const VehicleState& state, const bus::PeerId& sender);
   bool sees_all_endpoints() const;
   void announce(bool ready, bool done);
   /// True when the run has ended, well or not.

@@ -1,5 +1,6 @@
 #include "recorder/inbox.hpp"
 
+#include <algorithm>
 #include <iterator>
 #include <utility>
 
@@ -56,16 +57,16 @@ bool Inbox::belongs(const Received& received) const {
   return is_of_any_sender || received.sender == server_;
 }
 
-std::deque<Inbox::Sample> Inbox::take_all() {
+std::deque<Inbox::Received> Inbox::take_all() {
   std::deque<Received> all;
   {
     const std::lock_guard lock(mutex_);
     all.swap(runs_[open_].samples);
   }
-  std::deque<Sample> samples;
-  for (Received& received : all)
-    if (belongs(received)) samples.push_back(std::move(received.sample));
-  return samples;
+  all.erase(std::remove_if(all.begin(), all.end(),
+                           [this](const Received& received) { return !belongs(received); }),
+            all.end());
+  return all;
 }
 
 std::uint64_t Inbox::refused() const {

@@ -24,8 +24,13 @@ class Inbox {
   /// samples count from its `server` alone: only that knows where the run is.
   void open(std::uint64_t run_id, const bus::PeerId& server);
 
+  struct Received {
+    Sample sample;
+    bus::PeerId sender;
+  };
+
   /// All samples of the open run there are, oldest first.
-  std::deque<Sample> take_all();
+  std::deque<Received> take_all();
 
   /// Samples of the open run that were lost because there was no room.
   std::uint64_t refused() const;
@@ -36,10 +41,6 @@ class Inbox {
   bool hears_client(const bus::PeerId& client) const;
 
  private:
-  struct Received {
-    Sample sample;
-    bus::PeerId sender;
-  };
   struct Run {
     std::deque<Received> samples;
     std::uint64_t refused = 0;

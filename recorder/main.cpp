@@ -3,6 +3,7 @@
 #include "common/app/run_main.hpp"
 #include "common/bus/node.hpp"
 #include "common/bus/qos_file.hpp"
+#include "common/bus/security_files.hpp"
 #include "recorder/recorder.hpp"
 #include "recorder/recording_folder.hpp"
 
@@ -34,7 +35,7 @@ int main(int argc, char** argv) {
   cli.add_flag("--check", check, "only check QoS file and folder, then end");
 
   return app::run_main(argc, argv, cli, options, "recorder", [&] {
-    bus::read_qos_file(options.qos_file, kIdentity);
+    bus::check_security_files(bus::read_qos_file(options.qos_file, kIdentity));
     if (resume)
       recorder.unfinished = record::find_unfinished_recording(recorder.folder);
     else

@@ -52,6 +52,14 @@ Json describe_machine() {
           {"kernel", name.release}};
 }
 
+/// Vehicles of one server (idl/sls.idl); for each of them a recording's rows are read once.
+constexpr std::size_t kMaxVehicles = 256;
+
+/// Who verifies somebody else's recording opens the files of that folder and no others.
+bool is_in_folder(const std::filesystem::path& name) {
+  return name == name.filename() && name.has_filename() && name != "." && name != "..";
+}
+
 ManifestFile to_manifest(const Json& json) {
   ManifestFile manifest;
   manifest.complete = json.at("complete");
@@ -62,10 +70,15 @@ ManifestFile to_manifest(const Json& json) {
   manifest.mode = json.at("mode");
   manifest.period_s = json.at("period_s");
   manifest.vehicle_ids = json.at("vehicle_ids").get<std::vector<std::uint32_t>>();
+  if (manifest.vehicle_ids.size() > kMaxVehicles)
+    throw config::ConfigError(fmt::format("vehicle_ids: expected at most {}, got {}", kMaxVehicles,
+                                          manifest.vehicle_ids.size()));
   // Recordings of earlier versions have neither.
   if (json.contains("segment")) manifest.first_step = json.at("segment").at("first_step");
   manifest.certificate = json.value("certificate", "");
   for (const auto& [name, file] : json.at("files").items()) {
+    if (!is_in_folder(name))
+      throw config::ConfigError("files: expected names of files beside it, got '" + name + "'");
     ManifestFile::File& entry = manifest.files[name];
     entry.sha256 = file.at("sha256");
     if (file.contains("rows")) entry.rows = file.at("rows").get<std::uint64_t>();
@@ -158,6 +171,8 @@ ManifestFile read_manifest(const std::filesystem::path& folder) {
     return to_manifest(Json::parse(stream));
   } catch (const Json::exception& error) {
     throw config::ConfigError(path.string() + ": expected a manifest, got: " + error.what());
+  } catch (const config::ConfigError& error) {
+    throw config::ConfigError(path.string() + ": " + error.what());
   }
 }
 

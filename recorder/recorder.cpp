@@ -22,12 +22,14 @@ constexpr std::uint32_t kVehicle = 0;
 
 /// Asks `find` until it finds a run, a stop signal comes or `limit_s` is over.
 template <class Find>
-std::optional<bus::Run> wait_for_run(const std::string& whom, double limit_s, Find find) {
+std::optional<bus::Run> wait_for_run(const bus::Node& node, const std::string& whom, double limit_s,
+                                     Find find) {
   app::Wait wait(limit_s, kUsualJoinTime);
   while (app::stop_signal() == 0 && !wait.is_over()) {
     if (auto run = find()) return run;
     if (wait.is_report_due())
-      spdlog::info("waiting for: {} ({:.0f} s left)", whom, wait.seconds_left());
+      spdlog::info("waiting for: {} ({:.0f} s left){}", whom, wait.seconds_left(),
+                   node.describe_loneliness());
     std::this_thread::sleep_for(kPollTime);
   }
   return std::nullopt;
@@ -38,14 +40,15 @@ std::string to_text(std::uint64_t run_id) { return fmt::format("{:016x}", run_id
 }  // namespace
 
 Recorder::Recorder(bus::Node& node, const RecorderOptions& options)
-    : options_(options), surroundings_(node) {}
+    : options_(options), node_(node), surroundings_(node) {}
 
 void Recorder::run() {
   surroundings_.participant_writer.write(make_announcement(nullptr, false, false, -1));
   auto run = wait_for_first_run();
   if (!run && app::stop_signal() == 0)
-    throw app::RunError(fmt::format("{}: nothing recorded: no server within {} s",
-                                    options_.folder.string(), kJoinTimeout));
+    throw app::RunError(fmt::format("{}: nothing recorded: no server within {} s{}",
+                                    options_.folder.string(), kJoinTimeout,
+                                    node_.describe_loneliness()));
   while (run) {
     RunEnd end;
     try {
@@ -65,7 +68,7 @@ void Recorder::run() {
 std::optional<bus::Run> Recorder::wait_for_first_run() const {
   const std::string whom =
       options_.unfinished ? "server of run " + options_.unfinished->manifest().run_id : "server";
-  return wait_for_run(whom, kJoinTimeout, [this] {
+  return wait_for_run(node_, whom, kJoinTimeout, [this] {
     const auto unfinished = find_unfinished_run();
     return unfinished ? unfinished : surroundings_.servers.find_joinable(kVehicle);
   });
@@ -109,7 +112,7 @@ std::optional<bus::Run> Recorder::go_on_after(const bus::Run& run, const RunEnd&
 }
 
 std::optional<bus::Run> Recorder::wait_for_next_run(const bus::Run& ended, double limit_s) const {
-  return wait_for_run("the run after the reset of run " + to_text(ended.parameters.run_id()),
+  return wait_for_run(node_, "the run after the reset of run " + to_text(ended.parameters.run_id()),
                       limit_s, [&] { return find_follower(ended); });
 }
 

@@ -32,6 +32,7 @@ class Recorder {
   Segment open_segment(const bus::Run& run);
 
   const RecorderOptions options_;
+  const bus::Node& node_;
   bool is_folder_used_ = false;  // by another run
   Surroundings surroundings_;
 };

@@ -99,21 +99,21 @@ StepJoin* Recording::find_vehicle(std::uint64_t run_id, std::uint32_t vehicle_id
   return vehicle == vehicles_.end() ? nullptr : &vehicle->second;
 }
 
-void Recording::add(const VehicleState& state) {
+void Recording::add(const VehicleState& state, const bus::PeerId&) {
   if (StepJoin* vehicle = find_vehicle(state.run_id(), state.vehicle_id())) vehicle->add(state);
 }
 
-void Recording::add(const ControlCommand& command) {
+void Recording::add(const ControlCommand& command, const bus::PeerId& sender) {
   if (StepJoin* vehicle = find_vehicle(command.run_id(), command.vehicle_id()))
-    vehicle->add(command);
+    vehicle->add(command, sender);
 }
 
-void Recording::add(const Reference& reference) {
+void Recording::add(const Reference& reference, const bus::PeerId& sender) {
   if (StepJoin* vehicle = find_vehicle(reference.run_id(), reference.vehicle_id()))
-    vehicle->add(reference);
+    vehicle->add(reference, sender);
 }
 
-void Recording::add(const SimStatus& status) {
+void Recording::add(const SimStatus& status, const bus::PeerId&) {
   if (status.run_id() != parameters_.run_id()) return;
   // A server that is discovered again sends its past again.
   if (last_status_ && status.sample_index() <= last_status_->sample_index()) return;

@@ -33,11 +33,11 @@ class Recording {
   /// The same for a recording of one segment.
   Recording(const std::filesystem::path& folder, const Parameters& parameters);
 
-  /// Samples of other runs and vehicles are ignored.
-  void add(const VehicleState& state);
-  void add(const ControlCommand& command);
-  void add(const Reference& reference);
-  void add(const SimStatus& status);
+  /// Samples of other runs and vehicles are ignored. `sender` tells answers of one name apart.
+  void add(const VehicleState& state, const bus::PeerId& sender = {});
+  void add(const ControlCommand& command, const bus::PeerId& sender = {});
+  void add(const Reference& reference, const bus::PeerId& sender = {});
+  void add(const SimStatus& status, const bus::PeerId& sender = {});
 
   /// Tells how much time has passed: what dead clients have kept back is not waited for forever.
   void pass_time(StepJoin::Duration elapsed);

@@ -172,8 +172,9 @@ void RunRecorder::write_samples() {
     auto time = Clock::now();
     while (!recording_.has_all() && !is_stopped) {
       is_stopped = stop_writing_;  // what is there by now is still taken
-      for (const Inbox::Sample& sample : surroundings_.inbox.take_all())
-        std::visit([&](const auto& message) { recording_.add(message); }, sample);
+      for (const auto& [sample, sender] : surroundings_.inbox.take_all())
+        std::visit([&, from = sender](const auto& message) { recording_.add(message, from); },
+                   sample);
       const auto earlier = std::exchange(time, Clock::now());
       recording_.pass_time(std::min(time - earlier, kLongestPass));
       recording_.flush_if_due();

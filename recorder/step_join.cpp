@@ -16,7 +16,7 @@ using namespace std::chrono_literals;
 /// what came after must not wait in memory for it. Answers can be no further ahead: the server
 /// keeps within 2,000 steps of what a recorder holds, and whoever answers more than it asked is not
 /// heard.
-constexpr std::uint64_t kMaxPending = 16384;
+constexpr std::uint64_t kMaxPending = 8192;
 
 /// An accepted answer that has not come while so many later states are in was kept back by a client
 /// that died, and the answer to a step without one will not come. Well below the lag at which the
@@ -35,22 +35,17 @@ constexpr std::size_t kMaxEarly = 32768;
 /// Different answers kept for one step: more than any number of clients that fly one vehicle.
 constexpr std::size_t kMaxAnswers = 32;
 
+/// Of those of one sender, who has no reason to send a second one, so that nobody keeps the others
+/// out.
+constexpr std::size_t kMaxAnswersOfOne = 4;
+
 using Force = std::array<double, 3>;
 
 bool are_same_bits(const Force& a, const Force& b) {
   return std::memcmp(a.data(), b.data(), sizeof a) == 0;
 }
 
-template <class Sample>
-const Sample* find_by_client(const std::vector<Sample>& samples, const std::string& client) {
-  const auto found = std::find_if(samples.begin(), samples.end(), [&](const Sample& sample) {
-    return sample.client_name() == client;
-  });
-  return found == samples.end() ? nullptr : &*found;
-}
-
-/// Of one client and alike in what decides whether it is the one that was accepted. Anybody can
-/// send under any name, so the name alone does not say that.
+/// Of one client and alike in what decides whether it is the one that was accepted.
 bool are_copies(const ControlCommand& a, const ControlCommand& b) {
   return a.client_name() == b.client_name() && a.mission() == b.mission() &&
          are_same_bits(a.f_Q_W_n(), b.f_Q_W_n());
@@ -66,23 +61,37 @@ bool ends_mission(const ControlCommand& command) {
          std::all_of(force.begin(), force.end(), [](double x) { return std::isfinite(x); });
 }
 
-/// Adds `sample` unless a copy of it is there, or too many others.
-template <class Sample>
-bool add_answer(std::vector<Sample>& samples, const Sample& sample) {
-  const bool is_known = std::any_of(samples.begin(), samples.end(),
-                                    [&](const Sample& known) { return are_copies(known, sample); });
-  if (is_known || samples.size() >= kMaxAnswers) return false;
-  samples.push_back(sample);
+/// Adds `sample` unless a copy of the same sender is there, or too many others.
+template <class Received, class Sample>
+bool add_answer(std::vector<Received>& known, const Sample& sample, const bus::PeerId& sender) {
+  std::size_t of_sender = 0;
+  for (const Received& other : known) {
+    if (other.sender != sender) continue;
+    if (are_copies(other.sample, sample) || ++of_sender == kMaxAnswersOfOne) return false;
+  }
+  if (known.size() >= kMaxAnswers) return false;
+  known.push_back({sample, sender});
   return true;
+}
+
+/// What belongs to `command`: of the same sender and client.
+template <class References, class Command>
+const Reference* find_partner(const References& references, const Command& command) {
+  for (const auto& reference : references)
+    if (reference.sender == command.sender &&
+        reference.sample.client_name() == command.sample.client_name())
+      return &reference.sample;
+  return nullptr;
 }
 
 /// The first answer with its reference, of whichever client, of which `is_equal` holds.
 template <class Pending, class IsEqual>
 void find_stand_in(const Pending& pending, IsEqual is_equal, StepRecord& record) {
-  for (const ControlCommand& command : pending.commands) {
-    const auto* reference = find_by_client(pending.references, command.client_name().to_string());
-    if (!reference || !is_equal(command)) continue;
-    record.command = command;
+  for (const auto& command : pending.commands) {
+    const Reference* reference = find_partner(pending.references, command);
+    if (!reference || !is_equal(command.sample)) continue;
+    record.command = command.sample;
+    record.sender = command.sender;
     record.reference = *reference;
     return;
   }
@@ -129,14 +138,16 @@ void StepJoin::begin(std::uint64_t first_state) {
     if (gap_sink_) gap_sink_(next_step_, first_state - 1);
     next_step_ = first_state;
   }
-  for (const auto& command : std::exchange(early_commands_, {})) add(command);
-  for (const auto& reference : std::exchange(early_references_, {})) add(reference);
+  for (const auto& [command, sender] : std::exchange(early_commands_, {})) add(command, sender);
+  for (const auto& [reference, sender] : std::exchange(early_references_, {}))
+    add(reference, sender);
 }
 
 template <class Sample>
-void StepJoin::keep_early(std::vector<Sample>& early, const Sample& sample) {
+void StepJoin::keep_early(std::vector<Received<Sample>>& early, const Sample& sample,
+                          const bus::PeerId& sender) {
   if (early.size() < kMaxEarly)
-    early.push_back(sample);
+    early.push_back({sample, sender});
   else
     ++dropped_.out_of_range;
 }
@@ -155,19 +166,19 @@ void StepJoin::add(const VehicleState& state) {
   hand_on_settled_steps();
 }
 
-void StepJoin::add(const ControlCommand& command) {
-  if (!has_begun_) return keep_early(early_commands_, command);
+void StepJoin::add(const ControlCommand& command, const bus::PeerId& sender) {
+  if (!has_begun_) return keep_early(early_commands_, command, sender);
   Pending* pending = find(command.step(), kMaxPending);
   if (!pending) return;
-  if (!add_answer(pending->commands, command)) ++dropped_.repeated;
+  if (!add_answer(pending->commands, command, sender)) ++dropped_.repeated;
   hand_on_settled_steps();
 }
 
-void StepJoin::add(const Reference& reference) {
-  if (!has_begun_) return keep_early(early_references_, reference);
+void StepJoin::add(const Reference& reference, const bus::PeerId& sender) {
+  if (!has_begun_) return keep_early(early_references_, reference, sender);
   Pending* pending = find(reference.step(), kMaxPending);
   if (!pending) return;
-  if (!add_answer(pending->references, reference)) ++dropped_.repeated;
+  if (!add_answer(pending->references, reference, sender)) ++dropped_.repeated;
   hand_on_settled_steps();
 }
 
@@ -242,23 +253,62 @@ StepRecord StepJoin::make_record(const Pending& pending) const {
   return record;
 }
 
+bool StepJoin::is_flyer(const std::string& client, const bus::PeerId& sender) const {
+  return flyer_ && flyer_->client == client && flyer_->sender == sender;
+}
+
+/// The reference of `client`, of the sender that flew last if it is there.
+const StepJoin::Received<Reference>* StepJoin::find_reference(const Pending& pending,
+                                                              const std::string& client) const {
+  const Received<Reference>* found = nullptr;
+  for (const auto& reference : pending.references)
+    if (reference.sample.client_name() == client && (!found || is_flyer(client, reference.sender)))
+      found = &reference;
+  return found;
+}
+
+/// The first answer under the name `client` of which `is_accepted` holds, with the reference of its
+/// sender: of the sender that flew last, else one that is whole, else any.
+template <class IsAccepted>
+void StepJoin::take_answer(const Pending& pending, const std::string& client,
+                           IsAccepted is_accepted, StepRecord& record) const {
+  int best = 0;
+  for (const auto& command : pending.commands) {
+    if (!(command.sample.client_name() == client) || !is_accepted(command.sample)) continue;
+    const Reference* reference = find_partner(pending.references, command);
+    const int rank = 1 + (reference ? 1 : 0) + (is_flyer(client, command.sender) ? 2 : 0);
+    if (rank <= best) continue;
+    best = rank;
+    record.command = command.sample;
+    record.sender = command.sender;
+    record.reference = reference ? std::optional(*reference) : std::nullopt;
+  }
+}
+
 /// No next state tells the force; the final status names the client, and of a finished run the
-/// accepted answer is one that ends the mission.
+/// accepted answer is one that ends the mission. Where it comes from him who flew before, that is
+/// waited for.
 void StepJoin::settle_last(const Pending& pending, StepRecord& record) const {
   const bool is_any_taken = !end_->is_finished;
-  for (const ControlCommand& command : pending.commands)
-    if (!record.command && command.client_name() == end_->controller &&
-        (is_any_taken || ends_mission(command)))
-      record.command = command;
-  if (!record.command && is_any_taken && !pending.commands.empty())
-    record.command = pending.commands.front();
-
-  const std::string client =
-      record.command ? record.command->client_name().to_string() : end_->controller;
-  if (const Reference* reference = find_by_client(pending.references, client))
-    record.reference = *reference;
-  else if (is_any_taken && !pending.references.empty())
-    record.reference = pending.references.front();
+  const bool is_flyer_known = flyer_ && flyer_->client == end_->controller;
+  const bool has_flyer_answered =
+      std::any_of(pending.commands.begin(), pending.commands.end(),
+                  [&](const auto& command) { return is_flyer(end_->controller, command.sender); });
+  if (is_any_taken || !is_flyer_known || has_flyer_answered || is_late())
+    take_answer(
+        pending, end_->controller,
+        [&](const ControlCommand& command) { return is_any_taken || ends_mission(command); },
+        record);
+  if (!is_any_taken || record.is_complete()) return;
+  if (!record.command && !pending.commands.empty()) {
+    const auto& first = pending.commands.front();
+    record.command = first.sample;
+    record.sender = first.sender;
+    if (const Reference* reference = find_partner(pending.references, first))
+      record.reference = *reference;
+  }
+  if (!record.reference && !pending.references.empty())
+    record.reference = pending.references.front().sample;
 }
 
 /// The accepted answer is the one of the client that state k + 1 names with the force it says.
@@ -267,14 +317,12 @@ void StepJoin::settle(const Pending& pending, const VehicleState& next, StepReco
   const auto is_accepted = [&](const ControlCommand& command) {
     return are_same_bits(command.f_Q_W_n(), next.answer_f_Q_W_n());
   };
-  for (const ControlCommand& command : pending.commands)
-    if (!record.command && command.client_name() == client && is_accepted(command))
-      record.command = command;
-  if (const Reference* reference = find_by_client(pending.references, client))
-    record.reference = *reference;
+  take_answer(pending, client, is_accepted, record);
   if (record.is_complete() || !is_late()) return;
 
   // The client died. With its reference, the next state says all; without, an equal answer does.
+  const auto* reference = find_reference(pending, client);
+  if (!record.reference && reference) record.reference = reference->sample;
   if (!record.reference) find_stand_in(pending, is_accepted, record);
   if (record.command || next.force_origin() != FORCE_ANSWERED) return;
   record.command = make_command(next, next.answer_f_Q_W_n());
@@ -287,11 +335,10 @@ void StepJoin::settle_unanswered(const Pending& pending, const VehicleState& nex
   const bool is_held = next.force_origin() == FORCE_HELD;
   record.command = make_command(next, is_held ? next.answer_f_Q_W_n() : next.f_Q_W_n());
   record.origin = is_held ? AnswerOrigin::kHeld : AnswerOrigin::kFailSafe;
-  const std::string client = next.controller_name().to_string();
-  if (const Reference* reference = find_by_client(pending.references, client))
-    record.reference = *reference;
+  if (const auto* reference = find_reference(pending, next.controller_name().to_string()))
+    record.reference = reference->sample;
   else if (is_late() && !pending.references.empty())
-    record.reference = pending.references.front();
+    record.reference = pending.references.front().sample;
 }
 
 // --- handing on ----------------------------------------------------------------------------------
@@ -322,6 +369,7 @@ void StepJoin::hand_on_first() {
   const bool is_taken = record.command && record.origin == AnswerOrigin::kSent;
   dropped_.other_client += first.commands.size() - (is_taken ? 1 : 0);
   if (first.state) --states_pending_;
+  if (is_taken) flyer_ = Flyer{record.command->client_name().to_string(), record.sender};
   sink_(record);
   pending_.pop_front();
   ++next_step_;

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "common/bus/peer.hpp"
 #include "common/bus/topics.hpp"
 
 namespace sls::record {
@@ -30,6 +31,7 @@ struct StepRecord {
   std::optional<ControlCommand> command;
   std::optional<Reference> reference;
   AnswerOrigin origin = AnswerOrigin::kSent;  ///< of `command`
+  bus::PeerId sender;                         ///< of `command`, where it was sent
   bool is_answer_expected = true;  ///< not so for the last step of a run that failed or was lost
 
   bool is_complete() const { return state && command && reference; }
@@ -60,8 +62,10 @@ class StepJoin {
       : sink_(std::move(sink)), gap_sink_(std::move(gap_sink)), next_step_(first_step) {}
 
   void add(const VehicleState& state);
-  void add(const ControlCommand& command);
-  void add(const Reference& reference);
+  /// Anybody can send under any client's name: a command and a reference belong together where they
+  /// come from one `sender`.
+  void add(const ControlCommand& command, const bus::PeerId& sender = {});
+  void add(const Reference& reference, const bus::PeerId& sender = {});
 
   /// The run's last step is `last_step`. A finished run has an answer to it, by
   /// `last_controller`; a failed run's last step may have none, and any client's is recorded.
@@ -86,16 +90,28 @@ class StepJoin {
   const DroppedSamples& dropped() const { return dropped_; }
 
  private:
+  template <class Sample>
+  struct Received {
+    Sample sample;
+    bus::PeerId sender;
+  };
+  using Commands = std::vector<Received<ControlCommand>>;
+  using References = std::vector<Received<Reference>>;
   struct Pending {
     std::optional<VehicleState> state;
-    std::vector<ControlCommand> commands;  // different ones
-    std::vector<Reference> references;     // one per client
-    Duration state_time{};                 // on the clock of pass_time
+    Commands commands;      // different ones
+    References references;  // one per sender and client
+    Duration state_time{};  // on the clock of pass_time
+  };
+  struct Flyer {
+    std::string client;
+    bus::PeerId sender;
   };
 
   void begin(std::uint64_t first_state);
   template <class Sample>
-  void keep_early(std::vector<Sample>& early, const Sample& sample);
+  void keep_early(std::vector<Received<Sample>>& early, const Sample& sample,
+                  const bus::PeerId& sender);
   Pending* find(std::uint64_t step, std::uint64_t max_ahead);
   const VehicleState* next_state() const;
   bool is_last(std::uint64_t step) const;
@@ -105,6 +121,12 @@ class StepJoin {
   bool may_be_settled(const Pending& pending) const;
 
   StepRecord make_record(const Pending& pending) const;
+  bool is_flyer(const std::string& client, const bus::PeerId& sender) const;
+  const Received<Reference>* find_reference(const Pending& pending,
+                                            const std::string& client) const;
+  template <class IsAccepted>
+  void take_answer(const Pending& pending, const std::string& client, IsAccepted is_accepted,
+                   StepRecord& record) const;
   void settle_last(const Pending& pending, StepRecord& record) const;
   void settle(const Pending& pending, const VehicleState& next, StepRecord& record) const;
   void settle_unanswered(const Pending& pending, const VehicleState& next,
@@ -115,11 +137,11 @@ class StepJoin {
 
   Sink sink_;
   GapSink gap_sink_;
-  bool has_begun_ = false;                      // a state has come
-  std::vector<ControlCommand> early_commands_;  // before that
-  std::vector<Reference> early_references_;     // likewise
-  std::deque<Pending> pending_;                 // from next_step_ on
-  std::size_t states_pending_ = 0;              // among them
+  bool has_begun_ = false;          // a state has come
+  Commands early_commands_;         // before that
+  References early_references_;     // likewise
+  std::deque<Pending> pending_;     // from next_step_ on
+  std::size_t states_pending_ = 0;  // among them
   std::uint64_t next_step_;
   struct End {
     std::uint64_t step;
@@ -127,6 +149,7 @@ class StepJoin {
     std::string controller;
   };
   std::optional<End> end_;
+  std::optional<Flyer> flyer_;  // whose answer was recorded last
   bool is_giving_up_ = false;
   Duration clock_{};
   DroppedSamples dropped_;

@@ -19,8 +19,10 @@ namespace fs = std::filesystem;
 
 /// Hash and rows of a file, in one go.
 ManifestFile::File measure(const fs::path& path) {
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream) throw DamagedError(path.string() + ": cannot read, or not there");
+  std::error_code error;
+  std::ifstream stream;
+  if (fs::is_regular_file(path, error)) stream.open(path, std::ios::binary);  // a pipe has no end
+  if (!stream.is_open()) throw DamagedError(path.string() + ": cannot read, or not there");
   config::Sha256 hash;
   std::uint64_t lines = 0;
   bool is_quoted = false;

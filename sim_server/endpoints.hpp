@@ -23,7 +23,8 @@ struct Endpoints {
 
   /// In real time commands are read with DEADLINE and LIFESPAN, where the QoS file has them.
   Endpoints(bus::Node& node, config::SyncMode mode)
-      : participants(node),
+      : domain(node),
+        participants(node),
         servers(node),
         state_writer(node),
         parameters_writer(node),
@@ -43,6 +44,7 @@ struct Endpoints {
             node, bus::kLatchedReaderProfile,
             [this](const SimControl& request, const bus::PeerId&) { requests.put(request); }) {}
 
+  const bus::Node& domain;
   bus::ParticipantDirectory participants;
   bus::ServerDirectory servers;
   bus::Writer<VehicleState> state_writer;

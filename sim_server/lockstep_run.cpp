@@ -24,6 +24,7 @@ std::optional<Run::Outcome> LockstepRun::exchange(const VehicleState& state) {
   const std::uint64_t step = state.step();
   gate_.expect(step);
   const auto sent = Clock::now();
+  auto last_sent = sent;
   endpoints_.state_writer.write(state);
   auto resend_at = sent + timer_.timeout();
   // While steps are flown without answers, each is given a period.
@@ -41,10 +42,11 @@ std::optional<Run::Outcome> LockstepRun::exchange(const VehicleState& state) {
     is_late = true;
     note_waiting(sent);
     if (now >= resend_at) {
+      last_sent = Clock::now();
       endpoints_.state_writer.write(state);
       ++gate_.counters().resent();
       timer_.resent();
-      resend_at = Clock::now() + timer_.timeout();
+      resend_at = last_sent + timer_.timeout();
     }
     attend_now_and_then();
     if (attend_to_operator()) return std::nullopt;
@@ -58,8 +60,9 @@ std::optional<Run::Outcome> LockstepRun::exchange(const VehicleState& state) {
     wake_at =
         std::min(resend_at, absence_.is_acting() ? now + 1ms : std::max(take_over_at_, now + 1ms));
   }
-  timer_.answered(Clock::now() - sent);
-  board_.round_trips.add(Clock::now() - sent);
+  const auto answered = Clock::now();
+  timer_.answered(answered - sent, answered - last_sent);
+  board_.round_trips.add(answered - sent);
   return take_accepted_answer();
 }
 
@@ -71,8 +74,9 @@ void LockstepRun::take_over_if_silent(Clock::time_point now) {
 bool LockstepRun::wait_for_recorders(std::uint64_t step) {
   using config::RecorderPolicy;
   const auto& patience = scenario_.sync.wait.recorder;
+  const auto window = calc_recorder_window(endpoints_.state_writer.history_depth());
   const auto find_blocking = [&] {
-    return name_blocking_recorder(roster_, scenario_.sync.wait_for.recorders, step);
+    return name_blocking_recorder(roster_, scenario_.sync.wait_for.recorders, step, window);
   };
   refresh_roster_if_due();
   std::string blocking = find_blocking();

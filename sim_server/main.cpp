@@ -1,6 +1,7 @@
 #include "common/app/run_main.hpp"
 #include "common/bus/node.hpp"
 #include "common/bus/qos_file.hpp"
+#include "common/bus/security_files.hpp"
 #include "common/config/scenario.hpp"
 #include "sim_server/server.hpp"
 
@@ -40,7 +41,7 @@ int main(int argc, char** argv) {
           mode == "lockstep" ? config::SyncMode::kLockstep : config::SyncMode::kRealtime;
     if (real_time_factor) config::override_real_time_factor(scenario, *real_time_factor);
     if (check) {
-      bus::read_qos_file(options.qos_file, kIdentity);
+      bus::check_security_files(bus::read_qos_file(options.qos_file, kIdentity));
       return;
     }
     bus::Node node(options.qos_file, options.domain, "sim_server", kIdentity);

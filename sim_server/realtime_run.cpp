@@ -2,6 +2,8 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include <cmath>
+
 #include "common/app/run_main.hpp"
 #include "common/bus/convert.hpp"
 
@@ -121,8 +123,26 @@ void RealtimeRun::count_missed_deadlines() {
   missed_deadlines_ = missed;
 }
 
+void RealtimeRun::check_clocks() {
+  const auto lifespan = endpoints_.command_reader.lifespan();
+  if (!lifespan || is_lifespan_ignored_) return;
+  for (const auto& client : roster_.controllers) {
+    if (std::chrono::abs(client.age) <= *lifespan / 2) continue;
+    is_lifespan_ignored_ = true;
+    endpoints_.command_reader.ignore_lifespan();
+    const double behind_s = std::chrono::duration<double>(client.age).count();
+    board_.announce(fmt::format(
+        "the clock of controller '{}' on {} is {:.1f} s {} ours: its commands do not expire by it "
+        "(LIFESPAN), only by their step; synchronise the clocks",
+        client.announcement.name().c_str(), client.announcement.host().c_str(), std::abs(behind_s),
+        behind_s > 0 ? "behind" : "ahead of"));
+    return;
+  }
+}
+
 bool RealtimeRun::wait_for_recorders(std::uint64_t step) {
   refresh_roster_if_due();
+  check_clocks();
   const std::string blocking =
       name_blocking_recorder(roster_, scenario_.sync.wait_for.recorders, step);
   const auto& patience = scenario_.sync.wait.recorder;

@@ -32,12 +32,16 @@ class RealtimeRun : public Run {
   /// The answer to the last step, which is waited for: an earlier answer said it is the last.
   void wait_for_last_answer(const VehicleState& state);
   void count_missed_deadlines();
+  /// Says whose clock differs from ours by what would make his commands expire when they should
+  /// not, or never; from then on they are judged by their step alone.
+  void check_clocks();
 
   bus::QueuedWriter<VehicleState> state_queue_;
   Schedule schedule_;
   Clock::time_point published_;         // when the state in work was
   bool is_ending_ = false;              // a late answer has ended the mission
   std::uint64_t missed_deadlines_ = 0;  // of the middleware, up to the last look
+  bool is_lifespan_ignored_ = false;
   std::optional<app::Wait> recorder_wait_;
 };
 

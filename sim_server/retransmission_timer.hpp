@@ -8,6 +8,12 @@ namespace sls::sim {
 /// with every resend up to 100 ms. Karn's rules: only unambiguous round trips count, of a step that
 /// was sent once; and until there is one the doubled time stays in force for the steps that follow,
 /// or a link that has become slower than the timeout would never be measured again.
+///
+/// On a link that loses much, the second rule alone would double without end: at 20 % each way more
+/// than a third of the steps are ambiguous. So an answer that comes early after the last resend,
+/// within the undoubled timeout or a quarter of the doubled one, is taken for that resend's, and
+/// ends the doubling; for a few steps in a row at most, because on a slower link it may be a
+/// coincidence that repeats itself.
 class RetransmissionTimer {
  public:
   using Duration = std::chrono::nanoseconds;
@@ -21,15 +27,21 @@ class RetransmissionTimer {
   /// Time to wait for the answer before the state is sent again.
   Duration timeout() const;
 
-  /// The answer to a step came `round_trip` after the state was first sent.
-  void answered(Duration round_trip);
+  /// The answer to a step came `since_first` after the state was first sent, and `since_last` after
+  /// it was last sent.
+  void answered(Duration since_first, Duration since_last);
 
   /// The state was sent again.
   void resent();
 
  private:
+  static constexpr int kMostGuesses = 4;
+
+  Duration calc_undoubled() const;
+
   Duration smoothed_{0};
-  int resends_ = 0;            // since the last unambiguous round trip
+  int resends_ = 0;            // since the doubling last ended
+  int guesses_ = 0;            // ambiguous answers in a row that ended the doubling
   bool is_ambiguous_ = false;  // the current step was sent more than once
 };
 

@@ -21,6 +21,23 @@ std::string name_missing_role(const char* role, int expected, int ready,
   return details.empty() ? text : text + " [" + details + "]";
 }
 
+/// Those that were ready when the flight began and, in the place of such as are gone, the furthest
+/// of the others.
+std::vector<const Entry*> find_recorders_to_wait_for(const Roster& roster, int expected) {
+  std::vector<const Entry*> found, late;
+  for (const Entry& entry : roster.recorders) {
+    if (!entry.announcement.ready() || entry.is_silent()) continue;
+    const bool is_late = roster.began && entry.ready_since > *roster.began;
+    (is_late ? late : found).push_back(&entry);
+  }
+  std::sort(late.begin(), late.end(), [](const Entry* a, const Entry* b) {
+    return a->announcement.last_complete_step() > b->announcement.last_complete_step();
+  });
+  for (const Entry* entry : late)
+    if (static_cast<int>(found.size()) < expected) found.push_back(entry);
+  return found;
+}
+
 void append(std::string& list, const std::string& item) {
   if (!list.empty()) list += ", ";
   list += item;
@@ -65,17 +82,21 @@ std::string name_missing(const Roster& roster, const config::WaitFor& expected,
   return missing;
 }
 
-std::string name_blocking_recorder(const Roster& roster, int expected, std::uint64_t step) {
-  int ready = 0;
-  for (const Entry& entry : roster.recorders) {
-    if (!entry.announcement.ready() || entry.is_silent()) continue;
-    ++ready;
-    const std::int64_t last = std::max<std::int64_t>(entry.announcement.last_complete_step(), -1);
+std::int64_t calc_recorder_window(int history_depth) {
+  return std::clamp<std::int64_t>(history_depth * 2LL / 5, 1, kRecorderWindow);
+}
+
+std::string name_blocking_recorder(const Roster& roster, int expected, std::uint64_t step,
+                                   std::int64_t window) {
+  const auto waited_for = find_recorders_to_wait_for(roster, expected);
+  for (const Entry* entry : waited_for) {
+    const std::int64_t last = std::max<std::int64_t>(entry->announcement.last_complete_step(), -1);
     const std::int64_t behind = static_cast<std::int64_t>(step) - 1 - last;
-    if (behind >= kRecorderWindow)
-      return fmt::format("recorder {}: {} steps behind", describe(entry), behind);
+    if (behind >= window)
+      return fmt::format("recorder {}: {} steps behind", describe(*entry), behind);
   }
-  return ready < expected ? fmt::format("recorder: {} expected, {} there", expected, ready)
+  const int there = static_cast<int>(waited_for.size());
+  return there < expected ? fmt::format("recorder: {} expected, {} there", expected, there)
                           : std::string();
 }
 

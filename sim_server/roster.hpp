@@ -17,6 +17,8 @@ namespace sls::sim {
 struct Roster {
   std::vector<bus::ParticipantDirectory::Entry> controllers;
   std::vector<bus::ParticipantDirectory::Entry> recorders;
+  /// When the flight began; nothing before.
+  std::optional<std::chrono::steady_clock::time_point> began = std::nullopt;
 };
 
 /// Controllers that are ready and use the run's scenario, as the command gate wants them.
@@ -27,13 +29,19 @@ std::vector<ReadyClient> find_ready_clients(const Roster& roster,
 std::string name_missing(const Roster& roster, const config::WaitFor& expected,
                          const std::string& scenario_sha256);
 
-/// How far the slowest recorder may be behind the server, in steps. Below the writers' history, so
-/// that nothing can overrun it.
+/// How far the slowest recorder may be behind the server, in steps, at most.
 inline constexpr std::int64_t kRecorderWindow = 2000;
 
+/// The same where writers keep `history_depth` samples: two fifths of it, so that nothing a
+/// recorder needs is overwritten, not even where every state is sent twice.
+std::int64_t calc_recorder_window(int history_depth);
+
 /// Which recorder keeps the server from publishing `step`, in words; empty when none does: fewer
-/// than `expected` are there and not silent, or one of these is more than the window behind.
-std::string name_blocking_recorder(const Roster& roster, int expected, std::uint64_t step);
+/// than `expected` are there and not silent, or one of these is `window` behind. One that was not
+/// ready when the flight began is waited for only in the place of one that was: a stranger must not
+/// stop the others.
+std::string name_blocking_recorder(const Roster& roster, int expected, std::uint64_t step,
+                                   std::int64_t window = kRecorderWindow);
 
 /// Which ready recorder has announced nothing since `since` although it lags behind `step`, in
 /// words; empty when none has, or another one is there in the place of one taken for dead.

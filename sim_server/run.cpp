@@ -115,9 +115,11 @@ bool Run::wait_for_participants() {
     const std::string missing = name_missing(roster_, expected, scenario_.sha256);
     if (missing.empty()) return true;
     if (wait.is_over())
-      throw app::RunError(fmt::format("not ready within {} s: {}", expected.timeout_s, missing));
+      throw app::RunError(fmt::format("not ready within {} s: {}{}", expected.timeout_s, missing,
+                                      endpoints_.domain.describe_loneliness()));
     if (wait.is_report_due()) {
-      spdlog::info("waiting for: {} ({:.0f} s left)", missing, wait.seconds_left());
+      spdlog::info("waiting for: {} ({:.0f} s left){}", missing, wait.seconds_left(),
+                   endpoints_.domain.describe_loneliness());
       if (missing != published) board_.publish(PHASE_WAITING, "missing: " + missing);
       published = missing;
     }
@@ -132,6 +134,7 @@ bool Run::fly() {
   FaultLine faults(scenario_, vehicle_id_);
   const auto steps_per_period = scenario_.sync.period_ns / scenario_.plant.step_ns;
   board_.start_clock();
+  began_ = Clock::now();
   board_.publish(control_.is_paused() ? PHASE_PAUSED : PHASE_RUNNING, control_.last_event());
   begin();
   Applied applied;
@@ -170,11 +173,7 @@ bool Run::rest() {
 }
 
 bool Run::is_meant_for_another_server(const SimControl& request) const {
-  if (request.run_id() == run_id_) return false;
-  const auto others = endpoints_.servers.runs();
-  return std::any_of(others.begin(), others.end(), [&](const bus::Run& other) {
-    return other.parameters.run_id() == request.run_id();
-  });
+  return request.run_id() != run_id_ && endpoints_.servers.is_known(request.run_id());
 }
 
 bool Run::attend_to_operator() {
@@ -204,7 +203,7 @@ void Run::refresh_roster() {
   roster_version_ = endpoints_.participants.version();
   roster_time_ = Clock::now();
   roster_ = {endpoints_.participants.find(ROLE_CONTROLLER, run_id_),
-             endpoints_.participants.find(ROLE_RECORDER, run_id_)};
+             endpoints_.participants.find(ROLE_RECORDER, run_id_), began_};
   gate_.set_clients(find_ready_clients(roster_, scenario_.sha256));
 }
 

@@ -103,10 +103,11 @@ class Run {
   RunControl control_;
   ControllerAbsence absence_;
   Roster roster_;
-  Applied last_answer_;                  // accepted, or late but valid; what is held
-  std::uint64_t last_answer_step_ = 0;   // the step it answers
-  bool are_recorders_given_up_ = false;  // policy go_on
-  model::SlungLoadState state_;          // of the plant at the step in work
+  Applied last_answer_;                     // accepted, or late but valid; what is held
+  std::uint64_t last_answer_step_ = 0;      // the step it answers
+  bool are_recorders_given_up_ = false;     // policy go_on
+  std::optional<Clock::time_point> began_;  // when step 0 was about to be published
+  model::SlungLoadState state_;             // of the plant at the step in work
 
  private:
   bool is_meant_for_another_server(const SimControl& request) const;

@@ -1,11 +1,11 @@
 #include "common/bus/node.hpp"
 
+#include <fastdds/rtps/attributes/PropertyPolicy.h>
 #include <fastrtps/config.h>
+#include <fastrtps/utils/IPLocator.h>
 #include <slsPubSubTypes.h>
-#include <spdlog/spdlog.h>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
-#include <fastdds/dds/log/Log.hpp>
 #include <fastdds/dds/publisher/DataWriter.hpp>
 #include <fastdds/dds/publisher/DataWriterListener.hpp>
 #include <fastdds/dds/publisher/Publisher.hpp>
@@ -19,12 +19,18 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <cstdlib>
+#include <limits>
 #include <map>
 #include <mutex>
 #include <utility>
 
+#include "common/bus/guarded_type.hpp"
+#include "common/bus/middleware_log.hpp"
+#include "common/bus/participant_listener.hpp"
 #include "common/bus/qos_file.hpp"
+#include "common/bus/security_files.hpp"
 #include "common/bus/stale_segments.hpp"
 #include "common/config/config_error.hpp"
 
@@ -37,44 +43,18 @@ using eprosima::fastrtps::types::ReturnCode_t;
 
 constexpr int kMaxDomain = 232;  // beyond, RTPS port numbers overflow
 
-/// Sends the middleware's warnings and errors to our log on stderr (by itself it prints to stdout,
-/// which is for data) and keeps the first error since `clear()`, which names the cause where those
-/// that follow only say what failed because of it.
-class LogCollector : public dds::LogConsumer {
- public:
-  void Consume(const dds::Log::Entry& entry) override {
-    if (entry.kind == dds::Log::Kind::Info) return;
-    const std::lock_guard lock(mutex());
-    if (entry.kind == dds::Log::Kind::Error && first_error().empty()) first_error() = entry.message;
-    spdlog::debug("Fast DDS: {}", entry.message);
-  }
+/// On one domain. Each that is announced costs memory and packets, whether it exists or not: under
+/// 3,000 forged ones the middleware hangs (tests/hostile/README.md).
+constexpr std::size_t kMaxParticipants = 64;
 
-  static void clear() { find_first_error(); }
+}  // namespace
 
-  /// The first error since the last call of this or of `clear()`.
-  static std::string find_first_error() {
-    dds::Log::Flush();
-    const std::lock_guard lock(mutex());
-    return std::exchange(first_error(), {});
-  }
-
- private:
-  static std::mutex& mutex() {
-    static std::mutex instance;
-    return instance;
-  }
-  static std::string& first_error() {
-    static auto& instance = *new std::string;  // the middleware may still log while we exit
-    return instance;
-  }
-};
-
-/// Loads a QoS file into the factory: one for the whole process, because profiles are global there.
 void load_profiles(const std::filesystem::path& file, const std::string& identity) {
   static std::mutex mutex;
   static std::filesystem::path loaded;
   const std::lock_guard lock(mutex);
   const std::string profiles = read_qos_file(file, identity);
+  const bool is_secured = check_security_files(profiles);
   const auto absolute = std::filesystem::canonical(file);
   if (absolute == loaded) return;
   if (!loaded.empty())  // Fast DDS would go on with the profiles it has, without a word
@@ -84,17 +64,17 @@ void load_profiles(const std::filesystem::path& file, const std::string& identit
   // working folder or an exported FASTRTPS_DEFAULT_PROFILES_FILE.
   setenv("SKIP_DEFAULT_XML_FILE", "1", 1);
   unsetenv("FASTRTPS_DEFAULT_PROFILES_FILE");
-  dds::Log::ClearConsumers();
-  dds::Log::RegisterConsumer(std::make_unique<LogCollector>());
-  LogCollector::clear();
+  MiddlewareLog::start(is_secured);
   auto* factory = dds::DomainParticipantFactory::get_instance();
   factory->load_profiles();
   if (factory->load_XML_profiles_string(profiles.data(), profiles.size()) !=
       ReturnCode_t::RETCODE_OK)
     throw ConfigError(file.string() + ": expected profiles that Fast DDS takes, got: " +
-                      LogCollector::find_first_error());
+                      MiddlewareLog::find_first_error());
   loaded = absolute;
 }
+
+namespace {
 
 PeerId to_peer(const dds::InstanceHandle_t& handle) {
   eprosima::fastrtps::rtps::GUID_t guid;
@@ -128,42 +108,62 @@ class MatchedPeers {
 
 struct Node::Impl {
   Impl(const std::filesystem::path& qos_file, int domain, const std::string& name,
-       const std::string& identity)
-      : qos_place(qos_file.string()) {
+       const std::string& role)
+      : qos_place(qos_file.string()), identity(find_identity(role)) {
     if (domain < 0 || domain > kMaxDomain)
       throw ConfigError("--domain: expected 0 to " + std::to_string(kMaxDomain) + ", got " +
                         std::to_string(domain));
-    load_profiles(qos_file, identity);
+    load_profiles(qos_file, role);
     auto* factory = dds::DomainParticipantFactory::get_instance();
     dds::DomainParticipantQos qos;
     if (factory->get_participant_qos_from_profile(kParticipantProfile, qos) !=
         ReturnCode_t::RETCODE_OK)
       throw_unknown_profile(kParticipantProfile);
     qos.name(name.c_str());
-    LogCollector::clear();
+    auto& participants = qos.allocation().participants;
+    participants.maximum = std::min(participants.maximum, kMaxParticipants);
+    MiddlewareLog::clear();
     remove_stale_segments();
     auto& wire = qos.wire_protocol();
     if (wire.participant_id < 0)
       wire.participant_id = choose_participant_id(
           {wire.port.portBase + wire.port.domainIDGain * domain + wire.port.offsetd1,
            wire.port.participantIDGain});
-    participant = factory->create_participant(static_cast<std::uint32_t>(domain), qos);
+    listener = std::make_unique<ParticipantListener>(
+        eprosima::fastrtps::rtps::PropertyPolicyHelper::find_property(
+            qos.properties(), "dds.sec.auth.plugin") != nullptr);
+    participant = factory->create_participant(static_cast<std::uint32_t>(domain), qos,
+                                              listener.get(), dds::StatusMask::none());
     if (participant)
       publisher = participant->create_publisher(dds::PUBLISHER_QOS_DEFAULT),
       subscriber = participant->create_subscriber(dds::SUBSCRIBER_QOS_DEFAULT);
     if (!participant || !publisher || !subscriber)
       throw BusError("domain " + std::to_string(domain) +
-                     ": cannot join: " + LogCollector::find_first_error());
+                     ": cannot join: " + MiddlewareLog::find_first_error());
+    joined = std::chrono::steady_clock::now();
   }
 
   ~Impl() {
     if (!participant) return;
+    participant->set_listener(nullptr);
     participant->delete_contained_entities();
     dds::DomainParticipantFactory::get_instance()->delete_participant(participant);
   }
 
   [[noreturn]] void throw_unknown_profile(const char* profile) const {
     throw ConfigError(qos_place + ": profile '" + profile + "': expected a profile, got none");
+  }
+
+  /// Why the middleware made no writer or reader of `topic`; `verb` is "write" or "read".
+  [[noreturn]] void throw_refused_endpoint(const char* verb, const char* topic,
+                                           const char* profile) const {
+    const std::string cause = MiddlewareLog::find_first_error();
+    if (cause.find("topic not found in allow rule") != std::string::npos ||
+        cause.find("topic denied by deny rule") != std::string::npos)
+      throw ConfigError(qos_place + ": identity '" + identity + "': expected permission to " +
+                        verb + " " + topic + ", got none");
+    throw ConfigError(qos_place + ": profile '" + profile + "': expected QoS that " + topic +
+                      " can have, got: " + cause);
   }
 
   /// The topic, shared by this node's writer and reader of it.
@@ -178,11 +178,14 @@ struct Node::Impl {
       topic = participant->create_topic(name, type.get_type_name(), dds::TOPIC_QOS_DEFAULT);
     if (!topic)
       throw BusError(std::string(name) +
-                     ": cannot create the topic: " + LogCollector::find_first_error());
+                     ": cannot create the topic: " + MiddlewareLog::find_first_error());
     return topic;
   }
 
   std::string qos_place;
+  std::string identity;
+  std::chrono::steady_clock::time_point joined;
+  std::unique_ptr<ParticipantListener> listener;
   dds::DomainParticipant* participant = nullptr;
   dds::Publisher* publisher = nullptr;
   dds::Subscriber* subscriber = nullptr;
@@ -208,6 +211,36 @@ const char* Node::choose_reader_profile(const char* profile, const char* fallbac
              : fallback;
 }
 
+std::string Node::describe_loneliness() const {
+  constexpr auto kUsualDiscoveryTime = std::chrono::seconds(3);
+  const auto* participant = impl_->participant;
+  const bool is_alone = participant->get_participant_names().size() <= 1;  // the first is our own
+  if (!is_alone || std::chrono::steady_clock::now() - impl_->joined < kUsualDiscoveryTime)
+    return "";
+  const auto& builtin = participant->get_qos().wire_protocol().builtin;
+  const auto name_hosts = [](const auto& locators) {
+    std::string hosts;
+    for (const auto& locator : locators) {
+      const std::string host = eprosima::fastrtps::rtps::IPLocator::toIPv4string(locator);
+      if (hosts.find(host) == hosts.npos) hosts += (hosts.empty() ? "" : ", ") + host;
+    }
+    return hosts;
+  };
+  const auto& servers = builtin.discovery_config.m_DiscoveryServers;
+  if (!servers.empty())
+    return "; the discovery server at " +
+           name_hosts(servers.front().metatrafficUnicastLocatorList) +
+           " does not answer (SLS_DISCOVERY_SERVER; ./sls discovery-server starts one)";
+  const std::string domain =
+      "; nobody else was discovered on domain " + std::to_string(participant->get_domain_id());
+  if (!builtin.initialPeersList.empty())
+    return domain + " at " + name_hosts(builtin.initialPeersList) +
+           ": is SLS_PEERS right? (./sls doctor)";
+  return domain +
+         ": another domain or QoS file, or is multicast blocked? try config/qos/unicast.xml, "
+         "or ./sls doctor";
+}
+
 PeerId Node::id() const { return to_peer(impl_->participant->get_instance_handle()); }
 
 namespace detail {
@@ -231,11 +264,9 @@ AnyWriter::AnyWriter(Node& node, const char* topic, const char* profile, void* t
   dds::DataWriterQos qos;
   if (impl_->publisher->get_datawriter_qos_from_profile(profile, qos) != ReturnCode_t::RETCODE_OK)
     node.impl().throw_unknown_profile(profile);
-  LogCollector::clear();
+  MiddlewareLog::clear();
   impl_->writer = impl_->publisher->create_datawriter(dds_topic, qos, impl_.get());
-  if (!impl_->writer)
-    throw ConfigError(node.impl().qos_place + ": profile '" + profile + "': expected QoS that " +
-                      topic + " can have, got: " + LogCollector::find_first_error());
+  if (!impl_->writer) node.impl().throw_refused_endpoint("write", topic, profile);
 }
 
 AnyWriter::~AnyWriter() {
@@ -262,11 +293,22 @@ bool AnyWriter::wait_for_acknowledgments(std::chrono::milliseconds limit) {
 
 std::set<PeerId> AnyWriter::matched() const { return impl_->peers.peers(); }
 
+int AnyWriter::history_depth() const {
+  const dds::DataWriterQos& qos = impl_->writer->get_qos();
+  if (qos.history().kind == dds::KEEP_LAST_HISTORY_QOS) return qos.history().depth;
+  const int limit = qos.resource_limits().max_samples;
+  return limit > 0 ? limit : std::numeric_limits<int>::max();
+}
+
 struct AnyReader::Impl : dds::DataReaderListener {
   void on_data_available(dds::DataReader* source) override {
     dds::SampleInfo info;
     while (source->take_next_sample(sample, &info) == ReturnCode_t::RETCODE_OK)
-      if (info.valid_data) take(to_peer(info.publication_handle));
+      if (info.valid_data) {
+        written = std::chrono::system_clock::time_point(
+            std::chrono::nanoseconds(info.source_timestamp.to_ns()));
+        take(to_peer(info.publication_handle));
+      }
   }
   void on_subscription_matched(dds::DataReader*,
                                const dds::SubscriptionMatchedStatus& status) override {
@@ -279,6 +321,7 @@ struct AnyReader::Impl : dds::DataReaderListener {
   MatchedPeers peers;
   std::atomic<std::uint64_t> missed_deadlines{0};
   std::optional<std::chrono::nanoseconds> lifespan;
+  std::chrono::system_clock::time_point written;  // the sample in `sample`
   void* sample = nullptr;
   Take take;
   dds::Subscriber* subscriber = nullptr;
@@ -299,11 +342,9 @@ AnyReader::AnyReader(Node& node, const char* topic, const char* profile, void* t
   const auto& lifespan = qos.lifespan().duration;
   if (!(lifespan == eprosima::fastrtps::c_TimeInfinite))
     impl_->lifespan = std::chrono::nanoseconds(lifespan.to_ns());
-  LogCollector::clear();
+  MiddlewareLog::clear();
   impl_->reader = impl_->subscriber->create_datareader(dds_topic, qos, impl_.get());
-  if (!impl_->reader)
-    throw ConfigError(node.impl().qos_place + ": profile '" + profile + "': expected QoS that " +
-                      topic + " can have, got: " + LogCollector::find_first_error());
+  if (!impl_->reader) node.impl().throw_refused_endpoint("read", topic, profile);
 }
 
 AnyReader::~AnyReader() {
@@ -315,38 +356,45 @@ AnyReader::~AnyReader() {
 std::set<PeerId> AnyReader::matched() const { return impl_->peers.peers(); }
 std::uint64_t AnyReader::missed_deadlines() const { return impl_->missed_deadlines; }
 std::optional<std::chrono::nanoseconds> AnyReader::lifespan() const { return impl_->lifespan; }
+std::chrono::system_clock::time_point AnyReader::written() const { return impl_->written; }
+
+void AnyReader::ignore_lifespan() {
+  dds::DataReaderQos qos = impl_->reader->get_qos();
+  qos.lifespan().duration = eprosima::fastrtps::c_TimeInfinite;
+  impl_->reader->set_qos(qos);
+}
 
 template <>
 void* make_type_support<VehicleState>() {
-  return static_cast<dds::TopicDataType*>(new VehicleStatePubSubType);
+  return static_cast<dds::TopicDataType*>(new GuardedType<VehicleStatePubSubType>);
 }
 template <>
 void* make_type_support<ControlCommand>() {
-  return static_cast<dds::TopicDataType*>(new ControlCommandPubSubType);
+  return static_cast<dds::TopicDataType*>(new GuardedType<ControlCommandPubSubType>);
 }
 template <>
 void* make_type_support<Reference>() {
-  return static_cast<dds::TopicDataType*>(new ReferencePubSubType);
+  return static_cast<dds::TopicDataType*>(new GuardedType<ReferencePubSubType>);
 }
 template <>
 void* make_type_support<Participant>() {
-  return static_cast<dds::TopicDataType*>(new ParticipantPubSubType);
+  return static_cast<dds::TopicDataType*>(new GuardedType<ParticipantPubSubType>);
 }
 template <>
 void* make_type_support<Parameters>() {
-  return static_cast<dds::TopicDataType*>(new ParametersPubSubType);
+  return static_cast<dds::TopicDataType*>(new GuardedType<ParametersPubSubType>);
 }
 template <>
 void* make_type_support<SimStatus>() {
-  return static_cast<dds::TopicDataType*>(new SimStatusPubSubType);
+  return static_cast<dds::TopicDataType*>(new GuardedType<SimStatusPubSubType>);
 }
 template <>
 void* make_type_support<SimControl>() {
-  return static_cast<dds::TopicDataType*>(new SimControlPubSubType);
+  return static_cast<dds::TopicDataType*>(new GuardedType<SimControlPubSubType>);
 }
 template <>
 void* make_type_support<SimControlReply>() {
-  return static_cast<dds::TopicDataType*>(new SimControlReplyPubSubType);
+  return static_cast<dds::TopicDataType*>(new GuardedType<SimControlReplyPubSubType>);
 }
 
 }  // namespace detail

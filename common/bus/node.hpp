@@ -23,6 +23,12 @@ class BusError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// Loads a QoS file into the middleware: one for the whole process, because profiles are global
+/// there. A Node does it by itself; this is for who makes a participant of his own
+/// (doctor/observer.cpp).
+/// @throws config::ConfigError as Node does.
+void load_profiles(const std::filesystem::path& file, const std::string& identity);
+
 /// One DDS participant. Writers and readers must not outlive it.
 class Node {
  public:
@@ -44,6 +50,10 @@ class Node {
   const char* choose_writer_profile(const char* profile, const char* fallback) const;
   const char* choose_reader_profile(const char* profile, const char* fallback) const;
 
+  /// Where nobody else has been discovered 3 s after joining: "; " and that, with what to look at,
+  /// to be appended to a message about who is missing. Else empty.
+  std::string describe_loneliness() const;
+
   struct Impl;
   Impl& impl() { return *impl_; }
 
@@ -64,6 +74,7 @@ class AnyWriter {
   bool write(const void* sample);
   bool wait_for_acknowledgments(std::chrono::milliseconds limit);
   std::set<PeerId> matched() const;
+  int history_depth() const;
 
  private:
   struct Impl;
@@ -81,6 +92,8 @@ class AnyReader {
   std::set<PeerId> matched() const;
   std::uint64_t missed_deadlines() const;
   std::optional<std::chrono::nanoseconds> lifespan() const;
+  void ignore_lifespan();
+  std::chrono::system_clock::time_point written() const;
 
  private:
   struct Impl;
@@ -115,6 +128,9 @@ class Writer {
   /// Participants with a reader of this topic that this writer serves.
   std::set<PeerId> matched() const { return writer_.matched(); }
 
+  /// How many samples are kept for readers that are late.
+  int history_depth() const { return writer_.history_depth(); }
+
  private:
   detail::AnyWriter writer_;
 };
@@ -139,6 +155,12 @@ class Reader {
 
   /// LIFESPAN of the reader's profile; nothing where it is infinite.
   std::optional<std::chrono::nanoseconds> lifespan() const { return reader_.lifespan(); }
+
+  /// From now on no sample expires. `lifespan()` stays what the profile says.
+  void ignore_lifespan() { reader_.ignore_lifespan(); }
+
+  /// For the handler: when the sample it was given was written, by the writer's clock.
+  std::chrono::system_clock::time_point written() const { return reader_.written(); }
 
  private:
   std::unique_ptr<Message> buffer_ = std::make_unique<Message>();

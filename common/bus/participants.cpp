@@ -9,13 +9,44 @@
 #include <thread>
 
 namespace sls::bus {
+namespace {
+
+constexpr std::size_t kMaxParticipants = 256;
+constexpr std::size_t kMaxServers = 64;
+constexpr std::size_t kMaxRunsOfServer = 4;  // the one in work and those that resets ended
+
+/// True where `known` has, or now has, room for `sender`: who has left makes room.
+template <class Known>
+bool make_room(std::map<PeerId, Known>& known, std::size_t most, const PeerId& sender,
+               const std::set<PeerId>& present) {
+  if (known.count(sender) > 0 || known.size() < most) return true;
+  const auto gone = std::find_if(known.begin(), known.end(),
+                                 [&](const auto& item) { return present.count(item.first) == 0; });
+  if (gone == known.end()) return false;
+  known.erase(gone);
+  return true;
+}
+
+}  // namespace
 
 ParticipantDirectory::ParticipantDirectory(Node& node)
-    : reader_(node, kLatchedReaderProfile, [this](const Participant& sample, const PeerId& sender) {
-        const std::lock_guard lock(mutex_);
-        last_[sender] = {sample, std::chrono::steady_clock::now()};
-        version_.fetch_add(1, std::memory_order_release);
-      }) {}
+    : reader_(node, kLatchedReaderProfile,
+              [this](const Participant& sample, const PeerId& sender) { note(sample, sender); }) {}
+
+void ParticipantDirectory::note(const Participant& sample, const PeerId& sender) {
+  const std::chrono::nanoseconds age = std::chrono::system_clock::now() - reader_.written();
+  const auto now = std::chrono::steady_clock::now();
+  const std::lock_guard lock(mutex_);
+  if (!make_room(last_, kMaxParticipants, sender, reader_.matched())) return;
+  Heard& heard = last_[sender];
+  const bool is_same_run = heard.announcement.run_id() == sample.run_id();
+  if (!is_same_run || !sample.ready()) heard.ready_since.reset();
+  if (sample.ready() && !heard.ready_since) heard.ready_since = now;
+  heard.announcement = sample;
+  heard.time = now;
+  heard.age = std::min(heard.age, age);
+  version_.fetch_add(1, std::memory_order_release);
+}
 
 std::vector<ParticipantDirectory::Entry> ParticipantDirectory::find(ParticipantRole role,
                                                                     std::uint64_t run_id) const {
@@ -25,7 +56,8 @@ std::vector<ParticipantDirectory::Entry> ParticipantDirectory::find(ParticipantR
   for (const auto& [peer, heard] : last_) {
     const Participant& announcement = heard.announcement;
     if (announcement.role() == role && announcement.run_id() == run_id && present.count(peer) > 0)
-      found.push_back({peer, announcement, heard.time});
+      found.push_back(
+          {peer, announcement, heard.time, heard.age, heard.ready_since.value_or(heard.time)});
   }
   return found;
 }
@@ -70,34 +102,96 @@ void wait_for_recorders_to_end(const ParticipantDirectory& participants, std::ui
 ServerDirectory::ServerDirectory(Node& node, std::function<void(const SimStatus&)> on_status)
     : self_(node.id()),
       on_status_(std::move(on_status)),
-      parameters_reader_(node, kLatchedReaderProfile,
-                         [this](const Parameters& sample, const PeerId& sender) {
-                           const std::lock_guard lock(mutex_);
-                           parameters_[sender] = sample;
-                         }),
-      status_reader_(node, kLatchedReaderProfile, [this](const SimStatus& sample, const PeerId&) {
-        {
-          const std::lock_guard lock(mutex_);
-          status_[sample.run_id()] = {sample, std::chrono::steady_clock::now()};
-        }
-        if (on_status_) on_status_(sample);
-      }) {}
+      parameters_reader_(
+          node, kLatchedReaderProfile,
+          [this](const Parameters& sample, const PeerId& sender) { note(sample, sender); }),
+      status_reader_(node, kLatchedReaderProfile,
+                     [this](const SimStatus& sample, const PeerId& sender) {
+                       note(sample, sender);
+                       if (on_status_) on_status_(sample);
+                     }) {}
+
+void ServerDirectory::note(const Parameters& sample, const PeerId& sender) {
+  const std::lock_guard lock(mutex_);
+  HeardRun* run = find_or_add_run(sender, sample.run_id());
+  if (!run) return;
+  if (run->claim == 0) run->claim = ++claims_;
+  servers_.at(sender).parameters = sample;
+}
+
+void ServerDirectory::note(const SimStatus& sample, const PeerId& sender) {
+  const std::lock_guard lock(mutex_);
+  if (HeardRun* run = find_or_add_run(sender, sample.run_id()))
+    run->status = {sample, std::chrono::steady_clock::now()};
+}
+
+ServerDirectory::HeardRun* ServerDirectory::find_or_add_run(const PeerId& sender,
+                                                            std::uint64_t run_id) {
+  if (servers_.count(sender) == 0) {
+    auto present = parameters_reader_.matched();
+    present.insert(self_);
+    if (!make_room(servers_, kMaxServers, sender, present)) return nullptr;
+  }
+  auto& runs = servers_[sender].runs;
+  for (HeardRun& run : runs)
+    if (run.run_id == run_id) return &run;
+  if (runs.size() == kMaxRunsOfServer) runs.pop_front();
+  HeardRun& run = runs.emplace_back();
+  run.run_id = run_id;
+  return &run;
+}
+
+std::optional<PeerId> ServerDirectory::find_owner(std::uint64_t run_id) const {
+  std::optional<PeerId> owner;
+  std::uint64_t first = 0;
+  for (const auto& [server, known] : servers_)
+    for (const HeardRun& run : known.runs)
+      if (run.run_id == run_id && run.claim > 0 && (!owner || run.claim < first)) {
+        owner = server;
+        first = run.claim;
+      }
+  return owner;
+}
+
+const ServerDirectory::HeardStatus* ServerDirectory::find_heard(std::uint64_t run_id) const {
+  const auto owner = find_owner(run_id);
+  if (!owner) return nullptr;
+  for (const HeardRun& run : servers_.at(*owner).runs)
+    if (run.run_id == run_id && run.status) return &*run.status;
+  return nullptr;
+}
+
+bool ServerDirectory::is_present_run(const PeerId& server, const Server& known,
+                                     const std::set<PeerId>& present) const {
+  if (server == self_ || present.count(server) == 0 || !known.parameters) return false;
+  const std::uint64_t run_id = known.parameters->run_id();
+  if (find_owner(run_id) != server) return false;
+  const HeardStatus* heard = find_heard(run_id);
+  return !heard || calc_progress(heard->status.phase()) <= 0 ||
+         std::chrono::steady_clock::now() - heard->time <= kSilenceOfTheDead;
+}
 
 std::vector<Run> ServerDirectory::runs() const {
   const auto present = parameters_reader_.matched();
   const std::lock_guard lock(mutex_);
   std::vector<Run> runs;
-  for (const auto& [server, parameters] : parameters_) {
-    if (server == self_ || present.count(server) == 0) continue;
-    const auto status = status_.find(parameters.run_id());
-    const bool is_silent =
-        status != status_.end() && calc_progress(status->second.status.phase()) > 0 &&
-        std::chrono::steady_clock::now() - status->second.time > kSilenceOfTheDead;
-    if (is_silent) continue;
-    runs.push_back({server, parameters,
-                    status == status_.end() ? std::nullopt : std::optional(status->second.status)});
+  for (const auto& [server, known] : servers_) {
+    if (!is_present_run(server, known, present)) continue;
+    const HeardStatus* heard = find_heard(known.parameters->run_id());
+    runs.push_back(
+        {server, *known.parameters, heard ? std::optional(heard->status) : std::nullopt});
   }
   return runs;
+}
+
+bool ServerDirectory::is_known(std::uint64_t run_id) const {
+  const auto present = parameters_reader_.matched();
+  const std::lock_guard lock(mutex_);
+  const auto owner = find_owner(run_id);
+  if (!owner) return false;
+  const Server& known = servers_.at(*owner);
+  return known.parameters && known.parameters->run_id() == run_id &&
+         is_present_run(*owner, known, present);
 }
 
 std::optional<Run> ServerDirectory::find_joinable(std::uint32_t vehicle_id) const {
@@ -115,8 +209,8 @@ std::optional<Run> ServerDirectory::find_joinable(std::uint32_t vehicle_id) cons
 
 std::optional<SimStatus> ServerDirectory::find_status(std::uint64_t run_id) const {
   const std::lock_guard lock(mutex_);
-  const auto status = status_.find(run_id);
-  return status == status_.end() ? std::nullopt : std::optional(status->second.status);
+  const HeardStatus* heard = find_heard(run_id);
+  return heard ? std::optional(heard->status) : std::nullopt;
 }
 
 bool ServerDirectory::is_present(const PeerId& server) const {
@@ -131,8 +225,8 @@ bool ServerDirectory::is_silent(std::uint64_t run_id) const {
 std::optional<std::chrono::steady_clock::time_point> ServerDirectory::find_last_heard(
     std::uint64_t run_id) const {
   const std::lock_guard lock(mutex_);
-  const auto status = status_.find(run_id);
-  return status == status_.end() ? std::nullopt : std::optional(status->second.time);
+  const HeardStatus* heard = find_heard(run_id);
+  return heard ? std::optional(heard->time) : std::nullopt;
 }
 
 ServerWatch::ServerWatch(const ServerDirectory& servers, const Run& run, double deadline_s)

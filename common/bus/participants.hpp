@@ -5,6 +5,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <map>
 #include <mutex>
@@ -21,7 +22,8 @@ namespace sls::bus {
 /// until he is heard again. (The middleware's lease is much longer: config/qos/README.md.)
 inline constexpr auto kSilenceOfTheDead = std::chrono::seconds(2);
 
-/// The last announcement of every controller and recorder that is still there.
+/// The last announcement of every controller and recorder that is still there. Of 256 participants
+/// at most, so that strangers cannot fill the memory: those that have left make room.
 class ParticipantDirectory {
  public:
   explicit ParticipantDirectory(Node& node);
@@ -30,6 +32,11 @@ class ParticipantDirectory {
     PeerId peer;
     Participant announcement;
     std::chrono::steady_clock::time_point heard;  ///< when it came
+    /// Age of the youngest announcement when it came, by his clock and ours: about 0 where they
+    /// agree, positive where his is behind.
+    std::chrono::nanoseconds age{0};
+    /// When it first said it was ready.
+    std::chrono::steady_clock::time_point ready_since{};
 
     bool is_silent() const { return std::chrono::steady_clock::now() - heard > kSilenceOfTheDead; }
   };
@@ -45,10 +52,14 @@ class ParticipantDirectory {
   std::uint64_t version() const { return version_.load(std::memory_order_acquire); }
 
  private:
+  void note(const Participant& sample, const PeerId& sender);
+
   mutable std::mutex mutex_;
   struct Heard {
     Participant announcement;
     std::chrono::steady_clock::time_point time;
+    std::chrono::nanoseconds age = std::chrono::nanoseconds::max();
+    std::optional<std::chrono::steady_clock::time_point> ready_since;
   };
   std::map<PeerId, Heard> last_;
   std::atomic<std::uint64_t> version_{0};
@@ -70,7 +81,9 @@ struct Run {
   std::optional<SimStatus> status;  ///< nothing before the claim on its vehicles is settled
 };
 
-/// The last parameters and status of every server that is still there.
+/// The last parameters and status of every server that is still there, of 64 at most: those that
+/// have left make room. A run is of the server that was the first to claim it; what others say of
+/// it is not believed.
 class ServerDirectory {
  public:
   /// `on_status`, where given, sees every status sample, on a thread of the middleware.
@@ -79,6 +92,9 @@ class ServerDirectory {
   /// Runs of the servers present, other than this node's own. A server whose run goes on but that
   /// is silent is not present.
   std::vector<Run> runs() const;
+
+  /// True where `run_id` is among `runs()`.
+  bool is_known(std::uint64_t run_id) const;
 
   /// The run to join for `vehicle_id`: present, settled, neither finished nor failed; among several
   /// the one that is furthest, then the lowest run_id.
@@ -97,15 +113,33 @@ class ServerDirectory {
   std::optional<std::chrono::steady_clock::time_point> find_last_heard(std::uint64_t run_id) const;
 
  private:
-  const PeerId self_;
-  const std::function<void(const SimStatus&)> on_status_;
-  mutable std::mutex mutex_;
-  std::map<PeerId, Parameters> parameters_;
   struct HeardStatus {
     SimStatus status;
     std::chrono::steady_clock::time_point time;
   };
-  std::map<std::uint64_t, HeardStatus> status_;  // by run_id
+  struct HeardRun {
+    std::uint64_t run_id = 0;
+    std::uint64_t claim = 0;  // counts the claims heard from 1; 0: it has not claimed it
+    std::optional<HeardStatus> status;
+  };
+  struct Server {
+    std::optional<Parameters> parameters;
+    std::deque<HeardRun> runs;  // the last of them
+  };
+
+  void note(const Parameters& sample, const PeerId& sender);
+  void note(const SimStatus& sample, const PeerId& sender);
+  HeardRun* find_or_add_run(const PeerId& sender, std::uint64_t run_id);
+  std::optional<PeerId> find_owner(std::uint64_t run_id) const;
+  const HeardStatus* find_heard(std::uint64_t run_id) const;
+  bool is_present_run(const PeerId& server, const Server& known,
+                      const std::set<PeerId>& present) const;
+
+  const PeerId self_;
+  const std::function<void(const SimStatus&)> on_status_;
+  mutable std::mutex mutex_;  // over what follows
+  std::map<PeerId, Server> servers_;
+  std::uint64_t claims_ = 0;
   Reader<Parameters> parameters_reader_;
   Reader<SimStatus> status_reader_;
 };

@@ -24,6 +24,7 @@ namespace {
 using config::ConfigError;
 
 constexpr std::uintmax_t kMaxBytes = 1 << 20;
+constexpr std::size_t kMaxHosts = 256;  // of one locator
 constexpr const char* kIdentityVariable = "SLS_IDENTITY";
 
 constexpr const char* kOurs = "sls_";  // what the names of our profiles begin with
@@ -158,11 +159,15 @@ std::vector<std::string> split_hosts(const std::string& list) {
 
 /// Puts a locator for each host of its address in the place of `locator`; the last one is returned.
 tinyxml2::XMLElement* expand_locator(tinyxml2::XMLElement& locator, const std::string& place) {
-  const auto* udp = locator.FirstChildElement("udpv4");
-  const auto* address = udp ? udp->FirstChildElement("address") : nullptr;
+  auto* udp = locator.FirstChildElement("udpv4");
+  auto* address = udp ? udp->FirstChildElement("address") : nullptr;
   if (!address || !address->GetText()) return &locator;
   const std::string where = place + ":" + std::to_string(address->GetLineNum());
   const std::vector<std::string> hosts = split_hosts(address->GetText());
+  if (hosts.size() > kMaxHosts)
+    throw ConfigError(where + ": expected at most " + std::to_string(kMaxHosts) + " hosts, got " +
+                      std::to_string(hosts.size()));
+  if (!hosts.empty()) address->SetText("");  // a clone must not copy them all
   auto* last = &locator;
   for (const std::string& host : hosts) {
     auto* one = locator.DeepClone(locator.GetDocument())->ToElement();
@@ -174,14 +179,17 @@ tinyxml2::XMLElement* expand_locator(tinyxml2::XMLElement& locator, const std::s
   return last;
 }
 
-void complete(tinyxml2::XMLElement& element, const std::string& identity,
-              const std::string& place) {
+void complete(tinyxml2::XMLElement& element, const std::string& identity, const std::string& place,
+              bool is_in_locator = false) {
+  const std::string where = place + ":" + std::to_string(element.GetLineNum());
+  const bool is_locator = std::string(element.Name()) == "locator";
+  // One within another would be multiplied by the other's hosts, and so on.
+  if (is_locator && is_in_locator)
+    throw ConfigError(where + ": <locator>: expected none within another <locator>, got one");
   if (element.FirstChild() && element.FirstChild()->ToText())
-    element.SetText(
-        expand(element.GetText(), identity, place + ":" + std::to_string(element.GetLineNum()))
-            .c_str());
+    element.SetText(expand(element.GetText(), identity, where).c_str());
   for (auto* child = element.FirstChildElement(); child; child = child->NextSiblingElement()) {
-    complete(*child, identity, place);
+    complete(*child, identity, place, is_in_locator || is_locator);
     if (std::string(child->Name()) == "locator") child = expand_locator(*child, place);
   }
 }
@@ -193,8 +201,9 @@ void check_names(const std::map<std::string, Found>& found, const std::string& p
   for (const auto& [name, where] : found) {
     const std::string start =
         place + ":" + std::to_string(where.line) + ": profile '" + name + "': ";
-    const auto* known = std::find_if(kProfiles.begin(), kProfiles.end(),
-                                     [&](const Profile& profile) { return name == profile.name; });
+    const auto* known =
+        std::find_if(kProfiles.begin(), kProfiles.end(),
+                     [&name = name](const Profile& profile) { return name == profile.name; });
     if (known == kProfiles.end()) {
       if (name.rfind(kOurs, 0) == 0)
         throw ConfigError(start + "expected one that config/qos/README.md lists, got this name");
@@ -221,6 +230,11 @@ void add_missing_endpoints(tinyxml2::XMLElement& root, std::map<std::string, Fou
 }
 
 }  // namespace
+
+std::string find_identity(const std::string& role) {
+  const char* identity = std::getenv(kIdentityVariable);
+  return identity && *identity ? identity : role;
+}
 
 std::string read_qos_file(const std::filesystem::path& file, const std::string& identity) {
   const std::string place = file.string();

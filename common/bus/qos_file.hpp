@@ -17,6 +17,9 @@ namespace sls::bus {
 /// @throws config::ConfigError `FILE:LINE: …`.
 std::string read_qos_file(const std::filesystem::path& file, const std::string& identity);
 
+/// SLS_IDENTITY if it is set, else `role`: whose keys a secured domain sees.
+std::string find_identity(const std::string& role);
+
 /// The QoS file used without `--qos`: config/qos/default.xml of this installation.
 std::filesystem::path default_qos_file();
 

@@ -60,9 +60,9 @@ PortState find_state(int port, const fs::path& folder) {
   return Lock(file).is_held() ? PortState::kStale : PortState::kInUse;
 }
 
-}  // namespace
-
-void remove_stale_segments(const fs::path& folder) {
+/// Calls `visit(segment, lock_file)` for each stale segment, while its lock is held.
+template <class Visit>
+void visit_stale_segments(const fs::path& folder, const Visit& visit) {
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder, error)) {
     const fs::path file = entry.path();
@@ -71,11 +71,30 @@ void remove_stale_segments(const fs::path& folder) {
     std::error_code ignored;  // gone meanwhile, or of another user
     const auto changed = fs::last_write_time(file, ignored);
     if (ignored || fs::file_time_type::clock::now() - changed < kCreationTime) continue;
-    const Lock lock(file);
-    if (!lock.is_held()) continue;
-    fs::remove(folder / name.substr(0, name.size() - kLock.size()), ignored);
-    fs::remove(file, ignored);
+    if (const Lock lock(file); lock.is_held())
+      visit(folder / name.substr(0, name.size() - kLock.size()), file);
   }
+}
+
+}  // namespace
+
+void remove_stale_segments(const fs::path& folder) {
+  visit_stale_segments(folder, [](const fs::path& segment, const fs::path& lock_file) {
+    std::error_code ignored;  // gone meanwhile, or of another user
+    fs::remove(segment, ignored);
+    fs::remove(lock_file, ignored);
+  });
+}
+
+std::vector<fs::path> find_stale_segments(const fs::path& folder) {
+  std::vector<fs::path> found;
+  visit_stale_segments(folder,
+                       [&](const fs::path& segment, const fs::path&) { found.push_back(segment); });
+  return found;
+}
+
+bool is_port_read(int port, const fs::path& folder) {
+  return find_state(port, folder) == PortState::kInUse;
 }
 
 int choose_participant_id(const ParticipantPorts& ports, const fs::path& folder) {

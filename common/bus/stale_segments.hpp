@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <vector>
 
 namespace sls::bus {
 
@@ -10,11 +11,18 @@ namespace sls::bus {
 /// Never throws.
 void remove_stale_segments(const std::filesystem::path& folder = "/dev/shm");
 
+/// The segments that `remove_stale_segments` would remove, whoever owns them.
+std::vector<std::filesystem::path> find_stale_segments(
+    const std::filesystem::path& folder = "/dev/shm");
+
 /// Port numbers of RTPS participants: those of participant `id` are base + id × gain, and one more.
 struct ParticipantPorts {
   int base = 7410;
   int gain = 2;
 };
+
+/// True where a living process reads the shared-memory port of that number, here in `folder`.
+bool is_port_read(int port, const std::filesystem::path& folder = "/dev/shm");
 
 /// The participant id to ask for, or −1 where any will do.
 ///

@@ -45,6 +45,7 @@ int main(int argc, char** argv) {
     client_options.domain = options.common.domain;
     client_options.vehicle_id = options.vehicle_id;
     client_options.timeout_s = options.timeout_s;
+    client_options.asks = options.action.has_value();
     operation::OperatorClient client(node, client_options);
     if (options.action) return request(client, *options.action, options.steps);
     operation::ShowOptions show_options;

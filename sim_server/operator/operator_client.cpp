@@ -32,16 +32,20 @@ std::uint64_t make_request_id() {
 
 }  // namespace
 
+OperatorClient::Channel::Channel(bus::Node& node, app::Mailbox<Received>& replies)
+    : reply_reader(node, bus::kLatchedReaderProfile,
+                   [&replies](const SimControlReply& reply, const bus::PeerId& sender) {
+                     replies.put({reply, sender});
+                   }),
+      request_writer(node) {}
+
 OperatorClient::OperatorClient(bus::Node& node, const ClientOptions& options)
     : options_(options),
       participants_(node),
       servers_(node, [this](const SimStatus& status) { note_event(status); }),
-      replies_(kMailboxSize),
-      reply_reader_(node, bus::kLatchedReaderProfile,
-                    [this](const SimControlReply& reply, const bus::PeerId& sender) {
-                      replies_.put({reply, sender});
-                    }),
-      request_writer_(node) {}
+      replies_(kMailboxSize) {
+  if (options_.asks) channel_.emplace(node, replies_);
+}
 
 // --- finding a run -------------------------------------------------------------------------------
 
@@ -129,7 +133,7 @@ std::optional<SimControlReply> OperatorClient::ask(const bus::Run& run, ControlA
 
   app::Wait wait(options_.timeout_s, kUsualWait);
   if (!wait_until_heard(run, wait)) return std::nullopt;
-  request_writer_.write(request);
+  channel_->request_writer.write(request);
   const bool takes_its_time = action == ACTION_STEP;
   bus::ServerWatch server(servers_, run, options_.timeout_s);
   std::optional<Clock::time_point> give_up;  // once the run has ended
@@ -157,8 +161,8 @@ std::optional<SimControlReply> OperatorClient::ask(const bus::Run& run, ControlA
 }
 
 bool OperatorClient::wait_until_heard(const bus::Run& run, app::Wait& wait) const {
-  while (request_writer_.matched().count(run.server) == 0 ||
-         reply_reader_.matched().count(run.server) == 0) {
+  while (channel_->request_writer.matched().count(run.server) == 0 ||
+         channel_->reply_reader.matched().count(run.server) == 0) {
     if (app::stop_signal() != 0) return false;
     if (wait.is_over())
       throw app::RunError(

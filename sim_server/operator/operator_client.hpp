@@ -22,6 +22,7 @@ struct ClientOptions {
   int domain = 0;  ///< of the node, for messages
   std::uint32_t vehicle_id = 0;
   double timeout_s = 10.0;  ///< for a server to be found, and again for its reply
+  bool asks = true;         ///< false: only looks on, which the keys of every role allow
 };
 
 /// A stop signal ends every wait early; nothing is returned then.
@@ -40,8 +41,8 @@ class OperatorClient {
   /// its server.
   bus::Run refresh(const bus::Run& run) const;
 
-  /// Asks the server of `run` for `action` and waits for its reply. Steps may take as long as they
-  /// take, as long as the server gives signs of life.
+  /// Asks the server of `run` for `action` and waits for its reply; expects `asks`. Steps may take
+  /// as long as they take, as long as the server gives signs of life.
   /// @throws app::RunError if no reply comes: server gone or deaf, run ended, out of time.
   std::optional<SimControlReply> ask(const bus::Run& run, ControlAction action,
                                      std::uint64_t steps = 0);
@@ -59,6 +60,12 @@ class OperatorClient {
     SimControlReply reply;
     bus::PeerId sender;
   };
+  /// sls/control, and sls/control_reply for `replies`.
+  struct Channel {
+    Channel(bus::Node& node, app::Mailbox<Received>& replies);
+    bus::Reader<SimControlReply> reply_reader;
+    bus::Writer<SimControl> request_writer;
+  };
   using FindRun = std::function<std::optional<bus::Run>()>;
 
   std::optional<bus::Run> wait_for(const FindRun& find) const;
@@ -74,8 +81,7 @@ class OperatorClient {
   bus::ParticipantDirectory participants_;
   bus::ServerDirectory servers_;
   app::Mailbox<Received> replies_;
-  bus::Reader<SimControlReply> reply_reader_;
-  bus::Writer<SimControl> request_writer_;
+  std::optional<Channel> channel_;
 };
 
 /// USER@HOST, at most 64 bytes, for sls/control.

@@ -72,8 +72,8 @@ Network::Network(const std::vector<std::string>& hosts) : prefix_(make_prefix())
       run_shell("ip netns add " + find_namespace(host));
       run(kSwitch, "ip link add " + host + " type veth peer name eth0 netns " +
                        find_namespace(host) + " && ip link set " + host + " master br0 up");
-      run(host, "ip link set lo up && ip address add " + address +
-                    "/24 dev eth0 && ip link set eth0 up");
+      run(host,
+          "ip link set lo up && ip address add " + address + "/24 dev eth0 && ip link set eth0 up");
     }
   } catch (...) {
     remove();
@@ -81,7 +81,10 @@ Network::Network(const std::vector<std::string>& hosts) : prefix_(make_prefix())
   }
 }
 
-Network::~Network() { remove(); }
+Network::~Network() {
+  wires_.clear();
+  remove();
+}
 
 void Network::remove() const {
   try {
@@ -104,6 +107,77 @@ std::string Network::run(const std::string& host, const std::string& command) co
   for (const char letter : command)
     quoted += letter == '\'' ? std::string("'\\''") : std::string(1, letter);
   return run_shell("ip netns exec " + find_namespace(host) + " sh -c '" + quoted + "'");
+}
+
+// --- disturbances --------------------------------------------------------------------------------
+
+void Network::lose(int percent) const {
+  heal();
+  if (percent > 0)
+    run(kSwitch,
+        "nft 'add table bridge wire; add chain bridge wire f { type filter hook forward "
+        "priority 0; }; add rule bridge wire f ether type ip numgen random mod 100 < " +
+            std::to_string(percent) + " counter drop'");
+}
+
+void Network::cut() const {
+  heal();
+  run(kSwitch,
+      "nft 'add table bridge wire; add chain bridge wire f { type filter hook forward "
+      "priority 0; }; add rule bridge wire f counter drop'");
+}
+
+void Network::heal() const { run(kSwitch, "nft flush ruleset"); }
+
+std::uint64_t Network::lost() const {
+  const std::string rules = run(kSwitch, "nft list ruleset");
+  const std::string before = "counter packets ";
+  const auto at = rules.find(before);
+  return at == rules.npos ? 0 : std::stoull(rules.substr(at + before.size()));
+}
+
+void Network::set_mtu(int bytes) const {
+  const std::string mtu = " mtu " + std::to_string(bytes);
+  for (const auto& [host, address] : addresses_) {
+    run(kSwitch, "ip link set " + host + mtu);
+    run(host, "ip link set eth0" + mtu);
+  }
+}
+
+void Network::limit_rate(int kbit_per_s) const {
+  // A burst of two large packets: what lies in the queue, not in the bucket, is what is shaped.
+  const std::string limit =
+      " root tbf burst 4kb latency 50ms rate " + std::to_string(kbit_per_s) + "kbit";
+  for (const auto& [host, address] : addresses_) {
+    run(kSwitch, "tc qdisc add dev " + host + limit);
+    run(host, "tc qdisc add dev eth0" + limit);
+  }
+}
+
+void Network::block_multicast() const {
+  run(kSwitch, "ip link set br0 type bridge mcast_snooping 0");
+  for (const auto& [host, address] : addresses_)
+    run(kSwitch, "bridge link set dev " + host + " mcast_flood off");
+}
+
+void Network::disturb_wire(const std::string& host, const WireFaults& faults) {
+  // host:eth0 – HOST – [relay] – HOST-w – HOST-p – br0
+  run(kSwitch, "ip link set " + host + " nomaster");
+  run(kSwitch, "ip link add " + host + "-w type veth peer name " + host + "-p");
+  run(kSwitch, "ip link set " + host + "-w up && ip link set " + host + "-p master br0 up");
+  std::vector<std::string> command = on(kSwitch);
+  command.insert(command.end(),
+                 {SLS_FRAME_RELAY, host, host + "-w", "--delay-ms", std::to_string(faults.delay_ms),
+                  "--jitter-ms", std::to_string(faults.jitter_ms), "--duplicate-percent",
+                  std::to_string(faults.duplicate_percent), "--seed", std::to_string(faults.seed)});
+  wires_[host] = std::make_unique<Process>(command);
+}
+
+std::string Network::end_wire(const std::string& host) {
+  const auto wire = wires_.at(host).get();
+  wire->send(SIGTERM);
+  wire->wait(std::chrono::seconds(10));
+  return wire->output();
 }
 
 }  // namespace sls::test

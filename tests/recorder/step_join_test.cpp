@@ -495,8 +495,7 @@ TEST_F(StepJoinTest, AbsurdStepsTakeNoMemoryAndDisturbNothing) {
 }
 
 TEST_F(StepJoinTest, AnswersToStepsThatAreNotYetFlownCostNoStep) {
-  for (const std::uint64_t ahead :
-       {1000u, 10000u, 16383u, 16384u, 16385u, 20000u, 50000u, 65535u}) {
+  for (const std::uint64_t ahead : {1000u, 5000u, 8191u, 8192u, 8193u, 20000u, 50000u, 65535u}) {
     ControlCommand command = make_command(0);
     command.step(ahead);
     join_.add(command);
@@ -539,6 +538,38 @@ TEST_F(StepJoinTest, ManyDifferentAnswersToOneStepAreBounded) {
   EXPECT_GT(join_.dropped().repeated + join_.dropped().out_of_range, 190000u);
   join_.add(make_state(1));
   expect_whole_up_to(0);
+}
+
+// --- strangers -----------------------------------------------------------------------------------
+
+bus::PeerId make_peer(std::uint8_t number) {
+  bus::PeerId peer;
+  peer.bytes[0] = number;
+  return peer;
+}
+
+TEST_F(StepJoinTest, WhoUsesThePilotsNameNeitherReplacesNorKeepsOutWhatThePilotSent) {
+  const bus::PeerId pilot = make_peer(1);
+  join_.add(make_state(0));
+  // Ahead of time: references and ends of the mission under the pilot's name.
+  for (std::uint8_t stranger = 2; stranger < 8; ++stranger)
+    for (std::uint64_t step = 1; step <= kLastStep; ++step)
+      for (int i = 0; i < 50; ++i) {
+        ControlCommand command = make_command(step);
+        command.f_Q_W_n({1.0 * i, 0, stranger * 1.0});
+        command.mission(MISSION_FINISHED);
+        join_.add(command, make_peer(stranger));
+        Reference reference = make_reference(step);
+        reference.position_m({1e6, 1e6, 1e6});
+        join_.add(reference, make_peer(stranger));
+      }
+  join_.set_end(kLastStep, true, kPilot);
+  for (std::uint64_t step = 0; step <= kLastStep; ++step) {
+    join_.add(make_state(step));
+    join_.add(make_reference(step), pilot);
+    join_.add(make_command(step), pilot);
+  }
+  expect_whole_up_to(kLastStep);
 }
 
 // --- property ------------------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 #include "recorder/verification.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <array>
 #include <charconv>
@@ -10,6 +11,7 @@
 #include "common/config/config_error.hpp"
 #include "tests/recorder/flights.hpp"
 #include "tests/support/temporary_folder.hpp"
+#include "tests/support/text.hpp"
 
 namespace sls::record {
 namespace {
@@ -217,6 +219,28 @@ TEST_F(VerificationTest, WhatIsNoRecordingIsRefused) {
     write_bytes(b_ / "manifest.json", text);
     EXPECT_THROW(open_recording(b_), config::ConfigError) << text;
   }
+}
+
+// A manifest is opened by whoever verifies somebody else's recording.
+TEST_F(VerificationTest, AManifestNamesNoFilesElsewhereAndNoThousandsOfVehicles) {
+  const std::string manifest = read_bytes(b_ / "manifest.json");
+  for (const char* name : {"/dev/zero", "../a/state.csv", "..", "", "folder/"}) {
+    write_bytes(b_ / "manifest.json", sls::test::replace_once(manifest, "\"state.csv\"",
+                                                              "\"" + std::string(name) + "\""));
+    EXPECT_THROW(open_recording(b_), config::ConfigError) << name;
+  }
+  std::string ids = "0";
+  for (int i = 0; i < 300; ++i) ids += ", 0";
+  const auto begin = manifest.find('[', manifest.find("\"vehicle_ids\"")) + 1;
+  write_bytes(b_ / "manifest.json",
+              std::string(manifest).replace(begin, manifest.find(']', begin) - begin, ids));
+  EXPECT_THROW(open_recording(b_), config::ConfigError);
+}
+
+TEST_F(VerificationTest, APipeInThePlaceOfAFileIsAProblem) {
+  fs::remove(b_ / "status.csv");
+  ASSERT_EQ(::mkfifo((b_ / "status.csv").c_str(), 0600), 0);
+  EXPECT_NE(find_problems(b_).find("status.csv: cannot read"), std::string::npos);
 }
 
 }  // namespace

@@ -113,6 +113,15 @@ TEST(RosterTest, ARecorderMayBeTwoThousandStepsBehindAndNoMore) {
   EXPECT_NE(name_blocking_recorder({{}, {make_recorder_at(5000)}}, 1, 7001), "");
 }
 
+TEST(RosterTest, TheWindowIsSmallerWhereTheHistoryIs) {
+  EXPECT_EQ(calc_recorder_window(5000), kRecorderWindow);
+  EXPECT_EQ(calc_recorder_window(1000000), kRecorderWindow);
+  EXPECT_EQ(calc_recorder_window(1000), 400);
+  EXPECT_EQ(calc_recorder_window(1), 1);
+  EXPECT_EQ(name_blocking_recorder({{}, {make_recorder_at(-1)}}, 1, 399, 400), "");
+  EXPECT_NE(name_blocking_recorder({{}, {make_recorder_at(-1)}}, 1, 400, 400), "");
+}
+
 TEST(RosterTest, ABlockingRecorderIsNamedWithHowFarItIsBehind) {
   const std::string blocking = name_blocking_recorder({{}, {make_recorder_at(999)}}, 1, 3500);
   EXPECT_TRUE(contains(blocking, "recorder 'tape' on host-of-tape")) << blocking;
@@ -160,6 +169,20 @@ TEST(RosterTest, ARecorderThatIsTakenForDeadDoesNotBlockIfAnotherIsThere) {
   dead.heard -= 2 * bus::kSilenceOfTheDead;
   EXPECT_EQ(name_blocking_recorder({{}, {dead, make_recorder_at(4999)}}, 1, 5000), "");
   EXPECT_NE(name_blocking_recorder({{}, {dead}}, 1, 20), "") << "one is expected";
+}
+
+TEST(RosterTest, ARecorderThatComesDuringTheFlightStopsItOnlyInThePlaceOfOneThatIsGone) {
+  Roster roster = {{}, {make_recorder_at(4999), make_recorder_at(-1)}};
+  roster.began = std::chrono::steady_clock::now();
+  roster.recorders[1].ready_since = *roster.began + std::chrono::seconds(1);
+  EXPECT_EQ(name_blocking_recorder(roster, 1, 5000), "");
+  EXPECT_NE(name_blocking_recorder(roster, 2, 5000), "") << "two are expected";
+  roster.recorders[0].heard -= 2 * bus::kSilenceOfTheDead;
+  EXPECT_NE(name_blocking_recorder(roster, 1, 5000), "") << "it is the only one now";
+  // Of several the furthest takes the place.
+  roster.recorders.push_back(make_recorder_at(4900));
+  roster.recorders[2].ready_since = roster.recorders[1].ready_since;
+  EXPECT_EQ(name_blocking_recorder(roster, 1, 5000), "");
 }
 
 TEST(RosterTest, ARecorderThatLagsAndAnnouncesNothingIsNamedAsSilent) {

@@ -34,7 +34,7 @@ struct FlightOptions {
   std::vector<std::string> server;  ///< further flags
   std::vector<std::string> client;
   /// Put before the command line of a program, such as `Network::on("server")` or {"env", "A=B"}.
-  std::map<std::string, std::vector<std::string>> before;
+  std::map<std::string, std::vector<std::string>> before = {};
 };
 
 /// Starts recorder, server and client on `scenario_file`.

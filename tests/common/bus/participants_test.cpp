@@ -125,6 +125,33 @@ TEST(ServerDirectoryTest, FindsTheRunToJoin) {
   EXPECT_EQ(directory.find_status(kLowerRun + 1), std::nullopt);
 }
 
+TEST(ServerDirectoryTest, OnlyWhoClaimedARunFirstIsBelievedAboutIt) {
+  constexpr int kDomain = 79;
+  Node node(kQosFile, kDomain, "directory");
+  std::atomic<int> forged{0};
+  const ServerDirectory directory(node, [&](const SimStatus& status) {
+    if (status.run_id() == kRun && status.phase() == PHASE_FINISHED) ++forged;
+  });
+  Node server(kQosFile, kDomain, "server"), stranger(kQosFile, kDomain, "stranger");
+  Writer<Parameters> parameters(server), strangers_parameters(stranger);
+  Writer<SimStatus> status(server), strangers_status(stranger);
+  parameters.write(make_parameters(kRun, {kVehicle}));
+  status.write(make_status(kRun, PHASE_RUNNING));
+  ASSERT_TRUE(wait_until([&] { return directory.find_status(kRun).has_value(); }));
+
+  strangers_parameters.write(make_parameters(kRun, {kVehicle}));
+  strangers_parameters.write(make_parameters(kLowerRun, {kVehicle}));
+  strangers_parameters.write(make_parameters(kRun, {kVehicle}));
+  strangers_status.write(make_status(kRun, PHASE_FINISHED));
+  ASSERT_TRUE(wait_until([&] { return forged == 1; }));
+  EXPECT_EQ(directory.find_status(kRun)->phase(), PHASE_RUNNING);
+  EXPECT_TRUE(directory.is_known(kRun));
+  EXPECT_FALSE(directory.is_known(kRun + 1));
+  const auto runs = directory.runs();
+  ASSERT_EQ(runs.size(), 1u);
+  EXPECT_EQ(runs.front().server, server.id());
+}
+
 TEST(ServerWatchTest, ASilentServerIsNotJoinedIsGivenUpAndMayComeBack) {
   constexpr int kDomain = 73;
   Node node(kQosFile, kDomain, "directory");

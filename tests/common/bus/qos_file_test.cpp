@@ -47,6 +47,7 @@ class QosFileTest : public testing::Test {
 };
 
 TEST_F(QosFileTest, TheShippedFilesPass) {
+  ::setenv("SLS_KEYS", "keys", 1);  // secure.xml needs it
   int count = 0;
   for (const auto& entry : fs::directory_iterator(kConfig / "qos")) {
     if (entry.path().extension() != ".xml" || entry.path().stem() == "endpoints") continue;
@@ -261,6 +262,25 @@ TEST_F(QosFileTest, AVariableIsReplacedAndWhatItHoldsIsNotLookedAtAgain) {
   EXPECT_EQ(find_texts(read_qos_file(folder_ / "qos.xml", "tester"), "x"), Texts({"somebody"}));
 }
 
+TEST_F(QosFileTest, ListsOfHostsDoNotMultiply) {
+  const auto write = [&](const std::string& locator) {
+    test::write_bytes(folder_ / "qos.xml",
+                      "<dds><profiles><participant profile_name=\"sls_participant\">" + locator +
+                          "</participant></profiles></dds>");
+  };
+  const auto make_locator = [](const std::string& hosts, const std::string& inner) {
+    return "<locator><udpv4><address>" + hosts + "</address></udpv4><x>" + inner + "</x></locator>";
+  };
+  write(make_locator("10.0.0.1,10.0.0.2", make_locator("10.0.0.3,10.0.0.4", "")));
+  EXPECT_NE(find_error(folder_ / "qos.xml").find("expected none within another <locator>"),
+            std::string::npos);
+  std::string hosts;
+  for (int i = 0; i < 100000; ++i) hosts += "10.0.0.1,";
+  write(make_locator(hosts, ""));
+  EXPECT_NE(find_error(folder_ / "qos.xml").find("expected at most 256 hosts, got 100000"),
+            std::string::npos);
+}
+
 // --- transport is a matter of the file, behaviour is not -----------------------------------------
 
 /// Name of each profile of `xml` → its content without comments, the participant's left out.
@@ -284,9 +304,10 @@ std::map<std::string, std::string> read_endpoint_profiles(const std::string& xml
 }
 
 TEST(ShippedQosFilesTest, AFileThatSaysNothingAboutWritersAndReadersHasThoseOfEndpoints) {
+  ::setenv("SLS_KEYS", "keys", 1);  // secure.xml needs it
   const auto shared = read_endpoint_profiles(sls::test::read_bytes(kConfig / "qos/endpoints.xml"));
   EXPECT_EQ(shared.size(), 7u);
-  for (const char* name : {"default", "udp", "lan", "unicast", "discovery_server"})
+  for (const char* name : {"default", "udp", "lan", "unicast", "discovery_server", "secure"})
     EXPECT_EQ(read_endpoint_profiles(
                   read_qos_file(kConfig / "qos" / (std::string(name) + ".xml"), "tester")),
               shared)

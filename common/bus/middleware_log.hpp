@@ -1,0 +1,33 @@
+#pragma once
+
+#include <fastdds/dds/log/Log.hpp>
+
+#include <functional>
+#include <string>
+
+namespace sls::bus {
+
+/// What Fast DDS logs: warnings and errors go to our log on stderr (by itself it prints to stdout,
+/// which is for data). The first error since `clear()` is kept: it names the cause where those that
+/// follow only say what failed because of it.
+class MiddlewareLog : public eprosima::fastdds::dds::LogConsumer {
+ public:
+  /// Takes the log of this process over. Warnings too are wanted of a secured participant: only
+  /// they say why a certificate is refused.
+  static void start(bool with_warnings);
+
+  void Consume(const eprosima::fastdds::dds::Log::Entry& entry) override;
+
+  /// Returns when everything logged so far has been consumed.
+  static void flush();
+
+  static void clear() { find_first_error(); }
+
+  /// The first error since the last call of this or of `clear()`.
+  static std::string find_first_error();
+};
+
+/// A message of Fast DDS without the place in its source, and without a line's end.
+std::string trim_place(const std::string& message);
+
+}  // namespace sls::bus

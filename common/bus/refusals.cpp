@@ -1,0 +1,128 @@
+#include "common/bus/refusals.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "common/bus/middleware_log.hpp"
+
+namespace sls::bus {
+namespace {
+
+constexpr std::chrono::seconds kWindow(10);
+
+/// In our words where those of Fast DDS leave the user without a hint.
+std::string explain(const std::string& message) {
+  const auto has = [&](const char* text) { return message.find(text) != std::string::npos; };
+  if (has("verification of the permissions file"))
+    return "its permissions are not signed by our permissions authority";
+  if (has("doesn't found in its permissions file"))
+    return "its permissions are not for its certificate, or not valid now";
+  if (has("PermissionsCA differs")) return "its permissions are of another authority";
+  // "Invalidation error of certificate  (certificate has expired)", "Error validating … GUID (…)."
+  const std::string text = trim_place(message);
+  const auto begin = text.find('(');
+  if (!has("rror") || begin == std::string::npos) return text;
+  std::string reason = text.substr(begin + 1, text.rfind(')') - begin - 1);
+  if (has("of certificate")) reason = "its certificate is not accepted (" + reason + ")";
+  return reason;
+}
+
+}  // namespace
+
+Refusals::~Refusals() {
+  {
+    const std::lock_guard lock(mutex_);
+    is_over_ = true;
+  }
+  changed_.notify_one();
+  if (watcher_.joinable()) watcher_.join();
+}
+
+Refusals& Refusals::of_process() {
+  static auto& instance = *new Refusals;
+  return instance;
+}
+
+void Refusals::note_discovered(const std::string& guid, const std::string& description,
+                               const std::string& claim) {
+  const std::lock_guard lock(mutex_);
+  if (known_.size() >= kMostKnown) return;
+  known_.emplace(guid, description);
+  if (claim.empty()) return;
+  pending_.emplace(guid, Pending{Clock::now() + kTimeToProve, claim});
+  if (!watcher_.joinable()) watcher_ = std::thread([this] { watch(); });
+  changed_.notify_one();
+}
+
+void Refusals::note_accepted(const std::string& guid) {
+  const std::lock_guard lock(mutex_);
+  pending_.erase(guid);
+}
+
+void Refusals::note_gone(const std::string& guid) {
+  const std::lock_guard lock(mutex_);
+  known_.erase(guid);
+  pending_.erase(guid);
+  reported_.erase(guid);
+}
+
+void Refusals::note_refused(const std::string& guid, const std::string& cause) {
+  if (cause.empty()) MiddlewareLog::flush();
+  const std::lock_guard lock(mutex_);
+  const std::string logged = std::exchange(cause_, {});
+  if (!cause.empty() || !logged.empty()) report(guid, cause.empty() ? explain(logged) : cause);
+}
+
+void Refusals::note_cause(const std::string& message) {
+  if (message.find("Error verifying certificate") == 0) return;  // why has just been logged
+  const std::lock_guard lock(mutex_);
+  const auto named = std::find_if(known_.begin(), known_.end(), [&](const auto& participant) {
+    return message.find(participant.first) != std::string::npos;
+  });
+  if (named != known_.end())
+    report(named->first, explain(message));
+  else
+    cause_ = message;
+}
+
+void Refusals::watch() {
+  std::unique_lock lock(mutex_);
+  while (!is_over_) {
+    const auto next = std::min_element(
+        pending_.begin(), pending_.end(),
+        [](const auto& a, const auto& b) { return a.second.deadline < b.second.deadline; });
+    if (next == pending_.end()) {
+      changed_.wait(lock);
+    } else if (Clock::now() < next->second.deadline) {
+      const auto deadline = next->second.deadline;  // `next` may be gone meanwhile
+      changed_.wait_until(lock, deadline);
+    } else {
+      report(next->first, "no proof of an identity that holds here within " +
+                              std::to_string(kTimeToProve.count()) + " s; it claims " +
+                              next->second.claim);
+    }
+  }
+}
+
+void Refusals::report(const std::string& participant, const std::string& cause) {
+  const std::string guid = participant;  // may be a key that is erased here
+  pending_.erase(guid);
+  if (reported_.size() >= kMostKnown) reported_.clear();
+  if (!reported_.insert(guid).second) return;
+  const auto now = Clock::now();
+  if (now - window_began_ > kWindow) {
+    if (left_out_ > 0) spdlog::warn("refused {} more participants", left_out_);
+    window_began_ = now, lines_ = 0, left_out_ = 0;
+  }
+  if (++lines_ > kMostLines) {
+    ++left_out_;
+    return;
+  }
+  const auto found = known_.find(guid);
+  spdlog::warn("refused {}: {}", found == known_.end() ? "participant " + guid : found->second,
+               cause);
+}
+
+}  // namespace sls::bus

@@ -1,0 +1,82 @@
+#include "common/bus/refusals.hpp"
+
+#include <gtest/gtest.h>
+#include <spdlog/sinks/ostream_sink.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <sstream>
+
+#include "tests/support/waiting.hpp"
+
+namespace sls::bus {
+namespace {
+
+/// What refusals say, with the process's log in place of stderr.
+class RefusalsTest : public testing::Test {
+ protected:
+  RefusalsTest() : logger_(spdlog::default_logger()) {
+    const auto sink = std::make_shared<spdlog::sinks::ostream_sink_mt>(said_);
+    sink->set_pattern("%v");
+    spdlog::set_default_logger(std::make_shared<spdlog::logger>("test", sink));
+  }
+  ~RefusalsTest() override { spdlog::set_default_logger(logger_); }
+
+  std::size_t lines() const {
+    const std::string text = said_.str();
+    return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
+  }
+
+  std::ostringstream said_;
+  Refusals refusals_;
+
+ private:
+  std::shared_ptr<spdlog::logger> logger_;
+};
+
+TEST_F(RefusalsTest, NameParticipantAndCauseOnce) {
+  refusals_.note_discovered("01.0f", "'recorder' (10.77.0.3, 01.0f)");
+  refusals_.note_refused("01.0f", "it has no identity");
+  refusals_.note_refused("01.0f", "it has no identity");
+  EXPECT_EQ(said_.str(), "refused 'recorder' (10.77.0.3, 01.0f): it has no identity\n");
+}
+
+TEST_F(RefusalsTest, TakeTheCauseThatTheMiddlewareLoggedJustBefore) {
+  refusals_.note_discovered("01.0f", "'recorder'", "'CN=recorder'");
+  refusals_.note_cause("Invalidation error of certificate  (certificate has expired)");
+  refusals_.note_cause("Error verifying certificate");
+  refusals_.note_refused("01.0f");
+  EXPECT_EQ(said_.str(),
+            "refused 'recorder': its certificate is not accepted (certificate has expired)\n");
+}
+
+TEST_F(RefusalsTest, AreAlsoReadFromTheLogAlone) {
+  refusals_.note_discovered("01.0f", "'recorder'", "'CN=recorder'");
+  refusals_.note_cause(
+      "Error validating remote permissions for 01.0f|0.0.1.c1 (Failed verification of the "
+      "permissions file (./src/cpp/security/accesscontrol/Permissions.cpp:565)).");
+  EXPECT_EQ(said_.str(),
+            "refused 'recorder': its permissions are not signed by our permissions authority\n");
+}
+
+TEST_F(RefusalsTest, WhoeverProvesNothingIsNamedInTime) {
+  refusals_.note_discovered("01.0f", "'accepted'", "'CN=controller'");
+  refusals_.note_discovered("02.0f", "'silent'", "'CN=recorder' of 'CN=another'");
+  refusals_.note_accepted("01.0f");
+  ASSERT_TRUE(test::wait_until([&] { return lines() > 0; }));
+  EXPECT_EQ(said_.str(),
+            "refused 'silent': no proof of an identity that holds here within 5 s; it claims "
+            "'CN=recorder' of 'CN=another'\n");
+}
+
+TEST_F(RefusalsTest, AFloodOfThemIsFiveLines) {
+  for (int i = 0; i < 5000; ++i) {
+    const std::string guid = std::to_string(i) + ".0f";
+    refusals_.note_discovered(guid, guid);
+    refusals_.note_refused(guid, "it has no identity");
+  }
+  EXPECT_EQ(lines(), static_cast<std::size_t>(Refusals::kMostLines));
+}
+
+}  // namespace
+}  // namespace sls::bus

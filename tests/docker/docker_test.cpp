@@ -1,0 +1,231 @@
+/// The image and the compose files, flown for real by the launcher, judged by flights of the
+/// programs on this machine itself.
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <sstream>
+
+#include "tests/system/flight.hpp"
+
+namespace sls::test {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace std::chrono_literals;
+
+const std::string kLauncher = std::string(SLS_SOURCE_DIR) + "/sls";
+constexpr auto kImageTime = 1500s;  // the first test builds it
+constexpr auto kFlightTime = 120s;
+
+struct Outcome {
+  std::optional<int> code;
+  std::string output;
+};
+
+Outcome run_command(const std::vector<std::string>& command,
+                    std::chrono::milliseconds limit = kFlightTime) {
+  Process process(command);
+  const auto code = process.wait(limit);
+  return {code, process.output()};
+}
+
+Outcome run_shell(const std::string& command) { return run_command({"sh", "-c", command}); }
+
+/// What keeps this machine from flying in containers; nothing where it can.
+std::optional<std::string> find_obstacle() {
+  if (run_shell("timeout 1 docker version").code != 0) return "no Docker engine";
+  if (run_shell("docker compose version || docker-compose version").code != 0)
+    return "no docker compose";
+  return std::nullopt;
+}
+
+uid_t find_owner(const fs::path& path) {
+  struct stat status = {};
+  EXPECT_EQ(::lstat(path.c_str(), &status), 0) << path;
+  return status.st_uid;
+}
+
+void expect_owner(const fs::path& recording, uid_t owner) {
+  EXPECT_EQ(find_owner(recording), owner);
+  for (const auto& entry : fs::directory_iterator(recording))
+    EXPECT_EQ(find_owner(entry.path()), owner) << entry.path();
+}
+
+void expect_same_data(const fs::path& recording, const fs::path& expected) {
+  const Outcome verdict = run_command({program("sls_verify"), recording, expected});
+  EXPECT_EQ(verdict.code, 0) << verdict.output;
+}
+
+class DockerTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (const auto obstacle = find_obstacle()) GTEST_SKIP() << "skipped: " << *obstacle;
+    const Outcome image = run_command({kLauncher, "docker-demo", "--build"}, kImageTime);
+    ASSERT_EQ(image.code, 0) << image.output;
+  }
+
+  // A demo removes everything itself; this is for tests that failed.
+  void TearDown() override {
+    for (const std::string& project : projects_) {
+      const std::string filter = " --quiet --filter label=com.docker.compose.project=" + project;
+      run_shell("docker ps --all" + filter + " | xargs --no-run-if-empty docker rm --force");
+      run_shell("docker network ls" + filter + " | xargs --no-run-if-empty docker network rm");
+    }
+  }
+
+  std::vector<std::string> make_demo(const std::string& name, const std::string& what) const {
+    return {kLauncher, "docker-demo", name, "--scenario", what, "--out", recording(name)};
+  }
+  fs::path recording(const std::string& name) const { return folder / ("of_" + name); }
+
+  /// Flies with the launcher and expects a complete recording, the summary, and nothing left
+  /// behind.
+  std::string expect_demo(const std::string& name, const std::string& what) {
+    Process demo(make_demo(name, what));
+    const std::string project = note_project("sls-demo-", demo.id());
+    EXPECT_EQ(demo.wait(kFlightTime), 0) << demo.output();
+    EXPECT_NE(demo.output().find("Files in " + recording(name).string()), std::string::npos)
+        << demo.output();
+    EXPECT_TRUE(read_manifest(recording(name)).at("complete").get<bool>());
+    expect_owner(recording(name), geteuid());
+    expect_nothing_left(project);
+    return demo.output();
+  }
+
+  std::string note_project(const std::string& prefix, pid_t id) {
+    projects_.push_back(prefix + std::to_string(id));
+    return projects_.back();
+  }
+
+  static void expect_nothing_left(const std::string& project) {
+    const std::string filter = " --quiet --filter label=com.docker.compose.project=" + project;
+    EXPECT_EQ(run_shell("docker ps --all" + filter).output, "");
+    EXPECT_EQ(run_shell("docker network ls" + filter).output, "");
+    EXPECT_EQ(run_shell("docker volume ls" + filter).output, "");
+  }
+
+  /// The figure eight in real time, for long enough to look at it.
+  std::string make_slow_scenario() const {
+    std::string text = read_file(scenario("figure_eight"));
+    text = replace_once(text, "mode: lockstep", "mode: realtime");
+    text = replace_once(text, "for_s: 32", "for_s: 3200");
+    write_bytes(folder / "slow.yaml", text);
+    return folder / "slow.yaml";
+  }
+
+  TemporaryFolder folder;
+
+ private:
+  std::vector<std::string> projects_;
+};
+
+TEST_F(DockerTest, RecordsInContainersWhatTheMachineItselfRecords) {
+  Flight native(scenario("short"));
+  native.expect_success();
+  for (const std::string name : {"plain", "discovery", "secure"}) {
+    SCOPED_TRACE(name);
+    expect_demo(name, "short");
+    expect_same_data(recording(name), native.recording());
+  }
+  const char* image = std::getenv("SLS_IMAGE");
+  EXPECT_EQ(run_command({"docker", "run", "--rm", image ? image : "sls", "id", "-un"}).output,
+            "sls\n");
+}
+
+TEST_F(DockerTest, AStandbyTakesOverFromAKilledControllerAndNothingChanges) {
+  Flight native(scenario("figure_eight"));
+  native.expect_success();
+  const std::string output = expect_demo("standby", "figure_eight");
+  EXPECT_NE(output.find("killed the first controller"), std::string::npos) << output;
+  expect_same_data(recording("standby"), native.recording());
+  EXPECT_NE(output.find("controller 'standby' takes over from 'primary'"), std::string::npos)
+      << output;
+}
+
+TEST_F(DockerTest, AnInterruptedDemoLeavesAReadableRecordingAndNothingElse) {
+  Process demo(make_demo("plain", make_slow_scenario()));
+  const std::string project = note_project("sls-demo-", demo.id());
+  ASSERT_TRUE(wait_until(
+      [&] {
+        const auto rows = read_file(recording("plain") / "state.csv");
+        return std::count(rows.begin(), rows.end(), '\n') > 100 || !demo.is_running();
+      },
+      kFlightTime))
+      << demo.output();
+  demo.send(SIGINT);
+  EXPECT_EQ(demo.wait(kFlightTime), 130) << demo.output();
+  EXPECT_FALSE(read_manifest(recording("plain")).at("complete").get<bool>());
+  expect_owner(recording("plain"), geteuid());
+  expect_nothing_left(project);
+}
+
+TEST_F(DockerTest, ADemoEndsWithTheExitCodeOfTheProgramThatFailed) {
+  write_bytes(folder / "bad.yaml",
+              replace_once(read_file(scenario("short")), "period_s: 0.004", "period_s: -1"));
+  Process demo(make_demo("plain", folder / "bad.yaml"));
+  const std::string project = note_project("sls-demo-", demo.id());
+  EXPECT_EQ(demo.wait(kFlightTime), 2) << demo.output();
+  EXPECT_NE(demo.output().find("sync.period_s: expected"), std::string::npos) << demo.output();
+  expect_nothing_left(project);
+}
+
+TEST_F(DockerTest, ServicesAreHealthyWhileTheyFlyAndRunAsTheUserTheyWereTold) {
+  if (geteuid() != 0) GTEST_SKIP() << "skipped: only root can give a folder to another user";
+  constexpr uid_t kUser = 12345;
+  const fs::path out = folder / "out";
+  fs::create_directory(out);
+  ASSERT_EQ(::chown(out.c_str(), kUser, kUser), 0);
+  const std::string project = note_project("sls-test-", getpid());
+  const std::string compose =
+      "cd " + std::string(SLS_SOURCE_DIR) +
+      "/docker && export SLS_USER=12345:12345 SLS_RECORDING=" + out.string() +
+      " SLS_SCENARIO=" + make_slow_scenario() +
+      "; if docker compose version >/dev/null 2>&1; then set -- docker compose; else set -- "
+      "docker-compose; fi; \"$@\" --project-name " +
+      project + " --file compose.yaml ";
+  const auto find_container = [&](const std::string& service) {
+    std::istringstream ids(
+        run_shell("docker ps --all --quiet --filter label=com.docker.compose.project=" + project +
+                  " --filter label=com.docker.compose.service=" + service)
+            .output);
+    std::string id;
+    ids >> id;
+    return id;
+  };
+  Process up({"sh", "-c", compose + "up --detach"});
+  ASSERT_EQ(up.wait(kFlightTime), 0) << up.output();
+
+  for (const std::string service : {"server", "controller", "recorder"}) {
+    SCOPED_TRACE(service);
+    const std::string inside = "docker exec " + find_container(service) + " ";
+    Outcome health;
+    EXPECT_TRUE(
+        wait_until([&] { return (health = run_shell(inside + "sls-health")).code == 0; }, 60s))
+        << health.output;
+    EXPECT_EQ(run_shell(inside + "id -u").output, "12345\n");
+    EXPECT_EQ(run_shell("docker inspect --format '{{.Config.Healthcheck.Test}}' " +
+                        find_container(service))
+                  .output,
+              "[CMD sls-health]\n");
+  }
+  // A program that hangs is not well.
+  const std::string server = find_container("server");
+  EXPECT_EQ(run_shell("docker kill --signal STOP " + server).code, 0);
+  const Outcome health = run_shell("docker exec " + server + " sls-health");
+  EXPECT_EQ(health.code, 1) << health.output;
+  EXPECT_EQ(run_shell("docker kill --signal CONT " + server).code, 0);
+
+  const Outcome stop = run_shell(compose + "stop");
+  EXPECT_EQ(stop.code, 0) << stop.output;
+  expect_owner(out, kUser);
+  EXPECT_FALSE(read_manifest(out).at("complete").get<bool>());
+  const Outcome down = run_shell(compose + "down --volumes");
+  EXPECT_EQ(down.code, 0) << down.output;
+  expect_nothing_left(project);
+}
+
+}  // namespace
+}  // namespace sls::test

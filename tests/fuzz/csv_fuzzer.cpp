@@ -1,0 +1,18 @@
+/// Any file under the right columns is rows of that many fields, or a DamagedError.
+#include <cstdint>
+#include <cstdlib>
+
+#include "recorder/csv_reader.hpp"
+#include "tests/fuzz/memory_file.hpp"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace sls;
+  const fuzz::MemoryFile file(data, size);
+  try {
+    record::CsvReader reader(file.path(), "step,name,value");
+    while (reader.next())
+      if (reader.fields().size() != 3) std::abort();
+  } catch (const record::DamagedError&) {
+  }
+  return 0;
+}

@@ -1,0 +1,25 @@
+/// Any file is a QoS file or a ConfigError; one that is taken is taken again as it was completed.
+#include <netdb.h>
+
+#include <cstdint>
+#include <string>
+
+#include "common/bus/qos_file.hpp"
+#include "common/config/config_error.hpp"
+#include "tests/fuzz/memory_file.hpp"
+
+/// Stands for the system's (see CMakeLists.txt): a name in an input must not be looked up.
+extern "C" int __wrap_getaddrinfo(const char*, const char*, const addrinfo*, addrinfo**) {
+  return EAI_NONAME;
+}
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace sls;
+  std::string completed;
+  try {
+    completed = bus::read_qos_file(fuzz::MemoryFile(data, size).path(), "server");
+  } catch (const config::ConfigError&) {
+    return 0;
+  }
+  return completed.empty() ? -1 : 0;
+}

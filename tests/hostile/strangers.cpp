@@ -1,0 +1,241 @@
+#include <atomic>
+#include <chrono>
+#include <limits>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <random>
+#include <thread>
+
+#include "common/bus/node.hpp"
+#include "common/bus/participants.hpp"
+#include "tests/hostile/attack.hpp"
+
+namespace sls::hostile {
+namespace {
+
+using namespace std::chrono_literals;
+
+const std::string kQosFile = SLS_SOURCE_DIR "/config/qos/lan.xml";
+constexpr auto kPause = 1ms;
+constexpr const char* kPilot = "control_client";  // the real client's name
+
+/// Participates like anybody, and knows what everybody may know: the run, its scenario, its state.
+class Stranger {
+ public:
+  explicit Stranger(const Target& target)
+      : node(kQosFile, target.domain, "stranger"),
+        servers(node),
+        state_reader_(node, bus::kLoopReaderProfile,
+                      [this](const VehicleState& state, const bus::PeerId&) {
+                        const std::lock_guard lock(mutex_);
+                        state_ = state;
+                      }) {}
+
+  /// Waits until the server flies; false if the attack is over before.
+  bool wait_for_flight(const Target& target) {
+    while (goes_on(target)) {
+      run = servers.find_joinable(0);
+      if (run && run->status->phase() == PHASE_RUNNING && state()) return true;
+      std::this_thread::sleep_for(5ms);
+    }
+    return false;
+  }
+  bool is_flying() const {
+    const auto status = servers.find_status(run->parameters.run_id());
+    return status && status->phase() == PHASE_RUNNING;
+  }
+  std::optional<VehicleState> state() const {
+    const std::lock_guard lock(mutex_);
+    return state_;
+  }
+  std::uint64_t run_id() const { return run->parameters.run_id(); }
+
+  ControlCommand make_command(const std::string& name) const {
+    ControlCommand command;
+    command.run_id(run_id());
+    command.step(state()->step());
+    command.f_Q_W_n({1.0, 0.0, -16.0});
+    command.client_name(name);
+    command.strength(1000);
+    return command;
+  }
+  Participant make_announcement(ParticipantRole role) const {
+    Participant message;
+    message.run_id(run_id());
+    message.role(role);
+    message.name("stranger");
+    message.host("nowhere");
+    message.strength(std::numeric_limits<std::int32_t>::max());
+    message.scenario_sha256(run->parameters.scenario_sha256());
+    message.ready(true);
+    message.last_complete_step(-1);
+    return message;
+  }
+
+  bus::Node node;
+  bus::ServerDirectory servers;
+  std::optional<bus::Run> run;
+
+ private:
+  mutable std::mutex mutex_;
+  std::optional<VehicleState> state_;
+  bus::Reader<VehicleState> state_reader_;
+};
+
+/// `command` with one thing or another wrong.
+void spoil(ControlCommand& command, std::mt19937_64& random) {
+  switch (random() % 8) {
+    case 0:
+      return command.f_Q_W_n({std::numeric_limits<double>::quiet_NaN(), 0, 0});
+    case 1:
+      return command.f_Q_W_n({0, 0, -1e300});
+    case 2:
+      return command.run_id(random());
+    case 3:
+      return command.vehicle_id(static_cast<std::uint32_t>(random()));
+    case 4:
+      command.mission(MISSION_FAILED);
+      return command.fault(FAULT_FREE_FALL);
+    case 5:
+      return command.step(random());
+    case 6:
+      return command.step(command.step() + random() % 10000);
+    default:
+      return command.mission(MISSION_FINISHED);
+  }
+}
+
+}  // namespace
+
+std::uint64_t come_and_go(const Target& target) {
+  std::uint64_t count = 0;
+  for (; goes_on(target); ++count) {
+    bus::Node node(kQosFile, target.domain, "passer-by");
+    bus::Writer<Participant> writer(node);
+    bus::Reader<VehicleState> reader(node, bus::kRecorderReaderProfile,
+                                     [](const VehicleState&, const bus::PeerId&) {});
+    Participant message;
+    message.name("passer-by");
+    message.role(count % 2 ? ROLE_CONTROLLER : ROLE_RECORDER);
+    writer.write(message);
+    writer.wait_for_acknowledgments(50ms);
+  }
+  return count;
+}
+
+std::uint64_t flood_commands(const Target& target) {
+  Stranger stranger(target);
+  bus::Writer<ControlCommand> commands(stranger.node);
+  bus::Writer<Reference> references(stranger.node);
+  if (!stranger.wait_for_flight(target)) return 0;
+  std::mt19937_64 random(target.seed);
+  std::uint64_t count = 0;
+  while (goes_on(target)) {
+    for (int i = 0; i < 10; ++i, count += 2) {
+      ControlCommand command = stranger.make_command(random() % 2 ? kPilot : "stranger");
+      spoil(command, random);
+      commands.write(command);
+      Reference reference;  // under the pilot's name, of the steps to come
+      reference.run_id(stranger.run_id());
+      reference.step(command.step() % 100000);
+      reference.client_name(kPilot);
+      reference.stage_name("nowhere");
+      reference.position_m({1e6, 1e6, 1e6});
+      references.write(reference);
+    }
+    std::this_thread::sleep_for(kPause);
+  }
+  return count;
+}
+
+std::uint64_t forge_statements(const Target& target) {
+  Stranger stranger(target);
+  bus::Writer<VehicleState> states(stranger.node);
+  bus::Writer<SimStatus> statuses(stranger.node);
+  bus::Writer<Parameters> parameters(stranger.node);
+  bus::Writer<Participant> participants(stranger.node);
+  if (!stranger.wait_for_flight(target)) return 0;
+  std::mt19937_64 random(target.seed);
+  std::uint64_t count = 0;
+  // It stops with the flight: a recorder that is there and not done delays the end by up to 10 s.
+  for (; goes_on(target) && stranger.is_flying(); count += 5) {
+    VehicleState state = *stranger.state();  // the next one, where the load is somewhere else
+    state.step(state.step() + random() % 3);
+    state.p_WL_m({1e3, 1e3, 1e3});
+    states.write(state);
+    SimStatus status;  // that the flight is over
+    status.run_id(stranger.run_id());
+    status.sample_index(1 << 30);
+    status.phase(random() % 2 ? PHASE_FINISHED : PHASE_FAILED);
+    status.step(state.step());
+    statuses.write(status);
+    Parameters claim = stranger.run->parameters;  // the same run, or another server's of a lower id
+    if (random() % 2) claim.run_id(1);
+    parameters.write(claim);
+    status.run_id(1);
+    status.phase(PHASE_WAITING);
+    statuses.write(status);
+    participants.write(stranger.make_announcement(ROLE_RECORDER));  // one that has nothing yet
+    std::this_thread::sleep_for(5 * kPause);
+  }
+  return count;
+}
+
+std::uint64_t flood_control(const Target& target) {
+  Stranger stranger(target);
+  bus::Writer<SimControl> requests(stranger.node);
+  if (!stranger.wait_for_flight(target)) return 0;
+  std::mt19937_64 random(target.seed);
+  std::uint64_t count = 0;
+  for (; goes_on(target); ++count) {
+    SimControl request;
+    request.run_id(random() % 2 ? stranger.run_id() : random());
+    request.request_id(random());
+    request.operator_name("mallory");
+    request.action(random() % 2 ? ACTION_STEP : ACTION_START);  // refused: it is not paused
+    if (request.run_id() != stranger.run_id()) request.action(ACTION_STOP);
+    if (random() % 4 == 0) request.action(static_cast<ControlAction>(random() % 1000 + 100));
+    request.steps(random());
+    requests.write(request);
+    std::this_thread::sleep_for(kPause);
+  }
+  return count;
+}
+
+std::uint64_t pose_as_controller(const Target& target, bool answers) {
+  Stranger stranger(target);
+  bus::Writer<Participant> participants(stranger.node);
+  bus::Writer<ControlCommand> commands(stranger.node);
+  if (!stranger.wait_for_flight(target)) return 0;
+  participants.write(stranger.make_announcement(ROLE_CONTROLLER));
+  std::uint64_t count = 1;
+  std::uint64_t answered = 0;
+  while (goes_on(target)) {
+    const std::uint64_t step = stranger.state()->step();
+    if (!answers || step == answered) {
+      std::this_thread::sleep_for(100us);
+      continue;
+    }
+    ControlCommand command = stranger.make_command("stranger");
+    command.step(answered = step);
+    command.f_Q_W_n({std::numeric_limits<double>::infinity(), 0, 0});
+    commands.write(command);
+    ++count;
+  }
+  return count;
+}
+
+std::uint64_t read_all(const Target& target) {
+  bus::Node node(kQosFile, target.domain, "deaf");
+  std::atomic<std::uint64_t> count{0};
+  const auto hear = [&](const auto&, const bus::PeerId&) { ++count; };
+  const bus::Reader<VehicleState> states(node, bus::kRecorderReaderProfile, hear);
+  const bus::Reader<ControlCommand> commands(node, bus::kRecorderReaderProfile, hear);
+  const bus::Reader<Reference> references(node, bus::kRecorderReaderProfile, hear);
+  const bus::Reader<SimStatus> statuses(node, bus::kLatchedReaderProfile, hear);
+  while (goes_on(target)) std::this_thread::sleep_for(10ms);
+  return count;
+}
+
+}  // namespace sls::hostile

@@ -1,0 +1,255 @@
+/// Another vendor's DDS: a controller and a recorder in C on Eclipse Cyclone DDS fly and record
+/// with the programs of this project.
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "tests/network/network.hpp"
+#include "tests/system/flight.hpp"
+
+namespace sls::test {
+namespace {
+
+using Words = std::vector<std::string>;
+using std::chrono::seconds;
+
+/// Two implementations of one law round differently, 1e-15 of 17 N a step; the closed loop forgets
+/// each difference within seconds, so that they do not add up. Measured: 1e-15 m and 1.1e-14 N.
+constexpr double kPositionTolerance_m = 1e-12;
+constexpr double kForceTolerance_n = 1e-11;
+
+const Words kUdp = {"--qos", qos("udp")};
+
+/// Cyclone on loopback alone, like the profile `udp`; by itself it would take another interface.
+const Words kOnLoopback = {
+    "env",
+    "CYCLONEDDS_URI=<CycloneDDS><Domain><General><Interfaces><NetworkInterface name=\"lo\" "
+    "multicast=\"true\"/></Interfaces></General></Domain></CycloneDDS>"};
+
+Words operator+(Words words, const Words& more) {
+  words.insert(words.end(), more.begin(), more.end());
+  return words;
+}
+
+Words lossy(int percent) {
+  return {"env", std::string("LD_PRELOAD=") + SLS_DROP_SHIM,
+          "SLS_DROP_PERCENT=" + std::to_string(percent), "SLS_DROP_SEED=1"};
+}
+
+/// The result of a cyclone_recorder: the last line it printed.
+nlohmann::json read_result(const Process& recorder) {
+  const std::string output = recorder.output();
+  const auto begin = output.rfind("\n{");
+  return begin == std::string::npos ? nlohmann::json::object()
+                                    : nlohmann::json::parse(output.substr(begin));
+}
+
+void expect_every_sample(const Process& recorder, std::uint64_t last_step) {
+  const auto result = read_result(recorder);
+  ASSERT_TRUE(result.contains("last_step")) << recorder.output();
+  EXPECT_EQ(result.at("last_step"), last_step);
+  for (const char* stream : {"state", "command", "reference"}) {
+    EXPECT_EQ(result.at(stream).at("steps"), last_step + 1) << result;
+    EXPECT_EQ(result.at(stream).at("without_a_hole"), last_step + 1) << result;
+  }
+}
+
+std::size_t count_rows(const std::filesystem::path& file) {
+  const std::string text = read_file(file);
+  return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
+}
+
+class InteropTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (!SLS_HAS_CYCLONE)
+      GTEST_SKIP() << "built without Cyclone DDS: apt-get install cyclonedds-dev cyclonedds-tools";
+    write_quick_scenario(1);
+  }
+
+  /// Shaped like setpoints.yaml, but shorter: 4,000 steps.
+  void write_quick_scenario(int controllers) const {
+    std::ofstream(quick_) << "name: quick\n"
+                             "vehicle: { quad_mass_kg: 1.5, load_mass_kg: 0.2, rod_length_m: 1.0, "
+                             "gravity_m_s2: 9.8 }\n"
+                             "plant:\n"
+                             "  pendulum: ideal\n"
+                             "  step_s: 0.001\n"
+                             "  initial: { load_position_m: [0, 0, -1.5] }\n"
+                             "sync: { mode: lockstep, period_s: 0.004, wait_for: { controllers: "
+                          << controllers
+                          << ", recorders: 1, timeout_s: 60 } }\n"
+                             "controller:\n"
+                             "  gains: { lqr: { horizontal: 10, vertical: 5 } }\n"
+                             "  force_limit_n: 200\n"
+                             "mission:\n"
+                             "  - set_point: { position_m: [1, -1, -2] }\n"
+                             "    for_s: 2.5\n"
+                             "  - set_point: { position_m: [-1, 1, -1.75] }\n"
+                             "    for_s: 13.5\n";
+  }
+
+  /// One of the project's programs, over UDP on loopback; `before` comes before its command line.
+  std::unique_ptr<Process> start(const std::string& name, const Words& flags,
+                                 const Words& before = {}) const {
+    return std::make_unique<Process>(before + make_command(name, domain_.number(), kUdp + flags));
+  }
+  /// cyclone_controller or cyclone_recorder.
+  std::unique_ptr<Process> start_cyclone(const std::string& name, const Words& flags = {},
+                                         const Words& before = kOnLoopback) const {
+    return std::make_unique<Process>(
+        before + Words{SLS_INTEROP_DIR "/" + name, "--domain", domain_.text()} + flags);
+  }
+  std::unique_ptr<Process> start_recorder(const Words& further = {}) const {
+    return start("recorder", Words{"--out", recording_} + further);
+  }
+  std::unique_ptr<Process> start_server(const Words& before = {}) const {
+    return start("sim_server", {"--scenario", quick_}, before);
+  }
+  bool wait_for_steps(std::size_t steps) const {
+    return wait_until([&] { return count_rows(recording_ + "/state.csv") > steps; });
+  }
+
+  static void expect_success(const std::vector<Process*>& processes) {
+    std::string outputs;
+    for (Process* process : processes) process->wait();
+    for (Process* process : processes) outputs += process->output();
+    for (Process* process : processes) EXPECT_EQ(process->wait(seconds(0)), 0) << outputs;
+  }
+
+  /// Both flew the same mission, but for rounding.
+  static void expect_same_flight(const std::filesystem::path& a, const std::filesystem::path& b) {
+    const Table states_a(a / "state.csv"), states_b(b / "state.csv");
+    ASSERT_EQ(states_a.rows(), states_b.rows());
+    double position = 0, force = 0;
+    for (std::size_t row = 0; row < states_a.rows(); ++row) {
+      for (const char* body : {"quad", "load"})
+        position = std::max(
+            position,
+            (states_a.position(row, body) - states_b.position(row, body)).cwiseAbs().maxCoeff());
+      for (const char* axis : {"force_x_n", "force_y_n", "force_z_n"})
+        force = std::max(force, std::abs(states_a.number(row, axis) - states_b.number(row, axis)));
+    }
+    EXPECT_LE(position, kPositionTolerance_m);
+    EXPECT_LE(force, kForceTolerance_n);
+    RecordProperty("largest_position_difference_m", std::to_string(position * 1e15) + "e-15");
+    RecordProperty("largest_force_difference_n", std::to_string(force * 1e15) + "e-15");
+    EXPECT_EQ(read_file(a / "reference.csv"), read_file(b / "reference.csv"));
+  }
+
+  static constexpr std::uint64_t kQuickSteps = 4000;
+  TemporaryFolder folder_;
+  OwnDomain domain_;
+  const std::string quick_ = folder_ / "quick.yaml";
+  const std::string recording_ = folder_ / "recording";
+};
+
+TEST_F(InteropTest, ACycloneControllerFliesSetpointsLikeOursAndACycloneRecorderMissesNothing) {
+  // The shipped scenario, but the server waits for both recorders.
+  std::string text = read_file(scenario("setpoints"));
+  const std::string one = "recorders: 1";
+  ASSERT_NE(text.find(one), std::string::npos);
+  const std::string setpoints = folder_ / "setpoints.yaml";
+  std::ofstream(setpoints) << text.replace(text.find(one), one.size(), "recorders: 2");
+  const auto recorder = start_recorder();
+  const auto server = start("sim_server", {"--scenario", setpoints});
+  const auto cyclone_recorder = start_cyclone("cyclone_recorder");
+  const auto controller = start_cyclone("cyclone_controller", {"--name", "cyclone"});
+  expect_success({server.get(), controller.get(), recorder.get(), cyclone_recorder.get()});
+  const auto manifest = read_manifest(recording_);
+  EXPECT_TRUE(manifest.at("complete").get<bool>()) << manifest;
+  expect_every_sample(*cyclone_recorder, 11250);
+  const Table commands(recording_ + "/command.csv");
+  ASSERT_EQ(commands.rows(), 11251u);
+  EXPECT_EQ(commands.text(11250, "controller"), "cyclone");
+  Flight own(scenario("setpoints"));
+  own.expect_success();
+  expect_same_flight(recording_, own.recording());
+}
+
+TEST_F(InteropTest, ACycloneStandbyTakesOverFromAClientThatIsKilled) {
+  write_quick_scenario(2);
+  const auto recorder = start_recorder(), server = start_server();
+  const auto primary =
+      start("control_client", {"--scenario", quick_, "--strength", "1", "--name", "primary"});
+  const auto standby = start_cyclone("cyclone_controller", {"--name", "standby"});
+  ASSERT_TRUE(wait_for_steps(100)) << server->output();
+  primary->kill();
+  expect_success({server.get(), standby.get(), recorder.get()});
+  EXPECT_TRUE(read_manifest(recording_).at("complete").get<bool>());
+  const Table commands(recording_ + "/command.csv");
+  EXPECT_EQ(commands.text(0, "controller"), "primary");
+  EXPECT_EQ(commands.text(kQuickSteps, "controller"), "standby");
+  write_quick_scenario(1);
+  Flight own(quick_);
+  own.expect_success();
+  expect_same_flight(recording_, own.recording());
+}
+
+/// Every twentieth datagram of server and controller is lost: states are resent, and answered
+/// again.
+TEST_F(InteropTest, LossBetweenServerAndCycloneControllerChangesNoByte) {
+  const std::string undisturbed = recording_ + "-undisturbed";
+  for (const auto& [folder, loss] : {std::pair(undisturbed, 0), std::pair(recording_, 5)}) {
+    const auto recorder = start("recorder", {"--out", folder});
+    const auto server = start_server(lossy(loss));
+    const auto controller = start_cyclone("cyclone_controller", {}, kOnLoopback + lossy(loss));
+    expect_success({server.get(), controller.get(), recorder.get()});
+    EXPECT_TRUE(read_manifest(folder).at("complete").get<bool>());
+    const bool lost_none = controller->output().find("lost 0 of") != std::string::npos;
+    EXPECT_EQ(lost_none, loss == 0) << controller->output();
+  }
+  for (const char* file : {"state.csv", "reference.csv"})
+    EXPECT_EQ(read_file(recording_ + "/" + file), read_file(undisturbed + "/" + file)) << file;
+}
+
+TEST_F(InteropTest, CycloneControllerAndRecorderFlyOnWithTheServerThatReplacesAKilledOne) {
+  const auto recorder = start_recorder({"--follow"});
+  auto server = start_server();
+  const auto controller = start_cyclone("cyclone_controller"),
+             cyclone_recorder = start_cyclone("cyclone_recorder");
+  ASSERT_TRUE(wait_for_steps(100)) << server->output();
+  server->kill();
+  server = start_server();
+  expect_success({server.get(), controller.get(), recorder.get(), cyclone_recorder.get()});
+  expect_every_sample(*cyclone_recorder, kQuickSteps);
+}
+
+TEST_F(InteropTest, RecordersThatComeLateGetWhatTheyMissedFromACycloneController) {
+  auto recorder = start_recorder({"--resume"});
+  const auto server = start_server(), controller = start_cyclone("cyclone_controller");
+  ASSERT_TRUE(wait_for_steps(100)) << server->output();
+  controller->send(SIGSTOP);  // the flight stands still until the others have come
+  recorder->kill();
+  recorder = start_recorder({"--resume"});
+  const auto late_recorder = start_cyclone("cyclone_recorder");
+  for (Process* process : {recorder.get(), late_recorder.get()})
+    EXPECT_TRUE(wait_until([&] { return process->output().find(" run ") != std::string::npos; }))
+        << process->output();
+  controller->send(SIGCONT);
+  expect_success({server.get(), controller.get(), recorder.get(), late_recorder.get()});
+  const auto second = read_manifest(recording_ + "/segment-2");
+  EXPECT_TRUE(second.at("complete").get<bool>()) << second;
+  expect_every_sample(*late_recorder, kQuickSteps);
+}
+
+/// Without a configuration of its own Cyclone takes the host's network, as profile `lan` does.
+TEST_F(InteropTest, ACycloneControllerOnAnotherHostFliesWithProfileLan) {
+  if (const auto obstacle = Network::find_obstacle()) GTEST_SKIP() << *obstacle;
+  const Network network({"server", "controller", "recorder"});
+  const auto start_on = [&](const std::string& host, const std::string& name, const Words& flags) {
+    return std::make_unique<Process>(network.on(host) + make_command(name, 0, flags, qos("lan")));
+  };
+  const auto recorder = start_on("recorder", "recorder", {"--out", recording_});
+  const auto server = start_on("server", "sim_server", {"--scenario", quick_});
+  Process controller(network.on("controller") + Words{SLS_INTEROP_DIR "/cyclone_controller"});
+  expect_success({server.get(), &controller, recorder.get()});
+  EXPECT_TRUE(read_manifest(recording_).at("complete").get<bool>());
+}
+
+}  // namespace
+}  // namespace sls::test

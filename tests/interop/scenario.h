@@ -1,0 +1,24 @@
+/// What a scenario of the shape of config/scenarios/setpoints.yaml says. A server sends the text in
+/// sls/parameters, so that a client needs no file.
+#pragma once
+
+#include <stdbool.h>
+#include <stdint.h>
+
+enum { kMaxStages = 32 };
+
+typedef struct Stage {
+  double set_point[3];  ///< of the load, m
+  int64_t duration_ns;
+} Stage;
+
+typedef struct Scenario {
+  int recorders;                              ///< expected
+  double horizontal_weight, vertical_weight;  ///< of the LQR gains
+  Stage stages[kMaxStages];
+  int stage_count;
+} Scenario;
+
+/// Understands a list of set-points, each for a time, flown with LQR gains. A line that is anything
+/// else is refused: false, and `line` is its number (0: no stage, no gains or no end of a stage).
+bool parse_scenario(const char* text, Scenario* scenario, int* line);

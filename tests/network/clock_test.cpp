@@ -1,0 +1,79 @@
+/// Hosts whose clocks are an hour off, by Debian's libfaketime: the wall clock alone, as on a real
+/// host.
+#include <gtest/gtest.h>
+
+#include "tests/network/hosts_flight.hpp"
+
+namespace sls::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string find_faketime() {
+  for (const auto& folder : fs::directory_iterator("/usr/lib")) {
+    std::error_code none;
+    const fs::path library = folder.path() / "faketime/libfaketimeMT.so.1";
+    if (fs::exists(library, none)) return library;
+  }
+  return "";
+}
+
+class ClockTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (const auto obstacle = Network::find_obstacle()) GTEST_SKIP() << *obstacle;
+    faketime_ = find_faketime();
+    if (faketime_.empty()) GTEST_SKIP() << "no libfaketime (Debian package libfaketime)";
+    network_ = std::make_unique<Network>(kHosts);
+  }
+
+  void shift(FlightOptions& options, const std::string& program, const std::string& offset) const {
+    auto& before = options.before.at(program);
+    before.insert(before.end(), {"LD_PRELOAD=" + faketime_, "FAKETIME=" + offset,
+                                 "FAKETIME_DONT_FAKE_MONOTONIC=1"});
+  }
+
+  std::string faketime_;
+  std::unique_ptr<Network> network_;
+};
+
+TEST_F(ClockTest, InLockstepItDoesNotMatter) {
+  const Profile profile(*network_, "lan");
+  FlightOptions options = profile.flight_options();
+  shift(options, "control_client", "+3600s");
+  shift(options, "recorder", "-3600s");
+  Flight local(scenario("short")), flight(scenario("short"), options);
+  local.expect_success();
+  flight.expect_success();
+  EXPECT_TRUE(read_figures(flight.recording(), local.recording()).is_identical);
+}
+
+class RealtimeClockTest : public ClockTest, public testing::WithParamInterface<const char*> {};
+
+// The LIFESPAN of commands compares the clocks of two machines: each command of a client that is
+// behind would be dropped unseen.
+TEST_P(RealtimeClockTest, InRealTimeTheUserIsToldAndCommandsStillArrive) {
+  const Profile profile(*network_, "lan");
+  FlightOptions options = profile.flight_options();
+  options.server = {"--mode", "realtime"};
+  const std::string offset = GetParam();
+  shift(options, "control_client", offset);
+  Flight flight(scenario("short"), options);
+  flight.expect_success();
+  const std::string expected = offset[0] == '-' ? " s behind ours" : " s ahead of ours";
+  EXPECT_NE(flight.server->output().find("the clock of controller 'control_client' on "),
+            std::string::npos)
+      << flight.server->output();
+  EXPECT_NE(flight.server->output().find(expected), std::string::npos) << flight.server->output();
+  // Without a command that arrives it is each of the 500 steps; on a busy machine it may be some.
+  const Table status(flight.recording() / "status.csv");
+  EXPECT_LT(status.number(status.rows() - 1, "fail_safe"), 250) << flight.server->output();
+}
+
+INSTANTIATE_TEST_SUITE_P(AnHour, RealtimeClockTest, testing::Values("-3600s", "+3600s"),
+                         [](const auto& test) {
+                           return std::string(test.param[0] == '-' ? "Behind" : "Ahead");
+                         });
+
+}  // namespace
+}  // namespace sls::test

@@ -1,0 +1,53 @@
+/// A flight of the three programs on hosts of their own, and what came of it beside a local one.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "tests/network/network.hpp"
+#include "tests/system/flight.hpp"
+
+namespace sls::test {
+
+/// The hosts of a flight, in the order that `Network` wants them; the last is for a discovery
+/// server.
+inline const std::vector<std::string> kHosts = {"server", "controller", "recorder", "directory"};
+
+/// The profile `config/qos/NAME.xml` on hosts that each know what it must be told in the
+/// environment: the others' addresses, the discovery server's, its keys.
+class Profile {
+ public:
+  /// Starts the discovery server where the profile needs one, and makes keys.
+  Profile(const Network& network, const std::string& name);
+
+  /// Options of a flight with one program on each host.
+  FlightOptions flight_options() const { return options_; }
+  /// What to put before a program on `host`; the same for one more of them.
+  std::vector<std::string> before(const std::string& host) const;
+
+ private:
+  const Network& network_;
+  const TemporaryFolder folder_;
+  std::vector<std::string> environment_;
+  FlightOptions options_;
+  std::unique_ptr<Process> discovery_server_;
+};
+
+/// What a flight came to.
+struct Figures {
+  double wall_s = 0.0;  ///< from step 0 to the end
+  double steps_per_s = 0.0;
+  double round_trip_p50_us = 0.0, round_trip_p99_us = 0.0;  ///< of the last 1,000 steps
+  std::uint64_t resent = 0;                                 ///< states, by the server
+  std::uint64_t rows_lost = 0;
+  bool is_identical = false;  ///< to the local flight: state.csv, reference.csv, certificate
+};
+
+/// Reads them from the recording of a flight that has ended. @throws std::exception if it has none.
+Figures read_figures(const std::filesystem::path& recording, const std::filesystem::path& local);
+
+}  // namespace sls::test

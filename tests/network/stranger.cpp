@@ -1,0 +1,20 @@
+/// A program of somebody else: it writes sls/state with a type of another name, until it is ended.
+#include <pthread.h>
+#include <csignal>
+#include <cstdlib>
+
+#include "common/bus/node.hpp"
+
+int main(int argc, char** argv) {
+  using namespace sls::bus;
+  if (argc != 3) return 2;
+  sigset_t ends;
+  sigemptyset(&ends);
+  sigaddset(&ends, SIGTERM);
+  pthread_sigmask(SIG_BLOCK, &ends, nullptr);  // before the middleware's threads, which inherit it
+  Node node(argv[1], std::atoi(argv[2]), "stranger");
+  const detail::AnyWriter writer(node, Topic<sls::VehicleState>::kName, kLatchedWriterProfile,
+                                 detail::make_type_support<sls::SimStatus>());
+  int signal = 0;
+  sigwait(&ends, &signal);
+}

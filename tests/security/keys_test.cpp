@@ -1,0 +1,160 @@
+/// ./sls keys, and what the programs say of keys that will not do.
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+
+#include "tests/security/secured_run.hpp"
+#include "tests/support/waiting.hpp"
+
+namespace sls::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Runs `command`, expects it to fail with `code`, and returns what it said.
+std::string fail(const std::vector<std::string>& command, int code) {
+  Process process(command);
+  EXPECT_EQ(process.wait(), code) << process.output();
+  const std::string output = process.output();
+  EXPECT_EQ(std::count(output.begin(), output.end(), '\n'), 1) << output;
+  return output;
+}
+
+std::string fail_keys(const std::vector<std::string>& arguments) {
+  return fail(make_keys_command(arguments), 2);
+}
+
+std::vector<std::string> list(const fs::path& folder) {
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(folder)) names.push_back(entry.path().filename());
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+TEST(KeysTest, GiveEachRoleAFolderOfItsOwn) {
+  const Keys keys;
+  const std::vector<std::string> expected = {"certificate.pem", "governance.p7s",
+                                             "identity_ca.pem", "key.pem",
+                                             "permissions.p7s", "permissions_ca.pem"};
+  EXPECT_EQ(list(keys.path()),
+            (std::vector<std::string>{"ca", "controller", "operator", "recorder", "server"}));
+  for (const char* role : {"controller", "operator", "recorder", "server"}) {
+    EXPECT_EQ(list(keys.path() / role), expected);
+    struct stat status;
+    ASSERT_EQ(stat((keys.path() / role / "key.pem").c_str(), &status), 0);
+    EXPECT_EQ(status.st_mode & 0777, 0600u) << role;
+  }
+  EXPECT_EQ(list(keys.path().parent_path()), std::vector<std::string>{"keys"});
+}
+
+TEST(KeysTest, AreNotReplacedUnlessAskedTo) {
+  const Keys keys;
+  const std::string certificate = read_bytes(keys.path() / "server/certificate.pem");
+  EXPECT_NE(fail_keys({keys.path().string()}).find("--force replaces it"), std::string::npos);
+  EXPECT_EQ(read_bytes(keys.path() / "server/certificate.pem"), certificate);
+  run(make_keys_command({keys.path().string(), "--force"}));
+  EXPECT_NE(read_bytes(keys.path() / "server/certificate.pem"), certificate);
+  EXPECT_EQ(list(keys.path().parent_path()), std::vector<std::string>{"keys"});
+}
+
+TEST(KeysTest, NeverReplaceAnotherFolder) {
+  const TemporaryFolder folder;
+  write_bytes(folder / "thesis.tex", "important");
+  EXPECT_NE(fail_keys({folder.path().string(), "--force"}).find("which --force leaves alone"),
+            std::string::npos);
+  EXPECT_EQ(list(folder.path()), std::vector<std::string>{"thesis.tex"});
+}
+
+TEST(KeysTest, MistakesAreOneLine) {
+  const TemporaryFolder folder;
+  const std::string keys = (folder / "keys").string();
+  EXPECT_NE(fail_keys({}).find("expected a folder"), std::string::npos);
+  EXPECT_NE(fail_keys({keys, "--days", "0"}).find("expected 1 to 36500, got '0'"),
+            std::string::npos);
+  EXPECT_NE(fail_keys({keys, "--add", "pilot", "a"}).find("expected a role"), std::string::npos);
+  EXPECT_NE(fail_keys({keys, "--add", "controller", "../a"}).find("expected a name"),
+            std::string::npos);
+  EXPECT_NE(fail_keys({keys, "--add", "controller", "a"}).find("identity_ca.key"),
+            std::string::npos);
+  EXPECT_TRUE(list(folder.path()).empty());
+}
+
+/// A program that meets a mistake in its keys: exit 2, and one line.
+class BadKeysTest : public testing::Test {
+ protected:
+  std::string start_server(std::vector<std::string> before) {
+    return fail(
+        put_before(std::move(before),
+                   make_command("sim_server", 0, {"--scenario", scenario("short")}, qos("secure"))),
+        2);
+  }
+  fs::path file(const std::string& name) const { return keys_.path() / "server" / name; }
+
+  Keys keys_;
+};
+
+TEST_F(BadKeysTest, NoFolderAtAll) {
+  EXPECT_NE(start_server({"env", "-u", "SLS_KEYS"}).find("${SLS_KEYS}: expected"),
+            std::string::npos);
+}
+
+TEST_F(BadKeysTest, AMissingFile) {
+  for (const std::string& name : list(keys_.path() / "server")) {
+    fs::rename(file(name), file("hidden"));
+    const std::string output = start_server(keys_.as());
+    EXPECT_NE(output.find(file(name).string() + ": expected a file that ./sls keys made, got no "
+                                                "such file"),
+              std::string::npos)
+        << output;
+    fs::rename(file("hidden"), file(name));
+  }
+}
+
+TEST_F(BadKeysTest, AFileThatIsSomethingElse) {
+  for (const std::string& name : list(keys_.path() / "server")) {
+    const std::string content = read_bytes(file(name));
+    write_bytes(file(name), "something else\n");
+    const std::string output = start_server(keys_.as());
+    EXPECT_NE(output.find(file(name).string() + ": expected "), std::string::npos) << output;
+    write_bytes(file(name), content);
+  }
+}
+
+TEST_F(BadKeysTest, AFileOfOtherKeys) {
+  const Keys others;
+  const auto expect_message = [&](const std::string& name, const std::string& place,
+                                  const std::string& message) {
+    const std::string content = read_bytes(file(name));
+    write_bytes(file(name), read_bytes(others.path() / "server" / name));
+    const std::string output = start_server(keys_.as());
+    EXPECT_NE(output.find(file(place).string() + ": expected " + message), std::string::npos)
+        << output;
+    write_bytes(file(name), content);
+  };
+  expect_message("key.pem", "key.pem", "the private key of");
+  expect_message("certificate.pem", "certificate.pem",
+                 "a certificate that is valid now and signed");
+  expect_message("identity_ca.pem", "certificate.pem",
+                 "a certificate that is valid now and signed");
+  expect_message("permissions_ca.pem", "governance.p7s", "a document signed by");
+  expect_message("governance.p7s", "governance.p7s", "a document signed by");
+  expect_message("permissions.p7s", "permissions.p7s", "a document signed by");
+}
+
+TEST_F(BadKeysTest, PermissionsOfSomebodyElse) {
+  write_bytes(file("permissions.p7s"), read_bytes(keys_.path() / "operator/permissions.p7s"));
+  const std::string output = start_server(keys_.as());
+  EXPECT_NE(output.find("expected permissions for CN=server,OU=server,O=SLS, got none"),
+            std::string::npos)
+      << output;
+}
+
+TEST_F(BadKeysTest, ExpiredOnes) {
+  keys_.add_expired("server", "old");
+  const std::string output = start_server(keys_.as("old"));
+  EXPECT_NE(output.find("got: certificate has expired"), std::string::npos) << output;
+}
+
+}  // namespace
+}  // namespace sls::test

@@ -1,0 +1,154 @@
+/// Flights on a secured domain, and those who do not belong there.
+#include <gtest/gtest.h>
+
+#include "tests/security/secured_run.hpp"
+#include "tests/support/waiting.hpp"
+
+namespace sls::test {
+namespace {
+
+bool wait_for_text(const Process& process, const std::string& text) {
+  return wait_until([&] { return process.output().find(text) != std::string::npos; });
+}
+
+bool wait_for_rows(const std::filesystem::path& recording, std::size_t rows) {
+  return wait_until([&] {
+    const std::string text = read_file(recording / "state.csv");
+    return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n')) > rows;
+  });
+}
+
+// --- who belongs there ---------------------------------------------------------------------------
+
+TEST(SecureFlightTest, RecordsTheBytesOfAnOpenOne) {
+  const SecuredRun run;
+  const auto recorder = run.start_recorder(), server = run.start_server(),
+             client = run.start_client();
+  run.expect_same_as_open(*server, *client, *recorder);
+}
+
+TEST(SecureFlightTest, AStandbyTakesOverAndTheKilledClientIsLetInAgain) {
+  const SecuredRun run(32);
+  run.keys.add("controller", "standby");
+  const auto recorder = run.start_recorder(), server = run.start_server();
+  const auto standby = run.start_client({"--name", "standby", "--strength", "1"}, "standby");
+  auto primary = run.start_client({"--name", "primary", "--strength", "2"});
+  ASSERT_TRUE(wait_for_rows(run.recording(), 500)) << server->output();
+  primary->kill();
+  ASSERT_TRUE(wait_for_rows(run.recording(), 1000)) << server->output();
+  primary = run.start_client({"--name", "primary", "--strength", "2"});
+  run.expect_same_as_open(*server, *primary, *recorder);
+  EXPECT_EQ(standby->wait(), 0) << standby->output();
+
+  const Table commands(run.recording() / "command.csv");
+  std::string controllers;  // in the order in which they flew
+  for (std::size_t row = 0; row < commands.rows(); ++row)
+    if (row == 0 || commands.text(row, "controller") != commands.text(row - 1, "controller"))
+      controllers += commands.text(row, "controller") + " ";
+  EXPECT_NE(controllers.find("primary standby primary"), std::string::npos) << controllers;
+}
+
+TEST(SecureFlightTest, AnOperatorPausesAndResumesWhatAControllerMayNot) {
+  const SecuredRun run(12);
+  const auto recorder = run.start_recorder(), server = run.start_server(),
+             client = run.start_client();
+  ASSERT_TRUE(wait_for_rows(run.recording(), 100)) << server->output();
+  const auto pause = run.start("sim_ctl", {"pause"}, run.keys.as());
+  ASSERT_EQ(pause->wait(), 0) << pause->output();
+  const auto controller = run.start("sim_ctl", {"resume"}, run.keys.as("controller"));
+  EXPECT_EQ(controller->wait(), 2);
+  EXPECT_NE(controller->output().find("identity 'controller': expected permission to"),
+            std::string::npos)
+      << controller->output();
+  EXPECT_TRUE(server->is_running());
+  const auto resume = run.start("sim_ctl", {"resume"}, run.keys.as());
+  ASSERT_EQ(resume->wait(), 0) << resume->output();
+  run.expect_same_as_open(*server, *client, *recorder);
+}
+
+// --- who does not --------------------------------------------------------------------------------
+
+/// A server, and a stronger client than its own who must not be let in.
+class IntruderTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    // The scenario's, but an intruder who hears nothing gives up soon.
+    write_bytes(folder_ / "intruder.yaml",
+                replace_once(read_bytes(run_.scenario_file()), "timeout_s: 30", "timeout_s: 4"));
+  }
+
+  std::vector<std::string> flags() const {
+    return {"--scenario", (folder_ / "intruder.yaml").string(), "--strength", "1000"};
+  }
+
+  /// Expects the server to name the intruder with `cause`, the flight to be the one without him,
+  /// and him to have seen nothing of it.
+  void expect_harmless(const std::string& cause, const std::vector<std::string>& before,
+                       const std::string& qos_file = qos("secure")) {
+    const auto server = run_.start_server();
+    ASSERT_TRUE(wait_for_text(*server, "waiting for"));
+    const auto intruder = run_.start("control_client", flags(), before, qos_file);
+    ASSERT_TRUE(wait_for_text(*server, "refused 'control_client'"))
+        << server->output() << intruder->output();
+    const auto recorder = run_.start_recorder(), client = run_.start_client();
+    run_.expect_same_as_open(*server, *client, *recorder);
+    EXPECT_NE(server->output().find(cause), std::string::npos) << server->output();
+
+    EXPECT_EQ(intruder->wait(), 1) << intruder->output();
+    EXPECT_NE(intruder->output().find("no server for vehicle 0 within 4 s"), std::string::npos)
+        << intruder->output();
+    EXPECT_EQ(intruder->output().find("joins run"), std::string::npos) << intruder->output();
+  }
+
+  SecuredRun run_;
+  TemporaryFolder folder_;
+};
+
+TEST_F(IntruderTest, WithoutAnIdentity) { expect_harmless("it has no identity", {}, qos("lan")); }
+
+TEST_F(IntruderTest, OfAnotherAuthority) {
+  const Keys others;
+  expect_harmless("its certificate is not accepted (unable to get local issuer certificate)",
+                  others.as());
+}
+
+TEST_F(IntruderTest, WithAnExpiredCertificateAndAClockThatIsBehind) {
+  run_.keys.add_expired("controller", "old");
+  auto before = run_.keys.as("old");
+  before.insert(before.end(),
+                {std::string("LD_PRELOAD=") + SLS_CLOCK_SHIM, "SLS_CLOCK_SHIFT_S=-64800"});
+  expect_harmless("its certificate is not accepted (certificate has expired)", before);
+}
+
+TEST_F(IntruderTest, ARecorderThatSignsItsOwnPermissions) {
+  run_.keys.add_usurper("usurper");
+  expect_harmless("its permissions are not signed by our permissions authority",
+                  run_.keys.as("usurper"));
+}
+
+TEST_F(IntruderTest, ARecorderThatCommandsEndsAtOnce) {
+  const auto server = run_.start_server();
+  ASSERT_TRUE(wait_for_text(*server, "waiting for"));
+  const auto intruder = run_.start("control_client", flags(), run_.keys.as("recorder"));
+  EXPECT_EQ(intruder->wait(), 2);
+  EXPECT_NE(intruder->output().find("identity 'recorder': expected permission to write sls/"),
+            std::string::npos)
+      << intruder->output();
+  const auto recorder = run_.start_recorder(), client = run_.start_client();
+  run_.expect_same_as_open(*server, *client, *recorder);
+}
+
+TEST_F(IntruderTest, ARecorderWithoutAnIdentityRecordsNothing) {
+  const auto intruder =
+      run_.start("recorder", {"--out", (folder_ / "stolen").string()}, {}, qos("lan"));
+  const auto server = run_.start_server();
+  ASSERT_TRUE(wait_for_text(*server, "refused 'recorder'")) << server->output();
+  const auto recorder = run_.start_recorder(), client = run_.start_client();
+  run_.expect_same_as_open(*server, *client, *recorder);
+  intruder->send(SIGTERM);
+  EXPECT_EQ(intruder->wait(), 143) << intruder->output();
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "stolen/state.csv"));
+}
+
+}  // namespace
+}  // namespace sls::test

@@ -1,0 +1,131 @@
+/// What somebody on the network, without keys, hears and can do: three hosts of the flight and his.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <cstring>
+
+#include "tests/network/network.hpp"
+#include "tests/security/keys.hpp"
+#include "tests/security/secured_run.hpp"
+#include "tests/support/waiting.hpp"
+
+namespace sls::test {
+namespace {
+
+bool wait_for_text(const Process& process, const std::string& text) {
+  return wait_until([&] { return process.output().find(text) != std::string::npos; });
+}
+
+template <class Value>
+std::string to_bytes(const Value& value) {
+  std::string bytes(sizeof value, '\0');
+  std::memcpy(bytes.data(), &value, sizeof value);
+  return bytes;
+}
+
+class WireTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (const auto obstacle = Network::find_obstacle()) GTEST_SKIP() << *obstacle;
+    network_ = std::make_unique<Network>(
+        std::vector<std::string>{"server", "controller", "recorder", "stranger"});
+  }
+
+  FlightOptions options(const std::string& profile) const {
+    FlightOptions options;
+    options.qos_file = qos(profile);
+    options.before = {{"sim_server", put_before(network_->on("server"), keys_.as())},
+                      {"control_client", put_before(network_->on("controller"), keys_.as())},
+                      {"recorder", put_before(network_->on("recorder"), keys_.as())}};
+    return options;
+  }
+
+  Keys keys_;
+  std::unique_ptr<Network> network_;
+};
+
+/// How many of the positions of a recording, and of other secrets, stand in what was captured.
+struct Heard {
+  std::size_t packets_bytes = 0;
+  std::size_t positions = 0;
+  bool run_id = false;
+  bool scenario = false;
+};
+
+Heard find_secrets(const Flight& flight, const std::string& captured) {
+  Heard heard;
+  heard.packets_bytes = captured.size();
+  const Table states(flight.recording() / "state.csv");
+  for (std::size_t row = 100; row < states.rows(); row += 100)
+    for (const char* column : {"quad_x_m", "load_y_m"})
+      heard.positions += captured.find(to_bytes(states.number(row, column))) != std::string::npos;
+  const auto run_id =
+      std::stoull(read_manifest(flight.recording()).at("run_id").get<std::string>(), nullptr, 16);
+  heard.run_id = captured.find(to_bytes(static_cast<std::uint64_t>(run_id))) != std::string::npos;
+  heard.scenario = captured.find("figure_eight: { amplitude_m") != std::string::npos;
+  return heard;
+}
+
+TEST_F(WireTest, HoldsNoPlainTextOfASecuredFlight) {
+  const auto listen = [&](const std::string& profile) {
+    const TemporaryFolder folder;
+    const std::string file = (folder / "packets").string();
+    Process capture(put_before(network_->on(Network::kSwitch), {SLS_CAPTURE, file}));
+    EXPECT_TRUE(wait_for_text(capture, "capturing")) << capture.output();
+    Flight flight(scenario("short"), options(profile));
+    flight.expect_success();
+    capture.send(SIGTERM);
+    EXPECT_EQ(capture.wait(), 0) << capture.output();
+    return find_secrets(flight, read_bytes(file));
+  };
+  const Heard open = listen("lan"), secured = listen("secure");
+  // Four rows beyond the first hundred, two columns: all on the wire, or the test proves nothing.
+  EXPECT_EQ(open.positions, 10u);
+  EXPECT_TRUE(open.run_id);
+  EXPECT_TRUE(open.scenario);
+  EXPECT_GT(secured.packets_bytes, open.packets_bytes / 2);
+  EXPECT_EQ(secured.positions, 0u);
+  EXPECT_FALSE(secured.run_id);
+  EXPECT_FALSE(secured.scenario);
+}
+
+TEST_F(WireTest, WithoutMulticastASecuredFlightNeedsItsPeersNamed) {
+  network_->block_multicast();
+  FlightOptions secured = options("secure");
+  for (auto& [program, before] : secured.before)
+    before.push_back("SLS_PEERS=" + network_->address("server") + "," +
+                     network_->address("controller"));
+  Flight flight(scenario("short"), secured), local(scenario("short"));
+  flight.expect_success();
+  local.expect_success();
+  EXPECT_TRUE(read_bytes(flight.recording() / "state.csv") ==
+              read_bytes(local.recording() / "state.csv"));
+}
+
+TEST_F(WireTest, SamplesForgedInTheControllersNameStopAnOpenFlightAndNotASecuredOne) {
+  const auto start_forger = [&](const Flight& flight) {
+    return std::make_unique<Process>(
+        put_before(network_->on("stranger"), {SLS_FORGER, network_->address("controller"),
+                                              network_->address("server"), flight.domain.text()}));
+  };
+  Flight local(scenario("figure_eight"));
+  local.expect_success();
+  {
+    Flight open(scenario("figure_eight"), options("lan"));
+    ASSERT_TRUE(open.wait_for_steps(300)) << open.outputs();
+    const auto forger = start_forger(open);
+    EXPECT_TRUE(wait_for_text(*open.server, "waiting for")) << open.outputs();
+    EXPECT_EQ(forger->wait(), 0) << forger->output();
+  }
+  Flight secured(scenario("figure_eight"), options("secure"));
+  ASSERT_TRUE(secured.wait_for_steps(300)) << secured.outputs();
+  const auto forger = start_forger(secured);
+  EXPECT_EQ(forger->wait(), 0) << forger->output();
+  secured.expect_success();
+  EXPECT_TRUE(read_bytes(secured.recording() / "state.csv") ==
+              read_bytes(local.recording() / "state.csv"));
+}
+
+}  // namespace
+}  // namespace sls::test
