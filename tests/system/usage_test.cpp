@@ -113,9 +113,15 @@ TEST(UsageTest, UnusableQosFilesAreRefusedByEveryProgram) {
   TemporaryFolder folder;
   const std::string shipped = read_file(qos("default"));
   write_bytes(folder / "malformed.xml", shipped.substr(0, shipped.size() / 2));
-  write_bytes(folder / "misnamed.xml", replace_once(shipped, "\"sls_loop_reader\"", "\"sls_lop\""));
+  const std::string endpoints = read_file(qos("endpoints"));
+  const std::string whole = replace_once(
+      shipped, "</profiles>",
+      endpoints.substr(endpoints.find("<data_writer"),
+                       endpoints.rfind("</profiles>") - endpoints.find("<data_writer")) +
+          "</profiles>");
+  write_bytes(folder / "misnamed.xml", replace_once(whole, "\"sls_loop_reader\"", "\"sls_lop\""));
   write_bytes(folder / "refused.xml",
-              replace_once(shipped, "<depth>32</depth>", "<depth>many</depth>"));
+              replace_once(whole, "<depth>32</depth>", "<depth>many</depth>"));
   int run_number = 0;
   for (const char* name : {"sim_server", "control_client", "recorder"}) {
     const auto refuse = [&](const std::string& file, const std::string& cause) {
@@ -130,7 +136,7 @@ TEST(UsageTest, UnusableQosFilesAreRefusedByEveryProgram) {
     refuse(folder / "none.xml", "none.xml: ");
     refuse(folder.path(), "got a directory");
     refuse(folder / "malformed.xml", "malformed.xml:");
-    refuse(folder / "misnamed.xml", "profile 'sls_loop_reader'");
+    refuse(folder / "misnamed.xml", "profile 'sls_lop'");
     refuse(folder / "refused.xml", "refused.xml: ");
   }
 }
