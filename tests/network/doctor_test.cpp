@@ -269,6 +269,7 @@ TEST_F(DoctorTest, NamesTheTopicAndThePolicyOfAQosMismatch) {
 
 TEST_F(DoctorTest, NamesATypeThatIsNotOurs) {
   Process stranger(on("here") + Words{std::string(SLS_STRANGER), qos("default"), "0"});
+  ASSERT_TRUE(wait_until([&] { return !stranger.output().empty(); }));
   expect_faults(examine(on("here") + doctor("default")), {"types"},
                 "sls/state: stranger has type sls::SimStatus");
 }

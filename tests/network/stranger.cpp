@@ -1,6 +1,7 @@
 /// A program of somebody else: it writes sls/state with a type of another name, until it is ended.
 #include <pthread.h>
 #include <csignal>
+#include <cstdio>
 #include <cstdlib>
 
 #include "common/bus/node.hpp"
@@ -15,6 +16,8 @@ int main(int argc, char** argv) {
   Node node(argv[1], std::atoi(argv[2]), "stranger");
   const detail::AnyWriter writer(node, Topic<sls::VehicleState>::kName, kLatchedWriterProfile,
                                  detail::make_type_support<sls::SimStatus>());
+  std::puts("there");
+  std::fflush(stdout);
   int signal = 0;
   sigwait(&ends, &signal);
 }

@@ -90,7 +90,6 @@ class Examination {
     start_observer();
     work(kMostTime, is_stopped);
     gather();
-    add_later_ports();
     if (other_end_) seen_.other_end = other_end_->find_end();
     if (prober_ && !seen_.probes.is_there())
       seen_.is_peer_up = is_host_up(seen_.peer_address, kConnectTime);
@@ -172,13 +171,6 @@ class Examination {
     seen_.programs = observer_->programs();
     seen_.endpoints = observer_->endpoints();
     seen_.echoes = observer_->echoes();
-  }
-
-  /// Ports of programs that were started since the survey, which was before anything was touched.
-  void add_later_ports() {
-    const auto later = survey_shared_memory().read_ports;
-    auto& ports = seen_.shared_memory.read_ports;
-    ports.insert(ports.end(), later.begin(), later.end());
   }
 
   const DoctorOptions& options_;
