@@ -74,9 +74,9 @@ void LockstepRun::take_over_if_silent(Clock::time_point now) {
 bool LockstepRun::wait_for_recorders(std::uint64_t step) {
   using config::RecorderPolicy;
   const auto& patience = scenario_.sync.wait.recorder;
-  const auto window = calc_recorder_window(endpoints_.state_writer.history_depth());
   const auto find_blocking = [&] {
-    return name_blocking_recorder(roster_, scenario_.sync.wait_for.recorders, step, window);
+    return name_blocking_recorder(roster_, scenario_.sync.wait_for.recorders, step,
+                                  recorder_window_);
   };
   refresh_roster_if_due();
   std::string blocking = find_blocking();

@@ -23,6 +23,8 @@ class LockstepRun : public Run {
 
   void take_over_if_silent(Clock::time_point now);
 
+  const std::int64_t recorder_window_ =
+      calc_recorder_window(endpoints_.state_writer.history_depth());
   RetransmissionTimer timer_;
   Clock::time_point take_over_at_;
 };

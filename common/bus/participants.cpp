@@ -15,11 +15,13 @@ constexpr std::size_t kMaxParticipants = 256;
 constexpr std::size_t kMaxServers = 64;
 constexpr std::size_t kMaxRunsOfServer = 4;  // the one in work and those that resets ended
 
-/// True where `known` has, or now has, room for `sender`: who has left makes room.
-template <class Known>
+/// True where `known` has, or now has, room for `sender`: who has left makes room. Only where it is
+/// full must it be known who is there.
+template <class Known, class FindPresent>
 bool make_room(std::map<PeerId, Known>& known, std::size_t most, const PeerId& sender,
-               const std::set<PeerId>& present) {
+               FindPresent find_present) {
   if (known.count(sender) > 0 || known.size() < most) return true;
+  const std::set<PeerId> present = find_present();
   const auto gone = std::find_if(known.begin(), known.end(),
                                  [&](const auto& item) { return present.count(item.first) == 0; });
   if (gone == known.end()) return false;
@@ -37,7 +39,7 @@ void ParticipantDirectory::note(const Participant& sample, const PeerId& sender)
   const std::chrono::nanoseconds age = std::chrono::system_clock::now() - reader_.written();
   const auto now = std::chrono::steady_clock::now();
   const std::lock_guard lock(mutex_);
-  if (!make_room(last_, kMaxParticipants, sender, reader_.matched())) return;
+  if (!make_room(last_, kMaxParticipants, sender, [this] { return reader_.matched(); })) return;
   Heard& heard = last_[sender];
   const bool is_same_run = heard.announcement.run_id() == sample.run_id();
   if (!is_same_run || !sample.ready()) heard.ready_since.reset();
@@ -127,11 +129,12 @@ void ServerDirectory::note(const SimStatus& sample, const PeerId& sender) {
 
 ServerDirectory::HeardRun* ServerDirectory::find_or_add_run(const PeerId& sender,
                                                             std::uint64_t run_id) {
-  if (servers_.count(sender) == 0) {
+  const auto find_present = [this] {
     auto present = parameters_reader_.matched();
     present.insert(self_);
-    if (!make_room(servers_, kMaxServers, sender, present)) return nullptr;
-  }
+    return present;
+  };
+  if (!make_room(servers_, kMaxServers, sender, find_present)) return nullptr;
   auto& runs = servers_[sender].runs;
   for (HeardRun& run : runs)
     if (run.run_id == run_id) return &run;

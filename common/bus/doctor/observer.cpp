@@ -244,28 +244,27 @@ struct Observer::Impl : ParticipantListener {
 
   void on_publisher_discovery(dds::DomainParticipant*,
                               rtps::WriterDiscoveryInfo&& discovered) override {
-    const auto& data = discovered.info;
-    const std::lock_guard lock(mutex);
-    if (discovered.status == rtps::WriterDiscoveryInfo::REMOVED_WRITER) {
-      endpoints.erase(data.guid());
-      return;
-    }
-    endpoints[data.guid()] = {to_peer(data.guid()),        {},   data.topicName().to_string(),
-                              data.typeName().to_string(), true, data.typeMaxSerialized(),
-                              to_policies(data.m_qos)};
+    note_endpoint(discovered.info, discovered.status == rtps::WriterDiscoveryInfo::REMOVED_WRITER,
+                  true, discovered.info.typeMaxSerialized());
   }
 
   void on_subscriber_discovery(dds::DomainParticipant*,
                                rtps::ReaderDiscoveryInfo&& discovered) override {
-    const auto& data = discovered.info;
+    note_endpoint(discovered.info, discovered.status == rtps::ReaderDiscoveryInfo::REMOVED_READER,
+                  false, 0);
+  }
+
+  /// `size`: the largest sample in bytes, which only writers announce.
+  template <class Data>
+  void note_endpoint(const Data& data, bool is_gone, bool is_writer, std::uint32_t size) {
     const std::lock_guard lock(mutex);
-    if (discovered.status == rtps::ReaderDiscoveryInfo::REMOVED_READER) {
+    if (is_gone)
       endpoints.erase(data.guid());
-      return;
-    }
-    endpoints[data.guid()] = {to_peer(data.guid()),        {},    data.topicName().to_string(),
-                              data.typeName().to_string(), false, 0,
-                              to_policies(data.m_qos)};
+    else
+      endpoints[data.guid()] = {
+          to_peer(data.guid()),        {},        data.topicName().to_string(),
+          data.typeName().to_string(), is_writer, size,
+          to_policies(data.m_qos)};
   }
 
   const Options options;
