@@ -14,13 +14,12 @@ std::optional<RigidContradiction> find_rigid_contradiction(
   };
   const double load_and_rod = kRigidLoad.mass + kRigidRod.mass;
   if (vehicle.quad_mass != kRigidBaseMass)
-    return contradiction("vehicle.quad_mass_kg", to_text(kRigidBaseMass), vehicle.quad_mass);
+    return contradiction("quad_mass_kg", to_text(kRigidBaseMass), vehicle.quad_mass);
   if (vehicle.load_mass != kRigidLoad.mass && vehicle.load_mass != load_and_rod)
-    return contradiction("vehicle.load_mass_kg",
-                         to_text(kRigidLoad.mass) + " or " + to_text(load_and_rod),
+    return contradiction("load_mass_kg", to_text(kRigidLoad.mass) + " or " + to_text(load_and_rod),
                          vehicle.load_mass);
   if (vehicle.rod_length != kRigidLoad.distance)
-    return contradiction("vehicle.rod_length_m", to_text(kRigidLoad.distance), vehicle.rod_length);
+    return contradiction("rod_length_m", to_text(kRigidLoad.distance), vehicle.rod_length);
   return std::nullopt;
 }
 
@@ -28,7 +27,7 @@ void check_rigid_vehicle(const model::SlungLoadParameters& vehicle, const std::s
   const auto contradiction = find_rigid_contradiction(vehicle);
   if (!contradiction) return;
   const std::string prefix = place.empty() ? "" : place + ": ";
-  throw ConfigError(prefix + contradiction->key + ": " + contradiction->message);
+  throw ConfigError(prefix + "vehicle." + contradiction->key + ": " + contradiction->message);
 }
 
 }  // namespace sls::config

@@ -23,8 +23,7 @@ inline constexpr double kRigidBaseMass = 1.5;  ///< base link, a point mass here
 inline constexpr RigidLink kRigidRod{0.001, 0.5, 8.333e-4, 8.333e-4, 5e-5};
 inline constexpr RigidLink kRigidLoad{0.2, 1.1, 8e-4, 8e-4, 8e-4};
 
-/// A key of `vehicle` that contradicts the links, as `vehicle.rod_length_m` and
-/// `expected 1.1 (…), got 1`.
+/// A key of `vehicle` that contradicts the links, as `rod_length_m` and `expected 1.1 (…), got 1`.
 struct RigidContradiction {
   std::string key;
   std::string message;

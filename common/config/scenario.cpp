@@ -45,6 +45,13 @@ std::string read_file(const std::filesystem::path& file) {
   return text;
 }
 
+/// Puts the vehicle's own numbers in place of those of all.
+void put_own(const VehicleVariant& variant, model::SlungLoadParameters& vehicle) {
+  vehicle.quad_mass = variant.quad_mass.value_or(vehicle.quad_mass);
+  vehicle.load_mass = variant.load_mass.value_or(vehicle.load_mass);
+  vehicle.rod_length = variant.rod_length.value_or(vehicle.rod_length);
+}
+
 /// Index of the first timed stage that does not end with a control period.
 std::optional<std::size_t> find_stage_off_period(const Scenario& scenario) {
   for (std::size_t i = 0; i < scenario.mission.size(); ++i) {
@@ -61,7 +68,7 @@ struct DelayMismatch {
   bool is_too_long = false;  ///< else: not a whole number of periods
 };
 std::optional<DelayMismatch> find_delay_mismatch(const Scenario& scenario) {
-  std::int64_t periods[] = {0, 0};  // of each channel: delays of one channel add up
+  std::int64_t periods[] = {0, 0};  // of each channel: delays add up, those of all vehicles too
   for (std::size_t i = 0; i < scenario.faults.size(); ++i) {
     const Fault& fault = scenario.faults[i];
     const auto* delay = std::get_if<DelayFault>(&fault.effect);
@@ -133,6 +140,10 @@ void check_faults(const Scenario& scenario, const Places& places) {
   for (std::size_t i = 0; i < scenario.faults.size(); ++i) {
     const Fault& fault = scenario.faults[i];
     const std::string path = to_fault_path(scenario, i);
+    if (static_cast<std::size_t>(fault.vehicle) >= scenario.vehicles.size())
+      throw places.make_error_at(path + ".vehicle", "expected < the number of vehicles (" +
+                                                        std::to_string(scenario.vehicles.size()) +
+                                                        "), got " + std::to_string(fault.vehicle));
     if (fault.to_ns <= fault.from_ns)
       throw places.make_error_at(path + ".to_s", "expected > from_s (" +
                                                      to_seconds_text(fault.from_ns) + "), got " +
@@ -158,7 +169,28 @@ void check_faults(const Scenario& scenario, const Places& places) {
 void check_pendulum(const Scenario& scenario, const Places& places) {
   if (scenario.plant.pendulum != Pendulum::kRigid) return;
   if (const auto contradiction = find_rigid_contradiction(scenario.vehicle))
-    throw places.make_error_at(contradiction->key, contradiction->message);
+    throw places.make_error_at("vehicle." + contradiction->key, contradiction->message);
+  for (std::size_t i = 0; i < scenario.vehicles.size(); ++i) {
+    model::SlungLoadParameters vehicle = scenario.vehicle;
+    put_own(scenario.vehicles[i], vehicle);
+    if (const auto contradiction = find_rigid_contradiction(vehicle))
+      throw places.make_error_at("vehicles[" + std::to_string(i) + "]." + contradiction->key,
+                                 contradiction->message);
+  }
+}
+
+/// Moves where the vehicle starts and what it follows. Leave conditions refer to the reference.
+void shift(Scenario& scenario, const Eigen::Vector3d& offset) {
+  scenario.plant.initial.position += offset;
+  for (Stage& stage : scenario.mission) {
+    if (auto* constant = std::get_if<ConstantReference>(&stage.reference))
+      constant->position += offset;
+    if (auto* eight = std::get_if<FigureEightReference>(&stage.reference)) eight->offset += offset;
+    if (auto* rest = std::get_if<RestToRestReference>(&stage.reference)) {
+      rest->from += offset;
+      rest->to += offset;
+    }
+  }
 }
 
 }  // namespace
@@ -192,6 +224,32 @@ std::string to_yaml(const Scenario& scenario) {
   MapWriter writer(text);
   describe(writer, copy);
   return text;
+}
+
+std::vector<VehicleVariant> make_vehicle_grid(std::size_t count) {
+  constexpr double kSpacing = 5.0;  // m; a figure eight of 1.5 m fits between neighbours
+  std::size_t side = 1;
+  while (side * side < count) ++side;
+  std::vector<VehicleVariant> vehicles(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t row = i / side, column = i % side;
+    vehicles[i].offset << static_cast<double>(column), static_cast<double>(row), 0.0;
+    vehicles[i].offset *= kSpacing;
+  }
+  return vehicles;
+}
+
+Scenario make_vehicle_scenario(const Scenario& scenario, std::uint32_t id) {
+  const VehicleVariant& variant = scenario.vehicles.at(id);
+  Scenario alone = scenario;
+  alone.vehicles.assign(1, VehicleVariant{});
+  put_own(variant, alone.vehicle);
+  ControllerModel& model = alone.controller.model;
+  if (model.follows.quad_mass) model.vehicle.quad_mass = alone.vehicle.quad_mass;
+  if (model.follows.load_mass) model.vehicle.load_mass = alone.vehicle.load_mass;
+  if (model.follows.rod_length) model.vehicle.rod_length = alone.vehicle.rod_length;
+  if (!variant.offset.isZero(0.0)) shift(alone, variant.offset);  // −0 + 0 would be another bit
+  return alone;
 }
 
 void override_period(Scenario& scenario, double period_s) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -18,6 +19,19 @@ namespace sls::config {
 
 /// A scenario travels whole in `sls/parameters`, whose string is bounded by this.
 inline constexpr std::size_t kMaxScenarioBytes = 32768;
+
+/// Bound of the vehicle ids in `sls/parameters`.
+inline constexpr std::size_t kMaxVehicles = 256;
+
+// --- fleet -------------------------------------------------------------------------------------
+
+/// How one vehicle of a fleet differs from `vehicle`, `plant.initial` and `mission`.
+struct VehicleVariant {
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();  ///< of initial and reference positions, m
+  std::optional<double> quad_mass;                   ///< kg; none: as `vehicle` says
+  std::optional<double> load_mass;                   ///< kg
+  std::optional<double> rod_length;                  ///< m
+};
 
 // --- plant -------------------------------------------------------------------------------------
 
@@ -50,7 +64,7 @@ enum class SyncMode { kLockstep, kRealtime };
 
 /// Who must be ready before step 0.
 struct WaitFor {
-  int controllers = 1;
+  int controllers = 1;  ///< for each vehicle
   int recorders = 1;
   double timeout_s = 30.0;
 };
@@ -150,7 +164,7 @@ struct Fault {
   std::string kind;  ///< the YAML key: delay, drop, freeze, reorder, bias, noise
   FaultEffect effect;
   FaultChannel on = FaultChannel::kState;
-  int vehicle = 0;
+  int vehicle = 0;  ///< its id in the fleet
   std::int64_t from_ns = 0;
   std::int64_t to_ns = 1'000'000'000'000'000;  ///< default: to the end
 };
@@ -187,8 +201,16 @@ enum class StateWiring {
 
 /// What the controller believes; what the file leaves out equals the plant's truth.
 struct ControllerModel {
+  /// Which numbers the file leaves out: in a fleet they equal the truth of each vehicle.
+  struct Follows {
+    bool quad_mass = false;
+    bool load_mass = false;
+    bool rod_length = false;
+  };
+
   model::SlungLoadParameters vehicle;
   model::Aerodynamics air;
+  Follows follows;
 };
 
 struct Controller {
@@ -257,6 +279,7 @@ struct Record {
 struct Scenario {
   std::string name;
   model::SlungLoadParameters vehicle;
+  std::vector<VehicleVariant> vehicles{1};  ///< by id; not empty
   Plant plant;
   Sync sync;
   Controller controller;
@@ -275,8 +298,19 @@ Scenario load_scenario(const std::filesystem::path& file);
 /// The same from text that came over the wire; `place` stands for the file's name in messages.
 Scenario parse_scenario(const std::string& text, const std::string& place);
 
-/// Writes every value of `scenario` (not `text`) as YAML that reads back to the same values.
+/// Writes every value of `scenario` (not `text`) as YAML that reads back to the same values; what
+/// the controller's model follows is left out.
 std::string to_yaml(const Scenario& scenario);
+
+/// `count` equal vehicles on a level square grid, 5 m apart: rows of ⌈√count⌉ along x, the first
+/// vehicle at offset zero.
+std::vector<VehicleVariant> make_vehicle_grid(std::size_t count);
+
+/// The scenario of vehicle `id` alone: its own parameters, initial position and references, and one
+/// entry in `vehicles`. An offset of zero leaves every bit as it is. Name, text and hash stay those
+/// of the fleet; so do the faults, whose `vehicle` still counts in it.
+/// @throws std::out_of_range if there is no such vehicle.
+Scenario make_vehicle_scenario(const Scenario& scenario, std::uint32_t id);
 
 /// `seconds` in whole nanoseconds, or nothing where it is not a whole number of them (within 1e-3
 /// ns, so that 0.004 is exactly 4,000,000).

@@ -11,6 +11,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -76,7 +77,7 @@ struct Range {
 };
 inline constexpr Range kControllers{1, 100};
 inline constexpr Range kRecorders{0, 100};
-inline constexpr Range kVehicles{0, 0};  // a scenario has one
+inline constexpr Range kVehicleIds{0, static_cast<int>(kMaxVehicles) - 1};
 
 /// Bounds of a number that needs more digits than an int has.
 struct WideRange {
@@ -94,6 +95,7 @@ struct ListRange {
 };
 inline constexpr ListRange kStages{1, 1000, "stages"};
 inline constexpr ListRange kFaults{0, 1000, "faults"};
+inline constexpr ListRange kFleet{1, static_cast<int>(kMaxVehicles), "vehicles"};
 
 template <class Enum>
 struct Name {
@@ -144,11 +146,19 @@ Type& as(Variant& variant) {
 // --- vehicle and plant ---------------------------------------------------------------------------
 
 template <class Map>
-void describe(Map& map, model::SlungLoadParameters& vehicle, Presence presence = kRequired) {
-  map.key(presence, "quad_mass_kg", vehicle.quad_mass, kPositive);
-  map.key(presence, "load_mass_kg", vehicle.load_mass, kPositive);
-  map.key(presence, "rod_length_m", vehicle.rod_length, kPositive);
-  map.key(presence, "gravity_m_s2", vehicle.gravity, kPositive);
+void describe(Map& map, model::SlungLoadParameters& vehicle) {
+  map.key(kRequired, "quad_mass_kg", vehicle.quad_mass, kPositive);
+  map.key(kRequired, "load_mass_kg", vehicle.load_mass, kPositive);
+  map.key(kRequired, "rod_length_m", vehicle.rod_length, kPositive);
+  map.key(kRequired, "gravity_m_s2", vehicle.gravity, kPositive);
+}
+
+template <class Map>
+void describe(Map& map, VehicleVariant& variant) {
+  map.key(kOptional, "offset_m", variant.offset);
+  map.key(kOptional, "quad_mass_kg", variant.quad_mass, kPositive);
+  map.key(kOptional, "load_mass_kg", variant.load_mass, kPositive);
+  map.key(kOptional, "rod_length_m", variant.rod_length, kPositive);
 }
 
 template <class Map>
@@ -261,9 +271,23 @@ void describe(Map& map, Gains& gains) {
   }
 }
 
+/// A number that follows the truth unless the file says it.
+template <class Map>
+void describe_believed(Map& map, const char* name, double& number, bool& follows) {
+  std::optional<double> own = follows ? std::nullopt : std::optional(number);
+  map.key(kOptional, name, own, kPositive);
+  number = own.value_or(number);
+  follows = !own;
+}
+
 template <class Map>
 void describe(Map& map, ControllerModel& believed) {
-  describe(map, believed.vehicle, kOptional);
+  model::SlungLoadParameters& vehicle = believed.vehicle;
+  ControllerModel::Follows& follows = believed.follows;
+  describe_believed(map, "quad_mass_kg", vehicle.quad_mass, follows.quad_mass);
+  describe_believed(map, "load_mass_kg", vehicle.load_mass, follows.load_mass);
+  describe_believed(map, "rod_length_m", vehicle.rod_length, follows.rod_length);
+  map.key(kOptional, "gravity_m_s2", vehicle.gravity, kPositive);
   describe(map, believed.air);
 }
 
@@ -398,7 +422,7 @@ struct FaultBody {
 template <class Map, class Effect>
 void describe(Map& map, FaultBody<Effect>& body) {
   map.decide("on", body.fault.on, [&](FaultChannel on) { describe_effect(map, body.effect, on); });
-  map.key(kOptional, "vehicle", body.fault.vehicle, kVehicles);
+  map.key(kOptional, "vehicle", body.fault.vehicle, kVehicleIds);
   map.key(kOptional, "from_s", body.fault.from_ns, kNotNegative);
   map.key(kOptional, "to_s", body.fault.to_ns, kPositive);
 }
@@ -442,9 +466,11 @@ template <class Map>
 void describe(Map& map, Scenario& scenario) {
   map.key(kRequired, "name", scenario.name, kFolderName);
   map.key(kRequired, "vehicle", scenario.vehicle);
+  map.key(kOptional, "vehicles", scenario.vehicles, kFleet);
   map.key(kRequired, "plant", scenario.plant);
   map.key(kOptional, "sync", scenario.sync);
-  map.by_default(scenario.controller.model, ControllerModel{scenario.vehicle, scenario.plant.air});
+  map.by_default(scenario.controller.model,
+                 ControllerModel{scenario.vehicle, scenario.plant.air, {true, true, true}});
   map.key(kOptional, "controller", scenario.controller);
   map.key(kRequired, "mission", scenario.mission, kStages);
   map.key(kOptional, "faults", scenario.faults, kFaults);

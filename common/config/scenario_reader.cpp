@@ -68,15 +68,33 @@ double read_number(const Value& value) {
   return *number;
 }
 
+/// The whole number in `node` if it is one within `range`.
+template <class Number, class Bounds>
+std::optional<Number> find_whole_number(const YamlNode& node, const Bounds& range) {
+  Number number = 0;
+  const std::string& text = node.text;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  const bool whole = node.kind == YamlNode::Kind::kScalar && !node.quoted && error == std::errc() &&
+                     end == text.data() + text.size();
+  return whole && number >= range.least && number <= range.most ? std::optional(number)
+                                                                : std::nullopt;
+}
+
+template <class Bounds>
+std::string to_whole_number(const Bounds& range) {
+  return "a whole number from " + std::to_string(range.least) + " to " + std::to_string(range.most);
+}
+
+std::string to_list(const ListRange& range) {
+  return "a list of " + std::to_string(range.least) + " to " + std::to_string(range.most) + " " +
+         range.elements;
+}
+
 template <class Number, class Bounds>
 void read_whole_number(const Value& value, Number& number, const Bounds& range) {
-  const std::string& text = value.node.text;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  const bool whole = value.node.kind == YamlNode::Kind::kScalar && !value.node.quoted &&
-                     error == std::errc() && end == text.data() + text.size();
-  if (whole && number >= range.least && number <= range.most) return;
-  const std::string least = std::to_string(range.least), most = std::to_string(range.most);
-  value.fail_expecting(least == most ? least : "a whole number from " + least + " to " + most);
+  const auto whole = find_whole_number<Number>(value.node, range);
+  if (!whole) value.fail_expecting(to_whole_number(range));
+  number = *whole;
 }
 
 }  // namespace
@@ -139,6 +157,10 @@ void read_value(const Value& value, double& number, const NumberRule& rule) {
   if (!rule.holds(number)) value.fail_expecting(rule.expectation);
 }
 
+void read_value(const Value& value, std::optional<double>& number, const NumberRule& rule) {
+  read_value(value, number.emplace(), rule);
+}
+
 void read_value(const Value& value, std::int64_t& nanoseconds, const NumberRule& rule) {
   double seconds = 0.0;
   read_value(value, seconds, rule);
@@ -179,12 +201,22 @@ void read_value(const Value& value, Eigen::Vector3d& vector, const NumberRule& o
   for (int i = 0; i < 3; ++i) read_value(value.at(static_cast<std::size_t>(i)), vector[i], of_each);
 }
 
+void read_value(const Value& value, std::vector<VehicleVariant>& fleet, const ListRange& range) {
+  if (value.node.kind == YamlNode::Kind::kList) {
+    fleet.assign(read_list_length(value, range), VehicleVariant{});
+    for (std::size_t i = 0; i < fleet.size(); ++i) read_value(value.at(i), fleet[i]);
+    return;
+  }
+  const auto count = find_whole_number<int>(value.node, range);
+  if (!count) value.fail_expecting(to_whole_number(range) + " or " + to_list(range));
+  fleet = make_vehicle_grid(static_cast<std::size_t>(*count));
+}
+
 std::size_t read_list_length(const Value& value, const ListRange& range) {
   const std::size_t length = value.node.items.size();
   if (value.node.kind != YamlNode::Kind::kList || length < static_cast<std::size_t>(range.least) ||
       length > static_cast<std::size_t>(range.most))
-    value.fail_expecting("a list of " + std::to_string(range.least) + " to " +
-                         std::to_string(range.most) + " " + range.elements);
+    value.fail_expecting(to_list(range));
   return length;
 }
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <initializer_list>
 #include <map>
+#include <optional>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -88,6 +89,7 @@ void check_keys(const Value& value, const std::vector<std::string>& known);
 
 // One per type of field. @throws ConfigError where the node is something else or breaks the rule.
 void read_value(const Value& value, double& number, const NumberRule& rule);
+void read_value(const Value& value, std::optional<double>& number, const NumberRule& rule);
 void read_value(const Value& value, std::int64_t& nanoseconds, const NumberRule& rule);
 void read_value(const Value& value, int& number, const Range& range);
 void read_value(const Value& value, std::uint64_t& number, const WideRange& range);
@@ -95,6 +97,7 @@ void read_value(const Value& value, bool& flag);
 void read_value(const Value& value, std::string& text, const TextRule& rule);
 void read_value(const Value& value, Eigen::Vector3d& vector);
 void read_value(const Value& value, Eigen::Vector3d& vector, const NumberRule& of_each);
+void read_value(const Value& value, std::vector<VehicleVariant>& fleet, const ListRange& range);
 std::size_t read_list_length(const Value& value, const ListRange& range);
 
 template <class Enum>

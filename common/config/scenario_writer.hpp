@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <initializer_list>
+#include <optional>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -13,6 +14,7 @@
 namespace sls::config {
 
 inline std::string to_yaml_value(double number) { return to_text(number); }
+inline std::string to_yaml_value(const std::optional<double>& number) { return to_text(*number); }
 inline std::string to_yaml_value(std::int64_t nanoseconds) {
   return to_text(to_seconds(nanoseconds));
 }
@@ -39,7 +41,13 @@ std::string to_yaml_value(Enum value) {
 template <class Field>
 inline constexpr bool kOnOneLine =
     std::is_arithmetic_v<Field> || std::is_enum_v<Field> || std::is_same_v<Field, std::string> ||
-    std::is_same_v<Field, Eigen::Vector3d>;
+    std::is_same_v<Field, Eigen::Vector3d> || std::is_same_v<Field, std::optional<double>>;
+
+template <class Field>
+bool says_nothing(const Field&) {
+  return false;
+}
+inline bool says_nothing(const std::optional<double>& number) { return !number; }
 
 /// The `Map` that writes: describe(writer, field) appends `field` to the text.
 class MapWriter {
@@ -49,6 +57,7 @@ class MapWriter {
 
   template <class Field, class... Rule>
   void key(Presence, const char* name, Field& field, const Rule&... rule) {
+    if (says_nothing(field)) return;
     text_ += next_ + name + ":";
     next_ = indentation_;
     if constexpr (kOnOneLine<Field>) {

@@ -31,6 +31,9 @@ mission:
 constexpr const char* kEveryKey = R"(
 name: every_key
 vehicle: { quad_mass_kg: 1.6, load_mass_kg: 0.16, rod_length_m: 0.7, gravity_m_s2: 10 }
+vehicles:
+  - { offset_m: [1, 2, 3], quad_mass_kg: 1.8, load_mass_kg: 0.18, rod_length_m: 0.9 }
+  - {}
 plant:
   pendulum: ideal
   step_s: 0.0005
@@ -78,7 +81,7 @@ mission:
   - rest_to_rest: { from_m: [1, 1, 1], to_m: [2, 2, 2], duration_s: 3 }
     for_s: 4
 faults:
-  - delay: { on: command, vehicle: 0, from_s: 1, to_s: 2, by_s: 0.02 }
+  - delay: { on: command, vehicle: 1, from_s: 1, to_s: 2, by_s: 0.02 }
   - drop: { on: state, probability: 0.2, seed: 7, from_s: 4, to_s: 8 }
   - freeze: { on: state, from_s: 5, to_s: 5.2 }
   - reorder: { on: command, probability: 0.1, seed: 9223372036854775807 }
@@ -101,6 +104,19 @@ TEST(ScenarioTest, ReadsTheExampleOfTheDesign) {
   EXPECT_EQ(scenario.plant.initial.placed, Body::kLoad);
   EXPECT_EQ(scenario.plant.initial.position, Vector3d(0, 0, -0.5));
   EXPECT_EQ(scenario.text, kDesignExample);
+}
+
+TEST(ScenarioTest, ReadsEveryKeyOfTheVehicles) {
+  const auto vehicles = parse_scenario(kEveryKey, "file").vehicles;
+  ASSERT_EQ(vehicles.size(), 2u);
+  EXPECT_EQ(vehicles[0].offset, Vector3d(1, 2, 3));
+  EXPECT_EQ(vehicles[0].quad_mass, 1.8);
+  EXPECT_EQ(vehicles[0].load_mass, 0.18);
+  EXPECT_EQ(vehicles[0].rod_length, 0.9);
+  EXPECT_EQ(vehicles[1].offset, Vector3d(0, 0, 0));
+  EXPECT_EQ(vehicles[1].quad_mass, std::nullopt);
+  EXPECT_EQ(vehicles[1].load_mass, std::nullopt);
+  EXPECT_EQ(vehicles[1].rod_length, std::nullopt);
 }
 
 TEST(ScenarioTest, ReadsEveryKeyOfThePlant) {
@@ -203,7 +219,8 @@ TEST(ScenarioTest, ReadsEveryKeyOfTheFaults) {
             "delay command, drop state, freeze state, reorder command, bias state, bias command, "
             "noise state, noise command, ");
   EXPECT_EQ(std::get<DelayFault>(faults[0].effect).by_ns, 20'000'000);
-  EXPECT_EQ(faults[0].vehicle, 0);
+  EXPECT_EQ(faults[0].vehicle, 1);
+  EXPECT_EQ(faults[1].vehicle, 0);
   EXPECT_EQ(faults[0].from_ns, 1'000'000'000);
   EXPECT_EQ(faults[0].to_ns, 2'000'000'000);
   EXPECT_EQ(std::get<DropFault>(faults[1].effect).probability, 0.2);
@@ -288,6 +305,8 @@ TEST(ScenarioTest, LeavesTheDefaultsWhereTheFileIsSilent) {
   EXPECT_EQ(scenario.plant.pendulum, Pendulum::kIdeal);
   EXPECT_EQ(scenario.plant.step_ns, 1'000'000);
   EXPECT_EQ(scenario.plant.air, model::Aerodynamics{});
+  ASSERT_EQ(scenario.vehicles.size(), 1u);
+  EXPECT_EQ(scenario.vehicles[0].offset, Vector3d(0, 0, 0));
   EXPECT_EQ(scenario.sync.mode, SyncMode::kLockstep);
   EXPECT_EQ(scenario.sync.period_ns, 4'000'000);
   EXPECT_EQ(scenario.sync.take_over_s, 0.1);

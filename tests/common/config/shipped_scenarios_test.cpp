@@ -92,12 +92,26 @@ void expect_mission(const Scenario& scenario, double z, Body body, const Vector3
 TEST(ShippedScenariosTest, AreThese) {
   std::set<std::string> names;
   for (const auto& file : list_yaml_files("config/scenarios")) names.insert(file.stem().string());
-  EXPECT_EQ(names,
-            (std::set<std::string>{"faulty_figure_eight", "figure_eight", "gazebo_correct_wiring",
-                                   "gazebo_corrected", "gazebo_legacy", "integral_mass_error",
-                                   "matlab_figure_eight", "matlab_setpoint_1", "matlab_setpoint_2",
-                                   "matlab_setpoint_3", "mission", "rest_to_rest",
-                                   "rigid_figure_eight", "rotor_drag", "setpoints", "short"}));
+  EXPECT_EQ(names, (std::set<std::string>{"faulty_figure_eight",
+                                          "figure_eight",
+                                          "fleet",
+                                          "gazebo_correct_wiring",
+                                          "gazebo_corrected",
+                                          "gazebo_legacy",
+                                          "integral_mass_error",
+                                          "mass_error_without_integral",
+                                          "matlab_figure_eight",
+                                          "matlab_setpoint_1",
+                                          "matlab_setpoint_2",
+                                          "matlab_setpoint_3",
+                                          "mission",
+                                          "mixed_fleet",
+                                          "rest_to_rest",
+                                          "rigid_figure_eight",
+                                          "rotor_drag",
+                                          "rotor_drag_without_feed_forward",
+                                          "setpoints",
+                                          "short"}));
 }
 
 TEST(ShippedScenariosTest, ShareTimingAndBearTheirFilesName) {
@@ -126,7 +140,7 @@ TEST(ShippedScenariosTest, FitAOneMillisecondPeriod) {
 
 TEST(ShippedScenariosTest, ControllerKnowsTheTruthExceptWhereTheTableSaysSo) {
   const std::set<std::string> mistaken{"gazebo_legacy", "gazebo_correct_wiring",
-                                       "integral_mass_error"};
+                                       "integral_mass_error", "mass_error_without_integral"};
   for (const auto& file : list_yaml_files("config/scenarios")) {
     const Scenario scenario = load_scenario(file);
     const bool knows = scenario.controller.model.vehicle == scenario.vehicle;
@@ -244,6 +258,31 @@ TEST(ShippedScenariosTest, RotorDrag) {
   expect_eight(scenario.mission[0], -0.5, 32);
 }
 
+TEST(ShippedScenariosTest, MassErrorWithoutIntegralLacksNothingElse) {
+  const Scenario with = load("integral_mass_error"), without = load("mass_error_without_integral");
+  EXPECT_EQ(without.vehicle, with.vehicle);
+  EXPECT_EQ(without.controller.model.vehicle, with.controller.model.vehicle);
+  expect_named(without.controller.gains, {3.2469, 8.5803, 9.8503, 5.4498, 0},
+               {2.2667, 3.0876, 0, 0, 0});
+  expect_start(without, Body::kLoad, {0, 0, -1.5});
+  for (const Scenario* scenario : {&with, &without}) {
+    ASSERT_EQ(scenario->mission.size(), 1u);
+    expect_constant(scenario->mission[0], "set_point", {1, -1, -2});
+    expect_timed(scenario->mission[0], 300);
+  }
+}
+
+TEST(ShippedScenariosTest, RotorDragWithoutFeedForwardLacksNothingElse) {
+  const Scenario with = load("rotor_drag"), without = load("rotor_drag_without_feed_forward");
+  EXPECT_EQ(without.vehicle, with.vehicle);
+  EXPECT_EQ(without.plant.air, with.plant.air);
+  EXPECT_FALSE(without.controller.drag_feed_forward);
+  expect_lqr(without.controller.gains, 10, 5);
+  expect_start(without, Body::kLoad, {0, 0, -0.5});
+  ASSERT_EQ(without.mission.size(), 1u);
+  expect_eight(without.mission[0], -0.5, 32);
+}
+
 TEST(ShippedScenariosTest, FaultyFigureEightShowsEveryKindOfFault) {
   const Scenario scenario = load("faulty_figure_eight");
   EXPECT_EQ(scenario.vehicle, kVehicle);
@@ -260,6 +299,35 @@ TEST(ShippedScenariosTest, OnlyTheFaultyOneHasFaults) {
     const Scenario scenario = load_scenario(file);
     EXPECT_EQ(scenario.faults.empty(), scenario.name != "faulty_figure_eight") << file;
   }
+}
+
+TEST(ShippedScenariosTest, OnlyTheFleetsHaveMoreThanOneVehicle) {
+  for (const auto& file : list_yaml_files("config/scenarios")) {
+    const Scenario scenario = load_scenario(file);
+    const std::size_t vehicles =
+        scenario.name == "fleet" ? 10 : (scenario.name == "mixed_fleet" ? 4 : 1);
+    EXPECT_EQ(scenario.vehicles.size(), vehicles) << file;
+    EXPECT_EQ(scenario.vehicles[0].offset, Vector3d(0, 0, 0)) << file;
+  }
+}
+
+TEST(ShippedScenariosTest, Fleet) {
+  const Scenario scenario = load("fleet");
+  EXPECT_EQ(scenario.vehicle, kVehicle);
+  expect_start(scenario, Body::kLoad, {0, 0, -0.5});
+  ASSERT_EQ(scenario.mission.size(), 1u);
+  expect_eight(scenario.mission[0], -0.5, 16);
+}
+
+TEST(ShippedScenariosTest, MixedFleetHasFourDifferentVehicles) {
+  const Scenario scenario = load("mixed_fleet");
+  EXPECT_EQ(scenario.vehicle, kVehicle);
+  ASSERT_EQ(scenario.vehicles.size(), 4u);
+  for (std::uint32_t a = 0; a < 4; ++a)
+    for (std::uint32_t b = 0; b < a; ++b)
+      EXPECT_FALSE(make_vehicle_scenario(scenario, a).vehicle ==
+                   make_vehicle_scenario(scenario, b).vehicle)
+          << a << " " << b;
 }
 
 TEST(ShippedScenariosTest, Short) {

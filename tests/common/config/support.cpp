@@ -51,11 +51,20 @@ bool are_equal(const Gains& a, const Gains& b) {
   return are_equal(named.horizontal, other.horizontal) && are_equal(named.vertical, other.vertical);
 }
 
+bool are_equal(const VehicleVariant& a, const VehicleVariant& b) {
+  return a.offset == b.offset && a.quad_mass == b.quad_mass && a.load_mass == b.load_mass &&
+         a.rod_length == b.rod_length;
+}
+
+bool are_equal(const ControllerModel& a, const ControllerModel& b) {
+  return a.vehicle == b.vehicle && a.air == b.air && a.follows.quad_mass == b.follows.quad_mass &&
+         a.follows.load_mass == b.follows.load_mass && a.follows.rod_length == b.follows.rod_length;
+}
+
 bool are_equal(const Controller& a, const Controller& b) {
   return a.law == b.law && are_equal(a.gains, b.gains) && a.force_limit_n == b.force_limit_n &&
          a.saturate == b.saturate && a.drag_feed_forward == b.drag_feed_forward &&
-         a.state_wiring == b.state_wiring && a.model.vehicle == b.model.vehicle &&
-         a.model.air == b.model.air;
+         a.state_wiring == b.state_wiring && are_equal(a.model, b.model);
 }
 
 bool are_equal(const StageReference& a, const StageReference& b) {
@@ -209,7 +218,7 @@ Controller make_random_controller(Dice& dice) {
   controller.saturate = dice.toss();
   controller.drag_feed_forward = dice.toss();
   controller.state_wiring = dice.toss() ? StateWiring::kCorrect : StateWiring::kGazeboPlugin;
-  controller.model = {make_random_vehicle(dice), make_random_air(dice)};
+  controller.model = {make_random_vehicle(dice), make_random_air(dice), {}};
   return controller;
 }
 
@@ -259,13 +268,31 @@ SampleOffset make_random_offset(Dice& dice, FaultChannel on, bool is_signed) {
   return offset;
 }
 
-Fault make_random_fault(Dice& dice, std::int64_t period_ns) {
+VehicleVariant make_random_variant(Dice& dice) {
+  VehicleVariant variant;
+  if (dice.toss()) variant.offset = dice.vector();
+  if (dice.toss()) variant.quad_mass = dice.positive();
+  if (dice.toss()) variant.load_mass = dice.positive();
+  if (dice.toss()) variant.rod_length = dice.positive();
+  return variant;
+}
+
+/// What the file leaves out is the truth.
+void follow_at_random(Dice& dice, ControllerModel& model, const model::SlungLoadParameters& truth) {
+  model.follows = {dice.toss(), dice.toss(), dice.toss()};
+  if (model.follows.quad_mass) model.vehicle.quad_mass = truth.quad_mass;
+  if (model.follows.load_mass) model.vehicle.load_mass = truth.load_mass;
+  if (model.follows.rod_length) model.vehicle.rod_length = truth.rod_length;
+}
+
+Fault make_random_fault(Dice& dice, std::int64_t period_ns, std::size_t vehicles) {
   static const char* const kKinds[] = {"delay", "drop", "freeze", "reorder", "bias", "noise"};
   const auto seed = [&] { return static_cast<std::uint64_t>(dice.nanoseconds(0, INT64_MAX)); };
   Fault fault;
   const int kind = dice.roll(0, 5);
   fault.kind = kKinds[kind];
   fault.on = dice.toss() ? FaultChannel::kState : FaultChannel::kCommand;
+  fault.vehicle = dice.roll(0, static_cast<int>(vehicles) - 1);
   if (kind == 0) fault.effect = DelayFault{period_ns * dice.roll(0, 10'000)};
   if (kind == 1) fault.effect = DropFault{dice.between(0.0, 1.0), seed()};
   if (kind == 2) fault.effect = FreezeFault{};
@@ -293,8 +320,12 @@ const char* const kMinimalScenario =
     "    for_s: 2\n";
 
 bool are_equal(const Scenario& a, const Scenario& b) {
-  return a.name == b.name && a.vehicle == b.vehicle && are_equal(a.plant, b.plant) &&
-         are_equal(a.sync, b.sync) && are_equal(a.controller, b.controller) &&
+  return a.name == b.name && a.vehicle == b.vehicle &&
+         std::equal(
+             a.vehicles.begin(), a.vehicles.end(), b.vehicles.begin(), b.vehicles.end(),
+             [](const VehicleVariant& x, const VehicleVariant& y) { return are_equal(x, y); }) &&
+         are_equal(a.plant, b.plant) && are_equal(a.sync, b.sync) &&
+         are_equal(a.controller, b.controller) &&
          std::equal(a.mission.begin(), a.mission.end(), b.mission.begin(), b.mission.end(),
                     [](const Stage& x, const Stage& y) { return are_equal(x, y); }) &&
          std::equal(a.faults.begin(), a.faults.end(), b.faults.begin(), b.faults.end(),
@@ -312,13 +343,18 @@ Scenario make_random_scenario(std::mt19937_64& random) {
   scenario.controller = make_random_controller(dice);
   for (int left = dice.roll(1, 12); left > 0; --left)
     scenario.mission.push_back(make_random_stage(dice, scenario.sync.period_ns));
+  scenario.vehicles.resize(static_cast<std::size_t>(dice.roll(1, 5)));
+  for (VehicleVariant& variant : scenario.vehicles) variant = make_random_variant(dice);
   for (int left = dice.roll(0, 9); left > 0; --left)
-    scenario.faults.push_back(make_random_fault(dice, scenario.sync.period_ns));
+    scenario.faults.push_back(
+        make_random_fault(dice, scenario.sync.period_ns, scenario.vehicles.size()));
   scenario.record.flush_s = dice.between(1e-6, 0.2);
   if (dice.roll(0, 4) == 0) {
     scenario.plant.pendulum = Pendulum::kRigid;
     scenario.vehicle = {1.5, dice.toss() ? 0.2 : 0.201, 1.1, dice.positive()};
+    scenario.vehicles = make_vehicle_grid(scenario.vehicles.size());
   }
+  follow_at_random(dice, scenario.controller.model, scenario.vehicle);
   return scenario;
 }
 
