@@ -2,11 +2,15 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+#include <limits>
 #include <thread>
 
 #include "common/app/run_main.hpp"
+#include "common/app/scheduling.hpp"
 #include "common/app/stop_signal.hpp"
 #include "common/app/wait.hpp"
+#include "common/config/vehicle_ids.hpp"
 #include "control_client/messages.hpp"
 
 namespace sls::control {
@@ -20,21 +24,18 @@ constexpr auto kPollTime = 20ms;             // while nothing is in a hurry
 
 }  // namespace
 
-Client::Client(bus::Node& node, const config::Scenario& scenario, const std::string& name,
+Client::Client(bus::Node& node, const config::Scenario& scenario,
+               const std::vector<std::uint32_t>& vehicle_ids, const std::string& name,
                std::int32_t strength, bool follows_servers)
     : node_(node),
       scenario_(scenario),
       name_(name),
       strength_(strength),
       follows_servers_(follows_servers),
+      vehicle_ids_(vehicle_ids),
       participants_(node),
       servers_(node),
-      participant_writer_(node),
-      reference_writer_(node),
-      state_reader_(node, bus::kLoopReaderProfile,
-                    [this](const VehicleState& state, const bus::PeerId& sender) {
-                      receive(state, sender);
-                    }) {}
+      participant_writer_(node) {}
 
 void Client::run() {
   auto next = find_first_run();
@@ -47,17 +48,24 @@ void Client::run() {
 
 std::optional<bus::Run> Client::find_first_run() {
   const double timeout_s = scenario_.sync.wait_for.timeout_s;
+  const std::string vehicles = config::to_vehicle_ranges(vehicle_ids_);
   app::Wait wait(timeout_s, kUsualJoinTime);
   while (app::stop_signal() == 0) {
-    if (auto run = servers_.find_joinable(vehicle_id_)) return run;
+    if (auto run = find_joinable_run()) return run;
     if (wait.is_over())
-      throw app::RunError(fmt::format("no server for vehicle {} within {} s{}", vehicle_id_,
-                                      timeout_s, node_.describe_loneliness()));
+      throw app::RunError(fmt::format("no server for vehicle {} within {} s{}", vehicles, timeout_s,
+                                      node_.describe_loneliness()));
     if (wait.is_report_due())
-      spdlog::info("waiting for: server of vehicle {} ({:.0f} s left){}", vehicle_id_,
+      spdlog::info("waiting for: server of vehicle {} ({:.0f} s left){}", vehicles,
                    wait.seconds_left(), node_.describe_loneliness());
     std::this_thread::sleep_for(kPollTime);
   }
+  return std::nullopt;
+}
+
+std::optional<bus::Run> Client::find_joinable_run() const {
+  for (const std::uint32_t id : vehicle_ids_)
+    if (auto run = servers_.find_joinable(id)) return run;
   return std::nullopt;
 }
 
@@ -67,29 +75,39 @@ void Client::begin(const bus::Run& run) {
     throw config::ConfigError(
         fmt::format("scenario '{}': expected the server's, SHA-256 {}, got {}", scenario_.name,
                     parameters.scenario_sha256().c_str(), scenario_.sha256));
-  const char* profile = parameters.mode() == MODE_REALTIME
-                            ? node_.choose_writer_profile(bus::kRealtimeCommandWriterProfile,
-                                                          bus::kStreamWriterProfile)
-                            : bus::kStreamWriterProfile;
+  const LoopKind kind = {bus::is_fleet(parameters), parameters.mode() == MODE_REALTIME};
+  config::Scenario scenario = scenario_;
+  scenario.sync.period_ns = parameters.period_ns();
+  scenario.plant.step_ns = parameters.step_ns();
+  std::map<std::uint32_t, Pilot> pilots;
+  flown_ids_.clear();
+  for (const std::uint32_t id : vehicle_ids_) {
+    if (!bus::serves_vehicle(parameters, id)) continue;
+    flown_ids_.push_back(id);
+    pilots.try_emplace(id, config::make_vehicle_scenario(scenario, id));
+  }
   // Made and destroyed outside the lock: the middleware waits for handlers meanwhile, and ours for
   // the lock.
-  auto writer = profile == command_profile_
+  auto stream = stream_ && stream_->kind() == kind
                     ? nullptr
-                    : std::make_unique<bus::Writer<ControlCommand>>(node_, profile);
-  command_profile_ = profile;
+                    : std::make_unique<AnswerStream>(
+                          node_, kind,
+                          [this](const VehicleState* states, std::size_t count,
+                                 const bus::PeerId& sender) { receive(states, count, sender); });
   {
     const std::lock_guard lock(answer_mutex_);
     run_ = run;
-    scenario_.sync.period_ns = parameters.period_ns();
-    scenario_.plant.step_ns = parameters.step_ns();
-    controller_ = std::make_unique<FlightController>(scenario_);
-    last_command_.reset();
-    if (writer) command_writer_.swap(writer);
+    scenario_ = std::move(scenario);
+    pilots_ = std::move(pilots);
+    if (stream) stream_.swap(stream);
   }
+  if (kind.is_realtime) app::put_process_first();
   ready_ = false;
   watch_.emplace(servers_, run, scenario_.sync.wait.server_deadline_s);
-  spdlog::info("'{}' joins run {:016x}: {}, period {} s", name_, parameters.run_id(),
-               scenario_.name, scenario_.sync.period_ns * 1e-9);
+  const std::string vehicles =
+      kind.is_fleet ? ", vehicles " + config::to_vehicle_ranges(flown_ids_) : "";
+  spdlog::info("'{}' joins run {:016x}: {}{}, period {} s", name_, parameters.run_id(),
+               scenario_.name, vehicles, scenario_.sync.period_ns * 1e-9);
   announce(false, false);
 }
 
@@ -98,8 +116,7 @@ void Client::leave() {
   const auto status = servers_.find_status(run_id);
   const bool is_finished = status && status->phase() == PHASE_FINISHED;
   announce(false, true);
-  command_writer_->wait_for_acknowledgments(kAcknowledgmentTime);
-  reference_writer_.wait_for_acknowledgments(kAcknowledgmentTime);
+  stream_->wait_for_acknowledgments(kAcknowledgmentTime);
   if (app::stop_signal() == 0)
     bus::wait_for_recorders_to_end(participants_, run_id,
                                    is_finished ? scenario_.sync.wait_for.recorders : 0);
@@ -108,14 +125,10 @@ void Client::leave() {
 }
 
 bool Client::sees_all_endpoints() const {
-  if (state_reader_.matched().count(run_->server) == 0) return false;
-  const auto command_readers = command_writer_->matched();
-  const auto reference_readers = reference_writer_.matched();
-  if (command_readers.count(run_->server) == 0) return false;
+  if (!stream_->sees_server(run_->server)) return false;
   int recorders = 0;
   for (const auto& entry : participants_.find(ROLE_RECORDER, run_->parameters.run_id()))
-    if (command_readers.count(entry.peer) > 0 && reference_readers.count(entry.peer) > 0)
-      ++recorders;
+    if (stream_->sees_recorder(entry.peer)) ++recorders;
   return recorders >= scenario_.sync.wait_for.recorders;
 }
 
@@ -133,36 +146,39 @@ std::optional<bus::Run> Client::serve() {
   return std::nullopt;
 }
 
-void Client::receive(const VehicleState& state, const bus::PeerId& sender) {
+void Client::receive(const VehicleState* states, std::size_t count, const bus::PeerId& sender) {
+  const std::lock_guard lock(answer_mutex_);
   try {
-    answer(state, sender);
+    answer(states, count, sender);
   } catch (...) {  // an exception must not reach the middleware
-    const std::lock_guard lock(answer_mutex_);
     answer_error_ = std::current_exception();
   }
 }
 
-void Client::answer(const VehicleState& state, const bus::PeerId& sender) {
-  const std::lock_guard lock(answer_mutex_);
-  const bool is_ours = run_ && sender == run_->server &&
-                       state.run_id() == run_->parameters.run_id() &&
-                       state.vehicle_id() == vehicle_id_;
-  if (!is_ours) return;
-  if (last_command_ && last_command_->step() == state.step()) {
-    command_writer_->write(*last_command_);
-    return;
+void Client::answer(const VehicleState* states, std::size_t count, const bus::PeerId& sender) {
+  if (!run_ || !(sender == run_->server)) return;
+  references_.clear();
+  commands_.clear();
+  for (std::size_t i = 0; i < count; ++i) {
+    if (states[i].run_id() != run_->parameters.run_id()) continue;
+    const auto pilot = pilots_.find(states[i].vehicle_id());
+    if (pilot != pilots_.end()) answer(pilot->second, states[i]);
   }
-  const auto began = Clock::now();
-  const Answer answer =
-      controller_->calc_answer(state.step(), to_model_state(state), to_memory(state.controller()));
-  const auto compute_time = Clock::now() - began;
-  last_command_ = make_command_message(state, answer, name_, strength_, compute_time);
-  // The reference first: once the command is out the server moves on, and a client that is killed
-  // then must not have kept back what a recorder needs of this step.
-  reference_writer_.write(make_reference_message(state, answer, name_));
-  command_writer_->write(*last_command_);
-  if (answer.fault != Fault::kNone)
-    spdlog::error("step {}: fault {}", state.step(), to_string(answer.fault));
+  stream_->write(references_, commands_);
+}
+
+void Client::answer(Pilot& pilot, const VehicleState& state) {
+  if (!pilot.last_command || pilot.last_command->step() != state.step()) {
+    const auto began = Clock::now();
+    const Answer answer = pilot.controller.calc_answer(state.step(), to_model_state(state),
+                                                       to_memory(state.controller()));
+    const auto compute_time = Clock::now() - began;
+    pilot.last_command = make_command_message(state, answer, name_, strength_, compute_time);
+    references_.push_back(make_reference_message(state, answer, name_));
+    if (answer.fault != Fault::kNone)
+      spdlog::error("step {}: fault {}", state.step(), to_string(answer.fault));
+  }
+  commands_.push_back(*pilot.last_command);
 }
 
 void Client::rethrow_answer_error() {
@@ -177,7 +193,7 @@ bool Client::has_ended() const {
 
 std::optional<bus::Run> Client::find_successor() {
   const auto finding = watch_->look();
-  const auto next = servers_.find_joinable(vehicle_id_);
+  const auto next = find_joinable_run();
   if (next && next->parameters.run_id() != run_->parameters.run_id()) {
     const bool is_reset = next->server == run_->server;
     const bool is_replaced = servers_.is_silent(run_->parameters.run_id());
@@ -198,7 +214,8 @@ std::optional<bus::Run> Client::find_successor() {
 void Client::announce(bool ready, bool done) {
   Participant message;
   message.run_id(run_->parameters.run_id());
-  message.vehicle_id(vehicle_id_);
+  message.vehicle_id(flown_ids_.front());
+  message.vehicle_ids(flown_ids_);
   message.role(ROLE_CONTROLLER);
   message.name(name_);
   message.host(bus::host_name());
@@ -206,12 +223,18 @@ void Client::announce(bool ready, bool done) {
   message.scenario_sha256(scenario_.sha256);
   message.ready(ready);
   message.done(done);
-  {
-    const std::lock_guard lock(answer_mutex_);
-    message.last_complete_step(last_command_ ? static_cast<std::int64_t>(last_command_->step())
-                                             : -1);
-  }
+  message.last_complete_step(find_last_step());
   participant_writer_.write(message);
+}
+
+/// The last step that all of our vehicles' states were answered of; −1: none.
+std::int64_t Client::find_last_step() {
+  const std::lock_guard lock(answer_mutex_);
+  std::int64_t last = std::numeric_limits<std::int64_t>::max();
+  for (const auto& [id, pilot] : pilots_)
+    last = std::min(last, pilot.last_command ? static_cast<std::int64_t>(pilot.last_command->step())
+                                             : std::int64_t{-1});
+  return last;
 }
 
 }  // namespace sls::control

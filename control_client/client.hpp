@@ -9,24 +9,29 @@
 #include <chrono>
 #include <cstdint>
 #include <exception>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "common/bus/node.hpp"
 #include "common/bus/participants.hpp"
 #include "common/config/scenario.hpp"
+#include "control_client/answer_stream.hpp"
 #include "control_client/flight_controller.hpp"
 
 namespace sls::control {
 
 class Client {
  public:
-  /// Will fly vehicle 0 of `scenario` under `name`; among several clients the strongest flies.
+  /// Will fly those of `vehicle_ids` (ascending, at least one) that the server it finds has, under
+  /// `name`; among several clients of a vehicle the strongest flies.
   /// When another server replaces the one it flies with, it flies on with that one if
   /// `follows_servers`.
-  Client(bus::Node& node, const config::Scenario& scenario, const std::string& name,
+  Client(bus::Node& node, const config::Scenario& scenario,
+         const std::vector<std::uint32_t>& vehicle_ids, const std::string& name,
          std::int32_t strength, bool follows_servers);
 
   /// Runs from joining to the end of the run, and of those that follow it after a reset.
@@ -39,17 +44,28 @@ class Client {
 
   /// The run to begin with; nothing after a stop signal.
   std::optional<bus::Run> find_first_run();
+  /// That of the first of our vehicles that has one.
+  std::optional<bus::Run> find_joinable_run() const;
   void begin(const bus::Run& run);
   /// Serves until the run has ended (nothing), or another one has taken its place.
   std::optional<bus::Run> serve();
   void leave();
 
-  /// Called by the middleware for every sample.
-  void receive(const VehicleState& state, const bus::PeerId& sender);
+  /// One of our vehicles in the run that is joined.
+  struct Pilot {
+    explicit Pilot(const config::Scenario& scenario) : controller(scenario) {}
+    FlightController controller;
+    std::optional<ControlCommand> last_command;  // a repeated sample is answered from here
+  };
+
+  /// Called by the middleware for the states of every sample.
+  void receive(const VehicleState* states, std::size_t count, const bus::PeerId& sender);
   /// Answers states of the server whose run is joined; others' are nobody's business here.
-  void answer(const VehicleState& state, const bus::PeerId& sender);
+  void answer(const VehicleState* states, std::size_t count, const bus::PeerId& sender);
+  void answer(Pilot& pilot, const VehicleState& state);
   bool sees_all_endpoints() const;
   void announce(bool ready, bool done);
+  std::int64_t find_last_step();
   /// True when the run has ended, well or not.
   bool has_ended() const;
   /// The run that has taken the place of ours: after a reset, or because the server was replaced.
@@ -62,24 +78,23 @@ class Client {
   const std::string name_;
   const std::int32_t strength_;
   const bool follows_servers_;
-  const std::uint32_t vehicle_id_ = 0;
+  const std::vector<std::uint32_t> vehicle_ids_;
 
   bus::ParticipantDirectory participants_;
   bus::ServerDirectory servers_;
   bus::Writer<Participant> participant_writer_;
-  const char* command_profile_ = nullptr;
-  std::unique_ptr<bus::Writer<ControlCommand>> command_writer_;  // its profile depends on the run
-  bus::Writer<Reference> reference_writer_;
   std::optional<bus::Run> run_;
   std::optional<bus::ServerWatch> watch_;
-  std::unique_ptr<FlightController> controller_;
+  std::vector<std::uint32_t> flown_ids_;  // of vehicle_ids_, in this run
   bool ready_ = false;
 
   // Shared between the main thread and the middleware's.
-  std::mutex answer_mutex_;                     // over all that `answer` touches
-  std::optional<ControlCommand> last_command_;  // a repeated sample is answered from here
+  std::mutex answer_mutex_;  // over all that `answer` touches
+  std::map<std::uint32_t, Pilot> pilots_;
+  std::vector<Reference> references_;     // of the sample in work
+  std::vector<ControlCommand> commands_;  // likewise
   std::exception_ptr answer_error_;
-  bus::Reader<VehicleState> state_reader_;  // last: its callbacks use the members above
+  std::unique_ptr<AnswerStream> stream_;  // last: its callbacks use the members above
 };
 
 }  // namespace sls::control

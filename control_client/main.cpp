@@ -5,6 +5,7 @@
 #include "common/bus/node.hpp"
 #include "common/bus/qos_file.hpp"
 #include "common/config/scenario.hpp"
+#include "common/config/vehicle_ids.hpp"
 #include "control_client/client.hpp"
 
 namespace {
@@ -21,6 +22,7 @@ int main(int argc, char** argv) {
   std::filesystem::path scenario_file;
   std::string name = "control_client";
   std::int32_t strength = 0;
+  std::string vehicles = "all";
   bool follows_servers = false;
   app::add_common_options(cli, options);
   cli.add_option("--scenario", scenario_file, "scenario (YAML), the same as the server's")
@@ -28,6 +30,9 @@ int main(int argc, char** argv) {
       ->required();
   cli.add_option("--strength", strength, "among several clients the strongest flies")
       ->type_name("N");
+  cli.add_option("--vehicles", vehicles,
+                 "of the fleet, such as 0-9,20; default: all that the server has")
+      ->type_name("IDS");
   cli.add_flag("--follow", follows_servers,
                "fly on with a server that replaces this one; else end with exit code 1");
   cli.add_option("--name", name, "name in recordings and messages")
@@ -44,7 +49,8 @@ int main(int argc, char** argv) {
 
   return app::run_main(argc, argv, cli, options, "control_client", [&] {
     const config::Scenario scenario = config::load_scenario(scenario_file);
+    const auto vehicle_ids = config::parse_vehicle_ids(vehicles, scenario.vehicles.size());
     bus::Node node(options.qos_file, options.domain, "control_client", kIdentity);
-    control::Client(node, scenario, name, strength, follows_servers).run();
+    control::Client(node, scenario, vehicle_ids, name, strength, follows_servers).run();
   });
 }

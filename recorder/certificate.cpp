@@ -1,5 +1,6 @@
 #include "recorder/certificate.hpp"
 
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <type_traits>
@@ -9,10 +10,12 @@ namespace {
 
 template <class Integer, std::enable_if_t<std::is_integral_v<Integer>, int> = 0>
 void append(std::string& bytes, Integer value) {
-  for (std::size_t i = 0; i < sizeof value; ++i) {
-    bytes += static_cast<char>(value & 0xff);
+  std::array<char, sizeof value> little_endian;
+  for (char& byte : little_endian) {
+    byte = static_cast<char>(value & 0xff);
     value = static_cast<Integer>(value >> 8);
   }
+  bytes.append(little_endian.data(), little_endian.size());
 }
 
 void append(std::string& bytes, std::string_view text) {
@@ -29,7 +32,7 @@ void append(std::string& bytes, double number) {
 }
 
 struct Collector {
-  std::string bytes;
+  std::string& bytes;
 
   template <class Field>
   void operator()(const Field& field) {
@@ -40,11 +43,17 @@ struct Collector {
 };
 
 template <class Row>
-std::string collect(const Row& row) {
-  Collector collector;
-  append(collector.bytes, std::string_view(Row::kTopic));
+void append_row(std::string& bytes, const Row& row) {
+  append(bytes, std::string_view(Row::kTopic));
+  Collector collector{bytes};
   Row::visit(row, collector);
-  return std::move(collector.bytes);
+}
+
+template <class Row>
+std::string collect(const Row& row) {
+  std::string bytes;
+  append_row(bytes, row);
+  return bytes;
 }
 
 }  // namespace
@@ -54,10 +63,11 @@ std::string to_bytes(const CommandRow& row) { return collect(row); }
 std::string to_bytes(const ReferenceRow& row) { return collect(row); }
 
 void Certificate::add(const StepRows& rows) {
-  config::Sha256& vehicle = vehicles_[rows.vehicle_id];
-  if (rows.state) vehicle.add(to_bytes(*rows.state));
-  if (rows.command) vehicle.add(to_bytes(*rows.command));
-  if (rows.reference) vehicle.add(to_bytes(*rows.reference));
+  bytes_.clear();
+  if (rows.state) append_row(bytes_, *rows.state);
+  if (rows.command) append_row(bytes_, *rows.command);
+  if (rows.reference) append_row(bytes_, *rows.reference);
+  vehicles_[rows.vehicle_id].add(bytes_);
 }
 
 std::string Certificate::finish() {

@@ -27,6 +27,7 @@ class Certificate {
 
  private:
   std::map<std::uint32_t, config::Sha256> vehicles_;
+  std::string bytes_;  // of the step in work; a member to keep its memory
 };
 
 }  // namespace sls::record

@@ -57,7 +57,7 @@ void write_row(CsvFile& file, const SimStatus& status) {
 }
 
 void write_flight_row(CsvFile& file, const StateRow& state, const CommandRow& command,
-                      const ReferenceRow& reference) {
+                      const ReferenceRow& reference, bool is_of_fleet) {
   const Eigen::Vector3d f_Q_W = bus::to_vector(command.f_Q_W);
   const model::CommandedAttitude attitude = model::calc_commanded_attitude(f_Q_W);
   const Eigen::Vector3d n_W =
@@ -75,6 +75,7 @@ void write_flight_row(CsvFile& file, const StateRow& state, const CommandRow& co
   file.add(state.alpha_dot);
   file.add(state.beta_dot);
   file.add_all(f_Q_W);
+  if (is_of_fleet) file.add(state.vehicle_id);
   file.end_row();
 }
 

@@ -3,9 +3,8 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-#include <array>
+#include <algorithm>
 #include <cerrno>
-#include <charconv>
 #include <system_error>
 
 namespace sls::record {
@@ -22,42 +21,46 @@ constexpr std::size_t kFlushBytes = 1 << 18;  // bounds the memory between two t
 CsvFile::CsvFile(const std::filesystem::path& file, std::string_view header) : path_(file) {
   descriptor_ = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_APPEND | O_CLOEXEC, 0644);
   if (descriptor_ < 0) throw_errno(path_, "cannot create");
-  buffer_.append(header).push_back('\n');
-  finished_ = buffer_.size();
+  std::copy(header.begin(), header.end(), begin_field(header.size()));
+  used_ += header.size();
+  end_row();
+  rows_ = 0;
 }
 
 CsvFile::~CsvFile() {
   if (descriptor_ >= 0) ::close(descriptor_);
 }
 
-void CsvFile::add(double value) {
-  std::array<char, 32> digits;  // the longest shortest form of a double has 24 characters
-  const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr;
-  add_field({digits.data(), static_cast<std::size_t>(end - digits.data())});
-}
+void CsvFile::add(double value) { add_number(value); }
 
 void CsvFile::add(std::string_view text) {
-  if (text.find_first_of(",\"\n\r") == std::string_view::npos) return add_field(text);
-  std::string quoted = "\"";
+  const bool is_quoted = text.find_first_of(",\"\n\r") != text.npos;
+  char* const begin = begin_field(is_quoted ? 2 * text.size() + 2 : text.size());
+  char* end = begin;
+  if (is_quoted) *end++ = '"';
   for (const char letter : text) {
-    if (letter == '"') quoted += '"';
-    quoted += letter;
+    if (letter == '"') *end++ = '"';
+    *end++ = letter;
   }
-  add_field(quoted += '"');
+  if (is_quoted) *end++ = '"';
+  used_ += static_cast<std::size_t>(end - begin);
 }
 
-void CsvFile::add_field(std::string_view text) {
-  if (row_begun_) buffer_.push_back(',');
+char* CsvFile::begin_field(std::size_t bytes) {
+  if (buffer_.size() < used_ + bytes + 2)  // and a comma before it, a line break after it
+    buffer_.resize(std::max(2 * buffer_.size(), used_ + bytes + 2));
+  if (row_begun_) buffer_[used_++] = ',';
   row_begun_ = true;
-  buffer_.append(text);
+  return buffer_.data() + used_;
 }
 
 void CsvFile::end_row() {
-  buffer_.push_back('\n');
+  if (!row_begun_) begin_field(0);
+  buffer_[used_++] = '\n';
   row_begun_ = false;
-  finished_ = buffer_.size();
+  finished_ = used_;
   ++rows_;
-  if (buffer_.size() >= kFlushBytes) flush();
+  if (used_ >= kFlushBytes) flush();
 }
 
 void CsvFile::flush() {
@@ -93,7 +96,8 @@ void CsvFile::cut_back_to_whole_rows(std::size_t written) {
 }
 
 void CsvFile::forget(std::size_t bytes) {
-  buffer_.erase(0, bytes);
+  std::copy(buffer_.data() + bytes, buffer_.data() + used_, buffer_.data());
+  used_ -= bytes;
   finished_ -= bytes;
 }
 

@@ -1,10 +1,11 @@
 #pragma once
 
+#include <charconv>
 #include <cstdint>
 #include <filesystem>
-#include <string>
 #include <string_view>
 #include <type_traits>
+#include <vector>
 
 namespace sls::record {
 
@@ -23,7 +24,7 @@ class CsvFile {
   void add(std::string_view text);  ///< quoted where it holds a comma, a quote or a line break
   template <class Integer, std::enable_if_t<std::is_integral_v<Integer>, int> = 0>
   void add(Integer value) {
-    add_field(std::to_string(value));
+    add_number(value);
   }
   /// Each element of an array or vector is a field.
   template <class Vector>
@@ -41,14 +42,24 @@ class CsvFile {
   const std::filesystem::path& path() const { return path_; }
 
  private:
-  void add_field(std::string_view text);
+  /// Room for a field of so many bytes, and for what separates it from the one before.
+  char* begin_field(std::size_t bytes);
+  template <class Number>
+  void add_number(Number value) {
+    char* const begin = begin_field(kLongestNumber);
+    used_ +=
+        static_cast<std::size_t>(std::to_chars(begin, begin + kLongestNumber, value).ptr - begin);
+  }
   void cut_back_to_whole_rows(std::size_t written);
   void forget(std::size_t bytes);
 
+  static constexpr std::size_t kLongestNumber = 32;  // that of a double has 24 characters
+
   const std::filesystem::path path_;
   int descriptor_ = -1;
-  std::string buffer_;
-  std::size_t finished_ = 0;  // bytes of the buffer that are whole rows
+  std::vector<char> buffer_;
+  std::size_t used_ = 0;      // bytes of the buffer that are rows
+  std::size_t finished_ = 0;  // of those, whole ones
   bool row_begun_ = false;
   std::uint64_t rows_ = 0;
 };

@@ -12,8 +12,9 @@
 namespace sls::record {
 
 /// What the topics bring, sorted by run, on its way from the middleware's threads to the writing
-/// one. The readers live as long as the recorder: new ones would be sent all histories again, of
-/// earlier runs too. Putting never blocks; a run's samples that do not fit are counted.
+/// one; a fleet's samples vehicle by vehicle. The readers live as long as the recorder: new ones
+/// would be sent all histories again, of earlier runs too. Putting never blocks; a run's samples
+/// that do not fit are counted.
 class Inbox {
  public:
   using Sample = std::variant<VehicleState, ControlCommand, Reference, SimStatus>;
@@ -35,17 +36,18 @@ class Inbox {
   /// Samples of the open run that were lost because there was no room.
   std::uint64_t refused() const;
 
-  /// True where the reader of states hears `server`.
-  bool hears_server(const bus::PeerId& server) const;
+  /// True where the reader of states, of a fleet's where the run `is_fleet`, hears `server`.
+  bool hears_server(const bus::PeerId& server, bool is_fleet) const;
   /// True where the readers of both commands and references hear `client`.
-  bool hears_client(const bus::PeerId& client) const;
+  bool hears_client(const bus::PeerId& client, bool is_fleet) const;
 
  private:
   struct Run {
     std::deque<Received> samples;
     std::uint64_t refused = 0;
   };
-  void put(std::uint64_t run_id, Sample sample, const bus::PeerId& sender);
+  template <class Vehicle>
+  void put(const Vehicle* samples, std::size_t count, const bus::PeerId& sender);
   bool belongs(const Received& received) const;
 
   mutable std::mutex mutex_;
@@ -56,6 +58,9 @@ class Inbox {
   bus::Reader<VehicleState> state_reader_;
   bus::Reader<ControlCommand> command_reader_;
   bus::Reader<Reference> reference_reader_;
+  bus::Reader<FleetState> fleet_state_reader_;
+  bus::Reader<FleetCommand> fleet_command_reader_;
+  bus::Reader<FleetReference> fleet_reference_reader_;
   bus::Reader<SimStatus> status_reader_;
 };
 

@@ -1,6 +1,5 @@
-#include <sys/resource.h>
-
 #include "common/app/run_main.hpp"
+#include "common/app/scheduling.hpp"
 #include "common/bus/node.hpp"
 #include "common/bus/qos_file.hpp"
 #include "common/bus/security_files.hpp"
@@ -9,7 +8,6 @@
 
 namespace {
 
-constexpr int kNiceness = 5;
 constexpr const char* kIdentity = "recorder";  // whose keys it uses on a secured domain
 
 }  // namespace
@@ -27,6 +25,9 @@ int main(int argc, char** argv) {
   cli.add_option("--out", recorder.folder, "folder of the recording, new or empty")
       ->type_name("DIR")
       ->required();
+  cli.add_option("--vehicle", recorder.vehicle,
+                 "of several servers, record the run of the one that flies vehicle N; default: 0")
+      ->type_name("N");
   auto* force_flag = cli.add_flag("--force", force, "replace the recording that is there");
   cli.add_flag("--resume", resume, "continue the unfinished recording that is there, if one is")
       ->excludes(force_flag);
@@ -43,7 +44,7 @@ int main(int argc, char** argv) {
     if (check) return;
     // The loop waits for server and client, not for us: whoever answers a step goes first. Before
     // any thread starts, as they inherit it. It does no harm where it is refused.
-    setpriority(PRIO_PROCESS, 0, kNiceness);
+    app::put_thread_last();
     bus::Node node(options.qos_file, options.domain, "recorder", kIdentity);
     record::Recorder(node, recorder).run();
   });

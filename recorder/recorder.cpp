@@ -18,7 +18,6 @@ namespace fs = std::filesystem;
 constexpr auto kUsualJoinTime = 1500ms;  // a server's claim and discovery: no news
 constexpr auto kPollTime = 20ms;
 constexpr double kJoinTimeout = 60;  // until a run must be found, s
-constexpr std::uint32_t kVehicle = 0;
 
 /// Asks `find` until it finds a run, a stop signal comes or `limit_s` is over.
 template <class Find>
@@ -70,7 +69,7 @@ std::optional<bus::Run> Recorder::wait_for_first_run() const {
       options_.unfinished ? "server of run " + options_.unfinished->manifest().run_id : "server";
   return wait_for_run(node_, whom, kJoinTimeout, [this] {
     const auto unfinished = find_unfinished_run();
-    return unfinished ? unfinished : surroundings_.servers.find_joinable(kVehicle);
+    return unfinished ? unfinished : surroundings_.servers.find_joinable(options_.vehicle);
   });
 }
 
@@ -119,7 +118,8 @@ std::optional<bus::Run> Recorder::wait_for_next_run(const bus::Run& ended, doubl
 std::optional<bus::Run> Recorder::find_follower(const bus::Run& ended) const {
   for (const bus::Run& run : surroundings_.servers.runs()) {
     if (run.parameters.run_id() == ended.parameters.run_id() || !run.status) continue;
-    if (bus::calc_progress(run.status) < 0 || !bus::serves_vehicle(run.parameters, kVehicle))
+    if (bus::calc_progress(run.status) < 0 ||
+        !bus::serves_vehicle(run.parameters, options_.vehicle))
       continue;
     if (run.server == ended.server ||
         (options_.follow && surroundings_.servers.is_silent(ended.parameters.run_id())))

@@ -1,6 +1,7 @@
 /// The recorder: finds the runs there are to record, one after another, and where they go.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -12,7 +13,8 @@ namespace sls::record {
 struct RecorderOptions {
   std::filesystem::path folder;              ///< ready for the first run
   std::optional<RecordedFlight> unfinished;  ///< the recording in it that is to be continued
-  bool follow = false;  ///< record the run of a server that takes the place of ours
+  std::uint32_t vehicle = 0;  ///< the run that flies this one is recorded, with all its vehicles
+  bool follow = false;        ///< record the run of a server that takes the place of ours
 };
 
 class Recorder {

@@ -8,6 +8,7 @@
 #include <system_error>
 
 #include "common/bus/names.hpp"
+#include "common/bus/participants.hpp"
 #include "recorder/columns.hpp"
 
 namespace sls::record {
@@ -23,6 +24,12 @@ void write_text(const std::filesystem::path& file, const std::string& text) {
   stream.close();
   if (!stream)
     throw std::system_error(errno, std::generic_category(), file.string() + ": cannot write");
+}
+
+/// Who flew the last step of the `index`th vehicle of the run.
+std::string find_last_controller(const SimStatus& status, std::size_t index) {
+  return index < status.controller_names().size() ? status.controller_names()[index].to_string()
+                                                  : status.controller_name().to_string();
 }
 
 Segment make_only_segment(const std::filesystem::path& folder) {
@@ -54,7 +61,8 @@ Recording::Recording(const Segment& segment, const Parameters& parameters)
       commands_(segment.folder / CommandRow::kFile, CommandRow::kHeader),
       references_(segment.folder / ReferenceRow::kFile, ReferenceRow::kHeader),
       statuses_(segment.folder / "status.csv", kStatusHeader),
-      flight_(segment.folder / "flight.csv", kFlightHeader),
+      flight_(segment.folder / "flight.csv",
+              bus::is_fleet(parameters) ? kFleetFlightHeader : kFlightHeader),
       log_(scenario_, parameters) {
   for (const std::uint32_t id : parameters.vehicle_ids())
     vehicles_.emplace(id, StepJoin(
@@ -121,8 +129,9 @@ void Recording::add(const SimStatus& status, const bus::PeerId&) {
   write_row(statuses_, status);
   log_.add(status);
   if (has_ended())
-    for (auto& [id, vehicle] : vehicles_)
-      vehicle.set_end(status.step(), is_finished(), status.controller_name().to_string());
+    for (std::size_t i = 0; i < parameters_.vehicle_ids().size(); ++i)
+      vehicles_.at(parameters_.vehicle_ids()[i])
+          .set_end(status.step(), is_finished(), find_last_controller(status, i));
 }
 
 void Recording::pass_time(StepJoin::Duration elapsed) {
@@ -134,7 +143,9 @@ void Recording::pass_time(StepJoin::Duration elapsed) {
 void Recording::write(const StepRows& rows, bool is_answer_expected) {
   if (rows.state) write_row(states_, *rows.state);
   if (rows.reference) write_row(references_, *rows.reference);
-  if (rows.is_complete()) write_flight_row(flight_, *rows.state, *rows.command, *rows.reference);
+  if (rows.is_complete())
+    write_flight_row(flight_, *rows.state, *rows.command, *rows.reference,
+                     bus::is_fleet(parameters_));
   if (rows.command) {
     write_row(commands_, *rows.command);
     unanswered_steps_ += rows.command->is_unanswered() ? 1 : 0;
@@ -173,7 +184,7 @@ void Recording::note_missing(std::uint32_t vehicle_id, const char* topic, std::u
 }
 
 /// Commands last: where a killed recorder leaves one, the step's other rows are there too.
-std::vector<CsvFile*> Recording::files() {
+std::array<CsvFile*, 5> Recording::files() {
   return {&states_, &references_, &flight_, &statuses_, &commands_};
 }
 

@@ -2,6 +2,7 @@
 /// by one thread.
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <filesystem>
 #include <map>
@@ -76,7 +77,7 @@ class Recording {
   StepJoin* find_vehicle(std::uint64_t run_id, std::uint32_t vehicle_id);
   bool has_ended() const;
   bool is_finished() const;
-  std::vector<CsvFile*> files();
+  std::array<CsvFile*, 5> files();
   void flush();
   Manifest make_manifest() const;
 

@@ -19,13 +19,27 @@ namespace {
 namespace fs = std::filesystem;
 using config::ConfigError;
 
-constexpr std::array<std::string_view, 9> kRecordingFiles = {
-    "state.csv",  "command.csv",   "reference.csv", "status.csv",        "flight.csv",
-    "flight.txt", "scenario.yaml", "manifest.json", "manifest.json.part"};
+// The last is what `./sls report` puts beside them.
+constexpr std::array<std::string_view, 10> kRecordingFiles = {
+    "state.csv",  "command.csv",   "reference.csv", "status.csv",         "flight.csv",
+    "flight.txt", "scenario.yaml", "manifest.json", "manifest.json.part", "report.html"};
+// What `./sls plot` puts into the subfolder kFigureFolder, as .png and .pdf.
+constexpr std::array<std::string_view, 7> kFigures = {"fleet",  "positions", "errors",  "path",
+                                                      "angles", "forces",    "attitude"};
+constexpr std::string_view kFigureFolder = "figures";
+
+template <class Names>
+bool is_among(const Names& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
 
 bool is_recording_file(const fs::path& path) {
-  return std::find(kRecordingFiles.begin(), kRecordingFiles.end(), path.filename().string()) !=
-         kRecordingFiles.end();
+  return is_among(kRecordingFiles, path.filename().string());
+}
+
+bool is_figure(const fs::path& path) {
+  return (path.extension() == ".png" || path.extension() == ".pdf") &&
+         is_among(kFigures, path.stem().string());
 }
 
 /// True where `name` is `prefix` and then `digits` alone.
@@ -47,17 +61,22 @@ fs::directory_iterator list(const std::string& place, const fs::path& folder) {
   return entries;
 }
 
-/// Everything in `folder`, subfolders after what is in them.
+/// Everything in `folder`, of which `is_ours` says what files may be there, subfolders after what
+/// is in them.
 /// @throws ConfigError if something does not belong to a recording.
-std::vector<fs::path> list_recording(const std::string& place, const fs::path& folder) {
+std::vector<fs::path> list_recording(const std::string& place, const fs::path& folder,
+                                     bool (*is_ours)(const fs::path&) = is_recording_file) {
   std::vector<fs::path> paths;
   for (const auto& entry : list(place, folder)) {
     std::error_code error;
     const bool is_folder = fs::is_directory(entry.symlink_status(error));
-    if (is_folder && is_recording_subfolder(entry.path())) {
-      const auto inside = list_recording(place, entry.path());
+    const bool is_of_figures = entry.path().filename() == kFigureFolder;
+    if (is_folder && is_ours == is_recording_file &&
+        (is_of_figures || is_recording_subfolder(entry.path()))) {
+      const auto inside =
+          list_recording(place, entry.path(), is_of_figures ? is_figure : is_recording_file);
       paths.insert(paths.end(), inside.begin(), inside.end());
-    } else if (is_folder || !is_recording_file(entry.path())) {
+    } else if (is_folder || !is_ours(entry.path())) {
       throw ConfigError(place + ": expected nothing but an earlier recording, got '" +
                         entry.path().filename().string() + "', which --force does not remove");
     }

@@ -7,6 +7,7 @@
 #include <thread>
 #include <utility>
 
+#include "common/app/scheduling.hpp"
 #include "common/app/stop_signal.hpp"
 
 namespace sls::record {
@@ -58,7 +59,13 @@ RunRecorder::RunRecorder(Surroundings& surroundings, const bus::Run& run, const 
 
 RunEnd RunRecorder::run() {
   announce(false);
-  std::thread writing([this] { write_samples(); });
+  // Who writes into a port of shared memory waits for its reader, should that lose its processor
+  // just then.
+  if (run_.parameters.mode() == MODE_REALTIME) app::put_process_first();
+  std::thread writing([this] {
+    app::put_thread_last();
+    write_samples();
+  });
   std::exception_ptr watching_error;  // kept until the thread has closed its files
   try {
     watch();
@@ -135,18 +142,24 @@ void RunRecorder::end_within(std::chrono::duration<double> limit) {
   if (!give_up_ || give_up_->seconds_left() > limit.count()) give_up_.emplace(limit.count());
 }
 
-/// Before the flight begins the expected controllers must be heard; in flight, those that are
-/// there.
+/// Before the flight begins the expected controllers of every vehicle must be heard; in flight,
+/// those that are there.
 bool RunRecorder::sees_all_endpoints() const {
-  if (!surroundings_.inbox.hears_server(run_.server)) return false;
-  const auto controllers = surroundings_.participants.find(ROLE_CONTROLLER, run_id_);
-  const auto heard = std::count_if(controllers.begin(), controllers.end(), [&](const auto& entry) {
-    return surroundings_.inbox.hears_client(entry.peer);
-  });
+  const bool is_fleet = bus::is_fleet(run_.parameters);
+  if (!surroundings_.inbox.hears_server(run_.server, is_fleet)) return false;
+  auto controllers = surroundings_.participants.find(ROLE_CONTROLLER, run_id_);
+  const auto unheard = std::remove_if(
+      controllers.begin(), controllers.end(),
+      [&](const auto& entry) { return !surroundings_.inbox.hears_client(entry.peer, is_fleet); });
   const auto status = surroundings_.servers.find_status(run_id_);
   const bool is_flying = status && status->phase() != PHASE_WAITING;
-  return heard >= (is_flying ? static_cast<std::ptrdiff_t>(controllers.size())
-                             : scenario_.sync.wait_for.controllers);
+  if (is_flying) return unheard == controllers.end();
+  const auto& ids = run_.parameters.vehicle_ids();
+  return std::all_of(ids.begin(), ids.end(), [&](std::uint32_t id) {
+    return std::count_if(controllers.begin(), unheard, [id](const auto& entry) {
+             return bus::flies_vehicle(entry.announcement, id);
+           }) >= scenario_.sync.wait_for.controllers;
+  });
 }
 
 void RunRecorder::announce_news() {

@@ -357,14 +357,17 @@ bool StepJoin::is_settled(const StepRecord& record) const {
 void StepJoin::hand_on_settled_steps() {
   while (!pending_.empty() && !has_ended()) {
     const Pending& first = pending_.front();
-    const bool is_ready = may_be_settled(first) && is_settled(make_record(first));
-    if (!is_ready && pending_.size() <= kMaxPending) return;
-    hand_on_first();
+    const bool is_full = pending_.size() > kMaxPending;
+    if (!is_full && !may_be_settled(first)) return;
+    const StepRecord record = make_record(first);
+    if (!is_full && !is_settled(record)) return;
+    hand_on(record);
   }
 }
 
-void StepJoin::hand_on_first() {
-  const StepRecord record = make_record(pending_.front());
+void StepJoin::hand_on_first() { hand_on(make_record(pending_.front())); }
+
+void StepJoin::hand_on(const StepRecord& record) {
   const Pending& first = pending_.front();
   const bool is_taken = record.command && record.origin == AnswerOrigin::kSent;
   dropped_.other_client += first.commands.size() - (is_taken ? 1 : 0);

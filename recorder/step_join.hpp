@@ -134,6 +134,7 @@ class StepJoin {
   bool is_settled(const StepRecord& record) const;
   void hand_on_settled_steps();
   void hand_on_first();
+  void hand_on(const StepRecord& record);
 
   Sink sink_;
   GapSink gap_sink_;

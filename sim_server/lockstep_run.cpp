@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <thread>
+#include <utility>
 
 #include "common/app/run_main.hpp"
+#include "common/app/stop_signal.hpp"
 
 namespace sls::sim {
 namespace {
@@ -19,67 +21,179 @@ std::chrono::steady_clock::duration to_duration(double seconds) {
 
 }  // namespace
 
-std::optional<Run::Outcome> LockstepRun::exchange(const VehicleState& state) {
-  using Action = ControllerAbsence::Action;
-  const std::uint64_t step = state.step();
-  gate_.expect(step);
-  const auto sent = Clock::now();
-  auto last_sent = sent;
-  endpoints_.state_writer.write(state);
-  auto resend_at = sent + timer_.timeout();
+LockstepRun::~LockstepRun() { endpoints_.command_stream.set_handler(nullptr); }
+
+void LockstepRun::begin() {
+  main_lock_.lock();
+  endpoints_.command_stream.set_handler(
+      [this](const ControlCommand* commands, std::size_t count, const bus::PeerId& sender) {
+        return receive(commands, count, sender);
+      });
+}
+
+// --- on the main thread --------------------------------------------------------------------------
+
+bool LockstepRun::exchange() {
+  publish();
+  while (true) {
+    if (error_) std::rethrow_exception(error_);
+    for (const ReceivedCommand& received : endpoints_.commands.take_all())
+      judge(received.command, received.sender);
+    check_refusals();
+    if (are_all_accepted()) {
+      take_answered_step();
+      return true;
+    }
+    const auto now = Clock::now();
+    if (now >= wake_at_) {
+      if (!attend_to_silence(now)) return false;
+      if (is_settled()) return true;
+      if (are_all_accepted()) continue;
+    }
+    main_lock_.unlock();
+    endpoints_.commands.wait(wake_at_);
+    main_lock_.lock();
+  }
+}
+
+void LockstepRun::publish() {
+  for (const auto& vehicle : vehicles_) vehicle->gate.expect(board_.step);
+  sent_ = last_sent_ = Clock::now();
+  endpoints_.states.write();
+  resend_at_ = sent_ + timer_.timeout();
   // While steps are flown without answers, each is given a period.
+  const bool is_acting = std::any_of(vehicles_.begin(), vehicles_.end(), [](const auto& vehicle) {
+    return vehicle->absence.is_acting();
+  });
   const auto period = to_duration(static_cast<double>(scenario_.sync.period_ns) * 1e-9 /
                                   scenario_.sync.real_time_factor);
-  auto wake_at = absence_.is_acting() ? std::min(resend_at, sent + period) : resend_at;
-  bool is_late = false;  // most answers come before the first resend
-  while (!gate_.accepted()) {
-    if (const auto received = endpoints_.commands.take(wake_at)) judge(*received);
-    if (const auto refusal = gate_.refusal()) throw app::RunError(*refusal);
-    const auto now = Clock::now();
-    if (gate_.accepted() || now < wake_at) continue;
+  wake_at_ = is_acting ? std::min(resend_at_, sent_ + period) : resend_at_;
+  is_late_ = false;
+}
 
-    if (!is_late) take_over_at_ = sent + to_duration(scenario_.sync.take_over_s);
-    is_late = true;
-    note_waiting(sent);
-    if (now >= resend_at) {
-      last_sent = Clock::now();
-      endpoints_.state_writer.write(state);
-      ++gate_.counters().resent();
-      timer_.resent();
-      resend_at = last_sent + timer_.timeout();
-    }
-    attend_now_and_then();
-    if (attend_to_operator()) return std::nullopt;
-    refresh_roster();
-    take_over_if_silent(now);
-    if (gate_.accepted()) break;
-    const double step_wait_s = std::chrono::duration<double>(now - sent).count();
-    const Action action = absence_.decide(step_wait_s, calc_absence_s());
-    attend_to_absence(step, action);
-    if (action != Action::kWait) return fly_without_answer(step, action);
-    wake_at =
-        std::min(resend_at, absence_.is_acting() ? now + 1ms : std::max(take_over_at_, now + 1ms));
-  }
+void LockstepRun::take_answered_step() {
   const auto answered = Clock::now();
-  timer_.answered(answered - sent, answered - last_sent);
-  board_.round_trips.add(answered - sent);
-  return take_accepted_answer();
+  timer_.answered(answered - sent_, answered - last_sent_);
+  board_.round_trips.add(answered - sent_);
+  take_answers();
+}
+
+bool LockstepRun::is_settled() const {
+  return std::all_of(vehicles_.begin(), vehicles_.end(),
+                     [](const auto& vehicle) { return vehicle->is_settled(); });
+}
+
+bool LockstepRun::attend_to_silence(Clock::time_point now) {
+  if (!is_late_) take_over_at_ = sent_ + to_duration(scenario_.sync.take_over_s);
+  is_late_ = true;
+  for (const auto& vehicle : vehicles_)
+    if (!vehicle->gate.accepted()) vehicle->note_waiting(sent_);
+  if (now >= resend_at_) resend(now);
+  attend_now_and_then();
+  if (attend_to_operator()) return false;
+  refresh_roster();
+  take_over_if_silent(now);
+  if (!are_all_accepted()) fly_without_answers(now);
+  const bool is_acting = std::any_of(vehicles_.begin(), vehicles_.end(), [](const auto& vehicle) {
+    return vehicle->absence.is_acting();
+  });
+  wake_at_ = std::min(resend_at_, is_acting ? now + 1ms : std::max(take_over_at_, now + 1ms));
+  return true;
+}
+
+void LockstepRun::resend(Clock::time_point now) {
+  last_sent_ = now;
+  endpoints_.states.write_where(
+      [this](std::size_t i) { return !vehicles_[i]->gate.accepted().has_value(); });
+  ++link_.resent();
+  timer_.resent();
+  resend_at_ = last_sent_ + timer_.timeout();
+}
+
+/// Where the policy says so of every vehicle that nobody answers for, settles the step.
+void LockstepRun::fly_without_answers(Clock::time_point now) {
+  using Action = ControllerAbsence::Action;
+  const double step_wait_s = std::chrono::duration<double>(now - sent_).count();
+  std::vector<std::pair<VehicleFlight*, Action>> actions;
+  for (const auto& vehicle : vehicles_)
+    if (!vehicle->gate.accepted())
+      actions.emplace_back(vehicle.get(),
+                           vehicle->absence.decide(step_wait_s, vehicle->calc_absence_s()));
+  const auto [least, most] =
+      std::minmax_element(actions.begin(), actions.end(),
+                          [](const auto& a, const auto& b) { return a.second < b.second; });
+  const bool waits = least->second == Action::kWait && most->second != Action::kGiveUp;
+  attend_to_absence(waits ? Action::kWait : most->second);
+  if (waits) return;
+  for (const auto& [vehicle, action] : actions) vehicle->fly_without_answer(action);
+  take_answers();
 }
 
 void LockstepRun::take_over_if_silent(Clock::time_point now) {
-  if (now < take_over_at_ || !gate_.pass_over_silent_client()) return;
-  take_over_at_ = now + to_duration(scenario_.sync.take_over_s);
+  if (now < take_over_at_) return;
+  bool is_anybody_passed_over = false;
+  for (const auto& vehicle : vehicles_)
+    is_anybody_passed_over = vehicle->gate.pass_over_silent_client() || is_anybody_passed_over;
+  if (is_anybody_passed_over) take_over_at_ = now + to_duration(scenario_.sync.take_over_s);
 }
 
-bool LockstepRun::wait_for_recorders(std::uint64_t step) {
+// --- on the middleware's thread ------------------------------------------------------------------
+
+bool LockstepRun::receive(const ControlCommand* commands, std::size_t count,
+                          const bus::PeerId& sender) {
+  const std::unique_lock lock(step_mutex_, std::try_to_lock);
+  if (!lock || error_ || !is_plain_step()) return false;
+  try {
+    for (std::size_t i = 0; i < count; ++i) judge(commands[i], sender);
+    if (!are_all_accepted()) {
+      const bool is_refused =
+          std::any_of(vehicles_.begin(), vehicles_.end(),
+                      [](const auto& vehicle) { return vehicle->gate.refusal().has_value(); });
+      if (is_refused) endpoints_.commands.interrupt();
+      return true;
+    }
+    const bool is_news = std::any_of(vehicles_.begin(), vehicles_.end(), [](const auto& vehicle) {
+      return vehicle->gate.take_over() || vehicle->gate.accepted()->mission() == MISSION_FINISHED;
+    });
+    if (is_news) {
+      endpoints_.commands.interrupt();
+      return true;
+    }
+    take_answered_step();
+    advance();
+    publish();
+  } catch (...) {  // must not reach the middleware
+    error_ = std::current_exception();
+    endpoints_.commands.interrupt();
+  }
+  return true;
+}
+
+/// Nothing but the answers stands between the step in work and the one after it.
+bool LockstepRun::is_plain_step() const {
+  return !is_late_ && !is_anybody_absent() && !control_.is_paused() &&
+         endpoints_.requests.is_empty() && !is_roster_due() && !board_.is_due() &&
+         board_.step + 1 < recorder_limit_ && app::stop_signal() == 0;
+}
+
+// --- recorders -----------------------------------------------------------------------------------
+
+std::string LockstepRun::name_blocking() const {
+  return name_blocking_recorder(roster_, scenario_.sync.wait_for.recorders, board_.step,
+                                recorder_window_);
+}
+
+void LockstepRun::roster_changed() {
+  recorder_limit_ =
+      calc_recorder_limit(roster_, scenario_.sync.wait_for.recorders, recorder_window_);
+}
+
+bool LockstepRun::wait_for_recorders() {
   using config::RecorderPolicy;
   const auto& patience = scenario_.sync.wait.recorder;
-  const auto find_blocking = [&] {
-    return name_blocking_recorder(roster_, scenario_.sync.wait_for.recorders, step,
-                                  recorder_window_);
-  };
-  refresh_roster_if_due();
-  std::string blocking = find_blocking();
+  if (is_roster_due()) refresh_roster();
+  const std::uint64_t step = board_.step;
+  std::string blocking = name_blocking();
   if (blocking.empty() && are_recorders_given_up_) {
     are_recorders_given_up_ = false;
     board_.announce(fmt::format("step {}: the recorders are back", step));
@@ -87,7 +201,7 @@ bool LockstepRun::wait_for_recorders(std::uint64_t step) {
   if (are_recorders_given_up_) return true;
   std::optional<app::Wait> wait;
   bool is_reported = false;
-  for (; !blocking.empty(); blocking = find_blocking()) {
+  for (; !blocking.empty(); blocking = name_blocking()) {
     attend_now_and_then();
     if (attend_to_operator()) return false;
     if (!wait) wait.emplace(patience.deadline_s);

@@ -2,7 +2,8 @@
 
 #include <chrono>
 #include <cstdint>
-#include <optional>
+#include <exception>
+#include <mutex>
 
 #include "sim_server/retransmission_timer.hpp"
 #include "sim_server/run.hpp"
@@ -12,21 +13,48 @@ namespace sls::sim {
 /// Stop-and-wait: a state is integrated only with an answer to it, and the answer is the
 /// acknowledgement. Without one the state is sent again. Nothing is lost by waiting, so the result
 /// depends on no clock, unless `sync.wait.controller` says to fly on.
+///
+/// An answer that leaves nothing to wait for is applied where it arrives, on the middleware's
+/// thread, and the next state published there: waking the main thread would make a step a fifth
+/// longer. The main thread holds `step_mutex_` but while it waits for answers; the middleware's
+/// only tries to take it, and leaves what comes meanwhile, and all that is not a plain step, to the
+/// main thread.
 class LockstepRun : public Run {
  public:
   using Run::Run;
+  ~LockstepRun() override;
 
  private:
-  std::optional<Outcome> exchange(const VehicleState& state) override;
-  bool wait_for_recorders(std::uint64_t step) override;
+  void begin() override;
+  bool exchange() override;
+  bool wait_for_recorders() override;
+  void roster_changed() override;
   void rested(Clock::duration) override {}
 
-  void take_over_if_silent(Clock::time_point now);
+  // On the middleware's thread.
+  bool receive(const ControlCommand* commands, std::size_t count, const bus::PeerId& sender);
+  bool is_plain_step() const;
 
-  const std::int64_t recorder_window_ =
-      calc_recorder_window(endpoints_.state_writer.history_depth());
+  void publish();
+  void take_answered_step();
+  bool is_settled() const;
+  bool attend_to_silence(Clock::time_point now);
+  void resend(Clock::time_point now);
+  void fly_without_answers(Clock::time_point now);
+  void take_over_if_silent(Clock::time_point now);
+  std::string name_blocking() const;
+
+  const std::int64_t recorder_window_ = calc_recorder_window(endpoints_.states.history_depth());
   RetransmissionTimer timer_;
+
+  std::mutex step_mutex_;  // over what a step touches
+  std::unique_lock<std::mutex> main_lock_{step_mutex_, std::defer_lock};
+  std::exception_ptr error_;            // of the middleware's thread
+  std::uint64_t recorder_limit_ = 0;    // the first step that a recorder is not ready for
+  Clock::time_point sent_, last_sent_;  // the states of the step in work, first and last
+  Clock::time_point resend_at_, wake_at_;
   Clock::time_point take_over_at_;
+  bool is_late_ = false;  // most answers come before the first resend
 };
 
 }  // namespace sls::sim

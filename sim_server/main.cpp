@@ -1,8 +1,14 @@
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <thread>
+
 #include "common/app/run_main.hpp"
 #include "common/bus/node.hpp"
 #include "common/bus/qos_file.hpp"
 #include "common/bus/security_files.hpp"
 #include "common/config/scenario.hpp"
+#include "common/config/vehicle_ids.hpp"
 #include "sim_server/server.hpp"
 
 namespace {
@@ -20,6 +26,8 @@ int main(int argc, char** argv) {
   std::optional<double> period_s;
   std::string mode;
   std::optional<double> real_time_factor;
+  std::string vehicles = "all";
+  std::size_t threads = std::max(1u, std::thread::hardware_concurrency());
   bool check = false;
   app::add_common_options(cli, options);
   cli.add_option("--scenario", scenario_file, "scenario (YAML)")->type_name("FILE")->required();
@@ -31,6 +39,11 @@ int main(int argc, char** argv) {
   cli.add_option("--rtf", real_time_factor,
                  "simulated per wall time of real time; default: the scenario's")
       ->type_name("X");
+  cli.add_option("--vehicles", vehicles, "of the fleet, such as 0-9,20; default: all")
+      ->type_name("IDS");
+  cli.add_option("--threads", threads, "that integrate vehicles; default: one per processor")
+      ->type_name("N")
+      ->check(CLI::Range(1, 256));
   cli.add_flag("--check", check, "only check scenario and QoS file, then end");
 
   return app::run_main(argc, argv, cli, options, "sim_server", [&] {
@@ -40,11 +53,18 @@ int main(int argc, char** argv) {
       scenario.sync.mode =
           mode == "lockstep" ? config::SyncMode::kLockstep : config::SyncMode::kRealtime;
     if (real_time_factor) config::override_real_time_factor(scenario, *real_time_factor);
+    const sim::Assignment assignment = {
+        scenario, config::parse_vehicle_ids(vehicles, scenario.vehicles.size())};
     if (check) {
       bus::check_security_files(bus::read_qos_file(options.qos_file, kIdentity));
+      const bool is_lockstep = scenario.sync.mode == config::SyncMode::kLockstep;
+      const std::size_t count = assignment.vehicle_ids.size();
+      fmt::print("{}: {}, {} vehicle{}, period {} s\n", scenario.name,
+                 is_lockstep ? "lockstep" : "real time", count, count > 1 ? "s" : "",
+                 scenario.sync.period_ns * 1e-9);
       return;
     }
     bus::Node node(options.qos_file, options.domain, "sim_server", kIdentity);
-    sim::Server(node, scenario).run();
+    sim::Server(node, assignment, threads).run();
   });
 }

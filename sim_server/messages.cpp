@@ -39,12 +39,13 @@ VehicleState make_state_message(std::uint64_t run_id, std::uint32_t vehicle_id, 
   return message;
 }
 
-Parameters make_parameters_message(std::uint64_t run_id, std::uint32_t vehicle_id,
+Parameters make_parameters_message(std::uint64_t run_id,
+                                   const std::vector<std::uint32_t>& vehicle_ids,
                                    const config::Scenario& scenario, const std::string& version) {
   Parameters message;
   message.run_id(run_id);
-  message.vehicle_id(vehicle_id);
-  message.vehicle_ids({vehicle_id});
+  message.vehicle_id(vehicle_ids.front());
+  message.vehicle_ids(vehicle_ids);
   message.scenario_sha256(scenario.sha256);
   message.scenario_text(scenario.text);
   message.quad_mass_kg(scenario.vehicle.quad_mass);

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "common/bus/topics.hpp"
 #include "common/config/scenario.hpp"
@@ -28,7 +29,8 @@ VehicleState make_state_message(std::uint64_t run_id, std::uint32_t vehicle_id, 
                                 std::int64_t period_ns, const model::SlungLoadState& measured,
                                 const model::SlungLoadState& truth, const Applied& applied);
 
-Parameters make_parameters_message(std::uint64_t run_id, std::uint32_t vehicle_id,
+Parameters make_parameters_message(std::uint64_t run_id,
+                                   const std::vector<std::uint32_t>& vehicle_ids,
                                    const config::Scenario& scenario, const std::string& version);
 
 }  // namespace sls::sim

@@ -1,19 +1,21 @@
 #include "sim_server/realtime_run.hpp"
 
-#include <spdlog/fmt/fmt.h>
+#include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <cmath>
+#include <thread>
 
 #include "common/app/run_main.hpp"
-#include "common/bus/convert.hpp"
+#include "common/app/scheduling.hpp"
 
 namespace sls::sim {
 namespace {
 
 using namespace std::chrono_literals;
 
-/// States between loop and writing thread: a second at 1 kHz.
-constexpr std::size_t kQueueSize = 1024;
+/// Steps whose states may be between loop and writing thread: a second at 1 kHz.
+constexpr std::size_t kQueuedSteps = 1024;
 
 /// Periods in a row that a client may let go by before another one's answer is taken.
 constexpr int kMissesBeforeTakeOver = 3;
@@ -25,111 +27,120 @@ std::chrono::duration<double, std::nano> calc_wall_period(const config::Sync& sy
 
 }  // namespace
 
-RealtimeRun::RealtimeRun(Endpoints& endpoints, const config::Scenario& scenario,
-                         std::uint64_t run_id, std::uint32_t vehicle_id, bool begins_paused)
-    : Run(endpoints, scenario, run_id, vehicle_id, begins_paused),
-      state_queue_(endpoints.state_writer, kQueueSize),
-      schedule_(Clock::now(), calc_wall_period(scenario.sync)) {}
+RealtimeRun::RealtimeRun(Endpoints& endpoints, const Assignment& assignment, WorkerPool& workers,
+                         std::uint64_t run_id, bool begins_paused)
+    : Run(endpoints, assignment, workers, run_id, begins_paused),
+      state_queue_(endpoints.states, kQueuedSteps),
+      schedule_(Clock::now(), calc_wall_period(scenario_.sync)) {}
 
 void RealtimeRun::begin() {
+  if (!app::put_process_first())
+    spdlog::info("the system lets no process go first here (root, CAP_SYS_NICE or RLIMIT_RTPRIO)");
   schedule_ = Schedule(Clock::now(), calc_wall_period(scenario_.sync));
-  missed_deadlines_ = endpoints_.command_reader.missed_deadlines();
+  missed_deadlines_ = endpoints_.command_stream.missed_deadlines();
 }
 
 void RealtimeRun::rested(Clock::duration rest) {
   schedule_.pause(rest);
-  missed_deadlines_ = endpoints_.command_reader.missed_deadlines();  // nobody was asked
+  missed_deadlines_ = endpoints_.command_stream.missed_deadlines();  // nobody was asked
 }
 
-std::optional<Run::Outcome> RealtimeRun::exchange(const VehicleState& state) {
-  const std::uint64_t step = state.step();
-  gate_.expect(step);
-  publish(state);
-  take_commands(schedule_.close(step, published_));
-  if (is_ending_ && !gate_.accepted()) wait_for_last_answer(state);
+bool RealtimeRun::exchange() {
+  std::this_thread::sleep_until(schedule_.due(board_.step));
+  for (const auto& vehicle : vehicles_) vehicle->gate.expect(board_.step);
+  publish();
+  take_commands(schedule_.close(board_.step, published_));
+  if (is_ending() && !are_all_accepted()) wait_for_last_answers();
   count_missed_deadlines();
   board_.timing.set_overflow(state_queue_.lost());
 
-  if (!gate_.accepted()) {
-    note_waiting(published_);
-    const bool is_silent = gate_.count_miss() >= kMissesBeforeTakeOver ||
-                           calc_absence_s() >= scenario_.sync.take_over_s;
-    if (is_silent) gate_.pass_over_silent_client();
+  for (const auto& vehicle : vehicles_) {
+    if (vehicle->gate.accepted()) continue;
+    vehicle->note_waiting(published_);
+    const bool is_silent = vehicle->gate.count_miss() >= kMissesBeforeTakeOver ||
+                           vehicle->calc_absence_s() >= scenario_.sync.take_over_s;
+    if (is_silent) vehicle->gate.pass_over_silent_client();
   }
-  if (gate_.accepted()) return take_accepted_answer();
-  const auto action = absence_.decide(0.0, calc_absence_s());
-  attend_to_absence(step, action);
-  return fly_without_answer(step, action);
+  take_answers();
+  fly_without_answers();
+  return true;
 }
 
-void RealtimeRun::publish(const VehicleState& state) {
+void RealtimeRun::fly_without_answers() {
+  using Action = ControllerAbsence::Action;
+  Action most = Action::kWait;
+  for (const auto& vehicle : vehicles_) {
+    if (vehicle->is_settled()) continue;
+    const Action action = vehicle->absence.decide(0.0, vehicle->calc_absence_s());
+    most = std::max(most, action);
+    if (action != Action::kGiveUp) vehicle->fly_without_answer(action);
+  }
+  if (most != Action::kWait) attend_to_absence(most);
+}
+
+void RealtimeRun::publish() {
   const auto now = Clock::now();
-  if (const auto lost = schedule_.slip(state.step(), now))
+  if (const auto lost = schedule_.slip(board_.step, now))
     board_.timing.add_slip(std::chrono::duration<double>(*lost).count());
-  board_.timing.add_delay(std::chrono::duration<double>(now - schedule_.due(state.step())).count());
+  board_.timing.add_delay(std::chrono::duration<double>(now - schedule_.due(board_.step)).count());
   published_ = now;
-  state_queue_.write(state);
+  endpoints_.states.write();
 }
 
 void RealtimeRun::take_commands(Clock::time_point deadline) {
-  while (Clock::now() < deadline) {
+  while (!are_all_accepted() && Clock::now() < deadline) {
     const auto received = endpoints_.commands.take(deadline);
     if (!received) return;
-    const bool was_accepted = gate_.accepted().has_value();
-    const Verdict verdict = gate_.offer(received->command, received->sender);
-    if (verdict == Verdict::kLate) take_late(received->command);
-    if (const auto refusal = gate_.refusal()) throw app::RunError(*refusal);
-    if (was_accepted || !gate_.accepted()) continue;
-    board_.round_trips.add(Clock::now() - published_);
-    if (gate_.accepted()->mission() == MISSION_FINISHED) return;
+    VehicleFlight* vehicle = find_vehicle(received->command.vehicle_id());
+    const bool is_late = judge(received->command, received->sender) == Verdict::kLate;
+    if (is_late && vehicle) take_late(*vehicle, received->command);
+    check_refusals();
+    if (are_all_accepted()) board_.round_trips.add(Clock::now() - published_);
   }
 }
 
-void RealtimeRun::take_late(const ControlCommand& command) {
+bool RealtimeRun::is_ending() const {
+  return std::all_of(vehicles_.begin(), vehicles_.end(), [](const auto& vehicle) {
+    const auto& answer = vehicle->gate.accepted();
+    return answer ? answer->mission() == MISSION_FINISHED : vehicle->has_ended_late();
+  });
+}
+
+void RealtimeRun::take_late(VehicleFlight& vehicle, const ControlCommand& command) {
   const auto age = Clock::now() - schedule_.due(command.step());
-  const auto lifespan = endpoints_.command_reader.lifespan();
-  if (lifespan && age > *lifespan) {
-    ++gate_.counters().stale();
-    return;
-  }
-  if (command.mission() == MISSION_FINISHED) {
-    is_ending_ = true;
-    return;
-  }
-  if (last_answer_.origin != FORCE_NONE && command.step() <= last_answer_step_) return;
-  last_answer_.answer_f_Q_W = bus::to_vector(command.f_Q_W_n());
-  last_answer_.origin = FORCE_ANSWERED;
-  last_answer_.controller_name = command.client_name().to_string();
-  last_answer_.memory = command.controller();
-  last_answer_step_ = command.step();
+  const auto lifespan = endpoints_.command_stream.lifespan();
+  if (lifespan && age > *lifespan)
+    ++link_.stale();
+  else
+    vehicle.keep_late_answer(command);
 }
 
-void RealtimeRun::wait_for_last_answer(const VehicleState& state) {
+void RealtimeRun::wait_for_last_answers() {
   constexpr int kAttempts = 20;
-  for (int i = 0; i < kAttempts && !gate_.accepted(); ++i) {
+  for (int i = 0; i < kAttempts && !are_all_accepted(); ++i) {
     take_commands(Clock::now() + 50ms);
-    if (gate_.accepted()) return;
-    ++gate_.counters().resent();
-    state_queue_.write(state);
+    if (are_all_accepted()) return;
+    ++link_.resent();
+    endpoints_.states.write();
   }
-  if (!gate_.accepted())
+  if (!are_all_accepted())
     throw app::RunError(fmt::format("step {}: the mission was finished, but {} does not answer",
-                                    state.step(), name_awaited_controller()));
+                                    board_.step, name_awaited_controllers()));
 }
 
 void RealtimeRun::count_missed_deadlines() {
-  const std::uint64_t missed = endpoints_.command_reader.missed_deadlines();
-  gate_.counters().deadline_missed() += missed - missed_deadlines_;
+  const std::uint64_t missed = endpoints_.command_stream.missed_deadlines();
+  link_.deadline_missed() += missed - missed_deadlines_;
   missed_deadlines_ = missed;
 }
 
 void RealtimeRun::check_clocks() {
-  const auto lifespan = endpoints_.command_reader.lifespan();
+  const auto lifespan = endpoints_.command_stream.lifespan();
   if (!lifespan || is_lifespan_ignored_) return;
   for (const auto& client : roster_.controllers) {
     if (std::chrono::abs(client.age) <= *lifespan / 2) continue;
     is_lifespan_ignored_ = true;
-    endpoints_.command_reader.ignore_lifespan();
+    endpoints_.command_stream.ignore_lifespan();
     const double behind_s = std::chrono::duration<double>(client.age).count();
     board_.announce(fmt::format(
         "the clock of controller '{}' on {} is {:.1f} s {} ours: its commands do not expire by it "
@@ -140,11 +151,10 @@ void RealtimeRun::check_clocks() {
   }
 }
 
-bool RealtimeRun::wait_for_recorders(std::uint64_t step) {
-  refresh_roster_if_due();
-  check_clocks();
-  const std::string blocking =
-      name_blocking_recorder(roster_, scenario_.sync.wait_for.recorders, step);
+bool RealtimeRun::wait_for_recorders() {
+  if (is_roster_due()) refresh_roster();
+  const std::string blocking = name_blocking_recorder(roster_, scenario_.sync.wait_for.recorders,
+                                                      board_.step, recorder_window_);
   const auto& patience = scenario_.sync.wait.recorder;
   if (blocking.empty()) {
     recorder_wait_.reset();
@@ -154,9 +164,9 @@ bool RealtimeRun::wait_for_recorders(std::uint64_t step) {
   if (!recorder_wait_) recorder_wait_.emplace(patience.deadline_s);
   if (patience.policy == config::RecorderPolicy::kStop && recorder_wait_->is_over())
     throw app::RunError(
-        fmt::format("step {}: waited {} s for {}", step, patience.deadline_s, blocking));
+        fmt::format("step {}: waited {} s for {}", board_.step, patience.deadline_s, blocking));
   if (recorder_wait_->is_report_due())
-    board_.announce(fmt::format("step {}: flies on without: {}", step, blocking));
+    board_.announce(fmt::format("step {}: flies on without: {}", board_.step, blocking));
   return true;
 }
 

@@ -4,7 +4,6 @@
 #include <memory>
 #include <optional>
 
-#include "common/bus/queued_writer.hpp"
 #include "sim_server/run.hpp"
 #include "sim_server/schedule.hpp"
 
@@ -16,30 +15,35 @@ namespace sls::sim {
 /// bit for bit, as in lockstep. Nothing here waits for a reader: states go through a queue.
 class RealtimeRun : public Run {
  public:
-  RealtimeRun(Endpoints& endpoints, const config::Scenario& scenario, std::uint64_t run_id,
-              std::uint32_t vehicle_id, bool begins_paused);
+  RealtimeRun(Endpoints& endpoints, const Assignment& assignment, WorkerPool& workers,
+              std::uint64_t run_id, bool begins_paused);
 
  private:
   void begin() override;
-  std::optional<Outcome> exchange(const VehicleState& state) override;
-  bool wait_for_recorders(std::uint64_t step) override;
+  bool exchange() override;
+  bool wait_for_recorders() override;
+  void roster_changed() override { check_clocks(); }
   void rested(Clock::duration rest) override;
 
-  void publish(const VehicleState& state);
-  /// Takes commands until `deadline`, or until one for the awaited step ends the mission.
+  void publish();
+  /// Takes commands until `deadline`, or until every vehicle has its answer: the period can then be
+  /// flown ahead of its end, and the next state is ready when it is due.
   void take_commands(Clock::time_point deadline);
-  void take_late(const ControlCommand& command);
-  /// The answer to the last step, which is waited for: an earlier answer said it is the last.
-  void wait_for_last_answer(const VehicleState& state);
+  void take_late(VehicleFlight& vehicle, const ControlCommand& command);
+  /// True where the mission is over for every vehicle, be it by an answer that came late.
+  bool is_ending() const;
+  /// The answers to the last step, which are waited for: earlier ones said it is the last.
+  void wait_for_last_answers();
+  void fly_without_answers();
   void count_missed_deadlines();
   /// Says whose clock differs from ours by what would make his commands expire when they should
   /// not, or never; from then on they are judged by their step alone.
   void check_clocks();
 
-  bus::QueuedWriter<VehicleState> state_queue_;
+  const std::int64_t recorder_window_ = calc_recorder_window(endpoints_.states.history_depth());
+  StateStream::Queue state_queue_;
   Schedule schedule_;
   Clock::time_point published_;         // when the state in work was
-  bool is_ending_ = false;              // a late answer has ended the mission
   std::uint64_t missed_deadlines_ = 0;  // of the middleware, up to the last look
   bool is_lifespan_ignored_ = false;
   std::optional<app::Wait> recorder_wait_;

@@ -3,6 +3,9 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <limits>
+
+#include "common/config/vehicle_ids.hpp"
 
 namespace sls::sim {
 namespace {
@@ -38,6 +41,17 @@ std::vector<const Entry*> find_recorders_to_wait_for(const Roster& roster, int e
   return found;
 }
 
+/// The first step of which the recorder does not have all.
+std::int64_t find_next_step(const Entry& recorder) {
+  return std::max<std::int64_t>(recorder.announcement.last_complete_step(), -1) + 1;
+}
+
+/// The first step that must wait for the recorder, which may be `window` behind.
+std::int64_t find_limit(const Entry& recorder, std::int64_t window) {
+  const std::int64_t next = find_next_step(recorder);
+  return next + std::min(window, std::numeric_limits<std::int64_t>::max() - next);
+}
+
 void append(std::string& list, const std::string& item) {
   if (!list.empty()) list += ", ";
   list += item;
@@ -46,20 +60,29 @@ void append(std::string& list, const std::string& item) {
 }  // namespace
 
 std::vector<ReadyClient> find_ready_clients(const Roster& roster,
-                                            const std::string& scenario_sha256) {
+                                            const std::string& scenario_sha256,
+                                            std::uint32_t vehicle_id) {
   std::vector<ReadyClient> clients;
   for (const Entry& entry : roster.controllers)
-    if (entry.announcement.ready() && entry.announcement.scenario_sha256() == scenario_sha256)
+    if (entry.announcement.ready() && entry.announcement.scenario_sha256() == scenario_sha256 &&
+        bus::flies_vehicle(entry.announcement, vehicle_id))
       clients.push_back(
           {entry.peer, entry.announcement.name().to_string(), entry.announcement.strength()});
   return clients;
 }
 
 std::string name_missing(const Roster& roster, const config::WaitFor& expected,
-                         const std::string& scenario_sha256) {
+                         const std::string& scenario_sha256,
+                         const std::vector<std::uint32_t>& vehicle_ids) {
   std::string missing;
-  const int controllers = static_cast<int>(find_ready_clients(roster, scenario_sha256).size());
-  if (controllers < expected.controllers) {
+  int controllers = std::numeric_limits<int>::max();  // of the vehicle that has the fewest
+  std::vector<std::uint32_t> without;
+  for (const std::uint32_t id : vehicle_ids) {
+    const int ready = static_cast<int>(find_ready_clients(roster, scenario_sha256, id).size());
+    controllers = std::min(controllers, ready);
+    if (ready < expected.controllers) without.push_back(id);
+  }
+  if (!without.empty()) {
     std::string details;
     for (const Entry& entry : roster.controllers) {
       if (!(entry.announcement.scenario_sha256() == scenario_sha256))
@@ -67,6 +90,8 @@ std::string name_missing(const Roster& roster, const config::WaitFor& expected,
       else if (!entry.announcement.ready())
         append(details, describe(entry) + " is not ready");
     }
+    if (vehicle_ids.size() > 1)
+      append(details, "vehicles without: " + config::to_vehicle_ranges(without));
     append(missing, name_missing_role("controller", expected.controllers, controllers, details));
   }
   int recorders = 0;
@@ -86,14 +111,21 @@ std::int64_t calc_recorder_window(int history_depth) {
   return std::clamp<std::int64_t>(history_depth * 2LL / 5, 1, kRecorderWindow);
 }
 
+std::uint64_t calc_recorder_limit(const Roster& roster, int expected, std::int64_t window) {
+  const auto waited_for = find_recorders_to_wait_for(roster, expected);
+  if (static_cast<int>(waited_for.size()) < expected) return 0;
+  std::int64_t limit = std::numeric_limits<std::int64_t>::max();
+  for (const Entry* entry : waited_for) limit = std::min(limit, find_limit(*entry, window));
+  return static_cast<std::uint64_t>(limit);
+}
+
 std::string name_blocking_recorder(const Roster& roster, int expected, std::uint64_t step,
                                    std::int64_t window) {
   const auto waited_for = find_recorders_to_wait_for(roster, expected);
   for (const Entry* entry : waited_for) {
-    const std::int64_t last = std::max<std::int64_t>(entry->announcement.last_complete_step(), -1);
-    const std::int64_t behind = static_cast<std::int64_t>(step) - 1 - last;
-    if (behind >= window)
-      return fmt::format("recorder {}: {} steps behind", describe(*entry), behind);
+    if (static_cast<std::int64_t>(step) >= find_limit(*entry, window))
+      return fmt::format("recorder {}: {} steps behind", describe(*entry),
+                         static_cast<std::int64_t>(step) - find_next_step(*entry));
   }
   const int there = static_cast<int>(waited_for.size());
   return there < expected ? fmt::format("recorder: {} expected, {} there", expected, there)

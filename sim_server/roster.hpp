@@ -21,13 +21,17 @@ struct Roster {
   std::optional<std::chrono::steady_clock::time_point> began = std::nullopt;
 };
 
-/// Controllers that are ready and use the run's scenario, as the command gate wants them.
+/// Controllers that are ready to fly `vehicle_id` and use the run's scenario, as its command gate
+/// wants them.
 std::vector<ReadyClient> find_ready_clients(const Roster& roster,
-                                            const std::string& scenario_sha256);
+                                            const std::string& scenario_sha256,
+                                            std::uint32_t vehicle_id = 0);
 
-/// Whom the start still waits for, in words; empty when all expected are ready.
+/// Whom the start still waits for, in words; empty when all expected are ready: as many controllers
+/// for each of the vehicles.
 std::string name_missing(const Roster& roster, const config::WaitFor& expected,
-                         const std::string& scenario_sha256);
+                         const std::string& scenario_sha256,
+                         const std::vector<std::uint32_t>& vehicle_ids = {0});
 
 /// How far the slowest recorder may be behind the server, in steps, at most.
 inline constexpr std::int64_t kRecorderWindow = 2000;
@@ -42,6 +46,10 @@ std::int64_t calc_recorder_window(int history_depth);
 /// stop the others.
 std::string name_blocking_recorder(const Roster& roster, int expected, std::uint64_t step,
                                    std::int64_t window = kRecorderWindow);
+
+/// The first step that some recorder keeps the server from publishing; 0 where fewer than
+/// `expected` are there.
+std::uint64_t calc_recorder_limit(const Roster& roster, int expected, std::int64_t window);
 
 /// Which ready recorder has announced nothing since `since` although it lags behind `step`, in
 /// words; empty when none has, or another one is there in the place of one taken for dead.

@@ -9,9 +9,8 @@
 #include "common/app/options.hpp"
 #include "common/app/run_main.hpp"
 #include "common/app/stop_signal.hpp"
-#include "common/bus/convert.hpp"
 #include "common/bus/names.hpp"
-#include "sim_server/fail_safe.hpp"
+#include "common/config/vehicle_ids.hpp"
 
 namespace sls::sim {
 namespace {
@@ -26,25 +25,29 @@ constexpr auto kReportInterval = 5s;     // of the same silence
 
 }  // namespace
 
-Run::Run(Endpoints& endpoints, const config::Scenario& scenario, std::uint64_t run_id,
-         std::uint32_t vehicle_id, bool begins_paused)
+Run::Run(Endpoints& endpoints, const Assignment& assignment, WorkerPool& workers,
+         std::uint64_t run_id, bool begins_paused)
     : endpoints_(endpoints),
-      scenario_(scenario),
+      scenario_(assignment.scenario),
+      vehicle_ids_(assignment.vehicle_ids),
       run_id_(run_id),
-      vehicle_id_(vehicle_id),
-      gate_(run_id, vehicle_id, scenario.controller.force_limit_n),
-      board_(endpoints.status_writer, run_id, vehicle_id, scenario.sync, gate_.counters()),
-      control_(run_id, vehicle_id, begins_paused),
-      absence_(scenario.sync) {
+      board_(endpoints.status_writer, run_id, vehicle_ids_.front(), scenario_.sync,
+             [this] { return sum_counters(); }),
+      control_(run_id, vehicle_ids_, begins_paused),
+      workers_(workers),
+      plant_steps_(scenario_.sync.period_ns / scenario_.plant.step_ns) {
+  for (const std::uint32_t id : vehicle_ids_)
+    vehicles_.push_back(std::make_unique<VehicleFlight>(scenario_, id, run_id));
   endpoints_.commands.take_all();  // of an earlier run
   endpoints_.parameters_writer.write(
-      make_parameters_message(run_id, vehicle_id, scenario, app::version()));
-  const config::Sync& sync = scenario.sync;
+      make_parameters_message(run_id, vehicle_ids_, scenario_, app::version()));
+  const config::Sync& sync = scenario_.sync;
   const std::string mode = sync.mode == config::SyncMode::kLockstep
                                ? "lockstep"
                                : fmt::format("real time × {}", sync.real_time_factor);
-  spdlog::info("run {:016x}: {}, vehicle {}, {}, period {} s, step {} s", run_id, scenario.name,
-               vehicle_id, mode, sync.period_ns * 1e-9, scenario.plant.step_ns * 1e-9);
+  spdlog::info("run {:016x}: {}, vehicle{} {}, {}, period {} s, step {} s", run_id, scenario_.name,
+               vehicle_ids_.size() > 1 ? "s" : "", config::to_vehicle_ranges(vehicle_ids_), mode,
+               sync.period_ns * 1e-9, scenario_.plant.step_ns * 1e-9);
 }
 
 Run::End Run::execute() {
@@ -60,22 +63,31 @@ Run::End Run::execute() {
 void Run::fail(const std::string& reason) {
   close_requests(reason);
   // Before the claim is settled nobody has joined, and there is nobody to tell.
-  if (board_.has_published()) board_.publish(PHASE_FAILED, reason);
+  if (board_.has_published()) publish_end(PHASE_FAILED, reason);
 }
 
 void Run::finish() {
   close_requests("mission finished");
-  board_.publish(PHASE_FINISHED, "mission finished");
+  publish_end(PHASE_FINISHED, "mission finished");
   const double wall_s = board_.calc_wall_s();
   const auto step = static_cast<double>(board_.step);
   spdlog::info("finished: {} steps, {} s simulated in {:.2f} s, {:.0f} steps/s, {} resent, {}",
                board_.step, step * scenario_.sync.period_ns * 1e-9, wall_s, step / wall_s,
-               gate_.counters().resent(), board_.timing.label());
+               link_.resent(), board_.timing.label());
 }
 
 void Run::reset() {
   close_requests(control_.last_event());
-  board_.publish(PHASE_RESET, control_.last_event());
+  publish_end(PHASE_RESET, control_.last_event());
+}
+
+void Run::publish_end(RunPhase phase, const std::string& reason) {
+  if (vehicles_.size() > 1)
+    for (const auto& vehicle : vehicles_)
+      board_.controller_names.push_back(vehicle->outcome()
+                                            ? vehicle->outcome()->applied.controller_name
+                                            : vehicle->last_answer().controller_name);
+  board_.publish(phase, reason);
 }
 
 void Run::close_requests(const std::string& reason) {
@@ -89,11 +101,15 @@ void Run::check_claim() const {
   const int progress = board_.has_published() ? bus::calc_progress(board_.phase()) : 0;
   for (const bus::Run& other : endpoints_.servers.runs()) {
     const int others = bus::calc_progress(other.status);
-    if (others < 0 || !bus::serves_vehicle(other.parameters, vehicle_id_)) continue;
+    if (others < 0) continue;
+    const auto shared =
+        std::find_if(vehicle_ids_.begin(), vehicle_ids_.end(),
+                     [&](std::uint32_t id) { return bus::serves_vehicle(other.parameters, id); });
+    if (shared == vehicle_ids_.end()) continue;
     if (others > progress || (others == progress && other.parameters.run_id() < run_id_))
       throw app::RunError(
           fmt::format("vehicle {}: expected no other server on this domain, got one (run {:016x})",
-                      vehicle_id_, other.parameters.run_id()));
+                      *shared, other.parameters.run_id()));
   }
 }
 
@@ -112,7 +128,7 @@ bool Run::wait_for_participants() {
     attend_now_and_then();
     if (attend_to_operator()) return false;
     refresh_roster();
-    const std::string missing = name_missing(roster_, expected, scenario_.sha256);
+    const std::string missing = name_missing(roster_, expected, scenario_.sha256, vehicle_ids_);
     if (missing.empty()) return true;
     if (wait.is_over())
       throw app::RunError(fmt::format("not ready within {} s: {}{}", expected.timeout_s, missing,
@@ -130,29 +146,40 @@ bool Run::wait_for_participants() {
 // --- flight --------------------------------------------------------------------------------------
 
 bool Run::fly() {
-  SlungLoadPlant plant(scenario_.vehicle, scenario_.plant);
-  FaultLine faults(scenario_, vehicle_id_);
-  const auto steps_per_period = scenario_.sync.period_ns / scenario_.plant.step_ns;
   board_.start_clock();
   began_ = Clock::now();
   board_.publish(control_.is_paused() ? PHASE_PAUSED : PHASE_RUNNING, control_.last_event());
   begin();
-  Applied applied;
-  for (std::uint64_t& step = board_.step;; ++step) {
-    if (step > 0)
-      if (const auto reply = control_.stepped(step)) endpoints_.reply_writer.write(*reply);
-    if (!rest() || !wait_for_recorders(step)) return false;
-    state_ = plant.state();
-    const auto outcome =
-        exchange(make_state_message(run_id_, vehicle_id_, step, scenario_.sync.period_ns,
-                                    faults.measure(step, state_), state_, applied));
-    if (!outcome) return false;
-    if (outcome->is_finished) return true;
-    applied = outcome->applied;
-    applied.f_Q_W = faults.actuate(step, applied.answer_f_Q_W);
-    for (std::int64_t i = 0; i < steps_per_period; ++i) plant.step(applied.f_Q_W);
+  for (std::size_t i = 0; i < vehicles_.size(); ++i) measure(i);
+  while (true) {
+    if (board_.step > 0)
+      if (const auto reply = control_.stepped(board_.step)) endpoints_.reply_writer.write(*reply);
+    if (!rest() || !wait_for_recorders() || !exchange()) return false;
+    board_.controller_name = vehicles_.front()->outcome()->applied.controller_name;
+    if (is_finished()) return true;
+    advance();
     attend_now_and_then();
   }
+}
+
+void Run::measure(std::size_t index) {
+  endpoints_.states.at(index) = vehicles_[index]->measure(board_.step);
+}
+
+void Run::advance() {
+  for (const auto& vehicle : vehicles_)
+    board_.timing.add(vehicle->outcome()->applied.origin, vehicle->calc_age());
+  ++board_.step;
+  workers_.for_each(vehicles_.size(), [this](std::size_t i) {
+    vehicles_[i]->advance(plant_steps_);
+    measure(i);
+  });
+}
+
+/// A vehicle whose mission is over flies on until the others' are, too.
+bool Run::is_finished() const {
+  return std::all_of(vehicles_.begin(), vehicles_.end(),
+                     [](const auto& vehicle) { return vehicle->outcome()->is_finished; });
 }
 
 bool Run::rest() {
@@ -162,7 +189,7 @@ bool Run::rest() {
   bool is_ended = false;
   while (control_.holds() && !is_ended) {
     attend_now_and_then();
-    refresh_roster_if_due();
+    if (is_roster_due()) refresh_roster();
     is_ended = attend_to_operator();
     if (!is_ended && control_.holds()) endpoints_.requests.wait(Clock::now() + kPollTime);
   }
@@ -204,107 +231,14 @@ void Run::refresh_roster() {
   roster_time_ = Clock::now();
   roster_ = {endpoints_.participants.find(ROLE_CONTROLLER, run_id_),
              endpoints_.participants.find(ROLE_RECORDER, run_id_), began_};
-  gate_.set_clients(find_ready_clients(roster_, scenario_.sha256));
+  for (const auto& vehicle : vehicles_)
+    vehicle->gate.set_clients(find_ready_clients(roster_, scenario_.sha256, vehicle->id()));
+  roster_changed();
 }
 
-void Run::refresh_roster_if_due() {
-  if (endpoints_.participants.version() != roster_version_ ||
-      Clock::now() - roster_time_ > kRosterTime)
-    refresh_roster();
-}
-
-// --- answers -------------------------------------------------------------------------------------
-
-void Run::judge(const ReceivedCommand& received) {
-  const Verdict verdict = gate_.offer(received.command, received.sender);
-  const char* defect = to_string(verdict);
-  if (*defect != '\0')
-    spdlog::debug("command for step {} from '{}' rejected: {}", received.command.step(),
-                  received.command.client_name().c_str(), defect);
-}
-
-Run::Outcome Run::take_accepted_answer() {
-  const ControlCommand& answer = *gate_.accepted();
-  const std::uint64_t step = answer.step();
-  board_.controller_name = answer.client_name().to_string();
-  if (const auto& switched = gate_.take_over())
-    board_.announce(fmt::format("step {}: controller '{}' takes over from '{}'", step, switched->to,
-                                switched->from));
-  if (is_absence_announced_)
-    board_.announce(fmt::format("step {}: controller '{}' answers again after {:.1f} s", step,
-                                board_.controller_name, calc_absence_s()));
-  absent_since_.reset();
-  absence_wait_.reset();
-  absence_action_.reset();
-  is_absence_announced_ = false;
-  absence_.answered();
-
-  Outcome outcome;
-  outcome.is_finished = answer.mission() == MISSION_FINISHED;
-  outcome.applied.answer_f_Q_W = bus::to_vector(answer.f_Q_W_n());
-  outcome.applied.origin = FORCE_ANSWERED;
-  outcome.applied.controller_name = board_.controller_name;
-  outcome.applied.memory = answer.controller();
-  last_answer_ = outcome.applied;
-  last_answer_step_ = step;
-  if (!outcome.is_finished) board_.timing.add(FORCE_ANSWERED, 0);
-  return outcome;
-}
-
-Run::Outcome Run::fly_without_answer(std::uint64_t step, ControllerAbsence::Action action) {
-  Outcome outcome;
-  outcome.applied = last_answer_;
-  if (action == ControllerAbsence::Action::kHold && last_answer_.origin != FORCE_NONE) {
-    outcome.applied.origin = FORCE_HELD;
-  } else {  // also before the first answer, when there is nothing to hold
-    outcome.applied.origin = FORCE_FAIL_SAFE;
-    outcome.applied.controller_name = kFailSafeName;
-    outcome.applied.answer_f_Q_W =
-        calc_fail_safe_force(scenario_.vehicle, state_, scenario_.controller.force_limit_n);
-  }
-  absence_.flown_without_answer();
-  board_.controller_name = outcome.applied.controller_name;
-  board_.timing.add(outcome.applied.origin, step - last_answer_step_);
-  return outcome;
-}
-
-double Run::calc_absence_s() const {
-  return absent_since_ ? std::chrono::duration<double>(Clock::now() - *absent_since_).count() : 0.0;
-}
-
-std::string Run::name_awaited_controller() const {
-  if (const auto awaited = gate_.awaited_client())
-    return fmt::format("controller '{}' on {}", awaited->name, find_host(roster_, awaited->peer));
-  return last_answer_.controller_name.empty()
-             ? std::string("controller (none is ready)")
-             : fmt::format("controller '{}' (gone)", last_answer_.controller_name);
-}
-
-void Run::attend_to_absence(std::uint64_t step, ControllerAbsence::Action action) {
-  using Action = ControllerAbsence::Action;
-  if (action == Action::kGiveUp)
-    throw app::RunError(fmt::format("step {}: waited {} s for {}", step, absence_.give_up_s(),
-                                    name_awaited_controller()));
-  if (!absence_wait_)
-    absence_wait_.emplace(
-        absence_.give_up_s() - calc_absence_s(),
-        std::max(Clock::duration(0s), Clock::duration(1s) - (Clock::now() - *absent_since_)));
-  const bool is_lockstep = scenario_.sync.mode == config::SyncMode::kLockstep;
-  // In real time a few held steps are no news: they are counted.
-  const bool is_news = action != absence_action_ &&
-                       (action == Action::kFailSafe || (action == Action::kHold && is_lockstep));
-  if (is_news) {
-    absence_action_ = action;
-    is_absence_announced_ = true;
-    board_.announce(
-        fmt::format("step {}: {} for want of an answer of {}", step,
-                    action == Action::kHold ? "holds the last force" : "fail-safe force",
-                    name_awaited_controller()));
-  }
-  if (!absence_wait_->is_report_due()) return;
-  is_absence_announced_ = true;
-  board_.announce(fmt::format("step {}: waiting for: {} ({:.0f} s left)", step,
-                              name_awaited_controller(), absence_wait_->seconds_left()));
+bool Run::is_roster_due() const {
+  return endpoints_.participants.version() != roster_version_ ||
+         Clock::now() - roster_time_ > kRosterTime;
 }
 
 void Run::report_silent_recorder() {

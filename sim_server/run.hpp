@@ -1,32 +1,39 @@
 /// One run of the server, from its run_id to its end: waits for the participants, flies the
-/// scenario step by step, attends to operator and recorders. How a step gets its force is what
+/// vehicles step by step, attends to operator and recorders. How a step gets its forces is what
 /// lockstep_run.hpp and realtime_run.hpp add.
 #pragma once
 
 #include <chrono>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "common/app/wait.hpp"
 #include "common/config/scenario.hpp"
-#include "sim_server/command_gate.hpp"
 #include "sim_server/controller_absence.hpp"
 #include "sim_server/endpoints.hpp"
-#include "sim_server/fault_line.hpp"
-#include "sim_server/messages.hpp"
 #include "sim_server/roster.hpp"
 #include "sim_server/run_control.hpp"
-#include "sim_server/slung_load_plant.hpp"
 #include "sim_server/status_board.hpp"
+#include "sim_server/vehicle_flight.hpp"
+#include "sim_server/worker_pool.hpp"
 
 namespace sls::sim {
 
+/// What a server flies.
+struct Assignment {
+  config::Scenario scenario;
+  std::vector<std::uint32_t> vehicle_ids;  ///< of the scenario's, ascending; at least one
+};
+
 class Run {
  public:
-  /// Announces run `run_id` of `scenario` in sls/parameters. It begins at rest if `begins_paused`.
-  Run(Endpoints& endpoints, const config::Scenario& scenario, std::uint64_t run_id,
-      std::uint32_t vehicle_id, bool begins_paused);
+  /// Announces run `run_id` of `assignment` in sls/parameters. It begins at rest if
+  /// `begins_paused`.
+  Run(Endpoints& endpoints, const Assignment& assignment, WorkerPool& workers, std::uint64_t run_id,
+      bool begins_paused);
   virtual ~Run() = default;
   Run(const Run&) = delete;
   Run& operator=(const Run&) = delete;
@@ -50,7 +57,7 @@ class Run {
     return are_recorders_given_up_ ? 0 : scenario_.sync.wait_for.recorders;
   }
 
-  /// @throws app::RunError if another server has the better claim to the vehicle.
+  /// @throws app::RunError if another server has the better claim to one of the vehicles.
   void check_claim() const;
   /// @throws app::RunError after a stop signal.
   static void check_stop();
@@ -58,80 +65,85 @@ class Run {
  protected:
   using Clock = std::chrono::steady_clock;
 
-  /// What a step came to.
-  struct Outcome {
-    Applied applied;           // but for the faults
-    bool is_finished = false;  // the mission ends here; nothing is applied
-  };
-
   /// Step 0 is about to be published.
   virtual void begin() {}
-  /// Publishes `state` and returns what came of it; nothing if the operator ended the run.
-  virtual std::optional<Outcome> exchange(const VehicleState& state) = 0;
-  /// Whether `step` may be published as far as the recorders are concerned; false if the operator
-  /// ended the run meanwhile.
-  virtual bool wait_for_recorders(std::uint64_t step) = 0;
+  /// Publishes the states of the step in work, and settles what comes of it for each vehicle; false
+  /// if the operator ended the run.
+  virtual bool exchange() = 0;
+  /// Whether the step in work may be published as far as the recorders are concerned; false if the
+  /// operator ended the run meanwhile.
+  virtual bool wait_for_recorders() = 0;
+  /// The roster was looked at again.
+  virtual void roster_changed() {}
   /// The run was at rest for so long.
   virtual void rested(Clock::duration rest) = 0;
 
-  // For both ways of stepping.
-  void judge(const ReceivedCommand& received);
-  Outcome take_accepted_answer();
-  /// Flies `step` without an answer of its own.
-  Outcome fly_without_answer(std::uint64_t step, ControllerAbsence::Action action);
+  // For both ways of stepping (run_answers.cpp).
+  Verdict judge(const ControlCommand& command, const bus::PeerId& sender);
+  VehicleFlight* find_vehicle(std::uint32_t id);
+  /// True where every vehicle's answer to the step in work was accepted.
+  bool are_all_accepted() const;
+  /// True where a vehicle's last step had no answer.
+  bool is_anybody_absent() const;
+  /// @throws app::RunError where no client is left that could answer for a vehicle.
+  void check_refusals() const;
+  /// Takes what was accepted, and says who takes over and who is back.
+  void take_answers();
   /// Says now and then who is missing since when, also in sls/status. @throws app::RunError to give
   /// the run up.
-  void attend_to_absence(std::uint64_t step, ControllerAbsence::Action action);
-  double calc_absence_s() const;
-  std::string name_awaited_controller() const;
-  void report_silent_recorder();
+  void attend_to_absence(ControllerAbsence::Action action);
+  /// The controllers whose answers are awaited, in words.
+  std::string name_awaited_controllers() const;
+
+  /// Flies the period that begins with the step in work, and goes on to the next step.
+  void advance();
+  bool is_finished() const;
 
   /// Takes the operator's requests; true if one of them ended the run.
   bool attend_to_operator();
   void refresh_roster();
-  void refresh_roster_if_due();
+  bool is_roster_due() const;
   /// Status, stop signal, claim: what needs a look a few times a second.
   void attend_now_and_then();
 
   Endpoints& endpoints_;
   const config::Scenario scenario_;
+  const std::vector<std::uint32_t> vehicle_ids_;
   const std::uint64_t run_id_;
-  const std::uint32_t vehicle_id_;
 
-  CommandGate gate_;
+  std::vector<std::unique_ptr<VehicleFlight>> vehicles_;  // as vehicle_ids_
+  SyncCounters link_;                                     // what concerns no vehicle alone
   StatusBoard board_;
   RunControl control_;
-  ControllerAbsence absence_;
   Roster roster_;
-  Applied last_answer_;                     // accepted, or late but valid; what is held
-  std::uint64_t last_answer_step_ = 0;      // the step it answers
   bool are_recorders_given_up_ = false;     // policy go_on
   std::optional<Clock::time_point> began_;  // when step 0 was about to be published
-  model::SlungLoadState state_;             // of the plant at the step in work
 
  private:
   bool is_meant_for_another_server(const SimControl& request) const;
   bool wait_for_participants();
   bool fly();
+  void measure(std::size_t index);
   /// Waits while the operator holds the run; false if a request ended it.
   bool rest();
   void finish();
   void reset();
+  void publish_end(RunPhase phase, const std::string& reason);
   void close_requests(const std::string& reason);
+  void report_silent_recorder();
+  SyncCounters sum_counters() const;
+  std::string describe_vehicles(const std::vector<std::uint32_t>& ids) const;
+  void announce_take_overs();
+  double calc_longest_absence_s() const;
 
+  WorkerPool& workers_;
+  const std::int64_t plant_steps_;  // per period
   std::uint64_t roster_version_ = 0;
   Clock::time_point roster_time_;
-  std::optional<Clock::time_point> absent_since_;  // when the first unanswered step was published
   std::optional<app::Wait> absence_wait_;
   bool is_absence_announced_ = false;
   std::optional<ControllerAbsence::Action> absence_action_;  // announced last
   std::optional<Clock::time_point> recorder_report_time_;
-
- protected:
-  /// A step was published at `time` and has no answer yet.
-  void note_waiting(Clock::time_point time) {
-    if (!absent_since_) absent_since_ = time;
-  }
 };
 
 }  // namespace sls::sim

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/config/vehicle_ids.hpp"
+
 namespace sls::sim {
 namespace {
 
@@ -23,18 +25,20 @@ std::string describe_progress(std::uint64_t done, std::uint64_t steps) {
 
 }  // namespace
 
-RunControl::RunControl(std::uint64_t run_id, std::uint32_t vehicle_id, bool is_paused)
-    : run_id_(run_id), vehicle_id_(vehicle_id), is_paused_(is_paused) {}
+RunControl::RunControl(std::uint64_t run_id, const std::vector<std::uint32_t>& vehicle_ids,
+                       bool is_paused)
+    : run_id_(run_id), vehicle_ids_(vehicle_ids), is_paused_(is_paused) {}
 
 std::optional<SimControlReply> RunControl::request(const SimControl& request, std::uint64_t step) {
   // Neither of these concerns this run, so they leave no trace in it.
   if (request.run_id() != run_id_)
     return make_reply(request.request_id(), step,
                       fmt::format("run: expected {:016x}, got {:016x}", run_id_, request.run_id()));
-  if (request.vehicle_id() != vehicle_id_)
-    return make_reply(
-        request.request_id(), step,
-        fmt::format("vehicle: expected {}, got {}", vehicle_id_, request.vehicle_id()));
+  if (std::find(vehicle_ids_.begin(), vehicle_ids_.end(), request.vehicle_id()) ==
+      vehicle_ids_.end())
+    return make_reply(request.request_id(), step,
+                      fmt::format("vehicle: expected {}, got {}",
+                                  config::to_vehicle_ranges(vehicle_ids_), request.vehicle_id()));
 
   const std::string operator_name = request.operator_name().to_string();
   const auto earlier =
@@ -159,7 +163,7 @@ SimControlReply RunControl::make_reply(std::uint64_t request_id, std::uint64_t s
                                        const std::string& refusal) const {
   SimControlReply reply;
   reply.run_id(run_id_);
-  reply.vehicle_id(vehicle_id_);
+  reply.vehicle_id(vehicle_ids_.front());
   reply.request_id(request_id);
   reply.accepted(refusal.empty());
   reply.reason(refusal);

@@ -16,7 +16,8 @@ namespace sls::sim {
 class RunControl {
  public:
   /// Controls run `run_id`, which begins unpaused unless `is_paused`.
-  RunControl(std::uint64_t run_id, std::uint32_t vehicle_id, bool is_paused);
+  /// A request names any of its vehicles.
+  RunControl(std::uint64_t run_id, const std::vector<std::uint32_t>& vehicle_ids, bool is_paused);
 
   /// Judges `request`, made while the loop is at `step` (published next, or awaiting its answer).
   /// The reply, except where it comes later: that of an accepted step request, from `stepped` or
@@ -73,7 +74,7 @@ class RunControl {
   SimControlReply close_step_request(std::uint64_t step, const std::string& refusal);
 
   const std::uint64_t run_id_;
-  const std::uint32_t vehicle_id_;
+  const std::vector<std::uint32_t> vehicle_ids_;
   bool is_paused_;
   bool is_reset_requested_ = false;
   bool is_stop_requested_ = false;

@@ -1,5 +1,6 @@
 #include "sim_server/server.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <random>
 #include <thread>
@@ -25,13 +26,15 @@ std::uint64_t make_run_id() {
 
 }  // namespace
 
-Server::Server(bus::Node& node, const config::Scenario& scenario)
-    : scenario_(scenario), endpoints_(node, scenario.sync.mode) {}
+Server::Server(bus::Node& node, const Assignment& assignment, std::size_t threads)
+    : assignment_(assignment),
+      workers_(std::min(threads, assignment.vehicle_ids.size())),
+      endpoints_(node, assignment.vehicle_ids.size(), assignment.scenario.sync.mode) {}
 
 void Server::run() {
   auto run = make_run(false);
   try {
-    claim_vehicle(*run);
+    claim_vehicles(*run);
     while (run->execute() == Run::End::kReset) {
       const bool is_paused = run->is_paused();
       run.reset();
@@ -47,12 +50,12 @@ void Server::run() {
 
 std::unique_ptr<Run> Server::make_run(bool begins_paused) {
   const std::uint64_t run_id = make_run_id();
-  if (scenario_.sync.mode == config::SyncMode::kRealtime)
-    return std::make_unique<RealtimeRun>(endpoints_, scenario_, run_id, vehicle_id_, begins_paused);
-  return std::make_unique<LockstepRun>(endpoints_, scenario_, run_id, vehicle_id_, begins_paused);
+  if (assignment_.scenario.sync.mode == config::SyncMode::kRealtime)
+    return std::make_unique<RealtimeRun>(endpoints_, assignment_, workers_, run_id, begins_paused);
+  return std::make_unique<LockstepRun>(endpoints_, assignment_, workers_, run_id, begins_paused);
 }
 
-void Server::claim_vehicle(const Run& run) {
+void Server::claim_vehicles(const Run& run) {
   const auto settled = std::chrono::steady_clock::now() + kClaimTime;
   while (std::chrono::steady_clock::now() < settled) {
     Run::check_stop();
@@ -62,7 +65,7 @@ void Server::claim_vehicle(const Run& run) {
 }
 
 void Server::linger(const Run& run, int expected_recorders) {
-  endpoints_.state_writer.wait_for_acknowledgments(1s);
+  endpoints_.states.wait_for_acknowledgments(1s);
   endpoints_.status_writer.wait_for_acknowledgments(1s);
   bus::wait_for_recorders_to_end(endpoints_.participants, run.run_id(), expected_recorders);
 }

@@ -1,12 +1,11 @@
-/// The server: claims its vehicle, then flies one run after the other, as long as the operator
-/// resets. One thread works; the middleware's threads only fill mailboxes.
+/// The server: claims its vehicles, then flies one run after the other, as long as the operator
+/// resets.
 #pragma once
 
 #include <cstdint>
 #include <memory>
 
 #include "common/bus/node.hpp"
-#include "common/config/scenario.hpp"
 #include "sim_server/endpoints.hpp"
 #include "sim_server/run.hpp"
 
@@ -14,8 +13,9 @@ namespace sls::sim {
 
 class Server {
  public:
-  /// Joins the domain of `node` with the scenario in force.
-  Server(bus::Node& node, const config::Scenario& scenario);
+  /// Joins the domain of `node` with the scenario in force. `threads` ≥ 1 integrate the vehicles;
+  /// the result does not depend on how many.
+  Server(bus::Node& node, const Assignment& assignment, std::size_t threads);
 
   /// Runs from the claim to the end. Returns when the recorders are done.
   /// @throws app::RunError saying why the run failed, after the participants have been told.
@@ -23,12 +23,12 @@ class Server {
 
  private:
   std::unique_ptr<Run> make_run(bool begins_paused);
-  void claim_vehicle(const Run& run);
+  void claim_vehicles(const Run& run);
   /// Keeps the writers until the recorders, of which so many are expected, are done with `run`.
   void linger(const Run& run, int expected_recorders);
 
-  const config::Scenario scenario_;
-  const std::uint32_t vehicle_id_ = 0;
+  const Assignment assignment_;
+  WorkerPool workers_;
   Endpoints endpoints_;
 };
 

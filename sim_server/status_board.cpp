@@ -2,17 +2,19 @@
 
 #include <spdlog/spdlog.h>
 
+#include <utility>
+
 namespace sls::sim {
 
 StatusBoard::StatusBoard(bus::Writer<SimStatus>& writer, std::uint64_t run_id,
                          std::uint32_t vehicle_id, const config::Sync& sync,
-                         const SyncCounters& counters)
+                         std::function<SyncCounters()> sum_counters)
     : timing(sync),
       writer_(writer),
       run_id_(run_id),
       vehicle_id_(vehicle_id),
       period_ns_(sync.period_ns),
-      counters_(counters) {}
+      sum_counters_(std::move(sum_counters)) {}
 
 double StatusBoard::calc_wall_s() const {
   if (start_time_ == Clock::time_point{}) return 0.0;
@@ -27,7 +29,7 @@ double StatusBoard::calc_real_time_factor() const {
 void StatusBoard::publish(RunPhase phase, const std::string& reason) {
   phase_ = phase;
   publish_time_ = Clock::now();
-  SyncCounters counters = counters_;
+  SyncCounters counters = sum_counters_();
   timing.fill(counters);
   SimStatus message;
   message.run_id(run_id_);
@@ -37,6 +39,7 @@ void StatusBoard::publish(RunPhase phase, const std::string& reason) {
   message.reason(reason);
   message.step(step);
   message.controller_name(controller_name);
+  for (const std::string& name : controller_names) message.controller_names().emplace_back(name);
   message.real_time_factor(calc_real_time_factor());
   message.round_trip_p50_ns(static_cast<std::uint64_t>(round_trips.calc_percentile(50).count()));
   message.round_trip_p99_ns(static_cast<std::uint64_t>(round_trips.calc_percentile(99).count()));
@@ -51,7 +54,7 @@ void StatusBoard::announce(const std::string& event) {
 }
 
 bool StatusBoard::publish_if_due(const std::string& reason) {
-  if (Clock::now() - publish_time_ < kInterval) return false;
+  if (!is_due()) return false;
   publish(phase_, reason);
   return true;
 }

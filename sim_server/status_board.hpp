@@ -3,7 +3,9 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <string>
+#include <vector>
 
 #include "common/bus/node.hpp"
 #include "common/config/scenario.hpp"
@@ -19,9 +21,9 @@ class StatusBoard {
   /// Samples of a run are at most this far apart, so that silence says something.
   static constexpr auto kInterval = std::chrono::milliseconds(400);
 
-  /// `counters` (of the command gate) must outlive this.
+  /// `vehicle_id` is the first of the run's; `sum_counters` is asked for every sample.
   StatusBoard(bus::Writer<SimStatus>& writer, std::uint64_t run_id, std::uint32_t vehicle_id,
-              const config::Sync& sync, const SyncCounters& counters);
+              const config::Sync& sync, std::function<SyncCounters()> sum_counters);
 
   /// Publishes a sample now.
   void publish(RunPhase phase, const std::string& reason);
@@ -29,6 +31,7 @@ class StatusBoard {
   void announce(const std::string& event);
   /// Publishes if the last sample is `kInterval` ago: true.
   bool publish_if_due(const std::string& reason);
+  bool is_due() const { return Clock::now() - publish_time_ >= kInterval; }
 
   RunPhase phase() const { return phase_; }
   /// True once anybody can have heard of the run.
@@ -36,7 +39,8 @@ class StatusBoard {
 
   // What the samples say; the loop keeps it up to date.
   std::uint64_t step = 0;
-  std::string controller_name;  ///< whose command for `step` was accepted
+  std::string controller_name;  ///< whose command for `step` was accepted, of the first vehicle
+  std::vector<std::string> controller_names;  ///< of every vehicle, at the end of a fleet's run
   TimingRecord timing;
   RoundTrips round_trips;
 
@@ -53,7 +57,7 @@ class StatusBoard {
   const std::uint64_t run_id_;
   const std::uint32_t vehicle_id_;
   const std::int64_t period_ns_;
-  const SyncCounters& counters_;
+  const std::function<SyncCounters()> sum_counters_;
   RunPhase phase_ = PHASE_WAITING;
   std::uint64_t samples_ = 0;
   Clock::time_point publish_time_;

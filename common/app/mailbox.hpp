@@ -31,6 +31,20 @@ class Mailbox {
     return true;
   }
 
+  /// Ends the wait of a thread that waits, or that will wait next.
+  void interrupt() {
+    {
+      const std::lock_guard lock(mutex_);
+      is_interrupted_ = true;
+    }
+    filled_.notify_one();
+  }
+
+  bool is_empty() const {
+    const std::lock_guard lock(mutex_);
+    return items_.empty();
+  }
+
   /// The oldest item, waiting for one until `deadline`; nothing where none came.
   std::optional<T> take(std::chrono::steady_clock::time_point deadline) {
     std::unique_lock lock(mutex_);
@@ -41,10 +55,11 @@ class Mailbox {
     return item;
   }
 
-  /// Waits until there is an item, or until `deadline`.
+  /// Waits until there is an item, until `interrupt`, or until `deadline`.
   void wait(std::chrono::steady_clock::time_point deadline) {
     std::unique_lock lock(mutex_);
-    filled_.wait_until(lock, deadline, [this] { return !items_.empty(); });
+    filled_.wait_until(lock, deadline, [this] { return !items_.empty() || is_interrupted_; });
+    is_interrupted_ = false;
   }
 
   /// All items there are, oldest first, without waiting. A thread that can afford to look only now
@@ -66,6 +81,7 @@ class Mailbox {
   std::condition_variable filled_;
   std::deque<T> items_;
   std::uint64_t refused_ = 0;
+  bool is_interrupted_ = false;
 };
 
 }  // namespace sls::app

@@ -13,6 +13,9 @@ template <class Generated>
 class GuardedType : public Generated {
  public:
   bool deserialize(eprosima::fastrtps::rtps::SerializedPayload_t* payload, void* data) override {
+    // What is longer than any sample may claim elements without end, which are made before they are
+    // read.
+    if (payload->length > this->m_typeSize) return false;
     try {
       return Generated::deserialize(payload, data);
     } catch (const std::exception&) {

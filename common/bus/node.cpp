@@ -3,7 +3,6 @@
 #include <fastdds/rtps/attributes/PropertyPolicy.h>
 #include <fastrtps/config.h>
 #include <fastrtps/utils/IPLocator.h>
-#include <slsPubSubTypes.h>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <fastdds/dds/publisher/DataWriter.hpp>
@@ -26,7 +25,6 @@
 #include <mutex>
 #include <utility>
 
-#include "common/bus/guarded_type.hpp"
 #include "common/bus/middleware_log.hpp"
 #include "common/bus/participant_listener.hpp"
 #include "common/bus/qos_file.hpp"
@@ -362,39 +360,6 @@ void AnyReader::ignore_lifespan() {
   dds::DataReaderQos qos = impl_->reader->get_qos();
   qos.lifespan().duration = eprosima::fastrtps::c_TimeInfinite;
   impl_->reader->set_qos(qos);
-}
-
-template <>
-void* make_type_support<VehicleState>() {
-  return static_cast<dds::TopicDataType*>(new GuardedType<VehicleStatePubSubType>);
-}
-template <>
-void* make_type_support<ControlCommand>() {
-  return static_cast<dds::TopicDataType*>(new GuardedType<ControlCommandPubSubType>);
-}
-template <>
-void* make_type_support<Reference>() {
-  return static_cast<dds::TopicDataType*>(new GuardedType<ReferencePubSubType>);
-}
-template <>
-void* make_type_support<Participant>() {
-  return static_cast<dds::TopicDataType*>(new GuardedType<ParticipantPubSubType>);
-}
-template <>
-void* make_type_support<Parameters>() {
-  return static_cast<dds::TopicDataType*>(new GuardedType<ParametersPubSubType>);
-}
-template <>
-void* make_type_support<SimStatus>() {
-  return static_cast<dds::TopicDataType*>(new GuardedType<SimStatusPubSubType>);
-}
-template <>
-void* make_type_support<SimControl>() {
-  return static_cast<dds::TopicDataType*>(new GuardedType<SimControlPubSubType>);
-}
-template <>
-void* make_type_support<SimControlReply>() {
-  return static_cast<dds::TopicDataType*>(new GuardedType<SimControlReplyPubSubType>);
 }
 
 }  // namespace detail

@@ -63,9 +63,11 @@ class Node {
 
 namespace detail {
 
-/// Type-erased halves of Writer and Reader; `make_type` hands over the generated type support.
+/// The generated type support of `Message` (type_support.cpp), to be handed to a writer or reader.
 template <class Message>
 void* make_type_support();
+
+/// Type-erased halves of Writer and Reader.
 
 class AnyWriter {
  public:
@@ -106,9 +108,7 @@ template <class Message>
 class Writer {
  public:
   /// With the profile of the topic's flow, or `profile`.
-  explicit Writer(Node& node, const char* profile = Topic<Message>::kFlow == Flow::kStream
-                                                        ? kStreamWriterProfile
-                                                        : kLatchedWriterProfile)
+  explicit Writer(Node& node, const char* profile = find_writer_profile(Topic<Message>::kFlow))
       : writer_(node, Topic<Message>::kName, profile, detail::make_type_support<Message>()) {}
 
   /// Hands `message` to the middleware; may block while a history is full, so it has no place in a

@@ -290,6 +290,14 @@ bool serves_vehicle(const Parameters& parameters, std::uint32_t vehicle_id) {
   return std::find(ids.begin(), ids.end(), vehicle_id) != ids.end();
 }
 
+bool is_fleet(const Parameters& parameters) { return parameters.vehicle_ids().size() > 1; }
+
+bool flies_vehicle(const Participant& controller, std::uint32_t vehicle_id) {
+  const auto& ids = controller.vehicle_ids();
+  return ids.empty() ? controller.vehicle_id() == vehicle_id
+                     : std::find(ids.begin(), ids.end(), vehicle_id) != ids.end();
+}
+
 std::string host_name() {
   std::array<char, 65> name{};
   return gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "unknown";

@@ -179,6 +179,12 @@ int calc_progress(const std::optional<SimStatus>& status);
 /// True where `vehicle_id` is among `parameters`' vehicles.
 bool serves_vehicle(const Parameters& parameters, std::uint32_t vehicle_id);
 
+/// True where the run of `parameters` is of several vehicles, and speaks the fleet's topics.
+bool is_fleet(const Parameters& parameters);
+
+/// True where the controller that announced itself so flies `vehicle_id`.
+bool flies_vehicle(const Participant& controller, std::uint32_t vehicle_id);
+
 /// This machine's name, at most 64 bytes, for sls/participant.
 std::string host_name();
 

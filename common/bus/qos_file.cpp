@@ -34,7 +34,7 @@ struct Profile {
   const char* name;
   bool is_required = true;
 };
-constexpr std::array<Profile, 8> kProfiles = {
+constexpr std::array<Profile, 13> kProfiles = {
     {{"participant", kParticipantProfile},
      {"data_writer", kStreamWriterProfile},
      {"data_reader", kLoopReaderProfile},
@@ -42,7 +42,12 @@ constexpr std::array<Profile, 8> kProfiles = {
      {"data_writer", kLatchedWriterProfile},
      {"data_reader", kLatchedReaderProfile},
      {"data_writer", kRealtimeCommandWriterProfile, false},
-     {"data_reader", kRealtimeCommandReaderProfile, false}}};
+     {"data_reader", kRealtimeCommandReaderProfile, false},
+     {"data_writer", kFleetWriterProfile},
+     {"data_reader", kFleetLoopReaderProfile},
+     {"data_reader", kFleetRecorderReaderProfile},
+     {"data_writer", kRealtimeFleetCommandWriterProfile, false},
+     {"data_reader", kRealtimeFleetCommandReaderProfile, false}}};
 
 struct Found {
   std::string element;
@@ -194,6 +199,30 @@ void complete(tinyxml2::XMLElement& element, const std::string& identity, const 
   }
 }
 
+// --- what the middleware cannot do ---------------------------------------------------------------
+
+/// The first element of that name and text, in `element` or below; any text where it is empty.
+const tinyxml2::XMLElement* find_element(const tinyxml2::XMLElement& element,
+                                         const std::string& name, const std::string& text = {}) {
+  const char* own = element.GetText();
+  if (element.Name() == name && own && (text.empty() || own == text)) return &element;
+  for (auto* child = element.FirstChildElement(); child; child = child->NextSiblingElement())
+    if (const auto* found = find_element(*child, name, text)) return found;
+  return nullptr;
+}
+
+/// Fast DDS 2.9 authenticates nobody whom a discovery server names: all would wait for ever.
+void check_discovery(const tinyxml2::XMLElement& root, const std::string& place) {
+  const auto* protocol = find_element(root, "discoveryProtocol");
+  if (!protocol || std::string(protocol->GetText()) == "SIMPLE") return;
+  if (find_element(root, "name", "dds.sec.auth.plugin"))
+    throw ConfigError(place + ":" + std::to_string(protocol->GetLineNum()) +
+                      ": <discoveryProtocol>: expected SIMPLE beside DDS Security, which Fast DDS "
+                      "2.9 cannot do through a discovery server (SLS_PEERS works without "
+                      "multicast), got '" +
+                      protocol->GetText() + "'");
+}
+
 // --- profiles ------------------------------------------------------------------------------------
 
 /// A profile of ours that is misspelt would be left out without a word.
@@ -245,6 +274,7 @@ std::string read_qos_file(const std::filesystem::path& file, const std::string& 
   if (auto* root = document.RootElement()) {
     collect_profiles(*root, place, found);
     complete(*root, identity, place);
+    check_discovery(*root, place);
   }
   check_names(found, place);
   const std::map<std::string, Found> own = found;

@@ -7,7 +7,8 @@ namespace sls::bus {
 
 /// What a topic is for decides its QoS profiles: config/qos/README.md.
 enum class Flow {
-  kStream,   ///< one sample per control period and vehicle: state, command, reference
+  kStream,   ///< one sample per control period: state, command, reference of one vehicle
+  kFleet,    ///< the same of several vehicles in one sample: fewer samples, larger ones
   kLatched,  ///< what a late joiner must know: participant, parameters, status; and control, whose
              ///< requests carry a run_id, so that none acts on a later run
 };
@@ -17,11 +18,26 @@ inline constexpr const char* kParticipantProfile = "sls_participant";
 inline constexpr const char* kStreamWriterProfile = "sls_stream_writer";
 inline constexpr const char* kLoopReaderProfile = "sls_loop_reader";
 inline constexpr const char* kRecorderReaderProfile = "sls_recorder_reader";
+inline constexpr const char* kFleetWriterProfile = "sls_fleet_writer";
+inline constexpr const char* kFleetLoopReaderProfile = "sls_fleet_loop_reader";
+inline constexpr const char* kFleetRecorderReaderProfile = "sls_fleet_recorder_reader";
 inline constexpr const char* kLatchedWriterProfile = "sls_latched_writer";
 inline constexpr const char* kLatchedReaderProfile = "sls_latched_reader";
-/// sls/command in real time, with DEADLINE and LIFESPAN; a file without them flies without these.
+/// sls/command, and sls/fleet_command, in real time, with DEADLINE and LIFESPAN; a file without
+/// them flies without these.
 inline constexpr const char* kRealtimeCommandWriterProfile = "sls_realtime_command_writer";
 inline constexpr const char* kRealtimeCommandReaderProfile = "sls_realtime_command_reader";
+inline constexpr const char* kRealtimeFleetCommandWriterProfile =
+    "sls_realtime_fleet_command_writer";
+inline constexpr const char* kRealtimeFleetCommandReaderProfile =
+    "sls_realtime_fleet_command_reader";
+
+/// Writer profile of a flow.
+constexpr const char* find_writer_profile(Flow flow) {
+  return flow == Flow::kStream  ? kStreamWriterProfile
+         : flow == Flow::kFleet ? kFleetWriterProfile
+                                : kLatchedWriterProfile;
+}
 
 /// `kName` and `kFlow` of the topic that carries `Message`.
 template <class Message>
@@ -41,6 +57,21 @@ template <>
 struct Topic<Reference> {
   static constexpr const char* kName = "sls/reference";
   static constexpr Flow kFlow = Flow::kStream;
+};
+template <>
+struct Topic<FleetState> {
+  static constexpr const char* kName = "sls/fleet_state";
+  static constexpr Flow kFlow = Flow::kFleet;
+};
+template <>
+struct Topic<FleetCommand> {
+  static constexpr const char* kName = "sls/fleet_command";
+  static constexpr Flow kFlow = Flow::kFleet;
+};
+template <>
+struct Topic<FleetReference> {
+  static constexpr const char* kName = "sls/fleet_reference";
+  static constexpr Flow kFlow = Flow::kFleet;
 };
 template <>
 struct Topic<Participant> {

@@ -40,7 +40,7 @@ struct Judges {
   }
 
   void judge(std::uint8_t type, std::uint8_t sender, const std::uint8_t* data, std::uint32_t size) {
-    switch (type % 8) {
+    switch (type % 11) {
       case 0:
         if (const auto state = deserialize<VehicleStatePubSubType, VehicleState>(data, size))
           join.add(*state);
@@ -75,12 +75,26 @@ struct Judges {
       case 7:
         deserialize<SimControlReplyPubSubType, SimControlReply>(data, size);
         break;
+      case 8:
+        if (const auto fleet = deserialize<FleetStatePubSubType, FleetState>(data, size))
+          for (const VehicleState& state : fleet->vehicles()) join.add(state);
+        break;
+      case 9:
+        if (const auto fleet = deserialize<FleetCommandPubSubType, FleetCommand>(data, size))
+          for (const ControlCommand& command : fleet->vehicles())
+            gate.offer(command, make_peer(sender));
+        break;
+      case 10:
+        if (const auto fleet = deserialize<FleetReferencePubSubType, FleetReference>(data, size))
+          for (const Reference& reference : fleet->vehicles())
+            join.add(reference, make_peer(sender));
+        break;
     }
   }
 
   std::uint64_t step = 0;
   sim::CommandGate gate{kRun, 0, 200.0};
-  sim::RunControl control{kRun, 0, false};
+  sim::RunControl control{kRun, {0}, false};
   record::StepJoin join{[](const record::StepRecord&) {}};
 };
 

@@ -75,6 +75,25 @@ TEST_F(CsvFileTest, FieldsOfAllKindsMakeARow) {
   EXPECT_EQ(file.rows(), 1u);
 }
 
+TEST_F(CsvFileTest, FieldsAndRowsMayBeOfAnyLength) {
+  CsvFile file(path_, "h");
+  std::string expected = "h\n";
+  for (const std::size_t length : {0, 1, 30, 31, 32, 33, 1000, 100'000}) {
+    const std::string text(length, '"');  // doubled when it is quoted
+    const std::string quoted = length == 0 ? "" : '"' + text + text + '"';
+    file.add(text);
+    file.add(-2.2250738585072014e-308);
+    file.add(text);
+    file.end_row();
+    expected += quoted + ",-2.2250738585072014e-308," + quoted + '\n';
+    file.end_row();  // of no field at all
+    expected += '\n';
+  }
+  file.flush();
+  EXPECT_TRUE(read_bytes(path_) == expected);
+  EXPECT_EQ(file.rows(), 16u);
+}
+
 TEST_F(CsvFileTest, RowsAreCounted) {
   CsvFile file(path_, "h");
   for (int i = 0; i < 12345; ++i) {

@@ -119,9 +119,23 @@ TEST_F(RecordingFolderTest, ForceReplacesSegmentsAndFurtherRunsToo) {
   EXPECT_TRUE(fs::is_empty(out_));
 }
 
+TEST_F(RecordingFolderTest, ForceReplacesFiguresAndReportToo) {
+  for (const char* subfolder : {"", "run-0123456789abcdef"}) {
+    fill(out_ / subfolder);
+    write_bytes(out_ / subfolder / "report.html", "old");
+    fs::create_directory(out_ / subfolder / "figures");
+    for (const char* figure : {"positions.png", "positions.pdf", "fleet.png"})
+      write_bytes(out_ / subfolder / "figures" / figure, "old");
+  }
+  EXPECT_EQ(find_error(out_, true), "no error");
+  EXPECT_TRUE(fs::is_empty(out_));
+}
+
 TEST_F(RecordingFolderTest, ForceRefusesSubfoldersWithAnythingElseAndRemovesNothing) {
-  for (const char* foreign : {"segment-2/notes.txt", "run-0123456789abcdef/segment-3/notes.txt",
-                              "segment-0/state.csv", "run-1/state.csv", "figures/state.csv"}) {
+  for (const char* foreign :
+       {"segment-2/notes.txt", "run-0123456789abcdef/segment-3/notes.txt", "segment-0/state.csv",
+        "run-1/state.csv", "figures/state.csv", "figures/holiday.png", "figures/path.svg",
+        "figures/figures/path.png", "path.png"}) {
     SCOPED_TRACE(foreign);
     fs::remove_all(out_);
     for (const char* subfolder : {"", "segment-2", "run-0123456789abcdef"}) fill(out_ / subfolder);

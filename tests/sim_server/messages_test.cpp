@@ -87,7 +87,7 @@ TEST(MessagesTest, ParametersAreThoseInForce) {
   config::Scenario scenario =
       config::load_scenario(SLS_SOURCE_DIR "/config/scenarios/gazebo_legacy.yaml");
   config::override_period(scenario, 0.001);
-  const Parameters message = make_parameters_message(31, 2, scenario, "sls 9.9");
+  const Parameters message = make_parameters_message(31, {2}, scenario, "sls 9.9");
   EXPECT_EQ(message.run_id(), 31u);
   EXPECT_EQ(message.vehicle_id(), 2u);
   EXPECT_EQ(message.vehicle_ids(), std::vector<std::uint32_t>{2});

@@ -203,5 +203,64 @@ TEST(RosterTest, TheHostOfAControllerIsFoundByItsPeer) {
   EXPECT_EQ(find_host({}, pilot.peer), "?");
 }
 
+// --- fleets --------------------------------------------------------------------------------------
+
+bus::ParticipantDirectory::Entry make_pilot(const std::string& name,
+                                            const std::vector<std::uint32_t>& vehicle_ids) {
+  auto entry = make_controller(name);
+  entry.announcement.vehicle_id(vehicle_ids.front());
+  entry.announcement.vehicle_ids(vehicle_ids);
+  return entry;
+}
+
+TEST(RosterTest, ControllersAreReadyForTheirOwnVehicles) {
+  const Roster roster = {{make_pilot("low", {0, 1}), make_pilot("high", {1, 2})}, {}};
+  const auto name_ready = [&](std::uint32_t id) {
+    std::string names;
+    for (const auto& client : find_ready_clients(roster, kScenario, id)) names += client.name + " ";
+    return names;
+  };
+  EXPECT_EQ(name_ready(0), "low ");
+  EXPECT_EQ(name_ready(1), "low high ");
+  EXPECT_EQ(name_ready(2), "high ");
+  EXPECT_EQ(name_ready(3), "");
+}
+
+TEST(RosterTest, AControllerThatListsNoVehiclesFliesTheOneItNames) {
+  auto entry = make_controller("foreign");
+  entry.announcement.vehicle_id(4);
+  const Roster roster = {{entry}, {}};
+  EXPECT_EQ(find_ready_clients(roster, kScenario, 4).size(), 1u);
+  EXPECT_TRUE(find_ready_clients(roster, kScenario, 0).empty());
+}
+
+TEST(RosterTest, VehiclesWithoutAControllerAreNamed) {
+  const Roster roster = {{make_pilot("low", {0, 1, 2}), make_pilot("one", {5})}, {}};
+  const std::string missing =
+      name_missing(roster, make_wait_for(1, 0), kScenario, {0, 1, 2, 3, 4, 5, 6});
+  EXPECT_TRUE(contains(missing, "controller")) << missing;
+  EXPECT_TRUE(contains(missing, "vehicles without: 3-4,6")) << missing;
+  EXPECT_EQ(name_missing(roster, make_wait_for(1, 0), kScenario, {0, 1, 2, 5}), "");
+}
+
+TEST(RosterTest, TheLimitIsTheFirstStepThatARecorderBlocks) {
+  for (const std::int64_t window : {1, 10, 2000})
+    for (const std::int64_t last : {-1, 0, 7, 5000}) {
+      const Roster roster = {{}, {make_recorder_at(last), make_recorder_at(last + 3)}};
+      const std::uint64_t limit = calc_recorder_limit(roster, 2, window);
+      EXPECT_NE(name_blocking_recorder(roster, 2, limit, window), "");
+      ASSERT_GT(limit, 0u);
+      EXPECT_EQ(name_blocking_recorder(roster, 2, limit - 1, window), "");
+    }
+}
+
+TEST(RosterTest, WithoutTheExpectedRecordersNoStepIsWithinTheLimit) {
+  EXPECT_EQ(calc_recorder_limit({{}, {make_recorder_at(5)}}, 2, 10), 0u);
+}
+
+TEST(RosterTest, WithoutRecordersNoStepIsBeyondTheLimit) {
+  EXPECT_GT(calc_recorder_limit({}, 0, 10), std::uint64_t{1} << 62);
+}
+
 }  // namespace
 }  // namespace sls::sim

@@ -52,7 +52,7 @@ class RunControlTest : public ::testing::Test {
   }
 
   Operator anna, bob{"bob@lab"};
-  RunControl control{kRun, kVehicle, false};
+  RunControl control{kRun, {kVehicle}, false};
 };
 
 TEST_F(RunControlTest, ARunGoesUntilItIsPausedAndOnWhenItIsResumed) {
@@ -82,7 +82,7 @@ TEST_F(RunControlTest, WhatTheStateDoesNotAllowIsRefusedWithIt) {
 }
 
 TEST_F(RunControlTest, ARunThatBeginsPausedIsStarted) {
-  RunControl successor(kRun, kVehicle, true);
+  RunControl successor(kRun, {kVehicle}, true);
   EXPECT_TRUE(successor.holds());
   EXPECT_TRUE(successor.is_paused());
   expect_accepted(successor.request(anna.ask(ACTION_START), 0), 0);
@@ -158,7 +158,7 @@ TEST_F(RunControlTest, AnyNumberOfStepsMayBeAskedFor) {
 TEST_F(RunControlTest, ResetAndStopAreAcceptedAtAnyTime) {
   for (const auto action : {ACTION_RESET, ACTION_STOP})
     for (const bool is_paused : {false, true}) {
-      RunControl run(kRun, kVehicle, is_paused);
+      RunControl run(kRun, {kVehicle}, is_paused);
       expect_accepted(run.request(anna.ask(action), 40));
       EXPECT_EQ(run.is_reset_requested(), action == ACTION_RESET);
       EXPECT_EQ(run.is_stop_requested(), action == ACTION_STOP);
@@ -259,6 +259,25 @@ TEST_F(RunControlTest, AnOperatorsNameFitsOneLine) {
   EXPECT_EQ(control.last_event(), "paused by eve??[2J");
   control.request(nameless.ask(ACTION_RESUME), 40);
   EXPECT_EQ(control.last_event(), "resumed by an operator without a name");
+}
+
+TEST_F(RunControlTest, OfAFleetAnyVehicleMayBeNamed) {
+  RunControl fleet(kRun, {4, 5, 6}, false);
+  SimControl request;
+  request.run_id(kRun);
+  request.request_id(1);
+  request.action(ACTION_PAUSE);
+  request.vehicle_id(6);
+  const auto accepted = fleet.request(request, 0);
+  ASSERT_TRUE(accepted);
+  EXPECT_TRUE(accepted->accepted());
+  EXPECT_EQ(accepted->vehicle_id(), 4u) << "the first stands for the run";
+  request.request_id(2);
+  request.vehicle_id(7);
+  const auto refused = fleet.request(request, 0);
+  ASSERT_TRUE(refused);
+  EXPECT_FALSE(refused->accepted());
+  EXPECT_STREQ(refused->reason().c_str(), "vehicle: expected 4-6, got 7");
 }
 
 }  // namespace

@@ -115,7 +115,8 @@ Table::Table(const std::filesystem::path& file) {
   std::ifstream stream(file);
   std::string line;
   std::getline(stream, line);
-  for (const auto& name : split(line)) columns_.emplace(name, columns_.size());
+  names_ = split(line);
+  for (const auto& name : names_) columns_.emplace(name, columns_.size());
   while (std::getline(stream, line)) rows_.push_back(split(line));
 }
 

@@ -74,6 +74,7 @@ class Table {
  public:
   explicit Table(const std::filesystem::path& file);
   std::size_t rows() const { return rows_.size(); }
+  const std::vector<std::string>& names() const { return names_; }
   double number(std::size_t row, const std::string& column) const;
   const std::string& text(std::size_t row, const std::string& column) const;
   /// The columns `prefix`_x_m, `prefix`_y_m, `prefix`_z_m.
@@ -83,6 +84,7 @@ class Table {
 
  private:
   std::size_t find(const std::string& column) const;
+  std::vector<std::string> names_;
   std::map<std::string, std::size_t> columns_;
   std::vector<std::vector<std::string>> rows_;
 };

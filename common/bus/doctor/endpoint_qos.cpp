@@ -43,13 +43,14 @@ class Maker {
     endpoint.topic = Topic<Message>::kName;
     endpoint.type = type.getName();
     endpoint.max_size = type.m_typeSize;
-    if (Topic<Message>::kFlow == Flow::kLatched) {
-      add_writer(endpoint, kLatchedWriterProfile);
+    const Flow flow = Topic<Message>::kFlow;
+    add_writer(endpoint, find_writer_profile(flow));
+    if (flow == Flow::kLatched) {
       add_reader(endpoint, kLatchedReaderProfile);
     } else {
-      add_writer(endpoint, kStreamWriterProfile);
-      add_reader(endpoint, kRecorderReaderProfile);
-      add_reader(endpoint, kLoopReaderProfile);
+      add_reader(endpoint,
+                 flow == Flow::kFleet ? kFleetRecorderReaderProfile : kRecorderReaderProfile);
+      add_reader(endpoint, flow == Flow::kFleet ? kFleetLoopReaderProfile : kLoopReaderProfile);
     }
   }
 
@@ -91,6 +92,9 @@ std::vector<Endpoint> make_own_endpoints(dds::Publisher& publisher, dds::Subscri
   maker.add<VehicleState, VehicleStatePubSubType>();
   maker.add<ControlCommand, ControlCommandPubSubType>();
   maker.add<Reference, ReferencePubSubType>();
+  maker.add<FleetState, FleetStatePubSubType>();
+  maker.add<FleetCommand, FleetCommandPubSubType>();
+  maker.add<FleetReference, FleetReferencePubSubType>();
   maker.add<Participant, ParticipantPubSubType>();
   maker.add<Parameters, ParametersPubSubType>();
   maker.add<SimStatus, SimStatusPubSubType>();

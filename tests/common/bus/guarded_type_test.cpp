@@ -37,6 +37,16 @@ TEST(GuardedTypeTest, EndlessLengthsAreRefused) {
   }
 }
 
+TEST(GuardedTypeTest, WhatIsLongerThanAnySampleIsRefusedBeforeItsElementsAreMade) {
+  // run_id, step and a count of vehicles, each of which would be half a kilobyte, and bytes enough.
+  std::string bytes("\0\1\0\0", 4);
+  bytes += std::string(16, '\0') + std::string("\x40\x42\x0f\0", 4);  // 1,000,000
+  bytes += std::string(2'000'000, '\0');
+  EXPECT_FALSE((takes<FleetStatePubSubType, FleetState>(bytes)));
+  EXPECT_FALSE((takes<FleetCommandPubSubType, FleetCommand>(bytes)));
+  EXPECT_FALSE((takes<FleetReferencePubSubType, FleetReference>(bytes)));
+}
+
 TEST(GuardedTypeTest, RandomBytesThrowNothing) {
   std::mt19937_64 random(4);
   for (int i = 0; i < 20000; ++i) {

@@ -86,6 +86,11 @@ TEST(NodeTest, CommandsArriveUnchanged) {
 TEST(NodeTest, ReferencesArriveUnchanged) {
   expect_round_trip<Reference>(72, {kRecorderReaderProfile});
 }
+TEST(NodeTest, FleetsArriveUnchanged) {
+  expect_round_trip<FleetState>(73, {kFleetLoopReaderProfile, kFleetRecorderReaderProfile});
+  expect_round_trip<FleetCommand>(73, {kFleetLoopReaderProfile, kFleetRecorderReaderProfile});
+  expect_round_trip<FleetReference>(73, {kFleetRecorderReaderProfile});
+}
 TEST(NodeTest, ParticipantsArriveUnchanged) {
   expect_round_trip<Participant>(73, {kLatchedReaderProfile});
 }

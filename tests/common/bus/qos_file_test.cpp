@@ -306,7 +306,7 @@ std::map<std::string, std::string> read_endpoint_profiles(const std::string& xml
 TEST(ShippedQosFilesTest, AFileThatSaysNothingAboutWritersAndReadersHasThoseOfEndpoints) {
   ::setenv("SLS_KEYS", "keys", 1);  // secure.xml needs it
   const auto shared = read_endpoint_profiles(sls::test::read_bytes(kConfig / "qos/endpoints.xml"));
-  EXPECT_EQ(shared.size(), 7u);
+  EXPECT_EQ(shared.size(), 12u);
   for (const char* name : {"default", "udp", "lan", "unicast", "discovery_server", "secure"})
     EXPECT_EQ(read_endpoint_profiles(
                   read_qos_file(kConfig / "qos" / (std::string(name) + ".xml"), "tester")),
@@ -322,7 +322,7 @@ TEST_F(QosFileTest, AProfileOfItsOwnIsKept) {
       folder_ / "qos.xml",
       "<dds><profiles><participant profile_name=\"sls_participant\"/>" + own + "</profiles></dds>");
   const auto profiles = read_endpoint_profiles(read_qos_file(folder_ / "qos.xml", "tester"));
-  EXPECT_EQ(profiles.size(), 7u);
+  EXPECT_EQ(profiles.size(), 12u);
   EXPECT_EQ(profiles.at("sls_loop_reader"), own);
 }
 

@@ -95,12 +95,42 @@ Reference make_message(std::uint64_t seed) {
   return message;
 }
 
+namespace {
+
+/// As many vehicles as a sample holds.
+template <class Fleet, class Vehicle>
+Fleet make_fleet_message(std::uint64_t seed) {
+  Values values(seed);
+  Fleet message;
+  message.run_id(values.count());
+  message.step(values.count());
+  for (std::uint64_t i = 0; i < FLEET_SAMPLE_VEHICLES; ++i)
+    message.vehicles().push_back(make_message<Vehicle>(seed + i));
+  return message;
+}
+
+}  // namespace
+
+template <>
+FleetState make_message(std::uint64_t seed) {
+  return make_fleet_message<FleetState, VehicleState>(seed);
+}
+template <>
+FleetCommand make_message(std::uint64_t seed) {
+  return make_fleet_message<FleetCommand, ControlCommand>(seed);
+}
+template <>
+FleetReference make_message(std::uint64_t seed) {
+  return make_fleet_message<FleetReference, Reference>(seed);
+}
+
 template <>
 Participant make_message(std::uint64_t seed) {
   Values values(seed);
   Participant message;
   message.run_id(values.count());
   message.vehicle_id(values.small());
+  for (int i = 0; i < 256; ++i) message.vehicle_ids().push_back(values.small());
   message.role(ROLE_RECORDER);
   message.name(values.text(32));
   message.host(values.text(64));
@@ -144,6 +174,7 @@ SimStatus make_message(std::uint64_t seed) {
   message.reason(values.text(255));
   message.step(values.count());
   message.controller_name(values.text(32));
+  for (int i = 0; i < 256; ++i) message.controller_names().emplace_back(values.text(32));
   message.real_time_factor(values.real());
   SyncCounters& counters = message.counters();
   counters.resent(values.count());

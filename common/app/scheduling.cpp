@@ -1,0 +1,36 @@
+#include "common/app/scheduling.hpp"
+
+#include <sched.h>
+#include <sys/resource.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <system_error>
+
+namespace sls::app {
+namespace {
+
+constexpr int kPriority = 1;  // the lowest that goes before ordinary threads
+constexpr int kNiceness = 5;
+
+}  // namespace
+
+bool put_process_first() {
+  bool is_granted = true;
+  std::error_code error;
+  for (const auto& thread : std::filesystem::directory_iterator("/proc/self/task", error)) {
+    sched_param parameters{};
+    parameters.sched_priority = kPriority;
+    const int id = std::atoi(thread.path().filename().c_str());
+    is_granted = sched_setscheduler(id, SCHED_RR, &parameters) == 0 && is_granted;
+  }
+  return is_granted && !error;
+}
+
+void put_thread_last() {
+  const sched_param parameters{};
+  sched_setscheduler(0, SCHED_OTHER, &parameters);
+  setpriority(PRIO_PROCESS, 0, kNiceness);  // of the calling thread alone
+}
+
+}  // namespace sls::app

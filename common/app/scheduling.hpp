@@ -1,0 +1,15 @@
+/// Who goes first on the processors of this machine. Where the system refuses (it takes root,
+/// CAP_SYS_NICE or a limit RLIMIT_RTPRIO), everything works, and is late more often.
+#pragma once
+
+namespace sls::app {
+
+/// Puts all threads that this process has, and those they start, before those of ordinary
+/// processes (SCHED_RR): a control loop in real time must not wait until others have used up their
+/// time slice. False where that is refused.
+bool put_process_first();
+
+/// Puts the calling thread back among the ordinary ones, behind such as have the usual niceness.
+void put_thread_last();
+
+}  // namespace sls::app

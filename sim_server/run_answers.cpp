@@ -1,0 +1,165 @@
+// What becomes of the answers, and what to do where there are none: for both ways of stepping.
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <map>
+#include <utility>
+
+#include "common/app/run_main.hpp"
+#include "common/config/vehicle_ids.hpp"
+#include "sim_server/run.hpp"
+
+namespace sls::sim {
+namespace {
+
+using namespace std::chrono_literals;
+
+void add(SyncCounters& sum, const SyncCounters& counters) {
+  sum.resent() += counters.resent();
+  sum.stale() += counters.stale();
+  sum.deadline_missed() += counters.deadline_missed();
+  sum.duplicate() += counters.duplicate();
+  sum.superseded() += counters.superseded();
+  sum.take_overs() += counters.take_overs();
+  sum.rejected_not_finite() += counters.rejected_not_finite();
+  sum.rejected_force_limit() += counters.rejected_force_limit();
+  sum.rejected_run() += counters.rejected_run();
+  sum.rejected_step() += counters.rejected_step();
+  sum.rejected_vehicle() += counters.rejected_vehicle();
+  sum.rejected_client() += counters.rejected_client();
+  sum.rejected_fault() += counters.rejected_fault();
+}
+
+}  // namespace
+
+SyncCounters Run::sum_counters() const {
+  SyncCounters sum = link_;
+  for (const auto& vehicle : vehicles_) add(sum, vehicle->gate.counters());
+  return sum;
+}
+
+/// " (vehicles 0-3)" in a fleet.
+std::string Run::describe_vehicles(const std::vector<std::uint32_t>& ids) const {
+  if (vehicles_.size() == 1) return "";
+  return fmt::format(" (vehicle{} {})", ids.size() > 1 ? "s" : "", config::to_vehicle_ranges(ids));
+}
+
+VehicleFlight* Run::find_vehicle(std::uint32_t id) {
+  const auto found = std::lower_bound(vehicle_ids_.begin(), vehicle_ids_.end(), id);
+  if (found == vehicle_ids_.end() || *found != id) return nullptr;
+  return vehicles_[static_cast<std::size_t>(found - vehicle_ids_.begin())].get();
+}
+
+Verdict Run::judge(const ControlCommand& command, const bus::PeerId& sender) {
+  VehicleFlight* vehicle = find_vehicle(command.vehicle_id());
+  if (!vehicle) vehicle = vehicles_.front().get();  // whose gate refuses and counts it
+  const Verdict verdict = vehicle->gate.offer(command, sender);
+  const char* defect = to_string(verdict);
+  if (*defect != '\0')
+    spdlog::debug("command for step {} of vehicle {} from '{}' rejected: {}", command.step(),
+                  command.vehicle_id(), command.client_name().c_str(), defect);
+  return verdict;
+}
+
+bool Run::are_all_accepted() const {
+  return std::all_of(vehicles_.begin(), vehicles_.end(),
+                     [](const auto& vehicle) { return vehicle->gate.accepted().has_value(); });
+}
+
+bool Run::is_anybody_absent() const {
+  return std::any_of(vehicles_.begin(), vehicles_.end(),
+                     [](const auto& vehicle) { return vehicle->absent_since().has_value(); });
+}
+
+void Run::check_refusals() const {
+  for (const auto& vehicle : vehicles_)
+    if (const auto refusal = vehicle->gate.refusal())
+      throw app::RunError(vehicles_.size() == 1
+                              ? *refusal
+                              : fmt::format("vehicle {}: {}", vehicle->id(), *refusal));
+}
+
+void Run::take_answers() {
+  const double absence_s = is_absence_announced_ ? calc_longest_absence_s() : 0.0;
+  for (const auto& vehicle : vehicles_)
+    if (!vehicle->is_settled() && vehicle->gate.accepted()) vehicle->take_answer();
+  if (const auto& outcome = vehicles_.front()->outcome())
+    board_.controller_name = outcome->applied.controller_name;
+  announce_take_overs();
+  if (is_anybody_absent()) return;
+  if (is_absence_announced_)
+    board_.announce(vehicles_.size() == 1
+                        ? fmt::format("step {}: controller '{}' answers again after {:.1f} s",
+                                      board_.step, board_.controller_name, absence_s)
+                        : fmt::format("step {}: all vehicles are answered for again after {:.1f} s",
+                                      board_.step, absence_s));
+  absence_wait_.reset();
+  absence_action_.reset();
+  is_absence_announced_ = false;
+}
+
+void Run::announce_take_overs() {
+  std::map<std::pair<std::string, std::string>, std::vector<std::uint32_t>> switches;
+  for (const auto& vehicle : vehicles_)
+    if (const auto& switched = vehicle->gate.take_over())
+      switches[{switched->from, switched->to}].push_back(vehicle->id());
+  for (const auto& [names, ids] : switches)
+    board_.announce(fmt::format("step {}: controller '{}' takes over from '{}'{}", board_.step,
+                                names.second, names.first, describe_vehicles(ids)));
+}
+
+double Run::calc_longest_absence_s() const {
+  double longest = 0.0;
+  for (const auto& vehicle : vehicles_) longest = std::max(longest, vehicle->calc_absence_s());
+  return longest;
+}
+
+std::string Run::name_awaited_controllers() const {
+  std::map<std::string, std::vector<std::uint32_t>> awaited;
+  for (const auto& vehicle : vehicles_) {
+    if (vehicle->gate.accepted()) continue;
+    const auto client = vehicle->gate.awaited_client();
+    const std::string& last = vehicle->last_answer().controller_name;
+    awaited[client         ? fmt::format("controller '{}' on {}", client->name,
+                                         find_host(roster_, client->peer))
+            : last.empty() ? std::string("controller (none is ready)")
+                           : fmt::format("controller '{}' (gone)", last)]
+        .push_back(vehicle->id());
+  }
+  std::string names;
+  for (const auto& [name, ids] : awaited)
+    names += (names.empty() ? "" : ", ") + name + describe_vehicles(ids);
+  return names;
+}
+
+void Run::attend_to_absence(ControllerAbsence::Action action) {
+  using Action = ControllerAbsence::Action;
+  const double give_up_s = vehicles_.front()->absence.give_up_s();
+  const double absence_s = calc_longest_absence_s();
+  if (action == Action::kGiveUp)
+    throw app::RunError(fmt::format("step {}: waited {} s for {}", board_.step, give_up_s,
+                                    name_awaited_controllers()));
+  if (!absence_wait_)
+    absence_wait_.emplace(
+        give_up_s - absence_s,
+        std::max(Clock::duration(0s), std::chrono::duration_cast<Clock::duration>(
+                                          1s - std::chrono::duration<double>(absence_s))));
+  const bool is_lockstep = scenario_.sync.mode == config::SyncMode::kLockstep;
+  // In real time a few held steps are no news: they are counted.
+  const bool is_news = action != absence_action_ &&
+                       (action == Action::kFailSafe || (action == Action::kHold && is_lockstep));
+  if (is_news) {
+    absence_action_ = action;
+    is_absence_announced_ = true;
+    board_.announce(
+        fmt::format("step {}: {} for want of an answer of {}", board_.step,
+                    action == Action::kHold ? "holds the last force" : "fail-safe force",
+                    name_awaited_controllers()));
+  }
+  if (!absence_wait_->is_report_due()) return;
+  is_absence_announced_ = true;
+  board_.announce(fmt::format("step {}: waiting for: {} ({:.0f} s left)", board_.step,
+                              name_awaited_controllers(), absence_wait_->seconds_left()));
+}
+
+}  // namespace sls::sim

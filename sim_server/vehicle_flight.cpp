@@ -1,0 +1,102 @@
+#include "sim_server/vehicle_flight.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <stdexcept>
+
+#include "common/bus/convert.hpp"
+#include "sim_server/fail_safe.hpp"
+
+namespace sls::sim {
+namespace {
+
+/// Without the text, of which every vehicle would keep a copy.
+config::Scenario make_own_scenario(const config::Scenario& fleet, std::uint32_t id) {
+  config::Scenario scenario = config::make_vehicle_scenario(fleet, id);
+  scenario.text.clear();
+  return scenario;
+}
+
+}  // namespace
+
+VehicleFlight::VehicleFlight(const config::Scenario& fleet, std::uint32_t id, std::uint64_t run_id)
+    : gate(run_id, id, fleet.controller.force_limit_n),
+      absence(fleet.sync),
+      id_(id),
+      is_of_fleet_(fleet.vehicles.size() > 1),
+      scenario_(make_own_scenario(fleet, id)),
+      run_id_(run_id),
+      plant_(scenario_.vehicle, scenario_.plant),
+      faults_(scenario_, id) {}
+
+VehicleState VehicleFlight::measure(std::uint64_t step) {
+  step_ = step;
+  outcome_.reset();
+  state_ = plant_.state();
+  return make_state_message(run_id_, id_, step, scenario_.sync.period_ns,
+                            faults_.measure(step, state_), state_, applied_);
+}
+
+void VehicleFlight::take_answer() {
+  const ControlCommand& answer = *gate.accepted();
+  Outcome outcome;
+  outcome.is_finished = answer.mission() == MISSION_FINISHED;
+  outcome.applied.answer_f_Q_W = bus::to_vector(answer.f_Q_W_n());
+  outcome.applied.origin = FORCE_ANSWERED;
+  outcome.applied.controller_name = answer.client_name().to_string();
+  outcome.applied.memory = answer.controller();
+  last_answer_ = outcome.applied;
+  last_answer_step_ = step_;
+  absence.answered();
+  absent_since_.reset();
+  outcome_ = std::move(outcome);
+}
+
+void VehicleFlight::keep_late_answer(const ControlCommand& command) {
+  if (command.mission() == MISSION_FINISHED) {
+    has_ended_late_ = true;
+    return;
+  }
+  if (last_answer_.origin != FORCE_NONE && command.step() <= last_answer_step_) return;
+  last_answer_.answer_f_Q_W = bus::to_vector(command.f_Q_W_n());
+  last_answer_.origin = FORCE_ANSWERED;
+  last_answer_.controller_name = command.client_name().to_string();
+  last_answer_.memory = command.controller();
+  last_answer_step_ = command.step();
+}
+
+void VehicleFlight::fly_without_answer(ControllerAbsence::Action action) {
+  Outcome outcome;
+  outcome.applied = last_answer_;
+  if (action == ControllerAbsence::Action::kHold && last_answer_.origin != FORCE_NONE) {
+    outcome.applied.origin = FORCE_HELD;
+  } else {  // also before the first answer, when there is nothing to hold
+    outcome.applied.origin = FORCE_FAIL_SAFE;
+    outcome.applied.controller_name = kFailSafeName;
+    outcome.applied.answer_f_Q_W =
+        calc_fail_safe_force(scenario_.vehicle, state_, scenario_.controller.force_limit_n);
+  }
+  absence.flown_without_answer();
+  outcome_ = std::move(outcome);
+}
+
+void VehicleFlight::advance(std::int64_t plant_steps) {
+  applied_ = outcome_->applied;
+  applied_.f_Q_W = faults_.actuate(step_, applied_.answer_f_Q_W);
+  try {
+    for (std::int64_t i = 0; i < plant_steps; ++i) plant_.step(applied_.f_Q_W);
+  } catch (const std::exception& error) {
+    if (!is_of_fleet_) throw;
+    throw std::runtime_error(fmt::format("vehicle {}: {}", id_, error.what()));
+  }
+}
+
+std::uint64_t VehicleFlight::calc_age() const {
+  return outcome_ && outcome_->applied.origin == FORCE_ANSWERED ? 0 : step_ - last_answer_step_;
+}
+
+double VehicleFlight::calc_absence_s() const {
+  return absent_since_ ? std::chrono::duration<double>(Clock::now() - *absent_since_).count() : 0.0;
+}
+
+}  // namespace sls::sim

@@ -1,0 +1,81 @@
+/// One vehicle of a run: its plant and its faults, who may answer for it, and what flies it. No
+/// network here.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+
+#include "common/config/scenario.hpp"
+#include "sim_server/command_gate.hpp"
+#include "sim_server/controller_absence.hpp"
+#include "sim_server/fault_line.hpp"
+#include "sim_server/messages.hpp"
+#include "sim_server/slung_load_plant.hpp"
+
+namespace sls::sim {
+
+class VehicleFlight {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  /// Vehicle `id` of `fleet`, at rest where the scenario puts it.
+  VehicleFlight(const config::Scenario& fleet, std::uint32_t id, std::uint64_t run_id);
+
+  std::uint32_t id() const { return id_; }
+
+  /// What a step came to.
+  struct Outcome {
+    Applied applied;           // but for the faults
+    bool is_finished = false;  // the mission ends here
+  };
+
+  /// The state of `step` as it is published. Call once per step, in order, from step 0.
+  VehicleState measure(std::uint64_t step);
+  /// Takes the answer that the gate accepted for the step in work.
+  void take_answer();
+  /// Keeps an answer that came too late for its step, to be held. Older ones do not count.
+  void keep_late_answer(const ControlCommand& command);
+  /// Flies the step in work without an answer of its own.
+  void fly_without_answer(ControllerAbsence::Action action);
+  /// Flies `plant_steps` steps of the plant with what the step in work came to.
+  /// @throws std::runtime_error as SlungLoadPlant::step, naming the vehicle in a fleet.
+  void advance(std::int64_t plant_steps);
+
+  const std::optional<Outcome>& outcome() const { return outcome_; }
+  bool is_settled() const { return outcome_.has_value(); }
+  /// Periods between the state that the force of the step in work answers and that step.
+  std::uint64_t calc_age() const;
+  /// A late answer has ended the mission.
+  bool has_ended_late() const { return has_ended_late_; }
+  const Applied& last_answer() const { return last_answer_; }
+
+  /// The step in work was published at `time` and has no answer yet.
+  void note_waiting(Clock::time_point time) {
+    if (!absent_since_) absent_since_ = time;
+  }
+  /// When the first unanswered step was published; nothing where the last one was answered.
+  const std::optional<Clock::time_point>& absent_since() const { return absent_since_; }
+  double calc_absence_s() const;
+
+  CommandGate gate;
+  ControllerAbsence absence;
+
+ private:
+  const std::uint32_t id_;
+  const bool is_of_fleet_;
+  const config::Scenario scenario_;  // of this vehicle alone
+  const std::uint64_t run_id_;
+  SlungLoadPlant plant_;
+  FaultLine faults_;
+  std::uint64_t step_ = 0;              // in work
+  model::SlungLoadState state_;         // of the plant at that step
+  Applied applied_;                     // over the period before it
+  std::optional<Outcome> outcome_;      // of the step in work, once it is known
+  Applied last_answer_;                 // accepted, or late but valid; what is held
+  std::uint64_t last_answer_step_ = 0;  // the step it answers
+  bool has_ended_late_ = false;
+  std::optional<Clock::time_point> absent_since_;
+};
+
+}  // namespace sls::sim

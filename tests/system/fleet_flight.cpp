@@ -1,0 +1,98 @@
+#include "tests/system/fleet_flight.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "bench/in_process_flight.hpp"
+
+namespace sls::test {
+namespace {
+
+constexpr const char* kFleet = R"(name: fleet_test
+vehicle: { quad_mass_kg: 1.5, load_mass_kg: 0.2, rod_length_m: 1.0, gravity_m_s2: 9.8 }
+vehicles:
+  - {}
+  - { offset_m: [5, 0, 0] }
+  - { offset_m: [10, 0, 0], load_mass_kg: 0.3 }
+  - { offset_m: [0, 5, 0], quad_mass_kg: 1.2, rod_length_m: 0.7 }
+  - { offset_m: [5, 5, -1], quad_mass_kg: 2, load_mass_kg: 0.2, rod_length_m: 1.5 }
+  - { offset_m: [10.3, 5.7, 0.1], rod_length_m: 0.8 }
+plant: { initial: { load_position_m: [0, 0, -0.5] } }
+sync: { period_s: 0.004, wait_for: { controllers: 1, recorders: 1, timeout_s: 30 } }
+controller: { model: { load_mass_kg: 0.25 } }
+mission:
+  - set_point: { position_m: [1, -1, -2] }
+    until: { within_m: 0.3 }
+  - set_point: { position_m: [0, 0, -1] }
+    for_s: 0.4
+)";
+
+/// Row numbers of one vehicle.
+std::vector<std::size_t> find_rows(const Table& table, std::uint32_t id) {
+  std::vector<std::size_t> rows;
+  for (std::size_t row = 0; row < table.rows(); ++row)
+    if (table.text(row, "vehicle_id") == std::to_string(id)) rows.push_back(row);
+  return rows;
+}
+
+std::vector<std::string> read_rows(const std::filesystem::path& file, std::uint32_t id,
+                                   const std::vector<std::string>& left_out) {
+  const Table table(file);
+  std::vector<std::string> texts;
+  for (const std::size_t row : find_rows(table, id)) {
+    std::string text;
+    for (const std::string& column : table.names())
+      if (std::count(left_out.begin(), left_out.end(), column) == 0)
+        text += column + "=" + table.text(row, column) + " ";
+    texts.push_back(text);
+  }
+  return texts;
+}
+
+}  // namespace
+
+std::string make_fleet_scenario(const TemporaryFolder& folder,
+                                const std::vector<std::pair<std::string, std::string>>& changes) {
+  std::string text = kFleet;
+  for (const auto& [from, to] : changes) text = replace_once(text, from, to);
+  const std::string file = folder / "fleet.yaml";
+  write_bytes(file, text);
+  return file;
+}
+
+void expect_each_flies_as_alone(const std::filesystem::path& recording,
+                                const std::string& scenario_file,
+                                const std::vector<std::uint32_t>& ids) {
+  const config::Scenario fleet = config::load_scenario(scenario_file);
+  const Table states(recording / "state.csv"), commands(recording / "command.csv");
+  std::size_t longest = 0;
+  for (const std::uint32_t id : ids) {
+    SCOPED_TRACE("vehicle " + std::to_string(id));
+    const auto flown = bench::fly(fleet, id);
+    const auto state_rows = find_rows(states, id), command_rows = find_rows(commands, id);
+    ASSERT_GE(state_rows.size(), flown.size());
+    ASSERT_EQ(command_rows.size(), state_rows.size());
+    for (std::size_t step = 0; step < flown.size(); ++step) {
+      const std::size_t s = state_rows[step], c = command_rows[step];
+      ASSERT_EQ(states.number(s, "step"), static_cast<double>(step));
+      ASSERT_EQ(commands.number(c, "step"), static_cast<double>(step));
+      ASSERT_EQ(states.position(s, "quad"), flown[step].truth.p_WQ) << "step " << step;
+      ASSERT_EQ(states.position(s, "load"), flown[step].truth.p_WL) << "step " << step;
+      ASSERT_EQ(states.number(s, "load_vx_m_s"), flown[step].truth.v_WL.x()) << "step " << step;
+      ASSERT_EQ(states.number(s, "force_x_n"), flown[step].applied_f_Q_W.x()) << "step " << step;
+      ASSERT_EQ(commands.number(c, "force_x_n"), flown[step].answer.f_Q_W.x()) << "step " << step;
+      ASSERT_EQ(commands.number(c, "force_z_n"), flown[step].answer.f_Q_W.z()) << "step " << step;
+    }
+    longest = std::max(longest, flown.size());
+  }
+  EXPECT_EQ(states.rows(), ids.size() * longest);
+}
+
+VehicleRows read_vehicle_rows(const std::filesystem::path& recording, std::uint32_t id) {
+  return {read_rows(recording / "state.csv", id, {"vehicle_id"}),
+          read_rows(recording / "command.csv", id, {"vehicle_id", "controller", "compute_us"}),
+          read_rows(recording / "reference.csv", id, {"vehicle_id"})};
+}
+
+}  // namespace sls::test
