@@ -1,0 +1,148 @@
+"""`./sls plot`, `./sls report` and `./sls study`: command lines."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NoReturn
+
+from analysis import study
+from analysis.figures import make_figures, save
+from analysis.flight import Flight
+from analysis.input_error import InputError
+from analysis.published_logs import FORMATS, load_log
+from analysis.recordings import Recording
+from analysis.report import make_report
+
+
+class Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        place = f"{self.prog.removeprefix('sls ')}: " if self.prog != "sls" else ""
+        raise InputError(f"{place}{message} (see ./sls help)")
+
+
+def say(text: str) -> None:
+    print(f"sls: {text}", file=sys.stderr)
+
+
+def make_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"--out {folder}: expected a folder, got: {error.strerror}") from None
+
+
+def load_recording(recording: Recording, name: str | None, vehicle_id: int) -> Flight:
+    """One vehicle's flight; says what is missing."""
+    flight = recording.load_flight(vehicle_id, name or recording.folder.resolve().name)
+    for note in flight.notes:
+        say(f"{recording.folder}: {note}")
+    return flight
+
+
+def plot(options: argparse.Namespace) -> None:
+    names = options.name or [None] * len(options.source)
+    if len(names) != len(options.source):
+        raise InputError(f"--name: expected {len(options.source)} names, one for each source, "
+                         f"got {len(names)}")
+    flights, fleet, out = [], [], options.out or Path("figures")
+    for source, name in zip(options.source, names):
+        if not source.is_dir():
+            flights.append(load_log(source, name or source.stem, options.format,
+                                    options.rod_length_m))
+            continue
+        recording = Recording(source)
+        flights.append(load_recording(recording, name, options.vehicle))
+        if len(names) == 1:
+            fleet = recording.load_fleet()
+            out = options.out or source / "figures"
+    make_folder(out)
+    for name, figure in make_figures(flights, fleet).items():
+        for kind in ("png", "pdf"):
+            file = out / f"{name}.{kind}"
+            try:
+                save(figure, file)
+            except OSError as error:
+                raise InputError(f"{file}: expected to write it, got: {error.strerror}") from None
+    say(f"figures: {out}")
+
+
+def report(options: argparse.Namespace) -> None:
+    page = make_report(Recording(options.recording), options.vehicle)
+    file = options.recording / "report.html"
+    try:
+        file.write_text(page)
+    except OSError as error:
+        raise InputError(f"{file}: expected to write it, got: {error.strerror}") from None
+    say(f"report: {file}")
+
+
+def run_study(options: argparse.Namespace) -> None:
+    make_folder(options.out)
+    if not options.reuse:
+        study.fly_all(options.recordings, options.domain, say)
+    page = study.write_study(options.recordings, options.out, options.published)
+    say(f"study: {page}")
+
+
+def add_vehicle(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--vehicle", type=int, default=0, metavar="N",
+                        help="which vehicle of a fleet (default: 0)")
+
+
+def make_parser() -> argparse.ArgumentParser:
+    parser = Parser(prog="sls")
+    commands = parser.add_subparsers(dest="command", required=True)
+
+    plotting = commands.add_parser("plot", help="figures of recordings and published logs")
+    plotting.add_argument("source", nargs="+", type=Path, metavar="DIR",
+                          help="a recording's folder, or the file of a published log")
+    plotting.add_argument("--out", type=Path, metavar="DIR",
+                          help="where the figures go (default: DIR/figures of one recording, "
+                               "else figures)")
+    plotting.add_argument("--name", nargs="+", help="what each is called in the figures "
+                                                    "(default: its folder or file)")
+    add_vehicle(plotting)
+    plotting.add_argument("--format", choices=FORMATS,
+                          help="of the published logs (default: by their columns)")
+    plotting.add_argument("--rod-length-m", type=float, metavar="L",
+                          help="of published logs that do not hold the load's position "
+                               "(default: gazebo 1.1, px4 1)")
+    plotting.set_defaults(run=plot)
+
+    reporting = commands.add_parser("report", help="DIR/report.html, one self-contained page")
+    reporting.add_argument("recording", type=Path, metavar="DIR", help="a recording's folder")
+    add_vehicle(reporting)
+    reporting.set_defaults(run=report)
+
+    studying = commands.add_parser("study", help="flies the published comparison, writes the page")
+    studying.add_argument("--out", type=Path, default=study.HERE, metavar="DIR",
+                          help="where STUDY.md and its pictures go (default: analysis)")
+    studying.add_argument("--recordings", type=Path, default=Path("recordings/study"),
+                          metavar="DIR", help="where the flights go (default: recordings/study)")
+    studying.add_argument("--reuse", action="store_true",
+                          help="take complete recordings that are there instead of flying")
+    studying.add_argument("--published", type=Path, metavar="DIR",
+                          help="folder of the published matlab_setpoint1.csv, to compare with")
+    studying.add_argument("--domain", type=int, default=0, metavar="N",
+                          help="DDS domain, 0 to 232 (default: 0)")
+    studying.set_defaults(run=run_study)
+    return parser
+
+
+def main(arguments: Sequence[str]) -> int:
+    """The exit code."""
+    try:
+        options = make_parser().parse_args(arguments)
+        options.run(options)
+    except InputError as error:
+        say(f"error: {error}")
+        return 2
+    except study.FlightFailed as error:
+        say(f"error: {error}")
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

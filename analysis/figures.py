@@ -1,0 +1,320 @@
+"""The figures of flights. Each function draws one and returns it; `save` writes it.
+
+Times are simulated ones. Angles are drawn in degrees. Only `to_z_up` leaves frame W."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from analysis.flight import Flight
+
+# Told apart by readers with any colour vision (Okabe and Ito).
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f7f7f", "#8c510a")
+SECOND_COLOUR = "#e69f00"
+# Wide and light, so that what follows it well is seen in its middle.
+REFERENCE = {"linewidth": 3.4, "alpha": 0.3, "zorder": 1.5, "solid_capstyle": "butt"}
+REFERENCE_COLOUR = "#000000"
+
+STYLE = {
+    "font.size": 9.5, "axes.titlesize": 10.5, "axes.labelsize": 9.5, "legend.fontsize": 9,
+    "axes.spines.top": False, "axes.spines.right": False, "axes.edgecolor": "#666666",
+    "axes.grid": True, "grid.color": "#dddddd", "grid.linewidth": 0.6, "lines.linewidth": 1.3,
+    "legend.frameon": False, "svg.hashsalt": "sls", "path.simplify": True,
+    "axes.axisbelow": True,
+}
+# Nothing in a file tells when or by which version it was written.
+METADATA = {"png": {"Software": None}, "svg": {"Date": None, "Creator": None},
+            "pdf": {"CreationDate": None, "Creator": None, "Producer": None}}
+
+
+# Of all vehicles together: more would only make the file large.
+FLEET_POINTS = 100_000
+
+
+def to_z_up(positions: np.ndarray) -> np.ndarray:
+    """Positions as a viewer wants them: x, then y to the left, then height. The only place where z
+    is turned up; y turns with it, so that the frame stays right-handed."""
+    return positions * np.array([1.0, -1.0, -1.0])
+
+
+def colour_of(index: int) -> str:
+    return COLOURS[index % len(COLOURS)]
+
+
+def break_at_gaps(time_s: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Puts NaN where steps are missing, so that no line is drawn across."""
+    if len(time_s) < 3:
+        return time_s, values
+    spacing = np.diff(time_s)
+    gaps = np.flatnonzero(spacing > 1.5 * np.median(spacing)) + 1
+    return np.insert(time_s, gaps, np.nan), np.insert(values, gaps, np.nan, axis=0)
+
+
+def break_at_jumps(positions: np.ndarray) -> np.ndarray:
+    """Puts NaN where a reference jumps to the next set-point: no trajectory moves 10 cm a row."""
+    far = np.linalg.norm(np.diff(positions, axis=0), axis=1) > 0.1
+    return np.insert(positions, np.flatnonzero(far) + 1, np.nan, axis=0)
+
+
+def find_set_points(positions: np.ndarray) -> np.ndarray:
+    """Where a reference stays, each once."""
+    stays = np.all(positions[1:] == positions[:-1], axis=1)
+    return np.unique(positions[1:][stays], axis=0)
+
+
+def draw(axes: Axes, time_s: np.ndarray, values: np.ndarray, **style) -> None:
+    axes.plot(*break_at_gaps(time_s, values), **style)
+
+
+def mark_stages(all_axes: Sequence[Axes], flights: Sequence[Flight]) -> None:
+    """Where the stages of a mission begin; of several flights it would only confuse."""
+    if len(flights) != 1:
+        return
+    flight = flights[0]
+    for stage in flight.stages[1:]:
+        for axes in all_axes:
+            axes.axvline(flight.time_s[stage.first], color="#999999", linewidth=0.8,
+                         linestyle=(0, (2, 3)), zorder=0.5)
+
+
+def name_figure(figure: Figure, title: str) -> None:
+    figure.suptitle(title, x=0.01, ha="left", fontsize=11.5, fontweight="bold")
+
+
+def make_stack(rows: int, title: str, labels: Sequence[str], height: float = 1.75,
+               columns: int = 1) -> tuple[Figure, np.ndarray]:
+    """Axes above each other with one axis of time: figure and axes (rows, columns)."""
+    figure = Figure(figsize=(8.6, 0.9 + height * rows), layout="constrained")
+    axes = figure.subplots(rows, columns, sharex=True, squeeze=False)
+    name_figure(figure, title)
+    for row, label in enumerate(labels):
+        axes[row, 0].set_ylabel(label)
+    for one in axes[-1]:
+        one.set_xlabel("time (s)")
+    for one in axes.flat:
+        one.margins(x=0)
+    figure.align_ylabels(axes[:, 0])
+    return figure, axes
+
+
+def add_legend(axes: Axes, columns: int = 4) -> None:
+    """Above the axes, where no line is."""
+    count = len(axes.get_legend_handles_labels()[1])
+    if count:
+        axes.legend(loc="lower left", bbox_to_anchor=(0, 1.0), ncol=min(count, columns),
+                    borderaxespad=0.2, handlelength=1.8, columnspacing=1.4)
+
+
+def list_references(flights: Sequence[Flight]) -> list[tuple[Flight, str, str]]:
+    """The references that differ: of which flight, its label and its colour."""
+    found: list[tuple[Flight, str, str]] = []
+    for index, flight in enumerate(flights):
+        if np.all(np.isnan(flight.p_WL_ref)) or any(is_same_reference(flight, other)
+                                                    for other, _, _ in found):
+            continue
+        label = "reference" if not found else f"reference of {flight.name}"
+        found.append((flight, label, colour_of(index) if found else REFERENCE_COLOUR))
+    return found
+
+
+def is_same_reference(a: Flight, b: Flight) -> bool:
+    """Where both are known, at the instants of `a`, within 1 cm (which no line shows)."""
+    for axis in range(3):
+        known = np.isfinite(b.p_WL_ref[:, axis])
+        there = np.interp(a.time_s, b.time_s[known], b.p_WL_ref[known, axis])
+        both = np.isfinite(a.p_WL_ref[:, axis]) & (a.time_s <= b.time_s[-1])
+        if np.mean(np.abs(there - a.p_WL_ref[:, axis])[both] > 0.01) > 0.01:
+            return False
+    return True
+
+
+def plot_positions(flights: Sequence[Flight]) -> Figure:
+    figure, axes = make_stack(3, "Load position", ("x (m)", "y (m)", "z (m, down)"))
+    for index, flight in enumerate(flights):
+        for axis in range(3):
+            draw(axes[axis, 0], flight.time_s, flight.p_WL[:, axis], color=colour_of(index),
+                 label="load" if len(flights) == 1 else flight.name, zorder=3)
+            if len(flights) == 1:
+                draw(axes[axis, 0], flight.time_s, flight.p_WQ[:, axis], color=SECOND_COLOUR,
+                     linewidth=0.9, label="quadrotor")
+    for flight, label, colour in list_references(flights):
+        for axis in range(3):
+            draw(axes[axis, 0], flight.time_s, flight.p_WL_ref[:, axis], color=colour,
+                 label=label, **REFERENCE)
+    axes[2, 0].invert_yaxis()
+    mark_stages(axes[:, 0], flights)
+    add_legend(axes[0, 0])
+    return figure
+
+
+def plot_errors(flights: Sequence[Flight]) -> Figure:
+    figure, axes = make_stack(3, "Load position error", ("x (m)", "y (m)", "z (m)"), columns=2)
+    for index, flight in enumerate(flights):
+        error = flight.calc_error()
+        if np.all(np.isnan(error)):
+            continue
+        for axis in range(3):
+            style = {"color": colour_of(index), "label": flight.name, "linewidth": 1.1}
+            draw(axes[axis, 0], flight.time_s, error[:, axis], **style)
+            size = np.abs(error[:, axis])
+            draw(axes[axis, 1], flight.time_s, np.where(size > 0, size, np.nan), **style)
+    for axis in range(3):
+        set_log_scale(axes[axis, 1], [np.abs(flight.calc_error()[:, axis]) for flight in flights])
+    axes[0, 0].set_title("error", loc="right")
+    axes[0, 1].set_title("size of the error, logarithmic", loc="right")
+    mark_stages(axes.flat, flights)
+    if len(flights) > 1:
+        add_legend(axes[0, 0], columns=2)
+    return figure
+
+
+def set_log_scale(axes: Axes, sizes: Sequence[np.ndarray]) -> None:
+    """Logarithmic, down to what but 2 % of the values exceed, and at most 6 decades: where errors
+    change their sign they pass zero, which would stretch the axis without end."""
+    values = np.concatenate(sizes)
+    values = values[np.isfinite(values) & (values > 0)]
+    if not len(values):
+        return
+    axes.set_yscale("log")
+    decade = np.floor(np.log10([np.percentile(values, 2), np.max(values)]))
+    axes.set_ylim(10.0 ** max(decade[0], decade[1] - 6), 2.0 * np.max(values))
+
+
+def plot_path(flights: Sequence[Flight]) -> Figure:
+    figure = Figure(figsize=(8.6, 5.8))
+    axes = figure.add_axes((0.02, 0.0, 0.94, 0.92), projection="3d")
+    name_figure(figure, "Path of the load, z up")
+    drawn = []
+    for index, flight in enumerate(flights):
+        drawn.append(to_z_up(flight.p_WL))
+        axes.plot(*drawn[-1].T, color=colour_of(index),
+                  label="load" if len(flights) == 1 else flight.name)
+        axes.scatter(*drawn[-1][0], color=colour_of(index), s=18)
+        if len(flights) == 1:
+            drawn.append(to_z_up(flight.p_WQ))
+            axes.plot(*drawn[-1].T, color=SECOND_COLOUR, linewidth=0.8, label="quadrotor")
+    for flight, label, colour in list_references(flights):
+        drawn.append(to_z_up(flight.p_WL_ref))
+        axes.plot(*break_at_jumps(drawn[-1]).T, color=colour, label=label, **REFERENCE)
+        axes.scatter(*find_set_points(drawn[-1]).T, color="#444444", marker="x", s=34,
+                     linewidth=1.2)
+    set_equal_scale(axes, np.concatenate(drawn))
+    axes.set_xlabel("x (m)", labelpad=8)
+    axes.set_ylabel("−y (m)", labelpad=8)
+    axes.set_zlabel("height −z (m)", labelpad=6)
+    axes.view_init(elev=24, azim=-58)
+    figure.legend(loc="upper left", bbox_to_anchor=(0.01, 0.95), ncol=4, handlelength=1.8,
+                  columnspacing=1.4)
+    return figure
+
+
+def set_equal_scale(axes, points: np.ndarray) -> None:
+    """One metre is as long on each axis; no axis is shorter than a fourth of the longest."""
+    low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
+    centre, extent = (low + high) / 2, np.maximum(high - low, 1e-3)
+    extent = 1.08 * np.maximum(extent, 0.25 * np.max(extent))
+    for axis, name in enumerate("xyz"):
+        getattr(axes, f"set_{name}lim")(centre[axis] - extent[axis] / 2,
+                                        centre[axis] + extent[axis] / 2)
+        is_short = extent[axis] < 0.5 * np.max(extent)
+        getattr(axes, f"{name}axis").set_major_locator(MaxNLocator(2 if is_short else 4))
+        getattr(axes, f"{name}axis").set_pane_color((0.97, 0.97, 0.97, 1.0))
+    is_tall = extent[2] > 0.7 * max(extent[0], extent[1])
+    axes.set_box_aspect(extent, zoom=0.88 if is_tall else 1.05)
+
+
+def plot_angles(flights: Sequence[Flight]) -> Figure:
+    figure, axes = make_stack(2, "Rod angles", ("α about x (°)", "β about y (°)"))
+    for index, flight in enumerate(flights):
+        for row, angle in enumerate((flight.alpha, flight.beta)):
+            draw(axes[row, 0], flight.time_s, np.degrees(angle), color=colour_of(index),
+                 label=flight.name)
+    mark_stages(axes[:, 0], flights)
+    if len(flights) > 1:
+        add_legend(axes[0, 0])
+    return figure
+
+
+def plot_forces(flights: Sequence[Flight]) -> Figure:
+    figure, axes = make_stack(4, "Force on the quadrotor",
+                              ("F x (N)", "F y (N)", "F z (N, down)", "|F| (N)"), height=1.45)
+    for index, flight in enumerate(flights):
+        values = np.column_stack([flight.f_Q_W, np.linalg.norm(flight.f_Q_W, axis=1)])
+        if np.all(np.isnan(values)):
+            continue
+        for row in range(4):
+            draw(axes[row, 0], flight.time_s, values[:, row], color=colour_of(index),
+                 label=flight.name)
+    axes[2, 0].invert_yaxis()
+    mark_stages(axes[:, 0], flights)
+    if len(flights) > 1:
+        add_legend(axes[0, 0])
+    return figure
+
+
+def plot_attitude(flights: Sequence[Flight]) -> Figure:
+    figure, axes = make_stack(2, "Commanded attitude", ("roll (°)", "pitch (°)"))
+    for index, flight in enumerate(flights):
+        attitude = np.degrees(flight.calc_attitude())
+        if np.all(np.isnan(attitude)):
+            continue
+        for row in range(2):
+            draw(axes[row, 0], flight.time_s, attitude[:, row], color=colour_of(index),
+                 label=flight.name)
+    mark_stages(axes[:, 0], flights)
+    if len(flights) > 1:
+        add_legend(axes[0, 0])
+    return figure
+
+
+def plot_fleet(flights: Sequence[Flight]) -> Figure:
+    """All vehicles of a recording: their loads' paths from above, x up, and how far each is off."""
+    figure = Figure(figsize=(8.6, 4.6), layout="constrained")
+    plan, distance = figure.subplots(1, 2)
+    name_figure(figure, f"Fleet of {len(flights)} vehicles")
+    colours = matplotlib.colormaps["viridis"](np.linspace(0, 0.92, len(flights)))
+    sizes = []
+    rows = sum(len(flight.time_s) for flight in flights)
+    every = slice(None, None, 1 + rows // FLEET_POINTS)
+    for flight, colour in zip(flights, colours):
+        plan.plot(*flight.p_WL[every, 1::-1].T, color=colour, linewidth=0.8)
+        sizes.append(np.linalg.norm(flight.calc_error(), axis=1)[every])
+        draw(distance, flight.time_s[every], sizes[-1], color=colour, linewidth=0.8)
+        if len(flights) <= 64:
+            plan.annotate(flight.name, flight.p_WL[0, 1::-1], fontsize=6.5, color="#444444",
+                          ha="center", va="bottom", xytext=(0, 2), textcoords="offset points")
+    plan.set(xlabel="y (m, right)", ylabel="x (m, forward)", aspect="equal")
+    plan.set_title("loads from above; dark: low ids", loc="left")
+    distance.set(xlabel="time (s)", ylabel="distance (m)")
+    distance.margins(x=0)
+    distance.set_title("loads to their references", loc="left")
+    set_log_scale(distance, sizes)
+    return figure
+
+
+FIGURES: dict[str, Callable[[Sequence[Flight]], Figure]] = {
+    "positions": plot_positions, "errors": plot_errors, "path": plot_path, "angles": plot_angles,
+    "forces": plot_forces, "attitude": plot_attitude,
+}
+
+
+def make_figures(flights: Sequence[Flight], fleet: Sequence[Flight] = ()) -> dict[str, Figure]:
+    """All figures that these flights have data for, by name; of a `fleet` its overview first."""
+    with matplotlib.rc_context(STYLE):
+        figures = {"fleet": plot_fleet(fleet)} if len(fleet) > 1 else {}
+        for name, plot in FIGURES.items():
+            figure = plot(flights)
+            if any(axes.lines for axes in figure.axes):
+                figures[name] = figure
+        return figures
+
+
+def save(figure: Figure, path: Path, dpi: int = 150) -> None:
+    """Writes `path`, in the format its name says."""
+    with matplotlib.rc_context(STYLE):
+        figure.savefig(path, dpi=dpi, metadata=METADATA[path.suffix[1:]], facecolor="white")

@@ -1,0 +1,63 @@
+"""A flight as figures and metrics see it, whatever file it comes from.
+
+Frame W everywhere: x forward, y right, z down; SI units, radians. Arrays have a row per instant;
+what a source does not hold is NaN."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Stage:
+    """The rows [first, end) in which one stage of the mission was flown."""
+
+    index: int
+    name: str
+    first: int
+    end: int
+    lap_s: float | None = None
+    """Duration of a lap, of a figure eight."""
+
+    @property
+    def rows(self) -> slice:
+        return slice(self.first, self.end)
+
+
+@dataclass(frozen=True)
+class Flight:
+    name: str
+    time_s: np.ndarray
+    """(n,), rising."""
+    p_WQ: np.ndarray
+    """Quadrotor position, (n, 3), m."""
+    p_WL: np.ndarray
+    """Load position, (n, 3), m."""
+    p_WL_ref: np.ndarray
+    """Where the load should be, (n, 3), m."""
+    alpha: np.ndarray
+    """Rod angle about x, (n,), rad."""
+    beta: np.ndarray
+    """Rod angle about y, (n,), rad."""
+    f_Q_W: np.ndarray
+    """Force on the quadrotor that the controller answers, (n, 3), N."""
+    stages: tuple[Stage, ...] = ()
+    notes: tuple[str, ...] = ()
+    """What is missing, a line each."""
+
+    def calc_error(self) -> np.ndarray:
+        """Load position error, (n, 3), m."""
+        return self.p_WL - self.p_WL_ref
+
+    def calc_attitude(self) -> np.ndarray:
+        """Roll and pitch, (n, 2), rad, that realise the force: F = -|F| R(roll, pitch, 0) e3."""
+        f_x, f_y, f_z = self.f_Q_W.T
+        thrust = np.linalg.norm(self.f_Q_W, axis=1)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.column_stack([np.arcsin(f_y / thrust), np.arctan2(-f_x, -f_z)])
+
+
+def calc_rod(alpha: np.ndarray, beta: np.ndarray) -> np.ndarray:
+    """Unit vectors from quadrotor to load, (n, 3)."""
+    return np.column_stack([np.sin(beta), -np.sin(alpha) * np.cos(beta),
+                            np.cos(alpha) * np.cos(beta)])

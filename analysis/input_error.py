@@ -1,0 +1,5 @@
+"""What is wrong with what the user gave us."""
+
+
+class InputError(Exception):
+    """One line that names the place, what was expected there and what was found."""

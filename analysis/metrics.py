@@ -1,0 +1,116 @@
+"""How well a flight followed its reference. Formulas: README.md, "Metrics"."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.flight import Flight, Stage
+
+SETTLING_BAND = 0.02
+LEAST_STEP_M = 0.01
+"""What begins nearer than this to its target makes no step."""
+
+
+def calc_rms(values: np.ndarray) -> np.ndarray:
+    """Root mean square over the rows, per column."""
+    return np.sqrt(np.mean(np.square(values), axis=0))
+
+
+def calc_max(values: np.ndarray) -> np.ndarray:
+    """Largest absolute value over the rows, per column."""
+    return np.max(np.abs(values), axis=0)
+
+
+def calc_settling_time(time_s: np.ndarray, values: np.ndarray, target: float) -> float:
+    """Time after the first row from which on `values` stays within 2 % of the step, s. NaN: there
+    is no step; infinite: it is outside at the end."""
+    step = target - values[0]
+    if abs(step) < LEAST_STEP_M:
+        return math.nan
+    outside = np.flatnonzero(np.abs(values - target) > SETTLING_BAND * abs(step))
+    settled = outside[-1] + 1
+    return math.inf if settled == len(values) else float(time_s[settled] - time_s[0])
+
+
+def calc_overshoot(values: np.ndarray, target: float) -> float:
+    """How far `values` goes beyond its target, as a share of the step. NaN: there is no step."""
+    step = target - values[0]
+    if abs(step) < LEAST_STEP_M:
+        return math.nan
+    return max(0.0, float(np.max((values - target) / step)))
+
+
+def calc_steady_state_error(time_s: np.ndarray, errors: np.ndarray) -> np.ndarray:
+    """Mean over the last tenth of the time, per column."""
+    begin = time_s[-1] - 0.1 * (time_s[-1] - time_s[0])
+    return np.mean(errors[time_s >= begin], axis=0)
+
+
+@dataclass(frozen=True)
+class StepMetrics:
+    """Of a stage with a constant reference; per axis."""
+
+    settling_time_s: np.ndarray
+    overshoot: np.ndarray
+    steady_state_error_m: np.ndarray
+
+
+@dataclass(frozen=True)
+class StageMetrics:
+    """Load position error over a stage or one of its laps; per axis, m."""
+
+    label: str
+    from_s: float
+    to_s: float
+    rms_m: np.ndarray
+    max_m: np.ndarray
+    step: StepMetrics | None = None
+
+
+def calc_stage_metrics(flight: Flight) -> list[StageMetrics]:
+    """Of every stage, and after it of its laps. Rows without a reference do not count."""
+    results = []
+    for stage in flight.stages:
+        rows = find_rows(flight, stage)
+        if not len(rows):
+            continue
+        results.append(calc_over(flight, rows, f"{stage.index} {stage.name}"))
+        laps = split_laps(flight, stage)
+        results += [calc_over(flight, lap, f"lap {number}")
+                    for number, lap in enumerate(laps, 1) if len(lap)]
+    return results
+
+
+def find_rows(flight: Flight, stage: Stage) -> np.ndarray:
+    """The indices of a stage's rows that have a reference."""
+    rows = np.arange(stage.first, stage.end)
+    return rows[np.isfinite(flight.p_WL_ref[rows, 0])]
+
+
+def split_laps(flight: Flight, stage: Stage) -> list[np.ndarray]:
+    """The rows of each lap. The last row of a stage, at the end of a lap, belongs to that lap."""
+    if stage.lap_s is None:
+        return []
+    rows = find_rows(flight, stage)
+    flown_s = flight.time_s[rows] - flight.time_s[stage.first]
+    # Times are rounded; what is nearer to the next lap than 1 ns is in it.
+    lap = np.floor((flown_s + 1e-9) / stage.lap_s).astype(int)
+    if len(lap) > 1 and lap[-1] > lap[-2] and stage.end == len(flight.time_s):
+        lap[-1] = lap[-2]
+    return [rows[lap == number] for number in range(lap[-1] + 1)] if len(lap) else []
+
+
+def calc_over(flight: Flight, rows: np.ndarray, label: str) -> StageMetrics:
+    time_s, p_WL, reference = flight.time_s[rows], flight.p_WL[rows], flight.p_WL_ref[rows]
+    error = p_WL - reference
+    step = None
+    if np.all(reference == reference[0]):
+        step = StepMetrics(
+            settling_time_s=np.array([calc_settling_time(time_s, p_WL[:, axis], reference[0, axis])
+                                      for axis in range(3)]),
+            overshoot=np.array([calc_overshoot(p_WL[:, axis], reference[0, axis])
+                                for axis in range(3)]),
+            steady_state_error_m=calc_steady_state_error(time_s, error))
+    return StageMetrics(label=label, from_s=float(time_s[0]), to_s=float(time_s[-1]),
+                        rms_m=calc_rms(error), max_m=calc_max(error), step=step)

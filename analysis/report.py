@@ -1,0 +1,265 @@
+"""One self-contained page about a recording: report.html."""
+
+import base64
+import html
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from analysis.figures import make_figures, save
+from analysis.flight import Flight
+from analysis.metrics import StageMetrics, calc_max, calc_rms, calc_stage_metrics
+from analysis.recordings import Recording, describe_ids
+from analysis.tables import format_error, list_error_cells, list_step_cells
+
+CAPTIONS = {
+    "fleet": "All vehicles: the paths of their loads from above, and how far each load is from its "
+             "reference.",
+    "positions": "Load and quadrotor over time, and where the load should be. The axis of z points "
+                 "down, as z does; dotted lines: a stage begins.",
+    "errors": "Load position minus reference: as it is, and its size on a logarithmic axis.",
+    "path": "The same flight in space, height up, one metre as long on each axis. The dot is where "
+            "the load starts.",
+    "angles": "Angles of the rod; both are 0 where the load hangs straight down.",
+    "forces": "The force that the controller answers.",
+    "attitude": "The attitude that realises this force, with yaw 0.",
+}
+MOST_EVENTS = 200
+COUNTERS = ("resent", "late", "duplicate", "superseded", "take_overs", "rejected_not_finite",
+            "rejected_force_limit", "rejected_run", "rejected_step", "rejected_vehicle",
+            "rejected_client", "rejected_fault", "stale", "held", "fail_safe", "deadline_missed",
+            "overflow", "slipped")
+STYLE_SHEET = """
+:root { color-scheme: light; }
+* { box-sizing: border-box; }
+body { margin: 0; background: #f4f5f7; color: #1c2127; font: 15px/1.5 "DejaVu Sans", "Segoe UI",
+  Helvetica, Arial, sans-serif; }
+main { max-width: 1120px; margin: 0 auto; padding: 28px 24px 48px; }
+h1 { font-size: 26px; margin: 0 0 4px; }
+h2 { font-size: 17px; margin: 0 0 12px; }
+section { background: #fff; border: 1px solid #dfe3e8; border-radius: 8px; padding: 18px 20px;
+  margin-top: 18px; }
+.sub { color: #5b6570; margin: 0; }
+.badge { display: inline-block; border-radius: 4px; padding: 1px 9px; font-size: 13px;
+  font-weight: 600; margin-right: 6px; background: #e3eefa; color: #0b5394; }
+.good { background: #dff3e6; color: #14663a; }
+.bad { background: #fde7df; color: #a33b0b; }
+.notes { margin: 10px 0 0; padding-left: 20px; color: #a33b0b; }
+.facts { display: grid; grid-template-columns: repeat(4, 1fr); gap: 12px 20px; margin: 0; }
+.facts dt { color: #5b6570; font-size: 12.5px; }
+.facts dd { margin: 0; overflow-wrap: anywhere; font-variant-ligatures: none; }
+.scroll { overflow-x: auto; }
+table { border-collapse: collapse; font-size: 13px; width: 100%;
+  font-variant-numeric: tabular-nums; }
+th, td { padding: 4px 7px; text-align: right; white-space: nowrap;
+  min-width: 58px; border-bottom: 1px solid #eceff2; }
+th { font-weight: 600; color: #3c4650; }
+thead tr:first-child th:first-child, td:first-child, .text th, .text td { text-align: left; }
+.text td:last-child { white-space: normal; width: 100%; }
+thead tr:first-child th[colspan] { text-align: center; border-left: 1px solid #dfe3e8; }
+.lap td:first-child { padding-left: 26px; color: #5b6570; }
+.small { color: #5b6570; font-size: 13px; margin: 10px 0 0; }
+figure { margin: 0 0 26px; }
+figure:last-child { margin-bottom: 0; }
+figure img { display: block; width: 100%; max-width: 920px; height: auto; margin: 0 auto; }
+figcaption { color: #5b6570; font-size: 13.5px; text-align: center; margin-top: 4px; }
+pre { overflow-x: auto; background: #f7f8fa; padding: 12px; border-radius: 6px; font-size: 12.5px;
+  line-height: 1.45; }
+summary { cursor: pointer; font-weight: 600; font-size: 17px; }
+@media (max-width: 800px) { .facts { grid-template-columns: repeat(2, 1fr); } }
+@media print { body { background: #fff; } section { break-inside: avoid; } }
+"""
+
+
+def make_report(recording: Recording, vehicle_id: int) -> str:
+    """The page as HTML. Raises InputError."""
+    name = recording.manifest["scenario"]
+    flight = recording.load_flight(vehicle_id, name)
+    fleet = recording.load_fleet()
+    title = f"{name}, vehicle {vehicle_id}" if len(fleet) > 1 else name
+    sections = [
+        make_head(recording, flight, title),
+        make_section("Flight", make_facts(recording, flight, vehicle_id)),
+        make_section("Load position error per stage (m)", make_error_table(flight)),
+        make_step_section(flight),
+        make_fleet_section(fleet),
+        make_section("Figures", make_figure_list(flight, fleet)),
+        make_section("Events", make_events(recording)),
+        f"<section><details><summary>Scenario</summary><pre>{escape(recording.scenario_text)}</pre>"
+        "</details></section>",
+    ]
+    return ("<!DOCTYPE html>\n<html lang=\"en\">\n<head><meta charset=\"utf-8\">\n"
+            "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+            "<link rel=\"icon\" href=\"data:,\">\n"
+            f"<title>{escape(title)}: flight report</title>\n<style>{STYLE_SHEET}</style></head>\n"
+            f"<body><main>\n{''.join(sections)}</main></body>\n</html>\n")
+
+
+def escape(value: Any) -> str:
+    return html.escape(str(value))
+
+
+def make_section(title: str, content: str) -> str:
+    return f"<section><h2>{title}</h2>{content}</section>\n"
+
+
+def make_head(recording: Recording, flight: Flight, title: str) -> str:
+    manifest = recording.manifest
+    whole = manifest["complete"]
+    notes = "".join(f"<li>{escape(note)}</li>" for note in flight.notes)
+    return (f"<header><h1>{escape(title)}</h1><p class=\"sub\">"
+            f"<span class=\"badge {'good' if whole else 'bad'}\">"
+            f"{'complete' if whole else 'incomplete'}</span>"
+            f"<span class=\"badge\">timing: {escape(manifest.get('timing') or 'unknown')}</span>"
+            f"run {escape(manifest['run_id'])}</p>"
+            + (f"<ul class=\"notes\">{notes}</ul>" if notes else "") + "</header>\n")
+
+
+def make_facts(recording: Recording, flight: Flight, vehicle_id: int) -> str:
+    manifest, scenario = recording.manifest, recording.scenario
+    vehicle = find_vehicle(scenario, vehicle_id)
+    model = scenario.get("controller", {}).get("model") or {}
+    facts = [
+        ("quadrotor mass", f"{vehicle.get('quad_mass_kg', '–')} kg"),
+        ("load mass", f"{vehicle.get('load_mass_kg', '–')} kg"),
+        ("rod length", f"{vehicle.get('rod_length_m', '–')} m"),
+        ("gravity", f"{vehicle.get('gravity_m_s2', '–')} m/s²"),
+        ("control period", f"{manifest['period_s']:g} s"),
+        ("integration step", f"{manifest.get('step_s', '–')} s"),
+        ("mode", manifest["mode"]),
+        ("speed", describe_speed(recording.read_last_status())),
+        ("outcome", ": ".join(filter(None, (manifest["outcome"], manifest["reason"])))),
+        ("flown", f"{flight.time_s[0]:g} s to {flight.time_s[-1]:g} s, "
+                  f"{len(flight.time_s)} states"),
+        ("vehicles", f"{len(recording.vehicle_ids)} ({describe_ids(recording.vehicle_ids)})"),
+        ("controller believes", ", ".join(f"{key}\u00a0{value}" for key, value in model.items())
+         or "the vehicle as it is"),
+        ("gains", describe_gains(scenario)),
+        ("programs", describe_programs(manifest)),
+        ("machine", describe_machine(manifest.get("machine", {}))),
+        ("certificate", manifest.get("certificate") or "–"),
+    ]
+    entries = "".join(f"<div><dt>{escape(key)}</dt><dd>{escape(value)}</dd></div>"
+                      for key, value in facts)
+    return f"<dl class=\"facts\">{entries}</dl>"
+
+
+def find_vehicle(scenario: dict[str, Any], vehicle_id: int) -> dict[str, Any]:
+    """The parameters of one vehicle: the scenario's, and its own of a list of vehicles."""
+    vehicle = dict(scenario.get("vehicle") or {})
+    own = scenario.get("vehicles")
+    if isinstance(own, list) and vehicle_id < len(own) and isinstance(own[vehicle_id], dict):
+        vehicle.update(own[vehicle_id])
+    return vehicle
+
+
+def describe_speed(status: dict[str, str]) -> str:
+    factor = float(status.get("real_time_factor") or 0)
+    return f"{factor:.1f} × real time" if factor else "–"
+
+
+def describe_gains(scenario: dict[str, Any]) -> str:
+    gains = scenario.get("controller", {}).get("gains") or {}
+    if "lqr" in gains:
+        return f"LQR {gains['lqr'].get('horizontal', 10)} / {gains['lqr'].get('vertical', 5)}"
+    return "named, with integral" if "integral" in str(gains) else "named" if gains else "–"
+
+
+def describe_programs(manifest: dict[str, Any]) -> str:
+    versions = manifest.get("versions", {})
+    return f"{versions.get('sim_server', '–')}, Fast DDS {versions.get('fast_dds', '–')}"
+
+
+def describe_machine(machine: dict[str, Any]) -> str:
+    return ", ".join(str(machine[key]) for key in ("processor", "architecture", "libc")
+                     if machine.get(key)) or "–"
+
+
+def make_table(groups: Sequence[str], rows: Sequence[tuple[str, list[str]]]) -> str:
+    """Of stages and laps: three columns, x y z, per group."""
+    top = "".join(f"<th colspan=\"3\">{group}</th>" for group in groups)
+    axes = "<th>x</th><th>y</th><th>z</th>" * len(groups)
+    body = "".join(
+        f"<tr{' class=lap' if cells[0].startswith('lap') else ''}>"
+        + "".join(f"<td>{escape(cell)}</td>" for cell in [*cells, *numbers]) + "</tr>"
+        for cells, numbers in ((label.split("|"), numbers) for label, numbers in rows))
+    return ("<div class=\"scroll\"><table><thead><tr><th rowspan=\"2\">stage</th>"
+            f"<th rowspan=\"2\">from s</th><th rowspan=\"2\">to s</th>{top}</tr><tr>{axes}</tr>"
+            f"</thead><tbody>{body}</tbody></table></div>")
+
+
+def name_row(metrics: StageMetrics) -> str:
+    return f"{metrics.label}|{metrics.from_s:g}|{metrics.to_s:g}"
+
+
+def make_error_table(flight: Flight) -> str:
+    rows = [(name_row(metrics), list_error_cells(metrics))
+            for metrics in calc_stage_metrics(flight)]
+    if not rows:
+        return "<p>There is no reference in this recording.</p>"
+    return (make_table(("rms", "max"), rows) +
+            "<p class=\"small\">Error: load position minus reference, in frame W (x forward, "
+            "y right, z down). max: the largest size.</p>")
+
+
+def make_step_section(flight: Flight) -> str:
+    rows = [(name_row(metrics), list_step_cells(metrics)) for metrics in calc_stage_metrics(flight)
+            if metrics.step is not None]
+    if not rows:
+        return ""
+    return make_section(
+        "Steps to set-points",
+        make_table(("settling time to 2 % (s)", "overshoot (%)", "steady-state error (m)"), rows)
+        + "<p class=\"small\">Of the load. Settling time: from the start of the stage until the "
+        "position stays within 2 % of the step. Overshoot: how far beyond the set-point, as a "
+        "share of the step. Steady-state error: mean of the last tenth of the stage. –: the stage "
+        "begins less than 1 cm from its set-point.</p>")
+
+
+def make_fleet_section(fleet: Sequence[Flight]) -> str:
+    if len(fleet) < 2:
+        return ""
+    rows = ""
+    for flight in fleet:
+        error = flight.calc_error()
+        error = error[np.isfinite(error[:, 0])]
+        if len(error):
+            cells = [flight.name, *map(format_error, calc_rms(error)),
+                     *map(format_error, calc_max(error))]
+            rows += "<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
+    return ("<section><details><summary>All vehicles, whole flight (m)</summary>"
+            "<div class=\"scroll\"><table><thead><tr><th rowspan=\"2\">vehicle</th>"
+            "<th colspan=\"3\">rms</th><th colspan=\"3\">max</th></tr><tr>"
+            + "<th>x</th><th>y</th><th>z</th>" * 2
+            + f"</tr></thead><tbody>{rows}</tbody></table></div></details></section>\n")
+
+
+def make_figure_list(flight: Flight, fleet: Sequence[Flight]) -> str:
+    parts = []
+    with tempfile.TemporaryDirectory() as folder:
+        for name, figure in make_figures([flight], fleet).items():
+            file = Path(folder) / f"{name}.svg"
+            save(figure, file)
+            data = base64.b64encode(file.read_bytes()).decode()
+            caption = escape(CAPTIONS[name])
+            parts.append(f"<figure id=\"{name}\"><img alt=\"{caption}\" "
+                         f"src=\"data:image/svg+xml;base64,{data}\">"
+                         f"<figcaption>{caption}</figcaption></figure>\n")
+    return "".join(parts)
+
+
+def make_events(recording: Recording) -> str:
+    events = recording.list_events()
+    rows = "".join(f"<tr><td>{event.time_s:g}</td><td>{event.step}</td>"
+                   f"<td>{escape(event.text)}</td></tr>" for event in events[:MOST_EVENTS])
+    more = (f"<p class=\"small\">{len(events) - MOST_EVENTS} more are in status.csv.</p>"
+            if len(events) > MOST_EVENTS else "")
+    status = recording.read_last_status()
+    counted = ", ".join(f"{name.replace('_', ' ')} {status[name]}" for name in COUNTERS
+                        if status.get(name, "0") != "0")
+    return ("<div class=\"scroll\"><table class=\"text\"><thead><tr><th>time s</th><th>step</th>"
+            f"<th>what</th></tr></thead><tbody>{rows}</tbody></table></div>{more}"
+            f"<p class=\"small\">Counted by the server: {counted or 'nothing unusual'}.</p>")

@@ -1,0 +1,286 @@
+"""The published comparison with flights of our own: STUDY.md and its pictures."""
+
+import subprocess
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+
+from analysis.figures import (STYLE, add_legend, colour_of, draw, make_stack, plot_path,
+                              plot_positions, save, set_log_scale)
+from analysis.flight import Flight
+from analysis.input_error import InputError
+from analysis.metrics import StageMetrics, calc_over, calc_stage_metrics, split_laps
+from analysis.published_logs import load_log
+from analysis.recordings import Recording
+from analysis.tables import (format_error, list_error_cells, list_step_cells, make_markdown_table)
+
+HERE = Path(__file__).resolve().parent
+DPI = 100
+
+
+class FlightFailed(Exception):
+    """A flight of the study did not end well; the message names it."""
+
+
+@dataclass(frozen=True)
+class PlannedFlight:
+    name: str
+    scenario: str
+    period_s: str = "0.004"
+
+
+FLIGHTS = (
+    PlannedFlight("figure_eight", "figure_eight"),
+    PlannedFlight("figure_eight_1ms", "figure_eight", "0.001"),
+    PlannedFlight("matlab_setpoint_1", "matlab_setpoint_1", "0.001"),
+    PlannedFlight("matlab_setpoint_2", "matlab_setpoint_2", "0.001"),
+    PlannedFlight("matlab_setpoint_3", "matlab_setpoint_3", "0.001"),
+    PlannedFlight("matlab_figure_eight", "matlab_figure_eight", "0.001"),
+    PlannedFlight("setpoints", "setpoints"),
+    PlannedFlight("gazebo_legacy", "gazebo_legacy"),
+    PlannedFlight("gazebo_correct_wiring", "gazebo_correct_wiring"),
+    PlannedFlight("gazebo_corrected", "gazebo_corrected"),
+    PlannedFlight("integral_mass_error", "integral_mass_error"),
+    PlannedFlight("mass_error_without_integral", "mass_error_without_integral"),
+    PlannedFlight("rotor_drag", "rotor_drag"),
+    PlannedFlight("rotor_drag_without_feed_forward", "rotor_drag_without_feed_forward"),
+)
+
+# Load position error on the second lap, m: rms x, y, z, max x, y. Source of the published figures:
+# the project's design, section 7 (published MATLAB, Gazebo and PX4 logs of the same figure eight).
+PUBLISHED_LAP_2 = (
+    ("MATLAB ODE, continuous control", "1.7e-06", "4.3e-06", "3e-07", "6e-06", "2.6e-05"),
+    ("pure Gazebo, about z −0.6 as it was told", "0.211", "0.236", "0.098", "0.388", "0.413"),
+    ("pure Gazebo, about z −0.5", "0.211", "0.236", "0.004", "0.388", "0.413"),
+    ("PX4 software in the loop", "0.131", "0.234", "0.097", "0.214", "0.346"),
+)
+
+
+def fly_all(recordings: Path, domain: int, say: Callable[[str], None]) -> None:
+    """Flies everything, one after the other. Raises FlightFailed."""
+    launcher = HERE.parent / "sls"
+    for planned in FLIGHTS:
+        say(f"study: flying {planned.name}, period {planned.period_s} s")
+        command = [str(launcher), "run", planned.scenario, "--out", str(recordings / planned.name),
+                   "--force", "--period-s", planned.period_s, "--domain", str(domain)]
+        code = subprocess.run(command, check=False).returncode
+        if code != 0:
+            raise FlightFailed(f"study: expected {planned.name} to be flown, "
+                               f"got exit code {code} of ./sls run")
+
+
+def load_flights(recordings: Path) -> dict[str, Flight]:
+    flights = {}
+    for planned in FLIGHTS:
+        recording = Recording(recordings / planned.name)
+        if not recording.manifest["complete"]:
+            raise InputError(f"{recording.folder}: expected a complete recording, got one that "
+                             f"ends '{recording.manifest['outcome']}'")
+        if recording.manifest["period_s"] != float(planned.period_s):
+            raise InputError(f"{recording.folder}: expected a period of {planned.period_s} s, "
+                             f"got {recording.manifest['period_s']} s")
+        flights[planned.name] = recording.load_flight(0, planned.name)
+    return flights
+
+
+# --- pictures -------------------------------------------------------------------------------------
+
+
+def cut(flight: Flight, stage_name: str, lap: int, name: str) -> Flight:
+    """One lap of a flight as a flight of its own, from time 0."""
+    stage = next(stage for stage in flight.stages if stage.name == stage_name)
+    rows = split_laps(flight, stage)[lap - 1]
+    return replace(flight, name=name, time_s=flight.time_s[rows] - flight.time_s[rows[0]],
+                   p_WQ=flight.p_WQ[rows], p_WL=flight.p_WL[rows],
+                   p_WL_ref=flight.p_WL_ref[rows], alpha=flight.alpha[rows],
+                   beta=flight.beta[rows], f_Q_W=flight.f_Q_W[rows], stages=())
+
+
+def plot_error_sizes(flights: Sequence[Flight], title: str) -> Figure:
+    """Sizes of the load position errors over time, logarithmic."""
+    figure, axes = make_stack(3, title, ("|x| (m)", "|y| (m)", "|z| (m)"), height=1.55)
+    for axis in range(3):
+        sizes = [np.abs(flight.calc_error()[:, axis]) for flight in flights]
+        for index, (flight, size) in enumerate(zip(flights, sizes)):
+            draw(axes[axis, 0], flight.time_s, np.where(size > 0, size, np.nan),
+                 color=colour_of(index), label=flight.name)
+        set_log_scale(axes[axis, 0], sizes)
+    add_legend(axes[0, 0], columns=3)
+    return figure
+
+
+def plot_height_error(flights: Sequence[Flight]) -> Figure:
+    figure, axes = make_stack(1, "Height of the load above its set-point", ("height (mm)",),
+                              height=2.4)
+    for index, flight in enumerate(flights):
+        draw(axes[0, 0], flight.time_s, -1000.0 * flight.calc_error()[:, 2],
+             color=colour_of(index), label=flight.name)
+    axes[0, 0].axhline(0.0, color="#222222", linewidth=0.8)
+    axes[0, 0].set_ylim(-8, 32)
+    add_legend(axes[0, 0])
+    return figure
+
+
+def plot_set_points(flights: Sequence[Flight]) -> Figure:
+    """The steps of several legs, each as a share of its way, with the band of ±2 %."""
+    figure, axes = make_stack(3, "Load position as a share of the step; shaded: ±2 %",
+                              ("x / step", "y / step", "z / step"), height=1.55)
+    for index, flight in enumerate(flights):
+        way = flight.p_WL_ref[0] - flight.p_WL[0]
+        for axis in range(3):
+            if abs(way[axis]) > 0.0:
+                draw(axes[axis, 0], flight.time_s,
+                     (flight.p_WL[:, axis] - flight.p_WL[0, axis]) / way[axis],
+                     color=colour_of(index), label=flight.name, linewidth=4.0 - 1.5 * index)
+    for axis in range(3):
+        axes[axis, 0].axhspan(0.98, 1.02, color="#222222", alpha=0.12, linewidth=0)
+    add_legend(axes[0, 0])  # every leg steps along x
+    return figure
+
+
+def draw_pictures(flights: dict[str, Flight]) -> dict[str, Figure]:
+    """By the names of their files."""
+    wirings = [cut(flights[name], "figure_eight", 2, label) for name, label in (
+        ("gazebo_legacy", "published wiring"), ("gazebo_correct_wiring", "correct wiring"),
+        ("gazebo_corrected", "and correct model"))]
+    return {
+        "figure_eight": plot_error_sizes(
+            [replace(flights["figure_eight"], name="period 4 ms"),
+             replace(flights["figure_eight_1ms"], name="period 1 ms")],
+            "Figure eight from rest: size of the load position error"),
+        "matlab_set_points": plot_set_points(
+            [flights[f"matlab_setpoint_{leg}"] for leg in (1, 2, 3)]),
+        "set_points": plot_positions([replace(flights["setpoints"], name="load")]),
+        "gazebo_path": plot_path(wirings),
+        "gazebo_errors": plot_error_sizes(
+            wirings, "Figure eight of the Gazebo mission, second lap: size of the error"),
+        "integral": plot_height_error(
+            [replace(flights["integral_mass_error"], name="with integral"),
+             replace(flights["mass_error_without_integral"], name="without")]),
+        "rotor_drag": plot_error_sizes(
+            [replace(flights["rotor_drag"], name="with feed-forward"),
+             replace(flights["rotor_drag_without_feed_forward"], name="without")],
+            "Figure eight with rotor drag and wind: size of the load position error"),
+    }
+
+
+# --- the page -------------------------------------------------------------------------------------
+
+
+def measure_lap_2(flight: Flight, label: str) -> StageMetrics:
+    """Of the figure eight of a mission."""
+    stage = next(stage for stage in flight.stages if stage.lap_s is not None)
+    return calc_over(flight, split_laps(flight, stage)[1], label)
+
+
+def make_lap_row(metrics: StageMetrics) -> list[str]:
+    return [metrics.label, *list_error_cells(metrics)[:5]]
+
+
+def measure_about(flight: Flight, z_offset_m: float, label: str) -> StageMetrics:
+    """As `measure_lap_2`, about a figure eight that is shifted by `z_offset_m`."""
+    shifted = replace(flight, p_WL_ref=flight.p_WL_ref + np.array([0.0, 0.0, z_offset_m]))
+    return measure_lap_2(shifted, label)
+
+
+LAP_HEADER = ("figure eight, second lap", "rms x", "rms y", "rms z", "max x", "max y")
+STEP_HEADER = ("flight", "settling x s", "y", "z", "overshoot x %", "y", "z",
+               "steady-state error x m", "y", "z")
+
+
+def make_lap_table(flights: dict[str, Flight]) -> str:
+    ours = [
+        measure_lap_2(flights["figure_eight"], "`figure_eight`, hold of 4 ms"),
+        measure_lap_2(flights["figure_eight_1ms"], "`figure_eight`, hold of 1 ms"),
+        measure_lap_2(flights["matlab_figure_eight"], "`matlab_figure_eight`, hold of 1 ms"),
+        measure_lap_2(flights["gazebo_legacy"], "`gazebo_legacy`: published wiring"),
+        measure_about(flights["gazebo_legacy"], 0.1, "`gazebo_legacy`, about z −0.5"),
+        measure_lap_2(flights["gazebo_correct_wiring"],
+                      "`gazebo_correct_wiring`: only the wiring put right"),
+        measure_lap_2(flights["gazebo_corrected"],
+                      "`gazebo_corrected`: and the controller's model"),
+    ]
+    rows = [[f"published: {row[0]}", *row[1:]] for row in PUBLISHED_LAP_2]
+    return make_markdown_table(LAP_HEADER, [*rows, *map(make_lap_row, ours)])
+
+
+def make_step_table(flights: Sequence[Flight]) -> str:
+    rows = []
+    for flight in flights:
+        for metrics in calc_stage_metrics(flight):
+            place = f", stage {metrics.label.split()[0]}" if len(flight.stages) > 1 else ""
+            rows.append([f"`{flight.name}`{place}", *list_step_cells(metrics)])
+    return make_markdown_table(STEP_HEADER, rows)
+
+
+def make_drag_table(flights: dict[str, Flight]) -> str:
+    return make_markdown_table(LAP_HEADER, [
+        make_lap_row(measure_lap_2(flights["rotor_drag"], "`rotor_drag`: with feed-forward")),
+        make_lap_row(measure_lap_2(flights["rotor_drag_without_feed_forward"],
+                                   "`rotor_drag_without_feed_forward`"))])
+
+
+def describe_gain(flights: dict[str, Flight], worse: str, better: str, axes: str,
+                  digits: int) -> str:
+    """How many times smaller the rms of `better` is on the second lap: "118 (x) and 48 (y)"."""
+    ratios = measure_lap_2(flights[worse], "").rms_m / measure_lap_2(flights[better], "").rms_m
+    *most, last = [f"{ratio:.{digits}f} ({axis})" for ratio, axis in zip(ratios, axes)]
+    return f"{', '.join(most)} and {last}"
+
+
+def calc_distance(flight: Flight, published: Flight) -> float:
+    """Largest distance per axis, of quadrotor and load, at the instants published, m."""
+    step = np.searchsorted(flight.time_s, published.time_s - 1e-6)
+    return float(max(np.max(np.abs(flight.p_WQ[step] - published.p_WQ)),
+                     np.max(np.abs(flight.p_WL[step] - published.p_WL))))
+
+
+def make_published_note(flights: dict[str, Flight], published: Path | None) -> str:
+    if published is None:
+        return ("`./sls study --published DIR` adds how far `matlab_setpoint_1` is from the "
+                "published run, where somebody has its file.")
+    distance = calc_distance(flights["matlab_setpoint_1"],
+                             load_log(published / "matlab_setpoint1.csv", "published"))
+    return (f"`matlab_setpoint_1` is at most {distance:.2e} m from the published MATLAB run, "
+            "quadrotor and load, at each of its instants.")
+
+
+def make_page(flights: dict[str, Flight], published: Path | None) -> str:
+    """study_page.md with the numbers and tables that belong there."""
+    def describe_height(name: str, digits: int) -> str:
+        metrics = calc_stage_metrics(flights[name])[0]
+        return f"{abs(1000.0 * metrics.step.steady_state_error_m[2]):.{digits}f}"
+
+    legs = [flights[f"matlab_setpoint_{leg}"] for leg in (1, 2, 3)]
+    rod_error = measure_lap_2(flights["gazebo_correct_wiring"], "").rms_m[2]
+    return (HERE / "study_page.md").read_text().format(
+        count=len(FLIGHTS),
+        lap_table=make_lap_table(flights),
+        hold=describe_gain(flights, "figure_eight", "figure_eight_1ms", "xyz", 2),
+        wired=describe_gain(flights, "gazebo_legacy", "gazebo_correct_wiring", "xy", 0),
+        corrected=describe_gain(flights, "gazebo_legacy", "gazebo_corrected", "xy", 0),
+        rod_error=format_error(rod_error),
+        set_point_table=make_step_table([*legs, flights["setpoints"]]),
+        published_note=make_published_note(flights, published),
+        with_integral=describe_height("integral_mass_error", 2),
+        without_integral=describe_height("mass_error_without_integral", 1),
+        integral_table=make_step_table([flights["integral_mass_error"],
+                                        flights["mass_error_without_integral"]]),
+        drag=describe_gain(flights, "rotor_drag_without_feed_forward", "rotor_drag", "xyz", 0),
+        drag_table=make_drag_table(flights))
+
+
+def write_study(recordings: Path, out: Path, published: Path | None) -> Path:
+    """Writes `out`/STUDY.md and `out`/study/*.png from the flights in `recordings`."""
+    flights = load_flights(recordings)
+    page = make_page(flights, published)
+    (out / "study").mkdir(exist_ok=True)
+    with matplotlib.rc_context(STYLE):
+        for name, figure in draw_pictures(flights).items():
+            save(figure, out / "study" / f"{name}.png", DPI)
+    (out / "STUDY.md").write_text(page)
+    return out / "STUDY.md"

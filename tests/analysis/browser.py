@@ -1,0 +1,48 @@
+"""Chromium without a window, to see that a page renders."""
+
+import pathlib
+import re
+import shutil
+import subprocess
+import tempfile
+
+PROGRAM = shutil.which("chromium")
+MISSING = "skipped: no Chromium (apt-get install chromium)"
+
+# Put into the page's copy: tells, once everything is loaded, what a reader would see.
+PROBE = """<script>
+addEventListener("load", () => {
+  const images = [...document.images];
+  document.body.dataset.broken = images.filter(image => !image.naturalWidth).length;
+  document.body.dataset.overflow = document.documentElement.scrollWidth
+      - document.documentElement.clientWidth;
+  document.body.dataset.requests = performance.getEntriesByType("resource")
+      .filter(entry => !entry.name.startsWith("data:")).length;
+  document.body.dataset.seen = images.length;
+});
+</script>"""
+
+
+def run(page: pathlib.Path, *flags: str) -> tuple[str, str]:
+    """The page's document and what the browser logged."""
+    with tempfile.TemporaryDirectory() as profile:
+        done = subprocess.run(
+            [PROGRAM, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage",
+             "--window-size=1366,768", f"--user-data-dir={profile}", "--enable-logging=stderr",
+             *flags, page.as_uri()], capture_output=True, text=True, timeout=120, check=True)
+    return done.stdout, done.stderr
+
+
+def render(page: pathlib.Path) -> tuple[str, list[str]]:
+    """The document after loading, with the probe's findings and without its pictures, and what the
+    page put on the console."""
+    with tempfile.TemporaryDirectory() as folder:
+        copy = pathlib.Path(folder) / page.name
+        copy.write_text(page.read_text().replace("</body>", f"{PROBE}</body>"))
+        document, log = run(copy, "--dump-dom")
+    document = re.sub(r'"data:image[^"]*"', '"data:"', document)
+    return document, [line for line in log.splitlines() if "CONSOLE" in line]
+
+
+def take_picture(page: pathlib.Path, picture: pathlib.Path, height: int = 768) -> None:
+    run(page, f"--screenshot={picture}", f"--window-size=1366,{height}", "--hide-scrollbars")

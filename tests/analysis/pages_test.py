@@ -1,0 +1,154 @@
+"""Command lines, figures and reports, from recordings written here; the report in a browser."""
+
+import re
+import unittest
+from pathlib import Path
+
+import browser
+import support
+import numpy as np
+
+from analysis import figures
+from support import write_recording
+
+ALL = {"positions", "errors", "path", "angles", "forces", "attitude"}
+
+
+def names_of(folder, kind):
+    return {path.stem for path in Path(folder).glob(f"*.{kind}")}
+
+
+class PlotTest(support.FolderTest):
+    def test_one_recording_gives_every_figure_as_png_and_pdf_beside_it(self):
+        write_recording(self.folder / "r")
+        code, output = self.run_analysis("plot", "r")
+        self.assertEqual((code, output), (0, "sls: figures: r/figures\n"))
+        self.assertEqual(names_of(self.folder / "r/figures", "png"), ALL)
+        self.assertEqual(names_of(self.folder / "r/figures", "pdf"), ALL)
+        for path in (self.folder / "r/figures").glob("*.png"):
+            self.assertEqual(path.read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
+        for path in (self.folder / "r/figures").glob("*.pdf"):
+            self.assertEqual(path.read_bytes()[:5], b"%PDF-")
+        # The same recording gives the same bytes.
+        self.assertEqual(self.run_analysis("plot", "r", "--out", "again")[0], 0)
+        for path in (self.folder / "r/figures").iterdir():
+            again = self.folder / "again" / path.name
+            self.assertEqual(path.read_bytes(), again.read_bytes(), path.name)
+
+    def test_several_are_overlaid_with_names_and_a_log_without_forces_is_no_obstacle(self):
+        write_recording(self.folder / "r", last=150, complete=False)
+        self.write("log.csv", "Time,qx,qy,qz,lx,ly,lz,a,b\n"
+                              "0,0,0,-2,0,0,-1,0,0\n1,0,0,-2,0,0,-1,0,0\n")
+        code, output = self.run_analysis("plot", "r", "log.csv", "--out", "o", "--name", "ours",
+                                         "published")
+        self.assertEqual(code, 0, output)
+        self.assertIn("sls: r: incomplete: its recorder was killed", output)
+        self.assertEqual(names_of(self.folder / "o", "png"), ALL)
+        # A log alone has neither errors nor forces.
+        self.assertEqual(self.run_analysis("plot", "log.csv", "--out", "p")[0], 0)
+        self.assertEqual(names_of(self.folder / "p", "png"), {"positions", "path", "angles"})
+
+    def test_a_fleet_has_an_overview_of_all_and_figures_of_one(self):
+        write_recording(self.folder / "r", last=50, vehicles=(0, 1, 2))
+        self.assertEqual(self.run_analysis("plot", "r", "--vehicle", "2")[0], 0)
+        self.assertEqual(names_of(self.folder / "r/figures", "png"), ALL | {"fleet"})
+        self.expect_refused(["plot", "r", "--vehicle", "3"], "expected a vehicle of this recording")
+
+    def test_a_single_row_is_plotted(self):
+        write_recording(self.folder / "r", last=0, complete=False)
+        self.assertEqual(self.run_analysis("plot", "r")[0], 0)
+        self.assertEqual(self.run_analysis("report", "r")[0], 0)
+
+    def test_mistakes_are_refused_in_one_line(self):
+        write_recording(self.folder / "r", last=5)
+        self.write("f", "")
+        (self.folder / "empty").mkdir()
+        self.expect_refused(["plot"], "plot: the following arguments are required: DIR")
+        self.expect_refused(["plot", "nowhere"], "nowhere: expected a file, got: No such file")
+        self.expect_refused(["plot", "empty"], "empty: expected a recording")
+        self.expect_refused(["report", "empty"], "empty: expected a recording")
+        self.expect_refused(["report", "f"], "f: expected a recording")
+        self.expect_refused(["plot", "r", "--name", "a", "b"], "--name: expected 1 names", "got 2")
+        self.expect_refused(["plot", "r", "--out", "f"], "--out f: expected a folder, got: File")
+        self.expect_refused(["plot", "r", "--nonsense"], "unrecognized arguments: --nonsense")
+        self.expect_refused(["plot", "r", "--format", "csv"], "--format: invalid choice: 'csv'")
+        self.expect_refused(["nonsense"], "invalid choice: 'nonsense'")
+        self.expect_refused(["study", "--reuse", "--recordings", "empty", "--out", "s"],
+                            "empty/figure_eight: expected a recording")
+
+    def test_only_the_view_turns_z_up_and_stays_right_handed(self):
+        axes = figures.to_z_up(np.eye(3))
+        np.testing.assert_array_equal(axes[2], [0, 0, -1])
+        self.assertEqual(np.linalg.det(axes), 1.0)
+
+    def test_no_line_is_drawn_across_a_gap(self):
+        time_s = np.array([0.0, 0.1, 0.2, 0.6, 0.7])
+        times, values = figures.break_at_gaps(time_s, np.arange(5.0))
+        np.testing.assert_array_equal(times, [0, 0.1, 0.2, np.nan, 0.6, 0.7])
+        np.testing.assert_array_equal(values, [0, 1, 2, np.nan, 3, 4])
+
+
+class ReportTest(support.FolderTest):
+    def make_page(self, **what):
+        write_recording(self.folder / "r", **what)
+        code, output = self.run_analysis("report", "r")
+        self.assertEqual((code, output), (0, "sls: report: r/report.html\n"))
+        return (self.folder / "r/report.html").read_text()
+
+    def test_it_tells_scenario_parameters_metrics_events_and_figures(self):
+        page = self.make_page()
+        for part in ("<title>synthetic: flight report</title>", "complete", "timing: exact",
+                     "0123456789abcdef", "1.5 kg", "0.2 kg", "0.01 s", "lockstep",
+                     "0 set_point", "1 eight, &quot;two laps&quot;", "lap 2", "1.96", "0.010",
+                     "waiting: waiting for: recorder, client", "finished: mission finished",
+                     "resent 7", "figure_eight: { amplitude_m", "f" * 64):
+            self.assertIn(part, page)
+        self.assertEqual(set(re.findall(r'<figure id="(\w+)">', page)), ALL)
+
+    def test_it_refers_to_nothing_outside_itself(self):
+        page = self.make_page()
+        for reference in re.findall(r'(?:src|href)="([^"]*)"', page):
+            self.assertTrue(reference.startswith("data:"), reference[:80])
+        self.assertNotIn("http", re.sub(r'"data:[^"]*"', "", page))
+
+    def test_it_says_what_is_missing(self):
+        page = self.make_page(last=150, complete=False, missing=[
+            {"vehicle_id": 0, "topic": "sls/state", "from": 151, "to": 160}])
+        for part in (">incomplete<", "its recorder was killed", "10 samples missing"):
+            self.assertIn(part, page)
+
+    def test_text_of_a_recording_is_text_and_no_markup(self):
+        write_recording(self.folder / "r", last=5)
+        path = self.folder / "r/scenario.yaml"
+        path.write_text(path.read_text() + "# <script>alert(1)</script>\n")
+        self.assertEqual(self.run_analysis("report", "r")[0], 0)
+        self.assertNotIn("<script", (self.folder / "r/report.html").read_text())
+
+    @unittest.skipUnless(browser.PROGRAM, browser.MISSING)
+    def test_a_browser_renders_it_without_a_word(self):
+        self.make_page(vehicles=(0, 1))
+        page = self.folder / "r/report.html"
+        document, console = browser.render(page)
+        self.assertEqual(console, [])
+        self.assertIn('data-seen="7"', document)
+        self.assertIn('data-broken="0"', document)
+        self.assertIn('data-overflow="0"', document)
+        self.assertIn('data-requests="0"', document)
+        self.assertIn("Load position error per stage", document)
+        picture = self.folder / "page.png"
+        browser.take_picture(page, picture)
+        self.assertGreater(picture.stat().st_size, 20000)
+
+    @unittest.skipUnless(browser.PROGRAM, browser.MISSING)
+    def test_the_browser_would_tell_what_is_wrong(self):
+        page = self.write("bad.html", '<body><div style="width: 3000px">x</div>'
+                                      '<img src="data:image/png;base64,AAAA">'
+                                      "<script>console.error('no good')</script></body>")
+        document, console = browser.render(page)
+        self.assertIn('data-broken="1"', document)
+        self.assertNotIn('data-overflow="0"', document)
+        self.assertTrue(any("no good" in line for line in console), console)
+
+
+if __name__ == "__main__":
+    unittest.main()

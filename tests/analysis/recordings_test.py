@@ -1,0 +1,162 @@
+"""Recordings as the recorder leaves them, written here: whole, cut short, segmented, of fleets."""
+
+import json
+import shutil
+import unittest
+
+import support
+import numpy as np
+
+from analysis.input_error import InputError
+from analysis.metrics import calc_stage_metrics
+from analysis.recordings import Recording
+from support import PERIOD_S, STEPS_PER_STAGE, load_of, reference_of, write_recording
+
+
+class RecordingsTest(support.FolderTest):
+    def load(self, vehicle_id=0):
+        return Recording(self.folder / "r").load_flight(vehicle_id, "r")
+
+    def change(self, name, change):
+        path = self.folder / "r" / name
+        path.write_text(change(path.read_text()))
+
+    def refuse(self, message, vehicle_id=0):
+        with self.assertRaisesRegex(InputError, message):
+            self.load(vehicle_id)
+
+    def test_a_recording_reads_back_as_it_was_flown(self):
+        write_recording(self.folder / "r")
+        flight = self.load()
+        self.assertEqual(flight.notes, ())
+        for step in (0, 1, STEPS_PER_STAGE - 1, STEPS_PER_STAGE, 2 * STEPS_PER_STAGE):
+            self.assertEqual(flight.time_s[step], step * PERIOD_S)
+            np.testing.assert_array_equal(flight.p_WL[step], load_of(step, 0))
+            np.testing.assert_array_equal(flight.p_WL_ref[step], reference_of(step)[2])
+            np.testing.assert_array_equal(flight.f_Q_W[step], [1, 2, -16])
+        self.assertEqual([(stage.name, stage.first, stage.end, stage.lap_s)
+                          for stage in flight.stages],
+                         [("set_point", 0, STEPS_PER_STAGE, None),
+                          ('eight, "two laps"', STEPS_PER_STAGE, 2 * STEPS_PER_STAGE + 1, 2.0)])
+
+    def test_its_metrics_are_what_was_put_into_it(self):
+        write_recording(self.folder / "r")
+        stage, eight, first, second = calc_stage_metrics(self.load())
+        # exp(−2 t) of the way is left: 2 % after ln 50 / 2 = 1.956 s.
+        np.testing.assert_array_equal(stage.step.settling_time_s, [np.nan, np.nan, 1.96])
+        self.assertEqual(stage.max_m[2], 1.0)
+        np.testing.assert_allclose(first.rms_m, 0.01, rtol=1e-9)
+        np.testing.assert_allclose(second.max_m, 0.001, rtol=1e-9)
+        self.assertIsNone(eight.step)
+
+    def test_a_killed_recorder_leaves_what_is_read_and_said(self):
+        write_recording(self.folder / "r", last=150, complete=False)
+        self.change("state.csv", lambda text: text[:-30])
+        self.change("reference.csv", lambda text: "\n".join(text.split("\n")[:-20]) + "\n")
+        flight = self.load()
+        self.assertEqual(len(flight.time_s), 150)
+        self.assertEqual(flight.notes,
+                         ("incomplete: its recorder was killed, or is still recording",
+                          "state.csv: the last row is cut off and left out"))
+        self.assertTrue(np.isnan(flight.p_WL_ref[-1]).all())
+        self.assertTrue(np.isfinite(flight.p_WL_ref[100]).all())
+        self.assertEqual(len(calc_stage_metrics(flight)), 1)
+
+    def test_segments_are_joined_where_each_takes_over(self):
+        write_recording(self.folder / "whole")
+        write_recording(self.folder / "r", last=150, complete=False)
+        write_recording(self.folder / "r/segment-2", first=140, last=500, complete=False, segment=2)
+        write_recording(self.folder / "r/segment-3", first=501, segment=3)
+        (self.folder / "r/segment-4").mkdir()  # of a recorder killed before it had written anything
+        flight, whole = self.load(), Recording(self.folder / "whole").load_flight(0, "w")
+        for values, expected in ((flight.time_s, whole.time_s), (flight.p_WL, whole.p_WL),
+                                 (flight.p_WL_ref, whole.p_WL_ref), (flight.f_Q_W, whole.f_Q_W)):
+            np.testing.assert_array_equal(values, expected)
+        self.assertEqual(flight.notes, ())
+
+    def test_what_is_missing_is_told_and_not_invented(self):
+        write_recording(self.folder / "r", complete=False, missing=[
+            {"vehicle_id": 0, "topic": "sls/reference", "from": 200, "to": 202}])
+        self.change("reference.csv", lambda text: "\n".join(
+            line for line in text.split("\n") if line[:6] not in ("0,200,", "0,201,", "0,202,")))
+        flight = self.load()
+        self.assertIn("3 samples missing, first sls/reference step 200 of vehicle 0", flight.notes)
+        self.assertEqual(list(np.flatnonzero(np.isnan(flight.p_WL_ref[:, 0]))), [200, 201, 202])
+        self.assertEqual(len(flight.stages), 2)
+
+    def test_further_runs_in_the_folder_are_named(self):
+        write_recording(self.folder / "r")
+        write_recording(self.folder / "r/run-00000000000000aa")
+        self.assertEqual(self.load().notes,
+                         ("further runs are recordings of their own: run-00000000000000aa",))
+
+    def test_each_vehicle_of_a_fleet_is_itself(self):
+        write_recording(self.folder / "r", vehicles=(0, 1, 2))
+        for vehicle in range(3):
+            np.testing.assert_array_equal(self.load(vehicle).p_WL[0], load_of(0, vehicle))
+        self.refuse(r"r: expected a vehicle of this recording \(0 to 2\), got 3", 3)
+
+    def test_events_are_changes_of_phase_and_reason(self):
+        write_recording(self.folder / "r")
+        self.assertEqual([(event.time_s, event.text) for event in
+                          Recording(self.folder / "r").list_events()],
+                         [(0, "waiting: waiting for: recorder, client"), (0, "running"),
+                          (8.0, "finished: mission finished")])
+
+    def test_what_is_no_recording_is_refused(self):
+        (self.folder / "r").mkdir()
+        self.refuse("r: expected a recording, got no manifest.json that can be read")
+        (self.folder / "r/manifest.json").write_text("{")
+        self.refuse("manifest.json: expected a manifest, got: ")
+        (self.folder / "r/manifest.json").write_text("[]")
+        self.refuse("manifest.json: complete: expected bool, got null")
+        write_recording(self.folder / "r")
+        self.change("manifest.json", lambda text: text.replace('"vehicle_ids": [0]',
+                                                               '"vehicle_ids": 0'))
+        self.refuse("manifest.json: vehicle_ids: expected list, got 0")
+
+    def test_defects_of_its_files_are_named_with_file_and_line(self):
+        def truncate_row(text):
+            lines = text.split("\n")
+            lines[5] = lines[5][:20]
+            return "\n".join(lines)
+
+        cases = (
+            ("state.csv", truncate_row, "state.csv:6: expected 22 columns, got"),
+            ("command.csv", truncate_row, "command.csv:6: expected 8 columns, got 7"),
+            ("state.csv", lambda text: text.replace("\n0,3,0.03,", "\n0,3,x,"),
+             "state.csv:5: sim_time_s: expected a number, got 'x'"),
+            ("state.csv", lambda text: text.replace("load_x_m", "load"),
+             "state.csv:1: expected a column 'load_x_m', got 'vehicle_id"),
+            ("state.csv", lambda text: text.replace("\n0,3,", "\n0,2,"),
+             "state.csv: vehicle 0: expected a step after 2, got 2"),
+            ("state.csv", lambda text: "", "state.csv:1: expected a header, got an empty file"),
+            ("state.csv", lambda text: text.split("\n")[0] + "\n",
+             "state.csv: expected rows of vehicle 0, got none"),
+            ("scenario.yaml", lambda text: "a: [", "scenario.yaml: expected YAML, got: "),
+            ("scenario.yaml", lambda text: "a: 1\n",
+             "scenario.yaml: expected a scenario with a mission"),
+        )
+        for name, damage, message in cases:
+            with self.subTest(message):
+                write_recording(self.folder / "r", last=20)
+                self.change(name, damage)
+                self.refuse(message)
+        for name in ("state.csv", "command.csv", "reference.csv", "scenario.yaml"):
+            write_recording(self.folder / "r", last=20)
+            (self.folder / "r" / name).unlink()
+            self.refuse(f"{name}: expected a file, got: No such file or directory")
+        shutil.rmtree(self.folder / "r")
+        self.refuse("r: expected a recording")
+
+    def test_a_manifest_of_an_earlier_version_will_do(self):
+        folder = write_recording(self.folder / "r")
+        manifest = json.loads((folder / "manifest.json").read_text())
+        for key in ("segment", "certificate", "timing"):
+            del manifest[key]
+        (folder / "manifest.json").write_text(json.dumps(manifest))
+        self.assertEqual(len(self.load().time_s), 2 * STEPS_PER_STAGE + 1)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,156 @@
+"""What the tests of analysis share. A test is run with the build folder as its argument; without
+the packages that analysis needs it is skipped (exit code 77)."""
+
+import contextlib
+import io
+import json
+import os
+import pathlib
+import socket
+import sys
+import tempfile
+import time
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+BUILD = pathlib.Path(sys.argv.pop(1)) if len(sys.argv) > 1 else ROOT / "build"
+sys.path.insert(0, str(ROOT))
+CACHE = tempfile.TemporaryDirectory()
+os.environ.setdefault("MPLCONFIGDIR", CACHE.name)  # nothing is left in anybody's home
+
+try:
+    import matplotlib  # noqa: F401
+    import numpy as np
+    import yaml  # noqa: F401
+except ImportError as error:
+    print(f"skipped: {error.name} is missing (apt-get install python3-numpy python3-matplotlib "
+          "python3-yaml)")
+    sys.exit(77)
+
+
+class FolderTest(unittest.TestCase):
+    """A test with a folder of its own."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+    def write(self, name, text):
+        path = self.folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+        return path
+
+    def run_analysis(self, *arguments):
+        """The command line in the test's folder: exit code and what it said."""
+        from analysis.__main__ import main
+        with contextlib.chdir(self.folder), io.StringIO() as said:
+            with contextlib.redirect_stderr(said):
+                code = main([str(argument) for argument in arguments])
+            return code, said.getvalue()
+
+    def expect_refused(self, arguments, *parts):
+        """One line that holds `parts`, and exit code 2."""
+        code, output = self.run_analysis(*arguments)
+        self.assertEqual(code, 2, output)
+        self.assertEqual(output.count("\n"), 1, output)
+        self.assertTrue(output.startswith("sls: error: "), output)
+        for part in parts:
+            self.assertIn(str(part), output)
+
+
+class OwnDomain:
+    """A DDS domain that no other test flies on, by the lock that those in C++ hold, too: a name
+    that leaves nothing behind."""
+
+    def __enter__(self):
+        deadline = time.monotonic() + 240
+        while time.monotonic() < deadline:
+            for number in range(1, 61):
+                self.lock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+                try:
+                    self.lock.bind(f"\0sls-test-domain-{number}")
+                    return str(number)
+                except OSError:
+                    self.lock.close()
+            time.sleep(0.1)
+        raise RuntimeError("no free DDS domain among 1 to 60")
+
+    def __exit__(self, *_):
+        self.lock.close()
+
+
+STATE_HEADER = ("vehicle_id,step,sim_time_s,quad_x_m,quad_y_m,quad_z_m,quad_vx_m_s,quad_vy_m_s,"
+                "quad_vz_m_s,load_x_m,load_y_m,load_z_m,load_vx_m_s,load_vy_m_s,load_vz_m_s,"
+                "alpha_rad,beta_rad,alpha_dot_rad_s,beta_dot_rad_s,force_x_n,force_y_n,force_z_n")
+COMMAND_HEADER = "vehicle_id,step,controller,force_x_n,force_y_n,force_z_n,compute_us,fault"
+REFERENCE_HEADER = ("vehicle_id,step,sim_time_s,stage,stage_name,ref_x_m,ref_y_m,ref_z_m,"
+                    + ",".join(f"ref_{kind}{axis}_m_s{order}" for order, kind in
+                               (("", "v"), (2, "a"), (3, "j"), (4, "s")) for axis in "xyz"))
+STATUS_HEADER = ("sample_index,phase,reason,step,controller,real_time_factor,resent,late,duplicate,"
+                 "timing")
+PERIOD_S = 0.01
+SCENARIO = """name: synthetic
+vehicle: { quad_mass_kg: 1.5, load_mass_kg: 0.2, rod_length_m: 1.0, gravity_m_s2: 9.8 }
+mission:
+  - set_point: { position_m: [1, -1, -2] }
+    for_s: 4
+  - figure_eight: { amplitude_m: [1.5, 0.75, 0.5], period_s: 2 }
+    for_s: 4
+"""
+STEPS_PER_STAGE = 400
+
+
+def reference_of(step):
+    """Stage, name and position: a set-point for 4 s, then two laps of 2 s."""
+    if step < STEPS_PER_STAGE:
+        return 0, "set_point", np.array([1.0, -1.0, -2.0])
+    time_s = (step - STEPS_PER_STAGE) * PERIOD_S
+    swing = np.sin(np.pi * time_s)
+    return 1, 'eight, "two laps"', np.array([1.5 * swing, 0.75 * np.sin(2 * np.pi * time_s),
+                                             0.5 * swing])
+
+
+def load_of(step, vehicle_id):
+    """At first 1 m above the set-point, then nearer; on the laps 1 cm, then 1 mm off."""
+    _, _, reference = reference_of(step)
+    if step < STEPS_PER_STAGE:
+        return reference + np.array([0, 0, -np.exp(-2 * step * PERIOD_S)]) * (1 + vehicle_id)
+    return reference + (0.01 if step < STEPS_PER_STAGE + 200 else 0.001)
+
+
+def write_recording(folder, first=0, last=2 * STEPS_PER_STAGE, vehicles=(0,), complete=True,
+                    missing=(), segment=1):
+    """A recording of steps `first` to `last`, with the columns of design and recorder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    rows = {"state.csv": [STATE_HEADER], "command.csv": [COMMAND_HEADER],
+            "reference.csv": [REFERENCE_HEADER]}
+    for step in range(first, last + 1):
+        for vehicle in vehicles:
+            stage, name, reference = reference_of(step)
+            load = load_of(step, vehicle)
+            quad = load - [0, 0, 1]
+            quoted = '"' + name.replace('"', '""') + '"' if '"' in name else name
+            numbers = [*quad, 0, 0, 0, *load, 0, 0, 0, 0.1, -0.2, 0, 0, 0, 0, 0]
+            rows["state.csv"].append(
+                f"{vehicle},{step},{step * PERIOD_S!r}," + ",".join(f"{v:.17g}" for v in numbers))
+            rows["command.csv"].append(f"{vehicle},{step},client,1,2,-16,3.5,none")
+            rows["reference.csv"].append(
+                f"{vehicle},{step},{step * PERIOD_S!r},{stage},{quoted},"
+                + ",".join(f"{v:.17g}" for v in [*reference, *[0] * 12]))
+    for name, lines in rows.items():
+        (folder / name).write_text("\n".join(lines) + "\n")
+    (folder / "status.csv").write_text(
+        f"{STATUS_HEADER}\n0,waiting,\"waiting for: recorder, client\",0,,0,0,0,0,exact\n"
+        f"1,running,,0,,0,0,0,0,exact\n2,running,,{last},,0,7,0,0,exact\n"
+        f"3,finished,mission finished,{last},client,12,7,0,0,exact\n")
+    (folder / "scenario.yaml").write_text(SCENARIO)
+    (folder / "manifest.json").write_text(json.dumps({
+        "complete": complete, "outcome": "finished" if complete else "recording",
+        "reason": "mission finished" if complete else "", "run_id": "0123456789abcdef",
+        "scenario": "synthetic", "scenario_sha256": "0" * 64, "vehicle_ids": list(vehicles),
+        "period_s": PERIOD_S, "step_s": 0.001, "mode": "lockstep", "timing": "exact",
+        "certificate": "f" * 64, "segment": {"number": segment, "first_step": first},
+        "missing": list(missing)}))
+    return folder
