@@ -18,7 +18,8 @@ int main(int argc, char** argv) {
       ->type_name("X");
 
   return app::run_main(argc, argv, cli, options, "delay_margin", [&] {
-    config::Scenario scenario = config::load_scenario(scenario_file);
+    config::Scenario scenario =
+        config::make_vehicle_scenario(config::load_scenario(scenario_file), 0);
     if (period_s) config::override_period(scenario, *period_s);
     const bench::DelayMargin margin =
         bench::find_delay_margin(scenario, [](const bench::DelayedFlight&) {

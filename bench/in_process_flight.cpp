@@ -8,12 +8,13 @@
 
 namespace sls::bench {
 
-InProcessFlight::InProcessFlight(const config::Scenario& scenario)
-    : steps_per_period_(scenario.sync.period_ns / scenario.plant.step_ns),
-      force_limit_(scenario.controller.force_limit_n),
-      plant_(scenario.vehicle, scenario.plant),
-      faults_(scenario, 0),
-      controller_(scenario) {}
+InProcessFlight::InProcessFlight(const config::Scenario& scenario, std::uint32_t vehicle)
+    : scenario_(config::make_vehicle_scenario(scenario, vehicle)),
+      steps_per_period_(scenario_.sync.period_ns / scenario_.plant.step_ns),
+      force_limit_(scenario_.controller.force_limit_n),
+      plant_(scenario_.vehicle, scenario_.plant),
+      faults_(scenario_, vehicle),
+      controller_(scenario_) {}
 
 std::optional<FlownStep> InProcessFlight::fly_step() {
   if (has_ended_) return std::nullopt;
@@ -55,8 +56,8 @@ bool InProcessFlight::is_last(const control::Answer& answer) {
   return !failure_.empty() || answer.mission != control::MissionPhase::kRunning;
 }
 
-std::vector<FlownStep> fly(const config::Scenario& scenario) {
-  InProcessFlight flight(scenario);
+std::vector<FlownStep> fly(const config::Scenario& scenario, std::uint32_t vehicle) {
+  InProcessFlight flight(scenario, vehicle);
   std::vector<FlownStep> steps;
   while (auto step = flight.fly_step()) steps.push_back(std::move(*step));
   return steps;

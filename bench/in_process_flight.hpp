@@ -27,9 +27,9 @@ struct FlownStep {
 
 class InProcessFlight {
  public:
-  /// At step 0 of vehicle 0 of `scenario`, whose period is the one in force.
+  /// At step 0 of vehicle `vehicle` of `scenario`, whose period is the one in force.
   /// @throws config::ConfigError as plant and controller do.
-  explicit InProcessFlight(const config::Scenario& scenario);
+  explicit InProcessFlight(const config::Scenario& scenario, std::uint32_t vehicle = 0);
 
   /// The next step, up to the one whose answer ends the flight; then nothing.
   std::optional<FlownStep> fly_step();
@@ -43,6 +43,7 @@ class InProcessFlight {
   /// Whether the answer ends the flight, judged as the server does.
   bool is_last(const control::Answer& answer);
 
+  config::Scenario scenario_;  // of the vehicle alone
   std::int64_t steps_per_period_;
   double force_limit_;
   sim::SlungLoadPlant plant_;
@@ -56,7 +57,7 @@ class InProcessFlight {
   std::string failure_;
 };
 
-/// All steps of a flight.
-std::vector<FlownStep> fly(const config::Scenario& scenario);
+/// All steps of a flight of one vehicle of `scenario`.
+std::vector<FlownStep> fly(const config::Scenario& scenario, std::uint32_t vehicle = 0);
 
 }  // namespace sls::bench

@@ -61,6 +61,12 @@ TEST(InProcessFlightTest, WithoutFaultsItIsTheLoopOfControllerAndPlant) {
   }
 }
 
+TEST(InProcessFlightTest, AVehicleOfAFleetFliesItsOwnScenario) {
+  const config::Scenario fleet = load("mixed_fleet");
+  for (const std::uint32_t id : {0u, 3u})
+    expect_equal_bits(fly(fleet, id), fly_by_hand(config::make_vehicle_scenario(fleet, id), 0));
+}
+
 TEST(InProcessFlightTest, ADelayOfNothingChangesNoBit) {
   const config::Scenario scenario = load("short");
   expect_equal_bits(fly(delay_command(scenario, 0)), fly_by_hand(scenario, 0));

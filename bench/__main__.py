@@ -1,0 +1,133 @@
+"""`./sls bench`: its command line."""
+
+import argparse
+import json
+import os
+import signal
+import socket
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NoReturn
+
+from bench import loop, parts
+from bench.machine import describe_machine, now
+from bench.programs import MeasurementError, Programs, make_scratch
+from bench.results import Figure, format_table
+
+Measure = Callable[[Programs, int, bool], list[Figure]]
+PARTS: dict[str, tuple[Measure, int]] = {  # and its rounds
+    "lockstep": (loop.measure_lockstep, 5),
+    "breakdown": (loop.measure_breakdown, 3),
+    "round-trip": (loop.measure_round_trips, 3),
+    "realtime": (loop.measure_realtime, 3),
+    "plant": (parts.measure_plant, 5),
+    "recorder": (parts.measure_recorder, 5),
+    "fleet": (parts.measure_fleet, 3),
+    "qos": (loop.measure_qos, 3),
+}
+DOMAINS = range(61, 81)  # tests use those below
+
+
+class UsageError(Exception):
+    pass
+
+
+class Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        raise UsageError(f"bench: {message} (see ./sls bench --help)")
+
+
+def say(text: str) -> None:
+    print(f"sls: {text}", file=sys.stderr, flush=True)
+
+
+def parse_arguments() -> argparse.Namespace:
+    parser = Parser(prog="sls bench", description="Measures how fast everything is, each figure beside "
+                    "its bound in the same run: one table. Minutes, and an idle machine.")
+    parser.add_argument("--quick", action="store_true",
+                        help="one short round of everything: whether it works, not how fast it is")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="the figures of every round")
+    parser.add_argument("--only", nargs="+", choices=PARTS, metavar="NAME",
+                        help=f"these parts alone: {', '.join(PARTS)}")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="a folder for plots (PNG and SVG)")
+    parser.add_argument("--build", type=Path, required=True, help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.json and not options.json.resolve().parent.is_dir():
+        raise UsageError(f"--json {options.json}: expected a file in a folder that exists")
+    if options.out:
+        try:
+            options.out.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise UsageError(f"--out {options.out}: expected a folder, got: {error.strerror}") from None
+    return options
+
+
+def take_domain() -> tuple[int, socket.socket]:
+    """A DDS domain that no other bench uses, for as long as the socket is there."""
+    for domain in DOMAINS:
+        lock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        try:
+            lock.bind(f"\0sls-bench-domain-{domain}")
+            return domain, lock
+        except OSError:
+            lock.close()
+    raise MeasurementError(f"expected a free DDS domain among {DOMAINS[0]} to {DOMAINS[-1]}, got none")
+
+
+def make_keys(programs: Programs) -> None:
+    """For config/qos/secure.xml."""
+    keys = programs.scratch / "keys"
+    programs.run(Path(__file__).parents[1] / "config/security/keys.sh", keys)
+    os.environ["SLS_KEYS"] = str(keys)
+
+
+def measure(options: argparse.Namespace, programs: Programs) -> dict[str, Any]:
+    json_parts: dict[str, Any] = {"machine": describe_machine(), "began": now(),
+                                  "load_before": os.getloadavg()[0], "quick": options.quick}
+    figures: list[Figure] = []
+    for name in options.only or PARTS:
+        measure_part, rounds = PARTS[name]
+        say(f"measures {name}")
+        if name == "qos":
+            make_keys(programs)
+        figures += measure_part(programs, 1 if options.quick else rounds, options.quick)
+    json_parts["ended"] = now()
+    json_parts["figures"] = [figure.to_json() for figure in figures]
+    machine = json_parts["machine"]
+    print(f"{machine['processor']}, {machine['cores']} cores, load before: "
+          f"{json_parts['load_before']:.2f}{', quick' if options.quick else ''}")
+    print(format_table(figures))
+    return json_parts
+
+
+def main() -> int:
+    try:
+        options = parse_arguments()
+        domain, lock = take_domain()
+        with lock, make_scratch() as scratch:
+            result = measure(options, Programs(options.build, domain, Path(scratch)))
+        if options.json:
+            options.json.write_text(json.dumps(result, indent=2) + "\n")
+        if options.out:
+            from bench.plots import save_plots  # needs python3-matplotlib
+
+            for file in save_plots(result, options.out):
+                say(f"plot: {file}")
+    except UsageError as error:
+        say(f"error: {error}")
+        return 2
+    except (MeasurementError, OSError, ImportError) as error:
+        say(f"error: {error}")
+        return 1
+    return 0
+
+
+def interrupt(number: int, frame: Any) -> NoReturn:
+    raise SystemExit(128 + number)
+
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGTERM, interrupt)
+    signal.signal(signal.SIGINT, interrupt)
+    sys.exit(main())

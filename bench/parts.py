@@ -1,0 +1,182 @@
+"""Everything beside the loop: plant, recorder, fleets."""
+
+import json
+import os
+from pathlib import Path
+
+from bench.loop import PERIOD_S, StepCosts, count_late, lasting
+from bench.programs import MeasurementError, Programs, end_all
+from bench.results import LESS, Figure
+
+FLEETS = (1, 2, 5, 10, 20, 50, 100, 200)
+QUICK_FLEETS = (1, 2, 10)
+
+
+# --- plant ----------------------------------------------------------------------------------------
+
+
+def measure_plant(programs: Programs, rounds: int, is_quick: bool) -> list[Figure]:
+    """With Google Benchmark, which interleaves its repetitions at random."""
+    output = programs.run(
+        programs.build / "bin/sls_microbench", "--benchmark_format=json",
+        f"--benchmark_repetitions={rounds}", "--benchmark_enable_random_interleaving=true",
+        f"--benchmark_min_time={0.01 if is_quick else 0.2}")
+    times: dict[str, list[float]] = {}
+    for run in json.loads(output)["benchmarks"]:
+        if run["run_type"] == "iteration":
+            times.setdefault(run["run_name"], []).append(run["cpu_time"])
+    figures = []
+    for name in sorted(times, key=split_name):
+        (function, vehicles), values = split_name(name), times[name]
+        if function == "plant_step":
+            figures.append(Figure(
+                "plant", f"RK4 step of one vehicle, {vehicles} in turn", "ns", values,
+                "the same equations in closed form", times[f"closed_form_step/{vehicles}"], LESS))
+        elif function != "closed_form_step":
+            figures.append(Figure("plant", function.replace("_", " "), "ns", values, better=LESS))
+    return figures
+
+
+def split_name(name: str) -> tuple[str, int]:
+    """Of "plant_step/100": the function and how many vehicles; 0 where it has none."""
+    function, _, vehicles = name.partition("/")
+    return function, int(vehicles or 0)
+
+
+# --- recorder -------------------------------------------------------------------------------------
+
+
+def measure_recorder(programs: Programs, rounds: int, is_quick: bool) -> list[Figure]:
+    """Rows of state.csv, command.csv, reference.csv and flight.csv, all four counted."""
+    scenario = programs.scenario("figure_eight")
+    figures = []
+    for vehicles, steps in ((1, 2000), (100, 20)) if is_quick else ((1, 32000), (100, 1000)):
+        speeds, bounds, megabytes, ends = [], [], [], []
+        for _ in range(rounds):
+            result = programs.probe("record", "--scenario", scenario, "--period-s", PERIOD_S,
+                                    "--vehicles", str(vehicles), "--steps", str(steps),
+                                    "--folder", programs.scratch)
+            speeds.append(result["rows"] / result["recording_s"])
+            bounds.append(result["rows"] / result["plain_s"])
+            megabytes.append(result["bytes"] / result["recording_s"] / 1e6)
+            ends.append(result["finish_s"] / result["rows"] * 1e6)
+        title = f"Recording, {vehicles} vehicle{'s' if vehicles > 1 else ''}"
+        figures += [Figure("recorder", title, "rows/s", speeds,
+                           "std::to_chars and fwrite of the same bytes", bounds, goal=100_000),
+                    Figure("recorder", title, "MB/s", megabytes),
+                    Figure("recorder", f"{title}: hashes at the end", "µs/row", ends, better=LESS)]
+        figures.append(measure_recorder_process(programs, rounds, vehicles, steps))
+    return figures
+
+
+def measure_recorder_process(programs: Programs, rounds: int, vehicles: int, steps: int) -> Figure:
+    speeds = []
+    for _ in range(rounds):
+        scenario = programs.scenario("figure_eight", of_fleet(vehicles))
+        folder, log = programs.make_path(""), programs.make_path(".log")
+        common = ["--domain", str(programs.domain)]
+        recorder = programs.start([str(programs.build / "bin/recorder"), *common, "--out", str(folder)],
+                                  log)
+        try:
+            result = programs.probe("feed", *common, "--scenario", scenario, "--period-s", PERIOD_S,
+                                    "--vehicles", str(vehicles), "--steps", str(steps))
+            code = recorder.wait(timeout=60)
+        finally:
+            end_all([recorder])
+        check_recording(folder, code, log)
+        speeds.append(result["rows"] / result["seconds"])
+    return Figure("recorder", f"recorder process, over shared memory, {vehicles} "
+                  f"vehicle{'s' if vehicles > 1 else ''}, 0 lost", "rows/s", speeds, goal=100_000)
+
+
+def check_recording(folder: Path, code: int, log: Path) -> None:
+    if code != 0 or not json.loads((folder / "manifest.json").read_text())["complete"]:
+        raise MeasurementError(f"recorder ended with {code}: {log.read_text().strip()}")
+
+
+# --- fleets ---------------------------------------------------------------------------------------
+
+
+def of_fleet(vehicles: int, seconds: float = 32):
+    """figure_eight.yaml, flown by so many, with the step of the plant as long as the period."""
+    def change(text: str) -> str:
+        text = lasting(seconds)(text).replace("step_s: 0.001", "step_s: 0.004")
+        return text if vehicles == 1 else f"{text}vehicles: {vehicles}\n"
+
+    return change
+
+
+def choose_seconds(vehicles: int, is_quick: bool) -> float:
+    """Of simulated time, so that a lockstep flight takes some seconds."""
+    return 1.0 if is_quick else {1: 64, 2: 64, 5: 32, 10: 32, 20: 16}.get(vehicles, 8)
+
+
+def measure_fleet(programs: Programs, rounds: int, is_quick: bool) -> list[Figure]:
+    fleets = QUICK_FLEETS if is_quick else FLEETS
+    costs = StepCosts(programs, is_quick)
+    costs.round_trips = 200 if is_quick else 2000
+    cores = len(os.sched_getaffinity(0))
+    speeds: dict[int, list[float]] = {count: [] for count in fleets}
+    bounds: dict[int, list[float]] = {count: [] for count in fleets}
+    memory: dict[int, list[float]] = {count: [] for count in fleets}
+    for _ in range(rounds):
+        for count in fleets:
+            scenario = programs.scenario("figure_eight",
+                                         of_fleet(count, choose_seconds(count, is_quick)))
+            bounds[count].append(1e6 / (costs.ping("default", "--vehicles", str(count))
+                                        + count / min(count, cores) * costs.plant_and_law()))
+            flight = programs.fly(scenario)
+            if flight.lost or not flight.manifest["complete"]:
+                raise MeasurementError(f"{count} vehicles: the recording is not complete")
+            speeds[count].append(flight.steps_per_s)
+            memory[count].append(flight.server_memory_kb)
+    name = ("1 / (raw Fast DDS round trip of the fleet's samples + plant step and control law of each "
+            "vehicle, spread over the cores)")
+    figures = [Figure("fleet", f"{count} vehicle{'s' if count > 1 else ''}", "steps/s",
+                      speeds[count], name, bounds[count]) for count in fleets]
+    per_vehicle = {count: [1e6 / speed / count for speed in speeds[count]] for count in fleets}
+    figures += [Figure("fleet", f"{count} vehicle{'s' if count > 1 else ''}, per step and vehicle",
+                       "µs", per_vehicle[count], better=LESS) for count in fleets]
+    if 200 in fleets:
+        growth = [large / small for large, small in zip(per_vehicle[200], per_vehicle[10])]
+        figures.append(Figure("fleet", "time per step and vehicle, 200 over 10 vehicles", "1",
+                              growth, better=LESS, goal=1.0))
+    least, most = (2, 10) if is_quick else (10, 200)  # fleets, which have other histories than one
+    figures.append(Figure("fleet", "server memory per vehicle", "kB", [
+        (large - small) / (most - least) for large, small in zip(memory[most], memory[least])],
+        better=LESS))
+    figures.append(find_most_in_real_time(programs, is_quick))
+    return figures
+
+
+def holds_real_time(programs: Programs, vehicles: int, seconds: float) -> bool:
+    scenario = programs.scenario("figure_eight", of_fleet(vehicles, seconds))
+    try:
+        flight = programs.fly(scenario, server=("--mode", "realtime", "--rtf", "1"))
+    except MeasurementError:
+        return False  # a recorder that lost something ends with 1
+    is_on_time = flight.label.startswith("real-time") and count_late(flight.label) == 0
+    return is_on_time and flight.lost == 0 and flight.manifest["complete"]
+
+
+def find_most_in_real_time(programs: Programs, is_quick: bool) -> Figure:
+    """By bisection, to ten vehicles; each size has two attempts, as the machine has other work."""
+    seconds = 1.0 if is_quick else 10.0
+
+    def holds(vehicles: int) -> bool:
+        return any(holds_real_time(programs, vehicles, seconds) for _ in range(2))
+
+    held, failed = 0, 256 // 10 * 10 + 10
+    candidate = 10 if is_quick else 100
+    while failed - held > 10:
+        if holds(candidate):
+            held = candidate
+        else:
+            failed = candidate
+        if is_quick:
+            break
+        candidate = (held + failed) // 20 * 10
+    return Figure("fleet", f"most in real time at 250 Hz for {seconds:g} s, 0 late, 0 lost",
+                  "vehicles", [float(held)], goal=100)
+
+

@@ -1,0 +1,132 @@
+"""Figures, their bounds and their ratios; as a table and as JSON. Nothing is measured here."""
+
+import statistics
+from dataclasses import dataclass, field
+from typing import Any
+
+LESS = "less"  # is better
+MORE = "more"
+
+
+@dataclass
+class Figure:
+    """One figure, measured once in each round, and in the same rounds what it could be at best.
+
+    `bounds` has one value for each of `values`, or none where there is no bound; both in `unit`.
+    `goal` is of the ratio if `is_goal_of_ratio`, else of the figure.
+    """
+
+    part: str
+    name: str
+    unit: str
+    values: list[float]
+    bound_name: str = ""
+    bounds: list[float] = field(default_factory=list)
+    better: str = MORE
+    goal: float | None = None
+    is_goal_of_ratio: bool = False
+
+    def __post_init__(self) -> None:
+        if not self.values:
+            raise ValueError(f"{self.part}, {self.name}: expected a value, got none")
+        if self.bounds and len(self.bounds) != len(self.values):
+            raise ValueError(f"{self.part}, {self.name}: expected {len(self.values)} bounds, "
+                             f"got {len(self.bounds)}")
+        if any(value <= 0 for value in self.bounds) or (self.bounds and min(self.values) <= 0):
+            raise ValueError(f"{self.part}, {self.name}: expected numbers > 0 for a ratio")
+
+    @property
+    def median(self) -> float:
+        return statistics.median(self.values)
+
+    @property
+    def ratios(self) -> list[float]:
+        """Of each round: 1 at the bound, less where the figure falls short of it."""
+        if self.better == MORE:
+            return [value / bound for value, bound in zip(self.values, self.bounds)]
+        return [bound / value for value, bound in zip(self.values, self.bounds)]
+
+    @property
+    def is_goal_reached(self) -> bool | None:
+        if self.goal is None:
+            return None
+        reached = statistics.median(self.ratios) if self.is_goal_of_ratio else self.median
+        is_least = self.better == MORE or self.is_goal_of_ratio
+        return reached >= self.goal if is_least else reached <= self.goal
+
+    def to_json(self) -> dict[str, Any]:
+        json: dict[str, Any] = {"part": self.part, "name": self.name, "unit": self.unit,
+                                "better": self.better, **summarize(self.values)}
+        if self.bounds:
+            json["bound"] = {"name": self.bound_name, **summarize(self.bounds)}
+            json["ratio"] = summarize(self.ratios)
+        if self.goal is not None:
+            json["goal"] = {"of": "ratio" if self.is_goal_of_ratio else "figure",
+                            "value": self.goal, "reached": self.is_goal_reached}
+        return json
+
+
+def summarize(values: list[float]) -> dict[str, Any]:
+    return {"median": statistics.median(values), "min": min(values), "max": max(values),
+            "rounds": list(values)}
+
+
+def format_number(value: float) -> str:
+    """Three digits, or a whole number where that is more."""
+    if value == 0:
+        return "0"
+    if abs(value) >= 100:
+        return f"{value:,.0f}"
+    return f"{value:.3g}"
+
+
+def format_spread(values: list[float]) -> str:
+    median = format_number(statistics.median(values))
+    if len(values) == 1:
+        return median
+    return f"{median} ({format_number(min(values))} … {format_number(max(values))})"
+
+
+def format_ratio(ratio: float) -> str:
+    return f"{ratio:.2f}" if ratio >= 0.1 else f"{ratio:.2g}"
+
+
+HEADER = ("figure", "unit", "median (min … max)", "bound", "ratio", "goal")
+
+
+def make_rows(figures: list[Figure]) -> list[tuple[str, ...]]:
+    rows = []
+    for figure in figures:
+        bound = format_spread(figure.bounds) if figure.bounds else ""
+        ratio = format_ratio(statistics.median(figure.ratios)) if figure.bounds else ""
+        goal = ""
+        if figure.goal is not None:
+            relation = "≤" if figure.better == LESS and not figure.is_goal_of_ratio else "≥"
+            goal = (f"{relation} {format_number(figure.goal)}"
+                    f"{' of its bound' if figure.is_goal_of_ratio else ''}: "
+                    f"{'reached' if figure.is_goal_reached else 'missed'}")
+        rows.append((figure.name, figure.unit, format_spread(figure.values), bound, ratio, goal))
+    return rows
+
+
+def format_table(figures: list[Figure]) -> str:
+    """One table, a headed group of lines for each part; bounds are named below each group."""
+    rows = make_rows(figures)
+    widths = [max(map(len, column)) for column in zip(HEADER, *rows)]
+
+    def line(cells: tuple[str, ...]) -> str:
+        left = "  ".join(cell.ljust(width) for cell, width in zip(cells[:2], widths))
+        right = "  ".join(cell.rjust(width) for cell, width in zip(cells[2:5], widths[2:]))
+        return f"  {left}  {right}  {cells[5]}".rstrip()
+
+    text = [line(HEADER)]
+    part = ""
+    for figure, row in zip(figures, rows):
+        if figure.part != part:
+            part = figure.part
+            text.append(part)
+            bounds = dict.fromkeys(other.bound_name for other in figures
+                                   if other.part == part and other.bounds)
+            text += [f"  bound: {name}" for name in bounds]
+        text.append(line(row))
+    return "\n".join(text)
