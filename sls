@@ -12,7 +12,10 @@ readonly packages=(g++ make cmake libeigen3-dev libsimbody-dev libfastrtps-dev l
   libtinyxml2-dev openssl)
 readonly fuzz_packages=(clang libclang-rt-14-dev)
 readonly fuzzers=(scenario qos_file csv recording samples)
-readonly test_packages=(iproute2 nftables cyclonedds-dev cyclonedds-tools fastdds-tools libfaketime python3-kubernetes)
+readonly test_packages=(iproute2 nftables cyclonedds-dev cyclonedds-tools fastdds-tools libfaketime python3-kubernetes
+  chromium)
+readonly analysis_packages=(python3-numpy python3-matplotlib python3-yaml)
+readonly bench_packages=(libbenchmark-dev python3-matplotlib)
 
 say() { echo "sls: $*" >&2; }
 fail() { say "error: $1"; exit "${2:-1}"; }
@@ -31,6 +34,8 @@ usage: ./sls COMMAND [OPTIONS]
       --period-s X     control period in force (default: the scenario's)
       --mode MODE      lockstep or realtime (default: the scenario's)
       --rtf X          of realtime: simulated over wall time (default: the scenario's)
+      --no-pinning     leave it to the system which processor runs what; else, where one vehicle flies in
+                       lockstep, server and client share one and leave the others to the recorder
   ctl COMMAND        talk to the run on this domain: pause, step N, resume, start, reset, stop or
                      status [--watch] [--json]; with --help: its options
   delay-margin SCENARIO
@@ -45,6 +50,20 @@ usage: ./sls COMMAND [OPTIONS]
       --answer         answer the doctor of another machine, for --for-s seconds (default: 60)
   verify A [B]       compares the data of two recordings: equal, or the first difference; of one, its
                      files with its manifest
+  plot DIR…          figures of recordings, and of published logs (files), overlaid; PNG and PDF
+      --out DIR        where they go (default: DIR/figures of one recording, else figures)
+      --name NAME…     what each is called
+      --vehicle N      which vehicle of a fleet (default: 0); with --help: all options
+  report DIR         DIR/report.html: parameters, metrics of each stage, figures, events in one file
+      --vehicle N      which vehicle of a fleet (default: 0)
+  study              flies the whole published comparison, writes analysis/STUDY.md and its pictures;
+                     with --help: its options
+  bench              how fast everything is, each figure beside its bound in the same run; minutes, and
+                     an idle machine
+      --quick          one short round of everything: whether it works
+      --json FILE      the figures of every round
+      --only NAME…     lockstep, breakdown, round-trip, realtime, plant, recorder, fleet or qos alone
+      --out DIR        plots
   test               set up, build, run every test
       --slow           the ones that take minutes, too; they need an idle machine
       --sanitize KIND  the unit tests alone, built with a sanitizer: address; or thread, which
@@ -76,9 +95,11 @@ EOF
 # --- set-up and build -----------------------------------------------------------------------------
 
 # setup [PACKAGE…]: what building and flying need, and the packages named.
-setup() {
+setup() { install_missing "${packages[@]}" "$@"; }
+
+install_missing() {
   local missing=() package
-  for package in "${packages[@]}" "$@"; do
+  for package in "$@"; do
     [[ "$(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null)" == installed ]] ||
       missing+=("$package")
   done
@@ -132,12 +153,40 @@ build_programs() {
 # Processes this launcher started: name by process id.
 declare -A name_of=()
 
+# Processors on which a program may run, where they were chosen: by name of the program.
+declare -A processors_of=()
+
 # The kernel ends the process should this launcher be killed.
 start() {
-  local name=$1
+  local name=$1 place=()
   shift
-  setpriv --pdeathsig TERM -- "$build/bin/$name" "$@" &
+  [[ -z ${processors_of[$name]:-} ]] || place=(taskset --cpu-list "${processors_of[$name]}")
+  setpriv --pdeathsig TERM -- "${place[@]}" "$build/bin/$name" "$@" &
   name_of[$!]=$name
+}
+
+# One vehicle in lockstep: server and client take turns and never work at the same time. On one
+# processor a turn is a switch; between two it wakes the other out of its sleep, which takes longer
+# than the step itself. They get the one that was least busy just now, the recorder the others.
+place_programs() {
+  local allowed=() range
+  IFS=, read -ra ranges <<<"$(taskset --cpu-list -p $$ | sed 's/.*: //')"
+  for range in "${ranges[@]}"; do mapfile -t -O "${#allowed[@]}" allowed < <(seq "${range%-*}" "${range#*-}"); done
+  ((${#allowed[@]} > 1)) || return 0
+  local chosen
+  chosen="$({ cat /proc/stat; sleep 0.1; cat /proc/stat; } | awk -v allowed=" ${allowed[*]} " '
+    /^cpu[0-9]/ {
+      number = substr($1, 4)
+      if (!(number in idle)) { idle[number] = $5; next }
+      if (index(allowed, " " number " ") && (best == "" || $5 - idle[number] > most)) { most = $5 - idle[number]; best = number }
+    }
+    END { print best }')"
+  [[ -n $chosen ]] || return 0
+  processors_of[sim_server]=$chosen
+  processors_of[control_client]=$chosen
+  local others=" ${allowed[*]} "
+  others="${others/ $chosen / }"
+  processors_of[recorder]="$(xargs <<<"$others" | tr ' ' ',')"
 }
 
 signal_all() {
@@ -180,11 +229,12 @@ find_scenario() {
 
 # fly SCENARIO [OPTIONS]: sets `recording` and `result`.
 fly() {
-  local scenario='' force=() qos=() domain=() timing=()
+  local scenario='' force=() qos=() domain=() timing=() is_pinned=1
   recording=''
   while (($#)); do
     case $1 in
       --force) force=(--force) ;;
+      --no-pinning) is_pinned=0 ;;
       --out | --qos | --domain | --period-s | --mode | --rtf)
         (($# >= 2)) || fail "$1: expected a value (see ./sls help)" 2
         case $1 in
@@ -211,7 +261,8 @@ fly() {
   fi
 
   # One line about a mistake, before three programs stumble over it.
-  "$build/bin/sim_server" --check --scenario "$file" "${qos[@]}" "${domain[@]}" "${timing[@]}" ||
+  local plan
+  plan="$("$build/bin/sim_server" --check --scenario "$file" "${qos[@]}" "${domain[@]}" "${timing[@]}")" ||
     exit $?
   "$build/bin/recorder" --check --out "$recording" "${force[@]}" "${qos[@]}" "${domain[@]}" ||
     exit $?
@@ -219,6 +270,7 @@ fly() {
   trap 'on_signal 130 INT' INT
   trap 'on_signal 143 TERM' TERM HUP
   trap 'signal_all TERM' EXIT
+  [[ $is_pinned == 0 || $plan != *'lockstep, 1 vehicle,'* ]] || place_programs
   start recorder --out "$recording" "${force[@]}" "${qos[@]}" "${domain[@]}"
   start sim_server --scenario "$file" "${qos[@]}" "${domain[@]}" "${timing[@]}"
   start control_client --scenario "$file" "${qos[@]}" "${domain[@]}"
@@ -309,10 +361,28 @@ cmd_delay-margin() {
   exec "$build/bin/delay_margin" --scenario "$(find_scenario "$scenario")" "${period[@]}"
 }
 
+cmd_bench() {
+  [[ " $* " == *" --help "* || -n ${SLS_BUILD:-} ]] || setup "${bench_packages[@]}"
+  [[ " $* " == *" --help "* ]] || build_programs "${flying[@]}" sim_ctl sls_bench_probe sls_microbench
+  PYTHONPATH="$root" exec /usr/bin/python3 -BP -m bench --build "$build" "$@"
+}
+
 cmd_verify() {
   build_programs sls_verify
   exec "$build/bin/sls_verify" "$@"
 }
+
+# analyse COMMAND…: -P: nothing in the working folder is taken for a module of ours; -B: no files beside it.
+analyse() {
+  install_missing "${analysis_packages[@]}"
+  PYTHONPATH="$root" exec /usr/bin/python3 -BP -m analysis "$@"
+}
+
+cmd_plot() { analyse plot "$@"; }
+
+cmd_report() { analyse report "$@"; }
+
+cmd_study() { analyse study "$@"; }
 
 cmd_doctor() {
   build_programs sls_doctor
@@ -418,7 +488,7 @@ cmd_test() {
     [[ $2 == thread ]] && preset=tsan which=(--label-regex threaded) targets=(threaded_tests)
     folder="$root/build-$preset"
   fi
-  setup "${test_packages[@]}"
+  setup "${test_packages[@]}" "${analysis_packages[@]}" "${bench_packages[@]}"
   build_tree "$preset" "$folder" "${targets[@]}"
   cd "$root"
   # Nothing the middleware reads from the environment may reach the tests.
@@ -429,7 +499,7 @@ cmd_test() {
 command=${1:-help}
 (($#)) && shift
 case $command in
-  demo | run | doctor | keys | ctl | verify | delay-margin | chaos | fuzz | test | setup | build | docker-demo | discovery-server | network-table) "cmd_$command" "$@" ;;
+  demo | run | doctor | bench | keys | ctl | verify | delay-margin | chaos | fuzz | test | setup | build | docker-demo | discovery-server | network-table | plot | report | study) "cmd_$command" "$@" ;;
   clean) rm -rf "$root"/build "$root"/build-* ;;
   help | --help | -h) usage ;;
   *)

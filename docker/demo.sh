@@ -10,9 +10,11 @@ Builds the image and flies in containers; ends with the summary of ./sls demo. N
   discovery  the same through a discovery server
   standby    two controllers, of which the first is killed in flight
   secure     with DDS Security; SLS_KEYS: the folder that ./sls keys made (default: new keys)
+  fleet      eight vehicles, of which one server flies 0 to 3 and another 4 to 7 on the same domain
 
 SCENARIO is a name in config/scenarios or a path (default: figure_eight); DIR the folder of the
-recording, new or empty (default: recordings/docker-NAME-UTCTIME). SLS_IMAGE names an image to be used
+recording, new or empty (default: recordings/docker-NAME-UTCTIME); of a fleet it has a folder for each
+server's vehicles, 0-3 and 4-7. SLS_IMAGE names an image to be used
 as it is; SLS_BASE what it is built upon (default: debian:bookworm-slim). It needs a Docker engine with
 docker compose or docker-compose.
 TEXT
@@ -97,6 +99,7 @@ fly_in_containers() {
     { tail -n 5 "$scratch/log" >&2; fail "the containers were not made"; }
   ((interrupted == 0)) || exit "$interrupted"
   case $name in
+    fleet) services=({recorder,server,controller}-{0-3,4-7}) ;;
     discovery) docker start "$(container_of discovery)" >/dev/null ;;
     standby)
       # Its end is not the flight's.
@@ -113,6 +116,12 @@ fly_in_containers() {
   wait_all
 }
 
+# make_fleet_scenario FILE: FILE with eight vehicles, if it is of one.
+make_fleet_scenario() {
+  cat -- "$1"
+  grep -q '^vehicles:' -- "$1" || printf '\nvehicles: 8\n'
+}
+
 docker_demo() {
   local name='' scenario=figure_eight
   recording=''
@@ -125,11 +134,11 @@ docker_demo() {
         ;;
       --build) name=build ;;
       --help | -h) docker_usage; return 0 ;;
-      plain | discovery | standby | secure)
+      plain | discovery | standby | secure | fleet)
         [[ -z $name ]] || fail "expected one name, got '$name' and '$1'" 2
         name=$1
         ;;
-      *) fail "docker-demo: expected plain, discovery, standby or secure, got '$1'" 2 ;;
+      *) fail "docker-demo: expected plain, discovery, standby, secure or fleet, got '$1'" 2 ;;
     esac
     shift
   done
@@ -158,13 +167,15 @@ docker_demo() {
   trap 'on_signal 130 TERM' INT
   trap 'on_signal 143 TERM' TERM HUP
   trap clean_up EXIT
-  mkdir -p -- "$recording"
+  local parts=("$recording") part
+  [[ $name != fleet ]] || parts+=("$recording"/{0-3,4-7})
+  mkdir -p -- "${parts[@]}"
   # No program runs as root: a caller who is root lends the folders to the image's user.
   local user
   user="$(id -u):$(id -g)"
   if ((EUID == 0)); then
     user=1000:1000
-    chown "$user" -- "$recording"
+    chown "$user" -- "${parts[@]}"
   fi
   if [[ $name == secure ]]; then
     if [[ -n ${SLS_KEYS:-} ]]; then
@@ -176,9 +187,15 @@ docker_demo() {
     export SLS_KEYS="$scratch/keys"
   fi
   export SLS_USER=$user SLS_RECORDING=$recording SLS_SCENARIO=$file
+  if [[ $name == fleet ]]; then
+    export SLS_SCENARIO="$scratch/scenario.yaml"
+    make_fleet_scenario "$file" >"$SLS_SCENARIO"
+    chmod a+rx -- "$scratch"
+  fi
 
   say "flying $(basename "$file" .yaml) with docker/compose$suffix.yaml"
   fly_in_containers "$name"
   ((result == 0)) || exit "$result"
-  print_summary
+  [[ $name != fleet ]] || parts=("${parts[@]:1}")
+  for part in "${parts[@]}"; do (recording=$part && print_summary); done
 }

@@ -81,16 +81,20 @@ class DockerTest : public ::testing::Test {
   }
   fs::path recording(const std::string& name) const { return folder / ("of_" + name); }
 
-  /// Flies with the launcher and expects a complete recording, the summary, and nothing left
-  /// behind.
-  std::string expect_demo(const std::string& name, const std::string& what) {
+  /// Flies with the launcher and expects complete recordings (in these folders of `recording`),
+  /// their summaries, and nothing left behind.
+  std::string expect_demo(const std::string& name, const std::string& what,
+                          const std::vector<std::string>& folders = {""}) {
     Process demo(make_demo(name, what));
     const std::string project = note_project("sls-demo-", demo.id());
     EXPECT_EQ(demo.wait(kFlightTime), 0) << demo.output();
-    EXPECT_NE(demo.output().find("Files in " + recording(name).string()), std::string::npos)
-        << demo.output();
-    EXPECT_TRUE(read_manifest(recording(name)).at("complete").get<bool>());
-    expect_owner(recording(name), geteuid());
+    for (const std::string& part : folders) {
+      const fs::path made = part.empty() ? recording(name) : recording(name) / part;
+      EXPECT_NE(demo.output().find("Files in " + made.string()), std::string::npos)
+          << demo.output();
+      EXPECT_TRUE(read_manifest(made).at("complete").get<bool>());
+      expect_owner(made, geteuid());
+    }
     expect_nothing_left(project);
     return demo.output();
   }
@@ -143,6 +147,36 @@ TEST_F(DockerTest, AStandbyTakesOverFromAKilledControllerAndNothingChanges) {
   expect_same_data(recording("standby"), native.recording());
   EXPECT_NE(output.find("controller 'standby' takes over from 'primary'"), std::string::npos)
       << output;
+}
+
+/// What the programs record on this machine itself of the vehicles `first` to `last` of a scenario.
+void fly_natively(const std::string& scenario_file, int first, int last, const fs::path& out) {
+  const OwnDomain domain;
+  const std::string vehicles = std::to_string(first) + "-" + std::to_string(last);
+  const auto start = [&](const std::string& name, const std::vector<std::string>& flags) {
+    return std::make_unique<Process>(make_command(name, domain.number(), flags));
+  };
+  const auto recorder =
+      start("recorder", {"--out", out.string(), "--vehicle", std::to_string(first)});
+  const auto server = start("sim_server", {"--scenario", scenario_file, "--vehicles", vehicles});
+  const auto client =
+      start("control_client", {"--scenario", scenario_file, "--vehicles", vehicles});
+  for (Process* process : {server.get(), client.get(), recorder.get()})
+    EXPECT_EQ(process->wait(), 0) << process->output();
+}
+
+TEST_F(DockerTest, TwoServersOnOneNetworkShareAFleet) {
+  const std::string fleet = folder / "fleet.yaml";
+  write_bytes(fleet, read_file(scenario("short")) + "\nvehicles: 8\n");
+  expect_demo("fleet", fleet, {"0-3", "4-7"});
+  for (const int first : {0, 4}) {
+    const std::string vehicles = std::to_string(first) + "-" + std::to_string(first + 3);
+    SCOPED_TRACE(vehicles);
+    fly_natively(fleet, first, first + 3, folder / vehicles);
+    expect_same_data(recording("fleet") / vehicles, folder / vehicles);
+    const Table states(recording("fleet") / vehicles / "state.csv");
+    EXPECT_EQ(states.number(0, "vehicle_id"), first);
+  }
 }
 
 TEST_F(DockerTest, AnInterruptedDemoLeavesAReadableRecordingAndNothingElse) {

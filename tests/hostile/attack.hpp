@@ -13,7 +13,8 @@ struct Target {
   int domain = 0;
   std::uint64_t seed = 1;
   double seconds = 60;
-  bool endless_gaps = false;  ///< fire also what hangs the middleware
+  bool endless_gaps = false;       ///< fire also what hangs the middleware
+  bool forged_identities = false;  ///< fire also what takes all the memory of a secured one
 };
 
 /// True until SIGTERM, or `target.seconds` after the first call.

@@ -33,6 +33,8 @@ int main(int argc, char** argv) {
   cli.add_option("--seconds", target.seconds, "at most");
   cli.add_option("--file", file, "captured packets");
   cli.add_flag("--endless-gaps", target.endless_gaps, "fire also what hangs Fast DDS 2.9.1");
+  cli.add_flag("--forged-identities", target.forged_identities,
+               "fire also what takes all the memory of a secured Fast DDS 2.9.1");
   cli.add_option("--most", most, "forged participants");
   CLI11_PARSE(cli, argc, argv);
 
@@ -51,7 +53,8 @@ int main(int argc, char** argv) {
       {"malformed", [&] { return write_malformed(target); }}};
   sls::app::install_stop_signals();
   try {
-    std::cout << attack << ": " << attacks.at(attack)() << std::endl;
+    const std::uint64_t count = attacks.at(attack)();
+    std::cout << attack << ": " << count << std::endl;
   } catch (const std::exception& error) {
     std::cout << attack << ": error: " << error.what() << std::endl;
     return 1;

@@ -6,8 +6,7 @@
 #include <cstdio>
 #include <memory>
 
-#include "tests/network/network.hpp"
-#include "tests/system/flight.hpp"
+#include "tests/network/hosts_flight.hpp"
 
 namespace sls::test {
 namespace {
@@ -17,16 +16,14 @@ using namespace std::chrono_literals;
 /// Attacks that have nothing to do with each other run side by side.
 class HostileTest : public testing::Test {
  protected:
+  explicit HostileTest(const std::string& profile = "lan") : profile_name_(profile) {}
+
   void SetUp() override {
     if (const auto obstacle = Network::find_obstacle()) GTEST_SKIP() << *obstacle;
     network_ = std::make_unique<Network>(
         std::vector<std::string>{"server", "controller", "recorder", "attacker"});
-    FlightOptions options;
-    options.qos_file = qos("lan");
-    options.before["sim_server"] = network_->on("server");
-    options.before["control_client"] = network_->on("controller");
-    options.before["recorder"] = network_->on("recorder");
-    options_ = options;
+    profile_ = std::make_unique<Profile>(*network_, profile_name_);
+    options_ = profile_->flight_options();
   }
 
   void TearDown() override {
@@ -36,8 +33,9 @@ class HostileTest : public testing::Test {
     }
     for (auto& attacker : attackers_) {
       EXPECT_EQ(attacker->wait(30s), 0) << attacker->output();
-      EXPECT_EQ(attacker->output().find(": 0\n"), std::string::npos) << "it has fired nothing";
       std::printf("%s", attacker->output().c_str());
+      const bool has_none = attacker->output().find(": 0\n") != std::string::npos;
+      EXPECT_EQ(has_none, attacker.get() == deaf_) << "it has fired nothing, or heard something";
     }
   }
 
@@ -84,9 +82,26 @@ class HostileTest : public testing::Test {
           << file;
   }
 
+  /// Nobody crashes or hangs, whatever becomes of the flight.
+  static void expect_orderly_end(Flight& flight) {
+    const auto processes = {flight.server.get(), flight.client.get(), flight.recorder.get()};
+    wait_until([&] { return !flight.server->is_running(); }, 10s);
+    for (Process* process : processes) process->send(SIGTERM);
+    for (Process* process : processes) {
+      const auto code = process->wait(30s);
+      ASSERT_TRUE(code) << "hangs\n" << flight.outputs();
+      EXPECT_TRUE(*code == 0 || *code == 1 || *code == 128 + SIGTERM) << *code << flight.outputs();
+    }
+  }
+
   std::unique_ptr<Network> network_;
   FlightOptions options_;
   std::vector<std::unique_ptr<Process>> attackers_;
+  const Process* deaf_ = nullptr;  ///< the attacker that must hear nothing
+
+ private:
+  const std::string profile_name_;
+  std::unique_ptr<Profile> profile_;
 };
 
 TEST_F(HostileTest, PacketsThatNoFriendSendsDisturbNothing) {
@@ -141,14 +156,44 @@ TEST_F(HostileTest, AStrongerControllerThatIsOfNoUseIsPassedOver) {
 TEST_F(HostileTest, SpoofedPacketsOfTheFlightItselfCrashNobody) {
   Flight flight(scenario("figure_eight"), options_);
   attack("spoof", flight, "server");
-  const auto processes = {flight.server.get(), flight.client.get(), flight.recorder.get()};
-  wait_until([&] { return !flight.server->is_running(); }, 10s);
-  for (Process* process : processes) process->send(SIGTERM);
-  for (Process* process : processes) {
-    const auto code = process->wait(30s);
-    ASSERT_TRUE(code) << "hangs\n" << flight.outputs();
-    EXPECT_TRUE(*code == 0 || *code == 1 || *code == 128 + SIGTERM) << *code << flight.outputs();
-  }
+  expect_orderly_end(flight);
+}
+
+// --- the same against a flight with keys, by neighbours who have none ----------------------------
+
+class SecuredHostileTest : public HostileTest {
+ protected:
+  SecuredHostileTest() : HostileTest("secure") {}
+};
+
+TEST_F(SecuredHostileTest, PacketsThatNoFriendSendsDisturbNothing) {
+  const TemporaryFolder folder;
+  capture(folder / "packets");
+  Flight flight(scenario("figure_eight"), options_);
+  attack("packets", flight, "attacker", {"--file", folder / "packets"});
+  expect_undisturbed(flight, 400);
+}
+
+TEST_F(SecuredHostileTest, AnnouncementsOfThousandsThatDoNotExistDisturbNothing) {
+  const TemporaryFolder folder;
+  capture(folder / "packets");
+  Flight flight(scenario("figure_eight"), options_);
+  ASSERT_TRUE(flight.wait_for_steps(1)) << flight.outputs();  // before, they keep friends out
+  attack("announcements", flight, "attacker", {"--file", folder / "packets"});
+  expect_undisturbed(flight, 400);
+}
+
+TEST_F(SecuredHostileTest, WhoHasNoKeysDisturbsNothingAndHearsNothing) {
+  Flight flight(scenario("figure_eight"), options_);
+  attack("malformed", flight);
+  deaf_ = &attack("readers", flight);
+  expect_undisturbed(flight, 400);
+}
+
+TEST_F(SecuredHostileTest, SpoofedPacketsOfTheFlightItselfCrashNobody) {
+  Flight flight(scenario("figure_eight"), options_);
+  attack("spoof", flight, "server");
+  expect_orderly_end(flight);
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include <fstream>
 #include <random>
 #include <stdexcept>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -156,6 +157,13 @@ bool has_endless_gap(const Bytes& packet) {
   return false;
 }
 
+/// True where a packet holds tokens of DDS Security. With a changed length in them a secured
+/// middleware reserves as much as it says, gigabytes: README.md, what it found.
+bool has_identity(const Bytes& packet) {
+  const std::string kind = "DDS:Auth";
+  return std::search(packet.begin(), packet.end(), kind.begin(), kind.end()) != packet.end();
+}
+
 bool is_announcement(const Bytes& packet) {
   const std::array<std::uint8_t, 4> writer = {0x00, 0x01, 0x00, 0xc2};  // of SPDP
   return std::search(packet.begin() + kRtpsHeader, packet.end(), writer.begin(), writer.end()) !=
@@ -185,6 +193,7 @@ std::uint64_t fire_packets(const Target& target, const std::filesystem::path& ca
   Gun gun(target);
   while (goes_on(target)) {
     Bytes packet = random() % 4 ? packets[random() % packets.size()] : make_random_bytes(random);
+    if (!target.forged_identities && has_identity(packet)) continue;
     mutate(packet, 0, random);
     if (target.endless_gaps || !has_endless_gap(packet)) gun.fire(packet);
   }
@@ -219,6 +228,7 @@ std::uint64_t spoof(const Target& target) {
   while (goes_on(target)) {
     Bytes packet = sniffer.next();
     if (packet.empty() || random() % 8) continue;  // it sees what it sends, too
+    if (!target.forged_identities && has_identity(packet)) continue;
     mutate(packet, kRtpsHeader, random);
     if (target.endless_gaps || !has_endless_gap(packet)) gun.fire(packet);
   }

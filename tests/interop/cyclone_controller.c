@@ -5,7 +5,6 @@
 ///
 /// It flies vehicle 0, follows resets and servers that take another's place, and ends with its run:
 /// exit code 0 finished, 1 failed or nobody there, 2 bad usage.
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -15,8 +14,7 @@
 
 typedef struct Controller {
   Node node;
-  const char* name;
-  int32_t strength;
+  Options options;
   dds_entity_t state_reader, command_writer, reference_writer, waitset;
 
   uint64_t run_id;  ///< of the run it flies; 0: none
@@ -36,8 +34,8 @@ static const Run* current_run(const Controller* self) {
 
 static void announce_controller(Controller* self, bool ready, bool done) {
   const Announcement announcement = {.role = sls_ROLE_CONTROLLER,
-                                     .name = self->name,
-                                     .strength = self->strength,
+                                     .name = self->options.name,
+                                     .strength = self->options.strength,
                                      .ready = ready,
                                      .done = done,
                                      .last_complete_step = -1};
@@ -79,9 +77,9 @@ static sls_ControlCommand calc_answer(const Controller* self, const sls_VehicleS
   sls_ControlCommand command = {.run_id = state->run_id,
                                 .vehicle_id = state->vehicle_id,
                                 .step = state->step,
-                                .strength = self->strength,
+                                .strength = self->options.strength,
                                 .controller = state->controller};
-  COPY_TEXT(command.client_name, self->name);
+  COPY_TEXT(command.client_name, self->options.name);
   LawFault fault = kNotFinite;  // also of a damaged sample, which names no stage that can be flown
   bool is_over = false;
   if (command.controller.stage_index < (uint32_t)self->scenario.stage_count &&
@@ -110,7 +108,7 @@ static void write_reference(const Controller* self, const sls_VehicleState* stat
                              .step = state->step,
                              .sim_time_ns = state->sim_time_ns,
                              .stage_index = stage};
-  COPY_TEXT(reference.client_name, self->name);
+  COPY_TEXT(reference.client_name, self->options.name);
   COPY_TEXT(reference.stage_name, "set_point");
   if (stage < (uint32_t)self->scenario.stage_count)
     memcpy(reference.position_m, self->scenario.stages[stage].set_point,
@@ -155,7 +153,7 @@ static void join(Controller* self, const Run* run) {
   self->has_answered = false;
   self->is_ready = false;
   self->run_id = run->parameters.run_id;
-  say("'%s' joins run %016llx", self->name, (unsigned long long)self->run_id);
+  say("'%s' joins run %016llx", self->options.name, (unsigned long long)self->run_id);
   announce_controller(self, false, false);
 }
 
@@ -228,42 +226,12 @@ static int leave(Controller* self, bool has_server) {
   return is_finished ? 0 : 1;
 }
 
-static bool join_first_run(Controller* self) {
-  const dds_time_t limit = dds_time() + kJoinTime;
-  while (stop_signal == 0) {
-    look_around(&self->node);
-    const Run* run = find_joinable_run(&self->node);
-    if (run) {
-      join(self, run);
-      return true;
-    }
-    if (dds_time() > limit) {
-      say("no server within %d s", (int)(kJoinTime / DDS_SECS(1)));
-      return false;
-    }
-    dds_sleepfor(kPollTime);
-  }
-  return false;
-}
-
 int main(int argc, char** argv) {
-  static Controller self = {.name = "cyclone_controller"};
+  static Controller self = {.options = {.name = "cyclone_controller"}};
   program_name = "cyclone_controller";
-  uint32_t domain = 0;
-  for (int i = 1; i < argc; i += 2) {
-    if (i + 1 < argc && strcmp(argv[i], "--domain") == 0) {
-      domain = (uint32_t)strtoul(argv[i + 1], NULL, 10);
-    } else if (i + 1 < argc && strcmp(argv[i], "--name") == 0) {
-      self.name = argv[i + 1];
-    } else if (i + 1 < argc && strcmp(argv[i], "--strength") == 0) {
-      self.strength = (int32_t)strtol(argv[i + 1], NULL, 10);
-    } else {
-      say("expected --domain N, --name TEXT or --strength N, got '%s'", argv[i]);
-      return 2;
-    }
-  }
+  read_options(argc, argv, sls_ROLE_CONTROLLER, &self.options);
   catch_stop_signals();
-  open_node(&self.node, domain, self.name);
+  open_node(&self.node, &self.options);
   self.state_reader = make_reader(&self.node, &sls_VehicleState_desc, "sls/state", kLoop);
   self.command_writer =
       make_writer(&self.node, &sls_ControlCommand_desc, "sls/command", kStreamDepth);
@@ -272,8 +240,12 @@ int main(int argc, char** argv) {
   self.waitset = dds_create_waitset(self.node.participant);
   dds_waitset_attach(self.waitset, dds_create_readcondition(self.state_reader, DDS_ANY_STATE), 0);
 
-  const bool has_run = join_first_run(&self);
-  const int code = has_run ? leave(&self, serve(&self)) : 1;
+  const Run* run = wait_for_run(&self.node);
+  int code = 1;
+  if (run) {
+    join(&self, run);
+    code = leave(&self, serve(&self));
+  }
   close_node(&self.node);
   return stop_signal != 0 ? 128 + stop_signal : code;
 }

@@ -38,7 +38,7 @@ static void add_step(Steps* steps, uint64_t step) {
 
 typedef struct Recorder {
   Node node;
-  const char* name;
+  Options options;
   dds_entity_t state_reader, command_reader, reference_reader;
   uint64_t run_id;
   Steps states, commands, references;
@@ -97,7 +97,7 @@ static void join(Recorder* self, const Run* run) {
 
 static void announce_recorder(Recorder* self, bool done) {
   const Announcement announcement = {.role = sls_ROLE_RECORDER,
-                                     .name = self->name,
+                                     .name = self->options.name,
                                      .ready = self->is_ready,
                                      .done = done,
                                      .last_complete_step = (int64_t)calc_next_step(self) - 1};
@@ -119,17 +119,6 @@ static bool sees_all_endpoints(const Recorder* self, const Run* run) {
     ++controllers;
   }
   return controllers > 0 || run->status.phase != sls_PHASE_WAITING;
-}
-
-static const Run* find_first_run(Recorder* self) {
-  const dds_time_t limit = dds_time() + kJoinTime;
-  const Run* run = NULL;
-  while (!run && stop_signal == 0 && dds_time() < limit) {
-    dds_sleepfor(kPollTime);
-    look_around(&self->node);
-    run = find_joinable_run(&self->node);
-  }
-  return run;
 }
 
 /// Takes samples until all are there, or nothing more can be expected.
@@ -168,30 +157,19 @@ static void print_result(const Recorder* self) {
 }
 
 int main(int argc, char** argv) {
-  static Recorder self = {.name = "cyclone_recorder"};
+  static Recorder self = {.options = {.name = "cyclone_recorder"}};
   program_name = "cyclone_recorder";
-  uint32_t domain = 0;
-  for (int i = 1; i < argc; i += 2) {
-    if (i + 1 < argc && strcmp(argv[i], "--domain") == 0) {
-      domain = (uint32_t)strtoul(argv[i + 1], NULL, 10);
-    } else if (i + 1 < argc && strcmp(argv[i], "--name") == 0) {
-      self.name = argv[i + 1];
-    } else {
-      say("expected --domain N or --name TEXT, got '%s'", argv[i]);
-      return 2;
-    }
-  }
+  read_options(argc, argv, sls_ROLE_RECORDER, &self.options);
   catch_stop_signals();
-  open_node(&self.node, domain, self.name);
+  open_node(&self.node, &self.options);
   self.state_reader = make_reader(&self.node, &sls_VehicleState_desc, "sls/state", kEverything);
   self.command_reader =
       make_reader(&self.node, &sls_ControlCommand_desc, "sls/command", kEverything);
   self.reference_reader =
       make_reader(&self.node, &sls_Reference_desc, "sls/reference", kEverything);
 
-  const Run* run = find_first_run(&self);
+  const Run* run = wait_for_run(&self.node);
   if (!run) {
-    say("no server within %d s", (int)(kJoinTime / DDS_SECS(1)));
     close_node(&self.node);
     return 1;
   }

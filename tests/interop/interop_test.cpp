@@ -8,8 +8,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "tests/network/network.hpp"
-#include "tests/system/flight.hpp"
+#include "tests/network/hosts_flight.hpp"
 
 namespace sls::test {
 namespace {
@@ -237,18 +236,43 @@ TEST_F(InteropTest, RecordersThatComeLateGetWhatTheyMissedFromACycloneController
   expect_every_sample(*late_recorder, kQuickSteps);
 }
 
+/// On hosts of their own, where the programs of this project use `profile`.
+void expect_flight_on_hosts(const Network& network, const std::string& profile,
+                            const std::string& scenario_file, const std::string& recording,
+                            const Words& configuration) {
+  const Profile configured(network, profile);
+  const auto start = [&](const std::string& host, const std::string& name, const Words& flags) {
+    return std::make_unique<Process>(configured.before(host) +
+                                     make_command(name, 0, flags, qos(profile)));
+  };
+  const auto recorder = start("recorder", "recorder", {"--out", recording});
+  const auto server = start("server", "sim_server", {"--scenario", scenario_file});
+  Process controller(network.on("controller") + configuration +
+                     Words{SLS_INTEROP_DIR "/cyclone_controller"});
+  for (Process* process : {server.get(), &controller, recorder.get()})
+    EXPECT_EQ(process->wait(), 0) << process->output();
+  EXPECT_TRUE(read_manifest(recording).at("complete").get<bool>());
+}
+
 /// Without a configuration of its own Cyclone takes the host's network, as profile `lan` does.
 TEST_F(InteropTest, ACycloneControllerOnAnotherHostFliesWithProfileLan) {
   if (const auto obstacle = Network::find_obstacle()) GTEST_SKIP() << *obstacle;
-  const Network network({"server", "controller", "recorder"});
-  const auto start_on = [&](const std::string& host, const std::string& name, const Words& flags) {
-    return std::make_unique<Process>(network.on(host) + make_command(name, 0, flags, qos("lan")));
-  };
-  const auto recorder = start_on("recorder", "recorder", {"--out", recording_});
-  const auto server = start_on("server", "sim_server", {"--scenario", quick_});
-  Process controller(network.on("controller") + Words{SLS_INTEROP_DIR "/cyclone_controller"});
-  expect_success({server.get(), &controller, recorder.get()});
-  EXPECT_TRUE(read_manifest(recording_).at("complete").get<bool>());
+  expect_flight_on_hosts(Network(kHosts), "lan", quick_, recording_, {});
+}
+
+TEST_F(InteropTest, ACycloneControllerOnAnotherHostFliesWithProfileUnicast) {
+  if (const auto obstacle = Network::find_obstacle()) GTEST_SKIP() << *obstacle;
+  const Network network(kHosts);
+  network.block_multicast();
+  std::string peers;
+  for (const char* host : {"server", "recorder"})
+    peers += "<Peer address=\"" + network.address(host) + "\"/>";
+  expect_flight_on_hosts(
+      network, "unicast", quick_, recording_,
+      {"env",
+       "CYCLONEDDS_URI=<CycloneDDS><Domain><General><AllowMulticast>false</AllowMulticast>"
+       "</General><Discovery><ParticipantIndex>auto</ParticipantIndex><Peers>" +
+           peers + "</Peers></Discovery></Domain></CycloneDDS>"});
 }
 
 }  // namespace

@@ -77,11 +77,29 @@ dds_entity_t make_writer(Node* node, const dds_topic_descriptor_t* type, const c
   return writer;
 }
 
-void open_node(Node* node, uint32_t domain, const char* name) {
+void read_options(int argc, char** argv, sls_ParticipantRole role, Options* options) {
+  const bool flies = role == sls_ROLE_CONTROLLER;
+  for (int i = 1; i < argc; i += 2) {
+    if (i + 1 < argc && strcmp(argv[i], "--domain") == 0) {
+      options->domain = (uint32_t)strtoul(argv[i + 1], NULL, 10);
+    } else if (i + 1 < argc && strcmp(argv[i], "--name") == 0) {
+      options->name = argv[i + 1];
+    } else if (flies && i + 1 < argc && strcmp(argv[i], "--strength") == 0) {
+      options->strength = (int32_t)strtol(argv[i + 1], NULL, 10);
+    } else {
+      say("expected --domain N%s --name TEXT%s, got '%s'", flies ? "," : " or",
+          flies ? " or --strength N" : "", argv[i]);
+      exit(2);
+    }
+  }
+}
+
+void open_node(Node* node, const Options* options) {
   memset(node, 0, sizeof *node);
   dds_qos_t* qos = dds_create_qos();
-  dds_qset_entity_name(qos, name);
-  node->participant = expect(dds_create_participant(domain, qos, NULL), "dds_create_participant");
+  dds_qset_entity_name(qos, options->name);
+  node->participant =
+      expect(dds_create_participant(options->domain, qos, NULL), "dds_create_participant");
   dds_delete_qos(qos);
   node->parameters_reader = make_reader(node, &sls_Parameters_desc, "sls/parameters", kEverything);
   node->status_reader = make_reader(node, &sls_SimStatus_desc, "sls/status", kEverything);
@@ -233,6 +251,21 @@ const Run* find_joinable_run(const Node* node) {
       best = run;
   }
   return best;
+}
+
+const Run* wait_for_run(Node* node) {
+  const dds_time_t limit = dds_time() + kJoinTime;
+  while (stop_signal == 0) {
+    look_around(node);
+    const Run* run = find_joinable_run(node);
+    if (run) return run;
+    if (dds_time() > limit) {
+      say("no server within %d s", (int)(kJoinTime / DDS_SECS(1)));
+      return NULL;
+    }
+    dds_sleepfor(kPollTime);
+  }
+  return NULL;
 }
 
 const Run* find_successor(const Node* node, const Run* run) {

@@ -55,8 +55,18 @@ typedef enum Reading {
   kEverything  ///< reliable, with what was written before this reader came
 } Reading;
 
-/// Joins `domain` under `name`. Whatever Cyclone refuses ends the program with exit code 1.
-void open_node(Node* node, uint32_t domain, const char* name);
+/// From the command line.
+typedef struct Options {
+  uint32_t domain;
+  const char* name;
+  int32_t strength;  ///< a controller's
+} Options;
+/// Reads --domain N and --name TEXT, of a controller --strength N, into `options`, which holds the
+/// defaults. Anything else ends the program with exit code 2.
+void read_options(int argc, char** argv, sls_ParticipantRole role, Options* options);
+
+/// Joins the domain under that name. Whatever Cyclone refuses ends the program with exit code 1.
+void open_node(Node* node, const Options* options);
 void close_node(Node* node);
 
 dds_entity_t make_reader(Node* node, const dds_topic_descriptor_t* type, const char* topic,
@@ -76,6 +86,8 @@ void look_around(Node* node);
 /// The run to join: its server is alive, its vehicles are not disputed, it has not ended. The
 /// furthest; among equals the lowest run_id. NULL where there is none.
 const Run* find_joinable_run(const Node* node);
+/// Waits for that; after kJoinTime says that there is none. NULL then, or on a signal.
+const Run* wait_for_run(Node* node);
 /// NULL where it is unknown.
 const Run* find_run(const Node* node, uint64_t run_id);
 /// The run to go on with where `run` was reset, or its server is gone and another has its place.
