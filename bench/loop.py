@@ -64,8 +64,12 @@ def measure_lockstep(programs: Programs, rounds: int, is_quick: bool) -> list[Fi
     seconds = 2 if is_quick else 32
     bounds: dict[tuple[Placement, str], list[float]] = {}
     speeds: dict[tuple[Placement, str, bool], list[float]] = {}
+    overheard: dict[str, list[float]] = {}
     placements = find_placements()
     for _ in range(rounds):
+        for qos in TRANSPORTS:
+            messages = costs.ping(qos, "--reference", "--overheard")
+            overheard.setdefault(qos, []).append(1e6 / (messages + costs.plant_and_law()))
         for placement in placements:
             for qos in TRANSPORTS:
                 round_trip = costs.ping(qos, processors=placement.loop)
@@ -79,6 +83,9 @@ def measure_lockstep(programs: Programs, rounds: int, is_quick: bool) -> list[Fi
         name = f"{TRANSPORTS[qos]}, {'with' if is_recorded else 'without'} recorder, {placement.name}"
         figures.append(Figure("lockstep", name, "steps/s", values, BOUND, bounds[placement, qos],
                               goal=0.85 if is_recorded else None, is_goal_of_ratio=True))
+    for qos, bound in overheard.items():
+        figures.append(Figure("lockstep", f"{TRANSPORTS[qos]}, with recorder, beside all its messages",
+                              "steps/s", speeds[Placement(), qos, True], OVERHEARD_BOUND, bound))
     figures.append(Figure("lockstep", f"shared memory, with recorder, {placements[0].name}, by itself",
                           "steps/s", speeds[placements[0], "default", True], goal=12000))
     return figures

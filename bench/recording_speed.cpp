@@ -119,7 +119,8 @@ double write_plain_files(std::vector<record::StepRows> steps, std::uint32_t vehi
   PlainFile states(folder / kFiles[0], record::StateRow::kHeader);
   PlainFile commands(folder / kFiles[1], record::CommandRow::kHeader);
   PlainFile references(folder / kFiles[2], record::ReferenceRow::kHeader);
-  PlainFile flight(folder / kFiles[3], record::kFlightHeader);
+  PlainFile flight(folder / kFiles[3],
+                   vehicles > 1 ? record::kFleetFlightHeader : record::kFlightHeader);
   for (std::size_t i = 0; i < steps.size(); ++i) {
     record::StepRows& rows = steps[i];
     for (std::uint32_t id = 0; id < vehicles; ++id) {
@@ -127,6 +128,7 @@ double write_plain_files(std::vector<record::StepRows> steps, std::uint32_t vehi
       write_plain(states, *rows.state);
       write_plain(references, *rows.reference);
       for (const double number : flight_rows[i]) flight(number);
+      if (vehicles > 1) flight(id);
       flight.end_row();
       write_plain(commands, *rows.command);
     }

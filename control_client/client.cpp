@@ -35,7 +35,17 @@ Client::Client(bus::Node& node, const config::Scenario& scenario,
       vehicle_ids_(vehicle_ids),
       participants_(node),
       servers_(node),
-      participant_writer_(node) {}
+      participant_writer_(node),
+      stream_(make_stream(
+          {scenario.vehicles.size() > 1, scenario.sync.mode == config::SyncMode::kRealtime})) {}
+
+std::unique_ptr<AnswerStream> Client::make_stream(const LoopKind& kind) {
+  return std::make_unique<AnswerStream>(
+      node_, kind,
+      [this](const VehicleState* states, std::size_t count, const bus::PeerId& sender) {
+        receive(states, count, sender);
+      });
+}
 
 void Client::run() {
   auto next = find_first_run();
@@ -88,12 +98,7 @@ void Client::begin(const bus::Run& run) {
   }
   // Made and destroyed outside the lock: the middleware waits for handlers meanwhile, and ours for
   // the lock.
-  auto stream = stream_ && stream_->kind() == kind
-                    ? nullptr
-                    : std::make_unique<AnswerStream>(
-                          node_, kind,
-                          [this](const VehicleState* states, std::size_t count,
-                                 const bus::PeerId& sender) { receive(states, count, sender); });
+  auto stream = stream_->kind() == kind ? nullptr : make_stream(kind);
   {
     const std::lock_guard lock(answer_mutex_);
     run_ = run;
@@ -116,10 +121,10 @@ void Client::leave() {
   const auto status = servers_.find_status(run_id);
   const bool is_finished = status && status->phase() == PHASE_FINISHED;
   announce(false, true);
-  stream_->wait_for_acknowledgments(kAcknowledgmentTime);
   if (app::stop_signal() == 0)
     bus::wait_for_recorders_to_end(participants_, run_id,
                                    is_finished ? scenario_.sync.wait_for.recorders : 0);
+  stream_->wait_for_acknowledgments(kAcknowledgmentTime);
   if (status && status->phase() == PHASE_FAILED)
     throw app::RunError(fmt::format("the run failed: {}", status->reason().c_str()));
 }

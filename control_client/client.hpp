@@ -44,6 +44,7 @@ class Client {
 
   /// The run to begin with; nothing after a stop signal.
   std::optional<bus::Run> find_first_run();
+  std::unique_ptr<AnswerStream> make_stream(const LoopKind& kind);
   /// That of the first of our vehicles that has one.
   std::optional<bus::Run> find_joinable_run() const;
   void begin(const bus::Run& run);
@@ -94,6 +95,7 @@ class Client {
   std::vector<Reference> references_;     // of the sample in work
   std::vector<ControlCommand> commands_;  // likewise
   std::exception_ptr answer_error_;
+  /// Made for what the scenario says, and anew where the run is of another kind.
   std::unique_ptr<AnswerStream> stream_;  // last: its callbacks use the members above
 };
 
