@@ -41,9 +41,10 @@ std::vector<const Entry*> find_recorders_to_wait_for(const Roster& roster, int e
   return found;
 }
 
-/// The first step of which the recorder does not have all.
+/// The first step of which the recorder does not have all, whatever number it announces.
 std::int64_t find_next_step(const Entry& recorder) {
-  return std::max<std::int64_t>(recorder.announcement.last_complete_step(), -1) + 1;
+  constexpr std::int64_t kLargest = std::numeric_limits<std::int64_t>::max();
+  return std::clamp<std::int64_t>(recorder.announcement.last_complete_step(), -1, kLargest - 1) + 1;
 }
 
 /// The first step that must wait for the recorder, which may be `window` behind.
