@@ -28,8 +28,9 @@ void write_text(const std::filesystem::path& file, const std::string& text) {
 
 /// Who flew the last step of the `index`th vehicle of the run.
 std::string find_last_controller(const SimStatus& status, std::size_t index) {
-  return index < status.controller_names().size() ? status.controller_names()[index].to_string()
-                                                  : status.controller_name().to_string();
+  return index < status.controller_names().size()
+             ? status.controller_names()[index].name().to_string()
+             : status.controller_name().to_string();
 }
 
 Segment make_only_segment(const std::filesystem::path& folder) {

@@ -47,6 +47,19 @@ TEST(GuardedTypeTest, WhatIsLongerThanAnySampleIsRefusedBeforeItsElementsAreMade
   EXPECT_FALSE((takes<FleetReferencePubSubType, FleetReference>(bytes)));
 }
 
+// Found by tests/fuzz: sequences of strings are made before a look at how long the sample is.
+TEST(GuardedTypeTest, AShortStatusThatClaimsBillionsOfNamesIsRefused) {
+  std::string bytes("\0\1\0\0", 4);  // encapsulation; offsets below count from its end
+  bytes += std::string(28, '\0');    // run_id, vehicle_id, sample_index, phase
+  bytes +=
+      std::string("\1\0\0\0\0", 5) + std::string(7, '\0');  // reason, to the next multiple of 8
+  bytes += std::string(8, '\0');                            // step
+  bytes += std::string("\1\0\0\0\0", 5) + std::string(3, '\0');  // controller_name
+  bytes += std::string("\xff\xff\xff\x7f", 4);                   // of controller_names
+  bytes += std::string(500, '\0');
+  EXPECT_FALSE((takes<SimStatusPubSubType, SimStatus>(bytes)));
+}
+
 TEST(GuardedTypeTest, RandomBytesThrowNothing) {
   std::mt19937_64 random(4);
   for (int i = 0; i < 20000; ++i) {

@@ -174,7 +174,7 @@ SimStatus make_message(std::uint64_t seed) {
   message.reason(values.text(255));
   message.step(values.count());
   message.controller_name(values.text(32));
-  for (int i = 0; i < 256; ++i) message.controller_names().emplace_back(values.text(32));
+  for (int i = 0; i < 256; ++i) message.controller_names().emplace_back().name(values.text(32));
   message.real_time_factor(values.real());
   SyncCounters& counters = message.counters();
   counters.resent(values.count());
