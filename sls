@@ -169,22 +169,24 @@ start() {
 # processor a turn is a switch; between two it wakes the other out of its sleep, which takes longer
 # than the step itself. They get the one that was least busy just now, the recorder the others.
 place_programs() {
-  local allowed=() range
+  local allowed=() ranges range chosen others
   IFS=, read -ra ranges <<<"$(taskset --cpu-list -p $$ | sed 's/.*: //')"
-  for range in "${ranges[@]}"; do mapfile -t -O "${#allowed[@]}" allowed < <(seq "${range%-*}" "${range#*-}"); done
+  for range in "${ranges[@]}"; do
+    mapfile -t -O "${#allowed[@]}" allowed < <(seq "${range%-*}" "${range#*-}")
+  done
   ((${#allowed[@]} > 1)) || return 0
-  local chosen
   chosen="$({ cat /proc/stat; sleep 0.1; cat /proc/stat; } | awk -v allowed=" ${allowed[*]} " '
     /^cpu[0-9]/ {
       number = substr($1, 4)
       if (!(number in idle)) { idle[number] = $5; next }
-      if (index(allowed, " " number " ") && (best == "" || $5 - idle[number] > most)) { most = $5 - idle[number]; best = number }
+      rested = $5 - idle[number]
+      if (index(allowed, " " number " ") && (best == "" || rested > most)) { most = rested; best = number }
     }
     END { print best }')"
   [[ -n $chosen ]] || return 0
   processors_of[sim_server]=$chosen
   processors_of[control_client]=$chosen
-  local others=" ${allowed[*]} "
+  others=" ${allowed[*]} "
   others="${others/ $chosen / }"
   processors_of[recorder]="$(xargs <<<"$others" | tr ' ' ',')"
 }

@@ -228,47 +228,39 @@ def set_equal_scale(axes, points: np.ndarray) -> None:
     axes.set_box_aspect(extent, zoom=0.88 if is_tall else 1.05)
 
 
+def draw_columns(all_axes: Sequence[Axes], flights: Sequence[Flight],
+                 calc_columns: Callable[[Flight], np.ndarray]) -> None:
+    """Column i of each flight's `calc_columns` on axes i; nothing of a flight that has no such data."""
+    for index, flight in enumerate(flights):
+        columns = calc_columns(flight)
+        if np.all(np.isnan(columns)):
+            continue
+        for axes, values in zip(all_axes, columns.T):
+            draw(axes, flight.time_s, values, color=colour_of(index), label=flight.name)
+    mark_stages(all_axes, flights)
+    if len(flights) > 1:
+        add_legend(all_axes[0])
+
+
 def plot_angles(flights: Sequence[Flight]) -> Figure:
     figure, axes = make_stack(2, "Rod angles", ("α about x (°)", "β about y (°)"))
-    for index, flight in enumerate(flights):
-        for row, angle in enumerate((flight.alpha, flight.beta)):
-            draw(axes[row, 0], flight.time_s, np.degrees(angle), color=colour_of(index),
-                 label=flight.name)
-    mark_stages(axes[:, 0], flights)
-    if len(flights) > 1:
-        add_legend(axes[0, 0])
+    draw_columns(axes[:, 0], flights,
+                 lambda flight: np.degrees(np.column_stack([flight.alpha, flight.beta])))
     return figure
 
 
 def plot_forces(flights: Sequence[Flight]) -> Figure:
     figure, axes = make_stack(4, "Force on the quadrotor",
                               ("F x (N)", "F y (N)", "F z (N, down)", "|F| (N)"), height=1.45)
-    for index, flight in enumerate(flights):
-        values = np.column_stack([flight.f_Q_W, np.linalg.norm(flight.f_Q_W, axis=1)])
-        if np.all(np.isnan(values)):
-            continue
-        for row in range(4):
-            draw(axes[row, 0], flight.time_s, values[:, row], color=colour_of(index),
-                 label=flight.name)
     axes[2, 0].invert_yaxis()
-    mark_stages(axes[:, 0], flights)
-    if len(flights) > 1:
-        add_legend(axes[0, 0])
+    draw_columns(axes[:, 0], flights, lambda flight: np.column_stack(
+        [flight.f_Q_W, np.linalg.norm(flight.f_Q_W, axis=1)]))
     return figure
 
 
 def plot_attitude(flights: Sequence[Flight]) -> Figure:
     figure, axes = make_stack(2, "Commanded attitude", ("roll (°)", "pitch (°)"))
-    for index, flight in enumerate(flights):
-        attitude = np.degrees(flight.calc_attitude())
-        if np.all(np.isnan(attitude)):
-            continue
-        for row in range(2):
-            draw(axes[row, 0], flight.time_s, attitude[:, row], color=colour_of(index),
-                 label=flight.name)
-    mark_stages(axes[:, 0], flights)
-    if len(flights) > 1:
-        add_legend(axes[0, 0])
+    draw_columns(axes[:, 0], flights, lambda flight: np.degrees(flight.calc_attitude()))
     return figure
 
 

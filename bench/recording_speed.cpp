@@ -119,8 +119,7 @@ double write_plain_files(std::vector<record::StepRows> steps, std::uint32_t vehi
   PlainFile states(folder / kFiles[0], record::StateRow::kHeader);
   PlainFile commands(folder / kFiles[1], record::CommandRow::kHeader);
   PlainFile references(folder / kFiles[2], record::ReferenceRow::kHeader);
-  PlainFile flight(folder / kFiles[3],
-                   vehicles > 1 ? record::kFleetFlightHeader : record::kFlightHeader);
+  PlainFile flight(folder / kFiles[3], record::make_flight_header(vehicles > 1));
   for (std::size_t i = 0; i < steps.size(); ++i) {
     record::StepRows& rows = steps[i];
     for (std::uint32_t id = 0; id < vehicles; ++id) {

@@ -1,6 +1,7 @@
 #include "bench/samples.hpp"
 
 #include <chrono>
+#include <numeric>
 
 #include "bench/in_process_flight.hpp"
 #include "common/app/options.hpp"
@@ -39,20 +40,9 @@ std::vector<StepSamples> fly_samples(const config::Scenario& scenario, std::size
 
 Parameters make_parameters(const config::Scenario& scenario, std::uint64_t run_id,
                            std::uint32_t vehicles) {
-  Parameters message;
-  message.run_id(run_id);
-  for (std::uint32_t id = 0; id < vehicles; ++id) message.vehicle_ids().push_back(id);
-  message.scenario_sha256(scenario.sha256);
-  message.scenario_text(scenario.text);
-  message.quad_mass_kg(scenario.vehicle.quad_mass);
-  message.load_mass_kg(scenario.vehicle.load_mass);
-  message.rod_length_m(scenario.vehicle.rod_length);
-  message.gravity_m_s2(scenario.vehicle.gravity);
-  message.period_ns(scenario.sync.period_ns);
-  message.step_ns(scenario.plant.step_ns);
-  message.mode(MODE_LOCKSTEP);
-  message.version(app::version());
-  return message;
+  std::vector<std::uint32_t> ids(vehicles);
+  std::iota(ids.begin(), ids.end(), 0);
+  return sim::make_parameters_message(run_id, ids, scenario, app::version());
 }
 
 SimStatus make_status(std::uint64_t run_id, std::uint64_t index, RunPhase phase,

@@ -1,7 +1,5 @@
 #include "control_client/answer_stream.hpp"
 
-#include <utility>
-
 namespace sls::control {
 namespace {
 
@@ -66,17 +64,16 @@ void AnswerStream::write(std::vector<Reference>& references,
 }
 
 bool AnswerStream::sees_server(const bus::PeerId& server) const {
-  return vehicle_ ? vehicle_->states.matched().count(server) > 0 &&
-                        vehicle_->commands.matched().count(server) > 0
-                  : fleet_->states.matched().count(server) > 0 &&
-                        fleet_->commands.matched().count(server) > 0;
+  return look([&](const auto& topics) {
+    return topics.states.matched().count(server) > 0 && topics.commands.matched().count(server) > 0;
+  });
 }
 
 bool AnswerStream::sees_recorder(const bus::PeerId& recorder) const {
-  return vehicle_ ? vehicle_->commands.matched().count(recorder) > 0 &&
-                        vehicle_->references.matched().count(recorder) > 0
-                  : fleet_->commands.matched().count(recorder) > 0 &&
-                        fleet_->references.matched().count(recorder) > 0;
+  return look([&](const auto& topics) {
+    return topics.commands.matched().count(recorder) > 0 &&
+           topics.references.matched().count(recorder) > 0;
+  });
 }
 
 void AnswerStream::wait_for_acknowledgments(std::chrono::milliseconds limit) {

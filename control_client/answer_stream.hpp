@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <functional>
 #include <optional>
-#include <set>
 #include <vector>
 
 #include "common/bus/node.hpp"
@@ -59,6 +58,11 @@ class AnswerStream {
     FleetCommand command_sample;
     bus::Reader<FleetState> states;
   };
+
+  template <class Look>
+  bool look(Look look_at) const {
+    return vehicle_ ? look_at(*vehicle_) : look_at(*fleet_);
+  }
 
   const LoopKind kind_;
   std::optional<Vehicle> vehicle_;  // one of the two

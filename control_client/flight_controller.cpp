@@ -90,7 +90,7 @@ Answer FlightController::calc_answer(std::uint64_t step, const model::SlungLoadS
   }
 
   const MissionProgress progress = parts_->mission.calc_progress(step, state, memory);
-  answer.memory.stage = progress.stage;
+  answer.memory.stage = progress.remembered_stage;
   answer.memory.stage_start_step = progress.stage_start_step;
   answer.mission = progress.phase;
   answer.reference = progress.reference;

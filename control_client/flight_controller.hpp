@@ -15,8 +15,8 @@ namespace sls::control {
 /// All that a controller remembers. It travels in the command and comes back in the next state, so
 /// that any client can answer any sample. A run starts with the default.
 struct ControllerMemory {
-  std::uint32_t stage = 0;                             ///< index into the mission
-  std::uint64_t stage_start_step = 0;                  ///< step at which that stage began
+  std::uint32_t stage = 0;             ///< index into the mission; its size once it is over
+  std::uint64_t stage_start_step = 0;  ///< step at which that stage began
   Eigen::Vector3d integral = Eigen::Vector3d::Zero();  ///< ∫e dt of the load position, m·s
 };
 

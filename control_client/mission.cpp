@@ -1,5 +1,6 @@
 #include "control_client/mission.hpp"
 
+#include <algorithm>
 #include <limits>
 
 namespace sls::control {
@@ -39,7 +40,7 @@ Mission::Mission(const std::vector<config::Stage>& stages, std::int64_t period_n
 }
 
 bool Mission::is_possible(std::uint64_t step, const ControllerMemory& memory) const {
-  return memory.stage < stages_.size() && memory.stage_start_step <= step;
+  return memory.stage <= stages_.size() && memory.stage_start_step <= step;
 }
 
 std::int64_t Mission::calc_elapsed_ns(std::uint64_t step, std::uint64_t start_step) const {
@@ -51,14 +52,20 @@ std::int64_t Mission::calc_elapsed_ns(std::uint64_t step, std::uint64_t start_st
 
 MissionProgress Mission::calc_progress(std::uint64_t step, const model::SlungLoadState& state,
                                        const ControllerMemory& memory) const {
+  const auto end = static_cast<std::uint32_t>(stages_.size());
   MissionProgress progress;
-  progress.stage = memory.stage;
+  progress.stage = std::min(memory.stage, end - 1);
+  progress.remembered_stage = memory.stage;
   progress.stage_start_step = memory.stage_start_step;
   // A stage of no duration is left at the step it began: hence a loop, at most once per stage.
   while (true) {
     const FlownStage& stage = stages_[progress.stage];
     const std::int64_t elapsed_ns = calc_elapsed_ns(step, progress.stage_start_step);
     progress.reference = stage.trajectory->calc(to_seconds(elapsed_ns));
+    if (memory.stage == end) {
+      progress.phase = MissionPhase::kFinished;
+      return progress;
+    }
     const StageOutcome outcome = std::visit(
         [&](const auto& leave) { return judge(leave, elapsed_ns, state, progress.reference); },
         stage.leave);
@@ -67,11 +74,12 @@ MissionProgress Mission::calc_progress(std::uint64_t step, const model::SlungLoa
       progress.phase = MissionPhase::kFailed;
       return progress;
     }
-    if (progress.stage + 1 == stages_.size()) {
+    ++progress.remembered_stage;
+    if (progress.remembered_stage == end) {
       progress.phase = MissionPhase::kFinished;
       return progress;
     }
-    ++progress.stage;
+    progress.stage = progress.remembered_stage;
     progress.stage_start_step = step;
   }
 }

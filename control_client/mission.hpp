@@ -16,7 +16,8 @@ namespace sls::control {
 
 /// Where the mission stands at one step.
 struct MissionProgress {
-  std::uint32_t stage = 0;
+  std::uint32_t stage = 0;             ///< in force; the last one stays so when it is over
+  std::uint32_t remembered_stage = 0;  ///< `stage`, or the number of stages once all are over
   std::uint64_t stage_start_step = 0;
   MissionPhase phase = MissionPhase::kRunning;
   model::Reference reference;
@@ -27,10 +28,11 @@ class Mission {
   /// @throws config::ConfigError without a stage or without a positive period.
   Mission(const std::vector<config::Stage>& stages, std::int64_t period_ns);
 
-  /// True if `memory` names a stage that began at `step` or earlier.
+  /// True if `memory` names a stage, or the end of the mission, that began at `step` or earlier.
   bool is_possible(std::uint64_t step, const ControllerMemory& memory) const;
 
-  /// Progress at `step`, from the memory accepted one step before. Failed: a stage timed out.
+  /// Progress at `step`, from the memory accepted one step before. Finished: once and for all, even
+  /// if the body leaves the last stage's radius again. Failed: a stage timed out.
   /// `memory` must be possible at `step`.
   MissionProgress calc_progress(std::uint64_t step, const model::SlungLoadState& state,
                                 const ControllerMemory& memory) const;

@@ -56,6 +56,10 @@ void write_row(CsvFile& file, const SimStatus& status) {
   file.end_row();
 }
 
+std::string make_flight_header(bool is_of_fleet) {
+  return std::string(kFlightHeader) + (is_of_fleet ? ",vehicle_id" : "");
+}
+
 void write_flight_row(CsvFile& file, const StateRow& state, const CommandRow& command,
                       const ReferenceRow& reference, bool is_of_fleet) {
   const Eigen::Vector3d f_Q_W = bus::to_vector(command.f_Q_W);

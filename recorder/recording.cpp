@@ -62,8 +62,7 @@ Recording::Recording(const Segment& segment, const Parameters& parameters)
       commands_(segment.folder / CommandRow::kFile, CommandRow::kHeader),
       references_(segment.folder / ReferenceRow::kFile, ReferenceRow::kHeader),
       statuses_(segment.folder / "status.csv", kStatusHeader),
-      flight_(segment.folder / "flight.csv",
-              bus::is_fleet(parameters) ? kFleetFlightHeader : kFlightHeader),
+      flight_(segment.folder / "flight.csv", make_flight_header(bus::is_fleet(parameters))),
       log_(scenario_, parameters) {
   for (const std::uint32_t id : parameters.vehicle_ids())
     vehicles_.emplace(id, StepJoin(

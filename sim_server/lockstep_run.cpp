@@ -62,12 +62,9 @@ void LockstepRun::publish() {
   endpoints_.states.write();
   resend_at_ = sent_ + timer_.timeout();
   // While steps are flown without answers, each is given a period.
-  const bool is_acting = std::any_of(vehicles_.begin(), vehicles_.end(), [](const auto& vehicle) {
-    return vehicle->absence.is_acting();
-  });
   const auto period = to_duration(static_cast<double>(scenario_.sync.period_ns) * 1e-9 /
                                   scenario_.sync.real_time_factor);
-  wake_at_ = is_acting ? std::min(resend_at_, sent_ + period) : resend_at_;
+  wake_at_ = is_flying_without_answers() ? std::min(resend_at_, sent_ + period) : resend_at_;
   is_late_ = false;
 }
 
@@ -83,6 +80,11 @@ bool LockstepRun::is_settled() const {
                      [](const auto& vehicle) { return vehicle->is_settled(); });
 }
 
+bool LockstepRun::is_flying_without_answers() const {
+  return std::any_of(vehicles_.begin(), vehicles_.end(),
+                     [](const auto& vehicle) { return vehicle->absence.is_acting(); });
+}
+
 bool LockstepRun::attend_to_silence(Clock::time_point now) {
   if (!is_late_) take_over_at_ = sent_ + to_duration(scenario_.sync.take_over_s);
   is_late_ = true;
@@ -94,10 +96,9 @@ bool LockstepRun::attend_to_silence(Clock::time_point now) {
   refresh_roster();
   take_over_if_silent(now);
   if (!are_all_accepted()) fly_without_answers(now);
-  const bool is_acting = std::any_of(vehicles_.begin(), vehicles_.end(), [](const auto& vehicle) {
-    return vehicle->absence.is_acting();
-  });
-  wake_at_ = std::min(resend_at_, is_acting ? now + 1ms : std::max(take_over_at_, now + 1ms));
+  const auto next_look = now + 1ms;
+  wake_at_ = std::min(resend_at_,
+                      is_flying_without_answers() ? next_look : std::max(take_over_at_, next_look));
   return true;
 }
 

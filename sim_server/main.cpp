@@ -44,7 +44,7 @@ int main(int argc, char** argv) {
   cli.add_option("--threads", threads, "that integrate vehicles; default: one per processor")
       ->type_name("N")
       ->check(CLI::Range(1, 256));
-  cli.add_flag("--check", check, "only check scenario and QoS file, then end");
+  cli.add_flag("--check", check, "only check scenario and QoS file, say what would fly, then end");
 
   return app::run_main(argc, argv, cli, options, "sim_server", [&] {
     config::Scenario scenario = config::load_scenario(scenario_file);

@@ -89,11 +89,11 @@ void RealtimeRun::publish() {
 
 void RealtimeRun::take_commands(Clock::time_point deadline) {
   while (!are_all_accepted() && Clock::now() < deadline) {
-    const auto received = endpoints_.commands.take(deadline);
-    if (!received) return;
-    VehicleFlight* vehicle = find_vehicle(received->command.vehicle_id());
-    const bool is_late = judge(received->command, received->sender) == Verdict::kLate;
-    if (is_late && vehicle) take_late(*vehicle, received->command);
+    endpoints_.commands.wait(deadline);
+    for (const ReceivedCommand& received : endpoints_.commands.take_all()) {
+      const Verdict verdict = judge(received.command, received.sender);
+      if (verdict == Verdict::kLate) take_late(received.command);
+    }
     check_refusals();
     if (are_all_accepted()) board_.round_trips.add(Clock::now() - published_);
   }
@@ -106,13 +106,13 @@ bool RealtimeRun::is_ending() const {
   });
 }
 
-void RealtimeRun::take_late(VehicleFlight& vehicle, const ControlCommand& command) {
+void RealtimeRun::take_late(const ControlCommand& command) {
   const auto age = Clock::now() - schedule_.due(command.step());
   const auto lifespan = endpoints_.command_stream.lifespan();
   if (lifespan && age > *lifespan)
     ++link_.stale();
   else
-    vehicle.keep_late_answer(command);
+    find_vehicle(command.vehicle_id())->keep_late_answer(command);  // there is one: it judged it
 }
 
 void RealtimeRun::wait_for_last_answers() {

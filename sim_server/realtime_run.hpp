@@ -29,7 +29,7 @@ class RealtimeRun : public Run {
   /// Takes commands until `deadline`, or until every vehicle has its answer: the period can then be
   /// flown ahead of its end, and the next state is ready when it is due.
   void take_commands(Clock::time_point deadline);
-  void take_late(VehicleFlight& vehicle, const ControlCommand& command);
+  void take_late(const ControlCommand& command);
   /// True where the mission is over for every vehicle, be it by an answer that came late.
   bool is_ending() const;
   /// The answers to the last step, which are waited for: earlier ones said it is the last.

@@ -21,10 +21,6 @@ VehicleState& StateStream::at(std::size_t index) {
              : vehicle_;
 }
 
-const VehicleState& StateStream::at(std::size_t index) const {
-  return const_cast<StateStream*>(this)->at(index);
-}
-
 void StateStream::write_where(const std::function<bool(std::size_t)>& is_wanted) {
   if (!is_fleet()) {
     if (!is_wanted(0)) return;

@@ -19,7 +19,6 @@ class StateStream {
 
   /// The state of the `index`th vehicle, to be filled before it is written.
   VehicleState& at(std::size_t index);
-  const VehicleState& at(std::size_t index) const;
 
   /// Publishes the states of all vehicles.
   void write() {
@@ -28,8 +27,8 @@ class StateStream {
   /// Publishes the samples that hold a vehicle of which `is_wanted(index)`.
   void write_where(const std::function<bool(std::size_t)>& is_wanted);
 
-  /// From now on `write` hands samples to a thread of its own, by a queue for `steps` steps, and
-  /// never blocks; until the object that is returned is gone.
+  /// While there is one, `write` hands samples to a thread of its own, by a queue for `steps`
+  /// steps, and never blocks.
   class Queue {
    public:
     Queue(StateStream& stream, std::size_t steps);

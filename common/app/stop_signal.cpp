@@ -1,28 +1,45 @@
 #include "common/app/stop_signal.hpp"
 
+#include <errno.h>  // program_invocation_short_name
+#include <unistd.h>
+
 #include <atomic>
 #include <csignal>
+#include <cstring>
 #include <initializer_list>
 
 namespace sls::app {
 namespace {
 
-// Any thread may run the handler, and others read; sig_atomic_t is for one thread only.
+// Any thread may run the handlers, and others read; sig_atomic_t is for one thread only.
 std::atomic<int> received{0};
+std::atomic<unsigned> patience_s{0};
 static_assert(std::atomic<int>::is_always_lock_free, "only then a handler may touch it");
 
 extern "C" void remember_signal(int number) {
   int none = 0;
-  received.compare_exchange_strong(none, number);
+  if (received.compare_exchange_strong(none, number)) ::alarm(patience_s);
+}
+
+/// In a handler only a few functions may be called, and none that allocates or locks.
+extern "C" void give_up(int) {
+  for (const char* text : {const_cast<const char*>(program_invocation_short_name),
+                           ": error: hangs after the stop signal: ends as it is, what it was "
+                           "writing is not complete\n"})
+    if (::write(STDERR_FILENO, text, std::strlen(text)) < 0) break;
+  ::_exit(128 + received);
 }
 
 }  // namespace
 
-void install_stop_signals() {
+void install_stop_signals(std::chrono::seconds patience) {
+  patience_s = static_cast<unsigned>(patience.count());
   struct sigaction action {};
-  action.sa_handler = remember_signal;
   sigemptyset(&action.sa_mask);
+  action.sa_handler = remember_signal;
   for (const int number : {SIGINT, SIGTERM}) sigaction(number, &action, nullptr);
+  action.sa_handler = give_up;
+  sigaction(SIGALRM, &action, nullptr);
   action.sa_handler = SIG_IGN;
   for (const int number : {SIGPIPE, SIGXFSZ}) sigaction(number, &action, nullptr);
 }

@@ -67,7 +67,7 @@ namespace detail {
 template <class Message>
 void* make_type_support();
 
-/// Type-erased halves of Writer and Reader.
+// AnyWriter and AnyReader are the type-erased halves of Writer and Reader.
 
 class AnyWriter {
  public:

@@ -119,6 +119,31 @@ TEST(MissionTest, ARadiusStageIsLeftStrictlyAfterAndStrictlyWithin) {
   EXPECT_EQ(mission.calc_progress(251, on_the_sphere, {}).phase, MissionPhase::kRunning);
 }
 
+TEST(MissionTest, WhoHasFinishedStaysSoWhereverTheBodyGoes) {
+  config::LeaveWithin leave;
+  leave.radius_m = 0.25;
+  leave.timeout_ns = 10 * kSecond;
+  const Mission mission({make_hold({0, 0, -1}, 1 * kSecond), make_within(leave, {1, 0, -2})},
+                        kPeriod);
+  const auto inside = make_state_at({0, 0, 0}, {1, 0, -2});
+  const auto outside = make_state_at({0, 0, 0}, {9, 0, -2});
+  ControllerMemory memory;
+  const auto remember = [&](const MissionProgress& progress) {
+    memory.stage = progress.remembered_stage;
+    memory.stage_start_step = progress.stage_start_step;
+    return progress;
+  };
+  EXPECT_EQ(remember(mission.calc_progress(250, outside, memory)).phase, MissionPhase::kRunning);
+  EXPECT_EQ(remember(mission.calc_progress(300, inside, memory)).phase, MissionPhase::kFinished);
+  for (const std::uint64_t step : {301, 5000}) {  // before and after the stage's time limit
+    const MissionProgress progress = remember(mission.calc_progress(step, outside, memory));
+    EXPECT_EQ(progress.phase, MissionPhase::kFinished);
+    EXPECT_EQ(progress.stage, 1u);
+    EXPECT_EQ(progress.stage_start_step, 250u);
+    EXPECT_EQ(progress.reference.position, Vector3d(1, 0, -2));
+  }
+}
+
 TEST(MissionTest, ARadiusMayBeAroundTheQuadrotorWithAnOffset) {
   config::LeaveWithin leave;
   leave.after_ns = 15 * kSecond;
@@ -200,7 +225,9 @@ TEST(MissionTest, KnowsAMemoryThatCannotBe) {
   memory.stage_start_step = 10;
   EXPECT_FALSE(mission.is_possible(9, memory));
   EXPECT_TRUE(mission.is_possible(10, memory));
-  memory.stage = 1;
+  memory.stage = 1;  // over
+  EXPECT_TRUE(mission.is_possible(10, memory));
+  memory.stage = 2;
   EXPECT_FALSE(mission.is_possible(10, memory));
 }
 

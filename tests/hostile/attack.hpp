@@ -19,6 +19,8 @@ struct Target {
 
 /// True until SIGTERM, or `target.seconds` after the first call.
 bool goes_on(const Target& target);
+/// To be called when an attack is under way: says so on stdout, once, for the test waits for it.
+void say_that_it_fires();
 
 // --- without DDS: raw_attacks.cpp ----------------------------------------------------------------
 

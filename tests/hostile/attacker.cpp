@@ -18,6 +18,11 @@ bool goes_on(const Target& target) {
   return app::stop_signal() == 0 && Clock::now() < end;
 }
 
+void say_that_it_fires() {
+  static const bool is_said = static_cast<bool>(std::cout << "fires" << std::endl);
+  static_cast<void>(is_said);
+}
+
 }  // namespace sls::hostile
 
 int main(int argc, char** argv) {

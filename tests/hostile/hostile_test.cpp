@@ -58,6 +58,17 @@ class HostileTest : public testing::Test {
     ASSERT_EQ(sniffer.wait(30s), 0);
   }
 
+  /// Halts the flight until all attacks on it are under way: it could be over before.
+  void wait_until_all_fire(Flight& flight) {
+    ASSERT_TRUE(flight.wait_for_steps(1)) << flight.outputs();
+    flight.client->send(SIGSTOP);
+    for (auto& attacker : attackers_)
+      EXPECT_TRUE(
+          wait_until([&] { return attacker->output().find("fires") != std::string::npos; }, 20s))
+          << attacker->output() << flight.outputs();
+    flight.client->send(SIGCONT);
+  }
+
   /// The most memory the server has had, in MB; 0 where it has ended.
   static double find_peak_memory(const Process& server) {
     const std::string status = read_file("/proc/" + std::to_string(server.id()) + "/status");
@@ -94,6 +105,33 @@ class HostileTest : public testing::Test {
     }
   }
 
+  // --- attacks that the flight meets with and without keys ---
+
+  void expect_that_packets_disturb_nothing() {
+    const TemporaryFolder folder;
+    capture(folder / "packets");
+    Flight flight(scenario("figure_eight"), options_);
+    attack("packets", flight, "attacker", {"--file", folder / "packets"});
+    expect_undisturbed(flight, 400);
+  }
+
+  void expect_that_announcements_disturb_nothing() {
+    const TemporaryFolder folder;
+    capture(folder / "packets");
+    Flight flight(scenario("figure_eight"), options_);
+    ASSERT_TRUE(flight.wait_for_steps(1)) << flight.outputs();  // before, they keep friends out
+    attack("announcements", flight, "attacker", {"--file", folder / "packets"});
+    expect_undisturbed(flight, 400);
+  }
+
+  // Who forges packets under the sender's name can say anything; only security prevents that. But
+  // nobody may crash or hang over it.
+  void expect_that_spoofed_packets_crash_nobody() {
+    Flight flight(scenario("figure_eight"), options_);
+    attack("spoof", flight, "server");
+    expect_orderly_end(flight);
+  }
+
   std::unique_ptr<Network> network_;
   FlightOptions options_;
   std::vector<std::unique_ptr<Process>> attackers_;
@@ -105,25 +143,17 @@ class HostileTest : public testing::Test {
 };
 
 TEST_F(HostileTest, PacketsThatNoFriendSendsDisturbNothing) {
-  const TemporaryFolder folder;
-  capture(folder / "packets");
-  Flight flight(scenario("figure_eight"), options_);
-  attack("packets", flight, "attacker", {"--file", folder / "packets"});
-  expect_undisturbed(flight, 400);
+  expect_that_packets_disturb_nothing();
 }
 
 TEST_F(HostileTest, AnnouncementsOfThousandsThatDoNotExistDisturbNothing) {
-  const TemporaryFolder folder;
-  capture(folder / "packets");
-  Flight flight(scenario("figure_eight"), options_);
-  ASSERT_TRUE(flight.wait_for_steps(1)) << flight.outputs();  // before, they keep friends out
-  attack("announcements", flight, "attacker", {"--file", folder / "packets"});
-  expect_undisturbed(flight, 400);
+  expect_that_announcements_disturb_nothing();
 }
 
 TEST_F(HostileTest, ParticipantsThatComeAndGoDisturbNothing) {
   Flight flight(scenario("figure_eight"), options_);
   attack("come-and-go", flight);
+  wait_until_all_fire(flight);
   expect_undisturbed(flight, 400);
 }
 
@@ -132,7 +162,7 @@ TEST_F(HostileTest, SamplesThatNoFriendWritesDisturbNothing) {
   attack("malformed", flight);
   attack("control", flight);
   Process& deaf = attack("readers", flight);
-  ASSERT_TRUE(flight.wait_for_steps(100)) << flight.outputs();
+  wait_until_all_fire(flight);
   deaf.send(SIGSTOP);  // acknowledges nothing any more
   expect_undisturbed(flight, 400);
 }
@@ -141,6 +171,7 @@ TEST_F(HostileTest, LiesAboutTheFlightAreNotBelieved) {
   Flight flight(scenario("figure_eight"), options_);
   attack("commands", flight);
   attack("statements", flight);
+  wait_until_all_fire(flight);
   expect_undisturbed(flight, 400);
 }
 
@@ -148,15 +179,12 @@ TEST_F(HostileTest, AStrongerControllerThatIsOfNoUseIsPassedOver) {
   Flight flight(scenario("figure_eight"), options_);
   attack("silent-controller", flight);
   attack("mad-controller", flight);
+  wait_until_all_fire(flight);
   expect_undisturbed(flight, 400);
 }
 
-// Who forges packets under the sender's name can say anything; only security prevents that. But
-// nobody may crash or hang over it.
 TEST_F(HostileTest, SpoofedPacketsOfTheFlightItselfCrashNobody) {
-  Flight flight(scenario("figure_eight"), options_);
-  attack("spoof", flight, "server");
-  expect_orderly_end(flight);
+  expect_that_spoofed_packets_crash_nobody();
 }
 
 // --- the same against a flight with keys, by neighbours who have none ----------------------------
@@ -167,33 +195,23 @@ class SecuredHostileTest : public HostileTest {
 };
 
 TEST_F(SecuredHostileTest, PacketsThatNoFriendSendsDisturbNothing) {
-  const TemporaryFolder folder;
-  capture(folder / "packets");
-  Flight flight(scenario("figure_eight"), options_);
-  attack("packets", flight, "attacker", {"--file", folder / "packets"});
-  expect_undisturbed(flight, 400);
+  expect_that_packets_disturb_nothing();
 }
 
 TEST_F(SecuredHostileTest, AnnouncementsOfThousandsThatDoNotExistDisturbNothing) {
-  const TemporaryFolder folder;
-  capture(folder / "packets");
-  Flight flight(scenario("figure_eight"), options_);
-  ASSERT_TRUE(flight.wait_for_steps(1)) << flight.outputs();  // before, they keep friends out
-  attack("announcements", flight, "attacker", {"--file", folder / "packets"});
-  expect_undisturbed(flight, 400);
+  expect_that_announcements_disturb_nothing();
 }
 
 TEST_F(SecuredHostileTest, WhoHasNoKeysDisturbsNothingAndHearsNothing) {
   Flight flight(scenario("figure_eight"), options_);
   attack("malformed", flight);
   deaf_ = &attack("readers", flight);
+  wait_until_all_fire(flight);
   expect_undisturbed(flight, 400);
 }
 
 TEST_F(SecuredHostileTest, SpoofedPacketsOfTheFlightItselfCrashNobody) {
-  Flight flight(scenario("figure_eight"), options_);
-  attack("spoof", flight, "server");
-  expect_orderly_end(flight);
+  expect_that_spoofed_packets_crash_nobody();
 }
 
 }  // namespace

@@ -110,6 +110,7 @@ std::uint64_t write_malformed(const Target& target) {
       ++huge;
     }
     if (writer->write(&bytes)) ++count;
+    say_that_it_fires();
     std::this_thread::sleep_for(500us);
   }
   participant->delete_contained_entities();

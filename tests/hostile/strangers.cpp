@@ -119,6 +119,7 @@ std::uint64_t come_and_go(const Target& target) {
     message.name("passer-by");
     message.role(count % 2 ? ROLE_CONTROLLER : ROLE_RECORDER);
     writer.write(message);
+    say_that_it_fires();
     writer.wait_for_acknowledgments(50ms);
   }
   return count;
@@ -144,6 +145,7 @@ std::uint64_t flood_commands(const Target& target) {
       reference.position_m({1e6, 1e6, 1e6});
       references.write(reference);
     }
+    say_that_it_fires();
     std::this_thread::sleep_for(kPause);
   }
   return count;
@@ -177,6 +179,7 @@ std::uint64_t forge_statements(const Target& target) {
     status.phase(PHASE_WAITING);
     statuses.write(status);
     participants.write(stranger.make_announcement(ROLE_RECORDER));  // one that has nothing yet
+    say_that_it_fires();
     std::this_thread::sleep_for(5 * kPause);
   }
   return count;
@@ -198,6 +201,7 @@ std::uint64_t flood_control(const Target& target) {
     if (random() % 4 == 0) request.action(static_cast<ControlAction>(random() % 1000 + 100));
     request.steps(random());
     requests.write(request);
+    say_that_it_fires();
     std::this_thread::sleep_for(kPause);
   }
   return count;
@@ -209,6 +213,7 @@ std::uint64_t pose_as_controller(const Target& target, bool answers) {
   bus::Writer<ControlCommand> commands(stranger.node);
   if (!stranger.wait_for_flight(target)) return 0;
   participants.write(stranger.make_announcement(ROLE_CONTROLLER));
+  say_that_it_fires();
   std::uint64_t count = 1;
   std::uint64_t answered = 0;
   while (goes_on(target)) {
@@ -234,6 +239,7 @@ std::uint64_t read_all(const Target& target) {
   const bus::Reader<ControlCommand> commands(node, bus::kRecorderReaderProfile, hear);
   const bus::Reader<Reference> references(node, bus::kRecorderReaderProfile, hear);
   const bus::Reader<SimStatus> statuses(node, bus::kLatchedReaderProfile, hear);
+  say_that_it_fires();
   while (goes_on(target)) std::this_thread::sleep_for(10ms);
   return count;
 }

@@ -64,6 +64,16 @@ TEST_F(StopSignalDeathTest, ASignalThatAnotherThreadReceivesIsSeen) {
       testing::ExitedWithCode(SIGINT), "");
 }
 
+TEST_F(StopSignalDeathTest, WhoHangsAfterTheSignalIsEndedWithALine) {
+  EXPECT_EXIT(
+      {
+        install_stop_signals(std::chrono::seconds(1));
+        std::raise(SIGTERM);
+        while (true) ::pause();
+      },
+      testing::ExitedWithCode(128 + SIGTERM), "^[^ ]+: error: hangs after the stop signal");
+}
+
 TEST_F(StopSignalDeathTest, ABrokenPipeIsReportedByTheWrite) {
   EXPECT_EXIT(
       {
