@@ -5,7 +5,8 @@ import statistics
 import time
 from collections.abc import Callable
 
-from bench.programs import Flight, MeasurementError, Placement, Programs, find_placements
+from bench.programs import (Flight, MeasurementError, Placement, Programs, end_all,
+                            find_placements)
 from bench.results import LESS, Figure
 
 PERIOD_S = "0.001"
@@ -48,33 +49,42 @@ class StepCosts:
         self.round_trips = 2000 if is_quick else 20000
         self.flight = programs.scenario("figure_eight", lasting(2 if is_quick else 16))
 
-    def ping(self, qos: str, *flags: str, mean: str = "mean_us", processors: str = "") -> float:
-        result = self.programs.probe("ping", "--qos", self.programs.qos(qos), "--domain",
-                                     str(self.programs.domain), "--round-trips",
-                                     str(self.round_trips), *flags, processors=processors)
-        return result[mean]
+    def ping(self, qos: str, *flags: str, placement: Placement = Placement(),
+             is_overheard: bool = False) -> float:
+        """A round trip; with a third process, where the recorder is placed, if `is_overheard`."""
+        programs = self.programs
+        common = ["--qos", str(programs.qos(qos)), "--domain", str(programs.domain)]
+        others = []
+        if is_overheard:
+            flags = (*flags, "--overheard")
+            others.append(programs.start([str(programs.probe_program), "overhear", *common],
+                                         programs.make_path(".log"), placement.recorder))
+        try:
+            return programs.probe("ping", *common, "--round-trips", str(self.round_trips), *flags,
+                                  processors=placement.loop)["mean_us"]
+        finally:
+            end_all(others)
 
-    def plant_and_law(self, processors: str = "") -> float:
+    def plant_and_law(self, placement: Placement = Placement()) -> float:
         return self.programs.probe("fly", "--scenario", self.flight, "--period-s", PERIOD_S,
-                                   processors=processors)["mean_us"]
+                                   processors=placement.loop)["mean_us"]
 
 
 def measure_lockstep(programs: Programs, rounds: int, is_quick: bool) -> list[Figure]:
     costs = StepCosts(programs, is_quick)
     seconds = 2 if is_quick else 32
     bounds: dict[tuple[Placement, str], list[float]] = {}
+    overheard: dict[tuple[Placement, str], list[float]] = {}
     speeds: dict[tuple[Placement, str, bool], list[float]] = {}
-    overheard: dict[str, list[float]] = {}
     placements = find_placements()
     for _ in range(rounds):
-        for qos in TRANSPORTS:
-            messages = costs.ping(qos, "--reference", "--overheard")
-            overheard.setdefault(qos, []).append(1e6 / (messages + costs.plant_and_law()))
         for placement in placements:
             for qos in TRANSPORTS:
-                round_trip = costs.ping(qos, processors=placement.loop)
+                work = costs.plant_and_law(placement)
                 bounds.setdefault((placement, qos), []).append(
-                    1e6 / (round_trip + costs.plant_and_law(placement.loop)))
+                    1e6 / (costs.ping(qos, placement=placement) + work))
+                overheard.setdefault((placement, qos), []).append(1e6 / (work + costs.ping(
+                    qos, "--reference", placement=placement, is_overheard=True)))
                 for is_recorded in (True, False):
                     flight = fly_lockstep(programs, qos, seconds, is_recorded, placement)
                     speeds.setdefault((placement, qos, is_recorded), []).append(flight.steps_per_s)
@@ -83,9 +93,10 @@ def measure_lockstep(programs: Programs, rounds: int, is_quick: bool) -> list[Fi
         name = f"{TRANSPORTS[qos]}, {'with' if is_recorded else 'without'} recorder, {placement.name}"
         figures.append(Figure("lockstep", name, "steps/s", values, BOUND, bounds[placement, qos],
                               goal=0.85 if is_recorded else None, is_goal_of_ratio=True))
-    for qos, bound in overheard.items():
-        figures.append(Figure("lockstep", f"{TRANSPORTS[qos]}, with recorder, beside all its messages",
-                              "steps/s", speeds[Placement(), qos, True], OVERHEARD_BOUND, bound))
+    for (placement, qos), bound in overheard.items():
+        name = f"{TRANSPORTS[qos]}, {placement.name}, beside all its messages"
+        figures.append(Figure("lockstep", name, "steps/s", speeds[placement, qos, True],
+                              OVERHEARD_BOUND, bound))
     figures.append(Figure("lockstep", f"shared memory, with recorder, {placements[0].name}, by itself",
                           "steps/s", speeds[placements[0], "default", True], goal=12000))
     return figures
@@ -99,28 +110,29 @@ def measure_breakdown(programs: Programs, rounds: int, is_quick: bool) -> list[F
     it than without, and what no ping-pong has is the rest."""
     costs = StepCosts(programs, is_quick)
     seconds = 2 if is_quick else 32
-    total: list[float] = []
     parts: dict[str, list[float]] = {}
-
-    def add(name: str, value: float) -> None:
-        parts.setdefault(name, []).append(value)
-
     for _ in range(rounds):
-        bare = costs.ping("default")
-        through_bus = costs.ping("default", "--bus")
-        with_reference = costs.ping("default", "--bus", "--reference")
-        overheard = costs.ping("default", "--bus", "--reference", "--overheard")
-        plant_and_law = costs.plant_and_law()
-        recorded = 1e6 / fly_lockstep(programs, "default", seconds, True).steps_per_s
-        add("raw round trip of state and command", bare)
-        add("common/bus around Fast DDS", through_bus - bare)
-        add("the reference's sample, before the command", with_reference - through_bus)
-        add("a third process that takes all samples", overheard - with_reference)
-        add("plant step and control law", plant_and_law)
-        add("rest: our own code, and the recorder's work", recorded - overheard - plant_and_law)
-        total.append(recorded)
-    figures = [Figure("breakdown", name, "µs", values, better=LESS) for name, values in parts.items()]
-    return [*figures, Figure("breakdown", "sum: one step with recorder", "µs", total, better=LESS)]
+        for placement in find_placements():
+            for qos, transport in TRANSPORTS.items():
+                def add(name: str, value: float, where: str = f"{transport}, {placement.name}") -> None:
+                    parts.setdefault(f"{where}: {name}", []).append(value)
+
+                bare = costs.ping(qos, placement=placement)
+                through_bus = costs.ping(qos, "--bus", placement=placement)
+                with_reference = costs.ping(qos, "--bus", "--reference", placement=placement)
+                overheard = costs.ping(qos, "--bus", "--reference", placement=placement,
+                                       is_overheard=True)
+                plant_and_law = costs.plant_and_law(placement)
+                recorded = 1e6 / fly_lockstep(programs, qos, seconds, True, placement).steps_per_s
+                add("raw round trip of state and command", bare)
+                add("common/bus around Fast DDS", through_bus - bare)
+                add("the reference's sample, before the command", with_reference - through_bus)
+                add("a third process that takes all samples", overheard - with_reference)
+                add("plant step and control law", plant_and_law)
+                add("rest: our own code, and the recorder's work",
+                    recorded - overheard - plant_and_law)
+                add("sum: one step with recorder", recorded)
+    return [Figure("breakdown", name, "µs", values, better=LESS) for name, values in parts.items()]
 
 
 # --- distributions --------------------------------------------------------------------------------
@@ -179,7 +191,7 @@ def measure_round_trips(programs: Programs, rounds: int, is_quick: bool) -> list
                     if batches:
                         return  # the flight is over
                     raise
-                stamps = programs.run(programs.build / "bin/sls_bench_probe", "stamps",
+                stamps = programs.run(programs.probe_program, "stamps",
                                       "--domain", str(programs.domain))
                 batches.append(parse_stamps(stamps)["state"])
                 programs.run(*ctl, "resume")
@@ -239,7 +251,7 @@ def measure_realtime(programs: Programs, rounds: int, is_quick: bool) -> list[Fi
             stamps: list[str] = []
 
             def listen(stamps: list[str] = stamps) -> None:
-                stamps.append(programs.run(programs.build / "bin/sls_bench_probe", "stamps",
+                stamps.append(programs.run(programs.probe_program, "stamps",
                                            "--live", "--domain", str(programs.domain)))
 
             scenario = programs.scenario("figure_eight", lasting(seconds))

@@ -16,7 +16,7 @@ struct PingPongOptions {
   std::uint64_t warm_up = 2000;       ///< before, not measured
   bool uses_bus = false;       ///< through common/bus instead of on bare Fast DDS; one vehicle
   bool has_reference = false;  ///< the answer to a state is a reference and a command
-  bool is_overheard = false;   ///< a third process takes all samples, as a recorder does
+  bool is_overheard = false;   ///< a third process, `overhear`, takes all samples: waits for it
 };
 
 /// States out, commands back, each state sent when the answer to the one before has come. Both ends

@@ -28,16 +28,16 @@ using namespace sls;
 
 void print(const nlohmann::json& json) { std::puts(json.dump().c_str()); }
 
-/// Another process of the ping-pong, which ends with this one.
-class OtherProcess {
+/// The other process of the ping-pong, which ends with this one.
+class AnsweringProcess {
  public:
-  OtherProcess(const std::string& subcommand, const bench::PingPongOptions& options) {
-    std::vector<std::string> words = {"sls_bench_probe", subcommand,
+  explicit AnsweringProcess(const bench::PingPongOptions& options) {
+    std::vector<std::string> words = {"sls_bench_probe", "pong",
                                       "--qos",           options.qos_file.string(),
                                       "--domain",        std::to_string(options.domain),
                                       "--vehicles",      std::to_string(options.vehicles)};
-    if (subcommand == "pong" && options.uses_bus) words.push_back("--bus");
-    if (subcommand == "pong" && options.has_reference) words.push_back("--reference");
+    if (options.uses_bus) words.push_back("--bus");
+    if (options.has_reference) words.push_back("--reference");
     std::vector<char*> command;
     for (std::string& word : words) command.push_back(word.data());
     command.push_back(nullptr);
@@ -48,12 +48,12 @@ class OtherProcess {
     execv("/proc/self/exe", command.data());
     _exit(127);
   }
-  ~OtherProcess() {
+  ~AnsweringProcess() {
     kill(id_, SIGTERM);
     waitpid(id_, nullptr, 0);
   }
-  OtherProcess(const OtherProcess&) = delete;
-  OtherProcess& operator=(const OtherProcess&) = delete;
+  AnsweringProcess(const AnsweringProcess&) = delete;
+  AnsweringProcess& operator=(const AnsweringProcess&) = delete;
 
  private:
   pid_t id_ = -1;
@@ -104,13 +104,15 @@ int main(int argc, char** argv) {
 
   CLI::App* ping = add("ping", "round trips of the loop's samples with a process that answers");
   CLI::App* pong = add("pong", "that process");
-  CLI::App* overhear = add("overhear", "takes all of those samples, as a recorder does");
+  CLI::App* overhear =
+      add("overhear", "a third process that takes all of those samples, as a recorder does");
   for (CLI::App* command : {ping, pong, overhear}) add_vehicles(command);
   for (CLI::App* command : {ping, pong}) {
     command->add_flag("--bus", ping_pong.uses_bus, "through common/bus, not on bare Fast DDS");
     command->add_flag("--reference", ping_pong.has_reference, "answers have a reference, too");
   }
-  ping->add_flag("--overheard", ping_pong.is_overheard, "by a third process");
+  ping->add_flag("--overheard", ping_pong.is_overheard,
+                 "once a third process takes all samples, too");
   ping->add_option("--round-trips", ping_pong.round_trips, "measured")
       ->check(CLI::Range(1, 100'000'000));
   CLI::App* fly = add("fly", "plant and control law of a flight, without anything else");
@@ -141,9 +143,7 @@ int main(int argc, char** argv) {
       return scenario;
     };
     if (*ping) {
-      const OtherProcess answering("pong", ping_pong);
-      std::optional<OtherProcess> overhearing;
-      if (ping_pong.is_overheard) overhearing.emplace("overhear", ping_pong);
+      const AnsweringProcess answering(ping_pong);
       print(bench::ping(ping_pong));
     } else if (*overhear) {
       bench::overhear(ping_pong);

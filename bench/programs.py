@@ -73,6 +73,7 @@ class Programs:
         self.build = build
         self.domain = domain
         self.scratch = scratch
+        self.probe_program = build / "bin/sls_bench_probe"
         self.count = 0
 
     def make_path(self, suffix: str) -> Path:
@@ -94,7 +95,8 @@ class Programs:
     def start(self, command: list[str], log: Path, processors: str = "") -> subprocess.Popen[bytes]:
         """The kernel ends it should we be killed."""
         with log.open("wb") as output:
-            return subprocess.Popen([*START, *pin(processors), *command], stdout=output, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL)
+            return subprocess.Popen([*START, *pin(processors), *command], stdout=output,
+                                    stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL)
 
     def run(self, *words: str | Path, processors: str = "") -> str:
         """stdout of a program that must end well."""
@@ -112,8 +114,7 @@ class Programs:
 
     def probe(self, subcommand: str, *words: str | Path, processors: str = "") -> Any:
         """The JSON that bench's own program prints."""
-        return json.loads(self.run(self.build / "bin/sls_bench_probe", subcommand, *words,
-                                   processors=processors))
+        return json.loads(self.run(self.probe_program, subcommand, *words, processors=processors))
 
     # --- the three programs -----------------------------------------------------------------------
 
