@@ -45,13 +45,15 @@ bool LockstepRun::exchange() {
       return true;
     }
     const auto now = Clock::now();
-    if (now >= wake_at_) {
+    if (now >= wake_at_.load()) {
       if (!attend_to_silence(now)) return false;
       if (is_settled()) return true;
       if (are_all_accepted()) continue;
     }
     main_lock_.unlock();
-    endpoints_.commands.wait(wake_at_);
+    // Each step taken meanwhile moves the moment on: only the last one's is for us to look at.
+    while (!endpoints_.commands.wait(wake_at_) && Clock::now() < wake_at_.load()) {
+    }
     main_lock_.lock();
   }
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <exception>
@@ -53,7 +54,8 @@ class LockstepRun : public Run {
   std::exception_ptr error_;            // of the middleware's thread
   std::uint64_t recorder_limit_ = 0;    // the first step that a recorder is not ready for
   Clock::time_point sent_, last_sent_;  // the states of the step in work, first and last
-  Clock::time_point resend_at_, wake_at_;
+  Clock::time_point resend_at_;
+  std::atomic<Clock::time_point> wake_at_{Clock::time_point()};  // the main thread waits for it
   Clock::time_point take_over_at_;
   bool is_late_ = false;  // most answers come before the first resend
 };

@@ -55,11 +55,13 @@ class Mailbox {
     return item;
   }
 
-  /// Waits until there is an item, until `interrupt`, or until `deadline`.
-  void wait(std::chrono::steady_clock::time_point deadline) {
+  /// Waits until there is an item, until `interrupt`, or until `deadline`: then it is false.
+  bool wait(std::chrono::steady_clock::time_point deadline) {
     std::unique_lock lock(mutex_);
-    filled_.wait_until(lock, deadline, [this] { return !items_.empty() || is_interrupted_; });
+    const bool has_news =
+        filled_.wait_until(lock, deadline, [this] { return !items_.empty() || is_interrupted_; });
     is_interrupted_ = false;
+    return has_news;
   }
 
   /// All items there are, oldest first, without waiting. A thread that can afford to look only now
