@@ -47,8 +47,10 @@ def save_plots(result: dict[str, Any], folder: Path) -> list[Path]:
     parts = list(dict.fromkeys(figure["part"] for figure in result["figures"]))
     files = []
     for part in parts:
-        picture = draw_part([figure for figure in result["figures"] if figure["part"] == part])
-        picture.suptitle(f"{part} (red: bound)")
+        figures = [figure for figure in result["figures"] if figure["part"] == part]
+        picture = draw_part(figures)
+        has_bound = any("bound" in figure for figure in figures)
+        picture.suptitle(f"{part} (red: bound)" if has_bound else part)
         for kind in KINDS:
             file = folder / f"{part}.{kind}"
             picture.savefig(file, dpi=120)
