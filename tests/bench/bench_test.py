@@ -166,12 +166,24 @@ class ProgramTest(unittest.TestCase):
         said = bench(*words)
         figures = self.check(file, "lockstep")
         self.assertIn("shared memory, with recorder", said.stdout)
-        # Two transports, with and without recorder, in each placement of the programs; and each once
+        # In each placement of the programs two transports, with and without recorder, and once more
         # beside the bound of all messages.
-        self.assertEqual(sum("ratio" in figure for figure in figures), 4 * len(find_placements()) + 2)
+        self.assertEqual(sum("ratio" in figure for figure in figures), 6 * len(find_placements()))
         if "--out" in words:
             self.assertTrue((self.folder / "plots/lockstep.png").read_bytes().startswith(b"\x89PNG"))
             self.assertIn("<svg", (self.folder / "plots/lockstep.svg").read_text())
+
+    def test_the_parts_of_a_step_add_up(self):
+        file = self.folder / "bench.json"
+        bench("--quick", "--only", "breakdown", "--json", file)
+        steps = {}
+        for figure in self.check(file, "breakdown"):
+            where, name = figure["name"].split(": ", 1)
+            steps.setdefault(where, {})[name] = figure["median"]
+        self.assertEqual(len(steps), 2 * len(find_placements()))
+        for parts_of_step in steps.values():
+            whole = parts_of_step.pop("sum: one step with recorder")
+            self.assertAlmostEqual(sum(parts_of_step.values()), whole)
 
     def test_a_quick_recorder_part_loses_nothing(self):
         file = self.folder / "bench.json"
