@@ -111,6 +111,8 @@ class HostileTest : public testing::Test {
     const TemporaryFolder folder;
     capture(folder / "packets");
     Flight flight(scenario("figure_eight"), options_);
+    // Before, packets of an earlier flight bring back its programs, and ours would wait for them.
+    ASSERT_TRUE(flight.wait_for_steps(1)) << flight.outputs();
     attack("packets", flight, "attacker", {"--file", folder / "packets"});
     expect_undisturbed(flight, 400);
   }
