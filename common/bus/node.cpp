@@ -29,6 +29,7 @@
 #include "common/bus/participant_listener.hpp"
 #include "common/bus/qos_file.hpp"
 #include "common/bus/security_files.hpp"
+#include "common/bus/shared_locks.hpp"
 #include "common/bus/stale_segments.hpp"
 #include "common/config/config_error.hpp"
 
@@ -121,6 +122,7 @@ struct Node::Impl {
     auto& participants = qos.allocation().participants;
     participants.maximum = std::min(participants.maximum, kMaxParticipants);
     MiddlewareLog::clear();
+    guard_shared_locks();
     remove_stale_segments();
     auto& wire = qos.wire_protocol();
     if (wire.participant_id < 0)

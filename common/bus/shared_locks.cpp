@@ -1,0 +1,129 @@
+#include "common/bus/shared_locks.hpp"
+
+#include <dlfcn.h>
+#include <linux/futex.h>
+#include <pthread.h>
+#include <semaphore.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cstdint>
+#include <ctime>
+#include <fstream>
+#include <string>
+#include <utility>
+
+namespace sls::bus {
+namespace {
+
+constexpr std::int64_t kSecond_ns = 1'000'000'000;
+constexpr std::int64_t kPatienceWithStopped_ns = kSecond_ns / 20;
+constexpr std::int64_t kLook_ns = kSecond_ns / 10;
+/// The library waits for a lock for 1 s or 2 s, and at a port for a third of
+/// `healthy_check_timeout_ms`: what is longer than this is a reader that waits for messages.
+constexpr std::int64_t kLongestLockWait_ns = 3 * kSecond_ns;
+
+std::atomic<bool> is_on{false};
+
+/// The lock of the port that this thread reads: the one it takes next after waiting there. For it a
+/// reader waits as long as it takes; where it gives up, the library lets an exception end the
+/// process.
+thread_local const pthread_mutex_t* own_port = nullptr;
+thread_local bool is_next_own = false;
+
+/// The function of that name that ours stands before.
+template <class Function>
+Function* find_next(Function*, const char* name) {
+  return reinterpret_cast<Function*>(dlsym(RTLD_NEXT, name));
+}
+
+std::int64_t to_ns(const timespec& time) { return time.tv_sec * kSecond_ns + time.tv_nsec; }
+
+timespec to_timespec(std::int64_t time_ns) {
+  timespec time{};
+  time.tv_sec = time_ns / kSecond_ns;
+  time.tv_nsec = time_ns % kSecond_ns;
+  return time;
+}
+
+std::int64_t now_ns() {  // of the clock of the deadlines
+  timespec now{};
+  clock_gettime(CLOCK_REALTIME, &now);
+  return to_ns(now);
+}
+
+/// A lock that a dead process held is held by us now. What it guards in a port stays usable:
+/// indices of a ring of messages, each moved by one atomic operation, and who listens to it.
+int take_over(int result, pthread_mutex_t* mutex) {
+  return result == EOWNERDEAD ? pthread_mutex_consistent(mutex) : result;
+}
+
+/// True where the thread that holds the mutex is stopped, by a signal or a debugger.
+bool is_holder_stopped(const pthread_mutex_t& mutex) {
+  // The first word of a robust mutex is the kernel's, and names the holder (futex(2), robust
+  // lists).
+  const auto word =
+      __atomic_load_n(reinterpret_cast<const std::uint32_t*>(&mutex), __ATOMIC_RELAXED);
+  std::ifstream file("/proc/" + std::to_string(word & FUTEX_TID_MASK) + "/stat");
+  std::string line;
+  std::getline(file, line);
+  const auto name_end = line.rfind(") ");
+  return name_end != std::string::npos && name_end + 2 < line.size() &&
+         (line[name_end + 2] == 'T' || line[name_end + 2] == 't');
+}
+
+}  // namespace
+
+void guard_shared_locks() { is_on = true; }
+
+}  // namespace sls::bus
+
+// The middleware's library finds these before those of the C library. It uses these three for what
+// is between processes only (boost::interprocess with a time limit); the locks of its own threads
+// go another way and cost nothing more.
+
+int pthread_mutexattr_setpshared(pthread_mutexattr_t* attributes, int shared) noexcept {
+  static const auto next =
+      sls::bus::find_next(&pthread_mutexattr_setpshared, "pthread_mutexattr_setpshared");
+  const int result = next(attributes, shared);
+  if (result != 0 || shared != PTHREAD_PROCESS_SHARED || !sls::bus::is_on) return result;
+  return pthread_mutexattr_setrobust(attributes, PTHREAD_MUTEX_ROBUST);
+}
+
+int pthread_mutex_timedlock(pthread_mutex_t* mutex, const timespec* deadline) noexcept {
+  using namespace sls::bus;
+  static const auto next = find_next(&pthread_mutex_timedlock, "pthread_mutex_timedlock");
+  if (!is_on) return next(mutex, deadline);
+  if (std::exchange(is_next_own, false)) own_port = mutex;
+  if (mutex == own_port) return take_over(pthread_mutex_lock(mutex), mutex);
+  int result = take_over(pthread_mutex_trylock(mutex), mutex);
+  if (result != EBUSY) return result;
+  // Where the holder was found stopped the last time, the next message is not to wait as long
+  // again.
+  thread_local const pthread_mutex_t* stopped = nullptr;
+  if (mutex == stopped) {
+    if (is_holder_stopped(*mutex)) return ETIMEDOUT;
+    stopped = nullptr;
+  }
+  const timespec look = to_timespec(now_ns() + kPatienceWithStopped_ns);
+  const bool is_short = to_ns(*deadline) <= to_ns(look);
+  result = take_over(next(mutex, is_short ? deadline : &look), mutex);
+  if (result != ETIMEDOUT || is_short) return result;
+  if (is_holder_stopped(*mutex)) {
+    stopped = mutex;
+    return result;
+  }
+  return take_over(next(mutex, deadline), mutex);
+}
+
+int sem_timedwait(sem_t* semaphore, const timespec* deadline) {
+  using namespace sls::bus;
+  static const auto next = find_next(&sem_timedwait, "sem_timedwait");
+  if (!is_on) return next(semaphore, deadline);
+  const std::int64_t now = now_ns();
+  if (to_ns(*deadline) - now <= kLongestLockWait_ns) return next(semaphore, deadline);
+  const timespec look = to_timespec(now + kLook_ns);
+  const int result = next(semaphore, &look);
+  is_next_own = true;
+  return result;
+}
