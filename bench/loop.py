@@ -114,9 +114,6 @@ def measure_breakdown(programs: Programs, rounds: int, is_quick: bool) -> list[F
     for _ in range(rounds):
         for placement in find_placements():
             for qos, transport in TRANSPORTS.items():
-                def add(name: str, value: float, where: str = f"{transport}, {placement.name}") -> None:
-                    parts.setdefault(f"{where}: {name}", []).append(value)
-
                 bare = costs.ping(qos, placement=placement)
                 through_bus = costs.ping(qos, "--bus", placement=placement)
                 with_reference = costs.ping(qos, "--bus", "--reference", placement=placement)
@@ -124,14 +121,17 @@ def measure_breakdown(programs: Programs, rounds: int, is_quick: bool) -> list[F
                                        is_overheard=True)
                 plant_and_law = costs.plant_and_law(placement)
                 recorded = 1e6 / fly_lockstep(programs, qos, seconds, True, placement).steps_per_s
-                add("raw round trip of state and command", bare)
-                add("common/bus around Fast DDS", through_bus - bare)
-                add("the reference's sample, before the command", with_reference - through_bus)
-                add("a third process that takes all samples", overheard - with_reference)
-                add("plant step and control law", plant_and_law)
-                add("rest: our own code, and the recorder's work",
-                    recorded - overheard - plant_and_law)
-                add("sum: one step with recorder", recorded)
+                times = {
+                    "raw round trip of state and command": bare,
+                    "common/bus around Fast DDS": through_bus - bare,
+                    "the reference's sample, before the command": with_reference - through_bus,
+                    "a third process that takes all samples": overheard - with_reference,
+                    "plant step and control law": plant_and_law,
+                    "rest: our own code, and the recorder's work": recorded - overheard - plant_and_law,
+                    "sum: one step with recorder": recorded,
+                }
+                for name, value in times.items():
+                    parts.setdefault(f"{transport}, {placement.name}: {name}", []).append(value)
     return [Figure("breakdown", name, "µs", values, better=LESS) for name, values in parts.items()]
 
 

@@ -62,24 +62,22 @@ MissionProgress Mission::calc_progress(std::uint64_t step, const model::SlungLoa
     const FlownStage& stage = stages_[progress.stage];
     const std::int64_t elapsed_ns = calc_elapsed_ns(step, progress.stage_start_step);
     progress.reference = stage.trajectory->calc(to_seconds(elapsed_ns));
-    if (memory.stage == end) {
-      progress.phase = MissionPhase::kFinished;
-      return progress;
-    }
-    const StageOutcome outcome = std::visit(
-        [&](const auto& leave) { return judge(leave, elapsed_ns, state, progress.reference); },
-        stage.leave);
+    StageOutcome outcome = StageOutcome::kLeft;  // for good: a mission that is over stays so
+    if (memory.stage < end)
+      outcome = std::visit(
+          [&](const auto& leave) { return judge(leave, elapsed_ns, state, progress.reference); },
+          stage.leave);
     if (outcome == StageOutcome::kGoesOn) return progress;
     if (outcome == StageOutcome::kTimedOut) {
       progress.phase = MissionPhase::kFailed;
       return progress;
     }
-    ++progress.remembered_stage;
-    if (progress.remembered_stage == end) {
+    if (progress.stage + 1 == end) {
       progress.phase = MissionPhase::kFinished;
+      progress.remembered_stage = end;
       return progress;
     }
-    progress.stage = progress.remembered_stage;
+    progress.remembered_stage = ++progress.stage;
     progress.stage_start_step = step;
   }
 }

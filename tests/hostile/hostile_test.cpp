@@ -107,22 +107,15 @@ class HostileTest : public testing::Test {
 
   // --- attacks that the flight meets with and without keys ---
 
-  void expect_that_packets_disturb_nothing() {
+  /// Of an attack with packets of an earlier flight. It begins when this one is under way: before,
+  /// such packets bring back the earlier programs, or as many as keep friends out, and ours would
+  /// wait.
+  void expect_that_forgeries_disturb_nothing(const std::string& what) {
     const TemporaryFolder folder;
     capture(folder / "packets");
     Flight flight(scenario("figure_eight"), options_);
-    // Before, packets of an earlier flight bring back its programs, and ours would wait for them.
     ASSERT_TRUE(flight.wait_for_steps(1)) << flight.outputs();
-    attack("packets", flight, "attacker", {"--file", folder / "packets"});
-    expect_undisturbed(flight, 400);
-  }
-
-  void expect_that_announcements_disturb_nothing() {
-    const TemporaryFolder folder;
-    capture(folder / "packets");
-    Flight flight(scenario("figure_eight"), options_);
-    ASSERT_TRUE(flight.wait_for_steps(1)) << flight.outputs();  // before, they keep friends out
-    attack("announcements", flight, "attacker", {"--file", folder / "packets"});
+    attack(what, flight, "attacker", {"--file", folder / "packets"});
     expect_undisturbed(flight, 400);
   }
 
@@ -145,11 +138,11 @@ class HostileTest : public testing::Test {
 };
 
 TEST_F(HostileTest, PacketsThatNoFriendSendsDisturbNothing) {
-  expect_that_packets_disturb_nothing();
+  expect_that_forgeries_disturb_nothing("packets");
 }
 
 TEST_F(HostileTest, AnnouncementsOfThousandsThatDoNotExistDisturbNothing) {
-  expect_that_announcements_disturb_nothing();
+  expect_that_forgeries_disturb_nothing("announcements");
 }
 
 TEST_F(HostileTest, ParticipantsThatComeAndGoDisturbNothing) {
@@ -197,11 +190,11 @@ class SecuredHostileTest : public HostileTest {
 };
 
 TEST_F(SecuredHostileTest, PacketsThatNoFriendSendsDisturbNothing) {
-  expect_that_packets_disturb_nothing();
+  expect_that_forgeries_disturb_nothing("packets");
 }
 
 TEST_F(SecuredHostileTest, AnnouncementsOfThousandsThatDoNotExistDisturbNothing) {
-  expect_that_announcements_disturb_nothing();
+  expect_that_forgeries_disturb_nothing("announcements");
 }
 
 TEST_F(SecuredHostileTest, WhoHasNoKeysDisturbsNothingAndHearsNothing) {
