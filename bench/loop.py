@@ -105,6 +105,20 @@ def measure_lockstep(programs: Programs, rounds: int, is_quick: bool) -> list[Fi
 # --- where the time goes --------------------------------------------------------------------------
 
 
+def calc_parts(bare: float, through_bus: float, with_reference: float, overheard: float,
+               plant_and_law: float, recorded: float) -> dict[str, float]:
+    """Of one step, `recorded`; the first four are round trips, each of which has more in it."""
+    return {
+        "raw round trip of state and command": bare,
+        "common/bus around Fast DDS": through_bus - bare,
+        "the reference's sample, before the command": with_reference - through_bus,
+        "a third process that takes all samples": overheard - with_reference,
+        "plant step and control law": plant_and_law,
+        "rest: our own code, and the recorder's work": recorded - overheard - plant_and_law,
+        "sum: one step with recorder": recorded,
+    }
+
+
 def measure_breakdown(programs: Programs, rounds: int, is_quick: bool) -> list[Figure]:
     """The parts of one step with a recorder. They add up: each is what the ping-pong takes longer with
     it than without, and what no ping-pong has is the rest."""
@@ -121,16 +135,8 @@ def measure_breakdown(programs: Programs, rounds: int, is_quick: bool) -> list[F
                                        is_overheard=True)
                 plant_and_law = costs.plant_and_law(placement)
                 recorded = 1e6 / fly_lockstep(programs, qos, seconds, True, placement).steps_per_s
-                times = {
-                    "raw round trip of state and command": bare,
-                    "common/bus around Fast DDS": through_bus - bare,
-                    "the reference's sample, before the command": with_reference - through_bus,
-                    "a third process that takes all samples": overheard - with_reference,
-                    "plant step and control law": plant_and_law,
-                    "rest: our own code, and the recorder's work": recorded - overheard - plant_and_law,
-                    "sum: one step with recorder": recorded,
-                }
-                for name, value in times.items():
+                for name, value in calc_parts(bare, through_bus, with_reference, overheard,
+                                              plant_and_law, recorded).items():
                     parts.setdefault(f"{transport}, {placement.name}: {name}", []).append(value)
     return [Figure("breakdown", name, "µs", values, better=LESS) for name, values in parts.items()]
 

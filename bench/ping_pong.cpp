@@ -22,9 +22,8 @@ namespace {
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
-constexpr double kPatience_s = 20.0;    // for discovery
-constexpr auto kDiscoveryTime = 300ms;  // of the other two processes, who have discovered us
-constexpr auto kResendTime = 100ms;     // best-effort readers may lose a sample
+constexpr double kPatience_s = 20.0;  // for discovery
+constexpr auto kResendTime = 100ms;   // best-effort readers may lose a sample
 
 // --- the samples ---------------------------------------------------------------------------------
 
@@ -176,7 +175,6 @@ class Ping {
       check(wait);
       std::this_thread::sleep_for(1ms);
     }
-    std::this_thread::sleep_for(kDiscoveryTime);
     std::unique_lock lock(mutex_);
     send();
     while (!is_done()) {
@@ -249,8 +247,15 @@ void answer_with(const PingPongOptions& options) {
   }
   std::optional<typename Ends::ReferenceWriter> reference_writer;
   if (options.has_reference) reference_writer.emplace(node);
+  const std::size_t overhearing = options.is_overheard ? 1 : 0;
+  bool is_heard =
+      false;  // by all who shall: until then nothing is answered, and the state comes again
   std::size_t next = 0;
   typename Ends::StateReader reader(node, [&](const typename Ends::State& state) {
+    is_heard =
+        is_heard || (writer.count_matched() >= 1 + overhearing &&
+                     (!reference_writer || reference_writer->count_matched() >= overhearing));
+    if (!is_heard) return;
     if (reference_writer) {
       references[next].step(state.step());
       reference_writer->write(references[next]);

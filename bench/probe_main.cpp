@@ -38,6 +38,7 @@ class AnsweringProcess {
                                       "--vehicles",      std::to_string(options.vehicles)};
     if (options.uses_bus) words.push_back("--bus");
     if (options.has_reference) words.push_back("--reference");
+    if (options.is_overheard) words.push_back("--overheard");
     std::vector<char*> command;
     for (std::string& word : words) command.push_back(word.data());
     command.push_back(nullptr);
@@ -110,9 +111,9 @@ int main(int argc, char** argv) {
   for (CLI::App* command : {ping, pong}) {
     command->add_flag("--bus", ping_pong.uses_bus, "through common/bus, not on bare Fast DDS");
     command->add_flag("--reference", ping_pong.has_reference, "answers have a reference, too");
+    command->add_flag("--overheard", ping_pong.is_overheard,
+                      "once a third process takes all samples, too");
   }
-  ping->add_flag("--overheard", ping_pong.is_overheard,
-                 "once a third process takes all samples, too");
   ping->add_option("--round-trips", ping_pong.round_trips, "measured")
       ->check(CLI::Range(1, 100'000'000));
   CLI::App* fly = add("fly", "plant and control law of a flight, without anything else");

@@ -184,7 +184,7 @@ def end_all(processes: list[subprocess.Popen[bytes]]) -> None:
             process.send_signal(signal.SIGTERM)
     for process in processes:
         try:
-            process.wait(timeout=15)
+            process.wait(timeout=30)  # longer than a program that hangs is patient with itself
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()

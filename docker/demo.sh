@@ -64,7 +64,7 @@ clean_up() {
   trap '' INT TERM HUP
   signal_all TERM
   ((killer == 0)) || kill "$killer" 2>/dev/null || true
-  "${compose[@]}" "${flags[@]}" down --volumes --timeout 15 >/dev/null 2>&1 ||
+  "${compose[@]}" "${flags[@]}" down --volumes --timeout 30 >/dev/null 2>&1 ||
     say "warning: docker compose down failed: see docker ps --all"
   rm -rf -- "$scratch"
   ((EUID != 0)) || chown -R 0:0 -- "$recording"

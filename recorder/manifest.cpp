@@ -10,6 +10,7 @@
 #include <system_error>
 
 #include "common/app/options.hpp"
+#include "common/app/stop_signal.hpp"
 #include "common/bus/names.hpp"
 #include "common/bus/node.hpp"
 #include "common/config/config_error.hpp"
@@ -102,6 +103,7 @@ std::string describe(const std::vector<MissingSteps>& missing) {
 
 void write_manifest(const std::filesystem::path& folder, const Manifest& manifest) {
   const Parameters& parameters = manifest.parameters;
+  const app::Unhurried unhurried;  // the files are read once more
   Json files = Json::object();
   for (const RecordedFile& file : manifest.files) {
     Json entry;

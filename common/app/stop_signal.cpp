@@ -14,11 +14,12 @@ namespace {
 // Any thread may run the handlers, and others read; sig_atomic_t is for one thread only.
 std::atomic<int> received{0};
 std::atomic<unsigned> patience_s{0};
+std::atomic<int> unhurried{0};
 static_assert(std::atomic<int>::is_always_lock_free, "only then a handler may touch it");
 
 extern "C" void remember_signal(int number) {
   int none = 0;
-  if (received.compare_exchange_strong(none, number)) ::alarm(patience_s);
+  if (received.compare_exchange_strong(none, number) && unhurried == 0) ::alarm(patience_s);
 }
 
 /// In a handler only a few functions may be called, and none that allocates or locks.
@@ -45,5 +46,14 @@ void install_stop_signals(std::chrono::seconds patience) {
 }
 
 int stop_signal() { return received; }
+
+Unhurried::Unhurried() {
+  ++unhurried;
+  ::alarm(0);
+}
+
+Unhurried::~Unhurried() {
+  if (--unhurried == 0 && received != 0) ::alarm(patience_s);
+}
 
 }  // namespace sls::app

@@ -14,4 +14,14 @@ void install_stop_signals(std::chrono::seconds patience = std::chrono::seconds(2
 /// 0, or the number of the first stop signal received.
 int stop_signal();
 
+/// While one lives, that patience does not run: for work of its own that may take long. It begins
+/// anew after it.
+class Unhurried {
+ public:
+  Unhurried();
+  ~Unhurried();
+  Unhurried(const Unhurried&) = delete;
+  Unhurried& operator=(const Unhurried&) = delete;
+};
+
 }  // namespace sls::app

@@ -4,14 +4,16 @@
 #include <linux/futex.h>
 #include <pthread.h>
 #include <semaphore.h>
+#include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <atomic>
 #include <cerrno>
 #include <cstdint>
 #include <ctime>
 #include <fstream>
 #include <string>
-#include <utility>
 
 namespace sls::bus {
 namespace {
@@ -19,17 +21,26 @@ namespace {
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
 constexpr std::int64_t kPatienceWithStopped_ns = kSecond_ns / 20;
 constexpr std::int64_t kLook_ns = kSecond_ns / 10;
-/// The library waits for a lock for 1 s or 2 s, and at a port for a third of
-/// `healthy_check_timeout_ms`: what is longer than this is a reader that waits for messages.
-constexpr std::int64_t kLongestLockWait_ns = 3 * kSecond_ns;
+constexpr int kRobustBit = 16;  // of the kind of a mutex in the C library
 
 std::atomic<bool> is_on{false};
 
-/// The lock of the port that this thread reads: the one it takes next after waiting there. For it a
-/// reader waits as long as it takes; where it gives up, the library lets an exception end the
-/// process.
-thread_local const pthread_mutex_t* own_port = nullptr;
-thread_local bool is_next_own = false;
+/// Locks of the ports that threads of this process read, the latest of them. Two per port, taken
+/// one after the other when a reader has waited there. For them a reader waits as long as it takes:
+/// where it gives up, the library ends the process or replaces the port. So does who closes the
+/// port.
+std::array<std::atomic<const pthread_mutex_t*>, 16> own_locks{};
+thread_local int own_locks_to_come = 0;
+
+bool is_own(const pthread_mutex_t* mutex) {
+  return std::any_of(own_locks.begin(), own_locks.end(),
+                     [mutex](const auto& lock) { return lock == mutex; });
+}
+
+void remember_as_own(const pthread_mutex_t* mutex) {
+  static std::atomic<std::size_t> count{0};
+  if (!is_own(mutex)) own_locks[count++ % own_locks.size()] = mutex;
+}
 
 /// The function of that name that ours stands before.
 template <class Function>
@@ -56,6 +67,12 @@ std::int64_t now_ns() {  // of the clock of the deadlines
 /// indices of a ring of messages, each moved by one atomic operation, and who listens to it.
 int take_over(int result, pthread_mutex_t* mutex) {
   return result == EOWNERDEAD ? pthread_mutex_consistent(mutex) : result;
+}
+
+/// Named semaphores have a mapping of their own; those of a port stand amid it.
+bool is_of_port(const sem_t* semaphore) {
+  static const auto page_size = static_cast<std::uintptr_t>(sysconf(_SC_PAGESIZE));
+  return reinterpret_cast<std::uintptr_t>(semaphore) % page_size != 0;
 }
 
 /// True where the thread that holds the mutex is stopped, by a signal or a debugger.
@@ -93,9 +110,12 @@ int pthread_mutexattr_setpshared(pthread_mutexattr_t* attributes, int shared) no
 int pthread_mutex_timedlock(pthread_mutex_t* mutex, const timespec* deadline) noexcept {
   using namespace sls::bus;
   static const auto next = find_next(&pthread_mutex_timedlock, "pthread_mutex_timedlock");
-  if (!is_on) return next(mutex, deadline);
-  if (std::exchange(is_next_own, false)) own_port = mutex;
-  if (mutex == own_port) return take_over(pthread_mutex_lock(mutex), mutex);
+  if (!is_on || (mutex->__data.__kind & kRobustBit) == 0) return next(mutex, deadline);
+  if (own_locks_to_come > 0) {
+    --own_locks_to_come;
+    remember_as_own(mutex);
+  }
+  if (is_own(mutex)) return take_over(pthread_mutex_lock(mutex), mutex);
   int result = take_over(pthread_mutex_trylock(mutex), mutex);
   if (result != EBUSY) return result;
   // Where the holder was found stopped the last time, the next message is not to wait as long
@@ -119,11 +139,8 @@ int pthread_mutex_timedlock(pthread_mutex_t* mutex, const timespec* deadline) no
 int sem_timedwait(sem_t* semaphore, const timespec* deadline) {
   using namespace sls::bus;
   static const auto next = find_next(&sem_timedwait, "sem_timedwait");
-  if (!is_on) return next(semaphore, deadline);
-  const std::int64_t now = now_ns();
-  if (to_ns(*deadline) - now <= kLongestLockWait_ns) return next(semaphore, deadline);
-  const timespec look = to_timespec(now + kLook_ns);
-  const int result = next(semaphore, &look);
-  is_next_own = true;
-  return result;
+  const timespec look = to_timespec(now_ns() + kLook_ns);
+  if (!is_on || !is_of_port(semaphore)) return next(semaphore, deadline);
+  own_locks_to_come = 2;
+  return next(semaphore, to_ns(*deadline) <= to_ns(look) ? deadline : &look);
 }

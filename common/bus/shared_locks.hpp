@@ -9,10 +9,10 @@ namespace sls::bus {
 /// semaphore. At 5,000 steps/s about one in fourteen SIGKILLs hit a process that held such a mutex,
 /// and then every write of every other process to that port took a second, until
 /// `healthy_check_timeout_ms` was over. So in this process
-/// - a mutex that it makes for several processes is given to the next who waits when its holder
-/// dies;
+/// - a mutex that it makes for several processes goes to the next who waits when its holder dies;
 /// - whoever waits for one whose holder is stopped gives up after 50 ms (of 1 s): that message is
-///   lost, and a reliable stream sends it again;
+///   lost, and a reliable stream sends it again (a stopped process is found where both see the same
+///   process ids, so not from one container to another);
 /// - a reader looks at its port ten times a second, and not only when somebody wakes it: who dies
 ///   after a message and before the call that wakes the reader leaves a port that wakes nobody.
 ///

@@ -1,7 +1,9 @@
 /// LD_PRELOAD library that ends or stops a process in the middle of a lock that it shares with
 /// others. After it has given back SLS_LOCK_COUNT of them, it sends itself SLS_LOCK_SIGNAL instead
-/// of giving back the next one of a shared-memory port, which is the one it reads with
-/// SLS_LOCK_PORT=own and that of another process with SLS_LOCK_PORT=other.
+/// of giving back the next one of a shared-memory port
+/// - that it reads, with SLS_LOCK_PORT=own, or that another process reads, with other;
+/// - over the port's messages, with SLS_LOCK_KIND=messages, or over who waits for them, with
+/// waiters.
 #include <dlfcn.h>
 #include <pthread.h>
 #include <signal.h>
@@ -12,6 +14,10 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <set>
 #include <string>
 
 namespace {
@@ -42,15 +48,29 @@ bool is_read_here(const std::string& port) {
   return false;
 }
 
-bool is_moment(const pthread_mutex_t* mutex) {
-  static const std::string port = std::getenv("SLS_LOCK_PORT");
+/// True for the lock over a port's messages, false for that over who waits, which stands before it;
+/// of ports of which one was seen yet, nobody knows.
+std::optional<bool> is_over_messages(const std::string& port, const pthread_mutex_t* lock) {
+  static std::mutex mutex;
+  static std::map<std::string, std::set<const pthread_mutex_t*>> seen;
+  const std::lock_guard guard(mutex);
+  auto& locks = seen[port];
+  locks.insert(lock);
+  if (locks.size() < 2) return std::nullopt;
+  return lock == *locks.rbegin();
+}
+
+bool is_moment(const pthread_mutex_t* lock) {
+  static const bool is_own_wanted = std::getenv("SLS_LOCK_PORT") == std::string("own");
+  static const bool are_messages_wanted = std::getenv("SLS_LOCK_KIND") == std::string("messages");
   static const long count = std::atol(std::getenv("SLS_LOCK_COUNT"));
   static std::atomic<long> given_back{0};
   static std::atomic<bool> is_over{false};
   if (++given_back <= count || is_over) return false;
-  const std::string file = find_file(mutex);
-  if (file.find("/fastrtps_port") == std::string::npos) return false;
-  return is_read_here(file) == (port == "own") && !is_over.exchange(true);
+  const std::string file = find_file(lock);
+  if (file.find("/fastrtps_port") == std::string::npos || is_read_here(file) != is_own_wanted)
+    return false;
+  return is_over_messages(file, lock) == are_messages_wanted && !is_over.exchange(true);
 }
 
 }  // namespace

@@ -74,6 +74,35 @@ TEST_F(StopSignalDeathTest, WhoHangsAfterTheSignalIsEndedWithALine) {
       testing::ExitedWithCode(128 + SIGTERM), "^[^ ]+: error: hangs after the stop signal");
 }
 
+TEST_F(StopSignalDeathTest, WorkThatMayTakeLongIsNotEnded) {
+  EXPECT_EXIT(
+      {
+        install_stop_signals(std::chrono::seconds(1));
+        {
+          const Unhurried before;
+          std::raise(SIGTERM);
+          std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+        }
+        const Unhurried after;
+        std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+        std::exit(stop_signal());
+      },
+      testing::ExitedWithCode(SIGTERM), "");
+}
+
+TEST_F(StopSignalDeathTest, WhoHangsAfterSuchWorkIsEnded) {
+  EXPECT_EXIT(
+      {
+        install_stop_signals(std::chrono::seconds(1));
+        {
+          const Unhurried work;
+          std::raise(SIGTERM);
+        }
+        while (true) ::pause();
+      },
+      testing::ExitedWithCode(128 + SIGTERM), "^[^ ]+: error: hangs after the stop signal");
+}
+
 TEST_F(StopSignalDeathTest, ABrokenPipeIsReportedByTheWrite) {
   EXPECT_EXIT(
       {

@@ -1,5 +1,6 @@
 #include "common/bus/shared_locks.hpp"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <pthread.h>
 #include <semaphore.h>
@@ -8,11 +9,16 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cerrno>
 #include <chrono>
 #include <cmath>
 #include <ctime>
+#include <fstream>
+#include <string>
 #include <thread>
+
+#include "tests/support/waiting.hpp"
 
 namespace sls::bus {
 namespace {
@@ -56,23 +62,32 @@ class SharedLocksTest : public testing::Test {
     ASSERT_EQ(sem_init(&port_->semaphore, 1, 0), 0);
   }
 
+  // The port stays: a lock once known as a reader's own would be taken for it at the same place.
   void TearDown() override {
     if (holder_ > 0) {
       kill(holder_, SIGKILL);
       waitpid(holder_, nullptr, 0);
     }
-    munmap(port_, sizeof(Port));
   }
 
-  /// A process that takes the lock, sends itself the signal, and gives the lock back.
+  /// A process that takes the lock, sends itself the signal, and gives the lock back; with signal 0
+  /// it keeps the lock.
   void start_holder(int signal) {
     holder_ = fork();
     ASSERT_GE(holder_, 0);
     if (holder_ == 0) {
       pthread_mutex_lock(&port_->mutex);
+      if (signal == 0) {
+        sem_post(&port_->semaphore);
+        while (true) pause();
+      }
       raise(signal);
       pthread_mutex_unlock(&port_->mutex);
       _exit(0);
+    }
+    if (signal == 0) {
+      sem_wait(&port_->semaphore);
+      return;
     }
     int status = 0;
     ASSERT_EQ(waitpid(holder_, &status, WUNTRACED), holder_);
@@ -90,20 +105,46 @@ class SharedLocksTest : public testing::Test {
     return sem_timedwait(&port_->semaphore, &deadline) == 0 ? 0 : errno;
   }
 
-  /// Of a thread like the library's that reads a port: it waits for messages, then takes the lock
-  /// again, behind a stopped process that gets the signal when the reader's deadline is over.
+  /// A thread that waits for the lock, or, as a reader of the port, for messages and then for the
+  /// lock that it takes again. Made when it waits there.
+  class Waiting {
+   public:
+    explicit Waiting(SharedLocksTest& test, bool is_reader = false, double patience_s = kLong_s)
+        : thread_([this, &test, is_reader, patience_s] {
+            if (is_reader) {
+              EXPECT_EQ(test.wait_within(kLong_s), ETIMEDOUT);
+            }
+            id_ = gettid();
+            result_ = test.lock_within(patience_s);
+            if (result_ == 0) pthread_mutex_unlock(&test.port_->mutex);
+          }) {
+      EXPECT_TRUE(test::wait_until([this] { return id_ != 0 && is_asleep(); }));
+    }
+    /// What the lock said.
+    int finish() {
+      thread_.join();
+      return result_;
+    }
+
+   private:
+    bool is_asleep() const {
+      std::ifstream stat("/proc/self/task/" + std::to_string(id_) + "/stat");
+      std::string line;
+      std::getline(stat, line);
+      return line.find(") S ") != std::string::npos;
+    }
+    std::atomic<pid_t> id_{0};
+    int result_ = -1;
+    std::thread thread_;
+  };
+
+  /// The reader's deadline is over when the stopped holder of its lock gets the signal.
   void expect_reader_waits_until(int signal) {
     start_holder(SIGSTOP);
-    const auto start = Clock::now();
-    std::thread reader([&] {
-      EXPECT_EQ(wait_within(kLong_s), ETIMEDOUT);
-      EXPECT_EQ(lock_within(0.2), 0);
-      EXPECT_GE(seconds_since(start), 0.5);
-      EXPECT_EQ(pthread_mutex_unlock(&port_->mutex), 0);
-    });
-    while (seconds_since(start) < 0.5) std::this_thread::yield();
+    Waiting reader(*this, true, 0.2);
+    std::this_thread::sleep_for(std::chrono::milliseconds(400));
     kill(holder_, signal);
-    reader.join();
+    EXPECT_EQ(reader.finish(), 0);
   }
 
   Port* port_ = nullptr;
@@ -131,18 +172,19 @@ TEST_F(SharedLocksTest, NobodyWaitsForAStoppedProcess) {
   EXPECT_EQ(pthread_mutex_unlock(&port_->mutex), 0);
 }
 
-TEST_F(SharedLocksTest, ButForOneThatIsOnlySlow) {
+TEST_F(SharedLocksTest, OneWhoIsOnlySlowIsWaitedFor) {
   ASSERT_EQ(pthread_mutex_lock(&port_->mutex), 0);
-  int result = -1;
-  const auto start = Clock::now();
-  std::thread waiting([&] {
-    result = lock_within(kLong_s);
-    pthread_mutex_unlock(&port_->mutex);
-  });
-  while (seconds_since(start) < 0.3) std::this_thread::yield();  // longer than for a stopped one
-  pthread_mutex_unlock(&port_->mutex);
-  waiting.join();
-  EXPECT_EQ(result, 0);
+  Waiting waiting(*this);
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));  // longer than for a stopped one
+  ASSERT_EQ(pthread_mutex_unlock(&port_->mutex), 0);
+  EXPECT_EQ(waiting.finish(), 0);
+}
+
+TEST_F(SharedLocksTest, TheLockOfAProcessThatDiesGoesToOneWhoAlreadyWaits) {
+  start_holder(0);
+  Waiting waiting(*this);
+  kill(holder_, SIGKILL);
+  EXPECT_EQ(waiting.finish(), 0);
 }
 
 TEST_F(SharedLocksTest, AReaderLooksAtItsPortBeforeItsTime) {
@@ -151,10 +193,16 @@ TEST_F(SharedLocksTest, AReaderLooksAtItsPortBeforeItsTime) {
   EXPECT_LT(seconds_since(start), kSlow_s);
 }
 
-TEST_F(SharedLocksTest, WhoWaitsForALockWaitsToTheEnd) {
+TEST_F(SharedLocksTest, WhoWaitsForANamedSemaphoreWaitsToTheEnd) {
+  const std::string name = "/sls_test_" + std::to_string(getpid());
+  sem_t* semaphore = sem_open(name.c_str(), O_CREAT | O_EXCL, 0600, 0);
+  ASSERT_NE(semaphore, SEM_FAILED);
+  sem_unlink(name.c_str());
   const auto start = Clock::now();
-  EXPECT_EQ(wait_within(0.5), ETIMEDOUT);
+  const timespec deadline = after(0.5);
+  EXPECT_EQ(sem_timedwait(semaphore, &deadline), -1);
   EXPECT_GE(seconds_since(start), 0.5);
+  sem_close(semaphore);
 }
 
 TEST_F(SharedLocksTest, AReaderWaitsForItsOwnPortUntilAStoppedProcessGoesOn) {
