@@ -63,8 +63,9 @@ std::int64_t now_ns() {  // of the clock of the deadlines
   return to_ns(now);
 }
 
-/// A lock that a dead process held is held by us now. What it guards in a port stays usable:
-/// indices of a ring of messages, each moved by one atomic operation, and who listens to it.
+/// A lock that a dead process held is held by us now. What it guards in a port is a ring of
+/// messages and who waits for them; only between two of the dead's instructions, which reserve a
+/// place in the ring and fill it, is there a state that its reader cannot go on from.
 int take_over(int result, pthread_mutex_t* mutex) {
   return result == EOWNERDEAD ? pthread_mutex_consistent(mutex) : result;
 }
@@ -110,11 +111,10 @@ int pthread_mutexattr_setpshared(pthread_mutexattr_t* attributes, int shared) no
 int pthread_mutex_timedlock(pthread_mutex_t* mutex, const timespec* deadline) noexcept {
   using namespace sls::bus;
   static const auto next = find_next(&pthread_mutex_timedlock, "pthread_mutex_timedlock");
+  const bool is_next_own = own_locks_to_come > 0;
+  if (is_next_own) --own_locks_to_come;
   if (!is_on || (mutex->__data.__kind & kRobustBit) == 0) return next(mutex, deadline);
-  if (own_locks_to_come > 0) {
-    --own_locks_to_come;
-    remember_as_own(mutex);
-  }
+  if (is_next_own) remember_as_own(mutex);
   if (is_own(mutex)) return take_over(pthread_mutex_lock(mutex), mutex);
   int result = take_over(pthread_mutex_trylock(mutex), mutex);
   if (result != EBUSY) return result;
