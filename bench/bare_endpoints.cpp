@@ -1,12 +1,9 @@
 #include "bench/bare_endpoints.hpp"
 
-#include "common/bus/shared_locks.hpp"
-
 namespace sls::bench {
 
 BareNode::BareNode(const std::filesystem::path& qos_file, int domain, const std::string& identity) {
   bus::load_profiles(qos_file, identity);
-  bus::guard_shared_locks();  // made robust by another process, they need who can take them over
   auto* factory = dds::DomainParticipantFactory::get_instance();
   dds::DomainParticipantQos qos;
   factory->get_participant_qos_from_profile(bus::kParticipantProfile, qos);

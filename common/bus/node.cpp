@@ -64,6 +64,7 @@ void load_profiles(const std::filesystem::path& file, const std::string& identit
   setenv("SKIP_DEFAULT_XML_FILE", "1", 1);
   unsetenv("FASTRTPS_DEFAULT_PROFILES_FILE");
   MiddlewareLog::start(is_secured);
+  guard_shared_locks();
   auto* factory = dds::DomainParticipantFactory::get_instance();
   factory->load_profiles();
   if (factory->load_XML_profiles_string(profiles.data(), profiles.size()) !=
@@ -122,7 +123,6 @@ struct Node::Impl {
     auto& participants = qos.allocation().participants;
     participants.maximum = std::min(participants.maximum, kMaxParticipants);
     MiddlewareLog::clear();
-    guard_shared_locks();
     remove_stale_segments();
     auto& wire = qos.wire_protocol();
     if (wire.participant_id < 0)

@@ -63,6 +63,11 @@ std::int64_t now_ns() {  // of the clock of the deadlines
   return to_ns(now);
 }
 
+/// The earlier of the deadline and so long from now.
+timespec limit(const timespec& deadline, std::int64_t patience_ns) {
+  return to_timespec(std::min(to_ns(deadline), now_ns() + patience_ns));
+}
+
 /// A lock that a dead process held is held by us now. What it guards in a port is a ring of
 /// messages and who waits for them; only between two of the dead's instructions, which reserve a
 /// place in the ring and fill it, is there a state that its reader cannot go on from.
@@ -125,10 +130,9 @@ int pthread_mutex_timedlock(pthread_mutex_t* mutex, const timespec* deadline) no
     if (is_holder_stopped(*mutex)) return ETIMEDOUT;
     stopped = nullptr;
   }
-  const timespec look = to_timespec(now_ns() + kPatienceWithStopped_ns);
-  const bool is_short = to_ns(*deadline) <= to_ns(look);
-  result = take_over(next(mutex, is_short ? deadline : &look), mutex);
-  if (result != ETIMEDOUT || is_short) return result;
+  const timespec look = limit(*deadline, kPatienceWithStopped_ns);
+  result = take_over(next(mutex, &look), mutex);
+  if (result != ETIMEDOUT) return result;
   if (is_holder_stopped(*mutex)) {
     stopped = mutex;
     return result;
@@ -139,8 +143,8 @@ int pthread_mutex_timedlock(pthread_mutex_t* mutex, const timespec* deadline) no
 int sem_timedwait(sem_t* semaphore, const timespec* deadline) {
   using namespace sls::bus;
   static const auto next = find_next(&sem_timedwait, "sem_timedwait");
-  const timespec look = to_timespec(now_ns() + kLook_ns);
   if (!is_on || !is_of_port(semaphore)) return next(semaphore, deadline);
   own_locks_to_come = 2;
-  return next(semaphore, to_ns(*deadline) <= to_ns(look) ? deadline : &look);
+  const timespec look = limit(*deadline, kLook_ns);
+  return next(semaphore, &look);
 }

@@ -14,7 +14,9 @@ namespace sls::bus {
 ///   lost, and a reliable stream sends it again (a stopped process is found where both see the same
 ///   process ids, so not from one container to another);
 /// - a reader looks at its port ten times a second, and not only when somebody wakes it: who dies
-///   after a message and before the call that wakes the reader leaves a port that wakes nobody.
+///   after a message and before the call that wakes the reader leaves a port that wakes nobody;
+/// - a reader waits for the locks of its own port as long as it takes: where it gives up after 1 s,
+///   the library ends its process.
 ///
 /// It works by standing before three functions of the C library (`shared_locks.cpp`). To be called
 /// before the first participant is created; may be called again; never throws.

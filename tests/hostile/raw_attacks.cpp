@@ -135,7 +135,7 @@ Bytes make_random_bytes(std::mt19937_64& random) {
 bool has_endless_gap(const Bytes& packet) {
   constexpr std::uint8_t kHeartbeat = 0x07, kGap = 0x08;
   constexpr std::size_t kHeader = 4, kFirstAt = 12, kBaseAt = 20, kEnd = 28;
-  constexpr std::uint64_t kLongest = 10000;
+  constexpr std::int64_t kLongest = 10000;
   for (std::size_t at = kRtpsHeader; at + kHeader <= packet.size();) {
     const bool is_little = packet[at + 1] & 1;
     const auto read = [&](std::size_t from, std::size_t size) {
@@ -151,9 +151,8 @@ bool has_endless_gap(const Bytes& packet) {
       const auto first = read_sequence_number(at + kFirstAt);
       const auto base = read_sequence_number(at + kBaseAt);
       const auto gap = static_cast<std::uint64_t>(base) - static_cast<std::uint64_t>(first);
-      if (packet[at] == kGap && base > first && gap > kLongest) return true;
-      if (packet[at] == kHeartbeat && first > 0 && static_cast<std::uint64_t>(first) > kLongest)
-        return true;
+      if (packet[at] == kGap && base > first && gap > std::uint64_t{kLongest}) return true;
+      if (packet[at] == kHeartbeat && first > kLongest) return true;
     }
     at += kHeader + read(at + 2, 2);
   }

@@ -35,10 +35,7 @@ TEST_F(NoMulticastTest, ADiscoveryServerBringsThemTogether) {
 
 /// `short`, but it waits for the others only so long.
 std::string make_impatient_scenario(const TemporaryFolder& folder, int timeout_s) {
-  const std::string file = folder / "impatient.yaml";
-  write_bytes(file, replace_once(read_file(scenario("short")), "timeout_s: 30",
-                                 "timeout_s: " + std::to_string(timeout_s)));
-  return file;
+  return make_scenario(folder, {{"timeout_s: 30", "timeout_s: " + std::to_string(timeout_s)}});
 }
 
 TEST_F(NoMulticastTest, WithLanEachSaysWhoIsMissingAndThatItMayBeTheMulticast) {

@@ -44,11 +44,8 @@ const std::vector<std::string> kProfiles = {"lan", "unicast", "discovery_server"
 
 /// The figure eight for 16 s, 4,000 steps, with patience for a start over a bad link.
 std::string make_scenario(const TemporaryFolder& folder) {
-  const std::string file = folder / "scenario.yaml";
-  const std::string text =
-      replace_once(read_file(scenario("figure_eight")), "for_s: 32", "for_s: 16");
-  write_bytes(file, replace_once(text, "timeout_s: 30", "timeout_s: 120"));
-  return file;
+  return make_scenario(folder, {{"for_s: 32", "for_s: 16"}, {"timeout_s: 30", "timeout_s: 120"}},
+                       "figure_eight");
 }
 
 std::string format(const Figures& figures) {

@@ -57,10 +57,7 @@ TEST_F(NetworkTest, ALinkThatLosesTwentyPercent) {
   network_->lose(20);
   // The middleware's discovery repairs itself once a second: half a minute is not always enough.
   const TemporaryFolder folder;
-  const std::string patient = folder / "scenario.yaml";
-  write_bytes(patient,
-              replace_once(read_file(scenario("short")), "timeout_s: 30", "timeout_s: 120"));
-  expect_same("wifi", patient);
+  expect_same("wifi", make_scenario(folder, {{"timeout_s: 30", "timeout_s: 120"}}));
   EXPECT_GT(network_->lost(), 200u);
 }
 

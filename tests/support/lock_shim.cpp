@@ -2,8 +2,7 @@
 /// others. After it has given back SLS_LOCK_COUNT of them, it sends itself SLS_LOCK_SIGNAL instead
 /// of giving back the next one of a shared-memory port
 /// - that it reads, with SLS_LOCK_PORT=own, or that another process reads, with other;
-/// - over the port's messages, with SLS_LOCK_KIND=messages, or over who waits for them, with
-/// waiters.
+/// - over the port's messages with SLS_LOCK_KIND=messages, over who waits for them with waiters.
 #include <dlfcn.h>
 #include <pthread.h>
 #include <signal.h>

@@ -5,6 +5,10 @@
 
 namespace sls::test {
 
+inline bool holds(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
 /// `text` with the one place where it holds `from` changed to `to`.
 /// @throws std::logic_error if there is not exactly one.
 inline std::string replace_once(std::string text, const std::string& from, const std::string& to) {

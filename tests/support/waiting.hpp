@@ -1,7 +1,11 @@
 #pragma once
 
+#include <sys/types.h>
+
 #include <chrono>
+#include <fstream>
 #include <functional>
+#include <string>
 #include <thread>
 
 namespace sls::test {
@@ -17,6 +21,15 @@ inline bool wait_until(const std::function<bool()>& is_met,
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }
   return true;
+}
+
+/// What a process or thread does: R runs, S sleeps, T is stopped; ? where there is none.
+inline char find_state(pid_t id) {
+  std::ifstream stat("/proc/" + std::to_string(id) + "/stat");
+  std::string line;
+  std::getline(stat, line);
+  const auto name_end = line.rfind(") ");
+  return name_end == std::string::npos ? '?' : line.at(name_end + 2);
 }
 
 }  // namespace sls::test

@@ -279,10 +279,8 @@ int count_orphans() {
 
 int run_trials(int trials, std::uint64_t seed, bool is_verbose) {
   TemporaryFolder folder;
-  const std::string file = folder / "chaos.yaml";
-  const std::string two =
-      replace_once(read_file(scenario("figure_eight")), "controllers: 1", "controllers: 2");
-  write_bytes(file, replace_once(two, "for_s: 32", "for_s: 16"));
+  const std::string file = make_scenario(
+      folder, {{"controllers: 1", "controllers: 2"}, {"for_s: 32", "for_s: 16"}}, "figure_eight");
   // Undisturbed: the same scenario, both clients.
   FlightOptions options;
   options.server = {"--period-s", "0.001"};

@@ -45,10 +45,9 @@ void expect_parsable(const fs::path& recording) {
 /// The short flight with another text in it and quick time limits.
 std::string make_scenario(const TemporaryFolder& folder, const std::string& from,
                           const std::string& to, const std::string& base = "short") {
-  const std::string file = folder / "scenario.yaml";
-  std::string text = replace_once(read_file(scenario(base)), "timeout_s: 30", "timeout_s: 4");
-  write_bytes(file, from.empty() ? text : replace_once(text, from, to));
-  return file;
+  std::vector<std::pair<std::string, std::string>> changes = {{"timeout_s: 30", "timeout_s: 4"}};
+  if (!from.empty()) changes.emplace_back(from, to);
+  return make_scenario(folder, changes, base);
 }
 
 TEST(FaultsTest, InterruptedProgramsCloseTheirFilesAndSayWhichSignal) {

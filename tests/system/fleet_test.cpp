@@ -25,10 +25,6 @@ std::string read_certificate(const fs::path& recording) {
   return read_manifest(recording).at("certificate").get<std::string>();
 }
 
-bool holds(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
-
 /// True where `rows` begins with `beginning`.
 bool begin_with(const std::vector<std::string>& rows, const std::vector<std::string>& beginning) {
   return rows.size() >= beginning.size() &&

@@ -102,9 +102,8 @@ TEST_F(OneResultTest, PausedSteppedAndResumed) {
 TEST_F(OneResultTest, WithThePrimaryKilled) {
   TemporaryFolder folder;
   // The same bytes apart from the number of clients, which is no part of the certificate.
-  const std::string file = folder / "scenario.yaml";
-  write_bytes(
-      file, replace_once(read_file(scenario("figure_eight")), "controllers: 1", "controllers: 2"));
+  const std::string file =
+      make_scenario(folder, {{"controllers: 1", "controllers: 2"}}, "figure_eight");
   Flight flight(file, {{}, {}, {"--name", "primary", "--strength", "2"}});
   Process standby(make_command("control_client", flight.domain.number(),
                                {"--scenario", file, "--name", "standby", "--strength", "1"}));

@@ -93,4 +93,14 @@ std::string qos(const std::string& name) {
   return std::string(SLS_SOURCE_DIR) + "/config/qos/" + name + ".xml";
 }
 
+std::string make_scenario(const TemporaryFolder& folder,
+                          const std::vector<std::pair<std::string, std::string>>& changes,
+                          const std::string& base) {
+  std::string text = read_file(scenario(base));
+  for (const auto& [from, to] : changes) text = replace_once(text, from, to);
+  const std::string file = folder / "scenario.yaml";
+  write_bytes(file, text);
+  return file;
+}
+
 }  // namespace sls::test

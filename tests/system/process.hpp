@@ -9,6 +9,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/support/temporary_folder.hpp"
@@ -54,5 +55,11 @@ std::string read_file(const std::filesystem::path& file);
 std::string program(const std::string& name);
 std::string scenario(const std::string& name);
 std::string qos(const std::string& name);
+
+/// A shipped scenario, the short flight (2 s) or another, with `changes` to its text: a file in
+/// `folder`.
+std::string make_scenario(const TemporaryFolder& folder,
+                          const std::vector<std::pair<std::string, std::string>>& changes,
+                          const std::string& base = "short");
 
 }  // namespace sls::test

@@ -9,10 +9,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool holds(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
-
 /// What `sls_verify` says about two recordings, and whether they are equal.
 std::pair<bool, std::string> verify(const fs::path& a, const fs::path& b) {
   Process process({program("sls_verify"), a.string(), b.string()});

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 
-#include "tests/support/text.hpp"
 #include "tests/system/flight.hpp"
 
 namespace sls::test {
@@ -15,9 +14,8 @@ class SharedLockTest : public testing::TestWithParam<const char*> {
   /// Starts a flight of two clients. The primary sends itself `signal` in the middle of the flight,
   /// while it holds a lock of its own port or of that of another process.
   void start(int signal, const std::string& port) {
-    const std::string file = folder_ / "scenario.yaml";
-    write_bytes(file, replace_once(read_file(scenario("figure_eight")), "controllers: 1",
-                                   "controllers: 2"));
+    const std::string file =
+        make_scenario(folder_, {{"controllers: 1", "controllers: 2"}}, "figure_eight");
     FlightOptions options{{}, {}, {"--name", "primary", "--strength", "2"}, {}};
     options.before["control_client"] = {"env",
                                         std::string("LD_PRELOAD=") + SLS_LOCK_SHIM,
@@ -31,14 +29,9 @@ class SharedLockTest : public testing::TestWithParam<const char*> {
                      {"--scenario", file, "--name", "standby", "--strength", "1"}));
   }
 
-  bool is_said(const char* words) const {
-    return flight_->server->output().find(words) != std::string::npos;
-  }
+  bool is_said(const char* words) const { return holds(flight_->server->output(), words); }
 
-  bool is_primary_stopped() const {
-    return read_file("/proc/" + std::to_string(flight_->client->id()) + "/stat").find(") T ") !=
-           std::string::npos;
-  }
+  bool is_primary_stopped() const { return find_state(flight_->client->id()) == 'T'; }
 
   /// Of the flight without the primary.
   void expect_result() {

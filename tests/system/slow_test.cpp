@@ -12,10 +12,8 @@ namespace {
 /// The figure eight for 60 s at a real-time factor of 1.
 class RealTimeMinuteTest : public ::testing::Test {
  protected:
-  std::string make_scenario() const {
-    const std::string file = folder_ / "minute.yaml";
-    write_bytes(file, replace_once(read_file(scenario("figure_eight")), "for_s: 32", "for_s: 60"));
-    return file;
+  std::string make_minute() const {
+    return make_scenario(folder_, {{"for_s: 32", "for_s: 60"}}, "figure_eight");
   }
   static std::string read_timing(const Flight& flight) {
     const std::string timing = read_manifest(flight.recording()).at("timing");
@@ -26,14 +24,14 @@ class RealTimeMinuteTest : public ::testing::Test {
 };
 
 TEST_F(RealTimeMinuteTest, NoAnswerIsLateOnAnIdleMachine) {
-  Flight flight(make_scenario(), {{}, {"--mode", "realtime"}, {}});
+  Flight flight(make_minute(), {{}, {"--mode", "realtime"}, {}});
   flight.expect_success();
   EXPECT_EQ(read_timing(flight).rfind("real-time, 0 of 15000 late, worst age 0 ms", 0), 0u);
 }
 
 TEST_F(RealTimeMinuteTest, WithEveryCoreBusyTheFlightIsStableAndTheLabelSaysWhatHappened) {
   const Load load(std::thread::hardware_concurrency());
-  Flight flight(make_scenario(), {{}, {"--mode", "realtime"}, {}});
+  Flight flight(make_minute(), {{}, {"--mode", "realtime"}, {}});
   flight.expect_success();
   const std::string timing = read_timing(flight);
   EXPECT_NE(timing.find("real-time, "), std::string::npos) << timing;

@@ -7,21 +7,6 @@
 namespace sls::test {
 namespace {
 
-/// The short flight (2 s) with `changes` to its text.
-std::string make_scenario(const TemporaryFolder& folder,
-                          const std::vector<std::pair<std::string, std::string>>& changes,
-                          const std::string& base = "short") {
-  std::string text = read_file(scenario(base));
-  for (const auto& [from, to] : changes) text = replace_once(text, from, to);
-  const std::string file = folder / "scenario.yaml";
-  write_bytes(file, text);
-  return file;
-}
-
-bool holds(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
-
 std::string read_timing(const std::filesystem::path& recording) {
   return read_manifest(recording).at("timing").get<std::string>();
 }

@@ -161,11 +161,9 @@ TEST(UsageTest, RecorderRefusesAFolderThatIsNotEmptyAndReplacesARecordingWithFor
 
 TEST(UsageTest, ServerNamesWhoIsMissingAtTheStart) {
   TemporaryFolder folder;
-  write_bytes(folder / "scenario.yaml",
-              replace_once(read_file(scenario("short")), "timeout_s: 30", "timeout_s: 3"));
+  const std::string file = make_scenario(folder, {{"timeout_s: 30", "timeout_s: 3"}});
   OwnDomain domain;
-  Process server(
-      make_command("sim_server", domain.number(), {"--scenario", folder / "scenario.yaml"}));
+  Process server(make_command("sim_server", domain.number(), {"--scenario", file}));
   EXPECT_EQ(server.wait(), 1);
   EXPECT_NE(server.output().find("waiting for: controller, recorder"), std::string::npos)
       << server.output();

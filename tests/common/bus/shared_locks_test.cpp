@@ -14,7 +14,6 @@
 #include <chrono>
 #include <cmath>
 #include <ctime>
-#include <fstream>
 #include <string>
 #include <thread>
 
@@ -118,7 +117,7 @@ class SharedLocksTest : public testing::Test {
             result_ = test.lock_within(patience_s);
             if (result_ == 0) pthread_mutex_unlock(&test.port_->mutex);
           }) {
-      EXPECT_TRUE(test::wait_until([this] { return id_ != 0 && is_asleep(); }));
+      EXPECT_TRUE(test::wait_until([this] { return id_ != 0 && test::find_state(id_) == 'S'; }));
     }
     /// What the lock said.
     int finish() {
@@ -127,12 +126,6 @@ class SharedLocksTest : public testing::Test {
     }
 
    private:
-    bool is_asleep() const {
-      std::ifstream stat("/proc/self/task/" + std::to_string(id_) + "/stat");
-      std::string line;
-      std::getline(stat, line);
-      return line.find(") S ") != std::string::npos;
-    }
     std::atomic<pid_t> id_{0};
     int result_ = -1;
     std::thread thread_;
