@@ -79,6 +79,12 @@ std::optional<bus::Run> Client::find_joinable_run() const {
   return std::nullopt;
 }
 
+std::optional<bus::Run> Client::find_next_run() const {
+  for (const std::uint32_t id : flown_ids_)
+    if (auto run = servers_.find_successor(*run_, id)) return run;
+  return std::nullopt;
+}
+
 void Client::begin(const bus::Run& run) {
   const Parameters& parameters = run.parameters;
   if (!(parameters.scenario_sha256() == scenario_.sha256))
@@ -198,18 +204,14 @@ bool Client::has_ended() const {
 
 std::optional<bus::Run> Client::find_successor() {
   const auto finding = watch_->look();
-  const auto next = find_joinable_run();
-  if (next && next->parameters.run_id() != run_->parameters.run_id()) {
+  if (auto next = find_next_run()) {
     const bool is_reset = next->server == run_->server;
-    const bool is_replaced = servers_.is_silent(run_->parameters.run_id());
     const std::string news =
         fmt::format("run {:016x} was {} run {:016x}", run_->parameters.run_id(),
                     is_reset ? "reset to" : "replaced by", next->parameters.run_id());
-    if (is_reset || (follows_servers_ && is_replaced)) {
-      spdlog::warn("{}: follows it", news);
-      return next;
-    }
-    if (is_replaced) throw app::RunError(news + " (see --follow)");
+    if (!is_reset && !follows_servers_) throw app::RunError(news + " (see --follow)");
+    spdlog::warn("{}: follows it", news);
+    return next;
   }
   if (finding == bus::ServerWatch::Finding::kLost)
     throw app::RunError(fmt::format("the {}, expected it to finish", watch_->describe()));

@@ -116,16 +116,9 @@ std::optional<bus::Run> Recorder::wait_for_next_run(const bus::Run& ended, doubl
 }
 
 std::optional<bus::Run> Recorder::find_follower(const bus::Run& ended) const {
-  for (const bus::Run& run : surroundings_.servers.runs()) {
-    if (run.parameters.run_id() == ended.parameters.run_id() || !run.status) continue;
-    if (bus::calc_progress(run.status) < 0 ||
-        !bus::serves_vehicle(run.parameters, options_.vehicle))
-      continue;
-    if (run.server == ended.server ||
-        (options_.follow && surroundings_.servers.is_silent(ended.parameters.run_id())))
-      return run;
-  }
-  return std::nullopt;
+  auto next = surroundings_.servers.find_successor(ended, options_.vehicle);
+  if (next && !(next->server == ended.server) && !options_.follow) return std::nullopt;
+  return next;
 }
 
 // --- where it goes -------------------------------------------------------------------------------

@@ -19,7 +19,7 @@ constexpr auto kPollTime = 20ms;           // between two looks at the run
 constexpr auto kAnnounceTime = 500ms;      // between two announcements at the latest
 constexpr auto kWriteTime = 5ms;           // between two batches of the writing thread
 constexpr auto kStuckTime = 1s;            // until it is said what a step waits for
-constexpr auto kCompletionTime = 10s;      // for what is missing after the end of a finished run
+constexpr auto kCompletionTime = 10s;      // after the end of a finished run, for the next step
 constexpr auto kFailedTime = 1s;           // likewise of any other
 constexpr auto kInterruptionTime = 500ms;  // likewise after a stop signal
 
@@ -106,6 +106,8 @@ void RunRecorder::look_for_the_end(bus::ServerWatch& server) {
     end_within(kInterruptionTime);
   } else if (status && status->phase() == PHASE_FINISHED) {
     end_within(kCompletionTime);
+    const std::int64_t step = last_complete_step_;
+    if (step > std::exchange(step_after_end_, step)) give_up_->renew();
   } else if (status && (status->phase() == PHASE_FAILED || status->phase() == PHASE_RESET)) {
     end_within(kFailedTime);
   } else if (!give_up_) {
@@ -121,21 +123,15 @@ void RunRecorder::look_for_the_end(bus::ServerWatch& server) {
 
 /// Another run may be the end of this one: its own server's, or that of a server in its place.
 void RunRecorder::look_for_the_next_run() {
-  const bool is_server_dead = surroundings_.servers.is_silent(run_id_);
-  for (const bus::Run& other : surroundings_.servers.runs()) {
-    const bool is_own_server = other.server == run_.server;
-    const bool is_joinable = other.status && bus::calc_progress(other.status) >= 0 &&
-                             bus::serves_vehicle(other.parameters, run_.parameters.vehicle_id());
-    if (other.parameters.run_id() == run_id_ || !is_joinable) continue;
-    if (!is_own_server && !is_server_dead) continue;
-    end_.is_reset = is_own_server;
-    if (!is_own_server) end_.replacement = other;
-    outcome_ = is_own_server ? "reset" : "lost";
-    interruption_ =
-        fmt::format("run {:016x} was replaced by run {:016x}", run_id_, other.parameters.run_id());
-    spdlog::warn("{}", interruption_);
-    return end_within(kFailedTime);
-  }
+  const auto next = surroundings_.servers.find_successor(run_, run_.parameters.vehicle_id());
+  if (!next) return;
+  end_.is_reset = next->server == run_.server;
+  if (!end_.is_reset) end_.replacement = next;
+  outcome_ = end_.is_reset ? "reset" : "lost";
+  interruption_ =
+      fmt::format("run {:016x} was replaced by run {:016x}", run_id_, next->parameters.run_id());
+  spdlog::warn("{}", interruption_);
+  end_within(kFailedTime);
 }
 
 void RunRecorder::end_within(std::chrono::duration<double> limit) {

@@ -72,6 +72,7 @@ class RunRecorder {
   std::int64_t announced_step_ = -1;
   Clock::time_point announced_time_;
   std::optional<app::Wait> give_up_;
+  std::int64_t step_after_end_ = -1;  // the last complete one when last looked at
   RunEnd end_;
 
   // Shared by the two.

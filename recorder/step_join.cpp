@@ -257,14 +257,16 @@ bool StepJoin::is_flyer(const std::string& client, const bus::PeerId& sender) co
   return flyer_ && flyer_->client == client && flyer_->sender == sender;
 }
 
-/// The reference of `client`, of the sender that flew last if it is there.
+/// The reference of `client`: of the sender that flew last where that was under this name, else of
+/// anybody who uses it. A late one is not replaced by what a stranger says.
 const StepJoin::Received<Reference>* StepJoin::find_reference(const Pending& pending,
                                                               const std::string& client) const {
-  const Received<Reference>* found = nullptr;
+  const bool is_flyer_known = flyer_ && flyer_->client == client;
   for (const auto& reference : pending.references)
-    if (reference.sample.client_name() == client && (!found || is_flyer(client, reference.sender)))
-      found = &reference;
-  return found;
+    if (reference.sample.client_name() == client &&
+        (!is_flyer_known || reference.sender == flyer_->sender))
+      return &reference;
+  return nullptr;
 }
 
 /// The first answer under the name `client` of which `is_accepted` holds, with the reference of its
@@ -321,9 +323,11 @@ void StepJoin::settle(const Pending& pending, const VehicleState& next, StepReco
   if (record.is_complete() || !is_late()) return;
 
   // The client died. With its reference, the next state says all; without, an equal answer does.
-  const auto* reference = find_reference(pending, client);
-  if (!record.reference && reference) record.reference = reference->sample;
-  if (!record.reference) find_stand_in(pending, is_accepted, record);
+  const auto* reference = record.command ? nullptr : find_reference(pending, client);
+  if (reference)
+    record.reference = reference->sample;
+  else
+    find_stand_in(pending, is_accepted, record);
   if (record.command || next.force_origin() != FORCE_ANSWERED) return;
   record.command = make_command(next, next.answer_f_Q_W_n());
   record.origin = AnswerOrigin::kRebuilt;
@@ -381,6 +385,8 @@ void StepJoin::hand_on(const StepRecord& record) {
 void StepJoin::give_up() {
   if (!has_begun_) begin(next_step_);
   is_giving_up_ = true;
+  for (; !end_ && !pending_.empty() && !pending_.back().state; pending_.pop_back())
+    dropped_.out_of_range += pending_.back().commands.size() + pending_.back().references.size();
   while (!pending_.empty() && !has_ended()) hand_on_first();
 }
 

@@ -44,7 +44,7 @@ struct StepRecord {
 struct DroppedSamples {
   std::uint64_t repeated = 0;      ///< a resent state, a repeated answer, one to a step handed on
   std::uint64_t other_client = 0;  ///< answers of clients whose force was not applied
-  std::uint64_t out_of_range = 0;  ///< steps that no run could have reached yet
+  std::uint64_t out_of_range = 0;  ///< of steps that no run could have reached yet, or did
 };
 
 /// Which client's answer to step k was accepted is known from state k + 1, or for the last step
@@ -81,7 +81,8 @@ class StepJoin {
   /// True when the end is known and every step up to it has been handed on.
   bool has_ended() const;
 
-  /// Hands on what there is of every step of which anything is known, complete or not.
+  /// Hands on what there is of every step up to the end or, where that is not known, the last one
+  /// with a state, complete or not: an answer, which anybody may send, shows no step.
   void give_up();
 
   /// All steps up to here have been handed on; −1: none.

@@ -11,10 +11,13 @@ class Wait {
 
   /// Begins now and lasts `timeout_s` seconds; it is first reported after `quiet_time`.
   explicit Wait(double timeout_s, Clock::duration quiet_time = std::chrono::seconds(1))
-      : began_(Clock::now()),
-        deadline_(began_ + std::chrono::duration_cast<Clock::duration>(
-                               std::chrono::duration<double>(timeout_s))),
-        next_report_(began_ + quiet_time) {}
+      : timeout_(
+            std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(timeout_s))),
+        deadline_(Clock::now() + timeout_),
+        next_report_(Clock::now() + quiet_time) {}
+
+  /// Something has come: lasts as long again from now on, and is reported as before.
+  void renew() { deadline_ = Clock::now() + timeout_; }
 
   bool is_over() const { return Clock::now() >= deadline_; }
 
@@ -33,7 +36,7 @@ class Wait {
  private:
   static constexpr auto kReportInterval = std::chrono::seconds(5);
 
-  Clock::time_point began_;
+  Clock::duration timeout_;
   Clock::time_point deadline_;
   Clock::time_point next_report_;
 };

@@ -7,6 +7,9 @@
 #include <array>
 #include <chrono>
 #include <thread>
+#include <utility>
+
+#include "common/app/stop_signal.hpp"
 
 namespace sls::bus {
 namespace {
@@ -27,6 +30,20 @@ bool make_room(std::map<PeerId, Known>& known, std::size_t most, const PeerId& s
   if (gone == known.end()) return false;
   known.erase(gone);
   return true;
+}
+
+/// The furthest of the runs that may be joined for `vehicle_id`, then the one with the lowest id.
+std::optional<Run> find_best(const std::vector<Run>& runs, std::uint32_t vehicle_id) {
+  std::optional<Run> best;
+  for (const Run& run : runs) {
+    const int progress = calc_progress(run.status);
+    if (!run.status || progress < 0 || !serves_vehicle(run.parameters, vehicle_id)) continue;
+    if (!best || progress > calc_progress(best->status) ||
+        (progress == calc_progress(best->status) &&
+         run.parameters.run_id() < best->parameters.run_id()))
+      best = run;
+  }
+  return best;
 }
 
 }  // namespace
@@ -80,12 +97,18 @@ bool are_recorders_done(const std::vector<ParticipantDirectory::Entry>& recorder
 }
 
 void wait_for_recorders_to_end(const ParticipantDirectory& participants, std::uint64_t run_id,
-                               int expected) {
-  constexpr double kLongest = 10.0;  // s
+                               int expected, const RecorderPatience& patience) {
   constexpr auto kPollTime = std::chrono::milliseconds(20);
-  app::Wait wait(kLongest);
-  while (!wait.is_over()) {
+  app::Wait wait(patience.without_news);
+  const app::Wait longest(patience.longest);
+  std::map<PeerId, std::int64_t> last_steps;
+  while (!wait.is_over() && !longest.is_over()) {
     const auto recorders = participants.find(ROLE_RECORDER, run_id);
+    for (const auto& entry : recorders) {
+      const std::int64_t step = entry.announcement.last_complete_step();
+      const auto [known, is_first] = last_steps.try_emplace(entry.peer, step);
+      if (step > std::exchange(known->second, step) && app::stop_signal() == 0) wait.renew();
+    }
     const int missing = expected - participants.count_done(ROLE_RECORDER, run_id);
     if (are_recorders_done(recorders) && missing <= 0) return;
     if (wait.is_report_due()) {
@@ -135,7 +158,9 @@ ServerDirectory::HeardRun* ServerDirectory::find_or_add_run(const PeerId& sender
     return present;
   };
   if (!make_room(servers_, kMaxServers, sender, find_present)) return nullptr;
-  auto& runs = servers_[sender].runs;
+  const auto [server, is_new] = servers_.try_emplace(sender);
+  if (is_new) server->second.known_since = std::chrono::steady_clock::now();
+  auto& runs = server->second.runs;
   for (HeardRun& run : runs)
     if (run.run_id == run_id) return &run;
   if (runs.size() == kMaxRunsOfServer) runs.pop_front();
@@ -181,8 +206,8 @@ std::vector<Run> ServerDirectory::runs() const {
   for (const auto& [server, known] : servers_) {
     if (!is_present_run(server, known, present)) continue;
     const HeardStatus* heard = find_heard(known.parameters->run_id());
-    runs.push_back(
-        {server, *known.parameters, heard ? std::optional(heard->status) : std::nullopt});
+    runs.push_back({server, *known.parameters, heard ? std::optional(heard->status) : std::nullopt,
+                    known.known_since});
   }
   return runs;
 }
@@ -198,16 +223,23 @@ bool ServerDirectory::is_known(std::uint64_t run_id) const {
 }
 
 std::optional<Run> ServerDirectory::find_joinable(std::uint32_t vehicle_id) const {
-  std::optional<Run> best;
-  for (const Run& run : runs()) {
-    const int progress = calc_progress(run.status);
-    if (!run.status || progress < 0 || !serves_vehicle(run.parameters, vehicle_id)) continue;
-    if (!best || progress > calc_progress(best->status) ||
-        (progress == calc_progress(best->status) &&
-         run.parameters.run_id() < best->parameters.run_id()))
-      best = run;
-  }
-  return best;
+  return find_best(runs(), vehicle_id);
+}
+
+std::optional<Run> ServerDirectory::find_successor(const Run& run, std::uint32_t vehicle_id) const {
+  const std::uint64_t run_id = run.parameters.run_id();
+  const auto heard = find_last_heard(run_id);
+  const bool is_dead = is_silent(run_id);
+  std::vector<Run> others = runs();
+  others.erase(std::remove_if(others.begin(), others.end(),
+                              [&](const Run& other) {
+                                const bool is_own = other.server == run.server;
+                                const bool is_new = !heard || other.server_known_since > *heard;
+                                return other.parameters.run_id() == run_id ||
+                                       !(is_own || (is_dead && is_new));
+                              }),
+               others.end());
+  return find_best(others, vehicle_id);
 }
 
 std::optional<SimStatus> ServerDirectory::find_status(std::uint64_t run_id) const {

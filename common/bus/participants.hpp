@@ -69,16 +69,23 @@ class ParticipantDirectory {
 /// True when every one of `recorders` that is not silent says it is done.
 bool are_recorders_done(const std::vector<ParticipantDirectory::Entry>& recorders);
 
-/// Waits until the recorders of run `run_id` that are there, and `expected` at least, are done, at
-/// most 10 s: until then server and clients must keep their writers. Says for whom it waits.
+/// How long recorders are waited for, s.
+struct RecorderPatience {
+  double without_news = 10;  ///< while none gets further, and after a stop signal
+  double longest = 60;       ///< anybody can announce steps
+};
+
+/// Waits until the recorders of run `run_id` that are there, and `expected` at least, are done:
+/// until then server and clients must keep their writers. Says for whom it waits.
 void wait_for_recorders_to_end(const ParticipantDirectory& participants, std::uint64_t run_id,
-                               int expected);
+                               int expected, const RecorderPatience& patience = {});
 
 /// A server's run as its samples describe it.
 struct Run {
   PeerId server;
   Parameters parameters;
   std::optional<SimStatus> status;  ///< nothing before the claim on its vehicles is settled
+  std::chrono::steady_clock::time_point server_known_since;
 };
 
 /// The last parameters and status of every server that is still there, of 64 at most: those that
@@ -99,6 +106,11 @@ class ServerDirectory {
   /// The run to join for `vehicle_id`: present, settled, neither finished nor failed; among several
   /// the one that is furthest, then the lowest run_id.
   std::optional<Run> find_joinable(std::uint32_t vehicle_id) const;
+
+  /// The run to go on with for `vehicle_id` where `run` does not: its own server's after a reset
+  /// or, where that is silent, one of another server that was not known before it fell silent.
+  /// Whoever was, had lost the vehicle to it and is no server in its place, whatever he says.
+  std::optional<Run> find_successor(const Run& run, std::uint32_t vehicle_id) const;
 
   /// The last status of run `run_id`, also of a server that has gone.
   std::optional<SimStatus> find_status(std::uint64_t run_id) const;
@@ -125,6 +137,7 @@ class ServerDirectory {
   struct Server {
     std::optional<Parameters> parameters;
     std::deque<HeardRun> runs;  // the last of them
+    std::chrono::steady_clock::time_point known_since;
   };
 
   void note(const Parameters& sample, const PeerId& sender);

@@ -1,4 +1,6 @@
 /// One attack, until SIGTERM.
+#include <sys/resource.h>
+
 #include <CLI/CLI.hpp>
 
 #include <chrono>
@@ -57,6 +59,8 @@ int main(int argc, char** argv) {
       {"readers", [&] { return read_all(target); }},
       {"malformed", [&] { return write_malformed(target); }}};
   sls::app::install_stop_signals();
+  // A neighbour has processors of its own: here it must not take those of the flight.
+  setpriority(PRIO_PROCESS, 0, 10);
   try {
     const std::uint64_t count = attacks.at(attack)();
     std::cout << attack << ": " << count << std::endl;

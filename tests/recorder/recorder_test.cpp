@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <nlohmann/json.hpp>
 #include <thread>
 
@@ -57,6 +58,15 @@ class FakeFlight {
     publish(PHASE_WAITING, 0);
   }
 
+  /// True as soon as the recorder has all that a server says of itself.
+  bool is_heard() {
+    return wait_until([this] {
+      return !parameters_writer_.matched().empty() && !status_writer_.matched().empty() &&
+             parameters_writer_.wait_for_acknowledgments(1s) &&
+             status_writer_.wait_for_acknowledgments(1s);
+    });
+  }
+
   bool wait_for_recorder() {
     return wait_until([this] {
       publish(PHASE_WAITING, 0);
@@ -67,12 +77,13 @@ class FakeFlight {
   }
 
   void fly(std::uint64_t from, std::uint64_t to) {
-    for (std::uint64_t step = from; step <= to; ++step) {
-      write(state_writer_, make_state(step));
-      write(reference_writer_, make_reference(step));
-      write(command_writer_, make_command(step));
-    }
+    for (std::uint64_t step = from; step <= to; ++step) write_step(step);
     publish(PHASE_RUNNING, to);
+  }
+  void write_step(std::uint64_t step) {
+    write(state_writer_, make_state(step));
+    write(reference_writer_, make_reference(step));
+    write(command_writer_, make_command(step));
   }
 
   void publish(RunPhase phase, std::uint64_t step) {
@@ -121,11 +132,20 @@ class RecorderTest : public testing::Test {
       } catch (const std::exception& error) {
         error_ = error.what();
       }
+      has_ended_ = true;
     });
   }
   /// Waits for its end; how it ended is in `error_`.
   void join() {
     if (thread_.joinable()) thread_.join();
+  }
+  /// The same while `waiting` says again and again that it waits, as servers do.
+  void join_beside(FakeFlight& waiting) {
+    EXPECT_TRUE(wait_until([&] {
+      waiting.publish(PHASE_WAITING, 0);
+      return has_ended_.load();
+    }));
+    join();
   }
 
   Json read_manifest(const fs::path& folder) {
@@ -149,6 +169,7 @@ class RecorderTest : public testing::Test {
   RecorderOptions options_;
   std::thread thread_;
   std::string error_ = "no error";
+  std::atomic<bool> has_ended_{false};
 };
 
 TEST_F(RecorderTest, RecordsARunToItsEnd) {
@@ -187,12 +208,27 @@ TEST_F(RecorderTest, ARunThatIsReplacedByAnotherServersEndsTheRecording) {
   ASSERT_TRUE(flight->is_recorded_up_to(99));
   flight.reset();
   FakeFlight other(kOtherRun);
-  join();
+  join_beside(other);
   EXPECT_NE(error_.find("run 0123456789abcdef was replaced by run fedcba9876543210"),
             std::string::npos)
       << error_;
   EXPECT_EQ(read_manifest(out_).at("outcome"), "lost");
   EXPECT_EQ(read_manifest(out_).at("missing"), Json::array());
+}
+
+// A server that is overwhelmed falls silent too. Who was there before is then no successor.
+TEST_F(RecorderTest, AServerThatWasThereBeforeTakesNoSilentOnesPlace) {
+  auto flight = std::make_unique<FakeFlight>(kRunId, 3);
+  start();
+  ASSERT_TRUE(flight->wait_for_recorder());
+  flight->fly(0, 100);
+  FakeFlight other(kOtherRun);
+  ASSERT_TRUE(other.is_heard());
+  ASSERT_TRUE(flight->is_recorded_up_to(99));
+  flight.reset();
+  join_beside(other);
+  EXPECT_NE(error_.find("given up after 3 s"), std::string::npos) << error_;
+  EXPECT_EQ(read_manifest(out_).at("outcome"), "lost");
 }
 
 TEST_F(RecorderTest, ARecorderThatFollowsRecordsTheOtherServersRun) {
@@ -223,6 +259,24 @@ TEST_F(RecorderTest, AServerThatStaysAwayIsGivenUp) {
   join();
   EXPECT_NE(error_.find("given up after 1.5 s"), std::string::npos) << error_;
   EXPECT_EQ(read_manifest(out_).at("outcome"), "lost");
+}
+
+// The last samples may have to be sent again and again. What is missing has 10 s step by step.
+TEST_F(RecorderTest, WhatComesLateAfterTheEndIsWaitedForWhileItComes) {
+  FakeFlight flight(kRunId);
+  start();
+  ASSERT_TRUE(flight.wait_for_recorder());
+  flight.fly(0, 10);
+  flight.publish(PHASE_FINISHED, kLastStep);
+  for (std::uint64_t step = 11; step <= 13; ++step) {
+    const auto next = std::chrono::steady_clock::now() + 4s;
+    EXPECT_TRUE(wait_until([&] { return std::chrono::steady_clock::now() > next; }));
+    flight.write_step(step);
+  }
+  for (std::uint64_t step = 14; step <= kLastStep; ++step) flight.write_step(step);
+  join();
+  EXPECT_EQ(error_, "no error");
+  expect_whole(out_);
 }
 
 TEST_F(RecorderTest, AKilledRecorderIsResumedInMidFlight) {

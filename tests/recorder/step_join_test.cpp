@@ -469,6 +469,16 @@ TEST_F(StepJoinTest, OfALostRunTheLastStepsAnswerIsNotExpected) {
   EXPECT_FALSE(records_[10].command);
 }
 
+TEST_F(StepJoinTest, OfALostRunAnswersAloneShowNoStep) {
+  add_steps(0, 10);
+  join_.add(make_command(11));
+  join_.add(make_reference(5000));
+  join_.give_up();
+  EXPECT_EQ(records_.size(), 11u);
+  EXPECT_EQ(join_.last_step(), 10);
+  EXPECT_EQ(join_.dropped().out_of_range, 2u);
+}
+
 // --- samples that make no sense ------------------------------------------------------------------
 
 TEST_F(StepJoinTest, AbsurdStepsTakeNoMemoryAndDisturbNothing) {
@@ -570,6 +580,28 @@ TEST_F(StepJoinTest, WhoUsesThePilotsNameNeitherReplacesNorKeepsOutWhatThePilotS
     join_.add(make_command(step), pilot);
   }
   expect_whole_up_to(kLastStep);
+}
+
+TEST_F(StepJoinTest, WhatIsLateOfThePilotIsNotReplacedByWhatAStrangerSays) {
+  constexpr std::uint64_t kFirstLate = 5, kLastLate = 7;
+  const bus::PeerId pilot = make_peer(1), stranger = make_peer(2);
+  for (std::uint64_t step = 0; step <= 1200; ++step) {
+    const bool is_late = step >= kFirstLate && step <= kLastLate;
+    Reference forged = make_reference(step);
+    forged.position_m({1e6, 1e6, 1e6});
+    join_.add(forged, stranger);
+    join_.add(make_state(step));
+    if (!is_late || step == kFirstLate) join_.add(make_command(step), pilot);
+    if (!is_late) join_.add(make_reference(step), pilot);
+  }
+  EXPECT_EQ(records_.size(), kFirstLate) << "the pilot's may still come";
+  for (std::uint64_t step = kFirstLate; step <= kLastLate; ++step) {
+    join_.add(make_reference(step), pilot);
+    join_.add(make_command(step), pilot);
+  }
+  ASSERT_EQ(records_.size(), 1200u);
+  for (const StepRecord& record : records_)
+    ASSERT_EQ(*record.reference, make_reference(record.step));
 }
 
 // --- property ------------------------------------------------------------------------------------

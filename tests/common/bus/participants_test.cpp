@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <atomic>
 #include <optional>
+#include <thread>
 
 #include "tests/support/waiting.hpp"
 
@@ -75,6 +76,54 @@ TEST(ParticipantDirectoryTest, KnowsWhoServesARunUntilTheyLeave) {
   }
   EXPECT_TRUE(wait_until([&] { return directory.find(ROLE_CONTROLLER, kRun).empty(); }));
   EXPECT_EQ(directory.count_done(ROLE_CONTROLLER, kRun), 1) << "also after it has left";
+}
+
+class RecorderPatienceTest : public testing::Test {
+ protected:
+  /// Announces further steps until told to be done, or for good.
+  void write_further_steps(std::chrono::steady_clock::duration time) {
+    const auto end = std::chrono::steady_clock::now() + time;
+    Participant message = make_announcement(ROLE_RECORDER, kRun, "recorder");
+    wait_until([&] {
+      message.last_complete_step(message.last_complete_step() + 1);
+      writer_.write(message);
+      return has_given_up_ || std::chrono::steady_clock::now() > end;
+    });
+    is_done_ = true;
+    message.done(true);
+    writer_.write(message);
+  }
+  /// True where the recorder was done before.
+  bool wait_for_recorder(const RecorderPatience& patience) {
+    EXPECT_TRUE(wait_until([&] { return directory_.find(ROLE_RECORDER, kRun).size() == 1; }));
+    wait_for_recorders_to_end(directory_, kRun, 1, patience);
+    const bool was_done = is_done_;
+    has_given_up_ = true;
+    return was_done;
+  }
+
+  static constexpr int kDomain = 77;
+  Node node_{kQosFile, kDomain, "directory"}, recorder_{kQosFile, kDomain, "recorder"};
+  const ParticipantDirectory directory_{node_};
+  Writer<Participant> writer_{recorder_};
+  std::atomic<bool> is_done_{false}, has_given_up_{false};
+};
+
+TEST_F(RecorderPatienceTest, OneThatGetsFurtherIsWaitedFor) {
+  std::thread recording([this] { write_further_steps(std::chrono::seconds(3)); });
+  EXPECT_TRUE(wait_for_recorder({2, 60}));
+  recording.join();
+}
+
+TEST_F(RecorderPatienceTest, ButNotForEver) {
+  std::thread recording([this] { write_further_steps(std::chrono::seconds(60)); });
+  EXPECT_FALSE(wait_for_recorder({60, 0.5}));
+  recording.join();
+}
+
+TEST_F(RecorderPatienceTest, OneThatGetsNoFurtherIsNot) {
+  writer_.write(make_announcement(ROLE_RECORDER, kRun, "recorder"));
+  EXPECT_FALSE(wait_for_recorder({0.5, 60}));
 }
 
 TEST(ServerDirectoryTest, FindsTheRunToJoin) {
@@ -184,6 +233,54 @@ TEST(ServerWatchTest, ASilentServerIsNotJoinedIsGivenUpAndMayComeBack) {
   const auto later = ServerWatch::Clock::now() + std::chrono::milliseconds(1500);
   ASSERT_TRUE(wait_until([&] { return ServerWatch::Clock::now() > later; }));
   EXPECT_EQ(watch.look(), ServerWatch::Finding::kThere);
+}
+
+// A server whose samples are late, because this process or the network is overwhelmed, is taken for
+// dead as well: then whoever claims its vehicle all along must not have it.
+TEST(ServerDirectoryTest, OnlyAServerThatComesAfterTheSilenceBeganIsASuccessor) {
+  constexpr int kDomain = 78;
+  Node node(kQosFile, kDomain, "directory");
+  const ServerDirectory directory(node);
+  Node server(kQosFile, kDomain, "server"), stranger(kQosFile, kDomain, "stranger");
+  Writer<Parameters> parameters(server), strangers_parameters(stranger);
+  Writer<SimStatus> status(server), strangers_status(stranger);
+  parameters.write(make_parameters(kRun, {kVehicle}));
+  strangers_parameters.write(make_parameters(kLowerRun, {kVehicle}));
+  auto joined = directory.find_joinable(kVehicle);
+  ASSERT_TRUE(wait_until([&] {
+    status.write(make_status(kRun, PHASE_RUNNING));
+    strangers_status.write(make_status(kLowerRun, PHASE_WAITING));
+    joined = directory.find_joinable(kVehicle);
+    return joined && joined->server == server.id() && knows(directory, kLowerRun);
+  }));
+  const auto run = *joined;
+  EXPECT_EQ(directory.find_successor(run, kVehicle), std::nullopt);
+
+  ASSERT_TRUE(wait_until([&] {
+    strangers_status.write(make_status(kLowerRun, PHASE_WAITING));
+    return directory.is_silent(kRun) && knows(directory, kLowerRun);
+  }));
+  EXPECT_EQ(directory.find_successor(run, kVehicle), std::nullopt);
+
+  Node replacement(kQosFile, kDomain, "replacement");
+  Writer<Parameters> next_parameters(replacement);
+  Writer<SimStatus> next_status(replacement);
+  next_parameters.write(make_parameters(kRun + 1, {kVehicle}));
+  const auto is_found = [&](std::uint64_t run_id) {
+    return wait_until([&] {
+      strangers_status.write(make_status(kLowerRun, PHASE_WAITING));
+      next_status.write(make_status(kRun + 1, PHASE_WAITING));
+      const auto next = directory.find_successor(run, kVehicle);
+      return next && next->parameters.run_id() == run_id;
+    });
+  };
+  EXPECT_TRUE(is_found(kRun + 1));
+  EXPECT_EQ(directory.find_successor(run, kVehicle + 1), std::nullopt);
+
+  // Its own server may go on with another run whenever it likes.
+  parameters.write(make_parameters(kRun + 2, {kVehicle}));
+  status.write(make_status(kRun + 2, PHASE_RUNNING));
+  EXPECT_TRUE(is_found(kRun + 2));
 }
 
 TEST(ServerDirectoryTest, AServerDoesNotMeetItself) {
