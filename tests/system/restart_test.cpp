@@ -42,8 +42,9 @@ class RestartTest : public ::testing::Test {
     return start("recorder", flags);
   }
   std::string recording() const { return folder_ / "recording"; }
+  /// Waits for whole steps: commands are flushed last.
   bool wait_for_rows() const {
-    return wait_until([&] { return read_file(recording() + "/state.csv").size() > 100'000; });
+    return wait_until([&] { return read_file(recording() + "/command.csv").size() > 20'000; });
   }
 
   static std::unique_ptr<Flight> undisturbed_;
