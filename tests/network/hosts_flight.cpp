@@ -1,5 +1,7 @@
 #include "tests/network/hosts_flight.hpp"
 
+#include <csignal>
+
 namespace sls::test {
 
 Profile::Profile(const Network& network, const std::string& name) : network_(network) {
@@ -26,6 +28,12 @@ Profile::Profile(const Network& network, const std::string& name) : network_(net
   options_.before["sim_server"] = before("server");
   options_.before["control_client"] = before("controller");
   options_.before["recorder"] = before("recorder");
+}
+
+Profile::~Profile() {
+  if (!discovery_server_) return;
+  discovery_server_->send(SIGINT);  // at anything else it leaves its shared memory behind
+  discovery_server_->wait(std::chrono::seconds(10));
 }
 
 std::vector<std::string> Profile::before(const std::string& host) const {

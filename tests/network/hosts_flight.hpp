@@ -23,6 +23,9 @@ class Profile {
  public:
   /// Starts the discovery server where the profile needs one, and makes keys.
   Profile(const Network& network, const std::string& name);
+  ~Profile();
+  Profile(const Profile&) = delete;
+  Profile& operator=(const Profile&) = delete;
 
   /// Options of a flight with one program on each host.
   FlightOptions flight_options() const { return options_; }
