@@ -79,12 +79,6 @@ std::optional<bus::Run> Client::find_joinable_run() const {
   return std::nullopt;
 }
 
-std::optional<bus::Run> Client::find_next_run() const {
-  for (const std::uint32_t id : flown_ids_)
-    if (auto run = servers_.find_successor(*run_, id)) return run;
-  return std::nullopt;
-}
-
 void Client::begin(const bus::Run& run) {
   const Parameters& parameters = run.parameters;
   if (!(parameters.scenario_sha256() == scenario_.sha256))
@@ -204,7 +198,7 @@ bool Client::has_ended() const {
 
 std::optional<bus::Run> Client::find_successor() {
   const auto finding = watch_->look();
-  if (auto next = find_next_run()) {
+  if (auto next = servers_.find_successor(*run_, flown_ids_)) {
     const bool is_reset = next->server == run_->server;
     const std::string news =
         fmt::format("run {:016x} was {} run {:016x}", run_->parameters.run_id(),

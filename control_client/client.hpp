@@ -47,8 +47,6 @@ class Client {
   std::unique_ptr<AnswerStream> make_stream(const LoopKind& kind);
   /// That of the first of our vehicles that has one.
   std::optional<bus::Run> find_joinable_run() const;
-  /// The same of runs that have taken the place of ours.
-  std::optional<bus::Run> find_next_run() const;
   void begin(const bus::Run& run);
   /// Serves until the run has ended (nothing), or another one has taken its place.
   std::optional<bus::Run> serve();

@@ -116,7 +116,7 @@ std::optional<bus::Run> Recorder::wait_for_next_run(const bus::Run& ended, doubl
 }
 
 std::optional<bus::Run> Recorder::find_follower(const bus::Run& ended) const {
-  auto next = surroundings_.servers.find_successor(ended, options_.vehicle);
+  auto next = surroundings_.servers.find_successor(ended, {options_.vehicle});
   if (next && !(next->server == ended.server) && !options_.follow) return std::nullopt;
   return next;
 }

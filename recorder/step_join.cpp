@@ -253,18 +253,23 @@ StepRecord StepJoin::make_record(const Pending& pending) const {
   return record;
 }
 
+/// The sender that flew last, where that was under the name `client`.
+const bus::PeerId* StepJoin::find_flyer(const std::string& client) const {
+  return flyer_ && flyer_->client == client ? &flyer_->sender : nullptr;
+}
+
 bool StepJoin::is_flyer(const std::string& client, const bus::PeerId& sender) const {
-  return flyer_ && flyer_->client == client && flyer_->sender == sender;
+  const bus::PeerId* flyer = find_flyer(client);
+  return flyer && *flyer == sender;
 }
 
 /// The reference of `client`: of the sender that flew last where that was under this name, else of
 /// anybody who uses it. A late one is not replaced by what a stranger says.
 const StepJoin::Received<Reference>* StepJoin::find_reference(const Pending& pending,
                                                               const std::string& client) const {
-  const bool is_flyer_known = flyer_ && flyer_->client == client;
+  const bus::PeerId* flyer = find_flyer(client);
   for (const auto& reference : pending.references)
-    if (reference.sample.client_name() == client &&
-        (!is_flyer_known || reference.sender == flyer_->sender))
+    if (reference.sample.client_name() == client && (!flyer || reference.sender == *flyer))
       return &reference;
   return nullptr;
 }
@@ -292,7 +297,7 @@ void StepJoin::take_answer(const Pending& pending, const std::string& client,
 /// waited for.
 void StepJoin::settle_last(const Pending& pending, StepRecord& record) const {
   const bool is_any_taken = !end_->is_finished;
-  const bool is_flyer_known = flyer_ && flyer_->client == end_->controller;
+  const bool is_flyer_known = find_flyer(end_->controller) != nullptr;
   const bool has_flyer_answered =
       std::any_of(pending.commands.begin(), pending.commands.end(),
                   [&](const auto& command) { return is_flyer(end_->controller, command.sender); });

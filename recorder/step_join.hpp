@@ -122,6 +122,7 @@ class StepJoin {
   bool may_be_settled(const Pending& pending) const;
 
   StepRecord make_record(const Pending& pending) const;
+  const bus::PeerId* find_flyer(const std::string& client) const;
   bool is_flyer(const std::string& client, const bus::PeerId& sender) const;
   const Received<Reference>* find_reference(const Pending& pending,
                                             const std::string& client) const;

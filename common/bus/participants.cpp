@@ -32,6 +32,19 @@ bool make_room(std::map<PeerId, Known>& known, std::size_t most, const PeerId& s
   return true;
 }
 
+/// True where one of `recorders` has completed steps since `last_steps`, which are brought up to
+/// date.
+bool get_further(const std::vector<ParticipantDirectory::Entry>& recorders,
+                 std::map<PeerId, std::int64_t>& last_steps) {
+  bool is_any_further = false;
+  for (const auto& entry : recorders) {
+    const std::int64_t step = entry.announcement.last_complete_step();
+    std::int64_t& last = last_steps.try_emplace(entry.peer, step).first->second;
+    is_any_further = step > std::exchange(last, step) || is_any_further;
+  }
+  return is_any_further;
+}
+
 /// The furthest of the runs that may be joined for `vehicle_id`, then the one with the lowest id.
 std::optional<Run> find_best(const std::vector<Run>& runs, std::uint32_t vehicle_id) {
   std::optional<Run> best;
@@ -104,11 +117,7 @@ void wait_for_recorders_to_end(const ParticipantDirectory& participants, std::ui
   std::map<PeerId, std::int64_t> last_steps;
   while (!wait.is_over() && !longest.is_over()) {
     const auto recorders = participants.find(ROLE_RECORDER, run_id);
-    for (const auto& entry : recorders) {
-      const std::int64_t step = entry.announcement.last_complete_step();
-      const auto [known, is_first] = last_steps.try_emplace(entry.peer, step);
-      if (step > std::exchange(known->second, step) && app::stop_signal() == 0) wait.renew();
-    }
+    if (get_further(recorders, last_steps) && app::stop_signal() == 0) wait.renew();
     const int missing = expected - participants.count_done(ROLE_RECORDER, run_id);
     if (are_recorders_done(recorders) && missing <= 0) return;
     if (wait.is_report_due()) {
@@ -226,20 +235,22 @@ std::optional<Run> ServerDirectory::find_joinable(std::uint32_t vehicle_id) cons
   return find_best(runs(), vehicle_id);
 }
 
-std::optional<Run> ServerDirectory::find_successor(const Run& run, std::uint32_t vehicle_id) const {
+std::optional<Run> ServerDirectory::find_successor(
+    const Run& run, const std::vector<std::uint32_t>& vehicle_ids) const {
   const std::uint64_t run_id = run.parameters.run_id();
   const auto heard = find_last_heard(run_id);
   const bool is_dead = is_silent(run_id);
-  std::vector<Run> others = runs();
-  others.erase(std::remove_if(others.begin(), others.end(),
-                              [&](const Run& other) {
-                                const bool is_own = other.server == run.server;
-                                const bool is_new = !heard || other.server_known_since > *heard;
-                                return other.parameters.run_id() == run_id ||
-                                       !(is_own || (is_dead && is_new));
-                              }),
-               others.end());
-  return find_best(others, vehicle_id);
+  std::vector<Run> successors;
+  for (const Run& other : runs()) {
+    if (other.parameters.run_id() == run_id) continue;
+    const bool is_own = other.server == run.server;
+    const bool is_new = !heard || other.server_known_since > *heard;
+    if (is_own || (is_dead && is_new)) successors.push_back(other);
+  }
+  if (successors.empty()) return std::nullopt;
+  for (const std::uint32_t id : vehicle_ids)
+    if (auto best = find_best(successors, id)) return best;
+  return std::nullopt;
 }
 
 std::optional<SimStatus> ServerDirectory::find_status(std::uint64_t run_id) const {

@@ -107,10 +107,12 @@ class ServerDirectory {
   /// the one that is furthest, then the lowest run_id.
   std::optional<Run> find_joinable(std::uint32_t vehicle_id) const;
 
-  /// The run to go on with for `vehicle_id` where `run` does not: its own server's after a reset
-  /// or, where that is silent, one of another server that was not known before it fell silent.
-  /// Whoever was, had lost the vehicle to it and is no server in its place, whatever he says.
-  std::optional<Run> find_successor(const Run& run, std::uint32_t vehicle_id) const;
+  /// The run to go on with for the first of `vehicle_ids` that has one, where `run` does not: its
+  /// own server's after a reset or, where that is silent, one of another server that was not known
+  /// before it fell silent. Whoever was, had lost the vehicle to it and is no server in its place,
+  /// whatever he says.
+  std::optional<Run> find_successor(const Run& run,
+                                    const std::vector<std::uint32_t>& vehicle_ids) const;
 
   /// The last status of run `run_id`, also of a server that has gone.
   std::optional<SimStatus> find_status(std::uint64_t run_id) const;

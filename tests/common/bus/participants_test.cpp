@@ -254,13 +254,13 @@ TEST(ServerDirectoryTest, OnlyAServerThatComesAfterTheSilenceBeganIsASuccessor) 
     return joined && joined->server == server.id() && knows(directory, kLowerRun);
   }));
   const auto run = *joined;
-  EXPECT_EQ(directory.find_successor(run, kVehicle), std::nullopt);
+  EXPECT_EQ(directory.find_successor(run, {kVehicle}), std::nullopt);
 
   ASSERT_TRUE(wait_until([&] {
     strangers_status.write(make_status(kLowerRun, PHASE_WAITING));
     return directory.is_silent(kRun) && knows(directory, kLowerRun);
   }));
-  EXPECT_EQ(directory.find_successor(run, kVehicle), std::nullopt);
+  EXPECT_EQ(directory.find_successor(run, {kVehicle}), std::nullopt);
 
   Node replacement(kQosFile, kDomain, "replacement");
   Writer<Parameters> next_parameters(replacement);
@@ -270,12 +270,12 @@ TEST(ServerDirectoryTest, OnlyAServerThatComesAfterTheSilenceBeganIsASuccessor) 
     return wait_until([&] {
       strangers_status.write(make_status(kLowerRun, PHASE_WAITING));
       next_status.write(make_status(kRun + 1, PHASE_WAITING));
-      const auto next = directory.find_successor(run, kVehicle);
+      const auto next = directory.find_successor(run, {kVehicle});
       return next && next->parameters.run_id() == run_id;
     });
   };
   EXPECT_TRUE(is_found(kRun + 1));
-  EXPECT_EQ(directory.find_successor(run, kVehicle + 1), std::nullopt);
+  EXPECT_EQ(directory.find_successor(run, {kVehicle + 1}), std::nullopt);
 
   // Its own server may go on with another run whenever it likes.
   parameters.write(make_parameters(kRun + 2, {kVehicle}));
