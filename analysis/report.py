@@ -178,25 +178,24 @@ def describe_machine(machine: dict[str, Any]) -> str:
                      if machine.get(key)) or "–"
 
 
-def make_table(groups: Sequence[str], rows: Sequence[tuple[str, list[str]]]) -> str:
+def make_table(groups: Sequence[str], rows: Sequence[list[str]]) -> str:
     """Of stages and laps: three columns, x y z, per group."""
     top = "".join(f"<th colspan=\"3\">{group}</th>" for group in groups)
     axes = "<th>x</th><th>y</th><th>z</th>" * len(groups)
     body = "".join(
         f"<tr{' class=lap' if cells[0].startswith('lap') else ''}>"
-        + "".join(f"<td>{escape(cell)}</td>" for cell in [*cells, *numbers]) + "</tr>"
-        for cells, numbers in ((label.split("|"), numbers) for label, numbers in rows))
+        + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>" for cells in rows)
     return ("<div class=\"scroll\"><table><thead><tr><th rowspan=\"2\">stage</th>"
             f"<th rowspan=\"2\">from s</th><th rowspan=\"2\">to s</th>{top}</tr><tr>{axes}</tr>"
             f"</thead><tbody>{body}</tbody></table></div>")
 
 
-def name_row(metrics: StageMetrics) -> str:
-    return f"{metrics.label}|{metrics.from_s:g}|{metrics.to_s:g}"
+def name_row(metrics: StageMetrics) -> list[str]:
+    return [metrics.label, f"{metrics.from_s:g}", f"{metrics.to_s:g}"]
 
 
 def make_error_table(flight: Flight) -> str:
-    rows = [(name_row(metrics), list_error_cells(metrics))
+    rows = [[*name_row(metrics), *list_error_cells(metrics)]
             for metrics in calc_stage_metrics(flight)]
     if not rows:
         return "<p>There is no reference in this recording.</p>"
@@ -206,8 +205,8 @@ def make_error_table(flight: Flight) -> str:
 
 
 def make_step_section(flight: Flight) -> str:
-    rows = [(name_row(metrics), list_step_cells(metrics)) for metrics in calc_stage_metrics(flight)
-            if metrics.step is not None]
+    rows = [[*name_row(metrics), *list_step_cells(metrics)]
+            for metrics in calc_stage_metrics(flight) if metrics.step is not None]
     if not rows:
         return ""
     return make_section(

@@ -105,6 +105,14 @@ class ReportTest(support.FolderTest):
             self.assertIn(part, page)
         self.assertEqual(set(re.findall(r'<figure id="(\w+)">', page)), ALL)
 
+    def test_a_stage_may_be_called_anything(self):
+        write_recording(self.folder / "r")
+        path = self.folder / "r/reference.csv"
+        path.write_text(path.read_text().replace(",set_point,", ",a|b|c,"))
+        self.assertEqual(self.run_analysis("report", "r")[0], 0)
+        page = (self.folder / "r/report.html").read_text()
+        self.assertEqual(page.count("<tr><td>0 a|b|c</td><td>0</td><td>3.99</td>"), 2)
+
     def test_it_refers_to_nothing_outside_itself(self):
         page = self.make_page()
         for reference in re.findall(r'(?:src|href)="([^"]*)"', page):
