@@ -284,7 +284,7 @@ fly() {
 # Published figures of the same figure eight, second lap (sources: README.md).
 print_comparison() {
   local lap
-  lap="$(awk '$1 == "lap" && $2 == "2" { print $3, $4, $5, $6, $7 }' "$recording/flight.txt")"
+  lap="$(awk '$1 == "lap" && $2 == "2" && $3 != "(part)" { print $3, $4, $5, $6, $7 }' "$recording/flight.txt")"
   [[ -n $lap ]] || return 0
   local rms_x rms_y rms_z max_x max_y
   read -r rms_x rms_y rms_z max_x max_y <<<"$lap"

@@ -3,6 +3,7 @@
 Frame W everywhere: x forward, y right, z down; SI units, radians. Arrays have a row per instant;
 what a source does not hold is NaN."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,10 @@ class Stage:
     name: str
     first: int
     end: int
+    start_s: float
+    """When the stage began: before its first row where the recorder joined later."""
+    duration_s: float = math.inf
+    """As planned, of a timed stage."""
     lap_s: float | None = None
     """Duration of a lap, of a figure eight."""
 
@@ -42,6 +47,8 @@ class Flight:
     f_Q_W: np.ndarray
     """Force on the quadrotor that the controller answers, (n, 3), N."""
     stages: tuple[Stage, ...] = ()
+    period_s: float = math.nan
+    """Control period; NaN: not known."""
     notes: tuple[str, ...] = ()
     """What is missing, a line each."""
 

@@ -1,7 +1,7 @@
 """How well a flight followed its reference. Formulas: README.md, "Metrics"."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,6 +10,8 @@ from analysis.flight import Flight, Stage
 SETTLING_BAND = 0.02
 LEAST_STEP_M = 0.01
 """What begins nearer than this to its target makes no step."""
+MOST_LAPS = 1000
+"""Of a stage; flight.txt has no more either."""
 
 
 def calc_rms(values: np.ndarray) -> np.ndarray:
@@ -75,10 +77,11 @@ def calc_stage_metrics(flight: Flight) -> list[StageMetrics]:
         rows = find_rows(flight, stage)
         if not len(rows):
             continue
-        results.append(calc_over(flight, rows, f"{stage.index} {stage.name}"))
-        laps = split_laps(flight, stage)
-        results += [calc_over(flight, lap, f"lap {number}")
-                    for number, lap in enumerate(laps, 1) if len(lap)]
+        whole = calc_over(flight, rows, f"{stage.index} {stage.name}")
+        if flight.time_s[stage.first] > stage.start_s:
+            whole = replace(whole, step=None)  # where the step began is not known
+        results.append(whole)
+        results += [calc_over(flight, lap.rows, lap.label) for lap in split_laps(flight, stage)]
     return results
 
 
@@ -88,17 +91,34 @@ def find_rows(flight: Flight, stage: Stage) -> np.ndarray:
     return rows[np.isfinite(flight.p_WL_ref[rows, 0])]
 
 
-def split_laps(flight: Flight, stage: Stage) -> list[np.ndarray]:
-    """The rows of each lap. The last row of a stage, at the end of a lap, belongs to that lap."""
-    if stage.lap_s is None:
-        return []
+@dataclass(frozen=True)
+class Lap:
+    number: int
+    """From 1."""
+    rows: np.ndarray
+    is_whole: bool
+    """Neither begun before the first row of its stage nor cut short by the last one."""
+
+    @property
+    def label(self) -> str:
+        return f"lap {self.number}" + ("" if self.is_whole else " (part)")
+
+
+def split_laps(flight: Flight, stage: Stage) -> list[Lap]:
+    """The laps there are rows of. The last row of a mission, at the very end of its last stage,
+    belongs to the lap that ends there: the rule of flight.txt (recorder/flight_log.cpp)."""
     rows = find_rows(flight, stage)
-    flown_s = flight.time_s[rows] - flight.time_s[stage.first]
-    # Times are rounded; what is nearer to the next lap than 1 ns is in it.
-    lap = np.floor((flown_s + 1e-9) / stage.lap_s).astype(int)
-    if len(lap) > 1 and lap[-1] > lap[-2] and stage.end == len(flight.time_s):
-        lap[-1] = lap[-2]
-    return [rows[lap == number] for number in range(lap[-1] + 1)] if len(lap) else []
+    if stage.lap_s is None or not len(rows):
+        return []
+    lap_ns, period_ns = max(round(stage.lap_s * 1e9), 1), flight.period_s * 1e9
+    flown_ns = np.rint((flight.time_s[rows] - stage.start_s) * 1e9)
+    last_ns = math.inf if math.isinf(stage.duration_s) else round(stage.duration_s * 1e9) - 1
+    lap = np.maximum(np.minimum(flown_ns, last_ns), 0) // lap_ns
+    begins = [0, *np.flatnonzero(np.diff(lap)) + 1]
+    return [Lap(int(lap[begin]) + 1, rows[begin:end],
+                bool(flown_ns[0] < lap[begin] * lap_ns + period_ns
+                     and flown_ns[-1] + period_ns >= (lap[begin] + 1) * lap_ns))
+            for begin, end in zip(begins, [*begins[1:], len(rows)]) if lap[begin] < MOST_LAPS]
 
 
 def calc_over(flight: Flight, rows: np.ndarray, label: str) -> StageMetrics:

@@ -1,6 +1,7 @@
 """Recordings, as the recorder leaves them: whole, cut short, or in several segments."""
 
 import json
+import math
 import os
 from dataclasses import dataclass
 from functools import cached_property
@@ -131,14 +132,16 @@ class Recording:
             alpha=state["alpha_rad"],
             beta=state["beta_rad"],
             f_Q_W=align(state["step"], command, ("force_x_n", "force_y_n", "force_z_n")),
-            stages=self._find_stages(stage, reference),
+            stages=self._find_stages(stage, reference, state["sim_time_s"], vehicle_id),
+            period_s=self.manifest["period_s"],
             notes=self.list_notes())
 
     def load_fleet(self) -> list[Flight]:
         """Every vehicle's, named by its id."""
         return [self.load_flight(vehicle_id, str(vehicle_id)) for vehicle_id in self.vehicle_ids]
 
-    def _find_stages(self, stage: np.ndarray, reference: np.ndarray) -> tuple[Stage, ...]:
+    def _find_stages(self, stage: np.ndarray, reference: np.ndarray, time_s: np.ndarray,
+                     vehicle_id: int) -> tuple[Stage, ...]:
         """Consecutive rows with one stage index; rows without one belong to the stage before."""
         known = np.flatnonzero(np.isfinite(stage))
         if not len(known):
@@ -146,16 +149,25 @@ class Recording:
         begins = known[np.flatnonzero(np.diff(stage[known], prepend=-1.0))]
         ends = [*begins[1:], len(stage)]
         names = dict(zip(reference["stage"], reference["stage_name"]))
+        # Of stages of which the first recorded step is another one; earlier versions tell none.
+        starts = {start["stage"]: start["step"] * self.manifest["period_s"]
+                  for start in self.manifest.get("stage_starts", ())
+                  if start["vehicle_id"] == vehicle_id}
         return tuple(
             Stage(index=int(stage[first]), name=str(names[stage[first]]), first=int(first),
-                  end=int(end), lap_s=self._find_lap(int(stage[first])))
+                  end=int(end), start_s=starts.get(stage[first], float(time_s[first])),
+                  **self._find_plan(int(stage[first])))
             for first, end in zip(begins, ends))
 
-    def _find_lap(self, stage: int) -> float | None:
+    def _find_plan(self, stage: int) -> dict[str, float | None]:
+        """What the scenario says about a stage's time."""
         mission = self.scenario["mission"]
         planned = mission[stage] if stage < len(mission) else {}
-        eight = planned.get("figure_eight") if isinstance(planned, dict) else None
-        return float(eight["period_s"]) if eight else None
+        if not isinstance(planned, dict):
+            return {}
+        eight = planned.get("figure_eight")
+        return {"duration_s": float(planned.get("for_s", math.inf)),
+                "lap_s": float(eight["period_s"]) if eight else None}
 
     def list_notes(self) -> tuple[str, ...]:
         """What is missing, and what else the folder holds."""

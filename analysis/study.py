@@ -93,7 +93,7 @@ def load_flights(recordings: Path) -> dict[str, Flight]:
 def cut(flight: Flight, stage_name: str, lap: int, name: str) -> Flight:
     """One lap of a flight as a flight of its own, from time 0."""
     stage = next(stage for stage in flight.stages if stage.name == stage_name)
-    rows = split_laps(flight, stage)[lap - 1]
+    rows = split_laps(flight, stage)[lap - 1].rows
     return replace(flight, name=name, time_s=flight.time_s[rows] - flight.time_s[rows[0]],
                    p_WQ=flight.p_WQ[rows], p_WL=flight.p_WL[rows],
                    p_WL_ref=flight.p_WL_ref[rows], alpha=flight.alpha[rows],
@@ -174,7 +174,7 @@ def draw_pictures(flights: dict[str, Flight]) -> dict[str, Figure]:
 def measure_lap_2(flight: Flight, label: str) -> StageMetrics:
     """Of the figure eight of a mission."""
     stage = next(stage for stage in flight.stages if stage.lap_s is not None)
-    return calc_over(flight, split_laps(flight, stage)[1], label)
+    return calc_over(flight, split_laps(flight, stage)[1].rows, label)
 
 
 def make_lap_row(metrics: StageMetrics) -> list[str]:

@@ -19,6 +19,12 @@ std::string format_errors(const ErrorStatistics& statistics) {
                      statistics.max_abs.z(), statistics.last.norm());
 }
 
+std::int64_t calc_lap_ns(const config::Stage& stage) {
+  const auto& eight = std::get<config::FigureEightReference>(stage.reference);
+  // Whole nanoseconds: quotients of seconds may fall just short of the next lap.
+  return std::max<std::int64_t>(std::llround(eight.period_s * 1e9), 1);
+}
+
 }  // namespace
 
 void ErrorStatistics::add(const Eigen::Vector3d& error) {
@@ -47,23 +53,50 @@ FlightLog::Stage& FlightLog::find_or_begin_stage(const StepRows& rows) {
     Stage stage;
     stage.name = rows.reference->stage_name;
     stage.first_step = rows.step;
+    stage.start_step = find_start(rows.vehicle_id, index, rows.step);
     stages.emplace_back(index, stage);
   }
-  return stages.back().second;
+  Stage& stage = stages.back().second;
+  stage.start_step = rows.stage_start_step.value_or(stage.start_step);
+  return stage;
 }
 
-/// A stage's last sample, at the end of its last lap, belongs to that lap.
+std::uint64_t FlightLog::find_start(std::uint32_t vehicle_id, std::uint32_t index,
+                                    std::uint64_t first_step) const {
+  for (const StageStart& start : known_starts_)
+    if (start.vehicle_id == vehicle_id && start.stage == index)
+      return std::min(start.step, first_step);
+  return first_step;
+}
+
+std::vector<StageStart> FlightLog::list_stage_starts() const {
+  std::vector<StageStart> starts;
+  for (const auto& [vehicle_id, stages] : stages_)
+    for (const auto& [index, stage] : stages)
+      if (stage.start_step != stage.first_step)
+        starts.push_back({vehicle_id, index, stage.start_step});
+  return starts;
+}
+
+std::int64_t FlightLog::calc_flown_ns(const Stage& stage, std::uint64_t step) const {
+  return static_cast<std::int64_t>(step - stage.start_step) * parameters_.period_ns();
+}
+
+/// A mission's last sample, at the very end of its last stage, belongs to the lap that ends there.
 std::size_t FlightLog::calc_lap(const Stage& stage, std::size_t index, std::uint64_t step) const {
   const auto& planned = scenario_.mission[index];
-  const auto& eight = std::get<config::FigureEightReference>(planned.reference);
-  // Whole nanoseconds: quotients of seconds may fall just short of the next lap.
-  const auto lap_ns = std::max<std::int64_t>(std::llround(eight.period_s * 1e9), 1);
-  const auto flown_ns =
-      static_cast<std::int64_t>(step - stage.first_step) * parameters_.period_ns();
-  const std::int64_t lap = std::max<std::int64_t>(flown_ns / lap_ns, 0);
-  const auto* timed = std::get_if<config::LeaveAfter>(&planned.leave);
-  const std::int64_t laps = timed ? timed->duration_ns / lap_ns : 0;
-  return static_cast<std::size_t>(laps == 0 ? lap : std::min(lap, laps - 1));
+  std::int64_t flown_ns = calc_flown_ns(stage, step);
+  if (const auto* timed = std::get_if<config::LeaveAfter>(&planned.leave))
+    flown_ns = std::min(flown_ns, timed->duration_ns - 1);
+  return static_cast<std::size_t>(std::max<std::int64_t>(flown_ns, 0) / calc_lap_ns(planned));
+}
+
+/// Neither begun before the first step recorded nor cut short by the last one.
+bool FlightLog::is_whole_lap(const Stage& stage, std::size_t index, std::size_t lap) const {
+  const std::int64_t lap_ns = calc_lap_ns(scenario_.mission[index]);
+  const std::int64_t begin_ns = static_cast<std::int64_t>(lap) * lap_ns;
+  return calc_flown_ns(stage, stage.first_step) < begin_ns + parameters_.period_ns() &&
+         calc_flown_ns(stage, stage.last_step + 1) >= begin_ns + lap_ns;
 }
 
 void FlightLog::add(const StepRows& rows) {
@@ -126,9 +159,12 @@ void FlightLog::write(std::ostream& out) const {
       out << fmt::format("  {:<24} {:>9} {:>9}  {}\n", fmt::format("{} {}", index, stage.name),
                          to_time(stage.first_step), to_time(stage.last_step),
                          format_errors(stage.all));
-      for (std::size_t lap = 0; lap < stage.laps.size(); ++lap)
-        out << fmt::format("  {:<24} {:>9} {:>9}  {}\n", fmt::format("    lap {}", lap + 1), "", "",
-                           format_errors(stage.laps[lap]));
+      for (std::size_t lap = 0; lap < stage.laps.size(); ++lap) {
+        if (stage.laps[lap].samples == 0) continue;
+        const char* part = is_whole_lap(stage, index, lap) ? "" : " (part)";
+        out << fmt::format("  {:<24} {:>9} {:>9}  {}\n", fmt::format("    lap {}{}", lap + 1, part),
+                           "", "", format_errors(stage.laps[lap]));
+      }
     }
     out << '\n';
   }

@@ -10,6 +10,7 @@
 
 #include "common/bus/topics.hpp"
 #include "common/config/scenario.hpp"
+#include "recorder/manifest.hpp"
 #include "recorder/rows.hpp"
 
 namespace sls::record {
@@ -29,6 +30,11 @@ class FlightLog {
  public:
   FlightLog(const config::Scenario& scenario, const Parameters& parameters);
 
+  /// Of stages whose rows do not tell where they began.
+  void set_stage_starts(const std::vector<StageStart>& starts) { known_starts_ = starts; }
+  /// Of stages of which the first step added is another one.
+  std::vector<StageStart> list_stage_starts() const;
+
   /// Adds a complete step; the others say nothing about errors.
   void add(const StepRows& rows);
   void add(const SimStatus& status);
@@ -40,7 +46,8 @@ class FlightLog {
  private:
   struct Stage {
     std::string name;
-    std::uint64_t first_step = 0;
+    std::uint64_t start_step = 0;  // of the stage; laps count from here
+    std::uint64_t first_step = 0;  // of which there are rows
     std::uint64_t last_step = 0;
     ErrorStatistics all;
     std::vector<ErrorStatistics> laps;  // of a figure eight
@@ -48,12 +55,17 @@ class FlightLog {
 
   Stage& find_or_begin_stage(const StepRows& rows);
   void write_counters(std::ostream& out) const;
+  std::uint64_t find_start(std::uint32_t vehicle_id, std::uint32_t index,
+                           std::uint64_t first_step) const;
+  std::int64_t calc_flown_ns(const Stage& stage, std::uint64_t step) const;
   std::size_t calc_lap(const Stage& stage, std::size_t index, std::uint64_t step) const;
+  bool is_whole_lap(const Stage& stage, std::size_t index, std::size_t lap) const;
   double to_time(std::uint64_t step) const;
 
   const config::Scenario scenario_;
   const Parameters parameters_;
   std::map<std::uint32_t, std::vector<std::pair<std::uint32_t, Stage>>> stages_;  // by vehicle
+  std::vector<StageStart> known_starts_;
   std::vector<std::string> events_;
   SimStatus last_status_;
 };

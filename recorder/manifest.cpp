@@ -87,6 +87,8 @@ ManifestFile to_manifest(const Json& json) {
   for (const Json& steps : json.at("missing"))
     manifest.missing.push_back(
         {steps.at("vehicle_id"), steps.at("topic"), steps.at("from"), steps.at("to")});
+  for (const Json& start : json.value("stage_starts", Json::array()))  // earlier versions: none
+    manifest.stage_starts.push_back({start.at("vehicle_id"), start.at("stage"), start.at("step")});
   return manifest;
 }
 
@@ -117,6 +119,10 @@ void write_manifest(const std::filesystem::path& folder, const Manifest& manifes
                        {"topic", steps.topic},
                        {"from", steps.from},
                        {"to", steps.to}});
+  Json stage_starts = Json::array();
+  for (const StageStart& start : manifest.stage_starts)
+    stage_starts.push_back(
+        {{"vehicle_id", start.vehicle_id}, {"stage", start.stage}, {"step", start.step}});
 
   const Json json = {
       {"complete", manifest.complete},
@@ -140,6 +146,7 @@ void write_manifest(const std::filesystem::path& folder, const Manifest& manifes
       {"machine", describe_machine()},
       {"files", files},
       {"missing", missing},
+      {"stage_starts", stage_starts},
       {"unanswered_steps", manifest.unanswered_steps},
       {"rebuilt_commands", manifest.rebuilt_commands},
       {"refused_samples", manifest.refused_samples},

@@ -20,6 +20,17 @@ struct MissingSteps {
   std::uint64_t to = 0;  ///< inclusive
 };
 
+/// Where a stage began of which the first recorded step is another one.
+struct StageStart {
+  std::uint32_t vehicle_id = 0;
+  std::uint32_t stage = 0;
+  std::uint64_t step = 0;
+
+  bool operator==(const StageStart& other) const {
+    return vehicle_id == other.vehicle_id && stage == other.stage && step == other.step;
+  }
+};
+
 /// "3 samples missing, first sls/reference step 123 of vehicle 0".
 std::string describe(const std::vector<MissingSteps>& missing);
 
@@ -29,8 +40,9 @@ struct RecordedFile {
   bool has_rows = true;  ///< a CSV file: `rows` without its header
 };
 
-/// What a recording is and whether it is whole. Of a segment after the first, `complete`, `missing`
-/// and `certificate` speak for all segments up to it, the rest for itself.
+/// What a recording is and whether it is whole. Of a segment after the first, `complete`,
+/// `missing`, `stage_starts` and `certificate` speak for all segments up to it, the rest for
+/// itself.
 struct Manifest {
   Parameters parameters;
   std::string scenario_name;
@@ -43,6 +55,7 @@ struct Manifest {
   std::uint64_t last_step = 0;
   std::vector<RecordedFile> files;
   std::vector<MissingSteps> missing;
+  std::vector<StageStart> stage_starts;
   std::uint64_t unanswered_steps = 0;  ///< flown with a held answer or the fail-safe force
   std::uint64_t rebuilt_commands = 0;  ///< made from the next state, as their samples were lost
   std::uint64_t refused_samples = 0;   ///< lost because the recorder's queue was full
@@ -69,6 +82,7 @@ struct ManifestFile {
   std::string certificate;  ///< empty while recording
   std::map<std::string, File> files;
   std::vector<MissingSteps> missing;
+  std::vector<StageStart> stage_starts;
 };
 
 /// Reads `folder`/manifest.json.

@@ -78,15 +78,21 @@ Recording::Recording(const Segment& segment, const Parameters& parameters)
   write_text(segment_.folder / "scenario.yaml", scenario_.text);
   flush();
   read_earlier_segments();
+  write_provisional_manifest();
+}
+
+void Recording::write_provisional_manifest() {
   Manifest manifest = make_manifest();
   manifest.outcome = "recording";
   manifest.reason = "not finished: the recorder is running, or was killed";
   write_manifest(segment_.folder, manifest);
+  stage_starts_ = manifest.stage_starts;
 }
 
 /// Certificate, log and gaps speak for the whole flight.
 void Recording::read_earlier_segments() {
   if (!segment_.earlier) return;
+  log_.set_stage_starts(segment_.earlier->manifest().stage_starts);
   for (const auto& [id, vehicle] : vehicles_) {
     std::uint64_t next = 0;
     StepReader reader(*segment_.earlier, id, segment_.first_step);
@@ -189,6 +195,8 @@ std::array<CsvFile*, 5> Recording::files() {
 }
 
 void Recording::flush() {
+  // Before the rows, which do not tell it: a recorder may be killed at any moment.
+  if (log_.list_stage_starts() != stage_starts_) write_provisional_manifest();
   for (CsvFile* file : files()) file->flush();
   flush_time_ = std::chrono::steady_clock::now();
 }
@@ -275,6 +283,7 @@ Manifest Recording::make_manifest() const {
       has_ended() ? last_status_->step()
                   : static_cast<std::uint64_t>(std::max<std::int64_t>(last_complete_step(), 0));
   manifest.missing = missing_;
+  manifest.stage_starts = log_.list_stage_starts();
   manifest.unanswered_steps = unanswered_steps_;
   manifest.rebuilt_commands = rebuilt_commands_;
   manifest.refused_samples = refused_samples_;

@@ -69,6 +69,7 @@ class Recording {
 
  private:
   void read_earlier_segments();
+  void write_provisional_manifest();
   void write(const StepRows& rows, bool is_answer_expected);
   void account(const StepRows& rows, bool is_answer_expected);
   void note_missing(std::uint32_t vehicle_id, const char* topic, std::uint64_t from,
@@ -89,6 +90,7 @@ class Recording {
   Certificate certificate_;
   std::map<std::uint32_t, StepJoin> vehicles_;
   std::vector<MissingSteps> missing_;
+  std::vector<StageStart> stage_starts_;  // those in the provisional manifest
   std::uint64_t unanswered_steps_ = 0;
   std::uint64_t rebuilt_commands_ = 0;
   std::optional<SimStatus> last_status_;

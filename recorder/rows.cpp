@@ -54,6 +54,15 @@ ReferenceRow make_row(const Reference& reference) {
   return row;
 }
 
+/// Nothing where the answer in force is not the one that `reference` belongs to.
+std::optional<std::uint64_t> find_stage_start(const StepRecord& record) {
+  if (!record.command || !record.reference) return std::nullopt;
+  const ControllerState& controller = record.command->controller();
+  const bool is_of_reference = controller.stage_index() == record.reference->stage_index() &&
+                               controller.stage_start_step() <= record.step;
+  return is_of_reference ? std::optional(controller.stage_start_step()) : std::nullopt;
+}
+
 }  // namespace
 
 StepRows make_rows(std::uint32_t vehicle_id, const StepRecord& record) {
@@ -63,6 +72,7 @@ StepRows make_rows(std::uint32_t vehicle_id, const StepRecord& record) {
   if (record.state) rows.state = make_row(*record.state);
   if (record.command) rows.command = make_row(*record.command, record.origin);
   if (record.reference) rows.reference = make_row(*record.reference);
+  rows.stage_start_step = find_stage_start(record);
   return rows;
 }
 

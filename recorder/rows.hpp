@@ -109,6 +109,8 @@ struct StepRows {
   std::optional<StateRow> state;
   std::optional<CommandRow> command;
   std::optional<ReferenceRow> reference;
+  /// Step at which the stage of `reference` began; only samples tell, no file.
+  std::optional<std::uint64_t> stage_start_step;
 
   /// All three: what a row of flight.csv is made of.
   bool is_complete() const { return state && command && reference; }

@@ -3,6 +3,7 @@
 import os
 import re
 import subprocess
+import time
 import unittest
 
 import support
@@ -10,6 +11,7 @@ import numpy as np
 
 from analysis.metrics import calc_stage_metrics
 from analysis.recordings import Recording
+from analysis.tables import format_error
 
 LAUNCHER = support.ROOT / "sls"
 
@@ -50,6 +52,61 @@ class FlightTest(support.FolderTest):
         self.run_launcher("run", "short", "--out", "r", "--force", "--domain", domain)
         self.assertFalse((self.folder / "r/report.html").exists())
         self.assertFalse((self.folder / "r/figures").exists())
+
+    def start(self, program, *arguments):
+        process = subprocess.Popen([f"{support.BUILD}/bin/{program}", *arguments], cwd=self.folder,
+                                   stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        self.addCleanup(process.wait)
+        self.addCleanup(process.kill)
+        return process
+
+    def test_laps_are_those_of_the_flight_for_a_recorder_that_joins_late(self):
+        domain = self.enterContext(support.OwnDomain())
+        text = (support.ROOT / "config/scenarios/short.yaml").read_text()
+        for old, new in (("recorders: 1", "recorders: 0"), ("period_s: 16", "period_s: 6"),
+                         ("for_s: 2", "for_s: 20")):
+            self.assertIn(old, text)
+            text = text.replace(old, new)
+        self.write("s.yaml", text)
+        same = ("--scenario", "s.yaml", "--domain", domain)
+        server = self.start("sim_server", *same, "--period-s", "0.001")
+        operator = ("ctl", "--domain", domain, "--timeout-s", "100")
+        self.run_launcher(*operator, "pause")  # the flight begins paused
+        client = self.start("control_client", *same)
+        self.run_launcher(*operator, "step", "10000")
+        # The histories reach back 5,000 steps: into the first lap of 6,000.
+        recorder = self.start("recorder", "--out", "r", "--domain", domain)
+        deadline = time.monotonic() + 100
+        while len(self.read_rows("command")) < 2000 and time.monotonic() < deadline:
+            time.sleep(0.1)
+        self.run_launcher(*operator, "resume")
+        self.assertEqual([process.wait(200) for process in (server, client)], [0, 0])
+        self.assertEqual(recorder.wait(200), 1)  # incomplete
+
+        state, reference = self.read_rows("state"), self.read_rows("reference")
+        first = int(state["step"][0])
+        self.assertTrue(0 < first < 6000, first)
+        self.assertEqual(len(state), 20001 - first)
+        error = state["load_x_m"] - reference["ref_x_m"]
+        self.run_launcher("report", "r")
+        written, page = [(self.folder / "r" / name).read_text()
+                         for name in ("flight.txt", "report.html")]
+        for label, begin, end in (("lap 1 (part)", first, 6000), ("lap 2", 6000, 12000),
+                                  ("lap 3", 12000, 18000), ("lap 4 (part)", 18000, 20001)):
+            rms = np.sqrt(np.mean(error[begin - first:end - first]**2))
+            self.assertRegex(written, row := rf"\n +{re.escape(label)} +(\S+)")
+            number = float(re.search(row, written)[1])
+            np.testing.assert_allclose(number, rms, rtol=5e-3)  # three digits
+            self.assertIn(f"<td>{label}</td><td>{begin / 1000:g}</td><td>{(end - 1) / 1000:g}</td>"
+                          f"<td>{format_error(rms)}</td>", page)
+        self.assertEqual(len(re.findall(r"\n +lap ", written)), 4)
+        self.assertEqual(page.count("<td>lap "), 4)
+
+    def read_rows(self, name):
+        """The rows that are on the disk by now."""
+        path = self.folder / "r" / f"{name}.csv"
+        lines = path.read_text().split("\n")[:-1] if path.exists() else []
+        return np.genfromtxt(lines, delimiter=",", names=True) if len(lines) > 2 else []
 
 
 if __name__ == "__main__":

@@ -16,7 +16,13 @@ PERIOD_S = 1e-3
 def make_flight(time_s, p_WL, reference, stages):
     nothing = np.full(len(time_s), np.nan)
     return Flight("flight", time_s, p_WL, p_WL, reference, nothing, nothing,
-                  np.full((len(time_s), 3), np.nan), stages)
+                  np.full((len(time_s), 3), np.nan), stages, period_s=time_s[1] - time_s[0])
+
+
+def list_laps(flight):
+    """Label, first and last row of the laps of the first stage."""
+    return [(lap.label, lap.rows[0], lap.rows[-1])
+            for lap in metrics.split_laps(flight, flight.stages[0])]
 
 
 def respond(time_s, damping, frequency):
@@ -97,17 +103,47 @@ class StageMetricsTest(unittest.TestCase):
         # Two laps of 16 s at 4 ms from 0.004 s · 100 on; the very last row ends the second lap.
         time_s = np.arange(100, 8101) * 0.004
         zeros = np.zeros((8001, 3))
-        flight = make_flight(time_s, zeros, zeros, (Stage(0, "eight", 0, 8001, 16.0),))
-        laps = metrics.split_laps(flight, flight.stages[0])
-        self.assertEqual([(lap[0], lap[-1]) for lap in laps], [(0, 3999), (4000, 8000)])
+        flight = make_flight(time_s, zeros, zeros, (Stage(0, "eight", 0, 8001, 0.4, 32, 16),))
+        self.assertEqual(list_laps(flight), [("lap 1", 0, 3999), ("lap 2", 4000, 8000)])
+
+    def test_a_lap_that_the_rows_do_not_span_is_marked(self):
+        def list_of(first, last, duration_s):
+            time_s = np.arange(first, last + 1) * 0.004
+            zeros = np.zeros((len(time_s), 3))
+            return list_laps(make_flight(time_s, zeros, zeros, (
+                Stage(0, "eight", 0, len(time_s), 0, duration_s, 16),)))
+
+        self.assertEqual(list_of(0, 6000, 24),
+                         [("lap 1", 0, 3999), ("lap 2 (part)", 4000, 6000)])
+        self.assertEqual(list_of(0, 3999, 24), [("lap 1", 0, 3999)])
+        self.assertEqual(list_of(0, 3998, 24), [("lap 1 (part)", 0, 3998)])
+        # Of a recorder that joined 20 s after the stage began, and one that began with a lap.
+        self.assertEqual(list_of(5000, 12000, 48),
+                         [("lap 2 (part)", 0, 2999), ("lap 3", 3000, 7000)])
+        self.assertEqual(list_of(4000, 6000, 24), [("lap 2 (part)", 0, 2000)])
+        self.assertEqual(list_of(4000, 8000, 32), [("lap 2", 0, 4000)])
+
+    def test_laps_shorter_than_a_period_make_no_endless_table(self):
+        time_s = np.arange(0, 3000) * 0.004
+        zeros = np.zeros((3000, 3))
+        for lap_s, count in ((0.004, 1000), (1e-9, 1)):
+            flight = make_flight(time_s, zeros, zeros, (Stage(0, "eight", 0, 3000, 0, 12, lap_s),))
+            self.assertEqual(len(list_laps(flight)), count)
+
+    def test_a_step_whose_beginning_was_not_recorded_is_none(self):
+        time_s = np.arange(100, 300) * 0.1
+        zeros = np.zeros((200, 3))
+        for start_s, is_step in ((10.0, True), (9.9, False)):
+            flight = make_flight(time_s, zeros, zeros, (Stage(0, "hold", 0, 200, start_s),))
+            found, = metrics.calc_stage_metrics(flight)
+            self.assertEqual(found.step is not None, is_step)
 
     def test_a_stage_that_another_follows_keeps_its_last_row_in_its_lap(self):
         time_s = np.arange(0, 301) * 0.01
         zeros = np.zeros((301, 3))
-        flight = make_flight(time_s, zeros, zeros, (Stage(0, "eight", 0, 200, 1.0),
-                                                    Stage(1, "hold", 200, 301)))
-        laps = metrics.split_laps(flight, flight.stages[0])
-        self.assertEqual([(lap[0], lap[-1]) for lap in laps], [(0, 99), (100, 199)])
+        flight = make_flight(time_s, zeros, zeros, (Stage(0, "eight", 0, 200, 0, 2, 1),
+                                                    Stage(1, "hold", 200, 301, 2)))
+        self.assertEqual(list_laps(flight), [("lap 1", 0, 99), ("lap 2", 100, 199)])
         labels = [found.label for found in metrics.calc_stage_metrics(flight)]
         self.assertEqual(labels, ["0 eight", "lap 1", "lap 2", "1 hold"])
 
@@ -116,7 +152,7 @@ class StageMetricsTest(unittest.TestCase):
         reference[:40] = np.nan
         p_WL = np.ones((100, 3))
         p_WL[:40] = 1000.0
-        flight = make_flight(np.arange(100) * 0.1, p_WL, reference, (Stage(0, "hold", 0, 100),))
+        flight = make_flight(np.arange(100) * 0.1, p_WL, reference, (Stage(0, "hold", 0, 100, 0),))
         found, = metrics.calc_stage_metrics(flight)
         np.testing.assert_array_equal(found.rms_m, [1, 1, 1])
         self.assertAlmostEqual(found.from_s, 4.0)
@@ -127,7 +163,7 @@ class StageMetricsTest(unittest.TestCase):
         still = np.tile([1.0, 0.0, 0.0], (2000, 1))
         moving = still + np.column_stack([1e-9 * time_s, 0 * time_s, 0 * time_s])
         for reference, is_step in ((still, True), (moving, False)):
-            flight = make_flight(time_s, p_WL, reference, (Stage(0, "s", 0, 2000),))
+            flight = make_flight(time_s, p_WL, reference, (Stage(0, "s", 0, 2000, 0),))
             found, = metrics.calc_stage_metrics(flight)
             self.assertEqual(found.step is not None, is_step)
         self.assertTrue(math.isnan(metrics.calc_over(

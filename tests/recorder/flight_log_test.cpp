@@ -8,6 +8,7 @@
 
 #include "common/bus/convert.hpp"
 #include "tests/recorder/synthetic_run.hpp"
+#include "tests/support/text.hpp"
 
 namespace sls::record {
 namespace {
@@ -128,6 +129,33 @@ TEST_F(FlightLogTest, LapsOfAFigureEightAreSeparateAndTheLastSampleBelongsToTheL
   expect_statistics(text, "lap 1", calc_expected(100, 199));
   expect_statistics(text, "lap 2", calc_expected(200, kLastStep));
   EXPECT_EQ(text.find("lap 3"), std::string::npos) << text;
+}
+
+TEST(FlightLogLapTest, APartialLastLapIsMarkedAndCountsOnItsOwn) {
+  FlightLog log(config::parse_scenario(
+                    sls::test::replace_once(kScenarioText, "for_s: 0.8", "for_s: 1"), "scenario"),
+                make_parameters());
+  for (std::uint64_t step = 100; step <= 350; ++step) log.add(make_rows(step));
+  const std::string text = write(log);
+  expect_statistics(text, "lap 1 ", calc_expected(100, 199));
+  expect_statistics(text, "lap 2 ", calc_expected(200, 299));
+  expect_statistics(text, "lap 3 (part)", calc_expected(300, 350));
+  EXPECT_EQ(text.find("lap 2 (part)"), std::string::npos) << text;
+}
+
+TEST_F(FlightLogTest, LapsOfAStageJoinedLateCountFromItsTrueStart) {
+  for (std::uint64_t step = 150; step < 290; ++step) log_.add(make_rows(step));
+  const std::string text = write(log_);
+  expect_statistics(text, "lap 1 (part)", calc_expected(150, 199));
+  expect_statistics(text, "lap 2 (part)", calc_expected(200, 289));
+  EXPECT_EQ(log_.list_stage_starts(), std::vector<StageStart>({{0, 1, 100}}));
+}
+
+TEST_F(FlightLogTest, LapsThatWereNotRecordedAreNotListed) {
+  for (std::uint64_t step = 210; step <= kLastStep; ++step) log_.add(make_rows(step));
+  const std::string text = write(log_);
+  EXPECT_EQ(text.find("lap 1"), std::string::npos) << text;
+  expect_statistics(text, "lap 2 (part)", calc_expected(210, kLastStep));
 }
 
 // 0.7 / 0.1 is less than 7 in doubles: a lap boundary must not depend on that.

@@ -83,6 +83,21 @@ TEST_F(SegmentsTest, TheLastSegmentsFlightTextIsThatOfTheWholeFlight) {
   EXPECT_EQ(cut(read_bytes(segment.folder / "flight.txt")), cut(read_bytes(whole_ / "flight.txt")));
 }
 
+TEST_F(SegmentsTest, LapsOfAStageJoinedLateCountFromItsStartAfterARestartToo) {
+  record_until_killed(make_segment(out_), 150, 220);  // the stage began at step 100
+  EXPECT_EQ(read_manifest(out_).at("stage_starts"),
+            Json::array({{{"vehicle_id", 0}, {"stage", 1}, {"step", 100}}}));
+  const Segment segment = resume();
+  record_to_the_end(segment, 210);
+  EXPECT_EQ(read_manifest(segment.folder).at("stage_starts"),
+            read_manifest(out_).at("stage_starts"));
+  const auto second_lap = [](const fs::path& folder) {
+    const std::string text = read_bytes(folder / "flight.txt");
+    return text.substr(text.find("lap 2 "), text.find("\n\nCommands") - text.find("lap 2 "));
+  };
+  EXPECT_EQ(second_lap(segment.folder), second_lap(whole_));
+}
+
 TEST_F(SegmentsTest, ItMayBeKilledOftenAndAnywhere) {
   record_until_killed(make_segment(out_), 0, 100);
   record_until_killed(resume(), 50, 160);

@@ -25,6 +25,14 @@ Eigen::Vector3d make_force(std::uint64_t step) {
   return make_vector(step, 0.5, 3.0) - Eigen::Vector3d(0, 0, 16.66);
 }
 
+/// As the answer to `step` leaves it.
+ControllerState make_controller(std::uint64_t step) {
+  ControllerState message;
+  message.stage_index(step < 100 ? 0 : 1);
+  message.stage_start_step(step < 100 ? 0 : 100);
+  return message;
+}
+
 }  // namespace
 
 const char* const kScenarioText = R"(# Bytes that must survive: tabs	and trailing spaces   
@@ -92,6 +100,7 @@ VehicleState make_state(std::uint64_t step) {
     message.answer_f_Q_W_n(message.f_Q_W_n());
     message.force_origin(FORCE_ANSWERED);
     message.controller_name(kPilot);
+    message.controller(make_controller(step - 1));
   }
   return message;
 }
@@ -103,6 +112,7 @@ ControlCommand make_command(std::uint64_t step) {
   message.f_Q_W_n(bus::to_array(make_force(step)));
   message.client_name(kPilot);
   message.strength(5);
+  message.controller(make_controller(step));
   message.mission(step == kLastStep ? MISSION_FINISHED : MISSION_RUNNING);
   message.fault(FAULT_NONE);
   message.compute_time_ns(12345 + step);
