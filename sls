@@ -14,7 +14,7 @@ readonly fuzz_packages=(clang libclang-rt-14-dev)
 readonly fuzzers=(scenario qos_file csv recording samples)
 readonly test_packages=(iproute2 nftables cyclonedds-dev cyclonedds-tools fastdds-tools libfaketime python3-kubernetes
   chromium)
-readonly analysis_packages=(python3-numpy python3-matplotlib python3-yaml)
+readonly python_packages=(python3-numpy python3-matplotlib python3-yaml)
 readonly bench_packages=(libbenchmark-dev python3-matplotlib)
 
 say() { echo "sls: $*" >&2; }
@@ -56,7 +56,7 @@ usage: ./sls COMMAND [OPTIONS]
       --vehicle N      which vehicle of a fleet (default: 0); with --help: all options
   report DIR         DIR/report.html: parameters, metrics of each stage, figures, events in one file
       --vehicle N      which vehicle of a fleet (default: 0)
-  study              flies the whole published comparison, writes analysis/STUDY.md and its pictures;
+  study              flies the whole published comparison, writes docs/study.md and its pictures;
                      with --help: its options
   bench              how fast everything is, each figure beside its bound in the same run; minutes, and
                      an idle machine
@@ -374,17 +374,17 @@ cmd_verify() {
   exec "$build/bin/sls_verify" "$@"
 }
 
-# analyse COMMAND…: -P: nothing in the working folder is taken for a module of ours; -B: no files beside it.
-analyse() {
-  install_missing "${analysis_packages[@]}"
-  PYTHONPATH="$root" exec /usr/bin/python3 -BP -m analysis "$@"
+# run_python COMMAND…: -P: nothing in the working folder is taken for a module of ours; -B: no files beside it.
+run_python() {
+  install_missing "${python_packages[@]}"
+  PYTHONPATH="$root/python" exec /usr/bin/python3 -BP -m sls "$@"
 }
 
-cmd_plot() { analyse plot "$@"; }
+cmd_plot() { run_python plot "$@"; }
 
-cmd_report() { analyse report "$@"; }
+cmd_report() { run_python report "$@"; }
 
-cmd_study() { analyse study "$@"; }
+cmd_study() { run_python study "$@"; }
 
 cmd_doctor() {
   build_programs sls_doctor
@@ -490,7 +490,7 @@ cmd_test() {
     [[ $2 == thread ]] && preset=tsan which=(--label-regex threaded) targets=(threaded_tests)
     folder="$root/build-$preset"
   fi
-  setup "${test_packages[@]}" "${analysis_packages[@]}" "${bench_packages[@]}"
+  setup "${test_packages[@]}" "${python_packages[@]}" "${bench_packages[@]}"
   build_tree "$preset" "$folder" "${targets[@]}"
   cd "$root"
   # Nothing the middleware reads from the environment may reach the tests.

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from analysis.figures import make_figures, save
-from analysis.flight import Flight
-from analysis.metrics import StageMetrics, calc_max, calc_rms, calc_stage_metrics
-from analysis.recordings import Recording, describe_ids
-from analysis.tables import format_error, list_error_cells, list_step_cells
+from sls.figures import make_figures, save
+from sls.flight import Flight
+from sls.metrics import StageMetrics, calc_max, calc_rms, calc_stage_metrics
+from sls.recordings import Recording, describe_ids
+from sls.tables import format_error, list_error_cells, list_step_cells
 
 CAPTIONS = {
     "fleet": "All vehicles: the paths of their loads from above, and how far each load is from its "

@@ -8,7 +8,7 @@ import browser
 import support
 import numpy as np
 
-from analysis import figures
+from sls import figures
 from support import write_recording
 
 ALL = {"positions", "errors", "path", "angles", "forces", "attitude"}
@@ -21,7 +21,7 @@ def names_of(folder, kind):
 class PlotTest(support.FolderTest):
     def test_one_recording_gives_every_figure_as_png_and_pdf_beside_it(self):
         write_recording(self.folder / "r")
-        code, output = self.run_analysis("plot", "r")
+        code, output = self.run_sls("plot", "r")
         self.assertEqual((code, output), (0, "sls: figures: r/figures\n"))
         self.assertEqual(names_of(self.folder / "r/figures", "png"), ALL)
         self.assertEqual(names_of(self.folder / "r/figures", "pdf"), ALL)
@@ -30,7 +30,7 @@ class PlotTest(support.FolderTest):
         for path in (self.folder / "r/figures").glob("*.pdf"):
             self.assertEqual(path.read_bytes()[:5], b"%PDF-")
         # The same recording gives the same bytes.
-        self.assertEqual(self.run_analysis("plot", "r", "--out", "again")[0], 0)
+        self.assertEqual(self.run_sls("plot", "r", "--out", "again")[0], 0)
         for path in (self.folder / "r/figures").iterdir():
             again = self.folder / "again" / path.name
             self.assertEqual(path.read_bytes(), again.read_bytes(), path.name)
@@ -39,25 +39,25 @@ class PlotTest(support.FolderTest):
         write_recording(self.folder / "r", last=150, complete=False)
         self.write("log.csv", "Time,qx,qy,qz,lx,ly,lz,a,b\n"
                               "0,0,0,-2,0,0,-1,0,0\n1,0,0,-2,0,0,-1,0,0\n")
-        code, output = self.run_analysis("plot", "r", "log.csv", "--out", "o", "--name", "ours",
+        code, output = self.run_sls("plot", "r", "log.csv", "--out", "o", "--name", "ours",
                                          "published")
         self.assertEqual(code, 0, output)
         self.assertIn("sls: r: incomplete: its recorder was killed", output)
         self.assertEqual(names_of(self.folder / "o", "png"), ALL)
         # A log alone has neither errors nor forces.
-        self.assertEqual(self.run_analysis("plot", "log.csv", "--out", "p")[0], 0)
+        self.assertEqual(self.run_sls("plot", "log.csv", "--out", "p")[0], 0)
         self.assertEqual(names_of(self.folder / "p", "png"), {"positions", "path", "angles"})
 
     def test_a_fleet_has_an_overview_of_all_and_figures_of_one(self):
         write_recording(self.folder / "r", last=50, vehicles=(0, 1, 2))
-        self.assertEqual(self.run_analysis("plot", "r", "--vehicle", "2")[0], 0)
+        self.assertEqual(self.run_sls("plot", "r", "--vehicle", "2")[0], 0)
         self.assertEqual(names_of(self.folder / "r/figures", "png"), ALL | {"fleet"})
         self.expect_refused(["plot", "r", "--vehicle", "3"], "expected a vehicle of this recording")
 
     def test_a_single_row_is_plotted(self):
         write_recording(self.folder / "r", last=0, complete=False)
-        self.assertEqual(self.run_analysis("plot", "r")[0], 0)
-        self.assertEqual(self.run_analysis("report", "r")[0], 0)
+        self.assertEqual(self.run_sls("plot", "r")[0], 0)
+        self.assertEqual(self.run_sls("report", "r")[0], 0)
 
     def test_mistakes_are_refused_in_one_line(self):
         write_recording(self.folder / "r", last=5)
@@ -91,7 +91,7 @@ class PlotTest(support.FolderTest):
 class ReportTest(support.FolderTest):
     def make_page(self, **what):
         write_recording(self.folder / "r", **what)
-        code, output = self.run_analysis("report", "r")
+        code, output = self.run_sls("report", "r")
         self.assertEqual((code, output), (0, "sls: report: r/report.html\n"))
         return (self.folder / "r/report.html").read_text()
 
@@ -109,7 +109,7 @@ class ReportTest(support.FolderTest):
         write_recording(self.folder / "r")
         path = self.folder / "r/reference.csv"
         path.write_text(path.read_text().replace(",set_point,", ",a|b|c,"))
-        self.assertEqual(self.run_analysis("report", "r")[0], 0)
+        self.assertEqual(self.run_sls("report", "r")[0], 0)
         page = (self.folder / "r/report.html").read_text()
         self.assertEqual(page.count("<tr><td>0 a|b|c</td><td>0</td><td>3.99</td>"), 2)
 
@@ -129,7 +129,7 @@ class ReportTest(support.FolderTest):
         write_recording(self.folder / "r", last=5)
         path = self.folder / "r/scenario.yaml"
         path.write_text(path.read_text() + "# <script>alert(1)</script>\n")
-        self.assertEqual(self.run_analysis("report", "r")[0], 0)
+        self.assertEqual(self.run_sls("report", "r")[0], 0)
         self.assertNotIn("<script", (self.folder / "r/report.html").read_text())
 
     @unittest.skipUnless(browser.PROGRAM, browser.MISSING)

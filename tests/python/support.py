@@ -1,5 +1,5 @@
-"""What the tests of analysis share. A test is run with the build folder as its argument; without
-the packages that analysis needs it is skipped (exit code 77)."""
+"""What the tests of the package share. A test is run with the build folder as its argument; without
+what the package needs it is skipped (exit code 77)."""
 
 import contextlib
 import io
@@ -14,7 +14,7 @@ import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BUILD = pathlib.Path(sys.argv.pop(1)) if len(sys.argv) > 1 else ROOT / "build"
-sys.path.insert(0, str(ROOT))
+sys.path.insert(0, str(ROOT / "python"))
 CACHE = tempfile.TemporaryDirectory()
 os.environ.setdefault("MPLCONFIGDIR", CACHE.name)  # nothing is left in anybody's home
 
@@ -42,9 +42,9 @@ class FolderTest(unittest.TestCase):
         path.write_text(text)
         return path
 
-    def run_analysis(self, *arguments):
+    def run_sls(self, *arguments):
         """The command line in the test's folder: exit code and what it said."""
-        from analysis.__main__ import main
+        from sls.__main__ import main
         with contextlib.chdir(self.folder), io.StringIO() as said:
             with contextlib.redirect_stderr(said):
                 code = main([str(argument) for argument in arguments])
@@ -52,7 +52,7 @@ class FolderTest(unittest.TestCase):
 
     def expect_refused(self, arguments, *parts):
         """One line that holds `parts`, and exit code 2."""
-        code, output = self.run_analysis(*arguments)
+        code, output = self.run_sls(*arguments)
         self.assertEqual(code, 2, output)
         self.assertEqual(output.count("\n"), 1, output)
         self.assertTrue(output.startswith("sls: error: "), output)

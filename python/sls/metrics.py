@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.flight import Flight, Stage
+from sls.flight import Flight, Stage
 
 SETTLING_BAND = 0.02
 LEAST_STEP_M = 0.01

@@ -6,8 +6,8 @@ import unittest
 import support
 import numpy as np
 
-from analysis.input_error import InputError
-from analysis.published_logs import FORMATS, load_log
+from sls.input_error import InputError
+from sls.published_logs import FORMATS, load_log
 
 ALPHA, BETA = 0.3, -0.2  # rad, true ones
 ROD = (math.sin(BETA), -math.sin(ALPHA) * math.cos(BETA), math.cos(ALPHA) * math.cos(BETA))

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.csv_tables import Text, is_number, parse_rows, read_text, stack
-from analysis.flight import Flight, calc_rod
-from analysis.input_error import InputError
+from sls.csv_tables import Text, is_number, parse_rows, read_text, stack
+from sls.flight import Flight, calc_rod
+from sls.input_error import InputError
 
 QUADROTOR = ("quad_x", "quad_y", "quad_z")
 LOAD = ("load_x", "load_y", "load_z")

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.input_error import InputError
+from sls.input_error import InputError
 
 # Columns that hold text: their numpy types. Of who commanded nothing is shown.
 TEXT_COLUMNS = {"stage_name": "U32", "fault": "U16", "controller": "U1"}

@@ -6,9 +6,9 @@ import unittest
 import support
 import numpy as np
 
-from analysis import metrics
-from analysis.flight import Flight, Stage
-from analysis.published_logs import calc_rod
+from sls import metrics
+from sls.flight import Flight, Stage
+from sls.published_logs import calc_rod
 
 PERIOD_S = 1e-3
 

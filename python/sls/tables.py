@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from analysis.metrics import StageMetrics
+from sls.metrics import StageMetrics
 
 AXES = "xyz"
 

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from analysis import study
-from analysis.figures import make_figures, save
-from analysis.flight import Flight
-from analysis.input_error import InputError
-from analysis.published_logs import FORMATS, load_log
-from analysis.recordings import Recording
-from analysis.report import make_report
+from sls import study
+from sls.figures import make_figures, save
+from sls.flight import Flight
+from sls.input_error import InputError
+from sls.published_logs import FORMATS, load_log
+from sls.recordings import Recording
+from sls.report import make_report
 
 
 class Parser(argparse.ArgumentParser):
@@ -116,8 +116,8 @@ def make_parser() -> argparse.ArgumentParser:
     reporting.set_defaults(run=report)
 
     studying = commands.add_parser("study", help="flies the published comparison, writes the page")
-    studying.add_argument("--out", type=Path, default=study.HERE, metavar="DIR",
-                          help="where STUDY.md and its pictures go (default: analysis)")
+    studying.add_argument("--out", type=Path, default=study.ROOT / "docs", metavar="DIR",
+                          help="where study.md and its pictures go (default: docs)")
     studying.add_argument("--recordings", type=Path, default=Path("recordings/study"),
                           metavar="DIR", help="where the flights go (default: recordings/study)")
     studying.add_argument("--reuse", action="store_true",

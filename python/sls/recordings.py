@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import yaml
 
-from analysis.csv_tables import read_records, read_table, read_text, stack
-from analysis.flight import Flight, Stage
-from analysis.input_error import InputError
+from sls.csv_tables import read_records, read_table, read_text, stack
+from sls.flight import Flight, Stage
+from sls.input_error import InputError
 
 COLUMNS = {
     "state.csv": ("vehicle_id", "step", "sim_time_s", "quad_x_m", "quad_y_m", "quad_z_m",
@@ -153,21 +153,23 @@ class Recording:
         starts = {start["stage"]: start["step"] * self.manifest["period_s"]
                   for start in self.manifest.get("stage_starts", ())
                   if start["vehicle_id"] == vehicle_id}
-        return tuple(
-            Stage(index=int(stage[first]), name=str(names[stage[first]]), first=int(first),
-                  end=int(end), start_s=starts.get(stage[first], float(time_s[first])),
-                  **self._find_plan(int(stage[first])))
-            for first, end in zip(begins, ends))
+        stages = []
+        for first, end in zip(begins, ends):
+            index = int(stage[first])
+            planned = self._find_plan(index)
+            eight = planned.get("figure_eight")
+            stages.append(Stage(
+                index=index, name=str(names[index]), first=int(first), end=int(end),
+                start_s=starts.get(index, float(time_s[first])),
+                duration_s=float(planned.get("for_s", math.inf)),
+                lap_s=float(eight["period_s"]) if eight else None))
+        return tuple(stages)
 
-    def _find_plan(self, stage: int) -> dict[str, float | None]:
-        """What the scenario says about a stage's time."""
+    def _find_plan(self, stage: int) -> dict[str, Any]:
+        """What the scenario says about a stage."""
         mission = self.scenario["mission"]
         planned = mission[stage] if stage < len(mission) else {}
-        if not isinstance(planned, dict):
-            return {}
-        eight = planned.get("figure_eight")
-        return {"duration_s": float(planned.get("for_s", math.inf)),
-                "lap_s": float(eight["period_s"]) if eight else None}
+        return planned if isinstance(planned, dict) else {}
 
     def list_notes(self) -> tuple[str, ...]:
         """What is missing, and what else the folder holds."""

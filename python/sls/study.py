@@ -1,4 +1,4 @@
-"""The published comparison with flights of our own: STUDY.md and its pictures."""
+"""The published comparison with flights of our own: docs/study.md and its pictures."""
 
 import subprocess
 from collections.abc import Callable, Sequence
@@ -9,16 +9,17 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from analysis.figures import (STYLE, add_legend, colour_of, draw, make_stack, plot_path,
+from sls.figures import (STYLE, add_legend, colour_of, draw, make_stack, plot_path,
                               plot_positions, save, set_log_scale)
-from analysis.flight import Flight
-from analysis.input_error import InputError
-from analysis.metrics import StageMetrics, calc_over, calc_stage_metrics, split_laps
-from analysis.published_logs import load_log
-from analysis.recordings import Recording
-from analysis.tables import (format_error, list_error_cells, list_step_cells, make_markdown_table)
+from sls.flight import Flight
+from sls.input_error import InputError
+from sls.metrics import StageMetrics, calc_over, calc_stage_metrics, split_laps
+from sls.published_logs import load_log
+from sls.recordings import Recording
+from sls.tables import (format_error, list_error_cells, list_step_cells, make_markdown_table)
 
 HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
 DPI = 100
 
 
@@ -62,7 +63,7 @@ PUBLISHED_LAP_2 = (
 
 def fly_all(recordings: Path, domain: int, say: Callable[[str], None]) -> None:
     """Flies everything, one after the other. Raises FlightFailed."""
-    launcher = HERE.parent / "sls"
+    launcher = ROOT / "sls"
     for planned in FLIGHTS:
         say(f"study: flying {planned.name}, period {planned.period_s} s")
         command = [str(launcher), "run", planned.scenario, "--out", str(recordings / planned.name),
@@ -275,12 +276,12 @@ def make_page(flights: dict[str, Flight], published: Path | None) -> str:
 
 
 def write_study(recordings: Path, out: Path, published: Path | None) -> Path:
-    """Writes `out`/STUDY.md and `out`/study/*.png from the flights in `recordings`."""
+    """Writes `out`/study.md and `out`/study/*.png from the flights in `recordings`."""
     flights = load_flights(recordings)
     page = make_page(flights, published)
     (out / "study").mkdir(exist_ok=True)
     with matplotlib.rc_context(STYLE):
         for name, figure in draw_pictures(flights).items():
             save(figure, out / "study" / f"{name}.png", DPI)
-    (out / "STUDY.md").write_text(page)
-    return out / "STUDY.md"
+    (out / "study.md").write_text(page)
+    return out / "study.md"

@@ -7,9 +7,9 @@ import unittest
 import support
 import numpy as np
 
-from analysis.input_error import InputError
-from analysis.metrics import calc_stage_metrics
-from analysis.recordings import Recording
+from sls.input_error import InputError
+from sls.metrics import calc_stage_metrics
+from sls.recordings import Recording
 from support import PERIOD_S, STEPS_PER_STAGE, load_of, reference_of, write_recording
 
 

@@ -6,7 +6,7 @@ import unittest
 
 import support
 
-from analysis import study
+from sls import study
 
 
 class StudyTest(support.FolderTest):
@@ -17,10 +17,10 @@ class StudyTest(support.FolderTest):
             cwd=self.folder, env={**os.environ, "SLS_BUILD": support.BUILD}, capture_output=True,
             text=True, timeout=1500)
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
-        self.assertEqual((self.folder / "s/STUDY.md").read_text(),
-                         (study.HERE / "STUDY.md").read_text())
+        self.assertEqual((self.folder / "s/study.md").read_text(),
+                         (study.ROOT / "docs/study.md").read_text())
         names = {path.name for path in (self.folder / "s/study").iterdir()}
-        self.assertEqual(names, {path.name for path in (study.HERE / "study").iterdir()})
+        self.assertEqual(names, {path.name for path in (study.ROOT / "docs/study").iterdir()})
 
 
 if __name__ == "__main__":

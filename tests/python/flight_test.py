@@ -9,9 +9,9 @@ import unittest
 import support
 import numpy as np
 
-from analysis.metrics import calc_stage_metrics
-from analysis.recordings import Recording
-from analysis.tables import format_error
+from sls.metrics import calc_stage_metrics
+from sls.recordings import Recording
+from sls.tables import format_error
 
 LAUNCHER = support.ROOT / "sls"
 
