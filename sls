@@ -281,20 +281,18 @@ fly() {
 
 # --- the summary of a flight ----------------------------------------------------------------------
 
-# Published figures of the same figure eight, second lap (sources: README.md).
+# Beside the published figures of the same figure eight, second lap.
 print_comparison() {
-  local lap
-  lap="$(awk '$1 == "lap" && $2 == "2" && $3 != "(part)" { print $3, $4, $5, $6, $7 }' "$recording/flight.txt")"
-  [[ -n $lap ]] || return 0
-  local rms_x rms_y rms_z max_x max_y
-  read -r rms_x rms_y rms_z max_x max_y <<<"$lap"
-  local row='  %-34s %9s %9s %9s  %9s %9s\n'
+  local lap cells row='  %-34s %9s %9s %9s  %9s %9s\n'
+  read -ra lap < <(awk '$1 == "lap" && $2 == "2" && $3 != "(part)" { print $3, $4, $5, $6, $7 }' \
+    "$recording/flight.txt") || return 0
   echo "Load position error on the second lap, beside the published figures (m)"
-  printf "$row" '' 'rms x' 'rms y' 'rms z' 'max x' 'max y'
-  printf "$row" 'this flight' "$rms_x" "$rms_y" "$rms_z" "$max_x" "$max_y"
-  printf "$row" 'MATLAB ODE (continuous control)' 1.7e-06 4.3e-06 3e-07 6e-06 2.6e-05
-  printf "$row" 'pure Gazebo (state-wiring error)' 0.211 0.236 0.004 0.388 0.413
-  printf "$row" 'PX4 software in the loop' 0.131 0.234 0.097 0.214 0.346
+  {
+    IFS=, read -ra cells
+    printf "$row" '' "${cells[@]:1}"
+    printf "$row" 'this flight' "${lap[@]}"
+    while IFS=, read -ra cells; do printf "$row" "${cells[@]}"; done
+  } <"$root/python/sls/published_lap_2.csv"
   echo
 }
 

@@ -3,6 +3,7 @@
 import os
 import re
 import subprocess
+import textwrap
 import time
 import unittest
 
@@ -11,6 +12,7 @@ import numpy as np
 
 from sls.metrics import calc_stage_metrics
 from sls.recordings import Recording
+from sls.study import PUBLISHED_LAP_2
 from sls.tables import format_error
 
 LAUNCHER = support.ROOT / "sls"
@@ -22,7 +24,7 @@ class FlightTest(support.FolderTest):
                               env={**os.environ, "SLS_BUILD": support.BUILD}, text=True,
                               timeout=200)
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
-        return done.stderr
+        return done.stdout + done.stderr
 
     def test_the_short_flight_is_plotted_and_reported(self):
         domain = self.enterContext(support.OwnDomain())
@@ -52,6 +54,18 @@ class FlightTest(support.FolderTest):
         self.run_launcher("run", "short", "--out", "r", "--force", "--domain", domain)
         self.assertFalse((self.folder / "r/report.html").exists())
         self.assertFalse((self.folder / "r/figures").exists())
+
+    def test_readme_and_study_show_what_the_demo_prints_beside_the_published_figures(self):
+        domain = self.enterContext(support.OwnDomain())
+        printed = self.run_launcher("demo", "figure_eight", "--out", "r", "--domain", domain)
+        table = re.search(r"Load position error on the second lap.*?\n\n", printed, re.DOTALL)[0]
+        readme = (support.ROOT / "README.md").read_text()
+        self.assertIn(textwrap.indent(table, "    "), readme)
+        study_page = (support.ROOT / "docs/study.md").read_text()
+        for row in PUBLISHED_LAP_2[1:]:
+            self.assertRegex(table, rf"{re.escape(row[0])} +{' +'.join(row[1:])}\n")
+            self.assertIn(f"| published: {' | '.join(row)} |", study_page)
+        self.assertIn(f"| published Gazebo log | {' | '.join(PUBLISHED_LAP_2[2][1:4])} |", readme)
 
     def start(self, program, *arguments):
         process = subprocess.Popen([f"{support.BUILD}/bin/{program}", *arguments], cwd=self.folder,
