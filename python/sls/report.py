@@ -28,10 +28,9 @@ CAPTIONS = {
     "attitude": "The attitude that realises this force, with yaw 0.",
 }
 MOST_EVENTS = 200
-COUNTERS = ("resent", "late", "duplicate", "superseded", "take_overs", "rejected_not_finite",
-            "rejected_force_limit", "rejected_run", "rejected_step", "rejected_vehicle",
-            "rejected_client", "rejected_fault", "stale", "held", "fail_safe", "deadline_missed",
-            "overflow", "slipped")
+# Columns of status.csv that count nothing.
+NO_COUNTERS = ("sample_index", "phase", "reason", "step", "controller", "real_time_factor",
+               "round_trip_p50_us", "round_trip_p99_us", "timing")
 STYLE_SHEET = """
 :root { color-scheme: light; }
 * { box-sizing: border-box; }
@@ -257,8 +256,8 @@ def make_events(recording: Recording) -> str:
     more = (f"<p class=\"small\">{len(events) - MOST_EVENTS} more are in status.csv.</p>"
             if len(events) > MOST_EVENTS else "")
     status = recording.read_last_status()
-    counted = ", ".join(f"{name.replace('_', ' ')} {status[name]}" for name in COUNTERS
-                        if status.get(name, "0") != "0")
+    counted = ", ".join(f"{name.replace('_', ' ')} {count}" for name, count in status.items()
+                        if name not in NO_COUNTERS and count != "0")
     return ("<div class=\"scroll\"><table class=\"text\"><thead><tr><th>time s</th><th>step</th>"
             f"<th>what</th></tr></thead><tbody>{rows}</tbody></table></div>{more}"
             f"<p class=\"small\">Counted by the server: {counted or 'nothing unusual'}.</p>")

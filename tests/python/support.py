@@ -6,6 +6,7 @@ import io
 import json
 import os
 import pathlib
+import re
 import socket
 import sys
 import tempfile
@@ -81,15 +82,14 @@ class OwnDomain:
         self.lock.close()
 
 
-STATE_HEADER = ("vehicle_id,step,sim_time_s,quad_x_m,quad_y_m,quad_z_m,quad_vx_m_s,quad_vy_m_s,"
-                "quad_vz_m_s,load_x_m,load_y_m,load_z_m,load_vx_m_s,load_vy_m_s,load_vz_m_s,"
-                "alpha_rad,beta_rad,alpha_dot_rad_s,beta_dot_rad_s,force_x_n,force_y_n,force_z_n")
-COMMAND_HEADER = "vehicle_id,step,controller,force_x_n,force_y_n,force_z_n,compute_us,fault"
-REFERENCE_HEADER = ("vehicle_id,step,sim_time_s,stage,stage_name,ref_x_m,ref_y_m,ref_z_m,"
-                    + ",".join(f"ref_{kind}{axis}_m_s{order}" for order, kind in
-                               (("", "v"), (2, "a"), (3, "j"), (4, "s")) for axis in "xyz"))
-STATUS_HEADER = ("sample_index,phase,reason,step,controller,real_time_factor,resent,late,duplicate,"
-                 "timing")
+def read_headers(path):
+    """The headers that a file of the recorder defines, by their order in it."""
+    found = re.findall(r'Header =\s*((?:"[^"]*"\s*)+);', (ROOT / "recorder" / path).read_text())
+    return ["".join(re.findall(r'"([^"]*)"', text)) for text in found]
+
+
+STATE_HEADER, COMMAND_HEADER, REFERENCE_HEADER = read_headers("rows.hpp")
+STATUS_HEADER, _ = read_headers("columns.hpp")
 PERIOD_S = 0.01
 SCENARIO = """name: synthetic
 vehicle: { quad_mass_kg: 1.5, load_mass_kg: 0.2, rod_length_m: 1.0, gravity_m_s2: 9.8 }
@@ -141,10 +141,11 @@ def write_recording(folder, first=0, last=2 * STEPS_PER_STAGE, vehicles=(0,), co
                 + ",".join(f"{v:.17g}" for v in [*reference, *[0] * 12]))
     for name, lines in rows.items():
         (folder / name).write_text("\n".join(lines) + "\n")
+    zeros = ",0" * (STATUS_HEADER.count(",") - 7)
     (folder / "status.csv").write_text(
-        f"{STATUS_HEADER}\n0,waiting,\"waiting for: recorder, client\",0,,0,0,0,0,exact\n"
-        f"1,running,,0,,0,0,0,0,exact\n2,running,,{last},,0,7,0,0,exact\n"
-        f"3,finished,mission finished,{last},client,12,7,0,0,exact\n")
+        f"{STATUS_HEADER}\n0,waiting,\"waiting for: recorder, client\",0,,0,0{zeros},exact\n"
+        f"1,running,,0,,0,0{zeros},exact\n2,running,,{last},,0,7{zeros},exact\n"
+        f"3,finished,mission finished,{last},client,12,7{zeros},exact\n")
     (folder / "scenario.yaml").write_text(SCENARIO)
     (folder / "manifest.json").write_text(json.dumps({
         "complete": complete, "outcome": "finished" if complete else "recording",
