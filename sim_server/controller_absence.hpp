@@ -24,12 +24,12 @@ class ControllerAbsence {
   /// period is over, it never says kWait.
   Action decide(double step_wait_s, double absence_s) const;
 
-  /// A step was flown without an answer of its own.
+  /// A step was flown without an answer to it.
   void flown_without_answer() { ++steps_without_answer_; }
-  /// An answer was accepted.
+  /// An answer was accepted or, in real time, one came late that is newer than those before.
   void answered() { steps_without_answer_ = 0; }
 
-  /// True while steps are flown without answers.
+  /// True where the last step was flown without an answer, and none has come since.
   bool is_acting() const { return steps_without_answer_ > 0; }
 
   /// After so much absence decide() gives up, s.

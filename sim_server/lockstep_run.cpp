@@ -66,7 +66,7 @@ void LockstepRun::publish() {
   // While steps are flown without answers, each is given a period.
   const auto period = to_duration(static_cast<double>(scenario_.sync.period_ns) * 1e-9 /
                                   scenario_.sync.real_time_factor);
-  wake_at_ = is_flying_without_answers() ? std::min(resend_at_, sent_ + period) : resend_at_;
+  wake_at_ = is_anybody_absent() ? std::min(resend_at_, sent_ + period) : resend_at_;
   is_late_ = false;
 }
 
@@ -82,11 +82,6 @@ bool LockstepRun::is_settled() const {
                      [](const auto& vehicle) { return vehicle->is_settled(); });
 }
 
-bool LockstepRun::is_flying_without_answers() const {
-  return std::any_of(vehicles_.begin(), vehicles_.end(),
-                     [](const auto& vehicle) { return vehicle->absence.is_acting(); });
-}
-
 bool LockstepRun::attend_to_silence(Clock::time_point now) {
   if (!is_late_) take_over_at_ = sent_ + to_duration(scenario_.sync.take_over_s);
   is_late_ = true;
@@ -99,8 +94,8 @@ bool LockstepRun::attend_to_silence(Clock::time_point now) {
   take_over_if_silent(now);
   if (!are_all_accepted()) fly_without_answers(now);
   const auto next_look = now + 1ms;
-  wake_at_ = std::min(resend_at_,
-                      is_flying_without_answers() ? next_look : std::max(take_over_at_, next_look));
+  wake_at_ =
+      std::min(resend_at_, is_anybody_absent() ? next_look : std::max(take_over_at_, next_look));
   return true;
 }
 

@@ -39,7 +39,6 @@ class LockstepRun : public Run {
   void publish();
   void take_answered_step();
   bool is_settled() const;
-  bool is_flying_without_answers() const;
   bool attend_to_silence(Clock::time_point now);
   void resend(Clock::time_point now);
   void fly_without_answers(Clock::time_point now);

@@ -83,7 +83,7 @@ class Run {
   VehicleFlight* find_vehicle(std::uint32_t id);
   /// True where every vehicle's answer to the step in work was accepted.
   bool are_all_accepted() const;
-  /// True where a vehicle's last step had no answer.
+  /// True where a vehicle's last step was flown without an answer, and none has come since.
   bool is_anybody_absent() const;
   /// @throws app::RunError where no client is left that could answer for a vehicle.
   void check_refusals() const;
@@ -141,7 +141,7 @@ class Run {
   std::uint64_t roster_version_ = 0;
   Clock::time_point roster_time_;
   std::optional<app::Wait> absence_wait_;
-  bool is_absence_announced_ = false;
+  std::optional<Clock::time_point> announced_absence_;       // since when the one lasts that was
   std::optional<ControllerAbsence::Action> absence_action_;  // announced last
   std::optional<Clock::time_point> recorder_report_time_;
 };

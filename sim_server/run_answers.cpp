@@ -68,7 +68,7 @@ bool Run::are_all_accepted() const {
 
 bool Run::is_anybody_absent() const {
   return std::any_of(vehicles_.begin(), vehicles_.end(),
-                     [](const auto& vehicle) { return vehicle->absent_since().has_value(); });
+                     [](const auto& vehicle) { return vehicle->absence.is_acting(); });
 }
 
 void Run::check_refusals() const {
@@ -80,22 +80,25 @@ void Run::check_refusals() const {
 }
 
 void Run::take_answers() {
-  const double absence_s = is_absence_announced_ ? calc_longest_absence_s() : 0.0;
   for (const auto& vehicle : vehicles_)
     if (!vehicle->is_settled() && vehicle->gate.accepted()) vehicle->take_answer();
   if (const auto& outcome = vehicles_.front()->outcome())
     board_.controller_name = outcome->applied.controller_name;
   announce_take_overs();
   if (is_anybody_absent()) return;
-  if (is_absence_announced_)
+  if (announced_absence_) {
+    const double absence_s =
+        std::chrono::duration<double>(Clock::now() - *announced_absence_).count();
     board_.announce(vehicles_.size() == 1
                         ? fmt::format("step {}: controller '{}' answers again after {:.1f} s",
-                                      board_.step, board_.controller_name, absence_s)
+                                      board_.step, vehicles_.front()->last_answer().controller_name,
+                                      absence_s)
                         : fmt::format("step {}: all vehicles are answered for again after {:.1f} s",
                                       board_.step, absence_s));
+  }
   absence_wait_.reset();
   absence_action_.reset();
-  is_absence_announced_ = false;
+  announced_absence_.reset();
 }
 
 void Run::announce_take_overs() {
@@ -148,16 +151,18 @@ void Run::attend_to_absence(ControllerAbsence::Action action) {
   // In real time a few held steps are no news: they are counted.
   const bool is_news = action != absence_action_ &&
                        (action == Action::kFailSafe || (action == Action::kHold && is_lockstep));
+  const bool is_report_due = absence_wait_->is_report_due();
+  if (!announced_absence_ && (is_news || is_report_due))
+    announced_absence_ = Clock::now() - std::chrono::duration_cast<Clock::duration>(
+                                            std::chrono::duration<double>(absence_s));
   if (is_news) {
     absence_action_ = action;
-    is_absence_announced_ = true;
     board_.announce(
         fmt::format("step {}: {} for want of an answer of {}", board_.step,
                     action == Action::kHold ? "holds the last force" : "fail-safe force",
                     name_awaited_controllers()));
   }
-  if (!absence_wait_->is_report_due()) return;
-  is_absence_announced_ = true;
+  if (!is_report_due) return;
   board_.announce(fmt::format("step {}: waiting for: {} ({:.0f} s left)", board_.step,
                               name_awaited_controllers(), absence_wait_->seconds_left()));
 }

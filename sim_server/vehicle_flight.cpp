@@ -41,28 +41,24 @@ void VehicleFlight::take_answer() {
   const ControlCommand& answer = *gate.accepted();
   Outcome outcome;
   outcome.is_finished = answer.mission() == MISSION_FINISHED;
-  outcome.applied.answer_f_Q_W = bus::to_vector(answer.f_Q_W_n());
-  outcome.applied.origin = FORCE_ANSWERED;
-  outcome.applied.controller_name = answer.client_name().to_string();
-  outcome.applied.memory = answer.controller();
-  last_answer_ = outcome.applied;
-  last_answer_step_ = step_;
-  absence.answered();
-  absent_since_.reset();
+  hold(answer);
+  outcome.applied = last_answer_;
   outcome_ = std::move(outcome);
 }
 
 void VehicleFlight::keep_late_answer(const ControlCommand& command) {
-  if (command.mission() == MISSION_FINISHED) {
-    has_ended_late_ = true;
-    return;
-  }
-  if (last_answer_.origin != FORCE_NONE && command.step() <= last_answer_step_) return;
-  last_answer_.answer_f_Q_W = bus::to_vector(command.f_Q_W_n());
+  if (command.mission() == MISSION_FINISHED) has_ended_late_ = true;
+  if (last_answer_.origin == FORCE_NONE || command.step() > last_answer_step_) hold(command);
+}
+
+void VehicleFlight::hold(const ControlCommand& answer) {
+  last_answer_.answer_f_Q_W = bus::to_vector(answer.f_Q_W_n());
   last_answer_.origin = FORCE_ANSWERED;
-  last_answer_.controller_name = command.client_name().to_string();
-  last_answer_.memory = command.controller();
-  last_answer_step_ = command.step();
+  last_answer_.controller_name = answer.client_name().to_string();
+  last_answer_.memory = answer.controller();
+  last_answer_step_ = answer.step();
+  absence.answered();
+  absent_since_.reset();
 }
 
 void VehicleFlight::fly_without_answer(ControllerAbsence::Action action) {

@@ -34,7 +34,8 @@ class VehicleFlight {
   VehicleState measure(std::uint64_t step);
   /// Takes the answer that the gate accepted for the step in work.
   void take_answer();
-  /// Keeps an answer that came too late for its step, to be held. Older ones do not count.
+  /// Keeps an answer that came too late for its step, to be held: fresh where it is newer than the
+  /// one that is held. Older ones do not count.
   void keep_late_answer(const ControlCommand& command);
   /// Flies the step in work without an answer of its own.
   void fly_without_answer(ControllerAbsence::Action action);
@@ -54,14 +55,15 @@ class VehicleFlight {
   void note_waiting(Clock::time_point time) {
     if (!absent_since_) absent_since_ = time;
   }
-  /// When the first unanswered step was published; nothing where the last one was answered.
-  const std::optional<Clock::time_point>& absent_since() const { return absent_since_; }
+  /// Since the first step without a fresh answer was published; 0 where the last one had one.
   double calc_absence_s() const;
 
   CommandGate gate;
   ControllerAbsence absence;
 
  private:
+  void hold(const ControlCommand& answer);
+
   const std::uint32_t id_;
   const bool is_of_fleet_;
   const config::Scenario scenario_;  // of this vehicle alone

@@ -2,6 +2,12 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 
+#include <regex>
+#include <utility>
+
+#include "common/bus/participants.hpp"
+#include "control_client/answer_stream.hpp"
+#include "control_client/messages.hpp"
 #include "tests/system/flight.hpp"
 
 namespace sls::test {
@@ -28,6 +34,58 @@ std::size_t count_events(const std::filesystem::path& recording, const std::stri
   for (auto at = log.find(words); at != log.npos; at = log.find(words, at + 1)) ++count;
   return count;
 }
+
+/// A controller in this process that answers a state when the next one comes, and the last one when
+/// it is repeated: each answer is one period late.
+class LateController {
+ public:
+  LateController(int domain, const std::string& scenario_file)
+      : scenario_(config::load_scenario(scenario_file)),
+        controller_(scenario_),
+        node_(qos("default"), domain, "late"),
+        servers_(node_),
+        participant_writer_(node_),
+        stream_(node_, {false, true},
+                [this](const VehicleState* states, std::size_t, const bus::PeerId&) {
+                  answer(states[0]);
+                }) {}
+
+  /// False where there is no server.
+  bool join() {
+    std::optional<bus::Run> run;
+    if (!wait_until([&] { return (run = servers_.find_joinable(0)).has_value(); }) ||
+        !wait_until([&] { return stream_.sees_server(run->server); }))
+      return false;
+    Participant message;
+    message.run_id(run->parameters.run_id());
+    message.role(ROLE_CONTROLLER);
+    message.name("late");
+    message.scenario_sha256(scenario_.sha256);
+    message.ready(true);
+    participant_writer_.write(message);
+    return true;
+  }
+
+ private:
+  void answer(const VehicleState& state) {
+    const VehicleState answered = std::exchange(last_state_, state);
+    if (answered.run_id() != state.run_id()) return;  // there was none
+    const auto result = controller_.calc_answer(answered.step(), control::to_model_state(answered),
+                                                control::to_memory(answered.controller()));
+    std::vector<Reference> references;
+    std::vector<ControlCommand> commands = {
+        control::make_command_message(answered, result, "late", 0, {})};
+    stream_.write(references, commands);
+  }
+
+  const config::Scenario scenario_;
+  const control::FlightController controller_;
+  VehicleState last_state_;
+  bus::Node node_;
+  bus::ServerDirectory servers_;
+  bus::Writer<Participant> participant_writer_;
+  control::AnswerStream stream_;  // last: its handler uses the members above
+};
 
 // --- real time -----------------------------------------------------------------------------------
 
@@ -89,6 +147,26 @@ TEST(RealTimeTest, AStoppedClientIsReplacedByTheFailSafeAndFliesAgainWhenItRetur
   const TrackingError end = calc_tracking_error(flight.recording(), 3000, 3000);
   EXPECT_LT(end.max.maxCoeff(), 2.0);
   EXPECT_GE(count_events(flight.recording(), "fail-safe force for want of an answer"), 1u);
+}
+
+TEST(RealTimeTest, AControllerThatIsAlwaysOnePeriodLateFliesToTheEnd) {
+  TemporaryFolder folder;
+  const std::string file = make_scenario(
+      folder, {{"for_s: 2", "for_s: 1.2"},
+               {"recorders: 1, timeout_s: 30 }",
+                "recorders: 0, timeout_s: 30 }, wait: { controller: { policy: wait, deadline_s: 3 "
+                "} }"}});
+  OwnDomain domain;
+  // A quarter of real time: only after 2 s without the controller there is a fail-safe.
+  Process server(make_command("sim_server", domain.number(),
+                              {"--scenario", file, "--mode", "realtime", "--rtf", "0.25"}));
+  LateController controller(domain.number(), file);
+  ASSERT_TRUE(controller.join()) << server.output();
+  EXPECT_EQ(server.wait(), 0) << server.output();
+  EXPECT_TRUE(std::regex_search(server.output(), std::regex("real-time, ([0-9]+) of \\1 late")))
+      << server.output();
+  for (const char* words : {"fail-safe force", "waiting for: controller 'late'", "answers again"})
+    EXPECT_FALSE(holds(server.output(), words)) << server.output();
 }
 
 TEST(RealTimeTest, ARecorderThatStopsDoesNotStopTheFlight) {
