@@ -20,6 +20,8 @@ constexpr std::size_t kQueuedSteps = 1024;
 /// Periods in a row that a client may let go by before another one's answer is taken.
 constexpr int kMissesBeforeTakeOver = 3;
 
+constexpr auto kPollTime = 20ms;  // while nothing is in a hurry
+
 std::chrono::duration<double, std::nano> calc_wall_period(const config::Sync& sync) {
   return std::chrono::duration<double, std::nano>(static_cast<double>(sync.period_ns) /
                                                   sync.real_time_factor);
@@ -46,11 +48,11 @@ void RealtimeRun::rested(Clock::duration rest) {
 }
 
 bool RealtimeRun::exchange() {
-  std::this_thread::sleep_until(schedule_.due(board_.step));
+  if (!wait_until_due()) return false;
   for (const auto& vehicle : vehicles_) vehicle->gate.expect(board_.step);
   publish();
-  take_commands(schedule_.close(board_.step, published_));
-  if (is_ending() && !are_all_accepted()) wait_for_last_answers();
+  if (!take_commands(schedule_.close(board_.step, published_))) return false;
+  if (is_ending() && !are_all_accepted() && !wait_for_last_answers()) return false;
   count_missed_deadlines();
   board_.timing.set_overflow(state_queue_.lost());
 
@@ -87,16 +89,32 @@ void RealtimeRun::publish() {
   endpoints_.states.write();
 }
 
-void RealtimeRun::take_commands(Clock::time_point deadline) {
+bool RealtimeRun::wait_until_due() {
+  while (Clock::now() + kPollTime < schedule_.due(board_.step)) {
+    endpoints_.requests.wait(Clock::now() + kPollTime);
+    attend_now_and_then();
+    if (!rest() || !wait_for_recorders()) return false;
+  }
+  std::this_thread::sleep_until(schedule_.due(board_.step));
+  return true;
+}
+
+bool RealtimeRun::take_commands(Clock::time_point deadline) {
   while (!are_all_accepted() && Clock::now() < deadline) {
-    endpoints_.commands.wait(deadline);
+    endpoints_.commands.wait(std::min(deadline, Clock::now() + kPollTime));
     for (const ReceivedCommand& received : endpoints_.commands.take_all()) {
       const Verdict verdict = judge(received.command, received.sender);
       if (verdict == Verdict::kLate) take_late(received.command);
     }
     check_refusals();
-    if (are_all_accepted()) board_.round_trips.add(Clock::now() - published_);
+    if (are_all_accepted()) {
+      board_.round_trips.add(Clock::now() - published_);
+      return true;
+    }
+    attend_now_and_then();
+    if (attend_to_operator()) return false;
   }
+  return true;
 }
 
 bool RealtimeRun::is_ending() const {
@@ -115,17 +133,18 @@ void RealtimeRun::take_late(const ControlCommand& command) {
     find_vehicle(command.vehicle_id())->keep_late_answer(command);  // there is one: it judged it
 }
 
-void RealtimeRun::wait_for_last_answers() {
+bool RealtimeRun::wait_for_last_answers() {
   constexpr int kAttempts = 20;
   for (int i = 0; i < kAttempts && !are_all_accepted(); ++i) {
-    take_commands(Clock::now() + 50ms);
-    if (are_all_accepted()) return;
+    if (!take_commands(Clock::now() + 50ms)) return false;
+    if (are_all_accepted()) return true;
     ++link_.resent();
     endpoints_.states.write();
   }
   if (!are_all_accepted())
     throw app::RunError(fmt::format("step {}: the mission was finished, but {} does not answer",
                                     board_.step, name_awaited_controllers()));
+  return true;
 }
 
 void RealtimeRun::count_missed_deadlines() {

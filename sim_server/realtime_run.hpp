@@ -25,15 +25,19 @@ class RealtimeRun : public Run {
   void roster_changed() override { check_clocks(); }
   void rested(Clock::duration rest) override;
 
-  void publish();
+  // Periods may be long: these attend to operator, signals and status meanwhile, and return false
+  // if the operator ended the run.
+  bool wait_until_due();
   /// Takes commands until `deadline`, or until every vehicle has its answer: the period can then be
   /// flown ahead of its end, and the next state is ready when it is due.
-  void take_commands(Clock::time_point deadline);
+  bool take_commands(Clock::time_point deadline);
+  /// The answers to the last step, which are waited for: earlier ones said it is the last.
+  bool wait_for_last_answers();
+
+  void publish();
   void take_late(const ControlCommand& command);
   /// True where the mission is over for every vehicle, be it by an answer that came late.
   bool is_ending() const;
-  /// The answers to the last step, which are waited for: earlier ones said it is the last.
-  void wait_for_last_answers();
   void fly_without_answers();
   void count_missed_deadlines();
   /// Says whose clock differs from ours by what would make his commands expire when they should

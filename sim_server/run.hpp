@@ -101,6 +101,8 @@ class Run {
 
   /// Takes the operator's requests; true if one of them ended the run.
   bool attend_to_operator();
+  /// Takes them, and waits while the operator holds the run; false if a request ended it.
+  bool rest();
   void refresh_roster();
   bool is_roster_due() const;
   /// Status, stop signal, claim: what needs a look a few times a second.
@@ -124,8 +126,6 @@ class Run {
   bool wait_for_participants();
   bool fly();
   void measure(std::size_t index);
-  /// Waits while the operator holds the run; false if a request ended it.
-  bool rest();
   void finish();
   void reset();
   void publish_end(RunPhase phase, const std::string& reason);

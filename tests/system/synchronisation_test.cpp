@@ -9,6 +9,7 @@
 #include "control_client/answer_stream.hpp"
 #include "control_client/messages.hpp"
 #include "tests/system/flight.hpp"
+#include "tests/system/operator.hpp"
 
 namespace sls::test {
 namespace {
@@ -167,6 +168,66 @@ TEST(RealTimeTest, AControllerThatIsAlwaysOnePeriodLateFliesToTheEnd) {
       << server.output();
   for (const char* words : {"fail-safe force", "waiting for: controller 'late'", "answers again"})
     EXPECT_FALSE(holds(server.output(), words)) << server.output();
+}
+
+/// A server and a client without a recorder; the run is paused at step 0.
+class PausedTest : public testing::Test {
+ protected:
+  void start(const std::vector<std::pair<std::string, std::string>>& changes,
+             std::vector<std::string> server_flags) {
+    auto all_changes = changes;
+    all_changes.emplace_back("recorders: 1", "recorders: 0");
+    const std::string file = make_scenario(folder_, all_changes);
+    server_flags.insert(server_flags.begin(), {"--scenario", file});
+    server_ = std::make_unique<Process>(make_command("sim_server", domain_.number(), server_flags));
+    operator_ = std::make_unique<Operator>(domain_.number());
+    ASSERT_EQ(operator_->ask(ACTION_PAUSE), "") << server_->output();
+    client_ = std::make_unique<Process>(
+        make_command("control_client", domain_.number(), {"--scenario", file}));
+    ASSERT_TRUE(operator_->wait_for(PHASE_PAUSED)) << server_->output() << client_->output();
+  }
+
+  void stop_client() {
+    client_->send(SIGSTOP);
+    ASSERT_TRUE(wait_until([&] { return find_state(client_->id()) == 'T'; }));
+  }
+
+  TemporaryFolder folder_;
+  OwnDomain domain_;
+  std::unique_ptr<Process> server_, client_;
+  std::unique_ptr<Operator> operator_;
+};
+
+/// Steps of 1,000 s: the server is between two of them, or waits for an answer, all the time.
+class LongPeriodTest : public PausedTest {
+ protected:
+  void start() {
+    PausedTest::start({}, {"--mode", "realtime", "--rtf", "0.001", "--period-s", "1"});
+  }
+  void expect_signs_of_life() {
+    ASSERT_TRUE(operator_->wait_for_statuses(5)) << server_->output();
+    ASSERT_EQ(operator_->ask(ACTION_PAUSE), "") << server_->output();
+    ASSERT_EQ(operator_->ask(ACTION_RESUME), "") << server_->output();
+  }
+};
+
+TEST_F(LongPeriodTest, TheServerIsHeardAndHearsUntilTheNextStateIsDue) {
+  start();
+  ASSERT_EQ(operator_->ask(ACTION_STEP, 1), "") << server_->output();
+  ASSERT_EQ(operator_->ask(ACTION_RESUME), "") << server_->output();
+  expect_signs_of_life();
+  server_->send(SIGTERM);
+  EXPECT_EQ(server_->wait(std::chrono::seconds(60)), 143) << server_->output();
+}
+
+TEST_F(LongPeriodTest, TheServerIsHeardAndHearsWhileNobodyAnswers) {
+  start();
+  stop_client();
+  ASSERT_EQ(operator_->ask(ACTION_RESUME), "") << server_->output();
+  expect_signs_of_life();
+  EXPECT_EQ(operator_->ask(ACTION_STOP), "") << server_->output();
+  EXPECT_EQ(server_->wait(std::chrono::seconds(60)), 1) << server_->output();
+  EXPECT_TRUE(holds(server_->output(), "stopped by ")) << server_->output();
 }
 
 TEST(RealTimeTest, ARecorderThatStopsDoesNotStopTheFlight) {

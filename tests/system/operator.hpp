@@ -1,0 +1,64 @@
+/// An operator in the test's own process: asks a running server for things within milliseconds, and
+/// hears what it says in sls/status.
+#pragma once
+
+#include <mutex>
+#include <string>
+
+#include "sim_server/operator/operator_client.hpp"
+#include "tests/system/process.hpp"
+
+namespace sls::test {
+
+class Operator {
+ public:
+  explicit Operator(int domain)
+      : node_(qos("default"), domain, "operator"),
+        client_(node_, {domain, 0, 60.0}),
+        status_reader_(node_, bus::kLatchedReaderProfile,
+                       [this](const SimStatus& status, const bus::PeerId&) {
+                         const std::lock_guard lock(mutex_);
+                         phase_ = status.phase();
+                         ++samples_;
+                       }) {}
+
+  /// Empty where the server did what it was asked for; else why not.
+  std::string ask(ControlAction action, std::uint64_t steps = 0) {
+    try {
+      const auto reply = client_.ask(*client_.wait_for_run(), action, steps);
+      return reply->accepted() ? "" : "refused: " + reply->reason().to_string();
+    } catch (const std::exception& error) {
+      return error.what();
+    }
+  }
+
+  /// False where the server never says so.
+  bool wait_for(RunPhase phase) {
+    return wait_until([&] {
+      const std::lock_guard lock(mutex_);
+      return samples_ > 0 && phase_ == phase;
+    });
+  }
+
+  /// Waits for so many further statuses. While nothing happens they are 0.4 s apart, or more: so
+  /// much time has passed then.
+  bool wait_for_statuses(std::size_t count) {
+    const std::size_t before = samples();
+    return wait_until([&] { return samples() >= before + count; });
+  }
+
+ private:
+  std::size_t samples() const {
+    const std::lock_guard lock(mutex_);
+    return samples_;
+  }
+
+  bus::Node node_;
+  operation::OperatorClient client_;
+  mutable std::mutex mutex_;  // over what follows
+  RunPhase phase_ = PHASE_WAITING;
+  std::size_t samples_ = 0;
+  bus::Reader<SimStatus> status_reader_;  // last: its handler uses the members above
+};
+
+}  // namespace sls::test
