@@ -60,7 +60,7 @@ bool LockstepRun::exchange() {
 
 void LockstepRun::publish() {
   for (const auto& vehicle : vehicles_) vehicle->gate.expect(board_.step);
-  sent_ = last_sent_ = Clock::now();
+  sent_ = last_sent_ = looked_ = Clock::now();
   endpoints_.states.write();
   resend_at_ = sent_ + timer_.timeout();
   // While steps are flown without answers, each is given a period.
@@ -87,6 +87,8 @@ bool LockstepRun::attend_to_silence(Clock::time_point now) {
   is_late_ = true;
   for (const auto& vehicle : vehicles_)
     if (!vehicle->gate.accepted()) vehicle->note_waiting(sent_);
+  if (control_.holds()) note_rest(now - looked_);  // paused but for this step
+  looked_ = now;
   if (now >= resend_at_) resend(now);
   attend_now_and_then();
   if (attend_to_operator()) return false;

@@ -30,7 +30,6 @@ class LockstepRun : public Run {
   bool exchange() override;
   bool wait_for_recorders() override;
   void roster_changed() override;
-  void rested(Clock::duration) override {}
 
   // On the middleware's thread.
   bool receive(const ControlCommand* commands, std::size_t count, const bus::PeerId& sender);
@@ -56,7 +55,8 @@ class LockstepRun : public Run {
   Clock::time_point resend_at_;
   std::atomic<Clock::time_point> wake_at_{Clock::time_point()};  // the main thread waits for it
   Clock::time_point take_over_at_;
-  bool is_late_ = false;  // most answers come before the first resend
+  Clock::time_point looked_;  // when the main thread last looked for what is late
+  bool is_late_ = false;      // most answers come before the first resend
 };
 
 }  // namespace sls::sim

@@ -42,7 +42,8 @@ void RealtimeRun::begin() {
   missed_deadlines_ = endpoints_.command_stream.missed_deadlines();
 }
 
-void RealtimeRun::rested(Clock::duration rest) {
+void RealtimeRun::note_rest(Clock::duration rest) {
+  Run::note_rest(rest);
   schedule_.pause(rest);
   missed_deadlines_ = endpoints_.command_stream.missed_deadlines();  // nobody was asked
 }

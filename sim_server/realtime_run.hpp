@@ -23,7 +23,7 @@ class RealtimeRun : public Run {
   bool exchange() override;
   bool wait_for_recorders() override;
   void roster_changed() override { check_clocks(); }
-  void rested(Clock::duration rest) override;
+  void note_rest(Clock::duration rest) override;
 
   // Periods may be long: these attend to operator, signals and status meanwhile, and return false
   // if the operator ended the run.

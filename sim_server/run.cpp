@@ -193,10 +193,15 @@ bool Run::rest() {
     is_ended = attend_to_operator();
     if (!is_ended && control_.holds()) endpoints_.requests.wait(Clock::now() + kPollTime);
   }
-  const auto rest = Clock::now() - began;
-  board_.add_pause(rest);
-  rested(rest);
+  note_rest(Clock::now() - began);
   return !is_ended;
+}
+
+void Run::note_rest(Clock::duration rest) {
+  board_.add_pause(rest);
+  for (const auto& vehicle : vehicles_) vehicle->note_rest(rest);
+  if (absence_wait_) absence_wait_->extend(rest);
+  if (announced_absence_) *announced_absence_ += rest;
 }
 
 bool Run::is_meant_for_another_server(const SimControl& request) const {

@@ -75,8 +75,8 @@ class Run {
   virtual bool wait_for_recorders() = 0;
   /// The roster was looked at again.
   virtual void roster_changed() {}
-  /// The run was at rest for so long.
-  virtual void rested(Clock::duration rest) = 0;
+  /// The run was at rest for so long: nobody was asked for anything.
+  virtual void note_rest(Clock::duration rest);
 
   // For both ways of stepping (run_answers.cpp).
   Verdict judge(const ControlCommand& command, const bus::PeerId& sender);

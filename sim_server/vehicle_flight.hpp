@@ -57,6 +57,10 @@ class VehicleFlight {
   }
   /// Since the first step without a fresh answer was published; 0 where the last one had one.
   double calc_absence_s() const;
+  /// The run was at rest for so long, which is no absence.
+  void note_rest(Clock::duration rest) {
+    if (absent_since_) *absent_since_ += rest;
+  }
 
   CommandGate gate;
   ControllerAbsence absence;

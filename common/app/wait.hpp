@@ -19,6 +19,12 @@ class Wait {
   /// Something has come: lasts as long again from now on, and is reported as before.
   void renew() { deadline_ = Clock::now() + timeout_; }
 
+  /// For so long it was not to be waited.
+  void extend(Clock::duration rest) {
+    deadline_ += rest;
+    next_report_ += rest;
+  }
+
   bool is_over() const { return Clock::now() >= deadline_; }
 
   /// True once after the quiet time and then every 5 s: time for a line about it.

@@ -74,5 +74,15 @@ TEST_F(VehicleFlightTest, ALateAnswerEndsTheAbsence) {
   EXPECT_EQ(flight_.calc_absence_s(), 0.0);
 }
 
+TEST_F(VehicleFlightTest, APauseIsNoAbsence) {
+  flight_.note_rest(std::chrono::hours(1));
+  EXPECT_EQ(flight_.calc_absence_s(), 0.0);
+  flight_.measure(0);
+  flight_.note_waiting(VehicleFlight::Clock::now() - std::chrono::hours(2));
+  flight_.note_rest(std::chrono::hours(1));
+  EXPECT_GE(flight_.calc_absence_s(), 3600.0);
+  EXPECT_LT(flight_.calc_absence_s(), 7200.0);
+}
+
 }  // namespace
 }  // namespace sls::sim

@@ -198,6 +198,33 @@ class PausedTest : public testing::Test {
   std::unique_ptr<Operator> operator_;
 };
 
+constexpr const char* kTimeLimit = "timeout_s: 30 }";
+constexpr const char* kGivesUpAfter4s =
+    "timeout_s: 30 }, wait: { controller: { policy: wait, deadline_s: 4 } }";
+constexpr std::size_t kStatusesOf6s = 15;
+
+TEST_F(PausedTest, APauseInRealTimeIsNoAbsence) {
+  start({{kTimeLimit, kGivesUpAfter4s}}, {"--mode", "realtime"});
+  stop_client();
+  ASSERT_EQ(operator_->ask(ACTION_STEP, 1), "") << server_->output();
+  ASSERT_TRUE(operator_->wait_for_statuses(kStatusesOf6s)) << server_->output();
+  ASSERT_EQ(operator_->ask(ACTION_STEP, 1), "") << server_->output();
+  client_->send(SIGCONT);
+  EXPECT_EQ(operator_->ask(ACTION_RESUME), "") << server_->output();
+  EXPECT_EQ(server_->wait(), 0) << server_->output();
+}
+
+TEST_F(PausedTest, APauseThatWaitsForTheStepInWorkIsNoAbsence) {
+  start({{kTimeLimit, kGivesUpAfter4s}}, {});
+  stop_client();
+  ASSERT_EQ(operator_->ask(ACTION_RESUME), "") << server_->output();
+  ASSERT_EQ(operator_->ask(ACTION_PAUSE), "") << server_->output();
+  ASSERT_TRUE(operator_->wait_for_statuses(kStatusesOf6s)) << server_->output();
+  client_->send(SIGCONT);
+  EXPECT_EQ(operator_->ask(ACTION_RESUME), "") << server_->output();
+  EXPECT_EQ(server_->wait(), 0) << server_->output();
+}
+
 /// Steps of 1,000 s: the server is between two of them, or waits for an answer, all the time.
 class LongPeriodTest : public PausedTest {
  protected:
