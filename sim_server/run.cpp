@@ -38,7 +38,6 @@ Run::Run(Endpoints& endpoints, const Assignment& assignment, WorkerPool& workers
       plant_steps_(scenario_.sync.period_ns / scenario_.plant.step_ns) {
   for (const std::uint32_t id : vehicle_ids_)
     vehicles_.push_back(std::make_unique<VehicleFlight>(scenario_, id, run_id));
-  endpoints_.commands.take_all();  // of an earlier run
   endpoints_.parameters_writer.write(
       make_parameters_message(run_id, vehicle_ids_, scenario_, app::version()));
   const config::Sync& sync = scenario_.sync;
@@ -51,6 +50,7 @@ Run::Run(Endpoints& endpoints, const Assignment& assignment, WorkerPool& workers
 }
 
 Run::End Run::execute() {
+  endpoints_.commands.take_all();  // of an earlier run
   if (wait_for_participants() && fly()) {
     finish();
     return End::kFinished;

@@ -35,11 +35,8 @@ void Server::run() {
   auto run = make_run(false);
   try {
     claim_vehicles(*run);
-    while (run->execute() == Run::End::kReset) {
-      const bool is_paused = run->is_paused();
-      run.reset();
-      run = make_run(is_paused);
-    }
+    // A run lives until its successor is made: somebody must tell the participants if it cannot be.
+    while (run->execute() == Run::End::kReset) run = make_run(run->is_paused());
   } catch (const std::exception& error) {
     run->fail(error.what());
     if (run->is_known()) linger(*run, 0);

@@ -57,7 +57,9 @@ StateStream::Queue::Queue(StateStream& stream, std::size_t steps) : stream_(stre
   stream.queue_ = this;
 }
 
-StateStream::Queue::~Queue() { stream_.queue_ = nullptr; }
+StateStream::Queue::~Queue() {
+  if (stream_.queue_ == this) stream_.queue_ = nullptr;  // else its successor is in place
+}
 
 std::uint64_t StateStream::Queue::lost() const {
   return stream_.is_fleet() ? fleet_->lost() : vehicle_->lost();

@@ -98,6 +98,26 @@ TEST_F(ControlTest, WatchShowsTheRunUntilItEnds) {
   flight_.wait();
 }
 
+TEST(ResetTest, ASuccessorThatCannotBeMadeEndsTheRunWithItsCause) {
+  TemporaryFolder folder;
+  const std::string no_threads = folder / "no_threads";
+  FlightOptions options{{}, {"--mode", "realtime"}, {}, {}};
+  options.before["sim_server"] = {"env", std::string("LD_PRELOAD=") + SLS_THREAD_SHIM,
+                                  "SLS_NO_THREADS=" + no_threads};
+  Flight flight(scenario("figure_eight"), options);
+  ASSERT_TRUE(flight.wait_for_steps(50)) << flight.outputs();
+  write_bytes(no_threads, "");  // the queue of the next run's states needs one
+  Process reset({program("sim_ctl"), "--domain", flight.domain.text(), "reset"});
+  EXPECT_EQ(reset.wait(), 0) << reset.output();
+  flight.wait();
+  const std::string cause = "Resource temporarily unavailable";
+  for (Process* process : {flight.server.get(), flight.client.get()}) {
+    EXPECT_EQ(process->wait(), 1) << flight.outputs();
+    EXPECT_TRUE(holds(process->output(), cause)) << process->output();
+  }
+  EXPECT_EQ(flight.recorder->wait(), 1) << flight.outputs();
+}
+
 TEST(ControlUsageTest, WithoutAServerTheReasonIsNamed) {
   OwnDomain domain;
   Process process({program("sim_ctl"), "--domain", domain.text(), "--timeout-s", "1", "pause"});
