@@ -79,16 +79,17 @@ void CommandGate::set_clients(const std::vector<ReadyClient>& clients) {
 }
 
 void CommandGate::expect(std::uint64_t step) {
-  if (accepted_)
+  if (accepted_) {
     past_[step_] = Past{accepted_from_, accepted_->f_Q_W_n()};
-  else if (step > step_)
+    for (Client& client : clients_) client.refusal.clear();
+  } else if (step > step_) {
     past_[step_] = std::nullopt;
+  }
   while (past_.size() > kRememberedAnswers) past_.erase(past_.begin());
   step_ = step;
   accepted_.reset();
   take_over_.reset();
   drop_held();
-  for (Client& client : clients_) client.refusal.clear();
 }
 
 void CommandGate::drop_held() {
@@ -117,23 +118,11 @@ Verdict CommandGate::judge(const ControlCommand& command, const bus::PeerId& sen
     defect = Verdict::kFault;
 
   Client* client = find_client(sender);
-  if (command.step() != step_)
-    return defect != Verdict::kAccepted ? defect : judge_past(command, sender);
   if (defect != Verdict::kAccepted) {
-    if (client && !accepted_ && !client->held) {
-      client->refusal = fmt::format("controller '{}' answered step {} with {}",
-                                    client->identity.name, step_, to_string(defect));
-      if (defect == Verdict::kForceLimit)
-        client->refusal +=
-            fmt::format(": {:.6g} N > {:.6g} N", calc_norm(command.f_Q_W_n()), force_limit_n_);
-      if (defect == Verdict::kFault)
-        client->refusal +=
-            fmt::format(": {}", command.fault() == FAULT_NONE ? "mission failed"
-                                                              : bus::to_string(command.fault()));
-      settle();
-    }
+    if (client) note_refusal(*client, command, defect);
     return defect;
   }
+  if (command.step() != step_) return judge_past(command, sender);
   if (!client) return Verdict::kUnknownClient;
   // A client's first answer counts; what it sends besides is a copy or belongs to no step.
   const auto& first = accepted_ && accepted_from_ == sender ? accepted_ : client->held;
@@ -141,10 +130,29 @@ Verdict CommandGate::judge(const ControlCommand& command, const bus::PeerId& sen
     return first->f_Q_W_n() == command.f_Q_W_n() ? Verdict::kDuplicate : Verdict::kWrongStep;
   client->silent = false;
   client->misses = 0;
+  if (!is_refused(*client)) client->refusal.clear();  // of an earlier step
   if (accepted_) return Verdict::kSuperseded;
   client->held = command;
   settle();
   return accepted_ && accepted_from_ == sender ? Verdict::kAccepted : Verdict::kHeld;
+}
+
+void CommandGate::note_refusal(Client& client, const ControlCommand& command, Verdict defect) {
+  const auto past = past_.find(command.step());
+  const bool is_open =
+      command.step() == step_ ? !accepted_ && !client.held : past != past_.end() && !past->second;
+  const bool is_newer = client.refusal.empty() || command.step() > client.refused_step;
+  if (!is_open || !is_newer) return;
+  client.refused_step = command.step();
+  client.refusal = fmt::format("controller '{}' answered step {} with {}", client.identity.name,
+                               command.step(), to_string(defect));
+  if (defect == Verdict::kForceLimit)
+    client.refusal +=
+        fmt::format(": {:.6g} N > {:.6g} N", calc_norm(command.f_Q_W_n()), force_limit_n_);
+  if (defect == Verdict::kFault)
+    client.refusal += fmt::format(
+        ": {}", command.fault() == FAULT_NONE ? "mission failed" : bus::to_string(command.fault()));
+  settle();
 }
 
 Verdict CommandGate::judge_past(const ControlCommand& command, const bus::PeerId& sender) {
@@ -153,8 +161,10 @@ Verdict CommandGate::judge_past(const ControlCommand& command, const bus::PeerId
   std::optional<Past>& first = past->second;
   if (first && first->sender == sender)
     return first->force == command.f_Q_W_n() ? Verdict::kDuplicate : Verdict::kWrongStep;
-  if (!find_client(sender)) return Verdict::kWrongStep;
+  Client* client = find_client(sender);
+  if (!client) return Verdict::kWrongStep;
   if (first) return Verdict::kSuperseded;
+  client->refusal.clear();
   first = Past{sender, command.f_Q_W_n()};
   return Verdict::kLate;
 }
@@ -181,7 +191,7 @@ int CommandGate::count_miss() {
 const CommandGate::Client* CommandGate::find_awaited() const {
   const Client* silent = nullptr;
   for (const Client& client : clients_) {
-    if (!client.refusal.empty()) continue;
+    if (is_refused(client)) continue;
     if (!client.silent) return &client;
     if (!silent) silent = &client;
   }
@@ -197,7 +207,7 @@ bool CommandGate::pass_over_silent_client() {
   const Client* awaited = find_awaited();
   if (!awaited || accepted_) return false;
   const bool has_next = std::any_of(clients_.begin(), clients_.end(), [&](const Client& client) {
-    return &client != awaited && !client.silent && client.refusal.empty();
+    return &client != awaited && !client.silent && !is_refused(client);
   });
   if (!has_next) return false;
   if (!flyer_) flyer_ = awaited->identity;  // it was to fly first
@@ -207,10 +217,16 @@ bool CommandGate::pass_over_silent_client() {
 }
 
 std::optional<std::string> CommandGate::refusal() const {
-  if (accepted_ || clients_.empty()) return std::nullopt;
+  if (find_awaited() || clients_.empty() || accepted_) return std::nullopt;
+  return describe_refusals();
+}
+
+std::string CommandGate::describe_refusals() const {
+  std::string refusals;
+  if (accepted_) return refusals;
   for (const Client& client : clients_)
-    if (client.refusal.empty()) return std::nullopt;
-  return clients_.back().refusal;
+    if (!client.refusal.empty()) refusals += (refusals.empty() ? "" : "; ") + client.refusal;
+  return refusals;
 }
 
 CommandGate::Client* CommandGate::find_client(const bus::PeerId& peer) {

@@ -74,9 +74,13 @@ class CommandGate {
   /// (true). It is skipped until it answers an awaited step again.
   bool pass_over_silent_client();
 
-  /// Why no client is left to answer the awaited step: what the last one sent. Nothing while an
-  /// answer can still come.
+  /// Why no client is left to answer the awaited step: what they sent. Nothing while an answer can
+  /// still come.
   std::optional<std::string> refusal() const;
+
+  /// What clients sent that was refused, in answer to the awaited step or to one that went by since
+  /// the last accepted answer. Empty where the awaited step has its answer.
+  std::string describe_refusals() const;
 
   const SyncCounters& counters() const { return counters_; }
   SyncCounters& counters() { return counters_; }
@@ -86,13 +90,18 @@ class CommandGate {
     ReadyClient identity;
     bool silent = false;
     int misses = 0;                      // steps in a row that it let go by
-    std::string refusal;                 // why its answer to the awaited step was refused
+    std::string refusal;                 // why its last answer was refused
+    std::uint64_t refused_step = 0;      // which that one answered
     std::optional<ControlCommand> held;  // its first valid answer to the awaited step
   };
 
   Verdict judge(const ControlCommand& command, const bus::PeerId& sender);
   Verdict judge_past(const ControlCommand& command, const bus::PeerId& sender);
   void count(Verdict verdict);
+  bool is_refused(const Client& client) const {  // for the awaited step
+    return !client.refusal.empty() && client.refused_step == step_;
+  }
+  void note_refusal(Client& client, const ControlCommand& command, Verdict defect);
   void settle();
   void drop_held();
   Client* find_client(const bus::PeerId& peer);

@@ -85,8 +85,8 @@ class Run {
   bool are_all_accepted() const;
   /// True where a vehicle's last step was flown without an answer, and none has come since.
   bool is_anybody_absent() const;
-  /// @throws app::RunError where no client is left that could answer for a vehicle.
-  void check_refusals() const;
+  /// @throws app::RunError where a client's answer was refused and no other client answers.
+  void check_refusals();
   /// Takes what was accepted, and says who takes over and who is back.
   void take_answers();
   /// Says now and then who is missing since when, also in sls/status. @throws app::RunError to give
@@ -132,6 +132,8 @@ class Run {
   void close_requests(const std::string& reason);
   void report_silent_recorder();
   SyncCounters sum_counters() const;
+  std::string describe_refusals(const VehicleFlight& vehicle) const;
+  [[noreturn]] void give_up(double waited_s, const std::string& refusals) const;
   std::string describe_vehicles(const std::vector<std::uint32_t>& ids) const;
   void announce_take_overs();
   double calc_longest_absence_s() const;

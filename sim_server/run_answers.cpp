@@ -71,12 +71,30 @@ bool Run::is_anybody_absent() const {
                      [](const auto& vehicle) { return vehicle->absence.is_acting(); });
 }
 
-void Run::check_refusals() const {
-  for (const auto& vehicle : vehicles_)
-    if (const auto refusal = vehicle->gate.refusal())
-      throw app::RunError(vehicles_.size() == 1
-                              ? *refusal
-                              : fmt::format("vehicle {}: {}", vehicle->id(), *refusal));
+void Run::check_refusals() {
+  const double patience_s = std::chrono::duration<double>(bus::kSilenceOfTheDead).count();
+  for (const auto& vehicle : vehicles_) {
+    const std::string refusals = describe_refusals(*vehicle);
+    vehicle->note_refused(!refusals.empty());
+    if (refusals.empty()) continue;
+    if (vehicle->gate.refusal()) throw app::RunError(refusals);
+    // The announcement of a client that died outlives it: only its silence says that it is gone.
+    if (vehicle->calc_refused_s() >= patience_s) give_up(patience_s, refusals);
+  }
+}
+
+std::string Run::describe_refusals(const VehicleFlight& vehicle) const {
+  const std::string refusals = vehicle.gate.describe_refusals();
+  return vehicles_.size() == 1 || refusals.empty()
+             ? refusals
+             : fmt::format("vehicle {}: {}", vehicle.id(), refusals);
+}
+
+void Run::give_up(double waited_s, const std::string& refusals) const {
+  const std::string cause =
+      refusals.empty() ? fmt::format("step {}: ", board_.step) : refusals + "; ";
+  throw app::RunError(
+      fmt::format("{}waited {} s for {}", cause, waited_s, name_awaited_controllers()));
 }
 
 void Run::take_answers() {
@@ -139,9 +157,12 @@ void Run::attend_to_absence(ControllerAbsence::Action action) {
   using Action = ControllerAbsence::Action;
   const double give_up_s = vehicles_.front()->absence.give_up_s();
   const double absence_s = calc_longest_absence_s();
-  if (action == Action::kGiveUp)
-    throw app::RunError(fmt::format("step {}: waited {} s for {}", board_.step, give_up_s,
-                                    name_awaited_controllers()));
+  if (action == Action::kGiveUp) {
+    std::string refusals;
+    for (const auto& vehicle : vehicles_)
+      if (refusals.empty()) refusals = describe_refusals(*vehicle);
+    give_up(give_up_s, refusals);
+  }
   if (!absence_wait_)
     absence_wait_.emplace(
         give_up_s - absence_s,

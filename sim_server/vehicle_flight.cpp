@@ -17,6 +17,10 @@ config::Scenario make_own_scenario(const config::Scenario& fleet, std::uint32_t 
   return scenario;
 }
 
+double calc_elapsed_s(const std::optional<VehicleFlight::Clock::time_point>& since) {
+  return since ? std::chrono::duration<double>(VehicleFlight::Clock::now() - *since).count() : 0.0;
+}
+
 }  // namespace
 
 VehicleFlight::VehicleFlight(const config::Scenario& fleet, std::uint32_t id, std::uint64_t run_id)
@@ -59,6 +63,7 @@ void VehicleFlight::hold(const ControlCommand& answer) {
   last_answer_step_ = answer.step();
   absence.answered();
   absent_since_.reset();
+  refused_since_.reset();
 }
 
 void VehicleFlight::fly_without_answer(ControllerAbsence::Action action) {
@@ -91,8 +96,13 @@ std::uint64_t VehicleFlight::calc_age() const {
   return outcome_ && outcome_->applied.origin == FORCE_ANSWERED ? 0 : step_ - last_answer_step_;
 }
 
-double VehicleFlight::calc_absence_s() const {
-  return absent_since_ ? std::chrono::duration<double>(Clock::now() - *absent_since_).count() : 0.0;
+double VehicleFlight::calc_absence_s() const { return calc_elapsed_s(absent_since_); }
+
+double VehicleFlight::calc_refused_s() const { return calc_elapsed_s(refused_since_); }
+
+void VehicleFlight::note_rest(Clock::duration rest) {
+  for (auto* since : {&absent_since_, &refused_since_})
+    if (*since) **since += rest;
 }
 
 }  // namespace sls::sim

@@ -57,10 +57,15 @@ class VehicleFlight {
   }
   /// Since the first step without a fresh answer was published; 0 where the last one had one.
   double calc_absence_s() const;
-  /// The run was at rest for so long, which is no absence.
-  void note_rest(Clock::duration rest) {
-    if (absent_since_) *absent_since_ += rest;
+  /// Answers were refused, or none is any more.
+  void note_refused(bool is_refused) {
+    if (is_refused != refused_since_.has_value())
+      refused_since_ = is_refused ? std::optional(Clock::now()) : std::nullopt;
   }
+  /// Since answers are refused without a valid one; 0 where none is.
+  double calc_refused_s() const;
+  /// The run was at rest for so long, which is no absence.
+  void note_rest(Clock::duration rest);
 
   CommandGate gate;
   ControllerAbsence absence;
@@ -82,6 +87,7 @@ class VehicleFlight {
   std::uint64_t last_answer_step_ = 0;  // the step it answers
   bool has_ended_late_ = false;
   std::optional<Clock::time_point> absent_since_;
+  std::optional<Clock::time_point> refused_since_;
 };
 
 }  // namespace sls::sim

@@ -293,6 +293,32 @@ TEST_F(CommandGateTest, NoRefusalWhileAnotherReadyClientCanAnswer) {
   EXPECT_NE(gate_.refusal()->find("answered step 0"), std::string::npos);
 }
 
+TEST_F(CommandGateTest, ARefusalIsKnownWhileASilentStandbyIsAwaited) {
+  set_clients({kStrong, kWeak});
+  ControlCommand beyond = make_answer(0);
+  beyond.f_Q_W_n({0, 0, -60.0});
+  gate_.offer(beyond, kStrongPeer);
+  for (const char* words : {"'strong' answered step 0", "force_limit_n: 60 N > 50 N"})
+    EXPECT_NE(gate_.describe_refusals().find(words), std::string::npos)
+        << gate_.describe_refusals();
+  gate_.expect(1);
+  EXPECT_NE(gate_.describe_refusals().find("'strong' answered step 0"), std::string::npos)
+      << "nobody has answered since";
+  EXPECT_EQ(gate_.awaited_client()->name, "strong") << "its answer to this step may be valid";
+  gate_.offer(make_answer(1), kStrongPeer);
+  EXPECT_EQ(gate_.describe_refusals(), "");
+}
+
+TEST_F(CommandGateTest, ALateAnswerThatIsRefusedIsKnownUntilItsClientGivesAValidOne) {
+  gate_.expect(1);
+  gate_.offer(make_faulted(0, FAULT_ROD_LEVEL), kStrongPeer);
+  EXPECT_NE(gate_.describe_refusals().find("rod_level"), std::string::npos);
+  EXPECT_EQ(gate_.refusal(), std::nullopt) << "the awaited step may still get its answer";
+  gate_.expect(2);
+  gate_.offer(make_answer(1), kStrongPeer);
+  EXPECT_EQ(gate_.describe_refusals(), "");
+}
+
 TEST_F(CommandGateTest, TheRefusedClientsStandbyLeavingEndsTheWait) {
   set_clients({kStrong, kWeak});
   gate_.offer(make_faulted(0, FAULT_ROD_LEVEL), kStrongPeer);

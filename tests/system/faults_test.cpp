@@ -10,6 +10,7 @@
 #include <cmath>
 
 #include "tests/system/flight.hpp"
+#include "tests/system/operator.hpp"
 
 namespace sls::test {
 namespace {
@@ -177,6 +178,51 @@ TEST(FaultsTest, RefusedCommandOfTheOnlyClientEndsTheRunNamingForceAndClient) {
   EXPECT_FALSE(read_manifest(flight.recording()).at("complete").get<bool>());
   EXPECT_EQ(read_manifest(flight.recording()).at("outcome"), "failed");
 }
+
+/// By mode, and by what is done about a controller that does not answer: the server must not wait
+/// for it that long, or waits less than it takes to presume it dead.
+class RefusalTest : public testing::TestWithParam<std::pair<const char*, const char*>> {};
+
+TEST_P(RefusalTest, ARefusedControllerBesideAKilledStandbyIsNamedWithItsForce) {
+  TemporaryFolder folder;
+  const std::string file = make_scenario(
+      folder, {{"force_limit_n: 200", "force_limit_n: 10"},
+               {"controllers: 1, recorders: 1, timeout_s: 30 }",
+                "controllers: 2, recorders: 0, timeout_s: 30 }, wait: { controller: " +
+                    std::string(GetParam().second) + " }"}});
+  OwnDomain domain;
+  Process server(make_command("sim_server", domain.number(),
+                              {"--scenario", file, "--mode", GetParam().first}));
+  Operator someone(domain.number());
+  ASSERT_EQ(someone.ask(ACTION_PAUSE), "") << server.output();
+  const auto make_client = [&](const char* name, const char* strength) {
+    return make_command("control_client", domain.number(),
+                        {"--scenario", file, "--name", name, "--strength", strength});
+  };
+  Process primary(make_client("primary", "2")), standby(make_client("standby", "1"));
+  ASSERT_TRUE(someone.wait_for(PHASE_PAUSED)) << server.output();
+  // The clients discover each other meanwhile: one that dies amid that can leave the other deaf.
+  ASSERT_TRUE(someone.wait_for_statuses(2)) << server.output();
+  standby.kill();
+  ASSERT_EQ(someone.ask(ACTION_RESUME), "") << server.output();
+  EXPECT_EQ(server.wait(std::chrono::seconds(60)), 1) << server.output();
+  for (const char* words :
+       {"error: controller 'primary' answered step ",
+        " with a force beyond controller.force_limit_n: ", " N > 10 N; waited "})
+    EXPECT_TRUE(holds(server.output(), words)) << server.output();
+  EXPECT_EQ(primary.wait(), 1) << primary.output();
+}
+
+constexpr const char* kWaits = "{ policy: wait, deadline_s: 600 }";
+constexpr const char* kStops = "{ policy: stop, deadline_s: 1 }";
+INSTANTIATE_TEST_SUITE_P(, RefusalTest,
+                         testing::Values(std::pair("lockstep", kWaits),
+                                         std::pair("lockstep", kStops),
+                                         std::pair("realtime", kWaits)),
+                         [](const auto& kind) {
+                           return std::string(kind.param.first) +
+                                  (kind.param.second == kWaits ? "Waiting" : "Stopping");
+                         });
 
 TEST(FaultsTest, FullDiskEndsTheRecordingNamingFileAndCauseAndNothingLooksWhole) {
   TemporaryFolder folder;
