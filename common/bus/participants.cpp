@@ -32,6 +32,16 @@ bool make_room(std::map<PeerId, Known>& known, std::size_t most, const PeerId& s
   return true;
 }
 
+/// What is known of run `run_id` of a server, of whose runs the last are kept.
+template <class Known>
+Known& find_or_add(std::deque<Known>& runs, std::uint64_t run_id) {
+  for (Known& run : runs)
+    if (run.run_id == run_id) return run;
+  if (runs.size() == kMaxRunsOfServer) runs.pop_front();
+  runs.emplace_back().run_id = run_id;
+  return runs.back();
+}
+
 /// True where one of `recorders` has completed steps since `last_steps`, which are brought up to
 /// date.
 bool get_further(const std::vector<ParticipantDirectory::Entry>& recorders,
@@ -147,20 +157,23 @@ ServerDirectory::ServerDirectory(Node& node, std::function<void(const SimStatus&
 
 void ServerDirectory::note(const Parameters& sample, const PeerId& sender) {
   const std::lock_guard lock(mutex_);
-  HeardRun* run = find_or_add_run(sender, sample.run_id());
-  if (!run) return;
-  if (run->claim == 0) run->claim = ++claims_;
-  servers_.at(sender).parameters = sample;
+  Server* server = find_or_add_server(sender);
+  if (!server) return;
+  Claim& claim = find_or_add(server->claims, sample.run_id());
+  if (claim.number == 0) claim.number = ++claims_;
+  server->parameters = sample;
 }
 
 void ServerDirectory::note(const SimStatus& sample, const PeerId& sender) {
   const std::lock_guard lock(mutex_);
-  if (HeardRun* run = find_or_add_run(sender, sample.run_id()))
-    run->status = {sample, std::chrono::steady_clock::now()};
+  Server* server = find_or_add_server(sender);
+  if (!server) return;
+  HeardStatus& heard = find_or_add(server->statuses, sample.run_id());
+  heard.status = sample;
+  heard.time = std::chrono::steady_clock::now();
 }
 
-ServerDirectory::HeardRun* ServerDirectory::find_or_add_run(const PeerId& sender,
-                                                            std::uint64_t run_id) {
+ServerDirectory::Server* ServerDirectory::find_or_add_server(const PeerId& sender) {
   const auto find_present = [this] {
     auto present = parameters_reader_.matched();
     present.insert(self_);
@@ -169,23 +182,17 @@ ServerDirectory::HeardRun* ServerDirectory::find_or_add_run(const PeerId& sender
   if (!make_room(servers_, kMaxServers, sender, find_present)) return nullptr;
   const auto [server, is_new] = servers_.try_emplace(sender);
   if (is_new) server->second.known_since = std::chrono::steady_clock::now();
-  auto& runs = server->second.runs;
-  for (HeardRun& run : runs)
-    if (run.run_id == run_id) return &run;
-  if (runs.size() == kMaxRunsOfServer) runs.pop_front();
-  HeardRun& run = runs.emplace_back();
-  run.run_id = run_id;
-  return &run;
+  return &server->second;
 }
 
 std::optional<PeerId> ServerDirectory::find_owner(std::uint64_t run_id) const {
   std::optional<PeerId> owner;
   std::uint64_t first = 0;
   for (const auto& [server, known] : servers_)
-    for (const HeardRun& run : known.runs)
-      if (run.run_id == run_id && run.claim > 0 && (!owner || run.claim < first)) {
+    for (const Claim& claim : known.claims)
+      if (claim.run_id == run_id && (!owner || claim.number < first)) {
         owner = server;
-        first = run.claim;
+        first = claim.number;
       }
   return owner;
 }
@@ -193,8 +200,8 @@ std::optional<PeerId> ServerDirectory::find_owner(std::uint64_t run_id) const {
 const ServerDirectory::HeardStatus* ServerDirectory::find_heard(std::uint64_t run_id) const {
   const auto owner = find_owner(run_id);
   if (!owner) return nullptr;
-  for (const HeardRun& run : servers_.at(*owner).runs)
-    if (run.run_id == run_id && run.status) return &*run.status;
+  for (const HeardStatus& heard : servers_.at(*owner).statuses)
+    if (heard.run_id == run_id) return &heard;
   return nullptr;
 }
 

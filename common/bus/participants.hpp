@@ -127,24 +127,27 @@ class ServerDirectory {
   std::optional<std::chrono::steady_clock::time_point> find_last_heard(std::uint64_t run_id) const;
 
  private:
+  struct Claim {
+    std::uint64_t run_id = 0;
+    std::uint64_t number = 0;  // counts the claims heard
+  };
   struct HeardStatus {
+    std::uint64_t run_id = 0;
     SimStatus status;
     std::chrono::steady_clock::time_point time;
   };
-  struct HeardRun {
-    std::uint64_t run_id = 0;
-    std::uint64_t claim = 0;  // counts the claims heard from 1; 0: it has not claimed it
-    std::optional<HeardStatus> status;
-  };
+  // The two topics overtake each other: a late joiner may hear all of one before the other. So each
+  // keeps the last runs that it has told of, and neither pushes out what the other needs.
   struct Server {
     std::optional<Parameters> parameters;
-    std::deque<HeardRun> runs;  // the last of them
+    std::deque<Claim> claims;
+    std::deque<HeardStatus> statuses;
     std::chrono::steady_clock::time_point known_since;
   };
 
   void note(const Parameters& sample, const PeerId& sender);
   void note(const SimStatus& sample, const PeerId& sender);
-  HeardRun* find_or_add_run(const PeerId& sender, std::uint64_t run_id);
+  Server* find_or_add_server(const PeerId& sender);
   std::optional<PeerId> find_owner(std::uint64_t run_id) const;
   const HeardStatus* find_heard(std::uint64_t run_id) const;
   bool is_present_run(const PeerId& server, const Server& known,

@@ -118,6 +118,26 @@ TEST(ResetTest, ASuccessorThatCannotBeMadeEndsTheRunWithItsCause) {
   EXPECT_EQ(flight.recorder->wait(), 1) << flight.outputs();
 }
 
+TEST(ControlResetTest, AfterManyQuickResetsLateJoinersFindTheRunAndRecordAllOfIt) {
+  OwnDomain domain;
+  TemporaryFolder folder;
+  const auto start = [&](const char* name, const std::vector<std::string>& flags) {
+    return std::make_unique<Process>(make_command(name, domain.number(), flags));
+  };
+  const auto server = start("sim_server", {"--scenario", scenario("short")});
+  for (int i = 0; i < 6; ++i) {
+    const auto reset = start("sim_ctl", {"reset"});
+    ASSERT_EQ(reset->wait(), 0) << i << reset->output() << server->output();
+  }
+  const auto client = start("control_client", {"--scenario", scenario("short")});
+  const auto recorder = start("recorder", {"--out", folder / "recording"});
+  EXPECT_EQ(server->wait(), 0) << server->output();
+  EXPECT_EQ(client->wait(), 0) << client->output();
+  EXPECT_EQ(recorder->wait(), 0) << recorder->output();
+  EXPECT_TRUE(read_manifest(folder / "recording").at("complete").get<bool>());
+  EXPECT_EQ(Table(folder / "recording/status.csv").text(0, "sample_index"), "0");
+}
+
 TEST(ControlUsageTest, WithoutAServerTheReasonIsNamed) {
   OwnDomain domain;
   Process process({program("sim_ctl"), "--domain", domain.text(), "--timeout-s", "1", "pause"});

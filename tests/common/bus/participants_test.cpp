@@ -201,6 +201,42 @@ TEST(ServerDirectoryTest, OnlyWhoClaimedARunFirstIsBelievedAboutIt) {
   EXPECT_EQ(runs.front().server, server.id());
 }
 
+// A late joiner is sent the history of each topic, whichever first.
+TEST(ServerDirectoryTest, AfterManyResetsTheLastRunIsFoundWhicheverTopicComesFirst) {
+  constexpr int kDomain = 80;
+  constexpr std::uint64_t kRuns = 9;
+  for (const bool are_parameters_first : {true, false}) {
+    SCOPED_TRACE(are_parameters_first);
+    Node node(kQosFile, kDomain, "directory");
+    std::atomic<std::uint64_t> last_status{0};
+    const ServerDirectory directory(
+        node, [&](const SimStatus& status) { last_status = status.run_id(); });
+    Node server(kQosFile, kDomain, "server");
+    Writer<Parameters> parameters(server);
+    Writer<SimStatus> status(server);
+    const std::uint64_t last = kRun + kRuns - 1;
+    const auto write_parameters = [&] {
+      for (std::uint64_t i = 0; i < kRuns; ++i)
+        parameters.write(make_parameters(kRun + i, {kVehicle}));
+      EXPECT_TRUE(wait_until([&] { return knows(directory, last); }));
+    };
+    if (are_parameters_first) write_parameters();
+    for (std::uint64_t i = 0; i < kRuns; ++i)
+      for (const RunPhase phase : {PHASE_WAITING, i + 1 < kRuns ? PHASE_RESET : PHASE_RUNNING})
+        status.write(make_status(kRun + i, phase));
+    ASSERT_TRUE(wait_until([&] { return last_status == last; }));
+    if (!are_parameters_first) write_parameters();
+    // By its last status a recorder knows that its run was reset.
+    ASSERT_TRUE(directory.find_status(last - 1));
+    EXPECT_EQ(directory.find_status(last - 1)->phase(), PHASE_RESET);
+    ASSERT_TRUE(wait_until([&] {
+      status.write(make_status(last, PHASE_RUNNING));
+      return directory.find_joinable(kVehicle).has_value();
+    }));
+    EXPECT_EQ(directory.find_joinable(kVehicle)->parameters.run_id(), last);
+  }
+}
+
 TEST(ServerWatchTest, ASilentServerIsNotJoinedIsGivenUpAndMayComeBack) {
   constexpr int kDomain = 73;
   Node node(kQosFile, kDomain, "directory");
