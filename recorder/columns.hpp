@@ -10,6 +10,8 @@
 
 namespace sls::record {
 
+inline constexpr const char* kStatusFile = "status.csv";
+inline constexpr const char* kStatusTopic = "sls/status";
 inline constexpr std::string_view kStatusHeader =
     "sample_index,phase,reason,step,controller,real_time_factor,resent,late,duplicate,superseded,"
     "take_overs,rejected_not_finite,rejected_force_limit,rejected_run,rejected_step,"

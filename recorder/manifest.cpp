@@ -15,6 +15,7 @@
 #include "common/bus/node.hpp"
 #include "common/config/config_error.hpp"
 #include "common/config/sha256.hpp"
+#include "recorder/columns.hpp"
 
 namespace sls::record {
 namespace {
@@ -99,7 +100,8 @@ std::string describe(const std::vector<MissingSteps>& missing) {
   std::uint64_t steps = 0;
   for (const MissingSteps& gap : missing) steps += gap.to - gap.from + 1;
   const MissingSteps& first = missing.front();
-  return fmt::format("{} samples missing, first {} step {} of vehicle {}", steps, first.topic,
+  const char* unit = first.topic == kStatusTopic ? "sample" : "step";
+  return fmt::format("{} samples missing, first {} {} {} of vehicle {}", steps, first.topic, unit,
                      first.from, first.vehicle_id);
 }
 

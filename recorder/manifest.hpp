@@ -12,7 +12,8 @@
 
 namespace sls::record {
 
-/// Consecutive steps of one topic that are not in the recording.
+/// Consecutive steps of one topic, of sls/status samples by their sample_index, that are not in the
+/// recording.
 struct MissingSteps {
   std::uint32_t vehicle_id = 0;
   std::string topic;

@@ -61,7 +61,7 @@ Recording::Recording(const Segment& segment, const Parameters& parameters)
       states_(segment.folder / StateRow::kFile, StateRow::kHeader),
       commands_(segment.folder / CommandRow::kFile, CommandRow::kHeader),
       references_(segment.folder / ReferenceRow::kFile, ReferenceRow::kHeader),
-      statuses_(segment.folder / "status.csv", kStatusHeader),
+      statuses_(segment.folder / kStatusFile, kStatusHeader),
       flight_(segment.folder / "flight.csv", make_flight_header(bus::is_fleet(parameters))),
       log_(scenario_, parameters) {
   for (const std::uint32_t id : parameters.vehicle_ids())
@@ -103,6 +103,7 @@ void Recording::read_earlier_segments() {
     }
     if (next < segment_.first_step) note_missing_steps(id, next, segment_.first_step - 1);
   }
+  for (const std::uint64_t index : read_status_indices(*segment_.earlier)) note_status(index);
 }
 
 // --- samples in ----------------------------------------------------------------------------------
@@ -132,6 +133,7 @@ void Recording::add(const SimStatus& status, const bus::PeerId&) {
   // A server that is discovered again sends its past again.
   if (last_status_ && status.sample_index() <= last_status_->sample_index()) return;
   last_status_ = status;
+  note_status(status.sample_index());
   write_row(statuses_, status);
   log_.add(status);
   if (has_ended())
@@ -175,6 +177,13 @@ void Recording::account(const StepRows& rows, bool is_answer_expected) {
 
 void Recording::note_missing_steps(std::uint32_t vehicle_id, std::uint64_t from, std::uint64_t to) {
   for (const char* topic : kTopics) note_missing(vehicle_id, topic, from, to);
+}
+
+/// Of status samples the server keeps the last ones alone.
+void Recording::note_status(std::uint64_t sample_index) {
+  if (sample_index > next_status_)
+    note_missing(parameters_.vehicle_id(), kStatusTopic, next_status_, sample_index - 1);
+  next_status_ = std::max(next_status_, sample_index + 1);
 }
 
 void Recording::note_missing(std::uint32_t vehicle_id, const char* topic, std::uint64_t from,

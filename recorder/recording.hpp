@@ -75,6 +75,7 @@ class Recording {
   void note_missing(std::uint32_t vehicle_id, const char* topic, std::uint64_t from,
                     std::uint64_t to);
   void note_missing_steps(std::uint32_t vehicle_id, std::uint64_t from, std::uint64_t to);
+  void note_status(std::uint64_t sample_index);
   StepJoin* find_vehicle(std::uint64_t run_id, std::uint32_t vehicle_id);
   bool has_ended() const;
   bool is_finished() const;
@@ -94,6 +95,7 @@ class Recording {
   std::uint64_t unanswered_steps_ = 0;
   std::uint64_t rebuilt_commands_ = 0;
   std::optional<SimStatus> last_status_;
+  std::uint64_t next_status_ = 0;  // sample_index after the last one of all segments
   std::string interruption_;           // from `finish` on
   std::uint64_t refused_samples_ = 0;  // likewise
   std::chrono::steady_clock::time_point flush_time_;

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "common/config/config_error.hpp"
+#include "recorder/columns.hpp"
 
 namespace sls::record {
 namespace {
@@ -127,6 +128,15 @@ std::uint64_t find_next_step(const RecordedFlight& flight) {
     next = std::min(next, after_whole);
   }
   return flight.vehicle_ids().empty() ? 0 : next;
+}
+
+std::vector<std::uint64_t> read_status_indices(const RecordedFlight& flight) {
+  std::vector<std::uint64_t> indices;
+  for (const RecordedSegment& segment : flight.segments) {
+    CsvReader file(segment.folder / kStatusFile, kStatusHeader);
+    while (file.next()) FieldParser{file}(indices.emplace_back());
+  }
+  return indices;
 }
 
 }  // namespace sls::record

@@ -78,4 +78,8 @@ class StepReader {
 /// @throws DamagedError
 std::uint64_t find_next_step(const RecordedFlight& flight);
 
+/// The sample_index of every row of status.csv, of all segments in order.
+/// @throws DamagedError
+std::vector<std::uint64_t> read_status_indices(const RecordedFlight& flight);
+
 }  // namespace sls::record

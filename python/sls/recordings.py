@@ -184,8 +184,9 @@ class Recording:
         if manifest["missing"]:
             count = sum(gap["to"] - gap["from"] + 1 for gap in manifest["missing"])
             first = manifest["missing"][0]
-            notes.append(f"{count} samples missing, first {first['topic']} step {first['from']} of "
-                         f"vehicle {first['vehicle_id']}")
+            unit = "sample" if first["topic"] == "sls/status" else "step"
+            notes.append(f"{count} samples missing, first {first['topic']} {unit} {first['from']} "
+                         f"of vehicle {first['vehicle_id']}")
         notes += [f"{name}: the last row is cut off and left out"
                   for name, (_, is_cut) in self._tables.items() if is_cut]
         runs = sorted(folder.name for folder in self.folder.glob("run-*") if folder.is_dir())

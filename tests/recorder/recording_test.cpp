@@ -574,6 +574,25 @@ TEST_F(RecordingTest, StatusSamplesThatComeAgainAreOneRow) {
   EXPECT_EQ(read_table("status.csv").rows.size(), 3u);
 }
 
+TEST_F(RecordingTest, MissingStatusSamplesAreNamedAndTheRecordingIsNotComplete) {
+  std::vector<SimStatus> statuses;
+  for (int i = 0; i < 40; ++i) statuses.push_back(make_status(PHASE_WAITING, 0, "missing: recorder"));
+  for (int i = 23; i < 40; ++i)
+    if (i != 30 && i != 31) recording_->add(statuses[i]);
+  fly_to_the_end();
+  EXPECT_TRUE(recording_->has_all()) << "what is lost is not waited for";
+  EXPECT_FALSE(finish());
+  const Json manifest = read_manifest();
+  EXPECT_EQ(manifest.at("complete"), false);
+  EXPECT_EQ(manifest.at("outcome"), "finished");
+  const auto gap = [](int from, int to) {
+    return Json({{"vehicle_id", 0}, {"topic", "sls/status"}, {"from", from}, {"to", to}});
+  };
+  EXPECT_EQ(manifest.at("missing"), Json::array({gap(0, 22), gap(30, 31)}));
+  EXPECT_EQ(recording_->describe_gaps(),
+            "25 samples missing, first sls/status sample 0 of vehicle 0");
+}
+
 TEST_F(RecordingTest, ARunWithoutASingleSampleIsNotComplete) {
   EXPECT_FALSE(finish("the server is gone"));
   EXPECT_EQ(read_manifest().at("complete"), false);
@@ -680,11 +699,12 @@ TEST_F(RecordingTest, SamplesOfOtherRunsAndVehiclesAreIgnored) {
     recording_->add(command);
     add_step(step);
   }
-  SimStatus other = make_status(PHASE_FAILED, 3, "another run's");
+  const SimStatus end = make_status(PHASE_FINISHED, kLastStep);
+  SimStatus other = end;
   other.run_id(kRunId + 1);
   recording_->add(other);
   EXPECT_FALSE(recording_->has_all());
-  recording_->add(make_status(PHASE_FINISHED, kLastStep));
+  recording_->add(end);
   EXPECT_TRUE(finish());
   EXPECT_EQ(read_table("state.csv").rows.size(), kLastStep + 1);
   EXPECT_EQ(read_table("status.csv").rows.size(), 2u);

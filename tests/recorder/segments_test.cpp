@@ -176,6 +176,32 @@ TEST_F(SegmentsTest, AnEarlierSegmentsGapKeepsTheWholeFromBeingComplete) {
       Json::array({{{"vehicle_id", 0}, {"topic", "sls/reference"}, {"from", 50}, {"to", 50}}}));
 }
 
+TEST_F(SegmentsTest, StatusSamplesOfAllSegmentsCountTogether) {
+  std::vector<SimStatus> statuses;
+  const Parameters parameters = make_parameters();
+  for (int i = 0; i < 10; ++i) statuses.push_back(make_status(PHASE_RUNNING, 0));
+  statuses.push_back(make_status(PHASE_FINISHED, kLastStep, "mission finished"));
+  for (const std::size_t oldest : {3, 6}) {  // of the samples that the server still keeps
+    SCOPED_TRACE(oldest);
+    fs::remove_all(out_);
+    fs::create_directory(out_);
+    {
+      Recording recording(out_, parameters);
+      for (std::size_t i = 0; i < 5; ++i) recording.add(statuses[i]);
+      add_steps(recording, 0, 150);
+      while (fs::file_size(out_ / "command.csv") < 200) recording.flush_if_due();
+    }
+    const Segment segment = resume();
+    Recording recording(segment, parameters);
+    add_steps(recording, 0, kLastStep);
+    for (std::size_t i = oldest; i < statuses.size(); ++i) recording.add(statuses[i]);
+    EXPECT_EQ(recording.finish("", 0), oldest <= 5);
+    const Json gap = {{"vehicle_id", 0}, {"topic", "sls/status"}, {"from", 5}, {"to", 5}};
+    EXPECT_EQ(read_manifest(segment.folder).at("missing"),
+              oldest <= 5 ? Json::array() : Json::array({gap}));
+  }
+}
+
 TEST_F(SegmentsTest, StepsThatNobodyAnsweredAreWholeWithoutAReference) {
   const auto add = [](Recording& recording, std::uint64_t from, std::uint64_t to) {
     for (std::uint64_t step = from; step <= to; ++step) {

@@ -12,6 +12,8 @@ namespace {
 
 constexpr std::int64_t kPeriod = 4'000'000;
 
+std::uint64_t status_samples = 0;  // of the run in work
+
 double to_time(std::uint64_t step) { return static_cast<double>(step) * 0.004; }
 
 /// Three different functions of time, of the size `scale`.
@@ -49,6 +51,7 @@ mission:
 )";
 
 Parameters make_parameters() {
+  status_samples = 0;
   Parameters message;
   message.run_id(kRunId);
   message.vehicle_id(0);
@@ -159,10 +162,9 @@ Reference make_standby_reference(std::uint64_t step) {
 }
 
 SimStatus make_status(RunPhase phase, std::uint64_t step, const std::string& reason) {
-  static std::uint64_t samples = 0;
   SimStatus message;
   message.run_id(kRunId);
-  message.sample_index(samples++);
+  message.sample_index(status_samples++);
   message.phase(phase);
   message.reason(reason);
   message.step(step);

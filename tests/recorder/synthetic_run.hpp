@@ -15,6 +15,7 @@ inline constexpr const char* kPilot = "pilot";
 /// Scenario text with a 0.4 s hold, then two laps of 0.4 s of a figure eight; period 4 ms.
 extern const char* const kScenarioText;
 
+/// A run begins with them: its status samples count from 0.
 Parameters make_parameters();
 
 /// State of `step`; the force in it is that of the pilot's answer to the step before.
