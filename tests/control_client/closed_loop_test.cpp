@@ -2,11 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <unsupported/Eigen/MatrixFunctions>
 
 #include "control_client/lqr.hpp"
 #include "tests/control_client/oracle_flight.hpp"
 #include "tests/control_client/sample_scenarios.hpp"
+#include "tests/oracle/linear_theory.hpp"
 
 namespace sls::control {
 namespace {
@@ -35,24 +35,6 @@ TEST(ClosedLoopTest, FigureEightErrorGrowsLinearlyWithThePeriod) {
   EXPECT_NEAR(at_4 / at_2, 2.0, 0.05);
 }
 
-/// Error of the designed linear equation e⁽ⁿ⁾ = −Σ k_i e⁽ⁱ⁾ that starts at rest with `e0`, at
-/// multiples of `h`.
-std::vector<double> calc_designed_error(const Eigen::RowVectorXd& gains, double e0, double h,
-                                        std::size_t count) {
-  const Eigen::Index n = gains.size();
-  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(n, n);
-  A.diagonal(1).setOnes();
-  A.row(n - 1) = -gains;
-  const Eigen::MatrixXd transition = (A * h).exp();
-  Eigen::VectorXd x = e0 * Eigen::VectorXd::Unit(n, 0);
-  std::vector<double> error;
-  for (std::size_t i = 0; i < count; ++i) {
-    error.push_back(x[0]);
-    x = transition * x;
-  }
-  return error;
-}
-
 /// Largest distance between the load's error and the designed one in `matlab_setpoint_1`.
 double calc_largest_deviation(std::int64_t period_ns) {
   const config::Scenario scenario = make_matlab_set_point(period_ns);
@@ -61,12 +43,13 @@ double calc_largest_deviation(std::int64_t period_ns) {
   EXPECT_LE(flight.back().load_error().norm(), 1e-4);  // settled: slowest pole −0.9, 15 s
   const auto& gains = std::get<config::NamedGains>(scenario.controller.gains);
   const double h = static_cast<double>(period_ns) / 1e9;
-  const std::vector<double> xy =
-      calc_designed_error(Eigen::RowVector4d(gains.horizontal.position, gains.horizontal.velocity,
-                                             gains.horizontal.acceleration, gains.horizontal.jerk),
-                          -1.0, h, flight.size());
-  const std::vector<double> z = calc_designed_error(
-      Eigen::RowVector2d(gains.vertical.position, gains.vertical.velocity), 0.5, h, flight.size());
+  const std::vector<double> xy = oracle::calc_designed_error(
+      Eigen::RowVector4d(gains.horizontal.position, gains.horizontal.velocity,
+                         gains.horizontal.acceleration, gains.horizontal.jerk),
+      -Eigen::Vector4d::UnitX(), h, flight.size());
+  const std::vector<double> z = oracle::calc_designed_error(
+      Eigen::RowVector2d(gains.vertical.position, gains.vertical.velocity),
+      0.5 * Eigen::Vector2d::UnitX(), h, flight.size());
   double largest = 0.0;
   for (std::size_t i = 0; i < flight.size(); ++i) {
     const Vector3d designed(xy[i], -xy[i], z[i]);

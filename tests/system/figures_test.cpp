@@ -23,16 +23,6 @@ TEST(FiguresTest, FigureEightAtOneMillisecondIsTrackedOnTheSecondLapAndLosesNoRo
   EXPECT_TRUE(manifest.at("missing").empty());
 }
 
-TEST(FiguresTest, FigureEightMatchesTheExpectedErrorsOfTheHoldAtFourMilliseconds) {
-  Flight flight(scenario("figure_eight"));
-  flight.expect_success();
-  const TrackingError error = calc_tracking_error(flight.recording(), 4000, 8000);
-  // Design, section 7, two digits: 4.1e-4, 1.1e-3, 1.8e-5.
-  EXPECT_NEAR(error.rms.x(), 4.1e-4, 0.05e-4);
-  EXPECT_NEAR(error.rms.y(), 1.1e-3, 0.05e-3);
-  EXPECT_NEAR(error.rms.z(), 1.8e-5, 0.05e-5);
-}
-
 /// Largest distance of quadrotor and load from the published run, sampled every 20 ms.
 double calc_distance_from_matlab(const fs::path& published, const fs::path& recording,
                                  double period_s) {
@@ -68,34 +58,6 @@ TEST(FiguresTest, MatlabSetpointConvergesToThePublishedRunWithThePeriod) {
   EXPECT_LE(half, 0.525 * full);
 }
 
-TEST(FiguresTest, PublishedGazeboErrorsComeFromTheStateWiring) {
-  const auto fly = [](const char* name) {
-    Flight flight(scenario(name));
-    flight.expect_success();
-    const auto [first, last] = find_stage(flight.recording(), "figure_eight");
-    const TrackingError error =
-        calc_tracking_error(flight.recording(), first + (last - first + 1) / 2, last);
-    std::printf("%-24s rms x %.4g y %.4g z %.4g m\n", name, error.rms.x(), error.rms.y(),
-                error.rms.z());
-    return error;
-  };
-  const TrackingError legacy = fly("gazebo_legacy");
-  EXPECT_NEAR(legacy.rms.x(), 0.211, 0.005);
-  EXPECT_NEAR(legacy.rms.y(), 0.236, 0.03);
-
-  // Design, section 7: "about 120 times (x) and 50 times (y) better"; z keeps 0.10 m because the
-  // controller believes the rod 0.1 m too short. With its model right, too, at least 500 and 200
-  // times better.
-  const TrackingError wired = fly("gazebo_correct_wiring");
-  EXPECT_NEAR(legacy.rms.x() / wired.rms.x(), 120.0, 10.0);
-  EXPECT_NEAR(legacy.rms.y() / wired.rms.y(), 50.0, 5.0);
-  EXPECT_NEAR(wired.rms.z(), 0.10, 0.01);
-  const TrackingError corrected = fly("gazebo_corrected");
-  EXPECT_GE(legacy.rms.x() / corrected.rms.x(), 500.0);
-  EXPECT_GE(legacy.rms.y() / corrected.rms.y(), 200.0);
-  EXPECT_LT(corrected.rms.z(), 1e-4);
-}
-
 TEST(FiguresTest, SameScenarioGivesTheSameBytesTwiceAndOverUdp) {
   Flight first(scenario("figure_eight")), again(scenario("figure_eight")),
       udp(scenario("figure_eight"), {qos("udp"), {}, {}});
@@ -117,28 +79,6 @@ TEST(FiguresTest, SameScenarioGivesTheSameBytesTwiceAndOverUdp) {
   }
   EXPECT_GT(read_file(first.recording() / "state.csv").size(), 1000000u);
 }
-
-/// Every other shipped scenario flies to its end; what its mission promises is judged.
-class ShippedScenarioTest : public ::testing::TestWithParam<std::string> {};
-
-TEST_P(ShippedScenarioTest, FliesToTheEndAndReachesItsLastReference) {
-  Flight flight(scenario(GetParam()));
-  flight.expect_success();
-  const Table states(flight.recording() / "state.csv"),
-      references(flight.recording() / "reference.csv");
-  ASSERT_GT(states.rows(), 0u);
-  ASSERT_EQ(states.rows(), references.rows());
-  const std::size_t last = states.rows() - 1;
-  EXPECT_LT((states.position(last, "load") - references.position(last, "ref")).norm(), 0.05)
-      << "the load is not where the mission ends";
-}
-
-INSTANTIATE_TEST_SUITE_P(All, ShippedScenarioTest,
-                         ::testing::Values("setpoints", "mission", "matlab_setpoint_2",
-                                           "matlab_setpoint_3", "matlab_figure_eight",
-                                           "rest_to_rest", "rigid_figure_eight", "rotor_drag",
-                                           "integral_mass_error"),
-                         [](const auto& instance) { return instance.param; });
 
 }  // namespace
 }  // namespace sls::test

@@ -161,16 +161,4 @@ TrackingError calc_tracking_error(const std::filesystem::path& recording, std::s
   return error;
 }
 
-std::pair<std::size_t, std::size_t> find_stage(const std::filesystem::path& recording,
-                                               const std::string& name) {
-  const Table references(recording / "reference.csv");
-  std::size_t first = references.rows(), last = 0;
-  for (std::size_t row = 0; row < references.rows(); ++row)
-    if (references.text(row, "stage_name") == name) {
-      first = std::min(first, row);
-      last = row;
-    }
-  return {first, last};
-}
-
 }  // namespace sls::test

@@ -99,8 +99,4 @@ struct TrackingError {
 TrackingError calc_tracking_error(const std::filesystem::path& recording, std::size_t first,
                                   std::size_t last);
 
-/// First and last step of the stage of that name.
-std::pair<std::size_t, std::size_t> find_stage(const std::filesystem::path& recording,
-                                               const std::string& name);
-
 }  // namespace sls::test

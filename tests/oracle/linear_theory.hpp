@@ -1,0 +1,101 @@
+/// What linear theory says of a flight: judges that simulate nothing.
+#pragma once
+
+#include <Eigen/LU>
+#include <cmath>
+#include <complex>
+#include <unsupported/Eigen/MatrixFunctions>
+#include <vector>
+
+#include "control_client/lqr.hpp"
+#include "tests/sim_server/rigid_pendulum_ode.hpp"
+
+namespace sls::oracle {
+
+/// The error e of the designed equation e⁽ⁿ⁾ = −Σ gains_i e⁽ⁱ⁾ that starts with
+/// `start` = (e, ė, …, e⁽ⁿ⁻¹⁾), at multiples of `h`.
+inline std::vector<double> calc_designed_error(const Eigen::RowVectorXd& gains,
+                                               Eigen::VectorXd start, double h, std::size_t count) {
+  const Eigen::Index n = gains.size();
+  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(n, n);
+  A.diagonal(1).setOnes();
+  A.row(n - 1) = -gains;
+  const Eigen::MatrixXd transition = (A * h).exp();
+  std::vector<double> error;
+  for (std::size_t i = 0; i < count; ++i) {
+    error.push_back(start[0]);
+    start = transition * start;
+  }
+  return error;
+}
+
+/// Load error of a figure eight once the transients have died away: sines about a mean.
+struct SteadyError {
+  Eigen::Array3d amplitude = Eigen::Array3d::Zero();
+  Eigen::Array3d mean = Eigen::Array3d::Zero();
+  Eigen::Array3d rms() const { return (amplitude.square() / 2 + mean.square()).sqrt(); }
+};
+
+/// Small motions about hover of vehicle, drag and law, the force held over the period T:
+///
+///     horizontal  M p̈ + S q̈ = Z F − D (ṗ − v),   I q̈ + S p̈ + S g q = 0,   y = p + L q
+///                 F = −M′ g′ q + (m′ L′ / g′) n [+ D (ṗ − v)],   n as in the law's (6) with
+///                 ÿ = −g′ q, y⁽³⁾ = −g′ q̇ and the load seen at p + L′ q
+///     vertical    M z̈ = M g − Z M′ (g′ − z̈_r + k_v ė′ + k_p e′),   e′ = e − (L − L′)
+///     hold        Z = (1 − e^(−sT)) / (sT)
+///
+/// M, S, I are the vehicle's mass and the pendulum's first and second moment about its joint; what
+/// the controller believes bears a dash. On s = iw, of each axis its own frequency.
+inline SteadyError calc_steady_error(const config::Scenario& scenario,
+                                     const config::FigureEightReference& eight) {
+  using Complex = std::complex<double>;
+  const model::SlungLoadParameters& vehicle = scenario.vehicle;
+  const model::SlungLoadParameters& believed = scenario.controller.model.vehicle;
+  const config::NamedGains gains = control::make_named_gains(scenario.controller.gains);
+  const config::AxisGains &xy = gains.horizontal, &z = gains.vertical;
+  const double mass = vehicle.total_mass(), length = vehicle.rod_length, g = vehicle.gravity;
+  double first_moment = vehicle.load_mass * length, second_moment = first_moment * length;
+  if (scenario.plant.pendulum == config::Pendulum::kRigid) {
+    const RigidPendulum links;
+    first_moment = links.mass * links.centre;
+    second_moment = links.inertia + first_moment * links.centre;
+  }
+  const double drag = scenario.plant.air.rotor_drag;
+  const bool is_fed_forward = scenario.controller.drag_feed_forward;
+  const double to_force = believed.quad_mass * believed.rod_length / believed.gravity;
+  const double weight = believed.total_mass() * believed.gravity;
+  const auto calc_hold = [&](const Complex& s) {
+    const Complex sT = s * (static_cast<double>(scenario.sync.period_ns) * 1e-9);
+    return (1.0 - std::exp(-sT)) / sT;
+  };
+  SteadyError error;
+  for (int axis = 0; axis < 2; ++axis) {
+    const Complex s(0.0, 2.0 * M_PI * (axis + 1) / eight.period_s), hold = calc_hold(s);
+    const Complex of_error = xy.velocity * s + xy.position;  // in −n
+    const Complex by_position = (is_fed_forward ? drag * s : 0.0) - to_force * of_error;
+    const Complex by_rod = to_force * (believed.gravity * (xy.jerk * s + xy.acceleration) -
+                                       believed.rod_length * of_error) -
+                           weight;
+    const Complex by_reference =
+        to_force * (s * s * (s * s + xy.jerk * s + xy.acceleration) + of_error);
+    Eigen::Matrix2cd motion;
+    motion << mass * s * s + drag * s - hold * by_position, first_moment * s * s - hold * by_rod,
+        first_moment * s * s, second_moment * s * s + first_moment * g;
+    const Eigen::Vector2cd response =
+        motion.lu().solve(Eigen::Vector2cd(hold * by_reference, Complex(0.0)));
+    error.amplitude[axis] =
+        std::abs(response[0] + length * response[1] - 1.0) * eight.amplitude[axis];
+    if (!is_fed_forward)
+      error.mean[axis] = drag * scenario.plant.air.v_wind_W[axis] / (to_force * xy.position);
+  }
+  const Complex s(0.0, 2.0 * M_PI / eight.period_s), hold = calc_hold(s);
+  const double believed_mass = believed.total_mass();
+  error.amplitude[2] =
+      std::abs((hold * believed_mass - mass) * s * s /
+               (mass * s * s + hold * believed_mass * (z.velocity * s + z.position))) *
+      eight.amplitude[2];
+  error.mean[2] = length - believed.rod_length + (mass * g - weight) / (believed_mass * z.position);
+  return error;
+}
+
+}  // namespace sls::oracle
