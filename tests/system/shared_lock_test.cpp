@@ -44,8 +44,10 @@ class SharedLockTest : public testing::TestWithParam<const char*> {
                 read_file(flight_->recording() / "state.csv"));
   }
 
+  /// Nobody waits for the primary's lease to end, 2 s: a wait of 1 s would have been named.
   void expect_take_over() {
     expect_result();
+    EXPECT_FALSE(is_said("waiting for: controller '")) << flight_->outputs();
     EXPECT_TRUE(is_said("'standby' takes over from 'primary'")) << flight_->outputs();
   }
 

@@ -391,26 +391,36 @@ TEST(WaitingTest, AStoppedServerIsNamedByClientAndRecorderAndTheFlightGoesOn) {
   EXPECT_TRUE(holds(flight.client->output(), "is back")) << flight.client->output();
 }
 
-TEST(StandbyTest, TakesOverWithinAQuarterOfASecondWithOneEventForTheSwitch) {
+TEST(StandbyTest, TakesOverAfterTheTimeOfTheScenarioWithOneEventForTheSwitch) {
   TemporaryFolder folder;
   const std::string file =
       make_scenario(folder, {{"controllers: 1", "controllers: 2"}}, "figure_eight");
-  Flight flight(file, {{}, {"--period-s", "0.001"}, {"--name", "primary", "--strength", "2"}});
-  Process standby(make_command("control_client", flight.domain.number(),
-                               {"--scenario", file, "--name", "standby", "--strength", "1"}));
-  ASSERT_TRUE(wait_until([&] {
-    return holds(read_file(flight.recording() / "command.csv"), ",primary,");
-  })) << flight.outputs();
-  flight.client->kill();
-  const auto killed = std::chrono::steady_clock::now();
-  ASSERT_TRUE(wait_until([&] {
-    return holds(flight.server->output(), "'standby' takes over from 'primary'");
-  })) << flight.outputs();
-  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - killed;
-  std::printf("take-over in lockstep: %.0f ms after SIGKILL\n", elapsed.count() * 1e3);
-  EXPECT_EQ(flight.server->wait(), 0) << flight.outputs();
-  EXPECT_EQ(standby.wait(), 0) << standby.output();
-  EXPECT_EQ(flight.recorder->wait(), 0) << flight.outputs();
+  // A busy machine may be late, or the primary silent before it is killed: not five times.
+  for (int attempt = 0; attempt < 5; ++attempt) {
+    Flight flight(file, {{}, {"--period-s", "0.001"}, {"--name", "primary", "--strength", "2"}});
+    Process standby(make_command("control_client", flight.domain.number(),
+                                 {"--scenario", file, "--name", "standby", "--strength", "1"}));
+    ASSERT_TRUE(wait_until([&] {
+      return holds(read_file(flight.recording() / "command.csv"), ",primary,");
+    })) << flight.outputs();
+    const auto killed = std::chrono::steady_clock::now();
+    flight.client->kill();
+    ASSERT_TRUE(wait_until([&] {
+      return holds(flight.server->output(), "'standby' takes over from 'primary'");
+    })) << flight.outputs();
+    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - killed;
+    EXPECT_EQ(flight.server->wait(), 0) << flight.outputs();
+    EXPECT_EQ(standby.wait(), 0) << standby.output();
+    EXPECT_EQ(flight.recorder->wait(), 0) << flight.outputs();
+    const Table status(flight.recording() / "status.csv");
+    const std::size_t events = count_events(flight.recording(), "takes over from");
+    EXPECT_EQ(status.number(status.rows() - 1, "take_overs"), static_cast<double>(events));
+    std::printf("take-over in lockstep: %.0f ms after SIGKILL, %zu events\n", elapsed.count() * 1e3,
+                events);
+    // sync.take_over_s, 0.1 s, and 50 ms in which the server wakes and this test looks.
+    if (elapsed.count() >= 0.1 && elapsed.count() <= 0.15 && events == 1) return;
+  }
+  FAIL() << "not once within 100 to 150 ms of SIGKILL and with one event";
 }
 
 }  // namespace
