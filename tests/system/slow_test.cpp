@@ -1,8 +1,10 @@
 /// What real time promises at 250 Hz, for a minute. `./sls test --slow`, on an idle machine.
 #include <gtest/gtest.h>
 
+#include <regex>
 #include <thread>
 
+#include "bench/in_process_flight.hpp"
 #include "tests/system/flight.hpp"
 #include "tests/system/load.hpp"
 
@@ -15,10 +17,34 @@ class RealTimeMinuteTest : public ::testing::Test {
   std::string make_minute() const {
     return make_scenario(folder_, {{"for_s: 32", "for_s: 60"}}, "figure_eight");
   }
-  static std::string read_timing(const Flight& flight) {
-    const std::string timing = read_manifest(flight.recording()).at("timing");
-    std::printf("%s\n", timing.c_str());
-    return timing;
+  /// Numbers of the timing label, which must not say that the flight is degraded.
+  struct Timing {
+    int late = -1;
+    double worst_age_ms = 0.0;
+  };
+  static Timing read_timing(const Flight& flight) {
+    const std::string label = read_manifest(flight.recording()).at("timing");
+    std::printf("%s\n", label.c_str());
+    const std::regex form(
+        "real-time, (\\d+) of 15000 late, worst age (\\S+) ms, states at most \\S+ ms late");
+    std::smatch words;
+    if (std::regex_match(label, words, form)) return {std::stoi(words[1]), std::stod(words[2])};
+    ADD_FAILURE() << label;
+    return {};
+  }
+  /// From the second lap on, in the flight whose every force comes `delay_ms` late.
+  static double calc_largest_error(const std::string& file, double delay_ms) {
+    config::Scenario scenario = config::load_scenario(file);
+    config::Fault fault;
+    fault.on = config::FaultChannel::kCommand;
+    fault.effect = config::DelayFault{std::llround(delay_ms * 1e6)};
+    scenario.faults = {fault};
+    double largest = 0.0;
+    for (const bench::FlownStep& step : bench::fly(scenario))
+      if (step.step >= 4000)
+        largest = std::max(
+            largest, (step.truth.p_WL - step.answer.reference.position).cwiseAbs().maxCoeff());
+    return largest;
   }
   TemporaryFolder folder_;
 };
@@ -26,19 +52,27 @@ class RealTimeMinuteTest : public ::testing::Test {
 TEST_F(RealTimeMinuteTest, NoAnswerIsLateOnAnIdleMachine) {
   Flight flight(make_minute(), {{}, {"--mode", "realtime"}, {}});
   flight.expect_success();
-  EXPECT_EQ(read_timing(flight).rfind("real-time, 0 of 15000 late, worst age 0 ms", 0), 0u);
+  const Timing timing = read_timing(flight);
+  EXPECT_EQ(timing.late, 0);
+  EXPECT_EQ(timing.worst_age_ms, 0.0);
 }
 
-TEST_F(RealTimeMinuteTest, WithEveryCoreBusyTheFlightIsStableAndTheLabelSaysWhatHappened) {
+TEST_F(RealTimeMinuteTest, WithEveryCoreBusyTheLoadErrsNoMoreThanTheLabelExplains) {
+  const std::string file = make_minute();
   const Load load(std::thread::hardware_concurrency());
-  Flight flight(make_minute(), {{}, {"--mode", "realtime"}, {}});
+  Flight flight(file, {{}, {"--mode", "realtime"}, {}});
   flight.expect_success();
-  const std::string timing = read_timing(flight);
-  EXPECT_NE(timing.find("real-time, "), std::string::npos) << timing;
-  // From the second lap on; an undisturbed flight stays within 1.6e-3 m.
-  const TrackingError error = calc_tracking_error(flight.recording(), 4000, 15000);
-  std::printf("largest load position error from the second lap on: %.3g m\n", error.max.maxCoeff());
-  EXPECT_LT(error.max.maxCoeff(), 0.5);
+  const Timing timing = read_timing(flight);
+  const double error = calc_tracking_error(flight.recording(), 4000, 15000).max.maxCoeff();
+  const double undisturbed = calc_largest_error(file, 0.0);
+  const double delayed = calc_largest_error(file, timing.worst_age_ms);
+  // As if every force had been as old as the oldest, in the share of late steps in 2 s, over which
+  // the loop averages (its slowest pole is −0.5 1/s). Twice that: it does not weigh all alike.
+  const double share = std::min(1.0, 0.004 * timing.late / 2.0);
+  const double bound = undisturbed + 2.0 * share * (delayed - undisturbed);
+  std::printf("largest load position error from the second lap on: %.3g m, bound %.3g m\n", error,
+              bound);
+  EXPECT_LE(error, bound);
 }
 
 }  // namespace
