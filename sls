@@ -5,7 +5,7 @@ set -euo pipefail
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)"
 readonly root
 readonly build="${SLS_BUILD:-$root/build}"
-readonly flying=(sim_server control_client recorder)
+readonly flying=(sim_server control_client recorder closed_loop)
 readonly programs=("${flying[@]}" sim_ctl sls_verify delay_margin sls_doctor)
 readonly packages=(g++ make cmake libeigen3-dev libsimbody-dev libfastrtps-dev libfastcdr-dev
   fastddsgen default-jre-headless libyaml-cpp-dev libcli11-dev libspdlog-dev nlohmann-json3-dev libgtest-dev libssl-dev
@@ -34,6 +34,7 @@ usage: ./sls COMMAND [OPTIONS]
       --period-s X     control period in force (default: the scenario's)
       --mode MODE      lockstep or realtime (default: the scenario's)
       --rtf X          of realtime: simulated over wall time (default: the scenario's)
+      --in-process     the same flight in one process without DDS: same data, same certificate
       --no-pinning     leave it to the system which processor runs what; else, where one vehicle flies in
                        lockstep, server and client share one and leave the others to the recorder
   ctl COMMAND        talk to the run on this domain: pause, step N, resume, start, reset, stop or
@@ -231,12 +232,13 @@ find_scenario() {
 
 # fly SCENARIO [OPTIONS]: sets `recording` and `result`.
 fly() {
-  local scenario='' force=() qos=() domain=() timing=() is_pinned=1
+  local scenario='' force=() qos=() domain=() timing=() is_pinned=1 is_in_process=0
   recording=''
   while (($#)); do
     case $1 in
       --force) force=(--force) ;;
       --no-pinning) is_pinned=0 ;;
+      --in-process) is_in_process=1 ;;
       --out | --qos | --domain | --period-s | --mode | --rtf)
         (($# >= 2)) || fail "$1: expected a value (see ./sls help)" 2
         case $1 in
@@ -262,6 +264,17 @@ fly() {
     recording="recordings/$(basename "$file" .yaml)-$(date -u +%Y%m%dT%H%M%SZ)"
   fi
 
+  trap 'on_signal 130 INT' INT
+  trap 'on_signal 143 TERM' TERM HUP
+  trap 'signal_all TERM' EXIT
+  if ((is_in_process)); then
+    [[ -z "${qos[*]}${domain[*]}" && " ${timing[*]} " != *' --mode '* && " ${timing[*]} " != *' --rtf '* ]] ||
+      fail "--in-process: expected no --qos, --domain, --mode or --rtf with it: one process has no network and no clock" 2
+    start closed_loop --scenario "$file" --out "$recording" "${force[@]}" "${timing[@]}"
+    wait_all
+    return
+  fi
+
   # One line about a mistake, before three programs stumble over it.
   local plan
   plan="$("$build/bin/sim_server" --check --scenario "$file" "${qos[@]}" "${domain[@]}" "${timing[@]}")" ||
@@ -269,9 +282,6 @@ fly() {
   "$build/bin/recorder" --check --out "$recording" "${force[@]}" "${qos[@]}" "${domain[@]}" ||
     exit $?
 
-  trap 'on_signal 130 INT' INT
-  trap 'on_signal 143 TERM' TERM HUP
-  trap 'signal_all TERM' EXIT
   [[ $is_pinned == 0 || $plan != *'lockstep, 1 vehicle,'* ]] || place_programs
   start recorder --out "$recording" "${force[@]}" "${qos[@]}" "${domain[@]}"
   start sim_server --scenario "$file" "${qos[@]}" "${domain[@]}" "${timing[@]}"

@@ -7,7 +7,7 @@
 #include <thread>
 #include <vector>
 
-#include "bench/samples.hpp"
+#include "closed_loop/samples.hpp"
 #include "common/app/run_main.hpp"
 #include "common/app/stop_signal.hpp"
 #include "common/app/wait.hpp"
@@ -38,12 +38,12 @@ class Surroundings {
     controller_.host(bus::host_name());
     controller_.scenario_sha256(scenario.sha256);
     controller_.ready(true);
-    parameters_.write(make_parameters(scenario, kRunId, vehicles));
+    parameters_.write(closed_loop::make_parameters(scenario, kRunId, vehicles));
     announce(PHASE_WAITING, 0);
   }
 
   void announce(RunPhase phase, std::uint64_t step) {
-    statuses_.write(make_status(kRunId, index_++, phase, step));
+    statuses_.write(closed_loop::make_status(kRunId, index_++, phase, step));
     announcements_.write(controller_);
     announced_ = Clock::now();
   }
@@ -86,7 +86,7 @@ class SingleStream {
  public:
   SingleStream(bus::Node& node, std::uint32_t)
       : states_(node), references_(node), commands_(node) {}
-  void write(const StepSamples& step) {
+  void write(const closed_loop::StepSamples& step) {
     states_.write(step.state);
     references_.write(step.reference);
     commands_.write(step.command);
@@ -104,7 +104,7 @@ class FleetStream {
  public:
   FleetStream(bus::Node& node, std::uint32_t vehicles)
       : vehicles_(vehicles), states_(node), references_(node), commands_(node) {}
-  void write(const StepSamples& step) {
+  void write(const closed_loop::StepSamples& step) {
     write_all(states_, state_, step.state);
     write_all(references_, reference_, step.reference);
     write_all(commands_, command_, step.command);
@@ -139,7 +139,7 @@ class FleetStream {
 
 template <class Stream>
 nlohmann::json feed(const config::Scenario& scenario, const FeederOptions& options) {
-  std::vector<StepSamples> samples = fly_samples(scenario, options.steps, kRunId);
+  std::vector<closed_loop::StepSamples> samples = closed_loop::fly_samples(scenario, options.steps, kRunId);
   samples.back().command.mission(MISSION_FINISHED);
   bus::Node node(options.qos_file, options.domain, "bench", "server");
   Stream stream(node, options.vehicles);
@@ -150,7 +150,7 @@ nlohmann::json feed(const config::Scenario& scenario, const FeederOptions& optio
                     [](const Participant& recorder) { return recorder.ready(); });
   surroundings.announce(PHASE_RUNNING, 0);
   const auto began = Clock::now();
-  for (const StepSamples& step : samples) {
+  for (const closed_loop::StepSamples& step : samples) {
     const auto number = static_cast<std::int64_t>(step.state.step());
     surroundings.wait(PHASE_RUNNING, step.state.step(), "the recorder",
                       [&](const Participant& recorder) {

@@ -5,12 +5,12 @@
 #include <memory>
 #include <vector>
 
-#include "bench/samples.hpp"
+#include "closed_loop/samples.hpp"
 #include "common/config/scenario.hpp"
 #include "control_client/flight_controller.hpp"
 #include "control_client/messages.hpp"
 #include "sim_server/messages.hpp"
-#include "sim_server/slung_load_plant.hpp"
+#include "sim_server/plants/slung_load/slung_load_plant.hpp"
 #include "tests/oracle/slung_load_ode.hpp"
 
 namespace sls::bench {
@@ -48,8 +48,8 @@ void closed_form_step(benchmark::State& run) {
 }
 BENCHMARK(closed_form_step)->Arg(1)->Arg(2)->Arg(10)->Arg(100);
 
-const std::vector<StepSamples>& samples() {
-  static const std::vector<StepSamples> flown = fly_samples(load(), 1000, 1);
+const std::vector<closed_loop::StepSamples>& samples() {
+  static const std::vector<closed_loop::StepSamples> flown = closed_loop::fly_samples(load(), 1000, 1);
   return flown;
 }
 

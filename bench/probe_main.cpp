@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "bench/feeder.hpp"
-#include "bench/in_process_flight.hpp"
+#include "closed_loop/flight.hpp"
 #include "bench/ping_pong.hpp"
 #include "bench/recording_speed.hpp"
 #include "bench/stamps.hpp"
@@ -61,7 +61,7 @@ class AnsweringProcess {
 };
 
 nlohmann::json time_flight(const config::Scenario& scenario) {
-  bench::InProcessFlight flight(scenario);
+  closed_loop::Flight flight(scenario);
   std::uint64_t steps = 0;
   const auto began = std::chrono::steady_clock::now();
   while (flight.fly_step()) ++steps;

@@ -11,7 +11,7 @@
 #include <string_view>
 #include <vector>
 
-#include "bench/samples.hpp"
+#include "closed_loop/samples.hpp"
 #include "common/app/run_main.hpp"
 #include "common/bus/convert.hpp"
 #include "common/config/sha256.hpp"
@@ -137,7 +137,7 @@ double write_plain_files(std::vector<record::StepRows> steps, std::uint32_t vehi
 }
 
 /// What a lockstep run brings, in its order.
-void feed(record::Recording& recording, std::vector<StepSamples>& samples, std::uint32_t vehicles) {
+void feed(record::Recording& recording, std::vector<closed_loop::StepSamples>& samples, std::uint32_t vehicles) {
   for (StepSamples& step : samples) {
     for (std::uint32_t id = 0; id < vehicles; ++id) {
       step.state.vehicle_id(id);
@@ -157,24 +157,24 @@ void feed(record::Recording& recording, std::vector<StepSamples>& samples, std::
 
 nlohmann::json measure_recording(const config::Scenario& scenario, std::uint32_t vehicles,
                                  std::size_t steps, const fs::path& folder) {
-  std::vector<StepSamples> samples = fly_samples(scenario, steps, kRunId);
+  std::vector<closed_loop::StepSamples> samples = closed_loop::fly_samples(scenario, steps, kRunId);
   samples.back().command.mission(MISSION_FINISHED);
   const ScratchFolder ours(folder), plain(folder);
   nlohmann::json json;
   json["rows"] = kFiles.size() * samples.size() * vehicles;
   {
-    record::Recording recording(ours.path(), make_parameters(scenario, kRunId, vehicles));
-    recording.add(make_status(kRunId, 0, PHASE_RUNNING, 0));
+    record::Recording recording(ours.path(), closed_loop::make_parameters(scenario, kRunId, vehicles));
+    recording.add(closed_loop::make_status(kRunId, 0, PHASE_RUNNING, 0));
     auto began = Clock::now();
     feed(recording, samples, vehicles);
-    recording.add(make_status(kRunId, 1, PHASE_FINISHED, samples.size() - 1));
+    recording.add(closed_loop::make_status(kRunId, 1, PHASE_FINISHED, samples.size() - 1));
     json["recording_s"] = calc_seconds(began);
     began = Clock::now();
     if (!recording.finish("", 0)) throw app::RunError("recording: " + recording.describe_gaps());
     json["finish_s"] = calc_seconds(began);
   }
   std::vector<record::StepRows> rows;
-  for (const StepSamples& step : samples) {
+  for (const closed_loop::StepSamples& step : samples) {
     record::StepRecord record;
     record.step = step.state.step();
     record.state = step.state;

@@ -26,12 +26,13 @@ constexpr auto kPollTime = 20ms;             // while nothing is in a hurry
 
 Client::Client(bus::Node& node, const config::Scenario& scenario,
                const std::vector<std::uint32_t>& vehicle_ids, const std::string& name,
-               std::int32_t strength, bool follows_servers)
+               std::int32_t strength, bool follows_servers, bool checks_purity)
     : node_(node),
       scenario_(scenario),
       name_(name),
       strength_(strength),
       follows_servers_(follows_servers),
+      checks_purity_(checks_purity),
       vehicle_ids_(vehicle_ids),
       participants_(node),
       servers_(node),
@@ -94,7 +95,7 @@ void Client::begin(const bus::Run& run) {
   for (const std::uint32_t id : vehicle_ids_) {
     if (!bus::serves_vehicle(parameters, id)) continue;
     flown_ids_.push_back(id);
-    pilots.try_emplace(id, config::make_vehicle_scenario(scenario, id));
+    pilots.try_emplace(id, config::make_vehicle_scenario(scenario, id), id, checks_purity_);
   }
   // Made and destroyed outside the lock: the middleware waits for handlers meanwhile, and ours for
   // the lock.
@@ -175,8 +176,9 @@ void Client::answer(const VehicleState* states, std::size_t count, const bus::Pe
 void Client::answer(Pilot& pilot, const VehicleState& state) {
   if (!pilot.last_command || pilot.last_command->step() != state.step()) {
     const auto began = Clock::now();
-    const Answer answer = pilot.controller.calc_answer(state.step(), to_model_state(state),
-                                                       to_memory(state.controller()));
+    const Answer answer = pilot.controller.calc_answer(
+        state.step(), to_model_state(state),
+        to_memory(state.controller(), pilot.controller.memory_size()));
     const auto compute_time = Clock::now() - began;
     pilot.last_command = make_command_message(state, answer, name_, strength_, compute_time);
     references_.push_back(make_reference_message(state, answer, name_));

@@ -29,10 +29,11 @@ class Client {
   /// Will fly those of `vehicle_ids` (ascending, at least one) that the server it finds has, under
   /// `name`; among several clients of a vehicle the strongest flies.
   /// When another server replaces the one it flies with, it flies on with that one if
-  /// `follows_servers`.
+  /// `follows_servers`. With `checks_purity` every answer is computed twice and compared.
+  /// @throws config::ConfigError if the law cannot be made.
   Client(bus::Node& node, const config::Scenario& scenario,
          const std::vector<std::uint32_t>& vehicle_ids, const std::string& name,
-         std::int32_t strength, bool follows_servers);
+         std::int32_t strength, bool follows_servers, bool checks_purity = false);
 
   /// Runs from joining to the end of the run, and of those that follow it after a reset.
   /// @throws config::ConfigError if the server flies another scenario.
@@ -54,7 +55,8 @@ class Client {
 
   /// One of our vehicles in the run that is joined.
   struct Pilot {
-    explicit Pilot(const config::Scenario& scenario) : controller(scenario) {}
+    Pilot(const config::Scenario& scenario, std::uint32_t id, bool checks_purity)
+        : controller(scenario, id, checks_purity) {}
     FlightController controller;
     std::optional<ControlCommand> last_command;  // a repeated sample is answered from here
   };
@@ -79,6 +81,7 @@ class Client {
   const std::string name_;
   const std::int32_t strength_;
   const bool follows_servers_;
+  const bool checks_purity_;
   const std::vector<std::uint32_t> vehicle_ids_;
 
   bus::ParticipantDirectory participants_;

@@ -1,50 +1,19 @@
 #include "control_client/flight_controller.hpp"
 
-#include "control_client/control_law.hpp"
+#include <stdexcept>
+
 #include "control_client/drag_feed_forward.hpp"
-#include "control_client/error_integral.hpp"
+#include "control_client/laws/control_law.hpp"
 #include "control_client/mission.hpp"
 #include "control_client/saturation.hpp"
 #include "control_client/state_wiring.hpp"
 
 namespace sls::control {
 
-const char* to_string(Fault fault) {
-  switch (fault) {
-    case Fault::kNone:
-      return "none";
-    case Fault::kFreeFall:
-      return "free_fall";
-    case Fault::kRodLevel:
-      return "rod_level";
-    case Fault::kNotFinite:
-      return "not_finite";
-    case Fault::kStageTimeout:
-      return "stage_timeout";
-  }
-  return "unknown";
-}
-
-struct FlightController::Parts {
-  explicit Parts(const config::Scenario& scenario)
-      : controller(scenario.controller),
-        plant_rod_length(scenario.vehicle.rod_length),
-        period(static_cast<double>(scenario.sync.period_ns) / 1e9),
-        mission(scenario.mission, scenario.sync.period_ns),
-        law(make_control_law(scenario.controller)) {}
-
-  /// Force and integral for an answer whose reference is known.
-  void fly(const model::SlungLoadState& state, const Eigen::Vector3d& integral,
-           Answer& answer) const;
-
-  config::Controller controller;
-  double plant_rod_length;  ///< the truth, which only the gazebo wiring looks at
-  double period;            ///< s
-  Mission mission;
-  std::unique_ptr<const ControlLaw> law;
-};
-
 namespace {
+
+constexpr std::uint64_t kPurityCheckedSteps = 100;
+constexpr int kMostMemoryNumbers = 3;  // until contract 2 brings model::kMaxNumbers
 
 void fail(Answer& answer, Fault fault) {
   answer.f_Q_W.setZero();
@@ -52,39 +21,90 @@ void fail(Answer& answer, Fault fault) {
   answer.fault = fault;
 }
 
+bool are_equal(const LawOutput& a, const LawOutput& b) {
+  return a.f_Q_W == b.f_Q_W && a.memory == b.memory && a.fault == b.fault;
+}
+
 }  // namespace
 
-void FlightController::Parts::fly(const model::SlungLoadState& state,
-                                  const Eigen::Vector3d& integral, Answer& answer) const {
-  LawInput input;
-  input.p_WQ = state.p_WQ;
-  input.v_WQ = state.v_WQ;
-  input.rod = calc_wired_angles(state.rod, controller.state_wiring, plant_rod_length);
-  input.reference = answer.reference;
-  input.integral = integral;
+struct FlightController::Parts {
+  Parts(const config::Scenario& scenario, std::uint32_t vehicle_id, bool checks_purity_always,
+        const LawMaker& make_law)
+      : controller(scenario.controller),
+        plant_rod_length(scenario.vehicle.rod_length),
+        period(static_cast<double>(scenario.sync.period_ns) / 1e9),
+        mission(scenario.mission, scenario.sync.period_ns),
+        law(make_law({scenario.controller, period, vehicle_id, scenario.folder})),
+        checks_purity(checks_purity_always) {
+    if (law->memory_size() > kMostMemoryNumbers)
+      throw config::ConfigError(controller.law.place + ": controller.law: expected at most " +
+                                std::to_string(kMostMemoryNumbers) +
+                                " memory numbers, which is what sls/command carries, got " +
+                                std::to_string(law->memory_size()) + " of '" + controller.law.name +
+                                "'");
+  }
 
+  /// Force and memory for an answer whose reference is known.
+  void fly(std::uint64_t step, const model::Measurement& state, const model::Numbers& memory,
+           Answer& answer) const;
+  LawOutput calc_law(const LawInput& input) const;
+
+  config::Controller controller;
+  double plant_rod_length;  ///< the truth, which only the gazebo wiring looks at
+  double period;            ///< s
+  Mission mission;
+  std::unique_ptr<const ControlLaw> law;
+  bool checks_purity;
+};
+
+LawOutput FlightController::Parts::calc_law(const LawInput& input) const {
   const LawOutput output = law->calc(input);
+  if (!checks_purity && input.step >= kPurityCheckedSteps) return output;
+  if (!are_equal(output, law->calc(input)))
+    throw std::runtime_error(
+        controller.law.name + ": step " + std::to_string(input.step) +
+        ": expected equal answers to equal inputs, got two different ones; what the law must "
+        "remember belongs into its memory numbers");
+  return output;
+}
+
+void FlightController::Parts::fly(std::uint64_t step, const model::Measurement& state,
+                                  const model::Numbers& memory, Answer& answer) const {
+  LawInput input{state,        answer.reference,
+                 memory,       step,
+                 answer.stage, static_cast<double>(step - answer.memory.stage_start_step) * period};
+  input.state.rod = calc_wired_angles(state.rod, controller.state_wiring, plant_rod_length);
+  if (memory.size() == 0) input.memory.setZero(law->memory_size());  // step 0
+
+  const LawOutput output = calc_law(input);
   if (output.fault != Fault::kNone) return fail(answer, output.fault);
   answer.f_Q_W = output.f_Q_W;
   if (controller.drag_feed_forward) {
     answer.f_Q_W = calc_drag_feed_forward(answer.f_Q_W, state.v_WQ, controller.model.air);
   }
   if (controller.saturate) answer.f_Q_W = calc_saturated(answer.f_Q_W, controller.force_limit_n);
-  if (!answer.f_Q_W.allFinite()) return fail(answer, Fault::kNotFinite);
-  answer.memory.integral = calc_next_integral(integral, output.integral_rate, period);
+  if (!answer.f_Q_W.allFinite() || !output.memory.allFinite())
+    return fail(answer, Fault::kNotFinite);
+  answer.memory.numbers = output.memory;
 }
 
-FlightController::FlightController(const config::Scenario& scenario)
-    : parts_(std::make_unique<const Parts>(scenario)) {}
+FlightController::FlightController(const config::Scenario& scenario, std::uint32_t vehicle_id,
+                                   bool checks_purity, const LawMaker& make_law)
+    : parts_(std::make_unique<const Parts>(scenario, vehicle_id, checks_purity, make_law)) {}
 
 FlightController::~FlightController() = default;
+FlightController::FlightController(FlightController&&) noexcept = default;
 
-Answer FlightController::calc_answer(std::uint64_t step, const model::SlungLoadState& state,
+int FlightController::memory_size() const { return parts_->law->memory_size(); }
+
+Answer FlightController::calc_answer(std::uint64_t step, const model::Measurement& state,
                                      const ControllerMemory& memory) const {
   Answer answer;
   answer.memory = memory;
   answer.stage = memory.stage;
-  if (!parts_->mission.is_possible(step, memory)) {
+  const Eigen::Index remembered = memory.numbers.size();
+  if (!parts_->mission.is_possible(step, memory) ||
+      (remembered != 0 && remembered != parts_->law->memory_size())) {
     fail(answer, Fault::kNotFinite);  // a damaged sample: there is no stage to fly
     return answer;
   }
@@ -97,12 +117,12 @@ Answer FlightController::calc_answer(std::uint64_t step, const model::SlungLoadS
   answer.stage = progress.stage;
   answer.stage_name = parts_->mission.stage_name(progress.stage);
 
-  if (!model::is_finite(state) || !memory.integral.allFinite()) {
+  if (!model::is_finite(state) || !memory.numbers.allFinite()) {
     fail(answer, Fault::kNotFinite);
   } else if (progress.phase == MissionPhase::kFailed) {
     fail(answer, Fault::kStageTimeout);
   } else {
-    parts_->fly(state, memory.integral, answer);
+    parts_->fly(step, state, memory.numbers, answer);
   }
   return answer;
 }

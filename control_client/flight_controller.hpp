@@ -7,31 +7,24 @@
 #include <string>
 
 #include "common/config/scenario.hpp"
+#include "common/model/answer.hpp"
+#include "common/model/measurement.hpp"
 #include "common/model/reference.hpp"
-#include "common/model/state.hpp"
+#include "control_client/laws/control_law.hpp"
 
 namespace sls::control {
 
 /// All that a controller remembers. It travels in the command and comes back in the next state, so
-/// that any client can answer any sample. A run starts with the default.
+/// that any client can answer any sample. A run starts with the default,
+/// which stands for zeros.
 struct ControllerMemory {
   std::uint32_t stage = 0;             ///< index into the mission; its size once it is over
   std::uint64_t stage_start_step = 0;  ///< step at which that stage began
-  Eigen::Vector3d integral = Eigen::Vector3d::Zero();  ///< ∫e dt of the load position, m·s
+  model::Numbers numbers;              ///< the law's own; none yet where the run begins
 };
 
-enum class MissionPhase { kRunning, kFinished, kFailed };
-
-enum class Fault {
-  kNone,
-  kFreeFall,      ///< s → 0: the law asks the load to fall freely
-  kRodLevel,      ///< cos α → 0 or cos β → 0
-  kNotFinite,     ///< the state or the computed force is not finite
-  kStageTimeout,  ///< a stage's radius was not reached in time
-};
-
-/// For logs and files: "none", "free_fall", "rod_level", "not_finite", "stage_timeout".
-const char* to_string(Fault fault);
+using model::Fault;
+using model::MissionPhase;
 
 /// A pure function's result: equal inputs give equal bits.
 struct Answer {
@@ -48,12 +41,21 @@ class FlightController {
  public:
   /// Keeps what it needs of `scenario`; its period is the one in force.
   /// @throws config::ConfigError if the LQR weights or the law have no solution.
-  explicit FlightController(const config::Scenario& scenario);
+  /// In the first 100 steps, or in all if `checks_purity`, every answer is computed twice: a law
+  /// that keeps something between calls is refused.
+  explicit FlightController(const config::Scenario& scenario, std::uint32_t vehicle_id = 0,
+                            bool checks_purity = false,
+                            const LawMaker& make_law = &make_control_law);
   ~FlightController();
+  FlightController(FlightController&&) noexcept;
 
   /// Answer to the state of step `step`, given the memory accepted at step − 1.
-  Answer calc_answer(std::uint64_t step, const model::SlungLoadState& state,
+  /// @throws std::runtime_error where a law of a shared library is broken.
+  Answer calc_answer(std::uint64_t step, const model::Measurement& state,
                      const ControllerMemory& memory) const;
+
+  /// How many numbers the law remembers.
+  int memory_size() const;
 
  private:
   struct Parts;

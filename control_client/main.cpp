@@ -24,6 +24,7 @@ int main(int argc, char** argv) {
   std::int32_t strength = 0;
   std::string vehicles = "all";
   bool follows_servers = false;
+  bool checks_purity = false;
   app::add_common_options(cli, options);
   cli.add_option("--scenario", scenario_file, "scenario (YAML), the same as the server's")
       ->type_name("FILE")
@@ -35,6 +36,9 @@ int main(int argc, char** argv) {
       ->type_name("IDS");
   cli.add_flag("--follow", follows_servers,
                "fly on with a server that replaces this one; else end with exit code 1");
+  cli.add_flag("--check-purity", checks_purity,
+               "compute every answer twice and refuse a law that gives two different ones; default: "
+               "in the first 100 steps");
   cli.add_option("--name", name, "name in recordings and messages")
       ->check(CLI::Validator(
           [](const std::string& text) {
@@ -50,7 +54,12 @@ int main(int argc, char** argv) {
   return app::run_main(argc, argv, cli, options, "control_client", [&] {
     const config::Scenario scenario = config::load_scenario(scenario_file);
     const auto vehicle_ids = config::parse_vehicle_ids(vehicles, scenario.vehicles.size());
+    // A law that cannot be made is refused before anybody waits for this client.
+    control::FlightController(config::make_vehicle_scenario(scenario, vehicle_ids.front()),
+                              vehicle_ids.front());
     bus::Node node(options.qos_file, options.domain, "control_client", kIdentity);
-    control::Client(node, scenario, vehicle_ids, name, strength, follows_servers).run();
+    control::Client(node, scenario, vehicle_ids, name, strength, follows_servers,
+                    checks_purity)
+        .run();
   });
 }

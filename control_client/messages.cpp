@@ -37,7 +37,8 @@ ControllerState to_message(const ControllerMemory& memory) {
   ControllerState message;
   message.stage_index(memory.stage);
   message.stage_start_step(memory.stage_start_step);
-  message.integral_m_s(bus::to_array(memory.integral));
+  for (Eigen::Index i = 0; i < memory.numbers.size(); ++i)
+    message.integral_m_s()[static_cast<std::size_t>(i)] = memory.numbers[i];
   return message;
 }
 
@@ -56,11 +57,11 @@ model::SlungLoadState to_model_state(const VehicleState& message) {
   return state;
 }
 
-ControllerMemory to_memory(const ControllerState& message) {
+ControllerMemory to_memory(const ControllerState& message, int size) {
   ControllerMemory memory;
   memory.stage = message.stage_index();
   memory.stage_start_step = message.stage_start_step();
-  memory.integral = bus::to_vector(message.integral_m_s());
+  memory.numbers = bus::to_vector(message.integral_m_s()).head(size);
   return memory;
 }
 

@@ -10,7 +10,8 @@
 namespace sls::control {
 
 model::SlungLoadState to_model_state(const VehicleState& message);
-ControllerMemory to_memory(const ControllerState& message);
+/// The memory of a law that remembers `size` numbers.
+ControllerMemory to_memory(const ControllerState& message, int size);
 
 ControlCommand make_command_message(const VehicleState& answered, const Answer& answer,
                                     const std::string& client_name, std::int32_t strength,

@@ -1,11 +1,10 @@
 #include "sim_server/command_gate.hpp"
 
-#include <spdlog/fmt/fmt.h>
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
+#include "common/bus/convert.hpp"
 #include "common/bus/names.hpp"
 
 namespace sls::sim {
@@ -14,15 +13,27 @@ namespace {
 constexpr std::size_t kRememberedAnswers =
     64;  // copies older than that are rejected as wrong steps
 
-bool is_finite(const ControlCommand& command) {
-  const auto all_finite = [](const std::array<double, 3>& vector) {
-    return std::all_of(vector.begin(), vector.end(), [](double x) { return std::isfinite(x); });
-  };
-  return all_finite(command.f_Q_W_n()) && all_finite(command.controller().integral_m_s());
+JudgedAnswer to_judged(const ControlCommand& command) {
+  const auto& memory = command.controller().integral_m_s();
+  JudgedAnswer judged;
+  judged.f_Q_W = bus::to_vector(command.f_Q_W_n());
+  judged.is_memory_finite =
+      std::all_of(memory.begin(), memory.end(), [](double x) { return std::isfinite(x); });
+  if (command.fault() != FAULT_NONE) judged.fault = bus::to_string(command.fault());
+  judged.is_mission_failed = command.mission() == MISSION_FAILED;
+  return judged;
 }
 
-double calc_norm(const std::array<double, 3>& vector) {
-  return std::hypot(vector[0], vector[1], vector[2]);
+Verdict to_verdict(Defect defect) {
+  switch (defect) {
+    case Defect::kNotFinite:
+      return Verdict::kNotFinite;
+    case Defect::kForceLimit:
+      return Verdict::kForceLimit;
+    case Defect::kFault:
+      return Verdict::kFault;
+  }
+  return Verdict::kFault;
 }
 
 /// Strongest first; equal strengths in an order that does not depend on who arrived first.
@@ -43,9 +54,9 @@ const char* to_string(Verdict verdict) {
     case Verdict::kLate:
       return "";
     case Verdict::kNotFinite:
-      return "a number that is not finite";
+      return to_string(Defect::kNotFinite);
     case Verdict::kForceLimit:
-      return "a force beyond controller.force_limit_n";
+      return to_string(Defect::kForceLimit);
     case Verdict::kOtherRun:
       return "another run_id";
     case Verdict::kWrongStep:
@@ -55,7 +66,7 @@ const char* to_string(Verdict verdict) {
     case Verdict::kUnknownClient:
       return "a sender that is not announced as a ready controller";
     case Verdict::kFault:
-      return "a fault";
+      return to_string(Defect::kFault);
   }
   return "";
 }
@@ -109,18 +120,11 @@ Verdict CommandGate::judge(const ControlCommand& command, const bus::PeerId& sen
   if (command.run_id() != run_id_) return Verdict::kOtherRun;
   if (command.vehicle_id() != vehicle_id_) return Verdict::kUnknownVehicle;
 
-  Verdict defect = Verdict::kAccepted;
-  if (!is_finite(command))
-    defect = Verdict::kNotFinite;
-  else if (calc_norm(command.f_Q_W_n()) > force_limit_n_)
-    defect = Verdict::kForceLimit;
-  else if (command.fault() != FAULT_NONE || command.mission() == MISSION_FAILED)
-    defect = Verdict::kFault;
-
+  const JudgedAnswer answer = to_judged(command);
   Client* client = find_client(sender);
-  if (defect != Verdict::kAccepted) {
-    if (client) note_refusal(*client, command, defect);
-    return defect;
+  if (const auto defect = find_defect(answer, force_limit_n_)) {
+    if (client) note_refusal(*client, command.step(), answer, *defect);
+    return to_verdict(*defect);
   }
   if (command.step() != step_) return judge_past(command, sender);
   if (!client) return Verdict::kUnknownClient;
@@ -137,21 +141,15 @@ Verdict CommandGate::judge(const ControlCommand& command, const bus::PeerId& sen
   return accepted_ && accepted_from_ == sender ? Verdict::kAccepted : Verdict::kHeld;
 }
 
-void CommandGate::note_refusal(Client& client, const ControlCommand& command, Verdict defect) {
-  const auto past = past_.find(command.step());
+void CommandGate::note_refusal(Client& client, std::uint64_t step, const JudgedAnswer& answer,
+                               Defect defect) {
+  const auto past = past_.find(step);
   const bool is_open =
-      command.step() == step_ ? !accepted_ && !client.held : past != past_.end() && !past->second;
-  const bool is_newer = client.refusal.empty() || command.step() > client.refused_step;
+      step == step_ ? !accepted_ && !client.held : past != past_.end() && !past->second;
+  const bool is_newer = client.refusal.empty() || step > client.refused_step;
   if (!is_open || !is_newer) return;
-  client.refused_step = command.step();
-  client.refusal = fmt::format("controller '{}' answered step {} with {}", client.identity.name,
-                               command.step(), to_string(defect));
-  if (defect == Verdict::kForceLimit)
-    client.refusal +=
-        fmt::format(": {:.6g} N > {:.6g} N", calc_norm(command.f_Q_W_n()), force_limit_n_);
-  if (defect == Verdict::kFault)
-    client.refusal += fmt::format(
-        ": {}", command.fault() == FAULT_NONE ? "mission failed" : bus::to_string(command.fault()));
+  client.refused_step = step;
+  client.refusal = describe_refusal(defect, answer, force_limit_n_, client.identity.name, step);
   settle();
 }
 

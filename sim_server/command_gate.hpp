@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "common/bus/peer.hpp"
+#include "sim_server/judgement.hpp"
 #include "sls.h"
 
 namespace sls::sim {
@@ -101,7 +102,7 @@ class CommandGate {
   bool is_refused(const Client& client) const {  // for the awaited step
     return !client.refusal.empty() && client.refused_step == step_;
   }
-  void note_refusal(Client& client, const ControlCommand& command, Verdict defect);
+  void note_refusal(Client& client, std::uint64_t step, const JudgedAnswer& answer, Defect defect);
   void settle();
   void drop_held();
   Client* find_client(const bus::PeerId& peer);

@@ -56,9 +56,10 @@ bool moves_rod(const model::RodAngles& rod) {
   return rod.alpha != 0.0 || rod.beta != 0.0 || rod.alpha_dot != 0.0 || rod.beta_dot != 0.0;
 }
 
-model::SlungLoadState add(const model::SlungLoadState& state, const config::SampleOffset& offset,
+/// Attitude and signals stay as they are.
+model::Measurement add(const model::Measurement& state, const config::SampleOffset& offset,
                           double rod_length) {
-  model::SlungLoadState moved = state;
+  model::Measurement moved = state;
   moved.p_WQ += offset.position;
   moved.v_WQ += offset.velocity;
   moved.p_WL += offset.position;
@@ -68,7 +69,9 @@ model::SlungLoadState add(const model::SlungLoadState& state, const config::Samp
   moved.rod.beta += offset.rod.beta;
   moved.rod.alpha_dot += offset.rod.alpha_dot;
   moved.rod.beta_dot += offset.rod.beta_dot;
-  return model::make_state(moved.p_WQ, moved.v_WQ, moved.rod, rod_length);
+  static_cast<model::SlungLoadState&>(moved) =
+      model::make_state(moved.p_WQ, moved.v_WQ, moved.rod, rod_length);
+  return moved;
 }
 
 Eigen::Vector3d add(const Eigen::Vector3d& f_Q_W, const config::SampleOffset& offset, double) {
@@ -77,7 +80,7 @@ Eigen::Vector3d add(const Eigen::Vector3d& f_Q_W, const config::SampleOffset& of
 
 /// One draw for a state. Components are numbered in the order of the keys.
 config::SampleOffset draw(const config::SampleOffset& deviation, const Dice& dice,
-                          const model::SlungLoadState&) {
+                          const model::Measurement&) {
   config::SampleOffset offset;
   offset.position = deviation.position.cwiseProduct(dice.calc_normals(0));
   offset.velocity = deviation.velocity.cwiseProduct(dice.calc_normals(3));
@@ -191,7 +194,7 @@ Sample pass(std::vector<Receiver<Sample>>& receivers, std::uint64_t step, Sample
 }  // namespace
 
 struct FaultLine::Channels {
-  std::vector<Receiver<model::SlungLoadState>> state;
+  std::vector<Receiver<model::Measurement>> state;
   std::vector<Receiver<Eigen::Vector3d>> command;
 };
 
@@ -211,7 +214,7 @@ FaultLine::FaultLine(const config::Scenario& scenario, std::uint32_t vehicle_id)
 FaultLine::~FaultLine() = default;
 FaultLine::FaultLine(FaultLine&&) noexcept = default;
 
-model::SlungLoadState FaultLine::measure(std::uint64_t step, const model::SlungLoadState& truth) {
+model::Measurement FaultLine::measure(std::uint64_t step, const model::Measurement& truth) {
   return pass(channels_->state, step, truth);
 }
 

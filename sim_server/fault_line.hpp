@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "common/config/scenario.hpp"
-#include "common/model/state.hpp"
+#include "common/model/measurement.hpp"
 
 namespace sls::sim {
 
@@ -20,7 +20,7 @@ class FaultLine {
   FaultLine(FaultLine&&) noexcept;
 
   /// What the controllers measure at `step`. Call once per step, in order, from step 0.
-  model::SlungLoadState measure(std::uint64_t step, const model::SlungLoadState& truth);
+  model::Measurement measure(std::uint64_t step, const model::Measurement& truth);
 
   /// The force (N, in W) that acts on the quadrotor over [step, step + 1) where `f_Q_W` was meant
   /// to. Call once per step, in order, from step 0.

@@ -1,5 +1,7 @@
 #include "sim_server/messages.hpp"
 
+#include <random>
+
 #include "common/bus/convert.hpp"
 
 namespace sls::sim {
@@ -20,6 +22,13 @@ void fill(Message& message, const model::SlungLoadState& state) {
 }
 
 }  // namespace
+
+std::uint64_t make_run_id() {
+  std::random_device random;
+  std::uint64_t id = 0;
+  while (id == 0) id = (static_cast<std::uint64_t>(random()) << 32) | random();
+  return id;
+}
 
 VehicleState make_state_message(std::uint64_t run_id, std::uint32_t vehicle_id, std::uint64_t step,
                                 std::int64_t period_ns, const model::SlungLoadState& measured,

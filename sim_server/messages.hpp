@@ -24,6 +24,9 @@ struct Applied {
 /// `controller_name` of a force the server made by itself.
 inline constexpr const char* kFailSafeName = "fail-safe";
 
+/// A random id for a run, never 0.
+std::uint64_t make_run_id();
+
 /// State `step`: `truth` is what the plant does, `measured` what the controllers are to see of it.
 VehicleState make_state_message(std::uint64_t run_id, std::uint32_t vehicle_id, std::uint64_t step,
                                 std::int64_t period_ns, const model::SlungLoadState& measured,

@@ -31,10 +31,12 @@ Run::Run(Endpoints& endpoints, const Assignment& assignment, WorkerPool& workers
       scenario_(assignment.scenario),
       vehicle_ids_(assignment.vehicle_ids),
       run_id_(run_id),
-      board_(endpoints.status_writer, run_id, vehicle_ids_.front(), scenario_.sync,
+      board_([&endpoints](const SimStatus& status) { endpoints.status_writer.write(status); }, run_id,
+             vehicle_ids_.front(), scenario_.sync,
              [this] { return sum_counters(); }),
       control_(run_id, vehicle_ids_, begins_paused),
       workers_(workers),
+      plants_(make_plants(find_plant_type(scenario_.plant.model), scenario_, vehicle_ids_)),
       plant_steps_(scenario_.sync.period_ns / scenario_.plant.step_ns) {
   for (const std::uint32_t id : vehicle_ids_)
     vehicles_.push_back(std::make_unique<VehicleFlight>(scenario_, id, run_id));
@@ -150,7 +152,7 @@ bool Run::fly() {
   began_ = Clock::now();
   board_.publish(control_.is_paused() ? PHASE_PAUSED : PHASE_RUNNING, control_.last_event());
   begin();
-  for (std::size_t i = 0; i < vehicles_.size(); ++i) measure(i);
+  for (const PlantOfVehicles& group : plants_) measure(group);
   while (true) {
     if (board_.step > 0)
       if (const auto reply = control_.stepped(board_.step)) endpoints_.reply_writer.write(*reply);
@@ -162,18 +164,30 @@ bool Run::fly() {
   }
 }
 
-void Run::measure(std::size_t index) {
-  endpoints_.states.at(index) = vehicles_[index]->measure(board_.step);
+void Run::measure(const PlantOfVehicles& group) {
+  for (std::size_t i = 0; i < group.vehicles.size(); ++i)
+    endpoints_.states.at(group.vehicles[i]) =
+        vehicles_[group.vehicles[i]]->measure(board_.step, group.plant->measurement(i));
 }
 
 void Run::advance() {
   for (const auto& vehicle : vehicles_)
     board_.timing.add(vehicle->outcome()->applied.origin, vehicle->calc_age());
   ++board_.step;
-  workers_.for_each(vehicles_.size(), [this](std::size_t i) {
-    vehicles_[i]->advance(plant_steps_);
-    measure(i);
-  });
+  workers_.for_each(plants_.size(), [this](std::size_t i) { advance(plants_[i]); });
+}
+
+void Run::advance(PlantOfVehicles& group) {
+  group.forces.clear();
+  for (const std::size_t i : group.vehicles) group.forces.push_back(vehicles_[i]->actuate());
+  try {
+    group.plant->advance(group.forces, plant_steps_);
+  } catch (const std::exception& error) {
+    if (scenario_.vehicles.size() == 1) throw;
+    throw std::runtime_error(
+        fmt::format("vehicle {}: {}", vehicle_ids_[group.vehicles.front()], error.what()));
+  }
+  measure(group);
 }
 
 /// A vehicle whose mission is over flies on until the others' are, too.

@@ -14,6 +14,7 @@
 #include "common/config/scenario.hpp"
 #include "sim_server/controller_absence.hpp"
 #include "sim_server/endpoints.hpp"
+#include "sim_server/plants/plant.hpp"
 #include "sim_server/roster.hpp"
 #include "sim_server/run_control.hpp"
 #include "sim_server/status_board.hpp"
@@ -125,7 +126,9 @@ class Run {
   bool is_meant_for_another_server(const SimControl& request) const;
   bool wait_for_participants();
   bool fly();
-  void measure(std::size_t index);
+  void measure(const PlantOfVehicles& group);
+  /// Advances one plant over a period.
+  void advance(PlantOfVehicles& group);
   void finish();
   void reset();
   void publish_end(RunPhase phase, const std::string& reason);
@@ -139,6 +142,7 @@ class Run {
   double calc_longest_absence_s() const;
 
   WorkerPool& workers_;
+  std::vector<PlantOfVehicles> plants_;
   const std::int64_t plant_steps_;  // per period
   std::uint64_t roster_version_ = 0;
   Clock::time_point roster_time_;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <random>
 #include <thread>
 
 #include "common/app/run_main.hpp"
@@ -16,13 +15,6 @@ using namespace std::chrono_literals;
 
 constexpr auto kClaimTime = 1s;  // how long a claim on the vehicles is open to objection
 constexpr auto kPollTime = 20ms;
-
-std::uint64_t make_run_id() {
-  std::random_device random;
-  std::uint64_t id = 0;
-  while (id == 0) id = (static_cast<std::uint64_t>(random()) << 32) | random();
-  return id;
-}
 
 }  // namespace
 

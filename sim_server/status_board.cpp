@@ -6,11 +6,11 @@
 
 namespace sls::sim {
 
-StatusBoard::StatusBoard(bus::Writer<SimStatus>& writer, std::uint64_t run_id,
+StatusBoard::StatusBoard(std::function<void(const SimStatus&)> write, std::uint64_t run_id,
                          std::uint32_t vehicle_id, const config::Sync& sync,
                          std::function<SyncCounters()> sum_counters)
     : timing(sync),
-      writer_(writer),
+      write_(std::move(write)),
       run_id_(run_id),
       vehicle_id_(vehicle_id),
       period_ns_(sync.period_ns),
@@ -46,7 +46,7 @@ void StatusBoard::publish(RunPhase phase, const std::string& reason) {
   message.round_trip_p99_ns(static_cast<std::uint64_t>(round_trips.calc_percentile(99).count()));
   message.timing(timing.label());
   message.counters(counters);
-  writer_.write(message);
+  write_(message);
 }
 
 void StatusBoard::announce(const std::string& event) {

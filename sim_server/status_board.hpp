@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "common/bus/node.hpp"
+#include "common/bus/topics.hpp"
 #include "common/config/scenario.hpp"
 #include "sim_server/round_trips.hpp"
 #include "sim_server/timing_record.hpp"
@@ -21,9 +21,10 @@ class StatusBoard {
   /// Samples of a run are at most this far apart, so that silence says something.
   static constexpr auto kInterval = std::chrono::milliseconds(400);
 
-  /// `vehicle_id` is the first of the run's; `sum_counters` is asked for every sample.
-  StatusBoard(bus::Writer<SimStatus>& writer, std::uint64_t run_id, std::uint32_t vehicle_id,
-              const config::Sync& sync, std::function<SyncCounters()> sum_counters);
+  /// Samples go out by `write`. `vehicle_id` is the first of the run's; `sum_counters` is asked for every sample.
+  StatusBoard(std::function<void(const SimStatus&)> write, std::uint64_t run_id,
+              std::uint32_t vehicle_id, const config::Sync& sync,
+              std::function<SyncCounters()> sum_counters);
 
   /// Publishes a sample now.
   void publish(RunPhase phase, const std::string& reason);
@@ -53,7 +54,7 @@ class StatusBoard {
   void add_pause(Clock::duration pause) { start_time_ += pause; }
 
  private:
-  bus::Writer<SimStatus>& writer_;
+  const std::function<void(const SimStatus&)> write_;
   const std::uint64_t run_id_;
   const std::uint32_t vehicle_id_;
   const std::int64_t period_ns_;

@@ -1,9 +1,5 @@
 #include "sim_server/vehicle_flight.hpp"
 
-#include <spdlog/fmt/fmt.h>
-
-#include <stdexcept>
-
 #include "common/bus/convert.hpp"
 #include "sim_server/fail_safe.hpp"
 
@@ -27,18 +23,16 @@ VehicleFlight::VehicleFlight(const config::Scenario& fleet, std::uint32_t id, st
     : gate(run_id, id, fleet.controller.force_limit_n),
       absence(fleet.sync),
       id_(id),
-      is_of_fleet_(fleet.vehicles.size() > 1),
       scenario_(make_own_scenario(fleet, id)),
       run_id_(run_id),
-      plant_(scenario_.vehicle, scenario_.plant),
       faults_(scenario_, id) {}
 
-VehicleState VehicleFlight::measure(std::uint64_t step) {
+VehicleState VehicleFlight::measure(std::uint64_t step, const model::Measurement& truth) {
   step_ = step;
   outcome_.reset();
-  state_ = plant_.state();
+  state_ = truth;
   return make_state_message(run_id_, id_, step, scenario_.sync.period_ns,
-                            faults_.measure(step, state_), state_, applied_);
+                            faults_.measure(step, truth), truth, applied_);
 }
 
 void VehicleFlight::take_answer() {
@@ -81,15 +75,10 @@ void VehicleFlight::fly_without_answer(ControllerAbsence::Action action) {
   outcome_ = std::move(outcome);
 }
 
-void VehicleFlight::advance(std::int64_t plant_steps) {
+Eigen::Vector3d VehicleFlight::actuate() {
   applied_ = outcome_->applied;
   applied_.f_Q_W = faults_.actuate(step_, applied_.answer_f_Q_W);
-  try {
-    for (std::int64_t i = 0; i < plant_steps; ++i) plant_.step(applied_.f_Q_W);
-  } catch (const std::exception& error) {
-    if (!is_of_fleet_) throw;
-    throw std::runtime_error(fmt::format("vehicle {}: {}", id_, error.what()));
-  }
+  return applied_.f_Q_W;
 }
 
 std::uint64_t VehicleFlight::calc_age() const {

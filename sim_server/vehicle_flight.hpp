@@ -1,4 +1,4 @@
-/// One vehicle of a run: its plant and its faults, who may answer for it, and what flies it. No
+/// One vehicle of a run: its faults, who may answer for it, and what flies it. No
 /// network here.
 #pragma once
 
@@ -11,7 +11,6 @@
 #include "sim_server/controller_absence.hpp"
 #include "sim_server/fault_line.hpp"
 #include "sim_server/messages.hpp"
-#include "sim_server/slung_load_plant.hpp"
 
 namespace sls::sim {
 
@@ -30,8 +29,9 @@ class VehicleFlight {
     bool is_finished = false;  // the mission ends here
   };
 
-  /// The state of `step` as it is published. Call once per step, in order, from step 0.
-  VehicleState measure(std::uint64_t step);
+  /// The state of `step` as it is published, where the plant does `truth`. Call once per step, in
+  /// order, from step 0.
+  VehicleState measure(std::uint64_t step, const model::Measurement& truth);
   /// Takes the answer that the gate accepted for the step in work.
   void take_answer();
   /// Keeps an answer that came too late for its step, to be held: fresh where it is newer than the
@@ -39,9 +39,8 @@ class VehicleFlight {
   void keep_late_answer(const ControlCommand& command);
   /// Flies the step in work without an answer of its own.
   void fly_without_answer(ControllerAbsence::Action action);
-  /// Flies `plant_steps` steps of the plant with what the step in work came to.
-  /// @throws std::runtime_error as SlungLoadPlant::step, naming the vehicle in a fleet.
-  void advance(std::int64_t plant_steps);
+  /// Flies the step in work with what it came to: the force (N, in W) that acts on the plant.
+  Eigen::Vector3d actuate();
 
   const std::optional<Outcome>& outcome() const { return outcome_; }
   bool is_settled() const { return outcome_.has_value(); }
@@ -74,13 +73,11 @@ class VehicleFlight {
   void hold(const ControlCommand& answer);
 
   const std::uint32_t id_;
-  const bool is_of_fleet_;
   const config::Scenario scenario_;  // of this vehicle alone
   const std::uint64_t run_id_;
-  SlungLoadPlant plant_;
   FaultLine faults_;
   std::uint64_t step_ = 0;              // in work
-  model::SlungLoadState state_;         // of the plant at that step
+  model::SlungLoadState state_;         // at that step
   Applied applied_;                     // over the period before it
   std::optional<Outcome> outcome_;      // of the step in work, once it is known
   Applied last_answer_;                 // accepted, or late but valid; what is held

@@ -7,7 +7,6 @@
 #include <system_error>
 
 #include "common/config/numbers.hpp"
-#include "common/config/rigid_links.hpp"
 #include "common/config/scenario_reader.hpp"
 #include "common/config/scenario_writer.hpp"
 #include "common/config/sha256.hpp"
@@ -166,19 +165,6 @@ void check_faults(const Scenario& scenario, const Places& places) {
   }
 }
 
-void check_pendulum(const Scenario& scenario, const Places& places) {
-  if (scenario.plant.pendulum != Pendulum::kRigid) return;
-  if (const auto contradiction = find_rigid_contradiction(scenario.vehicle))
-    throw places.make_error_at("vehicle." + contradiction->key, contradiction->message);
-  for (std::size_t i = 0; i < scenario.vehicles.size(); ++i) {
-    model::SlungLoadParameters vehicle = scenario.vehicle;
-    put_own(scenario.vehicles[i], vehicle);
-    if (const auto contradiction = find_rigid_contradiction(vehicle))
-      throw places.make_error_at("vehicles[" + std::to_string(i) + "]." + contradiction->key,
-                                 contradiction->message);
-  }
-}
-
 /// Moves where the vehicle starts and what it follows. Leave conditions refer to the reference.
 void shift(Scenario& scenario, const Eigen::Vector3d& offset) {
   scenario.plant.initial.position += offset;
@@ -196,7 +182,9 @@ void shift(Scenario& scenario, const Eigen::Vector3d& offset) {
 }  // namespace
 
 Scenario load_scenario(const std::filesystem::path& file) {
-  return parse_scenario(read_file(file), file.string());
+  Scenario scenario = parse_scenario(read_file(file), file.string());
+  scenario.folder = file.parent_path();
+  return scenario;
 }
 
 Scenario parse_scenario(const std::string& text, const std::string& place) {
@@ -212,7 +200,8 @@ Scenario parse_scenario(const std::string& text, const std::string& place) {
   read_value(Value{root, "", root.line, places}, scenario);
   check_times(scenario, places);
   check_faults(scenario, places);
-  check_pendulum(scenario, places);
+  find_model_keys(plant_keys(), scenario.plant.model).check(scenario, places);
+  find_model_keys(law_keys(), scenario.controller.law).check(scenario, places);
   scenario.text = text;
   scenario.sha256 = calc_sha256(text);
   return scenario;

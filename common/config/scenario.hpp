@@ -3,11 +3,14 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <any>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <type_traits>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -23,6 +26,53 @@ inline constexpr std::size_t kMaxScenarioBytes = 32768;
 /// Bound of the vehicle ids in `sls/parameters`.
 inline constexpr std::size_t kMaxVehicles = 256;
 
+// --- models ------------------------------------------------------------------------------------
+
+/// A plant or a control law, as the file names it.
+struct ModelName {
+  std::string name;  ///< of the registry, or the path of a shared library
+  std::string
+      place;  ///< FILE:LINE of the key, for messages about the model; empty: not in the file
+
+  bool is_shared_library() const;  ///< ends with ".so"
+};
+
+/// The values of the keys that belong to the named model alone, of a type that its folder defines.
+class OwnValues {
+ public:
+  OwnValues() = default;
+  template <class Values, class = std::enable_if_t<!std::is_same_v<Values, OwnValues>>>
+  OwnValues(Values values) : any_(std::move(values)) {}
+
+  /// What is held, or the defaults of `Values` where it is something else.
+  template <class Values>
+  const Values& get() const {
+    static const Values kDefaults{};
+    const auto* held = std::any_cast<Values>(&any_);
+    return held ? *held : kDefaults;
+  }
+  /// The same to change.
+  template <class Values>
+  Values& edit() {
+    if (!std::any_cast<Values>(&any_)) any_ = Values{};
+    return std::any_cast<Values&>(any_);
+  }
+
+ private:
+  std::any any_;
+};
+
+/// Own values of a model in a shared library: any map, as JSON.
+struct LibraryParameters {
+  std::string json = "{}";
+  std::string place;  ///< FILE:LINE of the key; empty: not in the file
+
+  /// FILE:LINE: KEY of these parameters in `section`, or of the library where there are none.
+  std::string describe_place(const ModelName& library, const std::string& section) const {
+    return place.empty() ? library.place + ": " + section : place + ": " + section + ".parameters";
+  }
+};
+
 // --- fleet -------------------------------------------------------------------------------------
 
 /// How one vehicle of a fleet differs from `vehicle`, `plant.initial` and `mission`.
@@ -35,11 +85,6 @@ struct VehicleVariant {
 
 // --- plant -------------------------------------------------------------------------------------
 
-enum class Pendulum {
-  kIdeal,  ///< point load on a massless rod
-  kRigid,  ///< the published links: base, rod with inertia, load with inertia
-};
-
 enum class Body { kQuadrotor, kLoad };
 
 /// Where the bodies are at step 0: one of them is placed, the rod angles give the other.
@@ -51,7 +96,8 @@ struct InitialState {
 };
 
 struct Plant {
-  Pendulum pendulum = Pendulum::kIdeal;
+  ModelName model{"slung_load", ""};
+  OwnValues own;
   std::int64_t step_ns = 1'000'000;  ///< integration step
   InitialState initial;
   model::Aerodynamics air;                                  ///< true drag and wind
@@ -171,29 +217,6 @@ struct Fault {
 
 // --- controller --------------------------------------------------------------------------------
 
-/// Gains of one output axis, named by what they multiply. The vertical chain has no acceleration
-/// and jerk gain: they stay 0.
-struct AxisGains {
-  double position = 0.0;
-  double velocity = 0.0;
-  double acceleration = 0.0;
-  double jerk = 0.0;
-  double integral = 0.0;
-};
-
-struct NamedGains {
-  AxisGains horizontal;
-  AxisGains vertical;
-};
-
-/// Gains from LQR on the integrator chains, Q = weight · I, R = 1.
-struct LqrWeights {
-  double horizontal = 10.0;
-  double vertical = 5.0;
-};
-
-using Gains = std::variant<LqrWeights, NamedGains>;
-
 enum class StateWiring {
   kCorrect,
   kGazeboPlugin,  ///< the published plugin's permuted angle slots
@@ -214,8 +237,8 @@ struct ControllerModel {
 };
 
 struct Controller {
-  std::string law = "qsf";
-  Gains gains = LqrWeights{};
+  ModelName law{"qsf", ""};
+  OwnValues own;
   double force_limit_n = 200.0;  ///< commands beyond are refused by the server
   bool saturate = false;         ///< the client scales the force to the limit
   bool drag_feed_forward = false;
@@ -287,8 +310,9 @@ struct Scenario {
   std::vector<Fault> faults;  ///< of one channel, in the order in which they act
   Record record;
 
-  std::string text;    ///< the file's bytes
-  std::string sha256;  ///< of those bytes, 64 lower-case hex digits
+  std::string text;              ///< the file's bytes
+  std::filesystem::path folder;  ///< of the file: paths in it are relative to that
+  std::string sha256;            ///< of those bytes, 64 lower-case hex digits
 };
 
 /// Reads and checks a scenario file.

@@ -4,6 +4,7 @@
 ///     map.key(presence, "key", field, rule);     one value, map or list of maps
 ///     map.choose(choice, {{value, {"key", …}}}); exactly one of several alternatives is there
 ///     map.decide("key", field, describe_others); a required key whose value decides on other keys
+///     map.model("key", field, registry, section); a plant or law and the keys of its own
 ///     map.by_default(field, value);              what holds if the file does not say
 #pragma once
 
@@ -17,6 +18,7 @@
 #include <variant>
 #include <vector>
 
+#include "common/config/model_keys.hpp"
 #include "common/config/numbers.hpp"
 #include "common/config/scenario.hpp"
 
@@ -68,7 +70,6 @@ inline bool is_short_label(std::string_view text) {
 inline constexpr TextRule kFolderName{
     "1 to 64 letters, digits, '_', '.' or '-', not beginning with '.' or '-'", &is_folder_name};
 inline constexpr TextRule kShortLabel{"1 to 32 printable ASCII characters", &is_short_label};
-inline constexpr TextRule kLaw{"qsf", [](std::string_view text) { return text == "qsf"; }};
 
 /// Bounds of a whole number.
 struct Range {
@@ -102,9 +103,6 @@ struct Name {
   const char* text;
   Enum value;
 };
-inline std::array<Name<Pendulum>, 2> names_of(Pendulum) {
-  return {{{"ideal", Pendulum::kIdeal}, {"rigid", Pendulum::kRigid}}};
-}
 inline std::array<Name<SyncMode>, 2> names_of(SyncMode) {
   return {{{"lockstep", SyncMode::kLockstep}, {"realtime", SyncMode::kRealtime}}};
 }
@@ -180,13 +178,18 @@ void describe(Map& map, InitialState& initial) {
   map.key(kOptional, "beta_dot_rad_s", initial.rod.beta_dot, kFinite);
 }
 
+/// What acts on the quadrotor of a point-mass plant besides the control force.
 template <class Map>
-void describe(Map& map, Plant& plant) {
-  map.key(kOptional, "pendulum", plant.pendulum);
-  map.key(kOptional, "step_s", plant.step_ns, kPositive);
-  map.key(kRequired, "initial", plant.initial);
+void describe_point_mass_loads(Map& map, Plant& plant) {
   describe(map, plant.air);
   map.key(kOptional, "disturbance_n", plant.disturbance_W);
+}
+
+template <class Map>
+void describe(Map& map, Plant& plant) {
+  map.model("model", plant.model, plant_keys(), plant);
+  map.key(kOptional, "step_s", plant.step_ns, kPositive);
+  map.key(kRequired, "initial", plant.initial);
 }
 
 // --- synchronisation -----------------------------------------------------------------------------
@@ -240,37 +243,6 @@ void describe(Map& map, Sync& sync) {
 
 // --- controller ----------------------------------------------------------------------------------
 
-template <class Map>
-void describe(Map& map, LqrWeights& weights) {
-  map.key(kRequired, "horizontal", weights.horizontal, kPositive);
-  map.key(kRequired, "vertical", weights.vertical, kPositive);
-}
-
-enum class Axis { kHorizontal, kVertical };
-
-template <class Map>
-void describe(Map& map, AxisGains& gains, Axis axis) {
-  map.key(kRequired, "position", gains.position, kNotNegative);
-  map.key(kRequired, "velocity", gains.velocity, kNotNegative);
-  if (axis == Axis::kHorizontal) {
-    map.key(kRequired, "acceleration", gains.acceleration, kNotNegative);
-    map.key(kRequired, "jerk", gains.jerk, kNotNegative);
-  }
-  map.key(kOptional, "integral", gains.integral, kNotNegative);
-}
-
-template <class Map>
-void describe(Map& map, Gains& gains) {
-  bool by_lqr = std::holds_alternative<LqrWeights>(gains);
-  map.choose(by_lqr, {{true, {"lqr"}}, {false, {"horizontal", "vertical"}}});
-  if (by_lqr) {
-    map.key(kRequired, "lqr", as<LqrWeights>(gains));
-  } else {
-    map.key(kRequired, "horizontal", as<NamedGains>(gains).horizontal, Axis::kHorizontal);
-    map.key(kRequired, "vertical", as<NamedGains>(gains).vertical, Axis::kVertical);
-  }
-}
-
 /// A number that follows the truth unless the file says it.
 template <class Map>
 void describe_believed(Map& map, const char* name, double& number, bool& follows) {
@@ -293,8 +265,7 @@ void describe(Map& map, ControllerModel& believed) {
 
 template <class Map>
 void describe(Map& map, Controller& controller) {
-  map.key(kOptional, "law", controller.law, kLaw);
-  map.key(kOptional, "gains", controller.gains);
+  map.model("law", controller.law, law_keys(), controller);
   map.key(kOptional, "force_limit_n", controller.force_limit_n, kPositive);
   map.key(kOptional, "saturate", controller.saturate);
   map.key(kOptional, "drag_feed_forward", controller.drag_feed_forward);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <numeric>
 #include <optional>
 
@@ -97,7 +98,43 @@ void read_whole_number(const Value& value, Number& number, const Bounds& range) 
   number = *whole;
 }
 
+std::string to_json_text(const std::string& text) { return nlohmann::json(text).dump(); }
+
+/// Any value as JSON: a plain scalar that is a number, true, false or nothing stays that.
+std::string to_json(const Value& value) {
+  const YamlNode& node = value.node;
+  std::string text;
+  switch (node.kind) {
+    case YamlNode::Kind::kNothing:
+      return "null";
+    case YamlNode::Kind::kScalar:
+      if (!node.quoted && (node.text == "true" || node.text == "false")) return node.text;
+      if (!node.quoted && parse_number(node.text)) return to_text(read_number(value));
+      return to_json_text(node.text);
+    case YamlNode::Kind::kList:
+      for (std::size_t i = 0; i < node.items.size(); ++i)
+        text += (i > 0 ? ", " : "") + to_json(value.at(i));
+      return "[" + text + "]";
+    case YamlNode::Kind::kMap:
+      for (std::size_t i = 0; i < node.items.size(); ++i) {
+        const YamlNode& key = node.keys[i];
+        const Value child = value.at(key.text, node.items[i], key.line);
+        const auto is_same = [&](const YamlNode& other) { return other.text == key.text; };
+        if (key.kind != YamlNode::Kind::kScalar) child.fail("expected a key, got " + to_brief(key));
+        if (std::count_if(node.keys.begin(), node.keys.end(), is_same) > 1)
+          child.fail("duplicate key");
+        text += (i > 0 ? ", " : "") + to_json_text(key.text) + ": " + to_json(child);
+      }
+      return "{" + text + "}";
+  }
+  return "null";
+}
+
 }  // namespace
+
+std::string Places::describe(int line) const {
+  return line > 0 ? file_ + ":" + std::to_string(line) : file_;
+}
 
 ConfigError Places::make_error_at(const std::string& path, const std::string& message) const {
   std::string place = path;
@@ -125,7 +162,13 @@ Value Value::at(std::size_t index) const {
   return {child, child_path, child_line, places};
 }
 
-void check_keys(const Value& value, const std::vector<std::string>& known) {
+std::optional<std::string> KeyNames::find_owner(const std::string& name) const {
+  const auto found = owners_.find(name);
+  return found == owners_.end() ? std::nullopt : std::optional(found->second);
+}
+
+void check_keys(const Value& value, const KeyNames& names) {
+  const std::vector<std::string>& known = names.names();
   if (value.node.kind != YamlNode::Kind::kMap) value.fail_expecting("a map");
   std::map<std::string, int> seen;
   for (const YamlNode& key : value.node.keys) {
@@ -139,6 +182,7 @@ void check_keys(const Value& value, const std::vector<std::string>& known) {
     const auto [first, is_new] = seen.emplace(key.text, key.line);
     if (!is_new) fail("duplicate key; it is already on line " + std::to_string(first->second));
     if (std::find(known.begin(), known.end(), key.text) != known.end()) continue;
+    if (const auto owner = names.find_owner(key.text)) fail(*owner);
     if (const auto similar = find_similar(key.text, known))
       fail("unknown key; did you mean '" + *similar + "'?");
     fail("unknown key; expected one of " + join(known));
@@ -210,6 +254,25 @@ void read_value(const Value& value, std::vector<VehicleVariant>& fleet, const Li
   const auto count = find_whole_number<int>(value.node, range);
   if (!count) value.fail_expecting(to_whole_number(range) + " or " + to_list(range));
   fleet = make_vehicle_grid(static_cast<std::size_t>(*count));
+}
+
+void read_value(const Value& value, ModelName& model, const std::vector<std::string>& known,
+                const std::string& expectation) {
+  const std::string& name = value.node.text;
+  const bool is_text = value.node.kind == YamlNode::Kind::kScalar;
+  const ModelName named{name, value.places.describe(value.line)};
+  const bool is_known = std::find(known.begin(), known.end(), name) != known.end();
+  if (!is_text || !(is_known || named.is_shared_library())) {
+    const auto similar = is_text ? find_similar(name, known) : std::nullopt;
+    value.fail("expected " + expectation + ", got " + to_brief(value.node) +
+               (similar ? "; did you mean '" + *similar + "'?" : ""));
+  }
+  model = named;
+}
+
+void read_value(const Value& value, LibraryParameters& parameters) {
+  if (value.node.kind != YamlNode::Kind::kMap) value.fail_expecting("a map");
+  parameters = {to_json(value), value.places.describe(value.line)};
 }
 
 std::size_t read_list_length(const Value& value, const ListRange& range) {

@@ -22,6 +22,9 @@ class Places {
   void add(const std::string& path, int line) { lines_[path] = line; }
   bool has(const std::string& path) const { return lines_.count(path) != 0; }
 
+  /// FILE:LINE.
+  std::string describe(int line) const;
+
   /// Error at `path`, or at what contains it where the file leaves it out.
   ConfigError make_error_at(const std::string& path, const std::string& message) const;
   ConfigError make_error_at(int line, const std::string& path, const std::string& message) const {
@@ -67,10 +70,16 @@ class KeyNames {
   /// The others are those that go with the value in the file; without it, those of any value.
   template <class Enum, class DescribeOthers>
   void decide(const char* name, Enum& field, const DescribeOthers& describe_others);
+  /// The keys of the model in the file; those of the other models are known as theirs.
+  template <class Section>
+  void model(const char* name, ModelName& field, const ModelRegistry<Section>& registry,
+             Section& section);
   template <class Field>
   void by_default(Field&, const Field&) {}
 
   const std::vector<std::string>& names() const { return names_; }
+  /// Why `name` is no key here although another model has it; else nothing.
+  std::optional<std::string> find_owner(const std::string& name) const;
 
  private:
   void add(const std::string& name) {
@@ -79,13 +88,14 @@ class KeyNames {
 
   const Value& map_;
   std::vector<std::string> names_;
+  std::map<std::string, std::string> owners_;  // of keys that belong to other models
 };
 
 /// Index of `name` among the keys of `map`, or −1.
 int find_key(const YamlNode& map, const std::string& name);
 
 /// @throws ConfigError unless `value` is a map with no other keys than `known`, each at most once.
-void check_keys(const Value& value, const std::vector<std::string>& known);
+void check_keys(const Value& value, const KeyNames& known);
 
 // One per type of field. @throws ConfigError where the node is something else or breaks the rule.
 void read_value(const Value& value, double& number, const NumberRule& rule);
@@ -98,6 +108,10 @@ void read_value(const Value& value, std::string& text, const TextRule& rule);
 void read_value(const Value& value, Eigen::Vector3d& vector);
 void read_value(const Value& value, Eigen::Vector3d& vector, const NumberRule& of_each);
 void read_value(const Value& value, std::vector<VehicleVariant>& fleet, const ListRange& range);
+/// `names` are those of a registry, `expectation` what it lists.
+void read_value(const Value& value, ModelName& model, const std::vector<std::string>& names,
+                const std::string& expectation);
+void read_value(const Value& value, LibraryParameters& parameters);
 std::size_t read_list_length(const Value& value, const ListRange& range);
 
 template <class Enum>
@@ -106,6 +120,13 @@ std::string join_names() {
   for (const auto& name : names_of(Enum{}))
     joined += (joined.empty() ? "" : " or ") + std::string(name.text);
   return joined;
+}
+
+template <class Section>
+std::vector<std::string> list_names(const ModelRegistry<Section>& registry) {
+  std::vector<std::string> names;
+  for (const auto& item : registry) names.push_back(item.first);
+  return names;
 }
 
 /// Completes "missing key; expected …".
@@ -137,6 +158,13 @@ class MapReader {
     describe_others(field);
   }
 
+  template <class Section>
+  void model(const char* name, ModelName& field, const ModelRegistry<Section>& registry,
+             Section& section) {
+    key(kOptional, name, field, list_names(registry), list_models(registry));
+    find_model_keys(registry, field).describe(*this, section);
+  }
+
   template <class Field>
   void by_default(Field& field, const Field& value) {
     field = value;
@@ -165,7 +193,7 @@ void read_value(const Value& value, Field& field, const Rule&... rule) {
   } else {
     KeyNames keys(value);
     describe(keys, field, rule...);
-    check_keys(value, keys.names());
+    check_keys(value, keys);
     MapReader reader(value);
     describe(reader, field, rule...);
   }
@@ -213,6 +241,23 @@ void KeyNames::decide(const char* name, Enum& field, const DescribeOthers& descr
     describe_others(field);
   } else {
     for (const auto& any : names_of(field)) describe_others(any.value);
+  }
+}
+
+template <class Section>
+void KeyNames::model(const char* name, ModelName& field, const ModelRegistry<Section>& registry,
+                     Section& section) {
+  add(name);
+  if (find_key(map_.node, name) >= 0)
+    MapReader(map_).key(kOptional, name, field, list_names(registry), list_models(registry));
+  find_model_keys(registry, field).describe(*this, section);
+  for (const auto& [other, keys] : registry) {
+    KeyNames others(map_);
+    Section scratch;
+    keys->describe(others, scratch);
+    for (const std::string& key : others.names())
+      owners_.emplace(key, "a key of " + std::string(name) + " '" + other + "', here it is '" +
+                               field.name + "'");
   }
 }
 

@@ -30,6 +30,8 @@ inline std::string to_yaml_value(const std::string& text) {
 inline std::string to_yaml_value(const Eigen::Vector3d& vector) {
   return "[" + to_text(vector.x()) + ", " + to_text(vector.y()) + ", " + to_text(vector.z()) + "]";
 }
+inline std::string to_yaml_value(const ModelName& model) { return to_yaml_value(model.name); }
+inline std::string to_yaml_value(const LibraryParameters& parameters) { return parameters.json; }
 template <class Enum, std::enable_if_t<std::is_enum_v<Enum>, int> = 0>
 std::string to_yaml_value(Enum value) {
   for (const auto& name : names_of(value))
@@ -41,7 +43,8 @@ std::string to_yaml_value(Enum value) {
 template <class Field>
 inline constexpr bool kOnOneLine =
     std::is_arithmetic_v<Field> || std::is_enum_v<Field> || std::is_same_v<Field, std::string> ||
-    std::is_same_v<Field, Eigen::Vector3d> || std::is_same_v<Field, std::optional<double>>;
+    std::is_same_v<Field, Eigen::Vector3d> || std::is_same_v<Field, std::optional<double>> ||
+    std::is_same_v<Field, ModelName> || std::is_same_v<Field, LibraryParameters>;
 
 template <class Field>
 bool says_nothing(const Field&) {
@@ -74,6 +77,13 @@ class MapWriter {
   void decide(const char* name, Enum& field, const DescribeOthers& describe_others) {
     key(kRequired, name, field);
     describe_others(field);
+  }
+
+  template <class Section>
+  void model(const char* name, ModelName& field, const ModelRegistry<Section>& registry,
+             Section& section) {
+    key(kOptional, name, field);
+    find_model_keys(registry, field).describe(*this, section);
   }
 
   template <class Field>

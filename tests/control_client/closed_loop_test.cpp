@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "control_client/lqr.hpp"
+#include "control_client/laws/qsf/lqr.hpp"
 #include "tests/control_client/oracle_flight.hpp"
 #include "tests/control_client/sample_scenarios.hpp"
 #include "tests/oracle/linear_theory.hpp"
@@ -44,7 +44,7 @@ double calc_largest_deviation(std::int64_t period_ns) {
   const std::vector<FlownStep> flight = fly(scenario);
   EXPECT_EQ(flight.back().answer.mission, MissionPhase::kFinished);
   EXPECT_LE(flight.back().load_error().norm(), 1e-4);  // settled: slowest pole −0.9, 15 s
-  const auto& gains = std::get<config::NamedGains>(scenario.controller.gains);
+  const auto& gains = std::get<NamedGains>(scenario.controller.own.get<QsfKeys>().gains);
   const double h = static_cast<double>(period_ns) / 1e9;
   const std::vector<double> xy = oracle::calc_designed_error(
       Eigen::RowVector4d(gains.horizontal.position, gains.horizontal.velocity,
@@ -75,11 +75,11 @@ config::Scenario make_disturbed(bool with_integral) {
   config::Scenario scenario = make_figure_eight(4'000'000);
   scenario.plant.disturbance_W << 0.3, -0.2, 0.4;
   scenario.mission = {make_hold({0.0, 0.0, -0.5}, 20 * kSecond)};
-  config::NamedGains gains;
+  NamedGains gains;
   gains.horizontal = {80.0, 80.0, 40.0, 10.0, 32.0};  // (s + 2)⁵
   gains.vertical = {12.0, 6.0, 0.0, 0.0, 8.0};        // (s + 2)³
   if (!with_integral) gains.horizontal.integral = gains.vertical.integral = 0.0;
-  scenario.controller.gains = gains;
+  scenario.controller.own = QsfKeys{gains};
   return scenario;
 }
 

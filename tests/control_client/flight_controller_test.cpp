@@ -8,9 +8,9 @@
 #include <random>
 
 #include "common/model/forces.hpp"
-#include "control_client/error_integral.hpp"
-#include "control_client/lqr.hpp"
-#include "control_client/qsf_law.hpp"
+#include "control_client/laws/error_integral.hpp"
+#include "control_client/laws/qsf/lqr.hpp"
+#include "control_client/laws/qsf/qsf_law.hpp"
 #include "control_client/state_wiring.hpp"
 #include "tests/control_client/sample_scenarios.hpp"
 
@@ -39,7 +39,7 @@ bool same_bits(const Vector3d& a, const Vector3d& b) {
 }
 
 bool same_bits(const Answer& a, const Answer& b) {
-  return same_bits(a.f_Q_W, b.f_Q_W) && same_bits(a.memory.integral, b.memory.integral) &&
+  return same_bits(a.f_Q_W, b.f_Q_W) && a.memory.numbers == b.memory.numbers &&
          a.memory.stage == b.memory.stage &&
          a.memory.stage_start_step == b.memory.stage_start_step && a.mission == b.mission &&
          a.fault == b.fault && a.stage == b.stage && a.stage_name == b.stage_name &&
@@ -66,18 +66,18 @@ TEST(FlightControllerTest, AnswersWithTheLawsForceReferenceAndStage) {
   EXPECT_EQ(answer.stage, 0u);
   EXPECT_EQ(answer.stage_name, "figure_eight");
   EXPECT_EQ(answer.reference.position, Vector3d(0.0, 0.0, -0.5));
-  const LawOutput law =
+  const QsfOutput law =
       calc_qsf({state.p_WQ, state.v_WQ, state.rod, answer.reference, Vector3d::Zero()},
-               scenario.vehicle, make_named_gains(config::LqrWeights{}));
+               scenario.vehicle, make_named_gains(LqrWeights{}));
   EXPECT_TRUE(same_bits(answer.f_Q_W, law.f_Q_W));
 }
 
 TEST(FlightControllerTest, IsAPureFunctionInWhateverOrderSamplesCome) {
   config::Scenario scenario = make_figure_eight();
   scenario.mission.insert(scenario.mission.begin(), make_hold({0.0, 0.0, -0.5}, 2 * kSecond));
-  config::NamedGains gains = make_named_gains(config::LqrWeights{});
+  NamedGains gains = make_named_gains(LqrWeights{});
   gains.horizontal.integral = gains.vertical.integral = 0.05;
-  scenario.controller.gains = gains;
+  scenario.controller.own = QsfKeys{gains};
   scenario.controller.drag_feed_forward = true;
   scenario.controller.model.air.rotor_drag = 0.2;
   const FlightController controller(scenario), restarted(scenario);
@@ -133,20 +133,20 @@ TEST(FlightControllerTest, TheMemoryNamesTheStageInForceAtTheStepAnswered) {
 TEST(FlightControllerTest, AdvancesTheIntegralAfterTheForceByForwardEuler) {
   config::Scenario scenario = make_figure_eight(4'000'000);
   scenario.mission = {make_hold({0.0, 0.0, -1.0}, 10 * kSecond)};
-  config::NamedGains gains = make_named_gains(config::LqrWeights{});
+  NamedGains gains = make_named_gains(LqrWeights{});
   gains.horizontal.integral = 0.03;
   gains.vertical.integral = 0.02;
-  scenario.controller.gains = gains;
+  scenario.controller.own = QsfKeys{gains};
   const FlightController controller(scenario);
   const model::SlungLoadState state = make_hanging({0.5, -0.25, -1.125});
   ControllerMemory memory;
-  memory.integral << 1.0, 2.0, 3.0;
+  memory.numbers = Vector3d(1.0, 2.0, 3.0);
   const Answer answer = controller.calc_answer(5, state, memory);
   const Vector3d error(0.5, -0.25, -0.125);
-  EXPECT_LE((answer.memory.integral - memory.integral - 0.004 * error).norm(), 1e-15);
+  EXPECT_LE((answer.memory.numbers - memory.numbers - 0.004 * error).norm(), 1e-15);
   // The force used the integral that came in.
-  const LawOutput law =
-      calc_qsf({state.p_WQ, state.v_WQ, state.rod, answer.reference, memory.integral},
+  const QsfOutput law =
+      calc_qsf({state.p_WQ, state.v_WQ, state.rod, answer.reference, memory.numbers},
                scenario.vehicle, gains);
   EXPECT_TRUE(same_bits(answer.f_Q_W, law.f_Q_W));
 }
@@ -154,24 +154,24 @@ TEST(FlightControllerTest, AdvancesTheIntegralAfterTheForceByForwardEuler) {
 TEST(FlightControllerTest, ClampsTheIntegralAndReleasesItWhenTheErrorTurns) {
   config::Scenario scenario = make_figure_eight();
   scenario.mission = {make_hold({0.0, 0.0, -1.0}, 10 * kSecond)};
-  config::NamedGains gains = make_named_gains(config::LqrWeights{});
+  NamedGains gains = make_named_gains(LqrWeights{});
   gains.horizontal.integral = gains.vertical.integral = 0.01;
-  scenario.controller.gains = gains;
+  scenario.controller.own = QsfKeys{gains};
   const FlightController controller(scenario);
   ControllerMemory memory;
-  memory.integral << 19.999, -19.999, 0.0;
+  memory.numbers = Vector3d(19.999, -19.999, 0.0);
   for (std::uint64_t step = 0; step < 10; ++step) {
     memory = controller.calc_answer(step, make_hanging({1.0, -1.0, -1.0}), memory).memory;
   }
-  EXPECT_EQ(memory.integral, Vector3d(20.0, -20.0, 0.0));
+  EXPECT_EQ(memory.numbers, Vector3d(20.0, -20.0, 0.0));
   memory = controller.calc_answer(10, make_hanging({-1.0, 1.0, -1.0}), memory).memory;
-  EXPECT_LE((memory.integral - Vector3d(19.996, -19.996, 0.0)).norm(), 1e-12);
+  EXPECT_LE((memory.numbers - Vector3d(19.996, -19.996, 0.0)).norm(), 1e-12);
 }
 
 TEST(FlightControllerTest, WithoutAnIntegralGainTheIntegralStaysAsItIs) {
   const FlightController controller(make_figure_eight());
   const Answer answer = controller.calc_answer(0, make_hanging({1.0, 1.0, -0.5}), {});
-  EXPECT_EQ(answer.memory.integral, Vector3d::Zero());
+  EXPECT_EQ(answer.memory.numbers, Vector3d::Zero());
 }
 
 TEST(FlightControllerTest, SaturatesOnlyWhereAsked) {
@@ -213,9 +213,9 @@ TEST(FlightControllerTest, GazeboWiringUsesThePlantsRodAndTheLawTheBelievedOne) 
   const Answer answer = FlightController(scenario).calc_answer(0, state, {});
   const model::RodAngles slots =
       calc_wired_angles(state.rod, config::StateWiring::kGazeboPlugin, 1.1);
-  const LawOutput law =
+  const QsfOutput law =
       calc_qsf({state.p_WQ, state.v_WQ, slots, answer.reference, Vector3d::Zero()},
-               scenario.controller.model.vehicle, make_named_gains(config::LqrWeights{}));
+               scenario.controller.model.vehicle, make_named_gains(LqrWeights{}));
   EXPECT_EQ(scenario.controller.model.vehicle.rod_length, 1.0);
   EXPECT_TRUE(same_bits(answer.f_Q_W, law.f_Q_W));
 }
@@ -245,7 +245,7 @@ TEST(FlightControllerTest, EveryNumberOfASampleThatIsNotFiniteIsAFault) {
   bad.rod.beta_dot = std::numeric_limits<double>::infinity();
   expect_failed(controller.calc_answer(0, bad, {}), Fault::kNotFinite);
   ControllerMemory memory;
-  memory.integral.z() = kNan;
+  memory.numbers = Vector3d(0.0, 0.0, kNan);
   expect_failed(controller.calc_answer(0, good, memory), Fault::kNotFinite);
 }
 
@@ -298,17 +298,19 @@ TEST(FlightControllerTest, RadiusStagesLookAtTheTrueLoadNotAtTheBelievedOne) {
 
 TEST(FlightControllerTest, RefusesALawItDoesNotKnowAndWeightsWithoutSolution) {
   config::Scenario scenario = make_figure_eight();
-  scenario.controller.law = "pid";
+  scenario.controller.law.name = "lqr";
   try {
     const FlightController controller(scenario);
     FAIL() << "took a law that does not exist";
   } catch (const config::ConfigError& error) {
-    EXPECT_STREQ(error.what(), "controller.law: expected qsf, got pid");
+    EXPECT_STREQ(
+        error.what(),
+        "controller.law: expected pid, qsf or a shared library (a path ending in .so), got lqr");
   }
-  scenario.controller.law = "qsf";
-  scenario.controller.gains = config::LqrWeights{-1.0, 5.0};
+  scenario.controller.law.name = "qsf";
+  scenario.controller.own = QsfKeys{LqrWeights{-1.0, 5.0}};
   EXPECT_THROW(FlightController{scenario}, config::ConfigError);
-  scenario.controller.gains = config::LqrWeights{};
+  scenario.controller.own = QsfKeys{LqrWeights{}};
   scenario.mission.clear();
   EXPECT_THROW(FlightController{scenario}, config::ConfigError);
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "common/config/scenario.hpp"
+#include "control_client/laws/qsf/keys.hpp"
 
 namespace sls::control {
 
@@ -48,14 +49,14 @@ inline config::Scenario make_matlab_set_point(std::int64_t period_ns) {
   scenario.plant.initial.position << 0.0, 0.0, -1.5;
   scenario.sync.period_ns = period_ns;
   scenario.controller.model.vehicle = scenario.vehicle;
-  config::NamedGains gains;
+  NamedGains gains;
   gains.vertical.velocity = 7.0711;
   gains.vertical.position = 8.0089;
   gains.horizontal.jerk = 31.623;
   gains.horizontal.acceleration = 77.326;
   gains.horizontal.velocity = 78.729;
   gains.horizontal.position = 34.021;
-  scenario.controller.gains = gains;
+  scenario.controller.own = QsfKeys{gains};
   scenario.mission = {make_hold({1.0, -1.0, -2.0}, 15 * kSecond)};
   return scenario;
 }
@@ -68,14 +69,14 @@ inline config::Scenario make_gazebo_legacy(config::StateWiring wiring) {
   scenario.plant.initial.placed = config::Body::kQuadrotor;
   scenario.controller.model.vehicle = {1.5, 0.2, 1.0, 9.8};
   scenario.controller.state_wiring = wiring;
-  config::NamedGains gains;
+  NamedGains gains;
   gains.vertical.velocity = 2.2361;
   gains.vertical.position = 3.0777;
   gains.horizontal.jerk = 3.1623;
   gains.horizontal.acceleration = 8.4827;
   gains.horizontal.velocity = 9.7962;
   gains.horizontal.position = 5.4399;
-  scenario.controller.gains = gains;
+  scenario.controller.own = QsfKeys{gains};
   config::LeaveWithin arrival;
   arrival.after_ns = 15 * kSecond;
   arrival.radius_m = 0.2;

@@ -7,8 +7,9 @@
 #include <unsupported/Eigen/MatrixFunctions>
 #include <vector>
 
-#include "control_client/lqr.hpp"
-#include "tests/sim_server/rigid_pendulum_ode.hpp"
+#include "control_client/laws/qsf/lqr.hpp"
+#include "sim_server/plants/slung_load/keys.hpp"
+#include "tests/sim_server/plants/rigid_pendulum_ode.hpp"
 
 namespace sls::oracle {
 
@@ -51,11 +52,11 @@ inline SteadyError calc_steady_error(const config::Scenario& scenario,
   using Complex = std::complex<double>;
   const model::SlungLoadParameters& vehicle = scenario.vehicle;
   const model::SlungLoadParameters& believed = scenario.controller.model.vehicle;
-  const config::NamedGains gains = control::make_named_gains(scenario.controller.gains);
-  const config::AxisGains &xy = gains.horizontal, &z = gains.vertical;
+  const control::NamedGains gains = control::make_named_gains(scenario.controller.own.get<control::QsfKeys>().gains);
+  const control::AxisGains &xy = gains.horizontal, &z = gains.vertical;
   const double mass = vehicle.total_mass(), length = vehicle.rod_length, g = vehicle.gravity;
   double first_moment = vehicle.load_mass * length, second_moment = first_moment * length;
-  if (scenario.plant.pendulum == config::Pendulum::kRigid) {
+  if (scenario.plant.own.get<sim::SlungLoadKeys>().pendulum == sim::Pendulum::kRigid) {
     const RigidPendulum links;
     first_moment = links.mass * links.centre;
     second_moment = links.inertia + first_moment * links.centre;

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "sim_server/slung_load_plant.hpp"
+#include "sim_server/plants/slung_load/slung_load_plant.hpp"
 
 namespace sls::sim {
 namespace {

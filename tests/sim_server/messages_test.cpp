@@ -111,7 +111,7 @@ control::Answer make_distinct_answer() {
   answer.f_Q_W = {1, 2, 3};
   answer.memory.stage = 4;
   answer.memory.stage_start_step = 5;
-  answer.memory.integral = {6, 7, 8};
+  answer.memory.numbers = Eigen::Vector3d(6, 7, 8);
   answer.reference.position = {9, 10, 11};
   answer.reference.velocity = {12, 13, 14};
   answer.reference.acceleration = {15, 16, 17};
@@ -185,10 +185,10 @@ TEST(MessagesTest, ControllerMemorySurvivesTheWayThroughCommandAndState) {
   Applied applied;
   applied.memory = command.controller();
   const VehicleState next = make_state_message(1, 0, 1, 1'000'000, {}, {}, applied);
-  const control::ControllerMemory memory = control::to_memory(next.controller());
+  const control::ControllerMemory memory = control::to_memory(next.controller(), 3);
   EXPECT_EQ(memory.stage, answer.memory.stage);
   EXPECT_EQ(memory.stage_start_step, answer.memory.stage_start_step);
-  EXPECT_EQ(memory.integral, answer.memory.integral);
+  EXPECT_EQ(memory.numbers, answer.memory.numbers);
 }
 
 }  // namespace

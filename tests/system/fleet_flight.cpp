@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "bench/in_process_flight.hpp"
+#include "closed_loop/flight.hpp"
 
 namespace sls::test {
 namespace {
@@ -69,7 +69,7 @@ void expect_each_flies_as_alone(const std::filesystem::path& recording,
   std::size_t longest = 0;
   for (const std::uint32_t id : ids) {
     SCOPED_TRACE("vehicle " + std::to_string(id));
-    const auto flown = bench::fly(fleet, id);
+    const auto flown = closed_loop::fly(fleet, id);
     const auto state_rows = find_rows(states, id), command_rows = find_rows(commands, id);
     ASSERT_GE(state_rows.size(), flown.size());
     ASSERT_EQ(command_rows.size(), state_rows.size());

@@ -6,7 +6,7 @@
 
 #include <thread>
 
-#include "bench/in_process_flight.hpp"
+#include "closed_loop/flight.hpp"
 #include "tests/system/flight.hpp"
 #include "tests/system/load.hpp"
 
@@ -122,11 +122,11 @@ TEST(FaultLineSystemTest, AFaultyFlightRepeatsAndEqualsTheOneInProcess) {
   first.expect_success();
   second.expect_success();
   EXPECT_EQ(read_certificate(first.recording()), read_certificate(second.recording()));
-  const auto flown = bench::fly(config::load_scenario(scenario("faulty_figure_eight")));
+  const auto flown = closed_loop::fly(config::load_scenario(scenario("faulty_figure_eight")));
   const Table states(first.recording() / "state.csv"), commands(first.recording() / "command.csv");
   ASSERT_EQ(states.rows(), flown.size());
   for (std::size_t row = 0; row < flown.size(); ++row) {
-    const bench::FlownStep& step = flown[row];
+    const closed_loop::FlownStep& step = flown[row];
     ASSERT_EQ(states.position(row, "quad"), step.truth.p_WQ) << row;
     ASSERT_EQ(states.position(row, "load"), step.truth.p_WL) << row;
     ASSERT_EQ(states.number(row, "force_z_n"), step.applied_f_Q_W.z()) << row;

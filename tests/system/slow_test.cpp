@@ -4,7 +4,7 @@
 #include <regex>
 #include <thread>
 
-#include "bench/in_process_flight.hpp"
+#include "closed_loop/flight.hpp"
 #include "tests/system/flight.hpp"
 #include "tests/system/load.hpp"
 
@@ -40,7 +40,7 @@ class RealTimeMinuteTest : public ::testing::Test {
     fault.effect = config::DelayFault{std::llround(delay_ms * 1e6)};
     scenario.faults = {fault};
     double largest = 0.0;
-    for (const bench::FlownStep& step : bench::fly(scenario))
+    for (const closed_loop::FlownStep& step : closed_loop::fly(scenario))
       if (step.step >= 4000)
         largest = std::max(
             largest, (step.truth.p_WL - step.answer.reference.position).cwiseAbs().maxCoeff());

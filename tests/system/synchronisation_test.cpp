@@ -72,7 +72,7 @@ class LateController {
     const VehicleState answered = std::exchange(last_state_, state);
     if (answered.run_id() != state.run_id()) return;  // there was none
     const auto result = controller_.calc_answer(answered.step(), control::to_model_state(answered),
-                                                control::to_memory(answered.controller()));
+                                                control::to_memory(answered.controller(), 3));
     std::vector<Reference> references;
     std::vector<ControlCommand> commands = {
         control::make_command_message(answered, result, "late", 0, {})};

@@ -124,7 +124,7 @@ TEST(ScenarioTest, ReadsEveryKeyOfThePlant) {
   EXPECT_EQ(scenario.name, "every_key");
   EXPECT_EQ(scenario.vehicle, (model::SlungLoadParameters{1.6, 0.16, 0.7, 10.0}));
   const Plant& plant = scenario.plant;
-  EXPECT_EQ(plant.pendulum, Pendulum::kIdeal);
+  EXPECT_EQ(plant.own.get<sim::SlungLoadKeys>().pendulum, sim::Pendulum::kIdeal);
   EXPECT_EQ(plant.step_ns, 500'000);
   EXPECT_EQ(plant.initial.placed, Body::kQuadrotor);
   EXPECT_EQ(plant.initial.position, Vector3d(1, 2, -4));
@@ -157,8 +157,8 @@ TEST(ScenarioTest, ReadsEveryKeyOfSyncAndRecord) {
 
 TEST(ScenarioTest, ReadsEveryKeyOfTheController) {
   const Controller controller = parse_scenario(kEveryKey, "file").controller;
-  EXPECT_EQ(controller.law, "qsf");
-  const auto& gains = std::get<NamedGains>(controller.gains);
+  EXPECT_EQ(controller.law.name, "qsf");
+  const auto& gains = std::get<NamedGains>(controller.own.get<QsfKeys>().gains);
   EXPECT_EQ(gains.horizontal.position, 1.0);
   EXPECT_EQ(gains.horizontal.velocity, 2.0);
   EXPECT_EQ(gains.horizontal.acceleration, 3.0);
@@ -302,7 +302,7 @@ TEST(ScenarioTest, PatienceIsTheStartsUnderWaitAndOneSecondUnderOtherPolicies) {
 
 TEST(ScenarioTest, LeavesTheDefaultsWhereTheFileIsSilent) {
   const Scenario scenario = parse_scenario(kMinimalScenario, "file");
-  EXPECT_EQ(scenario.plant.pendulum, Pendulum::kIdeal);
+  EXPECT_EQ(scenario.plant.own.get<sim::SlungLoadKeys>().pendulum, sim::Pendulum::kIdeal);
   EXPECT_EQ(scenario.plant.step_ns, 1'000'000);
   EXPECT_EQ(scenario.plant.air, model::Aerodynamics{});
   ASSERT_EQ(scenario.vehicles.size(), 1u);
@@ -314,8 +314,8 @@ TEST(ScenarioTest, LeavesTheDefaultsWhereTheFileIsSilent) {
   EXPECT_TRUE(scenario.faults.empty());
   EXPECT_EQ(scenario.sync.wait_for.controllers, 1);
   EXPECT_EQ(scenario.sync.wait_for.recorders, 1);
-  EXPECT_EQ(std::get<LqrWeights>(scenario.controller.gains).horizontal, 10.0);
-  EXPECT_EQ(std::get<LqrWeights>(scenario.controller.gains).vertical, 5.0);
+  EXPECT_EQ(std::get<LqrWeights>(gains_of(scenario)).horizontal, 10.0);
+  EXPECT_EQ(std::get<LqrWeights>(gains_of(scenario)).vertical, 5.0);
   EXPECT_EQ(scenario.controller.force_limit_n, 200.0);
   EXPECT_FALSE(scenario.controller.saturate);
   EXPECT_EQ(scenario.controller.model.vehicle, scenario.vehicle);

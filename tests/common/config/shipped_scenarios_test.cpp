@@ -30,8 +30,8 @@ void expect_lqr(const Gains& gains, double horizontal, double vertical) {
 void expect_named(const Gains& gains, const AxisGains& horizontal, const AxisGains& vertical) {
   NamedGains expected{horizontal, vertical};
   Scenario a, b;
-  a.controller.gains = gains;
-  b.controller.gains = expected;
+  a.controller.own = QsfKeys{gains};
+  b.controller.own = QsfKeys{expected};
   EXPECT_TRUE(are_equal(a, b));
 }
 
@@ -94,6 +94,7 @@ TEST(ShippedScenariosTest, AreThese) {
   for (const auto& file : list_yaml_files("config/scenarios")) names.insert(file.stem().string());
   EXPECT_EQ(names, (std::set<std::string>{"faulty_figure_eight",
                                           "figure_eight",
+                                          "figure_eight_pid",
                                           "fleet",
                                           "gazebo_correct_wiring",
                                           "gazebo_corrected",
@@ -154,7 +155,7 @@ TEST(ShippedScenariosTest, ControllerKnowsTheTruthExceptWhereTheTableSaysSo) {
 TEST(ShippedScenariosTest, FigureEight) {
   const Scenario scenario = load("figure_eight");
   EXPECT_EQ(scenario.vehicle, kVehicle);
-  expect_lqr(scenario.controller.gains, 10, 5);
+  expect_lqr(gains_of(scenario), 10, 5);
   expect_start(scenario, Body::kLoad, {0, 0, -0.5});
   ASSERT_EQ(scenario.mission.size(), 1u);
   expect_eight(scenario.mission[0], -0.5, 32);
@@ -163,7 +164,7 @@ TEST(ShippedScenariosTest, FigureEight) {
 TEST(ShippedScenariosTest, Setpoints) {
   const Scenario scenario = load("setpoints");
   EXPECT_EQ(scenario.vehicle, kVehicle);
-  expect_lqr(scenario.controller.gains, 10, 5);
+  expect_lqr(gains_of(scenario), 10, 5);
   expect_start(scenario, Body::kLoad, {0, 0, -1.5});
   ASSERT_EQ(scenario.mission.size(), 3u);
   expect_constant(scenario.mission[0], "set_point", {1, -1, -2});
@@ -175,7 +176,7 @@ TEST(ShippedScenariosTest, Setpoints) {
 TEST(ShippedScenariosTest, Mission) {
   const Scenario scenario = load("mission");
   EXPECT_EQ(scenario.vehicle, kVehicle);
-  expect_lqr(scenario.controller.gains, 10, 5);
+  expect_lqr(gains_of(scenario), 10, 5);
   expect_start(scenario, Body::kQuadrotor, {0, 0, 0});
   expect_mission(scenario, -0.5, Body::kLoad, {0, 0, 0});
 }
@@ -186,7 +187,7 @@ TEST(ShippedScenariosTest, MatlabSetPoints) {
     const Scenario scenario = load("matlab_setpoint_" + std::to_string(i));
     SCOPED_TRACE(scenario.name);
     EXPECT_EQ(scenario.vehicle, kMatlabVehicle);
-    expect_named(scenario.controller.gains, {34.021, 78.729, 77.326, 31.623, 0},
+    expect_named(gains_of(scenario), {34.021, 78.729, 77.326, 31.623, 0},
                  {8.0089, 7.0711, 0, 0, 0});
     expect_start(scenario, Body::kLoad, points[i - 1]);
     ASSERT_EQ(scenario.mission.size(), 1u);
@@ -198,7 +199,7 @@ TEST(ShippedScenariosTest, MatlabSetPoints) {
 TEST(ShippedScenariosTest, MatlabFigureEight) {
   const Scenario scenario = load("matlab_figure_eight");
   EXPECT_EQ(scenario.vehicle, kMatlabVehicle);
-  expect_lqr(scenario.controller.gains, 10, 5);
+  expect_lqr(gains_of(scenario), 10, 5);
   expect_start(scenario, Body::kQuadrotor, {1, 2, -4});
   ASSERT_EQ(scenario.mission.size(), 1u);
   expect_eight(scenario.mission[0], -0.5, 32);
@@ -209,10 +210,10 @@ TEST(ShippedScenariosTest, GazeboLegacyAndItsRepairs) {
     SCOPED_TRACE(name);
     const Scenario scenario = load(name);
     EXPECT_EQ(scenario.vehicle, kGazeboVehicle);
-    EXPECT_EQ(scenario.plant.pendulum, Pendulum::kIdeal);
+    EXPECT_EQ(scenario.plant.own.get<sim::SlungLoadKeys>().pendulum, sim::Pendulum::kIdeal);
     EXPECT_EQ(scenario.controller.model.vehicle,
               name == "gazebo_corrected" ? kGazeboVehicle : kVehicle);
-    expect_named(scenario.controller.gains, {5.4399, 9.7962, 8.4827, 3.1623, 0},
+    expect_named(gains_of(scenario), {5.4399, 9.7962, 8.4827, 3.1623, 0},
                  {3.0777, 2.2361, 0, 0, 0});
     expect_start(scenario, Body::kQuadrotor, {0, 0, 0});
     expect_mission(scenario, -0.6, Body::kQuadrotor, {0, 0, -0.95});
@@ -236,7 +237,7 @@ TEST(ShippedScenariosTest, RestToRest) {
 
 TEST(ShippedScenariosTest, RigidFigureEight) {
   const Scenario scenario = load("rigid_figure_eight");
-  EXPECT_EQ(scenario.plant.pendulum, Pendulum::kRigid);
+  EXPECT_EQ(scenario.plant.own.get<sim::SlungLoadKeys>().pendulum, sim::Pendulum::kRigid);
   EXPECT_EQ(scenario.vehicle, (SlungLoadParameters{1.5, 0.201, 1.1, 9.8}));
   ASSERT_EQ(scenario.mission.size(), 1u);
   expect_eight(scenario.mission[0], -0.5, 32);
@@ -246,7 +247,7 @@ TEST(ShippedScenariosTest, IntegralMassError) {
   const Scenario scenario = load("integral_mass_error");
   EXPECT_EQ(scenario.vehicle, kVehicle);
   EXPECT_EQ(scenario.controller.model.vehicle, (SlungLoadParameters{1.5, 0.21, 1.0, 9.8}));
-  expect_named(scenario.controller.gains, {3.2469, 8.5803, 9.8503, 5.4498, 0.0316},
+  expect_named(gains_of(scenario), {3.2469, 8.5803, 9.8503, 5.4498, 0.0316},
                {2.2667, 3.0876, 0, 0, 0.0224});
 }
 
@@ -262,8 +263,7 @@ TEST(ShippedScenariosTest, MassErrorWithoutIntegralLacksNothingElse) {
   const Scenario with = load("integral_mass_error"), without = load("mass_error_without_integral");
   EXPECT_EQ(without.vehicle, with.vehicle);
   EXPECT_EQ(without.controller.model.vehicle, with.controller.model.vehicle);
-  expect_named(without.controller.gains, {3.2469, 8.5803, 9.8503, 5.4498, 0},
-               {2.2667, 3.0876, 0, 0, 0});
+  expect_named(gains_of(without), {3.2469, 8.5803, 9.8503, 5.4498, 0}, {2.2667, 3.0876, 0, 0, 0});
   expect_start(without, Body::kLoad, {0, 0, -1.5});
   for (const Scenario* scenario : {&with, &without}) {
     ASSERT_EQ(scenario->mission.size(), 1u);
@@ -277,7 +277,7 @@ TEST(ShippedScenariosTest, RotorDragWithoutFeedForwardLacksNothingElse) {
   EXPECT_EQ(without.vehicle, with.vehicle);
   EXPECT_EQ(without.plant.air, with.plant.air);
   EXPECT_FALSE(without.controller.drag_feed_forward);
-  expect_lqr(without.controller.gains, 10, 5);
+  expect_lqr(gains_of(without), 10, 5);
   expect_start(without, Body::kLoad, {0, 0, -0.5});
   ASSERT_EQ(without.mission.size(), 1u);
   expect_eight(without.mission[0], -0.5, 32);
@@ -286,7 +286,7 @@ TEST(ShippedScenariosTest, RotorDragWithoutFeedForwardLacksNothingElse) {
 TEST(ShippedScenariosTest, FaultyFigureEightShowsEveryKindOfFault) {
   const Scenario scenario = load("faulty_figure_eight");
   EXPECT_EQ(scenario.vehicle, kVehicle);
-  expect_lqr(scenario.controller.gains, 10, 5);
+  expect_lqr(gains_of(scenario), 10, 5);
   ASSERT_EQ(scenario.mission.size(), 1u);
   expect_eight(scenario.mission[0], -0.5, 32);
   std::set<std::string> kinds;

@@ -16,7 +16,9 @@ bool are_equal(const InitialState& a, const InitialState& b) {
 }
 
 bool are_equal(const Plant& a, const Plant& b) {
-  return a.pendulum == b.pendulum && a.step_ns == b.step_ns && are_equal(a.initial, b.initial) &&
+  return a.model.name == b.model.name &&
+         a.own.get<sim::SlungLoadKeys>().pendulum == b.own.get<sim::SlungLoadKeys>().pendulum &&
+         a.step_ns == b.step_ns && are_equal(a.initial, b.initial) &&
          a.air == b.air && a.disturbance_W == b.disturbance_W;
 }
 
@@ -62,7 +64,9 @@ bool are_equal(const ControllerModel& a, const ControllerModel& b) {
 }
 
 bool are_equal(const Controller& a, const Controller& b) {
-  return a.law == b.law && are_equal(a.gains, b.gains) && a.force_limit_n == b.force_limit_n &&
+  return a.law.name == b.law.name &&
+         are_equal(a.own.get<QsfKeys>().gains, b.own.get<QsfKeys>().gains) &&
+         a.force_limit_n == b.force_limit_n &&
          a.saturate == b.saturate && a.drag_feed_forward == b.drag_feed_forward &&
          a.state_wiring == b.state_wiring && are_equal(a.model, b.model);
 }
@@ -213,7 +217,7 @@ Gains make_random_gains(Dice& dice) {
 
 Controller make_random_controller(Dice& dice) {
   Controller controller;
-  controller.gains = make_random_gains(dice);
+  controller.own = QsfKeys{make_random_gains(dice)};
   controller.force_limit_n = dice.positive();
   controller.saturate = dice.toss();
   controller.drag_feed_forward = dice.toss();
@@ -350,7 +354,7 @@ Scenario make_random_scenario(std::mt19937_64& random) {
         make_random_fault(dice, scenario.sync.period_ns, scenario.vehicles.size()));
   scenario.record.flush_s = dice.between(1e-6, 0.2);
   if (dice.roll(0, 4) == 0) {
-    scenario.plant.pendulum = Pendulum::kRigid;
+    scenario.plant.own = sim::SlungLoadKeys{sim::Pendulum::kRigid};
     scenario.vehicle = {1.5, dice.toss() ? 0.2 : 0.201, 1.1, dice.positive()};
     scenario.vehicles = make_vehicle_grid(scenario.vehicles.size());
   }

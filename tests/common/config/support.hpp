@@ -7,11 +7,20 @@
 #include <vector>
 
 #include "common/config/scenario.hpp"
+#include "control_client/laws/qsf/keys.hpp"
+#include "sim_server/plants/slung_load/keys.hpp"
 #include "tests/support/text.hpp"
 
 namespace sls::config::test {
 
+using control::AxisGains;
+using control::Gains;
+using control::LqrWeights;
+using control::NamedGains;
+using control::QsfKeys;
 using sls::test::replace_once;
+
+inline Gains gains_of(const Scenario& scenario) { return scenario.controller.own.get<QsfKeys>().gains; }
 
 /// Equal in every field but `text` and `sha256`.
 bool are_equal(const Scenario& a, const Scenario& b);

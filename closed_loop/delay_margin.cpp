@@ -1,0 +1,170 @@
+#include "closed_loop/delay_margin.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "closed_loop/flight.hpp"
+#include "common/config/numbers.hpp"
+
+namespace sls::closed_loop {
+namespace {
+
+constexpr std::int64_t kLongestDelay = 10'000'000'000;  // ns
+constexpr std::int64_t kMostPeriods = 100'000;          // samples that a delay keeps in memory
+
+/// Distance of the load from its reference, by stage and step of the stage: a delayed flight may
+/// leave a stage at another step, and is compared with the same moment of the same stage.
+class ErrorHistory {
+ public:
+  void add(const FlownStep& step, double error) {
+    stages_.resize(std::max<std::size_t>(stages_.size(), step.answer.stage + 1));
+    stages_[step.answer.stage].push_back(error);
+  }
+
+  /// That at the moment of `step`, or at the end of its stage where that was shorter.
+  double find(const FlownStep& step) const {
+    if (step.answer.stage >= stages_.size() || stages_[step.answer.stage].empty()) return 0.0;
+    const std::vector<double>& errors = stages_[step.answer.stage];
+    const std::size_t since_start = step.step - step.answer.memory.stage_start_step;
+    return errors[std::min(since_start, errors.size() - 1)];
+  }
+
+ private:
+  std::vector<std::vector<double>> stages_;
+};
+
+double calc_error(const FlownStep& step) {
+  return (step.truth.p_WL - step.answer.reference.position).norm();
+}
+
+/// `scenario` with its command delayed by `periods`, after its own faults.
+config::Scenario make_delayed(config::Scenario scenario, std::int64_t periods) {
+  config::Fault fault;
+  fault.kind = "delay";
+  fault.on = config::FaultChannel::kCommand;
+  fault.effect = config::DelayFault{periods * scenario.sync.period_ns};
+  scenario.faults.push_back(fault);  // last: the numbers of random faults depend on their places
+  return scenario;
+}
+
+/// Flies until the end or the loss. `judge` says of a step and its error why the load is lost, or
+/// nothing.
+template <class Judge>
+DelayedFlight fly(const config::Scenario& scenario, std::int64_t periods, const Judge& judge) {
+  Flight flight(make_delayed(scenario, periods));
+  DelayedFlight result;
+  result.periods = periods;
+  std::uint64_t steps = 0;
+  double sum_of_squares = 0.0;
+  while (const auto step = flight.fly_step()) {
+    const double error = calc_error(*step);
+    result.worst_error = std::max(result.worst_error, error);
+    sum_of_squares += error * error;
+    ++steps;
+    result.loss = judge(*step, error);
+    if (result.is_lost()) break;
+  }
+  if (!result.is_lost()) result.loss = flight.failure();
+  if (result.is_lost())
+    result.loss += fmt::format(
+        ", at {} s", config::to_text(config::to_seconds(static_cast<std::int64_t>(steps - 1) *
+                                                        scenario.sync.period_ns)));
+  result.rms_error = std::sqrt(sum_of_squares / static_cast<double>(steps));
+  return result;
+}
+
+/// The flight without added delay, by which the others are judged.
+DelayedFlight fly_undelayed(const config::Scenario& scenario, ErrorHistory& errors) {
+  DelayedFlight result = fly(scenario, 0, [&](const FlownStep& step, double error) {
+    errors.add(step, error);
+    return std::string();
+  });
+  if (result.is_lost())
+    throw std::runtime_error("the load is lost without any added delay: " + result.loss);
+  return result;
+}
+
+DelayedFlight fly_delayed(const config::Scenario& scenario, std::int64_t periods,
+                          const ErrorHistory& undelayed) {
+  return fly(scenario, periods, [&](const FlownStep& step, double error) {
+    const double rod_length = scenario.vehicle.rod_length;
+    return error - undelayed.find(step) > rod_length
+               ? fmt::format("load more than {} m further from its reference than without delay",
+                             config::to_text(rod_length))
+               : std::string();
+  });
+}
+
+std::string to_seconds_text(std::int64_t periods, std::int64_t period_ns) {
+  return config::to_text(config::to_seconds(periods * period_ns));
+}
+
+}  // namespace
+
+const DelayedFlight* DelayMargin::shortest_lost() const {
+  const auto lost = std::find_if(flights.begin(), flights.end(),
+                                 [](const DelayedFlight& flight) { return flight.is_lost(); });
+  return lost == flights.end() ? nullptr : &*lost;
+}
+
+const DelayedFlight* DelayMargin::longest_held() const {
+  const DelayedFlight* held = nullptr;
+  for (const DelayedFlight& flight : flights) {
+    if (flight.is_lost()) break;
+    held = &flight;
+  }
+  return held;
+}
+
+DelayMargin find_delay_margin(const config::Scenario& scenario,
+                              const std::function<void(const DelayedFlight&)>& after_flight) {
+  DelayMargin margin;
+  margin.period_ns = scenario.sync.period_ns;
+  const auto add = [&](const DelayedFlight& flight) {
+    margin.flights.push_back(flight);
+    if (after_flight) after_flight(flight);
+    return flight.is_lost();
+  };
+  ErrorHistory undelayed;
+  add(fly_undelayed(scenario, undelayed));
+  const auto is_lost_with = [&](std::int64_t periods) {
+    return add(fly_delayed(scenario, periods, undelayed));
+  };
+
+  const std::int64_t most =
+      std::clamp<std::int64_t>(kLongestDelay / margin.period_ns, 1, kMostPeriods);
+  std::int64_t held = 0, lost = 1;
+  while (!is_lost_with(lost)) {
+    held = lost;
+    if (held == most) break;
+    lost = std::min(2 * lost, most);
+  }
+  while (lost - held > 1) {
+    const std::int64_t middle = held + (lost - held) / 2;
+    (is_lost_with(middle) ? lost : held) = middle;
+  }
+  std::sort(margin.flights.begin(), margin.flights.end(),
+            [](const DelayedFlight& a, const DelayedFlight& b) { return a.periods < b.periods; });
+  return margin;
+}
+
+std::string to_text(const DelayMargin& margin) {
+  std::string text = fmt::format("{:>9} {:>8} {:>15} {:>13}  {}\n", "delay (s)", "periods",
+                                 "worst error (m)", "rms error (m)", "outcome");
+  for (const DelayedFlight& flight : margin.flights)
+    text += fmt::format("{:>9} {:>8} {:>15.6f} {:>13.6f}  {}\n",
+                        to_seconds_text(flight.periods, margin.period_ns), flight.periods,
+                        flight.worst_error, flight.rms_error,
+                        flight.is_lost() ? "lost: " + flight.loss : "held");
+  const std::string holds =
+      "holds with " + to_seconds_text(margin.longest_held()->periods, margin.period_ns) + " s, ";
+  const DelayedFlight* lost = margin.shortest_lost();
+  return text + holds +
+         (lost ? "loses the load with " + to_seconds_text(lost->periods, margin.period_ns) + " s\n"
+               : "the longest delay tried: the load was never lost\n");
+}
+
+}  // namespace sls::closed_loop

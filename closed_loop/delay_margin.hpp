@@ -1,0 +1,43 @@
+/// How much later than meant a force may act before the controller loses the load. README.md says
+/// what that means and how it is searched.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "common/config/scenario.hpp"
+
+namespace sls::closed_loop {
+
+/// A flight whose command is delayed by this many control periods.
+struct DelayedFlight {
+  std::int64_t periods = 0;
+  double worst_error = 0.0;  ///< largest distance of the load from its reference, m
+  double rms_error = 0.0;    ///< over all steps flown, m
+  std::string loss;          ///< why and when the load was lost; empty if it was not
+  bool is_lost() const { return !loss.empty(); }
+};
+
+struct DelayMargin {
+  std::int64_t period_ns = 0;
+  std::vector<DelayedFlight> flights;  ///< all that were flown, in order of delay
+
+  /// The longest delay below which no flight was lost, and the next longer one, which was. Without
+  /// one that was lost, the latter is null.
+  const DelayedFlight* longest_held() const;
+  const DelayedFlight* shortest_lost() const;
+};
+
+/// Finds the margin to one control period by doubling and bisection, up to 10 s or 100,000 periods.
+/// The delay comes on top of the scenario's own faults. `after_flight` is called after each flight,
+/// and may throw to end the search.
+/// @throws std::runtime_error if the scenario loses the load without any added delay.
+DelayMargin find_delay_margin(const config::Scenario& scenario,
+                              const std::function<void(const DelayedFlight&)>& after_flight = {});
+
+/// A table, one row for each flight, and a line with the margin.
+std::string to_text(const DelayMargin& margin);
+
+}  // namespace sls::closed_loop

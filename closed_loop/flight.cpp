@@ -1,0 +1,104 @@
+#include "closed_loop/flight.hpp"
+
+#include <exception>
+#include <utility>
+
+#include "sim_server/judgement.hpp"
+
+namespace sls::closed_loop {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+}  // namespace
+
+Flight::Flight(const config::Scenario& scenario, const std::vector<std::uint32_t>& ids,
+               const FlightOptions& options)
+    : controller_name_(options.controller_name),
+      measures_compute_time_(options.measures_compute_time),
+      steps_per_period_(scenario.sync.period_ns / scenario.plant.step_ns),
+      force_limit_(scenario.controller.force_limit_n),
+      is_fleet_(scenario.vehicles.size() > 1),
+      plants_(sim::make_plants(sim::find_plant_type(scenario.plant.model), scenario, ids)),
+      steps_(ids.size()) {
+  for (const std::uint32_t id : ids) {
+    const config::Scenario alone = config::make_vehicle_scenario(scenario, id);
+    vehicles_.push_back(
+        {id, sim::FaultLine(alone, id),
+         control::FlightController(alone, id, options.checks_purity, options.make_law)});
+  }
+}
+
+const FlownStep* Flight::fly_step() {
+  if (has_ended_) return nullptr;
+  if (has_begun_ && !advance()) {
+    has_ended_ = true;
+    return nullptr;
+  }
+  has_begun_ = true;
+  for (sim::PlantOfVehicles& group : plants_)
+    for (std::size_t i = 0; i < group.vehicles.size(); ++i) {
+      FlownStep& flown = steps_[group.vehicles[i]];
+      Vehicle& vehicle = vehicles_[group.vehicles[i]];
+      flown.truth = group.plant->measurement(i);
+      flown.measured = vehicle.faults.measure(flown.step, flown.truth);
+      const control::ControllerMemory memory = flown.answer.memory;
+      const auto began = measures_compute_time_ ? Clock::now() : Clock::time_point();
+      flown.answer = vehicle.controller.calc_answer(flown.step, flown.measured, memory);
+      if (measures_compute_time_) flown.compute_time = Clock::now() - began;
+    }
+  has_ended_ = is_last();
+  return &steps_.front();
+}
+
+bool Flight::advance() {
+  for (sim::PlantOfVehicles& group : plants_) {
+    group.forces.clear();
+    for (const std::size_t i : group.vehicles) {
+      FlownStep& flown = steps_[i];
+      flown.answered_f_Q_W = flown.answer.f_Q_W;
+      flown.applied_f_Q_W = vehicles_[i].faults.actuate(flown.step, flown.answer.f_Q_W);
+      ++flown.step;
+      group.forces.push_back(flown.applied_f_Q_W);
+    }
+    try {
+      group.plant->advance(group.forces, steps_per_period_);
+    } catch (const std::exception& error) {
+      failure_ = name_vehicle(group.vehicles.front()) + error.what();
+      return false;
+    }
+  }
+  return true;
+}
+
+bool Flight::is_last() {
+  bool is_finished = true;
+  for (std::size_t i = 0; i < steps_.size(); ++i) {
+    const control::Answer& answer = steps_[i].answer;
+    sim::JudgedAnswer judged;
+    judged.f_Q_W = answer.f_Q_W;
+    judged.is_memory_finite = answer.memory.numbers.allFinite();
+    if (answer.fault != control::Fault::kNone) judged.fault = to_string(answer.fault);
+    judged.is_mission_failed = answer.mission == control::MissionPhase::kFailed;
+    if (const auto defect = sim::find_defect(judged, force_limit_)) {
+      failure_ = name_vehicle(i) + sim::describe_refusal(*defect, judged, force_limit_,
+                                                         controller_name_, steps_[i].step);
+      return true;
+    }
+    is_finished = is_finished && answer.mission == control::MissionPhase::kFinished;
+  }
+  return is_finished;
+}
+
+std::string Flight::name_vehicle(std::size_t index) const {
+  return is_fleet_ ? "vehicle " + std::to_string(vehicles_[index].id) + ": " : std::string();
+}
+
+std::vector<FlownStep> fly(const config::Scenario& scenario, std::uint32_t vehicle) {
+  Flight flight(scenario, vehicle);
+  std::vector<FlownStep> steps;
+  while (const FlownStep* step = flight.fly_step()) steps.push_back(*step);
+  return steps;
+}
+
+}  // namespace sls::closed_loop

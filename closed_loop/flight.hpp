@@ -1,0 +1,89 @@
+/// The closed loop in one process and one thread: plants, faults, missions, controllers and the
+/// judgement of their answers, with neither DDS nor a clock. A flight is bit for bit what the
+/// programs record in lockstep.
+#pragma once
+
+#include <Eigen/Core>
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/config/scenario.hpp"
+#include "common/model/measurement.hpp"
+#include "control_client/flight_controller.hpp"
+#include "control_client/laws/control_law.hpp"
+#include "sim_server/fault_line.hpp"
+#include "sim_server/plants/plant.hpp"
+
+namespace sls::closed_loop {
+
+/// One control period of one vehicle: what was true, what was measured, what was answered.
+struct FlownStep {
+  std::uint64_t step = 0;
+  model::Measurement truth;
+  model::Measurement measured;  ///< with the faults on `state`: what the controller answered
+  Eigen::Vector3d answered_f_Q_W = Eigen::Vector3d::Zero();  ///< for [step − 1, step), N; 0 at 0
+  Eigen::Vector3d applied_f_Q_W = Eigen::Vector3d::Zero();   ///< the same after faults
+  control::Answer answer;
+  std::chrono::nanoseconds compute_time{0};  ///< wall time of the answer, where it is measured
+};
+
+struct FlightOptions {
+  std::string controller_name = "control_client";  ///< in messages
+  bool checks_purity = false;                      ///< as of FlightController
+  bool measures_compute_time = false;
+  control::LawMaker make_law = &control::make_control_law;
+};
+
+class Flight {
+ public:
+  /// At step 0 of the vehicles `ids` (ascending) of `scenario`, whose period is the one in force.
+  /// @throws config::ConfigError as plant and controller do.
+  Flight(const config::Scenario& scenario, const std::vector<std::uint32_t>& ids,
+         const FlightOptions& options = {});
+  /// Of one vehicle.
+  explicit Flight(const config::Scenario& scenario, std::uint32_t vehicle = 0)
+      : Flight(scenario, std::vector<std::uint32_t>{vehicle}) {}
+
+  /// Flies the next step of all vehicles, up to the one whose answers end the flight: that of the
+  /// first, by which `steps` has those of all. Null when the flight has ended.
+  const FlownStep* fly_step();
+
+  /// The last step of every vehicle, in the order of the ids.
+  const std::vector<FlownStep>& steps() const { return steps_; }
+
+  /// Why the flight failed, once it has ended; empty if every mission was finished.
+  const std::string& failure() const { return failure_; }
+
+ private:
+  struct Vehicle {
+    std::uint32_t id;
+    sim::FaultLine faults;
+    control::FlightController controller;
+  };
+
+  /// Moves the plants over the period after the last step. False, with the failure, if one cannot.
+  bool advance();
+  /// Whether the answers end the flight, judged as the server does.
+  bool is_last();
+  std::string name_vehicle(std::size_t index) const;
+
+  const std::string controller_name_;
+  const bool measures_compute_time_;
+  const std::int64_t steps_per_period_;
+  const double force_limit_;
+  const bool is_fleet_;
+  std::vector<sim::PlantOfVehicles> plants_;
+  std::vector<Vehicle> vehicles_;
+  std::vector<FlownStep> steps_;
+  bool has_begun_ = false;
+  bool has_ended_ = false;
+  std::string failure_;
+};
+
+/// All steps of a flight of one vehicle of `scenario`.
+std::vector<FlownStep> fly(const config::Scenario& scenario, std::uint32_t vehicle = 0);
+
+}  // namespace sls::closed_loop

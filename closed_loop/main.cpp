@@ -1,0 +1,58 @@
+#include <spdlog/spdlog.h>
+
+#include <chrono>
+#include <numeric>
+#include <optional>
+
+#include "closed_loop/recorded_flight.hpp"
+#include "common/app/run_main.hpp"
+#include "common/app/stop_signal.hpp"
+#include "recorder/recording_folder.hpp"
+
+int main(int argc, char** argv) {
+  using namespace sls;
+  CLI::App cli("Flies a scenario in one process, without DDS, as fast as it goes.");
+  const app::CommonOptions options;  // no network here
+  std::filesystem::path scenario_file, folder;
+  std::optional<double> period_s;
+  bool force = false;
+  closed_loop::FlightOptions flight;
+  cli.set_version_flag("--version", app::version());
+  cli.add_option("--scenario", scenario_file, "scenario (YAML)")->type_name("FILE")->required();
+  cli.add_option("--out", folder, "folder of the recording, new or empty; default: no recording")
+      ->type_name("DIR");
+  cli.add_flag("--force", force, "replace the recording that is there");
+  cli.add_option("--period-s", period_s, "control period in force; default: the scenario's")
+      ->type_name("X");
+  cli.add_flag(
+      "--check-purity", flight.checks_purity,
+      "compute every answer twice and refuse a law that gives two different ones; default: "
+      "in the first 100 steps");
+
+  return app::run_main(argc, argv, cli, options, "closed_loop", [&] {
+    config::Scenario scenario = config::load_scenario(scenario_file);
+    if (period_s) config::override_period(scenario, *period_s);
+    scenario.sync.mode = config::SyncMode::kLockstep;  // nothing here is ever late
+    const auto began = std::chrono::steady_clock::now();
+    closed_loop::FlightEnd end;
+    if (folder.empty()) {
+      std::vector<std::uint32_t> ids(scenario.vehicles.size());
+      std::iota(ids.begin(), ids.end(), 0);
+      closed_loop::Flight flown(scenario, ids, flight);
+      while (app::stop_signal() == 0 && flown.fly_step()) end.last_step = flown.steps()[0].step;
+      end.failure = app::stop_signal() != 0 ? "interrupted" : flown.failure();
+    } else {
+      record::prepare_recording_folder(folder, force);
+      flight.measures_compute_time = true;
+      end = closed_loop::fly_recorded(scenario, flight, folder);
+    }
+    const double wall_s =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+    if (!end.failure.empty())
+      throw app::RunError(fmt::format("step {}: {}", end.last_step, end.failure));
+    const auto steps = static_cast<double>(end.last_step);
+    spdlog::info("finished: {} steps, {} s simulated in {:.2f} s, {:.0f} steps/s", end.last_step,
+                 steps * 1e-9 * static_cast<double>(scenario.sync.period_ns), wall_s,
+                 steps / wall_s);
+  });
+}

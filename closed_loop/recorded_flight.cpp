@@ -1,0 +1,55 @@
+#include "closed_loop/recorded_flight.hpp"
+
+#include <fmt/format.h>
+
+#include <numeric>
+
+#include "closed_loop/samples.hpp"
+#include "common/app/options.hpp"
+#include "common/app/stop_signal.hpp"
+#include "recorder/recording.hpp"
+#include "sim_server/status_board.hpp"
+
+namespace sls::closed_loop {
+
+FlightEnd fly_recorded(const config::Scenario& scenario, const FlightOptions& options,
+                       const std::filesystem::path& folder) {
+  std::vector<std::uint32_t> ids(scenario.vehicles.size());
+  std::iota(ids.begin(), ids.end(), 0);
+  const std::uint64_t run_id = sim::make_run_id();
+  Flight flight(scenario, ids, options);
+  std::vector<SampleMaker> makers;
+  for (const std::uint32_t id : ids) makers.emplace_back(run_id, id, scenario.sync.period_ns);
+
+  record::Recording recording(folder,
+                              sim::make_parameters_message(run_id, ids, scenario, app::version()));
+  sim::StatusBoard board([&](const SimStatus& status) { recording.add(status); }, run_id,
+                         ids.front(), scenario.sync, [] { return SyncCounters(); });
+  board.controller_name = options.controller_name;
+  board.start_clock();
+  board.publish(PHASE_RUNNING, "");
+  while (app::stop_signal() == 0 && flight.fly_step()) {
+    for (std::size_t i = 0; i < ids.size(); ++i) {
+      const StepSamples samples = makers[i].make(flight.steps()[i], options.controller_name);
+      recording.add(samples.state);
+      recording.add(samples.command);
+      recording.add(samples.reference);
+    }
+    board.step = flight.steps().front().step;
+    if (board.step > 0)
+      for (std::size_t i = 0; i < ids.size(); ++i) board.timing.add(FORCE_ANSWERED, 0);
+    board.publish_if_due("");
+    recording.flush_if_due();
+  }
+  FlightEnd end{board.step, flight.failure(), false};
+  const bool is_interrupted = app::stop_signal() != 0;
+  if (ids.size() > 1) board.controller_names.assign(ids.size(), options.controller_name);
+  const bool has_failed = is_interrupted || !end.failure.empty();
+  if (is_interrupted) end.failure = "interrupted";
+  board.publish(has_failed ? PHASE_FAILED : PHASE_FINISHED,
+                has_failed ? end.failure : "mission finished");
+  end.is_complete = recording.finish(is_interrupted ? "interrupted" : "", 0);
+  return end;
+}
+
+}  // namespace sls::closed_loop

@@ -1,0 +1,26 @@
+/// A flight in one process that leaves the recording of a distributed one.
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "closed_loop/flight.hpp"
+#include "common/config/scenario.hpp"
+
+namespace sls::closed_loop {
+
+/// What became of a flight.
+struct FlightEnd {
+  std::uint64_t last_step = 0;
+  std::string failure;       ///< why it failed; empty if every mission was finished
+  bool is_complete = false;  ///< the recording
+};
+
+/// Flies all vehicles of `scenario` in lockstep and records them into `folder`, which is ready for
+/// a recording. The files hold the same data, with the same certificate, as those of the three
+/// programs.
+/// @throws std::system_error naming the file when the disk refuses.
+FlightEnd fly_recorded(const config::Scenario& scenario, const FlightOptions& options,
+                       const std::filesystem::path& folder);
+
+}  // namespace sls::closed_loop

@@ -1,0 +1,24 @@
+#include "common/config/model_keys.hpp"
+
+#include "common/config/own_keys.hpp"
+
+namespace sls::config {
+
+bool ModelName::is_shared_library() const {
+  constexpr std::string_view kEnding = ".so";
+  return name.size() > kEnding.size() &&
+         name.compare(name.size() - kEnding.size(), kEnding.size(), kEnding) == 0;
+}
+
+template <class Section>
+const ModelKeys<Section>& find_model_keys(const ModelRegistry<Section>& registry,
+                                          const ModelName& model) {
+  static const OwnKeys<Section, LibraryParameters> kLibraryKeys;
+  return model.is_shared_library() ? kLibraryKeys : *registry.at(model.name);
+}
+
+template const ModelKeys<Plant>& find_model_keys(const ModelRegistry<Plant>&, const ModelName&);
+template const ModelKeys<Controller>& find_model_keys(const ModelRegistry<Controller>&,
+                                                      const ModelName&);
+
+}  // namespace sls::config

@@ -1,0 +1,53 @@
+/// What a plant or a control law adds to the scenario file: keys of its own in the section that
+/// names it. Each folder of sim_server/plants and control_client/laws describes them in its
+/// keys.hpp, without Simbody or DDS. Every program links all of them, so all accept and refuse the
+/// same file with the same line. How to describe keys: own_keys.hpp.
+#pragma once
+
+#include <map>
+#include <string>
+
+#include "common/config/scenario.hpp"
+
+namespace sls::config {
+
+class KeyNames;
+class MapReader;
+class MapWriter;
+class Places;
+
+/// The keys of one model. `Section` is what they stand in: Plant or Controller.
+template <class Section>
+class ModelKeys {
+ public:
+  virtual ~ModelKeys() = default;
+  virtual void describe(KeyNames& map, Section& section) const = 0;
+  virtual void describe(MapReader& map, Section& section) const = 0;
+  virtual void describe(MapWriter& map, Section& section) const = 0;
+  /// Rules between these keys and others of the scenario. @throws ConfigError.
+  virtual void check(const Scenario&, const Places&) const {}
+};
+
+/// By name.
+template <class Section>
+using ModelRegistry = std::map<std::string, const ModelKeys<Section>*>;
+
+/// Every plant of the project. Defined in sim_server/plants/keys.cpp.
+const ModelRegistry<Plant>& plant_keys();
+/// Every control law of the project. Defined in control_client/laws/keys.cpp.
+const ModelRegistry<Controller>& law_keys();
+
+/// "pid, qsf or a shared library (a path ending in .so)".
+template <class Section>
+std::string list_models(const ModelRegistry<Section>& registry) {
+  std::string names;
+  for (const auto& item : registry) names += (names.empty() ? "" : ", ") + item.first;
+  return names + " or a shared library (a path ending in .so)";
+}
+
+/// The keys of `model`: of the registry, or those of any shared library.
+template <class Section>
+const ModelKeys<Section>& find_model_keys(const ModelRegistry<Section>& registry,
+                                          const ModelName& model);
+
+}  // namespace sls::config

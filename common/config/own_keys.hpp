@@ -1,0 +1,37 @@
+/// How a folder of plants or laws describes the keys of its own:
+///
+///     struct PidKeys { … };                                     // keys.hpp: values with defaults
+///     template <class Map>
+///     void describe_own(Map& map, config::Controller&, PidKeys& keys) {
+///       map.key(config::kOptional, "gains", keys.gains);        // as in scenario_keys.hpp
+///     }
+///     const config::OwnKeys<config::Controller, PidKeys> kKeys;  // keys.cpp, for the registry
+#pragma once
+
+#include "common/config/model_keys.hpp"
+#include "common/config/scenario_reader.hpp"
+#include "common/config/scenario_writer.hpp"
+
+namespace sls::config {
+
+template <class Section, class Own>
+class OwnKeys : public ModelKeys<Section> {
+ public:
+  void describe(KeyNames& map, Section& section) const override { describe_with(map, section); }
+  void describe(MapReader& map, Section& section) const override { describe_with(map, section); }
+  void describe(MapWriter& map, Section& section) const override { describe_with(map, section); }
+
+ private:
+  template <class Map>
+  static void describe_with(Map& map, Section& section) {
+    describe_own(map, section, section.own.template edit<Own>());
+  }
+};
+
+/// The keys of every shared library: `parameters`, which only the library itself understands.
+template <class Map, class Section>
+void describe_own(Map& map, Section&, LibraryParameters& parameters) {
+  map.key(kOptional, "parameters", parameters);
+}
+
+}  // namespace sls::config

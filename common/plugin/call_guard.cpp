@@ -1,0 +1,184 @@
+#include <signal.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <charconv>
+#include <chrono>
+#include <csignal>
+#include <cstring>
+#include <mutex>
+#include <string_view>
+#include <thread>
+#include <vector>
+
+#include "common/plugin/shared_library.hpp"
+
+namespace sls::plugin {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto kLookEvery = 250ms;
+constexpr auto kReportAfter = 2s;
+constexpr auto kEndAfter = 60s;
+
+/// What one thread is doing. Odd: inside a library. The watchdog reads it without a lock.
+struct ThreadRecord {
+  std::atomic<std::uint64_t> calls{0};
+  Call call;
+  std::array<char, 16384> signal_stack;  // a stack overflow leaves no room on the thread's own
+};
+
+/// Text of a call, without allocation: also for signal handlers.
+class Line {
+ public:
+  Line& add(std::string_view text) {
+    const std::size_t size = std::min(text.size(), text_.size() - size_);
+    std::memcpy(text_.data() + size_, text.data(), size);
+    size_ += size;
+    return *this;
+  }
+  Line& add(std::uint64_t number) {
+    const auto end = std::to_chars(text_.data() + size_, text_.data() + text_.size(), number);
+    size_ = static_cast<std::size_t>(end.ptr - text_.data());
+    return *this;
+  }
+  Line& add(const Call& call) {
+    return add(call.library)
+        .add(": ")
+        .add(call.function)
+        .add(", vehicle ")
+        .add(call.vehicle_id)
+        .add(", step ")
+        .add(call.step);
+  }
+  std::string_view text() const { return {text_.data(), size_}; }
+  void write_to_stderr() const {
+    [[maybe_unused]] const auto written = ::write(STDERR_FILENO, text_.data(), size_);
+  }
+
+ private:
+  std::array<char, 1024> text_;
+  std::size_t size_ = 0;
+};
+
+thread_local ThreadRecord* current = nullptr;
+
+void report_crash(int number) {
+  if (current && current->calls.load(std::memory_order_relaxed) % 2 == 1)
+    Line()
+        .add("error: ")
+        .add(current->call)
+        .add(": crashed (signal ")
+        .add(static_cast<std::uint64_t>(number))
+        .add(")\n")
+        .write_to_stderr();
+  // SA_RESETHAND: what raised the signal raises it again, and now it ends the process.
+  if (number == SIGABRT) return;
+  ::raise(number);
+}
+
+/// Watches every thread that has ever called a library. One thread of its own, because those that
+/// call hang with the library.
+class Watchdog {
+ public:
+  static Watchdog& instance() {
+    static auto* watchdog = new Watchdog;  // never destroyed: its thread outlives main
+    return *watchdog;
+  }
+
+  void add(ThreadRecord* record) {
+    const std::lock_guard lock(mutex_);
+    watched_.push_back({record, 0, std::chrono::steady_clock::now(), false});
+  }
+  void remove(ThreadRecord* record) {
+    const std::lock_guard lock(mutex_);
+    watched_.erase(std::find_if(watched_.begin(), watched_.end(),
+                                [&](const Watched& one) { return one.record == record; }));
+  }
+
+ private:
+  struct Watched {
+    ThreadRecord* record;
+    std::uint64_t calls;
+    std::chrono::steady_clock::time_point since;
+    bool is_reported;
+  };
+
+  Watchdog() {
+    struct sigaction action {};
+    action.sa_handler = &report_crash;
+    action.sa_flags = static_cast<int>(SA_RESETHAND | SA_ONSTACK);
+    for (const int number : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT})
+      ::sigaction(number, &action, nullptr);
+    std::thread([this] { watch(); }).detach();
+  }
+
+  void watch() {
+    while (true) {
+      std::this_thread::sleep_for(kLookEvery);
+      const std::lock_guard lock(mutex_);
+      for (Watched& one : watched_) look(one, std::chrono::steady_clock::now());
+    }
+  }
+
+  static void look(Watched& one, std::chrono::steady_clock::time_point now) {
+    const std::uint64_t calls = one.record->calls.load(std::memory_order_acquire);
+    if (calls != one.calls || calls % 2 == 0) {
+      one = {one.record, calls, now, false};
+      return;
+    }
+    const auto silence = now - one.since;
+    const bool is_over = silence >= kEndAfter;
+    if (silence < kReportAfter || (one.is_reported && !is_over)) return;
+    one.is_reported = true;
+    const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(silence).count();
+    Line()
+        .add(is_over ? "error: " : "warning: ")
+        .add(one.record->call)
+        .add(": has not returned for ")
+        .add(static_cast<std::uint64_t>(seconds))
+        .add(is_over ? " s: ends the program\n" : " s\n")
+        .write_to_stderr();
+    if (is_over) ::_exit(1);
+  }
+
+  std::mutex mutex_;  // over watched_
+  std::vector<Watched> watched_;
+};
+
+/// Registers the thread for as long as it lives.
+struct Registration {
+  Registration() {
+    stack_t stack{};
+    stack.ss_sp = record.signal_stack.data();
+    stack.ss_size = record.signal_stack.size();
+    ::sigaltstack(&stack, nullptr);
+    Watchdog::instance().add(&record);
+    current = &record;
+  }
+  ~Registration() {
+    current = nullptr;
+    stack_t none{};
+    none.ss_flags = SS_DISABLE;
+    ::sigaltstack(&none, nullptr);
+    Watchdog::instance().remove(&record);
+  }
+  ThreadRecord record;
+};
+
+}  // namespace
+
+std::string Call::describe() const { return std::string(Line().add(*this).text()); }
+
+CallGuard::CallGuard(const Call& call) {
+  thread_local Registration registration;
+  registration.record.call = call;
+  registration.record.calls.fetch_add(1, std::memory_order_release);
+}
+
+CallGuard::~CallGuard() { current->calls.fetch_add(1, std::memory_order_release); }
+
+}  // namespace sls::plugin

@@ -1,0 +1,71 @@
+#include "common/plugin/shared_library.hpp"
+
+#include <dlfcn.h>
+
+#include <system_error>
+#if defined(__x86_64__)
+#include <xmmintrin.h>
+#endif
+
+#include "common/config/config_error.hpp"
+
+namespace sls::plugin {
+
+std::uint64_t floating_point_mode() {
+#if defined(__x86_64__)
+  constexpr unsigned kModeBits = 0xFFC0;  // of MXCSR; those below are status flags
+  std::uint16_t x87 = 0;
+  asm volatile("fnstcw %0" : "=m"(x87));
+  return (std::uint64_t{x87} << 32) | (_mm_getcsr() & kModeBits);
+#elif defined(__aarch64__)
+  std::uint64_t mode = 0;
+  asm volatile("mrs %0, fpcr" : "=r"(mode));
+  return mode;
+#else
+#error "floating_point_mode: not written for this processor"
+#endif
+}
+
+void restore_floating_point_mode(std::uint64_t mode) {
+#if defined(__x86_64__)
+  const auto x87 = static_cast<std::uint16_t>(mode >> 32);
+  asm volatile("fldcw %0" : : "m"(x87));
+  _mm_setcsr(static_cast<unsigned>(mode & 0xFFFF));
+#elif defined(__aarch64__)
+  asm volatile("msr fpcr, %0" : : "r"(mode));
+#endif
+}
+
+SharedLibrary::SharedLibrary(const std::filesystem::path& file, const std::string& place)
+    : name_(file.string()), place_(place) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(file, error))
+    fail("expected a shared library, got no such file");
+  const std::uint64_t mode = floating_point_mode();
+  {
+    const CallGuard guard({name_.c_str(), "(loading)", 0, 0});
+    // An absolute path: without a slash the loader would search the system's folders.
+    handle_ = ::dlopen(std::filesystem::absolute(file).c_str(), RTLD_NOW | RTLD_LOCAL);
+  }
+  if (floating_point_mode() != mode) {
+    restore_floating_point_mode(mode);
+    fail(
+        "changes the floating-point mode of the whole process when it is loaded; link it without "
+        "-ffast-math");
+  }
+  if (!handle_) fail(std::string("expected a shared library that loads, got: ") + ::dlerror());
+}
+
+void* SharedLibrary::find(const char* symbol) const {
+  void* address = ::dlsym(handle_, symbol);
+  if (!address)
+    fail(std::string("expected a library that defines ") + symbol + "(), got none (" + ::dlerror() +
+         ")");
+  return address;
+}
+
+void SharedLibrary::fail(const std::string& message) const {
+  throw config::ConfigError((place_.empty() ? "" : place_ + ": ") + name_ + ": " + message);
+}
+
+}  // namespace sls::plugin

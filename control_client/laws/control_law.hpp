@@ -1,0 +1,65 @@
+/// What a control law is: a pure function from what is measured, desired and remembered to a force.
+/// A new one is a folder beside this file and a line in laws.def. README.md shows how. No DDS here.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "common/config/scenario.hpp"
+#include "common/model/answer.hpp"
+#include "common/model/measurement.hpp"
+#include "common/model/reference.hpp"
+
+namespace sls::control {
+
+using model::Fault;
+using model::MissionPhase;
+
+/// All that a law may look at.
+struct LawInput {
+  model::Measurement state;  ///< rod angles as wired to the controller's slots
+  model::Reference reference;
+  model::Numbers memory;  ///< what the law returned for the step before; zeros at step 0
+
+  std::uint64_t step = 0;
+  std::uint32_t stage = 0;  ///< of the mission, whose reference that is
+  double stage_time = 0.0;  ///< s since the stage began
+};
+
+struct LawOutput {
+  Eigen::Vector3d f_Q_W = Eigen::Vector3d::Zero();  ///< N; zero with a fault
+  model::Numbers memory;                            ///< to be used at step + 1; as many as ever
+  Fault fault = Fault::kNone;
+};
+
+/// It holds nothing that changes: what it must remember travels in `memory`, so that any client can
+/// answer any sample.
+class ControlLaw {
+ public:
+  virtual ~ControlLaw() = default;
+  /// @throws std::runtime_error where the law is broken, which ends the client.
+  virtual LawOutput calc(const LawInput& input) const = 0;
+  /// How many numbers it remembers, at most `model::kMaxNumbers`.
+  virtual int memory_size() const { return 0; }
+};
+
+/// What a law is made from.
+struct LawSetup {
+  config::Controller controller;
+  double period = 0.0;           ///< control period in force, s
+  std::uint32_t vehicle_id = 0;  ///< that it flies
+  std::filesystem::path folder;  ///< of the scenario file
+};
+
+/// Makes the law of a vehicle.
+using LawMaker = std::function<std::unique_ptr<const ControlLaw>(const LawSetup&)>;
+
+/// The law that `controller.law` names.
+/// @throws config::ConfigError for gains without a solution, or a library that cannot be used.
+std::unique_ptr<const ControlLaw> make_control_law(const LawSetup& setup);
+
+}  // namespace sls::control

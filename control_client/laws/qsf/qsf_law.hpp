@@ -1,0 +1,56 @@
+/// Quasi-static feedback linearisation: the load follows its reference as if it were three
+/// independent integrator chains. Source: README.md, eqs. (1)–(9).
+#pragma once
+
+#include "common/model/parameters.hpp"
+#include "control_client/laws/control_law.hpp"
+#include "control_client/laws/qsf/keys.hpp"
+
+namespace sls::control {
+
+/// The law is singular where s = g − n₃ vanishes; below this fraction of g it reports kFreeFall.
+inline constexpr double kMinSupportFraction = 1e-3;
+
+/// It is singular where the rod is level; below this cos α or cos β (0.06° from level) it reports
+/// kRodLevel. So it does with the load above the quadrotor, where the cosines are negative.
+inline constexpr double kMinRodCosine = 1e-3;
+
+/// What the law looks at.
+struct QsfInput {
+  Eigen::Vector3d p_WQ = Eigen::Vector3d::Zero();  ///< m
+  Eigen::Vector3d v_WQ = Eigen::Vector3d::Zero();  ///< m/s
+  model::RodAngles rod;                            ///< as wired to the controller's slots
+  model::Reference reference;
+  Eigen::Vector3d integral = Eigen::Vector3d::Zero();  ///< ∫e dt, m·s
+};
+
+struct QsfOutput {
+  Eigen::Vector3d f_Q_W = Eigen::Vector3d::Zero();          ///< N; zero with a fault
+  Eigen::Vector3d load_error = Eigen::Vector3d::Zero();     ///< e = y − y_r as the law sees it, m
+  Eigen::Vector3d integral_rate = Eigen::Vector3d::Zero();  ///< e where e is integrated, else 0, m
+  Fault fault = Fault::kNone;
+};
+
+/// Force on the quadrotor that makes the load error obey the designed linear equations, for a
+/// vehicle with the parameters `vehicle`. Set-point, tracking and integral variant in one.
+/// Holds for |α|, |β| < π/2 and s > 0; outside it reports a fault and no force, never NaN.
+/// Source: README.md, eqs. (1)–(9).
+QsfOutput calc_qsf(const QsfInput& input, const model::SlungLoadParameters& vehicle,
+                   const NamedGains& gains);
+
+/// The same as a `ControlLaw`, which remembers the integral.
+class QsfLaw : public ControlLaw {
+ public:
+  QsfLaw(const model::SlungLoadParameters& vehicle, const NamedGains& gains, double period)
+      : vehicle_(vehicle), gains_(gains), period_(period) {}
+
+  LawOutput calc(const LawInput& input) const override;
+  int memory_size() const override { return 3; }
+
+ private:
+  model::SlungLoadParameters vehicle_;
+  NamedGains gains_;
+  double period_;  // s
+};
+
+}  // namespace sls::control

@@ -1,0 +1,179 @@
+// A law from a shared library of the user's own: sls_controller.h.
+#include <array>
+#include <cmath>
+#include <stdexcept>
+
+#include "common/plugin/shared_library.hpp"
+#include "common/plugin/tables.hpp"
+#include "control_client/laws/control_law.hpp"
+#include "control_client/laws/shared_library/sls_controller.h"
+
+namespace sls::control {
+namespace {
+
+using plugin::copy;
+using plugin::ErrorText;
+
+class SharedLibraryLaw : public ControlLaw {
+ public:
+  explicit SharedLibraryLaw(const LawSetup& setup)
+      : library_(setup.folder / setup.controller.law.name,
+                 setup.controller.law.place + ": controller.law"),
+        vehicle_id_(setup.vehicle_id),
+        period_(setup.period),
+        functions_(load_functions()) {
+    const auto parameters = setup.controller.own.get<config::LibraryParameters>();
+    const model::SlungLoadParameters& believed = setup.controller.model.vehicle;
+    sls_controller_setup given{};
+    given.size = sizeof given;
+    given.parameters = parameters.json.c_str();
+    given.vehicle_id = setup.vehicle_id;
+    given.period_s = setup.period;
+    given.quad_mass_kg = believed.quad_mass;
+    given.load_mass_kg = believed.load_mass;
+    given.rod_length_m = believed.rod_length;
+    given.gravity_m_s2 = believed.gravity;
+    given.force_limit_n = setup.controller.force_limit_n;
+    ErrorText error;
+    call_guarded(call("create", 0), [&] {
+      controller_ = functions_.create(&given, &memory_count_, error.data(), error.size());
+    });
+    if (!controller_)
+      throw config::ConfigError(parameters.describe_place(setup.controller.law, "controller") +
+                                ": " + library_.name() + ": " + error.text());
+    if (memory_count_ > SLS_CONTROLLER_MAX_MEMORY) {
+      destroy();
+      library_.fail("create: expected at most " + std::to_string(SLS_CONTROLLER_MAX_MEMORY) +
+                    " memory numbers, got " + std::to_string(memory_count_));
+    }
+  }
+  ~SharedLibraryLaw() override { destroy(); }
+  SharedLibraryLaw(const SharedLibraryLaw&) = delete;
+  SharedLibraryLaw& operator=(const SharedLibraryLaw&) = delete;
+
+  LawOutput calc(const LawInput& input) const override;
+  int memory_size() const override { return static_cast<int>(memory_count_); }
+
+ private:
+  sls_controller_functions load_functions() const {
+    const auto entry =
+        reinterpret_cast<const sls_controller_functions* (*)()>(library_.find("sls_controller"));
+    const sls_controller_functions* functions = nullptr;
+    call_guarded(call("sls_controller", 0), [&] { functions = entry(); });
+    if (!functions) library_.fail("sls_controller() returned no table of functions");
+    plugin::check_size(library_, "sls_controller_functions", sizeof *functions, functions->size);
+    plugin::check_version(library_, SLS_CONTROLLER_VERSION, functions->version);
+    plugin::check_size(library_, "sls_controller_setup", sizeof(sls_controller_setup),
+                       functions->setup_size);
+    plugin::check_size(library_, "sls_controller_input", sizeof(sls_controller_input),
+                       functions->input_size);
+    plugin::check_size(library_, "sls_controller_output", sizeof(sls_controller_output),
+                       functions->output_size);
+    if (!functions->create || !functions->destroy || !functions->answer)
+      library_.fail("expected create, destroy and answer, got a null pointer for one of them");
+    return *functions;
+  }
+
+  plugin::Call call(const char* function, std::uint64_t step) const {
+    return {library_.name().c_str(), function, vehicle_id_, step};
+  }
+
+  void destroy() noexcept {
+    if (!controller_) return;
+    const plugin::CallGuard guard(call("destroy", 0));
+    functions_.destroy(controller_);
+  }
+
+  const plugin::SharedLibrary library_;
+  const std::uint32_t vehicle_id_;
+  const double period_;  // s
+  const sls_controller_functions functions_;
+  void* controller_ = nullptr;
+  std::uint32_t memory_count_ = 0;
+};
+
+sls_controller_input make_input(const LawInput& input, double period) {
+  sls_controller_input given;
+  given.size = sizeof given;
+  given.step = input.step;
+  given.time_s = static_cast<double>(input.step) * period;
+  copy(input.state.p_WQ, given.quad_position_m);
+  copy(input.state.v_WQ, given.quad_velocity_m_s);
+  const Eigen::Quaterniond& q_WB = input.state.attitude.q_WB;
+  const double attitude[] = {q_WB.w(), q_WB.x(), q_WB.y(), q_WB.z()};
+  std::copy(std::begin(attitude), std::end(attitude), given.attitude_wb);
+  copy(input.state.attitude.w_WB_B, given.body_rates_rad_s);
+  copy(input.state.p_WL, given.load_position_m);
+  copy(input.state.v_WL, given.load_velocity_m_s);
+  given.alpha_rad = input.state.rod.alpha;
+  given.beta_rad = input.state.rod.beta;
+  given.alpha_dot_rad_s = input.state.rod.alpha_dot;
+  given.beta_dot_rad_s = input.state.rod.beta_dot;
+  given.signal_count = static_cast<std::uint32_t>(input.state.signals.size());
+  given.signals = input.state.signals.data();
+  given.stage = input.stage;
+  given.stage_time_s = input.stage_time;
+  copy(input.reference.position, given.reference_position_m);
+  copy(input.reference.velocity, given.reference_velocity_m_s);
+  copy(input.reference.acceleration, given.reference_acceleration_m_s2);
+  copy(input.reference.jerk, given.reference_jerk_m_s3);
+  copy(input.reference.snap, given.reference_snap_m_s4);
+  given.memory = input.memory.data();
+  return given;
+}
+
+Fault to_fault(int code) {
+  switch (code) {
+    case SLS_CONTROLLER_OK:
+      return Fault::kNone;
+    case SLS_CONTROLLER_FREE_FALL:
+      return Fault::kFreeFall;
+    case SLS_CONTROLLER_ROD_LEVEL:
+      return Fault::kRodLevel;
+    default:
+      return Fault::kNotFinite;
+  }
+}
+
+LawOutput SharedLibraryLaw::calc(const LawInput& input) const {
+  // One more number than declared: a library that fills it writes beyond its memory.
+  constexpr double kUntouched = -7.25e300;
+  std::array<double, SLS_CONTROLLER_MAX_MEMORY + 1> memory;
+  std::fill_n(memory.begin(), memory_count_, 0.0);
+  std::fill(memory.begin() + memory_count_, memory.end(), kUntouched);
+  const sls_controller_input given = make_input(input, period_);
+  sls_controller_output answer{sizeof answer, {}, memory.data()};
+  ErrorText error;
+  int code = SLS_CONTROLLER_ERROR;
+  const plugin::Call answering = call("answer", input.step);
+  call_guarded(answering, [&] {
+    code = functions_.answer(controller_, &given, &answer, error.data(), error.size());
+  });
+  const auto fail = [&](const std::string& defect) {
+    throw std::runtime_error(answering.describe() + ": " + defect);
+  };
+  if (code < SLS_CONTROLLER_OK || code >= SLS_CONTROLLER_ERROR) fail(error.text());
+  for (std::size_t i = memory_count_; i < memory.size(); ++i)
+    if (memory[i] != kUntouched)
+      fail("wrote memory number " + std::to_string(i) + ", expected at most the " +
+           std::to_string(memory_count_) + " that create asked for");
+  LawOutput output;
+  output.fault = to_fault(code);
+  if (output.fault != Fault::kNone) return output;
+  for (int i = 0; i < 3; ++i)
+    if (!std::isfinite(answer.force_n[i])) fail("force_n[" + std::to_string(i) + "] is not finite");
+  for (std::size_t i = 0; i < memory_count_; ++i)
+    if (!std::isfinite(memory[i])) fail("memory[" + std::to_string(i) + "] is not finite");
+  output.f_Q_W = Eigen::Map<const Eigen::Vector3d>(answer.force_n);
+  output.memory =
+      Eigen::Map<const Eigen::VectorXd>(memory.data(), static_cast<Eigen::Index>(memory_count_));
+  return output;
+}
+
+}  // namespace
+
+std::unique_ptr<const ControlLaw> make_shared_library_law(const LawSetup& setup) {
+  return std::make_unique<SharedLibraryLaw>(setup);
+}
+
+}  // namespace sls::control

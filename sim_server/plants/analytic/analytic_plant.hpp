@@ -1,0 +1,47 @@
+/// The ideal slung load in closed form, without Simbody: for campaigns. Equations: README.md.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "sim_server/plants/plant.hpp"
+
+namespace sls::sim {
+
+/// One vehicle: centre of mass, rod direction and its angular velocity, integrated by a fixed-step
+/// Runge-Kutta method of fourth order.
+class AnalyticPlant : public Plant {
+ public:
+  AnalyticPlant(const model::SlungLoadParameters& vehicle, const config::Plant& plant);
+
+  void advance(const std::vector<Eigen::Vector3d>& f_Q_W, std::int64_t steps) override;
+  const model::Measurement& measurement(std::size_t) const override { return measurement_; }
+
+ private:
+  /// Also the rate of change of each member.
+  struct Motion {
+    Eigen::Vector3d p_WC;  ///< centre of mass of both bodies, m
+    Eigen::Vector3d v_WC;  ///< m/s
+    Eigen::Vector3d n_W;   ///< rod direction Q→L, unit vector
+    Eigen::Vector3d w_W;   ///< angular velocity of the rod, normal to it, rad/s
+  };
+
+  static Motion add(const Motion& motion, double h, const Motion& rate);
+  Motion calc_rate(const Motion& motion, const Eigen::Vector3d& f_Q_W) const;
+  Motion calc_next(const Motion& start, const Eigen::Vector3d& f_Q_W) const;
+  model::SlungLoadState to_state(const Motion& motion) const;
+
+  const model::SlungLoadParameters vehicle_;
+  const model::Aerodynamics air_;
+  const Eigen::Vector3d disturbance_W_;
+  const double step_s_;
+  const double total_mass_;       // m + m_L, kg
+  const double arm_;              // from the quadrotor to the centre of mass, m
+  const double inverse_inertia_;  // 1 / (m L), 1/(kg·m)
+  std::int64_t steps_ = 0;
+  Motion motion_;
+  model::Measurement measurement_;
+};
+
+}  // namespace sls::sim

@@ -1,0 +1,89 @@
+/// What a plant is: moves one or several vehicles under held forces. A new one is a folder beside
+/// this file and a line in plants.def. README.md shows how. No DDS here.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/config/model_keys.hpp"
+#include "common/config/scenario.hpp"
+#include "common/model/measurement.hpp"
+
+namespace sls::sim {
+
+/// A number of its own that a plant publishes of each vehicle.
+struct Signal {
+  std::string name;  ///< column of state.csv, such as rotor_1_rad_s
+  std::string unit;  ///< such as rad/s
+};
+
+/// A pure function of its parameters, its initial states and the sequence of calls: the same calls
+/// give the same bits, however a sequence of steps is split into calls.
+class Plant {
+ public:
+  virtual ~Plant() = default;
+
+  /// Advances `steps` fixed steps of `plant.step_s` with the control force of each vehicle,
+  /// `f_Q_W[vehicle]` (N, in W), held.
+  /// @throws std::runtime_error naming the quantity and the step if a number is not finite;
+  ///   `measurement` is then still that of an earlier step.
+  virtual void advance(const std::vector<Eigen::Vector3d>& f_Q_W, std::int64_t steps) = 0;
+
+  /// After the last step; finite.
+  virtual const model::Measurement& measurement(std::size_t vehicle) const = 0;
+
+  /// The signals in every measurement, in their order; at most `model::kMaxNumbers`.
+  virtual std::vector<Signal> signals() const { return {}; }
+};
+
+/// What a plant is made from.
+struct PlantSetup {
+  struct Vehicle {
+    std::uint32_t id = 0;
+    model::SlungLoadParameters parameters;
+    config::InitialState initial;
+  };
+  config::Plant plant;            ///< but for `initial`, which each vehicle has of its own
+  std::filesystem::path folder;   ///< of the scenario file
+  std::vector<Vehicle> vehicles;  ///< at least one, by ascending id
+};
+
+enum class Moves {
+  kOneVehicle,   ///< a plant for each vehicle: they do not touch each other
+  kAllVehicles,  ///< one plant for the whole fleet, which one server must fly
+};
+
+/// An entry of the registry.
+struct PlantType {
+  Moves moves = Moves::kOneVehicle;
+  /// @throws config::ConfigError where the setup contradicts the plant.
+  std::unique_ptr<Plant> (*make)(const PlantSetup& setup) = nullptr;
+};
+
+/// The type that `plant.model` names.
+const PlantType& find_plant_type(const config::ModelName& model);
+
+/// A plant, and which of a list of vehicles it moves.
+struct PlantOfVehicles {
+  std::unique_ptr<Plant> plant;
+  std::vector<std::size_t> vehicles;    ///< indices into the list
+  std::vector<Eigen::Vector3d> forces;  ///< on them in the period in work; kept to spare allocation
+};
+
+/// The plants that fly the vehicles `ids` (ascending) of `fleet`.
+/// @throws config::ConfigError as `make`; also where a plant of all vehicles gets only some.
+std::vector<PlantOfVehicles> make_plants(const PlantType& type, const config::Scenario& fleet,
+                                         const std::vector<std::uint32_t>& ids);
+
+/// @throws std::runtime_error `QUANTITY is not finite after step N of the plant`; quantities are
+/// named as the columns of state.csv.
+void check_finite(const model::SlungLoadState& state, std::int64_t step);
+void check_finite(const Eigen::Vector3d& v, std::int64_t step, const char* x, const char* y,
+                  const char* z);
+[[noreturn]] void throw_not_finite(const std::string& quantity, std::int64_t step);
+
+}  // namespace sls::sim

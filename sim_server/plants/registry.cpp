@@ -1,0 +1,80 @@
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <stdexcept>
+
+#include "common/config/vehicle_ids.hpp"
+#include "sim_server/plants/plant.hpp"
+
+namespace sls::sim {
+
+#define SLS_PLANT(name) PlantType name##_type();
+#include "sim_server/plants/plants.def"
+#undef SLS_PLANT
+PlantType shared_library_plant_type();
+
+const PlantType& find_plant_type(const config::ModelName& model) {
+  static const std::map<std::string, PlantType> registry{
+#define SLS_PLANT(name) {#name, name##_type()},
+#include "sim_server/plants/plants.def"
+#undef SLS_PLANT
+  };
+  static const PlantType shared_library = shared_library_plant_type();
+  if (model.is_shared_library()) return shared_library;
+  const auto found = registry.find(model.name);
+  if (found == registry.end())
+    throw config::ConfigError("plant.model: expected " + config::list_models(config::plant_keys()) +
+                              ", got " + model.name);
+  return found->second;
+}
+
+std::vector<PlantOfVehicles> make_plants(const PlantType& type, const config::Scenario& fleet,
+                                         const std::vector<std::uint32_t>& ids) {
+  PlantSetup setup{fleet.plant, fleet.folder, {}};
+  for (const std::uint32_t id : ids) {
+    const config::Scenario alone = config::make_vehicle_scenario(fleet, id);
+    setup.vehicles.push_back({id, alone.vehicle, alone.plant.initial});
+  }
+  std::vector<PlantOfVehicles> plants;
+  if (type.moves == Moves::kAllVehicles) {
+    if (ids.size() != fleet.vehicles.size())
+      throw config::ConfigError("plant.model: expected a server of all " +
+                                std::to_string(fleet.vehicles.size()) + " vehicles, which '" +
+                                fleet.plant.model.name + "' moves together, got one of " +
+                                config::to_vehicle_ranges(ids));
+    plants.push_back({type.make(setup), std::vector<std::size_t>(ids.size()), {}});
+    std::iota(plants[0].vehicles.begin(), plants[0].vehicles.end(), 0);
+    return plants;
+  }
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    const PlantSetup one{setup.plant, setup.folder, {setup.vehicles[i]}};
+    plants.push_back({type.make(one), {i}, {}});
+  }
+  return plants;
+}
+
+void throw_not_finite(const std::string& quantity, std::int64_t step) {
+  throw std::runtime_error(quantity + " is not finite after step " + std::to_string(step) +
+                           " of the plant");
+}
+
+void check_finite(const Eigen::Vector3d& v, std::int64_t step, const char* x, const char* y,
+                  const char* z) {
+  if (!std::isfinite(v.x())) throw_not_finite(x, step);
+  if (!std::isfinite(v.y())) throw_not_finite(y, step);
+  if (!std::isfinite(v.z())) throw_not_finite(z, step);
+}
+
+void check_finite(const model::SlungLoadState& state, std::int64_t step) {
+  if (model::is_finite(state)) return;
+  check_finite(state.p_WQ, step, "quad_x_m", "quad_y_m", "quad_z_m");
+  check_finite(state.v_WQ, step, "quad_vx_m_s", "quad_vy_m_s", "quad_vz_m_s");
+  check_finite(state.p_WL, step, "load_x_m", "load_y_m", "load_z_m");
+  check_finite(state.v_WL, step, "load_vx_m_s", "load_vy_m_s", "load_vz_m_s");
+  if (!std::isfinite(state.rod.alpha)) throw_not_finite("alpha_rad", step);
+  if (!std::isfinite(state.rod.beta)) throw_not_finite("beta_rad", step);
+  if (!std::isfinite(state.rod.alpha_dot)) throw_not_finite("alpha_dot_rad_s", step);
+  throw_not_finite("beta_dot_rad_s", step);
+}
+
+}  // namespace sls::sim

@@ -1,0 +1,159 @@
+// A plant from a shared library of the user's own: sls_plant.h.
+#include <stdexcept>
+
+#include "common/plugin/shared_library.hpp"
+#include "common/plugin/tables.hpp"
+#include "sim_server/plants/plant.hpp"
+#include "sim_server/plants/shared_library/sls_plant.h"
+
+namespace sls::sim {
+namespace {
+
+using plugin::copy;
+using plugin::ErrorText;
+using plugin::to_vector;
+
+sls_plant_state make_initial(const config::InitialState& initial, double rod_length) {
+  const Eigen::Vector3d n_W = model::to_direction(initial.rod).n_W;
+  const bool is_load_placed = initial.placed == config::Body::kLoad;
+  const Eigen::Vector3d p_WQ = initial.position - (is_load_placed ? rod_length : 0.0) * n_W;
+  const model::SlungLoadState bodies =
+      model::make_state(p_WQ, initial.v_WQ, initial.rod, rod_length);
+  sls_plant_state state{};
+  state.size = sizeof state;
+  copy(bodies.p_WQ, state.quad_position_m);
+  copy(bodies.v_WQ, state.quad_velocity_m_s);
+  copy(bodies.p_WL, state.load_position_m);
+  copy(bodies.v_WL, state.load_velocity_m_s);
+  state.attitude_wb[0] = 1.0;
+  return state;
+}
+
+class SharedLibraryPlant : public Plant {
+ public:
+  explicit SharedLibraryPlant(const PlantSetup& setup)
+      : library_(setup.folder / setup.plant.model.name, setup.plant.model.place + ": plant.model"),
+        vehicle_id_(setup.vehicles[0].id),
+        functions_(load_functions()) {
+    const auto parameters = setup.plant.own.get<config::LibraryParameters>();
+    const model::SlungLoadParameters& vehicle = setup.vehicles[0].parameters;
+    sls_plant_setup given{};
+    given.size = sizeof given;
+    given.parameters = parameters.json.c_str();
+    given.vehicle_id = vehicle_id_;
+    given.step_s = 1e-9 * static_cast<double>(setup.plant.step_ns);
+    given.quad_mass_kg = vehicle.quad_mass;
+    given.load_mass_kg = vehicle.load_mass;
+    given.rod_length_m = vehicle.rod_length;
+    given.gravity_m_s2 = vehicle.gravity;
+    given.initial = make_initial(setup.vehicles[0].initial, vehicle.rod_length);
+    ErrorText error;
+    call_guarded(call("create"),
+                 [&] { plant_ = functions_.create(&given, error.data(), error.size()); });
+    if (!plant_)
+      throw config::ConfigError(parameters.describe_place(setup.plant.model, "plant") + ": " +
+                                library_.name() + ": " + error.text());
+    measurement_ = measure();
+  }
+  ~SharedLibraryPlant() override {
+    if (!plant_) return;
+    const plugin::CallGuard guard(call("destroy"));
+    functions_.destroy(plant_);
+  }
+  SharedLibraryPlant(const SharedLibraryPlant&) = delete;
+  SharedLibraryPlant& operator=(const SharedLibraryPlant&) = delete;
+
+  void advance(const std::vector<Eigen::Vector3d>& f_Q_W, std::int64_t steps) override {
+    check_finite(f_Q_W[0], steps_, "force_x_n", "force_y_n", "force_z_n");
+    ErrorText error;
+    int code = 1;
+    const plugin::Call advancing = call("advance");
+    call_guarded(advancing, [&] {
+      code = functions_.advance(plant_, f_Q_W[0].data(), steps, error.data(), error.size());
+    });
+    if (code != 0) throw std::runtime_error(advancing.describe() + ": " + error.text());
+    steps_ += steps;
+    measurement_ = measure();
+  }
+
+  const model::Measurement& measurement(std::size_t) const override { return measurement_; }
+
+  std::vector<Signal> signals() const override {
+    std::vector<Signal> signals;
+    for (std::uint32_t i = 0; i < functions_.signal_count; ++i)
+      signals.push_back({functions_.signal_names[i], functions_.signal_units[i]});
+    return signals;
+  }
+
+ private:
+  sls_plant_functions load_functions() const {
+    const auto entry =
+        reinterpret_cast<const sls_plant_functions* (*)()>(library_.find("sls_plant"));
+    const sls_plant_functions* functions = nullptr;
+    call_guarded(call("sls_plant"), [&] { functions = entry(); });
+    if (!functions) library_.fail("sls_plant() returned no table of functions");
+    plugin::check_size(library_, "sls_plant_functions", sizeof *functions, functions->size);
+    plugin::check_version(library_, SLS_PLANT_VERSION, functions->version);
+    plugin::check_size(library_, "sls_plant_setup", sizeof(sls_plant_setup), functions->setup_size);
+    plugin::check_size(library_, "sls_plant_state", sizeof(sls_plant_state), functions->state_size);
+    if (!functions->create || !functions->destroy || !functions->advance || !functions->measure)
+      library_.fail("expected create, destroy, advance and measure, got a null pointer for one");
+    if (functions->signal_count > SLS_PLANT_MAX_SIGNALS)
+      library_.fail("expected at most " + std::to_string(SLS_PLANT_MAX_SIGNALS) + " signals, got " +
+                    std::to_string(functions->signal_count));
+    for (std::uint32_t i = 0; i < functions->signal_count; ++i)
+      if (!functions->signal_names[i] || !functions->signal_units[i])
+        library_.fail("expected a name and a unit for signal " + std::to_string(i) + ", got none");
+    return *functions;
+  }
+
+  plugin::Call call(const char* function) const {
+    return {library_.name().c_str(), function, vehicle_id_, static_cast<std::uint64_t>(steps_)};
+  }
+
+  model::Measurement measure() const {
+    sls_plant_state state{};
+    state.size = sizeof state;
+    const plugin::Call measuring = call("measure");
+    call_guarded(measuring, [&] { functions_.measure(plant_, &state); });
+    model::Measurement measured =
+        model::make_state(to_vector(state.quad_position_m), to_vector(state.quad_velocity_m_s),
+                          to_vector(state.load_position_m), to_vector(state.load_velocity_m_s));
+    const double* q = state.attitude_wb;
+    measured.attitude.q_WB = Eigen::Quaterniond(q[0], q[1], q[2], q[3]);
+    measured.attitude.w_WB_B = to_vector(state.body_rates_rad_s);
+    measured.signals = Eigen::Map<const Eigen::VectorXd>(state.signals, functions_.signal_count);
+    const auto fail = [&](const std::string& defect) {
+      throw std::runtime_error(measuring.describe() + ": " + defect);
+    };
+    try {
+      check_finite(measured, steps_);
+    } catch (const std::runtime_error& error) {
+      fail(error.what());
+    }
+    constexpr double kUnitLength = 1e-6;  // what a normalised quaternion may be off
+    if (!(std::abs(measured.attitude.q_WB.norm() - 1.0) <= kUnitLength))
+      fail("expected a unit quaternion as attitude_wb, got one of length " +
+           std::to_string(measured.attitude.q_WB.norm()));
+    if (!measured.attitude.w_WB_B.allFinite()) fail("body_rates_rad_s is not finite");
+    if (!measured.signals.allFinite()) fail("a signal is not finite");
+    return measured;
+  }
+
+  const plugin::SharedLibrary library_;
+  const std::uint32_t vehicle_id_;
+  std::int64_t steps_ = 0;
+  const sls_plant_functions functions_;
+  void* plant_ = nullptr;
+  model::Measurement measurement_;
+};
+
+}  // namespace
+
+PlantType shared_library_plant_type() {
+  return {Moves::kOneVehicle, [](const PlantSetup& setup) -> std::unique_ptr<Plant> {
+            return std::make_unique<SharedLibraryPlant>(setup);
+          }};
+}
+
+}  // namespace sls::sim

@@ -1,0 +1,162 @@
+// The margin judged by brute force and, for small motions about hover, by linear theory.
+#include "closed_loop/delay_margin.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <complex>
+
+#include "closed_loop/flight.hpp"
+#include "tests/closed_loop/support.hpp"
+
+namespace sls::closed_loop::test {
+namespace {
+
+/// Delay at which small horizontal motions about hover neither grow nor decay, s. With the force
+/// F delayed by τ, ÿ = −g β and m L β̈ = −(m + m_L) g β − F of the plant, and the law's
+/// F = −(m + m_L) g β + m L n / g, n = −k_j y⁽³⁾ − k_a ÿ − k_v ẏ − k_p y, it is
+///   s⁴ + ω² s² + e^(−sτ) (k_j s³ + (k_a − ω²) s² + k_v s + k_p) = 0,   ω² = (m + m_L) g / (m L),
+/// on s = iw: the quotient of both parts has magnitude 1 there, and the delay turns it to −1.
+double calc_critical_delay(const model::SlungLoadParameters& vehicle) {
+  // LQR with q = 10 on a chain of four: design, section 4.
+  constexpr double kPosition = 3.1623, kVelocity = 8.4827, kAcceleration = 9.7962, kJerk = 5.4399;
+  const double omega_2 =
+      vehicle.total_mass() * vehicle.gravity / (vehicle.quad_mass * vehicle.rod_length);
+  const auto calc_loop = [&](double w) {
+    const std::complex<double> s(0.0, w);
+    return (kJerk * s * s * s + (kAcceleration - omega_2) * s * s + kVelocity * s + kPosition) /
+           (s * s * (s * s + omega_2));
+  };
+  double least = 1e9;
+  for (double w = 0.01; w < 50.0; w += 1e-3) {
+    if ((std::abs(calc_loop(w)) - 1.0) * (std::abs(calc_loop(w + 1e-3)) - 1.0) > 0.0) continue;
+    const double turn = std::fmod(std::arg(calc_loop(w)) + 3.0 * M_PI, 2.0 * M_PI);
+    least = std::min(least, turn / w);
+  }
+  return least;
+}
+
+/// Largest load error during [from, to) s.
+double calc_worst_error(const std::vector<FlownStep>& flight, double from, double to) {
+  double worst = 0.0;
+  for (const FlownStep& step : flight) {
+    const double time = 0.004 * static_cast<double>(step.step);
+    if (time >= from && time < to)
+      worst = std::max(worst, (step.truth.p_WL - step.answer.reference.position).norm());
+  }
+  return worst;
+}
+
+TEST(DelayMarginTest, SmallMotionsAboutHoverGrowFromTheDelayOfLinearTheoryOn) {
+  config::Scenario scenario = load("figure_eight");
+  scenario.plant.initial.position << 1e-6, 0.0, -0.5;  // so small that the motion stays linear
+  scenario.mission[0].reference = config::ConstantReference{{0.0, 0.0, -0.5}};
+  // By 20 s the other motions, with which the flight begins, have died away.
+  scenario.mission[0].leave = config::LeaveAfter{60'000'000'000};
+  // Holding the force for a period delays it by half a period more, on average.
+  const double critical = calc_critical_delay(scenario.vehicle) - 0.002;
+  const auto periods = static_cast<std::int64_t>(critical / 0.004);
+  ASSERT_EQ(periods, 57) << critical;  // 0.232 s
+  const auto calc_growth = [&](std::int64_t delay) {
+    const auto flight = fly(delay_command(scenario, delay));
+    return calc_worst_error(flight, 40.0, 60.0) / calc_worst_error(flight, 20.0, 40.0);
+  };
+  EXPECT_LT(calc_growth(periods), 1.0);
+  // Not the next period: that the hold delays by half a period is true to first order only.
+  EXPECT_GT(calc_growth(periods + 2), 1.0);
+}
+
+TEST(DelayMarginTest, EveryShorterDelayHoldsAndTheNextOneDoesNot) {
+  const config::Scenario scenario = load("matlab_setpoint_3");
+  const DelayMargin margin = find_delay_margin(scenario);
+  ASSERT_NE(margin.shortest_lost(), nullptr);
+  const std::int64_t lost = margin.shortest_lost()->periods;
+  EXPECT_EQ(margin.longest_held()->periods, lost - 1);
+  ASSERT_LT(lost, 20) << "flying every delay would take long";
+  for (std::int64_t periods = 0; periods <= lost; ++periods) {
+    Flight flight(delay_command(scenario, periods));
+    while (flight.fly_step()) continue;
+    EXPECT_EQ(flight.failure().empty(), periods < lost) << periods;
+  }
+}
+
+TEST(DelayMarginTest, TheScenariosOwnDelayIsPartOfIt) {
+  const config::Scenario scenario = load("matlab_setpoint_3");
+  const auto without = find_delay_margin(scenario);
+  const auto with = find_delay_margin(delay_command(scenario, 2));
+  EXPECT_EQ(with.shortest_lost()->periods, without.shortest_lost()->periods - 2);
+}
+
+TEST(DelayMarginTest, LosesTheLoadWhenItIsARodsLengthFurtherAwayThanWithoutDelay) {
+  // With 0.26 s the figure eight ends in oscillations of bounded size, and no fault.
+  const config::Scenario scenario = load("figure_eight");
+  const auto undelayed = fly(scenario), delayed = fly(delay_command(scenario, 65));
+  ASSERT_EQ(undelayed.size(), delayed.size());
+  const auto calc_error = [](const FlownStep& step) {
+    return (step.truth.p_WL - step.answer.reference.position).norm();
+  };
+  std::size_t lost = 0;
+  while (calc_error(delayed[lost]) - calc_error(undelayed[lost]) <= 1.0)
+    ASSERT_LT(++lost, delayed.size());
+
+  const DelayMargin margin = find_delay_margin(scenario);
+  EXPECT_EQ(margin.longest_held()->periods, 64);
+  const DelayedFlight& flight = *margin.shortest_lost();
+  EXPECT_EQ(flight.periods, 65);
+  EXPECT_EQ(flight.worst_error, calc_error(delayed[lost]));
+  EXPECT_EQ(std::lround(std::stod(flight.loss.substr(flight.loss.find(", at ") + 5)) / 0.004),
+            static_cast<long>(lost))
+      << flight.loss;
+}
+
+TEST(DelayMarginTest, RepeatsExactlyAndListsFlightsInOrderOfDelay) {
+  const config::Scenario scenario = load("matlab_setpoint_3");
+  const DelayMargin margin = find_delay_margin(scenario);
+  EXPECT_EQ(to_text(margin), to_text(find_delay_margin(scenario)));
+  for (std::size_t i = 1; i < margin.flights.size(); ++i)
+    EXPECT_LT(margin.flights[i - 1].periods, margin.flights[i].periods);
+  EXPECT_EQ(margin.flights.front().periods, 0);
+}
+
+TEST(DelayMarginTest, ErrorsAreThoseOfTheFlight) {
+  const config::Scenario scenario = load("short");
+  const auto flight = fly(delay_command(scenario, 4));
+  double worst = 0.0, sum = 0.0;
+  for (const FlownStep& step : flight) {
+    const double error = (step.truth.p_WL - step.answer.reference.position).norm();
+    worst = std::max(worst, error);
+    sum += error * error;
+  }
+  const DelayMargin margin = find_delay_margin(scenario);
+  ASSERT_EQ(margin.flights.at(3).periods, 4);
+  EXPECT_EQ(margin.flights[3].worst_error, worst);
+  EXPECT_EQ(margin.flights[3].rms_error, std::sqrt(sum / static_cast<double>(flight.size())));
+}
+
+TEST(DelayMarginTest, SaysSoWhereTheLoadIsNeverLost) {
+  // Within two seconds the force held from the start does no harm.
+  const DelayMargin margin = find_delay_margin(load("short"));
+  EXPECT_EQ(margin.shortest_lost(), nullptr);
+  EXPECT_EQ(margin.longest_held()->periods, 2500);
+  const std::string text = to_text(margin);
+  EXPECT_NE(text.find("\nholds with 10 s, the longest delay tried: the load was never lost\n"),
+            std::string::npos)
+      << text;
+}
+
+TEST(DelayMarginTest, AScenarioThatLosesTheLoadAnywayIsAnError) {
+  config::Scenario scenario = load("matlab_setpoint_3");
+  scenario.controller.force_limit_n = 100.0;
+  try {
+    find_delay_margin(scenario);
+    FAIL() << "no error";
+  } catch (const std::runtime_error& error) {
+    EXPECT_STREQ(
+        error.what(),
+        "the load is lost without any added delay: controller 'control_client' answered step "
+        "0 with a force beyond controller.force_limit_n: 116.04 N > 100 N, at 0 s");
+  }
+}
+
+}  // namespace
+}  // namespace sls::closed_loop::test

@@ -1,0 +1,107 @@
+// The program closed_loop: the same data and certificate as the three programs, and its errors.
+#include <gtest/gtest.h>
+
+#include <csignal>
+
+#include "tests/support/text.hpp"
+#include "tests/support/waiting.hpp"
+#include "tests/system/flight.hpp"
+
+namespace sls::test {
+namespace {
+
+std::string certificate_of(const std::filesystem::path& recording) {
+  return read_manifest(recording).at("certificate").get<std::string>();
+}
+
+std::vector<std::string> fly_in_process(const std::string& file, const std::filesystem::path& folder,
+                                        std::vector<std::string> flags = {}) {
+  flags.insert(flags.begin(), {program("closed_loop"), "--scenario", file, "--out", folder});
+  return flags;
+}
+
+class ClosedLoopProgramTest : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(ClosedLoopProgramTest, RecordsTheFilesAndTheCertificateOfTheThreePrograms) {
+  Flight flight(scenario(GetParam()));
+  const std::filesystem::path folder = flight.folder / "in_process";
+  Process alone(fly_in_process(scenario(GetParam()), folder));
+  EXPECT_EQ(alone.wait(), 0) << alone.output();
+  flight.expect_success();
+
+  const auto together = read_manifest(flight.recording()), apart = read_manifest(folder);
+  EXPECT_TRUE(apart.at("complete").get<bool>());
+  EXPECT_EQ(apart.at("certificate"), together.at("certificate"));
+  for (const char* key : {"outcome", "timing", "last_step", "scenario_sha256", "period_s", "mode"})
+    EXPECT_EQ(apart.at(key), together.at(key)) << key;
+  for (const char* name : {"state.csv", "reference.csv", "flight.csv", "scenario.yaml"})
+    EXPECT_EQ(read_file(folder / name), read_file(flight.recording() / name)) << name;
+  const Table ours(folder / "command.csv"), theirs(flight.recording() / "command.csv");
+  EXPECT_EQ(ours.names(), theirs.names());
+  EXPECT_EQ(ours.rows(), theirs.rows());
+  Process verify({program("sls_verify"), folder, flight.recording()});
+  EXPECT_EQ(verify.wait(), 0) << verify.output();
+}
+
+// One vehicle; a fleet that is left by radius; faults; another law.
+INSTANTIATE_TEST_SUITE_P(Scenarios, ClosedLoopProgramTest,
+                         ::testing::Values("short", "mixed_fleet", "faulty_figure_eight",
+                                           "figure_eight_pid"),
+                         [](const auto& info) { return std::string(info.param); });
+
+TEST(ClosedLoopErrorsTest, AFlightThatFailsSaysWhyAndItsRecordingIsNotComplete) {
+  TemporaryFolder folder;
+  const std::string file =
+      make_scenario(folder, {{"force_limit_n: 200", "force_limit_n: 10"}}, "figure_eight");
+  Process alone(fly_in_process(file, folder / "recording"));
+  EXPECT_EQ(alone.wait(), 1) << alone.output();
+  EXPECT_TRUE(holds(alone.output(),
+                    "error: step 0: controller 'control_client' answered step 0 with a force "
+                    "beyond controller.force_limit_n: "))
+      << alone.output();
+  const auto manifest = read_manifest(folder / "recording");
+  EXPECT_FALSE(manifest.at("complete").get<bool>());
+  EXPECT_EQ(manifest.at("outcome"), "failed");
+}
+
+TEST(ClosedLoopErrorsTest, AnInterruptedFlightClosesItsFiles) {
+  TemporaryFolder folder;
+  const std::string file = make_scenario(folder, {{"for_s: 32", "for_s: 100000"}}, "figure_eight");
+  Process alone(fly_in_process(file, folder / "recording"));
+  ASSERT_TRUE(wait_until([&] { return std::filesystem::exists(folder / "recording/state.csv"); }));
+  alone.send(SIGINT);
+  EXPECT_EQ(alone.wait(), 130) << alone.output();
+  const auto manifest = read_manifest(folder / "recording");
+  EXPECT_EQ(manifest.at("outcome"), "interrupted");
+  EXPECT_FALSE(manifest.at("complete").get<bool>());
+  EXPECT_TRUE(Table(folder / "recording/state.csv").is_well_formed());
+}
+
+TEST(ClosedLoopErrorsTest, AModelThatDoesNotExistIsRefusedWithTheListOfThose) {
+  TemporaryFolder folder;
+  const std::string file =
+      make_scenario(folder, {{"pendulum: ideal", "model: slungload"}}, "figure_eight");
+  Process alone(fly_in_process(file, folder / "recording"));
+  EXPECT_EQ(alone.wait(), 2) << alone.output();
+  EXPECT_TRUE(holds(alone.output(),
+                    "plant.model: expected analytic, slung_load or a shared library (a path ending "
+                    "in .so), got slungload; did you mean 'slung_load'?"))
+      << alone.output();
+  EXPECT_FALSE(std::filesystem::exists(folder / "recording"));
+}
+
+TEST(ClosedLoopErrorsTest, AKeyOfAnotherPlantIsRefusedWithItsOwner) {
+  TemporaryFolder folder;
+  const std::string file = make_scenario(
+      folder, {{"pendulum: ideal", "model: analytic\n  pendulum: ideal"}}, "figure_eight");
+  for (const char* name : {"closed_loop", "sim_server", "control_client"}) {
+    Process process({program(name), "--scenario", file});
+    EXPECT_EQ(process.wait(), 2) << process.output();
+    EXPECT_TRUE(holds(process.output(),
+                      "plant.pendulum: a key of model 'slung_load', here it is 'analytic'"))
+        << process.output();
+  }
+}
+
+}  // namespace
+}  // namespace sls::test

@@ -1,0 +1,31 @@
+#include <cstdio>
+#include <optional>
+
+#include "closed_loop/delay_margin.hpp"
+#include "common/app/run_main.hpp"
+#include "common/app/stop_signal.hpp"
+#include "common/config/scenario.hpp"
+
+int main(int argc, char** argv) {
+  using namespace sls;
+  CLI::App cli("Finds the delay of the command with which a scenario's controller loses the load.");
+  const app::CommonOptions options;  // no network here, and nothing to log but errors
+  std::filesystem::path scenario_file;
+  std::optional<double> period_s;
+  cli.set_version_flag("--version", app::version());
+  cli.add_option("--scenario", scenario_file, "scenario (YAML)")->type_name("FILE")->required();
+  cli.add_option("--period-s", period_s, "control period in force; default: the scenario's")
+      ->type_name("X");
+
+  return app::run_main(argc, argv, cli, options, "delay_margin", [&] {
+    config::Scenario scenario =
+        config::make_vehicle_scenario(config::load_scenario(scenario_file), 0);
+    if (period_s) config::override_period(scenario, *period_s);
+    const closed_loop::DelayMargin margin =
+        closed_loop::find_delay_margin(scenario, [](const closed_loop::DelayedFlight&) {
+          if (app::stop_signal() != 0) throw app::RunError("interrupted");
+        });
+    std::fputs(closed_loop::to_text(margin).c_str(), stdout);
+    if (std::fflush(stdout) != 0) throw app::RunError("the table could not be written to stdout");
+  });
+}
