@@ -1,5 +1,5 @@
 /// Decides what becomes of every command: the one that flies, or why not. No network here.
-/// Rules: design of the synchroniser in README.md.
+/// Rules: README.md, "Commands" and "Standby".
 #pragma once
 
 #include <array>

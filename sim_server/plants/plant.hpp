@@ -1,5 +1,5 @@
 /// What a plant is: moves one or several vehicles under held forces. A new one is a folder beside
-/// this file and a line in plants.def. README.md shows how. No DDS here.
+/// this file and a line in plants.def: README.md, "Adding a plant". No DDS here.
 #pragma once
 
 #include <Eigen/Core>

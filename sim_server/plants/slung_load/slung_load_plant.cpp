@@ -84,7 +84,7 @@ void check_finite(const Motion& motion, std::int64_t step) {
 
 }  // namespace
 
-/// The multibody system at one state. README.md, "Plant", says why forces and accelerations go
+/// The multibody system at one state. README.md, "Integration", says why forces and accelerations go
 /// through the operators of the matter subsystem and not through force elements and `realize`.
 struct SlungLoadPlant::Multibody {
   Multibody(const model::SlungLoadParameters& vehicle, const config::Plant& plant)
@@ -114,7 +114,7 @@ struct SlungLoadPlant::Multibody {
     const Eigen::Vector3d p_WQ = initial.placed == config::Body::kQuadrotor
                                      ? initial.position
                                      : initial.position - rod_length * rod.n_W;
-    // Its z axis is the rod: model/README.md, eq. (1).
+    // Its z axis is the rod: common/model/README.md, eq. (1).
     const SimTK::Rotation R_WL(SimTK::BodyRotationSequence, initial.rod.alpha, SimTK::XAxis,
                                initial.rod.beta, SimTK::YAxis);
     quadrotor.setQToFitTranslation(state, to_simtk(p_WQ));
@@ -149,7 +149,7 @@ struct SlungLoadPlant::Multibody {
     return f_Q_W + model::calc_rotor_drag(f_Q_W, v_WQ, config.air) + config.disturbance_W;
   }
 
-  /// Eq. (2) of README.md: u̇ = M⁻¹ Jᵀ (applied − centrifugal), and q̇ from u.
+  /// README.md, eq. (2): u̇ = M⁻¹ Jᵀ (applied − centrifugal), and q̇ from u.
   Motion calc_rate(const Eigen::Vector3d& f_Q_W) {
     const SimTK::MobilizedBodyIndex quadrotor_index = quadrotor.getMobilizedBodyIndex();
     const SimTK::MobilizedBodyIndex pendulum_index = pendulum.getMobilizedBodyIndex();
