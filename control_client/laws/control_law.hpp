@@ -1,5 +1,6 @@
 /// What a control law is: a pure function from what is measured, desired and remembered to a force.
-/// A new one is a folder beside this file and a line in laws.def. README.md shows how. No DDS here.
+/// A new one is a folder beside this file and a line in laws.def: README.md, "Adding a law". No DDS
+/// here.
 #pragma once
 
 #include <Eigen/Core>

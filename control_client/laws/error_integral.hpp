@@ -1,4 +1,5 @@
-/// The integral of the load position error. Source: README.md, eq. (10).
+/// The integral of the load position error. Source: control_client/laws/qsf/README.md,
+/// eq. (10).
 #pragma once
 
 #include <Eigen/Core>

@@ -1,1 +1,1 @@
-"""Figures, reports and the published comparison, from recordings. See README.md."""
+"""Figures, reports and the published comparison, from recordings. See python/README.md."""

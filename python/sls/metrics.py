@@ -1,4 +1,4 @@
-"""How well a flight followed its reference. Formulas: README.md, "Metrics"."""
+"""How well a flight followed its reference. Formulas: python/README.md, "Metrics"."""
 
 import math
 from dataclasses import dataclass, replace
