@@ -25,7 +25,7 @@ class BusError : public std::runtime_error {
 
 /// Makes the middleware ready and loads a QoS file into it: one for the whole process, because
 /// profiles are global there. A Node does it by itself; this is for who makes a participant of his
-/// own (doctor/observer.cpp).
+/// own (tools/doctor/observer.cpp).
 /// @throws config::ConfigError as Node does.
 void load_profiles(const std::filesystem::path& file, const std::string& identity);
 

@@ -1,0 +1,319 @@
+// The operator's end against a server that is played by the test, on a domain of the test's own.
+#include "tools/ctl/operator_client.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <functional>
+#include <sstream>
+#include <thread>
+
+#include "common/app/run_main.hpp"
+#include "tests/support/waiting.hpp"
+#include "tools/ctl/show_status.hpp"
+
+namespace sls::ctl {
+namespace {
+
+using namespace std::chrono_literals;
+using sls::test::wait_until;
+
+constexpr int kDomain = 78;
+const std::filesystem::path kQosFile = SLS_SOURCE_DIR "/config/qos/default.xml";
+
+// Another build's tests may use the same domain: numbers of this process alone.
+const std::uint64_t kRun = static_cast<std::uint64_t>(::getpid()) * 1000 + 500;
+const std::uint32_t kVehicle = static_cast<std::uint32_t>(::getpid()) * 10 + 4;
+
+/// Publishes a status every 20 ms and answers requests as it is told to.
+class FakeServer {
+ public:
+  using Answer = std::function<void(FakeServer&, const SimControl&)>;
+
+  explicit FakeServer(Answer answer, bool listens = true)
+      : node_(kQosFile, kDomain, "fake server"),
+        parameters_writer_(node_),
+        status_writer_(node_),
+        reply_writer_(node_),
+        requests_(64),
+        answer_(std::move(answer)) {
+    if (listens)
+      request_reader_.emplace(node_, bus::kLatchedReaderProfile,
+                              [this](const SimControl& request, const bus::PeerId&) {
+                                if (request.vehicle_id() == kVehicle) requests_.put(request);
+                              });
+    begin_run(kRun);
+    thread_ = std::thread([this] { work(); });
+  }
+
+  ~FakeServer() {
+    is_over_ = true;
+    thread_.join();
+  }
+
+  void begin_run(std::uint64_t run_id) {
+    Parameters parameters;
+    parameters.run_id(run_id);
+    parameters.vehicle_ids({kVehicle});
+    parameters.scenario_text("name: fake");
+    parameters.period_ns(4'000'000);
+    parameters_writer_.write(parameters);
+    run_id_ = run_id;
+  }
+
+  void reply(const SimControl& request, bool accepted, const std::string& reason = "") {
+    SimControlReply reply;
+    reply.run_id(request.run_id());
+    reply.vehicle_id(request.vehicle_id());
+    reply.request_id(request.request_id());
+    reply.accepted(accepted);
+    reply.reason(reason);
+    reply.step(step_);
+    reply_writer_.write(reply);
+  }
+
+  void publish(RunPhase now, const std::string& reason) {
+    SimStatus status;
+    status.run_id(run_id_);
+    status.vehicle_id(kVehicle);
+    status.sample_index(samples_++);
+    status.phase(now);
+    status.reason(reason);
+    status.step(step_);
+    status_writer_.write(status);
+  }
+
+  std::atomic<RunPhase> phase{PHASE_RUNNING};
+  std::atomic<bool> is_silent{false};
+  std::atomic<int> answered{0};
+
+ private:
+  void work() {
+    while (!is_over_) {
+      const auto request = requests_.take(std::chrono::steady_clock::now() + 20ms);
+      ++step_;
+      if (!is_silent) publish(phase, "as told");
+      if (!request) continue;
+      answer_(*this, *request);
+      ++answered;
+    }
+  }
+
+  bus::Node node_;
+  bus::Writer<Parameters> parameters_writer_;
+  bus::Writer<SimStatus> status_writer_;
+  bus::Writer<SimControlReply> reply_writer_;
+  app::Mailbox<SimControl> requests_;
+  std::optional<bus::Reader<SimControl>> request_reader_;
+  const Answer answer_;
+  std::atomic<std::uint64_t> run_id_{0};
+  std::atomic<std::uint64_t> samples_{0};
+  std::atomic<std::uint64_t> step_{100};
+  std::atomic<bool> is_over_{false};
+  std::thread thread_;
+};
+
+const FakeServer::Answer kAccept = [](FakeServer& server, const SimControl& request) {
+  server.reply(request, true);
+};
+const FakeServer::Answer kKeepSilent = [](FakeServer&, const SimControl&) {};
+
+ClientOptions make_options(double timeout_s) {
+  ClientOptions options;
+  options.domain = kDomain;
+  options.vehicle_id = kVehicle;
+  options.timeout_s = timeout_s;
+  return options;
+}
+
+class OperatorClientTest : public ::testing::Test {
+ protected:
+  // The limit only says when to call it a failure; tests that expect silence take a short one.
+  explicit OperatorClientTest(double timeout_s = 60.0) : client(node, make_options(timeout_s)) {}
+
+  std::string find_error(const std::function<void()>& act) {
+    try {
+      act();
+    } catch (const app::RunError& error) {
+      return error.what();
+    }
+    return "no error";
+  }
+
+  bus::Node node{kQosFile, kDomain, "operator"};
+  OperatorClient client;
+};
+
+class ImpatientClientTest : public OperatorClientTest {
+ protected:
+  ImpatientClientTest() : OperatorClientTest(1.0) {}
+
+  /// The run of a server that is there, however long its discovery takes.
+  bus::Run find_run() {
+    std::optional<bus::Run> run;
+    EXPECT_TRUE(wait_until([&] {
+      try {
+        run = client.wait_for_run();
+      } catch (const app::RunError&) {
+      }
+      return run.has_value();
+    }));
+    return run.value();
+  }
+};
+
+TEST_F(OperatorClientTest, ARequestReachesTheServerAndItsReplyComesBack) {
+  SimControl seen;
+  FakeServer server([&](FakeServer& self, const SimControl& request) {
+    seen = request;
+    self.reply(request, true);
+  });
+  const auto run = client.wait_for_run();
+  ASSERT_TRUE(run);
+  const auto reply = client.ask(*run, ACTION_STEP, 25);
+  ASSERT_TRUE(reply);
+  EXPECT_TRUE(reply->accepted());
+  EXPECT_GE(reply->step(), 100u);
+  ASSERT_TRUE(wait_until([&] { return server.answered == 1; }));
+  EXPECT_EQ(seen.run_id(), kRun);
+  EXPECT_EQ(seen.vehicle_id(), kVehicle);
+  EXPECT_EQ(seen.action(), ACTION_STEP);
+  EXPECT_EQ(seen.steps(), 25u);
+  EXPECT_EQ(seen.operator_name().to_string(), make_operator_name());
+}
+
+TEST_F(OperatorClientTest, ARefusalComesBackWithItsReason) {
+  FakeServer server([](FakeServer& self, const SimControl& request) {
+    SimControl of_another = request;  // replies to others are not taken for one's own
+    of_another.request_id(request.request_id() + 1);
+    self.reply(of_another, true);
+    self.reply(request, false, "already paused");
+  });
+  const auto reply = client.ask(client.wait_for_run().value(), ACTION_PAUSE);
+  ASSERT_TRUE(reply);
+  EXPECT_FALSE(reply->accepted());
+  EXPECT_EQ(reply->reason().to_string(), "already paused");
+}
+
+TEST_F(OperatorClientTest, ARunThatEndsBeforeItsReplyIsReported) {
+  FakeServer server([](FakeServer& self, const SimControl&) { self.phase = PHASE_FAILED; });
+  const auto run = client.wait_for_run().value();
+  EXPECT_EQ(find_error([&] { client.ask(run, ACTION_STEP, 10); }),
+            "no reply to step: the run has ended: failed, as told");
+}
+
+TEST_F(ImpatientClientTest, AServerThatDoesNotReplyIsReported) {
+  FakeServer server(kKeepSilent);
+  const auto run = find_run();
+  const std::string error = find_error([&] { client.ask(run, ACTION_PAUSE); });
+  EXPECT_EQ(error.rfind("no reply to pause from the server of run ", 0), 0u) << error;
+}
+
+TEST_F(ImpatientClientTest, AServerThatTakesNoRequestsIsReported) {
+  FakeServer server(kKeepSilent, false);
+  const auto run = find_run();
+  const std::string error = find_error([&] { client.ask(run, ACTION_PAUSE); });
+  EXPECT_NE(error.find("takes no requests: expected it on sls/control"), error.npos) << error;
+}
+
+TEST_F(ImpatientClientTest, StepsEndWithAServerThatFallsSilent) {
+  FakeServer server([](FakeServer& self, const SimControl&) { self.is_silent = true; });
+  const auto run = find_run();
+  const std::string error = find_error([&] { client.ask(run, ACTION_STEP, 10); });
+  EXPECT_EQ(error.rfind("no reply to step: server of run ", 0), 0u) << error;
+  EXPECT_NE(error.find("silent for "), error.npos) << error;
+}
+
+TEST_F(ImpatientClientTest, StepsMayTakeLongerThanTheTimeout) {
+  FakeServer server([](FakeServer& self, const SimControl& request) {
+    for (int i = 0; i < 100; ++i) {  // 2 s, twice the client's timeout
+      self.publish(PHASE_PAUSED, "stepping");
+      std::this_thread::sleep_for(20ms);
+    }
+    self.reply(request, true);
+  });
+  const auto run = find_run();
+  const auto reply = client.ask(run, ACTION_STEP, 10);
+  ASSERT_TRUE(reply);
+  EXPECT_TRUE(reply->accepted());
+}
+
+TEST_F(ImpatientClientTest, WithoutAServerDomainAndVehicleAreNamed) {
+  EXPECT_EQ(find_error([&] { client.wait_for_run(); }),
+            "no server for vehicle " + std::to_string(kVehicle) + " on domain 78 within 1 s");
+}
+
+TEST_F(OperatorClientTest, AnEndedRunTakesNoRequestsButHasAStatus) {
+  FakeServer server(kAccept);
+  server.phase = PHASE_FINISHED;
+  ASSERT_TRUE(wait_until([&] {
+    const auto run = client.wait_for_any_run();
+    return run && has_ended(run->status);
+  }));
+  std::ostringstream out;
+  show_status(client, ShowOptions(), out);
+  EXPECT_NE(out.str().find("phase       finished: as told\n"), std::string::npos) << out.str();
+}
+
+TEST_F(OperatorClientTest, AWatchWithoutTerminalWritesLinesUntilTheRunHasEnded) {
+  FakeServer server(kAccept);
+  std::ostringstream out;
+  ShowOptions options;
+  options.watch = true;
+  std::atomic<bool> is_over{false};
+  std::thread watching([&] {
+    show_status(client, options, out);
+    is_over = true;
+  });
+  EXPECT_TRUE(wait_until([&] { return client.wait_for_run().has_value(); }));
+  server.phase = PHASE_FINISHED;
+  EXPECT_TRUE(wait_until([&] { return is_over.load(); }));
+  watching.join();
+  const std::string text = out.str();
+  const std::string last_line = text.substr(text.rfind('\n', text.size() - 2) + 1);
+  EXPECT_NE(last_line.find("| finished: as told |"), text.npos) << text;
+  EXPECT_EQ(text.find('\x1b'), text.npos) << "no terminal, no escape sequences";
+}
+
+TEST_F(OperatorClientTest, AWatchFollowsAResetToItsSuccessor) {
+  FakeServer server(kAccept);
+  bus::Run run = client.wait_for_run().value();
+  server.phase = PHASE_RESET;
+  ASSERT_TRUE(wait_until([&] {
+    run = client.refresh(run);
+    return run.status->phase() == PHASE_RESET;
+  }));
+  server.begin_run(kRun + 1);
+  server.phase = PHASE_PAUSED;
+  EXPECT_TRUE(wait_until([&] {
+    run = client.refresh(run);
+    return run.parameters.run_id() == kRun + 1 && run.status->phase() == PHASE_PAUSED;
+  }));
+}
+
+TEST_F(OperatorClientTest, ASnapshotHoldsThePartiesOfTheRunAndTheServersSilence) {
+  FakeServer server(kAccept);
+  const auto run = client.wait_for_run().value();
+  bus::Writer<Participant> writer(node);
+  Participant participant;
+  participant.run_id(kRun);
+  participant.role(ROLE_RECORDER);
+  participant.name("tape");
+  writer.write(participant);
+  ASSERT_TRUE(wait_until([&] { return client.make_snapshot(run).participants.size() == 1; }));
+  EXPECT_TRUE(wait_until([&] { return client.make_snapshot(run).events.size() == 1; }));
+  EXPECT_NE(client.make_snapshot(run).events[0].find(": as told"), std::string::npos);
+  server.is_silent = true;
+  EXPECT_TRUE(wait_until([&] { return client.make_snapshot(run).silence_s > 0.2; }));
+  EXPECT_FALSE(client.make_snapshot(run).server_is_gone);
+}
+
+TEST(OperatorNameTest, SaysWhoAndWhereAndFitsTheWire) {
+  const std::string name = make_operator_name();
+  EXPECT_NE(name.find('@'), std::string::npos);
+  EXPECT_LE(name.size(), 64u);
+}
+
+}  // namespace
+}  // namespace sls::ctl

@@ -1,0 +1,171 @@
+#include "tools/doctor/diagnosis.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+namespace sls::doctor {
+namespace {
+
+/// A healthy network: a doctor and a server on another host.
+Observations make_healthy() {
+  Observations seen;
+  seen.qos_file = "lan.xml";
+  seen.user = "root";
+  seen.peer = "desk";
+  seen.peer_address = "10.0.0.2";
+  seen.is_peer_here = false;
+  seen.settings.uses_multicast = true;
+  seen.probes.is_tried = seen.probes.is_answered = seen.probes.is_answered_unasked = true;
+  seen.probes.is_multicast_answered = true;
+  seen.probes.sizes = {{1400, true}, {8000, true}};
+  seen.probes.clock_ahead = std::chrono::milliseconds(2);
+  seen.is_joined = true;
+  Program server;
+  server.name = "sim_server";
+  server.address = seen.peer_address;
+  server.is_expected = true;
+  server.samples = 3;
+  seen.programs = {server};
+  seen.echoes = {{200, true}};
+  return seen;
+}
+
+Observations make_healthy_with_shared_memory() {
+  Observations seen = make_healthy();
+  seen.settings.uses_shared_memory = true;
+  seen.settings.segment_size = 4'000'000;
+  seen.shared_memory.is_there = true;
+  seen.shared_memory.size = seen.shared_memory.free = 64'000'000;
+  seen.shared_memory.read_ports = {7411};
+  seen.programs.front().is_on_this_host = true;
+  seen.programs.front().user = "root";
+  seen.programs.front().shared_memory_ports = {7411};
+  return seen;
+}
+
+std::vector<std::string> find_faults(const Observations& seen) {
+  std::vector<std::string> names;
+  for (const Check& check : diagnose(seen))
+    if (check.verdict == Verdict::kFault) names.push_back(check.name);
+  return names;
+}
+
+using Names = std::vector<std::string>;
+
+TEST(DiagnosisTest, OfAHealthyNetworkFindsNothing) {
+  EXPECT_EQ(find_faults(make_healthy()), Names{});
+  EXPECT_EQ(find_faults(make_healthy_with_shared_memory()), Names{});
+}
+
+TEST(DiagnosisTest, MulticastIsBlamedOnlyWhereUnicastWorks) {
+  Observations seen = make_healthy();
+  seen.probes.is_multicast_answered = false;
+  EXPECT_EQ(find_faults(seen), Names{"multicast"});
+  seen.settings.uses_multicast = false;
+  EXPECT_EQ(find_faults(seen), Names{});
+}
+
+TEST(DiagnosisTest, PortsAreBlamedOnlyWhereTheHostIsUpAndNoDataPasses) {
+  Observations seen = make_healthy();
+  seen.settings.uses_multicast = false;
+  seen.probes = {};
+  seen.probes.is_tried = true;
+  EXPECT_EQ(find_faults(seen), Names{}) << "samples pass";
+  seen.programs.clear();
+  seen.echoes.clear();
+  seen.is_peer_up = true;
+  EXPECT_EQ(find_faults(seen), Names{"ports"});
+  seen.is_peer_up = false;
+  EXPECT_EQ(find_faults(seen), Names{"network"});
+}
+
+TEST(DiagnosisTest, AClockIsWrongFromATenthOfASecondOn) {
+  Observations seen = make_healthy();
+  seen.probes.clock_ahead = std::chrono::milliseconds(-99);
+  EXPECT_EQ(find_faults(seen), Names{});
+  seen.probes.clock_ahead = std::chrono::milliseconds(-101);
+  EXPECT_EQ(find_faults(seen), Names{"clock"});
+}
+
+TEST(DiagnosisTest, SharedMemoryNeedsRoomForAFlight) {
+  Observations seen = make_healthy_with_shared_memory();
+  seen.programs.clear();
+  seen.shared_memory.free = calc_shared_memory_need(seen.settings, 3);
+  EXPECT_TRUE(find_faults(seen) == Names{"domain"} || find_faults(seen).empty());
+  --seen.shared_memory.free;
+  EXPECT_EQ(find_faults(seen).front(), "shared memory");
+}
+
+TEST(DiagnosisTest, AProgramWithAnotherSharedMemoryIsSilentAndItsPortIsNotThere) {
+  Observations seen = make_healthy_with_shared_memory();
+  seen.shared_memory.read_ports = {};
+  EXPECT_EQ(find_faults(seen), Names{}) << "it started after we looked";
+  seen.programs.front().samples = 0;
+  EXPECT_EQ(find_faults(seen), (Names{"shared memory", "data"}));
+}
+
+TEST(DiagnosisTest, TwoUsersShareNoMemory) {
+  Observations seen = make_healthy_with_shared_memory();
+  seen.programs.front().user = "nobody";
+  EXPECT_EQ(find_faults(seen), Names{"users"});
+  seen.settings.uses_shared_memory = false;
+  EXPECT_EQ(find_faults(seen), Names{});
+}
+
+TEST(DiagnosisTest, AnotherFlightOnAnotherDomainIsNobodysFault) {
+  Observations seen = make_healthy();
+  Heard heard{5, seen.peer_address, {{}, "sim_server", false}};
+  seen.heard = {heard};
+  EXPECT_EQ(find_faults(seen), Names{});
+  seen.heard.front().announcement.name = "recorder";
+  EXPECT_EQ(find_faults(seen), Names{"domain"}) << "it has lost its server";
+}
+
+TEST(DiagnosisTest, WhoAnswersNoHandshakeRejectsUs) {
+  Observations seen = make_healthy();
+  seen.settings.is_secured = seen.programs.front().is_secured = true;
+  seen.refusal = "not allowed";
+  EXPECT_EQ(find_faults(seen), Names{"security"});
+  Endpoint endpoint;
+  endpoint.participant = seen.programs.front().id;
+  seen.endpoints = {endpoint};
+  EXPECT_EQ(find_faults(seen), Names{});
+  seen.programs.front().is_secured = false;
+  EXPECT_EQ(find_faults(seen), Names{"security"});
+}
+
+TEST(DiagnosisTest, CommandsInRealTimeHaveADeadlineOfTheirOwn) {
+  Observations seen = make_healthy();
+  Endpoint ours, theirs;
+  ours.topic = theirs.topic = "sls/command";
+  ours.is_writer = true;
+  ours.participant.bytes[0] = 1;
+  theirs.policies.deadline_ns = 100'000'000;
+  seen.own_endpoints = {ours};
+  seen.endpoints = {theirs};
+  EXPECT_EQ(find_faults(seen), Names{});
+  seen.endpoints.front().policies.reliability = 1;
+  EXPECT_EQ(find_faults(seen), Names{"qos"});
+}
+
+TEST(DiagnosisTest, WithoutAnotherFaultLostSamplesAreTheFault) {
+  Observations seen = make_healthy();
+  seen.programs.front().samples = 0;
+  EXPECT_EQ(find_faults(seen), Names{"data"});
+}
+
+TEST(CheckTest, ALineHoldsNameVerdictAndText) {
+  EXPECT_EQ(to_line({"ports", Verdict::kFault, "blocked"}), "ports         FAULT    blocked");
+}
+
+TEST(CheckTest, JsonStaysJsonWhateverANameHolds) {
+  const auto parsed = nlohmann::json::parse(
+      to_json({{"data", Verdict::kOk, "from \"x\xff\""}, {"ports", Verdict::kFault, "blocked"}}));
+  EXPECT_FALSE(parsed.at("ok").get<bool>());
+  EXPECT_EQ(parsed.at("checks").at(1).at("verdict"), "FAULT");
+}
+
+}  // namespace
+}  // namespace sls::doctor

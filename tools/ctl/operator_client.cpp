@@ -1,0 +1,218 @@
+#include "tools/ctl/operator_client.hpp"
+
+#include <pwd.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <random>
+#include <thread>
+#include <vector>
+
+#include "common/app/run_main.hpp"
+#include "common/app/stop_signal.hpp"
+#include "common/bus/names.hpp"
+
+namespace sls::ctl {
+namespace {
+
+using namespace std::chrono_literals;
+using Clock = std::chrono::steady_clock;
+
+constexpr auto kUsualWait = 1500ms;  // discovery and a server's claim: no news
+constexpr auto kPollTime = 20ms;
+constexpr auto kLastReplyTime = 1s;  // replies to open requests come around the end of a run
+constexpr std::size_t kMailboxSize = 256;
+constexpr std::size_t kEvents = 3;
+
+std::uint64_t make_request_id() {
+  std::random_device random;  // replies do not say to whom: ids must differ between operators, too
+  return (static_cast<std::uint64_t>(random()) << 32) | random();
+}
+
+}  // namespace
+
+OperatorClient::Channel::Channel(bus::Node& node, app::Mailbox<Received>& replies)
+    : reply_reader(node, bus::kLatchedReaderProfile,
+                   [&replies](const SimControlReply& reply, const bus::PeerId& sender) {
+                     replies.put({reply, sender});
+                   }),
+      request_writer(node) {}
+
+OperatorClient::OperatorClient(bus::Node& node, const ClientOptions& options)
+    : options_(options),
+      participants_(node),
+      servers_(node, [this](const SimStatus& status) { note_event(status); }),
+      replies_(kMailboxSize) {
+  if (options_.asks) channel_.emplace(node, replies_);
+}
+
+// --- finding a run -------------------------------------------------------------------------------
+
+std::optional<bus::Run> OperatorClient::wait_for_run() const {
+  return wait_for([this] { return servers_.find_joinable(options_.vehicle_id); });
+}
+
+std::optional<bus::Run> OperatorClient::wait_for_any_run() const {
+  return wait_for([this] {
+    const auto run = servers_.find_joinable(options_.vehicle_id);
+    return run ? run : find_ended_run();
+  });
+}
+
+std::optional<bus::Run> OperatorClient::wait_for(const FindRun& find) const {
+  app::Wait wait(options_.timeout_s, kUsualWait);
+  while (app::stop_signal() == 0) {
+    if (auto run = find()) return run;
+    if (wait.is_over())
+      throw app::RunError(fmt::format("no server for vehicle {} on domain {} within {} s",
+                                      options_.vehicle_id, options_.domain, options_.timeout_s));
+    if (wait.is_report_due())
+      spdlog::info("waiting for: server of vehicle {} on domain {} ({:.0f} s left)",
+                   options_.vehicle_id, options_.domain, wait.seconds_left());
+    std::this_thread::sleep_for(kPollTime);
+  }
+  return std::nullopt;
+}
+
+std::optional<bus::Run> OperatorClient::find_ended_run() const {
+  for (const bus::Run& run : servers_.runs())
+    if (run.status && bus::serves_vehicle(run.parameters, options_.vehicle_id)) return run;
+  return std::nullopt;
+}
+
+bus::Run OperatorClient::refresh(const bus::Run& run) const {
+  bus::Run last = run;
+  if (const auto status = servers_.find_status(run.parameters.run_id())) last.status = status;
+  if (has_ended(last.status)) return last;
+  return servers_.find_joinable(options_.vehicle_id).value_or(last);
+}
+
+Snapshot OperatorClient::make_snapshot(const bus::Run& run) const {
+  const std::uint64_t run_id = run.parameters.run_id();
+  Snapshot snapshot;
+  snapshot.parameters = run.parameters;
+  snapshot.vehicle_id = options_.vehicle_id;
+  snapshot.status = run.status;
+  snapshot.server_is_gone = !servers_.is_present(run.server);
+  if (const auto heard = servers_.find_last_heard(run_id))
+    snapshot.silence_s = std::chrono::duration<double>(Clock::now() - *heard).count();
+  {
+    const std::lock_guard lock(events_mutex_);
+    const auto events = events_.find(run_id);
+    if (events != events_.end())
+      snapshot.events.assign(events->second.lines.begin(), events->second.lines.end());
+  }
+  for (const auto role : {ROLE_CONTROLLER, ROLE_RECORDER})
+    for (const auto& entry : participants_.find(role, run_id))
+      snapshot.participants.push_back(entry.announcement);
+  return snapshot;
+}
+
+void OperatorClient::note_event(const SimStatus& status) {
+  const std::string reason = status.reason().to_string();
+  const std::lock_guard lock(events_mutex_);
+  Events& events = events_[status.run_id()];
+  if (reason.empty() || reason == events.last_reason) return;
+  events.last_reason = reason;
+  events.lines.push_back(fmt::format("step {}: {}", status.step(), reason));
+  if (events.lines.size() > kEvents) events.lines.pop_front();
+}
+
+// --- asking --------------------------------------------------------------------------------------
+
+std::optional<SimControlReply> OperatorClient::ask(const bus::Run& run, ControlAction action,
+                                                   std::uint64_t steps) {
+  SimControl request;
+  request.run_id(run.parameters.run_id());
+  request.vehicle_id(options_.vehicle_id);
+  request.request_id(make_request_id());
+  request.operator_name(make_operator_name());
+  request.action(action);
+  request.steps(steps);
+
+  app::Wait wait(options_.timeout_s, kUsualWait);
+  if (!wait_until_heard(run, wait)) return std::nullopt;
+  channel_->request_writer.write(request);
+  const bool takes_its_time = action == ACTION_STEP;
+  bus::ServerWatch server(servers_, run, options_.timeout_s);
+  std::optional<Clock::time_point> give_up;  // once the run has ended
+  while (app::stop_signal() == 0) {
+    const auto received = replies_.take(Clock::now() + kPollTime);
+    if (received && received->sender == run.server &&
+        received->reply.request_id() == request.request_id())
+      return received->reply;
+
+    const auto status = servers_.find_status(run.parameters.run_id());
+    if (bus::calc_progress(status) < 0 && !give_up) give_up = Clock::now() + kLastReplyTime;
+    if (give_up && Clock::now() >= *give_up)
+      throw app::RunError(fmt::format("no reply to {}: the run has ended: {}, {}",
+                                      to_string(action), bus::to_string(status->phase()),
+                                      status->reason().c_str()));
+    if (server.look() == bus::ServerWatch::Finding::kLost)
+      throw app::RunError(fmt::format("no reply to {}: {}", to_string(action), server.describe()));
+    if (!takes_its_time && wait.is_over())
+      throw app::RunError(fmt::format("no reply to {} from the server of run {:016x} within {} s",
+                                      to_string(action), run.parameters.run_id(),
+                                      options_.timeout_s));
+    if (wait.is_report_due()) report_wait(run, request, wait);
+  }
+  return std::nullopt;
+}
+
+bool OperatorClient::wait_until_heard(const bus::Run& run, app::Wait& wait) const {
+  while (channel_->request_writer.matched().count(run.server) == 0 ||
+         channel_->reply_reader.matched().count(run.server) == 0) {
+    if (app::stop_signal() != 0) return false;
+    if (wait.is_over())
+      throw app::RunError(
+          fmt::format("the server of run {:016x} takes no requests: expected it on sls/control and "
+                      "sls/control_reply within {} s",
+                      run.parameters.run_id(), options_.timeout_s));
+    if (wait.is_report_due())
+      spdlog::info("waiting for: server of run {:016x} to take requests ({:.0f} s left)",
+                   run.parameters.run_id(), wait.seconds_left());
+    std::this_thread::sleep_for(kPollTime);
+  }
+  return true;
+}
+
+void OperatorClient::report_wait(const bus::Run& run, const SimControl& request,
+                                 const app::Wait& wait) const {
+  if (request.action() != ACTION_STEP) {
+    spdlog::info("waiting for: reply of the server ({:.0f} s left)", wait.seconds_left());
+    return;
+  }
+  // A paused run's last status says where the steps began.
+  const auto status = servers_.find_status(request.run_id());
+  const std::uint64_t begin = run.status ? run.status->step() : 0;
+  const std::uint64_t now = status ? std::max(status->step(), begin) : begin;
+  spdlog::info("waiting for: {} steps ({} done, at step {})", request.steps(),
+               std::min(now - begin, request.steps()), now);
+}
+
+std::string make_operator_name() {
+  const passwd* user = getpwuid(geteuid());
+  const std::string name = user ? user->pw_name : std::to_string(geteuid());
+  return (name + "@" + bus::host_name()).substr(0, 64);
+}
+
+const char* to_string(ControlAction action) {
+  switch (action) {
+    case ACTION_START:
+      return "start";
+    case ACTION_PAUSE:
+      return "pause";
+    case ACTION_STEP:
+      return "step";
+    case ACTION_RESUME:
+      return "resume";
+    case ACTION_RESET:
+      return "reset";
+    case ACTION_STOP:
+      return "stop";
+  }
+  return "unknown";
+}
+
+}  // namespace sls::ctl

@@ -1,0 +1,64 @@
+#include "tools/ctl/options.hpp"
+
+#include <charconv>
+#include <string>
+#include <system_error>
+
+namespace sls::ctl {
+namespace {
+
+constexpr double kShortestTimeout = 0.1;  // s
+constexpr double kLongestTimeout = 86400;
+
+std::string check_timeout(const std::string& text) {
+  double timeout_s = 0.0;
+  const bool is_number = CLI::detail::lexical_cast(text, timeout_s);
+  if (is_number && timeout_s >= kShortestTimeout && timeout_s <= kLongestTimeout) return "";
+  return "expected " + std::to_string(kShortestTimeout).substr(0, 3) + " to " +
+         std::to_string(static_cast<int>(kLongestTimeout)) + ", got " + text;
+}
+
+std::string check_steps(const std::string& text) {
+  std::uint64_t steps = 0;  // CLI11 alone takes -1 for a very large number
+  const char* end = text.data() + text.size();
+  const auto [rest, error] = std::from_chars(text.data(), end, steps);
+  const bool is_count = error == std::errc() && rest == end && steps >= 1;
+  return is_count ? "" : "expected a whole number, at least 1, got " + text;
+}
+
+}  // namespace
+
+void add_options(CLI::App& cli, Options& options) {
+  app::add_common_options(cli, options.common);
+  cli.add_option("--vehicle", options.vehicle_id, "vehicle whose run is meant")->type_name("N");
+  cli.add_option("--timeout-s", options.timeout_s, "for a server to be found, and for its reply")
+      ->type_name("X")
+      ->check(check_timeout);
+  cli.require_subcommand(0, 1);  // not 1: that would hide which word is no command
+  cli.callback([&cli] {
+    if (cli.get_subcommands().empty())
+      throw CLI::RequiredError("pause, step, resume, start, reset, stop or status");
+  });
+  cli.fallthrough();  // the flags above may stand after the subcommand, too
+
+  const auto add_action = [&](const char* name, ControlAction action, const char* description) {
+    auto* subcommand = cli.add_subcommand(name, description);
+    subcommand->callback([&options, action] { options.action = action; });
+    return subcommand;
+  };
+  add_action("pause", ACTION_PAUSE, "hold a running run after the step in work");
+  add_action("step", ACTION_STEP, "let a paused run go N steps and wait until they are done")
+      ->add_option("N", options.steps, "control periods, at least 1")
+      ->required()
+      ->default_str("")
+      ->check(check_steps);
+  add_action("resume", ACTION_RESUME, "let a paused run go on");
+  add_action("start", ACTION_START, "the same, for a run that is paused before its first step");
+  add_action("reset", ACTION_RESET, "begin again from step 0 with another run_id");
+  add_action("stop", ACTION_STOP, "end the run");
+  auto* status = cli.add_subcommand("status", "print what the run does");
+  status->add_flag("--watch", options.watch, "again and again, until the run has ended");
+  status->add_flag("--json", options.json, "one JSON object per line");
+}
+
+}  // namespace sls::ctl

@@ -1,0 +1,32 @@
+/// What the doctor says: one line per check.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace sls::doctor {
+
+enum class Verdict {
+  kOk,
+  kFault,
+  kSkipped,  ///< could not be tried, or does not matter to this QoS file
+};
+
+struct Check {
+  std::string name;  ///< "multicast"
+  Verdict verdict = Verdict::kOk;
+  std::string text;  ///< the fact; of a fault also what follows from it, and what to do
+};
+
+bool is_any_fault(const std::vector<Check>& checks);
+
+/// One line: name, verdict, text.
+std::string to_line(const Check& check);
+
+/// {"ok": false, "checks": [{"name": "multicast", "verdict": "FAULT", "text": "…"}, …]}
+std::string to_json(const std::vector<Check>& checks);
+
+/// "a", "a and b", "a, b and c".
+std::string join(const std::vector<std::string>& words);
+
+}  // namespace sls::doctor

@@ -1,0 +1,43 @@
+#include "tools/doctor/diagnosis.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "tools/doctor/diagnosis_parts.hpp"
+
+namespace sls::doctor {
+namespace {
+
+constexpr std::array<const char*, 4> kFlying = {"sim_server", "control_client", "recorder",
+                                                "sim_ctl"};
+
+}  // namespace
+
+bool Observations::is_met(const bus::PeerId& id) const {
+  return std::any_of(endpoints.begin(), endpoints.end(),
+                     [&](const Endpoint& endpoint) { return endpoint.participant == id; });
+}
+
+bool Observations::is_rejected(const bus::PeerId& id) const {
+  return std::any_of(programs.begin(), programs.end(), [&](const Program& program) {
+    return program.id == id && program.is_rejected;
+  });
+}
+
+bool is_flying(const std::string& name) {
+  return std::find(kFlying.begin(), kFlying.end(), name) != kFlying.end();
+}
+
+std::uint64_t calc_shared_memory_need(const Settings& settings, int programs) {
+  constexpr std::uint64_t kPerProgram = 1'000'000;  // bytes: its ports and bookkeeping
+  return static_cast<std::uint64_t>(programs) * (settings.segment_size + kPerProgram);
+}
+
+std::vector<Check> diagnose(const Observations& seen) {
+  std::vector<Check> checks = check_machine(seen);
+  const std::vector<Check> further = check_domain(seen, is_any_fault(checks));
+  checks.insert(checks.end(), further.begin(), further.end());
+  return checks;
+}
+
+}  // namespace sls::doctor

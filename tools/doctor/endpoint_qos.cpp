@@ -1,0 +1,107 @@
+#include "tools/doctor/endpoint_qos.hpp"
+
+#include <slsPubSubTypes.h>
+
+#include <fastdds/dds/publisher/qos/DataWriterQos.hpp>
+#include <fastdds/dds/publisher/qos/PublisherQos.hpp>
+#include <fastdds/dds/subscriber/qos/DataReaderQos.hpp>
+#include <fastdds/dds/subscriber/qos/SubscriberQos.hpp>
+#include <fastdds/dds/topic/qos/TopicQos.hpp>
+
+#include "common/bus/topics.hpp"
+
+namespace sls::doctor {
+namespace {
+
+namespace dds = eprosima::fastdds::dds;
+
+std::int64_t to_ns(const eprosima::fastrtps::Duration_t& duration) {
+  return duration == eprosima::fastrtps::c_TimeInfinite ? kForeverNs : duration.to_ns();
+}
+
+template <class Qos>
+Policies convert(const Qos& qos) {
+  return {qos.m_reliability.kind == dds::RELIABLE_RELIABILITY_QOS ? 1 : 0,
+          static_cast<int>(qos.m_durability.kind),
+          to_ns(qos.m_deadline.period),
+          static_cast<int>(qos.m_liveliness.kind),
+          to_ns(qos.m_liveliness.lease_duration),
+          static_cast<int>(qos.m_ownership.kind),
+          qos.m_partition.names()};
+}
+
+/// Makes the endpoints of one topic after another.
+class Maker {
+ public:
+  Maker(dds::Publisher& publisher, dds::Subscriber& subscriber, const std::string& file)
+      : publisher_(publisher), subscriber_(subscriber), file_(file) {}
+
+  template <class Message, class PubSubType>
+  void add() {
+    PubSubType type;
+    Endpoint endpoint;
+    endpoint.topic = bus::Topic<Message>::kName;
+    endpoint.type = type.getName();
+    endpoint.max_size = type.m_typeSize;
+    const bus::Flow flow = bus::Topic<Message>::kFlow;
+    add_writer(endpoint, bus::find_writer_profile(flow));
+    if (flow == bus::Flow::kLatched) {
+      add_reader(endpoint, bus::kLatchedReaderProfile);
+    } else {
+      add_reader(endpoint, flow == bus::Flow::kFleet ? bus::kFleetRecorderReaderProfile
+                                                     : bus::kRecorderReaderProfile);
+      add_reader(endpoint, flow == bus::Flow::kFleet ? bus::kFleetLoopReaderProfile
+                                                     : bus::kLoopReaderProfile);
+    }
+  }
+
+  std::vector<Endpoint> made;
+
+ private:
+  void add_writer(Endpoint endpoint, const char* profile) {
+    dds::DataWriterQos qos;
+    publisher_.get_datawriter_qos_from_profile(profile, qos);
+    endpoint.is_writer = true;
+    endpoint.owner = std::string(profile) + " of " + file_;
+    endpoint.participant.bytes[0] = 1;  // another one than the readers'
+    endpoint.policies = to_policies(qos.get_writerqos(publisher_.get_qos(), dds::TopicQos()));
+    made.push_back(std::move(endpoint));
+  }
+
+  void add_reader(Endpoint endpoint, const char* profile) {
+    dds::DataReaderQos qos;
+    subscriber_.get_datareader_qos_from_profile(profile, qos);
+    endpoint.owner = std::string(profile) + " of " + file_;
+    endpoint.max_size = 0;
+    endpoint.policies = to_policies(qos.get_readerqos(subscriber_.get_qos()));
+    made.push_back(std::move(endpoint));
+  }
+
+  dds::Publisher& publisher_;
+  dds::Subscriber& subscriber_;
+  const std::string file_;
+};
+
+}  // namespace
+
+Policies to_policies(const dds::WriterQos& qos) { return convert(qos); }
+Policies to_policies(const dds::ReaderQos& qos) { return convert(qos); }
+
+std::vector<Endpoint> make_own_endpoints(dds::Publisher& publisher, dds::Subscriber& subscriber,
+                                         const std::string& file) {
+  Maker maker(publisher, subscriber, file);
+  maker.add<VehicleState, VehicleStatePubSubType>();
+  maker.add<ControlCommand, ControlCommandPubSubType>();
+  maker.add<Reference, ReferencePubSubType>();
+  maker.add<FleetState, FleetStatePubSubType>();
+  maker.add<FleetCommand, FleetCommandPubSubType>();
+  maker.add<FleetReference, FleetReferencePubSubType>();
+  maker.add<Participant, ParticipantPubSubType>();
+  maker.add<Parameters, ParametersPubSubType>();
+  maker.add<SimStatus, SimStatusPubSubType>();
+  maker.add<SimControl, SimControlPubSubType>();
+  maker.add<SimControlReply, SimControlReplyPubSubType>();
+  return maker.made;
+}
+
+}  // namespace sls::doctor

@@ -1,0 +1,37 @@
+#include "tools/doctor/listening_post.hpp"
+
+namespace sls::doctor {
+namespace {
+
+constexpr int kMaxDomain = 232, kMaxPort = 65535;
+
+}  // namespace
+
+ListeningPost::ListeningPost(Ports ports) {
+  const auto interfaces = find_interfaces();
+  for (ports.domain = 0; ports.domain <= kMaxDomain; ++ports.domain) {
+    if (ports.multicast() > kMaxPort) break;
+    UdpSocket socket;
+    if (!socket.bind(kMulticastGroup, ports.multicast(), true)) continue;  // somebody's alone
+    // The kernel hands a group to every socket on the port once one of them has joined it.
+    if (sockets_.empty()) socket.join(kMulticastGroup, interfaces);
+    sockets_.emplace_back(ports.domain, std::move(socket));
+  }
+}
+
+void ListeningPost::work() {
+  for (auto& [domain, socket] : sockets_)
+    while (const auto received = socket.receive(buffer_))
+      if (auto announcement = parse_announcement(buffer_.data(), received->size)) {
+        const auto key = std::make_pair(domain, announcement->id);
+        heard_[key] = {domain, to_string(received->sender.sin_addr), std::move(*announcement)};
+      }
+}
+
+std::vector<Heard> ListeningPost::heard() const {
+  std::vector<Heard> all;
+  for (const auto& [key, heard] : heard_) all.push_back(heard);
+  return all;
+}
+
+}  // namespace sls::doctor

@@ -1,0 +1,54 @@
+#include <spdlog/spdlog.h>
+
+#include <cstdio>
+
+#include "common/app/run_main.hpp"
+#include "common/app/stop_signal.hpp"
+#include "common/bus/qos_file.hpp"
+#include "tools/doctor/doctor.hpp"
+
+int main(int argc, char** argv) {
+  using namespace sls;
+  CLI::App cli("Finds out why data does not flow: moves datagrams and samples over each path.");
+  app::CommonOptions options;
+  options.qos_file = bus::default_qos_file();
+  doctor::DoctorOptions examination;
+  bool is_json = false, is_answering = false;
+  int seconds = 60;
+  app::add_common_options(cli, options);
+  auto* peer = cli.add_option("--peer", examination.peer,
+                              "another machine, where programs or sls_doctor --answer run; "
+                              "without it: this machine")
+                   ->type_name("HOST");
+  cli.add_option("--identity", examination.identity, "whose keys it uses on a secured domain")
+      ->type_name("NAME");
+  auto* json = cli.add_flag("--json", is_json, "print JSON instead of lines");
+  auto* answer = cli.add_flag("--answer", is_answering, "answer the doctor of another machine")
+                     ->excludes(peer)
+                     ->excludes(json);
+  cli.add_option("--for-s", seconds, "how long --answer stays, s")
+      ->type_name("S")
+      ->check(CLI::Range(1, 3600))
+      ->needs(answer);
+
+  return app::run_main(argc, argv, cli, options, "sls_doctor", [&] {
+    examination.qos_file = options.qos_file;
+    examination.domain = options.domain;
+    const auto is_stopped = [] { return app::stop_signal() != 0; };
+    if (is_answering) {
+      spdlog::info("answering on domain {} for {} s", examination.domain, seconds);
+      doctor::answer(examination, std::chrono::seconds(seconds), is_stopped);
+      return;
+    }
+    const auto checks = doctor::examine(examination, is_stopped);
+    if (is_stopped()) return;
+    if (is_json)
+      std::puts(doctor::to_json(checks).c_str());
+    else
+      for (const auto& check : checks) std::puts(doctor::to_line(check).c_str());
+    std::vector<std::string> faults;
+    for (const auto& check : checks)
+      if (check.verdict == doctor::Verdict::kFault) faults.push_back(check.name);
+    if (!faults.empty()) throw app::RunError("something is wrong: " + doctor::join(faults));
+  });
+}

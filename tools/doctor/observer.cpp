@@ -1,0 +1,361 @@
+#include "tools/doctor/observer.hpp"
+
+#include <doctorPubSubTypes.h>
+#include <fastrtps/utils/IPLocator.h>
+#include <slsPubSubTypes.h>
+#include <fastdds/dds/domain/DomainParticipant.hpp>
+#include <fastdds/dds/domain/DomainParticipantFactory.hpp>
+#include <fastdds/dds/publisher/DataWriter.hpp>
+#include <fastdds/dds/publisher/DataWriterListener.hpp>
+#include <fastdds/dds/publisher/Publisher.hpp>
+#include <fastdds/dds/subscriber/DataReader.hpp>
+#include <fastdds/dds/subscriber/DataReaderListener.hpp>
+#include <fastdds/dds/subscriber/SampleInfo.hpp>
+#include <fastdds/dds/subscriber/Subscriber.hpp>
+
+#include <algorithm>
+#include <array>
+#include <mutex>
+#include <random>
+#include <set>
+#include <utility>
+
+#include "common/bus/middleware_log.hpp"
+#include "common/bus/node.hpp"
+#include "common/bus/participant_listener.hpp"
+#include "common/bus/stale_segments.hpp"
+#include "common/bus/topics.hpp"
+#include "common/config/config_error.hpp"
+#include "tools/doctor/endpoint_qos.hpp"
+#include "tools/doctor/participant_qos.hpp"
+#include "tools/doctor/udp_socket.hpp"
+
+namespace sls::doctor {
+namespace {
+
+namespace dds = eprosima::fastdds::dds;
+namespace rtps = eprosima::fastrtps::rtps;
+using eprosima::fastrtps::types::ReturnCode_t;
+using Clock = std::chrono::steady_clock;
+
+constexpr const char* kDoctorTopic = "sls/doctor";
+constexpr std::array<std::uint32_t, 3> kEchoSizes = {200, 8000, 60000};
+
+/// What a late joiner is told comes at once; a sample that arrives later was written meanwhile.
+constexpr auto kHistoryTime = std::chrono::seconds(1);
+
+/// So that `peer` is found without multicast, too: otherwise a network without it would hide
+/// everything else that is to be seen.
+void add_peer(dds::DomainParticipantQos& qos, const Ports& ports, const std::string& peer) {
+  auto& builtin = qos.wire_protocol().builtin;
+  if (builtin.discovery_config.discoveryProtocol != rtps::DiscoveryProtocol::SIMPLE) return;
+  rtps::Locator_t locator;
+  locator.kind = LOCATOR_KIND_UDPv4;
+  if (uses_default_multicast(qos)) {
+    rtps::IPLocator::setIPv4(locator, kMulticastGroup);
+    locator.port = static_cast<std::uint32_t>(ports.multicast());
+    builtin.initialPeersList.push_back(locator);
+  }
+  rtps::IPLocator::setIPv4(locator, peer);
+  for (int id = 0; id <= kHighestProbeId; ++id) {
+    locator.port = static_cast<std::uint32_t>(ports.metatraffic(id));
+    builtin.initialPeersList.push_back(locator);
+  }
+}
+
+bus::PeerId to_peer(const rtps::GUID_t& guid) {
+  bus::PeerId peer;
+  std::copy(std::begin(guid.guidPrefix.value), std::end(guid.guidPrefix.value), peer.bytes.begin());
+  return peer;
+}
+
+bus::PeerId to_peer(const dds::InstanceHandle_t& handle) {
+  rtps::GUID_t guid;
+  rtps::iHandle2GUID(guid, handle);
+  return to_peer(guid);
+}
+
+std::string find_property(const rtps::ParticipantProxyData& data, const char* name) {
+  auto& properties = const_cast<dds::ParameterPropertyList_t&>(data.m_properties);  // no const find
+  for (auto property = properties.begin(); property != properties.end(); ++property)
+    if (property->first() == name) return property->second();
+  return {};
+}
+
+std::uint64_t choose_nonce() {
+  std::random_device source;
+  return std::uint64_t{source()} << 32 | source();
+}
+
+}  // namespace
+
+struct Observer::Impl : bus::ParticipantListener {
+  /// A reader of one of the topics that tell a late joiner, and when each participant's was
+  /// matched.
+  struct Listener : dds::DataReaderListener {
+    explicit Listener(Impl& observer) : impl(observer) {}
+    void on_subscription_matched(dds::DataReader*,
+                                 const dds::SubscriptionMatchedStatus& status) override {
+      const std::lock_guard lock(impl.mutex);
+      const bus::PeerId peer = to_peer(status.last_publication_handle);
+      if (status.current_count_change > 0) matched.emplace(peer, Clock::now());
+    }
+    Impl& impl;
+    std::map<bus::PeerId, Clock::time_point> matched;
+  };
+
+  template <class Message>
+  struct Told : Listener {
+    using Listener::Listener;
+    void on_data_available(dds::DataReader* reader) override {
+      dds::SampleInfo info;
+      while (reader->take_next_sample(&buffer, &info) == ReturnCode_t::RETCODE_OK) {
+        if (!info.valid_data) continue;
+        const std::lock_guard lock(this->impl.mutex);
+        this->impl.note_sample(*this, info);
+      }
+    }
+    Message buffer;
+  };
+
+  struct Echo : dds::DataReaderListener {
+    explicit Echo(Impl& observer) : impl(observer) {}
+    void on_data_available(dds::DataReader* reader) override {
+      dds::SampleInfo info;
+      while (reader->take_next_sample(&buffer, &info) == ReturnCode_t::RETCODE_OK) {
+        if (!info.valid_data || buffer.payload().size() != buffer.size()) continue;
+        const std::lock_guard lock(impl.mutex);
+        if (!buffer.is_answer() && impl.options.is_answering)
+          impl.questions.push_back(buffer);
+        else if (buffer.is_answer() && buffer.nonce() == impl.nonce)
+          impl.echoes[buffer.size()] = true;
+      }
+    }
+    Impl& impl;
+    DoctorProbe buffer;
+  };
+
+  Impl(const Options& wanted, dds::DomainParticipantQos qos)
+      : bus::ParticipantListener(is_secured(qos)), options(wanted) {
+    const Ports ports = find_ports(qos, options.domain);
+    qos.name(kDoctorName);
+    if (!options.peer_address.empty()) add_peer(qos, ports, options.peer_address);
+    auto& wire = qos.wire_protocol();
+    if (wire.participant_id < 0)
+      wire.participant_id =
+          bus::choose_participant_id({ports.metatraffic(0), ports.participant_gain});
+    bus::MiddlewareLog::clear();
+    auto* factory = dds::DomainParticipantFactory::get_instance();
+    participant = factory->create_participant(static_cast<std::uint32_t>(options.domain), qos, this,
+                                              dds::StatusMask::none());
+    if (!participant)
+      throw bus::BusError("domain " + std::to_string(options.domain) +
+                          ": cannot join: " + bus::MiddlewareLog::find_first_error());
+    publisher = participant->create_publisher(dds::PUBLISHER_QOS_DEFAULT);
+    subscriber = participant->create_subscriber(dds::SUBSCRIBER_QOS_DEFAULT);
+    if (!options.is_answering) {
+      listen<ParticipantPubSubType>(bus::Topic<Participant>::kName, participants);
+      listen<ParametersPubSubType>(bus::Topic<Parameters>::kName, parameters);
+      listen<SimStatusPubSubType>(bus::Topic<SimStatus>::kName, statuses);
+      for (const std::uint32_t size : kEchoSizes) echoes[size] = false;
+    }
+    bus::MiddlewareLog::clear();
+    dds::DataWriterQos writer_qos;
+    publisher->get_datawriter_qos_from_profile(bus::kLatchedWriterProfile, writer_qos);
+    dds::Topic* topic = make_topic<DoctorProbePubSubType>(kDoctorTopic);
+    writer = topic ? publisher->create_datawriter(topic, writer_qos, &writer_listener) : nullptr;
+    if (!listen<DoctorProbePubSubType>(kDoctorTopic, echo) || !writer)
+      refusal = "the middleware refused " + std::string(kDoctorTopic) + ": " +
+                bus::MiddlewareLog::find_first_error();
+  }
+
+  ~Impl() override {
+    participant->set_listener(nullptr);
+    participant->delete_contained_entities();
+    dds::DomainParticipantFactory::get_instance()->delete_participant(participant);
+  }
+
+  template <class PubSubType>
+  dds::Topic* make_topic(const char* name) {
+    if (auto* known = participant->lookup_topicdescription(name))
+      return static_cast<dds::Topic*>(known);
+    dds::TypeSupport type(new PubSubType);
+    type->auto_fill_type_object(false);  // it crashes peers (common/bus/README.md, trap 1)
+    type->auto_fill_type_information(false);
+    type.register_type(participant);
+    return participant->create_topic(name, type.get_type_name(), dds::TOPIC_QOS_DEFAULT);
+  }
+
+  template <class PubSubType>
+  bool listen(const char* name, dds::DataReaderListener& listener) {
+    dds::DataReaderQos qos;
+    subscriber->get_datareader_qos_from_profile(bus::kLatchedReaderProfile, qos);
+    dds::Topic* topic = make_topic<PubSubType>(name);
+    return topic && subscriber->create_datareader(topic, qos, &listener);
+  }
+
+  void note_sample(const Listener& topic, const dds::SampleInfo& info) {
+    const bus::PeerId sender = to_peer(info.publication_handle);
+    const auto program = programs.find(sender);
+    const auto matched = topic.matched.find(sender);
+    if (program == programs.end()) return;
+    ++program->second.samples;
+    if (matched == topic.matched.end() || Clock::now() < matched->second + kHistoryTime) return;
+    const auto delay =
+        std::chrono::nanoseconds(info.reception_timestamp.to_ns() - info.source_timestamp.to_ns());
+    auto& least = program->second.delay;
+    if (!least || std::chrono::abs(delay) < std::chrono::abs(*least)) least = delay;
+  }
+
+  void on_participant_discovery(dds::DomainParticipant* source,
+                                rtps::ParticipantDiscoveryInfo&& discovered) override {
+    const auto& data = discovered.info;
+    bus::ParticipantListener::on_participant_discovery(source, std::move(discovered));
+    const std::lock_guard lock(mutex);  // and not `participant`, which may not be there yet
+    const bus::PeerId id = to_peer(data.m_guid);
+    if (discovered.status == rtps::ParticipantDiscoveryInfo::REMOVED_PARTICIPANT ||
+        discovered.status == rtps::ParticipantDiscoveryInfo::DROPPED_PARTICIPANT) {
+      programs.erase(id);
+      return;
+    }
+    Program& program = programs[id];
+    program.id = id;
+    program.name = data.m_participantName.to_string();
+    program.user = find_property(data, dds::parameter_policy_physical_data_user);
+    program.is_discovery_server = find_property(data, "PARTICIPANT_TYPE") == "SERVER";
+    program.is_on_this_host = data.m_guid.is_on_same_host_as(source->guid());
+    program.is_secured = !data.identity_token_.class_id().empty();
+    program.udp_ports.clear();
+    program.shared_memory_ports.clear();
+    for (const auto& locator : data.default_locators.unicast) {
+      if (locator.kind == LOCATOR_KIND_SHM) program.shared_memory_ports.push_back(locator.port);
+      if (locator.kind != LOCATOR_KIND_UDPv4) continue;
+      program.udp_ports.push_back(locator.port);
+      program.address = rtps::IPLocator::ip_to_string(locator);
+    }
+  }
+
+  void onParticipantAuthentication(dds::DomainParticipant* source,
+                                   rtps::ParticipantAuthenticationInfo&& info) override {
+    const std::lock_guard lock(mutex);
+    if (info.status == rtps::ParticipantAuthenticationInfo::UNAUTHORIZED_PARTICIPANT)
+      rejected.insert(to_peer(info.guid));
+    bus::ParticipantListener::onParticipantAuthentication(source, std::move(info));
+  }
+
+  void on_publisher_discovery(dds::DomainParticipant*,
+                              rtps::WriterDiscoveryInfo&& discovered) override {
+    note_endpoint(discovered.info, discovered.status == rtps::WriterDiscoveryInfo::REMOVED_WRITER,
+                  true, discovered.info.typeMaxSerialized());
+  }
+
+  void on_subscriber_discovery(dds::DomainParticipant*,
+                               rtps::ReaderDiscoveryInfo&& discovered) override {
+    note_endpoint(discovered.info, discovered.status == rtps::ReaderDiscoveryInfo::REMOVED_READER,
+                  false, 0);
+  }
+
+  /// `size`: the largest sample in bytes, which only writers announce.
+  template <class Data>
+  void note_endpoint(const Data& data, bool is_gone, bool is_writer, std::uint32_t size) {
+    const std::lock_guard lock(mutex);
+    if (is_gone)
+      endpoints.erase(data.guid());
+    else
+      endpoints[data.guid()] = {
+          to_peer(data.guid()),        {},        data.topicName().to_string(),
+          data.typeName().to_string(), is_writer, size,
+          to_policies(data.m_qos)};
+  }
+
+  const Options options;
+  const std::uint64_t nonce = choose_nonce();
+  std::mutex mutex;
+  std::map<bus::PeerId, Program> programs;
+  std::set<bus::PeerId> rejected;
+  std::map<rtps::GUID_t, Endpoint> endpoints;
+  std::map<std::uint32_t, bool> echoes;
+  std::vector<DoctorProbe> questions;
+  std::string refusal;
+
+  Told<Participant> participants{*this};
+  Told<Parameters> parameters{*this};
+  Told<SimStatus> statuses{*this};
+  Echo echo{*this};
+  dds::DataWriterListener writer_listener;  // common/bus/README.md, trap 7
+  dds::DomainParticipant* participant = nullptr;
+  dds::Publisher* publisher = nullptr;
+  dds::Subscriber* subscriber = nullptr;
+  dds::DataWriter* writer = nullptr;
+};
+
+Observer::Observer(const Options& options)
+    : impl_(std::make_unique<Impl>(options,
+                                   load_participant_qos(options.qos_file, options.identity))) {}
+Observer::~Observer() = default;
+
+void Observer::ask() {
+  if (!impl_->writer) return;
+  for (const auto& [size, is_back] : echoes()) {
+    if (is_back) continue;
+    DoctorProbe probe;
+    probe.nonce(impl_->nonce);
+    probe.size(size);
+    probe.payload().resize(size);
+    impl_->writer->write(&probe);
+  }
+}
+
+void Observer::answer() {
+  std::vector<DoctorProbe> questions;
+  {
+    const std::lock_guard lock(impl_->mutex);
+    questions.swap(impl_->questions);
+  }
+  for (DoctorProbe& probe : questions) {
+    probe.is_answer(true);
+    if (impl_->writer) impl_->writer->write(&probe);
+  }
+}
+
+std::vector<Program> Observer::programs() const {
+  const std::lock_guard lock(impl_->mutex);
+  std::vector<Program> all;
+  for (auto [id, program] : impl_->programs) {
+    program.is_rejected = impl_->rejected.count(id) != 0;
+    for (const Impl::Listener* topic : {static_cast<const Impl::Listener*>(&impl_->participants),
+                                        static_cast<const Impl::Listener*>(&impl_->parameters),
+                                        static_cast<const Impl::Listener*>(&impl_->statuses)})
+      program.is_expected |= topic->matched.count(id) != 0;
+    all.push_back(std::move(program));
+  }
+  for (const bus::PeerId& id : impl_->rejected) {
+    if (impl_->programs.count(id) != 0) continue;
+    Program unknown;
+    unknown.id = id;
+    unknown.is_rejected = true;
+    all.push_back(std::move(unknown));
+  }
+  return all;
+}
+
+std::vector<Endpoint> Observer::endpoints() const {
+  const std::lock_guard lock(impl_->mutex);
+  std::vector<Endpoint> all;
+  for (const auto& [guid, endpoint] : impl_->endpoints) all.push_back(endpoint);
+  return all;
+}
+
+std::vector<Endpoint> Observer::own_endpoints() const {
+  return make_own_endpoints(*impl_->publisher, *impl_->subscriber,
+                            impl_->options.qos_file.filename().string());
+}
+
+std::map<std::uint32_t, bool> Observer::echoes() const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->echoes;
+}
+
+const std::string& Observer::refusal() const { return impl_->refusal; }
+
+}  // namespace sls::doctor

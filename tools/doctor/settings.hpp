@@ -1,0 +1,31 @@
+/// What a QoS file decides about the ways that data takes.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "tools/doctor/probe.hpp"
+
+namespace sls::doctor {
+
+/// Of the profile of the participant.
+struct Settings {
+  Ports ports;
+  bool uses_shared_memory = false;
+  std::uint32_t segment_size = 0;              ///< of shared memory, bytes
+  std::vector<std::string> only_addresses;     ///< of interfaces; none: all
+  bool uses_multicast = false;                 ///< for discovery
+  std::vector<std::string> discovery_servers;  ///< "10.0.0.1:11811"; none: it needs none
+  bool is_secured = false;
+
+  /// Nothing leaves the machine.
+  bool is_local() const;
+};
+
+/// @throws config::ConfigError as Node does.
+Settings load_settings(const std::filesystem::path& qos_file, int domain,
+                       const std::string& identity);
+
+}  // namespace sls::doctor

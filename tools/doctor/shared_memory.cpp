@@ -1,0 +1,54 @@
+#include "tools/doctor/shared_memory.hpp"
+
+#include <pwd.h>
+#include <sys/stat.h>
+#include <sys/statvfs.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <system_error>
+
+#include "common/bus/stale_segments.hpp"
+
+namespace sls::doctor {
+namespace {
+
+std::string find_user_name(uid_t user) {
+  const passwd* entry = ::getpwuid(user);
+  return entry ? entry->pw_name : std::to_string(user);
+}
+
+}  // namespace
+
+SharedMemory survey_shared_memory(const std::filesystem::path& folder) {
+  SharedMemory found;
+  struct statvfs room {};
+  if (::statvfs(folder.c_str(), &room) != 0 || ::access(folder.c_str(), R_OK | W_OK | X_OK) != 0)
+    return found;
+  found.is_there = true;
+  found.size = static_cast<std::uint64_t>(room.f_blocks) * room.f_frsize;
+  found.free = static_cast<std::uint64_t>(room.f_bavail) * room.f_frsize;
+  for (const auto& segment : bus::find_stale_segments(folder)) {
+    ++found.stale_segments;
+    struct stat status {};
+    if (::stat(segment.c_str(), &status) != 0) continue;
+    constexpr std::uint64_t kBlock = 512;  // of st_blocks, whatever the file system's is
+    found.stale_size += static_cast<std::uint64_t>(status.st_blocks) * kBlock;
+    const std::string owner = find_user_name(status.st_uid);
+    auto& owners = found.stale_owners;
+    if (std::find(owners.begin(), owners.end(), owner) == owners.end()) owners.push_back(owner);
+  }
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
+    int port = 0, length = 0;
+    const std::string name = entry.path().filename();
+    if (std::sscanf(name.c_str(), "fastrtps_port%d_el%n", &port, &length) != 1) continue;
+    if (length != static_cast<int>(name.size())) continue;  // the port itself, not its lock
+    if (bus::is_port_read(port, folder))
+      found.read_ports.push_back(static_cast<std::uint32_t>(port));
+  }
+  return found;
+}
+
+}  // namespace sls::doctor

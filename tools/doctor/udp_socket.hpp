@@ -1,0 +1,72 @@
+/// UDP as the raw probes need it: IPv4, never blocking, closed with the object.
+#pragma once
+
+#include <netinet/in.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace sls::doctor {
+
+/// The group in which participants announce themselves.
+inline constexpr const char* kMulticastGroup = "239.255.0.1";
+
+/// Largest UDP datagram, bytes.
+inline constexpr std::size_t kMaxDatagram = 65507;
+
+sockaddr_in make_address(const std::string& address, int port);
+std::string to_string(const in_addr& address);
+
+/// The IPv4 address of `host`, a name or an address; nothing where it has none.
+std::optional<std::string> find_address(const std::string& host);
+
+struct Interface {
+  std::string address;
+  bool is_loopback = false;
+};
+/// Those that are up and have an IPv4 address.
+std::vector<Interface> find_interfaces();
+
+/// True for an address of this host.
+bool is_own_address(const std::string& address);
+
+class UdpSocket {
+ public:
+  UdpSocket();
+  ~UdpSocket();
+  UdpSocket(UdpSocket&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
+  UdpSocket(const UdpSocket&) = delete;
+  UdpSocket& operator=(const UdpSocket&) = delete;
+
+  /// False where the port is taken.
+  bool bind(const std::string& address, int port, bool is_shared = false);
+  void join(const std::string& group, const std::vector<Interface>& interfaces);
+  /// What goes to a group leaves by the interface of this address.
+  void send_multicast_by(const std::string& interface_address);
+  bool connect(const sockaddr_in& peer);
+  /// The own address towards the peer that it is connected to.
+  std::string find_own_address() const;
+
+  /// 0, or the number of the error; one that an earlier datagram met (nobody there) is reported by
+  /// a later call.
+  int send(const void* data, std::size_t size);
+  int send_to(const sockaddr_in& peer, const void* data, std::size_t size);
+
+  struct Received {
+    std::size_t size = 0;
+    sockaddr_in sender{};
+  };
+  /// A datagram if there is one; `error` is the number of the error, or 0.
+  std::optional<Received> receive(std::vector<unsigned char>& buffer, int* error = nullptr);
+
+  int descriptor() const { return descriptor_; }
+
+ private:
+  int descriptor_;
+};
+
+}  // namespace sls::doctor
