@@ -463,8 +463,8 @@ cmd_fuzz() {
 run_fuzzer() {
   local corpus="$1/corpus/$2" crashes="$1/crashes/$2" log="$1/$2.log" seeds
   case $2 in
-    scenario) seeds=("$root"/config/scenarios "$root"/config/invalid) ;;
-    qos_file) seeds=("$root"/config/qos "$root"/config/invalid/qos) ;;
+    scenario) seeds=("$root"/config/scenarios "$root"/tests/common/config/invalid) ;;
+    qos_file) seeds=("$root"/config/qos "$root"/tests/common/bus/invalid) ;;
     *) seeds=("$root/tests/fuzz/corpus/$2") ;;
   esac
   mkdir -p "$corpus" "$crashes"

@@ -61,9 +61,10 @@ TEST(DelayMarginProgramTest, MistakesGiveOneLineAndExitCodeTwo) {
   expect_refused(program_with({"--scenario", "none.yaml"}), 2, "none.yaml: ");
   expect_refused(program_with({"--scenario", scenario("short"), "--period-s", "0.0035"}), 2,
                  "--period-s");
-  expect_refused(program_with({"--scenario", std::string(SLS_SOURCE_DIR) +
-                                                 "/config/invalid/delay_negative.yaml"}),
-                 2, "delay_negative.yaml:18: faults[0].delay.by_s: expected >= 0, got -0.02");
+  expect_refused(
+      program_with({"--scenario", std::string(SLS_SOURCE_DIR) +
+                                      "/tests/common/config/invalid/delay_negative.yaml"}),
+      2, "delay_negative.yaml:18: faults[0].delay.by_s: expected >= 0, got -0.02");
 }
 
 TEST(DelayMarginProgramTest, AScenarioThatLosesTheLoadAnywayEndsWithOne) {

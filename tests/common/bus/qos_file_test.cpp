@@ -133,7 +133,7 @@ TEST_F(QosFileTest, EachMisspeltProfileOfOursIsNamed) {
   }
 }
 
-// --- config/invalid/qos: one file per defect, the message in the comment after the declaration
+// --- invalid/: one file per defect, the message in the comment after the declaration
 
 /// What the comment of an invalid file promises: the message after the file's name.
 std::string read_expectation(const fs::path& file) {
@@ -146,7 +146,7 @@ std::string read_expectation(const fs::path& file) {
 
 std::vector<fs::path> list_invalid_files() {
   std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(kConfig / "invalid/qos"))
+  for (const auto& entry : fs::directory_iterator(SLS_SOURCE_DIR "/tests/common/bus/invalid"))
     if (entry.path().extension() == ".xml") files.push_back(entry.path());
   std::sort(files.begin(), files.end());
   return files;

@@ -36,7 +36,7 @@ class UnusableFileTest : public testing::Test {
 };
 
 TEST(InvalidScenariosTest, EachFileGivesTheMessageOnItsFirstLine) {
-  const auto files = list_yaml_files("config/invalid");
+  const auto files = list_yaml_files("tests/common/config/invalid");
   EXPECT_GT(files.size(), 100u);
   for (const fs::path& file : files) {
     const std::string text = read_text(file), mark = "# expect: ";
