@@ -20,8 +20,7 @@ BareNode::~BareNode() {
 }
 
 dds::Topic* BareNode::create_topic(const char* name, dds::TypeSupport type) {
-  type->auto_fill_type_object(false);  // common/bus/README.md, trap 1
-  type->auto_fill_type_information(false);
+  bus::leave_out_type_object(type);
   type.register_type(participant);
   return participant->create_topic(name, type.get_type_name(), dds::TOPIC_QOS_DEFAULT);
 }

@@ -21,6 +21,7 @@
 #include <memory>
 #include <string>
 
+#include "common/bus/fastdds/endpoints.hpp"
 #include "common/bus/node.hpp"
 
 namespace sls::bench {
@@ -53,12 +54,7 @@ class BareWriter : dds::DataWriterListener {
         node.create_topic(topic, dds::TypeSupport(new Type)), qos, this);
     if (!writer_) throw bus::BusError(std::string(topic) + ": no writer");
   }
-  ~BareWriter() override {
-    writer_->set_listener(nullptr);
-    std::size_t removed = 0;
-    writer_->clear_history(&removed);  // common/bus/README.md, trap 13
-    publisher_->delete_datawriter(writer_);
-  }
+  ~BareWriter() override { bus::delete_writer(*publisher_, writer_); }
 
   void write(Message& message) { writer_->write(&message); }
   std::size_t count_matched() const { return static_cast<std::size_t>(matched_); }

@@ -2,8 +2,8 @@
 ///
 /// A sample is answered where it arrives, on the middleware's thread: the step waits for the
 /// answer, and handing the sample to another thread would make the round trip a quarter longer.
-/// Writing there must never block (common/bus/README.md, trap 4): the stream writers' profile keeps
-/// the last samples rather than all of them.
+/// Writing there must never block (common/bus/fastdds/README.md, trap 4): the stream writers'
+/// profile keeps the last samples rather than all of them.
 #pragma once
 
 #include <chrono>

@@ -25,12 +25,12 @@
 #include <mutex>
 #include <utility>
 
-#include "common/bus/middleware_log.hpp"
-#include "common/bus/participant_listener.hpp"
+#include "common/bus/fastdds/endpoints.hpp"
+#include "common/bus/fastdds/middleware_log.hpp"
+#include "common/bus/fastdds/participant_listener.hpp"
+#include "common/bus/fastdds/stale_segments.hpp"
 #include "common/bus/qos_file.hpp"
 #include "common/bus/security_files.hpp"
-#include "common/bus/shared_locks.hpp"
-#include "common/bus/stale_segments.hpp"
 #include "common/config/config_error.hpp"
 
 namespace sls::bus {
@@ -64,7 +64,6 @@ void load_profiles(const std::filesystem::path& file, const std::string& identit
   setenv("SKIP_DEFAULT_XML_FILE", "1", 1);
   unsetenv("FASTRTPS_DEFAULT_PROFILES_FILE");
   MiddlewareLog::start(is_secured);
-  guard_shared_locks();
   auto* factory = dds::DomainParticipantFactory::get_instance();
   factory->load_profiles();
   if (factory->load_XML_profiles_string(profiles.data(), profiles.size()) !=
@@ -170,9 +169,7 @@ struct Node::Impl {
   dds::Topic* find_or_create_topic(const char* name, dds::TypeSupport type) {
     if (auto* known = participant->lookup_topicdescription(name))
       return static_cast<dds::Topic*>(known);
-    // A TypeObject on the wire crashes peers that do not know the type (README.md, trap 1).
-    type->auto_fill_type_object(false);
-    type->auto_fill_type_information(false);
+    leave_out_type_object(type);
     dds::Topic* topic = nullptr;
     if (type.register_type(participant) == ReturnCode_t::RETCODE_OK)
       topic = participant->create_topic(name, type.get_type_name(), dds::TOPIC_QOS_DEFAULT);
@@ -245,7 +242,8 @@ PeerId Node::id() const { return to_peer(impl_->participant->get_instance_handle
 
 namespace detail {
 
-// A DataWriter with a deadline needs a listener of its own, so every one has (README.md, trap 7).
+// A DataWriter with a deadline needs a listener of its own, so every one has (fastdds/README.md,
+// trap 7).
 struct AnyWriter::Impl : dds::DataWriterListener {
   void on_publication_matched(dds::DataWriter*,
                               const dds::PublicationMatchedStatus& status) override {
@@ -270,13 +268,7 @@ AnyWriter::AnyWriter(Node& node, const char* topic, const char* profile, void* t
 }
 
 AnyWriter::~AnyWriter() {
-  if (!impl_->writer) return;
-  impl_->writer->set_listener(nullptr);
-  // Otherwise a heartbeat to a reader that has died may meet a half-deleted history and never end
-  // (README.md, trap 13).
-  std::size_t removed = 0;
-  impl_->writer->clear_history(&removed);
-  impl_->publisher->delete_datawriter(impl_->writer);
+  if (impl_->writer) delete_writer(*impl_->publisher, impl_->writer);
 }
 
 bool AnyWriter::write(const void* sample) {

@@ -1,5 +1,6 @@
 /// The only door to Fast DDS: one domain participant configured by a QoS file, typed writers and
-/// readers on it. Nothing of Fast DDS shows through these headers. Traps it avoids: README.md.
+/// readers on it. Nothing of Fast DDS shows through these headers. Traps it avoids:
+/// fastdds/README.md.
 #pragma once
 
 #include <chrono>
@@ -112,7 +113,7 @@ class Writer {
       : writer_(node, Topic<Message>::kName, profile, detail::make_type_support<Message>()) {}
 
   /// Hands `message` to the middleware; may block while a history is full, so it has no place in a
-  /// reader's handler (README.md, trap 4).
+  /// reader's handler (fastdds/README.md, trap 4).
   /// @throws BusError if it was not taken: the history stayed full for `max_blocking_time`.
   void write(const Message& message) {
     if (!writer_.write(&message))

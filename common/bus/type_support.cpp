@@ -1,7 +1,7 @@
 /// The type supports of idl/sls.idl: what serialises each type.
 #include <fastdds/dds/topic/TopicDataType.hpp>
 
-#include "common/bus/guarded_type.hpp"
+#include "common/bus/fastdds/guarded_type.hpp"
 #include "common/bus/node.hpp"
 
 namespace sls::bus::detail {

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "common/bus/guarded_type.hpp"
+#include "common/bus/fastdds/guarded_type.hpp"
 #include "recorder/step_join.hpp"
 #include "sim_server/command_gate.hpp"
 #include "sim_server/run_control.hpp"

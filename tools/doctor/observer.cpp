@@ -20,10 +20,11 @@
 #include <set>
 #include <utility>
 
-#include "common/bus/middleware_log.hpp"
+#include "common/bus/fastdds/endpoints.hpp"
+#include "common/bus/fastdds/middleware_log.hpp"
+#include "common/bus/fastdds/participant_listener.hpp"
+#include "common/bus/fastdds/stale_segments.hpp"
 #include "common/bus/node.hpp"
-#include "common/bus/participant_listener.hpp"
-#include "common/bus/stale_segments.hpp"
 #include "common/bus/topics.hpp"
 #include "common/config/config_error.hpp"
 #include "tools/doctor/endpoint_qos.hpp"
@@ -180,8 +181,7 @@ struct Observer::Impl : bus::ParticipantListener {
     if (auto* known = participant->lookup_topicdescription(name))
       return static_cast<dds::Topic*>(known);
     dds::TypeSupport type(new PubSubType);
-    type->auto_fill_type_object(false);  // it crashes peers (common/bus/README.md, trap 1)
-    type->auto_fill_type_information(false);
+    bus::leave_out_type_object(type);
     type.register_type(participant);
     return participant->create_topic(name, type.get_type_name(), dds::TOPIC_QOS_DEFAULT);
   }
@@ -282,7 +282,7 @@ struct Observer::Impl : bus::ParticipantListener {
   Told<Parameters> parameters{*this};
   Told<SimStatus> statuses{*this};
   Echo echo{*this};
-  dds::DataWriterListener writer_listener;  // common/bus/README.md, trap 7
+  dds::DataWriterListener writer_listener;  // common/bus/fastdds/README.md, trap 7
   dds::DomainParticipant* participant = nullptr;
   dds::Publisher* publisher = nullptr;
   dds::Subscriber* subscriber = nullptr;

@@ -9,7 +9,7 @@
 #include <cstdio>
 #include <system_error>
 
-#include "common/bus/stale_segments.hpp"
+#include "common/bus/fastdds/stale_segments.hpp"
 
 namespace sls::doctor {
 namespace {

@@ -1,4 +1,4 @@
-#include "common/bus/stale_segments.hpp"
+#include "common/bus/fastdds/stale_segments.hpp"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>

@@ -1,11 +1,11 @@
-#include "common/bus/middleware_log.hpp"
+#include "common/bus/fastdds/middleware_log.hpp"
 
 #include <spdlog/spdlog.h>
 
 #include <mutex>
 #include <utility>
 
-#include "common/bus/refusals.hpp"
+#include "common/bus/fastdds/refusals.hpp"
 
 namespace sls::bus {
 namespace {

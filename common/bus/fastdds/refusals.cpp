@@ -1,11 +1,11 @@
-#include "common/bus/refusals.hpp"
+#include "common/bus/fastdds/refusals.hpp"
 
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <utility>
 
-#include "common/bus/middleware_log.hpp"
+#include "common/bus/fastdds/middleware_log.hpp"
 
 namespace sls::bus {
 namespace {

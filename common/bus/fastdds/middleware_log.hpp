@@ -10,6 +10,9 @@ namespace sls::bus {
 /// What Fast DDS logs: warnings and errors go to our log on stderr (by itself it prints to stdout,
 /// which is for data). The first error since `clear()` is kept: it names the cause where those that
 /// follow only say what failed because of it.
+///
+/// Upstream: #4873, the log goes to stderr from 3.0 on. To be deleted when, besides, the functions
+/// that create entities and load profiles return the reason of a failure (none reported).
 class MiddlewareLog : public eprosima::fastdds::dds::LogConsumer {
  public:
   /// Takes the log of this process over. Warnings too are wanted of a secured participant: only

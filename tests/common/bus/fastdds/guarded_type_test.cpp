@@ -1,4 +1,4 @@
-#include "common/bus/guarded_type.hpp"
+#include "common/bus/fastdds/guarded_type.hpp"
 
 #include <gtest/gtest.h>
 

@@ -6,12 +6,13 @@
 #include <sstream>
 #include <string>
 
-#include "common/bus/refusals.hpp"
+#include "common/bus/fastdds/refusals.hpp"
 #include "common/config/yaml_node.hpp"
 
 namespace sls::bus {
 
-/// Tells who is kept from a secured domain. Endpoints have listeners of their own.
+/// Tells `Refusals` who was discovered, accepted and refused. Endpoints have listeners of their
+/// own. To be deleted with refusals.hpp.
 class ParticipantListener : public eprosima::fastdds::dds::DomainParticipantListener {
  public:
   /// `is_secured`: whether this participant is.

@@ -1,4 +1,4 @@
-#include "common/bus/refusals.hpp"
+#include "common/bus/fastdds/refusals.hpp"
 
 #include <gtest/gtest.h>
 #include <spdlog/sinks/ostream_sink.h>
