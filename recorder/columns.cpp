@@ -2,6 +2,7 @@
 
 #include "common/bus/convert.hpp"
 #include "common/bus/names.hpp"
+#include "common/bus/sync_counters.hpp"
 #include "common/model/forces.hpp"
 
 namespace sls::record {
@@ -36,24 +37,25 @@ void write_row(CsvFile& file, const CommandRow& row) { write_fields(file, row); 
 void write_row(CsvFile& file, const ReferenceRow& row) { write_fields(file, row); }
 
 void write_row(CsvFile& file, const SimStatus& status) {
-  const SyncCounters& counters = status.counters();
   file.add(status.sample_index());
   file.add(bus::to_string(status.phase()));
   file.add(status.reason().c_str());
   file.add(status.step());
   file.add(status.controller_name().c_str());
   file.add(status.real_time_factor());
-  for (const auto count :
-       {counters.resent(), counters.late(), counters.duplicate(), counters.superseded(),
-        counters.take_overs(), counters.rejected_not_finite(), counters.rejected_force_limit(),
-        counters.rejected_run(), counters.rejected_step(), counters.rejected_vehicle(),
-        counters.rejected_client(), counters.rejected_fault(), counters.stale(), counters.held(),
-        counters.fail_safe(), counters.deadline_missed(), counters.overflow(), counters.slipped()})
-    file.add(count);
+  for (const bus::SyncCounter& counter : bus::kSyncCounters)
+    file.add((status.counters().*counter.get)());
   file.add(to_microseconds(status.round_trip_p50_ns()));
   file.add(to_microseconds(status.round_trip_p99_ns()));
   file.add(status.timing().c_str());
   file.end_row();
+}
+
+std::string make_status_header() {
+  std::string header = "sample_index,phase,reason,step,controller,real_time_factor,";
+  for (const bus::SyncCounter& counter : bus::kSyncCounters)
+    header += counter.name + std::string(",");
+  return header + "round_trip_p50_us,round_trip_p99_us,timing";
 }
 
 std::string make_flight_header(bool is_of_fleet) {

@@ -12,11 +12,8 @@ namespace sls::record {
 
 inline constexpr const char* kStatusFile = "status.csv";
 inline constexpr const char* kStatusTopic = "sls/status";
-inline constexpr std::string_view kStatusHeader =
-    "sample_index,phase,reason,step,controller,real_time_factor,resent,late,duplicate,superseded,"
-    "take_overs,rejected_not_finite,rejected_force_limit,rejected_run,rejected_step,"
-    "rejected_vehicle,rejected_client,rejected_fault,stale,held,fail_safe,deadline_missed,overflow,"
-    "slipped,round_trip_p50_us,round_trip_p99_us,timing";
+std::string make_status_header();
+
 /// In the order of the published flight logs.
 inline constexpr std::string_view kFlightHeader =
     "sim_time_s,ref_x_m,ref_y_m,ref_z_m,quad_x_m,quad_y_m,quad_z_m,roll_rad,pitch_rad,yaw_rad,"

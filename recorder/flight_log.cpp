@@ -8,6 +8,7 @@
 
 #include "common/bus/convert.hpp"
 #include "common/bus/names.hpp"
+#include "common/bus/sync_counters.hpp"
 
 namespace sls::record {
 namespace {
@@ -176,17 +177,18 @@ void FlightLog::write(std::ostream& out) const {
 
 void FlightLog::write_counters(std::ostream& out) const {
   const SyncCounters& counters = last_status_.counters();
-  out << fmt::format(
-      "Commands\n  states resent {}, duplicate {}, superseded {}, late {}, take-overs {}\n"
-      "  stale {}, held {}, fail-safe {}, deadline missed {}, overflow {}, slipped {}\n"
-      "  rejected: not finite {}, force limit {}, run {}, step {}, vehicle {}, client {}, fault "
-      "{}\n",
-      counters.resent(), counters.duplicate(), counters.superseded(), counters.late(),
-      counters.take_overs(), counters.stale(), counters.held(), counters.fail_safe(),
-      counters.deadline_missed(), counters.overflow(), counters.slipped(),
-      counters.rejected_not_finite(), counters.rejected_force_limit(), counters.rejected_run(),
-      counters.rejected_step(), counters.rejected_vehicle(), counters.rejected_client(),
-      counters.rejected_fault());
+  const auto list = [&](const std::string& prefix, std::initializer_list<const char*> words) {
+    std::string text;
+    for (const bus::Count& count : bus::list_counts(counters, prefix, words))
+      text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count.words, count.value);
+    return text + '\n';
+  };
+  out << "Commands\n  states "
+      << list("", {"resent", "duplicate", "superseded", "late", "take-overs"}) << "  "
+      << list("", {"stale", "held", "fail-safe", "deadline missed", "overflow", "slipped"})
+      << "  rejected: "
+      << list("rejected_",
+              {"not finite", "force limit", "run", "step", "vehicle", "client", "fault"});
   out << fmt::format("  round trip p50 {:.1f} µs, p99 {:.1f} µs\n",
                      static_cast<double>(last_status_.round_trip_p50_ns()) / 1e3,
                      static_cast<double>(last_status_.round_trip_p99_ns()) / 1e3);

@@ -61,7 +61,7 @@ Recording::Recording(const Segment& segment, const Parameters& parameters)
       states_(segment.folder / StateRow::kFile, StateRow::kHeader),
       commands_(segment.folder / CommandRow::kFile, CommandRow::kHeader),
       references_(segment.folder / ReferenceRow::kFile, ReferenceRow::kHeader),
-      statuses_(segment.folder / kStatusFile, kStatusHeader),
+      statuses_(segment.folder / kStatusFile, make_status_header()),
       flight_(segment.folder / "flight.csv", make_flight_header(bus::is_fleet(parameters))),
       log_(scenario_, parameters) {
   for (const std::uint32_t id : parameters.vehicle_ids())

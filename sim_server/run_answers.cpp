@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/app/run_main.hpp"
+#include "common/bus/sync_counters.hpp"
 #include "common/config/vehicle_ids.hpp"
 #include "sim_server/run.hpp"
 
@@ -14,27 +15,11 @@ namespace {
 
 using namespace std::chrono_literals;
 
-void add(SyncCounters& sum, const SyncCounters& counters) {
-  sum.resent() += counters.resent();
-  sum.stale() += counters.stale();
-  sum.deadline_missed() += counters.deadline_missed();
-  sum.duplicate() += counters.duplicate();
-  sum.superseded() += counters.superseded();
-  sum.take_overs() += counters.take_overs();
-  sum.rejected_not_finite() += counters.rejected_not_finite();
-  sum.rejected_force_limit() += counters.rejected_force_limit();
-  sum.rejected_run() += counters.rejected_run();
-  sum.rejected_step() += counters.rejected_step();
-  sum.rejected_vehicle() += counters.rejected_vehicle();
-  sum.rejected_client() += counters.rejected_client();
-  sum.rejected_fault() += counters.rejected_fault();
-}
-
 }  // namespace
 
 SyncCounters Run::sum_counters() const {
   SyncCounters sum = link_;
-  for (const auto& vehicle : vehicles_) add(sum, vehicle->gate.counters());
+  for (const auto& vehicle : vehicles_) bus::add(sum, vehicle->gate.counters());
   return sum;
 }
 

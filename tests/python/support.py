@@ -89,7 +89,9 @@ def read_headers(path):
 
 
 STATE_HEADER, COMMAND_HEADER, REFERENCE_HEADER = read_headers("rows.hpp")
-STATUS_HEADER, _ = read_headers("columns.hpp")
+COUNTERS = re.findall(r"SLS_COUNTER\((\w+)\)[,}]", (ROOT / "common/bus/sync_counters.hpp").read_text())
+STATUS_HEADER = ",".join(["sample_index,phase,reason,step,controller,real_time_factor", *COUNTERS,
+                          "round_trip_p50_us,round_trip_p99_us,timing"])
 PERIOD_S = 0.01
 SCENARIO = """name: synthetic
 vehicle: { quad_mass_kg: 1.5, load_mass_kg: 0.2, rod_length_m: 1.0, gravity_m_s2: 9.8 }

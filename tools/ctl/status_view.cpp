@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "common/bus/names.hpp"
+#include "common/bus/sync_counters.hpp"
 #include "common/config/yaml_node.hpp"
 
 namespace sls::ctl {
@@ -147,43 +148,30 @@ std::string describe_wanted_factor(const Parameters& parameters) {
              : "wanted any";
 }
 
-struct Count {
-  const char* name;
-  std::uint64_t value;
-};
+using bus::Count;
 
 std::vector<Count> list_link_counts(const SyncCounters& counters) {
-  return {{"resent", counters.resent()},
-          {"late", counters.late()},
-          {"held", counters.held()},
-          {"fail-safe", counters.fail_safe()},
-          {"stale", counters.stale()},
-          {"duplicate", counters.duplicate()},
-          {"superseded", counters.superseded()},
-          {"take-overs", counters.take_overs()}};
+  return bus::list_counts(
+      counters, "",
+      {"resent", "late", "held", "fail-safe", "stale", "duplicate", "superseded", "take-overs"});
 }
 
 /// What a healthy run never counts.
 std::vector<Count> list_trouble_counts(const SyncCounters& counters) {
-  return {{"deadline missed", counters.deadline_missed()},
-          {"overflow", counters.overflow()},
-          {"slipped", counters.slipped()}};
+  return bus::list_counts(counters, "", {"deadline missed", "overflow", "slipped"});
 }
 
 std::vector<Count> list_rejected_counts(const SyncCounters& counters) {
-  return {{"not finite", counters.rejected_not_finite()},
-          {"run", counters.rejected_run()},
-          {"force limit", counters.rejected_force_limit()},
-          {"step", counters.rejected_step()},
-          {"vehicle", counters.rejected_vehicle()},
-          {"client", counters.rejected_client()},
-          {"fault", counters.rejected_fault()}};
+  return bus::list_counts(
+      counters, "rejected_",
+      {"not finite", "run", "force limit", "step", "vehicle", "client", "fault"});
 }
 
 std::vector<std::string> to_fields(const std::vector<Count>& counts) {
   std::vector<std::string> fields;
   fields.reserve(counts.size() + 1);
-  for (const Count& count : counts) fields.push_back(fmt::format("{} {}", count.name, count.value));
+  for (const Count& count : counts)
+    fields.push_back(fmt::format("{} {}", count.words, count.value));
   return fields;
 }
 
@@ -342,12 +330,7 @@ std::string to_json(const Snapshot& snapshot) {
   using Json = nlohmann::ordered_json;
   const Parameters& parameters = snapshot.parameters;
   const auto add_counts = [](Json& object, const std::vector<Count>& counts) {
-    for (const Count& count : counts) {
-      std::string key = count.name;
-      std::replace_if(
-          key.begin(), key.end(), [](char letter) { return letter == ' ' || letter == '-'; }, '_');
-      object[key] = count.value;
-    }
+    for (const Count& count : counts) object[bus::to_counter_name(count.words)] = count.value;
   };
   Json json;
   json["scenario"] = find_scenario_name(parameters);

@@ -3,6 +3,8 @@
 #include <limits>
 #include <string>
 
+#include "common/bus/sync_counters.hpp"
+
 namespace sls::bus::test {
 namespace {
 
@@ -176,19 +178,8 @@ SimStatus make_message(std::uint64_t seed) {
   message.controller_name(values.text(32));
   for (int i = 0; i < 256; ++i) message.controller_names().emplace_back().name(values.text(32));
   message.real_time_factor(values.real());
-  SyncCounters& counters = message.counters();
-  counters.resent(values.count());
-  counters.late(values.count());
-  counters.duplicate(values.count());
-  counters.superseded(values.count());
-  counters.take_overs(values.count());
-  counters.rejected_not_finite(values.count());
-  counters.rejected_force_limit(values.count());
-  counters.rejected_run(values.count());
-  counters.rejected_step(values.count());
-  counters.rejected_vehicle(values.count());
-  counters.rejected_client(values.count());
-  counters.rejected_fault(values.count());
+  for (const SyncCounter& counter : kSyncCounters)
+    (message.counters().*counter.change)() = values.count();
   return message;
 }
 

@@ -5,6 +5,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "common/bus/sync_counters.hpp"
+
 namespace sls::ctl {
 namespace {
 
@@ -94,14 +96,7 @@ TEST(StatusViewTest, EveryCounterIsShown) {
   Snapshot snapshot = make_snapshot();
   SyncCounters& counters = snapshot.status->counters();
   std::uint64_t value = 7000;
-  for (auto* count :
-       {&counters.resent(), &counters.late(), &counters.stale(), &counters.held(),
-        &counters.fail_safe(), &counters.deadline_missed(), &counters.overflow(),
-        &counters.slipped(), &counters.duplicate(), &counters.superseded(), &counters.take_overs(),
-        &counters.rejected_not_finite(), &counters.rejected_force_limit(), &counters.rejected_run(),
-        &counters.rejected_step(), &counters.rejected_vehicle(), &counters.rejected_client(),
-        &counters.rejected_fault()})
-    *count = value++;
+  for (const bus::SyncCounter& counter : bus::kSyncCounters) (counters.*counter.change)() = value++;
   const std::string text = join(render(snapshot, 80)), json = to_json(snapshot);
   for (std::uint64_t shown = 7000; shown < value; ++shown) {
     EXPECT_TRUE(contains(text, " " + std::to_string(shown))) << shown << "\n" << text;

@@ -1,0 +1,59 @@
+/// The server's counters, each listed once: adding, recording and showing them goes by this table.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <initializer_list>
+#include <string>
+#include <vector>
+
+#include "common/bus/topics.hpp"
+
+namespace sls::bus {
+
+struct SyncCounter {
+  const char* name;  ///< of the field in sls.idl and of the column in status.csv
+  std::uint64_t (SyncCounters::*get)() const;
+  std::uint64_t& (SyncCounters::*change)();
+};
+
+/// In the order of status.csv.
+#define SLS_COUNTER(name) \
+  SyncCounter { #name, &SyncCounters::name, &SyncCounters::name }
+inline constexpr std::array kSyncCounters = {SLS_COUNTER(resent),
+                                             SLS_COUNTER(late),
+                                             SLS_COUNTER(duplicate),
+                                             SLS_COUNTER(superseded),
+                                             SLS_COUNTER(take_overs),
+                                             SLS_COUNTER(rejected_not_finite),
+                                             SLS_COUNTER(rejected_force_limit),
+                                             SLS_COUNTER(rejected_run),
+                                             SLS_COUNTER(rejected_step),
+                                             SLS_COUNTER(rejected_vehicle),
+                                             SLS_COUNTER(rejected_client),
+                                             SLS_COUNTER(rejected_fault),
+                                             SLS_COUNTER(stale),
+                                             SLS_COUNTER(held),
+                                             SLS_COUNTER(fail_safe),
+                                             SLS_COUNTER(deadline_missed),
+                                             SLS_COUNTER(overflow),
+                                             SLS_COUNTER(slipped)};
+#undef SLS_COUNTER
+
+void add(SyncCounters& sum, const SyncCounters& counters);
+
+struct Count {
+  const char* words;  ///< such as "fail-safe"
+  std::uint64_t value;
+};
+
+/// For texts, in their order: the counters whose names are `prefix` and one of `words`, with an
+/// underscore for each space and hyphen.
+/// @throws std::logic_error where there is none of that name.
+std::vector<Count> list_counts(const SyncCounters& counters, const std::string& prefix,
+                               std::initializer_list<const char*> words);
+
+/// "fail_safe" of "fail-safe".
+std::string to_counter_name(std::string words);
+
+}  // namespace sls::bus
