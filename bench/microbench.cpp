@@ -10,8 +10,8 @@
 #include "control_client/flight_controller.hpp"
 #include "control_client/messages.hpp"
 #include "sim_server/messages.hpp"
+#include "sim_server/plants/analytic/analytic_plant.hpp"
 #include "sim_server/plants/slung_load/slung_load_plant.hpp"
-#include "tests/oracle/slung_load_ode.hpp"
 
 namespace sls::bench {
 namespace {
@@ -24,28 +24,21 @@ Eigen::Vector3d make_hover_force(const config::Scenario& scenario) {
 }
 
 /// Time of one RK4 step of one vehicle, of a fleet of independent plants.
-void plant_step(benchmark::State& run) {
+template <class Plant>
+void step_plants(benchmark::State& run) {
   const config::Scenario scenario = load();
-  const Eigen::Vector3d f_Q_W = make_hover_force(scenario);
-  std::vector<std::unique_ptr<sim::SlungLoadPlant>> plants;
+  const std::vector<Eigen::Vector3d> f_Q_W = {make_hover_force(scenario)};
+  std::vector<std::unique_ptr<Plant>> plants;
   for (std::int64_t i = 0; i < run.range(0); ++i)
-    plants.push_back(std::make_unique<sim::SlungLoadPlant>(scenario.vehicle, scenario.plant));
+    plants.push_back(std::make_unique<Plant>(scenario.vehicle, scenario.plant));
   while (run.KeepRunningBatch(run.range(0)))
-    for (const auto& plant : plants) plant->step(f_Q_W);
+    for (const auto& plant : plants) plant->advance(f_Q_W, 1);
 }
+void plant_step(benchmark::State& run) { step_plants<sim::SlungLoadPlant>(run); }
 BENCHMARK(plant_step)->Arg(1)->Arg(2)->Arg(10)->Arg(100);
 
 /// The same equations in closed form.
-void closed_form_step(benchmark::State& run) {
-  const config::Scenario scenario = load();
-  const Eigen::Vector3d f_Q_W = make_hover_force(scenario);
-  std::vector<oracle::State> states(static_cast<std::size_t>(run.range(0)));
-  while (run.KeepRunningBatch(run.range(0)))
-    for (oracle::State& state : states) {
-      state = oracle::rk4_step(state, f_Q_W, 0.001, scenario.vehicle);
-      benchmark::DoNotOptimize(state);
-    }
-}
+void closed_form_step(benchmark::State& run) { step_plants<sim::AnalyticPlant>(run); }
 BENCHMARK(closed_form_step)->Arg(1)->Arg(2)->Arg(10)->Arg(100);
 
 const std::vector<closed_loop::StepSamples>& samples() {
