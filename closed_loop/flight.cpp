@@ -41,7 +41,9 @@ const FlownStep* Flight::fly_step() {
       FlownStep& flown = steps_[group.vehicles[i]];
       Vehicle& vehicle = vehicles_[group.vehicles[i]];
       flown.truth = group.plant->measurement(i);
-      flown.measured = vehicle.faults.measure(flown.step, flown.truth);
+      // Contract 1 of the topics carries the bodies alone: no attitude, no signals.
+      flown.measured = static_cast<const model::SlungLoadState&>(
+          vehicle.faults.measure(flown.step, flown.truth));
       const control::ControllerMemory memory = flown.answer.memory;
       const auto began = measures_compute_time_ ? Clock::now() : Clock::time_point();
       flown.answer = vehicle.controller.calc_answer(flown.step, flown.measured, memory);

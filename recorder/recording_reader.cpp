@@ -133,7 +133,7 @@ std::uint64_t find_next_step(const RecordedFlight& flight) {
 std::vector<std::uint64_t> read_status_indices(const RecordedFlight& flight) {
   std::vector<std::uint64_t> indices;
   for (const RecordedSegment& segment : flight.segments) {
-    CsvReader file(segment.folder / kStatusFile, kStatusHeader);
+    CsvReader file(segment.folder / kStatusFile, make_status_header());
     while (file.next()) FieldParser{file}(indices.emplace_back());
   }
   return indices;
