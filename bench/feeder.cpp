@@ -139,7 +139,8 @@ class FleetStream {
 
 template <class Stream>
 nlohmann::json feed(const config::Scenario& scenario, const FeederOptions& options) {
-  std::vector<closed_loop::StepSamples> samples = closed_loop::fly_samples(scenario, options.steps, kRunId);
+  std::vector<closed_loop::StepSamples> samples =
+      closed_loop::fly_samples(scenario, options.steps, kRunId);
   samples.back().command.mission(MISSION_FINISHED);
   bus::Node node(options.qos_file, options.domain, "bench", "server");
   Stream stream(node, options.vehicles);

@@ -42,7 +42,8 @@ void closed_form_step(benchmark::State& run) { step_plants<sim::AnalyticPlant>(r
 BENCHMARK(closed_form_step)->Arg(1)->Arg(2)->Arg(10)->Arg(100);
 
 const std::vector<closed_loop::StepSamples>& samples() {
-  static const std::vector<closed_loop::StepSamples> flown = closed_loop::fly_samples(load(), 1000, 1);
+  static const std::vector<closed_loop::StepSamples> flown =
+      closed_loop::fly_samples(load(), 1000, 1);
   return flown;
 }
 
@@ -51,14 +52,15 @@ void control_law(benchmark::State& run) {
   std::size_t i = 0;
   for (auto _ : run) {
     const VehicleState& state = samples()[i++ % samples().size()].state;
-    benchmark::DoNotOptimize(controller.calc_answer(state.step(), control::to_model_state(state),
-                                                    control::to_memory(state.controller())));
+    benchmark::DoNotOptimize(
+        controller.calc_answer(state.step(), control::to_model_state(state),
+                               control::to_memory(state.controller(), controller.memory_size())));
   }
 }
 BENCHMARK(control_law);
 
 template <class Type, class Message>
-void serialize(benchmark::State& run, Message StepSamples::*member) {
+void serialize(benchmark::State& run, Message closed_loop::StepSamples::*member) {
   Type type;
   const auto& all = samples();
   eprosima::fastrtps::rtps::SerializedPayload_t payload(type.m_typeSize);
@@ -71,13 +73,13 @@ void serialize(benchmark::State& run, Message StepSamples::*member) {
   }
 }
 void serialize_state(benchmark::State& run) {
-  serialize<VehicleStatePubSubType>(run, &StepSamples::state);
+  serialize<VehicleStatePubSubType>(run, &closed_loop::StepSamples::state);
 }
 void serialize_command(benchmark::State& run) {
-  serialize<ControlCommandPubSubType>(run, &StepSamples::command);
+  serialize<ControlCommandPubSubType>(run, &closed_loop::StepSamples::command);
 }
 void serialize_reference(benchmark::State& run) {
-  serialize<ReferencePubSubType>(run, &StepSamples::reference);
+  serialize<ReferencePubSubType>(run, &closed_loop::StepSamples::reference);
 }
 BENCHMARK(serialize_state);
 BENCHMARK(serialize_command);

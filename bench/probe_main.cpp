@@ -13,11 +13,11 @@
 #include <vector>
 
 #include "bench/feeder.hpp"
-#include "closed_loop/flight.hpp"
 #include "bench/ping_pong.hpp"
 #include "bench/recording_speed.hpp"
 #include "bench/stamps.hpp"
 #include "bench/timer_jitter.hpp"
+#include "closed_loop/flight.hpp"
 #include "common/app/run_main.hpp"
 #include "common/bus/qos_file.hpp"
 #include "common/config/scenario.hpp"

@@ -137,8 +137,9 @@ double write_plain_files(std::vector<record::StepRows> steps, std::uint32_t vehi
 }
 
 /// What a lockstep run brings, in its order.
-void feed(record::Recording& recording, std::vector<closed_loop::StepSamples>& samples, std::uint32_t vehicles) {
-  for (StepSamples& step : samples) {
+void feed(record::Recording& recording, std::vector<closed_loop::StepSamples>& samples,
+          std::uint32_t vehicles) {
+  for (closed_loop::StepSamples& step : samples) {
     for (std::uint32_t id = 0; id < vehicles; ++id) {
       step.state.vehicle_id(id);
       recording.add(step.state);
@@ -163,7 +164,8 @@ nlohmann::json measure_recording(const config::Scenario& scenario, std::uint32_t
   nlohmann::json json;
   json["rows"] = kFiles.size() * samples.size() * vehicles;
   {
-    record::Recording recording(ours.path(), closed_loop::make_parameters(scenario, kRunId, vehicles));
+    record::Recording recording(ours.path(),
+                                closed_loop::make_parameters(scenario, kRunId, vehicles));
     recording.add(closed_loop::make_status(kRunId, 0, PHASE_RUNNING, 0));
     auto began = Clock::now();
     feed(recording, samples, vehicles);

@@ -5,8 +5,8 @@
 #include <mutex>
 #include <string>
 
-#include "sim_server/operator/operator_client.hpp"
 #include "tests/system/process.hpp"
+#include "tools/ctl/operator_client.hpp"
 
 namespace sls::test {
 
@@ -54,7 +54,7 @@ class Operator {
   }
 
   bus::Node node_;
-  operation::OperatorClient client_;
+  ctl::OperatorClient client_;
   mutable std::mutex mutex_;  // over what follows
   RunPhase phase_ = PHASE_WAITING;
   std::size_t samples_ = 0;
