@@ -50,9 +50,11 @@ int main(int argc, char** argv) {
         std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
     if (!end.failure.empty())
       throw app::RunError(fmt::format("step {}: {}", end.last_step, end.failure));
+    if (!folder.empty() && !end.is_complete)
+      throw app::RunError(fmt::format("{}: the recording is not complete", folder.string()));
     const auto steps = static_cast<double>(end.last_step);
     spdlog::info("finished: {} steps, {} s simulated in {:.2f} s, {:.0f} steps/s", end.last_step,
-                 steps * 1e-9 * static_cast<double>(scenario.sync.period_ns), wall_s,
+                 steps * static_cast<double>(scenario.sync.period_ns) * 1e-9, wall_s,
                  steps / wall_s);
   });
 }

@@ -42,13 +42,15 @@ FlightEnd fly_recorded(const config::Scenario& scenario, const FlightOptions& op
     recording.flush_if_due();
   }
   FlightEnd end{board.step, flight.failure(), false};
-  const bool is_interrupted = app::stop_signal() != 0;
+  if (app::stop_signal() != 0) {
+    end.failure = "interrupted";
+    recording.finish(end.failure, 0);
+    return end;
+  }
   if (ids.size() > 1) board.controller_names.assign(ids.size(), options.controller_name);
-  const bool has_failed = is_interrupted || !end.failure.empty();
-  if (is_interrupted) end.failure = "interrupted";
-  board.publish(has_failed ? PHASE_FAILED : PHASE_FINISHED,
-                has_failed ? end.failure : "mission finished");
-  end.is_complete = recording.finish(is_interrupted ? "interrupted" : "", 0);
+  board.publish(end.failure.empty() ? PHASE_FINISHED : PHASE_FAILED,
+                end.failure.empty() ? "mission finished" : end.failure);
+  end.is_complete = recording.finish("", 0);
   return end;
 }
 

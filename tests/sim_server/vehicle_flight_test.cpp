@@ -33,7 +33,7 @@ class VehicleFlightTest : public testing::Test {
 
   /// Flies `step` without an answer to it, the answers to `late` having come during it.
   void fly(std::uint64_t step, const std::vector<std::uint64_t>& late) {
-    flight_.measure(step);
+    flight_.measure(step, {});
     for (const std::uint64_t answered : late) flight_.keep_late_answer(make_answer(answered));
     flight_.fly_without_answer(flight_.absence.decide(0.0, 0.0));
   }
@@ -67,7 +67,7 @@ TEST_F(VehicleFlightTest, OnlyANewerAnswerIsFresh) {
 }
 
 TEST_F(VehicleFlightTest, ALateAnswerEndsTheAbsence) {
-  flight_.measure(0);
+  flight_.measure(0, {});
   flight_.note_waiting(VehicleFlight::Clock::now() - std::chrono::hours(1));
   EXPECT_GE(flight_.calc_absence_s(), 3600.0);
   flight_.keep_late_answer(make_answer(0));
@@ -77,7 +77,7 @@ TEST_F(VehicleFlightTest, ALateAnswerEndsTheAbsence) {
 TEST_F(VehicleFlightTest, APauseIsNoAbsence) {
   flight_.note_rest(std::chrono::hours(1));
   EXPECT_EQ(flight_.calc_absence_s(), 0.0);
-  flight_.measure(0);
+  flight_.measure(0, {});
   flight_.note_waiting(VehicleFlight::Clock::now() - std::chrono::hours(2));
   flight_.note_rest(std::chrono::hours(1));
   EXPECT_GE(flight_.calc_absence_s(), 3600.0);
