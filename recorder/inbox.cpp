@@ -4,15 +4,18 @@
 
 #include <algorithm>
 #include <chrono>
-#include <iterator>
 #include <thread>
 #include <utility>
 
 namespace sls::record {
 namespace {
 
-constexpr std::size_t kMaxSamples = 262'144;  // of one run: of 100 vehicles at 250 Hz 3 s
-constexpr std::size_t kMaxRuns = 4;           // another vehicle's may be on the domain too
+/// Of the open run, and of all others together: of 100 vehicles at 250 Hz 3 s.
+constexpr std::size_t kMaxSamples = 262'144;
+
+std::uint64_t find_run_id(const Inbox::Sample& sample) {
+  return std::visit([](const auto& message) { return message.run_id(); }, sample);
+}
 
 /// How often the calling thread has waited for anything.
 long count_waits() {
@@ -35,8 +38,9 @@ void rest_when_idle() {
 
 }  // namespace
 
-Inbox::Inbox(bus::Node& node)
-    : state_reader_(node, bus::kRecorderReaderProfile,
+Inbox::Inbox(bus::Node& node, std::function<bool(std::uint64_t)> may_be_opened)
+    : may_be_opened_(std::move(may_be_opened)),
+      state_reader_(node, bus::kRecorderReaderProfile,
                     [this](const VehicleState& sample, const bus::PeerId& sender) {
                       put(&sample, 1, sender);
                     }),
@@ -70,15 +74,16 @@ void Inbox::put(const Vehicle* samples, std::size_t count, const bus::PeerId& se
     const std::lock_guard lock(mutex_);
     for (const Vehicle* sample = samples; sample != samples + count; ++sample) {
       const std::uint64_t run_id = sample->run_id();
-      if (closed_.count(run_id) > 0) continue;
-      const auto known = runs_.find(run_id);
-      if (known == runs_.end() && runs_.size() >= kMaxRuns)
-        runs_.erase(runs_.begin()->first == open_ ? std::next(runs_.begin()) : runs_.begin());
-      Run& run = runs_[run_id];
-      if (run.samples.size() < kMaxSamples)
-        run.samples.push_back({*sample, sender});
-      else
-        ++run.refused;
+      if (run_id == open_) {
+        if (samples_.size() < kMaxSamples)
+          samples_.push_back({*sample, sender});
+        else
+          ++refused_;
+      } else if (closed_.count(run_id) == 0 && may_be_opened_(run_id)) {
+        // What is pushed out, the recording names as missing.
+        if (waiting_.size() == kMaxSamples) waiting_.pop_front();
+        waiting_.push_back({*sample, sender});
+      }
     }
   }
   rest_when_idle();
@@ -87,9 +92,17 @@ void Inbox::put(const Vehicle* samples, std::size_t count, const bus::PeerId& se
 void Inbox::open(std::uint64_t run_id, const bus::PeerId& server) {
   const std::lock_guard lock(mutex_);
   if (open_ != 0) closed_.insert(open_);
-  runs_.erase(open_);
   open_ = run_id;
   server_ = server;
+  samples_.clear();
+  refused_ = 0;
+  for (Received& received : std::exchange(waiting_, {})) {
+    const std::uint64_t run = find_run_id(received.sample);
+    if (run == run_id)
+      samples_.push_back(std::move(received));
+    else if (may_be_opened_(run))
+      waiting_.push_back(std::move(received));
+  }
 }
 
 bool Inbox::belongs(const Received& received) const {
@@ -102,7 +115,7 @@ std::deque<Inbox::Received> Inbox::take_all() {
   std::deque<Received> all;
   {
     const std::lock_guard lock(mutex_);
-    all.swap(runs_[open_].samples);
+    all.swap(samples_);
   }
   all.erase(std::remove_if(all.begin(), all.end(),
                            [this](const Received& received) { return !belongs(received); }),
@@ -112,8 +125,7 @@ std::deque<Inbox::Received> Inbox::take_all() {
 
 std::uint64_t Inbox::refused() const {
   const std::lock_guard lock(mutex_);
-  const auto run = runs_.find(open_);
-  return run == runs_.end() ? 0 : run->second.refused;
+  return refused_;
 }
 
 bool Inbox::hears_server(const bus::PeerId& server, bool is_fleet) const {

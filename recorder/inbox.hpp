@@ -2,7 +2,7 @@
 
 #include <cstdint>
 #include <deque>
-#include <map>
+#include <functional>
 #include <mutex>
 #include <set>
 #include <variant>
@@ -11,15 +11,16 @@
 
 namespace sls::record {
 
-/// What the topics bring, sorted by run, on its way from the middleware's threads to the writing
+/// What the topics bring of the open run, on its way from the middleware's threads to the writing
 /// one; a fleet's samples vehicle by vehicle. The readers live as long as the recorder: new ones
-/// would be sent all histories again, of earlier runs too. Putting never blocks; a run's samples
-/// that do not fit are counted.
+/// would be sent all histories again, of earlier runs too. So samples of a run that may be opened
+/// next wait for that. Putting never blocks; samples of the open run that do not fit are counted.
 class Inbox {
  public:
   using Sample = std::variant<VehicleState, ControlCommand, Reference, SimStatus>;
 
-  explicit Inbox(bus::Node& node);
+  /// `may_be_opened` is asked about runs on the middleware's threads: others are not kept.
+  Inbox(bus::Node& node, std::function<bool(std::uint64_t run_id)> may_be_opened);
 
   /// From now on run `run_id` is recorded, what has come of it so far included. States and status
   /// samples count from its `server` alone: only that knows where the run is.
@@ -42,17 +43,16 @@ class Inbox {
   bool hears_client(const bus::PeerId& client, bool is_fleet) const;
 
  private:
-  struct Run {
-    std::deque<Received> samples;
-    std::uint64_t refused = 0;
-  };
   template <class Vehicle>
   void put(const Vehicle* samples, std::size_t count, const bus::PeerId& sender);
   bool belongs(const Received& received) const;
 
+  const std::function<bool(std::uint64_t)> may_be_opened_;
   mutable std::mutex mutex_;
-  std::map<std::uint64_t, Run> runs_;  // the open one, and those that may be opened
-  std::set<std::uint64_t> closed_;     // have been open
+  std::deque<Received> samples_;    // of the open run
+  std::uint64_t refused_ = 0;       // likewise
+  std::deque<Received> waiting_;    // of runs that may be opened
+  std::set<std::uint64_t> closed_;  // have been open
   std::uint64_t open_ = 0;
   bus::PeerId server_;
   bus::Reader<VehicleState> state_reader_;

@@ -2,6 +2,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <thread>
 #include <utility>
 
@@ -36,10 +37,18 @@ std::optional<bus::Run> wait_for_run(const bus::Node& node, const std::string& w
 
 std::string to_text(std::uint64_t run_id) { return fmt::format("{:016x}", run_id); }
 
+/// A recording that is continued has its vehicles, whichever the options name.
+std::uint32_t choose_vehicle(const RecorderOptions& options) {
+  const auto ids = options.unfinished ? options.unfinished->vehicle_ids()
+                                      : std::vector<std::uint32_t>{options.vehicle};
+  const bool is_among = std::find(ids.begin(), ids.end(), options.vehicle) != ids.end();
+  return is_among || ids.empty() ? options.vehicle : ids.front();
+}
+
 }  // namespace
 
 Recorder::Recorder(bus::Node& node, const RecorderOptions& options)
-    : options_(options), node_(node), surroundings_(node) {}
+    : options_(options), node_(node), surroundings_(node, choose_vehicle(options)) {}
 
 void Recorder::run() {
   surroundings_.participant_writer.write(make_announcement(nullptr, false, false, -1));
@@ -69,7 +78,7 @@ std::optional<bus::Run> Recorder::wait_for_first_run() const {
       options_.unfinished ? "server of run " + options_.unfinished->manifest().run_id : "server";
   return wait_for_run(node_, whom, kJoinTimeout, [this] {
     const auto unfinished = find_unfinished_run();
-    return unfinished ? unfinished : surroundings_.servers.find_joinable(options_.vehicle);
+    return unfinished ? unfinished : surroundings_.servers.find_joinable(surroundings_.vehicle);
   });
 }
 
@@ -116,7 +125,7 @@ std::optional<bus::Run> Recorder::wait_for_next_run(const bus::Run& ended, doubl
 }
 
 std::optional<bus::Run> Recorder::find_follower(const bus::Run& ended) const {
-  auto next = surroundings_.servers.find_successor(ended, {options_.vehicle});
+  auto next = surroundings_.servers.find_successor(ended, {surroundings_.vehicle});
   if (next && !(next->server == ended.server) && !options_.follow) return std::nullopt;
   return next;
 }

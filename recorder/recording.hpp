@@ -95,7 +95,7 @@ class Recording {
   std::uint64_t unanswered_steps_ = 0;
   std::uint64_t rebuilt_commands_ = 0;
   std::optional<SimStatus> last_status_;
-  std::uint64_t next_status_ = 0;  // sample_index after the last one of all segments
+  std::uint64_t next_status_ = 0;      // sample_index after the last one of all segments
   std::string interruption_;           // from `finish` on
   std::uint64_t refused_samples_ = 0;  // likewise
   std::chrono::steady_clock::time_point flush_time_;

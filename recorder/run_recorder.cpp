@@ -123,7 +123,7 @@ void RunRecorder::look_for_the_end(bus::ServerWatch& server) {
 
 /// Another run may be the end of this one: its own server's, or that of a server in its place.
 void RunRecorder::look_for_the_next_run() {
-  const auto next = surroundings_.servers.find_successor(run_, {run_.parameters.vehicle_id()});
+  const auto next = surroundings_.servers.find_successor(run_, {surroundings_.vehicle});
   if (!next) return;
   end_.is_reset = next->server == run_.server;
   if (!end_.is_reset) end_.replacement = next;

@@ -20,9 +20,15 @@ namespace sls::record {
 
 /// What outlives a run.
 struct Surroundings {
-  explicit Surroundings(bus::Node& domain)
-      : participants(domain), servers(domain), participant_writer(domain), inbox(domain) {}
+  /// Runs that fly `flown_vehicle` are recorded.
+  Surroundings(bus::Node& domain, std::uint32_t flown_vehicle)
+      : vehicle(flown_vehicle),
+        participants(domain),
+        servers(domain),
+        participant_writer(domain),
+        inbox(domain, [this](std::uint64_t run_id) { return servers.may_fly(run_id, vehicle); }) {}
 
+  const std::uint32_t vehicle;
   bus::ParticipantDirectory participants;
   bus::ServerDirectory servers;
   bus::Writer<Participant> participant_writer;

@@ -238,6 +238,12 @@ bool ServerDirectory::is_known(std::uint64_t run_id) const {
          is_present_run(*owner, known, present);
 }
 
+bool ServerDirectory::may_fly(std::uint64_t run_id, std::uint32_t vehicle_id) const {
+  const std::lock_guard lock(mutex_);
+  const auto owner = find_owner(run_id);
+  return !owner || serves_vehicle(*servers_.at(*owner).parameters, vehicle_id);
+}
+
 std::optional<Run> ServerDirectory::find_joinable(std::uint32_t vehicle_id) const {
   return find_best(runs(), vehicle_id);
 }

@@ -103,6 +103,10 @@ class ServerDirectory {
   /// True where `run_id` is among `runs()`.
   bool is_known(std::uint64_t run_id) const;
 
+  /// False where the server of run `run_id` is known, also one that has gone, and does not fly
+  /// `vehicle_id`.
+  bool may_fly(std::uint64_t run_id, std::uint32_t vehicle_id) const;
+
   /// The run to join for `vehicle_id`: present, settled, neither finished nor failed; among several
   /// the one that is furthest, then the lowest run_id.
   std::optional<Run> find_joinable(std::uint32_t vehicle_id) const;

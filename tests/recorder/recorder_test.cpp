@@ -291,6 +291,7 @@ TEST_F(RecorderTest, AKilledRecorderIsResumedInMidFlight) {
   FakeFlight flight(kRunId);
   flight.fly(0, 200);  // the histories hold what the next recorder needs
   options_.unfinished = find_unfinished_recording(out_);
+  options_.vehicle = 3;  // which vehicle it is of, the recording tells
   start();
   ASSERT_TRUE(flight.is_recorded_up_to(199));
   flight.fly(201, kLastStep);

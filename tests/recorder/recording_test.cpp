@@ -584,7 +584,8 @@ TEST_F(RecordingTest, StatusSamplesThatComeAgainAreOneRow) {
 
 TEST_F(RecordingTest, MissingStatusSamplesAreNamedAndTheRecordingIsNotComplete) {
   std::vector<SimStatus> statuses;
-  for (int i = 0; i < 40; ++i) statuses.push_back(make_status(PHASE_WAITING, 0, "missing: recorder"));
+  for (int i = 0; i < 40; ++i)
+    statuses.push_back(make_status(PHASE_WAITING, 0, "missing: recorder"));
   for (int i = 23; i < 40; ++i)
     if (i != 30 && i != 31) recording_->add(statuses[i]);
   fly_to_the_end();

@@ -366,5 +366,33 @@ TEST_F(FleetTest, NeitherMemoryNorDescriptorsGrowInFlightAndNothingIsLeftBehind)
   for (const auto& segment : segments) EXPECT_FALSE(fs::exists(segment)) << segment;
 }
 
+TEST_F(FleetTest, ARecorderKeepsNothingOfAnotherRunOnItsDomain) {
+  const std::string file = make_fleet_scenario(
+      folder_, {{"for_s: 0.4", "for_s: 30"}, {"timeout_s: 30", "timeout_s: 300"}});
+  const auto recorder = start("recorder", {"--out", recording()});
+  ASSERT_TRUE(wait_until([&] { return holds(recorder->output(), "waiting for: server"); }))
+      << recorder->output();
+  const long before_kb = read_resources(recorder->id()).resident_kb;
+  const std::string others = folder_ / "others";
+  std::vector<std::unique_ptr<Process>> programs;
+  programs.push_back(start("recorder", {"--out", others, "--vehicle", "1"}));
+  for (const char* name : {"sim_server", "control_client"})
+    programs.push_back(start(name, {"--scenario", file, "--vehicles", "1-5"}));
+  ASSERT_TRUE(wait_until([&] { return read_file(others + "/state.csv").size() > 1'000'000; }))
+      << programs[0]->output();
+  // Its own run begins amid the other one, and waits for its client until that is over.
+  const auto server = start("sim_server", {"--scenario", file, "--vehicles", "0"});
+  for (const auto& process : programs) EXPECT_EQ(process->wait(), 0) << process->output();
+  ASSERT_TRUE(holds(recorder->output(), "records run")) << recorder->output();
+  // State, command and reference of five vehicles and 7,500 steps at least went by, of 200 bytes
+  // at least: kept, they would be 22 MB (and were 83). More participants and a run of its own take
+  // about 4 MB.
+  EXPECT_LT(read_resources(recorder->id()).resident_kb, before_kb + 11'000);
+  const auto client = start("control_client", {"--scenario", file, "--vehicles", "0"});
+  for (Process* process : {server.get(), client.get(), recorder.get()})
+    EXPECT_EQ(process->wait(), 0) << process->output();
+  expect_each_flies_as_alone(recording(), file, {0});
+}
+
 }  // namespace
 }  // namespace sls::test
