@@ -106,6 +106,7 @@ void LockstepRun::resend(Clock::time_point now) {
   endpoints_.states.write_where(
       [this](std::size_t i) { return !vehicles_[i]->gate.accepted().has_value(); });
   ++link_.resent();
+  recorder_window_.note_resent(board_.step);
   timer_.resent();
   resend_at_ = last_sent_ + timer_.timeout();
 }

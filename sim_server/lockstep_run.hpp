@@ -44,7 +44,7 @@ class LockstepRun : public Run {
   void take_over_if_silent(Clock::time_point now);
   std::string name_blocking() const;
 
-  const std::int64_t recorder_window_ = calc_recorder_window(endpoints_.states.history_depth());
+  RecorderWindow recorder_window_{calc_recorder_window(endpoints_.states.history_depth())};
   RetransmissionTimer timer_;
 
   std::mutex step_mutex_;  // over what a step touches

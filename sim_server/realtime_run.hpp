@@ -44,7 +44,7 @@ class RealtimeRun : public Run {
   /// not, or never; from then on they are judged by their step alone.
   void check_clocks();
 
-  const std::int64_t recorder_window_ = calc_recorder_window(endpoints_.states.history_depth());
+  const RecorderWindow recorder_window_{calc_recorder_window(endpoints_.states.history_depth())};
   StateStream::Queue state_queue_;
   Schedule schedule_;
   Clock::time_point published_;         // when the state in work was

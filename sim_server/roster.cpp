@@ -47,12 +47,6 @@ std::int64_t find_next_step(const Entry& recorder) {
   return std::clamp<std::int64_t>(recorder.announcement.last_complete_step(), -1, kLargest - 1) + 1;
 }
 
-/// The first step that must wait for the recorder, which may be `window` behind.
-std::int64_t find_limit(const Entry& recorder, std::int64_t window) {
-  const std::int64_t next = find_next_step(recorder);
-  return next + std::min(window, std::numeric_limits<std::int64_t>::max() - next);
-}
-
 void append(std::string& list, const std::string& item) {
   if (!list.empty()) list += ", ";
   list += item;
@@ -112,19 +106,33 @@ std::int64_t calc_recorder_window(int history_depth) {
   return std::clamp<std::int64_t>(history_depth * 2LL / 5, 1, kRecorderWindow);
 }
 
-std::uint64_t calc_recorder_limit(const Roster& roster, int expected, std::int64_t window) {
+void RecorderWindow::note_resent(std::uint64_t step) {
+  resent_.push_back(static_cast<std::int64_t>(step));
+  if (static_cast<std::int64_t>(resent_.size()) > 2 * steps_) resent_.pop_front();
+}
+
+std::int64_t RecorderWindow::find_limit(std::int64_t next) const {
+  const auto later = std::upper_bound(resent_.begin(), resent_.end(), next);
+  const std::int64_t resent_later = resent_.end() - later;
+  const std::int64_t steps = std::clamp<std::int64_t>(2 * steps_ - resent_later, 0, steps_);
+  return next + std::min(steps, std::numeric_limits<std::int64_t>::max() - next);
+}
+
+std::uint64_t calc_recorder_limit(const Roster& roster, int expected,
+                                  const RecorderWindow& window) {
   const auto waited_for = find_recorders_to_wait_for(roster, expected);
   if (static_cast<int>(waited_for.size()) < expected) return 0;
   std::int64_t limit = std::numeric_limits<std::int64_t>::max();
-  for (const Entry* entry : waited_for) limit = std::min(limit, find_limit(*entry, window));
+  for (const Entry* entry : waited_for)
+    limit = std::min(limit, window.find_limit(find_next_step(*entry)));
   return static_cast<std::uint64_t>(limit);
 }
 
 std::string name_blocking_recorder(const Roster& roster, int expected, std::uint64_t step,
-                                   std::int64_t window) {
+                                   const RecorderWindow& window) {
   const auto waited_for = find_recorders_to_wait_for(roster, expected);
   for (const Entry* entry : waited_for) {
-    if (static_cast<std::int64_t>(step) >= find_limit(*entry, window))
+    if (static_cast<std::int64_t>(step) >= window.find_limit(find_next_step(*entry)))
       return fmt::format("recorder {}: {} steps behind", describe(*entry),
                          static_cast<std::int64_t>(step) - find_next_step(*entry));
   }

@@ -118,8 +118,31 @@ TEST(RosterTest, TheWindowIsSmallerWhereTheHistoryIs) {
   EXPECT_EQ(calc_recorder_window(1000000), kRecorderWindow);
   EXPECT_EQ(calc_recorder_window(1000), 400);
   EXPECT_EQ(calc_recorder_window(1), 1);
-  EXPECT_EQ(name_blocking_recorder({{}, {make_recorder_at(-1)}}, 1, 399, 400), "");
-  EXPECT_NE(name_blocking_recorder({{}, {make_recorder_at(-1)}}, 1, 400, 400), "");
+  EXPECT_EQ(name_blocking_recorder({{}, {make_recorder_at(-1)}}, 1, 399, RecorderWindow(400)), "");
+  EXPECT_NE(name_blocking_recorder({{}, {make_recorder_at(-1)}}, 1, 400, RecorderWindow(400)), "");
+}
+
+// The histories hold samples, not steps.
+TEST(RosterTest, TheWindowIsSmallerWhereStatesAreSentMoreThanTwice) {
+  const Roster roster = {{}, {make_recorder_at(9)}};  // step 10 comes next
+  RecorderWindow window(400);
+  const auto is_free = [&](std::uint64_t step) {
+    const bool is_named = !name_blocking_recorder(roster, 1, step, window).empty();
+    EXPECT_EQ(is_named, step >= calc_recorder_limit(roster, 1, window)) << step;
+    return !is_named;
+  };
+  for (int i = 0; i < 5000; ++i) window.note_resent(10);
+  EXPECT_TRUE(is_free(409)) << "one of those samples is enough";
+  EXPECT_FALSE(is_free(410));
+  for (int i = 0; i < 400; ++i) window.note_resent(11);
+  EXPECT_TRUE(is_free(409)) << "two samples for each step";
+  for (int i = 0; i < 300; ++i) window.note_resent(50);
+  EXPECT_TRUE(is_free(109));
+  EXPECT_FALSE(is_free(110));
+  for (int i = 0; i < 5000; ++i) window.note_resent(109);
+  EXPECT_FALSE(is_free(110));
+  EXPECT_EQ(calc_recorder_limit({{}, {make_recorder_at(108)}}, 1, window), 509u)
+      << "it has caught up";
 }
 
 TEST(RosterTest, ABlockingRecorderIsNamedWithHowFarItIsBehind) {
@@ -244,7 +267,7 @@ TEST(RosterTest, VehiclesWithoutAControllerAreNamed) {
 }
 
 TEST(RosterTest, TheLimitIsTheFirstStepThatARecorderBlocks) {
-  for (const std::int64_t window : {1, 10, 2000})
+  for (const RecorderWindow window : {RecorderWindow(1), RecorderWindow(10), RecorderWindow(2000)})
     for (const std::int64_t last : {-1, 0, 7, 5000}) {
       const Roster roster = {{}, {make_recorder_at(last), make_recorder_at(last + 3)}};
       const std::uint64_t limit = calc_recorder_limit(roster, 2, window);
@@ -255,11 +278,11 @@ TEST(RosterTest, TheLimitIsTheFirstStepThatARecorderBlocks) {
 }
 
 TEST(RosterTest, WithoutTheExpectedRecordersNoStepIsWithinTheLimit) {
-  EXPECT_EQ(calc_recorder_limit({{}, {make_recorder_at(5)}}, 2, 10), 0u);
+  EXPECT_EQ(calc_recorder_limit({{}, {make_recorder_at(5)}}, 2, RecorderWindow()), 0u);
 }
 
 TEST(RosterTest, WithoutRecordersNoStepIsBeyondTheLimit) {
-  EXPECT_GT(calc_recorder_limit({}, 0, 10), std::uint64_t{1} << 62);
+  EXPECT_GT(calc_recorder_limit({}, 0, RecorderWindow()), std::uint64_t{1} << 62);
 }
 
 }  // namespace

@@ -1,9 +1,12 @@
 /// LD_PRELOAD library that loses datagrams: of those a process sends over IPv4, SLS_DROP_PERCENT %
-/// never leave it, chosen by a generator seeded with SLS_DROP_SEED. The sender is told they did, as
-/// on a real network. How many it lost is printed when the process ends.
+/// never leave it, and of those sent to it, SLS_DROP_RECEIVED_PERCENT % never reach it, chosen by a
+/// generator seeded with SLS_DROP_SEED; where SLS_DROP_WHILE names a file, only while that exists.
+/// The sender is told they did, as on a real network. How many it lost is printed when the process
+/// ends.
 #include <dlfcn.h>
 #include <sys/socket.h>
 #include <sys/types.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <cstdint>
@@ -14,14 +17,14 @@
 
 namespace {
 
-std::atomic<std::uint64_t> sent{0}, lost{0};
+std::atomic<std::uint64_t> passed{0}, lost{0};
 
 double read_environment(const char* name) {
   const char* text = std::getenv(name);
   return text ? std::strtod(text, nullptr) : 0.0;
 }
 
-bool is_lost(int socket) {
+bool is_lost(int socket, double percent) {
   int type = 0, domain = 0;
   socklen_t size = sizeof type;
   if (getsockopt(socket, SOL_SOCKET, SO_TYPE, &type, &size) != 0 || type != SOCK_DGRAM)
@@ -29,14 +32,20 @@ bool is_lost(int socket) {
   size = sizeof domain;
   if (getsockopt(socket, SOL_SOCKET, SO_DOMAIN, &domain, &size) != 0 || domain != AF_INET)
     return false;
-  static const double probability = read_environment("SLS_DROP_PERCENT") / 100.0;
+  static const char* const condition = std::getenv("SLS_DROP_WHILE");
+  if (condition && access(condition, F_OK) != 0) return false;
   static std::mt19937_64 generator(static_cast<std::uint64_t>(read_environment("SLS_DROP_SEED")));
   static std::mutex mutex;
   const std::lock_guard lock(mutex);
-  ++sent;
-  if (std::uniform_real_distribution<double>()(generator) >= probability) return false;
+  ++passed;
+  if (std::uniform_real_distribution<double>(0, 100)(generator) >= percent) return false;
   ++lost;
   return true;
+}
+
+bool is_lost_on_sending(int socket) {
+  static const double percent = read_environment("SLS_DROP_PERCENT");
+  return is_lost(socket, percent);
 }
 
 template <class Function>
@@ -47,7 +56,7 @@ Function find_original(const char* name) {
 struct Report {
   ~Report() {
     std::fprintf(stderr, "drop_shim: lost %llu of %llu datagrams\n",
-                 static_cast<unsigned long long>(lost), static_cast<unsigned long long>(sent));
+                 static_cast<unsigned long long>(lost), static_cast<unsigned long long>(passed));
   }
 } report;
 
@@ -55,7 +64,7 @@ struct Report {
 
 extern "C" ssize_t sendmsg(int socket, const msghdr* message, int flags) {
   static const auto original = find_original<ssize_t (*)(int, const msghdr*, int)>("sendmsg");
-  if (!is_lost(socket)) return original(socket, message, flags);
+  if (!is_lost_on_sending(socket)) return original(socket, message, flags);
   std::size_t bytes = 0;
   for (std::size_t i = 0; i < message->msg_iovlen; ++i) bytes += message->msg_iov[i].iov_len;
   return static_cast<ssize_t>(bytes);
@@ -66,6 +75,19 @@ extern "C" ssize_t sendto(int socket, const void* data, std::size_t bytes, int f
   static const auto original =
       find_original<ssize_t (*)(int, const void*, std::size_t, int, const sockaddr*, socklen_t)>(
           "sendto");
-  if (!is_lost(socket)) return original(socket, data, bytes, flags, to, size);
+  if (!is_lost_on_sending(socket)) return original(socket, data, bytes, flags, to, size);
   return static_cast<ssize_t>(bytes);
+}
+
+extern "C" ssize_t recvfrom(int socket, void* data, std::size_t bytes, int flags, sockaddr* from,
+                            socklen_t* size) {
+  static const auto original =
+      find_original<ssize_t (*)(int, void*, std::size_t, int, sockaddr*, socklen_t*)>("recvfrom");
+  static const double percent = read_environment("SLS_DROP_RECEIVED_PERCENT");
+  const socklen_t room = size ? *size : 0;
+  while (true) {
+    const ssize_t count = original(socket, data, bytes, flags, from, size);
+    if (count < 0 || percent == 0.0 || !is_lost(socket, percent)) return count;
+    if (size) *size = room;
+  }
 }

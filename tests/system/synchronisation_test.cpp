@@ -379,6 +379,48 @@ TEST(WaitingTest, PolicyGoOnFliesToTheEndWithoutTheRecorder) {
   EXPECT_EQ(flight.client->wait(), 0) << flight.outputs();
 }
 
+/// `udp` with a history of `samples` states, commands and references: a file in `folder`.
+std::string make_qos(const TemporaryFolder& folder, const std::string& samples) {
+  const std::string endpoints = read_file(qos("endpoints")), end = "</data_writer>";
+  const auto from = endpoints.find("<data_writer profile_name=\"sls_stream_writer\">");
+  std::string profile = endpoints.substr(from, endpoints.find(end, from) + end.size() - from);
+  for (auto at = profile.find("5000"); at != profile.npos; at = profile.find("5000"))
+    profile.replace(at, 4, samples);
+  const std::string file = folder / "qos.xml";
+  write_bytes(file,
+              replace_once(read_file(qos("udp")), "\n  </profiles>", profile + "\n  </profiles>"));
+  return file;
+}
+
+// A history holds samples, not steps: three for each step fill it before the server is two fifths
+// of it ahead in steps.
+TEST(WaitingTest, StatesSentManyTimesCostARecorderThatIsBehindNothing) {
+  TemporaryFolder folder;
+  const std::string file =
+      make_scenario(folder, {{"timeout_s: 30", "timeout_s: 120"}}, "figure_eight");
+  const std::string condition = folder / "loss";
+  const std::vector<std::string> shim = {"env", std::string("LD_PRELOAD=") + SLS_DROP_SHIM,
+                                         "SLS_DROP_SEED=1", "SLS_DROP_WHILE=" + condition};
+  FlightOptions options;
+  options.qos_file = make_qos(folder, "400");
+  // While the file is there, a state is sent 3.3 times on average until an answer arrives, and the
+  // recorder announces itself but hears nothing.
+  options.before["control_client"] = options.before["recorder"] = shim;
+  options.before["control_client"].push_back("SLS_DROP_PERCENT=70");
+  options.before["recorder"].push_back("SLS_DROP_RECEIVED_PERCENT=100");
+  Flight flight(file, options);
+  ASSERT_TRUE(flight.wait_for_steps(20)) << flight.outputs();
+  write_bytes(condition, "");
+  ASSERT_TRUE(wait_until([&] { return holds(flight.server->output(), " steps behind"); },
+                         std::chrono::minutes(2)))
+      << flight.outputs();
+  std::filesystem::remove(condition);
+  flight.expect_success();
+  EXPECT_EQ(read_manifest(flight.recording()).at("rebuilt_commands"), 0);
+  const Table status(flight.recording() / "status.csv");
+  EXPECT_GT(status.number(status.rows() - 1, "resent"), 160) << flight.outputs();
+}
+
 TEST(WaitingTest, AStoppedServerIsNamedByClientAndRecorderAndTheFlightGoesOn) {
   Flight flight(scenario("figure_eight"), {{}, {"--period-s", "0.001"}, {}});
   ASSERT_TRUE(flight.wait_for_steps(500)) << flight.outputs();
