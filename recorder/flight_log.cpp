@@ -13,6 +13,9 @@
 namespace sls::record {
 namespace {
 
+/// Of one stage; they take memory and lines. More than anybody reads, of laps worth the name.
+constexpr std::size_t kMaxLaps = 1000;
+
 std::string format_errors(const ErrorStatistics& statistics) {
   const Eigen::Vector3d rms = statistics.calc_rms();
   return fmt::format("{:9.2e} {:9.2e} {:9.2e}  {:9.2e} {:9.2e} {:9.2e}  {:9.2e}", rms.x(), rms.y(),
@@ -112,6 +115,7 @@ void FlightLog::add(const StepRows& rows) {
       !std::holds_alternative<config::FigureEightReference>(scenario_.mission[index].reference))
     return;
   const std::size_t lap = calc_lap(stage, index, rows.step);
+  if (lap >= kMaxLaps) return;
   if (lap >= stage.laps.size()) stage.laps.resize(lap + 1);
   stage.laps[lap].add(error);
 }

@@ -50,7 +50,7 @@ class FlightLog {
     std::uint64_t first_step = 0;  // of which there are rows
     std::uint64_t last_step = 0;
     ErrorStatistics all;
-    std::vector<ErrorStatistics> laps;  // of a figure eight
+    std::vector<ErrorStatistics> laps;  // of a figure eight, the first ones
   };
 
   Stage& find_or_begin_stage(const StepRows& rows);

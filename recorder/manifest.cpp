@@ -1,7 +1,9 @@
 #include "recorder/manifest.hpp"
 
+#include <fcntl.h>
 #include <gnu/libc-version.h>
 #include <sys/utsname.h>
+#include <unistd.h>
 
 #include <spdlog/fmt/fmt.h>
 #include <cerrno>
@@ -54,8 +56,19 @@ Json describe_machine() {
           {"kernel", name.release}};
 }
 
-/// Vehicles of one server (idl/sls.idl); for each of them a recording's rows are read once.
+/// Vehicles of one server (idl/sls.idl).
 constexpr std::size_t kMaxVehicles = 256;
+
+/// What a manifest speaks for must be there after a power cut too.
+void sync_to_disk(const std::filesystem::path& path) {
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  // EINVAL: what this file system cannot do for a file or a folder.
+  const bool is_done = descriptor >= 0 && (::fsync(descriptor) == 0 || errno == EINVAL);
+  const int error = errno;
+  if (descriptor >= 0) ::close(descriptor);
+  if (!is_done)
+    throw std::system_error(error, std::generic_category(), path.string() + ": cannot write");
+}
 
 /// Who verifies somebody else's recording opens the files of that folder and no others.
 bool is_in_folder(const std::filesystem::path& name) {
@@ -107,9 +120,10 @@ std::string describe(const std::vector<MissingSteps>& missing) {
 
 void write_manifest(const std::filesystem::path& folder, const Manifest& manifest) {
   const Parameters& parameters = manifest.parameters;
-  const app::Unhurried unhurried;  // the files are read once more
+  const app::Unhurried unhurried;  // the files are synchronised and read once more
   Json files = Json::object();
   for (const RecordedFile& file : manifest.files) {
+    sync_to_disk(file.path);
     Json entry;
     if (file.has_rows) entry["rows"] = file.rows;
     entry["sha256"] = config::calc_file_sha256(file.path);
@@ -159,17 +173,21 @@ void write_manifest(const std::filesystem::path& folder, const Manifest& manifes
 
   const auto target = folder / "manifest.json";
   const auto part = folder / "manifest.json.part";
-  std::ofstream stream(part, std::ios::binary | std::ios::trunc);
-  // Texts that came over the wire may be cut within a letter: no reason to have no manifest.
-  stream << json.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';
-  stream.close();
-  if (!stream) {
-    const int error = errno;
+  try {
+    std::ofstream stream(part, std::ios::binary | std::ios::trunc);
+    // Texts that came over the wire may be cut within a letter: no reason to have no manifest.
+    stream << json.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';
+    stream.close();
+    if (!stream)
+      throw std::system_error(errno, std::generic_category(), target.string() + ": cannot write");
+    sync_to_disk(part);
+  } catch (const std::system_error&) {
     std::error_code ignored;
     std::filesystem::remove(part, ignored);
-    throw std::system_error(error, std::generic_category(), target.string() + ": cannot write");
+    throw;
   }
   std::filesystem::rename(part, target);
+  sync_to_disk(folder);
 }
 
 ManifestFile read_manifest(const std::filesystem::path& folder) {

@@ -65,7 +65,7 @@ struct Manifest {
 };
 
 /// Writes `folder`/manifest.json, replacing an earlier one at once: a reader sees the old or the
-/// new one, never half of one.
+/// new one, never half of one. The files that it lists are on the disk before it.
 /// @throws std::system_error naming the file.
 void write_manifest(const std::filesystem::path& folder, const Manifest& manifest);
 

@@ -93,16 +93,17 @@ void Recording::write_provisional_manifest() {
 void Recording::read_earlier_segments() {
   if (!segment_.earlier) return;
   log_.set_stage_starts(segment_.earlier->manifest().stage_starts);
-  for (const auto& [id, vehicle] : vehicles_) {
-    std::uint64_t next = 0;
-    StepReader reader(*segment_.earlier, id, segment_.first_step);
-    while (const auto rows = reader.next()) {
-      if (rows->step > next) note_missing_steps(id, next, rows->step - 1);
-      account(*rows, true);
-      next = rows->step + 1;
-    }
-    if (next < segment_.first_step) note_missing_steps(id, next, segment_.first_step - 1);
+  std::map<std::uint32_t, std::uint64_t> next_steps;
+  StepReader reader(*segment_.earlier, segment_.first_step);
+  while (const auto rows = reader.next()) {
+    std::uint64_t& next = next_steps[rows->vehicle_id];
+    if (rows->step > next) note_missing_steps(rows->vehicle_id, next, rows->step - 1);
+    account(*rows, true);
+    next = rows->step + 1;
   }
+  for (const auto& [id, vehicle] : vehicles_)
+    if (next_steps[id] < segment_.first_step)
+      note_missing_steps(id, next_steps[id], segment_.first_step - 1);
   for (const std::uint64_t index : read_status_indices(*segment_.earlier)) note_status(index);
 }
 
@@ -188,14 +189,13 @@ void Recording::note_status(std::uint64_t sample_index) {
 
 void Recording::note_missing(std::uint32_t vehicle_id, const char* topic, std::uint64_t from,
                              std::uint64_t to) {
-  const auto last =
-      std::find_if(missing_.rbegin(), missing_.rend(), [&](const MissingSteps& steps) {
-        return steps.vehicle_id == vehicle_id && steps.topic == topic;
-      });
-  if (last != missing_.rend() && last->to + 1 == from)
-    last->to = to;
-  else
-    missing_.push_back({vehicle_id, topic, from, to});
+  const auto [last, is_first] = last_gaps_.try_emplace({vehicle_id, topic}, missing_.size());
+  if (!is_first && missing_[last->second].to + 1 == from) {
+    missing_[last->second].to = to;
+    return;
+  }
+  last->second = missing_.size();
+  missing_.push_back({vehicle_id, topic, from, to});
 }
 
 /// Commands last: where a killed recorder leaves one, the step's other rows are there too.

@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/bus/topics.hpp"
@@ -92,6 +93,8 @@ class Recording {
   std::map<std::uint32_t, StepJoin> vehicles_;
   std::vector<MissingSteps> missing_;
   std::vector<StageStart> stage_starts_;  // those in the provisional manifest
+  // In missing_, the last ones of each vehicle and topic.
+  std::map<std::pair<std::uint32_t, std::string>, std::size_t> last_gaps_;
   std::uint64_t unanswered_steps_ = 0;
   std::uint64_t rebuilt_commands_ = 0;
   std::optional<SimStatus> last_status_;

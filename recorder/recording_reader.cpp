@@ -58,59 +58,85 @@ RecordedFlight open_recording(const fs::path& folder) {
 }
 
 template <class Row>
-RowReader<Row>::RowReader(const RecordedFlight& flight, std::uint32_t vehicle_id, std::uint64_t end)
-    : flight_(flight), vehicle_id_(vehicle_id), end_(end) {
-  advance();
+RowReader<Row>::RowReader(const RecordedFlight& flight, std::uint64_t end)
+    : flight_(flight), end_(end) {
+  for (const std::uint32_t id : flight.vehicle_ids()) vehicles_[id];
 }
 
 template <class Row>
-void RowReader<Row>::advance() {
-  for (; segment_ < flight_.segments.size(); ++segment_) {
+const Row* RowReader<Row>::peek(std::uint32_t vehicle_id) {
+  const auto vehicle = vehicles_.find(vehicle_id);
+  if (vehicle == vehicles_.end()) return nullptr;
+  const auto& rows = vehicle->second.rows;
+  while (rows.empty())
+    if (!read_row()) return nullptr;
+  return &rows.front();
+}
+
+template <class Row>
+Row RowReader<Row>::take(std::uint32_t vehicle_id) {
+  auto& rows = vehicles_.at(vehicle_id).rows;
+  Row row = std::move(rows.front());
+  rows.pop_front();
+  return row;
+}
+
+/// Reads one row, of whichever vehicle; false at the end.
+template <class Row>
+bool RowReader<Row>::read_row() {
+  for (; segment_ < flight_.segments.size(); ++segment_, file_.reset()) {
     if (!file_)
       file_ =
           std::make_unique<CsvReader>(flight_.segments[segment_].folder / Row::kFile, Row::kHeader);
-    if (read_from_segment()) return;
-    file_.reset();
-  }
-  row_.reset();
-}
-
-template <class Row>
-bool RowReader<Row>::read_from_segment() {
-  const bool is_last = segment_ + 1 == flight_.segments.size();
-  const std::uint64_t end =
-      is_last ? end_ : std::min(end_, flight_.segments[segment_ + 1].manifest.first_step);
-  while (file_->next()) {
-    Row row = parse_row<Row>(*file_);
-    if (row.vehicle_id != vehicle_id_) continue;
-    if (row_ && row.step <= row_->step)
-      throw DamagedError(file_->place() + "step: expected one after " + std::to_string(row_->step) +
-                         ", got " + std::to_string(row.step));
-    if (row.step >= end) return false;
-    row_ = std::move(row);
+    if (!file_->next()) continue;
+    keep(parse_row<Row>(*file_));
     return true;
   }
   return false;
 }
 
-StepReader::StepReader(const RecordedFlight& flight, std::uint32_t vehicle_id, std::uint64_t end)
-    : vehicle_id_(vehicle_id),
-      states_(flight, vehicle_id, end),
-      commands_(flight, vehicle_id, end),
-      references_(flight, vehicle_id, end) {}
+template <class Row>
+void RowReader<Row>::keep(Row row) {
+  const auto vehicle = vehicles_.find(row.vehicle_id);
+  if (vehicle == vehicles_.end()) return;
+  auto& [rows, next_step] = vehicle->second;
+  if (row.step < next_step)
+    throw DamagedError(file_->place() + "step: expected one after " +
+                       std::to_string(next_step - 1) + ", got " + std::to_string(row.step));
+  const bool is_last = segment_ + 1 == flight_.segments.size();
+  if (row.step >=
+      (is_last ? end_ : std::min(end_, flight_.segments[segment_ + 1].manifest.first_step)))
+    return;
+  next_step = row.step + 1;
+  rows.push_back(std::move(row));
+}
+
+StepReader::StepReader(const RecordedFlight& flight, std::uint64_t end)
+    : states_(flight, end), commands_(flight, end), references_(flight, end) {
+  const auto ids = flight.vehicle_ids();
+  turns_.assign(ids.begin(), ids.end());
+}
 
 std::optional<StepRows> StepReader::next() {
+  for (; !turns_.empty(); turns_.pop_front())
+    if (auto rows = next(turns_.front())) {
+      turns_.push_back(turns_.front());
+      turns_.pop_front();
+      return rows;
+    }
+  return std::nullopt;
+}
+
+std::optional<StepRows> StepReader::next(std::uint32_t vehicle_id) {
   constexpr auto kNone = std::numeric_limits<std::uint64_t>::max();
-  const auto step_of = [](const auto& row) { return row ? row->step : kNone; };
+  const auto step_of = [](const auto* row) { return row ? row->step : kNone; };
   StepRows rows;
-  rows.vehicle_id = vehicle_id_;
-  rows.step =
-      std::min({step_of(states_.peek()), step_of(commands_.peek()), step_of(references_.peek())});
+  rows.vehicle_id = vehicle_id;
+  rows.step = std::min({step_of(states_.peek(vehicle_id)), step_of(commands_.peek(vehicle_id)),
+                        step_of(references_.peek(vehicle_id))});
   if (rows.step == kNone) return std::nullopt;
   const auto take = [&](auto& reader, auto& row) {
-    if (step_of(reader.peek()) != rows.step) return;
-    row = reader.peek();
-    reader.advance();
+    if (step_of(reader.peek(vehicle_id)) == rows.step) row = reader.take(vehicle_id);
   };
   take(states_, rows.state);
   take(commands_, rows.command);
@@ -119,15 +145,15 @@ std::optional<StepRows> StepReader::next() {
 }
 
 std::uint64_t find_next_step(const RecordedFlight& flight) {
-  std::uint64_t next = std::numeric_limits<std::uint64_t>::max();
-  for (const std::uint32_t id : flight.vehicle_ids()) {
-    std::uint64_t after_whole = 0;
-    StepReader reader(flight, id);
-    while (const auto rows = reader.next())
-      if (rows->is_whole()) after_whole = rows->step + 1;
-    next = std::min(next, after_whole);
-  }
-  return flight.vehicle_ids().empty() ? 0 : next;
+  std::map<std::uint32_t, std::uint64_t> after_whole;
+  for (const std::uint32_t id : flight.vehicle_ids()) after_whole[id] = 0;
+  StepReader reader(flight);
+  while (const auto rows = reader.next())
+    if (rows->is_whole()) after_whole[rows->vehicle_id] = rows->step + 1;
+  const auto least = std::min_element(
+      after_whole.begin(), after_whole.end(),
+      [](const auto& one, const auto& other) { return one.second < other.second; });
+  return least == after_whole.end() ? 0 : least->second;
 }
 
 std::vector<std::uint64_t> read_status_indices(const RecordedFlight& flight) {

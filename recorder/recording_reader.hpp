@@ -1,9 +1,12 @@
-/// Reads recordings back: finds their segments and joins their rows step by step, with constant
-/// memory.
+/// Reads recordings back: finds their segments and joins their rows step by step, in one pass over
+/// the files however many vehicles there are. Memory holds the rows that were read before they were
+/// asked for: as many as vehicles, or rows of one step, are apart in the files.
 #pragma once
 
+#include <deque>
 #include <filesystem>
 #include <limits>
+#include <map>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -35,43 +38,52 @@ std::string name_segment(int number);
 ///   not of one run.
 RecordedFlight open_recording(const std::filesystem::path& folder);
 
-/// Rows of one kind and one vehicle, of all segments in order. A segment's rows count up to the
-/// step with which the next one takes over.
+/// Rows of one kind, of all segments in order, asked for by vehicle. A segment's rows count up to
+/// the step with which the next one takes over.
 /// Every member @throws DamagedError.
 template <class Row>
 class RowReader {
  public:
-  RowReader(const RecordedFlight& flight, std::uint32_t vehicle_id, std::uint64_t end);
+  RowReader(const RecordedFlight& flight, std::uint64_t end);
 
-  /// The row that comes next; nothing at the end.
-  const std::optional<Row>& peek() const { return row_; }
-  void advance();
+  /// The vehicle's row that comes next; null at the end.
+  const Row* peek(std::uint32_t vehicle_id);
+  /// Takes that row, which there must be.
+  Row take(std::uint32_t vehicle_id);
 
  private:
-  bool read_from_segment();
+  bool read_row();
+  void keep(Row row);
+
+  struct Vehicle {
+    std::deque<Row> rows;  // read, and not asked for yet
+    std::uint64_t next_step = 0;
+  };
 
   const RecordedFlight& flight_;
-  const std::uint32_t vehicle_id_;
   const std::uint64_t end_;
+  std::map<std::uint32_t, Vehicle> vehicles_;
   std::size_t segment_ = 0;
   std::unique_ptr<CsvReader> file_;
-  std::optional<Row> row_;
 };
 
-/// The steps of one vehicle before `end`, in order; such of which there is no row are left out.
+/// The steps before `end`, of each vehicle in order; such of which there is no row are left out.
 class StepReader {
  public:
-  /// @throws DamagedError, like `next`.
-  StepReader(const RecordedFlight& flight, std::uint32_t vehicle_id,
-             std::uint64_t end = std::numeric_limits<std::uint64_t>::max());
+  explicit StepReader(const RecordedFlight& flight,
+                      std::uint64_t end = std::numeric_limits<std::uint64_t>::max());
 
+  /// The next step of the vehicles in turn.
+  /// @throws DamagedError, like the other one.
   std::optional<StepRows> next();
+  /// The next step of one vehicle.
+  std::optional<StepRows> next(std::uint32_t vehicle_id);
 
  private:
-  const std::uint32_t vehicle_id_;
   RowReader<StateRow> states_;
   RowReader<CommandRow> commands_;
   RowReader<ReferenceRow> references_;
+  std::deque<std::uint32_t> turns_;  // of vehicles that may have further steps
 };
 
 /// The step after the last one that every vehicle has whole; 0: there is none.

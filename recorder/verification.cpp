@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <fstream>
+#include <map>
 #include <set>
 
 #include "recorder/certificate.hpp"
@@ -66,11 +67,11 @@ void check_files(const RecordedSegment& segment, bool is_last, std::vector<std::
 
 void certify(const RecordedFlight& flight, Inspection& inspection) {
   Certificate certificate;
-  for (const std::uint32_t id : flight.vehicle_ids()) {
-    StepReader reader(flight, id);
-    std::uint64_t steps = 0;
-    for (; const auto rows = reader.next(); ++steps) certificate.add(*rows);
-    inspection.steps = std::max(inspection.steps, steps);
+  std::map<std::uint32_t, std::uint64_t> steps;
+  StepReader reader(flight);
+  while (const auto rows = reader.next()) {
+    certificate.add(*rows);
+    inspection.steps = std::max(inspection.steps, ++steps[rows->vehicle_id]);
   }
   inspection.certificate = certificate.finish();
 }
@@ -138,20 +139,18 @@ std::optional<std::string> compare_steps(const StepRows& a, const StepRows& b) {
   return compare_rows(a.reference, b.reference, a);
 }
 
-std::optional<Difference> compare_vehicle(const RecordedFlight& a, const RecordedFlight& b,
-                                          std::uint32_t id) {
-  StepReader reader_a(a, id), reader_b(b, id);
-  while (true) {
-    const auto step_a = reader_a.next(), step_b = reader_b.next();
-    if (!step_a && !step_b) return std::nullopt;
-    if (!step_a || !step_b || step_a->step != step_b->step) {
-      const bool is_in_a = step_a && (!step_b || step_a->step < step_b->step);
-      const std::uint64_t step = is_in_a ? step_a->step : step_b->step;
-      return Difference{
-          step, fmt::format("vehicle {}, step {}: in {} alone", id, step, is_in_a ? "A" : "B")};
-    }
-    if (auto text = compare_steps(*step_a, *step_b)) return Difference{step_a->step, *text};
+/// Of what comes next of the vehicle in either recording.
+std::optional<Difference> compare_next(const std::optional<StepRows>& a,
+                                       const std::optional<StepRows>& b) {
+  if (!a && !b) return std::nullopt;
+  if (!a || !b || a->step != b->step) {
+    const bool is_in_a = a && (!b || a->step < b->step);
+    const StepRows& alone = is_in_a ? *a : *b;
+    return Difference{alone.step, fmt::format("vehicle {}, step {}: in {} alone", alone.vehicle_id,
+                                              alone.step, is_in_a ? "A" : "B")};
   }
+  if (auto text = compare_steps(*a, *b)) return Difference{a->step, *text};
+  return std::nullopt;
 }
 
 }  // namespace
@@ -178,11 +177,16 @@ std::optional<Difference> find_first_difference(const RecordedFlight& a, const R
   std::set<std::uint32_t> ids;
   for (const auto* flight : {&a, &b})
     for (const std::uint32_t id : flight->vehicle_ids()) ids.insert(id);
+  StepReader reader_a(a), reader_b(b);
   std::optional<Difference> first;
-  for (const std::uint32_t id : ids) {
-    const auto difference = compare_vehicle(a, b, id);
-    if (difference && (!first || difference->step < first->step)) first = difference;
-  }
+  while (!ids.empty())
+    for (auto id = ids.begin(); id != ids.end();) {
+      const auto step_a = reader_a.next(*id), step_b = reader_b.next(*id);
+      const auto difference = compare_next(step_a, step_b);
+      if (difference && (!first || difference->step < first->step)) first = difference;
+      const bool is_over = difference || !step_a || (first && step_a->step >= first->step);
+      id = is_over ? ids.erase(id) : std::next(id);
+    }
   return first;
 }
 

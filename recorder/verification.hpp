@@ -24,7 +24,7 @@ struct Difference {
   std::uint64_t step = 0;
   std::string text;  ///< file, vehicle, step, column and both values
 };
-/// @throws DamagedError where a row before the first difference cannot be read.
+/// @throws DamagedError where a row that is read before the first difference is damaged.
 std::optional<Difference> find_first_difference(const RecordedFlight& a, const RecordedFlight& b);
 
 /// What differs or is missing according to the manifests; none of it need make the data differ.

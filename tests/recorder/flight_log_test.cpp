@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fstream>
 #include <random>
 #include <sstream>
 
@@ -172,6 +173,24 @@ TEST(FlightLogLapTest, ALapBeginsAtItsFirstSampleWhateverItsPeriod) {
   for (std::uint64_t lap = 0; lap < 8; ++lap)  // 25 steps each
     expect_statistics(out, "lap " + std::to_string(lap + 1) + " ",
                       calc_expected(100 + 25 * lap, 124 + 25 * lap));
+}
+
+// The second of these steps is in lap 4,000,001: with all laps before it, 320 MB.
+TEST(FlightLogLapTest, LapsOfANanosecondTakeNoMemory) {
+  const auto count_resident_pages = [] {
+    long total = 0, resident = 0;
+    std::ifstream("/proc/self/statm") >> total >> resident;
+    return resident;
+  };
+  const std::string text =
+      sls::test::replace_once(kScenarioText, "period_s: 0.4 }", "period_s: 1e-9 }");
+  FlightLog log(config::parse_scenario(text, "scenario"), make_parameters());
+  const long before = count_resident_pages();
+  for (const std::uint64_t step : {100u, 101u}) log.add(make_rows(step));
+  ASSERT_LT(count_resident_pages(), before + 8000) << "of 4 kB at least";
+  const std::string out = write(log);
+  expect_statistics(out, "1 figure_eight", calc_expected(100, 101));
+  expect_statistics(out, "lap 1 ", calc_expected(100, 100));
 }
 
 TEST_F(FlightLogTest, AStageThatIsFlownAgainIsAStageOfItsOwn) {

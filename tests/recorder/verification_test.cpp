@@ -204,6 +204,51 @@ TEST_F(VerificationTest, RowsOutOfOrderAreDamage) {
       << find_problems(b_);
 }
 
+// Which vehicle's rows come first, and by how much, is chance.
+TEST_F(VerificationTest, AFleetIsComparedInStepOrderWhateverTheOrderOfItsRows) {
+  constexpr std::uint32_t kIds[] = {7, 0, 3};
+  const auto record = [&](const fs::path& folder, std::uint64_t steps_apart) {
+    fs::remove_all(folder);
+    fs::create_directory(folder);
+    Parameters parameters = make_parameters();
+    parameters.vehicle_ids({7, 0, 3});
+    Recording recording(folder, parameters);
+    for (std::uint64_t first = 0; first <= kLastStep; first += steps_apart)
+      for (const std::uint32_t id : kIds)
+        for (auto step = first; step < std::min(first + steps_apart, kLastStep + 1); ++step) {
+          VehicleState state = make_state(step);
+          ControlCommand command = make_command(step);
+          Reference reference = make_reference(step);
+          state.vehicle_id(id);
+          command.vehicle_id(id);
+          reference.vehicle_id(id);
+          recording.add(state);
+          recording.add(command);
+          if (id != 3 || step % 2 == 0) recording.add(reference);
+          if (id == 3) recording.pass_time(std::chrono::seconds(11));  // no longer waited for
+        }
+    finish_flight(recording);
+  };
+  record(a_, 1);
+  record(b_, 100);
+  EXPECT_EQ(find_difference(), "equal");
+  for (const auto& folder : {a_, b_}) EXPECT_EQ(find_problems(folder), "");
+  EXPECT_EQ(inspect(open_recording(a_)).certificate, inspect(open_recording(b_)).certificate);
+  EXPECT_EQ(inspect(open_recording(b_)).steps, kLastStep + 1);
+  EXPECT_EQ(find_next_step(open_recording(b_)), kLastStep + 1);
+
+  const auto find_line = [&](const std::string& file, const std::string& begin) {
+    const std::string bytes = read_bytes(b_ / file);
+    return 1 + std::count(bytes.begin(), bytes.begin() + bytes.find('\n' + begin) + 1, '\n');
+  };
+  change("state.csv", find_line("state.csv", "7,50,"), 5, to_next);
+  EXPECT_EQ(find_difference().find("state.csv, vehicle 7, step 50, quad_z_m"), 0u);
+  change("state.csv", find_line("state.csv", "0,20,"), 5, to_next);
+  EXPECT_EQ(find_difference().find("state.csv, vehicle 0, step 20, quad_z_m"), 0u);
+  remove_line("command.csv", find_line("command.csv", "3,10,"));
+  EXPECT_EQ(find_difference(), "command.csv, vehicle 3, step 10: a row in A alone");
+}
+
 TEST_F(VerificationTest, AKilledRecordingIsReadAndSaidToBeUnfinished) {
   fs::remove_all(b_);
   fs::create_directory(b_);

@@ -51,7 +51,9 @@ void Process::send(int signal) {
 }
 
 void Process::kill() {
-  if (is_running()) kill_process(id_);
+  if (!is_running()) return;
+  kill_process(id_);
+  wait(std::chrono::seconds(10));
 }
 
 std::vector<std::filesystem::path> find_shared_memory(pid_t id) {

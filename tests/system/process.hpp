@@ -30,7 +30,8 @@ class Process {
   std::optional<int> wait(std::chrono::milliseconds limit = std::chrono::seconds(240));
   bool is_running();
   void send(int signal);
-  /// SIGKILL, and what it keeps the process from removing is removed.
+  /// SIGKILL, and what it keeps the process from removing is removed. Waits for its end: a process
+  /// that is started while another one still dies may take over its ports, and is never discovered.
   void kill();
   pid_t id() const { return id_; }
   /// Everything it has printed so far.

@@ -32,6 +32,7 @@ void verify_two(const RecordedFlight& a, const RecordedFlight& b) {
     std::cout << "first difference: " << difference->text << '\n';
     throw app::RunError("A and B differ");
   }
+  if (of_a.steps == 0) throw app::RunError("nothing to compare: neither A nor B holds a step");
   std::cout << fmt::format("equal: {} steps, certificate {}\n", of_a.steps, of_a.certificate);
 }
 

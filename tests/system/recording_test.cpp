@@ -1,0 +1,129 @@
+/// What the real recorder leaves on the disk, and the real verifier makes of it.
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <map>
+#include <sstream>
+#include <utility>
+
+#include "tests/system/flight.hpp"
+
+namespace sls::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// How many bytes a process has read from files; also when it has ended, until it is waited for.
+std::uint64_t count_reads(const Process& process) {
+  const std::string counters = read_file("/proc/" + std::to_string(process.id()) + "/io");
+  const std::string key = "rchar: ";
+  return std::stoull(counters.substr(counters.find(key) + key.size()));
+}
+
+std::uint64_t count_bytes(const fs::path& folder) {
+  std::uint64_t bytes = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(folder))
+    if (entry.is_regular_file()) bytes += entry.file_size();
+  return bytes;
+}
+
+class RecordingFilesTest : public testing::Test {
+ protected:
+  std::unique_ptr<Process> start(const char* name, const std::vector<std::string>& flags) const {
+    return std::make_unique<Process>(make_command(name, domain_.number(), flags));
+  }
+  std::string recording() const { return folder_ / "recording"; }
+
+  const TemporaryFolder folder_;
+  const OwnDomain domain_;
+};
+
+// Read once for each of the 40 vehicles, they would be many times as many bytes.
+TEST_F(RecordingFilesTest, OfAFleetAreReadAFewTimesToResumeAndToVerifyHoweverManyVehiclesFly) {
+  const std::string file = make_scenario(folder_, {{"for_s: 2", "for_s: 8"}});
+  write_bytes(file, read_file(file) + "vehicles: 40\n");
+  auto recorder = start("recorder", {"--out", recording(), "--resume"});
+  const auto server = start("sim_server", {"--scenario", file});
+  const auto client = start("control_client", {"--scenario", file});
+  ASSERT_TRUE(wait_until([&] { return read_file(recording() + "/command.csv").size() > 300'000; }))
+      << server->output();
+  recorder->kill();
+  std::uint64_t rows = 0;
+  for (const char* name : {"state.csv", "command.csv", "reference.csv"})
+    rows += fs::file_size(fs::path(recording()) / name);
+
+  // For settings and the like: a recorder that finds no server reads 50 kB.
+  constexpr std::uint64_t kStart = 1 << 20;
+  recorder = start("recorder", {"--out", recording(), "--resume"});
+  ASSERT_TRUE(wait_until([&] { return holds(recorder->output(), "segment-2, from step "); },
+                         std::chrono::minutes(4)))
+      << recorder->output();
+  // For the step to go on with, and for the certificate.
+  EXPECT_LT(count_reads(*recorder), kStart + 3 * rows);
+  for (Process* process : {recorder.get(), server.get(), client.get()}) {
+    process->send(SIGTERM);
+    EXPECT_TRUE(process->wait().has_value()) << process->output();
+  }
+
+  // Of each of the two: for the hashes, for the certificate, for the comparison.
+  Process verify({program("sls_verify"), recording(), recording()});
+  ASSERT_TRUE(wait_until([&] { return find_state(verify.id()) == 'Z'; }, std::chrono::minutes(4)));
+  EXPECT_LT(count_reads(verify), kStart + 6 * count_bytes(recording()));
+  EXPECT_EQ(verify.wait(), 0) << verify.output();
+}
+
+// A power cut may leave any part of what is not on the disk yet, and the renaming too.
+TEST_F(RecordingFilesTest, AreOnTheDiskBeforeTheManifestThatListsThem) {
+  const std::string log = folder_ / "log";
+  FlightOptions options;
+  options.before["recorder"] = {"env", std::string("LD_PRELOAD=") + SLS_SYNC_SHIM,
+                                "SLS_SYNC_LOG=" + log};
+  Flight flight(scenario("short"), options);
+  flight.expect_success();
+  const std::string folder = flight.recording();
+  const std::string part = folder + "/manifest.json.part", manifest = folder + "/manifest.json";
+
+  std::istringstream lines(read_file(log));
+  std::map<std::string, std::uint64_t> synced;  // since the last renaming; bytes
+  std::map<std::string, std::uint64_t> before_the_last;
+  int renamings = 0;
+  for (std::string what, from, to; lines >> what >> from >> to;) {
+    if (what == "sync") {
+      synced[from] = std::stoull(to);
+      continue;
+    }
+    ASSERT_EQ(from + ' ' + to, part + ' ' + manifest);
+    EXPECT_EQ(synced.count(part), 1u) << "after renaming " << renamings;
+    EXPECT_TRUE(renamings == 0 || synced.count(folder) == 1) << "after renaming " << renamings;
+    ++renamings;
+    before_the_last = std::exchange(synced, {});
+  }
+  EXPECT_GE(renamings, 2) << "one when it begins, one at the end";
+  EXPECT_EQ(synced.count(folder), 1u);
+  before_the_last[manifest] = before_the_last[part];
+  const auto files = read_manifest(folder).at("files");
+  EXPECT_EQ(files.size(), 7u);
+  for (const auto& entry : fs::directory_iterator(folder))
+    EXPECT_EQ(before_the_last[entry.path()], entry.file_size()) << entry.path();
+}
+
+// Who compares recordings wants to know that a flight came out the same. Of none nothing does.
+TEST_F(RecordingFilesTest, WithoutAStepAreEqualToNothing) {
+  const auto recorder = start("recorder", {"--out", recording()});
+  const auto server = start("sim_server", {"--scenario", scenario("short")});  // waits for a client
+  ASSERT_TRUE(wait_until([&] { return fs::exists(recording() + "/manifest.json"); }))
+      << recorder->output() << server->output();
+  recorder->send(SIGTERM);
+  EXPECT_EQ(recorder->wait(), 143) << recorder->output();
+
+  Process alone({program("sls_verify"), recording()});
+  EXPECT_EQ(alone.wait(), 0) << alone.output();
+  EXPECT_TRUE(holds(alone.output(), "as its manifest says: 0 steps")) << alone.output();
+  fs::copy(recording(), folder_ / "copy");
+  Process both({program("sls_verify"), recording(), folder_ / "copy"});
+  EXPECT_EQ(both.wait(), 1) << both.output();
+  EXPECT_TRUE(holds(both.output(), "neither A nor B holds a step")) << both.output();
+}
+
+}  // namespace
+}  // namespace sls::test
