@@ -73,10 +73,10 @@ class StepReader {
   explicit StepReader(const RecordedFlight& flight,
                       std::uint64_t end = std::numeric_limits<std::uint64_t>::max());
 
-  /// The next step of the vehicles in turn.
+  /// The next step of the vehicle whose turn it is; nothing after the last step of all.
   /// @throws DamagedError, like the other one.
   std::optional<StepRows> next();
-  /// The next step of one vehicle.
+  /// The next step of that vehicle; nothing after its last one.
   std::optional<StepRows> next(std::uint32_t vehicle_id);
 
  private:

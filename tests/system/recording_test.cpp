@@ -38,7 +38,7 @@ class RecordingFilesTest : public testing::Test {
   const OwnDomain domain_;
 };
 
-// Read once for each of the 40 vehicles, they would be many times as many bytes.
+// Not once for each of the 40 vehicles.
 TEST_F(RecordingFilesTest, OfAFleetAreReadAFewTimesToResumeAndToVerifyHoweverManyVehiclesFly) {
   const std::string file = make_scenario(folder_, {{"for_s: 2", "for_s: 8"}});
   write_bytes(file, read_file(file) + "vehicles: 40\n");
@@ -58,14 +58,14 @@ TEST_F(RecordingFilesTest, OfAFleetAreReadAFewTimesToResumeAndToVerifyHoweverMan
   ASSERT_TRUE(wait_until([&] { return holds(recorder->output(), "segment-2, from step "); },
                          std::chrono::minutes(4)))
       << recorder->output();
-  // For the step to go on with, and for the certificate.
+  // Twice: to find the step to go on with, and for the certificate.
   EXPECT_LT(count_reads(*recorder), kStart + 3 * rows);
   for (Process* process : {recorder.get(), server.get(), client.get()}) {
     process->send(SIGTERM);
     EXPECT_TRUE(process->wait().has_value()) << process->output();
   }
 
-  // Of each of the two: for the hashes, for the certificate, for the comparison.
+  // Each of the two three times: for the hashes, for the certificate, for the comparison.
   Process verify({program("sls_verify"), recording(), recording()});
   ASSERT_TRUE(wait_until([&] { return find_state(verify.id()) == 'Z'; }, std::chrono::minutes(4)));
   EXPECT_LT(count_reads(verify), kStart + 6 * count_bytes(recording()));
@@ -107,14 +107,15 @@ TEST_F(RecordingFilesTest, AreOnTheDiskBeforeTheManifestThatListsThem) {
     EXPECT_EQ(before_the_last[entry.path()], entry.file_size()) << entry.path();
 }
 
-// Who compares recordings wants to know that a flight came out the same. Of none nothing does.
 TEST_F(RecordingFilesTest, WithoutAStepAreEqualToNothing) {
   const auto recorder = start("recorder", {"--out", recording()});
   const auto server = start("sim_server", {"--scenario", scenario("short")});  // waits for a client
   ASSERT_TRUE(wait_until([&] { return fs::exists(recording() + "/manifest.json"); }))
       << recorder->output() << server->output();
   recorder->send(SIGTERM);
+  server->send(SIGTERM);
   EXPECT_EQ(recorder->wait(), 143) << recorder->output();
+  EXPECT_EQ(server->wait(), 143) << server->output();
 
   Process alone({program("sls_verify"), recording()});
   EXPECT_EQ(alone.wait(), 0) << alone.output();

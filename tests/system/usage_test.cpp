@@ -121,7 +121,7 @@ TEST(UsageTest, UnusableQosFilesAreRefusedByEveryProgram) {
           "</profiles>");
   write_bytes(folder / "misnamed.xml", replace_once(whole, "\"sls_loop_reader\"", "\"sls_lop\""));
   write_bytes(folder / "refused.xml",
-              replace_once(whole, "<depth>32</depth>", "<depth>many</depth>"));
+              replace_once(whole, "<depth>150</depth>", "<depth>many</depth>"));
   int run_number = 0;
   for (const char* name : {"sim_server", "control_client", "recorder"}) {
     const auto refuse = [&](const std::string& file, const std::string& cause) {

@@ -27,6 +27,7 @@ template <class Map>
 void describe(Map& map, PidAxisGains& gains, bool has_rod) {
   map.key(config::kRequired, "position", gains.position, config::kNotNegative);
   map.key(config::kRequired, "velocity", gains.velocity, config::kNotNegative);
+  map.by_default(gains.integral, 0.0);
   map.key(config::kOptional, "integral", gains.integral, config::kNotNegative);
   if (!has_rod) return;
   map.key(config::kRequired, "rod_angle", gains.rod_angle, config::kNotNegative);
