@@ -2,7 +2,6 @@
 #include "recorder/recorder.hpp"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <atomic>
 #include <nlohmann/json.hpp>
@@ -12,6 +11,7 @@
 #include "common/config/sha256.hpp"
 #include "recorder/verification.hpp"
 #include "tests/recorder/flights.hpp"
+#include "tests/support/own_domain.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/support/text.hpp"
 #include "tests/support/waiting.hpp"
@@ -27,7 +27,10 @@ using sls::test::wait_until;
 using Json = nlohmann::json;
 
 const fs::path kQosFile = SLS_SOURCE_DIR "/config/qos/default.xml";
-const int kDomain = 100 + ::getpid() % 100;  // tests of other processes at the same time
+int own_domain() {
+  static const sls::test::OwnDomain domain;
+  return domain.number();
+}
 constexpr std::uint64_t kOtherRun = 0xfedcba9876543210;
 
 /// A server of the synthetic run and its only client.
@@ -109,7 +112,7 @@ class FakeFlight {
     writer.write(message);
   }
 
-  bus::Node node_{kQosFile, kDomain, "server"};
+  bus::Node node_{kQosFile, own_domain(), "server"};
   std::uint64_t run_id_ = 0;
   std::chrono::steady_clock::time_point publish_time_;
   bus::ParticipantDirectory participants_{node_};
@@ -132,7 +135,7 @@ class RecorderTest : public testing::Test {
   void start() {
     thread_ = std::thread([this] {
       try {
-        bus::Node node(kQosFile, kDomain, "recorder");
+        bus::Node node(kQosFile, own_domain(), "recorder");
         Recorder(node, options_).run();
       } catch (const std::exception& error) {
         error_ = error.what();

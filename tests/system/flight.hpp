@@ -9,25 +9,10 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/own_domain.hpp"
 #include "tests/system/process.hpp"
 
 namespace sls::test {
-
-/// A DDS domain that no other test of this run uses at the same time (1 to 60): taken by a lock
-/// that the kernel releases with the process.
-class OwnDomain {
- public:
-  OwnDomain();
-  ~OwnDomain();
-  OwnDomain(const OwnDomain&) = delete;
-  OwnDomain& operator=(const OwnDomain&) = delete;
-  int number() const { return number_; }
-  std::string text() const { return std::to_string(number_); }
-
- private:
-  int number_ = 0;
-  int lock_ = -1;
-};
 
 struct FlightOptions {
   std::string qos_file;             ///< default: the programs' own

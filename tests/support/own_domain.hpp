@@ -1,0 +1,66 @@
+#pragma once
+
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+
+#include "tests/support/waiting.hpp"
+
+namespace sls::test {
+
+/// A DDS domain that no other test of this run uses at the same time (1 to 60): taken by a lock
+/// that the kernel releases with the process.
+class OwnDomain {
+ public:
+  OwnDomain();
+  ~OwnDomain();
+  OwnDomain(const OwnDomain&) = delete;
+  OwnDomain& operator=(const OwnDomain&) = delete;
+  int number() const { return number_; }
+  std::string text() const { return std::to_string(number_); }
+
+ private:
+  int number_ = 0;
+  int lock_ = -1;
+};
+
+inline OwnDomain::OwnDomain() {
+  // A name in the abstract socket namespace is a lock that leaves nothing behind.
+  const bool found = wait_until([this] {
+    for (number_ = 1; number_ <= 60; ++number_) {
+      sockaddr_un address{};
+      address.sun_family = AF_UNIX;
+      const std::string name = "sls-test-domain-" + std::to_string(number_);
+      std::copy(name.begin(), name.end(), address.sun_path + 1);
+      const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + name.size());
+      lock_ = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+      if (lock_ < 0) throw std::runtime_error("socket");
+      if (bind(lock_, reinterpret_cast<const sockaddr*>(&address), size) == 0) return true;
+      close(lock_);
+    }
+    return false;
+  });
+  if (!found) throw std::runtime_error("no free DDS domain among 1 to 60");
+}
+
+inline OwnDomain::~OwnDomain() {
+  // The shared-memory ports of a domain outlive processes that were killed. Its ports: 7400 + 250
+  // N.
+  for (int port = 7400 + 250 * number_; port < 7400 + 250 * (number_ + 1); ++port) {
+    const std::string name = "fastrtps_port" + std::to_string(port);
+    for (const std::string& file : {name, name + "_el", name + "_sl", "sem." + name + "_mutex"}) {
+      std::error_code ignored;
+      std::filesystem::remove("/dev/shm/" + file, ignored);
+    }
+  }
+  close(lock_);
+}
+
+}  // namespace sls::test
