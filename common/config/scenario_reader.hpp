@@ -251,14 +251,15 @@ void KeyNames::model(const char* name, ModelName& field, const ModelRegistry<Sec
   if (find_key(map_.node, name) >= 0)
     MapReader(map_).key(kOptional, name, field, list_names(registry), list_models(registry));
   find_model_keys(registry, field).describe(*this, section);
-  for (const auto& [other, keys] : registry) {
+  const auto note = [&](const ModelKeys<Section>& keys, const std::string& owner) {
     KeyNames others(map_);
     Section scratch;
-    keys->describe(others, scratch);
+    keys.describe(others, scratch);
     for (const std::string& key : others.names())
-      owners_.emplace(key, "a key of " + std::string(name) + " '" + other + "', here it is '" +
-                               field.name + "'");
-  }
+      owners_.emplace(key, "a key of " + owner + ", here " + name + " is '" + field.name + "'");
+  };
+  for (const auto& [other, keys] : registry) note(*keys, name + (" '" + other + "'"));
+  note(find_model_keys(registry, ModelName{"any.so", ""}), "shared libraries");
 }
 
 }  // namespace sls::config
