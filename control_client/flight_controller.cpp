@@ -1,5 +1,6 @@
 #include "control_client/flight_controller.hpp"
 
+#include <cstring>
 #include <stdexcept>
 
 #include "control_client/drag_feed_forward.hpp"
@@ -21,24 +22,32 @@ void fail(Answer& answer, Fault fault) {
   answer.fault = fault;
 }
 
+/// Bit for bit: a number that is not finite is no sign of impurity.
+bool are_equal(const double* a, const double* b, Eigen::Index count) {
+  return std::memcmp(a, b, static_cast<std::size_t>(count) * sizeof(double)) == 0;
+}
+
 bool are_equal(const LawOutput& a, const LawOutput& b) {
-  return a.f_Q_W == b.f_Q_W && a.memory == b.memory && a.fault == b.fault;
+  return a.fault == b.fault && a.memory.size() == b.memory.size() &&
+         are_equal(a.f_Q_W.data(), b.f_Q_W.data(), 3) &&
+         are_equal(a.memory.data(), b.memory.data(), a.memory.size());
 }
 
 }  // namespace
 
 struct FlightController::Parts {
-  Parts(const config::Scenario& scenario, std::uint32_t vehicle_id, bool checks_purity_always,
+  Parts(const config::Scenario& scenario, std::uint32_t vehicle, bool checks_purity_always,
         const LawMaker& make_law)
       : controller(scenario.controller),
+        vehicle_id(vehicle),
         plant_rod_length(scenario.vehicle.rod_length),
         period(static_cast<double>(scenario.sync.period_ns) / 1e9),
         mission(scenario.mission, scenario.sync.period_ns),
         law(make_law({scenario.controller, period, vehicle_id, scenario.folder})),
         checks_purity(checks_purity_always) {
     if (law->memory_size() > kMostMemoryNumbers)
-      throw config::ConfigError(controller.law.place + ": controller.law: expected at most " +
-                                std::to_string(kMostMemoryNumbers) +
+      throw config::ConfigError(controller.law.describe_place("controller.law") +
+                                ": expected at most " + std::to_string(kMostMemoryNumbers) +
                                 " memory numbers, which is what sls/command carries, got " +
                                 std::to_string(law->memory_size()) + " of '" + controller.law.name +
                                 "'");
@@ -50,6 +59,7 @@ struct FlightController::Parts {
   LawOutput calc_law(const LawInput& input) const;
 
   config::Controller controller;
+  std::uint32_t vehicle_id;
   double plant_rod_length;  ///< the truth, which only the gazebo wiring looks at
   double period;            ///< s
   Mission mission;
@@ -62,7 +72,8 @@ LawOutput FlightController::Parts::calc_law(const LawInput& input) const {
   if (!checks_purity && input.step >= kPurityCheckedSteps) return output;
   if (!are_equal(output, law->calc(input)))
     throw std::runtime_error(
-        controller.law.name + ": step " + std::to_string(input.step) +
+        controller.law.name + ": vehicle " + std::to_string(vehicle_id) + ", step " +
+        std::to_string(input.step) +
         ": expected equal answers to equal inputs, got two different ones; what the law must "
         "remember belongs into its memory numbers");
   return output;

@@ -30,11 +30,14 @@ inline constexpr std::size_t kMaxVehicles = 256;
 
 /// A plant or a control law, as the file names it.
 struct ModelName {
-  std::string name;  ///< of the registry, or the path of a shared library
-  std::string
-      place;  ///< FILE:LINE of the key, for messages about the model; empty: not in the file
+  std::string name;   ///< of the registry, or the path of a shared library
+  std::string place;  ///< FILE:LINE of the key, for messages; empty: not in the file
 
   bool is_shared_library() const;  ///< ends with ".so"
+  /// FILE:LINE: `key`.
+  std::string describe_place(const std::string& key) const {
+    return place.empty() ? key : place + ": " + key;
+  }
 };
 
 /// The values of the keys that belong to the named model alone, of a type that its folder defines.
@@ -69,7 +72,7 @@ struct LibraryParameters {
 
   /// FILE:LINE: KEY of these parameters in `section`, or of the library where there are none.
   std::string describe_place(const ModelName& library, const std::string& section) const {
-    return place.empty() ? library.place + ": " + section : place + ": " + section + ".parameters";
+    return place.empty() ? library.describe_place(section) : place + ": " + section + ".parameters";
   }
 };
 

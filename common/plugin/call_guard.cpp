@@ -1,3 +1,4 @@
+#include <errno.h>  // program_invocation_short_name
 #include <signal.h>
 #include <unistd.h>
 
@@ -22,7 +23,8 @@ using namespace std::chrono_literals;
 
 constexpr auto kLookEvery = 250ms;
 constexpr auto kReportAfter = 2s;
-constexpr auto kEndAfter = 60s;
+
+std::atomic<double> patience_s{60.0};
 
 /// What one thread is doing. Odd: inside a library. The watchdog reads it without a lock.
 struct ThreadRecord {
@@ -34,6 +36,9 @@ struct ThreadRecord {
 /// Text of a call, without allocation: also for signal handlers.
 class Line {
  public:
+  Line& begin(std::string_view level) {
+    return add(program_invocation_short_name).add(": ").add(level).add(": ");
+  }
   Line& add(std::string_view text) {
     const std::size_t size = std::min(text.size(), text_.size() - size_);
     std::memcpy(text_.data() + size_, text.data(), size);
@@ -69,7 +74,7 @@ thread_local ThreadRecord* current = nullptr;
 void report_crash(int number) {
   if (current && current->calls.load(std::memory_order_relaxed) % 2 == 1)
     Line()
-        .add("error: ")
+        .begin("error")
         .add(current->call)
         .add(": crashed (signal ")
         .add(static_cast<std::uint64_t>(number))
@@ -131,12 +136,12 @@ class Watchdog {
       return;
     }
     const auto silence = now - one.since;
-    const bool is_over = silence >= kEndAfter;
+    const bool is_over = silence >= std::chrono::duration<double>(patience_s);
     if (silence < kReportAfter || (one.is_reported && !is_over)) return;
     one.is_reported = true;
     const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(silence).count();
     Line()
-        .add(is_over ? "error: " : "warning: ")
+        .begin(is_over ? "error" : "warning")
         .add(one.record->call)
         .add(": has not returned for ")
         .add(static_cast<std::uint64_t>(seconds))
@@ -155,23 +160,26 @@ struct Registration {
     stack_t stack{};
     stack.ss_sp = record.signal_stack.data();
     stack.ss_size = record.signal_stack.size();
-    ::sigaltstack(&stack, nullptr);
+    ::sigaltstack(&stack, &others);
     Watchdog::instance().add(&record);
     current = &record;
   }
   ~Registration() {
     current = nullptr;
-    stack_t none{};
-    none.ss_flags = SS_DISABLE;
-    ::sigaltstack(&none, nullptr);
+    ::sigaltstack(&others, nullptr);
     Watchdog::instance().remove(&record);
   }
   ThreadRecord record;
+  stack_t others{};  // what the thread had before
 };
 
 }  // namespace
 
 std::string Call::describe() const { return std::string(Line().add(*this).text()); }
+
+void set_patience(double seconds) { patience_s = seconds; }
+
+void warn(const char* message) { Line().begin("warning").add(message).add("\n").write_to_stderr(); }
 
 CallGuard::CallGuard(const Call& call) {
   thread_local Registration registration;

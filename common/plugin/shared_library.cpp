@@ -37,10 +37,10 @@ void restore_floating_point_mode(std::uint64_t mode) {
 }
 
 SharedLibrary::SharedLibrary(const std::filesystem::path& file, const std::string& place)
-    : name_(file.string()), place_(place) {
+    : name_(file.lexically_normal().string()), place_(place) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(file, error))
-    fail("expected a shared library, got no such file");
+    fail("expected a shared library, got no file of this name");
   const std::uint64_t mode = floating_point_mode();
   {
     const CallGuard guard({name_.c_str(), "(loading)", 0, 0});
@@ -65,7 +65,11 @@ void* SharedLibrary::find(const char* symbol) const {
 }
 
 void SharedLibrary::fail(const std::string& message) const {
-  throw config::ConfigError((place_.empty() ? "" : place_ + ": ") + name_ + ": " + message);
+  fail_at_place(name_ + ": " + message);
+}
+
+void SharedLibrary::fail_at_place(const std::string& message) const {
+  throw config::ConfigError(place_ + ": " + message);
 }
 
 }  // namespace sls::plugin

@@ -23,7 +23,7 @@ struct Call {
 
 /// Marks the thread as being inside a library while it lives. If the process crashes meanwhile, it
 /// says where on stderr before it ends; if the call does not return, it says so after 2 s, and ends
-/// the process with exit code 1 after 60 s, later than any patience of the others by default.
+/// the process with exit code 1 after 60 s, or what `set_patience` said last.
 class CallGuard {
  public:
   explicit CallGuard(const Call& call);
@@ -32,9 +32,15 @@ class CallGuard {
   CallGuard& operator=(const CallGuard&) = delete;
 };
 
+/// How long a call may take from now on.
+void set_patience(double seconds);
+
 /// The floating-point mode of this thread: rounding, flush to zero, traps; not the status flags.
 std::uint64_t floating_point_mode();
 void restore_floating_point_mode(std::uint64_t mode);
+
+/// One line on stderr.
+void warn(const char* message);
 
 /// Calls `work` inside a library.
 /// @throws std::runtime_error if the call throws, or changes the floating-point mode (which is then
@@ -61,6 +67,16 @@ void call_guarded(const Call& call, const Work& work) {
   if (!defect.empty()) throw std::runtime_error(call.describe() + ": " + defect);
 }
 
+/// The same for `destroy`, after which nothing can be refused: what goes wrong is a warning.
+template <class Work>
+void call_at_end(const Call& call, const Work& work) noexcept {
+  try {
+    call_guarded(call, work);
+  } catch (const std::exception& error) {
+    warn(error.what());
+  }
+}
+
 class SharedLibrary {
  public:
   /// Loads `file`. `place` is FILE:LINE: KEY of the scenario, for messages; it stays loaded.
@@ -71,12 +87,24 @@ class SharedLibrary {
   /// Address of `symbol`. @throws config::ConfigError if there is none.
   void* find(const char* symbol) const;
 
-  /// As in the scenario, for messages.
+  /// Calls `work` before the flight. @throws config::ConfigError `PLACE: …` as call_guarded.
+  template <class Work>
+  void call(const Call& call, const Work& work) const {
+    try {
+      call_guarded(call, work);
+    } catch (const std::exception& error) {
+      fail_at_place(error.what());
+    }
+  }
+
+  /// The path of the file, for messages.
   const std::string& name() const { return name_; }
   /// @throws config::ConfigError `PLACE: LIBRARY: message`.
   [[noreturn]] void fail(const std::string& message) const;
 
  private:
+  [[noreturn]] void fail_at_place(const std::string& message) const;
+
   std::string name_;
   std::string place_;
   void* handle_ = nullptr;

@@ -72,6 +72,15 @@ TEST(FlightControllerTest, AnswersWithTheLawsForceReferenceAndStage) {
   EXPECT_TRUE(same_bits(answer.f_Q_W, law.f_Q_W));
 }
 
+TEST(FlightControllerTest, AForceThatIsNoNumberIsAFaultAndNoImpurity) {
+  struct Broken : ControlLaw {
+    LawOutput calc(const LawInput&) const override { return {{0.0, kNan, 0.0}, {}, Fault::kNone}; }
+  };
+  const FlightController controller(make_figure_eight(), 0, true,
+                                    [](const LawSetup&) { return std::make_unique<Broken>(); });
+  expect_failed(controller.calc_answer(0, make_hanging({0.0, 0.0, -0.5}), {}), Fault::kNotFinite);
+}
+
 TEST(FlightControllerTest, IsAPureFunctionInWhateverOrderSamplesCome) {
   config::Scenario scenario = make_figure_eight();
   scenario.mission.insert(scenario.mission.begin(), make_hold({0.0, 0.0, -0.5}, 2 * kSecond));

@@ -18,7 +18,7 @@ class SharedLibraryLaw : public ControlLaw {
  public:
   explicit SharedLibraryLaw(const LawSetup& setup)
       : library_(setup.folder / setup.controller.law.name,
-                 setup.controller.law.place + ": controller.law"),
+                 setup.controller.law.describe_place("controller.law")),
         vehicle_id_(setup.vehicle_id),
         period_(setup.period),
         functions_(load_functions()) {
@@ -35,7 +35,7 @@ class SharedLibraryLaw : public ControlLaw {
     given.gravity_m_s2 = believed.gravity;
     given.force_limit_n = setup.controller.force_limit_n;
     ErrorText error;
-    call_guarded(call("create", 0), [&] {
+    library_.call(call("create", 0), [&] {
       controller_ = functions_.create(&given, &memory_count_, error.data(), error.size());
     });
     if (!controller_)
@@ -59,10 +59,10 @@ class SharedLibraryLaw : public ControlLaw {
     const auto entry =
         reinterpret_cast<const sls_controller_functions* (*)()>(library_.find("sls_controller"));
     const sls_controller_functions* functions = nullptr;
-    call_guarded(call("sls_controller", 0), [&] { functions = entry(); });
+    library_.call(call("sls_controller", 0), [&] { functions = entry(); });
     if (!functions) library_.fail("sls_controller() returned no table of functions");
-    plugin::check_size(library_, "sls_controller_functions", sizeof *functions, functions->size);
     plugin::check_version(library_, SLS_CONTROLLER_VERSION, functions->version);
+    plugin::check_size(library_, "sls_controller_functions", sizeof *functions, functions->size);
     plugin::check_size(library_, "sls_controller_setup", sizeof(sls_controller_setup),
                        functions->setup_size);
     plugin::check_size(library_, "sls_controller_input", sizeof(sls_controller_input),
@@ -79,9 +79,8 @@ class SharedLibraryLaw : public ControlLaw {
   }
 
   void destroy() noexcept {
-    if (!controller_) return;
-    const plugin::CallGuard guard(call("destroy", 0));
-    functions_.destroy(controller_);
+    if (controller_)
+      plugin::call_at_end(call("destroy", 0), [this] { functions_.destroy(controller_); });
   }
 
   const plugin::SharedLibrary library_;
@@ -152,7 +151,9 @@ LawOutput SharedLibraryLaw::calc(const LawInput& input) const {
   const auto fail = [&](const std::string& defect) {
     throw std::runtime_error(answering.describe() + ": " + defect);
   };
-  if (code < SLS_CONTROLLER_OK || code >= SLS_CONTROLLER_ERROR) fail(error.text());
+  if (code == SLS_CONTROLLER_ERROR) fail(error.text());
+  if (code < SLS_CONTROLLER_OK || code > SLS_CONTROLLER_ERROR)
+    fail("expected a return value from 0 to 4, got " + std::to_string(code));
   for (std::size_t i = memory_count_; i < memory.size(); ++i)
     if (memory[i] != kUntouched)
       fail("wrote memory number " + std::to_string(i) + ", expected at most the " +

@@ -23,7 +23,7 @@ extern "C" {
 #define SLS_CONTROLLER_VERSION 1
 #define SLS_CONTROLLER_MAX_MEMORY 64 /* contract 1 of the topics carries 3 of them */
 
-/* What a controller is made from. */
+/* What a controller is made from. What it points to lives until `create` returns. */
 typedef struct {
   size_t size;            /* of this struct */
   const char* parameters; /* `controller.parameters` as JSON, a map; "{}" where there is none */

@@ -1,4 +1,5 @@
 // A plant from a shared library of the user's own: sls_plant.h.
+#include <cmath>
 #include <stdexcept>
 
 #include "common/plugin/shared_library.hpp"
@@ -12,6 +13,8 @@ namespace {
 using plugin::copy;
 using plugin::ErrorText;
 using plugin::to_vector;
+
+constexpr const char* kNameLetters = "abcdefghijklmnopqrstuvwxyz0123456789_";
 
 sls_plant_state make_initial(const config::InitialState& initial, double rod_length) {
   const Eigen::Vector3d n_W = model::to_direction(initial.rod).n_W;
@@ -32,7 +35,8 @@ sls_plant_state make_initial(const config::InitialState& initial, double rod_len
 class SharedLibraryPlant : public Plant {
  public:
   explicit SharedLibraryPlant(const PlantSetup& setup)
-      : library_(setup.folder / setup.plant.model.name, setup.plant.model.place + ": plant.model"),
+      : library_(setup.folder / setup.plant.model.name,
+                 setup.plant.model.describe_place("plant.model")),
         vehicle_id_(setup.vehicles[0].id),
         functions_(load_functions()) {
     const auto parameters = setup.plant.own.get<config::LibraryParameters>();
@@ -48,17 +52,15 @@ class SharedLibraryPlant : public Plant {
     given.gravity_m_s2 = vehicle.gravity;
     given.initial = make_initial(setup.vehicles[0].initial, vehicle.rod_length);
     ErrorText error;
-    call_guarded(call("create"),
-                 [&] { plant_ = functions_.create(&given, error.data(), error.size()); });
+    library_.call(call("create"),
+                  [&] { plant_ = functions_.create(&given, error.data(), error.size()); });
     if (!plant_)
       throw config::ConfigError(parameters.describe_place(setup.plant.model, "plant") + ": " +
                                 library_.name() + ": " + error.text());
     measurement_ = measure();
   }
   ~SharedLibraryPlant() override {
-    if (!plant_) return;
-    const plugin::CallGuard guard(call("destroy"));
-    functions_.destroy(plant_);
+    if (plant_) plugin::call_at_end(call("destroy"), [this] { functions_.destroy(plant_); });
   }
   SharedLibraryPlant(const SharedLibraryPlant&) = delete;
   SharedLibraryPlant& operator=(const SharedLibraryPlant&) = delete;
@@ -90,10 +92,10 @@ class SharedLibraryPlant : public Plant {
     const auto entry =
         reinterpret_cast<const sls_plant_functions* (*)()>(library_.find("sls_plant"));
     const sls_plant_functions* functions = nullptr;
-    call_guarded(call("sls_plant"), [&] { functions = entry(); });
+    library_.call(call("sls_plant"), [&] { functions = entry(); });
     if (!functions) library_.fail("sls_plant() returned no table of functions");
-    plugin::check_size(library_, "sls_plant_functions", sizeof *functions, functions->size);
     plugin::check_version(library_, SLS_PLANT_VERSION, functions->version);
+    plugin::check_size(library_, "sls_plant_functions", sizeof *functions, functions->size);
     plugin::check_size(library_, "sls_plant_setup", sizeof(sls_plant_setup), functions->setup_size);
     plugin::check_size(library_, "sls_plant_state", sizeof(sls_plant_state), functions->state_size);
     if (!functions->create || !functions->destroy || !functions->advance || !functions->measure)
@@ -101,9 +103,14 @@ class SharedLibraryPlant : public Plant {
     if (functions->signal_count > SLS_PLANT_MAX_SIGNALS)
       library_.fail("expected at most " + std::to_string(SLS_PLANT_MAX_SIGNALS) + " signals, got " +
                     std::to_string(functions->signal_count));
-    for (std::uint32_t i = 0; i < functions->signal_count; ++i)
+    for (std::uint32_t i = 0; i < functions->signal_count; ++i) {
       if (!functions->signal_names[i] || !functions->signal_units[i])
         library_.fail("expected a name and a unit for signal " + std::to_string(i) + ", got none");
+      const std::string name = functions->signal_names[i];
+      if (name.empty() || name.find_first_not_of(kNameLetters) != name.npos)
+        library_.fail("expected lower-case letters, digits and '_' as the name of signal " +
+                      std::to_string(i) + ", got '" + name + "'");
+    }
     return *functions;
   }
 
@@ -136,7 +143,9 @@ class SharedLibraryPlant : public Plant {
       fail("expected a unit quaternion as attitude_wb, got one of length " +
            std::to_string(measured.attitude.q_WB.norm()));
     if (!measured.attitude.w_WB_B.allFinite()) fail("body_rates_rad_s is not finite");
-    if (!measured.signals.allFinite()) fail("a signal is not finite");
+    for (std::uint32_t i = 0; i < functions_.signal_count; ++i)
+      if (!std::isfinite(measured.signals[i]))
+        fail(std::string("signal ") + functions_.signal_names[i] + " is not finite");
     return measured;
   }
 

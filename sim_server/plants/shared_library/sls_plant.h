@@ -32,7 +32,7 @@ typedef struct {
   double signals[SLS_PLANT_MAX_SIGNALS];
 } sls_plant_state;
 
-/* What a plant is made from. */
+/* What a plant is made from. What it points to lives until `create` returns. */
 typedef struct {
   size_t size;            /* of this struct */
   const char* parameters; /* `plant.parameters` as JSON, a map; "{}" where there is none */

@@ -1,0 +1,1 @@
+// Nothing: how it is linked is what matters.

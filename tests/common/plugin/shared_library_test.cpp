@@ -1,0 +1,102 @@
+#include "common/plugin/shared_library.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cfenv>
+
+#include "common/config/config_error.hpp"
+#include "tests/common/plugin/misbehaviour.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace sls::plugin {
+namespace {
+
+const std::string kFolder = SLS_LIBRARIES "/";
+
+/// What is said about loading `file` and finding `symbol` in it; "no error".
+std::string find_error(const std::string& file, const char* symbol = "sls_controller") {
+  try {
+    SharedLibrary(file, "flight.yaml:7: controller.law").find(symbol);
+  } catch (const config::ConfigError& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+/// The message of what calling `work` throws; "no error".
+template <class Work>
+std::string find_call_error(const Work& work) {
+  try {
+    call_guarded({"./mine.so", "answer", 3, 41}, work);
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+std::string expected(const std::string& file, const std::string& message) {
+  return "flight.yaml:7: controller.law: " + file + ": " + message;
+}
+
+TEST(SharedLibraryTest, WhatIsNoFileIsRefused) {
+  const sls::test::TemporaryFolder folder;
+  const std::string none = folder / "none.so", directory = folder.path();
+  EXPECT_EQ(find_error(none),
+            expected(none, "expected a shared library, got no file of this name"));
+  EXPECT_EQ(find_error(directory),
+            expected(directory, "expected a shared library, got no file of this name"));
+}
+
+TEST(SharedLibraryTest, WhatIsNoLibraryIsRefusedWithTheSystemsReason) {
+  const std::string text = kFolder + "text.so", unresolved = kFolder + "unresolved.so";
+  EXPECT_EQ(find_error(text), expected(text, "expected a shared library that loads, got: " + text +
+                                                 ": file too short"));
+  EXPECT_EQ(find_error(unresolved),
+            expected(unresolved, "expected a shared library that loads, got: " + unresolved +
+                                     ": undefined symbol: sls_test_defined_nowhere"));
+}
+
+TEST(SharedLibraryTest, ALibraryWithoutTheSymbolIsRefused) {
+  const std::string file = kFolder + "empty.so";
+  EXPECT_EQ(find_error(file),
+            expected(file, "expected a library that defines sls_controller(), got none (" + file +
+                               ": undefined symbol: sls_controller)"));
+}
+
+TEST(SharedLibraryTest, FastMathIsRefusedWhenItIsLoadedAndTheModePutBack) {
+  const std::string file = kFolder + "fast_math.so";
+  const std::uint64_t mode = floating_point_mode();
+  EXPECT_EQ(find_error(file),
+            expected(file,
+                     "changes the floating-point mode of the whole process when it is "
+                     "loaded; link it without -ffast-math"));
+  EXPECT_EQ(floating_point_mode(), mode);
+}
+
+TEST(CallTest, AnExceptionOfALibraryIsNamedWithItsPlace) {
+  EXPECT_EQ(find_call_error([] { sls::test::misbehave("throw"); }),
+            "./mine.so: answer, vehicle 3, step 41: threw an exception: out of luck");
+  EXPECT_EQ(find_call_error([] { sls::test::misbehave("throw a number"); }),
+            "./mine.so: answer, vehicle 3, step 41: threw an exception");
+  EXPECT_EQ(find_call_error([] {}), "no error");
+}
+
+TEST(CallTest, AChangedFloatingPointModeIsNamedAndPutBack) {
+  const std::uint64_t mode = floating_point_mode();
+  for (const char* how : {"round up", "flush to zero"}) {
+    EXPECT_EQ(
+        find_call_error([&] { sls::test::misbehave(how); }),
+        "./mine.so: answer, vehicle 3, step 41: changed the floating-point mode of the thread "
+        "(rounding, flush to zero or traps)")
+        << how;
+    EXPECT_EQ(floating_point_mode(), mode) << how;
+    EXPECT_EQ(std::fegetround(), FE_TONEAREST) << how;
+  }
+}
+
+TEST(CallTest, FlagsOfTheFloatingPointUnitAreNoMode) {
+  EXPECT_EQ(find_call_error([] { std::feraiseexcept(FE_ALL_EXCEPT); }), "no error");
+}
+
+}  // namespace
+}  // namespace sls::plugin
