@@ -46,7 +46,13 @@ const FlownStep* Flight::fly_step() {
           vehicle.faults.measure(flown.step, flown.truth));
       const control::ControllerMemory memory = flown.answer.memory;
       const auto began = measures_compute_time_ ? Clock::now() : Clock::time_point();
-      flown.answer = vehicle.controller.calc_answer(flown.step, flown.measured, memory);
+      try {
+        flown.answer = vehicle.controller.calc_answer(flown.step, flown.measured, memory);
+      } catch (const std::exception& error) {
+        failure_ = error.what();
+        has_ended_ = true;
+        return nullptr;
+      }
       if (measures_compute_time_) flown.compute_time = Clock::now() - began;
     }
   has_ended_ = is_last();

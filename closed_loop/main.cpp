@@ -7,7 +7,6 @@
 #include "closed_loop/recorded_flight.hpp"
 #include "common/app/run_main.hpp"
 #include "common/app/stop_signal.hpp"
-#include "recorder/recording_folder.hpp"
 
 int main(int argc, char** argv) {
   using namespace sls;
@@ -42,9 +41,8 @@ int main(int argc, char** argv) {
       while (app::stop_signal() == 0 && flown.fly_step()) end.last_step = flown.steps()[0].step;
       end.failure = app::stop_signal() != 0 ? "interrupted" : flown.failure();
     } else {
-      record::prepare_recording_folder(folder, force);
       flight.measures_compute_time = true;
-      end = closed_loop::fly_recorded(scenario, flight, folder);
+      end = closed_loop::fly_recorded(scenario, flight, folder, force);
     }
     const double wall_s =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();

@@ -8,16 +8,18 @@
 #include "common/app/options.hpp"
 #include "common/app/stop_signal.hpp"
 #include "recorder/recording.hpp"
+#include "recorder/recording_folder.hpp"
 #include "sim_server/status_board.hpp"
 
 namespace sls::closed_loop {
 
 FlightEnd fly_recorded(const config::Scenario& scenario, const FlightOptions& options,
-                       const std::filesystem::path& folder) {
+                       const std::filesystem::path& folder, bool force) {
   std::vector<std::uint32_t> ids(scenario.vehicles.size());
   std::iota(ids.begin(), ids.end(), 0);
   const std::uint64_t run_id = sim::make_run_id();
   Flight flight(scenario, ids, options);
+  record::prepare_recording_folder(folder, force);
   std::vector<SampleMaker> makers;
   for (const std::uint32_t id : ids) makers.emplace_back(run_id, id, scenario.sync.period_ns);
 

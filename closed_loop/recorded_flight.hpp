@@ -16,11 +16,12 @@ struct FlightEnd {
   bool is_complete = false;  ///< the recording
 };
 
-/// Flies all vehicles of `scenario` in lockstep and records them into `folder`, which is ready for
-/// a recording. The files hold the same data, with the same certificate, as those of the three
-/// programs.
+/// Flies all vehicles of `scenario` in lockstep and records them into `folder`, new or empty; with
+/// `force`, instead of the recording that is there. The files hold the same data, with the same
+/// certificate, as those of the three programs.
+/// @throws config::ConfigError as Flight does, before the folder is touched, or for the folder.
 /// @throws std::system_error naming the file when the disk refuses.
 FlightEnd fly_recorded(const config::Scenario& scenario, const FlightOptions& options,
-                       const std::filesystem::path& folder);
+                       const std::filesystem::path& folder, bool force);
 
 }  // namespace sls::closed_loop

@@ -11,6 +11,7 @@
 #include "common/app/stop_signal.hpp"
 #include "common/app/wait.hpp"
 #include "common/config/vehicle_ids.hpp"
+#include "common/plugin/shared_library.hpp"
 #include "control_client/messages.hpp"
 
 namespace sls::control {
@@ -20,6 +21,7 @@ using namespace std::chrono_literals;
 
 constexpr auto kUsualJoinTime = 1500ms;      // a server's claim and discovery: no news
 constexpr auto kAcknowledgmentTime = 500ms;  // for the last samples to reach the recorders
+constexpr double kAfterThePatience_s = 5.0;  // a law that does not return ends after the run
 constexpr auto kPollTime = 20ms;             // while nothing is in a hurry
 
 }  // namespace
@@ -108,6 +110,7 @@ void Client::begin(const bus::Run& run) {
     if (stream) stream_.swap(stream);
   }
   if (kind.is_realtime) app::put_process_first();
+  plugin::set_patience(scenario_.sync.calc_controller_patience_s() + kAfterThePatience_s);
   ready_ = false;
   watch_.emplace(servers_, run, scenario_.sync.wait.server_deadline_s);
   const std::string vehicles =
@@ -176,9 +179,9 @@ void Client::answer(const VehicleState* states, std::size_t count, const bus::Pe
 void Client::answer(Pilot& pilot, const VehicleState& state) {
   if (!pilot.last_command || pilot.last_command->step() != state.step()) {
     const auto began = Clock::now();
-    const Answer answer = pilot.controller.calc_answer(
-        state.step(), to_model_state(state),
-        to_memory(state.controller(), pilot.controller.memory_size()));
+    const Answer answer =
+        pilot.controller.calc_answer(state.step(), to_model_state(state),
+                                     to_memory(state.controller(), pilot.controller.memory_size()));
     const auto compute_time = Clock::now() - began;
     pilot.last_command = make_command_message(state, answer, name_, strength_, compute_time);
     references_.push_back(make_reference_message(state, answer, name_));

@@ -1,7 +1,5 @@
 #include "sim_server/controller_absence.hpp"
 
-#include <algorithm>
-
 namespace sls::sim {
 namespace {
 
@@ -13,12 +11,7 @@ ControllerAbsence::ControllerAbsence(const config::Sync& sync)
     : sync_(sync),
       period_wall_s_(static_cast<double>(sync.period_ns) * 1e-9 / sync.real_time_factor) {}
 
-double ControllerAbsence::give_up_s() const {
-  const auto& absence = sync_.wait.controller;
-  if (absence.policy == ControllerPolicy::kWait || absence.policy == ControllerPolicy::kStop)
-    return absence.deadline_s;
-  return std::max(absence.deadline_s, sync_.wait_for.timeout_s);
-}
+double ControllerAbsence::give_up_s() const { return sync_.calc_controller_patience_s(); }
 
 ControllerAbsence::Action ControllerAbsence::decide(double step_wait_s, double absence_s) const {
   if (absence_s >= give_up_s()) return Action::kGiveUp;

@@ -55,6 +55,8 @@ int main(int argc, char** argv) {
     if (real_time_factor) config::override_real_time_factor(scenario, *real_time_factor);
     const sim::Assignment assignment = {
         scenario, config::parse_vehicle_ids(vehicles, scenario.vehicles.size())};
+    // A plant that cannot be made is refused before anybody waits for this server.
+    sim::make_plants(sim::find_plant_type(scenario.plant.model), scenario, assignment.vehicle_ids);
     if (check) {
       bus::check_security_files(bus::read_qos_file(options.qos_file, kIdentity));
       const bool is_lockstep = scenario.sync.mode == config::SyncMode::kLockstep;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <any>
 #include <cstddef>
 #include <cstdint>
@@ -156,6 +157,14 @@ struct Sync {
   double max_hold_s = 0.5;             ///< simulated time a force is held before the fail-safe
   WaitFor wait_for;
   WaitPolicies wait;
+
+  /// Silence of a vehicle's controllers after which the server ends the run.
+  double calc_controller_patience_s() const {
+    const Absence<ControllerPolicy>& absence = wait.controller;
+    const bool flies_on =
+        absence.policy == ControllerPolicy::kHold || absence.policy == ControllerPolicy::kFailsafe;
+    return flies_on ? std::max(absence.deadline_s, wait_for.timeout_s) : absence.deadline_s;
+  }
 };
 
 // --- faults ------------------------------------------------------------------------------------

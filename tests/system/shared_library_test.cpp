@@ -1,0 +1,224 @@
+/// Shared libraries that end, or would hang, the program that calls them.
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <regex>
+
+#include "tests/system/flight.hpp"
+
+namespace sls::test {
+namespace {
+
+const std::string kController = std::string(SLS_LIBRARIES) + "/controller.so";
+const std::string kPlant = std::string(SLS_LIBRARIES) + "/plant.so";
+
+/// The short flight with the test controller or the test plant.
+std::string make_controller_scenario(const TemporaryFolder& folder, const std::string& parameters) {
+  return make_scenario(
+      folder,
+      {{"  gains: { lqr: { horizontal: 10, vertical: 5 } }\n",
+        "  law: " + kController + "\n  parameters: { " + parameters + " }\n"},
+       {"timeout_s: 30 } }", "timeout_s: 30 }, wait: { controller: { deadline_s: 4 } } }"}});
+}
+std::string make_plant_scenario(const TemporaryFolder& folder, const std::string& parameters) {
+  return make_scenario(
+      folder,
+      {{"  pendulum: ideal\n", "  model: " + kPlant + "\n  parameters: { " + parameters + " }\n"}});
+}
+
+struct Outcome {
+  std::optional<int> exit_code;
+  std::string output;
+};
+Outcome run(const std::vector<std::string>& command) {
+  Process process(command);
+  const auto exit_code = process.wait();
+  return {exit_code, process.output()};
+}
+
+class CrashTest : public testing::TestWithParam<std::pair<const char*, int>> {
+ protected:
+  const std::string how_ = GetParam().first;
+  const int signal_ = GetParam().second;
+  const std::string crashed_ = ": crashed (signal " + std::to_string(signal_) + ")\n";
+  TemporaryFolder folder_;
+};
+
+TEST_P(CrashTest, IsNamedWithLibraryFunctionVehicleAndStep) {
+  const auto fly = [&](const std::string& file) {
+    return run({program("closed_loop"), "--scenario", file});
+  };
+  Outcome outcome = fly(make_controller_scenario(folder_, "in: answer, at: 5, do: " + how_));
+  EXPECT_EQ(outcome.exit_code, 128 + signal_);
+  EXPECT_EQ(outcome.output,
+            "closed_loop: error: " + kController + ": answer, vehicle 0, step 5" + crashed_);
+
+  outcome = fly(make_plant_scenario(folder_, "in: advance, at: 8, do: " + how_));
+  EXPECT_EQ(outcome.exit_code, 128 + signal_);
+  EXPECT_EQ(outcome.output,
+            "closed_loop: error: " + kPlant + ": advance, vehicle 0, step 8" + crashed_);
+}
+
+INSTANTIATE_TEST_SUITE_P(Signals, CrashTest,
+                         testing::Values(std::pair("crash", SIGSEGV), std::pair("abort", SIGABRT),
+                                         std::pair("overflow the stack", SIGSEGV)));
+
+TEST(SharedLibraryProgramTest, ACrashBeforeTheFlightIsNamedByServerAndClient) {
+  TemporaryFolder folder;
+  OwnDomain domain;
+  const std::string plant = make_plant_scenario(folder, "in: create, do: crash");
+  Outcome outcome = run(make_command("sim_server", domain.number(), {"--scenario", plant}));
+  EXPECT_EQ(outcome.exit_code, 128 + SIGSEGV);
+  EXPECT_EQ(outcome.output,
+            "sim_server: error: " + kPlant + ": create, vehicle 0, step 0: crashed (signal 11)\n");
+
+  const std::string law = make_controller_scenario(folder, "in: create, do: crash");
+  outcome = run(make_command("control_client", domain.number(), {"--scenario", law}));
+  EXPECT_EQ(outcome.exit_code, 128 + SIGSEGV);
+  EXPECT_EQ(outcome.output, "control_client: error: " + kController +
+                                ": create, vehicle 0, step 0: crashed (signal 11)\n");
+}
+
+TEST(SharedLibraryProgramTest, ALibraryThatIsRefusedEndsServerAndClientWithItsLine) {
+  TemporaryFolder folder;
+  const std::string plant = make_plant_scenario(folder, "in: create");
+  const std::string refusal = ": failed without saying why\n";
+  Outcome outcome = run({program("sim_server"), "--check", "--scenario", plant});
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_EQ(outcome.output,
+            "sim_server: error: " + plant + ":6: plant.parameters: " + kPlant + refusal);
+
+  const std::string law = make_controller_scenario(folder, "in: create");
+  for (const std::string name : {"control_client", "closed_loop"}) {
+    outcome = run({program(name), "--scenario", law});
+    EXPECT_EQ(outcome.exit_code, 2);
+    EXPECT_EQ(outcome.output,
+              name + ": error: " + law + ":11: controller.parameters: " + kController + refusal);
+  }
+}
+
+TEST(SharedLibraryProgramTest, ALibraryThatIsRefusedLeavesTheRecordingThatIsThere) {
+  TemporaryFolder folder;
+  const auto fly = [&](const std::string& parameters) {
+    return run({program("closed_loop"), "--out", folder / "recording", "--force", "--scenario",
+                make_controller_scenario(folder, parameters)});
+  };
+  EXPECT_EQ(fly("in: nothing").exit_code, 0);
+  const std::string manifest = read_bytes(folder / "recording/manifest.json");
+  EXPECT_EQ(fly("in: create").exit_code, 2);
+  EXPECT_EQ(read_bytes(folder / "recording/manifest.json"), manifest);
+}
+
+TEST(SharedLibraryProgramTest, ACrashWhileALibraryIsLoadedIsNamed) {
+  TemporaryFolder folder;
+  const std::string library = std::string(SLS_LIBRARIES) + "/crashing_at_load.so";
+  const std::string file = make_scenario(
+      folder,
+      {{"  gains: { lqr: { horizontal: 10, vertical: 5 } }\n", "  law: " + library + "\n"}});
+  EXPECT_EQ(
+      run({program("closed_loop"), "--scenario", file}).output,
+      "closed_loop: error: " + library + ": (loading), vehicle 0, step 0: crashed (signal 11)\n");
+}
+
+TEST(SharedLibraryProgramTest, WhatDestroyDoesWrongIsNamedAndHarmsNoFlight) {
+  TemporaryFolder folder;
+  const Outcome outcome = run({program("closed_loop"), "--scenario",
+                               make_controller_scenario(folder, "in: destroy, do: throw")});
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_TRUE(holds(outcome.output, "closed_loop: warning: " + kController +
+                                        ": destroy, vehicle 0, step 0: threw an exception: out of "
+                                        "luck\n"))
+      << outcome.output;
+}
+
+TEST(SharedLibraryProgramTest, CheckPurityLooksBeyondTheFirst100Steps) {
+  TemporaryFolder folder;
+  const std::string file = make_controller_scenario(folder, "in: answer, at: 150, do: remember");
+  EXPECT_EQ(run({program("closed_loop"), "--scenario", file}).exit_code, 0);
+  const Outcome outcome = run({program("closed_loop"), "--scenario", file, "--check-purity"});
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_TRUE(holds(outcome.output, kController + ": vehicle 0, step 150: expected equal answers"))
+      << outcome.output;
+}
+
+TEST(SharedLibraryProgramTest, AFailedRecordingSaysWhatTheLibrarySaid) {
+  TemporaryFolder folder;
+  const Outcome outcome = run({program("closed_loop"), "--out", folder / "recording", "--scenario",
+                               make_controller_scenario(folder, "in: answer, at: 5, do: fail")});
+  const std::string message = kController + ": answer, vehicle 0, step 5: no solution after 20 ";
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_TRUE(holds(outcome.output, message)) << outcome.output;
+  const std::string statuses = read_bytes(folder / "recording/status.csv");
+  EXPECT_TRUE(holds(statuses, message)) << statuses;
+}
+
+/// Flights without shared memory, of which a process that ends amid a call would leave its own.
+FlightOptions over_udp() {
+  FlightOptions options;
+  options.qos_file = qos("udp");
+  return options;
+}
+
+void expect_line(const std::string& output, const std::string& line) {
+  EXPECT_TRUE(std::regex_search(output, std::regex("(^|\n)" + line + "\n"))) << output;
+}
+
+TEST(SharedLibraryProgramTest, AnErrorInFlightEndsTheClientAndTheServerNamesIt) {
+  TemporaryFolder folder;
+  FlightOptions options = over_udp();
+  options.client = {"--check-purity"};
+  Flight flight(make_controller_scenario(folder, "in: answer, at: 150, do: remember"), options);
+  flight.wait();
+  EXPECT_EQ(flight.client->wait(), 1);
+  expect_line(
+      flight.client->output(),
+      "control_client: error: " + kController +
+          ": vehicle 0, step 150: expected equal answers to equal inputs, got two different "
+          "ones; what the law must remember belongs into its memory numbers");
+  EXPECT_EQ(flight.server->wait(), 1);
+  expect_line(flight.server->output(),
+              "sim_server: error: step 150: waited 4 s for controller 'control_client' \\(gone\\)");
+}
+
+TEST(SharedLibraryProgramTest, AControllerThatNeverReturnsIsNamedAndEndsAfterTheRun) {
+  TemporaryFolder folder;
+  Flight flight(make_controller_scenario(folder, "in: answer, at: 5, do: hang"), over_udp());
+  flight.wait();
+  EXPECT_EQ(flight.server->wait(), 1);
+  expect_line(flight.server->output(),
+              "sim_server: error: step 5: waited 4 s for controller 'control_client' on .*");
+  EXPECT_EQ(flight.client->wait(), 1);
+  const std::string place = kController + ": answer, vehicle 0, step 5: has not returned for ";
+  expect_line(flight.client->output(), "control_client: warning: " + place + "[0-9]+ s");
+  // Not the minute that a call may take in flight.
+  expect_line(flight.client->output(),
+              "control_client: error: " + place + "[0-5]?[0-9] s: ends the program");
+}
+
+TEST(SharedLibraryProgramTest, EveryCallThatDoesNotReturnIsNamed) {
+  TemporaryFolder plant_folder, law_folder;
+  const std::string plant = make_plant_scenario(plant_folder, "in: measure, at: 8, do: hang");
+  const std::string law = make_controller_scenario(law_folder, "in: create, do: hang");
+  Process in_plant({program("closed_loop"), "--scenario", plant});
+  Process in_client({program("control_client"), "--scenario", law});
+  const auto names = [](const Process& process, const std::string& place) {
+    return wait_until([&] { return holds(process.output(), place + ": has not returned for "); });
+  };
+  EXPECT_TRUE(names(in_plant, "closed_loop: warning: " + kPlant + ": measure, vehicle 0, step 8"));
+  EXPECT_TRUE(
+      names(in_client, "control_client: warning: " + kController + ": create, vehicle 0, step 0"));
+}
+
+TEST(SharedLibraryProgramTest, APlantThatFailsEndsTheRunWithItsLine) {
+  TemporaryFolder folder;
+  Flight flight(make_plant_scenario(folder, "in: advance, at: 8, do: fail"), over_udp());
+  flight.wait();
+  const std::string failure = kPlant + ": advance, vehicle 0, step 8: the rope is torn";
+  EXPECT_EQ(flight.server->wait(), 1);
+  expect_line(flight.server->output(), "sim_server: error: " + failure);
+  EXPECT_EQ(flight.client->wait(), 1);
+  expect_line(flight.client->output(), "control_client: error: the run failed: " + failure);
+}
+
+}  // namespace
+}  // namespace sls::test
