@@ -289,6 +289,8 @@ std::string read_qos_file(const std::filesystem::path& file, const std::string& 
 }
 
 std::filesystem::path default_qos_file() {
+  if (const char* folder = std::getenv("SLS_CONFIG"); folder && *folder)
+    return std::filesystem::path(folder) / "qos/default.xml";
   // build/bin/PROGRAM of a checkout, PREFIX/bin/PROGRAM of an installation, any other build folder.
   std::error_code error;
   const auto program = std::filesystem::read_symlink("/proc/self/exe", error);

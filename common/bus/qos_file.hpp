@@ -20,7 +20,8 @@ std::string read_qos_file(const std::filesystem::path& file, const std::string& 
 /// SLS_IDENTITY if it is set, else `role`: whose keys a secured domain sees.
 std::string find_identity(const std::string& role);
 
-/// The QoS file used without `--qos`: config/qos/default.xml of this installation.
+/// The QoS file used without `--qos`: qos/default.xml of the folder SLS_CONFIG (environment), or of
+/// config/ of this installation. Programs of one's own stand in no installation.
 std::filesystem::path default_qos_file();
 
 }  // namespace sls::bus

@@ -103,6 +103,10 @@ TEST_F(QosFileTest, AnUnreadableFileIsNamedWithTheCause) {
 
 TEST_F(QosFileTest, TheDefaultOfThisBuildPasses) {
   EXPECT_EQ(find_error(default_qos_file()), "no error") << default_qos_file();
+  setenv("SLS_CONFIG", "/opt/sls/config", 1);
+  EXPECT_EQ(default_qos_file(), "/opt/sls/config/qos/default.xml");
+  unsetenv("SLS_CONFIG");
+  EXPECT_NE(default_qos_file(), "/opt/sls/config/qos/default.xml");
 }
 
 TEST_F(QosFileTest, AFileWithoutElementsLacksTheFirstProfile) {
