@@ -98,7 +98,7 @@ TEST(ClosedLoopErrorsTest, AKeyOfAnotherPlantIsRefusedWithItsOwner) {
     Process process({program(name), "--scenario", file});
     EXPECT_EQ(process.wait(), 2) << process.output();
     EXPECT_TRUE(holds(process.output(),
-                      "plant.pendulum: a key of model 'slung_load', here it is 'analytic'"))
+                      "plant.pendulum: a key of model 'slung_load', here model is 'analytic'"))
         << process.output();
   }
 }
