@@ -89,7 +89,8 @@ def read_headers(path):
 
 
 STATE_HEADER, COMMAND_HEADER, REFERENCE_HEADER = read_headers("rows.hpp")
-COUNTERS = re.findall(r"SLS_COUNTER\((\w+)\)[,}]", (ROOT / "common/bus/sync_counters.hpp").read_text())
+COUNTERS = re.findall(r"SLS_COUNTER\((\w+)\)[,}]",
+                      (ROOT / "common/bus/sync_counters.hpp").read_text())
 STATUS_HEADER = ",".join(["sample_index,phase,reason,step,controller,real_time_factor", *COUNTERS,
                           "round_trip_p50_us,round_trip_p99_us,timing"])
 PERIOD_S = 0.01
