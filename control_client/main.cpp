@@ -36,9 +36,10 @@ int main(int argc, char** argv) {
       ->type_name("IDS");
   cli.add_flag("--follow", follows_servers,
                "fly on with a server that replaces this one; else end with exit code 1");
-  cli.add_flag("--check-purity", checks_purity,
-               "compute every answer twice and refuse a law that gives two different ones; default: "
-               "in the first 100 steps");
+  cli.add_flag(
+      "--check-purity", checks_purity,
+      "compute every answer twice and refuse a law that gives two different ones; default: "
+      "in the first 100 steps");
   cli.add_option("--name", name, "name in recordings and messages")
       ->check(CLI::Validator(
           [](const std::string& text) {
@@ -58,8 +59,7 @@ int main(int argc, char** argv) {
     control::FlightController(config::make_vehicle_scenario(scenario, vehicle_ids.front()),
                               vehicle_ids.front());
     bus::Node node(options.qos_file, options.domain, "control_client", kIdentity);
-    control::Client(node, scenario, vehicle_ids, name, strength, follows_servers,
-                    checks_purity)
+    control::Client(node, scenario, vehicle_ids, name, strength, follows_servers, checks_purity)
         .run();
   });
 }

@@ -58,7 +58,7 @@ bool moves_rod(const model::RodAngles& rod) {
 
 /// Attitude and signals stay as they are.
 model::Measurement add(const model::Measurement& state, const config::SampleOffset& offset,
-                          double rod_length) {
+                       double rod_length) {
   model::Measurement moved = state;
   moved.p_WQ += offset.position;
   moved.v_WQ += offset.velocity;

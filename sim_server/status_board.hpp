@@ -21,7 +21,8 @@ class StatusBoard {
   /// Samples of a run are at most this far apart, so that silence says something.
   static constexpr auto kInterval = std::chrono::milliseconds(400);
 
-  /// Samples go out by `write`. `vehicle_id` is the first of the run's; `sum_counters` is asked for every sample.
+  /// Samples go out by `write`. `vehicle_id` is the first of the run's; `sum_counters` is asked for
+  /// every sample.
   StatusBoard(std::function<void(const SimStatus&)> write, std::uint64_t run_id,
               std::uint32_t vehicle_id, const config::Sync& sync,
               std::function<SyncCounters()> sum_counters);

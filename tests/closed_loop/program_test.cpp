@@ -14,7 +14,8 @@ std::string certificate_of(const std::filesystem::path& recording) {
   return read_manifest(recording).at("certificate").get<std::string>();
 }
 
-std::vector<std::string> fly_in_process(const std::string& file, const std::filesystem::path& folder,
+std::vector<std::string> fly_in_process(const std::string& file,
+                                        const std::filesystem::path& folder,
                                         std::vector<std::string> flags = {}) {
   flags.insert(flags.begin(), {program("closed_loop"), "--scenario", file, "--out", folder});
   return flags;

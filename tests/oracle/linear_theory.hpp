@@ -52,7 +52,8 @@ inline SteadyError calc_steady_error(const config::Scenario& scenario,
   using Complex = std::complex<double>;
   const model::SlungLoadParameters& vehicle = scenario.vehicle;
   const model::SlungLoadParameters& believed = scenario.controller.model.vehicle;
-  const control::NamedGains gains = control::make_named_gains(scenario.controller.own.get<control::QsfKeys>().gains);
+  const control::NamedGains gains =
+      control::make_named_gains(scenario.controller.own.get<control::QsfKeys>().gains);
   const control::AxisGains &xy = gains.horizontal, &z = gains.vertical;
   const double mass = vehicle.total_mass(), length = vehicle.rod_length, g = vehicle.gravity;
   double first_moment = vehicle.load_mass * length, second_moment = first_moment * length;

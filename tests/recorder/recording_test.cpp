@@ -317,12 +317,13 @@ TEST_F(RecordingTest, StatusRowsKeepReasonsWithCommasQuotesAndLineBreaksAndEvery
         "overflow", "slipped"})
     EXPECT_EQ(table.text(0, column), std::to_string(++expected)) << column;
   const std::string text = read_bytes(folder_ / "flight.txt");
-  EXPECT_NE(text.find("Commands\n"
-                      "  states resent 1, duplicate 3, superseded 4, late 2, take-overs 5\n"
-                      "  stale 13, held 14, fail-safe 15, deadline missed 16, overflow 17, slipped 18\n"
-                      "  rejected: not finite 6, force limit 7, run 8, step 9, vehicle 10, client 11, "
-                      "fault 12\n"),
-            text.npos)
+  EXPECT_NE(
+      text.find("Commands\n"
+                "  states resent 1, duplicate 3, superseded 4, late 2, take-overs 5\n"
+                "  stale 13, held 14, fail-safe 15, deadline missed 16, overflow 17, slipped 18\n"
+                "  rejected: not finite 6, force limit 7, run 8, step 9, vehicle 10, client 11, "
+                "fault 12\n"),
+      text.npos)
       << text;
   EXPECT_EQ(table.text(0, "round_trip_p50_us"), "81.25");
   EXPECT_EQ(table.text(0, "round_trip_p99_us"), "140");

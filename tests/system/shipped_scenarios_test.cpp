@@ -25,7 +25,8 @@ struct Step {
 /// One vehicle's flight.
 struct Flown {
   explicit Flown(const config::Scenario& alone)
-      : scenario(alone), gains(control::make_named_gains(alone.controller.own.get<control::QsfKeys>().gains)) {}
+      : scenario(alone),
+        gains(control::make_named_gains(alone.controller.own.get<control::QsfKeys>().gains)) {}
   const config::Scenario scenario;  ///< of the vehicle alone
   const control::NamedGains gains;
   std::vector<Step> steps;
@@ -269,8 +270,7 @@ void expect_offset_of_biased_angle(const Flown& flown) {
 /// near hover: laws/pid/README.md, eqs. (2) to (5).
 void expect_lag_of_cascade(const Flown& flown) {
   const auto& gains = flown.scenario.controller.own.get<control::PidKeys>().gains;
-  const auto& eight =
-      std::get<config::FigureEightReference>(flown.scenario.mission[0].reference);
+  const auto& eight = std::get<config::FigureEightReference>(flown.scenario.mission[0].reference);
   const double omega = 2 * M_PI / eight.period_s;
   const auto calc_rms = [&](int axis, double frequency) {
     const std::complex<double> s(0.0, frequency);

@@ -73,7 +73,8 @@ TEST(DelayMarginProgramTest, AScenarioThatLosesTheLoadAnywayEndsWithOne) {
   write_bytes(file, replace_once(read_file(scenario("matlab_setpoint_3")), "force_limit_n: 200",
                                  "force_limit_n: 100"));
   expect_refused(program_with({"--scenario", file}), 1,
-                 "the load is lost without any added delay: controller 'control_client' answered step 0 with a force "
+                 "the load is lost without any added delay: controller 'control_client' answered "
+                 "step 0 with a force "
                  "beyond");
 }
 

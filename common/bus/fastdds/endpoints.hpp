@@ -18,8 +18,8 @@ inline void leave_out_type_object(eprosima::fastdds::dds::TypeSupport& type) {
 }
 
 /// Deletes a writer of `publisher`. Its history goes first: otherwise a heartbeat to a reader that
-/// has died may meet a half-deleted one and never end (README.md, trap 13). Upstream: none reported.
-/// To be deleted when deleting a writer waits for its heartbeat.
+/// has died may meet a half-deleted one and never end (README.md, trap 13). Upstream: none
+/// reported. To be deleted when deleting a writer waits for its heartbeat.
 inline void delete_writer(eprosima::fastdds::dds::Publisher& publisher,
                           eprosima::fastdds::dds::DataWriter* writer) {
   writer->set_listener(nullptr);

@@ -1,4 +1,5 @@
-/// The ideal slung load in closed form, without Simbody: for campaigns. README.md, eqs. (1) and (2).
+/// The ideal slung load in closed form, without Simbody: for campaigns. README.md, eqs. (1) and
+/// (2).
 #pragma once
 
 #include <Eigen/Core>

@@ -84,8 +84,8 @@ void check_finite(const Motion& motion, std::int64_t step) {
 
 }  // namespace
 
-/// The multibody system at one state. README.md, "Integration", says why forces and accelerations go
-/// through the operators of the matter subsystem and not through force elements and `realize`.
+/// The multibody system at one state. README.md, "Integration", says why forces and accelerations
+/// go through the operators of the matter subsystem and not through force elements and `realize`.
 struct SlungLoadPlant::Multibody {
   Multibody(const model::SlungLoadParameters& vehicle, const config::Plant& plant)
       : config(plant),

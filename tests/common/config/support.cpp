@@ -18,8 +18,8 @@ bool are_equal(const InitialState& a, const InitialState& b) {
 bool are_equal(const Plant& a, const Plant& b) {
   return a.model.name == b.model.name &&
          a.own.get<sim::SlungLoadKeys>().pendulum == b.own.get<sim::SlungLoadKeys>().pendulum &&
-         a.step_ns == b.step_ns && are_equal(a.initial, b.initial) &&
-         a.air == b.air && a.disturbance_W == b.disturbance_W;
+         a.step_ns == b.step_ns && are_equal(a.initial, b.initial) && a.air == b.air &&
+         a.disturbance_W == b.disturbance_W;
 }
 
 template <class Policy>
@@ -66,9 +66,9 @@ bool are_equal(const ControllerModel& a, const ControllerModel& b) {
 bool are_equal(const Controller& a, const Controller& b) {
   return a.law.name == b.law.name &&
          are_equal(a.own.get<QsfKeys>().gains, b.own.get<QsfKeys>().gains) &&
-         a.force_limit_n == b.force_limit_n &&
-         a.saturate == b.saturate && a.drag_feed_forward == b.drag_feed_forward &&
-         a.state_wiring == b.state_wiring && are_equal(a.model, b.model);
+         a.force_limit_n == b.force_limit_n && a.saturate == b.saturate &&
+         a.drag_feed_forward == b.drag_feed_forward && a.state_wiring == b.state_wiring &&
+         are_equal(a.model, b.model);
 }
 
 bool are_equal(const StageReference& a, const StageReference& b) {

@@ -20,7 +20,9 @@ using control::NamedGains;
 using control::QsfKeys;
 using sls::test::replace_once;
 
-inline Gains gains_of(const Scenario& scenario) { return scenario.controller.own.get<QsfKeys>().gains; }
+inline Gains gains_of(const Scenario& scenario) {
+  return scenario.controller.own.get<QsfKeys>().gains;
+}
 
 /// Equal in every field but `text` and `sha256`.
 bool are_equal(const Scenario& a, const Scenario& b);

@@ -21,8 +21,8 @@ config::Scenario fly_with_pid(config::Scenario scenario) {
 
 LawInput make_hover_input(const Vector3d& p_WL) {
   LawInput input;
-  static_cast<model::SlungLoadState&>(input.state) = model::make_state(
-      p_WL - Vector3d::UnitZ(), Vector3d::Zero(), model::RodAngles{}, 1.0);
+  static_cast<model::SlungLoadState&>(input.state) =
+      model::make_state(p_WL - Vector3d::UnitZ(), Vector3d::Zero(), model::RodAngles{}, 1.0);
   input.memory = Vector3d::Zero();
   return input;
 }
@@ -75,8 +75,8 @@ TEST(PidLawTest, ClosesTheLoopThatItsGainsSay) {
   const Eigen::Matrix4d A = calc_linearised_loop(law, vehicle);
   for (const auto& s : A.eigenvalues()) {
     EXPECT_LT(s.real(), 0.0);
-    const auto value = s * s * s * s + 12.0 * s * s * s + 36.0 * s * s + 36.0 * 1.5 * s +
-                       36.0 * 1.5 * 0.6;
+    const auto value =
+        s * s * s * s + 12.0 * s * s * s + 36.0 * s * s + 36.0 * 1.5 * s + 36.0 * 1.5 * 0.6;
     EXPECT_LE(std::abs(value), 1e-3 * 36.0 * 1.5);  // differences of 1e-6
   }
 }

@@ -165,7 +165,8 @@ TEST(PlantTest, RefusesAForceThatIsNotFiniteAndKeepsItsState) {
   }
 }
 
-// --- plants that move all vehicles together --------------------------------------------------------
+// --- plants that move all vehicles together
+// --------------------------------------------------------
 
 /// Points that move by their force, all in one plant.
 class Swarm : public Plant {
