@@ -267,7 +267,7 @@ void expect_offset_of_biased_angle(const Flown& flown) {
 }
 
 /// The cascade without feed-forward follows a sine of frequency ω as its transfer function says,
-/// near hover: laws/pid/README.md, eqs. (2) to (5).
+/// near hover: control_client/laws/pid/README.md, eqs. (2) to (5).
 void expect_lag_of_cascade(const Flown& flown) {
   const auto& gains = flown.scenario.controller.own.get<control::PidKeys>().gains;
   const auto& eight = std::get<config::FigureEightReference>(flown.scenario.mission[0].reference);
