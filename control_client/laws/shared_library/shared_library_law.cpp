@@ -1,6 +1,7 @@
 // A law from a shared library of the user's own: sls_controller.h.
 #include <array>
 #include <cmath>
+#include <memory>
 #include <stdexcept>
 
 #include "common/plugin/shared_library.hpp"
@@ -35,19 +36,20 @@ class SharedLibraryLaw : public ControlLaw {
     given.gravity_m_s2 = believed.gravity;
     given.force_limit_n = setup.controller.force_limit_n;
     ErrorText error;
+    void* made = nullptr;
     library_.call(call("create", 0), [&] {
-      controller_ = functions_.create(&given, &memory_count_, error.data(), error.size());
+      made = functions_.create(&given, &memory_count_, error.data(), error.size());
     });
-    if (!controller_)
+    if (!made)
       throw config::ConfigError(parameters.describe_place(setup.controller.law, "controller") +
                                 ": " + library_.name() + ": " + error.text());
-    if (memory_count_ > SLS_CONTROLLER_MAX_MEMORY) {
-      destroy();
+    controller_.reset(made, [this](void* controller) {
+      plugin::call_at_end(call("destroy", 0), [&] { functions_.destroy(controller); });
+    });
+    if (memory_count_ > SLS_CONTROLLER_MAX_MEMORY)
       library_.fail("create: expected at most " + std::to_string(SLS_CONTROLLER_MAX_MEMORY) +
                     " memory numbers, got " + std::to_string(memory_count_));
-    }
   }
-  ~SharedLibraryLaw() override { destroy(); }
   SharedLibraryLaw(const SharedLibraryLaw&) = delete;
   SharedLibraryLaw& operator=(const SharedLibraryLaw&) = delete;
 
@@ -78,16 +80,11 @@ class SharedLibraryLaw : public ControlLaw {
     return {library_.name().c_str(), function, vehicle_id_, step};
   }
 
-  void destroy() noexcept {
-    if (controller_)
-      plugin::call_at_end(call("destroy", 0), [this] { functions_.destroy(controller_); });
-  }
-
   const plugin::SharedLibrary library_;
   const std::uint32_t vehicle_id_;
   const double period_;  // s
   const sls_controller_functions functions_;
-  void* controller_ = nullptr;
+  std::shared_ptr<void> controller_;
   std::uint32_t memory_count_ = 0;
 };
 
@@ -146,7 +143,7 @@ LawOutput SharedLibraryLaw::calc(const LawInput& input) const {
   int code = SLS_CONTROLLER_ERROR;
   const plugin::Call answering = call("answer", input.step);
   call_guarded(answering, [&] {
-    code = functions_.answer(controller_, &given, &answer, error.data(), error.size());
+    code = functions_.answer(controller_.get(), &given, &answer, error.data(), error.size());
   });
   const auto fail = [&](const std::string& defect) {
     throw std::runtime_error(answering.describe() + ": " + defect);

@@ -1,5 +1,6 @@
 // A plant from a shared library of the user's own: sls_plant.h.
 #include <cmath>
+#include <memory>
 #include <stdexcept>
 
 #include "common/plugin/shared_library.hpp"
@@ -52,15 +53,16 @@ class SharedLibraryPlant : public Plant {
     given.gravity_m_s2 = vehicle.gravity;
     given.initial = make_initial(setup.vehicles[0].initial, vehicle.rod_length);
     ErrorText error;
+    void* made = nullptr;
     library_.call(call("create"),
-                  [&] { plant_ = functions_.create(&given, error.data(), error.size()); });
-    if (!plant_)
+                  [&] { made = functions_.create(&given, error.data(), error.size()); });
+    if (!made)
       throw config::ConfigError(parameters.describe_place(setup.plant.model, "plant") + ": " +
                                 library_.name() + ": " + error.text());
+    plant_.reset(made, [this](void* plant) {
+      plugin::call_at_end(call("destroy"), [&] { functions_.destroy(plant); });
+    });
     measurement_ = measure();
-  }
-  ~SharedLibraryPlant() override {
-    if (plant_) plugin::call_at_end(call("destroy"), [this] { functions_.destroy(plant_); });
   }
   SharedLibraryPlant(const SharedLibraryPlant&) = delete;
   SharedLibraryPlant& operator=(const SharedLibraryPlant&) = delete;
@@ -71,7 +73,7 @@ class SharedLibraryPlant : public Plant {
     int code = 1;
     const plugin::Call advancing = call("advance");
     call_guarded(advancing, [&] {
-      code = functions_.advance(plant_, f_Q_W[0].data(), steps, error.data(), error.size());
+      code = functions_.advance(plant_.get(), f_Q_W[0].data(), steps, error.data(), error.size());
     });
     if (code != 0) throw std::runtime_error(advancing.describe() + ": " + error.text());
     steps_ += steps;
@@ -122,7 +124,7 @@ class SharedLibraryPlant : public Plant {
     sls_plant_state state{};
     state.size = sizeof state;
     const plugin::Call measuring = call("measure");
-    call_guarded(measuring, [&] { functions_.measure(plant_, &state); });
+    call_guarded(measuring, [&] { functions_.measure(plant_.get(), &state); });
     model::Measurement measured =
         model::make_state(to_vector(state.quad_position_m), to_vector(state.quad_velocity_m_s),
                           to_vector(state.load_position_m), to_vector(state.load_velocity_m_s));
@@ -153,7 +155,7 @@ class SharedLibraryPlant : public Plant {
   const std::uint32_t vehicle_id_;
   std::int64_t steps_ = 0;
   const sls_plant_functions functions_;
-  void* plant_ = nullptr;
+  std::shared_ptr<void> plant_;
   model::Measurement measurement_;
 };
 
