@@ -34,20 +34,16 @@ struct Profile {
   const char* name;
   bool is_required = true;
 };
-constexpr std::array<Profile, 13> kProfiles = {
+constexpr std::array<Profile, 9> kProfiles = {
     {{"participant", kParticipantProfile},
-     {"data_writer", kStreamWriterProfile},
+     {"data_writer", kLoopWriterProfile},
      {"data_reader", kLoopReaderProfile},
-     {"data_reader", kRecorderReaderProfile},
+     {"data_writer", kRecordWriterProfile},
+     {"data_reader", kRecordReaderProfile},
      {"data_writer", kLatchedWriterProfile},
      {"data_reader", kLatchedReaderProfile},
      {"data_writer", kRealtimeCommandWriterProfile, false},
-     {"data_reader", kRealtimeCommandReaderProfile, false},
-     {"data_writer", kFleetWriterProfile},
-     {"data_reader", kFleetLoopReaderProfile},
-     {"data_reader", kFleetRecorderReaderProfile},
-     {"data_writer", kRealtimeFleetCommandWriterProfile, false},
-     {"data_reader", kRealtimeFleetCommandReaderProfile, false}}};
+     {"data_reader", kRealtimeCommandReaderProfile, false}}};
 
 struct Found {
   std::string element;

@@ -7,32 +7,16 @@
 namespace sls::bus::detail {
 
 template <>
-void* make_type_support<VehicleState>() {
-  return static_cast<eprosima::fastdds::dds::TopicDataType*>(
-      new GuardedType<VehicleStatePubSubType>);
+void* make_type_support<States>() {
+  return static_cast<eprosima::fastdds::dds::TopicDataType*>(new GuardedType<StatesPubSubType>);
 }
 template <>
-void* make_type_support<ControlCommand>() {
-  return static_cast<eprosima::fastdds::dds::TopicDataType*>(
-      new GuardedType<ControlCommandPubSubType>);
+void* make_type_support<Commands>() {
+  return static_cast<eprosima::fastdds::dds::TopicDataType*>(new GuardedType<CommandsPubSubType>);
 }
 template <>
-void* make_type_support<Reference>() {
-  return static_cast<eprosima::fastdds::dds::TopicDataType*>(new GuardedType<ReferencePubSubType>);
-}
-template <>
-void* make_type_support<FleetState>() {
-  return static_cast<eprosima::fastdds::dds::TopicDataType*>(new GuardedType<FleetStatePubSubType>);
-}
-template <>
-void* make_type_support<FleetCommand>() {
-  return static_cast<eprosima::fastdds::dds::TopicDataType*>(
-      new GuardedType<FleetCommandPubSubType>);
-}
-template <>
-void* make_type_support<FleetReference>() {
-  return static_cast<eprosima::fastdds::dds::TopicDataType*>(
-      new GuardedType<FleetReferencePubSubType>);
+void* make_type_support<RecordBatch>() {
+  return static_cast<eprosima::fastdds::dds::TopicDataType*>(new GuardedType<RecordBatchPubSubType>);
 }
 template <>
 void* make_type_support<Participant>() {
