@@ -19,6 +19,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cstddef>
 #include <cstdlib>
 #include <limits>
 #include <map>
@@ -26,7 +27,10 @@
 #include <utility>
 
 #include "common/bus/fastdds/endpoints.hpp"
+#include "common/bus/fastdds/facts_of.hpp"
+#include "common/bus/fastdds/guarded_type.hpp"
 #include "common/bus/fastdds/middleware_log.hpp"
+#include "common/bus/fastdds/neighbours.hpp"
 #include "common/bus/fastdds/participant_listener.hpp"
 #include "common/bus/fastdds/stale_segments.hpp"
 #include "common/bus/qos_file.hpp"
@@ -78,9 +82,18 @@ namespace {
 PeerId to_peer(const dds::InstanceHandle_t& handle) {
   eprosima::fastrtps::rtps::GUID_t guid;
   eprosima::fastrtps::rtps::iHandle2GUID(guid, handle);
-  PeerId peer;
-  std::copy(std::begin(guid.guidPrefix.value), std::end(guid.guidPrefix.value), peer.bytes.begin());
-  return peer;
+  return bus::to_peer(guid);
+}
+
+/// The sample that `payload` is of. A reader of Fast DDS 2.9 hands no other to a type.
+const eprosima::fastrtps::rtps::CacheChange_t& find_change(
+    const eprosima::fastrtps::rtps::SerializedPayload_t& payload) {
+  using Change = eprosima::fastrtps::rtps::CacheChange_t;
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Winvalid-offsetof"  // it has bases neither virtual nor any
+  constexpr std::size_t kOffset = offsetof(Change, serializedPayload);
+#pragma GCC diagnostic pop
+  return *reinterpret_cast<const Change*>(reinterpret_cast<const char*>(&payload) - kOffset);
 }
 
 /// Counts matched endpoints per participant, one of which may have several.
@@ -130,7 +143,8 @@ struct Node::Impl {
            wire.port.participantIDGain});
     listener = std::make_unique<ParticipantListener>(
         eprosima::fastrtps::rtps::PropertyPolicyHelper::find_property(
-            qos.properties(), "dds.sec.auth.plugin") != nullptr);
+            qos.properties(), "dds.sec.auth.plugin") != nullptr,
+        neighbours);
     participant = factory->create_participant(static_cast<std::uint32_t>(domain), qos,
                                               listener.get(), dds::StatusMask::none());
     if (participant)
@@ -139,6 +153,7 @@ struct Node::Impl {
     if (!participant || !publisher || !subscriber)
       throw BusError("domain " + std::to_string(domain) +
                      ": cannot join: " + MiddlewareLog::find_first_error());
+    neighbours.set_self(to_peer(participant->get_instance_handle()));
     joined = std::chrono::steady_clock::now();
   }
 
@@ -182,6 +197,8 @@ struct Node::Impl {
   std::string qos_place;
   std::string identity;
   std::chrono::steady_clock::time_point joined;
+  Problems problems;
+  Neighbours neighbours{problems};
   std::unique_ptr<ParticipantListener> listener;
   dds::DomainParticipant* participant = nullptr;
   dds::Publisher* publisher = nullptr;
@@ -240,6 +257,14 @@ std::string Node::describe_loneliness() const {
 
 PeerId Node::id() const { return to_peer(impl_->participant->get_instance_handle()); }
 
+Problems& Node::problems() { return impl_->problems; }
+
+std::string Node::describe(const PeerId& peer) const { return impl_->neighbours.describe(peer); }
+
+std::map<PeerId, std::string> Node::find_missing_deadlines() const {
+  return impl_->neighbours.find_missing_deadlines();
+}
+
 namespace detail {
 
 // A DataWriter with a deadline needs a listener of its own, so every one has (fastdds/README.md,
@@ -250,6 +275,7 @@ struct AnyWriter::Impl : dds::DataWriterListener {
     peers.update(status.last_subscription_handle, status.current_count_change);
   }
   MatchedPeers peers;
+  Neighbours* neighbours = nullptr;
   dds::Publisher* publisher = nullptr;
   dds::DataWriter* writer = nullptr;
 };
@@ -265,10 +291,14 @@ AnyWriter::AnyWriter(Node& node, const char* topic, const char* profile, void* t
   MiddlewareLog::clear();
   impl_->writer = impl_->publisher->create_datawriter(dds_topic, qos, impl_.get());
   if (!impl_->writer) node.impl().throw_refused_endpoint("write", topic, profile);
+  impl_->neighbours = &node.impl().neighbours;
+  impl_->neighbours->add_own(make_facts(*impl_->writer));
 }
 
 AnyWriter::~AnyWriter() {
-  if (impl_->writer) delete_writer(*impl_->publisher, impl_->writer);
+  if (!impl_->writer) return;
+  impl_->neighbours->drop_own(make_facts(*impl_->writer));
+  delete_writer(*impl_->publisher, impl_->writer);
 }
 
 bool AnyWriter::write(const void* sample) {
@@ -292,9 +322,10 @@ int AnyWriter::history_depth() const {
   return limit > 0 ? limit : std::numeric_limits<int>::max();
 }
 
-struct AnyReader::Impl : dds::DataReaderListener {
+struct AnyReader::Impl : dds::DataReaderListener, MisfitReport {
   void on_data_available(dds::DataReader* source) override {
     dds::SampleInfo info;
+    const MisfitScope scope(*this);
     while (source->take_next_sample(sample, &info) == ReturnCode_t::RETCODE_OK)
       if (info.valid_data) {
         written = std::chrono::system_clock::time_point(
@@ -310,7 +341,16 @@ struct AnyReader::Impl : dds::DataReaderListener {
                                     const dds::RequestedDeadlineMissedStatus& status) override {
     missed_deadlines = status.total_count;
   }
+  void report(const eprosima::fastrtps::rtps::SerializedPayload_t& payload, const char* type,
+              const std::string& defect) override {
+    const auto& guid = find_change(payload).writerGUID;
+    Neighbours::EntityId writer;
+    std::copy(std::begin(guid.entityId.value), std::end(guid.entityId.value), writer.begin());
+    neighbours->note_misfit(to_peer(guid), writer, topic, type, defect);
+  }
   MatchedPeers peers;
+  Neighbours* neighbours = nullptr;
+  std::string topic;
   std::atomic<std::uint64_t> missed_deadlines{0};
   std::optional<std::chrono::nanoseconds> lifespan;
   std::chrono::system_clock::time_point written;  // the sample in `sample`
@@ -325,6 +365,8 @@ AnyReader::AnyReader(Node& node, const char* topic, const char* profile, void* t
     : impl_(std::make_unique<Impl>()) {
   dds::TypeSupport type(static_cast<dds::TopicDataType*>(type_support));
   auto* dds_topic = node.impl().find_or_create_topic(topic, type);
+  impl_->neighbours = &node.impl().neighbours;
+  impl_->topic = topic;
   impl_->sample = sample;
   impl_->take = std::move(take);
   impl_->subscriber = node.impl().subscriber;
@@ -337,10 +379,12 @@ AnyReader::AnyReader(Node& node, const char* topic, const char* profile, void* t
   MiddlewareLog::clear();
   impl_->reader = impl_->subscriber->create_datareader(dds_topic, qos, impl_.get());
   if (!impl_->reader) node.impl().throw_refused_endpoint("read", topic, profile);
+  impl_->neighbours->add_own(make_facts(*impl_->reader));
 }
 
 AnyReader::~AnyReader() {
   if (!impl_->reader) return;
+  impl_->neighbours->drop_own(make_facts(*impl_->reader));
   impl_->reader->set_listener(nullptr);
   impl_->subscriber->delete_datareader(impl_->reader);
 }
