@@ -41,9 +41,8 @@ const FlownStep* Flight::fly_step() {
       FlownStep& flown = steps_[group.vehicles[i]];
       Vehicle& vehicle = vehicles_[group.vehicles[i]];
       flown.truth = group.plant->measurement(i);
-      // Contract 1 of the topics carries the bodies alone: no attitude, no signals.
-      flown.measured = static_cast<const model::SlungLoadState&>(
-          vehicle.faults.measure(flown.step, flown.truth));
+      flown.measured = vehicle.faults.measure(flown.step, flown.truth);
+      flown.can_measurement_differ = vehicle.faults.can_disturb_state();
       const control::ControllerMemory memory = flown.answer.memory;
       const auto began = measures_compute_time_ ? Clock::now() : Clock::time_point();
       try {
@@ -89,6 +88,7 @@ bool Flight::is_last() {
     if (answer.fault != control::Fault::kNone) judged.fault = to_string(answer.fault);
     judged.is_mission_failed = answer.mission == control::MissionPhase::kFailed;
     if (const auto defect = sim::find_defect(judged, force_limit_)) {
+      refused_ = i;
       failure_ = name_vehicle(i) + sim::describe_refusal(*defect, judged, force_limit_,
                                                          controller_name_, steps_[i].step);
       return true;

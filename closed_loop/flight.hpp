@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,7 @@ struct FlownStep {
   std::uint64_t step = 0;
   model::Measurement truth;
   model::Measurement measured;  ///< with the faults on `state`: what the controller answered
+  bool can_measurement_differ = false;                       ///< from the truth
   Eigen::Vector3d answered_f_Q_W = Eigen::Vector3d::Zero();  ///< for [step − 1, step), N; 0 at 0
   Eigen::Vector3d applied_f_Q_W = Eigen::Vector3d::Zero();   ///< the same after faults
   control::Answer answer;
@@ -54,6 +56,12 @@ class Flight {
   /// The last step of every vehicle, in the order of the ids.
   const std::vector<FlownStep>& steps() const { return steps_; }
 
+  /// Whether the last answer of the `index`th vehicle failed the flight.
+  bool is_refused(std::size_t index) const { return refused_ == index; }
+
+  /// That of the first vehicle.
+  const sim::Plant& plant() const { return *plants_.front().plant; }
+
   /// Why the flight failed, once it has ended; empty if every mission was finished.
   const std::string& failure() const { return failure_; }
 
@@ -78,6 +86,7 @@ class Flight {
   std::vector<sim::PlantOfVehicles> plants_;
   std::vector<Vehicle> vehicles_;
   std::vector<FlownStep> steps_;
+  std::optional<std::size_t> refused_;
   bool has_begun_ = false;
   bool has_ended_ = false;
   std::string failure_;

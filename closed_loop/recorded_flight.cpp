@@ -4,7 +4,7 @@
 
 #include <numeric>
 
-#include "closed_loop/samples.hpp"
+#include "closed_loop/record_entries.hpp"
 #include "common/app/options.hpp"
 #include "common/app/stop_signal.hpp"
 #include "recorder/recording.hpp"
@@ -20,22 +20,25 @@ FlightEnd fly_recorded(const config::Scenario& scenario, const FlightOptions& op
   const std::uint64_t run_id = sim::make_run_id();
   Flight flight(scenario, ids, options);
   record::prepare_recording_folder(folder, force);
-  std::vector<SampleMaker> makers;
-  for (const std::uint32_t id : ids) makers.emplace_back(run_id, id, scenario.sync.period_ns);
-
-  record::Recording recording(folder,
-                              sim::make_parameters_message(run_id, ids, scenario, app::version()));
+  record::Recording recording(
+      folder, sim::make_parameters_message(run_id, ids, scenario, flight.plant(), app::version()));
   sim::StatusBoard board([&](const SimStatus& status) { recording.add(status); }, run_id,
                          ids.front(), scenario.sync, [] { return SyncCounters(); });
   board.controller_name = options.controller_name;
   board.start_clock();
   board.publish(PHASE_RUNNING, "");
+  RecordBatch batch;
+  batch.run_id(run_id);
+  const auto hand_on = [&] {
+    recording.add(batch);
+    batch.batch_index(batch.batch_index() + 1);
+    batch.entries().clear();
+  };
   while (app::stop_signal() == 0 && flight.fly_step()) {
     for (std::size_t i = 0; i < ids.size(); ++i) {
-      const StepSamples samples = makers[i].make(flight.steps()[i], options.controller_name);
-      recording.add(samples.state);
-      recording.add(samples.command);
-      recording.add(samples.reference);
+      batch.entries().push_back(
+          make_entry(ids[i], flight.steps()[i], options.controller_name, flight.is_refused(i)));
+      if (batch.entries().size() == BATCH_ENTRIES) hand_on();
     }
     board.step = flight.steps().front().step;
     if (board.step > 0)
@@ -43,13 +46,14 @@ FlightEnd fly_recorded(const config::Scenario& scenario, const FlightOptions& op
     board.publish_if_due("");
     recording.flush_if_due();
   }
+  batch.is_last(true);
+  hand_on();
   FlightEnd end{board.step, flight.failure(), false};
   if (app::stop_signal() != 0) {
     end.failure = "interrupted";
     recording.finish(end.failure, 0);
     return end;
   }
-  if (ids.size() > 1) board.controller_names.assign(ids.size(), options.controller_name);
   board.publish(end.failure.empty() ? PHASE_FINISHED : PHASE_FAILED,
                 end.failure.empty() ? "mission finished" : end.failure);
   end.is_complete = recording.finish("", 0);

@@ -1,72 +1,39 @@
-/// The client's end of the control loop: states in, commands and references out; of one vehicle's
-/// topics, or of a fleet's.
+/// The client's end of the control loop: states in, commands out.
 #pragma once
 
-#include <chrono>
-#include <cstddef>
 #include <functional>
-#include <optional>
-#include <vector>
 
 #include "common/bus/node.hpp"
 
 namespace sls::control {
 
-/// What a run decides about the topics that fly it.
-struct LoopKind {
-  bool is_fleet = false;
-  bool is_realtime = false;
-
-  bool operator==(const LoopKind& other) const {
-    return is_fleet == other.is_fleet && is_realtime == other.is_realtime;
-  }
-};
-
 class AnswerStream {
  public:
-  /// Sees the states of one sample, on a thread of the middleware.
-  using Handler =
-      std::function<void(const VehicleState* states, std::size_t count, const bus::PeerId& sender)>;
+  /// Sees a sample of states, on a thread of the middleware.
+  using Handler = std::function<void(const States& sample, const bus::PeerId& sender)>;
 
-  AnswerStream(bus::Node& node, const LoopKind& kind, Handler handler);
+  /// In real time commands are written with DEADLINE, where the QoS file has it.
+  AnswerStream(bus::Node& node, bool is_realtime, Handler handler)
+      : is_realtime_(is_realtime),
+        commands_(node, is_realtime ? node.choose_writer_profile(bus::kRealtimeCommandWriterProfile,
+                                                                 bus::kLoopWriterProfile)
+                                    : bus::kLoopWriterProfile),
+        states_(node, bus::kLoopReaderProfile, std::move(handler)) {}
 
-  const LoopKind& kind() const { return kind_; }
+  bool is_realtime() const { return is_realtime_; }
 
-  /// Publishes the answers to the states of one sample, all of one step, in the order of both
-  /// vectors, which it may leave empty.
-  void write(std::vector<Reference>& references, std::vector<ControlCommand>& commands);
+  /// Publishes the answers to one sample of states.
+  void write(const Commands& answers) { commands_.write(answers); }
 
   /// True where `server` is heard and hears.
-  bool sees_server(const bus::PeerId& server) const;
-  /// True where `recorder` hears commands and references.
-  bool sees_recorder(const bus::PeerId& recorder) const;
-
-  void wait_for_acknowledgments(std::chrono::milliseconds limit);
-
- private:
-  struct Vehicle {
-    Vehicle(bus::Node& node, const char* command_profile, const Handler& handler);
-    bus::Writer<Reference> references;
-    bus::Writer<ControlCommand> commands;
-    bus::Reader<VehicleState> states;
-  };
-  struct Fleet {
-    Fleet(bus::Node& node, const char* command_profile, const Handler& handler);
-    bus::Writer<FleetReference> references;
-    bus::Writer<FleetCommand> commands;
-    FleetReference reference_sample;
-    FleetCommand command_sample;
-    bus::Reader<FleetState> states;
-  };
-
-  template <class Look>
-  bool look(Look look_at) const {
-    return vehicle_ ? look_at(*vehicle_) : look_at(*fleet_);
+  bool sees_server(const bus::PeerId& server) const {
+    return states_.matched().count(server) > 0 && commands_.matched().count(server) > 0;
   }
 
-  const LoopKind kind_;
-  std::optional<Vehicle> vehicle_;  // one of the two
-  std::optional<Fleet> fleet_;
+ private:
+  const bool is_realtime_;
+  bus::Writer<Commands> commands_;
+  bus::Reader<States> states_;  // last: its handler uses the writer
 };
 
 }  // namespace sls::control

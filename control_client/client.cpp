@@ -10,6 +10,7 @@
 #include "common/app/scheduling.hpp"
 #include "common/app/stop_signal.hpp"
 #include "common/app/wait.hpp"
+#include "common/bus/convert.hpp"
 #include "common/config/vehicle_ids.hpp"
 #include "common/plugin/shared_library.hpp"
 #include "control_client/messages.hpp"
@@ -20,7 +21,6 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto kUsualJoinTime = 1500ms;      // a server's claim and discovery: no news
-constexpr auto kAcknowledgmentTime = 500ms;  // for the last samples to reach the recorders
 constexpr double kAfterThePatience_s = 5.0;  // a law that does not return ends after the run
 constexpr auto kPollTime = 20ms;             // while nothing is in a hurry
 
@@ -35,19 +35,19 @@ Client::Client(bus::Node& node, const config::Scenario& scenario,
       strength_(strength),
       follows_servers_(follows_servers),
       checks_purity_(checks_purity),
+      library_sha256_(scenario.controller.law.calc_library_sha256(scenario.folder)),
       vehicle_ids_(vehicle_ids),
-      participants_(node),
       servers_(node),
       participant_writer_(node),
-      stream_(make_stream(
-          {scenario.vehicles.size() > 1, scenario.sync.mode == config::SyncMode::kRealtime})) {}
+      stream_(make_stream(scenario.sync.mode == config::SyncMode::kRealtime)) {
+  answers_.client_name(name);
+  answers_.strength(strength);
+}
 
-std::unique_ptr<AnswerStream> Client::make_stream(const LoopKind& kind) {
+std::unique_ptr<AnswerStream> Client::make_stream(bool is_realtime) {
   return std::make_unique<AnswerStream>(
-      node_, kind,
-      [this](const VehicleState* states, std::size_t count, const bus::PeerId& sender) {
-        receive(states, count, sender);
-      });
+      node_, is_realtime,
+      [this](const States& sample, const bus::PeerId& sender) { receive(sample, sender); });
 }
 
 void Client::run() {
@@ -88,7 +88,7 @@ void Client::begin(const bus::Run& run) {
     throw config::ConfigError(
         fmt::format("scenario '{}': expected the server's, SHA-256 {}, got {}", scenario_.name,
                     parameters.scenario_sha256().c_str(), scenario_.sha256));
-  const LoopKind kind = {bus::is_fleet(parameters), parameters.mode() == MODE_REALTIME};
+  const bool is_realtime = parameters.mode() == MODE_REALTIME;
   config::Scenario scenario = scenario_;
   scenario.sync.period_ns = parameters.period_ns();
   scenario.plant.step_ns = parameters.step_ns();
@@ -101,7 +101,7 @@ void Client::begin(const bus::Run& run) {
   }
   // Made and destroyed outside the lock: the middleware waits for handlers meanwhile, and ours for
   // the lock.
-  auto stream = stream_->kind() == kind ? nullptr : make_stream(kind);
+  auto stream = stream_->is_realtime() == is_realtime ? nullptr : make_stream(is_realtime);
   {
     const std::lock_guard lock(answer_mutex_);
     run_ = run;
@@ -109,12 +109,12 @@ void Client::begin(const bus::Run& run) {
     pilots_ = std::move(pilots);
     if (stream) stream_.swap(stream);
   }
-  if (kind.is_realtime) app::put_process_first();
+  if (is_realtime) app::put_process_first();
   plugin::set_patience(scenario_.sync.calc_controller_patience_s() + kAfterThePatience_s);
   ready_ = false;
   watch_.emplace(servers_, run, scenario_.sync.wait.server_deadline_s);
   const std::string vehicles =
-      kind.is_fleet ? ", vehicles " + config::to_vehicle_ranges(flown_ids_) : "";
+      bus::is_fleet(parameters) ? ", vehicles " + config::to_vehicle_ranges(flown_ids_) : "";
   spdlog::info("'{}' joins run {:016x}: {}{}, period {} s", name_, parameters.run_id(),
                scenario_.name, vehicles, scenario_.sync.period_ns * 1e-9);
   announce(false, false);
@@ -123,22 +123,9 @@ void Client::begin(const bus::Run& run) {
 void Client::leave() {
   const std::uint64_t run_id = run_->parameters.run_id();
   const auto status = servers_.find_status(run_id);
-  const bool is_finished = status && status->phase() == PHASE_FINISHED;
   announce(false, true);
-  if (app::stop_signal() == 0)
-    bus::wait_for_recorders_to_end(participants_, run_id,
-                                   is_finished ? scenario_.sync.wait_for.recorders : 0);
-  stream_->wait_for_acknowledgments(kAcknowledgmentTime);
   if (status && status->phase() == PHASE_FAILED)
     throw app::RunError(fmt::format("the run failed: {}", status->reason().c_str()));
-}
-
-bool Client::sees_all_endpoints() const {
-  if (!stream_->sees_server(run_->server)) return false;
-  int recorders = 0;
-  for (const auto& entry : participants_.find(ROLE_RECORDER, run_->parameters.run_id()))
-    if (stream_->sees_recorder(entry.peer)) ++recorders;
-  return recorders >= scenario_.sync.wait_for.recorders;
 }
 
 std::optional<bus::Run> Client::serve() {
@@ -146,7 +133,7 @@ std::optional<bus::Run> Client::serve() {
     rethrow_answer_error();
     if (has_ended()) return std::nullopt;
     if (auto next = find_successor()) return next;
-    if (!ready_ && sees_all_endpoints()) {
+    if (!ready_ && stream_->sees_server(run_->server)) {
       ready_ = true;
       announce(true, false);
     }
@@ -155,40 +142,39 @@ std::optional<bus::Run> Client::serve() {
   return std::nullopt;
 }
 
-void Client::receive(const VehicleState* states, std::size_t count, const bus::PeerId& sender) {
+void Client::receive(const States& sample, const bus::PeerId& sender) {
   const std::lock_guard lock(answer_mutex_);
   try {
-    answer(states, count, sender);
+    answer(sample, sender);
   } catch (...) {  // an exception must not reach the middleware
     answer_error_ = std::current_exception();
   }
 }
 
-void Client::answer(const VehicleState* states, std::size_t count, const bus::PeerId& sender) {
-  if (!run_ || !(sender == run_->server)) return;
-  references_.clear();
-  commands_.clear();
-  for (std::size_t i = 0; i < count; ++i) {
-    if (states[i].run_id() != run_->parameters.run_id()) continue;
-    const auto pilot = pilots_.find(states[i].vehicle_id());
-    if (pilot != pilots_.end()) answer(pilot->second, states[i]);
+void Client::answer(const States& sample, const bus::PeerId& sender) {
+  if (!run_ || !(sender == run_->server) || sample.run_id() != run_->parameters.run_id()) return;
+  answers_.run_id(sample.run_id());
+  answers_.step(sample.step());
+  answers_.vehicles().clear();
+  for (const VehicleState& state : sample.vehicles()) {
+    const auto pilot = pilots_.find(state.vehicle_id());
+    if (pilot != pilots_.end())
+      answers_.vehicles().push_back(answer(pilot->second, sample.step(), state));
   }
-  stream_->write(references_, commands_);
+  if (!answers_.vehicles().empty()) stream_->write(answers_);
 }
 
-void Client::answer(Pilot& pilot, const VehicleState& state) {
-  if (!pilot.last_command || pilot.last_command->step() != state.step()) {
-    const auto began = Clock::now();
-    const Answer answer =
-        pilot.controller.calc_answer(state.step(), to_model_state(state),
-                                     to_memory(state.controller(), pilot.controller.memory_size()));
-    const auto compute_time = Clock::now() - began;
-    pilot.last_command = make_command_message(state, answer, name_, strength_, compute_time);
-    references_.push_back(make_reference_message(state, answer, name_));
-    if (answer.fault != Fault::kNone)
-      spdlog::error("step {}: fault {}", state.step(), to_string(answer.fault));
-  }
-  commands_.push_back(*pilot.last_command);
+const ControlCommand& Client::answer(Pilot& pilot, std::uint64_t step, const VehicleState& state) {
+  if (pilot.last_step == step) return pilot.last_command;
+  const auto began = Clock::now();
+  const Answer answer = pilot.controller.calc_answer(step, bus::to_measurement(state.measured()),
+                                                     to_memory(state.controller()));
+  const auto compute_time = Clock::now() - began;
+  pilot.last_command = make_command_message(state.vehicle_id(), answer, compute_time);
+  pilot.last_step = step;
+  if (answer.fault != Fault::kNone)
+    spdlog::error("step {}: fault {}", step, to_string(answer.fault));
+  return pilot.last_command;
 }
 
 void Client::rethrow_answer_error() {
@@ -220,13 +206,14 @@ std::optional<bus::Run> Client::find_successor() {
 void Client::announce(bool ready, bool done) {
   Participant message;
   message.run_id(run_->parameters.run_id());
-  message.vehicle_id(flown_ids_.front());
+  message.contract_sha256(bus::kContractSha256);
   message.vehicle_ids(flown_ids_);
   message.role(ROLE_CONTROLLER);
   message.name(name_);
   message.host(bus::host_name());
   message.strength(strength_);
   message.scenario_sha256(scenario_.sha256);
+  message.library_sha256(library_sha256_);
   message.ready(ready);
   message.done(done);
   message.last_complete_step(find_last_step());
@@ -238,8 +225,7 @@ std::int64_t Client::find_last_step() {
   const std::lock_guard lock(answer_mutex_);
   std::int64_t last = std::numeric_limits<std::int64_t>::max();
   for (const auto& [id, pilot] : pilots_)
-    last = std::min(last, pilot.last_command ? static_cast<std::int64_t>(pilot.last_command->step())
-                                             : std::int64_t{-1});
+    last = std::min(last, pilot.last_step ? static_cast<std::int64_t>(*pilot.last_step) : -1);
   return last;
 }
 

@@ -2,8 +2,8 @@
 ///
 /// A sample is answered where it arrives, on the middleware's thread: the step waits for the
 /// answer, and handing the sample to another thread would make the round trip a quarter longer.
-/// Writing there must never block (common/bus/fastdds/README.md, trap 4): the stream writers'
-/// profile keeps the last samples rather than all of them.
+/// Writing there must never block (common/bus/fastdds/README.md, trap 4): the profile of the loop's
+/// writers keeps the last samples rather than all of them.
 #pragma once
 
 #include <chrono>
@@ -45,7 +45,7 @@ class Client {
 
   /// The run to begin with; nothing after a stop signal.
   std::optional<bus::Run> find_first_run();
-  std::unique_ptr<AnswerStream> make_stream(const LoopKind& kind);
+  std::unique_ptr<AnswerStream> make_stream(bool is_realtime);
   /// That of the first of our vehicles that has one.
   std::optional<bus::Run> find_joinable_run() const;
   void begin(const bus::Run& run);
@@ -58,15 +58,15 @@ class Client {
     Pilot(const config::Scenario& scenario, std::uint32_t id, bool checks_purity)
         : controller(scenario, id, checks_purity) {}
     FlightController controller;
-    std::optional<ControlCommand> last_command;  // a repeated sample is answered from here
+    std::optional<std::uint64_t> last_step;
+    ControlCommand last_command;  // the answer to that step: a repeated sample gets it again
   };
 
-  /// Called by the middleware for the states of every sample.
-  void receive(const VehicleState* states, std::size_t count, const bus::PeerId& sender);
+  /// Called by the middleware for every sample of states.
+  void receive(const States& sample, const bus::PeerId& sender);
   /// Answers states of the server whose run is joined; others' are nobody's business here.
-  void answer(const VehicleState* states, std::size_t count, const bus::PeerId& sender);
-  void answer(Pilot& pilot, const VehicleState& state);
-  bool sees_all_endpoints() const;
+  void answer(const States& sample, const bus::PeerId& sender);
+  const ControlCommand& answer(Pilot& pilot, std::uint64_t step, const VehicleState& state);
   void announce(bool ready, bool done);
   std::int64_t find_last_step();
   /// True when the run has ended, well or not.
@@ -82,9 +82,9 @@ class Client {
   const std::int32_t strength_;
   const bool follows_servers_;
   const bool checks_purity_;
+  const std::string library_sha256_;
   const std::vector<std::uint32_t> vehicle_ids_;
 
-  bus::ParticipantDirectory participants_;
   bus::ServerDirectory servers_;
   bus::Writer<Participant> participant_writer_;
   std::optional<bus::Run> run_;
@@ -95,10 +95,9 @@ class Client {
   // Shared between the main thread and the middleware's.
   std::mutex answer_mutex_;  // over all that `answer` touches
   std::map<std::uint32_t, Pilot> pilots_;
-  std::vector<Reference> references_;     // of the sample in work
-  std::vector<ControlCommand> commands_;  // likewise
+  Commands answers_;  // to the sample in work
   std::exception_ptr answer_error_;
-  /// Made for what the scenario says, and anew where the run is of another kind.
+  /// Made for what the scenario says, and anew where the run is of another mode.
   std::unique_ptr<AnswerStream> stream_;  // last: its callbacks use the members above
 };
 

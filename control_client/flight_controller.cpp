@@ -14,7 +14,6 @@ namespace sls::control {
 namespace {
 
 constexpr std::uint64_t kPurityCheckedSteps = 100;
-constexpr int kMostMemoryNumbers = 3;  // until contract 2 brings model::kMaxNumbers
 
 void fail(Answer& answer, Fault fault) {
   answer.f_Q_W.setZero();
@@ -45,9 +44,9 @@ struct FlightController::Parts {
         mission(scenario.mission, scenario.sync.period_ns),
         law(make_law({scenario.controller, period, vehicle_id, scenario.folder})),
         checks_purity(checks_purity_always) {
-    if (law->memory_size() > kMostMemoryNumbers)
+    if (law->memory_size() > model::kMaxNumbers)
       throw config::ConfigError(controller.law.describe_place("controller.law") +
-                                ": expected at most " + std::to_string(kMostMemoryNumbers) +
+                                ": expected at most " + std::to_string(model::kMaxNumbers) +
                                 " memory numbers, which is what sls/command carries, got " +
                                 std::to_string(law->memory_size()) + " of '" + controller.law.name +
                                 "'");

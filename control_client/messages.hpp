@@ -2,21 +2,16 @@
 #pragma once
 
 #include <chrono>
-#include <string>
+#include <cstdint>
 
 #include "common/bus/topics.hpp"
 #include "control_client/flight_controller.hpp"
 
 namespace sls::control {
 
-model::SlungLoadState to_model_state(const VehicleState& message);
-/// The memory of a law that remembers `size` numbers.
-ControllerMemory to_memory(const ControllerState& message, int size);
+ControllerMemory to_memory(const ControllerState& message);
 
-ControlCommand make_command_message(const VehicleState& answered, const Answer& answer,
-                                    const std::string& client_name, std::int32_t strength,
+ControlCommand make_command_message(std::uint32_t vehicle_id, const Answer& answer,
                                     std::chrono::nanoseconds compute_time);
-Reference make_reference_message(const VehicleState& answered, const Answer& answer,
-                                 const std::string& client_name);
 
 }  // namespace sls::control

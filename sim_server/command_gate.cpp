@@ -14,7 +14,7 @@ constexpr std::size_t kRememberedAnswers =
     64;  // copies older than that are rejected as wrong steps
 
 JudgedAnswer to_judged(const ControlCommand& command) {
-  const auto& memory = command.controller().integral_m_s();
+  const auto& memory = command.controller().numbers();
   JudgedAnswer judged;
   judged.f_Q_W = bus::to_vector(command.f_Q_W_n());
   judged.is_memory_finite =
@@ -59,6 +59,8 @@ const char* to_string(Verdict verdict) {
       return to_string(Defect::kForceLimit);
     case Verdict::kOtherRun:
       return "another run_id";
+    case Verdict::kEarly:
+      return "a step whose state was not published yet";
     case Verdict::kWrongStep:
       return "a step that is not awaited";
     case Verdict::kUnknownVehicle:
@@ -91,7 +93,7 @@ void CommandGate::set_clients(const std::vector<ReadyClient>& clients) {
 
 void CommandGate::expect(std::uint64_t step) {
   if (accepted_) {
-    past_[step_] = Past{accepted_from_, accepted_->f_Q_W_n()};
+    past_[step_] = Past{accepted_from_, accepted_->command.f_Q_W_n()};
     for (Client& client : clients_) client.refusal.clear();
   } else if (step > step_) {
     past_[step_] = std::nullopt;
@@ -99,6 +101,7 @@ void CommandGate::expect(std::uint64_t step) {
   while (past_.size() > kRememberedAnswers) past_.erase(past_.begin());
   step_ = step;
   accepted_.reset();
+  refused_.reset();
   take_over_.reset();
   drop_held();
 }
@@ -110,60 +113,65 @@ void CommandGate::drop_held() {
   }
 }
 
-Verdict CommandGate::offer(const ControlCommand& command, const bus::PeerId& sender) {
-  const Verdict verdict = judge(command, sender);
+Verdict CommandGate::offer(const OfferedAnswer& answer, const bus::PeerId& sender) {
+  const Verdict verdict = judge(answer, sender);
   count(verdict);
   return verdict;
 }
 
-Verdict CommandGate::judge(const ControlCommand& command, const bus::PeerId& sender) {
-  if (command.run_id() != run_id_) return Verdict::kOtherRun;
-  if (command.vehicle_id() != vehicle_id_) return Verdict::kUnknownVehicle;
+Verdict CommandGate::judge(const OfferedAnswer& answer, const bus::PeerId& sender) {
+  if (answer.run_id != run_id_) return Verdict::kOtherRun;
+  if (answer.command.vehicle_id() != vehicle_id_) return Verdict::kUnknownVehicle;
+  if (answer.is_early && answer.step >= step_) return Verdict::kEarly;
 
-  const JudgedAnswer answer = to_judged(command);
+  const JudgedAnswer judged = to_judged(answer.command);
   Client* client = find_client(sender);
-  if (const auto defect = find_defect(answer, force_limit_n_)) {
-    if (client) note_refusal(*client, command.step(), answer, *defect);
+  if (const auto defect = find_defect(judged, force_limit_n_)) {
+    if (client) note_refusal(*client, answer, judged, *defect);
     return to_verdict(*defect);
   }
-  if (command.step() != step_) return judge_past(command, sender);
+  if (answer.step != step_) return judge_past(answer, sender);
   if (!client) return Verdict::kUnknownClient;
   // A client's first answer counts; what it sends besides is a copy or belongs to no step.
   const auto& first = accepted_ && accepted_from_ == sender ? accepted_ : client->held;
   if (first)
-    return first->f_Q_W_n() == command.f_Q_W_n() ? Verdict::kDuplicate : Verdict::kWrongStep;
+    return first->command.f_Q_W_n() == answer.command.f_Q_W_n() ? Verdict::kDuplicate
+                                                                : Verdict::kWrongStep;
   client->silent = false;
   client->misses = 0;
   if (!is_refused(*client)) client->refusal.clear();  // of an earlier step
   if (accepted_) return Verdict::kSuperseded;
-  client->held = command;
+  client->held = answer;
   settle();
   return accepted_ && accepted_from_ == sender ? Verdict::kAccepted : Verdict::kHeld;
 }
 
-void CommandGate::note_refusal(Client& client, std::uint64_t step, const JudgedAnswer& answer,
-                               Defect defect) {
+void CommandGate::note_refusal(Client& client, const OfferedAnswer& answer,
+                               const JudgedAnswer& judged, Defect defect) {
+  const std::uint64_t step = answer.step;
   const auto past = past_.find(step);
   const bool is_open =
       step == step_ ? !accepted_ && !client.held : past != past_.end() && !past->second;
   const bool is_newer = client.refusal.empty() || step > client.refused_step;
   if (!is_open || !is_newer) return;
+  if (step == step_) refused_ = answer;
   client.refused_step = step;
-  client.refusal = describe_refusal(defect, answer, force_limit_n_, client.identity.name, step);
+  client.refusal = describe_refusal(defect, judged, force_limit_n_, client.identity.name, step);
   settle();
 }
 
-Verdict CommandGate::judge_past(const ControlCommand& command, const bus::PeerId& sender) {
-  const auto past = past_.find(command.step());
+Verdict CommandGate::judge_past(const OfferedAnswer& answer, const bus::PeerId& sender) {
+  const auto past = past_.find(answer.step);
   if (past == past_.end()) return Verdict::kWrongStep;
+  const auto& force = answer.command.f_Q_W_n();
   std::optional<Past>& first = past->second;
   if (first && first->sender == sender)
-    return first->force == command.f_Q_W_n() ? Verdict::kDuplicate : Verdict::kWrongStep;
+    return first->force == force ? Verdict::kDuplicate : Verdict::kWrongStep;
   Client* client = find_client(sender);
   if (!client) return Verdict::kWrongStep;
   if (first) return Verdict::kSuperseded;
   client->refusal.clear();
-  first = Past{sender, command.f_Q_W_n()};
+  first = Past{sender, force};
   return Verdict::kLate;
 }
 
@@ -254,6 +262,7 @@ void CommandGate::count(Verdict verdict) {
     case Verdict::kOtherRun:
       ++counters_.rejected_run();
       return;
+    case Verdict::kEarly:
     case Verdict::kWrongStep:
       ++counters_.rejected_step();
       return;

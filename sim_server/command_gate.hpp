@@ -1,4 +1,4 @@
-/// Decides what becomes of every command: the one that flies, or why not. No network here.
+/// Decides what becomes of every answer: the one that flies, or why not. No network here.
 /// Rules: README.md, "Commands" and "Standby".
 #pragma once
 
@@ -24,6 +24,7 @@ enum class Verdict {
   kNotFinite,
   kForceLimit,
   kOtherRun,
+  kEarly,  ///< it answers a state that had not been published
   kWrongStep,
   kUnknownVehicle,
   kUnknownClient,
@@ -32,6 +33,15 @@ enum class Verdict {
 
 /// For messages: what is wrong with a rejected command. Empty for the first five verdicts.
 const char* to_string(Verdict verdict);
+
+/// One vehicle's part of a sample of sls/command.
+struct OfferedAnswer {
+  std::uint64_t run_id = 0;
+  std::uint64_t step = 0;
+  std::string client_name;
+  bool is_early = false;  ///< it came before the state of its step was published
+  ControlCommand command;
+};
 
 /// A client that announced itself ready to fly the vehicle.
 struct ReadyClient {
@@ -51,11 +61,14 @@ class CommandGate {
   /// an accepted answer (real time, or a vehicle nobody flew) may still get a late one.
   void expect(std::uint64_t step);
 
-  /// Judges one command and counts it.
-  Verdict offer(const ControlCommand& command, const bus::PeerId& sender);
+  /// Judges one answer and counts it.
+  Verdict offer(const OfferedAnswer& answer, const bus::PeerId& sender);
 
   /// The accepted answer to the awaited step, once there is one.
-  const std::optional<ControlCommand>& accepted() const { return accepted_; }
+  const std::optional<OfferedAnswer>& accepted() const { return accepted_; }
+
+  /// The last answer to the awaited step that was refused for what it says.
+  const std::optional<OfferedAnswer>& refused() const { return refused_; }
 
   /// The client whose answer is awaited: the strongest that is neither silent nor refused.
   std::optional<ReadyClient> awaited_client() const;
@@ -90,19 +103,20 @@ class CommandGate {
   struct Client {
     ReadyClient identity;
     bool silent = false;
-    int misses = 0;                      // steps in a row that it let go by
-    std::string refusal;                 // why its last answer was refused
-    std::uint64_t refused_step = 0;      // which that one answered
-    std::optional<ControlCommand> held;  // its first valid answer to the awaited step
+    int misses = 0;                     // steps in a row that it let go by
+    std::string refusal;                // why its last answer was refused
+    std::uint64_t refused_step = 0;     // which that one answered
+    std::optional<OfferedAnswer> held;  // its first valid answer to the awaited step
   };
 
-  Verdict judge(const ControlCommand& command, const bus::PeerId& sender);
-  Verdict judge_past(const ControlCommand& command, const bus::PeerId& sender);
+  Verdict judge(const OfferedAnswer& answer, const bus::PeerId& sender);
+  Verdict judge_past(const OfferedAnswer& answer, const bus::PeerId& sender);
   void count(Verdict verdict);
   bool is_refused(const Client& client) const {  // for the awaited step
     return !client.refusal.empty() && client.refused_step == step_;
   }
-  void note_refusal(Client& client, std::uint64_t step, const JudgedAnswer& answer, Defect defect);
+  void note_refusal(Client& client, const OfferedAnswer& answer, const JudgedAnswer& judged,
+                    Defect defect);
   void settle();
   void drop_held();
   Client* find_client(const bus::PeerId& peer);
@@ -114,7 +128,8 @@ class CommandGate {
 
   std::uint64_t step_ = 0;
   std::vector<Client> clients_;  // strongest first
-  std::optional<ControlCommand> accepted_;
+  std::optional<OfferedAnswer> accepted_;
+  std::optional<OfferedAnswer> refused_;
   bus::PeerId accepted_from_;
   std::optional<ReadyClient> flyer_;  // of the last accepted answer
   std::optional<TakeOver> take_over_;

@@ -3,6 +3,7 @@
 /// (lockstep_run.hpp).
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstddef>
 #include <functional>
@@ -17,42 +18,42 @@
 
 namespace sls::sim {
 
-struct ReceivedCommand {
-  ControlCommand command;
+struct ReceivedCommands {
+  Commands sample;
   bus::PeerId sender;
+  std::chrono::steady_clock::time_point arrived;
 };
 
-/// Commands in, of one vehicle's topic or of a fleet's.
+/// Commands in.
 class CommandStream {
  public:
-  /// Sees a sample's commands first, on a thread of the middleware; true where it has taken them,
-  /// else they go into the mailbox.
-  using Handler =
-      std::function<bool(const ControlCommand* commands, std::size_t count, const bus::PeerId&)>;
+  /// Sees a sample first, on a thread of the middleware; true where it has taken it, else it goes
+  /// into the mailbox.
+  using Handler = std::function<bool(const Commands& sample, const bus::PeerId& sender)>;
 
-  CommandStream(bus::Node& node, std::size_t vehicles, config::SyncMode mode,
-                app::Mailbox<ReceivedCommand>& mailbox);
+  CommandStream(bus::Node& node, config::SyncMode mode, app::Mailbox<ReceivedCommands>& mailbox);
 
   /// Puts `handler` in place of the one there was, which is not called any more on return.
   void set_handler(Handler handler);
 
-  std::uint64_t missed_deadlines() const;
-  std::optional<std::chrono::nanoseconds> lifespan() const;
-  void ignore_lifespan();
+  std::uint64_t missed_deadlines() const { return reader_.missed_deadlines(); }
+  std::optional<std::chrono::nanoseconds> lifespan() const { return reader_.lifespan(); }
+  void ignore_lifespan() { reader_.ignore_lifespan(); }
 
  private:
-  void receive(const ControlCommand* commands, std::size_t count, const bus::PeerId& sender);
+  void receive(const Commands& sample, const bus::PeerId& sender);
 
-  app::Mailbox<ReceivedCommand>& mailbox_;
+  app::Mailbox<ReceivedCommands>& mailbox_;
   std::mutex mutex_;  // over handler_
   Handler handler_;
-  std::optional<bus::Reader<ControlCommand>> vehicle_reader_;  // last: they call `receive`
-  std::optional<bus::Reader<FleetCommand>> fleet_reader_;
+  bus::Reader<Commands> reader_;  // last: it calls `receive`
 };
 
 struct Endpoints {
   static constexpr std::size_t kCommands = 4096;
   static constexpr std::size_t kRequests = 64;
+  /// A full history of 5,000 batches takes no more than 64 MB.
+  static constexpr std::size_t kMaxBatchBytes = 12'000;
 
   /// In real time commands are read with DEADLINE and LIFESPAN, where the QoS file has them.
   Endpoints(bus::Node& node, std::size_t vehicles, config::SyncMode mode)
@@ -60,12 +61,14 @@ struct Endpoints {
         participants(node),
         servers(node),
         states(node, vehicles),
+        record_writer(node),
+        max_batch_bytes(std::min(node.max_sample_bytes(), kMaxBatchBytes)),
         parameters_writer(node),
         status_writer(node),
         reply_writer(node),
         commands(kCommands),
         requests(kRequests),
-        command_stream(node, vehicles, mode, commands),
+        command_stream(node, mode, commands),
         request_reader(
             node, bus::kLatchedReaderProfile,
             [this](const SimControl& request, const bus::PeerId&) { requests.put(request); }) {}
@@ -74,10 +77,12 @@ struct Endpoints {
   bus::ParticipantDirectory participants;
   bus::ServerDirectory servers;
   StateStream states;
+  bus::Writer<RecordBatch> record_writer;
+  const std::size_t max_batch_bytes;
   bus::Writer<Parameters> parameters_writer;
   bus::Writer<SimStatus> status_writer;
   bus::Writer<SimControlReply> reply_writer;
-  app::Mailbox<ReceivedCommand> commands;
+  app::Mailbox<ReceivedCommands> commands;
   app::Mailbox<SimControl> requests;
   CommandStream command_stream;
   bus::Reader<SimControl> request_reader;

@@ -214,6 +214,8 @@ FaultLine::FaultLine(const config::Scenario& scenario, std::uint32_t vehicle_id)
 FaultLine::~FaultLine() = default;
 FaultLine::FaultLine(FaultLine&&) noexcept = default;
 
+bool FaultLine::can_disturb_state() const { return !channels_->state.empty(); }
+
 model::Measurement FaultLine::measure(std::uint64_t step, const model::Measurement& truth) {
   return pass(channels_->state, step, truth);
 }

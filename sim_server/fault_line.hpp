@@ -19,6 +19,9 @@ class FaultLine {
   ~FaultLine();
   FaultLine(FaultLine&&) noexcept;
 
+  /// Whether what is measured can differ from the truth at all.
+  bool can_disturb_state() const;
+
   /// What the controllers measure at `step`. Call once per step, in order, from step 0.
   model::Measurement measure(std::uint64_t step, const model::Measurement& truth);
 

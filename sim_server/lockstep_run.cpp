@@ -25,10 +25,9 @@ LockstepRun::~LockstepRun() { endpoints_.command_stream.set_handler(nullptr); }
 
 void LockstepRun::begin() {
   main_lock_.lock();
-  endpoints_.command_stream.set_handler(
-      [this](const ControlCommand* commands, std::size_t count, const bus::PeerId& sender) {
-        return receive(commands, count, sender);
-      });
+  endpoints_.command_stream.set_handler([this](const Commands& sample, const bus::PeerId& sender) {
+    return receive(sample, sender);
+  });
 }
 
 // --- on the main thread --------------------------------------------------------------------------
@@ -37,8 +36,8 @@ bool LockstepRun::exchange() {
   publish();
   while (true) {
     if (error_) std::rethrow_exception(error_);
-    for (const ReceivedCommand& received : endpoints_.commands.take_all())
-      judge(received.command, received.sender);
+    for (const ReceivedCommands& received : endpoints_.commands.take_all())
+      judge(received.sample, received.sender);
     check_refusals();
     if (are_all_accepted()) {
       take_answered_step();
@@ -61,7 +60,7 @@ bool LockstepRun::exchange() {
 void LockstepRun::publish() {
   for (const auto& vehicle : vehicles_) vehicle->gate.expect(board_.step);
   sent_ = last_sent_ = looked_ = Clock::now();
-  endpoints_.states.write();
+  publish_states();
   resend_at_ = sent_ + timer_.timeout();
   // While steps are flown without answers, each is given a period.
   const auto period = to_duration(static_cast<double>(scenario_.sync.period_ns) * 1e-9 /
@@ -106,7 +105,6 @@ void LockstepRun::resend(Clock::time_point now) {
   endpoints_.states.write_where(
       [this](std::size_t i) { return !vehicles_[i]->gate.accepted().has_value(); });
   ++link_.resent();
-  recorder_window_.note_resent(board_.step);
   timer_.resent();
   resend_at_ = last_sent_ + timer_.timeout();
 }
@@ -140,12 +138,11 @@ void LockstepRun::take_over_if_silent(Clock::time_point now) {
 
 // --- on the middleware's thread ------------------------------------------------------------------
 
-bool LockstepRun::receive(const ControlCommand* commands, std::size_t count,
-                          const bus::PeerId& sender) {
+bool LockstepRun::receive(const Commands& sample, const bus::PeerId& sender) {
   const std::unique_lock lock(step_mutex_, std::try_to_lock);
   if (!lock || error_ || !is_plain_step()) return false;
   try {
-    for (std::size_t i = 0; i < count; ++i) judge(commands[i], sender);
+    judge(sample, sender);
     if (!are_all_accepted()) {
       const bool is_refused =
           std::any_of(vehicles_.begin(), vehicles_.end(),
@@ -154,7 +151,8 @@ bool LockstepRun::receive(const ControlCommand* commands, std::size_t count,
       return true;
     }
     const bool is_news = std::any_of(vehicles_.begin(), vehicles_.end(), [](const auto& vehicle) {
-      return vehicle->gate.take_over() || vehicle->gate.accepted()->mission() == MISSION_FINISHED;
+      return vehicle->gate.take_over() ||
+             vehicle->gate.accepted()->command.mission() == MISSION_FINISHED;
     });
     if (is_news) {
       endpoints_.commands.interrupt();
@@ -174,24 +172,25 @@ bool LockstepRun::receive(const ControlCommand* commands, std::size_t count,
 bool LockstepRun::is_plain_step() const {
   return !is_late_ && !is_anybody_absent() && !control_.is_paused() &&
          endpoints_.requests.is_empty() && !is_roster_due() && !board_.is_due() &&
-         board_.step + 1 < recorder_limit_ && app::stop_signal() == 0;
+         board_.step + 1 < recorder_limit_ && !record_.is_full() && app::stop_signal() == 0;
 }
 
 // --- recorders -----------------------------------------------------------------------------------
 
 std::string LockstepRun::name_blocking() const {
   return name_blocking_recorder(roster_, scenario_.sync.wait_for.recorders, board_.step,
-                                recorder_window_);
+                                calc_recorder_window(record_.history_steps()));
 }
 
 void LockstepRun::roster_changed() {
-  recorder_limit_ =
-      calc_recorder_limit(roster_, scenario_.sync.wait_for.recorders, recorder_window_);
+  recorder_limit_ = calc_recorder_limit(roster_, scenario_.sync.wait_for.recorders,
+                                        calc_recorder_window(record_.history_steps()));
 }
 
 bool LockstepRun::wait_for_recorders() {
   using config::RecorderPolicy;
   const auto& patience = scenario_.sync.wait.recorder;
+  while (record_.is_full()) std::this_thread::sleep_for(1ms);  // its thread needs the processor
   if (is_roster_due()) refresh_roster();
   const std::uint64_t step = board_.step;
   std::string blocking = name_blocking();

@@ -32,7 +32,7 @@ class LockstepRun : public Run {
   void roster_changed() override;
 
   // On the middleware's thread.
-  bool receive(const ControlCommand* commands, std::size_t count, const bus::PeerId& sender);
+  bool receive(const Commands& sample, const bus::PeerId& sender);
   bool is_plain_step() const;
 
   void publish();
@@ -44,7 +44,6 @@ class LockstepRun : public Run {
   void take_over_if_silent(Clock::time_point now);
   std::string name_blocking() const;
 
-  RecorderWindow recorder_window_{calc_recorder_window(endpoints_.states.history_depth())};
   RetransmissionTimer timer_;
 
   std::mutex step_mutex_;  // over what a step touches

@@ -6,23 +6,6 @@
 
 namespace sls::sim {
 
-namespace {
-
-/// The fields that VehicleState (measured) and PlantState (true) share.
-template <class Message>
-void fill(Message& message, const model::SlungLoadState& state) {
-  message.p_WQ_m(bus::to_array(state.p_WQ));
-  message.v_WQ_m_s(bus::to_array(state.v_WQ));
-  message.p_WL_m(bus::to_array(state.p_WL));
-  message.v_WL_m_s(bus::to_array(state.v_WL));
-  message.alpha_rad(state.rod.alpha);
-  message.beta_rad(state.rod.beta);
-  message.alpha_dot_rad_s(state.rod.alpha_dot);
-  message.beta_dot_rad_s(state.rod.beta_dot);
-}
-
-}  // namespace
-
 std::uint64_t make_run_id() {
   std::random_device random;
   std::uint64_t id = 0;
@@ -30,44 +13,63 @@ std::uint64_t make_run_id() {
   return id;
 }
 
-VehicleState make_state_message(std::uint64_t run_id, std::uint32_t vehicle_id, std::uint64_t step,
-                                std::int64_t period_ns, const model::SlungLoadState& measured,
-                                const model::SlungLoadState& truth, const Applied& applied) {
+VehicleState make_state_message(std::uint32_t vehicle_id, const model::Measurement& measured,
+                                const Applied& applied) {
   VehicleState message;
-  message.run_id(run_id);
   message.vehicle_id(vehicle_id);
-  message.step(step);
-  message.sim_time_ns(static_cast<std::int64_t>(step) * period_ns);
-  fill(message, measured);
-  fill(message.truth(), truth);
+  bus::fill(message.measured(), measured);
   message.f_Q_W_n(bus::to_array(applied.f_Q_W));
   message.force_origin(applied.origin);
   message.controller_name(applied.controller_name);
   message.controller(applied.memory);
-  message.answer_f_Q_W_n(bus::to_array(applied.answer_f_Q_W));
   return message;
 }
 
 Parameters make_parameters_message(std::uint64_t run_id,
                                    const std::vector<std::uint32_t>& vehicle_ids,
-                                   const config::Scenario& scenario, const std::string& version) {
+                                   const config::Scenario& scenario, const Plant& plant,
+                                   const std::string& version) {
   Parameters message;
   message.run_id(run_id);
-  message.vehicle_id(vehicle_ids.front());
-  message.vehicle_ids(vehicle_ids);
+  message.contract_sha256(bus::kContractSha256);
+  message.version(version);
   message.scenario_sha256(scenario.sha256);
   message.scenario_text(scenario.text);
-  message.quad_mass_kg(scenario.vehicle.quad_mass);
-  message.load_mass_kg(scenario.vehicle.load_mass);
-  message.rod_length_m(scenario.vehicle.rod_length);
-  message.gravity_m_s2(scenario.vehicle.gravity);
+  message.library_sha256(scenario.plant.model.calc_library_sha256(scenario.folder));
+  for (const std::uint32_t id : vehicle_ids) {
+    const model::SlungLoadParameters vehicle = config::make_vehicle_scenario(scenario, id).vehicle;
+    VehicleParameters& item = message.vehicles().emplace_back();
+    item.vehicle_id(id);
+    item.quad_mass_kg(vehicle.quad_mass);
+    item.load_mass_kg(vehicle.load_mass);
+    item.rod_length_m(vehicle.rod_length);
+    item.gravity_m_s2(vehicle.gravity);
+  }
+  message.has_attitude(plant.has_attitude());
+  for (const Signal& signal : plant.signals()) {
+    SignalDescription& item = message.signals().emplace_back();
+    item.name(signal.name);
+    item.unit(signal.unit);
+  }
+  message.force_limit_n(scenario.controller.force_limit_n);
+  message.expected_recorders(static_cast<std::uint32_t>(scenario.sync.wait_for.recorders));
   message.period_ns(scenario.sync.period_ns);
   message.step_ns(scenario.plant.step_ns);
   const bool lockstep = scenario.sync.mode == config::SyncMode::kLockstep;
   message.mode(lockstep ? MODE_LOCKSTEP : MODE_REALTIME);
   message.real_time_factor(lockstep ? 0.0 : scenario.sync.real_time_factor);
-  message.version(version);
   return message;
+}
+
+void fill_state(RecordEntry& entry, std::uint32_t vehicle_id, std::uint64_t step,
+                const model::Measurement& truth, const model::Measurement* measured,
+                const Applied& applied) {
+  entry.vehicle_id(vehicle_id);
+  entry.step(step);
+  bus::fill(entry.truth(), truth);
+  entry.measured().resize(measured ? 1 : 0);
+  if (measured) bus::fill(entry.measured().front(), *measured);
+  entry.f_Q_W_n(bus::to_array(applied.f_Q_W));
 }
 
 }  // namespace sls::sim

@@ -8,7 +8,8 @@
 
 #include "common/bus/topics.hpp"
 #include "common/config/scenario.hpp"
-#include "common/model/state.hpp"
+#include "common/model/measurement.hpp"
+#include "sim_server/plants/plant.hpp"
 
 namespace sls::sim {
 
@@ -27,13 +28,20 @@ inline constexpr const char* kFailSafeName = "fail-safe";
 /// A random id for a run, never 0.
 std::uint64_t make_run_id();
 
-/// State `step`: `truth` is what the plant does, `measured` what the controllers are to see of it.
-VehicleState make_state_message(std::uint64_t run_id, std::uint32_t vehicle_id, std::uint64_t step,
-                                std::int64_t period_ns, const model::SlungLoadState& measured,
-                                const model::SlungLoadState& truth, const Applied& applied);
+/// What the controllers are to see of a vehicle: `measured`, and what acted in the period before.
+VehicleState make_state_message(std::uint32_t vehicle_id, const model::Measurement& measured,
+                                const Applied& applied);
 
+/// `plant` moves one of the vehicles; the others' are like it.
 Parameters make_parameters_message(std::uint64_t run_id,
                                    const std::vector<std::uint32_t>& vehicle_ids,
-                                   const config::Scenario& scenario, const std::string& version);
+                                   const config::Scenario& scenario, const Plant& plant,
+                                   const std::string& version);
+
+/// Puts the state of a step into `entry`, which may hold another one: `truth` is what the plant
+/// does; `measured`, where it can differ, what is measured of it.
+void fill_state(RecordEntry& entry, std::uint32_t vehicle_id, std::uint64_t step,
+                const model::Measurement& truth, const model::Measurement* measured,
+                const Applied& applied);
 
 }  // namespace sls::sim

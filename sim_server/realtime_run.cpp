@@ -55,7 +55,7 @@ bool RealtimeRun::exchange() {
   if (!take_commands(schedule_.close(board_.step, published_))) return false;
   if (is_ending() && !are_all_accepted() && !wait_for_last_answers()) return false;
   count_missed_deadlines();
-  board_.timing.set_overflow(state_queue_.lost());
+  board_.timing.set_overflow(state_queue_.lost() + record_.lost());
 
   for (const auto& vehicle : vehicles_) {
     if (vehicle->gate.accepted()) continue;
@@ -87,7 +87,7 @@ void RealtimeRun::publish() {
     board_.timing.add_slip(std::chrono::duration<double>(*lost).count());
   board_.timing.add_delay(std::chrono::duration<double>(now - schedule_.due(board_.step)).count());
   published_ = now;
-  endpoints_.states.write();
+  publish_states();
 }
 
 bool RealtimeRun::wait_until_due() {
@@ -103,10 +103,8 @@ bool RealtimeRun::wait_until_due() {
 bool RealtimeRun::take_commands(Clock::time_point deadline) {
   while (!are_all_accepted() && Clock::now() < deadline) {
     endpoints_.commands.wait(std::min(deadline, Clock::now() + kPollTime));
-    for (const ReceivedCommand& received : endpoints_.commands.take_all()) {
-      const Verdict verdict = judge(received.command, received.sender);
-      if (verdict == Verdict::kLate) take_late(received.command);
-    }
+    for (const ReceivedCommands& received : endpoints_.commands.take_all())
+      judge(received.sample, received.sender, received.arrived < published_);
     check_refusals();
     if (are_all_accepted()) {
       board_.round_trips.add(Clock::now() - published_);
@@ -121,17 +119,17 @@ bool RealtimeRun::take_commands(Clock::time_point deadline) {
 bool RealtimeRun::is_ending() const {
   return std::all_of(vehicles_.begin(), vehicles_.end(), [](const auto& vehicle) {
     const auto& answer = vehicle->gate.accepted();
-    return answer ? answer->mission() == MISSION_FINISHED : vehicle->has_ended_late();
+    return answer ? answer->command.mission() == MISSION_FINISHED : vehicle->has_ended_late();
   });
 }
 
-void RealtimeRun::take_late(const ControlCommand& command) {
-  const auto age = Clock::now() - schedule_.due(command.step());
+void RealtimeRun::note_late(VehicleFlight& vehicle, const OfferedAnswer& answer) {
+  const auto age = Clock::now() - schedule_.due(answer.step);
   const auto lifespan = endpoints_.command_stream.lifespan();
   if (lifespan && age > *lifespan)
     ++link_.stale();
   else
-    find_vehicle(command.vehicle_id())->keep_late_answer(command);  // there is one: it judged it
+    vehicle.keep_late_answer(answer);
 }
 
 bool RealtimeRun::wait_for_last_answers() {
@@ -173,8 +171,9 @@ void RealtimeRun::check_clocks() {
 
 bool RealtimeRun::wait_for_recorders() {
   if (is_roster_due()) refresh_roster();
-  const std::string blocking = name_blocking_recorder(roster_, scenario_.sync.wait_for.recorders,
-                                                      board_.step, recorder_window_);
+  const std::string blocking =
+      name_blocking_recorder(roster_, scenario_.sync.wait_for.recorders, board_.step,
+                             calc_recorder_window(record_.history_steps()));
   const auto& patience = scenario_.sync.wait.recorder;
   if (blocking.empty()) {
     recorder_wait_.reset();

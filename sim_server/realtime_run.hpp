@@ -35,7 +35,7 @@ class RealtimeRun : public Run {
   bool wait_for_last_answers();
 
   void publish();
-  void take_late(const ControlCommand& command);
+  void note_late(VehicleFlight& vehicle, const OfferedAnswer& answer) override;
   /// True where the mission is over for every vehicle, be it by an answer that came late.
   bool is_ending() const;
   void fly_without_answers();
@@ -44,7 +44,6 @@ class RealtimeRun : public Run {
   /// not, or never; from then on they are judged by their step alone.
   void check_clocks();
 
-  const RecorderWindow recorder_window_{calc_recorder_window(endpoints_.states.history_depth())};
   StateStream::Queue state_queue_;
   Schedule schedule_;
   Clock::time_point published_;         // when the state in work was

@@ -47,6 +47,11 @@ std::int64_t find_next_step(const Entry& recorder) {
   return std::clamp<std::int64_t>(recorder.announcement.last_complete_step(), -1, kLargest - 1) + 1;
 }
 
+/// The first step that must wait for a recorder that has all before `next`.
+std::int64_t find_limit(std::int64_t next, std::int64_t window) {
+  return next + std::min(window, std::numeric_limits<std::int64_t>::max() - next);
+}
+
 void append(std::string& list, const std::string& item) {
   if (!list.empty()) list += ", ";
   list += item;
@@ -102,37 +107,25 @@ std::string name_missing(const Roster& roster, const config::WaitFor& expected,
   return missing;
 }
 
-std::int64_t calc_recorder_window(int history_depth) {
-  return std::clamp<std::int64_t>(history_depth * 2LL / 5, 1, kRecorderWindow);
+std::int64_t calc_recorder_window(std::uint64_t history_steps) {
+  const std::uint64_t steps = std::min<std::uint64_t>(history_steps * 2 / 5, kRecorderWindow);
+  return std::max<std::int64_t>(static_cast<std::int64_t>(steps), 1);
 }
 
-void RecorderWindow::note_resent(std::uint64_t step) {
-  resent_.push_back(static_cast<std::int64_t>(step));
-  if (static_cast<std::int64_t>(resent_.size()) > 2 * steps_) resent_.pop_front();
-}
-
-std::int64_t RecorderWindow::find_limit(std::int64_t next) const {
-  const auto later = std::upper_bound(resent_.begin(), resent_.end(), next);
-  const std::int64_t resent_later = resent_.end() - later;
-  const std::int64_t steps = std::clamp<std::int64_t>(2 * steps_ - resent_later, 0, steps_);
-  return next + std::min(steps, std::numeric_limits<std::int64_t>::max() - next);
-}
-
-std::uint64_t calc_recorder_limit(const Roster& roster, int expected,
-                                  const RecorderWindow& window) {
+std::uint64_t calc_recorder_limit(const Roster& roster, int expected, std::int64_t window) {
   const auto waited_for = find_recorders_to_wait_for(roster, expected);
   if (static_cast<int>(waited_for.size()) < expected) return 0;
   std::int64_t limit = std::numeric_limits<std::int64_t>::max();
   for (const Entry* entry : waited_for)
-    limit = std::min(limit, window.find_limit(find_next_step(*entry)));
+    limit = std::min(limit, find_limit(find_next_step(*entry), window));
   return static_cast<std::uint64_t>(limit);
 }
 
 std::string name_blocking_recorder(const Roster& roster, int expected, std::uint64_t step,
-                                   const RecorderWindow& window) {
+                                   std::int64_t window) {
   const auto waited_for = find_recorders_to_wait_for(roster, expected);
   for (const Entry* entry : waited_for) {
-    if (static_cast<std::int64_t>(step) >= window.find_limit(find_next_step(*entry)))
+    if (static_cast<std::int64_t>(step) >= find_limit(find_next_step(*entry), window))
       return fmt::format("recorder {}: {} steps behind", describe(*entry),
                          static_cast<std::int64_t>(step) - find_next_step(*entry));
   }

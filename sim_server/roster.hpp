@@ -3,7 +3,6 @@
 
 #include <chrono>
 #include <cstdint>
-#include <deque>
 #include <optional>
 #include <string>
 #include <vector>
@@ -37,38 +36,21 @@ std::string name_missing(const Roster& roster, const config::WaitFor& expected,
 /// How far the slowest recorder may be behind the server, in steps, at most.
 inline constexpr std::int64_t kRecorderWindow = 2000;
 
-/// The same where writers keep `history_depth` samples: two fifths of it, so that nothing a
-/// recorder needs is overwritten, not even where every state is sent twice.
-std::int64_t calc_recorder_window(int history_depth);
-
-/// That window, and the states that were sent again: they fill the histories, too, those of the
-/// clients as well, which answer each.
-class RecorderWindow {
- public:
-  explicit RecorderWindow(std::int64_t steps = kRecorderWindow) : steps_(steps) {}
-
-  /// The state of `step`, the last one, was sent again.
-  void note_resent(std::uint64_t step);
-
-  /// The first step that must wait for a recorder that has all before `next`. It may be the window
-  /// behind, and the samples after those of `next` may be twice as many.
-  std::int64_t find_limit(std::int64_t next) const;
-
- private:
-  const std::int64_t steps_;
-  std::deque<std::int64_t> resent_;  // the steps of the last resends, as many as can count
-};
+/// The same where the batches of `history_steps` steps are kept for late recorders: two fifths of
+/// them, so that nothing a recorder needs is overwritten.
+std::int64_t calc_recorder_window(std::uint64_t history_steps);
 
 /// Which recorder keeps the server from publishing `step`, in words; empty when none does: fewer
-/// than `expected` are there and not silent, or one of these is at the limit of `window`. One that
+/// than `expected` are there and not silent, or one of these is `window` steps behind. One that
 /// was not ready when the flight began is waited for only in the place of one that was: a stranger
 /// must not stop the others.
 std::string name_blocking_recorder(const Roster& roster, int expected, std::uint64_t step,
-                                   const RecorderWindow& window = RecorderWindow());
+                                   std::int64_t window = kRecorderWindow);
 
 /// The first step that some recorder keeps the server from publishing; 0 where fewer than
 /// `expected` are there.
-std::uint64_t calc_recorder_limit(const Roster& roster, int expected, const RecorderWindow& window);
+std::uint64_t calc_recorder_limit(const Roster& roster, int expected,
+                                  std::int64_t window = kRecorderWindow);
 
 /// Which ready recorder has announced nothing since `since` although it lags behind `step`, in
 /// words; empty when none has, or another one is there in the place of one taken for dead.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <csignal>
 #include <thread>
+#include <utility>
 
 #include "common/app/options.hpp"
 #include "common/app/run_main.hpp"
@@ -34,13 +35,14 @@ Run::Run(Endpoints& endpoints, const Assignment& assignment, WorkerPool& workers
       board_([&endpoints](const SimStatus& status) { endpoints.status_writer.write(status); },
              run_id, vehicle_ids_.front(), scenario_.sync, [this] { return sum_counters(); }),
       control_(run_id, vehicle_ids_, begins_paused),
+      record_(endpoints.record_writer, endpoints.max_batch_bytes, run_id),
       workers_(workers),
       plants_(make_plants(find_plant_type(scenario_.plant.model), scenario_, vehicle_ids_)),
       plant_steps_(scenario_.sync.period_ns / scenario_.plant.step_ns) {
   for (const std::uint32_t id : vehicle_ids_)
     vehicles_.push_back(std::make_unique<VehicleFlight>(scenario_, id, run_id));
-  endpoints_.parameters_writer.write(
-      make_parameters_message(run_id, vehicle_ids_, scenario_, app::version()));
+  endpoints_.parameters_writer.write(make_parameters_message(
+      run_id, vehicle_ids_, scenario_, *plants_.front().plant, app::version()));
   const config::Sync& sync = scenario_.sync;
   const std::string mode = sync.mode == config::SyncMode::kLockstep
                                ? "lockstep"
@@ -83,11 +85,8 @@ void Run::reset() {
 }
 
 void Run::publish_end(RunPhase phase, const std::string& reason) {
-  if (vehicles_.size() > 1)
-    for (const auto& vehicle : vehicles_)
-      board_.controller_names.push_back(vehicle->outcome()
-                                            ? vehicle->outcome()->applied.controller_name
-                                            : vehicle->last_answer().controller_name);
+  record_step();
+  record_.end();
   board_.publish(phase, reason);
 }
 
@@ -169,7 +168,21 @@ void Run::measure(const PlantOfVehicles& group) {
         vehicles_[group.vehicles[i]]->measure(board_.step, group.plant->measurement(i));
 }
 
+void Run::publish_states() {
+  const auto step = static_cast<std::int64_t>(board_.step);
+  endpoints_.states.set_step(run_id_, board_.step, step * scenario_.sync.period_ns);
+  is_step_published_ = true;
+  endpoints_.states.write();
+}
+
+void Run::record_step() {
+  if (!std::exchange(is_step_published_, false)) return;
+  record_.add_step(vehicles_.size(),
+                   [this](std::size_t i, RecordEntry& entry) { vehicles_[i]->fill_record(entry); });
+}
+
 void Run::advance() {
+  record_step();
   for (const auto& vehicle : vehicles_)
     board_.timing.add(vehicle->outcome()->applied.origin, vehicle->calc_age());
   ++board_.step;
@@ -200,6 +213,7 @@ bool Run::rest() {
   if (!control_.holds()) return true;
   const auto began = Clock::now();
   bool is_ended = false;
+  record_.flush();
   while (control_.holds() && !is_ended) {
     attend_now_and_then();
     if (is_roster_due()) refresh_roster();

@@ -15,6 +15,7 @@
 #include "sim_server/controller_absence.hpp"
 #include "sim_server/endpoints.hpp"
 #include "sim_server/plants/plant.hpp"
+#include "sim_server/record_stream.hpp"
 #include "sim_server/roster.hpp"
 #include "sim_server/run_control.hpp"
 #include "sim_server/status_board.hpp"
@@ -79,8 +80,15 @@ class Run {
   /// The run was at rest for so long: nobody was asked for anything.
   virtual void note_rest(Clock::duration rest);
 
+  /// Publishes the states of the step in work.
+  void publish_states();
+
   // For both ways of stepping (run_answers.cpp).
-  Verdict judge(const ControlCommand& command, const bus::PeerId& sender);
+  /// Judges the answers of one sample, and records those that are late; `is_early` where it came
+  /// before the states of its step were published.
+  void judge(const Commands& sample, const bus::PeerId& sender, bool is_early = false);
+  /// A valid answer to a step that has gone by.
+  virtual void note_late(VehicleFlight&, const OfferedAnswer&) {}
   VehicleFlight* find_vehicle(std::uint32_t id);
   /// True where every vehicle's answer to the step in work was accepted.
   bool are_all_accepted() const;
@@ -119,6 +127,7 @@ class Run {
   StatusBoard board_;
   RunControl control_;
   Roster roster_;
+  RecordStream record_;
   bool are_recorders_given_up_ = false;     // policy go_on
   std::optional<Clock::time_point> began_;  // when step 0 was about to be published
 
@@ -129,6 +138,9 @@ class Run {
   void measure(const PlantOfVehicles& group);
   /// Advances one plant over a period.
   void advance(PlantOfVehicles& group);
+  /// Hands the step in work to the recorders, where its states were published.
+  void record_step();
+  void record_late(const VehicleFlight& vehicle, const OfferedAnswer& answer);
   void finish();
   void reset();
   void publish_end(RunPhase phase, const std::string& reason);
@@ -144,6 +156,8 @@ class Run {
   WorkerPool& workers_;
   std::vector<PlantOfVehicles> plants_;
   const std::int64_t plant_steps_;  // per period
+  bool is_step_published_ = false;
+  OfferedAnswer offered_;  // in work
   std::uint64_t roster_version_ = 0;
   Clock::time_point roster_time_;
   std::optional<app::Wait> absence_wait_;

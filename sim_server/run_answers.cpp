@@ -35,15 +35,37 @@ VehicleFlight* Run::find_vehicle(std::uint32_t id) {
   return vehicles_[static_cast<std::size_t>(found - vehicle_ids_.begin())].get();
 }
 
-Verdict Run::judge(const ControlCommand& command, const bus::PeerId& sender) {
-  VehicleFlight* vehicle = find_vehicle(command.vehicle_id());
-  if (!vehicle) vehicle = vehicles_.front().get();  // whose gate refuses and counts it
-  const Verdict verdict = vehicle->gate.offer(command, sender);
-  const char* defect = to_string(verdict);
-  if (*defect != '\0')
-    spdlog::debug("command for step {} of vehicle {} from '{}' rejected: {}", command.step(),
-                  command.vehicle_id(), command.client_name().c_str(), defect);
-  return verdict;
+void Run::judge(const Commands& sample, const bus::PeerId& sender, bool is_early) {
+  offered_.run_id = sample.run_id();
+  offered_.step = sample.step();
+  offered_.client_name = sample.client_name().c_str();
+  offered_.is_early = is_early;
+  for (const ControlCommand& command : sample.vehicles()) {
+    offered_.command = command;
+    VehicleFlight* vehicle = find_vehicle(command.vehicle_id());
+    if (!vehicle) vehicle = vehicles_.front().get();  // whose gate refuses and counts it
+    const Verdict verdict = vehicle->gate.offer(offered_, sender);
+    if (verdict == Verdict::kLate) {
+      record_late(*vehicle, offered_);
+      note_late(*vehicle, offered_);
+    }
+    const char* defect = to_string(verdict);
+    if (*defect != '\0')
+      spdlog::debug("command for step {} of vehicle {} from '{}' rejected: {}", offered_.step,
+                    command.vehicle_id(), offered_.client_name, defect);
+  }
+}
+
+void Run::record_late(const VehicleFlight& vehicle, const OfferedAnswer& answer) {
+  record_.add_step(1, [&](std::size_t, RecordEntry& entry) {
+    entry = RecordEntry();
+    entry.vehicle_id(vehicle.id());
+    entry.step(answer.step);
+    entry.kind(ANSWER_LATE);
+    entry.answered_step(answer.step);
+    entry.client_name(answer.client_name);
+    entry.answer(answer.command);
+  });
 }
 
 bool Run::are_all_accepted() const {

@@ -56,7 +56,7 @@ void Server::claim_vehicles(const Run& run) {
 void Server::linger(const Run& run, int expected_recorders) {
   // The recorders first: who of them keeps us waiting is named.
   bus::wait_for_recorders_to_end(endpoints_.participants, run.run_id(), expected_recorders);
-  endpoints_.states.wait_for_acknowledgments(1s);
+  endpoints_.record_writer.wait_for_acknowledgments(1s);
   endpoints_.status_writer.wait_for_acknowledgments(1s);
 }
 

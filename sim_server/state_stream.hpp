@@ -1,10 +1,10 @@
-/// The states of a run on their way out: sls/state of one vehicle, sls/fleet_state of several.
+/// The states of a run on their way out: as many vehicles in a sample of sls/state as fit into a
+/// datagram.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <optional>
 #include <vector>
 
 #include "common/bus/node.hpp"
@@ -15,10 +15,14 @@ namespace sls::sim {
 class StateStream {
  public:
   /// Of `vehicles` vehicles, at least one.
-  StateStream(bus::Node& node, std::size_t vehicles);
+  StateStream(bus::Node& node, std::size_t vehicles)
+      : max_bytes_(node.max_sample_bytes()), writer_(node), vehicles_(vehicles) {}
 
   /// The state of the `index`th vehicle, to be filled before it is written.
-  VehicleState& at(std::size_t index);
+  VehicleState& at(std::size_t index) { return vehicles_[index]; }
+
+  /// The step that the states are of.
+  void set_step(std::uint64_t run_id, std::uint64_t step, std::int64_t sim_time_ns);
 
   /// Publishes the states of all vehicles.
   void write() {
@@ -27,33 +31,26 @@ class StateStream {
   /// Publishes the samples that hold a vehicle of which `is_wanted(index)`.
   void write_where(const std::function<bool(std::size_t)>& is_wanted);
 
-  /// While there is one, `write` hands samples to a thread of its own, by a queue for `steps`
-  /// steps, and never blocks.
+  /// While there is one, `write` hands samples to a thread of its own, by a queue for `samples` of
+  /// them, and never blocks.
   class Queue {
    public:
-    Queue(StateStream& stream, std::size_t steps);
+    Queue(StateStream& stream, std::size_t samples);
     ~Queue();
     /// Samples that were lost so far.
-    std::uint64_t lost() const;
+    std::uint64_t lost() const { return writer_.lost(); }
 
    private:
     friend class StateStream;
     StateStream& stream_;
-    std::optional<bus::QueuedWriter<VehicleState>> vehicle_;
-    std::optional<bus::QueuedWriter<FleetState>> fleet_;
+    bus::QueuedWriter<States> writer_;
   };
 
-  /// Steps of which the samples are kept for readers that are late.
-  int history_depth() const;
-  void wait_for_acknowledgments(std::chrono::milliseconds limit);
-
  private:
-  bool is_fleet() const { return !fleet_.empty(); }
-
-  std::optional<bus::Writer<VehicleState>> vehicle_writer_;
-  std::optional<bus::Writer<FleetState>> fleet_writer_;
-  VehicleState vehicle_;
-  std::vector<FleetState> fleet_;  // as many vehicles in each as it may hold, the rest in the last
+  const std::size_t max_bytes_;
+  bus::Writer<States> writer_;
+  std::vector<VehicleState> vehicles_;
+  States sample_;
   Queue* queue_ = nullptr;
 };
 

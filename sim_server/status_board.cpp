@@ -39,12 +39,11 @@ void StatusBoard::publish(RunPhase phase, const std::string& reason) {
   message.reason(reason);
   message.step(step);
   message.controller_name(controller_name);
-  for (const std::string& name : controller_names)
-    message.controller_names().emplace_back().name(name);
   message.real_time_factor(calc_real_time_factor());
   message.round_trip_p50_ns(static_cast<std::uint64_t>(round_trips.calc_percentile(50).count()));
   message.round_trip_p99_ns(static_cast<std::uint64_t>(round_trips.calc_percentile(99).count()));
   message.timing(timing.label());
+  message.problem(problem);
   message.counters(counters);
   write_(message);
 }

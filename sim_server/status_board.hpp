@@ -42,7 +42,7 @@ class StatusBoard {
   // What the samples say; the loop keeps it up to date.
   std::uint64_t step = 0;
   std::string controller_name;  ///< whose command for `step` was accepted, of the first vehicle
-  std::vector<std::string> controller_names;  ///< of every vehicle, at the end of a fleet's run
+  std::string problem;          ///< what a participant does wrong; empty where none does
   TimingRecord timing;
   RoundTrips round_trips;
 

@@ -24,37 +24,37 @@ VehicleFlight::VehicleFlight(const config::Scenario& fleet, std::uint32_t id, st
       absence(fleet.sync),
       id_(id),
       scenario_(make_own_scenario(fleet, id)),
-      run_id_(run_id),
       faults_(scenario_, id) {}
 
 VehicleState VehicleFlight::measure(std::uint64_t step, const model::Measurement& truth) {
   step_ = step;
   outcome_.reset();
   state_ = truth;
-  return make_state_message(run_id_, id_, step, scenario_.sync.period_ns,
-                            faults_.measure(step, truth), truth, applied_);
+  measured_ = faults_.measure(step, truth);
+  return make_state_message(id_, measured_, applied_);
 }
 
 void VehicleFlight::take_answer() {
-  const ControlCommand& answer = *gate.accepted();
+  const OfferedAnswer& answer = *gate.accepted();
   Outcome outcome;
-  outcome.is_finished = answer.mission() == MISSION_FINISHED;
+  outcome.is_finished = answer.command.mission() == MISSION_FINISHED;
   hold(answer);
   outcome.applied = last_answer_;
   outcome_ = std::move(outcome);
 }
 
-void VehicleFlight::keep_late_answer(const ControlCommand& command) {
-  if (command.mission() == MISSION_FINISHED) has_ended_late_ = true;
-  if (last_answer_.origin == FORCE_NONE || command.step() > last_answer_step_) hold(command);
+void VehicleFlight::keep_late_answer(const OfferedAnswer& answer) {
+  if (answer.command.mission() == MISSION_FINISHED) has_ended_late_ = true;
+  if (last_answer_.origin == FORCE_NONE || answer.step > last_answer_step_) hold(answer);
 }
 
-void VehicleFlight::hold(const ControlCommand& answer) {
-  last_answer_.answer_f_Q_W = bus::to_vector(answer.f_Q_W_n());
+void VehicleFlight::hold(const OfferedAnswer& answer) {
+  last_answer_.answer_f_Q_W = bus::to_vector(answer.command.f_Q_W_n());
   last_answer_.origin = FORCE_ANSWERED;
-  last_answer_.controller_name = answer.client_name().to_string();
-  last_answer_.memory = answer.controller();
-  last_answer_step_ = answer.step();
+  last_answer_.controller_name = answer.client_name;
+  last_answer_.memory = answer.command.controller();
+  last_answer_step_ = answer.step;
+  last_command_ = answer.command;
   absence.answered();
   absent_since_.reset();
   refused_since_.reset();
@@ -79,6 +79,27 @@ Eigen::Vector3d VehicleFlight::actuate() {
   applied_ = outcome_->applied;
   applied_.f_Q_W = faults_.actuate(step_, applied_.answer_f_Q_W);
   return applied_.f_Q_W;
+}
+
+void VehicleFlight::fill_record(RecordEntry& entry) const {
+  fill_state(entry, id_, step_, state_, faults_.can_disturb_state() ? &measured_ : nullptr,
+             applied_);
+  entry.answer(last_command_);
+  entry.answered_step(last_answer_step_);
+  if (outcome_) {
+    const Applied& applied = outcome_->applied;
+    entry.kind(applied.origin == FORCE_ANSWERED ? ANSWER_ACCEPTED
+               : applied.origin == FORCE_HELD   ? ANSWER_HELD
+                                                : ANSWER_FAIL_SAFE);
+    entry.client_name(applied.controller_name);
+    entry.answer().f_Q_W_n(bus::to_array(applied.answer_f_Q_W));
+    return;
+  }
+  const auto& answer = gate.accepted() ? gate.accepted() : gate.refused();
+  entry.kind(gate.accepted() ? ANSWER_ACCEPTED : answer ? ANSWER_REFUSED : ANSWER_NONE);
+  entry.answered_step(step_);
+  entry.client_name(answer ? answer->client_name : std::string());
+  entry.answer(answer ? answer->command : ControlCommand());
 }
 
 std::uint64_t VehicleFlight::calc_age() const {

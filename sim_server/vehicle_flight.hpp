@@ -21,6 +21,9 @@ class VehicleFlight {
   /// Vehicle `id` of `fleet`, at rest where the scenario puts it.
   VehicleFlight(const config::Scenario& fleet, std::uint32_t id, std::uint64_t run_id);
 
+  VehicleFlight(const VehicleFlight&) = delete;
+  VehicleFlight& operator=(const VehicleFlight&) = delete;
+
   std::uint32_t id() const { return id_; }
 
   /// What a step came to.
@@ -36,11 +39,14 @@ class VehicleFlight {
   void take_answer();
   /// Keeps an answer that came too late for its step, to be held: fresh where it is newer than the
   /// one that is held. Older ones do not count.
-  void keep_late_answer(const ControlCommand& command);
+  void keep_late_answer(const OfferedAnswer& answer);
   /// Flies the step in work without an answer of its own.
   void fly_without_answer(ControllerAbsence::Action action);
   /// Flies the step in work with what it came to: the force (N, in W) that acts on the plant.
   Eigen::Vector3d actuate();
+
+  /// Puts what is to be recorded of the step in work into `entry`, once all is known of it.
+  void fill_record(RecordEntry& entry) const;
 
   const std::optional<Outcome>& outcome() const { return outcome_; }
   bool is_settled() const { return outcome_.has_value(); }
@@ -70,18 +76,19 @@ class VehicleFlight {
   ControllerAbsence absence;
 
  private:
-  void hold(const ControlCommand& answer);
+  void hold(const OfferedAnswer& answer);
 
   const std::uint32_t id_;
   const config::Scenario scenario_;  // of this vehicle alone
-  const std::uint64_t run_id_;
   FaultLine faults_;
   std::uint64_t step_ = 0;              // in work
-  model::SlungLoadState state_;         // at that step
+  model::Measurement state_;            // at that step
+  model::Measurement measured_;         // of it
   Applied applied_;                     // over the period before it
   std::optional<Outcome> outcome_;      // of the step in work, once it is known
   Applied last_answer_;                 // accepted, or late but valid; what is held
   std::uint64_t last_answer_step_ = 0;  // the step it answers
+  ControlCommand last_command_;         // as it came
   bool has_ended_late_ = false;
   std::optional<Clock::time_point> absent_since_;
   std::optional<Clock::time_point> refused_since_;

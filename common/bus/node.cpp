@@ -18,6 +18,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <charconv>
 #include <chrono>
 #include <cstdlib>
 #include <limits>
@@ -45,6 +46,8 @@ constexpr int kMaxDomain = 232;  // beyond, RTPS port numbers overflow
 /// On one domain. Each that is announced costs memory and packets, whether it exists or not: under
 /// 3,000 forged ones the middleware hangs (tests/hostile/README.md).
 constexpr std::size_t kMaxParticipants = 64;
+
+constexpr std::size_t kLeastSampleBytes = 500;  // of one vehicle
 
 }  // namespace
 
@@ -206,6 +209,21 @@ const char* Node::choose_reader_profile(const char* profile, const char* fallbac
                  ReturnCode_t::RETCODE_OK
              ? profile
              : fallback;
+}
+
+std::size_t Node::max_sample_bytes() const {
+  constexpr std::size_t kDatagram = 60'000;  // of UDP on loopback, and of shared memory
+  const auto* limit = eprosima::fastrtps::rtps::PropertyPolicyHelper::find_property(
+      impl_->participant->get_qos().properties(), "sls.max_sample_bytes");
+  if (!limit) return kDatagram;
+  std::size_t bytes = 0;
+  const char* end = limit->data() + limit->size();
+  const auto [rest, error] = std::from_chars(limit->data(), end, bytes);
+  if (error != std::errc() || rest != end || bytes < kLeastSampleBytes || bytes > kDatagram)
+    throw ConfigError(impl_->qos_place + ": property sls.max_sample_bytes: expected " +
+                      std::to_string(kLeastSampleBytes) + " to " + std::to_string(kDatagram) +
+                      ", got '" + *limit + "'");
+  return bytes;
 }
 
 std::string Node::describe_loneliness() const {

@@ -51,6 +51,11 @@ class Node {
   const char* choose_writer_profile(const char* profile, const char* fallback) const;
   const char* choose_reader_profile(const char* profile, const char* fallback) const;
 
+  /// What a sample that is made of many parts should not exceed: one datagram of the network, where
+  /// the QoS file names it (property sls.max_sample_bytes of the participant), so that one lost
+  /// packet does not lose the parts that came in others.
+  std::size_t max_sample_bytes() const;
+
   /// Where nobody else has been discovered 3 s after joining: "; " and that, with what to look at,
   /// to be appended to a message about who is missing. Else empty.
   std::string describe_loneliness() const;

@@ -342,16 +342,24 @@ int calc_progress(const std::optional<SimStatus>& status) {
 }
 
 bool serves_vehicle(const Parameters& parameters, std::uint32_t vehicle_id) {
-  const auto& ids = parameters.vehicle_ids();
-  return std::find(ids.begin(), ids.end(), vehicle_id) != ids.end();
+  const auto& vehicles = parameters.vehicles();
+  return std::any_of(vehicles.begin(), vehicles.end(), [vehicle_id](const auto& vehicle) {
+    return vehicle.vehicle_id() == vehicle_id;
+  });
 }
 
-bool is_fleet(const Parameters& parameters) { return parameters.vehicle_ids().size() > 1; }
+std::vector<std::uint32_t> list_vehicle_ids(const Parameters& parameters) {
+  std::vector<std::uint32_t> ids;
+  for (const VehicleParameters& vehicle : parameters.vehicles())
+    ids.push_back(vehicle.vehicle_id());
+  return ids;
+}
+
+bool is_fleet(const Parameters& parameters) { return parameters.vehicles().size() > 1; }
 
 bool flies_vehicle(const Participant& controller, std::uint32_t vehicle_id) {
   const auto& ids = controller.vehicle_ids();
-  return ids.empty() ? controller.vehicle_id() == vehicle_id
-                     : std::find(ids.begin(), ids.end(), vehicle_id) != ids.end();
+  return std::find(ids.begin(), ids.end(), vehicle_id) != ids.end();
 }
 
 std::string host_name() {

@@ -76,7 +76,7 @@ struct RecorderPatience {
 };
 
 /// Waits until the recorders of run `run_id` that are there, and `expected` at least, are done:
-/// until then server and clients must keep their writers. Says for whom it waits.
+/// until then the server must keep its writers. Says for whom it waits.
 void wait_for_recorders_to_end(const ParticipantDirectory& participants, std::uint64_t run_id,
                                int expected, const RecorderPatience& patience = {});
 
@@ -201,7 +201,10 @@ int calc_progress(const std::optional<SimStatus>& status);
 /// True where `vehicle_id` is among `parameters`' vehicles.
 bool serves_vehicle(const Parameters& parameters, std::uint32_t vehicle_id);
 
-/// True where the run of `parameters` is of several vehicles, and speaks the fleet's topics.
+/// The vehicles that it claims.
+std::vector<std::uint32_t> list_vehicle_ids(const Parameters& parameters);
+
+/// True where the run of `parameters` is of several vehicles.
 bool is_fleet(const Parameters& parameters);
 
 /// True where the controller that announced itself so flies `vehicle_id`.

@@ -1,5 +1,7 @@
 #include "common/config/model_keys.hpp"
 
+#include "common/config/sha256.hpp"
+
 #include "common/config/own_keys.hpp"
 
 namespace sls::config {
@@ -8,6 +10,10 @@ bool ModelName::is_shared_library() const {
   constexpr std::string_view kEnding = ".so";
   return name.size() > kEnding.size() &&
          name.compare(name.size() - kEnding.size(), kEnding.size(), kEnding) == 0;
+}
+
+std::string ModelName::calc_library_sha256(const std::filesystem::path& folder) const {
+  return is_shared_library() ? calc_file_sha256(folder / name) : std::string();
 }
 
 template <class Section>

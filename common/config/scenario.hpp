@@ -35,6 +35,10 @@ struct ModelName {
   std::string place;  ///< FILE:LINE of the key, for messages; empty: not in the file
 
   bool is_shared_library() const;  ///< ends with ".so"
+  /// SHA-256 of the shared library, whose path is relative to `folder`; empty for a registered
+  /// name.
+  /// @throws std::system_error naming the file where it cannot be read.
+  std::string calc_library_sha256(const std::filesystem::path& folder) const;
   /// FILE:LINE: `key`.
   std::string describe_place(const std::string& key) const {
     return place.empty() ? key : place + ": " + key;

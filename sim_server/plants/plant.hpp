@@ -36,6 +36,9 @@ class Plant {
   /// After the last step; finite.
   virtual const model::Measurement& measurement(std::size_t vehicle) const = 0;
 
+  /// Whether attitude and body rates say anything: false of point masses, which stay level.
+  virtual bool has_attitude() const { return false; }
+
   /// The signals in every measurement, in their order; at most `model::kMaxNumbers`.
   virtual std::vector<Signal> signals() const { return {}; }
 };

@@ -82,6 +82,8 @@ class SharedLibraryPlant : public Plant {
 
   const model::Measurement& measurement(std::size_t) const override { return measurement_; }
 
+  bool has_attitude() const override { return true; }
+
   std::vector<Signal> signals() const override {
     std::vector<Signal> signals;
     for (std::uint32_t i = 0; i < functions_.signal_count; ++i)

@@ -1,0 +1,62 @@
+#include "closed_loop/record_entries.hpp"
+
+#include <numeric>
+
+#include "common/app/options.hpp"
+#include "common/bus/convert.hpp"
+#include "control_client/messages.hpp"
+#include "sim_server/messages.hpp"
+
+namespace sls::closed_loop {
+namespace {
+
+constexpr const char* kController = "control_client";
+
+}  // namespace
+
+RecordEntry make_entry(std::uint32_t vehicle_id, const FlownStep& flown,
+                       const std::string& controller_name, bool is_refused) {
+  RecordEntry entry;
+  sim::Applied applied;
+  applied.f_Q_W = flown.applied_f_Q_W;
+  sim::fill_state(entry, vehicle_id, flown.step, flown.truth,
+                  flown.can_measurement_differ ? &flown.measured : nullptr, applied);
+  entry.kind(is_refused ? ANSWER_REFUSED : ANSWER_ACCEPTED);
+  entry.answered_step(flown.step);
+  entry.client_name(controller_name);
+  entry.answer(control::make_command_message(vehicle_id, flown.answer, flown.compute_time));
+  return entry;
+}
+
+std::vector<RecordEntry> fly_entries(const config::Scenario& scenario, std::size_t steps) {
+  std::vector<RecordEntry> entries;
+  Flight flight(scenario);
+  while (entries.size() < steps) {
+    const FlownStep* flown = flight.fly_step();
+    if (!flown) break;
+    entries.push_back(make_entry(0, *flown, kController));
+  }
+  return entries;
+}
+
+Parameters make_parameters(const config::Scenario& scenario, std::uint64_t run_id,
+                           std::uint32_t vehicles) {
+  std::vector<std::uint32_t> ids(vehicles);
+  std::iota(ids.begin(), ids.end(), 0);
+  return sim::make_parameters_message(run_id, ids, scenario, Flight(scenario).plant(),
+                                      app::version());
+}
+
+SimStatus make_status(std::uint64_t run_id, std::uint64_t index, RunPhase phase,
+                      std::uint64_t step) {
+  SimStatus status;
+  status.run_id(run_id);
+  status.sample_index(index);
+  status.phase(phase);
+  status.step(step);
+  status.controller_name(kController);
+  status.timing("exact");
+  return status;
+}
+
+}  // namespace sls::closed_loop

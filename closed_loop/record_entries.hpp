@@ -1,0 +1,28 @@
+/// What a server would hand to recorders of a flight in one process.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "closed_loop/flight.hpp"
+#include "common/bus/topics.hpp"
+#include "common/config/scenario.hpp"
+
+namespace sls::closed_loop {
+
+/// The entry of a step of one vehicle; `is_refused` where its answer failed the flight.
+RecordEntry make_entry(std::uint32_t vehicle_id, const FlownStep& flown,
+                       const std::string& controller_name, bool is_refused = false);
+
+/// Entries of the first `steps` steps of vehicle 0 of `scenario`.
+std::vector<RecordEntry> fly_entries(const config::Scenario& scenario, std::size_t steps);
+
+/// What a server of `vehicles` vehicles claims.
+Parameters make_parameters(const config::Scenario& scenario, std::uint64_t run_id,
+                           std::uint32_t vehicles);
+
+SimStatus make_status(std::uint64_t run_id, std::uint64_t index, RunPhase phase,
+                      std::uint64_t step);
+
+}  // namespace sls::closed_loop

@@ -1,0 +1,97 @@
+/// The steps of a run on their way to recorders: collected in the loop, made into batches of
+/// sls/record and written by a thread of its own.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "common/bus/node.hpp"
+
+namespace sls::sim {
+
+class RecordStream {
+ public:
+  /// Steps, and time, after which what was collected is written.
+  static constexpr std::size_t kMostSteps = 64;
+  static constexpr auto kLongestWait = std::chrono::milliseconds(20);
+
+  /// Of run `run_id`, in batches of at most `max_bytes`, unless one entry is larger.
+  RecordStream(bus::Writer<RecordBatch>& writer, std::size_t max_bytes, std::uint64_t run_id);
+  ~RecordStream() { end(); }
+  RecordStream(const RecordStream&) = delete;
+  RecordStream& operator=(const RecordStream&) = delete;
+
+  /// Collects `count` entries of one step: `fill(i, entry)` fills the ith, which may hold an
+  /// earlier one. Never blocks but for the thread's swap of two pointers.
+  template <class Fill>
+  void add_step(std::size_t count, const Fill& fill) {
+    bool is_due = false;
+    {
+      const std::lock_guard lock(mutex_);
+      if (collected_.count + count > kMostCollected || is_ended_) {
+        lost_ += count;
+        return;
+      }
+      if (collected_.entries.size() < collected_.count + count)
+        collected_.entries.resize(collected_.count + count);
+      for (std::size_t i = 0; i < count; ++i) fill(i, collected_.entries[collected_.count + i]);
+      collected_.count += count;
+      is_due = ++collected_.steps == kMostSteps || collected_.count >= kManyEntries;
+      is_due_ = is_due_ || is_due;
+      if (collected_.count > kMostCollected / 2) is_full_ = true;
+    }
+    if (is_due) wake_.notify_one();
+  }
+
+  /// Has all that was collected written now: the run rests.
+  void flush();
+  /// Writes what there is, and the last batch of the run; nothing is collected any more.
+  void end();
+
+  /// True while the thread is so far behind that a loop that may wait should.
+  bool is_full() const { return is_full_; }
+  /// Entries that were lost because there was no room, or the middleware refused them.
+  std::uint64_t lost() const { return lost_; }
+  /// Steps of which the writer keeps the batches for late recorders, at least.
+  std::uint64_t history_steps() const;
+
+ private:
+  static constexpr std::size_t kManyEntries = 512;
+  static constexpr std::size_t kMostCollected = 32'768;
+
+  struct Collected {
+    std::vector<RecordEntry>
+        entries;  // the first `count` of them; the others' memory is used again
+    std::size_t count = 0;
+    std::size_t steps = 0;
+  };
+
+  void work();
+  void write(const Collected& collected, bool is_last);
+  void write_batch(bool is_last);
+
+  bus::Writer<RecordBatch>& writer_;
+  const std::size_t max_bytes_;
+  const std::uint64_t run_id_;
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  Collected collected_;    // under the mutex
+  bool is_due_ = false;    // likewise
+  bool is_ended_ = false;  // likewise
+  std::atomic<bool> is_full_{false};
+  std::atomic<std::uint64_t> lost_{0};
+  std::atomic<std::size_t> step_bytes_{0};  // of the largest step so far
+  RecordBatch batch_;                       // the thread's own
+  std::uint64_t next_batch_ = 0;            // likewise
+  std::uint64_t step_ = 0;                  // likewise: of the last entry
+  std::size_t bytes_of_step_ = 0;           // likewise
+  std::thread thread_;                      // last: it uses the members above
+};
+
+}  // namespace sls::sim
