@@ -275,9 +275,11 @@ std::string Node::describe_loneliness() const {
 
 PeerId Node::id() const { return to_peer(impl_->participant->get_instance_handle()); }
 
-Problems& Node::problems() { return impl_->problems; }
+Problems& Node::problems() const { return impl_->problems; }
 
 std::string Node::describe(const PeerId& peer) const { return impl_->neighbours.describe(peer); }
+
+std::set<PeerId> Node::find_misfits() const { return impl_->neighbours.find_misfits(); }
 
 std::map<PeerId, std::string> Node::find_missing_deadlines() const {
   return impl_->neighbours.find_missing_deadlines();

@@ -64,7 +64,7 @@ class Node {
 
   /// What the others on the domain do wrong. Endpoints and samples that do not fit ours are in it
   /// by themselves.
-  Problems& problems();
+  Problems& problems() const;
 
   /// 'foo' (10.0.0.2): what a participant says of itself in discovery.
   std::string describe(const PeerId& peer) const;
@@ -72,6 +72,9 @@ class Node {
   /// Participants whose sls/command offers a longer DEADLINE than ours asks, in words: a mistake of
   /// those who fly for us (fastdds/neighbours.hpp).
   std::map<PeerId, std::string> find_missing_deadlines() const;
+
+  /// Participants that `problems` names for their endpoints or samples.
+  std::set<PeerId> find_misfits() const;
 
   struct Impl;
   Impl& impl() { return *impl_; }

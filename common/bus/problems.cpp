@@ -56,6 +56,12 @@ void Problems::replace(const std::string& prefix, const std::map<std::string, st
   for (const auto& [key, text] : found) add(key, text, std::nullopt);
 }
 
+bool Problems::has_any(const std::string& prefix) const {
+  const std::lock_guard lock(mutex_);
+  const auto problem = problems_.lower_bound(prefix);
+  return problem != problems_.end() && begins_with(problem->first, prefix);
+}
+
 void Problems::say(const std::string& text) {
   const auto now = Clock::now();
   if (now - window_began_ > kWindow) {

@@ -150,6 +150,14 @@ bool Neighbours::is_of_contract_1(const PeerId& peer) const {
   return known != participants_.end() && known->second.is_of_contract_1;
 }
 
+std::set<PeerId> Neighbours::find_misfits() const {
+  const std::lock_guard lock(mutex_);
+  std::set<PeerId> found;
+  for (const auto& [peer, participant] : participants_)
+    if (problems_.has_any(make_key(peer))) found.insert(peer);
+  return found;
+}
+
 std::map<PeerId, std::string> Neighbours::find_missing_deadlines() const {
   const std::lock_guard lock(mutex_);
   std::map<PeerId, std::string> found;

@@ -51,6 +51,9 @@ class Neighbours {
   /// 'foo' (10.0.0.2): what the participant says of itself.
   std::string describe(const PeerId& peer) const;
 
+  /// Participants that a problem of ours names.
+  std::set<PeerId> find_misfits() const;
+
   /// Writers of sls/command that offer a longer DEADLINE than ours asks, or none, in words; by
   /// their participants. That is no mistake of those who fly for another server, in lockstep: the
   /// server judges, who knows whom they serve.
