@@ -142,11 +142,11 @@ class Writer {
 };
 
 /// Calls `handler(message, sender)` for every sample, on a thread of the middleware: the handler
-/// must be short and must not write.
+/// must be short and must not write. It may take what the sample holds.
 template <class Message>
 class Reader {
  public:
-  using Handler = std::function<void(const Message& message, const PeerId& sender)>;
+  using Handler = std::function<void(Message& message, const PeerId& sender)>;
 
   Reader(Node& node, const char* profile, Handler handler)
       : handler_(std::move(handler)),
