@@ -142,10 +142,11 @@ class Writer {
 };
 
 /// Calls `handler(message, sender)` for every sample, on a thread of the middleware: the handler
-/// must be short and must not write. It may take what the sample holds.
+/// must be short and must not write.
 template <class Message>
 class Reader {
  public:
+  /// May take over what `message` holds: the next sample finds other memory.
   using Handler = std::function<void(Message& message, const PeerId& sender)>;
 
   Reader(Node& node, const char* profile, Handler handler)
