@@ -9,6 +9,7 @@
 #include "common/app/stop_signal.hpp"
 #include "recorder/recording.hpp"
 #include "recorder/recording_folder.hpp"
+#include "sim_server/messages.hpp"
 #include "sim_server/status_board.hpp"
 
 namespace sls::closed_loop {

@@ -35,11 +35,10 @@ struct Collector {
   std::string& bytes;
 
   template <class Field>
-  void operator()(const Field& field) {
-    append(bytes, field);
+  void operator()(const Column& column, const Field& field) {
+    if (!column.is_certified) return;
+    for_each_component(field, [this](const auto& component) { append(bytes, component); });
   }
-  template <class Field>
-  void incidental(const Field&) {}
 };
 
 template <class Row>

@@ -11,7 +11,7 @@
 
 namespace sls::record {
 
-/// A row's fields as little-endian bytes, those that are incidental left out. Two rows are equal
+/// A row's fields as little-endian bytes, those that are not certified left out. Two rows are equal
 /// where their bytes are.
 std::string to_bytes(const StateRow& row);
 std::string to_bytes(const CommandRow& row);

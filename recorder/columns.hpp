@@ -1,35 +1,73 @@
-/// How rows and status samples become lines of the CSV files.
+/// One table of columns for all files: each row type of rows.hpp visits its fields with them, and
+/// header, row, reader, certificate and README.md go by that.
 #pragma once
 
 #include <string>
 #include <string_view>
+#include <type_traits>
+#include <vector>
 
 #include "common/bus/topics.hpp"
-#include "recorder/csv_file.hpp"
-#include "recorder/rows.hpp"
 
 namespace sls::record {
 
-inline constexpr const char* kStatusFile = "status.csv";
-inline constexpr const char* kStatusTopic = "sls/status";
-std::string make_status_header();
+struct Column {
+  const char* name;  ///< of a vector with '?' for its components: x, y, z; of four: w, x, y, z
+  const char* unit;
+  const char* meaning;
+  const char* source;        ///< field of idl/sls.idl, or of the other files
+  bool is_certified = true;  ///< not so where equal flights differ
+};
 
-/// In the order of the published flight logs.
-inline constexpr std::string_view kFlightHeader =
-    "sim_time_s,ref_x_m,ref_y_m,ref_z_m,quad_x_m,quad_y_m,quad_z_m,roll_rad,pitch_rad,yaw_rad,"
-    "quad_vx_m_s,quad_vy_m_s,quad_vz_m_s,rod_x,rod_y,rod_z,alpha_rad,beta_rad,alpha_dot_rad_s,"
-    "beta_dot_rad_s,force_x_n,force_y_n,force_z_n";
-/// That, and of a fleet, whose rows one must be able to tell apart, the vehicle.
+/// Calls `work` with a scalar or text, or with each component of a vector.
+template <class Field, class Work>
+void for_each_component(Field& field, Work work) {
+  if constexpr (std::is_arithmetic_v<Field> || std::is_convertible_v<Field, std::string_view>)
+    work(field);
+  else
+    for (auto& component : field) work(component);
+}
+
+/// A visitor that lists the columns of a row, names with their '?' replaced.
+struct ColumnLister {
+  struct Entry {
+    Column column;
+    std::vector<std::string> names;
+  };
+  std::vector<Entry> entries;
+
+  template <class Field>
+  void operator()(const Column& column, const Field& field) {
+    std::size_t size = 0;
+    for_each_component(field, [&](const auto&) { ++size; });
+    add(column, size);
+  }
+  void add(const Column& column, std::size_t size);
+};
+
+template <class Row>
+std::vector<ColumnLister::Entry> list_columns() {
+  ColumnLister lister;
+  const Row row;
+  Row::visit(row, lister);
+  return lister.entries;
+}
+
+std::string join_names(const std::vector<ColumnLister::Entry>& columns);
+
+/// The first line of the row's file; of state.csv without what a run may have further.
+template <class Row>
+std::string make_header() {
+  return join_names(list_columns<Row>());
+}
+
+/// That of state.csv and measured.csv: of a plant with attitude and signals these too.
+/// @throws config::ConfigError if a signal's name cannot be a column.
+std::string make_state_header(const Parameters& parameters);
+/// That of flight.csv: rows of a fleet, which one must be able to tell apart, have the vehicle.
 std::string make_flight_header(bool is_of_fleet);
 
-void write_row(CsvFile& file, const StateRow& row);
-void write_row(CsvFile& file, const CommandRow& row);
-void write_row(CsvFile& file, const ReferenceRow& row);
-void write_row(CsvFile& file, const SimStatus& status);
-
-/// Row of flight.csv: the state of a step, the reference it was to follow and the force answered;
-/// in a fleet, whose it is.
-void write_flight_row(CsvFile& file, const StateRow& state, const CommandRow& command,
-                      const ReferenceRow& reference, bool is_of_fleet);
+/// Every file's columns as Markdown: what README.md shows.
+std::string describe_columns();
 
 }  // namespace sls::record

@@ -108,7 +108,7 @@ void FlightLog::add(const StepRows& rows) {
   Stage& stage = find_or_begin_stage(rows);
   stage.last_step = rows.step;
   const Eigen::Vector3d error =
-      bus::to_vector(rows.state->p_WL) - bus::to_vector(rows.reference->position());
+      bus::to_vector(rows.state->p_WL) - bus::to_vector(rows.reference->position);
   stage.all.add(error);
   const std::size_t index = rows.reference->stage;
   if (index >= scenario_.mission.size() ||
@@ -140,11 +140,13 @@ void FlightLog::write(std::ostream& out) const {
   out << fmt::format("{}: {}\n", scenario_.name, bus::to_string(last_status_.phase()));
   out << fmt::format("run {:016x}, scenario SHA-256 {}\n\n", parameters_.run_id(),
                      parameters_.scenario_sha256().c_str());
+  const VehicleParameters vehicle =
+      parameters_.vehicles().empty() ? VehicleParameters() : parameters_.vehicles().front();
   out << fmt::format(
       "Parameters\n  quadrotor {} kg, load {} kg, rod {} m, gravity {} m/s²\n"
       "  period {} s, step {} s, {}\n",
-      parameters_.quad_mass_kg(), parameters_.load_mass_kg(), parameters_.rod_length_m(),
-      parameters_.gravity_m_s2(), static_cast<double>(parameters_.period_ns()) / 1e9,
+      vehicle.quad_mass_kg(), vehicle.load_mass_kg(), vehicle.rod_length_m(),
+      vehicle.gravity_m_s2(), static_cast<double>(parameters_.period_ns()) / 1e9,
       static_cast<double>(parameters_.step_ns()) / 1e9, bus::to_string(parameters_.mode()));
   const double rate = last_status_.real_time_factor() * 1e9 /
                       static_cast<double>(std::max<std::int64_t>(parameters_.period_ns(), 1));

@@ -1,8 +1,11 @@
+#include <iostream>
+
 #include "common/app/run_main.hpp"
 #include "common/app/scheduling.hpp"
 #include "common/bus/node.hpp"
 #include "common/bus/qos_file.hpp"
 #include "common/bus/security_files.hpp"
+#include "recorder/columns.hpp"
 #include "recorder/recorder.hpp"
 #include "recorder/recording_folder.hpp"
 
@@ -33,6 +36,13 @@ int main(int argc, char** argv) {
       ->excludes(force_flag);
   cli.add_flag("--follow", recorder.follow,
                "when another server takes the place of ours, record its run into a subfolder");
+  cli.add_flag_callback(
+      "--columns",
+      [] {
+        std::cout << record::describe_columns();
+        throw CLI::Success();
+      },
+      "list the columns of every file as Markdown, then end");
   cli.add_flag("--check", check, "only check QoS file and folder, then end");
 
   return app::run_main(argc, argv, cli, options, "recorder", [&] {

@@ -15,9 +15,9 @@
 #include "common/app/stop_signal.hpp"
 #include "common/bus/names.hpp"
 #include "common/bus/node.hpp"
+#include "common/bus/participants.hpp"
 #include "common/config/config_error.hpp"
 #include "common/config/sha256.hpp"
-#include "recorder/columns.hpp"
 
 namespace sls::record {
 namespace {
@@ -113,7 +113,7 @@ std::string describe(const std::vector<MissingSteps>& missing) {
   std::uint64_t steps = 0;
   for (const MissingSteps& gap : missing) steps += gap.to - gap.from + 1;
   const MissingSteps& first = missing.front();
-  const char* unit = first.topic == kStatusTopic ? "sample" : "step";
+  const char* unit = first.topic == StatusRow::kTopic ? "sample" : "step";
   return fmt::format("{} samples missing, first {} {} {} of vehicle {}", steps, first.topic, unit,
                      first.from, first.vehicle_id);
 }
@@ -140,14 +140,15 @@ void write_manifest(const std::filesystem::path& folder, const Manifest& manifes
     stage_starts.push_back(
         {{"vehicle_id", start.vehicle_id}, {"stage", start.stage}, {"step", start.step}});
 
-  const Json json = {
+  Json json = {
       {"complete", manifest.complete},
       {"outcome", manifest.outcome},
       {"reason", manifest.reason},
       {"run_id", fmt::format("{:016x}", parameters.run_id())},
       {"scenario", manifest.scenario_name},
       {"scenario_sha256", parameters.scenario_sha256().to_string()},
-      {"vehicle_ids", parameters.vehicle_ids()},
+      {"contract_sha256", parameters.contract_sha256().to_string()},
+      {"vehicle_ids", bus::list_vehicle_ids(parameters)},
       {"period_s", static_cast<double>(parameters.period_ns()) / 1e9},
       {"step_s", static_cast<double>(parameters.step_ns()) / 1e9},
       {"mode", bus::to_string(parameters.mode())},
@@ -164,12 +165,18 @@ void write_manifest(const std::filesystem::path& folder, const Manifest& manifes
       {"missing", missing},
       {"stage_starts", stage_starts},
       {"unanswered_steps", manifest.unanswered_steps},
-      {"rebuilt_commands", manifest.rebuilt_commands},
       {"refused_samples", manifest.refused_samples},
       {"dropped",
        {{"repeated", manifest.dropped.repeated},
-        {"other_client", manifest.dropped.other_client},
         {"out_of_range", manifest.dropped.out_of_range}}}};
+  Json libraries;
+  if (parameters.library_sha256().size() > 0)
+    libraries["plant"] = parameters.library_sha256().to_string();
+  if (!manifest.libraries.empty()) libraries["controllers"] = manifest.libraries;
+  if (!libraries.empty()) json["libraries"] = libraries;
+  for (const SignalDescription& signal : parameters.signals())
+    json["signals"].push_back(
+        {{"name", signal.name().to_string()}, {"unit", signal.unit().to_string()}});
 
   const auto target = folder / "manifest.json";
   const auto part = folder / "manifest.json.part";

@@ -8,7 +8,8 @@
 #include <vector>
 
 #include "common/bus/topics.hpp"
-#include "recorder/step_join.hpp"
+#include "recorder/sinks/record_sink.hpp"
+#include "recorder/stream.hpp"
 
 namespace sls::record {
 
@@ -35,12 +36,6 @@ struct StageStart {
 /// "3 samples missing, first sls/reference step 123 of vehicle 0".
 std::string describe(const std::vector<MissingSteps>& missing);
 
-struct RecordedFile {
-  std::filesystem::path path;
-  std::uint64_t rows = 0;
-  bool has_rows = true;  ///< a CSV file: `rows` without its header
-};
-
 /// What a recording is and whether it is whole. Of a segment after the first, `complete`,
 /// `missing`, `stage_starts` and `certificate` speak for all segments up to it, the rest for
 /// itself.
@@ -58,9 +53,9 @@ struct Manifest {
   std::vector<MissingSteps> missing;
   std::vector<StageStart> stage_starts;
   std::uint64_t unanswered_steps = 0;  ///< flown with a held answer or the fail-safe force
-  std::uint64_t rebuilt_commands = 0;  ///< made from the next state, as their samples were lost
   std::uint64_t refused_samples = 0;   ///< lost because the recorder's queue was full
-  DroppedSamples dropped;
+  DroppedEntries dropped;
+  std::map<std::string, std::string> libraries;  ///< SHA-256 of controllers' libraries, by name
   bool complete = false;  ///< the mission finished and nothing is missing
 };
 

@@ -1,8 +1,7 @@
-/// One recording on disk: takes the samples of one run and keeps the files. No network here; used
-/// by one thread.
+/// One recording on disk: takes the batches and status samples of one run and keeps the files. No
+/// network here; used by one thread.
 #pragma once
 
-#include <array>
 #include <chrono>
 #include <filesystem>
 #include <map>
@@ -15,11 +14,11 @@
 #include "common/bus/topics.hpp"
 #include "common/config/scenario.hpp"
 #include "recorder/certificate.hpp"
-#include "recorder/csv_file.hpp"
 #include "recorder/flight_log.hpp"
 #include "recorder/manifest.hpp"
 #include "recorder/recording_folder.hpp"
-#include "recorder/step_join.hpp"
+#include "recorder/sinks/record_sink.hpp"
+#include "recorder/stream.hpp"
 
 namespace sls::record {
 
@@ -27,37 +26,40 @@ class Recording {
  public:
   /// Opens the files in the segment's folder, which is ready for them, reads the segments before it
   /// and writes a manifest that says "recording", not complete.
-  /// @throws config::ConfigError if the scenario in `parameters` cannot be read, or is not that of
-  ///   the earlier segments.
+  /// @throws config::ConfigError if the scenario or the signals in `parameters` cannot be used, or
+  ///   the scenario is not that of the earlier segments.
   /// @throws DamagedError if an earlier segment cannot be read.
   /// Every member @throws std::system_error naming the file when the disk refuses.
   Recording(const Segment& segment, const Parameters& parameters);
   /// The same for a recording of one segment.
   Recording(const std::filesystem::path& folder, const Parameters& parameters);
 
-  /// Samples of other runs and vehicles are ignored. `sender` tells answers of one name apart.
-  void add(const VehicleState& state, const bus::PeerId& sender = {});
-  void add(const ControlCommand& command, const bus::PeerId& sender = {});
-  void add(const Reference& reference, const bus::PeerId& sender = {});
-  void add(const SimStatus& status, const bus::PeerId& sender = {});
+  /// Samples of other runs are ignored.
+  void add(const RecordBatch& batch);
+  void add(const SimStatus& status);
 
-  /// Tells how much time has passed: what dead clients have kept back is not waited for forever.
-  void pass_time(StepJoin::Duration elapsed);
+  /// A controller of the run has loaded a shared library.
+  void note_library(const std::string& controller, const std::string& sha256);
 
-  /// What it waits for although later states have been in for `patience`: in words.
-  std::optional<std::string> describe_stuck(StepJoin::Duration patience) const;
+  /// Tells how much time has passed: a lost batch is not waited for forever.
+  void pass_time(Stream::Duration elapsed) { stream_.pass_time(elapsed); }
+
+  /// What it has waited for since `patience`: in words.
+  std::optional<std::string> describe_stuck(Stream::Duration patience) const {
+    return stream_.describe_stuck(patience);
+  }
 
   /// Flushes the files if the last time is `record.flush_s` ago.
   void flush_if_due();
 
-  /// True when the run has ended and every step of every vehicle is in.
-  bool has_all() const;
+  /// True when the run has ended and its last batch is in.
+  bool has_all() const { return has_ended() && stream_.has_ended(); }
 
   /// True when the run was ended by an operator's reset.
   bool is_reset() const { return last_status_ && last_status_->phase() == PHASE_RESET; }
 
   /// The last step of which, and of all before it, all vehicles' rows are in; −1: none.
-  std::int64_t last_complete_step() const;
+  std::int64_t last_complete_step() const { return stream_.last_step(); }
 
   /// Writes what is pending, flight.txt and the final manifest. `interruption` says why the
   /// recorder stops early and `outcome` what that is called; empty where it did not. True if the
@@ -71,32 +73,33 @@ class Recording {
  private:
   void read_earlier_segments();
   void write_provisional_manifest();
-  void write(const StepRows& rows, bool is_answer_expected);
-  void account(const StepRows& rows, bool is_answer_expected);
+  void write(const StepRows& rows);
+  void account(const StepRows& rows);
   void note_missing(std::uint32_t vehicle_id, const char* topic, std::uint64_t from,
                     std::uint64_t to);
   void note_missing_steps(std::uint32_t vehicle_id, std::uint64_t from, std::uint64_t to);
+  void note_missing_answers(std::uint32_t vehicle_id, std::uint64_t from, std::uint64_t to);
+  void note_missing_end();
   void note_status(std::uint64_t sample_index);
-  StepJoin* find_vehicle(std::uint64_t run_id, std::uint32_t vehicle_id);
   bool has_ended() const;
   bool is_finished() const;
-  std::array<CsvFile*, 5> files();
   void flush();
   Manifest make_manifest() const;
 
   const Segment segment_;
   const Parameters parameters_;
   const config::Scenario scenario_;
-  CsvFile states_, commands_, references_, statuses_, flight_;
+  const std::vector<std::unique_ptr<RecordSink>> sinks_;
   FlightLog log_;
   Certificate certificate_;
-  std::map<std::uint32_t, StepJoin> vehicles_;
+  Stream stream_;
+  std::map<std::string, std::string> libraries_;  // of controllers, by name
   std::vector<MissingSteps> missing_;
   std::vector<StageStart> stage_starts_;  // those in the provisional manifest
   // In missing_, the last ones of each vehicle and topic.
   std::map<std::pair<std::uint32_t, std::string>, std::size_t> last_gaps_;
+  std::map<std::uint32_t, std::uint64_t> bare_steps_;  // the last ones with a state alone
   std::uint64_t unanswered_steps_ = 0;
-  std::uint64_t rebuilt_commands_ = 0;
   std::optional<SimStatus> last_status_;
   std::uint64_t next_status_ = 0;      // sample_index after the last one of all segments
   std::string interruption_;           // from `finish` on

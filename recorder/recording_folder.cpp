@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <fstream>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -20,8 +21,8 @@ namespace fs = std::filesystem;
 using config::ConfigError;
 
 // The last is what `./sls report` puts beside them.
-constexpr std::array<std::string_view, 10> kRecordingFiles = {
-    "state.csv",  "command.csv",   "reference.csv", "status.csv",         "flight.csv",
+constexpr std::array<std::string_view, 11> kRecordingFiles = {
+    "state.csv", "measured.csv",  "command.csv",   "reference.csv", "status.csv",         "flight.csv",
     "flight.txt", "scenario.yaml", "manifest.json", "manifest.json.part", "report.html"};
 // What `./sls plot` puts into the subfolder kFigureFolder, as .png and .pdf.
 constexpr std::array<std::string_view, 7> kFigures = {"fleet",  "positions", "errors",  "path",
@@ -97,9 +98,9 @@ void remove_recording(const std::string& place, const fs::path& folder) {
 
 /// A recorder that is killed at its very beginning has created files and written nothing yet.
 bool is_without_rows(const fs::path& folder) {
-  std::error_code error;
-  const auto size = fs::file_size(folder / StateRow::kFile, error);
-  return !error && size <= StateRow::kHeader.size() + 1;
+  std::ifstream file(folder / StateRow::kFile);
+  std::string header;
+  return file && (!std::getline(file, header) || file.peek() == file.eof());
 }
 
 }  // namespace

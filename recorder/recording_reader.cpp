@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <charconv>
 #include <string>
+#include <type_traits>
 
 #include "common/config/config_error.hpp"
-#include "recorder/columns.hpp"
 
 namespace sls::record {
 namespace {
@@ -16,21 +16,30 @@ struct FieldParser {
   const CsvReader& file;
   std::size_t index = 0;
 
+  template <class Field>
+  void operator()(const Column&, Field& field) {
+    for_each_component(field, [this](auto& component) { parse(component); });
+  }
+  void operator()(const Column&, std::vector<double>& further) {
+    further.resize(file.columns().size() - index);
+    for (double& number : further) parse(number);
+  }
+
   template <class Number>
-  void operator()(Number& number) {
+  void parse(Number& number) {
     const std::string_view text = file.fields()[index];
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
     if (error != std::errc() || end != text.data() + text.size())
-      throw DamagedError(file.place() + std::string(file.columns()[index]) +
-                         ": expected a number, got '" + std::string(text) + "'");
+      throw DamagedError(file.place() + file.columns()[index] + ": expected a number, got '" +
+                         std::string(text) + "'");
     ++index;
   }
-  void operator()(std::string& text) { text = file.fields()[index++]; }
-  template <class Field>
-  void incidental(Field& field) {
-    (*this)(field);
-  }
+  void parse(std::string& text) { text = file.fields()[index++]; }
 };
+
+template <class Row>
+constexpr auto kFurther = std::is_same_v<Row, StateRow> ? CsvReader::Further::kAllowed
+                                                        : CsvReader::Further::kNone;
 
 template <class Row>
 Row parse_row(const CsvReader& file) {
@@ -86,8 +95,8 @@ template <class Row>
 bool RowReader<Row>::read_row() {
   for (; segment_ < flight_.segments.size(); ++segment_, file_.reset()) {
     if (!file_)
-      file_ =
-          std::make_unique<CsvReader>(flight_.segments[segment_].folder / Row::kFile, Row::kHeader);
+      file_ = std::make_unique<CsvReader>(flight_.segments[segment_].folder / Row::kFile,
+                                          make_header<Row>(), kFurther<Row>);
     if (!file_->next()) continue;
     keep(parse_row<Row>(*file_));
     return true;
@@ -159,8 +168,8 @@ std::uint64_t find_next_step(const RecordedFlight& flight) {
 std::vector<std::uint64_t> read_status_indices(const RecordedFlight& flight) {
   std::vector<std::uint64_t> indices;
   for (const RecordedSegment& segment : flight.segments) {
-    CsvReader file(segment.folder / kStatusFile, make_status_header());
-    while (file.next()) FieldParser{file}(indices.emplace_back());
+    CsvReader file(segment.folder / StatusRow::kFile, "sample_index", CsvReader::Further::kAllowed);
+    while (file.next()) FieldParser{file}.parse(indices.emplace_back());
   }
   return indices;
 }

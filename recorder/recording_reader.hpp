@@ -11,7 +11,7 @@
 #include <optional>
 #include <vector>
 
-#include "recorder/csv_reader.hpp"
+#include "recorder/sinks/csv/csv_reader.hpp"
 #include "recorder/manifest.hpp"
 #include "recorder/rows.hpp"
 

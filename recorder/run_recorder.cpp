@@ -18,7 +18,7 @@ using namespace std::chrono_literals;
 constexpr auto kPollTime = 20ms;           // between two looks at the run
 constexpr auto kAnnounceTime = 500ms;      // between two announcements at the latest
 constexpr auto kWriteTime = 5ms;           // between two batches of the writing thread
-constexpr auto kStuckTime = 1s;            // until it is said what a step waits for
+constexpr auto kStuckTime = 1s;            // until it is said which batch is missing
 constexpr auto kCompletionTime = 10s;      // after the end of a finished run, for the next step
 constexpr auto kFailedTime = 1s;           // likewise of any other
 constexpr auto kInterruptionTime = 500ms;  // likewise after a stop signal
@@ -30,6 +30,7 @@ constexpr std::chrono::steady_clock::duration kLongestPass = 1s;
 
 Participant make_announcement(const bus::Run* run, bool ready, bool done, std::int64_t last_step) {
   Participant message;
+  message.contract_sha256(bus::kContractSha256);
   message.role(ROLE_RECORDER);
   message.name("recorder");
   message.host(bus::host_name());
@@ -138,28 +139,8 @@ void RunRecorder::end_within(std::chrono::duration<double> limit) {
   if (!give_up_ || give_up_->seconds_left() > limit.count()) give_up_.emplace(limit.count());
 }
 
-/// Before the flight begins the expected controllers of every vehicle must be heard; in flight,
-/// those that are there.
-bool RunRecorder::sees_all_endpoints() const {
-  const bool is_fleet = bus::is_fleet(run_.parameters);
-  if (!surroundings_.inbox.hears_server(run_.server, is_fleet)) return false;
-  auto controllers = surroundings_.participants.find(ROLE_CONTROLLER, run_id_);
-  const auto unheard = std::remove_if(
-      controllers.begin(), controllers.end(),
-      [&](const auto& entry) { return !surroundings_.inbox.hears_client(entry.peer, is_fleet); });
-  const auto status = surroundings_.servers.find_status(run_id_);
-  const bool is_flying = status && status->phase() != PHASE_WAITING;
-  if (is_flying) return unheard == controllers.end();
-  const auto& ids = run_.parameters.vehicle_ids();
-  return std::all_of(ids.begin(), ids.end(), [&](std::uint32_t id) {
-    return std::count_if(controllers.begin(), unheard, [id](const auto& entry) {
-             return bus::flies_vehicle(entry.announcement, id);
-           }) >= scenario_.sync.wait_for.controllers;
-  });
-}
-
 void RunRecorder::announce_news() {
-  const bool is_now_ready = !ready_ && sees_all_endpoints();
+  const bool is_now_ready = !ready_ && surroundings_.inbox.hears(run_.server);
   ready_ = ready_ || is_now_ready;
   if (is_now_ready || last_complete_step_ != announced_step_ ||
       Clock::now() - announced_time_ >= kAnnounceTime)
@@ -181,14 +162,14 @@ void RunRecorder::write_samples() {
     auto time = Clock::now();
     while (!recording_.has_all() && !is_stopped) {
       is_stopped = stop_writing_;  // what is there by now is still taken
-      for (const auto& [sample, sender] : surroundings_.inbox.take_all())
-        std::visit([&, from = sender](const auto& message) { recording_.add(message, from); },
-                   sample);
+      for (const Inbox::Sample& sample : surroundings_.inbox.take_all())
+        std::visit([this](const auto& message) { recording_.add(message); }, sample);
+      note_libraries();
       const auto earlier = std::exchange(time, Clock::now());
       recording_.pass_time(std::min(time - earlier, kLongestPass));
       recording_.flush_if_due();
       last_complete_step_ = recording_.last_complete_step();
-      report_stuck_step();
+      report_missing_batch();
       std::this_thread::sleep_for(kWriteTime);
     }
     const bool has_all = recording_.has_all();  // if so, the main thread may still be looking
@@ -203,11 +184,20 @@ void RunRecorder::write_samples() {
   }
 }
 
-void RunRecorder::report_stuck_step() {
-  const auto step = recording_.describe_stuck(kStuckTime);
-  if (!step) return stuck_.reset();
+void RunRecorder::note_libraries() {
+  const std::uint64_t version = surroundings_.participants.version();
+  if (std::exchange(participants_version_, version) == version) return;
+  for (const auto& entry : surroundings_.participants.find(ROLE_CONTROLLER, run_id_))
+    if (entry.announcement.library_sha256().size() > 0)
+      recording_.note_library(entry.announcement.name().to_string(),
+                              entry.announcement.library_sha256().to_string());
+}
+
+void RunRecorder::report_missing_batch() {
+  const auto batch = recording_.describe_stuck(kStuckTime);
+  if (!batch) return stuck_.reset();
   if (!stuck_) stuck_.emplace(0.0, Clock::duration::zero());
-  if (stuck_->is_report_due()) spdlog::warn("waiting for: {}", *step);
+  if (stuck_->is_report_due()) spdlog::warn("waiting for: {}", *batch);
 }
 
 }  // namespace sls::record

@@ -59,13 +59,13 @@ class RunRecorder {
   void look_for_the_end(bus::ServerWatch& server);
   void look_for_the_next_run();
   void end_within(std::chrono::duration<double> limit);
-  bool sees_all_endpoints() const;
   void announce_news();
   void announce(bool done);
 
   // On the writing thread.
   void write_samples();
-  void report_stuck_step();
+  void note_libraries();
+  void report_missing_batch();
 
   Surroundings& surroundings_;
   const bus::Run run_;
@@ -73,6 +73,7 @@ class RunRecorder {
   const config::Scenario scenario_;
   Recording recording_;  // the writing thread's while it runs
   std::optional<app::Wait> stuck_;
+  std::uint64_t participants_version_ = 0;
 
   bool ready_ = false;
   std::int64_t announced_step_ = -1;

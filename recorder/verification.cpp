@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <fstream>
 #include <map>
 #include <set>
@@ -78,70 +77,68 @@ void certify(const RecordedFlight& flight, Inspection& inspection) {
 
 // --- two recordings ------------------------------------------------------------------------------
 
-/// A row's fields as people read them and as they are compared.
+/// A row's fields as people read them; empty where equal flights may differ.
 struct FieldLister {
-  struct Field {
-    std::string text;
-    bool is_incidental = false;
-    bool is_nan = false;
-  };
-  std::vector<Field> fields;
+  std::vector<std::string> texts;
+  std::vector<bool> are_nan;
 
-  void operator()(double number) {
-    fields.push_back({fmt::format("{}", number), false, std::isnan(number)});
+  template <class Field>
+  void operator()(const Column& column, const Field& field) {
+    for_each_component(field, [&](const auto& component) {
+      are_nan.push_back(component != component);
+      texts.push_back(column.is_certified ? format(component) : "");
+    });
   }
-  void operator()(const std::string& text) { fields.push_back({"'" + text + "'"}); }
-  template <class Integer>
-  void operator()(Integer number) {
-    fields.push_back({std::to_string(number)});
+  template <class Number>
+  static std::string format(const Number& number) {
+    return fmt::format("{}", number);
   }
-  template <class Any>
-  void incidental(const Any& any) {
-    (*this)(any);
-    fields.back().is_incidental = true;
-  }
+  static std::string format(const std::string& text) { return "'" + text + "'"; }
 };
 
 template <class Row>
-std::vector<FieldLister::Field> list_fields(const Row& row) {
+FieldLister list_fields(const Row& row) {
   FieldLister lister;
   Row::visit(row, lister);
-  return lister.fields;
+  return lister;
 }
 
-std::string name_column(std::string_view header, std::size_t index) {
-  for (; index > 0; --index) header.remove_prefix(header.find(',') + 1);
-  return std::string(header.substr(0, header.find(',')));
+template <class Row>
+std::vector<std::string> read_columns(const RecordedFlight& flight) {
+  return CsvReader(flight.folder / Row::kFile, "vehicle_id", CsvReader::Further::kAllowed).columns();
 }
 
 template <class Row>
 std::optional<std::string> compare_rows(const std::optional<Row>& a, const std::optional<Row>& b,
-                                        const StepRows& step) {
+                                        const StepRows& step, const RecordedFlight& flight) {
   if (!a && !b) return std::nullopt;
   const std::string place =
       fmt::format("{}, vehicle {}, step {}", Row::kFile, step.vehicle_id, step.step);
   if (!a || !b) return fmt::format("{}: a row in {} alone", place, a ? "A" : "B");
   if (to_bytes(*a) == to_bytes(*b)) return std::nullopt;
-  const auto fields_a = list_fields(*a), fields_b = list_fields(*b);
-  for (std::size_t i = 0; i < fields_a.size(); ++i) {
-    if (fields_a[i].is_incidental || fields_a[i].text == fields_b[i].text) continue;
-    const bool are_nan = fields_a[i].is_nan && fields_b[i].is_nan;
-    return fmt::format("{}, {}: {} in A, {} in B{}", place, name_column(Row::kHeader, i),
-                       fields_a[i].text, fields_b[i].text,
-                       are_nan ? " (neither is a number; their signs differ)" : "");
-  }
-  return place + ": the rows differ";  // not reached: shortest digits tell all doubles apart
+  const FieldLister of_a = list_fields(*a), of_b = list_fields(*b);
+  const std::vector<std::string> columns = read_columns<Row>(flight);
+  for (std::size_t i = 0; i < std::min({of_a.texts.size(), of_b.texts.size(), columns.size()}); ++i)
+    if (of_a.texts[i] != of_b.texts[i])
+      return fmt::format("{}, {}: {} in A, {} in B{}", place, columns[i], of_a.texts[i],
+                         of_b.texts[i],
+                         of_a.are_nan[i] && of_b.are_nan[i]
+                             ? " (neither is a number; their signs differ)"
+                             : "");
+  return fmt::format("{}: {} fields in A, {} in B", place, of_a.texts.size(), of_b.texts.size());
 }
 
-std::optional<std::string> compare_steps(const StepRows& a, const StepRows& b) {
-  if (auto text = compare_rows(a.state, b.state, a)) return text;
-  if (auto text = compare_rows(a.command, b.command, a)) return text;
-  return compare_rows(a.reference, b.reference, a);
+std::optional<std::string> compare_steps(const StepRows& a, const StepRows& b,
+                                         const RecordedFlight& flight) {
+  if (auto text = compare_rows(a.state, b.state, a, flight)) return text;
+  if (auto text = compare_rows(a.command, b.command, a, flight)) return text;
+  return compare_rows(a.reference, b.reference, a, flight);
 }
 
 /// Of what comes next of the vehicle in either recording.
 std::optional<Difference> compare_next(const std::optional<StepRows>& a,
-                                       const std::optional<StepRows>& b) {
+                                       const std::optional<StepRows>& b,
+                                       const RecordedFlight& flight) {
   if (!a && !b) return std::nullopt;
   if (!a || !b || a->step != b->step) {
     const bool is_in_a = a && (!b || a->step < b->step);
@@ -149,7 +146,7 @@ std::optional<Difference> compare_next(const std::optional<StepRows>& a,
     return Difference{alone.step, fmt::format("vehicle {}, step {}: in {} alone", alone.vehicle_id,
                                               alone.step, is_in_a ? "A" : "B")};
   }
-  if (auto text = compare_steps(*a, *b)) return Difference{a->step, *text};
+  if (auto text = compare_steps(*a, *b, flight)) return Difference{a->step, *text};
   return std::nullopt;
 }
 
@@ -174,6 +171,8 @@ Inspection inspect(const RecordedFlight& flight) {
 }
 
 std::optional<Difference> find_first_difference(const RecordedFlight& a, const RecordedFlight& b) {
+  if (read_columns<StateRow>(a) != read_columns<StateRow>(b))
+    return Difference{0, fmt::format("{}: other columns in A than in B", StateRow::kFile)};
   std::set<std::uint32_t> ids;
   for (const auto* flight : {&a, &b})
     for (const std::uint32_t id : flight->vehicle_ids()) ids.insert(id);
@@ -182,7 +181,7 @@ std::optional<Difference> find_first_difference(const RecordedFlight& a, const R
   while (!ids.empty())
     for (auto id = ids.begin(); id != ids.end();) {
       const auto step_a = reader_a.next(*id), step_b = reader_b.next(*id);
-      const auto difference = compare_next(step_a, step_b);
+      const auto difference = compare_next(step_a, step_b, a);
       if (difference && (!first || difference->step < first->step)) first = difference;
       const bool is_over = difference || !step_a || (first && step_a->step >= first->step);
       id = is_over ? ids.erase(id) : std::next(id);

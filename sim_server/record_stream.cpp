@@ -53,10 +53,11 @@ void RecordStream::work() {
 }
 
 void RecordStream::write(const Collected& collected, bool is_last) {
-  std::size_t bytes = 0;
+  const std::size_t header = RecordBatch::getCdrSerializedSize(batch_);
+  std::size_t bytes = header;
   for (std::size_t i = 0; i < collected.count; ++i) {
     const RecordEntry& entry = collected.entries[i];
-    const std::size_t more = RecordEntry::getCdrSerializedSize(entry);
+    std::size_t more = RecordEntry::getCdrSerializedSize(entry, bytes);
     if (entry.step() != step_) bytes_of_step_ = 0;
     step_ = entry.step();
     bytes_of_step_ += more;
@@ -64,7 +65,8 @@ void RecordStream::write(const Collected& collected, bool is_last) {
     const bool is_full = bytes + more > max_bytes_ || batch_.entries().size() == BATCH_ENTRIES;
     if (is_full && !batch_.entries().empty()) {
       write_batch(false);
-      bytes = 0;
+      bytes = header;
+      more = RecordEntry::getCdrSerializedSize(entry, bytes);
     }
     batch_.entries().push_back(entry);
     bytes += more;

@@ -146,7 +146,8 @@ class Writer {
 template <class Message>
 class Reader {
  public:
-  using Handler = std::function<void(const Message& message, const PeerId& sender)>;
+  /// May take over what `message` holds: the next sample finds other memory.
+  using Handler = std::function<void(Message& message, const PeerId& sender)>;
 
   Reader(Node& node, const char* profile, Handler handler)
       : handler_(std::move(handler)),

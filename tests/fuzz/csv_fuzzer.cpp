@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <cstdlib>
 
-#include "recorder/csv_reader.hpp"
+#include "recorder/sinks/csv/csv_reader.hpp"
 #include "tests/fuzz/memory_file.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -1,8 +1,8 @@
-#include "recorder/csv_reader.hpp"
+#include "recorder/sinks/csv/csv_reader.hpp"
 
 #include <gtest/gtest.h>
 
-#include "recorder/csv_file.hpp"
+#include "recorder/sinks/csv/csv_file.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace sls::record {

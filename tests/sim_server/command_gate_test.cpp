@@ -10,6 +10,12 @@
 #include <set>
 
 namespace sls::sim {
+
+bool operator==(const OfferedAnswer& a, const OfferedAnswer& b) {
+  return a.run_id == b.run_id && a.step == b.step && a.client_name == b.client_name &&
+         a.command == b.command;
+}
+
 namespace {
 
 constexpr std::uint64_t kRun = 0xfeed;
@@ -30,22 +36,22 @@ const ReadyClient kStrong = {kStrongPeer, "strong", 10};
 const ReadyClient kWeak = {kWeakPeer, "weak", 1};
 const ReadyClient kWeakest = {kWeakestPeer, "weakest", 0};
 
-ControlCommand make_answer(std::uint64_t step, double force_z = -10.0) {
-  ControlCommand command;
-  command.run_id(kRun);
-  command.vehicle_id(kVehicle);
-  command.step(step);
-  command.f_Q_W_n({0.01 * static_cast<double>(step % 1000), 1.0, force_z});
-  command.client_name("named by nobody");
-  command.mission(MISSION_RUNNING);
-  command.fault(FAULT_NONE);
+OfferedAnswer make_answer(std::uint64_t step, double force_z = -10.0) {
+  OfferedAnswer command;
+  command.run_id = kRun;
+  command.command.vehicle_id(kVehicle);
+  command.step = step;
+  command.command.f_Q_W_n({0.01 * static_cast<double>(step % 1000), 1.0, force_z});
+  command.client_name = "named by nobody";
+  command.command.mission(MISSION_RUNNING);
+  command.command.fault(FAULT_NONE);
   return command;
 }
 
-ControlCommand make_faulted(std::uint64_t step, FaultCode fault) {
-  ControlCommand command = make_answer(step);
-  command.fault(fault);
-  command.mission(MISSION_FAILED);
+OfferedAnswer make_faulted(std::uint64_t step, FaultCode fault) {
+  OfferedAnswer command = make_answer(step);
+  command.command.fault(fault);
+  command.command.mission(MISSION_FAILED);
   return command;
 }
 
@@ -70,7 +76,7 @@ class CommandGateTest : public testing::Test {
 
   /// Offers `command` from the only ready client and checks that it neither flies nor is lost from
   /// the counters.
-  Verdict offer_bad(const ControlCommand& command) {
+  Verdict offer_bad(const OfferedAnswer& command) {
     const auto before = sum_rejections(gate_.counters());
     const Verdict verdict = gate_.offer(command, kStrongPeer);
     EXPECT_FALSE(gate_.accepted());
@@ -83,12 +89,35 @@ class CommandGateTest : public testing::Test {
 };
 
 TEST_F(CommandGateTest, TheAwaitedAnswerOfAReadyClientIsAccepted) {
-  const ControlCommand answer = make_answer(0);
+  const OfferedAnswer answer = make_answer(0);
   EXPECT_EQ(gate_.offer(answer, kStrongPeer), Verdict::kAccepted);
   ASSERT_TRUE(gate_.accepted());
   EXPECT_EQ(*gate_.accepted(), answer);
   EXPECT_EQ(gate_.counters(), SyncCounters());
   EXPECT_EQ(gate_.refusal(), std::nullopt);
+}
+
+TEST_F(CommandGateTest, AnAnswerToAStateThatWasNotPublishedYetIsRefused) {
+  gate_.expect(4);
+  gate_.expect(5);
+  OfferedAnswer early = make_answer(5);
+  early.is_early = true;
+  EXPECT_EQ(offer_bad(early), Verdict::kEarly);
+  EXPECT_EQ(gate_.counters().rejected_step(), 1u);
+  OfferedAnswer late = make_answer(4);  // before the next state, as late answers come
+  late.is_early = true;
+  EXPECT_EQ(gate_.offer(late, kStrongPeer), Verdict::kLate);
+  EXPECT_EQ(gate_.offer(make_answer(5), kStrongPeer), Verdict::kAccepted);
+}
+
+TEST_F(CommandGateTest, TheRefusedAnswerToTheAwaitedStepIsKept) {
+  EXPECT_FALSE(gate_.refused());
+  const OfferedAnswer faulted = make_faulted(0, FAULT_FREE_FALL);
+  gate_.offer(faulted, kStrongPeer);
+  ASSERT_TRUE(gate_.refused());
+  EXPECT_EQ(*gate_.refused(), faulted);
+  gate_.expect(1);
+  EXPECT_FALSE(gate_.refused());
 }
 
 TEST_F(CommandGateTest, ExpectingTheNextStepForgetsTheAcceptedAnswer) {
@@ -99,19 +128,19 @@ TEST_F(CommandGateTest, ExpectingTheNextStepForgetsTheAcceptedAnswer) {
 }
 
 TEST_F(CommandGateTest, AForceAtTheLimitIsAcceptedAndJustBeyondRefused) {
-  ControlCommand beyond = make_answer(0);
-  beyond.f_Q_W_n({0, 0, -std::nextafter(kForceLimit, 100.0)});
+  OfferedAnswer beyond = make_answer(0);
+  beyond.command.f_Q_W_n({0, 0, -std::nextafter(kForceLimit, 100.0)});
   EXPECT_EQ(offer_bad(beyond), Verdict::kForceLimit);
   gate_.set_clients({});  // the refused client is gone, another one comes
   gate_.set_clients({kWeak});
-  ControlCommand at_limit = make_answer(0);
-  at_limit.f_Q_W_n({30.0, 0.0, -40.0});
+  OfferedAnswer at_limit = make_answer(0);
+  at_limit.command.f_Q_W_n({30.0, 0.0, -40.0});
   EXPECT_EQ(gate_.offer(at_limit, kWeakPeer), Verdict::kAccepted);
 }
 
 TEST_F(CommandGateTest, AForceWhoseSquaresOverflowIsBeyondTheLimit) {
-  ControlCommand command = make_answer(0);
-  command.f_Q_W_n({1e300, -1e300, 1e300});
+  OfferedAnswer command = make_answer(0);
+  command.command.f_Q_W_n({1e300, -1e300, 1e300});
   EXPECT_EQ(offer_bad(command), Verdict::kForceLimit);
   EXPECT_EQ(gate_.counters().rejected_force_limit(), 1u);
 }
@@ -122,11 +151,12 @@ TEST_F(CommandGateTest, AnyNumberThatIsNotFiniteIsRefused) {
   std::uint64_t offered = 0;
   for (const double bad : {nan, infinity, -infinity})
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      ControlCommand force = make_answer(0);
-      force.f_Q_W_n()[axis] = bad;
+      OfferedAnswer force = make_answer(0);
+      force.command.f_Q_W_n()[axis] = bad;
       EXPECT_EQ(offer_bad(force), Verdict::kNotFinite);
-      ControlCommand memory = make_answer(0);
-      memory.controller().integral_m_s()[axis] = bad;
+      OfferedAnswer memory = make_answer(0);
+      memory.command.controller().numbers() = {0.0, 0.0, 0.0};
+      memory.command.controller().numbers()[axis] = bad;
       EXPECT_EQ(offer_bad(memory), Verdict::kNotFinite);
       offered += 2;
     }
@@ -134,16 +164,16 @@ TEST_F(CommandGateTest, AnyNumberThatIsNotFiniteIsRefused) {
 }
 
 TEST_F(CommandGateTest, ACommandOfAnotherRunIsRefusedWithoutBlame) {
-  ControlCommand command = make_answer(0);
-  command.run_id(kRun + 1);
+  OfferedAnswer command = make_answer(0);
+  command.run_id = kRun + 1;
   EXPECT_EQ(offer_bad(command), Verdict::kOtherRun);
   EXPECT_EQ(gate_.counters().rejected_run(), 1u);
   EXPECT_EQ(gate_.refusal(), std::nullopt);
 }
 
 TEST_F(CommandGateTest, ACommandForAnUnknownVehicleIsRefusedWithoutBlame) {
-  ControlCommand command = make_answer(0);
-  command.vehicle_id(kVehicle + 1);
+  OfferedAnswer command = make_answer(0);
+  command.command.vehicle_id(kVehicle + 1);
   EXPECT_EQ(offer_bad(command), Verdict::kUnknownVehicle);
   EXPECT_EQ(gate_.counters().rejected_vehicle(), 1u);
   EXPECT_EQ(gate_.refusal(), std::nullopt);
@@ -167,13 +197,13 @@ TEST_F(CommandGateTest, AnAnswerOfNobodyAnnouncedIsRefused) {
 }
 
 TEST_F(CommandGateTest, NothingThatAnUnannouncedSenderSendsEndsTheFlight) {
-  ControlCommand not_finite = make_answer(0);
-  not_finite.f_Q_W_n()[0] = std::numeric_limits<double>::quiet_NaN();
-  ControlCommand excessive = make_answer(0);
-  excessive.f_Q_W_n()[0] = 1e6;
-  const std::vector<ControlCommand> bad = {not_finite, excessive, make_faulted(0, FAULT_FREE_FALL),
-                                           make_answer(0), make_answer(77)};
-  for (const ControlCommand& command : bad) {
+  OfferedAnswer not_finite = make_answer(0);
+  not_finite.command.f_Q_W_n()[0] = std::numeric_limits<double>::quiet_NaN();
+  OfferedAnswer excessive = make_answer(0);
+  excessive.command.f_Q_W_n()[0] = 1e6;
+  const std::vector<OfferedAnswer> bad = {not_finite, excessive, make_faulted(0, FAULT_FREE_FALL),
+                                          make_answer(0), make_answer(77)};
+  for (const OfferedAnswer& command : bad) {
     gate_.offer(command, kStranger);
     EXPECT_EQ(gate_.refusal(), std::nullopt);
     EXPECT_FALSE(gate_.accepted());
@@ -184,8 +214,8 @@ TEST_F(CommandGateTest, NothingThatAnUnannouncedSenderSendsEndsTheFlight) {
 
 TEST_F(CommandGateTest, ACopyOfAnAcceptedCommandIsCountedDuplicate) {
   gate_.offer(make_answer(0), kStrongPeer);
-  ControlCommand again = make_answer(0);
-  again.compute_time_ns(12345);  // how long it took is not part of the answer
+  OfferedAnswer again = make_answer(0);
+  again.command.compute_time_ns(12345);  // how long it took is not part of the answer
   EXPECT_EQ(gate_.offer(again, kStrongPeer), Verdict::kDuplicate);
   gate_.expect(1);
   EXPECT_EQ(gate_.offer(again, kStrongPeer), Verdict::kDuplicate);
@@ -228,8 +258,8 @@ TEST_F(CommandGateTest, ACopyFromFarBackIsCountedAndMemoryStaysBounded) {
 
 TEST_F(CommandGateTest, ARefusalOfTheOnlyClientNamesCauseClientAndStep) {
   gate_.expect(41);
-  ControlCommand command = make_answer(41);
-  command.f_Q_W_n()[1] = std::numeric_limits<double>::quiet_NaN();
+  OfferedAnswer command = make_answer(41);
+  command.command.f_Q_W_n()[1] = std::numeric_limits<double>::quiet_NaN();
   offer_bad(command);
   ASSERT_TRUE(gate_.refusal());
   EXPECT_NE(gate_.refusal()->find("'strong'"), std::string::npos) << *gate_.refusal();
@@ -238,8 +268,8 @@ TEST_F(CommandGateTest, ARefusalOfTheOnlyClientNamesCauseClientAndStep) {
 }
 
 TEST_F(CommandGateTest, AnExcessiveForceIsNamedWithItsLimit) {
-  ControlCommand command = make_answer(0);
-  command.f_Q_W_n({0, 300.0, -400.0});
+  OfferedAnswer command = make_answer(0);
+  command.command.f_Q_W_n({0, 300.0, -400.0});
   offer_bad(command);
   ASSERT_TRUE(gate_.refusal());
   EXPECT_NE(gate_.refusal()->find("500 N > 50 N"), std::string::npos) << *gate_.refusal();
@@ -295,8 +325,8 @@ TEST_F(CommandGateTest, NoRefusalWhileAnotherReadyClientCanAnswer) {
 
 TEST_F(CommandGateTest, ARefusalIsKnownWhileASilentStandbyIsAwaited) {
   set_clients({kStrong, kWeak});
-  ControlCommand beyond = make_answer(0);
-  beyond.f_Q_W_n({0, 0, -60.0});
+  OfferedAnswer beyond = make_answer(0);
+  beyond.command.f_Q_W_n({0, 0, -60.0});
   gate_.offer(beyond, kStrongPeer);
   for (const char* words : {"'strong' answered step 0", "force_limit_n: 60 N > 50 N"})
     EXPECT_NE(gate_.describe_refusals().find(words), std::string::npos)
@@ -583,30 +613,30 @@ class Junk {
   explicit Junk(std::mt19937_64& random) : random_(random) {}
 
   /// For the awaited step or not, depending on the kind.
-  ControlCommand make(std::uint64_t awaited) {
-    ControlCommand command = make_answer(awaited, -static_cast<double>(pick(40)));
+  OfferedAnswer make(std::uint64_t awaited) {
+    OfferedAnswer command = make_answer(awaited, -static_cast<double>(pick(40)));
     switch (pick(7)) {
       case 0:
-        command.f_Q_W_n()[pick(3)] = std::numeric_limits<double>::quiet_NaN();
+        command.command.f_Q_W_n()[pick(3)] = std::numeric_limits<double>::quiet_NaN();
         break;
       case 1:
-        command.controller().integral_m_s()[pick(3)] = -std::numeric_limits<double>::infinity();
+        command.command.controller().numbers() = {1.0, -std::numeric_limits<double>::infinity()};
         break;
       case 2:
-        command.f_Q_W_n()[pick(3)] = kForceLimit * 1.001 + static_cast<double>(pick(1000));
+        command.command.f_Q_W_n()[pick(3)] = kForceLimit * 1.001 + static_cast<double>(pick(1000));
         break;
       case 3:
-        command.run_id(random_());
+        command.run_id = random_();
         break;
       case 4:
-        command.vehicle_id(kVehicle + 1 + static_cast<std::uint32_t>(pick(100)));
+        command.command.vehicle_id(kVehicle + 1 + static_cast<std::uint32_t>(pick(100)));
         break;
       case 5:
-        command.fault(static_cast<FaultCode>(1 + pick(7)));
+        command.command.fault(static_cast<FaultCode>(1 + pick(7)));
         break;
       default:
         // Another step: far ahead, far behind, or just missed.
-        command.step(pick(2) == 0 ? random_() | (1ull << 40) : awaited + 1 + pick(3));
+        command.step = pick(2) == 0 ? random_() | (1ull << 40) : awaited + 1 + pick(3);
     }
     return command;
   }
@@ -629,9 +659,9 @@ TEST(CommandGatePropertyTest, JunkNeitherChangesWhatFliesNorEscapesTheCounters) 
     constexpr std::uint64_t kSteps = 150;
     for (std::uint64_t step = 0; step < kSteps; ++step) {
       gate.expect(step);
-      const ControlCommand strong_answer = make_answer(step, -10.0 - static_cast<double>(seed));
+      const OfferedAnswer strong_answer = make_answer(step, -10.0 - static_cast<double>(seed));
       struct Offer {
-        ControlCommand command;
+        OfferedAnswer command;
         bus::PeerId sender;
       };
       // Before the answers, in any order: strangers' junk, and clients' junk about other things
@@ -641,7 +671,7 @@ TEST(CommandGatePropertyTest, JunkNeitherChangesWhatFliesNorEscapesTheCounters) 
         before.push_back({junk.make(step), kStranger});
         const auto command = junk.make(step);
         const auto sender = clients[junk.pick(3)].peer;
-        (command.step() == step && command.run_id() == kRun && command.vehicle_id() == kVehicle
+        (command.step == step && command.run_id == kRun && command.command.vehicle_id() == kVehicle
              ? after
              : before)
             .push_back({command, sender});

@@ -21,13 +21,14 @@ class VehicleFlightTest : public testing::Test {
     return scenario;
   }
 
-  static ControlCommand make_answer(std::uint64_t step) {
-    ControlCommand answer;
-    answer.run_id(kRun);
-    answer.step(step);
-    answer.f_Q_W_n({0.0, 0.0, -16.0 - 0.001 * static_cast<double>(step)});
-    answer.client_name("late");
-    answer.mission(MISSION_RUNNING);
+  static OfferedAnswer make_answer(std::uint64_t step) {
+    OfferedAnswer answer;
+    answer.run_id = kRun;
+    answer.step = step;
+    answer.client_name = "late";
+    answer.command.f_Q_W_n({0.0, 0.0, -16.0 - 0.001 * static_cast<double>(step)});
+    answer.command.reference().stage_index(7);
+    answer.command.mission(MISSION_RUNNING);
     return answer;
   }
 
@@ -47,7 +48,7 @@ TEST_F(VehicleFlightTest, AnswersThatAreAllOnePeriodLateFlyItWithoutEnd) {
   for (std::uint64_t step = 1; step < 4 * kHeldSteps; ++step) {
     fly(step, {step - 1});
     ASSERT_EQ(applied().origin, FORCE_HELD) << step;
-    ASSERT_EQ(applied().answer_f_Q_W.z(), make_answer(step - 1).f_Q_W_n()[2]) << step;
+    ASSERT_EQ(applied().answer_f_Q_W.z(), make_answer(step - 1).command.f_Q_W_n()[2]) << step;
     ASSERT_EQ(flight_.calc_age(), 1u) << step;
   }
 }
@@ -64,6 +65,45 @@ TEST_F(VehicleFlightTest, OnlyANewerAnswerIsFresh) {
   EXPECT_EQ(applied().origin, FORCE_FAIL_SAFE);
   fly(3 + kHeldSteps, {2});
   EXPECT_EQ(applied().origin, FORCE_HELD) << "a newer one, however late, ends the fail-safe";
+}
+
+TEST_F(VehicleFlightTest, TheRecordSaysWhichAnswerIsInForce) {
+  const bus::PeerId peer{};
+  flight_.gate.set_clients({{peer, "late", 0}});
+  RecordEntry entry;
+  flight_.measure(0, {});
+  flight_.gate.expect(0);
+  ASSERT_EQ(flight_.gate.offer(make_answer(0), peer), Verdict::kAccepted);
+  flight_.take_answer();
+  flight_.fill_record(entry);
+  EXPECT_EQ(entry.kind(), ANSWER_ACCEPTED);
+  EXPECT_EQ(entry.step(), 0u);
+  EXPECT_EQ(entry.answered_step(), 0u);
+  EXPECT_STREQ(entry.client_name().c_str(), "late");
+  EXPECT_EQ(entry.answer(), make_answer(0).command);
+  flight_.actuate();
+
+  flight_.gate.expect(1);
+  fly(1, {});
+  flight_.fill_record(entry);
+  EXPECT_EQ(entry.kind(), ANSWER_HELD);
+  EXPECT_EQ(entry.step(), 1u);
+  EXPECT_EQ(entry.answered_step(), 0u);
+  EXPECT_EQ(entry.answer(), make_answer(0).command);
+  EXPECT_EQ(entry.f_Q_W_n(), make_answer(0).command.f_Q_W_n()) << "which acted before";
+
+  flight_.actuate();
+  flight_.gate.expect(2);
+  flight_.measure(2, {});
+  flight_.fill_record(entry);
+  EXPECT_EQ(entry.kind(), ANSWER_NONE);
+  OfferedAnswer refused = make_answer(2);
+  refused.command.fault(FAULT_FREE_FALL);
+  flight_.gate.offer(refused, peer);
+  flight_.fill_record(entry);
+  EXPECT_EQ(entry.kind(), ANSWER_REFUSED);
+  EXPECT_EQ(entry.answered_step(), 2u);
+  EXPECT_EQ(entry.answer(), refused.command);
 }
 
 TEST_F(VehicleFlightTest, ALateAnswerEndsTheAbsence) {

@@ -21,35 +21,35 @@ class Stranger {
       : node_(qos("default"), domain, "stranger"),
         servers_(node_),
         writer_(node_),
-        reader_(node_, bus::kLoopReaderProfile,
-                [this](const VehicleState& state, const bus::PeerId&) {
-                  const std::lock_guard lock(mutex_);
-                  last_ = state;
-                  seen_ = true;
-                }) {}
+        reader_(node_, bus::kLoopReaderProfile, [this](const States& state, const bus::PeerId&) {
+          const std::lock_guard lock(mutex_);
+          last_ = state;
+          seen_ = true;
+        }) {}
 
   bool wait_for_state() {
     return wait_until([this] { return seen_.load() && !writer_.matched().empty(); });
   }
 
-  VehicleState last_state() {
+  States last_state() {
     const std::lock_guard lock(mutex_);
     return last_;
   }
 
   /// A command that would be right but for what the caller changes.
-  ControlCommand make_command(std::uint64_t ahead) {
-    const VehicleState state = last_state();
-    ControlCommand command;
+  Commands make_command(std::uint64_t ahead) {
+    const States state = last_state();
+    Commands command;
     command.run_id(state.run_id());
     command.step(state.step() + ahead);
-    command.f_Q_W_n({0.0, 0.0, -16.66});
+    command.vehicles().resize(1);
+    command.vehicles()[0].f_Q_W_n({0.0, 0.0, -16.66});
     command.client_name("stranger");
     command.strength(1000);
     return command;
   }
 
-  void write(const ControlCommand& command) { writer_.write(command); }
+  void write(const Commands& command) { writer_.write(command); }
 
   SyncCounters counters() {
     const auto status = servers_.find_status(last_state().run_id());
@@ -59,11 +59,11 @@ class Stranger {
  private:
   bus::Node node_;
   bus::ServerDirectory servers_;
-  bus::Writer<ControlCommand> writer_;
+  bus::Writer<Commands> writer_;
   std::mutex mutex_;
-  VehicleState last_;
+  States last_;
   std::atomic<bool> seen_{false};
-  bus::Reader<VehicleState> reader_;
+  bus::Reader<States> reader_;
 };
 
 TEST(CommandsTest, ABadCommandIsCountedByItsCauseAndNeverDisturbsTheFlight) {
@@ -77,26 +77,26 @@ TEST(CommandsTest, ABadCommandIsCountedByItsCauseAndNeverDisturbsTheFlight) {
   const double infinity = std::numeric_limits<double>::infinity();
   for (int i = 0; i < kEach; ++i) {
     for (std::uint64_t ahead : {0, 1, 2}) {  // one of them is the awaited step when it arrives
-      ControlCommand command = stranger.make_command(ahead);
-      command.f_Q_W_n({nan, 0.0, 0.0});
+      Commands command = stranger.make_command(ahead);
+      command.vehicles()[0].f_Q_W_n({nan, 0.0, 0.0});
       stranger.write(command);
-      command.f_Q_W_n({0.0, infinity, 0.0});
+      command.vehicles()[0].f_Q_W_n({0.0, infinity, 0.0});
       stranger.write(command);
-      command.f_Q_W_n({0.0, 0.0, -1e6});
+      command.vehicles()[0].f_Q_W_n({0.0, 0.0, -1e6});
       stranger.write(command);
       command = stranger.make_command(ahead);
-      command.fault(FAULT_FREE_FALL);
-      command.mission(MISSION_FAILED);
+      command.vehicles()[0].fault(FAULT_FREE_FALL);
+      command.vehicles()[0].mission(MISSION_FAILED);
       stranger.write(command);
       command = stranger.make_command(ahead);
       command.run_id(command.run_id() + 1);
       stranger.write(command);
       command = stranger.make_command(ahead);
-      command.vehicle_id(7);
+      command.vehicles()[0].vehicle_id(7);
       stranger.write(command);
       stranger.write(stranger.make_command(ahead));  // nothing wrong but who sends it
     }
-    ControlCommand command = stranger.make_command(1000000);
+    Commands command = stranger.make_command(1000000);
     stranger.write(command);
   }
   flight.expect_success();

@@ -5,6 +5,7 @@
 #include <regex>
 #include <utility>
 
+#include "common/bus/convert.hpp"
 #include "common/bus/participants.hpp"
 #include "control_client/answer_stream.hpp"
 #include "control_client/messages.hpp"
@@ -46,10 +47,8 @@ class LateController {
         node_(qos("default"), domain, "late"),
         servers_(node_),
         participant_writer_(node_),
-        stream_(node_, {false, true},
-                [this](const VehicleState* states, std::size_t, const bus::PeerId&) {
-                  answer(states[0]);
-                }) {}
+        stream_(node_, true, [this](const States& states, const bus::PeerId&) { answer(states); }) {
+  }
 
   /// False where there is no server.
   bool join() {
@@ -59,7 +58,9 @@ class LateController {
       return false;
     Participant message;
     message.run_id(run->parameters.run_id());
+    message.contract_sha256(bus::kContractSha256);
     message.role(ROLE_CONTROLLER);
+    message.vehicle_ids({0});
     message.name("late");
     message.scenario_sha256(scenario_.sha256);
     message.ready(true);
@@ -68,20 +69,24 @@ class LateController {
   }
 
  private:
-  void answer(const VehicleState& state) {
-    const VehicleState answered = std::exchange(last_state_, state);
-    if (answered.run_id() != state.run_id()) return;  // there was none
-    const auto result = controller_.calc_answer(answered.step(), control::to_model_state(answered),
-                                                control::to_memory(answered.controller(), 3));
-    std::vector<Reference> references;
-    std::vector<ControlCommand> commands = {
-        control::make_command_message(answered, result, "late", 0, {})};
-    stream_.write(references, commands);
+  void answer(const States& states) {
+    const States answered = std::exchange(last_states_, states);
+    if (answered.run_id() != states.run_id()) return;  // there was none
+    const VehicleState& state = answered.vehicles().front();
+    const auto result =
+        controller_.calc_answer(answered.step(), bus::to_measurement(state.measured()),
+                                control::to_memory(state.controller()));
+    Commands commands;
+    commands.run_id(answered.run_id());
+    commands.step(answered.step());
+    commands.client_name("late");
+    commands.vehicles({control::make_command_message(0, result, {})});
+    stream_.write(commands);
   }
 
   const config::Scenario scenario_;
   const control::FlightController controller_;
-  VehicleState last_state_;
+  States last_states_;
   bus::Node node_;
   bus::ServerDirectory servers_;
   bus::Writer<Participant> participant_writer_;

@@ -1,4 +1,4 @@
-#include "recorder/csv_file.hpp"
+#include "recorder/sinks/csv/csv_file.hpp"
 
 #include <fcntl.h>
 #include <unistd.h>

@@ -1,4 +1,4 @@
-#include "recorder/csv_reader.hpp"
+#include "recorder/sinks/csv/csv_reader.hpp"
 
 #include <algorithm>
 #include <cerrno>
@@ -12,14 +12,18 @@ constexpr std::size_t kLongestRecord = 1 << 20;  // of a file that is what it sh
 
 }  // namespace
 
-CsvReader::CsvReader(const std::filesystem::path& file, std::string_view header)
+CsvReader::CsvReader(const std::filesystem::path& file, std::string_view header, Further further)
     : path_(file.string()), stream_(file, std::ios::binary) {
   if (!stream_) throw DamagedError(path_ + ": cannot read: " + std::strerror(errno));
-  if (!find_record() || std::string_view(buffer_).substr(begin_, end_ - begin_) != header)
-    throw DamagedError(path_ + ":1: expected the columns " + std::string(header));
-  for (std::size_t from = 0; from <= header.size();) {
-    const std::size_t comma = std::min(header.find(',', from), header.size());
-    columns_.push_back(header.substr(from, comma - from));
+  const std::string expected(header);
+  const bool is_there = find_record();
+  const std::string line = is_there ? buffer_.substr(begin_, end_ - begin_) : "";
+  if (!is_there || (line != expected && (further == Further::kNone ||
+                                         line.compare(0, expected.size() + 1, expected + ",") != 0)))
+    throw DamagedError(path_ + ":1: expected the columns " + expected);
+  for (std::size_t from = 0; from <= line.size();) {
+    const std::size_t comma = std::min(line.find(',', from), line.size());
+    columns_.push_back(line.substr(from, comma - from));
     from = comma + 1;
   }
 }

@@ -21,9 +21,12 @@ class DamagedError : public std::runtime_error {
 /// line break was cut when its writer was killed: it is no row.
 class CsvReader {
  public:
-  /// Opens `file`, whose first line must be `header`.
+  enum class Further { kNone, kAllowed };  ///< columns after those that are known
+
+  /// Opens `file`, whose first line must be `header`, or may go on after it.
   /// Every member @throws DamagedError.
-  CsvReader(const std::filesystem::path& file, std::string_view header);
+  CsvReader(const std::filesystem::path& file, std::string_view header,
+            Further further = Further::kNone);
 
   /// Reads the next row into `fields()`; false at the end.
   bool next();
@@ -32,7 +35,7 @@ class CsvReader {
   const std::vector<std::string_view>& fields() const { return fields_; }
 
   /// A row has that many.
-  const std::vector<std::string_view>& columns() const { return columns_; }
+  const std::vector<std::string>& columns() const { return columns_; }
 
   /// "FILE:LINE: " of the last row read.
   std::string place() const;
@@ -48,7 +51,7 @@ class CsvReader {
   std::size_t begin_ = 0, end_ = 0;  // of the record in the buffer, without its line break
   std::uint64_t line_ = 0, next_line_ = 1;
   bool is_at_end_ = false;
-  std::vector<std::string_view> columns_;
+  std::vector<std::string> columns_;
   std::vector<std::string_view> fields_;
   std::list<std::string> unquoted_;  // fields whose text is not in the buffer as it is
 };

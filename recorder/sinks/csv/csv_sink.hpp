@@ -1,0 +1,35 @@
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "recorder/sinks/csv/csv_file.hpp"
+#include "recorder/sinks/record_sink.hpp"
+
+namespace sls::record {
+
+/// The CSV files of README.md.
+class CsvSink : public RecordSink {
+ public:
+  CsvSink(const std::filesystem::path& folder, const Parameters& parameters);
+
+  void add(const StepRows& rows) override;
+  void add(const SimStatus& status) override;
+  bool is_full() const override;
+  void flush() override;
+  std::vector<RecordedFile> finish() override;
+
+ private:
+  const std::filesystem::path folder_;
+  const std::string state_header_;
+  const bool is_of_fleet_;
+  CsvFile states_, references_, flight_, statuses_, commands_;
+  /// Commands last: where a killed recorder leaves one, the step's other rows are there too.
+  const std::array<CsvFile*, 5> files_{&states_, &references_, &flight_, &statuses_, &commands_};
+  std::optional<CsvFile> measured_;  // from its first row on
+};
+
+}  // namespace sls::record

@@ -1,0 +1,14 @@
+#include "recorder/sinks/record_sink.hpp"
+
+#include "recorder/sinks/csv/csv_sink.hpp"
+
+namespace sls::record {
+
+std::vector<std::unique_ptr<RecordSink>> make_sinks(const std::filesystem::path& folder,
+                                                    const Parameters& parameters) {
+  std::vector<std::unique_ptr<RecordSink>> sinks;
+  sinks.push_back(std::make_unique<CsvSink>(folder, parameters));
+  return sinks;
+}
+
+}  // namespace sls::record

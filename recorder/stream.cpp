@@ -1,0 +1,141 @@
+#include "recorder/stream.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "common/bus/participants.hpp"
+
+namespace sls::record {
+namespace {
+
+using namespace std::chrono_literals;
+
+/// A batch that is missing while so many later ones are in, or for so long, is lost.
+constexpr std::size_t kMaxWaiting = 64;
+constexpr auto kMaxStuckTime = 10s;
+
+/// A late answer comes at most so many steps later (idl/sls.idl).
+constexpr std::uint64_t kMaxLateness = 64;
+
+/// Steps that wait for late answers: more than 256 vehicles have. It bounds the memory that steps
+/// out of order can take.
+constexpr std::size_t kMaxPending = 32768;
+
+}  // namespace
+
+Stream::Stream(const Parameters& parameters, std::uint64_t first_step, Sink sink, GapSink gap_sink)
+    : parameters_(parameters),
+      max_step_(static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max() /
+                                           std::max<std::int64_t>(parameters.period_ns(), 1))),
+      sink_(std::move(sink)),
+      gap_sink_(std::move(gap_sink)) {
+  for (const std::uint32_t id : bus::list_vehicle_ids(parameters)) next_steps_[id] = first_step;
+}
+
+// --- batches -------------------------------------------------------------------------------------
+
+void Stream::add(const RecordBatch& batch) {
+  if (!next_batch_) next_batch_ = batch.batch_index();
+  if (batch.batch_index() == *next_batch_ && !has_ended_) {
+    handle(batch);
+    return handle_waiting_batches();
+  }
+  if (has_ended_ || batch.batch_index() < *next_batch_ ||
+      !waiting_.emplace(batch.batch_index(), batch).second)
+    dropped_.repeated += batch.entries().size();
+  if (waiting_.size() > kMaxWaiting) skip_missing_batches();
+}
+
+void Stream::handle_waiting_batches() {
+  while (!waiting_.empty() && waiting_.begin()->first == *next_batch_) {
+    handle(waiting_.begin()->second);
+    waiting_.erase(waiting_.begin());
+  }
+}
+
+void Stream::skip_missing_batches() {
+  next_batch_ = waiting_.begin()->first;
+  handle_waiting_batches();
+}
+
+void Stream::pass_time(Duration elapsed) {
+  stuck_ = waiting_.empty() ? Duration() : stuck_ + elapsed;
+  if (stuck_ >= kMaxStuckTime) skip_missing_batches();
+}
+
+std::optional<std::string> Stream::describe_stuck(Duration patience) const {
+  if (waiting_.empty() || stuck_ < patience) return std::nullopt;
+  return fmt::format("batch {} of sls/record", *next_batch_);
+}
+
+void Stream::give_up() {
+  while (!waiting_.empty()) skip_missing_batches();
+  has_ended_ = true;
+  hand_on_settled_steps();
+}
+
+// --- entries -------------------------------------------------------------------------------------
+
+void Stream::handle(const RecordBatch& batch) {
+  for (const RecordEntry& entry : batch.entries()) handle(entry);
+  ++*next_batch_;
+  stuck_ = Duration();
+  has_ended_ = has_ended_ || batch.is_last();
+  hand_on_settled_steps();
+}
+
+void Stream::handle(const RecordEntry& entry) {
+  const auto vehicle = next_steps_.find(entry.vehicle_id());
+  if (vehicle == next_steps_.end() || entry.step() > max_step_ || entry.kind() > ANSWER_LATE) {
+    ++dropped_.out_of_range;
+    return;
+  }
+  if (entry.kind() == ANSWER_LATE) return handle_late(entry);
+  std::uint64_t& next = vehicle->second;
+  if (entry.step() < next) {
+    ++dropped_.repeated;
+    return;
+  }
+  if (entry.step() > next) gap_sink_(vehicle->first, next, entry.step() - 1);
+  next = entry.step() + 1;
+  newest_step_ = std::max(newest_step_, entry.step());
+  pending_.push_back(make_rows(entry, parameters_));
+  hand_on_settled_steps();
+}
+
+void Stream::handle_late(const RecordEntry& entry) {
+  const auto rows = std::find_if(pending_.begin(), pending_.end(), [&](const StepRows& pending) {
+    return pending.step == entry.step() && pending.vehicle_id == entry.vehicle_id();
+  });
+  if (rows == pending_.end() || !may_be_answered(*rows)) {
+    ++dropped_.repeated;
+    return;
+  }
+  add_reference(*rows, entry, parameters_);
+  hand_on_settled_steps();
+}
+
+bool Stream::may_be_answered(const StepRows& rows) const {
+  return rows.command && rows.command->is_unanswered() && !rows.reference &&
+         newest_step_ <= rows.step + kMaxLateness && !has_ended_;
+}
+
+void Stream::hand_on_settled_steps() {
+  while (!pending_.empty() &&
+         (!may_be_answered(pending_.front()) || pending_.size() > kMaxPending)) {
+    sink_(pending_.front());
+    pending_.pop_front();
+  }
+}
+
+std::int64_t Stream::last_step() const {
+  std::uint64_t next = next_steps_.empty() ? 0 : next_steps_.begin()->second;
+  for (const auto& [id, step] : next_steps_) next = std::min(next, step);
+  if (!pending_.empty()) next = std::min(next, pending_.front().step);
+  return static_cast<std::int64_t>(next) - 1;
+}
+
+}  // namespace sls::record
