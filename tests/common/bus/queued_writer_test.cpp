@@ -22,10 +22,10 @@ TEST(QueuedWriterTest, WritesInOrderAndFinishesWhatIsQueuedWhenItEnds) {
   std::mutex mutex;
   std::vector<std::uint64_t> indices;
   Reader<RecordBatch> reader(far, kRecordReaderProfile,
-                              [&](const RecordBatch& batch, const PeerId&) {
-                                const std::lock_guard lock(mutex);
-                                if (batch.run_id() == kRun) indices.push_back(batch.batch_index());
-                              });
+                             [&](const RecordBatch& batch, const PeerId&) {
+                               const std::lock_guard lock(mutex);
+                               if (batch.run_id() == kRun) indices.push_back(batch.batch_index());
+                             });
   Writer<RecordBatch> writer(near);
   ASSERT_TRUE(wait_until([&] { return writer.matched().count(far.id()) > 0; }));
   constexpr std::uint64_t kCount = 500;
