@@ -157,9 +157,9 @@ std::string Run::name_awaited_controllers() const {
     if (vehicle->gate.accepted()) continue;
     const auto client = vehicle->gate.awaited_client();
     const std::string& last = vehicle->last_answer().controller_name;
-    awaited[client         ? fmt::format("controller '{}' on {}{}", client->name,
-                                         find_host(roster_, client->peer),
-                                         check_.describe_rejections(client->peer))
+    awaited[client ? fmt::format(
+                         "controller '{}' on {}{}", client->name, find_host(roster_, client->peer),
+                         board_.problem.empty() ? check_.describe_rejections(client->peer) : "")
             : last.empty() ? std::string("controller (none is ready)")
                            : fmt::format("controller '{}' (gone)", last)]
         .push_back(vehicle->id());

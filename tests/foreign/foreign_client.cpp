@@ -126,8 +126,8 @@ class ForeignClient {
   bool is_visible_by_itself() const {
     for (const char* mistake :
          {"volatile_announcement", "best_effort_announcement", "exclusive_command",
-          "state_deadline", "appendable_command", "other_type", "keyed_command", "no_deadline",
-          "contract_1", "contract_1_state", "record_deadline", "unannounced"})
+          "state_deadline", "other_type", "keyed_command", "no_deadline", "contract_1",
+          "contract_1_state", "record_deadline", "unannounced"})
       if (makes(mistake)) return true;
     return false;
   }
@@ -210,9 +210,6 @@ class ForeignClient {
     dds::DataWriterQos qos = make_writer_qos();
     if (!makes("no_deadline")) qos.deadline().period = eprosima::fastrtps::Duration_t(0.1);
     if (makes("exclusive_command")) qos.ownership().kind = dds::EXCLUSIVE_OWNERSHIP_QOS;
-    if (makes("appendable_command"))
-      qos.representation().m_value.push_back(dds::XCDR2_DATA_REPRESENTATION),
-          qos.representation().hasChanged = true;
     // After the encapsulation (4), run_id (8) and step (8).
     const Edit edit = makes("extra_field")     ? Edit{20, 8}
                       : makes("missing_field") ? Edit{12, -8}
