@@ -1,5 +1,4 @@
-/// A server and its clients in one, without plant and control law: sends a recorder a finished
-/// flight as fast as it takes it.
+/// A server without plant and clients: sends a recorder a finished flight as fast as it takes it.
 #pragma once
 
 #include <cstdint>

@@ -5,11 +5,11 @@
 #include <memory>
 #include <vector>
 
-#include "closed_loop/samples.hpp"
+#include "closed_loop/record_entries.hpp"
+#include "common/bus/convert.hpp"
 #include "common/config/scenario.hpp"
 #include "control_client/flight_controller.hpp"
 #include "control_client/messages.hpp"
-#include "sim_server/messages.hpp"
 #include "sim_server/plants/analytic/analytic_plant.hpp"
 #include "sim_server/plants/slung_load/slung_load_plant.hpp"
 
@@ -41,9 +41,8 @@ BENCHMARK(plant_step)->Arg(1)->Arg(2)->Arg(10)->Arg(100);
 void closed_form_step(benchmark::State& run) { step_plants<sim::AnalyticPlant>(run); }
 BENCHMARK(closed_form_step)->Arg(1)->Arg(2)->Arg(10)->Arg(100);
 
-const std::vector<closed_loop::StepSamples>& samples() {
-  static const std::vector<closed_loop::StepSamples> flown =
-      closed_loop::fly_samples(load(), 1000, 1);
+const std::vector<RecordEntry>& entries() {
+  static const std::vector<RecordEntry> flown = closed_loop::fly_entries(load(), 1000);
   return flown;
 }
 
@@ -51,39 +50,55 @@ void control_law(benchmark::State& run) {
   const control::FlightController controller(load());
   std::size_t i = 0;
   for (auto _ : run) {
-    const VehicleState& state = samples()[i++ % samples().size()].state;
-    benchmark::DoNotOptimize(
-        controller.calc_answer(state.step(), control::to_model_state(state),
-                               control::to_memory(state.controller(), controller.memory_size())));
+    const RecordEntry& entry = entries()[i++ % entries().size()];
+    benchmark::DoNotOptimize(controller.calc_answer(
+        entry.step(), bus::to_measurement(entry.truth()), control::to_memory({})));
   }
 }
 BENCHMARK(control_law);
 
-template <class Type, class Message>
-void serialize(benchmark::State& run, Message closed_loop::StepSamples::*member) {
+/// There and back; `make` makes a sample of an entry.
+template <class Type, class Make>
+void serialize(benchmark::State& run, const Make& make) {
+  using Message = typename Type::type;
   Type type;
-  const auto& all = samples();
+  std::vector<Message> samples;
+  for (const RecordEntry& entry : entries()) samples.push_back(make(entry));
   eprosima::fastrtps::rtps::SerializedPayload_t payload(type.m_typeSize);
   Message back;
   std::size_t i = 0;
   for (auto _ : run) {
-    type.serialize(const_cast<Message*>(&(all[i++ % all.size()].*member)), &payload);
+    type.serialize(&samples[i++ % samples.size()], &payload);
     type.deserialize(&payload, &back);
     benchmark::DoNotOptimize(back);
   }
 }
 void serialize_state(benchmark::State& run) {
-  serialize<VehicleStatePubSubType>(run, &closed_loop::StepSamples::state);
+  serialize<StatesPubSubType>(run, [](const RecordEntry& entry) {
+    States sample;
+    VehicleState& state = sample.vehicles().emplace_back();
+    state.measured(entry.truth());
+    state.controller_name(entry.client_name());
+    return sample;
+  });
 }
 void serialize_command(benchmark::State& run) {
-  serialize<ControlCommandPubSubType>(run, &closed_loop::StepSamples::command);
+  serialize<CommandsPubSubType>(run, [](const RecordEntry& entry) {
+    Commands sample;
+    sample.vehicles().push_back(entry.answer());
+    return sample;
+  });
 }
-void serialize_reference(benchmark::State& run) {
-  serialize<ReferencePubSubType>(run, &closed_loop::StepSamples::reference);
+void serialize_batch_of_16_entries(benchmark::State& run) {
+  serialize<RecordBatchPubSubType>(run, [](const RecordEntry& entry) {
+    RecordBatch sample;
+    sample.entries().assign(16, entry);
+    return sample;
+  });
 }
 BENCHMARK(serialize_state);
 BENCHMARK(serialize_command);
-BENCHMARK(serialize_reference);
+BENCHMARK(serialize_batch_of_16_entries);
 
 }  // namespace
 }  // namespace sls::bench

@@ -6,7 +6,6 @@
 #include <condition_variable>
 #include <mutex>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <thread>
 #include <vector>
 
@@ -27,82 +26,33 @@ constexpr auto kResendTime = 100ms;   // best-effort readers may lose a sample
 
 // --- the samples ---------------------------------------------------------------------------------
 
-VehicleState make_state(std::uint32_t vehicle_id) {
-  VehicleState state;
-  state.run_id(1);
-  state.vehicle_id(vehicle_id);
-  state.force_origin(FORCE_ANSWERED);
-  state.controller_name("control_client");
-  return state;
+std::vector<States> make_states(std::uint32_t vehicles) {
+  std::vector<States> samples;
+  for (std::uint32_t id = 0; id < vehicles; ++id) {
+    if (id % SAMPLE_VEHICLES == 0) samples.emplace_back().run_id(1);
+    VehicleState& state = samples.back().vehicles().emplace_back();
+    state.vehicle_id(id);
+    state.force_origin(FORCE_ANSWERED);
+    state.controller_name("control_client");
+  }
+  return samples;
 }
 
-ControlCommand make_command(std::uint32_t vehicle_id) {
-  ControlCommand command;
-  command.run_id(1);
-  command.vehicle_id(vehicle_id);
-  command.client_name("control_client");
-  return command;
+Commands make_answer(const States& states) {
+  Commands answer;
+  answer.run_id(1);
+  answer.client_name("control_client");
+  for (const VehicleState& state : states.vehicles()) {
+    ControlCommand& command = answer.vehicles().emplace_back();
+    command.vehicle_id(state.vehicle_id());
+    command.reference().stage_name("figure_eight");
+  }
+  return answer;
 }
-
-sls::Reference make_reference_of(std::uint32_t vehicle_id) {
-  sls::Reference reference;
-  reference.run_id(1);
-  reference.vehicle_id(vehicle_id);
-  reference.client_name("control_client");
-  reference.stage_name("figure_eight");
-  return reference;
-}
-
-struct Single {
-  using State = VehicleState;
-  using Command = ControlCommand;
-  static std::vector<State> make_states(std::uint32_t) { return {make_state(0)}; }
-  static Command make_answer(const State&) { return make_command(0); }
-  using Reference = sls::Reference;
-  static Reference make_reference(const State&) { return make_reference_of(0); }
-
-  static constexpr const char* kWriterProfile = bus::kStreamWriterProfile;
-  static constexpr const char* kReaderProfile = bus::kLoopReaderProfile;
-};
-
-struct Fleet {
-  using State = FleetState;
-  using Command = FleetCommand;
-  static std::vector<State> make_states(std::uint32_t vehicles) {
-    std::vector<State> samples;
-    for (std::uint32_t id = 0; id < vehicles; ++id) {
-      if (id % FLEET_SAMPLE_VEHICLES == 0) samples.emplace_back().run_id(1);
-      samples.back().vehicles().push_back(make_state(id));
-    }
-    return samples;
-  }
-  static Command make_answer(const State& state) {
-    Command command;
-    command.run_id(1);
-    for (const VehicleState& vehicle : state.vehicles())
-      command.vehicles().push_back(make_command(vehicle.vehicle_id()));
-    return command;
-  }
-  using Reference = FleetReference;
-  static Reference make_reference(const State& state) {
-    Reference reference;
-    reference.run_id(1);
-    for (const VehicleState& vehicle : state.vehicles())
-      reference.vehicles().push_back(make_reference_of(vehicle.vehicle_id()));
-    return reference;
-  }
-
-  static constexpr const char* kWriterProfile = bus::kFleetWriterProfile;
-  static constexpr const char* kReaderProfile = bus::kFleetLoopReaderProfile;
-};
 
 // --- the ways to send them -----------------------------------------------------------------------
 
-template <class Samples, class StateType, class CommandType, class ReferenceType>
-struct Bare : Samples {
-  using typename Samples::Command;
-  using typename Samples::Reference;
-  using typename Samples::State;
+struct Bare {
   struct Node : BareNode {
     Node(const PingPongOptions& options, const char* identity)
         : BareNode(options.qos_file, options.domain, identity) {}
@@ -110,20 +60,19 @@ struct Bare : Samples {
   template <class Message, class Type>
   struct Writer : BareWriter<Message, Type> {
     explicit Writer(Node& node)
-        : BareWriter<Message, Type>(node, bus::Topic<Message>::kName, Samples::kWriterProfile) {}
+        : BareWriter<Message, Type>(node, bus::Topic<Message>::kName, bus::kLoopWriterProfile) {}
   };
   template <class Message, class Type>
   struct Reader : BareReader<Message, Type> {
     template <class Handler>
     Reader(Node& node, Handler handler)
-        : BareReader<Message, Type>(node, bus::Topic<Message>::kName, Samples::kReaderProfile,
+        : BareReader<Message, Type>(node, bus::Topic<Message>::kName, bus::kLoopReaderProfile,
                                     handler) {}
   };
-  using StateWriter = Writer<State, StateType>;
-  using CommandWriter = Writer<Command, CommandType>;
-  using ReferenceWriter = Writer<Reference, ReferenceType>;
-  using StateReader = Reader<State, StateType>;
-  using CommandReader = Reader<Command, CommandType>;
+  using StateWriter = Writer<States, StatesPubSubType>;
+  using CommandWriter = Writer<Commands, CommandsPubSubType>;
+  using StateReader = Reader<States, StatesPubSubType>;
+  using CommandReader = Reader<Commands, CommandsPubSubType>;
 };
 
 template <class Message>
@@ -142,16 +91,15 @@ struct BusReader : bus::Reader<Message> {
   std::size_t count_matched() const { return this->matched().size(); }
 };
 
-struct Bus : Single {
+struct Bus {
   struct Node : bus::Node {
     Node(const PingPongOptions& options, const char* identity)
         : bus::Node(options.qos_file, options.domain, "bench", identity) {}
   };
-  using StateWriter = BusWriter<VehicleState>;
-  using CommandWriter = BusWriter<ControlCommand>;
-  using ReferenceWriter = BusWriter<sls::Reference>;
-  using StateReader = BusReader<VehicleState>;
-  using CommandReader = BusReader<ControlCommand>;
+  using StateWriter = BusWriter<States>;
+  using CommandWriter = BusWriter<Commands>;
+  using StateReader = BusReader<States>;
+  using CommandReader = BusReader<Commands>;
 };
 
 // --- the two ends --------------------------------------------------------------------------------
@@ -161,17 +109,16 @@ class Ping {
  public:
   explicit Ping(const PingPongOptions& options)
       : options_(options),
-        states_(Ends::make_states(options.vehicles)),
+        states_(make_states(options.vehicles)),
         node_(options, "server"),
         writer_(node_),
-        reader_(node_, [this](const typename Ends::Command& command) { receive(command); }) {
+        reader_(node_, [this](const Commands& command) { receive(command); }) {
     latencies_.reserve(options.round_trips);
   }
 
   nlohmann::json run() {
     app::Wait wait(kPatience_s);
-    const std::size_t readers = options_.is_overheard ? 2 : 1;
-    while (writer_.count_matched() < readers || reader_.count_matched() == 0) {
+    while (writer_.count_matched() == 0 || reader_.count_matched() == 0) {
       check(wait);
       std::this_thread::sleep_for(1ms);
     }
@@ -202,14 +149,14 @@ class Ping {
   void send() {
     answers_ = 0;
     sent_ = Clock::now();
-    for (auto& state : states_) {
+    for (States& state : states_) {
       state.step(step_);
       writer_.write(state);
     }
   }
 
   /// On the middleware's thread.
-  void receive(const typename Ends::Command& command) {
+  void receive(const Commands& command) {
     const std::lock_guard lock(mutex_);
     if (command.step() != step_ || is_done() || ++answers_ < states_.size()) return;
     if (step_ >= options_.warm_up) latencies_.add(Clock::now() - sent_);
@@ -221,7 +168,7 @@ class Ping {
   }
 
   const PingPongOptions options_;
-  std::vector<typename Ends::State> states_;
+  std::vector<States> states_;
   std::mutex mutex_;  // over what follows
   std::uint64_t step_ = 0;
   std::size_t answers_ = 0;  // to this step
@@ -238,69 +185,28 @@ template <class Ends>
 void answer_with(const PingPongOptions& options) {
   typename Ends::Node node(options, "controller");
   typename Ends::CommandWriter writer(node);
-  const auto states = Ends::make_states(options.vehicles);
-  std::vector<typename Ends::Command> commands;  // one for each size of sample
-  std::vector<typename Ends::Reference> references;
-  for (const auto& state : states) {
-    commands.push_back(Ends::make_answer(state));
-    references.push_back(Ends::make_reference(state));
-  }
-  std::optional<typename Ends::ReferenceWriter> reference_writer;
-  if (options.has_reference) reference_writer.emplace(node);
-  const std::size_t overhearing = options.is_overheard ? 1 : 0;
-  bool is_heard =
-      false;  // by all who shall: until then nothing is answered, and the state comes again
+  std::vector<Commands> answers;  // one for each size of sample
+  for (const States& state : make_states(options.vehicles)) answers.push_back(make_answer(state));
+  bool is_heard = false;  // until then nothing is answered, and the state comes again
   std::size_t next = 0;
-  typename Ends::StateReader reader(node, [&](const typename Ends::State& state) {
-    is_heard =
-        is_heard || (writer.count_matched() >= 1 + overhearing &&
-                     (!reference_writer || reference_writer->count_matched() >= overhearing));
+  typename Ends::StateReader reader(node, [&](const States& state) {
+    is_heard = is_heard || writer.count_matched() > 0;
     if (!is_heard) return;
-    if (reference_writer) {
-      references[next].step(state.step());
-      reference_writer->write(references[next]);
-    }
-    commands[next].step(state.step());
-    writer.write(commands[next]);
-    next = (next + 1) % commands.size();
+    answers[next].step(state.step());
+    writer.write(answers[next]);
+    next = (next + 1) % answers.size();
   });
-  while (app::stop_signal() == 0) std::this_thread::sleep_for(20ms);
-}
-
-using BareSingle =
-    Bare<Single, VehicleStatePubSubType, ControlCommandPubSubType, ReferencePubSubType>;
-using BareFleet =
-    Bare<Fleet, FleetStatePubSubType, FleetCommandPubSubType, FleetReferencePubSubType>;
-
-/// Takes what a recorder takes, and forgets it.
-template <class State, class Command, class Reference>
-void overhear_with(const PingPongOptions& options, const char* profile) {
-  bus::Node node(options.qos_file, options.domain, "bench", "recorder");
-  const auto forget = [](const auto&, const bus::PeerId&) {};
-  const bus::Reader<State> states(node, profile, forget);
-  const bus::Reader<Command> commands(node, profile, forget);
-  const bus::Reader<Reference> references(node, profile, forget);
   while (app::stop_signal() == 0) std::this_thread::sleep_for(20ms);
 }
 
 }  // namespace
 
 nlohmann::json ping(const PingPongOptions& options) {
-  if (options.vehicles > 1) return Ping<BareFleet>(options).run();
-  return options.uses_bus ? Ping<Bus>(options).run() : Ping<BareSingle>(options).run();
-}
-
-void overhear(const PingPongOptions& options) {
-  if (options.vehicles > 1)
-    overhear_with<FleetState, FleetCommand, FleetReference>(options,
-                                                            bus::kFleetRecorderReaderProfile);
-  else
-    overhear_with<VehicleState, ControlCommand, Reference>(options, bus::kRecorderReaderProfile);
+  return options.uses_bus ? Ping<Bus>(options).run() : Ping<Bare>(options).run();
 }
 
 void answer(const PingPongOptions& options) {
-  if (options.vehicles > 1) return answer_with<BareFleet>(options);
-  options.uses_bus ? answer_with<Bus>(options) : answer_with<BareSingle>(options);
+  options.uses_bus ? answer_with<Bus>(options) : answer_with<Bare>(options);
 }
 
 }  // namespace sls::bench

@@ -11,12 +11,10 @@ namespace sls::bench {
 struct PingPongOptions {
   std::filesystem::path qos_file;
   int domain = 0;
-  std::uint32_t vehicles = 1;  ///< of more than one: the fleet's samples, 64 vehicles in each
+  std::uint32_t vehicles = 1;         ///< up to 64 in each sample
   std::uint64_t round_trips = 20000;  ///< measured
   std::uint64_t warm_up = 2000;       ///< before, not measured
-  bool uses_bus = false;       ///< through common/bus instead of on bare Fast DDS; one vehicle
-  bool has_reference = false;  ///< the answer to a state is a reference and a command
-  bool is_overheard = false;   ///< a third process, `overhear`, takes all samples: waits for it
+  bool uses_bus = false;              ///< through common/bus instead of on bare Fast DDS
 };
 
 /// States out, commands back, each state sent when the answer to the one before has come. Both ends
@@ -24,9 +22,6 @@ struct PingPongOptions {
 /// Returns the round trips as Latencies does, and `lost`, the states that had to be sent again.
 /// @throws app::RunError if nobody answers.
 nlohmann::json ping(const PingPongOptions& options);
-
-/// Takes all samples until a stop signal.
-void overhear(const PingPongOptions& options);
 
 /// Answers states until a stop signal.
 void answer(const PingPongOptions& options);

@@ -37,8 +37,6 @@ class AnsweringProcess {
                                       "--domain",        std::to_string(options.domain),
                                       "--vehicles",      std::to_string(options.vehicles)};
     if (options.uses_bus) words.push_back("--bus");
-    if (options.has_reference) words.push_back("--reference");
-    if (options.is_overheard) words.push_back("--overheard");
     std::vector<char*> command;
     for (std::string& word : words) command.push_back(word.data());
     command.push_back(nullptr);
@@ -105,14 +103,9 @@ int main(int argc, char** argv) {
 
   CLI::App* ping = add("ping", "round trips of the loop's samples with a process that answers");
   CLI::App* pong = add("pong", "that process");
-  CLI::App* overhear =
-      add("overhear", "a third process that takes all of those samples, as a recorder does");
-  for (CLI::App* command : {ping, pong, overhear}) add_vehicles(command);
   for (CLI::App* command : {ping, pong}) {
+    add_vehicles(command);
     command->add_flag("--bus", ping_pong.uses_bus, "through common/bus, not on bare Fast DDS");
-    command->add_flag("--reference", ping_pong.has_reference, "answers have a reference, too");
-    command->add_flag("--overheard", ping_pong.is_overheard,
-                      "once a third process takes all samples, too");
   }
   ping->add_option("--round-trips", ping_pong.round_trips, "measured")
       ->check(CLI::Range(1, 100'000'000));
@@ -121,8 +114,8 @@ int main(int argc, char** argv) {
   CLI::App* timer = add("timer", "how late this machine wakes a thread that sleeps until a time");
   timer->add_option("--period-s", period_s, "between two times")->required();
   timer->add_option("--seconds", seconds, "how long");
-  CLI::App* stamp = add("stamps", "when the samples of a run were written");
-  stamp->add_flag("--live", stamps.is_live, "from now on, instead of what writers have kept");
+  CLI::App* stamp = add("stamps", "when the states of a run were written");
+  stamp->add_flag("--live", stamps.is_live, "from now on, instead of what the writer has kept");
   CLI::App* record = add("record", "Recording, fed in this process");
   add_scenario(record);
   add_vehicles(record);
@@ -146,8 +139,6 @@ int main(int argc, char** argv) {
     if (*ping) {
       const AnsweringProcess answering(ping_pong);
       print(bench::ping(ping_pong));
-    } else if (*overhear) {
-      bench::overhear(ping_pong);
     } else if (*pong) {
       bench::answer(ping_pong);
     } else if (*fly) {

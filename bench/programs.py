@@ -87,8 +87,8 @@ class Programs:
         path.write_text(text)
         return path
 
-    def qos(self, name: str) -> Path:
-        return ROOT / "config/qos" / f"{name}.xml"
+    def qos(self, name: str | Path) -> Path:
+        return name if isinstance(name, Path) else ROOT / "config/qos" / f"{name}.xml"
 
     # --- one program ------------------------------------------------------------------------------
 
@@ -118,7 +118,7 @@ class Programs:
 
     # --- the three programs -----------------------------------------------------------------------
 
-    def fly(self, scenario: Path, *, qos: str = "default", is_recorded: bool = True,
+    def fly(self, scenario: Path, *, qos: str | Path = "default", is_recorded: bool = True,
             server: tuple[str, ...] = (), during: Callable[[], None] | None = None,
             placement: Placement = Placement()) -> Flight:
         """Flies `scenario`; `during` is called while it flies."""

@@ -9,15 +9,15 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string_view>
+#include <utility>
 #include <vector>
 
-#include "closed_loop/samples.hpp"
+#include "closed_loop/record_entries.hpp"
 #include "common/app/run_main.hpp"
-#include "common/bus/convert.hpp"
 #include "common/config/sha256.hpp"
-#include "common/model/forces.hpp"
 #include "recorder/columns.hpp"
 #include "recorder/recording.hpp"
+#include "recorder/rows.hpp"
 
 namespace sls::bench {
 namespace {
@@ -52,23 +52,6 @@ class ScratchFolder {
   const fs::path path_;
 };
 
-/// A row of flight.csv as the numbers that it holds.
-using FlightRow = std::array<double, 23>;
-
-FlightRow make_flight_row(const record::StepRows& rows) {
-  const Eigen::Vector3d f_Q_W = bus::to_vector(rows.command->f_Q_W);
-  const auto attitude = model::calc_commanded_attitude(f_Q_W);
-  const auto& state = *rows.state;
-  const Eigen::Vector3d n_W =
-      (bus::to_vector(state.p_WL) - bus::to_vector(state.p_WQ)).normalized();
-  const auto& ref = rows.reference->position();
-  return {state.sim_time_s, ref[0],        ref[1],        ref[2],          state.p_WQ[0],
-          state.p_WQ[1],    state.p_WQ[2], attitude.roll, attitude.pitch,  attitude.yaw,
-          state.v_WQ[0],    state.v_WQ[1], state.v_WQ[2], n_W.x(),         n_W.y(),
-          n_W.z(),          state.alpha,   state.beta,    state.alpha_dot, state.beta_dot,
-          f_Q_W.x(),        f_Q_W.y(),     f_Q_W.z()};
-}
-
 /// A CSV file with what the C library has for buffering.
 class PlainFile {
  public:
@@ -79,18 +62,19 @@ class PlainFile {
     std::fwrite(header.data(), 1, header.size(), file_.get());
     std::fputc('\n', file_.get());
   }
+  /// Visits the fields of a row.
+  template <class Field>
+  void operator()(const record::Column&, const Field& field) {
+    record::for_each_component(field, [this](const auto& component) { add(component); });
+  }
   template <class Number>
-  void operator()(const Number& number) {
+  void add(const Number& number) {
     end_ = std::to_chars(end_, row_.data() + row_.size(), number).ptr;
     *end_++ = ',';
   }
-  void operator()(const std::string& text) {
+  void add(const std::string& text) {
     end_ = std::copy(text.begin(), text.end(), end_);
     *end_++ = ',';
-  }
-  template <class Field>
-  void incidental(const Field& field) {
-    (*this)(field);
   }
   void end_row() {
     end_[-1] = '\n';
@@ -105,85 +89,81 @@ class PlainFile {
   char* end_ = row_.data();
 };
 
-template <class Row>
-void write_plain(PlainFile& file, const Row& row) {
-  Row::visit(row, file);
-  file.end_row();
-}
-
 double write_plain_files(std::vector<record::StepRows> steps, std::uint32_t vehicles,
                          const fs::path& folder) {
-  std::vector<FlightRow> flight_rows;
-  for (const auto& rows : steps) flight_rows.push_back(make_flight_row(rows));
+  std::vector<record::FlightRow> flight_rows;
+  for (const auto& rows : steps) flight_rows.push_back(record::make_flight_row(rows));
   const auto began = Clock::now();
-  PlainFile states(folder / kFiles[0], record::StateRow::kHeader);
-  PlainFile commands(folder / kFiles[1], record::CommandRow::kHeader);
-  PlainFile references(folder / kFiles[2], record::ReferenceRow::kHeader);
+  PlainFile states(folder / kFiles[0], record::make_header<record::StateRow>());
+  PlainFile commands(folder / kFiles[1], record::make_header<record::CommandRow>());
+  PlainFile references(folder / kFiles[2], record::make_header<record::ReferenceRow>());
   PlainFile flight(folder / kFiles[3], record::make_flight_header(vehicles > 1));
+  const auto write = [](PlainFile& file, const auto& row) {
+    row.visit(row, file);
+    file.end_row();
+  };
   for (std::size_t i = 0; i < steps.size(); ++i) {
     record::StepRows& rows = steps[i];
     for (std::uint32_t id = 0; id < vehicles; ++id) {
       rows.state->vehicle_id = rows.command->vehicle_id = rows.reference->vehicle_id = id;
-      write_plain(states, *rows.state);
-      write_plain(references, *rows.reference);
-      for (const double number : flight_rows[i]) flight(number);
-      if (vehicles > 1) flight(id);
+      write(states, *rows.state);
+      write(references, *rows.reference);
+      flight_rows[i].visit(flight_rows[i], flight);
+      if (vehicles > 1) flight.add(id);
       flight.end_row();
-      write_plain(commands, *rows.command);
+      write(commands, *rows.command);
     }
   }
   for (PlainFile* file : {&states, &commands, &references, &flight}) file->close();
   return calc_seconds(began);
 }
 
-/// What a lockstep run brings, in its order.
-void feed(record::Recording& recording, std::vector<closed_loop::StepSamples>& samples,
-          std::uint32_t vehicles) {
-  for (closed_loop::StepSamples& step : samples) {
+/// What a server writes.
+std::vector<RecordBatch> make_batches(const std::vector<RecordEntry>& entries,
+                                      std::uint32_t vehicles) {
+  constexpr std::size_t kEntries = 20;  // 12 KB
+  std::vector<RecordBatch> batches(1);
+  for (const RecordEntry& entry : entries)
     for (std::uint32_t id = 0; id < vehicles; ++id) {
-      step.state.vehicle_id(id);
-      recording.add(step.state);
+      if (batches.back().entries().size() == kEntries) batches.emplace_back();
+      batches.back().entries().push_back(entry);
+      batches.back().entries().back().vehicle_id(id);
     }
-    for (std::uint32_t id = 0; id < vehicles; ++id) {
-      step.reference.vehicle_id(id);
-      step.command.vehicle_id(id);
-      recording.add(step.reference);
-      recording.add(step.command);
-    }
-    recording.flush_if_due();
+  for (std::size_t i = 0; i < batches.size(); ++i) {
+    batches[i].run_id(kRunId);
+    batches[i].batch_index(i);
   }
+  batches.back().is_last(true);
+  return batches;
 }
 
 }  // namespace
 
 nlohmann::json measure_recording(const config::Scenario& scenario, std::uint32_t vehicles,
                                  std::size_t steps, const fs::path& folder) {
-  std::vector<closed_loop::StepSamples> samples = closed_loop::fly_samples(scenario, steps, kRunId);
-  samples.back().command.mission(MISSION_FINISHED);
+  std::vector<RecordEntry> entries = closed_loop::fly_entries(scenario, steps);
+  entries.back().answer().mission(MISSION_FINISHED);
+  const Parameters parameters = closed_loop::make_parameters(scenario, kRunId, vehicles);
   const ScratchFolder ours(folder), plain(folder);
   nlohmann::json json;
-  json["rows"] = kFiles.size() * samples.size() * vehicles;
+  json["rows"] = kFiles.size() * entries.size() * vehicles;
   {
-    record::Recording recording(ours.path(),
-                                closed_loop::make_parameters(scenario, kRunId, vehicles));
+    const auto batches = make_batches(entries, vehicles);
+    record::Recording recording(ours.path(), parameters);
     recording.add(closed_loop::make_status(kRunId, 0, PHASE_RUNNING, 0));
     auto began = Clock::now();
-    feed(recording, samples, vehicles);
-    recording.add(closed_loop::make_status(kRunId, 1, PHASE_FINISHED, samples.size() - 1));
+    for (const RecordBatch& batch : batches) {
+      recording.add(batch);
+      recording.flush_if_due();
+    }
+    recording.add(closed_loop::make_status(kRunId, 1, PHASE_FINISHED, entries.size() - 1));
     json["recording_s"] = calc_seconds(began);
     began = Clock::now();
     if (!recording.finish("", 0)) throw app::RunError("recording: " + recording.describe_gaps());
     json["finish_s"] = calc_seconds(began);
   }
   std::vector<record::StepRows> rows;
-  for (const closed_loop::StepSamples& step : samples) {
-    record::StepRecord record;
-    record.step = step.state.step();
-    record.state = step.state;
-    record.command = step.command;
-    record.reference = step.reference;
-    rows.push_back(record::make_rows(0, record));
-  }
+  for (const RecordEntry& entry : entries) rows.push_back(record::make_rows(entry, parameters));
   json["plain_s"] = write_plain_files(std::move(rows), vehicles, plain.path());
   std::uintmax_t bytes = 0;
   for (const char* file : kFiles) {

@@ -23,7 +23,6 @@ constexpr auto kSilenceOfHistory = 300ms;  // after which all of it has come
 constexpr auto kSilenceOfRun = 2s;
 
 struct Stamp {
-  const char* topic;
   std::uint64_t step;
   std::int64_t written_ns;
 };
@@ -31,9 +30,12 @@ struct Stamp {
 class Listener {
  public:
   Listener(bus::Node& node, const char* profile)
-      : states_(node, profile, make_handler<VehicleState>("state", states_)),
-        references_(node, profile, make_handler<Reference>("reference", references_)),
-        commands_(node, profile, make_handler<ControlCommand>("command", commands_)) {}
+      : states_(node, profile, [this](const States& sample, const bus::PeerId&) {
+          const std::chrono::nanoseconds written = states_.written().time_since_epoch();
+          const std::lock_guard lock(mutex_);
+          stamps_.push_back({sample.step(), written.count()});
+          last_ = Clock::now();
+        }) {}
 
   /// Nothing has come for `silence`, but something before.
   bool is_over(Clock::duration silence) const {
@@ -47,24 +49,10 @@ class Listener {
   const std::vector<Stamp>& stamps() const { return stamps_; }  // when it is over
 
  private:
-  template <class Message>
-  typename bus::Reader<Message>::Handler make_handler(const char* topic,
-                                                      const bus::Reader<Message>& reader) {
-    return [this, topic, &reader](const Message& message, const bus::PeerId&) {
-      if (message.vehicle_id() != 0) return;
-      const std::chrono::nanoseconds written = reader.written().time_since_epoch();
-      const std::lock_guard lock(mutex_);
-      stamps_.push_back({topic, message.step(), written.count()});
-      last_ = Clock::now();
-    };
-  }
-
   mutable std::mutex mutex_;
   std::vector<Stamp> stamps_;
   Clock::time_point last_;
-  bus::Reader<VehicleState> states_;
-  bus::Reader<Reference> references_;
-  bus::Reader<ControlCommand> commands_;
+  bus::Reader<States> states_;
 };
 
 }  // namespace
@@ -73,8 +61,7 @@ void print_stamps(const StampsOptions& options) {
   bus::Node node(options.qos_file, options.domain, "bench", "recorder");
   std::vector<Stamp> stamps;
   {
-    Listener listener(node,
-                      options.is_live ? bus::kLoopReaderProfile : bus::kRecorderReaderProfile);
+    Listener listener(node, options.is_live ? bus::kLoopReaderProfile : bus::kRecordReaderProfile);
     const auto silence = options.is_live ? Clock::duration(kSilenceOfRun) : kSilenceOfHistory;
     const app::Wait wait(kPatience_s);
     while (!listener.is_over(silence) && app::stop_signal() == 0) {
@@ -84,7 +71,7 @@ void print_stamps(const StampsOptions& options) {
     stamps = listener.stamps();
   }
   for (const Stamp& stamp : stamps)
-    std::printf("%s,%llu,%lld\n", stamp.topic, static_cast<unsigned long long>(stamp.step),
+    std::printf("%llu,%lld\n", static_cast<unsigned long long>(stamp.step),
                 static_cast<long long>(stamp.written_ns));
   if (std::fflush(stdout) != 0) throw app::RunError("stamps: stdout cannot be written");
 }

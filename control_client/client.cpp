@@ -63,6 +63,7 @@ std::optional<bus::Run> Client::find_first_run() {
   const double timeout_s = scenario_.sync.wait_for.timeout_s;
   const std::string vehicles = config::to_vehicle_ranges(vehicle_ids_);
   app::Wait wait(timeout_s, kUsualJoinTime);
+  announce_waiting();
   while (app::stop_signal() == 0) {
     if (auto run = find_joinable_run()) return run;
     if (wait.is_over())
@@ -203,21 +204,32 @@ std::optional<bus::Run> Client::find_successor() {
   return std::nullopt;
 }
 
+void Client::announce_waiting() {
+  Participant message = make_announcement(vehicle_ids_);
+  message.last_complete_step(-1);
+  participant_writer_.write(message);
+}
+
 void Client::announce(bool ready, bool done) {
-  Participant message;
+  Participant message = make_announcement(flown_ids_);
   message.run_id(run_->parameters.run_id());
+  message.ready(ready);
+  message.done(done);
+  message.last_complete_step(find_last_step());
+  participant_writer_.write(message);
+}
+
+Participant Client::make_announcement(const std::vector<std::uint32_t>& vehicle_ids) const {
+  Participant message;
   message.contract_sha256(bus::kContractSha256);
-  message.vehicle_ids(flown_ids_);
+  message.vehicle_ids(vehicle_ids);
   message.role(ROLE_CONTROLLER);
   message.name(name_);
   message.host(bus::host_name());
   message.strength(strength_);
   message.scenario_sha256(scenario_.sha256);
   message.library_sha256(library_sha256_);
-  message.ready(ready);
-  message.done(done);
-  message.last_complete_step(find_last_step());
-  participant_writer_.write(message);
+  return message;
 }
 
 /// The last step that all of our vehicles' states were answered of; −1: none.

@@ -46,9 +46,9 @@ class Inbox {
 
   const std::function<bool(std::uint64_t)> may_be_opened_;
   mutable std::mutex mutex_;
-  std::deque<Sample> samples_;  // of the open run
-  std::size_t size_ = 0;        // of those, counting entries
-  std::size_t refused_ = 0;     // likewise, of the open run
+  std::deque<Sample> samples_;    // of the open run
+  std::size_t size_ = 0;          // of those, counting entries
+  std::size_t refused_ = 0;       // likewise, of the open run
   std::deque<Received> waiting_;  // of runs that may be opened
   std::size_t waiting_size_ = 0;
   std::set<std::uint64_t> closed_;  // have been open

@@ -167,8 +167,7 @@ void write_manifest(const std::filesystem::path& folder, const Manifest& manifes
       {"unanswered_steps", manifest.unanswered_steps},
       {"refused_samples", manifest.refused_samples},
       {"dropped",
-       {{"repeated", manifest.dropped.repeated},
-        {"out_of_range", manifest.dropped.out_of_range}}}};
+       {{"repeated", manifest.dropped.repeated}, {"out_of_range", manifest.dropped.out_of_range}}}};
   Json libraries;
   if (parameters.library_sha256().size() > 0)
     libraries["plant"] = parameters.library_sha256().to_string();

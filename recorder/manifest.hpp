@@ -56,7 +56,7 @@ struct Manifest {
   std::uint64_t refused_samples = 0;   ///< lost because the recorder's queue was full
   DroppedEntries dropped;
   std::map<std::string, std::string> libraries;  ///< SHA-256 of controllers' libraries, by name
-  bool complete = false;  ///< the mission finished and nothing is missing
+  bool complete = false;                         ///< the mission finished and nothing is missing
 };
 
 /// Writes `folder`/manifest.json, replacing an earlier one at once: a reader sees the old or the

@@ -124,10 +124,13 @@ void Recording::account(const StepRows& rows) {
   const std::uint32_t id = rows.vehicle_id;
   // Of a run that failed the last step may have no answer; no other one may.
   if (!bare_steps_.empty())
-    if (const auto bare = bare_steps_.extract(id)) note_missing_answers(id, bare.mapped(), bare.mapped());
+    if (const auto bare = bare_steps_.extract(id))
+      note_missing_answers(id, bare.mapped(), bare.mapped());
   if (!rows.state) note_missing(id, StateRow::kTopic, rows.step, rows.step);
-  if (!rows.command && !rows.reference) bare_steps_[id] = rows.step;
-  else if (!rows.command) note_missing(id, CommandRow::kTopic, rows.step, rows.step);
+  if (!rows.command && !rows.reference)
+    bare_steps_[id] = rows.step;
+  else if (!rows.command)
+    note_missing(id, CommandRow::kTopic, rows.step, rows.step);
   else if (!rows.reference && !rows.command->is_unanswered())
     note_missing(id, ReferenceRow::kTopic, rows.step, rows.step);
 }

@@ -22,8 +22,9 @@ using config::ConfigError;
 
 // The last is what `./sls report` puts beside them.
 constexpr std::array<std::string_view, 11> kRecordingFiles = {
-    "state.csv", "measured.csv",  "command.csv",   "reference.csv", "status.csv",         "flight.csv",
-    "flight.txt", "scenario.yaml", "manifest.json", "manifest.json.part", "report.html"};
+    "state.csv",     "measured.csv",       "command.csv", "reference.csv",
+    "status.csv",    "flight.csv",         "flight.txt",  "scenario.yaml",
+    "manifest.json", "manifest.json.part", "report.html"};
 // What `./sls plot` puts into the subfolder kFigureFolder, as .png and .pdf.
 constexpr std::array<std::string_view, 7> kFigures = {"fleet",  "positions", "errors",  "path",
                                                       "angles", "forces",    "attitude"};
@@ -100,7 +101,7 @@ void remove_recording(const std::string& place, const fs::path& folder) {
 bool is_without_rows(const fs::path& folder) {
   std::ifstream file(folder / StateRow::kFile);
   std::string header;
-  return file && (!std::getline(file, header) || file.peek() == file.eof());
+  return file && (!std::getline(file, header) || file.peek() == std::ifstream::traits_type::eof());
 }
 
 }  // namespace

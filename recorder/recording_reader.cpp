@@ -38,8 +38,8 @@ struct FieldParser {
 };
 
 template <class Row>
-constexpr auto kFurther = std::is_same_v<Row, StateRow> ? CsvReader::Further::kAllowed
-                                                        : CsvReader::Further::kNone;
+constexpr auto kFurther =
+    std::is_same_v<Row, StateRow> ? CsvReader::Further::kAllowed : CsvReader::Further::kNone;
 
 template <class Row>
 Row parse_row(const CsvReader& file) {

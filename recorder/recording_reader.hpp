@@ -11,9 +11,9 @@
 #include <optional>
 #include <vector>
 
-#include "recorder/sinks/csv/csv_reader.hpp"
 #include "recorder/manifest.hpp"
 #include "recorder/rows.hpp"
+#include "recorder/sinks/csv/csv_reader.hpp"
 
 namespace sls::record {
 

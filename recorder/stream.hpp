@@ -29,7 +29,8 @@ class Stream {
   using Duration = std::chrono::steady_clock::duration;
   using Sink = std::function<void(const StepRows&)>;
   /// Called where a vehicle's steps [from, to] are not in the stream.
-  using GapSink = std::function<void(std::uint32_t vehicle_id, std::uint64_t from, std::uint64_t to)>;
+  using GapSink =
+      std::function<void(std::uint32_t vehicle_id, std::uint64_t from, std::uint64_t to)>;
 
   /// Steps before `first_step` are left out. `parameters` must outlive it.
   Stream(const Parameters& parameters, std::uint64_t first_step, Sink sink, GapSink gap_sink);
@@ -71,9 +72,9 @@ class Stream {
   const std::uint64_t max_step_;  // of which the time can be told
   const Sink sink_;
   const GapSink gap_sink_;
-  std::optional<std::uint64_t> next_batch_;        // nothing before the first one
-  std::map<std::uint64_t, RecordBatch> waiting_;   // later ones
-  Duration stuck_{};                               // since one was handled, while others wait
+  std::optional<std::uint64_t> next_batch_;       // nothing before the first one
+  std::map<std::uint64_t, RecordBatch> waiting_;  // later ones
+  Duration stuck_{};                              // since one was handled, while others wait
   bool has_ended_ = false;
   std::map<std::uint32_t, std::uint64_t> next_steps_;
   std::uint64_t newest_step_ = 0;

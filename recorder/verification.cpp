@@ -105,7 +105,8 @@ FieldLister list_fields(const Row& row) {
 
 template <class Row>
 std::vector<std::string> read_columns(const RecordedFlight& flight) {
-  return CsvReader(flight.folder / Row::kFile, "vehicle_id", CsvReader::Further::kAllowed).columns();
+  return CsvReader(flight.folder / Row::kFile, "vehicle_id", CsvReader::Further::kAllowed)
+      .columns();
 }
 
 template <class Row>
@@ -120,11 +121,9 @@ std::optional<std::string> compare_rows(const std::optional<Row>& a, const std::
   const std::vector<std::string> columns = read_columns<Row>(flight);
   for (std::size_t i = 0; i < std::min({of_a.texts.size(), of_b.texts.size(), columns.size()}); ++i)
     if (of_a.texts[i] != of_b.texts[i])
-      return fmt::format("{}, {}: {} in A, {} in B{}", place, columns[i], of_a.texts[i],
-                         of_b.texts[i],
-                         of_a.are_nan[i] && of_b.are_nan[i]
-                             ? " (neither is a number; their signs differ)"
-                             : "");
+      return fmt::format(
+          "{}, {}: {} in A, {} in B{}", place, columns[i], of_a.texts[i], of_b.texts[i],
+          of_a.are_nan[i] && of_b.are_nan[i] ? " (neither is a number; their signs differ)" : "");
   return fmt::format("{}: {} fields in A, {} in B", place, of_a.texts.size(), of_b.texts.size());
 }
 

@@ -63,6 +63,8 @@ const char* to_string(Verdict verdict) {
       return "a step whose state was not published yet";
     case Verdict::kWrongStep:
       return "a step that is not awaited";
+    case Verdict::kContradiction:
+      return "another answer to the same step";
     case Verdict::kUnknownVehicle:
       return "a vehicle_id of no vehicle here";
     case Verdict::kUnknownClient:
@@ -136,7 +138,7 @@ Verdict CommandGate::judge(const OfferedAnswer& answer, const bus::PeerId& sende
   const auto& first = accepted_ && accepted_from_ == sender ? accepted_ : client->held;
   if (first)
     return first->command.f_Q_W_n() == answer.command.f_Q_W_n() ? Verdict::kDuplicate
-                                                                : Verdict::kWrongStep;
+                                                                : Verdict::kContradiction;
   client->silent = false;
   client->misses = 0;
   if (!is_refused(*client)) client->refusal.clear();  // of an earlier step
@@ -166,7 +168,7 @@ Verdict CommandGate::judge_past(const OfferedAnswer& answer, const bus::PeerId& 
   const auto& force = answer.command.f_Q_W_n();
   std::optional<Past>& first = past->second;
   if (first && first->sender == sender)
-    return first->force == force ? Verdict::kDuplicate : Verdict::kWrongStep;
+    return first->force == force ? Verdict::kDuplicate : Verdict::kContradiction;
   Client* client = find_client(sender);
   if (!client) return Verdict::kWrongStep;
   if (first) return Verdict::kSuperseded;
@@ -264,6 +266,7 @@ void CommandGate::count(Verdict verdict) {
       return;
     case Verdict::kEarly:
     case Verdict::kWrongStep:
+    case Verdict::kContradiction:
       ++counters_.rejected_step();
       return;
     case Verdict::kUnknownVehicle:

@@ -26,6 +26,7 @@ enum class Verdict {
   kOtherRun,
   kEarly,  ///< it answers a state that had not been published
   kWrongStep,
+  kContradiction,  ///< another answer of the same client to the same step
   kUnknownVehicle,
   kUnknownClient,
   kFault,

@@ -9,6 +9,7 @@
 #include <functional>
 #include <mutex>
 #include <optional>
+#include <set>
 
 #include "common/app/mailbox.hpp"
 #include "common/bus/node.hpp"
@@ -35,6 +36,9 @@ class CommandStream {
 
   /// Puts `handler` in place of the one there was, which is not called any more on return.
   void set_handler(Handler handler);
+
+  /// Participants with a writer that this hears.
+  std::set<bus::PeerId> matched() const { return reader_.matched(); }
 
   std::uint64_t missed_deadlines() const { return reader_.missed_deadlines(); }
   std::optional<std::chrono::nanoseconds> lifespan() const { return reader_.lifespan(); }
@@ -73,7 +77,7 @@ struct Endpoints {
             node, bus::kLatchedReaderProfile,
             [this](const SimControl& request, const bus::PeerId&) { requests.put(request); }) {}
 
-  const bus::Node& domain;
+  bus::Node& domain;
   bus::ParticipantDirectory participants;
   bus::ServerDirectory servers;
   StateStream states;

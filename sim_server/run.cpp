@@ -18,11 +18,13 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto kUsualStartTime = 300ms;  // for discovery, after the claim: no news
-constexpr auto kRosterTime = 100ms;      // until a silent departure is looked for
-constexpr auto kPollTime = 20ms;         // while nothing is in a hurry
-constexpr auto kRecorderSilence = 1s;    // of one that should be announcing progress
-constexpr auto kReportInterval = 5s;     // of the same silence
+constexpr auto kUsualStartTime = 300ms;   // for discovery, after the claim: no news
+constexpr auto kRosterTime = 100ms;       // until a silent departure is looked for
+constexpr auto kPollTime = 20ms;          // while nothing is in a hurry
+constexpr auto kRecorderSilence = 1s;     // of one that should be announcing progress
+constexpr auto kReportInterval = 5s;      // of the same silence
+constexpr auto kProblemInterval = 100ms;  // of statuses that tell of nothing else
+constexpr auto kLongStart = 5s;           // from then on it may be the network
 
 }  // namespace
 
@@ -35,6 +37,7 @@ Run::Run(Endpoints& endpoints, const Assignment& assignment, WorkerPool& workers
       board_([&endpoints](const SimStatus& status) { endpoints.status_writer.write(status); },
              run_id, vehicle_ids_.front(), scenario_.sync, [this] { return sum_counters(); }),
       control_(run_id, vehicle_ids_, begins_paused),
+      check_(run_id, scenario_, vehicle_ids_),
       record_(endpoints.record_writer, endpoints.max_batch_bytes, run_id),
       workers_(workers),
       plants_(make_plants(find_plant_type(scenario_.plant.model), scenario_, vehicle_ids_)),
@@ -122,6 +125,7 @@ void Run::check_stop() {
 bool Run::wait_for_participants() {
   const auto& expected = scenario_.sync.wait_for;
   app::Wait wait(expected.timeout_s, kUsualStartTime);
+  const auto began = Clock::now();
   std::string published;
   board_.publish(PHASE_WAITING, "participants are not ready");
   while (true) {
@@ -130,12 +134,14 @@ bool Run::wait_for_participants() {
     refresh_roster();
     const std::string missing = name_missing(roster_, expected, scenario_.sha256, vehicle_ids_);
     if (missing.empty()) return true;
+    const std::string problem = board_.problem.empty() ? "" : "; " + board_.problem;
     if (wait.is_over())
-      throw app::RunError(fmt::format("not ready within {} s: {}{}", expected.timeout_s, missing,
-                                      endpoints_.domain.describe_loneliness()));
+      throw app::RunError(fmt::format("not ready within {} s: {}{}{}", expected.timeout_s, missing,
+                                      problem, endpoints_.domain.describe_loneliness()));
     if (wait.is_report_due()) {
-      spdlog::info("waiting for: {} ({:.0f} s left){}", missing, wait.seconds_left(),
-                   endpoints_.domain.describe_loneliness());
+      spdlog::info("waiting for: {} ({:.0f} s left){}{}{}", missing, wait.seconds_left(), problem,
+                   endpoints_.domain.describe_loneliness(),
+                   Clock::now() - began > kLongStart ? "; run ./sls doctor" : "");
       if (missing != published) board_.publish(PHASE_WAITING, "missing: " + missing);
       published = missing;
     }
@@ -252,7 +258,9 @@ bool Run::attend_to_operator() {
 }
 
 void Run::attend_now_and_then() {
-  if (!board_.publish_if_due(control_.is_paused() ? control_.last_event() : "")) return;
+  if (!board_.is_due() && !is_problem_due()) return;
+  look_for_problems();
+  board_.publish(board_.phase(), control_.is_paused() ? control_.last_event() : "");
   check_stop();
   check_claim();
   report_silent_recorder();
@@ -261,8 +269,10 @@ void Run::attend_now_and_then() {
 void Run::refresh_roster() {
   roster_version_ = endpoints_.participants.version();
   roster_time_ = Clock::now();
-  roster_ = {endpoints_.participants.find(ROLE_CONTROLLER, run_id_),
-             endpoints_.participants.find(ROLE_RECORDER, run_id_), began_};
+  roster_ = {
+      check_.admit_controllers(endpoints_.participants.find(ROLE_CONTROLLER, run_id_)),
+      ParticipantCheck::admit_recorders(endpoints_.participants.find(ROLE_RECORDER, run_id_)),
+      began_};
   for (const auto& vehicle : vehicles_)
     vehicle->gate.set_clients(find_ready_clients(roster_, scenario_.sha256, vehicle->id()));
   roster_changed();
@@ -271,6 +281,32 @@ void Run::refresh_roster() {
 bool Run::is_roster_due() const {
   return endpoints_.participants.version() != roster_version_ ||
          Clock::now() - roster_time_ > kRosterTime;
+}
+
+bool Run::is_problem_due() const {
+  return endpoints_.domain.problems().version() != problems_version_ &&
+         board_.is_due(kProblemInterval);
+}
+
+void Run::look_for_problems() {
+  const bus::Node& domain = endpoints_.domain;
+  Neighbourhood neighbourhood;
+  neighbourhood.now = Clock::now();
+  neighbourhood.participants = endpoints_.participants.all();
+  for (const bus::Run& other : endpoints_.servers.runs()) {
+    neighbourhood.other_runs.insert(other.parameters.run_id());
+    for (const std::uint32_t id : bus::list_vehicle_ids(other.parameters))
+      neighbourhood.other_vehicles.insert(id);
+  }
+  for (const bus::PeerId& peer : endpoints_.command_stream.matched())
+    neighbourhood.command_writers[peer] = domain.describe(peer);
+  neighbourhood.missing_deadlines = domain.find_missing_deadlines();
+  neighbourhood.explained = domain.find_misfits();
+  bus::Problems& problems = endpoints_.domain.problems();
+  problems.replace("run ", check_.look(neighbourhood));
+  problems_version_ = problems.version();
+  board_.problem = problems.describe();
+  for (const std::string& event : check_.take_events()) board_.announce(event);
 }
 
 void Run::report_silent_recorder() {

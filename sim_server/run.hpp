@@ -14,6 +14,7 @@
 #include "common/config/scenario.hpp"
 #include "sim_server/controller_absence.hpp"
 #include "sim_server/endpoints.hpp"
+#include "sim_server/participant_check.hpp"
 #include "sim_server/plants/plant.hpp"
 #include "sim_server/record_stream.hpp"
 #include "sim_server/roster.hpp"
@@ -116,6 +117,8 @@ class Run {
   bool is_roster_due() const;
   /// Status, stop signal, claim: what needs a look a few times a second.
   void attend_now_and_then();
+  /// True where a problem began or ended that no status has told of.
+  bool is_problem_due() const;
 
   Endpoints& endpoints_;
   const config::Scenario scenario_;
@@ -127,6 +130,7 @@ class Run {
   StatusBoard board_;
   RunControl control_;
   Roster roster_;
+  ParticipantCheck check_;
   RecordStream record_;
   bool are_recorders_given_up_ = false;     // policy go_on
   std::optional<Clock::time_point> began_;  // when step 0 was about to be published
@@ -146,6 +150,8 @@ class Run {
   void publish_end(RunPhase phase, const std::string& reason);
   void close_requests(const std::string& reason);
   void report_silent_recorder();
+  /// Looks for what the participants do wrong.
+  void look_for_problems();
   SyncCounters sum_counters() const;
   std::string describe_refusals(const VehicleFlight& vehicle) const;
   [[noreturn]] void give_up(double waited_s, const std::string& refusals) const;
@@ -158,6 +164,7 @@ class Run {
   const std::int64_t plant_steps_;  // per period
   bool is_step_published_ = false;
   OfferedAnswer offered_;  // in work
+  std::uint64_t problems_version_ = 0;
   std::uint64_t roster_version_ = 0;
   Clock::time_point roster_time_;
   std::optional<app::Wait> absence_wait_;

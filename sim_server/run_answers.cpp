@@ -50,9 +50,13 @@ void Run::judge(const Commands& sample, const bus::PeerId& sender, bool is_early
       note_late(*vehicle, offered_);
     }
     const char* defect = to_string(verdict);
-    if (*defect != '\0')
+    if (*defect == '\0') {
+      check_.note_taken(offered_, sender, verdict, vehicle->returned(), vehicle->state());
+    } else {
+      check_.note_rejected(offered_, sender, verdict, board_.step);
       spdlog::debug("command for step {} of vehicle {} from '{}' rejected: {}", offered_.step,
                     command.vehicle_id(), offered_.client_name, defect);
+    }
   }
 }
 
@@ -148,8 +152,9 @@ std::string Run::name_awaited_controllers() const {
     if (vehicle->gate.accepted()) continue;
     const auto client = vehicle->gate.awaited_client();
     const std::string& last = vehicle->last_answer().controller_name;
-    awaited[client         ? fmt::format("controller '{}' on {}", client->name,
-                                         find_host(roster_, client->peer))
+    awaited[client         ? fmt::format("controller '{}' on {}{}", client->name,
+                                         find_host(roster_, client->peer),
+                                         check_.describe_rejections(client->peer))
             : last.empty() ? std::string("controller (none is ready)")
                            : fmt::format("controller '{}' (gone)", last)]
         .push_back(vehicle->id());

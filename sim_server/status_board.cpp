@@ -53,10 +53,4 @@ void StatusBoard::announce(const std::string& event) {
   publish(phase_, event);
 }
 
-bool StatusBoard::publish_if_due(const std::string& reason) {
-  if (!is_due()) return false;
-  publish(phase_, reason);
-  return true;
-}
-
 }  // namespace sls::sim

@@ -31,9 +31,10 @@ class StatusBoard {
   void publish(RunPhase phase, const std::string& reason);
   /// An event that does not change the phase: said on stderr and published as a reason.
   void announce(const std::string& event);
-  /// Publishes if the last sample is `kInterval` ago: true.
-  bool publish_if_due(const std::string& reason);
-  bool is_due() const { return Clock::now() - publish_time_ >= kInterval; }
+  /// The last sample is so long ago.
+  bool is_due(Clock::duration interval = kInterval) const {
+    return Clock::now() - publish_time_ >= interval;
+  }
 
   RunPhase phase() const { return phase_; }
   /// True once anybody can have heard of the run.

@@ -55,6 +55,10 @@ class VehicleFlight {
   /// A late answer has ended the mission.
   bool has_ended_late() const { return has_ended_late_; }
   const Applied& last_answer() const { return last_answer_; }
+  /// What the state of the step in work returned to the controllers.
+  const ControllerState& returned() const { return applied_.memory; }
+  /// What the vehicle does at the step in work.
+  const model::Measurement& state() const { return state_; }
 
   /// The step in work was published at `time` and has no answer yet.
   void note_waiting(Clock::time_point time) {

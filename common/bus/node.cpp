@@ -20,6 +20,7 @@
 #include <atomic>
 #include <charconv>
 #include <chrono>
+#include <cstddef>
 #include <cstdlib>
 #include <limits>
 #include <map>
@@ -27,7 +28,10 @@
 #include <utility>
 
 #include "common/bus/fastdds/endpoints.hpp"
+#include "common/bus/fastdds/facts_of.hpp"
+#include "common/bus/fastdds/guarded_type.hpp"
 #include "common/bus/fastdds/middleware_log.hpp"
+#include "common/bus/fastdds/neighbours.hpp"
 #include "common/bus/fastdds/participant_listener.hpp"
 #include "common/bus/fastdds/stale_segments.hpp"
 #include "common/bus/qos_file.hpp"
@@ -81,9 +85,18 @@ namespace {
 PeerId to_peer(const dds::InstanceHandle_t& handle) {
   eprosima::fastrtps::rtps::GUID_t guid;
   eprosima::fastrtps::rtps::iHandle2GUID(guid, handle);
-  PeerId peer;
-  std::copy(std::begin(guid.guidPrefix.value), std::end(guid.guidPrefix.value), peer.bytes.begin());
-  return peer;
+  return bus::to_peer(guid);
+}
+
+/// The sample that `payload` is of. A reader of Fast DDS 2.9 hands no other to a type.
+const eprosima::fastrtps::rtps::CacheChange_t& find_change(
+    const eprosima::fastrtps::rtps::SerializedPayload_t& payload) {
+  using Change = eprosima::fastrtps::rtps::CacheChange_t;
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Winvalid-offsetof"  // it has bases neither virtual nor any
+  constexpr std::size_t kOffset = offsetof(Change, serializedPayload);
+#pragma GCC diagnostic pop
+  return *reinterpret_cast<const Change*>(reinterpret_cast<const char*>(&payload) - kOffset);
 }
 
 /// Counts matched endpoints per participant, one of which may have several.
@@ -133,7 +146,8 @@ struct Node::Impl {
            wire.port.participantIDGain});
     listener = std::make_unique<ParticipantListener>(
         eprosima::fastrtps::rtps::PropertyPolicyHelper::find_property(
-            qos.properties(), "dds.sec.auth.plugin") != nullptr);
+            qos.properties(), "dds.sec.auth.plugin") != nullptr,
+        neighbours);
     participant = factory->create_participant(static_cast<std::uint32_t>(domain), qos,
                                               listener.get(), dds::StatusMask::none());
     if (participant)
@@ -142,6 +156,7 @@ struct Node::Impl {
     if (!participant || !publisher || !subscriber)
       throw BusError("domain " + std::to_string(domain) +
                      ": cannot join: " + MiddlewareLog::find_first_error());
+    neighbours.set_self(to_peer(participant->get_instance_handle()));
     joined = std::chrono::steady_clock::now();
   }
 
@@ -185,6 +200,8 @@ struct Node::Impl {
   std::string qos_place;
   std::string identity;
   std::chrono::steady_clock::time_point joined;
+  Problems problems;
+  Neighbours neighbours{problems};
   std::unique_ptr<ParticipantListener> listener;
   dds::DomainParticipant* participant = nullptr;
   dds::Publisher* publisher = nullptr;
@@ -258,6 +275,16 @@ std::string Node::describe_loneliness() const {
 
 PeerId Node::id() const { return to_peer(impl_->participant->get_instance_handle()); }
 
+Problems& Node::problems() const { return impl_->problems; }
+
+std::string Node::describe(const PeerId& peer) const { return impl_->neighbours.describe(peer); }
+
+std::set<PeerId> Node::find_misfits() const { return impl_->neighbours.find_misfits(); }
+
+std::map<PeerId, std::string> Node::find_missing_deadlines() const {
+  return impl_->neighbours.find_missing_deadlines();
+}
+
 namespace detail {
 
 // A DataWriter with a deadline needs a listener of its own, so every one has (fastdds/README.md,
@@ -268,6 +295,7 @@ struct AnyWriter::Impl : dds::DataWriterListener {
     peers.update(status.last_subscription_handle, status.current_count_change);
   }
   MatchedPeers peers;
+  Neighbours* neighbours = nullptr;
   dds::Publisher* publisher = nullptr;
   dds::DataWriter* writer = nullptr;
 };
@@ -283,10 +311,14 @@ AnyWriter::AnyWriter(Node& node, const char* topic, const char* profile, void* t
   MiddlewareLog::clear();
   impl_->writer = impl_->publisher->create_datawriter(dds_topic, qos, impl_.get());
   if (!impl_->writer) node.impl().throw_refused_endpoint("write", topic, profile);
+  impl_->neighbours = &node.impl().neighbours;
+  impl_->neighbours->add_own(make_facts(*impl_->writer));
 }
 
 AnyWriter::~AnyWriter() {
-  if (impl_->writer) delete_writer(*impl_->publisher, impl_->writer);
+  if (!impl_->writer) return;
+  impl_->neighbours->drop_own(make_facts(*impl_->writer));
+  delete_writer(*impl_->publisher, impl_->writer);
 }
 
 bool AnyWriter::write(const void* sample) {
@@ -310,9 +342,10 @@ int AnyWriter::history_depth() const {
   return limit > 0 ? limit : std::numeric_limits<int>::max();
 }
 
-struct AnyReader::Impl : dds::DataReaderListener {
+struct AnyReader::Impl : dds::DataReaderListener, MisfitReport {
   void on_data_available(dds::DataReader* source) override {
     dds::SampleInfo info;
+    const MisfitScope scope(*this);
     while (source->take_next_sample(sample, &info) == ReturnCode_t::RETCODE_OK)
       if (info.valid_data) {
         written = std::chrono::system_clock::time_point(
@@ -328,7 +361,16 @@ struct AnyReader::Impl : dds::DataReaderListener {
                                     const dds::RequestedDeadlineMissedStatus& status) override {
     missed_deadlines = status.total_count;
   }
+  void report(const eprosima::fastrtps::rtps::SerializedPayload_t& payload, const char* type,
+              const std::string& defect) override {
+    const auto& guid = find_change(payload).writerGUID;
+    Neighbours::EntityId writer;
+    std::copy(std::begin(guid.entityId.value), std::end(guid.entityId.value), writer.begin());
+    neighbours->note_misfit(to_peer(guid), writer, topic, type, defect);
+  }
   MatchedPeers peers;
+  Neighbours* neighbours = nullptr;
+  std::string topic;
   std::atomic<std::uint64_t> missed_deadlines{0};
   std::optional<std::chrono::nanoseconds> lifespan;
   std::chrono::system_clock::time_point written;  // the sample in `sample`
@@ -343,6 +385,8 @@ AnyReader::AnyReader(Node& node, const char* topic, const char* profile, void* t
     : impl_(std::make_unique<Impl>()) {
   dds::TypeSupport type(static_cast<dds::TopicDataType*>(type_support));
   auto* dds_topic = node.impl().find_or_create_topic(topic, type);
+  impl_->neighbours = &node.impl().neighbours;
+  impl_->topic = topic;
   impl_->sample = sample;
   impl_->take = std::move(take);
   impl_->subscriber = node.impl().subscriber;
@@ -355,10 +399,12 @@ AnyReader::AnyReader(Node& node, const char* topic, const char* profile, void* t
   MiddlewareLog::clear();
   impl_->reader = impl_->subscriber->create_datareader(dds_topic, qos, impl_.get());
   if (!impl_->reader) node.impl().throw_refused_endpoint("read", topic, profile);
+  impl_->neighbours->add_own(make_facts(*impl_->reader));
 }
 
 AnyReader::~AnyReader() {
   if (!impl_->reader) return;
+  impl_->neighbours->drop_own(make_facts(*impl_->reader));
   impl_->reader->set_listener(nullptr);
   impl_->subscriber->delete_datareader(impl_->reader);
 }

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -14,6 +15,7 @@
 #include <string>
 
 #include "common/bus/peer.hpp"
+#include "common/bus/problems.hpp"
 #include "common/bus/topics.hpp"
 
 namespace sls::bus {
@@ -59,6 +61,20 @@ class Node {
   /// Where nobody else has been discovered 3 s after joining: "; " and that, with what to look at,
   /// to be appended to a message about who is missing. Else empty.
   std::string describe_loneliness() const;
+
+  /// What the others on the domain do wrong. Endpoints and samples that do not fit ours are in it
+  /// by themselves.
+  Problems& problems() const;
+
+  /// 'foo' (10.0.0.2): what a participant says of itself in discovery.
+  std::string describe(const PeerId& peer) const;
+
+  /// Participants whose sls/command offers a longer DEADLINE than ours asks, in words: a mistake of
+  /// those who fly for us (fastdds/neighbours.hpp).
+  std::map<PeerId, std::string> find_missing_deadlines() const;
+
+  /// Participants that `problems` names for their endpoints or samples.
+  std::set<PeerId> find_misfits() const;
 
   struct Impl;
   Impl& impl() { return *impl_; }

@@ -92,15 +92,22 @@ void ParticipantDirectory::note(const Participant& sample, const PeerId& sender)
 
 std::vector<ParticipantDirectory::Entry> ParticipantDirectory::find(ParticipantRole role,
                                                                     std::uint64_t run_id) const {
+  std::vector<Entry> found = all();
+  const auto is_other = [&](const Entry& entry) {
+    return entry.announcement.role() != role || entry.announcement.run_id() != run_id;
+  };
+  found.erase(std::remove_if(found.begin(), found.end(), is_other), found.end());
+  return found;
+}
+
+std::vector<ParticipantDirectory::Entry> ParticipantDirectory::all() const {
   const auto present = reader_.matched();
   const std::lock_guard lock(mutex_);
   std::vector<Entry> found;
-  for (const auto& [peer, heard] : last_) {
-    const Participant& announcement = heard.announcement;
-    if (announcement.role() == role && announcement.run_id() == run_id && present.count(peer) > 0)
-      found.push_back(
-          {peer, announcement, heard.time, heard.age, heard.ready_since.value_or(heard.time)});
-  }
+  for (const auto& [peer, heard] : last_)
+    if (present.count(peer) > 0)
+      found.push_back({peer, heard.announcement, heard.time, heard.age,
+                       heard.ready_since.value_or(heard.time)});
   return found;
 }
 

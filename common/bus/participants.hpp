@@ -44,6 +44,9 @@ class ParticipantDirectory {
   /// Present participants of `role` that serve run `run_id`.
   std::vector<Entry> find(ParticipantRole role, std::uint64_t run_id) const;
 
+  /// Present participants, whatever their role and run.
+  std::vector<Entry> all() const;
+
   /// Participants of `role` that have said they are done with run `run_id`, also those that have
   /// left since.
   int count_done(ParticipantRole role, std::uint64_t run_id) const;

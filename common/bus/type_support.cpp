@@ -16,7 +16,8 @@ void* make_type_support<Commands>() {
 }
 template <>
 void* make_type_support<RecordBatch>() {
-  return static_cast<eprosima::fastdds::dds::TopicDataType*>(new GuardedType<RecordBatchPubSubType>);
+  return static_cast<eprosima::fastdds::dds::TopicDataType*>(
+      new GuardedType<RecordBatchPubSubType>);
 }
 template <>
 void* make_type_support<Participant>() {

@@ -30,9 +30,9 @@ def bench(*words, check=0):
 
 class BreakdownTest(unittest.TestCase):
     def test_each_part_is_what_its_round_trip_takes_longer_and_they_add_up(self):
-        parts_of_step = loop.calc_parts(10, 11, 13, 18, 20, 50)
+        parts_of_step = loop.calc_parts(10, 11, 20, 43, 50)
         self.assertEqual(parts_of_step.pop("sum: one step with recorder"), 50)
-        self.assertEqual(list(parts_of_step.values()), [10, 1, 2, 5, 20, 12])
+        self.assertEqual(list(parts_of_step.values()), [10, 1, 20, 12, 7])
         self.assertEqual(sum(parts_of_step.values()), 50)
 
 
@@ -88,8 +88,7 @@ class DistributionTest(unittest.TestCase):
         self.assertEqual(loop.percentile([7.0], 0.5), 7)
 
     def test_of_a_sample_sent_again_the_first_time_counts(self):
-        stamps = loop.parse_stamps("state,0,1000\ncommand,0,1500\nstate,0,9000\nstate,1,2000\n")
-        self.assertEqual(stamps, {"state": {0: 1000, 1: 2000}, "command": {0: 1500}})
+        self.assertEqual(loop.parse_stamps("0,1000\n0,9000\n1,2000\n"), {0: 1000, 1: 2000})
 
     def test_no_step_is_counted_twice_or_with_a_rest_in_it(self):
         before = {step: step * 100_000 for step in range(5)}
@@ -175,7 +174,7 @@ class ProgramTest(unittest.TestCase):
         figures = self.check(file, "lockstep")
         self.assertIn("shared memory, with recorder", said.stdout)
         # In each placement of the programs two transports, with and without recorder, and once more
-        # beside the bound of all messages.
+        # with one beside without.
         self.assertEqual(sum("ratio" in figure for figure in figures), 6 * len(find_placements()))
         if "--out" in words:
             self.assertTrue((self.folder / "plots/lockstep.png").read_bytes().startswith(b"\x89PNG"))
@@ -190,7 +189,7 @@ class ProgramTest(unittest.TestCase):
             steps.setdefault(where, set()).add(name)
         self.assertEqual(len(steps), 2 * len(find_placements()))
         for names in steps.values():
-            self.assertEqual(names, set(loop.calc_parts(1, 2, 3, 4, 5, 6)))
+            self.assertEqual(names, set(loop.calc_parts(1, 2, 3, 4, 5)))
 
     def test_a_quick_recorder_part_loses_nothing(self):
         file = self.folder / "bench.json"

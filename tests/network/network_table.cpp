@@ -43,8 +43,12 @@ const std::vector<Disturbance> kDisturbances = {
 const std::vector<std::string> kProfiles = {"lan", "unicast", "discovery_server", "wifi", "secure"};
 
 /// The figure eight for 16 s, 4,000 steps, with patience for a start over a bad link.
-std::string make_scenario(const TemporaryFolder& folder) {
-  return make_scenario(folder, {{"for_s: 32", "for_s: 16"}, {"timeout_s: 30", "timeout_s: 120"}},
+std::string make_scenario(const TemporaryFolder& folder, int vehicles) {
+  return make_scenario(folder,
+                       {{"for_s: 32", "for_s: 16"},
+                        {"timeout_s: 30", "timeout_s: 120"},
+                        {"name: figure_eight",
+                         "name: figure_eight\nvehicles: " + std::to_string(vehicles)}},
                        "figure_eight");
 }
 
@@ -84,8 +88,10 @@ std::string fly(const std::string& file, const std::string& profile, const Distu
 int main(int argc, char** argv) {
   CLI::App cli("Flies every QoS profile on test hosts through every disturbance of their network.");
   std::vector<std::string> profiles = kProfiles, disturbances;
+  int vehicles = 1;
   cli.add_option("--profile", profiles, "only these (names in config/qos)");
   cli.add_option("--disturbance", disturbances, "only these (names in the table)");
+  cli.add_option("--vehicles", vehicles, "vehicles in each flight")->check(CLI::Range(1, 256));
   CLI11_PARSE(cli, argc, argv);
   if (const auto obstacle = Network::find_obstacle()) {
     std::fprintf(stderr, "network_table: error: %s\n", obstacle->c_str());
@@ -93,7 +99,7 @@ int main(int argc, char** argv) {
   }
   try {
     const TemporaryFolder folder;
-    const std::string file = make_scenario(folder);
+    const std::string file = make_scenario(folder, vehicles);
     Flight local(file);
     local.expect_success();
     std::puts(

@@ -14,7 +14,7 @@ int main(int argc, char** argv) {
   sigaddset(&ends, SIGTERM);
   pthread_sigmask(SIG_BLOCK, &ends, nullptr);  // before the middleware's threads, which inherit it
   Node node(argv[1], std::atoi(argv[2]), "stranger");
-  const detail::AnyWriter writer(node, Topic<sls::VehicleState>::kName, kLatchedWriterProfile,
+  const detail::AnyWriter writer(node, Topic<sls::States>::kName, kLatchedWriterProfile,
                                  detail::make_type_support<sls::SimStatus>());
   std::puts("there");
   std::fflush(stdout);

@@ -62,7 +62,8 @@ std::string calc_certificate(const fs::path& folder) {
       vehicles[std::stoul(row.at(0))][std::stoull(row.at(1))][place] =
           to_certified_bytes(topic, kinds, row);
   };
-  add_file("state.csv", 0, "sls/state", std::string(20, 'n'));
+  const std::size_t columns = parse_csv(read_bytes(folder / "state.csv")).header.size();
+  add_file("state.csv", 0, "sls/state", std::string(columns - 2, 'n'));
   add_file("command.csv", 1, "sls/command", "-nnn-t");
   add_file("reference.csv", 2, "sls/reference", "nit" + std::string(15, 'n'));
   std::string all;
@@ -80,9 +81,10 @@ std::string read_certificate(const fs::path& folder) {
 }
 
 /// The certificate of the synthetic run with something changed.
-std::string certify(const std::function<void(VehicleState&, ControlCommand&, Reference&)>& change) {
+std::string certify(const std::function<void(RecordEntry&)>& change,
+                    const Parameters& parameters = make_parameters()) {
   const sls::test::TemporaryFolder folder;
-  record_flight(folder.path(), change);
+  record_flight(folder.path(), change, parameters);
   EXPECT_EQ(read_certificate(folder.path()), calc_certificate(folder.path()));
   return read_certificate(folder.path());
 }
@@ -97,35 +99,27 @@ TEST(CertificateTest, IsRecomputableFromTheFiles) {
 TEST(CertificateTest, CoversEveryVehicle) {
   const sls::test::TemporaryFolder folder;
   Parameters parameters = make_parameters();
-  parameters.vehicle_ids({7, 0});
+  set_vehicles(parameters, {0, 7});
   Recording recording(folder.path(), parameters);
-  for (std::uint64_t step = 0; step <= kLastStep; ++step)
-    for (const std::uint32_t id : {7u, 0u}) {
-      VehicleState state = make_state(step);
-      ControlCommand command = make_command(step);
-      Reference reference = make_reference(step);
-      state.vehicle_id(id);
-      state.truth().p_WQ_m()[0] += id;
-      command.vehicle_id(id);
-      reference.vehicle_id(id);
-      recording.add(state);
-      recording.add(command);
-      recording.add(reference);
-    }
+  BatchFeeder feeder(recording);
+  for (std::uint64_t step = 0; step <= kLastStep; ++step) {
+    RecordEntry other = make_entry(step, 7);
+    other.truth().p_WQ_m()[0] += 7;
+    feeder.add({make_entry(step), other}, step == kLastStep);
+  }
   EXPECT_TRUE(finish_flight(recording));
   EXPECT_EQ(read_certificate(folder.path()), calc_certificate(folder.path()));
 }
 
 TEST(CertificateTest, LeavesOutWhatDiffersBetweenEqualFlights) {
   const std::string expected = certify({});
-  EXPECT_EQ(certify([](VehicleState& state, ControlCommand& command, Reference& reference) {
-              if (state.step() == kLastStep) return;  // the final status names its client
-              if (state.step() > 0) state.controller_name("other");
-              state.p_WQ_m()[0] += 1;  // measured; the truth is what counts
-              command.client_name("other");
-              command.strength(1);
-              command.compute_time_ns(7);
-              reference.client_name("other");
+  EXPECT_EQ(certify([](RecordEntry& entry) {
+              entry.measured({PlantState()});  // the truth is what counts
+              entry.client_name("other");
+              entry.answered_step(3);
+              entry.answer().compute_time_ns(7);
+              entry.truth().q_WB({0, 1, 0, 0});  // of a plant that says it has none
+              entry.truth().signals({1, 2, 3});
             }),
             expected);
   const sls::test::TemporaryFolder folder;
@@ -133,15 +127,9 @@ TEST(CertificateTest, LeavesOutWhatDiffersBetweenEqualFlights) {
   parameters.run_id(5);
   Recording recording(folder.path(), parameters);
   for (std::uint64_t step = 0; step <= kLastStep; ++step) {
-    VehicleState state = make_state(step);
-    ControlCommand command = make_command(step);
-    Reference reference = make_reference(step);
-    state.run_id(5);
-    command.run_id(5);
-    reference.run_id(5);
-    recording.add(state);
-    recording.add(command);
-    recording.add(reference);
+    RecordBatch batch = make_batch(step, {make_entry(step)}, step == kLastStep);
+    batch.run_id(5);
+    recording.add(batch);
   }
   SimStatus end = make_status(PHASE_FINISHED, kLastStep);
   end.run_id(5);
@@ -151,30 +139,47 @@ TEST(CertificateTest, LeavesOutWhatDiffersBetweenEqualFlights) {
   EXPECT_EQ(read_certificate(folder.path()), expected);
 }
 
-TEST(CertificateTest, ChangesWithEveryFieldThatIsPartOfTheFlight) {
-  const std::string expected = certify({});
-  const std::vector<std::function<void(VehicleState&, ControlCommand&, Reference&)>> changes = {
-      [](VehicleState& state, auto&, auto&) { state.truth().p_WL_m()[2] += 1e-15; },
-      [](VehicleState& state, auto&, auto&) { state.truth().beta_dot_rad_s(-0.0); },
-      [](VehicleState& state, auto&, auto&) { state.f_Q_W_n()[1] = 17; },
-      [](VehicleState& state, auto&, auto&) { state.sim_time_ns(state.sim_time_ns() + 1); },
-      [](auto&, ControlCommand& command, auto&) { command.fault(FAULT_STAGE_TIMEOUT); },
-      [](auto&, auto&, Reference& reference) { reference.stage_index(2); },
-      [](auto&, auto&, Reference& reference) { reference.stage_name("a, \"b\"\n"); },
-      [](auto&, auto&, Reference& reference) { reference.snap_m_s4()[2] += 1e-12; }};
+using Changes = std::vector<std::function<void(RecordEntry&)>>;
+
+void expect_others(const Changes& changes, const Parameters& parameters) {
+  const std::string expected = certify({}, parameters);
   for (std::size_t i = 0; i < changes.size(); ++i)
-    EXPECT_NE(certify([&](VehicleState& state, ControlCommand& command, Reference& reference) {
-                if (state.step() == 123) changes[i](state, command, reference);
-              }),
+    EXPECT_NE(certify(
+                  [&](RecordEntry& entry) {
+                    if (entry.step() == 123) changes[i](entry);
+                  },
+                  parameters),
               expected)
         << i;
 }
 
+TEST(CertificateTest, ChangesWithEveryFieldThatIsPartOfTheFlight) {
+  expect_others({[](RecordEntry& entry) { entry.truth().p_WL_m()[2] += 1e-15; },
+                 [](RecordEntry& entry) { entry.truth().beta_dot_rad_s(-0.0); },
+                 [](RecordEntry& entry) { entry.f_Q_W_n()[1] = 17; },
+                 [](RecordEntry& entry) { entry.answer().f_Q_W_n()[1] = 17; },
+                 [](RecordEntry& entry) { entry.answer().fault(FAULT_STAGE_TIMEOUT); },
+                 [](RecordEntry& entry) { entry.kind(ANSWER_HELD); },
+                 [](RecordEntry& entry) { entry.answer().reference().stage_index(2); },
+                 [](RecordEntry& entry) { entry.answer().reference().stage_name("a, \"b\"\n"); },
+                 [](RecordEntry& entry) { entry.answer().reference().snap_m_s4()[2] += 1e-12; }},
+                make_parameters());
+}
+
+TEST(CertificateTest, CoversAttitudeRatesAndSignalsWhereTheRunHasThem) {
+  EXPECT_NE(certify({}, make_signal_parameters()), certify({}));
+  expect_others({[](RecordEntry& entry) { entry.truth().q_WB()[3] = 0.0; },
+                 [](RecordEntry& entry) { entry.truth().w_WB_B_rad_s()[2] += 1e-14; },
+                 [](RecordEntry& entry) { entry.truth().signals()[1] = -8; },
+                 [](RecordEntry& entry) { entry.truth().signals().clear(); }},
+                make_signal_parameters());
+}
+
 TEST(CertificateTest, NumbersThatAreNoneReadBackToTheSameCertificate) {
-  certify([](VehicleState& state, ControlCommand&, Reference& reference) {
+  certify([](RecordEntry& entry) {
     const double nan = std::numeric_limits<double>::quiet_NaN();
-    state.truth().p_WQ_m({nan, -nan, std::numeric_limits<double>::infinity()});
-    reference.jerk_m_s3({-0.0, 0.0, -std::numeric_limits<double>::infinity()});
+    entry.truth().p_WQ_m({nan, -nan, std::numeric_limits<double>::infinity()});
+    entry.answer().reference().jerk_m_s3({-0.0, 0.0, -std::numeric_limits<double>::infinity()});
   });
 }
 

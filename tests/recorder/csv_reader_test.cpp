@@ -69,6 +69,20 @@ TEST_F(CsvReaderTest, ErrorsNameFileAndLine) {
             file + ":2: expected a row, got no end");
 }
 
+TEST_F(CsvReaderTest, FurtherColumnsAreReadWhereTheyAreAllowed) {
+  const auto find_columns = [&](const std::string& header) {
+    write_bytes(path_, header + "\n1,2,3\n");
+    CsvReader reader(path_, "a,b", CsvReader::Further::kAllowed);
+    EXPECT_EQ(reader.next(), reader.columns().size() == 3);
+    return reader.columns();
+  };
+  EXPECT_EQ(find_columns("a,b,c"), (std::vector<std::string>{"a", "b", "c"}));
+  EXPECT_THROW(find_columns("a,b"), DamagedError) << "its row has three fields";
+  EXPECT_THROW(find_columns("a,bc"), DamagedError);
+  EXPECT_THROW(find_columns("a,c,b"), DamagedError);
+  EXPECT_EQ(find_error("a,b,c\n"), path_.string() + ":1: expected the columns a,b");
+}
+
 TEST_F(CsvReaderTest, AFileThatIsNotThereIsNamed) {
   EXPECT_THROW(CsvReader(folder_ / "none.csv", "a"), DamagedError);
 }

@@ -17,17 +17,13 @@ namespace {
 using namespace test;
 
 StepRows make_rows(std::uint64_t step) {
-  StepRecord record;
-  record.step = step;
-  record.state = make_state(step);
-  record.command = make_command(step);
-  record.reference = make_reference(step);
-  return record::make_rows(0, record);
+  return record::make_rows(make_entry(step), make_parameters());
 }
 
 Eigen::Vector3d calc_error(std::uint64_t step) {
-  return bus::to_vector(make_state(step).truth().p_WL_m()) -
-         bus::to_vector(make_reference(step).position_m());
+  const RecordEntry entry = make_entry(step);
+  return bus::to_vector(entry.truth().p_WL_m()) -
+         bus::to_vector(entry.answer().reference().position_m());
 }
 
 /// rms, largest and last error over the steps [from, to], each summed up on its own.

@@ -9,35 +9,44 @@
 
 namespace sls::record::test {
 
-inline void add_step(Recording& recording, std::uint64_t step) {
-  recording.add(make_state(step));
-  recording.add(make_command(step));
-  recording.add(make_reference(step));
-}
+/// Numbers batches as a server does, one step in each.
+class BatchFeeder {
+ public:
+  explicit BatchFeeder(Recording& recording, std::uint64_t first_index = 0)
+      : recording_(recording), index_(first_index) {}
+
+  void add(const std::vector<RecordEntry>& entries, bool is_last = false) {
+    recording_.add(make_batch(index_++, entries, is_last));
+  }
+  void add_steps(std::uint64_t from, std::uint64_t to) {
+    for (std::uint64_t step = from; step <= to; ++step) add({make_entry(step)}, step == kLastStep);
+  }
+
+ private:
+  Recording& recording_;
+  std::uint64_t index_;
+};
 
 inline void add_steps(Recording& recording, std::uint64_t from, std::uint64_t to) {
-  for (std::uint64_t step = from; step <= to; ++step) add_step(recording, step);
+  BatchFeeder(recording, from).add_steps(from, to);
 }
 
-/// The last step, the final status and the end of the recording.
+/// The final status and the end of the recording.
 inline bool finish_flight(Recording& recording) {
   recording.add(make_status(PHASE_FINISHED, kLastStep, "mission finished"));
   return recording.finish("", 0);
 }
 
-/// The whole synthetic run, each state changed by `disturb`.
-inline void record_flight(
-    const std::filesystem::path& folder,
-    const std::function<void(VehicleState&, ControlCommand&, Reference&)>& disturb = {}) {
-  Recording recording(folder, make_parameters());
+/// The whole synthetic run, each entry changed by `disturb`.
+inline void record_flight(const std::filesystem::path& folder,
+                          const std::function<void(RecordEntry&)>& disturb = {},
+                          const Parameters& parameters = make_parameters()) {
+  Recording recording(folder, parameters);
+  BatchFeeder feeder(recording);
   for (std::uint64_t step = 0; step <= kLastStep; ++step) {
-    VehicleState state = make_state(step);
-    ControlCommand command = make_command(step);
-    Reference reference = make_reference(step);
-    if (disturb) disturb(state, command, reference);
-    recording.add(state);
-    recording.add(command);
-    recording.add(reference);
+    RecordEntry entry = make_entry(step);
+    if (disturb) disturb(entry);
+    feeder.add({entry}, step == kLastStep);
   }
   finish_flight(recording);
 }

@@ -53,11 +53,7 @@ class FakeFlight {
       parameters.scenario_sha256(config::calc_sha256(text));
     }
     parameters_writer_.write(parameters);
-    Participant pilot;
-    pilot.run_id(run_id);
-    pilot.role(ROLE_CONTROLLER);
-    pilot.name(kPilot);
-    participant_writer_.write(pilot);
+    next_batch_ = 0;
     publish(PHASE_WAITING, 0);
   }
 
@@ -83,9 +79,14 @@ class FakeFlight {
     publish(PHASE_RUNNING, to);
   }
   void write_step(std::uint64_t step) {
-    write(state_writer_, make_state(step));
-    write(reference_writer_, make_reference(step));
-    write(command_writer_, make_command(step));
+    write(record_writer_, make_batch(next_batch_++, {make_entry(step)}, step == kLastStep));
+  }
+  void announce_library(const std::string& sha256) {
+    Participant pilot;
+    pilot.role(ROLE_CONTROLLER);
+    pilot.name(kPilot);
+    pilot.library_sha256(sha256);
+    write(participant_writer_, pilot);
   }
 
   void publish(RunPhase phase, std::uint64_t step) {
@@ -114,13 +115,12 @@ class FakeFlight {
 
   bus::Node node_{kQosFile, own_domain(), "server"};
   std::uint64_t run_id_ = 0;
+  std::uint64_t next_batch_ = 0;
   std::chrono::steady_clock::time_point publish_time_;
   bus::ParticipantDirectory participants_{node_};
   bus::Writer<Parameters> parameters_writer_{node_};
   bus::Writer<SimStatus> status_writer_{node_};
-  bus::Writer<VehicleState> state_writer_{node_};
-  bus::Writer<ControlCommand> command_writer_{node_};
-  bus::Writer<Reference> reference_writer_{node_};
+  bus::Writer<RecordBatch> record_writer_{node_};
   bus::Writer<Participant> participant_writer_{node_};
 };
 
@@ -184,6 +184,28 @@ TEST_F(RecorderTest, RecordsARunToItsEnd) {
   FakeFlight flight(kRunId);
   start();
   ASSERT_TRUE(flight.wait_for_recorder());
+  flight.announce_library(std::string(64, 'b'));
+  flight.fly(0, kLastStep - 1);
+  ASSERT_TRUE(flight.is_recorded_up_to(kLastStep - 1));
+  flight.write_step(kLastStep);
+  flight.publish(PHASE_FINISHED, kLastStep);
+  join();
+  EXPECT_EQ(error_, "no error");
+  expect_whole(out_);
+  EXPECT_EQ(read_manifest(out_).at("libraries"),
+            Json({{"controllers", {{kPilot, std::string(64, 'b')}}}}));
+}
+
+// Anybody can write batches of the run; only the server knows where it is.
+TEST_F(RecorderTest, BatchesOfOtherSendersDoNotCount) {
+  FakeFlight flight(kRunId);
+  start();
+  ASSERT_TRUE(flight.wait_for_recorder());
+  bus::Node node(kQosFile, own_domain(), "stranger");
+  bus::Writer<RecordBatch> writer(node);
+  ASSERT_TRUE(wait_until([&] { return !writer.matched().empty(); }));
+  writer.write(make_batch(0, {make_entry(200)}, true));
+  ASSERT_TRUE(writer.wait_for_acknowledgments(5s));
   flight.fly(0, kLastStep);
   flight.publish(PHASE_FINISHED, kLastStep);
   join();
@@ -302,7 +324,7 @@ TEST_F(RecorderTest, AKilledRecorderIsResumedInMidFlight) {
   join();
   EXPECT_EQ(error_, "no error");
   expect_whole(out_);
-  EXPECT_EQ(read_manifest(out_ / "segment-2").at("segment").at("first_step"), 100);
+  EXPECT_EQ(read_manifest(out_ / "segment-2").at("segment").at("first_step"), 101);
 }
 
 TEST_F(RecorderTest, ARecordingOfAnotherRunIsNotResumed) {

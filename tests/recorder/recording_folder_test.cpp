@@ -16,9 +16,9 @@ namespace {
 namespace fs = std::filesystem;
 using sls::test::write_bytes;
 
-constexpr const char* kFiles[] = {"state.csv",     "command.csv",   "reference.csv",
-                                  "status.csv",    "flight.csv",    "flight.txt",
-                                  "scenario.yaml", "manifest.json", "manifest.json.part"};
+constexpr const char* kFiles[] = {
+    "state.csv",  "measured.csv", "command.csv",   "reference.csv", "status.csv",
+    "flight.csv", "flight.txt",   "scenario.yaml", "manifest.json", "manifest.json.part"};
 
 class RecordingFolderTest : public testing::Test {
  protected:
@@ -168,10 +168,13 @@ class ResumeTest : public RecordingFolderTest {
 TEST_F(ResumeTest, NewAndEmptyFoldersAndOnesWithoutARowAreFresh) {
   EXPECT_FALSE(find_unfinished_recording(out_));
   EXPECT_FALSE(find_unfinished_recording(out_));
-  write_bytes(out_ / "state.csv", std::string(StateRow::kHeader) + "\n");
-  write_bytes(out_ / "command.csv", "");
-  EXPECT_FALSE(find_unfinished_recording(out_));
-  EXPECT_TRUE(fs::is_empty(out_));
+  for (const std::string& header : {std::string(), make_header<StateRow>() + "\n",
+                                    make_state_header(test::make_signal_parameters()) + "\n"}) {
+    write_bytes(out_ / "state.csv", header);
+    write_bytes(out_ / "command.csv", "");
+    EXPECT_FALSE(find_unfinished_recording(out_));
+    EXPECT_TRUE(fs::is_empty(out_));
+  }
 }
 
 TEST_F(ResumeTest, AnUnfinishedRecordingIsFound) {
@@ -180,7 +183,7 @@ TEST_F(ResumeTest, AnUnfinishedRecordingIsFound) {
   const auto flight = find_unfinished_recording(out_);
   ASSERT_TRUE(flight);
   EXPECT_EQ(flight->manifest().run_id, "0123456789abcdef");
-  EXPECT_EQ(find_next_step(*flight), 100u);
+  EXPECT_EQ(find_next_step(*flight), 101u);
 }
 
 TEST_F(ResumeTest, ACompleteRecordingIsRefused) {
@@ -193,7 +196,7 @@ TEST_F(ResumeTest, WhatIsNoRecordingIsRefusedAndKept) {
   fill(out_);
   EXPECT_NE(find_resume_error().find("manifest.json"), std::string::npos);
   fs::remove(out_ / "manifest.json");
-  write_bytes(out_ / "state.csv", std::string(1000, 'x'));
+  write_bytes(out_ / "state.csv", std::string(1000, 'x') + "\nx");
   EXPECT_NE(find_resume_error().find("expected an empty folder"), std::string::npos);
   EXPECT_TRUE(fs::exists(out_ / "state.csv"));
 }

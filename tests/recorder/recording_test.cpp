@@ -14,7 +14,7 @@
 #include "common/config/sha256.hpp"
 #include "tests/recorder/csv_table.hpp"
 #include "tests/recorder/file_size_limit.hpp"
-#include "tests/recorder/synthetic_run.hpp"
+#include "tests/recorder/flights.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace sls::record {
@@ -32,14 +32,7 @@ class RecordingTest : public testing::Test {
  protected:
   RecordingTest() : recording_(std::make_unique<Recording>(folder_.path(), make_parameters())) {}
 
-  void add_step(std::uint64_t step) {
-    recording_->add(make_state(step));
-    recording_->add(make_command(step));
-    recording_->add(make_reference(step));
-  }
-  void add_steps(std::uint64_t from, std::uint64_t to) {
-    for (std::uint64_t step = from; step <= to; ++step) add_step(step);
-  }
+  void add_steps(std::uint64_t from, std::uint64_t to) { feeder_.add_steps(from, to); }
   void fly_to_the_end() {
     recording_->add(make_status(PHASE_RUNNING, 0));
     add_steps(0, kLastStep);
@@ -63,6 +56,7 @@ class RecordingTest : public testing::Test {
 
   const sls::test::TemporaryFolder folder_;
   std::unique_ptr<Recording> recording_;
+  BatchFeeder feeder_{*recording_};
 };
 
 // --- a run that finished -------------------------------------------------------------------------
@@ -135,7 +129,8 @@ TEST_F(RecordingTest, RowsHoldTheSamplesToTheBit) {
       ASSERT_EQ(std::stod(table.rows[row][first + i]), values[i]) << table.header[first + i];
   };
   for (std::uint64_t step = 0; step <= kLastStep; ++step) {
-    const PlantState state = make_state(step).truth();
+    const RecordEntry entry = make_entry(step);
+    const PlantState& state = entry.truth();
     EXPECT_EQ(states.number(step, "sim_time_s"), static_cast<double>(4 * step) / 1000.0);
     expect_vector(states, step, states.find_column("quad_x_m"), state.p_WQ_m());
     expect_vector(states, step, states.find_column("quad_vx_m_s"), state.v_WQ_m_s());
@@ -145,15 +140,15 @@ TEST_F(RecordingTest, RowsHoldTheSamplesToTheBit) {
     EXPECT_EQ(states.number(step, "beta_rad"), state.beta_rad());
     EXPECT_EQ(states.number(step, "alpha_dot_rad_s"), state.alpha_dot_rad_s());
     EXPECT_EQ(states.number(step, "beta_dot_rad_s"), state.beta_dot_rad_s());
-    expect_vector(states, step, states.find_column("force_x_n"), make_state(step).f_Q_W_n());
+    expect_vector(states, step, states.find_column("force_x_n"), entry.f_Q_W_n());
 
-    const ControlCommand command = make_command(step);
+    const ControlCommand& command = entry.answer();
     EXPECT_EQ(commands.text(step, "controller"), kPilot);
     expect_vector(commands, step, commands.find_column("force_x_n"), command.f_Q_W_n());
     EXPECT_EQ(commands.number(step, "compute_us"), static_cast<double>(12345 + step) / 1000.0);
     EXPECT_EQ(commands.text(step, "fault"), "none");
 
-    const Reference reference = make_reference(step);
+    const Reference& reference = command.reference();
     EXPECT_EQ(references.number(step, "sim_time_s"), static_cast<double>(4 * step) / 1000.0);
     EXPECT_EQ(references.text(step, "stage"), step < 100 ? "0" : "1");
     EXPECT_EQ(references.text(step, "stage_name"), step < 100 ? "hold" : "figure_eight");
@@ -211,22 +206,6 @@ TEST_F(RecordingTest, FlightRowsJoinTheStepAndTheirAttitudeReproducesTheForce) {
   }
 }
 
-TEST_F(RecordingTest, ForcesOfAStandbyStayOut) {
-  recording_->add(make_status(PHASE_RUNNING, 0));
-  for (std::uint64_t step = 0; step <= kLastStep; ++step) {
-    recording_->add(make_standby_command(step));
-    recording_->add(make_standby_reference(step));
-    add_step(step);
-    add_step(step);
-  }
-  recording_->add(make_status(PHASE_FINISHED, kLastStep));
-  EXPECT_TRUE(finish());
-  const CsvTable commands = read_table("command.csv");
-  ASSERT_EQ(commands.rows.size(), kLastStep + 1);
-  for (const auto& row : commands.rows) EXPECT_EQ(row[2], kPilot);
-  EXPECT_EQ(read_table("reference.csv").rows.size(), kLastStep + 1);
-}
-
 TEST_F(RecordingTest, TheManifestDescribesTheRunTheMachineAndEveryFile) {
   fly_to_the_end();
   finish();
@@ -241,7 +220,10 @@ TEST_F(RecordingTest, TheManifestDescribesTheRunTheMachineAndEveryFile) {
   EXPECT_EQ(manifest.at("timing"), "exact");
   EXPECT_EQ(manifest.at("segment"), Json({{"number", 1}, {"first_step", 0}}));
   EXPECT_EQ(manifest.at("unanswered_steps"), 0);
-  EXPECT_EQ(manifest.at("rebuilt_commands"), 0);
+  EXPECT_EQ(manifest.at("contract_sha256"), std::string(64, 'c'));
+  EXPECT_EQ(manifest.at("dropped"), Json({{"repeated", 0}, {"out_of_range", 0}}));
+  EXPECT_FALSE(manifest.contains("libraries"));
+  EXPECT_FALSE(manifest.contains("signals"));
   EXPECT_EQ(manifest.at("versions").at("sim_server"), "sls 0.0.test");
   EXPECT_FALSE(manifest.at("versions").at("recorder").get<std::string>().empty());
   EXPECT_FALSE(manifest.at("versions").at("fast_dds").get<std::string>().empty());
@@ -266,6 +248,21 @@ TEST_F(RecordingTest, TheManifestDescribesTheRunTheMachineAndEveryFile) {
   for (const char* name : kCsvFiles) EXPECT_EQ(listed.count(name), 1u) << name;
 }
 
+TEST(RecordingLibraryTest, LibrariesAreInTheManifest) {
+  const sls::test::TemporaryFolder folder;
+  Parameters parameters = make_parameters();
+  parameters.library_sha256(std::string(64, 'a'));
+  Recording recording(folder.path(), parameters);
+  recording.note_library("pilot", std::string(64, 'b'));
+  recording.note_library("standby", std::string(64, 'd'));
+  recording.note_library("pilot", std::string(64, 'e'));  // another one cannot have flown
+  recording.finish("interrupted", 0);
+  EXPECT_EQ(Json::parse(read_bytes(folder / "manifest.json")).at("libraries"),
+            Json({{"plant", std::string(64, 'a')},
+                  {"controllers",
+                   {{"pilot", std::string(64, 'b')}, {"standby", std::string(64, 'd')}}}}));
+}
+
 TEST_F(RecordingTest, TheScenarioIsKeptByteForByte) {
   EXPECT_EQ(read_bytes(folder_ / "scenario.yaml"), kScenarioText);
   EXPECT_EQ(config::calc_file_sha256(folder_ / "scenario.yaml"),
@@ -282,6 +279,7 @@ TEST_F(RecordingTest, FlightTextNamesTheOutcomeAndTheStages) {
 
 TEST_F(RecordingTest, StatusRowsKeepReasonsWithCommasQuotesAndLineBreaksAndEveryCounter) {
   SimStatus status = make_status(PHASE_PAUSED, 7, "a, \"b\"\nc");
+  status.problem("client 'x': run_id: expected 1, got 0");
   SyncCounters& counters = status.counters();
   counters.resent(1);
   counters.late(2);
@@ -328,52 +326,53 @@ TEST_F(RecordingTest, StatusRowsKeepReasonsWithCommasQuotesAndLineBreaksAndEvery
   EXPECT_EQ(table.text(0, "round_trip_p50_us"), "81.25");
   EXPECT_EQ(table.text(0, "round_trip_p99_us"), "140");
   EXPECT_EQ(table.text(0, "timing"), "exact");
+  EXPECT_EQ(table.text(0, "problem"), "client 'x': run_id: expected 1, got 0");
+  EXPECT_EQ(table.header.back(), "problem");
 }
 
 // --- what is missing is said ---------------------------------------------------------------------
 
-TEST_F(RecordingTest, OneLostReferenceMakesItIncompleteAndIsListed) {
-  for (std::uint64_t step = 0; step <= kLastStep; ++step) {
-    recording_->add(make_state(step));
-    recording_->add(make_command(step));
-    if (step != 123) recording_->add(make_reference(step));
-  }
+TEST_F(RecordingTest, StepsLostInOneStretchAreListedAndMakeItIncomplete) {
+  recording_->add(make_status(PHASE_RUNNING, 0));
+  add_steps(0, 49);
+  feeder_.add({make_entry(60)});
+  add_steps(61, kLastStep);
   recording_->add(make_status(PHASE_FINISHED, kLastStep));
-  EXPECT_FALSE(recording_->has_all());
-  EXPECT_EQ(recording_->last_complete_step(), 122);
+  EXPECT_TRUE(recording_->has_all()) << "what is lost is not waited for";
   EXPECT_FALSE(finish());
   const Json manifest = read_manifest();
   EXPECT_EQ(manifest.at("complete"), false);
   EXPECT_EQ(manifest.at("outcome"), "finished");
-  EXPECT_EQ(
-      manifest.at("missing"),
-      Json::array({{{"vehicle_id", 0}, {"topic", "sls/reference"}, {"from", 123}, {"to", 123}}}));
-  EXPECT_EQ(read_table("state.csv").rows.size(), kLastStep + 1);
-  EXPECT_EQ(read_table("command.csv").rows.size(), kLastStep + 1);
-  EXPECT_EQ(read_table("reference.csv").rows.size(), kLastStep);
-  EXPECT_EQ(read_table("flight.csv").rows.size(), kLastStep);
+  const auto gap = [](const char* topic) {
+    return Json({{"vehicle_id", 0}, {"topic", topic}, {"from", 50}, {"to", 59}});
+  };
+  EXPECT_EQ(manifest.at("missing"),
+            Json::array({gap("sls/state"), gap("sls/command"), gap("sls/reference")}));
+  for (const char* name : {"state.csv", "command.csv", "reference.csv", "flight.csv"})
+    EXPECT_EQ(read_table(name).rows.size(), kLastStep + 1 - 10) << name;
   const std::string gaps = recording_->describe_gaps();
-  EXPECT_NE(gaps.find("sls/reference step 123"), std::string::npos) << gaps;
-  EXPECT_NE(read_bytes(folder_ / "flight.txt").find("sls/reference step 123"), std::string::npos);
+  EXPECT_NE(gaps.find("sls/state step 50"), std::string::npos) << gaps;
+  EXPECT_NE(read_bytes(folder_ / "flight.txt").find("sls/state step 50"), std::string::npos);
 }
 
-TEST_F(RecordingTest, LostStatesAreListedAsOneStretch) {
-  for (std::uint64_t step = 0; step <= kLastStep; ++step) {
-    if (step < 50 || step > 59) recording_->add(make_state(step));
-    recording_->add(make_command(step));
-    recording_->add(make_reference(step));
-  }
+TEST_F(RecordingTest, AStepAmidARunWithoutAnAnswerMissesIt) {
+  add_steps(0, 49);
+  feeder_.add({make_bare_entry(50)});
+  add_steps(51, kLastStep);
   recording_->add(make_status(PHASE_FINISHED, kLastStep));
   EXPECT_FALSE(finish());
-  bool is_listed = false;
-  const Json manifest = read_manifest();
-  for (const Json& gap : manifest.at("missing"))
-    if (gap.at("topic") == "sls/state") {
-      EXPECT_EQ(gap.at("from"), 50);
-      EXPECT_EQ(gap.at("to"), 59);
-      is_listed = true;
-    }
-  EXPECT_TRUE(is_listed);
+  const auto gap = [](const char* topic) {
+    return Json({{"vehicle_id", 0}, {"topic", topic}, {"from", 50}, {"to", 50}});
+  };
+  EXPECT_EQ(read_manifest().at("missing"), Json::array({gap("sls/command"), gap("sls/reference")}));
+}
+
+TEST_F(RecordingTest, AFinishedRunWithoutItsLastAnswerMissesIt) {
+  add_steps(0, kLastStep - 1);
+  feeder_.add({make_bare_entry(kLastStep)}, true);
+  recording_->add(make_status(PHASE_FINISHED, kLastStep));
+  EXPECT_FALSE(finish());
+  EXPECT_EQ(read_manifest().at("missing").size(), 2u);
 }
 
 TEST_F(RecordingTest, TheLostEndOfAFinishedRunIsListed) {
@@ -386,8 +385,7 @@ TEST_F(RecordingTest, TheLostEndOfAFinishedRunIsListed) {
   for (const Json& gap : manifest.at("missing")) {
     topics.insert(gap.at("topic").get<std::string>());
     EXPECT_EQ(gap.at("to"), kLastStep);
-    EXPECT_LE(gap.at("from"), 201);
-    EXPECT_GE(gap.at("from"), 200);
+    EXPECT_EQ(gap.at("from"), 201);
   }
   EXPECT_EQ(topics, (std::set<std::string>{"sls/state", "sls/command", "sls/reference"}));
   EXPECT_EQ(manifest.at("last_step"), kLastStep);
@@ -405,47 +403,31 @@ TEST_F(RecordingTest, SamplesTheQueueRefusedMakeItIncomplete) {
 }
 
 TEST_F(RecordingTest, StepsThatNobodyAnsweredAreRowsAndNotMissing) {
-  for (std::uint64_t step = 0; step <= kLastStep; ++step) {
-    const bool is_after_silence = step > 10 && step <= 20;
-    const ForceOrigin origin = step <= 15 ? FORCE_HELD : FORCE_FAIL_SAFE;
-    recording_->add(is_after_silence ? make_unanswered_state(step, origin) : make_state(step));
-    if (step >= 10 && step < 20) continue;
-    recording_->add(make_command(step));
-    recording_->add(make_reference(step));
-  }
+  add_steps(0, 9);
+  for (std::uint64_t step = 10; step < 20; ++step)
+    feeder_.add({make_unanswered_entry(step, step < 15 ? ANSWER_HELD : ANSWER_FAIL_SAFE)});
+  feeder_.add({make_late_entry(12)});
+  EXPECT_EQ(recording_->last_complete_step(), 9) << "late answers may still come";
+  add_steps(20, kLastStep);
   recording_->add(make_status(PHASE_FINISHED, kLastStep));
-  EXPECT_FALSE(recording_->has_all()) << "their references may still come";
+  EXPECT_TRUE(recording_->has_all());
   EXPECT_TRUE(finish());
   const Json manifest = read_manifest();
   EXPECT_EQ(manifest.at("unanswered_steps"), 10);
   EXPECT_EQ(manifest.at("missing"), Json::array());
-  const CsvTable commands = read_table("command.csv");
+  const CsvTable commands = read_table("command.csv"), references = read_table("reference.csv");
   ASSERT_EQ(commands.rows.size(), kLastStep + 1);
   for (std::uint64_t step = 10; step < 20; ++step) {
-    const bool is_held = step + 1 <= 15;
-    const auto next = make_unanswered_state(step + 1, is_held ? FORCE_HELD : FORCE_FAIL_SAFE);
-    EXPECT_EQ(commands.text(step, "fault"), is_held ? "held" : "fail_safe");
+    EXPECT_EQ(commands.text(step, "fault"), step < 15 ? "held" : "fail_safe");
     EXPECT_EQ(commands.text(step, "controller"), kPilot);
     EXPECT_EQ(commands.text(step, "compute_us"), "0");
     EXPECT_EQ(commands.number(step, "force_x_n"),
-              is_held ? next.answer_f_Q_W_n()[0] : next.f_Q_W_n()[0]);
+              make_unanswered_entry(step, ANSWER_HELD).answer().f_Q_W_n()[0]);
   }
-  EXPECT_EQ(read_table("reference.csv").rows.size(), kLastStep + 1 - 10);
-  EXPECT_EQ(read_table("flight.csv").rows.size(), kLastStep + 1 - 10);
-}
-
-TEST_F(RecordingTest, ALostCommandIsRebuiltAndCounted) {
-  for (std::uint64_t step = 0; step <= kLastStep; ++step) {
-    recording_->add(make_state(step));
-    if (step != 123) recording_->add(make_command(step));
-    recording_->add(make_reference(step));
-  }
-  recording_->add(make_status(PHASE_FINISHED, kLastStep));
-  EXPECT_TRUE(finish());
-  EXPECT_EQ(read_manifest().at("rebuilt_commands"), 1);
-  const CsvTable commands = read_table("command.csv");
-  EXPECT_EQ(commands.number(123, "force_x_n"), make_command(123).f_Q_W_n()[0]);
-  EXPECT_EQ(commands.text(123, "fault"), "none");
+  ASSERT_EQ(references.rows.size(), kLastStep + 1 - 9);
+  EXPECT_EQ(references.text(10, "step"), "12");
+  EXPECT_EQ(references.number(10, "ref_x_m"), make_entry(12).answer().reference().position_m()[0]);
+  EXPECT_EQ(read_table("flight.csv").rows.size(), kLastStep + 1 - 9);
 }
 
 TEST_F(RecordingTest, ALateJoinerListsWhatItHasMissed) {
@@ -461,22 +443,68 @@ TEST_F(RecordingTest, ALateJoinerListsWhatItHasMissed) {
   EXPECT_EQ(read_table("state.csv").text(0, "step"), "100");
 }
 
-TEST_F(RecordingTest, DroppedSamplesAreCountedInTheManifest) {
-  for (std::uint64_t step = 0; step <= kLastStep; ++step) {
-    add_step(step);
-    recording_->add(make_standby_command(step));
-    recording_->add(make_standby_reference(step));
-  }
-  recording_->add(make_state(3));
-  ControlCommand absurd = make_command(0);
-  absurd.step(1u << 30);
-  recording_->add(absurd);
+TEST_F(RecordingTest, DroppedEntriesAreCountedInTheManifest) {
+  add_steps(0, 10);
+  recording_->add(make_batch(3, {make_entry(3), make_entry(200)}));
+  feeder_.add({make_entry(5), make_entry(11, 9)});
+  add_steps(11, kLastStep);
   recording_->add(make_status(PHASE_FINISHED, kLastStep));
   EXPECT_TRUE(finish());
-  const Json dropped = read_manifest().at("dropped");
-  EXPECT_EQ(dropped.at("other_client"), kLastStep + 1);
-  EXPECT_EQ(dropped.at("repeated"), 1);
-  EXPECT_EQ(dropped.at("out_of_range"), 1);
+  EXPECT_EQ(read_manifest().at("dropped"), Json({{"repeated", 3}, {"out_of_range", 1}}));
+}
+
+// --- attitude, signals, measurements -------------------------------------------------------------
+
+TEST(SignalsTest, AttitudeRatesAndSignalsAreTheLastColumnsAndInTheManifest) {
+  const sls::test::TemporaryFolder folder;
+  record_flight(folder.path(), {}, make_signal_parameters());
+  const CsvTable states = parse_csv(read_bytes(folder / "state.csv"));
+  ASSERT_EQ(states.header.size(), 22u + 4 + 3 + 2);
+  ASSERT_EQ(states.rows.size(), kLastStep + 1);
+  for (std::uint64_t step = 0; step <= kLastStep; ++step) {
+    const PlantState truth = make_entry(step).truth();
+    EXPECT_EQ(states.number(step, "att_w"), truth.q_WB()[0]);
+    EXPECT_EQ(states.text(step, "att_z"), "-0");
+    EXPECT_EQ(states.number(step, "rate_y_rad_s"), truth.w_WB_B_rad_s()[1]);
+    EXPECT_EQ(states.number(step, "tension_n"), truth.signals()[0]);
+    EXPECT_EQ(states.text(step, "wind"), "-7");
+  }
+  const Json manifest = Json::parse(read_bytes(folder / "manifest.json"));
+  EXPECT_EQ(manifest.at("complete"), true);
+  EXPECT_EQ(manifest.at("signals"), Json::array({{{"name", "tension_n"}, {"unit", "N"}},
+                                                 {{"name", "wind"}, {"unit", ""}}}));
+}
+
+TEST(SignalsTest, RowsHaveAsManyFieldsAsTheHeaderWhateverComes) {
+  const sls::test::TemporaryFolder folder;
+  record_flight(
+      folder.path(), [](RecordEntry& entry) { entry.truth().signals().resize(entry.step() % 5); },
+      make_signal_parameters());
+  const CsvTable states = parse_csv(read_bytes(folder / "state.csv"));
+  for (const auto& row : states.rows) ASSERT_EQ(row.size(), states.header.size());
+  EXPECT_EQ(states.text(0, "tension_n"), "nan");
+}
+
+TEST_F(RecordingTest, WhatWasMeasuredHasAFileOfItsOwnFromItsFirstRowOn) {
+  add_steps(0, 49);
+  EXPECT_FALSE(fs::exists(folder_ / "measured.csv"));
+  for (std::uint64_t step = 50; step <= kLastStep; ++step) {
+    RecordEntry entry = make_entry(step);
+    entry.measured({entry.truth()});
+    entry.measured()[0].p_WQ_m()[0] += 1;
+    feeder_.add({entry}, step == kLastStep);
+  }
+  recording_->add(make_status(PHASE_FINISHED, kLastStep));
+  finish();
+  const CsvTable measured = read_table("measured.csv"), states = read_table("state.csv");
+  EXPECT_EQ(measured.header, states.header);
+  ASSERT_EQ(measured.rows.size(), kLastStep + 1 - 50);
+  for (std::size_t row = 0; row < measured.rows.size(); ++row) {
+    EXPECT_EQ(measured.number(row, "quad_x_m"), states.number(row + 50, "quad_x_m") + 1);
+    EXPECT_EQ(measured.text(row, "step"), states.text(row + 50, "step"));
+    EXPECT_EQ(measured.text(row, "force_z_n"), states.text(row + 50, "force_z_n"));
+  }
+  EXPECT_EQ(read_manifest().at("files").at("measured.csv").at("rows"), measured.rows.size());
 }
 
 // --- runs that did not finish --------------------------------------------------------------------
@@ -484,12 +512,11 @@ TEST_F(RecordingTest, DroppedSamplesAreCountedInTheManifest) {
 TEST_F(RecordingTest, AFailedRunIsKeptWithItsCauseAndNeverComplete) {
   recording_->add(make_status(PHASE_RUNNING, 0));
   add_steps(0, 149);
-  recording_->add(make_state(150));
-  ControlCommand faulted = make_command(150);
-  faulted.fault(FAULT_FREE_FALL);
-  faulted.mission(MISSION_FAILED);
-  recording_->add(faulted);
-  recording_->add(make_reference(150));
+  RecordEntry faulted = make_entry(150);
+  faulted.kind(ANSWER_REFUSED);
+  faulted.answer().fault(FAULT_FREE_FALL);
+  faulted.answer().mission(MISSION_FAILED);
+  feeder_.add({faulted}, true);
   recording_->add(make_status(PHASE_FAILED, 150, "controller 'pilot' answered with a fault"));
   EXPECT_FALSE(finish());
   const Json manifest = read_manifest();
@@ -507,7 +534,7 @@ TEST_F(RecordingTest, AFailedRunIsKeptWithItsCauseAndNeverComplete) {
 
 TEST_F(RecordingTest, AFailedRunsLastStepNeedsNoAnswer) {
   add_steps(0, 149);
-  recording_->add(make_state(150));
+  feeder_.add({make_bare_entry(150)}, true);
   recording_->add(make_status(PHASE_FAILED, 150, "no answer to step 150"));
   EXPECT_FALSE(finish());
   EXPECT_EQ(read_manifest().at("missing"), Json::array());
@@ -527,7 +554,7 @@ TEST_F(RecordingTest, ARunThatFailedBeforeItBeganMissesNothing) {
 
 TEST_F(RecordingTest, TheReasonOfAFailureComesBeforeWhatIsMissing) {
   add_steps(0, 20);
-  for (std::uint64_t step = 22; step <= 30; ++step) add_step(step);
+  add_steps(22, 30);
   recording_->add(make_status(PHASE_FAILED, 30, "the recorder was behind"));
   EXPECT_FALSE(finish());
   const std::string gaps = recording_->describe_gaps();
@@ -546,7 +573,7 @@ TEST_F(RecordingTest, AnInterruptedRunSaysSo) {
   EXPECT_EQ(manifest.at("reason"), "interrupted by SIGINT");
   EXPECT_EQ(manifest.at("files").at("state.csv").at("rows"), 100);
   EXPECT_EQ(read_table("state.csv").rows.size(), 100u);
-  EXPECT_EQ(read_table("flight.csv").rows.size(), 99u);
+  EXPECT_EQ(read_table("flight.csv").rows.size(), 100u);
   const std::string gaps = recording_->describe_gaps();
   EXPECT_NE(gaps.find("SIGINT"), std::string::npos) << gaps;
   EXPECT_NE(read_bytes(folder_ / "flight.txt").find("SIGINT"), std::string::npos);
@@ -555,7 +582,7 @@ TEST_F(RecordingTest, AnInterruptedRunSaysSo) {
 TEST_F(RecordingTest, AResetRunIsKeptAndItsLastStepNeedsNoAnswer) {
   recording_->add(make_status(PHASE_RUNNING, 0));
   add_steps(0, 99);
-  recording_->add(make_state(100));
+  feeder_.add({make_bare_entry(100)}, true);
   recording_->add(make_status(PHASE_RESET, 100, "reset by nina@lab"));
   EXPECT_FALSE(finish());
   const Json manifest = read_manifest();
@@ -565,12 +592,29 @@ TEST_F(RecordingTest, AResetRunIsKeptAndItsLastStepNeedsNoAnswer) {
   EXPECT_EQ(manifest.at("complete"), false);
 }
 
-TEST_F(RecordingTest, ALostServersRunSaysSo) {
+// What was not published is not in the recording.
+TEST_F(RecordingTest, AServerKilledBetweenTwoBatchesLeavesWhatItPublished) {
   recording_->add(make_status(PHASE_RUNNING, 0));
   add_steps(0, 99);
+  recording_->add(make_status(PHASE_RUNNING, 120));
+  EXPECT_FALSE(recording_->has_all());
   EXPECT_FALSE(recording_->finish("the server is gone", 0, "lost"));
   EXPECT_EQ(read_manifest().at("outcome"), "lost");
   EXPECT_EQ(read_manifest().at("reason"), "the server is gone");
+  EXPECT_EQ(read_manifest().at("missing"), Json::array());
+  EXPECT_EQ(read_manifest().at("last_step"), 99);
+  EXPECT_EQ(read_table("command.csv").rows.size(), 100u);
+}
+
+TEST_F(RecordingTest, TheEndTakesBothTheStatusAndTheLastBatch) {
+  add_steps(0, kLastStep - 1);
+  recording_->add(make_status(PHASE_FINISHED, kLastStep));
+  EXPECT_FALSE(recording_->has_all());
+  feeder_.add({make_entry(kLastStep)});
+  EXPECT_FALSE(recording_->has_all());
+  feeder_.add({}, true);
+  EXPECT_TRUE(recording_->has_all());
+  EXPECT_TRUE(finish());
 }
 
 TEST_F(RecordingTest, StatusSamplesThatComeAgainAreOneRow) {
@@ -689,25 +733,13 @@ TEST_F(RecordingTest, AManifestThatDoesNotFitLeavesTheEarlierOneWhole) {
 
 // --- samples that do not belong here -------------------------------------------------------------
 
-TEST_F(RecordingTest, SamplesOfOtherRunsAndVehiclesAreIgnored) {
+TEST_F(RecordingTest, SamplesOfOtherRunsAreIgnored) {
   recording_->add(make_status(PHASE_RUNNING, 0));
   for (std::uint64_t step = 0; step <= kLastStep; ++step) {
-    VehicleState state = make_state(step);
-    ControlCommand command = make_command(step);
-    Reference reference = make_reference(step);
-    state.run_id(kRunId + 1);
-    command.run_id(kRunId + 1);
-    reference.run_id(0);
-    recording_->add(state);
-    recording_->add(command);
-    recording_->add(reference);
-    state = make_state(step);
-    state.vehicle_id(1);
-    command = make_command(step);
-    command.vehicle_id(4000000000);
-    recording_->add(state);
-    recording_->add(command);
-    add_step(step);
+    RecordBatch other = make_batch(step, {make_entry(step + 1)}, true);
+    other.run_id(kRunId + 1);
+    recording_->add(other);
+    add_steps(step, step);
   }
   const SimStatus end = make_status(PHASE_FINISHED, kLastStep);
   SimStatus other = end;
@@ -734,23 +766,15 @@ TEST_F(RecordingTest, TextsCutWithinALetterDoNotCostTheManifest) {
 TEST_F(RecordingTest, EveryVehicleOfTheRunIsWaitedFor) {
   const sls::test::TemporaryFolder folder;
   Parameters parameters = make_parameters();
-  parameters.vehicle_ids({0, 7});
+  set_vehicles(parameters, {0, 7});
   Recording recording(folder.path(), parameters);
   recording.add(make_status(PHASE_FINISHED, kLastStep));
+  BatchFeeder feeder(recording);
   for (const std::uint32_t id : {0u, 7u}) {
     EXPECT_FALSE(recording.has_all());
     EXPECT_EQ(recording.last_complete_step(), -1);
-    for (std::uint64_t step = 0; step <= kLastStep; ++step) {
-      VehicleState state = make_state(step);
-      ControlCommand command = make_command(step);
-      Reference reference = make_reference(step);
-      state.vehicle_id(id);
-      command.vehicle_id(id);
-      reference.vehicle_id(id);
-      recording.add(state);
-      recording.add(command);
-      recording.add(reference);
-    }
+    for (std::uint64_t step = 0; step <= kLastStep; ++step)
+      feeder.add({make_entry(step, id)}, id == 7 && step == kLastStep);
   }
   EXPECT_TRUE(recording.has_all());
   EXPECT_TRUE(recording.finish("", 0));
@@ -764,10 +788,16 @@ TEST_F(RecordingTest, ASecondRecordingIntoTheSameFolderIsRefusedAndTheFirstKept)
   EXPECT_EQ(read_table("state.csv").rows.size(), kLastStep + 1);
 }
 
-TEST(RecordingErrorTest, AScenarioThatCannotBeReadIsRefusedBeforeAnyFile) {
+TEST(RecordingErrorTest, ParametersThatCannotBeUsedAreRefusedBeforeAnyFile) {
   const sls::test::TemporaryFolder folder;
   Parameters parameters = make_parameters();
   parameters.scenario_text("name: [");
+  EXPECT_THROW(Recording(folder.path(), parameters), config::ConfigError);
+  parameters = make_signal_parameters();
+  parameters.signals()[0].name("step");
+  EXPECT_THROW(Recording(folder.path(), parameters), config::ConfigError);
+  parameters = make_parameters();
+  parameters.vehicles().clear();
   EXPECT_THROW(Recording(folder.path(), parameters), config::ConfigError);
   EXPECT_TRUE(fs::is_empty(folder.path()));
 }

@@ -63,14 +63,14 @@ TEST_F(SegmentsTest, AResumedRecordingEqualsTheUndisturbedOne) {
   const Segment segment = resume();
   EXPECT_EQ(segment.number, 2);
   EXPECT_EQ(segment.folder, out_ / "segment-2");
-  EXPECT_EQ(segment.first_step, 150u) << "of step 150 the next state has not come";
+  EXPECT_EQ(segment.first_step, 151u);
   EXPECT_TRUE(record_to_the_end(segment, 20));
   expect_equal_to_the_undisturbed(segment.folder);
   EXPECT_EQ(read_manifest(segment.folder).at("segment"),
-            Json({{"number", 2}, {"first_step", 150}}));
+            Json({{"number", 2}, {"first_step", 151}}));
   EXPECT_EQ(read_manifest(out_).at("complete"), false) << "the last segment speaks for all";
   const auto table = parse_csv(read_bytes(segment.folder / "state.csv"));
-  EXPECT_EQ(table.text(0, "step"), "150");
+  EXPECT_EQ(table.text(0, "step"), "151");
 }
 
 TEST_F(SegmentsTest, TheLastSegmentsFlightTextIsThatOfTheWholeFlight) {
@@ -124,7 +124,7 @@ TEST_F(SegmentsTest, RowsCutAnywhereAreRecordedAgain) {
       write_bytes(out_ / name, bytes.substr(0, bytes.size() - surplus));
       fs::remove_all(out_ / "segment-2");
       const Segment segment = resume();
-      EXPECT_LT(segment.first_step, 150u);
+      EXPECT_LT(segment.first_step, 151u);
       EXPECT_TRUE(record_to_the_end(segment, 0));
       expect_equal_to_the_undisturbed(segment.folder);
     }
@@ -150,30 +150,30 @@ TEST_F(SegmentsTest, WhatTheHistoriesNoLongerHoldIsNamedAsAGap) {
   EXPECT_EQ(manifest.at("outcome"), "finished");
   ASSERT_EQ(manifest.at("missing").size(), 3u);
   for (const Json& gap : manifest.at("missing")) {
-    EXPECT_EQ(gap.at("from"), 150);
+    EXPECT_EQ(gap.at("from"), 151);
     EXPECT_EQ(gap.at("to"), 199);
   }
-  EXPECT_EQ(find_difference(), "vehicle 0, step 150: in A alone");
+  EXPECT_EQ(find_difference(), "vehicle 0, step 151: in A alone");
   EXPECT_TRUE(inspect(open_recording(out_)).problems.empty());
 }
 
 TEST_F(SegmentsTest, AnEarlierSegmentsGapKeepsTheWholeFromBeingComplete) {
   {
     Recording recording(out_, make_parameters());
-    for (std::uint64_t step = 0; step <= 150; ++step) {
-      recording.add(make_state(step));
-      recording.add(make_command(step));
-      if (step != 50) recording.add(make_reference(step));
-    }
-    for (int i = 0; i < 12; ++i) recording.pass_time(std::chrono::seconds(1));
+    BatchFeeder feeder(recording);
+    feeder.add_steps(0, 49);
+    feeder.add_steps(51, 150);
     while (fs::file_size(out_ / "command.csv") < 200) recording.flush_if_due();
   }
   const Segment segment = resume();
-  EXPECT_EQ(segment.first_step, 150u);
+  EXPECT_EQ(segment.first_step, 151u);
   EXPECT_FALSE(record_to_the_end(segment, 0));
-  EXPECT_EQ(
-      read_manifest(segment.folder).at("missing"),
-      Json::array({{{"vehicle_id", 0}, {"topic", "sls/reference"}, {"from", 50}, {"to", 50}}}));
+  const Json missing = read_manifest(segment.folder).at("missing");
+  EXPECT_EQ(missing.size(), 3u);
+  for (const Json& gap : missing) {
+    EXPECT_EQ(gap.at("from"), 50);
+    EXPECT_EQ(gap.at("to"), 50);
+  }
 }
 
 TEST_F(SegmentsTest, StatusSamplesOfAllSegmentsCountTogether) {
@@ -204,14 +204,11 @@ TEST_F(SegmentsTest, StatusSamplesOfAllSegmentsCountTogether) {
 
 TEST_F(SegmentsTest, StepsThatNobodyAnsweredAreWholeWithoutAReference) {
   const auto add = [](Recording& recording, std::uint64_t from, std::uint64_t to) {
-    for (std::uint64_t step = from; step <= to; ++step) {
-      const bool is_after_silence = step > 40 && step <= 60;
-      recording.add(is_after_silence ? make_unanswered_state(step, FORCE_HELD) : make_state(step));
-      if (step >= 40 && step < 60) continue;
-      recording.add(make_command(step));
-      recording.add(make_reference(step));
-    }
-    for (int i = 0; i < 12; ++i) recording.pass_time(std::chrono::seconds(1));
+    BatchFeeder feeder(recording, from);
+    for (std::uint64_t step = from; step <= to; ++step)
+      feeder.add(
+          {step < 40 || step >= 60 ? make_entry(step) : make_unanswered_entry(step, ANSWER_HELD)},
+          step == kLastStep);
   };
   fs::remove_all(whole_);
   fs::create_directory(whole_);
@@ -222,19 +219,37 @@ TEST_F(SegmentsTest, StepsThatNobodyAnsweredAreWholeWithoutAReference) {
   }
   {
     Recording recording(out_, make_parameters());
-    add(recording, 0, 51);
+    add(recording, 0, 116);  // to the step 52 none can come late
     while (fs::file_size(out_ / "command.csv") < 200) recording.flush_if_due();
   }
   const Segment segment = resume();
-  EXPECT_EQ(segment.first_step, 51u);
+  EXPECT_EQ(segment.first_step, 52u);
   {
     Recording recording(segment, make_parameters());
-    add(recording, 0, kLastStep);
+    add(recording, 30, kLastStep);
     EXPECT_TRUE(finish_flight(recording));
   }
   expect_equal_to_the_undisturbed(segment.folder);
   EXPECT_EQ(read_manifest(whole_).at("unanswered_steps"), 20);
-  EXPECT_EQ(read_manifest(segment.folder).at("unanswered_steps"), 9);
+  EXPECT_EQ(read_manifest(segment.folder).at("unanswered_steps"), 8);
+}
+
+TEST_F(SegmentsTest, SignalsAreJoinedToo) {
+  fs::remove_all(whole_);
+  fs::create_directory(whole_);
+  record_flight(whole_, {}, make_signal_parameters());
+  {
+    Recording recording(out_, make_signal_parameters());
+    add_steps(recording, 0, 150);
+    recording.finish("interrupted by SIGTERM", 0);
+  }
+  const Segment segment = resume();
+  {
+    Recording recording(segment, make_signal_parameters());
+    add_steps(recording, 100, kLastStep);
+    EXPECT_TRUE(finish_flight(recording));
+  }
+  expect_equal_to_the_undisturbed(segment.folder);
 }
 
 TEST_F(SegmentsTest, ASegmentOfAnotherScenarioIsRefused) {

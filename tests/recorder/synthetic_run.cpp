@@ -50,18 +50,26 @@ mission:
     for_s: 0.8
 )";
 
+void set_vehicles(Parameters& parameters, const std::vector<std::uint32_t>& ids) {
+  parameters.vehicles().clear();
+  for (const std::uint32_t id : ids) {
+    VehicleParameters& vehicle = parameters.vehicles().emplace_back();
+    vehicle.vehicle_id(id);
+    vehicle.quad_mass_kg(1.5);
+    vehicle.load_mass_kg(0.2);
+    vehicle.rod_length_m(1.0);
+    vehicle.gravity_m_s2(9.8);
+  }
+}
+
 Parameters make_parameters() {
   status_samples = 0;
   Parameters message;
   message.run_id(kRunId);
-  message.vehicle_id(0);
-  message.vehicle_ids({0});
+  set_vehicles(message, {0});
   message.scenario_text(kScenarioText);
   message.scenario_sha256(config::calc_sha256(kScenarioText));
-  message.quad_mass_kg(1.5);
-  message.load_mass_kg(0.2);
-  message.rod_length_m(1.0);
-  message.gravity_m_s2(9.8);
+  message.contract_sha256(std::string(64, 'c'));
   message.period_ns(kPeriod);
   message.step_ns(1'000'000);
   message.mode(MODE_LOCKSTEP);
@@ -69,96 +77,93 @@ Parameters make_parameters() {
   return message;
 }
 
-VehicleState make_state(std::uint64_t step) {
+Parameters make_signal_parameters() {
+  Parameters message = make_parameters();
+  message.has_attitude(true);
+  message.signals().resize(2);
+  message.signals()[0].name("tension_n");
+  message.signals()[0].unit("N");
+  message.signals()[1].name("wind");
+  return message;
+}
+
+RecordEntry make_entry(std::uint64_t step, std::uint32_t vehicle_id) {
   model::RodAngles rod;
   rod.alpha = 0.3 * std::sin(to_time(step) + 1);
   rod.beta = 0.2 * std::cos(to_time(step) + 1);
   rod.alpha_dot = 0.31;
   rod.beta_dot = -0.21 - to_time(step);
   const auto state = model::make_state(make_vector(step, 1, 10), make_vector(step, 2, 5), rod, 1.0);
-  VehicleState message;
-  message.run_id(kRunId);
-  message.step(step);
-  message.sim_time_ns(static_cast<std::int64_t>(step) * kPeriod);
-  PlantState& truth = message.truth();
+  RecordEntry entry;
+  entry.vehicle_id(vehicle_id);
+  entry.step(step);
+  entry.kind(ANSWER_ACCEPTED);
+  PlantState& truth = entry.truth();
   truth.p_WQ_m(bus::to_array(state.p_WQ));
   truth.v_WQ_m_s(bus::to_array(state.v_WQ));
+  truth.q_WB({std::cos(to_time(step)), std::sin(to_time(step)), 0, -0.0});
+  truth.w_WB_B_rad_s(bus::to_array(make_vector(step, 8, 4)));
   truth.p_WL_m(bus::to_array(state.p_WL));
   truth.v_WL_m_s(bus::to_array(state.v_WL));
   truth.alpha_rad(rod.alpha);
   truth.beta_rad(rod.beta);
   truth.alpha_dot_rad_s(rod.alpha_dot);
   truth.beta_dot_rad_s(rod.beta_dot);
-  const Eigen::Vector3d bias(0.1, 0.2, 0.3);  // what is measured is not what is recorded
-  message.p_WQ_m(bus::to_array(state.p_WQ + bias));
-  message.v_WQ_m_s(bus::to_array(state.v_WQ + bias));
-  message.p_WL_m(bus::to_array(state.p_WL + bias));
-  message.v_WL_m_s(bus::to_array(state.v_WL + bias));
-  message.alpha_rad(rod.alpha + 0.1);
-  message.beta_rad(rod.beta + 0.1);
-  message.alpha_dot_rad_s(rod.alpha_dot + 0.1);
-  message.beta_dot_rad_s(rod.beta_dot + 0.1);
-  if (step > 0) {
-    message.f_Q_W_n(bus::to_array(make_force(step - 1)));
-    message.answer_f_Q_W_n(message.f_Q_W_n());
-    message.force_origin(FORCE_ANSWERED);
-    message.controller_name(kPilot);
-    message.controller(make_controller(step - 1));
-  }
-  return message;
+  truth.signals({0.1 + to_time(step), -7});
+  if (step > 0) entry.f_Q_W_n(bus::to_array(make_force(step - 1)));
+  entry.answered_step(step);
+  entry.client_name(kPilot);
+  ControlCommand& answer = entry.answer();
+  answer.vehicle_id(vehicle_id);
+  answer.f_Q_W_n(bus::to_array(make_force(step)));
+  answer.controller(make_controller(step));
+  answer.mission(step == kLastStep ? MISSION_FINISHED : MISSION_RUNNING);
+  answer.fault(FAULT_NONE);
+  answer.compute_time_ns(12345 + step);
+  Reference& reference = answer.reference();
+  reference.stage_index(step < 100 ? 0 : 1);
+  reference.stage_name(step < 100 ? "hold" : "figure_eight");
+  reference.position_m(bus::to_array(make_vector(step, 3, 9)));
+  reference.velocity_m_s(bus::to_array(make_vector(step, 4, 8)));
+  reference.acceleration_m_s2(bus::to_array(make_vector(step, 5, 7)));
+  reference.jerk_m_s3(bus::to_array(make_vector(step, 6, 6)));
+  reference.snap_m_s4(bus::to_array(make_vector(step, 7, 5)));
+  return entry;
 }
 
-ControlCommand make_command(std::uint64_t step) {
-  ControlCommand message;
-  message.run_id(kRunId);
-  message.step(step);
-  message.f_Q_W_n(bus::to_array(make_force(step)));
-  message.client_name(kPilot);
-  message.strength(5);
-  message.controller(make_controller(step));
-  message.mission(step == kLastStep ? MISSION_FINISHED : MISSION_RUNNING);
-  message.fault(FAULT_NONE);
-  message.compute_time_ns(12345 + step);
-  return message;
+RecordEntry make_unanswered_entry(std::uint64_t step, AnswerKind kind) {
+  RecordEntry entry = make_entry(step);
+  entry.kind(kind);
+  entry.answered_step(step - 1);
+  entry.answer().f_Q_W_n(bus::to_array(make_force(step + 1000)));
+  entry.answer().reference().position_m({1, 2, 3});  // of another step: not to be recorded
+  return entry;
 }
 
-Reference make_reference(std::uint64_t step) {
-  Reference message;
-  message.run_id(kRunId);
-  message.step(step);
-  message.sim_time_ns(static_cast<std::int64_t>(step) * kPeriod);
-  message.client_name(kPilot);
-  message.stage_index(step < 100 ? 0 : 1);
-  message.stage_name(step < 100 ? "hold" : "figure_eight");
-  message.position_m(bus::to_array(make_vector(step, 3, 9)));
-  message.velocity_m_s(bus::to_array(make_vector(step, 4, 8)));
-  message.acceleration_m_s2(bus::to_array(make_vector(step, 5, 7)));
-  message.jerk_m_s3(bus::to_array(make_vector(step, 6, 6)));
-  message.snap_m_s4(bus::to_array(make_vector(step, 7, 5)));
-  return message;
+RecordEntry make_late_entry(std::uint64_t step, std::uint32_t vehicle_id) {
+  RecordEntry entry = make_entry(step, vehicle_id);
+  entry.kind(ANSWER_LATE);
+  entry.truth(PlantState());
+  entry.f_Q_W_n({0, 0, 0});
+  return entry;
 }
 
-VehicleState make_unanswered_state(std::uint64_t step, ForceOrigin origin) {
-  VehicleState message = make_state(step);
-  message.force_origin(origin);
-  message.answer_f_Q_W_n(bus::to_array(make_force(step + 1000)));
-  message.f_Q_W_n(bus::to_array(make_force(step + 2000)));
-  return message;
+RecordEntry make_bare_entry(std::uint64_t step) {
+  RecordEntry entry = make_entry(step);
+  entry.kind(ANSWER_NONE);
+  entry.client_name("");
+  entry.answer(ControlCommand());
+  return entry;
 }
 
-ControlCommand make_standby_command(std::uint64_t step) {
-  ControlCommand message = make_command(step);
-  message.client_name("standby");
-  message.strength(1);
-  message.f_Q_W_n()[0] += 1.0;
-  return message;
-}
-
-Reference make_standby_reference(std::uint64_t step) {
-  Reference message = make_reference(step);
-  message.client_name("standby");
-  message.position_m()[0] += 1.0;
-  return message;
+RecordBatch make_batch(std::uint64_t batch_index, const std::vector<RecordEntry>& entries,
+                       bool is_last) {
+  RecordBatch batch;
+  batch.run_id(kRunId);
+  batch.batch_index(batch_index);
+  batch.is_last(is_last);
+  batch.entries(entries);
+  return batch;
 }
 
 SimStatus make_status(RunPhase phase, std::uint64_t step, const std::string& reason) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "common/bus/topics.hpp"
@@ -17,19 +18,23 @@ extern const char* const kScenarioText;
 
 /// A run begins with them: its status samples count from 0.
 Parameters make_parameters();
+void set_vehicles(Parameters& parameters, const std::vector<std::uint32_t>& ids);
+/// Those of a plant with attitude, and of two signals.
+Parameters make_signal_parameters();
 
-/// State of `step`; the force in it is that of the pilot's answer to the step before.
-VehicleState make_state(std::uint64_t step);
-ControlCommand make_command(std::uint64_t step);
-Reference make_reference(std::uint64_t step);
+/// Step `step`, answered by the pilot.
+RecordEntry make_entry(std::uint64_t step, std::uint32_t vehicle_id = 0);
 
-/// State of `step` where nobody's answer to the step before was in force but `origin`: the force
-/// answered earlier and the force applied are two others.
-VehicleState make_unanswered_state(std::uint64_t step, ForceOrigin origin);
+/// Step `step` that went by with another force than the pilot's.
+RecordEntry make_unanswered_entry(std::uint64_t step, AnswerKind kind);
+/// The pilot's answer to it, which came late.
+RecordEntry make_late_entry(std::uint64_t step, std::uint32_t vehicle_id = 0);
 
-/// What another client answered to `step`: another force, another reference.
-ControlCommand make_standby_command(std::uint64_t step);
-Reference make_standby_reference(std::uint64_t step);
+/// The last step of a run that failed or was reset: nobody's answer is in force.
+RecordEntry make_bare_entry(std::uint64_t step);
+
+RecordBatch make_batch(std::uint64_t batch_index, const std::vector<RecordEntry>& entries,
+                       bool is_last = false);
 
 SimStatus make_status(RunPhase phase, std::uint64_t step, const std::string& reason = "");
 

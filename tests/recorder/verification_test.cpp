@@ -7,6 +7,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <sstream>
 
 #include "common/config/config_error.hpp"
 #include "tests/recorder/flights.hpp"
@@ -144,7 +145,7 @@ TEST_F(VerificationTest, AShorterRecordingDiffersWhereItEnds) {
     add_steps(recording, 0, 200);
     recording.finish("interrupted by SIGINT", 0);
   }
-  EXPECT_EQ(find_difference(), "command.csv, vehicle 0, step 200: a row in A alone");
+  EXPECT_EQ(find_difference(), "vehicle 0, step 201: in A alone");
   EXPECT_EQ(find_problems(b_), "") << "it is what its manifest says";
   const auto notes = list_notes(open_recording(a_), open_recording(b_));
   ASSERT_EQ(notes.size(), 1u);
@@ -159,19 +160,17 @@ TEST_F(VerificationTest, ScenarioPeriodModeAndMissingStepsAreNoted) {
   parameters.mode(MODE_REALTIME);
   parameters.scenario_sha256(std::string(64, 'f'));
   Recording recording(b_, parameters);
-  for (std::uint64_t step = 0; step <= kLastStep; ++step) {
-    recording.add(make_state(step));
-    recording.add(make_command(step));
-    if (step != 7) recording.add(make_reference(step));
-  }
+  BatchFeeder feeder(recording);
+  feeder.add_steps(0, 6);
+  feeder.add_steps(8, kLastStep);
   finish_flight(recording);
   std::string text;
   for (const auto& note : list_notes(open_recording(a_), open_recording(b_))) text += note + '\n';
   for (const char* part :
        {"period in force, s: 0.004 in A, 0.002 in B", "mode: lockstep in A, realtime in B",
-        "ffff in B", "B: 1 samples missing, first sls/reference step 7 of vehicle 0"})
+        "ffff in B", "B: 3 samples missing, first sls/state step 7 of vehicle 0"})
     EXPECT_NE(text.find(part), std::string::npos) << part << '\n' << text;
-  EXPECT_EQ(find_difference(), "reference.csv, vehicle 0, step 7: a row in A alone");
+  EXPECT_EQ(find_difference(), "state.csv, vehicle 0, step 1, sim_time_s: 0.004 in A, 0.002 in B");
 }
 
 TEST_F(VerificationTest, FilesThatAreNotWhatTheManifestSaysAreNamed) {
@@ -211,22 +210,17 @@ TEST_F(VerificationTest, AFleetIsComparedInStepOrderWhateverTheOrderOfItsRows) {
     fs::remove_all(folder);
     fs::create_directory(folder);
     Parameters parameters = make_parameters();
-    parameters.vehicle_ids({7, 0, 3});
+    set_vehicles(parameters, {0, 3, 7});
     Recording recording(folder, parameters);
+    BatchFeeder feeder(recording);
     for (std::uint64_t first = 0; first <= kLastStep; first += steps_apart)
       for (const std::uint32_t id : kIds)
         for (auto step = first; step < std::min(first + steps_apart, kLastStep + 1); ++step) {
-          VehicleState state = make_state(step);
-          ControlCommand command = make_command(step);
-          Reference reference = make_reference(step);
-          state.vehicle_id(id);
-          command.vehicle_id(id);
-          reference.vehicle_id(id);
-          recording.add(state);
-          recording.add(command);
-          if (id != 3 || step % 2 == 0) recording.add(reference);
-          if (id == 3) recording.pass_time(std::chrono::seconds(11));  // no longer waited for
+          RecordEntry entry = make_entry(step, id);
+          if (id == 3 && step % 2 == 1) entry.kind(ANSWER_HELD);
+          feeder.add({entry});
         }
+    feeder.add({}, true);
     finish_flight(recording);
   };
   record(a_, 1);
@@ -249,11 +243,56 @@ TEST_F(VerificationTest, AFleetIsComparedInStepOrderWhateverTheOrderOfItsRows) {
   EXPECT_EQ(find_difference(), "command.csv, vehicle 3, step 10: a row in A alone");
 }
 
+TEST_F(VerificationTest, SignalsAreComparedByTheirNames) {
+  for (const auto& folder : {a_, b_}) {
+    fs::remove_all(folder);
+    fs::create_directory(folder);
+    record_flight(folder, {}, make_signal_parameters());
+    EXPECT_EQ(find_problems(folder), "");
+  }
+  EXPECT_EQ(find_difference(), "equal");
+  change("state.csv", 102, 30, [](auto&) { return "-7.5"; });
+  EXPECT_EQ(find_difference(), "state.csv, vehicle 0, step 100, wind: -7 in A, -7.5 in B");
+  EXPECT_NE(find_problems(b_).find("certificate"), std::string::npos);
+  change("state.csv", 52, 22, to_next);
+  EXPECT_EQ(find_difference().find("state.csv, vehicle 0, step 50, att_w"), 0u);
+  change("state.csv", 1, 29, [](auto&) { return "force_n"; });
+  EXPECT_EQ(find_difference(), "state.csv: other columns in A than in B");
+  change("state.csv", 32, 23, [](auto&) { return "fast"; });
+  EXPECT_NE(find_problems(b_).find("state.csv:32: att_x: expected a number, got 'fast'"),
+            std::string::npos);
+}
+
+TEST_F(VerificationTest, WhatWasMeasuredIsCheckedAgainstTheManifestAndNotCertified) {
+  fs::remove_all(b_);
+  fs::create_directory(b_);
+  record_flight(b_, [](RecordEntry& entry) { entry.measured({entry.truth()}); });
+  EXPECT_EQ(find_problems(b_), "");
+  EXPECT_EQ(find_difference(), "equal");
+  EXPECT_EQ(inspect(open_recording(a_)).certificate, inspect(open_recording(b_)).certificate);
+  remove_line("measured.csv", 100);
+  EXPECT_NE(find_problems(b_).find("measured.csv: 300 rows, manifest: 301"), std::string::npos);
+}
+
+// Three steps that a recorder of contract 1 wrote; of its files the fuzzer's corpus has four.
+TEST_F(VerificationTest, ARecordingOfAnEarlierVersionKeepsItsCertificate) {
+  std::istringstream corpus(read_bytes(SLS_SOURCE_DIR "/tests/fuzz/corpus/recording/three_steps"));
+  for (const char* name : {"manifest.json", "state.csv", "command.csv", "reference.csv"}) {
+    std::string bytes;
+    std::getline(corpus, bytes, '\x1e');
+    write_bytes(b_ / name, bytes);
+  }
+  const RecordedFlight flight = open_recording(b_);
+  const Inspection inspection = inspect(flight);
+  EXPECT_EQ(inspection.steps, 3u);
+  EXPECT_EQ(inspection.certificate, flight.manifest().certificate);
+}
+
 TEST_F(VerificationTest, AKilledRecordingIsReadAndSaidToBeUnfinished) {
   fs::remove_all(b_);
   fs::create_directory(b_);
   record_until_killed(make_segment(b_), 0, 200);
-  EXPECT_EQ(find_difference(), "vehicle 0, step 200: in A alone");
+  EXPECT_EQ(find_difference(), "vehicle 0, step 201: in A alone");
   EXPECT_NE(find_problems(b_).find("lists no files"), std::string::npos);
 }
 

@@ -73,16 +73,19 @@ class LineWriter {
   }
 
  private:
-  /// Another run, phase or reason; that a reason is not repeated is none.
+  /// Another run, phase, problem or reason; that a reason is not repeated is none.
   bool is_news(const Snapshot& snapshot) {
     const std::uint64_t run_id = snapshot.parameters.run_id();
     std::string reason = snapshot.status ? snapshot.status->reason().to_string() : "";
     if (reason.empty()) reason = last_reason_;
     const auto phase = snapshot.status ? std::optional(snapshot.status->phase()) : std::nullopt;
-    const bool is_new = run_id != last_run_id_ || phase != last_phase_ || reason != last_reason_;
+    const std::string problem = snapshot.status ? snapshot.status->problem().to_string() : "";
+    const bool is_new = run_id != last_run_id_ || phase != last_phase_ || reason != last_reason_ ||
+                        problem != last_problem_;
     last_run_id_ = run_id;
     last_phase_ = phase;
     last_reason_ = reason;
+    last_problem_ = problem;
     return is_new;
   }
 
@@ -91,6 +94,7 @@ class LineWriter {
   std::uint64_t last_run_id_ = 0;
   std::optional<RunPhase> last_phase_;
   std::string last_reason_;
+  std::string last_problem_;
   Clock::time_point last_time_;
 };
 

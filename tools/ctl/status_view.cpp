@@ -284,6 +284,8 @@ std::vector<std::string> render(const Snapshot& snapshot, std::size_t columns) {
   const SimStatus& status = *snapshot.status;
   const SyncCounters& counters = status.counters();
   add_text(lines, columns, "phase", describe_phase(status));
+  if (status.problem().size() > 0)
+    add_text(lines, columns, "problem", status.problem().to_string());
   add_fields(lines, columns, "time",
              {fmt::format("step {}", status.step()),
               fmt::format("{:.3f} s simulated", calc_sim_time(snapshot))});
@@ -320,6 +322,7 @@ std::string render_line(const Snapshot& snapshot) {
       for (const std::string& field : to_fields(keep_nonzero(counts))) line += " | " + field;
     const auto rejected = calc_sum(list_rejected_counts(status.counters()));
     if (rejected > 0) line += fmt::format(" | rejected {}", rejected);
+    if (status.problem().size() > 0) line += " | problem: " + status.problem().to_string();
   }
   const std::string silence = describe_silence(snapshot);
   if (!silence.empty()) line += " | " + silence;
@@ -349,6 +352,7 @@ std::string to_json(const Snapshot& snapshot) {
     const SimStatus& status = *snapshot.status;
     json["phase"] = bus::to_string(status.phase());
     json["reason"] = status.reason().to_string();
+    json["problem"] = status.problem().to_string();
     json["step"] = status.step();
     json["sim_time_s"] = calc_sim_time(snapshot);
     json["real_time_factor"] = status.real_time_factor();

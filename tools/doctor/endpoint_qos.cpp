@@ -45,14 +45,9 @@ class Maker {
     endpoint.max_size = type.m_typeSize;
     const bus::Flow flow = bus::Topic<Message>::kFlow;
     add_writer(endpoint, bus::find_writer_profile(flow));
-    if (flow == bus::Flow::kLatched) {
-      add_reader(endpoint, bus::kLatchedReaderProfile);
-    } else {
-      add_reader(endpoint, flow == bus::Flow::kFleet ? bus::kFleetRecorderReaderProfile
-                                                     : bus::kRecorderReaderProfile);
-      add_reader(endpoint, flow == bus::Flow::kFleet ? bus::kFleetLoopReaderProfile
-                                                     : bus::kLoopReaderProfile);
-    }
+    add_reader(endpoint, flow == bus::Flow::kLoop     ? bus::kLoopReaderProfile
+                         : flow == bus::Flow::kRecord ? bus::kRecordReaderProfile
+                                                      : bus::kLatchedReaderProfile);
   }
 
   std::vector<Endpoint> made;
@@ -90,12 +85,9 @@ Policies to_policies(const dds::ReaderQos& qos) { return convert(qos); }
 std::vector<Endpoint> make_own_endpoints(dds::Publisher& publisher, dds::Subscriber& subscriber,
                                          const std::string& file) {
   Maker maker(publisher, subscriber, file);
-  maker.add<VehicleState, VehicleStatePubSubType>();
-  maker.add<ControlCommand, ControlCommandPubSubType>();
-  maker.add<Reference, ReferencePubSubType>();
-  maker.add<FleetState, FleetStatePubSubType>();
-  maker.add<FleetCommand, FleetCommandPubSubType>();
-  maker.add<FleetReference, FleetReferencePubSubType>();
+  maker.add<States, StatesPubSubType>();
+  maker.add<Commands, CommandsPubSubType>();
+  maker.add<RecordBatch, RecordBatchPubSubType>();
   maker.add<Participant, ParticipantPubSubType>();
   maker.add<Parameters, ParametersPubSubType>();
   maker.add<SimStatus, SimStatusPubSubType>();

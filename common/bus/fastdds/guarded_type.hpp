@@ -1,30 +1,79 @@
 #pragma once
 
+#include <fastcdr/Cdr.h>
+#include <fastcdr/FastBuffer.h>
 #include <slsPubSubTypes.h>
 
 #include <exception>
+#include <string>
 
 namespace sls::bus {
 
+/// What a reader in this thread is taking samples for; a sample that is refused is reported to it.
+class MisfitReport {
+ public:
+  virtual ~MisfitReport() = default;
+  /// `payload` does not fit `type`, because of `defect`.
+  virtual void report(const eprosima::fastrtps::rtps::SerializedPayload_t& payload,
+                      const char* type, const std::string& defect) = 0;
+};
+
+/// The one in force; none outside of a reader's `take`.
+inline thread_local MisfitReport* misfit_report = nullptr;
+
+/// Puts `report` in force while it lives.
+class MisfitScope {
+ public:
+  explicit MisfitScope(MisfitReport& report) { misfit_report = &report; }
+  ~MisfitScope() { misfit_report = nullptr; }
+  MisfitScope(const MisfitScope&) = delete;
+  MisfitScope& operator=(const MisfitScope&) = delete;
+};
+
 /// A generated type support whose `deserialize` refuses malformed samples. The generated one lets
 /// most exceptions of the serialisation library through, which end the process: one sample of any
-/// stranger would do (README.md, traps 15 and 23).
+/// stranger would do (README.md, traps 15 and 23). And it takes samples with bytes left over:
+/// those of another type, whose fields it reads in the wrong places (trap 25).
 ///
 /// Upstream: Fast-CDR #144; Fast DDS 2.11 catches more, but not std::bad_alloc. To be deleted when
-/// the generated function catches every exception and makes no more elements than a sample's length
-/// allows; guarded_type_test.cpp then passes without.
+/// the generated function catches every exception, makes no more elements than a sample's length
+/// allows and refuses what is longer than its type; guarded_type_test.cpp then passes without.
 template <class Generated>
 class GuardedType : public Generated {
  public:
   bool deserialize(eprosima::fastrtps::rtps::SerializedPayload_t* payload, void* data) override {
+    using eprosima::fastcdr::Cdr;
     // What is longer than any sample may claim elements without end, which are made before they are
     // read.
-    if (payload->length > this->m_typeSize) return false;
+    if (payload->length > this->m_typeSize)
+      return refuse(*payload, "expected at most " + std::to_string(this->m_typeSize) +
+                                  " bytes, got " + std::to_string(payload->length));
+    // As the generated function, which does not say where it ended.
+    eprosima::fastcdr::FastBuffer buffer(reinterpret_cast<char*>(payload->data), payload->length);
+    Cdr cdr(buffer, Cdr::DEFAULT_ENDIAN, Cdr::DDS_CDR);
     try {
-      return Generated::deserialize(payload, data);
-    } catch (const std::exception&) {
-      return false;
+      cdr.read_encapsulation();
+      payload->encapsulation = cdr.endianness() == Cdr::BIG_ENDIANNESS ? CDR_BE : CDR_LE;
+      static_cast<typename Generated::type*>(data)->deserialize(cdr);
+    } catch (const eprosima::fastcdr::exception::NotEnoughMemoryException&) {
+      return refuse(*payload, "expected more bytes, got " + std::to_string(payload->length));
+    } catch (const std::exception& error) {
+      return refuse(*payload, std::string("expected plain CDR of that type, got: ") + error.what());
     }
+    const std::size_t used = cdr.getSerializedDataLength();
+    if (payload->length - used > kMostPadding)
+      return refuse(*payload, "expected " + std::to_string(used) + " bytes, got " +
+                                  std::to_string(payload->length));
+    return true;
+  }
+
+ private:
+  static constexpr std::size_t kMostPadding = 3;  // to a multiple of four
+
+  bool refuse(const eprosima::fastrtps::rtps::SerializedPayload_t& payload,
+              const std::string& defect) const {
+    if (misfit_report) misfit_report->report(payload, this->getName(), defect);
+    return false;
   }
 };
 

@@ -3,29 +3,41 @@
 #include <fastrtps/utils/IPLocator.h>
 #include <fastdds/dds/domain/DomainParticipantListener.hpp>
 
+#include <algorithm>
+#include <iterator>
 #include <sstream>
 #include <string>
+#include <utility>
 
+#include "common/bus/fastdds/facts_of.hpp"
+#include "common/bus/fastdds/neighbours.hpp"
 #include "common/bus/fastdds/refusals.hpp"
 #include "common/config/yaml_node.hpp"
 
 namespace sls::bus {
 
-/// Tells `Refusals` who was discovered, accepted and refused. Endpoints have listeners of their
-/// own. To be deleted with refusals.hpp.
+/// Tells `Refusals` who was discovered, accepted and refused, and `Neighbours` which participants
+/// and endpoints there are. Our own endpoints have listeners of their own. To be deleted with
+/// refusals.hpp and neighbours.hpp.
 class ParticipantListener : public eprosima::fastdds::dds::DomainParticipantListener {
  public:
   /// `is_secured`: whether this participant is.
-  explicit ParticipantListener(bool is_secured) : is_secured_(is_secured) {}
+  ParticipantListener(bool is_secured, Neighbours& neighbours)
+      : is_secured_(is_secured), neighbours_(neighbours) {}
 
   void on_participant_discovery(
       eprosima::fastdds::dds::DomainParticipant*,
       eprosima::fastrtps::rtps::ParticipantDiscoveryInfo&& info) override {
     using Info = eprosima::fastrtps::rtps::ParticipantDiscoveryInfo;
     const std::string guid = to_text(info.info.m_guid);
+    const PeerId peer = to_peer(info.info.m_guid);
     auto& refusals = Refusals::of_process();
-    if (info.status == Info::DROPPED_PARTICIPANT || info.status == Info::REMOVED_PARTICIPANT)
+    if (info.status == Info::DROPPED_PARTICIPANT || info.status == Info::REMOVED_PARTICIPANT) {
+      neighbours_.drop_participant(peer);
       return refusals.note_gone(guid);
+    }
+    neighbours_.note_participant(peer, info.info.m_participantName.to_string(),
+                                 find_address(info.info));
     if (info.status != Info::DISCOVERED_PARTICIPANT) return;
     const auto& token = info.info.identity_token_;
     const bool is_other_secured = !token.class_id().empty();
@@ -35,6 +47,15 @@ class ParticipantListener : public eprosima::fastdds::dds::DomainParticipantList
       refusals.note_refused(guid, "it has no identity (its QoS file is not config/qos/secure.xml)");
     if (!is_secured_ && is_other_secured)
       refusals.note_refused(guid, "it is secured, this is not (--qos config/qos/secure.xml)");
+  }
+
+  void on_publisher_discovery(eprosima::fastdds::dds::DomainParticipant*,
+                              eprosima::fastrtps::rtps::WriterDiscoveryInfo&& info) override {
+    note_endpoint(info, info.REMOVED_WRITER);
+  }
+  void on_subscriber_discovery(eprosima::fastdds::dds::DomainParticipant*,
+                               eprosima::fastrtps::rtps::ReaderDiscoveryInfo&& info) override {
+    note_endpoint(info, info.REMOVED_READER);
   }
 
   void onParticipantAuthentication(
@@ -48,6 +69,17 @@ class ParticipantListener : public eprosima::fastdds::dds::DomainParticipantList
   }
 
  private:
+  template <class Info, class Status>
+  void note_endpoint(const Info& info, Status removed) {
+    const auto& guid = info.info.guid();
+    Neighbours::EntityId id;
+    std::copy(std::begin(guid.entityId.value), std::end(guid.entityId.value), id.begin());
+    if (info.status == removed)
+      neighbours_.drop_endpoint(to_peer(guid), id);
+    else
+      neighbours_.note_endpoint(to_peer(guid), id, make_facts(info.info));
+  }
+
   template <class Value>
   static std::string to_text(const Value& value) {
     std::ostringstream text;
@@ -57,12 +89,18 @@ class ParticipantListener : public eprosima::fastdds::dds::DomainParticipantList
 
   /// 'control_client' (10.77.0.2, 01.0f.…): what a participant says of itself.
   static std::string describe(const eprosima::fastrtps::rtps::ParticipantProxyData& participant) {
-    std::string address;
-    for (const auto& locator : participant.metatraffic_locators.unicast)
-      if (locator.kind == LOCATOR_KIND_UDPv4 && address.empty())
-        address = eprosima::fastrtps::rtps::IPLocator::toIPv4string(locator) + ", ";
+    const std::string address = find_address(participant);
     return "'" + config::to_printable(participant.m_participantName.to_string()) + "' (" + address +
-           to_text(participant.m_guid.guidPrefix) + ")";
+           (address.empty() ? "" : ", ") + to_text(participant.m_guid.guidPrefix) + ")";
+  }
+
+  /// The first IPv4 address at which it hears; empty where it has none.
+  static std::string find_address(
+      const eprosima::fastrtps::rtps::ParticipantProxyData& participant) {
+    for (const auto& locator : participant.metatraffic_locators.unicast)
+      if (locator.kind == LOCATOR_KIND_UDPv4)
+        return eprosima::fastrtps::rtps::IPLocator::toIPv4string(locator);
+    return "";
   }
 
   /// 'O=SLS, CN=…' of 'O=SLS, CN=identity authority …': what it says of its identity.
@@ -78,6 +116,7 @@ class ParticipantListener : public eprosima::fastdds::dds::DomainParticipantList
   }
 
   const bool is_secured_;
+  Neighbours& neighbours_;
 };
 
 }  // namespace sls::bus

@@ -21,7 +21,7 @@ extern "C" {
 #endif
 
 #define SLS_CONTROLLER_VERSION 1
-#define SLS_CONTROLLER_MAX_MEMORY 64 /* contract 1 of the topics carries 3 of them */
+#define SLS_CONTROLLER_MAX_MEMORY 64
 
 /* What a controller is made from. What it points to lives until `create` returns. */
 typedef struct {

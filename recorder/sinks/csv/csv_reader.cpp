@@ -18,8 +18,9 @@ CsvReader::CsvReader(const std::filesystem::path& file, std::string_view header,
   const std::string expected(header);
   const bool is_there = find_record();
   const std::string line = is_there ? buffer_.substr(begin_, end_ - begin_) : "";
-  if (!is_there || (line != expected && (further == Further::kNone ||
-                                         line.compare(0, expected.size() + 1, expected + ",") != 0)))
+  if (!is_there ||
+      (line != expected &&
+       (further == Further::kNone || line.compare(0, expected.size() + 1, expected + ",") != 0)))
     throw DamagedError(path_ + ":1: expected the columns " + expected);
   for (std::size_t from = 0; from <= line.size();) {
     const std::size_t comma = std::min(line.find(',', from), line.size());

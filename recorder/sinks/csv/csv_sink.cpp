@@ -60,9 +60,8 @@ void CsvSink::add(const StepRows& rows) {
 void CsvSink::add(const SimStatus& status) { write_row(statuses_, StatusRow{status}); }
 
 bool CsvSink::is_full() const {
-  return std::any_of(files_.begin(), files_.end(), [](const CsvFile* file) {
-    return file->pending_bytes() >= kFlushBytes;
-  });
+  return std::any_of(files_.begin(), files_.end(),
+                     [](const CsvFile* file) { return file->pending_bytes() >= kFlushBytes; });
 }
 
 void CsvSink::flush() {

@@ -77,19 +77,10 @@ void expect_round_trip(int domain, const std::vector<const char*>& profiles) {
   }
 }
 
-TEST(NodeTest, StatesArriveUnchanged) {
-  expect_round_trip<VehicleState>(70, {kLoopReaderProfile, kRecorderReaderProfile});
-}
-TEST(NodeTest, CommandsArriveUnchanged) {
-  expect_round_trip<ControlCommand>(71, {kLoopReaderProfile, kRecorderReaderProfile});
-}
-TEST(NodeTest, ReferencesArriveUnchanged) {
-  expect_round_trip<Reference>(72, {kRecorderReaderProfile});
-}
-TEST(NodeTest, FleetsArriveUnchanged) {
-  expect_round_trip<FleetState>(73, {kFleetLoopReaderProfile, kFleetRecorderReaderProfile});
-  expect_round_trip<FleetCommand>(73, {kFleetLoopReaderProfile, kFleetRecorderReaderProfile});
-  expect_round_trip<FleetReference>(73, {kFleetRecorderReaderProfile});
+TEST(NodeTest, StatesArriveUnchanged) { expect_round_trip<States>(70, {kLoopReaderProfile}); }
+TEST(NodeTest, CommandsArriveUnchanged) { expect_round_trip<Commands>(71, {kLoopReaderProfile}); }
+TEST(NodeTest, BatchesArriveUnchanged) {
+  expect_round_trip<RecordBatch>(72, {kRecordReaderProfile, kLoopReaderProfile});
 }
 TEST(NodeTest, ParticipantsArriveUnchanged) {
   expect_round_trip<Participant>(73, {kLatchedReaderProfile});
@@ -103,19 +94,19 @@ TEST(NodeTest, StatusesArriveUnchanged) {
 
 TEST(NodeTest, MatchesComeAndGoOnBothSides) {
   Node near(kQosFile, 76, "near");
-  Writer<VehicleState> writer(near);
-  Reader<ControlCommand> reader(near, kLoopReaderProfile, [](const auto&, const PeerId&) {});
+  Writer<States> writer(near);
+  Reader<Commands> reader(near, kLoopReaderProfile, [](const auto&, const PeerId&) {});
   PeerId gone;
   {
     Node far(kQosFile, 76, "far");
     gone = far.id();
     EXPECT_FALSE(is_matched(writer, far));
-    Listener<VehicleState> far_listener(far, kLoopReaderProfile, near);
-    Writer<ControlCommand> far_writer(far);
+    Listener<States> far_listener(far, kLoopReaderProfile, near);
+    Writer<Commands> far_writer(far);
     EXPECT_TRUE(wait_until([&] { return is_matched(writer, far); }));
     EXPECT_TRUE(wait_until([&] { return reader.matched().count(gone) > 0; }));
     {
-      Listener<VehicleState> second(far, kRecorderReaderProfile, near);
+      Listener<States> second(far, kLoopReaderProfile, near);
       EXPECT_TRUE(wait_until([&] { return second.is_matched(); }));
     }
     EXPECT_TRUE(is_matched(writer, far)) << "one of two readers has gone, not the participant";
@@ -126,23 +117,19 @@ TEST(NodeTest, MatchesComeAndGoOnBothSides) {
 
 TEST(NodeTest, ALateRecorderGetsTheStreamFromItsBeginningInOrder) {
   Node writing(kQosFile, 77, "writing"), reading(kQosFile, 77, "reading");
-  Writer<VehicleState> writer(writing);
-  constexpr std::uint64_t kSamples = 1500;
-  for (std::uint64_t step = 0; step < kSamples / 2; ++step) {
-    VehicleState state;
-    state.step(step);
-    writer.write(state);
-  }
-  Listener<VehicleState> recorder(reading, kRecorderReaderProfile, writing);
-  for (std::uint64_t step = kSamples / 2; step < kSamples; ++step) {
-    VehicleState state;
-    state.step(step);
-    writer.write(state);
-  }
-  ASSERT_TRUE(wait_until([&] { return recorder.count() >= kSamples; }));
+  Writer<RecordBatch> writer(writing);
+  constexpr std::uint64_t kBatches = 1500;
+  RecordBatch batch;
+  const auto write_half = [&] {
+    for (std::uint64_t i = 0; i < kBatches / 2; ++i, batch.batch_index()++) writer.write(batch);
+  };
+  write_half();
+  Listener<RecordBatch> recorder(reading, kRecordReaderProfile, writing);
+  write_half();
+  ASSERT_TRUE(wait_until([&] { return recorder.count() >= kBatches; }));
   std::uint64_t next = 0;
-  for (const VehicleState& state : recorder.messages()) ASSERT_EQ(state.step(), next++);
-  EXPECT_EQ(next, kSamples);
+  for (const RecordBatch& heard : recorder.messages()) ASSERT_EQ(heard.batch_index(), next++);
+  EXPECT_EQ(next, kBatches);
 }
 
 TEST(NodeTest, ALateJoinerLearnsWhatIsLatched) {

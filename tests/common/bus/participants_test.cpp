@@ -37,10 +37,10 @@ SimStatus make_status(std::uint64_t run_id, RunPhase phase) {
   return status;
 }
 
-Parameters make_parameters(std::uint64_t run_id, std::vector<std::uint32_t> vehicle_ids) {
+Parameters make_parameters(std::uint64_t run_id, const std::vector<std::uint32_t>& vehicle_ids) {
   Parameters parameters;
   parameters.run_id(run_id);
-  parameters.vehicle_ids(std::move(vehicle_ids));
+  for (const std::uint32_t id : vehicle_ids) parameters.vehicles().emplace_back().vehicle_id(id);
   return parameters;
 }
 
@@ -346,6 +346,7 @@ TEST(ParticipantsTest, AServerServesTheVehiclesItNames) {
   EXPECT_TRUE(serves_vehicle(make_parameters(1, {0, 7}), 7));
   EXPECT_FALSE(serves_vehicle(make_parameters(1, {0, 7}), 1));
   EXPECT_FALSE(serves_vehicle(make_parameters(1, {}), 0));
+  EXPECT_EQ(list_vehicle_ids(make_parameters(1, {0, 7})), std::vector<std::uint32_t>({0, 7}));
 }
 
 TEST(ParticipantsTest, TheHostsNameFitsTheWire) {

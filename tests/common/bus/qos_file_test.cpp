@@ -161,11 +161,13 @@ std::vector<fs::path> list_invalid_files() {
   int code = 0;
   try {
     Node node(file, 79, "test_bus");
-    Writer<VehicleState> stream_writer(node);
+    node.max_sample_bytes();
+    Writer<States> loop_writer(node);
+    Writer<RecordBatch> record_writer(node);
     Writer<Parameters> latched_writer(node);
-    Reader<VehicleState> loop_reader(node, kLoopReaderProfile, [](const auto&, const PeerId&) {});
-    Reader<VehicleState> recorder_reader(node, kRecorderReaderProfile,
-                                         [](const auto&, const PeerId&) {});
+    Reader<States> loop_reader(node, kLoopReaderProfile, [](const auto&, const PeerId&) {});
+    Reader<RecordBatch> record_reader(node, kRecordReaderProfile,
+                                      [](const auto&, const PeerId&) {});
     Reader<Parameters> latched_reader(node, kLatchedReaderProfile,
                                       [](const auto&, const PeerId&) {});
   } catch (const config::ConfigError& error) {
@@ -310,7 +312,7 @@ std::map<std::string, std::string> read_endpoint_profiles(const std::string& xml
 TEST(ShippedQosFilesTest, AFileThatSaysNothingAboutWritersAndReadersHasThoseOfEndpoints) {
   ::setenv("SLS_KEYS", "keys", 1);  // secure.xml needs it
   const auto shared = read_endpoint_profiles(sls::test::read_bytes(kConfig / "qos/endpoints.xml"));
-  EXPECT_EQ(shared.size(), 12u);
+  EXPECT_EQ(shared.size(), 8u);
   for (const char* name : {"default", "udp", "lan", "unicast", "discovery_server", "secure"})
     EXPECT_EQ(read_endpoint_profiles(
                   read_qos_file(kConfig / "qos" / (std::string(name) + ".xml"), "tester")),
@@ -326,7 +328,7 @@ TEST_F(QosFileTest, AProfileOfItsOwnIsKept) {
       folder_ / "qos.xml",
       "<dds><profiles><participant profile_name=\"sls_participant\"/>" + own + "</profiles></dds>");
   const auto profiles = read_endpoint_profiles(read_qos_file(folder_ / "qos.xml", "tester"));
-  EXPECT_EQ(profiles.size(), 12u);
+  EXPECT_EQ(profiles.size(), 8u);
   EXPECT_EQ(profiles.at("sls_loop_reader"), own);
 }
 

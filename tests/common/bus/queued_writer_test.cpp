@@ -20,38 +20,38 @@ TEST(QueuedWriterTest, WritesInOrderAndFinishesWhatIsQueuedWhenItEnds) {
   constexpr int kDomain = 74;
   Node near(kQosFile, kDomain, "near"), far(kQosFile, kDomain, "far");
   std::mutex mutex;
-  std::vector<std::uint64_t> steps;
-  Reader<VehicleState> reader(far, kRecorderReaderProfile,
-                              [&](const VehicleState& state, const PeerId&) {
-                                const std::lock_guard lock(mutex);
-                                if (state.run_id() == kRun) steps.push_back(state.step());
-                              });
-  Writer<VehicleState> writer(near);
+  std::vector<std::uint64_t> indices;
+  Reader<RecordBatch> reader(far, kRecordReaderProfile,
+                             [&](const RecordBatch& batch, const PeerId&) {
+                               const std::lock_guard lock(mutex);
+                               if (batch.run_id() == kRun) indices.push_back(batch.batch_index());
+                             });
+  Writer<RecordBatch> writer(near);
   ASSERT_TRUE(wait_until([&] { return writer.matched().count(far.id()) > 0; }));
   constexpr std::uint64_t kCount = 500;
   {
-    QueuedWriter<VehicleState> queue(writer, kCount);
-    VehicleState state;
-    state.run_id(kRun);
-    for (std::uint64_t step = 0; step < kCount; ++step) {
-      state.step(step);
-      queue.write(state);
+    QueuedWriter<RecordBatch> queue(writer, kCount);
+    RecordBatch batch;
+    batch.run_id(kRun);
+    for (std::uint64_t index = 0; index < kCount; ++index) {
+      batch.batch_index(index);
+      queue.write(batch);
     }
     EXPECT_EQ(queue.lost(), 0u);
   }
   ASSERT_TRUE(wait_until([&] {
     const std::lock_guard lock(mutex);
-    return steps.size() == kCount;
+    return indices.size() == kCount;
   }));
-  for (std::uint64_t step = 0; step < kCount; ++step) EXPECT_EQ(steps[step], step);
+  for (std::uint64_t index = 0; index < kCount; ++index) EXPECT_EQ(indices[index], index);
 }
 
 TEST(QueuedWriterTest, WhatDoesNotFitIsCountedAndNeverBlocks) {
   constexpr int kDomain = 75;
   Node node(kQosFile, kDomain, "near");
-  Writer<VehicleState> writer(node);
-  QueuedWriter<VehicleState> queue(writer, 0);  // room for nothing
-  for (int i = 0; i < 10; ++i) queue.write(VehicleState());
+  Writer<RecordBatch> writer(node);
+  QueuedWriter<RecordBatch> queue(writer, 0);  // room for nothing
+  for (int i = 0; i < 10; ++i) queue.write(RecordBatch());
   EXPECT_EQ(queue.lost(), 10u);
 }
 

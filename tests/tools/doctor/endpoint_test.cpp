@@ -10,7 +10,7 @@ Endpoint make(const std::string& owner, bool is_writer) {
   endpoint.participant.bytes[0] = is_writer ? 1 : 2;
   endpoint.owner = owner;
   endpoint.topic = "sls/state";
-  endpoint.type = "sls::VehicleState";
+  endpoint.type = "sls::States";
   endpoint.is_writer = is_writer;
   return endpoint;
 }
@@ -87,7 +87,7 @@ TEST_F(EndpointTest, AnotherTypeNameOrAnotherSizeIsATypeMismatch) {
   ASSERT_EQ(find_type_mismatches({writer_, other}).size(), 1u);
   reader_.type = "sls::SimStatus";
   EXPECT_EQ(find_type_mismatches({writer_, reader_}).front().text,
-            "sim_server has type sls::VehicleState, recorder has sls::SimStatus");
+            "sim_server has type sls::States, recorder has sls::SimStatus");
 }
 
 }  // namespace

@@ -11,19 +11,26 @@ namespace {
 namespace rtps = eprosima::fastrtps::rtps;
 
 template <class Type, class Message>
-bool takes(const std::string& bytes) {
+bool takes(const std::string& bytes, Message& message) {
   rtps::SerializedPayload_t payload(static_cast<std::uint32_t>(bytes.size()));
   std::copy(bytes.begin(), bytes.end(), payload.data);
   payload.length = static_cast<std::uint32_t>(bytes.size());
   GuardedType<Type> type;
-  Message message;
   return type.deserialize(&payload, &message);
+}
+
+template <class Type, class Message>
+bool takes(const std::string& bytes) {
+  Message message;
+  return takes<Type>(bytes, message);
 }
 
 // Found by tests/fuzz: the generated code throws, through the middleware's thread.
 TEST(GuardedTypeTest, ASampleOfWrongEncapsulationIsRefused) {
   const std::string bytes(200, 'x');
-  EXPECT_FALSE((takes<ControlCommandPubSubType, ControlCommand>(bytes)));
+  EXPECT_FALSE((takes<StatesPubSubType, States>(bytes)));
+  EXPECT_FALSE((takes<CommandsPubSubType, Commands>(bytes)));
+  EXPECT_FALSE((takes<RecordBatchPubSubType, RecordBatch>(bytes)));
   EXPECT_FALSE((takes<ParametersPubSubType, Parameters>(bytes)));
   EXPECT_FALSE((takes<ParticipantPubSubType, Participant>("")));
 }
@@ -33,31 +40,59 @@ TEST(GuardedTypeTest, EndlessLengthsAreRefused) {
     const std::string bytes = std::string(encapsulation, 4) + std::string(600, '\xff');
     EXPECT_FALSE((takes<ParametersPubSubType, Parameters>(bytes)));
     EXPECT_FALSE((takes<SimStatusPubSubType, SimStatus>(bytes)));
-    EXPECT_FALSE((takes<ReferencePubSubType, Reference>(bytes)));
+    EXPECT_FALSE((takes<StatesPubSubType, States>(bytes)));
+    EXPECT_FALSE((takes<CommandsPubSubType, Commands>(bytes)));
+    EXPECT_FALSE((takes<RecordBatchPubSubType, RecordBatch>(bytes)));
   }
 }
 
-TEST(GuardedTypeTest, WhatIsLongerThanAnySampleIsRefusedBeforeItsElementsAreMade) {
-  // run_id, step and a count of vehicles, each of which would be half a kilobyte, and bytes enough.
-  std::string bytes("\0\1\0\0", 4);
-  bytes += std::string(16, '\0') + std::string("\x40\x42\x0f\0", 4);  // 1,000,000
-  bytes += std::string(2'000'000, '\0');
-  EXPECT_FALSE((takes<FleetStatePubSubType, FleetState>(bytes)));
-  EXPECT_FALSE((takes<FleetCommandPubSubType, FleetCommand>(bytes)));
-  EXPECT_FALSE((takes<FleetReferencePubSubType, FleetReference>(bytes)));
+/// A sample of `size` bytes that claims `count` elements behind `before`.
+std::string make_claim(const std::string& before, std::uint32_t count, std::size_t size) {
+  std::string bytes = std::string("\0\1\0\0", 4) + before;
+  for (int shift = 0; shift < 32; shift += 8) bytes += static_cast<char>(count >> shift & 0xff);
+  bytes.resize(size);
+  return bytes;
 }
 
-// Found by tests/fuzz: sequences of strings are made before a look at how long the sample is.
-TEST(GuardedTypeTest, AShortStatusThatClaimsBillionsOfNamesIsRefused) {
-  std::string bytes("\0\1\0\0", 4);  // encapsulation; offsets below count from its end
-  bytes += std::string(28, '\0');    // run_id, vehicle_id, sample_index, phase
-  bytes +=
-      std::string("\1\0\0\0\0", 5) + std::string(7, '\0');  // reason, to the next multiple of 8
-  bytes += std::string(8, '\0');                            // step
-  bytes += std::string("\1\0\0\0\0", 5) + std::string(3, '\0');  // controller_name
-  bytes += std::string("\xff\xff\xff\x7f", 4);                   // of controller_names
-  bytes += std::string(500, '\0');
-  EXPECT_FALSE((takes<SimStatusPubSubType, SimStatus>(bytes)));
+const std::string kBeforeVehicles(24, '\0');                 // run_id, step, sim_time_ns
+const std::string kBeforeCommands = std::string(16, '\0') +  // run_id, step
+                                    std::string("\1\0\0\0\0\0\0\0\0\0\0\0", 12);  // name, strength
+const std::string kBeforeEntries(20, '\0');  // run_id, batch_index, is_last
+
+TEST(GuardedTypeTest, WhatIsLongerThanAnySampleIsRefusedBeforeItsElementsAreMade) {
+  constexpr std::uint32_t kCount = 1'000'000;  // each would be half a kilobyte
+  constexpr std::size_t kSize = 2'000'000;
+  EXPECT_FALSE((takes<StatesPubSubType, States>(make_claim(kBeforeVehicles, kCount, kSize))));
+  EXPECT_FALSE((takes<CommandsPubSubType, Commands>(make_claim(kBeforeCommands, kCount, kSize))));
+  EXPECT_FALSE(
+      (takes<RecordBatchPubSubType, RecordBatch>(make_claim(kBeforeEntries, kCount, kSize))));
+}
+
+/// A sample no longer than the longest, but with as many claimed elements as it has bytes, is
+/// refused and keeps none of their memory.
+template <class Type, class Message, class Elements>
+void expect_nothing_kept(const std::string& before, Elements elements) {
+  const auto size = Type().m_typeSize;
+  for (const std::uint32_t count : {0xffffffffU, 0x7fffffffU, size - 1000}) {
+    Message message;
+    EXPECT_FALSE((takes<Type>(make_claim(before, count, size), message))) << count;
+    EXPECT_EQ((message.*elements)().capacity(), 0u) << count;
+  }
+}
+
+TEST(GuardedTypeTest, ClaimedElementsThatDoNotFollowAreNotKept) {
+  using VehicleStates = std::vector<VehicleState>& (States::*)();
+  using VehicleCommands = std::vector<ControlCommand>& (Commands::*)();
+  using Entries = std::vector<RecordEntry>& (RecordBatch::*)();
+  expect_nothing_kept<StatesPubSubType, States, VehicleStates>(kBeforeVehicles, &States::vehicles);
+  expect_nothing_kept<CommandsPubSubType, Commands, VehicleCommands>(kBeforeCommands,
+                                                                     &Commands::vehicles);
+  expect_nothing_kept<RecordBatchPubSubType, RecordBatch, Entries>(kBeforeEntries,
+                                                                   &RecordBatch::entries);
+  // One entry that claims as many measured states.
+  std::string entry = make_claim(kBeforeEntries, 1, 28).substr(4);
+  entry += std::string(24 + 23 * 8 + 4, '\0');  // vehicle_id, step, kind; truth without signals
+  expect_nothing_kept<RecordBatchPubSubType, RecordBatch, Entries>(entry, &RecordBatch::entries);
 }
 
 TEST(GuardedTypeTest, RandomBytesThrowNothing) {

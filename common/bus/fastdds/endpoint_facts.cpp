@@ -1,0 +1,133 @@
+#include "common/bus/fastdds/endpoint_facts.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+
+#include "common/config/yaml_node.hpp"
+
+namespace sls::bus {
+namespace {
+
+constexpr int kXcdr1 = 0;
+
+std::string to_words(const std::optional<std::chrono::nanoseconds>& period) {
+  return period ? fmt::format("{:g} s", std::chrono::duration<double>(*period).count()) : "none";
+}
+
+std::string to_words(EndpointFacts::Durability durability) {
+  switch (durability) {
+    case EndpointFacts::Durability::kVolatile:
+      return "volatile";
+    case EndpointFacts::Durability::kTransientLocal:
+      return "transient local";
+    case EndpointFacts::Durability::kTransient:
+      return "transient";
+    case EndpointFacts::Durability::kPersistent:
+      return "persistent";
+  }
+  return "unknown";
+}
+
+std::string to_words(EndpointFacts::Liveliness liveliness) {
+  switch (liveliness) {
+    case EndpointFacts::Liveliness::kAutomatic:
+      return "automatic";
+    case EndpointFacts::Liveliness::kManualByParticipant:
+      return "manual by participant";
+    case EndpointFacts::Liveliness::kManualByTopic:
+      return "manual by topic";
+  }
+  return "unknown";
+}
+
+std::string to_words(const std::vector<int>& representations) {
+  std::string words;
+  for (const int id : representations)
+    words += (words.empty() ? "" : " or ") + (id == kXcdr1 ? std::string("XCDR1")
+                                              : id == 1    ? "XML"
+                                              : id == 2    ? "XCDR2"
+                                                           : fmt::format("number {}", id));
+  return words;
+}
+
+std::string to_words(const std::vector<std::string>& partitions) {
+  std::string words;
+  for (const std::string& name : partitions)
+    words += (words.empty() ? "'" : ", '") + config::to_printable(name) + "'";
+  return words.empty() ? "none" : words;
+}
+
+/// Nothing stands for the default.
+std::vector<int> to_list(std::vector<int> representations) {
+  if (representations.empty()) representations = {kXcdr1};
+  return representations;
+}
+
+template <class Value>
+bool share_one(const std::vector<Value>& a, const std::vector<Value>& b) {
+  return std::any_of(a.begin(), a.end(), [&](const Value& value) {
+    return std::find(b.begin(), b.end(), value) != b.end();
+  });
+}
+
+/// A shorter period is the stricter one.
+bool is_longer(const std::optional<std::chrono::nanoseconds>& offered,
+               const std::optional<std::chrono::nanoseconds>& asked) {
+  return asked && (!offered || *offered > *asked);
+}
+
+}  // namespace
+
+std::vector<Mismatch> find_mismatches(const EndpointFacts& writer, const EndpointFacts& reader) {
+  std::vector<Mismatch> found;
+  const auto add = [&](const char* policy, const auto& offered, const auto& asked,
+                       const char* hint = "") {
+    found.push_back({policy, fmt::format("{}: offered {}, asked {}{}", policy, to_words(offered),
+                                         to_words(asked), hint)});
+  };
+  const auto add_words = [&](const char* policy, const char* offered, const char* asked) {
+    found.push_back({policy, fmt::format("{}: offered {}, asked {}", policy, offered, asked)});
+  };
+  const auto offered = to_list(writer.representations), asked = to_list(reader.representations);
+  if (!share_one(offered, asked))
+    add("DATA_REPRESENTATION", offered, asked, " (compile the types as @final)");
+  if (!writer.is_reliable && reader.is_reliable)
+    add_words("RELIABILITY", "best effort", "reliable");
+  if (writer.durability < reader.durability)
+    add("DURABILITY", writer.durability, reader.durability);
+  if (is_longer(writer.deadline, reader.deadline))
+    add("DEADLINE", writer.deadline, reader.deadline);
+  if (writer.liveliness < reader.liveliness)
+    add("LIVELINESS", writer.liveliness, reader.liveliness);
+  if (is_longer(writer.lease, reader.lease)) add("LIVELINESS lease", writer.lease, reader.lease);
+  if (writer.is_exclusive != reader.is_exclusive)
+    add_words("OWNERSHIP", writer.is_exclusive ? "exclusive" : "shared",
+              reader.is_exclusive ? "exclusive" : "shared");
+  const bool has_partition = !writer.partitions.empty() || !reader.partitions.empty();
+  if (has_partition && !share_one(writer.partitions, reader.partitions))
+    add("PARTITION", writer.partitions, reader.partitions);
+  return found;
+}
+
+std::vector<Mismatch> compare(const EndpointFacts& own, const EndpointFacts& other) {
+  if (own.topic != other.topic || own.is_writer == other.is_writer) return {};
+  if (own.type != other.type)  // then the rest means nothing
+    return {{"type", fmt::format("type: expected {}, got {}", own.type,
+                                 config::to_printable(other.type, 80))}};
+  auto found = own.is_writer ? find_mismatches(own, other) : find_mismatches(other, own);
+  if (own.is_keyed != other.is_keyed)
+    found.insert(found.begin(), {"key", fmt::format("key: expected {}, got {}",
+                                                    own.is_keyed ? "a keyed type" : "none",
+                                                    other.is_keyed ? "a keyed type" : "none")});
+  return found;
+}
+
+bool is_of_contract_1(const EndpointFacts& endpoint) {
+  const auto& [topic, type] = std::tie(endpoint.topic, endpoint.type);
+  return topic == "sls/reference" || topic.compare(0, 10, "sls/fleet_") == 0 ||
+         (topic == "sls/state" && type == "sls::VehicleState") ||
+         (topic == "sls/command" && type == "sls::ControlCommand");
+}
+
+}  // namespace sls::bus

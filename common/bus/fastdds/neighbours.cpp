@@ -1,0 +1,168 @@
+#include "common/bus/fastdds/neighbours.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+
+#include "common/bus/topics.hpp"
+#include "common/config/yaml_node.hpp"
+
+namespace sls::bus {
+namespace {
+
+constexpr std::chrono::seconds kMisfitLasts(5);
+
+std::string to_hex(const std::uint8_t* bytes, std::size_t count) {
+  std::string text;
+  for (std::size_t i = 0; i < count; ++i) text += fmt::format("{:02x}", bytes[i]);
+  return text;
+}
+
+/// Keys of problems: "dds PARTICIPANT ENDPOINT WHAT".
+std::string make_key(const PeerId& peer) {
+  return "dds " + to_hex(peer.bytes.data(), peer.bytes.size()) + " ";
+}
+std::string make_key(const PeerId& peer, const Neighbours::EntityId& id) {
+  return make_key(peer) + to_hex(id.data(), id.size()) + " ";
+}
+
+bool is_ours(const std::string& topic) { return topic.compare(0, 4, "sls/") == 0; }
+
+bool is_same(const EndpointFacts& a, const EndpointFacts& b) {
+  return a.topic == b.topic && a.is_writer == b.is_writer;
+}
+
+}  // namespace
+
+void Neighbours::set_self(const PeerId& self) {
+  const std::lock_guard lock(mutex_);
+  self_ = self;
+}
+
+void Neighbours::note_participant(const PeerId& peer, const std::string& name,
+                                  const std::string& address) {
+  const std::lock_guard lock(mutex_);
+  if (participants_.size() >= kMostParticipants && participants_.count(peer) == 0) return;
+  std::string text = name.empty() ? std::string("a participant without a name")
+                                  : "'" + config::to_printable(name) + "'";
+  if (!address.empty()) text += " (" + config::to_printable(address) + ")";
+  participants_[peer].description = text;
+}
+
+void Neighbours::drop_participant(const PeerId& peer) {
+  const std::lock_guard lock(mutex_);
+  participants_.erase(peer);
+  const auto is_his = [&](const auto& item) { return item.first.first == peer; };
+  for (auto it = endpoints_.begin(); it != endpoints_.end();)
+    it = is_his(*it) ? endpoints_.erase(it) : std::next(it);
+  for (auto it = missing_deadlines_.begin(); it != missing_deadlines_.end();)
+    it = is_his(*it) ? missing_deadlines_.erase(it) : std::next(it);
+  problems_.end_all(make_key(peer));
+}
+
+void Neighbours::note_endpoint(const PeerId& peer, const EntityId& id, const EndpointFacts& facts) {
+  if (!is_ours(facts.topic)) return;
+  const std::lock_guard lock(mutex_);
+  if (peer == self_) return;
+  const Endpoint endpoint(peer, id);
+  if (endpoints_.size() >= kMostEndpoints && endpoints_.count(endpoint) == 0) return;
+  endpoints_[endpoint] = facts;
+  judge(endpoint, facts);
+}
+
+void Neighbours::drop_endpoint(const PeerId& peer, const EntityId& id) {
+  const std::lock_guard lock(mutex_);
+  if (endpoints_.erase({peer, id}) == 0) return;
+  missing_deadlines_.erase({peer, id});
+  problems_.end_all(make_key(peer, id));
+}
+
+void Neighbours::add_own(const EndpointFacts& facts) {
+  if (!is_ours(facts.topic)) return;
+  const std::lock_guard lock(mutex_);
+  own_.push_back(facts);
+  for (const auto& [endpoint, other] : endpoints_) judge(endpoint, other);
+}
+
+void Neighbours::drop_own(const EndpointFacts& facts) {
+  const std::lock_guard lock(mutex_);
+  const auto own = std::find_if(own_.begin(), own_.end(),
+                                [&](const EndpointFacts& item) { return is_same(item, facts); });
+  if (own == own_.end()) return;
+  own_.erase(own);
+  for (const auto& [endpoint, other] : endpoints_) judge(endpoint, other);
+}
+
+void Neighbours::judge(const Endpoint& endpoint, const EndpointFacts& facts) {
+  const auto& [peer, id] = endpoint;
+  const std::string place = fmt::format("{} {} {}", config::to_printable(facts.topic),
+                                        facts.is_writer ? "of" : "for", describe_held(peer));
+  if (sls::bus::is_of_contract_1(facts)) {
+    const auto known = participants_.find(peer);
+    if (known != participants_.end()) known->second.is_of_contract_1 = true;
+    problems_.replace(make_key(peer), {{make_key(peer) + "contract",
+                                        place + ": expected contract 2, got contract 1 ("
+                                                "it was built from an older sls.idl)"}});
+    return;
+  }
+  if (is_of_contract_1(peer)) return;  // said once, and all that follows from it
+  std::string text, missing_deadline;
+  for (const EndpointFacts& own : own_)
+    for (const Mismatch& mismatch : compare(own, facts)) {
+      const bool is_of_others =
+          mismatch.policy == "DEADLINE" && facts.topic == Topic<Commands>::kName;
+      std::string& words = is_of_others ? missing_deadline : text;
+      if (words.find(mismatch.text) == words.npos)
+        words += (words.empty() ? place + ": " : "; ") + mismatch.text;
+    }
+  if (missing_deadline.empty())
+    missing_deadlines_.erase(endpoint);
+  else
+    missing_deadlines_[endpoint] = missing_deadline;
+  const std::string key = make_key(peer, id) + "fit";
+  if (text.empty())
+    problems_.end(key);
+  else
+    problems_.begin(key, text);
+}
+
+void Neighbours::note_misfit(const PeerId& peer, const EntityId& writer, const std::string& topic,
+                             const std::string& type, const std::string& defect) {
+  const std::lock_guard lock(mutex_);
+  if (is_of_contract_1(peer) || endpoints_.count({peer, writer}) == 0) return;
+  problems_.begin(make_key(peer, writer) + "length",
+                  fmt::format("{} of {}: {}: {}", topic, describe_held(peer), type, defect),
+                  kMisfitLasts);
+}
+
+std::string Neighbours::describe(const PeerId& peer) const {
+  const std::lock_guard lock(mutex_);
+  return describe_held(peer);
+}
+
+std::string Neighbours::describe_held(const PeerId& peer) const {
+  const auto known = participants_.find(peer);
+  return known == participants_.end() ? "a participant without a name" : known->second.description;
+}
+
+bool Neighbours::is_of_contract_1(const PeerId& peer) const {
+  const auto known = participants_.find(peer);
+  return known != participants_.end() && known->second.is_of_contract_1;
+}
+
+std::set<PeerId> Neighbours::find_misfits() const {
+  const std::lock_guard lock(mutex_);
+  std::set<PeerId> found;
+  for (const auto& [peer, participant] : participants_)
+    if (problems_.has_any(make_key(peer))) found.insert(peer);
+  return found;
+}
+
+std::map<PeerId, std::string> Neighbours::find_missing_deadlines() const {
+  const std::lock_guard lock(mutex_);
+  std::map<PeerId, std::string> found;
+  for (const auto& [endpoint, text] : missing_deadlines_) found.emplace(endpoint.first, text);
+  return found;
+}
+
+}  // namespace sls::bus

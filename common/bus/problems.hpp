@@ -1,0 +1,61 @@
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <string>
+
+namespace sls::bus {
+
+/// What participants do wrong, as this program sees it. A mistake is one line on stderr when it
+/// begins, and is listed while it holds. At most `kMostLines` lines in 10 s and `kMost` mistakes,
+/// whatever strangers send. May be used from any thread.
+class Problems {
+ public:
+  using Clock = std::chrono::steady_clock;
+  static constexpr int kMostLines = 5;
+  static constexpr std::size_t kMost = 256;
+
+  /// The mistake `key` holds until `end`; or, where `lasting` is given, for so long from now. Only
+  /// its first text is said, and listed.
+  void begin(const std::string& key, const std::string& text,
+             std::optional<Clock::duration> lasting = std::nullopt);
+  void end(const std::string& key);
+  /// Ends every mistake whose key begins so.
+  void end_all(const std::string& prefix);
+  /// Of the mistakes whose keys begin with `prefix`, those of `found` hold and no others.
+  void replace(const std::string& prefix, const std::map<std::string, std::string>& found);
+
+  /// True where one holds whose key begins with `prefix`.
+  bool has_any(const std::string& prefix) const;
+
+  /// Changes when a mistake begins or ends (not when one that lasts for a time runs out).
+  std::uint64_t version() const { return version_.load(std::memory_order_acquire); }
+
+  /// The mistakes that hold, oldest first, in at most `most` bytes; empty where none does.
+  std::string describe(std::size_t most = 255) const;
+
+ private:
+  struct Problem {
+    std::string text;
+    std::uint64_t number = 0;  // counts the mistakes
+    std::optional<Clock::time_point> end;
+  };
+
+  void add(const std::string& key, const std::string& text, std::optional<Clock::duration> lasting);
+  void say(const std::string& text);
+
+  mutable std::mutex mutex_;
+  std::map<std::string, Problem> problems_;
+  std::uint64_t count_ = 0;
+  std::atomic<std::uint64_t> version_{0};
+  Clock::time_point window_began_{};
+  int lines_ = 0;
+  int left_out_ = 0;
+};
+
+}  // namespace sls::bus

@@ -1,0 +1,419 @@
+#include "sim_server/participant_check.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <utility>
+
+#include "common/bus/convert.hpp"
+#include "common/bus/names.hpp"
+#include "common/config/vehicle_ids.hpp"
+#include "common/config/yaml_node.hpp"
+
+namespace sls::sim {
+namespace {
+
+constexpr std::int64_t kStageTolerance_ns = 1'000'000'000;
+/// Answers to steps that have gone by: a client that was stopped for a while sends some, too.
+constexpr std::uint64_t kFewOldAnswers = 3;
+
+std::string describe(const ParticipantCheck::Entry& entry) {
+  return fmt::format("{} '{}' on {}", bus::to_string(entry.announcement.role()),
+                     config::to_printable(entry.announcement.name().to_string(), 32),
+                     config::to_printable(entry.announcement.host().to_string(), 64));
+}
+
+/// "controller 'foo' on box: sls/participant FIELD: expected A, got B".
+std::string describe_field(const ParticipantCheck::Entry& entry, const char* field,
+                           const std::string& expected, const std::string& got) {
+  return fmt::format("{}: sls/participant {}: expected {}, got {}", describe(entry), field,
+                     expected, got);
+}
+
+std::string to_words(const std::string& sha256) {
+  return sha256.empty() ? "none" : config::to_printable(sha256, 64);
+}
+
+std::string to_words(std::uint64_t run_id) {
+  return run_id == 0 ? "0" : fmt::format("{:016x}", run_id);
+}
+
+std::string make_key(const bus::PeerId& peer, const std::string& what) {
+  std::string key = "run ";
+  for (const std::uint8_t byte : peer.bytes) key += fmt::format("{:02x}", byte);
+  return key + " " + what;
+}
+
+bool flies_any(const Participant& controller, const std::vector<std::uint32_t>& ids) {
+  return std::any_of(ids.begin(), ids.end(),
+                     [&](std::uint32_t id) { return bus::flies_vehicle(controller, id); });
+}
+
+bool has_this_contract(const Participant& participant) {
+  return participant.contract_sha256() == bus::kContractSha256;
+}
+
+}  // namespace
+
+ParticipantCheck::ParticipantCheck(std::uint64_t run_id, const config::Scenario& scenario,
+                                   const std::vector<std::uint32_t>& vehicle_ids)
+    : run_id_(run_id),
+      scenario_sha256_(scenario.sha256),
+      vehicle_ids_(vehicle_ids),
+      period_ns_(scenario.sync.period_ns) {
+  for (const std::uint32_t id : vehicle_ids) {
+    const config::Scenario own = config::make_vehicle_scenario(scenario, id);
+    Vehicle vehicle;
+    vehicle.id = id;
+    vehicle.rod_length = own.vehicle.rod_length;
+    for (const config::Stage& stage : own.mission) {
+      const auto* after = std::get_if<config::LeaveAfter>(&stage.leave);
+      vehicle.stages_ns.push_back(after ? std::optional(after->duration_ns) : std::nullopt);
+      vehicle.stage_names.push_back(stage.name);
+    }
+    vehicles_.push_back(std::move(vehicle));
+  }
+}
+
+bool ParticipantCheck::is_own_vehicle(std::uint32_t id) const {
+  return std::binary_search(vehicle_ids_.begin(), vehicle_ids_.end(), id);
+}
+
+// --- who may take part ---------------------------------------------------------------------------
+
+std::vector<ParticipantCheck::Entry> ParticipantCheck::admit_recorders(
+    const std::vector<Entry>& entries) {
+  std::vector<Entry> admitted;
+  std::copy_if(entries.begin(), entries.end(), std::back_inserter(admitted),
+               [](const Entry& entry) { return has_this_contract(entry.announcement); });
+  return admitted;
+}
+
+std::vector<ParticipantCheck::Entry> ParticipantCheck::admit_controllers(
+    const std::vector<Entry>& entries) {
+  std::vector<Entry> admitted = admit_recorders(entries);
+  find_first_libraries(admitted);
+  refused_libraries_.clear();
+  const auto is_refused = [this](const Entry& entry) {
+    const Library* library = find_other_library(entry.announcement);
+    if (library)
+      refused_libraries_[entry.peer] =
+          describe_field(entry, "library_sha256",
+                         fmt::format("{} (that of '{}')", to_words(library->sha256),
+                                     config::to_printable(library->name, 32)),
+                         to_words(entry.announcement.library_sha256().to_string())) +
+          "; it is refused";
+    return library != nullptr;
+  };
+  admitted.erase(std::remove_if(admitted.begin(), admitted.end(), is_refused), admitted.end());
+  return admitted;
+}
+
+void ParticipantCheck::find_first_libraries(const std::vector<Entry>& controllers) {
+  const auto is_earlier = [](const Entry& a, const Entry& b) {
+    return a.ready_since != b.ready_since ? a.ready_since < b.ready_since : a.peer < b.peer;
+  };
+  for (Vehicle& vehicle : vehicles_) {
+    if (vehicle.has_flown) continue;
+    const Entry* first = nullptr;
+    for (const Entry& entry : controllers) {
+      const Participant& announcement = entry.announcement;
+      const bool is_ready = announcement.ready() &&
+                            announcement.scenario_sha256() == scenario_sha256_ &&
+                            bus::flies_vehicle(announcement, vehicle.id);
+      if (is_ready && (!first || is_earlier(entry, *first))) first = &entry;
+    }
+    vehicle.library.reset();
+    if (first)
+      vehicle.library = Library{first->announcement.library_sha256().to_string(),
+                                first->announcement.name().to_string()};
+  }
+}
+
+const ParticipantCheck::Library* ParticipantCheck::find_other_library(
+    const Participant& controller) const {
+  for (const Vehicle& vehicle : vehicles_)
+    if (vehicle.library && bus::flies_vehicle(controller, vehicle.id) &&
+        !(controller.library_sha256() == vehicle.library->sha256))
+      return &*vehicle.library;
+  return nullptr;
+}
+
+// --- answers -------------------------------------------------------------------------------------
+
+void ParticipantCheck::note_taken(const OfferedAnswer& answer, const bus::PeerId& sender,
+                                  Verdict verdict, const ControllerState& returned,
+                                  const model::Measurement& state) {
+  if (!rejections_.empty()) rejections_.erase(sender);
+  if (verdict != Verdict::kAccepted && verdict != Verdict::kHeld) return;
+  check_memory(answer, sender, returned);
+  if (verdict != Verdict::kAccepted) return;
+  const auto id =
+      std::lower_bound(vehicle_ids_.begin(), vehicle_ids_.end(), answer.command.vehicle_id());
+  Vehicle& flown = vehicles_[static_cast<std::size_t>(id - vehicle_ids_.begin())];
+  flown.has_flown = true;
+  check_stage(flown, answer, sender);
+  check_distance(flown, answer, state);
+}
+
+void ParticipantCheck::note_rejected(const OfferedAnswer& answer, const bus::PeerId& sender,
+                                     Verdict verdict, std::uint64_t step) {
+  const bool is_of_this_run = answer.run_id == run_id_;
+  if (verdict == Verdict::kEarly || (is_of_this_run && answer.step > step))
+    see(sender, "early", [&] {
+      return "step: " + describe_early(answer.step, verdict == Verdict::kEarly ? step : step + 1);
+    });
+  if (verdict == Verdict::kContradiction)
+    see(sender, "two", [&] {
+      return fmt::format("step {}: expected one answer, got two that differ", answer.step);
+    });
+  if (rejections_.size() >= kMostSenders && rejections_.count(sender) == 0) return;
+  Rejections& rejections = rejections_[sender];
+  ++rejections.count;
+  const bool is_old = verdict == Verdict::kWrongStep && answer.step < step;
+  rejections.is_old = rejections.is_old && is_old;
+  rejections.defect = describe_defect(answer, verdict, step);
+}
+
+/// `unpublished`: the first step whose state had not been published.
+std::string ParticipantCheck::describe_early(std::uint64_t got, std::uint64_t unpublished) {
+  return unpublished == 0
+             ? fmt::format("expected none before a state is published, got {}", got)
+             : fmt::format("expected at most {}, the last published, got {}", unpublished - 1, got);
+}
+
+std::string ParticipantCheck::describe_defect(const OfferedAnswer& answer, Verdict verdict,
+                                              std::uint64_t step) const {
+  switch (verdict) {
+    case Verdict::kOtherRun:
+      return fmt::format("run_id: expected {}, got {}", to_words(run_id_), to_words(answer.run_id));
+    case Verdict::kUnknownVehicle:
+      return fmt::format("vehicle_id: expected {}, got {}", config::to_vehicle_ranges(vehicle_ids_),
+                         answer.command.vehicle_id());
+    case Verdict::kEarly:
+      return "step: " + describe_early(answer.step, step);
+    case Verdict::kWrongStep:
+      return fmt::format("step: expected {}, got {}", step, answer.step);
+    default:
+      return to_string(verdict);
+  }
+}
+
+template <class MakeText>
+void ParticipantCheck::see(const bus::PeerId& sender, const char* what, MakeText make_text) {
+  const auto key = std::pair(sender, std::string(what));
+  const auto known = seen_.find(key);
+  if (known != seen_.end()) {
+    known->second.is_fresh = true;
+    return;
+  }
+  if (seen_.size() < kMostSenders) seen_[key].text = make_text();
+}
+
+void ParticipantCheck::check_memory(const OfferedAnswer& answer, const bus::PeerId& sender,
+                                    const ControllerState& returned) {
+  const ControllerState& memory = answer.command.controller();
+  if (memory.stage_index() < returned.stage_index())
+    see(sender, "stage", [&] {
+      return fmt::format(
+          "controller.stage_index at step {}: expected at least {}, as in the state, got {}",
+          answer.step, returned.stage_index(), memory.stage_index());
+    });
+  if (memory.numbers().size() < returned.numbers().size())
+    see(sender, "numbers", [&] {
+      return fmt::format(
+          "controller.numbers at step {}: expected {} of them, as in the state, got {}",
+          answer.step, returned.numbers().size(), memory.numbers().size());
+    });
+}
+
+void ParticipantCheck::check_stage(Vehicle& vehicle, const OfferedAnswer& answer,
+                                   const bus::PeerId& sender) {
+  const std::uint32_t stage = answer.command.controller().stage_index();
+  if (stage != vehicle.stage) {
+    vehicle.stage = stage;
+    vehicle.stage_start_step = answer.step;
+    return;
+  }
+  if (answer.command.mission() != MISSION_RUNNING) return;
+  // Beyond the last stage the mission is over at once.
+  const bool is_over = stage >= vehicle.stages_ns.size();
+  const auto duration_ns = is_over ? std::optional<std::int64_t>(0) : vehicle.stages_ns[stage];
+  if (!duration_ns || answer.step < vehicle.stage_start_step) return;
+  const auto steps = static_cast<std::int64_t>(answer.step - vehicle.stage_start_step);
+  if (steps * period_ns_ <= *duration_ns + kStageTolerance_ns) return;
+  const auto start_ns = static_cast<std::int64_t>(vehicle.stage_start_step) * period_ns_;
+  const double end_s = static_cast<double>(start_ns + *duration_ns) * 1e-9;
+  see(sender, "mission", [&] {
+    return is_over ? fmt::format(
+                         "mission at step {}: expected finished after the last stage, "
+                         "which was over at {:g} s, got running",
+                         answer.step, end_s)
+                   : fmt::format(
+                         "controller.stage_index at step {}: expected more than {} (stage "
+                         "'{}' was over at {:g} s), got {} and mission running",
+                         answer.step, stage, config::to_printable(vehicle.stage_names[stage], 32),
+                         end_s, stage);
+  });
+}
+
+void ParticipantCheck::check_distance(Vehicle& vehicle, const OfferedAnswer& answer,
+                                      const model::Measurement& state) {
+  const Eigen::Vector3d reference = bus::to_vector(answer.command.reference().position_m());
+  const double most = kMostRodLengths * vehicle.rod_length;
+  const double load = (state.p_WL - reference).squaredNorm();
+  const double quad = (state.p_WQ - reference).squaredNorm();
+  if (vehicle.is_far || std::max(load, quad) <= most * most) return;
+  vehicle.is_far = true;
+  events_.push_back(fmt::format(
+      "step {}: vehicle {}: {} {:.4g} m from its reference, expected at most {:g} rod lengths "
+      "({:g} m)",
+      answer.step, vehicle.id, load > most * most ? "load" : "quadrotor",
+      std::sqrt(load > most * most ? load : quad), kMostRodLengths, most));
+}
+
+std::string ParticipantCheck::describe_rejections(const bus::PeerId& sender) const {
+  const auto found = rejections_.find(sender);
+  if (found == rejections_.end()) return "";
+  return fmt::format(" ({} of its answers rejected, none taken: {})", found->second.count,
+                     found->second.defect);
+}
+
+std::vector<std::string> ParticipantCheck::take_events() { return std::exchange(events_, {}); }
+
+// --- all that is wrong ---------------------------------------------------------------------------
+
+bool ParticipantCheck::lasts(const std::string& key, Clock::time_point now,
+                             Clock::duration patience) {
+  pending_now_.insert(key);
+  return now - pending_.try_emplace(key, now).first->second >= patience;
+}
+
+ParticipantCheck::Findings ParticipantCheck::look(const Neighbourhood& neighbourhood) {
+  Findings findings;
+  Senders announced;
+  pending_now_.clear();
+  for (const Entry& entry : neighbourhood.participants) {
+    announced[entry.peer] = &entry;
+    look_at(entry, neighbourhood, findings);
+  }
+  look_at_strangers(neighbourhood, announced, findings);
+  look_at_answers(neighbourhood, announced, findings);
+  for (auto it = pending_.begin(); it != pending_.end();)
+    it = pending_now_.count(it->first) > 0 ? std::next(it) : pending_.erase(it);
+  return findings;
+}
+
+void ParticipantCheck::look_at(const Entry& entry, const Neighbourhood& neighbourhood,
+                               Findings& findings) {
+  const Participant& announcement = entry.announcement;
+  if (neighbourhood.other_runs.count(announcement.run_id()) > 0) return;
+  if (!has_this_contract(announcement)) {
+    findings[make_key(entry.peer, "contract")] =
+        describe_field(entry, "contract_sha256", bus::kContractSha256,
+                       to_words(announcement.contract_sha256().to_string()));
+    return;  // the rest may mean something else
+  }
+  if (announcement.role() != ROLE_CONTROLLER || announcement.done()) return;
+  if (announcement.run_id() != run_id_) {
+    // What flies other vehicles may wait for another server.
+    const bool is_ours =
+        announcement.vehicle_ids().empty() || flies_any(announcement, vehicle_ids_);
+    const std::string key = make_key(entry.peer, "run_id " + to_words(announcement.run_id()));
+    const Clock::duration patience = announcement.run_id() == 0 ? kPatience : kPatienceWithRun;
+    if (is_ours && lasts(key, neighbourhood.now, patience))
+      findings[key] =
+          describe_field(entry, "run_id", to_words(run_id_), to_words(announcement.run_id()));
+    return;
+  }
+  if (!(announcement.scenario_sha256() == scenario_sha256_))
+    findings[make_key(entry.peer, "scenario")] =
+        describe_field(entry, "scenario_sha256", scenario_sha256_,
+                       to_words(announcement.scenario_sha256().to_string()));
+  if (const auto vehicles = find_wrong_vehicles(announcement, neighbourhood)) {
+    const std::string key = make_key(entry.peer, "vehicle_ids " + *vehicles);
+    if (lasts(key, neighbourhood.now, kPatience))
+      findings[key] =
+          describe_field(entry, "vehicle_ids", config::to_vehicle_ranges(vehicle_ids_), *vehicles);
+  }
+  const auto library = refused_libraries_.find(entry.peer);
+  if (library != refused_libraries_.end())
+    findings[make_key(entry.peer, "library")] = library->second;
+}
+
+/// The announced vehicles that no server flies, in words.
+std::optional<std::string> ParticipantCheck::find_wrong_vehicles(
+    const Participant& announcement, const Neighbourhood& neighbourhood) const {
+  std::vector<std::uint32_t> wrong;
+  for (const std::uint32_t id : announcement.vehicle_ids())
+    if (!is_own_vehicle(id) && neighbourhood.other_vehicles.count(id) == 0) wrong.push_back(id);
+  if (announcement.vehicle_ids().empty()) return "none";
+  if (wrong.empty()) return std::nullopt;
+  std::sort(wrong.begin(), wrong.end());
+  wrong.erase(std::unique(wrong.begin(), wrong.end()), wrong.end());
+  return config::to_vehicle_ranges(wrong);
+}
+
+void ParticipantCheck::look_at_strangers(const Neighbourhood& neighbourhood,
+                                         const Senders& announced, Findings& findings) {
+  for (const auto& [peer, description] : neighbourhood.command_writers) {
+    const std::string key = make_key(peer, "announcement");
+    if (announced.count(peer) > 0 || neighbourhood.explained.count(peer) > 0) continue;
+    if (lasts(key, neighbourhood.now, kPatience))
+      findings[key] = description +
+                      ": writes sls/command: expected an announcement in sls/participant, got none";
+  }
+  for (const auto& [peer, text] : neighbourhood.missing_deadlines) {
+    const auto known = announced.find(peer);
+    const std::uint64_t run_id =
+        known == announced.end() ? 0 : known->second->announcement.run_id();
+    if (neighbourhood.other_runs.count(run_id) > 0) continue;
+    const std::string key = make_key(peer, "deadline");
+    if (lasts(key, neighbourhood.now, kPatience)) findings[key] = text;
+  }
+}
+
+void ParticipantCheck::look_at_answers(const Neighbourhood& neighbourhood, const Senders& announced,
+                                       Findings& findings) {
+  const auto now = neighbourhood.now;
+  const auto describe_sender = [&](const bus::PeerId& peer) {
+    const auto known = announced.find(peer);
+    if (known != announced.end()) return describe(*known->second);
+    const auto writer = neighbourhood.command_writers.find(peer);
+    return writer != neighbourhood.command_writers.end() ? writer->second : std::string();
+  };
+  for (auto it = seen_.begin(); it != seen_.end();) {
+    auto& [key, seen] = *it;
+    if (std::exchange(seen.is_fresh, false)) seen.last = now;
+    const std::string sender = describe_sender(key.first);
+    if (sender.empty() || now - seen.last > kMemory) {
+      it = seen_.erase(it);
+      continue;
+    }
+    findings[make_key(key.first, key.second)] = sender + ": sls/command " + seen.text;
+    ++it;
+  }
+  for (auto it = rejections_.begin(); it != rejections_.end();) {
+    auto& [peer, rejections] = *it;
+    const auto known = announced.find(peer);
+    if (known == announced.end()) {  // that is the mistake, or it is gone
+      it = rejections_.erase(it);
+      continue;
+    }
+    if (!rejections.since) rejections.since = now;
+    const auto own = findings.lower_bound(make_key(peer, ""));
+    const bool is_explained =
+        own != findings.end() &&
+        own->first.compare(0, make_key(peer, "").size(), make_key(peer, "")) == 0;
+    const bool is_few = rejections.is_old && rejections.count < kFewOldAnswers;
+    if (!is_explained && !is_few && now - *rejections.since >= kPatienceWithAnswers)
+      findings[make_key(peer, "rejected")] =
+          fmt::format("{}: sls/command: {} answers rejected, none taken: {}",
+                      describe(*known->second), rejections.count, rejections.defect);
+    ++it;
+  }
+}
+
+}  // namespace sls::sim

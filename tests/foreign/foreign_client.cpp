@@ -1,0 +1,359 @@
+/// Somebody else's controller, on Fast DDS as it comes, that makes one mistake (--mistake) and does
+/// the rest as idl/README.md asks: it keeps a vehicle that hangs at rest where it is. Prints
+/// "begins" when its mistake can first be seen, and ends at SIGTERM.
+#include <slsPubSubTypes.h>
+
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
+#include <CLI/CLI.hpp>
+#include <fastdds/dds/domain/DomainParticipant.hpp>
+#include <fastdds/dds/domain/DomainParticipantFactory.hpp>
+#include <fastdds/dds/publisher/DataWriter.hpp>
+#include <fastdds/dds/publisher/Publisher.hpp>
+#include <fastdds/dds/subscriber/DataReader.hpp>
+#include <fastdds/dds/subscriber/SampleInfo.hpp>
+#include <fastdds/dds/subscriber/Subscriber.hpp>
+#include <fastdds/dds/topic/Topic.hpp>
+
+#include <chrono>
+#include <csignal>
+#include <cstring>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "common/app/stop_signal.hpp"
+
+namespace {
+
+namespace dds = eprosima::fastdds::dds;
+namespace rtps = eprosima::fastrtps::rtps;
+using eprosima::fastrtps::types::ReturnCode_t;
+using namespace sls;
+using namespace std::chrono_literals;
+
+struct Options {
+  int domain = 0;
+  std::string mistake = "none";
+  std::string name = "foreign";
+  std::string library;
+  int strength = 0;
+};
+
+/// The bytes of a message, `count` of them put in (or, where negative, taken out) at `offset`.
+struct Edit {
+  std::size_t offset = 0;
+  int count = 0;
+};
+
+/// What a compiler made of an IDL file in which a field was added or left out; or under another
+/// name, or with a key.
+template <class Generated>
+class OtherType : public Generated {
+ public:
+  explicit OtherType(const Edit& edit) : edit_(edit) {
+    this->m_typeSize += 16;
+    this->auto_fill_type_object(false);
+    this->auto_fill_type_information(false);
+  }
+  void set_keyed() { this->m_isGetKeyDefined = true; }
+
+  bool serialize(void* data, rtps::SerializedPayload_t* payload) override {
+    if (!Generated::serialize(data, payload)) return false;
+    char* const begin = reinterpret_cast<char*>(payload->data) + edit_.offset;
+    const std::size_t rest = payload->length - edit_.offset;
+    if (edit_.count >= 0) {
+      std::memmove(begin + edit_.count, begin, rest);
+      std::memset(begin, 0, static_cast<std::size_t>(edit_.count));
+    } else {
+      std::memmove(begin, begin - edit_.count, rest + edit_.count);
+    }
+    payload->length = static_cast<std::uint32_t>(static_cast<int>(payload->length) + edit_.count);
+    return true;
+  }
+  std::function<std::uint32_t()> getSerializedSizeProvider(void* data) override {
+    return [size = Generated::getSerializedSizeProvider(data)] { return size() + 16; };
+  }
+  bool getKey(void*, rtps::InstanceHandle_t* handle, bool) override {
+    handle->value[0] = 1;
+    return true;
+  }
+
+ private:
+  const Edit edit_;
+};
+
+class ForeignClient {
+ public:
+  explicit ForeignClient(const Options& options) : options_(options) {
+    dds::DomainParticipantQos qos = dds::PARTICIPANT_QOS_DEFAULT;
+    qos.name(options.name.c_str());
+    qos.transport().use_builtin_transports = false;
+    const auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
+    udp->interfaceWhiteList.push_back("127.0.0.1");
+    qos.transport().user_transports.push_back(udp);
+    participant_ = dds::DomainParticipantFactory::get_instance()->create_participant(
+        static_cast<std::uint32_t>(options.domain), qos);
+    if (!participant_) throw std::runtime_error("cannot join");
+    publisher_ = participant_->create_publisher(dds::PUBLISHER_QOS_DEFAULT);
+    subscriber_ = participant_->create_subscriber(dds::SUBSCRIBER_QOS_DEFAULT);
+    create_endpoints();
+  }
+  ~ForeignClient() {
+    participant_->delete_contained_entities();
+    dds::DomainParticipantFactory::get_instance()->delete_participant(participant_);
+  }
+  ForeignClient(const ForeignClient&) = delete;
+  ForeignClient& operator=(const ForeignClient&) = delete;
+
+  void run() {
+    if (is_visible_by_itself()) say_that_it_begins();
+    while (app::stop_signal() == 0) {
+      look_for_run();
+      if (parameters_) fly();
+      std::this_thread::sleep_for(1ms);
+    }
+  }
+
+ private:
+  bool makes(const char* mistake) const { return options_.mistake == mistake; }
+
+  bool is_visible_by_itself() const {
+    for (const char* mistake :
+         {"volatile_announcement", "best_effort_announcement", "exclusive_command",
+          "state_deadline", "appendable_command", "other_type", "keyed_command", "no_deadline",
+          "contract_1", "contract_1_state", "persistent_record", "unannounced"})
+      if (makes(mistake)) return true;
+    return false;
+  }
+
+  void say_that_it_begins() {
+    if (!std::exchange(has_begun_, true)) std::cout << "begins" << std::endl;
+  }
+
+  // --- endpoints ---
+
+  template <class Generated>
+  dds::Topic* create_topic(const char* name, const Edit& edit = {},
+                           const std::string& type_name = {}, bool is_keyed = false) {
+    auto* type = new OtherType<Generated>(edit);
+    if (!type_name.empty()) type->setName(type_name.c_str());
+    if (is_keyed) type->set_keyed();
+    const dds::TypeSupport support(type);
+    support.register_type(participant_);
+    return participant_->create_topic(name, support.get_type_name(), dds::TOPIC_QOS_DEFAULT);
+  }
+
+  dds::DataReader* create_reader(dds::Topic* topic, bool is_latched) const {
+    dds::DataReaderQos qos = dds::DATAREADER_QOS_DEFAULT;
+    qos.reliability().kind =
+        is_latched ? dds::RELIABLE_RELIABILITY_QOS : dds::BEST_EFFORT_RELIABILITY_QOS;
+    qos.durability().kind =
+        is_latched ? dds::TRANSIENT_LOCAL_DURABILITY_QOS : dds::VOLATILE_DURABILITY_QOS;
+    qos.history().depth = 64;
+    qos.data_sharing().off();
+    qos.endpoint().history_memory_policy = rtps::DYNAMIC_REUSABLE_MEMORY_MODE;
+    if (makes("state_deadline") && topic->get_name() == "sls/state")
+      qos.deadline().period = eprosima::fastrtps::Duration_t(0.01);
+    if (makes("persistent_record") && topic->get_name() == "sls/record")
+      qos.durability().kind = dds::PERSISTENT_DURABILITY_QOS;
+    return subscriber_->create_datareader(topic, qos);
+  }
+
+  dds::DataWriterQos make_writer_qos() const {
+    dds::DataWriterQos qos = dds::DATAWRITER_QOS_DEFAULT;
+    qos.reliability().kind = dds::RELIABLE_RELIABILITY_QOS;
+    qos.durability().kind = dds::TRANSIENT_LOCAL_DURABILITY_QOS;
+    qos.history().depth = 64;
+    qos.data_sharing().off();
+    qos.endpoint().history_memory_policy = rtps::DYNAMIC_REUSABLE_MEMORY_MODE;
+    return qos;
+  }
+
+  void create_endpoints() {
+    if (makes("contract_1")) {
+      publisher_->create_datawriter(create_topic<ReferencePubSubType>("sls/reference"),
+                                    make_writer_qos());
+      return;
+    }
+    if (makes("contract_1_state")) {
+      create_reader(create_topic<VehicleStatePubSubType>("sls/state"), false);
+      return;
+    }
+    if (makes("persistent_record")) {
+      create_reader(create_topic<RecordBatchPubSubType>("sls/record"), true);
+      return;
+    }
+    create_announcement_writer();
+    create_command_writer();
+    parameters_reader_ = create_reader(create_topic<ParametersPubSubType>("sls/parameters"), true);
+    status_reader_ = create_reader(create_topic<SimStatusPubSubType>("sls/status"), true);
+    state_reader_ = create_reader(create_topic<StatesPubSubType>("sls/state"), false);
+  }
+
+  void create_announcement_writer() {
+    dds::DataWriterQos qos = make_writer_qos();
+    if (makes("volatile_announcement")) qos.durability().kind = dds::VOLATILE_DURABILITY_QOS;
+    if (makes("best_effort_announcement"))
+      qos.reliability().kind = dds::BEST_EFFORT_RELIABILITY_QOS;
+    // One more number after run_id.
+    const Edit edit = makes("announcement_extra_field") ? Edit{12, 8} : Edit{};
+    participant_writer_ = publisher_->create_datawriter(
+        create_topic<ParticipantPubSubType>("sls/participant", edit), qos);
+  }
+
+  void create_command_writer() {
+    dds::DataWriterQos qos = make_writer_qos();
+    if (!makes("no_deadline")) qos.deadline().period = eprosima::fastrtps::Duration_t(0.1);
+    if (makes("exclusive_command")) qos.ownership().kind = dds::EXCLUSIVE_OWNERSHIP_QOS;
+    if (makes("appendable_command"))
+      qos.representation().m_value.push_back(dds::XCDR2_DATA_REPRESENTATION);
+    // After the encapsulation (4), run_id (8) and step (8).
+    const Edit edit = makes("extra_field")     ? Edit{20, 8}
+                      : makes("missing_field") ? Edit{12, -8}
+                      : makes("retyped_field") ? Edit{12, -4}
+                                               : Edit{};
+    command_writer_ = publisher_->create_datawriter(
+        create_topic<CommandsPubSubType>("sls/command", edit,
+                                         makes("other_type") ? "mine::Commands" : "",
+                                         makes("keyed_command")),
+        qos);
+  }
+
+  // --- the life of a client ---
+
+  void look_for_run() {
+    dds::SampleInfo info;
+    Parameters parameters;
+    while (parameters_reader_ &&
+           parameters_reader_->take_next_sample(&parameters, &info) == ReturnCode_t::RETCODE_OK)
+      if (info.valid_data && parameters.vehicles().size() > 0) {
+        parameters_ = parameters;
+        announce();
+      }
+    SimStatus status;
+    while (status_reader_ &&
+           status_reader_->take_next_sample(&status, &info) == ReturnCode_t::RETCODE_OK) {
+    }
+  }
+
+  void announce() {
+    if (makes("unannounced")) return;
+    Participant message;
+    message.run_id(makes("zero_run_id")    ? 0
+                   : makes("other_run_id") ? 0x1234
+                                           : parameters_->run_id());
+    message.contract_sha256(makes("other_contract") ? std::string(64, '0')
+                            : makes("no_contract")  ? std::string()
+                                                    : SLS_CONTRACT_SHA256);
+    message.role(ROLE_CONTROLLER);
+    message.name(options_.name);
+    message.host("elsewhere");
+    message.vehicle_ids({makes("unknown_vehicle") ? 7u : 0u});
+    message.strength(options_.strength);
+    message.scenario_sha256(makes("other_scenario") ? std::string(64, 'f')
+                                                    : parameters_->scenario_sha256().to_string());
+    message.library_sha256(options_.library);
+    message.ready(true);
+    message.last_complete_step(-1);
+    participant_writer_->write(&message);
+    for (const char* mistake : {"zero_run_id", "other_run_id", "other_contract", "no_contract",
+                                "unknown_vehicle", "other_scenario", "announcement_extra_field"})
+      if (makes(mistake)) say_that_it_begins();
+    if (!options_.library.empty()) say_that_it_begins();
+  }
+
+  void fly() {
+    dds::SampleInfo info;
+    while (state_reader_->take_next_sample(&states_, &info) == ReturnCode_t::RETCODE_OK)
+      if (info.valid_data && states_.run_id() == parameters_->run_id()) answer();
+  }
+
+  void answer() {
+    const std::uint64_t step = states_.step();
+    const double time_s = static_cast<double>(states_.sim_time_ns()) * 1e-9;
+    const VehicleState& state = states_.vehicles().front();
+    const VehicleParameters& vehicle = parameters_->vehicles().front();
+    if (step == 0) start_m_ = state.measured().p_WL_m();
+
+    ControlCommand command;
+    command.vehicle_id(0);
+    const double mass = vehicle.quad_mass_kg() + vehicle.load_mass_kg();
+    command.f_Q_W_n({makes("far") ? 20.0 : 0.0, 0.0, -mass * vehicle.gravity_m_s2()});
+    command.reference().position_m(start_m_);
+    command.reference().stage_name("hang");
+    ControllerState memory = state.controller();
+    // The first stage of the test's scenario lasts half a second.
+    if (memory.stage_index() == 0 && time_s >= 0.5 && !makes("stuck")) {
+      memory.stage_index(1);
+      memory.stage_start_step(step);
+    }
+    if (makes("numbers_lost")) memory.numbers().assign(step < 250 ? 3 : 0, 1.0);
+    command.reference().stage_index(memory.stage_index());
+    if (makes("memory_lost") && time_s >= 1.0) memory = ControllerState();
+    command.controller(memory);
+    command.mission(MISSION_RUNNING);
+
+    Commands answers;
+    answers.run_id(makes("wrong_run") ? 0x1234 : parameters_->run_id());
+    answers.step(step);
+    answers.client_name(options_.name);
+    answers.strength(options_.strength);
+    if (makes("wrong_vehicle")) command.vehicle_id(7);
+    answers.vehicles().push_back(command);
+    command_writer_->write(&answers);
+    if (makes("early")) {  // it guesses that nothing changes
+      answers.step(step + 2);
+      command_writer_->write(&answers);
+    }
+    if (makes("two_answers")) {
+      answers.vehicles().front().f_Q_W_n()[0] += 1e-3;
+      command_writer_->write(&answers);
+    }
+    for (const char* mistake : {"extra_field", "missing_field", "retyped_field", "wrong_run",
+                                "wrong_vehicle", "two_answers", "early"})
+      if (makes(mistake)) say_that_it_begins();
+    if ((makes("numbers_lost") && step >= 250) || (makes("memory_lost") && time_s >= 1.0) ||
+        (makes("stuck") && time_s >= 1.5) || (makes("far") && is_far(state)))
+      say_that_it_begins();
+  }
+
+  bool is_far(const VehicleState& state) const {
+    return state.measured().p_WL_m()[0] - start_m_[0] > 50.0;  // rod of 1 m
+  }
+
+  const Options options_;
+  dds::DomainParticipant* participant_ = nullptr;
+  dds::Publisher* publisher_ = nullptr;
+  dds::Subscriber* subscriber_ = nullptr;
+  dds::DataWriter* participant_writer_ = nullptr;
+  dds::DataWriter* command_writer_ = nullptr;
+  dds::DataReader* parameters_reader_ = nullptr;
+  dds::DataReader* status_reader_ = nullptr;
+  dds::DataReader* state_reader_ = nullptr;
+  std::optional<Parameters> parameters_;
+  States states_;
+  std::array<double, 3> start_m_{};
+  bool has_begun_ = false;
+};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App cli("A foreign controller with a mistake, for tests.");
+  Options options;
+  cli.add_option("--domain", options.domain);
+  cli.add_option("--mistake", options.mistake);
+  cli.add_option("--name", options.name);
+  cli.add_option("--library", options.library, "SHA-256 of the library it says it has loaded");
+  cli.add_option("--strength", options.strength);
+  CLI11_PARSE(cli, argc, argv);
+  app::install_stop_signals();
+  try {
+    ForeignClient(options).run();
+  } catch (const std::exception& error) {
+    std::cerr << "foreign_client: " << error.what() << std::endl;
+    return 1;
+  }
+}
