@@ -31,8 +31,8 @@ TEXT
 
 writes_of() {
   case $1 in
-    server) echo sls/state sls/fleet_state sls/parameters sls/status sls/control_reply ;;
-    controller) echo sls/command sls/fleet_command sls/reference sls/fleet_reference sls/participant ;;
+    server) echo sls/state sls/record sls/parameters sls/status sls/control_reply ;;
+    controller) echo sls/command sls/participant ;;
     recorder) echo sls/participant ;;
     operator) echo sls/control ;;
   esac
@@ -40,12 +40,9 @@ writes_of() {
 
 reads_of() {
   case $1 in
-    server) echo sls/command sls/fleet_command sls/control sls/participant sls/parameters sls/status ;;
-    controller) echo sls/state sls/fleet_state sls/participant sls/parameters sls/status ;;
-    recorder)
-      echo sls/state sls/command sls/reference sls/fleet_state sls/fleet_command sls/fleet_reference \
-        sls/participant sls/parameters sls/status
-      ;;
+    server) echo sls/command sls/control sls/participant sls/parameters sls/status ;;
+    controller) echo sls/state sls/participant sls/parameters sls/status ;;
+    recorder) echo sls/record sls/participant sls/parameters sls/status ;;
     operator) echo sls/control_reply sls/participant sls/parameters sls/status ;;
   esac
 }
