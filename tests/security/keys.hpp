@@ -35,6 +35,8 @@ class Keys {
   /// A recorder that gives itself the controller's permissions, signed with its own key, in a
   /// folder of that name. It has its middleware trust them, too.
   void add_usurper(const std::string& name) const;
+  /// Gives a role the topics of contract 1 in place of sls/record, signed as they should be.
+  void make_contract_1(const std::string& role) const;
 
  private:
   TemporaryFolder folder_;
