@@ -148,11 +148,11 @@ void ParticipantCheck::note_taken(const OfferedAnswer& answer, const bus::PeerId
                                   const model::Measurement& state) {
   if (!rejections_.empty()) rejections_.erase(sender);
   if (verdict != Verdict::kAccepted && verdict != Verdict::kHeld) return;
-  check_memory(answer, sender, returned);
-  if (verdict != Verdict::kAccepted) return;
   const auto id =
       std::lower_bound(vehicle_ids_.begin(), vehicle_ids_.end(), answer.command.vehicle_id());
   Vehicle& flown = vehicles_[static_cast<std::size_t>(id - vehicle_ids_.begin())];
+  check_memory(flown, answer, sender, returned);
+  if (verdict != Verdict::kAccepted) return;
   flown.has_flown = true;
   check_stage(flown, answer, sender);
   check_distance(flown, answer, state);
@@ -212,21 +212,24 @@ void ParticipantCheck::see(const bus::PeerId& sender, const char* what, MakeText
   if (seen_.size() < kMostSenders) seen_[key].text = make_text();
 }
 
-void ParticipantCheck::check_memory(const OfferedAnswer& answer, const bus::PeerId& sender,
-                                    const ControllerState& returned) {
+void ParticipantCheck::check_memory(Vehicle& vehicle, const OfferedAnswer& answer,
+                                    const bus::PeerId& sender, const ControllerState& returned) {
   const ControllerState& memory = answer.command.controller();
-  if (memory.stage_index() < returned.stage_index())
+  if (memory.stage_index() < returned.stage_index()) {
+    vehicle.is_stage_lost = true;
     see(sender, "stage", [&] {
       return fmt::format(
           "controller.stage_index at step {}: expected at least {}, as in the state, got {}",
           answer.step, returned.stage_index(), memory.stage_index());
     });
-  if (memory.numbers().size() < returned.numbers().size())
+  }
+  const std::size_t numbers = memory.numbers().size();
+  if (numbers < vehicle.numbers)
     see(sender, "numbers", [&] {
-      return fmt::format(
-          "controller.numbers at step {}: expected {} of them, as in the state, got {}",
-          answer.step, returned.numbers().size(), memory.numbers().size());
+      return fmt::format("controller.numbers at step {}: expected {} of them, as before, got {}",
+                         answer.step, vehicle.numbers, numbers);
     });
+  vehicle.numbers = std::max(vehicle.numbers, numbers);
 }
 
 void ParticipantCheck::check_stage(Vehicle& vehicle, const OfferedAnswer& answer,
@@ -246,7 +249,8 @@ void ParticipantCheck::check_stage(Vehicle& vehicle, const OfferedAnswer& answer
   if (steps * period_ns_ <= *duration_ns + kStageTolerance_ns) return;
   const auto start_ns = static_cast<std::int64_t>(vehicle.stage_start_step) * period_ns_;
   const double end_s = static_cast<double>(start_ns + *duration_ns) * 1e-9;
-  see(sender, "mission", [&] {
+  // Whose memory was lost does not get further because of that.
+  see(sender, vehicle.is_stage_lost ? "stage" : "mission", [&] {
     return is_over ? fmt::format(
                          "mission at step {}: expected finished after the last stage, "
                          "which was over at {:g} s, got running",
@@ -371,7 +375,7 @@ void ParticipantCheck::look_at_strangers(const Neighbourhood& neighbourhood,
         known == announced.end() ? 0 : known->second->announcement.run_id();
     if (neighbourhood.other_runs.count(run_id) > 0) continue;
     const std::string key = make_key(peer, "deadline");
-    if (lasts(key, neighbourhood.now, kPatience)) findings[key] = text;
+    if (run_id == run_id_ || lasts(key, neighbourhood.now, kPatience)) findings[key] = text;
   }
 }
 

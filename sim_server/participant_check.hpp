@@ -101,6 +101,8 @@ class ParticipantCheck {
     std::vector<std::string> stage_names;
     std::uint32_t stage = 0;             // in the last accepted answer
     std::uint64_t stage_start_step = 0;  // the first that said so
+    bool is_stage_lost = false;          // it fell behind what the state said
+    std::size_t numbers = 0;             // the most that an accepted answer carried
     bool is_far = false;
     bool has_flown = false;
     std::optional<Library> library;  // of the client that flies it or, before, was ready first
@@ -111,7 +113,7 @@ class ParticipantCheck {
   /// The one that it should have loaded; nothing where all is well.
   const Library* find_other_library(const Participant& controller) const;
 
-  void check_memory(const OfferedAnswer& answer, const bus::PeerId& sender,
+  void check_memory(Vehicle& vehicle, const OfferedAnswer& answer, const bus::PeerId& sender,
                     const ControllerState& returned);
   void check_stage(Vehicle& vehicle, const OfferedAnswer& answer, const bus::PeerId& sender);
   void check_distance(Vehicle& vehicle, const OfferedAnswer& answer,

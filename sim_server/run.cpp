@@ -134,13 +134,12 @@ bool Run::wait_for_participants() {
     refresh_roster();
     const std::string missing = name_missing(roster_, expected, scenario_.sha256, vehicle_ids_);
     if (missing.empty()) return true;
-    const std::string problem = board_.problem.empty() ? "" : "; " + board_.problem;
     if (wait.is_over())
       throw app::RunError(fmt::format("not ready within {} s: {}{}{}", expected.timeout_s, missing,
-                                      problem, endpoints_.domain.describe_loneliness()));
+                                      describe_problem(), endpoints_.domain.describe_loneliness()));
     if (wait.is_report_due()) {
-      spdlog::info("waiting for: {} ({:.0f} s left){}{}{}", missing, wait.seconds_left(), problem,
-                   endpoints_.domain.describe_loneliness(),
+      spdlog::info("waiting for: {} ({:.0f} s left){}{}{}", missing, wait.seconds_left(),
+                   describe_problem(), endpoints_.domain.describe_loneliness(),
                    Clock::now() - began > kLongStart ? "; run ./sls doctor" : "");
       if (missing != published) board_.publish(PHASE_WAITING, "missing: " + missing);
       published = missing;

@@ -119,6 +119,7 @@ class Run {
   void attend_now_and_then();
   /// True where a problem began or ended that no status has told of.
   bool is_problem_due() const;
+  std::string describe_problem() const;
 
   Endpoints& endpoints_;
   const config::Scenario scenario_;

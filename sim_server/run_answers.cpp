@@ -104,8 +104,13 @@ std::string Run::describe_refusals(const VehicleFlight& vehicle) const {
 void Run::give_up(double waited_s, const std::string& refusals) const {
   const std::string cause =
       refusals.empty() ? fmt::format("step {}: ", board_.step) : refusals + "; ";
-  throw app::RunError(
-      fmt::format("{}waited {} s for {}", cause, waited_s, name_awaited_controllers()));
+  throw app::RunError(fmt::format("{}waited {} s for {}{}", cause, waited_s,
+                                  name_awaited_controllers(), describe_problem()));
+}
+
+/// "; " and what a participant does wrong, to be appended to a message about who is missing.
+std::string Run::describe_problem() const {
+  return board_.problem.empty() ? "" : "; " + board_.problem;
 }
 
 void Run::take_answers() {
@@ -152,9 +157,9 @@ std::string Run::name_awaited_controllers() const {
     if (vehicle->gate.accepted()) continue;
     const auto client = vehicle->gate.awaited_client();
     const std::string& last = vehicle->last_answer().controller_name;
-    awaited[client         ? fmt::format("controller '{}' on {}{}", client->name,
-                                         find_host(roster_, client->peer),
-                                         check_.describe_rejections(client->peer))
+    awaited[client ? fmt::format(
+                         "controller '{}' on {}{}", client->name, find_host(roster_, client->peer),
+                         board_.problem.empty() ? check_.describe_rejections(client->peer) : "")
             : last.empty() ? std::string("controller (none is ready)")
                            : fmt::format("controller '{}' (gone)", last)]
         .push_back(vehicle->id());
@@ -196,8 +201,9 @@ void Run::attend_to_absence(ControllerAbsence::Action action) {
                     name_awaited_controllers()));
   }
   if (!is_report_due) return;
-  board_.announce(fmt::format("step {}: waiting for: {} ({:.0f} s left)", board_.step,
-                              name_awaited_controllers(), absence_wait_->seconds_left()));
+  board_.announce(fmt::format("step {}: waiting for: {} ({:.0f} s left){}", board_.step,
+                              name_awaited_controllers(), absence_wait_->seconds_left(),
+                              describe_problem()));
 }
 
 }  // namespace sls::sim

@@ -124,7 +124,7 @@ class MatchedPeers {
 struct Node::Impl {
   Impl(const std::filesystem::path& qos_file, int domain, const std::string& name,
        const std::string& role)
-      : qos_place(qos_file.string()), identity(find_identity(role)) {
+      : qos_place(qos_file.string()), own_role(role), identity(find_identity(role)) {
     if (domain < 0 || domain > kMaxDomain)
       throw ConfigError("--domain: expected 0 to " + std::to_string(kMaxDomain) + ", got " +
                         std::to_string(domain));
@@ -147,7 +147,7 @@ struct Node::Impl {
     listener = std::make_unique<ParticipantListener>(
         eprosima::fastrtps::rtps::PropertyPolicyHelper::find_property(
             qos.properties(), "dds.sec.auth.plugin") != nullptr,
-        neighbours);
+        &neighbours);
     participant = factory->create_participant(static_cast<std::uint32_t>(domain), qos,
                                               listener.get(), dds::StatusMask::none());
     if (participant)
@@ -171,14 +171,30 @@ struct Node::Impl {
     throw ConfigError(qos_place + ": profile '" + profile + "': expected a profile, got none");
   }
 
+  /// Of a secured participant.
+  std::filesystem::path find_permissions_file() const {
+    const std::string scheme = "file://";
+    const auto* file = eprosima::fastrtps::rtps::PropertyPolicyHelper::find_property(
+        participant->get_qos().properties(),
+        "dds.sec.access.builtin.Access-Permissions.permissions");
+    return file && file->compare(0, scheme.size(), scheme) == 0 ? file->substr(scheme.size()) : "";
+  }
+
   /// Why the middleware made no writer or reader of `topic`; `verb` is "write" or "read".
   [[noreturn]] void throw_refused_endpoint(const char* verb, const char* topic,
                                            const char* profile) const {
     const std::string cause = MiddlewareLog::find_first_error();
     if (cause.find("topic not found in allow rule") != std::string::npos ||
-        cause.find("topic denied by deny rule") != std::string::npos)
+        cause.find("topic denied by deny rule") != std::string::npos) {
+      const std::filesystem::path permissions = find_permissions_file();
+      if (is_of_contract_1(permissions))
+        throw ConfigError(permissions.string() + ": expected permission to " + verb + " " + topic +
+                          ", got a document of contract 1; renew it where the authorities are: " +
+                          "./sls keys " + permissions.parent_path().parent_path().string() +
+                          " --add " + own_role + " " + identity + " --force");
       throw ConfigError(qos_place + ": identity '" + identity + "': expected permission to " +
                         verb + " " + topic + ", got none");
+    }
     throw ConfigError(qos_place + ": profile '" + profile + "': expected QoS that " + topic +
                       " can have, got: " + cause);
   }
@@ -197,8 +213,9 @@ struct Node::Impl {
     return topic;
   }
 
-  std::string qos_place;
-  std::string identity;
+  const std::string qos_place;
+  const std::string own_role;
+  const std::string identity;
   std::chrono::steady_clock::time_point joined;
   Problems problems;
   Neighbours neighbours{problems};

@@ -9,6 +9,7 @@
 
 #include <ctime>
 #include <filesystem>
+#include <fstream>
 #include <iomanip>
 #include <map>
 #include <memory>
@@ -182,6 +183,15 @@ void check_permissions(const std::string& file, const std::string& authority_fil
 }
 
 }  // namespace
+
+bool is_of_contract_1(const std::filesystem::path& permissions) {
+  std::ostringstream text;  // the document in plain text, and its signature
+  text << std::ifstream(permissions).rdbuf();
+  const auto grants = [text = text.str()](const char* topic) {
+    return text.find(std::string("<topic>") + topic) != std::string::npos;
+  };
+  return (grants("sls/reference<") || grants("sls/fleet_")) && !grants("sls/record<");
+}
 
 bool check_security_files(const std::string& profiles) {
   tinyxml2::XMLDocument document;

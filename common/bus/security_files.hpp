@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <string>
 
 namespace sls::bus {
@@ -11,5 +12,9 @@ namespace sls::bus {
 /// @returns whether there are any, which makes a participant a secured one.
 /// @throws config::ConfigError `FILE: expected …, got …`.
 bool check_security_files(const std::string& profiles);
+
+/// True where a signed permissions document is of contract 1: it grants topics that contract 2 has
+/// not, and not sls/record.
+bool is_of_contract_1(const std::filesystem::path& permissions);
 
 }  // namespace sls::bus

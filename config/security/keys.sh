@@ -12,7 +12,7 @@ fail() { say "error: $1"; exit "${2:-1}"; }
 
 usage() {
   cat <<'TEXT'
-usage: ./sls keys DIR [--days N] [--force]
+usage: ./sls keys DIR [--days N] [--force] [--other-vendors]
        ./sls keys DIR --add ROLE NAME [--days N] [--force]
 
 Makes DIR: certificate authorities (DIR/ca) and one folder for each role, server, controller, recorder
@@ -20,6 +20,8 @@ and operator, with the identity and the signed documents that a host of that rol
 
   --days N         valid for N days, 1 to 36500 (default: 365)
   --force          replace what is there
+  --other-vendors  for programs on another vendor's DDS, such as Cyclone DDS: submessages are
+                   encrypted, too, which costs up to a third of the speed
   --add ROLE NAME  one more identity of that role in DIR/NAME, signed by the authorities in DIR/ca
 
 Fly with them: SLS_KEYS=DIR ./sls run SCENARIO --qos config/qos/secure.xml
@@ -31,8 +33,8 @@ TEXT
 
 writes_of() {
   case $1 in
-    server) echo sls/state sls/fleet_state sls/parameters sls/status sls/control_reply ;;
-    controller) echo sls/command sls/fleet_command sls/reference sls/fleet_reference sls/participant ;;
+    server) echo sls/state sls/record sls/parameters sls/status sls/control_reply ;;
+    controller) echo sls/command sls/participant ;;
     recorder) echo sls/participant ;;
     operator) echo sls/control ;;
   esac
@@ -40,12 +42,9 @@ writes_of() {
 
 reads_of() {
   case $1 in
-    server) echo sls/command sls/fleet_command sls/control sls/participant sls/parameters sls/status ;;
-    controller) echo sls/state sls/fleet_state sls/participant sls/parameters sls/status ;;
-    recorder)
-      echo sls/state sls/command sls/reference sls/fleet_state sls/fleet_command sls/fleet_reference \
-        sls/participant sls/parameters sls/status
-      ;;
+    server) echo sls/command sls/control sls/participant sls/parameters sls/status ;;
+    controller) echo sls/state sls/participant sls/parameters sls/status ;;
+    recorder) echo sls/record sls/participant sls/parameters sls/status ;;
     operator) echo sls/control_reply sls/participant sls/parameters sls/status ;;
   esac
 }
@@ -132,7 +131,11 @@ make_authorities() {
   name="$(openssl rand -hex 4)"
   make_authority identity "$name"
   make_authority permissions "$name"
-  sign_document "$here/governance.xml" "$ca/governance.p7s"
+  # Other vendors' readers send keys only where submessages are protected, and without those keys Fast
+  # DDS sends them nothing: common/bus/fastdds/README.md, trap 25.
+  sed "s|<metadata_protection_kind>NONE<|<metadata_protection_kind>$submessages<|" \
+    "$here/governance.xml" >"$work/governance.xml"
+  sign_document "$work/governance.xml" "$ca/governance.p7s"
 }
 
 # make_identity ROLE NAME FOLDER
@@ -159,7 +162,7 @@ replace() {
   mv -T -- "$1" "$2"
 }
 
-folder='' days=365 force='' role='' name=''
+folder='' days=365 force='' role='' name='' submessages=NONE
 while (($#)); do
   case $1 in
     --days)
@@ -169,6 +172,7 @@ while (($#)); do
       shift
       ;;
     --force) force=yes ;;
+    --other-vendors) submessages=ENCRYPT ;;
     --add)
       role=${2:-} name=${3:-}
       [[ " ${roles[*]} " == *" $role "* && -n $role ]] ||

@@ -14,6 +14,8 @@
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
 
+#include <algorithm>
+#include <array>
 #include <chrono>
 #include <csignal>
 #include <cstring>
@@ -46,6 +48,7 @@ struct Edit {
   std::size_t offset = 0;
   int count = 0;
 };
+constexpr std::size_t kEnd = SIZE_MAX;
 
 /// What a compiler made of an IDL file in which a field was added or left out; or under another
 /// name, or with a key.
@@ -61,8 +64,9 @@ class OtherType : public Generated {
 
   bool serialize(void* data, rtps::SerializedPayload_t* payload) override {
     if (!Generated::serialize(data, payload)) return false;
-    char* const begin = reinterpret_cast<char*>(payload->data) + edit_.offset;
-    const std::size_t rest = payload->length - edit_.offset;
+    const std::size_t offset = std::min<std::size_t>(edit_.offset, payload->length);
+    char* const begin = reinterpret_cast<char*>(payload->data) + offset;
+    const std::size_t rest = payload->length - offset;
     if (edit_.count >= 0) {
       std::memmove(begin + edit_.count, begin, rest);
       std::memset(begin, 0, static_cast<std::size_t>(edit_.count));
@@ -122,8 +126,8 @@ class ForeignClient {
   bool is_visible_by_itself() const {
     for (const char* mistake :
          {"volatile_announcement", "best_effort_announcement", "exclusive_command",
-          "state_deadline", "appendable_command", "other_type", "keyed_command", "no_deadline",
-          "contract_1", "contract_1_state", "persistent_record", "unannounced"})
+          "state_deadline", "other_type", "keyed_command", "no_deadline", "contract_1",
+          "contract_1_state", "record_deadline", "unannounced"})
       if (makes(mistake)) return true;
     return false;
   }
@@ -156,8 +160,8 @@ class ForeignClient {
     qos.endpoint().history_memory_policy = rtps::DYNAMIC_REUSABLE_MEMORY_MODE;
     if (makes("state_deadline") && topic->get_name() == "sls/state")
       qos.deadline().period = eprosima::fastrtps::Duration_t(0.01);
-    if (makes("persistent_record") && topic->get_name() == "sls/record")
-      qos.durability().kind = dds::PERSISTENT_DURABILITY_QOS;
+    if (makes("record_deadline") && topic->get_name() == "sls/record")
+      qos.deadline().period = eprosima::fastrtps::Duration_t(0.01);
     return subscriber_->create_datareader(topic, qos);
   }
 
@@ -181,7 +185,7 @@ class ForeignClient {
       create_reader(create_topic<VehicleStatePubSubType>("sls/state"), false);
       return;
     }
-    if (makes("persistent_record")) {
+    if (makes("record_deadline")) {
       create_reader(create_topic<RecordBatchPubSubType>("sls/record"), true);
       return;
     }
@@ -197,8 +201,7 @@ class ForeignClient {
     if (makes("volatile_announcement")) qos.durability().kind = dds::VOLATILE_DURABILITY_QOS;
     if (makes("best_effort_announcement"))
       qos.reliability().kind = dds::BEST_EFFORT_RELIABILITY_QOS;
-    // One more number after run_id.
-    const Edit edit = makes("announcement_extra_field") ? Edit{12, 8} : Edit{};
+    const Edit edit = makes("announcement_extra_field") ? Edit{kEnd, 8} : Edit{};
     participant_writer_ = publisher_->create_datawriter(
         create_topic<ParticipantPubSubType>("sls/participant", edit), qos);
   }
@@ -207,8 +210,6 @@ class ForeignClient {
     dds::DataWriterQos qos = make_writer_qos();
     if (!makes("no_deadline")) qos.deadline().period = eprosima::fastrtps::Duration_t(0.1);
     if (makes("exclusive_command")) qos.ownership().kind = dds::EXCLUSIVE_OWNERSHIP_QOS;
-    if (makes("appendable_command"))
-      qos.representation().m_value.push_back(dds::XCDR2_DATA_REPRESENTATION);
     // After the encapsulation (4), run_id (8) and step (8).
     const Edit edit = makes("extra_field")     ? Edit{20, 8}
                       : makes("missing_field") ? Edit{12, -8}

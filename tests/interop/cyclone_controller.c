@@ -3,8 +3,8 @@
 ///
 ///     cyclone_controller [--domain N] [--name TEXT] [--strength N]
 ///
-/// It flies vehicle 0, follows resets and servers that take another's place, and ends with its run:
-/// exit code 0 finished, 1 failed or nobody there, 2 bad usage.
+/// It flies all vehicles of its server, follows resets and servers that take another's place, and
+/// ends with its run: exit code 0 finished, 1 failed or nobody there, 2 bad usage.
 #include <stdlib.h>
 #include <string.h>
 
@@ -15,17 +15,13 @@
 typedef struct Controller {
   Node node;
   Options options;
-  dds_entity_t state_reader, command_writer, reference_writer, waitset;
+  dds_entity_t state_reader, command_writer, waitset;
 
   uint64_t run_id;  ///< of the run it flies; 0: none
   bool is_ready;
   Scenario scenario;
-  Vehicle vehicle;
   Gains horizontal, vertical;
   int64_t period_ns;
-
-  bool has_answered;
-  sls_ControlCommand last;  ///< a state that comes again is answered with the same bytes
 } Controller;
 
 static const Run* current_run(const Controller* self) {
@@ -70,29 +66,33 @@ static bool advance_mission(const Controller* self, uint64_t step, sls_Controlle
   return false;
 }
 
-/// A pure function of the sample: the controller state that came with it is all the memory there
-/// is.
-static sls_ControlCommand calc_answer(const Controller* self, const sls_VehicleState* state) {
+/// A pure function of `state`: the controller state that came with it is all the memory there is.
+static sls_ControlCommand calc_answer(const Controller* self, const sls_VehicleParameters* vehicle,
+                                      uint64_t step, const sls_VehicleState* state) {
   const dds_time_t began = dds_time();
-  sls_ControlCommand command = {.run_id = state->run_id,
-                                .vehicle_id = state->vehicle_id,
-                                .step = state->step,
-                                .strength = self->options.strength,
-                                .controller = state->controller};
-  COPY_TEXT(command.client_name, self->options.name);
+  sls_ControlCommand command = {.vehicle_id = state->vehicle_id, .controller = state->controller};
   LawFault fault = kNotFinite;  // also of a damaged sample, which names no stage that can be flown
   bool is_over = false;
-  if (command.controller.stage_index < (uint32_t)self->scenario.stage_count &&
-      command.controller.stage_start_step <= state->step) {
-    is_over = advance_mission(self, state->step, &command.controller);
+  sls_ControllerState* memory = &command.controller;  // this law has no numbers of its own
+  if (memory->stage_index < (uint32_t)self->scenario.stage_count &&
+      memory->stage_start_step <= step) {
+    is_over = advance_mission(self, step, memory);
+    const double* set_point = self->scenario.stages[memory->stage_index].set_point;
+    const Vehicle model = {.quad_mass = vehicle->quad_mass_kg,
+                           .load_mass = vehicle->load_mass_kg,
+                           .rod_length = vehicle->rod_length_m,
+                           .gravity = vehicle->gravity_m_s2};
     Motion motion;
-    memcpy(motion.p_WQ, state->p_WQ_m, sizeof motion.p_WQ);
-    memcpy(motion.v_WQ, state->v_WQ_m_s, sizeof motion.v_WQ);
-    memcpy(motion.p_WL, state->p_WL_m, sizeof motion.p_WL);
-    memcpy(motion.v_WL, state->v_WL_m_s, sizeof motion.v_WL);
-    fault = calc_force(&motion, self->scenario.stages[command.controller.stage_index].set_point,
-                       &self->vehicle, &self->horizontal, &self->vertical, command.f_Q_W_n);
+    memcpy(motion.p_WQ, state->measured.p_WQ_m, sizeof motion.p_WQ);
+    memcpy(motion.v_WQ, state->measured.v_WQ_m_s, sizeof motion.v_WQ);
+    memcpy(motion.p_WL, state->measured.p_WL_m, sizeof motion.p_WL);
+    memcpy(motion.v_WL, state->measured.v_WL_m_s, sizeof motion.v_WL);
+    fault =
+        calc_force(&motion, set_point, &model, &self->horizontal, &self->vertical, command.f_Q_W_n);
+    memcpy(command.reference.position_m, set_point, sizeof command.reference.position_m);
   }
+  command.reference.stage_index = memory->stage_index;
+  COPY_TEXT(command.reference.stage_name, "set_point");
   command.fault = to_message(fault);
   command.mission = fault != kNoFault ? sls_MISSION_FAILED
                     : is_over         ? sls_MISSION_FINISHED
@@ -101,36 +101,38 @@ static sls_ControlCommand calc_answer(const Controller* self, const sls_VehicleS
   return command;
 }
 
-static void write_reference(const Controller* self, const sls_VehicleState* state) {
-  const uint32_t stage = self->last.controller.stage_index;
-  sls_Reference reference = {.run_id = state->run_id,
-                             .vehicle_id = state->vehicle_id,
-                             .step = state->step,
-                             .sim_time_ns = state->sim_time_ns,
-                             .stage_index = stage};
-  COPY_TEXT(reference.client_name, self->options.name);
-  COPY_TEXT(reference.stage_name, "set_point");
-  if (stage < (uint32_t)self->scenario.stage_count)
-    memcpy(reference.position_m, self->scenario.stages[stage].set_point,
-           sizeof reference.position_m);
-  write_sample(self->reference_writer, &reference);
+static const sls_VehicleParameters* find_vehicle(const Run* run, uint32_t id) {
+  for (uint32_t i = 0; i < run->vehicle_count; ++i)
+    if (run->vehicles[i].vehicle_id == id) return &run->vehicles[i];
+  return NULL;
 }
 
-static void answer_states(Controller* self) {
-  static sls_VehicleState state;
-  dds_sample_info_t info;
-  while (take(self->state_reader, &state, &info)) {
-    if (state.run_id != self->run_id || state.vehicle_id != 0) continue;
-    if (!self->has_answered || self->last.step != state.step) {
-      self->last = calc_answer(self, &state);
-      self->has_answered = true;
-      // First, so that a recorder has it should this program be killed after the command.
-      write_reference(self, &state);
-      if (self->last.fault != sls_FAULT_NONE)
-        say("step %llu: fault %d", (unsigned long long)state.step, (int)self->last.fault);
-    }
-    write_sample(self->command_writer, &self->last);
+/// Answers a sample of states with one of commands, also where it comes again.
+static void answer(const Controller* self, const Run* run, const sls_States* states) {
+  static sls_ControlCommand answers[sls_SAMPLE_VEHICLES];
+  sls_Commands commands = {.run_id = states->run_id,
+                           .step = states->step,
+                           .strength = self->options.strength,
+                           .vehicles = {._buffer = answers}};
+  COPY_TEXT(commands.client_name, self->options.name);
+  for (uint32_t i = 0; i < states->vehicles._length; ++i) {
+    const sls_VehicleState* state = &states->vehicles._buffer[i];
+    const sls_VehicleParameters* vehicle = find_vehicle(run, state->vehicle_id);
+    if (!vehicle) continue;
+    sls_ControlCommand* command = &answers[commands.vehicles._length++];
+    *command = calc_answer(self, vehicle, states->step, state);
+    if (command->fault != sls_FAULT_NONE)
+      say("step %llu: fault %d", (unsigned long long)states->step, (int)command->fault);
   }
+  if (commands.vehicles._length > 0) write_sample(self->command_writer, &commands);
+}
+
+static void answer_states(const Controller* self) {
+  static sls_States states;
+  dds_sample_info_t info;
+  const Run* run = current_run(self);
+  while (take(self->state_reader, &states, &info))
+    if (run && states.run_id == self->run_id) answer(self, run, &states);
 }
 
 // --- the life of a client ------------------------------------------------------------------------
@@ -143,30 +145,13 @@ static void join(Controller* self, const Run* run) {
         (unsigned long long)run->parameters.run_id, line);
     exit(2);
   }
-  self->vehicle = (Vehicle){.quad_mass = run->parameters.quad_mass_kg,
-                            .load_mass = run->parameters.load_mass_kg,
-                            .rod_length = run->parameters.rod_length_m,
-                            .gravity = run->parameters.gravity_m_s2};
   self->horizontal = calc_horizontal_gains(self->scenario.horizontal_weight);
   self->vertical = calc_vertical_gains(self->scenario.vertical_weight);
   self->period_ns = run->parameters.period_ns;
-  self->has_answered = false;
   self->is_ready = false;
   self->run_id = run->parameters.run_id;
   say("'%s' joins run %016llx", self->options.name, (unsigned long long)self->run_id);
   announce_controller(self, false, false);
-}
-
-/// The server's endpoints and those of the recorders that the scenario expects.
-static bool sees_all_endpoints(const Controller* self, const Run* run) {
-  if (!hears(self->state_reader, &run->server) || !reaches(self->command_writer, &run->server))
-    return false;
-  int recorders = 0;
-  for (const Peer* peer = self->node.peers; peer < self->node.peers + self->node.peer_count; ++peer)
-    if (peer->announcement.role == sls_ROLE_RECORDER && peer->announcement.run_id == self->run_id &&
-        reaches(self->command_writer, &peer->id) && reaches(self->reference_writer, &peer->id))
-      ++recorders;
-  return recorders >= self->scenario.recorders;
 }
 
 /// Answers until the run has ended; false when its server is gone for good.
@@ -183,7 +168,8 @@ static bool serve(Controller* self) {
     const Run* next = find_successor(&self->node, run);
     if (next) {
       join(self, next);
-    } else if (!self->is_ready && sees_all_endpoints(self, run)) {
+    } else if (!self->is_ready && hears(self->state_reader, &run->server) &&
+               reaches(self->command_writer, &run->server)) {
       self->is_ready = true;
       announce_controller(self, true, false);
     } else if (dds_time() - run->heard > kServerDeadline) {
@@ -194,36 +180,12 @@ static bool serve(Controller* self) {
   return true;
 }
 
-/// True when all recorders that are there have said they hold everything, the expected ones at
-/// least.
-static bool are_recorders_done(const Controller* self) {
-  int done = 0;
-  for (const Peer* peer = self->node.peers; peer < self->node.peers + self->node.peer_count;
-       ++peer) {
-    if (peer->announcement.role != sls_ROLE_RECORDER || peer->announcement.run_id != self->run_id)
-      continue;
-    if (peer->announcement.done)
-      ++done;
-    else if (!is_silent(peer->heard))
-      return false;
-  }
-  return done >= self->scenario.recorders;
-}
-
-/// Keeps the writers until the recorders have everything, at most 10 s. Returns the exit code.
+/// Says that it is done. Returns the exit code.
 static int leave(Controller* self, bool has_server) {
   announce_controller(self, false, true);
-  dds_wait_for_acks(self->command_writer, DDS_MSECS(500));
-  dds_wait_for_acks(self->reference_writer, DDS_MSECS(500));
   const Run* run = current_run(self);
-  const bool is_finished = has_server && run && run->status.phase == sls_PHASE_FINISHED;
-  const dds_time_t limit = dds_time() + DDS_SECS(10);
-  while (is_finished && stop_signal == 0 && dds_time() < limit && !are_recorders_done(self)) {
-    dds_sleepfor(kPollTime);
-    look_around(&self->node);
-  }
   if (run && run->status.phase == sls_PHASE_FAILED) say("the run failed: %s", run->status.reason);
-  return is_finished ? 0 : 1;
+  return has_server && run && run->status.phase == sls_PHASE_FINISHED ? 0 : 1;
 }
 
 int main(int argc, char** argv) {
@@ -232,11 +194,8 @@ int main(int argc, char** argv) {
   read_options(argc, argv, sls_ROLE_CONTROLLER, &self.options);
   catch_stop_signals();
   open_node(&self.node, &self.options);
-  self.state_reader = make_reader(&self.node, &sls_VehicleState_desc, "sls/state", kLoop);
-  self.command_writer =
-      make_writer(&self.node, &sls_ControlCommand_desc, "sls/command", kStreamDepth);
-  self.reference_writer =
-      make_writer(&self.node, &sls_Reference_desc, "sls/reference", kStreamDepth);
+  self.state_reader = make_reader(&self.node, &sls_States_desc, "sls/state", kLoop);
+  self.command_writer = make_writer(&self.node, &sls_Commands_desc, "sls/command", kLoopDepth);
   self.waitset = dds_create_waitset(self.node.participant);
   dds_waitset_attach(self.waitset, dds_create_readcondition(self.state_reader, DDS_ANY_STATE), 0);
 

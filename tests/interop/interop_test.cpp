@@ -47,19 +47,22 @@ nlohmann::json read_result(const Process& recorder) {
                                     : nlohmann::json::parse(output.substr(begin));
 }
 
-void expect_every_sample(const Process& recorder, std::uint64_t last_step) {
-  const auto result = read_result(recorder);
-  ASSERT_TRUE(result.contains("last_step")) << recorder.output();
-  EXPECT_EQ(result.at("last_step"), last_step);
-  for (const char* stream : {"state", "command", "reference"}) {
-    EXPECT_EQ(result.at(stream).at("steps"), last_step + 1) << result;
-    EXPECT_EQ(result.at(stream).at("without_a_hole"), last_step + 1) << result;
-  }
-}
-
 std::size_t count_rows(const std::filesystem::path& file) {
   const std::string text = read_file(file);
   return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
+}
+
+/// A cyclone_recorder has every step, and wrote the bytes that our recorder wrote of that flight.
+void expect_same_rows(const Process& recorder, const std::filesystem::path& rows,
+                      const std::filesystem::path& ours, std::uint64_t last_step) {
+  const auto result = read_result(recorder);
+  ASSERT_TRUE(result.contains("last_step")) << recorder.output();
+  EXPECT_EQ(result.at("last_step"), last_step) << result;
+  EXPECT_TRUE(result.at("complete").get<bool>()) << result;
+  for (const char* file : {"state.csv", "command.csv", "reference.csv"}) {
+    EXPECT_GT(count_rows(ours / file), last_step) << file;
+    EXPECT_TRUE(read_file(rows / file) == read_file(ours / file)) << file;
+  }
 }
 
 class InteropTest : public testing::Test {
@@ -71,17 +74,18 @@ class InteropTest : public testing::Test {
   }
 
   /// Shaped like setpoints.yaml, but shorter: 4,000 steps.
-  void write_quick_scenario(int controllers) const {
+  void write_quick_scenario(int controllers, int recorders = 1, int vehicles = 1) const {
     std::ofstream(quick_) << "name: quick\n"
-                             "vehicle: { quad_mass_kg: 1.5, load_mass_kg: 0.2, rod_length_m: 1.0, "
+                          << (vehicles > 1 ? "vehicles: " + std::to_string(vehicles) + "\n" : "")
+                          << "vehicle: { quad_mass_kg: 1.5, load_mass_kg: 0.2, rod_length_m: 1.0, "
                              "gravity_m_s2: 9.8 }\n"
                              "plant:\n"
                              "  pendulum: ideal\n"
                              "  step_s: 0.001\n"
                              "  initial: { load_position_m: [0, 0, -1.5] }\n"
                              "sync: { mode: lockstep, period_s: 0.004, wait_for: { controllers: "
-                          << controllers
-                          << ", recorders: 1, timeout_s: 60 } }\n"
+                          << controllers << ", recorders: " << recorders
+                          << ", timeout_s: 60 } }\n"
                              "controller:\n"
                              "  gains: { lqr: { horizontal: 10, vertical: 5 } }\n"
                              "  force_limit_n: 200\n"
@@ -103,6 +107,9 @@ class InteropTest : public testing::Test {
     return std::make_unique<Process>(
         before + Words{SLS_INTEROP_DIR "/" + name, "--domain", domain_.text()} + flags);
   }
+  std::unique_ptr<Process> start_cyclone_recorder() const {
+    return start_cyclone("cyclone_recorder", {"--out", rows_});
+  }
   std::unique_ptr<Process> start_recorder(const Words& further = {}) const {
     return start("recorder", Words{"--out", recording_} + further);
   }
@@ -111,6 +118,13 @@ class InteropTest : public testing::Test {
   }
   bool wait_for_steps(std::size_t steps) const {
     return wait_until([&] { return count_rows(recording_ + "/state.csv") > steps; });
+  }
+
+  /// The subfolder of the recording with the run after the first.
+  std::filesystem::path find_second_run() const {
+    for (const auto& entry : std::filesystem::directory_iterator(recording_))
+      if (entry.path().filename().string().rfind("run-", 0) == 0) return entry.path();
+    return {};
   }
 
   static void expect_success(const std::vector<Process*>& processes) {
@@ -145,29 +159,42 @@ class InteropTest : public testing::Test {
   OwnDomain domain_;
   const std::string quick_ = folder_ / "quick.yaml";
   const std::string recording_ = folder_ / "recording";
+  const std::string rows_ = folder_ / "rows";  // of the cyclone_recorder
 };
 
-TEST_F(InteropTest, ACycloneControllerFliesSetpointsLikeOursAndACycloneRecorderMissesNothing) {
+TEST_F(InteropTest, ACycloneControllerFliesSetpointsLikeOursAndACycloneRecorderWritesTheSameRows) {
   // The shipped scenario, but the server waits for both recorders.
-  std::string text = read_file(scenario("setpoints"));
-  const std::string one = "recorders: 1";
-  ASSERT_NE(text.find(one), std::string::npos);
   const std::string setpoints = folder_ / "setpoints.yaml";
-  std::ofstream(setpoints) << text.replace(text.find(one), one.size(), "recorders: 2");
+  std::ofstream(setpoints) << replace_once(read_file(scenario("setpoints")), "recorders: 1",
+                                           "recorders: 2");
   const auto recorder = start_recorder();
   const auto server = start("sim_server", {"--scenario", setpoints});
-  const auto cyclone_recorder = start_cyclone("cyclone_recorder");
+  const auto cyclone_recorder = start_cyclone_recorder();
   const auto controller = start_cyclone("cyclone_controller", {"--name", "cyclone"});
   expect_success({server.get(), controller.get(), recorder.get(), cyclone_recorder.get()});
   const auto manifest = read_manifest(recording_);
   EXPECT_TRUE(manifest.at("complete").get<bool>()) << manifest;
-  expect_every_sample(*cyclone_recorder, 11250);
+  expect_same_rows(*cyclone_recorder, rows_, recording_, 11250);
   const Table commands(recording_ + "/command.csv");
   ASSERT_EQ(commands.rows(), 11251u);
   EXPECT_EQ(commands.text(11250, "controller"), "cyclone");
   Flight own(scenario("setpoints"));
   own.expect_success();
   expect_same_flight(recording_, own.recording());
+}
+
+/// Seventy: two samples a step.
+TEST_F(InteropTest, ACycloneControllerFliesAFleetAndACycloneRecorderWritesTheSameRows) {
+  write_quick_scenario(1, 2, 70);
+  const std::string text = read_file(quick_);
+  std::ofstream(quick_) << replace_once(text, "for_s: 13.5", "for_s: 0.5");
+  const auto recorder = start_recorder(), server = start_server();
+  const auto cyclone_recorder = start_cyclone_recorder();
+  const auto controller = start_cyclone("cyclone_controller");
+  expect_success({server.get(), controller.get(), recorder.get(), cyclone_recorder.get()});
+  EXPECT_TRUE(read_manifest(recording_).at("complete").get<bool>());
+  EXPECT_EQ(count_rows(recording_ + "/state.csv"), 1 + 70 * 751u);
+  expect_same_rows(*cyclone_recorder, rows_, recording_, 750);
 }
 
 TEST_F(InteropTest, ACycloneStandbyTakesOverFromAClientThatIsKilled) {
@@ -210,30 +237,45 @@ TEST_F(InteropTest, CycloneControllerAndRecorderFlyOnWithTheServerThatReplacesAK
   const auto recorder = start_recorder({"--follow"});
   auto server = start_server();
   const auto controller = start_cyclone("cyclone_controller"),
-             cyclone_recorder = start_cyclone("cyclone_recorder");
+             cyclone_recorder = start_cyclone_recorder();
   ASSERT_TRUE(wait_for_steps(100)) << server->output();
   server->kill();
   server = start_server();
   expect_success({server.get(), controller.get(), recorder.get(), cyclone_recorder.get()});
-  expect_every_sample(*cyclone_recorder, kQuickSteps);
+  expect_same_rows(*cyclone_recorder, rows_, find_second_run(), kQuickSteps);
 }
 
-TEST_F(InteropTest, RecordersThatComeLateGetWhatTheyMissedFromACycloneController) {
-  auto recorder = start_recorder({"--resume"});
+TEST_F(InteropTest, ACycloneRecorderThatComesLateGetsWhatItMissed) {
+  const auto recorder = start_recorder();
   const auto server = start_server(), controller = start_cyclone("cyclone_controller");
   ASSERT_TRUE(wait_for_steps(100)) << server->output();
-  controller->send(SIGSTOP);  // the flight stands still until the others have come
-  recorder->kill();
-  recorder = start_recorder({"--resume"});
-  const auto late_recorder = start_cyclone("cyclone_recorder");
-  for (Process* process : {recorder.get(), late_recorder.get()})
-    EXPECT_TRUE(wait_until([&] { return process->output().find(" run ") != std::string::npos; }))
-        << process->output();
+  controller->send(SIGSTOP);  // the flight stands still until it has come
+  const auto late_recorder = start_cyclone_recorder();
+  EXPECT_TRUE(wait_until([&] { return holds(late_recorder->output(), " run "); }));
   controller->send(SIGCONT);
   expect_success({server.get(), controller.get(), recorder.get(), late_recorder.get()});
-  const auto second = read_manifest(recording_ + "/segment-2");
-  EXPECT_TRUE(second.at("complete").get<bool>()) << second;
-  expect_every_sample(*late_recorder, kQuickSteps);
+  expect_same_rows(*late_recorder, rows_, recording_, kQuickSteps);
+}
+
+/// Without their submessages protected, Fast DDS sends no sample to a reader of Cyclone DDS.
+TEST_F(InteropTest, ACycloneControllerFliesOnASecuredDomainWithKeysForOtherVendors) {
+  if (!std::filesystem::exists(SLS_CYCLONE_PLUGINS "/libdds_security_crypto.so"))
+    GTEST_SKIP() << "expected Cyclone's security plugins in " SLS_CYCLONE_PLUGINS;
+  const std::string keys = folder_ / "keys";
+  Process make_keys({SLS_SOURCE_DIR "/sls", "keys", keys, "--other-vendors"});
+  ASSERT_EQ(make_keys.wait(), 0) << make_keys.output();
+  const Words with_keys = {"env", "SLS_KEYS=" + keys};
+  const auto secured = [&](const std::string& name, const Words& flags) {
+    return Process(with_keys + make_command(name, domain_.number(), flags, qos("secure")));
+  };
+  Process recorder = secured("recorder", {"--out", recording_});
+  Process server = secured("sim_server", {"--scenario", quick_});
+  Process controller(
+      with_keys + Words{"SLS_IDENTITY=controller", "SLS_CYCLONE_PLUGINS=" SLS_CYCLONE_PLUGINS,
+                        "CYCLONEDDS_URI=file://" SLS_SOURCE_DIR "/tests/interop/cyclone_secure.xml",
+                        SLS_INTEROP_DIR "/cyclone_controller", "--domain", domain_.text()});
+  expect_success({&server, &controller, &recorder});
+  EXPECT_TRUE(read_manifest(recording_).at("complete").get<bool>());
 }
 
 /// On hosts of their own, where the programs of this project use `profile`.
@@ -273,6 +315,71 @@ TEST_F(InteropTest, ACycloneControllerOnAnotherHostFliesWithProfileUnicast) {
        "CYCLONEDDS_URI=<CycloneDDS><Domain><General><AllowMulticast>false</AllowMulticast>"
        "</General><Discovery><ParticipantIndex>auto</ParticipantIndex><Peers>" +
            peers + "</Peers></Discovery></Domain></CycloneDDS>"});
+}
+
+// --- examples/my_client --------------------------------------------------------------------------
+
+/// The template as a user has it: built outside the tree.
+class MyClientTest : public InteropTest {
+ protected:
+  void SetUp() override {
+    InteropTest::SetUp();
+    if (IsSkipped()) return;
+    std::filesystem::copy(SLS_SOURCE_DIR "/examples/my_client", folder_ / "my_client");
+    Process build({"sh", "-c",
+                   "cd " + (folder_ / "my_client").string() +
+                       " && " SLS_CMAKE " -B build -DSLS_IDL=" SLS_SOURCE_DIR
+                       "/idl/sls.idl -DCMAKE_C_FLAGS=-Werror && " SLS_CMAKE " --build build"});
+    ASSERT_EQ(build.wait(), 0) << build.output();
+  }
+  std::unique_ptr<Process> start_client(const Words& before = {}) const {
+    return std::make_unique<Process>(
+        kOnLoopback + before +
+        Words{(folder_ / "my_client/build/my_client").string(), domain_.text()});
+  }
+
+  static constexpr std::size_t kLastStep = 5000;
+};
+
+TEST_F(MyClientTest, HasNoMoreThan200Lines) {
+  EXPECT_LE(count_rows(folder_ / "my_client/my_client.c"), 200u);
+}
+
+/// Its memory, an integral, travels: neither loss nor a client that is killed changes a byte.
+TEST_F(MyClientTest, BringsTheLoadToItsPointWithTheSameBytesWhateverIsLost) {
+  const std::string undisturbed = recording_ + "-undisturbed";
+  for (const bool is_disturbed : {false, true}) {
+    const Words loss = is_disturbed ? lossy(5) : Words{};
+    const auto recorder = start("recorder", {"--out", is_disturbed ? recording_ : undisturbed});
+    const auto server = start_server(loss);
+    auto client = start_client(loss);
+    if (is_disturbed) {
+      ASSERT_TRUE(wait_for_steps(100)) << server->output();
+      client->kill();
+      client = start_client(loss);
+    }
+    expect_success({server.get(), client.get(), recorder.get()});
+  }
+  EXPECT_TRUE(read_manifest(recording_).at("complete").get<bool>());
+  for (const char* file : {"state.csv", "reference.csv"})
+    EXPECT_TRUE(read_file(recording_ + "/" + file) == read_file(undisturbed + "/" + file)) << file;
+  const Table states(recording_ + "/state.csv");
+  ASSERT_EQ(states.rows(), kLastStep + 1);
+  EXPECT_LE((states.position(kLastStep, "load") - Eigen::Vector3d(1, -1, -2)).norm(), 0.05);
+}
+
+TEST_F(MyClientTest, FollowsAResetAndTheServerThatReplacesAKilledOne) {
+  const auto recorder = start_recorder({"--follow"});
+  auto server = start_server();
+  const auto client = start_client();
+  ASSERT_TRUE(wait_for_steps(100)) << server->output();
+  const auto reset = start("sim_ctl", {"reset"});
+  ASSERT_EQ(reset->wait(), 0) << reset->output() << server->output();
+  ASSERT_TRUE(wait_until([&] { return count_rows(find_second_run() / "state.csv") > 100; }))
+      << server->output() << client->output();
+  server->kill();
+  server = start_server();
+  expect_success({server.get(), client.get(), recorder.get()});
 }
 
 }  // namespace

@@ -7,7 +7,7 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { kVehicle = 0, kMaxMatched = 64 };
+enum { kMaxMatched = 64 };
 
 volatile int stop_signal = 0;
 const char* program_name = "cyclone";
@@ -50,7 +50,7 @@ dds_entity_t make_reader(Node* node, const dds_topic_descriptor_t* type, const c
   if (reading == kLoop) {
     dds_qset_reliability(qos, DDS_RELIABILITY_BEST_EFFORT, 0);
     dds_qset_durability(qos, DDS_DURABILITY_VOLATILE);
-    dds_qset_history(qos, DDS_HISTORY_KEEP_LAST, 64);
+    dds_qset_history(qos, DDS_HISTORY_KEEP_LAST, kLoopDepth);
   } else {
     dds_qset_reliability(qos, DDS_RELIABILITY_RELIABLE, DDS_SECS(5));
     dds_qset_durability(qos, DDS_DURABILITY_TRANSIENT_LOCAL);
@@ -86,12 +86,17 @@ void read_options(int argc, char** argv, sls_ParticipantRole role, Options* opti
       options->name = argv[i + 1];
     } else if (flies && i + 1 < argc && strcmp(argv[i], "--strength") == 0) {
       options->strength = (int32_t)strtol(argv[i + 1], NULL, 10);
+    } else if (!flies && i + 1 < argc && strcmp(argv[i], "--out") == 0) {
+      options->folder = argv[i + 1];
     } else {
-      say("expected --domain N%s --name TEXT%s, got '%s'", flies ? "," : " or",
-          flies ? " or --strength N" : "", argv[i]);
+      say("expected --domain N, --name TEXT or --%s, got '%s'", flies ? "strength N" : "out DIR",
+          argv[i]);
       exit(2);
     }
   }
+  if (flies || options->folder) return;
+  say("expected --out DIR, got none");
+  exit(2);
 }
 
 void open_node(Node* node, const Options* options) {
@@ -103,8 +108,6 @@ void open_node(Node* node, const Options* options) {
   dds_delete_qos(qos);
   node->parameters_reader = make_reader(node, &sls_Parameters_desc, "sls/parameters", kEverything);
   node->status_reader = make_reader(node, &sls_SimStatus_desc, "sls/status", kEverything);
-  node->participant_reader =
-      make_reader(node, &sls_Participant_desc, "sls/participant", kEverything);
   node->participant_writer =
       make_writer(node, &sls_Participant_desc, "sls/participant", kLatchedDepth);
 }
@@ -177,49 +180,37 @@ static Run* find_or_add_run(Node* node, uint64_t run_id) {
   return added;
 }
 
-/// The peer that wrote an announcement. One that has left before it was heard has no participant
-/// any more, but what it said still counts: a recorder is done, then leaves.
-static Peer* find_or_add_peer(Node* node, const dds_sample_info_t* info) {
-  Peer* oldest = &node->peers[0];
-  for (Peer* peer = node->peers; peer < node->peers + node->peer_count; ++peer) {
-    if (peer->writer == info->publication_handle) return peer;
-    if (peer->heard < oldest->heard) oldest = peer;
+static void note_parameters(Node* node, const sls_Parameters* parameters,
+                            const dds_guid_t* server) {
+  if (strcmp(parameters->contract_sha256, SLS_CONTRACT_SHA256) != 0) {
+    say("contract of a server: expected %s, got %s", SLS_CONTRACT_SHA256,
+        parameters->contract_sha256);
+    return;
   }
-  Peer* added = node->peer_count < kMaxPeers ? &node->peers[node->peer_count++] : oldest;
-  memset(added, 0, sizeof *added);
-  added->writer = info->publication_handle;
-  find_sender(node->participant_reader, info, &added->id);
-  return added;
+  Run* run = find_or_add_run(node, parameters->run_id);
+  run->server = *server;
+  run->heard = dds_time();
+  run->parameters = *parameters;
+  run->vehicle_count = parameters->vehicles._length;
+  memcpy(run->vehicles, parameters->vehicles._buffer, run->vehicle_count * sizeof run->vehicles[0]);
+  memset(&run->parameters.vehicles, 0, sizeof run->parameters.vehicles);
+  memset(&run->parameters.signals, 0, sizeof run->parameters.signals);
 }
 
 void look_around(Node* node) {
-  // Large, and Cyclone reuses the buffer of its sequence.
+  // Large, and Cyclone uses the buffers of their sequences again.
   static sls_Parameters parameters;
   static sls_SimStatus status;
-  static sls_Participant announcement;
   dds_sample_info_t info;
   dds_guid_t sender;
-  while (take(node->parameters_reader, &parameters, &info)) {
-    if (!find_sender(node->parameters_reader, &info, &sender)) continue;
-    Run* run = find_or_add_run(node, parameters.run_id);
-    run->server = sender;
-    run->heard = dds_time();
-    run->serves_vehicle = false;
-    for (uint32_t i = 0; i < parameters.vehicle_ids._length; ++i)
-      run->serves_vehicle = run->serves_vehicle || parameters.vehicle_ids._buffer[i] == kVehicle;
-    run->parameters = parameters;
-    memset(&run->parameters.vehicle_ids, 0, sizeof run->parameters.vehicle_ids);
-  }
+  while (take(node->parameters_reader, &parameters, &info))
+    if (find_sender(node->parameters_reader, &info, &sender))
+      note_parameters(node, &parameters, &sender);
   while (take(node->status_reader, &status, &info)) {
     Run* run = find_or_add_run(node, status.run_id);
     run->status = status;
     run->has_status = true;
     run->heard = dds_time();
-  }
-  while (take(node->participant_reader, &announcement, &info)) {
-    Peer* peer = find_or_add_peer(node, &info);
-    peer->announcement = announcement;
-    peer->heard = dds_time();
   }
 }
 
@@ -237,7 +228,7 @@ const Run* find_run(const Node* node, uint64_t run_id) {
 
 /// Position on the way waiting → running; 0 where there is nothing to join.
 static int calc_progress(const Run* run) {
-  if (!run->has_status || !run->serves_vehicle || is_silent(run->heard)) return 0;
+  if (!run->has_status || run->vehicle_count == 0 || is_silent(run->heard)) return 0;
   if (run->status.phase == sls_PHASE_WAITING) return 1;
   return run->status.phase == sls_PHASE_RUNNING || run->status.phase == sls_PHASE_PAUSED ? 2 : 0;
 }
@@ -275,8 +266,9 @@ const Run* find_successor(const Node* node, const Run* run) {
 }
 
 void announce(Node* node, const Run* run, const Announcement* announcement) {
+  static uint32_t ids[kMaxVehicles];
   sls_Participant message = {
-      .vehicle_id = kVehicle,
+      .contract_sha256 = SLS_CONTRACT_SHA256,
       .role = announcement->role,
       .strength = announcement->strength,
       .ready = announcement->ready,
@@ -287,6 +279,11 @@ void announce(Node* node, const Run* run, const Announcement* announcement) {
   if (run) {
     message.run_id = run->parameters.run_id;
     COPY_TEXT(message.scenario_sha256, run->parameters.scenario_sha256);
+  }
+  if (run && announcement->role == sls_ROLE_CONTROLLER) {
+    for (uint32_t i = 0; i < run->vehicle_count; ++i) ids[i] = run->vehicles[i].vehicle_id;
+    message.vehicle_ids._buffer = ids;
+    message.vehicle_ids._length = run->vehicle_count;
   }
   if (gethostname(message.host, sizeof message.host - 1) != 0) COPY_TEXT(message.host, "unknown");
   write_sample(node->participant_writer, &message);

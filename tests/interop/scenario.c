@@ -6,16 +6,10 @@
 
 /// Lines that do not concern a controller of set-points, or come in sls/parameters as numbers.
 static bool is_of_no_concern(const char* line) {
-  static const char* const beginnings[] = {"#",
-                                           "name: ",
-                                           "vehicle: {",
-                                           "plant:",
-                                           "  pendulum:",
-                                           "  step_s: ",
-                                           "  initial: {",
-                                           "controller:",
-                                           "  force_limit_n: ",
-                                           "mission:"};
+  static const char* const beginnings[] = {
+      "#",       "name: ",      "vehicles: ",        "vehicle: {",
+      "plant:",  "  pendulum:", "  step_s: ",        "  initial: {",
+      "sync: {", "controller:", "  force_limit_n: ", "mission:"};
   for (size_t i = 0; i < sizeof beginnings / sizeof beginnings[0]; ++i)
     if (strncmp(line, beginnings[i], strlen(beginnings[i])) == 0) return true;
   return *line == '\0';
@@ -27,10 +21,6 @@ static bool parse_line(const char* line, Scenario* scenario) {
   double* p = next->set_point;
   double seconds = 0;
   if (is_of_no_concern(line)) return true;
-  if (strncmp(line, "sync: {", 7) == 0) {
-    const char* recorders = strstr(line, "recorders:");
-    return recorders && sscanf(recorders, "recorders: %d", &scenario->recorders) == 1;
-  }
   if (sscanf(line, " gains: { lqr: { horizontal: %lf, vertical: %lf } }%n",
              &scenario->horizontal_weight, &scenario->vertical_weight, &end) == 2 &&
       end > 0)

@@ -13,7 +13,6 @@ typedef struct Stage {
 } Stage;
 
 typedef struct Scenario {
-  int recorders;                              ///< expected
   double horizontal_weight, vertical_weight;  ///< of the LQR gains
   Stage stages[kMaxStages];
   int stage_count;

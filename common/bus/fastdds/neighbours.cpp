@@ -119,7 +119,9 @@ void Neighbours::judge(const Endpoint& endpoint, const EndpointFacts& facts) {
     missing_deadlines_.erase(endpoint);
   else
     missing_deadlines_[endpoint] = missing_deadline;
-  const std::string key = make_key(peer, id) + "fit";
+  // Types compiled wrongly are so on every topic: that is said once.
+  const bool is_of_types = text.find("DATA_REPRESENTATION") != text.npos;
+  const std::string key = (is_of_types ? make_key(peer) : make_key(peer, id)) + "fit";
   if (text.empty())
     problems_.end(key);
   else
