@@ -44,7 +44,7 @@ FlightEnd fly_recorded(const config::Scenario& scenario, const FlightOptions& op
     board.step = flight.steps().front().step;
     if (board.step > 0)
       for (std::size_t i = 0; i < ids.size(); ++i) board.timing.add(FORCE_ANSWERED, 0);
-    board.publish_if_due("");
+    if (board.is_due()) board.publish(PHASE_RUNNING, "");
     recording.flush_if_due();
   }
   batch.is_last(true);

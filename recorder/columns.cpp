@@ -10,12 +10,6 @@
 namespace sls::record {
 namespace {
 
-constexpr Column kAttitude{"att_?", "", "attitude: unit quaternion, body to W", "truth.q_WB"};
-constexpr Column kBodyRates{"rate_?_rad_s", "rad/s", "body rates, in the body's frame",
-                            "truth.w_WB_B_rad_s"};
-constexpr Column kSignals{"NAME", "its own", "signal of the plant", "truth.signals"};
-constexpr Column kVehicle{"vehicle_id", "", "vehicle, of a fleet alone", "state.csv"};
-
 bool can_be_column(const std::string& name) {
   constexpr const char* kLetters =
       "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_";
@@ -58,13 +52,9 @@ std::string join_names(const std::vector<ColumnLister::Entry>& columns) {
 }
 
 std::string make_state_header(const Parameters& parameters) {
-  ColumnLister further;
-  if (parameters.has_attitude()) {
-    further.add(kAttitude, 4);
-    further.add(kBodyRates, 3);
-  }
-  std::string header = make_header<StateRow>();
-  if (parameters.has_attitude()) header += "," + join_names(further.entries);
+  StateRow row;
+  row.has_attitude = parameters.has_attitude();
+  std::string header = join_names(list_columns(row));
   for (const SignalDescription& signal : parameters.signals()) {
     const std::string name = signal.name().to_string();
     if (!can_be_column(name) || ("," + header + ",").find("," + name + ",") != header.npos)
@@ -78,19 +68,17 @@ std::string make_state_header(const Parameters& parameters) {
 }
 
 std::string make_flight_header(bool is_of_fleet) {
-  return make_header<FlightRow>() + (is_of_fleet ? ",vehicle_id" : "");
+  return join_names(list_columns(FlightRow{{}, {}, {}, is_of_fleet}));
 }
 
 std::string describe_columns() {
-  ColumnLister states{list_columns<StateRow>()}, flight{list_columns<FlightRow>()};
-  states.add(kAttitude, 4);
-  states.add(kBodyRates, 3);
-  states.add(kSignals, 1);
-  flight.add(kVehicle, 1);
-  return describe("`state.csv`, `measured.csv`", states.entries) +
+  StateRow state;
+  state.has_attitude = true;
+  state.plant.signals({0});
+  return describe("`state.csv`, `measured.csv`", list_columns(state)) +
          describe("`command.csv`", list_columns<CommandRow>()) +
          describe("`reference.csv`", list_columns<ReferenceRow>()) +
-         describe("`flight.csv`", flight.entries) +
+         describe("`flight.csv`", list_columns(FlightRow{{}, {}, {}, true})) +
          describe("`status.csv`", list_columns<StatusRow>());
 }
 

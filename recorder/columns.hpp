@@ -46,9 +46,8 @@ struct ColumnLister {
 };
 
 template <class Row>
-std::vector<ColumnLister::Entry> list_columns() {
+std::vector<ColumnLister::Entry> list_columns(const Row& row = Row()) {
   ColumnLister lister;
-  const Row row;
   Row::visit(row, lister);
   return lister.entries;
 }
@@ -64,7 +63,6 @@ std::string make_header() {
 /// That of state.csv and measured.csv: of a plant with attitude and signals these too.
 /// @throws config::ConfigError if a signal's name cannot be a column.
 std::string make_state_header(const Parameters& parameters);
-/// That of flight.csv: rows of a fleet, which one must be able to tell apart, have the vehicle.
 std::string make_flight_header(bool is_of_fleet);
 
 /// Every file's columns as Markdown: what README.md shows.

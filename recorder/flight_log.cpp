@@ -52,7 +52,7 @@ double FlightLog::to_time(std::uint64_t step) const {
 
 FlightLog::Stage& FlightLog::find_or_begin_stage(const StepRows& rows) {
   auto& stages = stages_[rows.vehicle_id];
-  const std::uint32_t index = rows.reference->stage;
+  const std::uint32_t index = rows.reference->reference.stage_index();
   if (stages.empty() || stages.back().first != index) {
     Stage stage;
     stage.name = rows.reference->stage_name;
@@ -107,10 +107,10 @@ void FlightLog::add(const StepRows& rows) {
   if (!rows.is_complete()) return;
   Stage& stage = find_or_begin_stage(rows);
   stage.last_step = rows.step;
-  const Eigen::Vector3d error =
-      bus::to_vector(rows.state->p_WL) - bus::to_vector(rows.reference->position);
+  const Eigen::Vector3d error = bus::to_vector(rows.state->plant.p_WL_m()) -
+                                bus::to_vector(rows.reference->reference.position_m());
   stage.all.add(error);
-  const std::size_t index = rows.reference->stage;
+  const std::size_t index = rows.reference->reference.stage_index();
   if (index >= scenario_.mission.size() ||
       !std::holds_alternative<config::FigureEightReference>(scenario_.mission[index].reference))
     return;

@@ -20,9 +20,9 @@ struct FieldParser {
   void operator()(const Column&, Field& field) {
     for_each_component(field, [this](auto& component) { parse(component); });
   }
-  void operator()(const Column&, std::vector<double>& further) {
-    further.resize(file.columns().size() - index);
-    for (double& number : further) parse(number);
+  void operator()(const Column&, std::vector<double>& signals) {
+    signals.resize(file.columns().size() - index);
+    for (double& number : signals) parse(number);
   }
 
   template <class Number>
@@ -44,6 +44,10 @@ constexpr auto kFurther =
 template <class Row>
 Row parse_row(const CsvReader& file) {
   Row row;
+  const auto& columns = file.columns();
+  if constexpr (std::is_same_v<Row, StateRow>)
+    row.has_attitude =
+        columns.size() >= 29 && columns[22] == "att_w" && columns[28] == "rate_z_rad_s";
   FieldParser parser{file};
   Row::visit(row, parser);
   return row;

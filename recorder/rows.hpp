@@ -9,8 +9,10 @@
 #include <string_view>
 #include <vector>
 
+#include "common/bus/convert.hpp"
 #include "common/bus/names.hpp"
 #include "common/bus/sync_counters.hpp"
+#include "common/model/forces.hpp"
 #include "recorder/columns.hpp"
 
 namespace sls::record {
@@ -26,26 +28,31 @@ struct StateRow {
   std::uint32_t vehicle_id = 0;
   std::uint64_t step = 0;
   double sim_time_s = 0;
-  Numbers3 p_WQ{}, v_WQ{}, p_WL{}, v_WL{};
-  double alpha = 0, beta = 0, alpha_dot = 0, beta_dot = 0;
+  PlantState plant;
   Numbers3 f_Q_W{};
-  std::vector<double> further;  ///< attitude, body rates and signals, where the run has them
+  bool has_attitude = false;
 
   template <class Row, class Visitor>
   static void visit(Row& row, Visitor& field) {
-    field(Column{"vehicle_id", "", "vehicle", "vehicle_id"}, row.vehicle_id);
-    field(Column{"step", "", "k, counts control periods", "step"}, row.step);
-    field(Column{"sim_time_s", "s", "k × period", "step"}, row.sim_time_s);
-    field(Column{"quad_?_m", "m", "position of the quadrotor", "truth.p_WQ_m"}, row.p_WQ);
-    field(Column{"quad_v?_m_s", "m/s", "its velocity", "truth.v_WQ_m_s"}, row.v_WQ);
-    field(Column{"load_?_m", "m", "position of the load", "truth.p_WL_m"}, row.p_WL);
-    field(Column{"load_v?_m_s", "m/s", "its velocity", "truth.v_WL_m_s"}, row.v_WL);
-    field(Column{"alpha_rad", "rad", "angle of the rod about x", "truth.alpha_rad"}, row.alpha);
-    field(Column{"beta_rad", "rad", "angle of the rod about y", "truth.beta_rad"}, row.beta);
-    field(Column{"alpha_dot_rad_s", "rad/s", "its rate", "truth.alpha_dot_rad_s"}, row.alpha_dot);
-    field(Column{"beta_dot_rad_s", "rad/s", "its rate", "truth.beta_dot_rad_s"}, row.beta_dot);
-    field(Column{"force_?_n", "N", "force that acted over [k−1, k)", "f_Q_W_n"}, row.f_Q_W);
-    field(Column{}, row.further);
+    auto& plant = row.plant;
+    field({"vehicle_id", "", "vehicle", "vehicle_id"}, row.vehicle_id);
+    field({"step", "", "k, counts control periods", "step"}, row.step);
+    field({"sim_time_s", "s", "k × period", "step"}, row.sim_time_s);
+    field({"quad_?_m", "m", "position of the quadrotor", "truth.p_WQ_m"}, plant.p_WQ_m());
+    field({"quad_v?_m_s", "m/s", "its velocity", "truth.v_WQ_m_s"}, plant.v_WQ_m_s());
+    field({"load_?_m", "m", "position of the load", "truth.p_WL_m"}, plant.p_WL_m());
+    field({"load_v?_m_s", "m/s", "its velocity", "truth.v_WL_m_s"}, plant.v_WL_m_s());
+    field({"alpha_rad", "rad", "angle of the rod about x", "truth"}, plant.alpha_rad());
+    field({"beta_rad", "rad", "angle of the rod about y", "truth"}, plant.beta_rad());
+    field({"alpha_dot_rad_s", "rad/s", "its rate", "truth"}, plant.alpha_dot_rad_s());
+    field({"beta_dot_rad_s", "rad/s", "its rate", "truth"}, plant.beta_dot_rad_s());
+    field({"force_?_n", "N", "force that acted over [k−1, k)", "f_Q_W_n"}, row.f_Q_W);
+    if (row.has_attitude) {
+      field({"att_?", "", "attitude: unit quaternion, body to W", "truth.q_WB"}, plant.q_WB());
+      field({"rate_?_rad_s", "rad/s", "body rates, in the body", "truth.w_WB_B_rad_s"},
+            plant.w_WB_B_rad_s());
+    }
+    field({"NAME", "its own", "signal of the plant", "truth.signals"}, plant.signals());
   }
 };
 
@@ -67,15 +74,12 @@ struct CommandRow {
 
   template <class Row, class Visitor>
   static void visit(Row& row, Visitor& field) {
-    field(Column{"vehicle_id", "", "vehicle", "vehicle_id"}, row.vehicle_id);
-    field(Column{"step", "", "k", "step"}, row.step);
-    field(Column{"controller", "", "whose answer", "client_name", false}, row.controller);
-    field(Column{"force_?_n", "N", "force answered for [k, k+1)", "answer.f_Q_W_n"}, row.f_Q_W);
-    field(Column{"compute_us", "µs", "wall time it took; 0 where held", "answer.compute_time_ns",
-                 false},
-          row.compute_us);
-    field(Column{"fault", "", "error code, or `held`, `fail_safe`", "answer.fault, kind"},
-          row.fault);
+    field({"vehicle_id", "", "vehicle", "vehicle_id"}, row.vehicle_id);
+    field({"step", "", "k", "step"}, row.step);
+    field({"controller", "", "whose answer", "client_name", false}, row.controller);
+    field({"force_?_n", "N", "force answered for [k, k+1)", "answer"}, row.f_Q_W);
+    field({"compute_us", "µs", "wall time it took; 0 where held", "answer", false}, row.compute_us);
+    field({"fault", "", "error code, or `held`, `fail_safe`", "kind"}, row.fault);
   }
 };
 
@@ -87,25 +91,22 @@ struct ReferenceRow {
   std::uint32_t vehicle_id = 0;
   std::uint64_t step = 0;
   double sim_time_s = 0;
-  std::uint32_t stage = 0;
   std::string stage_name;
-  Numbers3 position{}, velocity{}, acceleration{}, jerk{}, snap{};
+  Reference reference;  ///< but for its stage's name
 
   template <class Row, class Visitor>
   static void visit(Row& row, Visitor& field) {
-    field(Column{"vehicle_id", "", "vehicle", "vehicle_id"}, row.vehicle_id);
-    field(Column{"step", "", "k", "step"}, row.step);
-    field(Column{"sim_time_s", "s", "k × period", "step"}, row.sim_time_s);
-    field(Column{"stage", "", "index into the mission", "answer.reference.stage_index"}, row.stage);
-    field(Column{"stage_name", "", "its name", "answer.reference.stage_name"}, row.stage_name);
-    field(Column{"ref_?_m", "m", "desired position of the load", "answer.reference.position_m"},
-          row.position);
-    field(Column{"ref_v?_m_s", "m/s", "1st derivative", "answer.reference.velocity_m_s"},
-          row.velocity);
-    field(Column{"ref_a?_m_s2", "m/s²", "2nd derivative", "answer.reference.acceleration_m_s2"},
-          row.acceleration);
-    field(Column{"ref_j?_m_s3", "m/s³", "3rd derivative", "answer.reference.jerk_m_s3"}, row.jerk);
-    field(Column{"ref_s?_m_s4", "m/s⁴", "4th derivative", "answer.reference.snap_m_s4"}, row.snap);
+    auto& wire = row.reference;
+    field({"vehicle_id", "", "vehicle", "vehicle_id"}, row.vehicle_id);
+    field({"step", "", "k", "step"}, row.step);
+    field({"sim_time_s", "s", "k × period", "step"}, row.sim_time_s);
+    field({"stage", "", "index into the mission", "answer.reference"}, wire.stage_index());
+    field({"stage_name", "", "its name", "answer.reference"}, row.stage_name);
+    field({"ref_?_m", "m", "desired position of the load", "answer.reference"}, wire.position_m());
+    field({"ref_v?_m_s", "m/s", "1st derivative", "answer.reference"}, wire.velocity_m_s());
+    field({"ref_a?_m_s2", "m/s²", "2nd derivative", "answer.reference"}, wire.acceleration_m_s2());
+    field({"ref_j?_m_s3", "m/s³", "3rd derivative", "answer.reference"}, wire.jerk_m_s3());
+    field({"ref_s?_m_s4", "m/s⁴", "4th derivative", "answer.reference"}, wire.snap_m_s4());
   }
 };
 
@@ -113,28 +114,33 @@ struct ReferenceRow {
 struct FlightRow {
   static constexpr const char* kFile = "flight.csv";
 
-  double sim_time_s = 0;
-  Numbers3 p_WL_ref{}, p_WQ{};
-  double roll = 0, pitch = 0, yaw = 0;
-  Numbers3 v_WQ{}, n_W{};
-  double alpha = 0, beta = 0, alpha_dot = 0, beta_dot = 0;
-  Numbers3 f_Q_W{};
+  const StateRow& state;
+  const CommandRow& command;
+  const ReferenceRow& reference;
+  bool is_of_fleet = false;  ///< whose rows one must be able to tell apart
 
-  template <class Row, class Visitor>
-  static void visit(Row& row, Visitor& field) {
-    field(Column{"sim_time_s", "s", "k × period", "state.csv"}, row.sim_time_s);
-    field(Column{"ref_?_m", "m", "desired position of the load", "reference.csv"}, row.p_WL_ref);
-    field(Column{"quad_?_m", "m", "position of the quadrotor", "state.csv"}, row.p_WQ);
-    field(Column{"roll_rad", "rad", "attitude that realises the force", "force"}, row.roll);
-    field(Column{"pitch_rad", "rad", "attitude that realises the force", "force"}, row.pitch);
-    field(Column{"yaw_rad", "rad", "attitude that realises the force", "force"}, row.yaw);
-    field(Column{"quad_v?_m_s", "m/s", "velocity of the quadrotor", "state.csv"}, row.v_WQ);
-    field(Column{"rod_?", "", "unit vector from quadrotor to load", "positions"}, row.n_W);
-    field(Column{"alpha_rad", "rad", "angle of the rod about x", "state.csv"}, row.alpha);
-    field(Column{"beta_rad", "rad", "angle of the rod about y", "state.csv"}, row.beta);
-    field(Column{"alpha_dot_rad_s", "rad/s", "its rate", "state.csv"}, row.alpha_dot);
-    field(Column{"beta_dot_rad_s", "rad/s", "its rate", "state.csv"}, row.beta_dot);
-    field(Column{"force_?_n", "N", "force answered", "command.csv"}, row.f_Q_W);
+  template <class Visitor>
+  static void visit(const FlightRow& row, Visitor& field) {
+    const PlantState& plant = row.state.plant;
+    const model::CommandedAttitude attitude =
+        model::calc_commanded_attitude(bus::to_vector(row.command.f_Q_W));
+    const Eigen::Vector3d p_QL_W = bus::to_vector(plant.p_WL_m()) - bus::to_vector(plant.p_WQ_m());
+    field({"sim_time_s", "s", "k × period", "state.csv"}, row.state.sim_time_s);
+    field({"ref_?_m", "m", "desired position of the load", "reference.csv"},
+          row.reference.reference.position_m());
+    field({"quad_?_m", "m", "position of the quadrotor", "state.csv"}, plant.p_WQ_m());
+    field({"roll_rad", "rad", "attitude that realises the force", "force"}, attitude.roll);
+    field({"pitch_rad", "rad", "attitude that realises the force", "force"}, attitude.pitch);
+    field({"yaw_rad", "rad", "attitude that realises the force", "force"}, attitude.yaw);
+    field({"quad_v?_m_s", "m/s", "its velocity", "state.csv"}, plant.v_WQ_m_s());
+    field({"rod_?", "", "unit vector of the rod", "state.csv"}, bus::to_array(p_QL_W.normalized()));
+    field({"alpha_rad", "rad", "angle of the rod about x", "state.csv"}, plant.alpha_rad());
+    field({"beta_rad", "rad", "angle of the rod about y", "state.csv"}, plant.beta_rad());
+    field({"alpha_dot_rad_s", "rad/s", "its rate", "state.csv"}, plant.alpha_dot_rad_s());
+    field({"beta_dot_rad_s", "rad/s", "its rate", "state.csv"}, plant.beta_dot_rad_s());
+    field({"force_?_n", "N", "force answered", "command.csv"}, row.command.f_Q_W);
+    if (row.is_of_fleet)
+      field({"vehicle_id", "", "vehicle, of a fleet alone", "state.csv"}, row.state.vehicle_id);
   }
 };
 
@@ -148,26 +154,23 @@ struct StatusRow {
   template <class Row, class Visitor>
   static void visit(Row& row, Visitor& field) {
     const SimStatus& status = row.status;
+    const auto text = [](const auto& words) { return std::string_view(words.c_str()); };
     const auto to_us = [](std::uint64_t ns) { return static_cast<double>(ns) / 1e3; };
-    field(Column{"sample_index", "", "counts samples", "sample_index"}, status.sample_index());
-    field(Column{"phase", "", "", "phase"}, std::string_view(bus::to_string(status.phase())));
-    field(Column{"reason", "", "why, and what happened", "reason"},
-          std::string_view(status.reason().c_str()));
-    field(Column{"step", "", "in work", "step"}, status.step());
-    field(Column{"controller", "", "who flies", "controller_name"},
-          std::string_view(status.controller_name().c_str()));
-    field(Column{"real_time_factor", "", "simulated over wall time", "real_time_factor"},
+    field({"sample_index", "", "counts samples", "sample_index"}, status.sample_index());
+    field({"phase", "", "", "phase"}, std::string_view(bus::to_string(status.phase())));
+    field({"reason", "", "why, and what happened", "reason"}, text(status.reason()));
+    field({"step", "", "in work", "step"}, status.step());
+    field({"controller", "", "who flies", "controller_name"}, text(status.controller_name()));
+    field({"real_time_factor", "", "simulated over wall time", "real_time_factor"},
           status.real_time_factor());
     for (const bus::SyncCounter& counter : bus::kSyncCounters)
-      field(Column{counter.name, "", "SyncCounters", "counters"},
-            (status.counters().*counter.get)());
-    field(Column{"round_trip_p50_us", "µs", "median of the last 1,000", "round_trip_p50_ns"},
+      field({counter.name, "", "SyncCounters", "counters"}, (status.counters().*counter.get)());
+    field({"round_trip_p50_us", "µs", "median of the last 1,000", "round_trip_p50_ns"},
           to_us(status.round_trip_p50_ns()));
-    field(Column{"round_trip_p99_us", "µs", "99th percentile", "round_trip_p99_ns"},
+    field({"round_trip_p99_us", "µs", "99th percentile", "round_trip_p99_ns"},
           to_us(status.round_trip_p99_ns()));
-    field(Column{"timing", "", "label", "timing"}, std::string_view(status.timing().c_str()));
-    field(Column{"problem", "", "what a participant does wrong", "problem"},
-          std::string_view(status.problem().c_str()));
+    field({"timing", "", "label", "timing"}, text(status.timing()));
+    field({"problem", "", "what a participant does wrong", "problem"}, text(status.problem()));
   }
 };
 
@@ -192,8 +195,5 @@ struct StepRows {
 StepRows make_rows(const RecordEntry& entry, const Parameters& parameters);
 /// Adds the reference of `entry`, the answer to that step.
 void add_reference(StepRows& rows, const RecordEntry& entry, const Parameters& parameters);
-
-/// Of a step that is complete.
-FlightRow make_flight_row(const StepRows& rows);
 
 }  // namespace sls::record

@@ -147,7 +147,7 @@ struct Node::Impl {
     listener = std::make_unique<ParticipantListener>(
         eprosima::fastrtps::rtps::PropertyPolicyHelper::find_property(
             qos.properties(), "dds.sec.auth.plugin") != nullptr,
-        neighbours);
+        &neighbours);
     participant = factory->create_participant(static_cast<std::uint32_t>(domain), qos,
                                               listener.get(), dds::StatusMask::none());
     if (participant)

@@ -30,7 +30,7 @@ CAPTIONS = {
 MOST_EVENTS = 200
 # Columns of status.csv that count nothing.
 NO_COUNTERS = ("sample_index", "phase", "reason", "step", "controller", "real_time_factor",
-               "round_trip_p50_us", "round_trip_p99_us", "timing")
+               "round_trip_p50_us", "round_trip_p99_us", "timing", "problem")
 STYLE_SHEET = """
 :root { color-scheme: light; }
 * { box-sizing: border-box; }

@@ -78,9 +78,13 @@ struct PlantOfVehicles {
 };
 
 /// The plants that fly the vehicles `ids` (ascending) of `fleet`.
-/// @throws config::ConfigError as `make`; also where a plant of all vehicles gets only some.
+/// @throws config::ConfigError as `make`; also where a plant of all vehicles gets only some, or a
+///   signal's name or unit cannot be that of a column.
 std::vector<PlantOfVehicles> make_plants(const PlantType& type, const config::Scenario& fleet,
                                          const std::vector<std::uint32_t>& ids);
+
+/// What a signal cannot be called: columns that state.csv has of every vehicle.
+const std::vector<std::string>& list_reserved_signal_names();
 
 /// @throws std::runtime_error `QUANTITY is not finite after step N of the plant`; quantities are
 /// named as the columns of state.csv.

@@ -1,6 +1,7 @@
 #include <cmath>
 #include <map>
 #include <numeric>
+#include <set>
 #include <stdexcept>
 
 #include "common/config/vehicle_ids.hpp"
@@ -28,6 +29,39 @@ const PlantType& find_plant_type(const config::ModelName& model) {
   return found->second;
 }
 
+const std::vector<std::string>& list_reserved_signal_names() {
+  static const std::vector<std::string> names = {
+      "vehicle_id",  "step",        "sim_time_s",      "quad_x_m",       "quad_y_m",
+      "quad_z_m",    "quad_vx_m_s", "quad_vy_m_s",     "quad_vz_m_s",    "load_x_m",
+      "load_y_m",    "load_z_m",    "load_vx_m_s",     "load_vy_m_s",    "load_vz_m_s",
+      "alpha_rad",   "beta_rad",    "alpha_dot_rad_s", "beta_dot_rad_s", "force_x_n",
+      "force_y_n",   "force_z_n",   "att_w",           "att_x",          "att_y",
+      "att_z",       "rate_x_rad_s", "rate_y_rad_s",   "rate_z_rad_s"};
+  return names;
+}
+
+namespace {
+
+/// What sls/parameters can carry and state.csv can show.
+void check_signals(const std::vector<Signal>& signals, const config::ModelName& model) {
+  constexpr std::size_t kMostLettersOfName = 32, kMostLettersOfUnit = 16;
+  std::set<std::string> taken(list_reserved_signal_names().begin(),
+                              list_reserved_signal_names().end());
+  for (const Signal& signal : signals) {
+    const std::string place =
+        model.describe_place("plant.model") + ": signal '" + signal.name + "' of '" + model.name + "': ";
+    if (!taken.insert(signal.name).second)
+      throw config::ConfigError(place + "expected a name that no other column has, got this one");
+    if (signal.name.size() > kMostLettersOfName || signal.unit.size() > kMostLettersOfUnit)
+      throw config::ConfigError(place + "expected at most " + std::to_string(kMostLettersOfName) +
+                                " letters and " + std::to_string(kMostLettersOfUnit) +
+                                " of its unit, got " + std::to_string(signal.name.size()) +
+                                " and " + std::to_string(signal.unit.size()));
+  }
+}
+
+}  // namespace
+
 std::vector<PlantOfVehicles> make_plants(const PlantType& type, const config::Scenario& fleet,
                                          const std::vector<std::uint32_t>& ids) {
   PlantSetup setup{fleet.plant, fleet.folder, {}};
@@ -44,11 +78,13 @@ std::vector<PlantOfVehicles> make_plants(const PlantType& type, const config::Sc
                                 config::to_vehicle_ranges(ids));
     plants.push_back({type.make(setup), std::vector<std::size_t>(ids.size()), {}});
     std::iota(plants[0].vehicles.begin(), plants[0].vehicles.end(), 0);
+    check_signals(plants[0].plant->signals(), fleet.plant.model);
     return plants;
   }
   for (std::size_t i = 0; i < ids.size(); ++i) {
     const PlantSetup one{setup.plant, setup.folder, {setup.vehicles[i]}};
     plants.push_back({type.make(one), {i}, {}});
+    check_signals(plants.back().plant->signals(), fleet.plant.model);
   }
   return plants;
 }

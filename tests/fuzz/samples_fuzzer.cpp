@@ -2,10 +2,12 @@
 /// input is samples, each: type, sender, length (2 bytes, little-endian), serialised payload.
 #include <algorithm>
 #include <cstdint>
+#include <cstdlib>
+#include <map>
 #include <optional>
 
 #include "common/bus/fastdds/guarded_type.hpp"
-#include "recorder/step_join.hpp"
+#include "recorder/stream.hpp"
 #include "sim_server/command_gate.hpp"
 #include "sim_server/run_control.hpp"
 
@@ -40,22 +42,23 @@ struct Judges {
   }
 
   void judge(std::uint8_t type, std::uint8_t sender, const std::uint8_t* data, std::uint32_t size) {
-    switch (type % 11) {
+    switch (type % 8) {
       case 0:
-        if (const auto state = deserialize<VehicleStatePubSubType, VehicleState>(data, size))
-          join.add(*state);
+        deserialize<StatesPubSubType, States>(data, size);
         break;
       case 1:
-        if (const auto command =
-                deserialize<ControlCommandPubSubType, ControlCommand>(data, size)) {
-          gate.offer(*command, make_peer(sender));
-          if (gate.accepted() || gate.refusal()) gate.expect(++step);
-          join.add(*command, make_peer(sender));
-        }
+        if (const auto commands = deserialize<CommandsPubSubType, Commands>(data, size))
+          for (const ControlCommand& command : commands->vehicles()) {
+            gate.offer({commands->run_id(), commands->step(), commands->client_name().to_string(),
+                        false, command},
+                       make_peer(sender));
+            if (gate.accepted() || gate.refusal()) gate.expect(++step);
+          }
         break;
       case 2:
-        if (const auto reference = deserialize<ReferencePubSubType, Reference>(data, size))
-          join.add(*reference, make_peer(sender));
+        if (const auto batch = deserialize<RecordBatchPubSubType, RecordBatch>(data, size))
+          stream.add(*batch);
+        stream.pass_time(std::chrono::seconds(sender));
         break;
       case 3:
         if (const auto request = deserialize<SimControlPubSubType, SimControl>(data, size)) {
@@ -75,27 +78,30 @@ struct Judges {
       case 7:
         deserialize<SimControlReplyPubSubType, SimControlReply>(data, size);
         break;
-      case 8:
-        if (const auto fleet = deserialize<FleetStatePubSubType, FleetState>(data, size))
-          for (const VehicleState& state : fleet->vehicles()) join.add(state);
-        break;
-      case 9:
-        if (const auto fleet = deserialize<FleetCommandPubSubType, FleetCommand>(data, size))
-          for (const ControlCommand& command : fleet->vehicles())
-            gate.offer(command, make_peer(sender));
-        break;
-      case 10:
-        if (const auto fleet = deserialize<FleetReferencePubSubType, FleetReference>(data, size))
-          for (const Reference& reference : fleet->vehicles())
-            join.add(reference, make_peer(sender));
-        break;
     }
+  }
+
+  static Parameters make_parameters() {
+    Parameters parameters;
+    parameters.period_ns(4'000'000);
+    parameters.vehicles().resize(2);
+    parameters.vehicles()[1].vehicle_id(1);
+    return parameters;
+  }
+  /// Every vehicle's rows are in order.
+  void check(const record::StepRows& rows) {
+    const auto [last, is_first] = last_steps.try_emplace(rows.vehicle_id, rows.step);
+    if (!is_first && rows.step <= last->second) std::abort();
+    last->second = rows.step;
   }
 
   std::uint64_t step = 0;
   sim::CommandGate gate{kRun, 0, 200.0};
   sim::RunControl control{kRun, {0}, false};
-  record::StepJoin join{[](const record::StepRecord&) {}};
+  const Parameters parameters = make_parameters();
+  std::map<std::uint32_t, std::uint64_t> last_steps;
+  record::Stream stream{parameters, 0, [this](const record::StepRows& rows) { check(rows); },
+                        [](std::uint32_t, std::uint64_t, std::uint64_t) {}};
 };
 
 }  // namespace
@@ -109,6 +115,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     data += kHeader + length;
     size -= kHeader + length;
   }
-  judges.join.give_up();
+  judges.stream.give_up();
   return 0;
 }

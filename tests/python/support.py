@@ -82,17 +82,18 @@ class OwnDomain:
         self.lock.close()
 
 
-def read_headers(path):
-    """The headers that a file of the recorder defines, by their order in it."""
-    found = re.findall(r'Header =\s*((?:"[^"]*"\s*)+);', (ROOT / "recorder" / path).read_text())
-    return ["".join(re.findall(r'"([^"]*)"', text)) for text in found]
+def read_header(file):
+    """The columns of a file of the recorder, of a plant without signals."""
+    readme = (ROOT / "recorder/README.md").read_text()
+    table = readme[readme.index(f"\n`{file}`", readme.index("## Columns")):].split("\n\n")[1]
+    rows = [line.split(" | ") for line in table.split("\n")[2:]]
+    return ",".join(name for row in rows if "`truth.q_WB`" not in row[3]
+                    and "`truth.w_WB_B" not in row[3] and "`truth.signals`" not in row[3]
+                    for name in re.findall(r"`(\w+)`", row[0]))
 
 
-STATE_HEADER, COMMAND_HEADER, REFERENCE_HEADER = read_headers("rows.hpp")
-COUNTERS = re.findall(r"SLS_COUNTER\((\w+)\)[,}]",
-                      (ROOT / "common/bus/sync_counters.hpp").read_text())
-STATUS_HEADER = ",".join(["sample_index,phase,reason,step,controller,real_time_factor", *COUNTERS,
-                          "round_trip_p50_us,round_trip_p99_us,timing"])
+STATE_HEADER, COMMAND_HEADER, REFERENCE_HEADER, STATUS_HEADER = map(
+    read_header, ("state.csv", "command.csv", "reference.csv", "status.csv"))
 PERIOD_S = 0.01
 SCENARIO = """name: synthetic
 vehicle: { quad_mass_kg: 1.5, load_mass_kg: 0.2, rod_length_m: 1.0, gravity_m_s2: 9.8 }
@@ -144,11 +145,11 @@ def write_recording(folder, first=0, last=2 * STEPS_PER_STAGE, vehicles=(0,), co
                 + ",".join(f"{v:.17g}" for v in [*reference, *[0] * 12]))
     for name, lines in rows.items():
         (folder / name).write_text("\n".join(lines) + "\n")
-    zeros = ",0" * (STATUS_HEADER.count(",") - 7)
+    zeros = ",0" * (STATUS_HEADER.count(",") - 8)
     (folder / "status.csv").write_text(
-        f"{STATUS_HEADER}\n0,waiting,\"waiting for: recorder, client\",0,,0,0{zeros},exact\n"
-        f"1,running,,0,,0,0{zeros},exact\n2,running,,{last},,0,7{zeros},exact\n"
-        f"3,finished,mission finished,{last},client,12,7{zeros},exact\n")
+        f"{STATUS_HEADER}\n0,waiting,\"waiting for: recorder, client\",0,,0,0{zeros},exact,\n"
+        f"1,running,,0,,0,0{zeros},exact,\n2,running,,{last},,0,7{zeros},exact,\n"
+        f"3,finished,mission finished,{last},client,12,7{zeros},exact,\n")
     (folder / "scenario.yaml").write_text(SCENARIO)
     (folder / "manifest.json").write_text(json.dumps({
         "complete": complete, "outcome": "finished" if complete else "recording",

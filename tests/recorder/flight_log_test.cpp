@@ -192,7 +192,7 @@ TEST(FlightLogLapTest, LapsOfANanosecondTakeNoMemory) {
 TEST_F(FlightLogTest, AStageThatIsFlownAgainIsAStageOfItsOwn) {
   for (const std::uint64_t step : {0u, 1u, 100u, 101u}) log_.add(make_rows(step));
   StepRows again = make_rows(102);
-  again.reference->stage = 0;
+  again.reference->reference.stage_index(0);
   again.reference->stage_name = "hold";
   log_.add(again);
   const std::string text = write(log_);
@@ -213,7 +213,7 @@ TEST_F(FlightLogTest, IncompleteStepsSayNothingAboutErrors) {
 
 TEST_F(FlightLogTest, AStageTheScenarioDoesNotHaveIsListedWithoutLaps) {
   StepRows rows = make_rows(0);
-  rows.reference->stage = 4000000000u;
+  rows.reference->reference.stage_index(4000000000u);
   log_.add(rows);
   const std::string text = write(log_);
   EXPECT_NE(text.find("4000000000"), std::string::npos) << text;

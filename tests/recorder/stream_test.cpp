@@ -244,7 +244,8 @@ TEST_F(LateAnswerTest, AStepWithoutAnAnswerWaitsForALateOneAndTheOthersWithIt) {
   EXPECT_EQ(rows.command->compute_us, 0);
   EXPECT_EQ(rows.command->f_Q_W, make_unanswered_entry(10, ANSWER_HELD).answer().f_Q_W_n());
   ASSERT_TRUE(rows.reference);
-  EXPECT_EQ(rows.reference->position, make_entry(10).answer().reference().position_m());
+  EXPECT_EQ(rows.reference->reference.position_m(),
+            make_entry(10).answer().reference().position_m());
   EXPECT_EQ(rows.stage_start_step, 0u);
 }
 

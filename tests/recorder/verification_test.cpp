@@ -258,6 +258,13 @@ TEST_F(VerificationTest, SignalsAreComparedByTheirNames) {
   EXPECT_EQ(find_difference().find("state.csv, vehicle 0, step 50, att_w"), 0u);
   change("state.csv", 1, 29, [](auto&) { return "force_n"; });
   EXPECT_EQ(find_difference(), "state.csv: other columns in A than in B");
+  for (const char* header : {"att_w", "att_w,att_x,att_y,rate_z_rad_s"}) {  // signals, then
+    std::string bytes = read_bytes(b_ / "state.csv");
+    write_bytes(b_ / "state.csv",
+                bytes.replace(0, bytes.find('\n'), make_header<StateRow>() + "," + header));
+    EXPECT_NE(find_problems(b_).find("state.csv:2: expected"), std::string::npos);
+  }
+  fs::copy_file(a_ / "state.csv", b_ / "state.csv", fs::copy_options::overwrite_existing);
   change("state.csv", 32, 23, [](auto&) { return "fast"; });
   EXPECT_NE(find_problems(b_).find("state.csv:32: att_x: expected a number, got 'fast'"),
             std::string::npos);

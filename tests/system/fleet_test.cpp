@@ -334,8 +334,9 @@ Resources read_resources(pid_t id) {
 }
 
 TEST_F(FleetTest, NeitherMemoryNorDescriptorsGrowInFlightAndNothingIsLeftBehind) {
+  // A history of sls/record that is full soon, and does not grow then.
   const std::string file = make_fleet_scenario(folder_, kLong);
-  Flight flight(file);
+  Flight flight(file, {make_qos_with_history(folder_, "default", "100"), {}, {}});
   const auto control = [&](const std::vector<std::string>& words) {
     std::vector<std::string> command = {program("sim_ctl"), "--domain", flight.domain.text()};
     command.insert(command.end(), words.begin(), words.end());
@@ -344,7 +345,7 @@ TEST_F(FleetTest, NeitherMemoryNorDescriptorsGrowInFlightAndNothingIsLeftBehind)
   };
   ASSERT_TRUE(flight.wait_for_steps(6)) << flight.outputs();
   control({"pause"});
-  // By then every history is full: of the fleet's topics it holds 500 samples.
+  // By then every history is full.
   control({"step", "1000"});
   Process* const programs[] = {flight.server.get(), flight.client.get(), flight.recorder.get()};
   std::vector<Resources> before;

@@ -112,12 +112,29 @@ nlohmann::json read_manifest(const std::filesystem::path& recording) {
   return nlohmann::json::parse(read_file(recording / "manifest.json"));
 }
 
+std::string make_qos_with_history(const TemporaryFolder& folder, const std::string& base,
+                                  const std::string& batches) {
+  const std::string endpoints = read_file(qos("endpoints")), end = "</data_writer>";
+  const auto from = endpoints.find("<data_writer profile_name=\"sls_record_writer\">");
+  std::string profile = endpoints.substr(from, endpoints.find(end, from) + end.size() - from);
+  for (auto at = profile.find("5000<"); at != profile.npos; at = profile.find("5000<"))
+    profile.replace(at, 4, batches);
+  const std::string file = folder / "small_history.xml";
+  write_bytes(file,
+              replace_once(read_file(qos(base)), "\n  </profiles>", profile + "\n  </profiles>"));
+  return file;
+}
+
 TrackingError calc_tracking_error(const std::filesystem::path& recording, std::size_t first,
                                   std::size_t last) {
   const Table states(recording / "state.csv"), references(recording / "reference.csv");
+  std::map<std::size_t, std::size_t> rows;  // of references, which unanswered steps may not have
+  for (std::size_t row = 0; row < references.rows(); ++row)
+    rows[static_cast<std::size_t>(references.number(row, "step"))] = row;
   TrackingError error;
   for (std::size_t step = first; step <= last; ++step) {
-    const Eigen::Vector3d e = states.position(step, "load") - references.position(step, "ref");
+    const Eigen::Vector3d e =
+        states.position(step, "load") - references.position(rows.at(step), "ref");
     error.rms += e.cwiseAbs2();
     error.max = error.max.cwiseMax(e.cwiseAbs());
   }

@@ -54,6 +54,10 @@ std::vector<std::string> make_command(const std::string& name, int domain,
                                       const std::vector<std::string>& flags,
                                       const std::string& qos_file = {});
 
+/// A QoS file in `folder`: the shipped `base` with a history of so many batches of sls/record.
+std::string make_qos_with_history(const TemporaryFolder& folder, const std::string& base,
+                                  const std::string& batches);
+
 /// A CSV file by columns; numbers and text.
 class Table {
  public:

@@ -22,7 +22,7 @@ namespace sls::bus {
 class ParticipantListener : public eprosima::fastdds::dds::DomainParticipantListener {
  public:
   /// `is_secured`: whether this participant is.
-  ParticipantListener(bool is_secured, Neighbours& neighbours)
+  explicit ParticipantListener(bool is_secured, Neighbours* neighbours = nullptr)
       : is_secured_(is_secured), neighbours_(neighbours) {}
 
   void on_participant_discovery(
@@ -33,11 +33,12 @@ class ParticipantListener : public eprosima::fastdds::dds::DomainParticipantList
     const PeerId peer = to_peer(info.info.m_guid);
     auto& refusals = Refusals::of_process();
     if (info.status == Info::DROPPED_PARTICIPANT || info.status == Info::REMOVED_PARTICIPANT) {
-      neighbours_.drop_participant(peer);
+      if (neighbours_) neighbours_->drop_participant(peer);
       return refusals.note_gone(guid);
     }
-    neighbours_.note_participant(peer, info.info.m_participantName.to_string(),
-                                 find_address(info.info));
+    if (neighbours_)
+      neighbours_->note_participant(peer, info.info.m_participantName.to_string(),
+                                    find_address(info.info));
     if (info.status != Info::DISCOVERED_PARTICIPANT) return;
     const auto& token = info.info.identity_token_;
     const bool is_other_secured = !token.class_id().empty();
@@ -71,13 +72,14 @@ class ParticipantListener : public eprosima::fastdds::dds::DomainParticipantList
  private:
   template <class Info, class Status>
   void note_endpoint(const Info& info, Status removed) {
+    if (!neighbours_) return;
     const auto& guid = info.info.guid();
     Neighbours::EntityId id;
     std::copy(std::begin(guid.entityId.value), std::end(guid.entityId.value), id.begin());
     if (info.status == removed)
-      neighbours_.drop_endpoint(to_peer(guid), id);
+      neighbours_->drop_endpoint(to_peer(guid), id);
     else
-      neighbours_.note_endpoint(to_peer(guid), id, make_facts(info.info));
+      neighbours_->note_endpoint(to_peer(guid), id, make_facts(info.info));
   }
 
   template <class Value>
@@ -116,7 +118,7 @@ class ParticipantListener : public eprosima::fastdds::dds::DomainParticipantList
   }
 
   const bool is_secured_;
-  Neighbours& neighbours_;
+  Neighbours* const neighbours_;
 };
 
 }  // namespace sls::bus

@@ -19,14 +19,9 @@ struct FieldWriter {
 };
 
 template <class Row>
-void write_fields(CsvFile& file, const Row& row) {
+void write_row(CsvFile& file, const Row& row) {
   FieldWriter writer{file};
   Row::visit(row, writer);
-}
-
-template <class Row>
-void write_row(CsvFile& file, const Row& row) {
-  write_fields(file, row);
   file.end_row();
 }
 
@@ -49,11 +44,8 @@ void CsvSink::add(const StepRows& rows) {
     write_row(*measured_, *rows.measured);
   }
   if (rows.reference) write_row(references_, *rows.reference);
-  if (rows.is_complete()) {
-    write_fields(flight_, make_flight_row(rows));
-    if (is_of_fleet_) flight_.add(rows.vehicle_id);
-    flight_.end_row();
-  }
+  if (rows.is_complete())
+    write_row(flight_, FlightRow{*rows.state, *rows.command, *rows.reference, is_of_fleet_});
   if (rows.command) write_row(commands_, *rows.command);
 }
 

@@ -61,7 +61,7 @@ TEST(SharedLibraryPlantTest, MovesAVehicleAndPublishesItsSignals) {
   const auto signals = plant.signals();
   ASSERT_EQ(signals.size(), 2u);
   EXPECT_EQ(signals[0].name + " " + signals[0].unit, "steps 1");
-  EXPECT_EQ(signals[1].name + " " + signals[1].unit, "force_z_n N");
+  EXPECT_EQ(signals[1].name + " " + signals[1].unit, "held_force_z_n N");
   plant.advance({kForce}, 3);
   plant.advance({kForce}, 1);
   const model::Measurement& measured = plant.measurement(0);
@@ -154,7 +154,7 @@ TEST(SharedLibraryPlantTest, WhatGoesWrongInFlightNamesFunctionVehicleAndStep) {
   EXPECT_EQ(fly_wrong("measure", "rate that is no number"),
             measure + "body_rates_rad_s is not finite");
   EXPECT_EQ(fly_wrong("measure", "signal that is no number"),
-            measure + "signal force_z_n is not finite");
+            measure + "signal held_force_z_n is not finite");
   EXPECT_EQ(fly_wrong("measure", "attitude of length 2"),
             measure + "expected a unit quaternion as attitude_wb, got one of length 2.000000");
 }

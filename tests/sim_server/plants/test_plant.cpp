@@ -40,7 +40,7 @@ struct Plant {
   std::string what, where;
   std::int64_t at = 0, step = 0;
   sls_plant_state state;
-  double force_z_n = 0.0;
+  double held_force_z_n = 0.0;
 };
 
 void* create(const sls_plant_setup* setup, char* error, std::size_t error_size) {
@@ -73,7 +73,7 @@ int advance(void* plant, const double force_n[3], std::int64_t steps, char* erro
     return 1;
   }
   self.step += steps;
-  self.force_z_n = force_n[2];
+  self.held_force_z_n = force_n[2];
   return 0;
 }
 
@@ -81,7 +81,7 @@ void measure(void* plant, sls_plant_state* state) {
   const Plant& self = *static_cast<Plant*>(plant);
   *state = self.state;
   state->signals[0] = static_cast<double>(self.step);
-  state->signals[1] = self.force_z_n;
+  state->signals[1] = self.held_force_z_n;
   if (self.where != "measure" || self.step < self.at) return;
   sls::test::misbehave(self.what);
   const double nan = std::strtod("nan", nullptr);
@@ -94,7 +94,7 @@ void measure(void* plant, sls_plant_state* state) {
 }  // namespace
 
 extern "C" const sls_plant_functions* sls_plant(void) {
-  static const char* const names[65] = {TEST_SIGNAL_NAME, "force_z_n"};
+  static const char* const names[65] = {TEST_SIGNAL_NAME, "held_force_z_n"};
   static const char* const units[65] = {"1", "N"};
   static const sls_plant_functions functions = {
       TEST_TABLE_SIZE, TEST_VERSION, TEST_SETUP_SIZE, TEST_STATE_SIZE, TEST_SIGNAL_COUNT, names,
