@@ -142,7 +142,7 @@ TEST_F(ForeignTest, AnotherContract) {
   expect_server_line(kWho + "sls/participant contract_sha256: expected " + bus::kContractSha256 +
                      ", got " + std::string(64, '0'));
   expect_no_other_warnings(*server, 1);  // it is not counted ready: no step is flown
-  EXPECT_FALSE(wait_until([&] { return has(*server, "step 0"); }, 1s)) << outputs();
+  EXPECT_FALSE(wait_until([&] { return has(*server, "step 0: "); }, 1s)) << outputs();
 }
 
 TEST_F(ForeignTest, NoContract) {

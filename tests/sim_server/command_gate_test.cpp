@@ -227,9 +227,9 @@ TEST_F(CommandGateTest, ACopyOfAnAcceptedCommandIsCountedDuplicate) {
 
 TEST_F(CommandGateTest, AnotherAnswerToAnAnsweredStepIsNoCopy) {
   gate_.offer(make_answer(0, -10.0), kStrongPeer);
-  EXPECT_EQ(gate_.offer(make_answer(0, -11.0), kStrongPeer), Verdict::kWrongStep);
+  EXPECT_EQ(gate_.offer(make_answer(0, -11.0), kStrongPeer), Verdict::kContradiction);
   gate_.expect(1);
-  EXPECT_EQ(gate_.offer(make_answer(0, -11.0), kStrongPeer), Verdict::kWrongStep);
+  EXPECT_EQ(gate_.offer(make_answer(0, -11.0), kStrongPeer), Verdict::kContradiction);
   EXPECT_EQ(gate_.counters().rejected_step(), 2u);
   EXPECT_EQ(gate_.counters().duplicate(), 0u);
   EXPECT_EQ(gate_.counters().superseded(), 0u);
@@ -594,11 +594,11 @@ TEST_F(CommandGateTest, WithoutClientsNothingIsAwaitedAndNothingRefused) {
 
 TEST_F(CommandGateTest, EveryRejectionSaysWhy) {
   std::set<std::string> texts;
-  for (const Verdict verdict :
-       {Verdict::kNotFinite, Verdict::kForceLimit, Verdict::kOtherRun, Verdict::kWrongStep,
-        Verdict::kUnknownVehicle, Verdict::kUnknownClient, Verdict::kFault})
+  for (const Verdict verdict : {Verdict::kNotFinite, Verdict::kForceLimit, Verdict::kOtherRun,
+                                Verdict::kEarly, Verdict::kWrongStep, Verdict::kContradiction,
+                                Verdict::kUnknownVehicle, Verdict::kUnknownClient, Verdict::kFault})
     texts.insert(to_string(verdict));
-  EXPECT_EQ(texts.size(), 7u);
+  EXPECT_EQ(texts.size(), 9u);
   EXPECT_EQ(texts.count(""), 0u);
   for (const Verdict verdict :
        {Verdict::kAccepted, Verdict::kHeld, Verdict::kDuplicate, Verdict::kSuperseded})

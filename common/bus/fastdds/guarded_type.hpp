@@ -46,8 +46,9 @@ class GuardedType : public Generated {
     // What is longer than any sample may claim elements without end, which are made before they are
     // read.
     if (payload->length > this->m_typeSize)
-      return refuse(*payload, "expected at most " + std::to_string(this->m_typeSize) +
-                                  " bytes, got " + std::to_string(payload->length));
+      return refuse(*payload, data,
+                    "expected at most " + std::to_string(this->m_typeSize) + " bytes, got " +
+                        std::to_string(payload->length));
     // As the generated function, which does not say where it ended.
     eprosima::fastcdr::FastBuffer buffer(reinterpret_cast<char*>(payload->data), payload->length);
     Cdr cdr(buffer, Cdr::DEFAULT_ENDIAN, Cdr::DDS_CDR);
@@ -56,22 +57,26 @@ class GuardedType : public Generated {
       payload->encapsulation = cdr.endianness() == Cdr::BIG_ENDIANNESS ? CDR_BE : CDR_LE;
       static_cast<typename Generated::type*>(data)->deserialize(cdr);
     } catch (const eprosima::fastcdr::exception::NotEnoughMemoryException&) {
-      return refuse(*payload, "expected more bytes, got " + std::to_string(payload->length));
+      return refuse(*payload, data, "expected more bytes, got " + std::to_string(payload->length));
     } catch (const std::exception& error) {
-      return refuse(*payload, std::string("expected plain CDR of that type, got: ") + error.what());
+      return refuse(*payload, data,
+                    std::string("expected plain CDR of that type, got: ") + error.what());
     }
     const std::size_t used = cdr.getSerializedDataLength();
     if (payload->length - used > kMostPadding)
-      return refuse(*payload, "expected " + std::to_string(used) + " bytes, got " +
-                                  std::to_string(payload->length));
+      return refuse(
+          *payload, data,
+          "expected " + std::to_string(used) + " bytes, got " + std::to_string(payload->length));
     return true;
   }
 
  private:
   static constexpr std::size_t kMostPadding = 3;  // to a multiple of four
 
-  bool refuse(const eprosima::fastrtps::rtps::SerializedPayload_t& payload,
+  bool refuse(const eprosima::fastrtps::rtps::SerializedPayload_t& payload, void* data,
               const std::string& defect) const {
+    // What it claimed and did not hold may be a thousand times its size.
+    *static_cast<typename Generated::type*>(data) = typename Generated::type();
     if (misfit_report) misfit_report->report(payload, this->getName(), defect);
     return false;
   }

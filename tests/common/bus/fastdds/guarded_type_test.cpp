@@ -95,6 +95,56 @@ TEST(GuardedTypeTest, ClaimedElementsThatDoNotFollowAreNotKept) {
   expect_nothing_kept<RecordBatchPubSubType, RecordBatch, Entries>(entry, &RecordBatch::entries);
 }
 
+/// What a reader is told of the samples that it cannot take.
+class Report : public MisfitReport {
+ public:
+  void report(const rtps::SerializedPayload_t&, const char* type,
+              const std::string& defect) override {
+    text = std::string(type) + ": " + defect;
+  }
+  std::string text;
+};
+
+std::string serialize(const Commands& message) {
+  CommandsPubSubType type;
+  Commands copy = message;
+  rtps::SerializedPayload_t payload(type.getSerializedSizeProvider(&copy)());
+  EXPECT_TRUE(type.serialize(&copy, &payload));
+  return {reinterpret_cast<const char*>(payload.data), payload.length};
+}
+
+TEST(GuardedTypeTest, ASampleWithAFieldMoreOrLessIsRefusedAndReported) {
+  Commands sent, received;
+  sent.client_name("foo");
+  sent.vehicles().resize(2);
+  const std::string bytes = serialize(sent);
+  const std::string size = std::to_string(bytes.size());
+  Report report;
+  const MisfitScope scope(report);
+  EXPECT_TRUE((takes<CommandsPubSubType>(bytes, received)));
+  EXPECT_EQ(received, sent);
+  for (int padding = 1; padding <= 3; ++padding)  // other vendors fill up to a multiple of four
+    EXPECT_TRUE((takes<CommandsPubSubType>(bytes + std::string(padding, '\0'), received)));
+  EXPECT_EQ(report.text, "");
+
+  for (const std::size_t more : {4, 8, 400}) {
+    EXPECT_FALSE((takes<CommandsPubSubType>(bytes + std::string(more, '\0'), received)));
+    EXPECT_EQ(report.text, "sls::Commands: expected " + size + " bytes, got " +
+                               std::to_string(bytes.size() + more));
+  }
+  for (const std::size_t less : {1, 4, 8, 400}) {
+    EXPECT_FALSE((takes<CommandsPubSubType>(bytes.substr(0, bytes.size() - less), received)));
+    EXPECT_EQ(report.text,
+              "sls::Commands: expected more bytes, got " + std::to_string(bytes.size() - less));
+  }
+  const auto type_size = CommandsPubSubType().m_typeSize;
+  EXPECT_FALSE((takes<CommandsPubSubType>(std::string(type_size + 1, '\0'), received)));
+  EXPECT_EQ(report.text, "sls::Commands: expected at most " + std::to_string(type_size) +
+                             " bytes, got " + std::to_string(type_size + 1));
+  EXPECT_FALSE((takes<CommandsPubSubType>("\x09" + bytes, received)));  // no plain CDR
+  EXPECT_EQ(report.text.find("sls::Commands: expected plain CDR of that type, got: "), 0u);
+}
+
 TEST(GuardedTypeTest, RandomBytesThrowNothing) {
   std::mt19937_64 random(4);
   for (int i = 0; i < 20000; ++i) {
