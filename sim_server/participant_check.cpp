@@ -310,6 +310,14 @@ ParticipantCheck::Findings ParticipantCheck::look(const Neighbourhood& neighbour
   return findings;
 }
 
+/// False for who has another server, or flies other vehicles and may wait for theirs.
+bool ParticipantCheck::may_fly_for_us(const Participant& controller,
+                                      const Neighbourhood& neighbourhood) const {
+  if (controller.run_id() == run_id_) return true;
+  return neighbourhood.other_runs.count(controller.run_id()) == 0 &&
+         (controller.vehicle_ids().empty() || flies_any(controller, vehicle_ids_));
+}
+
 void ParticipantCheck::look_at(const Entry& entry, const Neighbourhood& neighbourhood,
                                Findings& findings) {
   const Participant& announcement = entry.announcement;
@@ -322,12 +330,9 @@ void ParticipantCheck::look_at(const Entry& entry, const Neighbourhood& neighbou
   }
   if (announcement.role() != ROLE_CONTROLLER || announcement.done()) return;
   if (announcement.run_id() != run_id_) {
-    // What flies other vehicles may wait for another server.
-    const bool is_ours =
-        announcement.vehicle_ids().empty() || flies_any(announcement, vehicle_ids_);
     const std::string key = make_key(entry.peer, "run_id " + to_words(announcement.run_id()));
     const Clock::duration patience = announcement.run_id() == 0 ? kPatience : kPatienceWithRun;
-    if (is_ours && lasts(key, neighbourhood.now, patience))
+    if (may_fly_for_us(announcement, neighbourhood) && lasts(key, neighbourhood.now, patience))
       findings[key] =
           describe_field(entry, "run_id", to_words(run_id_), to_words(announcement.run_id()));
     return;
@@ -371,11 +376,12 @@ void ParticipantCheck::look_at_strangers(const Neighbourhood& neighbourhood,
   }
   for (const auto& [peer, text] : neighbourhood.missing_deadlines) {
     const auto known = announced.find(peer);
-    const std::uint64_t run_id =
-        known == announced.end() ? 0 : known->second->announcement.run_id();
-    if (neighbourhood.other_runs.count(run_id) > 0) continue;
+    const Participant* announcement =
+        known == announced.end() ? nullptr : &known->second->announcement;
+    if (announcement && !may_fly_for_us(*announcement, neighbourhood)) continue;
+    const bool is_certain = announcement && announcement->run_id() == run_id_;
     const std::string key = make_key(peer, "deadline");
-    if (run_id == run_id_ || lasts(key, neighbourhood.now, kPatience)) findings[key] = text;
+    if (is_certain || lasts(key, neighbourhood.now, kPatience)) findings[key] = text;
   }
 }
 

@@ -125,6 +125,7 @@ class ParticipantCheck {
                               std::uint64_t step) const;
 
   void look_at(const Entry& entry, const Neighbourhood& neighbourhood, Findings& findings);
+  bool may_fly_for_us(const Participant& controller, const Neighbourhood& neighbourhood) const;
   std::optional<std::string> find_wrong_vehicles(const Participant& announcement,
                                                  const Neighbourhood& neighbourhood) const;
   void look_at_strangers(const Neighbourhood& neighbourhood, const Senders& announced,

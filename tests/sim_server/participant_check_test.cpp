@@ -139,7 +139,8 @@ TEST_F(ParticipantCheckTest, WhoFliesOrAwaitsAnotherServerIsNoneOfOurs) {
   neighbourhood_.participants = {other, waits};
   neighbourhood_.other_runs = {0xcd};
   neighbourhood_.other_vehicles = {7};
-  neighbourhood_.missing_deadlines[make_peer(1)] = "sls/command of 'foo': DEADLINE: …";
+  for (const std::uint8_t number : {1, 2})
+    neighbourhood_.missing_deadlines[make_peer(number)] = "sls/command of 'foo': DEADLINE: …";
   look();
   EXPECT_TRUE(look(5s).empty());
 }
