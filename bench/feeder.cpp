@@ -81,8 +81,7 @@ nlohmann::json feed_recorder(const config::Scenario& scenario, const FeederOptio
   bus::Node node(options.qos_file, options.domain, "bench", "server");
   bus::Writer<RecordBatch> writer(node);
   Surroundings surroundings(node, scenario, options.vehicles);
-  sim::RecordStream stream(
-      writer, std::min(node.max_sample_bytes(), sim::Endpoints::kMaxBatchBytes), kRunId);
+  sim::RecordStream stream(writer, sim::Endpoints::kMaxBatchBytes, kRunId);
   const std::uint64_t last = entries.size() - 1;
   surroundings.wait(PHASE_WAITING, 0, "a recorder that is ready",
                     [](const Participant& recorder) { return recorder.ready(); });

@@ -91,8 +91,6 @@ class PlainFile {
 
 double write_plain_files(std::vector<record::StepRows> steps, std::uint32_t vehicles,
                          const fs::path& folder) {
-  std::vector<record::FlightRow> flight_rows;
-  for (const auto& rows : steps) flight_rows.push_back(record::make_flight_row(rows));
   const auto began = Clock::now();
   PlainFile states(folder / kFiles[0], record::make_header<record::StateRow>());
   PlainFile commands(folder / kFiles[1], record::make_header<record::CommandRow>());
@@ -102,15 +100,12 @@ double write_plain_files(std::vector<record::StepRows> steps, std::uint32_t vehi
     row.visit(row, file);
     file.end_row();
   };
-  for (std::size_t i = 0; i < steps.size(); ++i) {
-    record::StepRows& rows = steps[i];
+  for (record::StepRows& rows : steps) {
     for (std::uint32_t id = 0; id < vehicles; ++id) {
       rows.state->vehicle_id = rows.command->vehicle_id = rows.reference->vehicle_id = id;
       write(states, *rows.state);
       write(references, *rows.reference);
-      flight_rows[i].visit(flight_rows[i], flight);
-      if (vehicles > 1) flight.add(id);
-      flight.end_row();
+      write(flight, record::FlightRow{*rows.state, *rows.command, *rows.reference, vehicles > 1});
       write(commands, *rows.command);
     }
   }

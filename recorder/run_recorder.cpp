@@ -15,9 +15,12 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto kPollTime = 20ms;           // between two looks at the run
+constexpr auto kPollTime = 5ms;            // between two looks at the run
+constexpr auto kNewsTime = 20ms;           // between two announcements of further steps,
+constexpr std::int64_t kManySteps = 500;   // but of so many at once: the server may wait for it
 constexpr auto kAnnounceTime = 500ms;      // between two announcements at the latest
-constexpr auto kWriteTime = 5ms;           // between two batches of the writing thread
+constexpr auto kWriteTime = 5ms;           // between two looks of the writing thread
+constexpr auto kBusyTime = 1ms;            // likewise while samples come
 constexpr auto kStuckTime = 1s;            // until it is said which batch is missing
 constexpr auto kCompletionTime = 10s;      // after the end of a finished run, for the next step
 constexpr auto kFailedTime = 1s;           // likewise of any other
@@ -142,8 +145,9 @@ void RunRecorder::end_within(std::chrono::duration<double> limit) {
 void RunRecorder::announce_news() {
   const bool is_now_ready = !ready_ && surroundings_.inbox.hears(run_.server);
   ready_ = ready_ || is_now_ready;
-  if (is_now_ready || last_complete_step_ != announced_step_ ||
-      Clock::now() - announced_time_ >= kAnnounceTime)
+  const auto age = Clock::now() - announced_time_;
+  const std::int64_t news = last_complete_step_ - announced_step_;
+  if (is_now_ready || age >= kAnnounceTime || news >= kManySteps || (news > 0 && age >= kNewsTime))
     announce(false);
 }
 
@@ -162,7 +166,8 @@ void RunRecorder::write_samples() {
     auto time = Clock::now();
     while (!recording_.has_all() && !is_stopped) {
       is_stopped = stop_writing_;  // what is there by now is still taken
-      for (const Inbox::Sample& sample : surroundings_.inbox.take_all())
+      const std::deque<Inbox::Sample> samples = surroundings_.inbox.take_all();
+      for (const Inbox::Sample& sample : samples)
         std::visit([this](const auto& message) { recording_.add(message); }, sample);
       note_libraries();
       const auto earlier = std::exchange(time, Clock::now());
@@ -170,7 +175,7 @@ void RunRecorder::write_samples() {
       recording_.flush_if_due();
       last_complete_step_ = recording_.last_complete_step();
       report_missing_batch();
-      std::this_thread::sleep_for(kWriteTime);
+      std::this_thread::sleep_for(samples.empty() ? kWriteTime : kBusyTime);
     }
     const bool has_all = recording_.has_all();  // if so, the main thread may still be looking
     end_.is_complete = recording_.finish(has_all ? "" : interruption_,

@@ -33,6 +33,7 @@
 #include "common/bus/fastdds/middleware_log.hpp"
 #include "common/bus/fastdds/neighbours.hpp"
 #include "common/bus/fastdds/participant_listener.hpp"
+#include "common/bus/fastdds/small_datagrams.hpp"
 #include "common/bus/fastdds/stale_segments.hpp"
 #include "common/bus/qos_file.hpp"
 #include "common/bus/security_files.hpp"
@@ -51,7 +52,9 @@ constexpr int kMaxDomain = 232;  // beyond, RTPS port numbers overflow
 /// 3,000 forged ones the middleware hangs (tests/hostile/README.md).
 constexpr std::size_t kMaxParticipants = 64;
 
-constexpr std::size_t kLeastSampleBytes = 500;  // of one vehicle
+/// Of what a sample of the loop has around its vehicles on the wire: headers, a heartbeat, and what
+/// encryption adds.
+constexpr std::size_t kEnvelopeBytes = 200;
 
 }  // namespace
 
@@ -135,6 +138,7 @@ struct Node::Impl {
         ReturnCode_t::RETCODE_OK)
       throw_unknown_profile(kParticipantProfile);
     qos.name(name.c_str());
+    limit_datagrams(qos);
     auto& participants = qos.allocation().participants;
     participants.maximum = std::min(participants.maximum, kMaxParticipants);
     MiddlewareLog::clear();
@@ -165,6 +169,25 @@ struct Node::Impl {
     participant->set_listener(nullptr);
     participant->delete_contained_entities();
     dds::DomainParticipantFactory::get_instance()->delete_participant(participant);
+  }
+
+  /// To what the profile says.
+  void limit_datagrams(dds::DomainParticipantQos& qos) {
+    constexpr const char* kProperty = "sls.max_datagram_bytes";
+    constexpr std::size_t kLeast = 600;  // a vehicle fits
+    const auto* text =
+        eprosima::fastrtps::rtps::PropertyPolicyHelper::find_property(qos.properties(), kProperty);
+    if (!text) return;
+    std::size_t bytes = 0;
+    const char* end = text->data() + text->size();
+    const auto [rest, error] = std::from_chars(text->data(), end, bytes);
+    if (error != std::errc() || rest != end || bytes < kLeast || bytes > max_datagram_bytes)
+      throw ConfigError(qos_place + ": property " + kProperty + ": expected " +
+                        std::to_string(kLeast) + " to " + std::to_string(max_datagram_bytes) +
+                        ", got '" + *text + "'");
+    max_datagram_bytes = bytes;
+    for (auto& transport : qos.transport().user_transports)
+      transport = send_small_datagrams(transport, static_cast<std::uint32_t>(bytes));
   }
 
   [[noreturn]] void throw_unknown_profile(const char* profile) const {
@@ -216,6 +239,7 @@ struct Node::Impl {
   const std::string qos_place;
   const std::string own_role;
   const std::string identity;
+  std::size_t max_datagram_bytes = 60'000;  // of UDP on loopback, and of shared memory
   std::chrono::steady_clock::time_point joined;
   Problems problems;
   Neighbours neighbours{problems};
@@ -245,20 +269,7 @@ const char* Node::choose_reader_profile(const char* profile, const char* fallbac
              : fallback;
 }
 
-std::size_t Node::max_sample_bytes() const {
-  constexpr std::size_t kDatagram = 60'000;  // of UDP on loopback, and of shared memory
-  const auto* limit = eprosima::fastrtps::rtps::PropertyPolicyHelper::find_property(
-      impl_->participant->get_qos().properties(), "sls.max_sample_bytes");
-  if (!limit) return kDatagram;
-  std::size_t bytes = 0;
-  const char* end = limit->data() + limit->size();
-  const auto [rest, error] = std::from_chars(limit->data(), end, bytes);
-  if (error != std::errc() || rest != end || bytes < kLeastSampleBytes || bytes > kDatagram)
-    throw ConfigError(impl_->qos_place + ": property sls.max_sample_bytes: expected " +
-                      std::to_string(kLeastSampleBytes) + " to " + std::to_string(kDatagram) +
-                      ", got '" + *limit + "'");
-  return bytes;
-}
+std::size_t Node::max_sample_bytes() const { return impl_->max_datagram_bytes - kEnvelopeBytes; }
 
 std::string Node::describe_loneliness() const {
   constexpr auto kUsualDiscoveryTime = std::chrono::seconds(3);

@@ -53,9 +53,9 @@ class Node {
   const char* choose_writer_profile(const char* profile, const char* fallback) const;
   const char* choose_reader_profile(const char* profile, const char* fallback) const;
 
-  /// What a sample that is made of many parts should not exceed: one datagram of the network, where
-  /// the QoS file names it (property sls.max_sample_bytes of the participant), so that one lost
-  /// packet does not lose the parts that came in others.
+  /// What a sample of the loop that is made of many parts should not exceed to fit into one
+  /// datagram, so that one lost packet does not lose the parts that came in others. The QoS file
+  /// says how long a datagram may be (property sls.max_datagram_bytes of the participant).
   std::size_t max_sample_bytes() const;
 
   /// Where nobody else has been discovered 3 s after joining: "; " and that, with what to look at,

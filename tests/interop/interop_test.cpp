@@ -172,6 +172,7 @@ TEST_F(InteropTest, ACycloneControllerFliesSetpointsLikeOursAndACycloneRecorderW
   const auto cyclone_recorder = start_cyclone_recorder();
   const auto controller = start_cyclone("cyclone_controller", {"--name", "cyclone"});
   expect_success({server.get(), controller.get(), recorder.get(), cyclone_recorder.get()});
+  EXPECT_FALSE(holds(server->output(), "expected")) << server->output();  // they do nothing wrong
   const auto manifest = read_manifest(recording_);
   EXPECT_TRUE(manifest.at("complete").get<bool>()) << manifest;
   expect_same_rows(*cyclone_recorder, rows_, recording_, 11250);
@@ -332,6 +333,9 @@ class MyClientTest : public InteropTest {
                        "/idl/sls.idl -DCMAKE_C_FLAGS=-Werror && " SLS_CMAKE " --build build"});
     ASSERT_EQ(build.wait(), 0) << build.output();
   }
+  std::unique_ptr<Process> start_server(const Words& before = {}) const {
+    return start("sim_server", {"--scenario", folder_ / "my_client/my_client.yaml"}, before);
+  }
   std::unique_ptr<Process> start_client(const Words& before = {}) const {
     return std::make_unique<Process>(
         kOnLoopback + before +
@@ -359,6 +363,7 @@ TEST_F(MyClientTest, BringsTheLoadToItsPointWithTheSameBytesWhateverIsLost) {
       client = start_client(loss);
     }
     expect_success({server.get(), client.get(), recorder.get()});
+    EXPECT_FALSE(holds(server->output(), "expected")) << server->output();  // it does nothing wrong
   }
   EXPECT_TRUE(read_manifest(recording_).at("complete").get<bool>());
   for (const char* file : {"state.csv", "reference.csv"})

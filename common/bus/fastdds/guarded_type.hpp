@@ -33,7 +33,7 @@ class MisfitScope {
 /// A generated type support whose `deserialize` refuses malformed samples. The generated one lets
 /// most exceptions of the serialisation library through, which end the process: one sample of any
 /// stranger would do (README.md, traps 15 and 23). And it takes samples with bytes left over:
-/// those of another type, whose fields it reads in the wrong places (trap 25).
+/// those of another type, whose fields it reads in the wrong places (trap 26).
 ///
 /// Upstream: Fast-CDR #144; Fast DDS 2.11 catches more, but not std::bad_alloc. To be deleted when
 /// the generated function catches every exception, makes no more elements than a sample's length

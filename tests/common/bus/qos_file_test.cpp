@@ -161,7 +161,6 @@ std::vector<fs::path> list_invalid_files() {
   int code = 0;
   try {
     Node node(file, 79, "test_bus");
-    node.max_sample_bytes();
     Writer<States> loop_writer(node);
     Writer<RecordBatch> record_writer(node);
     Writer<Parameters> latched_writer(node);
