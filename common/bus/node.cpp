@@ -305,6 +305,10 @@ PeerId Node::id() const { return to_peer(impl_->participant->get_instance_handle
 
 Problems& Node::problems() const { return impl_->problems; }
 
+void Node::note_problem(const PeerId& peer, const std::string& key, const std::string& text) const {
+  impl_->neighbours.note_problem(peer, key, text);
+}
+
 std::string Node::describe(const PeerId& peer) const { return impl_->neighbours.describe(peer); }
 
 std::set<PeerId> Node::find_misfits() const { return impl_->neighbours.find_misfits(); }

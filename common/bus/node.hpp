@@ -66,6 +66,10 @@ class Node {
   /// by themselves.
   Problems& problems() const;
 
+  /// What a participant does wrong until it leaves: `text` is said behind its description, once for
+  /// each `key`.
+  void note_problem(const PeerId& peer, const std::string& key, const std::string& text) const;
+
   /// 'foo' (10.0.0.2): what a participant says of itself in discovery.
   std::string describe(const PeerId& peer) const;
 

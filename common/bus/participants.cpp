@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "common/app/stop_signal.hpp"
+#include "common/config/yaml_node.hpp"
 
 namespace sls::bus {
 namespace {
@@ -155,7 +156,14 @@ ServerDirectory::ServerDirectory(Node& node, std::function<void(const SimStatus&
       on_status_(std::move(on_status)),
       parameters_reader_(
           node, kLatchedReaderProfile,
-          [this](const Parameters& sample, const PeerId& sender) { note(sample, sender); }),
+          [this, &node](const Parameters& sample, const PeerId& sender) {
+            if (sample.contract_sha256() == kContractSha256) return note(sample, sender);
+            const std::string got = sample.contract_sha256().to_string();
+            node.note_problem(
+                sender, "parameters",
+                fmt::format("sls/parameters contract_sha256: expected {}, got {}", kContractSha256,
+                            got.empty() ? "none" : config::to_printable(got, 64)));
+          }),
       status_reader_(node, kLatchedReaderProfile,
                      [this](const SimStatus& sample, const PeerId& sender) {
                        note(sample, sender);

@@ -91,9 +91,9 @@ struct Run {
   std::chrono::steady_clock::time_point server_known_since;
 };
 
-/// The last parameters and status of every server that is still there, of 64 at most: those that
-/// have left make room. A run is of the server that was the first to claim it; what others say of
-/// it is not believed.
+/// The last parameters and status of every server that is still there and speaks this contract, of
+/// 64 at most: those that have left make room. A run is of the server that was the first to claim
+/// it; what others say of it is not believed.
 class ServerDirectory {
  public:
   /// `on_status`, where given, sees every status sample, on a thread of the middleware.

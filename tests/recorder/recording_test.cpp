@@ -220,7 +220,7 @@ TEST_F(RecordingTest, TheManifestDescribesTheRunTheMachineAndEveryFile) {
   EXPECT_EQ(manifest.at("timing"), "exact");
   EXPECT_EQ(manifest.at("segment"), Json({{"number", 1}, {"first_step", 0}}));
   EXPECT_EQ(manifest.at("unanswered_steps"), 0);
-  EXPECT_EQ(manifest.at("contract_sha256"), std::string(64, 'c'));
+  EXPECT_EQ(manifest.at("contract_sha256"), bus::kContractSha256);
   EXPECT_EQ(manifest.at("dropped"), Json({{"repeated", 0}, {"out_of_range", 0}}));
   EXPECT_FALSE(manifest.contains("libraries"));
   EXPECT_FALSE(manifest.contains("signals"));

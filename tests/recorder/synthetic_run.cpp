@@ -69,7 +69,7 @@ Parameters make_parameters() {
   set_vehicles(message, {0});
   message.scenario_text(kScenarioText);
   message.scenario_sha256(config::calc_sha256(kScenarioText));
-  message.contract_sha256(std::string(64, 'c'));
+  message.contract_sha256(bus::kContractSha256);
   message.period_ns(kPeriod);
   message.step_ns(1'000'000);
   message.mode(MODE_LOCKSTEP);

@@ -137,6 +137,12 @@ void Neighbours::note_misfit(const PeerId& peer, const EntityId& writer, const s
                   kMisfitLasts);
 }
 
+void Neighbours::note_problem(const PeerId& peer, const std::string& key, const std::string& text) {
+  const std::lock_guard lock(mutex_);
+  if (!is_of_contract_1(peer) && participants_.count(peer) > 0)
+    problems_.begin(make_key(peer) + key, describe_held(peer) + ": " + text);
+}
+
 std::string Neighbours::describe(const PeerId& peer) const {
   const std::lock_guard lock(mutex_);
   return describe_held(peer);

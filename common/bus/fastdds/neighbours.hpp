@@ -48,6 +48,9 @@ class Neighbours {
   void note_misfit(const PeerId& peer, const EntityId& writer, const std::string& topic,
                    const std::string& type, const std::string& defect);
 
+  /// Something else that a participant does wrong until it leaves.
+  void note_problem(const PeerId& peer, const std::string& key, const std::string& text);
+
   /// 'foo' (10.0.0.2): what the participant says of itself.
   std::string describe(const PeerId& peer) const;
 

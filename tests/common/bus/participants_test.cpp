@@ -39,6 +39,7 @@ SimStatus make_status(std::uint64_t run_id, RunPhase phase) {
 
 Parameters make_parameters(std::uint64_t run_id, const std::vector<std::uint32_t>& vehicle_ids) {
   Parameters parameters;
+  parameters.contract_sha256(kContractSha256);
   parameters.run_id(run_id);
   for (const std::uint32_t id : vehicle_ids) parameters.vehicles().emplace_back().vehicle_id(id);
   return parameters;
@@ -124,6 +125,22 @@ TEST_F(RecorderPatienceTest, ButNotForEver) {
 TEST_F(RecorderPatienceTest, OneThatGetsNoFurtherIsNot) {
   writer_.write(make_announcement(ROLE_RECORDER, kRun, "recorder"));
   EXPECT_FALSE(wait_for_recorder({0.5, 60}));
+}
+
+TEST(ServerDirectoryTest, AServerOfAnotherContractIsNotBelievedAndNamed) {
+  constexpr int kDomain = 71;
+  Node node(kQosFile, kDomain, "directory");
+  const ServerDirectory directory(node);
+  Node other(kQosFile, kDomain, "other");
+  Writer<Parameters> parameters(other);
+  Parameters sample = make_parameters(kRun, {kVehicle});
+  sample.contract_sha256(std::string(64, '0'));
+  parameters.write(sample);
+  ASSERT_TRUE(wait_until([&] { return !node.problems().describe().empty(); }));
+  EXPECT_EQ(node.problems().describe(),
+            "'other' (127.0.0.1): sls/parameters contract_sha256: expected " +
+                std::string(kContractSha256) + ", got " + std::string(64, '0'));
+  EXPECT_FALSE(knows(directory, kRun));
 }
 
 TEST(ServerDirectoryTest, FindsTheRunToJoin) {

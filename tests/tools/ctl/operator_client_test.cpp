@@ -55,6 +55,7 @@ class FakeServer {
   void begin_run(std::uint64_t run_id) {
     Parameters parameters;
     parameters.run_id(run_id);
+    parameters.contract_sha256(bus::kContractSha256);
     parameters.vehicles().emplace_back().vehicle_id(kVehicle);
     parameters.scenario_text("name: fake");
     parameters.period_ns(4'000'000);
