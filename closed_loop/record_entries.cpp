@@ -1,7 +1,5 @@
 #include "closed_loop/record_entries.hpp"
 
-#include <numeric>
-
 #include "common/app/options.hpp"
 #include "common/bus/convert.hpp"
 #include "control_client/messages.hpp"
@@ -41,10 +39,11 @@ std::vector<RecordEntry> fly_entries(const config::Scenario& scenario, std::size
 
 Parameters make_parameters(const config::Scenario& scenario, std::uint64_t run_id,
                            std::uint32_t vehicles) {
-  std::vector<std::uint32_t> ids(vehicles);
-  std::iota(ids.begin(), ids.end(), 0);
-  return sim::make_parameters_message(run_id, ids, scenario, Flight(scenario).plant(),
-                                      app::version());
+  Parameters parameters = sim::make_parameters_message(
+      run_id, {0}, scenario, Flight(scenario).plant(), app::version());
+  parameters.vehicles().resize(vehicles, parameters.vehicles().front());
+  for (std::uint32_t id = 0; id < vehicles; ++id) parameters.vehicles()[id].vehicle_id(id);
+  return parameters;
 }
 
 SimStatus make_status(std::uint64_t run_id, std::uint64_t index, RunPhase phase,

@@ -18,7 +18,7 @@ RecordEntry make_entry(std::uint32_t vehicle_id, const FlownStep& flown,
 /// Entries of the first `steps` steps of vehicle 0 of `scenario`.
 std::vector<RecordEntry> fly_entries(const config::Scenario& scenario, std::size_t steps);
 
-/// What a server of `vehicles` vehicles claims.
+/// What a server of `vehicles` vehicles that are all like the first one claims.
 Parameters make_parameters(const config::Scenario& scenario, std::uint64_t run_id,
                            std::uint32_t vehicles);
 
