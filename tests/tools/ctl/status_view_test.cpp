@@ -140,6 +140,18 @@ TEST(StatusViewTest, OnlyFinishedAndFailedRunsHaveEnded) {
   EXPECT_FALSE(has_ended(std::nullopt));
 }
 
+TEST(StatusViewTest, WhatAParticipantDoesWrongIsShown) {
+  Snapshot snapshot = make_snapshot();
+  const std::string problem =
+      "sls/command of 'foo' (10.0.0.2): DEADLINE: offered none, asked 0.1 s";
+  EXPECT_EQ(nlohmann::json::parse(to_json(snapshot)).at("problem"), "");
+  EXPECT_FALSE(contains(render_line(snapshot), "problem"));
+  snapshot.status->problem(problem);
+  EXPECT_EQ(nlohmann::json::parse(to_json(snapshot)).at("problem"), problem);
+  EXPECT_TRUE(contains(render_line(snapshot), " | problem: " + problem));
+  EXPECT_TRUE(contains(join(render(snapshot, 120)), "\nproblem     " + problem + "\n"));
+}
+
 TEST(StatusViewTest, LongReasonsAreWrappedBetweenWords) {
   Snapshot snapshot = make_snapshot();
   snapshot.status->reason(
