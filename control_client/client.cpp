@@ -67,14 +67,20 @@ std::optional<bus::Run> Client::find_first_run() {
   while (app::stop_signal() == 0) {
     if (auto run = find_joinable_run()) return run;
     if (wait.is_over())
-      throw app::RunError(fmt::format("no server for vehicle {} within {} s{}", vehicles, timeout_s,
-                                      node_.describe_loneliness()));
+      throw app::RunError(fmt::format("no server for vehicle {} within {} s{}{}", vehicles,
+                                      timeout_s, describe_problem(), node_.describe_loneliness()));
     if (wait.is_report_due())
-      spdlog::info("waiting for: server of vehicle {} ({:.0f} s left){}", vehicles,
-                   wait.seconds_left(), node_.describe_loneliness());
+      spdlog::info("waiting for: server of vehicle {} ({:.0f} s left){}{}", vehicles,
+                   wait.seconds_left(), describe_problem(), node_.describe_loneliness());
     std::this_thread::sleep_for(kPollTime);
   }
   return std::nullopt;
+}
+
+/// "; " and what others on the domain do wrong, to be appended to a message about who is missing.
+std::string Client::describe_problem() const {
+  const std::string problem = node_.problems().describe();
+  return problem.empty() ? "" : "; " + problem;
 }
 
 std::optional<bus::Run> Client::find_joinable_run() const {

@@ -46,6 +46,7 @@ class Client {
   /// The run to begin with; nothing after a stop signal.
   std::optional<bus::Run> find_first_run();
   std::unique_ptr<AnswerStream> make_stream(bool is_realtime);
+  std::string describe_problem() const;
   /// That of the first of our vehicles that has one.
   std::optional<bus::Run> find_joinable_run() const;
   void begin(const bus::Run& run);
