@@ -138,7 +138,9 @@ struct Node::Impl {
         ReturnCode_t::RETCODE_OK)
       throw_unknown_profile(kParticipantProfile);
     qos.name(name.c_str());
-    limit_datagrams(qos);
+    const bool is_secured = eprosima::fastrtps::rtps::PropertyPolicyHelper::find_property(
+                                qos.properties(), "dds.sec.auth.plugin") != nullptr;
+    limit_datagrams(qos, is_secured);
     auto& participants = qos.allocation().participants;
     participants.maximum = std::min(participants.maximum, kMaxParticipants);
     MiddlewareLog::clear();
@@ -148,10 +150,7 @@ struct Node::Impl {
       wire.participant_id = choose_participant_id(
           {wire.port.portBase + wire.port.domainIDGain * domain + wire.port.offsetd1,
            wire.port.participantIDGain});
-    listener = std::make_unique<ParticipantListener>(
-        eprosima::fastrtps::rtps::PropertyPolicyHelper::find_property(
-            qos.properties(), "dds.sec.auth.plugin") != nullptr,
-        &neighbours);
+    listener = std::make_unique<ParticipantListener>(is_secured, &neighbours);
     participant = factory->create_participant(static_cast<std::uint32_t>(domain), qos,
                                               listener.get(), dds::StatusMask::none());
     if (participant)
@@ -172,9 +171,10 @@ struct Node::Impl {
   }
 
   /// To what the profile says.
-  void limit_datagrams(dds::DomainParticipantQos& qos) {
+  void limit_datagrams(dds::DomainParticipantQos& qos, bool is_secured) {
     constexpr const char* kProperty = "sls.max_datagram_bytes";
-    constexpr std::size_t kLeast = 600;  // a vehicle fits
+    constexpr std::size_t kLeast = 600;                  // a vehicle fits
+    constexpr std::size_t kMostHandshakeBytes = 16'000;  // of our keys: 5,500
     const auto* text =
         eprosima::fastrtps::rtps::PropertyPolicyHelper::find_property(qos.properties(), kProperty);
     if (!text) return;
@@ -186,8 +186,10 @@ struct Node::Impl {
                         std::to_string(kLeast) + " to " + std::to_string(max_datagram_bytes) +
                         ", got '" + *text + "'");
     max_datagram_bytes = bytes;
+    // The handshake of DDS Security goes in no fragments.
+    const auto sent = std::max<std::size_t>(bytes, is_secured ? kMostHandshakeBytes : 0);
     for (auto& transport : qos.transport().user_transports)
-      transport = send_small_datagrams(transport, static_cast<std::uint32_t>(bytes));
+      transport = send_small_datagrams(transport, static_cast<std::uint32_t>(sent));
   }
 
   [[noreturn]] void throw_unknown_profile(const char* profile) const {

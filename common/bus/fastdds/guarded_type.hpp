@@ -7,6 +7,8 @@
 #include <exception>
 #include <string>
 
+#include "common/bus/fastdds/bounds.hpp"
+
 namespace sls::bus {
 
 /// What a reader in this thread is taking samples for; a sample that is refused is reported to it.
@@ -33,7 +35,8 @@ class MisfitScope {
 /// A generated type support whose `deserialize` refuses malformed samples. The generated one lets
 /// most exceptions of the serialisation library through, which end the process: one sample of any
 /// stranger would do (README.md, traps 15 and 23). And it takes samples with bytes left over:
-/// those of another type, whose fields it reads in the wrong places (trap 26).
+/// those of another type, whose fields it reads in the wrong places (trap 26), and sequences beyond
+/// their bounds, which cannot be sent on (bounds.hpp).
 ///
 /// Upstream: Fast-CDR #144; Fast DDS 2.11 catches more, but not std::bad_alloc. To be deleted when
 /// the generated function catches every exception, makes no more elements than a sample's length
@@ -67,7 +70,8 @@ class GuardedType : public Generated {
       return refuse(
           *payload, data,
           "expected " + std::to_string(used) + " bytes, got " + std::to_string(payload->length));
-    return true;
+    const std::string excess = find_excess(*static_cast<const typename Generated::type*>(data));
+    return excess.empty() || refuse(*payload, data, "expected at most " + excess);
   }
 
  private:

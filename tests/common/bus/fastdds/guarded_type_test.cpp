@@ -145,6 +145,36 @@ TEST(GuardedTypeTest, ASampleWithAFieldMoreOrLessIsRefusedAndReported) {
   EXPECT_EQ(report.text.find("sls::Commands: expected plain CDR of that type, got: "), 0u);
 }
 
+/// As many bytes as the sample needs, but longer sequences than the contract allows.
+template <class Type, class Message>
+bool is_taken_back(Message message) {
+  rtps::SerializedPayload_t payload(
+      static_cast<std::uint32_t>(Message::getCdrSerializedSize(message)) + 4);
+  EXPECT_TRUE(Type().serialize(&message, &payload));
+  Message back;
+  return GuardedType<Type>().deserialize(&payload, &back);
+}
+
+TEST(GuardedTypeTest, SequencesBeyondTheirBoundsAreRefused) {
+  Commands commands;
+  commands.vehicles().resize(SAMPLE_VEHICLES);
+  commands.vehicles().back().controller().numbers().resize(MOST_NUMBERS);
+  EXPECT_TRUE(is_taken_back<CommandsPubSubType>(commands));
+  commands.vehicles().back().controller().numbers().resize(MOST_NUMBERS + 1);
+  EXPECT_FALSE(is_taken_back<CommandsPubSubType>(commands));
+  States states;
+  states.vehicles().resize(SAMPLE_VEHICLES + 1);
+  EXPECT_FALSE(is_taken_back<StatesPubSubType>(states));
+  RecordBatch batch;
+  batch.entries().resize(1);
+  batch.entries().front().measured().resize(1);
+  EXPECT_TRUE(is_taken_back<RecordBatchPubSubType>(batch));
+  batch.entries().front().measured().resize(2);
+  EXPECT_FALSE(is_taken_back<RecordBatchPubSubType>(batch));
+  batch.entries().resize(BATCH_ENTRIES + 1);
+  EXPECT_FALSE(is_taken_back<RecordBatchPubSubType>(batch));
+}
+
 TEST(GuardedTypeTest, RandomBytesThrowNothing) {
   std::mt19937_64 random(4);
   for (int i = 0; i < 20000; ++i) {
