@@ -39,8 +39,8 @@ std::vector<RecordEntry> fly_entries(const config::Scenario& scenario, std::size
 
 Parameters make_parameters(const config::Scenario& scenario, std::uint64_t run_id,
                            std::uint32_t vehicles) {
-  Parameters parameters = sim::make_parameters_message(
-      run_id, {0}, scenario, Flight(scenario).plant(), app::version());
+  Parameters parameters =
+      sim::make_parameters_message(run_id, {0}, scenario, Flight(scenario).plant(), app::version());
   parameters.vehicles().resize(vehicles, parameters.vehicles().front());
   for (std::uint32_t id = 0; id < vehicles; ++id) parameters.vehicles()[id].vehicle_id(id);
   return parameters;

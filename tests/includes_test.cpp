@@ -16,7 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Files of `folder`, where no later rule names a folder below it, may include its own files and
-/// those of `others`: folders of this project, and libraries of others as their first path element.
+/// those of `others`: folders and files of this project, and libraries of others.
 struct Rule {
   std::string folder;
   std::vector<std::string> others;
@@ -27,8 +27,10 @@ const std::vector<Rule> kRules = {
      {"closed_loop", "common", "control_client", "recorder", "sim_server", "Wire", "Fast DDS"}},
     {"closed_loop", {"common", "control_client", "recorder", "sim_server"}},
     {"common/app", {"common/config"}},
-    {"common/bus", {"common/app", "common/config", "Wire", "Fast DDS"}},
-    {"common/bus/fastdds", {"common/config", "Wire", "Fast DDS"}},
+    {"common/bus", {"common/app", "common/config", "common/model", "Wire", "Fast DDS"}},
+    {"common/bus/fastdds",
+     {"common/bus/peer.hpp", "common/bus/problems.hpp", "common/bus/topics.hpp", "common/config",
+      "Wire", "Fast DDS"}},
     {"common/config", {"common/model"}},
     {"common/model", {}},
     {"common/plugin", {"common/config", "common/model"}},
@@ -69,7 +71,7 @@ bool is_allowed(const std::string& file, const std::string& header, bool is_ours
   const std::string library = find_library(header);
   if (library.empty() && (!is_ours || is_below(header, rule.folder))) return true;
   return std::any_of(rule.others.begin(), rule.others.end(), [&](const std::string& other) {
-    return library == other || is_below(header, other);
+    return library == other || header == other || is_below(header, other);
   });
 }
 

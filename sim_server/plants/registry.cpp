@@ -31,12 +31,12 @@ const PlantType& find_plant_type(const config::ModelName& model) {
 
 const std::vector<std::string>& list_reserved_signal_names() {
   static const std::vector<std::string> names = {
-      "vehicle_id",  "step",        "sim_time_s",      "quad_x_m",       "quad_y_m",
-      "quad_z_m",    "quad_vx_m_s", "quad_vy_m_s",     "quad_vz_m_s",    "load_x_m",
-      "load_y_m",    "load_z_m",    "load_vx_m_s",     "load_vy_m_s",    "load_vz_m_s",
-      "alpha_rad",   "beta_rad",    "alpha_dot_rad_s", "beta_dot_rad_s", "force_x_n",
-      "force_y_n",   "force_z_n",   "att_w",           "att_x",          "att_y",
-      "att_z",       "rate_x_rad_s", "rate_y_rad_s",   "rate_z_rad_s"};
+      "vehicle_id", "step",         "sim_time_s",      "quad_x_m",       "quad_y_m",
+      "quad_z_m",   "quad_vx_m_s",  "quad_vy_m_s",     "quad_vz_m_s",    "load_x_m",
+      "load_y_m",   "load_z_m",     "load_vx_m_s",     "load_vy_m_s",    "load_vz_m_s",
+      "alpha_rad",  "beta_rad",     "alpha_dot_rad_s", "beta_dot_rad_s", "force_x_n",
+      "force_y_n",  "force_z_n",    "att_w",           "att_x",          "att_y",
+      "att_z",      "rate_x_rad_s", "rate_y_rad_s",    "rate_z_rad_s"};
   return names;
 }
 
@@ -48,8 +48,8 @@ void check_signals(const std::vector<Signal>& signals, const config::ModelName& 
   std::set<std::string> taken(list_reserved_signal_names().begin(),
                               list_reserved_signal_names().end());
   for (const Signal& signal : signals) {
-    const std::string place =
-        model.describe_place("plant.model") + ": signal '" + signal.name + "' of '" + model.name + "': ";
+    const std::string place = model.describe_place("plant.model") + ": signal '" + signal.name +
+                              "' of '" + model.name + "': ";
     if (!taken.insert(signal.name).second)
       throw config::ConfigError(place + "expected a name that no other column has, got this one");
     if (signal.name.size() > kMostLettersOfName || signal.unit.size() > kMostLettersOfUnit)

@@ -44,12 +44,12 @@ const std::vector<std::string> kProfiles = {"lan", "unicast", "discovery_server"
 
 /// The figure eight for 16 s, 4,000 steps, with patience for a start over a bad link.
 std::string make_scenario(const TemporaryFolder& folder, int vehicles) {
-  return make_scenario(folder,
-                       {{"for_s: 32", "for_s: 16"},
-                        {"timeout_s: 30", "timeout_s: 120"},
-                        {"name: figure_eight",
-                         "name: figure_eight\nvehicles: " + std::to_string(vehicles)}},
-                       "figure_eight");
+  return make_scenario(
+      folder,
+      {{"for_s: 32", "for_s: 16"},
+       {"timeout_s: 30", "timeout_s: 120"},
+       {"name: figure_eight", "name: figure_eight\nvehicles: " + std::to_string(vehicles)}},
+      "figure_eight");
 }
 
 std::string format(const Figures& figures) {

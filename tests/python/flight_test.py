@@ -83,12 +83,18 @@ class FlightTest(support.FolderTest):
             text = text.replace(old, new)
         self.write("s.yaml", text)
         same = ("--scenario", "s.yaml", "--domain", domain)
-        server = self.start("sim_server", *same, "--period-s", "0.001")
+        # A history of 180 batches of 27 steps at most: it does not reach back to step 0.
+        profiles = (support.ROOT / "config/qos/endpoints.xml").read_text()
+        begin = profiles.index('<data_writer profile_name="sls_record_writer">')
+        end = profiles.index("</data_writer>", begin) + len("</data_writer>")
+        writer = profiles[begin:end].replace("5000<", "180<")
+        qos = (support.ROOT / "config/qos/default.xml").read_text()
+        self.write("qos.xml", qos.replace("</profiles>", writer + "</profiles>"))
+        server = self.start("sim_server", *same, "--period-s", "0.001", "--qos", "qos.xml")
         operator = ("ctl", "--domain", domain, "--timeout-s", "100")
         self.run_launcher(*operator, "pause")  # the flight begins paused
         client = self.start("control_client", *same)
-        self.run_launcher(*operator, "step", "10000")
-        # The histories reach back 5,000 steps: into the first lap of 6,000.
+        self.run_launcher(*operator, "step", "5500")  # of the first lap's 6,000
         recorder = self.start("recorder", "--out", "r", "--domain", domain)
         deadline = time.monotonic() + 100
         while len(self.read_rows("command")) < 2000 and time.monotonic() < deadline:
