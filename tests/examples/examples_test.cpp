@@ -113,7 +113,7 @@ TEST(ExamplesTest, AreInstalledBuiltAndFlownAsByAUser) {
   Process logger({installation.example("my_logger") / "build/my_logger", domain.text()});
   installation.fly(scenario("short"), domain);
   EXPECT_EQ(logger.wait(), 0) << logger.output();
-  EXPECT_TRUE(holds(logger.output(), "  0.0 s  load at   0.000   0.000  -0.500 m\n"));
+  EXPECT_TRUE(holds(logger.output(), "step     0  load at   0.000   0.000  -0.500 m\n"));
   EXPECT_TRUE(holds(logger.output(), "\n501 states\n")) << logger.output();
 }
 

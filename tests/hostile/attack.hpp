@@ -39,9 +39,9 @@ std::uint64_t spoof(const Target& target);
 
 /// Participants that appear, say something and vanish.
 std::uint64_t come_and_go(const Target& target);
-/// Commands and references with every fault, copies of right ones, and such for the future.
+/// Commands with every fault, copies of right ones, and such for the future.
 std::uint64_t flood_commands(const Target& target);
-/// States, statuses, parameters and recorders that are not there.
+/// States, batches, statuses, parameters and recorders that are not there.
 std::uint64_t forge_statements(const Target& target);
 /// Requests to sls/control that nobody may grant.
 std::uint64_t flood_control(const Target& target);

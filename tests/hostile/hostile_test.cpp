@@ -1,10 +1,12 @@
 /// A neighbour on the network attacks a flight with all it has. The flight must finish with the
-/// bytes of an undisturbed one, and the server's memory must stay bounded: README.md.
+/// bytes of an undisturbed one, and the memory of the programs must stay bounded: README.md.
 #include <gtest/gtest.h>
 
 #include <csignal>
 #include <cstdio>
+#include <map>
 #include <memory>
+#include <utility>
 
 #include "tests/network/hosts_flight.hpp"
 
@@ -69,23 +71,28 @@ class HostileTest : public testing::Test {
     flight.client->send(SIGCONT);
   }
 
-  /// The most memory the server has had, in MB; 0 where it has ended.
-  static double find_peak_memory(const Process& server) {
-    const std::string status = read_file("/proc/" + std::to_string(server.id()) + "/status");
+  /// The most memory that a program has had, in MB; 0 where it has ended.
+  static double find_peak_memory(const Process& program) {
+    const std::string status = read_file("/proc/" + std::to_string(program.id()) + "/status");
     const auto at = status.find("VmHWM:");
     return at == std::string::npos ? 0 : std::atof(status.c_str() + at + 6) / 1024;
   }
 
   /// Waits for the end of an attacked flight, which is as if there had been no attack.
   void expect_undisturbed(Flight& flight, double most_mb) {
-    double peak = 0;
+    std::map<std::string, double> peaks;
     wait_until([&] {
-      peak = std::max(peak, find_peak_memory(*flight.server));
+      for (const auto& [name, program] :
+           {std::pair("server", flight.server.get()), std::pair("client", flight.client.get()),
+            std::pair("recorder", flight.recorder.get())})
+        peaks[name] = std::max(peaks[name], find_peak_memory(*program));
       return !flight.server->is_running();
     });
     flight.expect_success();
-    std::printf("peak memory of the server: %.0f MB\n", peak);
-    EXPECT_LT(peak, most_mb);
+    for (const auto& [name, peak] : peaks) {
+      std::printf("peak memory of the %s: %.0f MB\n", name.c_str(), peak);
+      EXPECT_LT(peak, most_mb) << name;
+    }
     Flight undisturbed(scenario("figure_eight"));
     undisturbed.expect_success();
     for (const char* file : {"state.csv", "reference.csv"})

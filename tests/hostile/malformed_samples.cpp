@@ -66,13 +66,23 @@ Bytes make_malformed(std::mt19937_64& random) {
   return bytes;
 }
 
+/// Zeros that claim as many vehicles, entries or numbers as they are long.
+Bytes make_claim(std::mt19937_64& random) {
+  Bytes bytes(1000 + random() % 140'000);
+  bytes[1] = 1;                              // little-endian
+  const auto at = 4 * (1 + random() % 100);  // where a sequence of some type may begin
+  for (std::size_t i = 0; i < 4; ++i)
+    bytes[at + i] = static_cast<std::uint8_t>(bytes.size() >> 8 * i);
+  return bytes;
+}
+
 }  // namespace
 
 std::uint64_t write_malformed(const Target& target) {
   const std::map<std::string, std::string> types = {
-      {topic_of<VehicleState>(), "sls::VehicleState"},
-      {topic_of<ControlCommand>(), "sls::ControlCommand"},
-      {topic_of<Reference>(), "sls::Reference"},
+      {topic_of<States>(), "sls::States"},
+      {topic_of<Commands>(), "sls::Commands"},
+      {topic_of<RecordBatch>(), "sls::RecordBatch"},
       {topic_of<Participant>(), "sls::Participant"},
       {topic_of<Parameters>(), "sls::Parameters"},
       {topic_of<SimStatus>(), "sls::SimStatus"},
@@ -103,7 +113,7 @@ std::uint64_t write_malformed(const Target& target) {
   std::size_t huge = 0;
   while (goes_on(target)) {
     auto* writer = writers[random() % writers.size()];
-    Bytes bytes = make_malformed(random);
+    Bytes bytes = random() % 20 ? make_malformed(random) : make_claim(random);
     if (count % 200 == 0 && huge < kMostHuge) {
       bytes.assign(huge % 2 ? kHuge : 64000, 'x');
       std::copy_n("\0\1\0\0", 4, bytes.begin());

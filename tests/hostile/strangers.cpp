@@ -27,9 +27,9 @@ class Stranger {
       : node(kQosFile, target.domain, "stranger"),
         servers(node),
         state_reader_(node, bus::kLoopReaderProfile,
-                      [this](const VehicleState& state, const bus::PeerId&) {
+                      [this](const States& sample, const bus::PeerId&) {
                         const std::lock_guard lock(mutex_);
-                        state_ = state;
+                        state_ = sample;
                       }) {}
 
   /// Waits until the server flies; false if the attack is over before.
@@ -45,28 +45,30 @@ class Stranger {
     const auto status = servers.find_status(run->parameters.run_id());
     return status && status->phase() == PHASE_RUNNING;
   }
-  std::optional<VehicleState> state() const {
+  std::optional<States> state() const {
     const std::lock_guard lock(mutex_);
     return state_;
   }
   std::uint64_t run_id() const { return run->parameters.run_id(); }
 
-  ControlCommand make_command(const std::string& name) const {
-    ControlCommand command;
-    command.run_id(run_id());
-    command.step(state()->step());
-    command.f_Q_W_n({1.0, 0.0, -16.0});
-    command.client_name(name);
-    command.strength(1000);
-    return command;
+  Commands make_commands(const std::string& name) const {
+    Commands sample;
+    sample.run_id(run_id());
+    sample.step(state()->step());
+    sample.client_name(name);
+    sample.strength(1000);
+    sample.vehicles().emplace_back().f_Q_W_n({1.0, 0.0, -16.0});
+    return sample;
   }
   Participant make_announcement(ParticipantRole role) const {
     Participant message;
     message.run_id(run_id());
+    message.contract_sha256(bus::kContractSha256);
     message.role(role);
     message.name("stranger");
     message.host("nowhere");
     message.strength(std::numeric_limits<std::int32_t>::max());
+    message.vehicle_ids({0});
     message.scenario_sha256(run->parameters.scenario_sha256());
     message.ready(true);
     message.last_complete_step(-1);
@@ -79,28 +81,33 @@ class Stranger {
 
  private:
   mutable std::mutex mutex_;
-  std::optional<VehicleState> state_;
-  bus::Reader<VehicleState> state_reader_;
+  std::optional<States> state_;
+  bus::Reader<States> state_reader_;
 };
 
-/// `command` with one thing or another wrong.
-void spoil(ControlCommand& command, std::mt19937_64& random) {
-  switch (random() % 8) {
+/// `sample` with one thing or another wrong.
+void spoil(Commands& sample, std::mt19937_64& random) {
+  ControlCommand& command = sample.vehicles().front();
+  switch (random() % 10) {
     case 0:
       return command.f_Q_W_n({std::numeric_limits<double>::quiet_NaN(), 0, 0});
     case 1:
       return command.f_Q_W_n({0, 0, -1e300});
     case 2:
-      return command.run_id(random());
+      return sample.run_id(random());
     case 3:
       return command.vehicle_id(static_cast<std::uint32_t>(random()));
     case 4:
       command.mission(MISSION_FAILED);
       return command.fault(FAULT_FREE_FALL);
     case 5:
-      return command.step(random());
+      return sample.step(random());
     case 6:
-      return command.step(command.step() + random() % 10000);
+      return sample.step(sample.step() + random() % 10000);
+    case 7:
+      return sample.vehicles().resize(SAMPLE_VEHICLES, command);  // the same vehicle
+    case 8:
+      return command.controller().numbers().resize(MOST_NUMBERS);
     default:
       return command.mission(MISSION_FINISHED);
   }
@@ -113,8 +120,8 @@ std::uint64_t come_and_go(const Target& target) {
   for (; goes_on(target); ++count) {
     bus::Node node(kQosFile, target.domain, "passer-by");
     bus::Writer<Participant> writer(node);
-    bus::Reader<VehicleState> reader(node, bus::kRecorderReaderProfile,
-                                     [](const VehicleState&, const bus::PeerId&) {});
+    bus::Reader<RecordBatch> reader(node, bus::kRecordReaderProfile,
+                                    [](const RecordBatch&, const bus::PeerId&) {});
     Participant message;
     message.name("passer-by");
     message.role(count % 2 ? ROLE_CONTROLLER : ROLE_RECORDER);
@@ -127,23 +134,15 @@ std::uint64_t come_and_go(const Target& target) {
 
 std::uint64_t flood_commands(const Target& target) {
   Stranger stranger(target);
-  bus::Writer<ControlCommand> commands(stranger.node);
-  bus::Writer<Reference> references(stranger.node);
+  bus::Writer<Commands> commands(stranger.node);
   if (!stranger.wait_for_flight(target)) return 0;
   std::mt19937_64 random(target.seed);
   std::uint64_t count = 0;
   while (goes_on(target)) {
-    for (int i = 0; i < 10; ++i, count += 2) {
-      ControlCommand command = stranger.make_command(random() % 2 ? kPilot : "stranger");
-      spoil(command, random);
-      commands.write(command);
-      Reference reference;  // under the pilot's name, of the steps to come
-      reference.run_id(stranger.run_id());
-      reference.step(command.step() % 100000);
-      reference.client_name(kPilot);
-      reference.stage_name("nowhere");
-      reference.position_m({1e6, 1e6, 1e6});
-      references.write(reference);
+    for (int i = 0; i < 20; ++i, ++count) {
+      Commands sample = stranger.make_commands(random() % 2 ? kPilot : "stranger");
+      spoil(sample, random);
+      commands.write(sample);
     }
     say_that_it_fires();
     std::this_thread::sleep_for(kPause);
@@ -153,7 +152,8 @@ std::uint64_t flood_commands(const Target& target) {
 
 std::uint64_t forge_statements(const Target& target) {
   Stranger stranger(target);
-  bus::Writer<VehicleState> states(stranger.node);
+  bus::Writer<States> states(stranger.node);
+  bus::Writer<RecordBatch> batches(stranger.node);
   bus::Writer<SimStatus> statuses(stranger.node);
   bus::Writer<Parameters> parameters(stranger.node);
   bus::Writer<Participant> participants(stranger.node);
@@ -161,11 +161,22 @@ std::uint64_t forge_statements(const Target& target) {
   std::mt19937_64 random(target.seed);
   std::uint64_t count = 0;
   // It stops with the flight: a recorder that is there and not done delays the end by up to 10 s.
-  for (; goes_on(target) && stranger.is_flying(); count += 5) {
-    VehicleState state = *stranger.state();  // the next one, where the load is somewhere else
+  for (; goes_on(target) && stranger.is_flying(); count += 6) {
+    States state = *stranger.state();  // the next one, where the load is somewhere else
     state.step(state.step() + random() % 3);
-    state.p_WL_m({1e3, 1e3, 1e3});
+    VehicleState& vehicle = state.vehicles().front();
+    vehicle.measured().p_WL_m({1e3, 1e3, 1e3});
     states.write(state);
+    RecordBatch batch;  // the same, for recorders, and often the last
+    batch.run_id(stranger.run_id());
+    batch.batch_index(random() % 3 ? state.step() / 20 + random() % 3 : random());
+    batch.is_last(random() % 2);
+    RecordEntry& entry = batch.entries().emplace_back();
+    entry.step(state.step());
+    entry.kind(static_cast<AnswerKind>(random() % 6));
+    entry.truth(vehicle.measured());
+    entry.client_name(kPilot);
+    batches.write(batch);
     SimStatus status;  // that the flight is over
     status.run_id(stranger.run_id());
     status.sample_index(1 << 30);
@@ -210,7 +221,7 @@ std::uint64_t flood_control(const Target& target) {
 std::uint64_t pose_as_controller(const Target& target, bool answers) {
   Stranger stranger(target);
   bus::Writer<Participant> participants(stranger.node);
-  bus::Writer<ControlCommand> commands(stranger.node);
+  bus::Writer<Commands> commands(stranger.node);
   if (!stranger.wait_for_flight(target)) return 0;
   participants.write(stranger.make_announcement(ROLE_CONTROLLER));
   say_that_it_fires();
@@ -222,10 +233,10 @@ std::uint64_t pose_as_controller(const Target& target, bool answers) {
       std::this_thread::sleep_for(100us);
       continue;
     }
-    ControlCommand command = stranger.make_command("stranger");
-    command.step(answered = step);
-    command.f_Q_W_n({std::numeric_limits<double>::infinity(), 0, 0});
-    commands.write(command);
+    Commands sample = stranger.make_commands("stranger");
+    sample.step(answered = step);
+    sample.vehicles().front().f_Q_W_n({std::numeric_limits<double>::infinity(), 0, 0});
+    commands.write(sample);
     ++count;
   }
   return count;
@@ -235,9 +246,10 @@ std::uint64_t read_all(const Target& target) {
   bus::Node node(kQosFile, target.domain, "deaf");
   std::atomic<std::uint64_t> count{0};
   const auto hear = [&](const auto&, const bus::PeerId&) { ++count; };
-  const bus::Reader<VehicleState> states(node, bus::kRecorderReaderProfile, hear);
-  const bus::Reader<ControlCommand> commands(node, bus::kRecorderReaderProfile, hear);
-  const bus::Reader<Reference> references(node, bus::kRecorderReaderProfile, hear);
+  // Reliable on the loop's topics too.
+  const bus::Reader<States> states(node, bus::kRecordReaderProfile, hear);
+  const bus::Reader<Commands> commands(node, bus::kRecordReaderProfile, hear);
+  const bus::Reader<RecordBatch> batches(node, bus::kRecordReaderProfile, hear);
   const bus::Reader<SimStatus> statuses(node, bus::kLatchedReaderProfile, hear);
   say_that_it_fires();
   while (goes_on(target)) std::this_thread::sleep_for(10ms);
