@@ -55,9 +55,6 @@ class CommandStream {
 struct Endpoints {
   static constexpr std::size_t kCommands = 4096;
   static constexpr std::size_t kRequests = 64;
-  /// A full history of 5,000 batches takes no more than 64 MB. Where a datagram is shorter, a batch
-  /// goes in fragments, which are repaired one by one.
-  static constexpr std::size_t kMaxBatchBytes = 12'000;
 
   /// In real time commands are read with DEADLINE and LIFESPAN, where the QoS file has them.
   Endpoints(bus::Node& node, std::size_t vehicles, config::SyncMode mode)

@@ -25,6 +25,8 @@
 #include <limits>
 #include <map>
 #include <mutex>
+#include <string_view>
+#include <system_error>
 #include <utility>
 
 #include "common/bus/fastdds/endpoints.hpp"
@@ -138,9 +140,9 @@ struct Node::Impl {
         ReturnCode_t::RETCODE_OK)
       throw_unknown_profile(kParticipantProfile);
     qos.name(name.c_str());
-    const bool is_secured = eprosima::fastrtps::rtps::PropertyPolicyHelper::find_property(
-                                qos.properties(), "dds.sec.auth.plugin") != nullptr;
-    limit_datagrams(qos, is_secured);
+    is_secured = eprosima::fastrtps::rtps::PropertyPolicyHelper::find_property(
+                     qos.properties(), "dds.sec.auth.plugin") != nullptr;
+    limit_datagrams(qos);
     auto& participants = qos.allocation().participants;
     participants.maximum = std::min(participants.maximum, kMaxParticipants);
     MiddlewareLog::clear();
@@ -170,11 +172,29 @@ struct Node::Impl {
     dds::DomainParticipantFactory::get_instance()->delete_participant(participant);
   }
 
+  /// What a handshake of DDS Security may take, which goes in no fragments: with the keys of
+  /// `./sls keys` 5,500 bytes, mostly certificate and signed permissions.
+  static std::size_t calc_handshake_bytes(
+      const eprosima::fastrtps::rtps::PropertyPolicy& properties) {
+    constexpr std::size_t kLeast = 6'000, kBesides = 2'000;
+    constexpr std::string_view kFile = "file://";
+    std::size_t bytes = kBesides;
+    for (const char* name : {"dds.sec.auth.builtin.PKI-DH.identity_certificate",
+                             "dds.sec.access.builtin.Access-Permissions.permissions"}) {
+      const auto* place =
+          eprosima::fastrtps::rtps::PropertyPolicyHelper::find_property(properties, name);
+      if (!place || place->rfind(kFile, 0) != 0) continue;
+      std::error_code error;
+      const auto size = std::filesystem::file_size(place->substr(kFile.size()), error);
+      if (!error) bytes += static_cast<std::size_t>(size);
+    }
+    return std::max(kLeast, bytes);
+  }
+
   /// To what the profile says.
-  void limit_datagrams(dds::DomainParticipantQos& qos, bool is_secured) {
+  void limit_datagrams(dds::DomainParticipantQos& qos) {
     constexpr const char* kProperty = "sls.max_datagram_bytes";
-    constexpr std::size_t kLeast = 600;                  // a vehicle fits
-    constexpr std::size_t kMostHandshakeBytes = 16'000;  // of our keys: 5,500
+    constexpr std::size_t kLeast = 600;  // a vehicle fits
     const auto* text =
         eprosima::fastrtps::rtps::PropertyPolicyHelper::find_property(qos.properties(), kProperty);
     if (!text) return;
@@ -186,8 +206,8 @@ struct Node::Impl {
                         std::to_string(kLeast) + " to " + std::to_string(max_datagram_bytes) +
                         ", got '" + *text + "'");
     max_datagram_bytes = bytes;
-    // The handshake of DDS Security goes in no fragments.
-    const auto sent = std::max<std::size_t>(bytes, is_secured ? kMostHandshakeBytes : 0);
+    const std::size_t sent =
+        is_secured ? std::max(bytes, calc_handshake_bytes(qos.properties())) : bytes;
     for (auto& transport : qos.transport().user_transports)
       transport = send_small_datagrams(transport, static_cast<std::uint32_t>(sent));
   }
@@ -240,7 +260,8 @@ struct Node::Impl {
 
   const std::string qos_place;
   const std::string own_role;
-  const std::string identity;
+  std::string identity;
+  bool is_secured = false;
   std::size_t max_datagram_bytes = 60'000;  // of UDP on loopback, and of shared memory
   std::chrono::steady_clock::time_point joined;
   Problems problems;
@@ -269,6 +290,11 @@ const char* Node::choose_reader_profile(const char* profile, const char* fallbac
                  ReturnCode_t::RETCODE_OK
              ? profile
              : fallback;
+}
+
+std::size_t Node::max_batch_bytes() const {
+  constexpr std::size_t kMost = 12'000;
+  return impl_->is_secured ? std::min(kMost, max_sample_bytes()) : kMost;
 }
 
 std::size_t Node::max_sample_bytes() const { return impl_->max_datagram_bytes - kEnvelopeBytes; }

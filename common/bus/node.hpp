@@ -58,6 +58,11 @@ class Node {
   /// says how long a datagram may be (property sls.max_datagram_bytes of the participant).
   std::size_t max_sample_bytes() const;
 
+  /// The same of a batch of sls/record: 12,000 bytes, which go in fragments that are repaired one
+  /// by one, so that a full history takes 64 MB at most; one datagram where DDS Security leaves
+  /// none.
+  std::size_t max_batch_bytes() const;
+
   /// Where nobody else has been discovered 3 s after joining: "; " and that, with what to look at,
   /// to be appended to a message about who is missing. Else empty.
   std::string describe_loneliness() const;
