@@ -13,7 +13,6 @@
 #include "common/app/wait.hpp"
 #include "common/bus/node.hpp"
 #include "common/bus/participants.hpp"
-#include "sim_server/endpoints.hpp"
 #include "sim_server/record_stream.hpp"
 #include "sim_server/roster.hpp"
 
@@ -81,7 +80,7 @@ nlohmann::json feed_recorder(const config::Scenario& scenario, const FeederOptio
   bus::Node node(options.qos_file, options.domain, "bench", "server");
   bus::Writer<RecordBatch> writer(node);
   Surroundings surroundings(node, scenario, options.vehicles);
-  sim::RecordStream stream(writer, sim::Endpoints::kMaxBatchBytes, kRunId);
+  sim::RecordStream stream(writer, node.max_batch_bytes(), kRunId);
   const std::uint64_t last = entries.size() - 1;
   surroundings.wait(PHASE_WAITING, 0, "a recorder that is ready",
                     [](const Participant& recorder) { return recorder.ready(); });

@@ -55,9 +55,6 @@ class CommandStream {
 struct Endpoints {
   static constexpr std::size_t kCommands = 4096;
   static constexpr std::size_t kRequests = 64;
-  /// A full history of 5,000 batches takes no more than 64 MB. Where a datagram is shorter, a batch
-  /// goes in fragments, which are repaired one by one.
-  static constexpr std::size_t kMaxBatchBytes = 12'000;
 
   /// In real time commands are read with DEADLINE and LIFESPAN, where the QoS file has them.
   Endpoints(bus::Node& node, std::size_t vehicles, config::SyncMode mode)
@@ -66,6 +63,7 @@ struct Endpoints {
         servers(node),
         states(node, vehicles),
         record_writer(node),
+        max_batch_bytes(node.max_batch_bytes()),
         parameters_writer(node),
         status_writer(node),
         reply_writer(node),
@@ -81,6 +79,7 @@ struct Endpoints {
   bus::ServerDirectory servers;
   StateStream states;
   bus::Writer<RecordBatch> record_writer;
+  const std::size_t max_batch_bytes;
   bus::Writer<Parameters> parameters_writer;
   bus::Writer<SimStatus> status_writer;
   bus::Writer<SimControlReply> reply_writer;

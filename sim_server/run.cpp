@@ -38,7 +38,7 @@ Run::Run(Endpoints& endpoints, const Assignment& assignment, WorkerPool& workers
              run_id, vehicle_ids_.front(), scenario_.sync, [this] { return sum_counters(); }),
       control_(run_id, vehicle_ids_, begins_paused),
       check_(run_id, scenario_, vehicle_ids_),
-      record_(endpoints.record_writer, Endpoints::kMaxBatchBytes, run_id),
+      record_(endpoints.record_writer, endpoints.max_batch_bytes, run_id),
       workers_(workers),
       plants_(make_plants(find_plant_type(scenario_.plant.model), scenario_, vehicle_ids_)),
       plant_steps_(scenario_.sync.period_ns / scenario_.plant.step_ns) {

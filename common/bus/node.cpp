@@ -56,6 +56,9 @@ constexpr std::size_t kMaxParticipants = 64;
 /// encryption adds.
 constexpr std::size_t kEnvelopeBytes = 200;
 
+/// A full history of 5,000 such batches takes no more than 64 MB.
+constexpr std::size_t kLargeBatchBytes = 12'000;
+
 }  // namespace
 
 void load_profiles(const std::filesystem::path& file, const std::string& identity) {
@@ -173,8 +176,8 @@ struct Node::Impl {
   /// To what the profile says.
   void limit_datagrams(dds::DomainParticipantQos& qos, bool is_secured) {
     constexpr const char* kProperty = "sls.max_datagram_bytes";
-    constexpr std::size_t kLeast = 600;                  // a vehicle fits
-    constexpr std::size_t kMostHandshakeBytes = 16'000;  // of our keys: 5,500
+    constexpr std::size_t kLeast = 600;                 // a vehicle fits
+    constexpr std::size_t kMostHandshakeBytes = 8'000;  // of our keys: 5,500
     const auto* text =
         eprosima::fastrtps::rtps::PropertyPolicyHelper::find_property(qos.properties(), kProperty);
     if (!text) return;
@@ -188,6 +191,7 @@ struct Node::Impl {
     max_datagram_bytes = bytes;
     // The handshake of DDS Security goes in no fragments.
     const auto sent = std::max<std::size_t>(bytes, is_secured ? kMostHandshakeBytes : 0);
+    has_small_fragments = sent == bytes;
     for (auto& transport : qos.transport().user_transports)
       transport = send_small_datagrams(transport, static_cast<std::uint32_t>(sent));
   }
@@ -242,6 +246,7 @@ struct Node::Impl {
   const std::string own_role;
   const std::string identity;
   std::size_t max_datagram_bytes = 60'000;  // of UDP on loopback, and of shared memory
+  bool has_small_fragments = true;          // no larger than such a datagram
   std::chrono::steady_clock::time_point joined;
   Problems problems;
   Neighbours neighbours{problems};
@@ -272,6 +277,10 @@ const char* Node::choose_reader_profile(const char* profile, const char* fallbac
 }
 
 std::size_t Node::max_sample_bytes() const { return impl_->max_datagram_bytes - kEnvelopeBytes; }
+
+std::size_t Node::max_batch_bytes() const {
+  return impl_->has_small_fragments ? kLargeBatchBytes : max_sample_bytes();
+}
 
 std::string Node::describe_loneliness() const {
   constexpr auto kUsualDiscoveryTime = std::chrono::seconds(3);

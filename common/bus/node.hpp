@@ -58,6 +58,10 @@ class Node {
   /// says how long a datagram may be (property sls.max_datagram_bytes of the participant).
   std::size_t max_sample_bytes() const;
 
+  /// The same for samples that are read reliably: larger, where the fragments of a sample fit into
+  /// such datagrams and are repaired one by one. With DDS Security they do not.
+  std::size_t max_batch_bytes() const;
+
   /// Where nobody else has been discovered 3 s after joining: "; " and that, with what to look at,
   /// to be appended to a message about who is missing. Else empty.
   std::string describe_loneliness() const;
