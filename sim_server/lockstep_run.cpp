@@ -172,7 +172,7 @@ bool LockstepRun::receive(const Commands& sample, const bus::PeerId& sender) {
 bool LockstepRun::is_plain_step() const {
   return !is_late_ && !is_anybody_absent() && !control_.is_paused() &&
          endpoints_.requests.is_empty() && !is_roster_due() && !board_.is_due() &&
-         board_.step + 1 < recorder_limit_ && !record_.is_full() && !is_problem_due() &&
+         board_.step + 1 < recorder_limit_ && !record_.is_full() && !is_look_due() &&
          app::stop_signal() == 0;
 }
 

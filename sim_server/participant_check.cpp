@@ -292,13 +292,17 @@ std::vector<std::string> ParticipantCheck::take_events() { return std::exchange(
 bool ParticipantCheck::lasts(const std::string& key, Clock::time_point now,
                              Clock::duration patience) {
   pending_now_.insert(key);
-  return now - pending_.try_emplace(key, now).first->second >= patience;
+  const auto due = pending_.try_emplace(key, now).first->second + patience;
+  if (now >= due) return true;
+  if (!next_due_ || due < *next_due_) next_due_ = due;
+  return false;
 }
 
 ParticipantCheck::Findings ParticipantCheck::look(const Neighbourhood& neighbourhood) {
   Findings findings;
   Senders announced;
   pending_now_.clear();
+  next_due_.reset();
   for (const Entry& entry : neighbourhood.participants) {
     announced[entry.peer] = &entry;
     look_at(entry, neighbourhood, findings);

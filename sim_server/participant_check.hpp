@@ -74,6 +74,9 @@ class ParticipantCheck {
   /// one was taken.
   std::string describe_rejections(const bus::PeerId& sender) const;
 
+  /// When to look again, because something will then have lasted too long.
+  const std::optional<Clock::time_point>& next_due() const { return next_due_; }
+
   /// What is to be announced since the last call, such as a vehicle far from its reference.
   std::vector<std::string> take_events();
 
@@ -146,6 +149,7 @@ class ParticipantCheck {
   std::map<std::pair<bus::PeerId, std::string>, Seen> seen_;
   std::map<std::string, Clock::time_point> pending_;  // since when
   std::set<std::string> pending_now_;
+  std::optional<Clock::time_point> next_due_;
   std::vector<std::string> events_;
 };
 

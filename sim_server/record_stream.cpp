@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "common/app/scheduling.hpp"
-
 namespace sls::sim {
 
 RecordStream::RecordStream(bus::Writer<RecordBatch>& writer, std::size_t max_bytes,

@@ -18,13 +18,13 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto kUsualStartTime = 300ms;   // for discovery, after the claim: no news
-constexpr auto kRosterTime = 100ms;       // until a silent departure is looked for
-constexpr auto kPollTime = 20ms;          // while nothing is in a hurry
-constexpr auto kRecorderSilence = 1s;     // of one that should be announcing progress
-constexpr auto kReportInterval = 5s;      // of the same silence
-constexpr auto kProblemInterval = 100ms;  // of statuses that tell of nothing else
-constexpr auto kLongStart = 5s;           // from then on it may be the network
+constexpr auto kUsualStartTime = 300ms;  // for discovery, after the claim: no news
+constexpr auto kRosterTime = 100ms;      // until a silent departure is looked for
+constexpr auto kPollTime = 20ms;         // while nothing is in a hurry
+constexpr auto kRecorderSilence = 1s;    // of one that should be announcing progress
+constexpr auto kReportInterval = 5s;     // of the same silence
+constexpr auto kLookInterval = 100ms;    // at least, between looks at what participants do
+constexpr auto kLongStart = 5s;          // from then on it may be the network
 
 }  // namespace
 
@@ -257,8 +257,10 @@ bool Run::attend_to_operator() {
 }
 
 void Run::attend_now_and_then() {
-  if (!board_.is_due() && !is_problem_due()) return;
+  if (!board_.is_due() && !is_look_due()) return;
+  const std::string problem = board_.problem;
   look_for_problems();
+  if (!board_.is_due() && board_.problem == problem) return;
   board_.publish(board_.phase(), control_.is_paused() ? control_.last_event() : "");
   check_stop();
   check_claim();
@@ -282,15 +284,20 @@ bool Run::is_roster_due() const {
          Clock::now() - roster_time_ > kRosterTime;
 }
 
-bool Run::is_problem_due() const {
-  return endpoints_.domain.problems().version() != problems_version_ &&
-         board_.is_due(kProblemInterval);
+bool Run::is_look_due() const {
+  const auto& due = check_.next_due();
+  const bool is_news = endpoints_.domain.problems().version() != problems_version_ ||
+                       endpoints_.participants.version() != looked_at_version_;
+  if (!is_news && !due) return false;
+  const auto now = Clock::now();
+  return now - look_time_ >= kLookInterval && (is_news || now >= *due);
 }
 
 void Run::look_for_problems() {
   const bus::Node& domain = endpoints_.domain;
   Neighbourhood neighbourhood;
-  neighbourhood.now = Clock::now();
+  neighbourhood.now = look_time_ = Clock::now();
+  looked_at_version_ = endpoints_.participants.version();
   neighbourhood.participants = endpoints_.participants.all();
   for (const bus::Run& other : endpoints_.servers.runs()) {
     neighbourhood.other_runs.insert(other.parameters.run_id());

@@ -117,8 +117,8 @@ class Run {
   bool is_roster_due() const;
   /// Status, stop signal, claim: what needs a look a few times a second.
   void attend_now_and_then();
-  /// True where a problem began or ended that no status has told of.
-  bool is_problem_due() const;
+  /// True where the participants should be looked at before the next status is due.
+  bool is_look_due() const;
   std::string describe_problem() const;
 
   Endpoints& endpoints_;
@@ -166,6 +166,8 @@ class Run {
   bool is_step_published_ = false;
   OfferedAnswer offered_;  // in work
   std::uint64_t problems_version_ = 0;
+  std::uint64_t looked_at_version_ = 0;  // of the participants
+  Clock::time_point look_time_;
   std::uint64_t roster_version_ = 0;
   Clock::time_point roster_time_;
   std::optional<app::Wait> absence_wait_;

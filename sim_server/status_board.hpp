@@ -32,9 +32,7 @@ class StatusBoard {
   /// An event that does not change the phase: said on stderr and published as a reason.
   void announce(const std::string& event);
   /// The last sample is so long ago.
-  bool is_due(Clock::duration interval = kInterval) const {
-    return Clock::now() - publish_time_ >= interval;
-  }
+  bool is_due() const { return Clock::now() - publish_time_ >= kInterval; }
 
   RunPhase phase() const { return phase_; }
   /// True once anybody can have heard of the run.

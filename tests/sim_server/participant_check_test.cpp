@@ -181,6 +181,7 @@ TEST_F(ParticipantCheckTest, NamesAreShownPrintable) {
 TEST_F(ParticipantCheckTest, AWriterOfCommandsWithoutAnAnnouncementIsNamedOnceThatLasts) {
   neighbourhood_.command_writers[make_peer(1)] = "'foo' (10.0.0.2)";
   EXPECT_TRUE(look().empty());
+  EXPECT_EQ(check_.next_due(), ParticipantCheck::Clock::time_point(1h + 1s));
   EXPECT_TRUE(look(900ms).empty());
   EXPECT_EQ(look(1s), only("'foo' (10.0.0.2): writes sls/command: expected an announcement in "
                            "sls/participant, got none"));
