@@ -144,7 +144,7 @@ Check check_qos(const Observations& seen) {
   std::vector<Mismatch> found = find_policy_mismatches(theirs);
   for (const Mismatch& mismatch : find_policy_mismatches(add_own(theirs, seen))) {
     // In real time the programs use other profiles for commands, with a deadline.
-    if (mismatch.topic == bus::Topic<Commands>::kName && mismatch.policy == "deadline") continue;
+    if (mismatch.topic == bus::Topic<Commands>::kName && mismatch.policy == "DEADLINE") continue;
     const bool is_known = std::any_of(found.begin(), found.end(), [&](const Mismatch& known) {
       return known.topic == mismatch.topic && known.policy == mismatch.policy;
     });

@@ -8,6 +8,7 @@
 #include <fastdds/dds/subscriber/qos/SubscriberQos.hpp>
 #include <fastdds/dds/topic/qos/TopicQos.hpp>
 
+#include "common/bus/fastdds/facts_of.hpp"
 #include "common/bus/topics.hpp"
 
 namespace sls::doctor {
@@ -15,19 +16,11 @@ namespace {
 
 namespace dds = eprosima::fastdds::dds;
 
-std::int64_t to_ns(const eprosima::fastrtps::Duration_t& duration) {
-  return duration == eprosima::fastrtps::c_TimeInfinite ? kForeverNs : duration.to_ns();
-}
-
 template <class Qos>
-Policies convert(const Qos& qos) {
-  return {qos.m_reliability.kind == dds::RELIABLE_RELIABILITY_QOS ? 1 : 0,
-          static_cast<int>(qos.m_durability.kind),
-          to_ns(qos.m_deadline.period),
-          static_cast<int>(qos.m_liveliness.kind),
-          to_ns(qos.m_liveliness.lease_duration),
-          static_cast<int>(qos.m_ownership.kind),
-          qos.m_partition.names()};
+void fill(Endpoint& endpoint, const Qos& qos) {
+  bus::detail::fill(endpoint, qos.m_reliability, qos.m_durability, qos.m_deadline, qos.m_liveliness,
+                    qos.m_ownership);
+  endpoint.partitions = qos.m_partition.names();
 }
 
 /// Makes the endpoints of one topic after another.
@@ -59,7 +52,7 @@ class Maker {
     endpoint.is_writer = true;
     endpoint.owner = std::string(profile) + " of " + file_;
     endpoint.participant.bytes[0] = 1;  // another one than the readers'
-    endpoint.policies = to_policies(qos.get_writerqos(publisher_.get_qos(), dds::TopicQos()));
+    fill(endpoint, qos.get_writerqos(publisher_.get_qos(), dds::TopicQos()));
     made.push_back(std::move(endpoint));
   }
 
@@ -68,7 +61,7 @@ class Maker {
     subscriber_.get_datareader_qos_from_profile(profile, qos);
     endpoint.owner = std::string(profile) + " of " + file_;
     endpoint.max_size = 0;
-    endpoint.policies = to_policies(qos.get_readerqos(subscriber_.get_qos()));
+    fill(endpoint, qos.get_readerqos(subscriber_.get_qos()));
     made.push_back(std::move(endpoint));
   }
 
@@ -78,9 +71,6 @@ class Maker {
 };
 
 }  // namespace
-
-Policies to_policies(const dds::WriterQos& qos) { return convert(qos); }
-Policies to_policies(const dds::ReaderQos& qos) { return convert(qos); }
 
 std::vector<Endpoint> make_own_endpoints(dds::Publisher& publisher, dds::Subscriber& subscriber,
                                          const std::string& file) {

@@ -1,11 +1,8 @@
-/// From the middleware's QoS to the policies that decide a match. Internal to the doctor: it shows
-/// Fast DDS.
+/// What our own endpoints would announce. Internal to the doctor: it shows Fast DDS.
 #pragma once
 
 #include <fastdds/dds/publisher/Publisher.hpp>
-#include <fastdds/dds/publisher/qos/WriterQos.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
-#include <fastdds/dds/subscriber/qos/ReaderQos.hpp>
 
 #include <string>
 #include <vector>
@@ -13,9 +10,6 @@
 #include "tools/doctor/endpoint.hpp"
 
 namespace sls::doctor {
-
-Policies to_policies(const eprosima::fastdds::dds::WriterQos& qos);
-Policies to_policies(const eprosima::fastdds::dds::ReaderQos& qos);
 
 /// The writers and readers that the programs make of the profiles in force, `file`'s, in lockstep.
 std::vector<Endpoint> make_own_endpoints(eprosima::fastdds::dds::Publisher& publisher,

@@ -21,6 +21,7 @@
 #include <utility>
 
 #include "common/bus/fastdds/endpoints.hpp"
+#include "common/bus/fastdds/facts_of.hpp"
 #include "common/bus/fastdds/middleware_log.hpp"
 #include "common/bus/fastdds/participant_listener.hpp"
 #include "common/bus/fastdds/stale_segments.hpp"
@@ -246,26 +247,23 @@ struct Observer::Impl : bus::ParticipantListener {
   void on_publisher_discovery(dds::DomainParticipant*,
                               rtps::WriterDiscoveryInfo&& discovered) override {
     note_endpoint(discovered.info, discovered.status == rtps::WriterDiscoveryInfo::REMOVED_WRITER,
-                  true, discovered.info.typeMaxSerialized());
+                  discovered.info.typeMaxSerialized());
   }
 
   void on_subscriber_discovery(dds::DomainParticipant*,
                                rtps::ReaderDiscoveryInfo&& discovered) override {
     note_endpoint(discovered.info, discovered.status == rtps::ReaderDiscoveryInfo::REMOVED_READER,
-                  false, 0);
+                  0);
   }
 
   /// `size`: the largest sample in bytes, which only writers announce.
   template <class Data>
-  void note_endpoint(const Data& data, bool is_gone, bool is_writer, std::uint32_t size) {
+  void note_endpoint(const Data& data, bool is_gone, std::uint32_t size) {
     const std::lock_guard lock(mutex);
     if (is_gone)
       endpoints.erase(data.guid());
     else
-      endpoints[data.guid()] = {
-          to_peer(data.guid()),        {},        data.topicName().to_string(),
-          data.typeName().to_string(), is_writer, size,
-          to_policies(data.m_qos)};
+      endpoints[data.guid()] = {bus::make_facts(data), to_peer(data.guid()), {}, size};
   }
 
   const Options options;

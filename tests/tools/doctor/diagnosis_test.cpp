@@ -142,11 +142,11 @@ TEST(DiagnosisTest, CommandsInRealTimeHaveADeadlineOfTheirOwn) {
   ours.topic = theirs.topic = "sls/command";
   ours.is_writer = true;
   ours.participant.bytes[0] = 1;
-  theirs.policies.deadline_ns = 100'000'000;
+  theirs.deadline = std::chrono::milliseconds(100);
   seen.own_endpoints = {ours};
   seen.endpoints = {theirs};
   EXPECT_EQ(find_faults(seen), Names{});
-  seen.endpoints.front().policies.reliability = 1;
+  seen.endpoints.front().is_reliable = true;
   EXPECT_EQ(find_faults(seen), Names{"qos"});
 }
 
