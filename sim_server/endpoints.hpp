@@ -63,7 +63,6 @@ struct Endpoints {
         servers(node),
         states(node, vehicles),
         record_writer(node),
-        max_batch_bytes(node.max_batch_bytes()),
         parameters_writer(node),
         status_writer(node),
         reply_writer(node),
@@ -79,7 +78,6 @@ struct Endpoints {
   bus::ServerDirectory servers;
   StateStream states;
   bus::Writer<RecordBatch> record_writer;
-  const std::size_t max_batch_bytes;
   bus::Writer<Parameters> parameters_writer;
   bus::Writer<SimStatus> status_writer;
   bus::Writer<SimControlReply> reply_writer;

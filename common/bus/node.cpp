@@ -58,9 +58,6 @@ constexpr std::size_t kMaxParticipants = 64;
 /// encryption adds.
 constexpr std::size_t kEnvelopeBytes = 200;
 
-/// A full history of 5,000 such batches takes no more than 64 MB.
-constexpr std::size_t kLargeBatchBytes = 12'000;
-
 }  // namespace
 
 void load_profiles(const std::filesystem::path& file, const std::string& identity) {
@@ -266,7 +263,6 @@ struct Node::Impl {
   std::string identity;
   bool is_secured = false;
   std::size_t max_datagram_bytes = 60'000;  // of UDP on loopback, and of shared memory
-  bool has_small_fragments = true;          // no larger than such a datagram
   std::chrono::steady_clock::time_point joined;
   Problems problems;
   Neighbours neighbours{problems};
@@ -302,10 +298,6 @@ std::size_t Node::max_batch_bytes() const {
 }
 
 std::size_t Node::max_sample_bytes() const { return impl_->max_datagram_bytes - kEnvelopeBytes; }
-
-std::size_t Node::max_batch_bytes() const {
-  return impl_->has_small_fragments ? kLargeBatchBytes : max_sample_bytes();
-}
 
 std::string Node::describe_loneliness() const {
   constexpr auto kUsualDiscoveryTime = std::chrono::seconds(3);
