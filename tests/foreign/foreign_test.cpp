@@ -341,10 +341,12 @@ class ForeignAnswerTest : public ForeignTest {
         << outputs();
     EXPECT_EQ(line.substr(line.find(" answers")), end);
     EXPECT_EQ(ask_problem(), line);
-    // Who is waited for, and why.
+    // Who is waited for, and why: of the one that is awaited, or as the problem that it is.
     EXPECT_TRUE(wait_until([&] {
+      const bool is_of_awaited =
+          has(*server, " of its answers rejected, none taken: " + cause + ") (");
       return has(*server, "step 0: waiting for: controller 'foreign' on elsewhere (") &&
-             has(*server, " of its answers rejected, none taken: " + cause + ") (");
+             (is_of_awaited || has(*server, " s left); " + line));
     })) << outputs();
   }
 };
