@@ -11,6 +11,7 @@
 #include "common/app/stop_signal.hpp"
 #include "common/app/wait.hpp"
 #include "common/bus/convert.hpp"
+#include "common/bus/spinning.hpp"
 #include "common/config/vehicle_ids.hpp"
 #include "common/plugin/shared_library.hpp"
 #include "control_client/messages.hpp"
@@ -116,7 +117,12 @@ void Client::begin(const bus::Run& run) {
     pilots_ = std::move(pilots);
     if (stream) stream_.swap(stream);
   }
-  if (is_realtime) app::put_process_first();
+  if (is_realtime) {
+    bus::stop_spinning();
+    app::put_process_first();
+  } else {
+    bus::start_spinning();
+  }
   plugin::set_patience(scenario_.sync.calc_controller_patience_s() + kAfterThePatience_s);
   ready_ = false;
   watch_.emplace(servers_, run, scenario_.sync.wait.server_deadline_s);
@@ -128,6 +134,7 @@ void Client::begin(const bus::Run& run) {
 }
 
 void Client::leave() {
+  bus::stop_spinning();
   const std::uint64_t run_id = run_->parameters.run_id();
   const auto status = servers_.find_status(run_id);
   announce(false, true);

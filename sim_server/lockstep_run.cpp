@@ -8,6 +8,7 @@
 
 #include "common/app/run_main.hpp"
 #include "common/app/stop_signal.hpp"
+#include "common/bus/spinning.hpp"
 
 namespace sls::sim {
 namespace {
@@ -21,9 +22,13 @@ std::chrono::steady_clock::duration to_duration(double seconds) {
 
 }  // namespace
 
-LockstepRun::~LockstepRun() { endpoints_.command_stream.set_handler(nullptr); }
+LockstepRun::~LockstepRun() {
+  bus::stop_spinning();
+  endpoints_.command_stream.set_handler(nullptr);
+}
 
 void LockstepRun::begin() {
+  bus::start_spinning();
   main_lock_.lock();
   endpoints_.command_stream.set_handler([this](const Commands& sample, const bus::PeerId& sender) {
     return receive(sample, sender);

@@ -34,6 +34,9 @@
 #include <fstream>
 #include <string>
 
+#include "common/bus/fastdds/adaptive_spin.hpp"
+#include "common/bus/spinning.hpp"
+
 namespace sls::bus {
 namespace {
 
@@ -160,6 +163,10 @@ int sem_timedwait(sem_t* semaphore, const timespec* deadline) {
   static const auto next = find_next(&sem_timedwait, "sem_timedwait");
   if (!is_of_port(semaphore)) return next(semaphore, deadline);
   own_locks_to_come = 2;
+  thread_local AdaptiveSpin spin(16);
+  if (is_spinning.load(std::memory_order_relaxed) &&
+      spin.wait_for([semaphore] { return sem_trywait(semaphore) == 0; }))
+    return 0;
   const timespec look = limit(*deadline, kLook_ns);
   return next(semaphore, &look);
 }
