@@ -35,8 +35,6 @@ usage: ./sls COMMAND [OPTIONS]
       --mode MODE      lockstep or realtime (default: the scenario's)
       --rtf X          of realtime: simulated over wall time (default: the scenario's)
       --in-process     the same flight in one process without DDS: same data, same certificate
-      --no-pinning     leave it to the system which processor runs what; else, where one vehicle flies in
-                       lockstep, server and client share one and leave the others to the recorder
   ctl COMMAND        talk to the run on this domain: pause, step N, resume, start, reset, stop or
                      status [--watch] [--json]; with --help: its options
   delay-margin SCENARIO
@@ -154,42 +152,12 @@ build_programs() {
 # Processes this launcher started: name by process id.
 declare -A name_of=()
 
-# Processors on which a program may run, where they were chosen: by name of the program.
-declare -A processors_of=()
-
 # The kernel ends the process should this launcher be killed.
 start() {
-  local name=$1 place=()
+  local name=$1
   shift
-  [[ -z ${processors_of[$name]:-} ]] || place=(taskset --cpu-list "${processors_of[$name]}")
-  setpriv --pdeathsig TERM -- "${place[@]}" "$build/bin/$name" "$@" &
+  setpriv --pdeathsig TERM -- "$build/bin/$name" "$@" &
   name_of[$!]=$name
-}
-
-# One vehicle in lockstep: server and client take turns and never work at the same time. On one
-# processor a turn is a switch; between two it wakes the other out of its sleep, which takes longer
-# than the step itself. They get the one that was least busy just now, the recorder the others.
-place_programs() {
-  local allowed=() ranges range chosen others
-  IFS=, read -ra ranges <<<"$(taskset --cpu-list -p $$ | sed 's/.*: //')"
-  for range in "${ranges[@]}"; do
-    mapfile -t -O "${#allowed[@]}" allowed < <(seq "${range%-*}" "${range#*-}")
-  done
-  ((${#allowed[@]} > 1)) || return 0
-  chosen="$({ cat /proc/stat; sleep 0.1; cat /proc/stat; } | awk -v allowed=" ${allowed[*]} " '
-    /^cpu[0-9]/ {
-      number = substr($1, 4)
-      if (!(number in idle)) { idle[number] = $5; next }
-      rested = $5 - idle[number]
-      if (index(allowed, " " number " ") && (best == "" || rested > most)) { most = rested; best = number }
-    }
-    END { print best }')"
-  [[ -n $chosen ]] || return 0
-  processors_of[sim_server]=$chosen
-  processors_of[control_client]=$chosen
-  others=" ${allowed[*]} "
-  others="${others/ $chosen / }"
-  processors_of[recorder]="$(xargs <<<"$others" | tr ' ' ',')"
 }
 
 signal_all() {
@@ -232,12 +200,12 @@ find_scenario() {
 
 # fly SCENARIO [OPTIONS]: sets `recording` and `result`.
 fly() {
-  local scenario='' force=() qos=() domain=() timing=() is_pinned=1 is_in_process=0
+  local scenario='' force=() qos=() domain=() timing=() is_in_process=0
   recording=''
   while (($#)); do
     case $1 in
       --force) force=(--force) ;;
-      --no-pinning) is_pinned=0 ;;
+      --no-pinning) ;;  # of earlier versions, which chose the processors
       --in-process) is_in_process=1 ;;
       --out | --qos | --domain | --period-s | --mode | --rtf)
         (($# >= 2)) || fail "$1: expected a value (see ./sls help)" 2
@@ -276,13 +244,11 @@ fly() {
   fi
 
   # One line about a mistake, before three programs stumble over it.
-  local plan
-  plan="$("$build/bin/sim_server" --check --scenario "$file" "${qos[@]}" "${domain[@]}" "${timing[@]}")" ||
+  "$build/bin/sim_server" --check --scenario "$file" "${qos[@]}" "${domain[@]}" "${timing[@]}" >/dev/null ||
     exit $?
   "$build/bin/recorder" --check --out "$recording" "${force[@]}" "${qos[@]}" "${domain[@]}" ||
     exit $?
 
-  [[ $is_pinned == 0 || $plan != *'lockstep, 1 vehicle,'* ]] || place_programs
   start recorder --out "$recording" "${force[@]}" "${qos[@]}" "${domain[@]}"
   start sim_server --scenario "$file" "${qos[@]}" "${domain[@]}" "${timing[@]}"
   start control_client --scenario "$file" "${qos[@]}" "${domain[@]}"
