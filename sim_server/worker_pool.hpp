@@ -1,6 +1,7 @@
 /// Threads that share the work of a step: independent vehicles integrate in parallel.
 #pragma once
 
+#include <atomic>
 #include <condition_variable>
 #include <cstddef>
 #include <cstdint>
@@ -20,28 +21,31 @@ class WorkerPool {
   WorkerPool(const WorkerPool&) = delete;
   WorkerPool& operator=(const WorkerPool&) = delete;
 
-  /// Calls `work(i)` once for each i below `count` and returns when all are done. Which thread does
-  /// which is fixed: equal shares of neighbours.
-  /// @throws what `work` throws, for the lowest such i of the first share that has one.
+  /// Calls `work(i)` once for each i below `count` and returns when all are done. Each thread has
+  /// an equal share of neighbours, the same in each call, whose data its processor's cache may
+  /// still hold; who has done its own helps the others, because processors are not equally fast.
+  /// @throws what `work` throws for the lowest i, after all have been worked on.
   void for_each(std::size_t count, const std::function<void(std::size_t)>& work);
 
  private:
   struct Share {
-    std::thread thread;
-    std::exception_ptr error;
+    std::atomic<std::size_t> next{0};
+    std::size_t end = 0;
   };
-  void serve(std::size_t share);
-  void do_share(std::size_t share, std::exception_ptr& error) const;
+  void serve(std::size_t own);
+  void do_shares(std::size_t own);
 
-  const std::size_t threads_;
+  std::vector<Share> shares_;  // the caller's is the first
+  std::vector<std::thread> threads_;
+  const std::function<void(std::size_t)>* work_ = nullptr;
+
   std::mutex mutex_;  // over what follows
   std::condition_variable begun_, done_;
   std::uint64_t round_ = 0;
   std::size_t busy_ = 0;
   bool stop_ = false;
-  std::size_t count_ = 0;
-  const std::function<void(std::size_t)>* work_ = nullptr;
-  std::vector<Share> shares_;  // of the others; the caller has share 0
+  std::exception_ptr error_;
+  std::size_t error_at_ = 0;
 };
 
 }  // namespace sls::sim

@@ -6,6 +6,7 @@
 #include <numeric>
 #include <stdexcept>
 #include <string>
+#include <thread>
 
 namespace sls::sim {
 namespace {
@@ -32,7 +33,7 @@ TEST(WorkerPoolTest, WhatOneCallWritesTheNextOneReads) {
   EXPECT_EQ(values, expected);
 }
 
-TEST(WorkerPoolTest, TheFirstErrorIsThrownAfterAllHaveEnded) {
+TEST(WorkerPoolTest, TheErrorOfTheLowestItemIsThrownAfterAllHaveEnded) {
   WorkerPool pool(3);
   std::atomic<int> calls{0};
   const auto fail_from_four_on = [&](std::size_t i) {
@@ -45,9 +46,20 @@ TEST(WorkerPoolTest, TheFirstErrorIsThrownAfterAllHaveEnded) {
   } catch (const std::runtime_error& error) {
     EXPECT_STREQ(error.what(), "4");
   }
-  EXPECT_EQ(calls, 3 + 2 + 1) << "each share ends with its first error";
-  pool.for_each(3, [&](std::size_t) { ++calls; });  // and the pool works on
   EXPECT_EQ(calls, 9);
+  pool.for_each(3, [&](std::size_t) { ++calls; });  // and the pool works on
+  EXPECT_EQ(calls, 12);
+}
+
+TEST(WorkerPoolTest, AThreadThatHasDoneItsShareHelpsTheOthers) {
+  WorkerPool pool(2);
+  std::atomic<int> others{0};
+  // The first item waits for all others, those of its own share included.
+  pool.for_each(8, [&](std::size_t i) {
+    if (i > 0) ++others;
+    while (i == 0 && others < 7) std::this_thread::yield();
+  });
+  EXPECT_EQ(others, 7);
 }
 
 }  // namespace
