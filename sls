@@ -61,7 +61,7 @@ usage: ./sls COMMAND [OPTIONS]
                      an idle machine
       --quick          one short round of everything: whether it works
       --json FILE      the figures of every round
-      --only NAME…     lockstep, breakdown, round-trip, realtime, plant, recorder, fleet or qos alone
+      --only NAME…     lockstep, load, round-trip, realtime, plant, recorder, fleet or qos alone
       --out DIR        plots
   test               set up, build, run every test
       --slow           the ones that take minutes, too; they need an idle machine
