@@ -339,7 +339,7 @@ cmd_delay-margin() {
 
 cmd_bench() {
   [[ " $* " == *" --help "* || -n ${SLS_BUILD:-} ]] || setup "${bench_packages[@]}"
-  [[ " $* " == *" --help "* ]] || build_programs "${flying[@]}" sim_ctl sls_bench_probe sls_microbench
+  [[ " $* " == *" --help "* ]] || build_programs "${flying[@]}" sim_ctl sls_bench_probe sls_bench_spinning_probe sls_microbench
   PYTHONPATH="$root" exec /usr/bin/python3 -BP -m bench --build "$build" "$@"
 }
 

@@ -21,7 +21,7 @@ WAITING = {True: "spinning", False: "blocking"}  # a thread that waits may spin 
 FUTEX_BOUND = ("1 / (plant step + control law + hand-over of two processes by futex, the fastest of "
                "spinning and blocking, on one processor and on two)")
 FAST_DDS_BOUND = ("1 / (plant step + control law + raw Fast DDS round trip of the same samples with "
-                  "the same QoS profiles, which blocks, on one processor or two, the faster)")
+                  "the same QoS profiles, the fastest likewise)")
 IN_PROCESS_BOUND = "1 / (plant step + control law)"
 
 
@@ -67,6 +67,13 @@ def fly_lockstep(programs: Programs, loop: Loop, seconds: float) -> Flight:
 # --- bounds ---------------------------------------------------------------------------------------
 
 
+Times = dict[tuple[bool, str], float]  # µs, by whether waiting threads may spin, and where
+
+
+def find_fastest(times: Times, may_spin: bool) -> float:
+    return min(time for (spins, _), time in times.items() if may_spin or not spins)
+
+
 def find_pairs() -> dict[str, tuple[int, int]]:
     """Where two processes may run."""
     first, *others = sorted(os.sched_getaffinity(0))
@@ -90,7 +97,7 @@ class StepCosts:
         self.round_trips = 2000 if is_quick else 20000
         self.scenario = programs.scenario("figure_eight", lasting(2 if is_quick else 16))
         self.work: dict[str, float] = {}
-        self.futex: dict[tuple[bool, str], float] = {}  # whether it may spin, and where
+        self.futex: Times = {}
 
     def measure_work(self, *flags: str | Path) -> None:
         """Plant and law."""
@@ -104,7 +111,7 @@ class StepCosts:
             for place, (ours, theirs) in find_pairs().items():
                 self.futex[may_spin, place] = self.programs.probe(
                     "hand-over", "--rounds", str(self.round_trips), "--work-us", str(self.in_process),
-                    "--processors", str(ours), str(theirs), *(["--spin"] if may_spin else []))["mean_us"]
+                    "--processors", str(ours), str(theirs), *["--spin"] * may_spin)["mean_us"]
 
     @property
     def in_process(self) -> float:
@@ -112,23 +119,26 @@ class StepCosts:
         return self.work["plant_us"] + self.work["law_us"]
 
     def hand_over(self, may_spin: bool) -> float:
-        """Of a round, in the faster place, without the work."""
-        return min(time for (spins, _), time in self.futex.items()
-                   if may_spin or not spins) - self.in_process
+        """Of a round, without the work."""
+        return find_fastest(self.futex, may_spin) - self.in_process
 
-    def ping(self, qos: str, *flags: str) -> dict[str, float]:
-        """A round trip of bare Fast DDS, by place."""
-        programs = self.programs
-        return {place: programs.probe(
-            "ping", "--qos", programs.qos(qos), "--domain", str(programs.domain), "--round-trips",
-            str(self.round_trips), "--processors", *map(str, pair), *flags)["mean_us"]
-            for place, pair in find_pairs().items()}
+    def ping(self, qos: str, *flags: str) -> Times:
+        """Round trips of bare Fast DDS. On one processor nothing is gained by spinning."""
+        programs, times = self.programs, Times()
+        for may_spin, (place, pair) in itertools.product(WAITING, find_pairs().items()):
+            if may_spin and len(set(pair)) == 1:
+                continue
+            times[may_spin, place] = programs.probe(
+                "ping", "--qos", programs.qos(qos), "--domain", str(programs.domain), "--round-trips",
+                str(self.round_trips), "--processors", *map(str, pair), *flags,
+                may_spin=may_spin)["mean_us"]
+        return times
 
 
 # --- lockstep -------------------------------------------------------------------------------------
 
 
-def add_bounds(figures: Rounds, costs: StepCosts, pings: dict[str, dict[str, float]]) -> None:
+def add_bounds(figures: Rounds, costs: StepCosts, pings: dict[str, Times]) -> None:
     work, bound = costs.work, 1e6 / costs.in_process
     parts = {"plant": work["plant_us"], "law": work["law_us"], "record entries": work["entries_us"]}
     figures.add("one process, without files", "steps/s", 1e6 / sum(parts.values()), IN_PROCESS_BOUND,
@@ -140,24 +150,25 @@ def add_bounds(figures: Rounds, costs: StepCosts, pings: dict[str, dict[str, flo
         name = f"two processes by futex, {WAITING[may_spin]}, {place}"
         figures.add(name, "µs", time_us, better=LESS)
         figures.add(name, "steps/s", 1e6 / time_us)
-    for qos, places in pings.items():
-        for place, time_us in places.items():
-            figures.add(f"raw Fast DDS round trip, {TRANSPORTS[qos]}, {place}", "µs", time_us,
-                        better=LESS)
+    for qos, times in pings.items():
+        for (may_spin, place), time_us in times.items():
+            figures.add(f"raw Fast DDS round trip, {TRANSPORTS[qos]}, {WAITING[may_spin]}, {place}",
+                        "µs", time_us, better=LESS)
 
 
-def add_speeds(figures: Rounds, costs: StepCosts, pings: dict[str, dict[str, float]],
+def add_speeds(figures: Rounds, costs: StepCosts, pings: dict[str, Times],
                flights: dict[Loop, Flight]) -> None:
     for loop, flight in flights.items():
-        speed, raw = flight.steps_per_s, min(pings[loop.qos].values())
+        speed = flight.steps_per_s
         unrecorded = flights[replace(loop, is_recorded=False)].steps_per_s
-        parts = calc_parts(1e6 / unrecorded, costs.work, costs.hand_over(loop.may_spin), raw)
+        parts = calc_parts(1e6 / unrecorded, costs.work, costs.hand_over(loop.may_spin),
+                           find_fastest(pings[loop.qos], loop.may_spin))
         if loop.is_recorded:
             parts["recorder"] = 1e6 / speed - 1e6 / unrecorded
         figures.add(loop.name, "steps/s", speed, FUTEX_BOUND,
                     1e6 / (costs.in_process + costs.hand_over(may_spin=True)), parts)
         figures.add(f"{loop.name}, beside Fast DDS", "steps/s", speed, FAST_DDS_BOUND,
-                    1e6 / (costs.in_process + raw))
+                    1e6 / (costs.in_process + find_fastest(pings[loop.qos], may_spin=True)))
         if loop.is_recorded:
             figures.add(f"{loop.name}, beside the same without", "steps/s", speed,
                         "the same without recorder", unrecorded, goal=0.85, is_goal_of_ratio=True)
@@ -248,8 +259,7 @@ def measure_round_trips(programs: Programs, rounds: int, is_quick: bool) -> list
     costs = StepCosts(programs, is_quick)
     pauses = 1 if is_quick else 8
     figures = Rounds("round-trip")
-    bound_name = ("raw Fast DDS round trip, which blocks, and plant step and control law for a whole "
-                  "step")
+    bound_name = "raw Fast DDS round trip, and plant step and control law for a whole step"
     for _ in range(rounds):
         scenario = programs.scenario("figure_eight", lasting(24 if is_quick else 160))
         batches: list[dict[int, int]] = []
@@ -277,7 +287,7 @@ def measure_round_trips(programs: Programs, rounds: int, is_quick: bool) -> list
         if not times:
             raise MeasurementError("round-trip: no steps between two pauses")
         raw = programs.probe("ping", "--domain", str(programs.domain), "--round-trips",
-                             str(costs.round_trips))
+                             str(costs.round_trips), may_spin=True)
         costs.measure_work()
         for name, share in PERCENTILES.items():
             figures.add(f"state to next state, {name}", "µs", percentile(times, share), bound_name,
@@ -373,7 +383,7 @@ def measure_qos(programs: Programs, rounds: int, is_quick: bool) -> list[Figure]
         costs.measure()
         speeds = {}
         for qos in PROFILES:
-            raw = min(costs.ping(qos).values())
+            raw = find_fastest(costs.ping(qos), may_spin=True)
             speeds[qos] = fly_lockstep(programs, Loop(qos), 2 if is_quick else 16).steps_per_s
             figures.add(qos, "steps/s", speeds[qos], FAST_DDS_BOUND, 1e6 / (costs.in_process + raw),
                         calc_parts(1e6 / speeds[qos], costs.work, costs.hand_over(True), raw))

@@ -24,6 +24,7 @@
 #include "closed_loop/recorded_flight.hpp"
 #include "common/app/run_main.hpp"
 #include "common/bus/qos_file.hpp"
+#include "common/bus/spinning.hpp"
 #include "common/config/scenario.hpp"
 
 namespace {
@@ -40,6 +41,7 @@ class AnsweringProcess {
                                       "--qos",           options.qos_file.string(),
                                       "--domain",        std::to_string(options.domain),
                                       "--vehicles",      std::to_string(options.vehicles)};
+    if (options.may_spin) words.push_back("--spin");
     std::vector<char*> command;
     for (std::string& word : words) command.push_back(word.data());
     command.push_back(nullptr);
@@ -140,8 +142,11 @@ int main(int argc, char** argv) {
 
   CLI::App* ping = add("ping", "round trips of the loop's samples with a process that answers");
   CLI::App* pong = add("pong", "that process");
-  add_vehicles(ping);
-  add_vehicles(pong);
+  for (CLI::App* command : {ping, pong}) {
+    add_vehicles(command);
+    command->add_flag("--spin", ping_pong.may_spin,
+                      "as server and client do in lockstep; of sls_bench_spinning_probe");
+  }
   CLI::App* turns = add("hand-over", "turns of two processes by futex, with work in one of them");
   turns->add_option("--rounds", hand_over.rounds, "measured")->check(CLI::Range(1, 100'000'000));
   turns->add_option("--work-us", hand_over.work_us, "work in each round")
@@ -175,6 +180,7 @@ int main(int argc, char** argv) {
     ping_pong.domain = stamps.domain = feeder.domain = options.domain;
     ping_pong.vehicles = feeder.vehicles = vehicles;
     feeder.steps = steps;
+    bus::is_spinning = ping_pong.may_spin;
     const auto load = [&] {
       config::Scenario scenario = config::load_scenario(scenario_file);
       if (period_s) config::override_period(scenario, *period_s);

@@ -113,9 +113,10 @@ class Programs:
                                    f"{done.stderr.strip() or done.stdout.strip()}")
         return done.stdout
 
-    def probe(self, subcommand: str, *words: str | Path) -> Any:
-        """The JSON that bench's own program prints."""
-        return json.loads(self.run(self.probe_program, subcommand, *words))
+    def probe(self, subcommand: str, *words: str | Path, may_spin: bool = False) -> Any:
+        """The JSON that bench's own program prints; `may_spin` where Fast DDS waits in it."""
+        program = self.build / "bin/sls_bench_spinning_probe" if may_spin else self.probe_program
+        return json.loads(self.run(program, subcommand, *["--spin"] * may_spin, *words))
 
     @contextlib.contextmanager
     def busy_loops(self, count: int) -> Iterator[list[subprocess.Popen[bytes]]]:

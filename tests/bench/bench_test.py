@@ -79,7 +79,8 @@ class BoundTest(unittest.TestCase):
 
     def test_each_loop_stands_beside_its_bounds_with_what_is_between(self):
         figures = Rounds("lockstep")
-        pings = {"default": {"one": 30.0, "two": 25.0}, "udp": {"one": 40.0, "two": 80.0}}
+        pings = {"default": {(True, "two"): 10.0, (False, "one"): 25.0, (False, "two"): 30.0},
+                 "udp": {(True, "two"): 16.0, (False, "one"): 40.0, (False, "two"): 80.0}}
         loop.add_speeds(figures, self.costs, pings, self.flights([10000, 12500, 8000, 10000] * 2))
         made = {(figure.name, figure.bound_name): figure for figure in figures.make_figures()}
         name = "shared memory, with recorder, blocking"
@@ -87,12 +88,13 @@ class BoundTest(unittest.TestCase):
         self.assertAlmostEqual(figure.bounds[0], 1e6 / 15)
         self.assertEqual({part: values[0] for part, values in figure.parts.items()}, {
             "plant": 14.0, "law": 0.5, "futex": 5.5, "Fast DDS": 19.5, "rest": 60.5, "recorder": 25.0})
-        self.assertAlmostEqual(made[f"{name}, beside Fast DDS", loop.FAST_DDS_BOUND].bounds[0], 1e6 / 39.5)
+        self.assertAlmostEqual(made[f"{name}, beside Fast DDS", loop.FAST_DDS_BOUND].bounds[0],
+                               1e6 / 24.5)
         self.assertAlmostEqual(made[f"{name}, beside the same without", "the same without recorder"]
                                .ratios[0], 0.8)
         spinning = made["UDP, without recorder, spinning", loop.FUTEX_BOUND]
         self.assertEqual({part: values[0] for part, values in spinning.parts.items()}, {
-            "plant": 14.0, "law": 0.5, "futex": 0.5, "Fast DDS": 39.5, "rest": 25.5})
+            "plant": 14.0, "law": 0.5, "futex": 0.5, "Fast DDS": 15.5, "rest": 49.5})
 
     def test_processor_time_is_for_a_step_and_stands_beside_that_without_spinning(self):
         figures = Rounds("lockstep")
@@ -141,7 +143,8 @@ class FigureTest(unittest.TestCase):
                 Figure("part", "speed", "steps/s", [10000.0, 8000.0], parts=wrong)
 
     def test_below_the_table_each_step_stands_with_its_parts(self):
-        figures = [Figure("one", "first", "steps/s", [10000.0], parts={"plant": [60.0], "rest": [40.0]}),
+        figures = [Figure("one", "first", "steps/s", [10000.0],
+                          parts={"plant": [60.0], "rest": [40.0]}),
                    Figure("one", "second", "µs", [50.0], parts={"rest": [50.0]}),
                    Figure("one", "third", "µs", [50.0])]
         lines = format_table(figures).split("\n")
