@@ -61,7 +61,7 @@ usage: ./sls COMMAND [OPTIONS]
                      an idle machine
       --quick          one short round of everything: whether it works
       --json FILE      the figures of every round
-      --only NAME…     lockstep, breakdown, round-trip, realtime, plant, recorder, fleet or qos alone
+      --only NAME…     lockstep, load, round-trip, realtime, plant, recorder, fleet or qos alone
       --out DIR        plots
   test               set up, build, run every test
       --slow           the ones that take minutes, too; they need an idle machine
@@ -339,7 +339,7 @@ cmd_delay-margin() {
 
 cmd_bench() {
   [[ " $* " == *" --help "* || -n ${SLS_BUILD:-} ]] || setup "${bench_packages[@]}"
-  [[ " $* " == *" --help "* ]] || build_programs "${flying[@]}" sim_ctl sls_bench_probe sls_microbench
+  [[ " $* " == *" --help "* ]] || build_programs "${flying[@]}" sim_ctl sls_bench_probe sls_bench_spinning_probe sls_microbench
   PYTHONPATH="$root" exec /usr/bin/python3 -BP -m bench --build "$build" "$@"
 }
 

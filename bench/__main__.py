@@ -18,7 +18,7 @@ from bench.results import Figure, format_table
 Measure = Callable[[Programs, int, bool], list[Figure]]
 PARTS: dict[str, tuple[Measure, int]] = {  # and its rounds
     "lockstep": (loop.measure_lockstep, 3),
-    "breakdown": (loop.measure_breakdown, 3),
+    "load": (loop.measure_load, 3),
     "round-trip": (loop.measure_round_trips, 3),
     "realtime": (loop.measure_realtime, 3),
     "plant": (parts.measure_plant, 5),

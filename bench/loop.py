@@ -1,20 +1,28 @@
-"""The closed loop: lockstep speed, where its time goes, its round trips, real time, QoS profiles."""
+"""The closed loop: its bounds and its speed in lockstep, where its time goes, its speed beside other
+work, its round trips, real time, QoS profiles."""
 
 import csv
-import statistics
+import itertools
+import os
 import time
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from bench.programs import Flight, MeasurementError, Placement, Programs, find_placements
-from bench.results import LESS, Figure
+from bench.programs import Flight, MeasurementError, Programs
+from bench.results import LESS, Figure, Rounds
 
 PERIOD_S = "0.001"
 TRANSPORTS = {"default": "shared memory", "udp": "UDP"}
-UNRECORDED_BOUND = "the same without recorder"
 PROFILES = ("default", "udp", "lan", "wifi", "secure")
-BOUND = ("1 / (raw Fast DDS round trip of the same samples with the same QoS profiles + plant step "
-         "+ control law)")
+LOADS = (0, 1, 2, 4)  # busy loops
+QUICK_LOADS = (0, 1)
+WAITING = {True: "spinning", False: "blocking"}  # a thread that waits may spin before it blocks
+FUTEX_BOUND = ("1 / (plant step + control law + hand-over of two processes by futex, the fastest of "
+               "spinning and blocking, on one processor and on two)")
+FAST_DDS_BOUND = ("1 / (plant step + control law + raw Fast DDS round trip of the same samples with "
+                  "the same QoS profiles, the fastest likewise)")
+IN_PROCESS_BOUND = "1 / (plant step + control law)"
 
 
 def without_recorder(text: str) -> str:
@@ -26,109 +34,196 @@ def lasting(seconds: float) -> Callable[[str], str]:
     return lambda text: text.replace("for_s: 32", f"for_s: {seconds:g}")
 
 
-def fly_lockstep(programs: Programs, qos: str, seconds: float, is_recorded: bool,
-                 placement: Placement = Placement()) -> Flight:
+@dataclass(frozen=True)
+class Loop:
+    """A way to fly the closed loop."""
+
+    qos: str = "default"
+    is_recorded: bool = True
+    may_spin: bool = True
+
+    @property
+    def name(self) -> str:
+        return (f"{TRANSPORTS[self.qos]}, {'with' if self.is_recorded else 'without'} recorder, "
+                f"{WAITING[self.may_spin]}")
+
+
+LOOPS = tuple(Loop(*how) for how in itertools.product(TRANSPORTS, (False, True), (False, True)))
+
+
+def fly_lockstep(programs: Programs, loop: Loop, seconds: float) -> Flight:
     def change(text: str) -> str:
         text = lasting(seconds)(text)
-        return text if is_recorded else without_recorder(text)
+        return text if loop.is_recorded else without_recorder(text)
 
-    scenario = programs.scenario("figure_eight", change)
-    flight = programs.fly(scenario, qos=qos, is_recorded=is_recorded,
-                          server=("--period-s", PERIOD_S), placement=placement)
-    if is_recorded and not flight.manifest["complete"]:
-        raise MeasurementError(f"{qos}: the recording is not complete")
+    flight = programs.fly(programs.scenario("figure_eight", change), qos=loop.qos,
+                          is_recorded=loop.is_recorded, server=("--period-s", PERIOD_S),
+                          may_spin=loop.may_spin)
+    if loop.is_recorded and not flight.manifest["complete"]:
+        raise MeasurementError(f"{loop.qos}: the recording is not complete")
     return flight
 
 
+# --- bounds ---------------------------------------------------------------------------------------
+
+
+Times = dict[tuple[bool, str], float]  # µs, by whether waiting threads may spin, and where
+
+
+def find_fastest(times: Times, may_spin: bool) -> float:
+    return min(time for (spins, _), time in times.items() if may_spin or not spins)
+
+
+def find_pairs() -> dict[str, tuple[int, int]]:
+    """Where two processes may run."""
+    first, *others = sorted(os.sched_getaffinity(0))
+    pairs = {"on one processor": (first, first)}
+    return {**pairs, "on two processors": (first, others[0])} if others else pairs
+
+
+def calc_parts(step: float, work: dict[str, float], hand_over: float, raw: float) -> dict[str, float]:
+    """Of a step of two processes, µs. A raw round trip of Fast DDS is two hand-overs, too: what it
+    takes longer is Fast DDS."""
+    parts = {"plant": work["plant_us"], "law": work["law_us"], "futex": hand_over,
+             "Fast DDS": raw - hand_over}
+    return {**parts, "rest": step - sum(parts.values())}
+
+
 class StepCosts:
-    """What a step costs at least, measured in each round: in µs."""
+    """What a step costs at least, in µs: measured in each round."""
 
     def __init__(self, programs: Programs, is_quick: bool):
         self.programs = programs
         self.round_trips = 2000 if is_quick else 20000
-        self.flight = programs.scenario("figure_eight", lasting(2 if is_quick else 16))
+        self.scenario = programs.scenario("figure_eight", lasting(2 if is_quick else 16))
+        self.work: dict[str, float] = {}
+        self.futex: Times = {}
 
-    def ping(self, qos: str, *flags: str, placement: Placement = Placement()) -> float:
-        """A round trip."""
-        programs = self.programs
-        return programs.probe("ping", "--qos", programs.qos(qos), "--domain", str(programs.domain),
-                              "--round-trips", str(self.round_trips), *flags,
-                              processors=placement.loop)["mean_us"]
+    def measure_work(self, *flags: str | Path) -> None:
+        """Plant and law."""
+        self.work = self.programs.probe("fly", "--scenario", self.scenario, "--period-s", PERIOD_S,
+                                        *flags)
 
-    def plant_and_law(self, placement: Placement = Placement()) -> float:
-        return self.programs.probe("fly", "--scenario", self.flight, "--period-s", PERIOD_S,
-                                   processors=placement.loop)["mean_us"]
+    def measure(self, *flags: str | Path) -> None:
+        """And two processes that hand over by futex, with as much work."""
+        self.measure_work(*flags)
+        for may_spin in WAITING:
+            for place, (ours, theirs) in find_pairs().items():
+                self.futex[may_spin, place] = self.programs.probe(
+                    "hand-over", "--rounds", str(self.round_trips), "--work-us", str(self.in_process),
+                    "--processors", str(ours), str(theirs), *["--spin"] * may_spin)["mean_us"]
+
+    @property
+    def in_process(self) -> float:
+        """Plant step and control law."""
+        return self.work["plant_us"] + self.work["law_us"]
+
+    def hand_over(self, may_spin: bool) -> float:
+        """Of a round, without the work."""
+        return find_fastest(self.futex, may_spin) - self.in_process
+
+    def ping(self, qos: str, *flags: str) -> Times:
+        """Round trips of bare Fast DDS. On one processor nothing is gained by spinning."""
+        programs, times = self.programs, Times()
+        for may_spin, (place, pair) in itertools.product(WAITING, find_pairs().items()):
+            if may_spin and len(set(pair)) == 1:
+                continue
+            times[may_spin, place] = programs.probe(
+                "ping", "--qos", programs.qos(qos), "--domain", str(programs.domain), "--round-trips",
+                str(self.round_trips), "--processors", *map(str, pair), *flags,
+                may_spin=may_spin)["mean_us"]
+        return times
+
+
+# --- lockstep -------------------------------------------------------------------------------------
+
+
+def add_bounds(figures: Rounds, costs: StepCosts, pings: dict[str, Times]) -> None:
+    work, bound = costs.work, 1e6 / costs.in_process
+    parts = {"plant": work["plant_us"], "law": work["law_us"], "record entries": work["entries_us"]}
+    figures.add("one process, without files", "steps/s", 1e6 / sum(parts.values()), IN_PROCESS_BOUND,
+                bound, parts)
+    parts["files"] = work["recorded_us"] - sum(parts.values())
+    figures.add("one process, with files", "steps/s", 1e6 / work["recorded_us"], IN_PROCESS_BOUND,
+                bound, parts)
+    for (may_spin, place), time_us in costs.futex.items():
+        name = f"two processes by futex, {WAITING[may_spin]}, {place}"
+        figures.add(name, "µs", time_us, better=LESS)
+        figures.add(name, "steps/s", 1e6 / time_us)
+    for qos, times in pings.items():
+        for (may_spin, place), time_us in times.items():
+            figures.add(f"raw Fast DDS round trip, {TRANSPORTS[qos]}, {WAITING[may_spin]}, {place}",
+                        "µs", time_us, better=LESS)
+
+
+def add_speeds(figures: Rounds, costs: StepCosts, pings: dict[str, Times],
+               flights: dict[Loop, Flight]) -> None:
+    for loop, flight in flights.items():
+        speed = flight.steps_per_s
+        unrecorded = flights[replace(loop, is_recorded=False)].steps_per_s
+        parts = calc_parts(1e6 / unrecorded, costs.work, costs.hand_over(loop.may_spin),
+                           find_fastest(pings[loop.qos], loop.may_spin))
+        if loop.is_recorded:
+            parts["recorder"] = 1e6 / speed - 1e6 / unrecorded
+        figures.add(loop.name, "steps/s", speed, FUTEX_BOUND,
+                    1e6 / (costs.in_process + costs.hand_over(may_spin=True)), parts)
+        figures.add(f"{loop.name}, beside Fast DDS", "steps/s", speed, FAST_DDS_BOUND,
+                    1e6 / (costs.in_process + find_fastest(pings[loop.qos], may_spin=True)))
+        if loop.is_recorded:
+            figures.add(f"{loop.name}, beside the same without", "steps/s", speed,
+                        "the same without recorder", unrecorded, goal=0.85, is_goal_of_ratio=True)
+
+
+def add_processor_times(figures: Rounds, flights: dict[Loop, Flight]) -> None:
+    for loop, flight in flights.items():
+        title, time_us = f"{loop.name}: processor time", flight.processor_us
+        for program, value in time_us.items():
+            figures.add(f"{title}, {program}", "µs/step", value, better=LESS)
+        if not loop.may_spin:
+            figures.add(f"{title}, all", "µs/step", sum(time_us.values()), better=LESS)
+            continue
+        blocking = flights[replace(loop, may_spin=False)].processor_us
+        figures.add(f"{title}, all", "µs/step", sum(time_us.values()), "the same, blocking",
+                    sum(blocking.values()), better=LESS, goal=1 / 1.3, is_goal_of_ratio=True)
 
 
 def measure_lockstep(programs: Programs, rounds: int, is_quick: bool) -> list[Figure]:
     costs = StepCosts(programs, is_quick)
-    seconds = 2 if is_quick else 32
-    bounds: dict[tuple[Placement, str], list[float]] = {}
-    speeds: dict[tuple[Placement, str, bool], list[float]] = {}
-    placements = find_placements()
+    parts = [Rounds("lockstep") for _ in range(3)]
     for _ in range(rounds):
-        for placement in placements:
-            for qos in TRANSPORTS:
-                bounds.setdefault((placement, qos), []).append(
-                    1e6 / (costs.ping(qos, placement=placement) + costs.plant_and_law(placement)))
-                for is_recorded in (True, False):
-                    flight = fly_lockstep(programs, qos, seconds, is_recorded, placement)
-                    speeds.setdefault((placement, qos, is_recorded), []).append(flight.steps_per_s)
-    figures = []
-    for (placement, qos, is_recorded), values in speeds.items():
-        name = f"{TRANSPORTS[qos]}, {'with' if is_recorded else 'without'} recorder, {placement.name}"
-        figures.append(Figure("lockstep", name, "steps/s", values, BOUND, bounds[placement, qos],
-                              goal=0.85 if is_recorded else None, is_goal_of_ratio=True))
-    for placement, qos in bounds:
-        name = f"{TRANSPORTS[qos]}, with recorder, {placement.name}, beside the same without"
-        figures.append(Figure("lockstep", name, "steps/s", speeds[placement, qos, True],
-                              UNRECORDED_BOUND, speeds[placement, qos, False],
-                              goal=0.9, is_goal_of_ratio=True))
-    figures.append(Figure("lockstep", f"shared memory, with recorder, {placements[0].name}, by itself",
-                          "steps/s", speeds[placements[0], "default", True], goal=12000))
-    return figures
+        costs.measure("--folder", programs.make_path(""))
+        pings = {qos: costs.ping(qos) for qos in TRANSPORTS}
+        flights = {loop: fly_lockstep(programs, loop, 2 if is_quick else 32) for loop in LOOPS}
+        add_bounds(parts[0], costs, pings)
+        add_speeds(parts[1], costs, pings, flights)
+        add_processor_times(parts[2], flights)
+    return [figure for part in parts for figure in part.make_figures()]
 
 
-# --- where the time goes --------------------------------------------------------------------------
-
-
-def calc_parts(bare: float, through_bus: float, plant_and_law: float, unrecorded: float,
-               recorded: float) -> dict[str, float]:
-    """Of one step, `recorded`; the first two are round trips."""
-    return {
-        "raw round trip of state and command": bare,
-        "common/bus around Fast DDS": through_bus - bare,
-        "plant step and control law": plant_and_law,
-        "rest: our own code": unrecorded - through_bus - plant_and_law,
-        "the recorder and its batches": recorded - unrecorded,
-        "sum: one step with recorder": recorded,
-    }
-
-
-def measure_breakdown(programs: Programs, rounds: int, is_quick: bool) -> list[Figure]:
-    """The parts of one step with a recorder. They add up: each is what a round trip or a step takes
-    longer with it than without."""
-    costs = StepCosts(programs, is_quick)
-    seconds = 2 if is_quick else 32
-    parts: dict[str, list[float]] = {}
+def measure_load(programs: Programs, rounds: int, is_quick: bool) -> list[Figure]:
+    """Over shared memory, beside processes that only count."""
+    figures, comparison = Rounds("load"), Rounds("load")
+    loops = [loop for loop in LOOPS if loop.qos == "default"]
     for _ in range(rounds):
-        for placement in find_placements():
-            for qos, transport in TRANSPORTS.items():
-                bare = costs.ping(qos, placement=placement)
-                through_bus = costs.ping(qos, "--bus", placement=placement)
-                plant_and_law = costs.plant_and_law(placement)
-                unrecorded, recorded = (
-                    1e6 / fly_lockstep(programs, qos, seconds, is_recorded, placement).steps_per_s
-                    for is_recorded in (False, True))
-                for name, value in calc_parts(bare, through_bus, plant_and_law, unrecorded,
-                                              recorded).items():
-                    parts.setdefault(f"{transport}, {placement.name}: {name}", []).append(value)
-    return [Figure("breakdown", name, "µs", values, better=LESS) for name, values in parts.items()]
+        speeds: dict[tuple[int, Loop], float] = {}
+        for count, loop in itertools.product(QUICK_LOADS if is_quick else LOADS, loops):
+            with programs.busy_loops(count):
+                flight = fly_lockstep(programs, loop, 1 if is_quick else 16)
+            speeds[count, loop] = flight.steps_per_s
+        for (count, loop), speed in speeds.items():
+            name = f"{loop.name}, {count} busy loop{'s' if count != 1 else ''}"
+            figures.add(name, "steps/s", speed, "the same without busy loops",
+                        speeds[0, loop] if count else None)
+            if loop.may_spin:
+                comparison.add(f"{name}, beside blocking", "steps/s", speed, "the same, blocking",
+                               speeds[count, replace(loop, may_spin=False)])
+    return figures.make_figures() + comparison.make_figures()
 
 
 # --- distributions --------------------------------------------------------------------------------
 
 PERCENTILES = {"p50": 0.5, "p99": 0.99, "p99.9": 0.999, "max": 1.0}
+RAW_KEYS = {"p50": "p50_us", "p99": "p99_us", "p99.9": "p999_us", "max": "max_us"}  # of the probe
 
 
 def percentile(values: list[float], share: float) -> float:
@@ -163,9 +258,8 @@ def measure_round_trips(programs: Programs, rounds: int, is_quick: bool) -> list
     """By the history that the writer keeps, asked for while the run is paused."""
     costs = StepCosts(programs, is_quick)
     pauses = 1 if is_quick else 8
-    figures: dict[str, list[float]] = {}
-    bounds: dict[str, list[float]] = {}
-    counts = []
+    figures = Rounds("round-trip")
+    bound_name = "raw Fast DDS round trip, and plant step and control law for a whole step"
     for _ in range(rounds):
         scenario = programs.scenario("figure_eight", lasting(24 if is_quick else 160))
         batches: list[dict[int, int]] = []
@@ -190,27 +284,22 @@ def measure_round_trips(programs: Programs, rounds: int, is_quick: bool) -> list
         flight = programs.fly(scenario, qos=with_history(programs), during=look,
                               server=("--period-s", PERIOD_S))
         times = calc_step_times(batches)
-        counts.append(len(times))
+        if not times:
+            raise MeasurementError("round-trip: no steps between two pauses")
         raw = programs.probe("ping", "--domain", str(programs.domain), "--round-trips",
-                             str(costs.round_trips))
-        work = costs.plant_and_law()
+                             str(costs.round_trips), may_spin=True)
+        costs.measure_work()
         for name, share in PERCENTILES.items():
-            figures.setdefault(f"state to next state, {name}", []).append(percentile(times, share))
-            key = {"p50": "p50_us", "p99": "p99_us", "p99.9": "p999_us", "max": "max_us"}[name]
-            bounds.setdefault(f"state to next state, {name}", []).append(raw[key] + work)
+            figures.add(f"state to next state, {name}", "µs", percentile(times, share), bound_name,
+                        raw[RAW_KEYS[name]] + costs.in_process, better=LESS)
         assert flight.recording
         with (flight.recording / "status.csv").open() as file:
             last = list(csv.DictReader(file))[-1]
         for name in ("p50", "p99"):
-            figures.setdefault(f"round trip as the server sees it, {name}", []).append(
-                float(last[f"round_trip_{name}_us"]))
-            bounds.setdefault(f"round trip as the server sees it, {name}", []).append(
-                raw[f"{name}_us"])
-    if min(counts) == 0:
-        raise MeasurementError("round-trip: no steps between two pauses")
-    name = "raw Fast DDS round trip, and plant step and control law for a whole step"
-    return [Figure("round-trip", title, "µs", values, name, bounds[title], LESS)
-            for title, values in figures.items()]
+            figures.add(f"round trip as the server sees it, {name}", "µs",
+                        float(last[f"round_trip_{name}_us"]), bound_name, raw[f"{name}_us"],
+                        better=LESS)
+    return figures.make_figures()
 
 
 def with_history(programs: Programs) -> Path:
@@ -247,8 +336,9 @@ def calc_lateness(states: dict[int, int], period_ns: int) -> list[float]:
 
 
 def measure_realtime(programs: Programs, rounds: int, is_quick: bool) -> list[Figure]:
-    figures: dict[str, list[float]] = {}
-    bounds: dict[str, list[float]] = {}
+    figures = Rounds("realtime")
+    bound_name = ("a thread that does nothing but sleep until the same times; both count from their "
+                  "earliest")
     seconds = 2 if is_quick else 10
     for _ in range(rounds):
         for period_s, title in ((0.001, "1 kHz"), (0.004, "250 Hz")):
@@ -264,17 +354,12 @@ def measure_realtime(programs: Programs, rounds: int, is_quick: bool) -> list[Fi
                 "--mode", "realtime", "--rtf", "1", "--period-s", str(period_s)))
             late = calc_lateness(parse_stamps(stamps[0]), round(period_s * 1e9))
             for name, share in PERCENTILES.items():
-                key = {"p50": "p50_us", "p99": "p99_us", "p99.9": "p999_us", "max": "max_us"}[name]
-                figures.setdefault(f"{title}: states late, {name}", []).append(
-                    max(percentile(late, share), 0.001))
-                bounds.setdefault(f"{title}: states late, {name}", []).append(
-                    max(timer[key] - timer["min_us"], 0.001))
-            figures.setdefault(f"{title}: steps without an answer in time", []).append(
-                count_late(flight.label))
-    name = "a thread that does nothing but sleep until the same times; both count from their earliest"
-    return [Figure("realtime", title, "steps" if "steps" in title else "µs", values,
-                   name if title in bounds else "", bounds.get(title, []), LESS)
-            for title, values in figures.items()]
+                figures.add(f"{title}: states late, {name}", "µs", max(percentile(late, share), 0.001),
+                            bound_name, max(timer[RAW_KEYS[name]] - timer["min_us"], 0.001),
+                            better=LESS)
+            figures.add(f"{title}: steps without an answer in time", "steps",
+                        count_late(flight.label), better=LESS)
+    return figures.make_figures()
 
 
 def count_late(label: str) -> float:
@@ -293,17 +378,18 @@ def measure_qos(programs: Programs, rounds: int, is_quick: bool) -> list[Figure]
     """Each profile's closed loop beside its own bound, and a whole short flight, most of which is
     discovery and, with security, handshakes."""
     costs = StepCosts(programs, is_quick)
-    seconds = 2 if is_quick else 16
-    speeds: dict[str, list[float]] = {qos: [] for qos in PROFILES}
-    bounds: dict[str, list[float]] = {qos: [] for qos in PROFILES}
-    starts: dict[str, list[float]] = {qos: [] for qos in PROFILES}
+    figures, starts = Rounds("qos"), Rounds("qos")
     for _ in range(rounds):
+        costs.measure()
+        speeds = {}
         for qos in PROFILES:
-            bounds[qos].append(1e6 / (costs.ping(qos) + costs.plant_and_law()))
-            speeds[qos].append(fly_lockstep(programs, qos, seconds, True).steps_per_s)
-            starts[qos].append(programs.fly(programs.scenario("short"), qos=qos).wall_s)
-    udp = statistics.median(speeds["udp"])
-    figures = [Figure("qos", f"{qos}: {statistics.median(speeds[qos]) / udp:.2f} of udp", "steps/s",
-                      speeds[qos], BOUND, bounds[qos]) for qos in PROFILES]
-    return figures + [Figure("qos", f"{qos}: a whole short flight", "s", starts[qos], better=LESS)
-                      for qos in PROFILES]
+            raw = find_fastest(costs.ping(qos), may_spin=True)
+            speeds[qos] = fly_lockstep(programs, Loop(qos), 2 if is_quick else 16).steps_per_s
+            figures.add(qos, "steps/s", speeds[qos], FAST_DDS_BOUND, 1e6 / (costs.in_process + raw),
+                        calc_parts(1e6 / speeds[qos], costs.work, costs.hand_over(True), raw))
+            starts.add(f"{qos}: a whole short flight", "s",
+                       programs.fly(programs.scenario("short"), qos=qos).wall_s, better=LESS)
+        for qos, speed in speeds.items():
+            if qos != "udp":
+                starts.add(f"{qos}, beside udp", "steps/s", speed, "profile udp", speeds["udp"])
+    return figures.make_figures() + starts.make_figures()

@@ -4,9 +4,9 @@ import json
 import os
 from pathlib import Path
 
-from bench.loop import PERIOD_S, StepCosts, count_late, lasting
+from bench.loop import PERIOD_S, StepCosts, calc_parts, count_late, find_fastest, lasting
 from bench.programs import MeasurementError, Programs, end_all
-from bench.results import LESS, Figure
+from bench.results import LESS, Figure, Rounds
 
 FLEETS = (1, 2, 5, 10, 20, 50, 100, 200)
 QUICK_FLEETS = (1, 2, 10)
@@ -31,7 +31,8 @@ def measure_plant(programs: Programs, rounds: int, is_quick: bool) -> list[Figur
         if function == "plant_step":
             figures.append(Figure(
                 "plant", f"RK4 step of one vehicle, {vehicles} in turn", "ns", values,
-                "the same equations in closed form", times[f"closed_form_step/{vehicles}"], LESS))
+                "the same equations in closed form", times[f"closed_form_step/{vehicles}"], LESS,
+                goal={1: 10_000, 100: 8_000}.get(vehicles)))
         elif function != "closed_form_step":
             figures.append(Figure("plant", function.replace("_", " "), "ns", values, better=LESS))
     return figures
@@ -115,34 +116,38 @@ def choose_seconds(vehicles: int, is_quick: bool) -> float:
 def measure_fleet(programs: Programs, rounds: int, is_quick: bool) -> list[Figure]:
     fleets = QUICK_FLEETS if is_quick else FLEETS
     costs = StepCosts(programs, is_quick)
-    costs.round_trips = 200 if is_quick else 2000
     cores = len(os.sched_getaffinity(0))
-    speeds: dict[int, list[float]] = {count: [] for count in fleets}
-    bounds: dict[int, list[float]] = {count: [] for count in fleets}
+    speeds, times = Rounds("fleet"), Rounds("fleet")
     memory: dict[int, list[float]] = {count: [] for count in fleets}
+    name = ("1 / (raw Fast DDS round trip of the fleet's samples + plant step and control "
+            "law of each vehicle, spread over the cores)")
     for _ in range(rounds):
+        costs.round_trips = 2000 if is_quick else 20000
+        costs.measure()
+        costs.round_trips = 200 if is_quick else 2000
+        per_vehicle = {}
         for count in fleets:
             scenario = programs.scenario("figure_eight",
                                          of_fleet(count, choose_seconds(count, is_quick)))
-            bounds[count].append(1e6 / (costs.ping("default", "--vehicles", str(count))
-                                        + count / min(count, cores) * costs.plant_and_law()))
+            raw = find_fastest(costs.ping("default", "--vehicles", str(count)), may_spin=True)
+            work = {part: count / min(count, cores) * time for part, time in costs.work.items()}
             flight = programs.fly(scenario)
             if flight.lost or not flight.manifest["complete"]:
                 raise MeasurementError(f"{count} vehicles: the recording is not complete")
-            speeds[count].append(flight.steps_per_s)
+            step_us = 1e6 / flight.steps_per_s
+            title = f"{count} vehicle{'s' if count > 1 else ''}"
+            speeds.add(title, "steps/s", flight.steps_per_s, name,
+                       1e6 / (raw + work["plant_us"] + work["law_us"]),
+                       calc_parts(step_us, work, costs.hand_over(True), raw))
+            per_vehicle[count] = step_us / count
+            times.add(f"{title}, per step and vehicle", "µs", per_vehicle[count], better=LESS,
+                      goal=12.0 if count == 100 else None)
             memory[count].append(flight.server_memory_kb)
-    name = ("1 / (raw Fast DDS round trip of the fleet's samples + plant step and control law of each "
-            "vehicle, spread over the cores)")
-    figures = [Figure("fleet", f"{count} vehicle{'s' if count > 1 else ''}", "steps/s",
-                      speeds[count], name, bounds[count]) for count in fleets]
-    per_vehicle = {count: [1e6 / speed / count for speed in speeds[count]] for count in fleets}
-    figures += [Figure("fleet", f"{count} vehicle{'s' if count > 1 else ''}, per step and vehicle",
-                       "µs", per_vehicle[count], better=LESS) for count in fleets]
-    if 200 in fleets:
-        growth = [large / small for large, small in zip(per_vehicle[200], per_vehicle[10])]
-        figures.append(Figure("fleet", "time per step and vehicle, 200 over 10 vehicles", "1",
-                              growth, better=LESS, goal=1.0))
+        if 200 in fleets:
+            times.add("time per step and vehicle, 200 over 10 vehicles", "1",
+                      per_vehicle[200] / per_vehicle[10], better=LESS, goal=1.0)
     least, most = (2, 10) if is_quick else (10, 200)  # fleets, which have other histories than one
+    figures = speeds.make_figures() + times.make_figures()
     figures.append(Figure("fleet", "server memory per vehicle", "kB", [
         (large - small) / (most - least) for large, small in zip(memory[most], memory[least])],
         better=LESS))

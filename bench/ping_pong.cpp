@@ -50,67 +50,28 @@ Commands make_answer(const States& states) {
   return answer;
 }
 
-// --- the ways to send them -----------------------------------------------------------------------
-
-struct Bare {
-  struct Node : BareNode {
-    Node(const PingPongOptions& options, const char* identity)
-        : BareNode(options.qos_file, options.domain, identity) {}
-  };
-  template <class Message, class Type>
-  struct Writer : BareWriter<Message, Type> {
-    explicit Writer(Node& node)
-        : BareWriter<Message, Type>(node, bus::Topic<Message>::kName, bus::kLoopWriterProfile) {}
-  };
-  template <class Message, class Type>
-  struct Reader : BareReader<Message, Type> {
-    template <class Handler>
-    Reader(Node& node, Handler handler)
-        : BareReader<Message, Type>(node, bus::Topic<Message>::kName, bus::kLoopReaderProfile,
-                                    handler) {}
-  };
-  using StateWriter = Writer<States, StatesPubSubType>;
-  using CommandWriter = Writer<Commands, CommandsPubSubType>;
-  using StateReader = Reader<States, StatesPubSubType>;
-  using CommandReader = Reader<Commands, CommandsPubSubType>;
-};
-
-template <class Message>
-struct BusWriter : bus::Writer<Message> {
-  using bus::Writer<Message>::Writer;
-  std::size_t count_matched() const { return this->matched().size(); }
-};
-
-template <class Message>
-struct BusReader : bus::Reader<Message> {
-  template <class Handler>
-  BusReader(bus::Node& node, Handler handler)
-      : bus::Reader<Message>(
-            node, bus::kLoopReaderProfile,
-            [handler](const Message& message, const bus::PeerId&) { handler(message); }) {}
-  std::size_t count_matched() const { return this->matched().size(); }
-};
-
-struct Bus {
-  struct Node : bus::Node {
-    Node(const PingPongOptions& options, const char* identity)
-        : bus::Node(options.qos_file, options.domain, "bench", identity) {}
-  };
-  using StateWriter = BusWriter<States>;
-  using CommandWriter = BusWriter<Commands>;
-  using StateReader = BusReader<States>;
-  using CommandReader = BusReader<Commands>;
-};
-
 // --- the two ends --------------------------------------------------------------------------------
 
-template <class Ends>
+template <class Message, class Type>
+struct Writer : BareWriter<Message, Type> {
+  explicit Writer(BareNode& node)
+      : BareWriter<Message, Type>(node, bus::Topic<Message>::kName, bus::kLoopWriterProfile) {}
+};
+
+template <class Message, class Type>
+struct Reader : BareReader<Message, Type> {
+  template <class Handler>
+  Reader(BareNode& node, Handler handler)
+      : BareReader<Message, Type>(node, bus::Topic<Message>::kName, bus::kLoopReaderProfile,
+                                  handler) {}
+};
+
 class Ping {
  public:
   explicit Ping(const PingPongOptions& options)
       : options_(options),
         states_(make_states(options.vehicles)),
-        node_(options, "server"),
+        node_(options.qos_file, options.domain, "server"),
         writer_(node_),
         reader_(node_, [this](const Commands& command) { receive(command); }) {
     latencies_.reserve(options.round_trips);
@@ -176,20 +137,23 @@ class Ping {
   std::uint64_t lost_ = 0;
   Latencies latencies_;
   std::condition_variable over_;
-  typename Ends::Node node_;
-  typename Ends::StateWriter writer_;
-  typename Ends::CommandReader reader_;  // last: its callbacks use the members above
+  BareNode node_;
+  Writer<States, StatesPubSubType> writer_;
+  Reader<Commands, CommandsPubSubType> reader_;  // last: its callbacks use the members above
 };
 
-template <class Ends>
-void answer_with(const PingPongOptions& options) {
-  typename Ends::Node node(options, "controller");
-  typename Ends::CommandWriter writer(node);
+}  // namespace
+
+nlohmann::json ping(const PingPongOptions& options) { return Ping(options).run(); }
+
+void answer(const PingPongOptions& options) {
+  BareNode node(options.qos_file, options.domain, "controller");
+  Writer<Commands, CommandsPubSubType> writer(node);
   std::vector<Commands> answers;  // one for each size of sample
   for (const States& state : make_states(options.vehicles)) answers.push_back(make_answer(state));
   bool is_heard = false;  // until then nothing is answered, and the state comes again
   std::size_t next = 0;
-  typename Ends::StateReader reader(node, [&](const States& state) {
+  Reader<States, StatesPubSubType> reader(node, [&](const States& state) {
     is_heard = is_heard || writer.count_matched() > 0;
     if (!is_heard) return;
     answers[next].step(state.step());
@@ -197,16 +161,6 @@ void answer_with(const PingPongOptions& options) {
     next = (next + 1) % answers.size();
   });
   while (app::stop_signal() == 0) std::this_thread::sleep_for(20ms);
-}
-
-}  // namespace
-
-nlohmann::json ping(const PingPongOptions& options) {
-  return options.uses_bus ? Ping<Bus>(options).run() : Ping<Bare>(options).run();
-}
-
-void answer(const PingPongOptions& options) {
-  options.uses_bus ? answer_with<Bus>(options) : answer_with<Bare>(options);
 }
 
 }  // namespace sls::bench

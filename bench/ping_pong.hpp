@@ -14,7 +14,7 @@ struct PingPongOptions {
   std::uint32_t vehicles = 1;         ///< up to 64 in each sample
   std::uint64_t round_trips = 20000;  ///< measured
   std::uint64_t warm_up = 2000;       ///< before, not measured
-  bool uses_bus = false;              ///< through common/bus instead of on bare Fast DDS
+  bool may_spin = false;              ///< both ends, where sls::shared_locks is linked
 };
 
 /// States out, commands back, each state sent when the answer to the one before has come. Both ends

@@ -1,5 +1,6 @@
 // The measurements of `./sls bench` that are neither programs of their own nor benchmarks of one
 // function. Each prints one line of JSON on stdout (stamps: CSV). README.md.
+#include <sched.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -13,13 +14,17 @@
 #include <vector>
 
 #include "bench/feeder.hpp"
+#include "bench/hand_over.hpp"
 #include "bench/ping_pong.hpp"
 #include "bench/recording_speed.hpp"
 #include "bench/stamps.hpp"
 #include "bench/timer_jitter.hpp"
 #include "closed_loop/flight.hpp"
+#include "closed_loop/record_entries.hpp"
+#include "closed_loop/recorded_flight.hpp"
 #include "common/app/run_main.hpp"
 #include "common/bus/qos_file.hpp"
+#include "common/bus/spinning.hpp"
 #include "common/config/scenario.hpp"
 
 namespace {
@@ -36,7 +41,7 @@ class AnsweringProcess {
                                       "--qos",           options.qos_file.string(),
                                       "--domain",        std::to_string(options.domain),
                                       "--vehicles",      std::to_string(options.vehicles)};
-    if (options.uses_bus) words.push_back("--bus");
+    if (options.may_spin) words.push_back("--spin");
     std::vector<char*> command;
     for (std::string& word : words) command.push_back(word.data());
     command.push_back(nullptr);
@@ -58,14 +63,46 @@ class AnsweringProcess {
   pid_t id_ = -1;
 };
 
-nlohmann::json time_flight(const config::Scenario& scenario) {
-  closed_loop::Flight flight(scenario);
-  std::uint64_t steps = 0;
-  const auto began = std::chrono::steady_clock::now();
-  while (flight.fly_step()) ++steps;
-  const std::chrono::duration<double, std::micro> elapsed =
-      std::chrono::steady_clock::now() - began;
-  return {{"steps", steps}, {"mean_us", elapsed.count() / static_cast<double>(steps)}};
+/// Of two processes, where they were chosen: the first is this one.
+using Processors = std::vector<int>;
+
+/// This thread and what it starts from now on.
+void stay_on(const Processors& processors, std::size_t process) {
+  if (processors.empty()) return;
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  CPU_SET(processors[process], &set);
+  if (sched_setaffinity(0, sizeof set, &set) != 0)
+    throw app::RunError("processor " + std::to_string(processors[process]) + ": cannot run there");
+}
+
+/// One process: the parts of a step, and a whole step with files where there is a folder for them.
+nlohmann::json time_flight(const config::Scenario& scenario, const std::filesystem::path& folder) {
+  using Clock = std::chrono::steady_clock;
+  using Microseconds = std::chrono::duration<double, std::micro>;
+  closed_loop::FlightOptions options;
+  options.measures_compute_time = true;
+  closed_loop::Flight flight(scenario, {0}, options);
+  double steps = 0.0;
+  Microseconds law{0}, entries{0};
+  auto began = Clock::now();
+  while (const closed_loop::FlownStep* flown = flight.fly_step()) {
+    const auto answered = Clock::now();
+    const RecordEntry entry = closed_loop::make_entry(0, *flown, options.controller_name);
+    entries += Clock::now() - answered;
+    law += flown->compute_time;
+    ++steps;
+  }
+  const Microseconds whole = Clock::now() - began;
+  nlohmann::json json = {{"plant_us", (whole - law - entries).count() / steps},
+                         {"law_us", law.count() / steps},
+                         {"entries_us", entries.count() / steps}};
+  if (folder.empty()) return json;
+  began = Clock::now();
+  const auto end = closed_loop::fly_recorded(scenario, options, folder, false);
+  json["recorded_us"] = Microseconds(Clock::now() - began).count() / steps;
+  if (!end.is_complete) throw app::RunError("fly: the recording is not complete");
+  return json;
 }
 
 }  // namespace
@@ -79,6 +116,8 @@ int main(int argc, char** argv) {
   bench::PingPongOptions ping_pong;
   bench::StampsOptions stamps;
   bench::FeederOptions feeder;
+  bench::HandOverOptions hand_over;
+  Processors processors;
   std::filesystem::path scenario_file, folder;
   std::optional<double> period_s;
   std::uint32_t vehicles = 1;
@@ -105,11 +144,20 @@ int main(int argc, char** argv) {
   CLI::App* pong = add("pong", "that process");
   for (CLI::App* command : {ping, pong}) {
     add_vehicles(command);
-    command->add_flag("--bus", ping_pong.uses_bus, "through common/bus, not on bare Fast DDS");
+    command->add_flag("--spin", ping_pong.may_spin,
+                      "as server and client do in lockstep; of sls_bench_spinning_probe");
   }
+  CLI::App* turns = add("hand-over", "turns of two processes by futex, with work in one of them");
+  turns->add_option("--rounds", hand_over.rounds, "measured")->check(CLI::Range(1, 100'000'000));
+  turns->add_option("--work-us", hand_over.work_us, "work in each round")
+      ->check(CLI::Range(0.0, 1e6));
+  turns->add_flag("--spin", hand_over.may_spin, "look for up to 50 µs before a wait blocks");
+  for (CLI::App* command : {ping, turns})
+    command->add_option("--processors", processors, "of this process and of the other one")
+        ->expected(2);
   ping->add_option("--round-trips", ping_pong.round_trips, "measured")
       ->check(CLI::Range(1, 100'000'000));
-  CLI::App* fly = add("fly", "plant and control law of a flight, without anything else");
+  CLI::App* fly = add("fly", "the parts of a flight in one process");
   add_scenario(fly);
   CLI::App* timer = add("timer", "how late this machine wakes a thread that sleeps until a time");
   timer->add_option("--period-s", period_s, "between two times")->required();
@@ -121,6 +169,7 @@ int main(int argc, char** argv) {
   add_vehicles(record);
   add_steps(record);
   record->add_option("--folder", folder, "for the files, which are removed again")->required();
+  fly->add_option("--folder", folder, "for a recording, new");
   CLI::App* feed = add("feed", "sends a recorder a whole flight as fast as it takes it");
   add_scenario(feed);
   add_vehicles(feed);
@@ -131,18 +180,26 @@ int main(int argc, char** argv) {
     ping_pong.domain = stamps.domain = feeder.domain = options.domain;
     ping_pong.vehicles = feeder.vehicles = vehicles;
     feeder.steps = steps;
+    bus::is_spinning = ping_pong.may_spin;
     const auto load = [&] {
       config::Scenario scenario = config::load_scenario(scenario_file);
       if (period_s) config::override_period(scenario, *period_s);
       return scenario;
     };
     if (*ping) {
+      stay_on(processors, 1);
       const AnsweringProcess answering(ping_pong);
+      stay_on(processors, 0);
       print(bench::ping(ping_pong));
     } else if (*pong) {
       bench::answer(ping_pong);
+    } else if (*turns) {
+      stay_on(processors, 1);
+      bench::HandOver two(hand_over);
+      stay_on(processors, 0);
+      print(two.measure());
     } else if (*fly) {
-      print(time_flight(load()));
+      print(time_flight(load(), folder));
     } else if (*timer) {
       print(bench::measure_timer(*period_s, seconds));
     } else if (*stamp) {

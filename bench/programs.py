@@ -1,5 +1,6 @@
 """Starts the programs, waits for them with deadlines and leaves none behind."""
 
+import contextlib
 import json
 import os
 import re
@@ -8,7 +9,7 @@ import subprocess
 import tempfile
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -32,8 +33,14 @@ class Flight:
     label: str  # timing, as the server says it
     wall_s: float  # from starting the programs to the end of all
     server_memory_kb: int  # resident, the largest seen
+    processor_s: dict[str, float]  # user and system time of each program, start and end included
     recording: Path | None
     manifest: dict[str, Any]
+
+    @property
+    def processor_us(self) -> dict[str, float]:
+        """Of each program, for a step."""
+        return {name: time * 1e6 / self.steps for name, time in self.processor_s.items()}
 
     @property
     def lost(self) -> int:
@@ -44,28 +51,19 @@ class Flight:
 
 
 START = ["setpriv", "--pdeathsig", "TERM", "--"]
+# Ends by itself after ten minutes of processor time, should nobody end it.
+COUNTING = ["sh", "-c", "ulimit -t 600; while :; do n=$((n + 1)); done"]
 
 
-@dataclass(frozen=True)
-class Placement:
-    """Processors of server and client, and of the recorder; empty: the system chooses."""
-
-    name: str = "placed by the system"
-    loop: str = ""
-    recorder: str = ""
-
-
-def pin(processors: str) -> list[str]:
-    return ["taskset", "--cpu-list", processors] if processors else []
-
-
-def find_placements() -> list[Placement]:
-    """That of the system and, with two processors or more, that of `./sls run`."""
-    first, *others = sorted(os.sched_getaffinity(0))
-    if not others:
-        return [Placement()]
-    return [Placement("server and client on one processor", str(first), ",".join(map(str, others))),
-            Placement()]
+def wait_for(process: subprocess.Popen[bytes], deadline: float) -> float:
+    """Until it ends: s of processor time that it took."""
+    while time.monotonic() < deadline:
+        ended, status, usage = os.wait4(process.pid, os.WNOHANG)
+        if ended:
+            process.returncode = os.waitstatus_to_exitcode(status)
+            return usage.ru_utime + usage.ru_stime
+        time.sleep(0.05)
+    raise MeasurementError(f"{process.args}: expected an end within {LONGEST_S:.0f} s")
 
 
 class Programs:
@@ -92,18 +90,21 @@ class Programs:
 
     # --- one program ------------------------------------------------------------------------------
 
-    def start(self, command: list[str], log: Path, processors: str = "") -> subprocess.Popen[bytes]:
+    def start(self, command: list[str], log: Path, may_spin: bool = True) -> subprocess.Popen[bytes]:
         """The kernel ends it should we be killed."""
+        environment = {name: value for name, value in os.environ.items() if name != "SLS_SPIN"}
+        if not may_spin:
+            environment["SLS_SPIN"] = "off"
         with log.open("wb") as output:
-            return subprocess.Popen([*START, *pin(processors), *command], stdout=output,
-                                    stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL)
+            return subprocess.Popen([*START, *command], stdout=output, stderr=subprocess.STDOUT,
+                                    stdin=subprocess.DEVNULL, env=environment)
 
-    def run(self, *words: str | Path, processors: str = "") -> str:
+    def run(self, *words: str | Path) -> str:
         """stdout of a program that must end well."""
         command = [str(word) for word in words]
         try:
-            done = subprocess.run([*START, *pin(processors), *command],
-                                  capture_output=True, text=True, timeout=LONGEST_S, check=False)
+            done = subprocess.run([*START, *command], capture_output=True, text=True,
+                                  timeout=LONGEST_S, check=False)
         except subprocess.TimeoutExpired:
             raise MeasurementError(f"{' '.join(command)}: expected an end within {LONGEST_S:.0f} s"
                                    ) from None
@@ -112,16 +113,29 @@ class Programs:
                                    f"{done.stderr.strip() or done.stdout.strip()}")
         return done.stdout
 
-    def probe(self, subcommand: str, *words: str | Path, processors: str = "") -> Any:
-        """The JSON that bench's own program prints."""
-        return json.loads(self.run(self.probe_program, subcommand, *words, processors=processors))
+    def probe(self, subcommand: str, *words: str | Path, may_spin: bool = False) -> Any:
+        """The JSON that bench's own program prints; `may_spin` where Fast DDS waits in it."""
+        program = self.build / "bin/sls_bench_spinning_probe" if may_spin else self.probe_program
+        return json.loads(self.run(program, subcommand, *["--spin"] * may_spin, *words))
+
+    @contextlib.contextmanager
+    def busy_loops(self, count: int) -> Iterator[list[subprocess.Popen[bytes]]]:
+        """Processes that only count, for as long as the context lasts."""
+        loops: list[subprocess.Popen[bytes]] = []
+        try:
+            for _ in range(count):
+                loops.append(self.start(COUNTING, self.make_path("-count.log")))
+            yield loops
+        finally:
+            end_all(loops)
 
     # --- the three programs -----------------------------------------------------------------------
 
     def fly(self, scenario: Path, *, qos: str | Path = "default", is_recorded: bool = True,
             server: tuple[str, ...] = (), during: Callable[[], None] | None = None,
-            placement: Placement = Placement()) -> Flight:
-        """Flies `scenario`; `during` is called while it flies."""
+            may_spin: bool = True) -> Flight:
+        """Flies `scenario`; `during` is called while it flies. Where they may not spin, the threads
+        of server and client that wait for an answer block at once."""
         common = ["--domain", str(self.domain), "--qos", str(self.qos(qos))]
         programs = {name: str(self.build / "bin" / name)
                     for name in ("recorder", "sim_server", "control_client")}
@@ -135,18 +149,16 @@ class Programs:
         processes = {}
         try:
             for name, flags in commands.items():
-                processors = placement.recorder if name == "recorder" else placement.loop
-                processes[name] = self.start([programs[name], *flags], logs[name], processors)
+                processes[name] = self.start([programs[name], *flags], logs[name], may_spin)
             memory = MemoryWatch(processes["sim_server"].pid)  # setpriv becomes the program
             if during:
                 during()
+            processor_s = {}
             for name, process in processes.items():
-                code = process.wait(timeout=max(LONGEST_S - (time.monotonic() - began), 1))
-                if code != 0:
-                    raise MeasurementError(f"{name} ended with {code}: {logs[name].read_text().strip()}")
-        except subprocess.TimeoutExpired as error:
-            program = next(word for word in error.cmd if word.startswith(str(self.build)))
-            raise MeasurementError(f"{program}: expected an end within {LONGEST_S:.0f} s") from None
+                processor_s[name] = wait_for(process, began + LONGEST_S)
+                if process.returncode != 0:
+                    raise MeasurementError(f"{name} ended with {process.returncode}: "
+                                           f"{logs[name].read_text().strip()}")
         finally:
             end_all(list(processes.values()))
         said = logs["sim_server"].read_text()
@@ -155,7 +167,7 @@ class Programs:
             raise MeasurementError(f"sim_server: expected a last line with steps/s, got: {said}")
         manifest = json.loads((recording / "manifest.json").read_text()) if recording else {}
         return Flight(int(found[1]), float(found[2]), found[3].strip(),
-                      time.monotonic() - began, memory.stop(), recording, manifest)
+                      time.monotonic() - began, memory.stop(), processor_s, recording, manifest)
 
 
 class MemoryWatch:

@@ -1,5 +1,6 @@
 """Figures, their bounds and their ratios; as a table and as JSON. Nothing is measured here."""
 
+import math
 import statistics
 from dataclasses import dataclass, field
 from typing import Any
@@ -13,7 +14,8 @@ class Figure:
     """One figure, measured once in each round, and in the same rounds what it could be at best.
 
     `bounds` has one value for each of `values`, or none where there is no bound; both in `unit`.
-    `goal` is of the ratio if `is_goal_of_ratio`, else of the figure.
+    `goal` is of the ratio if `is_goal_of_ratio`, else of the figure. `parts` of a figure in steps/s or
+    µs: where a step goes, in µs; they add up to it in each round.
     """
 
     part: str
@@ -25,6 +27,7 @@ class Figure:
     better: str = MORE
     goal: float | None = None
     is_goal_of_ratio: bool = False
+    parts: dict[str, list[float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not self.values:
@@ -34,10 +37,19 @@ class Figure:
                              f"got {len(self.bounds)}")
         if any(value <= 0 for value in self.bounds) or (self.bounds and min(self.values) <= 0):
             raise ValueError(f"{self.part}, {self.name}: expected numbers > 0 for a ratio")
+        for times in zip(self.step_times, *self.parts.values()) if self.parts else ():
+            if not math.isclose(times[0], sum(times[1:]), rel_tol=1e-9):
+                raise ValueError(f"{self.part}, {self.name}: expected parts of {times[0]} µs, "
+                                 f"got {sum(times[1:])} µs")
 
     @property
     def median(self) -> float:
         return statistics.median(self.values)
+
+    @property
+    def step_times(self) -> list[float]:
+        """µs, in each round."""
+        return [1e6 / value if self.unit == "steps/s" else value for value in self.values]
 
     @property
     def ratios(self) -> list[float]:
@@ -60,10 +72,35 @@ class Figure:
         if self.bounds:
             json["bound"] = {"name": self.bound_name, **summarize(self.bounds)}
             json["ratio"] = summarize(self.ratios)
+        if self.parts:
+            json["parts_us"] = {name: summarize(values) for name, values in self.parts.items()}
         if self.goal is not None:
             json["goal"] = {"of": "ratio" if self.is_goal_of_ratio else "figure",
                             "value": self.goal, "reached": self.is_goal_reached}
         return json
+
+
+class Rounds:
+    """The figures of a part in the making: each is added once in every round."""
+
+    def __init__(self, part: str):
+        self.part = part
+        self.added: dict[tuple[str, str, str], dict[str, Any]] = {}
+
+    def add(self, name: str, unit: str, value: float, bound_name: str = "", bound: float | None = None,
+            parts: dict[str, float] | None = None, **options: Any) -> None:
+        """`options` are those of Figure."""
+        figure = self.added.setdefault((name, unit, bound_name), {
+            "values": [], "bounds": [], "parts": {}, **options})
+        figure["values"].append(value)
+        if bound is not None:
+            figure["bounds"].append(bound)
+        for part, time in (parts or {}).items():
+            figure["parts"].setdefault(part, []).append(time)
+
+    def make_figures(self) -> list[Figure]:
+        return [Figure(self.part, name, unit, bound_name=bound_name, **figure)
+                for (name, unit, bound_name), figure in self.added.items()]
 
 
 def summarize(values: list[float]) -> dict[str, Any]:
@@ -109,24 +146,41 @@ def make_rows(figures: list[Figure]) -> list[tuple[str, ...]]:
     return rows
 
 
+def format_lines(rows: list[tuple[str, ...]], left: tuple[int, ...]) -> list[str]:
+    """Columns as wide as they need, these set left."""
+    widths = [max(map(len, column)) for column in zip(*rows)]
+    return ["  " + "  ".join(
+        cell.ljust(width) if index in left else cell.rjust(width)
+        for index, (cell, width) in enumerate(zip(row, widths))).rstrip() for row in rows]
+
+
+def format_parts(figures: list[Figure]) -> list[str]:
+    """A line for each figure that has parts."""
+    figures = [figure for figure in figures if figure.parts]
+    if not figures:
+        return []
+    names = list(dict.fromkeys(name for figure in figures for name in figure.parts))
+    rows = [("where a step goes, µs", "step", *names)]
+    for figure in figures:
+        columns = [figure.step_times, *(figure.parts.get(name) for name in names)]
+        rows.append((f"{figure.part}: {figure.name}",
+                     *(format_number(statistics.median(values)) if values else ""
+                       for values in columns)))
+    return ["", *format_lines(rows, left=(0,))]
+
+
 def format_table(figures: list[Figure]) -> str:
-    """One table, a headed group of lines for each part; bounds are named below each group."""
-    rows = make_rows(figures)
-    widths = [max(map(len, column)) for column in zip(HEADER, *rows)]
-
-    def line(cells: tuple[str, ...]) -> str:
-        left = "  ".join(cell.ljust(width) for cell, width in zip(cells[:2], widths))
-        right = "  ".join(cell.rjust(width) for cell, width in zip(cells[2:5], widths[2:]))
-        return f"  {left}  {right}  {cells[5]}".rstrip()
-
-    text = [line(HEADER)]
+    """One line for each figure, a headed group of them for each part; bounds are named below each
+    group's head. Below all: where the steps go."""
+    header, *lines = format_lines([HEADER, *make_rows(figures)], left=(0, 1, 5))
+    text = [header]
     part = ""
-    for figure, row in zip(figures, rows):
+    for figure, line in zip(figures, lines):
         if figure.part != part:
             part = figure.part
             text.append(part)
             bounds = dict.fromkeys(other.bound_name for other in figures
                                    if other.part == part and other.bounds)
             text += [f"  bound: {name}" for name in bounds]
-        text.append(line(row))
-    return "\n".join(text)
+        text.append(line)
+    return "\n".join(text + format_parts(figures))

@@ -4,9 +4,12 @@ it answers to mistakes. How fast anything is, is no business of a test."""
 import json
 import os
 import pathlib
+import resource
+import signal
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -14,10 +17,25 @@ BUILD = pathlib.Path(sys.argv.pop()).resolve() if __name__ == "__main__" else RO
 sys.path.insert(0, str(ROOT))
 
 from bench import loop, parts  # noqa: E402
-from bench.programs import find_placements  # noqa: E402
-from bench.results import LESS, Figure, format_number, format_table  # noqa: E402
+from bench.programs import Programs, wait_for  # noqa: E402
+from bench.results import LESS, Figure, Rounds, format_number, format_table  # noqa: E402
 
 GOOGLE_BENCHMARK = BUILD / "bin/sls_microbench"
+
+
+def wait_until(condition):
+    deadline = time.monotonic() + 30
+    while not condition():
+        if time.monotonic() > deadline:
+            raise AssertionError("waited for 30 s")
+        time.sleep(0.01)
+
+
+def is_alive(process):
+    try:
+        return ") Z " not in (process / "stat").read_text()
+    except OSError:
+        return False
 
 
 def bench(*words, check=0):
@@ -28,12 +46,64 @@ def bench(*words, check=0):
     return done
 
 
-class BreakdownTest(unittest.TestCase):
-    def test_each_part_is_what_its_round_trip_takes_longer_and_they_add_up(self):
-        parts_of_step = loop.calc_parts(10, 11, 20, 43, 50)
-        self.assertEqual(parts_of_step.pop("sum: one step with recorder"), 50)
-        self.assertEqual(list(parts_of_step.values()), [10, 1, 20, 12, 7])
-        self.assertEqual(sum(parts_of_step.values()), 50)
+class BoundTest(unittest.TestCase):
+    def setUp(self):
+        self.costs = loop.StepCosts.__new__(loop.StepCosts)
+        self.costs.work = {"plant_us": 14.0, "law_us": 0.5}
+        self.costs.futex = {(True, "one"): 100.0, (True, "two"): 15.0,
+                            (False, "one"): 20.0, (False, "two"): 30.0}
+
+    def test_a_hand_over_is_the_fastest_round_without_its_work(self):
+        self.assertEqual(self.costs.hand_over(may_spin=True), 0.5)
+        self.assertEqual(self.costs.hand_over(may_spin=False), 5.5)
+
+    def test_with_one_processor_there_is_one_place(self):
+        pairs, everywhere = loop.find_pairs(), os.sched_getaffinity(0)
+        self.assertEqual(len(pairs), min(len(everywhere), 2))
+        self.assertEqual([len(set(pair)) for pair in pairs.values()], [1, 2][:len(pairs)])
+        os.sched_setaffinity(0, {max(everywhere)})
+        try:
+            self.assertEqual(loop.find_pairs(), {"on one processor": (max(everywhere),) * 2})
+        finally:
+            os.sched_setaffinity(0, everywhere)
+
+    def test_the_parts_of_a_step_add_up_to_it(self):
+        parts_of_step = loop.calc_parts(60.0, self.costs.work, 5.5, 25.0)
+        self.assertEqual(list(parts_of_step.items()), [
+            ("plant", 14.0), ("law", 0.5), ("futex", 5.5), ("Fast DDS", 19.5), ("rest", 20.5)])
+
+    def flights(self, speeds):
+        return {how: loop.Flight(1000, speed, "exact", 9.0, 1, {"sim_server": 0.04,
+                                 "control_client": 0.02 if how.may_spin else 0.01}, None, {})
+                for how, speed in zip(loop.LOOPS, speeds)}
+
+    def test_each_loop_stands_beside_its_bounds_with_what_is_between(self):
+        figures = Rounds("lockstep")
+        pings = {"default": {(True, "two"): 10.0, (False, "one"): 25.0, (False, "two"): 30.0},
+                 "udp": {(True, "two"): 16.0, (False, "one"): 40.0, (False, "two"): 80.0}}
+        loop.add_speeds(figures, self.costs, pings, self.flights([10000, 12500, 8000, 10000] * 2))
+        made = {(figure.name, figure.bound_name): figure for figure in figures.make_figures()}
+        name = "shared memory, with recorder, blocking"
+        figure = made[name, loop.FUTEX_BOUND]
+        self.assertAlmostEqual(figure.bounds[0], 1e6 / 15)
+        self.assertEqual({part: values[0] for part, values in figure.parts.items()}, {
+            "plant": 14.0, "law": 0.5, "futex": 5.5, "Fast DDS": 19.5, "rest": 60.5, "recorder": 25.0})
+        self.assertAlmostEqual(made[f"{name}, beside Fast DDS", loop.FAST_DDS_BOUND].bounds[0],
+                               1e6 / 24.5)
+        self.assertAlmostEqual(made[f"{name}, beside the same without", "the same without recorder"]
+                               .ratios[0], 0.8)
+        spinning = made["UDP, without recorder, spinning", loop.FUTEX_BOUND]
+        self.assertEqual({part: values[0] for part, values in spinning.parts.items()}, {
+            "plant": 14.0, "law": 0.5, "futex": 0.5, "Fast DDS": 15.5, "rest": 49.5})
+
+    def test_processor_time_is_for_a_step_and_stands_beside_that_without_spinning(self):
+        figures = Rounds("lockstep")
+        loop.add_processor_times(figures, self.flights([10000] * 8))
+        made = {figure.name: figure for figure in figures.make_figures()}
+        name = "UDP, with recorder, spinning: processor time"
+        self.assertAlmostEqual(made[f"{name}, sim_server"].median, 40)
+        self.assertAlmostEqual(made[f"{name}, all"].median, 60)
+        self.assertAlmostEqual(made[f"{name}, all"].ratios[0], 50 / 60)
 
 
 class FigureTest(unittest.TestCase):
@@ -63,6 +133,38 @@ class FigureTest(unittest.TestCase):
         for values, bounds in (([], []), ([1.0, 2.0], [1.0]), ([1.0], [0.0]), ([0.0], [1.0])):
             with self.assertRaisesRegex(ValueError, "^part, name: expected "):
                 Figure("part", "name", "s", values, "bound", bounds)
+
+    def test_parts_add_up_to_the_step_in_every_round(self):
+        parts_us = {"plant": [60.0, 70.0], "rest": [40.0, 55.0]}
+        figure = Figure("part", "speed", "steps/s", [10000.0, 8000.0], parts=parts_us)
+        self.assertEqual(figure.to_json()["parts_us"]["rest"]["rounds"], [40, 55])
+        for wrong in ({"plant": [60.0, 70.0]}, {"plant": [60.0, 70.0], "rest": [40.0, 30.0]}):
+            with self.assertRaisesRegex(ValueError, "expected parts of 1"):
+                Figure("part", "speed", "steps/s", [10000.0, 8000.0], parts=wrong)
+
+    def test_below_the_table_each_step_stands_with_its_parts(self):
+        figures = [Figure("one", "first", "steps/s", [10000.0],
+                          parts={"plant": [60.0], "rest": [40.0]}),
+                   Figure("one", "second", "µs", [50.0], parts={"rest": [50.0]}),
+                   Figure("one", "third", "µs", [50.0])]
+        lines = format_table(figures).split("\n")
+        self.assertEqual([line.split() for line in lines[-3:]], [
+            ["where", "a", "step", "goes,", "µs", "step", "plant", "rest"],
+            ["one:", "first", "100", "60", "40"], ["one:", "second", "50", "50"]])
+        self.assertTrue(lines[-1].endswith("  50"))  # below "rest"
+        self.assertEqual(len(lines[-1]), len(lines[-2]))
+
+    def test_figures_grow_by_one_value_in_each_round(self):
+        rounds = Rounds("part")
+        for value in (80.0, 90.0):
+            rounds.add("speed", "steps/s", value, "bound", 100.0, {"rest": 1e6 / value}, goal=85)
+            rounds.add("speed", "steps/s", value, "half", 50.0)
+            rounds.add("time", "s", value, better=LESS)
+        speed, half, time = rounds.make_figures()
+        self.assertEqual((speed.values, speed.bounds, speed.goal), ([80, 90], [100, 100], 85))
+        self.assertEqual(speed.parts["rest"], [1e6 / 80, 1e6 / 90])
+        self.assertEqual(half.ratios, [1.6, 1.8])
+        self.assertEqual((time.values, time.bounds, time.better), ([80, 90], [], LESS))
 
     def test_the_table_has_a_line_for_each_figure_and_one_for_each_bound(self):
         figures = [Figure("one", "first", "s", [1.0, 3.0, 2.0], "the bound", [1.0, 1.0, 1.0], LESS),
@@ -130,6 +232,44 @@ class RealTimeSearchTest(unittest.TestCase):
             self.assertLessEqual(max(seen), 256)
 
 
+class ProcessTest(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.programs = Programs(BUILD, 0, pathlib.Path(folder.name))
+
+    def test_busy_loops_are_processes_of_their_own_and_gone_at_the_end(self):
+        with self.assertRaises(KeyError):
+            with self.programs.busy_loops(3) as counting:
+                self.assertEqual([process.poll() for process in counting], [None] * 3)
+                raise KeyError
+        self.assertEqual([process.returncode for process in counting], [-signal.SIGTERM] * 3)
+
+    def test_no_busy_loop_outlives_a_bench_that_is_killed(self):
+        script = ("import pathlib, signal, sys\nfrom bench.programs import Programs\n"
+                  "programs = Programs(pathlib.Path(), 0, pathlib.Path(sys.argv[1]))\n"
+                  "with programs.busy_loops(1) as counting:\n"
+                  "    print(counting[0].pid, flush=True)\n    signal.pause()\n")
+        with subprocess.Popen([sys.executable, "-c", script, self.programs.scratch], text=True,
+                              stdout=subprocess.PIPE, env={**os.environ, "PYTHONPATH": str(ROOT)}
+                              ) as process:
+            counting = pathlib.Path(f"/proc/{int(process.stdout.readline())}")
+            wait_until(lambda: (counting / "comm").read_text() == "sh\n")  # past setpriv
+            process.kill()
+        wait_until(lambda: not is_alive(counting))
+
+    def test_a_process_is_waited_for_with_the_processor_time_it_took(self):
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        process = self.programs.start(["sh", "-c", "ulimit -t 1; while :; do :; done"],
+                                      self.programs.make_path(".log"))
+        took = wait_for(process, time.monotonic() + 60)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        self.assertAlmostEqual(
+            took, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, delta=0.01)
+        self.assertGreater(took, 0.9)
+        self.assertLess(process.returncode, 0)
+
+
 class ProgramTest(unittest.TestCase):
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
@@ -147,7 +287,7 @@ class ProgramTest(unittest.TestCase):
 
     def test_help_names_every_part(self):
         said = bench("--help").stdout
-        for part in ("lockstep", "breakdown", "round-trip", "realtime", "plant", "recorder", "fleet", "qos"):
+        for part in ("lockstep", "load", "round-trip", "realtime", "plant", "recorder", "fleet", "qos"):
             self.assertIn(part, said)
 
     def check(self, file, part):
@@ -173,23 +313,31 @@ class ProgramTest(unittest.TestCase):
         said = bench(*words)
         figures = self.check(file, "lockstep")
         self.assertIn("shared memory, with recorder", said.stdout)
-        # In each placement of the programs two transports, with and without recorder, and once more
-        # with one beside without.
-        self.assertEqual(sum("ratio" in figure for figure in figures), 6 * len(find_placements()))
+        self.assertIn("where a step goes", said.stdout)
+        loops = [figure for figure in figures if "rest" in figure.get("parts_us", {})]
+        self.assertEqual([figure["name"] for figure in loops], [how.name for how in loop.LOOPS])
+        for figure in loops:
+            parts_us = [part["median"] for part in figure["parts_us"].values()]
+            self.assertAlmostEqual(sum(parts_us), 1e6 / figure["median"], places=6)
+        names = {figure["name"]: figure for figure in figures}
+        for how in loop.LOOPS:
+            for program in ("sim_server", "control_client", *(["recorder"] if how.is_recorded else [])):
+                self.assertGreater(names[f"{how.name}: processor time, {program}"]["min"], 0)
+        futex = [name for name in names if name.startswith("two processes by futex")]
+        self.assertEqual(len(futex), 2 * len(loop.find_pairs()))
+        one = names["one process, without files"]
+        for name in futex:  # a round has all the work of a step in it, to a nanosecond
+            self.assertLess(names[name]["median"], 1.001 * one["bound"]["median"])
         if "--out" in words:
             self.assertTrue((self.folder / "plots/lockstep.png").read_bytes().startswith(b"\x89PNG"))
             self.assertIn("<svg", (self.folder / "plots/lockstep.svg").read_text())
 
-    def test_the_breakdown_has_the_same_parts_for_each_transport_and_placement(self):
+    def test_a_quick_load_part_compares_with_no_load_and_with_no_spinning(self):
         file = self.folder / "bench.json"
-        bench("--quick", "--only", "breakdown", "--json", file)
-        steps = {}
-        for figure in self.check(file, "breakdown"):
-            where, name = figure["name"].split(": ", 1)
-            steps.setdefault(where, set()).add(name)
-        self.assertEqual(len(steps), 2 * len(find_placements()))
-        for names in steps.values():
-            self.assertEqual(names, set(loop.calc_parts(1, 2, 3, 4, 5)))
+        bench("--quick", "--only", "load", "--json", file)
+        names = [figure["name"] for figure in self.check(file, "load") if "ratio" in figure]
+        self.assertEqual(sum("1 busy loop" in name for name in names), 6)
+        self.assertEqual(sum("beside blocking" in name for name in names), 4)
 
     def test_a_quick_recorder_part_loses_nothing(self):
         file = self.folder / "bench.json"
