@@ -10,20 +10,23 @@
 
 #include "common/model/forces.hpp"
 #include "sim_server/plants/slung_load/keys.hpp"
+#include "sim_server/plants/slung_load/pendulum_dynamics.hpp"
 #include "sim_server/plants/slung_load/rigid_links.hpp"
 
 namespace sls::sim {
 namespace {
 
-/// Simbody's generalised coordinates (quadrotor position, rod quaternion) and speeds (quadrotor
-/// velocity, rod angular velocity: two numbers for `ideal`, three for `rigid`), or their rates.
+/// Simbody's generalised coordinates and speeds of one vehicle, or their rates.
 struct Motion {
-  Eigen::Matrix<double, 7, 1> q;
-  Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 6, 1> u;
+  SimTK::Vec3 p_WQ;
+  SimTK::Vec4 rod;  ///< quaternion
+  SimTK::Vec3 v_WQ;
+  SimTK::Vec3 rod_speeds;  ///< angular velocity of the rod: `ideal` in L, its z 0; `rigid` in W
 };
 
-Motion add(const Motion& motion, const Motion& rate, double h) {
-  return {motion.q + h * rate.q, motion.u + h * rate.u};
+Motion add(const Motion& motion, double h, const Motion& rate) {
+  return {motion.p_WQ + h * rate.p_WQ, motion.rod + h * rate.rod, motion.v_WQ + h * rate.v_WQ,
+          motion.rod_speeds + h * rate.rod_speeds};
 }
 
 SimTK::Vec3 to_simtk(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
@@ -76,37 +79,37 @@ SimTK::MobilizedBody add_pendulum(SimTK::MobilizedBody& quadrotor, Pendulum pend
 }
 
 void check_finite(const Motion& motion, std::int64_t step) {
-  if (!motion.q.head<3>().allFinite()) throw_not_finite("quadrotor position", step);
-  if (!motion.q.tail<4>().allFinite()) throw_not_finite("rod direction", step);
-  if (!motion.u.head<3>().allFinite()) throw_not_finite("quadrotor velocity", step);
-  if (!motion.u.allFinite()) throw_not_finite("rod angular velocity", step);
+  if (!motion.p_WQ.isFinite()) throw_not_finite("quadrotor position", step);
+  if (!motion.rod.isFinite()) throw_not_finite("rod direction", step);
+  if (!motion.v_WQ.isFinite()) throw_not_finite("quadrotor velocity", step);
+  if (!motion.rod_speeds.isFinite()) throw_not_finite("rod angular velocity", step);
 }
 
 }  // namespace
 
-/// The multibody system at one state. README.md, "Integration", says why forces and accelerations
-/// go through the operators of the matter subsystem and not through force elements and `realize`.
+/// The multibody system at one motion. README.md, "Integration", says what is left to Simbody and
+/// why. L is the pendulum's frame.
 struct SlungLoadPlant::Multibody {
   Multibody(const model::SlungLoadParameters& vehicle, const config::Plant& plant)
       : config(plant),
         step_s(1e-9 * static_cast<double>(plant.step_ns)),
+        has_speeds_in_L(plant.own.get<SlungLoadKeys>().pendulum == Pendulum::kIdeal),
         matter(system),
         quadrotor(add_quadrotor(matter, vehicle.quad_mass)),
         pendulum(add_pendulum(quadrotor, plant.own.get<SlungLoadKeys>().pendulum, vehicle)),
-        p_QL(0, 0, vehicle.rod_length) {
-    system.realizeTopology();
-    state = system.getDefaultState();
-    system.realize(state, SimTK::Stage::Instance);
-    const SimTK::MassProperties& links = pendulum.getBodyMassProperties(state);
-    pendulum_centre = links.getMassCenter();
-    weight_quadrotor = SimTK::Vec3(0, 0, vehicle.quad_mass * vehicle.gravity);
-    weight_pendulum = SimTK::Vec3(0, 0, links.getMass() * vehicle.gravity);
-    body_forces.resize(matter.getNumBodies());
-    body_forces.setToZero();
-    generalized_forces.resize(matter.getNumMobilities());
-    accelerations.resize(matter.getNumMobilities());
+        state(make_state(system)),
+        dynamics(quadrotor.getBodyMassProperties(state), pendulum.getBodyMassProperties(state),
+                 vehicle.gravity),
+        p_QL_L(0, 0, vehicle.rod_length) {
     place(plant.initial, vehicle.rod_length);
     held = calc_finite_state(0);
+  }
+
+  static SimTK::State make_state(SimTK::MultibodySystem& system) {
+    system.realizeTopology();
+    SimTK::State state = system.getDefaultState();
+    system.realize(state, SimTK::Stage::Instance);
+    return state;
   }
 
   void place(const config::InitialState& initial, double rod_length) {
@@ -121,94 +124,83 @@ struct SlungLoadPlant::Multibody {
     quadrotor.setUToFitLinearVelocity(state, to_simtk(initial.v_WQ));
     pendulum.setQToFitRotation(state, R_WL);
     pendulum.setUToFitAngularVelocity(state, to_simtk(rod.n_W.cross(rod.n_dot_W)));  // no spin
-    realize_kinematics();
+    motion.p_WQ = SimTK::Vec3::getAs(&state.getQ()[0]);
+    motion.rod = SimTK::Vec4::getAs(&state.getQ()[3]);
+    motion.v_WQ = SimTK::Vec3::getAs(&state.getU()[0]);
+    motion.rod_speeds = SimTK::Vec3(0);
+    for (int i = 3; i < state.getNU(); ++i) motion.rod_speeds[i - 3] = state.getU()[i];
+    realize_positions(motion);
+    realize_velocities(motion);
   }
 
-  Motion motion() const {
-    const SimTK::Vector &q = state.getQ(), &u = state.getU();
-    return {Eigen::Map<const Eigen::Matrix<double, 7, 1>>(q.getContiguousScalarData()),
-            Eigen::Map<const Eigen::VectorXd>(u.getContiguousScalarData(), u.size())};
-  }
-
-  void set_motion(const Motion& motion) {
-    SimTK::Vector &q = state.updQ(), &u = state.updU();
-    Eigen::Map<Eigen::VectorXd>(q.updContiguousScalarData(), q.size()) = motion.q;
-    Eigen::Map<Eigen::VectorXd>(u.updContiguousScalarData(), u.size()) = motion.u;
-    realize_kinematics();
-  }
-
-  void realize_kinematics() const {
+  void realize_positions(const Motion& at) {
+    SimTK::Vector& q = state.updQ();
+    SimTK::Vec3::updAs(&q[0]) = at.p_WQ;
+    SimTK::Vec4::updAs(&q[3]) = at.rod;
     matter.realizePositionKinematics(state);
+  }
+
+  void realize_velocities(const Motion& at) {
+    SimTK::Vector& u = state.updU();
+    SimTK::Vec3::updAs(&u[0]) = at.v_WQ;
+    for (int i = 3; i < u.size(); ++i) u[i] = at.rod_speeds[i - 3];
     matter.realizeVelocityKinematics(state);
   }
 
-  /// Total force on the quadrotor besides gravity and rod, at the velocity of this stage.
-  Eigen::Vector3d calc_force(const Eigen::Vector3d& f_Q_W) const {
-    const Eigen::Vector3d v_WQ =
-        to_eigen(SimTK::Vec3::getAs(state.getU().getContiguousScalarData()));
-    return f_Q_W + model::calc_rotor_drag(f_Q_W, v_WQ, config.air) + config.disturbance_W;
+  /// README.md, eqs. (1) to (4), with the positions of `at` realized.
+  Motion calc_rate(const Motion& at, const Eigen::Vector3d& f_Q_W) const {
+    const SimTK::Rotation& R_WL = pendulum.getBodyRotation(state);
+    const SimTK::Vec3 w_L = has_speeds_in_L ? at.rod_speeds : ~R_WL * at.rod_speeds;
+    const SimTK::Vec3 w_W = has_speeds_in_L ? R_WL * at.rod_speeds : at.rod_speeds;
+
+    Eigen::Vector3d force = f_Q_W + config.disturbance_W;
+    if (config.air.rotor_drag != 0.0)
+      force += model::calc_rotor_drag(f_Q_W, to_eigen(at.v_WQ), config.air);
+    const auto [a_WQ, b_L] = dynamics.calc_accelerations(R_WL, w_L, to_simtk(force));
+
+    return {at.v_WQ, SimTK::Rotation::convertAngVelToQuaternionDot(at.rod, w_W), a_WQ,
+            has_speeds_in_L ? b_L : R_WL * b_L};
   }
 
-  /// README.md, eq. (2): u̇ = M⁻¹ Jᵀ (applied − centrifugal), and q̇ from u.
-  Motion calc_rate(const Eigen::Vector3d& f_Q_W) {
-    const SimTK::MobilizedBodyIndex quadrotor_index = quadrotor.getMobilizedBodyIndex();
-    const SimTK::MobilizedBodyIndex pendulum_index = pendulum.getMobilizedBodyIndex();
-    body_forces[quadrotor_index][1] = weight_quadrotor + to_simtk(calc_force(f_Q_W));
-    body_forces[pendulum_index] = -matter.getTotalCentrifugalForces(state, pendulum_index);
-    matter.addInStationForce(state, pendulum_index, pendulum_centre, weight_pendulum, body_forces);
-    matter.multiplyBySystemJacobianTranspose(state, body_forces, generalized_forces);
-    matter.multiplyByMInv(state, generalized_forces, accelerations);
-
-    const Motion now = motion();
-    const SimTK::Vec4 quaternion_dot = SimTK::Rotation::convertAngVelToQuaternionDot(
-        SimTK::Vec4::getAs(now.q.data() + 3), pendulum.getBodyAngularVelocity(state));
-    Motion rate;
-    rate.q << now.u.head<3>(), quaternion_dot[0], quaternion_dot[1], quaternion_dot[2],
-        quaternion_dot[3];
-    rate.u = Eigen::Map<const Eigen::VectorXd>(accelerations.getContiguousScalarData(),
-                                               accelerations.size());
-    return rate;
-  }
-
-  /// Rate at another motion than the present one, which is lost.
-  Motion calc_rate_at(const Motion& there, const Eigen::Vector3d& f_Q_W) {
-    check_finite(there, steps + 1);
-    set_motion(there);
-    return calc_rate(f_Q_W);
-  }
-
-  /// Classical Runge-Kutta step of fourth order.
-  Motion calc_next(const Motion& start, const Eigen::Vector3d& f_Q_W) {
+  /// Classical Runge-Kutta step of fourth order from `start`, whose positions are realized, to a
+  /// motion whose positions are.
+  Motion calc_next(const Motion& start, const Eigen::Vector3d& f_Q_W, std::int64_t step) {
     const double h = step_s;
-    const Motion k1 = calc_rate(f_Q_W);
-    const Motion k2 = calc_rate_at(add(start, k1, h / 2), f_Q_W);
-    const Motion k3 = calc_rate_at(add(start, k2, h / 2), f_Q_W);
-    const Motion k4 = calc_rate_at(add(start, k3, h), f_Q_W);
-    Motion next;
-    next.q = start.q + h / 6 * (k1.q + 2 * k2.q + 2 * k3.q + k4.q);
-    next.u = start.u + h / 6 * (k1.u + 2 * k2.u + 2 * k3.u + k4.u);
-    next.q.tail<4>().normalize();
-    check_finite(next, steps + 1);
+    const auto calc_rate_at = [&](const Motion& there) {
+      check_finite(there, step);
+      realize_positions(there);
+      return calc_rate(there, f_Q_W);
+    };
+    const Motion k1 = calc_rate(start, f_Q_W);
+    const Motion k2 = calc_rate_at(add(start, h / 2, k1));
+    const Motion k3 = calc_rate_at(add(start, h / 2, k2));
+    const Motion k4 = calc_rate_at(add(start, h, k3));
+    Motion next = add(start, h / 6, add(add(add(k1, 2, k2), 2, k3), 1, k4));
+    next.rod = next.rod.normalize();
+    check_finite(next, step);
+    realize_positions(next);
     return next;
   }
 
-  /// A step that throws leaves everything as it was.
-  void step(const Eigen::Vector3d& f_Q_W) {
+  /// Steps of which one throws leave everything as it was.
+  void advance(const Eigen::Vector3d& f_Q_W, std::int64_t count) {
     check_finite(f_Q_W, steps, "force_x_n", "force_y_n", "force_z_n");
-    const Motion start = motion();
     try {
-      set_motion(calc_next(start, f_Q_W));
-      held = calc_finite_state(steps + 1);
+      Motion next = motion;
+      for (std::int64_t i = 1; i <= count; ++i) next = calc_next(next, f_Q_W, steps + i);
+      realize_velocities(next);
+      static_cast<model::SlungLoadState&>(held) = calc_finite_state(steps + count);
+      motion = next;
     } catch (...) {
-      set_motion(start);
+      realize_positions(motion);
       throw;
     }
-    ++steps;
+    steps += count;
   }
 
   model::SlungLoadState calc_finite_state(std::int64_t step) const {
     SimTK::Vec3 p_WL, v_WL;
-    pendulum.findStationLocationAndVelocityInGround(state, p_QL, p_WL, v_WL);
+    pendulum.findStationLocationAndVelocityInGround(state, p_QL_L, p_WL, v_WL);
     const model::SlungLoadState result = model::make_state(
         to_eigen(quadrotor.getBodyOriginLocation(state)),
         to_eigen(quadrotor.getBodyOriginVelocity(state)), to_eigen(p_WL), to_eigen(v_WL));
@@ -218,23 +210,17 @@ struct SlungLoadPlant::Multibody {
 
   const config::Plant config;
   const double step_s;
+  const bool has_speeds_in_L;
   std::int64_t steps = 0;
+  Motion motion;  ///< after `steps` steps
 
   SimTK::MultibodySystem system;
   SimTK::SimbodyMatterSubsystem matter;
   SimTK::MobilizedBody quadrotor;
   SimTK::MobilizedBody pendulum;
-  SimTK::State state;  ///< stays at Stage::Instance, with the kinematics of q and u realized
-
-  const SimTK::Vec3 p_QL;       ///< load in the pendulum's frame, m
-  SimTK::Vec3 pendulum_centre;  ///< its centre of mass in its frame, m
-  SimTK::Vec3 weight_quadrotor;
-  SimTK::Vec3 weight_pendulum;
-
-  // Kept from step to step to spare their allocation.
-  SimTK::Vector_<SimTK::SpatialVec> body_forces;
-  SimTK::Vector generalized_forces;
-  SimTK::Vector accelerations;
+  SimTK::State state;  ///< stays at Stage::Instance
+  const PendulumDynamics dynamics;
+  const SimTK::Vec3 p_QL_L;  ///< m
 
   model::Measurement held;  ///< what `state` says
 };
@@ -246,12 +232,12 @@ SlungLoadPlant::SlungLoadPlant(const model::SlungLoadParameters& vehicle,
 
 SlungLoadPlant::~SlungLoadPlant() = default;
 
-void SlungLoadPlant::step(const Eigen::Vector3d& f_Q_W) { multibody_->step(f_Q_W); }
+void SlungLoadPlant::step(const Eigen::Vector3d& f_Q_W) { multibody_->advance(f_Q_W, 1); }
 
 const model::SlungLoadState& SlungLoadPlant::state() const { return multibody_->held; }
 
 void SlungLoadPlant::advance(const std::vector<Eigen::Vector3d>& f_Q_W, std::int64_t steps) {
-  for (std::int64_t i = 0; i < steps; ++i) multibody_->step(f_Q_W[0]);
+  multibody_->advance(f_Q_W[0], steps);
 }
 
 const model::Measurement& SlungLoadPlant::measurement(std::size_t) const {

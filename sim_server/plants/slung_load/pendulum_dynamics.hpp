@@ -1,0 +1,51 @@
+/// Accelerations of a quadrotor, a point mass, and its pendulum from Simbody's mass properties and
+/// position kinematics. Source: README.md, eqs. (2) and (3); "Integration" says why by hand.
+#pragma once
+
+#include <Simbody.h>
+
+namespace sls::sim {
+
+/// Frame L is the pendulum's: its origin is the joint, at the quadrotor, its z axis the rod; the
+/// axes are principal axes of inertia. C is the centre of mass of both bodies.
+class PendulumDynamics {
+ public:
+  PendulumDynamics(const SimTK::MassProperties& quadrotor, const SimTK::MassProperties& pendulum,
+                   double gravity)
+      : gravity_W_(0, 0, gravity), mass_(quadrotor.getMass() + pendulum.getMass()) {
+    const SimTK::Vec3& centre = pendulum.getMassCenter();
+    p_QC_L_ = pendulum.getMass() / mass_ * centre;
+    // The pendulum about its own centre, and both centres, which are `centre` apart.
+    const double reduced_mass = quadrotor.getMass() * pendulum.getMass() / mass_;
+    inertia_C_ = (pendulum.calcCentralInertia() + SimTK::Inertia::pointMassAt(centre, reduced_mass))
+                     .getMoments();
+    // A point load has no inertia about the rod, and its joint no speed there: ω̇ is zero.
+    for (int i = 0; i < 3; ++i)
+      inverse_inertia_C_[i] = inertia_C_[i] > 0.0 ? 1.0 / inertia_C_[i] : 0.0;
+  }
+
+  struct Accelerations {
+    SimTK::Vec3 a_WQ;  ///< of the quadrotor, m/s²
+    SimTK::Vec3 b_L;   ///< angular, of the pendulum in W, axes of L, rad/s²
+  };
+
+  /// Under the force `force_W` on the quadrotor (N), gravity apart. `w_L` is the pendulum's angular
+  /// velocity in W, axes of L, rad/s.
+  Accelerations calc_accelerations(const SimTK::Rotation& R_WL, const SimTK::Vec3& w_L,
+                                   const SimTK::Vec3& force_W) const {
+    const SimTK::Vec3 torque_L =
+        (~R_WL * force_W) % p_QC_L_ - w_L % inertia_C_.elementwiseMultiply(w_L);
+    const SimTK::Vec3 b_L = inverse_inertia_C_.elementwiseMultiply(torque_L);
+    const SimTK::Vec3 a_QC_L = b_L % p_QC_L_ + w_L % (w_L % p_QC_L_);
+    return {gravity_W_ + force_W / mass_ - R_WL * a_QC_L, b_L};
+  }
+
+ private:
+  const SimTK::Vec3 gravity_W_;    // m/s²
+  const double mass_;              // of both, kg
+  SimTK::Vec3 p_QC_L_;             // a of eq. (3), m
+  SimTK::Vec3 inertia_C_;          // J of eq. (2), principal moments, kg·m²
+  SimTK::Vec3 inverse_inertia_C_;  // 1/(kg·m²)
+};
+
+}  // namespace sls::sim
