@@ -35,7 +35,7 @@ class MisfitScope {
 /// A generated type support whose `deserialize` refuses malformed samples. The generated one lets
 /// most exceptions of the serialisation library through, which end the process: one sample of any
 /// stranger would do (README.md, traps 15 and 23). And it takes samples with bytes left over:
-/// those of another type, whose fields it reads in the wrong places (trap 26), and sequences beyond
+/// those of another type, whose fields it reads in the wrong places (trap 25), and sequences beyond
 /// their bounds, which cannot be sent on (bounds.hpp).
 ///
 /// Upstream: Fast-CDR #144; Fast DDS 2.11 catches more, but not std::bad_alloc. To be deleted when
