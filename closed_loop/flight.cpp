@@ -41,8 +41,9 @@ const FlownStep* Flight::fly_step() {
       FlownStep& flown = steps_[group.vehicles[i]];
       Vehicle& vehicle = vehicles_[group.vehicles[i]];
       flown.truth = group.plant->measurement(i);
-      flown.measured = vehicle.faults.measure(flown.step, flown.truth);
-      flown.can_measurement_differ = vehicle.faults.can_disturb_state();
+      flown.measured = vehicle.faults.measure(flown.step, group.plant->seen(i));
+      flown.can_measurement_differ =
+          vehicle.faults.can_disturb_state() || !group.plant->sees_truth();
       const control::ControllerMemory memory = flown.answer.memory;
       const auto began = measures_compute_time_ ? Clock::now() : Clock::time_point();
       try {
@@ -100,6 +101,16 @@ bool Flight::is_last() {
 
 std::string Flight::name_vehicle(std::size_t index) const {
   return is_fleet_ ? "vehicle " + std::to_string(vehicles_[index].id) + ": " : std::string();
+}
+
+std::vector<std::string> Flight::take_remarks() {
+  std::vector<std::string> remarks;
+  for (const sim::PlantOfVehicles& group : plants_)
+    for (std::size_t i = 0; i < group.vehicles.size(); ++i)
+      for (const std::string& remark : group.plant->take_remarks(i))
+        remarks.push_back("vehicle " + std::to_string(vehicles_[group.vehicles[i]].id) + ": " +
+                          remark);
+  return remarks;
 }
 
 std::vector<FlownStep> fly(const config::Scenario& scenario, std::uint32_t vehicle) {

@@ -24,7 +24,7 @@ namespace sls::closed_loop {
 struct FlownStep {
   std::uint64_t step = 0;
   model::Measurement truth;
-  model::Measurement measured;  ///< with the faults on `state`: what the controller answered
+  model::Measurement measured;  ///< by sensors, estimator and faults: what the controller answered
   bool can_measurement_differ = false;                       ///< from the truth
   Eigen::Vector3d answered_f_Q_W = Eigen::Vector3d::Zero();  ///< for [step − 1, step), N; 0 at 0
   Eigen::Vector3d applied_f_Q_W = Eigen::Vector3d::Zero();   ///< the same after faults
@@ -61,6 +61,9 @@ class Flight {
 
   /// That of the first vehicle.
   const sim::Plant& plant() const { return *plants_.front().plant; }
+
+  /// What the plants have to say of their vehicles since this was last asked.
+  std::vector<std::string> take_remarks();
 
   /// Why the flight failed, once it has ended; empty if every mission was finished.
   const std::string& failure() const { return failure_; }

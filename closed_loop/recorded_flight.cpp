@@ -44,9 +44,13 @@ FlightEnd fly_recorded(const config::Scenario& scenario, const FlightOptions& op
     board.step = flight.steps().front().step;
     if (board.step > 0)
       for (std::size_t i = 0; i < ids.size(); ++i) board.timing.add(FORCE_ANSWERED, 0);
-    if (board.is_due()) board.publish(PHASE_RUNNING, "");
+    if (board.is_due()) {
+      for (const std::string& remark : flight.take_remarks()) board.announce(remark);
+      board.publish(PHASE_RUNNING, "");
+    }
     recording.flush_if_due();
   }
+  for (const std::string& remark : flight.take_remarks()) board.announce(remark);
   batch.is_last(true);
   hand_on();
   FlightEnd end{board.step, flight.failure(), false};

@@ -5,6 +5,9 @@
 #include <optional>
 #include <variant>
 
+#include "common/model/offset.hpp"
+#include "sim_server/plants/sensing/delay_line.hpp"
+
 namespace sls::sim {
 namespace {
 
@@ -52,28 +55,6 @@ class Dice {
 
 // --- offsets -------------------------------------------------------------------------------------
 
-bool moves_rod(const model::RodAngles& rod) {
-  return rod.alpha != 0.0 || rod.beta != 0.0 || rod.alpha_dot != 0.0 || rod.beta_dot != 0.0;
-}
-
-/// Attitude and signals stay as they are.
-model::Measurement add(const model::Measurement& state, const config::SampleOffset& offset,
-                       double rod_length) {
-  model::Measurement moved = state;
-  moved.p_WQ += offset.position;
-  moved.v_WQ += offset.velocity;
-  moved.p_WL += offset.position;
-  moved.v_WL += offset.velocity;
-  if (!moves_rod(offset.rod)) return moved;
-  moved.rod.alpha += offset.rod.alpha;
-  moved.rod.beta += offset.rod.beta;
-  moved.rod.alpha_dot += offset.rod.alpha_dot;
-  moved.rod.beta_dot += offset.rod.beta_dot;
-  static_cast<model::SlungLoadState&>(moved) =
-      model::make_state(moved.p_WQ, moved.v_WQ, moved.rod, rod_length);
-  return moved;
-}
-
 Eigen::Vector3d add(const Eigen::Vector3d& f_Q_W, const config::SampleOffset& offset, double) {
   return f_Q_W + offset.force;
 }
@@ -84,7 +65,7 @@ config::SampleOffset draw(const config::SampleOffset& deviation, const Dice& dic
   config::SampleOffset offset;
   offset.position = deviation.position.cwiseProduct(dice.calc_normals(0));
   offset.velocity = deviation.velocity.cwiseProduct(dice.calc_normals(3));
-  if (!moves_rod(deviation.rod)) return offset;
+  if (!model::moves_rod(deviation.rod)) return offset;
   offset.rod.alpha = deviation.rod.alpha * dice.calc_normal(6);
   offset.rod.beta = deviation.rod.beta * dice.calc_normal(7);
   offset.rod.alpha_dot = deviation.rod.alpha_dot * dice.calc_normal(8);
@@ -133,16 +114,11 @@ class Receiver {
 
   void receive(const config::DelayFault& delay, bool is_active, std::uint64_t step,
                const Sample& sample) {
-    const auto periods = static_cast<std::uint64_t>(delay.by_ns / timing_.period_ns);
-    // The ring grows with the flight up to the delay. Once it is full, the sample of step − periods
-    // stands where the next one will be written.
-    const std::size_t at = step % (periods + 1);
-    if (at == history_.size())
-      history_.push_back(sample);
-    else
-      history_[at] = sample;
-    const std::size_t delayed = step < periods ? 0 : (step + 1) % (periods + 1);
-    held_ = is_active ? history_[delayed] : sample;
+    const std::int64_t periods = delay.by_ns / timing_.period_ns;
+    const auto at = static_cast<std::int64_t>(step);
+    under_way_.put(at, sample);
+    const Sample& delayed = under_way_.take(at - periods);
+    held_ = is_active ? delayed : sample;
   }
 
   void receive(const config::DropFault& drop, bool is_active, std::uint64_t step,
@@ -181,7 +157,7 @@ class Receiver {
   std::optional<Sample> held_;
   Sample sent_before_;           // at the step before
   bool was_late_ = false;        // that one, by a reorder
-  std::vector<Sample> history_;  // of a delay: what was sent last
+  DelayLine<Sample> under_way_;  // of a delay
 };
 
 /// Receivers in a row: each gets what the one before holds.

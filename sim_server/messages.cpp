@@ -35,7 +35,7 @@ Parameters make_parameters_message(std::uint64_t run_id,
   message.version(version);
   message.scenario_sha256(scenario.sha256);
   message.scenario_text(scenario.text);
-  message.library_sha256(scenario.plant.model.calc_library_sha256(scenario.folder));
+  message.library_sha256(config::calc_plant_library_sha256(scenario));
   for (const std::uint32_t id : vehicle_ids) {
     const model::SlungLoadParameters vehicle = config::make_vehicle_scenario(scenario, id).vehicle;
     VehicleParameters& item = message.vehicles().emplace_back();

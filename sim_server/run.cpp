@@ -90,6 +90,7 @@ void Run::reset() {
 void Run::publish_end(RunPhase phase, const std::string& reason) {
   record_step();
   record_.end();
+  announce_remarks();
   board_.publish(phase, reason);
 }
 
@@ -168,9 +169,10 @@ bool Run::fly() {
 }
 
 void Run::measure(const PlantOfVehicles& group) {
+  const Plant& plant = *group.plant;
   for (std::size_t i = 0; i < group.vehicles.size(); ++i)
-    endpoints_.states.at(group.vehicles[i]) =
-        vehicles_[group.vehicles[i]]->measure(board_.step, group.plant->measurement(i));
+    endpoints_.states.at(group.vehicles[i]) = vehicles_[group.vehicles[i]]->measure(
+        board_.step, plant.measurement(i), plant.sees_truth() ? nullptr : &plant.seen(i));
 }
 
 void Run::publish_states() {
@@ -313,6 +315,14 @@ void Run::look_for_problems() {
   problems_version_ = problems.version();
   board_.problem = problems.describe();
   for (const std::string& event : check_.take_events()) board_.announce(event);
+  announce_remarks();
+}
+
+void Run::announce_remarks() {
+  for (const PlantOfVehicles& group : plants_)
+    for (std::size_t i = 0; i < group.vehicles.size(); ++i)
+      for (const std::string& remark : group.plant->take_remarks(i))
+        board_.announce(fmt::format("vehicle {}: {}", vehicle_ids_[group.vehicles[i]], remark));
 }
 
 void Run::report_silent_recorder() {

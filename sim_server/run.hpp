@@ -153,6 +153,8 @@ class Run {
   void report_silent_recorder();
   /// Looks for what the participants do wrong.
   void look_for_problems();
+  /// Says what the plants have to say of their vehicles.
+  void announce_remarks();
   SyncCounters sum_counters() const;
   std::string describe_refusals(const VehicleFlight& vehicle) const;
   [[noreturn]] void give_up(double waited_s, const std::string& refusals) const;

@@ -26,11 +26,13 @@ VehicleFlight::VehicleFlight(const config::Scenario& fleet, std::uint32_t id, st
       scenario_(make_own_scenario(fleet, id)),
       faults_(scenario_, id) {}
 
-VehicleState VehicleFlight::measure(std::uint64_t step, const model::Measurement& truth) {
+VehicleState VehicleFlight::measure(std::uint64_t step, const model::Measurement& truth,
+                                    const model::Measurement* seen) {
   step_ = step;
   outcome_.reset();
   state_ = truth;
-  measured_ = faults_.measure(step, truth);
+  measured_ = faults_.measure(step, seen ? *seen : truth);
+  can_measured_differ_ = seen || faults_.can_disturb_state();
   return make_state_message(id_, measured_, applied_);
 }
 
@@ -82,8 +84,7 @@ Eigen::Vector3d VehicleFlight::actuate() {
 }
 
 void VehicleFlight::fill_record(RecordEntry& entry) const {
-  fill_state(entry, id_, step_, state_, faults_.can_disturb_state() ? &measured_ : nullptr,
-             applied_);
+  fill_state(entry, id_, step_, state_, can_measured_differ_ ? &measured_ : nullptr, applied_);
   entry.answer(last_command_);
   entry.answered_step(last_answer_step_);
   if (outcome_) {

@@ -32,9 +32,10 @@ class VehicleFlight {
     bool is_finished = false;  // the mission ends here
   };
 
-  /// The state of `step` as it is published, where the plant does `truth`. Call once per step, in
-  /// order, from step 0.
-  VehicleState measure(std::uint64_t step, const model::Measurement& truth);
+  /// The state of `step` as it is published, where the plant does `truth` and sensors and estimator
+  /// say `seen`; null where that cannot differ. Call once per step, in order, from step 0.
+  VehicleState measure(std::uint64_t step, const model::Measurement& truth,
+                       const model::Measurement* seen = nullptr);
   /// Takes the answer that the gate accepted for the step in work.
   void take_answer();
   /// Keeps an answer that came too late for its step, to be held: fresh where it is newer than the
@@ -88,6 +89,7 @@ class VehicleFlight {
   std::uint64_t step_ = 0;              // in work
   model::Measurement state_;            // at that step
   model::Measurement measured_;         // of it
+  bool can_measured_differ_ = false;    // from that state
   Applied applied_;                     // over the period before it
   std::optional<Outcome> outcome_;      // of the step in work, once it is known
   Applied last_answer_;                 // accepted, or late but valid; what is held

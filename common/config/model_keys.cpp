@@ -16,14 +16,26 @@ std::string ModelName::calc_library_sha256(const std::filesystem::path& folder) 
   return is_shared_library() ? calc_file_sha256(folder / name) : std::string();
 }
 
+namespace {
+
+/// Of every shared library. One that is a plant may have an attitude.
+template <class Section>
+class LibraryKeys : public OwnKeys<Section, LibraryParameters> {
+  bool has_attitude() const override { return true; }
+};
+
+}  // namespace
+
 template <class Section>
 const ModelKeys<Section>& find_model_keys(const ModelRegistry<Section>& registry,
                                           const ModelName& model) {
-  static const OwnKeys<Section, LibraryParameters> kLibraryKeys;
+  static const LibraryKeys<Section> kLibraryKeys;
   return model.is_shared_library() ? kLibraryKeys : *registry.at(model.name);
 }
 
 template const ModelKeys<Plant>& find_model_keys(const ModelRegistry<Plant>&, const ModelName&);
+template const ModelKeys<Autopilot>& find_model_keys(const ModelRegistry<Autopilot>&,
+                                                     const ModelName&);
 template const ModelKeys<Controller>& find_model_keys(const ModelRegistry<Controller>&,
                                                       const ModelName&);
 

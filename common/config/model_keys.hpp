@@ -1,7 +1,8 @@
-/// What a plant or a control law adds to the scenario file: keys of its own in the section that
-/// names it. Each folder of sim_server/plants and control_client/laws describes them in its
-/// keys.hpp, without Simbody or DDS. Every program links all of them, so all accept and refuse the
-/// same file with the same line. How to describe keys: own_keys.hpp.
+/// What a plant, an autopilot or a control law adds to the scenario file: keys of its own in the
+/// section that names it. Each folder of sim_server/plants, sim_server/autopilots and
+/// control_client/laws describes them in its keys.hpp, without Simbody or DDS. Every program links
+/// all of them, so all accept and refuse the same file with the same line. How to describe keys:
+/// own_keys.hpp.
 #pragma once
 
 #include <map>
@@ -16,7 +17,7 @@ class MapReader;
 class MapWriter;
 class Places;
 
-/// The keys of one model. `Section` is what they stand in: Plant or Controller.
+/// The keys of one model. `Section` is what they stand in: Plant, Autopilot or Controller.
 template <class Section>
 class ModelKeys {
  public:
@@ -26,6 +27,9 @@ class ModelKeys {
   virtual void describe(MapWriter& map, Section& section) const = 0;
   /// Rules between these keys and others of the scenario. @throws ConfigError.
   virtual void check(const Scenario&, const Places&) const {}
+  /// Of a plant: whether its vehicles turn. `initial` can then say how they are turned, and
+  /// `estimator` errors of their attitude; one of the project takes an `autopilot`.
+  virtual bool has_attitude() const { return false; }
 };
 
 /// By name.
@@ -34,6 +38,8 @@ using ModelRegistry = std::map<std::string, const ModelKeys<Section>*>;
 
 /// Every plant of the project. Defined in sim_server/plants/keys.cpp.
 const ModelRegistry<Plant>& plant_keys();
+/// Every autopilot of the project. Defined in sim_server/autopilots/keys.cpp.
+const ModelRegistry<Autopilot>& autopilot_keys();
 /// Every control law of the project. Defined in control_client/laws/keys.cpp.
 const ModelRegistry<Controller>& law_keys();
 

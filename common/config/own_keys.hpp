@@ -34,4 +34,11 @@ void describe_own(Map& map, Section&, LibraryParameters& parameters) {
   map.key(kOptional, "parameters", parameters);
 }
 
+/// Of an autopilot in a shared library: its period besides.
+template <class Map>
+void describe_own(Map& map, Autopilot& autopilot, LibraryParameters& parameters) {
+  describe_period(map, autopilot);
+  map.key(kOptional, "parameters", parameters);
+}
+
 }  // namespace sls::config

@@ -1,6 +1,7 @@
 #include "common/config/scenario.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <iterator>
@@ -16,6 +17,7 @@ namespace {
 
 /// A delay keeps that many samples in memory.
 constexpr std::int64_t kMaxDelayPeriods = 100'000;
+constexpr std::int64_t kMaxSamplesUnderWay = 100'000;
 
 /// The file's bytes; it is refused by its size before anything is read.
 std::string read_file(const std::filesystem::path& file) {
@@ -121,6 +123,27 @@ std::string to_too_long(std::int64_t period_ns) {
          to_seconds_text(kMaxDelayPeriods * period_ns) + " s)";
 }
 
+/// What only plants have whose vehicles turn, and their autopilot.
+void check_autopilot(const Scenario& scenario, const Places& places) {
+  const ModelName& model = scenario.plant.model;
+  if (model.is_shared_library() || !find_model_keys(plant_keys(), model).has_attitude()) {
+    std::string takers;
+    for (const auto& [name, keys] : plant_keys())
+      if (keys->has_attitude()) takers += (takers.empty() ? "'" : " or '") + name + "'";
+    for (const char* key :
+         {"autopilot", "plant.initial.attitude", "plant.initial.body_rates_rad_s"})
+      if (places.has(key))
+        throw places.make_error_at(key, "of plant.model " + takers + " alone, here it is '" +
+                                            scenario.plant.model.name + "'");
+  }
+  const std::int64_t period = scenario.autopilot ? scenario.autopilot->period_ns : 0;
+  if (period % scenario.plant.step_ns != 0)
+    throw places.make_error_at("autopilot.period_s", to_mismatch("multiple", "plant.step_s",
+                                                                 scenario.plant.step_ns, period));
+  if (scenario.autopilot)
+    find_model_keys(autopilot_keys(), scenario.autopilot->model).check(scenario, places);
+}
+
 /// Nothing where `offset` says something to its channel, else the keys that could.
 std::optional<std::string> find_missing_offset(const SampleOffset& offset, FaultChannel on) {
   const model::RodAngles& rod = offset.rod;
@@ -165,6 +188,64 @@ void check_faults(const Scenario& scenario, const Places& places) {
   }
 }
 
+/// An age or a delay of `sensing`, and what keeps its samples few: its key, itself, and the time
+/// between samples.
+struct SensingTime {
+  const char* key;
+  std::int64_t age_ns;
+  std::int64_t interval_ns;
+};
+std::array<SensingTime, 3> list_sensing_times(const Scenario& scenario) {
+  const Sensing& sensing = scenario.sensing;
+  const std::int64_t step = scenario.plant.step_ns;
+  return {{{"sensing.age_s", sensing.body.age_ns, std::max(sensing.body.period_ns, step)},
+           {"sensing.rod.age_s", sensing.rod.age_ns, std::max(sensing.rod.period_ns, step)},
+           {"sensing.node_delay_s", sensing.node_delay_ns, step}}};
+}
+
+/// Which of them means too many samples.
+std::optional<SensingTime> find_too_many_samples(const Scenario& scenario) {
+  for (const SensingTime& time : list_sensing_times(scenario))
+    if (time.age_ns / time.interval_ns > kMaxSamplesUnderWay) return time;
+  return std::nullopt;
+}
+std::string to_too_many(const SensingTime& time) {
+  return "expected at most " + std::to_string(kMaxSamplesUnderWay) + " samples of " +
+         to_seconds_text(time.interval_ns) + " s under way, got " + to_seconds_text(time.age_ns);
+}
+
+/// How long the flight can last.
+std::int64_t calc_longest_flight_ns(const Scenario& scenario) {
+  std::int64_t sum = 0;
+  for (const Stage& stage : scenario.mission) {
+    const auto* timed = std::get_if<LeaveAfter>(&stage.leave);
+    sum += timed ? timed->duration_ns : std::get<LeaveWithin>(stage.leave).timeout_ns;
+  }
+  return sum;
+}
+
+void check_sensing(const Scenario& scenario, const Places& places) {
+  const std::int64_t longest = calc_longest_flight_ns(scenario);
+  for (const SensingTime& time : list_sensing_times(scenario))
+    if (time.age_ns > longest)
+      throw places.make_error_at(time.key, "expected at most the longest flight of the mission (" +
+                                               to_seconds_text(longest) + "), got " +
+                                               to_seconds_text(time.age_ns));
+  if (const auto time = find_too_many_samples(scenario))
+    throw places.make_error_at(time->key, to_too_many(*time));
+}
+
+void check_estimator(const Scenario& scenario, const Places& places) {
+  const ModelName& model = scenario.plant.model;
+  const model::AttitudeError& error = scenario.estimator.attitude;
+  if (error.is_zero() || find_model_keys(plant_keys(), model).has_attitude()) return;
+  const bool is_tilted = !error.tilt.isZero(0.0);
+  throw places.make_error_at(
+      is_tilted ? "estimator.tilt_rad" : "estimator.yaw_rad",
+      "expected a plant with an attitude, or 0; model is '" + model.name + "', got " +
+          (is_tilted ? to_yaml_value(error.tilt) : to_yaml_value(error.yaw)));
+}
+
 /// Moves where the vehicle starts and what it follows. Leave conditions refer to the reference.
 void shift(Scenario& scenario, const Eigen::Vector3d& offset) {
   scenario.plant.initial.position += offset;
@@ -200,11 +281,21 @@ Scenario parse_scenario(const std::string& text, const std::string& place) {
   read_value(Value{root, "", root.line, places}, scenario);
   check_times(scenario, places);
   check_faults(scenario, places);
+  check_autopilot(scenario, places);
+  check_sensing(scenario, places);
+  check_estimator(scenario, places);
   find_model_keys(plant_keys(), scenario.plant.model).check(scenario, places);
   find_model_keys(law_keys(), scenario.controller.law).check(scenario, places);
   scenario.text = text;
   scenario.sha256 = calc_sha256(text);
   return scenario;
+}
+
+std::string calc_plant_library_sha256(const Scenario& scenario) {
+  // A plant in a library has no autopilot of ours.
+  const bool is_autopilot = !scenario.plant.model.is_shared_library() && scenario.autopilot;
+  const ModelName& model = is_autopilot ? scenario.autopilot->model : scenario.plant.model;
+  return model.calc_library_sha256(scenario.folder);
 }
 
 std::string to_yaml(const Scenario& scenario) {
@@ -254,6 +345,9 @@ void override_period(Scenario& scenario, double period_s) {
   changed.plant.step_ns = std::min(scenario.plant.step_ns, *period);
   if (*period % changed.plant.step_ns != 0)
     fail(to_mismatch("multiple", "plant.step_s", changed.plant.step_ns, *period));
+  const std::int64_t autopilot_period = changed.autopilot ? changed.autopilot->period_ns : 0;
+  if (autopilot_period % changed.plant.step_ns != 0)
+    fail(to_mismatch("divisor", "autopilot.period_s", autopilot_period, changed.plant.step_ns));
   if (const auto index = find_stage_off_period(changed)) {
     const auto& leave = std::get<LeaveAfter>(changed.mission[*index].leave);
     fail(to_mismatch("divisor", to_stage_path(*index) + ".for_s", leave.duration_ns, *period));
@@ -263,6 +357,8 @@ void override_period(Scenario& scenario, double period_s) {
     if (!mismatch->is_too_long) fail(to_mismatch("divisor", key, mismatch->by_ns, *period));
     fail(key + ": expected " + to_too_long(*period) + ", got " + to_seconds_text(mismatch->by_ns));
   }
+  if (const auto time = find_too_many_samples(changed))
+    fail(std::string(time->key) + ": " + to_too_many(*time));
   scenario = std::move(changed);
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <any>
 #include <cstddef>
@@ -16,6 +17,7 @@
 #include <vector>
 
 #include "common/config/config_error.hpp"
+#include "common/model/offset.hpp"
 #include "common/model/parameters.hpp"
 #include "common/model/state.hpp"
 
@@ -29,7 +31,7 @@ inline constexpr std::size_t kMaxVehicles = 256;
 
 // --- models ------------------------------------------------------------------------------------
 
-/// A plant or a control law, as the file names it.
+/// A plant, a control law or an autopilot, as the file names it.
 struct ModelName {
   std::string name;   ///< of the registry, or the path of a shared library
   std::string place;  ///< FILE:LINE of the key, for messages; empty: not in the file
@@ -101,6 +103,8 @@ struct InitialState {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< of the placed body, m
   Eigen::Vector3d v_WQ = Eigen::Vector3d::Zero();      ///< quadrotor velocity, m/s
   model::RodAngles rod;
+  std::optional<Eigen::Quaterniond> q_WB;  ///< of plants whose vehicles turn; none: level
+  std::optional<Eigen::Vector3d> w_WB_B;   ///< the same, rad/s; none: at rest
 };
 
 struct Plant {
@@ -110,6 +114,13 @@ struct Plant {
   InitialState initial;
   model::Aerodynamics air;                                  ///< true drag and wind
   Eigen::Vector3d disturbance_W = Eigen::Vector3d::Zero();  ///< d, constant, on the quadrotor, N
+};
+
+/// What turns the force that a controller asks for into what the rotors do, inside the plant.
+struct Autopilot {
+  ModelName model{"none", ""};
+  OwnValues own;
+  std::int64_t period_ns = 0;  ///< a multiple of the plant's step; 0: every step
 };
 
 // --- synchronisation ---------------------------------------------------------------------------
@@ -171,6 +182,28 @@ struct Sync {
   }
 };
 
+// --- sensing -----------------------------------------------------------------------------------
+
+/// When a group of sensors samples, and when its samples are seen.
+struct SampleTimes {
+  std::int64_t period_ns = 0;  ///< samples at its multiples from time 0; 0: at every plant step
+  std::int64_t age_ns = 0;     ///< and each is seen this much later
+};
+
+/// How old is what the controllers see, and how late is what they answer.
+struct Sensing {
+  SampleTimes body;                ///< position, velocity, attitude, body rates, signals
+  SampleTimes rod;                 ///< the rod's angles and rates
+  std::int64_t node_delay_ns = 0;  ///< from an answer to the plant
+};
+
+/// Constant errors of what the controllers see.
+struct Estimator {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< of quadrotor and load alike, m
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< of quadrotor and load alike, m/s
+  model::AttitudeError attitude;                       ///< of plants that have one
+};
+
 // --- faults ------------------------------------------------------------------------------------
 
 /// Where a fault acts.
@@ -201,11 +234,8 @@ struct ReorderFault {
 };
 
 /// Numbers added to a sample. `state`: all but `force`; `command`: `force` alone.
-struct SampleOffset {
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< of quadrotor and load alike, m
-  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< of quadrotor and load alike, m/s
-  model::RodAngles rod;                                ///< rad, rad/s; the load moves accordingly
-  Eigen::Vector3d force = Eigen::Vector3d::Zero();     ///< N
+struct SampleOffset : model::StateOffset {
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();  ///< N
 };
 
 struct BiasFault {
@@ -320,9 +350,12 @@ struct Scenario {
   model::SlungLoadParameters vehicle;
   std::vector<VehicleVariant> vehicles{1};  ///< by id; not empty
   Plant plant;
+  std::optional<Autopilot> autopilot;  ///< of plants that have one
   Sync sync;
   Controller controller;
   std::vector<Stage> mission;
+  Sensing sensing;
+  Estimator estimator;
   std::vector<Fault> faults;  ///< of one channel, in the order in which they act
   Record record;
 
@@ -337,6 +370,11 @@ Scenario load_scenario(const std::filesystem::path& file);
 
 /// The same from text that came over the wire; `place` stands for the file's name in messages.
 Scenario parse_scenario(const std::string& text, const std::string& place);
+
+/// SHA-256 of the shared library that the plant loads: that of the plant itself or, where it is none,
+/// of its autopilot; empty where neither is one.
+/// @throws std::system_error naming the file where it cannot be read.
+std::string calc_plant_library_sha256(const Scenario& scenario);
 
 /// Writes every value of `scenario` (not `text`) as YAML that reads back to the same values; what
 /// the controller's model follows is left out.

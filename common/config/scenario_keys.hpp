@@ -176,6 +176,8 @@ void describe(Map& map, InitialState& initial) {
   map.key(kOptional, "beta_rad", initial.rod.beta, kHalfTurn);
   map.key(kOptional, "alpha_dot_rad_s", initial.rod.alpha_dot, kFinite);
   map.key(kOptional, "beta_dot_rad_s", initial.rod.beta_dot, kFinite);
+  map.key(kOptional, "attitude", initial.q_WB);
+  map.key(kOptional, "body_rates_rad_s", initial.w_WB_B);
 }
 
 /// What acts on the quadrotor of a point-mass plant besides the control force.
@@ -190,6 +192,19 @@ void describe(Map& map, Plant& plant) {
   map.model("model", plant.model, plant_keys(), plant);
   map.key(kOptional, "step_s", plant.step_ns, kPositive);
   map.key(kRequired, "initial", plant.initial);
+}
+
+/// Of an autopilot with a rhythm of its own.
+template <class Map>
+void describe_period(Map& map, Autopilot& autopilot) {
+  constexpr std::int64_t kUsual = 4'000'000;  // ns
+  map.by_default(autopilot.period_ns, kUsual);
+  map.key(kOptional, "period_s", autopilot.period_ns, kPositive);
+}
+
+template <class Map>
+void describe(Map& map, Autopilot& autopilot) {
+  map.model("model", autopilot.model, autopilot_keys(), autopilot);
 }
 
 // --- synchronisation -----------------------------------------------------------------------------
@@ -329,6 +344,30 @@ void describe(Map& map, Stage& stage) {
     map.key(kRequired, "until", as<LeaveWithin>(stage.leave));
 }
 
+// --- sensing -------------------------------------------------------------------------------------
+
+template <class Map>
+void describe(Map& map, SampleTimes& times) {
+  map.key(kOptional, "period_s", times.period_ns, kNotNegative);
+  map.key(kOptional, "age_s", times.age_ns, kNotNegative);
+}
+
+template <class Map>
+void describe(Map& map, Sensing& sensing) {
+  describe(map, sensing.body);
+  map.by_default(sensing.rod, sensing.body);
+  map.key(kOptional, "rod", sensing.rod);
+  map.key(kOptional, "node_delay_s", sensing.node_delay_ns, kNotNegative);
+}
+
+template <class Map>
+void describe(Map& map, Estimator& estimator) {
+  map.key(kOptional, "position_m", estimator.position);
+  map.key(kOptional, "velocity_m_s", estimator.velocity);
+  map.key(kOptional, "tilt_rad", estimator.attitude.tilt, kHalfTurn);
+  map.key(kOptional, "yaw_rad", estimator.attitude.yaw, kFullTurn);
+}
+
 // --- faults --------------------------------------------------------------------------------------
 
 template <class Map>
@@ -439,11 +478,14 @@ void describe(Map& map, Scenario& scenario) {
   map.key(kRequired, "vehicle", scenario.vehicle);
   map.key(kOptional, "vehicles", scenario.vehicles, kFleet);
   map.key(kRequired, "plant", scenario.plant);
+  map.key(kOptional, "autopilot", scenario.autopilot);
   map.key(kOptional, "sync", scenario.sync);
   map.by_default(scenario.controller.model,
                  ControllerModel{scenario.vehicle, scenario.plant.air, {true, true, true}});
   map.key(kOptional, "controller", scenario.controller);
   map.key(kRequired, "mission", scenario.mission, kStages);
+  map.key(kOptional, "sensing", scenario.sensing);
+  map.key(kOptional, "estimator", scenario.estimator);
   map.key(kOptional, "faults", scenario.faults, kFaults);
   map.key(kOptional, "record", scenario.record);
 }

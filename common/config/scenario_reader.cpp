@@ -98,6 +98,16 @@ void read_whole_number(const Value& value, Number& number, const Bounds& range) 
   number = *whole;
 }
 
+template <class Vector>
+void read_numbers(const Value& value, Vector& vector, const char* expectation,
+                  const NumberRule& of_each) {
+  if (value.node.kind != YamlNode::Kind::kList ||
+      value.node.items.size() != static_cast<std::size_t>(vector.size()))
+    value.fail_expecting(expectation);
+  for (int i = 0; i < vector.size(); ++i)
+    read_value(value.at(static_cast<std::size_t>(i)), vector[i], of_each);
+}
+
 std::string to_json_text(const std::string& text) { return nlohmann::json(text).dump(); }
 
 /// Any value as JSON: a plain scalar that is a number, true, false or nothing stays that.
@@ -201,10 +211,6 @@ void read_value(const Value& value, double& number, const NumberRule& rule) {
   if (!rule.holds(number)) value.fail_expecting(rule.expectation);
 }
 
-void read_value(const Value& value, std::optional<double>& number, const NumberRule& rule) {
-  read_value(value, number.emplace(), rule);
-}
-
 void read_value(const Value& value, std::int64_t& nanoseconds, const NumberRule& rule) {
   double seconds = 0.0;
   read_value(value, seconds, rule);
@@ -240,9 +246,25 @@ void read_value(const Value& value, std::string& text, const TextRule& rule) {
 void read_value(const Value& value, Eigen::Vector3d& vector) { read_value(value, vector, kFinite); }
 
 void read_value(const Value& value, Eigen::Vector3d& vector, const NumberRule& of_each) {
-  if (value.node.kind != YamlNode::Kind::kList || value.node.items.size() != 3)
-    value.fail_expecting("a list of three numbers");
-  for (int i = 0; i < 3; ++i) read_value(value.at(static_cast<std::size_t>(i)), vector[i], of_each);
+  read_numbers(value, vector, "a list of three numbers", of_each);
+}
+
+void read_value(const Value& value, Eigen::Vector2d& vector, const NumberRule& of_each) {
+  read_numbers(value, vector, "a list of two numbers", of_each);
+}
+
+void read_value(const Value& value, Eigen::Quaterniond& quaternion) {
+  constexpr double kUnitLength = 1e-6;  // what a rounded unit quaternion may be off
+  constexpr double kRounding = 1e-15;   // so that what is written reads back to the same bits
+  if (value.node.kind != YamlNode::Kind::kList || value.node.items.size() != 4)
+    value.fail_expecting("a unit quaternion, a list w, x, y, z");
+  double wxyz[4];
+  for (std::size_t i = 0; i < 4; ++i) read_value(value.at(i), wxyz[i], kFinite);
+  quaternion = Eigen::Quaterniond(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
+  const double length = quaternion.norm();
+  if (!(std::abs(length - 1.0) <= kUnitLength))
+    value.fail("expected a unit quaternion, got one of length " + to_text(length));
+  if (std::abs(length - 1.0) > kRounding) quaternion.normalize();
 }
 
 void read_value(const Value& value, std::vector<VehicleVariant>& fleet, const ListRange& range) {

@@ -99,7 +99,6 @@ void check_keys(const Value& value, const KeyNames& known);
 
 // One per type of field. @throws ConfigError where the node is something else or breaks the rule.
 void read_value(const Value& value, double& number, const NumberRule& rule);
-void read_value(const Value& value, std::optional<double>& number, const NumberRule& rule);
 void read_value(const Value& value, std::int64_t& nanoseconds, const NumberRule& rule);
 void read_value(const Value& value, int& number, const Range& range);
 void read_value(const Value& value, std::uint64_t& number, const WideRange& range);
@@ -107,6 +106,9 @@ void read_value(const Value& value, bool& flag);
 void read_value(const Value& value, std::string& text, const TextRule& rule);
 void read_value(const Value& value, Eigen::Vector3d& vector);
 void read_value(const Value& value, Eigen::Vector3d& vector, const NumberRule& of_each);
+void read_value(const Value& value, Eigen::Vector2d& vector, const NumberRule& of_each);
+/// A list w, x, y, z of length 1, which is then normalised.
+void read_value(const Value& value, Eigen::Quaterniond& quaternion);
 void read_value(const Value& value, std::vector<VehicleVariant>& fleet, const ListRange& range);
 /// `names` are those of a registry, `expectation` what it lists.
 void read_value(const Value& value, ModelName& model, const std::vector<std::string>& names,
@@ -180,6 +182,12 @@ void read_value(const Value& value, std::vector<Element>& list, const ListRange&
   for (std::size_t i = 0; i < list.size(); ++i) read_value(value.at(i), list[i]);
 }
 
+/// What the file may leave out.
+template <class Field, class... Rule>
+void read_value(const Value& value, std::optional<Field>& field, const Rule&... rule) {
+  read_value(value, field.emplace(), rule...);
+}
+
 /// Maps, and texts that stand for the value of an enumeration.
 template <class Field, class... Rule>
 void read_value(const Value& value, Field& field, const Rule&... rule) {
@@ -251,15 +259,18 @@ void KeyNames::model(const char* name, ModelName& field, const ModelRegistry<Sec
   if (find_key(map_.node, name) >= 0)
     MapReader(map_).key(kOptional, name, field, list_names(registry), list_models(registry));
   find_model_keys(registry, field).describe(*this, section);
+  std::map<std::string, std::string> owners;  // of each key
   const auto note = [&](const ModelKeys<Section>& keys, const std::string& owner) {
     KeyNames others(map_);
     Section scratch;
     keys.describe(others, scratch);
     for (const std::string& key : others.names())
-      owners_.emplace(key, "a key of " + owner + ", here " + name + " is '" + field.name + "'");
+      owners[key] += (owners[key].empty() ? "" : " or ") + owner;
   };
   for (const auto& [other, keys] : registry) note(*keys, name + (" '" + other + "'"));
   note(find_model_keys(registry, ModelName{"any.so", ""}), "shared libraries");
+  for (const auto& [key, all] : owners)
+    owners_.emplace(key, "a key of " + all + ", here " + name + " is '" + field.name + "'");
 }
 
 }  // namespace sls::config

@@ -14,7 +14,6 @@
 namespace sls::config {
 
 inline std::string to_yaml_value(double number) { return to_text(number); }
-inline std::string to_yaml_value(const std::optional<double>& number) { return to_text(*number); }
 inline std::string to_yaml_value(std::int64_t nanoseconds) {
   return to_text(to_seconds(nanoseconds));
 }
@@ -30,6 +29,13 @@ inline std::string to_yaml_value(const std::string& text) {
 inline std::string to_yaml_value(const Eigen::Vector3d& vector) {
   return "[" + to_text(vector.x()) + ", " + to_text(vector.y()) + ", " + to_text(vector.z()) + "]";
 }
+inline std::string to_yaml_value(const Eigen::Vector2d& vector) {
+  return "[" + to_text(vector.x()) + ", " + to_text(vector.y()) + "]";
+}
+inline std::string to_yaml_value(const Eigen::Quaterniond& q) {
+  return "[" + to_text(q.w()) + ", " + to_text(q.x()) + ", " + to_text(q.y()) + ", " +
+         to_text(q.z()) + "]";
+}
 inline std::string to_yaml_value(const ModelName& model) { return to_yaml_value(model.name); }
 inline std::string to_yaml_value(const LibraryParameters& parameters) { return parameters.json; }
 template <class Enum, std::enable_if_t<std::is_enum_v<Enum>, int> = 0>
@@ -43,14 +49,9 @@ std::string to_yaml_value(Enum value) {
 template <class Field>
 inline constexpr bool kOnOneLine =
     std::is_arithmetic_v<Field> || std::is_enum_v<Field> || std::is_same_v<Field, std::string> ||
-    std::is_same_v<Field, Eigen::Vector3d> || std::is_same_v<Field, std::optional<double>> ||
-    std::is_same_v<Field, ModelName> || std::is_same_v<Field, LibraryParameters>;
-
-template <class Field>
-bool says_nothing(const Field&) {
-  return false;
-}
-inline bool says_nothing(const std::optional<double>& number) { return !number; }
+    std::is_same_v<Field, Eigen::Vector3d> || std::is_same_v<Field, Eigen::Vector2d> ||
+    std::is_same_v<Field, Eigen::Quaterniond> || std::is_same_v<Field, ModelName> ||
+    std::is_same_v<Field, LibraryParameters>;
 
 /// The `Map` that writes: describe(writer, field) appends `field` to the text.
 class MapWriter {
@@ -60,7 +61,6 @@ class MapWriter {
 
   template <class Field, class... Rule>
   void key(Presence, const char* name, Field& field, const Rule&... rule) {
-    if (says_nothing(field)) return;
     text_ += next_ + name + ":";
     next_ = indentation_;
     if constexpr (kOnOneLine<Field>) {
@@ -68,6 +68,12 @@ class MapWriter {
     } else {
       write_block(field, rule...);
     }
+  }
+
+  /// What the file may leave out.
+  template <class Field, class... Rule>
+  void key(Presence presence, const char* name, std::optional<Field>& field, const Rule&... rule) {
+    if (field) key(presence, name, *field, rule...);
   }
 
   template <class Choice>

@@ -1,4 +1,4 @@
-/// What plants and laws in shared libraries have in common: the check of a library's table of
+/// What plants, laws and autopilots in shared libraries have in common: the check of a library's table of
 /// functions, and texts that it writes.
 #pragma once
 

@@ -33,14 +33,24 @@ class Plant {
   ///   `measurement` is then still that of an earlier step.
   virtual void advance(const std::vector<Eigen::Vector3d>& f_Q_W, std::int64_t steps) = 0;
 
-  /// After the last step; finite.
+  /// The truth after the last step; finite.
   virtual const model::Measurement& measurement(std::size_t vehicle) const = 0;
+
+  /// What sensors and estimator say after the last step. A plant leaves this alone: `sensing` and
+  /// `estimator` of the scenario are put around every plant alike (sensing/).
+  virtual const model::Measurement& seen(std::size_t vehicle) const { return measurement(vehicle); }
+
+  /// Whether `seen` is always the truth at the end of a control period.
+  virtual bool sees_truth() const { return true; }
 
   /// Whether attitude and body rates say anything: false of point masses, which stay level.
   virtual bool has_attitude() const { return false; }
 
   /// The signals in every measurement, in their order; at most `model::kMaxNumbers`.
   virtual std::vector<Signal> signals() const { return {}; }
+
+  /// What people should know of a vehicle's flight, since this was last asked: a few lines at most.
+  virtual std::vector<std::string> take_remarks(std::size_t) { return {}; }
 };
 
 /// What a plant is made from.
@@ -51,8 +61,10 @@ struct PlantSetup {
     config::InitialState initial;
   };
   config::Plant plant;            ///< but for `initial`, which each vehicle has of its own
+  config::Autopilot autopilot;    ///< of plants that take one
   std::filesystem::path folder;   ///< of the scenario file
   std::vector<Vehicle> vehicles;  ///< at least one, by ascending id
+  config::Estimator estimator;    ///< for an autopilot inside the plant; `seen` is none of its work
 };
 
 enum class Moves {
@@ -77,7 +89,8 @@ struct PlantOfVehicles {
   std::vector<Eigen::Vector3d> forces;  ///< on them in the period in work; kept to spare allocation
 };
 
-/// The plants that fly the vehicles `ids` (ascending) of `fleet`.
+/// The plants that fly the vehicles `ids` (ascending) of `fleet`, seen as its `sensing` and
+/// `estimator` say.
 /// @throws config::ConfigError as `make`; also where a plant of all vehicles gets only some, or a
 ///   signal's name or unit cannot be that of a column.
 std::vector<PlantOfVehicles> make_plants(const PlantType& type, const config::Scenario& fleet,

@@ -6,6 +6,7 @@
 
 #include "common/config/vehicle_ids.hpp"
 #include "sim_server/plants/plant.hpp"
+#include "sim_server/plants/sensing/sensed_plant.hpp"
 
 namespace sls::sim {
 
@@ -64,7 +65,11 @@ void check_signals(const std::vector<Signal>& signals, const config::ModelName& 
 
 std::vector<PlantOfVehicles> make_plants(const PlantType& type, const config::Scenario& fleet,
                                          const std::vector<std::uint32_t>& ids) {
-  PlantSetup setup{fleet.plant, fleet.folder, {}};
+  PlantSetup setup;
+  setup.plant = fleet.plant;
+  setup.autopilot = fleet.autopilot.value_or(config::Autopilot());
+  setup.folder = fleet.folder;
+  setup.estimator = fleet.estimator;
   for (const std::uint32_t id : ids) {
     const config::Scenario alone = config::make_vehicle_scenario(fleet, id);
     setup.vehicles.push_back({id, alone.vehicle, alone.plant.initial});
@@ -76,14 +81,16 @@ std::vector<PlantOfVehicles> make_plants(const PlantType& type, const config::Sc
                                 std::to_string(fleet.vehicles.size()) + " vehicles, which '" +
                                 fleet.plant.model.name + "' moves together, got one of " +
                                 config::to_vehicle_ranges(ids));
-    plants.push_back({type.make(setup), std::vector<std::size_t>(ids.size()), {}});
+    plants.push_back(
+        {make_sensed(type.make(setup), setup, fleet), std::vector<std::size_t>(ids.size()), {}});
     std::iota(plants[0].vehicles.begin(), plants[0].vehicles.end(), 0);
     check_signals(plants[0].plant->signals(), fleet.plant.model);
     return plants;
   }
   for (std::size_t i = 0; i < ids.size(); ++i) {
-    const PlantSetup one{setup.plant, setup.folder, {setup.vehicles[i]}};
-    plants.push_back({type.make(one), {i}, {}});
+    PlantSetup one = setup;
+    one.vehicles = {setup.vehicles[i]};
+    plants.push_back({make_sensed(type.make(one), one, fleet), {i}, {}});
     check_signals(plants.back().plant->signals(), fleet.plant.model);
   }
   return plants;

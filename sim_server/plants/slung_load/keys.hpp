@@ -1,22 +1,13 @@
 /// The scenario keys of the plant `slung_load`.
 #pragma once
 
-#include <array>
-
 #include "common/config/scenario_keys.hpp"
+#include "sim_server/plants/pendulum.hpp"
 
 namespace sls::sim {
 
-enum class Pendulum {
-  kIdeal,  ///< point load on a massless rod
-  kRigid,  ///< the published links: base, rod with inertia, load with inertia
-};
-inline std::array<config::Name<Pendulum>, 2> names_of(Pendulum) {
-  return {{{"ideal", Pendulum::kIdeal}, {"rigid", Pendulum::kRigid}}};
-}
-
 struct SlungLoadKeys {
-  Pendulum pendulum = Pendulum::kIdeal;
+  Pendulum pendulum = Pendulum::kIdeal;  ///< `rigid`: the published links
 };
 
 template <class Map>

@@ -1,0 +1,33 @@
+# How plants, autopilots and laws are built. Each kind has a folder with a registry, a file
+# KINDs.def that names the models, one line each, and a folder for each of them.
+#
+# sls_add_models(KIND SOURCES …): in the folder of the kind. Makes sls_KIND_keys, which every
+# program links, and sls_KINDs, for those that fly or control.
+function(sls_add_models kind)
+  add_library(sls_${kind}_keys STATIC keys.cpp)
+  add_library(sls::${kind}_keys ALIAS sls_${kind}_keys)
+  target_link_libraries(sls_${kind}_keys PUBLIC sls::config)
+  cmake_parse_arguments(MODELS "" "" "SOURCES" ${ARGN})
+  add_library(sls_${kind}s STATIC ${MODELS_SOURCES})
+  add_library(sls::${kind}s ALIAS sls_${kind}s)
+  target_link_libraries(sls_${kind}s PUBLIC sls::config sls::model)
+
+  string(TOUPPER ${kind} macro)
+  file(STRINGS ${kind}s.def models REGEX "^SLS_${macro}\\(")
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${kind}s.def)
+  foreach(model IN LISTS models)
+    string(REGEX REPLACE "^SLS_${macro}\\((.*)\\)$" "\\1" model ${model})
+    add_subdirectory(${model})
+  endforeach()
+endfunction()
+
+# sls_add_model(KIND KEYS … SOURCES … [LIBRARIES …]): in the folder of one model. KIND is plant,
+# autopilot or law.
+function(sls_add_model kind)
+  cmake_parse_arguments(MODEL "" "" "KEYS;SOURCES;LIBRARIES" ${ARGN})
+  list(TRANSFORM MODEL_KEYS PREPEND ${CMAKE_CURRENT_SOURCE_DIR}/)
+  list(TRANSFORM MODEL_SOURCES PREPEND ${CMAKE_CURRENT_SOURCE_DIR}/)
+  target_sources(sls_${kind}_keys PRIVATE ${MODEL_KEYS})
+  target_sources(sls_${kind}s PRIVATE ${MODEL_SOURCES})
+  target_link_libraries(sls_${kind}s PRIVATE ${MODEL_LIBRARIES})
+endfunction()

@@ -1,0 +1,33 @@
+#include "sim_server/autopilots/px4/low_pass_filter.hpp"
+
+#include <cmath>
+
+#include "common/config/scenario_keys.hpp"
+
+namespace sls::sim::px4 {
+
+LowPassFilter::LowPassFilter(double sample_rate, double cut_off) : is_off_(cut_off == 0.0) {
+  if (is_off_) return;
+  // Eq. (7).
+  const double w = std::tan(config::kPi * cut_off / sample_rate);
+  const double scale = 1.0 / (1.0 + std::sqrt(2.0) * w + w * w);
+  gain_ = w * w * scale;
+  a1_ = 2.0 * (w * w - 1.0) * scale;
+  a2_ = (1.0 - std::sqrt(2.0) * w + w * w) * scale;
+}
+
+Eigen::Vector3d LowPassFilter::step(const Eigen::Vector3d& sample) {
+  if (is_off_) return sample;
+  if (!has_started_) {
+    last_ = last_but_one_ = sample / (1.0 + a1_ + a2_);
+    has_started_ = true;
+  }
+  // Eq. (8).
+  const Eigen::Vector3d now = sample - a1_ * last_ - a2_ * last_but_one_;
+  const Eigen::Vector3d filtered = gain_ * (now + 2.0 * last_ + last_but_one_);
+  last_but_one_ = last_;
+  last_ = now;
+  return filtered;
+}
+
+}  // namespace sls::sim::px4

@@ -1,0 +1,33 @@
+/// From torques and thrust to the outputs of the rotors.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "sim_server/autopilots/autopilot.hpp"
+#include "sim_server/autopilots/px4/rate_control.hpp"
+
+namespace sls::sim::px4 {
+
+/// What a rotor's output gets of each normalised demand.
+struct MixerRow {
+  double roll = 0.0;
+  double pitch = 0.0;
+  double yaw = 0.0;
+  double thrust = 1.0;
+};
+
+/// Rows that suit the rotors' places, axes and constants, scaled as PX4 scales them: README.md,
+/// eq. (12). Without authority over yaw its entries are 0.
+/// @throws config::ConfigError where the rotors cannot roll or pitch the body.
+std::vector<MixerRow> make_mixer(const AutopilotSetup& setup);
+
+struct MixerOutput {
+  Eigen::VectorXd outputs;  ///< of each rotor, 0 … 1
+  Saturation saturation;
+};
+
+/// README.md, "Mixer". `torque` (roll, pitch, yaw) counts up to ±1, `thrust` from 0 to 1.
+MixerOutput mix(const std::vector<MixerRow>& mixer, const Eigen::Vector3d& torque, double thrust);
+
+}  // namespace sls::sim::px4

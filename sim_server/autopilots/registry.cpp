@@ -1,0 +1,48 @@
+#include <cmath>
+#include <map>
+
+#include "sim_server/autopilots/autopilot.hpp"
+
+namespace sls::sim {
+
+#define SLS_AUTOPILOT(name) std::unique_ptr<Autopilot> make_##name(const AutopilotSetup& setup);
+#include "sim_server/autopilots/autopilots.def"
+#undef SLS_AUTOPILOT
+std::unique_ptr<Autopilot> make_shared_library_autopilot(const AutopilotSetup& setup);
+
+std::unique_ptr<Autopilot> make_autopilot(const AutopilotSetup& setup) {
+  using Make = std::unique_ptr<Autopilot> (*)(const AutopilotSetup&);
+  static const std::map<std::string, Make> registry{
+#define SLS_AUTOPILOT(name) {#name, make_##name},
+#include "sim_server/autopilots/autopilots.def"
+#undef SLS_AUTOPILOT
+  };
+  const config::ModelName& model = setup.autopilot.model;
+  if (model.is_shared_library()) return make_shared_library_autopilot(setup);
+  const auto found = registry.find(model.name);
+  if (found == registry.end())
+    throw config::ConfigError("autopilot.model: expected " +
+                              config::list_models(config::autopilot_keys()) + ", got " +
+                              model.name);
+  return found->second(setup);
+}
+
+Eigen::Quaterniond calc_attitude_for(const Eigen::Vector3d& f_W, double yaw) {
+  using Eigen::AngleAxisd, Eigen::Vector3d;
+  // Seen from the heading, so that roll and pitch mean the same whatever the yaw.
+  const Vector3d f = AngleAxisd(-yaw, Vector3d::UnitZ()) * f_W.normalized();
+  const double roll = std::asin(std::max(-1.0, std::min(1.0, f.y())));
+  const double pitch = std::atan2(-f.x(), -f.z());
+  return AngleAxisd(yaw, Vector3d::UnitZ()) * AngleAxisd(pitch, Vector3d::UnitY()) *
+         AngleAxisd(roll, Vector3d::UnitX());
+}
+
+Eigen::VectorXd calc_equal_speeds(const std::vector<Rotor>& rotors, double thrust) {
+  Eigen::VectorXd speeds(rotors.size());
+  const double share = std::max(thrust, 0.0) / static_cast<double>(rotors.size());
+  for (std::size_t i = 0; i < rotors.size(); ++i)
+    speeds[i] = std::sqrt(share / rotors[i].thrust_constant);
+  return speeds;
+}
+
+}  // namespace sls::sim

@@ -1,0 +1,90 @@
+#include "sim_server/plants/multirotor/airframe.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <cmath>
+#include <sstream>
+
+namespace sls::sim {
+namespace {
+
+using Eigen::Matrix3d, Eigen::Vector3d;
+
+Matrix3d make_tensor(const Vector3d& moments, const Vector3d& products) {
+  Matrix3d tensor = moments.asDiagonal();
+  tensor(0, 1) = tensor(1, 0) = products[0];
+  tensor(0, 2) = tensor(2, 0) = products[1];
+  tensor(1, 2) = tensor(2, 1) = products[2];
+  return tensor;
+}
+
+/// Inertia of a point mass at `p` about the origin.
+Matrix3d calc_point_inertia(double mass, const Vector3d& p) {
+  return mass * (p.squaredNorm() * Matrix3d::Identity() - p * p.transpose());
+}
+
+}  // namespace
+
+std::vector<FlyingRotor> make_rotors(const MultirotorKeys& keys) {
+  std::vector<FlyingRotor> rotors;
+  for (const RotorKeys& described : keys.rotors) {
+    const RotorNumbers<double>& all = keys.rotor;
+    const RotorNumbers<std::optional<double>>& own = described.own;
+    FlyingRotor rotor;
+    rotor.p_BR = described.position;
+    rotor.axis_B = described.axis.normalized();
+    rotor.spin = described.spin == Spin::kCounterClockwise ? 1.0 : -1.0;
+    rotor.thrust_constant = own.thrust_constant.value_or(all.thrust_constant);
+    rotor.torque_constant = own.torque_constant.value_or(all.torque_constant);
+    rotor.drag_constant = own.drag_constant.value_or(all.drag_constant);
+    rotor.rolling_constant = own.rolling_constant.value_or(all.rolling_constant);
+    rotor.min_speed = own.min_speed.value_or(all.min_speed);
+    rotor.max_speed = own.max_speed.value_or(all.max_speed);
+    rotor.lag_up = own.lag_up.value_or(all.lag_up);
+    rotor.lag_down = own.lag_down.value_or(all.lag_down);
+    rotor.thrust_loss_speed = own.thrust_loss_speed.value_or(all.thrust_loss_speed);
+    rotors.push_back(rotor);
+  }
+  return rotors;
+}
+
+Airframe make_airframe(const MultirotorKeys& keys, double quad_mass) {
+  Airframe airframe;
+  airframe.mass = quad_mass;
+  double bare_mass = quad_mass;
+  for (const FixedBodyKeys& body : keys.bodies) {
+    bare_mass -= body.mass;
+    airframe.p_BC += body.mass / quad_mass * body.position;
+  }
+  // About the centre of mass: each part's own, and that of its mass at its place.
+  airframe.inertia_C_B =
+      make_tensor(keys.inertia, keys.products) + calc_point_inertia(bare_mass, -airframe.p_BC);
+  for (const FixedBodyKeys& body : keys.bodies)
+    airframe.inertia_C_B += Matrix3d(body.inertia.asDiagonal()) +
+                            calc_point_inertia(body.mass, body.position - airframe.p_BC);
+  for (const FlyingRotor& rotor : make_rotors(keys)) airframe.rotors.push_back(rotor);
+  return airframe;
+}
+
+double calc_largest_lift(const std::vector<FlyingRotor>& rotors) {
+  double lift = 0.0;
+  for (const FlyingRotor& rotor : rotors)
+    lift -= rotor.axis_B.z() * rotor.thrust_constant * rotor.max_speed * rotor.max_speed;
+  return lift;
+}
+
+std::string find_inertia_defect(const Vector3d& moments, const Vector3d& products) {
+  const Vector3d principal =
+      Eigen::SelfAdjointEigenSolver<Matrix3d>(make_tensor(moments, products)).eigenvalues();
+  std::ostringstream list;
+  list.precision(12);  // the digits beyond are the solver's
+  list << principal[0] << ", " << principal[1] << ", " << principal[2];
+  if (principal[0] < 0.0) return "expected principal moments >= 0, got " + list.str();
+  const double rounding = 1e-12 * principal[2];
+  if (principal[2] > principal[0] + principal[1] + rounding)
+    return "expected principal moments of which none is larger than the sum of the others, got " +
+           list.str();
+  return "";
+}
+
+}  // namespace sls::sim

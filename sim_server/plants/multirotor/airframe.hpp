@@ -1,0 +1,35 @@
+/// The rigid body that a scenario describes: its mass properties and rotors, and what contradicts
+/// them. No Simbody here.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "sim_server/autopilots/autopilot.hpp"
+#include "sim_server/plants/multirotor/keys.hpp"
+
+namespace sls::sim {
+
+/// A rotor with what the autopilot does not know of it.
+struct FlyingRotor : Rotor {
+  double drag_constant = 0.0;      ///< N·s²/m
+  double rolling_constant = 0.0;   ///< N·s²
+  double lag_up = 0.0;             ///< s
+  double lag_down = 0.0;           ///< s
+  double thrust_loss_speed = 0.0;  ///< m/s; 0: no loss
+};
+
+/// The rotors that the keys describe, their axes of length 1.
+std::vector<FlyingRotor> make_rotors(const MultirotorKeys& keys);
+
+/// The body with all that is fixed to it: `quad_mass` is the mass of the whole.
+Airframe make_airframe(const MultirotorKeys& keys, double quad_mass);
+
+/// Largest collective thrust of a level vehicle at rest, N.
+double calc_largest_lift(const std::vector<FlyingRotor>& rotors);
+
+/// Triangle rule of a rigid body: no principal moment is larger than the sum of the others.
+/// Empty, or what is wrong.
+std::string find_inertia_defect(const Eigen::Vector3d& moments, const Eigen::Vector3d& products);
+
+}  // namespace sls::sim

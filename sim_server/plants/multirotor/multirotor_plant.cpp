@@ -1,0 +1,446 @@
+#include "sim_server/plants/multirotor/multirotor_plant.hpp"
+
+#include <Simbody.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <stdexcept>
+#include <string>
+
+#include "common/model/offset.hpp"
+#include "sim_server/autopilots/autopilot.hpp"
+#include "sim_server/autopilots/rotor_wrenches.hpp"
+#include "sim_server/plants/multirotor/airframe.hpp"
+#include "sim_server/plants/multirotor/keys.hpp"
+#include "sim_server/plants/multirotor/multirotor_dynamics.hpp"
+#include "sim_server/plants/multirotor/rotor_model.hpp"
+#include "sim_server/plants/multirotor/saturation_watch.hpp"
+
+namespace sls::sim {
+namespace {
+
+using Eigen::Vector3d, Eigen::VectorXd;
+
+/// Coordinates and speeds as Simbody orders them. The body: quaternion and place; angular velocity
+/// and velocity, both in W. The pendulum, seen from the body: quaternion; two or three speeds.
+constexpr int kCoordinates = 11, kMostSpeeds = 9;
+struct Motion {
+  Eigen::Matrix<double, kCoordinates, 1> q;
+  Eigen::Matrix<double, kMostSpeeds, 1> u;  ///< a speed that the joint lacks is 0
+};
+
+Motion add(const Motion& motion, double h, const Motion& rate) {
+  return {motion.q + h * rate.q, motion.u + h * rate.u};
+}
+
+SimTK::Vec3 to_simtk(const Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+Vector3d to_eigen(const SimTK::Vec3& v) { return {v[0], v[1], v[2]}; }
+
+SimTK::Rotation to_simtk(const Eigen::Quaterniond& q) {
+  return SimTK::Rotation(SimTK::Quaternion(q.w(), q.x(), q.y(), q.z()));
+}
+
+/// Rotation whose z axis is the rod: common/model/README.md, eq. (1).
+SimTK::Rotation to_rod_frame(const model::RodAngles& rod) {
+  return {SimTK::BodyRotationSequence, rod.alpha, SimTK::XAxis, rod.beta, SimTK::YAxis};
+}
+
+/// About the body's origin.
+SimTK::MassProperties make_mass_properties(const Airframe& airframe) {
+  const Eigen::Matrix3d& J = airframe.inertia_C_B;
+  const SimTK::Inertia central(J(0, 0), J(1, 1), J(2, 2), J(0, 1), J(0, 2), J(1, 2));
+  const SimTK::Vec3 centre = to_simtk(airframe.p_BC);
+  return {airframe.mass, centre, central.shiftFromMassCenter(centre, airframe.mass)};
+}
+
+/// Rod and load about the joint; z along the rod.
+SimTK::MassProperties make_pendulum_properties(const MultirotorKeys& keys,
+                                               const model::SlungLoadParameters& vehicle) {
+  const SimTK::Vec3 p_JL(0, 0, vehicle.rod_length);
+  const SimTK::Inertia point = SimTK::Inertia::pointMassAt(p_JL, vehicle.load_mass);
+  if (keys.pendulum == Pendulum::kIdeal) return {vehicle.load_mass, p_JL, point};
+  const RodKeys& rod = *keys.rod;
+  const SimTK::Vec3 p_JR(0, 0, rod.centre);
+  const double mass = vehicle.load_mass + rod.mass;
+  const SimTK::Inertia inertia = point + SimTK::Inertia(to_simtk(*keys.load_inertia)) +
+                                 SimTK::Inertia::pointMassAt(p_JR, rod.mass) +
+                                 SimTK::Inertia(to_simtk(rod.inertia));
+  return {mass, (vehicle.load_mass * p_JL + rod.mass * p_JR) / mass, inertia};
+}
+
+SimTK::MobilizedBody add_pendulum(SimTK::MobilizedBody& body, const MultirotorKeys& keys,
+                                  const model::SlungLoadParameters& vehicle) {
+  const SimTK::Transform joint(to_simtk(keys.attachment));
+  const SimTK::Body::Rigid links(make_pendulum_properties(keys, vehicle));
+  // A point load has no inertia about the rod, which makes the mass matrix of a Ball singular.
+  if (keys.pendulum == Pendulum::kIdeal)
+    return SimTK::MobilizedBody::LineOrientation(body, joint, links, SimTK::Transform());
+  return SimTK::MobilizedBody::Ball(body, joint, links, SimTK::Transform());
+}
+
+void check_finite(const Motion& motion, std::int64_t step) {
+  if (!motion.q.segment<3>(4).allFinite()) throw_not_finite("quadrotor position", step);
+  if (!motion.q.head<4>().allFinite()) throw_not_finite("attitude", step);
+  if (!motion.q.tail<4>().allFinite()) throw_not_finite("rod direction", step);
+  if (!motion.u.segment<3>(3).allFinite()) throw_not_finite("quadrotor velocity", step);
+  if (!motion.u.head<3>().allFinite()) throw_not_finite("body rates", step);
+  if (!motion.u.allFinite()) throw_not_finite("rod angular velocity", step);
+}
+
+void check_finite(const AutopilotOutput& wanted, std::int64_t step) {
+  for (Eigen::Index i = 0; i < wanted.rotor_speeds.size(); ++i)
+    if (!std::isfinite(wanted.rotor_speeds[i]))
+      throw_not_finite("rotor_" + std::to_string(i + 1) + "_set_rad_s", step);
+  if (!wanted.q_WB.coeffs().allFinite()) throw_not_finite("attitude set-point", step);
+  if (!std::isfinite(wanted.thrust)) throw_not_finite("thrust_set_n", step);
+  if (wanted.direction_W && !wanted.direction_W->allFinite())
+    throw_not_finite("direction of the thrust", step);
+}
+
+using TurningRotors = std::vector<RotorSpeed>;
+
+}  // namespace
+
+/// The multibody system at one motion. README.md, "Integration", says what is Simbody's part.
+struct MultirotorPlant::Multibody {
+  explicit Multibody(const PlantSetup& setup)
+      : keys(setup.plant.own.get<MultirotorKeys>()),
+        config(setup.plant),
+        vehicle(setup.vehicles[0].parameters),
+        airframe(make_airframe(keys, vehicle.quad_mass)),
+        rotors(make_rotors(keys)),
+        step_s(1e-9 * static_cast<double>(config.step_ns)),
+        is_ideal(keys.pendulum == Pendulum::kIdeal),
+        attitude_error(model::turn(Eigen::Quaterniond::Identity(), setup.estimator.attitude)),
+        body(matter.Ground(), SimTK::Transform(),
+             SimTK::Body::Rigid(make_mass_properties(airframe)), SimTK::Transform()),
+        pendulum(add_pendulum(body, keys, vehicle)),
+        watch(rotors.size(), config.step_ns),
+        starting(rotors.size()),
+        middle(rotors.size()),
+        ending(rotors.size()) {
+    for (const FlyingRotor& rotor : rotors) {
+      lags.emplace_back(rotor, step_s);
+    }
+    make_autopilot_of(setup);
+    system.realizeTopology();
+    state = system.getDefaultState();
+    system.realize(state, SimTK::Stage::Instance);
+    speeds = state.getNU();
+    pendulum_mass = pendulum.getBodyMassProperties(state).getMass();
+    dynamics.emplace(body.getBodyMassProperties(state), to_simtk(keys.attachment),
+                     pendulum.getBodyMassProperties(state),
+                     is_ideal ? PendulumBody::kPoint : PendulumBody::kRigid, vehicle.gravity);
+    place(setup.vehicles[0].initial);
+    start_rotors();
+    held = measure(0);
+    if (!has_yaw_authority(airframe))
+      watch.add(
+          "the rotors have no authority over yaw: they cannot turn the vehicle about z alone");
+  }
+
+  void make_autopilot_of(const PlantSetup& setup) {
+    AutopilotSetup given{setup.autopilot, setup.folder, setup.vehicles[0].id, vehicle, airframe};
+    if (given.autopilot.period_ns == 0) given.autopilot.period_ns = config.step_ns;
+    autopilot_steps = given.autopilot.period_ns / config.step_ns;
+    autopilot = make_autopilot(given);
+  }
+
+  void place(const config::InitialState& initial) {
+    const model::RodDirection rod = model::to_direction(initial.rod);
+    const SimTK::Rotation R_WB = to_simtk(initial.q_WB.value_or(Eigen::Quaterniond::Identity()));
+    const SimTK::Vec3 w_WB_W = R_WB * to_simtk(initial.w_WB_B.value_or(Vector3d::Zero()));
+    const SimTK::Vec3 p_BA_W = R_WB * to_simtk(keys.attachment);
+    SimTK::Vec3 p_WQ = to_simtk(initial.position);
+    if (initial.placed == config::Body::kLoad)
+      p_WQ -= p_BA_W + vehicle.rod_length * to_simtk(rod.n_W);
+    body.setQToFitTransform(state, SimTK::Transform(R_WB, p_WQ));
+    body.setUToFitVelocity(state, SimTK::SpatialVec(w_WB_W, to_simtk(initial.v_WQ)));
+    // The joint's own motion is that of the rod beside the body.
+    pendulum.setQToFitRotation(state, ~R_WB * to_rod_frame(initial.rod));
+    pendulum.setUToFitAngularVelocity(state,
+                                      ~R_WB * (to_simtk(rod.n_W.cross(rod.n_dot_W)) - w_WB_W));
+    const SimTK::Vector &q = state.getQ(), &u = state.getU();
+    for (int i = 0; i < kCoordinates; ++i) motion.q[i] = q[i];
+    motion.u.setZero();
+    for (int i = 0; i < speeds; ++i) motion.u[i] = u[i];
+    realize_positions(motion);
+    realize_velocities(motion);
+  }
+
+  void start_rotors() {
+    output.rotor_speeds =
+        calc_equal_speeds(airframe.rotors, (vehicle.quad_mass + pendulum_mass) * vehicle.gravity);
+    set_points = output.rotor_speeds;
+    limit(set_points);
+    rotor_speeds = set_points;
+  }
+
+  /// To what the rotors can do.
+  void limit(VectorXd& wanted) const {
+    for (std::size_t i = 0; i < rotors.size(); ++i) {
+      double& speed = wanted[static_cast<Eigen::Index>(i)];
+      speed = std::max(rotors[i].min_speed, std::min(rotors[i].max_speed, speed));
+    }
+  }
+
+  void realize_positions(const Motion& at) {
+    std::copy_n(at.q.data(), kCoordinates, &state.updQ()[0]);
+    matter.realizePositionKinematics(state);
+  }
+
+  void realize_velocities(const Motion& at) {
+    std::copy_n(at.u.data(), speeds, &state.updU()[0]);
+    matter.realizeVelocityKinematics(state);
+  }
+
+  model::Attitude attitude() const {
+    // The coordinates hold it as a quaternion of length 1.
+    const Eigen::Quaterniond q_WB(motion.q[0], motion.q[1], motion.q[2], motion.q[3]);
+    return {q_WB, q_WB.conjugate() * Vector3d(motion.u.head<3>())};
+  }
+
+  // --- autopilot ---------------------------------------------------------------------------------
+
+  void step_autopilot(const Vector3d& f_Q_W, std::int64_t step) {
+    if (step % autopilot_steps == 0) {
+      AutopilotInput input;
+      input.f_Q_W = f_Q_W;
+      input.attitude = attitude();
+      input.attitude.q_WB = attitude_error * input.attitude.q_WB;
+      input.v_WQ = attitude_error * Vector3d(motion.u.segment<3>(3));
+      const AutopilotOutput& wanted = autopilot->step(input);
+      check_finite(wanted, step);  // limit() would make the largest speed of a NaN
+      output = wanted;
+      set_points = output.rotor_speeds;
+      limit(set_points);
+      // Rotors without a lag turn so from now on, not from the next step.
+      for (std::size_t i = 0; i < rotors.size(); ++i) {
+        double& speed = rotor_speeds[static_cast<Eigen::Index>(i)];
+        speed = lags[i].begin(speed, set_points[static_cast<Eigen::Index>(i)]);
+      }
+      if (output.direction_W) output.direction_W = attitude_error.conjugate() * *output.direction_W;
+    }
+    watch.look(rotors, output.rotor_speeds, step, step_s);
+  }
+
+  // --- dynamics ----------------------------------------------------------------------------------
+
+  /// Of the rotors on the body; README.md, eqs. (3) to (5).
+  RotorLoads calc_rotor_loads(const Motion& at, const TurningRotors& turning) const {
+    const SimTK::Rotation& R_WB = body.getBodyRotation(state);
+    const SimTK::Vec3 v_WQ = SimTK::Vec3::getAs(at.u.data() + 3);
+    const Vector3d v_B = to_eigen(~R_WB * (v_WQ - to_simtk(config.air.v_wind_W)));
+    const Vector3d w_B = to_eigen(~R_WB * SimTK::Vec3::getAs(at.u.data()));
+    RotorLoads loads;
+    if (!output.direction_W) {
+      for (std::size_t i = 0; i < rotors.size(); ++i)
+        add_loads(rotors[i], turning[i], v_B + w_B.cross(rotors[i].p_BR), loads);
+      return loads;
+    }
+    // The autopilot turns the thrust and not the body: all rotors are at the centre of mass.
+    const Vector3d axis_B = to_eigen(~R_WB * to_simtk(*output.direction_W));
+    for (std::size_t i = 0; i < rotors.size(); ++i) {
+      FlyingRotor turned = rotors[i];
+      turned.p_BR = airframe.p_BC;
+      turned.axis_B = axis_B;
+      turned.torque_constant = turned.rolling_constant = 0.0;
+      add_loads(turned, turning[i], v_B + w_B.cross(airframe.p_BC), loads);
+    }
+    return loads;
+  }
+
+  /// How body and pendulum are turned where `at` is, whose positions are realized.
+  MultirotorDynamics::Rotations find_rotations(const Motion& at) const {
+    const SimTK::Rotation &R_WB = body.getBodyRotation(state),
+                          &R_WP = pendulum.getBodyRotation(state);
+    const SimTK::Vec3 w_WB_W = SimTK::Vec3::getAs(at.u.data());
+    const SimTK::Vec3 beside = SimTK::Vec3::getAs(at.u.data() + 6);
+    return {R_WB, w_WB_W, R_WP, w_WB_W + (is_ideal ? R_WP : R_WB) * beside};
+  }
+
+  /// The same moment's accelerations under the rotors' loads.
+  MultirotorDynamics::Accelerations calc_accelerations(
+      const MultirotorDynamics::Rotations& rotations, const RotorLoads& loads) const {
+    const SimTK::Rotation& R_WB = rotations.R_WB;
+    return dynamics->calc_accelerations(
+        rotations, R_WB * to_simtk(loads.force_B) + to_simtk(config.disturbance_W),
+        R_WB * to_simtk(loads.torque_B) + to_simtk(keys.disturbance_torque));
+  }
+
+  /// With the positions of `at` realized.
+  Motion calc_rate(const Motion& at, const TurningRotors& turning) const {
+    const MultirotorDynamics::Rotations rotations = find_rotations(at);
+    const auto& [R_WB, w_WB_W, R_WP, w_WP_W] = rotations;
+    const auto accelerations = calc_accelerations(rotations, calc_rotor_loads(at, turning));
+    // Eq. (13): the pendulum's speeds are those beside the body, of `ideal` in P, of `rigid` in B.
+    const SimTK::Vec3 beside_W = accelerations.b_WP_W - accelerations.b_WB_W;
+    SimTK::Vec3 beside =
+        is_ideal ? ~R_WP * (beside_W + w_WP_W % w_WB_W) : ~R_WB * (beside_W - w_WB_W % w_WP_W);
+    if (is_ideal) beside[2] = 0.0;  // the joint has no such speed
+    const SimTK::Vec4 body_quaternion_rate =
+        SimTK::Rotation::convertAngVelToQuaternionDot(SimTK::Vec4::getAs(at.q.data()), w_WB_W);
+    const SimTK::Vec4 pendulum_quaternion_rate = SimTK::Rotation::convertAngVelToQuaternionDot(
+        SimTK::Vec4::getAs(at.q.data() + 7), ~R_WB * (w_WP_W - w_WB_W));
+    Motion rate;
+    for (int i = 0; i < 4; ++i) rate.q[i] = body_quaternion_rate[i];
+    for (int i = 0; i < 3; ++i) rate.q[4 + i] = at.u[3 + i];
+    for (int i = 0; i < 4; ++i) rate.q[7 + i] = pendulum_quaternion_rate[i];
+    for (int i = 0; i < 3; ++i) rate.u[i] = accelerations.b_WB_W[i];
+    for (int i = 0; i < 3; ++i) rate.u[3 + i] = accelerations.a_WQ[i];
+    for (int i = 0; i < 3; ++i) rate.u[6 + i] = beside[i];
+    return rate;
+  }
+
+  /// One step of the classical Runge-Kutta method of fourth order; the rotors are exact.
+  void fly_step(std::int64_t step) {
+    const double h = step_s;
+    for (std::size_t i = 0; i < rotors.size(); ++i) {
+      const auto k = static_cast<Eigen::Index>(i);
+      const RotorLag::Stages stages = lags[i].find_stages(rotor_speeds[k], set_points[k]);
+      starting[i] = stages.start;
+      middle[i] = stages.middle;
+      ending[i] = stages.end;
+    }
+    const auto calc_rate_at = [&](const Motion& there, const TurningRotors& turning) {
+      check_finite(there, step);
+      realize_positions(there);
+      return calc_rate(there, turning);
+    };
+    const Motion k1 = calc_rate(motion, starting);
+    const Motion k2 = calc_rate_at(add(motion, h / 2, k1), middle);
+    const Motion k3 = calc_rate_at(add(motion, h / 2, k2), middle);
+    const Motion k4 = calc_rate_at(add(motion, h, k3), ending);
+    Motion next = add(motion, h / 6, add(add(add(k1, 2, k2), 2, k3), 1, k4));
+    next.q.head<4>().normalize();
+    next.q.tail<4>().normalize();
+    check_finite(next, step);
+    motion = next;
+    for (std::size_t i = 0; i < rotors.size(); ++i)
+      rotor_speeds[static_cast<Eigen::Index>(i)] = ending[i].speed;
+    realize_positions(motion);
+  }
+
+  void advance(const Vector3d& f_Q_W, std::int64_t count) {
+    check_finite(f_Q_W, steps, "force_x_n", "force_y_n", "force_z_n");
+    for (std::int64_t i = 0; i < count; ++i) {
+      step_autopilot(f_Q_W, steps);
+      fly_step(steps + 1);
+      ++steps;
+    }
+    realize_velocities(motion);
+    held = measure(steps);
+  }
+
+  // --- measurement -------------------------------------------------------------------------------
+
+  model::Measurement measure(std::int64_t step) {
+    const SimTK::Vec3 p_PL(0, 0, vehicle.rod_length);
+    SimTK::Vec3 p_WA, v_WA, p_WL, v_WL;
+    body.findStationLocationAndVelocityInGround(state, to_simtk(keys.attachment), p_WA, v_WA);
+    pendulum.findStationLocationAndVelocityInGround(state, p_PL, p_WL, v_WL);
+    model::Measurement result;
+    result.p_WQ = to_eigen(body.getBodyOriginLocation(state));
+    result.v_WQ = to_eigen(body.getBodyOriginVelocity(state));
+    result.p_WL = to_eigen(p_WL);
+    result.v_WL = to_eigen(v_WL);
+    // The rod begins at the attachment, which need not be the body's origin.
+    result.rod = model::make_state(to_eigen(p_WA), to_eigen(v_WA), result.p_WL, result.v_WL).rod;
+    result.attitude = attitude();
+    sim::check_finite(result, step);
+    result.signals = calc_signals();
+    return result;
+  }
+
+  model::Numbers calc_signals() {
+    for (std::size_t i = 0; i < rotors.size(); ++i) {
+      const double speed = rotor_speeds[static_cast<Eigen::Index>(i)];
+      starting[i] = {speed, speed * speed};
+    }
+    const RotorLoads loads = calc_rotor_loads(motion, starting);
+    const double tension = calc_accelerations(find_rotations(motion), loads).tension;
+
+    const auto count = static_cast<Eigen::Index>(rotors.size());
+    model::Numbers signals(2 * count + 7);
+    const Eigen::Quaterniond& q = output.q_WB;
+    signals << rotor_speeds, set_points, q.w(), q.x(), q.y(), q.z(), output.thrust, loads.thrust,
+        tension;
+    return signals;
+  }
+
+  const MultirotorKeys keys;
+  const config::Plant config;
+  const model::SlungLoadParameters vehicle;
+  const Airframe airframe;
+  const std::vector<FlyingRotor> rotors;
+  const double step_s;
+  std::vector<RotorLag> lags;  ///< of the rotors
+  const bool is_ideal;
+  const Eigen::Quaterniond attitude_error;  ///< what the estimator says is it times the truth
+  std::int64_t steps = 0;
+
+  SimTK::MultibodySystem system;
+  SimTK::SimbodyMatterSubsystem matter{system};
+  SimTK::MobilizedBody::Free body;
+  SimTK::MobilizedBody pendulum;
+  SimTK::State state;  ///< stays at Stage::Instance, with the positions of `motion` realized
+  int speeds = 0;      ///< how many the tree has
+  double pendulum_mass = 0.0;
+
+  std::optional<MultirotorDynamics> dynamics;
+
+  std::unique_ptr<Autopilot> autopilot;
+  std::int64_t autopilot_steps = 1;  ///< of the plant, in a period
+  AutopilotOutput output;            ///< in force; its direction is in the plant's W
+  VectorXd set_points;               ///< of the rotors, within their limits, rad/s
+  VectorXd rotor_speeds;             ///< rad/s
+  Motion motion;
+  SaturationWatch watch;
+
+  // Kept from step to step to spare their allocation.
+  TurningRotors starting, middle, ending;  // at the stages of a step
+
+  model::Measurement held;
+};
+
+MultirotorPlant::MultirotorPlant(const PlantSetup& setup)
+    : multibody_(std::make_unique<Multibody>(setup)) {}
+
+MultirotorPlant::~MultirotorPlant() = default;
+
+void MultirotorPlant::advance(const std::vector<Vector3d>& f_Q_W, std::int64_t steps) {
+  multibody_->advance(f_Q_W[0], steps);
+}
+
+const model::Measurement& MultirotorPlant::measurement(std::size_t) const {
+  return multibody_->held;
+}
+
+std::vector<Signal> MultirotorPlant::signals() const {
+  std::vector<Signal> signals;
+  const std::size_t count = multibody_->rotors.size();
+  for (std::size_t i = 1; i <= count; ++i)
+    signals.push_back({"rotor_" + std::to_string(i) + "_rad_s", "rad/s"});
+  for (std::size_t i = 1; i <= count; ++i)
+    signals.push_back({"rotor_" + std::to_string(i) + "_set_rad_s", "rad/s"});
+  for (const char* name : {"att_set_w", "att_set_x", "att_set_y", "att_set_z"})
+    signals.push_back({name, "1"});
+  for (const char* name : {"thrust_set_n", "thrust_n", "rod_tension_n"})
+    signals.push_back({name, "N"});
+  return signals;
+}
+
+std::vector<std::string> MultirotorPlant::take_remarks(std::size_t) {
+  return multibody_->watch.take_remarks();
+}
+
+PlantType multirotor_type() {
+  return {Moves::kOneVehicle, [](const PlantSetup& setup) -> std::unique_ptr<Plant> {
+            return std::make_unique<MultirotorPlant>(setup);
+          }};
+}
+
+}  // namespace sls::sim

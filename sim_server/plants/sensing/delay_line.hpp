@@ -1,0 +1,41 @@
+/// What is under way: samples that were sent and can still be received.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <utility>
+
+namespace sls::sim {
+
+template <class Sample>
+class DelayLine {
+ public:
+  /// Sends `sample` at `step`, later than all before.
+  void put(std::int64_t step, Sample sample) { sent_.push_back({step, std::move(sample)}); }
+
+  /// The last sample sent at or before `step`; the first of all, where all came later. Forgets the
+  /// ones before it, so `step` never falls from call to call.
+  const Sample& take(std::int64_t step) {
+    while (sent_.size() > 1 && sent_[1].step <= step) sent_.pop_front();
+    return sent_.front().sample;
+  }
+
+  /// When the sample after the one taken last was sent; nothing where none was.
+  std::optional<std::int64_t> find_next() const {
+    return sent_.size() > 1 ? std::optional(sent_[1].step) : std::nullopt;
+  }
+
+  /// How many are kept.
+  std::size_t size() const { return sent_.size(); }
+
+ private:
+  struct Sent {
+    std::int64_t step;
+    Sample sample;
+  };
+  std::deque<Sent> sent_;
+};
+
+}  // namespace sls::sim

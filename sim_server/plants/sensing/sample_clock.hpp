@@ -1,0 +1,36 @@
+/// Which step of the plant a group of sensors shows: README.md, eqs. (1) and (2).
+#pragma once
+
+#include <cstdint>
+#include <limits>
+
+#include "common/config/scenario.hpp"
+
+namespace sls::sim {
+
+class SampleClock {
+ public:
+  /// `step_ns` > 0 is the plant's.
+  SampleClock(const config::SampleTimes& times, std::int64_t step_ns)
+      : times_(times), step_ns_(step_ns) {}
+
+  /// The step whose state is seen at `step`. Source: README.md, eqs. (1) and (2).
+  std::int64_t find_seen(std::int64_t step) const;
+
+  /// The first step after `step` whose state can be seen later than at once; none: kNever.
+  std::int64_t find_next_sample(std::int64_t step) const;
+
+  static constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
+
+ private:
+  config::SampleTimes times_;
+  std::int64_t step_ns_;
+};
+
+/// Whether what is seen at a multiple of `period_ns`, the control period, can be older than that.
+bool is_ever_old(const config::SampleTimes& times, std::int64_t period_ns);
+
+/// Steps until a force acts that is `delay_ns` under way. Source: README.md, eq. (3).
+std::int64_t calc_delay_steps(std::int64_t delay_ns, std::int64_t step_ns);
+
+}  // namespace sls::sim

@@ -1,0 +1,58 @@
+/// Sensors that sample together: README.md.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "sim_server/plants/plant.hpp"
+#include "sim_server/plants/sensing/delay_line.hpp"
+#include "sim_server/plants/sensing/sample_clock.hpp"
+
+namespace sls::sim {
+
+/// A group of sensors: its samples of every vehicle that can still be seen.
+template <class Sample>
+class SensorGroup {
+ public:
+  SensorGroup(const SampleClock& clock, const Plant& plant, std::size_t vehicles)
+      : clock_(clock), lines_(vehicles), next_step_(clock.find_next_sample(0)) {
+    if (next_step_ != SampleClock::kNever) put(plant, 0);
+  }
+
+  /// When it samples next.
+  std::int64_t next_step() const { return next_step_; }
+
+  /// Takes the samples of `step`, to which the plant has come, where they are due.
+  void sample(const Plant& plant, std::int64_t step) {
+    if (step != next_step_) return;
+    put(plant, step);
+    next_step_ = clock_.find_next_sample(step);
+  }
+
+  /// Of which step it shows the state at `step`.
+  std::int64_t find_seen(std::int64_t step) const { return clock_.find_seen(step); }
+
+  /// What it shows of a vehicle at `step`, to which the plant has come.
+  Sample show(const Plant& plant, std::size_t vehicle, std::int64_t step) {
+    return next_step_ == SampleClock::kNever ? Sample(plant.measurement(vehicle))
+                                             : lines_[vehicle].take(clock_.find_seen(step));
+  }
+
+  /// How many samples of a vehicle are kept.
+  std::size_t kept() const { return lines_.front().size(); }
+
+ private:
+  void put(const Plant& plant, std::int64_t step) {
+    for (std::size_t i = 0; i < lines_.size(); ++i) {
+      lines_[i].put(step, Sample(plant.measurement(i)));
+      lines_[i].take(clock_.find_seen(step));  // forgets what nobody can see any more
+    }
+  }
+
+  SampleClock clock_;
+  std::vector<DelayLine<Sample>> lines_;  // by vehicle
+  std::int64_t next_step_;
+};
+
+}  // namespace sls::sim
