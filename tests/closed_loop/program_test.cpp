@@ -84,9 +84,10 @@ TEST(ClosedLoopErrorsTest, AModelThatDoesNotExistIsRefusedWithTheListOfThose) {
       make_scenario(folder, {{"pendulum: ideal", "model: slungload"}}, "figure_eight");
   Process alone(fly_in_process(file, folder / "recording"));
   EXPECT_EQ(alone.wait(), 2) << alone.output();
-  EXPECT_TRUE(holds(alone.output(),
-                    "plant.model: expected analytic, slung_load or a shared library (a path ending "
-                    "in .so), got slungload; did you mean 'slung_load'?"))
+  EXPECT_TRUE(holds(
+      alone.output(),
+      "plant.model: expected analytic, multirotor, slung_load or a shared library (a path ending "
+      "in .so), got slungload; did you mean 'slung_load'?"))
       << alone.output();
   EXPECT_FALSE(std::filesystem::exists(folder / "recording"));
 }
@@ -99,7 +100,8 @@ TEST(ClosedLoopErrorsTest, AKeyOfAnotherPlantIsRefusedWithItsOwner) {
     Process process({program(name), "--scenario", file});
     EXPECT_EQ(process.wait(), 2) << process.output();
     EXPECT_TRUE(holds(process.output(),
-                      "plant.pendulum: a key of model 'slung_load', here model is 'analytic'"))
+                      "plant.pendulum: a key of model 'multirotor' or model 'slung_load', here "
+                      "model is 'analytic'"))
         << process.output();
   }
 }

@@ -3,6 +3,7 @@
 
 #include <cstdio>
 
+#include "common/config/sha256.hpp"
 #include "tests/system/flight.hpp"
 
 namespace sls::test {
@@ -23,7 +24,7 @@ class Installation {
   Installation() {
     run({SLS_CMAKE, "--install", SLS_BUILD_DIR, "--prefix", folder_ / "installed"});
     std::vector<std::unique_ptr<Process>> builds;
-    for (const char* name : {"my_controller", "my_plant", "my_law", "my_logger"}) {
+    for (const char* name : {"my_autopilot", "my_controller", "my_plant", "my_law", "my_logger"}) {
       fs::copy(std::string(SLS_SOURCE_DIR) + "/examples/" + name, example(name));
       const std::string build = example(name) / "build";
       builds.push_back(std::make_unique<Process>(std::vector<std::string>{
@@ -61,7 +62,8 @@ class Installation {
 };
 
 /// Flies the example's scenario with the three programs and in one process: the same flight.
-void expect_same_flight(Installation& installation, const std::string& name) {
+/// @returns the recording in one process.
+fs::path expect_same_flight(Installation& installation, const std::string& name) {
   SCOPED_TRACE(name);
   const std::string scenario = installation.scenario(name);
   const OwnDomain domain;
@@ -71,6 +73,7 @@ void expect_same_flight(Installation& installation, const std::string& name) {
   EXPECT_TRUE(read_manifest(one).at("complete").get<bool>());
   EXPECT_EQ(read_manifest(three).at("certificate"), read_manifest(one).at("certificate"));
   EXPECT_GT(Table(one / "state.csv").rows(), 500u);
+  return one;
 }
 
 /// `name`'s scenario with the parameter `parameter` misspelt is refused with its line.
@@ -96,18 +99,28 @@ TEST(ExamplesTest, AreInstalledBuiltAndFlownAsByAUser) {
   expect_same_flight(installation, "my_plant");
   expect_refused(installation, "my_plant", "stiffness_n_m", "plant", 6,
                  "stiffness_n_m or damping_n_s_m");
+  const fs::path turned = expect_same_flight(installation, "my_autopilot");
+  EXPECT_EQ(
+      read_manifest(turned).at("libraries").at("plant").get<std::string>(),
+      config::calc_file_sha256(installation.example("my_autopilot") / "build/my_autopilot.so"));
+  expect_refused(installation, "my_autopilot", "attitude_1_s2", "autopilot", 18,
+                 "attitude_1_s2 or rate_1_s");
+  // 6 s after its reference came back there.
+  const Table flown(turned / "state.csv");
+  const Eigen::Vector3d end = flown.position(flown.rows() - 1, "load");
+  EXPECT_LT((end - Eigen::Vector3d(0.0, 0.0, -1.0)).norm(), 1e-3);
 
   const std::string said =
       run({installation.example("my_law") / "build/my_law", installation.scenario("my_law")});
   int steps = 0;
-  double rms = 0.0, end = 1.0;
+  double rms = 0.0, error_at_end = 1.0;
   ASSERT_EQ(std::sscanf(said.c_str(), "%d steps, load position error: rms %lf m, at the end %lf m",
-                        &steps, &rms, &end),
+                        &steps, &rms, &error_at_end),
             3)
       << said;
   EXPECT_EQ(steps, 7501);  // 30 s at 4 ms
   EXPECT_GT(rms, 0.5);     // it is told of set-points metres away, and goes there within seconds
-  EXPECT_LT(end, 1e-3);    // poles of at most -0.7 1/s, 15 s
+  EXPECT_LT(error_at_end, 1e-3);  // poles of at most -0.7 1/s, 15 s
 
   const OwnDomain domain;
   Process logger({installation.example("my_logger") / "build/my_logger", domain.text()});

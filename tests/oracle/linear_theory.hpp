@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 #include <cmath>
 #include <complex>
+#include <functional>
 #include <unsupported/Eigen/MatrixFunctions>
 #include <vector>
 
@@ -33,9 +34,14 @@ inline std::vector<double> calc_designed_error(const Eigen::RowVectorXd& gains,
 /// Load error of a figure eight once the transients have died away: sines about a mean.
 struct SteadyError {
   Eigen::Array3d amplitude = Eigen::Array3d::Zero();
+  Eigen::Array3d seen_amplitude = Eigen::Array3d::Zero();  ///< of the load that sensors tell
   Eigen::Array3d mean = Eigen::Array3d::Zero();
   Eigen::Array3d rms() const { return (amplitude.square() / 2 + mean.square()).sqrt(); }
+  Eigen::Array3d seen_rms() const { return (seen_amplitude.square() / 2 + mean.square()).sqrt(); }
 };
+
+/// What becomes of a sine on s = iw.
+using Transfer = std::function<std::complex<double>(const std::complex<double>& s)>;
 
 /// Small motions about hover of vehicle, drag and law, the force held over the period T:
 ///
@@ -43,12 +49,16 @@ struct SteadyError {
 ///                 F = −M′ g′ q + (m′ L′ / g′) n [+ D (ṗ − v)],   n as in the law's (6) with
 ///                 ÿ = −g′ q, y⁽³⁾ = −g′ q̇ and the load seen at p + L′ q
 ///     vertical    M z̈ = M g − Z M′ (g′ − z̈_r + k_v ė′ + k_p e′),   e′ = e − (L − L′)
-///     hold        Z = (1 − e^(−sT)) / (sT)
+///     hold        Z = H(T) e^(−sd) G,   H(T) = (1 − e^(−sT)) / (sT)
+///     sensing     F has p e^(−sa) H(P) for p, and q likewise
 ///
 /// M, S, I are the vehicle's mass and the pendulum's first and second moment about its joint; what
-/// the controller believes bears a dash. On s = iw, of each axis its own frequency.
+/// the controller believes bears a dash. d is the delay of the node, P and a period and age of the
+/// samples. G, `horizontal_lag`, is what vehicle and autopilot make of a horizontal force. On
+/// s = iw, of each axis its own frequency.
 inline SteadyError calc_steady_error(const config::Scenario& scenario,
-                                     const config::FigureEightReference& eight) {
+                                     const config::FigureEightReference& eight,
+                                     const Transfer& horizontal_lag = {}) {
   using Complex = std::complex<double>;
   const model::SlungLoadParameters& vehicle = scenario.vehicle;
   const model::SlungLoadParameters& believed = scenario.controller.model.vehicle;
@@ -66,36 +76,54 @@ inline SteadyError calc_steady_error(const config::Scenario& scenario,
   const bool is_fed_forward = scenario.controller.drag_feed_forward;
   const double to_force = believed.quad_mass * believed.rod_length / believed.gravity;
   const double weight = believed.total_mass() * believed.gravity;
+  const auto hold = [](const Complex& s, std::int64_t period_ns) {
+    const Complex sT = s * (static_cast<double>(period_ns) * 1e-9);
+    return period_ns == 0 ? 1.0 : (1.0 - std::exp(-sT)) / sT;
+  };
+  const auto delay = [](const Complex& s, std::int64_t by_ns) {
+    return std::exp(-s * (static_cast<double>(by_ns) * 1e-9));
+  };
+  const config::Sensing& sensing = scenario.sensing;
   const auto calc_hold = [&](const Complex& s) {
-    const Complex sT = s * (static_cast<double>(scenario.sync.period_ns) * 1e-9);
-    return (1.0 - std::exp(-sT)) / sT;
+    return hold(s, scenario.sync.period_ns) * delay(s, sensing.node_delay_ns);
+  };
+  const auto sample = [&](const Complex& s, const config::SampleTimes& times) {
+    return hold(s, times.period_ns) * delay(s, times.age_ns);
   };
   SteadyError error;
   for (int axis = 0; axis < 2; ++axis) {
-    const Complex s(0.0, 2.0 * M_PI * (axis + 1) / eight.period_s), hold = calc_hold(s);
+    const Complex s(0.0, 2.0 * M_PI * (axis + 1) / eight.period_s);
+    const Complex held = calc_hold(s) * (horizontal_lag ? horizontal_lag(s) : 1.0);
+    const Complex seen_position = sample(s, sensing.body), seen_rod = sample(s, sensing.rod);
     const Complex of_error = xy.velocity * s + xy.position;  // in −n
-    const Complex by_position = (is_fed_forward ? drag * s : 0.0) - to_force * of_error;
-    const Complex by_rod = to_force * (believed.gravity * (xy.jerk * s + xy.acceleration) -
-                                       believed.rod_length * of_error) -
-                           weight;
+    const Complex by_position =
+        ((is_fed_forward ? drag * s : 0.0) - to_force * of_error) * seen_position;
+    const Complex by_rod = (to_force * (believed.gravity * (xy.jerk * s + xy.acceleration) -
+                                        believed.rod_length * of_error) -
+                            weight) *
+                           seen_rod;
     const Complex by_reference =
         to_force * (s * s * (s * s + xy.jerk * s + xy.acceleration) + of_error);
     Eigen::Matrix2cd motion;
-    motion << mass * s * s + drag * s - hold * by_position, first_moment * s * s - hold * by_rod,
+    motion << mass * s * s + drag * s - held * by_position, first_moment * s * s - held * by_rod,
         first_moment * s * s, second_moment * s * s + first_moment * g;
     const Eigen::Vector2cd response =
-        motion.lu().solve(Eigen::Vector2cd(hold * by_reference, Complex(0.0)));
+        motion.lu().solve(Eigen::Vector2cd(held * by_reference, Complex(0.0)));
     error.amplitude[axis] =
         std::abs(response[0] + length * response[1] - 1.0) * eight.amplitude[axis];
+    error.seen_amplitude[axis] =
+        std::abs(seen_position * response[0] + length * seen_rod * response[1] - 1.0) *
+        eight.amplitude[axis];
     if (!is_fed_forward)
       error.mean[axis] = drag * scenario.plant.air.v_wind_W[axis] / (to_force * xy.position);
   }
-  const Complex s(0.0, 2.0 * M_PI / eight.period_s), hold = calc_hold(s);
+  const Complex s(0.0, 2.0 * M_PI / eight.period_s);
+  const Complex seen = sample(s, sensing.body), law = z.velocity * s + z.position;
   const double believed_mass = believed.total_mass();
-  error.amplitude[2] =
-      std::abs((hold * believed_mass - mass) * s * s /
-               (mass * s * s + hold * believed_mass * (z.velocity * s + z.position))) *
-      eight.amplitude[2];
+  const Complex held = calc_hold(s) * believed_mass;
+  const Complex height = held * (s * s + law) / (mass * s * s + held * seen * law);
+  error.amplitude[2] = std::abs(height - 1.0) * eight.amplitude[2];
+  error.seen_amplitude[2] = std::abs(seen * height - 1.0) * eight.amplitude[2];
   error.mean[2] = length - believed.rod_length + (mass * g - weight) / (believed_mass * z.position);
   return error;
 }

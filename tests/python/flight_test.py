@@ -16,6 +16,27 @@ from sls.study import PUBLISHED_LAP_2
 from sls.tables import format_error
 
 LAUNCHER = support.ROOT / "sls"
+HOVER = """name: hover
+vehicle: { quad_mass_kg: 1.5, load_mass_kg: 0.2, rod_length_m: 1.0, gravity_m_s2: 9.8 }
+plant:
+  model: multirotor
+  inertia_kg_m2: [0.029, 0.029, 0.055]
+  rotor: { thrust_constant_n_s2: 5.0e-6, torque_constant_m: 0.05, max_speed_rad_s: 1100,
+           lag_up_s: 0.0125, lag_down_s: 0.025 }
+  rotors:
+    - { position_m: [0.2, 0.2, 0], spin: ccw }
+    - { position_m: [-0.2, -0.2, 0], spin: ccw }
+    - { position_m: [0.2, -0.2, 0], spin: cw }
+    - { position_m: [-0.2, 0.2, 0], spin: cw }
+  step_s: 0.001
+  initial: { load_position_m: [0, 0, -1] }
+autopilot: { model: px4, period_s: 0.004, thrust_map: exact }
+sync: { mode: lockstep, period_s: 0.004, wait_for: { controllers: 1, recorders: 1, timeout_s: 30 } }
+controller: { gains: { lqr: { horizontal: 10, vertical: 5 } } }
+mission:
+  - set_point: { position_m: [0, 0, -1] }
+    for_s: 1
+"""
 
 
 class FlightTest(support.FolderTest):
@@ -54,6 +75,24 @@ class FlightTest(support.FolderTest):
         self.run_launcher("run", "short", "--out", "r", "--force", "--domain", domain)
         self.assertFalse((self.folder / "r/report.html").exists())
         self.assertFalse((self.folder / "r/figures").exists())
+
+    def test_a_multirotor_that_hovers_shows_the_forces_of_its_weights(self):
+        self.write("hover.yaml", HOVER)
+        self.run_launcher("run", "hover.yaml", "--in-process", "--out", "r")
+        flight = Recording(self.folder / "r").load_flight(0, "r")
+        # m g, m_L g; each of four rotors lifts a fourth with k w².
+        np.testing.assert_allclose(flight.body.thrust, 1.7 * 9.8, rtol=1e-9)
+        np.testing.assert_allclose(flight.body.thrust_set[1:], 1.7 * 9.8, rtol=1e-9)
+        np.testing.assert_allclose(flight.body.rod_tension, 0.2 * 9.8, rtol=1e-9)
+        speed = np.sqrt(1.7 * 9.8 / 4 / 5.0e-6)
+        np.testing.assert_allclose(flight.body.rotor_speed, np.full((251, 4), speed), rtol=1e-9)
+        np.testing.assert_allclose(flight.body.rotor_speed_set, flight.body.rotor_speed, rtol=1e-9)
+        np.testing.assert_allclose(flight.body.q_WB, np.tile([1, 0, 0, 0], (251, 1)), atol=1e-12)
+        self.run_launcher("plot", "r")
+        self.run_launcher("report", "r")
+        for name in ("body_attitude", "body_rates", "rotors", "thrust"):
+            self.assertTrue((self.folder / f"r/figures/{name}.png").exists(), name)
+            self.assertIn(f'<figure id="{name}">', (self.folder / "r/report.html").read_text())
 
     def test_readme_and_study_show_what_the_demo_prints_beside_the_published_figures(self):
         domain = self.enterContext(support.OwnDomain())

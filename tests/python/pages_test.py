@@ -2,6 +2,7 @@
 
 import re
 import unittest
+from dataclasses import replace
 from pathlib import Path
 
 import browser
@@ -9,9 +10,11 @@ import support
 import numpy as np
 
 from sls import figures
+from sls.recordings import Recording
 from support import write_recording
 
 ALL = {"positions", "errors", "path", "angles", "forces", "attitude"}
+BODY = ALL - {"attitude"} | {"body_attitude", "body_rates", "rotors", "thrust"}
 
 
 def names_of(folder, kind):
@@ -55,9 +58,66 @@ class PlotTest(support.FolderTest):
         self.expect_refused(["plot", "r", "--vehicle", "3"], "expected a vehicle of this recording")
 
     def test_a_single_row_is_plotted(self):
-        write_recording(self.folder / "r", last=0, complete=False)
+        for rotors in (0, 4):
+            write_recording(self.folder / "r", last=0, complete=False, rotors=rotors)
+            self.assertEqual(self.run_sls("plot", "r")[0], 0)
+            self.assertEqual(self.run_sls("report", "r")[0], 0)
+
+    def test_a_multirotor_has_figures_of_attitude_rates_rotors_and_thrust(self):
+        write_recording(self.folder / "r", last=50, rotors=4, vehicles=(0, 1))
+        write_recording(self.folder / "six", last=50, rotors=6)
+        write_recording(self.folder / "point", last=50)
         self.assertEqual(self.run_sls("plot", "r")[0], 0)
+        self.assertEqual(names_of(self.folder / "r/figures", "png"), BODY | {"fleet"})
         self.assertEqual(self.run_sls("report", "r")[0], 0)
+        page = (self.folder / "r/report.html").read_text()
+        self.assertEqual(set(re.findall(r'<figure id="(\w+)">', page)), BODY | {"fleet"})
+        # Beside a point mass, and with another number of rotors.
+        self.assertEqual(self.run_sls("plot", "point", "r", "six", "--out", "o")[0], 0)
+        self.assertEqual(names_of(self.folder / "o", "png"), BODY)
+
+    def test_what_was_commanded_is_drawn_beside_what_was_done(self):
+        write_recording(self.folder / "r", last=50, rotors=4)
+        flight = Recording(self.folder / "r").load_flight(0, "r")
+        drawn = figures.make_figures([flight])
+        for name, rows in (("body_attitude", 3), ("rotors", 4), ("thrust", 1)):
+            all_axes = drawn[name].axes
+            self.assertEqual([len(axes.lines) for axes in all_axes[:rows]], [2] * rows, name)
+            labels = all_axes[0].get_legend_handles_labels()[1]
+            self.assertEqual(labels, ["set-point", "real"], name)
+        steps = np.arange(1, 51)  # at step 0 there is no set-point yet
+        for axis in range(3):
+            asked, real = [line.get_ydata() for line in drawn["body_attitude"].axes[axis].lines]
+            expected = np.degrees([support.angles_of(step)[axis] for step in steps])
+            np.testing.assert_allclose(asked[1:], expected, rtol=0, atol=1e-12)
+            np.testing.assert_allclose(real[1:], expected - np.degrees(0.01), rtol=0, atol=1e-12)
+            self.assertTrue(np.isnan(asked[0]))
+        asked, real = [line.get_ydata() for line in drawn["rotors"].axes[3].lines]
+        np.testing.assert_array_equal(asked, 940 + np.arange(51))
+        np.testing.assert_array_equal(real, asked - 5)
+        asked, real = [line.get_ydata() for line in drawn["thrust"].axes[0].lines]
+        self.assertEqual((asked[1], real[1]), (16, 15.5))
+        self.assertEqual(drawn["thrust"].axes[1].lines[0].get_ydata()[1], 1.96)
+        rate = drawn["body_rates"].axes[1].lines[0].get_ydata()
+        np.testing.assert_allclose(rate, np.degrees(-0.2))
+
+    def test_every_stage_is_marked_on_all_axes(self):
+        write_recording(self.folder / "r", last=600)
+        flight = Recording(self.folder / "r").load_flight(0, "r")
+        eight = flight.stages[1]
+        flight = replace(flight, stages=(*flight.stages[:1], replace(eight, end=500),
+                                         replace(eight, index=2, first=500)))
+        for name, figure in figures.make_figures([flight]).items():
+            marks = [len([line for line in axes.lines if len(line.get_xdata()) == 2])
+                     for axes in figure.axes]
+            if name != "path":
+                self.assertEqual(marks, [2] * len(marks), name)
+
+    def test_no_line_is_drawn_where_an_angle_goes_on_at_its_other_end(self):
+        angles = np.radians([[170.0, 0], [179, 1], [-179, 2], [-170, 3]])
+        broken = figures.break_at_turns(angles)
+        np.testing.assert_array_equal(np.isnan(broken[:, 0]), [False, False, True, False])
+        np.testing.assert_array_equal(broken[:, 1], angles[:, 1])
 
     def test_mistakes_are_refused_in_one_line(self):
         write_recording(self.folder / "r", last=5)

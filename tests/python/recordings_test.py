@@ -7,6 +7,8 @@ import unittest
 import support
 import numpy as np
 
+from sls.figures import make_figures
+from sls.flight import calc_roll_pitch_yaw
 from sls.input_error import InputError
 from sls.metrics import calc_stage_metrics
 from sls.recordings import Recording
@@ -38,6 +40,61 @@ class RecordingsTest(support.FolderTest):
                           for stage in flight.stages],
                          [("set_point", 0, STEPS_PER_STAGE, None),
                           ('eight, "two laps"', STEPS_PER_STAGE, 2 * STEPS_PER_STAGE + 1, 2.0)])
+
+    def test_what_the_controller_saw_is_what_was_measured_or_else_the_truth(self):
+        write_recording(self.folder / "r", last=3, vehicles=(0, 1))
+        seen = Recording(self.folder / "r").load_seen(1, "r")
+        np.testing.assert_array_equal(seen.p_WL[3], load_of(3, 1))
+        # As from a sensor that shows step 0 for ever; its last row is missing.
+        state = (self.folder / "r/state.csv").read_text().splitlines()
+        old = {row.split(",")[0]: row.split(",")[3:] for row in state[:0:-1]}
+        rows = [",".join(row.split(",")[:3] + old[row.split(",")[0]]) for row in state[1:-1]]
+        (self.folder / "r/measured.csv").write_text("\n".join([state[0], *rows]) + "\n")
+        seen = Recording(self.folder / "r").load_seen(1, "r")
+        np.testing.assert_array_equal(seen.p_WL[2], load_of(0, 1))
+        np.testing.assert_array_equal(seen.p_WQ[2], load_of(0, 1) - [0, 0, 1])
+        np.testing.assert_array_equal(seen.p_WL_ref[2], reference_of(2)[2])
+        self.assertTrue(np.isnan(seen.p_WL[3]).all())
+
+    def test_a_body_reads_back_and_a_point_mass_has_none(self):
+        write_recording(self.folder / "r", last=3)
+        self.assertIsNone(self.load().body)
+        write_recording(self.folder / "r", last=3, rotors=6)
+        body = self.load().body
+        np.testing.assert_allclose(
+            calc_roll_pitch_yaw(body.q_WB_set)[3], support.angles_of(3), rtol=0, atol=1e-15)
+        np.testing.assert_array_equal(body.w_WB_B[3], [0.1, -0.2, 0.3])
+        np.testing.assert_array_equal(body.rotor_speed_set[3], [913, 923, 933, 943, 953, 963])
+        np.testing.assert_array_equal(body.rotor_speed[3], body.rotor_speed_set[3] - 5)
+        self.assertEqual((body.thrust[3], body.thrust_set[3], body.rod_tension[3]),
+                         (15.5, 16, 1.96))
+        # Before the autopilot was asked there is no set-point.
+        self.assertTrue(np.isnan(body.q_WB_set[0]).all() and np.isnan(body.thrust_set[0]))
+
+    def test_of_a_plant_with_attitude_alone_that_is_all_there_is(self):
+        write_recording(self.folder / "r", last=3, rotors=4)
+        def keep(text):
+            lines = [line.split(",") for line in text.split("\n")]
+            end = lines[0].index("rate_x_rad_s")
+            return "\n".join(",".join(fields[:end]) for fields in lines)
+        self.change("state.csv", keep)
+        flight = self.load()
+        self.assertEqual(flight.body.rotor_speed.shape, (4, 0))
+        self.assertTrue(np.isfinite(flight.body.q_WB).all())
+        self.assertTrue(np.isnan(flight.body.w_WB_B).all())
+        # What its force asks of the attitude is still known.
+        figure = make_figures([flight])["body_attitude"]
+        self.assertEqual([len(axes.lines) for axes in figure.axes], [2, 2, 2])
+
+    def test_the_attitude_that_realises_a_force_turns_the_thrust_into_it(self):
+        write_recording(self.folder / "r", last=3)
+        flight = self.load()
+        roll, pitch = flight.calc_attitude()[0]
+        q = support.quaternion_of(roll, pitch, 0)
+        up = support.multiply(q, [0, 0, 0, -1], q * [1, -1, -1, -1])[1:]
+        np.testing.assert_allclose(up * np.sqrt(1 + 4 + 256), [1, 2, -16], rtol=0, atol=1e-14)
+        np.testing.assert_allclose(calc_roll_pitch_yaw(q[np.newaxis])[0], [roll, pitch, 0],
+                                   rtol=0, atol=1e-15)
 
     def test_its_metrics_are_what_was_put_into_it(self):
         write_recording(self.folder / "r")

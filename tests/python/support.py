@@ -124,11 +124,52 @@ def load_of(step, vehicle_id):
     return reference + (0.01 if step < STEPS_PER_STAGE + 200 else 0.001)
 
 
+def multiply(*quaternions):
+    """Hamilton's product of w x y z."""
+    product = np.array([1.0, 0, 0, 0])
+    for w, *v in quaternions:
+        a, u = product[0], product[1:]
+        product = np.array([a * w - u @ v, *(a * np.array(v) + w * u + np.cross(u, v))])
+    return product
+
+
+def angles_of(step):
+    """Roll, pitch, yaw of the synthetic vehicle's set-point; it follows 0.01 rad behind in each."""
+    time_s = step * PERIOD_S
+    return 0.4 * np.sin(time_s), -0.3 * np.cos(time_s), 0.1 * time_s
+
+
+def quaternion_of(roll, pitch, yaw):
+    """About z, then y, then x."""
+    return multiply(*([np.cos(angle / 2), *(np.sin(angle / 2) * np.eye(3)[axis])]
+                      for angle, axis in ((yaw, 2), (pitch, 1), (roll, 0))))
+
+
+def list_body_columns(rotors):
+    """Of a plant with attitude and signals: sim_server/plants/multirotor/README.md, "Signals"."""
+    return ["att_w", "att_x", "att_y", "att_z", "rate_x_rad_s", "rate_y_rad_s", "rate_z_rad_s",
+            *(f"rotor_{n}_rad_s" for n in range(1, rotors + 1)),
+            *(f"rotor_{n}_set_rad_s" for n in range(1, rotors + 1)),
+            "att_set_w", "att_set_x", "att_set_y", "att_set_z", "thrust_set_n", "thrust_n",
+            "rod_tension_n"]
+
+
+def list_body_values(step, rotors):
+    asked = angles_of(step)
+    set_points = [900 + 10 * n + step for n in range(1, rotors + 1)]
+    # At step 0 the plant has not asked its autopilot yet.
+    att_set, thrust_set = (quaternion_of(*asked), 16) if step else ([1, 0, 0, 0], 0)
+    return [*quaternion_of(*(angle - 0.01 for angle in asked)), 0.1, -0.2, 0.3,
+            *(speed - 5 for speed in set_points), *set_points, *att_set, thrust_set, 15.5, 1.96]
+
+
 def write_recording(folder, first=0, last=2 * STEPS_PER_STAGE, vehicles=(0,), complete=True,
-                    missing=(), segment=1):
-    """A recording of steps `first` to `last`, with the columns of design and recorder."""
+                    missing=(), segment=1, rotors=0):
+    """A recording of steps `first` to `last`, with the columns of design and recorder; of a body
+    with `rotors` where there are any."""
     folder.mkdir(parents=True, exist_ok=True)
-    rows = {"state.csv": [STATE_HEADER], "command.csv": [COMMAND_HEADER],
+    header = ",".join([STATE_HEADER, *(list_body_columns(rotors) if rotors else ())])
+    rows = {"state.csv": [header], "command.csv": [COMMAND_HEADER],
             "reference.csv": [REFERENCE_HEADER]}
     for step in range(first, last + 1):
         for vehicle in vehicles:
@@ -136,7 +177,8 @@ def write_recording(folder, first=0, last=2 * STEPS_PER_STAGE, vehicles=(0,), co
             load = load_of(step, vehicle)
             quad = load - [0, 0, 1]
             quoted = '"' + name.replace('"', '""') + '"' if '"' in name else name
-            numbers = [*quad, 0, 0, 0, *load, 0, 0, 0, 0.1, -0.2, 0, 0, 0, 0, 0]
+            numbers = [*quad, 0, 0, 0, *load, 0, 0, 0, 0.1, -0.2, 0, 0, 0, 0, 0,
+                       *(list_body_values(step, rotors) if rotors else ())]
             rows["state.csv"].append(
                 f"{vehicle},{step},{step * PERIOD_S!r}," + ",".join(f"{v:.17g}" for v in numbers))
             rows["command.csv"].append(f"{vehicle},{step},client,1,2,-16,3.5,none")

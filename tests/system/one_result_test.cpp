@@ -115,6 +115,72 @@ TEST_F(OneResultTest, WithThePrimaryKilled) {
   EXPECT_EQ(read_certificate(flight.recording()), certificate_);
 }
 
+// --- sensing
+// ---------------------------------------------------------------------------------------
+
+/// `figure_eight` with sensors that fit neither plant step nor control period, and late answers.
+std::string make_sensed_scenario(const TemporaryFolder& folder, const std::string& controllers) {
+  return make_scenario(
+      folder,
+      {{"mission:",
+        "sensing:\n"
+        "  period_s: 0.033333333\n"
+        "  age_s: 0.02\n"
+        "  rod: { period_s: 0.02, age_s: 0.011000001 }\n"
+        "  node_delay_s: 0.0105\n"
+        "estimator: { position_m: [0.02, -0.01, 0.03], velocity_m_s: [0, 0.01, 0] }\n"
+        "mission:"},
+       {"controllers: 1", "controllers: " + controllers}},
+      "figure_eight");
+}
+
+TEST(SensingSystemTest, HasOneResultInProcessOverUdpAndWithThePrimaryKilled) {
+  TemporaryFolder folder, other_folder;
+  const std::string file = make_sensed_scenario(folder, "1");
+  const std::filesystem::path in_process = folder / "in_process";
+  Process alone({program("closed_loop"), "--scenario", file, "--out", in_process});
+  EXPECT_EQ(alone.wait(), 0) << alone.output();
+  Process checked({program("closed_loop"), "--scenario", file, "--check-purity"});
+  EXPECT_EQ(checked.wait(), 0) << checked.output();
+  const std::string certificate = read_certificate(in_process);
+
+  Flight flight(file, {qos("udp"), {}, {}});
+  flight.expect_success();
+  EXPECT_EQ(read_certificate(flight.recording()), certificate);
+  for (const char* name : {"state.csv", "measured.csv", "reference.csv"})
+    EXPECT_EQ(read_file(in_process / name), read_file(flight.recording() / name)) << name;
+  const Table truth(in_process / "state.csv"), seen(in_process / "measured.csv");
+  ASSERT_EQ(seen.rows(), truth.rows());
+  EXPECT_GT((seen.position(500, "quad") - truth.position(500, "quad")).norm(), 1e-3);
+
+  const std::string file_of_two = make_sensed_scenario(other_folder, "2");
+  Flight pair(file_of_two, {{}, {}, {"--name", "primary", "--strength", "2"}});
+  Process standby(
+      make_command("control_client", pair.domain.number(),
+                   {"--scenario", file_of_two, "--name", "standby", "--strength", "1"}));
+  ASSERT_TRUE(pair.wait_for_steps(500)) << pair.outputs() << standby.output();
+  pair.client->kill();
+  EXPECT_EQ(pair.server->wait(), 0) << pair.outputs();
+  EXPECT_EQ(standby.wait(), 0) << standby.output();
+  EXPECT_EQ(pair.recorder->wait(), 0) << pair.outputs();
+  EXPECT_EQ(read_certificate(pair.recording()), certificate);
+}
+
+TEST(SensingSystemTest, AFleetHasTheSameResultInProcess) {
+  TemporaryFolder folder;
+  const std::string file = make_scenario(
+      folder,
+      {{"mission:", "sensing: { period_s: 0.007, age_s: 0.0033, node_delay_s: 0.0015 }\nmission:"}},
+      "mixed_fleet");
+  Process alone({program("closed_loop"), "--scenario", file, "--out", folder / "in_process"});
+  EXPECT_EQ(alone.wait(), 0) << alone.output();
+  Flight flight(file);
+  flight.expect_success();
+  EXPECT_EQ(read_certificate(flight.recording()), read_certificate(folder / "in_process"));
+  EXPECT_EQ(read_file(flight.recording() / "measured.csv"),
+            read_file(folder / "in_process/measured.csv"));
+}
+
 // --- faults in simulation time -------------------------------------------------------------------
 
 TEST(FaultLineSystemTest, AFaultyFlightRepeatsAndEqualsTheOneInProcess) {

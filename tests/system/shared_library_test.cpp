@@ -11,8 +11,9 @@ namespace {
 
 const std::string kController = std::string(SLS_LIBRARIES) + "/controller.so";
 const std::string kPlant = std::string(SLS_LIBRARIES) + "/plant.so";
+const std::string kAutopilot = std::string(SLS_LIBRARIES) + "/autopilot.so";
 
-/// The short flight with the test controller or the test plant.
+/// The short flight with the test controller, the test plant or the test autopilot.
 std::string make_controller_scenario(const TemporaryFolder& folder, const std::string& parameters) {
   return make_scenario(
       folder,
@@ -24,6 +25,19 @@ std::string make_plant_scenario(const TemporaryFolder& folder, const std::string
   return make_scenario(
       folder,
       {{"  pendulum: ideal\n", "  model: " + kPlant + "\n  parameters: { " + parameters + " }\n"}});
+}
+
+std::string make_autopilot_scenario(const TemporaryFolder& folder, const std::string& parameters) {
+  return make_scenario(
+      folder,
+      {{"  pendulum: ideal\n",
+        "  model: multirotor\n"
+        "  inertia_kg_m2: [0.03, 0.03, 0.06]\n"
+        "  rotor: { thrust_constant_n_s2: 5.0e-6, max_speed_rad_s: 2000 }\n"
+        "  rotors: [{ position_m: [1, 1, 0], spin: ccw }, { position_m: [-1, -1, 0], spin: ccw },\n"
+        "           { position_m: [1, -1, 0], spin: cw }, { position_m: [-1, 1, 0], spin: cw }]\n"},
+       {"sync:",
+        "autopilot:\n  model: " + kAutopilot + "\n  parameters: { " + parameters + " }\nsync:"}});
 }
 
 struct Outcome {
@@ -57,6 +71,11 @@ TEST_P(CrashTest, IsNamedWithLibraryFunctionVehicleAndStep) {
   EXPECT_EQ(outcome.exit_code, 128 + signal_);
   EXPECT_EQ(outcome.output,
             "closed_loop: error: " + kPlant + ": advance, vehicle 0, step 8" + crashed_);
+
+  outcome = fly(make_autopilot_scenario(folder_, "in: step, at: 8, do: " + how_));
+  EXPECT_EQ(outcome.exit_code, 128 + signal_);
+  EXPECT_EQ(outcome.output,
+            "closed_loop: error: " + kAutopilot + ": step, vehicle 0, step 8" + crashed_);
 }
 
 INSTANTIATE_TEST_SUITE_P(Signals, CrashTest,
@@ -87,6 +106,18 @@ TEST(SharedLibraryProgramTest, ALibraryThatIsRefusedEndsServerAndClientWithItsLi
   EXPECT_EQ(outcome.exit_code, 2);
   EXPECT_EQ(outcome.output,
             "sim_server: error: " + plant + ":6: plant.parameters: " + kPlant + refusal);
+
+  const std::string autopilot = make_autopilot_scenario(folder, "in: create");
+  for (const std::vector<std::string>& command :
+       {std::vector{program("sim_server"), std::string("--check")}, {program("closed_loop")}}) {
+    std::vector<std::string> whole = command;
+    whole.insert(whole.end(), {"--scenario", autopilot});
+    outcome = run(whole);
+    EXPECT_EQ(outcome.exit_code, 2);
+    EXPECT_TRUE(holds(outcome.output, ": error: " + autopilot +
+                                          ":14: autopilot.parameters: " + kAutopilot + refusal))
+        << outcome.output;
+  }
 
   const std::string law = make_controller_scenario(folder, "in: create");
   for (const std::string name : {"control_client", "closed_loop"}) {
@@ -207,6 +238,17 @@ TEST(SharedLibraryProgramTest, EveryCallThatDoesNotReturnIsNamed) {
   EXPECT_TRUE(names(in_plant, "closed_loop: warning: " + kPlant + ": measure, vehicle 0, step 8"));
   EXPECT_TRUE(
       names(in_client, "control_client: warning: " + kController + ": create, vehicle 0, step 0"));
+}
+
+TEST(SharedLibraryProgramTest, AnAutopilotThatFailsEndsTheRunWithItsLine) {
+  TemporaryFolder folder;
+  Flight flight(make_autopilot_scenario(folder, "in: step, at: 8, do: fail"), over_udp());
+  flight.wait();
+  const std::string failure = kAutopilot + ": step, vehicle 0, step 8: the gyroscope is dead";
+  EXPECT_EQ(flight.server->wait(), 1);
+  expect_line(flight.server->output(), "sim_server: error: " + failure);
+  EXPECT_EQ(flight.client->wait(), 1);
+  expect_line(flight.client->output(), "control_client: error: the run failed: " + failure);
 }
 
 TEST(SharedLibraryProgramTest, APlantThatFailsEndsTheRunWithItsLine) {

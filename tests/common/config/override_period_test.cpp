@@ -87,5 +87,51 @@ TEST(OverridePeriodTest, PeriodMustFitTheDelaysOfFaults) {
             "periods (100 s), got 200");
 }
 
+TEST(OverridePeriodTest, AShorterStepMustNotMeanTooManySamplesUnderWay) {
+  Scenario scenario = parse_scenario(
+      std::string(kMinimalScenario) + "sensing: { period_s: 0.01, age_s: 1.5 }\n", "file");
+  override_period(scenario, 0.00001);  // samples stay 10 ms apart
+  EXPECT_EQ(scenario.plant.step_ns, 10'000);
+  scenario.sensing.node_delay_ns = 1'500'000'000;
+  try {
+    override_period(scenario, 0.00001);
+    FAIL() << "no error";
+  } catch (const ConfigError& error) {
+    EXPECT_STREQ(error.what(),
+                 "--period-s: sensing.node_delay_s: expected at most 100000 samples of 0.00001 s "
+                 "under way, got 1.5");
+  }
+}
+
+TEST(OverridePeriodTest, TheStepInForceMustFitThePeriodOfTheAutopilot) {
+  const auto with_period = [](const char* autopilot) {
+    return parse_scenario(
+        replace_once(kMinimalScenario, "plant:\n",
+                     std::string("autopilot: ") + autopilot +
+                         "\n"
+                         "plant:\n"
+                         "  model: multirotor\n"
+                         "  inertia_kg_m2: [0.03, 0.03, 0.06]\n"
+                         "  rotor: { thrust_constant_n_s2: 5.0e-6, max_speed_rad_s: 2000 }\n"
+                         "  rotors: [{ position_m: [0, 0, 0], spin: ccw }]\n"),
+        "file");
+  };
+  const auto find_error_at = [&](const char* autopilot, double period_s) -> std::string {
+    Scenario scenario = with_period(autopilot);
+    try {
+      override_period(scenario, period_s);
+    } catch (const ConfigError& error) {
+      EXPECT_TRUE(are_equal(scenario, with_period(autopilot))) << "changed in spite of the error";
+      return error.what();
+    }
+    return "no error";
+  };
+  EXPECT_EQ(find_error_at("{ model: px4, period_s: 0.003 }", 0.02), "no error");  // the step stays
+  EXPECT_EQ(find_error_at("{ model: px4, period_s: 0.003 }", 0.0005), "no error");
+  EXPECT_EQ(find_error_at("{ model: px4, period_s: 0.003 }", 0.0008),
+            "--period-s: expected a divisor of autopilot.period_s (0.003), got 0.0008");
+  EXPECT_EQ(find_error_at("{ model: none }", 0.0008), "no error");
+}
+
 }  // namespace
 }  // namespace sls::config::test

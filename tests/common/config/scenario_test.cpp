@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include "common/config/sha256.hpp"
 #include "tests/common/config/support.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace sls::config::test {
 namespace {
@@ -252,6 +254,59 @@ TEST(ScenarioTest, ReadsEveryKeyOfTheFaults) {
   EXPECT_EQ(std::get<NoiseFault>(faults[7].effect).seed, 0u);
 }
 
+TEST(ScenarioTest, ReadsEveryKeyOfSensingAndEstimator) {
+  const Scenario scenario = parse_scenario(std::string(kMinimalScenario) +
+                                               "sensing:\n"
+                                               "  period_s: 0.033333333\n"
+                                               "  age_s: 0.02\n"
+                                               "  rod: { period_s: 0.02, age_s: 0.011 }\n"
+                                               "  node_delay_s: 0.0105\n"
+                                               "estimator:\n"
+                                               "  position_m: [0.1, 0.2, 0.3]\n"
+                                               "  velocity_m_s: [0.4, 0.5, 0.6]\n",
+                                           "file");
+  const Sensing& sensing = scenario.sensing;
+  EXPECT_EQ(sensing.body.period_ns, 33'333'333);
+  EXPECT_EQ(sensing.body.age_ns, 20'000'000);
+  EXPECT_EQ(sensing.rod.period_ns, 20'000'000);
+  EXPECT_EQ(sensing.rod.age_ns, 11'000'000);
+  EXPECT_EQ(sensing.node_delay_ns, 10'500'000);
+  EXPECT_EQ(scenario.estimator.position, Eigen::Vector3d(0.1, 0.2, 0.3));
+  EXPECT_EQ(scenario.estimator.velocity, Eigen::Vector3d(0.4, 0.5, 0.6));
+  EXPECT_TRUE(are_equal(parse_scenario(to_yaml(scenario), "file"), scenario));
+}
+
+TEST(ScenarioTest, TheRodIsSampledAsTheRestWhereTheFileIsSilent) {
+  const auto read = [](const std::string& sensing) {
+    return parse_scenario(std::string(kMinimalScenario) + "sensing: " + sensing + "\n", "file")
+        .sensing;
+  };
+  const Sensing silent = read("{ period_s: 0.03, age_s: 0.02 }");
+  EXPECT_EQ(silent.rod.period_ns, 30'000'000);
+  EXPECT_EQ(silent.rod.age_ns, 20'000'000);
+  const Sensing own_age = read("{ rod: { age_s: 0.01 }, age_s: 0.02, period_s: 0.03 }");
+  EXPECT_EQ(own_age.rod.period_ns, 30'000'000);
+  EXPECT_EQ(own_age.rod.age_ns, 10'000'000);
+  const Sensing own_period = read("{ rod: { period_s: 0 }, age_s: 0.02, period_s: 0.03 }");
+  EXPECT_EQ(own_period.rod.period_ns, 0);
+  EXPECT_EQ(own_period.rod.age_ns, 20'000'000);
+}
+
+TEST(ScenarioTest, AnAttitudeErrorNeedsAPlantWithAnAttitudeWhichALibraryMayHave) {
+  const auto with = [](const char* model) {
+    return replace_once(std::string(kMinimalScenario) +
+                            "estimator: { tilt_rad: [-0.0118, -0.0046], yaw_rad: 0.055 }\n",
+                        "plant:\n", std::string("plant:\n  model: ") + model + "\n");
+  };
+  const Scenario scenario = parse_scenario(with("./mine.so"), "file");
+  EXPECT_EQ(scenario.estimator.attitude.tilt, Eigen::Vector2d(-0.0118, -0.0046));
+  EXPECT_EQ(scenario.estimator.attitude.yaw, 0.055);
+  EXPECT_TRUE(are_equal(parse_scenario(to_yaml(scenario), "file"), scenario));
+  EXPECT_EQ(find_error(with("analytic")),
+            "file:13: estimator.tilt_rad: expected a plant with an attitude, or 0; model is "
+            "'analytic', got [-0.0118, -0.0046]");
+}
+
 TEST(ScenarioTest, AFaultLastsFromStartToEndWhereTheFileIsSilent) {
   const std::string text = std::string(kMinimalScenario) + "faults: [ { freeze: { on: state } } ]";
   const Scenario scenario = parse_scenario(text, "file");
@@ -323,12 +378,75 @@ TEST(ScenarioTest, LeavesTheDefaultsWhereTheFileIsSilent) {
   EXPECT_EQ(scenario.record.flush_s, 0.2);
 }
 
+TEST(ScenarioTest, SensingIsFreshAndExactWhereTheFileIsSilent) {
+  const Scenario scenario = parse_scenario(kMinimalScenario, "file");
+  EXPECT_EQ(scenario.sensing.body.period_ns, 0);
+  EXPECT_EQ(scenario.sensing.body.age_ns, 0);
+  EXPECT_EQ(scenario.sensing.rod.period_ns, 0);
+  EXPECT_EQ(scenario.sensing.rod.age_ns, 0);
+  EXPECT_EQ(scenario.sensing.node_delay_ns, 0);
+  EXPECT_TRUE(scenario.estimator.position.isZero(0.0));
+  EXPECT_TRUE(scenario.estimator.velocity.isZero(0.0));
+  EXPECT_TRUE(scenario.estimator.attitude.is_zero());
+}
+
 TEST(ScenarioTest, ControllerBelievesThePlantsTruthWhereTheFileIsSilent) {
   std::string text = replace_once(kMinimalScenario, "plant:", "plant:\n  rotor_drag_n_s_m: 0.3");
   text += "controller: { model: { load_mass_kg: 0.21 } }\n";
   const Scenario scenario = parse_scenario(text, "file");
   EXPECT_EQ(scenario.controller.model.vehicle, (model::SlungLoadParameters{1.5, 0.21, 1.0, 9.8}));
   EXPECT_EQ(scenario.controller.model.air.rotor_drag, 0.3);
+}
+
+/// The minimal scenario with a multirotor and the section `autopilot`.
+std::string make_autopilot_text(const std::string& autopilot) {
+  return replace_once(kMinimalScenario, "plant:\n",
+                      "autopilot: " + autopilot +
+                          "\n"
+                          "plant:\n"
+                          "  model: multirotor\n"
+                          "  inertia_kg_m2: [0.03, 0.03, 0.06]\n"
+                          "  rotor: { thrust_constant_n_s2: 5.0e-6, max_speed_rad_s: 2000 }\n"
+                          "  rotors: [{ position_m: [0, 0, 0], spin: ccw }]\n");
+}
+
+TEST(ScenarioTest, AnAutopilotInALibraryHasAPeriodAndParameters) {
+  const Scenario silent = parse_scenario(make_autopilot_text("{ model: ./mine.so }"), "file");
+  EXPECT_EQ(silent.autopilot->model.name, "./mine.so");
+  EXPECT_EQ(silent.autopilot->period_ns, 4'000'000);
+  EXPECT_EQ(silent.autopilot->own.get<LibraryParameters>().json, "{}");
+
+  const Scenario said = parse_scenario(
+      make_autopilot_text("{ model: ./mine.so, period_s: 0.002, parameters: { roll: 6.5 } }"),
+      "file");
+  EXPECT_EQ(said.autopilot->period_ns, 2'000'000);
+  EXPECT_EQ(said.autopilot->own.get<LibraryParameters>().json, R"({"roll": 6.5})");
+
+  const Scenario again = parse_scenario(to_yaml(said), "again");
+  EXPECT_EQ(again.autopilot->model.name, "./mine.so");
+  EXPECT_EQ(again.autopilot->period_ns, 2'000'000);
+  EXPECT_EQ(again.autopilot->own.get<LibraryParameters>().json, R"({"roll": 6.5})");
+
+  EXPECT_EQ(find_error(make_autopilot_text("{ model: none, parameters: {} }")),
+            "file:7: autopilot.parameters: a key of shared libraries, here model is 'none'");
+  EXPECT_EQ(find_error(make_autopilot_text("{ model: ./mine.so, period_s: 0.0015 }")),
+            "file:7: autopilot.period_s: expected a multiple of plant.step_s (0.001), got 0.0015");
+}
+
+TEST(ScenarioTest, TheLibraryOfAPlantIsItsOwnOrThatOfItsAutopilot) {
+  const sls::test::TemporaryFolder folder;
+  std::ofstream(folder / "mine.so") << "bytes";
+  const auto calc = [&](const std::string& text) {
+    Scenario scenario = parse_scenario(text, "file");
+    scenario.folder = folder.path();
+    return calc_plant_library_sha256(scenario);
+  };
+  const std::string sha256 = calc_sha256("bytes");
+  EXPECT_EQ(calc(kMinimalScenario), "");
+  EXPECT_EQ(calc(replace_once(kMinimalScenario, "plant:", "plant:\n  model: mine.so")), sha256);
+  EXPECT_EQ(calc(make_autopilot_text("{ model: none }")), "");
+  EXPECT_EQ(calc(make_autopilot_text("{ model: mine.so }")), sha256);
+  EXPECT_THROW(calc(make_autopilot_text("{ model: gone.so }")), std::system_error);
 }
 
 TEST(ScenarioTest, ReadsKeysInAnyOrderAndWithAByteOrderMark) {

@@ -12,7 +12,9 @@ namespace {
 bool are_equal(const InitialState& a, const InitialState& b) {
   return a.placed == b.placed && a.position == b.position && a.v_WQ == b.v_WQ &&
          a.rod.alpha == b.rod.alpha && a.rod.beta == b.rod.beta &&
-         a.rod.alpha_dot == b.rod.alpha_dot && a.rod.beta_dot == b.rod.beta_dot;
+         a.rod.alpha_dot == b.rod.alpha_dot && a.rod.beta_dot == b.rod.beta_dot &&
+         a.q_WB.has_value() == b.q_WB.has_value() &&
+         (!a.q_WB || a.q_WB->coeffs() == b.q_WB->coeffs()) && a.w_WB_B == b.w_WB_B;
 }
 
 bool are_equal(const Plant& a, const Plant& b) {
@@ -20,6 +22,11 @@ bool are_equal(const Plant& a, const Plant& b) {
          a.own.get<sim::SlungLoadKeys>().pendulum == b.own.get<sim::SlungLoadKeys>().pendulum &&
          a.step_ns == b.step_ns && are_equal(a.initial, b.initial) && a.air == b.air &&
          a.disturbance_W == b.disturbance_W;
+}
+
+bool are_equal(const std::optional<Autopilot>& a, const std::optional<Autopilot>& b) {
+  if (a.has_value() != b.has_value()) return false;
+  return !a || (a->model.name == b->model.name && a->period_ns == b->period_ns);
 }
 
 template <class Policy>
@@ -107,6 +114,17 @@ bool are_equal(const model::RodAngles& a, const model::RodAngles& b) {
 bool are_equal(const SampleOffset& a, const SampleOffset& b) {
   return a.position == b.position && a.velocity == b.velocity && are_equal(a.rod, b.rod) &&
          a.force == b.force;
+}
+
+bool are_equal(const Sensing& a, const Sensing& b) {
+  return a.body.period_ns == b.body.period_ns && a.body.age_ns == b.body.age_ns &&
+         a.rod.period_ns == b.rod.period_ns && a.rod.age_ns == b.rod.age_ns &&
+         a.node_delay_ns == b.node_delay_ns;
+}
+
+bool are_equal(const Estimator& a, const Estimator& b) {
+  return a.position == b.position && a.velocity == b.velocity &&
+         a.attitude.tilt == b.attitude.tilt && a.attitude.yaw == b.attitude.yaw;
 }
 
 bool are_equal(const DelayFault& a, const DelayFault& b) { return a.by_ns == b.by_ns; }
@@ -272,6 +290,16 @@ SampleOffset make_random_offset(Dice& dice, FaultChannel on, bool is_signed) {
   return offset;
 }
 
+/// With ages of a period at most, for which every flight is long enough.
+Sensing make_random_sensing(Dice& dice, std::int64_t period_ns) {
+  const auto times = [&](std::int64_t longest) {
+    return dice.toss() ? 0 : dice.nanoseconds(1, longest);
+  };
+  return {{times(1'000'000'000), times(period_ns)},
+          {times(1'000'000'000), times(period_ns)},
+          times(period_ns)};
+}
+
 VehicleVariant make_random_variant(Dice& dice) {
   VehicleVariant variant;
   if (dice.toss()) variant.offset = dice.vector();
@@ -328,12 +356,13 @@ bool are_equal(const Scenario& a, const Scenario& b) {
          std::equal(
              a.vehicles.begin(), a.vehicles.end(), b.vehicles.begin(), b.vehicles.end(),
              [](const VehicleVariant& x, const VehicleVariant& y) { return are_equal(x, y); }) &&
-         are_equal(a.plant, b.plant) && are_equal(a.sync, b.sync) &&
-         are_equal(a.controller, b.controller) &&
+         are_equal(a.plant, b.plant) && are_equal(a.autopilot, b.autopilot) &&
+         are_equal(a.sync, b.sync) && are_equal(a.controller, b.controller) &&
          std::equal(a.mission.begin(), a.mission.end(), b.mission.begin(), b.mission.end(),
                     [](const Stage& x, const Stage& y) { return are_equal(x, y); }) &&
          std::equal(a.faults.begin(), a.faults.end(), b.faults.begin(), b.faults.end(),
                     [](const Fault& x, const Fault& y) { return are_equal(x, y); }) &&
+         are_equal(a.sensing, b.sensing) && are_equal(a.estimator, b.estimator) &&
          a.record.flush_s == b.record.flush_s;
 }
 
@@ -352,6 +381,9 @@ Scenario make_random_scenario(std::mt19937_64& random) {
   for (int left = dice.roll(0, 9); left > 0; --left)
     scenario.faults.push_back(
         make_random_fault(dice, scenario.sync.period_ns, scenario.vehicles.size()));
+  scenario.sensing = make_random_sensing(dice, scenario.sync.period_ns);
+  if (dice.toss()) scenario.estimator.position = dice.vector();
+  if (dice.toss()) scenario.estimator.velocity = dice.vector();
   scenario.record.flush_s = dice.between(1e-6, 0.2);
   if (dice.roll(0, 4) == 0) {
     scenario.plant.own = sim::SlungLoadKeys{sim::Pendulum::kRigid};

@@ -1,0 +1,228 @@
+// Scenarios of the plant `multirotor` that are right: what is read, and what is written reads back.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "sim_server/autopilots/px4/keys.hpp"
+#include "sim_server/plants/multirotor/keys.hpp"
+#include "tests/common/config/support.hpp"
+
+namespace sls::config::test {
+namespace {
+
+using Eigen::Vector3d;
+using sim::MultirotorKeys;
+
+/// Every key of the plant and of its autopilot `px4`, none with its default.
+const char* const kEverything = R"(name: everything
+vehicle: { quad_mass_kg: 1.55, load_mass_kg: 0.15, rod_length_m: 0.9, gravity_m_s2: 9.8066 }
+plant:
+  model: multirotor
+  inertia_kg_m2: [0.029125, 0.0292, 0.055225]
+  inertia_products_kg_m2: [0.0001, -0.0002, 0.0003]
+  rotor:
+    thrust_constant_n_s2: 5.1e-6
+    torque_constant_m: 0.05
+    drag_constant_n_s2_m: 8.0e-5
+    rolling_constant_n_s2: 1.0e-6
+    min_speed_rad_s: 100
+    max_speed_rad_s: 1500
+    lag_up_s: 0.0125
+    lag_down_s: 0.025
+    thrust_loss_speed_m_s: 25
+  rotors:
+    - { position_m: [0.13, 0.22, -0.01], spin: ccw, axis: [0.1, 0, -2] }
+    - position_m: [-0.13, -0.2, 0]
+      spin: cw
+      thrust_constant_n_s2: 5.2e-6
+      torque_constant_m: 0.06
+      drag_constant_n_s2_m: 9.0e-5
+      rolling_constant_n_s2: 2.0e-6
+      min_speed_rad_s: 110
+      max_speed_rad_s: 1600
+      lag_up_s: 0.013
+      lag_down_s: 0.026
+      thrust_loss_speed_m_s: 26
+  bodies:
+    - { mass_kg: 0.03, position_m: [0.01, 0.02, 0.03], inertia_kg_m2: [1.0e-4, 2.0e-4, 2.5e-4] }
+    - { mass_kg: 0.005 }
+  pendulum: rigid
+  attachment_m: [0.01, -0.02, 0.05]
+  rod: { mass_kg: 0.01, centre_m: 0.45, inertia_kg_m2: [8.333e-4, 8.334e-4, 5.0e-5] }
+  load_inertia_kg_m2: [1.0e-9, 2.0e-9, 3.0e-9]
+  wind_m_s: [1, -2, 0.5]
+  disturbance_n: [0.1, 0.2, -0.3]
+  disturbance_torque_n_m: [0.001, -0.002, 0.003]
+  step_s: 0.0005
+  initial:
+    quad_position_m: [1, 2, -3]
+    attitude: [0.8, 0.36, -0.48, 0]
+    body_rates_rad_s: [0.4, -0.5, 0.6]
+autopilot:
+  model: px4
+  period_s: 0.002
+  thrust_map: affine
+  affine_thrust: { force_n: 16, thrust: 0.8, force_per_thrust_n: 21 }
+  attitude: { gains_per_s: [6, 6.1, 2.9], yaw_weight: 0.3, rate_limits_rad_s: [3, 3.1, 3.2] }
+  rates:
+    proportional_per_rad_s: [0.15, 0.16, 0.21]
+    integral_per_rad: [0.2, 0.21, 0.11]
+    derivative_per_rad_s2: [0.003, 0.004, 0.001]
+    integral_limits: [0.3, 0.31, 0.32]
+    integral_off_error_rad_s: 6
+    rate_cut_off_hz: 41
+    derivative_cut_off_hz: 31
+  mixer:
+    - { roll: -0.4, pitch: 0.7, yaw: 0.9, thrust: 0.95 }
+    - { roll: 0.4, pitch: -0.7, yaw: -1 }
+  rotor_speeds: { at_zero_rad_s: 90, per_output_rad_s: 1010 }
+estimator: { tilt_rad: [-0.0118, -0.0046], yaw_rad: 0.055 }
+mission:
+  - hold: { position_m: [1, 2, -3] }
+    for_s: 1
+)";
+
+void expect_rotors(const MultirotorKeys& keys) {
+  const sim::RotorNumbers<double>& all = keys.rotor;
+  EXPECT_EQ(all.thrust_constant, 5.1e-6);
+  EXPECT_EQ(all.torque_constant, 0.05);
+  EXPECT_EQ(all.drag_constant, 8e-5);
+  EXPECT_EQ(all.rolling_constant, 1e-6);
+  EXPECT_EQ(all.min_speed, 100.0);
+  EXPECT_EQ(all.max_speed, 1500.0);
+  EXPECT_EQ(all.lag_up, 0.0125);
+  EXPECT_EQ(all.lag_down, 0.025);
+  EXPECT_EQ(all.thrust_loss_speed, 25.0);
+  ASSERT_EQ(keys.rotors.size(), 2u);
+  const sim::RotorKeys &first = keys.rotors[0], &second = keys.rotors[1];
+  EXPECT_EQ(first.position, Vector3d(0.13, 0.22, -0.01));
+  EXPECT_EQ(first.axis, Vector3d(0.1, 0, -2));
+  EXPECT_EQ(first.spin, sim::Spin::kCounterClockwise);
+  EXPECT_FALSE(first.own.thrust_constant || first.own.min_speed || first.own.lag_up);
+  EXPECT_EQ(second.position, Vector3d(-0.13, -0.2, 0));
+  EXPECT_EQ(second.axis, Vector3d(0, 0, -1));
+  EXPECT_EQ(second.spin, sim::Spin::kClockwise);
+  EXPECT_EQ(second.own.thrust_constant, 5.2e-6);
+  EXPECT_EQ(second.own.torque_constant, 0.06);
+  EXPECT_EQ(second.own.drag_constant, 9e-5);
+  EXPECT_EQ(second.own.rolling_constant, 2e-6);
+  EXPECT_EQ(second.own.min_speed, 110.0);
+  EXPECT_EQ(second.own.max_speed, 1600.0);
+  EXPECT_EQ(second.own.lag_up, 0.013);
+  EXPECT_EQ(second.own.lag_down, 0.026);
+  EXPECT_EQ(second.own.thrust_loss_speed, 26.0);
+}
+
+void expect_bodies(const MultirotorKeys& keys) {
+  EXPECT_EQ(keys.inertia, Vector3d(0.029125, 0.0292, 0.055225));
+  EXPECT_EQ(keys.products, Vector3d(0.0001, -0.0002, 0.0003));
+  ASSERT_EQ(keys.bodies.size(), 2u);
+  EXPECT_EQ(keys.bodies[0].mass, 0.03);
+  EXPECT_EQ(keys.bodies[0].position, Vector3d(0.01, 0.02, 0.03));
+  EXPECT_EQ(keys.bodies[0].inertia, Vector3d(1e-4, 2e-4, 2.5e-4));
+  EXPECT_EQ(keys.bodies[1].mass, 0.005);
+  EXPECT_TRUE(keys.bodies[1].position.isZero(0.0) && keys.bodies[1].inertia.isZero(0.0));
+  EXPECT_EQ(keys.pendulum, sim::Pendulum::kRigid);
+  EXPECT_EQ(keys.attachment, Vector3d(0.01, -0.02, 0.05));
+  ASSERT_TRUE(keys.rod.has_value() && keys.load_inertia.has_value());
+  EXPECT_EQ(keys.rod->mass, 0.01);
+  EXPECT_EQ(keys.rod->centre, 0.45);
+  EXPECT_EQ(keys.rod->inertia, Vector3d(8.333e-4, 8.334e-4, 5e-5));
+  EXPECT_EQ(*keys.load_inertia, Vector3d(1e-9, 2e-9, 3e-9));
+}
+
+void expect_px4(const Autopilot& autopilot) {
+  EXPECT_EQ(autopilot.model.name, "px4");
+  EXPECT_EQ(autopilot.period_ns, 2'000'000);
+  const auto& keys = autopilot.own.get<sim::px4::Keys>();
+  EXPECT_EQ(keys.thrust_map, sim::px4::ThrustMap::kAffine);
+  ASSERT_TRUE(keys.affine_thrust.has_value());
+  EXPECT_EQ(keys.affine_thrust->force, 16.0);
+  EXPECT_EQ(keys.affine_thrust->thrust, 0.8);
+  EXPECT_EQ(keys.affine_thrust->force_per_thrust, 21.0);
+  EXPECT_EQ(keys.attitude.per_rad, Vector3d(6, 6.1, 2.9));
+  EXPECT_EQ(keys.attitude.yaw_weight, 0.3);
+  EXPECT_EQ(keys.attitude.rate_limits, Vector3d(3, 3.1, 3.2));
+  EXPECT_EQ(keys.rates.proportional, Vector3d(0.15, 0.16, 0.21));
+  EXPECT_EQ(keys.rates.integral, Vector3d(0.2, 0.21, 0.11));
+  EXPECT_EQ(keys.rates.derivative, Vector3d(0.003, 0.004, 0.001));
+  EXPECT_EQ(keys.rates.integral_limits, Vector3d(0.3, 0.31, 0.32));
+  EXPECT_EQ(keys.rates.integral_off_error, 6.0);
+  EXPECT_EQ(keys.rates.rate_cut_off, 41.0);
+  EXPECT_EQ(keys.rates.derivative_cut_off, 31.0);
+  ASSERT_TRUE(keys.mixer.has_value());
+  ASSERT_EQ(keys.mixer->size(), 2u);
+  const sim::px4::MixerRow &first = keys.mixer->front(), &second = keys.mixer->back();
+  EXPECT_EQ(Vector3d(first.roll, first.pitch, first.yaw), Vector3d(-0.4, 0.7, 0.9));
+  EXPECT_EQ(first.thrust, 0.95);
+  EXPECT_EQ(Vector3d(second.roll, second.pitch, second.yaw), Vector3d(0.4, -0.7, -1));
+  EXPECT_EQ(second.thrust, 1.0);
+  EXPECT_EQ(keys.speeds.speed_at_zero, 90.0);
+  EXPECT_EQ(keys.speeds.speed_per_output, 1010.0);
+}
+
+void expect_everything(const Scenario& scenario) {
+  const Plant& plant = scenario.plant;
+  const auto& keys = plant.own.get<MultirotorKeys>();
+  expect_rotors(keys);
+  expect_bodies(keys);
+  EXPECT_EQ(keys.disturbance_torque, Vector3d(0.001, -0.002, 0.003));
+  EXPECT_EQ(plant.disturbance_W, Vector3d(0.1, 0.2, -0.3));
+  EXPECT_EQ(plant.air.v_wind_W, Vector3d(1, -2, 0.5));
+  EXPECT_EQ(plant.step_ns, 500'000);
+  EXPECT_EQ(plant.initial.placed, Body::kQuadrotor);
+  EXPECT_EQ(plant.initial.position, Vector3d(1, 2, -3));
+  ASSERT_TRUE(plant.initial.q_WB && plant.initial.w_WB_B && scenario.autopilot);
+  EXPECT_EQ(plant.initial.q_WB->coeffs(), Eigen::Vector4d(0.36, -0.48, 0, 0.8));  // x, y, z, w
+  EXPECT_EQ(*plant.initial.w_WB_B, Vector3d(0.4, -0.5, 0.6));
+  expect_px4(*scenario.autopilot);
+  EXPECT_EQ(scenario.estimator.attitude.tilt, Eigen::Vector2d(-0.0118, -0.0046));
+  EXPECT_EQ(scenario.estimator.attitude.yaw, 0.055);
+}
+
+TEST(MultirotorScenarioTest, WithEveryKeyReadsAndReadsBackWhatWasWritten) {
+  const Scenario scenario = parse_scenario(kEverything, "file");
+  expect_everything(scenario);
+  const std::string written = to_yaml(scenario);
+  const Scenario again = parse_scenario(written, "written");
+  expect_everything(again);
+  EXPECT_TRUE(are_equal(again, scenario)) << written;
+  EXPECT_EQ(to_yaml(again), written);
+}
+
+/// `kEverything` with another text in one place.
+std::string with(const std::string& from, const std::string& to) {
+  return replace_once(kEverything, from, to);
+}
+
+TEST(MultirotorScenarioTest, ARoundedQuaternionIsMadeAUnitOne) {
+  const Scenario scenario =
+      parse_scenario(with("[0.8, 0.36, -0.48, 0]", "[0.70710678, 0.70710678, 0, 0]"), "file");
+  EXPECT_NEAR(scenario.plant.initial.q_WB->norm(), 1.0, 1e-15);
+  EXPECT_NEAR(scenario.plant.initial.q_WB->w(), std::sqrt(0.5), 1e-15);
+  EXPECT_TRUE(are_equal(parse_scenario(to_yaml(scenario), "written"), scenario));
+}
+
+TEST(MultirotorScenarioTest, WhatLooksStrangeButMakesSenseIsAllowed) {
+  // Rotors without lag; with no authority over yaw; that stand still at most; a flat rigid body; an
+  // attachment at the end of the rod's reach.
+  EXPECT_EQ(find_error(with("    lag_up_s: 0.0125\n", "    lag_up_s: 0\n")), "no error");
+  EXPECT_EQ(find_error(with("      lag_down_s: 0.026\n", "      lag_down_s: 0\n")), "no error");
+  EXPECT_EQ(find_error(with("spin: cw", "spin: ccw")), "no error");
+  EXPECT_EQ(find_error(with("    min_speed_rad_s: 100\n", "    min_speed_rad_s: 1500\n")),
+            "no error");
+  EXPECT_EQ(find_error(with("[1.0e-4, 2.0e-4, 2.5e-4]", "[1.0e-4, 2.0e-4, 3.0e-4]")), "no error");
+  EXPECT_EQ(find_error(with("[0.01, -0.02, 0.05]", "[0, 0, 0.9]")), "no error");
+}
+
+TEST(MultirotorScenarioTest, WithoutAnAutopilotHasNone) {
+  std::string text = kEverything;
+  const auto first = text.find("autopilot:"), last = text.find("estimator:");
+  text.erase(first, last - first);
+  const Scenario scenario = parse_scenario(text, "file");
+  EXPECT_FALSE(scenario.autopilot.has_value());
+  EXPECT_EQ(to_yaml(scenario).find("autopilot"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace sls::config::test
