@@ -138,7 +138,7 @@ def main(arguments: Sequence[str]) -> int:
     except InputError as error:
         say(f"error: {error}")
         return 2
-    except study.FlightFailed as error:
+    except study.RunFailed as error:
         say(f"error: {error}")
         return 1
     return 0

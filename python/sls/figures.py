@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from sls.flight import Flight
+from sls.flight import Flight, calc_roll_pitch_yaw
 
 # Told apart by readers with any colour vision (Okabe and Ito).
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f7f7f", "#8c510a")
@@ -73,7 +73,7 @@ def draw(axes: Axes, time_s: np.ndarray, values: np.ndarray, **style) -> None:
 
 def mark_stages(all_axes: Sequence[Axes], flights: Sequence[Flight]) -> None:
     """Where the stages of a mission begin; of several flights it would only confuse."""
-    if len(flights) != 1:
+    if len(flights) != 1 or not any(axes.lines for axes in all_axes):
         return
     flight = flights[0]
     for stage in flight.stages[1:]:
@@ -167,7 +167,7 @@ def plot_errors(flights: Sequence[Flight]) -> Figure:
         set_log_scale(axes[axis, 1], [np.abs(flight.calc_error()[:, axis]) for flight in flights])
     axes[0, 0].set_title("error", loc="right")
     axes[0, 1].set_title("size of the error, logarithmic", loc="right")
-    mark_stages(axes.flat, flights)
+    mark_stages(list(axes.flat), flights)
     if len(flights) > 1:
         add_legend(axes[0, 0], columns=2)
     return figure
@@ -259,8 +259,98 @@ def plot_forces(flights: Sequence[Flight]) -> Figure:
 
 
 def plot_attitude(flights: Sequence[Flight]) -> Figure:
+    """Of point masses alone: where there is a body, `plot_body_attitude` shows both."""
     figure, axes = make_stack(2, "Commanded attitude", ("roll (°)", "pitch (°)"))
-    draw_columns(axes[:, 0], flights, lambda flight: np.degrees(flight.calc_attitude()))
+    if all(np.all(np.isnan(list_attitudes(flight)[0])) for flight in flights):
+        draw_columns(axes[:, 0], flights, lambda flight: np.degrees(flight.calc_attitude()))
+    return figure
+
+
+def list_attitudes(flight: Flight) -> tuple[np.ndarray, np.ndarray]:
+    """Roll, pitch and yaw, (n, 3), rad, and their set-points; of a flight whose plant has none,
+    those that realise the force."""
+    force = np.column_stack([flight.calc_attitude(), np.zeros(len(flight.time_s))])
+    if flight.body is None:
+        return np.full(force.shape, np.nan), force
+    known = np.any(np.isfinite(flight.body.q_WB_set))
+    return (calc_roll_pitch_yaw(flight.body.q_WB),
+            calc_roll_pitch_yaw(flight.body.q_WB_set) if known else force)
+
+
+def break_at_turns(angles: np.ndarray) -> np.ndarray:
+    """Puts NaN where an angle (n, k) goes on at the other end of its range."""
+    jumps = np.abs(np.diff(angles, axis=0, prepend=angles[:1])) > np.pi
+    return np.where(jumps, np.nan, angles)
+
+
+def widen(all_axes: Sequence[Axes], least: float) -> None:
+    """Gives the axes a range of at least `least`, so that rounding is not drawn as motion."""
+    for axes in all_axes:
+        low, high = axes.get_ylim()
+        if axes.lines and high - low < least:
+            axes.set_ylim((low + high - least) / 2, (low + high + least) / 2)
+
+
+def draw_beside(all_axes: Sequence[Axes], flights: Sequence[Flight],
+                calc_both: Callable[[Flight], tuple[np.ndarray, np.ndarray] | None],
+                legend_columns: int = 4) -> None:
+    """Column i of what `calc_both` gives on axes i: what was done, over its set-point. None: the
+    flight has no such data."""
+    for index, flight in enumerate(flights):
+        alone = len(flights) == 1
+        real, asked = calc_both(flight) or (np.empty((0, 0)), np.empty((0, 0)))
+        for values, label, style in (
+                (asked, "set-point", {"color": REFERENCE_COLOUR if alone else colour_of(index),
+                                      **REFERENCE}),
+                (real, "", {"color": colour_of(index), "zorder": 3})):
+            name = label if alone else f"{flight.name} {label}".strip()
+            for axes, column in zip(all_axes, values.T):
+                if np.any(np.isfinite(column)):
+                    draw(axes, flight.time_s, column, label=name or "real", **style)
+    mark_stages(all_axes, flights)
+    add_legend(all_axes[0], legend_columns)
+
+
+def plot_body_attitude(flights: Sequence[Flight]) -> Figure:
+    figure, axes = make_stack(3, "Attitude and its set-point", ("roll (°)", "pitch (°)", "yaw (°)"),
+                              height=1.55)
+    if any(np.any(np.isfinite(list_attitudes(flight)[0])) for flight in flights):
+        draw_beside(axes[:, 0], flights, lambda flight: tuple(
+            np.degrees(break_at_turns(angles)) for angles in list_attitudes(flight)))
+        widen(axes[:, 0], 1.0)
+    return figure
+
+
+def plot_body_rates(flights: Sequence[Flight]) -> Figure:
+    figure, axes = make_stack(3, "Body rates", ("about x (°/s)", "about y (°/s)", "about z (°/s)"),
+                              height=1.55)
+    draw_columns(axes[:, 0], flights, lambda flight: np.degrees(
+        flight.body.w_WB_B if flight.body else np.full((len(flight.time_s), 3), np.nan)))
+    widen(axes[:, 0], 1.0)
+    return figure
+
+
+def plot_rotors(flights: Sequence[Flight]) -> Figure:
+    """One below the other up to four, more in two columns."""
+    count = max(flight.body.rotor_speed.shape[1] if flight.body else 0 for flight in flights)
+    columns = 1 if count <= 4 else 2
+    rows = max(-(-count // columns), 1)
+    figure, axes = make_stack(rows, "Rotor speeds and their set-points",
+                              [""] * rows, height=1.3, columns=columns)
+    for number, one in enumerate(axes.flat, 1):
+        one.set_ylabel(f"{number} (rad/s)")
+        one.set_visible(number <= count)
+    draw_beside(list(axes.flat), flights, lambda flight: flight.body and (
+        flight.body.rotor_speed, flight.body.rotor_speed_set), legend_columns=4 // columns)
+    return figure
+
+
+def plot_thrust(flights: Sequence[Flight]) -> Figure:
+    figure, axes = make_stack(2, "Thrust of all rotors and the thrust asked for; force of the rod",
+                              ("thrust (N)", "rod tension (N)"))
+    draw_beside(axes[:, 0], flights, lambda flight: flight.body and (
+        np.column_stack([flight.body.thrust, flight.body.rod_tension]),
+        flight.body.thrust_set[:, np.newaxis]))
     return figure
 
 
@@ -291,7 +381,8 @@ def plot_fleet(flights: Sequence[Flight]) -> Figure:
 
 FIGURES: dict[str, Callable[[Sequence[Flight]], Figure]] = {
     "positions": plot_positions, "errors": plot_errors, "path": plot_path, "angles": plot_angles,
-    "forces": plot_forces, "attitude": plot_attitude,
+    "forces": plot_forces, "attitude": plot_attitude, "body_attitude": plot_body_attitude,
+    "body_rates": plot_body_rates, "rotors": plot_rotors, "thrust": plot_thrust,
 }
 
 

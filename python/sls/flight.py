@@ -4,7 +4,7 @@ Frame W everywhere: x forward, y right, z down; SI units, radians. Arrays have a
 what a source does not hold is NaN."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -30,6 +30,31 @@ class Stage:
 
 
 @dataclass(frozen=True)
+class Body:
+    """What a plant with attitude and rotors does, beside what it was asked for."""
+
+    q_WB: np.ndarray
+    """Attitude, (n, 4), w x y z."""
+    q_WB_set: np.ndarray
+    """Its set-point, (n, 4)."""
+    w_WB_B: np.ndarray
+    """Body rates, (n, 3), rad/s."""
+    rotor_speed: np.ndarray
+    """(n, rotors), rad/s."""
+    rotor_speed_set: np.ndarray
+    """Set-points, (n, rotors), rad/s."""
+    thrust: np.ndarray
+    """Of all rotors, (n,), N."""
+    thrust_set: np.ndarray
+    """Thrust asked for, (n,), N."""
+    rod_tension: np.ndarray
+    """(n,), N."""
+
+    def take(self, rows: np.ndarray) -> "Body":
+        return Body(**{field.name: getattr(self, field.name)[rows] for field in fields(self)})
+
+
+@dataclass(frozen=True)
 class Flight:
     name: str
     time_s: np.ndarray
@@ -51,6 +76,8 @@ class Flight:
     """Control period; NaN: not known."""
     notes: tuple[str, ...] = ()
     """What is missing, a line each."""
+    body: Body | None = None
+    """None: the source knows a point mass alone."""
 
     def calc_error(self) -> np.ndarray:
         """Load position error, (n, 3), m."""
@@ -62,6 +89,14 @@ class Flight:
         thrust = np.linalg.norm(self.f_Q_W, axis=1)
         with np.errstate(invalid="ignore", divide="ignore"):
             return np.column_stack([np.arcsin(f_y / thrust), np.arctan2(-f_x, -f_z)])
+
+
+def calc_roll_pitch_yaw(q_WB: np.ndarray) -> np.ndarray:
+    """Angles (n, 3), rad, of unit quaternions (n, 4): R = Rz(yaw) Ry(pitch) Rx(roll)."""
+    w, x, y, z = q_WB.T
+    return np.column_stack([np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
+                            np.arcsin(np.clip(2 * (w * y - x * z), -1, 1)),
+                            np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))])
 
 
 def calc_rod(alpha: np.ndarray, beta: np.ndarray) -> np.ndarray:

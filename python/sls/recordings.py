@@ -3,7 +3,7 @@
 import json
 import math
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ import numpy as np
 import yaml
 
 from sls.csv_tables import read_records, read_table, read_text, stack
-from sls.flight import Flight, Stage
+from sls.flight import Body, Flight, Stage
 from sls.input_error import InputError
 
 COLUMNS = {
@@ -94,7 +94,8 @@ class Recording:
         and whether a row was cut off."""
         parts, is_cut = [], False
         for number, (folder, _) in enumerate(self.segments):
-            rows, is_part_cut = read_table(folder / name, COLUMNS[name])
+            columns = COLUMNS["state.csv" if name == "measured.csv" else name]
+            rows, is_part_cut = read_table(folder / name, columns)
             is_cut |= is_part_cut
             if number + 1 < len(self.segments):
                 rows = rows[rows["step"] < self.segments[number + 1][1]["segment"]["first_step"]]
@@ -134,7 +135,21 @@ class Recording:
             f_Q_W=align(state["step"], command, ("force_x_n", "force_y_n", "force_z_n")),
             stages=self._find_stages(stage, reference, state["sim_time_s"], vehicle_id),
             period_s=self.manifest["period_s"],
-            notes=self.list_notes())
+            notes=self.list_notes(),
+            body=read_body(state))
+
+    def load_seen(self, vehicle_id: int, name: str) -> Flight:
+        """The same with the positions that the controller saw: what was measured."""
+        flight = self.load_flight(vehicle_id, name)
+        if not (self.folder / "measured.csv").exists():
+            return flight  # the recorder writes that file only where it can differ
+        table, _ = self._join_segments("measured.csv")
+        rows = table[table["vehicle_id"] == vehicle_id]
+        steps = self._rows_of("state.csv", vehicle_id)["step"]
+        return replace(flight, p_WQ=align(steps, rows, ("quad_x_m", "quad_y_m", "quad_z_m")),
+                       p_WL=align(steps, rows, ("load_x_m", "load_y_m", "load_z_m")),
+                       alpha=align(steps, rows, ("alpha_rad",))[:, 0],
+                       beta=align(steps, rows, ("beta_rad",))[:, 0])
 
     def load_fleet(self) -> list[Flight]:
         """Every vehicle's, named by its id."""
@@ -211,6 +226,34 @@ class Recording:
         """The last row of status.csv; empty where there is none."""
         rows = read_records(self.segments[-1][0] / "status.csv")
         return rows[-1] if rows else {}
+
+
+def read_body(state: np.ndarray) -> Body | None:
+    """From the columns of a plant that has attitude or rotors: those that are there. At step 0 the
+    autopilot has not been asked yet."""
+    def columns(*names: str) -> np.ndarray:
+        if names and set(names) <= set(state.dtype.names):
+            return stack(state, names)
+        return np.full((len(state), len(names)), np.nan)
+
+    def asked(*names: str) -> np.ndarray:
+        return np.where(state["step"][:, np.newaxis] > 0, columns(*names), np.nan)
+
+    rotors = 0
+    while f"rotor_{rotors + 1}_rad_s" in state.dtype.names:
+        rotors += 1
+    numbers = range(1, rotors + 1)
+    body = Body(
+        q_WB=columns("att_w", "att_x", "att_y", "att_z"),
+        q_WB_set=asked("att_set_w", "att_set_x", "att_set_y", "att_set_z"),
+        w_WB_B=columns("rate_x_rad_s", "rate_y_rad_s", "rate_z_rad_s"),
+        rotor_speed=columns(*(f"rotor_{n}_rad_s" for n in numbers)),
+        rotor_speed_set=columns(*(f"rotor_{n}_set_rad_s" for n in numbers)),
+        thrust=columns("thrust_n")[:, 0],
+        thrust_set=asked("thrust_set_n")[:, 0],
+        rod_tension=columns("rod_tension_n")[:, 0])
+    is_known = any(np.any(np.isfinite(getattr(body, field.name))) for field in fields(body))
+    return body if is_known else None
 
 
 def align(steps: np.ndarray, table: np.ndarray, names: tuple[str, ...]) -> np.ndarray:

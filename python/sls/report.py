@@ -26,6 +26,11 @@ CAPTIONS = {
     "angles": "Angles of the rod; both are 0 where the load hangs straight down.",
     "forces": "The force that the controller answers.",
     "attitude": "The attitude that realises this force, with yaw 0.",
+    "body_attitude": "Attitude of the vehicle, over the set-point of its autopilot (wide, light).",
+    "body_rates": "How fast the vehicle turns about its own axes.",
+    "rotors": "Speeds of the rotors, over their set-points in force (wide, light).",
+    "thrust": "Thrust of all rotors, over the thrust that the autopilot asks for (wide, light); "
+              "and the force of the rod on the quadrotor, along the rod.",
 }
 MOST_EVENTS = 200
 # Columns of status.csv that count nothing.

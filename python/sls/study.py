@@ -10,22 +10,20 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
+from sls import px4_study
 from sls.figures import (STYLE, add_legend, colour_of, draw, make_stack, plot_path,
                               plot_positions, save, set_log_scale)
 from sls.flight import Flight
 from sls.input_error import InputError
 from sls.metrics import StageMetrics, calc_over, calc_stage_metrics, split_laps
 from sls.published_logs import load_log
+from sls.px4_study import RunFailed
 from sls.recordings import Recording
 from sls.tables import (format_error, list_error_cells, list_step_cells, make_markdown_table)
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 DPI = 100
-
-
-class FlightFailed(Exception):
-    """A flight of the study did not end well; the message names it."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +56,8 @@ PUBLISHED_LAP_2 = list(csv.reader((HERE / "published_lap_2.csv").read_text().spl
 
 
 def fly_all(recordings: Path, domain: int, say: Callable[[str], None]) -> None:
-    """Flies everything, one after the other. Raises FlightFailed."""
+    """Flies everything, one after the other, then the chapter on PX4. Raises
+    RunFailed."""
     launcher = ROOT / "sls"
     for planned in FLIGHTS:
         say(f"study: flying {planned.name}, period {planned.period_s} s")
@@ -66,8 +65,9 @@ def fly_all(recordings: Path, domain: int, say: Callable[[str], None]) -> None:
                    "--force", "--period-s", planned.period_s, "--domain", str(domain)]
         code = subprocess.run(command, check=False).returncode
         if code != 0:
-            raise FlightFailed(f"study: expected {planned.name} to be flown, "
-                               f"got exit code {code} of ./sls run")
+            raise RunFailed(f"study: expected {planned.name} to be flown, "
+                            f"got exit code {code} of ./sls run")
+    px4_study.fly_all(recordings, say)
 
 
 def load_flights(recordings: Path) -> dict[str, Flight]:
@@ -246,7 +246,11 @@ def make_published_note(flights: dict[str, Flight], published: Path | None) -> s
             "quadrotor and load, at each of its instants.")
 
 
-def make_page(flights: dict[str, Flight], published: Path | None) -> str:
+PUBLISHED_PX4 = PUBLISHED_LAP_2[-1][1:]
+
+
+def make_page(flights: dict[str, Flight], px4_values: dict[str, str],
+              published: Path | None) -> str:
     """study_page.md with the numbers and tables that belong there."""
     def describe_height(name: str, digits: int) -> str:
         metrics = calc_stage_metrics(flights[name])[0]
@@ -268,16 +272,19 @@ def make_page(flights: dict[str, Flight], published: Path | None) -> str:
         integral_table=make_step_table([flights["integral_mass_error"],
                                         flights["mass_error_without_integral"]]),
         drag=describe_gain(flights, "rotor_drag_without_feed_forward", "rotor_drag", "xyz", 0),
-        drag_table=make_drag_table(flights))
+        drag_table=make_drag_table(flights), **px4_values)
 
 
 def write_study(recordings: Path, out: Path, published: Path | None) -> Path:
     """Writes `out`/study.md and `out`/study/*.png from the flights in `recordings`."""
     flights = load_flights(recordings)
-    page = make_page(flights, published)
+    flown = px4_study.load_flights(recordings)
+    page = make_page(flights, px4_study.make_values(flown, recordings, PUBLISHED_PX4), published)
     (out / "study").mkdir(exist_ok=True)
     with matplotlib.rc_context(STYLE):
-        for name, figure in draw_pictures(flights).items():
+        figures = {**draw_pictures(flights),
+                   **px4_study.draw_pictures(flown, [float(cell) for cell in PUBLISHED_PX4])}
+        for name, figure in figures.items():
             save(figure, out / "study" / f"{name}.png", DPI)
     (out / "study.md").write_text(page)
     return out / "study.md"
