@@ -358,7 +358,13 @@ cmd_plot() { run_python plot "$@"; }
 
 cmd_report() { run_python report "$@"; }
 
-cmd_study() { run_python study "$@"; }
+cmd_study() {
+  if [[ " $* " != *" --help "* && " $* " != *" --reuse "* ]]; then
+    build_programs "${flying[@]}" delay_margin
+    export SLS_BUILD="$build"  # the flights of the study fly side by side and must not build
+  fi
+  run_python study "$@"
+}
 
 cmd_doctor() {
   build_programs sls_doctor

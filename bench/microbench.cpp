@@ -3,6 +3,7 @@
 #include <slsPubSubTypes.h>
 
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "closed_loop/record_entries.hpp"
@@ -11,12 +12,15 @@
 #include "control_client/flight_controller.hpp"
 #include "control_client/messages.hpp"
 #include "sim_server/plants/analytic/analytic_plant.hpp"
+#include "sim_server/plants/plant.hpp"
 #include "sim_server/plants/slung_load/slung_load_plant.hpp"
 
 namespace sls::bench {
 namespace {
 
-config::Scenario load() { return config::load_scenario(SLS_SCENARIO); }
+config::Scenario load(const std::string& name = "figure_eight") {
+  return config::load_scenario(SLS_SCENARIOS "/" + name + ".yaml");
+}
 
 Eigen::Vector3d make_hover_force(const config::Scenario& scenario) {
   const auto& vehicle = scenario.vehicle;
@@ -40,6 +44,25 @@ BENCHMARK(plant_step)->Arg(1)->Arg(2)->Arg(10)->Arg(100);
 /// The same equations in closed form.
 void closed_form_step(benchmark::State& run) { step_plants<sim::AnalyticPlant>(run); }
 BENCHMARK(closed_form_step)->Arg(1)->Arg(2)->Arg(10)->Arg(100);
+
+/// The same of the multirotors of a scenario, with autopilot and signals, without its sensors.
+void step_multirotors(benchmark::State& run, const std::string& name) {
+  config::Scenario scenario = load(name);
+  scenario.sensing = {};
+  const std::vector<Eigen::Vector3d> f_Q_W = {make_hover_force(scenario)};
+  const sim::PlantType& type = sim::find_plant_type(scenario.plant.model);
+  std::vector<std::unique_ptr<sim::Plant>> plants;
+  for (std::int64_t i = 0; i < run.range(0); ++i)
+    plants.push_back(std::move(sim::make_plants(type, scenario, {0})[0].plant));
+  while (run.KeepRunningBatch(run.range(0)))
+    for (const auto& plant : plants) plant->advance(f_Q_W, 1);
+}
+void px4_published_step(benchmark::State& run) { step_multirotors(run, "px4_published"); }
+void multirotor_figure_eight_step(benchmark::State& run) {
+  step_multirotors(run, "multirotor_figure_eight");
+}
+BENCHMARK(px4_published_step)->Arg(1)->Arg(100);
+BENCHMARK(multirotor_figure_eight_step)->Arg(1)->Arg(100);
 
 const std::vector<RecordEntry>& entries() {
   static const std::vector<RecordEntry> flown = closed_loop::fly_entries(load(), 1000);

@@ -15,6 +15,9 @@ QUICK_FLEETS = (1, 2, 10)
 # --- plant ----------------------------------------------------------------------------------------
 
 
+MULTIROTORS = {f"{name}_step": name for name in ("px4_published", "multirotor_figure_eight")}
+
+
 def measure_plant(programs: Programs, rounds: int, is_quick: bool) -> list[Figure]:
     """With Google Benchmark, which interleaves its repetitions at random."""
     output = programs.run(
@@ -33,6 +36,10 @@ def measure_plant(programs: Programs, rounds: int, is_quick: bool) -> list[Figur
                 "plant", f"RK4 step of one vehicle, {vehicles} in turn", "ns", values,
                 "the same equations in closed form", times[f"closed_form_step/{vehicles}"], LESS,
                 goal={1: 10_000, 100: 8_000}.get(vehicles)))
+        elif function in MULTIROTORS:
+            figures.append(Figure(
+                "plant", f"RK4 step of one multirotor of {MULTIROTORS[function]}, {vehicles} in turn",
+                "ns", values, better=LESS, goal=30_000))
         elif function != "closed_form_step":
             figures.append(Figure("plant", function.replace("_", " "), "ns", values, better=LESS))
     return figures
