@@ -9,12 +9,12 @@ readonly flying=(sim_server control_client recorder closed_loop)
 readonly programs=("${flying[@]}" sim_ctl sls_verify delay_margin sls_doctor)
 readonly packages=(g++ make cmake libeigen3-dev libsimbody-dev libfastrtps-dev libfastcdr-dev
   fastddsgen default-jre-headless libyaml-cpp-dev libcli11-dev libspdlog-dev nlohmann-json3-dev libgtest-dev libssl-dev
-  libtinyxml2-dev openssl)
+  libtinyxml2-dev openssl pybind11-dev python3-dev python3-numpy)
 readonly fuzz_packages=(clang libclang-rt-14-dev)
 readonly fuzzers=(scenario qos_file csv recording samples)
 readonly test_packages=(iproute2 nftables cyclonedds-dev cyclonedds-tools fastdds-tools libfaketime python3-kubernetes
-  chromium)
-readonly python_packages=(python3-numpy python3-matplotlib python3-yaml)
+  python3-pytest slurm-wlm munge python3-distributed chromium)
+readonly python_packages=(python3-numpy python3-scipy python3-matplotlib python3-yaml)
 readonly bench_packages=(libbenchmark-dev python3-matplotlib)
 
 say() { echo "sls: $*" >&2; }

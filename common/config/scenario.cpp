@@ -19,31 +19,11 @@ namespace {
 constexpr std::int64_t kMaxDelayPeriods = 100'000;
 constexpr std::int64_t kMaxSamplesUnderWay = 100'000;
 
-/// The file's bytes; it is refused by its size before anything is read.
-std::string read_file(const std::filesystem::path& file) {
-  namespace fs = std::filesystem;
-  const auto fail = [&](const std::string& expectation, const std::string& found) {
-    throw make_error(file.string(), 0, "", "expected " + expectation + ", got " + found);
-  };
-  std::error_code error;
-  const fs::file_status status = fs::status(file, error);
-  if (!fs::exists(status)) fail("a scenario file", "none (" + error.message() + ")");
-  if (fs::is_directory(status)) fail("a scenario file", "a directory");
-  if (!fs::is_regular_file(status)) fail("a scenario file", "a pipe, socket or device");
-
-  const std::string size_limit = "at most " + std::to_string(kMaxScenarioBytes) + " bytes";
-  const std::uintmax_t size = fs::file_size(file, error);
-  if (error) fail("a scenario file", error.message());
-  if (size > kMaxScenarioBytes) fail(size_limit, std::to_string(size));
-
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) fail("a readable file", std::generic_category().message(errno));
-  std::string text(kMaxScenarioBytes + 1, '\0');  // one more, should it have grown meanwhile
-  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (stream.bad()) fail("a readable file", std::generic_category().message(errno));
-  text.resize(static_cast<std::size_t>(stream.gcount()));
-  if (text.empty()) fail("a scenario file", "an empty file");
-  return text;
+void check_size(const std::string& text, const std::string& place) {
+  if (text.size() > kMaxScenarioBytes)
+    throw make_error(place, 0, "",
+                     "expected at most " + std::to_string(kMaxScenarioBytes) + " bytes, got " +
+                         std::to_string(text.size()));
 }
 
 /// Puts the vehicle's own numbers in place of those of all.
@@ -262,18 +242,45 @@ void shift(Scenario& scenario, const Eigen::Vector3d& offset) {
 
 }  // namespace
 
+std::string read_scenario_file(const std::filesystem::path& file) {
+  namespace fs = std::filesystem;
+  const auto fail = [&](const std::string& expectation, const std::string& found) {
+    throw make_error(file.string(), 0, "", "expected " + expectation + ", got " + found);
+  };
+  std::error_code error;
+  const fs::file_status status = fs::status(file, error);
+  if (!fs::exists(status)) fail("a scenario file", "none (" + error.message() + ")");
+  if (fs::is_directory(status)) fail("a scenario file", "a directory");
+  if (!fs::is_regular_file(status)) fail("a scenario file", "a pipe, socket or device");
+
+  const std::string size_limit = "at most " + std::to_string(kMaxScenarioBytes) + " bytes";
+  const std::uintmax_t size = fs::file_size(file, error);
+  if (error) fail("a scenario file", error.message());
+  if (size > kMaxScenarioBytes) fail(size_limit, std::to_string(size));
+
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) fail("a readable file", std::generic_category().message(errno));
+  std::string text(kMaxScenarioBytes + 1, '\0');  // one more, should it have grown meanwhile
+  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
+  if (stream.bad()) fail("a readable file", std::generic_category().message(errno));
+  text.resize(static_cast<std::size_t>(stream.gcount()));
+  if (text.empty()) fail("a scenario file", "an empty file");
+  return text;
+}
+
 Scenario load_scenario(const std::filesystem::path& file) {
-  Scenario scenario = parse_scenario(read_file(file), file.string());
+  Scenario scenario = parse_scenario(read_scenario_file(file), file.string());
   scenario.folder = file.parent_path();
   return scenario;
 }
 
 Scenario parse_scenario(const std::string& text, const std::string& place) {
-  if (text.size() > kMaxScenarioBytes)
-    throw make_error(place, 0, "",
-                     "expected at most " + std::to_string(kMaxScenarioBytes) + " bytes, got " +
-                         std::to_string(text.size()));
-  const YamlNode root = parse_yaml(text, place);
+  check_size(text, place);
+  return read_scenario(parse_yaml(text, place), place, text);
+}
+
+Scenario read_scenario(const YamlNode& root, const std::string& place, const std::string& text) {
+  check_size(text, place);
   Places places(place);
   places.add("", root.line);
 

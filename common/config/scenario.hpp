@@ -371,8 +371,8 @@ Scenario load_scenario(const std::filesystem::path& file);
 /// The same from text that came over the wire; `place` stands for the file's name in messages.
 Scenario parse_scenario(const std::string& text, const std::string& place);
 
-/// SHA-256 of the shared library that the plant loads: that of the plant itself or, where it is none,
-/// of its autopilot; empty where neither is one.
+/// SHA-256 of the shared library that the plant loads: that of the plant itself or, where it is
+/// none, of its autopilot; empty where neither is one.
 /// @throws std::system_error naming the file where it cannot be read.
 std::string calc_plant_library_sha256(const Scenario& scenario);
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <filesystem>
 #include <initializer_list>
 #include <map>
 #include <optional>
@@ -272,5 +273,12 @@ void KeyNames::model(const char* name, ModelName& field, const ModelRegistry<Sec
   for (const auto& [key, all] : owners)
     owners_.emplace(key, "a key of " + all + ", here " + name + " is '" + field.name + "'");
 }
+
+/// The bytes of a scenario file.
+/// @throws ConfigError for a file that cannot be read, or is larger than a scenario may be.
+std::string read_scenario_file(const std::filesystem::path& file);
+
+/// The scenario in the tree of a file with this text, checked as load_scenario does.
+Scenario read_scenario(const YamlNode& root, const std::string& place, const std::string& text);
 
 }  // namespace sls::config

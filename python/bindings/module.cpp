@@ -1,0 +1,11 @@
+#include "python/bindings/bindings.hpp"
+
+PYBIND11_MODULE(_sls_core, module) {
+  using namespace sls::python;
+  module.doc() = "The simulator in this process. The package sls is its face.";
+  add_scenario(module);
+  add_flight(module);
+  add_campaign(module);
+  add_batch(module);
+  add_client(module);
+}
