@@ -1,5 +1,5 @@
 """What is wrong with what the user gave us."""
 
 
-class InputError(Exception):
+class InputError(ValueError):
     """One line that names the place, what was expected there and what was found."""
