@@ -35,12 +35,12 @@ class Expression:
             raise ExpressionError(f"expected at most {MOST_LETTERS} letters, got {len(text)}")
         try:
             tree = ast.parse(self._to_python(), mode="eval")
+            self._check(tree.body)
+            self._code = compile(tree, "expression", "eval")
         except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
             if isinstance(error, ExpressionError):
                 raise
             raise ExpressionError(f"expected arithmetic, got '{text}'") from None
-        self._check(tree.body)
-        self._code = compile(tree, "expression", "eval")
 
     def __reduce__(self) -> tuple[type, tuple[str]]:
         """Pickled as its text: compiled code cannot be sent to another process."""
@@ -62,8 +62,13 @@ class Expression:
                 raise ExpressionError(f"expected arithmetic, got '{text[at]}' in '{text}'")
             at = token.end()
             name = token["name"]
-            if name is None:
-                parts.append(f" {float(token['number'])!r} " if token["number"] else token[0])
+            if token["number"]:
+                number = float(token["number"])
+                if math.isinf(number):
+                    raise ExpressionError(f"expected a finite number, got '{token['number']}'")
+                parts.append(f" {number!r} ")
+            elif name is None:
+                parts.append(token["sign"] or " ")
             elif text[at:].lstrip().startswith("("):
                 if name not in FUNCTIONS:
                     raise ExpressionError(f"unknown function '{name}'; known are "
