@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import yaml
 
-from sls.campaign.sampling import make_values, to_yaml_value
+from sls.campaign.sampling import choose_runs, is_certified, make_values, to_yaml_value
 from sls.campaign.yaml_nodes import parse_yaml
 from sls.input_error import InputError
 
@@ -322,6 +322,28 @@ def test_rounds_to_multiples(tmp_path):
     assert all(isinstance(value, int) for value in values)
 
 
+# --- Runs that are chosen ------------------------------------------------------------------------
+
+def test_chooses_runs_without_repetition_and_evenly():
+    counts = np.zeros(50)
+    for seed in range(2000):
+        chosen = choose_runs(50, 5, seed)
+        assert len(set(chosen)) == 5
+        assert chosen == sorted(chosen)
+        counts[chosen] += 1
+    # Each run is chosen with probability 1/10: binomial, n = 2000; 50 of them.
+    assert np.max(np.abs(counts - 200)) < 4 * math.sqrt(2000 * 0.1 * 0.9)
+    assert choose_runs(50, 5, 1) != choose_runs(50, 5, 1, purpose="verify")
+    assert choose_runs(7, 7, 1) == list(range(7))
+
+
+@pytest.mark.parametrize("certify, expected", [("all", 40), ("none", 0), ("7", 7),
+                                               ("{ some: 40, seed: 2 }", 40)])
+def test_certifies_as_many_runs_as_asked_for(tmp_path, certify, expected):
+    campaign = make(tmp_path, "  _x: { uniform: [0, 1] }\ncertify: " + certify, 40)
+    assert sum(is_certified(campaign, run) for run in range(40)) == expected
+
+
 # --- Derived values ------------------------------------------------------------------------------
 
 def test_derives_values_in_any_order(tmp_path):
@@ -377,6 +399,7 @@ def test_numbers_read_back_to_the_same_bits(read):
 
 @pytest.mark.parametrize("value", [
     0, -3, 2**63 - 1, True, False, "pid", "1", "true", "a \"b\" \\ c: # {}", "two\nlines", "", "~",
+    "tab\tbell\a", "é", "😀", {"a b": 1, "c: d": [2]},
     [1, 2.5, "x"], [[0.1], []], {"a": 1, "b": {"c": [1.0, "d"]}},
 ])
 def test_other_values_read_back(value):
