@@ -69,6 +69,10 @@ CDFS = {
     "uniform: [-1, 3]": lambda x: (x + 1) / 4,
     "normal: [0.2, 0.02]": lambda x: calc_phi((x - 0.2) / 0.02),
     "normal: [0.2, 0.1], within: [0.1, 0.5]": calc_cut_cdf,
+    "normal: [0, 1], within: [9, 10]": lambda x: 1 - (
+        (math.erfc(x / math.sqrt(2)) - math.erfc(10 / math.sqrt(2)))
+        / (math.erfc(9 / math.sqrt(2)) - math.erfc(10 / math.sqrt(2)))),
+    "normal: [0, 1], within: [-10, -1]": lambda x: calc_phi(x) / calc_phi(-1),
     "log_uniform: [0.01, 100]": lambda x: math.log(x / 0.01) / math.log(1e4),
     "latin_hypercube: [2, 5]": lambda x: (x - 2) / 3,
     "latin_hypercube: { normal: [1, 2] }": lambda x: calc_phi((x - 1) / 2),
@@ -106,6 +110,7 @@ def test_has_the_moments_of_its_closed_form(tmp_path, spec, mean, deviation):
     ("uniform: [0.1, 0.3]", 0.1, 0.3),
     ("normal: [0.2, 10], within: [0.1, 0.3]", 0.1, 0.3),
     ("normal: [0, 1], within: [9, 10]", 9, 10),
+    ("normal: [0, 1], within: [90, 100]", 90, 100),
     ("log_uniform: [0.1, 0.3]", 0.1, 0.3),
     ("sobol: [0.1, 0.3]", 0.1, 0.3),
     ("latin_hypercube: [0.1, 0.3]", 0.1, 0.3),
@@ -142,8 +147,8 @@ def test_a_latin_hypercube_has_one_draw_in_each_stratum(tmp_path, runs):
 
 
 def test_each_elementary_interval_holds_one_point_of_sobol(tmp_path):
-    """The first two coordinates are a (0, 2)-sequence in base 2: each block of 2^m points has one in
-    each of the 2^m boxes of width 2^-k and height 2^-(m-k)."""
+    """The first two coordinates are a (0, 2)-sequence in base 2: each block of 2^m points has one
+    in each of the 2^m boxes of width 2^-k and height 2^-(m-k)."""
     m = 8
     campaign = make(tmp_path, "  _x: { sobol: [0, 1], seed: 3 }\n  _y: { sobol: [0, 1], seed: 3 }",
                     4 * 2**m)
