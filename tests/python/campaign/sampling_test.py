@@ -295,14 +295,16 @@ def test_a_grid_is_rounded_once(tmp_path):
 
 
 def test_a_logarithmic_grid_has_equal_ratios(tmp_path):
-    campaign = make(tmp_path, "  _x: { grid: { from: 0.001, to: 1000, values: 7, log: true } }", None)
+    grid = "{ from: 0.001, to: 1000, values: 7, log: true }"
+    campaign = make(tmp_path, f"  _x: {{ grid: {grid} }}", None)
     values = [row[0] for row in make_values(campaign, 0, 6)]
     assert values == pytest.approx([10.0**i for i in range(-3, 4)], rel=1e-14)
     assert (values[0], values[-1]) == (0.001, 1000.0)
 
 
 def test_a_list_keeps_its_types(tmp_path):
-    campaign = make(tmp_path, "  a.b: { list: [1, 1.0, true, text, \"2\", [1, 2.5], { c: 1 }] }", None)
+    items = '[1, 1.0, true, text, "2", [1, 2.5], { c: 1 }]'
+    campaign = make(tmp_path, f"  a.b: {{ list: {items} }}", None)
     values = [row[0] for row in make_values(campaign, 0, 6)]
     assert values == [1, 1.0, True, "text", "2", (1, 2.5), {"c": 1}]
     assert [type(value) for value in values[:4]] == [int, float, bool, str]
