@@ -13,7 +13,6 @@
 
 #include "common/config/numbers.hpp"
 #include "python/bindings/bindings.hpp"
-#include "python/bindings/scenario_argument.hpp"
 
 namespace sls::python {
 namespace {
@@ -69,19 +68,18 @@ Eigen::Map<const Eigen::VectorXd> find_row(const Numbers& values, std::size_t ro
 /// A batch for Python: one caller at a time, who does not hold the GIL while the loops move.
 class PythonBatch {
  public:
-  PythonBatch(const py::object& scenario, std::size_t count, std::size_t threads,
+  PythonBatch(const config::Scenario& scenario, std::size_t count, std::size_t threads,
               std::uint32_t vehicle, const std::string& name) {
     closed_loop::BatchOptions options;
     options.threads = threads;
     options.vehicle = vehicle;
     options.controller_name = name;
-    const config::Scenario read = read_scenario_argument(scenario);
-    if (vehicle >= read.vehicles.size())
+    if (vehicle >= scenario.vehicles.size())
       throw config::ConfigError("vehicle: expected a vehicle of the " +
-                                std::to_string(read.vehicles.size()) + " in '" + read.name +
+                                std::to_string(scenario.vehicles.size()) + " in '" + scenario.name +
                                 "', got " + std::to_string(vehicle));
     const py::gil_scoped_release release;
-    batch_ = std::make_unique<Batch>(read, count, options);
+    batch_ = std::make_unique<Batch>(scenario, count, options);
   }
 
   const Batch& get() const { return *batch_; }
@@ -172,7 +170,7 @@ class PythonBatch {
 void add_batch(py::module_& module) {
   py::class_<PythonBatch>(module, "Batch",
                           "Many loops of one scenario: sls.ClosedLoop is its face.")
-      .def(py::init<const py::object&, std::size_t, std::size_t, std::uint32_t,
+      .def(py::init<const config::Scenario&, std::size_t, std::size_t, std::uint32_t,
                     const std::string&>(),
            py::arg("scenario"), py::arg("count"), py::arg("threads"), py::arg("vehicle"),
            py::arg("name"))

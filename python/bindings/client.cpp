@@ -22,7 +22,6 @@
 #include "python/bindings/bindings.hpp"
 #include "python/bindings/errors.hpp"
 #include "python/bindings/python_law.hpp"
-#include "python/bindings/scenario_argument.hpp"
 
 namespace sls::python {
 namespace {
@@ -36,10 +35,10 @@ constexpr auto kSignalInterval = 50ms;           // in which Python's signal han
 /// A client whose law is a Python object. It installs no signal handlers: Python's count.
 class PythonClient {
  public:
-  PythonClient(const py::object& law, const py::object& scenario, const std::string& name,
+  PythonClient(const py::object& law, const config::Scenario& scenario, const std::string& name,
                std::int32_t strength, const std::string& vehicles, bool follow,
                const std::string& qos_file, int domain, std::string log_level)
-      : scenario_(read_scenario_argument(scenario)),
+      : scenario_(scenario),
         vehicle_ids_(config::parse_vehicle_ids(vehicles, scenario_.vehicles.size())),
         qos_file_(qos_file.empty() ? bus::default_qos_file() : std::filesystem::path(qos_file)),
         domain_(domain),
@@ -129,7 +128,7 @@ class PythonClient {
 
 void add_client(py::module_& module) {
   py::class_<PythonClient>(module, "Client", "A Python law over DDS: sls.Client is its face.")
-      .def(py::init<const py::object&, const py::object&, const std::string&, std::int32_t,
+      .def(py::init<const py::object&, const config::Scenario&, const std::string&, std::int32_t,
                     const std::string&, bool, const std::string&, int, std::string>(),
            py::arg("law"), py::arg("scenario"), py::arg("name"), py::arg("strength"),
            py::arg("vehicles"), py::arg("follow"), py::arg("qos"), py::arg("domain"),

@@ -13,12 +13,17 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import _sls_core
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .errors import ConfigError
+from sls.core import load_core
+from sls.errors import ConfigError
+from sls.scenario import load_scenario
+
+if TYPE_CHECKING:
+    from _sls_core import Scenario
 
 BLOCK = 32  # loops that a thread takes at once (closed_loop/batch.cpp)
 WIDTHS = {"quad_position": 3, "load_position": 3, "quad_velocity": 3, "angles": 2,
@@ -75,9 +80,9 @@ class ClosedLoop:
     rod_length_m: float
     gravity_m_s2: float
 
-    def __init__(self, scenario, count: int = 1, *, threads: int | None = None,
+    def __init__(self, scenario: Scenario | str | os.PathLike[str], count: int = 1, *, threads: int | None = None,
                  seeds: Sequence[int] | None = None, vehicle: int = 0):
-        """All loops are at step 0 of `scenario` (of `sls.load_scenario`, or the path of a file).
+        """All loops are at step 0 of `scenario` (of `sls.load_scenario`, or what that takes).
 
         threads: that share the work of a step; None: as many as there are processors and work.
         seeds: whole numbers ≥ 0, one for each loop, added to each seed of the scenario's faults.
@@ -85,12 +90,12 @@ class ClosedLoop:
         vehicle: of the scenario's fleet; every loop flies this one.
         Raises ConfigError as reading the scenario does.
         """
-        self._count = _to_whole("count", count, 1, 10_000_000)
+        self._count = to_whole("count", count, 1, 10_000_000)
         if threads is None:
             threads = min(len(os.sched_getaffinity(0)), -(-self._count // BLOCK))
-        self._loops = _sls_core.Batch(_to_scenario(scenario), self._count,
-                                      _to_whole("threads", threads, 1, 1024),
-                                      _to_whole("vehicle", vehicle, 0, 255), "python")
+        self._loops = load_core().Batch(to_scenario(scenario), self._count,
+                                      to_whole("threads", threads, 1, 1024),
+                                      to_whole("vehicle", vehicle, 0, 255), "python")
         for name, value in self._loops.constants.items():
             setattr(self, name, value)
         counters = self._loops.counters
@@ -120,7 +125,7 @@ class ClosedLoop:
 
     def reason(self, loop: int) -> str:
         """Why a loop has failed, in one line; empty: it has not."""
-        return self._loops.failure(_to_whole("loop", loop, 0, self._count - 1))
+        return self._loops.failure(to_whole("loop", loop, 0, self._count - 1))
 
     def step(self, force: NDArray[np.float64]) -> LoopState:
         """Moves each loop over one control period under its row of `force`, held.
@@ -181,14 +186,18 @@ class ClosedLoop:
         return which.astype(np.int64)
 
 
-def _to_scenario(scenario):
+def to_scenario(scenario: Scenario | str | os.PathLike[str]) -> Scenario:
+    """The scenario itself, or the one that `sls.load_scenario` reads. Raises ConfigError."""
     if isinstance(scenario, (str, os.PathLike)):
-        from . import load_scenario
         return load_scenario(scenario)
+    if not isinstance(scenario, load_core().Scenario):
+        raise ConfigError("scenario: expected one of sls.load_scenario, or the path of a file, got "
+                          f"{type(scenario).__name__}")
     return scenario
 
 
-def _to_whole(name: str, value: int, least: int, most: int) -> int:
+def to_whole(name: str, value: int, least: int, most: int) -> int:
+    """`value` as an int. Raises ConfigError unless it is a whole number from `least` to `most`."""
     if not isinstance(value, (int, np.integer)) or isinstance(value, bool) \
             or not least <= value <= most:
         raise ConfigError(f"{name}: expected a whole number from {least} to {most}, got {value!r}")
