@@ -81,9 +81,7 @@ def main() -> None:
     print(f"{GENERATIONS * LOOPS} flights of {FLIGHT_S:g} s in {time.perf_counter() - began:.1f} s")
 
     flight = sls.fly(load_scenario(position=float(best[0]), velocity=float(best[1])))
-    state, reference = flight.state, flight.reference
-    error = np.sqrt(sum(((state[f"load_{axis}_m"] - reference[f"ref_{axis}_m"]) ** 2).mean()
-                        for axis in "xyz"))
+    error = np.sqrt((flight.calc_load_error()**2).sum(axis=1).mean())
     print(f"the C++ law with these gains: rms error {error:.3f} m, "
           f"{first / error:.1f} times better than at the start")
 

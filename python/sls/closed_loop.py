@@ -220,10 +220,12 @@ def _to_rows(name: str, value: ArrayLike, count: int) -> NDArray[np.float64]:
     shape = (count, WIDTHS[name])
     try:
         numbers = np.asarray(value, np.float64)
-        rows = np.ascontiguousarray(np.broadcast_to(numbers, shape))
     except (TypeError, ValueError):
+        raise ConfigError(f"reset: {name}: expected numbers, got {value!r}") from None
+    if numbers.shape not in (shape, shape[1:]):
         raise ConfigError(f"reset: {name}: expected numbers of shape {shape} or {shape[1:]}, got "
-                          f"{np.asarray(value, object).shape}") from None
+                          f"{numbers.shape}")
+    rows = np.ascontiguousarray(np.broadcast_to(numbers, shape))
     if not np.isfinite(rows).all():
         raise ConfigError(f"reset: {name}: expected finite numbers, got "
                           f"{rows[~np.isfinite(rows)][0]}")
@@ -232,6 +234,6 @@ def _to_rows(name: str, value: ArrayLike, count: int) -> NDArray[np.float64]:
         raise ConfigError(f"reset: {name}: expected alpha from -pi to pi and beta from -pi/2 to "
                           f"pi/2, got {row.tolist()}")
     if name == "attitude" and (np.abs(np.linalg.norm(rows, axis=1) - 1) > 1e-6).any():
-        raise ConfigError("reset: attitude: expected unit quaternions w, x, y, z, got one of "
-                          f"another length")
+        raise ConfigError("reset: attitude: expected unit quaternions w, x, y, z, got another "
+                          "length")
     return rows
