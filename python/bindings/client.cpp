@@ -32,6 +32,15 @@ using namespace std::chrono_literals;
 constexpr const char* kIdentity = "controller";  // whose keys it uses on a secured domain
 constexpr auto kSignalInterval = 50ms;           // in which Python's signal handlers run
 
+/// As the option of control_client, which the text of its errors names.
+std::vector<std::uint32_t> parse_vehicles(const std::string& text, std::size_t fleet_size) {
+  try {
+    return config::parse_vehicle_ids(text, fleet_size);
+  } catch (const config::ConfigError& error) {
+    throw config::ConfigError(std::string(error.what()).substr(2));  // without "--"
+  }
+}
+
 /// A client whose law is a Python object. It installs no signal handlers: Python's count.
 class PythonClient {
  public:
@@ -39,7 +48,7 @@ class PythonClient {
                std::int32_t strength, const std::string& vehicles, bool follow,
                const std::string& qos_file, int domain, std::string log_level)
       : scenario_(scenario),
-        vehicle_ids_(config::parse_vehicle_ids(vehicles, scenario_.vehicles.size())),
+        vehicle_ids_(parse_vehicles(vehicles, scenario_.vehicles.size())),
         qos_file_(qos_file.empty() ? bus::default_qos_file() : std::filesystem::path(qos_file)),
         domain_(domain),
         log_level_(std::move(log_level)) {

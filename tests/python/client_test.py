@@ -222,7 +222,7 @@ def test_without_a_server_it_says_so(domain):
     ({"name": "a b"}, "name: expected 1 to 32 letters, digits, '_', '-' or '.', got 'a b'"),
     ({"domain": 233}, "domain: expected a whole number from 0 to 232, got 233"),
     ({"strength": 0.5}, "strength: expected a whole number from -2147483648 to 2147483647"),
-    ({"vehicles": [1]}, "expected vehicles 0 to 0"),
+    ({"vehicles": [1]}, "vehicles: expected 0, the scenario's only vehicle, got '1'"),
     ({"log_level": "loud"}, "log_level: expected one of debug, info, warning, error, got 'loud'"),
 ])
 def test_bad_arguments_are_named(arguments, message):
