@@ -2,6 +2,7 @@
 
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <map>
@@ -155,6 +156,9 @@ class PythonBatch {
   }
 
   std::unique_lock<std::mutex> take_turn() {
+    if (::getpid() != process_)  // where a fork has left the threads behind
+      throw config::ConfigError(
+          "ClosedLoop: expected the process that made it, got a fork of that: make one there");
     std::unique_lock lock(mutex_, std::try_to_lock);
     if (!lock)
       throw config::ConfigError("ClosedLoop: expected one thread at a time, another is at work");
@@ -163,6 +167,7 @@ class PythonBatch {
 
   std::unique_ptr<Batch> batch_;
   std::mutex mutex_;
+  const pid_t process_ = ::getpid();
 };
 
 }  // namespace

@@ -1,10 +1,13 @@
 #include "control_client/client.hpp"
 
 #include <pybind11/pybind11.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <csignal>
+#include <cstdio>
 #include <exception>
 #include <memory>
 #include <mutex>
@@ -31,6 +34,17 @@ using namespace std::chrono_literals;
 
 constexpr const char* kIdentity = "controller";  // whose keys it uses on a secured domain
 constexpr auto kSignalInterval = 50ms;           // in which Python's signal handlers run
+constexpr auto kPatience = 20s;                  // after a signal, as of the programs
+
+/// As the programs do where something hangs after a stop signal, such as a law that does not
+/// return.
+[[noreturn]] void end_process(py::error_already_set& interruption) {
+  std::fputs(
+      "sls.Client: error: hangs after the stop signal: ends as it is, what it was writing is not "
+      "complete\n",
+      stderr);
+  ::_exit(interruption.matches(PyExc_KeyboardInterrupt) ? 128 + SIGINT : 128 + SIGTERM);
+}
 
 /// As the option of control_client, which the text of its errors names.
 std::vector<std::uint32_t> parse_vehicles(const std::string& text, std::size_t fleet_size) {
@@ -51,16 +65,15 @@ class PythonClient {
         vehicle_ids_(parse_vehicles(vehicles, scenario_.vehicles.size())),
         qos_file_(qos_file.empty() ? bus::default_qos_file() : std::filesystem::path(qos_file)),
         domain_(domain),
-        log_level_(std::move(log_level)) {
+        log_level_(std::move(log_level)),
+        law_(law) {
     const std::string defect = control::describe_name_defect(name);
     if (!defect.empty()) throw config::ConfigError("name: " + defect);
     options_.name = name;
     options_.strength = strength;
     options_.follows_servers = follow;
-    const bool has_attitude =
-        config::find_model_keys(config::plant_keys(), scenario_.plant.model).has_attitude();
-    options_.make_law = make_python_law_maker(law, has_attitude, errors_);
     options_.is_stopped = [this] { return is_stopped_.load(); };
+    prepare_law();
     // A law that cannot be made is refused before anybody waits for this client.
     control::FlightController(config::make_vehicle_scenario(scenario_, vehicle_ids_.front()),
                               vehicle_ids_.front(), false, options_.make_law);
@@ -72,13 +85,19 @@ class PythonClient {
   void run() {
     if (is_running_.exchange(true))
       throw config::ConfigError("Client.run: expected one call at a time, another is at work");
+    prepare_law();
     is_done_ = false;
     std::thread flight([this] { fly(); });
     std::optional<py::error_already_set> interruption;
+    Clock::time_point give_up;
     while (!wait()) {
-      if (interruption || PyErr_CheckSignals() == 0) continue;
-      interruption.emplace();
-      is_stopped_ = true;
+      if (interruption) {
+        if (Clock::now() > give_up) end_process(*interruption);
+      } else if (PyErr_CheckSignals() != 0) {
+        interruption.emplace();
+        give_up = Clock::now() + kPatience;
+        is_stopped_ = true;
+      }
     }
     {
       const py::gil_scoped_release release;
@@ -93,6 +112,16 @@ class PythonClient {
   }
 
  private:
+  using Clock = std::chrono::steady_clock;
+
+  /// Each run has laws, and errors of laws, of its own.
+  void prepare_law() {
+    const bool has_attitude =
+        config::find_model_keys(config::plant_keys(), scenario_.plant.model).has_attitude();
+    errors_ = std::make_shared<LawErrors>();
+    options_.make_law = make_python_law_maker(law_, has_attitude, errors_);
+  }
+
   void fly() {
     std::exception_ptr failure;
     try {
@@ -122,7 +151,8 @@ class PythonClient {
   const std::filesystem::path qos_file_;
   const int domain_;
   const std::string log_level_;
-  const std::shared_ptr<LawErrors> errors_ = std::make_shared<LawErrors>();
+  const py::object law_;
+  std::shared_ptr<LawErrors> errors_;
   control::ClientOptions options_;
   std::atomic<bool> is_stopped_{false};
   std::atomic<bool> is_running_{false};

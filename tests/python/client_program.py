@@ -1,6 +1,7 @@
 """A client as a user writes one: `client_program.py SCENARIO DOMAIN NAME STRENGTH LAW`."""
 
 import sys
+import time
 
 import sls
 
@@ -31,6 +32,13 @@ def broken(now):
     return pid(now)
 
 
+def sleepy(now):
+    if now.step == 150:
+        print("sleeps", flush=True)
+        time.sleep(1000)
+    return pid(now)
+
+
 class Counting:
     """Integrates the error in its memory, as a law must that remembers anything."""
 
@@ -43,7 +51,7 @@ class Counting:
         return (x + memory[0], y + memory[1], z), memory
 
 
-LAWS = {"pid": pid, "broken": broken, "counting": Counting()}
+LAWS = {"pid": pid, "broken": broken, "sleepy": sleepy, "counting": Counting()}
 
 
 def main():

@@ -8,6 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 
 import numpy as np
@@ -144,6 +145,19 @@ def test_a_python_law_flies_a_server_to_the_same_bits_as_in_process(tmp_path, do
         print(next(line for line in steps.splitlines() if "steps/s" in line))
 
 
+def test_the_example_flies_a_server(tmp_path, domain):
+    with make_flight(tmp_path, domain) as flight:
+        flight.start("python", sys.executable, "-B", ROOT / "examples/python/pid_client.py",
+                     flight.scenario, "--domain", domain)
+        for name in ("server", "recorder", "python"):
+            assert flight.wait(name) == 0, flight.logs()
+        assert flight.manifest["complete"]
+        load = sls.Recording(flight.recording).state["load_x_m"]
+        built_in = sls.fly(sls.load_scenario(flight.scenario))
+        # Python's sines are the C library's, as those of C++ are; sums are in another order.
+        assert np.abs(load - built_in.state["load_x_m"]).max() < 1e-12
+
+
 def test_the_python_law_flies_as_the_law_in_cpp_does():
     scenario = sls.load_scenario("figure_eight_pid")
     ours, theirs = sls.fly(scenario, client_program.pid), sls.fly(scenario)
@@ -189,6 +203,24 @@ def test_a_signal_ends_the_client_in_order(tmp_path, domain, number, code):
         assert flight.wait("first") == code, flight.logs()
         assert ("interrupted" in flight.log("first")) == (number == signal.SIGINT)
         expect_flown(flight, "pid")
+
+
+def test_a_law_that_does_not_return_can_be_interrupted(tmp_path, domain):
+    with make_flight(tmp_path, domain) as flight:
+        client = flight.start_client(law="sleepy")
+        flight.wait_until(lambda: "sleeps" in flight.log("python"), "law that sleeps")
+        client.send_signal(signal.SIGINT)
+        assert flight.wait("python") == 130, flight.logs()
+        assert "sls.Client: error: hangs after the stop signal" in flight.log("python")
+
+
+def test_stop_ends_a_run_in_another_thread(domain):
+    client = sls.Client(client_program.pid, "figure_eight_pid", domain=domain, log_level="error")
+    thread = threading.Thread(target=client.run)
+    thread.start()
+    client.stop()
+    thread.join(DEADLINE_S)
+    assert not thread.is_alive()
 
 
 def test_a_law_that_raises_ends_the_client_with_the_reason(tmp_path, domain):

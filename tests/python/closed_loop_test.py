@@ -1,9 +1,16 @@
 """sls.ClosedLoop: judged by closed forms, and by flights whose forces it is given."""
 
+import os
+import pathlib
+import re
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 import sls
 
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 PLANT = {"model": "analytic", "step_s": 0.004,
          "initial": {"load_position_m": [0.0, 0.0, -0.5]}}
 
@@ -221,3 +228,24 @@ def test_a_vehicle_that_turns_begins_as_it_is_told():
 def test_something_else_than_a_scenario_is_refused():
     with pytest.raises(sls.ConfigError, match="^scenario: expected one of sls.load_scenario"):
         sls.ClosedLoop(7)
+
+
+def test_a_fork_is_told_to_make_its_own():
+    loop = sls.ClosedLoop(load_analytic(), 100, threads=2)
+    child = os.fork()
+    if child == 0:
+        try:
+            loop.step(hover(loop, 100))
+            os._exit(1)
+        except sls.ConfigError as error:
+            os._exit(0 if "expected the process that made it" in str(error) else 2)
+    assert os.waitpid(child, 0)[1] == 0
+
+
+def test_the_example_learns_gains_with_which_the_law_in_cpp_flies_as_well():
+    said = subprocess.run([sys.executable, "-B", ROOT / "examples/python/learn.py"], check=True,
+                          capture_output=True, text=True, timeout=120).stdout
+    errors = [float(number) for number in re.findall(r"rms error ([0-9.]+) m", said)]
+    assert errors[-1] < 0.6 * errors[0], said
+    assert errors[-1] == errors[-2], said  # to the millimetre: the batch and the law in C++
+    assert float(re.search(r"flights of 8 s in ([0-9.]+) s", said)[1]) < 60, said
