@@ -11,15 +11,12 @@ import sys
 import threading
 import time
 
+import client_program
 import numpy as np
 import pytest
 import sls
+from conftest import BUILD, PYTHON_PATH, ROOT
 
-sys.path.insert(0, str(pathlib.Path(__file__).parent))
-import client_program  # noqa: E402
-
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-BUILD = pathlib.Path(os.environ.get("SLS_BUILD", ROOT / "build"))
 DEADLINE_S = 60
 LAWS = {name: client_program.LAWS[name] for name in ("pid", "counting")}
 
@@ -59,7 +56,7 @@ class Flight:
         with log:
             self.processes[name] = subprocess.Popen(
                 [str(word) for word in command], stdout=log, stderr=log, cwd=self.folder,
-                env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)})
+                env={**os.environ, "PYTHONPATH": PYTHON_PATH})
         return self.processes[name]
 
     def start_server(self):

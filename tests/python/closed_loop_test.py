@@ -1,7 +1,6 @@
 """sls.ClosedLoop: judged by closed forms, and by flights whose forces it is given."""
 
 import os
-import pathlib
 import re
 import subprocess
 import sys
@@ -9,8 +8,8 @@ import sys
 import numpy as np
 import pytest
 import sls
+from conftest import PYTHON_PATH, ROOT
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
 PLANT = {"model": "analytic", "step_s": 0.004,
          "initial": {"load_position_m": [0.0, 0.0, -0.5]}}
 
@@ -244,7 +243,8 @@ def test_a_fork_is_told_to_make_its_own():
 
 def test_the_example_learns_gains_with_which_the_law_in_cpp_flies_as_well():
     said = subprocess.run([sys.executable, "-B", ROOT / "examples/python/learn.py"], check=True,
-                          capture_output=True, text=True, timeout=120).stdout
+                          capture_output=True, text=True, timeout=120,
+                          env={**os.environ, "PYTHONPATH": PYTHON_PATH}).stdout
     errors = [float(number) for number in re.findall(r"rms error ([0-9.]+) m", said)]
     assert errors[-1] < 0.6 * errors[0], said
     assert errors[-1] == errors[-2], said  # to the millimetre: the batch and the law in C++
