@@ -147,7 +147,7 @@ def test_without_the_extension_module_the_rest_works(run_python, tmp_path):
     done = run_python(
         f"import sls\nprint(sls.Recording({str(folder)!r}).state['load_z_m'][0])\n"
         "import sls.figures, sls.report, sls.study\n"
-        "try: sls.fly\n"
+        "try: sls.fly('short')\n"
         "except ImportError as error: print(error)\n"
         "try: sls.Scenario\n"
         "except ImportError as error: print(error)\n", path=str(conftest.ROOT / "python"),

@@ -26,7 +26,8 @@ SCENARIOS = {
     "attitude": ("multirotor_figure_eight", {"mission.0.for_s": 0.8}),
     "fleet": ("mixed_fleet", {"mission": TWO_STAGES}),
     "fault_of_one": ("mixed_fleet", {"mission": TWO_STAGES,
-                                     "faults": [{**FAULTS[0], "vehicle": 1}]}),
+                                     "faults": [{"noise": {**FAULTS[0]["noise"],
+                                                           "vehicle": 1}}]}),
 }
 TABLES = ("state", "measured", "command", "reference")
 

@@ -43,7 +43,8 @@ def test_the_example_flies_as_the_same_law_in_cpp(integral):
 
 
 def test_a_law_is_given_what_was_measured_and_wanted():
-    scenario = load_hover(faults=[{"noise": {"position_m": [0.01, 0.01, 0.01], "seed": 3}}])
+    noise = {"on": "state", "position_m": [0.01, 0.01, 0.01], "seed": 3}
+    scenario = load_hover(faults=[{"noise": noise}])
     seen = {}
 
     def law(now):
