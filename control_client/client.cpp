@@ -3,12 +3,12 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <cctype>
 #include <limits>
 #include <thread>
 
 #include "common/app/run_main.hpp"
 #include "common/app/scheduling.hpp"
-#include "common/app/stop_signal.hpp"
 #include "common/app/wait.hpp"
 #include "common/bus/convert.hpp"
 #include "common/bus/spinning.hpp"
@@ -27,22 +27,26 @@ constexpr auto kPollTime = 20ms;             // while nothing is in a hurry
 
 }  // namespace
 
+std::string describe_name_defect(const std::string& name) {
+  const bool is_plain = std::all_of(name.begin(), name.end(), [](unsigned char letter) {
+    return std::isalnum(letter) || letter == '_' || letter == '-' || letter == '.';
+  });
+  if (!name.empty() && name.size() <= 32 && is_plain) return "";
+  return "expected 1 to 32 letters, digits, '_', '-' or '.', got '" + name + "'";
+}
+
 Client::Client(bus::Node& node, const config::Scenario& scenario,
-               const std::vector<std::uint32_t>& vehicle_ids, const std::string& name,
-               std::int32_t strength, bool follows_servers, bool checks_purity)
+               const std::vector<std::uint32_t>& vehicle_ids, const ClientOptions& options)
     : node_(node),
       scenario_(scenario),
-      name_(name),
-      strength_(strength),
-      follows_servers_(follows_servers),
-      checks_purity_(checks_purity),
+      options_(options),
       library_sha256_(scenario.controller.law.calc_library_sha256(scenario.folder)),
       vehicle_ids_(vehicle_ids),
       servers_(node),
       participant_writer_(node),
       stream_(make_stream(scenario.sync.mode == config::SyncMode::kRealtime)) {
-  answers_.client_name(name);
-  answers_.strength(strength);
+  answers_.client_name(options.name);
+  answers_.strength(options.strength);
 }
 
 std::unique_ptr<AnswerStream> Client::make_stream(bool is_realtime) {
@@ -65,7 +69,7 @@ std::optional<bus::Run> Client::find_first_run() {
   const std::string vehicles = config::to_vehicle_ranges(vehicle_ids_);
   app::Wait wait(timeout_s, kUsualJoinTime);
   announce_waiting();
-  while (app::stop_signal() == 0) {
+  while (!options_.is_stopped()) {
     if (auto run = find_joinable_run()) return run;
     if (wait.is_over())
       throw app::RunError(fmt::format("no server for vehicle {} within {} s{}{}", vehicles,
@@ -105,7 +109,7 @@ void Client::begin(const bus::Run& run) {
   for (const std::uint32_t id : vehicle_ids_) {
     if (!bus::serves_vehicle(parameters, id)) continue;
     flown_ids_.push_back(id);
-    pilots.try_emplace(id, config::make_vehicle_scenario(scenario, id), id, checks_purity_);
+    pilots.try_emplace(id, config::make_vehicle_scenario(scenario, id), id, options_);
   }
   // Made and destroyed outside the lock: the middleware waits for handlers meanwhile, and ours for
   // the lock.
@@ -128,7 +132,7 @@ void Client::begin(const bus::Run& run) {
   watch_.emplace(servers_, run, scenario_.sync.wait.server_deadline_s);
   const std::string vehicles =
       bus::is_fleet(parameters) ? ", vehicles " + config::to_vehicle_ranges(flown_ids_) : "";
-  spdlog::info("'{}' joins run {:016x}: {}{}, period {} s", name_, parameters.run_id(),
+  spdlog::info("'{}' joins run {:016x}: {}{}, period {} s", options_.name, parameters.run_id(),
                scenario_.name, vehicles, scenario_.sync.period_ns * 1e-9);
   announce(false, false);
 }
@@ -143,7 +147,7 @@ void Client::leave() {
 }
 
 std::optional<bus::Run> Client::serve() {
-  while (app::stop_signal() == 0) {
+  while (!options_.is_stopped()) {
     rethrow_answer_error();
     if (has_ended()) return std::nullopt;
     if (auto next = find_successor()) return next;
@@ -208,7 +212,7 @@ std::optional<bus::Run> Client::find_successor() {
     const std::string news =
         fmt::format("run {:016x} was {} run {:016x}", run_->parameters.run_id(),
                     is_reset ? "reset to" : "replaced by", next->parameters.run_id());
-    if (!is_reset && !follows_servers_) throw app::RunError(news + " (see --follow)");
+    if (!is_reset && !options_.follows_servers) throw app::RunError(news + " (see --follow)");
     spdlog::warn("{}: follows it", news);
     return next;
   }
@@ -237,9 +241,9 @@ Participant Client::make_announcement(const std::vector<std::uint32_t>& vehicle_
   message.contract_sha256(bus::kContractSha256);
   message.vehicle_ids(vehicle_ids);
   message.role(ROLE_CONTROLLER);
-  message.name(name_);
+  message.name(options_.name);
   message.host(bus::host_name());
-  message.strength(strength_);
+  message.strength(options_.strength);
   message.scenario_sha256(scenario_.sha256);
   message.library_sha256(library_sha256_);
   return message;

@@ -9,6 +9,7 @@
 #include <chrono>
 #include <cstdint>
 #include <exception>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -16,24 +17,36 @@
 #include <string>
 #include <vector>
 
+#include "common/app/stop_signal.hpp"
 #include "common/bus/node.hpp"
 #include "common/bus/participants.hpp"
 #include "common/config/scenario.hpp"
 #include "control_client/answer_stream.hpp"
 #include "control_client/flight_controller.hpp"
+#include "control_client/laws/control_law.hpp"
 
 namespace sls::control {
 
+/// "expected 1 to 32 letters, …, got 'NAME'" where `name` may not be that of a client; else empty.
+std::string describe_name_defect(const std::string& name);
+
+struct ClientOptions {
+  std::string name = "control_client";  ///< in recordings and messages
+  std::int32_t strength = 0;            ///< among several clients of a vehicle the strongest flies
+  /// When another server replaces the one it flies with, it flies on with that one; else it ends.
+  bool follows_servers = false;
+  bool checks_purity = false;  ///< as of FlightController
+  LawMaker make_law = &make_control_law;
+  /// Asked 50 times a second: whether the client is to leave before the run has ended.
+  std::function<bool()> is_stopped = [] { return app::stop_signal() != 0; };
+};
+
 class Client {
  public:
-  /// Will fly those of `vehicle_ids` (ascending, at least one) that the server it finds has, under
-  /// `name`; among several clients of a vehicle the strongest flies.
-  /// When another server replaces the one it flies with, it flies on with that one if
-  /// `follows_servers`. With `checks_purity` every answer is computed twice and compared.
+  /// Will fly those of `vehicle_ids` (ascending, at least one) that the server it finds has.
   /// @throws config::ConfigError if the law cannot be made.
   Client(bus::Node& node, const config::Scenario& scenario,
-         const std::vector<std::uint32_t>& vehicle_ids, const std::string& name,
-         std::int32_t strength, bool follows_servers, bool checks_purity = false);
+         const std::vector<std::uint32_t>& vehicle_ids, const ClientOptions& options);
 
   /// Runs from joining to the end of the run, and of those that follow it after a reset.
   /// @throws config::ConfigError if the server flies another scenario.
@@ -43,7 +56,7 @@ class Client {
  private:
   using Clock = std::chrono::steady_clock;
 
-  /// The run to begin with; nothing after a stop signal.
+  /// The run to begin with; nothing once it is stopped.
   std::optional<bus::Run> find_first_run();
   std::unique_ptr<AnswerStream> make_stream(bool is_realtime);
   std::string describe_problem() const;
@@ -56,8 +69,8 @@ class Client {
 
   /// One of our vehicles in the run that is joined.
   struct Pilot {
-    Pilot(const config::Scenario& scenario, std::uint32_t id, bool checks_purity)
-        : controller(scenario, id, checks_purity) {}
+    Pilot(const config::Scenario& scenario, std::uint32_t id, const ClientOptions& options)
+        : controller(scenario, id, options.checks_purity, options.make_law) {}
     FlightController controller;
     std::optional<std::uint64_t> last_step;
     ControlCommand last_command;  // the answer to that step: a repeated sample gets it again
@@ -82,10 +95,7 @@ class Client {
 
   bus::Node& node_;
   config::Scenario scenario_;  // with the period in force once a run is joined
-  const std::string name_;
-  const std::int32_t strength_;
-  const bool follows_servers_;
-  const bool checks_purity_;
+  const ClientOptions options_;
   const std::string library_sha256_;
   const std::vector<std::uint32_t> vehicle_ids_;
 

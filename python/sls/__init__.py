@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from _sls_core import Now, Reference, Scenario, Vehicle
 
     from sls import metrics
+    from sls.client import Client
+    from sls.closed_loop import ClosedLoop, LoopReference, LoopState
     from sls.columns import Columns
     from sls.errors import ConfigError, LawFault, RunError
     from sls.flight import Flight, FlownVehicle, Law, LawWithMemory, fly
@@ -25,6 +27,8 @@ if TYPE_CHECKING:
 # Where each name is. Imported when first asked for: a program that only reads recordings needs
 # neither the extension module nor what the figures need.
 _PLACES = {
+    "Client": "sls.client",
+    "ClosedLoop": "sls.closed_loop",
     "Columns": "sls.columns",
     "ConfigError": "sls.errors",
     "Flight": "sls.flight",
@@ -32,6 +36,8 @@ _PLACES = {
     "Law": "sls.flight",
     "LawFault": "sls.errors",
     "LawWithMemory": "sls.flight",
+    "LoopReference": "sls.closed_loop",
+    "LoopState": "sls.closed_loop",
     "Now": "_sls_core",
     "Recording": "sls.recordings",
     "Reference": "_sls_core",

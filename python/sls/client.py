@@ -1,0 +1,96 @@
+"""A Python control law flies a running server over DDS, beside or instead of `control_client`.
+
+    sls.Client(my_law, "figure_eight.yaml").run()        # with sim_server and recorder elsewhere
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Iterable
+from types import FrameType
+from typing import TYPE_CHECKING, Any
+
+from sls.closed_loop import to_scenario, to_whole
+from sls.core import load_core
+from sls.errors import ConfigError
+
+if TYPE_CHECKING:
+    from _sls_core import Scenario
+    from sls.flight import Law, LawWithMemory
+
+LOG_LEVELS = ("debug", "info", "warning", "error")
+
+
+class Client:
+    """Answers every state sample of a run with the force of a Python law, by the rules of
+    `control_client`: announced to the server, stateless (what the law remembers travels in its
+    memory), among several clients of a vehicle the strongest flies and the others stand by."""
+
+    def __init__(self, law: Law | LawWithMemory, scenario: Scenario | str | os.PathLike[str], *,
+                 name: str = "python", strength: int = 0,
+                 vehicles: Iterable[int] | str | None = None, follow: bool = False,
+                 qos: str | os.PathLike[str] | None = None, domain: int = 0,
+                 log_level: str = "info"):
+        """Joins nothing yet: `run` does.
+
+        law: as of `sls.fly`: called with sls.Now, returns the force (3 floats, N, in W) or, where
+            it has a `memory_size`, (force, memory). One law for all vehicles; called on a thread
+            of the middleware, with the GIL.
+        scenario: of `sls.load_scenario`, or what that takes; the same as the server's.
+        name: in recordings and messages, 1 to 32 letters, digits, '_', '-' or '.'.
+        strength: among several clients the strongest flies.
+        vehicles: of the fleet, ids or text such as "0-9,20"; None: all that the server has.
+        follow: fly on with a server that replaces this one; else `run` raises RunError.
+        qos: QoS file; None: config/qos/default.xml. A process can use one only.
+        domain: DDS domain, 0 to 232.
+        log_level: of the lines on stderr: debug, info, warning or error.
+        Raises ConfigError for a mistake in any of these.
+        """
+        if vehicles is None:
+            vehicles = "all"
+        elif not isinstance(vehicles, str):
+            vehicles = ",".join(str(to_whole("vehicles", vehicle, 0, 255))
+                                for vehicle in sorted(set(vehicles)))
+        if log_level not in LOG_LEVELS:
+            raise ConfigError(f"log_level: expected one of {', '.join(LOG_LEVELS)}, got "
+                              f"{log_level!r}")
+        self._client = load_core().Client(
+            law, to_scenario(scenario), name, to_whole("strength", strength, -2**31, 2**31 - 1),
+            vehicles, bool(follow), "" if qos is None else os.fspath(qos),
+            to_whole("domain", domain, 0, 232), log_level)
+
+    def run(self) -> None:
+        """Flies from joining to the end of the run, and the runs that follow it after a reset.
+
+        Ctrl-C and SIGTERM end it in order: the server is told, and KeyboardInterrupt or
+        SystemExit(143) is raised. (SIGTERM: where the program has no handler of its own.) Call it
+        from the main thread; in another one only `stop` ends it early.
+        Raises ConfigError if the server flies another scenario or for the QoS file; RunError if no
+        server is found, it disappears, the run fails or the law is broken.
+        """
+        with _terminable():
+            self._client.run()
+
+    def stop(self) -> None:
+        """Ends `run`, which is at work in another thread, in order. `run` then returns."""
+        self._client.stop()
+
+
+class _terminable:
+    """Inside, SIGTERM raises SystemExit(143) unless the program has a handler for it."""
+
+    def __enter__(self) -> None:
+        self._is_ours = (threading.current_thread() is threading.main_thread()
+                         and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL)
+        if self._is_ours:
+            signal.signal(signal.SIGTERM, _exit)
+
+    def __exit__(self, *_: object) -> None:
+        if self._is_ours:
+            signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+
+def _exit(number: int, _frame: FrameType | None) -> Any:
+    raise SystemExit(128 + number)

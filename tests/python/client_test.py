@@ -1,0 +1,260 @@
+"""sls.Client: real flights, with server, recorder and Python clients as processes of their own."""
+
+import contextlib
+import json
+import os
+import pathlib
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+
+import client_program
+import numpy as np
+import pytest
+import sls
+from conftest import BUILD, PYTHON_PATH, ROOT
+
+DEADLINE_S = 60
+LAWS = {name: client_program.LAWS[name] for name in ("pid", "counting")}
+
+
+@pytest.fixture
+def domain():
+    """A DDS domain of one's own, by the lock that the tests in C++ take, too."""
+    deadline = time.monotonic() + 240
+    while time.monotonic() < deadline:
+        for number in range(1, 61):
+            with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as lock:
+                try:
+                    lock.bind(f"\0sls-test-domain-{number}")
+                except OSError:
+                    continue
+                yield number
+                # The shared-memory ports outlive processes that were killed.
+                for port in range(7400 + 250 * number, 7650 + 250 * number):
+                    for file in (f"fastrtps_port{port}", f"fastrtps_port{port}_el",
+                                 f"fastrtps_port{port}_sl", f"sem.fastrtps_port{port}_mutex"):
+                        pathlib.Path("/dev/shm", file).unlink(missing_ok=True)
+                return
+        time.sleep(0.1)
+    pytest.fail("no free DDS domain among 1 to 60")
+
+
+class Flight:
+    """Server, recorder and clients; what is still there at the end is killed."""
+
+    def __init__(self, folder, domain, scenario):
+        self.folder, self.domain, self.scenario = folder, domain, scenario
+        self.recording = folder / "recording"
+        self.processes = {}
+
+    def start(self, name, *command):
+        log = open(self.folder / f"{name}.log", "w")
+        with log:
+            self.processes[name] = subprocess.Popen(
+                [str(word) for word in command], stdout=log, stderr=log, cwd=self.folder,
+                env={**os.environ, "PYTHONPATH": PYTHON_PATH})
+        return self.processes[name]
+
+    def start_server(self):
+        self.start("server", BUILD / "bin/sim_server", "--scenario", self.scenario,
+                   "--domain", self.domain)
+
+    def start_recorder(self):
+        self.start("recorder", BUILD / "bin/recorder", "--out", self.recording,
+                   "--domain", self.domain)
+
+    def start_client(self, name="python", strength=0, law="pid"):
+        return self.start(name, sys.executable, "-B", ROOT / "tests/python/client_program.py",
+                          self.scenario, self.domain, name, strength, law)
+
+    def log(self, name):
+        return (self.folder / f"{name}.log").read_text()
+
+    def logs(self):
+        return "\n".join(f"--- {name}\n{self.log(name)}" for name in self.processes)
+
+    def wait(self, name):
+        """The exit code."""
+        try:
+            return self.processes[name].wait(DEADLINE_S)
+        except subprocess.TimeoutExpired:
+            pytest.fail(f"{name} goes on and on\n{self.logs()}")
+
+    def wait_until(self, is_true, what):
+        deadline = time.monotonic() + DEADLINE_S
+        while not is_true():
+            if time.monotonic() > deadline:
+                pytest.fail(f"no {what}\n{self.logs()}")
+            time.sleep(0.01)
+
+    def wait_for_steps(self):
+        """Until some of the flight is recorded."""
+        file = self.recording / "state.csv"
+        self.wait_until(lambda: file.exists() and file.stat().st_size > 100_000, "steps")
+
+    def end(self):
+        for process in self.processes.values():
+            if process.poll() is None:
+                process.kill()
+                process.wait()
+
+    @property
+    def manifest(self):
+        return json.loads((self.recording / "manifest.json").read_text())
+
+
+@contextlib.contextmanager
+def make_flight(folder, domain, for_s=32, controllers=1):
+    """A figure eight of so many seconds with so many clients; server and recorder are started."""
+    text = sls.load_scenario("figure_eight_pid", changes={
+        "mission.0.for_s": for_s, "sync.wait_for.controllers": controllers}).text
+    scenario = folder / "scenario.yaml"
+    scenario.write_text(text)
+    flight = Flight(folder, domain, scenario)
+    try:
+        flight.start_recorder()
+        flight.start_server()
+        yield flight
+    finally:
+        flight.end()
+
+
+def expect_flown(flight, law):
+    """Complete, and bit for bit what the same law flies undisturbed in this process."""
+    assert flight.wait("server") == 0, flight.logs()
+    assert flight.wait("recorder") == 0, flight.logs()
+    assert flight.manifest["complete"], flight.logs()
+    alone = sls.fly(sls.load_scenario(flight.scenario), LAWS[law])
+    assert flight.manifest["certificate"] == alone.certificate
+
+
+@pytest.mark.parametrize("law", ["pid", "counting"])
+def test_a_python_law_flies_a_server_to_the_same_bits_as_in_process(tmp_path, domain, law):
+    with make_flight(tmp_path, domain) as flight:
+        flight.start_client(law=law)
+        expect_flown(flight, law)
+        assert flight.wait("python") == 0, flight.logs()
+        steps = (flight.recording / "flight.txt").read_text()
+        print(next(line for line in steps.splitlines() if "steps/s" in line))
+
+
+def test_the_example_flies_a_server(tmp_path, domain):
+    with make_flight(tmp_path, domain) as flight:
+        flight.start("python", sys.executable, "-B", ROOT / "examples/python/pid_client.py",
+                     flight.scenario, "--domain", domain)
+        for name in ("server", "recorder", "python"):
+            assert flight.wait(name) == 0, flight.logs()
+        assert flight.manifest["complete"]
+        load = sls.Recording(flight.recording).state["load_x_m"]
+        built_in = sls.fly(sls.load_scenario(flight.scenario))
+        # Python's sines are the C library's, as those of C++ are; sums are in another order.
+        assert np.abs(load - built_in.state["load_x_m"]).max() < 1e-12
+
+
+def test_the_python_law_flies_as_the_law_in_cpp_does():
+    scenario = sls.load_scenario("figure_eight_pid")
+    ours, theirs = sls.fly(scenario, client_program.pid), sls.fly(scenario)
+    # The same equations in another order of operations: rounding, damped by the loop.
+    assert np.abs(ours.load_position - theirs.load_position).max() < 1e-12
+
+
+def test_after_a_kill_the_standby_flies_on_to_the_same_bits(tmp_path, domain):
+    with make_flight(tmp_path, domain, for_s=96, controllers=2) as flight:
+        first = flight.start_client("first", strength=2)
+        flight.start_client("standby", strength=1)
+        flight.wait_for_steps()
+        assert first.poll() is None, flight.logs()
+        first.kill()
+        expect_flown(flight, "pid")
+        assert flight.wait("standby") == 0, flight.logs()
+        clients = (flight.recording / "command.csv").read_text()
+        assert ",first," in clients and ",standby," in clients
+
+
+def test_a_standby_in_cpp_takes_over_from_a_killed_python_client(tmp_path, domain):
+    with make_flight(tmp_path, domain, for_s=96, controllers=2) as flight:
+        first = flight.start_client("first", strength=2)
+        flight.start("standby", BUILD / "bin/control_client", "--scenario", flight.scenario,
+                     "--domain", domain, "--name", "standby", "--strength", 1)
+        flight.wait_for_steps()
+        first.kill()
+        assert flight.wait("server") == 0, flight.logs()
+        assert flight.wait("recorder") == 0 and flight.manifest["complete"], flight.logs()
+        state = sls.Recording(flight.recording).state
+        undisturbed = sls.fly(sls.load_scenario(flight.scenario))
+        # Either law flies the same path but for rounding.
+        assert np.abs(state["load_x_m"] - undisturbed.state["load_x_m"]).max() < 1e-12
+
+
+@pytest.mark.parametrize("number, code", [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_ends_the_client_in_order(tmp_path, domain, number, code):
+    with make_flight(tmp_path, domain, for_s=96, controllers=2) as flight:
+        first = flight.start_client("first", strength=2)
+        flight.start_client("standby", strength=1)
+        flight.wait_for_steps()
+        first.send_signal(number)
+        assert flight.wait("first") == code, flight.logs()
+        assert ("interrupted" in flight.log("first")) == (number == signal.SIGINT)
+        expect_flown(flight, "pid")
+
+
+def test_a_law_that_does_not_return_can_be_interrupted(tmp_path, domain):
+    with make_flight(tmp_path, domain) as flight:
+        client = flight.start_client(law="sleepy")
+        flight.wait_until(lambda: "sleeps" in flight.log("python"), "law that sleeps")
+        client.send_signal(signal.SIGINT)
+        assert flight.wait("python") == 130, flight.logs()
+        assert "sls.Client: error: hangs after the stop signal" in flight.log("python")
+
+
+def test_stop_ends_a_run_in_another_thread(domain):
+    client = sls.Client(client_program.pid, "figure_eight_pid", domain=domain, log_level="error")
+    thread = threading.Thread(target=client.run)
+    thread.start()
+    client.stop()
+    thread.join(DEADLINE_S)
+    assert not thread.is_alive()
+
+
+def test_a_law_that_raises_ends_the_client_with_the_reason(tmp_path, domain):
+    with make_flight(tmp_path, domain) as flight:
+        flight.start_client(law="broken")
+        assert flight.wait("python") == 1, flight.logs()
+        assert "RunError: broken: vehicle 0, step 150: ValueError: no idea" in flight.log("python")
+
+
+def test_a_server_of_another_scenario_is_refused(tmp_path, domain):
+    with make_flight(tmp_path, domain) as flight:
+        other = tmp_path / "other.yaml"
+        other.write_text(flight.scenario.read_text() + "\n")
+        flight.scenario = other
+        flight.start_client()
+        assert flight.wait("python") == 2, flight.logs()
+        assert "ConfigError: scenario 'figure_eight_pid': expected the server's, SHA-256" \
+            in flight.log("python")
+
+
+def test_without_a_server_it_says_so(domain):
+    scenario = sls.load_scenario("figure_eight_pid", changes={"sync.wait_for.timeout_s": 0.5})
+    client = sls.Client(client_program.pid, scenario, domain=domain, log_level="error")
+    for _ in range(2):  # a client can run again
+        with pytest.raises(sls.RunError, match="^no server for vehicle 0 within 0.5 s"):
+            client.run()
+
+
+@pytest.mark.parametrize("arguments, message", [
+    ({"law": 3}, "controller: expected an object that can be called with sls.Now, got 3"),
+    ({"name": "a b"}, "name: expected 1 to 32 letters, digits, '_', '-' or '.', got 'a b'"),
+    ({"domain": 233}, "domain: expected a whole number from 0 to 232, got 233"),
+    ({"strength": 0.5}, "strength: expected a whole number from -2147483648 to 2147483647"),
+    ({"vehicles": [1]}, "vehicles: expected 0, the scenario's only vehicle, got '1'"),
+    ({"log_level": "loud"}, "log_level: expected one of debug, info, warning, error, got 'loud'"),
+])
+def test_bad_arguments_are_named(arguments, message):
+    with pytest.raises(sls.ConfigError) as error:
+        sls.Client(**{"law": client_program.pid, "scenario": "figure_eight_pid", **arguments})
+    assert message in str(error.value)
