@@ -84,7 +84,7 @@ def list_yaml_values(campaign: Campaign, values: list[Any]) -> list[str]:
 def fly_run(campaign: Campaign, runs: "Runs", index: int, values: list[Any],
             own: "OwnMeasures | None" = None) -> Row:
     """Flies one run. Raises RefusedRun where its scenario is refused."""
-    from _sls_core import ConfigError
+    from sls.errors import ConfigError
     texts = list_yaml_values(campaign, values)
     try:
         outcome, reason, measures, certificate, steps = runs.fly(
@@ -107,7 +107,7 @@ def check_values(campaign: Campaign, runs: "Runs", first: int, last: int) -> Non
     """Reads the scenarios that are most likely refused: the first and the last run, and of each
     varied key those with its least and greatest number and with each of its texts. Raises
     RefusedRun. A run that is refused all the same ends the campaign when it is flown."""
-    from _sls_core import ConfigError
+    from sls.errors import ConfigError
     chosen = dict[Any, tuple[int, list[Any]]]()
     for index, values in list_values(campaign, first, last):
         for column, value in enumerate(values):

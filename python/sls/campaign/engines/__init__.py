@@ -10,12 +10,13 @@ from dataclasses import dataclass
 from importlib import import_module
 from types import ModuleType
 
+from sls.errors import RunError
 from sls.input_error import InputError
 
 ENGINES = ("local", "slurm", "dask")
 
 
-class EngineError(Exception):
+class EngineError(RunError):
     """One line: what keeps the campaign from its end. What was flown stays; `--resume` goes on."""
 
 
