@@ -20,7 +20,7 @@ class Varied:
 
     `grid` and `list` hold their `items`. `uniform`, `normal`, `log_uniform`, `sobol` and
     `latin_hypercube` hold a `distribution` of DISTRIBUTIONS with its two `parameters`: bounds, or
-    mean and standard deviation. `derived` holds `expressions`: a text, or a list of texts and lists.
+    mean and standard deviation; a normal one may be cut off `within` bounds. `derived` holds `expressions`: a text, or a list of texts and lists.
     `seed` is a noise seed, drawn by counting up from `seed`."""
 
     path: str
@@ -31,6 +31,8 @@ class Varied:
     parameters: tuple[float, float] = (0.0, 0.0)
     seed: int = 0
     expressions: Any = None
+    constants: tuple[tuple[str, float], ...] = ()  # of `derived`: names that stand in the base file
+    within: tuple[float, float] | None = None
     multiple_of: int | float | None = None  # values are rounded to a multiple of it
 
     @property
