@@ -31,7 +31,8 @@ class Plan:
 
     campaign: str        # its name
     sha256: str
-    file: str            # where the campaign file was, and is for the workers
+    file: str            # where the campaign file was; own measures are relative to it
+    base: str            # where the base scenario was
     engine: str
     first: int
     last: int            # inclusive
@@ -77,14 +78,21 @@ class CampaignFolder:
 
     @cached_property
     def campaign(self) -> Campaign:
-        """Read from where the campaign file was when it was planned. Raises InputError where it is
-        another one by now."""
+        """As it was planned: editing the campaign file or its base does no harm. Raises InputError
+        where one of the copies or an own measure is another one by now."""
         from sls.campaign.campaign_file import load_campaign
-        campaign = load_campaign(Path(self.plan.file))
+        # Libraries in the base scenario are relative to where it was.
+        base, copy = Path(self.plan.base), self.folder / "base.yaml"
+        try:
+            is_same = base.read_bytes() == copy.read_bytes()
+        except OSError:
+            is_same = False
+        campaign = load_campaign(self.folder / "campaign.yaml", base=base if is_same else copy,
+                                 folder=Path(self.plan.file).parent)
         if campaign.sha256 != self.plan.sha256:
-            raise InputError(f"{self.plan.file}: expected the campaign that {self.folder} was begun "
-                             f"with (sha256 {self.plan.sha256}), got sha256 {campaign.sha256}; the "
-                             "file, its base scenario or an own measure was changed")
+            raise InputError(f"{self.folder}: expected the campaign that it was begun with (sha256 "
+                             f"{self.plan.sha256}), got sha256 {campaign.sha256}: campaign.yaml, "
+                             "base.yaml or an own measure was changed")
         return campaign
 
     def create(self, campaign: Campaign, engine: str, chunk_runs: int, first: int, last: int,
@@ -99,12 +107,12 @@ class CampaignFolder:
         if (self.folder / "plan.json").exists():
             self.take_up(campaign, engine, first, last, list(columns), allow_other_machines)
             return
-        self.__dict__.pop("plan", None)
+        self.forget_plan()
         write_whole(self.folder / "campaign.yaml", campaign.text.encode())
         write_whole(self.folder / "base.yaml", campaign.base_text.encode())
         self.write_plan(Plan(
             campaign=campaign.name, sha256=campaign.sha256, file=str(campaign.file.resolve()),
-            engine=engine, first=first, last=last, campaign_runs=campaign.runs,
+            base=str(campaign.base.resolve()), engine=engine, first=first, last=last, campaign_runs=campaign.runs,
             chunk_runs=chunk_runs, columns=list(columns), machine=describe_machine(),
             allow_other_machines=allow_other_machines))
 
@@ -118,11 +126,16 @@ class CampaignFolder:
         if plan.columns != columns:
             raise InputError(f"{self.folder}: expected the columns {','.join(columns)} of this "
                              f"version, got {','.join(plan.columns)}")
-        plan = replace(plan, engine=engine, file=str(campaign.file.resolve()), allow_other_machines=
-                       plan.allow_other_machines or allow_other_machines)
+        plan = replace(plan, engine=engine, file=str(campaign.file.resolve()),
+                       base=str(campaign.base.resolve()),
+                       allow_other_machines=plan.allow_other_machines or allow_other_machines)
         self.refuse_other_machine(plan)
         self.write_plan(plan)
         self.remove_leftovers()
+
+    def forget_plan(self) -> None:
+        """Reads it again when it is needed."""
+        self.__dict__.pop("plan", None)
 
     def write_plan(self, plan: Plan) -> None:
         write_whole(self.folder / "plan.json",

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from sls.campaign.campaign import Campaign, OwnMeasure
-from sls.campaign.runs import to_number, to_one_line
+from sls.campaign.runs import fly_text, to_number, to_one_line
 from sls.input_error import InputError
 
 LONGEST_ERROR = 300
@@ -52,14 +52,13 @@ class OwnMeasures:
     """All own measures of a campaign, loaded once in each process. Raises InputError."""
 
     def __init__(self, campaign: Campaign):
-        self.base = campaign.base
+        self.campaign = campaign
         self.measures = [(own, load_function(own)) for own in campaign.own_measures]
 
     def measure(self, scenario_text: str) -> list[str]:
         """Flies the scenario and calls each function with the flight: cells of their columns, then
         what went wrong; columns of a function that raises are empty."""
-        import sls
-        flight = sls.fly(sls.load_scenario_text(scenario_text, self.base.parent))
+        flight = fly_text(scenario_text, self.campaign)
         cells, errors = list[str](), list[str]()
         for own, function in self.measures:
             try:

@@ -1,21 +1,22 @@
 """Rows of runs.csv: one run each, a pure function of its index."""
 
-import hashlib
 import math
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from sls.campaign.campaign import Campaign
-from sls.campaign.sampling import make_values, to_yaml_value
+from sls.campaign.sampling import is_certified, make_values, to_yaml_value
+from sls.errors import ConfigError
 
 if TYPE_CHECKING:
     from _sls_core import Runs
+    from sls import Flight
     from sls.campaign.own_measures import OwnMeasures
 
 BLOCK = 1000  # runs whose values are held at once
+MOST_CHECKED = 100_000  # runs whose values are looked through before the first is flown
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,7 @@ class RefusedRun(Exception):
 def make_runs(campaign: Campaign) -> "Runs":
     """Flies the base scenario once. Raises sls.ConfigError."""
     from _sls_core import Runs
+    from sls import Flight
     return Runs(str(campaign.base), campaign.scenario_paths, list(campaign.measures),
                 campaign.period_s)
 
@@ -61,21 +63,6 @@ def to_one_line(text: str) -> str:
     return re.sub(r"0x[0-9a-f]{6,}", "0x…", " ".join(text.split()))
 
 
-@lru_cache(maxsize=4)
-def choose_runs(count: int, of: int, seed: int) -> frozenset[int]:
-    """`count` runs of 0 … `of`-1, by the seed alone: those whose SHA-256 of "seed:run" is least."""
-    def rank(index: int) -> bytes:
-        return hashlib.sha256(f"{seed}:{index}".encode()).digest()
-    return frozenset(range(of) if count >= of else sorted(range(of), key=rank)[:count])
-
-
-def is_certified(campaign: Campaign, index: int) -> bool:
-    certify = campaign.certify
-    if certify.kind == "some":
-        return index in choose_runs(certify.count, campaign.runs, certify.seed)
-    return certify.kind == "all"
-
-
 def list_yaml_values(campaign: Campaign, values: list[Any]) -> list[str]:
     """What the scenario's varied keys hold in a run."""
     return [to_yaml_value(value) for value in campaign.pick_scenario_values(values)]
@@ -84,7 +71,6 @@ def list_yaml_values(campaign: Campaign, values: list[Any]) -> list[str]:
 def fly_run(campaign: Campaign, runs: "Runs", index: int, values: list[Any],
             own: "OwnMeasures | None" = None) -> Row:
     """Flies one run. Raises RefusedRun where its scenario is refused."""
-    from sls.errors import ConfigError
     texts = list_yaml_values(campaign, values)
     try:
         outcome, reason, measures, certificate, steps = runs.fly(
@@ -96,6 +82,18 @@ def fly_run(campaign: Campaign, runs: "Runs", index: int, values: list[Any],
                        *map(to_number, measures), *own_cells, str(steps), certificate))
 
 
+def fly_whole(campaign: Campaign, runs: "Runs", values: list[Any]) -> "Flight":
+    """The same flight with all its columns. Raises ConfigError, RunError."""
+    return fly_text(runs.scenario_text(list_yaml_values(campaign, values)), campaign)
+
+
+def fly_text(scenario_text: str, campaign: Campaign) -> "Flight":
+    """Flies a scenario whose paths are relative to the base scenario's folder."""
+    import _sls_core
+    import sls
+    return sls.fly(_sls_core.Scenario(None, scenario_text, str(campaign.base.parent), {}))
+
+
 def list_values(campaign: Campaign, first: int, last: int) -> Iterator[tuple[int, list[Any]]]:
     """Index and values of each run, in order, without holding all."""
     for begin in range(first, last + 1, BLOCK):
@@ -105,11 +103,11 @@ def list_values(campaign: Campaign, first: int, last: int) -> Iterator[tuple[int
 
 def check_values(campaign: Campaign, runs: "Runs", first: int, last: int) -> None:
     """Reads the scenarios that are most likely refused: the first and the last run, and of each
-    varied key those with its least and greatest number and with each of its texts. Raises
-    RefusedRun. A run that is refused all the same ends the campaign when it is flown."""
-    from sls.errors import ConfigError
+    varied key those with its least and greatest number and with each of its texts, of up to
+    MOST_CHECKED runs. Raises RefusedRun. A run that is refused all the same ends the campaign when it is flown."""
     chosen = dict[Any, tuple[int, list[Any]]]()
-    for index, values in list_values(campaign, first, last):
+    last_looked_at = min(last, first + MOST_CHECKED - 1)
+    for index, values in list_values(campaign, first, last_looked_at):
         for column, value in enumerate(values):
             if isinstance(value, (int, float)) and not isinstance(value, bool):
                 for sign in (-1, 1):
@@ -118,7 +116,7 @@ def check_values(campaign: Campaign, runs: "Runs", first: int, last: int) -> Non
                         chosen[column, sign] = index, values
             elif len(chosen) < BLOCK:
                 chosen.setdefault((column, str(value)), (index, values))
-        if index in (first, last):
+        if index in (first, last_looked_at):
             chosen["end", index] = index, values
     for index, values in sorted(chosen.values(), key=lambda item: item[0]):
         try:
