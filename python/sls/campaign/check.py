@@ -10,6 +10,7 @@ from sls.campaign.yaml_nodes import fail
 
 MOST_LOOKED_AT = 100_000  # runs whose values are compared, to find the extreme ones
 MOST_SEARCHED = 20_000    # runs that are checked one by one, to name the first that fails
+BLOCK = 1000              # of them, whose values are held at once
 MOST_LISTED = 100         # different values of a key that is no number, each checked
 
 
@@ -27,19 +28,24 @@ def check_campaign(campaign: Campaign, runs: Checker) -> None:
 
     Raises InputError `FILE:LINE: vary.PATH: run I: …`."""
     for run in _list_extreme_runs(campaign):
-        if message := _check_run(campaign, runs, run):
-            for earlier in range(min(run, MOST_SEARCHED)):
-                if earlier_message := _check_run(campaign, runs, earlier):
-                    run, message = earlier, earlier_message
-                    break
-            _fail(campaign, run, message)
+        if message := _check_run(campaign, runs, make_values(campaign, run, run)[0]):
+            _fail(campaign, *(_find_first(campaign, runs, run) or (run, message)))
 
 
-def _check_run(campaign: Campaign, runs: Checker, run: int) -> str:
-    """The message, empty if nothing is wrong with the run's scenario."""
-    values = campaign.pick_scenario_values(make_values(campaign, run, run)[0])
+def _find_first(campaign: Campaign, runs: Checker, end: int) -> tuple[int, str] | None:
+    """The first run before `end` that fails, and its message."""
+    for first in range(0, min(end, MOST_SEARCHED), BLOCK):
+        block = make_values(campaign, first, min(first + BLOCK, end) - 1)
+        for run, values in enumerate(block, first):
+            if message := _check_run(campaign, runs, values):
+                return run, message
+    return None
+
+
+def _check_run(campaign: Campaign, runs: Checker, values: list[Any]) -> str:
+    """What is wrong with the scenario of a run with these values; empty if nothing is."""
     try:
-        runs.check([to_yaml_value(value) for value in values])
+        runs.check([to_yaml_value(value) for value in campaign.pick_scenario_values(values)])
     except ValueError as error:
         return str(error)
     return ""

@@ -5,7 +5,6 @@ FUNCTIONS. Nothing else is evaluated."""
 
 import ast
 import math
-import operator
 import re
 from collections.abc import Callable, Mapping
 
@@ -13,9 +12,7 @@ FUNCTIONS: dict[str, Callable[..., float]] = {
     "abs": abs, "cos": math.cos, "exp": math.exp, "log": math.log, "max": max, "min": min,
     "sin": math.sin, "sqrt": math.sqrt, "tan": math.tan}
 FEWEST_ARGUMENTS = {"max": 2, "min": 2}  # all others take exactly one
-OPERATORS = {ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul,
-             ast.Div: operator.truediv, ast.Pow: operator.pow}
-SIGNS = {ast.UAdd: operator.pos, ast.USub: operator.neg}
+SCOPE = {"__builtins__": {}, **FUNCTIONS}
 MOST_LETTERS = 1000
 TOKEN = re.compile(r"\s+|(?P<name>[A-Za-z_][A-Za-z0-9_]*(?:\.[A-Za-z0-9_]+)*)"
                    r"|(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)"
@@ -37,12 +34,23 @@ class Expression:
         if len(text) > MOST_LETTERS:
             raise ExpressionError(f"expected at most {MOST_LETTERS} letters, got {len(text)}")
         try:
-            self._root = ast.parse(self._to_python(), mode="eval").body
+            tree = ast.parse(self._to_python(), mode="eval")
+            self._check(tree.body)
+            self._code = compile(tree, "expression", "eval")
         except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
             if isinstance(error, ExpressionError):
                 raise
             raise ExpressionError(f"expected arithmetic, got '{text}'") from None
-        self._check(self._root)
+
+    def __reduce__(self) -> tuple[type, tuple[str]]:
+        """Pickled as its text: compiled code cannot be sent to another process."""
+        return Expression, (self.text,)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Expression) and other.text == self.text
+
+    def __hash__(self) -> int:
+        return hash(self.text)
 
     def _to_python(self) -> str:
         """The same with a plain identifier for each name: Python reads dots otherwise."""
@@ -54,8 +62,13 @@ class Expression:
                 raise ExpressionError(f"expected arithmetic, got '{text[at]}' in '{text}'")
             at = token.end()
             name = token["name"]
-            if name is None:
-                parts.append(f" {float(token['number'])!r} " if token["number"] else token[0])
+            if token["number"]:
+                number = float(token["number"])
+                if math.isinf(number):
+                    raise ExpressionError(f"expected a finite number, got '{token['number']}'")
+                parts.append(f" {number!r} ")
+            elif name is None:
+                parts.append(token["sign"] or " ")
             elif text[at:].lstrip().startswith("("):
                 if name not in FUNCTIONS:
                     raise ExpressionError(f"unknown function '{name}'; known are "
@@ -73,9 +86,10 @@ class Expression:
         match node:
             case ast.Constant(value=float()) | ast.Name():
                 parts = []
-            case ast.BinOp(left=left, op=op, right=right) if type(op) in OPERATORS:
+            case ast.BinOp(left=left, right=right,
+                           op=ast.Add() | ast.Sub() | ast.Mult() | ast.Div() | ast.Pow()):
                 parts = [left, right]
-            case ast.UnaryOp(op=op, operand=operand) if type(op) in SIGNS:
+            case ast.UnaryOp(op=ast.UAdd() | ast.USub(), operand=operand):
                 parts = [operand]
             case ast.Call(func=ast.Name(id=name), args=parts, keywords=[]):
                 fewest = FEWEST_ARGUMENTS.get(name)
@@ -97,32 +111,17 @@ class Expression:
             if isinstance(value, bool) or not isinstance(value, int | float):
                 raise ExpressionError(f"expected a number of {name}, got {value!r}")
             floats.append(float(value))
+        names = {f"name_{i}": value for i, value in enumerate(floats)}
         try:
-            result = self._evaluate(self._root, floats)
+            result = eval(self._code, SCOPE, names)  # of nothing but arithmetic: see _check
         except ZeroDivisionError:
             raise ExpressionError(f"division by zero in '{self.text}'") from None
         except OverflowError:
             raise ExpressionError(f"'{self.text}' is too large") from None
-        except ValueError:
+        except (ValueError, TypeError):  # such as the least of complex numbers
             raise ExpressionError(f"'{self.text}' is not defined") from None
-        if not isinstance(result, float) or not math.isfinite(result):  # (-1) ** 0.5 is complex
+        if isinstance(result, complex):  # the root of a negative number
+            raise ExpressionError(f"'{self.text}' is not defined")
+        if not math.isfinite(result):
             raise ExpressionError(f"'{self.text}' is not a finite number")
-        return result
-
-    def _evaluate(self, node: ast.expr, values: list[float]) -> float:
-        match node:
-            case ast.Constant():
-                return node.value
-            case ast.Name():
-                return values[int(node.id.removeprefix("name_"))]
-            case ast.UnaryOp():
-                return SIGNS[type(node.op)](self._evaluate(node.operand, values))
-            case ast.BinOp():
-                result = OPERATORS[type(node.op)](self._evaluate(node.left, values),
-                                                  self._evaluate(node.right, values))
-            case ast.Call():
-                result = FUNCTIONS[node.func.id](*(self._evaluate(part, values)
-                                                   for part in node.args))
-        if isinstance(result, complex):
-            raise ValueError
         return result

@@ -51,9 +51,7 @@ def make_values(campaign: Campaign, first: int, last: int) -> list[list[Any]]:
                                     for run in range(first, last + 1)]
     for varied in order_derived(campaign.varied):
         columns[varied.path] = _derive(campaign, varied, columns, first, last)
-    return [list(row) for row in zip(*(columns[varied.path] for varied in campaign.varied),
-                                     strict=True)] if columns else [[] for _ in
-                                                                    range(first, last + 1)]
+    return [list(row) for row in zip(*(columns[path] for path in campaign.paths), strict=True)]
 
 
 def to_yaml_value(value: Any) -> str:
@@ -72,25 +70,6 @@ def to_yaml_value(value: Any) -> str:
     if isinstance(value, Sequence):
         return "[" + ", ".join(to_yaml_value(item) for item in value) + "]"
     return "{" + ", ".join(f"{key}: {to_yaml_value(item)}" for key, item in value.items()) + "}"
-
-
-def choose_runs(runs: int, count: int, seed: int, purpose: str = "certify") -> list[int]:
-    """`count` of the runs 0 to `runs` - 1, ascending, without repetition, chosen by `seed`. Another
-    `purpose` chooses others."""
-    return sorted(_make_permutation(_make_key(purpose, seed, ""), runs)[:count].tolist())
-
-
-def is_certified(campaign: Campaign, run: int) -> bool:
-    """Whether this run gets a certificate."""
-    certify = campaign.certify
-    if certify.kind != "some":
-        return certify.kind == "all"
-    return run in _choose_certified(campaign.runs, certify.count, certify.seed)
-
-
-@lru_cache(maxsize=4)
-def _choose_certified(runs: int, count: int, seed: int) -> frozenset[int]:
-    return frozenset(choose_runs(runs, count, seed))
 
 
 # --- Streams of random bits ----------------------------------------------------------------------
