@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from sls.campaign.drawing import format_number
+from sls.campaign.pairs import (count_changes, describe_changes, find_finished, make_measure_rows,
+                                make_outcome_rows)
 from sls.campaign.report import flatten, read_manifest
 from sls.campaign.run_table import OUTCOMES, RunTable, find_rows, read_runs
-from sls.campaign.statistics import (calc_mcnemar_p, calc_paired_difference, calc_quantiles,
-                                     calc_wilson_interval)
 from sls.input_error import InputError
 
 MOST_FACTS = 20
@@ -118,57 +118,17 @@ def describe_runs(a: RunTable, b: RunTable, common: int) -> list[str]:
 
 
 def compare_outcomes(a: RunTable, b: RunTable, in_a: np.ndarray, in_b: np.ndarray) -> list[str]:
-    """A table of how often each outcome of A met each of B, and McNemar's test of finished or not."""
-    outcomes_a, outcomes_b = a.outcome[in_a], b.outcome[in_b]
-    counts = np.zeros((3, 3), dtype=int)
-    np.add.at(counts, (outcomes_a, outcomes_b), 1)
-    header = ["A \\ B", *OUTCOMES, "share of A", "95 % interval"]
-    rows = [[name, *map(str, counts[place]), f"{100 * counts[place].sum() / len(in_a):.2f} %",
-             describe_interval(int(counts[place].sum()), len(in_a))]
-            for place, name in enumerate(OUTCOMES)]
-    total = counts.sum(axis=0)
-    rows.append(["share of B", *(f"{100 * count / len(in_a):.2f} %" for count in total), "", ""])
-    lines = ["", "outcomes", *make_text_table(header, rows)]
-    worse, better = int(counts[0, 1:].sum()), int(counts[1:, 0].sum())
-    lines.append(f"  {worse} runs finish in A alone, {better} in B alone: "
-                 f"McNemar's exact p = {calc_mcnemar_p(worse, better):.3g}")
-    return lines
-
-
-def describe_interval(count: int, total: int) -> str:
-    low, high = calc_wilson_interval(count, total)
-    return f"{100 * low:.2f} to {100 * high:.2f} %"
-
-
-def list_shared_measures(a: RunTable, b: RunTable) -> list[str]:
-    return [name for name in a.measures if name in b.measures]
-
-
-def find_finished_in_both(a: RunTable, b: RunTable, in_a: np.ndarray,
-                          in_b: np.ndarray) -> np.ndarray:
-    return a.is_outcome("finished")[in_a] & b.is_outcome("finished")[in_b]
+    counts = count_changes(a, b, in_a, in_b)
+    return ["", "outcomes", *make_text_table(make_outcome_rows(counts, "A", "B")),
+            f"  {describe_changes(counts, 'A', 'B')}"]
 
 
 def compare_measures(a: RunTable, b: RunTable, in_a: np.ndarray, in_b: np.ndarray) -> list[str]:
-    names = list_shared_measures(a, b)
-    if not names:
+    rows = make_measure_rows(a, b, in_a, in_b, "A", "B")
+    if len(rows) == 1:
         return []
-    both = find_finished_in_both(a, b, in_a, in_b)
-    rows = []
-    for name in names:
-        values_a, values_b = a.numbers[name][in_a][both], b.numbers[name][in_b][both]
-        paired = calc_paired_difference(values_a, values_b)
-        if not paired.count:
-            continue
-        medians = [calc_quantiles(values, (0.5,))[0] for values in (values_a, values_b)]
-        rows.append([name, str(paired.count), *map(format_number, medians),
-                     format_number(paired.median),
-                     f"{format_number(paired.low)} to {format_number(paired.high)}",
-                     str(paired.smaller), str(paired.larger), f"{paired.p:.3g}"])
-    header = ["measure", "pairs", "median A", "median B", "median B − A", "95 % interval", "B < A",
-              "B > A", "p (sign test)"]
-    return ["", f"measures, of the {int(both.sum())} runs that finish in both",
-            *make_text_table(header, rows)]
+    count = int(find_finished(a, b, in_a, in_b).sum())
+    return ["", f"measures, of the {count} runs that finish in both", *make_text_table(rows)]
 
 
 def list_most_different(a: RunTable, b: RunTable, in_a: np.ndarray, in_b: np.ndarray) -> list[str]:
@@ -180,21 +140,21 @@ def list_most_different(a: RunTable, b: RunTable, in_a: np.ndarray, in_b: np.nda
                  OUTCOMES[b.outcome[in_b[pair]]], describe_values(a, in_a[pair])]
                 for pair in changed]
         lines += ["", f"runs with another outcome (the first {len(changed)})",
-                  *make_text_table(["run", "A", "B", "values"], rows)]
-    names = list_shared_measures(a, b)
+                  *make_text_table([["run", "A", "B", "values"], *rows])]
+    names = [name for name in a.measures if name in b.measures]
     name = next((name for name in ("load_error_rms_m", "load_error_max_m") if name in names),
                 names[0] if names else None)
     if name is not None:
         with np.errstate(invalid="ignore"):
             size = np.abs(b.numbers[name][in_b] - a.numbers[name][in_a])
-        size[~find_finished_in_both(a, b, in_a, in_b) | ~np.isfinite(size)] = 0.0
+        size[~find_finished(a, b, in_a, in_b) | ~np.isfinite(size)] = 0.0
         order = np.argsort(-size, kind="stable")[:MOST_RUNS]
         rows = [[str(a.run[in_a[pair]]), format_number(float(a.numbers[name][in_a[pair]])),
                  format_number(float(b.numbers[name][in_b[pair]])), describe_values(a, in_a[pair])]
                 for pair in order if size[pair] > 0.0]
         if rows:
             lines += ["", f"runs that differ most in {name}",
-                      *make_text_table(["run", "A", "B", "values"], rows)]
+                      *make_text_table([["run", "A", "B", "values"], *rows])]
     return lines
 
 
@@ -206,12 +166,13 @@ def describe_values(table: RunTable, place: int) -> str:
     return ", ".join(cells)
 
 
-def make_text_table(header: list[str], rows: list[list[str]]) -> list[str]:
+def make_text_table(rows: list[list[str]]) -> list[str]:
     """Columns as wide as their cells, numbers to the right, the first and last to the left."""
-    widths = [max(len(row[place]) for row in [header, *rows]) for place in range(len(header))]
+    last = len(rows[0]) - 1
+    widths = [max(len(row[place]) for row in rows) for place in range(last + 1)]
     lines = []
-    for row in [header, *rows]:
-        cells = [cell.ljust(width) if place in (0, len(header) - 1) else cell.rjust(width)
+    for row in rows:
+        cells = [cell.ljust(width) if place in (0, last) else cell.rjust(width)
                  for place, (cell, width) in enumerate(zip(row, widths))]
         lines.append(("  " + "  ".join(cells)).rstrip())
     return lines

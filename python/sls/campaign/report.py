@@ -17,6 +17,8 @@ import yaml
 
 from sls.campaign import drawing
 from sls.campaign.drawing import OUTCOME_COLOURS, format_number, format_share
+from sls.campaign.pairs import (count_changes, describe_changes, describe_interval, find_finished,
+                                find_pairs, make_measure_rows, make_outcome_rows)
 from sls.campaign.run_table import OUTCOMES, RunTable, find_rows, read_runs
 from sls.campaign.statistics import calc_quantiles, calc_wilson_interval
 from sls.input_error import InputError
@@ -63,6 +65,7 @@ def make_campaign_report(folder: Path) -> str:
             make_section("Outcomes", make_outcomes(table)),
             make_key_section(table),
             make_pair_section(table),
+            *(make_paired_section(table, key) for key in table.keys),
             make_section("Measures", make_measures(table)),
             make_section("All together", make_parallel(table)),
             make_section("Worst runs", make_worst(table, find_file(manifest))),
@@ -193,16 +196,11 @@ def make_head(name: str, table: RunTable) -> str:
 
 
 def make_plain_table(header: Sequence[str], rows: Sequence[Sequence[str]], style: str = "") -> str:
-    """`rows` hold HTML."""
-    head = "".join(f"<th>{escape(cell)}</th>" for cell in header)
+    """`header` and `rows` hold HTML."""
+    head = "".join(f"<th>{cell}</th>" for cell in header)
     body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows)
     return (f"<div class=\"scroll\"><table{style}><thead><tr>{head}</tr></thead><tbody>{body}"
             "</tbody></table></div>")
-
-
-def describe_interval(count: int, total: int) -> str:
-    low, high = calc_wilson_interval(count, total)
-    return f"{100 * low:.2f} % to {100 * high:.2f} %"
 
 
 def make_outcomes(table: RunTable) -> str:
@@ -290,6 +288,27 @@ def make_pair_section(table: RunTable) -> str:
         "Pairs of varied keys",
         f"<div class=\"pair\">{pictures}</div><p class=\"small\">Grey: no run there. Keys of many "
         f"values are counted in {BINS} classes, named by their middles.</p>")
+
+
+def make_paired_section(table: RunTable, key: str) -> str:
+    """Of a key with two values: runs that differ in it alone, beside each other."""
+    found = find_pairs(table, key)
+    if found is None:
+        return ""
+    (a, b), in_a, in_b = found
+    a, b = name_word(a), name_word(b)
+    counts = count_changes(table, table, in_a, in_b)
+    outcomes = [[escape(cell) for cell in row] for row in make_outcome_rows(counts, a, b)]
+    measures = [[escape(cell) for cell in row]
+                for row in make_measure_rows(table, table, in_a, in_b, a, b)]
+    page = (make_plain_table(outcomes[0], outcomes[1:])
+            + f"<p class=\"small\">{len(in_a)} pairs of runs that differ in {escape(key)} alone. "
+            f"{escape(describe_changes(counts, a, b))}.</p>")
+    if len(measures) > 1:
+        page += ("<h3>Measures, of the "
+                 f"{int(find_finished(table, table, in_a, in_b).sum())} pairs that finish with "
+                 f"both</h3>{make_plain_table(measures[0], measures[1:])}")
+    return make_section(f"{escape(key)}: {escape(a)} against {escape(b)}", page)
 
 
 def make_measures(table: RunTable) -> str:
