@@ -374,7 +374,8 @@ void ParticipantCheck::look_at_strangers(const Neighbourhood& neighbourhood,
   for (const auto& [peer, description] : neighbourhood.command_writers) {
     const std::string key = make_key(peer, "announcement");
     if (announced.count(peer) > 0 || neighbourhood.explained.count(peer) > 0) continue;
-    if (lasts(key, neighbourhood.now, kPatience))
+    const bool may_announce = neighbourhood.announcement_writers.count(peer) > 0;
+    if (lasts(key, neighbourhood.now, may_announce ? kPatienceWithAnnouncement : kPatience))
       findings[key] = description +
                       ": writes sls/command: expected an announcement in sls/participant, got none";
   }

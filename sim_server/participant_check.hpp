@@ -25,6 +25,8 @@ struct Neighbourhood {
   std::set<std::uint32_t> other_vehicles;                      ///< and what they fly
   /// Participants with a writer of sls/command that matches, in words.
   std::map<bus::PeerId, std::string> command_writers;
+  /// Those with a writer of sls/participant: an announcement may be on its way.
+  std::set<bus::PeerId> announcement_writers;
   /// Those whose writer does not for want of a DEADLINE (bus::Node::find_missing_deadlines).
   std::map<bus::PeerId, std::string> missing_deadlines;
   /// Those with another problem in discovery: their silence has been explained.
@@ -40,6 +42,9 @@ class ParticipantCheck {
 
   /// What does not last longer is none: discovery takes its time.
   static constexpr std::chrono::milliseconds kPatience{1000};
+  /// An announcement on a lossy network: a peer learns of a reader from discovery, which Fast DDS
+  /// repeats once a second.
+  static constexpr std::chrono::milliseconds kPatienceWithAnnouncement{5000};
   /// An announcement of a run that has just ended is none: its client joins the next one.
   static constexpr std::chrono::milliseconds kPatienceWithRun{1400};
   /// Rejected answers without a taken one are none before.

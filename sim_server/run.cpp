@@ -308,6 +308,7 @@ void Run::look_for_problems() {
   }
   for (const bus::PeerId& peer : endpoints_.command_stream.matched())
     neighbourhood.command_writers[peer] = domain.describe(peer);
+  neighbourhood.announcement_writers = endpoints_.participants.writers();
   neighbourhood.missing_deadlines = domain.find_missing_deadlines();
   neighbourhood.explained = domain.find_misfits();
   bus::Problems& problems = endpoints_.domain.problems();

@@ -10,6 +10,7 @@
 #include <map>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -46,6 +47,9 @@ class ParticipantDirectory {
 
   /// Present participants, whatever their role and run.
   std::vector<Entry> all() const;
+
+  /// Participants with a writer of sls/participant, whether they have announced anything or not.
+  std::set<PeerId> writers() const { return reader_.matched(); }
 
   /// Participants of `role` that have said they are done with run `run_id`, also those that have
   /// left since.

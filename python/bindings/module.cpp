@@ -1,8 +1,12 @@
 #include "python/bindings/bindings.hpp"
+#include "python/bindings/errors.hpp"
+#include "python/bindings/python_law.hpp"
 
 PYBIND11_MODULE(_sls_core, module) {
   using namespace sls::python;
   module.doc() = "The simulator in this process. The package sls is its face.";
+  add_errors(module);
+  add_python_law(module);
   add_scenario(module);
   add_flight(module);
   add_campaign(module);

@@ -189,6 +189,16 @@ TEST_F(ParticipantCheckTest, AWriterOfCommandsWithoutAnAnnouncementIsNamedOnceTh
   EXPECT_TRUE(look(2s).empty());
 }
 
+TEST_F(ParticipantCheckTest, AnAnnouncementThatMayBeOnItsWayIsWaitedForLonger) {
+  neighbourhood_.command_writers[make_peer(1)] = "'foo' (10.0.0.2)";
+  neighbourhood_.announcement_writers = {make_peer(1)};
+  EXPECT_TRUE(look().empty());
+  EXPECT_TRUE(look(4900ms).empty());  // several losses in a row
+  EXPECT_EQ(look(5s).size(), 1u);
+  neighbourhood_.participants = {make_entry(1, "foo")};
+  EXPECT_TRUE(look(6s).empty());
+}
+
 TEST_F(ParticipantCheckTest, AMissingDeadlineIsAMistakeOfThoseWhoFlyForUs) {
   neighbourhood_.missing_deadlines[make_peer(1)] = "sls/command of 'foo': DEADLINE";
   EXPECT_TRUE(look().empty());  // it has not said for whom it flies

@@ -1,0 +1,72 @@
+#include "python/bindings/errors.hpp"
+
+#include <pybind11/gil.h>
+
+#include <exception>
+#include <system_error>
+
+#include "common/app/run_main.hpp"
+#include "common/config/config_error.hpp"
+#include "recorder/sinks/csv/csv_reader.hpp"
+
+namespace sls::python {
+namespace {
+
+namespace py = pybind11;
+
+/// Of sls/errors.py: pure Python code raises the same classes where this module is not built.
+py::handle find_type(const char* name) {
+  static const py::handle module = py::module_::import("sls.errors").release();
+  return py::object(module.attr(name)).release();  // lives as long as the interpreter
+}
+
+void raise_os_error(const std::system_error& error) {
+  // One argument: the text alone, which has the place and the cause. Two would put [Errno …] first.
+  const py::object raised = py::handle(PyExc_OSError)(error.what());
+  raised.attr("errno") = error.code().value();
+  PyErr_SetObject(PyExc_OSError, raised.ptr());
+}
+
+void translate(std::exception_ptr thrown) {
+  if (!thrown) return;
+  try {
+    std::rethrow_exception(thrown);
+  } catch (const config::ConfigError& error) {
+    PyErr_SetString(config_error_type().ptr(), error.what());
+  } catch (const std::system_error& error) {
+    raise_os_error(error);
+  } catch (const app::RunError& error) {
+    PyErr_SetString(run_error_type().ptr(), error.what());
+  } catch (const record::DamagedError& error) {
+    PyErr_SetString(run_error_type().ptr(), error.what());
+  }
+}
+
+}  // namespace
+
+py::handle config_error_type() {
+  static const py::handle type = find_type("ConfigError");
+  return type;
+}
+
+py::handle run_error_type() {
+  static const py::handle type = find_type("RunError");
+  return type;
+}
+
+py::handle law_fault_type() {
+  static const py::handle type = find_type("LawFault");
+  return type;
+}
+
+void check_signals() {
+  if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+}
+
+void add_errors(py::module_& module) {
+  module.attr("ConfigError") = config_error_type();
+  module.attr("RunError") = run_error_type();
+  py::register_local_exception_translator(translate);
+}
+
+}  // namespace sls::python

@@ -1,0 +1,127 @@
+"""Arithmetic of campaign files: `vehicle.load_mass_kg * 1.1 + 0.01`.
+
+A small language: numbers, names with dots, `+ - * / **`, parentheses, `pi` and the functions of
+FUNCTIONS. Nothing else is evaluated."""
+
+import ast
+import math
+import re
+from collections.abc import Callable, Mapping
+
+FUNCTIONS: dict[str, Callable[..., float]] = {
+    "abs": abs, "cos": math.cos, "exp": math.exp, "log": math.log, "max": max, "min": min,
+    "sin": math.sin, "sqrt": math.sqrt, "tan": math.tan}
+FEWEST_ARGUMENTS = {"max": 2, "min": 2}  # all others take exactly one
+SCOPE = {"__builtins__": {}, **FUNCTIONS}
+MOST_LETTERS = 1000
+TOKEN = re.compile(r"\s+|(?P<name>[A-Za-z_][A-Za-z0-9_]*(?:\.[A-Za-z0-9_]+)*)"
+                   r"|(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)"
+                   r"|(?P<sign>\*\*|[-+*/(),])")
+
+
+class ExpressionError(ValueError):
+    """What is wrong with an expression or with its value, without its place."""
+
+
+class Expression:
+    """A parsed expression. Every number in it is a float.
+
+    Raises ExpressionError for anything that is not arithmetic."""
+
+    def __init__(self, text: str):
+        self.text = text
+        self.names: list[str] = []  # of other values, each once, in order of appearance
+        if len(text) > MOST_LETTERS:
+            raise ExpressionError(f"expected at most {MOST_LETTERS} letters, got {len(text)}")
+        try:
+            tree = ast.parse(self._to_python(), mode="eval")
+            self._check(tree.body)
+            self._code = compile(tree, "expression", "eval")
+        except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
+            if isinstance(error, ExpressionError):
+                raise
+            raise ExpressionError(f"expected arithmetic, got '{text}'") from None
+
+    def __reduce__(self) -> tuple[type, tuple[str]]:
+        """Pickled as its text: compiled code cannot be sent to another process."""
+        return Expression, (self.text,)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Expression) and other.text == self.text
+
+    def __hash__(self) -> int:
+        return hash(self.text)
+
+    def _to_python(self) -> str:
+        """The same with a plain identifier for each name: Python reads dots otherwise."""
+        parts, at = [], 0
+        text = self.text.strip()
+        while at < len(text):
+            token = TOKEN.match(text, at)
+            if not token:
+                raise ExpressionError(f"expected arithmetic, got '{text[at]}' in '{text}'")
+            at = token.end()
+            name = token["name"]
+            if token["number"]:
+                number = float(token["number"])
+                if math.isinf(number):
+                    raise ExpressionError(f"expected a finite number, got '{token['number']}'")
+                parts.append(f" {number!r} ")
+            elif name is None:
+                parts.append(token["sign"] or " ")
+            elif text[at:].lstrip().startswith("("):
+                if name not in FUNCTIONS:
+                    raise ExpressionError(f"unknown function '{name}'; known are "
+                                          f"{', '.join(FUNCTIONS)}")
+                parts.append(f" {name}")
+            elif name == "pi":
+                parts.append(f" {math.pi!r} ")
+            else:
+                if name not in self.names:
+                    self.names.append(name)
+                parts.append(f" name_{self.names.index(name)} ")
+        return "".join(parts).strip()
+
+    def _check(self, node: ast.expr) -> None:
+        match node:
+            case ast.Constant(value=float()) | ast.Name():
+                parts = []
+            case ast.BinOp(left=left, right=right,
+                           op=ast.Add() | ast.Sub() | ast.Mult() | ast.Div() | ast.Pow()):
+                parts = [left, right]
+            case ast.UnaryOp(op=ast.UAdd() | ast.USub(), operand=operand):
+                parts = [operand]
+            case ast.Call(func=ast.Name(id=name), args=parts, keywords=[]):
+                fewest = FEWEST_ARGUMENTS.get(name)
+                if len(parts) < fewest if fewest else len(parts) != 1:
+                    expected = f"at least {fewest} values" if fewest else "one value"
+                    raise ExpressionError(f"{name}: expected {expected}, got {len(parts)}")
+            case _:
+                raise ExpressionError(f"expected arithmetic, got '{self.text}'")
+        for part in parts:
+            self._check(part)
+
+    def evaluate(self, values: Mapping[str, float]) -> float:
+        """The value with `values` for the names.
+
+        Raises ExpressionError if it is no finite number, or if one of `values` is no number."""
+        floats = []
+        for name in self.names:
+            value = values[name]
+            if isinstance(value, bool) or not isinstance(value, int | float):
+                raise ExpressionError(f"expected a number of {name}, got {value!r}")
+            floats.append(float(value))
+        names = {f"name_{i}": value for i, value in enumerate(floats)}
+        try:
+            result = eval(self._code, SCOPE, names)  # of nothing but arithmetic: see _check
+        except ZeroDivisionError:
+            raise ExpressionError(f"division by zero in '{self.text}'") from None
+        except OverflowError:
+            raise ExpressionError(f"'{self.text}' is too large") from None
+        except (ValueError, TypeError):  # such as the least of complex numbers
+            raise ExpressionError(f"'{self.text}' is not defined") from None
+        if isinstance(result, complex):  # the root of a negative number
+            raise ExpressionError(f"'{self.text}' is not defined")
+        if not math.isfinite(result):
+            raise ExpressionError(f"'{self.text}' is not a finite number")
+        return result

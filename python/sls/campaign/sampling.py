@@ -1,0 +1,232 @@
+"""The values of each run: functions of the campaign and of the run's index alone.
+
+Whatever is drawn for run i stays the same if other runs are flown, if they are flown in other
+chunks, and if other keys are varied. The numbers come from Philox, a generator that counts: the
+i-th number of a stream is had without the ones before it. A stream is named by seed and path.
+
+Functions of `math` draw one number at a time, never those of numpy over an array: these round
+differently at an array's end, so that values would depend on the chunk."""
+
+import hashlib
+import math
+import warnings
+from collections.abc import Sequence
+from fractions import Fraction
+from functools import lru_cache
+from statistics import NormalDist
+from typing import Any
+
+import numpy as np
+
+from sls.campaign.campaign import Campaign, Varied
+from sls.campaign.expressions import Expression, ExpressionError
+from sls.input_error import InputError
+
+SOBOL_BITS = 30
+# With a stratum's number below 2^24 the sum of both is exact.
+JITTER_BITS = 28
+STANDARD_NORMAL = NormalDist()
+
+
+def make_values(campaign: Campaign, first: int, last: int) -> list[list[Any]]:
+    """The values of runs `first` to `last` inclusive, for each run in the order of
+    `campaign.varied`.
+
+    Raises InputError naming the run for a derived value that is no number."""
+    if not 0 <= first <= last < campaign.runs:
+        raise InputError(f"{campaign.file}: expected runs within 0 to {campaign.runs - 1}, got "
+                         f"{first} to {last}")
+    points = campaign.points
+    first_draw, last_draw = first // points, last // points
+    columns: dict[str, list[Any]] = {}
+    stride = points  # of the crossed keys the last one changes with every run
+    for varied in campaign.varied:
+        if varied.is_crossed:
+            stride //= len(varied.items)
+            columns[varied.path] = [varied.items[run // stride % len(varied.items)]
+                                    for run in range(first, last + 1)]
+        elif varied.is_drawn:
+            drawn = _draw(campaign, varied, first_draw, last_draw)
+            columns[varied.path] = [drawn[run // points - first_draw]
+                                    for run in range(first, last + 1)]
+    for varied in order_derived(campaign.varied):
+        columns[varied.path] = _derive(campaign, varied, columns, first, last)
+    return [list(row) for row in zip(*(columns[path] for path in campaign.paths), strict=True)]
+
+
+def to_yaml_value(value: Any) -> str:
+    """`value` as YAML in one line that reads back to the same bits: a number, a truth value, a text,
+    a list or a map of such."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int):
+        return str(value)
+    if isinstance(value, float):
+        text = repr(value)
+        # YAML 1.1 readers, Python's among them, take 1e-07 for text and 1.0e-07 for a number.
+        return text if "." in text or "e" not in text else text.replace("e", ".0e")
+    if isinstance(value, str):
+        return '"' + value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n") + '"'
+    if isinstance(value, Sequence):
+        return "[" + ", ".join(to_yaml_value(item) for item in value) + "]"
+    return "{" + ", ".join(f"{key}: {to_yaml_value(item)}" for key, item in value.items()) + "}"
+
+
+# --- Streams of random bits ----------------------------------------------------------------------
+
+def _make_key(purpose: str, seed: int, path: str) -> tuple[int, int]:
+    """Of the stream: 128 bits. The purpose keeps two uses of one seed and path apart."""
+    digest = hashlib.sha256(f"sls campaign 1\0{purpose}\0{seed}\0{path}".encode()).digest()
+    return int.from_bytes(digest[:8], "little"), int.from_bytes(digest[8:16], "little")
+
+
+def _draw_words(key: tuple[int, int], first: int, count: int) -> np.ndarray:
+    """Words `first` … of the stream, 64 bits each; the generator makes four with each count."""
+    generator = np.random.Philox(key=np.array(key, dtype=np.uint64), counter=first // 4)
+    return generator.random_raw(first % 4 + count)[first % 4:]
+
+
+def _draw_unit(key: tuple[int, int], first: int, count: int) -> np.ndarray:
+    """Numbers in (0, 1), neither end included: the middles of 2^52 equal intervals."""
+    return ((_draw_words(key, first, count) >> np.uint64(12)) + 0.5) * 2.0**-52
+
+
+@lru_cache(maxsize=32)
+def _make_permutation(key: tuple[int, int], size: int) -> np.ndarray:
+    """Of 0 … size - 1."""
+    order = np.argsort(_draw_words(key, 0, size), kind="stable").astype(np.int32)
+    order.setflags(write=False)
+    return order
+
+
+# --- What is drawn ---------------------------------------------------------------------------
+
+def _draw(campaign: Campaign, varied: Varied, first: int, last: int) -> list[Any]:
+    """The values of draws `first` to `last`."""
+    count = last - first + 1
+    if varied.kind == "seed":
+        return [varied.seed + draw for draw in range(first, last + 1)]
+    if varied.kind == "sobol":
+        unit = _draw_sobol(campaign, varied, first, count)
+    elif varied.kind == "latin_hypercube":
+        unit = _draw_latin(varied, first, count, campaign.draws)
+    else:
+        unit = _draw_unit(_make_key("unit", varied.seed, varied.path), first, count)
+    return [_round(varied, _transform(varied, u)) for u in unit.tolist()]
+
+
+def _draw_latin(varied: Varied, first: int, count: int, draws: int) -> np.ndarray:
+    """Of as many equal intervals as there are draws, each draw lies in another one."""
+    strata = _make_permutation(_make_key("strata", varied.seed, varied.path), draws)
+    words = _draw_words(_make_key("jitter", varied.seed, varied.path), first, count)
+    jitter = ((words >> np.uint64(64 - JITTER_BITS)) + 0.5) * 2.0**-JITTER_BITS
+    return (strata[first:first + count] + jitter) / draws
+
+
+def _draw_sobol(campaign: Campaign, varied: Varied, first: int, count: int) -> np.ndarray:
+    """One coordinate of Sobol's sequence with a digital shift (bits flipped alike in all points),
+    which keeps its balance. All keys of kind sobol with one seed are coordinates of one sequence."""
+    try:
+        from scipy.stats import qmc
+    except ImportError:
+        raise InputError(f"{campaign.file}:{varied.line}: vary.{varied.path}.sobol: expected scipy "
+                         "(apt-get install python3-scipy), got none") from None
+    same = [other.path for other in campaign.varied
+            if other.kind == "sobol" and other.seed == varied.seed]
+    coordinate = same.index(varied.path)
+    sequence = qmc.Sobol(coordinate + 1, scramble=False, bits=SOBOL_BITS)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # about numbers of points other than a power of 2
+        if first:
+            sequence.fast_forward(first)
+        points = sequence.random(count)[:, coordinate]
+    shift = _draw_words(_make_key("shift", varied.seed, varied.path), 0, 1)[0] >> np.uint64(
+        64 - SOBOL_BITS)
+    digits = (points * 2.0**SOBOL_BITS).astype(np.uint64) ^ shift
+    return (digits + 0.5) * 2.0**-SOBOL_BITS
+
+
+def _transform(varied: Varied, u: float) -> float:
+    """From a number in (0, 1) to the distribution: its inverse cumulative distribution function."""
+    a, b = varied.parameters
+    if varied.distribution == "normal":
+        if varied.within is None:
+            return a + b * STANDARD_NORMAL.inv_cdf(u)
+        low, high = varied.within
+        below = STANDARD_NORMAL.cdf((low - a) / b)
+        above = STANDARD_NORMAL.cdf((high - a) / b)
+        u = min(max(below + u * (above - below), 1e-300), 1 - 2.0**-53)
+        return min(max(a + b * STANDARD_NORMAL.inv_cdf(u), low), high)
+    if varied.distribution == "log_uniform":
+        value = math.exp(math.log(a) + u * (math.log(b) - math.log(a)))
+    else:
+        value = a + u * (b - a)
+    return min(max(value, a), b)
+
+
+def _round(varied: Varied, value: float) -> int | float:
+    """To the nearest multiple, where the campaign asks for it."""
+    unit = varied.multiple_of
+    if unit is None:
+        return value
+    exact = round(Fraction(value) / to_fraction(unit)) * to_fraction(unit)
+    return int(exact) if isinstance(unit, int) else float(exact)
+
+
+def to_fraction(number: int | float) -> Fraction:
+    """The decimal that was written: 1/10 for 0.1."""
+    return Fraction(repr(number))
+
+
+# --- Derived values --------------------------------------------------------------------------
+
+def list_expressions(varied: Varied) -> list[Expression]:
+    """All of a derived value, those in lists included."""
+    def flatten(part: Any) -> list[Expression]:
+        return [part] if isinstance(part, Expression) else [
+            expression for item in part for expression in flatten(item)]
+    return flatten(varied.expressions) if varied.kind == "derived" else []
+
+
+def order_derived(varied: Sequence[Varied]) -> list[Varied]:
+    """The derived values, each after those it depends on.
+
+    Raises ExpressionError naming a cycle."""
+    derived = {member.path: member for member in varied if member.kind == "derived"}
+    ordered: dict[str, Varied] = {}
+
+    def visit(path: str, on_the_way: list[str]) -> None:
+        if path in on_the_way:
+            cycle = [*on_the_way[on_the_way.index(path):], path]
+            raise ExpressionError("expected no cycle, got " + " -> ".join(cycle))
+        if path in ordered or path not in derived:
+            return
+        for expression in list_expressions(derived[path]):
+            for name in expression.names:
+                visit(name, [*on_the_way, path])
+        ordered[path] = derived[path]
+
+    for path in derived:
+        visit(path, [])
+    return list(ordered.values())
+
+
+def _derive(campaign: Campaign, varied: Varied, columns: dict[str, list[Any]], first: int,
+            last: int) -> list[Any]:
+    def evaluate(part: Any, values: dict[str, Any]) -> Any:
+        if isinstance(part, Expression):
+            return _round(varied, part.evaluate(values))
+        return [evaluate(item, values) for item in part]
+
+    constants = dict(varied.constants)
+    names = {name for expression in list_expressions(varied) for name in expression.names}
+    names -= constants.keys()
+    result = []
+    for row in range(last - first + 1):
+        values = constants | {name: columns[name][row] for name in names}
+        try:
+            result.append(evaluate(varied.expressions, values))
+        except ExpressionError as error:
+            raise InputError(f"{campaign.file}:{varied.line}: vary.{varied.path}: run "
+                             f"{first + row}: {error}") from None
+    return result

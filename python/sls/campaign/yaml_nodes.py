@@ -1,0 +1,226 @@
+"""YAML as a tree whose every place knows its line, and what the strict readers of the package say
+about a place. The rules are those of scenarios: config_error messages with file, line and key, no
+anchors, aliases and tags, `true` and `false` alone as truth values, a number in quotes is text."""
+
+import difflib
+import re
+from collections.abc import Collection
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NoReturn
+
+import yaml
+
+from sls.input_error import InputError
+
+MOST_DEPTH = 16
+WHOLE = re.compile(r"[-+]?[0-9]+")
+NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
+
+
+@dataclass(frozen=True)
+class Place:
+    """A value in a file, with the path of keys that leads to it."""
+
+    file: Path
+    node: yaml.Node
+    path: str = ""
+
+    @property
+    def line(self) -> int:
+        """From 1."""
+        return self.node.start_mark.line + 1
+
+    def fail(self, message: str) -> NoReturn:
+        """Raises InputError `FILE:LINE: PATH: message`."""
+        fail(self.file, self.line, self.path, message)
+
+    def fail_expected(self, expected: str) -> NoReturn:
+        self.fail(f"expected {expected}, got {self.brief}")
+
+    def at(self, key: str, node: yaml.Node) -> "Place":
+        return Place(self.file, node, f"{self.path}.{key}" if self.path else key)
+
+    @property
+    def brief(self) -> str:
+        """What stands here, in a few printable characters."""
+        if isinstance(self.node, yaml.SequenceNode):
+            return f"a list of {len(self.node.value)}"
+        if isinstance(self.node, yaml.MappingNode):
+            return "a map"
+        if self.is_nothing:
+            return "nothing"
+        text = to_printable(self.node.value)
+        return text if self.node.style is None else f'"{text}"'
+
+    @property
+    def is_map(self) -> bool:
+        return isinstance(self.node, yaml.MappingNode)
+
+    @property
+    def is_list(self) -> bool:
+        return isinstance(self.node, yaml.SequenceNode)
+
+    @property
+    def is_nothing(self) -> bool:
+        return (isinstance(self.node, yaml.ScalarNode) and self.node.style is None
+                and self.node.value in ("", "~", "null"))
+
+    def list_items(self) -> list["Place"]:
+        """Of a list; their path ends with their index in brackets."""
+        return [Place(self.file, item, f"{self.path}[{i}]")
+                for i, item in enumerate(self.node.value)]
+
+    def read_map(self, expected: str = "a map",
+                 known: Collection[str] | None = None) -> dict[str, "Place"]:
+        """Its values by key. Refuses keys that are not `known`, and any key that comes twice."""
+        if not self.is_map:
+            self.fail_expected(expected)
+        values: dict[str, Place] = {}
+        lines: dict[str, int] = {}
+        for key_node, node in self.node.value:
+            key_place = Place(self.file, key_node, self.path)
+            if not isinstance(key_node, yaml.ScalarNode) or key_place.is_nothing:
+                key_place.fail_expected("a key")
+            key = key_node.value
+            key_place = self.at(to_printable(key, 100), key_node)
+            if key in values:
+                key_place.fail(f"duplicate key; it is already on line {lines[key]}")
+            if known is not None and key not in known:
+                nearest = difflib.get_close_matches(key, known, n=1)
+                key_place.fail(f"unknown key; did you mean '{nearest[0]}'?" if nearest else
+                               f"unknown key; expected one of {', '.join(known)}")
+            values[key] = self.at(to_printable(key, 100), node)
+            lines[key] = key_place.line
+        return values
+
+    def require(self, values: dict[str, "Place"], key: str, expected: str) -> "Place":
+        """The value of `key` of this map, which was read as `values`."""
+        if key not in values:
+            self.at(key, self.node).fail(f"missing key; expected {expected}")
+        return values[key]
+
+    def find_scalar(self) -> bool | int | float | str | None:
+        """What a scalar means; None for a list, a map, nothing and a number that is not finite."""
+        if not isinstance(self.node, yaml.ScalarNode) or self.is_nothing:
+            return None
+        text = self.node.value
+        if self.node.style is not None:
+            return text
+        if text in ("true", "false"):
+            return text == "true"
+        if WHOLE.fullmatch(text):
+            return int(text) if len(text) <= 20 else None
+        if NUMBER.fullmatch(text):
+            return float(text) if abs(float(text)) < float("inf") else None
+        if re.fullmatch(r"[-+]?\.?(inf|Inf|INF|nan|NaN|NAN)", text):
+            return None
+        return text
+
+    def read_number(self, expected: str = "a number") -> int | float:
+        """A whole number stays an int."""
+        value = self.find_scalar()
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            self.fail_expected(expected)
+        return value
+
+    def read_whole(self, least: int, most: int) -> int:
+        value = self.find_scalar()
+        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+            self.fail_expected(f"a whole number from {least} to {most}")
+        return value
+
+    def read_text(self, expected: str) -> str:
+        value = self.find_scalar()
+        if not isinstance(value, str) or not value:
+            self.fail_expected(expected)
+        return value
+
+    def read_value(self) -> Any:
+        """Whatever a scenario may hold: scalars, lists (as tuples), maps."""
+        if self.is_list:
+            return tuple(item.read_value() for item in self.list_items())
+        if self.is_map:
+            return {key: value.read_value() for key, value in self.read_map().items()}
+        value = self.find_scalar()
+        if value is None:
+            self.fail_expected("a value")
+        return value
+
+    def find(self, path: str) -> "Place | None":
+        """The place below this one that keys and indices, separated by dots, lead to."""
+        place: Place | None = self
+        for part in path.split("."):
+            if place is None:
+                return None
+            if place.is_map:
+                place = place.read_map().get(part)
+            elif place.is_list and part.isdecimal() and int(part) < len(place.node.value):
+                place = place.list_items()[int(part)]
+            else:
+                return None
+        return place
+
+
+def fail(file: Path, line: int, path: str, message: str) -> NoReturn:
+    """Raises InputError `FILE:LINE: PATH: message`; a line below 1 and an empty path are left
+    out."""
+    place = f"{file}:{line}" if line > 0 else str(file)
+    raise InputError(": ".join(part for part in (place, path, message) if part))
+
+
+def to_printable(text: str, most: int = 40) -> str:
+    escaped = "".join(letter if " " <= letter <= "~" else f"\\x{ord(letter):02x}"
+                      for letter in text[:most])
+    return escaped + ("..." if len(text) > most else "")
+
+
+def read_bytes(file: Path, what: str, most: int) -> bytes:
+    """Raises InputError if the file cannot be read or holds more than `most` bytes."""
+    try:
+        with file.open("rb") as stream:
+            data = stream.read(most + 1)
+    except OSError as error:
+        fail(file, 0, "", f"expected {what}, got no file that can be read ({error.strerror})")
+    if len(data) > most:
+        fail(file, 0, "", f"expected {what} of at most {most} bytes, got more")
+    return data
+
+
+def parse_yaml(data: bytes, file: Path) -> Place:
+    """The one document in `data`. Raises InputError for what is no UTF-8, no YAML, nested too
+    deeply, or holds anchors, aliases and tags."""
+    try:
+        text = data.decode()
+    except UnicodeDecodeError as error:
+        fail(file, data.count(b"\n", 0, error.start) + 1, "",
+             f"expected UTF-8 text, got the byte 0x{data[error.start]:02x}")
+    try:
+        depth = 0
+        for event in yaml.parse(text, Loader=yaml.SafeLoader):
+            line = event.start_mark.line + 1
+            if isinstance(event, yaml.AliasEvent):
+                fail(file, line, "", "expected a value, got a YAML alias (write the value out)")
+            if getattr(event, "anchor", None):
+                fail(file, line, "", "expected a value, got a YAML anchor (write the value out)")
+            if getattr(event, "tag", None):
+                fail(file, line, "", f"expected a plain value, got the YAML tag {event.tag}")
+            depth += isinstance(event, yaml.CollectionStartEvent)
+            depth -= isinstance(event, yaml.CollectionEndEvent)
+            if depth > MOST_DEPTH:
+                fail(file, line, "",
+                     f"expected at most {MOST_DEPTH} levels of nesting, got more")
+        root = yaml.compose(text, Loader=yaml.SafeLoader)
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        problem = getattr(error, "problem", None) or getattr(error, "reason", "")
+        line = mark.line + 1 if mark else 0
+        if not mark and (position := getattr(error, "position", None)) is not None:
+            line = text.count("\n", 0, position) + 1
+        if isinstance(error, yaml.composer.ComposerError):
+            fail(file, line, "", "expected one YAML document, got a second one")
+        fail(file, line, "", f"expected YAML, got a syntax error: {to_printable(str(problem), 100)}")
+    if root is None:
+        mark = yaml.Mark(str(file), 0, 0, 0, None, None)
+        root = yaml.ScalarNode("", "", mark, mark)
+    return Place(file, root)
