@@ -37,8 +37,8 @@ FlightEnd fly_recorded(const config::Scenario& scenario, const FlightOptions& op
   };
   while (app::stop_signal() == 0 && flight.fly_step()) {
     for (std::size_t i = 0; i < ids.size(); ++i) {
-      batch.entries().push_back(
-          make_entry(ids[i], flight.steps()[i], options.controller_name, flight.is_refused(i)));
+      fill_entry(batch.entries().emplace_back(), ids[i], flight.steps()[i], options.controller_name,
+                 flight.is_refused(i));
       if (batch.entries().size() == BATCH_ENTRIES) hand_on();
     }
     board.step = flight.steps().front().step;
