@@ -84,7 +84,10 @@ def check_values(a: RunTable, b: RunTable, in_a: np.ndarray, in_b: np.ndarray) -
     for key in a.keys:
         values = [read_values(table, key)[places] for table, places in ((a, in_a), (b, in_b))]
         if values[0].dtype != values[1].dtype:
-            values = [value.astype(object) for value in values]
+            # Text beside numbers: numbers as text, as `read_runs` has them in a column with text.
+            values = [value if value.dtype == object
+                      else np.array([repr(float(number)) for number in value], dtype=object)
+                      for value in values]
         different = np.flatnonzero(values[0] != values[1])
         if len(different) and different[0] < first:
             first, first_key = int(different[0]), key
