@@ -17,7 +17,9 @@ import unittest
 from pathlib import Path
 
 import support
-from campaign_engine_support import CampaignTest
+from campaign_engine_support import BASE, FAKE, CampaignTest
+
+sys.path.insert(0, str(FAKE))
 
 
 class LocalEngineTest(CampaignTest):
@@ -220,11 +222,11 @@ class LocalEngineTest(CampaignTest):
             self.expect_line(self.fly(*arguments, code=2), part)
 
     def test_a_value_that_no_run_could_have_is_refused_with_its_run_before_anything_flies(self):
-        self.write("base.yaml", BASE_WITH_LIST)
-        self.write("campaign.yaml", "base: base.yaml\nvary:\n  vehicle.load_mass_kg: "
+        self.write("base.yaml", BASE)
+        self.write("campaign.yaml", "base: base.yaml\nruns: 4\nvary:\n  vehicle.load_mass_kg: "
                                     "{ list: [0.2, -0.1] }\nseeds: [faults.0.noise.seed]\n")
         said = self.fly("campaign.yaml", "--out", "out", code=2)
-        self.expect_line(said, "campaign.yaml:3: vary.vehicle.load_mass_kg: run 1")
+        self.expect_line(said, "campaign.yaml:4: vary.vehicle.load_mass_kg: run 1")
         self.assertFalse((self.folder / "out").exists())
 
     def test_worker_flies_listed_chunks_and_those_of_its_index(self):
@@ -320,15 +322,6 @@ def read_peak_mb(process):
         pass
     return 0.0
 
-
-BASE_WITH_LIST = """name: base
-vehicle: { quad_mass_kg: 1.5, load_mass_kg: 0.2, rod_length_m: 1.0, gravity_m_s2: 9.8 }
-faults:
-  - noise: { std_n: [0.05, 0.05, 0.05], seed: 0 }
-mission:
-  - set_point: { position_m: [0.5, 0, -2] }
-    for_s: 2
-"""
 
 if __name__ == "__main__":
     unittest.main()
