@@ -55,7 +55,10 @@ class FlownVehicle:
         self.scenario = scenario
         self.vehicle_id: int = core.vehicle_ids[index]
         self._cells: np.ndarray = core.rows(index)
-        self._places = {(table, name): place for table, name, place, _ in core.columns}
+
+    @cached_property
+    def _places(self) -> dict[tuple[str, str], int]:
+        return {(table, name): place for table, name, place, _ in self._core.columns}
 
     def _make_columns(self, wanted: str) -> Columns:
         columns = {}
