@@ -8,7 +8,7 @@ from typing import NoReturn
 
 from sls import study
 from sls.figures import make_figures, save
-from sls.flight import Flight
+from sls.trajectory import Trajectory
 from sls.input_error import InputError
 from sls.published_logs import FORMATS, load_log
 from sls.recordings import Recording
@@ -32,7 +32,7 @@ def make_folder(folder: Path) -> None:
         raise InputError(f"--out {folder}: expected a folder, got: {error.strerror}") from None
 
 
-def load_recording(recording: Recording, name: str | None, vehicle_id: int) -> Flight:
+def load_recording(recording: Recording, name: str | None, vehicle_id: int) -> Trajectory:
     """One vehicle's flight; says what is missing."""
     flight = recording.load_flight(vehicle_id, name or recording.folder.resolve().name)
     for note in flight.notes:
