@@ -32,8 +32,8 @@ FIRST_POLL_S = 0.5
 LAST_POLL_S = 15.0     # the controller serves the whole site
 COMMAND_LIMIT_S = 60.0
 WORKER_ERROR = "campaign-worker: error:"
-INSTALL = ("apt-get install slurm-client; `sinfo` must show the nodes of a running cluster "
-           "(SLURM_CONF names its slurm.conf)")
+START = "`sinfo` must show the nodes of a running cluster; SLURM_CONF names its slurm.conf"
+INSTALL = f"apt-get install slurm-client; {START}"
 
 
 class ControllerLost(Exception):
@@ -305,10 +305,19 @@ def describe_loss(folder: CampaignFolder, error: ControllerLost) -> str:
     return f"slurm: the controller does not answer ({error}); {describe_rest(folder)}"
 
 
+def check(options: EngineOptions) -> None:
+    """Raises InputError, EngineError where nothing can be submitted from here."""
+    split_options(options.sbatch)
+    try:
+        ask("sinfo", "--noheader")
+    except ControllerLost as error:
+        raise EngineError(f"slurm: no cluster answers ({error}): {START}") from None
+
+
 def run(folder: CampaignFolder, options: EngineOptions) -> None:
     """Flies what is missing. Ctrl-C cancels the jobs; after SIGTERM and SIGHUP they go on, and the
     collect job makes the table. Raises InputError, EngineError."""
-    split_options(options.sbatch)
+    check(options)
     try:
         cancel(folder)  # of a launcher that was killed
         missing = folder.missing()
