@@ -56,7 +56,7 @@ import importlib, sys
 for change in sys.argv[1].split():
     name, value = change.split("=")
     module, _, constant = name.rpartition(".")
-    setattr(importlib.import_module("sls.campaign.engines." + module), constant, float(value))
+    setattr(importlib.import_module("sls.campaign.engines." + module), constant, eval(value))
 from sls.campaign.cli import main
 sys.exit(main(sys.argv[2:]))
 """

@@ -47,7 +47,7 @@ def test_the_chunk_of_a_killed_worker_goes_to_another_one(dask: DaskCluster,
     campaign.hold()
     launched = campaign.fly("killed", "--on", "dask", "--scheduler", dask.address)
     campaign.wait_until_held("n1", "n2")
-    dask.processes.kill_with_descendants("n1")
+    dask.processes.kill("n1")
     campaign.release()
     launched.expect(0)
     assert campaign.table("killed") == campaign.table("local")
@@ -60,7 +60,7 @@ def test_a_campaign_waits_for_workers(dask: DaskCluster, campaign: TestCampaign)
     launched = campaign.fly("waited", "--on", "dask", "--scheduler", dask.address)
     campaign.wait_until_held("n1", "n2")
     for worker in ("n1", "n2"):
-        dask.processes.kill_with_descendants(worker)
+        dask.processes.kill(worker)
     campaign.release()
     for worker in ("n1", "n2"):
         dask.start_worker(worker)
@@ -73,10 +73,10 @@ def test_a_lost_scheduler_ends_the_campaign_with_a_line_and_resume_goes_on(
     campaign.hold()
     launched = campaign.fly("lost", "--on", "dask", "--scheduler", dask.address, changes=FAST)
     campaign.wait_until_held("n1", "n2")
-    dask.processes.kill_with_descendants("scheduler")
+    dask.processes.kill("scheduler")
     launched.expect(1, "is lost; 0 of 6 chunks are in", "--resume")
     for worker in ("n1", "n2"):  # they would end themselves
-        dask.processes.kill_with_descendants(worker)
+        dask.processes.kill(worker)
     campaign.release()
     dask.start_scheduler()
     for worker in ("n1", "n2"):

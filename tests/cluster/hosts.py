@@ -8,6 +8,8 @@ import shutil
 import subprocess
 from pathlib import Path
 
+from processes import kill
+
 OURS = "sls-test-"  # as tests/network: what killed tests left is removed by either
 
 
@@ -75,8 +77,21 @@ class TestHosts:
         self.remove()
 
     def remove(self) -> None:
+        for host in self.address:
+            self.lose_power(host)
         for name in [*self.address, "switch"]:
             subprocess.run(["ip", "netns", "delete", self.prefix + name], capture_output=True)
+
+    def processes(self, host: str) -> list[int]:
+        """Ids of what runs there, daemons included."""
+        done = subprocess.run(["ip", "netns", "pids", self.prefix + host], capture_output=True,
+                              text=True)
+        return [int(process) for process in done.stdout.split()]
+
+    def lose_power(self, host: str) -> None:
+        """Everything that runs there is gone at once."""
+        for process in self.processes(host):
+            kill(process)
 
     def on(self, host: str, *command: str) -> list[str]:
         """A command that runs there. Each part of the prefix is replaced by the next, so that the

@@ -19,15 +19,6 @@ def wait_until(condition: Callable[[], object], limit_s: float, what: str) -> No
         time.sleep(EVERY_S)
 
 
-def list_descendants(process: int) -> list[int]:
-    """Ids of the processes that it started, and of those that they started."""
-    try:
-        children = Path(f"/proc/{process}/task/{process}/children").read_text().split()
-    except OSError:
-        return []
-    return [one for child in children for one in (int(child), *list_descendants(int(child)))]
-
-
 def kill(process: int) -> None:
     try:
         os.kill(process, signal.SIGKILL)
@@ -63,14 +54,10 @@ class Processes:
             process.kill()
             process.wait()
 
-    def kill_with_descendants(self, name: str) -> None:
-        """As a machine that loses its power."""
+    def kill(self, name: str) -> None:
         process = self.started.pop(name)
-        descendants = list_descendants(process.pid)
         process.kill()
         process.wait()
-        for descendant in descendants:
-            kill(descendant)
 
     def end_all(self) -> None:
         for name in reversed(list(self.started)):

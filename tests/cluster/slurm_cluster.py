@@ -6,7 +6,7 @@ import secrets
 import subprocess
 from pathlib import Path
 
-from processes import Processes, kill, list_descendants, wait_until
+from processes import Processes, wait_until
 from hosts import TestHosts, need_programs
 
 START_S = 30.0
@@ -87,18 +87,23 @@ class SlurmCluster:
         return self
 
     def __exit__(self, *_: object) -> None:
-        # slurmd leaves its tasks running when it ends.
-        tasks = [task for node in NODES if node in self.processes.started
-                 for task in list_descendants(self.processes.started[node].pid)]
-        self.processes.end_all()
-        for task in tasks:
-            kill(task)
+        self.processes.end_all()  # tasks that still run end with their hosts
 
     def start(self, name: str, host: str, *command: str) -> None:
         self.processes.start(name, self.hosts.on(host, *command), **self.environment)
 
     def start_controller(self) -> None:
         self.start("slurmctld", "head", "slurmctld", "-D", "-f", str(self.configuration))
+
+    def kill_controller(self) -> None:
+        self.processes.kill("slurmctld")
+
+    def lose_node(self, node: str) -> None:
+        """As when its power fails, and slurmctld has noticed: which it does by itself when the node
+        has been silent for SlurmdTimeout."""
+        self.hosts.lose_power(node)
+        self.processes.kill(node)
+        self.ask("scontrol", "update", f"NodeName={node}", "State=DOWN", "Reason=killed")
 
     def start_node(self, node: str) -> None:
         self.start(node, node, "slurmd", "-D", "-f", str(self.configuration))

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from campaigns import TestCampaign
 from hosts import Obstacle, TestHosts
-from processes import kill, list_descendants, wait_until
+from processes import kill, wait_until
 from slurm_cluster import SlurmCluster
 
 LIMIT_S = 60.0
@@ -65,7 +65,7 @@ def test_short_chunks_share_a_task(slurm: SlurmCluster, campaign: TestCampaign) 
 
 def find_worker(slurm: SlurmCluster, node: str) -> int:
     """The process on that node that flies a chunk."""
-    for process in list_descendants(slurm.processes.started[node].pid):
+    for process in slurm.hosts.processes(node):
         command = Path(f"/proc/{process}/cmdline").read_bytes().split(b"\0")
         if b"sls.campaign.worker" in command:
             return process
@@ -88,9 +88,7 @@ def test_a_lost_node_and_a_killed_worker_change_nothing(slurm: SlurmCluster,
     status = campaign.start("status", "killed", **slurm.environment).expect(0)
     assert "4 running" in status and "2 pending (Resources)" in status, status
     kill(find_worker(slurm, "n2"))
-    slurm.processes.kill_with_descendants("n1")
-    # What slurmctld does itself when the node has been silent for SlurmdTimeout.
-    slurm.ask("scontrol", "update", "NodeName=n1", "State=DOWN", "Reason=killed")
+    slurm.lose_node("n1")
     campaign.release()
 
     def is_over() -> bool:
@@ -110,7 +108,7 @@ def test_a_lost_controller_ends_the_campaign_with_a_line_and_resume_goes_on(
     launched = campaign.fly("lost", "--on", "slurm", changes="slurm.LOST_AFTER_S=1",
                             **slurm.environment)
     campaign.wait_until_held("n1", "n2")
-    slurm.processes.kill_with_descendants("slurmctld")
+    slurm.kill_controller()
     launched.expect(1, "slurm: the controller does not answer", "0 of 6 chunks", "--resume")
     campaign.release()
     slurm.start_controller()

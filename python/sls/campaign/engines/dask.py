@@ -64,7 +64,8 @@ def connect(address: str) -> Any:
                          f"tcp://HOST:8786, got none; {START}")
     cloudpickle.register_pickle_by_value(sys.modules[__name__])
     # It tells in many lines what is told here in one.
-    logging.getLogger("distributed").setLevel(logging.CRITICAL + 1)
+    for name in ("distributed", "asyncio", "tornado"):
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     try:
         return Client(address, timeout=CONNECT_S, set_as_default=False, name="sls-campaign")
     except (OSError, ValueError) as error:
