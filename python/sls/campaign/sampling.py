@@ -8,6 +8,7 @@ Functions of `math` draw one number at a time, never those of numpy over an arra
 differently at an array's end, so that values would depend on the chunk."""
 
 import hashlib
+import json
 import math
 import warnings
 from collections.abc import Sequence
@@ -66,10 +67,31 @@ def to_yaml_value(value: Any) -> str:
         # YAML 1.1 readers, Python's among them, take 1e-07 for text and 1.0e-07 for a number.
         return text if "." in text or "e" not in text else text.replace("e", ".0e")
     if isinstance(value, str):
-        return '"' + value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n") + '"'
+        return json.dumps(value, ensure_ascii=False)  # YAML reads JSON
     if isinstance(value, Sequence):
         return "[" + ", ".join(to_yaml_value(item) for item in value) + "]"
-    return "{" + ", ".join(f"{key}: {to_yaml_value(item)}" for key, item in value.items()) + "}"
+    keys = [key if key.isidentifier() else json.dumps(key, ensure_ascii=False) for key in value]
+    return "{" + ", ".join(f"{key}: {to_yaml_value(item)}"
+                           for key, item in zip(keys, value.values())) + "}"
+
+
+def choose_runs(runs: int, count: int, seed: int, purpose: str = "certify") -> list[int]:
+    """`count` of the runs 0 to `runs` - 1, ascending, without repetition, chosen by `seed`. Another
+    `purpose` chooses others."""
+    return sorted(_make_permutation(_make_key(purpose, seed, ""), runs)[:count].tolist())
+
+
+def is_certified(campaign: Campaign, run: int) -> bool:
+    """Whether this run gets a certificate."""
+    certify = campaign.certify
+    if certify.kind != "some":
+        return certify.kind == "all"
+    return run in _choose_certified(campaign.runs, certify.count, certify.seed)
+
+
+@lru_cache(maxsize=4)
+def _choose_certified(runs: int, count: int, seed: int) -> frozenset[int]:
+    return frozenset(choose_runs(runs, count, seed))
 
 
 # --- Streams of random bits ----------------------------------------------------------------------
