@@ -37,7 +37,7 @@ class CampaignTest(support.FolderTest):
 
     def environment(self, **more):
         path = os.pathsep.join([str(self.core), str(support.ROOT / "python")])
-        return {**os.environ, "PYTHONPATH": path, "SLS_BUILD": str(support.BUILD), **more}
+        return {**os.environ, "PYTHONPATH": path, "SLS_BUILD": str(support.BUILD.resolve()), **more}
 
     def start(self, *arguments, fake="", **options):
         """The command line in a process of its own, in the test's folder."""

@@ -261,7 +261,7 @@ def main(arguments: Sequence[str]) -> int:
             COMMANDS[arguments[0]](arguments[1:])
         else:
             fly(make_parser().parse_args(arguments))
-    except ConfigError as error:
+    except (ConfigError, ImportError) as error:
         say(f"error: {error}")
         return 2
     except (EngineError, RunError, OSError) as error:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from sls.campaign.campaign import Campaign
 from sls.campaign.sampling import is_certified, make_values, to_yaml_value
+from sls.core import load_core
 from sls.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -88,9 +89,8 @@ def fly_whole(campaign: Campaign, runs: "Runs", values: list[Any]) -> "Flight":
 
 def fly_text(scenario_text: str, campaign: Campaign) -> "Flight":
     """Flies a scenario whose paths are relative to the base scenario's folder."""
-    import _sls_core
     import sls
-    return sls.fly(_sls_core.Scenario(None, scenario_text, str(campaign.base.parent), {}))
+    return sls.fly(load_core().Scenario(None, scenario_text, str(campaign.base.parent), {}))
 
 
 def list_values(campaign: Campaign, first: int, last: int) -> Iterator[tuple[int, list[Any]]]:
