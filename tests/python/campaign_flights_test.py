@@ -8,6 +8,7 @@ import sys
 import unittest
 
 import support
+import yaml
 from campaign_engine_support import CampaignTest
 
 CORE = support.BUILD.resolve() / "python"
@@ -19,20 +20,20 @@ sys.path.insert(0, str(CORE))
 BASE = """name: short
 vehicle: { quad_mass_kg: 1.5, load_mass_kg: 0.2, rod_length_m: 1.0, gravity_m_s2: 9.8 }
 plant: { model: analytic, step_s: 0.001, initial: { load_position_m: [0, 0, -0.5] } }
-sync: { mode: realtime, period_s: 0.004, rtf: 1 }
+sync: { mode: realtime, period_s: 0.004, real_time_factor: 1, wait_for: { controllers: 1, recorders: 1, timeout_s: 60 } }
 controller: { law: qsf, gains: { lqr: { horizontal: 10, vertical: 5 } }, force_limit_n: 200 }
 mission:
   - set_point: { position_m: [0.5, 0, -0.5] }
     for_s: 3
 faults:
   - noise: { on: command, force_n: [0.1, 0.1, 0.1], seed: 0 }
-  - delay: { on: command, by_s: 0 }
+  - bias: { on: command, force_n: [0.1, 0, 0] }
 """
-# A late force of 0.4 s loses the load, and the force limit of 5 N fails at once.
+# A push of 12 N loses the load, and the force limit of 5 N fails at once.
 CAMPAIGN = """base: base.yaml
 runs: 6
 vary:
-  faults.1.delay.by_s: { list: [0, 0.008, 0.4] }
+  faults.1.bias.force_n: { list: [[0.1, 0, 0], [0.5, 0, 0], [12, 0, 0]] }
   controller.force_limit_n: { list: [200, 5] }
 seeds: [faults.0.noise.seed]
 measure: [load_error_rms, load_error_max, force_max, outcome, time_of_loss]
@@ -64,9 +65,9 @@ class FlightsTest(CampaignTest):
     def fly_row(self, row):
         """The same flight by the package alone."""
         import sls
-        paths = ("faults.1.delay.by_s", "controller.force_limit_n", "faults.0.noise.seed")
+        paths = ("faults.1.bias.force_n", "controller.force_limit_n", "faults.0.noise.seed")
         return sls.fly(sls.load_scenario(self.folder / "base.yaml", changes={
-            path: float(row[path]) if "." in row[path] else int(row[path]) for path in paths}))
+            path: yaml.safe_load(row[path]) for path in paths}))
 
     def test_rows_are_what_the_package_flies(self):
         self.write_campaign()
@@ -128,7 +129,7 @@ class FlightsTest(CampaignTest):
                                ("{ worst: 2, by: load_error_max }", None), ("none", [])):
             with self.subTest(keep):
                 self.write_campaign(f"keep: {keep}\n")
-                out = f"out-{keep.split()[0].strip('{')}"
+                out = f"out-{keep.strip('{ ')[:5]}"
                 self.fly("campaign.yaml", "--out", out)
                 rows = self.read_rows(out)
                 if expected is None:
