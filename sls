@@ -6,7 +6,7 @@ root="$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)"
 readonly root
 readonly build="${SLS_BUILD:-$root/build}"
 readonly flying=(sim_server control_client recorder closed_loop)
-readonly programs=("${flying[@]}" sim_ctl sls_verify delay_margin sls_doctor _sls_core)
+readonly programs=("${flying[@]}" sim_ctl sls_verify delay_margin sls_doctor)
 readonly packages=(g++ make cmake libeigen3-dev libsimbody-dev libfastrtps-dev libfastcdr-dev
   fastddsgen default-jre-headless libyaml-cpp-dev libcli11-dev libspdlog-dev nlohmann-json3-dev libgtest-dev libssl-dev
   libtinyxml2-dev openssl pybind11-dev python3-dev python3-numpy)
@@ -156,7 +156,7 @@ build_tree() {
 # (SLS_BUILD) is taken as it is.
 build_programs() {
   [[ -z ${SLS_BUILD:-} ]] || return 0
-  (($#)) || set -- "${programs[@]}"
+  (($#)) || set -- "${programs[@]}" _sls_core
   setup
   build_tree release "$build" "$@"
 }
@@ -301,7 +301,7 @@ cmd_setup() { setup; }
 
 cmd_build() {
   build_programs
-  say "programs in build/bin: ${programs[*]}"
+  say "programs in build/bin: ${programs[*]}; the module of the package sls in build/python"
 }
 
 cmd_run() {

@@ -200,9 +200,13 @@ class Flight(FlownVehicle):
 
     def __init__(self, core: Any, scenario: "Scenario"):
         super().__init__(core, 0, scenario)
-        self.vehicles: tuple[FlownVehicle, ...] = (
-            self, *(FlownVehicle(core, index, scenario)
-                    for index in range(1, len(core.vehicle_ids))))
+        self._others = tuple(FlownVehicle(core, index, scenario)
+                             for index in range(1, len(core.vehicle_ids)))
+
+    @property
+    def vehicles(self) -> tuple[FlownVehicle, ...]:
+        """All vehicles, by id; the first one is the flight itself."""
+        return (self, *self._others)  # not kept: a cycle would keep the flight's memory
 
     @property
     def failure(self) -> str:
@@ -231,7 +235,7 @@ class Flight(FlownVehicle):
 
         Raises ConfigError for the folder, OSError where the disk refuses."""
         from sls.recordings import Recording
-        if not self._core.save(os.fspath(folder), force):
+        if not self._core.save(os.fspath(folder), force) and self.is_finished:
             raise RunError(f"{os.fspath(folder)}: the recording is not complete")
         return Recording(Path(folder))
 
