@@ -45,9 +45,19 @@ def gate(flight):
 """
 
 BASE = """\
-plant: analytic
+name: short
+vehicle: { quad_mass_kg: 1.5, load_mass_kg: 0.2, rod_length_m: 1.0, gravity_m_s2: 9.8 }
+plant:
+  model: analytic
+  step_s: 0.001
+  initial: { load_position_m: [0, 0, -0.5] }
+sync: { mode: lockstep, period_s: 0.004, wait_for: { controllers: 1, recorders: 1, timeout_s: 30 } }
+controller:
+  gains: { lqr: { horizontal: 10, vertical: 5 } }
+  force_limit_n: 200
 mission:
-  - setpoint: { position_m: [1, 1, -1], for_s: 2 }
+  - figure_eight: { amplitude_m: [1.5, 0.75, 0.5], offset_m: [0, 0, -0.5], period_s: 16 }
+    for_s: 2
 """
 
 # As `./sls campaign`, with shorter patience where a test asks for it.

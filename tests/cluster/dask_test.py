@@ -92,7 +92,7 @@ def test_without_dask_the_message_says_what_to_install_or_start(campaign: TestCa
     campaign.fly("closed", "--on", "dask", "--scheduler", address, changes=FAST).expect(
         1, f"dask: no scheduler at {address}", "dask-scheduler")
     campaign.fly("wrong", "--on", "dask", "--scheduler", "no address", changes=FAST).expect(
-        1, "dask: no scheduler at no address")
+        2, "--scheduler: expected", "got 'no address'")
     (tmp_path / "distributed.py").write_text(
         "raise ModuleNotFoundError('No module', name='distributed')\n")
     campaign.fly("missing", "--on", "dask", "--scheduler", address, PYTHONPATH=f"{tmp_path}:{PATH}").expect(

@@ -35,7 +35,19 @@ def remove_what_killed_tests_left() -> None:
     for namespace in Path("/run/netns").glob(f"{OURS}*"):
         process = namespace.name.removeprefix(OURS).partition("-")[0]
         if process.isdecimal() and not Path(f"/proc/{process}").exists():
-            subprocess.run(["ip", "netns", "delete", namespace.name], capture_output=True)
+            remove_namespace(namespace.name)
+
+
+def list_processes(namespace: str) -> list[int]:
+    done = subprocess.run(["ip", "netns", "pids", namespace], capture_output=True, text=True)
+    return [int(process) for process in done.stdout.split()]
+
+
+def remove_namespace(namespace: str) -> None:
+    """With what still runs there."""
+    for process in list_processes(namespace):
+        kill(process)
+    subprocess.run(["ip", "netns", "delete", namespace], capture_output=True)
 
 
 class TestHosts:
@@ -77,16 +89,12 @@ class TestHosts:
         self.remove()
 
     def remove(self) -> None:
-        for host in self.address:
-            self.lose_power(host)
         for name in [*self.address, "switch"]:
-            subprocess.run(["ip", "netns", "delete", self.prefix + name], capture_output=True)
+            remove_namespace(self.prefix + name)
 
     def processes(self, host: str) -> list[int]:
         """Ids of what runs there, daemons included."""
-        done = subprocess.run(["ip", "netns", "pids", self.prefix + host], capture_output=True,
-                              text=True)
-        return [int(process) for process in done.stdout.split()]
+        return list_processes(self.prefix + host)
 
     def lose_power(self, host: str) -> None:
         """Everything that runs there is gone at once."""

@@ -6,6 +6,7 @@ chunk a try: the scheduler gives it to another one."""
 
 import logging
 import queue
+import re
 import sys
 import time
 import uuid
@@ -59,13 +60,13 @@ def connect(address: str) -> Any:
     except ImportError as error:
         raise EngineError(f"dask: Python module '{error.name}' is missing: apt-get install "
                           "python3-distributed") from None
-    if not address:
+    if not re.fullmatch(r"(\w+://)?[^\s/]+:\d+", address):
         raise InputError("--scheduler: expected the address of a Dask scheduler, such as "
-                         f"tcp://HOST:8786, got none; {START}")
+                         f"tcp://HOST:8786, got "
+                         f"{repr(address) if address else 'none'}; {START}")
     cloudpickle.register_pickle_by_value(sys.modules[__name__])
     # It tells in many lines what is told here in one.
-    for name in ("distributed", "asyncio", "tornado"):
-        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+    logging.disable(logging.CRITICAL)
     try:
         return Client(address, timeout=CONNECT_S, set_as_default=False, name="sls-campaign")
     except (OSError, ValueError) as error:
