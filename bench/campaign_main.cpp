@@ -2,6 +2,7 @@
 // run is made of. Prints one line of JSON on stdout. README.md.
 #include <chrono>
 #include <cstdio>
+#include <ctime>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -61,7 +62,12 @@ nlohmann::json fly(const Options& options) {
   return json;
 }
 
-/// Seconds of each part of the runs; each part is timed with all runs in turn.
+/// CPU time of this process, s: other work on the machine is not in it.
+double take_cpu_seconds() {
+  return static_cast<double>(std::clock()) / static_cast<double>(CLOCKS_PER_SEC);
+}
+
+/// CPU seconds of each part of the runs; the parts of a run are timed in turn.
 nlohmann::json time_parts(const Options& options) {
   const closed_loop::CampaignRuns runs(options.scenario, {options.path}, kMeasures);
   const std::vector<std::string> values = read_lines(options.values);
@@ -71,21 +77,21 @@ nlohmann::json time_parts(const Options& options) {
   double scenario = 0.0, flight = 0.0, steps = 0.0, measured = 0.0, certified = 0.0;
   std::uint64_t count = 0;
   for (const std::string& value : values) {
-    auto began = Clock::now();
+    double began = take_cpu_seconds();
     const config::Scenario run = runs.make_scenario({value});
-    scenario += calc_seconds(began);
-    began = Clock::now();
+    scenario += take_cpu_seconds() - began;
+    began = take_cpu_seconds();
     closed_loop::Flight alone(run);
-    flight += calc_seconds(began);
-    began = Clock::now();
+    flight += take_cpu_seconds() - began;
+    began = take_cpu_seconds();
     while (alone.fly_step()) ++count;
-    steps += calc_seconds(began);
-    began = Clock::now();
+    steps += take_cpu_seconds() - began;
+    began = take_cpu_seconds();
     closed_loop::fly_measured(run, all, errors, false);
-    measured += calc_seconds(began);
-    began = Clock::now();
+    measured += take_cpu_seconds() - began;
+    began = take_cpu_seconds();
     closed_loop::fly_measured(run, all, errors, true);
-    certified += calc_seconds(began);
+    certified += take_cpu_seconds() - began;
     if (app::stop_signal() != 0) break;
   }
   return {{"runs", values.size()},

@@ -10,19 +10,30 @@
 
 namespace sls::record {
 
-/// Numbers go in as little-endian bytes, texts after their length of 32 bits.
+/// Numbers go in as little-endian bytes, texts after their length of 32 bits. There is always room
+/// for `kRoom` bytes, so that the few numbers of a row need no look at it each.
 class ByteBuffer {
  public:
+  static constexpr std::size_t kRoom = 512;
+
   std::string_view bytes() const { return {bytes_.data(), size_}; }
   void clear() { size_ = 0; }
 
-  template <class Integer, std::enable_if_t<std::is_integral_v<Integer>, int> = 0>
-  void append(Integer value) {
-    char* place = extend(sizeof value);
-    // Which compilers turn into one store.
-    for (std::size_t i = 0; i < sizeof value; ++i) place[i] = static_cast<char>(value >> (8 * i));
+  /// Makes room for `size` bytes, and for `kRoom` after them.
+  void make_room(std::size_t size) {
+    if (size_ + size + kRoom > bytes_.size()) bytes_.resize(2 * (size_ + size + kRoom));
   }
 
+  /// There must be room for it.
+  template <class Integer, std::enable_if_t<std::is_integral_v<Integer>, int> = 0>
+  void append(Integer value) {
+    char* place = bytes_.data() + size_;
+    // Which compilers turn into one store.
+    for (std::size_t i = 0; i < sizeof value; ++i) place[i] = static_cast<char>(value >> (8 * i));
+    size_ += sizeof value;
+  }
+
+  /// There must be room for it.
   void append(double number) {
     std::uint64_t bits = 0;
     std::memcpy(&bits, &number, sizeof bits);
@@ -32,18 +43,13 @@ class ByteBuffer {
   }
 
   void append(std::string_view text) {
+    make_room(sizeof(std::uint32_t) + text.size());
     append(static_cast<std::uint32_t>(text.size()));
-    if (!text.empty()) std::memcpy(extend(text.size()), text.data(), text.size());
+    if (!text.empty()) std::memcpy(bytes_.data() + size_, text.data(), text.size());
+    size_ += text.size();
   }
 
  private:
-  /// The begin of so many more bytes.
-  char* extend(std::size_t size) {
-    if (size_ + size > bytes_.size()) bytes_.resize(2 * (size_ + size));
-    size_ += size;
-    return bytes_.data() + size_ - size;
-  }
-
   std::vector<char> bytes_;
   std::size_t size_ = 0;  // of those in use
 };

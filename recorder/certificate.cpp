@@ -1,6 +1,8 @@
 #include "recorder/certificate.hpp"
 
 #include <string_view>
+#include <type_traits>
+#include <vector>
 
 namespace sls::record {
 namespace {
@@ -14,6 +16,9 @@ struct Collector {
   template <class Field>
   void operator()(const Column& column, const Field& field) {
     if (!column.is_certified) return;
+    // A sequence may be of any length; a row's other numbers have room.
+    if constexpr (std::is_same_v<Field, std::vector<double>>)
+      bytes.make_room(field.size() * sizeof(double));
     for_each_component(field, [this](const auto& component) { bytes.append(component); });
   }
 };
@@ -55,6 +60,7 @@ std::string Certificate::finish() {
   config::Sha256 flight;
   for (auto& [id, vehicle] : vehicles_) {
     vehicle.hash_bytes();
+    vehicle.bytes.make_room(0);  // kRoom
     vehicle.bytes.append(id);
     flight.add(vehicle.bytes.bytes());
     const auto digest = vehicle.hash.finish();

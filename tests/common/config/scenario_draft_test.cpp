@@ -3,6 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <string>
+#include <vector>
+
 #include "common/config/scenario.hpp"
 
 namespace sls::config {
@@ -11,6 +15,13 @@ namespace {
 using testing::HasSubstr;
 
 const std::filesystem::path kFolder = SLS_SOURCE_DIR "/config/scenarios";
+
+std::vector<std::filesystem::path> list_scenarios() {
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::directory_iterator(kFolder))
+    if (entry.path().extension() == ".yaml") files.push_back(entry.path());
+  return files;
+}
 
 std::string find_error(ScenarioDraft draft, const std::string& path, const std::string& value) {
   try {
@@ -23,15 +34,13 @@ std::string find_error(ScenarioDraft draft, const std::string& path, const std::
 }
 
 TEST(ScenarioDraftTest, KeepsEveryValueOfEveryShippedScenario) {
-  for (const auto& file : std::filesystem::directory_iterator(kFolder)) {
-    const ScenarioDraft draft(file.path());
-    EXPECT_EQ(to_yaml(draft.make_scenario()), to_yaml(load_scenario(file.path()))) << file.path();
-  }
+  for (const auto& file : list_scenarios())
+    EXPECT_EQ(to_yaml(ScenarioDraft(file).make_scenario()), to_yaml(load_scenario(file))) << file;
 }
 
 TEST(ScenarioDraftTest, WritesATextThatIsTheSameScenario) {
-  for (const auto& file : std::filesystem::directory_iterator(kFolder)) {
-    ScenarioDraft draft(file.path());
+  for (const auto& file : list_scenarios()) {
+    ScenarioDraft draft(file);
     draft.set("vehicle.gravity_m_s2", "9.75");
     const Scenario made = draft.make_scenario();
     const Scenario read = parse_scenario(draft.to_text(), "again");
@@ -45,7 +54,7 @@ TEST(ScenarioDraftTest, WritesATextThatIsTheSameScenario) {
 TEST(ScenarioDraftTest, ReplacesValuesInMapsAndLists) {
   ScenarioDraft draft(kFolder / "figure_eight.yaml");
   draft.set("vehicle.load_mass_kg", "0.30000000000000004");
-  draft.set("faults", "[{ delay: { by_s: 0.004 }, on: command }]");
+  draft.set("faults", "[{ delay: { by_s: 0.004, on: command } }]");
   draft.set("faults.0.delay.by_s", "0.008");
   draft.set("plant.initial.load_position_m", "[1, 2, -3]");
   draft.set("plant.initial.load_position_m.2", "-1.5");
@@ -64,8 +73,9 @@ TEST(ScenarioDraftTest, AddsKeysThatTheFileLeavesOut) {
 
 TEST(ScenarioDraftTest, KeepsTextsInQuotes) {
   ScenarioDraft draft(kFolder / "figure_eight.yaml");
-  draft.set("name", "\"a \\\"b\\\": #c\"");
-  EXPECT_EQ(parse_scenario(draft.to_text(), "again").name, draft.make_scenario().name);
+  draft.set("name", "\"17\"");  // without quotes it would be a number
+  EXPECT_THAT(draft.to_text(), HasSubstr("name: \"17\"\n"));
+  EXPECT_EQ(draft.make_scenario().name, "17");
 }
 
 TEST(ScenarioDraftTest, RefusesPathsThatLeadNowhere) {
