@@ -6,7 +6,7 @@ root="$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)"
 readonly root
 readonly build="${SLS_BUILD:-$root/build}"
 readonly flying=(sim_server control_client recorder closed_loop)
-readonly programs=("${flying[@]}" sim_ctl sls_verify delay_margin sls_doctor)
+readonly programs=("${flying[@]}" sim_ctl sls_verify delay_margin sls_doctor _sls_core)
 readonly packages=(g++ make cmake libeigen3-dev libsimbody-dev libfastrtps-dev libfastcdr-dev
   fastddsgen default-jre-headless libyaml-cpp-dev libcli11-dev libspdlog-dev nlohmann-json3-dev libgtest-dev libssl-dev
   libtinyxml2-dev openssl pybind11-dev python3-dev python3-numpy)
@@ -55,8 +55,22 @@ usage: ./sls COMMAND [OPTIONS]
       --vehicle N      which vehicle of a fleet (default: 0); with --help: all options
   report DIR         DIR/report.html: parameters, metrics of each stage, figures, events in one file
       --vehicle N      which vehicle of a fleet (default: 0)
+  python [ARGS]      Debian's Python with the package `sls`: a script, -m MODULE, -c COMMAND, or none
   study              flies the whole published comparison, writes docs/study.md and its pictures;
                      with --help: its options
+  campaign FILE      flies a campaign: many runs of one scenario in which keys vary; DIR/runs.csv, report.html.
+                     FILE is a name in config/campaigns or a path
+      --out DIR        its folder (default: campaigns/NAME-UTCTIME)
+      --on ENGINE      local, slurm or dask (default: local)
+      --workers N      processes (default: one for each core)
+      --runs A-B       these runs alone (default: all)
+      --resume         fly what is missing or damaged in DIR; interrupted campaigns go on
+      --verify N       fly N runs again with the three programs over DDS, compare certificates
+      --sbatch "…"     options of the site for Slurm; --scheduler ADDRESS: of Dask; with --help: all options
+  campaign status DIR | report DIR | compare A B
+                     chunks, rate and outcomes so far; report.html again; two campaigns run by run
+  campaign-worker DIR --chunks A-B
+                     flies these chunks of a campaign's folder; what Slurm and Kubernetes start
   bench              how fast everything is, each figure beside its bound in the same run; minutes, and
                      an idle machine
       --quick          one short round of everything: whether it works
@@ -351,7 +365,13 @@ cmd_verify() {
 # run_python COMMAND…: -P: nothing in the working folder is taken for a module of ours; -B: no files beside it.
 run_python() {
   install_missing "${python_packages[@]}"
-  PYTHONPATH="$root/python" exec /usr/bin/python3 -BP -m sls "$@"
+  PYTHONPATH="$root/python:$build/python" exec /usr/bin/python3 -BP -m sls "$@"
+}
+
+cmd_python() {
+  install_missing "${python_packages[@]}"
+  build_programs _sls_core
+  PYTHONPATH="$root/python:$build/python${PYTHONPATH:+:$PYTHONPATH}" exec /usr/bin/python3 -B "$@"
 }
 
 cmd_plot() { run_python plot "$@"; }
@@ -364,6 +384,27 @@ cmd_study() {
     export SLS_BUILD="$build"  # the flights of the study fly side by side and must not build
   fi
   run_python study "$@"
+}
+
+# run_campaign MODULE [ARGS…]: with the compiled module on the path.
+run_campaign() {
+  install_missing "${python_packages[@]}"
+  export SLS_BUILD="$build"  # flights over DDS must not build
+  PYTHONPATH="$root/python:$build/python" exec /usr/bin/python3 -BP -m "$@"
+}
+
+cmd_campaign() {
+  if [[ " status report compare " != *" ${1:-} "* && " $* " != *" --help "* ]]; then
+    local targets=(_sls_core)
+    [[ " $* " != *" --verify"* ]] || targets+=("${flying[@]}" sls_verify)
+    build_programs "${targets[@]}"
+  fi
+  run_campaign sls.campaign "$@"
+}
+
+cmd_campaign-worker() {
+  [[ " $* " == *" --help "* ]] || build_programs _sls_core
+  run_campaign sls.campaign.worker "$@"
 }
 
 cmd_doctor() {
@@ -481,7 +522,7 @@ cmd_test() {
 command=${1:-help}
 (($#)) && shift
 case $command in
-  demo | run | doctor | bench | keys | ctl | verify | delay-margin | chaos | fuzz | test | setup | build | docker-demo | discovery-server | network-table | plot | report | study) "cmd_$command" "$@" ;;
+  demo | run | doctor | bench | keys | ctl | verify | delay-margin | chaos | fuzz | test | setup | build | docker-demo | discovery-server | network-table | campaign | campaign-worker | plot | python | report | study) "cmd_$command" "$@" ;;
   clean) rm -rf "$root"/build "$root"/build-* ;;
   help | --help | -h) usage ;;
   *)

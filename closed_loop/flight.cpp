@@ -50,7 +50,7 @@ const FlownStep* Flight::fly_step() {
         flown.answer = vehicle.controller.calc_answer(flown.step, flown.measured, memory);
       } catch (const std::exception& error) {
         failure_ = error.what();
-        has_ended_ = true;
+        is_law_broken_ = has_ended_ = true;
         return nullptr;
       }
       if (measures_compute_time_) flown.compute_time = Clock::now() - began;

@@ -58,6 +58,11 @@ class Flight {
 
   /// Whether the last answer of the `index`th vehicle failed the flight.
   bool is_refused(std::size_t index) const { return refused_ == index; }
+  /// The index of that vehicle.
+  const std::optional<std::size_t>& refused() const { return refused_; }
+
+  /// Whether a law that is broken ended the flight: it threw, or answers equal inputs differently.
+  bool is_law_broken() const { return is_law_broken_; }
 
   /// That of the first vehicle.
   const sim::Plant& plant() const { return *plants_.front().plant; }
@@ -92,6 +97,7 @@ class Flight {
   std::optional<std::size_t> refused_;
   bool has_begun_ = false;
   bool has_ended_ = false;
+  bool is_law_broken_ = false;
   std::string failure_;
 };
 

@@ -1,7 +1,119 @@
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include <memory>
+#include <numeric>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/app/run_main.hpp"
+#include "common/config/scenario.hpp"
 #include "python/bindings/bindings.hpp"
+#include "python/bindings/errors.hpp"
+#include "python/bindings/flown_flight.hpp"
+#include "python/bindings/python_law.hpp"
+#include "sim_server/plants/plant.hpp"
 
 namespace sls::python {
+namespace {
 
-void add_flight(pybind11::module_&) {}
+namespace py = pybind11;
+using Ids = std::vector<std::uint32_t>;
+
+Ids list_ids(const config::Scenario& scenario, std::optional<std::uint32_t> vehicle) {
+  const std::size_t count = scenario.vehicles.size();
+  if (!vehicle) {
+    Ids ids(count);
+    std::iota(ids.begin(), ids.end(), 0);
+    return ids;
+  }
+  if (*vehicle >= count)
+    throw config::ConfigError("vehicle: expected one of " + scenario.name + ", 0 to " +
+                              std::to_string(count - 1) + ", got " + std::to_string(*vehicle));
+  return {*vehicle};
+}
+
+std::unique_ptr<FlownFlight> fly(config::Scenario scenario, const py::object& controller,
+                                 std::optional<std::uint32_t> vehicle, bool check_purity) {
+  scenario.sync.mode = config::SyncMode::kLockstep;  // nothing here is ever late
+  const Ids ids = list_ids(scenario, vehicle);
+  closed_loop::FlightOptions options;
+  options.checks_purity = check_purity;
+  if (controller.is_none()) {
+    const py::gil_scoped_release released;
+    return std::make_unique<FlownFlight>(scenario, ids, options, [] {
+      const py::gil_scoped_acquire gil;
+      check_signals();
+    });
+  }
+
+  const auto plants = sim::make_plants(sim::find_plant_type(scenario.plant.model), scenario, ids);
+  const auto errors = std::make_shared<LawErrors>();
+  options.controller_name = "python";
+  options.make_law =
+      make_python_law_maker(controller, plants.front().plant->has_attitude(), errors);
+  scenario.controller.law.name = name_controller(controller);  // in messages
+  // The GIL stays held, for the law needs it at every step: others get it while the law runs, as
+  // under any Python code, and at every rest.
+  try {
+    return std::make_unique<FlownFlight>(scenario, ids, options, [] {
+      check_signals();
+      const py::gil_scoped_release released;
+    });
+  } catch (const app::RunError&) {
+    errors->raise_first();
+    throw;  // refused by the check of purity
+  }
+}
+
+/// The rows of a vehicle, (steps, columns), without a copy: they live as long as an array on them.
+py::array make_rows(const py::object& self, std::size_t index) {
+  const RowBuffer& rows = py::cast<const FlownFlight&>(self).rows(index);
+  const auto to_size = [](std::size_t size) { return static_cast<py::ssize_t>(size); };
+  const py::array array(py::dtype::of<double>(), {to_size(rows.rows()), to_size(rows.width())},
+                        rows.row(0), self);
+  array.attr("setflags")(py::arg("write") = false);
+  return array;
+}
+
+py::list list_columns(const FlownFlight& flight) {
+  const char* const kinds[] = {"double", "integer", "fault", "stage_name"};
+  py::list columns;
+  for (const ColumnPlace& place : flight.columns())
+    columns.append(py::make_tuple(place.table, place.name, place.index,
+                                  kinds[static_cast<std::size_t>(place.kind)]));
+  return columns;
+}
+
+}  // namespace
+
+void add_flight(py::module_& module) {
+  py::class_<FlownFlight>(module, "FlownFlight", "A flight that is kept; sls.Flight shows it.")
+      .def_property_readonly("vehicle_ids", &FlownFlight::ids)
+      .def_property_readonly("failure", &FlownFlight::failure)
+      .def_property_readonly("last_step", &FlownFlight::last_step)
+      .def_property_readonly("columns", &list_columns,
+                             "Tuples (table, name, index in a row, kind of the cell).")
+      .def_property_readonly("certificate", &FlownFlight::calc_certificate,
+                             py::call_guard<py::gil_scoped_release>())
+      .def("can_measurement_differ", &FlownFlight::can_measurement_differ, py::arg("index"))
+      .def("rows", &make_rows, py::arg("index"),
+           "Cells of the index-th vehicle, (steps, columns), read-only and not copied.")
+      .def(
+          "save",
+          [](const FlownFlight& flight, const std::string& folder, bool force) {
+            return flight.save(folder, force);
+          },
+          py::arg("folder"), py::arg("force"), py::call_guard<py::gil_scoped_release>());
+  const char* const codes[] = {to_string(model::Fault::kNone), to_string(model::Fault::kFreeFall),
+                               to_string(model::Fault::kRodLevel),
+                               to_string(model::Fault::kNotFinite),
+                               to_string(model::Fault::kStageTimeout)};
+  module.attr("FAULTS") = py::make_tuple(codes[0], codes[1], codes[2], codes[3], codes[4]);
+  module.def("fly", &fly, py::arg("scenario"), py::arg("controller") = py::none(),
+             py::arg("vehicle") = py::none(), py::arg("check_purity") = false);
+}
 
 }  // namespace sls::python

@@ -1,1 +1,66 @@
-"""Figures, reports and the published comparison, from recordings. See python/README.md."""
+"""Flights from Python: fly a scenario, read its columns, write a control law, verify a recording.
+
+    import sls
+    flight = sls.fly(sls.load_scenario("figure_eight", vehicle__load_mass_kg=0.3))
+    flight.load_position, flight.state["alpha_rad"], flight.metrics, flight.certificate
+
+What each name does is said where it is defined. Figures, reports and recordings work without the
+extension module; what flies needs it (`./sls python` builds it). See python/README.md."""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from _sls_core import Now, Reference, Scenario, Vehicle
+
+    from sls import metrics
+    from sls.columns import Columns
+    from sls.errors import ConfigError, LawFault, RunError
+    from sls.flight import Flight, FlownVehicle, Law, LawWithMemory, fly
+    from sls.gains import lqr
+    from sls.recordings import Recording
+    from sls.scenario import load_scenario
+    from sls.trajectory import Trajectory
+
+# Where each name is. Imported when first asked for: a program that only reads recordings needs
+# neither the extension module nor what the figures need.
+_PLACES = {
+    "Columns": "sls.columns",
+    "ConfigError": "sls.errors",
+    "Flight": "sls.flight",
+    "FlownVehicle": "sls.flight",
+    "Law": "sls.flight",
+    "LawFault": "sls.errors",
+    "LawWithMemory": "sls.flight",
+    "Now": "_sls_core",
+    "Recording": "sls.recordings",
+    "Reference": "_sls_core",
+    "RunError": "sls.errors",
+    "Scenario": "_sls_core",
+    "Trajectory": "sls.trajectory",
+    "Vehicle": "_sls_core",
+    "fly": "sls.flight",
+    "load_scenario": "sls.scenario",
+    "lqr": "sls.gains",
+    "metrics": "sls.metrics",
+}
+
+__all__ = sorted(_PLACES)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _PLACES:
+        raise AttributeError(f"module 'sls' has no attribute '{name}'")
+    place = _PLACES[name]
+    if place == "_sls_core":
+        from sls.core import load_core
+        value = getattr(load_core(), name)
+    else:
+        module = import_module(place)
+        value = module if place == f"sls.{name}" else getattr(module, name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_PLACES})

@@ -1,4 +1,5 @@
-"""`./sls plot`, `./sls report` and `./sls study`: command lines."""
+"""`./sls plot`, `./sls report` and `./sls study`: command lines. That of `./sls campaign` is in
+campaign/cli.py."""
 
 import argparse
 import sys
@@ -8,7 +9,7 @@ from typing import NoReturn
 
 from sls import study
 from sls.figures import make_figures, save
-from sls.flight import Flight
+from sls.trajectory import Trajectory
 from sls.input_error import InputError
 from sls.published_logs import FORMATS, load_log
 from sls.recordings import Recording
@@ -32,7 +33,7 @@ def make_folder(folder: Path) -> None:
         raise InputError(f"--out {folder}: expected a folder, got: {error.strerror}") from None
 
 
-def load_recording(recording: Recording, name: str | None, vehicle_id: int) -> Flight:
+def load_recording(recording: Recording, name: str | None, vehicle_id: int) -> Trajectory:
     """One vehicle's flight; says what is missing."""
     flight = recording.load_flight(vehicle_id, name or recording.folder.resolve().name)
     for note in flight.notes:
@@ -132,6 +133,9 @@ def make_parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str]) -> int:
     """The exit code."""
+    if arguments and arguments[0] == "campaign":
+        from sls.campaign.cli import main as fly_campaign
+        return fly_campaign(arguments[1:])
     try:
         options = make_parser().parse_args(arguments)
         options.run(options)

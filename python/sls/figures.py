@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from sls.flight import Flight, calc_roll_pitch_yaw
+from sls.trajectory import Trajectory, calc_roll_pitch_yaw
 
 # Told apart by readers with any colour vision (Okabe and Ito).
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f7f7f", "#8c510a")
@@ -71,7 +71,7 @@ def draw(axes: Axes, time_s: np.ndarray, values: np.ndarray, **style) -> None:
     axes.plot(*break_at_gaps(time_s, values), **style)
 
 
-def mark_stages(all_axes: Sequence[Axes], flights: Sequence[Flight]) -> None:
+def mark_stages(all_axes: Sequence[Axes], flights: Sequence[Trajectory]) -> None:
     """Where the stages of a mission begin; of several flights it would only confuse."""
     if len(flights) != 1 or not any(axes.lines for axes in all_axes):
         return
@@ -110,9 +110,9 @@ def add_legend(axes: Axes, columns: int = 4) -> None:
                     borderaxespad=0.2, handlelength=1.8, columnspacing=1.4)
 
 
-def list_references(flights: Sequence[Flight]) -> list[tuple[Flight, str, str]]:
+def list_references(flights: Sequence[Trajectory]) -> list[tuple[Trajectory, str, str]]:
     """The references that differ: of which flight, its label and its colour."""
-    found: list[tuple[Flight, str, str]] = []
+    found: list[tuple[Trajectory, str, str]] = []
     for index, flight in enumerate(flights):
         if np.all(np.isnan(flight.p_WL_ref)) or any(is_same_reference(flight, other)
                                                     for other, _, _ in found):
@@ -122,7 +122,7 @@ def list_references(flights: Sequence[Flight]) -> list[tuple[Flight, str, str]]:
     return found
 
 
-def is_same_reference(a: Flight, b: Flight) -> bool:
+def is_same_reference(a: Trajectory, b: Trajectory) -> bool:
     """Where both are known, at the instants of `a`, within 1 cm (which no line shows)."""
     for axis in range(3):
         known = np.isfinite(b.p_WL_ref[:, axis])
@@ -133,7 +133,7 @@ def is_same_reference(a: Flight, b: Flight) -> bool:
     return True
 
 
-def plot_positions(flights: Sequence[Flight]) -> Figure:
+def plot_positions(flights: Sequence[Trajectory]) -> Figure:
     figure, axes = make_stack(3, "Load position", ("x (m)", "y (m)", "z (m, down)"))
     for index, flight in enumerate(flights):
         for axis in range(3):
@@ -152,7 +152,7 @@ def plot_positions(flights: Sequence[Flight]) -> Figure:
     return figure
 
 
-def plot_errors(flights: Sequence[Flight]) -> Figure:
+def plot_errors(flights: Sequence[Trajectory]) -> Figure:
     figure, axes = make_stack(3, "Load position error", ("x (m)", "y (m)", "z (m)"), columns=2)
     for index, flight in enumerate(flights):
         error = flight.calc_error()
@@ -185,7 +185,7 @@ def set_log_scale(axes: Axes, sizes: Sequence[np.ndarray]) -> None:
     axes.set_ylim(10.0 ** max(decade[0], decade[1] - 6), 2.0 * np.max(values))
 
 
-def plot_path(flights: Sequence[Flight]) -> Figure:
+def plot_path(flights: Sequence[Trajectory]) -> Figure:
     figure = Figure(figsize=(8.6, 5.8))
     axes = figure.add_axes((0.02, 0.0, 0.94, 0.92), projection="3d")
     name_figure(figure, "Path of the load, z up")
@@ -228,8 +228,8 @@ def set_equal_scale(axes, points: np.ndarray) -> None:
     axes.set_box_aspect(extent, zoom=0.88 if is_tall else 1.05)
 
 
-def draw_columns(all_axes: Sequence[Axes], flights: Sequence[Flight],
-                 calc_columns: Callable[[Flight], np.ndarray]) -> None:
+def draw_columns(all_axes: Sequence[Axes], flights: Sequence[Trajectory],
+                 calc_columns: Callable[[Trajectory], np.ndarray]) -> None:
     """Column i of each flight's `calc_columns` on axes i; nothing of a flight that has no such data."""
     for index, flight in enumerate(flights):
         columns = calc_columns(flight)
@@ -242,14 +242,14 @@ def draw_columns(all_axes: Sequence[Axes], flights: Sequence[Flight],
         add_legend(all_axes[0])
 
 
-def plot_angles(flights: Sequence[Flight]) -> Figure:
+def plot_angles(flights: Sequence[Trajectory]) -> Figure:
     figure, axes = make_stack(2, "Rod angles", ("α about x (°)", "β about y (°)"))
     draw_columns(axes[:, 0], flights,
                  lambda flight: np.degrees(np.column_stack([flight.alpha, flight.beta])))
     return figure
 
 
-def plot_forces(flights: Sequence[Flight]) -> Figure:
+def plot_forces(flights: Sequence[Trajectory]) -> Figure:
     figure, axes = make_stack(4, "Force on the quadrotor",
                               ("F x (N)", "F y (N)", "F z (N, down)", "|F| (N)"), height=1.45)
     axes[2, 0].invert_yaxis()
@@ -258,7 +258,7 @@ def plot_forces(flights: Sequence[Flight]) -> Figure:
     return figure
 
 
-def plot_attitude(flights: Sequence[Flight]) -> Figure:
+def plot_attitude(flights: Sequence[Trajectory]) -> Figure:
     """Of point masses alone: where there is a body, `plot_body_attitude` shows both."""
     figure, axes = make_stack(2, "Commanded attitude", ("roll (°)", "pitch (°)"))
     if all(np.all(np.isnan(list_attitudes(flight)[0])) for flight in flights):
@@ -266,7 +266,7 @@ def plot_attitude(flights: Sequence[Flight]) -> Figure:
     return figure
 
 
-def list_attitudes(flight: Flight) -> tuple[np.ndarray, np.ndarray]:
+def list_attitudes(flight: Trajectory) -> tuple[np.ndarray, np.ndarray]:
     """Roll, pitch and yaw, (n, 3), rad, and their set-points; of a flight whose plant has none,
     those that realise the force."""
     force = np.column_stack([flight.calc_attitude(), np.zeros(len(flight.time_s))])
@@ -291,8 +291,8 @@ def widen(all_axes: Sequence[Axes], least: float) -> None:
             axes.set_ylim((low + high - least) / 2, (low + high + least) / 2)
 
 
-def draw_beside(all_axes: Sequence[Axes], flights: Sequence[Flight],
-                calc_both: Callable[[Flight], tuple[np.ndarray, np.ndarray] | None],
+def draw_beside(all_axes: Sequence[Axes], flights: Sequence[Trajectory],
+                calc_both: Callable[[Trajectory], tuple[np.ndarray, np.ndarray] | None],
                 legend_columns: int = 4) -> None:
     """Column i of what `calc_both` gives on axes i: what was done, over its set-point. None: the
     flight has no such data."""
@@ -311,7 +311,7 @@ def draw_beside(all_axes: Sequence[Axes], flights: Sequence[Flight],
     add_legend(all_axes[0], legend_columns)
 
 
-def plot_body_attitude(flights: Sequence[Flight]) -> Figure:
+def plot_body_attitude(flights: Sequence[Trajectory]) -> Figure:
     figure, axes = make_stack(3, "Attitude and its set-point", ("roll (°)", "pitch (°)", "yaw (°)"),
                               height=1.55)
     if any(np.any(np.isfinite(list_attitudes(flight)[0])) for flight in flights):
@@ -321,7 +321,7 @@ def plot_body_attitude(flights: Sequence[Flight]) -> Figure:
     return figure
 
 
-def plot_body_rates(flights: Sequence[Flight]) -> Figure:
+def plot_body_rates(flights: Sequence[Trajectory]) -> Figure:
     figure, axes = make_stack(3, "Body rates", ("about x (°/s)", "about y (°/s)", "about z (°/s)"),
                               height=1.55)
     draw_columns(axes[:, 0], flights, lambda flight: np.degrees(
@@ -330,7 +330,7 @@ def plot_body_rates(flights: Sequence[Flight]) -> Figure:
     return figure
 
 
-def plot_rotors(flights: Sequence[Flight]) -> Figure:
+def plot_rotors(flights: Sequence[Trajectory]) -> Figure:
     """One below the other up to four, more in two columns."""
     count = max(flight.body.rotor_speed.shape[1] if flight.body else 0 for flight in flights)
     columns = 1 if count <= 4 else 2
@@ -345,7 +345,7 @@ def plot_rotors(flights: Sequence[Flight]) -> Figure:
     return figure
 
 
-def plot_thrust(flights: Sequence[Flight]) -> Figure:
+def plot_thrust(flights: Sequence[Trajectory]) -> Figure:
     figure, axes = make_stack(2, "Thrust of all rotors and the thrust asked for; force of the rod",
                               ("thrust (N)", "rod tension (N)"))
     draw_beside(axes[:, 0], flights, lambda flight: flight.body and (
@@ -354,7 +354,7 @@ def plot_thrust(flights: Sequence[Flight]) -> Figure:
     return figure
 
 
-def plot_fleet(flights: Sequence[Flight]) -> Figure:
+def plot_fleet(flights: Sequence[Trajectory]) -> Figure:
     """All vehicles of a recording: their loads' paths from above, x up, and how far each is off."""
     figure = Figure(figsize=(8.6, 4.6), layout="constrained")
     plan, distance = figure.subplots(1, 2)
@@ -379,14 +379,15 @@ def plot_fleet(flights: Sequence[Flight]) -> Figure:
     return figure
 
 
-FIGURES: dict[str, Callable[[Sequence[Flight]], Figure]] = {
+FIGURES: dict[str, Callable[[Sequence[Trajectory]], Figure]] = {
     "positions": plot_positions, "errors": plot_errors, "path": plot_path, "angles": plot_angles,
     "forces": plot_forces, "attitude": plot_attitude, "body_attitude": plot_body_attitude,
     "body_rates": plot_body_rates, "rotors": plot_rotors, "thrust": plot_thrust,
 }
 
 
-def make_figures(flights: Sequence[Flight], fleet: Sequence[Flight] = ()) -> dict[str, Figure]:
+def make_figures(flights: Sequence[Trajectory],
+                 fleet: Sequence[Trajectory] = ()) -> dict[str, Figure]:
     """All figures that these flights have data for, by name; of a `fleet` its overview first."""
     with matplotlib.rc_context(STYLE):
         figures = {"fleet": plot_fleet(fleet)} if len(fleet) > 1 else {}

@@ -1,105 +1,260 @@
-"""A flight as figures and metrics see it, whatever file it comes from.
+"""Flights that are flown in this process."""
 
-Frame W everywhere: x forward, y right, z down; SI units, radians. Arrays have a row per instant;
-what a source does not hold is NaN."""
-
-import math
-from dataclasses import dataclass, fields
+import os
+from collections.abc import Sequence
+from functools import cached_property, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from sls.columns import Columns
+from sls.core import load_core
+from sls.errors import RunError
+from sls.scenario import load_scenario
+from sls.trajectory import Stage, Trajectory, find_stages, read_body
 
-@dataclass(frozen=True)
-class Stage:
-    """The rows [first, end) in which one stage of the mission was flown."""
+if TYPE_CHECKING:
+    from _sls_core import Now, Scenario
 
-    index: int
-    name: str
-    first: int
-    end: int
-    start_s: float
-    """When the stage began: before its first row where the recorder joined later."""
-    duration_s: float = math.inf
-    """As planned, of a timed stage."""
-    lap_s: float | None = None
-    """Duration of a lap, of a figure eight."""
+    from sls.metrics import StageMetrics
+    from sls.recordings import Recording
+
+
+class Law(Protocol):
+    """A control law: what answers a force, (x, y, z) in W, N, to what is measured at a step.
+
+    It keeps nothing between calls: equal `now` give equal answers. In the first 100 steps (with
+    `check_purity` in all) each answer is computed twice, and a law that gives two different ones is
+    refused. LawFault says that there is no force to answer."""
+
+    def __call__(self, now: "Now") -> Sequence[float]:
+        ...
+
+
+class LawWithMemory(Protocol):
+    """A control law that remembers: it returns (force, memory), and gets that memory back as
+    `now.memory` at the next step; zeros at step 0. For the rest it is like Law."""
+
+    memory_size: int
+    """How many numbers, 0 to 64."""
+
+    def __call__(self, now: "Now") -> tuple[Sequence[float], Sequence[float]]:
+        ...
+
+
+class FlownVehicle:
+    """One vehicle of a flight. Arrays have a row for each step, from step 0 to the end of the
+    flight; frame W (x forward, y right, z down), SI units, radians. They are read-only views of the
+    flight's memory, which lives as long as one of them; only text columns are copies."""
+
+    def __init__(self, core: Any, index: int, scenario: "Scenario"):
+        """The `index`-th vehicle of a _sls_core.FlownFlight."""
+        self._core = core
+        self._index = index
+        self.scenario = scenario
+        self.vehicle_id: int = core.vehicle_ids[index]
+        self._cells: np.ndarray = core.rows(index)
+
+    @cached_property
+    def _places(self) -> dict[tuple[str, str], int]:
+        return {(table, name): place for table, name, place, _ in self._core.columns}
+
+    def _make_columns(self, wanted: str) -> Columns:
+        columns = {}
+        for table, name, index, kind in self._core.columns:
+            if table != wanted:
+                continue
+            cells = self._cells[:, index]
+            if kind == "double":
+                columns[name] = cells
+            elif kind == "integer":
+                columns[name] = cells.view(np.int64)
+            else:
+                texts = (load_core().FAULTS if kind == "fault"
+                         else [stage[1] for stage in self.scenario.stages])
+                columns[name] = partial(np.take, np.array(texts), cells.view(np.int64))
+        return Columns(columns)
+
+    @cached_property
+    def state(self) -> Columns:
+        """The columns of state.csv: what quadrotor and load really do."""
+        return self._make_columns("state")
+
+    @cached_property
+    def measured(self) -> Columns:
+        """Those of measured.csv: what the controller saw; the state where that is the truth."""
+        if self._core.can_measurement_differ(self._index):
+            return self._make_columns("measured")
+        return self.state
+
+    @cached_property
+    def command(self) -> Columns:
+        """Those of command.csv, but for the controller's name and its compute time."""
+        return self._make_columns("command")
+
+    @cached_property
+    def reference(self) -> Columns:
+        """Those of reference.csv: what the load is asked to do."""
+        return self._make_columns("reference")
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """A column of the state. Raises KeyError for another name."""
+        return self.state[name]
+
+    def _view(self, table: str, first: str, size: int = 3) -> np.ndarray:
+        """The column `first` and those after it, (steps, size)."""
+        index = self._places[table, first]
+        return self._cells[:, index:index + size]
 
     @property
-    def rows(self) -> slice:
-        return slice(self.first, self.end)
+    def time_s(self) -> np.ndarray:
+        """Simulated time, (steps,), s."""
+        return self.state["sim_time_s"]
+
+    @property
+    def quad_position(self) -> np.ndarray:
+        """(steps, 3), m."""
+        return self._view("state", "quad_x_m")
+
+    @property
+    def quad_velocity(self) -> np.ndarray:
+        """(steps, 3), m/s."""
+        return self._view("state", "quad_vx_m_s")
+
+    @property
+    def load_position(self) -> np.ndarray:
+        """(steps, 3), m."""
+        return self._view("state", "load_x_m")
+
+    @property
+    def load_velocity(self) -> np.ndarray:
+        """(steps, 3), m/s."""
+        return self._view("state", "load_vx_m_s")
+
+    @property
+    def alpha(self) -> np.ndarray:
+        """Angle of the rod about x, (steps,), rad."""
+        return self.state["alpha_rad"]
+
+    @property
+    def beta(self) -> np.ndarray:
+        """Angle of the rod about y, (steps,), rad."""
+        return self.state["beta_rad"]
+
+    @property
+    def applied_force(self) -> np.ndarray:
+        """Force that acted on the quadrotor over the period before each step, (steps, 3), N."""
+        return self._view("state", "force_x_n")
+
+    @property
+    def attitude(self) -> np.ndarray | None:
+        """Unit quaternions w, x, y, z, body to W, (steps, 4); None of a plant without attitude."""
+        return self._view("state", "att_w", 4) if "att_w" in self.state else None
+
+    @property
+    def body_rates(self) -> np.ndarray | None:
+        """In the body, (steps, 3), rad/s; None of a plant without attitude."""
+        return self._view("state", "rate_x_rad_s") if "rate_x_rad_s" in self.state else None
+
+    @property
+    def force(self) -> np.ndarray:
+        """Force on the quadrotor that the controller answered, (steps, 3), N."""
+        return self._view("command", "force_x_n")
+
+    @property
+    def reference_position(self) -> np.ndarray:
+        """Where the load should be, (steps, 3), m."""
+        return self._view("reference", "ref_x_m")
+
+    def calc_load_error(self) -> np.ndarray:
+        """Position of the load less its reference, (steps, 3), m."""
+        return self.load_position - self.reference_position
+
+    @cached_property
+    def trajectory(self) -> Trajectory:
+        """What figures and metrics work on."""
+        return Trajectory(
+            name=f"vehicle {self.vehicle_id}" if len(self.scenario.vehicles) > 1
+            else self.scenario.name,
+            time_s=self.time_s, p_WQ=self.quad_position, p_WL=self.load_position,
+            p_WL_ref=self.reference_position, alpha=self.alpha, beta=self.beta,
+            f_Q_W=self.force, stages=self._find_stages(), period_s=self.scenario.period_s,
+            body=read_body(self.state))
+
+    def _find_stages(self) -> tuple[Stage, ...]:
+        plans = [(for_s, lap_s) for _, _, for_s, lap_s in self.scenario.stages]
+        names = [name for _, name, _, _ in self.scenario.stages]
+        return find_stages(self.reference["stage"].astype(float), self.time_s,
+                           dict(enumerate(names)), dict(enumerate(plans)), {})
+
+    @cached_property
+    def metrics(self) -> "list[StageMetrics]":
+        """Of every stage, and after it of its laps: sls.metrics.calc_stage_metrics."""
+        from sls.metrics import calc_stage_metrics
+        return calc_stage_metrics(self.trajectory)
 
 
-@dataclass(frozen=True)
-class Body:
-    """What a plant with attitude and rotors does, beside what it was asked for."""
+class Flight(FlownVehicle):
+    """A flight. Its columns are those of its first vehicle; `vehicles` has all of them."""
 
-    q_WB: np.ndarray
-    """Attitude, (n, 4), w x y z."""
-    q_WB_set: np.ndarray
-    """Its set-point, (n, 4)."""
-    w_WB_B: np.ndarray
-    """Body rates, (n, 3), rad/s."""
-    rotor_speed: np.ndarray
-    """(n, rotors), rad/s."""
-    rotor_speed_set: np.ndarray
-    """Set-points, (n, rotors), rad/s."""
-    thrust: np.ndarray
-    """Of all rotors, (n,), N."""
-    thrust_set: np.ndarray
-    """Thrust asked for, (n,), N."""
-    rod_tension: np.ndarray
-    """(n,), N."""
+    def __init__(self, core: Any, scenario: "Scenario"):
+        super().__init__(core, 0, scenario)
+        self.vehicles: tuple[FlownVehicle, ...] = (
+            self, *(FlownVehicle(core, index, scenario)
+                    for index in range(1, len(core.vehicle_ids))))
 
-    def take(self, rows: np.ndarray) -> "Body":
-        return Body(**{field.name: getattr(self, field.name)[rows] for field in fields(self)})
+    @property
+    def failure(self) -> str:
+        """Why the flight failed, one line; empty where every mission was finished."""
+        return self._core.failure
 
+    @property
+    def is_finished(self) -> bool:
+        """Whether every vehicle has finished its mission."""
+        return not self.failure
 
-@dataclass(frozen=True)
-class Flight:
-    name: str
-    time_s: np.ndarray
-    """(n,), rising."""
-    p_WQ: np.ndarray
-    """Quadrotor position, (n, 3), m."""
-    p_WL: np.ndarray
-    """Load position, (n, 3), m."""
-    p_WL_ref: np.ndarray
-    """Where the load should be, (n, 3), m."""
-    alpha: np.ndarray
-    """Rod angle about x, (n,), rad."""
-    beta: np.ndarray
-    """Rod angle about y, (n,), rad."""
-    f_Q_W: np.ndarray
-    """Force on the quadrotor that the controller answers, (n, 3), N."""
-    stages: tuple[Stage, ...] = ()
-    period_s: float = math.nan
-    """Control period; NaN: not known."""
-    notes: tuple[str, ...] = ()
-    """What is missing, a line each."""
-    body: Body | None = None
-    """None: the source knows a point mass alone."""
+    @property
+    def last_step(self) -> int:
+        """The last one that was answered."""
+        return self._core.last_step
 
-    def calc_error(self) -> np.ndarray:
-        """Load position error, (n, 3), m."""
-        return self.p_WL - self.p_WL_ref
+    @property
+    def certificate(self) -> str:
+        """Hash of the flight, equal to that of its recording by the three programs: 64 lower-case
+        hex digits. Computed when first asked for."""
+        return self._core.certificate
 
-    def calc_attitude(self) -> np.ndarray:
-        """Roll and pitch, (n, 2), rad, that realise the force: F = -|F| R(roll, pitch, 0) e3."""
-        f_x, f_y, f_z = self.f_Q_W.T
-        thrust = np.linalg.norm(self.f_Q_W, axis=1)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            return np.column_stack([np.arcsin(f_y / thrust), np.arctan2(-f_x, -f_z)])
+    def save(self, folder: str | os.PathLike[str], *, force: bool = False) -> "Recording":
+        """Writes the recording that `./sls run --in-process` would leave, into a new or empty
+        folder; with `force`, instead of the recording that is there.
+
+        Raises ConfigError for the folder, OSError where the disk refuses."""
+        from sls.recordings import Recording
+        if not self._core.save(os.fspath(folder), force):
+            raise RunError(f"{os.fspath(folder)}: the recording is not complete")
+        return Recording(Path(folder))
+
+    def __len__(self) -> int:
+        """Steps that were answered."""
+        return len(self._cells)
+
+    def __repr__(self) -> str:
+        end = "finished" if self.is_finished else f"failed: {self.failure}"
+        return f"<sls.Flight {self.scenario.name}: {len(self)} steps, {end}>"
 
 
-def calc_roll_pitch_yaw(q_WB: np.ndarray) -> np.ndarray:
-    """Angles (n, 3), rad, of unit quaternions (n, 4): R = Rz(yaw) Ry(pitch) Rx(roll)."""
-    w, x, y, z = q_WB.T
-    return np.column_stack([np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
-                            np.arcsin(np.clip(2 * (w * y - x * z), -1, 1)),
-                            np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))])
+def fly(scenario: "Scenario | str | os.PathLike[str]",
+        controller: Law | LawWithMemory | None = None, *, vehicle: int | None = None,
+        check_purity: bool = False) -> Flight:
+    """Flies a scenario in this process, bit for bit as the three programs do in lockstep.
 
+    `scenario` may also be what load_scenario takes. `controller` flies instead of the scenario's
+    law. Of a fleet all vehicles fly, or `vehicle` alone. `check_purity` computes each answer twice.
+    Ctrl-C ends the flight with KeyboardInterrupt; other Python threads run meanwhile.
 
-def calc_rod(alpha: np.ndarray, beta: np.ndarray) -> np.ndarray:
-    """Unit vectors from quadrotor to load, (n, 3)."""
-    return np.column_stack([np.sin(beta), -np.sin(alpha) * np.cos(beta),
-                            np.cos(alpha) * np.cos(beta)])
+    A mission that fails does not raise: the flight says so in `failure`. Raises ConfigError for
+    what cannot be flown, RunError for a control law that is broken."""
+    if isinstance(scenario, (str, os.PathLike)):
+        scenario = load_scenario(scenario)
+    return Flight(load_core().fly(scenario, controller, vehicle, check_purity), scenario)

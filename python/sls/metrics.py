@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sls.flight import Flight, Stage
+from sls.trajectory import Trajectory, Stage
 
 SETTLING_BAND = 0.02
 LEAST_STEP_M = 0.01
@@ -70,7 +70,7 @@ class StageMetrics:
     step: StepMetrics | None = None
 
 
-def calc_stage_metrics(flight: Flight) -> list[StageMetrics]:
+def calc_stage_metrics(flight: Trajectory) -> list[StageMetrics]:
     """Of every stage, and after it of its laps. Rows without a reference do not count."""
     results = []
     for stage in flight.stages:
@@ -85,7 +85,7 @@ def calc_stage_metrics(flight: Flight) -> list[StageMetrics]:
     return results
 
 
-def find_rows(flight: Flight, stage: Stage) -> np.ndarray:
+def find_rows(flight: Trajectory, stage: Stage) -> np.ndarray:
     """The indices of a stage's rows that have a reference."""
     rows = np.arange(stage.first, stage.end)
     return rows[np.isfinite(flight.p_WL_ref[rows, 0])]
@@ -104,7 +104,7 @@ class Lap:
         return f"lap {self.number}" + ("" if self.is_whole else " (part)")
 
 
-def split_laps(flight: Flight, stage: Stage) -> list[Lap]:
+def split_laps(flight: Trajectory, stage: Stage) -> list[Lap]:
     """The laps there are rows of. The last row of a mission, at the very end of its last stage,
     belongs to the lap that ends there: the rule of flight.txt (recorder/flight_log.cpp)."""
     rows = find_rows(flight, stage)
@@ -121,7 +121,7 @@ def split_laps(flight: Flight, stage: Stage) -> list[Lap]:
             for begin, end in zip(begins, [*begins[1:], len(rows)]) if lap[begin] < MOST_LAPS]
 
 
-def calc_over(flight: Flight, rows: np.ndarray, label: str) -> StageMetrics:
+def calc_over(flight: Trajectory, rows: np.ndarray, label: str) -> StageMetrics:
     time_s, p_WL, reference = flight.time_s[rows], flight.p_WL[rows], flight.p_WL_ref[rows]
     error = p_WL - reference
     step = None

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from sls.csv_tables import Text, is_number, parse_rows, read_text, stack
-from sls.flight import Flight, calc_rod
+from sls.trajectory import Trajectory, calc_rod
 from sls.input_error import InputError
 
 QUADROTOR = ("quad_x", "quad_y", "quad_z")
@@ -54,7 +54,7 @@ def detect_format(text: Text, fields: list[str]) -> LogFormat:
 
 
 def load_log(path: Path, name: str, format_name: str | None = None,
-             rod_length_m: float | None = None) -> Flight:
+             rod_length_m: float | None = None) -> Trajectory:
     """Reads `path`, in the format named or, without, the one it looks like. `rod_length_m` replaces
     the format's own where that has no load position. Raises InputError."""
     text = read_text(path)
@@ -74,7 +74,7 @@ def load_log(path: Path, name: str, format_name: str | None = None,
     return make_flight(table, layout, name, rod_length_m or layout.rod_length_m)
 
 
-def make_flight(table: np.ndarray, layout: LogFormat, name: str, rod_length_m: float) -> Flight:
+def make_flight(table: np.ndarray, layout: LogFormat, name: str, rod_length_m: float) -> Trajectory:
     def vectors(columns: tuple[str, ...]) -> np.ndarray:
         if columns[0] in layout.columns:
             return stack(table, columns)
@@ -84,5 +84,5 @@ def make_flight(table: np.ndarray, layout: LogFormat, name: str, rod_length_m: f
     p_WQ = vectors(QUADROTOR)
     p_WL = vectors(LOAD) if LOAD[0] in layout.columns else p_WQ + rod_length_m * calc_rod(alpha,
                                                                                           beta)
-    return Flight(name=name, time_s=table["time"] - table["time"][0], p_WQ=p_WQ, p_WL=p_WL,
+    return Trajectory(name=name, time_s=table["time"] - table["time"][0], p_WQ=p_WQ, p_WL=p_WL,
                   p_WL_ref=vectors(REFERENCE), alpha=alpha, beta=beta, f_Q_W=vectors(FORCE))

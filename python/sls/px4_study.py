@@ -20,7 +20,7 @@ from sls.delay_formula import (HorizontalChain, Lateness, calc_error_ratio,
                                calc_stability_limit)
 from sls.figures import (REFERENCE, REFERENCE_COLOUR, add_legend, colour_of, draw, make_stack,
                          name_figure)
-from sls.flight import Flight, calc_roll_pitch_yaw
+from sls.trajectory import Trajectory, calc_roll_pitch_yaw
 from sls.input_error import InputError
 from sls.metrics import StageMetrics, calc_over, split_laps
 from sls.recordings import Recording
@@ -225,8 +225,8 @@ def fly_all(recordings: Path, say: Callable[[str], None]) -> None:
 class Flown:
     """A flight as it was, and as the controller saw it."""
 
-    true: Flight
-    seen: Flight
+    true: Trajectory
+    seen: Trajectory
 
 
 def load_flights(recordings: Path) -> dict[str, Flown]:
@@ -274,13 +274,13 @@ def find_eight(base: str) -> dict[str, Any]:
                 if "figure_eight" in stage)
 
 
-def shift_to_published(flight: Flight, base: str) -> Flight:
+def shift_to_published(flight: Trajectory, base: str) -> Trajectory:
     """The same beside the figure eight at z −0.5 that the published errors are measured from."""
     shift = np.array([0.0, 0.0, PUBLISHED_Z_M - find_eight(base)["offset_m"][2]])
     return replace(flight, p_WL_ref=flight.p_WL_ref + shift)
 
 
-def measure(flight: Flight, label: str = "") -> StageMetrics:
+def measure(flight: Trajectory, label: str = "") -> StageMetrics:
     """Of the second lap."""
     stage = next(stage for stage in flight.stages if stage.lap_s is not None)
     return calc_over(flight, split_laps(flight, stage)[1].rows, label)
@@ -325,7 +325,7 @@ class StepResponse:
     """When it first reaches 63 %."""
 
 
-def measure_step(flight: Flight, angle: int) -> StepResponse:
+def measure_step(flight: Trajectory, angle: int) -> StepResponse:
     time_s = flight.time_s - STEP_AT_S
     share = (calc_roll_pitch_yaw(flight.body.q_WB)[:, angle]
              / calc_roll_pitch_yaw(flight.body.q_WB_set)[-1, angle])
@@ -337,7 +337,7 @@ def measure_step(flight: Flight, angle: int) -> StepResponse:
 # --- pictures -------------------------------------------------------------------------------------
 
 
-def cut_eight(flight: Flight, name: str) -> Flight:
+def cut_eight(flight: Trajectory, name: str) -> Trajectory:
     """Both laps as a flight of their own, from time 0."""
     stage = next(stage for stage in flight.stages if stage.lap_s is not None)
     rows = np.arange(stage.first, stage.end)
@@ -347,7 +347,7 @@ def cut_eight(flight: Flight, name: str) -> Flight:
                    stages=(), body=None)
 
 
-def plot_plan(flights: Sequence[Flight]) -> Figure:
+def plot_plan(flights: Sequence[Trajectory]) -> Figure:
     """Loads from above, lap by lap."""
     figure = Figure(figsize=(8.6, 5.2), layout="constrained")
     laps = figure.subplots(1, 2, sharex=True, sharey=True)
@@ -367,7 +367,7 @@ def plot_plan(flights: Sequence[Flight]) -> Figure:
     return figure
 
 
-def plot_lap_errors(flights: Sequence[Flight], published: Sequence[float]) -> Figure:
+def plot_lap_errors(flights: Sequence[Trajectory], published: Sequence[float]) -> Figure:
     """Errors over both laps; on the second the published rms (shaded) and largest values."""
     figure, axes = make_stack(3, "Load position error, as the controller saw it",
                               ("x (m)", "y (m)", "z (m, about −0.5)"))
@@ -446,7 +446,7 @@ ERROR_HEADER = ("rms x", "rms y", "rms z", "max x", "max y", "max z")
 
 
 def make_ingredient_table(flown: dict[str, Flown], published: Sequence[str],
-                          pick: Callable[[Flown], Flight]) -> str:
+                          pick: Callable[[Flown], Trajectory]) -> str:
     rows = [[f"`{name}`: {adds}",
              *list_error_cells(measure(shift_to_published(pick(flown[name]), name))), prototype]
             for name, adds, prototype in INGREDIENTS]

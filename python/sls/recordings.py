@@ -1,9 +1,8 @@
 """Recordings, as the recorder leaves them: whole, cut short, or in several segments."""
 
 import json
-import math
 import os
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -11,8 +10,10 @@ from typing import Any
 import numpy as np
 import yaml
 
+from sls.columns import Columns
+from sls.core import load_core
 from sls.csv_tables import read_records, read_table, read_text, stack
-from sls.flight import Body, Flight, Stage
+from sls.trajectory import Stage, Trajectory, find_stages, read_body
 from sls.input_error import InputError
 
 COLUMNS = {
@@ -48,11 +49,78 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     return manifest
 
 
-class Recording:
-    """A recording's folder. Every member raises InputError for what it cannot read."""
+@dataclass(frozen=True)
+class Verification:
+    """What re-reading every file of a recording gives."""
 
-    def __init__(self, folder: Path):
-        self.folder = folder
+    steps: int
+    """Of the vehicle that has most."""
+    certificate: str
+    """Of the rows; empty where they cannot be read."""
+    problems: tuple[str, ...]
+    """Where a file is not what its manifest says, one line each."""
+
+    @property
+    def is_ok(self) -> bool:
+        return not self.problems
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Whether two recordings are of the same flight."""
+
+    difference: str | None
+    """The first row or field that differs: file, vehicle, step, column and both values."""
+    notes: tuple[str, ...]
+    """What differs or is missing according to the manifests; it need not make the data differ."""
+
+    @property
+    def is_equal(self) -> bool:
+        return self.difference is None
+
+
+@dataclass(frozen=True)
+class RecordedVehicle:
+    """The columns of one vehicle, read when first asked for."""
+
+    recording: "Recording"
+    vehicle_id: int
+
+    @cached_property
+    def state(self) -> Columns:
+        """Of state.csv: what quadrotor and load really do."""
+        return self._read("state.csv")
+
+    @cached_property
+    def measured(self) -> Columns:
+        """Of measured.csv: what the controller saw; the state where there is no such row."""
+        if not (self.recording.folder / "measured.csv").exists():
+            return self.state
+        measured = self._read("measured.csv")
+        return measured if len(measured["step"]) else self.state
+
+    @cached_property
+    def command(self) -> Columns:
+        """Of command.csv: what the controller answered."""
+        return self._read("command.csv")
+
+    @cached_property
+    def reference(self) -> Columns:
+        """Of reference.csv: what the load is asked to do."""
+        return self._read("reference.csv")
+
+    def _read(self, name: str) -> Columns:
+        return Columns.of_rows(self.recording.rows_of(name, self.vehicle_id))
+
+
+class Recording:
+    """A recording's folder. `state`, `measured`, `command` and `reference` are the columns of the
+    files with these names, of the first vehicle; `vehicle(ID)` has those of another one. Arrays have
+    a row for each row of the file, SI units, radians. Every member raises InputError, which is a
+    ConfigError, for what it cannot read."""
+
+    def __init__(self, folder: str | os.PathLike[str]):
+        self.folder = folder = Path(folder)
         self.segments = [(folder, read_manifest(folder))]
         while (segment := folder / f"segment-{len(self.segments) + 1}").is_dir():
             if not (segment / "manifest.json").exists():
@@ -67,6 +135,53 @@ class Recording:
     @property
     def vehicle_ids(self) -> list[int]:
         return self.segments[0][1]["vehicle_ids"]
+
+    @property
+    def certificate(self) -> str:
+        """Hash of the flight, as the manifest says; empty in an earlier version's."""
+        return str(self.manifest.get("certificate", ""))
+
+    def vehicle(self, vehicle_id: int) -> RecordedVehicle:
+        self._check_vehicle(vehicle_id)
+        return RecordedVehicle(self, vehicle_id)
+
+    @cached_property
+    def _first(self) -> RecordedVehicle:
+        return self.vehicle(self.vehicle_ids[0])
+
+    @property
+    def state(self) -> Columns:
+        return self._first.state
+
+    @property
+    def measured(self) -> Columns:
+        return self._first.measured
+
+    @property
+    def command(self) -> Columns:
+        return self._first.command
+
+    @property
+    def reference(self) -> Columns:
+        return self._first.reference
+
+    @cached_property
+    def trajectory(self) -> Trajectory:
+        """The first vehicle's flight: what figures and metrics work on."""
+        return self.load_flight(self.vehicle_ids[0], self.folder.resolve().name)
+
+    def verify(self) -> Verification:
+        """Reads every file again, as `./sls verify DIR` does. Needs the extension module.
+
+        Raises RunError for a file that is damaged beyond reading."""
+        steps, certificate, problems = load_core().inspect_recording(str(self.folder))
+        return Verification(steps, certificate, tuple(problems))
+
+    def compare(self, other: "Recording") -> Comparison:
+        """Compares the data of two recordings, as `./sls verify A B` does. Needs the extension
+        module. Raises RunError for a file that is damaged beyond reading."""
+        difference, notes = load_core().compare_recordings(str(self.folder), str(other.folder))
+        return Comparison(difference, tuple(notes))
 
     @cached_property
     def scenario_text(self) -> str:
@@ -102,8 +217,9 @@ class Recording:
             parts.append(rows)
         return np.concatenate(parts), is_cut
 
-    def _rows_of(self, name: str, vehicle_id: int) -> np.ndarray:
-        table, _ = self._tables[name]
+    def rows_of(self, name: str, vehicle_id: int) -> np.ndarray:
+        """The rows of a file of one vehicle, in all segments: a structured array."""
+        table, _ = self._tables[name] if name in COLUMNS else self._join_segments(name)
         rows = table[table["vehicle_id"] == vehicle_id]
         falling = np.flatnonzero(np.diff(rows["step"]) <= 0)
         if len(falling):
@@ -112,19 +228,17 @@ class Recording:
                              f"{at:.0f}, got {after:.0f}")
         return rows
 
-    def load_flight(self, vehicle_id: int, name: str) -> Flight:
+    def load_flight(self, vehicle_id: int, name: str) -> Trajectory:
         """The steps of one vehicle of which there is a state."""
-        if vehicle_id not in self.vehicle_ids:
-            raise InputError(f"{self.folder}: expected a vehicle of this recording "
-                             f"({describe_ids(self.vehicle_ids)}), got {vehicle_id}")
-        state = self._rows_of("state.csv", vehicle_id)
+        self._check_vehicle(vehicle_id)
+        state = self.rows_of("state.csv", vehicle_id)
         if not len(state):
             raise InputError(f"{self.folder / 'state.csv'}: expected rows of vehicle {vehicle_id}, "
                              f"got none")
-        command = self._rows_of("command.csv", vehicle_id)
-        reference = self._rows_of("reference.csv", vehicle_id)
+        command = self.rows_of("command.csv", vehicle_id)
+        reference = self.rows_of("reference.csv", vehicle_id)
         stage = align(state["step"], reference, ("stage",))[:, 0]
-        return Flight(
+        return Trajectory(
             name=name,
             time_s=state["sim_time_s"],
             p_WQ=stack(state, ("quad_x_m", "quad_y_m", "quad_z_m")),
@@ -136,49 +250,43 @@ class Recording:
             stages=self._find_stages(stage, reference, state["sim_time_s"], vehicle_id),
             period_s=self.manifest["period_s"],
             notes=self.list_notes(),
-            body=read_body(state))
+            body=read_body(Columns.of_rows(state)))
 
-    def load_seen(self, vehicle_id: int, name: str) -> Flight:
+    def _check_vehicle(self, vehicle_id: int) -> None:
+        if vehicle_id not in self.vehicle_ids:
+            raise InputError(f"{self.folder}: expected a vehicle of this recording "
+                             f"({describe_ids(self.vehicle_ids)}), got {vehicle_id}")
+
+    def load_seen(self, vehicle_id: int, name: str) -> Trajectory:
         """The same with the positions that the controller saw: what was measured."""
         flight = self.load_flight(vehicle_id, name)
         if not (self.folder / "measured.csv").exists():
             return flight  # the recorder writes that file only where it can differ
-        table, _ = self._join_segments("measured.csv")
-        rows = table[table["vehicle_id"] == vehicle_id]
-        steps = self._rows_of("state.csv", vehicle_id)["step"]
+        rows = self.rows_of("measured.csv", vehicle_id)
+        steps = self.rows_of("state.csv", vehicle_id)["step"]
         return replace(flight, p_WQ=align(steps, rows, ("quad_x_m", "quad_y_m", "quad_z_m")),
                        p_WL=align(steps, rows, ("load_x_m", "load_y_m", "load_z_m")),
                        alpha=align(steps, rows, ("alpha_rad",))[:, 0],
                        beta=align(steps, rows, ("beta_rad",))[:, 0])
 
-    def load_fleet(self) -> list[Flight]:
+    def load_fleet(self) -> list[Trajectory]:
         """Every vehicle's, named by its id."""
         return [self.load_flight(vehicle_id, str(vehicle_id)) for vehicle_id in self.vehicle_ids]
 
     def _find_stages(self, stage: np.ndarray, reference: np.ndarray, time_s: np.ndarray,
                      vehicle_id: int) -> tuple[Stage, ...]:
-        """Consecutive rows with one stage index; rows without one belong to the stage before."""
-        known = np.flatnonzero(np.isfinite(stage))
-        if not len(known):
-            return ()
-        begins = known[np.flatnonzero(np.diff(stage[known], prepend=-1.0))]
-        ends = [*begins[1:], len(stage)]
-        names = dict(zip(reference["stage"], reference["stage_name"]))
+        names = {int(index): str(name)
+                 for index, name in zip(reference["stage"], reference["stage_name"])}
         # Of stages of which the first recorded step is another one; earlier versions tell none.
         starts = {start["stage"]: start["step"] * self.manifest["period_s"]
                   for start in self.manifest.get("stage_starts", ())
                   if start["vehicle_id"] == vehicle_id}
-        stages = []
-        for first, end in zip(begins, ends):
-            index = int(stage[first])
+        plans = {}
+        for index in names:
             planned = self._find_plan(index)
             eight = planned.get("figure_eight")
-            stages.append(Stage(
-                index=index, name=str(names[index]), first=int(first), end=int(end),
-                start_s=starts.get(index, float(time_s[first])),
-                duration_s=float(planned.get("for_s", math.inf)),
-                lap_s=float(eight["period_s"]) if eight else None))
-        return tuple(stages)
+            plans[index] = planned.get("for_s"), eight["period_s"] if eight else None
+        return find_stages(stage, time_s, names, plans, starts)
 
     def _find_plan(self, stage: int) -> dict[str, Any]:
         """What the scenario says about a stage."""
@@ -226,34 +334,6 @@ class Recording:
         """The last row of status.csv; empty where there is none."""
         rows = read_records(self.segments[-1][0] / "status.csv")
         return rows[-1] if rows else {}
-
-
-def read_body(state: np.ndarray) -> Body | None:
-    """From the columns of a plant that has attitude or rotors: those that are there. At step 0 the
-    autopilot has not been asked yet."""
-    def columns(*names: str) -> np.ndarray:
-        if names and set(names) <= set(state.dtype.names):
-            return stack(state, names)
-        return np.full((len(state), len(names)), np.nan)
-
-    def asked(*names: str) -> np.ndarray:
-        return np.where(state["step"][:, np.newaxis] > 0, columns(*names), np.nan)
-
-    rotors = 0
-    while f"rotor_{rotors + 1}_rad_s" in state.dtype.names:
-        rotors += 1
-    numbers = range(1, rotors + 1)
-    body = Body(
-        q_WB=columns("att_w", "att_x", "att_y", "att_z"),
-        q_WB_set=asked("att_set_w", "att_set_x", "att_set_y", "att_set_z"),
-        w_WB_B=columns("rate_x_rad_s", "rate_y_rad_s", "rate_z_rad_s"),
-        rotor_speed=columns(*(f"rotor_{n}_rad_s" for n in numbers)),
-        rotor_speed_set=columns(*(f"rotor_{n}_set_rad_s" for n in numbers)),
-        thrust=columns("thrust_n")[:, 0],
-        thrust_set=asked("thrust_set_n")[:, 0],
-        rod_tension=columns("rod_tension_n")[:, 0])
-    is_known = any(np.any(np.isfinite(getattr(body, field.name))) for field in fields(body))
-    return body if is_known else None
 
 
 def align(steps: np.ndarray, table: np.ndarray, names: tuple[str, ...]) -> np.ndarray:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from sls.figures import make_figures, save
-from sls.flight import Flight
+from sls.trajectory import Trajectory
 from sls.metrics import StageMetrics, calc_max, calc_rms, calc_stage_metrics
 from sls.recordings import Recording, describe_ids
 from sls.tables import format_error, list_error_cells, list_step_cells
@@ -110,7 +110,7 @@ def make_section(title: str, content: str) -> str:
     return f"<section><h2>{title}</h2>{content}</section>\n"
 
 
-def make_head(recording: Recording, flight: Flight, title: str) -> str:
+def make_head(recording: Recording, flight: Trajectory, title: str) -> str:
     manifest = recording.manifest
     whole = manifest["complete"]
     notes = "".join(f"<li>{escape(note)}</li>" for note in flight.notes)
@@ -122,7 +122,7 @@ def make_head(recording: Recording, flight: Flight, title: str) -> str:
             + (f"<ul class=\"notes\">{notes}</ul>" if notes else "") + "</header>\n")
 
 
-def make_facts(recording: Recording, flight: Flight, vehicle_id: int) -> str:
+def make_facts(recording: Recording, flight: Trajectory, vehicle_id: int) -> str:
     manifest, scenario = recording.manifest, recording.scenario
     vehicle = find_vehicle(scenario, vehicle_id)
     model = scenario.get("controller", {}).get("model") or {}
@@ -198,7 +198,7 @@ def name_row(metrics: StageMetrics) -> list[str]:
     return [metrics.label, f"{metrics.from_s:g}", f"{metrics.to_s:g}"]
 
 
-def make_error_table(flight: Flight) -> str:
+def make_error_table(flight: Trajectory) -> str:
     rows = [[*name_row(metrics), *list_error_cells(metrics)]
             for metrics in calc_stage_metrics(flight)]
     if not rows:
@@ -208,7 +208,7 @@ def make_error_table(flight: Flight) -> str:
             "y right, z down). max: the largest size.</p>")
 
 
-def make_step_section(flight: Flight) -> str:
+def make_step_section(flight: Trajectory) -> str:
     rows = [[*name_row(metrics), *list_step_cells(metrics)]
             for metrics in calc_stage_metrics(flight) if metrics.step is not None]
     if not rows:
@@ -222,7 +222,7 @@ def make_step_section(flight: Flight) -> str:
         "begins less than 1 cm from its set-point.</p>")
 
 
-def make_fleet_section(fleet: Sequence[Flight]) -> str:
+def make_fleet_section(fleet: Sequence[Trajectory]) -> str:
     if len(fleet) < 2:
         return ""
     rows = ""
@@ -240,7 +240,7 @@ def make_fleet_section(fleet: Sequence[Flight]) -> str:
             + f"</tr></thead><tbody>{rows}</tbody></table></div></details></section>\n")
 
 
-def make_figure_list(flight: Flight, fleet: Sequence[Flight]) -> str:
+def make_figure_list(flight: Trajectory, fleet: Sequence[Trajectory]) -> str:
     parts = []
     with tempfile.TemporaryDirectory() as folder:
         for name, figure in make_figures([flight], fleet).items():

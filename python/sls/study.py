@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from sls import px4_study
 from sls.figures import (STYLE, add_legend, colour_of, draw, make_stack, plot_path,
                               plot_positions, save, set_log_scale)
-from sls.flight import Flight
+from sls.trajectory import Trajectory
 from sls.input_error import InputError
 from sls.metrics import StageMetrics, calc_over, calc_stage_metrics, split_laps
 from sls.published_logs import load_log
@@ -70,7 +70,7 @@ def fly_all(recordings: Path, domain: int, say: Callable[[str], None]) -> None:
     px4_study.fly_all(recordings, say)
 
 
-def load_flights(recordings: Path) -> dict[str, Flight]:
+def load_flights(recordings: Path) -> dict[str, Trajectory]:
     flights = {}
     for planned in FLIGHTS:
         recording = Recording(recordings / planned.name)
@@ -87,7 +87,7 @@ def load_flights(recordings: Path) -> dict[str, Flight]:
 # --- pictures -------------------------------------------------------------------------------------
 
 
-def cut(flight: Flight, stage_name: str, lap: int, name: str) -> Flight:
+def cut(flight: Trajectory, stage_name: str, lap: int, name: str) -> Trajectory:
     """One lap of a flight as a flight of its own, from time 0."""
     stage = next(stage for stage in flight.stages if stage.name == stage_name)
     rows = split_laps(flight, stage)[lap - 1].rows
@@ -97,7 +97,7 @@ def cut(flight: Flight, stage_name: str, lap: int, name: str) -> Flight:
                    beta=flight.beta[rows], f_Q_W=flight.f_Q_W[rows], stages=())
 
 
-def plot_error_sizes(flights: Sequence[Flight], title: str) -> Figure:
+def plot_error_sizes(flights: Sequence[Trajectory], title: str) -> Figure:
     """Sizes of the load position errors over time, logarithmic."""
     figure, axes = make_stack(3, title, ("|x| (m)", "|y| (m)", "|z| (m)"), height=1.55)
     for axis in range(3):
@@ -110,7 +110,7 @@ def plot_error_sizes(flights: Sequence[Flight], title: str) -> Figure:
     return figure
 
 
-def plot_height_error(flights: Sequence[Flight]) -> Figure:
+def plot_height_error(flights: Sequence[Trajectory]) -> Figure:
     figure, axes = make_stack(1, "Height of the load above its set-point", ("height (mm)",),
                               height=2.4)
     for index, flight in enumerate(flights):
@@ -122,7 +122,7 @@ def plot_height_error(flights: Sequence[Flight]) -> Figure:
     return figure
 
 
-def plot_set_points(flights: Sequence[Flight]) -> Figure:
+def plot_set_points(flights: Sequence[Trajectory]) -> Figure:
     """The steps of several legs, each as a share of its way, with the band of ±2 %."""
     figure, axes = make_stack(3, "Load position as a share of the step; shaded: ±2 %",
                               ("x / step", "y / step", "z / step"), height=1.55)
@@ -139,7 +139,7 @@ def plot_set_points(flights: Sequence[Flight]) -> Figure:
     return figure
 
 
-def draw_pictures(flights: dict[str, Flight]) -> dict[str, Figure]:
+def draw_pictures(flights: dict[str, Trajectory]) -> dict[str, Figure]:
     """By the names of their files."""
     wirings = [cut(flights[name], "figure_eight", 2, label) for name, label in (
         ("gazebo_legacy", "published wiring"), ("gazebo_correct_wiring", "correct wiring"),
@@ -168,7 +168,7 @@ def draw_pictures(flights: dict[str, Flight]) -> dict[str, Figure]:
 # --- the page -------------------------------------------------------------------------------------
 
 
-def measure_lap_2(flight: Flight, label: str) -> StageMetrics:
+def measure_lap_2(flight: Trajectory, label: str) -> StageMetrics:
     """Of the figure eight of a mission."""
     stage = next(stage for stage in flight.stages if stage.lap_s is not None)
     return calc_over(flight, split_laps(flight, stage)[1].rows, label)
@@ -178,7 +178,7 @@ def make_lap_row(metrics: StageMetrics) -> list[str]:
     return [metrics.label, *list_error_cells(metrics)[:5]]
 
 
-def measure_about(flight: Flight, z_offset_m: float, label: str) -> StageMetrics:
+def measure_about(flight: Trajectory, z_offset_m: float, label: str) -> StageMetrics:
     """As `measure_lap_2`, about a figure eight that is shifted by `z_offset_m`."""
     shifted = replace(flight, p_WL_ref=flight.p_WL_ref + np.array([0.0, 0.0, z_offset_m]))
     return measure_lap_2(shifted, label)
@@ -189,7 +189,7 @@ STEP_HEADER = ("flight", "settling x s", "y", "z", "overshoot x %", "y", "z",
                "steady-state error x m", "y", "z")
 
 
-def make_lap_table(flights: dict[str, Flight]) -> str:
+def make_lap_table(flights: dict[str, Trajectory]) -> str:
     ours = [
         measure_lap_2(flights["figure_eight"], "`figure_eight`, hold of 4 ms"),
         measure_lap_2(flights["figure_eight_1ms"], "`figure_eight`, hold of 1 ms"),
@@ -205,7 +205,7 @@ def make_lap_table(flights: dict[str, Flight]) -> str:
     return make_markdown_table(LAP_HEADER, [*rows, *map(make_lap_row, ours)])
 
 
-def make_step_table(flights: Sequence[Flight]) -> str:
+def make_step_table(flights: Sequence[Trajectory]) -> str:
     rows = []
     for flight in flights:
         for metrics in calc_stage_metrics(flight):
@@ -214,14 +214,14 @@ def make_step_table(flights: Sequence[Flight]) -> str:
     return make_markdown_table(STEP_HEADER, rows)
 
 
-def make_drag_table(flights: dict[str, Flight]) -> str:
+def make_drag_table(flights: dict[str, Trajectory]) -> str:
     return make_markdown_table(LAP_HEADER, [
         make_lap_row(measure_lap_2(flights["rotor_drag"], "`rotor_drag`: with feed-forward")),
         make_lap_row(measure_lap_2(flights["rotor_drag_without_feed_forward"],
                                    "`rotor_drag_without_feed_forward`"))])
 
 
-def describe_gain(flights: dict[str, Flight], worse: str, better: str, axes: str,
+def describe_gain(flights: dict[str, Trajectory], worse: str, better: str, axes: str,
                   digits: int) -> str:
     """How many times smaller the rms of `better` is on the second lap: "118 (x) and 48 (y)"."""
     ratios = measure_lap_2(flights[worse], "").rms_m / measure_lap_2(flights[better], "").rms_m
@@ -229,14 +229,14 @@ def describe_gain(flights: dict[str, Flight], worse: str, better: str, axes: str
     return f"{', '.join(most)} and {last}"
 
 
-def calc_distance(flight: Flight, published: Flight) -> float:
+def calc_distance(flight: Trajectory, published: Trajectory) -> float:
     """Largest distance per axis, of quadrotor and load, at the instants published, m."""
     step = np.searchsorted(flight.time_s, published.time_s - 1e-6)
     return float(max(np.max(np.abs(flight.p_WQ[step] - published.p_WQ)),
                      np.max(np.abs(flight.p_WL[step] - published.p_WL))))
 
 
-def make_published_note(flights: dict[str, Flight], published: Path | None) -> str:
+def make_published_note(flights: dict[str, Trajectory], published: Path | None) -> str:
     if published is None:
         return ("`./sls study --published DIR` adds how far `matlab_setpoint_1` is from the "
                 "published run, where somebody has its file.")
@@ -249,7 +249,7 @@ def make_published_note(flights: dict[str, Flight], published: Path | None) -> s
 PUBLISHED_PX4 = PUBLISHED_LAP_2[-1][1:]
 
 
-def make_page(flights: dict[str, Flight], px4_values: dict[str, str],
+def make_page(flights: dict[str, Trajectory], px4_values: dict[str, str],
               published: Path | None) -> str:
     """study_page.md with the numbers and tables that belong there."""
     def describe_height(name: str, digits: int) -> str:

@@ -7,7 +7,7 @@ import support
 import numpy as np
 
 from sls import metrics
-from sls.flight import Flight, Stage
+from sls.trajectory import Trajectory, Stage
 from sls.published_logs import calc_rod
 
 PERIOD_S = 1e-3
@@ -15,7 +15,7 @@ PERIOD_S = 1e-3
 
 def make_flight(time_s, p_WL, reference, stages):
     nothing = np.full(len(time_s), np.nan)
-    return Flight("flight", time_s, p_WL, p_WL, reference, nothing, nothing,
+    return Trajectory("flight", time_s, p_WL, p_WL, reference, nothing, nothing,
                   np.full((len(time_s), 3), np.nan), stages, period_s=time_s[1] - time_s[0])
 
 
@@ -172,7 +172,7 @@ class StageMetricsTest(unittest.TestCase):
     def test_the_commanded_attitude_realises_the_force(self):
         force = np.random.default_rng(1).normal(size=(50, 3)) + [0, 0, -12]
         nothing = np.zeros((50, 3))
-        flight = Flight("f", np.arange(50.0), nothing, nothing, nothing, nothing[:, 0],
+        flight = Trajectory("f", np.arange(50.0), nothing, nothing, nothing, nothing[:, 0],
                         nothing[:, 0], force)
         for f_Q_W, (roll, pitch) in zip(force, flight.calc_attitude()):
             about_x = np.array([[1, 0, 0], [0, math.cos(roll), -math.sin(roll)],

@@ -8,7 +8,7 @@ import support
 import numpy as np
 
 from sls.figures import make_figures
-from sls.flight import calc_roll_pitch_yaw
+from sls.trajectory import calc_roll_pitch_yaw
 from sls.input_error import InputError
 from sls.metrics import calc_stage_metrics
 from sls.recordings import Recording

@@ -6,6 +6,8 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from sls.core import load_core
+
 # Flags of /proc/cpuinfo that each level of the x86-64 psABI adds. The mathematical library chooses
 # its sin and cos by them, so that equal bits are promised for one level only.
 LEVEL_FLAGS = (
@@ -59,8 +61,7 @@ def describe_machine() -> dict[str, str]:
 
 
 def describe_core() -> str:
-    import _sls_core
-    return hashlib.sha256(Path(_sls_core.__file__).read_bytes()).hexdigest()[:16]
+    return hashlib.sha256(Path(str(load_core().__file__)).read_bytes()).hexdigest()[:16]
 
 
 def host_name() -> str:

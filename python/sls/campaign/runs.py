@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from sls.campaign.campaign import Campaign
 from sls.campaign.sampling import is_certified, make_values, to_yaml_value
+from sls.core import load_core
 from sls.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
     from sls.campaign.own_measures import OwnMeasures
 
 BLOCK = 1000  # runs whose values are held at once
-MOST_CHECKED = 100_000  # runs whose values are looked through before the first is flown
 
 
 @dataclass(frozen=True)
@@ -89,9 +89,8 @@ def fly_whole(campaign: Campaign, runs: "Runs", values: list[Any]) -> "Flight":
 
 def fly_text(scenario_text: str, campaign: Campaign) -> "Flight":
     """Flies a scenario whose paths are relative to the base scenario's folder."""
-    import _sls_core
     import sls
-    return sls.fly(_sls_core.Scenario(None, scenario_text, str(campaign.base.parent), {}))
+    return sls.fly(load_core().Scenario(None, scenario_text, str(campaign.base.parent), {}))
 
 
 def list_values(campaign: Campaign, first: int, last: int) -> Iterator[tuple[int, list[Any]]]:
@@ -99,30 +98,6 @@ def list_values(campaign: Campaign, first: int, last: int) -> Iterator[tuple[int
     for begin in range(first, last + 1, BLOCK):
         block = make_values(campaign, begin, min(begin + BLOCK - 1, last))
         yield from enumerate(block, begin)
-
-
-def check_values(campaign: Campaign, runs: "Runs", first: int, last: int) -> None:
-    """Reads the scenarios that are most likely refused: the first and the last run, and of each
-    varied key those with its least and greatest number and with each of its texts, of up to
-    MOST_CHECKED runs. Raises RefusedRun. A run that is refused all the same ends the campaign when it is flown."""
-    chosen = dict[Any, tuple[int, list[Any]]]()
-    last_looked_at = min(last, first + MOST_CHECKED - 1)
-    for index, values in list_values(campaign, first, last_looked_at):
-        for column, value in enumerate(values):
-            if isinstance(value, (int, float)) and not isinstance(value, bool):
-                for sign in (-1, 1):
-                    best = chosen.get((column, sign))
-                    if best is None or sign * value > sign * best[1][column]:
-                        chosen[column, sign] = index, values
-            elif len(chosen) < BLOCK:
-                chosen.setdefault((column, str(value)), (index, values))
-        if index in (first, last_looked_at):
-            chosen["end", index] = index, values
-    for index, values in sorted(chosen.values(), key=lambda item: item[0]):
-        try:
-            runs.check(list_yaml_values(campaign, values))
-        except ConfigError as error:
-            raise RefusedRun(f"run {index}: {error}") from None
 
 
 Announce = Callable[[int], None]

@@ -58,6 +58,7 @@ class Work:
 
     waiting: deque[int]
     tries: dict[int, int] = field(default_factory=dict)
+    failed_starts: int = 0  # in a row
     given_up: list[str] = field(default_factory=list)
 
 
@@ -152,6 +153,7 @@ def hear(worker: Worker, message: dict, work: Work, progress: Progress) -> None:
         raise (InputError if message["code"] == 2 else EngineError)(message["error"])
     if "ready" in message:
         worker.is_ready = True
+        work.failed_starts = 0
     elif "run" in message:
         worker.run = message["run"]
     else:
@@ -174,7 +176,10 @@ def note_end(worker: Worker, work: Work, folder: CampaignFolder) -> bool:
     end = worker.describe_end()
     chunk = worker.chunk
     if not worker.is_ready:
-        raise EngineError(f"local: a worker process {end} before its first run")
+        work.failed_starts += 1
+        if work.failed_starts >= MOST_TRIES:
+            raise EngineError(f"local: a worker process {end} before its first run; tried "
+                              f"{MOST_TRIES} times")
     if chunk is None:
         return bool(work.waiting)
     work.tries[chunk] = work.tries.get(chunk, 0) + 1

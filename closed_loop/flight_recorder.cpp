@@ -1,0 +1,67 @@
+#include "closed_loop/flight_recorder.hpp"
+
+#include "closed_loop/record_entries.hpp"
+#include "recorder/recording_folder.hpp"
+
+namespace sls::closed_loop {
+namespace {
+
+const std::filesystem::path& make_ready(const std::filesystem::path& folder, bool force) {
+  record::prepare_recording_folder(folder, force);
+  return folder;
+}
+
+}  // namespace
+
+FlightRecorder::FlightRecorder(const std::filesystem::path& folder, bool force,
+                               const Parameters& parameters, const config::Sync& sync,
+                               const std::string& controller_name)
+    : controller_name_(controller_name),
+      recording_(make_ready(folder, force), parameters),
+      board_([this](const SimStatus& status) { recording_.add(status); }, parameters.run_id(),
+             parameters.vehicles().front().vehicle_id(), sync, [] { return SyncCounters(); }) {
+  for (const VehicleParameters& vehicle : parameters.vehicles())
+    ids_.push_back(vehicle.vehicle_id());
+  board_.controller_name = controller_name;
+  board_.start_clock();
+  board_.publish(PHASE_RUNNING, "");
+  batch_.run_id(parameters.run_id());
+}
+
+void FlightRecorder::hand_on() {
+  recording_.add(batch_);
+  batch_.batch_index(batch_.batch_index() + 1);
+  batch_.entries().clear();
+}
+
+void FlightRecorder::add(const std::vector<FlownStep>& steps, std::optional<std::size_t> refused) {
+  for (std::size_t i = 0; i < ids_.size(); ++i) {
+    batch_.entries().push_back(make_entry(ids_[i], steps[i], controller_name_, refused == i));
+    if (batch_.entries().size() == BATCH_ENTRIES) hand_on();
+  }
+  board_.step = steps.front().step;
+  if (board_.step > 0)
+    for (std::size_t i = 0; i < ids_.size(); ++i) board_.timing.add(FORCE_ANSWERED, 0);
+  if (board_.is_due()) board_.publish(PHASE_RUNNING, "");
+  recording_.flush_if_due();
+}
+
+void FlightRecorder::announce(const std::vector<std::string>& remarks) {
+  for (const std::string& remark : remarks) board_.announce(remark);
+}
+
+bool FlightRecorder::finish(const std::string& failure) {
+  batch_.is_last(true);
+  hand_on();
+  board_.publish(failure.empty() ? PHASE_FINISHED : PHASE_FAILED,
+                 failure.empty() ? "mission finished" : failure);
+  return recording_.finish("", 0);
+}
+
+void FlightRecorder::interrupt(const std::string& reason) {
+  batch_.is_last(true);
+  hand_on();
+  recording_.finish(reason, 0);
+}
+
+}  // namespace sls::closed_loop

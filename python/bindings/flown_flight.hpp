@@ -1,0 +1,88 @@
+/// A flight in this process that is kept: the columns of its recording, in memory.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "closed_loop/flight.hpp"
+#include "closed_loop/flight_recorder.hpp"
+#include "common/bus/topics.hpp"
+#include "common/config/scenario.hpp"
+#include "python/bindings/row_buffer.hpp"
+
+namespace sls::python {
+
+/// Where a column of a recording's file is in the rows.
+struct ColumnPlace {
+  enum class Kind { kDouble, kInteger, kFault, kStageName };  ///< the latter two: integers, codes
+
+  std::string table;  ///< "state", "measured", "command" or "reference"
+  std::string name;   ///< as in the file
+  std::size_t index;  ///< of its cell in a row
+  Kind kind = Kind::kDouble;
+};
+
+class FlownFlight {
+ public:
+  /// Flies `ids` (ascending) of `scenario` to the end. `rest` is called now and then, and may throw
+  /// to end the flight.
+  /// @throws config::ConfigError as Flight does.
+  /// @throws app::RunError where a control law is broken.
+  FlownFlight(const config::Scenario& scenario, const std::vector<std::uint32_t>& ids,
+              const closed_loop::FlightOptions& options, const std::function<void()>& rest);
+
+  const std::vector<std::uint32_t>& ids() const { return ids_; }
+  const std::vector<ColumnPlace>& columns() const { return columns_; }
+  /// The rows of the `index`th vehicle.
+  const RowBuffer& rows(std::size_t index) const { return rows_[index]; }
+
+  /// Empty where every mission was finished.
+  const std::string& failure() const { return failure_; }
+  /// Whether what is measured of the `index`th vehicle can differ from the truth.
+  bool can_measurement_differ(std::size_t index) const { return differs_[index]; }
+  /// The last one of which there are rows.
+  std::uint64_t last_step() const { return rows_.front().rows() - 1; }
+
+  /// That of the flight's recording. The first call hashes all rows; any thread may ask.
+  const std::string& calc_certificate() const;
+
+  /// Writes the recording into `folder` as `closed_loop::fly_recorded` does. False where it is not
+  /// complete.
+  bool save(const std::filesystem::path& folder, bool force) const;
+
+ private:
+  struct Remarks {
+    std::size_t row;  // before which they were made
+    std::vector<std::string> texts;
+  };
+
+  void list_columns(const closed_loop::Flight& flight);
+  void keep(const closed_loop::FlownStep& flown, std::size_t index);
+  void keep_remarks(closed_loop::Flight& flight);
+  /// Step `row` of the `index`th vehicle as it was flown, but for the numbers of the law's memory,
+  /// which no file holds.
+  closed_loop::FlownStep make_step(std::size_t index, std::size_t row) const;
+
+  const config::Scenario scenario_;
+  const std::vector<std::uint32_t> ids_;
+  const std::string controller_name_;
+  Parameters parameters_;
+  bool has_attitude_ = false;
+  std::vector<bool> differs_;  // by vehicle: whether what is measured can differ from the truth
+  bool has_measured_ = false;  // of one at least: all rows are alike
+  std::size_t signals_ = 0;
+  std::vector<ColumnPlace> columns_;
+  std::vector<RowBuffer> rows_;
+  std::vector<Remarks> remarks_;
+  std::optional<std::size_t> refused_;
+  std::string failure_;
+  mutable std::once_flag is_certified_;
+  mutable std::string certificate_;
+};
+
+}  // namespace sls::python

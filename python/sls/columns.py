@@ -1,0 +1,47 @@
+"""The columns of a recording's file, by the names that they have there."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+
+import numpy as np
+
+INTEGERS = ("vehicle_id", "step", "stage")
+
+
+class Columns(Mapping[str, np.ndarray]):
+    """A mapping from the names of columns to arrays (rows,), in the order of the file. Numbers are
+    float64; `vehicle_id`, `step` and `stage` int64; `fault` and `stage_name` text."""
+
+    def __init__(self, columns: Mapping[str, np.ndarray | Callable[[], np.ndarray]]):
+        """A column that is a function is called when the column is first asked for."""
+        self._columns = dict(columns)
+
+    @classmethod
+    def of_rows(cls, rows: np.ndarray) -> "Columns":
+        """Of a structured array, whose numbers are all float64."""
+        return cls({name: rows[name].astype(np.int64) if name in INTEGERS else rows[name]
+                    for name in rows.dtype.names or ()})
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """Raises KeyError, with the names that there are, for another one."""
+        if name not in self._columns:
+            raise KeyError(f"expected a column, one of {', '.join(self._columns)}; got {name!r}")
+        column = self._columns[name]
+        if not isinstance(column, np.ndarray):
+            column = self._columns[name] = column()
+        return column
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._columns)
+
+    def __len__(self) -> int:
+        return len(self._columns)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._columns
+
+    def __repr__(self) -> str:
+        return f"Columns({', '.join(self._columns)})"
+
+    def stack(self, names: Sequence[str]) -> np.ndarray:
+        """The columns `names` side by side, (rows, len(names)): a copy."""
+        return np.column_stack([self[name] for name in names])

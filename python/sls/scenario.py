@@ -1,0 +1,45 @@
+"""Scenarios from files, with some values replaced."""
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from sls.core import load_core
+from sls.errors import ConfigError
+from sls.yaml_values import to_yaml
+
+if TYPE_CHECKING:
+    from _sls_core import Scenario
+
+SHIPPED = Path(__file__).resolve().parents[2] / "config/scenarios"
+
+
+def find_scenario(path_or_name: str | os.PathLike[str]) -> Path:
+    """The file of a scenario: a name means SHIPPED/NAME.yaml, as for `./sls run`."""
+    text = os.fspath(path_or_name)
+    is_path = not isinstance(path_or_name, str) or "/" in text or text.endswith(".yaml")
+    if is_path or Path(text).is_file():
+        return Path(text)
+    return SHIPPED / f"{text}.yaml"
+
+
+def load_scenario(path_or_name: str | os.PathLike[str], *,
+                  changes: Mapping[str, object] | None = None, **keys: object) -> "Scenario":
+    """Reads a scenario, with values replaced where asked for.
+
+    `changes` names keys by path: keys and, of a list, indices from 0, separated by dots, such as
+    `{"vehicle.load_mass_kg": 0.3, "faults.0.delay.by_s": 0.008}`. A keyword does the same with two
+    underscores for a dot: `vehicle__load_mass_kg=0.3`. Values are numbers, texts, bools, lists and
+    maps, in the units of the file. A key that the file leaves out is added. Without changes the
+    scenario's text is the file's, to the byte.
+
+    Raises ConfigError, with file, line and key, for what the programs refuse."""
+    replaced: dict[str, str] = {}
+    named = {key.replace("__", "."): value for key, value in keys.items()}
+    for path, value in {**(changes or {}), **named}.items():
+        try:
+            replaced[path] = to_yaml(value)
+        except (TypeError, ValueError) as error:
+            raise ConfigError(f"{path_or_name}: {path}: {error}") from None
+    return load_core().Scenario(file=str(find_scenario(path_or_name)), changes=replaced)

@@ -1,0 +1,158 @@
+"""A flight as figures and metrics see it, whatever file it comes from.
+
+Frame W everywhere: x forward, y right, z down; SI units, radians. Arrays have a row per instant;
+what a source does not hold is NaN."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from sls.columns import Columns
+
+
+@dataclass(frozen=True)
+class Stage:
+    """The rows [first, end) in which one stage of the mission was flown."""
+
+    index: int
+    name: str
+    first: int
+    end: int
+    start_s: float
+    """When the stage began: before its first row where the recorder joined later."""
+    duration_s: float = math.inf
+    """As planned, of a timed stage."""
+    lap_s: float | None = None
+    """Duration of a lap, of a figure eight."""
+
+    @property
+    def rows(self) -> slice:
+        return slice(self.first, self.end)
+
+
+@dataclass(frozen=True)
+class Body:
+    """What a plant with attitude and rotors does, beside what it was asked for."""
+
+    q_WB: np.ndarray
+    """Attitude, (n, 4), w x y z."""
+    q_WB_set: np.ndarray
+    """Its set-point, (n, 4)."""
+    w_WB_B: np.ndarray
+    """Body rates, (n, 3), rad/s."""
+    rotor_speed: np.ndarray
+    """(n, rotors), rad/s."""
+    rotor_speed_set: np.ndarray
+    """Set-points, (n, rotors), rad/s."""
+    thrust: np.ndarray
+    """Of all rotors, (n,), N."""
+    thrust_set: np.ndarray
+    """Thrust asked for, (n,), N."""
+    rod_tension: np.ndarray
+    """(n,), N."""
+
+    def take(self, rows: np.ndarray) -> "Body":
+        return Body(**{field.name: getattr(self, field.name)[rows] for field in fields(self)})
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    name: str
+    time_s: np.ndarray
+    """(n,), rising."""
+    p_WQ: np.ndarray
+    """Quadrotor position, (n, 3), m."""
+    p_WL: np.ndarray
+    """Load position, (n, 3), m."""
+    p_WL_ref: np.ndarray
+    """Where the load should be, (n, 3), m."""
+    alpha: np.ndarray
+    """Rod angle about x, (n,), rad."""
+    beta: np.ndarray
+    """Rod angle about y, (n,), rad."""
+    f_Q_W: np.ndarray
+    """Force on the quadrotor that the controller answers, (n, 3), N."""
+    stages: tuple[Stage, ...] = ()
+    period_s: float = math.nan
+    """Control period; NaN: not known."""
+    notes: tuple[str, ...] = ()
+    """What is missing, a line each."""
+    body: Body | None = None
+    """None: the source knows a point mass alone."""
+
+    def calc_error(self) -> np.ndarray:
+        """Load position error, (n, 3), m."""
+        return self.p_WL - self.p_WL_ref
+
+    def calc_attitude(self) -> np.ndarray:
+        """Roll and pitch, (n, 2), rad, that realise the force: F = -|F| R(roll, pitch, 0) e3."""
+        f_x, f_y, f_z = self.f_Q_W.T
+        thrust = np.linalg.norm(self.f_Q_W, axis=1)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.column_stack([np.arcsin(f_y / thrust), np.arctan2(-f_x, -f_z)])
+
+
+def calc_roll_pitch_yaw(q_WB: np.ndarray) -> np.ndarray:
+    """Angles (n, 3), rad, of unit quaternions (n, 4): R = Rz(yaw) Ry(pitch) Rx(roll)."""
+    w, x, y, z = q_WB.T
+    return np.column_stack([np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
+                            np.arcsin(np.clip(2 * (w * y - x * z), -1, 1)),
+                            np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))])
+
+
+def calc_rod(alpha: np.ndarray, beta: np.ndarray) -> np.ndarray:
+    """Unit vectors from quadrotor to load, (n, 3)."""
+    return np.column_stack([np.sin(beta), -np.sin(alpha) * np.cos(beta),
+                            np.cos(alpha) * np.cos(beta)])
+
+
+def read_body(state: Columns) -> Body | None:
+    """From the columns of a plant that has attitude or rotors: those that are there. At step 0 the
+    autopilot has not been asked yet."""
+    def columns(*names: str) -> np.ndarray:
+        if names and set(names) <= set(state):
+            return state.stack(names)
+        return np.full((len(state["step"]), len(names)), np.nan)
+
+    def asked(*names: str) -> np.ndarray:
+        return np.where(state["step"][:, np.newaxis] > 0, columns(*names), np.nan)
+
+    rotors = 0
+    while f"rotor_{rotors + 1}_rad_s" in state:
+        rotors += 1
+    numbers = range(1, rotors + 1)
+    body = Body(
+        q_WB=columns("att_w", "att_x", "att_y", "att_z"),
+        q_WB_set=asked("att_set_w", "att_set_x", "att_set_y", "att_set_z"),
+        w_WB_B=columns("rate_x_rad_s", "rate_y_rad_s", "rate_z_rad_s"),
+        rotor_speed=columns(*(f"rotor_{n}_rad_s" for n in numbers)),
+        rotor_speed_set=columns(*(f"rotor_{n}_set_rad_s" for n in numbers)),
+        thrust=columns("thrust_n")[:, 0],
+        thrust_set=asked("thrust_set_n")[:, 0],
+        rod_tension=columns("rod_tension_n")[:, 0])
+    is_known = any(np.any(np.isfinite(getattr(body, field.name))) for field in fields(body))
+    return body if is_known else None
+
+
+def find_stages(stage: np.ndarray, time_s: np.ndarray, names: Mapping[int, str],
+                plans: Mapping[int, tuple[float | None, float | None]],
+                starts_s: Mapping[int, float]) -> tuple[Stage, ...]:
+    """Consecutive rows with one stage index, (n,), in `stage`; rows without one, NaN, belong to the
+    stage before. By index: the stages' names, what is planned (duration, lap, s) and, where it is
+    not at the first row, the start."""
+    known = np.flatnonzero(np.isfinite(stage))
+    if not len(known):
+        return ()
+    begins = known[np.flatnonzero(np.diff(stage[known], prepend=-1.0))]
+    stages = []
+    for first, end in zip(begins, [*begins[1:], len(stage)]):
+        index = int(stage[first])
+        duration_s, lap_s = plans.get(index, (None, None))
+        stages.append(Stage(
+            index=index, name=names[index], first=int(first), end=int(end),
+            start_s=starts_s.get(index, float(time_s[first])),
+            duration_s=math.inf if duration_s is None else float(duration_s),
+            lap_s=None if lap_s is None else float(lap_s)))
+    return tuple(stages)

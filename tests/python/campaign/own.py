@@ -1,0 +1,5 @@
+"""A measure of the user, for the tests."""
+
+
+def peak(flight):
+    return 1.0

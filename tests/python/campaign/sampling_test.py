@@ -1,0 +1,417 @@
+"""The values of runs: distributions against closed forms, the generator against its definition, and
+that run i has the same values whatever else is asked for."""
+
+import hashlib
+import itertools
+import math
+import random
+import struct
+import tracemalloc
+
+import campaign_support as support
+import numpy as np
+import pytest
+import yaml
+
+from sls.campaign.sampling import choose_runs, is_certified, make_values, to_yaml_value
+from sls.campaign.yaml_nodes import parse_yaml
+from sls.input_error import InputError
+
+DRAWS = 20_000
+# A Kolmogorov-Smirnov distance of n true samples is above 1.95 / √n once in a thousand times
+# (Kolmogorov's distribution); the seeds are fixed, so these tests pass always or never.
+LARGEST_DISTANCE = 1.95 / math.sqrt(DRAWS)
+EVERYTHING = """
+  _uniform: { uniform: [-1, 3], seed: 1 }
+  _normal: { normal: [0.2, 0.02], seed: 1 }
+  _cut: { normal: [0.2, 0.1], within: [0.1, 0.5], seed: 1 }
+  _log: { log_uniform: [0.01, 100], seed: 1 }
+  _latin: { latin_hypercube: [2, 5], seed: 1 }
+  _latin_normal: { latin_hypercube: { normal: [1, 2] }, seed: 1 }
+  _sobol: { sobol: [0, 1], seed: 1 }
+  _sobol_log: { sobol: { log_uniform: [1, 10] }, seed: 1 }
+  _derived: { derived: "_uniform * 2 + max(_normal, 0)" }
+  vehicle.load_mass_kg: { derived: 1.1 * vehicle.quad_mass_kg }
+  faults.2.delay.by_s: { uniform: [0, 0.08], multiple_of: 0.004, seed: 1 }
+seeds: [faults.0.noise.seed, faults.1.noise.seed]
+"""
+
+
+def make(folder, vary, runs=DRAWS):
+    head = "" if runs is None else f"runs: {runs}\n"
+    return support.make_campaign(folder, f"{head}vary:\n{vary}\n")
+
+
+def draw(folder, spec, runs=DRAWS, path="_x"):
+    campaign = make(folder, f"  {path}: {{ {spec} }}", runs)
+    return np.array([row[0] for row in make_values(campaign, 0, runs - 1)])
+
+
+def calc_phi(x):
+    return (1 + math.erf(x / math.sqrt(2))) / 2
+
+
+def calc_distance(samples, calc_cdf):
+    """Kolmogorov-Smirnov: largest distance between the samples' distribution and the exact one."""
+    exact = np.array([calc_cdf(x) for x in np.sort(samples)])
+    steps = np.arange(len(samples) + 1) / len(samples)
+    return max(np.max(exact - steps[:-1]), np.max(steps[1:] - exact))
+
+
+def calc_cut_cdf(x):
+    below, above = calc_phi((0.1 - 0.2) / 0.1), calc_phi((0.5 - 0.2) / 0.1)
+    return (calc_phi((x - 0.2) / 0.1) - below) / (above - below)
+
+
+# --- Distributions -------------------------------------------------------------------------------
+
+CDFS = {
+    "uniform: [-1, 3]": lambda x: (x + 1) / 4,
+    "normal: [0.2, 0.02]": lambda x: calc_phi((x - 0.2) / 0.02),
+    "normal: [0.2, 0.1], within: [0.1, 0.5]": calc_cut_cdf,
+    "normal: [0, 1], within: [9, 10]": lambda x: 1 - (
+        (math.erfc(x / math.sqrt(2)) - math.erfc(10 / math.sqrt(2)))
+        / (math.erfc(9 / math.sqrt(2)) - math.erfc(10 / math.sqrt(2)))),
+    "normal: [0, 1], within: [-10, -1]": lambda x: calc_phi(x) / calc_phi(-1),
+    "log_uniform: [0.01, 100]": lambda x: math.log(x / 0.01) / math.log(1e4),
+    "latin_hypercube: [2, 5]": lambda x: (x - 2) / 3,
+    "latin_hypercube: { normal: [1, 2] }": lambda x: calc_phi((x - 1) / 2),
+    "sobol: [0, 1]": lambda x: x,
+    "sobol: { log_uniform: [1, 10] }": math.log10,
+}
+
+
+@pytest.mark.parametrize("spec", CDFS)
+@pytest.mark.parametrize("seed", [0, 7])
+def test_has_the_distribution_of_its_closed_form(tmp_path, spec, seed):
+    assert calc_distance(draw(tmp_path, f"{spec}, seed: {seed}"), CDFS[spec]) < LARGEST_DISTANCE
+
+
+def test_the_distance_tells_distributions_apart(tmp_path):
+    samples = draw(tmp_path, "uniform: [-1, 3]")
+    assert calc_distance(samples, lambda x: (x + 1) / 4.2) > LARGEST_DISTANCE
+
+
+@pytest.mark.parametrize("spec, mean, deviation", [
+    ("uniform: [-1, 3]", 1.0, 4 / math.sqrt(12)),
+    ("normal: [0.2, 0.02]", 0.2, 0.02),
+    ("log_uniform: [1, 10]", 9 / math.log(10),
+     math.sqrt(99 / (2 * math.log(10)) - (9 / math.log(10)) ** 2)),
+])
+def test_has_the_moments_of_its_closed_form(tmp_path, spec, mean, deviation):
+    samples = draw(tmp_path, spec)
+    error = deviation / math.sqrt(DRAWS)  # of the mean
+    assert abs(samples.mean() - mean) < 4 * error
+    # The variance of the sample deviation is below 1/n times the variance for all three.
+    assert abs(samples.std() - deviation) < 4 * error
+
+
+@pytest.mark.parametrize("spec, least, most", [
+    ("uniform: [0.1, 0.3]", 0.1, 0.3),
+    ("normal: [0.2, 10], within: [0.1, 0.3]", 0.1, 0.3),
+    ("normal: [0, 1], within: [9, 10]", 9, 10),
+    ("normal: [0, 1], within: [90, 100]", 90, 100),
+    ("log_uniform: [0.1, 0.3]", 0.1, 0.3),
+    ("sobol: [0.1, 0.3]", 0.1, 0.3),
+    ("latin_hypercube: [0.1, 0.3]", 0.1, 0.3),
+    ("uniform: [0.1, 0.1000000000000001]", 0.1, 0.1000000000000001),
+])
+def test_stays_within_its_bounds(tmp_path, spec, least, most):
+    samples = draw(tmp_path, spec, 2000)
+    assert samples.min() >= least
+    assert samples.max() <= most
+
+
+def test_different_keys_and_seeds_are_independent(tmp_path):
+    columns = [draw(tmp_path, f"{kind}: [0, 1], seed: {seed}", path=path)
+               for kind in ("uniform", "latin_hypercube") for seed in (0, 1)
+               for path in ("_x", "_y")]
+    for a, b in itertools.combinations(columns, 2):
+        # Of independent samples the correlation has standard deviation 1/√n; 28 pairs.
+        assert abs(np.corrcoef(a, b)[0, 1]) < 4 / math.sqrt(DRAWS)
+
+
+def test_successive_draws_are_independent(tmp_path):
+    samples = draw(tmp_path, "uniform: [0, 1]")
+    for lag in range(1, 9):
+        assert abs(np.corrcoef(samples[lag:], samples[:-lag])[0, 1]) < 4 / math.sqrt(DRAWS)
+
+
+@pytest.mark.parametrize("runs", [1, 2, 7, 1000, 10_000])
+def test_a_latin_hypercube_has_one_draw_in_each_stratum(tmp_path, runs):
+    campaign = make(tmp_path, f"""
+  _a: {{ latin_hypercube: [0, {runs}] }}
+  _b: {{ latin_hypercube: [0, {runs}], seed: 5 }}""", runs)
+    for column in zip(*make_values(campaign, 0, runs - 1)):
+        assert sorted(map(int, column)) == list(range(runs))
+
+
+def test_each_elementary_interval_holds_one_point_of_sobol(tmp_path):
+    """The first two coordinates are a (0, 2)-sequence in base 2: each block of 2^m points has one
+    in each of the 2^m boxes of width 2^-k and height 2^-(m-k)."""
+    m = 8
+    campaign = make(tmp_path, "  _x: { sobol: [0, 1], seed: 3 }\n  _y: { sobol: [0, 1], seed: 3 }",
+                    4 * 2**m)
+    for block in range(4):
+        points = np.array(make_values(campaign, block * 2**m, (block + 1) * 2**m - 1))
+        for k in range(m + 1):
+            boxes = (points * [2**k, 2 ** (m - k)]).astype(int)
+            assert len({tuple(box) for box in boxes.tolist()}) == 2**m
+
+
+def test_sobol_integrates_better_than_chance(tmp_path):
+    """Of Π (1 + (x_i - 1/2)) over six coordinates, which is 1."""
+    runs = 4096
+    vary = "\n".join(f"  _{i}: {{ %s: [0, 1], seed: 2 }}" for i in range(6))
+    errors = {}
+    for kind in ("uniform", "sobol"):
+        campaign = make(tmp_path, vary.replace("%s", kind), runs)
+        points = np.array(make_values(campaign, 0, runs - 1))
+        errors[kind] = abs(np.mean(np.prod(0.5 + points, axis=1)) - 1)
+    # Chance alone: standard deviation √((13/12)^6 - 1) / √4096 = 0.0125.
+    assert errors["uniform"] < 4 * 0.0125
+    assert errors["sobol"] < 0.001
+
+
+# --- The generator, by its definition ------------------------------------------------------------
+
+def calc_philox(key, counter):
+    """Philox4x64-10. Source: Salmon et al., Parallel random numbers: as easy as 1, 2, 3 (2011)."""
+    mask = 2**64 - 1
+    words = [counter & mask, counter >> 64, 0, 0]
+    k0, k1 = key
+    for _ in range(10):
+        low, high = 0xD2E7470EE14C6C93 * words[0], 0xCA5A826395121157 * words[2]
+        words = [(high >> 64) ^ words[1] ^ k0, high & mask, (low >> 64) ^ words[3] ^ k1, low & mask]
+        k0, k1 = (k0 + 0x9E3779B97F4A7C15) & mask, (k1 + 0xBB67AE8584CAA73B) & mask
+    return words
+
+
+def test_uniform_numbers_are_those_of_philox(tmp_path):
+    campaign = make(tmp_path, "  _x: { uniform: [0, 1], seed: 42 }", 10_000_000)
+    digest = hashlib.sha256("\0".join(["sls campaign 1", "unit", "42", "_x"]).encode()).digest()
+    key = struct.unpack("<2Q", digest[:16])
+    for run in (0, 1, 2, 3, 4, 5, 1001, 9_999_999):
+        word = calc_philox(key, run // 4 + 1)[run % 4]
+        assert make_values(campaign, run, run) == [[((word >> 12) + 0.5) / 2**52]]
+
+
+# --- Run i is run i ------------------------------------------------------------------------------
+
+def test_values_do_not_depend_on_chunks_and_order(tmp_path):
+    runs = 300
+    campaign = make(tmp_path, EVERYTHING, runs)
+    whole = make_values(campaign, 0, runs - 1)
+    generator = random.Random(1)
+    chunks = [(first, min(first + size - 1, runs - 1)) for size in (1, 3, 4, 7, 64, 299)
+              for first in range(0, runs, size)]
+    generator.shuffle(chunks)
+    for first, last in chunks:
+        assert make_values(campaign, first, last) == whole[first:last + 1]
+
+
+def test_another_key_changes_no_other(tmp_path):
+    vary, seeds = EVERYTHING.split("seeds:")
+    lines = vary.strip("\n").split("\n")
+    whole = make(tmp_path, EVERYTHING, 50)
+    expected = dict(zip(whole.paths, zip(*make_values(whole, 0, 49))))
+    more = "  _new: { uniform: [0, 1], seed: 1 }\n  _newer: { latin_hypercube: [0, 1], seed: 1 }"
+    changed = [
+        "\n".join([more, *lines]),
+        "\n".join(reversed(lines)).replace("_sobol", "_sobel"),  # Sobol's go by their order
+        *("\n".join(lines[:i] + lines[i + 1:]) for i in (1, 2, 3, 4, 5, 7, 8, 9, 10)),
+    ]
+    for vary in changed:
+        if "  _normal:" not in vary:
+            vary = "\n".join(line for line in vary.split("\n") if "_derived" not in line)
+        campaign = make(tmp_path, vary + "\nseeds:" + seeds, 50)
+        values = dict(zip(campaign.paths, zip(*make_values(campaign, 0, 49))))
+        for path in values.keys() & expected.keys():
+            assert values[path] == expected[path], path
+
+
+def test_another_number_of_runs_changes_latin_hypercubes_alone(tmp_path):
+    few, many = make(tmp_path, EVERYTHING, 50), make(tmp_path, EVERYTHING, 100)
+    for path, a, b in zip(few.paths, zip(*make_values(few, 0, 49)), zip(*make_values(many, 0, 49))):
+        assert (a == b) == ("latin" not in path), path
+
+
+def test_another_seed_has_other_values(tmp_path):
+    for kind in ("uniform", "normal", "latin_hypercube", "sobol"):
+        a, b = (draw(tmp_path, f"{kind}: [1, 2], seed: {seed}", 100) for seed in (0, 1))
+        assert not np.any(a == b)
+
+
+def test_refuses_runs_that_there_are_not(tmp_path):
+    campaign = make(tmp_path, "  _x: { uniform: [0, 1] }", 10)
+    for first, last in ((-1, 3), (0, 10), (5, 4)):
+        with pytest.raises(InputError, match="expected runs within 0 to 9, got"):
+            make_values(campaign, first, last)
+
+
+def test_a_long_campaign_needs_little_memory(tmp_path):
+    campaign = make(tmp_path, EVERYTHING, 100_000)
+    tracemalloc.start()
+    for first in (0, 50_000, 99_000):
+        make_values(campaign, first, first + 999)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 20e6
+
+
+# --- Grids, lists, draws -------------------------------------------------------------------------
+
+def test_grids_and_lists_are_crossed(tmp_path):
+    campaign = make(tmp_path, """
+  vehicle.load_mass_kg: { grid: [0.1, 0.3, 5] }
+  controller.law: { list: [qsf, pid] }
+  sync.wait_for.controllers: { grid: { from: 1, to: 3, values: 3 } }""", None)
+    assert campaign.runs == 30
+    expected = itertools.product((0.1, 0.15, 0.2, 0.25, 0.3), ("qsf", "pid"), (1, 2, 3))
+    values = make_values(campaign, 0, 29)
+    assert values == [list(point) for point in expected]
+    assert isinstance(values[0][2], int)
+
+
+def test_each_draw_is_flown_at_every_point(tmp_path):
+    campaign = make(tmp_path, """
+  controller.law: { list: [qsf, pid] }
+  _x: { uniform: [0, 1], seed: 1 }
+  vehicle.load_mass_kg: { list: [0.1, 0.2, 0.3] }
+seeds: [faults.0.noise.seed]""", 20)
+    alone = make(tmp_path, "  _x: { uniform: [0, 1], seed: 1 }", 4)
+    assert (campaign.points, campaign.draws) == (6, 4)
+    points = list(itertools.product(("qsf", "pid"), (0.1, 0.2, 0.3)))
+    for run, (law, x, mass, seed) in enumerate(make_values(campaign, 0, 19)):
+        assert (law, mass) == points[run % 6]
+        assert [x] == make_values(alone, run // 6, run // 6)[0]
+        assert seed == 3 + run // 6  # 3 stands in the base scenario
+
+
+def test_a_grid_is_rounded_once(tmp_path):
+    """Whole nanoseconds: a delay must be a multiple of the period."""
+    campaign = make(tmp_path, "  faults.2.delay.by_s: { grid: [0, 0.4, 101] }", None)
+    assert [row[0] for row in make_values(campaign, 0, 100)] == [i * 4 / 1000 for i in range(101)]
+
+
+def test_a_logarithmic_grid_has_equal_ratios(tmp_path):
+    grid = "{ from: 0.001, to: 1000, values: 7, log: true }"
+    campaign = make(tmp_path, f"  _x: {{ grid: {grid} }}", None)
+    values = [row[0] for row in make_values(campaign, 0, 6)]
+    assert values == pytest.approx([10.0**i for i in range(-3, 4)], rel=1e-14)
+    assert (values[0], values[-1]) == (0.001, 1000.0)
+
+
+def test_a_list_keeps_its_types(tmp_path):
+    items = '[1, 1.0, true, text, "2", [1, 2.5], { c: 1 }]'
+    campaign = make(tmp_path, f"  a.b: {{ list: {items} }}", None)
+    values = [row[0] for row in make_values(campaign, 0, 6)]
+    assert values == [1, 1.0, True, "text", "2", (1, 2.5), {"c": 1}]
+    assert [type(value) for value in values[:4]] == [int, float, bool, str]
+
+
+def test_noise_seeds_count_up_from_the_scenario(tmp_path):
+    campaign = make(tmp_path, EVERYTHING, 10)
+    assert campaign.seeds == ("faults.0.noise.seed", "faults.1.noise.seed")
+    assert [row[-2:] for row in make_values(campaign, 0, 9)] == [[3 + i, i] for i in range(10)]
+
+
+def test_rounds_to_multiples(tmp_path):
+    samples = draw(tmp_path, "uniform: [0, 0.08], multiple_of: 0.004")
+    counts = dict(zip(*np.unique(samples, return_counts=True)))
+    assert sorted(counts) == [i * 4 / 1000 for i in range(21)]
+    # The ends are hit half as often: binomial, n = 20,000, p = 1/40 and 1/20.
+    assert abs(counts[0.0] - 500) < 4 * math.sqrt(500)
+    assert abs(counts[0.04] - 1000) < 4 * math.sqrt(1000)
+    whole = make(tmp_path, "  _x: { uniform: [0, 9], multiple_of: 3 }", 50)
+    values = [row[0] for row in make_values(whole, 0, 49)]
+    assert set(values) == {0, 3, 6, 9}
+    assert all(isinstance(value, int) for value in values)
+
+
+# --- Runs that are chosen ------------------------------------------------------------------------
+
+def test_chooses_runs_without_repetition_and_evenly():
+    counts = np.zeros(50)
+    for seed in range(2000):
+        chosen = choose_runs(50, 5, seed)
+        assert len(set(chosen)) == 5
+        assert chosen == sorted(chosen)
+        counts[chosen] += 1
+    # Each run is chosen with probability 1/10: binomial, n = 2000; 50 of them.
+    assert np.max(np.abs(counts - 200)) < 4 * math.sqrt(2000 * 0.1 * 0.9)
+    assert choose_runs(50, 5, 1) != choose_runs(50, 5, 1, purpose="verify")
+    assert choose_runs(7, 7, 1) == list(range(7))
+
+
+@pytest.mark.parametrize("certify, expected", [("all", 40), ("none", 0), ("7", 7),
+                                               ("{ some: 40, seed: 2 }", 40)])
+def test_certifies_as_many_runs_as_asked_for(tmp_path, certify, expected):
+    campaign = make(tmp_path, "  _x: { uniform: [0, 1] }\ncertify: " + certify, 40)
+    assert sum(is_certified(campaign, run) for run in range(40)) == expected
+
+
+# --- Derived values ------------------------------------------------------------------------------
+
+def test_derives_values_in_any_order(tmp_path):
+    campaign = make(tmp_path, """
+  plant.wind_m_s: { derived: [_speed * cos(_angle), _speed * sin(_angle), 0] }
+  _speed: { derived: 2 * _half }
+  _half: { uniform: [0, 2], seed: 1 }
+  _angle: { uniform: [0, 6.28], seed: 1 }
+  controller.model.rod_length_m: { derived: "vehicle.rod_length_m * 1.1" }
+  sync.wait_for.controllers: { derived: 1 + 3 * _half, multiple_of: 1 }""", 50)
+    assert campaign.scenario_paths == ["plant.wind_m_s", "controller.model.rod_length_m",
+                                       "sync.wait_for.controllers"]
+    for row in make_values(campaign, 0, 49):
+        wind, speed, half, angle, length, controllers = row
+        assert speed == 2 * half
+        assert wind == [speed * math.cos(angle), speed * math.sin(angle), 0.0]
+        assert length == 1.0 * 1.1  # of the base scenario
+        assert isinstance(controllers, int) and abs(controllers - 1 - 3 * half) <= 0.5
+        assert campaign.pick_scenario_values(row) == [wind, length, controllers]
+
+
+def test_names_the_run_of_a_division_by_zero(tmp_path):
+    campaign = make(tmp_path, """
+  _x: { grid: [-2, 2, 5] }
+  vehicle.load_mass_kg: { derived: 1 / _x }""", None)
+    with pytest.raises(InputError) as error:
+        make_values(campaign, 0, 4)
+    assert str(error.value) == (f"{campaign.file}:5: vary.vehicle.load_mass_kg: run 2: division by "
+                                "zero in '1 / _x'")
+    assert make_values(campaign, 3, 4) == [[1, 1.0], [2, 0.5]]
+
+
+# --- Text ----------------------------------------------------------------------------------------
+
+def list_floats():
+    generator = random.Random(5)
+    floats = [struct.unpack("<d", generator.randbytes(8))[0] for _ in range(5000)]
+    yield from (number for number in floats if math.isfinite(number))
+    yield from (0.0, -0.0, 1e22, 1e16, 1e15, 123456789012345680.0, 1e-5, 1e-4, 5e-324, 0.1, -2.0,
+                1.7976931348623157e308)
+
+
+@pytest.mark.parametrize("read", [
+    yaml.safe_load,
+    lambda text: parse_yaml(text.encode(), support.HERE / "base.yaml").find_scalar(),
+], ids=["PyYAML", "campaign files"])
+def test_numbers_read_back_to_the_same_bits(read):
+    for number in list_floats():
+        value = read(to_yaml_value(number))
+        assert isinstance(value, float)
+        assert struct.pack("<d", value) == struct.pack("<d", number)
+
+
+@pytest.mark.parametrize("value", [
+    0, -3, 2**63 - 1, True, False, "pid", "1", "true", "a \"b\" \\ c: # {}", "two\nlines", "", "~",
+    "tab\tbell\a", "é", "😀", {"a b": 1, "c: d": [2]},
+    [1, 2.5, "x"], [[0.1], []], {"a": 1, "b": {"c": [1.0, "d"]}},
+])
+def test_other_values_read_back(value):
+    text = to_yaml_value(value)
+    assert "\n" not in text
+    back = yaml.safe_load(text)
+    assert back == value
+    assert type(back) is type(value)
