@@ -20,7 +20,7 @@ sys.path.insert(0, str(CORE))
 BASE = """name: short
 vehicle: { quad_mass_kg: 1.5, load_mass_kg: 0.2, rod_length_m: 1.0, gravity_m_s2: 9.8 }
 plant: { model: analytic, step_s: 0.001, initial: { load_position_m: [0, 0, -0.5] } }
-sync: { mode: realtime, period_s: 0.004, real_time_factor: 1, wait_for: { controllers: 1, recorders: 1, timeout_s: 60 } }
+sync: { mode: realtime, period_s: 0.004, real_time_factor: 1 }
 controller: { law: qsf, gains: { lqr: { horizontal: 10, vertical: 5 } }, force_limit_n: 200 }
 mission:
   - set_point: { position_m: [0.5, 0, -0.5] }

@@ -255,7 +255,8 @@ def raise_ended(*_: object) -> None:
 def main(arguments: Sequence[str]) -> int:
     """The exit code."""
     for number in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, raise_ended)
+        if signal.getsignal(number) is not signal.SIG_IGN:  # as under nohup
+            signal.signal(number, raise_ended)
     try:
         if arguments and arguments[0] in COMMANDS:
             COMMANDS[arguments[0]](arguments[1:])

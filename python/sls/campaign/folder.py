@@ -103,7 +103,7 @@ class CampaignFolder:
         self.refuse_foreign(campaign, resume)
         self.make_folders()
         self.take_lock()
-        self.refuse_foreign(campaign, resume)  # nobody has begun it between the two
+        self.refuse_foreign(campaign, resume)  # another process may have begun it meanwhile
         if (self.folder / "plan.json").exists():
             self.take_up(campaign, engine, first, last, list(columns), allow_other_machines)
             return
