@@ -49,8 +49,9 @@ def list_columns(campaign: Campaign, runs: "Runs") -> list[str]:
 
 
 def to_cell(value: Any) -> str:
-    """A varied value as text: that of the scenario's YAML, text without its quotes."""
-    return value if isinstance(value, str) else to_yaml_value(value)
+    """A varied value as text: that of the scenario's YAML, a text of one line without its quotes."""
+    is_plain = isinstance(value, str) and value.isprintable()
+    return value if is_plain else to_yaml_value(value)
 
 
 def to_number(value: float) -> str:
