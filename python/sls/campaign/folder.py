@@ -1,4 +1,4 @@
-"""The folder of a campaign: what planner, workers and engines share. See README.md, "The folder"."""
+"""The folder of a campaign, which planner, workers and engines share. README.md, "The folder"."""
 
 import csv
 import errno
@@ -112,7 +112,8 @@ class CampaignFolder:
         write_whole(self.folder / "base.yaml", campaign.base_text.encode())
         self.write_plan(Plan(
             campaign=campaign.name, sha256=campaign.sha256, file=str(campaign.file.resolve()),
-            base=str(campaign.base.resolve()), engine=engine, first=first, last=last, campaign_runs=campaign.runs,
+            base=str(campaign.base.resolve()), engine=engine, first=first, last=last,
+            campaign_runs=campaign.runs,
             chunk_runs=chunk_runs, columns=list(columns), machine=describe_machine(),
             allow_other_machines=allow_other_machines))
 
