@@ -14,6 +14,7 @@ import subprocess
 import sys
 import tempfile
 import unittest
+import unittest.mock
 from pathlib import Path
 
 import support
@@ -209,6 +210,24 @@ class LocalEngineTest(CampaignTest):
         self.fly("campaign.yaml", "--out", "out", "--resume", "--allow-other-machines")
         manifest = json.loads((self.folder / "out/manifest.json").read_text())
         self.assertTrue(manifest["other_machines"])
+
+    def test_a_c_library_that_is_told_to_use_other_instructions_is_another_machine(self):
+        self.write_campaign(40)
+        self.fly("campaign.yaml", "--out", "out", "--chunk-runs", 5)
+        (self.folder / "out/chunks/chunk-000001.csv").unlink()
+        with unittest.mock.patch.dict(os.environ, GLIBC_TUNABLES="glibc.cpu.hwcaps=-FMA"):
+            said = self.fly("campaign.yaml", "--out", "out", "--resume", code=2)
+        self.expect_line(said, "tunables: expected none, got glibc.cpu.hwcaps=-FMA")
+
+    def test_levels_follow_the_flags_of_the_processor(self):
+        from sls.campaign.machine import LEVEL_FLAGS, calc_level
+        flags = set()
+        self.assertEqual(calc_level("x86_64", flags), "x86-64-v1")
+        for level, needed in LEVEL_FLAGS:
+            flags |= needed
+            self.assertEqual(calc_level("x86_64", flags), level)
+        self.assertEqual(calc_level("x86_64", flags - {"popcnt"}), "x86-64-v1")
+        self.assertEqual(calc_level("aarch64", set()), "aarch64")
 
     def test_mistakes_of_the_command_line_are_one_line(self):
         self.write_campaign(40)

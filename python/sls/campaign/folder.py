@@ -170,9 +170,9 @@ class CampaignFolder:
         """Raises InputError where this machine's rows could differ from the plan's machine."""
         difference = find_difference(plan.machine, describe_machine())
         if difference and not plan.allow_other_machines:
-            raise InputError(f"{self.folder}: machine {host_name()}: {difference} as where the "
-                             "campaign was begun; equal bits are promised for equal machines only "
-                             "(--resume --allow-other-machines flies on and names them)")
+            raise InputError(f"{self.folder}: machine {host_name()}: {difference}; equal "
+                             "bits are promised only for machines like the one that began the "
+                             "campaign (--resume --allow-other-machines flies on and names them)")
 
     def make_folders(self) -> None:
         try:
