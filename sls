@@ -58,6 +58,19 @@ usage: ./sls COMMAND [OPTIONS]
   python [ARGS]      Debian's Python with the package `sls`: a script, -m MODULE, -c COMMAND, or none
   study              flies the whole published comparison, writes docs/study.md and its pictures;
                      with --help: its options
+  campaign FILE      flies a campaign: many runs of one scenario in which keys vary; DIR/runs.csv, report.html.
+                     FILE is a name in config/campaigns or a path
+      --out DIR        its folder (default: campaigns/NAME-UTCTIME)
+      --on ENGINE      local, slurm or dask (default: local)
+      --workers N      processes (default: one for each core)
+      --runs A-B       these runs alone (default: all)
+      --resume         fly what is missing or damaged in DIR; interrupted campaigns go on
+      --verify N       fly N runs again with the three programs over DDS, compare certificates
+      --sbatch "…"     options of the site for Slurm; --scheduler ADDRESS: of Dask; with --help: all options
+  campaign status DIR | report DIR | compare A B
+                     chunks, rate and outcomes so far; report.html again; two campaigns run by run
+  campaign-worker DIR --chunks A-B
+                     flies these chunks of a campaign's folder; what Slurm and Kubernetes start
   bench              how fast everything is, each figure beside its bound in the same run; minutes, and
                      an idle machine
       --quick          one short round of everything: whether it works
@@ -373,6 +386,27 @@ cmd_study() {
   run_python study "$@"
 }
 
+# run_campaign MODULE [ARGS…]: with the compiled module on the path.
+run_campaign() {
+  install_missing "${python_packages[@]}"
+  export SLS_BUILD="$build"  # flights over DDS must not build
+  PYTHONPATH="$root/python:$build/python" exec /usr/bin/python3 -BP -m "$@"
+}
+
+cmd_campaign() {
+  if [[ " status report compare " != *" ${1:-} "* && " $* " != *" --help "* ]]; then
+    local targets=(_sls_core)
+    [[ " $* " != *" --verify"* ]] || targets+=("${flying[@]}" sls_verify)
+    build_programs "${targets[@]}"
+  fi
+  run_campaign sls.campaign "$@"
+}
+
+cmd_campaign-worker() {
+  [[ " $* " == *" --help "* ]] || build_programs _sls_core
+  run_campaign sls.campaign.worker "$@"
+}
+
 cmd_doctor() {
   build_programs sls_doctor
   exec "$build/bin/sls_doctor" "$@"
@@ -488,7 +522,7 @@ cmd_test() {
 command=${1:-help}
 (($#)) && shift
 case $command in
-  demo | run | doctor | bench | keys | ctl | verify | delay-margin | chaos | fuzz | test | setup | build | docker-demo | discovery-server | network-table | plot | python | report | study) "cmd_$command" "$@" ;;
+  demo | run | doctor | bench | keys | ctl | verify | delay-margin | chaos | fuzz | test | setup | build | docker-demo | discovery-server | network-table | campaign | campaign-worker | plot | python | report | study) "cmd_$command" "$@" ;;
   clean) rm -rf "$root"/build "$root"/build-* ;;
   help | --help | -h) usage ;;
   *)

@@ -1,4 +1,5 @@
-"""`./sls plot`, `./sls report` and `./sls study`: command lines."""
+"""`./sls plot`, `./sls report` and `./sls study`: command lines. That of `./sls campaign` is in
+campaign/cli.py."""
 
 import argparse
 import sys
@@ -132,6 +133,9 @@ def make_parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str]) -> int:
     """The exit code."""
+    if arguments and arguments[0] == "campaign":
+        from sls.campaign.cli import main as fly_campaign
+        return fly_campaign(arguments[1:])
     try:
         options = make_parser().parse_args(arguments)
         options.run(options)

@@ -1,0 +1,275 @@
+"""`./sls campaign`: its command lines."""
+
+import argparse
+import shlex
+import signal
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NoReturn
+
+from sls.campaign.engines import ENGINES, EngineError, EngineOptions, load_engine
+from sls.campaign.folder import CampaignFolder, opened
+from sls.errors import ConfigError, RunError
+from sls.input_error import InputError
+
+ROOT = Path(__file__).resolve().parents[3]
+MOST_CHUNKS = 10_000  # files in a folder
+LEAST_CHUNKS = 16     # so that several workers end at about the same time
+
+
+class Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        raise InputError(f"{self.prog}: {message} (see ./sls help)")
+
+
+class Ended(KeyboardInterrupt):
+    """SIGTERM or SIGHUP."""
+
+
+def say(text: str) -> None:
+    print(f"sls: {text}", file=sys.stderr)
+
+
+# --- flying ---------------------------------------------------------------------------------------
+
+
+def make_parser() -> argparse.ArgumentParser:
+    from sls.campaign.worker import parse_range
+    parser = Parser(prog="campaign", description="Flies a campaign: DIR/runs.csv, report.html.")
+    parser.add_argument("file", metavar="FILE",
+                        help="a campaign file, or a name in config/campaigns")
+    parser.add_argument("--out", type=Path, metavar="DIR",
+                        help="folder of the campaign (default: campaigns/NAME-UTCTIME)")
+    parser.add_argument("--on", default="local", metavar="ENGINE",
+                        help=f"{', '.join(ENGINES)} (default: local)")
+    parser.add_argument("--workers", type=to_count, metavar="N",
+                        help="processes (default: one for each core)")
+    parser.add_argument("--runs", type=parse_range, metavar="A-B",
+                        help="these runs alone, inclusive (default: all)")
+    parser.add_argument("--resume", action="store_true",
+                        help="fly what is missing or damaged in DIR")
+    parser.add_argument("--verify", type=to_count, metavar="N",
+                        help="fly N runs again over DDS and compare certificates")
+    parser.add_argument("--domain", type=int, metavar="N",
+                        help="DDS domain of --verify, 0 to 232 (default: a free one from 100)")
+    parser.add_argument("--chunk-runs", type=to_count, metavar="N",
+                        help="runs of a chunk (default: by the time that a run takes)")
+    parser.add_argument("--sbatch", default="", metavar="OPTIONS",
+                        help="options of the site for Slurm's sbatch, as one text")
+    parser.add_argument("--scheduler", default="", metavar="ADDRESS", help="of Dask's scheduler")
+    parser.add_argument("--allow-other-machines", action="store_true",
+                        help="also fly on machines whose rows may differ in their last bits; "
+                             "manifest.json names them")
+    return parser
+
+
+def to_count(text: str) -> int:
+    """Raises ArgumentTypeError."""
+    if not text.isdecimal() or not 1 <= int(text) <= 10**9:
+        raise argparse.ArgumentTypeError(f"expected a whole number of at least 1, got '{text}'")
+    return int(text)
+
+
+def find_file(name: str) -> Path:
+    if "/" in name or name.endswith((".yaml", ".yml")) or Path(name).is_file():
+        return Path(name)
+    return ROOT / "config" / "campaigns" / f"{name}.yaml"
+
+
+def fly(options: argparse.Namespace) -> None:
+    """Flies, collects and verifies. Raises ConfigError, EngineError."""
+    from sls.campaign.campaign_file import load_campaign
+    campaign = load_campaign(find_file(options.file))
+    engine = load_engine(options.on)
+    if options.resume and options.out is None:
+        raise InputError("campaign: --resume: expected --out DIR with it, got none")
+    out = options.out or Path("campaigns") / (campaign.name + time.strftime("-%Y%m%dT%H%M%SZ",
+                                                                            time.gmtime()))
+    engine_options = EngineOptions(options.workers, options.sbatch, options.scheduler,
+                                   options.chunk_runs, progress=True)
+    with opened(out) as folder:
+        try:
+            prepare(folder, campaign, engine, options)
+            engine.run(folder, engine_options)
+            folder.collect(options.on)
+        except KeyboardInterrupt:
+            say_how_to_resume(folder, options)
+            raise
+        say_result(folder)
+        if options.verify and not verify(folder, options):
+            raise EngineError(f"{out}: --verify: expected equal certificates, got others")
+
+
+def prepare(folder: CampaignFolder, campaign: Any, engine: Any,
+            options: argparse.Namespace) -> None:
+    """Checks the campaign, then begins or takes up its folder."""
+    from sls.campaign.check import check_campaign
+    from sls.campaign.runs import list_columns, list_yaml_values, make_runs
+    from sls.campaign.own_measures import load_own_measures
+    from sls.campaign.sampling import is_certified, make_values
+    folder.refuse_foreign(campaign, options.resume)
+    is_begun = (folder.folder / "plan.json").exists()
+    first, last = find_range(folder, campaign, options, is_begun)
+    runs = make_runs(campaign)
+    check_campaign(campaign, runs)
+    own = load_own_measures(campaign)
+    chunk_runs = 0
+    if not is_begun:
+        begin = time.monotonic()
+        values = list_yaml_values(campaign, make_values(campaign, first, first)[0])
+        runs.fly(values, is_certified(campaign, first))
+        if own:
+            own.measure(runs.scenario_text(values))
+        chunk_runs = options.chunk_runs or choose_chunk_runs(
+            getattr(engine, "CHUNK_S", 1.0), time.monotonic() - begin, last - first + 1)
+    folder.create(campaign, options.on, chunk_runs, first, last, options.resume,
+                  list_columns(campaign, runs), options.allow_other_machines)
+
+
+def find_range(folder: CampaignFolder, campaign: Any, options: argparse.Namespace,
+               is_begun: bool) -> tuple[int, int]:
+    """The runs that are asked for. Raises InputError for those that the campaign has not."""
+    if options.runs is None:
+        return (folder.plan.first, folder.plan.last) if is_begun else (0, campaign.runs - 1)
+    if options.runs[1] >= campaign.runs:
+        raise InputError(f"campaign: --runs: expected runs from 0 to {campaign.runs - 1}, got "
+                         f"{options.runs[0]}-{options.runs[1]}")
+    return options.runs
+
+
+def choose_chunk_runs(chunk_s: float, run_s: float, count: int) -> int:
+    """Runs of a chunk that flies for about `chunk_s`; not so many that workers wait for the last
+    chunk, nor so few that a folder holds very many files."""
+    wanted = min(round(chunk_s / max(run_s, 1e-6)), -(-count // LEAST_CHUNKS))
+    return max(wanted, -(-count // MOST_CHUNKS), 1)
+
+
+def say_result(folder: CampaignFolder) -> None:
+    manifest = folder.manifest
+    counts = ", ".join(f"{count} {outcome}" for outcome, count in manifest["outcomes"].items())
+    say(f"campaign: {manifest['runs']} runs: {counts}")
+    if manifest["other_machines"]:
+        say("campaign: flown on machines of several kinds, so that rows may differ in their last "
+            "bits; manifest.json names them")
+    say(f"campaign: {folder.folder}/runs.csv, {folder.folder}/report.html")
+
+
+def say_how_to_resume(folder: CampaignFolder, options: argparse.Namespace) -> None:
+    try:
+        whole = sum(not defect for _, defect in folder.check_chunks())
+        count = len(folder.chunks)
+    except ConfigError:  # not begun
+        say("campaign: interrupted before the first run")
+        return
+    command = ["./sls", "campaign", options.file, "--out", str(folder.folder), "--resume"]
+    if options.on != "local":
+        command += ["--on", options.on]
+    say(f"campaign: interrupted with {whole} of {count} chunks flown; to go on: "
+        f"{shlex.join(command)}")
+
+
+def verify(folder: CampaignFolder, options: argparse.Namespace) -> bool:
+    from sls.campaign.verify import verify as verify_runs
+    return verify_runs(folder, options.verify, say, options.domain)
+
+
+# --- about a folder -------------------------------------------------------------------------------
+
+
+def parse_folders(command: str, arguments: Sequence[str], *names: str) -> list[Path]:
+    parser = Parser(prog=f"campaign {command}")
+    for name in names:
+        parser.add_argument(name, type=Path)
+    options = vars(parser.parse_args(arguments))
+    return [options[name] for name in names]
+
+
+def show_status(arguments: Sequence[str]) -> None:
+    folder = CampaignFolder(*parse_folders("status", arguments, "DIR"))
+    for line in describe_status(folder):
+        print(line)
+
+
+def describe_status(folder: CampaignFolder) -> list[str]:
+    """Lines for a person: chunks, rate, outcomes. Reads every chunk once."""
+    plan = folder.plan
+    whole, flying_s, damaged, missing = 0, 0.0, list[str](), list[int]()
+    runs, counts = 0, dict[str, int]()
+    outcome = plan.columns.index("outcome")
+    for number, defect in folder.check_chunks():
+        if defect == "missing":
+            missing.append(number)
+        elif defect:
+            damaged.append(f"{number} ({defect})")
+        else:
+            whole += 1
+            flying_s += folder.read_whole_chunk(number).flown["wall_s"]
+            for cells in folder.read_chunk(number):
+                counts[cells[outcome]] = counts.get(cells[outcome], 0) + 1
+                runs += 1
+    lines = [f"campaign  {plan.campaign}, sha256 {plan.sha256}",
+             f"runs      {plan.first} to {plan.last} of {plan.campaign_runs}, "
+             f"{plan.chunk_runs} in a chunk; engine {plan.engine}",
+             f"chunks    {whole} flown, {len(missing)} missing, {len(damaged)} damaged"]
+    if missing:
+        lines.append(f"missing   {list_some([str(number) for number in missing])}")
+    if damaged:
+        lines.append(f"damaged   {list_some(damaged)}")
+    if runs and flying_s:
+        lines.append(f"flown     {runs} runs in {flying_s:.1f} s of workers' time, "
+                     f"{runs / flying_s:.1f}/s each")
+    if counts:
+        lines.append("outcomes  " + ", ".join(f"{count} {name}"
+                                              for name, count in sorted(counts.items())))
+    if (folder.folder / "runs.csv").exists():
+        lines.append(f"table     {folder.folder / 'runs.csv'}")
+    describe = getattr(load_engine(plan.engine), "describe_status", None)
+    return lines + (describe(folder) if describe else [])
+
+
+def list_some(items: list[str], most: int = 10) -> str:
+    more = f" and {len(items) - most} more" if len(items) > most else ""
+    return ", ".join(items[:most]) + more
+
+
+def make_report(arguments: Sequence[str]) -> None:
+    folder = CampaignFolder(*parse_folders("report", arguments, "DIR"))
+    folder.write_report()
+    say(f"report: {folder.folder / 'report.html'}")
+
+
+def show_comparison(arguments: Sequence[str]) -> None:
+    from sls.campaign.compare import compare
+    print(compare(*parse_folders("compare", arguments, "A", "B")).rstrip("\n"))
+
+
+COMMANDS = {"status": show_status, "report": make_report, "compare": show_comparison}
+
+
+def raise_ended(*_: object) -> None:
+    raise Ended
+
+
+def main(arguments: Sequence[str]) -> int:
+    """The exit code."""
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) is not signal.SIG_IGN:  # as under nohup
+            signal.signal(number, raise_ended)
+    try:
+        if arguments and arguments[0] in COMMANDS:
+            COMMANDS[arguments[0]](arguments[1:])
+        else:
+            fly(make_parser().parse_args(arguments))
+    except (ConfigError, ImportError) as error:
+        say(f"error: {error}")
+        return 2
+    except (EngineError, RunError, OSError) as error:
+        say(f"error: {error}")
+        return 1
+    except Ended:
+        return 143
+    except KeyboardInterrupt:
+        return 130
+    return 0

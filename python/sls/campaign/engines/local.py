@@ -1,0 +1,193 @@
+"""Flies a campaign in processes of this machine.
+
+Each process is `sls.campaign.worker --serve`: it reads the number of a chunk from a pipe and answers
+when the chunk is in the folder. A process that is killed closes its pipe; another one flies its
+chunk. The kernel ends the processes should this one be killed."""
+
+import json
+import os
+import selectors
+import signal
+import subprocess
+import sys
+from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from sls.campaign.engines import EngineError, EngineOptions
+from sls.campaign.folder import CampaignFolder
+from sls.campaign.progress import Progress
+from sls.input_error import InputError
+
+CHUNK_S = 0.75      # of work in a chunk: little is lost with a process, and little time between two
+MOST_TRIES = 3      # of a chunk whose process ends without an answer
+END_WITHIN_S = 5.0  # of a process that was asked to end
+
+
+@dataclass
+class Worker:
+    """One process and what it does."""
+
+    process: subprocess.Popen[bytes]
+    chunk: int | None = None
+    run: int | None = None  # which it announced last
+    is_ready: bool = False
+    unread: bytes = b""
+
+    def give(self, chunk: int, announce: bool) -> None:
+        self.chunk, self.run = chunk, None
+        assert self.process.stdin
+        try:
+            self.process.stdin.write(b"%d%s\n" % (chunk, b" announce" if announce else b""))
+            self.process.stdin.flush()
+        except BrokenPipeError:
+            pass  # its end is noticed on the other pipe
+
+    def describe_end(self) -> str:
+        code = self.process.wait()
+        if code < 0:
+            return f"was ended by {signal.Signals(-code).name}"
+        return f"ended with exit code {code}"
+
+
+@dataclass
+class Work:
+    """The chunks that are not flown."""
+
+    waiting: deque[int]
+    tries: dict[int, int] = field(default_factory=dict)
+    failed_starts: int = 0  # in a row
+    given_up: list[str] = field(default_factory=list)
+
+
+def count_cores() -> int:
+    return len(os.sched_getaffinity(0))
+
+
+def start_worker(folder: CampaignFolder) -> Worker:
+    # A session of its own: Ctrl-C reaches this process alone, which ends the others.
+    command = ["setpriv", "--pdeathsig", "TERM", "--", sys.executable, "-BP", "-m",
+               "sls.campaign.worker", str(folder.folder.resolve()), "--serve"]
+    one_thread = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                               start_new_session=True,
+                               env={**os.environ, **one_thread, "PYTHONPATH": find_path()})
+    return Worker(process)
+
+
+def find_path() -> str:
+    """PYTHONPATH with which another process finds the same modules."""
+    return os.pathsep.join(str(Path(place).resolve()) for place in sys.path if place)
+
+
+@contextmanager
+def started(workers: list[Worker]) -> Iterator[None]:
+    """In the end every process of `workers` is gone."""
+    try:
+        yield
+    finally:
+        for worker in workers:
+            worker.process.terminate()
+        for worker in workers:
+            try:
+                worker.process.wait(END_WITHIN_S)
+            except subprocess.TimeoutExpired:
+                worker.process.kill()
+                worker.process.wait()
+            for pipe in (worker.process.stdin, worker.process.stdout):
+                try:
+                    pipe.close()
+                except BrokenPipeError:
+                    pass
+
+
+def run(folder: CampaignFolder, options: EngineOptions) -> None:
+    """Flies what is missing. Raises InputError where a run or the campaign is refused, EngineError
+    where a chunk cannot be written or ends its process again and again."""
+    work = Work(deque(folder.missing()))
+    workers = list[Worker]()
+    with started(workers), selectors.DefaultSelector() as selector, \
+            Progress(folder, len(work.waiting), options.progress) as progress:
+        def add_worker() -> None:
+            worker = start_worker(folder)
+            workers.append(worker)
+            selector.register(worker.process.stdout, selectors.EVENT_READ, worker)
+
+        for _ in range(min(options.workers or count_cores(), len(work.waiting))):
+            add_worker()
+        while workers:
+            for key, _ in selector.select(progress.until_next_s()):
+                worker = key.data
+                data = os.read(key.fd, 65536)
+                if data:
+                    for line in take_lines(worker, data):
+                        hear(worker, json.loads(line), work, progress)
+                    continue
+                selector.unregister(key.fileobj)
+                workers.remove(worker)
+                close(worker)
+                if note_end(worker, work, folder):
+                    add_worker()
+            progress.draw()
+            # A process without work ends with its pipe.
+            for worker in workers:
+                if worker.is_ready and worker.chunk is None and not worker.process.stdin.closed:
+                    if work.waiting:
+                        chunk = work.waiting.popleft()
+                        worker.give(chunk, announce=chunk in work.tries)
+                    elif not any(other.chunk is not None for other in workers):
+                        worker.process.stdin.close()
+    if work.given_up:
+        raise EngineError("; ".join(work.given_up))
+
+
+def take_lines(worker: Worker, data: bytes) -> list[bytes]:
+    *lines, worker.unread = (worker.unread + data).split(b"\n")
+    return lines
+
+
+def hear(worker: Worker, message: dict, work: Work, progress: Progress) -> None:
+    if "error" in message:
+        raise (InputError if message["code"] == 2 else EngineError)(message["error"])
+    if "ready" in message:
+        worker.is_ready = True
+        work.failed_starts = 0
+    elif "run" in message:
+        worker.run = message["run"]
+    else:
+        progress.add(message["chunk"])
+        work.tries.pop(message["chunk"], None)
+        worker.chunk = worker.run = None
+
+
+def close(worker: Worker) -> None:
+    worker.process.stdout.close()
+    try:
+        worker.process.stdin.close()
+    except BrokenPipeError:
+        pass
+
+
+def note_end(worker: Worker, work: Work, folder: CampaignFolder) -> bool:
+    """Whether another process is needed in its place. Its chunk waits again, or after MOST_TRIES is
+    given up, which ends the campaign when all others are flown."""
+    end = worker.describe_end()
+    chunk = worker.chunk
+    if not worker.is_ready:
+        work.failed_starts += 1
+        if work.failed_starts >= MOST_TRIES:
+            raise EngineError(f"local: a worker process {end} before its first run; tried "
+                              f"{MOST_TRIES} times")
+    if chunk is None:
+        return bool(work.waiting)
+    work.tries[chunk] = work.tries.get(chunk, 0) + 1
+    if work.tries[chunk] < MOST_TRIES:
+        work.waiting.append(chunk)
+    else:
+        first, last = folder.find_chunk(chunk)
+        where = f"in run {worker.run}" if worker.run is not None else f"in runs {first}-{last}"
+        work.given_up.append(f"{folder.chunk_file(chunk)}: a worker process {end} {where}; tried "
+                             f"{MOST_TRIES} times, the other chunks are flown")
+    return bool(work.waiting)

@@ -1,0 +1,423 @@
+"""The folder of a campaign, which planner, workers and engines share. README.md, "The folder"."""
+
+import csv
+import errno
+import fcntl
+import hashlib
+import io
+import json
+import os
+import re
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from sls.campaign.campaign import Campaign
+from sls.campaign.engines import EngineError
+from sls.campaign.machine import describe_machine, find_difference, host_name
+from sls.campaign.whole_files import WholeFile, is_left_over, write_whole
+from sls.input_error import InputError
+
+OWN_FILES = {"lock", "campaign.yaml", "base.yaml", "chunks", "kept"}  # before plan.json is there
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What was decided before the first run was flown: plan.json."""
+
+    campaign: str        # its name
+    sha256: str
+    file: str            # where the campaign file was; own measures are relative to it
+    base: str            # where the base scenario was
+    engine: str
+    first: int
+    last: int            # inclusive
+    campaign_runs: int   # of the whole campaign
+    chunk_runs: int
+    columns: list[str]   # of runs.csv
+    machine: dict[str, str]
+    allow_other_machines: bool
+
+
+class DamagedChunk(Exception):
+    """What is wrong with a chunk's file; it counts as not flown."""
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """A whole chunk: its rows as they stand in runs.csv, and how they came about."""
+
+    rows: bytes
+    flown: dict[str, Any]  # host, machine, wall_s
+
+
+class CampaignFolder:
+    def __init__(self, folder: str | Path):
+        self.folder = Path(folder)
+        self._lock: int | None = None
+
+    # --- the plan ---------------------------------------------------------------------------------
+
+    @cached_property
+    def plan(self) -> Plan:
+        """Raises InputError where there is none."""
+        file = self.folder / "plan.json"
+        try:
+            return Plan(**json.loads(file.read_text()))
+        except FileNotFoundError:
+            raise InputError(f"{self.folder}: expected the folder of a campaign, got one without "
+                             "plan.json") from None
+        except OSError as error:
+            raise InputError(f"{file}: expected to read it, got: {error.strerror}") from None
+        except (ValueError, TypeError) as error:
+            raise InputError(f"{file}: expected the plan of a campaign, got: {error}") from None
+
+    @cached_property
+    def campaign(self) -> Campaign:
+        """As it was planned: editing the campaign file or its base does no harm. Raises InputError
+        where one of the copies or an own measure is another one by now."""
+        from sls.campaign.campaign_file import load_campaign
+        # Libraries in the base scenario are relative to where it was.
+        base, copy = Path(self.plan.base), self.folder / "base.yaml"
+        try:
+            is_same = base.read_bytes() == copy.read_bytes()
+        except OSError:
+            is_same = False
+        campaign = load_campaign(self.folder / "campaign.yaml", base=base if is_same else copy,
+                                 folder=Path(self.plan.file).parent)
+        if campaign.sha256 != self.plan.sha256:
+            raise InputError(f"{self.folder}: expected the campaign that it was begun with (sha256 "
+                             f"{self.plan.sha256}), got sha256 {campaign.sha256}: campaign.yaml, "
+                             "base.yaml or an own measure was changed")
+        return campaign
+
+    def create(self, campaign: Campaign, engine: str, chunk_runs: int, first: int, last: int,
+               resume: bool, columns: Sequence[str], allow_other_machines: bool = False) -> None:
+        """Begins the folder, or with `resume` checks that it is this campaign's and takes the
+        chunks that are there. Holds the lock until `close`. Raises InputError where the folder is
+        something else, is in use, or was begun on a machine of another kind."""
+        self.refuse_foreign(campaign, resume)
+        self.make_folders()
+        self.take_lock()
+        self.refuse_foreign(campaign, resume)  # another process may have begun it meanwhile
+        if (self.folder / "plan.json").exists():
+            self.take_up(campaign, engine, first, last, list(columns), allow_other_machines)
+            return
+        self.forget_plan()
+        write_whole(self.folder / "campaign.yaml", campaign.text.encode())
+        write_whole(self.folder / "base.yaml", campaign.base_text.encode())
+        self.write_plan(Plan(
+            campaign=campaign.name, sha256=campaign.sha256, file=str(campaign.file.resolve()),
+            base=str(campaign.base.resolve()), engine=engine, first=first, last=last,
+            campaign_runs=campaign.runs,
+            chunk_runs=chunk_runs, columns=list(columns), machine=describe_machine(),
+            allow_other_machines=allow_other_machines))
+
+    def take_up(self, campaign: Campaign, engine: str, first: int, last: int, columns: list[str],
+                allow_other_machines: bool) -> None:
+        """Goes on with the plan that is there."""
+        plan = self.plan
+        if (plan.first, plan.last) != (first, last):
+            raise InputError(f"--runs: expected {plan.first}-{plan.last}, with which {self.folder} "
+                             f"was begun, got {first}-{last}")
+        if plan.columns != columns:
+            raise InputError(f"{self.folder}: expected the columns {','.join(columns)} of this "
+                             f"version, got {','.join(plan.columns)}")
+        plan = replace(plan, engine=engine, file=str(campaign.file.resolve()),
+                       base=str(campaign.base.resolve()),
+                       allow_other_machines=plan.allow_other_machines or allow_other_machines)
+        self.refuse_other_machine(plan)
+        self.write_plan(plan)
+        self.remove_leftovers()
+
+    def forget_plan(self) -> None:
+        """Reads it again when it is needed."""
+        self.__dict__.pop("plan", None)
+
+    def write_plan(self, plan: Plan) -> None:
+        write_whole(self.folder / "plan.json",
+                    (json.dumps(asdict(plan), indent=1, sort_keys=True) + "\n").encode())
+        self.__dict__["plan"] = plan
+
+    def refuse_foreign(self, campaign: Campaign, resume: bool) -> None:
+        """Raises InputError unless the folder is new, or resumes this very campaign."""
+        if (self.folder / "plan.json").exists():
+            if self.plan.sha256 != campaign.sha256:
+                raise InputError(
+                    f"{self.folder}: expected a folder of campaign '{campaign.name}' (sha256 "
+                    f"{campaign.sha256}), got one of '{self.plan.campaign}' (sha256 "
+                    f"{self.plan.sha256})")
+            if not resume:
+                raise InputError(f"{self.folder}: expected a new folder, got one where this "
+                                 "campaign was begun; --resume flies what is missing")
+            return
+        try:
+            foreign = sorted(entry.name for entry in self.folder.iterdir()
+                             if entry.name not in OWN_FILES and not entry.name.endswith(".tmp"))
+        except FileNotFoundError:
+            return
+        except OSError as error:
+            raise InputError(f"{self.folder}: expected a folder, got: {error.strerror}") from None
+        if foreign:
+            raise InputError(f"{self.folder}: expected a new or empty folder, got one that holds "
+                             f"'{foreign[0]}'")
+
+    def refuse_other_machine(self, plan: Plan) -> None:
+        """Raises InputError where this machine's rows could differ from the plan's machine."""
+        difference = find_difference(plan.machine, describe_machine())
+        if difference and not plan.allow_other_machines:
+            raise InputError(f"{self.folder}: machine {host_name()}: {difference}; equal "
+                             "bits are promised only for machines like the one that began the "
+                             "campaign (--resume --allow-other-machines flies on and names them)")
+
+    def make_folders(self) -> None:
+        try:
+            for folder in (self.folder, self.folder / "chunks"):
+                folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"{self.folder}: expected a folder to write in, got: "
+                             f"{error.strerror}") from None
+
+    def remove_leftovers(self) -> None:
+        """Temporary files of processes that were killed: those of this machine whose process is
+        gone, and any that nobody has written for a day."""
+        for folder in (self.folder, self.folder / "chunks"):
+            for file in folder.glob(".*.tmp"):
+                with suppress(FileNotFoundError):
+                    if is_left_over(file):
+                        file.unlink()
+
+    # --- the lock ---------------------------------------------------------------------------------
+
+    def take_lock(self) -> None:
+        """One process plans and collects. The kernel frees the lock when that process ends."""
+        if self._lock is not None:
+            return
+        file = self.folder / "lock"
+        try:
+            lock = os.open(file, os.O_RDWR | os.O_CREAT, 0o666)
+        except OSError as error:
+            raise InputError(f"{file}: expected to write it, got: {error.strerror}") from None
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            holder = os.read(lock, 200).decode(errors="replace").strip()
+            os.close(lock)
+            if error.errno not in (errno.EWOULDBLOCK, errno.EACCES):
+                raise InputError(f"{file}: expected to lock it, got: {error.strerror}") from None
+            raise InputError(f"{self.folder}: expected a folder that no other campaign uses, got "
+                             f"one in use by {holder or 'another process'}") from None
+        try:
+            os.ftruncate(lock, 0)
+            os.pwrite(lock, f"process {os.getpid()} on {host_name()}\n".encode(), 0)
+        except OSError:  # a full disk: it is locked all the same
+            pass
+        self._lock = lock
+
+    def close(self) -> None:
+        """Frees the lock."""
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
+
+    # --- chunks -----------------------------------------------------------------------------------
+
+    @property
+    def chunks(self) -> list[tuple[int, int, int]]:
+        """Number, first and last run (inclusive) of each."""
+        plan = self.plan
+        return [(number, begin, min(begin + plan.chunk_runs - 1, plan.last))
+                for number, begin in enumerate(range(plan.first, plan.last + 1, plan.chunk_runs))]
+
+    def find_chunk(self, number: int) -> tuple[int, int]:
+        """First and last run. Raises InputError for a number there is none of."""
+        plan = self.plan
+        count = -(-(plan.last - plan.first + 1) // plan.chunk_runs)
+        if not 0 <= number < count:
+            raise InputError(f"{self.folder}: expected a chunk from 0 to {count - 1}, got {number}")
+        first = plan.first + number * plan.chunk_runs
+        return first, min(first + plan.chunk_runs - 1, plan.last)
+
+    def chunk_file(self, number: int) -> Path:
+        return self.folder / "chunks" / f"chunk-{number:06d}.csv"
+
+    @cached_property
+    def header(self) -> bytes:
+        return to_line(self.plan.columns)
+
+    def write_chunk(self, number: int, rows: Iterable[Sequence[str]], wall_s: float = 0.0) -> None:
+        """Writes a chunk whole, or leaves one with the same rows as it is. Raises EngineError where
+        it cannot be written, or where the chunk is there with other rows."""
+        first, last = self.find_chunk(number)
+        table = b"".join(map(to_line, rows))
+        flown = {"host": host_name(), "machine": describe_machine(), "wall_s": round(wall_s, 6)}
+        body = self.header + table + (
+            f"# campaign {self.plan.sha256} runs {first}-{last}\n"
+            f"# flown {json.dumps(flown, sort_keys=True)}\n").encode()
+        text = body + f"# sha256 {hashlib.sha256(body).hexdigest()}\n".encode()
+        file = self.chunk_file(number)
+        self.parse_chunk(number, text)  # a mistake of the caller ends here
+        with WholeFile(file) as writing:
+            writing.write(text)
+            if writing.finish_new():
+                return
+            try:
+                there = self.read_whole_chunk(number)
+            except DamagedChunk:
+                writing.finish()
+                return
+            if there.rows != table:
+                raise EngineError(
+                    f"{file}: expected the rows that machine {there.flown.get('host')} wrote, got "
+                    f"others on machine {host_name()}, first of run "
+                    f"{first + find_first_difference(there.rows, table)}")
+
+    def read_whole_chunk(self, number: int) -> Chunk:
+        """Raises DamagedChunk, which says what is wrong, also where there is no such file."""
+        try:
+            text = self.chunk_file(number).read_bytes()
+        except FileNotFoundError:
+            raise DamagedChunk("missing") from None
+        except OSError as error:
+            raise DamagedChunk(f"cannot be read: {error.strerror}") from None
+        return self.parse_chunk(number, text)
+
+    def parse_chunk(self, number: int, text: bytes) -> Chunk:
+        body, mark, checksum = text.rpartition(b"# sha256 ")
+        if not mark or checksum != hashlib.sha256(body).hexdigest().encode() + b"\n":
+            raise DamagedChunk("checksum does not fit")
+        table, mark, rest = body.rpartition(b"# campaign ")
+        first, last = self.find_chunk(number)
+        campaign, _, flown = rest.partition(b"\n# flown ")
+        if not mark or campaign != f"{self.plan.sha256} runs {first}-{last}".encode():
+            raise DamagedChunk("of another campaign or other runs")
+        if not table.startswith(self.header):
+            raise DamagedChunk("other columns")
+        rows = table[len(self.header):]
+        if re.findall(rb"^(\d+),", rows, re.MULTILINE) != [
+                b"%d" % index for index in range(first, last + 1)] or not rows.endswith(b"\n"):
+            raise DamagedChunk("rows are missing")
+        return Chunk(rows, json.loads(flown))
+
+    def read_chunk(self, number: int) -> list[list[str]]:
+        """The cells of its rows. Raises DamagedChunk."""
+        return list(csv.reader(io.StringIO(self.read_whole_chunk(number).rows.decode())))
+
+    def check_chunks(self) -> Iterator[tuple[int, str]]:
+        """Number and what is wrong of every chunk: "" is whole, "missing" has no file."""
+        for number, _, _ in self.chunks:
+            try:
+                self.read_whole_chunk(number)
+                yield number, ""
+            except DamagedChunk as defect:
+                yield number, str(defect)
+
+    def missing(self) -> list[int]:
+        """Chunks that are to be flown: without a file or damaged."""
+        return [number for number, defect in self.check_chunks() if defect]
+
+    # --- the table --------------------------------------------------------------------------------
+
+    def read_rows(self) -> Iterator[dict[str, str]]:
+        """The rows of every whole chunk, in order."""
+        for number, _, _ in self.chunks:
+            try:
+                for cells in self.read_chunk(number):
+                    yield dict(zip(self.plan.columns, cells))
+            except DamagedChunk:
+                continue
+
+    def read_row(self, index: int) -> dict[str, str]:
+        """Raises DamagedChunk."""
+        number = (index - self.plan.first) // self.plan.chunk_runs
+        cells = self.read_chunk(number)[index - self.find_chunk(number)[0]]
+        return dict(zip(self.plan.columns, cells))
+
+    def collect(self, engine: str) -> Path:
+        """Writes runs.csv and manifest.json from the chunks, keeps the recordings that the campaign
+        asks for, writes report.html. Streams: never holds more than one chunk. Raises EngineError
+        where a chunk is missing or something cannot be written."""
+        from sls.campaign.kept import keep_recordings
+        self.take_lock()
+        counts, machines, flying_s = {}, {}, 0.0
+        table, sha256 = self.folder / "runs.csv", hashlib.sha256(self.header)
+        outcome = self.plan.columns.index("outcome")
+        with WholeFile(table) as writing:
+            writing.write(self.header)
+            for number, first, last in self.chunks:
+                try:
+                    chunk = self.read_whole_chunk(number)
+                except DamagedChunk as defect:
+                    raise EngineError(f"{self.chunk_file(number)}: expected runs {first}-{last}, "
+                                      f"got: {defect}; --resume flies them again") from None
+                sha256.update(chunk.rows)
+                writing.write(chunk.rows)
+                for cells in csv.reader(io.StringIO(chunk.rows.decode())):
+                    counts[cells[outcome]] = counts.get(cells[outcome], 0) + 1
+                flying_s += chunk.flown["wall_s"]
+                machine = machines.setdefault(chunk.flown["host"], {**chunk.flown["machine"],
+                                                                    "chunks": 0})
+                machine["chunks"] += 1
+            writing.finish()
+        plan = self.plan
+        self.write_manifest({
+            "campaign": plan.campaign, "campaign_sha256": plan.sha256, "file": plan.file,
+            "engine": engine, "runs": plan.last - plan.first + 1, "first": plan.first,
+            "last": plan.last, "campaign_runs": plan.campaign_runs,
+            "complete": plan.last - plan.first + 1 == plan.campaign_runs,
+            "outcomes": dict(sorted(counts.items())), "runs_csv_sha256": sha256.hexdigest(),
+            "machines": dict(sorted(machines.items())),
+            "other_machines": any(find_difference(plan.machine, {
+                name: value for name, value in machine.items() if name != "chunks"})
+                for machine in machines.values()),
+            "versions": plan.machine, "flying_s": round(flying_s, 3),
+            "collected_utc": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
+            "kept": keep_recordings(self),
+        })
+        self.write_report()
+        return table
+
+    @property
+    def manifest(self) -> dict[str, Any]:
+        """Raises InputError where there is none."""
+        file = self.folder / "manifest.json"
+        try:
+            return json.loads(file.read_text())
+        except OSError as error:
+            raise InputError(f"{file}: expected to read it, got: {error.strerror}") from None
+        except ValueError as error:
+            raise InputError(f"{file}: expected JSON, got: {error}") from None
+
+    def write_manifest(self, manifest: dict[str, Any]) -> None:
+        write_whole(self.folder / "manifest.json", (json.dumps(manifest, indent=1) + "\n").encode())
+
+    def write_report(self) -> None:
+        from sls.campaign.report import make_campaign_report
+        write_whole(self.folder / "report.html", make_campaign_report(self.folder).encode())
+
+
+def to_line(cells: Sequence[str]) -> bytes:
+    """A row of CSV: fields with a comma or quote are quoted, a line ends with one line feed."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerow(cells)
+    return text.getvalue().encode()
+
+
+def find_first_difference(rows: bytes, others: bytes) -> int:
+    """Number of the first line that differs."""
+    pairs = zip(rows.splitlines(), others.splitlines())
+    return next((number for number, (one, other) in enumerate(pairs) if one != other), 0)
+
+
+@contextmanager
+def opened(folder: str | Path) -> Iterator[CampaignFolder]:
+    """A folder whose lock is freed in the end."""
+    campaign_folder = CampaignFolder(folder)
+    try:
+        yield campaign_folder
+    finally:
+        campaign_folder.close()

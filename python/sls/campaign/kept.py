@@ -1,0 +1,138 @@
+"""Recordings that a campaign keeps: DIR/kept/run-NNNNNN.
+
+Those of failed or of all runs are written while their chunk is flown; the worst are known only when
+the table is. Each is flown again and must have the certificate of its row."""
+
+import heapq
+import json
+import math
+import os
+import shutil
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sls.campaign.campaign import Campaign
+from sls.campaign.engines import EngineError
+from sls.campaign.runs import fly_whole, make_runs
+from sls.campaign.sampling import make_values
+from sls.campaign.whole_files import name_temporary, sync_folder
+from sls.errors import RunError
+
+if TYPE_CHECKING:
+    from _sls_core import Runs
+
+    from sls import Flight
+    from sls.campaign.folder import CampaignFolder
+
+
+def kept_folder(folder: "CampaignFolder", index: int) -> Path:
+    return folder.folder / "kept" / f"run-{index:06d}"
+
+
+def is_kept(campaign: Campaign, row: dict[str, str]) -> bool:
+    """Whether this row alone says that its recording is kept."""
+    kind = campaign.keep.kind
+    return kind == "all" or kind == "failed" and row["outcome"] != "finished"
+
+
+def keep_while_flying(folder: "CampaignFolder", campaign: Campaign, runs: "Runs",
+                      cells: Sequence[str]) -> None:
+    """Raises EngineError where the recording cannot be written."""
+    if campaign.keep.kind in ("none", "worst"):
+        return
+    row = dict(zip(folder.plan.columns, cells))
+    if is_kept(campaign, row):
+        keep_run(folder, campaign, runs, row)
+
+
+def keep_run(folder: "CampaignFolder", campaign: Campaign, runs: "Runs",
+             row: dict[str, str]) -> None:
+    """Writes one recording whole, unless it is there. Raises EngineError where it cannot be
+    written, or where the flight is another one than the row's."""
+    index = int(row["run"])
+    target = kept_folder(folder, index)
+    if is_whole(target, row["certificate"]):
+        return
+    temporary = name_temporary(target)
+    try:
+        target.parent.mkdir(exist_ok=True)
+        shutil.rmtree(temporary, ignore_errors=True)
+        save(fly_whole(campaign, runs, make_values(campaign, index, index)[0]), temporary)
+        certificate = json.loads((temporary / "manifest.json").read_text())["certificate"]
+        if row["certificate"] not in ("", certificate):
+            raise EngineError(f"{target}: expected certificate {row['certificate']} of runs.csv, "
+                              f"got {certificate}")
+        shutil.rmtree(target, ignore_errors=True)  # damaged, or not there
+        os.rename(temporary, target)
+        sync_folder(target.parent)
+    except OSError as error:
+        if not is_whole(target, row["certificate"]):  # else another worker was faster
+            raise EngineError(f"{target}: expected to write a recording, got: "
+                              f"{error.strerror or error}") from None
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def save(flight: "Flight", recording: Path) -> None:
+    """Raises RunError for a flight that finished and whose recording is not complete; that of one
+    that failed never is."""
+    try:
+        flight.save(recording)
+    except RunError:
+        if flight.is_finished:
+            raise
+
+
+def is_whole(recording: Path, certificate: str) -> bool:
+    try:
+        manifest = json.loads((recording / "manifest.json").read_text())
+    except (OSError, ValueError):
+        return False
+    return certificate in ("", manifest.get("certificate"))
+
+
+def list_worst(folder: "CampaignFolder", campaign: Campaign) -> list[dict[str, str]]:
+    """The rows with the largest values in the column, the largest first; of equal ones those with
+    the lower index. Rows without a value are left out."""
+    column = campaign.keep.find_column(folder.plan.columns)
+    if column is None:
+        raise EngineError(f"{campaign.file}: keep.by: expected a column of runs.csv, got "
+                          f"'{campaign.keep.by}'")
+
+    def rank(row: dict[str, str]) -> tuple[float, int]:
+        return float(row[column]), -int(row["run"])
+    rows = (row for row in folder.read_rows() if is_number(row[column]))
+    return heapq.nlargest(campaign.keep.count, rows, rank)
+
+
+def is_number(text: str) -> bool:
+    try:
+        return not math.isnan(float(text))
+    except ValueError:
+        return False
+
+
+def list_kept(folder: "CampaignFolder", campaign: Campaign) -> Iterator[dict[str, str]]:
+    if campaign.keep.kind == "worst":
+        yield from list_worst(folder, campaign)
+    else:
+        yield from (row for row in folder.read_rows() if is_kept(campaign, row))
+
+
+def keep_recordings(folder: "CampaignFolder") -> dict[str, Any]:
+    """Writes every recording that is asked for and not there. What the manifest says of them:
+    their kind and number, and of the worst their runs."""
+    campaign = folder.campaign
+    kept: dict[str, Any] = {"kind": campaign.keep.kind, "count": 0}
+    if campaign.keep.kind == "none":
+        return kept
+    runs = None
+    for row in list_kept(folder, campaign):
+        if not is_whole(kept_folder(folder, int(row["run"])), row["certificate"]):
+            runs = runs or make_runs(campaign)
+            keep_run(folder, campaign, runs, row)
+        kept["count"] += 1
+        if campaign.keep.kind == "worst":
+            kept.setdefault("runs", []).append(int(row["run"]))
+    return kept

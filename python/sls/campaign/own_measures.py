@@ -1,0 +1,73 @@
+"""Measures of the user's own: functions of a Python file, called with each run's flight."""
+
+import importlib.util
+import traceback
+from collections.abc import Callable
+from typing import Any
+
+from sls.campaign.campaign import Campaign, OwnMeasure
+from sls.campaign.runs import fly_text, to_number, to_one_line
+from sls.input_error import InputError
+
+LONGEST_ERROR = 300
+
+
+def load_function(own: OwnMeasure) -> Callable[..., Any]:
+    """Raises InputError where the file cannot be run or has no such function."""
+    place = f"{own.file}: {own.function}"
+    spec = importlib.util.spec_from_file_location(f"own_measure_{own.file.stem}", own.file)
+    if spec is None or spec.loader is None:
+        raise InputError(f"{place}: expected a Python file")
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise InputError(f"{place}: expected a Python file that can be run, got: "
+                         f"{describe(error)}") from None
+    function = getattr(module, own.function, None)
+    if not callable(function):
+        raise InputError(f"{place}: expected a function of this name, got none")
+    return function
+
+
+def describe(error: Exception) -> str:
+    """Kind, text and line of the user's file, in one line."""
+    where = traceback.extract_tb(error.__traceback__)
+    line = f" (line {where[-1].lineno})" if where else ""
+    return to_one_line(f"{type(error).__name__}: {error}"[:LONGEST_ERROR] + line)
+
+
+def to_columns(own: OwnMeasure, result: Any) -> list[float]:
+    """Raises TypeError or KeyError where the function returned something else."""
+    if isinstance(result, dict):
+        if set(result) != set(own.columns):
+            raise KeyError(f"expected {', '.join(own.columns)}, got {', '.join(map(str, result))}")
+        return [float(result[column]) for column in own.columns]
+    if len(own.columns) != 1:
+        raise TypeError(f"expected a dict with {', '.join(own.columns)}, got {result!r:.50}")
+    return [float(result)]
+
+
+class OwnMeasures:
+    """All own measures of a campaign, loaded once in each process. Raises InputError."""
+
+    def __init__(self, campaign: Campaign):
+        self.campaign = campaign
+        self.measures = [(own, load_function(own)) for own in campaign.own_measures]
+
+    def measure(self, scenario_text: str) -> list[str]:
+        """Flies the scenario and calls each function with the flight: cells of their columns, then
+        what went wrong; columns of a function that raises are empty."""
+        flight = fly_text(scenario_text, self.campaign)
+        cells, errors = list[str](), list[str]()
+        for own, function in self.measures:
+            try:
+                cells += map(to_number, to_columns(own, function(flight)))
+            except Exception as error:
+                cells += [""] * len(own.columns)
+                errors.append(f"{own.function}: {describe(error)}")
+        return [*cells, "; ".join(errors)]
+
+
+def load_own_measures(campaign: Campaign) -> OwnMeasures | None:
+    return OwnMeasures(campaign) if campaign.own_measures else None

@@ -1,0 +1,444 @@
+"""One self-contained page about a campaign: report.html.
+
+Made from runs.csv, campaign.yaml and manifest.json alone, so that it can be made again wherever the folder
+is; equal files give equal bytes. Its size does not grow with the number of runs: everything is counted
+into bins or taken as a sample."""
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from sls.campaign import drawing
+from sls.campaign.drawing import OUTCOME_COLOURS, format_number, format_share
+from sls.campaign.pairs import (count_changes, describe_changes, describe_interval, find_finished,
+                                find_pairs, make_measure_rows, make_outcome_rows)
+from sls.campaign.run_table import OUTCOMES, RunTable, find_rows, read_runs
+from sls.campaign.statistics import calc_quantiles, calc_wilson_interval
+from sls.input_error import InputError
+from sls.report import STYLE_SHEET, escape, make_section
+
+MOST_VALUES = 41  # of a key that get a bin each; of more values these are bins of equal width
+BINS = 20
+MOST_PAIRS = 10  # of varied keys that are drawn
+MOST_LINES = 400  # of parallel coordinates
+MOST_COLUMNS = 80  # distributions that are drawn
+MOST_REASONS = 20
+WORST = 10
+SHARES = (0.05, 0.5, 0.95)
+STYLE = STYLE_SHEET + """
+svg { display: block; width: 100%; height: auto; margin: 0 auto 8px; }
+.pair { display: grid; grid-template-columns: repeat(2, 1fr); gap: 8px 20px; }
+.pair > * { min-width: 0; }
+h3 { font-size: 14px; margin: 14px 0 4px; overflow-wrap: anywhere; }
+code { font-size: 12.5px; }
+.left td, .left th { text-align: left; }
+.left td { white-space: normal; }
+.left td:first-child { width: 1%; }
+"""
+
+
+@dataclass(frozen=True)
+class Bins:
+    """A varied key in classes."""
+
+    label: str
+    names: list[str]
+    places: np.ndarray  # (n,) class of each run
+
+
+def make_campaign_report(folder: Path) -> str:
+    """The page as HTML. Raises InputError."""
+    campaign_text = read_text(folder / "campaign.yaml")
+    manifest = read_manifest(folder / "manifest.json")
+    table = read_runs(folder / "runs.csv")
+    name = describe_name(folder, campaign_text, manifest)
+    sections = [make_head(name, table)]
+    if len(table):
+        sections += [
+            make_section("Outcomes", make_outcomes(table)),
+            make_key_section(table),
+            make_pair_section(table),
+            *(make_paired_section(table, key) for key in table.keys),
+            make_section("Measures", make_measures(table)),
+            make_section("All together", make_parallel(table)),
+            make_section("Worst runs", make_worst(table, find_file(manifest))),
+        ]
+    sections += [make_section("Campaign", make_facts(manifest)),
+                 "<section><details><summary>Campaign file</summary>"
+                 f"<pre>{escape(campaign_text)}</pre></details></section>"]
+    return ("<!DOCTYPE html>\n<html lang=\"en\">\n<head><meta charset=\"utf-8\">\n"
+            "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+            "<link rel=\"icon\" href=\"data:,\">\n"
+            f"<title>{escape(name)}: campaign report</title>\n<style>{STYLE}</style></head>\n"
+            f"<body><main>\n{''.join(sections)}</main></body>\n</html>\n")
+
+
+# --- what is read ---------------------------------------------------------------------------------
+
+
+def read_text(file: Path) -> str:
+    try:
+        return file.read_text()
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "bytes that are no text"
+        raise InputError(f"{file}: expected a file of a campaign, got: {reason}") from None
+
+
+def read_manifest(file: Path) -> dict[str, Any]:
+    try:
+        manifest = json.loads(read_text(file))
+    except ValueError as error:
+        raise InputError(f"{file}: expected JSON, got: {error}") from None
+    if not isinstance(manifest, dict):
+        raise InputError(f"{file}: expected a map, got {type(manifest).__name__}")
+    return manifest
+
+
+def describe_name(folder: Path, campaign_text: str, manifest: dict[str, Any]) -> str:
+    """From the manifest, else from the file, else the folder's."""
+    try:
+        own = yaml.safe_load(campaign_text)
+    except yaml.YAMLError as error:
+        raise InputError(f"{folder / 'campaign.yaml'}: expected YAML, got: "
+                         f"{' '.join(str(error).split())}") from None
+    if isinstance(manifest.get("campaign"), str):
+        return manifest["campaign"]
+    if isinstance(own, dict) and isinstance(own.get("name"), str):
+        return own["name"]
+    file = manifest.get("file")
+    return Path(file).stem if isinstance(file, str) else folder.resolve().name
+
+
+def find_file(manifest: dict[str, Any]) -> str:
+    """The campaign file that a command names: the manifest says from where it was read."""
+    file = manifest.get("file")
+    return file if isinstance(file, str) else "FILE"
+
+
+# --- classes of a varied key ----------------------------------------------------------------------
+
+
+def make_bins(table: RunTable, key: str, most_values: int = MOST_VALUES) -> Bins:
+    """A class for each value; of many values, classes of equal width (or ratio, of wide ranges)."""
+    if key in table.words:
+        words, places = table.words[key]
+        names = list(map(name_word, words))
+        if len(words) <= most_values:
+            return Bins(key, names, places)
+        # More words than can be drawn: all but the first ones are one class.
+        return Bins(key, [*names[:most_values - 1], "others"],
+                    np.minimum(places, most_values - 1))
+    values = table.numbers[key]
+    unique, places = np.unique(values, return_inverse=True)
+    if len(unique) <= most_values:
+        return Bins(key, [format_number(value) for value in unique], places)
+    low, high = float(unique[0]), float(unique[-1])
+    edges = (np.geomspace if drawing.deserves_log(unique) else np.linspace)(low, high, BINS + 1)
+    places = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, BINS - 1)
+    middles = (np.sqrt(edges[1:] * edges[:-1]) if drawing.deserves_log(unique)
+               else (edges[1:] + edges[:-1]) / 2)
+    return Bins(key, [f"{middle:.2g}" for middle in middles], places)
+
+
+def name_word(word: str) -> str:
+    """Of a map, its first value: `qsf` of {law: "qsf", gains: …}; of other text its beginning."""
+    if word.startswith("{"):
+        try:
+            values = list(yaml.safe_load(word).values())
+        except (yaml.YAMLError, AttributeError):
+            values = []
+        if values and not isinstance(values[0], (dict, list)):
+            word = str(values[0])
+    return word if len(word) <= 24 else f"{word[:23]}…"
+
+
+def is_lost(table: RunTable) -> np.ndarray:
+    """Runs that did not finish: lost or failed, (n,)."""
+    return ~table.is_outcome("finished")
+
+
+def find_main_measure(table: RunTable) -> str | None:
+    """What heat maps show: the rms of the load's error where it was measured."""
+    for name in ("load_error_rms_m", "load_error_max_m"):
+        if name in table.measures:
+            return name
+    others = [name for name in table.measures if name != "time_of_loss_s"]
+    return others[0] if others else None
+
+
+def find_values(table: RunTable, name: str) -> np.ndarray:
+    """Of a measure, the runs that finished; of one that only others have, such as the time of the
+    loss, all that have it. NaN left out."""
+    values = table.numbers[name]
+    finished = values[table.is_outcome("finished")]
+    finished = finished[~np.isnan(finished)]
+    return finished if len(finished) else values[~np.isnan(values)]
+
+
+# --- the page's sections --------------------------------------------------------------------------
+
+
+def make_head(name: str, table: RunTable) -> str:
+    count = len(table)
+    badges = "".join(
+        f"<span class=\"badge {style}\">{table.count(outcome)} {outcome}</span>"
+        for outcome, style in zip(OUTCOMES, ("good", "bad", "bad")) if table.count(outcome))
+    varied = ", ".join(table.keys) or "nothing"
+    return (f"<header><h1>{escape(name)}</h1><p class=\"sub\">{badges}{count} "
+            f"{'run' if count == 1 else 'runs'}; varied: {escape(varied)}</p></header>\n")
+
+
+def make_plain_table(header: Sequence[str], rows: Sequence[Sequence[str]], style: str = "") -> str:
+    """`header` and `rows` hold HTML."""
+    head = "".join(f"<th>{cell}</th>" for cell in header)
+    body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows)
+    return (f"<div class=\"scroll\"><table{style}><thead><tr>{head}</tr></thead><tbody>{body}"
+            "</tbody></table></div>")
+
+
+def make_outcomes(table: RunTable) -> str:
+    rows = [[escape(outcome), str(table.count(outcome)),
+             format_share(table.count(outcome) / len(table)),
+             describe_interval(table.count(outcome), len(table))] for outcome in OUTCOMES]
+    page = make_plain_table(("outcome", "runs", "share", "95 % interval (Wilson)"), rows)
+    if table.reasons:
+        common = sorted(table.reasons.items(), key=lambda item: (-item[1], item[0]))
+        page += "<h3>Reasons</h3>" + make_plain_table(
+            ("runs", "reason (numbers left out)"),
+            [[str(count), escape(reason)] for reason, count in common[:MOST_REASONS]],
+            " class=\"left\"")
+        if len(common) > MOST_REASONS:
+            page += f"<p class=\"small\">{len(common) - MOST_REASONS} more are in runs.csv.</p>"
+    return page
+
+
+def make_share_picture(table: RunTable, key: str) -> str:
+    bins = make_bins(table, key)
+    totals = np.bincount(bins.places, minlength=len(bins.names))
+    counts = np.bincount(bins.places[is_lost(table)], minlength=len(bins.names))
+    rows = []
+    for name, count, total in zip(bins.names, counts, totals):
+        if total:
+            low, high = calc_wilson_interval(int(count), int(total))
+            rows.append((name, count / total, low, high,
+                         f"{name}: {count} of {total}, {100 * low:.1f} % to {100 * high:.1f} %"))
+    return f"<div>{drawing.draw_shares(rows, key)}</div>"
+
+
+def make_key_section(table: RunTable) -> str:
+    if not table.keys or not np.any(is_lost(table)):
+        return ""
+    pictures = "".join(make_share_picture(table, key) for key in table.keys)
+    return make_section(
+        "Share lost along each varied key",
+        f"<div class=\"pair\">{pictures}</div><p class=\"small\">Over all values of the other "
+        "keys; runs that failed count as lost. Lines: 95 % interval (Wilson).</p>")
+
+
+def make_heat_maps(table: RunTable, x: str, y: str, measure: str | None) -> str:
+    """Share lost and median of `measure` in the classes of two keys."""
+    columns, rows = make_bins(table, x), make_bins(table, y)
+    shape = (len(rows.names), len(columns.names))
+    place = rows.places * shape[1] + columns.places
+    counts = np.bincount(place, minlength=shape[0] * shape[1]).reshape(shape)
+    lost = np.bincount(place[is_lost(table)], minlength=shape[0] * shape[1]).reshape(shape)
+    names, labels = (columns.names, rows.names), (x, y)
+    pictures = ""
+    if np.any(lost):
+        with np.errstate(invalid="ignore"):
+            share = np.where(counts > 0, lost / np.maximum(counts, 1), np.nan)
+        pictures += f"<div>{drawing.draw_heat(share, counts, names, labels, 'share lost', (0, 1))}</div>"
+    if measure is not None:
+        medians = calc_class_medians(table, measure, place, shape)
+        title = f"median of {measure}, finished runs"
+        pictures += f"<div>{drawing.draw_heat(medians, counts, names, labels, title)}</div>"
+    return pictures
+
+
+def calc_class_medians(table: RunTable, measure: str, place: np.ndarray,
+                       shape: tuple[int, int]) -> np.ndarray:
+    """Of the runs that finished; NaN where none did."""
+    values = table.numbers[measure]
+    use = table.is_outcome("finished") & np.isfinite(values)
+    order = np.argsort(place[use], kind="stable")
+    places, values = place[use][order], values[use][order]
+    medians = np.full(shape[0] * shape[1], np.nan)
+    starts = np.flatnonzero(np.diff(places, prepend=-1))
+    for start, end in zip(starts, [*starts[1:], len(places)]):
+        medians[places[start]] = np.median(values[start:end])
+    return medians.reshape(shape)
+
+
+def make_pair_section(table: RunTable) -> str:
+    """Heat maps of each pair of keys that take more than one value."""
+    keys = [key for key in table.keys if len(make_bins(table, key).names) > 1]
+    pairs = list(combinations(keys, 2))[:MOST_PAIRS]
+    if not pairs:
+        return ""
+    measure = find_main_measure(table)
+    pictures = "".join(make_heat_maps(table, x, y, measure) for x, y in pairs)
+    return make_section(
+        "Pairs of varied keys",
+        f"<div class=\"pair\">{pictures}</div><p class=\"small\">Grey: no run there. Keys of many "
+        f"values are counted in {BINS} classes, named by their middles.</p>")
+
+
+def make_paired_section(table: RunTable, key: str) -> str:
+    """Of a key with two values: runs that differ in it alone, beside each other."""
+    found = find_pairs(table, key)
+    if found is None:
+        return ""
+    (a, b), in_a, in_b = found
+    a, b = name_word(a), name_word(b)
+    counts = count_changes(table, table, in_a, in_b)
+    outcomes = [[escape(cell) for cell in row] for row in make_outcome_rows(counts, a, b)]
+    measures = [[escape(cell) for cell in row]
+                for row in make_measure_rows(table, table, in_a, in_b, a, b)]
+    page = (make_plain_table(outcomes[0], outcomes[1:])
+            + f"<p class=\"small\">{len(in_a)} pairs of runs that differ in {escape(key)} alone. "
+            f"{escape(describe_changes(counts, a, b))}.</p>")
+    if len(measures) > 1:
+        page += ("<h3>Measures, of the "
+                 f"{int(find_finished(table, table, in_a, in_b).sum())} pairs that finish with "
+                 f"both</h3>{make_plain_table(measures[0], measures[1:])}")
+    return make_section(f"{escape(key)}: {escape(a)} against {escape(b)}", page)
+
+
+def make_measures(table: RunTable) -> str:
+    if not table.measures:
+        return "<p>Nothing was measured but the outcome.</p>"
+    rows, main, stages = [], "", ""
+    for name in table.measures:
+        values = find_values(table, name)
+        missing = len(table) - len(values)
+        quantiles = calc_quantiles(values, SHARES)
+        ends = (np.min(values), np.max(values)) if len(values) else (np.nan, np.nan)
+        rows.append([escape(name), *map(format_number, (ends[0], *quantiles, ends[1])),
+                     str(len(values)), str(missing)])
+    for name in table.measures[:MOST_COLUMNS]:
+        values = find_values(table, name)
+        finite = values[np.isfinite(values)]
+        if len(finite):
+            beyond = len(values) - len(finite)
+            note = (f"<p class=\"small\">{beyond} infinite values are not drawn.</p>"
+                    if beyond else "")
+            picture = (f"<h3>{escape(name)}</h3>{drawing.draw_distribution(finite, name)}{note}")
+            if name.startswith("stage_"):
+                stages += picture
+            else:
+                main += picture
+    page = make_plain_table(("measure", "least", "5 %", "median", "95 %", "largest", "runs",
+                             "without"), rows)
+    page += ("<p class=\"small\">Of the runs that finished; a measure that none of them has, such "
+             "as the time of the loss, of the others. Without: runs that are not counted. Right: "
+             "share of the runs with at most this value.</p>")
+    if stages:
+        main += f"<details><summary>Per stage</summary>{stages}</details>"
+    return page + main
+
+
+def choose_sample(table: RunTable) -> np.ndarray:
+    """Places of at most MOST_LINES runs, half of them lost where there are as many, evenly spaced."""
+    lost, finished = np.flatnonzero(is_lost(table)), np.flatnonzero(~is_lost(table))
+    half = MOST_LINES // 2
+    take_lost = min(len(lost), max(half, MOST_LINES - len(finished)))
+    take_finished = min(len(finished), MOST_LINES - take_lost)
+    chosen = [group[np.linspace(0, len(group) - 1, take).round().astype(int)]
+              for group, take in ((finished, take_finished), (lost, take_lost)) if take]
+    return np.concatenate(chosen)
+
+
+def make_parallel(table: RunTable) -> str:
+    sample = choose_sample(table)
+    axes: list[tuple[str, np.ndarray, Sequence[str] | None]] = []
+    for key in table.keys[:8]:
+        if key in table.words:
+            bins = make_bins(table, key, 12)
+            axes.append((key, bins.places[sample].astype(float), bins.names))
+        else:
+            axes.append((key, table.numbers[key][sample], None))
+    axes.append(("outcome", table.outcome[sample].astype(float), OUTCOMES))
+    shown = [name for name in table.measures if not name.startswith("stage_")
+             and not name.endswith(("_x_m", "_y_m", "_z_m"))]
+    axes += [(name, table.numbers[name][sample], None) for name in (shown or table.measures)[:6]]
+    colours = [OUTCOME_COLOURS[OUTCOMES[place]] for place in table.outcome[sample]]
+    return (f"<div class=\"scroll\">{drawing.draw_parallel(axes, colours)}</div>"
+            f"<p class=\"small\">One line per run: {len(sample)} of {len(table)} runs, evenly "
+            "chosen among those that finished (blue) and those that did not (orange: lost, grey: "
+            "failed).</p>")
+
+
+def list_worst(table: RunTable) -> list[tuple[str, np.ndarray]]:
+    """Titles and places in the table: failed, lost earliest, largest errors of those that finished."""
+    groups = [("Failed", np.flatnonzero(table.is_outcome("failed"))[:WORST])]
+    lost = np.flatnonzero(table.is_outcome("lost"))
+    moment = table.numbers.get("time_of_loss_s", table.numbers["steps"])[lost]
+    groups.append(("Lost, the earliest first", lost[np.argsort(moment, kind="stable")][:WORST]))
+    finished = np.flatnonzero(table.is_outcome("finished"))
+    measure = ("load_error_max_m" if "load_error_max_m" in table.measures
+               else find_main_measure(table))
+    if measure is not None:
+        values = table.numbers[measure][finished]
+        order = np.argsort(-values, kind="stable")
+        order = order[~np.isnan(values[order])]
+        groups.append((f"Finished, the largest {measure} first", finished[order][:WORST]))
+    return [(title, places) for title, places in groups if len(places)]
+
+
+def make_command(file: str, run: int) -> str:
+    return f"./sls campaign {file} --runs {run}-{run} --out /tmp/run-{run}"
+
+
+def make_worst(table: RunTable, file: str) -> str:
+    groups = list_worst(table)
+    rows_of = find_rows(table.file, (int(table.run[place]) for _, places in groups
+                                     for place in places))
+    page = ""
+    for title, places in groups:
+        rows = []
+        for place in places:
+            run = int(table.run[place])
+            row = rows_of[run]
+            values = ", ".join(f"{key} {shorten(row[key])}" for key in table.keys)
+            measured = row["reason"] or ", ".join(
+                f"{name} {format_number(float(table.numbers[name][place]))}"
+                for name in ("load_error_rms_m", "load_error_max_m", "tilt_max_rad", "force_max_n")
+                if name in table.measures)
+            rows.append([str(run), escape(values), escape(measured),
+                         f"<code>{escape(make_command(file, run))}</code>"])
+        page += f"<h3>{escape(title)}</h3>" + make_plain_table(
+            ("run", "values", "what happened", "fly it again"), rows, " class=\"left\"")
+    return page + ("<p class=\"small\">To keep its recording, set <code>keep: all</code> in a copy "
+                   "of the campaign file.</p>")
+
+
+def shorten(cell: str) -> str:
+    """A number with four digits; of text the first 40 characters."""
+    try:
+        return format_number(float(cell))
+    except ValueError:
+        return cell if len(cell) <= 40 else f"{cell[:39]}…"
+
+
+def make_facts(manifest: dict[str, Any]) -> str:
+    entries = "".join(f"<div><dt>{escape(key)}</dt><dd>{escape(value)}</dd></div>"
+                      for key, value in flatten(manifest))
+    return f"<dl class=\"facts\">{entries}</dl>"
+
+
+def flatten(value: Any, place: str = "") -> list[tuple[str, str]]:
+    """Leaves of the manifest by their paths, in its order, long ones cut."""
+    if isinstance(value, dict):
+        return [leaf for key, item in value.items()
+                for leaf in flatten(item, f"{place}.{key}" if place else str(key))]
+    if isinstance(value, float) and math.isfinite(value):
+        return [(place, f"{value:g}")]
+    text = ", ".join(map(str, value)) if isinstance(value, list) else str(value)
+    return [(place.replace("_", " "), text if len(text) <= 160 else f"{text[:159]}…")]

@@ -1,0 +1,138 @@
+"""runs.csv of a campaign as columns.
+
+Numbers are kept as arrays of doubles, text as numbers of a list of words, certificates not at all: a
+campaign of 100,000 runs takes some 40 MB. Columns in the order of the file: `run`, the varied keys by
+their paths, `outcome`, `reason`, the measures, `own_error` where the user's own functions measure, `steps`,
+`certificate`."""
+
+import csv
+import re
+from array import array
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from sls.input_error import InputError
+
+OWN_ERROR = "own_error"
+OUTCOMES = ("finished", "lost", "failed")
+NUMBER = re.compile(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?")
+
+
+@dataclass(frozen=True)
+class RunTable:
+    file: Path
+    keys: tuple[str, ...]  # paths of what was varied
+    measures: tuple[str, ...]  # column names
+    run: np.ndarray  # (n,) run indices
+    numbers: dict[str, np.ndarray]  # varied keys that hold numbers alone, measures and steps, (n,)
+    words: dict[str, tuple[list[str], np.ndarray]]  # other varied keys: values, and which of them, (n,)
+    outcome: np.ndarray  # (n,) place in OUTCOMES
+    reasons: Counter  # how often each reason, without its numbers, after the outcome
+
+    def __len__(self) -> int:
+        return len(self.run)
+
+    def is_outcome(self, name: str) -> np.ndarray:
+        return self.outcome == OUTCOMES.index(name)
+
+    def count(self, name: str) -> int:
+        return int(np.sum(self.is_outcome(name)))
+
+
+class Column:
+    """Of a varied key: doubles as long as every cell is a number, words from the first other one."""
+
+    def __init__(self) -> None:
+        self.cells = array("d")
+        self.texts: dict[str, int] | None = None
+        self.places = array("l")
+
+    def add(self, cell: str) -> None:
+        if self.texts is None:
+            try:
+                self.cells.append(float(cell))
+                return
+            except ValueError:
+                self.texts = {}
+                for value in self.cells:
+                    self.add(repr(value))
+        self.places.append(self.texts.setdefault(cell, len(self.texts)))
+
+
+def read_rows(file: Path) -> Iterator[list[str]]:
+    """Header and rows; raises InputError."""
+    try:
+        with file.open(newline="") as lines:
+            yield from csv.reader(lines)
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise InputError(f"{file}: expected the table of a campaign, got: {reason}") from None
+
+
+def split_header(file: Path, header: list[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Varied keys and measures; raises InputError."""
+    if (header[:1] != ["run"] or "outcome" not in header
+            or header[header.index("outcome"):][:2] != ["outcome", "reason"]
+            or header[-2:] != ["steps", "certificate"]):
+        raise InputError(f"{file}:1: expected the columns run, …, outcome, reason, …, steps, "
+                         f"certificate, got '{','.join(header)[:80]}'")
+    middle = header.index("outcome")
+    measures = header[middle + 2:-2]
+    return tuple(header[1:middle]), tuple(measures[:-1] if measures[-1:] == [OWN_ERROR]
+                                          else measures)
+
+
+def read_runs(file: Path) -> RunTable:
+    """One pass over the file. Raises InputError with file and line."""
+    rows = read_rows(file)
+    header = next(rows, [])
+    keys, measures = split_header(file, header)
+    run, outcome, steps = array("q"), array("b"), array("d")
+    columns = [Column() for _ in keys]
+    values = [array("d") for _ in measures]
+    reasons: Counter = Counter()
+    first_measure = len(keys) + 3
+    for line, row in enumerate(rows, start=2):
+        try:
+            if len(row) != len(header):
+                raise ValueError(f"{len(row)} fields")
+            run.append(int(row[0]))
+            for column, cell in zip(columns, row[1:]):
+                column.add(cell)
+            outcome.append(OUTCOMES.index(row[len(keys) + 1]))
+            for numbers, cell in zip(values, row[first_measure:]):
+                numbers.append(float(cell) if cell else np.nan)
+            steps.append(float(row[-2] or "nan"))
+        except ValueError as error:
+            raise InputError(f"{file}:{line}: expected a run of {len(header)} fields, "
+                             f"got: {error}") from None
+        if row[len(keys) + 2]:
+            reasons[f"{row[len(keys) + 1]}: {leave_out_numbers(row[len(keys) + 2])}"] += 1
+        if header[-3] == OWN_ERROR and row[-3]:
+            reasons[f"own measure: {leave_out_numbers(row[-3])}"] += 1
+    numbers = {key: np.asarray(column.cells) for key, column in zip(keys, columns)
+               if column.texts is None}
+    numbers |= {name: np.asarray(cells) for name, cells in zip(measures, values)}
+    numbers["steps"] = np.asarray(steps)
+    words = {key: (list(column.texts), np.asarray(column.places))
+             for key, column in zip(keys, columns) if column.texts is not None}
+    return RunTable(file, keys, measures, np.asarray(run), numbers, words, np.asarray(outcome),
+                    reasons)
+
+
+def leave_out_numbers(reason: str) -> str:
+    """So that reasons that only differ in a moment or a size count as one. A number is kept where it
+    belongs to a name, such as `figure_eight_2`."""
+    return re.sub(rf"(?<![\w.-]){NUMBER.pattern}(?![\w])", "…", reason)
+
+
+def find_rows(file: Path, runs: Iterable[int]) -> dict[int, dict[str, str]]:
+    """The rows of some runs, as text, by run index: a second pass."""
+    wanted = {str(run) for run in runs}
+    rows = read_rows(file)
+    header = next(rows, [])
+    return {int(row[0]): dict(zip(header, row)) for row in rows if row and row[0] in wanted}

@@ -1,0 +1,114 @@
+"""Rows of runs.csv: one run each, a pure function of its index."""
+
+import math
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from sls.campaign.campaign import Campaign
+from sls.campaign.sampling import is_certified, make_values, to_yaml_value
+from sls.core import load_core
+from sls.errors import ConfigError
+
+if TYPE_CHECKING:
+    from _sls_core import Runs
+    from sls import Flight
+    from sls.campaign.own_measures import OwnMeasures
+
+BLOCK = 1000  # runs whose values are held at once
+
+
+@dataclass(frozen=True)
+class Row:
+    index: int
+    cells: tuple[str, ...]  # one for each of `list_columns`
+
+
+class RefusedRun(Exception):
+    """A run whose scenario is refused: one line that names its index."""
+
+
+def make_runs(campaign: Campaign) -> "Runs":
+    """Flies the base scenario once. Raises sls.ConfigError."""
+    from _sls_core import Runs
+    from sls import Flight
+    return Runs(str(campaign.base), campaign.scenario_paths, list(campaign.measures),
+                campaign.period_s)
+
+
+def list_own_columns(campaign: Campaign) -> list[str]:
+    names = [column for own in campaign.own_measures for column in own.columns]
+    return [*names, "own_error"] if names else []
+
+
+def list_columns(campaign: Campaign, runs: "Runs") -> list[str]:
+    """The columns of runs.csv."""
+    return ["run", *campaign.paths, "outcome", "reason", *runs.columns,
+            *list_own_columns(campaign), "steps", "certificate"]
+
+
+def to_cell(value: Any) -> str:
+    """A varied value as text: that of the scenario's YAML, a text of one line without its quotes."""
+    is_plain = isinstance(value, str) and value.isprintable()
+    return value if is_plain else to_yaml_value(value)
+
+
+def to_number(value: float) -> str:
+    """The shortest text that reads back as the same number; empty where there is none."""
+    return "" if math.isnan(value) else repr(value)
+
+
+def to_one_line(text: str) -> str:
+    """Without line breaks, and without addresses, which differ from process to process."""
+    return re.sub(r"0x[0-9a-f]{6,}", "0x…", " ".join(text.split()))
+
+
+def list_yaml_values(campaign: Campaign, values: list[Any]) -> list[str]:
+    """What the scenario's varied keys hold in a run."""
+    return [to_yaml_value(value) for value in campaign.pick_scenario_values(values)]
+
+
+def fly_run(campaign: Campaign, runs: "Runs", index: int, values: list[Any],
+            own: "OwnMeasures | None" = None) -> Row:
+    """Flies one run. Raises RefusedRun where its scenario is refused."""
+    texts = list_yaml_values(campaign, values)
+    try:
+        outcome, reason, measures, certificate, steps = runs.fly(
+            texts, is_certified(campaign, index))
+        own_cells = own.measure(runs.scenario_text(texts)) if own else []
+    except ConfigError as error:
+        raise RefusedRun(f"run {index}: {error}") from None
+    return Row(index, (str(index), *map(to_cell, values), outcome, to_one_line(reason),
+                       *map(to_number, measures), *own_cells, str(steps), certificate))
+
+
+def fly_whole(campaign: Campaign, runs: "Runs", values: list[Any]) -> "Flight":
+    """The same flight with all its columns. Raises ConfigError, RunError."""
+    return fly_text(runs.scenario_text(list_yaml_values(campaign, values)), campaign)
+
+
+def fly_text(scenario_text: str, campaign: Campaign) -> "Flight":
+    """Flies a scenario whose paths are relative to the base scenario's folder."""
+    import sls
+    return sls.fly(load_core().Scenario(None, scenario_text, str(campaign.base.parent), {}))
+
+
+def list_values(campaign: Campaign, first: int, last: int) -> Iterator[tuple[int, list[Any]]]:
+    """Index and values of each run, in order, without holding all."""
+    for begin in range(first, last + 1, BLOCK):
+        block = make_values(campaign, begin, min(begin + BLOCK - 1, last))
+        yield from enumerate(block, begin)
+
+
+Announce = Callable[[int], None]
+
+
+def fly_range(campaign: Campaign, runs: "Runs", first: int, last: int,
+              own: "OwnMeasures | None" = None,
+              announce: Announce | None = None) -> Iterator[Sequence[str]]:
+    """The cells of each run's row. `announce` hears each index before it is flown."""
+    for index, values in list_values(campaign, first, last):
+        if announce:
+            announce(index)
+        yield fly_run(campaign, runs, index, values, own).cells

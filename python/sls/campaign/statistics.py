@@ -1,0 +1,115 @@
+"""The statistics of a campaign: shares, distributions and paired differences.
+
+Nothing here is random: intervals are by formula, so that the same runs give the same page. With Φ the
+standard normal distribution, z = Φ⁻¹((1 + level)/2) and B(n) the number of heads of n fair coins:
+
+    (1)  Wilson score interval of a share p = k/n:
+         (p + z²/2n ± z √(p (1 − p)/n + z²/4n²)) / (1 + z²/n)
+    (2)  empirical distribution: E(x) = number of values ≤ x, divided by their number
+    (3)  quantile of share p: the sorted values x₀ … x₍ₙ₋₁₎, linear between them, at rank p (n − 1)
+    (4)  median of paired differences, interval without any assumption on their distribution: from the
+         k-th smallest to the k-th largest, k the largest number with P(B(n) < k) ≤ (1 − level)/2
+    (5)  sign test: of n differences other than 0, the smaller of both signs occurs k times;
+         p = min(1, 2 P(B(n) ≤ k))
+    (6)  McNemar's exact test of changed outcomes: (5) with the runs that changed to one outcome and
+         those that changed to the other
+
+Sources: Wilson (1927), J. Am. Stat. Assoc. 22, 209; Hyndman and Fan (1996), Am. Stat. 50, 361, type 7, for
+(3); Hahn and Meeker, Statistical Intervals, section 5.2, for (4); McNemar (1947), Psychometrika 12, 153.
+"""
+
+from dataclasses import dataclass
+from statistics import NormalDist
+
+import numpy as np
+from scipy.stats import binom
+
+LEVEL = 0.95
+
+
+def calc_wilson_interval(count: int, total: int, level: float = LEVEL) -> tuple[float, float]:
+    """Low and high end of the share `count`/`total`, eq. (1); (0, 1) of no runs at all."""
+    if not 0 <= count <= total:
+        raise ValueError(f"count: expected from 0 to {total}, got {count}")
+    if total == 0:
+        return 0.0, 1.0
+    z_2 = NormalDist().inv_cdf((1.0 + level) / 2.0) ** 2
+    share = count / total
+    centre = share + z_2 / (2 * total)
+    spread = (z_2 * (share * (1.0 - share) / total + z_2 / (4.0 * total**2))) ** 0.5
+    # Rounding must not leave the range: the ends are exact where nothing or everything counts.
+    low = 0.0 if count == 0 else (centre - spread) / (1.0 + z_2 / total)
+    high = 1.0 if count == total else (centre + spread) / (1.0 + z_2 / total)
+    return low, high
+
+
+def calc_ecdf(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where the empirical distribution (2) steps, ascending, and its value from there on. NaN is left
+    out."""
+    values = np.asarray(values, dtype=float)
+    places, counts = np.unique(values[~np.isnan(values)], return_counts=True)
+    return places, np.cumsum(counts) / max(1, counts.sum())
+
+
+def calc_quantiles(values: np.ndarray, shares: tuple[float, ...]) -> np.ndarray:
+    """Quantiles (3), one per share; NaN is left out, and all are NaN of no values. Infinite values are
+    values."""
+    values = np.sort(values[~np.isnan(values)])
+    if not len(values):
+        return np.full(len(shares), np.nan)
+    ranks = np.asarray(shares, dtype=float) * (len(values) - 1)
+    low = np.floor(ranks).astype(int)
+    high = np.minimum(low + 1, len(values) - 1)
+    part = ranks - low
+    with np.errstate(invalid="ignore"):  # infinity beside infinity
+        between = values[low] + part * (values[high] - values[low])
+    return np.where((part == 0.0) | (values[low] == values[high]), values[low], between)
+
+
+@dataclass(frozen=True)
+class PairedDifference:
+    """Of b − a, run by run, where both are defined."""
+
+    count: int
+    median: float
+    low: float  # of the interval of the median (4); −inf where there are too few pairs for one
+    high: float
+    smaller: int  # how often b < a
+    larger: int
+    p: float  # of the sign test (5)
+
+
+def calc_sign_p(one: int, other: int) -> float:
+    """p of eq. (5), where one sign occurs `one` and the other `other` times; 1 if neither occurs."""
+    return float(min(1.0, 2.0 * binom.cdf(min(one, other), one + other, 0.5)))
+
+
+def calc_mcnemar_p(to_one: int, to_other: int) -> float:
+    """p of eq. (6): that so unequal numbers of changes in both directions come about by chance."""
+    return calc_sign_p(to_one, to_other)
+
+
+def calc_paired_difference(a: np.ndarray, b: np.ndarray, level: float = LEVEL) -> PairedDifference:
+    """Of arrays of equal length; pairs with a NaN, or with two equal infinities, are left out."""
+    with np.errstate(invalid="ignore"):
+        differences = np.asarray(b, dtype=float) - np.asarray(a, dtype=float)
+    differences = np.sort(differences[~np.isnan(differences)])
+    count = len(differences)
+    if not count:
+        return PairedDifference(0, np.nan, -np.inf, np.inf, 0, 0, 1.0)
+    smaller, larger = int(np.sum(differences < 0)), int(np.sum(differences > 0))
+    rank = find_interval_rank(count, level)
+    low, high = ((differences[rank - 1], differences[count - rank]) if rank
+                 else (-np.inf, np.inf))
+    return PairedDifference(count, float(calc_quantiles(differences, (0.5,))[0]), float(low),
+                            float(high), smaller, larger, calc_sign_p(smaller, larger))
+
+
+def find_interval_rank(count: int, level: float = LEVEL) -> int:
+    """k of eq. (4); 0 where even the extremes are no interval of this level."""
+    tail = (1.0 - level) / 2.0
+    # ppf gives the smallest j with P(B ≤ j) ≥ tail, hence P(B < j) = P(B ≤ j − 1) < tail.
+    rank = int(binom.ppf(tail, count, 0.5))
+    while rank > 0 and binom.cdf(rank - 1, count, 0.5) > tail:
+        rank -= 1
+    return rank

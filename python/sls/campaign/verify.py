@@ -1,0 +1,130 @@
+"""Flies runs of a campaign again with the three programs over DDS and compares certificates."""
+
+import json
+import os
+import re
+import socket
+import subprocess
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sls.campaign.campaign import Campaign
+from sls.campaign.engines import EngineError
+from sls.campaign.folder import CampaignFolder
+from sls.campaign.runs import list_yaml_values, make_runs
+from sls.campaign.sampling import choose_runs, make_values
+from sls.core import load_core
+
+if TYPE_CHECKING:
+    from _sls_core import Runs
+
+ROOT = Path(__file__).resolve().parents[3]
+SEED = 1
+DOMAINS = range(100, 161)
+LONGEST_FLIGHT_S = 1800.0
+# The flight begins with its recorder, whatever the scenario says: no certificate depends on it.
+ALL_TAKE_PART = {"sync.wait_for": "{ controllers: 1, recorders: 1, timeout_s: 60 }"}
+
+
+@contextmanager
+def own_domain() -> Iterator[int]:
+    """A DDS domain that no other campaign of this machine flies on now, by the name of a socket
+    that leaves nothing behind."""
+    for number in DOMAINS:
+        lock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        try:
+            lock.bind(f"\0sls-verify-domain-{number}")
+        except OSError:
+            lock.close()
+            continue
+        try:
+            yield number
+        finally:
+            lock.close()
+        return
+    raise EngineError(f"--verify: expected a free DDS domain from {DOMAINS[0]} to {DOMAINS[-1]}, "
+                      "got none; --domain names one")
+
+
+@contextmanager
+def written_scenario(text: str, base: Path, folder: Path) -> Iterator[Path]:
+    """A file with this scenario; beside the base where it names a library, whose path is relative
+    to the file."""
+    if re.search(r"\.so\b", text):
+        folder = base.parent
+    file = folder / f".verify-{os.getpid()}.yaml"
+    try:
+        file.write_text(text)
+    except OSError as error:
+        raise EngineError(f"{file}: expected to write it, got: {error.strerror}") from None
+    try:
+        yield file
+    finally:
+        file.unlink(missing_ok=True)
+
+
+def fly_over_dds(scenario: Path, recording: Path, domain: int) -> str:
+    """The certificate of the flight by sim_server, control_client and recorder, in lockstep. A
+    flight that fails has one, too. Raises EngineError where there is no recording."""
+    command = [str(ROOT / "sls"), "run", str(scenario), "--out", str(recording), "--mode",
+               "lockstep", "--domain", str(domain)]
+    build = os.environ.get("SLS_BUILD", str(ROOT / "build"))
+    try:
+        done = subprocess.run(command, env={**os.environ, "SLS_BUILD": build}, check=False,
+                              capture_output=True, text=True, errors="replace",
+                              timeout=LONGEST_FLIGHT_S)
+    except subprocess.TimeoutExpired:
+        raise EngineError(f"{scenario}: expected a flight of less than {LONGEST_FLIGHT_S:.0f} s, "
+                          "got a longer one") from None
+    try:
+        return json.loads((recording / "manifest.json").read_text())["certificate"]
+    except (OSError, ValueError, KeyError):
+        said = done.stderr.strip().splitlines()
+        raise EngineError(f"{scenario}: expected a recording with a certificate, got exit code "
+                          f"{done.returncode}: {said[-1] if said else 'nothing said'}") from None
+
+
+def find_certificate(campaign: Campaign, runs: "Runs", row: dict[str, str]) -> str:
+    """That of the table; of a run that has none there from a flight in this process."""
+    if row["certificate"]:
+        return row["certificate"]
+    index = int(row["run"])
+    return runs.fly(list_yaml_values(campaign, make_values(campaign, index, index)[0]), True)[3]
+
+
+def verify(folder: CampaignFolder, count: int, say: Callable[[str], None],
+           domain: int | None = None, seed: int = SEED) -> bool:
+    """Flies `count` runs of those in the folder, chosen by `seed`, in turn. Says each that differs
+    and a summary, puts them into the manifest. True where all are equal. Raises EngineError."""
+    campaign, plan = folder.campaign, folder.plan
+    runs = make_runs(campaign)
+    size = plan.last - plan.first + 1
+    chosen = [plan.first + index for index in
+              choose_runs(size, min(count, size), seed, purpose="verify")]
+    differing = list[dict[str, Any]]()
+    for index in chosen:
+        expected = find_certificate(campaign, runs, folder.read_row(index))
+        got = fly_run_over_dds(campaign, runs, index, domain)
+        if got != expected:
+            differing.append({"run": index, "expected": expected, "got": got})
+            say(f"verify: run {index}: expected certificate {expected}, got {got}")
+    say(f"verify: {len(chosen) - len(differing)} of {len(chosen)} runs have the same certificate "
+        "when flown over DDS")
+    manifest = folder.manifest
+    manifest["verified"] = {"runs": chosen, "seed": seed, "differing": differing}
+    folder.write_manifest(manifest)
+    return not differing
+
+
+def fly_run_over_dds(campaign: Campaign, runs: "Runs", index: int, domain: int | None) -> str:
+    text = runs.scenario_text(list_yaml_values(campaign, make_values(campaign, index, index)[0]))
+    text = load_core().Scenario(None, text, str(campaign.base.parent), ALL_TAKE_PART).to_text()
+    with tempfile.TemporaryDirectory(prefix="sls-verify-") as scratch, \
+            written_scenario(text, campaign.base, Path(scratch)) as scenario:
+        if domain is not None:
+            return fly_over_dds(scenario, Path(scratch) / "recording", domain)
+        with own_domain() as number:
+            return fly_over_dds(scenario, Path(scratch) / "recording", number)

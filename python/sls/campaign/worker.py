@@ -1,0 +1,166 @@
+"""Flies chunks of a campaign's folder: `./sls campaign-worker DIR --chunks A-B`, the processes of
+the local engine, and `fly_chunk` for Slurm and Dask."""
+
+import argparse
+import json
+import os
+import re
+import sys
+import threading
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NoReturn
+
+from sls.campaign.engines import EngineError
+from sls.campaign.folder import CampaignFolder, DamagedChunk
+from sls.campaign.kept import keep_while_flying
+from sls.campaign.own_measures import load_own_measures
+from sls.campaign.runs import Announce, RefusedRun, fly_range, make_runs
+from sls.errors import ConfigError, RunError
+from sls.input_error import InputError
+
+
+class ChunkFlyer:
+    """What a process needs for the chunks of one folder, made once. Raises ConfigError where the
+    campaign cannot be flown here, such as on a machine of another kind."""
+
+    def __init__(self, folder: Path):
+        self.folder = CampaignFolder(folder)
+        self.folder.refuse_other_machine(self.folder.plan)
+        self.campaign = self.folder.campaign
+        self.runs = make_runs(self.campaign)
+        self.own = load_own_measures(self.campaign)
+
+    def fly(self, number: int, announce: Announce | None = None) -> dict[str, int | float]:
+        """Flies a chunk unless it is there whole; `runs` are those that were flown. Raises
+        EngineError, RefusedRun."""
+        first, last = self.folder.find_chunk(number)
+        begin = time.monotonic()
+        try:
+            self.folder.read_whole_chunk(number)
+            return {"chunk": number, "runs": 0, "wall_s": 0.0}
+        except DamagedChunk:
+            pass
+        rows = []
+        for cells in fly_range(self.campaign, self.runs, first, last, self.own, announce):
+            keep_while_flying(self.folder, self.campaign, self.runs, cells)
+            rows.append(cells)
+        wall_s = time.monotonic() - begin
+        self.folder.write_chunk(number, rows, wall_s)
+        return {"chunk": number, "runs": len(rows), "wall_s": wall_s}
+
+
+_flyers: dict[tuple[str, str], ChunkFlyer] = {}
+_one_at_a_time = threading.Lock()  # a Dask worker may have several threads
+
+
+def fly_chunk(folder: str, number: int) -> dict[str, int | float]:
+    """Flies one chunk and writes it whole; does nothing where it is there. Raises ConfigError,
+    EngineError."""
+    with _one_at_a_time:
+        place = str(Path(folder).resolve())
+        key = place, CampaignFolder(place).plan.sha256
+        if key not in _flyers:
+            _flyers.clear()
+            _flyers[key] = ChunkFlyer(Path(place))
+        flyer = _flyers[key]
+        flyer.folder.forget_plan()  # its permissions may have changed
+        try:
+            return flyer.fly(number)
+        except RefusedRun as error:
+            raise InputError(str(error)) from None
+
+
+def serve(folder: Path) -> None:
+    """A process of the local engine: reads `CHUNK` or `CHUNK announce` from stdin, answers one line
+    of JSON each; with `announce` a line before each run, too, so that a run that ends the process
+    is known. Ends with stdin."""
+    flyer = ChunkFlyer(folder)
+    answer({"ready": os.getpid()})
+    for line in sys.stdin:
+        number, *announce = line.split()
+        answer(flyer.fly(int(number), (lambda run: answer({"run": run})) if announce else None))
+
+
+def answer(message: dict[str, int | float | str]) -> None:
+    print(json.dumps(message), flush=True)
+
+
+class Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        raise InputError(f"{self.prog}: {message} (see ./sls help)")
+
+
+def parse_range(text: str) -> tuple[int, int]:
+    """`A-B` or `A`. Raises ArgumentTypeError."""
+    match = re.fullmatch(r"(\d{1,12})(?:-(\d{1,12}))?", text)
+    if not match or int(match[2] or match[1]) < int(match[1]):
+        raise argparse.ArgumentTypeError(f"expected A-B with A ≤ B, got '{text}'")
+    return int(match[1]), int(match[2] or match[1])
+
+
+def list_numbers(options: argparse.Namespace) -> list[int]:
+    """The chunks that the command line asks for. Raises InputError."""
+    if options.chunks:
+        first, last = options.chunks
+        return list(range(first, last + 1))
+    text = os.environ.get(options.index_from, "")
+    if not re.fullmatch(r"\d{1,9}", text):
+        raise InputError(f"--index-from {options.index_from}: expected this environment variable to "
+                         f"hold an index, got '{text}'")
+    begin = int(text) * options.chunks_each
+    return list(range(begin, begin + options.chunks_each))
+
+
+def fly_listed(options: argparse.Namespace) -> None:
+    numbers = list_numbers(options)
+    flyer = ChunkFlyer(options.folder)
+    count = len(flyer.folder.chunks)
+    for number in numbers:
+        if number >= count and options.index_from:
+            break  # the last index has fewer
+        done = flyer.fly(number)
+        print(f"campaign-worker: chunk {number}: {done['runs']} runs in {done['wall_s']:.3f} s",
+              file=sys.stderr)
+
+
+def main(arguments: Sequence[str]) -> int:
+    """The exit code."""
+    parser = Parser(prog="campaign-worker", description="Flies chunks of a campaign's folder.")
+    parser.add_argument("folder", type=Path, metavar="DIR", help="folder of the campaign")
+    which = parser.add_mutually_exclusive_group(required=True)
+    which.add_argument("--chunks", type=parse_range, metavar="A-B", help="which chunks, inclusive")
+    which.add_argument("--index-from", metavar="ENV", default="",
+                       help="environment variable with the index of this task, such as "
+                            "JOB_COMPLETION_INDEX")
+    which.add_argument("--serve", action="store_true", help=argparse.SUPPRESS)
+    parser.add_argument("--chunks-each", type=int, default=1, metavar="N",
+                        help="of --index-from: chunks of each index (default: 1)")
+    serving = False
+    try:
+        options = parser.parse_args(arguments)
+        serving = options.serve
+        if serving:
+            serve(options.folder)
+        else:
+            fly_listed(options)
+        return 0
+    except (ConfigError, RefusedRun, ImportError) as error:
+        return fail(str(error), 2, serving)
+    except (EngineError, RunError, OSError) as error:
+        return fail(str(error), 1, serving)
+    except KeyboardInterrupt:
+        return 130
+
+
+def fail(text: str, code: int, serving: bool) -> int:
+    if serving:
+        answer({"error": text, "code": code})
+    else:
+        print(f"campaign-worker: error: {text}", file=sys.stderr)
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

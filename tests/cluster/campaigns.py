@@ -1,0 +1,151 @@
+"""A short campaign that a test can hold in flight, and `./sls campaign` on a test host."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+from hosts import TestHosts
+from processes import wait_until
+
+ROOT = Path(__file__).resolve().parents[2]
+BUILD = Path(os.environ.get("SLS_BUILD", ROOT / "build"))
+PATH = os.pathsep.join([str(ROOT / "python"), str(BUILD / "python")])
+LIMIT_S = 60.0
+
+CAMPAIGN = """\
+base: base.yaml
+runs: 60
+vary:
+  vehicle.load_mass_kg: { uniform: [0.15, 0.25], seed: 1 }
+measure:
+  - load_error_rms
+  - load_error_max
+  - { python: gate.py, function: gate, columns: [gate] }
+"""
+
+# The table is the same, held or not: the measure is 0.
+GATE = """\
+import platform
+import time
+from pathlib import Path
+
+HERE = Path(__file__).parent
+
+
+def gate(flight):
+    hold, deadline = HERE / "hold", time.monotonic() + 60
+    if platform.node() == "head":  # the launcher tries a run
+        return 0.0
+    if hold.exists():
+        (HERE / f"flying-{platform.node()}").touch()
+    while hold.exists() and time.monotonic() < deadline:
+        time.sleep(0.02)
+    return 0.0
+"""
+
+BASE = """\
+name: short
+vehicle: { quad_mass_kg: 1.5, load_mass_kg: 0.2, rod_length_m: 1.0, gravity_m_s2: 9.8 }
+plant:
+  model: analytic
+  step_s: 0.001
+  initial: { load_position_m: [0, 0, -0.5] }
+sync: { mode: lockstep, period_s: 0.004, wait_for: { controllers: 1, recorders: 1, timeout_s: 30 } }
+controller:
+  gains: { lqr: { horizontal: 10, vertical: 5 } }
+  force_limit_n: 200
+mission:
+  - figure_eight: { amplitude_m: [1.5, 0.75, 0.5], offset_m: [0, 0, -0.5], period_s: 16 }
+    for_s: 2
+"""
+
+# As `./sls campaign`, with shorter patience where a test asks for it.
+LAUNCH = """\
+import importlib, sys
+for change in sys.argv[1].split():
+    name, value = change.split("=")
+    module, _, constant = name.rpartition(".")
+    setattr(importlib.import_module("sls.campaign.engines." + module), constant, eval(value))
+from sls.campaign.cli import main
+sys.exit(main(sys.argv[2:]))
+"""
+
+
+class TestCampaign:
+    """In `folder`, flown by a launcher on the test host `head`."""
+
+    __test__ = False  # not for pytest
+
+    def __init__(self, hosts: TestHosts, folder: Path):
+        self.hosts = hosts
+        self.folder = folder
+        self.file = folder / "short.yaml"
+        self.file.write_text(CAMPAIGN)
+        (folder / "gate.py").write_text(GATE)
+        (folder / "base.yaml").write_text(BASE)
+        self.hold_file = folder / "hold"
+
+    def start(self, *arguments: str, changes: str = "", **environment: str) -> "Launched":
+        command = [sys.executable, "-BP", "-c", LAUNCH, changes, *arguments]
+        return Launched(subprocess.Popen(
+            self.hosts.on("head", *command), stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+            text=True, cwd=self.folder,
+            env={**os.environ, "SLS_BUILD": str(BUILD), "PYTHONPATH": PATH, **environment}))
+
+    def fly(self, out: str, *arguments: str, changes: str = "", **environment: str) -> "Launched":
+        return self.start(self.file.name, "--out", out, "--chunk-runs", "10", *arguments,
+                          changes=changes, **environment)
+
+    def table(self, out: str) -> bytes:
+        return (self.folder / out / "runs.csv").read_bytes()
+
+    def machines(self, out: str) -> set[str]:
+        """Which of them flew chunks, as their files tell."""
+        return {host for file in (self.folder / out / "chunks").glob("chunk-*.csv")
+                for host in self.hosts.address if f'"host": "{host}"' in file.read_text()}
+
+    def hold(self) -> None:
+        """From now on, runs wait."""
+        for file in self.folder.glob("flying-*"):
+            file.unlink()
+        self.hold_file.touch()
+
+    def wait_until_held(self, *hosts: str) -> None:
+        for host in hosts:
+            wait_until((self.folder / f"flying-{host}").exists, LIMIT_S, f"a run waits on {host}")
+
+    def release(self) -> None:
+        self.hold_file.unlink(missing_ok=True)
+
+
+class Launched:
+    """A launcher that runs."""
+
+    def __init__(self, process: subprocess.Popen):
+        self.process = process
+        self.output = ""
+
+    def is_running(self) -> bool:
+        return self.process.poll() is None
+
+    def expect(self, code: int, *texts: str) -> str:
+        """Waits for its end. Raises AssertionError with its output for another exit code, or where
+        a text is missing; an error is one line."""
+        try:
+            self.output, _ = self.process.communicate(timeout=LIMIT_S)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.output, _ = self.process.communicate()
+        assert self.process.returncode == code, self.output
+        for text in texts:
+            assert text in self.output, self.output
+        if code in (1, 2):
+            assert "Traceback" not in self.output, self.output
+            assert self.output.splitlines()[-1].startswith("sls: error: "), self.output
+        return self.output
+
+    def close(self) -> None:
+        if self.is_running():
+            self.process.kill()
+            self.process.communicate()

@@ -1,0 +1,65 @@
+"""A real Dask of Debian's packages: the scheduler on the test host `head`, a worker on each of the
+others."""
+
+import re
+import sys
+from pathlib import Path
+
+from hosts import Obstacle, TestHosts
+from processes import Processes, wait_until
+
+START_S = 30.0
+WORKERS = ("n1", "n2")
+
+
+class DaskCluster:
+    """`with DaskCluster(hosts, folder) as dask`: in the end every process is gone. Raises
+    Obstacle."""
+
+    def __init__(self, hosts: TestHosts, folder: Path, port: int = 8786):
+        try:
+            import distributed
+        except ImportError:
+            raise Obstacle("distributed is missing (apt-get install python3-distributed)") from None
+        assert distributed
+        self.hosts = hosts
+        self.folder = folder
+        self.port = port
+        self.address = f"tcp://{hosts.address['head']}:{port}"
+        self.processes = Processes(folder)
+
+    def __enter__(self) -> "DaskCluster":
+        try:
+            self.start_scheduler()
+            for worker in WORKERS:
+                self.start_worker(worker)
+            for worker in WORKERS:
+                self.wait_for(worker, r"Registered to:")
+        except BaseException:
+            self.processes.end_all()
+            raise
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.processes.end_all()
+
+    def start_scheduler(self) -> None:
+        self.start("scheduler", "head", "dask_scheduler", "--host", self.hosts.address["head"],
+                   "--port", str(self.port))
+        self.wait_for("scheduler", r"Scheduler at:")
+
+    def start_worker(self, name: str) -> None:
+        # No path of ours: the worker finds the package as it was told with its task. Without a
+        # nanny, which would start it again.
+        self.start(name, name, "dask_worker", self.address, "--nthreads", "1", "--no-nanny",
+                   "--host", self.hosts.address[name], "--local-directory",
+                   str(self.folder / f"of-{name}"), "--memory-limit", "0")
+
+    def start(self, name: str, host: str, module: str, *options: str) -> None:
+        self.processes.start(name, self.hosts.on(
+            host, sys.executable, "-B", "-m", f"distributed.cli.{module}", "--no-dashboard",
+            *options), PYTHONPATH="")
+
+    def wait_for(self, name: str, line: str) -> None:
+        wait_until(lambda: re.search(line, self.processes.output(name)), START_S,
+                   f"{name} says '{line}'")

@@ -1,0 +1,99 @@
+"""Campaigns on a real Dask: the table of the local engine, whatever is killed meanwhile."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from campaigns import PATH, TestCampaign
+from dask_cluster import DaskCluster
+from hosts import Obstacle, TestHosts
+
+FAST = "dask.CONNECT_S=1"
+
+
+@pytest.fixture(scope="module")
+def dask(tmp_path_factory: pytest.TempPathFactory) -> Iterator[DaskCluster]:
+    try:
+        with TestHosts("head", "n1", "n2") as hosts, \
+                DaskCluster(hosts, tmp_path_factory.mktemp("dask")) as cluster:
+            yield cluster
+    except Obstacle as obstacle:
+        pytest.skip(str(obstacle))
+
+
+@pytest.fixture(scope="module")
+def flown(dask: DaskCluster, tmp_path_factory: pytest.TempPathFactory) -> TestCampaign:
+    """The campaign, flown by the local engine in the folder `local`."""
+    campaign = TestCampaign(dask.hosts, tmp_path_factory.mktemp("campaign"))
+    campaign.fly("local").expect(0)
+    return campaign
+
+
+@pytest.fixture
+def campaign(flown: TestCampaign) -> Iterator[TestCampaign]:
+    yield flown
+    flown.release()
+
+
+def test_dask_makes_the_table_of_the_local_engine(dask: DaskCluster,
+                                                  campaign: TestCampaign) -> None:
+    campaign.fly("plain", "--on", "dask", "--scheduler", dask.address).expect(0)
+    assert campaign.table("plain") == campaign.table("local")
+    assert campaign.machines("plain") == {"n1", "n2"}
+
+
+def test_the_chunk_of_a_killed_worker_goes_to_another_one(dask: DaskCluster,
+                                                          campaign: TestCampaign) -> None:
+    campaign.hold()
+    launched = campaign.fly("killed", "--on", "dask", "--scheduler", dask.address)
+    campaign.wait_until_held("n1", "n2")
+    dask.processes.kill("n1")
+    campaign.release()
+    launched.expect(0)
+    assert campaign.table("killed") == campaign.table("local")
+    assert campaign.machines("killed") == {"n2"}
+    dask.start_worker("n1")
+
+
+def test_a_campaign_waits_for_workers(dask: DaskCluster, campaign: TestCampaign) -> None:
+    campaign.hold()
+    launched = campaign.fly("waited", "--on", "dask", "--scheduler", dask.address)
+    campaign.wait_until_held("n1", "n2")
+    for worker in ("n1", "n2"):
+        dask.processes.kill(worker)
+    campaign.release()
+    for worker in ("n1", "n2"):
+        dask.start_worker(worker)
+    launched.expect(0)
+    assert campaign.table("waited") == campaign.table("local")
+
+
+def test_a_lost_scheduler_ends_the_campaign_with_a_line_and_resume_goes_on(
+        dask: DaskCluster, campaign: TestCampaign) -> None:
+    campaign.hold()
+    launched = campaign.fly("lost", "--on", "dask", "--scheduler", dask.address, changes=FAST)
+    campaign.wait_until_held("n1", "n2")
+    dask.processes.kill("scheduler")
+    launched.expect(1, "is lost; 0 of 6 chunks are in", "--resume")
+    for worker in ("n1", "n2"):  # they would end themselves
+        dask.processes.kill(worker)
+    campaign.release()
+    dask.start_scheduler()
+    for worker in ("n1", "n2"):
+        dask.start_worker(worker)
+    campaign.fly("lost", "--on", "dask", "--scheduler", dask.address, "--resume").expect(0)
+    assert campaign.table("lost") == campaign.table("local")
+
+
+def test_without_dask_the_message_says_what_to_install_or_start(campaign: TestCampaign,
+                                                                tmp_path: Path) -> None:
+    campaign.fly("none", "--on", "dask").expect(2, "--scheduler: expected", "dask-worker")
+    address = f"tcp://{campaign.hosts.address['head']}:9"
+    campaign.fly("closed", "--on", "dask", "--scheduler", address, changes=FAST).expect(
+        1, f"dask: no scheduler at {address}", "dask-scheduler")
+    campaign.fly("wrong", "--on", "dask", "--scheduler", "no address", changes=FAST).expect(
+        2, "--scheduler: expected", "got 'no address'")
+    (tmp_path / "distributed.py").write_text(
+        "raise ModuleNotFoundError('No module', name='distributed')\n")
+    campaign.fly("missing", "--on", "dask", "--scheduler", address, PYTHONPATH=f"{tmp_path}:{PATH}").expect(
+        1, "'distributed' is missing: apt-get install python3-distributed")

@@ -1,0 +1,106 @@
+"""Statistics of campaigns, against closed forms, scipy and enumeration."""
+
+import math
+import unittest
+from itertools import product
+
+import support  # noqa: F401  (paths)
+import numpy as np
+from scipy import optimize, stats
+
+from sls.campaign.statistics import (calc_ecdf, calc_mcnemar_p, calc_paired_difference,
+                                     calc_quantiles, calc_sign_p, calc_wilson_interval,
+                                     find_interval_rank)
+
+
+class WilsonTest(unittest.TestCase):
+    def test_its_ends_are_the_shares_that_the_score_test_just_accepts(self):
+        z = stats.norm.ppf(0.975)
+        for count, total in ((1, 3), (7, 40), (39, 40), (500, 1000), (3, 100_000)):
+            share = count / total
+
+            def score(p):
+                return (share - p) ** 2 * total - z**2 * p * (1 - p)
+
+            low, high = calc_wilson_interval(count, total)
+            self.assertAlmostEqual(low, optimize.brentq(score, 1e-12, share), delta=1e-10)
+            self.assertAlmostEqual(high, optimize.brentq(score, share, 1 - 1e-12), delta=1e-10)
+
+    def test_it_agrees_with_scipy(self):
+        for count, total, level in ((0, 10, 0.95), (10, 10, 0.95), (3, 17, 0.9), (60, 200, 0.99)):
+            theirs = stats.binomtest(count, total).proportion_ci(level, "wilson")
+            np.testing.assert_allclose(calc_wilson_interval(count, total, level), theirs, atol=1e-12)
+
+    def test_the_ends_are_exact_where_nothing_or_everything_counts(self):
+        self.assertEqual(calc_wilson_interval(0, 50)[0], 0.0)
+        self.assertEqual(calc_wilson_interval(50, 50)[1], 1.0)
+        self.assertEqual(calc_wilson_interval(0, 0), (0.0, 1.0))
+        z_2 = stats.norm.ppf(0.975) ** 2
+        self.assertAlmostEqual(calc_wilson_interval(0, 50)[1], z_2 / (50 + z_2), delta=1e-15)
+
+    def test_impossible_counts_are_refused(self):
+        for count, total in ((-1, 3), (4, 3)):
+            with self.assertRaisesRegex(ValueError, f"from 0 to 3, got {count}"):
+                calc_wilson_interval(count, total)
+
+
+class DistributionTest(unittest.TestCase):
+    def test_the_empirical_distribution_counts_values_up_to_each_place(self):
+        places, shares = calc_ecdf(np.array([3.0, 1.0, np.nan, 1.0, 2.0]))
+        np.testing.assert_array_equal(places, [1, 2, 3])
+        np.testing.assert_array_equal(shares, [0.5, 0.75, 1])
+        places, shares = calc_ecdf(np.array([np.nan]))
+        self.assertEqual((len(places), len(shares)), (0, 0))
+
+    def test_quantiles_agree_with_numpy(self):
+        values = np.random.default_rng(1).normal(size=137)
+        shares = (0.0, 0.05, 0.5, 0.9, 1.0)
+        np.testing.assert_allclose(calc_quantiles(values, shares), np.quantile(values, shares),
+                                   rtol=0, atol=1e-15)
+
+    def test_infinite_values_count_as_values(self):
+        values = np.array([1.0, 2.0, np.inf, np.inf, np.nan])
+        np.testing.assert_array_equal(calc_quantiles(values, (0.0, 0.5, 0.9)), [1, np.inf, np.inf])
+        self.assertTrue(np.all(np.isnan(calc_quantiles(np.array([]), (0.1, 0.5)))))
+
+
+class PairedTest(unittest.TestCase):
+    def test_the_sign_test_counts_coins(self):
+        for n in range(1, 9):  # all outcomes of n coins, one by one
+            heads = [sum(coins) for coins in product((0, 1), repeat=n)]
+            for k in range(n + 1):
+                least = min(k, n - k)
+                tail = sum(head <= least for head in heads) / 2**n
+                self.assertAlmostEqual(calc_sign_p(k, n - k), min(1.0, 2 * tail), delta=1e-14)
+        self.assertEqual(calc_sign_p(0, 0), 1.0)
+
+    def test_mcnemars_test_agrees_with_scipys_binomial_test(self):
+        for one, other in ((0, 5), (3, 12), (40, 41), (1000, 1200)):
+            self.assertAlmostEqual(calc_mcnemar_p(one, other),
+                                   stats.binomtest(one, one + other, 0.5).pvalue, delta=1e-12)
+
+    def test_the_interval_of_the_median_covers_at_least_its_level(self):
+        for n in range(1, 200):
+            rank = find_interval_rank(n)
+            # P(B < k) of n fair coins, by integers.
+            below = sum(math.comb(n, i) for i in range(rank))
+            self.assertLessEqual(40 * below, 2**n, n)
+            self.assertGreater(40 * (below + math.comb(n, rank)), 2**n, n)  # k + 1 would not do
+        self.assertEqual([find_interval_rank(n) for n in (5, 6, 20)], [0, 1, 6])  # tables of signs
+
+    def test_differences_are_taken_pair_by_pair(self):
+        a = np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, np.nan, np.inf])
+        b = np.array([2.0, 4.0, 6.0, 8.0, 10.0, 6.0, 1.0, np.inf])
+        paired = calc_paired_difference(a, b)
+        self.assertEqual((paired.count, paired.median, paired.smaller, paired.larger),
+                         (6, 2.5, 0, 5))
+        self.assertEqual((paired.low, paired.high), (0.0, 5.0))
+        self.assertAlmostEqual(paired.p, 2 / 32)
+        few = calc_paired_difference(a[:3], b[:3])
+        self.assertEqual((few.low, few.high), (-np.inf, np.inf))
+        none = calc_paired_difference(a[6:], b[6:])
+        self.assertEqual((none.count, none.p), (0, 1.0))
+
+
+if __name__ == "__main__":
+    unittest.main()

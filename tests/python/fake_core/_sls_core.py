@@ -1,0 +1,52 @@
+"""Stands for the extension module where a test is about chunks and processes, not about flights: a run
+costs nothing and its measures are simple functions of its values.
+
+SLS_FAKE holds words: `kill=17` ends the process in run 17 each time, `kill-once=17:FILE` only where FILE
+is not there yet, `sleep=0.01` makes a run last, `refuse=17` refuses run 17 when it is flown,
+`other=1` gives other measures. The run is the value of the key `index`."""
+
+import hashlib
+import math
+import os
+import pathlib
+import signal
+import time
+
+from sls.errors import ConfigError, RunError  # noqa: F401
+
+WORDS = dict(word.split("=", 1) for word in os.environ.get("SLS_FAKE", "").split())
+
+
+class Runs:
+    columns = ["load_error_rms_m", "load_error_max_m"]
+
+    def __init__(self, base_file, paths, measures, period_s=None):
+        self.base = pathlib.Path(base_file).read_text()
+        self.paths = paths
+
+    def scenario_text(self, values):
+        return "".join(f"{path}: {value}\n" for path, value in zip(self.paths, values))
+
+    def check(self, values):
+        if values and float(values[0]) < 0:
+            raise ConfigError(f"base.yaml:2: {self.paths[0]}: expected > 0, got {values[0]}")
+
+    def fly(self, values, certify):
+        self.check(values)
+        if "sleep" in WORDS:
+            time.sleep(float(WORDS["sleep"]))
+        index = int(values[-1])
+        once, _, marker = WORDS.get("kill-once", "").partition(":")
+        if WORDS.get("kill") == str(index) or once == str(index) and not os.path.exists(marker):
+            if marker:
+                pathlib.Path(marker).touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        if WORDS.get("refuse") == str(index):
+            raise ConfigError(f"base.yaml:2: {self.paths[0]}: expected > 0, got 0")
+        mass = float(values[0])
+        outcome = "lost" if mass > 0.3 else "finished"
+        certificate = hashlib.sha256(self.scenario_text(values).encode()).hexdigest()
+        shift = float(WORDS.get("other", 0))
+        return (outcome, "load more than 1 m, further\nfrom its reference" * (outcome == "lost"),
+                [math.sqrt(mass) + shift, math.nan if outcome == "lost" else mass],
+                certificate if certify else "", 8000)
