@@ -16,6 +16,13 @@ class SharedLockTest : public testing::TestWithParam<const char*> {
   void start(int signal, const std::string& port) {
     const std::string file =
         make_scenario(folder_, {{"controllers: 1", "controllers: 2"}}, "figure_eight");
+    start_primary(file, signal, port);
+    standby_ = std::make_unique<Process>(
+        make_command("control_client", flight_->domain.number(),
+                     {"--scenario", file, "--name", "standby", "--strength", "1"}));
+  }
+
+  void start_primary(const std::string& file, int signal, const std::string& port) {
     FlightOptions options{{}, {}, {"--name", "primary", "--strength", "2"}, {}};
     options.before["control_client"] = {"env",
                                         std::string("LD_PRELOAD=") + SLS_LOCK_SHIM,
@@ -24,9 +31,6 @@ class SharedLockTest : public testing::TestWithParam<const char*> {
                                         "SLS_LOCK_COUNT=3000",
                                         "SLS_LOCK_SIGNAL=" + std::to_string(signal)};
     flight_ = std::make_unique<Flight>(file, options);
-    standby_ = std::make_unique<Process>(
-        make_command("control_client", flight_->domain.number(),
-                     {"--scenario", file, "--name", "standby", "--strength", "1"}));
   }
 
   bool is_said(const char* words) const { return holds(flight_->server->output(), words); }
@@ -82,6 +86,21 @@ TEST_P(SharedLockTest, OfAnotherPortWithAStoppedClient) {
   flight_->client->send(SIGCONT);
   expect_result();
   EXPECT_EQ(flight_->client->wait(), 0) << flight_->client->output();
+}
+
+/// The client stays stopped, mostly with a lock of the server's port.
+TEST_P(SharedLockTest, OfAnotherPortWithAStoppedClientDoesNotKeepTheServerFromEnding) {
+  const std::string file =
+      make_scenario(folder_,
+                    {{"timeout_s: 30 }",
+                      "timeout_s: 30 }, wait: { controller: { policy: stop, deadline_s: 1 } }"}},
+                    "figure_eight");
+  start_primary(file, SIGSTOP, "other");
+  EXPECT_EQ(flight_->server->wait(), 1) << flight_->outputs();
+  EXPECT_TRUE(is_said("waited 1 s for controller 'primary'")) << flight_->outputs();
+  EXPECT_TRUE(is_primary_stopped());
+  flight_->client->kill();
+  EXPECT_EQ(flight_->recorder->wait(), 1) << flight_->outputs();
 }
 
 INSTANTIATE_TEST_SUITE_P(, SharedLockTest, testing::Values("messages", "waiters"),
