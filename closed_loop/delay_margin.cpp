@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "closed_loop/flight.hpp"
+#include "closed_loop/loss.hpp"
 #include "common/config/numbers.hpp"
 
 namespace sls::closed_loop {
@@ -14,31 +15,6 @@ namespace {
 
 constexpr std::int64_t kLongestDelay = 10'000'000'000;  // ns
 constexpr std::int64_t kMostPeriods = 100'000;          // samples that a delay keeps in memory
-
-/// Distance of the load from its reference, by stage and step of the stage: a delayed flight may
-/// leave a stage at another step, and is compared with the same moment of the same stage.
-class ErrorHistory {
- public:
-  void add(const FlownStep& step, double error) {
-    stages_.resize(std::max<std::size_t>(stages_.size(), step.answer.stage + 1));
-    stages_[step.answer.stage].push_back(error);
-  }
-
-  /// That at the moment of `step`, or at the end of its stage where that was shorter.
-  double find(const FlownStep& step) const {
-    if (step.answer.stage >= stages_.size() || stages_[step.answer.stage].empty()) return 0.0;
-    const std::vector<double>& errors = stages_[step.answer.stage];
-    const std::size_t since_start = step.step - step.answer.memory.stage_start_step;
-    return errors[std::min(since_start, errors.size() - 1)];
-  }
-
- private:
-  std::vector<std::vector<double>> stages_;
-};
-
-double calc_error(const FlownStep& step) {
-  return (step.truth.p_WL - step.answer.reference.position).norm();
-}
 
 /// `scenario` with its command delayed by `periods`, after its own faults.
 config::Scenario make_delayed(config::Scenario scenario, std::int64_t periods) {
@@ -60,7 +36,7 @@ DelayedFlight fly(const config::Scenario& scenario, std::int64_t periods, const 
   std::uint64_t steps = 0;
   double sum_of_squares = 0.0;
   while (const auto step = flight.fly_step()) {
-    const double error = calc_error(*step);
+    const double error = calc_load_error(*step);
     result.worst_error = std::max(result.worst_error, error);
     sum_of_squares += error * error;
     ++steps;
@@ -69,9 +45,7 @@ DelayedFlight fly(const config::Scenario& scenario, std::int64_t periods, const 
   }
   if (!result.is_lost()) result.loss = flight.failure();
   if (result.is_lost())
-    result.loss += fmt::format(
-        ", at {} s", config::to_text(config::to_seconds(static_cast<std::int64_t>(steps - 1) *
-                                                        scenario.sync.period_ns)));
+    result.loss += describe_time(calc_last_time_ns(steps, scenario.sync.period_ns));
   result.rms_error = std::sqrt(sum_of_squares / static_cast<double>(steps));
   return result;
 }
@@ -91,9 +65,8 @@ DelayedFlight fly_delayed(const config::Scenario& scenario, std::int64_t periods
                           const ErrorHistory& undelayed) {
   return fly(scenario, periods, [&](const FlownStep& step, double error) {
     const double rod_length = scenario.vehicle.rod_length;
-    return error - undelayed.find(step) > rod_length
-               ? fmt::format("load more than {} m further from its reference than without delay",
-                             config::to_text(rod_length))
+    return is_load_lost(step, error, undelayed, rod_length)
+               ? describe_loss(rod_length, "without delay")
                : std::string();
   });
 }

@@ -12,9 +12,8 @@ constexpr const char* kController = "control_client";
 
 }  // namespace
 
-RecordEntry make_entry(std::uint32_t vehicle_id, const FlownStep& flown,
-                       const std::string& controller_name, bool is_refused) {
-  RecordEntry entry;
+void fill_entry(RecordEntry& entry, std::uint32_t vehicle_id, const FlownStep& flown,
+                const std::string& controller_name, bool is_refused) {
   sim::Applied applied;
   applied.f_Q_W = flown.applied_f_Q_W;
   sim::fill_state(entry, vehicle_id, flown.step, flown.truth,
@@ -22,7 +21,13 @@ RecordEntry make_entry(std::uint32_t vehicle_id, const FlownStep& flown,
   entry.kind(is_refused ? ANSWER_REFUSED : ANSWER_ACCEPTED);
   entry.answered_step(flown.step);
   entry.client_name(controller_name);
-  entry.answer(control::make_command_message(vehicle_id, flown.answer, flown.compute_time));
+  control::fill_command_message(entry.answer(), vehicle_id, flown.answer, flown.compute_time);
+}
+
+RecordEntry make_entry(std::uint32_t vehicle_id, const FlownStep& flown,
+                       const std::string& controller_name, bool is_refused) {
+  RecordEntry entry;
+  fill_entry(entry, vehicle_id, flown, controller_name, is_refused);
   return entry;
 }
 

@@ -11,6 +11,11 @@
 
 namespace sls::closed_loop {
 
+/// Puts a step of one vehicle into `entry`, which may hold another one; `is_refused` where its
+/// answer failed the flight.
+void fill_entry(RecordEntry& entry, std::uint32_t vehicle_id, const FlownStep& flown,
+                const std::string& controller_name, bool is_refused = false);
+
 /// The entry of a step of one vehicle; `is_refused` where its answer failed the flight.
 RecordEntry make_entry(std::uint32_t vehicle_id, const FlownStep& flown,
                        const std::string& controller_name, bool is_refused = false);

@@ -33,16 +33,13 @@ FaultCode to_message(Fault fault) {
   return MISSION_FAILED;
 }
 
-ControllerState to_message(const ControllerMemory& memory) {
-  ControllerState message;
+void fill(ControllerState& message, const ControllerMemory& memory) {
   message.stage_index(memory.stage);
   message.stage_start_step(memory.stage_start_step);
   bus::fill(message.numbers(), memory.numbers);
-  return message;
 }
 
-Reference make_reference_message(const Answer& answer) {
-  Reference message;
+void fill(Reference& message, const Answer& answer) {
   message.stage_index(answer.stage);
   message.stage_name(answer.stage_name);
   message.position_m(bus::to_array(answer.reference.position));
@@ -50,7 +47,6 @@ Reference make_reference_message(const Answer& answer) {
   message.acceleration_m_s2(bus::to_array(answer.reference.acceleration));
   message.jerk_m_s3(bus::to_array(answer.reference.jerk));
   message.snap_m_s4(bus::to_array(answer.reference.snap));
-  return message;
 }
 
 }  // namespace
@@ -63,16 +59,21 @@ ControllerMemory to_memory(const ControllerState& message) {
   return memory;
 }
 
-ControlCommand make_command_message(std::uint32_t vehicle_id, const Answer& answer,
-                                    std::chrono::nanoseconds compute_time) {
-  ControlCommand message;
+void fill_command_message(ControlCommand& message, std::uint32_t vehicle_id, const Answer& answer,
+                          std::chrono::nanoseconds compute_time) {
   message.vehicle_id(vehicle_id);
   message.f_Q_W_n(bus::to_array(answer.f_Q_W));
-  message.reference(make_reference_message(answer));
-  message.controller(to_message(answer.memory));
+  fill(message.reference(), answer);
+  fill(message.controller(), answer.memory);
   message.mission(to_message(answer.mission));
   message.fault(to_message(answer.fault));
   message.compute_time_ns(static_cast<std::uint64_t>(compute_time.count()));
+}
+
+ControlCommand make_command_message(std::uint32_t vehicle_id, const Answer& answer,
+                                    std::chrono::nanoseconds compute_time) {
+  ControlCommand message;
+  fill_command_message(message, vehicle_id, answer, compute_time);
   return message;
 }
 

@@ -11,6 +11,10 @@ namespace sls::control {
 
 ControllerMemory to_memory(const ControllerState& message);
 
+/// Puts an answer into `message`, which may hold another one.
+void fill_command_message(ControlCommand& message, std::uint32_t vehicle_id, const Answer& answer,
+                          std::chrono::nanoseconds compute_time);
+
 ControlCommand make_command_message(std::uint32_t vehicle_id, const Answer& answer,
                                     std::chrono::nanoseconds compute_time);
 

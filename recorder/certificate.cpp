@@ -1,58 +1,40 @@
 #include "recorder/certificate.hpp"
 
-#include <array>
-#include <cmath>
-#include <cstring>
+#include <string_view>
 #include <type_traits>
+#include <vector>
 
 namespace sls::record {
 namespace {
 
-template <class Integer, std::enable_if_t<std::is_integral_v<Integer>, int> = 0>
-void append(std::string& bytes, Integer value) {
-  std::array<char, sizeof value> little_endian;
-  for (char& byte : little_endian) {
-    byte = static_cast<char>(value & 0xff);
-    value = static_cast<Integer>(value >> 8);
-  }
-  bytes.append(little_endian.data(), little_endian.size());
-}
-
-void append(std::string& bytes, std::string_view text) {
-  append(bytes, static_cast<std::uint32_t>(text.size()));
-  bytes += text;
-}
-
-void append(std::string& bytes, double number) {
-  std::uint64_t bits = 0;
-  std::memcpy(&bits, &number, sizeof bits);
-  // What "nan" and "-nan" in a file read back to.
-  if (std::isnan(number)) bits = std::signbit(number) ? 0xfff8000000000000 : 0x7ff8000000000000;
-  append(bytes, bits);
-}
+/// Bytes that are hashed together: a call for each row would take as long as the hash itself.
+constexpr std::size_t kHashedTogether = 4096;
 
 struct Collector {
-  std::string& bytes;
+  ByteBuffer& bytes;
 
   template <class Field>
   void operator()(const Column& column, const Field& field) {
     if (!column.is_certified) return;
-    for_each_component(field, [this](const auto& component) { append(bytes, component); });
+    // A sequence may be of any length; a row's other numbers have room.
+    if constexpr (std::is_same_v<Field, std::vector<double>>)
+      bytes.make_room(field.size() * sizeof(double));
+    for_each_component(field, [this](const auto& component) { bytes.append(component); });
   }
 };
 
 template <class Row>
-void append_row(std::string& bytes, const Row& row) {
-  append(bytes, std::string_view(Row::kTopic));
+void append_row(ByteBuffer& bytes, const Row& row) {
+  bytes.append(std::string_view(Row::kTopic));
   Collector collector{bytes};
   Row::visit(row, collector);
 }
 
 template <class Row>
 std::string collect(const Row& row) {
-  std::string bytes;
+  ByteBuffer bytes;
   append_row(bytes, row);
-  return bytes;
+  return std::string(bytes.bytes());
 }
 
 }  // namespace
@@ -62,20 +44,26 @@ std::string to_bytes(const CommandRow& row) { return collect(row); }
 std::string to_bytes(const ReferenceRow& row) { return collect(row); }
 
 void Certificate::add(const StepRows& rows) {
-  bytes_.clear();
-  if (rows.state) append_row(bytes_, *rows.state);
-  if (rows.command) append_row(bytes_, *rows.command);
-  if (rows.reference) append_row(bytes_, *rows.reference);
-  vehicles_[rows.vehicle_id].add(bytes_);
+  Vehicle& vehicle = vehicles_[rows.vehicle_id];
+  if (rows.state) append_row(vehicle.bytes, *rows.state);
+  if (rows.command) append_row(vehicle.bytes, *rows.command);
+  if (rows.reference) append_row(vehicle.bytes, *rows.reference);
+  if (vehicle.bytes.bytes().size() >= kHashedTogether) vehicle.hash_bytes();
+}
+
+void Certificate::Vehicle::hash_bytes() {
+  hash.add(bytes.bytes());
+  bytes.clear();
 }
 
 std::string Certificate::finish() {
   config::Sha256 flight;
   for (auto& [id, vehicle] : vehicles_) {
-    std::string bytes;
-    append(bytes, id);
-    flight.add(bytes);
-    const auto digest = vehicle.finish();
+    vehicle.hash_bytes();
+    vehicle.bytes.make_room(0);  // kRoom
+    vehicle.bytes.append(id);
+    flight.add(vehicle.bytes.bytes());
+    const auto digest = vehicle.hash.finish();
     flight.add(digest.data(), digest.size());
   }
   return config::to_hex(flight.finish());

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "common/config/sha256.hpp"
+#include "recorder/byte_buffer.hpp"
 #include "recorder/rows.hpp"
 
 namespace sls::record {
@@ -26,8 +27,14 @@ class Certificate {
   std::string finish();
 
  private:
-  std::map<std::uint32_t, config::Sha256> vehicles_;
-  std::string bytes_;  // of the step in work; a member to keep its memory
+  struct Vehicle {
+    void hash_bytes();
+
+    config::Sha256 hash;
+    ByteBuffer bytes;  // that are not hashed yet
+  };
+
+  std::map<std::uint32_t, Vehicle> vehicles_;
 };
 
 }  // namespace sls::record

@@ -9,9 +9,14 @@ double calc_time(std::uint64_t step, const Parameters& parameters) {
   return static_cast<double>(static_cast<std::int64_t>(step) * parameters.period_ns()) / 1e9;
 }
 
-StateRow make_state_row(const RecordEntry& entry, const PlantState& state,
-                        const Parameters& parameters) {
-  StateRow row;
+/// What is in `row`, or a new one.
+template <class Row>
+Row& reuse(std::optional<Row>& row) {
+  return row ? *row : row.emplace();
+}
+
+void fill(StateRow& row, const RecordEntry& entry, const PlantState& state,
+          const Parameters& parameters) {
   row.vehicle_id = entry.vehicle_id();
   row.step = entry.step();
   row.sim_time_s = calc_time(entry.step(), parameters);
@@ -20,12 +25,10 @@ StateRow make_state_row(const RecordEntry& entry, const PlantState& state,
   row.has_attitude = parameters.has_attitude();
   // Rows have as many fields as the header, whatever came.
   row.plant.signals().resize(parameters.signals().size(), std::numeric_limits<double>::quiet_NaN());
-  return row;
 }
 
-CommandRow make_command_row(const RecordEntry& entry) {
+void fill(CommandRow& row, const RecordEntry& entry) {
   const ControlCommand& answer = entry.answer();
-  CommandRow row;
   row.vehicle_id = entry.vehicle_id();
   row.step = entry.step();
   row.controller = entry.client_name().c_str();
@@ -36,26 +39,38 @@ CommandRow make_command_row(const RecordEntry& entry) {
     row.fault = CommandRow::kFailSafe;
   else
     row.fault = bus::to_string(answer.fault());
-  if (!row.is_unanswered()) row.compute_us = static_cast<double>(answer.compute_time_ns()) / 1e3;
-  return row;
+  row.compute_us = row.is_unanswered() ? 0.0 : static_cast<double>(answer.compute_time_ns()) / 1e3;
 }
 
 }  // namespace
 
-StepRows make_rows(const RecordEntry& entry, const Parameters& parameters) {
-  StepRows rows;
+void fill_rows(StepRows& rows, const RecordEntry& entry, const Parameters& parameters) {
   rows.vehicle_id = entry.vehicle_id();
   rows.step = entry.step();
-  rows.state = make_state_row(entry, entry.truth(), parameters);
-  if (!entry.measured().empty())
-    rows.measured = make_state_row(entry, entry.measured().front(), parameters);
-  if (entry.kind() != ANSWER_NONE) rows.command = make_command_row(entry);
-  if (rows.command && !rows.command->is_unanswered()) add_reference(rows, entry, parameters);
+  rows.stage_start_step.reset();
+  fill(reuse(rows.state), entry, entry.truth(), parameters);
+  if (entry.measured().empty())
+    rows.measured.reset();
+  else
+    fill(reuse(rows.measured), entry, entry.measured().front(), parameters);
+  if (entry.kind() == ANSWER_NONE)
+    rows.command.reset();
+  else
+    fill(reuse(rows.command), entry);
+  if (rows.command && !rows.command->is_unanswered())
+    add_reference(rows, entry, parameters);
+  else
+    rows.reference.reset();
+}
+
+StepRows make_rows(const RecordEntry& entry, const Parameters& parameters) {
+  StepRows rows;
+  fill_rows(rows, entry, parameters);
   return rows;
 }
 
 void add_reference(StepRows& rows, const RecordEntry& entry, const Parameters& parameters) {
-  ReferenceRow& row = rows.reference.emplace();
+  ReferenceRow& row = reuse(rows.reference);
   row.vehicle_id = entry.vehicle_id();
   row.step = entry.step();
   row.sim_time_s = calc_time(entry.step(), parameters);

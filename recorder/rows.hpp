@@ -191,7 +191,9 @@ struct StepRows {
   bool is_whole() const { return state && command && (reference || command->is_unanswered()); }
 };
 
-/// What an entry of any kind but ANSWER_LATE brings.
+/// What an entry of any kind but ANSWER_LATE brings; `rows` may hold another one's, whose memory is
+/// used again.
+void fill_rows(StepRows& rows, const RecordEntry& entry, const Parameters& parameters);
 StepRows make_rows(const RecordEntry& entry, const Parameters& parameters);
 /// Adds the reference of `entry`, the answer to that step.
 void add_reference(StepRows& rows, const RecordEntry& entry, const Parameters& parameters);

@@ -1,0 +1,51 @@
+/// When a flight has lost its load: the rule that delay margins and campaigns share. README.md says
+/// it.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "closed_loop/flight.hpp"
+
+namespace sls::closed_loop {
+
+/// Distance of the load from its reference, m.
+inline double calc_load_error(const FlownStep& step) {
+  return (step.truth.p_WL - step.answer.reference.position).norm();
+}
+
+/// The load errors of a flight with which others are compared, by stage and step of the stage:
+/// another flight may leave a stage at another step, and is compared with the same moment of the
+/// same stage.
+class ErrorHistory {
+ public:
+  void add(const FlownStep& step, double error);
+
+  /// That at the moment of `step`, or at the end of its stage where that was shorter; 0 of a stage
+  /// that was never flown.
+  double find(const FlownStep& step) const;
+
+ private:
+  std::vector<std::vector<double>> stages_;
+};
+
+/// Whether the load, `error` from its reference, is more than one rod length (m) further away than
+/// it was in the flight `base`.
+inline bool is_load_lost(const FlownStep& step, double error, const ErrorHistory& base,
+                         double rod_length) {
+  return error - base.find(step) > rod_length;
+}
+
+/// Such a loss in words; `comparison` completes "further from its reference than …".
+std::string describe_loss(double rod_length, const std::string& comparison);
+
+/// Time of the last of `steps` answered steps, ns: when a flight ended or lost its load.
+inline std::int64_t calc_last_time_ns(std::uint64_t steps, std::int64_t period_ns) {
+  return (static_cast<std::int64_t>(steps) - 1) * period_ns;
+}
+
+/// `, at X s`.
+std::string describe_time(std::int64_t time_ns);
+
+}  // namespace sls::closed_loop

@@ -1,0 +1,57 @@
+/// Bytes in the making, whose memory is kept from one use to the next.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+namespace sls::record {
+
+/// Numbers go in as little-endian bytes, texts after their length of 32 bits. There is always room
+/// for `kRoom` bytes, so that the few numbers of a row need no look at it each.
+class ByteBuffer {
+ public:
+  static constexpr std::size_t kRoom = 512;
+
+  std::string_view bytes() const { return {bytes_.data(), size_}; }
+  void clear() { size_ = 0; }
+
+  /// Makes room for `size` bytes, and for `kRoom` after them.
+  void make_room(std::size_t size) {
+    if (size_ + size + kRoom > bytes_.size()) bytes_.resize(2 * (size_ + size + kRoom));
+  }
+
+  /// There must be room for it.
+  template <class Integer, std::enable_if_t<std::is_integral_v<Integer>, int> = 0>
+  void append(Integer value) {
+    char* place = bytes_.data() + size_;
+    // Which compilers turn into one store.
+    for (std::size_t i = 0; i < sizeof value; ++i) place[i] = static_cast<char>(value >> (8 * i));
+    size_ += sizeof value;
+  }
+
+  /// There must be room for it.
+  void append(double number) {
+    std::uint64_t bits = 0;
+    std::memcpy(&bits, &number, sizeof bits);
+    // What "nan" and "-nan" in a file read back to.
+    if (std::isnan(number)) bits = std::signbit(number) ? 0xfff8000000000000 : 0x7ff8000000000000;
+    append(bits);
+  }
+
+  void append(std::string_view text) {
+    make_room(sizeof(std::uint32_t) + text.size());
+    append(static_cast<std::uint32_t>(text.size()));
+    if (!text.empty()) std::memcpy(bytes_.data() + size_, text.data(), text.size());
+    size_ += text.size();
+  }
+
+ private:
+  std::vector<char> bytes_;
+  std::size_t size_ = 0;  // of those in use
+};
+
+}  // namespace sls::record

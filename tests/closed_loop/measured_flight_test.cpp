@@ -1,0 +1,503 @@
+// Measures judged by textbook formulas on the stored columns of the same flight; outcomes by the
+// delay margin's; certificates by those of recordings.
+#include "closed_loop/measured_flight.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include "closed_loop/campaign_runs.hpp"
+#include "closed_loop/delay_margin.hpp"
+#include "closed_loop/recorded_flight.hpp"
+#include "common/config/scenario_draft.hpp"
+#include "recorder/manifest.hpp"
+#include "tests/closed_loop/support.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace sls::closed_loop::test {
+namespace {
+
+using sls::test::TemporaryFolder;
+
+const std::vector<std::string> kAll = {"load_error_rms", "load_error_max", "settling",
+                                       "overshoot",      "tilt_max",       "force_max",
+                                       "time_of_loss",   "outcome"};
+
+std::filesystem::path file_of(const std::string& name) {
+  return std::string(SLS_SOURCE_DIR) + "/config/scenarios/" + name + ".yaml";
+}
+
+using Values = std::map<std::string, std::string>;
+
+/// A shipped scenario with some values replaced.
+config::Scenario load_changed(const std::string& name, const Values& values) {
+  config::ScenarioDraft draft(file_of(name));
+  for (const auto& [path, value] : values) draft.set(path, value);
+  return draft.make_scenario();
+}
+
+/// The values of `flown` by column.
+std::map<std::string, double> name_values(const config::Scenario& base,
+                                          const MeasuredFlight& flown) {
+  const MeasureList list(base, kAll);
+  std::map<std::string, double> values;
+  EXPECT_EQ(flown.values.size(), list.columns().size());
+  for (std::size_t i = 0; i < flown.values.size(); ++i) values[list.columns()[i]] = flown.values[i];
+  return values;
+}
+
+MeasuredFlight fly_all(const config::Scenario& scenario, const config::Scenario& base,
+                       bool certify = false) {
+  return fly_measured(scenario, MeasureList(base, kAll), fly_base(base), certify);
+}
+
+// --- measures, once more -------------------------------------------------------------------------
+
+/// One column of a stretch of a flight.
+using Column = std::vector<double>;
+
+double calc_rms(const Column& values) {
+  double sum = 0.0;
+  for (const double value : values) sum += value * value;
+  return std::sqrt(sum / static_cast<double>(values.size()));
+}
+
+double calc_max(const Column& values) {
+  double largest = 0.0;
+  for (const double value : values) largest = std::max(largest, std::abs(value));
+  return largest;
+}
+
+/// Time from which on `values` stays within 2 % of the step: looked for from the end.
+double calc_settling(const Column& time, const Column& values, double target) {
+  const double step = target - values.front();
+  if (std::abs(step) < 0.01) return std::nan("");
+  std::size_t settled = values.size();
+  while (settled > 0 && std::abs(values[settled - 1] - target) <= 0.02 * std::abs(step)) --settled;
+  return settled == values.size() ? std::numeric_limits<double>::infinity()
+                                  : time[settled] - time.front();
+}
+
+double calc_overshoot(const Column& values, double target) {
+  const double step = target - values.front();
+  if (std::abs(step) < 0.01) return std::nan("");
+  double most = 0.0;
+  for (const double value : values) most = std::max(most, (value - target) / step);
+  return most;
+}
+
+/// Everything of the stored steps of a flight, second pass over columns.
+std::map<std::string, double> calc_measures(const std::vector<FlownStep>& steps,
+                                            const config::Scenario& scenario) {
+  const double period = static_cast<double>(scenario.sync.period_ns) / 1e9;
+  std::map<std::string, double> values;
+  const char* axes = "xyz";
+  const auto calc_errors = [&](const std::string& prefix, const std::vector<FlownStep>& of) {
+    for (int axis = 0; axis < 3; ++axis) {
+      Column errors;
+      for (const FlownStep& step : of)
+        errors.push_back(step.truth.p_WL[axis] - step.answer.reference.position[axis]);
+      const std::string suffix = std::string("_") + axes[axis] + "_m";
+      values[prefix + "load_error_rms" + suffix] = of.empty() ? std::nan("") : calc_rms(errors);
+      values[prefix + "load_error_max" + suffix] = of.empty() ? std::nan("") : calc_max(errors);
+    }
+  };
+  calc_errors("", steps);
+  Column norms, forces, tilts;
+  for (const FlownStep& step : steps) {
+    norms.push_back((step.truth.p_WL - step.answer.reference.position).norm());
+    forces.push_back(step.answer.f_Q_W.norm());
+    // The rod's direction by its angles; the code under test goes by the bodies' positions.
+    const double cosine = std::cos(step.truth.rod.alpha) * std::cos(step.truth.rod.beta);
+    tilts.push_back(std::acos(std::min(cosine, 1.0)));
+  }
+  values["load_error_rms_m"] = calc_rms(norms);
+  values["load_error_max_m"] = calc_max(norms);
+  values["force_max_n"] = calc_max(forces);
+  values["tilt_max_rad"] = calc_max(tilts);
+  for (std::size_t stage = 0; stage < scenario.mission.size(); ++stage) {
+    const std::string prefix = "stage_" + std::to_string(stage) + "_";
+    std::vector<FlownStep> of;
+    for (const FlownStep& step : steps)
+      if (step.answer.stage == stage) of.push_back(step);
+    calc_errors(prefix, of);
+    const auto* constant =
+        std::get_if<config::ConstantReference>(&scenario.mission[stage].reference);
+    if (!constant) continue;
+    for (int axis = 0; axis < 3; ++axis) {
+      Column time, position;
+      for (const FlownStep& step : of) {
+        time.push_back(static_cast<double>(step.step) * period);
+        position.push_back(step.truth.p_WL[axis]);
+      }
+      const std::string letter(1, axes[axis]);
+      const double target = constant->position[axis];
+      values[prefix + "settling_" + letter + "_s"] =
+          of.empty() ? std::nan("") : calc_settling(time, position, target);
+      values[prefix + "overshoot_" + letter] =
+          of.empty() ? std::nan("") : calc_overshoot(position, target);
+    }
+  }
+  return values;
+}
+
+void expect_equal_measures(const std::map<std::string, double>& ours,
+                           const std::map<std::string, double>& theirs) {
+  for (const auto& [name, value] : theirs) {
+    ASSERT_EQ(ours.count(name), 1u) << name;
+    if (!std::isfinite(value))
+      EXPECT_TRUE(std::isnan(value) ? std::isnan(ours.at(name)) : ours.at(name) == value)
+          << name << ": " << ours.at(name) << ", expected " << value;
+    else  // sums in another order; an angle by the cosine of a small one
+      EXPECT_NEAR(ours.at(name), value, name == "tilt_max_rad" ? 1e-8 : 1e-12 * (1 + value))
+          << name;
+  }
+}
+
+void expect_measures_of_its_columns(const config::Scenario& scenario,
+                                    const config::Scenario& base) {
+  const MeasuredFlight flown = fly_all(scenario, base);
+  std::vector<FlownStep> steps = fly(scenario);
+  ASSERT_GE(steps.size(), flown.steps);
+  steps.resize(flown.steps);  // those up to the loss
+  auto theirs = calc_measures(steps, scenario);
+  theirs["time_of_loss_s"] = flown.outcome == Outcome::kFinished
+                                 ? std::nan("")
+                                 : 1e-9 * static_cast<double>(scenario.sync.period_ns) *
+                                       static_cast<double>(steps.back().step);
+  const auto ours = name_values(base, flown);
+  EXPECT_EQ(ours.size(), theirs.size());
+  expect_equal_measures(ours, theirs);
+}
+
+TEST(FlightMeasuresTest, AreThoseOfTheStoredColumnsOfAFlightThatFinishes) {
+  for (const char* name : {"setpoints", "short", "rest_to_rest", "faulty_figure_eight"}) {
+    SCOPED_TRACE(name);
+    const config::Scenario scenario = load(name);
+    expect_measures_of_its_columns(scenario, scenario);
+  }
+}
+
+TEST(FlightMeasuresTest, AreThoseUpToTheLoss) {
+  const config::Scenario base = load("figure_eight");
+  expect_measures_of_its_columns(delay_command(base, 65), base);  // loses the load at 20.396 s
+}
+
+TEST(FlightMeasuresTest, AreThoseUpToTheFailureAndNothingOfStagesThatWereNotFlown) {
+  const config::Scenario base = load("setpoints");
+  // Half a second after the second set point came the state freezes.
+  const config::Scenario frozen = load_changed(
+      "setpoints", {{"faults", "[{ freeze: { on: state, from_s: 15.5, to_s: 40 } }]"}});
+  EXPECT_NE(fly_all(frozen, base).outcome, Outcome::kFinished);
+  expect_measures_of_its_columns(frozen, base);
+  // The second stage cannot be left.
+  const config::Scenario stuck =
+      load_changed("setpoints", {{"mission.1",
+                                  "{ set_point: { position_m: [-1, -1, -4] }, until: { after_s: "
+                                  "1, within_m: 1.0e-9, timeout_s: 2 } }"}});
+  const MeasuredFlight flown = fly_all(stuck, base);
+  EXPECT_EQ(flown.outcome, Outcome::kFailed);
+  EXPECT_EQ(flown.reason,
+            "controller 'control_client' answered step 4250 with a fault: stage_timeout, at 17 s");
+  expect_measures_of_its_columns(stuck, base);
+}
+
+TEST(FlightMeasuresTest, AStepByHandHasTheMeasuresOfItsFormulas) {
+  // Load 0 → 1 m by 0.5, 1.2, 0.99, 0.97, 1.01, 1 m: overshoot 20 %, settled from the fifth row on.
+  const config::Scenario base = load("setpoints");
+  const MeasureList list(base, {"settling", "overshoot", "force_max", "tilt_max"});
+  FlightMeasures measures(list, 10'000'000);
+  std::uint64_t number = 0;
+  for (const double x : {0.0, 0.5, 1.2, 0.99, 0.97, 1.01, 1.0}) {
+    FlownStep step;
+    step.step = number++;
+    step.answer.reference.position << 1.0, 0.0, 0.0;
+    step.truth.p_WL << x, 0.0, 0.0;
+    step.truth.p_WQ << x + 3.0 * static_cast<double>(step.step == 3), 0.0, -4.0;
+    step.answer.f_Q_W << 0.0, 3.0, step.step == 2 ? -4.0 : -1.0;
+    measures.add(step);
+  }
+  const std::vector<double> values = measures.finish(std::nullopt);
+  std::map<std::string, double> by_name;
+  for (std::size_t i = 0; i < values.size(); ++i) by_name[list.columns()[i]] = values[i];
+  EXPECT_DOUBLE_EQ(by_name.at("stage_0_settling_x_s"), 0.05);
+  EXPECT_DOUBLE_EQ(by_name.at("stage_0_overshoot_x"), 0.2);
+  EXPECT_TRUE(std::isnan(by_name.at("stage_0_settling_y_s"))) << "there is no step";
+  EXPECT_TRUE(std::isnan(by_name.at("stage_1_overshoot_x"))) << "was not flown";
+  EXPECT_DOUBLE_EQ(by_name.at("force_max_n"), 5.0);
+  EXPECT_DOUBLE_EQ(by_name.at("tilt_max_rad"), std::atan2(3.0, 4.0));
+}
+
+TEST(FlightMeasuresTest, ListsColumnsInTheOrderOfTheMeasures) {
+  const config::Scenario base = load("mission");  // its stage 4 is a figure eight
+  EXPECT_EQ(MeasureList(base, {"time_of_loss", "outcome", "load_error_rms"}).columns(),
+            (std::vector<std::string>{"time_of_loss_s",
+                                      "load_error_rms_m",
+                                      "load_error_rms_x_m",
+                                      "load_error_rms_y_m",
+                                      "load_error_rms_z_m",
+                                      "stage_0_load_error_rms_x_m",
+                                      "stage_0_load_error_rms_y_m",
+                                      "stage_0_load_error_rms_z_m",
+                                      "stage_1_load_error_rms_x_m",
+                                      "stage_1_load_error_rms_y_m",
+                                      "stage_1_load_error_rms_z_m",
+                                      "stage_2_load_error_rms_x_m",
+                                      "stage_2_load_error_rms_y_m",
+                                      "stage_2_load_error_rms_z_m",
+                                      "stage_3_load_error_rms_x_m",
+                                      "stage_3_load_error_rms_y_m",
+                                      "stage_3_load_error_rms_z_m",
+                                      "stage_4_load_error_rms_x_m",
+                                      "stage_4_load_error_rms_y_m",
+                                      "stage_4_load_error_rms_z_m",
+                                      "stage_5_load_error_rms_x_m",
+                                      "stage_5_load_error_rms_y_m",
+                                      "stage_5_load_error_rms_z_m"}));
+  const auto settling = MeasureList(base, {"settling"}).columns();
+  EXPECT_EQ(settling.size(), 15u);
+  EXPECT_EQ(settling.front(), "stage_0_settling_x_s");
+  EXPECT_EQ(settling.back(), "stage_5_settling_z_s");
+  EXPECT_EQ(MeasureList(base, {"overshoot"}).columns()[3], "stage_1_overshoot_x");
+}
+
+TEST(FlightMeasuresTest, AnUnknownMeasureIsRefusedWithTheListOfThose) {
+  try {
+    MeasureList(load("short"), {"load_error_mean"});
+    FAIL() << "no error";
+  } catch (const config::ConfigError& error) {
+    EXPECT_STREQ(error.what(),
+                 "measure: expected load_error_rms, load_error_max, settling, overshoot, tilt_max, "
+                 "force_max, time_of_loss or outcome, got 'load_error_mean'");
+  }
+}
+
+// --- outcome -------------------------------------------------------------------------------------
+
+/// All flights of a delay margin, each flown again as a run of a campaign.
+void expect_outcomes_of_delay_margin(const config::Scenario& scenario) {
+  const ErrorHistory base = fly_base(scenario);
+  const MeasureList list(scenario, {"load_error_max", "load_error_rms"});
+  int lost = 0, failed = 0;
+  for (const DelayedFlight& delayed : find_delay_margin(scenario).flights) {
+    SCOPED_TRACE(delayed.periods);
+    const MeasuredFlight flown =
+        fly_measured(delay_command(scenario, delayed.periods), list, base, false);
+    lost += flown.outcome == Outcome::kLost ? 1 : 0;
+    failed += flown.outcome == Outcome::kFailed ? 1 : 0;
+    std::string reason = flown.reason;
+    const std::string comparison = "in the base flight";
+    if (const auto found = reason.find(comparison); found != std::string::npos)
+      reason.replace(found, comparison.size(), "without delay");
+    EXPECT_EQ(reason, delayed.loss);
+    EXPECT_EQ(flown.outcome == Outcome::kFinished, !delayed.is_lost());
+    EXPECT_NEAR(flown.values[0], delayed.worst_error, 1e-15 * delayed.worst_error);
+    const auto rms = static_cast<std::size_t>(
+        std::find(list.columns().begin(), list.columns().end(), "load_error_rms_m") -
+        list.columns().begin());
+    EXPECT_NEAR(flown.values[rms], delayed.rms_error, 1e-12 * delayed.rms_error);
+  }
+  EXPECT_GT(lost + failed, 0);
+}
+
+TEST(MeasuredFlightTest, LosesTheLoadByTheRuleOfTheDelayMargin) {
+  expect_outcomes_of_delay_margin(load("figure_eight"));
+  expect_outcomes_of_delay_margin(load("matlab_setpoint_3"));
+}
+
+TEST(MeasuredFlightTest, SaysWhyAndWhenAFlightFails) {
+  const config::Scenario base = load("short");
+  config::Scenario late = base;
+  config::LeaveWithin never;
+  never.radius_m = 1e-9;
+  never.timeout_ns = 400'000'000;
+  late.mission[0].leave = never;
+  const MeasuredFlight flown = fly_all(late, base);
+  EXPECT_EQ(flown.outcome, Outcome::kFailed);
+  EXPECT_EQ(flown.reason,
+            "controller 'control_client' answered step 100 with a fault: stage_timeout, at 0.4 s");
+  EXPECT_EQ(flown.steps, 101u);
+  EXPECT_EQ(name_values(base, flown).at("time_of_loss_s"), 0.4);
+
+  config::Scenario torn = base;
+  config::BiasFault force;
+  force.offset.force << 1e308, 0.0, 0.0;
+  torn.faults = {make_fault(config::FaultChannel::kCommand, force)};
+  const MeasuredFlight not_finite = fly_all(torn, base);
+  EXPECT_EQ(not_finite.outcome, Outcome::kFailed);
+  EXPECT_NE(not_finite.reason.find("is not finite"), std::string::npos) << not_finite.reason;
+  EXPECT_EQ(not_finite.steps, 1u);
+}
+
+TEST(MeasuredFlightTest, MeasuresDoNotDependOnTheCertificate) {
+  const config::Scenario base = load("figure_eight"), scenario = delay_command(base, 65);
+  const MeasuredFlight without = fly_all(scenario, base), with = fly_all(scenario, base, true);
+  EXPECT_EQ(without.outcome, Outcome::kLost);
+  EXPECT_EQ(with.outcome, Outcome::kLost);
+  EXPECT_EQ(with.reason, without.reason);
+  EXPECT_LT(without.steps, with.steps);  // which goes on to its end
+  EXPECT_EQ(with.steps, 8001u);
+  EXPECT_TRUE(without.certificate.empty());
+  const auto a = name_values(base, without), b = name_values(base, with);
+  for (const auto& [name, value] : a)
+    EXPECT_TRUE(value == b.at(name) || std::isnan(value)) << name << ": " << value;
+}
+
+TEST(MeasuredFlightTest, AFleetIsRefused) {
+  try {
+    fly_base(load("mixed_fleet"));
+    FAIL() << "no error";
+  } catch (const config::ConfigError& error) {
+    EXPECT_STREQ(error.what(),
+                 "vehicles: expected one vehicle, of which a campaign measures, got 4");
+  }
+}
+
+TEST(MeasuredFlightTest, IsAskedNowAndThenWhetherToGoOn) {
+  const config::Scenario scenario = load("short");
+  struct Stop {};
+  int calls = 0;
+  const Poll poll = [&] {
+    if (++calls == 3) throw Stop();
+  };
+  EXPECT_THROW(
+      fly_measured(scenario, MeasureList(scenario, kAll), fly_base(scenario), false, {}, poll),
+      Stop);
+}
+
+// --- certificate ---------------------------------------------------------------------------------
+
+struct Certified {
+  const char* name;
+  const char* scenario;
+  Values values;
+  bool is_complete = true;  ///< its recording: the flight finishes
+};
+
+void PrintTo(const Certified& certified, std::ostream* out) { *out << certified.name; }
+
+const Values kTwoSeconds = {{"mission.0.for_s", "2"}};
+
+const std::vector<Certified> kCertified = {
+    {"SlungLoad", "short", {}},
+    {"Analytic",
+     "figure_eight",
+     {{"plant", "{ model: analytic, step_s: 0.004, initial: { load_position_m: [0, 0, -0.5] } }"}}},
+    {"MultirotorWithPx4", "multirotor_setpoints", {{"mission.0.for_s", "2"}}},
+    {"PublishedChainWithSensing", "px4_published", {}},
+    {"FaultsAndNoise", "faulty_figure_eight", {}},
+    {"StagesLeftByRadius", "mission", {}},
+    {"LongStageName", "short", {{"mission.0.name", "a stage with a name of 31 chars"}}},
+    {"AnotherLaw", "figure_eight_pid", kTwoSeconds},
+    {"RefusedForce", "figure_eight", {{"controller.force_limit_n", "10"}}, false},
+    {"ControllerFault",
+     "short",
+     {{"mission.0", "{ set_point: { position_m: [0, 0, 100] }, for_s: 2 }"}},
+     false},
+    {"PlantNotFinite",
+     "short",
+     {{"faults", "[{ bias: { on: command, force_n: [1.0e+300, 0, 0], from_s: 1 } }]"}},
+     false},
+    {"LostLoad", "figure_eight", {{"faults", "[{ delay: { on: command, by_s: 0.26 } }]"}}},
+};
+
+class CertificateOfFlightTest : public ::testing::TestWithParam<Certified> {};
+
+TEST_P(CertificateOfFlightTest, IsThatOfItsRecording) {
+  const config::Scenario base = load(GetParam().scenario);
+  const config::Scenario scenario = load_changed(GetParam().scenario, GetParam().values);
+  const TemporaryFolder folder;
+  const FlightEnd end = fly_recorded(scenario, {}, folder / "recording", false);
+  EXPECT_EQ(end.is_complete, GetParam().is_complete) << end.failure;
+  const std::string recorded = record::read_manifest(folder / "recording").certificate;
+  const MeasuredFlight flown = fly_all(scenario, base, true);
+  EXPECT_EQ(flown.certificate, recorded);
+  EXPECT_EQ(flown.steps, end.last_step + 1);
+  EXPECT_EQ(flown.certificate.size(), 64u);
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenarios, CertificateOfFlightTest, ::testing::ValuesIn(kCertified),
+                         [](const auto& certified) { return std::string(certified.param.name); });
+
+// --- runs ----------------------------------------------------------------------------------------
+
+TEST(CampaignRunsTest, ARunIsTheScenarioOfItsText) {
+  const TemporaryFolder folder;
+  const CampaignRuns runs(file_of("short"), {"vehicle.load_mass_kg", "mission.0.for_s"}, kAll);
+  const config::Scenario scenario = runs.make_scenario({"0.3", "1"});
+  EXPECT_EQ(scenario.vehicle.load_mass, 0.3);
+  sls::test::write_bytes(folder / "run.yaml", scenario.text);
+  const config::Scenario again = config::load_scenario(folder / "run.yaml");
+  EXPECT_EQ(config::to_yaml(again), config::to_yaml(scenario));
+  const MeasuredFlight flown = runs.fly({"0.3", "1"}, true);
+  EXPECT_EQ(flown.steps, 251u);
+  fly_recorded(again, {}, folder / "recording", false);
+  EXPECT_EQ(flown.certificate, record::read_manifest(folder / "recording").certificate);
+  EXPECT_NE(runs.fly({"0.2", "1"}, true).certificate, flown.certificate);
+  EXPECT_EQ(runs.fly({"0.3", "1"}, true).certificate, flown.certificate) << "a run is repeatable";
+}
+
+TEST(CampaignRunsTest, AnotherPeriodIsInEachRunsText) {
+  const CampaignRuns runs(file_of("short"), {"vehicle.load_mass_kg"}, kAll, 0.02);
+  const config::Scenario run = runs.make_scenario({"0.2"});
+  EXPECT_EQ(run.sync.period_ns, 20'000'000);
+  EXPECT_EQ(run.plant.step_ns, 1'000'000);
+  EXPECT_EQ(config::parse_scenario(run.text, "text").sync.period_ns, 20'000'000);
+  EXPECT_EQ(runs.fly({"0.2"}, false).steps, 101u);
+  const CampaignRuns fine(file_of("short"), {}, kAll, 0.0005);
+  EXPECT_EQ(fine.make_scenario({}).plant.step_ns, 500'000);
+}
+
+/// What the constructor or `work` says, called with runs of `file` that vary `path`.
+template <class Work>
+std::string find_error(const std::filesystem::path& file, const std::string& path,
+                       const Work& work) {
+  try {
+    work(CampaignRuns(file, {path}, {"outcome"}));
+  } catch (const config::ConfigError& error) {
+    std::string text = error.what();
+    const std::string place = file.string();
+    return text.rfind(place, 0) == 0 ? "FILE" + text.substr(place.size()) : text;
+  }
+  return "";
+}
+
+TEST(CampaignRunsTest, MistakesNameFileAndKey) {
+  const auto check = [](const char* value) {
+    return [value](const CampaignRuns& runs) { runs.check({value}); };
+  };
+  const auto file = file_of("short");
+  EXPECT_EQ(find_error(file, "vehicle.load_mass_kg", check("0.3")), "");
+  EXPECT_EQ(find_error(file, "vehicle.load_mass_kg", check("-0.3")),
+            "FILE:3: vehicle.load_mass_kg: expected > 0, got -0.3");
+  EXPECT_EQ(find_error(file, "vehicle.load_mas_kg", check("0.3")).substr(0, 25),
+            "FILE:3: vehicle.load_mas_");
+  EXPECT_EQ(find_error(file, "vehicles", check("2")),
+            "FILE: vehicles: expected one vehicle, of which a campaign measures, got 2");
+  EXPECT_EQ(find_error(file_of("fleet"), "vehicle.load_mass_kg", check("0.3")).substr(0, 38),
+            "FILE: vehicles: expected one vehicle, ");
+  EXPECT_EQ(find_error(file, "vehicle.load_mass_kg",
+                       [](const CampaignRuns& runs) {
+                         runs.check({"1", "2"});
+                       }),
+            "expected 1 values, one for each path, got 2");
+}
+
+TEST(CampaignRunsTest, ABaseScenarioThatFailsIsRefused) {
+  const TemporaryFolder folder;
+  const auto file = folder / "base.yaml";
+  sls::test::write_bytes(file,
+                         load_changed("figure_eight", {{"controller.force_limit_n", "10"}}).text);
+  const std::string error = find_error(file, "vehicle.load_mass_kg", [](const CampaignRuns&) {});
+  EXPECT_EQ(error.find("FILE: the base scenario fails, and by its flight the others would be "
+                       "judged: controller 'control_client' answered step 0 with a force beyond "
+                       "controller.force_limit_n: "),
+            0u)
+      << error;
+  EXPECT_EQ(error.substr(error.size() - 8), ", at 0 s") << error;
+}
+
+}  // namespace
+}  // namespace sls::closed_loop::test
