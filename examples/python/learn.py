@@ -1,10 +1,9 @@
-#!/usr/bin/env python3
-"""Learns two gains of a cascaded controller: 256 loops fly a figure eight at once, the best survive.
+"""Learns two gains of a cascaded controller: 256 loops fly a figure eight at once.
 
     ./sls python examples/python/learn.py
 
 Random search: each generation draws position and velocity gains around the best so far, closer and
-closer. A loop that loses its load counts as the worst. The winner then flies with the C++ law."""
+closer to it. A loop that loses its load counts as the worst. The winner then flies with the C++ law."""
 
 import time
 

@@ -11,7 +11,6 @@ optimisation.
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -80,8 +79,8 @@ class ClosedLoop:
     rod_length_m: float
     gravity_m_s2: float
 
-    def __init__(self, scenario: Scenario | str | os.PathLike[str], count: int = 1, *, threads: int | None = None,
-                 seeds: Sequence[int] | None = None, vehicle: int = 0):
+    def __init__(self, scenario: Scenario | str | os.PathLike[str], count: int = 1, *,
+                 threads: int | None = None, seeds: ArrayLike | None = None, vehicle: int = 0):
         """All loops are at step 0 of `scenario` (of `sls.load_scenario`, or what that takes).
 
         threads: that share the work of a step; None: as many as there are processors and work.
