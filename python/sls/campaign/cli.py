@@ -4,8 +4,10 @@ import argparse
 import shlex
 import signal
 import sys
+import threading
 import time
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -92,6 +94,9 @@ def fly(options: argparse.Namespace) -> None:
     with opened(out) as folder:
         try:
             prepare(folder, campaign, engine, options)
+            # Takes most of a second, in which the workers fly.
+            threading.Thread(target=import_module, args=("sls.campaign.report",),
+                             daemon=True).start()
             engine.run(folder, engine_options)
             folder.collect(options.on)
         except KeyboardInterrupt:
