@@ -1,4 +1,4 @@
-"""A control law of one's own: the cascade of control_client/laws/pid/README.md in plain floats.
+"""A control law of one's own: the equations of control_client/laws/pid/README.md in plain floats.
 
     ./sls python examples/python/pid.py [SCENARIO]
 
@@ -42,7 +42,7 @@ class Pid:
         rate_y = -cos_a * cos_b * alpha_rate + sin_a * sin_b * beta_rate
         rate_z = -sin_a * cos_b * alpha_rate - cos_a * sin_b * beta_rate
 
-        # Eq. (1): where the controller's own model sees the load.
+        # (1): where the controller's own model sees the load.
         x, y, z = now.quad_position
         v_x, v_y, v_z = now.quad_velocity
         ref_x, ref_y, ref_z = now.reference.position
@@ -53,7 +53,7 @@ class Pid:
         v_y += length * rate_y
         v_z += length * rate_z
 
-        # Eqs. (2) and (3).
+        # (2) and (3): the wanted acceleration.
         sum_x, sum_y, sum_z = now.memory
         a_x = k_v * (k_p * error_x - v_x) + k_i * sum_x
         a_y = k_v * (k_p * error_y - v_y) + k_i * sum_y
@@ -64,12 +64,12 @@ class Pid:
         if support < 1e-3 * gravity:
             raise sls.LawFault("free_fall")
 
-        # Eq. (4): of the rod, slope and its rate; what acceleration of the slope is wanted.
+        # (4): of the rod, slope and its rate; what acceleration of the slope is wanted.
         w_x, w_y = n_x / n_z, n_y / n_z
         slope_x = k_angle * (-a_x / support - w_x) - k_rate * (rate_x - w_x * rate_z) / n_z
         slope_y = k_angle * (-a_y / support - w_y) - k_rate * (rate_y - w_y * rate_z) / n_z
 
-        # Eq. (5): the force carries both bodies along the rod and turns it.
+        # (5): the force carries both bodies along the rod and turns it.
         lift = (m + m_load) * support
         force = (-lift * w_x - m * length * slope_x, -lift * w_y - m * length * slope_y, -lift)
         period = now.period_s

@@ -274,10 +274,12 @@ FlownStep FlownFlight::make_step(std::size_t index, std::size_t number) const {
 const std::string& FlownFlight::calc_certificate() const {
   std::call_once(is_certified_, [this] {
     record::Certificate certificate;
+    RecordEntry entry;  // one, to keep its memory
     for (std::size_t i = 0; i < ids_.size(); ++i)
-      for (std::size_t row = 0; row < rows_[i].rows(); ++row)
-        certificate.add(record::make_rows(
-            closed_loop::make_entry(ids_[i], make_step(i, row), controller_name_), parameters_));
+      for (std::size_t row = 0; row < rows_[i].rows(); ++row) {
+        closed_loop::fill_entry(entry, ids_[i], make_step(i, row), controller_name_);
+        certificate.add(record::make_rows(entry, parameters_));
+      }
     certificate_ = certificate.finish();
   });
   return certificate_;
