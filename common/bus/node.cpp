@@ -32,6 +32,7 @@
 #include "common/bus/fastdds/endpoints.hpp"
 #include "common/bus/fastdds/facts_of.hpp"
 #include "common/bus/fastdds/guarded_type.hpp"
+#include "common/bus/fastdds/leaving.hpp"
 #include "common/bus/fastdds/middleware_log.hpp"
 #include "common/bus/fastdds/neighbours.hpp"
 #include "common/bus/fastdds/participant_listener.hpp"
@@ -275,7 +276,7 @@ struct Node::Impl {
 Node::Node(const std::filesystem::path& qos_file, int domain, const std::string& name,
            const std::string& identity)
     : impl_(std::make_unique<Impl>(qos_file, domain, name, identity)) {}
-Node::~Node() = default;
+Node::~Node() { is_leaving = true; }
 
 const char* Node::choose_writer_profile(const char* profile, const char* fallback) const {
   dds::DataWriterQos qos;

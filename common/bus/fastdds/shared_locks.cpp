@@ -1,4 +1,4 @@
-/// Stands before three functions of the C library in the programs that link it (sim_server,
+/// Stands before four functions of the C library in the programs that link it (sim_server,
 /// control_client, recorder), so that they live with processes that are killed or stopped in the
 /// middle of a lock of shared memory.
 ///
@@ -14,7 +14,8 @@
 ///   dies after a message and before the call that wakes the reader leaves a port that wakes
 ///   nobody;
 /// - a reader waits for the locks of its own port as long as it takes: where it gives up after 1 s,
-///   the library ends its process.
+///   the library ends its process. But a process that closes its ports goes on without a lock whose
+///   holder is stopped: nothing reads them any more.
 ///
 /// Upstream: #5469 (open) has the symptom, none names the locks. To be deleted when the mutexes of
 /// ports are robust and a reader does not rely on being woken; tests/system/shared_lock_test.cpp
@@ -35,6 +36,7 @@
 #include <string>
 
 #include "common/bus/fastdds/adaptive_spin.hpp"
+#include "common/bus/fastdds/leaving.hpp"
 #include "common/bus/spinning.hpp"
 
 namespace sls::bus {
@@ -115,13 +117,24 @@ bool is_holder_stopped(const pthread_mutex_t& mutex) {
          (line[name_end + 2] == 'T' || line[name_end + 2] == 't');
 }
 
+/// Takes a lock of our own port, however long that lasts; or goes on without it where this process
+/// leaves and the holder is stopped.
+int lock_own(decltype(pthread_mutex_timedlock)* lock_until, pthread_mutex_t* mutex) {
+  while (true) {
+    const timespec look = to_timespec(now_ns() + kPatienceWithStopped_ns);
+    const int result = take_over(lock_until(mutex, &look), mutex);
+    if (result != ETIMEDOUT) return result;
+    if (is_leaving.load(std::memory_order_relaxed) && is_holder_stopped(*mutex)) return 0;
+  }
+}
+
 }  // namespace
 
 }  // namespace sls::bus
 
-// The middleware's library finds these before those of the C library. It uses these three for what
-// is between processes only (boost::interprocess with a time limit); the locks of its own threads
-// go another way and cost nothing more.
+// The middleware's library finds these before those of the C library. But for the unlocking it uses
+// them for what is between processes only (boost::interprocess with a time limit); the locks of its
+// own threads go another way and cost nothing more.
 
 int pthread_mutexattr_setpshared(pthread_mutexattr_t* attributes, int shared) noexcept {
   static const auto next =
@@ -138,7 +151,7 @@ int pthread_mutex_timedlock(pthread_mutex_t* mutex, const timespec* deadline) no
   if (is_next_own) --own_locks_to_come;
   if ((mutex->__data.__kind & kRobustBit) == 0) return next(mutex, deadline);
   if (is_next_own) remember_as_own(mutex);
-  if (is_own(mutex)) return take_over(pthread_mutex_lock(mutex), mutex);
+  if (is_own(mutex)) return lock_own(next, mutex);
   int result = take_over(pthread_mutex_trylock(mutex), mutex);
   if (result != EBUSY) return result;
   // Where the holder was found stopped the last time, the next message is not to wait as long
@@ -156,6 +169,14 @@ int pthread_mutex_timedlock(pthread_mutex_t* mutex, const timespec* deadline) no
     return result;
   }
   return take_over(next(mutex, deadline), mutex);
+}
+
+int pthread_mutex_unlock(pthread_mutex_t* mutex) noexcept {
+  using namespace sls::bus;
+  static const auto next = find_next(&pthread_mutex_unlock, "pthread_mutex_unlock");
+  const int result = next(mutex);
+  // A lock that this process went on without: boost::interprocess ends the process otherwise.
+  return result == EPERM && is_leaving.load(std::memory_order_relaxed) ? 0 : result;
 }
 
 int sem_timedwait(sem_t* semaphore, const timespec* deadline) {
