@@ -95,8 +95,10 @@ class SlurmCluster:
     def start_controller(self) -> None:
         self.start("slurmctld", "head", "slurmctld", "-D", "-f", str(self.configuration))
 
-    def kill_controller(self) -> None:
-        self.processes.kill("slurmctld")
+    def end_controller(self) -> None:
+        """It saves its state: one that forgets its jobs gives their numbers again, and drains the
+        nodes that still run them."""
+        self.processes.end("slurmctld")
 
     def lose_node(self, node: str) -> None:
         """As when its power fails, and slurmctld has noticed: which it does by itself when the node

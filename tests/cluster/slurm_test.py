@@ -108,11 +108,11 @@ def test_a_lost_controller_ends_the_campaign_with_a_line_and_resume_goes_on(
     launched = campaign.fly("lost", "--on", "slurm", changes="slurm.LOST_AFTER_S=1",
                             **slurm.environment)
     campaign.wait_until_held("n1", "n2")
-    slurm.kill_controller()
+    slurm.end_controller()
     launched.expect(1, "slurm: the controller does not answer", "0 of 6 chunks", "--resume")
     campaign.release()
     slurm.start_controller()
-    wait_until(lambda: slurm.list_states(), LIMIT_S, "slurmctld answers")
+    wait_until(lambda: slurm.ask("sinfo", "--noheader"), LIMIT_S, "slurmctld answers")
     campaign.fly("lost", "--on", "slurm", "--resume", **slurm.environment).expect(0)
     assert campaign.table("lost") == campaign.table("local")
 

@@ -4,6 +4,7 @@ other. Nothing here needs a cluster."""
 
 import datetime
 import json
+import os
 import pathlib
 import re
 import subprocess
@@ -66,7 +67,7 @@ def check_manifest(manifest, place):
 
 
 def load_manifests():
-    for file in sorted((ROOT / "docker/k8s").glob("*.yaml")):
+    for file in sorted((ROOT / "docker/k8s").rglob("*.yaml")):
         for manifest in yaml.safe_load_all(file.read_text()):
             yield f"{file.name}: {manifest['kind']} {manifest['metadata']['name']}", manifest
 
@@ -78,7 +79,7 @@ PODS = {place: manifest["spec"]["template"] for place, manifest in MANIFESTS.ite
 
 class ManifestsTest(unittest.TestCase):
     def test_every_manifest_fits_the_schema(self):
-        self.assertEqual(len(MANIFESTS), 6)
+        self.assertEqual(len(MANIFESTS), 10)
         for place, manifest in MANIFESTS.items():
             check_manifest(manifest, place)
 
@@ -136,6 +137,18 @@ class ManifestsTest(unittest.TestCase):
                                  {"allowPrivilegeEscalation": False, "readOnlyRootFilesystem": True,
                                   "capabilities": {"drop": ["ALL"]}}, place)
 
+    def test_a_campaign_is_flown_by_indices_of_a_job(self):
+        jobs = {m["metadata"]["name"]: m["spec"] for m in MANIFESTS.values() if m["kind"] == "Job"}
+        fly = jobs["sls-campaign-fly"]
+        self.assertEqual(fly["completionMode"], "Indexed")
+        self.assertLessEqual(fly["parallelism"], fly["completions"])
+        commands = {name: jobs[f"sls-campaign-{name}"]["template"]["spec"]["containers"][0]["command"]
+                    for name in ("plan", "fly", "collect")}
+        self.assertIn("JOB_COMPLETION_INDEX", commands["fly"])
+        for command in commands.values():  # all of the same folder
+            self.assertIn("/campaigns/mine", command)
+        self.assertEqual(commands["plan"][4], commands["collect"][4])
+
     @unittest.skipUnless(len(sys.argv) > 1, "expected the folder of the programs")
     def test_the_command_lines_are_those_of_the_programs(self):
         for place, pod in PODS.items():
@@ -143,8 +156,12 @@ class ManifestsTest(unittest.TestCase):
                 program, *flags = container["command"]
                 if program == "fast-discovery-server":
                     continue
-                known = subprocess.run([f"{PROGRAMS}/{program}", "--help"], capture_output=True,
-                                       text=True, check=True).stdout
+                asked, environment = [f"{PROGRAMS}/{program}"], dict(os.environ)
+                if program == "/usr/bin/python3":
+                    python = [str(ROOT / "python"), f"{PROGRAMS}/../python"]
+                    asked, environment["PYTHONPATH"] = container["command"][:4], ":".join(python)
+                known = subprocess.run([*asked, "--help"], capture_output=True, text=True,
+                                       check=True, env=environment).stdout
                 for flag in flags:
                     if flag.startswith("--"):
                         self.assertIn(flag, known, place)

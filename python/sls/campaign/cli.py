@@ -4,8 +4,11 @@ import argparse
 import shlex
 import signal
 import sys
+import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -92,7 +95,8 @@ def fly(options: argparse.Namespace) -> None:
     with opened(out) as folder:
         try:
             prepare(folder, campaign, engine, options)
-            engine.run(folder, engine_options)
+            with report_imported():
+                engine.run(folder, engine_options)
             folder.collect(options.on)
         except KeyboardInterrupt:
             say_how_to_resume(folder, options)
@@ -100,6 +104,17 @@ def fly(options: argparse.Namespace) -> None:
         say_result(folder)
         if options.verify and not verify(folder, options):
             raise EngineError(f"{out}: --verify: expected equal certificates, got others")
+
+
+@contextmanager
+def report_imported() -> Iterator[None]:
+    """Imports what makes the page while the workers fly: it takes most of a second."""
+    importing = threading.Thread(target=import_module, args=("sls.campaign.report",))
+    importing.start()
+    try:
+        yield
+    finally:
+        importing.join()  # a module cannot be imported while the interpreter ends
 
 
 def prepare(folder: CampaignFolder, campaign: Any, engine: Any,

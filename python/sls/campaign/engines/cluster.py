@@ -1,7 +1,10 @@
-"""What the engines for clusters have in common."""
+"""What the engines for clusters have in common. As a program: begins the folder of a campaign and flies
+nothing, for workers that are started by hand or by Kubernetes (docker/k8s/campaign)."""
 
 import os
+import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 from sls.campaign.folder import CampaignFolder
@@ -33,3 +36,30 @@ def describe_rest(folder: CampaignFolder) -> str:
     whole = len(folder.chunks) - len(folder.missing())
     return (f"{whole} of {len(folder.chunks)} chunks are in {folder.folder}; --resume flies the "
             "others")
+
+
+def plan(arguments: Sequence[str]) -> int:
+    """Command line of `./sls campaign`. The exit code."""
+    from sls.campaign.campaign_file import load_campaign
+    from sls.campaign.cli import find_file, make_parser, prepare, say
+    from sls.campaign.engines import local
+    from sls.campaign.folder import opened
+    from sls.errors import ConfigError
+    try:
+        options = make_parser().parse_args(arguments)
+        if options.out is None:
+            raise ConfigError("campaign: expected --out DIR, got none")
+        with opened(options.out) as folder:
+            prepare(folder, load_campaign(find_file(options.file)), local, options)
+            say(f"campaign: {options.out}: chunks: {len(folder.chunks)}")
+        return 0
+    except ConfigError as error:
+        say(f"error: {error}")
+        return 2
+    except (RuntimeError, OSError) as error:
+        say(f"error: {error}")
+        return 1
+
+
+if __name__ == "__main__":
+    sys.exit(plan(sys.argv[1:]))

@@ -276,7 +276,7 @@ def count_files(folder: CampaignFolder) -> set[int]:
 
 
 def wait(folder: CampaignFolder, missing: Sequence[int], progress: Progress) -> None:
-    """Until no task is queued or running, or all chunks have a file. Raises EngineError where the
+    """Until no task is queued or running but held ones, or all chunks have a file. Raises EngineError where the
     controller does not answer for LOST_AFTER_S."""
     missing = set(missing)
     # A damaged chunk has a file, too, until a task replaces it.
@@ -291,14 +291,21 @@ def wait(folder: CampaignFolder, missing: Sequence[int], progress: Progress) -> 
         if seen == missing and not damaged:
             return
         try:
-            if not list_states(name_job(folder)):
-                return
+            states = list_states(name_job(folder))
             answered = time.monotonic()
+            if all(is_held(state) for state in states):
+                cancel(folder)
+                return
         except ControllerLost as error:
             if time.monotonic() - answered > LOST_AFTER_S:
                 raise EngineError(describe_loss(folder, error)) from None
         time.sleep(poll_s)
         poll_s = min(poll_s * 1.2, LAST_POLL_S)
+
+
+def is_held(state: str) -> bool:
+    """Whether Slurm does not start the task by itself any more, as after a failed launch."""
+    return state.startswith("PENDING") and "held" in state.lower()
 
 
 def describe_loss(folder: CampaignFolder, error: ControllerLost) -> str:
