@@ -35,14 +35,11 @@ class SharedLibraryLaw : public ControlLaw {
     given.rod_length_m = believed.rod_length;
     given.gravity_m_s2 = believed.gravity;
     given.force_limit_n = setup.controller.force_limit_n;
-    ErrorText error;
-    void* made = nullptr;
-    library_.call(call("create", 0), [&] {
-      made = functions_.create(&given, &memory_count_, error.data(), error.size());
-    });
-    if (!made)
-      throw config::ConfigError(parameters.describe_place(setup.controller.law, "controller") +
-                                ": " + library_.name() + ": " + error.text());
+    void* made = plugin::create_object(
+        library_, call("create", 0), parameters.describe_place(setup.controller.law, "controller"),
+        [&](char* error, std::size_t size) {
+          return functions_.create(&given, &memory_count_, error, size);
+        });
     controller_.reset(made, [this](void* controller) {
       plugin::call_at_end(call("destroy", 0), [&] { functions_.destroy(controller); });
     });
@@ -58,22 +55,17 @@ class SharedLibraryLaw : public ControlLaw {
 
  private:
   sls_controller_functions load_functions() const {
-    const auto entry =
-        reinterpret_cast<const sls_controller_functions* (*)()>(library_.find("sls_controller"));
-    const sls_controller_functions* functions = nullptr;
-    library_.call(call("sls_controller", 0), [&] { functions = entry(); });
-    if (!functions) library_.fail("sls_controller() returned no table of functions");
-    plugin::check_version(library_, SLS_CONTROLLER_VERSION, functions->version);
-    plugin::check_size(library_, "sls_controller_functions", sizeof *functions, functions->size);
+    const auto& functions = plugin::load_table<sls_controller_functions>(
+        library_, call("sls_controller", 0), SLS_CONTROLLER_VERSION);
     plugin::check_size(library_, "sls_controller_setup", sizeof(sls_controller_setup),
-                       functions->setup_size);
+                       functions.setup_size);
     plugin::check_size(library_, "sls_controller_input", sizeof(sls_controller_input),
-                       functions->input_size);
+                       functions.input_size);
     plugin::check_size(library_, "sls_controller_output", sizeof(sls_controller_output),
-                       functions->output_size);
-    if (!functions->create || !functions->destroy || !functions->answer)
+                       functions.output_size);
+    if (!functions.create || !functions.destroy || !functions.answer)
       library_.fail("expected create, destroy and answer, got a null pointer for one of them");
-    return *functions;
+    return functions;
   }
 
   plugin::Call call(const char* function, std::uint64_t step) const {
@@ -95,9 +87,7 @@ sls_controller_input make_input(const LawInput& input, double period) {
   given.time_s = static_cast<double>(input.step) * period;
   copy(input.state.p_WQ, given.quad_position_m);
   copy(input.state.v_WQ, given.quad_velocity_m_s);
-  const Eigen::Quaterniond& q_WB = input.state.attitude.q_WB;
-  const double attitude[] = {q_WB.w(), q_WB.x(), q_WB.y(), q_WB.z()};
-  std::copy(std::begin(attitude), std::end(attitude), given.attitude_wb);
+  copy(input.state.attitude.q_WB, given.attitude_wb);
   copy(input.state.attitude.w_WB_B, given.body_rates_rad_s);
   copy(input.state.p_WL, given.load_position_m);
   copy(input.state.v_WL, given.load_velocity_m_s);

@@ -17,8 +17,6 @@ using plugin::copy;
 using plugin::ErrorText;
 using plugin::to_vector;
 
-constexpr double kUnitLength = 1e-6;  // what a normalised quaternion or vector may be off
-
 std::vector<sls_autopilot_rotor> make_rotors(const std::vector<Rotor>& rotors) {
   std::vector<sls_autopilot_rotor> made;
   for (const Rotor& rotor : rotors) {
@@ -46,13 +44,9 @@ class SharedLibraryAutopilot : public Autopilot {
         rotors_(make_rotors(setup.airframe.rotors)),
         functions_(load_functions()) {
     const sls_autopilot_setup given = make_setup(setup);
-    ErrorText error;
-    void* made = nullptr;
-    library_.call(call("create"),
-                  [&] { made = functions_.create(&given, error.data(), error.size()); });
-    if (!made)
-      throw config::ConfigError(parameters_.describe_place(setup.autopilot.model, "autopilot") +
-                                ": " + library_.name() + ": " + error.text());
+    void* made = plugin::create_object(
+        library_, call("create"), parameters_.describe_place(setup.autopilot.model, "autopilot"),
+        [&](char* error, std::size_t size) { return functions_.create(&given, error, size); });
     autopilot_.reset(made, [this](void* autopilot) {
       plugin::call_at_end(call("destroy"), [&] { functions_.destroy(autopilot); });
     });
@@ -84,24 +78,19 @@ class SharedLibraryAutopilot : public Autopilot {
 };
 
 sls_autopilot_functions SharedLibraryAutopilot::load_functions() const {
-  const auto entry =
-      reinterpret_cast<const sls_autopilot_functions* (*)()>(library_.find("sls_autopilot"));
-  const sls_autopilot_functions* functions = nullptr;
-  library_.call(call("sls_autopilot"), [&] { functions = entry(); });
-  if (!functions) library_.fail("sls_autopilot() returned no table of functions");
-  plugin::check_version(library_, SLS_AUTOPILOT_VERSION, functions->version);
-  plugin::check_size(library_, "sls_autopilot_functions", sizeof *functions, functions->size);
+  const auto& functions = plugin::load_table<sls_autopilot_functions>(
+      library_, call("sls_autopilot"), SLS_AUTOPILOT_VERSION);
   plugin::check_size(library_, "sls_autopilot_setup", sizeof(sls_autopilot_setup),
-                     functions->setup_size);
+                     functions.setup_size);
   plugin::check_size(library_, "sls_autopilot_rotor", sizeof(sls_autopilot_rotor),
-                     functions->rotor_size);
+                     functions.rotor_size);
   plugin::check_size(library_, "sls_autopilot_input", sizeof(sls_autopilot_input),
-                     functions->input_size);
+                     functions.input_size);
   plugin::check_size(library_, "sls_autopilot_output", sizeof(sls_autopilot_output),
-                     functions->output_size);
-  if (!functions->create || !functions->destroy || !functions->step)
+                     functions.output_size);
+  if (!functions.create || !functions.destroy || !functions.step)
     library_.fail("expected create, destroy and step, got a null pointer for one of them");
-  return *functions;
+  return functions;
 }
 
 sls_autopilot_setup SharedLibraryAutopilot::make_setup(const AutopilotSetup& setup) const {
@@ -130,9 +119,7 @@ sls_autopilot_input SharedLibraryAutopilot::make_input(const AutopilotInput& inp
   given.time_s = static_cast<double>(steps_) * period_;
   copy(input.f_Q_W, given.force_n);
   copy(input.v_WQ, given.velocity_m_s);
-  const Eigen::Quaterniond& q_WB = input.attitude.q_WB;
-  const double attitude[] = {q_WB.w(), q_WB.x(), q_WB.y(), q_WB.z()};
-  std::copy(std::begin(attitude), std::end(attitude), given.attitude_wb);
+  copy(input.attitude.q_WB, given.attitude_wb);
   copy(input.attitude.w_WB_B, given.body_rates_rad_s);
   return given;
 }
@@ -158,6 +145,10 @@ const AutopilotOutput& SharedLibraryAutopilot::step(const AutopilotInput& input)
   const auto fail = [&](const std::string& defect) {
     throw std::runtime_error(stepping.describe() + ": " + defect);
   };
+  const auto check_length = [&](double length, const char* kind, const char* name) {
+    const std::string defect = plugin::find_length_defect(length, kind, name);
+    if (!defect.empty()) fail(defect);
+  };
   const auto check_finite = [&](const double* first, std::size_t count, const char* name) {
     for (std::size_t i = 0; i < count; ++i)
       if (!std::isfinite(first[i])) fail(name + ("[" + std::to_string(i) + "] is not finite"));
@@ -173,19 +164,14 @@ const AutopilotOutput& SharedLibraryAutopilot::step(const AutopilotInput& input)
       fail("rotor_speeds_rad_s[" + std::to_string(i) + "]: expected >= 0, got " +
            std::to_string(speeds_[i]));
   check_finite(answer.attitude_wb, 4, "attitude_wb");
-  const double* q = answer.attitude_wb;
-  output_.q_WB = Eigen::Quaterniond(q[0], q[1], q[2], q[3]);
-  if (!(std::abs(output_.q_WB.norm() - 1.0) <= kUnitLength))
-    fail("expected a unit quaternion as attitude_wb, got one of length " +
-         std::to_string(output_.q_WB.norm()));
+  output_.q_WB = plugin::to_quaternion(answer.attitude_wb);
+  check_length(output_.q_WB.norm(), "quaternion", "attitude_wb");
   if (!std::isfinite(answer.thrust_n)) fail("thrust_n is not finite");
   output_.direction_W.reset();
   if (answer.has_direction != 0) {
     check_finite(answer.direction, 3, "direction");
     output_.direction_W = to_vector(answer.direction);
-    if (!(std::abs(output_.direction_W->norm() - 1.0) <= kUnitLength))
-      fail("expected a unit vector as direction, got one of length " +
-           std::to_string(output_.direction_W->norm()));
+    check_length(output_.direction_W->norm(), "vector", "direction");
   }
   output_.rotor_speeds =
       Eigen::Map<const Eigen::VectorXd>(speeds_.data(), static_cast<Eigen::Index>(rotors_.size()));

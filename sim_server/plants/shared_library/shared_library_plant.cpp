@@ -52,13 +52,9 @@ class SharedLibraryPlant : public Plant {
     given.rod_length_m = vehicle.rod_length;
     given.gravity_m_s2 = vehicle.gravity;
     given.initial = make_initial(setup.vehicles[0].initial, vehicle.rod_length);
-    ErrorText error;
-    void* made = nullptr;
-    library_.call(call("create"),
-                  [&] { made = functions_.create(&given, error.data(), error.size()); });
-    if (!made)
-      throw config::ConfigError(parameters.describe_place(setup.plant.model, "plant") + ": " +
-                                library_.name() + ": " + error.text());
+    void* made = plugin::create_object(
+        library_, call("create"), parameters.describe_place(setup.plant.model, "plant"),
+        [&](char* error, std::size_t size) { return functions_.create(&given, error, size); });
     plant_.reset(made, [this](void* plant) {
       plugin::call_at_end(call("destroy"), [&] { functions_.destroy(plant); });
     });
@@ -93,29 +89,24 @@ class SharedLibraryPlant : public Plant {
 
  private:
   sls_plant_functions load_functions() const {
-    const auto entry =
-        reinterpret_cast<const sls_plant_functions* (*)()>(library_.find("sls_plant"));
-    const sls_plant_functions* functions = nullptr;
-    library_.call(call("sls_plant"), [&] { functions = entry(); });
-    if (!functions) library_.fail("sls_plant() returned no table of functions");
-    plugin::check_version(library_, SLS_PLANT_VERSION, functions->version);
-    plugin::check_size(library_, "sls_plant_functions", sizeof *functions, functions->size);
-    plugin::check_size(library_, "sls_plant_setup", sizeof(sls_plant_setup), functions->setup_size);
-    plugin::check_size(library_, "sls_plant_state", sizeof(sls_plant_state), functions->state_size);
-    if (!functions->create || !functions->destroy || !functions->advance || !functions->measure)
+    const auto& functions =
+        plugin::load_table<sls_plant_functions>(library_, call("sls_plant"), SLS_PLANT_VERSION);
+    plugin::check_size(library_, "sls_plant_setup", sizeof(sls_plant_setup), functions.setup_size);
+    plugin::check_size(library_, "sls_plant_state", sizeof(sls_plant_state), functions.state_size);
+    if (!functions.create || !functions.destroy || !functions.advance || !functions.measure)
       library_.fail("expected create, destroy, advance and measure, got a null pointer for one");
-    if (functions->signal_count > SLS_PLANT_MAX_SIGNALS)
+    if (functions.signal_count > SLS_PLANT_MAX_SIGNALS)
       library_.fail("expected at most " + std::to_string(SLS_PLANT_MAX_SIGNALS) + " signals, got " +
-                    std::to_string(functions->signal_count));
-    for (std::uint32_t i = 0; i < functions->signal_count; ++i) {
-      if (!functions->signal_names[i] || !functions->signal_units[i])
+                    std::to_string(functions.signal_count));
+    for (std::uint32_t i = 0; i < functions.signal_count; ++i) {
+      if (!functions.signal_names[i] || !functions.signal_units[i])
         library_.fail("expected a name and a unit for signal " + std::to_string(i) + ", got none");
-      const std::string name = functions->signal_names[i];
+      const std::string name = functions.signal_names[i];
       if (name.empty() || name.find_first_not_of(kNameLetters) != name.npos)
         library_.fail("expected lower-case letters, digits and '_' as the name of signal " +
                       std::to_string(i) + ", got '" + name + "'");
     }
-    return *functions;
+    return functions;
   }
 
   plugin::Call call(const char* function) const {
@@ -130,8 +121,7 @@ class SharedLibraryPlant : public Plant {
     model::Measurement measured =
         model::make_state(to_vector(state.quad_position_m), to_vector(state.quad_velocity_m_s),
                           to_vector(state.load_position_m), to_vector(state.load_velocity_m_s));
-    const double* q = state.attitude_wb;
-    measured.attitude.q_WB = Eigen::Quaterniond(q[0], q[1], q[2], q[3]);
+    measured.attitude.q_WB = plugin::to_quaternion(state.attitude_wb);
     measured.attitude.w_WB_B = to_vector(state.body_rates_rad_s);
     measured.signals = Eigen::Map<const Eigen::VectorXd>(state.signals, functions_.signal_count);
     const auto fail = [&](const std::string& defect) {
@@ -142,10 +132,9 @@ class SharedLibraryPlant : public Plant {
     } catch (const std::runtime_error& error) {
       fail(error.what());
     }
-    constexpr double kUnitLength = 1e-6;  // what a normalised quaternion may be off
-    if (!(std::abs(measured.attitude.q_WB.norm() - 1.0) <= kUnitLength))
-      fail("expected a unit quaternion as attitude_wb, got one of length " +
-           std::to_string(measured.attitude.q_WB.norm()));
+    const std::string defect =
+        plugin::find_length_defect(measured.attitude.q_WB.norm(), "quaternion", "attitude_wb");
+    if (!defect.empty()) fail(defect);
     if (!measured.attitude.w_WB_B.allFinite()) fail("body_rates_rad_s is not finite");
     for (std::uint32_t i = 0; i < functions_.signal_count; ++i)
       if (!std::isfinite(measured.signals[i]))
