@@ -55,6 +55,7 @@ usage: ./sls COMMAND [OPTIONS]
       --vehicle N      which vehicle of a fleet (default: 0); with --help: all options
   report DIR         DIR/report.html: parameters, metrics of each stage, figures, events in one file
       --vehicle N      which vehicle of a fleet (default: 0)
+  python [ARGS]      Debian's Python with the package `sls`: a script, -m MODULE, -c COMMAND, or none
   study              flies the whole published comparison, writes docs/study.md and its pictures;
                      with --help: its options
   campaign FILE      flies a campaign: many runs of one scenario in which keys vary; DIR/runs.csv, report.html.
@@ -155,7 +156,7 @@ build_tree() {
 # (SLS_BUILD) is taken as it is.
 build_programs() {
   [[ -z ${SLS_BUILD:-} ]] || return 0
-  (($#)) || set -- "${programs[@]}"
+  (($#)) || set -- "${programs[@]}" _sls_core
   setup
   build_tree release "$build" "$@"
 }
@@ -300,7 +301,7 @@ cmd_setup() { setup; }
 
 cmd_build() {
   build_programs
-  say "programs in build/bin: ${programs[*]}"
+  say "programs in build/bin: ${programs[*]}; the module of the package sls in build/python"
 }
 
 cmd_run() {
@@ -364,7 +365,13 @@ cmd_verify() {
 # run_python COMMAND…: -P: nothing in the working folder is taken for a module of ours; -B: no files beside it.
 run_python() {
   install_missing "${python_packages[@]}"
-  PYTHONPATH="$root/python" exec /usr/bin/python3 -BP -m sls "$@"
+  PYTHONPATH="$root/python:$build/python" exec /usr/bin/python3 -BP -m sls "$@"
+}
+
+cmd_python() {
+  install_missing "${python_packages[@]}"
+  build_programs _sls_core
+  PYTHONPATH="$root/python:$build/python${PYTHONPATH:+:$PYTHONPATH}" exec /usr/bin/python3 -B "$@"
 }
 
 cmd_plot() { run_python plot "$@"; }
@@ -515,7 +522,7 @@ cmd_test() {
 command=${1:-help}
 (($#)) && shift
 case $command in
-  demo | run | doctor | bench | keys | ctl | verify | delay-margin | chaos | fuzz | test | setup | build | docker-demo | discovery-server | network-table | campaign | campaign-worker | plot | report | study) "cmd_$command" "$@" ;;
+  demo | run | doctor | bench | keys | ctl | verify | delay-margin | chaos | fuzz | test | setup | build | docker-demo | discovery-server | network-table | campaign | campaign-worker | plot | python | report | study) "cmd_$command" "$@" ;;
   clean) rm -rf "$root"/build "$root"/build-* ;;
   help | --help | -h) usage ;;
   *)

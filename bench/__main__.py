@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NoReturn
 
-from bench import loop, parts
+from bench import campaign, loop, parts
 from bench.machine import describe_machine, now
 from bench.programs import MeasurementError, Programs, make_scratch
 from bench.results import Figure, format_table
@@ -23,6 +23,7 @@ PARTS: dict[str, tuple[Measure, int]] = {  # and its rounds
     "realtime": (loop.measure_realtime, 3),
     "plant": (parts.measure_plant, 5),
     "recorder": (parts.measure_recorder, 3),
+    "campaign": (campaign.measure_campaign, 2),
     "fleet": (parts.measure_fleet, 3),
     "qos": (loop.measure_qos, 3),
 }

@@ -36,7 +36,7 @@ void FlightRecorder::hand_on() {
 
 void FlightRecorder::add(const std::vector<FlownStep>& steps, std::optional<std::size_t> refused) {
   for (std::size_t i = 0; i < ids_.size(); ++i) {
-    batch_.entries().push_back(make_entry(ids_[i], steps[i], controller_name_, refused == i));
+    fill_entry(batch_.entries().emplace_back(), ids_[i], steps[i], controller_name_, refused == i);
     if (batch_.entries().size() == BATCH_ENTRIES) hand_on();
   }
   board_.step = steps.front().step;

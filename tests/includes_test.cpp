@@ -36,6 +36,7 @@ const std::vector<Rule> kRules = {
     {"common/plugin", {"common/config", "common/model"}},
     {"control_client", {"common"}},
     {"control_client/laws", {"common/config", "common/model", "common/plugin"}},
+    {"python", {"closed_loop", "common", "control_client", "recorder", "sim_server"}},
     {"recorder", {"common"}},
     {"sim_server", {"common", "Wire"}},
     {"sim_server/autopilots", {"common/config", "common/model", "common/plugin"}},
@@ -82,8 +83,8 @@ bool is_allowed(const std::string& file, const std::string& header, bool is_ours
 std::vector<std::string> find_faults(const fs::path& root) {
   const std::regex include(R"(^\s*#\s*include\s*([<"])([^>"]+)[>"])");
   std::vector<std::string> faults;
-  for (const char* top :
-       {"bench", "closed_loop", "common", "control_client", "recorder", "sim_server", "tools"}) {
+  for (const char* top : {"bench", "closed_loop", "common", "control_client", "python", "recorder",
+                          "sim_server", "tools"}) {
     if (!fs::exists(root / top)) continue;
     for (const auto& entry : fs::recursive_directory_iterator(root / top)) {
       const std::string ending = entry.path().extension();

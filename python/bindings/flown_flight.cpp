@@ -5,8 +5,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cstring>
-#include <new>
+#include <type_traits>
 #include <utility>
+#include <variant>
 
 #include "closed_loop/record_entries.hpp"
 #include "common/app/options.hpp"
@@ -28,9 +29,15 @@ class Writer {
   explicit Writer(double* cell) : cell_(cell) {}
   void add(double value) { *cell_++ = value; }
   void add(std::uint64_t value) { std::memcpy(cell_++, &value, sizeof value); }
-  template <class Vector>
-  void add_all(const Vector& vector) {
-    for (Eigen::Index i = 0; i < vector.size(); ++i) add(vector[i]);
+  /// All numbers of an object that holds nothing else.
+  template <class Doubles>
+  void add_all(const Doubles& doubles) {
+    static_assert(std::is_standard_layout_v<Doubles> && sizeof(Doubles) % sizeof(double) == 0);
+    std::memcpy(cell_, &doubles, sizeof doubles);
+    cell_ += sizeof doubles / sizeof(double);
+  }
+  void add_numbers(const model::Numbers& numbers) {
+    cell_ = std::copy_n(numbers.data(), numbers.size(), cell_);
   }
 
  private:
@@ -47,49 +54,54 @@ class Reader {
     std::memcpy(&value, cell_++, sizeof value);
     return value;
   }
-  template <class Vector>
-  void take_all(Vector&& vector) {
-    for (Eigen::Index i = 0; i < vector.size(); ++i) take(vector[i]);
+  template <class Doubles>
+  void take_all(Doubles& doubles) {
+    std::memcpy(static_cast<void*>(&doubles), cell_, sizeof doubles);
+    cell_ += sizeof doubles / sizeof(double);
+  }
+  void take_numbers(model::Numbers& numbers) {
+    std::copy_n(cell_, numbers.size(), numbers.data());
+    cell_ += numbers.size();
   }
 
  private:
   const double* cell_;
 };
 
-// The order is that of the columns in state.csv.
+// The order is that of the columns in state.csv and reference.csv, and of the numbers in memory.
+static_assert(sizeof(model::SlungLoadState) == 16 * sizeof(double));
+static_assert(sizeof(model::Reference) == 15 * sizeof(double));
 
-void write_bodies(Writer& row, const model::Measurement& state) {
-  row.add_all(state.p_WQ);
-  row.add_all(state.v_WQ);
-  row.add_all(state.p_WL);
-  row.add_all(state.v_WL);
-  row.add(state.rod.alpha);
-  row.add(state.rod.beta);
-  row.add(state.rod.alpha_dot);
-  row.add(state.rod.beta_dot);
-}
+const model::SlungLoadState& bodies(const model::Measurement& state) { return state; }
+model::SlungLoadState& bodies(model::Measurement& state) { return state; }
 
 void write_attitude(Writer& row, const model::Attitude& attitude) {
   row.add(attitude.q_WB.w());
-  row.add_all(attitude.q_WB.vec());
+  row.add(attitude.q_WB.x());
+  row.add(attitude.q_WB.y());
+  row.add(attitude.q_WB.z());
   row.add_all(attitude.w_WB_B);
-}
-
-void read_bodies(Reader& row, model::Measurement& state) {
-  row.take_all(state.p_WQ);
-  row.take_all(state.v_WQ);
-  row.take_all(state.p_WL);
-  row.take_all(state.v_WL);
-  row.take(state.rod.alpha);
-  row.take(state.rod.beta);
-  row.take(state.rod.alpha_dot);
-  row.take(state.rod.beta_dot);
 }
 
 void read_attitude(Reader& row, model::Attitude& attitude) {
   row.take(attitude.q_WB.w());
-  row.take_all(attitude.q_WB.vec());
+  row.take(attitude.q_WB.x());
+  row.take(attitude.q_WB.y());
+  row.take(attitude.q_WB.z());
   row.take_all(attitude.w_WB_B);
+}
+
+/// Steps of the mission where every stage lasts as long as it must.
+std::size_t estimate_steps(const config::Scenario& scenario) {
+  std::int64_t duration_ns = 0;
+  for (const config::Stage& stage : scenario.mission)
+    if (const auto* after = std::get_if<config::LeaveAfter>(&stage.leave))
+      duration_ns += after->duration_ns;
+    else
+      duration_ns += std::get<config::LeaveWithin>(stage.leave).after_ns;
+  // A day of 1 ms is no flight: memory is taken as it is needed.
+  return static_cast<std::size_t>(
+      std::min<std::int64_t>(duration_ns / scenario.sync.period_ns + 1, 1'000'000));
 }
 
 /// Says when it is time for a rest: at least 50 times a second, and never asks the clock often.
@@ -112,25 +124,6 @@ class RestTimer {
 
 }  // namespace
 
-// --- rows ----------------------------------------------------------------------------------------
-
-double* RowBuffer::add_row() {
-  if (rows_ == capacity_) resize(std::max<std::size_t>(2 * capacity_, 512));
-  return cells_.get() + width_ * rows_++;
-}
-
-void RowBuffer::shrink() {
-  if (rows_ > 0) resize(rows_);
-}
-
-void RowBuffer::resize(std::size_t rows) {
-  void* const moved = std::realloc(cells_.get(), rows * width_ * sizeof(double));
-  if (!moved) throw std::bad_alloc();
-  cells_.release();
-  cells_.reset(static_cast<double*>(moved));
-  capacity_ = rows;
-}
-
 // --- flying --------------------------------------------------------------------------------------
 
 FlownFlight::FlownFlight(const config::Scenario& scenario, const std::vector<std::uint32_t>& ids,
@@ -150,7 +143,6 @@ FlownFlight::FlownFlight(const config::Scenario& scenario, const std::vector<std
   }
   if (flight.is_law_broken()) throw app::RunError(flight.failure());
   keep_remarks(flight);
-  for (RowBuffer& rows : rows_) rows.shrink();
   refused_ = flight.refused();
   failure_ = flight.failure();
 }
@@ -207,36 +199,33 @@ void FlownFlight::list_columns(const closed_loop::Flight& flight) {
         columns_.push_back({"reference", name, index - 1, Kind::kStageName});  // its stage's cell
       else
         add("reference", name, name == "stage" ? Kind::kInteger : Kind::kDouble);
+  const std::size_t steps = estimate_steps(scenario_);
   index += 3;  // what only the recorder is told: `keep`
-  for (std::size_t i = 0; i < ids_.size(); ++i) rows_.emplace_back(index);
+  for (std::size_t i = 0; i < ids_.size(); ++i) rows_.emplace_back(index, steps);
 }
 
 void FlownFlight::keep(const FlownStep& flown, std::size_t index) {
   Writer row(rows_[index].add_row());
   const auto write_rest = [&](const model::Measurement& state) {
     if (has_attitude_) write_attitude(row, state.attitude);
-    row.add_all(state.signals);
+    row.add_numbers(state.signals);
   };
   row.add(std::uint64_t{ids_[index]});
   row.add(flown.step);
   row.add(static_cast<double>(static_cast<std::int64_t>(flown.step) * scenario_.sync.period_ns) /
           1e9);
-  write_bodies(row, flown.truth);
+  row.add_all(bodies(flown.truth));
   row.add_all(flown.applied_f_Q_W);
   write_rest(flown.truth);
   if (has_measured_) {
-    write_bodies(row, flown.measured);
+    row.add_all(bodies(flown.measured));
     write_rest(flown.measured);
   }
   const control::Answer& answer = flown.answer;
   row.add_all(answer.f_Q_W);
   row.add(static_cast<std::uint64_t>(answer.fault));
   row.add(std::uint64_t{answer.stage});
-  row.add_all(answer.reference.position);
-  row.add_all(answer.reference.velocity);
-  row.add_all(answer.reference.acceleration);
-  row.add_all(answer.reference.jerk);
-  row.add_all(answer.reference.snap);
+  row.add_all(answer.reference);
   row.add(std::uint64_t{answer.memory.stage});
   row.add(answer.memory.stage_start_step);
   row.add(static_cast<std::uint64_t>(answer.mission));
@@ -255,18 +244,18 @@ FlownStep FlownFlight::make_step(std::size_t index, std::size_t number) const {
   const auto read_rest = [&](model::Measurement& state) {
     if (has_attitude_) read_attitude(row, state.attitude);
     state.signals.resize(static_cast<Eigen::Index>(signals_));
-    row.take_all(state.signals);
+    row.take_numbers(state.signals);
   };
   row.take_integer();  // the vehicle's id
   flown.step = row.take_integer();
   double time_s = 0.0;
   row.take(time_s);
-  read_bodies(row, flown.truth);
+  row.take_all(bodies(flown.truth));
   row.take_all(flown.applied_f_Q_W);
   read_rest(flown.truth);
   flown.can_measurement_differ = differs_[index];
   if (has_measured_) {
-    read_bodies(row, flown.measured);
+    row.take_all(bodies(flown.measured));
     read_rest(flown.measured);
   }
   control::Answer& answer = flown.answer;
@@ -275,11 +264,7 @@ FlownStep FlownFlight::make_step(std::size_t index, std::size_t number) const {
   answer.stage = static_cast<std::uint32_t>(row.take_integer());
   if (answer.stage < scenario_.mission.size())
     answer.stage_name = scenario_.mission[answer.stage].name;
-  row.take_all(answer.reference.position);
-  row.take_all(answer.reference.velocity);
-  row.take_all(answer.reference.acceleration);
-  row.take_all(answer.reference.jerk);
-  row.take_all(answer.reference.snap);
+  row.take_all(answer.reference);
   answer.memory.stage = static_cast<std::uint32_t>(row.take_integer());
   answer.memory.stage_start_step = row.take_integer();
   answer.mission = static_cast<model::MissionPhase>(row.take_integer());
@@ -289,10 +274,12 @@ FlownStep FlownFlight::make_step(std::size_t index, std::size_t number) const {
 const std::string& FlownFlight::calc_certificate() const {
   std::call_once(is_certified_, [this] {
     record::Certificate certificate;
+    RecordEntry entry;  // one, to keep its memory
     for (std::size_t i = 0; i < ids_.size(); ++i)
-      for (std::size_t row = 0; row < rows_[i].rows(); ++row)
-        certificate.add(record::make_rows(
-            closed_loop::make_entry(ids_[i], make_step(i, row), controller_name_), parameters_));
+      for (std::size_t row = 0; row < rows_[i].rows(); ++row) {
+        closed_loop::fill_entry(entry, ids_[i], make_step(i, row), controller_name_);
+        certificate.add(record::make_rows(entry, parameters_));
+      }
     certificate_ = certificate.finish();
   });
   return certificate_;

@@ -3,9 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <functional>
-#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -15,34 +13,9 @@
 #include "closed_loop/flight_recorder.hpp"
 #include "common/bus/topics.hpp"
 #include "common/config/scenario.hpp"
+#include "python/bindings/row_buffer.hpp"
 
 namespace sls::python {
-
-/// Rows of equal width, which grow one by one. A cell is 8 bytes: a double or an integer.
-class RowBuffer {
- public:
-  explicit RowBuffer(std::size_t width) : width_(width) {}
-
-  /// A further row, whose cells hold anything; valid until the next one.
-  double* add_row();
-  /// Gives back the memory beyond the last row.
-  void shrink();
-
-  std::size_t width() const { return width_; }
-  std::size_t rows() const { return rows_; }
-  const double* row(std::size_t index) const { return cells_.get() + index * width_; }
-
- private:
-  struct Free {
-    void operator()(double* cells) const { std::free(cells); }
-  };
-  void resize(std::size_t rows);
-
-  std::size_t width_;
-  std::size_t rows_ = 0;
-  std::size_t capacity_ = 0;
-  std::unique_ptr<double, Free> cells_;  // by realloc, which moves pages instead of bytes
-};
 
 /// Where a column of a recording's file is in the rows.
 struct ColumnPlace {

@@ -185,6 +185,7 @@ void LawErrors::raise_first() {
 PythonLaw::PythonLaw(const py::object& controller, const control::LawSetup& setup,
                      bool has_attitude, std::shared_ptr<LawErrors> errors)
     : period_(setup.period),
+      period_ns_(std::llround(setup.period * 1e9)),
       vehicle_id_(setup.vehicle_id),
       has_attitude_(has_attitude),
       errors_(std::move(errors)) {
@@ -237,7 +238,7 @@ py::object PythonLaw::make_now(const LawInput& input) const {
   Py_ssize_t i = 0;
   const auto add = [&](PyObject* value) { PyStructSequence_SET_ITEM(now.ptr(), i++, value); };
   add(PyLong_FromUnsignedLongLong(input.step));
-  add(make_float(static_cast<double>(input.step) * period_));
+  add(make_float(static_cast<double>(static_cast<std::int64_t>(input.step) * period_ns_) / 1e9));
   add(make_float(period_));
   add(PyLong_FromUnsignedLong(vehicle_id_));
   add(PyLong_FromUnsignedLong(input.stage));

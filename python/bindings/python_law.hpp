@@ -57,7 +57,8 @@ class PythonLaw : public control::ControlLaw {
   void read_answer(pybind11::handle answer, control::LawOutput& output) const;
 
   std::string name_;
-  double period_;
+  double period_;           // s
+  std::int64_t period_ns_;  // the same: times are those of the recording, to the bit
   std::uint32_t vehicle_id_;
   bool has_attitude_;
   int memory_size_ = 0;

@@ -11,7 +11,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from _sls_core import Now, Reference, Scenario
+    from _sls_core import Now, Reference, Scenario, Vehicle
 
     from sls import metrics
     from sls.columns import Columns
@@ -38,6 +38,7 @@ _PLACES = {
     "RunError": "sls.errors",
     "Scenario": "_sls_core",
     "Trajectory": "sls.trajectory",
+    "Vehicle": "_sls_core",
     "fly": "sls.flight",
     "load_scenario": "sls.scenario",
     "lqr": "sls.gains",

@@ -55,7 +55,10 @@ class FlownVehicle:
         self.scenario = scenario
         self.vehicle_id: int = core.vehicle_ids[index]
         self._cells: np.ndarray = core.rows(index)
-        self._places = {(table, name): place for table, name, place, _ in core.columns}
+
+    @cached_property
+    def _places(self) -> dict[tuple[str, str], int]:
+        return {(table, name): place for table, name, place, _ in self._core.columns}
 
     def _make_columns(self, wanted: str) -> Columns:
         columns = {}
@@ -197,9 +200,13 @@ class Flight(FlownVehicle):
 
     def __init__(self, core: Any, scenario: "Scenario"):
         super().__init__(core, 0, scenario)
-        self.vehicles: tuple[FlownVehicle, ...] = (
-            self, *(FlownVehicle(core, index, scenario)
-                    for index in range(1, len(core.vehicle_ids))))
+        self._others = tuple(FlownVehicle(core, index, scenario)
+                             for index in range(1, len(core.vehicle_ids)))
+
+    @property
+    def vehicles(self) -> tuple[FlownVehicle, ...]:
+        """All vehicles, by id; the first one is the flight itself."""
+        return (self, *self._others)  # not kept: a cycle would keep the flight's memory
 
     @property
     def failure(self) -> str:
@@ -228,7 +235,7 @@ class Flight(FlownVehicle):
 
         Raises ConfigError for the folder, OSError where the disk refuses."""
         from sls.recordings import Recording
-        if not self._core.save(os.fspath(folder), force):
+        if not self._core.save(os.fspath(folder), force) and self.is_finished:
             raise RunError(f"{os.fspath(folder)}: the recording is not complete")
         return Recording(Path(folder))
 

@@ -16,7 +16,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 BUILD = pathlib.Path(sys.argv.pop()).resolve() if __name__ == "__main__" else ROOT / "build"
 sys.path.insert(0, str(ROOT))
 
-from bench import loop, parts  # noqa: E402
+from bench import campaign, loop, parts  # noqa: E402
 from bench.programs import Programs, wait_for  # noqa: E402
 from bench.results import LESS, Figure, Rounds, format_number, format_table  # noqa: E402
 
@@ -232,6 +232,34 @@ class RealTimeSearchTest(unittest.TestCase):
             self.assertLessEqual(max(seen), 256)
 
 
+class CampaignTest(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.programs = Programs(BUILD, 0, pathlib.Path(folder.name))
+        self.scenario = self.programs.scenario("figure_eight", campaign.fly_in_closed_form)
+
+    def test_every_run_has_a_value_of_its_own(self):
+        self.assertEqual(len(set(campaign.make_values(10_000))), 10_000)
+        self.assertEqual(campaign.make_values(4), ["0.15", "0.175", "0.2", "0.225"])
+
+    def test_processes_fly_all_runs_and_say_so_where_one_does_not_finish(self):
+        self.assertIn("model: analytic\n  step_s: 0.004", self.scenario.read_text())
+        seconds = campaign.time_processes(self.programs, self.scenario, ["0.2", "0.21", "0.22"], True, 2)
+        self.assertGreater(seconds, 0)
+        with self.assertRaisesRegex(campaign.MeasurementError, "vehicle.load_mass_kg: expected > 0, got -1"):
+            campaign.time_processes(self.programs, self.scenario, ["0.2", "-1"], False, 2)
+
+    def test_the_parts_of_a_run_are_all_there(self):
+        figures = Rounds("campaign")
+        campaign.add_parts(self.programs, figures, self.scenario, ["0.2", "0.25"])
+        made = figures.make_figures()
+        self.assertEqual([figure.name for figure in made], [
+            "a run: reading its scenario", "a run: making plant and controller",
+            "a run: plant and controller", "a run: all measures", "a run: certificate"])
+        self.assertGreater(made[2].median, made[1].median)
+
+
 class ProcessTest(unittest.TestCase):
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
@@ -287,7 +315,8 @@ class ProgramTest(unittest.TestCase):
 
     def test_help_names_every_part(self):
         said = bench("--help").stdout
-        for part in ("lockstep", "load", "round-trip", "realtime", "plant", "recorder", "fleet", "qos"):
+        for part in ("lockstep", "load", "round-trip", "realtime", "plant", "recorder", "campaign", "fleet",
+                     "qos"):
             self.assertIn(part, said)
 
     def check(self, file, part):

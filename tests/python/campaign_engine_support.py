@@ -13,9 +13,8 @@ HERE = pathlib.Path(__file__).resolve().parent
 FAKE = HERE / "fake_core"
 BASE = """name: base
 vehicle: { quad_mass_kg: 1.5, load_mass_kg: 0.2, rod_length_m: 1.0, gravity_m_s2: 9.8 }
-initial: { quad_position_m: [0, 0, -2] }
 faults:
-  - noise: { std_n: [0.05, 0.05, 0.05], seed: 0 }
+  - noise: { on: command, force_n: [0.05, 0.05, 0.05], seed: 0 }
 mission:
   - set_point: { position_m: [0.5, 0, -2] }
     for_s: 2
@@ -38,7 +37,7 @@ class CampaignTest(support.FolderTest):
 
     def environment(self, **more):
         path = os.pathsep.join([str(self.core), str(support.ROOT / "python")])
-        return {**os.environ, "PYTHONPATH": path, "SLS_BUILD": str(support.BUILD), **more}
+        return {**os.environ, "PYTHONPATH": path, "SLS_BUILD": str(support.BUILD.resolve()), **more}
 
     def start(self, *arguments, fake="", **options):
         """The command line in a process of its own, in the test's folder."""

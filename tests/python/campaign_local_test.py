@@ -14,10 +14,13 @@ import subprocess
 import sys
 import tempfile
 import unittest
+import unittest.mock
 from pathlib import Path
 
 import support
-from campaign_engine_support import CampaignTest
+from campaign_engine_support import BASE, FAKE, CampaignTest
+
+sys.path.insert(0, str(FAKE))
 
 
 class LocalEngineTest(CampaignTest):
@@ -208,6 +211,24 @@ class LocalEngineTest(CampaignTest):
         manifest = json.loads((self.folder / "out/manifest.json").read_text())
         self.assertTrue(manifest["other_machines"])
 
+    def test_a_c_library_that_is_told_to_use_other_instructions_is_another_machine(self):
+        self.write_campaign(40)
+        self.fly("campaign.yaml", "--out", "out", "--chunk-runs", 5)
+        (self.folder / "out/chunks/chunk-000001.csv").unlink()
+        with unittest.mock.patch.dict(os.environ, GLIBC_TUNABLES="glibc.cpu.hwcaps=-FMA"):
+            said = self.fly("campaign.yaml", "--out", "out", "--resume", code=2)
+        self.expect_line(said, "tunables: expected none, got glibc.cpu.hwcaps=-FMA")
+
+    def test_levels_follow_the_flags_of_the_processor(self):
+        from sls.campaign.machine import LEVEL_FLAGS, calc_level
+        flags = set()
+        self.assertEqual(calc_level("x86_64", flags), "x86-64-v1")
+        for level, needed in LEVEL_FLAGS:
+            flags |= needed
+            self.assertEqual(calc_level("x86_64", flags), level)
+        self.assertEqual(calc_level("x86_64", flags - {"popcnt"}), "x86-64-v1")
+        self.assertEqual(calc_level("aarch64", set()), "aarch64")
+
     def test_mistakes_of_the_command_line_are_one_line(self):
         self.write_campaign(40)
         for arguments, part in (
@@ -220,11 +241,11 @@ class LocalEngineTest(CampaignTest):
             self.expect_line(self.fly(*arguments, code=2), part)
 
     def test_a_value_that_no_run_could_have_is_refused_with_its_run_before_anything_flies(self):
-        self.write("base.yaml", BASE_WITH_LIST)
-        self.write("campaign.yaml", "base: base.yaml\nvary:\n  vehicle.load_mass_kg: "
+        self.write("base.yaml", BASE)
+        self.write("campaign.yaml", "base: base.yaml\nruns: 4\nvary:\n  vehicle.load_mass_kg: "
                                     "{ list: [0.2, -0.1] }\nseeds: [faults.0.noise.seed]\n")
         said = self.fly("campaign.yaml", "--out", "out", code=2)
-        self.expect_line(said, "campaign.yaml:3: vary.vehicle.load_mass_kg: run 1")
+        self.expect_line(said, "campaign.yaml:4: vary.vehicle.load_mass_kg: run 1")
         self.assertFalse((self.folder / "out").exists())
 
     def test_worker_flies_listed_chunks_and_those_of_its_index(self):
@@ -320,15 +341,6 @@ def read_peak_mb(process):
         pass
     return 0.0
 
-
-BASE_WITH_LIST = """name: base
-vehicle: { quad_mass_kg: 1.5, load_mass_kg: 0.2, rod_length_m: 1.0, gravity_m_s2: 9.8 }
-faults:
-  - noise: { std_n: [0.05, 0.05, 0.05], seed: 0 }
-mission:
-  - set_point: { position_m: [0.5, 0, -2] }
-    for_s: 2
-"""
 
 if __name__ == "__main__":
     unittest.main()

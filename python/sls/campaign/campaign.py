@@ -20,7 +20,8 @@ class Varied:
 
     `grid` and `list` hold their `items`. `uniform`, `normal`, `log_uniform`, `sobol` and
     `latin_hypercube` hold a `distribution` of DISTRIBUTIONS with its two `parameters`: bounds, or
-    mean and standard deviation; a normal one may be cut off `within` bounds. `derived` holds `expressions`: a text, or a list of texts and lists.
+    mean and standard deviation; a normal one may be cut off `within` bounds.
+    `derived` holds `expressions`: an Expression, or a list of these and lists.
     `seed` is a noise seed, drawn by counting up from `seed`."""
 
     path: str
@@ -77,8 +78,8 @@ class Certify:
 
 @dataclass(frozen=True)
 class OwnMeasure:
-    """A Python function of the user: called with a flight, returns a number, or a dict with a number
-    for each of `columns`."""
+    """A Python function of the user: called with a flight, returns a number, or a dict with a
+    number for each of `columns`."""
 
     file: Path
     function: str

@@ -22,8 +22,8 @@ class Checker(Protocol):
 
 
 def check_campaign(campaign: Campaign, runs: Checker) -> None:
-    """Checks run 0 and, for each varied key, the runs with its least and its largest value (of a key
-    that is no number: with each value) among the first 100,000. If one fails, the first of the
+    """Checks run 0 and, for each varied key, the runs with its least and its largest value (of a
+    key that is no number: with each value) among the first 100,000. If one fails, the first of the
     campaign that fails is searched.
 
     Raises InputError `FILE:LINE: vary.PATH: run I: …`."""

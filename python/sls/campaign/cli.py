@@ -4,8 +4,10 @@ import argparse
 import shlex
 import signal
 import sys
+import threading
 import time
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -92,6 +94,9 @@ def fly(options: argparse.Namespace) -> None:
     with opened(out) as folder:
         try:
             prepare(folder, campaign, engine, options)
+            # Takes most of a second, in which the workers fly.
+            threading.Thread(target=import_module, args=("sls.campaign.report",),
+                             daemon=True).start()
             engine.run(folder, engine_options)
             folder.collect(options.on)
         except KeyboardInterrupt:
@@ -255,13 +260,14 @@ def raise_ended(*_: object) -> None:
 def main(arguments: Sequence[str]) -> int:
     """The exit code."""
     for number in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, raise_ended)
+        if signal.getsignal(number) is not signal.SIG_IGN:  # as under nohup
+            signal.signal(number, raise_ended)
     try:
         if arguments and arguments[0] in COMMANDS:
             COMMANDS[arguments[0]](arguments[1:])
         else:
             fly(make_parser().parse_args(arguments))
-    except ConfigError as error:
+    except (ConfigError, ImportError) as error:
         say(f"error: {error}")
         return 2
     except (EngineError, RunError, OSError) as error:

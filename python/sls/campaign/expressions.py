@@ -29,7 +29,7 @@ class Expression:
     Raises ExpressionError for anything that is not arithmetic."""
 
     def __init__(self, text: str):
-        self.text = text
+        text = self.text = " ".join(text.split())  # in one line, for messages
         self.names: list[str] = []  # of other values, each once, in order of appearance
         if len(text) > MOST_LETTERS:
             raise ExpressionError(f"expected at most {MOST_LETTERS} letters, got {len(text)}")
@@ -55,7 +55,7 @@ class Expression:
     def _to_python(self) -> str:
         """The same with a plain identifier for each name: Python reads dots otherwise."""
         parts, at = [], 0
-        text = self.text.strip()
+        text = self.text
         while at < len(text):
             token = TOKEN.match(text, at)
             if not token:

@@ -1,4 +1,4 @@
-"""The folder of a campaign: what planner, workers and engines share. See README.md, "The folder"."""
+"""The folder of a campaign, which planner, workers and engines share. README.md, "The folder"."""
 
 import csv
 import errno
@@ -103,7 +103,7 @@ class CampaignFolder:
         self.refuse_foreign(campaign, resume)
         self.make_folders()
         self.take_lock()
-        self.refuse_foreign(campaign, resume)  # nobody has begun it between the two
+        self.refuse_foreign(campaign, resume)  # another process may have begun it meanwhile
         if (self.folder / "plan.json").exists():
             self.take_up(campaign, engine, first, last, list(columns), allow_other_machines)
             return
@@ -112,7 +112,8 @@ class CampaignFolder:
         write_whole(self.folder / "base.yaml", campaign.base_text.encode())
         self.write_plan(Plan(
             campaign=campaign.name, sha256=campaign.sha256, file=str(campaign.file.resolve()),
-            base=str(campaign.base.resolve()), engine=engine, first=first, last=last, campaign_runs=campaign.runs,
+            base=str(campaign.base.resolve()), engine=engine, first=first, last=last,
+            campaign_runs=campaign.runs,
             chunk_runs=chunk_runs, columns=list(columns), machine=describe_machine(),
             allow_other_machines=allow_other_machines))
 
@@ -169,9 +170,9 @@ class CampaignFolder:
         """Raises InputError where this machine's rows could differ from the plan's machine."""
         difference = find_difference(plan.machine, describe_machine())
         if difference and not plan.allow_other_machines:
-            raise InputError(f"{self.folder}: machine {host_name()}: {difference} as where the "
-                             "campaign was begun; equal bits are promised for equal machines only "
-                             "(--resume --allow-other-machines flies on and names them)")
+            raise InputError(f"{self.folder}: machine {host_name()}: {difference}; equal "
+                             "bits are promised only for machines like the one that began the "
+                             "campaign (--resume --allow-other-machines flies on and names them)")
 
     def make_folders(self) -> None:
         try:

@@ -17,9 +17,12 @@ from sls.campaign.engines import EngineError
 from sls.campaign.runs import fly_whole, make_runs
 from sls.campaign.sampling import make_values
 from sls.campaign.whole_files import name_temporary, sync_folder
+from sls.errors import RunError
 
 if TYPE_CHECKING:
     from _sls_core import Runs
+
+    from sls import Flight
     from sls.campaign.folder import CampaignFolder
 
 
@@ -55,7 +58,7 @@ def keep_run(folder: "CampaignFolder", campaign: Campaign, runs: "Runs",
     try:
         target.parent.mkdir(exist_ok=True)
         shutil.rmtree(temporary, ignore_errors=True)
-        fly_whole(campaign, runs, make_values(campaign, index, index)[0]).save(temporary)
+        save(fly_whole(campaign, runs, make_values(campaign, index, index)[0]), temporary)
         certificate = json.loads((temporary / "manifest.json").read_text())["certificate"]
         if row["certificate"] not in ("", certificate):
             raise EngineError(f"{target}: expected certificate {row['certificate']} of runs.csv, "
@@ -69,6 +72,16 @@ def keep_run(folder: "CampaignFolder", campaign: Campaign, runs: "Runs",
                               f"{error.strerror or error}") from None
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
+
+
+def save(flight: "Flight", recording: Path) -> None:
+    """Raises RunError for a flight that finished and whose recording is not complete; that of one
+    that failed never is."""
+    try:
+        flight.save(recording)
+    except RunError:
+        if flight.is_finished:
+            raise
 
 
 def is_whole(recording: Path, certificate: str) -> bool:

@@ -1,10 +1,13 @@
 """What decides the bits of a flight beside its scenario: processor level, libraries, versions."""
 
 import hashlib
+import os
 import platform
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+
+from sls.core import load_core
 
 # Flags of /proc/cpuinfo that each level of the x86-64 psABI adds. The mathematical library chooses
 # its sin and cos by them, so that equal bits are promised for one level only.
@@ -13,6 +16,8 @@ LEVEL_FLAGS = (
     ("x86-64-v3", {"avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "abm", "movbe"}),
     ("x86-64-v4", {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"}),
 )
+# What glibc's sin and cos look at, which a processor may have without the whole level.
+LIBM_FLAGS = {"fma", "fma4", "avx2", "avx"}
 
 
 def calc_level(architecture: str, flags: set[str]) -> str:
@@ -48,8 +53,11 @@ def find_version(package: str) -> str:
 def describe_machine() -> dict[str, str]:
     """Everything that could change a bit of the table, by name. Equal descriptions promise equal
     rows. `core` names the bytes of the compiled module `_sls_core`."""
+    flags = read_flags()
     return {
-        "level": calc_level(platform.machine(), read_flags()),
+        "level": calc_level(platform.machine(), flags),
+        "libm": " ".join(sorted(LIBM_FLAGS & flags)),
+        "tunables": os.environ.get("GLIBC_TUNABLES", ""),
         "libc": " ".join(platform.libc_ver()),
         "python": platform.python_version(),
         "numpy": find_version("numpy"),
@@ -59,8 +67,7 @@ def describe_machine() -> dict[str, str]:
 
 
 def describe_core() -> str:
-    import _sls_core
-    return hashlib.sha256(Path(_sls_core.__file__).read_bytes()).hexdigest()[:16]
+    return hashlib.sha256(Path(str(load_core().__file__)).read_bytes()).hexdigest()[:16]
 
 
 def host_name() -> str:
@@ -71,5 +78,5 @@ def find_difference(expected: dict[str, str], got: dict[str, str]) -> str:
     """One phrase that names the first difference; empty where there is none."""
     for name in sorted({*expected, *got}):
         if expected.get(name) != got.get(name):
-            return f"{name}: expected {expected.get(name)}, got {got.get(name)}"
+            return f"{name}: expected {expected.get(name) or 'none'}, got {got.get(name) or 'none'}"
     return ""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from sls.campaign.campaign import Campaign
 from sls.campaign.sampling import is_certified, make_values, to_yaml_value
+from sls.core import load_core
 from sls.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -48,8 +49,9 @@ def list_columns(campaign: Campaign, runs: "Runs") -> list[str]:
 
 
 def to_cell(value: Any) -> str:
-    """A varied value as text: that of the scenario's YAML, text without its quotes."""
-    return value if isinstance(value, str) else to_yaml_value(value)
+    """A varied value as text: that of the scenario's YAML, a text of one line without its quotes."""
+    is_plain = isinstance(value, str) and value.isprintable()
+    return value if is_plain else to_yaml_value(value)
 
 
 def to_number(value: float) -> str:
@@ -88,9 +90,8 @@ def fly_whole(campaign: Campaign, runs: "Runs", values: list[Any]) -> "Flight":
 
 def fly_text(scenario_text: str, campaign: Campaign) -> "Flight":
     """Flies a scenario whose paths are relative to the base scenario's folder."""
-    import _sls_core
     import sls
-    return sls.fly(_sls_core.Scenario(None, scenario_text, str(campaign.base.parent), {}))
+    return sls.fly(load_core().Scenario(None, scenario_text, str(campaign.base.parent), {}))
 
 
 def list_values(campaign: Campaign, first: int, last: int) -> Iterator[tuple[int, list[Any]]]:

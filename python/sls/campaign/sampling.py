@@ -56,8 +56,8 @@ def make_values(campaign: Campaign, first: int, last: int) -> list[list[Any]]:
 
 
 def to_yaml_value(value: Any) -> str:
-    """`value` as YAML in one line that reads back to the same bits: a number, a truth value, a text,
-    a list or a map of such."""
+    """`value` as YAML in one line that reads back to the same bits: a number, a truth value, a
+    text, a list or a map of such."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, int):
@@ -147,7 +147,7 @@ def _draw_latin(varied: Varied, first: int, count: int, draws: int) -> np.ndarra
 
 def _draw_sobol(campaign: Campaign, varied: Varied, first: int, count: int) -> np.ndarray:
     """One coordinate of Sobol's sequence with a digital shift (bits flipped alike in all points),
-    which keeps its balance. All keys of kind sobol with one seed are coordinates of one sequence."""
+    which keeps its balance. All sobol keys with one seed are coordinates of one sequence."""
     try:
         from scipy.stats import qmc
     except ImportError:
@@ -175,15 +175,22 @@ def _transform(varied: Varied, u: float) -> float:
         if varied.within is None:
             return a + b * STANDARD_NORMAL.inv_cdf(u)
         low, high = varied.within
-        below = STANDARD_NORMAL.cdf((low - a) / b)
-        above = STANDARD_NORMAL.cdf((high - a) / b)
-        u = min(max(below + u * (above - below), 1e-300), 1 - 2.0**-53)
-        return min(max(a + b * STANDARD_NORMAL.inv_cdf(u), low), high)
+        return min(max(a + b * _cut_normal((low - a) / b, (high - a) / b, u), low), high)
     if varied.distribution == "log_uniform":
         value = math.exp(math.log(a) + u * (math.log(b) - math.log(a)))
     else:
         value = a + u * (b - a)
     return min(max(value, a), b)
+
+
+def _cut_normal(low: float, high: float, u: float) -> float:
+    """Of the standard normal distribution between `low` and `high`: its inverse at `u`."""
+    if low > 0:  # the lower tail has more digits: 1e-19 is a number, and 1 - 1e-19 is 1
+        return -_cut_normal(-high, -low, 1 - u)
+    below, above = (math.erfc(-bound / math.sqrt(2)) / 2 for bound in (low, high))
+    probability = below + u * (above - below)
+    # Both bounds may be so far away that nothing is left: the caller's bounds hold then.
+    return STANDARD_NORMAL.inv_cdf(min(max(probability, 1e-300), 1 - 2.0**-53))
 
 
 def _round(varied: Varied, value: float) -> int | float:

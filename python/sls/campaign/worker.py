@@ -146,7 +146,7 @@ def main(arguments: Sequence[str]) -> int:
         else:
             fly_listed(options)
         return 0
-    except (ConfigError, RefusedRun) as error:
+    except (ConfigError, RefusedRun, ImportError) as error:
         return fail(str(error), 2, serving)
     except (EngineError, RunError, OSError) as error:
         return fail(str(error), 1, serving)

@@ -219,7 +219,8 @@ def parse_yaml(data: bytes, file: Path) -> Place:
             line = text.count("\n", 0, position) + 1
         if isinstance(error, yaml.composer.ComposerError):
             fail(file, line, "", "expected one YAML document, got a second one")
-        fail(file, line, "", f"expected YAML, got a syntax error: {to_printable(str(problem), 100)}")
+        fail(file, line, "",
+             f"expected YAML, got a syntax error: {to_printable(str(problem), 100)}")
     if root is None:
         mark = yaml.Mark(str(file), 0, 0, 0, None, None)
         root = yaml.ScalarNode("", "", mark, mark)

@@ -2,7 +2,9 @@
 
 import dataclasses
 import pickle
+import re
 import shutil
+import textwrap
 
 import campaign_support as support
 import pytest
@@ -69,6 +71,19 @@ period_s: 0.002
     assert campaign.certify == Certify("some", 10, 4)
     assert campaign.period_s == 0.002
     assert campaign.varied[0].line == 5
+
+
+def test_the_examples_of_the_readme_are_campaigns(tmp_path):
+    readme = support.HERE.parents[2] / "config" / "campaigns" / "README.md"
+    blocks = re.findall(r"(?:^    .*\n)+", readme.read_text(), re.MULTILINE)
+    first, *others = [textwrap.dedent(block) for block in blocks]
+    scenarios = readme.parents[1] / "scenarios"
+    file = tmp_path / "campaign.yaml"
+    file.write_text(first.replace("../scenarios", str(scenarios)))
+    assert load_campaign(file).runs == 10000
+    derived, = (block for block in others if block.startswith("vary:"))
+    file.write_text(f"base: {scenarios / 'figure_eight.yaml'}\nruns: 5\n" + derived)
+    assert len(make_values(load_campaign(file), 0, 4)) == 5
 
 
 def test_has_defaults(tmp_path):

@@ -70,8 +70,8 @@ vary:
     ("vary:\n  _x: { grid: [0, 1, 11] }\n  plant.wind_m_s: { derived: [0, _x, 0] }\n",
      "4: vary.plant.wind_m_s: run 10: plant.wind_m_s[1]: expected < 0.99, got 1.0"),
     ("vary:\n  faults.7.delay.by_s: { list: [0.004] }\n",
-     "3: vary.faults.7.delay.by_s: run 0: faults: expected one of the list's items, 0 to 2, got 7 on "
-     "the way to faults.7.delay.by_s"),
+     "3: vary.faults.7.delay.by_s: run 0: faults: expected one of the list's items, 0 to 2, got 7 "
+     "on the way to faults.7.delay.by_s"),
     ("vary:\n  name: { list: [a] }\n", " vary: run 0: something else is wrong"),
 ])
 def test_names_key_line_and_first_run(tmp_path, text, expected):

@@ -69,6 +69,10 @@ CDFS = {
     "uniform: [-1, 3]": lambda x: (x + 1) / 4,
     "normal: [0.2, 0.02]": lambda x: calc_phi((x - 0.2) / 0.02),
     "normal: [0.2, 0.1], within: [0.1, 0.5]": calc_cut_cdf,
+    "normal: [0, 1], within: [9, 10]": lambda x: 1 - (
+        (math.erfc(x / math.sqrt(2)) - math.erfc(10 / math.sqrt(2)))
+        / (math.erfc(9 / math.sqrt(2)) - math.erfc(10 / math.sqrt(2)))),
+    "normal: [0, 1], within: [-10, -1]": lambda x: calc_phi(x) / calc_phi(-1),
     "log_uniform: [0.01, 100]": lambda x: math.log(x / 0.01) / math.log(1e4),
     "latin_hypercube: [2, 5]": lambda x: (x - 2) / 3,
     "latin_hypercube: { normal: [1, 2] }": lambda x: calc_phi((x - 1) / 2),
@@ -106,6 +110,7 @@ def test_has_the_moments_of_its_closed_form(tmp_path, spec, mean, deviation):
     ("uniform: [0.1, 0.3]", 0.1, 0.3),
     ("normal: [0.2, 10], within: [0.1, 0.3]", 0.1, 0.3),
     ("normal: [0, 1], within: [9, 10]", 9, 10),
+    ("normal: [0, 1], within: [90, 100]", 90, 100),
     ("log_uniform: [0.1, 0.3]", 0.1, 0.3),
     ("sobol: [0.1, 0.3]", 0.1, 0.3),
     ("latin_hypercube: [0.1, 0.3]", 0.1, 0.3),
@@ -142,8 +147,8 @@ def test_a_latin_hypercube_has_one_draw_in_each_stratum(tmp_path, runs):
 
 
 def test_each_elementary_interval_holds_one_point_of_sobol(tmp_path):
-    """The first two coordinates are a (0, 2)-sequence in base 2: each block of 2^m points has one in
-    each of the 2^m boxes of width 2^-k and height 2^-(m-k)."""
+    """The first two coordinates are a (0, 2)-sequence in base 2: each block of 2^m points has one
+    in each of the 2^m boxes of width 2^-k and height 2^-(m-k)."""
     m = 8
     campaign = make(tmp_path, "  _x: { sobol: [0, 1], seed: 3 }\n  _y: { sobol: [0, 1], seed: 3 }",
                     4 * 2**m)
@@ -290,14 +295,16 @@ def test_a_grid_is_rounded_once(tmp_path):
 
 
 def test_a_logarithmic_grid_has_equal_ratios(tmp_path):
-    campaign = make(tmp_path, "  _x: { grid: { from: 0.001, to: 1000, values: 7, log: true } }", None)
+    grid = "{ from: 0.001, to: 1000, values: 7, log: true }"
+    campaign = make(tmp_path, f"  _x: {{ grid: {grid} }}", None)
     values = [row[0] for row in make_values(campaign, 0, 6)]
     assert values == pytest.approx([10.0**i for i in range(-3, 4)], rel=1e-14)
     assert (values[0], values[-1]) == (0.001, 1000.0)
 
 
 def test_a_list_keeps_its_types(tmp_path):
-    campaign = make(tmp_path, "  a.b: { list: [1, 1.0, true, text, \"2\", [1, 2.5], { c: 1 }] }", None)
+    items = '[1, 1.0, true, text, "2", [1, 2.5], { c: 1 }]'
+    campaign = make(tmp_path, f"  a.b: {{ list: {items} }}", None)
     values = [row[0] for row in make_values(campaign, 0, 6)]
     assert values == [1, 1.0, True, "text", "2", (1, 2.5), {"c": 1}]
     assert [type(value) for value in values[:4]] == [int, float, bool, str]

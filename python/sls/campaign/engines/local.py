@@ -21,7 +21,7 @@ from sls.campaign.folder import CampaignFolder
 from sls.campaign.progress import Progress
 from sls.input_error import InputError
 
-CHUNK_S = 0.75      # of work in a chunk: little is lost with a process, and little time between two
+CHUNK_S = 0.5       # of work in a chunk: little is lost with a process, and little time between two
 MOST_TRIES = 3      # of a chunk whose process ends without an answer
 END_WITHIN_S = 5.0  # of a process that was asked to end
 

@@ -1,0 +1,160 @@
+"""Types of the extension module. The package sls is its face: what each name does is said there."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from sls.errors import ConfigError as ConfigError, RunError as RunError
+
+FAULTS: tuple[str, ...]
+
+Vector = tuple[float, float, float]
+
+class Vehicle:
+    """Masses and rod of one vehicle of a scenario."""
+
+    @property
+    def quad_mass_kg(self) -> float: ...
+    @property
+    def load_mass_kg(self) -> float: ...
+    @property
+    def rod_length_m(self) -> float: ...
+    @property
+    def gravity_m_s2(self) -> float: ...
+
+class Scenario:
+    """Everything that decides a flight. Made by sls.load_scenario."""
+
+    def __init__(self, file: str | None = None, text: str = "", folder: str = "",
+                 changes: Mapping[str, str] = ...) -> None: ...
+    @property
+    def text(self) -> str:
+        """YAML: a file with this text is the same scenario."""
+    def to_text(self) -> str: ...
+    @property
+    def sha256(self) -> str: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def folder(self) -> str:
+        """Paths in the scenario are relative to it."""
+    @property
+    def period_s(self) -> float:
+        """Control period, s."""
+    @property
+    def step_s(self) -> float:
+        """Integration step of the plant, s."""
+    @property
+    def law(self) -> str: ...
+    @property
+    def plant(self) -> str: ...
+    @property
+    def vehicle(self) -> Vehicle: ...
+    @property
+    def vehicles(self) -> tuple[Vehicle, ...]:
+        """Every vehicle, by id."""
+    @property
+    def controller_model(self) -> Vehicle:
+        """What the controller believes of the vehicle."""
+    @property
+    def force_limit_n(self) -> float: ...
+    @property
+    def stages(self) -> tuple[tuple[str, str, float | None, float | None], ...]:
+        """Of the mission: (kind, name, for_s, lap_s)."""
+
+class Reference(tuple[Vector, ...]):
+    """What the load is asked to do at one instant: vectors in W."""
+
+    @property
+    def position(self) -> Vector:
+        """m"""
+    @property
+    def velocity(self) -> Vector:
+        """m/s"""
+    @property
+    def acceleration(self) -> Vector:
+        """m/s²"""
+    @property
+    def jerk(self) -> Vector:
+        """m/s³"""
+    @property
+    def snap(self) -> Vector:
+        """m/s⁴"""
+
+class Now(tuple[Any, ...]):
+    """All that a control law may look at, of one vehicle at one step. Frame W, z down."""
+
+    @property
+    def step(self) -> int:
+        """k, counts control periods from 0."""
+    @property
+    def time_s(self) -> float: ...
+    @property
+    def period_s(self) -> float: ...
+    @property
+    def vehicle_id(self) -> int: ...
+    @property
+    def stage(self) -> int:
+        """Index into the mission."""
+    @property
+    def stage_time_s(self) -> float: ...
+    @property
+    def quad_position(self) -> Vector:
+        """m"""
+    @property
+    def quad_velocity(self) -> Vector:
+        """m/s"""
+    @property
+    def load_position(self) -> Vector:
+        """m"""
+    @property
+    def load_velocity(self) -> Vector:
+        """m/s"""
+    @property
+    def alpha(self) -> float:
+        """Angle of the rod about x, rad."""
+    @property
+    def beta(self) -> float:
+        """Angle of the rod about y, rad."""
+    @property
+    def alpha_rate(self) -> float:
+        """rad/s"""
+    @property
+    def beta_rate(self) -> float:
+        """rad/s"""
+    @property
+    def attitude(self) -> tuple[float, float, float, float] | None:
+        """Unit quaternion (w, x, y, z), body to W; None of a plant without attitude."""
+    @property
+    def body_rates(self) -> Vector | None:
+        """In the body, rad/s; None of a plant without attitude."""
+    @property
+    def signals(self) -> tuple[float, ...]:
+        """Of the plant, in its order."""
+    @property
+    def reference(self) -> Reference: ...
+    @property
+    def memory(self) -> tuple[float, ...]:
+        """What the law returned at the step before; zeros at step 0."""
+
+class FlownFlight:
+    @property
+    def vehicle_ids(self) -> list[int]: ...
+    @property
+    def failure(self) -> str: ...
+    @property
+    def last_step(self) -> int: ...
+    @property
+    def columns(self) -> list[tuple[str, str, int, str]]: ...
+    @property
+    def certificate(self) -> str: ...
+    def can_measurement_differ(self, index: int) -> bool: ...
+    def rows(self, index: int) -> np.ndarray: ...
+    def save(self, folder: str, force: bool) -> bool: ...
+
+def fly(scenario: Scenario, controller: Callable[[Now], Any] | None = None,
+        vehicle: int | None = None, check_purity: bool = False) -> FlownFlight: ...
+def inspect_recording(folder: str) -> tuple[int, str, list[str]]: ...
+def compare_recordings(a: str, b: str) -> tuple[str | None, list[str]]: ...
+def lqr(horizontal: float, vertical: float) -> dict[str, dict[str, float]]: ...

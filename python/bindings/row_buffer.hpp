@@ -1,0 +1,42 @@
+/// Rows of numbers that grow one by one, in one piece of memory.
+#pragma once
+
+#include <cstddef>
+
+namespace sls::python {
+
+/// A cell is 8 bytes: a double or an integer. The memory of buffers that are gone is kept, up to a
+/// bound, for the next ones: to get fresh pages from the system takes as long as half a flight.
+class RowBuffer {
+ public:
+  /// `rows`: how many are expected.
+  RowBuffer(std::size_t width, std::size_t rows);
+  ~RowBuffer();
+  RowBuffer(RowBuffer&& other) noexcept;
+  RowBuffer& operator=(RowBuffer&&) = delete;
+  RowBuffer(const RowBuffer&) = delete;
+  RowBuffer& operator=(const RowBuffer&) = delete;
+
+  /// A further row, whose cells hold anything; valid until the next one.
+  /// @throws std::bad_alloc
+  double* add_row() {
+    if (used_ + width_ > capacity_) grow();
+    double* const row = cells_ + used_;
+    used_ += width_;
+    return row;
+  }
+
+  std::size_t width() const { return width_; }
+  std::size_t rows() const { return used_ / width_; }
+  const double* row(std::size_t index) const { return cells_ + index * width_; }
+
+ private:
+  void grow();
+
+  std::size_t width_;
+  std::size_t used_ = 0;  // cells
+  std::size_t capacity_;  // cells
+  double* cells_;
+};
+
+}  // namespace sls::python

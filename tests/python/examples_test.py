@@ -1,0 +1,63 @@
+"""The examples in Python, as a user runs them."""
+
+import os
+import re
+import subprocess
+
+import conftest
+import pytest
+import sls
+
+LAUNCHER = conftest.ROOT / "sls"
+
+
+def run_example(name, *arguments, folder):
+    done = subprocess.run(
+        [LAUNCHER, "python", conftest.ROOT / "examples/python" / name, *map(str, arguments)],
+        cwd=folder, capture_output=True, text=True, timeout=200,
+        env={**os.environ, "SLS_BUILD": str(conftest.BUILD), "MPLCONFIGDIR": str(folder)})
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def test_pid_flies_as_the_law_in_cpp(tmp_path):
+    said = run_example("pid.py", folder=tmp_path)
+    apart = re.search(r"at most (\S+) m from the law 'pid' in C\+\+", said)
+    assert float(apart[1]) < 1e-12
+    assert "8001 steps, finished" in said
+
+
+def test_fly_and_plot_draws_what_it_flew(tmp_path):
+    said = run_example("fly_and_plot.py", "--out", tmp_path, folder=tmp_path)
+    rms = {mass: float(error) for mass, error in re.findall(r"(\S+) kg: .* rms (\S+) m", said)}
+    assert list(rms) == ["0.1", "0.2", "0.3"]
+    assert rms["0.2"] < min(rms["0.1"], rms["0.3"])  # the mass that the law believes
+    assert (tmp_path / "masses.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_compare_laws_leaves_recordings_that_verify(tmp_path):
+    said = run_example("compare_laws.py", "--flights", 2, "--recordings", tmp_path, folder=tmp_path)
+    mean = dict(re.findall(r"(\w+): mean (\S+),", said))
+    assert float(mean["qsf"]) < float(mean["pid"])  # what QSF is for
+    for law in mean:
+        assert sls.Recording(tmp_path / law).verify().is_ok
+
+
+def test_the_readme_lists_every_example():
+    listed = (conftest.ROOT / "python/README.md").read_text()
+    for file in (conftest.ROOT / "examples/python").glob("*.py"):
+        assert f"`{file.name}`" in listed, file.name
+
+
+def test_the_launcher_starts_python_with_the_package(tmp_path):
+    done = subprocess.run([LAUNCHER, "python", "-c", "import sls; print(sls.fly('short'))"],
+                          cwd=tmp_path, capture_output=True, text=True, timeout=100,
+                          env={**os.environ, "SLS_BUILD": str(conftest.BUILD)})
+    assert done.stdout == "<sls.Flight short: 501 steps, finished>\n", done.stderr
+
+
+@pytest.mark.parametrize("code, exit_code", [("raise SystemExit(3)", 3), ("1/0", 1)])
+def test_the_launcher_passes_the_exit_code_on(code, exit_code, tmp_path):
+    done = subprocess.run([LAUNCHER, "python", "-c", code], cwd=tmp_path, capture_output=True,
+                          env={**os.environ, "SLS_BUILD": str(conftest.BUILD)}, timeout=100)
+    assert done.returncode == exit_code

@@ -1,0 +1,124 @@
+"""The campaigns of config/campaigns: files, bases, first and last runs; the predictions beside them."""
+
+import sys
+import unittest
+
+import support
+import numpy as np
+
+sys.path.insert(0, str(support.BUILD / "python"))
+try:
+    import _sls_core
+except ImportError:
+    print(f"skipped: no _sls_core in {support.BUILD / 'python'}")
+    sys.exit(77)
+
+from sls.campaign import findings
+from sls.campaign.campaign_file import load_campaign
+from sls.campaign.check import check_campaign
+from sls.campaign.sampling import make_values, to_yaml_value
+
+FOLDER = support.ROOT / "config/campaigns"
+FILES = sorted(FOLDER.glob("*.yaml"))
+
+
+def make_runs(campaign):
+    return _sls_core.Runs(str(campaign.base), campaign.scenario_paths, list(campaign.measures),
+                          campaign.period_s)
+
+
+def list_values(campaign, run):
+    values = make_values(campaign, run, run)[0]
+    return [to_yaml_value(value) for value in campaign.pick_scenario_values(values)]
+
+
+class ShippedCampaignsTest(unittest.TestCase):
+    def test_they_are_those_that_the_page_studies(self):
+        self.assertEqual({file.stem for file in FILES}, set(findings.NAMES))
+
+    def test_every_base_is_used_and_bears_its_files_name(self):
+        used = {load_campaign(file).base.resolve() for file in FILES}
+        self.assertEqual(used, {file.resolve() for file in (FOLDER / "bases").glob("*.yaml")})
+        for base in used:
+            self.assertIn(f"\nname: {base.stem}\n", base.read_text())
+
+    def test_their_first_last_and_extreme_runs_are_accepted(self):
+        for file in FILES:
+            with self.subTest(file.stem):
+                campaign = load_campaign(file)
+                runs = make_runs(campaign)
+                runs.check(list_values(campaign, 0))
+                runs.check(list_values(campaign, campaign.runs - 1))
+                check_campaign(campaign, runs)
+
+    def test_both_laws_of_a_pair_get_the_same_disturbances(self):
+        campaign = load_campaign(FOLDER / "law_comparison.yaml")
+        qsf, pid = make_values(campaign, 6, 7)
+        self.assertNotEqual(qsf[0], pid[0])
+        self.assertEqual(qsf[1:], pid[1:])
+
+    def test_the_page_holds_pictures_of_all(self):
+        page = (support.ROOT / "docs/campaigns.md").read_text()
+        for name in findings.NAMES:
+            self.assertIn(f"](campaigns/{name}.png)", page)
+            self.assertGreater((support.ROOT / f"docs/campaigns/{name}.png").stat().st_size, 5000)
+            self.assertIn(f"./sls campaign {name} ", page)
+
+
+class PredictionTest(unittest.TestCase):
+    """Against flights, not against the page."""
+
+    def fly(self, name, **values):
+        """Measures of one flight of a campaign's base, by column."""
+        campaign = load_campaign(FOLDER / f"{name}.yaml")
+        paths = [path.replace("__", ".") for path in values]
+        runs = _sls_core.Runs(str(campaign.base), paths, list(campaign.measures), None)
+        outcome, _, measured, _, _ = runs.fly([str(value) for value in values.values()], False)
+        return outcome, dict(zip(runs.columns, measured))
+
+    def do_motions_grow(self, mass, delay):
+        _, found = self.fly("mass_and_delay", vehicle__load_mass_kg=mass,
+                            faults__0__delay__by_s=delay)
+        return not found["stage_2_load_error_rms_x_m"] < 0.98 * found["stage_1_load_error_rms_x_m"]
+
+    def test_small_motions_of_a_load_of_the_wrong_mass_grow_where_it_is_predicted(self):
+        gains, vertical = findings.calc_lqr_gains(10, 4), findings.calc_lqr_gains(5, 2)
+        for mass in (0.1, 0.2, 0.4):
+            limit = findings.calc_delay_limit(gains, mass, 0.0, vertical)
+            periods = round(limit / 0.004)
+            self.assertFalse(self.do_motions_grow(mass, round(0.004 * (periods - 2), 3)), mass)
+            self.assertTrue(self.do_motions_grow(mass, round(0.004 * (periods + 3), 3)), mass)
+
+    def test_the_right_mass_is_the_formula_of_the_readme(self):
+        gains = findings.calc_lqr_gains(10, 4)
+        # closed_loop/README.md: 0.234 s, less half a period for the hold.
+        self.assertAlmostEqual(findings.calc_delay_limit(gains), 0.232, delta=5e-4)
+        np.testing.assert_allclose(gains, [3.1623, 8.4827, 9.7962, 5.4399], atol=5e-5)
+
+    def test_the_load_sags_as_predicted(self):
+        # After 12 s of settling what is left of the transient is below a millimetre.
+        _, found = self.fly("mass_and_delay", vehicle__load_mass_kg=0.3)
+        sag = findings.calc_sag(0.3, 0.2, findings.calc_lqr_gains(5, 2)[0])
+        self.assertAlmostEqual(found["stage_2_load_error_rms_z_m"], sag, delta=1e-3)
+
+    def test_a_gust_moves_the_load_as_predicted(self):
+        force = 0.2  # small, so that what is not linear stays below 1 %
+        outcome, found = self.fly("wind", faults__0__bias__force_n=f"[{force}, 0, 0]",
+                                  plant__rotor_drag_n_s_m=0)
+        self.assertEqual(outcome, "finished")
+        peak = force * findings.calc_pulse_peak(findings.calc_lqr_gains(10, 4))
+        # Beside what the start leaves: a few millimetres.
+        self.assertAlmostEqual(found["load_error_max_x_m"], peak, delta=0.01 * peak + 0.005)
+
+    def test_the_vertical_loop_ends_where_its_root_is_imaginary(self):
+        for weight in (5.0, 50.0, 500.0):
+            position, velocity = findings.calc_lqr_gains(weight, 2)
+            delay = findings.calc_vertical_limit((position, velocity)) + findings.PERIOD_S / 2
+            w = np.sqrt((velocity**2 + np.sqrt(velocity**4 + 4 * position**2)) / 2)
+            s = 1j * w
+            self.assertAlmostEqual(abs(s**2 + np.exp(-s * delay) * (velocity * s + position)), 0.0,
+                                   delta=1e-9 * w**2)
+
+
+if __name__ == "__main__":
+    unittest.main()
