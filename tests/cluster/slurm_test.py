@@ -143,7 +143,7 @@ def test_ctrl_c_cancels_the_jobs_and_another_engine_goes_on(slurm: SlurmCluster,
     assert campaign.table("stopped") == campaign.table("local")
 
 
-def test_a_run_that_ends_its_worker_is_named_after_three_submissions(
+def test_a_run_that_ends_its_worker_is_named_after_the_last_submission(
         slurm: SlurmCluster, campaign: TestCampaign) -> None:
     gate = campaign.folder / "gate.py"
     text = gate.read_text()
