@@ -58,9 +58,10 @@ def make_scale(values: np.ndarray, first: float, last: float, is_log: bool = Fal
 
 
 def deserves_log(values: np.ndarray) -> bool:
-    """Whether positive values are spread over more than two decades."""
-    low, high = np.min(values), np.max(values)
-    return bool(low > 0.0 and high / low > 100.0)
+    """Whether positive values are spread over more than two decades, and not mostly near the upper end,
+    as evenly spread numbers that begin near 0 are."""
+    low, middle, high = np.min(values), np.median(values), np.max(values)
+    return bool(low > 0.0 and high > 100.0 * low and high > 5.0 * middle)
 
 
 def px(value: float) -> str:

@@ -251,8 +251,8 @@ def study_gains(table: RunTable) -> tuple[Figure, dict[str, str]]:
     ratio = (errors[:, standard, 0] / peaks)[fine]
     lightest = weights[outcome[:, standard, 0] == 0]
     return figure, {"ga_runs": str(len(table)), **describe(10.0), **describe(100.0),
-                    **describe(1000.0), "ga_ratio_low": f"{ratio.min():.2f}",
-                    "ga_ratio_high": f"{ratio.max():.2f}", "ga_least": f"{lightest[0]:.2g}",
+                    **describe(1000.0), "ga_ratio_low": f"{ratio.min():.3f}",
+                    "ga_ratio_high": f"{ratio.max():.3f}", "ga_least": f"{lightest[0]:.2g}",
                     "ga_vertical_50": f"{calc_vertical_limit(calc_lqr_gains(50.0, 2)):.3f}",
                     "ga_vertical_500": f"{calc_vertical_limit(calc_lqr_gains(500.0, 2)):.3f}",
                     "ga_free_fall": str(free_fall)}
@@ -331,14 +331,14 @@ def study_integral(table: RunTable) -> tuple[Figure, dict[str, str]]:
     right.set_ylabel("error in x at rest (m)")
     return figure, {
         "in_runs": str(len(table)),
-        "in_z_gap": f"{1000 * np.max(np.abs(error_z - np.abs(sag + offset))[~vertical]):.2f}",
+        "in_z_gap": f"{1000 * np.max(np.abs(error_z - np.abs(sag + offset))[~vertical]):.0e}",
         "in_z_rod": f"{1000 * np.max(np.abs(error_z - np.abs(offset))[vertical & small]):.0f}",
         "in_clamp_z": f"{clamp_z:.3f}", "in_clamp_x": f"{clamp_x:.3f}",
-        "in_beyond_x": f"{1000 * np.max(np.abs(error_x - (drift - clamp_x))[beyond]):.0f}",
+        "in_beyond_x": f"{1000 * np.max(np.abs(error_x - (drift - clamp_x))[beyond]):.0e}",
         "in_beyond_count": str(int(np.sum(beyond))),
         "in_z_left": f"{1000 * np.median(error_z[vertical]):.0f}",
         "in_z_before": f"{1000 * np.median(error_z[~vertical]):.0f}",
-        "in_x_gap": f"{1000 * np.max(np.abs(error_x - drift)[~horizontal]):.2f}",
+        "in_x_gap": f"{1000 * np.max(np.abs(error_x - drift)[~horizontal]):.0e}",
         "in_x_before": f"{np.max(error_x[~horizontal]):.3f}",
         "in_x_share": f"{100 * np.median(error_x[below] / drift[below]):.1f}",
         "in_push": f"{np.max(push):.1f}"}

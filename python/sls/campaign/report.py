@@ -26,6 +26,7 @@ from sls.report import STYLE_SHEET, escape, make_section
 
 MOST_VALUES = 41  # of a key that get a bin each; of more values these are bins of equal width
 BINS = 20
+MOST_WORDS = 12  # of a key that is drawn: more are those of derived lists, which nobody could read
 MOST_PAIRS = 10  # of varied keys that are drawn
 MOST_LINES = 400  # of parallel coordinates
 MOST_COLUMNS = 80  # distributions that are drawn
@@ -147,6 +148,15 @@ def make_bins(table: RunTable, key: str, most_values: int = MOST_VALUES) -> Bins
     return Bins(key, [f"{middle:.2g}" for middle in middles], places)
 
 
+def list_drawn_keys(table: RunTable) -> list[str]:
+    """Varied keys that pictures show: several values, and no more texts than a reader can take in; no
+    seeds."""
+    return [key for key in table.keys
+            if not key.endswith(".seed")
+            and (1 < len(table.words[key][0]) <= MOST_WORDS if key in table.words
+                 else np.ptp(table.numbers[key]) > 0.0)]
+
+
 def name_word(word: str) -> str:
     """Of a map, its first value: `qsf` of {law: "qsf", gains: …}; of other text its beginning."""
     if word.startswith("{"):
@@ -233,9 +243,10 @@ def make_share_picture(table: RunTable, key: str) -> str:
 
 
 def make_key_section(table: RunTable) -> str:
-    if not table.keys or not np.any(is_lost(table)):
+    keys = list_drawn_keys(table)
+    if not keys or not np.any(is_lost(table)):
         return ""
-    pictures = "".join(make_share_picture(table, key) for key in table.keys)
+    pictures = "".join(make_share_picture(table, key) for key in keys)
     return make_section(
         "Share lost along each varied key",
         f"<div class=\"pair\">{pictures}</div><p class=\"small\">Over all values of the other "
@@ -278,8 +289,7 @@ def calc_class_medians(table: RunTable, measure: str, place: np.ndarray,
 
 def make_pair_section(table: RunTable) -> str:
     """Heat maps of each pair of keys that take more than one value."""
-    keys = [key for key in table.keys if len(make_bins(table, key).names) > 1]
-    pairs = list(combinations(keys, 2))[:MOST_PAIRS]
+    pairs = list(combinations(list_drawn_keys(table), 2))[:MOST_PAIRS]
     if not pairs:
         return ""
     measure = find_main_measure(table)
@@ -358,7 +368,7 @@ def choose_sample(table: RunTable) -> np.ndarray:
 def make_parallel(table: RunTable) -> str:
     sample = choose_sample(table)
     axes: list[tuple[str, np.ndarray, Sequence[str] | None]] = []
-    for key in table.keys[:8]:
+    for key in list_drawn_keys(table)[:8]:
         if key in table.words:
             bins = make_bins(table, key, 12)
             axes.append((key, bins.places[sample].astype(float), bins.names))
