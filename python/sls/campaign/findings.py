@@ -2,8 +2,8 @@
 
     ./sls python -m sls.campaign.findings DIR [--out docs]
 
-DIR holds a folder for each campaign of config/campaigns/, by its name. The linear predictions are derived in
-the page, findings_page.md."""
+DIR holds a folder for each campaign of config/campaigns/, by its name. The linear predictions are
+derived in the page, findings_page.md."""
 
 import argparse
 import sys
@@ -56,8 +56,9 @@ def calc_mass_ratio(load_mass_kg: float, believed_kg: float = LOAD_MASS_KG) -> f
 
 def make_chain(gains: Sequence[float], load_mass_kg: float,
                vertical: Sequence[float]) -> HorizontalChain:
-    """The horizontal loop about a hover in which the load sags, because the controller believes 0.2 kg:
-    (1) of the page. `gains` position, velocity, acceleration, jerk; `vertical` position, velocity."""
+    """The horizontal loop about a hover in which the load sags, because the controller believes 0.2
+    kg: (1) of the page. `gains` position, velocity, acceleration, jerk; `vertical` position,
+    velocity."""
     ratio = calc_mass_ratio(float(load_mass_kg))
     slope = vertical[1] * (ratio - 1.0)
     bend = (vertical[1]**2 - vertical[0]) * (1.0 - ratio)
@@ -68,8 +69,8 @@ def make_chain(gains: Sequence[float], load_mass_kg: float,
 
 def calc_delay_limit(gains: Sequence[float], load_mass_kg: float = LOAD_MASS_KG,
                      lag_s: float = 0.0, vertical: Sequence[float] = (0.0, 0.0)) -> float:
-    """The delay from which small motions grow, s, less half a period for the hold. Of the right mass,
-    `vertical` does not matter."""
+    """The delay from which small motions grow, s, less half a period for the hold. Of the right
+    mass, `vertical` does not matter."""
     chain = make_chain(gains, load_mass_kg, vertical)
     return calc_stability_limit(chain, float(lag_s)) - PERIOD_S / 2
 
@@ -352,7 +353,8 @@ def study_px4_ingredients(table: RunTable) -> tuple[Figure, dict[str, str]]:
     gains = (5.4399, 9.7962, 8.4827, 3.1623)
     fine_lags = np.linspace(0.0, float(lags[-1]), 61)
     limits = np.array([calc_delay_limit(gains, LOAD_MASS_KG, lag) for lag in fine_lags])
-    figure, (axes,) = make_figure(1, "Old states and a slow attitude loop, published gains", 6.6, 4.6)
+    figure, (axes,) = make_figure(1, "Old states and a slow attitude loop, published gains", 6.6,
+                                  4.6)
     mesh = axes.pcolormesh(lags, ages, errors, shading="nearest", cmap="viridis", rasterized=True)
     axes.set_facecolor("#d55e00")
     axes.grid(False)

@@ -1,8 +1,8 @@
 """One self-contained page about a campaign: report.html.
 
-Made from runs.csv, campaign.yaml and manifest.json alone, so that it can be made again wherever the folder
-is; equal files give equal bytes. Its size does not grow with the number of runs: everything is counted
-into bins or taken as a sample."""
+Made from runs.csv, campaign.yaml and manifest.json alone, so that it can be made again wherever the
+folder is; equal files give equal bytes. Its size does not grow with the number of runs: everything
+is counted into bins or taken as a sample."""
 
 import json
 import math
@@ -149,8 +149,8 @@ def make_bins(table: RunTable, key: str, most_values: int = MOST_VALUES) -> Bins
 
 
 def list_drawn_keys(table: RunTable) -> list[str]:
-    """Varied keys that pictures show: several values, and no more texts than a reader can take in; no
-    seeds."""
+    """Varied keys that pictures show: several values, and no more texts than a reader can take in;
+    no seeds."""
     return [key for key in table.keys
             if not key.endswith(".seed")
             and (1 < len(table.words[key][0]) <= MOST_WORDS if key in table.words
@@ -265,7 +265,8 @@ def make_heat_maps(table: RunTable, x: str, y: str, measure: str | None) -> str:
     if np.any(lost):
         with np.errstate(invalid="ignore"):
             share = np.where(counts > 0, lost / np.maximum(counts, 1), np.nan)
-        pictures += f"<div>{drawing.draw_heat(share, counts, names, labels, 'share lost', (0, 1))}</div>"
+        picture = drawing.draw_heat(share, counts, names, labels, "share lost", (0, 1))
+        pictures += f"<div>{picture}</div>"
     if measure is not None:
         medians = calc_class_medians(table, measure, place, shape)
         title = f"median of {measure}, finished runs"
@@ -355,7 +356,8 @@ def make_measures(table: RunTable) -> str:
 
 
 def choose_sample(table: RunTable) -> np.ndarray:
-    """Places of at most MOST_LINES runs, half of them lost where there are as many, evenly spaced."""
+    """Places of at most MOST_LINES runs, half of them lost where there are as many, evenly
+    spaced."""
     lost, finished = np.flatnonzero(is_lost(table)), np.flatnonzero(~is_lost(table))
     half = MOST_LINES // 2
     take_lost = min(len(lost), max(half, MOST_LINES - len(finished)))
@@ -386,7 +388,8 @@ def make_parallel(table: RunTable) -> str:
 
 
 def list_worst(table: RunTable) -> list[tuple[str, np.ndarray]]:
-    """Titles and places in the table: failed, lost earliest, largest errors of those that finished."""
+    """Titles and places in the table: failed, lost earliest, largest errors of those that
+    finished."""
     groups = [("Failed", np.flatnonzero(table.is_outcome("failed"))[:WORST])]
     lost = np.flatnonzero(table.is_outcome("lost"))
     moment = table.numbers.get("time_of_loss_s", table.numbers["steps"])[lost]
