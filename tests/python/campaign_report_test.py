@@ -189,7 +189,8 @@ class ReportTest(CampaignTest):
     def test_what_is_missing_or_damaged_is_refused_in_one_line(self):
         folder = self.write_campaign()
         (folder / "manifest.json").write_text("{")
-        self.expect_input_error(lambda: make_campaign_report(folder), "manifest.json: expected JSON")
+        self.expect_input_error(lambda: make_campaign_report(folder),
+                                "manifest.json: expected JSON")
         (folder / "manifest.json").unlink()
         self.expect_input_error(lambda: make_campaign_report(folder), "manifest.json", "No such")
         (folder / "campaign.yaml").write_text("a: [")
@@ -258,7 +259,8 @@ class CompareTest(CampaignTest):
         for row in rows:
             row[6] = repr(float(row[6]) + 0.25)
         rows[1][7] = "100.0"
-        b = self.write_campaign("b", rows=rows, manifest={"campaign": "synthetic", "engine": "dask"})
+        b = self.write_campaign("b", rows=rows,
+                                manifest={"campaign": "synthetic", "engine": "dask"})
         text = compare(a, b)
         for part in ("engine: local | dask", "runs.csv: 400 runs in both",
                      "12 finish with A alone, 0 with B alone: McNemar's exact p = 0.000488",
@@ -299,7 +301,8 @@ class CompareTest(CampaignTest):
 
     def test_folders_without_a_result_are_refused(self):
         a = self.write_campaign("a")
-        self.expect_input_error(lambda: compare(a, self.folder / "nowhere"), "nowhere/manifest.json")
+        self.expect_input_error(lambda: compare(a, self.folder / "nowhere"),
+                                "nowhere/manifest.json")
         (a / "runs.csv").unlink()
         self.expect_input_error(lambda: compare(a, a), "a/runs.csv", "no such file")
 

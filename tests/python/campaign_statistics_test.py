@@ -29,7 +29,8 @@ class WilsonTest(unittest.TestCase):
     def test_it_agrees_with_scipy(self):
         for count, total, level in ((0, 10, 0.95), (10, 10, 0.95), (3, 17, 0.9), (60, 200, 0.99)):
             theirs = stats.binomtest(count, total).proportion_ci(level, "wilson")
-            np.testing.assert_allclose(calc_wilson_interval(count, total, level), theirs, atol=1e-12)
+            np.testing.assert_allclose(calc_wilson_interval(count, total, level), theirs,
+                                       atol=1e-12)
 
     def test_the_ends_are_exact_where_nothing_or_everything_counts(self):
         self.assertEqual(calc_wilson_interval(0, 50)[0], 0.0)

@@ -1,4 +1,5 @@
-"""The campaigns of config/campaigns: files, bases, first and last runs; the predictions beside them."""
+"""The campaigns of config/campaigns: files, bases, first and last runs; the predictions beside
+them."""
 
 import sys
 import unittest

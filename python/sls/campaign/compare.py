@@ -1,7 +1,7 @@
 """Two campaigns beside each other: `./sls campaign compare A B`.
 
-Both must have flown the same values of the same keys; what differs is the rest: the base scenario (another
-law, other gains), the version, the machine. Runs of the same index form pairs."""
+Both must have flown the same values of the same keys; what differs is the rest: the base scenario
+(another law, other gains), the version, the machine. Runs of the same index form pairs."""
 
 import filecmp
 from pathlib import Path
@@ -21,8 +21,9 @@ MOST_RUNS = 10
 
 
 def compare(a: Path, b: Path) -> str:
-    """The comparison as text. Raises InputError for folders that are no campaigns with results, and for
-    campaigns that varied different keys or flew different values, naming the first difference."""
+    """The comparison as text. Raises InputError for folders that are no campaigns with results, and
+    for campaigns that varied different keys or flew different values, naming the first
+    difference."""
     lines = [f"A: {a}", f"B: {b}", ""]
     lines += compare_manifests(read_manifest(a / "manifest.json"),
                                read_manifest(b / "manifest.json"))

@@ -1,7 +1,7 @@
 """Small pictures as SVG text, for a page that must stay small and equal for equal numbers.
 
-A picture has a size in pixels and a y axis that points down, as SVG has it; `Scale` leads from values to
-pixels. Coordinates are written to a tenth of a pixel."""
+A picture has a size in pixels and a y axis that points down, as SVG has it; `Scale` leads from
+values to pixels. Coordinates are written to a tenth of a pixel."""
 
 import html
 import math
@@ -58,9 +58,10 @@ def make_scale(values: np.ndarray, first: float, last: float, is_log: bool = Fal
 
 
 def deserves_log(values: np.ndarray) -> bool:
-    """Whether positive values are spread over more than two decades."""
-    low, high = np.min(values), np.max(values)
-    return bool(low > 0.0 and high / low > 100.0)
+    """Whether positive values are spread over more than two decades, and not mostly near the upper
+    end, as evenly spread numbers that begin near 0 are."""
+    low, middle, high = np.min(values), np.median(values), np.max(values)
+    return bool(low > 0.0 and high > 100.0 * low and high > 5.0 * middle)
 
 
 def px(value: float) -> str:
@@ -205,8 +206,8 @@ def draw_shares(rows: Sequence[tuple[str, float, float, float, str]], label: str
 
 def draw_heat(values: np.ndarray, counts: np.ndarray, names: tuple[Sequence[str], Sequence[str]],
               labels: tuple[str, str], title: str, scale: tuple[float, float] | None = None) -> str:
-    """Of values (rows, columns), NaN where there is none; row 0 at the bottom. `names` and `labels` are
-    those of columns, then rows; `counts` says how many runs each field holds."""
+    """Of values (rows, columns), NaN where there is none; row 0 at the bottom. `names` and `labels`
+    are those of columns, then rows; `counts` says how many runs each field holds."""
     rows, columns = values.shape
     width, left, right, top, bottom = 440.0, 74.0, 360.0, 28.0, 268.0
     finite = values[np.isfinite(values)]

@@ -2,8 +2,8 @@
 
     ./sls python -m sls.campaign.findings DIR [--out docs]
 
-DIR holds a folder for each campaign of config/campaigns/, by its name. The linear predictions are derived in
-the page, findings_page.md."""
+DIR holds a folder for each campaign of config/campaigns/, by its name. The linear predictions are
+derived in the page, findings_page.md."""
 
 import argparse
 import sys
@@ -56,8 +56,9 @@ def calc_mass_ratio(load_mass_kg: float, believed_kg: float = LOAD_MASS_KG) -> f
 
 def make_chain(gains: Sequence[float], load_mass_kg: float,
                vertical: Sequence[float]) -> HorizontalChain:
-    """The horizontal loop about a hover in which the load sags, because the controller believes 0.2 kg:
-    (1) of the page. `gains` position, velocity, acceleration, jerk; `vertical` position, velocity."""
+    """The horizontal loop about a hover in which the load sags, because the controller believes 0.2
+    kg: (1) of the page. `gains` position, velocity, acceleration, jerk; `vertical` position,
+    velocity."""
     ratio = calc_mass_ratio(float(load_mass_kg))
     slope = vertical[1] * (ratio - 1.0)
     bend = (vertical[1]**2 - vertical[0]) * (1.0 - ratio)
@@ -68,8 +69,8 @@ def make_chain(gains: Sequence[float], load_mass_kg: float,
 
 def calc_delay_limit(gains: Sequence[float], load_mass_kg: float = LOAD_MASS_KG,
                      lag_s: float = 0.0, vertical: Sequence[float] = (0.0, 0.0)) -> float:
-    """The delay from which small motions grow, s, less half a period for the hold. Of the right mass,
-    `vertical` does not matter."""
+    """The delay from which small motions grow, s, less half a period for the hold. Of the right
+    mass, `vertical` does not matter."""
     chain = make_chain(gains, load_mass_kg, vertical)
     return calc_stability_limit(chain, float(lag_s)) - PERIOD_S / 2
 
@@ -251,8 +252,8 @@ def study_gains(table: RunTable) -> tuple[Figure, dict[str, str]]:
     ratio = (errors[:, standard, 0] / peaks)[fine]
     lightest = weights[outcome[:, standard, 0] == 0]
     return figure, {"ga_runs": str(len(table)), **describe(10.0), **describe(100.0),
-                    **describe(1000.0), "ga_ratio_low": f"{ratio.min():.2f}",
-                    "ga_ratio_high": f"{ratio.max():.2f}", "ga_least": f"{lightest[0]:.2g}",
+                    **describe(1000.0), "ga_ratio_low": f"{ratio.min():.3f}",
+                    "ga_ratio_high": f"{ratio.max():.3f}", "ga_least": f"{lightest[0]:.2g}",
                     "ga_vertical_50": f"{calc_vertical_limit(calc_lqr_gains(50.0, 2)):.3f}",
                     "ga_vertical_500": f"{calc_vertical_limit(calc_lqr_gains(500.0, 2)):.3f}",
                     "ga_free_fall": str(free_fall)}
@@ -331,14 +332,14 @@ def study_integral(table: RunTable) -> tuple[Figure, dict[str, str]]:
     right.set_ylabel("error in x at rest (m)")
     return figure, {
         "in_runs": str(len(table)),
-        "in_z_gap": f"{1000 * np.max(np.abs(error_z - np.abs(sag + offset))[~vertical]):.2f}",
+        "in_z_gap": f"{1000 * np.max(np.abs(error_z - np.abs(sag + offset))[~vertical]):.0e}",
         "in_z_rod": f"{1000 * np.max(np.abs(error_z - np.abs(offset))[vertical & small]):.0f}",
         "in_clamp_z": f"{clamp_z:.3f}", "in_clamp_x": f"{clamp_x:.3f}",
-        "in_beyond_x": f"{1000 * np.max(np.abs(error_x - (drift - clamp_x))[beyond]):.0f}",
+        "in_beyond_x": f"{1000 * np.max(np.abs(error_x - (drift - clamp_x))[beyond]):.0e}",
         "in_beyond_count": str(int(np.sum(beyond))),
         "in_z_left": f"{1000 * np.median(error_z[vertical]):.0f}",
         "in_z_before": f"{1000 * np.median(error_z[~vertical]):.0f}",
-        "in_x_gap": f"{1000 * np.max(np.abs(error_x - drift)[~horizontal]):.2f}",
+        "in_x_gap": f"{1000 * np.max(np.abs(error_x - drift)[~horizontal]):.0e}",
         "in_x_before": f"{np.max(error_x[~horizontal]):.3f}",
         "in_x_share": f"{100 * np.median(error_x[below] / drift[below]):.1f}",
         "in_push": f"{np.max(push):.1f}"}
@@ -352,7 +353,8 @@ def study_px4_ingredients(table: RunTable) -> tuple[Figure, dict[str, str]]:
     gains = (5.4399, 9.7962, 8.4827, 3.1623)
     fine_lags = np.linspace(0.0, float(lags[-1]), 61)
     limits = np.array([calc_delay_limit(gains, LOAD_MASS_KG, lag) for lag in fine_lags])
-    figure, (axes,) = make_figure(1, "Old states and a slow attitude loop, published gains", 6.6, 4.6)
+    figure, (axes,) = make_figure(1, "Old states and a slow attitude loop, published gains", 6.6,
+                                  4.6)
     mesh = axes.pcolormesh(lags, ages, errors, shading="nearest", cmap="viridis", rasterized=True)
     axes.set_facecolor("#d55e00")
     axes.grid(False)

@@ -1,5 +1,5 @@
-"""Runs that form pairs: of two campaigns those of equal index, of one campaign those that differ in one key
-alone. Tables of how their outcomes and measures differ."""
+"""Runs that form pairs: of two campaigns those of equal index, of one campaign those that differ in
+one key alone. Tables of how their outcomes and measures differ."""
 
 import numpy as np
 
@@ -18,8 +18,9 @@ def describe_interval(count: int, total: int) -> str:
 
 
 def find_pairs(table: RunTable, key: str) -> tuple[list[str], Places, Places] | None:
-    """Of a key with exactly two values: the values as text, and the runs with the first and with the
-    second whose other varied values are equal. None where fewer than half of the runs form pairs."""
+    """Of a key with exactly two values: the values as text, and the runs with the first and with
+    the second whose other varied values are equal. None where fewer than half of the runs form
+    pairs."""
     if key in table.words:
         names, side = table.words[key]
     else:

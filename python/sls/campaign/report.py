@@ -1,8 +1,8 @@
 """One self-contained page about a campaign: report.html.
 
-Made from runs.csv, campaign.yaml and manifest.json alone, so that it can be made again wherever the folder
-is; equal files give equal bytes. Its size does not grow with the number of runs: everything is counted
-into bins or taken as a sample."""
+Made from runs.csv, campaign.yaml and manifest.json alone, so that it can be made again wherever the
+folder is; equal files give equal bytes. Its size does not grow with the number of runs: everything
+is counted into bins or taken as a sample."""
 
 import json
 import math
@@ -26,6 +26,7 @@ from sls.report import STYLE_SHEET, escape, make_section
 
 MOST_VALUES = 41  # of a key that get a bin each; of more values these are bins of equal width
 BINS = 20
+MOST_WORDS = 12  # of a key that is drawn: more are those of derived lists, which nobody could read
 MOST_PAIRS = 10  # of varied keys that are drawn
 MOST_LINES = 400  # of parallel coordinates
 MOST_COLUMNS = 80  # distributions that are drawn
@@ -147,6 +148,15 @@ def make_bins(table: RunTable, key: str, most_values: int = MOST_VALUES) -> Bins
     return Bins(key, [f"{middle:.2g}" for middle in middles], places)
 
 
+def list_drawn_keys(table: RunTable) -> list[str]:
+    """Varied keys that pictures show: several values, and no more texts than a reader can take in;
+    no seeds."""
+    return [key for key in table.keys
+            if not key.endswith(".seed")
+            and (1 < len(table.words[key][0]) <= MOST_WORDS if key in table.words
+                 else np.ptp(table.numbers[key]) > 0.0)]
+
+
 def name_word(word: str) -> str:
     """Of a map, its first value: `qsf` of {law: "qsf", gains: …}; of other text its beginning."""
     if word.startswith("{"):
@@ -233,9 +243,10 @@ def make_share_picture(table: RunTable, key: str) -> str:
 
 
 def make_key_section(table: RunTable) -> str:
-    if not table.keys or not np.any(is_lost(table)):
+    keys = list_drawn_keys(table)
+    if not keys or not np.any(is_lost(table)):
         return ""
-    pictures = "".join(make_share_picture(table, key) for key in table.keys)
+    pictures = "".join(make_share_picture(table, key) for key in keys)
     return make_section(
         "Share lost along each varied key",
         f"<div class=\"pair\">{pictures}</div><p class=\"small\">Over all values of the other "
@@ -254,7 +265,8 @@ def make_heat_maps(table: RunTable, x: str, y: str, measure: str | None) -> str:
     if np.any(lost):
         with np.errstate(invalid="ignore"):
             share = np.where(counts > 0, lost / np.maximum(counts, 1), np.nan)
-        pictures += f"<div>{drawing.draw_heat(share, counts, names, labels, 'share lost', (0, 1))}</div>"
+        picture = drawing.draw_heat(share, counts, names, labels, "share lost", (0, 1))
+        pictures += f"<div>{picture}</div>"
     if measure is not None:
         medians = calc_class_medians(table, measure, place, shape)
         title = f"median of {measure}, finished runs"
@@ -278,8 +290,7 @@ def calc_class_medians(table: RunTable, measure: str, place: np.ndarray,
 
 def make_pair_section(table: RunTable) -> str:
     """Heat maps of each pair of keys that take more than one value."""
-    keys = [key for key in table.keys if len(make_bins(table, key).names) > 1]
-    pairs = list(combinations(keys, 2))[:MOST_PAIRS]
+    pairs = list(combinations(list_drawn_keys(table), 2))[:MOST_PAIRS]
     if not pairs:
         return ""
     measure = find_main_measure(table)
@@ -345,7 +356,8 @@ def make_measures(table: RunTable) -> str:
 
 
 def choose_sample(table: RunTable) -> np.ndarray:
-    """Places of at most MOST_LINES runs, half of them lost where there are as many, evenly spaced."""
+    """Places of at most MOST_LINES runs, half of them lost where there are as many, evenly
+    spaced."""
     lost, finished = np.flatnonzero(is_lost(table)), np.flatnonzero(~is_lost(table))
     half = MOST_LINES // 2
     take_lost = min(len(lost), max(half, MOST_LINES - len(finished)))
@@ -358,7 +370,7 @@ def choose_sample(table: RunTable) -> np.ndarray:
 def make_parallel(table: RunTable) -> str:
     sample = choose_sample(table)
     axes: list[tuple[str, np.ndarray, Sequence[str] | None]] = []
-    for key in table.keys[:8]:
+    for key in list_drawn_keys(table)[:8]:
         if key in table.words:
             bins = make_bins(table, key, 12)
             axes.append((key, bins.places[sample].astype(float), bins.names))
@@ -376,7 +388,8 @@ def make_parallel(table: RunTable) -> str:
 
 
 def list_worst(table: RunTable) -> list[tuple[str, np.ndarray]]:
-    """Titles and places in the table: failed, lost earliest, largest errors of those that finished."""
+    """Titles and places in the table: failed, lost earliest, largest errors of those that
+    finished."""
     groups = [("Failed", np.flatnonzero(table.is_outcome("failed"))[:WORST])]
     lost = np.flatnonzero(table.is_outcome("lost"))
     moment = table.numbers.get("time_of_loss_s", table.numbers["steps"])[lost]

@@ -1,9 +1,9 @@
 """runs.csv of a campaign as columns.
 
-Numbers are kept as arrays of doubles, text as numbers of a list of words, certificates not at all: a
-campaign of 100,000 runs takes some 40 MB. Columns in the order of the file: `run`, the varied keys by
-their paths, `outcome`, `reason`, the measures, `own_error` where the user's own functions measure, `steps`,
-`certificate`."""
+Numbers are kept as arrays of doubles, text as numbers of a list of words, certificates not at all:
+a campaign of 100,000 runs takes some 40 MB. Columns in the order of the file: `run`, the varied
+keys by their paths, `outcome`, `reason`, the measures, `own_error` where the user's own functions
+measure, `steps`, `certificate`."""
 
 import csv
 import re
@@ -29,7 +29,7 @@ class RunTable:
     measures: tuple[str, ...]  # column names
     run: np.ndarray  # (n,) run indices
     numbers: dict[str, np.ndarray]  # varied keys that hold numbers alone, measures and steps, (n,)
-    words: dict[str, tuple[list[str], np.ndarray]]  # other varied keys: values, and which of them, (n,)
+    words: dict[str, tuple[list[str], np.ndarray]]  # other varied keys: values, which, (n,)
     outcome: np.ndarray  # (n,) place in OUTCOMES
     reasons: Counter  # how often each reason, without its numbers, after the outcome
 
@@ -44,7 +44,8 @@ class RunTable:
 
 
 class Column:
-    """Of a varied key: doubles as long as every cell is a number, words from the first other one."""
+    """Of a varied key: doubles as long as every cell is a number, words from the first other
+    one."""
 
     def __init__(self) -> None:
         self.cells = array("d")
@@ -125,8 +126,8 @@ def read_runs(file: Path) -> RunTable:
 
 
 def leave_out_numbers(reason: str) -> str:
-    """So that reasons that only differ in a moment or a size count as one. A number is kept where it
-    belongs to a name, such as `figure_eight_2`."""
+    """So that reasons that only differ in a moment or a size count as one. A number is kept where
+    it belongs to a name, such as `figure_eight_2`."""
     return re.sub(rf"(?<![\w.-]){NUMBER.pattern}(?![\w])", "…", reason)
 
 

@@ -1,22 +1,24 @@
 """The statistics of a campaign: shares, distributions and paired differences.
 
-Nothing here is random: intervals are by formula, so that the same runs give the same page. With Φ the
-standard normal distribution, z = Φ⁻¹((1 + level)/2) and B(n) the number of heads of n fair coins:
+Nothing here is random: intervals are by formula, so that the same runs give the same page. With Φ
+the standard normal distribution, z = Φ⁻¹((1 + level)/2) and B(n) the number of heads of n fair
+coins:
 
     (1)  Wilson score interval of a share p = k/n:
          (p + z²/2n ± z √(p (1 − p)/n + z²/4n²)) / (1 + z²/n)
     (2)  empirical distribution: E(x) = number of values ≤ x, divided by their number
     (3)  quantile of share p: the sorted values x₀ … x₍ₙ₋₁₎, linear between them, at rank p (n − 1)
-    (4)  median of paired differences, interval without any assumption on their distribution: from the
-         k-th smallest to the k-th largest, k the largest number with P(B(n) < k) ≤ (1 − level)/2
+    (4)  median of paired differences, interval without assumption on their distribution: from
+         the k-th smallest to the k-th largest, k the largest number with
+         P(B(n) < k) ≤ (1 − level)/2
     (5)  sign test: of n differences other than 0, the smaller of both signs occurs k times;
          p = min(1, 2 P(B(n) ≤ k))
     (6)  McNemar's exact test of changed outcomes: (5) with the runs that changed to one outcome and
          those that changed to the other
 
-Sources: Wilson (1927), J. Am. Stat. Assoc. 22, 209; Hyndman and Fan (1996), Am. Stat. 50, 361, type 7, for
-(3); Hahn and Meeker, Statistical Intervals, section 5.2, for (4); McNemar (1947), Psychometrika 12, 153.
-"""
+Sources: Wilson (1927), J. Am. Stat. Assoc. 22, 209; Hyndman and Fan (1996), Am. Stat. 50, 361, type
+7, for (3); Hahn and Meeker, Statistical Intervals, section 5.2, for (4); McNemar (1947),
+Psychometrika 12, 153. """
 
 from dataclasses import dataclass
 from statistics import NormalDist
@@ -28,7 +30,7 @@ LEVEL = 0.95
 
 
 def calc_wilson_interval(count: int, total: int, level: float = LEVEL) -> tuple[float, float]:
-    """Low and high end of the share `count`/`total`, eq. (1); (0, 1) of no runs at all."""
+    """Low and high end of the share `count`/`total`, formula 1; (0, 1) of no runs at all."""
     if not 0 <= count <= total:
         raise ValueError(f"count: expected from 0 to {total}, got {count}")
     if total == 0:
@@ -44,16 +46,16 @@ def calc_wilson_interval(count: int, total: int, level: float = LEVEL) -> tuple[
 
 
 def calc_ecdf(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where the empirical distribution (2) steps, ascending, and its value from there on. NaN is left
-    out."""
+    """Where the empirical distribution (2) steps, ascending, and its value from there on. NaN is
+    left out."""
     values = np.asarray(values, dtype=float)
     places, counts = np.unique(values[~np.isnan(values)], return_counts=True)
     return places, np.cumsum(counts) / max(1, counts.sum())
 
 
 def calc_quantiles(values: np.ndarray, shares: tuple[float, ...]) -> np.ndarray:
-    """Quantiles (3), one per share; NaN is left out, and all are NaN of no values. Infinite values are
-    values."""
+    """Quantiles (3), one per share; NaN is left out, and all are NaN of no values. Infinite values
+    are values."""
     values = np.sort(values[~np.isnan(values)])
     if not len(values):
         return np.full(len(shares), np.nan)
@@ -80,12 +82,14 @@ class PairedDifference:
 
 
 def calc_sign_p(one: int, other: int) -> float:
-    """p of eq. (5), where one sign occurs `one` and the other `other` times; 1 if neither occurs."""
+    """p of formula 5, where one sign occurs `one` and the other `other` times; 1 if neither
+    occurs."""
     return float(min(1.0, 2.0 * binom.cdf(min(one, other), one + other, 0.5)))
 
 
 def calc_mcnemar_p(to_one: int, to_other: int) -> float:
-    """p of eq. (6): that so unequal numbers of changes in both directions come about by chance."""
+    """p of formula 6: that so unequal numbers of changes in both directions come about by
+    chance."""
     return calc_sign_p(to_one, to_other)
 
 
@@ -106,7 +110,7 @@ def calc_paired_difference(a: np.ndarray, b: np.ndarray, level: float = LEVEL) -
 
 
 def find_interval_rank(count: int, level: float = LEVEL) -> int:
-    """k of eq. (4); 0 where even the extremes are no interval of this level."""
+    """k of formula 4; 0 where even the extremes are no interval of this level."""
     tail = (1.0 - level) / 2.0
     # ppf gives the smallest j with P(B ≤ j) ≥ tail, hence P(B < j) = P(B ≤ j − 1) < tail.
     rank = int(binom.ppf(tail, count, 0.5))
