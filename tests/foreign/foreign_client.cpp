@@ -127,7 +127,7 @@ class ForeignClient {
     for (const char* mistake :
          {"volatile_announcement", "best_effort_announcement", "exclusive_command",
           "state_deadline", "other_type", "keyed_command", "no_deadline", "contract_1",
-          "contract_1_state", "record_deadline", "unannounced"})
+          "contract_1_state", "record_deadline", "unannounced", "unannounced_writer"})
       if (makes(mistake)) return true;
     return false;
   }
@@ -189,7 +189,7 @@ class ForeignClient {
       create_reader(create_topic<RecordBatchPubSubType>("sls/record"), true);
       return;
     }
-    create_announcement_writer();
+    if (!makes("unannounced")) create_announcement_writer();
     create_command_writer();
     parameters_reader_ = create_reader(create_topic<ParametersPubSubType>("sls/parameters"), true);
     status_reader_ = create_reader(create_topic<SimStatusPubSubType>("sls/status"), true);
@@ -240,7 +240,7 @@ class ForeignClient {
   }
 
   void announce() {
-    if (makes("unannounced")) return;
+    if (makes("unannounced") || makes("unannounced_writer")) return;
     Participant message;
     message.run_id(makes("zero_run_id")    ? 0
                    : makes("other_run_id") ? 0x1234

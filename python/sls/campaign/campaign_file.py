@@ -25,7 +25,7 @@ MOST_BYTES = 2**20
 PATH = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*(\.[A-Za-z0-9][A-Za-z0-9_-]*)*|_[A-Za-z0-9_]+")
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,63}")
 COLUMN = re.compile(r"[a-z][a-z0-9_]{0,63}")
-FIXED_COLUMNS = ("run", "outcome", "reason", "steps", "certificate")
+FIXED_COLUMNS = ("run", "outcome", "reason", "steps", "certificate", "own_error")
 
 
 def load_campaign(file: Path, *, base: Path | None = None,

@@ -92,6 +92,8 @@ def fly(options: argparse.Namespace) -> None:
                                                                             time.gmtime()))
     engine_options = EngineOptions(options.workers, options.sbatch, options.scheduler,
                                    options.chunk_runs, progress=True)
+    if hasattr(engine, "check"):
+        engine.check(engine_options)  # a cluster that is missing leaves no folder behind
     with opened(out) as folder:
         try:
             prepare(folder, campaign, engine, options)
@@ -104,6 +106,17 @@ def fly(options: argparse.Namespace) -> None:
         say_result(folder)
         if options.verify and not verify(folder, options):
             raise EngineError(f"{out}: --verify: expected equal certificates, got others")
+
+
+def join_sbatch(arguments: Sequence[str]) -> list[str]:
+    """`--sbatch --partition=x` as one argument: argparse takes the second for an option of ours."""
+    joined: list[str] = []
+    for argument in arguments:
+        if joined and joined[-1] == "--sbatch":
+            joined[-1] += f"={argument}"
+        else:
+            joined.append(argument)
+    return joined
 
 
 @contextmanager
@@ -276,7 +289,7 @@ def main(arguments: Sequence[str]) -> int:
         if arguments and arguments[0] in COMMANDS:
             COMMANDS[arguments[0]](arguments[1:])
         else:
-            fly(make_parser().parse_args(arguments))
+            fly(make_parser().parse_args(join_sbatch(arguments)))
     except (ConfigError, ImportError) as error:
         say(f"error: {error}")
         return 2

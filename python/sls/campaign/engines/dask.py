@@ -74,6 +74,11 @@ def connect(address: str) -> Any:
         raise EngineError(f"dask: no scheduler at {address} ({text}); {START}") from None
 
 
+def check(options: EngineOptions) -> None:
+    """Raises InputError, EngineError where nothing can be submitted from here."""
+    connect(options.scheduler).close()
+
+
 class Flight:
     """The chunks that are on their way."""
 
