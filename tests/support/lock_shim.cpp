@@ -6,8 +6,10 @@
 #include <dlfcn.h>
 #include <pthread.h>
 #include <signal.h>
+#include <unistd.h>
 
 #include <atomic>
+#include <cerrno>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
@@ -72,12 +74,66 @@ bool is_moment(const pthread_mutex_t* lock) {
   return is_over_messages(file, lock) == are_messages_wanted && !is_over.exchange(true);
 }
 
+// A signal stops all threads: none but the one that sends it may be in a lock, or that of another
+// port than the wanted one would be held, too.
+std::atomic<int> threads_inside{0};  // lock, or want to
+std::atomic<bool> is_stopping{false};
+thread_local int locks_here = 0;
+
+bool is_shared(const pthread_mutex_t* mutex) { return mutex->__data.__kind & kSharedBit; }
+
+/// Takes a shared lock by `take`, but not while the process is about to be stopped.
+template <class Take>
+int lock_shared(const Take& take) {
+  if (locks_here > 0) {
+    const int result = take();
+    if (result == 0 || result == EOWNERDEAD) ++locks_here;
+    return result;
+  }
+  ++threads_inside;
+  while (is_stopping) {
+    --threads_inside;
+    usleep(1000);
+    ++threads_inside;
+  }
+  const int result = take();
+  if (result == 0 || result == EOWNERDEAD)
+    ++locks_here;
+  else
+    --threads_inside;
+  return result;
+}
+
+void send_signal() {
+  is_stopping = true;
+  for (int i = 0; i < 1000 && threads_inside > 1; ++i) usleep(1000);
+  raise(std::atoi(std::getenv("SLS_LOCK_SIGNAL")));
+  is_stopping = false;
+}
+
+template <class Function>
+Function* find_next(Function*, const char* name) {
+  return reinterpret_cast<Function*>(dlsym(RTLD_NEXT, name));
+}
+
 }  // namespace
 
+extern "C" int pthread_mutex_trylock(pthread_mutex_t* mutex) noexcept {
+  static const auto next = find_next(&pthread_mutex_trylock, "pthread_mutex_trylock");
+  return is_shared(mutex) ? lock_shared([&] { return next(mutex); }) : next(mutex);
+}
+
+extern "C" int pthread_mutex_timedlock(pthread_mutex_t* mutex, const timespec* deadline) noexcept {
+  static const auto next = find_next(&pthread_mutex_timedlock, "pthread_mutex_timedlock");
+  return is_shared(mutex) ? lock_shared([&] { return next(mutex, deadline); })
+                          : next(mutex, deadline);
+}
+
 extern "C" int pthread_mutex_unlock(pthread_mutex_t* mutex) noexcept {
-  static const auto next =
-      reinterpret_cast<decltype(&pthread_mutex_unlock)>(dlsym(RTLD_NEXT, "pthread_mutex_unlock"));
-  if ((mutex->__data.__kind & kSharedBit) && is_moment(mutex))
-    raise(std::atoi(std::getenv("SLS_LOCK_SIGNAL")));
-  return next(mutex);
+  static const auto next = find_next(&pthread_mutex_unlock, "pthread_mutex_unlock");
+  if (!is_shared(mutex)) return next(mutex);
+  if (is_moment(mutex)) send_signal();
+  const int result = next(mutex);
+  if (locks_here > 0 && --locks_here == 0) --threads_inside;
+  return result;
 }

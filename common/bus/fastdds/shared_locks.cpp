@@ -124,7 +124,13 @@ int lock_own(decltype(pthread_mutex_timedlock)* lock_until, pthread_mutex_t* mut
     const timespec look = to_timespec(now_ns() + kPatienceWithStopped_ns);
     const int result = take_over(lock_until(mutex, &look), mutex);
     if (result != ETIMEDOUT) return result;
-    if (is_leaving.load(std::memory_order_relaxed) && is_holder_stopped(*mutex)) return 0;
+    if (!is_leaving.load(std::memory_order_relaxed)) continue;
+    static std::atomic<bool> is_forgone{false};
+    if (is_forgone || is_holder_stopped(*mutex)) {
+      // The first one lets the others go ahead, before it unmaps what they look at.
+      if (!is_forgone.exchange(true)) usleep(4 * kPatienceWithStopped_ns / 1000);
+      return 0;
+    }
   }
 }
 
