@@ -17,6 +17,8 @@ class FlightCertificate {
  public:
   /// Of vehicles that are moved by `plant` or ones like it, with the period in force.
   FlightCertificate(std::int64_t period_ns, const sim::Plant& plant);
+  /// Of the flight that a server announces with `parameters`.
+  explicit FlightCertificate(const Parameters& parameters) : parameters_(parameters) {}
 
   /// Adds what was flown of a step; of one vehicle in step order.
   void add(std::uint32_t vehicle_id, const FlownStep& flown, bool is_refused);

@@ -9,10 +9,9 @@
 #include <utility>
 #include <variant>
 
-#include "closed_loop/record_entries.hpp"
+#include "closed_loop/flight_certificate.hpp"
 #include "common/app/options.hpp"
 #include "common/app/run_main.hpp"
-#include "recorder/certificate.hpp"
 #include "recorder/columns.hpp"
 #include "recorder/rows.hpp"
 #include "sim_server/messages.hpp"
@@ -273,13 +272,10 @@ FlownStep FlownFlight::make_step(std::size_t index, std::size_t number) const {
 
 const std::string& FlownFlight::calc_certificate() const {
   std::call_once(is_certified_, [this] {
-    record::Certificate certificate;
-    RecordEntry entry;  // one, to keep its memory
+    closed_loop::FlightCertificate certificate(parameters_);
     for (std::size_t i = 0; i < ids_.size(); ++i)
-      for (std::size_t row = 0; row < rows_[i].rows(); ++row) {
-        closed_loop::fill_entry(entry, ids_[i], make_step(i, row), controller_name_);
-        certificate.add(record::make_rows(entry, parameters_));
-      }
+      for (std::size_t row = 0; row < rows_[i].rows(); ++row)
+        certificate.add(ids_[i], make_step(i, row), row == last_step() && refused_ == i);
     certificate_ = certificate.finish();
   });
   return certificate_;
