@@ -12,6 +12,13 @@ namespace {
 
 constexpr int kPriority = 1;  // the lowest that goes before ordinary threads
 constexpr int kNiceness = 5;
+constexpr int kOnlookerNiceness = 10;  // further, a page stands still on a busy machine
+
+void put_back(int policy, int niceness) {
+  const sched_param parameters{};
+  sched_setscheduler(0, policy, &parameters);
+  setpriority(PRIO_PROCESS, 0, niceness);  // of the calling thread alone
+}
 
 }  // namespace
 
@@ -27,10 +34,8 @@ bool put_process_first() {
   return is_granted && !error;
 }
 
-void put_thread_last() {
-  const sched_param parameters{};
-  sched_setscheduler(0, SCHED_OTHER, &parameters);
-  setpriority(PRIO_PROCESS, 0, kNiceness);  // of the calling thread alone
-}
+void put_thread_last() { put_back(SCHED_OTHER, kNiceness); }
+
+void put_onlooker_last() { put_back(SCHED_BATCH, kOnlookerNiceness); }
 
 }  // namespace sls::app

@@ -10,6 +10,11 @@ namespace sls::app {
 bool put_process_first();
 
 /// Puts the calling thread back among the ordinary ones, behind such as have the usual niceness.
+/// Threads that it starts from then on inherit it.
 void put_thread_last();
+
+/// The same for all threads that are started from now on, further back: they interrupt nobody when
+/// they wake (SCHED_BATCH). For a process that only looks on.
+void put_onlooker_last();
 
 }  // namespace sls::app

@@ -1,6 +1,8 @@
 #include "common/bus/node.hpp"
 
 #include <fastdds/rtps/attributes/PropertyPolicy.h>
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
+#include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
 #include <fastrtps/config.h>
 #include <fastrtps/utils/IPLocator.h>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
@@ -129,7 +131,7 @@ class MatchedPeers {
 
 struct Node::Impl {
   Impl(const std::filesystem::path& qos_file, int domain, const std::string& name,
-       const std::string& role)
+       const std::string& role, Transports transports)
       : qos_place(qos_file.string()), own_role(role), identity(find_identity(role)) {
     if (domain < 0 || domain > kMaxDomain)
       throw ConfigError("--domain: expected 0 to " + std::to_string(kMaxDomain) + ", got " +
@@ -143,6 +145,7 @@ struct Node::Impl {
     qos.name(name.c_str());
     is_secured = eprosima::fastrtps::rtps::PropertyPolicyHelper::find_property(
                      qos.properties(), "dds.sec.auth.plugin") != nullptr;
+    if (transports == Transports::kNetwork) leave_out_shared_memory(qos);
     limit_datagrams(qos);
     auto& participants = qos.allocation().participants;
     participants.maximum = std::min(participants.maximum, kMaxParticipants);
@@ -213,6 +216,22 @@ struct Node::Impl {
       transport = send_small_datagrams(transport, static_cast<std::uint32_t>(sent));
   }
 
+  static void leave_out_shared_memory(dds::DomainParticipantQos& qos) {
+    using eprosima::fastdds::rtps::SharedMemTransportDescriptor;
+    using eprosima::fastdds::rtps::UDPv4TransportDescriptor;
+    auto& transport = qos.transport();
+    auto& own = transport.user_transports;
+    own.erase(std::remove_if(own.begin(), own.end(),
+                             [](const auto& descriptor) {
+                               return std::dynamic_pointer_cast<SharedMemTransportDescriptor>(
+                                          descriptor) != nullptr;
+                             }),
+              own.end());
+    if (transport.use_builtin_transports || own.empty())
+      own.push_back(std::make_shared<UDPv4TransportDescriptor>());
+    transport.use_builtin_transports = false;
+  }
+
   [[noreturn]] void throw_unknown_profile(const char* profile) const {
     throw ConfigError(qos_place + ": profile '" + profile + "': expected a profile, got none");
   }
@@ -249,6 +268,9 @@ struct Node::Impl {
   dds::Topic* find_or_create_topic(const char* name, dds::TypeSupport type) {
     if (auto* known = participant->lookup_topicdescription(name))
       return static_cast<dds::Topic*>(known);
+    // Topics of one type share its support: a second one of the same name is refused.
+    const dds::TypeSupport known_type = participant->find_type(type.get_type_name());
+    if (!known_type.empty()) type = known_type;
     leave_out_type_object(type);
     dds::Topic* topic = nullptr;
     if (type.register_type(participant) == ReturnCode_t::RETCODE_OK)
@@ -274,8 +296,8 @@ struct Node::Impl {
 };
 
 Node::Node(const std::filesystem::path& qos_file, int domain, const std::string& name,
-           const std::string& identity)
-    : impl_(std::make_unique<Impl>(qos_file, domain, name, identity)) {}
+           const std::string& identity, Transports transports)
+    : impl_(std::make_unique<Impl>(qos_file, domain, name, identity, transports)) {}
 Node::~Node() { is_leaving = true; }
 
 const char* Node::choose_writer_profile(const char* profile, const char* fallback) const {
@@ -361,7 +383,8 @@ struct AnyWriter::Impl : dds::DataWriterListener {
   dds::DataWriter* writer = nullptr;
 };
 
-AnyWriter::AnyWriter(Node& node, const char* topic, const char* profile, void* type_support)
+AnyWriter::AnyWriter(Node& node, const char* topic, const char* profile, void* type_support,
+                     const std::string& user_data)
     : impl_(std::make_unique<Impl>()) {
   dds::TypeSupport type(static_cast<dds::TopicDataType*>(type_support));
   auto* dds_topic = node.impl().find_or_create_topic(topic, type);
@@ -369,6 +392,7 @@ AnyWriter::AnyWriter(Node& node, const char* topic, const char* profile, void* t
   dds::DataWriterQos qos;
   if (impl_->publisher->get_datawriter_qos_from_profile(profile, qos) != ReturnCode_t::RETCODE_OK)
     node.impl().throw_unknown_profile(profile);
+  if (!user_data.empty()) qos.user_data().data_vec({user_data.begin(), user_data.end()});
   MiddlewareLog::clear();
   impl_->writer = impl_->publisher->create_datawriter(dds_topic, qos, impl_.get());
   if (!impl_->writer) node.impl().throw_refused_endpoint("write", topic, profile);
@@ -407,6 +431,7 @@ struct AnyReader::Impl : dds::DataReaderListener, MisfitReport {
   void on_data_available(dds::DataReader* source) override {
     dds::SampleInfo info;
     const MisfitScope scope(*this);
+    const RawScope raw_scope(raw);
     while (source->take_next_sample(sample, &info) == ReturnCode_t::RETCODE_OK)
       if (info.valid_data) {
         written = std::chrono::system_clock::time_point(
@@ -436,19 +461,21 @@ struct AnyReader::Impl : dds::DataReaderListener, MisfitReport {
   std::optional<std::chrono::nanoseconds> lifespan;
   std::chrono::system_clock::time_point written;  // the sample in `sample`
   void* sample = nullptr;
+  std::vector<std::uint8_t>* raw = nullptr;
   Take take;
   dds::Subscriber* subscriber = nullptr;
   dds::DataReader* reader = nullptr;
 };
 
 AnyReader::AnyReader(Node& node, const char* topic, const char* profile, void* type_support,
-                     void* sample, Take take)
+                     void* sample, Take take, std::vector<std::uint8_t>* raw)
     : impl_(std::make_unique<Impl>()) {
   dds::TypeSupport type(static_cast<dds::TopicDataType*>(type_support));
   auto* dds_topic = node.impl().find_or_create_topic(topic, type);
   impl_->neighbours = &node.impl().neighbours;
   impl_->topic = topic;
   impl_->sample = sample;
+  impl_->raw = raw;
   impl_->take = std::move(take);
   impl_->subscriber = node.impl().subscriber;
   dds::DataReaderQos qos;

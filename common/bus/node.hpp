@@ -13,6 +13,8 @@
 #include <set>
 #include <stdexcept>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "common/bus/peer.hpp"
 #include "common/bus/problems.hpp"
@@ -32,6 +34,14 @@ class BusError : public std::runtime_error {
 /// @throws config::ConfigError as Node does.
 void load_profiles(const std::filesystem::path& file, const std::string& identity);
 
+/// Which transports of its profile a participant uses.
+enum class Transports {
+  kAll,
+  /// All but shared memory, whose ports have locks that a process which is stopped or starved may
+  /// hold: an onlooker on the network alone can make nobody wait.
+  kNetwork
+};
+
 /// One DDS participant. Writers and readers must not outlive it.
 class Node {
  public:
@@ -42,7 +52,7 @@ class Node {
   ///   that this process uses; or for the domain.
   /// @throws BusError if the participant cannot be created.
   Node(const std::filesystem::path& qos_file, int domain, const std::string& name,
-       const std::string& identity = {});
+       const std::string& identity = {}, Transports transports = Transports::kAll);
   ~Node();
   Node(const Node&) = delete;
   Node& operator=(const Node&) = delete;
@@ -102,7 +112,9 @@ void* make_type_support();
 
 class AnyWriter {
  public:
-  AnyWriter(Node& node, const char* topic, const char* profile, void* type_support);
+  /// `user_data`: what discovery shows of the writer (policy USER_DATA).
+  AnyWriter(Node& node, const char* topic, const char* profile, void* type_support,
+            const std::string& user_data = {});
   ~AnyWriter();
   bool write(const void* sample);
   bool wait_for_acknowledgments(std::chrono::milliseconds limit);
@@ -119,8 +131,9 @@ class AnyReader {
   using Take = std::function<void(const PeerId& sender)>;
   /// `sample` is the buffer every sample is taken into; `take` is called after each, on a thread of
   /// the middleware.
+  /// With `raw`, samples are put there as they came, and `sample` stays as it is.
   AnyReader(Node& node, const char* topic, const char* profile, void* type_support, void* sample,
-            Take take);
+            Take take, std::vector<std::uint8_t>* raw = nullptr);
   ~AnyReader();
   std::set<PeerId> matched() const;
   std::uint64_t missed_deadlines() const;
@@ -199,6 +212,37 @@ class Reader {
   Handler handler_;
   detail::AnyReader reader_;  // last: its callbacks use the members above
 };
+
+/// Like Reader, for samples as they came: plain CDR with its encapsulation header, not decoded and
+/// checked for nothing but their size.
+template <class Message>
+class RawReader {
+ public:
+  /// May take over the bytes: the next sample finds other memory.
+  using Handler = std::function<void(std::vector<std::uint8_t>& cdr, const PeerId& sender)>;
+
+  RawReader(Node& node, const char* profile, Handler handler)
+      : handler_(std::move(handler)),
+        reader_(
+            node, Topic<Message>::kName, profile, detail::make_type_support<Message>(),
+            unused_.get(), [this](const PeerId& sender) { handler_(cdr_, sender); }, &cdr_) {}
+
+  /// Participants with a writer of this topic that this reader hears.
+  std::set<PeerId> matched() const { return reader_.matched(); }
+
+  /// For the handler: when the sample it was given was written, by the writer's clock.
+  std::chrono::system_clock::time_point written() const { return reader_.written(); }
+
+ private:
+  std::unique_ptr<Message> unused_ = std::make_unique<Message>();
+  std::vector<std::uint8_t> cdr_;
+  Handler handler_;
+  detail::AnyReader reader_;  // last: its callbacks use the members above
+};
+
+/// Decodes what a RawReader was given. False, and `message` empty, where it is no such message.
+template <class Message>
+bool decode(const std::vector<std::uint8_t>& cdr, Message& message);
 
 /// "2.9.1": the version of Fast DDS this was built with.
 std::string middleware_version();

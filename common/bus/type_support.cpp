@@ -4,6 +4,37 @@
 #include "common/bus/fastdds/guarded_type.hpp"
 #include "common/bus/node.hpp"
 
+namespace sls::bus {
+namespace {
+
+template <class Support, class Message>
+bool decode_by(const std::vector<std::uint8_t>& cdr, Message& message) {
+  Support support;
+  eprosima::fastrtps::rtps::SerializedPayload_t payload;
+  payload.data = const_cast<std::uint8_t*>(cdr.data());  // it is only read
+  payload.length = static_cast<std::uint32_t>(cdr.size());
+  const bool is_decoded = support.deserialize(&payload, &message);
+  payload.data = nullptr;  // it is not the payload's to free
+  return is_decoded;
+}
+
+}  // namespace
+
+template <>
+bool decode(const std::vector<std::uint8_t>& cdr, States& message) {
+  return decode_by<GuardedType<StatesPubSubType>>(cdr, message);
+}
+template <>
+bool decode(const std::vector<std::uint8_t>& cdr, Commands& message) {
+  return decode_by<GuardedType<CommandsPubSubType>>(cdr, message);
+}
+template <>
+bool decode(const std::vector<std::uint8_t>& cdr, RecordBatch& message) {
+  return decode_by<GuardedType<RecordBatchPubSubType>>(cdr, message);
+}
+
+}  // namespace sls::bus
+
 namespace sls::bus::detail {
 
 template <>

@@ -4,8 +4,10 @@
 #include <fastcdr/FastBuffer.h>
 #include <slsPubSubTypes.h>
 
+#include <cstdint>
 #include <exception>
 #include <string>
+#include <vector>
 
 #include "common/bus/fastdds/bounds.hpp"
 
@@ -32,6 +34,19 @@ class MisfitScope {
   MisfitScope& operator=(const MisfitScope&) = delete;
 };
 
+/// Where a reader in this thread wants samples as they came, with their encapsulation header; null
+/// outside of a raw reader's `take`. They are not decoded then.
+inline thread_local std::vector<std::uint8_t>* raw_target = nullptr;
+
+/// Puts `target` in force while it lives.
+class RawScope {
+ public:
+  explicit RawScope(std::vector<std::uint8_t>* target) { raw_target = target; }
+  ~RawScope() { raw_target = nullptr; }
+  RawScope(const RawScope&) = delete;
+  RawScope& operator=(const RawScope&) = delete;
+};
+
 /// A generated type support whose `deserialize` refuses malformed samples. The generated one lets
 /// most exceptions of the serialisation library through, which end the process: one sample of any
 /// stranger would do (README.md, traps 15 and 23). And it takes samples with bytes left over:
@@ -52,6 +67,10 @@ class GuardedType : public Generated {
       return refuse(*payload, data,
                     "expected at most " + std::to_string(this->m_typeSize) + " bytes, got " +
                         std::to_string(payload->length));
+    if (raw_target) {
+      raw_target->assign(payload->data, payload->data + payload->length);
+      return true;
+    }
     // As the generated function, which does not say where it ended.
     eprosima::fastcdr::FastBuffer buffer(reinterpret_cast<char*>(payload->data), payload->length);
     Cdr cdr(buffer, Cdr::DEFAULT_ENDIAN, Cdr::DDS_CDR);

@@ -2,6 +2,8 @@
 // a process; every test here uses the shipped default.
 #include "common/bus/node.hpp"
 
+#include <fastcdr/Cdr.h>
+#include <fastcdr/FastBuffer.h>
 #include <gtest/gtest.h>
 
 #include <mutex>
@@ -140,6 +142,102 @@ TEST(NodeTest, ALateJoinerLearnsWhatIsLatched) {
   Listener<Parameters> listener(reading, kLatchedReaderProfile, writing);
   ASSERT_TRUE(wait_until([&] { return listener.count() > 0; }));
   EXPECT_EQ(listener.messages().front(), make_message<Parameters>(7));
+}
+
+// --- raw samples ---------------------------------------------------------------------------------
+
+/// As Fast CDR serialises it, behind the header of an encapsulation.
+template <class Message>
+std::vector<std::uint8_t> serialize(const Message& message) {
+  using eprosima::fastcdr::Cdr;
+  std::vector<std::uint8_t> bytes(4'000'000);
+  eprosima::fastcdr::FastBuffer buffer(reinterpret_cast<char*>(bytes.data()), bytes.size());
+  Cdr cdr(buffer, Cdr::DEFAULT_ENDIAN, Cdr::DDS_CDR);
+  cdr.serialize_encapsulation();
+  message.serialize(cdr);
+  bytes.resize(cdr.getSerializedDataLength());
+  return bytes;
+}
+
+/// Like Listener, of samples as they came.
+template <class Message>
+class RawListener {
+ public:
+  RawListener(Node& node, const char* profile, const Node& sender)
+      : sender_(sender.id()),
+        reader_(node, profile, [this](std::vector<std::uint8_t>& cdr, const PeerId& from) {
+          if (from != sender_) return;
+          const std::lock_guard lock(mutex_);
+          samples_.push_back(std::move(cdr));
+        }) {}
+
+  std::vector<std::vector<std::uint8_t>> samples() const {
+    const std::lock_guard lock(mutex_);
+    return samples_;
+  }
+  bool is_matched() const { return reader_.matched().count(sender_) > 0; }
+
+ private:
+  const PeerId sender_;
+  mutable std::mutex mutex_;
+  std::vector<std::vector<std::uint8_t>> samples_;
+  RawReader<Message> reader_;
+};
+
+/// Both readers are on one node, so that they share its topic and its type support.
+template <class Message>
+void expect_raw_beside_typed(int domain, const char* profile) {
+  Node writing(kQosFile, domain, "writing");
+  Node reading(kQosFile, domain, "reading", "", Transports::kNetwork);
+  Writer<Message> writer(writing);
+  RawListener<Message> raw(reading, profile, writing);
+  Listener<Message> typed(reading, profile, writing);
+  RawListener<Message> second(reading, profile, writing);
+  ASSERT_TRUE(wait_until([&] {
+    return raw.is_matched() && typed.is_matched() && second.is_matched() &&
+           is_matched(writer, reading);
+  }));
+  const std::vector<Message> sent = {make_message<Message>(1), Message(), make_message<Message>(2)};
+  for (const Message& message : sent) writer.write(message);
+  ASSERT_TRUE(wait_until([&] {
+    return raw.samples().size() == 3 && typed.count() == 3 && second.samples().size() == 3;
+  }));
+  EXPECT_EQ(typed.messages(), sent);
+  for (std::size_t i = 0; i < sent.size(); ++i) {
+    EXPECT_EQ(raw.samples()[i], serialize(sent[i]));
+    EXPECT_EQ(second.samples()[i], serialize(sent[i]));
+  }
+}
+
+TEST(RawReaderTest, GivesTheBytesOfEachSampleBesideATypedReader) {
+  expect_raw_beside_typed<States>(80, kLoopReaderProfile);
+  expect_raw_beside_typed<RecordBatch>(80, kLoopReaderProfile);
+  expect_raw_beside_typed<SimStatus>(80, kLatchedReaderProfile);
+  expect_raw_beside_typed<Parameters>(80, kLatchedReaderProfile);
+}
+
+TEST(RawReaderTest, WhatItGaveIsDecodedToTheSameMessage) {
+  const auto states = make_message<States>(3);
+  States decoded;
+  ASSERT_TRUE(decode(serialize(states), decoded));
+  EXPECT_EQ(decoded, states);
+  const auto batch = make_message<RecordBatch>(4);
+  RecordBatch decoded_batch;
+  ASSERT_TRUE(decode(serialize(batch), decoded_batch));
+  EXPECT_EQ(decoded_batch, batch);
+}
+
+TEST(RawReaderTest, BytesThatAreNoMessageAreNotDecoded) {
+  auto bytes = serialize(make_message<States>(3));
+  States decoded;
+  for (const std::size_t size : {std::size_t{0}, std::size_t{3}, bytes.size() / 2}) {
+    const std::vector<std::uint8_t> cut(bytes.begin(),
+                                        bytes.begin() + static_cast<std::ptrdiff_t>(size));
+    EXPECT_FALSE(decode(cut, decoded)) << size;
+    EXPECT_EQ(decoded, States()) << size;
+  }
+  bytes.resize(bytes.size() + 100);
+  EXPECT_FALSE(decode(bytes, decoded)) << "bytes left over";
 }
 
 // --- errors --------------------------------------------------------------------------------------

@@ -1,0 +1,57 @@
+#include "common/bus/raw_writer.hpp"
+
+#include <fastdds/dds/topic/TopicDataType.hpp>
+
+#include <algorithm>
+
+namespace sls::bus {
+namespace {
+
+namespace rtps = eprosima::fastrtps::rtps;
+
+using Bytes = std::vector<std::uint8_t>;
+
+/// A type whose samples are serialised already.
+class RawType : public eprosima::fastdds::dds::TopicDataType {
+ public:
+  explicit RawType(const std::string& name) {
+    setName(name.c_str());
+    m_typeSize = RawWriter::kMostBytes;
+    m_isGetKeyDefined = false;
+  }
+  bool serialize(void* data, rtps::SerializedPayload_t* payload) override {
+    const Bytes& cdr = *static_cast<const Bytes*>(data);
+    if (cdr.size() > payload->max_size) return false;
+    std::copy(cdr.begin(), cdr.end(), payload->data);
+    payload->length = static_cast<std::uint32_t>(cdr.size());
+    payload->encapsulation = CDR_LE;
+    return true;
+  }
+  std::function<std::uint32_t()> getSerializedSizeProvider(void* data) override {
+    return [data] { return static_cast<std::uint32_t>(static_cast<const Bytes*>(data)->size()); };
+  }
+  bool deserialize(rtps::SerializedPayload_t*, void*) override { return false; }  // no reader
+  bool getKey(void*, rtps::InstanceHandle_t*, bool) override { return false; }
+  void* createData() override { return new Bytes; }
+  void deleteData(void* data) override { delete static_cast<Bytes*>(data); }
+};
+
+void* make_raw_type(const std::string& name) {
+  return static_cast<eprosima::fastdds::dds::TopicDataType*>(new RawType(name));
+}
+
+}  // namespace
+
+RawWriter::RawWriter(Node& node, const RawTopic& topic, const char* profile)
+    : topic_(topic.name),
+      writer_(node, topic.name.c_str(), profile, make_raw_type(topic.type), topic.user_data) {}
+
+void RawWriter::write(const std::vector<std::uint8_t>& cdr) {
+  if (cdr.size() > kMostBytes)
+    throw BusError(topic_ + ": expected at most " + std::to_string(kMostBytes) + " bytes, got " +
+                   std::to_string(cdr.size()));
+  if (!writer_.write(&cdr))
+    throw BusError(topic_ + ": write refused: a reliable reader has not acknowledged for too long");
+}
+
+}  // namespace sls::bus
