@@ -18,6 +18,7 @@
 #include "recorder/columns.hpp"
 #include "recorder/recording.hpp"
 #include "recorder/rows.hpp"
+#include "recorder/sinks/mcap/mcap_sink.hpp"
 
 namespace sls::bench {
 namespace {
@@ -168,6 +169,8 @@ nlohmann::json measure_recording(const config::Scenario& scenario, std::uint32_t
       throw app::RunError(std::string(file) + ": the plain file differs from the recording's");
   }
   json["bytes"] = bytes;
+  if (scenario.record.has(config::RecordFormat::kMcap))
+    json["mcap_bytes"] = fs::file_size(ours.path() / record::McapSink::kFile);
   return json;
 }
 

@@ -45,8 +45,23 @@ class ByteBuffer {
   void append(std::string_view text) {
     make_room(sizeof(std::uint32_t) + text.size());
     append(static_cast<std::uint32_t>(text.size()));
-    if (!text.empty()) std::memcpy(bytes_.data() + size_, text.data(), text.size());
-    size_ += text.size();
+    append_raw(text);
+  }
+
+  /// Bytes alone, of another buffer.
+  void append_raw(std::string_view bytes) {
+    make_room(bytes.size());
+    if (!bytes.empty()) std::memcpy(bytes_.data() + size_, bytes.data(), bytes.size());
+    size_ += bytes.size();
+  }
+
+  /// Writes over what has been appended at `place`.
+  template <class Integer>
+  void replace(std::size_t place, Integer value) {
+    const std::size_t size = size_;
+    size_ = place;
+    append(value);
+    size_ = size;
   }
 
  private:

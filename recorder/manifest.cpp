@@ -91,6 +91,9 @@ ManifestFile to_manifest(const Json& json) {
   // Recordings of earlier versions have neither.
   if (json.contains("segment")) manifest.first_step = json.at("segment").at("first_step");
   manifest.certificate = json.value("certificate", "");
+  manifest.contract_sha256 = json.value("contract_sha256", "");
+  for (const Json& signal : json.value("signals", Json::array()))
+    manifest.signals.push_back({signal.at("name"), signal.at("unit")});
   for (const auto& [name, file] : json.at("files").items()) {
     if (!is_in_folder(name))
       throw config::ConfigError("files: expected names of files beside it, got '" + name + "'");
@@ -173,6 +176,8 @@ void write_manifest(const std::filesystem::path& folder, const Manifest& manifes
     libraries["plant"] = parameters.library_sha256().to_string();
   if (!manifest.libraries.empty()) libraries["controllers"] = manifest.libraries;
   if (!libraries.empty()) json["libraries"] = libraries;
+  for (const auto& [library, version] : manifest.format_versions)
+    json["versions"][library] = version;
   for (const SignalDescription& signal : parameters.signals())
     json["signals"].push_back(
         {{"name", signal.name().to_string()}, {"unit", signal.unit().to_string()}});

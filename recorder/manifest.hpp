@@ -56,7 +56,8 @@ struct Manifest {
   std::uint64_t refused_samples = 0;   ///< lost because the recorder's queue was full
   DroppedEntries dropped;
   std::map<std::string, std::string> libraries;  ///< SHA-256 of controllers' libraries, by name
-  bool complete = false;                         ///< the mission finished and nothing is missing
+  std::map<std::string, std::string> format_versions;  ///< of what sinks use: "zstd"
+  bool complete = false;  ///< the mission finished and nothing is missing
 };
 
 /// Writes `folder`/manifest.json, replacing an earlier one at once: a reader sees the old or the
@@ -70,8 +71,12 @@ struct ManifestFile {
     std::optional<std::uint64_t> rows;
     std::string sha256;
   };
+  struct Signal {
+    std::string name, unit;
+  };
   bool complete = false;
   std::string outcome, reason, run_id, scenario_sha256, mode;
+  std::string contract_sha256;  ///< empty in recordings of earlier versions
   double period_s = 0;
   std::vector<std::uint32_t> vehicle_ids;
   std::uint64_t first_step = 0;
@@ -79,6 +84,7 @@ struct ManifestFile {
   std::map<std::string, File> files;
   std::vector<MissingSteps> missing;
   std::vector<StageStart> stage_starts;
+  std::vector<Signal> signals;
 };
 
 /// Reads `folder`/manifest.json.

@@ -49,7 +49,7 @@ Recording::Recording(const Segment& segment, const Parameters& parameters)
     : segment_(segment),
       parameters_(parameters),
       scenario_(parse_scenario(segment, parameters)),
-      sinks_(make_sinks(segment.folder, parameters_)),
+      sinks_(make_sinks(segment.folder, parameters_, scenario_.record)),
       log_(scenario_, parameters_),
       stream_(
           parameters_, segment.first_step, [this](const StepRows& rows) { write(rows); },
@@ -247,6 +247,7 @@ Manifest Recording::make_manifest() const {
   manifest.refused_samples = refused_samples_;
   manifest.dropped = stream_.dropped();
   manifest.libraries = libraries_;
+  for (const auto& sink : sinks_) manifest.format_versions.merge(sink->list_versions());
   return manifest;
 }
 

@@ -21,13 +21,14 @@ namespace fs = std::filesystem;
 using config::ConfigError;
 
 // The last is what `./sls report` puts beside them.
-constexpr std::array<std::string_view, 11> kRecordingFiles = {
-    "state.csv",     "measured.csv",       "command.csv", "reference.csv",
-    "status.csv",    "flight.csv",         "flight.txt",  "scenario.yaml",
+constexpr std::array<std::string_view, 13> kRecordingFiles = {
+    "state.csv",     "measured.csv",       "command.csv",   "reference.csv", "status.csv",
+    "flight.csv",    "sls.mcap",           "sls.mcap.part", "flight.txt",    "scenario.yaml",
     "manifest.json", "manifest.json.part", "report.html"};
 // What `./sls plot` puts into the subfolder kFigureFolder, as .png and .pdf.
-constexpr std::array<std::string_view, 7> kFigures = {"fleet",  "positions", "errors",  "path",
-                                                      "angles", "forces",    "attitude"};
+constexpr std::array<std::string_view, 11> kFigures = {
+    "fleet",    "positions",     "errors",     "path",   "angles", "forces",
+    "attitude", "body_attitude", "body_rates", "rotors", "thrust"};
 constexpr std::string_view kFigureFolder = "figures";
 
 template <class Names>

@@ -71,8 +71,8 @@ RecordedFlight open_recording(const fs::path& folder) {
 }
 
 template <class Row>
-RowReader<Row>::RowReader(const RecordedFlight& flight, std::uint64_t end)
-    : flight_(flight), end_(end) {
+RowReader<Row>::RowReader(const RecordedFlight& flight, std::uint64_t end, const char* file)
+    : flight_(flight), end_(end), name_(file) {
   for (const std::uint32_t id : flight.vehicle_ids()) vehicles_[id];
 }
 
@@ -94,12 +94,27 @@ Row RowReader<Row>::take(std::uint32_t vehicle_id) {
   return row;
 }
 
+template <class Row>
+std::optional<std::uint32_t> RowReader<Row>::read_on() {
+  kept_.reset();
+  while (!kept_ && read_row()) {
+  }
+  return kept_;
+}
+
+template <class Row>
+bool RowReader<Row>::is_left_out() const {
+  return name_ != std::string_view(Row::kFile) &&
+         !fs::exists(flight_.segments[segment_].folder / name_);
+}
+
 /// Reads one row, of whichever vehicle; false at the end.
 template <class Row>
 bool RowReader<Row>::read_row() {
   for (; segment_ < flight_.segments.size(); ++segment_, file_.reset()) {
+    if (is_left_out()) continue;
     if (!file_)
-      file_ = std::make_unique<CsvReader>(flight_.segments[segment_].folder / Row::kFile,
+      file_ = std::make_unique<CsvReader>(flight_.segments[segment_].folder / name_,
                                           make_header<Row>(), kFurther<Row>);
     if (!file_->next()) continue;
     keep(parse_row<Row>(*file_));
@@ -121,8 +136,11 @@ void RowReader<Row>::keep(Row row) {
       (is_last ? end_ : std::min(end_, flight_.segments[segment_ + 1].manifest.first_step)))
     return;
   next_step = row.step + 1;
+  kept_ = row.vehicle_id;
   rows.push_back(std::move(row));
 }
+
+template class RowReader<StateRow>;  // for measured.csv
 
 StepReader::StepReader(const RecordedFlight& flight, std::uint64_t end)
     : states_(flight, end), commands_(flight, end), references_(flight, end) {
@@ -138,6 +156,14 @@ std::optional<StepRows> StepReader::next() {
       return rows;
     }
   return std::nullopt;
+}
+
+std::optional<StepRows> StepReader::next_as_written() {
+  if (!written_) written_ = states_.read_on();
+  if (!written_) return next();
+  auto rows = next(*written_);
+  if (rows && rows->state) written_.reset();
+  return rows;
 }
 
 std::optional<StepRows> StepReader::next(std::uint32_t vehicle_id) {

@@ -44,12 +44,16 @@ RecordedFlight open_recording(const std::filesystem::path& folder);
 template <class Row>
 class RowReader {
  public:
-  RowReader(const RecordedFlight& flight, std::uint64_t end);
+  /// Of a file other than the row's own, segments may have none.
+  RowReader(const RecordedFlight& flight, std::uint64_t end, const char* file = Row::kFile);
 
   /// The vehicle's row that comes next; null at the end.
   const Row* peek(std::uint32_t vehicle_id);
   /// Takes that row, which there must be.
   Row take(std::uint32_t vehicle_id);
+
+  /// Reads one row on: of which vehicle it is; nothing at the end.
+  std::optional<std::uint32_t> read_on();
 
  private:
   bool read_row();
@@ -60,9 +64,13 @@ class RowReader {
     std::uint64_t next_step = 0;
   };
 
+  bool is_left_out() const;
+
   const RecordedFlight& flight_;
   const std::uint64_t end_;
+  const char* const name_;
   std::map<std::uint32_t, Vehicle> vehicles_;
+  std::optional<std::uint32_t> kept_;  // vehicle of the row that was read last
   std::size_t segment_ = 0;
   std::unique_ptr<CsvReader> file_;
 };
@@ -78,12 +86,16 @@ class StepReader {
   std::optional<StepRows> next();
   /// The next step of that vehicle; nothing after its last one.
   std::optional<StepRows> next(std::uint32_t vehicle_id);
+  /// The next step in the order in which state.csv has them; steps without a state stand before a
+  /// later one of their vehicle, or at the end.
+  std::optional<StepRows> next_as_written();
 
  private:
   RowReader<StateRow> states_;
   RowReader<CommandRow> commands_;
   RowReader<ReferenceRow> references_;
-  std::deque<std::uint32_t> turns_;  // of vehicles that may have further steps
+  std::deque<std::uint32_t> turns_;       // of vehicles that may have further steps
+  std::optional<std::uint32_t> written_;  // vehicle of the state that is next as written
 };
 
 /// The step after the last one that every vehicle has whole; 0: there is none.

@@ -341,8 +341,15 @@ struct Stage {
 
 // --- the whole ---------------------------------------------------------------------------------
 
+enum class RecordFormat { kCsv, kMcap };
+
 struct Record {
   double flush_s = 0.2;  ///< files are flushed at least this often, ≤ 0.2
+  std::vector<RecordFormat> formats{RecordFormat::kCsv};  ///< each once, kCsv among them
+
+  bool has(RecordFormat format) const {
+    return std::find(formats.begin(), formats.end(), format) != formats.end();
+  }
 };
 
 struct Scenario {

@@ -123,6 +123,9 @@ inline std::array<Name<FaultChannel>, 2> names_of(FaultChannel) {
 inline std::array<Name<StateWiring>, 2> names_of(StateWiring) {
   return {{{"correct", StateWiring::kCorrect}, {"gazebo_plugin", StateWiring::kGazeboPlugin}}};
 }
+inline std::array<Name<RecordFormat>, 2> names_of(RecordFormat) {
+  return {{{"csv", RecordFormat::kCsv}, {"mcap", RecordFormat::kMcap}}};
+}
 inline std::array<Name<Body>, 2> names_of(Body) {
   return {{{"load", Body::kLoad}, {"quadrotor", Body::kQuadrotor}}};
 }
@@ -470,6 +473,7 @@ void describe(Map& map, Fault& fault) {
 template <class Map>
 void describe(Map& map, Record& record) {
   map.key(kOptional, "flush_s", record.flush_s, kFlushInterval);
+  map.key(kOptional, "format", record.formats);
 }
 
 template <class Map>

@@ -297,6 +297,23 @@ void read_value(const Value& value, LibraryParameters& parameters) {
   parameters = {to_json(value), value.places.describe(value.line)};
 }
 
+void read_value(const Value& value, std::vector<RecordFormat>& formats) {
+  if (value.node.kind != YamlNode::Kind::kList) value.fail_expecting("a list of csv and mcap");
+  Record record;
+  record.formats.clear();
+  for (std::size_t i = 0; i < value.node.items.size(); ++i) {
+    const Value item = value.at(i);
+    RecordFormat format{};
+    read_value(item, format);
+    if (record.has(format))
+      item.fail("expected each format once, got " + item.node.text + " again");
+    record.formats.push_back(format);
+  }
+  if (!record.has(RecordFormat::kCsv))
+    value.fail_expecting("csv among the formats, which verify, resume and report read");
+  formats = record.formats;
+}
+
 std::size_t read_list_length(const Value& value, const ListRange& range) {
   const std::size_t length = value.node.items.size();
   if (value.node.kind != YamlNode::Kind::kList || length < static_cast<std::size_t>(range.least) ||

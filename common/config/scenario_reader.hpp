@@ -111,6 +111,8 @@ void read_value(const Value& value, Eigen::Vector2d& vector, const NumberRule& o
 /// A list w, x, y, z of length 1, which is then normalised.
 void read_value(const Value& value, Eigen::Quaterniond& quaternion);
 void read_value(const Value& value, std::vector<VehicleVariant>& fleet, const ListRange& range);
+/// A list of formats, each at most once, csv among them.
+void read_value(const Value& value, std::vector<RecordFormat>& formats);
 /// `names` are those of a registry, `expectation` what it lists.
 void read_value(const Value& value, ModelName& model, const std::vector<std::string>& names,
                 const std::string& expectation);

@@ -45,13 +45,20 @@ std::string to_yaml_value(Enum value) {
   return "";
 }
 
+inline std::string to_yaml_value(const std::vector<RecordFormat>& formats) {
+  std::string list;
+  for (const RecordFormat format : formats)
+    list += (list.empty() ? "" : ", ") + to_yaml_value(format);
+  return "[" + list + "]";
+}
+
 /// A field that stands on the line of its key.
 template <class Field>
 inline constexpr bool kOnOneLine =
     std::is_arithmetic_v<Field> || std::is_enum_v<Field> || std::is_same_v<Field, std::string> ||
     std::is_same_v<Field, Eigen::Vector3d> || std::is_same_v<Field, Eigen::Vector2d> ||
     std::is_same_v<Field, Eigen::Quaterniond> || std::is_same_v<Field, ModelName> ||
-    std::is_same_v<Field, LibraryParameters>;
+    std::is_same_v<Field, LibraryParameters> || std::is_same_v<Field, std::vector<RecordFormat>>;
 
 /// The `Map` that writes: describe(writer, field) appends `field` to the text.
 class MapWriter {

@@ -4,9 +4,12 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
+#include <string>
 #include <vector>
 
+#include "common/config/scenario.hpp"
 #include "recorder/rows.hpp"
 
 namespace sls::record {
@@ -33,13 +36,17 @@ class RecordSink {
   /// files that can be read and resumed.
   virtual void flush() = 0;
 
+  /// Libraries whose version decides on the bytes of the files, by name.
+  virtual std::map<std::string, std::string> list_versions() const { return {}; }
+
   /// Flushes and ends the files, and lists them.
   virtual std::vector<RecordedFile> finish() = 0;
 };
 
-/// Creates the files of every format in `folder`.
+/// Creates the files of the scenario's formats in `folder`.
 /// @throws config::ConfigError, before any file is there, if `parameters` do not allow it.
 std::vector<std::unique_ptr<RecordSink>> make_sinks(const std::filesystem::path& folder,
-                                                    const Parameters& parameters);
+                                                    const Parameters& parameters,
+                                                    const config::Record& record);
 
 }  // namespace sls::record

@@ -16,9 +16,10 @@ namespace {
 namespace fs = std::filesystem;
 using sls::test::write_bytes;
 
-constexpr const char* kFiles[] = {
-    "state.csv",  "measured.csv", "command.csv",   "reference.csv", "status.csv",
-    "flight.csv", "flight.txt",   "scenario.yaml", "manifest.json", "manifest.json.part"};
+constexpr const char* kFiles[] = {"state.csv",     "measured.csv",      "command.csv",
+                                  "reference.csv", "status.csv",        "flight.csv",
+                                  "sls.mcap",      "flight.txt",        "scenario.yaml",
+                                  "manifest.json", "manifest.json.part"};
 
 class RecordingFolderTest : public testing::Test {
  protected:
@@ -124,7 +125,7 @@ TEST_F(RecordingFolderTest, ForceReplacesFiguresAndReportToo) {
     fill(out_ / subfolder);
     write_bytes(out_ / subfolder / "report.html", "old");
     fs::create_directory(out_ / subfolder / "figures");
-    for (const char* figure : {"positions.png", "positions.pdf", "fleet.png"})
+    for (const char* figure : {"positions.png", "positions.pdf", "fleet.png", "body_rates.pdf"})
       write_bytes(out_ / subfolder / "figures" / figure, "old");
   }
   EXPECT_EQ(find_error(out_, true), "no error");

@@ -95,7 +95,7 @@ faults:
       { on: state, seed: 3, position_m: [0.01, 0.02, 0.03], velocity_m_s: [0.04, 0.05, 0.06],
         alpha_rad: 0.07, beta_rad: 0.08, alpha_dot_rad_s: 0.09, beta_dot_rad_s: 0.1 }
   - noise: { force_n: [0.1, 0, 0], on: command }
-record: { flush_s: 0.05 }
+record: { flush_s: 0.05, format: [csv, mcap] }
 )";
 
 TEST(ScenarioTest, ReadsTheExampleOfTheDesign) {
@@ -155,6 +155,7 @@ TEST(ScenarioTest, ReadsEveryKeyOfSyncAndRecord) {
   EXPECT_EQ(scenario.sync.wait.recorder.deadline_s, 0.6);
   EXPECT_EQ(scenario.sync.wait.server_deadline_s, 12.0);
   EXPECT_EQ(scenario.record.flush_s, 0.05);
+  EXPECT_EQ(scenario.record.formats, (std::vector{RecordFormat::kCsv, RecordFormat::kMcap}));
 }
 
 TEST(ScenarioTest, ReadsEveryKeyOfTheController) {
@@ -376,6 +377,7 @@ TEST(ScenarioTest, LeavesTheDefaultsWhereTheFileIsSilent) {
   EXPECT_EQ(scenario.controller.model.vehicle, scenario.vehicle);
   EXPECT_EQ(scenario.mission.at(0).name, "hold");
   EXPECT_EQ(scenario.record.flush_s, 0.2);
+  EXPECT_EQ(scenario.record.formats, std::vector{RecordFormat::kCsv});
 }
 
 TEST(ScenarioTest, SensingIsFreshAndExactWhereTheFileIsSilent) {

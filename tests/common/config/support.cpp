@@ -363,7 +363,7 @@ bool are_equal(const Scenario& a, const Scenario& b) {
          std::equal(a.faults.begin(), a.faults.end(), b.faults.begin(), b.faults.end(),
                     [](const Fault& x, const Fault& y) { return are_equal(x, y); }) &&
          are_equal(a.sensing, b.sensing) && are_equal(a.estimator, b.estimator) &&
-         a.record.flush_s == b.record.flush_s;
+         a.record.flush_s == b.record.flush_s && a.record.formats == b.record.formats;
 }
 
 Scenario make_random_scenario(std::mt19937_64& random) {
@@ -385,6 +385,7 @@ Scenario make_random_scenario(std::mt19937_64& random) {
   if (dice.toss()) scenario.estimator.position = dice.vector();
   if (dice.toss()) scenario.estimator.velocity = dice.vector();
   scenario.record.flush_s = dice.between(1e-6, 0.2);
+  if (dice.toss()) scenario.record.formats = {RecordFormat::kMcap, RecordFormat::kCsv};
   if (dice.roll(0, 4) == 0) {
     scenario.plant.own = sim::SlungLoadKeys{sim::Pendulum::kRigid};
     scenario.vehicle = {1.5, dice.toss() ? 0.2 : 0.201, 1.1, dice.positive()};

@@ -1,0 +1,124 @@
+#include "recorder/sinks/mcap/mcap_sink.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <nlohmann/json.hpp>
+
+#include "common/bus/participants.hpp"
+#include "recorder/sinks/mcap/contract.hpp"
+
+namespace sls::record {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// A vehicle is mirrored at its first step in each such time.
+constexpr std::int64_t kMirrorPeriodNs = 10'000'000;
+
+/// The log time of every message is that of the simulation: a file needs no clock.
+constexpr std::string_view kClockTopic = "/clock";
+constexpr std::uint16_t kLeftOut = 0;  // no channel
+
+/// What of manifest.json is the same for equal flights, on whatever machine and whenever.
+std::string describe(const Parameters& parameters) {
+  const Compression compression = describe_compression();
+  Json json = {{"scenario_sha256", parameters.scenario_sha256().to_string()},
+               {"contract_sha256", parameters.contract_sha256().to_string()},
+               {"vehicle_ids", bus::list_vehicle_ids(parameters)},
+               {"period_s", static_cast<double>(parameters.period_ns()) / 1e9},
+               {"signals", Json::array()},
+               {"compression",
+                {{"library", compression.library},
+                 {"version", compression.version},
+                 {"level", compression.level}}}};
+  for (const SignalDescription& signal : parameters.signals())
+    json["signals"].push_back(
+        {{"name", signal.name().to_string()}, {"unit", signal.unit().to_string()}});
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
+}
+
+}  // namespace
+
+McapSink::McapSink(const std::filesystem::path& file, const Parameters& parameters)
+    : period_ns_(parameters.period_ns()),
+      file_(file),
+      mirrors_(bus::list_vehicle_ids(parameters)),
+      emit_([this](std::size_t channel, std::int64_t time_ns, const auto& message) {
+        write_mirror(channel, time_ns, message);
+      }) {
+  for (const std::uint32_t id : bus::list_vehicle_ids(parameters)) vehicles_[id];
+  add_channels();
+  add_attachments(parameters);
+  mirrors_.emit_static(emit_);
+}
+
+void McapSink::add_channels() {
+  const std::uint16_t entry = file_.add_schema("sls::RecordEntry", "omgidl", contract_idl());
+  for (auto& [id, vehicle] : vehicles_)
+    vehicle.channel = file_.add_channel(entry, fmt::format("/sls/vehicle_{}/record", id), "cdr");
+  std::map<std::string, std::uint16_t> schemas;  // by type
+  for (const ros::Channel& channel : mirrors_.channels()) {
+    std::uint16_t& id = mirror_channels_.emplace_back(kLeftOut);
+    if (channel.topic == kClockTopic) continue;
+    std::uint16_t& schema = schemas[channel.type];
+    if (schema == 0) schema = file_.add_schema(channel.type, "ros2msg", channel.schema);
+    id = file_.add_channel(schema, channel.topic, "cdr");
+  }
+}
+
+void McapSink::add_attachments(const Parameters& parameters) {
+  file_.add_attachment("scenario.yaml", "application/yaml", parameters.scenario_text().to_string());
+  file_.add_attachment("manifest.json", "application/json", describe(parameters));
+}
+
+void McapSink::add(const StepRows& rows) {
+  const auto vehicle = vehicles_.find(rows.vehicle_id);
+  if (vehicle == vehicles_.end()) return;  // of no vehicle of the run
+  const auto time_ns = static_cast<std::int64_t>(rows.step) * period_ns_;
+  file_.add_message(vehicle->second.channel, static_cast<std::uint32_t>(rows.step),
+                    static_cast<std::uint64_t>(time_ns), message_.serialize(rows));
+  const std::int64_t slot = time_ns / kMirrorPeriodNs;
+  if (!rows.state || slot <= vehicle->second.mirrored_slot) return;
+  vehicle->second.mirrored_slot = slot;
+  mirror(*rows.state, rows.reference, time_ns);
+}
+
+void McapSink::mirror(const StateRow& state, const std::optional<ReferenceRow>& reference,
+                      std::int64_t time_ns) {
+  const PlantState& plant = state.plant;
+  ros::VehicleSample sample;
+  sample.vehicle_id = state.vehicle_id;
+  sample.step = state.step;
+  sample.sim_time_ns = time_ns;
+  sample.p_WQ = bus::to_vector(plant.p_WQ_m());
+  sample.v_WQ = bus::to_vector(plant.v_WQ_m_s());
+  sample.p_WL = bus::to_vector(plant.p_WL_m());
+  sample.v_WL = bus::to_vector(plant.v_WL_m_s());
+  if (state.has_attitude) {
+    const auto& q_WB = plant.q_WB();
+    sample.q_WB = Eigen::Quaterniond(q_WB[0], q_WB[1], q_WB[2], q_WB[3]);
+    sample.w_WB_B = bus::to_vector(plant.w_WB_B_rad_s());
+  }
+  if (reference) sample.reference = bus::to_vector(reference->reference.position_m());
+  mirrors_.emit(sample, emit_);
+}
+
+void McapSink::write_mirror(std::size_t channel, std::int64_t time_ns,
+                            const std::vector<std::uint8_t>& message) {
+  const std::uint16_t id = mirror_channels_.at(channel);
+  if (id == kLeftOut) return;
+  file_.add_message(id, 0, static_cast<std::uint64_t>(time_ns),
+                    {reinterpret_cast<const char*>(message.data()), message.size()});
+}
+
+std::map<std::string, std::string> McapSink::list_versions() const {
+  const Compression compression = describe_compression();
+  return {{compression.library, compression.version}};
+}
+
+std::vector<RecordedFile> McapSink::finish() {
+  file_.finish();
+  return {{file_.path(), file_.messages(), false}};
+}
+
+}  // namespace sls::record

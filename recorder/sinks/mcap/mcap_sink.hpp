@@ -1,0 +1,59 @@
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "common/ros/mirrors.hpp"
+#include "recorder/sinks/mcap/entry_message.hpp"
+#include "recorder/sinks/mcap/mcap_file.hpp"
+#include "recorder/sinks/record_sink.hpp"
+
+namespace sls::record {
+
+/// sls.mcap: one message per step and vehicle, made of what the CSV files hold and nothing else;
+/// beside them, at most 100 times a simulated second, standard ROS 2 messages that mirror it. Of
+/// equal rows and parameters it is the same bytes; status samples are not in it.
+class McapSink : public RecordSink {
+ public:
+  static constexpr const char* kFile = "sls.mcap";
+  static constexpr std::size_t kFlushBytes = 1 << 17;
+
+  /// Creates `file`. Of the parameters it uses scenario, contract, vehicles, signals and period.
+  McapSink(const std::filesystem::path& file, const Parameters& parameters);
+
+  void add(const StepRows& rows) override;
+  void add(const SimStatus&) override {}
+  bool is_full() const override { return file_.pending_bytes() >= kFlushBytes; }
+  /// Of full chunks alone: what is in another one waits until it is full, so that no byte depends
+  /// on wall time.
+  void flush() override { file_.flush(); }
+  std::map<std::string, std::string> list_versions() const override;
+  std::vector<RecordedFile> finish() override;
+
+  std::uint64_t messages() const { return file_.messages(); }
+
+ private:
+  struct Vehicle {
+    std::uint16_t channel = 0;
+    std::int64_t mirrored_slot = -1;  // the last one in which it was mirrored
+  };
+
+  void add_channels();
+  void add_attachments(const Parameters& parameters);
+  void mirror(const StateRow& state, const std::optional<ReferenceRow>& reference,
+              std::int64_t time_ns);
+  void write_mirror(std::size_t channel, std::int64_t time_ns,
+                    const std::vector<std::uint8_t>& message);
+
+  const std::int64_t period_ns_;
+  McapFile file_;
+  EntryMessage message_;
+  ros::Mirrors mirrors_;
+  const ros::Mirrors::Emit emit_;
+  std::map<std::uint32_t, Vehicle> vehicles_;
+  std::vector<std::uint16_t> mirror_channels_;  // ids in the file of the mirrors' channels
+};
+
+}  // namespace sls::record

@@ -1,0 +1,26 @@
+#include <spdlog/fmt/fmt.h>
+
+#include <iostream>
+
+#include "common/app/run_main.hpp"
+#include "tools/convert/conversion.hpp"
+
+int main(int argc, char** argv) {
+  using namespace sls;
+  CLI::App cli(
+      "Writes a recording as one MCAP file: for Foxglove, Lichtblick, PlotJuggler and other "
+      "readers.\n"
+      "Exit codes: 0 done; 1 the recording is damaged, or the disk refuses; 2 not a recording.");
+  std::filesystem::path folder, out;
+  bool force = false;
+  cli.add_option("DIR", folder, "folder of a recording")->required();
+  cli.add_option("--out", out, "the file (default: DIR/sls.mcap)")->type_name("FILE");
+  cli.add_flag("--force", force, "replace a file that is there");
+  cli.set_version_flag("--version", app::version());
+  return app::run_main(argc, argv, cli, {}, "sls_convert", [&] {
+    const record::RecordedFlight flight = record::open_recording(folder);
+    if (out.empty()) out = convert::make_default_output(flight);
+    const std::uint64_t messages = convert::write_mcap(flight, out, force);
+    std::cout << fmt::format("{}: {} messages\n", out.string(), messages);
+  });
+}
