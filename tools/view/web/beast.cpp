@@ -1,0 +1,3 @@
+// Boost.Asio and Boost.Beast, compiled once (BOOST_…_SEPARATE_COMPILATION).
+#include <boost/asio/impl/src.hpp>
+#include <boost/beast/src.hpp>

@@ -1,0 +1,66 @@
+/// What a WebSocket protocol sees of the server: connections to send on, sessions to be called.
+/// Everything here happens on the server's one thread.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace sls::view {
+
+/// Bytes of one message, shared by the connections that send it.
+using Payload = std::shared_ptr<const std::string>;
+
+enum class MessageKind { kText, kBinary };
+
+/// What happens to a message while the browser is slower than what it is sent.
+enum class Delivery {
+  kAlways,    ///< the connection is closed if its queue is full
+  kNewest,    ///< replaces a queued message of the same `key` that is not being sent yet
+  kDroppable  ///< of the queued droppable messages the oldest goes first, and is counted
+};
+
+class Connection {
+ public:
+  virtual ~Connection() = default;
+
+  /// Queues a message; never blocks. `key`: of kNewest alone.
+  virtual void send(MessageKind kind, Payload payload, Delivery delivery,
+                    std::uint64_t key = 0) = 0;
+
+  /// Bytes queued and not handed to the system yet.
+  virtual std::size_t queued_bytes() const = 0;
+  /// Messages dropped or replaced since the beginning.
+  virtual std::uint64_t dropped() const = 0;
+
+  /// True where this connection may operate a flight (web/access.hpp); `why_not` says in words why
+  /// not: "expected a token", "started with --read-only".
+  virtual bool may_operate() const = 0;
+  virtual std::string why_not() const = 0;
+
+  /// Gives the token that a page was opened with; true where it is right.
+  virtual bool authenticate(std::string_view token) = 0;
+
+  /// Closes with a WebSocket close code (1008: policy) and reason, after what is queued.
+  virtual void close(std::uint16_t code, const std::string& reason) = 0;
+};
+
+/// One client's end of a protocol; lives as long as its connection.
+class Session {
+ public:
+  virtual ~Session() = default;
+  virtual void receive(MessageKind kind, std::string_view message) = 0;
+};
+
+using MakeSession = std::function<std::unique_ptr<Session>(Connection&)>;
+
+/// A WebSocket subprotocol by its names, in the order in which the server prefers them.
+struct Protocol {
+  std::vector<std::string> names;
+  MakeSession make_session;
+};
+
+}  // namespace sls::view

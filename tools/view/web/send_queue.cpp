@@ -1,0 +1,87 @@
+#include "tools/view/web/send_queue.hpp"
+
+#include <utility>
+
+namespace sls::view {
+namespace {
+
+/// What a message takes beside its payload: nodes of list and table, the payload's string.
+constexpr std::size_t kMessageCost = 256;
+
+}  // namespace
+
+bool SendQueue::push(MessageKind kind, Payload payload, Delivery delivery, std::uint64_t key) {
+  QueuedMessage message{kind, std::move(payload), delivery, key};
+  if (delivery == Delivery::kNewest && replace(message)) return true;
+  if (!make_room(message.payload->size())) {
+    ++dropped_;
+    return delivery != Delivery::kAlways;
+  }
+  bytes_ += message.payload->size();
+  const Place place = messages_.insert(messages_.end(), std::move(message));
+  if (delivery == Delivery::kDroppable) droppable_.push_back(place);
+  if (delivery == Delivery::kNewest) newest_[key] = place;
+  return true;
+}
+
+/// Puts a kNewest message where an older one of its key waits: a stream that is faster than its
+/// client does not push its own message to the end again and again. True where there was one; it
+/// stays where the new one does not fit.
+bool SendQueue::replace(const QueuedMessage& message) {
+  const auto found = newest_.find(message.key);
+  if (found == newest_.end()) return false;
+  QueuedMessage& queued = *found->second;
+  ++dropped_;
+  const std::size_t old_bytes = queued.payload->size();
+  const std::size_t new_bytes = message.payload->size();
+  if (new_bytes > old_bytes && !make_room(new_bytes - old_bytes)) return true;
+  bytes_ = bytes_ - old_bytes + new_bytes;
+  queued = message;
+  return true;
+}
+
+/// Drops droppable messages until so many bytes fit; none where they never would.
+bool SendQueue::make_room(std::size_t payload_bytes) {
+  if (payload_bytes > capacity_) return false;
+  while (!fits(payload_bytes))
+    if (!drop_oldest()) return false;
+  return true;
+}
+
+bool SendQueue::fits(std::size_t payload_bytes) const {
+  return bytes_ + payload_bytes + (messages_.size() + 1) * kMessageCost <= capacity_;
+}
+
+bool SendQueue::drop_oldest() {
+  if (droppable_.empty()) return false;
+  const Place oldest = droppable_.front();
+  ++dropped_;
+  forget(oldest);
+  messages_.erase(oldest);
+  return true;
+}
+
+/// Takes a message that goes out of the lists that name it.
+void SendQueue::forget(Place place) {
+  bytes_ -= place->payload->size();
+  // Of the droppable ones the oldest always goes first.
+  if (place->delivery == Delivery::kDroppable) droppable_.pop_front();
+  if (place->delivery == Delivery::kNewest) newest_.erase(place->key);
+}
+
+std::optional<QueuedMessage> SendQueue::pop() {
+  if (messages_.empty()) return std::nullopt;
+  forget(messages_.begin());
+  QueuedMessage message = std::move(messages_.front());
+  messages_.pop_front();
+  return message;
+}
+
+void SendQueue::clear() {
+  messages_.clear();
+  droppable_.clear();
+  newest_.clear();
+  bytes_ = 0;
+}
+
+}  // namespace sls::view

@@ -1,0 +1,79 @@
+/// The one port of sls_view: serves files from memory and WebSocket protocols, by Boost.Beast, on
+/// one thread.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "tools/view/web/access.hpp"
+#include "tools/view/web/connection.hpp"
+
+namespace sls::view {
+
+/// What a path answers: bytes that do not change while the server runs.
+struct Resource {
+  std::string content_type;      ///< "text/html; charset=utf-8"
+  std::string content_encoding;  ///< "gzip", or empty
+  Payload body;
+  std::string security_policy;  ///< Content-Security-Policy, or empty
+};
+
+/// Bounds of what one server gives to clients.
+struct ServerLimits {
+  std::size_t connections = 256;          ///< at a time, HTTP and WebSocket; the rest is closed
+  std::size_t request_bytes = 8 * 1024;   ///< header of an HTTP request; bodies are refused
+  std::size_t message_bytes = 64 * 1024;  ///< of a WebSocket message from a client
+  std::size_t queue_bytes = 8 << 20;      ///< of one connection
+  double request_timeout_s = 10;          ///< for a whole request, and for the next one
+  double silence_timeout_s = 30;          ///< without an answer to a ping
+};
+
+struct ServerOptions {
+  std::string address = "127.0.0.1";
+  std::uint16_t port = 8765;  ///< 0: any that is free
+  AccessOptions access;
+  ServerLimits limits;
+};
+
+class Server {
+ public:
+  /// Listens. @throws config::ConfigError "--port: …" where the port is taken, "--listen: …" where
+  /// the address is none of this machine, or needs a token (`check` of access.hpp). Of the two
+  /// addresses in `options` the server's own counts.
+  explicit Server(const ServerOptions& options);
+  ~Server();
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
+
+  std::uint16_t port() const;
+  /// "http://127.0.0.1:8765/".
+  std::string url() const;
+
+  /// Both before `run`. `path` begins with a slash.
+  void add_resource(const std::string& path, Resource resource);
+  void add_protocol(Protocol protocol);
+
+  /// Calls `task` on the server's thread; from any thread.
+  void post(std::function<void()> task);
+  /// Calls `task` on the server's thread every `period_s`.
+  void repeat(double period_s, std::function<void()> task);
+
+  /// Serves until `stop`. No session outlives it.
+  void run();
+  /// From any thread: closes all connections (1001) and ends `run`.
+  void stop();
+
+  /// WebSocket connections there are.
+  std::size_t count_connections() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace sls::view
