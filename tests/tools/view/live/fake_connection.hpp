@@ -1,0 +1,50 @@
+/// A connection that keeps what it is given.
+#pragma once
+
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "tools/view/web/connection.hpp"
+
+namespace sls::test {
+
+class FakeConnection : public view::Connection {
+ public:
+  void send(view::MessageKind kind, view::Payload payload, view::Delivery delivery,
+            std::uint64_t key) override {
+    if (kind == view::MessageKind::kBinary)
+      binary.push_back(*payload);
+    else
+      texts.push_back(nlohmann::json::parse(*payload));
+    (void)delivery;
+    (void)key;
+  }
+  std::size_t queued_bytes() const override { return queued; }
+  std::uint64_t dropped() const override { return 0; }
+  bool may_operate() const override { return obstacle.empty(); }
+  std::string why_not() const override { return obstacle; }
+  bool authenticate(std::string_view token) override {
+    if (token != "the right token") return false;
+    obstacle.clear();
+    return true;
+  }
+  void close(std::uint16_t code, const std::string&) override { close_code = code; }
+
+  /// Messages with this `op`.
+  std::vector<nlohmann::json> find(const std::string& op) const {
+    std::vector<nlohmann::json> found;
+    for (const auto& text : texts)
+      if (text.at("op") == op) found.push_back(text);
+    return found;
+  }
+
+  std::vector<nlohmann::json> texts;
+  std::vector<std::string> binary;
+  std::string obstacle;  ///< to operating
+  std::size_t queued = 0;
+  int close_code = 0;
+};
+
+}  // namespace sls::test

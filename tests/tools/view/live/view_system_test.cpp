@@ -1,0 +1,210 @@
+/// The real sls_view beside flights of the real programs.
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <cmath>
+
+#include "tests/system/flight.hpp"
+#include "tests/tools/view/live/page_client.hpp"
+
+namespace sls::test {
+namespace {
+
+std::unique_ptr<Process> start_viewer(const OwnDomain& domain,
+                                      std::vector<std::string> flags = {}) {
+  flags.insert(flags.end(), {"--port", "0"});
+  return std::make_unique<Process>(make_command("sls_view", domain.number(), flags));
+}
+
+const std::vector<std::string> kRealtime = {"--mode", "realtime"};
+
+TEST(ViewSystemTest, APageSeesTheFlightThatIsRecorded) {
+  Flight flight(scenario("figure_eight"), {{}, kRealtime, {}});
+  const auto viewer = start_viewer(flight.domain);
+  PageClient page(wait_for_port(*viewer));
+  ASSERT_TRUE(page.wait_for_step(500)) << viewer->output() << flight.outputs();
+  EXPECT_EQ(page.last("run").at("run").at("scenario"), "figure_eight");
+  EXPECT_EQ(page.last("status").at("participants").size(), 2u);
+  ASSERT_TRUE(flight.wait_for_steps(500));
+  EXPECT_EQ(page.control("stop").at("accepted"), true);
+  EXPECT_TRUE(page.wait_for_status("phase", "failed"));
+  flight.wait();
+
+  const auto rows = page.rows();
+  ASSERT_GT(rows.size(), 100u);
+  const Table states(flight.recording() / "state.csv");
+  const Table references(flight.recording() / "reference.csv");
+  for (const auto& [time, row] : rows) {
+    const auto step = static_cast<std::size_t>(std::lround(time / 0.004));
+    ASSERT_LT(step, states.rows());
+    ASSERT_NEAR(states.number(step, "sim_time_s"), time, 1e-9);
+    ASSERT_FLOAT_EQ(row[0], static_cast<float>(states.number(step, "quad_x_m")));
+    ASSERT_FLOAT_EQ(row[8], static_cast<float>(states.number(step, "load_z_m")));
+    if (step >= references.rows()) continue;
+    ASSERT_FLOAT_EQ(row[26], static_cast<float>(references.number(step, "ref_x_m")));
+  }
+}
+
+TEST(ViewSystemTest, APagePausesStepsResumesAndResets) {
+  Flight flight(scenario("figure_eight"), {{}, kRealtime, {}});
+  const auto viewer = start_viewer(flight.domain);
+  PageClient page(wait_for_port(*viewer));
+  ASSERT_TRUE(page.wait_for_step(50)) << viewer->output() << flight.outputs();
+  EXPECT_EQ(page.control("step", 5).at("accepted"), false);
+  EXPECT_NE(page.last("reply").at("reason").get<std::string>().find("not paused"),
+            std::string::npos);
+  EXPECT_EQ(page.control("pause").at("accepted"), true);
+  ASSERT_TRUE(page.wait_for_status("phase", "paused"));
+  const auto before = page.last("reply").at("step").get<std::uint64_t>();
+  EXPECT_EQ(page.control("step", 25).at("accepted"), true);
+  EXPECT_TRUE(page.wait_for_step(before + 24)) << "the last step of a flight that rests is shown";
+  EXPECT_EQ(page.control("resume").at("accepted"), true);
+  ASSERT_TRUE(page.wait_for_step(before + 100));
+
+  const auto run_id = page.last("run").at("run").at("run_id");
+  EXPECT_EQ(page.control("reset").at("accepted"), true);
+  ASSERT_TRUE(wait_until([&] { return page.last("run").at("run").at("run_id") != run_id; }));
+  ASSERT_TRUE(wait_until([&] {
+    char hex[17];
+    std::snprintf(hex, sizeof(hex), "%016llx",
+                  static_cast<unsigned long long>(page.poses()->run_id));
+    return page.last("run").at("run").at("run_id") == hex;
+  })) << "states of the new run";
+  EXPECT_EQ(page.control("stop").at("accepted"), true);
+  flight.wait();
+}
+
+TEST(ViewSystemTest, AKilledServerIsSilentAndTheNextRunIsShown) {
+  const TemporaryFolder folder;
+  Flight flight(scenario("figure_eight"), {{}, kRealtime, {}});
+  const auto viewer = start_viewer(flight.domain);
+  PageClient page(wait_for_port(*viewer));
+  ASSERT_TRUE(page.wait_for_step(50)) << viewer->output() << flight.outputs();
+  const auto run_id = page.last("run").at("run").at("run_id");
+  flight.server->kill();
+  EXPECT_TRUE(page.wait_for_status("is_silent", true));
+  EXPECT_NE(page.last("status").at("waiting_for").get<std::string>().find("silent"),
+            std::string::npos);
+  for (Process* process : {flight.client.get(), flight.recorder.get()}) process->kill();
+
+  const auto start = [&](const char* name, const std::vector<std::string>& flags) {
+    return std::make_unique<Process>(make_command(name, flight.domain.number(), flags));
+  };
+  const auto recorder = start("recorder", {"--out", (folder / "next").string()});
+  const auto server = start("sim_server", {"--scenario", scenario("short")});
+  const auto client = start("control_client", {"--scenario", scenario("short")});
+  ASSERT_TRUE(wait_until([&] { return page.last("run").at("run").at("run_id") != run_id; }))
+      << server->output();
+  EXPECT_EQ(server->wait(), 0) << server->output();
+  EXPECT_TRUE(page.wait_for_status("phase", "finished"));
+  EXPECT_EQ(recorder->wait(), 0) << recorder->output();
+  EXPECT_EQ(client->wait(), 0) << client->output();
+}
+
+/// What the flight computes and records is the same, whoever looks on, and however badly.
+TEST(ViewSystemTest, ThreeViewersOfWhichOneIsStoppedChangeNothing) {
+  Flight alone(scenario("figure_eight"));
+  alone.expect_success();
+
+  const OwnDomain other;  // so that the flight below does not begin before its viewers
+  const TemporaryFolder folder;
+  std::vector<std::unique_ptr<Process>> viewers;
+  std::vector<std::unique_ptr<PageClient>> pages;
+  for (int i = 0; i < 3; ++i) {
+    viewers.push_back(start_viewer(other));
+    pages.push_back(std::make_unique<PageClient>(wait_for_port(*viewers.back())));
+  }
+  const auto start = [&](const char* name, const std::vector<std::string>& flags) {
+    return std::make_unique<Process>(make_command(name, other.number(), flags));
+  };
+  const auto recording = folder / "recording";
+  const auto recorder = start("recorder", {"--out", recording.string()});
+  const auto server = start("sim_server", {"--scenario", scenario("figure_eight")});
+  const auto client = start("control_client", {"--scenario", scenario("figure_eight")});
+  ASSERT_TRUE(pages[0]->wait_for_step(10)) << viewers[0]->output() << server->output();
+  viewers[0]->send(SIGSTOP);
+  EXPECT_EQ(server->wait(), 0) << server->output();
+  EXPECT_EQ(client->wait(), 0) << client->output();
+  EXPECT_EQ(recorder->wait(), 0) << recorder->output();
+  EXPECT_TRUE(pages[1]->wait_for_status("phase", "finished"));
+  EXPECT_TRUE(pages[2]->wait_for_status("phase", "finished"));
+  viewers[0]->send(SIGCONT);
+
+  const auto manifest = read_manifest(recording);
+  EXPECT_TRUE(manifest.at("complete").get<bool>());
+  for (const char* file : {"state.csv", "reference.csv"})
+    EXPECT_TRUE(read_bytes(recording / file) == read_bytes(alone.recording() / file)) << file;
+}
+
+std::vector<std::string> make_launch(const OwnDomain& domain, const std::string& recording) {
+  return {"env",
+          "SLS_BUILD=" SLS_BUILD_DIR,
+          SLS_SOURCE_DIR "/sls",
+          "run",
+          scenario("short"),
+          "--mode",
+          "realtime",
+          "--domain",
+          domain.text(),
+          "--out",
+          recording,
+          "--view",
+          "--view-port",
+          "0"};
+}
+
+TEST(ViewSystemTest, TheLauncherShowsAFlightFromItsBeginningAndEndsTheViewerWithIt) {
+  const OwnDomain domain;
+  const TemporaryFolder folder;
+  Process run(make_launch(domain, folder / "recording"));
+  const auto port = wait_for_port(run);
+  PageClient page(port);
+  EXPECT_TRUE(page.wait_for_step(100)) << run.output();
+  EXPECT_EQ(run.wait(), 0) << run.output();
+  EXPECT_THROW(RawClient{port}, std::runtime_error) << "nobody listens any more";
+  EXPECT_TRUE(read_manifest(folder / "recording").at("complete").get<bool>());
+}
+
+TEST(ViewSystemTest, TheFlightOfTheLauncherGoesOnWithoutItsViewer) {
+  const OwnDomain domain, other;
+  const auto taken = start_viewer(other);
+  const TemporaryFolder folder;
+  auto command = make_launch(domain, folder / "recording");
+  command.back() = std::to_string(wait_for_port(*taken));
+  Process run(command);
+  EXPECT_EQ(run.wait(), 0) << run.output();
+  EXPECT_NE(run.output().find("--port: expected a free port"), std::string::npos) << run.output();
+  EXPECT_TRUE(read_manifest(folder / "recording").at("complete").get<bool>());
+}
+
+TEST(ViewSystemTest, AStopSignalEndsItLikeTheOtherPrograms) {
+  const OwnDomain domain;
+  for (const auto& [signal, code] : {std::pair(SIGINT, 130), std::pair(SIGTERM, 143)}) {
+    const auto viewer = start_viewer(domain);
+    const PageClient page(wait_for_port(*viewer));
+    viewer->send(signal);
+    EXPECT_EQ(viewer->wait(), code) << viewer->output();
+  }
+}
+
+TEST(ViewSystemTest, BadUsageIsOneLineAndExitCode2) {
+  const OwnDomain domain;
+  const auto expect_refused = [&](const std::vector<std::string>& flags, const std::string& text) {
+    Process viewer(make_command("sls_view", domain.number(), flags));
+    EXPECT_EQ(viewer.wait(), 2) << viewer.output();
+    const std::string output = viewer.output();
+    EXPECT_NE(output.find(text), std::string::npos) << output;
+    EXPECT_EQ(std::count(output.begin(), output.end(), '\n'), 1) << output;
+  };
+  expect_refused({"--listen", "0.0.0.0", "--port", "0"}, "--token-file");
+  expect_refused({"--listen", "nowhere", "--port", "0"}, "--listen");
+  expect_refused({"--port", "65536"}, "--port");
+  expect_refused({"--token-file", "/nowhere/token"}, "/nowhere/token");
+  expect_refused({"--export", "/tmp/page.html"}, "--export: expected a recording");
+  const auto first = start_viewer(domain);
+  const std::string port = std::to_string(wait_for_port(*first));
+  expect_refused({"--port", port}, "--port: expected a free port, got " + port);
+}
+
+}  // namespace
+}  // namespace sls::test

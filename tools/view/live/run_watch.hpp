@@ -1,0 +1,62 @@
+/// Which run is looked at, and what is known of it.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "common/bus/node.hpp"
+#include "common/bus/participants.hpp"
+#include "tools/view/live/feed.hpp"
+
+namespace sls::view {
+
+/// Something that happened in a run: a new reason in its status.
+struct RunEvent {
+  std::uint64_t run_id = 0;
+  std::uint64_t step = 0;
+  std::string text;
+};
+
+/// Asked from one thread; listens on the middleware's.
+class RunWatch {
+ public:
+  /// `on_status`: called on a thread of the middleware at every status.
+  RunWatch(bus::Node& node, std::uint32_t vehicle_id, std::function<void()> on_status);
+
+  /// The view as it is now; null: there has been no run yet.
+  std::shared_ptr<const RunView> look();
+  /// False where the last look found nothing that the one before had not.
+  bool has_changed() const { return has_changed_; }
+  /// Events since the last call, oldest first.
+  std::deque<RunEvent> take_events();
+
+ private:
+  /// What a change of the view shows in.
+  using Mark = std::tuple<std::uint64_t, std::uint64_t, std::uint64_t, std::size_t, bool, bool>;
+
+  std::optional<bus::Run> choose_run() const;
+  std::optional<bus::Run> find_ended_run() const;
+  void note(const SimStatus& status);
+
+  const std::uint32_t vehicle_id_;
+  const std::function<void()> on_status_;
+  std::mutex events_mutex_;  // over the two that follow
+  std::deque<RunEvent> events_;
+  std::map<std::uint64_t, std::string> last_reasons_;  // by run_id
+  std::optional<bus::Run> run_;
+  Mark mark_{};
+  bool has_changed_ = false;
+  bus::ParticipantDirectory participants_;
+  bus::ServerDirectory servers_;  // last: its callback uses the members above
+};
+
+}  // namespace sls::view

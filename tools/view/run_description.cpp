@@ -1,0 +1,139 @@
+#include "tools/view/run_description.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "common/bus/names.hpp"
+#include "common/config/scenario.hpp"
+#include "control_client/reference_trajectory.hpp"
+#include "sim_server/plants/multirotor/keys.hpp"
+
+namespace sls::view {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::size_t kMostPathPoints = 2000;
+constexpr std::size_t kCurvePoints = 200;  // of a stage whose reference moves
+constexpr double kDrawnArm = 0.15;         // m, along x and y: rotors of a point mass
+
+Json to_json(const Eigen::Vector3d& vector) { return {vector.x(), vector.y(), vector.z()}; }
+
+// --- vehicles ------------------------------------------------------------------------------------
+
+Json make_drawn_rotors() {
+  Json rotors = Json::array();
+  for (const auto& [x, y, spin] :
+       {std::array{1, 1, 1}, std::array{-1, -1, 1}, std::array{1, -1, -1}, std::array{-1, 1, -1}})
+    rotors.push_back({{"position_m", {x * kDrawnArm, y * kDrawnArm, 0.0}}, {"spin", spin}});
+  return rotors;
+}
+
+/// `spin`: 1 counter-clockwise, −1 clockwise, as the scenario says it.
+Json make_rotors(const std::vector<sim::RotorKeys>& keys) {
+  Json rotors = Json::array();
+  for (const sim::RotorKeys& rotor : keys)
+    rotors.push_back({{"position_m", to_json(rotor.position)},
+                      {"spin", rotor.spin == sim::Spin::kCounterClockwise ? 1 : -1}});
+  return rotors;
+}
+
+Json describe_vehicles(const Parameters& parameters, const config::Scenario& scenario) {
+  const bool has_rotors = scenario.plant.model.name == "multirotor";
+  const auto& keys = scenario.plant.own.get<sim::MultirotorKeys>();
+  Json vehicles = Json::array();
+  for (const VehicleParameters& vehicle : parameters.vehicles()) {
+    Json json = {{"id", vehicle.vehicle_id()},
+                 {"quad_mass_kg", vehicle.quad_mass_kg()},
+                 {"load_mass_kg", vehicle.load_mass_kg()},
+                 {"rod_length_m", vehicle.rod_length_m()},
+                 {"attachment_m", to_json(has_rotors ? keys.attachment : Eigen::Vector3d::Zero())},
+                 {"rotors", has_rotors ? make_rotors(keys.rotors) : make_drawn_rotors()}};
+    if (!has_rotors) json["is_drawn_only"] = true;
+    vehicles.push_back(std::move(json));
+  }
+  return vehicles;
+}
+
+// --- columns -------------------------------------------------------------------------------------
+
+bool ends_with(const std::string& text, const std::string& end) {
+  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
+}
+
+std::string find_unit(const std::string& column) {
+  for (const auto& [end, unit] :
+       {std::pair("_rad_s", "rad/s"), std::pair("_m_s", "m/s"), std::pair("_rad", "rad"),
+        std::pair("_m", "m"), std::pair("_n", "N")})
+    if (ends_with(column, end)) return unit;
+  return "1";
+}
+
+Json describe_columns(const Parameters& parameters) {
+  Json columns = Json::array();
+  for (const std::string& name : kColumns)
+    columns.push_back({{"name", name}, {"unit", find_unit(name)}});
+  for (const SignalDescription& signal : parameters.signals())
+    columns.push_back({{"name", signal.name().to_string()}, {"unit", signal.unit().to_string()}});
+  return columns;
+}
+
+// --- mission -------------------------------------------------------------------------------------
+
+/// For how long the reference of a stage moves on, s: to the end of the stage, and of a figure
+/// eight one lap at most. 0: it does not move.
+double calc_moving_time(const config::Stage& stage) {
+  double longest = 0;
+  if (const auto* eight = std::get_if<config::FigureEightReference>(&stage.reference))
+    longest = eight->period_s;
+  else if (const auto* rest = std::get_if<config::RestToRestReference>(&stage.reference))
+    longest = rest->duration_s;
+  if (const auto* after = std::get_if<config::LeaveAfter>(&stage.leave))
+    longest = std::min(longest, static_cast<double>(after->duration_ns) * 1e-9);
+  return longest;
+}
+
+Json describe_path(const config::Scenario& scenario) {
+  Json path = Json::array();
+  const std::size_t stages = std::max<std::size_t>(scenario.mission.size(), 1);
+  const std::size_t most = std::clamp<std::size_t>(kMostPathPoints / stages, 2, kCurvePoints + 1);
+  for (const config::Stage& stage : scenario.mission) {
+    const double duration = calc_moving_time(stage);
+    const auto trajectory = control::make_reference_trajectory(stage.reference);
+    const std::size_t points = duration > 0 ? most : 1;
+    for (std::size_t i = 0; i < points && path.size() < kMostPathPoints; ++i) {
+      const double time =
+          points == 1 ? 0 : duration * static_cast<double>(i) / static_cast<double>(points - 1);
+      path.push_back(to_json(trajectory->calc(time).position));
+    }
+  }
+  return path;
+}
+
+}  // namespace
+
+std::string describe_run(const Parameters& parameters) {
+  const std::string run_id = fmt::format("{:016x}", parameters.run_id());
+  const config::Scenario scenario =
+      config::parse_scenario(parameters.scenario_text().to_string(), "scenario of run " + run_id);
+  Json stages = Json::array();
+  for (const config::Stage& stage : scenario.mission) stages.push_back(stage.name);
+  const bool is_realtime = parameters.mode() == MODE_REALTIME;
+  const Json run = {{"run_id", run_id},
+                    {"scenario", scenario.name},
+                    {"mode", bus::to_string(parameters.mode())},
+                    {"period_s", static_cast<double>(parameters.period_ns()) * 1e-9},
+                    {"real_time_factor", is_realtime ? parameters.real_time_factor() : 0.0},
+                    {"has_attitude", parameters.has_attitude()},
+                    {"vehicles", describe_vehicles(parameters, scenario)},
+                    {"columns", describe_columns(parameters)},
+                    {"stages", std::move(stages)},
+                    {"path_m", describe_path(config::make_vehicle_scenario(scenario, 0))}};
+  return run.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+}  // namespace sls::view
