@@ -1,0 +1,66 @@
+// A headless Chromium with a folder of its own, and what tests ask of a page.
+import { mkdtempSync, rmSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import puppeteer from "puppeteer-core";
+
+const kChromium = process.env.SLS_CHROMIUM ?? "/usr/bin/chromium";
+
+export async function startBrowser({ flags = [], width = 1366, height = 768, scheme = "dark", touch = false } = {}) {
+  const folder = mkdtempSync(join(tmpdir(), "sls-view-chromium-"));
+  const browser = await puppeteer.launch({
+    executablePath: kChromium,
+    headless: true,
+    userDataDir: folder,
+    protocolTimeout: 120_000,
+    defaultViewport: { width, height, hasTouch: touch, isMobile: touch, deviceScaleFactor: 1 },
+    args: ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run",
+           "--disable-background-networking", "--disable-component-update", "--disable-sync", "--disable-dev-shm-usage",
+           ...flags],
+  });
+  const [page] = await browser.pages();
+  await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: scheme }]);
+  const errors = [];
+  const requests = [];
+  page.on("console", (message) => ["error", "warn"].includes(message.type()) && errors.push(message.text()));
+  page.on("pageerror", (error) => errors.push(String(error)));
+  page.on("request", (request) => requests.push(request.url()));
+  return {
+    browser, page, errors, requests,
+    async stop() {
+      await browser.close();
+      rmSync(folder, { recursive: true, force: true, maxRetries: 5 });
+    },
+  };
+}
+
+/** Waits until `check` gives something true. @throws Error after `limit` ms, with the last value. */
+export async function waitFor(what, check, limit = 30_000) {
+  const end = performance.now() + limit;
+  let last;
+  for (;;) {
+    last = await check();
+    if (last) return last;
+    if (performance.now() > end) throw new Error(`${what}: not within ${limit} ms; last: ${JSON.stringify(last)}`);
+    await new Promise((resolve) => setTimeout(resolve, 50));
+  }
+}
+
+/** Red, green and blue of pixels of a screenshot, decoded by Chromium itself: [[x, y], …] → [[r, g, b], …]. */
+export async function readPixels(browser, png, places) {
+  const page = await browser.newPage();
+  try {
+    return await page.evaluate(async (data, wanted) => {
+      const image = new Image();
+      image.src = data;
+      await image.decode();
+      const canvas = document.createElement("canvas");
+      [canvas.width, canvas.height] = [image.width, image.height];
+      const context = canvas.getContext("2d");
+      context.drawImage(image, 0, 0);
+      return wanted.map(([x, y]) => [...context.getImageData(Math.round(x), Math.round(y), 1, 1).data.slice(0, 3)]);
+    }, `data:image/png;base64,${Buffer.from(png).toString("base64")}`, places);
+  } finally {
+    await page.close();
+  }
+}

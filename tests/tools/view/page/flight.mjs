@@ -1,0 +1,62 @@
+// A flight of the real programs, in real time, with sls_view beside it.
+import { spawn, spawnSync } from "node:child_process";
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { dirname, join } from "node:path";
+import { fileURLToPath } from "node:url";
+import { waitFor } from "./browser.mjs";
+
+const source = join(dirname(fileURLToPath(import.meta.url)), "../../../..");
+
+/** `build`: the build tree. `scenario`: name in config/scenarios. Gives { url, ctl, stop }. */
+export async function startFlight({ build, domain, scenario = "figure_eight", vehicles = 1, port = 0 }) {
+  const folder = mkdtempSync(join(tmpdir(), "sls-view-flight-"));
+  const file = join(folder, "scenario.yaml");
+  let text = readFileSync(join(source, "config/scenarios", `${scenario}.yaml`), "utf8");
+  if (vehicles > 1) text = text.replace(/^vehicles: .*$/m, `vehicles: ${vehicles}`);
+  writeFileSync(file, text);
+  const programs = [];
+  const start = (name, ...args) => {
+    const child = spawn(join(build, "bin", name), ["--domain", String(domain), ...args], { stdio: ["ignore", "ignore", "pipe"] });
+    const program = { name, child, log: "" };
+    child.stderr.on("data", (data) => (program.log += data));
+    programs.push(program);
+    return program;
+  };
+  const end = async (program) => {
+    if (program.child.exitCode !== null || program.child.signalCode !== null) return;
+    const ended = new Promise((resolve) => program.child.once("exit", resolve));
+    program.child.kill("SIGINT");
+    const timer = setTimeout(() => program.child.kill("SIGKILL"), 15_000);
+    await ended;
+    clearTimeout(timer);
+  };
+  const startViewer = async (wanted) => {
+    const viewer = start("sls_view", "--port", String(wanted));
+    const url = await waitFor("address of sls_view", () => /page: (http:\S+)/.exec(viewer.log)?.[1]);
+    return { viewer, url };
+  };
+  let { viewer, url } = await startViewer(port);
+  start("sim_server", "--scenario", file, "--mode", "realtime", "--rtf", "1");
+  start("control_client", "--scenario", file);
+  start("recorder", "--out", join(folder, "recording"));
+  return {
+    url,
+    /** What sim_ctl says of the run: not the page's word for it. */
+    status() {
+      const result = spawnSync(join(build, "bin/sim_ctl"), ["--domain", String(domain), "status", "--json"], { encoding: "utf8" });
+      if (result.status !== 0) throw new Error(`sim_ctl: ${result.stderr}`);
+      return JSON.parse(result.stdout);
+    },
+    async endViewer() {
+      await end(viewer);
+    },
+    async restartViewer() {
+      ({ viewer, url } = await startViewer(new URL(url).port));
+    },
+    async stop() {
+      await Promise.all([...programs].reverse().map(end));
+      rmSync(folder, { recursive: true, force: true });
+    },
+  };
+}

@@ -1,0 +1,69 @@
+// Figures of the page, one JSON line: node measure.mjs load|latency|fleet BUILD [DOMAIN]
+import { statSync } from "node:fs";
+import { join } from "node:path";
+import { startBrowser, waitFor } from "./browser.mjs";
+import { startFakeServer } from "./fake_server.mjs";
+import { startFlight } from "./flight.mjs";
+
+const [what, build, domain = "141"] = process.argv.slice(2);
+const kMeasuredMs = 10_000;
+const page_file = join(build, "tools/view/page/page.html");
+
+/** Time from the request until the page has drawn for the first time. */
+async function measureLoad() {
+  const flight = await startFlight({ build, domain });
+  const chromium = await startBrowser();
+  try {
+    const began = performance.now();
+    await chromium.page.goto(flight.url, { waitUntil: "load" });
+    await waitFor("first frame", () => chromium.page.evaluate(() => (window.slsView?.frames() ?? 0) > 0));
+    const first_frame_ms = performance.now() - began;
+    const load_ms = await chromium.page.evaluate(() => performance.getEntriesByType("navigation")[0].loadEventEnd);
+    return { load_ms, first_frame_ms, bytes: statSync(page_file).size, gzip_bytes: statSync(`${page_file}.gz`).size };
+  } finally {
+    await chromium.stop();
+    await flight.stop();
+  }
+}
+
+/** A flight of 250 Hz in real time; latencies of the last 1,000 frames. */
+async function measureLatency() {
+  const flight = await startFlight({ build, domain });
+  const chromium = await startBrowser();
+  try {
+    await chromium.page.goto(flight.url);
+    await waitFor("flight", () => chromium.page.evaluate(() => (window.slsView?.state().step ?? 0) > 250), 60_000);
+    await chromium.page.evaluate(() => window.slsView.resetLatency());
+    await new Promise((resolve) => setTimeout(resolve, kMeasuredMs));
+    const { p50, p99, count } = await chromium.page.evaluate(() => window.slsView.latency());
+    return { p50_ms: p50, p99_ms: p99, frames: count };
+  } finally {
+    await chromium.stop();
+    await flight.stop();
+  }
+}
+
+/** 100 vehicles that fly by closed forms: how many frames a second Chromium draws by software. */
+async function measureFleet() {
+  const server = await startFakeServer({ page: page_file, vehicles: 100 });
+  const chromium = await startBrowser();
+  try {
+    await chromium.page.goto(server.url);
+    await waitFor("flight", () => chromium.page.evaluate(() => (window.slsView?.state().step ?? 0) > 250));
+    await new Promise((resolve) => setTimeout(resolve, 3000)); // the resolution adapts
+    const begin = await chromium.page.evaluate(() => [window.slsView.frames(), performance.now()]);
+    await new Promise((resolve) => setTimeout(resolve, kMeasuredMs));
+    const end = await chromium.page.evaluate(() => [window.slsView.frames(), performance.now(), window.slsView.camera().resolution]);
+    return { frames_per_s: ((end[0] - begin[0]) * 1000) / (end[1] - begin[1]), resolution: end[2] };
+  } finally {
+    await chromium.stop();
+    await server.stop();
+  }
+}
+
+const measures = { load: measureLoad, latency: measureLatency, fleet: measureFleet };
+if (!measures[what] || !build) {
+  console.error("usage: node measure.mjs load|latency|fleet BUILD [DOMAIN]");
+  process.exit(2);
+}
+console.log(JSON.stringify(await measures[what]()));

@@ -1,0 +1,76 @@
+// The page on a real flight of the real programs: node real_flight_test.mjs BUILD FOLDER [DOMAIN]
+import assert from "node:assert/strict";
+import { mkdirSync } from "node:fs";
+import { join } from "node:path";
+import { readPixels, startBrowser, waitFor } from "./browser.mjs";
+import { startFlight } from "./flight.mjs";
+
+const [build, folder, domain = "140"] = process.argv.slice(2);
+mkdirSync(folder, { recursive: true });
+const kColours = { quad: [0x1f, 0x84, 0xd6], load: [0xe0, 0x86, 0x00] };
+const kTolerance = 6;
+
+const flight = await startFlight({ build, domain });
+const chromium = await startBrowser();
+const { page, browser } = chromium;
+const state = () => page.evaluate(() => window.slsView.state());
+try {
+  await page.goto(flight.url);
+  await waitFor("a flight on the page", async () => (await state()).step > 250, 60_000);
+
+  await page.click("[data-action=pause]");
+  await waitFor("sim_ctl: paused", () => flight.status().phase === "paused");
+  await waitFor("page: paused", async () => (await state()).phase === "paused");
+  console.log("ok the pause button holds the real run");
+
+  const before = flight.status().step;
+  await page.$eval("#bar input[type=number]", (field) => (field.value = "7"));
+  await page.click("[data-action=step]");
+  await waitFor("seven steps", () => flight.status().step === before + 7);
+  console.log("ok the step button lets it go seven steps");
+
+  await page.click("[data-camera=side]");
+  await page.click("#fit");
+  // The picture is that of the newest step once nothing changes any more.
+  let last = -1;
+  await waitFor("the last frame", async () => {
+    const frames = await page.evaluate(() => window.slsView.frames());
+    const isLast = frames === last;
+    last = frames;
+    return isLast;
+  });
+  const [camera, pose] = await page.evaluate(() => [window.slsView.camera(), window.slsView.pose(0)]);
+  const png = await page.screenshot({ path: join(folder, "real_side.png") });
+  const scale = camera.area.height / camera.height_m;
+  for (const part of ["quad", "load"]) {
+    const pixel = [
+      camera.area.left + camera.area.width / 2 + (pose[part][0] - camera.target_m[0]) * scale,
+      camera.area.top + camera.area.height / 2 + (pose[part][2] - camera.target_m[2]) * scale,
+    ];
+    const [colour] = await readPixels(browser, png, [pixel]);
+    const isRight = colour.every((value, index) => Math.abs(value - kColours[part][index]) <= kTolerance);
+    assert.ok(isRight, `${part} at ${pixel}: expected ${kColours[part]}, got ${colour}`);
+  }
+  console.log("ok pixels of the real flight have the colours of quadrotor and load");
+
+  await page.click("[data-action=resume]");
+  await waitFor("sim_ctl: running", () => flight.status().phase === "running");
+  console.log("ok the resume button lets it go on");
+
+  await page.click("[data-camera=free]");
+  await flight.endViewer();
+  await waitFor("banner", () => page.$eval("#banner", ({ hidden }) => !hidden));
+  await flight.restartViewer();
+  const step = (await state()).step;
+  await waitFor("later steps", async () => (await state()).is_connected && (await state()).step > step);
+  await page.screenshot({ path: join(folder, "real.png") });
+  console.log("ok the page finds a viewer that was started again");
+
+  const unexpected = chromium.errors.filter((text) => !/WebSocket|ERR_CONNECTION/.test(text));
+  assert.deepEqual(unexpected, []);
+  for (const url of chromium.requests) assert.ok(url.startsWith(flight.url) || url.startsWith("data:"), `foreign request: ${url}`);
+  console.log("ok no error in the console, no request to another server");
+} finally {
+  await chromium.stop();
+  await flight.stop();
+}

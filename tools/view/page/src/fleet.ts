@@ -1,0 +1,285 @@
+/** All vehicles of one run: every part is one draw call, whatever their number. */
+import {
+  BackSide,
+  Color,
+  DoubleSide,
+  Group,
+  InstancedMesh,
+  Matrix4,
+  MeshBasicMaterial,
+  Quaternion,
+  Vector3,
+  type BufferGeometry,
+  type Camera,
+} from "three";
+import { kLoadColour, kReferenceColour, type Theme } from "./colours";
+import {
+  calcLoadRadius,
+  makeAirframe,
+  makeBallGeometry,
+  makeBladeGeometry,
+  makeDiscGeometry,
+  makeFrameGeometry,
+  makeReticleGeometry,
+  makeRodGeometry,
+  makeShadowGeometry,
+  type Airframe,
+} from "./parts";
+import { toScene, toSceneRotation } from "./frames";
+import type { Pose, Run, RunIndex, Vehicle } from "./types";
+
+const kNominalRate = 700; // rad/s, of rotors whose rate is unknown
+const kDrawnRate = 9; // rad/s at the nominal rate: faster ones seem to stand still on a screen
+const kLeastFramePixels = 9; // radius on the screen below which vehicles are drawn larger than they are
+const kLeastBladePixels = 16;
+const kLeastLoadPixels = 4.5;
+
+/** Where one vehicle is, in scene coordinates. */
+export interface Body {
+  readonly vehicle: Vehicle;
+  readonly airframe: Airframe;
+  readonly loadRadius: number;
+  readonly quad: Vector3;
+  readonly load: Vector3;
+  readonly reference: Vector3;
+  readonly rotation: Quaternion;
+  hasPose: boolean;
+  hasReference: boolean;
+  rotorRate: number;
+}
+
+class Part {
+  readonly mesh: InstancedMesh;
+
+  constructor(group: Group, geometry: BufferGeometry, material: MeshBasicMaterial, count: number, order = 0) {
+    this.mesh = new InstancedMesh(geometry, material, count);
+    this.mesh.frustumCulled = false;
+    this.mesh.renderOrder = order;
+    group.add(this.mesh);
+  }
+
+  set(index: number, matrix: Matrix4): void {
+    matrix.toArray(this.mesh.instanceMatrix.array, 16 * index);
+  }
+
+  commit(): void {
+    this.mesh.instanceMatrix.needsUpdate = true;
+  }
+
+  dispose(): void {
+    this.mesh.geometry.dispose();
+    (this.mesh.material as MeshBasicMaterial).dispose();
+    this.mesh.dispose();
+  }
+}
+
+export class Fleet {
+  readonly group = new Group();
+  readonly bodies: Body[];
+  private readonly places = new Map<number, number>();
+  private readonly frames: { part: Part; outline: Part; members: number[] }[] = [];
+  private readonly discs: Part;
+  private readonly blades: Part;
+  private readonly rods: Part;
+  private readonly loads: Part;
+  private readonly outlines: Part;
+  private readonly reticles: Part;
+  private readonly shadows: Part;
+  private readonly parts: Part[] = [];
+  private readonly themed: { material: MeshBasicMaterial; colour: keyof Theme }[] = [];
+  private spin = 0;
+  private simTime = NaN;
+
+  constructor(run: Run, index: RunIndex, theme: Theme, isMany: boolean) {
+    this.bodies = run.vehicles.map((vehicle) => ({
+      vehicle,
+      airframe: makeAirframe(vehicle),
+      loadRadius: calcLoadRadius(vehicle),
+      quad: new Vector3(),
+      load: new Vector3(),
+      reference: new Vector3(),
+      rotation: new Quaternion(),
+      hasPose: false,
+      hasReference: false,
+      rotorRate: NaN,
+    }));
+    this.bodies.forEach((body, place) => this.places.set(body.vehicle.id, place));
+    const opacity = index === 1 ? 0.38 : 1;
+    const count = this.bodies.length;
+    const rotors = this.bodies.reduce((sum, { airframe }) => sum + airframe.rotors.length, 0);
+
+    this.shadows = this.add(makeShadowGeometry(), count, 1, { colour: "outline", opacity: 0.22 * opacity });
+    for (const [key, members] of this.groupByAirframe()) {
+      const { airframe } = this.bodies[members[0]!]!;
+      const geometry = makeFrameGeometry(airframe);
+      const outline = this.add(geometry, members.length, 2, { colour: "outline", side: BackSide, opacity });
+      const part = this.add(geometry, members.length, 3, { opacity, vertexColors: true });
+      part.mesh.name = key;
+      this.frames.push({ part, outline, members });
+    }
+    this.rods = this.add(makeRodGeometry(), count, 3, { colour: "frame", opacity });
+    this.outlines = this.add(makeBallGeometry(), count, 3, { colour: "outline", side: BackSide, opacity });
+    this.loads = this.add(makeBallGeometry(), count, 4, { fixed: kLoadColour, opacity });
+    this.blades = this.add(makeBladeGeometry(), rotors, 5, { colour: "frame", side: DoubleSide, opacity: 0.85 * opacity });
+    this.discs = this.add(makeDiscGeometry(), rotors, 6, {
+      colour: "frame",
+      side: DoubleSide,
+      opacity: (isMany ? 0.3 : 0.16) * opacity,
+    });
+    this.reticles = this.add(makeReticleGeometry(), count, 7, { fixed: kReferenceColour, side: DoubleSide, opacity });
+    this.setTheme(theme);
+    this.group.visible = false;
+  }
+
+  find(vehicleId: number): Body | undefined {
+    const place = this.places.get(vehicleId);
+    return place === undefined ? undefined : this.bodies[place];
+  }
+
+  setTheme(theme: Theme): void {
+    for (const { material, colour } of this.themed) material.color.set(theme[colour] as string);
+  }
+
+  setPoses(simTime: number, poses: readonly Pose[]): void {
+    for (const pose of poses) {
+      const body = this.find(pose.vehicleId);
+      if (!body) continue;
+      toScene(pose.quad, body.quad);
+      toScene(pose.load, body.load);
+      toSceneRotation(pose.attitude, body.rotation);
+      body.hasReference = Number.isFinite(pose.reference[0]);
+      if (body.hasReference) toScene(pose.reference, body.reference);
+      body.hasPose = true;
+      body.rotorRate = pose.rotorRate;
+    }
+    const passed = simTime - this.simTime;
+    if (passed > 0) this.spin += Math.min(passed, 0.05) * kDrawnRate;
+    this.simTime = simTime;
+    this.group.visible = true;
+  }
+
+  /** How much larger than life vehicles are drawn, so that they can be seen from afar. */
+  calcScales(metresPerPixel: number): { frame: number; load: number } {
+    const radius = this.bodies[0]?.airframe.radius ?? 0.2;
+    const load = this.bodies[0]?.loadRadius ?? 0.05;
+    const frame = Math.max(1, (kLeastFramePixels * metresPerPixel) / radius);
+    return { frame, load: Math.max(1, (kLeastLoadPixels * metresPerPixel) / load) };
+  }
+
+  /** Sets every part to where the bodies are, as seen by `camera`. */
+  update(camera: Camera, metresPerPixel: number): void {
+    const scales = this.calcScales(metresPerPixel);
+    this.updateFrames(scales.frame, metresPerPixel);
+    this.updateRotors(scales.frame, metresPerPixel);
+    this.updateRods(metresPerPixel);
+    this.updateBalls(camera, scales.load, metresPerPixel);
+    for (const part of this.parts) part.commit();
+  }
+
+  dispose(): void {
+    for (const part of this.parts) part.dispose();
+    this.group.removeFromParent();
+  }
+
+  private groupByAirframe(): Map<string, number[]> {
+    const groups = new Map<string, number[]>();
+    this.bodies.forEach(({ airframe }, place) => groups.set(airframe.key, [...(groups.get(airframe.key) ?? []), place]));
+    return groups;
+  }
+
+  private add(
+    geometry: BufferGeometry,
+    count: number,
+    order: number,
+    look: { colour?: keyof Theme; fixed?: number; side?: typeof BackSide | typeof DoubleSide; opacity: number;
+            vertexColors?: boolean },
+  ): Part {
+    const material = new MeshBasicMaterial({
+      color: look.fixed ?? 0xffffff,
+      opacity: look.opacity,
+      transparent: look.opacity < 1,
+      depthWrite: look.opacity === 1,
+      vertexColors: look.vertexColors ?? false,
+      toneMapped: false,
+      ...(look.side !== undefined ? { side: look.side } : {}),
+    });
+    if (look.colour) this.themed.push({ material, colour: look.colour });
+    const part = new Part(this.group, geometry, material, count, order);
+    this.parts.push(part);
+    return part;
+  }
+
+  private updateFrames(scale: number, metresPerPixel: number): void {
+    for (const { part, outline, members } of this.frames) {
+      members.forEach((place, index) => {
+        const { quad, rotation, airframe, hasPose } = this.bodies[place]!;
+        const size = hasPose ? scale : 0;
+        part.set(index, compose(quad, rotation, size, size, size));
+        const grown = hasPose ? size * (1 + (1.3 * metresPerPixel) / (airframe.radius * size)) : 0;
+        outline.set(index, compose(quad, rotation, grown, grown, grown));
+      });
+    }
+  }
+
+  private updateRotors(scale: number, metresPerPixel: number): void {
+    let index = 0;
+    // From afar blades would be noise: then the discs alone are drawn.
+    const hasBlades = ((this.bodies[0]?.airframe.radius ?? 0) * scale) / metresPerPixel >= kLeastBladePixels;
+    for (const { quad, rotation, airframe, hasPose, rotorRate } of this.bodies) {
+      const speed = Number.isFinite(rotorRate) ? rotorRate / kNominalRate : 1;
+      const size = hasPose ? scale * airframe.rotorRadius : 0;
+      for (const { position_m, spin } of airframe.rotors) {
+        toScene(position_m, scratch.point);
+        scratch.point.z += 0.11 * airframe.radius; // on top of the motor
+        scratch.point.multiplyScalar(scale).applyQuaternion(rotation).add(quad);
+        // A positive sense is about the body's z axis, which points down.
+        scratch.turn.setFromAxisAngle(kUp, -spin * this.spin * Math.max(0.15, speed) + index).premultiply(rotation);
+        this.discs.set(index, compose(scratch.point, scratch.turn, size, size, size));
+        const blade = hasBlades ? size : 0;
+        this.blades.set(index, compose(scratch.point, scratch.turn, blade, blade, blade));
+        ++index;
+      }
+    }
+  }
+
+  private updateRods(metresPerPixel: number): void {
+    const radius = Math.max(0.008, 0.7 * metresPerPixel);
+    this.bodies.forEach(({ vehicle, quad, load, rotation, hasPose }, index) => {
+      toScene(vehicle.attachment_m, scratch.point).applyQuaternion(rotation).add(quad);
+      scratch.along.subVectors(load, scratch.point);
+      const length = scratch.along.length();
+      scratch.turn.setFromUnitVectors(kUp, length > 0 ? scratch.along.divideScalar(length) : kUp);
+      const size = hasPose ? radius : 0;
+      this.rods.set(index, compose(scratch.point, scratch.turn, size, size, hasPose ? length : 0));
+    });
+  }
+
+  private updateBalls(camera: Camera, scale: number, metresPerPixel: number): void {
+    this.bodies.forEach(({ load, reference, quad, loadRadius, airframe, hasPose, hasReference }, index) => {
+      const size = hasPose ? scale * loadRadius : 0;
+      this.loads.set(index, compose(load, kLevel, size, size, size));
+      const grown = hasPose ? size + 1.3 * metresPerPixel : 0;
+      this.outlines.set(index, compose(load, kLevel, grown, grown, grown));
+      const reticle = hasReference && hasPose ? size : 0;
+      this.reticles.set(index, compose(reference, camera.quaternion, reticle, reticle, reticle));
+      scratch.point.set(quad.x, quad.y, 0.004);
+      const shadow = hasPose ? airframe.radius * 1.1 : 0;
+      this.shadows.set(index, compose(scratch.point, kLevel, shadow, shadow, shadow));
+    });
+  }
+}
+
+const kUp = new Vector3(0, 0, 1);
+const kLevel = new Quaternion();
+const scratch = {
+  point: new Vector3(),
+  along: new Vector3(),
+  turn: new Quaternion(),
+  scale: new Vector3(),
+  matrix: new Matrix4(),
+  colour: new Color(),
+};
+
+function compose(position: Vector3, rotation: Quaternion, x: number, y: number, z: number): Matrix4 {
+  return scratch.matrix.compose(position, rotation, scratch.scale.set(x, y, z));
+}

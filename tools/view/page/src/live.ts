@@ -1,0 +1,268 @@
+/** The page on a flight: speaks subprotocol sls.view.1, connects again by itself. */
+import { OperatorBar } from "./operator";
+import {
+  addEvent, clearEvents, showBanner, showEmpty, showLink, showPhase, showRun, showStage, showStatus, showTime, type Latency,
+} from "./panels";
+import { readKind, readPoses, readRows, type Poses } from "./protocol";
+import { makeShell, type Shell } from "./shell";
+import type { FlightEvent, Hello, Mark, NoRun, Reply, Run, Status } from "./types";
+
+const kFirstWait = 250; // ms before the next try to connect
+const kMostWait = 4000;
+const kPanelTime = 250;
+const kMostLatencies = 1000;
+const kMostMarks = 300;
+
+type Message =
+  | ({ op: "hello" } & Hello)
+  | { op: "run"; run: Run }
+  | ({ op: "no_run" } & NoRun)
+  | ({ op: "status" } & Status)
+  | ({ op: "event" } & FlightEvent)
+  | ({ op: "reply" } & Reply);
+
+export function startLive(): void {
+  new Live(makeShell());
+}
+
+/** A token in the fragment never reaches a server; it leaves the address bar, too. */
+function takeToken(): string {
+  const token = new URLSearchParams(location.hash.slice(1)).get("token") ?? "";
+  if (token) history.replaceState(null, "", location.pathname + location.search);
+  return token;
+}
+
+class Live {
+  private socket: WebSocket | null = null;
+  private wait = kFirstWait;
+  private token = takeToken();
+  private hello: Hello | null = null;
+  private run: Run | null = null;
+  private status: Status | null = null;
+  private newest: Poses | null = null;
+  private drawnStep = -1;
+  private marks: Mark[] = [];
+  private readonly events = new Set<string>();
+  private readonly latencies: number[] = [];
+  private readonly bar: OperatorBar;
+  private readonly channel = new MessageChannel();
+  private readonly measured: number[] = [];
+
+  constructor(private readonly shell: Shell) {
+    this.bar = new OperatorBar(
+      (id, action, steps) => this.send({ op: "control", id, action, steps }),
+      (token) => {
+        this.token = token;
+        this.send({ op: "authenticate", token });
+      },
+    );
+    shell.onSelect((vehicleId) => {
+      if (this.run) shell.plots.setRun(this.run);
+      this.showMarks();
+      this.send({ op: "select", vehicle_id: vehicleId });
+    });
+    shell.scene?.onDrawn(() => this.noteFrame());
+    this.channel.port1.onmessage = () => this.noteDrawn();
+    clearEvents();
+    showPhase("connecting");
+    setInterval(() => this.showPanels(), kPanelTime);
+    addEventListener("online", () => this.retryNow());
+    this.exposeMeasurements();
+    this.connect();
+  }
+
+  private connect(): void {
+    const scheme = location.protocol === "https:" ? "wss" : "ws";
+    const socket = new WebSocket(`${scheme}://${location.host}/`, "sls.view.1");
+    socket.binaryType = "arraybuffer";
+    this.socket = socket;
+    socket.onopen = () => {
+      this.wait = kFirstWait;
+      showLink("open", "connected");
+      showBanner(null);
+      if (this.token) this.send({ op: "authenticate", token: this.token });
+      if (this.run) this.send({ op: "select", vehicle_id: this.shell.selected() });
+    };
+    socket.onmessage = ({ data }) => this.receive(data as string | ArrayBuffer);
+    socket.onclose = ({ reason }) => this.noteLost(socket, reason);
+  }
+
+  private noteLost(socket: WebSocket, reason: string): void {
+    if (socket !== this.socket) return;
+    this.socket = null;
+    showLink("lost", "not connected");
+    const why = reason ? ` (${reason})` : "";
+    const kept = this.run ? " The picture is the last one that came." : "";
+    showBanner(`Connection to sls_view lost${why}; trying again.${kept}`);
+    this.bar.setPhase(this.status?.phase ?? "", this.status?.step ?? 0, false);
+    setTimeout(() => this.retry(), this.wait * (0.8 + 0.4 * Math.random()));
+    this.wait = Math.min(kMostWait, 2 * this.wait);
+  }
+
+  private retry(): void {
+    if (this.socket === null) this.connect();
+  }
+
+  private retryNow(): void {
+    this.wait = kFirstWait;
+    this.retry();
+  }
+
+  private send(message: object): void {
+    if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(message));
+  }
+
+  private receive(data: string | ArrayBuffer): void {
+    if (typeof data === "string") return this.receiveText(JSON.parse(data) as Message);
+    const kind = readKind(data);
+    if (kind === 1) this.receivePoses(readPoses(data));
+    else if (kind === 2) this.receiveRows(data);
+  }
+
+  private receiveText(message: Message): void {
+    switch (message.op) {
+      case "hello":
+        this.hello = message;
+        this.bar.setHello(message);
+        break;
+      case "run":
+        this.setRun(message.run);
+        break;
+      case "no_run":
+        this.noteNoRun(message);
+        break;
+      case "status":
+        this.status = { ...message, phase: message.phase.toLowerCase() };
+        this.bar.setPhase(this.status.phase, this.status.step, true);
+        break;
+      case "event":
+        this.noteEvent(message);
+        break;
+      case "reply":
+        this.bar.showReply(message);
+        break;
+    }
+  }
+
+  private setRun(run: Run): void {
+    showRun(run);
+    if (this.run?.run_id === run.run_id) return; // the connection was lost and found
+    this.run = run;
+    this.status = null;
+    this.newest = null;
+    this.marks = [];
+    this.events.clear();
+    this.latencies.length = 0;
+    clearEvents();
+    showTime(NaN);
+    showPhase("waiting");
+    this.shell.setRun(run);
+    this.shell.scene?.resetTrails();
+  }
+
+  private noteNoRun(missing: NoRun): void {
+    if (this.run) {
+      // The last flight stays in the picture.
+      showBanner(`${missing.text} ${missing.command}`, "warn");
+      showPhase(this.status?.phase ?? "no flight");
+    } else {
+      showRun(null);
+      showPhase("no flight");
+      showEmpty(missing);
+    }
+    this.bar.setPhase("", 0, true);
+  }
+
+  private noteEvent(event: FlightEvent): void {
+    const key = `${event.run_id} ${event.step} ${event.text}`;
+    if (this.events.has(key)) return; // past events come again with every connection
+    this.events.add(key);
+    addEvent(event);
+    this.marks = [...this.marks.slice(1 - kMostMarks), { time: event.sim_time_s, text: event.text, kind: kindOf(event.text) }];
+    this.showMarks();
+  }
+
+  private showMarks(): void {
+    this.shell.plots.setMarks(this.marks);
+  }
+
+  private receivePoses(poses: Poses): void {
+    if (poses.runId !== this.run?.run_id) return;
+    this.newest = poses;
+    this.shell.setPoses(poses.step, poses.simTime, poses.poses);
+  }
+
+  private receiveRows(data: ArrayBuffer): void {
+    const rows = readRows(data);
+    if (rows.runId !== this.run?.run_id || rows.vehicleId !== this.shell.selected()) return;
+    this.shell.plots.append(rows);
+  }
+
+  /** What is after the frame's last work on this thread comes through a channel: layout and paint are counted. */
+  private noteFrame(): void {
+    if (!this.newest || this.newest.step === this.drawnStep) return;
+    this.drawnStep = this.newest.step;
+    showTime(this.newest.simTime);
+    this.measured.push(this.newest.publishedMs);
+    this.channel.port2.postMessage(0);
+  }
+
+  private noteDrawn(): void {
+    const now = performance.timeOrigin + performance.now();
+    for (const published of this.measured.splice(0)) this.latencies.push(now - published);
+    if (this.latencies.length > kMostLatencies) this.latencies.splice(0, this.latencies.length - kMostLatencies);
+  }
+
+  private calcLatency(): Latency {
+    const sorted = [...this.latencies].sort((a, b) => a - b);
+    const at = (part: number) => sorted[Math.min(sorted.length - 1, Math.floor(part * sorted.length))] ?? NaN;
+    return { p50: at(0.5), p99: at(0.99), count: sorted.length };
+  }
+
+  private showPanels(): void {
+    if (!this.status || document.hidden) return;
+    if (this.newest && !this.shell.scene) showTime(this.newest.simTime);
+    else if (!this.newest) showTime(this.status.sim_time_s);
+    const stages = this.run?.stages ?? [];
+    const stage = this.status.stage || (stages.length === 1 ? stages[0]! : "");
+    showStage(stage, stages.indexOf(stage), stages.length);
+    showStatus(this.status, this.run, this.calcLatency(), this.shell.scene?.fps() ?? 0);
+  }
+
+  /** For tests and benchmarks. */
+  private exposeMeasurements(): void {
+    const { scene } = this.shell;
+    Object.assign(window, {
+      slsView: {
+        latency: () => this.calcLatency(),
+        resetLatency: () => void (this.latencies.length = 0),
+        fps: () => scene?.fps() ?? 0,
+        redraw: () => scene?.invalidate(),
+        frames: () => scene?.frames() ?? 0,
+        projection: (vehicleId: number) => scene?.projection(vehicleId) ?? null,
+        camera: () => scene?.camera() ?? null,
+        state: () => ({
+          is_connected: this.socket?.readyState === WebSocket.OPEN,
+          run_id: this.run?.run_id ?? null,
+          phase: this.status?.phase ?? null,
+          step: this.newest?.step ?? null,
+          sim_time_s: this.newest?.simTime ?? null,
+          selected: this.shell.selected(),
+          may_operate: this.hello?.may_operate ?? null,
+          events: this.events.size,
+          has_scene: scene !== null,
+        }),
+        /** Positions of the newest step, frame W. */
+        pose: (vehicleId: number) => {
+          const pose = this.newest?.poses.find((candidate) => candidate.vehicleId === vehicleId);
+          return pose ? { quad: [...Array.from(pose.quad)], load: [...Array.from(pose.load)] } : null;
+        },
+      },
+    });
+  }
+}
+
+function kindOf(text: string): Mark["kind"] {
+  if (/fault/i.test(text)) return "fault";
+  return /stage/i.test(text) ? "stage" : "event";
+}

@@ -1,0 +1,257 @@
+/** A recording as sls_view packs it (tools/view/replay/README.md): parsed with care, and asked for poses at any time. */
+import { AnswerKind, Columns, type Pose, type Rows, type Run } from "../types";
+
+export interface RecordedEvent {
+  step: number;
+  sim_time_s: number;
+  text: string;
+}
+
+export interface RecordedFault {
+  from_s: number;
+  to_s: number;
+  kind: string;
+  /** state or command; empty where it is no fault of the scenario. */
+  on: string;
+  vehicle: number;
+}
+
+export interface RecordedStage {
+  vehicle: number;
+  sim_time_s: number;
+  name: string;
+}
+
+interface Head {
+  run: Run;
+  name: string;
+  complete: boolean;
+  outcome: string;
+  every: number;
+  steps_total: number;
+  events: RecordedEvent[];
+  faults: RecordedFault[];
+  stage_starts: RecordedStage[];
+  vehicles: { id: number; rows: number }[];
+}
+
+const kMagic = "SLSVIEW1";
+const kMostColumns = 256;
+const kMostVehicles = 256;
+
+function expect(condition: boolean, what: string): asserts condition {
+  if (!condition) throw new Error(`expected ${what}`);
+}
+
+const isNumber = (value: unknown): value is number => typeof value === "number" && Number.isFinite(value);
+const isCount = (value: unknown): value is number => isNumber(value) && Number.isInteger(value) && value >= 0;
+
+function checkHead(value: unknown): Head {
+  expect(typeof value === "object" && value !== null, "a JSON object at the beginning");
+  const head = value as Head;
+  const { run } = head;
+  expect(typeof run === "object" && run !== null, "'run'");
+  expect(Array.isArray(run.columns) && run.columns.length <= kMostColumns, `at most ${kMostColumns} columns`);
+  expect(run.columns.every((column) => typeof column?.name === "string"), "columns with names");
+  expect(Array.isArray(run.vehicles) && Array.isArray(run.stages) && Array.isArray(run.path_m), "a run with vehicles");
+  expect(isNumber(run.period_s) && run.period_s > 0, "a period above 0");
+  expect(isCount(head.every) && head.every > 0, "'every' above 0");
+  expect(Array.isArray(head.vehicles) && head.vehicles.length <= kMostVehicles, `at most ${kMostVehicles} vehicles`);
+  expect(head.vehicles.every((vehicle) => isCount(vehicle?.id) && isCount(vehicle?.rows)), "vehicles with rows");
+  return {
+    ...head,
+    name: String(head.name ?? "recording"),
+    outcome: String(head.outcome ?? ""),
+    complete: head.complete === true,
+    events: keepGood(head.events, (event) => isNumber(event.sim_time_s) && typeof event.text === "string"),
+    faults: keepGood(head.faults, (fault) => isNumber(fault.from_s) && isNumber(fault.to_s)),
+    stage_starts: keepGood(head.stage_starts, (stage) => isNumber(stage.sim_time_s)),
+  };
+}
+
+function keepGood<Item extends object>(list: Item[] | undefined, isGood: (item: Item) => boolean): Item[] {
+  return Array.isArray(list) ? list.filter((item) => typeof item === "object" && item !== null && isGood(item)) : [];
+}
+
+/** @throws Error saying what is wrong with the bytes. */
+export function parseRecording(bytes: ArrayBuffer): Recording {
+  expect(bytes.byteLength >= 12, `a recording, got ${bytes.byteLength} bytes`);
+  const text = new TextDecoder();
+  const magic = text.decode(new Uint8Array(bytes, 0, 8));
+  expect(magic === kMagic, `the first bytes ${kMagic}, got another format`);
+  const length = new DataView(bytes).getUint32(8, true);
+  expect(12 + length <= bytes.byteLength, `${length} bytes of JSON, got ${bytes.byteLength - 12}`);
+  const head = checkHead(JSON.parse(text.decode(new Uint8Array(bytes, 12, length))));
+  const columns = head.run.columns.length;
+  const rows = new Map<number, Rows>();
+  let at = 12 + length;
+  for (const { id, rows: count } of head.vehicles) {
+    const size = count * (8 + 4 * columns);
+    expect(at + size <= bytes.byteLength, `${size} bytes of vehicle ${id}, got ${bytes.byteLength - at}`);
+    // Copied: times of a second vehicle may begin at any multiple of 4.
+    const time = new Float64Array(bytes.slice(at, at + 8 * count));
+    const values = new Float32Array(bytes.slice(at + 8 * count, at + size));
+    expect(isAscending(time), `ascending times of vehicle ${id}`);
+    rows.set(id, { vehicleId: id, time, values, columns });
+    at += size;
+  }
+  expect(at === bytes.byteLength, `${at} bytes, got ${bytes.byteLength}`);
+  return new Recording(head, rows);
+}
+
+function isAscending(time: Float64Array): boolean {
+  for (let i = 0; i < time.length; ++i) if (!(time[i]! > (i ? time[i - 1]! : -1))) return false;
+  return true;
+}
+
+export class Recording {
+  readonly run: Run;
+  readonly columns: Columns;
+  readonly vehicleIds: number[];
+  /** Simulated time of the first and last row, s. */
+  readonly from: number;
+  readonly to: number;
+  /** Time between two kept rows, s. */
+  readonly spacing: number;
+  private readonly places: Record<"quad" | "quadV" | "load" | "loadV" | "attitude" | "reference", number>;
+  private readonly rotors: number[];
+
+  constructor(
+    readonly head: Head,
+    private readonly rows: ReadonlyMap<number, Rows>,
+  ) {
+    this.run = head.run;
+    this.columns = new Columns(head.run.columns);
+    this.vehicleIds = [...rows.keys()].filter((id) => rows.get(id)!.time.length > 0);
+    expect(this.vehicleIds.length > 0, "rows of at least one vehicle");
+    const all = this.vehicleIds.map((id) => rows.get(id)!.time);
+    this.from = Math.min(...all.map((time) => time[0]!));
+    this.to = Math.max(...all.map((time) => time[time.length - 1]!));
+    this.spacing = head.every * head.run.period_s;
+    const find = (name: string) => {
+      const place = this.columns.find(name);
+      expect(place >= 0, `a column ${name}`);
+      return place;
+    };
+    this.places = {
+      quad: find("quad_x_m"),
+      quadV: find("quad_vx_m_s"),
+      load: find("load_x_m"),
+      loadV: find("load_vx_m_s"),
+      attitude: find("att_w"),
+      reference: find("ref_x_m"),
+    };
+    this.rotors = head.run.columns.flatMap(({ name }, place) => (/^rotor_\d+_rad_s$/.test(name) ? [place] : []));
+  }
+
+  rowsOf(vehicleId: number): Rows | undefined {
+    return this.rows.get(vehicleId);
+  }
+
+  /** The rows of a vehicle with the columns of another recording; NaN where this one has none. */
+  rowsAs(columns: Columns, vehicleId: number): Rows | undefined {
+    const rows = this.rows.get(vehicleId);
+    const isSame = columns.count === this.columns.count &&
+      columns.list.every(({ name }, place) => this.columns.find(name) === place);
+    if (!rows || isSame) return rows;
+    const places = columns.list.map(({ name }) => this.columns.find(name));
+    const values = new Float32Array(rows.time.length * columns.count).fill(NaN);
+    for (let row = 0; row < rows.time.length; ++row)
+      places.forEach((place, column) => {
+        if (place >= 0) values[row * columns.count + column] = rows.values[row * rows.columns + place]!;
+      });
+    return { vehicleId, time: rows.time, values, columns: columns.count };
+  }
+
+  /** Poses of all vehicles that have rows around `time`; of those before their first or after their last row, that. */
+  posesAt(time: number): Pose[] {
+    return this.vehicleIds.map((id) => this.poseAt(id, time));
+  }
+
+  poseAt(vehicleId: number, time: number): Pose {
+    const rows = this.rows.get(vehicleId)!;
+    const before = findRow(rows.time, time);
+    const after = Math.min(before + 1, rows.time.length - 1);
+    const span = rows.time[after]! - rows.time[before]!;
+    // Between rows further apart than usual some are missing: the vehicle stays where it was.
+    const isGap = span > 1.5 * this.spacing + 1e-9;
+    const u = span > 0 && !isGap ? Math.min(1, Math.max(0, (time - rows.time[before]!) / span)) : 0;
+    const [a, b] = [before * rows.columns, after * rows.columns];
+    const { quad, quadV, load, loadV, attitude, reference } = this.places;
+    const { values } = rows;
+    return {
+      vehicleId,
+      kind: this.findKind(vehicleId, time),
+      quad: calcBetween(values, a, b, quad, quadV, u, span),
+      load: calcBetween(values, a, b, load, loadV, u, span),
+      attitude: calcAttitude(values.subarray(a + attitude, a + attitude + 4), values.subarray(b + attitude, b + attitude + 4), u),
+      reference: [0, 1, 2].map((axis) => mix(values[a + reference + axis]!, values[b + reference + axis]!, u)),
+      rotorRate: this.calcRotorRate(values, a),
+    };
+  }
+
+  /** Name of the stage that the vehicle flies at `time`. */
+  stageAt(vehicleId: number, time: number): string {
+    let name = "";
+    for (const stage of this.head.stage_starts)
+      if (stage.vehicle === vehicleId && stage.sim_time_s <= time + 1e-9) name = stage.name;
+    return name;
+  }
+
+  private calcRotorRate(values: Float32Array, row: number): number {
+    if (this.rotors.length === 0) return NaN;
+    return this.rotors.reduce((sum, place) => sum + values[row + place]!, 0) / this.rotors.length;
+  }
+
+  private findKind(vehicleId: number, time: number): AnswerKind {
+    for (const { vehicle, on, kind, from_s, to_s } of this.head.faults)
+      if (!on && vehicle === vehicleId && from_s <= time && time < to_s)
+        return kind === "held" ? AnswerKind.Held : kind === "fail_safe" ? AnswerKind.FailSafe : AnswerKind.Refused;
+    return AnswerKind.Accepted;
+  }
+}
+
+/** Index of the last row that is not after `time`; 0 where all are. */
+export function findRow(times: Float64Array, time: number): number {
+  let [low, high] = [0, times.length - 1];
+  while (low < high) {
+    const middle = Math.ceil((low + high) / 2);
+    if (times[middle]! <= time + 1e-9) low = middle;
+    else high = middle - 1;
+  }
+  return low;
+}
+
+export function distance(a: ArrayLike<number>, b: ArrayLike<number>): number {
+  return Math.hypot(a[0]! - b[0]!, a[1]! - b[1]!, a[2]! - b[2]!);
+}
+
+const mix = (a: number, b: number, u: number) => (u === 0 || !Number.isFinite(b) ? a : a + (b - a) * u);
+
+/** Cubic through both positions with both velocities: what lies between two kept steps. */
+function calcBetween(
+  values: Float32Array, a: number, b: number, position: number, velocity: number, u: number, span: number,
+): number[] {
+  return [0, 1, 2].map((axis) => {
+    const [p, q] = [values[a + position + axis]!, values[b + position + axis]!];
+    const [v, w] = [values[a + velocity + axis]! * span, values[b + velocity + axis]! * span];
+    if (u === 0) return p;
+    if (!Number.isFinite(v + w)) return mix(p, q, u);
+    const r = 1 - u;
+    return p * r * r * (1 + 2 * u) + v * u * r * r + q * u * u * (3 - 2 * u) - w * u * u * r;
+  });
+}
+
+/** Between two attitudes w, x, y, z along the shorter way; level where there are none. */
+function calcAttitude(a: ArrayLike<number>, b: ArrayLike<number>, u: number): number[] {
+  const from = Array.from(a);
+  const to = Array.from(b);
+  if (!from.every(Number.isFinite)) return [1, 0, 0, 0];
+  if (u === 0 || !to.every(Number.isFinite)) return from;
+  const dot = from.reduce((sum, value, i) => sum + value * to[i]!, 0);
+  const sign = dot < 0 ? -1 : 1;
+  const angle = Math.acos(Math.min(1, Math.abs(dot)));
+  const sine = Math.sin(angle);
+  const [s, t] = sine < 1e-6 ? [1 - u, u] : [Math.sin((1 - u) * angle) / sine, Math.sin(u * angle) / sine];
+  return from.map((value, i) => s * value + t * sign * to[i]!);
+}

@@ -1,0 +1,61 @@
+/** Which quantities are plotted, and how they follow from a row. */
+import { Columns, type Run } from "./types";
+
+const kDegrees = 180 / Math.PI;
+
+export interface Series {
+  label: string;
+  calc: (row: Float32Array) => number;
+}
+
+export interface PlotDescription {
+  key: string;
+  title: string;
+  unit: string;
+  series: Series[];
+}
+
+/** Roll, pitch and yaw in radians of the attitude w, x, y, z: turns about z, then y, then x. */
+export function calcEuler(w: number, x: number, y: number, z: number): [number, number, number] {
+  return [
+    Math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
+    Math.asin(Math.max(-1, Math.min(1, 2 * (w * y - z * x)))),
+    Math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)),
+  ];
+}
+
+/** The plots of a run; those for which it has no columns are left out. */
+export function describePlots(run: Run): PlotDescription[] {
+  const columns = new Columns(run.columns);
+  const plots: PlotDescription[] = [];
+  const plain = (name: string, label: string, factor = 1): Series[] => {
+    const place = columns.find(name);
+    return place < 0 ? [] : [{ label, calc: (row) => row[place]! * factor }];
+  };
+  const add = (key: string, title: string, unit: string, series: Series[]) => {
+    if (series.length > 0) plots.push({ key, title, unit, series });
+  };
+
+  const error = ["x", "y", "z"].flatMap((axis) => {
+    const [load, reference] = [columns.find(`load_${axis}_m`), columns.find(`ref_${axis}_m`)];
+    return load < 0 || reference < 0 ? [] : [{ label: axis, calc: (row: Float32Array) => row[load]! - row[reference]! }];
+  });
+  add("error", "Tracking error", "m", error);
+  add("rod", "Rod angles", "°", [...plain("alpha_rad", "α", kDegrees), ...plain("beta_rad", "β", kDegrees)]);
+  add("force", "Force", "N", ["x", "y", "z"].flatMap((axis) => plain(`force_${axis}_n`, axis)));
+  if (run.has_attitude) {
+    const places = ["w", "x", "y", "z"].map((axis) => columns.find(`att_${axis}`));
+    if (places.every((place) => place >= 0)) {
+      const [w, x, y, z] = places as [number, number, number, number];
+      const angles = ["roll", "pitch", "yaw"].map((label, index) => ({
+        label,
+        calc: (row: Float32Array) => calcEuler(row[w]!, row[x]!, row[y]!, row[z]!)[index]! * kDegrees,
+      }));
+      add("attitude", "Attitude", "°", angles);
+    }
+  }
+  const rotors = run.columns.filter(({ name }) => /^rotor_\d+_rad_s$/.test(name));
+  add("rotors", "Rotors", "rad/s", rotors.slice(0, 8).flatMap(({ name }) => plain(name, name.split("_")[1]!)));
+  add("speed", "Load velocity", "m/s", ["x", "y", "z"].flatMap((axis) => plain(`load_v${axis}_m_s`, axis)));
+  return plots;
+}

@@ -1,0 +1,186 @@
+/** What the page knows of a flight. Everything is in frame W (z down), SI units and radians, until frames.ts turns it for drawing. */
+
+/** What became of a step's answer: AnswerKind of idl/sls.idl. */
+export enum AnswerKind {
+  None,
+  Accepted,
+  Held,
+  FailSafe,
+  Refused,
+  Late,
+}
+
+export type Vector3 = readonly [number, number, number];
+
+export interface Rotor {
+  /** In the body frame (z down), from the centre of mass. */
+  position_m: Vector3;
+  /** +1 or −1: sense of rotation. */
+  spin: number;
+}
+
+export interface Vehicle {
+  id: number;
+  quad_mass_kg: number;
+  load_mass_kg: number;
+  rod_length_m: number;
+  /** Where the rod begins, in the body frame. */
+  attachment_m: Vector3;
+  rotors: Rotor[];
+  /** True of a point mass: it has no rotors, the page draws some. */
+  is_drawn_only?: boolean;
+}
+
+export interface Column {
+  name: string;
+  unit: string;
+}
+
+/** What is flown: describe_run of tools/view/run_description.hpp. */
+export interface Run {
+  /** 16 hex digits. */
+  run_id: string;
+  scenario: string;
+  mode: string;
+  period_s: number;
+  /** Wanted; 0 in lockstep. */
+  real_time_factor: number;
+  has_attitude: boolean;
+  vehicles: Vehicle[];
+  /** kColumns, then the plant's signals. */
+  columns: Column[];
+  stages: string[];
+  /** Planned path of the load of vehicle 0. */
+  path_m: Vector3[];
+}
+
+/** Where the columns of rows are. */
+export class Columns {
+  readonly count: number;
+  private readonly places = new Map<string, number>();
+
+  constructor(readonly list: readonly Column[]) {
+    this.count = list.length;
+    list.forEach((column, index) => this.places.set(column.name, index));
+  }
+
+  /** Index of the column, or −1. */
+  find(name: string): number {
+    return this.places.get(name) ?? -1;
+  }
+}
+
+/** One vehicle at one step. Whoever keeps one copies it: the arrays may be used again for the next step. */
+export interface Pose {
+  vehicleId: number;
+  kind: AnswerKind;
+  /** Position of the quadrotor, m. */
+  quad: ArrayLike<number>;
+  /** w, x, y, z. */
+  attitude: ArrayLike<number>;
+  load: ArrayLike<number>;
+  /** Desired position of the load; NaN where there is none. */
+  reference: ArrayLike<number>;
+  /** Mean, rad/s; NaN where there is none. */
+  rotorRate: number;
+}
+
+/** Where a vehicle has been: x, y, z of each point one after another, as many points in both. */
+export interface Trail {
+  quad: ArrayLike<number>;
+  load: ArrayLike<number>;
+}
+
+/** Consecutive rows of one vehicle; `values` holds `time.length` × `columns` numbers, row by row. */
+export interface Rows {
+  vehicleId: number;
+  /** Simulated time, s, ascending. */
+  time: Float64Array;
+  values: Float32Array;
+  columns: number;
+}
+
+export interface Participant {
+  role: string;
+  name: string;
+  host: string;
+  vehicle_ids: number[];
+  ready: boolean;
+  done: boolean;
+  /** Recorder: all rows up to here are in; −1: none. */
+  last_complete_step: number;
+}
+
+/** Message "status" of the protocol. */
+export interface Status {
+  run_id: string;
+  /** waiting, running, paused, finished, failed, reset */
+  phase: string;
+  reason: string;
+  step: number;
+  sim_time_s: number;
+  controller: string;
+  real_time_factor: number;
+  round_trip_p50_us: number;
+  round_trip_p99_us: number;
+  timing: string;
+  problem: string;
+  counters: Record<string, number>;
+  is_silent: boolean;
+  silence_s: number;
+  waiting_for: string | string[];
+  participants: Participant[];
+  /** Stage that the vehicle of the lowest id flies; empty before the first answer. */
+  stage: string;
+}
+
+export interface FlightEvent {
+  run_id: string;
+  step: number;
+  sim_time_s: number;
+  text: string;
+}
+
+/** A place in time that plots and slider show. */
+export interface Mark {
+  time: number;
+  text: string;
+  kind: "event" | "fault" | "stage";
+}
+
+export interface Hello {
+  version: string;
+  domain: number;
+  vehicle_id: number;
+  may_operate: boolean;
+  why_not: string;
+  needs_token: boolean;
+}
+
+export interface Reply {
+  id: number;
+  action: string;
+  accepted: boolean;
+  reason: string;
+  step: number;
+}
+
+export interface NoRun {
+  text: string;
+  command: string;
+}
+
+export type Action = "start" | "pause" | "step" | "resume" | "reset" | "stop";
+
+/** `free`: the camera stays where it was put; `follow`: goes with the selected vehicle. */
+export type CameraMode = "free" | "follow" | "top" | "side";
+
+/** 0: the flight or recording; 1: a second recording laid over it, drawn translucent. */
+export type RunIndex = 0 | 1;
+
+/** The data block `sls-mode` of the page: what the page is there for. */
+export interface PageMode {
+  mode: "live" | "replay" | "embedded";
+  /** Addresses, or `#id` of data blocks. */
+  recordings?: string[];
+}
