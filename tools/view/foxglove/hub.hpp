@@ -1,0 +1,122 @@
+/// What all sessions of the protocol share: the channels, who subscribes to them, and the work done
+/// once for each sample however many look on.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "tools/view/foxglove/flight_source.hpp"
+#include "tools/view/foxglove/messages.hpp"
+#include "tools/view/foxglove/mirror_source.hpp"
+
+namespace sls::view::foxglove {
+
+/// The text of idl/sls.idl: the schema of every sls/… channel.
+extern const char* const kContractText;
+
+/// A session as the hub sees it.
+class Client {
+ public:
+  virtual ~Client() = default;
+  virtual Connection& connection() = 0;
+  virtual bool may_call() const = 0;
+  /// The hub ended this subscription: its channel is gone.
+  virtual void forget(std::uint32_t subscription_id) = 0;
+};
+
+class Hub final : public Feed::Listener {
+ public:
+  using Clock = std::function<std::chrono::steady_clock::time_point()>;
+
+  /// `source` must outlive the hub.
+  explicit Hub(std::unique_ptr<FlightSource> source, Clock clock = std::chrono::steady_clock::now);
+
+  /// Tells a new client server, channels, time and what has happened.
+  void add(Client& client);
+  void remove(Client& client);
+  /// Begins to send; latched topics at once. Nothing, or what is wrong in words.
+  std::optional<std::string> subscribe(Client& client, const Subscribe::Item& item);
+  /// False where there is no such subscription.
+  bool unsubscribe(Client& client, std::uint32_t subscription_id);
+
+  FlightSource& source() { return *source_; }
+
+  void note(const Sample& sample) override;
+  void note(const RunView* run) override;
+  void note_event(std::uint64_t run_id, std::uint64_t step, const std::string& text) override;
+
+ private:
+  struct Subscriber {
+    Client* client;
+    std::uint32_t subscription_id;
+  };
+  struct Kept {
+    std::int64_t time_ns;
+    std::vector<std::uint8_t> cdr;
+  };
+  struct OpenChannel {
+    Channel channel;
+    std::optional<TopicId> topic;  ///< nothing: a mirror
+    bool is_latched = false;
+    std::vector<Subscriber> subscribers;
+    std::vector<Kept> kept;  ///< messages of a latched mirror
+  };
+  using Time = std::chrono::steady_clock::time_point;
+
+  OpenChannel& open_channel(Channel channel);
+  void add_native_channels();
+  void greet(Client& client);
+  void begin_run(const RunView& run);
+  std::vector<std::uint32_t> close_vanished_mirrors(const std::vector<ros::Channel>& wanted);
+  std::vector<const Channel*> open_mirrors(const std::vector<ros::Channel>& wanted);
+  void close_subscriptions(OpenChannel& channel);
+  void note_wanted(const OpenChannel& channel, bool is_wanted);
+  void send_kept(const OpenChannel& channel, const Subscriber& subscriber);
+  void broadcast(const OpenChannel& channel, std::int64_t time_ns,
+                 const std::vector<std::uint8_t>& cdr);
+  void emit_mirrors(const Sample& sample);
+  void emit_static_mirrors();
+  std::int64_t find_time(const Sample& sample);
+  void advance(std::int64_t time_ns);
+  void say(StatusLevel level, const std::string& text);
+  void say_dropped();
+  void note_silence(const RunView& run);
+  std::string session_id() const;
+
+  std::unique_ptr<FlightSource> source_;
+  const Clock clock_;
+  std::map<std::uint32_t, OpenChannel> channels_;  // by id
+  std::vector<OpenChannel*> natives_;              // by TopicId
+  std::vector<OpenChannel*> mirrors_;              // as MirrorSource::channels
+  Payload advertisement_;                          // of all channels; null: to be made
+  std::uint32_t next_channel_id_ = 1;
+  std::size_t subscribed_mirrors_ = 0;
+
+  std::optional<std::uint64_t> run_id_;
+  bus::PeerId server_;
+  std::int64_t period_ns_ = 0;
+  std::optional<MirrorSource> mirror_source_;
+  std::int64_t now_ns_ = 0;  // newest simulation time of the run
+  bool has_time_ = false;
+  Time time_sent_{};
+  bool has_left_ = false;  // the server of the run
+  bool is_silent_ = false;
+  std::string problem_;
+  std::deque<Payload> events_;  // for those who come late
+
+  struct Seen {
+    std::uint64_t dropped = 0;
+    Time said{};
+  };
+  std::map<Client*, Seen> clients_;
+};
+
+}  // namespace sls::view::foxglove

@@ -1,0 +1,44 @@
+/// The mirrors of common/ros from batches of sls/record, thinned for people who look on.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <vector>
+
+#include "common/bus/topics.hpp"
+#include "common/ros/mirrors.hpp"
+
+namespace sls::view::foxglove {
+
+class MirrorSource {
+ public:
+  using Time = std::chrono::steady_clock::time_point;
+
+  /// Of vehicles by ascending id; steps are `period_ns` apart.
+  MirrorSource(const std::vector<std::uint32_t>& vehicle_ids, std::int64_t period_ns);
+
+  const std::vector<ros::Channel>& channels() const { return mirrors_.channels(); }
+  /// To be called first.
+  void emit_static(const ros::Mirrors::Emit& emit) { mirrors_.emit_static(emit); }
+
+  /// True where some vehicle's next sample is due: each gets at most 100 a second of wall time, a
+  /// batch that comes late at most 4 at once. So most batches of a fast flight need no decoding.
+  bool is_due(Time now) const;
+  /// Emits the due ones of `batch`, evenly spaced, the newest always among them.
+  void note(const RecordBatch& batch, Time now, const ros::Mirrors::Emit& emit);
+
+ private:
+  struct Vehicle {
+    Time paid_until{};  ///< samples up to this time have been emitted
+    std::uint64_t next_step = 0;
+  };
+
+  void emit(const RecordEntry& entry, const ros::Mirrors::Emit& emit);
+
+  const std::int64_t period_ns_;
+  ros::Mirrors mirrors_;
+  std::map<std::uint32_t, Vehicle> vehicles_;
+};
+
+}  // namespace sls::view::foxglove

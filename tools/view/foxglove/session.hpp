@@ -1,0 +1,54 @@
+/// One client of the Foxglove protocol.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+
+#include "tools/view/foxglove/hub.hpp"
+
+namespace sls::view::foxglove {
+
+struct Service;
+
+/// Answers what a client asks; what is wrong is answered in words, and after kMostErrors of them
+/// the connection is closed (1008).
+class FoxgloveSession final : public Session, public Client {
+ public:
+  static constexpr int kMostErrors = 32;
+
+  /// `connection` must outlive the session.
+  FoxgloveSession(std::shared_ptr<Hub> hub, Connection& connection);
+  ~FoxgloveSession() override;
+  FoxgloveSession(const FoxgloveSession&) = delete;
+  FoxgloveSession& operator=(const FoxgloveSession&) = delete;
+
+  void receive(MessageKind kind, std::string_view message) override;
+
+  Connection& connection() override { return connection_; }
+  bool may_call() const override;
+  void forget(std::uint32_t subscription_id) override;
+
+ private:
+  void receive_text(std::string_view message);
+  void receive_binary(std::string_view message);
+  void unsubscribe(std::uint32_t subscription_id);
+  void call(const ServiceCall& call);
+  void answer(const Service& service, std::uint32_t call_id, const OperatorReply& reply);
+  void fail(const ServiceCall& call, const std::string& text);
+  void note_error(const std::string& text);
+  void send_text(Payload text);
+
+  const std::shared_ptr<Hub> hub_;
+  Connection& connection_;
+  std::set<std::uint32_t> forgotten_;  // of channels that are gone: the client may not know yet
+  int errors_ = 0;
+  /// Replies of requests may come after the session has gone: they hold it weakly.
+  const std::shared_ptr<FoxgloveSession*> self_ = std::make_shared<FoxgloveSession*>(this);
+};
+
+}  // namespace sls::view::foxglove
