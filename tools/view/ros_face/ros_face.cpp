@@ -1,0 +1,127 @@
+#include "tools/view/ros_face/ros_face.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <chrono>
+#include <condition_variable>
+#include <deque>
+#include <exception>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <utility>
+
+#include "common/bus/participants.hpp"
+#include "tools/view/ros_face/newest_samples.hpp"
+#include "tools/view/ros_face/publications.hpp"
+
+namespace sls::view {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// Between two messages of a vehicle, whatever the speed of the flight.
+constexpr auto kPeriod = std::chrono::milliseconds(10);
+
+/// Batches that wait to be decoded; beyond, the oldest are dropped. Several steps of 256 vehicles.
+constexpr std::size_t kMostBatches = 256;
+
+}  // namespace
+
+struct RosFace::Impl : Feed::Listener {
+  Impl(bus::Node& node, Feed& source) : feed(source), publications(node) {
+    feed.add(*this);
+    feed.want(TopicId::kRecord);
+    thread = std::thread([this] { work(); });
+  }
+
+  ~Impl() override {
+    feed.unwant(TopicId::kRecord);
+    feed.remove(*this);
+    {
+      const std::lock_guard lock(mutex);
+      is_ending = true;
+    }
+    changed.notify_one();
+    thread.join();
+  }
+
+  // --- on the server's thread ---
+
+  void note(const Sample& sample) override {
+    if (sample.topic != TopicId::kRecord) return;
+    {
+      const std::lock_guard lock(mutex);
+      if (batches.size() == kMostBatches) batches.pop_front();
+      batches.push_back(sample.cdr);
+    }
+    changed.notify_one();
+  }
+
+  void note(const RunView* view) override {
+    if (!view || view->run.parameters.run_id() == run_id) return;
+    run_id = view->run.parameters.run_id();
+    {
+      const std::lock_guard lock(mutex);
+      new_run = view->run.parameters;
+    }
+    changed.notify_one();
+  }
+
+  // --- on our own: writers take their time, and the browsers shall not wait for them ---
+
+  void work() {
+    try {
+      while (wait_for_news()) {
+        const auto next = Clock::now() + kPeriod;
+        publish();
+        wait_until(next);
+      }
+    } catch (const std::exception& error) {
+      spdlog::error("ROS topics end: {}", error.what());
+    }
+  }
+
+  bool wait_for_news() {
+    std::unique_lock lock(mutex);
+    changed.wait(lock, [this] { return is_ending || new_run || !batches.empty(); });
+    return !is_ending;
+  }
+
+  void wait_until(Clock::time_point time) {
+    std::unique_lock lock(mutex);
+    changed.wait_until(lock, time, [this] { return is_ending; });
+  }
+
+  void publish() {
+    std::optional<Parameters> run;
+    std::deque<Bytes> news;
+    {
+      const std::lock_guard lock(mutex);
+      run = std::exchange(new_run, std::nullopt);
+      news = std::exchange(batches, {});
+    }
+    if (run) {
+      publications.begin(bus::list_vehicle_ids(*run));
+      newest.emplace(*run);
+    }
+    if (!newest || !publications.has_readers()) return;
+    for (const ros::VehicleSample& sample : newest->take(news)) publications.publish(sample);
+  }
+
+  Feed& feed;
+  std::uint64_t run_id = 0;             // of the server's thread
+  Publications publications;            // of our own, once it runs
+  std::optional<NewestSamples> newest;  // likewise
+  std::mutex mutex;                     // over what follows
+  std::condition_variable changed;
+  bool is_ending = false;
+  std::optional<Parameters> new_run;  // whose vehicles have no writers yet
+  std::deque<Bytes> batches;
+  std::thread thread;
+};
+
+RosFace::RosFace(bus::Node& node, Feed& feed) : impl_(std::make_unique<Impl>(node, feed)) {}
+RosFace::~RosFace() = default;
+
+}  // namespace sls::view

@@ -1,0 +1,22 @@
+/// `sls_view --ros`: the mirrors of common/ros on rt/… topics, over UDP. It writes, and reads
+/// nothing of ROS: no topic or service of ROS moves a flight.
+#pragma once
+
+#include <memory>
+
+#include "common/bus/node.hpp"
+#include "tools/view/live/feed.hpp"
+
+namespace sls::view {
+
+class RosFace {
+ public:
+  RosFace(bus::Node& node, Feed& feed);
+  ~RosFace();
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace sls::view
