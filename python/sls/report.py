@@ -13,6 +13,7 @@ from sls.figures import make_figures, save
 from sls.trajectory import Trajectory
 from sls.metrics import StageMetrics, calc_max, calc_rms, calc_stage_metrics
 from sls.recordings import Recording, describe_ids
+from sls.scene import MOST_BYTES, make_scene
 from sls.tables import format_error, list_error_cells, list_step_cells
 
 CAPTIONS = {
@@ -69,6 +70,7 @@ thead tr:first-child th[colspan] { text-align: center; border-left: 1px solid #d
 figure { margin: 0 0 26px; }
 figure:last-child { margin-bottom: 0; }
 figure img { display: block; width: 100%; max-width: 920px; height: auto; margin: 0 auto; }
+.scene { display: block; width: 100%; height: 680px; border: 1px solid #dfe3e8; }
 figcaption { color: #5b6570; font-size: 13.5px; text-align: center; margin-top: 4px; }
 pre { overflow-x: auto; background: #f7f8fa; padding: 12px; border-radius: 6px; font-size: 12.5px;
   line-height: 1.45; }
@@ -79,7 +81,7 @@ summary { cursor: pointer; font-weight: 600; font-size: 17px; }
 
 
 def make_report(recording: Recording, vehicle_id: int) -> str:
-    """The page as HTML. Raises InputError."""
+    """The page as HTML, with the scene in what is left of its bytes. Raises InputError."""
     name = recording.manifest["scenario"]
     flight = recording.load_flight(vehicle_id, name)
     fleet = recording.load_fleet()
@@ -95,6 +97,12 @@ def make_report(recording: Recording, vehicle_id: int) -> str:
         f"<section><details><summary>Scenario</summary><pre>{escape(recording.scenario_text)}</pre>"
         "</details></section>",
     ]
+    page = join_page(title, sections)
+    scene = make_scene(recording, MOST_BYTES - len(page.encode()))
+    return join_page(title, [*sections[:2], scene, *sections[2:]])
+
+
+def join_page(title: str, sections: Sequence[str]) -> str:
     return ("<!DOCTYPE html>\n<html lang=\"en\">\n<head><meta charset=\"utf-8\">\n"
             "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
             "<link rel=\"icon\" href=\"data:,\">\n"

@@ -27,7 +27,8 @@ def run(page: pathlib.Path, *flags: str) -> tuple[str, str]:
     """The page's document and what the browser logged."""
     with tempfile.TemporaryDirectory() as profile:
         done = subprocess.run(
-            [PROGRAM, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage",
+            [PROGRAM, "--headless", "--no-sandbox", "--use-angle=swiftshader",
+             "--enable-unsafe-swiftshader", "--disable-dev-shm-usage",
              "--window-size=1366,768", f"--user-data-dir={profile}", "--enable-logging=stderr",
              *flags, page.as_uri()], capture_output=True, text=True, timeout=120, check=True)
     return done.stdout, done.stderr

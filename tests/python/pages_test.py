@@ -1,7 +1,10 @@
 """Command lines, figures and reports, from recordings written here; the report in a browser."""
 
+import os
 import re
+import subprocess
 import unittest
+from unittest import mock
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +15,10 @@ import numpy as np
 from sls import figures
 from sls.recordings import Recording
 from support import write_recording
+
+NO_SCENE = "sls: report without its scene: "
+VIEWER, FLYER = support.BUILD / "bin/sls_view", support.BUILD / "bin/closed_loop"
+os.environ.pop("SLS_VIEW", None)  # only tests of the scene have one
 
 ALL = {"positions", "errors", "path", "angles", "forces", "attitude"}
 BODY = ALL - {"attitude"} | {"body_attitude", "body_rates", "rotors", "thrust"}
@@ -152,7 +159,8 @@ class ReportTest(support.FolderTest):
     def make_page(self, **what):
         write_recording(self.folder / "r", **what)
         code, output = self.run_sls("report", "r")
-        self.assertEqual((code, output), (0, "sls: report: r/report.html\n"))
+        self.assertEqual(code, 0)
+        self.assertRegex(output, f"^{NO_SCENE}expected the program sls_view.*\nsls: report: r/report.html\n$")
         return (self.folder / "r/report.html").read_text()
 
     def test_it_tells_scenario_parameters_metrics_events_and_figures(self):
@@ -216,6 +224,72 @@ class ReportTest(support.FolderTest):
         self.assertIn('data-broken="1"', document)
         self.assertNotIn('data-overflow="0"', document)
         self.assertTrue(any("no good" in line for line in console), console)
+
+
+class SceneTest(support.FolderTest):
+    def make_report(self, folder, program):
+        with mock.patch.dict(os.environ, {"SLS_VIEW": str(program)}):
+            code, output = self.run_sls("report", folder)
+        self.assertEqual(code, 0, output)
+        page = self.folder / folder / "report.html"
+        self.assertLessEqual(page.stat().st_size, 4_000_000)
+        return page, output
+
+    def fly(self, name, text=None):
+        """A real flight of a shipped scenario, or of `text`: a recording's folder."""
+        text = text or (support.ROOT / f"config/scenarios/{name}.yaml").read_text()
+        scenario = self.write(f"{name}.yaml", text)
+        subprocess.run([FLYER, "--scenario", scenario, "--out", self.folder / name], check=True,
+                       capture_output=True, timeout=200)
+        return name
+
+    def test_a_program_that_fails_leaves_a_report_without_scene_and_one_line(self):
+        write_recording(self.folder / "r", last=50)
+        program = self.write("fails", "#!/bin/sh\necho first >&2\necho 'error: no page' >&2\nexit 1\n")
+        program.chmod(0o755)
+        page, output = self.make_report("r", program)
+        self.assertNotIn("<iframe", page.read_text())
+        self.assertEqual(output, f"{NO_SCENE}error: no page\nsls: report: r/report.html\n")
+        program.chmod(0o644)
+        page, output = self.make_report("r", program)
+        self.assertEqual(output.count("\n"), 2, output)
+        self.assertIn(NO_SCENE, output)
+
+    def test_a_program_that_writes_too_much_leaves_a_report_without_scene(self):
+        write_recording(self.folder / "r", last=50)
+        program = self.write("much", '#!/bin/sh\nhead -c 5000000 /dev/zero | tr "\\0" x > "$3"\n')
+        program.chmod(0o755)
+        page, output = self.make_report("r", program)
+        self.assertNotIn("<iframe", page.read_text())
+        self.assertIn(f"{NO_SCENE}expected at most", output)
+
+    @unittest.skipUnless(VIEWER.exists() and FLYER.exists(), "skipped: no sls_view in this build")
+    def test_the_scene_is_in_the_report_and_the_same_recording_gives_the_same_bytes(self):
+        page, output = self.make_report(self.fly("short"), VIEWER)
+        self.assertEqual(output, "sls: report: short/report.html\n")
+        first = page.read_bytes()
+        self.assertEqual(first.count(b"<iframe"), 1)
+        self.make_report("short", VIEWER)
+        self.assertEqual(page.read_bytes(), first)
+
+    @unittest.skipUnless(VIEWER.exists() and FLYER.exists(), "skipped: no sls_view in this build")
+    def test_long_flights_and_fleets_stay_within_4_mb(self):
+        text = (support.ROOT / "config/scenarios/figure_eight.yaml").read_text()
+        long = re.sub(r"for_s: \d+", "for_s: 320", text)
+        for name in (self.fly("fleet"), self.fly("long", long)):
+            page, output = self.make_report(name, VIEWER)
+            self.assertEqual(page.read_text().count("<iframe"), 1, output)
+            self.assertGreater(page.stat().st_size, 2_000_000)  # what is left is used
+
+    @unittest.skipUnless(browser.PROGRAM, browser.MISSING)
+    @unittest.skipUnless(VIEWER.exists() and FLYER.exists(), "skipped: no sls_view in this build")
+    def test_a_browser_renders_it_without_a_word(self):
+        page, _ = self.make_report(self.fly("short"), VIEWER)
+        document, console = browser.render(page)
+        self.assertEqual(console, [])
+        self.assertIn('data-broken="0"', document)
+        self.assertIn('data-overflow="0"', document)
+        self.assertIn('data-requests="0"', document)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,54 @@
+"""The scene of a report: the page of sls_view with the recording in it."""
+
+import html
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from sls.recordings import Recording
+
+MOST_BYTES = 4_000_000
+"""Of a whole report."""
+MARGIN = 0.04
+"""Of the page: letters that stand for themselves in a file of its own, but not in an attribute."""
+
+
+def find_program() -> Path | None:
+    """sls_view, where `./sls report` has built it."""
+    program = Path(os.environ.get("SLS_VIEW", ""))
+    return program if program.is_file() else None
+
+
+def make_scene(recording: Recording, most_bytes: int) -> str:
+    """A section of at most `most_bytes`, which come from steps that are left out; empty, and a line
+    on stderr, where there is none to be had."""
+    program = find_program()
+    if program is None:
+        return leave_out("expected the program sls_view, got none (./sls report builds it)")
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "scene.html"
+        try:
+            done = subprocess.run(
+                [program, recording.folder, "--export", file, "--most-bytes",
+                 str(max(0, int(most_bytes * (1 - MARGIN))))],
+                capture_output=True, text=True, timeout=300)
+        except (OSError, subprocess.TimeoutExpired) as error:
+            return leave_out(str(error))
+        if done.returncode != 0:
+            lines = done.stderr.strip().splitlines() or ["no message"]
+            return leave_out(lines[-1])
+        page = file.read_text(encoding="utf-8")
+    # Of an attribute in double quotes; html.escape would write more.
+    source = page.replace("&", "&amp;").replace('"', "&quot;")
+    section = ("<section><h2>Scene</h2><iframe class=\"scene\" title=\"The flight in three dimensions\" "
+               f"loading=\"lazy\" srcdoc=\"{source}\"></iframe></section>\n")
+    if len(section.encode()) > most_bytes:
+        return leave_out(f"expected at most {most_bytes} bytes, got {len(section.encode())}")
+    return section
+
+
+def leave_out(why: str) -> str:
+    print(f"sls: report without its scene: {' '.join(why.split())}", file=sys.stderr)
+    return ""

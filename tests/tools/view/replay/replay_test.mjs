@@ -1,0 +1,244 @@
+// The exported page, the served one and the report in Chromium: node --test replay_test.mjs, with the build folder
+// in SLS_BUILD. Flights are flown in one process; positions on the screen are compared with the CSV files.
+import assert from "node:assert/strict";
+import { execFileSync, spawn } from "node:child_process";
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { after, before, test } from "node:test";
+import { fileURLToPath, pathToFileURL } from "node:url";
+import puppeteer from "puppeteer-core";
+
+const root = fileURLToPath(new URL("../../../..", import.meta.url));
+const bin = join(process.env.SLS_BUILD ?? join(root, "build"), "bin");
+const folder = mkdtempSync(join(tmpdir(), "sls-replay-"));
+const kTimeout = 60_000;
+let browser;
+
+function fly(name, change = (text) => text) {
+  const scenario = join(folder, `${name}.yaml`);
+  writeFileSync(scenario, change(readFileSync(join(root, "config/scenarios/faulty_figure_eight.yaml"), "utf8")));
+  execFileSync(join(bin, "closed_loop"), ["--scenario", scenario, "--out", join(folder, name)], { stdio: "pipe" });
+  return join(folder, name);
+}
+
+function exportPage(name, ...recordings) {
+  const file = join(folder, name);
+  execFileSync(join(bin, "sls_view"), [...recordings, "--export", file], { stdio: "pipe" });
+  return file;
+}
+
+function readColumns(file) {
+  const [header, ...lines] = readFileSync(file, "utf8").trimEnd().split("\n").map((line) => line.split(","));
+  return lines.map((fields) => Object.fromEntries(header.map((name, index) => [name, Number(fields[index])])));
+}
+
+/** A page that keeps what goes wrong in `problems` and what is asked for over a network in `requests`. */
+async function open(address, { reducedMotion = true } = {}) {
+  const page = await browser.newPage();
+  const problems = [];
+  const requests = [];
+  page.on("console", (message) => problems.push(message.text()));
+  page.on("pageerror", (error) => problems.push(error.message));
+  page.on("request", (request) => request.url().startsWith("data:") || requests.push(request.url()));
+  await page.setViewport({ width: 1280, height: 800 });
+  await page.emulateMediaFeatures([{ name: "prefers-reduced-motion", value: reducedMotion ? "reduce" : "no-preference" }]);
+  await page.goto(address, { timeout: kTimeout });
+  return { page, problems, requests };
+}
+
+const waitFor = (page, condition, ...given) => page.waitForFunction(condition, { timeout: kTimeout }, ...given);
+const stateOf = (page) => page.evaluate("window.slsView.state()");
+
+/** Moves the slider as a user's drag does. */
+const drag = (page, time) => page.$eval("#time", (slider, value) => {
+  slider.value = value;
+  slider.dispatchEvent(new Event("input"));
+}, String(time));
+
+/** Colour on the screen: red, green, blue. Decoded in a page of its own, because ours lets nothing be fetched. */
+async function readPixel(page, [x, y]) {
+  const picture = await page.screenshot({ encoding: "base64", clip: { x: Math.round(x), y: Math.round(y), width: 1, height: 1 } });
+  const reader = await browser.newPage();
+  const colour = await reader.evaluate(async (data) => {
+    const image = await createImageBitmap(await (await fetch(`data:image/png;base64,${data}`)).blob());
+    const context = new OffscreenCanvas(1, 1).getContext("2d");
+    context.drawImage(image, 0, 0);
+    return [...context.getImageData(0, 0, 1, 1).data].slice(0, 3);
+  }, picture);
+  await reader.close();
+  return colour;
+}
+
+before(async () => {
+  browser = await puppeteer.launch({
+    executablePath: "/usr/bin/chromium",
+    userDataDir: join(folder, "profile"),
+    args: ["--headless", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic",
+      "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"],
+  });
+  fly("first");
+  fly("second", (text) => text.replace("horizontal: 10", "horizontal: 3"));
+});
+
+after(async () => {
+  await browser?.close();
+  rmSync(folder, { recursive: true, force: true });
+});
+
+test("the slider shows the positions of the CSV file, and the load's colour is where they are", async () => {
+  const { page, problems, requests } = await open(pathToFileURL(exportPage("one.html", join(folder, "first"))).href);
+  await waitFor(page, () => window.slsView);
+  assert.equal((await stateOf(page)).is_playing, false, "reduced motion starts paused");
+  await page.click("[data-camera=top]");
+  const rows = readColumns(join(folder, "first/state.csv"));
+  for (const step of [0, 1250, 4000, 8000]) {
+    const row = rows[step];
+    await drag(page, row.sim_time_s);
+    const pose = await page.evaluate("window.slsView.pose(0)");
+    for (const [axis, name] of ["x", "y", "z"].entries()) {
+      assert.ok(Math.abs(pose.quad[axis] - row[`quad_${name}_m`]) < 1e-6, `quad ${name} at step ${step}`);
+      assert.ok(Math.abs(pose.load[axis] - row[`load_${name}_m`]) < 1e-6, `load ${name} at step ${step}`);
+    }
+    // From above: x up, y to the right; so many metres in the height of the picture.
+    const { camera, projection } = await page.evaluate(() => ({
+      camera: window.slsView.camera(), projection: window.slsView.projection(0) }));
+    const scale = camera.area.height / camera.height_m;
+    const expected = [
+      camera.area.left + camera.area.width / 2 + (row.load_y_m - camera.target_m[1]) * scale,
+      camera.area.top + camera.area.height / 2 - (row.load_x_m - camera.target_m[0]) * scale,
+    ];
+    assert.ok(Math.hypot(projection.load[0] - expected[0], projection.load[1] - expected[1]) < 1.5, `step ${step}`);
+  }
+  await page.click("[data-camera=follow]");
+  await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
+  const { load } = await page.evaluate("window.slsView.projection(0)");
+  const [red, green, blue] = await readPixel(page, load);
+  assert.ok(red > 150 && green > 70 && green < 200 && blue < 120, `the load is orange, got ${red}, ${green}, ${blue}`);
+  assert.deepEqual(problems, []);
+  assert.deepEqual(requests.filter((address) => !address.startsWith("file:")), []);
+  await page.close();
+});
+
+test("it plays by itself, at the chosen speed, and by keys", async () => {
+  const { page, problems } = await open(pathToFileURL(join(folder, "one.html")).href, { reducedMotion: false });
+  await waitFor(page, () => window.slsView?.state().sim_time_s > 0.2);
+  await page.keyboard.press(" ");
+  const paused = await stateOf(page);
+  assert.equal(paused.is_playing, false);
+  await page.keyboard.press(".");
+  assert.ok(Math.abs((await stateOf(page)).sim_time_s - paused.sim_time_s - 0.004) < 1e-9);
+  await page.focus("#time");
+  await page.keyboard.press("ArrowLeft");
+  assert.ok(Math.abs((await stateOf(page)).sim_time_s - paused.sim_time_s) < 1e-9);
+  await page.keyboard.press("End");
+  await drag(page, 31.9);
+  await page.select(".timeline-controls select", "10");
+  await page.keyboard.press("l");
+  await page.click(".timeline-play");
+  await waitFor(page, () => window.slsView.state().sim_time_s < 20); // once round
+  assert.equal((await stateOf(page)).is_playing, true);
+  assert.deepEqual(problems, []);
+  await page.close();
+});
+
+test("stages, events and faults are marks, and a click goes there", async () => {
+  const { page } = await open(pathToFileURL(join(folder, "one.html")).href);
+  await waitFor(page, () => window.slsView);
+  const texts = await page.$$eval("#events li", (items) => items.map((item) => item.textContent));
+  for (const text of ["fault: freeze on state", "fault: bias on command", "stage figure_eight", "finished"])
+    assert.ok(texts.some((item) => item.includes(text)), `${text} in ${texts}`);
+  assert.equal((await page.$$(".timeline-band .timeline-fault")).length, 7);
+  await page.$$eval("#events button", (buttons) =>
+    buttons.find((button) => button.textContent.includes("freeze on state")).click());
+  assert.equal((await stateOf(page)).sim_time_s, 10);
+  const slider = await page.$eval("#time", ({ ariaValueText, value }) => ({ ariaValueText, value }));
+  assert.deepEqual(slider, { ariaValueText: "10.00 / 32.00 s, figure_eight", value: "10" });
+  await page.close();
+});
+
+test("two recordings are overlaid and their difference is that of the CSV files", async () => {
+  const file = exportPage("two.html", join(folder, "first"), join(folder, "second"));
+  const { page, problems } = await open(pathToFileURL(file).href);
+  await waitFor(page, () => window.slsView);
+  assert.deepEqual((await stateOf(page)).recordings, ["first", "second"]);
+  const [first, second] = ["first", "second"].map((name) => readColumns(join(folder, name, "state.csv")));
+  const apart = first.map((row, step) => Math.hypot(
+    ...["x", "y", "z"].map((axis) => row[`load_${axis}_m`] - second[step][`load_${axis}_m`])));
+  const most = await page.$eval("#most-apart", ({ textContent }) => textContent);
+  // Of some thousand steps, to three digits.
+  assert.ok(Math.abs(parseFloat(most) / Math.max(...apart) - 1) < 0.02, `${most}, ${Math.max(...apart)}`);
+  await drag(page, first[3600].sim_time_s);
+  const texts = await page.$$eval("#participants dd", (items) => items.map(({ textContent }) => textContent));
+  assert.ok(texts.some((text) => Math.abs(parseFloat(text) / apart[3600] - 1) < 0.01), `${texts}, ${apart[3600]}`);
+  assert.deepEqual(problems, []);
+  await page.close();
+});
+
+test("sls_view serves two recordings, and says what is wrong with a folder that holds none", async (context) => {
+  assert.throws(() => execFileSync(join(bin, "sls_view"), [folder], { stdio: "pipe", timeout: kTimeout }),
+    ({ status, stderr }) => status === 2 && /expected a recording/.test(stderr));
+  const server = spawn(join(bin, "sls_view"), [join(folder, "first"), join(folder, "second"), "--port", "0"]);
+  context.after(() => server.kill("SIGTERM"));
+  const address = await new Promise((found, failed) => {
+    let text = "";
+    server.stderr.on("data", (data) => {
+      text += data;
+      const place = /http:\/\/[0-9.:]+\//.exec(text);
+      if (place) found(place[0]);
+    });
+    server.on("exit", () => failed(new Error(text)));
+  });
+  const { page, problems, requests } = await open(address);
+  await waitFor(page, () => window.slsView);
+  assert.deepEqual((await stateOf(page)).recordings, ["first", "second"]);
+  assert.ok(requests.every((request) => request.startsWith(address)), `${requests}`);
+  assert.deepEqual(problems, []);
+  await page.close();
+});
+
+test("a damaged recording in the page is named on it", async () => {
+  const html = readFileSync(join(folder, "one.html"), "utf8");
+  const begin = html.indexOf(">", html.indexOf('id="sls-recording-0"')) + 1;
+  const end = html.indexOf("</script>", begin);
+  const cases = {
+    "expected base64": "?",
+    "expected a recording, got 0 bytes": "",
+    "expected the first bytes SLSVIEW1": "A".repeat(400),
+    "bytes of vehicle 0": html.slice(begin, begin + 400_000),
+  };
+  for (const [text, data] of Object.entries(cases)) {
+    const file = join(folder, "damaged.html");
+    writeFileSync(file, html.slice(0, begin) + data + html.slice(end));
+    const { page } = await open(pathToFileURL(file).href);
+    await waitFor(page, () => !document.getElementById("banner").hidden);
+    const banner = await page.$eval("#banner", ({ textContent }) => textContent);
+    assert.ok(banner.includes(text), `${text} in ${banner}`);
+    await page.close();
+  }
+});
+
+test("the report shows the scene, needs nothing else and has at most 4 MB", async () => {
+  const recording = join(folder, "first");
+  execFileSync("/usr/bin/python3", ["-B", "-m", "sls", "report", recording], {
+    stdio: "pipe",
+    env: { ...process.env, SLS_VIEW: join(bin, "sls_view"), PYTHONPATH: join(root, "python") },
+  });
+  const file = join(recording, "report.html");
+  assert.ok(readFileSync(file).length <= 4_000_000);
+  const { page, problems, requests } = await open(pathToFileURL(file).href);
+  const element = await page.waitForSelector("iframe.scene", { timeout: kTimeout });
+  await element.scrollIntoView();
+  const frame = await element.contentFrame();
+  await waitFor(frame, () => window.slsView?.frames() > 0);
+  const state = await stateOf(frame);
+  assert.equal(state.has_scene, true);
+  assert.equal(state.is_playing, false, "a report does not move by itself");
+  await frame.evaluate("window.slsView.seek(5)");
+  const row = readColumns(join(recording, "state.csv"))[1250];
+  const pose = await frame.evaluate("window.slsView.pose(0)");
+  assert.ok(Math.abs(pose.load[0] - row.load_x_m) < 1e-4 && Math.abs(pose.load[2] - row.load_z_m) < 1e-4);
+  assert.deepEqual(problems, []);
+  assert.deepEqual(requests.filter((address) => !/^(file|about):/.test(address)), []);
+  await page.close();
+});

@@ -1,0 +1,138 @@
+#include "tools/view/replay/recorded_parameters.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <charconv>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <string>
+
+#include "common/bus/names.hpp"
+#include "recorder/columns.hpp"
+#include "recorder/rows.hpp"
+#include "recorder/sinks/csv/csv_reader.hpp"
+
+namespace sls::view {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kMostSignals = 64;  // MOST_NUMBERS of idl/sls.idl
+
+std::string read_scenario(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream)
+    throw config::ConfigError(file.string() +
+                              ": expected the recording's scenario, got no file that can be read");
+  std::string text(config::kMaxScenarioBytes + 1, '\0');
+  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(stream.gcount()));
+  if (text.size() > config::kMaxScenarioBytes)
+    throw config::ConfigError(fmt::format("{}: expected a scenario of at most {} bytes, got more",
+                                          file.string(), config::kMaxScenarioBytes));
+  return text;
+}
+
+std::uint64_t parse_run_id(const std::string& text, const fs::path& folder) {
+  std::uint64_t run_id = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), run_id, 16);
+  if (error != std::errc() || end != text.data() + text.size() || text.size() != 16)
+    throw config::ConfigError((folder / "manifest.json").string() +
+                              ": run_id: expected 16 hex digits, got '" + text + "'");
+  return run_id;
+}
+
+/// Units of the plant's signals by their names; empty where the manifest has none.
+std::map<std::string, std::string> read_units(const fs::path& folder) {
+  std::map<std::string, std::string> units;
+  std::ifstream stream(folder / "manifest.json", std::ios::binary);
+  try {
+    const auto manifest = nlohmann::json::parse(stream);
+    for (const auto& signal : manifest.value("signals", nlohmann::json::array()))
+      units[signal.at("name")] = signal.at("unit");
+  } catch (const nlohmann::json::exception& error) {
+    throw config::ConfigError((folder / "manifest.json").string() +
+                              ": signals: expected names and units, got: " + error.what());
+  }
+  return units;
+}
+
+/// What state.csv has beyond the columns of a point mass.
+void set_columns(Parameters& message, const fs::path& folder) {
+  const record::CsvReader file(folder / record::StateRow::kFile,
+                               record::make_header<record::StateRow>(),
+                               record::CsvReader::Further::kAllowed);
+  record::StateRow with_attitude;
+  with_attitude.has_attitude = true;
+  const std::string without = record::make_header<record::StateRow>();
+  const std::string known = record::join_names(record::list_columns(with_attitude));
+  std::string header;
+  for (const std::string& name : file.columns()) header += (header.empty() ? "" : ",") + name;
+  message.has_attitude((header + ",").rfind(known + ",", 0) == 0);
+  const std::string& before = message.has_attitude() ? known : without;
+  const auto count = static_cast<std::size_t>(std::count(before.begin(), before.end(), ',') + 1);
+  if (file.columns().size() - count > kMostSignals)
+    throw record::DamagedError(fmt::format("{}:1: expected at most {} signals, got {}",
+                                           (folder / record::StateRow::kFile).string(),
+                                           kMostSignals, file.columns().size() - count));
+  const auto units = read_units(folder);
+  for (std::size_t index = count; index < file.columns().size(); ++index) {
+    SignalDescription& signal = message.signals().emplace_back();
+    signal.name(file.columns()[index]);
+    const auto unit = units.find(file.columns()[index]);
+    if (unit != units.end()) signal.unit(unit->second);
+  }
+}
+
+void set_vehicles(Parameters& message, const config::Scenario& scenario,
+                  const record::RecordedFlight& flight) {
+  const auto ids = flight.vehicle_ids();
+  for (const std::uint32_t id : std::set<std::uint32_t>(ids.begin(), ids.end())) {
+    if (id >= scenario.vehicles.size())
+      throw config::ConfigError(
+          fmt::format("{}: vehicle_ids: expected ids of the scenario's {} vehicles, got {}",
+                      (flight.folder / "manifest.json").string(), scenario.vehicles.size(), id));
+    const model::SlungLoadParameters vehicle = config::make_vehicle_scenario(scenario, id).vehicle;
+    VehicleParameters& item = message.vehicles().emplace_back();
+    item.vehicle_id(id);
+    item.quad_mass_kg(vehicle.quad_mass);
+    item.load_mass_kg(vehicle.load_mass);
+    item.rod_length_m(vehicle.rod_length);
+    item.gravity_m_s2(vehicle.gravity);
+  }
+  if (message.vehicles().empty())
+    throw config::ConfigError((flight.folder / "manifest.json").string() +
+                              ": vehicle_ids: expected at least one, got none");
+}
+
+}  // namespace
+
+RecordedParameters load_parameters(const record::RecordedFlight& flight) {
+  const record::ManifestFile& manifest = flight.segments.front().manifest;
+  const fs::path file = flight.folder / "scenario.yaml";
+  RecordedParameters parameters;
+  parameters.scenario = config::parse_scenario(read_scenario(file), file.string());
+  Parameters& message = parameters.message;
+  message.run_id(parse_run_id(manifest.run_id, flight.folder));
+  message.scenario_text(parameters.scenario.text);
+  message.scenario_sha256(parameters.scenario.sha256);
+  // The command line may have put another period than the scenario's in force.
+  const auto period_ns = config::to_nanoseconds(manifest.period_s);
+  if (!period_ns || *period_ns <= 0)
+    throw config::ConfigError(fmt::format("{}: period_s: expected > 0, got {}",
+                                          (flight.folder / "manifest.json").string(),
+                                          manifest.period_s));
+  message.period_ns(*period_ns);
+  message.step_ns(std::min(parameters.scenario.plant.step_ns, *period_ns));
+  const bool is_lockstep = manifest.mode != bus::to_string(MODE_REALTIME);
+  message.mode(is_lockstep ? MODE_LOCKSTEP : MODE_REALTIME);
+  message.real_time_factor(is_lockstep ? 0 : parameters.scenario.sync.real_time_factor);
+  set_vehicles(message, parameters.scenario, flight);
+  set_columns(message, flight.folder);
+  return parameters;
+}
+
+}  // namespace sls::view
