@@ -6,12 +6,12 @@ root="$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)"
 readonly root
 readonly build="${SLS_BUILD:-$root/build}"
 readonly flying=(sim_server control_client recorder closed_loop)
-readonly programs=("${flying[@]}" sim_ctl sls_verify delay_margin sls_doctor)
+readonly programs=("${flying[@]}" sim_ctl sls_verify sls_convert delay_margin sls_doctor sls_view)
 readonly packages=(g++ make cmake libeigen3-dev libsimbody-dev libfastrtps-dev libfastcdr-dev
   fastddsgen default-jre-headless libyaml-cpp-dev libcli11-dev libspdlog-dev nlohmann-json3-dev libgtest-dev libssl-dev
-  libtinyxml2-dev openssl pybind11-dev python3-dev python3-numpy)
+  libtinyxml2-dev openssl pybind11-dev python3-dev python3-numpy libboost-dev libzstd-dev zlib1g-dev)
 readonly fuzz_packages=(clang libclang-rt-14-dev)
-readonly fuzzers=(scenario qos_file csv recording samples)
+readonly fuzzers=(scenario qos_file csv recording samples foxglove web)
 readonly test_packages=(iproute2 nftables cyclonedds-dev cyclonedds-tools fastdds-tools libfaketime python3-kubernetes
   python3-pytest slurm-wlm munge python3-distributed chromium)
 readonly python_packages=(python3-numpy python3-scipy python3-matplotlib python3-yaml)
@@ -35,6 +35,17 @@ usage: ./sls COMMAND [OPTIONS]
       --mode MODE      lockstep or realtime (default: the scenario's)
       --rtf X          of realtime: simulated over wall time (default: the scenario's)
       --in-process     the same flight in one process without DDS: same data, same certificate
+      --view           with a page on which the flight happens; prints its address, ends with the flight
+      --view-port N    the same on port N; 0: any that is free (default: 8765)
+  view [DIR [DIR]]   a page in the browser: the flight on this domain, or a recording, or two overlaid; prints its
+                     address, lasts until it is interrupted
+      --port N         port of the page; 0: any that is free (default: 8765)
+      --qos FILE       QoS profiles (default: config/qos/default.xml)
+      --domain N       DDS domain, 0 to 232 (default: 0)
+      --listen ADDRESS where other machines can open it; needs --token-file FILE (default: 127.0.0.1)
+      --read-only      without buttons
+      --ros            the flight on ROS 2 topics, too
+      --export FILE    the page with the recordings in it as one file; with --help: all options
   ctl COMMAND        talk to the run on this domain: pause, step N, resume, start, reset, stop or
                      status [--watch] [--json]; with --help: its options
   delay-margin SCENARIO
@@ -49,6 +60,9 @@ usage: ./sls COMMAND [OPTIONS]
       --answer         answer the doctor of another machine, for --for-s seconds (default: 60)
   verify A [B]       compares the data of two recordings: equal, or the first difference; of one, its
                      files with its manifest
+  convert DIR        a recording as one MCAP file, for Foxglove, Lichtblick, PlotJuggler and others
+      --out FILE       where it goes (default: DIR/sls.mcap)
+      --force          replace the file that is there
   plot DIR…          figures of recordings, and of published logs (files), overlaid; PNG and PDF
       --out DIR        where they go (default: DIR/figures of one recording, else figures)
       --name NAME…     what each is called
@@ -75,7 +89,7 @@ usage: ./sls COMMAND [OPTIONS]
                      an idle machine
       --quick          one short round of everything: whether it works
       --json FILE      the figures of every round
-      --only NAME…     lockstep, load, round-trip, realtime, plant, recorder, fleet or qos alone
+      --only NAME…     lockstep, load, round-trip, realtime, plant, recorder, campaign, fleet, qos or view alone
       --out DIR        plots
   test               set up, build, run every test
       --slow           the ones that take minutes, too; they need an idle machine
@@ -108,7 +122,40 @@ EOF
 # --- set-up and build -----------------------------------------------------------------------------
 
 # setup [PACKAGE…]: what building and flying need, and the packages named.
-setup() { install_missing "${packages[@]}" "$@"; }
+setup() {
+  install_missing "${packages[@]}" "$@"
+  install_node
+  install_node_modules "$root/tools/view/page"
+}
+
+# What bundles the page: Debian's node and npm, unless there are others already.
+install_node() {
+  local missing=()
+  command -v node >/dev/null || missing+=(nodejs)
+  command -v npm >/dev/null || missing+=(npm)
+  ((${#missing[@]} == 0)) || install_missing "${missing[@]}"
+  local version
+  version="$(node --version)" || fail "node --version failed"
+  if ! [[ $version =~ ^v([0-9]+)\. ]] || ((BASH_REMATCH[1] < 18)); then
+    fail "node: expected version 18 or later, got $version"
+  fi
+}
+
+# install_node_modules FOLDER: what its lock file names, where that has changed. Nothing where the folder is not
+# there: in docker/Dockerfile the launcher comes first.
+install_node_modules() {
+  local lock="$1/package-lock.json" installed="$1/node_modules/.package-lock.json" log
+  [[ -f $lock ]] || return 0
+  [[ -f $installed && ! $lock -nt $installed ]] && return
+  say "installing with npm: what $lock names"
+  log="$(mktemp)"
+  if ! npm ci --prefix "$1" --no-audit --no-fund >"$log" 2>&1; then
+    tail -n 15 "$log" >&2
+    fail "npm ci failed (whole log: $log)"
+  fi
+  rm -f "$log"
+  touch "$installed"  # npm leaves it older than the lock file where nothing had to change
+}
 
 install_missing() {
   local missing=() package
@@ -179,6 +226,20 @@ signal_all() {
   kill "-$1" "${!name_of[@]}" 2>/dev/null || true
 }
 
+# The page of a flight: no part of it, so nobody waits for it or asks how it ended.
+viewer=''
+start_viewer() {
+  setpriv --pdeathsig TERM -- "$build/bin/sls_view" "$@" &
+  viewer=$!
+}
+
+end_viewer() {
+  [[ -n $viewer ]] || return 0
+  kill -TERM "$viewer" 2>/dev/null || true
+  wait "$viewer" 2>/dev/null || true
+  viewer=''
+}
+
 interrupted=0
 on_signal() {
   interrupted=$1
@@ -214,16 +275,18 @@ find_scenario() {
 
 # fly SCENARIO [OPTIONS]: sets `recording` and `result`.
 fly() {
-  local scenario='' force=() qos=() domain=() timing=() is_in_process=0
+  local scenario='' force=() qos=() domain=() timing=() view=() is_in_process=0
   recording=''
   while (($#)); do
     case $1 in
       --force) force=(--force) ;;
       --no-pinning) ;;  # of earlier versions, which chose the processors
       --in-process) is_in_process=1 ;;
-      --out | --qos | --domain | --period-s | --mode | --rtf)
+      --view) ((${#view[@]})) || view=(--port 8765) ;;
+      --view-port | --out | --qos | --domain | --period-s | --mode | --rtf)
         (($# >= 2)) || fail "$1: expected a value (see ./sls help)" 2
         case $1 in
+          --view-port) view=(--port "$2") ;;
           --out) recording=$2 ;;
           --qos) qos=(--qos "$2") ;;
           --domain) domain=(--domain "$2") ;;
@@ -248,10 +311,10 @@ fly() {
 
   trap 'on_signal 130 INT' INT
   trap 'on_signal 143 TERM' TERM HUP
-  trap 'signal_all TERM' EXIT
+  trap 'signal_all TERM; end_viewer' EXIT
   if ((is_in_process)); then
-    [[ -z "${qos[*]}${domain[*]}" && " ${timing[*]} " != *' --mode '* && " ${timing[*]} " != *' --rtf '* ]] ||
-      fail "--in-process: expected no --qos, --domain, --mode or --rtf with it: one process has no network and no clock" 2
+    [[ -z "${qos[*]}${domain[*]}${view[*]}" && " ${timing[*]} " != *' --mode '* && " ${timing[*]} " != *' --rtf '* ]] ||
+      fail "--in-process: expected no --qos, --domain, --mode, --rtf or --view with it: one process has no network and no clock" 2
     start closed_loop --scenario "$file" --out "$recording" "${force[@]}" "${timing[@]}"
     wait_all
     return
@@ -263,10 +326,12 @@ fly() {
   "$build/bin/recorder" --check --out "$recording" "${force[@]}" "${qos[@]}" "${domain[@]}" ||
     exit $?
 
+  ((${#view[@]} == 0)) || start_viewer "${view[@]}" "${qos[@]}" "${domain[@]}"
   start recorder --out "$recording" "${force[@]}" "${qos[@]}" "${domain[@]}"
   start sim_server --scenario "$file" "${qos[@]}" "${domain[@]}" "${timing[@]}"
   start control_client --scenario "$file" "${qos[@]}" "${domain[@]}"
   wait_all
+  end_viewer
 }
 
 # --- the summary of a flight ----------------------------------------------------------------------
@@ -304,15 +369,24 @@ cmd_build() {
   say "programs in build/bin: ${programs[*]}; the module of the package sls in build/python"
 }
 
+# build_for_flight [OPTIONS of the flight]
+build_for_flight() {
+  if [[ " $* " == *" --view"* ]]; then
+    build_programs "${flying[@]}" sls_view
+  else
+    build_programs "${flying[@]}"
+  fi
+}
+
 cmd_run() {
-  build_programs "${flying[@]}"
+  build_for_flight "$@"
   fly "$@"
   ((result == 0)) && say "recording: $recording"
   exit "$result"
 }
 
 cmd_demo() {
-  build_programs "${flying[@]}"
+  build_for_flight "$@"
   local scenario=figure_eight
   if (($#)) && [[ $1 != -* ]]; then
     scenario=$1
@@ -322,6 +396,11 @@ cmd_demo() {
   fly "$scenario" "$@"
   ((result == 0)) || exit "$result"
   print_summary
+}
+
+cmd_view() {
+  build_programs sls_view
+  exec "$build/bin/sls_view" "$@"
 }
 
 cmd_ctl() {
@@ -353,13 +432,18 @@ cmd_delay-margin() {
 
 cmd_bench() {
   [[ " $* " == *" --help "* || -n ${SLS_BUILD:-} ]] || setup "${bench_packages[@]}"
-  [[ " $* " == *" --help "* ]] || build_programs "${flying[@]}" sim_ctl sls_bench_probe sls_bench_spinning_probe sls_microbench
+  [[ " $* " == *" --help "* ]] || build_programs "${flying[@]}" sim_ctl sls_view sls_bench_probe sls_bench_spinning_probe sls_microbench
   PYTHONPATH="$root" exec /usr/bin/python3 -BP -m bench --build "$build" "$@"
 }
 
 cmd_verify() {
   build_programs sls_verify
   exec "$build/bin/sls_verify" "$@"
+}
+
+cmd_convert() {
+  build_programs sls_convert
+  exec "$build/bin/sls_convert" "$@"
 }
 
 # run_python COMMAND…: -P: nothing in the working folder is taken for a module of ours; -B: no files beside it.
@@ -376,7 +460,13 @@ cmd_python() {
 
 cmd_plot() { run_python plot "$@"; }
 
-cmd_report() { run_python report "$@"; }
+cmd_report() {
+  if [[ " $* " != *" --help "* ]]; then
+    build_programs sls_view
+    export SLS_VIEW="$build/bin/sls_view"  # draws the report's scene
+  fi
+  run_python report "$@"
+}
 
 cmd_study() {
   if [[ " $* " != *" --help "* && " $* " != *" --reuse "* ]]; then
@@ -512,6 +602,7 @@ cmd_test() {
     folder="$root/build-$preset"
   fi
   setup "${test_packages[@]}" "${python_packages[@]}" "${bench_packages[@]}"
+  install_node_modules "$root/tests/tools/view"
   build_tree "$preset" "$folder" "${targets[@]}"
   cd "$root"
   # Nothing the middleware reads from the environment may reach the tests.
@@ -522,7 +613,7 @@ cmd_test() {
 command=${1:-help}
 (($#)) && shift
 case $command in
-  demo | run | doctor | bench | keys | ctl | verify | delay-margin | chaos | fuzz | test | setup | build | docker-demo | discovery-server | network-table | campaign | campaign-worker | plot | python | report | study) "cmd_$command" "$@" ;;
+  demo | run | view | doctor | bench | keys | ctl | verify | delay-margin | chaos | fuzz | test | setup | build | docker-demo | discovery-server | network-table | campaign | campaign-worker | plot | python | report | study) "cmd_$command" "$@" ;;
   clean) rm -rf "$root"/build "$root"/build-* ;;
   help | --help | -h) usage ;;
   *)

@@ -34,18 +34,22 @@ const std::vector<Rule> kRules = {
     {"common/config", {"common/model"}},
     {"common/model", {}},
     {"common/plugin", {"common/config", "common/model"}},
+    {"common/ros", {"common/model", "Fast DDS"}},
     {"control_client", {"common"}},
     {"control_client/laws", {"common/config", "common/model", "common/plugin"}},
     {"python", {"closed_loop", "common", "control_client", "recorder", "sim_server"}},
     {"recorder", {"common"}},
+    {"recorder/sinks/mcap", {"common", "recorder", "Fast DDS"}},
     {"sim_server", {"common", "Wire"}},
     {"sim_server/autopilots", {"common/config", "common/model", "common/plugin"}},
     {"sim_server/plants",
      {"common/config", "common/model", "common/plugin", "sim_server/autopilots", "Simbody"}},
+    {"tools/convert", {"common", "recorder"}},
     {"tools/ctl", {"common"}},
     {"tools/delay_margin", {"closed_loop", "common"}},
     {"tools/doctor", {"common", "Wire", "Fast DDS"}},
     {"tools/verify", {"common", "recorder"}},
+    {"tools/view", {"common", "control_client", "recorder", "tools/ctl"}},
 };
 
 bool is_below(const std::string& path, const std::string& folder) {

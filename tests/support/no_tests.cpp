@@ -1,0 +1,1 @@
+// A translation unit for the precompiled headers of tests/CMakeLists.txt.

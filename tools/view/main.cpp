@@ -1,0 +1,117 @@
+#include <spdlog/spdlog.h>
+
+#include <optional>
+
+#include "common/app/run_main.hpp"
+#include "common/app/scheduling.hpp"
+#include "common/app/stop_signal.hpp"
+#include "common/bus/node.hpp"
+#include "common/bus/qos_file.hpp"
+#include "common/config/config_error.hpp"
+#include "recorder/sinks/csv/csv_reader.hpp"
+#include "tools/view/foxglove/protocol.hpp"
+#include "tools/view/live/feed.hpp"
+#include "tools/view/live/operator.hpp"
+#include "tools/view/live/page_protocol.hpp"
+#include "tools/view/options.hpp"
+#include "tools/view/page/page.hpp"
+#include "tools/view/replay/export.hpp"
+#include "tools/view/replay/recorded_run.hpp"
+#include "tools/view/ros_face/ros_face.hpp"
+
+namespace {
+
+using namespace sls;
+
+constexpr double kSignalTime = 0.1;  // s between two looks for a stop signal
+
+view::Resource make_page() {
+  view::Resource page;
+  page.content_type = "text/html; charset=utf-8";
+  page.content_encoding = "gzip";
+  page.body = std::make_shared<const std::string>(view::page_html_gz());
+  return page;
+}
+
+/// Until a stop signal.
+void serve(view::Server& server) {
+  server.repeat(kSignalTime, [&server] {
+    if (app::stop_signal() != 0) server.stop();
+  });
+  spdlog::info("page: {}", server.url());
+  server.run();
+}
+
+void watch(const view::Options& options) {
+  view::Server server(options.server);
+  bus::Node node(options.common.qos_file, options.common.domain, "sls_view", options.identity,
+                 bus::Transports::kNetwork);
+  const auto post = [&server](std::function<void()> task) { server.post(std::move(task)); };
+  view::Feed feed(node, options.vehicle_id, post);
+  view::Operator requests(node, options.vehicle_id, post, view::may_write_requests(node));
+
+  view::PageOptions page;
+  page.domain = options.common.domain;
+  page.vehicle_id = options.vehicle_id;
+  page.takes_token = options.server.access.token && !options.server.access.is_read_only;
+  server.add_protocol(view::make_page_protocol(feed, requests, page));
+  server.add_protocol(view::make_foxglove_protocol(feed, requests));
+  server.add_resource("/", make_page());
+  std::optional<view::RosFace> ros_face;
+  if (options.has_ros_face) ros_face.emplace(node, feed);
+  serve(server);
+}
+
+/// Recordings do not change while they are shown: everything is read once.
+void replay(const view::Options& options) {
+  view::Server server(options.server);
+  const std::size_t count = options.recordings.size();
+  for (std::size_t index = 0; index < count; ++index) {
+    view::Resource recording;
+    recording.content_type = "application/octet-stream";
+    recording.body = std::make_shared<const std::string>(
+        view::load_recorded_run(options.recordings[index], view::kMostServedBytes));
+    server.add_resource("/recording/" + std::to_string(index), recording);
+  }
+  view::Resource page;
+  page.content_type = "text/html; charset=utf-8";
+  page.body =
+      std::make_shared<const std::string>(view::make_replay_page(view::page_html_gz(), count));
+  server.add_resource("/", page);
+  serve(server);
+}
+
+void run(const view::Options& options) {
+  if (!options.export_file.empty())
+    view::export_page(options.export_file, view::page_html_gz(), options.recordings,
+                      options.most_bytes);
+  else if (!options.recordings.empty())
+    replay(options);
+  else
+    watch(options);
+}
+
+/// What is wrong with a recording is a mistake in what the user asked for: exit code 2.
+void run_checked(const view::Options& options) {
+  try {
+    run(options);
+  } catch (const record::DamagedError& error) {
+    throw config::ConfigError(error.what());
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App cli("Shows a flight in the browser, and to Foxglove and ROS 2: live or recorded.");
+  view::Options options;
+  options.common.qos_file = bus::default_qos_file();
+  view::add_options(cli, options);
+
+  return app::run_main(argc, argv, cli, options.common, "sls_view", [&] {
+    options.complete();
+    // Before any thread starts, as they inherit it.
+    app::put_onlooker_last();
+    run_checked(options);
+  });
+}
