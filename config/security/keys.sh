@@ -5,7 +5,7 @@ set -euo pipefail
 
 here="$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)"
 readonly here
-readonly roles=(server controller recorder operator)
+readonly roles=(server controller recorder operator viewer)
 
 say() { echo "sls: $*" >&2; }
 fail() { say "error: $1"; exit "${2:-1}"; }
@@ -15,8 +15,8 @@ usage() {
 usage: ./sls keys DIR [--days N] [--force] [--other-vendors]
        ./sls keys DIR --add ROLE NAME [--days N] [--force]
 
-Makes DIR: certificate authorities (DIR/ca) and one folder for each role, server, controller, recorder
-and operator, with the identity and the signed documents that a host of that role needs.
+Makes DIR: certificate authorities (DIR/ca) and one folder for each role, server, controller, recorder,
+operator and viewer, with the identity and the signed documents that a host of that role needs.
 
   --days N         valid for N days, 1 to 36500 (default: 365)
   --force          replace what is there
@@ -37,6 +37,7 @@ writes_of() {
     controller) echo sls/command sls/participant ;;
     recorder) echo sls/participant ;;
     operator) echo sls/control ;;
+    viewer) ;;
   esac
 }
 
@@ -45,7 +46,10 @@ reads_of() {
     server) echo sls/command sls/control sls/participant sls/parameters sls/status ;;
     controller) echo sls/state sls/participant sls/parameters sls/status ;;
     recorder) echo sls/record sls/participant sls/parameters sls/status ;;
-    operator) echo sls/control_reply sls/participant sls/parameters sls/status ;;
+    # An operator's sls_view shows what a viewer's does.
+    operator | viewer)
+      echo sls/state sls/command sls/record sls/control sls/control_reply sls/participant sls/parameters sls/status
+      ;;
   esac
 }
 

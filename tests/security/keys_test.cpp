@@ -37,9 +37,9 @@ TEST(KeysTest, GiveEachRoleAFolderOfItsOwn) {
   const std::vector<std::string> expected = {"certificate.pem", "governance.p7s",
                                              "identity_ca.pem", "key.pem",
                                              "permissions.p7s", "permissions_ca.pem"};
-  EXPECT_EQ(list(keys.path()),
-            (std::vector<std::string>{"ca", "controller", "operator", "recorder", "server"}));
-  for (const char* role : {"controller", "operator", "recorder", "server"}) {
+  EXPECT_EQ(list(keys.path()), (std::vector<std::string>{"ca", "controller", "operator", "recorder",
+                                                         "server", "viewer"}));
+  for (const char* role : {"controller", "operator", "recorder", "server", "viewer"}) {
     EXPECT_EQ(list(keys.path() / role), expected);
     struct stat status;
     ASSERT_EQ(stat((keys.path() / role / "key.pem").c_str(), &status), 0);

@@ -3,6 +3,7 @@
 
 #include "tests/security/secured_run.hpp"
 #include "tests/support/waiting.hpp"
+#include "tests/tools/view/live/page_client.hpp"
 
 namespace sls::test {
 namespace {
@@ -63,6 +64,35 @@ TEST(SecureFlightTest, AnOperatorPausesAndResumesWhatAControllerMayNot) {
   EXPECT_TRUE(server->is_running());
   const auto resume = run.start("sim_ctl", {"resume"}, run.keys.as());
   ASSERT_EQ(resume->wait(), 0) << resume->output();
+  run.expect_same_as_open(*server, *client, *recorder);
+}
+
+TEST(SecureFlightTest, AViewerSeesTheFlightAndMayNotOperateIt) {
+  const SecuredRun run(32);
+  const auto viewer = run.start("sls_view", {"--port", "0"}, run.keys.as());
+  PageClient page(wait_for_port(*viewer));
+  const auto recorder = run.start_recorder(), server = run.start_server(),
+             client = run.start_client();
+  ASSERT_TRUE(page.wait_for_step(100)) << viewer->output() << server->output();
+  EXPECT_EQ(page.last("hello").at("may_operate"), false);
+  const auto reply = page.control("stop");
+  EXPECT_EQ(reply.at("accepted"), false);
+  EXPECT_NE(reply.at("reason").get<std::string>().find("--identity operator"), std::string::npos);
+  run.expect_same_as_open(*server, *client, *recorder);
+}
+
+TEST(SecureFlightTest, AViewerWithAnOperatorsKeysOperates) {
+  const SecuredRun run(32);
+  const auto viewer =
+      run.start("sls_view", {"--port", "0", "--identity", "operator"}, run.keys.as());
+  PageClient page(wait_for_port(*viewer));
+  const auto recorder = run.start_recorder(), server = run.start_server(),
+             client = run.start_client();
+  ASSERT_TRUE(page.wait_for_step(100)) << viewer->output() << server->output();
+  EXPECT_EQ(page.last("hello").at("may_operate"), true);
+  EXPECT_EQ(page.control("pause").at("accepted"), true) << page.last("reply");
+  EXPECT_TRUE(page.wait_for_status("phase", "paused"));
+  EXPECT_EQ(page.control("resume").at("accepted"), true) << page.last("reply");
   run.expect_same_as_open(*server, *client, *recorder);
 }
 
