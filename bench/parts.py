@@ -10,6 +10,8 @@ from bench.results import LESS, Figure, Rounds
 
 FLEETS = (1, 2, 5, 10, 20, 50, 100, 200)
 QUICK_FLEETS = (1, 2, 10)
+MCAP_TOO = "record: { format: [csv, mcap] }\n"
+MCAP_GOAL = 150_000  # rows/s
 
 
 # --- plant ----------------------------------------------------------------------------------------
@@ -74,11 +76,31 @@ def measure_recorder(programs: Programs, rounds: int, is_quick: bool) -> list[Fi
                     Figure("recorder", title, "MB/s", megabytes),
                     Figure("recorder", f"{title}: hashes at the end", "µs/row", ends, better=LESS)]
         figures.append(measure_recorder_process(programs, rounds, scenario, vehicles, steps))
+        figures += measure_mcap(programs, rounds, vehicles, steps)
     return figures
 
 
+def measure_mcap(programs: Programs, rounds: int, vehicles: int, steps: int) -> list[Figure]:
+    """The same with sls.mcap beside the CSV files; a row is one of these. And that file's size."""
+    of_both = programs.scenario("figure_eight", lambda text: of_fleet(vehicles)(text) + MCAP_TOO)
+    alone = programs.scenario("figure_eight", of_fleet(vehicles))
+    speeds, speeds_alone, ratios = [], [], []
+    for _ in range(rounds):
+        common = ["--vehicles", str(vehicles), "--steps", str(steps), "--folder", programs.scratch]
+        both = programs.probe("record", "--scenario", of_both, *common)
+        csv = programs.probe("record", "--scenario", alone, *common)
+        speeds.append(both["rows"] / both["recording_s"])
+        speeds_alone.append(csv["rows"] / csv["recording_s"])
+        ratios.append(both["mcap_bytes"] / both["bytes"])
+    title = f"Recording with MCAP, {vehicles} vehicle{'s' if vehicles > 1 else ''}, 4 ms"
+    return [Figure("recorder", title, "rows/s", speeds, "the same without", speeds_alone,
+                   goal=MCAP_GOAL),
+            Figure("recorder", f"{title}: size", "of the CSV files'", ratios, goal=1 / 3, better=LESS),
+            measure_recorder_process(programs, rounds, of_both, vehicles, steps, with_mcap=True)]
+
+
 def measure_recorder_process(programs: Programs, rounds: int, scenario: Path, vehicles: int,
-                             steps: int) -> Figure:
+                             steps: int, with_mcap: bool = False) -> Figure:
     speeds = []
     for _ in range(rounds):
         folder, log = programs.make_path(""), programs.make_path(".log")
@@ -93,9 +115,9 @@ def measure_recorder_process(programs: Programs, rounds: int, scenario: Path, ve
             end_all([recorder])
         check_recording(folder, code, log)
         speeds.append(result["rows"] / result["seconds"])
-    return Figure("recorder", f"recorder process, over shared memory, {vehicles} "
-                  f"vehicle{'s' if vehicles > 1 else ''}, 0 lost", "rows/s", speeds,
-                  goal=400_000 if vehicles == 1 else 500_000)
+    return Figure("recorder", f"recorder process{' with MCAP' if with_mcap else ''}, over shared memory, "
+                  f"{vehicles} vehicle{'s' if vehicles > 1 else ''}, 0 lost", "rows/s", speeds,
+                  goal=MCAP_GOAL if with_mcap else 400_000 if vehicles == 1 else 500_000)
 
 
 def check_recording(folder: Path, code: int, log: Path) -> None:

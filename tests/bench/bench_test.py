@@ -316,7 +316,7 @@ class ProgramTest(unittest.TestCase):
     def test_help_names_every_part(self):
         said = bench("--help").stdout
         for part in ("lockstep", "load", "round-trip", "realtime", "plant", "recorder", "campaign", "fleet",
-                     "qos"):
+                     "qos", "view"):
             self.assertIn(part, said)
 
     def check(self, file, part):
@@ -330,6 +330,13 @@ class ProgramTest(unittest.TestCase):
             if "ratio" in figure:
                 self.assertGreater(figure["ratio"]["min"], 0)
         return result["figures"]
+
+    def test_a_quick_view_part_compares_flights_with_viewers_and_without(self):
+        file = self.folder / "bench.json"
+        bench("--quick", "--only", "view", "--json", file)
+        beside = [figure for figure in self.check(file, "view") if "ratio" in figure]
+        self.assertEqual(len(beside), 1)
+        self.assertEqual(beside[0]["goal"]["value"], 0.95)
 
     def test_a_quick_lockstep_part_has_bounds_a_table_and_a_plot(self):
         file = self.folder / "bench.json"
