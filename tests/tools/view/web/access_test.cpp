@@ -159,13 +159,6 @@ TEST(AccessTest, AllowedPagesOperateWithTheToken) {
   EXPECT_FALSE(judge(request, options).may_look);
 }
 
-TEST(AccessTest, AnAllowedPageDoesNotOperateWithTheTokenEither) {
-  AccessOptions options = make_options();
-  options.token = kToken;
-  options.allowed_origins = {"https://app.foxglove.dev"};
-  EXPECT_FALSE(judge({"127.0.0.1:8765", "https://app.foxglove.dev", kToken}, options).may_operate);
-}
-
 // --- operating -----------------------------------------------------------------------------------
 
 TEST(AccessTest, OperatingNeedsTheTokenWhereThereIsOne) {
