@@ -49,7 +49,9 @@ const std::vector<Rule> kRules = {
     {"tools/delay_margin", {"closed_loop", "common"}},
     {"tools/doctor", {"common", "Wire", "Fast DDS"}},
     {"tools/verify", {"common", "recorder"}},
-    {"tools/view", {"common", "control_client", "recorder", "tools/ctl"}},
+    {"tools/view",
+     {"common", "control_client/reference_trajectory.hpp", "recorder",
+      "sim_server/plants/multirotor/keys.hpp", "tools/ctl"}},
 };
 
 bool is_below(const std::string& path, const std::string& folder) {
