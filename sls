@@ -109,7 +109,7 @@ usage: ./sls COMMAND [OPTIONS]
       --verbose        print what the processes said
   fuzz               feed everything that reads files or samples with mutated ones, until one crashes
       --seconds N      for all targets together (default: 60)
-      --target NAME    this one alone: scenario, qos_file, csv, recording or samples
+      --target NAME    this one alone: scenario, qos_file, csv, recording, samples, foxglove or web
   setup              install the packages that building and flying need
   build              set up and build; the programs are in build/bin
   clean              remove what was built
@@ -610,15 +610,18 @@ cmd_test() {
     ctest --preset "$preset" --parallel "$(nproc)" "${which[@]}"
 }
 
+cmd_clean() { rm -rf "$root"/build "$root"/build-*; }
+
 command=${1:-help}
 (($#)) && shift
 case $command in
-  demo | run | view | doctor | bench | keys | ctl | verify | delay-margin | chaos | fuzz | test | setup | build | docker-demo | discovery-server | network-table | campaign | campaign-worker | plot | python | report | study) "cmd_$command" "$@" ;;
-  clean) rm -rf "$root"/build "$root"/build-* ;;
   help | --help | -h) usage ;;
   *)
-    say "error: unknown command '$command'"
-    usage >&2
-    exit 2
+    if ! declare -F "cmd_$command" >/dev/null; then
+      say "error: unknown command '$command'"
+      usage >&2
+      exit 2
+    fi
+    "cmd_$command" "$@"
     ;;
 esac

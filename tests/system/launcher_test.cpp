@@ -52,6 +52,17 @@ TEST_F(LauncherTest, RunTakesPathsPeriodsAndQosFiles) {
   EXPECT_EQ(read_manifest(recording()).at("period_s"), 0.002);
 }
 
+TEST_F(LauncherTest, ConvertWritesARecordingAsMcap) {
+  Process run({launcher(), "run", "short", "--in-process", "--out", recording()});
+  ASSERT_EQ(run.wait(), 0) << run.output();
+  Process convert({launcher(), "convert", recording()});
+  EXPECT_EQ(convert.wait(), 0) << convert.output();
+  const std::string magic = "\x89MCAP0\r\n";
+  const std::string file = read_file(recording() + "/sls.mcap");
+  EXPECT_EQ(file.substr(0, magic.size()), magic);
+  EXPECT_EQ(file.substr(file.size() - magic.size()), magic);
+}
+
 TEST_F(LauncherTest, MistakesEndWithTwoAndOneLine) {
   const auto refuse = [](const std::vector<std::string>& command, const std::string& cause) {
     Process run(command);
