@@ -1,5 +1,5 @@
 // Mirrors decoded by @foxglove/rosmsg and @foxglove/rosmsg2-serialization, values compared with the samples.
-// SLS_MIRRORS_DUMP names the program that dumps them; @foxglove/… is in node_modules of tests/tools/view.
+// mirrors_dump, in the build tree SLS_BUILD, prints them; @foxglove/… is in node_modules of tests/tools/view.
 import assert from "node:assert/strict";
 import { spawnSync } from "node:child_process";
 import { createRequire } from "node:module";
@@ -13,7 +13,7 @@ const { parse } = require("@foxglove/rosmsg");
 const { MessageReader, MessageWriter } = require("@foxglove/rosmsg2-serialization");
 
 const kTolerance = 1e-12; // of numbers that both sides compute: some 10 m and m/s
-const dump = spawnSync(process.env.SLS_MIRRORS_DUMP, { maxBuffer: 1 << 28, encoding: "utf8" });
+const dump = spawnSync(path.join(process.env.SLS_BUILD, "tests/mirrors_dump"), { maxBuffer: 1 << 28, encoding: "utf8" });
 assert.equal(dump.status, 0, dump.stderr);
 const lines = dump.stdout.trimEnd().split("\n").map((line) => JSON.parse(line));
 const channels = lines.filter((line) => line.topic);

@@ -24,11 +24,6 @@ std::uint64_t count_csv_bytes(const fs::path& recording) {
 
 class McapFlightTest : public testing::Test {
  protected:
-  void SetUp() override {
-    if (!fs::exists(SLS_SOURCE_DIR "/tests/tools/view/node_modules/@mcap/core"))
-      GTEST_SKIP() << "tests/tools/view/node_modules is missing: npm ci there";
-  }
-
   /// A shipped scenario with `further` keys, recorded as MCAP too.
   std::string make_file(const std::string& base, const std::string& further = "") {
     const std::string file = make_scenario(folder_, {}, base);

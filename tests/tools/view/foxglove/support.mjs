@@ -8,10 +8,11 @@ import { spawn } from "node:child_process";
 import { once } from "node:events";
 import path from "node:path";
 import readline from "node:readline";
+import { fileURLToPath } from "node:url";
 import { WebSocket } from "ws";
 
 export const { FoxgloveClient } = wsProtocol;
-export const root = path.resolve(import.meta.dirname, "../../../..");
+export const root = path.resolve(path.dirname(fileURLToPath(import.meta.url)), "../../../..");
 const build = process.env.SLS_BUILD ?? path.join(root, "build");
 const kPatience = 60_000; // says only when to call it a failure, on a busy machine too
 
