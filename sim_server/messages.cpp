@@ -37,13 +37,9 @@ Parameters make_parameters_message(std::uint64_t run_id,
   message.scenario_text(scenario.text);
   message.library_sha256(config::calc_plant_library_sha256(scenario));
   for (const std::uint32_t id : vehicle_ids) {
-    const model::SlungLoadParameters vehicle = config::make_vehicle_scenario(scenario, id).vehicle;
     VehicleParameters& item = message.vehicles().emplace_back();
     item.vehicle_id(id);
-    item.quad_mass_kg(vehicle.quad_mass);
-    item.load_mass_kg(vehicle.load_mass);
-    item.rod_length_m(vehicle.rod_length);
-    item.gravity_m_s2(vehicle.gravity);
+    bus::fill(item, config::make_vehicle_scenario(scenario, id).vehicle);
   }
   message.has_attitude(plant.has_attitude());
   for (const Signal& signal : plant.signals()) {

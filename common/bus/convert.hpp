@@ -7,6 +7,7 @@
 
 #include "common/bus/topics.hpp"
 #include "common/model/measurement.hpp"
+#include "common/model/parameters.hpp"
 
 namespace sls::bus {
 
@@ -25,6 +26,13 @@ inline model::Numbers to_numbers(const std::vector<double>& sequence) {
 
 inline void fill(std::vector<double>& sequence, const model::Numbers& numbers) {
   sequence.assign(numbers.data(), numbers.data() + numbers.size());
+}
+
+inline void fill(VehicleParameters& message, const model::SlungLoadParameters& vehicle) {
+  message.quad_mass_kg(vehicle.quad_mass);
+  message.load_mass_kg(vehicle.load_mass);
+  message.rod_length_m(vehicle.rod_length);
+  message.gravity_m_s2(vehicle.gravity);
 }
 
 inline void fill(PlantState& message, const model::Measurement& state) {

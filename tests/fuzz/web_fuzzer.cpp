@@ -35,7 +35,7 @@ class Mirror : public view::Session {
   view::Connection& connection_;
 };
 
-/// Whoever has a protocol that can do without a network adds it here.
+/// The protocols that need no network. A new one is added here.
 void add_protocols(view::Hub& hub) {
   hub.protocols.push_back(test::make_echo({"echo"}));
   hub.protocols.push_back({{"mirror"}, [](view::Connection& connection) {

@@ -4,8 +4,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "common/bus/contract_text.hpp"
 #include "common/bus/participants.hpp"
-#include "recorder/sinks/mcap/contract.hpp"
 
 namespace sls::record {
 namespace {
@@ -53,7 +53,7 @@ McapSink::McapSink(const std::filesystem::path& file, const Parameters& paramete
 }
 
 void McapSink::add_channels() {
-  const std::uint16_t entry = file_.add_schema("sls::RecordEntry", "omgidl", contract_idl());
+  const std::uint16_t entry = file_.add_schema("sls::RecordEntry", "omgidl", bus::kContractText);
   for (auto& [id, vehicle] : vehicles_)
     vehicle.channel = file_.add_channel(entry, fmt::format("/sls/vehicle_{}/record", id), "cdr");
   std::map<std::string, std::uint16_t> schemas;  // by type

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 
+#include "common/bus/contract_text.hpp"
 #include "common/bus/participants.hpp"
 #include "tools/view/foxglove/sample_stamp.hpp"
 
@@ -16,11 +17,6 @@ constexpr auto kTimeSpacing = std::chrono::microseconds(16'667);
 constexpr auto kDroppedSpacing = std::chrono::seconds(1);
 constexpr std::size_t kMostEvents = 32;
 constexpr const char* kNoFlight = "No flight on this domain. Start one: ./sls run";
-
-/// Samples of these come seldom, and each counts; the last ones are sent on subscription.
-bool is_latched(TopicId topic) {
-  return topic != TopicId::kState && topic != TopicId::kCommand && topic != TopicId::kRecord;
-}
 
 /// Read as long as there is a client: they tell the time.
 constexpr std::array kClockTopics = {TopicId::kRecord, TopicId::kStatus};
@@ -144,7 +140,8 @@ Hub::OpenChannel& Hub::open_channel(Channel channel) {
 void Hub::add_native_channels() {
   for (std::size_t i = 0; i < kTopics; ++i) {
     const auto topic = static_cast<TopicId>(i);
-    OpenChannel& open = open_channel({0, name_of(topic), type_of(topic), "omgidl", kContractText});
+    OpenChannel& open = open_channel(
+        {0, name_of(topic), type_of(topic), "omgidl", std::string(bus::kContractText)});
     open.topic = topic;
     natives_.push_back(&open);
   }

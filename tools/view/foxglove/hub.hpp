@@ -19,9 +19,6 @@
 
 namespace sls::view::foxglove {
 
-/// The text of idl/sls.idl: the schema of every sls/… channel.
-extern const char* const kContractText;
-
 /// A session as the hub sees it.
 class Client {
  public:

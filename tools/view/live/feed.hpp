@@ -29,6 +29,9 @@ inline constexpr std::size_t kTopics = 8;
 const char* name_of(TopicId topic);  ///< "sls/state"
 const char* type_of(TopicId topic);  ///< "sls::States"
 
+/// True of the topics whose samples come seldom and must reach a late joiner: never left out.
+bool is_latched(TopicId topic);
+
 /// A sample as it came over the wire.
 struct Sample {
   TopicId topic;

@@ -6,10 +6,6 @@
 
 namespace sls::view {
 
-bool is_latched(TopicId topic) {
-  return topic != TopicId::kState && topic != TopicId::kCommand && topic != TopicId::kRecord;
-}
-
 void SampleQueue::set_period(Clock::duration period) {
   const std::lock_guard lock(mutex_);
   period_ = period;

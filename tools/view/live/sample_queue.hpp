@@ -13,9 +13,6 @@
 
 namespace sls::view {
 
-/// True of the topics whose samples a late joiner must know, which are never left out.
-bool is_latched(TopicId topic);
-
 /// Bounded: beyond `most_bytes` the oldest of the loop's topics and of sls/record are dropped;
 /// latched ones only where they alone are as many, as in a flood. Each topic keeps its order. What
 /// is put is announced at most once until it is taken, and at most once a period. Called from any

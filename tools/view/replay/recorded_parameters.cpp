@@ -10,6 +10,7 @@
 #include <set>
 #include <string>
 
+#include "common/bus/convert.hpp"
 #include "common/bus/names.hpp"
 #include "recorder/columns.hpp"
 #include "recorder/rows.hpp"
@@ -95,13 +96,9 @@ void set_vehicles(Parameters& message, const config::Scenario& scenario,
       throw config::ConfigError(
           fmt::format("{}: vehicle_ids: expected ids of the scenario's {} vehicles, got {}",
                       (flight.folder / "manifest.json").string(), scenario.vehicles.size(), id));
-    const model::SlungLoadParameters vehicle = config::make_vehicle_scenario(scenario, id).vehicle;
     VehicleParameters& item = message.vehicles().emplace_back();
     item.vehicle_id(id);
-    item.quad_mass_kg(vehicle.quad_mass);
-    item.load_mass_kg(vehicle.load_mass);
-    item.rod_length_m(vehicle.rod_length);
-    item.gravity_m_s2(vehicle.gravity);
+    bus::fill(item, config::make_vehicle_scenario(scenario, id).vehicle);
   }
   if (message.vehicles().empty())
     throw config::ConfigError((flight.folder / "manifest.json").string() +

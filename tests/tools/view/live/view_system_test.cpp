@@ -101,7 +101,7 @@ TEST(ViewSystemTest, AKilledServerIsSilentAndTheNextRunIsShown) {
   EXPECT_EQ(client->wait(), 0) << client->output();
 }
 
-/// What the flight computes and records is the same, whoever looks on, and however badly.
+/// A stopped viewer is the worst one: it takes nothing from its sockets.
 TEST(ViewSystemTest, ThreeViewersOfWhichOneIsStoppedChangeNothing) {
   Flight alone(scenario("figure_eight"));
   alone.expect_success();

@@ -1,0 +1,10 @@
+#pragma once
+
+#include <string_view>
+
+namespace sls::bus {
+
+/// The text of idl/sls.idl as it was when this was built: the schema of MCAP and Foxglove channels.
+extern const std::string_view kContractText;
+
+}  // namespace sls::bus
