@@ -196,7 +196,7 @@ class KeyLister {
     constexpr bool kIsFleet = std::is_same_v<Element, VehicleVariant>;
     add(presence, name, kIsFleet ? "whole number, or list of maps" : "list of maps",
         std::to_string(range.least) + " to " + std::to_string(range.most) + " " + range.elements,
-        "");
+        presence == kOptional ? "[]" : "");
     Element element{};
     list_keys(prefix_ + name + "[i].", element);
   }

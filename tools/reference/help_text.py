@@ -87,6 +87,8 @@ def parse_item(spec, text):
         limits = f"{match[1]} to {match[2]}"
         spec = spec.replace(match[0], "")
     argument = re.sub(r":(TEXT|INT|UINT|FLOAT)\b", "", spec).strip()
+    if not names[0].startswith("-") and argument == "TEXT":
+        argument = ""
     return Item(names, argument, choices, limits, default, notes, text)
 
 
