@@ -71,7 +71,8 @@ def list_commands():
 def read_launcher(build):
     """{"": the text of ./sls help, command: that of ./sls COMMAND --help}.
 
-    As long as ./sls help shows the options itself, only the commands for which it refers to --help are asked.
+    Where ./sls help does not say that every command has --help, only the commands for which it does are asked:
+    another one might begin its work.
     """
     environment = dict(os.environ, SLS_BUILD=str(build), COLUMNS="100", LC_ALL="C.UTF-8")
 
@@ -82,12 +83,12 @@ def read_launcher(build):
         return re.sub(r"([Uu]sage: )(?!\./sls\b)\S*/", r"\1", text).rstrip()
 
     texts = {"": ask("help")}
-    shows_options = re.search(r"^ {6,}--", texts[""], re.MULTILINE)
+    all_have_help = re.search(r"COMMAND --help", texts[""])
     for command in list_commands():
         if command == "help":
             continue
         part = find_usage_part(texts[""], command)
-        if not shows_options or part and "--help" in part:
+        if all_have_help or part and "--help" in part:
             texts[command] = ask(command, "--help")
         elif part:
             texts[command] = part
