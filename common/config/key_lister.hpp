@@ -157,9 +157,8 @@ class KeyLister {
 
   void add(Presence presence, const std::string& name, std::string type, std::string range,
            std::string default_value) {
-    ListedKey listed{prefix_ + name, std::move(type),
-                     std::move(range), std::move(default_value),
-                     "optional",      {}};
+    ListedKey listed{prefix_ + name,           std::move(type), std::move(range),
+                     std::move(default_value), "optional",      {}};
     if (presence == kRequired) listed.presence = "required";
     for (const auto& [one, text] : one_of_)
       if (one == name) listed.presence = text;
