@@ -99,7 +99,7 @@ def parse(text):
     for line in text.splitlines():
         match = re.match(r"[Uu]sage: (.*)", line)
         if match:
-            usage.append(match[1].strip())
+            usage.append(match[1].strip().replace("(0x)", "..."))
             is_usage, section = True, None
             continue
         if is_usage and line.startswith(" ") and line.strip():

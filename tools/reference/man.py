@@ -54,9 +54,8 @@ def make_end(name, names):
 
 
 def make_program(name, parsed, subcommands, version, names):
-    usage = [line.replace("(0x)", "...") for line in parsed.usage]
     summary = re.split(r"(?<=\.)\s", parsed.description.replace("\n", " "))[0]
-    text = make_start(name, version, summary, usage)
+    text = make_start(name, version, summary, parsed.usage)
     text += ".SH DESCRIPTION\n" + escape(parsed.description) + "\n"
     for title, items in (("ARGUMENTS", parsed.positionals), ("COMMANDS", parsed.subcommands),
                          ("OPTIONS", parsed.options)):
