@@ -173,7 +173,8 @@ Topics, their types and their QoS, from `common/bus/topics.hpp`, `idl/sls.idl` a
         rows.append([f"`{name}`", f"[{message}](#{message.lower()})", f"`{profiles[flow + 'Writer']}`",
                      f"`{profiles[flow + 'Reader']}`"])
     text += make_table(["topic", "type", "writer's profile", "reader's profile"], rows)
-    text += ("\nIn real time `sls/command` has the profiles "
+    text += "\n"
+    text += ("In real time `sls/command` has the profiles "
              f"`{profiles['RealtimeCommandWriter']}` and `{profiles['RealtimeCommandReader']}`.\n\n## QoS profiles\n\n")
     text += make_table(["profile", "reliability", "durability", "history", "deadline", "lifespan"],
                        [[f"`{profile}`", *qos.values()] for profile, qos in endpoints.items()])
@@ -216,7 +217,7 @@ The server counts these events in `counters` of `sls/status`; `status.csv` has a
 """
     text += make_table(["counter", "meaning"],
                        [[f"`{field}`", comment] for _, field, comment in structs["SyncCounters"]])
-    text += "\n## What became of a step's answer\n\n"
+    text += "\n## Kinds of an entry in sls/record\n\n"
     text += make_table(["number", "value", "meaning"],
                        [[str(number), f"`{value}`", comment]
                         for number, (value, comment) in enumerate(enums["AnswerKind"])])
