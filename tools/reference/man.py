@@ -16,8 +16,9 @@ def escape(text):
 
 def make_date():
     seconds = os.environ.get("SOURCE_DATE_EPOCH")
-    now = datetime.datetime.now(datetime.timezone.utc)
-    return (datetime.datetime.fromtimestamp(int(seconds), datetime.timezone.utc) if seconds else now).strftime("%Y-%m-%d")
+    zone = datetime.timezone.utc
+    when = datetime.datetime.fromtimestamp(int(seconds), zone) if seconds else datetime.datetime.now(zone)
+    return when.strftime("%Y-%m-%d")
 
 
 def make_start(name, version, summary, synopsis):

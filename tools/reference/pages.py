@@ -4,8 +4,8 @@ import re
 
 import sources
 
-NOTE = ("<!-- Generated from the code's own tables by ./sls reference; changes here are lost. tests/docs/reference_test.py"
-        " compares. -->\n")
+NOTE = ("<!-- Generated from the code's own tables by ./sls reference; changes here are lost. "
+        "tests/docs/reference_test.py compares. -->\n")
 
 
 def escape(text):
@@ -24,13 +24,12 @@ def shorten_number(text):
 
 def to_range(key):
     text = key["range"]
-    for old, new in ((">= ", "≥ "), ("<= ", "≤ "), ("radians from ", ""), ("from ", ""), ("pi", "π"), ("-", "−"),
-                     (" or a shared library (a path ending in .so)", ", or a path ending in `.so`")):
-        if key["type"] != "text":
-            text = text.replace(old, new)
     if key["type"] == "name or path":
-        names, _, rest = text.partition(", or a path")
-        text = ", ".join(f"`{name}`" for name in names.split(", ")) + ", or a path" + rest
+        names = text.removesuffix(" or a shared library (a path ending in .so)").split(", ")
+        text = ", ".join(f"`{name}`" for name in names) + ", or a path ending in `.so`"
+    elif key["type"] != "text":
+        text = re.sub(r"\b(?:radians )?from ", "", text)
+        text = re.sub(r"\bpi\b", "π", text).replace("-", "−").replace(">=", "≥").replace("<=", "≤")
     if key["also"].startswith(">"):
         return key["also"]  # stricter than the rule for the value alone
     return ("; " if text and key["also"] else "").join([text, key["also"]])
