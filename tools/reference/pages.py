@@ -62,8 +62,7 @@ def to_condition(key):
 
 def make_scenario_page(build):
     text = "# Scenario keys\n\n" + NOTE + """
-Every key of a scenario file. [common/config](../../common/config/README.md) says how the file is read, and how a fleet is
-described.
+Every key of a scenario file. [common/config](../../common/config/README.md) describes how the file is read, and fleets.
 
 - All units are SI, angles are in radians, the world frame is x forward, y right, z down.
 - A *vector* is a list of three numbers. A *time* is at most 1,000,000 s and a whole number of nanoseconds.
