@@ -23,8 +23,11 @@ def read(path):
 
 
 def run(command, **more):
-    """What the command prints. Paths of this tree are relative in it."""
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, **more)
+    """What the command prints."""
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=120, **more)
+    except OSError as error:
+        raise StaleReference(f"{command[0]}: {error.strerror} (is it built? ./sls build)") from error
     if done.returncode != 0:
         raise StaleReference(f"{' '.join(map(str, command))}: exit code {done.returncode}: {done.stderr.strip()}")
     return done.stdout
