@@ -15,7 +15,7 @@ readonly fuzzers=(scenario qos_file csv recording samples foxglove web)
 readonly test_packages=(iproute2 nftables cyclonedds-dev cyclonedds-tools fastdds-tools libfaketime python3-kubernetes
   python3-pytest slurm-wlm munge python3-distributed chromium mandoc)
 readonly python_packages=(python3-numpy python3-scipy python3-matplotlib python3-yaml)
-readonly bench_packages=(libbenchmark-dev python3-matplotlib)
+readonly bench_packages=(libbenchmark-dev python3-matplotlib chromium)
 
 say() { echo "sls: $*" >&2; }
 fail() { say "error: $1"; exit "${2:-1}"; }
@@ -89,7 +89,7 @@ usage: ./sls COMMAND [OPTIONS]
                      an idle machine
       --quick          one short round of everything: whether it works
       --json FILE      the figures of every round
-      --only NAME…     lockstep, load, round-trip, realtime, plant, recorder, campaign, fleet, qos or view alone
+      --only NAME…     lockstep, load, round-trip, realtime, plant, recorder, campaign, fleet, qos, view or page alone
       --out DIR        plots
   test               set up, build, run every test
       --slow           the ones that take minutes, too; they need an idle machine
@@ -434,8 +434,13 @@ cmd_delay-margin() {
 }
 
 cmd_bench() {
-  [[ " $* " == *" --help "* || -n ${SLS_BUILD:-} ]] || setup "${bench_packages[@]}"
-  [[ " $* " == *" --help "* ]] || build_programs "${flying[@]}" sim_ctl sls_view sls_bench_probe sls_bench_spinning_probe sls_microbench
+  if [[ " $* " != *" --help "* ]]; then
+    if [[ -z ${SLS_BUILD:-} ]]; then
+      setup "${bench_packages[@]}"
+      install_node_modules "$root/tests/tools/view"
+    fi
+    build_programs "${flying[@]}" sim_ctl sls_view sls_bench_probe sls_bench_spinning_probe sls_microbench view_foxglove_publisher
+  fi
   PYTHONPATH="$root" exec /usr/bin/python3 -BP -m bench --build "$build" "$@"
 }
 
