@@ -24,7 +24,7 @@ _sls
 
 
 def complete(*words, folder=ROOT):
-    """What the last word can become."""
+    """The completions of the last word."""
     done = subprocess.run(["bash", "--norc", "-c", COMPLETE, "bash", FILE, *map(str, words)], cwd=folder,
                           capture_output=True, text=True, timeout=60)
     assert done.returncode == 0 and not done.stderr, done.stderr

@@ -73,7 +73,7 @@ Every key of a scenario file. [common/config](../../common/config/README.md) des
     sections = {}
     for key in sources.load_keys(build):
         section = sections.setdefault(re.split(r"[.\[]", key["path"])[0], {})
-        # What goes with a model has a table of its own; what goes with a channel says so.
+        # Keys of a model have a table of their own; keys of a channel say so.
         condition = to_condition(key) if key["condition"] else ""
         own_table = condition if key["condition"].startswith(("model", "law")) else ""
         meaning = key["meaning"] + (f" {condition}." if condition and not own_table else "")
@@ -102,7 +102,7 @@ def to_rows(items):
     rows = []
     for item in items:
         notes = ([item.range] if item.range else []) + [f"`{choice}`" for choice in item.choices]
-        # What the sentence says about the default is right on every machine; the number may not be.
+        # The default in the sentence is right on every machine; the number may not be.
         default = "" if re.search(r"\bdefault:", item.text) else item.default
         default = "required" if "required" in item.notes else f"`{default}`" if default else ""
         extra = "; ".join(note for note in item.notes if note != "required")

@@ -23,7 +23,7 @@ def read(path):
 
 
 def run(command, **more):
-    """What the command prints."""
+    """The output of the command."""
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=120, **more)
     except OSError as error:
