@@ -12,7 +12,7 @@ import { startBrowser, waitFor } from "../../tests/tools/view/page/browser.mjs";
 const root = join(dirname(fileURLToPath(import.meta.url)), "../..");
 const picture = join(root, "docs/pictures/live.png");
 const domain = process.argv[2] ?? "0";
-const kPauseTime = 21.5; // s of simulated time: on the second lap
+const kPauseTime = 17; // s of simulated time: on the second lap
 const kMostBytes = 300_000;
 
 const folder = mkdtempSync(join(tmpdir(), "sls-picture-"));
@@ -33,7 +33,7 @@ try {
   await waitFor("the pause", async () => (await state()).phase === "paused");
   await page.click("#fit");
   await page.focus("#scene");
-  for (let i = 0; i < 3; ++i) await page.keyboard.press("+");
+  for (let i = 0; i < 2; ++i) await page.keyboard.press("+");
   let last = -1; // frame: none is drawn once nothing changes
   await waitFor("the last frame", async () => {
     const frames = await page.evaluate(() => window.slsView.frames());
