@@ -16,7 +16,7 @@ const kPauseTime = 17; // s of simulated time: on the second lap
 const kMostBytes = 300_000;
 
 const folder = mkdtempSync(join(tmpdir(), "sls-picture-"));
-const flight = spawn(join(root, "sls"), ["run", "figure_eight", "--mode", "realtime", "--rtf", "1", "--view-port", "0",
+const flight = spawn(join(root, "sls"), ["run", "figure_eight", "--mode", "realtime", "--rtf", "0.5", "--view-port", "0",
                                          "--domain", domain, "--out", join(folder, "recording")],
                      { stdio: ["ignore", "inherit", "pipe"] });
 let log = "";
