@@ -94,7 +94,7 @@ class FlightTest(support.FolderTest):
             self.assertTrue((self.folder / f"r/figures/{name}.png").exists(), name)
             self.assertIn(f'<figure id="{name}">', (self.folder / "r/report.html").read_text())
 
-    def test_readme_and_study_show_what_the_demo_prints_beside_the_published_figures(self):
+    def test_documents_show_what_the_demo_prints_beside_the_published_figures(self):
         domain = self.enterContext(support.OwnDomain())
         printed = self.run_launcher("demo", "figure_eight", "--out", "r", "--domain", domain)
         table = re.search(r"Load position error on the second lap.*?\n\n", printed, re.DOTALL)[0]
@@ -104,7 +104,8 @@ class FlightTest(support.FolderTest):
         for row in PUBLISHED_LAP_2[1:]:
             self.assertRegex(table, rf"{re.escape(row[0])} +{' +'.join(row[1:])}\n")
             self.assertIn(f"| published: {' | '.join(row)} |", study_page)
-        self.assertIn(f"| published Gazebo log | {' | '.join(PUBLISHED_LAP_2[2][1:4])} |", readme)
+        results = (support.ROOT / "docs/results.md").read_text()
+        self.assertIn(f"| published Gazebo log | {' | '.join(PUBLISHED_LAP_2[2][1:4])} |", results)
 
     def start(self, program, *arguments):
         process = subprocess.Popen([f"{support.BUILD}/bin/{program}", *arguments], cwd=self.folder,

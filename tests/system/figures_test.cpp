@@ -14,7 +14,7 @@ TEST(FiguresTest, FigureEightAtOneMillisecondIsTrackedOnTheSecondLapAndLosesNoRo
   Flight flight(scenario("figure_eight"), {{}, {"--period-s", "0.001"}, {}});
   flight.expect_success();
   const TrackingError error = calc_tracking_error(flight.recording(), 16000, 32000);
-  // README.md, to its last digit. The hold alone explains 4.02e-4 m
+  // docs/results.md, to its last digit. The hold alone explains 4.02e-4 m
   // (tests/oracle/linear_theory.hpp); the rest is left of the first lap.
   EXPECT_NEAR(error.max.maxCoeff(), 4.06e-4, 0.005e-4);
   // Design, section 7: two digits.
@@ -57,8 +57,8 @@ TEST(FiguresTest, MatlabSetpointConvergesToThePublishedRunWithThePeriod) {
   RecordProperty("distance_at_1_ms_m", std::to_string(full));
   RecordProperty("distance_at_half_ms_m", std::to_string(half));
   std::printf("distance from the published run: %.3e m at 1 ms, %.3e m at 0.5 ms\n", full, half);
-  // Half a period of the load's largest speed, 0.45 m/s in z, which the hold delays: README.md, to
-  // its last digit.
+  // Half a period of the load's largest speed, 0.45 m/s in z, which the hold delays:
+  // docs/results.md, to its last digit.
   EXPECT_NEAR(full, 2.27e-4, 0.005e-4);
   EXPECT_NEAR(half, 1.13e-4, 0.005e-4);
 }

@@ -168,7 +168,7 @@ void expect_steady_error(const Flown& flown, double tolerance_z = 0.05,
         << "axis " << axis;
 }
 
-/// As printed in README.md: to half a unit of the last digit.
+/// As printed in docs/results.md: to half a unit of the last digit.
 void expect_printed(const Array3d& error, const Vector3d& printed, const Vector3d& last_digit) {
   for (int axis = 0; axis < 3; ++axis)
     EXPECT_NEAR(error[axis], printed[axis], 0.5 * last_digit[axis]) << "axis " << axis;

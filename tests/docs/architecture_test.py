@@ -1,0 +1,94 @@
+"""The documents name what there is: diagrams are drawn from the sources beside them, and files and functions
+that docs/architecture.md and the diagrams name exist."""
+
+import importlib.util
+import pathlib
+import re
+import sys
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+DIAGRAMS = ROOT / "docs/diagrams"
+PAGES = ["README.md", "CONTRIBUTING.md", *(f"docs/{name}.md" for name in (
+    "architecture", "design", "glossary", "limits", "results"))]
+CODE = (".cpp", ".hpp", ".h", ".py", ".ts")
+FOLDERS = ("bench", "closed_loop", "common", "control_client", "python", "recorder", "sim_server", "tests", "tools")
+
+
+def load_make():
+    spec = importlib.util.spec_from_file_location("make", DIAGRAMS / "make.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def read(name):
+    return (ROOT / name).read_text()
+
+
+def read_code():
+    """The whole text of the code."""
+    files = (path for folder in FOLDERS for path in sorted((ROOT / folder).rglob("*"))
+             if path.suffix in CODE and "node_modules" not in path.parts)
+    return "\n".join(path.read_text() for path in files)
+
+
+class ArchitectureTest(unittest.TestCase):
+    maxDiff = None
+    make = load_make()
+
+    def test_every_diagram_is_drawn_from_the_source_beside_it(self):
+        sources = self.make.list_sources()
+        self.assertGreater(len(sources), 4)
+        self.assertEqual({path.stem for path in DIAGRAMS.glob("*.svg")}, {path.stem for path in sources})
+        for source in sources:
+            last = source.with_suffix(".svg").read_text().splitlines()[-1]
+            self.assertEqual(last, self.make.calc_mark(source), "run docs/diagrams/make.py")
+
+    def test_the_layers_are_those_of_the_include_rules(self):
+        self.assertEqual((DIAGRAMS / "layers.dot").read_text(), self.make.draw_layers(), "run docs/diagrams/make.py")
+        self.assertGreater(len(self.make.read_rules()), 15)
+
+    def test_every_diagram_is_shown(self):
+        shown = {name for page in PAGES for name in re.findall(r"diagrams/(\w+)\.svg", read(page))}
+        self.assertEqual(shown, {path.stem for path in DIAGRAMS.glob("*.svg")})
+
+    def test_files_that_the_architecture_names_exist(self):
+        pages = read("docs/architecture.md") + "".join(path.read_text() for path in self.make.list_sources())
+        names = re.findall(r"\b(?:%s)/[\w./]+" % "|".join(FOLDERS), pages)
+        missing = [name for name in names if not (ROOT / name.rstrip(".")).exists()]
+        self.assertEqual(missing, [])
+        self.assertGreater(len(names), 40)
+
+    def test_functions_that_the_architecture_names_exist(self):
+        pages = read("docs/architecture.md") + "".join(path.read_text() for path in self.make.list_sources())
+        code = read_code()
+        names = sorted(set(re.findall(r"\b([A-Z]\w+)::(\w+)", pages)))
+        missing = [f"{kind}::{name}" for kind, name in names
+                   if not re.search(rf"\b(?:class|struct) {kind}\b", code) or not re.search(rf"\b{name}\b", code)]
+        self.assertEqual(missing, [])
+        self.assertGreater(len(names), 20)
+
+    def test_the_readme_is_short_and_its_picture_small(self):
+        self.assertLessEqual(len(read("README.md").splitlines()), 150)
+        self.assertLess((ROOT / "docs/pictures/live.png").stat().st_size, 300_000)
+
+    def test_the_commands_of_the_readme_exist(self):
+        commands = re.findall(r"\./sls ([a-z][\w-]*)", read("README.md"))
+        known = ["help", *re.findall(r"^cmd_([\w-]+)\(\)", read("sls"), re.MULTILINE)]
+        self.assertEqual([name for name in commands if name not in known], [])
+        self.assertIn("./sls test", read("README.md"))
+
+    def test_lines_fit(self):
+        long = [f"{page}:{number}" for page in PAGES for number, line in enumerate(read(page).splitlines(), 1)
+                if len(line) > 120 and not line.startswith(("|", "    "))]
+        self.assertEqual(long, [])
+
+    def test_each_term_of_the_glossary_stands_once_and_in_order(self):
+        terms = [term.lower() for term in re.findall(r"^\| \*\*(.+?)\*\*", read("docs/glossary.md"), re.MULTILINE)]
+        self.assertEqual(terms, sorted(set(terms)))
+        self.assertGreater(len(terms), 30)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])
