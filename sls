@@ -115,6 +115,8 @@ usage: ./sls COMMAND [OPTIONS]
   clean              remove what was built
   help               this text
 
+environment: SLS_DOMAIN is the DDS domain of every program that is not given --domain
+
 exit codes: 0 done; 1 the run or a test failed; 2 bad usage or bad configuration; 130/143 interrupted
 EOF
 }
