@@ -11,6 +11,7 @@ The document marks its blocks with comments, which a reader does not see:
     <!-- needs: hosts -->                  runs only where these hosts are; `docker`: where an engine and image are
     <!-- exit: 2 -->                       its last command ends with 2 (default: 0)
     <!-- any order -->                     its lines come in any order: several programs print them
+    <!-- waits -->                         the document goes on when its commands have ended, as those of terminal 1
     <!-- when 2 shows: TEXT -->            runs only after terminal 2 has printed TEXT
     <!-- checked: page -->                 after it, the page's address must answer; `foxglove`: as a Foxglove server
 
@@ -40,7 +41,7 @@ import urllib.request
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 DOCUMENT = ROOT / "docs/tutorial.md"
 PAGE_PORT = "8765"  # as the document has it
-COMMAND_S = 60  # more than any command of the document takes on a busy machine
+COMMAND_S = 100  # more than any command of the document takes on a busy machine
 
 VARYING = [(re.compile(pattern), name) for pattern, name in (
     (r"\b[0-9a-f]{16}\b", "RUN_ID"),
@@ -106,7 +107,7 @@ def read_document(text):
             steps.append(None)
         elif found := re.fullmatch(r"<!-- (when \S+ shows|[a-z]+(?: order)?)(?:: (.*))? -->", line):
             if found[1].startswith("when "):
-                marks["when"] = (found[1].split()[1], found[2])
+                marks.setdefault("when", []).append((found[1].split()[1], found[2]))
             else:
                 marks[found[1]] = found[2]
         elif line.startswith("```"):
@@ -343,7 +344,7 @@ def find_free_port():
 
 def expect_page(port):
     with urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=20) as page:
-        if b"<html" not in page.read():
+        if not page.read().lower().startswith(b"<!doctype html>"):
             raise Failure(f"no page on port {port}")
 
 
@@ -408,8 +409,7 @@ class Reader:
         if obstacle := self.find_obstacle(block):
             self.skipped.append(f"line {block.line}: {obstacle}")
             return
-        if "when" in marks:
-            name, text = marks["when"]
+        for name, text in marks.get("when", ()):
             next(terminal for (other, _), terminal in self.terminals.items() if other == name).wait_for(text)
         terminal = self.find_terminal(block)
         for command in block.commands:
@@ -425,7 +425,7 @@ class Reader:
             command.shown = [line.replace(PAGE_PORT, self.port) for line in command.shown]
             is_last = command is block.commands[-1]
             terminal.start(command, int(marks.get("exit", 0)) if is_last else 0, "any order" in marks)
-            if terminal.name == "1":
+            if terminal.name == "1" or "waits" in marks:
                 terminal.finish()
         if "checked" in marks:
             terminal.wait_for(f"page: http://127.0.0.1:{self.port}/")
@@ -434,7 +434,10 @@ class Reader:
     def end_chapter(self):
         for terminal in self.terminals.values():
             terminal.finish()
-            if left := terminal.find_descendants():
+            deadline = time.monotonic() + 20  # for what runs in the background
+            while (left := terminal.find_descendants()) and time.monotonic() < deadline:
+                time.sleep(0.02)
+            if left:
                 raise Failure(f"terminal {terminal.name} still runs something at the end of the chapter: {left}")
 
     def say(self, text):
