@@ -232,9 +232,11 @@ class Terminal:
                 if difference:
                     raise Failure(said + f"{difference}; it printed\n" + "\n".join(came))
 
-    def wait_for(self, text, timeout_s=COMMAND_S):
+    def wait_for(self, text, begin, timeout_s=COMMAND_S):
+        """Waits until a line from `begin` on holds `text`."""
         with self.changed:
-            if not self.changed.wait_for(lambda: any(text in (line or "") for line in self.lines), timeout_s):
+            if not self.changed.wait_for(lambda: any(text in (line or "") for line in self.lines[begin:]),
+                                         timeout_s):
                 raise Failure(f"terminal {self.name} has not printed '{text}' within {timeout_s} s but\n"
                               + "\n".join(map(str, self.lines)))
 
@@ -344,7 +346,7 @@ def find_free_port():
 
 def expect_page(port):
     with urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=20) as page:
-        if not page.read().lower().startswith(b"<!doctype html>"):
+        if page.headers.get_content_type() != "text/html" or not page.read():
             raise Failure(f"no page on port {port}")
 
 
@@ -410,7 +412,8 @@ class Reader:
             self.skipped.append(f"line {block.line}: {obstacle}")
             return
         for name, text in marks.get("when", ()):
-            next(terminal for (other, _), terminal in self.terminals.items() if other == name).wait_for(text)
+            next(terminal for (other, _), terminal in self.terminals.items() if other == name).wait_for(
+                text, 0)
         terminal = self.find_terminal(block)
         for command in block.commands:
             self.ran += 1
@@ -428,7 +431,7 @@ class Reader:
             if terminal.name == "1" or "waits" in marks:
                 terminal.finish()
         if "checked" in marks:
-            terminal.wait_for(f"page: http://127.0.0.1:{self.port}/")
+            terminal.wait_for(f"page: http://127.0.0.1:{self.port}/", terminal.begin)
             CHECKS[marks["checked"]](self.port)
 
     def end_chapter(self):
