@@ -314,8 +314,9 @@ def find_docker_obstacle():
     image = os.environ.get("SLS_IMAGE")
     if not image:
         return "SLS_IMAGE names no image"
-    done = subprocess.run(["docker", "image", "inspect", image], capture_output=True) if shutil.which("docker") else None
-    return None if done and done.returncode == 0 else f"no Docker engine with the image {image}"
+    command = ["docker", "image", "inspect", image]
+    has_image = shutil.which("docker") and subprocess.run(command, capture_output=True).returncode == 0
+    return None if has_image else f"no Docker engine with the image {image}"
 
 
 class OwnDomain:
@@ -347,7 +348,7 @@ def find_free_port():
 def expect_page(port):
     with urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=20) as page:
         if page.headers.get_content_type() != "text/html" or not page.read():
-            raise Failure(f"no page on port {port}")
+            raise Failure(f" no page on port {port}")
 
 
 def expect_foxglove(port):
@@ -362,7 +363,7 @@ def expect_foxglove(port):
         while b'"serverInfo"' not in received:
             part = connection.recv(4096)
             if not part:
-                raise Failure(f"no Foxglove server on port {port}: {received.decode(errors='replace')}")
+                raise Failure(f" no Foxglove server on port {port}: {received.decode(errors='replace')}")
             received += part
 
 
@@ -432,7 +433,10 @@ class Reader:
                 terminal.finish()
         if "checked" in marks:
             terminal.wait_for(f"page: http://127.0.0.1:{self.port}/", terminal.begin)
-            CHECKS[marks["checked"]](self.port)
+            try:
+                CHECKS[marks["checked"]](self.port)
+            except OSError as error:
+                raise Failure(f"{block.line}: {error}") from error
 
     def end_chapter(self):
         for terminal in self.terminals.values():
