@@ -608,7 +608,7 @@ cmd_test() {
   build_tree "$preset" "$folder" "${targets[@]}"
   cd "$root"
   # Nothing the middleware reads from the environment may reach the tests.
-  env -u ROS_DISCOVERY_SERVER -u FASTRTPS_DEFAULT_PROFILES_FILE \
+  env -u ROS_DISCOVERY_SERVER -u FASTRTPS_DEFAULT_PROFILES_FILE -u SLS_DOMAIN \
     ctest --preset "$preset" --parallel "$(nproc)" "${which[@]}"
 }
 
