@@ -13,9 +13,9 @@ readonly packages=(g++ make cmake libeigen3-dev libsimbody-dev libfastrtps-dev l
 readonly fuzz_packages=(clang libclang-rt-14-dev)
 readonly fuzzers=(scenario qos_file csv recording samples foxglove web)
 readonly test_packages=(iproute2 nftables cyclonedds-dev cyclonedds-tools fastdds-tools libfaketime python3-kubernetes
-  python3-pytest slurm-wlm munge python3-distributed chromium)
+  python3-pytest slurm-wlm munge python3-distributed chromium mandoc)
 readonly python_packages=(python3-numpy python3-scipy python3-matplotlib python3-yaml)
-readonly bench_packages=(libbenchmark-dev python3-matplotlib)
+readonly bench_packages=(libbenchmark-dev python3-matplotlib chromium)
 
 say() { echo "sls: $*" >&2; }
 fail() { say "error: $1"; exit "${2:-1}"; }
@@ -89,7 +89,7 @@ usage: ./sls COMMAND [OPTIONS]
                      an idle machine
       --quick          one short round of everything: whether it works
       --json FILE      the figures of every round
-      --only NAME…     lockstep, load, round-trip, realtime, plant, recorder, campaign, fleet, qos or view alone
+      --only NAME…     lockstep, load, round-trip, realtime, plant, recorder, campaign, fleet, qos, view or page alone
       --out DIR        plots
   test               set up, build, run every test
       --slow           the ones that take minutes, too; they need an idle machine
@@ -110,6 +110,9 @@ usage: ./sls COMMAND [OPTIONS]
   fuzz               feed everything that reads files or samples with mutated ones, until one crashes
       --seconds N      for all targets together (default: 60)
       --target NAME    this one alone: scenario, qos_file, csv, recording, samples, foxglove or web
+  reference          write docs/reference and tools/completion again, from the code's own tables
+      --man DIR        write the man pages to DIR instead
+      --check          write nothing; ends 1 where a file is stale
   setup              install the packages that building and flying need
   build              set up and build; the programs are in build/bin
   clean              remove what was built
@@ -433,8 +436,13 @@ cmd_delay-margin() {
 }
 
 cmd_bench() {
-  [[ " $* " == *" --help "* || -n ${SLS_BUILD:-} ]] || setup "${bench_packages[@]}"
-  [[ " $* " == *" --help "* ]] || build_programs "${flying[@]}" sim_ctl sls_view sls_bench_probe sls_bench_spinning_probe sls_microbench
+  if [[ " $* " != *" --help "* ]]; then
+    if [[ -z ${SLS_BUILD:-} ]]; then
+      setup "${bench_packages[@]}"
+      install_node_modules "$root/tests/tools/view"
+    fi
+    build_programs "${flying[@]}" sim_ctl sls_view sls_bench_probe sls_bench_spinning_probe sls_microbench view_foxglove_publisher
+  fi
   PYTHONPATH="$root" exec /usr/bin/python3 -BP -m bench --build "$build" "$@"
 }
 
@@ -610,6 +618,12 @@ cmd_test() {
   # Nothing the middleware reads from the environment may reach the tests.
   env -u ROS_DISCOVERY_SERVER -u FASTRTPS_DEFAULT_PROFILES_FILE -u SLS_DOMAIN \
     ctest --preset "$preset" --parallel "$(nproc)" "${which[@]}"
+}
+
+cmd_reference() {
+  install_missing "${python_packages[@]}"
+  build_programs "${programs[@]}" _sls_core sls_scenario_keys network_table chaos
+  exec /usr/bin/python3 -B "$root/tools/reference" --build "$build" "$@"
 }
 
 cmd_clean() { rm -rf "$root"/build "$root"/build-*; }

@@ -48,6 +48,9 @@ build_image() {
   [[ -z ${SLS_IMAGE:-} ]] || return 0
   local base=${SLS_BASE:-debian:bookworm-slim} log
   make_base "$base"
+  if command -v npm >/dev/null; then
+    install_node_modules "$root/tools/view/page"  # this machine may trust a proxy that the base image does not
+  fi
   log="$(mktemp)"
   say "building the image sls, for the first time some minutes (log: $log)"
   if ! docker build --build-arg "BASE=$base" -f "$root/docker/Dockerfile" -t sls "$root" >"$log" 2>&1; then

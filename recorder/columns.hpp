@@ -1,5 +1,5 @@
 /// One table of columns for all files: each row type of rows.hpp visits its fields with them, and
-/// header, row, reader, certificate and README.md go by that.
+/// header, row, reader, certificate and reference page go by that.
 #pragma once
 
 #include <string>
@@ -65,7 +65,7 @@ std::string make_header() {
 std::string make_state_header(const Parameters& parameters);
 std::string make_flight_header(bool is_of_fleet);
 
-/// Every file's columns as Markdown: what README.md shows.
+/// Every file's columns as Markdown, for docs/reference/recordings.md.
 std::string describe_columns();
 
 }  // namespace sls::record

@@ -48,6 +48,7 @@ const std::vector<Rule> kRules = {
     {"tools/ctl", {"common"}},
     {"tools/delay_margin", {"closed_loop", "common"}},
     {"tools/doctor", {"common", "Wire", "Fast DDS"}},
+    {"tools/reference", {"common/config"}},
     {"tools/verify", {"common", "recorder"}},
     {"tools/view",
      {"common", "control_client/reference_trajectory.hpp", "recorder",

@@ -10,9 +10,9 @@
 namespace sls::app {
 
 /// Exit codes of all programs. Interrupted: 130 (SIGINT) or 143 (SIGTERM).
-inline constexpr int kExitDone = 0;
-inline constexpr int kExitRunFailed = 1;
-inline constexpr int kExitBadUsage = 2;
+inline constexpr int kExitDone = 0;       ///< The work is done.
+inline constexpr int kExitRunFailed = 1;  ///< The run failed, or the comparison found a difference.
+inline constexpr int kExitBadUsage = 2;   ///< The command line or a file is wrong.
 
 /// The run failed: the mission was not finished, a peer was lost, data was lost. Exit code 1.
 class RunError : public std::runtime_error {

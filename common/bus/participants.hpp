@@ -20,7 +20,7 @@
 namespace sls::bus {
 
 /// Somebody who announces himself at least every 0.5 s and has not for so long is taken for dead,
-/// until he is heard again. (The middleware's lease is much longer: config/qos/README.md.)
+/// until he is heard again. (The middleware's lease is much longer: docs/networks.md.)
 inline constexpr auto kSilenceOfTheDead = std::chrono::seconds(2);
 
 /// The last announcement of every controller and recorder that is still there. Of 256 participants

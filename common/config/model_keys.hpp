@@ -12,6 +12,7 @@
 
 namespace sls::config {
 
+class KeyLister;
 class KeyNames;
 class MapReader;
 class MapWriter;
@@ -22,6 +23,7 @@ template <class Section>
 class ModelKeys {
  public:
   virtual ~ModelKeys() = default;
+  virtual void describe(KeyLister& map, Section& section) const = 0;
   virtual void describe(KeyNames& map, Section& section) const = 0;
   virtual void describe(MapReader& map, Section& section) const = 0;
   virtual void describe(MapWriter& map, Section& section) const = 0;

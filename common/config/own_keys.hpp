@@ -8,6 +8,7 @@
 ///     const config::OwnKeys<config::Controller, PidKeys> kKeys;  // keys.cpp, for the registry
 #pragma once
 
+#include "common/config/key_lister.hpp"
 #include "common/config/model_keys.hpp"
 #include "common/config/scenario_reader.hpp"
 #include "common/config/scenario_writer.hpp"
@@ -17,6 +18,7 @@ namespace sls::config {
 template <class Section, class Own>
 class OwnKeys : public ModelKeys<Section> {
  public:
+  void describe(KeyLister& map, Section& section) const override { describe_with(map, section); }
   void describe(KeyNames& map, Section& section) const override { describe_with(map, section); }
   void describe(MapReader& map, Section& section) const override { describe_with(map, section); }
   void describe(MapWriter& map, Section& section) const override { describe_with(map, section); }

@@ -1,5 +1,6 @@
-/// A scenario: everything that decides a run. Read from one YAML file (README.md lists every key).
-/// Programs and tests share these plain structs; all values are SI, times whole nanoseconds.
+/// A scenario: everything that decides a run. Read from one YAML file; docs/reference/scenario.md
+/// lists its keys. Programs and tests share these plain structs; all values are SI, times whole
+/// nanoseconds.
 #pragma once
 
 #include <Eigen/Core>

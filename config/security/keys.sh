@@ -136,7 +136,7 @@ make_authorities() {
   make_authority identity "$name"
   make_authority permissions "$name"
   # Other vendors' readers send keys only where submessages are protected, and without those keys Fast
-  # DDS sends them nothing: common/bus/fastdds/README.md, trap 25.
+  # DDS sends them nothing: common/bus/fastdds/README.md, trap 28.
   sed "s|<metadata_protection_kind>NONE<|<metadata_protection_kind>$submessages<|" \
     "$here/governance.xml" >"$work/governance.xml"
   sign_document "$work/governance.xml" "$ca/governance.p7s"

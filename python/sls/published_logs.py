@@ -1,4 +1,4 @@
-"""The log files of the published study, as flights. Their columns are in python/README.md."""
+"""The log files of the published study, as flights. Their columns: docs/figures.md."""
 
 from dataclasses import dataclass
 from pathlib import Path

@@ -84,8 +84,8 @@ class OwnDomain:
 
 def read_header(file):
     """The columns of a file of the recorder, of a plant without signals."""
-    readme = (ROOT / "recorder/README.md").read_text()
-    table = readme[readme.index(f"\n`{file}`", readme.index("## Columns")):].split("\n\n")[1]
+    page = (ROOT / "docs/reference/recordings.md").read_text()
+    table = page[page.index(f"\n## {file}"):].split("\n\n")[1].rstrip()
     rows = [line.split(" | ") for line in table.split("\n")[2:]]
     return ",".join(name for row in rows if "`truth.q_WB`" not in row[3]
                     and "`truth.w_WB_B" not in row[3] and "`truth.signals`" not in row[3]

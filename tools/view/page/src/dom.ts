@@ -70,13 +70,14 @@ export function confirmAction(title: string, text: string, action: string): Prom
   dialog.showModal();
   no.focus();
   return new Promise((resolve) => {
-    let answer = false;
-    no.onclick = () => dialog.close();
-    yes.onclick = () => {
-      answer = true;
+    // Not by the event `close`: it comes later, and may then meet the next question.
+    const settle = (answer: boolean) => {
       dialog.close();
+      resolve(answer);
     };
-    dialog.onclose = () => resolve(answer);
+    no.onclick = () => settle(false);
+    yes.onclick = () => settle(true);
+    dialog.oncancel = () => resolve(false); // Escape
   });
 }
 

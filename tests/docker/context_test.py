@@ -1,0 +1,50 @@
+"""The build context of docker/Dockerfile: .dockerignore lets through all that it copies and that CMake builds without
+tests. Needs no Docker engine."""
+
+import pathlib
+import re
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+
+
+def list_allowed():
+    """Paths that .dockerignore lets through after its first pattern, which leaves out everything."""
+    lines = (ROOT / ".dockerignore").read_text(encoding="utf-8").split("\n")
+    patterns = [line for line in lines if line and not line.startswith("#")]
+    assert patterns[0] == "*"
+    return {pattern[1:] for pattern in patterns if pattern.startswith("!")}
+
+
+def is_let_through(path):
+    parts = pathlib.PurePosixPath(path).parts
+    return any("/".join(parts[:end]) in list_allowed() for end in range(1, len(parts) + 1))
+
+
+def list_folders_of_cmake():
+    """What the root CMakeLists.txt adds or installs where SLS_BUILD_TESTS and SLS_BUILD_FUZZERS are off."""
+    text = (ROOT / "CMakeLists.txt").read_text(encoding="utf-8")
+    text = re.sub(r"if\(SLS_BUILD_(TESTS|FUZZERS).*?endif\(\)", "", text, flags=re.DOTALL)
+    return re.findall(r"add_subdirectory\((\S+)\)", text)
+
+
+def list_copied():
+    text = (ROOT / "docker/Dockerfile").read_text(encoding="utf-8")
+    copies = re.findall(r"^COPY (?!--from)(.+) \S+$", text, flags=re.MULTILINE)
+    return [path.rstrip("/") for copy in copies for path in copy.split() if path != "."]
+
+
+class ContextTest(unittest.TestCase):
+    def test_all_that_cmake_builds_is_in_the_context(self):
+        folders = list_folders_of_cmake()
+        self.assertIn("sim_server", folders)
+        self.assertEqual([folder for folder in folders if not is_let_through(folder)], [])
+
+    def test_all_that_the_dockerfile_copies_is_in_the_context(self):
+        copied = list_copied()
+        self.assertIn("config", copied)
+        self.assertEqual([path for path in copied if not is_let_through(path)], [])
+
+
+if __name__ == "__main__":
+    unittest.main()

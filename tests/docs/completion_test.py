@@ -1,0 +1,96 @@
+"""tools/completion/sls.bash completes the command line in a bash, as the launcher and the folders say."""
+
+import os
+import pathlib
+import pty
+import re
+import select
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+FILE = ROOT / "tools/completion/sls.bash"
+del sys.argv[1:]  # the build tree
+
+COMPLETE = """
+source "$1"; shift
+COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1))
+_sls
+((${#COMPREPLY[@]} == 0)) || printf '%s\\n' "${COMPREPLY[@]}"
+"""
+
+
+def complete(*words, folder=ROOT):
+    """The completions of the last word."""
+    done = subprocess.run(["bash", "--norc", "-c", COMPLETE, "bash", FILE, *map(str, words)], cwd=folder,
+                          capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0 and not done.stderr, done.stderr
+    return done.stdout.splitlines()
+
+
+def list_names(folder):
+    return {file.stem for file in (ROOT / "config" / folder).glob("*.yaml")}
+
+
+class Completion(unittest.TestCase):
+    def test_knows_every_command_of_the_launcher(self):
+        launcher = (ROOT / "sls").read_text(encoding="utf-8")
+        commands = set(re.findall(r"^cmd_([\w-]+)\(\)", launcher, re.MULTILINE)) | {"help"}
+        self.assertEqual(set(complete("./sls", "")), commands)
+        self.assertEqual(complete("./sls", "ru"), ["run"])
+
+    def test_offers_scenarios(self):
+        self.assertLessEqual(list_names("scenarios"), set(complete("./sls", "run", "")))
+        self.assertEqual(complete("./sls", "run", "figure_eight_"), ["figure_eight_pid"])
+        self.assertEqual(complete("./sls", "run", "config/scenarios/figure_eight_"),
+                         ["config/scenarios/figure_eight_pid.yaml"])
+
+    def test_offers_campaigns(self):
+        self.assertLessEqual(list_names("campaigns"), set(complete("./sls", "campaign", "")))
+        self.assertIn("status", complete("./sls", "campaign", "st"))
+
+    def test_offers_options_and_their_values(self):
+        self.assertEqual(complete("./sls", "run", "--mo"), ["--mode"])
+        self.assertEqual(complete("./sls", "run", "--mode", ""), ["lockstep", "realtime"])
+        self.assertEqual(complete("./sls", "run", "--domain", ""), [])
+        self.assertIn("--watch", complete("./sls", "ctl", "status", "--"))
+        self.assertEqual(complete("./sls", "ctl", "pau"), ["pause"])
+
+    def test_offers_files_and_folders(self):
+        self.assertEqual(complete("./sls", "run", "--qos", "config/qos/def"), ["config/qos/default.xml"])
+        self.assertEqual(complete("./sls", "verify", "conf"), ["config"])
+
+    def test_offers_what_an_installed_launcher_finds(self):
+        with tempfile.TemporaryDirectory() as folder:
+            launcher = pathlib.Path(folder) / "bin/sls"
+            scenarios = pathlib.Path(folder) / "share/sls/config/scenarios"
+            launcher.parent.mkdir()
+            launcher.write_text("#!/bin/sh\n")
+            launcher.chmod(0o755)
+            scenarios.mkdir(parents=True)
+            (scenarios / "installed_one.yaml").touch()
+            self.assertEqual(complete(launcher, "run", "installed", folder=folder), ["installed_one"])
+
+    def test_is_used_by_an_interactive_bash(self):
+        typed = f"source {FILE}\n./sls discovery-s\tX\n"
+        process, terminal = pty.fork()
+        if process == 0:
+            os.chdir(ROOT)
+            os.execvpe("bash", ["bash", "--norc", "--noprofile", "-i"], dict(os.environ, TERM="dumb", HISTFILE=""))
+        shown, deadline = b"", time.monotonic() + 30
+        try:
+            os.write(terminal, typed.encode())
+            while b"./sls discovery-server X" not in shown and time.monotonic() < deadline:
+                if select.select([terminal], [], [], 0.2)[0]:
+                    shown += os.read(terminal, 65536)
+        finally:
+            os.close(terminal)  # hangs up
+            os.waitpid(process, 0)
+        self.assertIn(b"./sls discovery-server X", shown)
+
+
+if __name__ == "__main__":
+    unittest.main()

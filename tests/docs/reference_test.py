@@ -1,0 +1,70 @@
+"""docs/reference is what the built programs say; the man pages are well formed.
+
+Its argument is the build tree.
+"""
+
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import yaml
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+BUILD = pathlib.Path(sys.argv.pop(1)) if len(sys.argv) > 1 else ROOT / "build"
+
+
+def run_reference(*arguments):
+    return subprocess.run(["/usr/bin/python3", "-B", ROOT / "tools/reference", "--build", BUILD, *arguments],
+                          capture_output=True, text=True, timeout=300)
+
+
+def lint(page):
+    return subprocess.run(["mandoc", "-T", "lint", "-W", "warning", page], capture_output=True, text=True).stdout
+
+
+class Reference(unittest.TestCase):
+    def test_is_what_the_programs_say(self):
+        done = run_reference("--check")
+        self.assertEqual(done.returncode, 0, f"renew docs/reference with: ./sls reference\n{done.stdout}{done.stderr}")
+
+    def test_names_every_key_of_the_shipped_scenarios(self):
+        page = (ROOT / "docs/reference/scenario.md").read_text(encoding="utf-8")
+
+        def list_paths(node, path=""):
+            if isinstance(node, dict):
+                for key, value in node.items():
+                    below = f"{path}.{key}" if path else key
+                    yield below
+                    yield from list_paths(value, below)
+            elif isinstance(node, list):
+                for value in node:
+                    yield from list_paths(value, path + "[i]") if isinstance(value, dict) else ()
+
+        for file in sorted((ROOT / "config/scenarios").glob("*.yaml")):
+            for path in list_paths(yaml.load(file.read_text(encoding="utf-8"), yaml.BaseLoader)):
+                self.assertTrue(f"| `{path}` |" in page, f"{file.name}: {path}")
+
+
+class ManPages(unittest.TestCase):
+    def test_are_well_formed(self):
+        with tempfile.TemporaryDirectory() as folder:
+            done = run_reference("--man", folder)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            pages = sorted(pathlib.Path(folder).iterdir())
+            names = [page.name for page in pages]
+            self.assertIn("sls.1", names)
+            self.assertIn("sim_server.1", names)
+            for page in pages:
+                self.assertEqual(lint(page), "", page.name)
+
+    def test_lint_finds_a_mistake(self):
+        with tempfile.NamedTemporaryFile("w", suffix=".1") as page:
+            page.write('.TH X 1 2026-01-01\n.SH NAME\nx \\- y\n.XX\n')
+            page.flush()
+            self.assertNotEqual(lint(page.name), "")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,160 @@
+# Completion of ./sls and sls in bash. To use it: source tools/completion/sls.bash
+# Generated from the help of ./sls and of the programs by ./sls reference; changes here are lost.
+# tests/docs/completion_test.py completes with it. shellcheck shell=bash
+
+_sls_commands="bench build campaign campaign-worker chaos clean convert ctl delay-margin demo discovery-server docker-demo doctor fuzz help keys network-table plot python reference report run setup study test verify view"
+declare -gA _sls_options=(
+  ["bench"]="--quick --json --only --out"
+  ["campaign"]="--help --out --on --workers --runs --resume --verify --domain --chunk-runs --sbatch --scheduler --allow-other-machines"
+  ["chaos"]="--trials --seed --verbose"
+  ["convert"]="--out --force"
+  ["ctl"]="--help --qos --domain --log-level --version --vehicle --timeout-s --watch --json"
+  ["delay-margin"]="--period-s"
+  ["discovery-server"]="--listen --port"
+  ["doctor"]="--qos --domain --peer --json --answer"
+  ["fuzz"]="--seconds --target"
+  ["keys"]="--days --force --other-vendors --add"
+  ["network-table"]="--help --profile --disturbance --vehicles"
+  ["plot"]="--help --out --name --vehicle --format --rod-length-m"
+  ["reference"]="--man --check"
+  ["report"]="--vehicle"
+  ["run"]="--out --force --qos --domain --period-s --mode --rtf --in-process --view --view-port"
+  ["study"]="--help --out --recordings --reuse --published --domain"
+  ["test"]="--slow --sanitize"
+  ["view"]="--help --qos --domain --log-level --version --vehicle --listen --port --token-file --read-only --allow-origin --ros --identity --export --most-bytes"
+)
+declare -gA _sls_subcommands=(
+  ["campaign"]="status report compare"
+  ["ctl"]="pause step resume start reset stop status"
+)
+declare -gA _sls_positionals=(
+  ["campaign"]="campaign"
+  ["campaign-worker"]="dir"
+  ["convert"]="dir"
+  ["delay-margin"]="scenario"
+  ["demo"]="scenario"
+  ["keys"]="dir"
+  ["plot"]="dir"
+  ["report"]="dir"
+  ["run"]="scenario"
+  ["verify"]="dir"
+  ["view"]="dir"
+)
+declare -gA _sls_arguments=(
+  ["bench --json"]="file"
+  ["bench --only"]="lockstep load round-trip realtime plant recorder campaign fleet qos view page"
+  ["bench --out"]="dir"
+  ["campaign --chunk-runs"]="any"
+  ["campaign --domain"]="any"
+  ["campaign --on"]="local slurm dask"
+  ["campaign --out"]="dir"
+  ["campaign --runs"]="any"
+  ["campaign --sbatch"]="any"
+  ["campaign --scheduler"]="any"
+  ["campaign --verify"]="any"
+  ["campaign --workers"]="any"
+  ["chaos --seed"]="any"
+  ["chaos --trials"]="any"
+  ["convert --out"]="file"
+  ["ctl --domain"]="any"
+  ["ctl --log-level"]="debug info warning error"
+  ["ctl --qos"]="file"
+  ["ctl --timeout-s"]="any"
+  ["ctl --vehicle"]="any"
+  ["delay-margin --period-s"]="any"
+  ["discovery-server --listen"]="any"
+  ["discovery-server --port"]="any"
+  ["doctor --domain"]="any"
+  ["doctor --peer"]="any"
+  ["doctor --qos"]="file"
+  ["fuzz --seconds"]="any"
+  ["fuzz --target"]="scenario qos_file csv recording samples foxglove web"
+  ["keys --add"]="any"
+  ["keys --days"]="any"
+  ["network-table --disturbance"]="any"
+  ["network-table --profile"]="any"
+  ["network-table --vehicles"]="any"
+  ["plot --format"]="matlab-setpoint matlab-trajectory gazebo px4"
+  ["plot --name"]="any"
+  ["plot --out"]="dir"
+  ["plot --rod-length-m"]="any"
+  ["plot --vehicle"]="any"
+  ["reference --man"]="dir"
+  ["report --vehicle"]="any"
+  ["run --domain"]="any"
+  ["run --mode"]="lockstep realtime"
+  ["run --out"]="dir"
+  ["run --period-s"]="any"
+  ["run --qos"]="file"
+  ["run --rtf"]="any"
+  ["run --view-port"]="any"
+  ["study --domain"]="any"
+  ["study --out"]="dir"
+  ["study --published"]="dir"
+  ["study --recordings"]="dir"
+  ["test --sanitize"]="any"
+  ["view --allow-origin"]="any"
+  ["view --domain"]="any"
+  ["view --export"]="file"
+  ["view --identity"]="any"
+  ["view --listen"]="any"
+  ["view --log-level"]="debug info warning error"
+  ["view --most-bytes"]="any"
+  ["view --port"]="any"
+  ["view --qos"]="file"
+  ["view --token-file"]="file"
+  ["view --vehicle"]="any"
+)
+
+# _sls_names KIND: names of the scenarios or campaigns that the launcher finds.
+_sls_names() {
+  local launcher folder file
+  launcher="$(type -P -- "${COMP_WORDS[0]/#\~/$HOME}")" || launcher=$PWD/sls
+  folder="$(dirname -- "$(readlink -f -- "$launcher")")"
+  for folder in "$folder/config" "$folder/../share/sls/config" /usr/share/sls/config; do
+    for file in "$folder/$1"/*.yaml; do
+      [[ -f $file ]] || continue
+      file=${file##*/}
+      echo "${file%.yaml}"
+    done
+  done
+}
+
+# _sls_values KIND WORD: what WORD can become. KIND is file, dir, scenario, campaign or the values themselves.
+_sls_values() {
+  case $1 in
+    file) compgen -f -- "$2" ;;
+    dir) compgen -d -- "$2" ;;
+    scenario) compgen -W "$(_sls_names scenarios)" -- "$2"; compgen -f -X '!*.yaml' -- "$2"; compgen -d -- "$2" ;;
+    campaign) compgen -W "$(_sls_names campaigns)" -- "$2"; compgen -f -X '!*.yaml' -- "$2"; compgen -d -- "$2" ;;
+    any) ;;
+    *) compgen -W "$1" -- "$2" ;;
+  esac
+}
+
+_sls() {
+  local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD - 1]} command=${COMP_WORDS[1]} kind=''
+  COMPREPLY=()
+  if ((COMP_CWORD == 1)); then
+    kind=$_sls_commands
+  elif [[ -n ${_sls_arguments["$command $previous"]-} ]]; then
+    kind=${_sls_arguments["$command $previous"]}
+  elif [[ $current == -* ]]; then
+    kind=${_sls_options["$command"]-}
+  elif [[ -n ${_sls_subcommands["$command"]-} ]] && ((COMP_CWORD == 2)); then
+    mapfile -t COMPREPLY < <(compgen -W "${_sls_subcommands["$command"]}" -- "$current")
+    kind=${_sls_positionals["$command"]-any}
+  else
+    kind=${_sls_positionals["$command"]-file}
+  fi
+  local values
+  mapfile -t values < <(_sls_values "$kind" "$current" | sort -u)
+  COMPREPLY+=("${values[@]}")
+  case $kind in
+    file | dir | scenario | campaign) compopt -o filenames 2>/dev/null ;;
+  esac
+  return 0
+}
+
+# Bash uses it for every path that ends in sls, ./sls too.
+complete -F _sls sls

@@ -1,0 +1,231 @@
+"""The pages of docs/reference as Markdown."""
+
+import re
+
+import sources
+
+NOTE = ("<!-- Generated from the code's own tables by ./sls reference; changes here are lost. "
+        "tests/docs/reference_test.py compares. -->\n")
+
+
+def escape(text):
+    return text.replace("|", "\\|")
+
+
+def make_table(head, rows):
+    lines = ["| " + " | ".join(head) + " |", "|" + " --- |" * len(head)]
+    lines += ["| " + " | ".join(escape(cell) for cell in row) + " |" for row in rows]
+    return "\n".join(lines) + "\n"
+
+
+def shorten_number(text):
+    return re.sub(r"-?\d+\.\d{7,}", lambda match: f"{float(match[0]):.6g}", text)
+
+
+def to_range(key):
+    text = key["range"]
+    if key["type"] == "name or path":
+        names = text.removesuffix(" or a shared library (a path ending in .so)").split(", ")
+        text = ", ".join(f"`{name}`" for name in names) + ", or a path ending in `.so`"
+    elif key["type"] != "text":
+        text = re.sub(r"\b(?:radians )?from ", "", text)
+        text = re.sub(r"\bpi\b", "π", text).replace("-", "−").replace(">=", "≥").replace("<=", "≤")
+    if key["also"].startswith(">"):
+        return key["also"]  # stricter than the rule for the value alone
+    return ("; " if text and key["also"] else "").join([text, key["also"]])
+
+
+def to_default(key):
+    if key["presence"] == "required":
+        return "required"
+    if key["presence"].startswith("one of "):
+        parts = [" and ".join(f"`{name}`" for name in part.split("+")) for part in key["presence"][7:].split(", ")]
+        return "exactly one of " + ", ".join(parts)
+    if key["default_words"]:
+        return key["default_words"]
+    text = shorten_number(re.sub(r"-0(?![.\d])", "0", key["default"].strip('"')))
+    return "none" if key["default"] == "none" else f"`{text}`" if text else ""
+
+
+def to_type(key):
+    text = key["type"]
+    if text.startswith(("map", "list", "number", "name or path", "whole number", "text", "time", "vector")):
+        return text
+    return ", ".join(f"`{value}`" for value in text.split(", "))
+
+
+def to_condition(key):
+    name, _, values = key["condition"].partition(": ")
+    values = [value if " " in value else f"`{value}`" for value in values.split(", ")]
+    return f"With `{name}`: " + (", ".join(values[:-1]) + " or " if values[1:] else "") + values[-1]
+
+
+def make_scenario_page(build):
+    text = "# Scenario keys\n\n" + NOTE + """
+Every key of a scenario file. [common/config](../../common/config/README.md) describes how the file is read, and fleets.
+
+- All units are SI, angles are in radians, the world frame is x forward, y right, z down.
+- A *vector* is a list of three numbers. A *time* is at most 1,000,000 s and a whole number of nanoseconds.
+- Numbers are finite. `[i]` stands for each element of a list. The keys of a map come in any order.
+- A rule that names a number holds for each component of a vector.
+- Keys under "With `model`: …" belong to these values of `model` in the same section, and are refused with others.
+"""
+    sections = {}
+    for key in sources.load_keys(build):
+        section = sections.setdefault(re.split(r"[.\[]", key["path"])[0], {})
+        # Keys of a model have a table of their own; keys of a channel say so.
+        condition = to_condition(key) if key["condition"] else ""
+        own_table = condition if key["condition"].startswith(("model", "law")) else ""
+        meaning = key["meaning"] + (f" {condition}." if condition and not own_table else "")
+        section.setdefault(own_table, []).append(
+            [f"`{key['path']}`", to_type(key), key["unit"], to_range(key), to_default(key), meaning])
+    for name, tables in sections.items():
+        text += f"\n## {name}\n"
+        for condition, rows in tables.items():
+            text += f"\n### {condition}\n" if condition else ""
+            text += "\n" + make_table(["key", "type", "unit", "range", "default", "meaning"], rows)
+    return text
+
+
+def make_recordings_page(build):
+    columns = sources.run([build / "bin/recorder", "--columns"]).rstrip()
+    columns = re.sub(r"^(`\w+\.csv`(?:, `\w+\.csv`)*)$", lambda match: "## " + match[1].replace("`", ""), columns,
+                     flags=re.MULTILINE)
+    return "# Columns of a recording\n\n" + NOTE + """
+Every CSV file of a recording and its columns, as `recorder --columns` prints them.
+[recorder](../../recorder/README.md) says what the other files hold.
+
+""" + columns + "\n"
+
+
+def to_rows(items):
+    rows = []
+    for item in items:
+        notes = ([item.range] if item.range else []) + [f"`{choice}`" for choice in item.choices]
+        # The default in the sentence is right on every machine; the number may not be.
+        default = "" if re.search(r"\bdefault:", item.text) else item.default
+        default = "required" if "required" in item.notes else f"`{default}`" if default else ""
+        extra = "; ".join(note for note in item.notes if note != "required")
+        rows.append([f"`{item.spell()}`", ", ".join(notes), default, item.text + (f" ({extra})" if extra else "")])
+    return rows
+
+
+def describe_help(name, parsed, level):
+    text = f"\n{'#' * level} {name}\n\n{parsed.description}\n\n"
+    text += "".join(f"    {usage}\n" for usage in parsed.usage)
+    items = parsed.positionals + parsed.options
+    if items:
+        text += "\n" + make_table(["argument", "values", "default", "meaning"], to_rows(items))
+    return text
+
+
+def make_commands_page(build):
+    text = "# Commands and options\n\n" + NOTE + """
+First the commands of `./sls`, then the programs that they start. Each text is what `--help` prints.
+[Exit codes](error-codes.md) are the same for all programs.
+
+## ./sls
+"""
+    launcher = sources.read_launcher(build)
+    programs = sources.load_programs(build)
+    helps = {sources.read_help(build, name).rstrip(): name for name in programs}
+    text += "\n" + to_block(launcher[""])
+    for command, block in launcher.items():
+        if not command:
+            continue
+        text += f"\n### ./sls {command}\n\n"
+        if block in helps:
+            text += f"It starts `{helps[block]}` with the same options: [{helps[block]}](#{helps[block]}).\n"
+        else:
+            text += to_block(block)
+    for name, (parsed, subcommands) in programs.items():
+        text += describe_help(name, parsed, 2)
+        for subcommand, its_help in subcommands.items():
+            text += describe_help(f"{name} {subcommand}", its_help, 3)
+    return text
+
+
+def to_block(text):
+    return "```text\n" + text.rstrip() + "\n```\n"
+
+
+def find_block(page, command):
+    """The text of a command in docs/reference/commands.md; of "" that of ./sls help."""
+    heading = re.escape(f"### ./sls {command}" if command else "## ./sls")
+    match = re.search(rf"^{heading}\n\n```text\n(.*?)\n```$", page, re.MULTILINE | re.DOTALL)
+    return match[1] if match else ""
+
+
+def make_topics_page(_):
+    structs, enums, comments = sources.load_contract()
+    profiles, endpoints = sources.load_profiles(), sources.load_endpoints()
+    text = "# Topics and messages\n\n" + NOTE + """
+Topics, their types and their QoS, from `common/bus/topics.hpp`, `idl/sls.idl` and `config/qos/endpoints.xml`.
+[idl](../../idl/README.md) says which program writes and reads each topic, and how another program takes part.
+
+## Topics
+
+"""
+    rows = []
+    for name, message, flow in sources.load_topics():
+        rows.append([f"`{name}`", f"[{message}](#{message.lower()})", f"`{profiles[flow + 'Writer']}`",
+                     f"`{profiles[flow + 'Reader']}`"])
+    text += make_table(["topic", "type", "writer's profile", "reader's profile"], rows)
+    text += "\n"
+    text += ("In real time `sls/command` has the profiles "
+             f"`{profiles['RealtimeCommandWriter']}` and `{profiles['RealtimeCommandReader']}`.\n\n## QoS profiles\n\n")
+    text += make_table(["profile", "reliability", "durability", "history", "deadline", "lifespan"],
+                       [[f"`{profile}`", *qos.values()] for profile, qos in endpoints.items()])
+    text += "\n## Types\n"
+    for name, fields in structs.items():
+        text += f"\n### {name}\n\n" + (comments[name] + "\n\n" if comments[name] else "")
+        text += make_table(["field", "type", "meaning"],
+                           [[f"`{field}`", f"`{kind}`", comment] for kind, field, comment in fields])
+    text += "\n## Enumerations\n"
+    for name, values in enums.items():
+        text += f"\n### {name}\n\n" + (comments[name] + "\n\n" if comments[name] else "")
+        text += make_table(["number", "value", "meaning"],
+                           [[str(number), f"`{value}`", comment] for number, (value, comment) in enumerate(values)])
+    return text
+
+
+def make_error_codes_page(_):
+    enums = sources.load_contract()[1]
+    structs = sources.load_contract()[0]
+    text = "# Error codes\n\n" + NOTE + """
+## Exit codes of every program and of ./sls
+
+"""
+    text += make_table(["code", "meaning"], [list(row) for row in sources.load_exit_codes()])
+    text += """
+## Error codes of a controller
+
+A controller that cannot answer sends one of these in `fault` of its command. The force is then zero and the mission has
+failed. Logs and recordings show the name.
+
+"""
+    text += make_table(["number", "name", "in the contract", "meaning"],
+                       [[str(number), f"`{name}`", f"`{wire}`", meaning]
+                        for number, name, wire, meaning in sources.load_faults()])
+    text += """
+## Counters of a run
+
+The server counts these events in `counters` of `sls/status`; `status.csv` has a column for each.
+
+"""
+    text += make_table(["counter", "meaning"],
+                       [[f"`{field}`", comment] for _, field, comment in structs["SyncCounters"]])
+    text += "\n## Kinds of an entry in sls/record\n\n"
+    text += make_table(["number", "value", "meaning"],
+                       [[str(number), f"`{value}`", comment]
+                        for number, (value, comment) in enumerate(enums["AnswerKind"])])
+    return text
+
+
+PAGES = {
+    "scenario.md": make_scenario_page,
+    "recordings.md": make_recordings_page,
+    "commands.md": make_commands_page,
+    "topics.md": make_topics_page,
+    "error-codes.md": make_error_codes_page,
+}

@@ -1,0 +1,277 @@
+"""The tables of the code, as the pages need them."""
+
+import json
+import os
+import pathlib
+import re
+import subprocess
+import xml.etree.ElementTree as xml
+
+import yaml
+
+import help_text
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+
+
+class StaleReference(Exception):
+    """A table and what describes it do not fit together."""
+
+
+def read(path):
+    return (ROOT / path).read_text(encoding="utf-8")
+
+
+def run(command, **more):
+    """The output of the command."""
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=120, **more)
+    except OSError as error:
+        raise StaleReference(f"{command[0]}: {error.strerror} (is it built? ./sls build)") from error
+    if done.returncode != 0:
+        raise StaleReference(f"{' '.join(map(str, command))}: exit code {done.returncode}: {done.stderr.strip()}")
+    return done.stdout
+
+
+# --- programs -------------------------------------------------------------------------------------
+
+
+def list_programs():
+    """The programs that the project installs, as CMakeLists.txt names them."""
+    match = re.search(r"set\(installed_programs\s+([^)]*)\)", read("CMakeLists.txt"))
+    return match[1].split()
+
+
+def read_help(build, program, *arguments):
+    text = run([build / "bin" / program, *arguments, "--help"])
+    # The folder of the tree and that of the programs differ from machine to machine.
+    text = re.sub(r"=\S*/config/qos/", "=config/qos/", text)
+    return re.sub(r"(Usage: )\S*/", r"\1", text)
+
+
+def load_programs(build):
+    """Help of each program; of one with subcommands, theirs too: {name: (Help, {subcommand: Help})}."""
+    programs = {}
+    for name in list_programs():
+        main = help_text.parse(read_help(build, name))
+        programs[name] = (main, {item.names[0]: help_text.parse(read_help(build, name, item.names[0]))
+                                 for item in main.subcommands})
+    return programs
+
+
+def read_version(build):
+    return run([build / "bin/sim_server", "--version"]).strip()
+
+
+# --- the launcher ---------------------------------------------------------------------------------
+
+
+def list_commands():
+    """The commands of ./sls: a function cmd_NAME each."""
+    return re.findall(r"^cmd_([\w-]+)\(\)", read("sls"), re.MULTILINE) + ["help"]
+
+
+def read_launcher(build):
+    """{"": the text of ./sls help, command: that of ./sls COMMAND --help}.
+
+    Where ./sls help does not say that every command has --help, only the commands for which it does are asked:
+    another one might begin its work.
+    """
+    environment = dict(os.environ, SLS_BUILD=str(build), COLUMNS="100", LC_ALL="C.UTF-8")
+
+    def ask(*arguments):
+        text = run([ROOT / "sls", *arguments], env=environment, cwd=ROOT)
+        text = text.replace(str(build) + "/", "build/").replace(str(ROOT) + "/", "")
+        text = re.sub(r"=\S*/config/qos/", "=config/qos/", text)
+        return re.sub(r"([Uu]sage: )(?!\./sls\b)\S*/", r"\1", text).rstrip()
+
+    texts = {"": ask("help")}
+    all_have_help = re.search(r"COMMAND --help", texts[""])
+    for command in list_commands():
+        if command == "help":
+            continue
+        part = find_usage_part(texts[""], command)
+        if all_have_help or part and "--help" in part:
+            texts[command] = ask(command, "--help")
+        elif part:
+            texts[command] = part
+        else:
+            raise StaleReference(f"./sls help does not show the command '{command}'")
+    return texts
+
+
+def find_usage_part(text, command):
+    """The lines of ./sls help about a command: where each command has its options there."""
+    lines, found = text.splitlines(), []
+    for i, line in enumerate(lines):
+        if re.match(rf"  {command}\b(?!-)", line):
+            end = i + 1
+            while end < len(lines) and lines[end].startswith("   "):
+                end += 1
+            found += [entry[2:] for entry in lines[i:end]]
+    return "\n".join(found)
+
+
+# --- scenario -------------------------------------------------------------------------------------
+
+# The endings of names: style guide, "Frames and units". The longest that fits counts.
+UNITS = {
+    "kg_m2": "kg·m²", "kg": "kg", "m_s2": "m/s²", "m_s": "m/s", "m": "m", "per_rad_s2": "s²/rad", "per_rad_s": "s/rad",
+    "per_rad": "1/rad", "per_s": "1/s", "rad_s": "rad/s", "rad": "rad", "s": "s", "hz": "Hz", "n_s_m": "N·s/m",
+    "n_s2_m": "N·s²/m", "n_s2": "N·s²", "n_m_s": "N·m·s", "n_m": "N·m", "n": "N",
+}  # fmt: skip
+
+
+def find_unit(path):
+    name = path.rsplit(".", 1)[-1]
+    fitting = [ending for ending in UNITS if name.endswith("_" + ending)]
+    return UNITS[max(fitting, key=len)] if fitting else ""
+
+
+def _fits(pattern, path):
+    patterns, parts = pattern.split("."), path.split(".")
+    return len(patterns) == len(parts) and all(p in ("*", part) for p, part in zip(patterns, parts))
+
+
+def load_keys(build):
+    """Every key with unit and meaning.
+
+    @throws StaleReference for a key without a meaning or a meaning without a key.
+    """
+    keys = json.loads(run([build / "bin/sls_scenario_keys"]))
+    entries = {pattern: {"text": entry} if isinstance(entry, str) else entry
+               for pattern, entry in yaml.safe_load(read("tools/reference/meanings.yaml")).items()}
+    used = set()
+
+    def find(path, field):
+        for pattern, entry in entries.items():
+            if field in entry and _fits(pattern, path):
+                used.add(pattern)
+                return str(entry[field])
+        return ""
+
+    rows, by_path = [], {}
+    for key in keys:
+        path = key["path"]
+        key["meaning"] = find(path, "text")
+        if not key["meaning"]:
+            raise StaleReference(f"tools/reference/meanings.yaml: no entry for the key '{path}'")
+        key["unit"] = find(path, "unit") or find_unit(path)
+        key["also"] = find(path, "range")
+        words = find(path, "default") or (find(path, "none") if key["default"] == "none" else "")
+        key["default_words"] = words
+        # One row where only a default differs that depends on another key.
+        alike = (path, key["type"], key["range"], key["presence"], key["condition"])
+        if words and alike in by_path:
+            continue
+        by_path[alike] = key
+        rows.append(key)
+    unused = [pattern for pattern in entries if pattern not in used]
+    if unused:
+        raise StaleReference(f"tools/reference/meanings.yaml: no key for the entry '{unused[0]}'")
+    return rows
+
+
+# --- topics and codes -----------------------------------------------------------------------------
+
+
+def load_topics():
+    """[(name, type, flow)], as common/bus/topics.hpp has them."""
+    found = re.findall(r'struct Topic<(\w+)> \{\s*static constexpr const char\* kName = "([^"]+)";\s*'
+                       r"static constexpr Flow kFlow = Flow::k(\w+);", read("common/bus/topics.hpp"))
+    return [(name, message, flow) for message, name, flow in found]
+
+
+def load_profiles():
+    """{constant: profile name} of topics.hpp."""
+    return dict(re.findall(r'k(\w+)Profile = "([^"]+)"', read("common/bus/topics.hpp")))
+
+
+def load_endpoints():
+    """{profile: its QoS} of config/qos/endpoints.xml."""
+    space = {"": "http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles"}
+    tree = xml.fromstring(read("config/qos/endpoints.xml"))
+
+    def text(node, path):
+        found = node.find("/".join("{%s}%s" % (space[""], part) for part in path.split("/")))
+        return found.text if found is not None else ""
+
+    def seconds(node, path):
+        whole, parts = text(node, path + "/sec"), text(node, path + "/nanosec")
+        return f"{int(whole or 0) + int(parts or 0) / 1e9:g} s" if whole or parts else ""
+
+    endpoints = {}
+    for node in tree.iter():
+        name = node.get("profile_name")
+        if not name:
+            continue
+        depth = text(node, "topic/historyQos/depth")
+        endpoints[name] = {
+            "reliability": text(node, "qos/reliability/kind"),
+            "durability": text(node, "qos/durability/kind"),
+            "history": " ".join(filter(None, [text(node, "topic/historyQos/kind"), depth])),
+            "deadline": seconds(node, "qos/deadline/period"),
+            "lifespan": seconds(node, "qos/lifespan/duration"),
+        }
+    return endpoints
+
+
+def load_contract():
+    """The structs and enumerations of idl/sls.idl: ({name: [(type, name, comment)]}, {name: [(value, comment)]},
+    {name: comment before it})."""
+    structs, enums, comments, before = {}, {}, {}, []
+    body = None
+    enum = None
+    for line in read("idl/sls.idl").splitlines():
+        code, _, comment = line.partition("//")
+        code, comment = code.strip(), comment.strip()
+        if enum is not None or code.startswith("enum "):
+            if code.startswith("enum "):
+                enum = re.match(r"enum (\w+)", code)[1]
+                comments[enum], enums[enum], before = " ".join(before), [], []
+                code = code.partition("{")[2]
+            values = re.findall(r"[A-Z]\w+", code)
+            enums[enum] += [(value, "") for value in values]
+            if comment and enums[enum]:
+                value, so_far = enums[enum][-1]
+                enums[enum][-1] = (value, f"{so_far} {comment}".strip())
+            if "}" in code:
+                enum = None
+        elif code.startswith("struct "):
+            body = re.match(r"struct (\w+)", code)[1]
+            comments[body], structs[body], before = " ".join(before), [], []
+        elif body and (match := re.match(r"(.+?)\s+(\w+(?:\[\d+\])?);$", code)):
+            name, _, size = match[2].partition("[")
+            structs[body].append((match[1] + ("[" + size if size else ""), name, comment))
+        elif body and not code and comment:
+            kind, name, so_far = structs[body][-1]
+            structs[body][-1] = (kind, name, f"{so_far} {comment}".strip())
+        elif code.startswith("}"):
+            body, before = None, []
+        elif code == "@final":
+            pass
+        elif not code and comment:
+            before.append(comment)
+        else:
+            before = []
+    return structs, enums, comments
+
+
+def load_faults():
+    """The error codes of a controller: [(number, name in files, name in the contract, meaning)]."""
+    enums = load_contract()[1]
+    header = re.search(r"enum class Fault \{(.*?)\};", read("common/model/answer.hpp"), re.DOTALL)[1]
+    meanings = re.findall(r"(k\w+),(?:\s*///< (.*))?", header)
+    texts = dict(re.findall(r'case Fault::(k\w+):\s*return "(\w+)";', read("common/model/answer.cpp")))
+    wire = [value for value, _ in enums["FaultCode"]]
+    if len(wire) != len(meanings):
+        raise StaleReference("idl/sls.idl and common/model/answer.hpp have different numbers of error codes")
+    return [(number, texts[name], wire[number], meaning) for number, (name, meaning) in enumerate(meanings)]
+
+
+def load_exit_codes():
+    """[(code, meaning)] of every program."""
+    header = read("common/app/run_main.hpp")
+    codes = re.findall(r"kExit\w+ = (\d+);\s*///< (.*)", header)
+    match = re.search(r"Interrupted: (\d+) \((\w+)\) or (\d+) \((\w+)\)", header)
+    return codes + [(match[1], f"Interrupted by {match[2]}."), (match[3], f"Interrupted by {match[4]}.")]
