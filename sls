@@ -118,6 +118,8 @@ usage: ./sls COMMAND [OPTIONS]
   clean              remove what was built
   help               this text
 
+environment: SLS_DOMAIN is the DDS domain of every program that is not given --domain
+
 exit codes: 0 done; 1 the run or a test failed; 2 bad usage or bad configuration; 130/143 interrupted
 EOF
 }
@@ -614,7 +616,7 @@ cmd_test() {
   build_tree "$preset" "$folder" "${targets[@]}"
   cd "$root"
   # Nothing the middleware reads from the environment may reach the tests.
-  env -u ROS_DISCOVERY_SERVER -u FASTRTPS_DEFAULT_PROFILES_FILE \
+  env -u ROS_DISCOVERY_SERVER -u FASTRTPS_DEFAULT_PROFILES_FILE -u SLS_DOMAIN \
     ctest --preset "$preset" --parallel "$(nproc)" "${which[@]}"
 }
 

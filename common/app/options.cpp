@@ -7,6 +7,7 @@ void add_common_options(CLI::App& cli, CommonOptions& options) {
   cli.add_option("--qos", options.qos_file, "QoS profiles (XML)")->type_name("FILE");
   cli.add_option("--domain", options.domain, "DDS domain, 0 to 232")
       ->type_name("N")
+      ->envname("SLS_DOMAIN")
       ->check(CLI::Range(0, 232));
   cli.add_option("--log-level", options.log_level, "least severe message shown on stderr")
       ->type_name("LEVEL")

@@ -18,7 +18,7 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     options.add_argument("scenario", nargs="?", default="figure_eight_pid",
                          help="name or path, the server's (default: %(default)s)")
-    options.add_argument("--domain", type=int, default=0, help="DDS domain (default: 0)")
+    options.add_argument("--domain", type=int, help="DDS domain (default: SLS_DOMAIN, else 0)")
     options.add_argument("--name", default="pid_client", help="in recordings")
     options.add_argument("--strength", type=int, default=0, help="the strongest flies (default: 0)")
     chosen = options.parse_args()

@@ -23,6 +23,14 @@ if TYPE_CHECKING:
 LOG_LEVELS = ("debug", "info", "warning", "error")
 
 
+def read_domain() -> int:
+    """The domain of SLS_DOMAIN, without it 0."""
+    text = os.environ.get("SLS_DOMAIN") or "0"
+    if not (text.isascii() and text.isdecimal() and int(text) <= 232):
+        raise ConfigError(f"SLS_DOMAIN: expected a DDS domain, 0 to 232, got {text!r}")
+    return int(text)
+
+
 class Client:
     """Answers every state sample of a run with the force of a Python law, by the rules of
     `control_client`: announced to the server, stateless (what the law remembers travels in its
@@ -31,7 +39,7 @@ class Client:
     def __init__(self, law: Law | LawWithMemory, scenario: Scenario | str | os.PathLike[str], *,
                  name: str = "python", strength: int = 0,
                  vehicles: Iterable[int] | str | None = None, follow: bool = False,
-                 qos: str | os.PathLike[str] | None = None, domain: int = 0,
+                 qos: str | os.PathLike[str] | None = None, domain: int | None = None,
                  log_level: str = "info"):
         """Joins nothing yet: `run` does.
 
@@ -44,7 +52,7 @@ class Client:
         vehicles: of the fleet, ids or text such as "0-9,20"; None: all that the server has.
         follow: fly on with a server that replaces this one; else `run` raises RunError.
         qos: QoS file; None: config/qos/default.xml. A process can use one only.
-        domain: DDS domain, 0 to 232.
+        domain: DDS domain, 0 to 232; None: that of the environment variable SLS_DOMAIN, else 0.
         log_level: of the lines on stderr: debug, info, warning or error.
         Raises ConfigError for a mistake in any of these.
         """
@@ -59,7 +67,7 @@ class Client:
         self._client = load_core().Client(
             law, to_scenario(scenario), name, to_whole("strength", strength, -2**31, 2**31 - 1),
             vehicles, bool(follow), "" if qos is None else os.fspath(qos),
-            to_whole("domain", domain, 0, 232), log_level)
+            to_whole("domain", read_domain() if domain is None else domain, 0, 232), log_level)
 
     def run(self) -> None:
         """Flies from joining to the end of the run, and the runs that follow it after a reset.

@@ -58,6 +58,7 @@ def _split_lines(text):
 def parse_item(spec, text):
     """An item from the two columns of its line."""
     notes, choices, default, limits = [], [], "", ""
+    spec = re.sub(r" \(Env:\w+\)$", "", spec)  # ./sls help says it once for all programs
     for word in ("Excludes", "Needs"):
         match = re.search(rf" {word}: ((?:--[\w-]+ ?)+)", spec + " ")
         if match:

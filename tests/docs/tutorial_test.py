@@ -1,0 +1,507 @@
+"""Runs docs/tutorial.md as a reader does: every listing is written to its file, every command is run in its
+terminal, and what it prints is compared with what the document shows.
+
+    tests/docs/tutorial_test.py BUILD [--verbose]
+
+The document marks its blocks with comments, which a reader does not see:
+
+    <!-- file: mine/hop.yaml -->           the block below is written to this file
+    <!-- terminal: 2 -->                   its commands run in terminal 2 (default: 1)
+    <!-- host: recorder -->                on a host of its own, a network namespace: with root alone
+    <!-- needs: hosts -->                  runs only where these hosts are; `docker`: where an engine and image are
+    <!-- exit: 2 -->                       its last command ends with 2 (default: 0)
+    <!-- any order -->                     its lines come in any order: several programs print them
+    <!-- waits -->                         the document goes on when its commands have ended, as those of terminal 1
+    <!-- when 2 shows: TEXT -->            runs only after terminal 2 has printed TEXT
+    <!-- checked: page -->                 after it, the page's address must answer; `foxglove`: as a Foxglove server
+
+Lines after `$ ` are commands, `^C` interrupts; the other lines are their output. A command without output lines is
+not compared. `…` stands for lines left out, or for any text in a line. Numbers of VARYING differ from flight to
+flight; everything else must be equal. Terminal 1 waits for each command. Other terminals run beside it; they are
+compared when the document comes back to them, and at the end of the chapter.
+
+The programs fly on a DDS domain and with a port of their own (SLS_DOMAIN; 8765 is replaced).
+"""
+
+import base64
+import os
+import pathlib
+import re
+import secrets
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import urllib.request
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+DOCUMENT = ROOT / "docs/tutorial.md"
+PAGE_PORT = "8765"  # as the document has it
+COMMAND_S = 100  # more than any command of the document takes on a busy machine
+
+VARYING = [(re.compile(pattern), name) for pattern, name in (
+    (r"\b[0-9a-f]{16}\b", "RUN_ID"),
+    (r"[\d.,]+ steps/s", "RATE steps/s"),
+    (r"[\d.]+ × real time", "RATE × real time"),
+    (r"simulated in [\d.]+ s", "simulated in TIME s"),
+    (r"\b\d+ resent\b", "N resent"),
+    (r"\b(resent|duplicate|superseded) +\d+", r"\1 N"),
+    (r"round trip( +)p50 [\d.]+ [µm]?s,? +p99 [\d.]+ [µm]?s", "round trip TIMES"),
+    (r"real-time factor [\d.]+", "real-time factor X"),
+    (r"\(\d+ s left\)", "(N s left)"),
+    (r"[\d.]+ s of workers' time, [\d.]+/s", "TIME of workers' time, RATE/s"),
+    (r"by \S+@\S+", "by USER@HOST"),
+)]
+
+
+def make_comparable(line):
+    for pattern, name in VARYING:
+        line = pattern.sub(name, line)
+    return line.rstrip()
+
+
+# --- the document ---------------------------------------------------------------------------------
+
+
+class Failure(Exception):
+    pass
+
+
+class Command:
+    def __init__(self, text, line):
+        self.text, self.line, self.shown = text, line, []
+
+
+class Block:
+    """A fenced block, its line in the document and the marks above it."""
+
+    def __init__(self, kind, line, marks, lines):
+        self.kind, self.line, self.marks, self.lines = kind, line, marks, lines
+        self.commands = self._split() if kind == "console" else []
+
+    def _split(self):
+        commands = []
+        for line, text in enumerate(self.lines, self.line + 1):
+            if commands and commands[-1].text.endswith("\\\n"):
+                commands[-1].text += text + ("\n" if text.endswith("\\") else "")
+            elif text.startswith("$ ") or text == "^C":
+                commands.append(Command(text.removeprefix("$ ") + ("\n" if text.endswith("\\") else ""), line))
+            elif commands:
+                commands[-1].shown.append(text)
+            else:
+                raise Failure(f"{line}: expected a line that begins with '$ ', got '{text}'")
+        return commands
+
+
+def read_document(text):
+    """Its blocks in order; a chapter's heading is None."""
+    steps, marks, lines = [], {}, text.split("\n")
+    at = 0
+    while at < len(lines):
+        line = lines[at]
+        if line.startswith("## "):
+            steps.append(None)
+        elif found := re.fullmatch(r"<!-- (when \S+ shows|[a-z]+(?: order)?)(?:: (.*))? -->", line):
+            if found[1].startswith("when "):
+                marks.setdefault("when", []).append((found[1].split()[1], found[2]))
+            else:
+                marks[found[1]] = found[2]
+        elif line.startswith("```"):
+            end = lines.index("```", at + 1)
+            kind = line[3:]
+            if kind in ("yaml", "python", "c") and "file" not in marks:
+                raise Failure(f"{at + 1}: a listing without <!-- file: … -->")
+            steps.append(Block(kind, at + 1, marks, lines[at + 1:end]))
+            marks, at = {}, end
+        elif line.strip() and marks and not line.startswith("<!--"):
+            raise Failure(f"{at + 1}: marks without a block: {marks}")
+        at += 1
+    return steps
+
+
+# --- what came, beside what is shown --------------------------------------------------------------
+
+
+def to_pattern(line):
+    return ".*".join(map(re.escape, make_comparable(line).split("…")))
+
+
+def find_difference(shown, came, is_any_order):
+    """What is wrong with the lines that came, or None."""
+    came = [make_comparable(line) for line in came]
+    if is_any_order:
+        left = list(came)
+        for line in shown:
+            if line.strip() == "…":
+                continue
+            found = next((other for other in left if re.fullmatch(to_pattern(line), other)), None)
+            if found is None:
+                return f"no line '{line}'"
+            left.remove(found)
+        if left and "…" not in (line.strip() for line in shown):
+            return f"not shown: '{left[0]}'"
+        return None
+    # Dynamic in small: which lines of `came` may have been reached after each shown line.
+    reached = {0}
+    for line in shown:
+        if line.strip() == "…":
+            reached = set(range(min(reached), len(came) + 1))
+            continue
+        pattern = to_pattern(line)
+        after = {at + 1 for at in reached if at < len(came) and re.fullmatch(pattern, came[at])}
+        if not after:
+            return f"expected '{line}'"
+        reached = after
+    return None if len(came) in reached else f"not shown: '{came[max(reached)]}'"
+
+
+# --- terminals ------------------------------------------------------------------------------------
+
+# Reads commands, each ended by a zero byte, from descriptor 3, and says after each how it ended.
+SHELL = r"""
+while IFS= read -r -d '' -u 3 command; do
+  eval "$command" 3<&-
+  printf '\n%s %d\n' "$END_OF_COMMAND" $?
+done
+"""
+
+
+class Terminal:
+    """A shell that lives as long as the document needs it."""
+
+    def __init__(self, name, folder, environment, before=()):
+        self.name, self.lines, self.begin, self.pending = name, [], 0, []
+        self.end_of_command = "end-of-command-" + secrets.token_hex(8)
+        self.changed = threading.Condition()
+        read_end, self.write_end = os.pipe()
+        self.process = subprocess.Popen(
+            [*before, "bash", "--norc", "-c", f"exec 3<&{read_end}-\n{SHELL}"], cwd=folder, stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, pass_fds=[read_end], start_new_session=True,
+            env={**environment, "END_OF_COMMAND": self.end_of_command})
+        os.close(read_end)
+        self.reader = threading.Thread(target=self._read, daemon=True)
+        self.reader.start()
+
+    def _read(self):
+        for line in self.process.stdout:
+            with self.changed:
+                self.lines.append(line.decode(errors="replace").rstrip("\n"))
+                self.changed.notify_all()
+        with self.changed:
+            self.lines.append(None)
+            self.changed.notify_all()
+
+    def start(self, command, exit_code, is_any_order):
+        os.write(self.write_end, command.text.replace("\\\n", " ").encode() + b"\0")
+        self.pending.append((command, exit_code, is_any_order))
+
+    def find_end(self):
+        """Index of the line that ends the oldest command, or None."""
+        for at in range(self.begin, len(self.lines)):
+            if self.lines[at] is None:
+                raise Failure(f"terminal {self.name} is gone")
+            if self.lines[at].startswith(self.end_of_command):
+                return at
+        return None
+
+    def finish(self, timeout_s=COMMAND_S):
+        """Waits for the pending commands and compares what they printed."""
+        while self.pending:
+            command, exit_code, is_any_order = self.pending.pop(0)
+            with self.changed:
+                if not self.changed.wait_for(lambda: self.find_end() is not None, timeout_s):
+                    raise Failure(f"{command.line}: '{command.text}' has not ended within {timeout_s} s; it "
+                                  "printed\n" + "\n".join(map(str, self.lines[self.begin:])))
+                end = self.find_end()
+                came = self.lines[self.begin:end]
+                code = int(self.lines[end].split()[1])
+            self.begin = end + 1
+            if came and came[-1] == "":  # of the line that ends it
+                came.pop()
+            while came and not came[-1].strip():
+                came.pop()
+            said = f"{command.line}: '{command.text}' "
+            if code != exit_code:
+                raise Failure(said + f"ended with {code}, expected {exit_code}; it printed\n" + "\n".join(came))
+            if command.shown:
+                difference = find_difference(command.shown, came, is_any_order)
+                if difference:
+                    raise Failure(said + f"{difference}; it printed\n" + "\n".join(came))
+
+    def wait_for(self, text, begin, timeout_s=COMMAND_S):
+        """Waits until a line from `begin` on holds `text`."""
+        with self.changed:
+            if not self.changed.wait_for(lambda: any(text in (line or "") for line in self.lines[begin:]),
+                                         timeout_s):
+                raise Failure(f"terminal {self.name} has not printed '{text}' within {timeout_s} s but\n"
+                              + "\n".join(map(str, self.lines)))
+
+    def find_descendants(self):
+        found, parents = [], [self.process.pid]
+        while parents:
+            parent = parents.pop()
+            try:
+                children = pathlib.Path(f"/proc/{parent}/task/{parent}/children").read_text().split()
+            except OSError:
+                continue
+            found += map(int, children)
+            parents += map(int, children)
+        return found
+
+    def signal_all(self, number):
+        for process in self.find_descendants():
+            try:
+                os.kill(process, number)
+            except ProcessLookupError:
+                pass
+
+    def close(self):
+        self.signal_all(signal.SIGKILL)
+        os.close(self.write_end)
+        self.process.kill()
+        self.process.wait()
+        self.reader.join(10)
+
+
+# --- hosts, containers, domain --------------------------------------------------------------------
+
+
+class Hosts:
+    """Network namespaces on one bridge, named as tests/network/network.cpp names and clears away its own."""
+
+    NAMES = ("server", "controller", "recorder")
+
+    def __init__(self):
+        self.prefix = f"sls-test-{os.getpid()}-tutorial-"
+        self.obstacle = None if os.geteuid() == 0 else "network namespaces need root"
+        if self.obstacle:
+            return
+        try:
+            self._run("ip", "netns", "add", self.prefix + "switch")
+            self._on("switch", "ip link add br0 type bridge && ip link set br0 up")
+            for number, host in enumerate(self.NAMES, 1):
+                self._run("ip", "netns", "add", self.prefix + host)
+                self._on("switch", f"ip link add {host} type veth peer name eth0 netns {self.prefix}{host} && "
+                                   f"ip link set {host} master br0 up")
+                self._on(host, f"ip link set lo up && ip address add 10.77.0.{number}/24 dev eth0 && "
+                               "ip link set eth0 up")
+        except (Failure, OSError) as error:
+            self.remove()
+            self.obstacle = f"no network namespaces here: {error}"
+
+    def _run(self, *command):
+        done = subprocess.run(command, capture_output=True, text=True)
+        if done.returncode != 0:
+            raise Failure(" ".join(command) + ": " + done.stderr)
+
+    def _on(self, host, command):
+        self._run(*self.find_prefix(host), "sh", "-c", command)
+
+    def find_prefix(self, host):
+        return ["ip", "netns", "exec", self.prefix + host]
+
+    def remove(self):
+        if os.geteuid() == 0:
+            for host in (*self.NAMES, "switch"):
+                subprocess.run(["ip", "netns", "delete", self.prefix + host], capture_output=True)
+
+
+def find_docker_obstacle():
+    image = os.environ.get("SLS_IMAGE")
+    if not image:
+        return "SLS_IMAGE names no image"
+    command = ["docker", "image", "inspect", image]
+    has_image = shutil.which("docker") and subprocess.run(command, capture_output=True).returncode == 0
+    return None if has_image else f"no Docker engine with the image {image}"
+
+
+class OwnDomain:
+    """A DDS domain that no other test flies on, by the lock that the others hold, too."""
+
+    def __enter__(self):
+        deadline = time.monotonic() + 60
+        while time.monotonic() < deadline:
+            for number in range(1, 61):
+                self.lock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+                try:
+                    self.lock.bind(f"\0sls-test-domain-{number}")
+                    return str(number)
+                except OSError:
+                    self.lock.close()
+            time.sleep(0.1)
+        raise Failure("no free DDS domain among 1 to 60")
+
+    def __exit__(self, *_):
+        self.lock.close()
+
+
+def find_free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return str(probe.getsockname()[1])
+
+
+def expect_page(port):
+    with urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=20) as page:
+        if page.headers.get_content_type() != "text/html" or not page.read():
+            raise Failure(f" no page on port {port}")
+
+
+def expect_foxglove(port):
+    """Connects as Foxglove does: the handshake, and the first message."""
+    key = base64.b64encode(secrets.token_bytes(16)).decode()
+    with socket.create_connection(("127.0.0.1", int(port)), 20) as connection:
+        connection.sendall((f"GET / HTTP/1.1\r\nHost: localhost:{port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+                            f"Sec-WebSocket-Key: {key}\r\nSec-WebSocket-Version: 13\r\n"
+                            "Origin: https://app.foxglove.dev\r\nSec-WebSocket-Protocol: foxglove.sdk.v1\r\n\r\n")
+                           .encode())
+        received = b""
+        while b'"serverInfo"' not in received:
+            part = connection.recv(4096)
+            if not part:
+                raise Failure(f" no Foxglove server on port {port}: {received.decode(errors='replace')}")
+            received += part
+
+
+CHECKS = {"page": expect_page, "foxglove": expect_foxglove}
+
+
+# --- the run --------------------------------------------------------------------------------------
+
+
+class Reader:
+    """Follows the document in a folder that looks like the repository and keeps what the reader makes."""
+
+    def __init__(self, folder, build, domain, hosts, is_verbose):
+        self.folder, self.hosts, self.is_verbose = folder, hosts, is_verbose
+        self.terminals, self.skipped, self.ran = {}, [], 0
+        self.port = find_free_port()
+        for entry in ROOT.iterdir():
+            if not entry.name.startswith((".", "build", "recordings", "campaigns", "mine")):
+                (folder / entry.name).symlink_to(entry)
+        (folder / "build").symlink_to(build)
+        (folder / "home").mkdir()
+        self.environment = {**os.environ, "SLS_BUILD": str(build), "SLS_DOMAIN": domain, "MPLCONFIGDIR":
+                            str(folder / "home"), "LC_ALL": "C.UTF-8"}
+
+    def find_obstacle(self, block):
+        if "host" in block.marks or block.marks.get("needs") == "hosts":
+            return self.hosts.obstacle
+        return find_docker_obstacle() if block.marks.get("needs") == "docker" else None
+
+    def find_terminal(self, block):
+        host = block.marks.get("host")
+        name = block.marks.get("terminal", "1")
+        if (name, host) not in self.terminals:
+            self.terminals[name, host] = Terminal(name, self.folder, self.environment,
+                                                  self.hosts.find_prefix(host) if host else ())
+        return self.terminals[name, host]
+
+    def follow(self, block):
+        marks = block.marks
+        if block.kind != "console":
+            if "file" in marks:
+                file = self.folder / marks["file"]
+                file.parent.mkdir(exist_ok=True)
+                file.write_text("\n".join(block.lines) + "\n")
+            return
+        if obstacle := self.find_obstacle(block):
+            self.skipped.append(f"line {block.line}: {obstacle}")
+            return
+        for name, text in marks.get("when", ()):
+            next(terminal for (other, _), terminal in self.terminals.items() if other == name).wait_for(
+                text, 0)
+        terminal = self.find_terminal(block)
+        for command in block.commands:
+            self.ran += 1
+            self.say(f"line {command.line}, terminal {terminal.name}: {command.text}")
+            if command.text == "^C":
+                terminal.signal_all(signal.SIGINT)
+                terminal.finish()
+                continue
+            terminal.finish()
+            command.text = command.text.replace("./sls view", f"./sls view --port {PAGE_PORT}").replace(
+                PAGE_PORT, self.port)
+            command.shown = [line.replace(PAGE_PORT, self.port) for line in command.shown]
+            is_last = command is block.commands[-1]
+            terminal.start(command, int(marks.get("exit", 0)) if is_last else 0, "any order" in marks)
+            if terminal.name == "1" or "waits" in marks:
+                terminal.finish()
+        if "checked" in marks:
+            terminal.wait_for(f"page: http://127.0.0.1:{self.port}/", terminal.begin)
+            try:
+                CHECKS[marks["checked"]](self.port)
+            except OSError as error:
+                raise Failure(f"{block.line}: {error}") from error
+
+    def end_chapter(self):
+        for terminal in self.terminals.values():
+            terminal.finish()
+            deadline = time.monotonic() + 20  # for what runs in the background
+            while (left := terminal.find_descendants()) and time.monotonic() < deadline:
+                time.sleep(0.02)
+            if left:
+                raise Failure(f"terminal {terminal.name} still runs something at the end of the chapter: {left}")
+
+    def say(self, text):
+        if self.is_verbose:
+            print(f"{time.monotonic() - self.began:6.1f} s  {text}", flush=True)
+
+    def read(self, steps):
+        self.began = time.monotonic()
+        try:
+            for step in steps:
+                if step is None:
+                    self.end_chapter()
+                else:
+                    self.follow(step)
+            self.end_chapter()
+        finally:
+            for terminal in self.terminals.values():
+                terminal.close()
+
+
+def test_the_comparison_itself():
+    """Each case: lines shown, lines that came, whether in any order, whether they are equal."""
+    for shown, came, is_any_order, is_equal in (
+            (["a", "b"], ["a", "b"], False, True),
+            (["a", "b"], ["b", "a"], False, False),
+            (["a", "b"], ["b", "a"], True, True),
+            (["a"], ["a", "b"], False, False),
+            (["a"], ["a", "b"], True, False),
+            (["a", "…"], ["a", "b", "c"], False, True),
+            (["…", "c"], ["a", "b", "c"], False, True),
+            (["…", "b"], ["a", "b", "c"], False, False),
+            (["a … c"], ["a b c"], False, True),
+            (["rms 1.62e-01"], ["rms 1.63e-01"], False, False),
+            (["4000 steps/s, run 0123456789abcdef"], ["51.5 steps/s, run ffff456789abcdef"], False, True),
+            (["certificate 0123456789abcdef00"], ["certificate 0123456789abcdef01"], False, False)):
+        assert (find_difference(shown, came, is_any_order) is None) == is_equal, (shown, came)
+
+
+def main():
+    build = pathlib.Path(sys.argv[1]).resolve()
+    test_the_comparison_itself()
+    hosts = Hosts()
+    try:
+        steps = read_document(DOCUMENT.read_text())
+        with OwnDomain() as domain, tempfile.TemporaryDirectory() as folder:
+            reader = Reader(pathlib.Path(folder), build, domain, hosts, "--verbose" in sys.argv)
+            reader.read(steps)
+            print(f"{reader.ran} commands in {time.monotonic() - reader.began:.0f} s")
+            for reason in reader.skipped:
+                print(f"left out: {reason}")
+    except Failure as failure:
+        print(f"docs/tutorial.md:{failure}", file=sys.stderr)
+        return 1
+    finally:
+        hosts.remove()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
