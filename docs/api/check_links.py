@@ -1,4 +1,7 @@
-"""Every link of the pages in a folder leads to a file, and to an anchor where it names one. usage: check_links.py DIR"""
+"""Every link of the pages in a folder leads to a file, and to an anchor where it names one.
+
+usage: check_links.py DIR
+"""
 
 import re
 import sys
