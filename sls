@@ -12,7 +12,7 @@ else
   readonly is_installed=0 self=./sls build="${SLS_BUILD:-$root/build}"
   readonly python_path="$root/python:$build/python"
 fi
-readonly source_commands=(bench build chaos clean docker-demo docs fuzz network-table package setup study test)
+readonly source_commands=(bench build chaos clean docker-demo docs fuzz network-table package reference setup study test)
 readonly flying=(sim_server control_client recorder closed_loop)
 readonly programs=("${flying[@]}" sim_ctl sls_verify sls_convert delay_margin sls_doctor sls_view)
 readonly packages=(g++ make cmake libeigen3-dev libsimbody-dev libfastrtps-dev libfastcdr-dev
