@@ -630,7 +630,7 @@ cmd_test() {
 }
 
 cmd_docs() {
-  setup "${doc_packages[@]}"
+  setup "${doc_packages[@]}" "${python_packages[@]}"
   build_programs _sls_core  # its docstrings are pages, too
   "$root/docs/api/build.sh" "$build"
   say "pages: $build/docs/index.html"
