@@ -652,13 +652,13 @@ command=${1:-help}
 case $command in
   help | --help | -h) usage | sed "s#\./sls#$self#g" ;;
   *)
+    ((is_installed == 0)) || [[ " ${source_commands[*]} " != *" $command "* ]] ||
+      fail "$command: needs the source tree; this sls is installed without it" 2
     if ! declare -F "cmd_$command" >/dev/null; then
       say "error: unknown command '$command'"
       usage >&2
       exit 2
     fi
-    ((is_installed == 0)) || [[ " ${source_commands[*]} " != *" $command "* ]] ||
-      fail "$command: needs the source tree; this sls is installed without it" 2
     "cmd_$command" "$@"
     ;;
 esac
