@@ -13,6 +13,8 @@ ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "python/sls"
 SKIPPED = ("build", "recordings", "node_modules", ".")  # how folders begin that are not the project's
 
+TUPLES = ("Now", "Reference")  # named tuples of the extension module that call themselves sls.NAME
+
 INDEX = """\
 sls
 ===
@@ -93,16 +95,25 @@ def list_names():
     raise ValueError("python/sls/__init__.py: expected _PLACES, got none")
 
 
+def find_place(name, module):
+    """Where a name is described."""
+    if name in TUPLES:
+        return f"sls.{name}"
+    return module if module == f"sls.{name}" else f"{module}.{name}"
+
+
 def main(pages, out):
     pages.mkdir(parents=True)
     (pages / "index.rst").write_text(make_index(out))
     modules = ["_sls_core", *list_modules()]
-    names = "\n".join(f"- :py:obj:`sls.{name} <{module if name == 'metrics' else f'{module}.{name}'}>`"
-                      for name, module in list_names())
+    names = "\n".join(f"- :any:`sls.{name} <{find_place(name, module)}>`" for name, module in list_names())
     (pages / "python.rst").write_text(PYTHON.format(
         names=names, modules="\n".join(f"   {module}" for module in modules)))
     for module in modules:
         (pages / f"{module}.rst").write_text(f"{underline(module)}\n.. automodule:: {module}\n")
+    with (pages / "_sls_core.rst").open("a") as page:
+        for name in TUPLES:
+            page.write(f"\n.. autoclass:: sls.{name}\n")
     # Doxygen's pages take the place of this one.
     (pages / "headers.rst").write_text(f"{underline('C and C++ headers')}\n"
                                        "`The headers <headers/index.html>`__\n")
