@@ -96,17 +96,17 @@ def list_names():
 
 
 def find_place(name, module):
-    """Where a name is described."""
-    if name in TUPLES:
-        return f"sls.{name}"
-    return module if module == f"sls.{name}" else f"{module}.{name}"
+    """A link to where a name is described; without such a place Sphinx warns."""
+    if module == f"sls.{name}":
+        return f":doc:`sls.{name} <{module}>`"
+    return f":any:`sls.{name}`" if name in TUPLES else f":any:`sls.{name} <{module}.{name}>`"
 
 
 def main(pages, out):
     pages.mkdir(parents=True)
     (pages / "index.rst").write_text(make_index(out))
     modules = ["_sls_core", *list_modules()]
-    names = "\n".join(f"- :any:`sls.{name} <{find_place(name, module)}>`" for name, module in list_names())
+    names = "\n".join(f"- {find_place(name, module)}" for name, module in list_names())
     (pages / "python.rst").write_text(PYTHON.format(
         names=names, modules="\n".join(f"   {module}" for module in modules)))
     for module in modules:
