@@ -2,9 +2,17 @@
 # The launcher: sets up what it needs, builds, flies, tests. `./sls help` lists the subcommands.
 set -euo pipefail
 
-root="$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)"
+root="$(cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")" && pwd)"
 readonly root
-readonly build="${SLS_BUILD:-$root/build}"
+# Installed, this file is PREFIX/share/sls/sls, beside `bin`, a link to the programs; nothing is built then.
+if [[ $root == */share/sls && ! -f $root/CMakeLists.txt ]]; then
+  readonly is_installed=1 self=sls build="${SLS_BUILD:-$root}"
+  readonly python_path="$root/python:$build/python:${root%/share/sls}/lib/python3/dist-packages"
+else
+  readonly is_installed=0 self=./sls build="${SLS_BUILD:-$root/build}"
+  readonly python_path="$root/python:$build/python"
+fi
+readonly source_commands=(bench build chaos clean docker-demo docs fuzz network-table package reference setup study test)
 readonly flying=(sim_server control_client recorder closed_loop)
 readonly programs=("${flying[@]}" sim_ctl sls_verify sls_convert delay_margin sls_doctor sls_view)
 readonly packages=(g++ make cmake libeigen3-dev libsimbody-dev libfastrtps-dev libfastcdr-dev
@@ -13,11 +21,13 @@ readonly packages=(g++ make cmake libeigen3-dev libsimbody-dev libfastrtps-dev l
 readonly fuzz_packages=(clang libclang-rt-14-dev)
 readonly fuzzers=(scenario qos_file csv recording samples foxglove web)
 readonly test_packages=(iproute2 nftables cyclonedds-dev cyclonedds-tools fastdds-tools libfaketime python3-kubernetes
-  python3-pytest slurm-wlm munge python3-distributed chromium mandoc)
+  python3-pytest slurm-wlm munge python3-distributed chromium mandoc debootstrap)
 readonly python_packages=(python3-numpy python3-scipy python3-matplotlib python3-yaml)
 readonly bench_packages=(libbenchmark-dev python3-matplotlib chromium)
+readonly doc_packages=(doxygen python3-sphinx)
+readonly package_packages=(dpkg-dev file)
 
-say() { echo "sls: $*" >&2; }
+say() { local text="$*"; echo "sls: ${text//see .\/sls/see $self}" >&2; }
 fail() { say "error: $1"; exit "${2:-1}"; }
 
 usage() {
@@ -113,6 +123,8 @@ usage: ./sls COMMAND [OPTIONS]
   reference          write docs/reference and tools/completion again, from the code's own tables
       --man DIR        write the man pages to DIR instead
       --check          write nothing; ends 1 where a file is stale
+  docs               API pages of the C++ and C headers and of the Python package: build/docs/index.html
+  package            a Debian package of everything a user needs: build/package/sls_VERSION_ARCHITECTURE.deb
   setup              install the packages that building and flying need
   build              set up and build; the programs are in build/bin
   clean              remove what was built
@@ -128,6 +140,10 @@ EOF
 
 # setup [PACKAGE…]: what building and flying need, and the packages named.
 setup() {
+  if ((is_installed)); then
+    install_missing "$@"
+    return
+  fi
   install_missing "${packages[@]}" "$@"
   install_node
   install_node_modules "$root/tools/view/page"
@@ -169,6 +185,7 @@ install_missing() {
       missing+=("$package")
   done
   ((${#missing[@]})) || return 0
+  ((is_installed == 0)) || fail "this needs packages that are not installed: apt-get install ${missing[*]}"
   say "installing with apt-get: ${missing[*]}"
   local sudo=()
   if ((EUID != 0)); then
@@ -207,7 +224,7 @@ build_tree() {
 # build_programs [TARGET…]: what is named, or all programs, up to date. A build made elsewhere
 # (SLS_BUILD) is taken as it is.
 build_programs() {
-  [[ -z ${SLS_BUILD:-} ]] || return 0
+  [[ -z ${SLS_BUILD:-} && $is_installed == 0 ]] || return 0
   (($#)) || set -- "${programs[@]}" _sls_core
   setup
   build_tree release "$build" "$@"
@@ -459,13 +476,13 @@ cmd_convert() {
 # run_python COMMAND…: -P: nothing in the working folder is taken for a module of ours; -B: no files beside it.
 run_python() {
   install_missing "${python_packages[@]}"
-  PYTHONPATH="$root/python:$build/python" exec /usr/bin/python3 -BP -m sls "$@"
+  PYTHONPATH="$python_path" exec /usr/bin/python3 -BP -m sls "$@"
 }
 
 cmd_python() {
   install_missing "${python_packages[@]}"
   build_programs _sls_core
-  PYTHONPATH="$root/python:$build/python${PYTHONPATH:+:$PYTHONPATH}" exec /usr/bin/python3 -B "$@"
+  PYTHONPATH="$python_path${PYTHONPATH:+:$PYTHONPATH}" exec /usr/bin/python3 -B "$@"
 }
 
 cmd_plot() { run_python plot "$@"; }
@@ -490,7 +507,7 @@ cmd_study() {
 run_campaign() {
   install_missing "${python_packages[@]}"
   export SLS_BUILD="$build"  # flights over DDS must not build
-  PYTHONPATH="$root/python:$build/python" exec /usr/bin/python3 -BP -m "$@"
+  PYTHONPATH="$python_path" exec /usr/bin/python3 -BP -m "$@"
 }
 
 cmd_campaign() {
@@ -611,7 +628,8 @@ cmd_test() {
     [[ $2 == thread ]] && preset=tsan which=(--label-regex threaded) targets=(threaded_tests)
     folder="$root/build-$preset"
   fi
-  setup "${test_packages[@]}" "${python_packages[@]}" "${bench_packages[@]}"
+  setup "${test_packages[@]}" "${python_packages[@]}" "${bench_packages[@]}" \
+    "${doc_packages[@]}" "${package_packages[@]}"
   install_node_modules "$root/tests/tools/view"
   build_tree "$preset" "$folder" "${targets[@]}"
   cd "$root"
@@ -626,13 +644,31 @@ cmd_reference() {
   exec /usr/bin/python3 -B "$root/tools/reference" --build "$build" "$@"
 }
 
+cmd_docs() {
+  setup "${doc_packages[@]}" "${python_packages[@]}"
+  build_programs _sls_core  # its docstrings are pages, too
+  "$root/docs/api/build.sh" "$build"
+  say "pages: $build/docs/index.html"
+}
+
+cmd_package() {
+  setup "${package_packages[@]}"
+  build_tree release "$build" package_contents
+  local log="$build/package.log"
+  cpack --config "$build/CPackConfig.cmake" -B "$build/package" >"$log" 2>&1 ||
+    { tail -n 15 "$log" >&2; fail "cpack failed (whole log: $log)"; }
+  say "package: $(sed -n 's/^CPack: - package: \(.*\) generated\.$/\1/p' "$log")"
+}
+
 cmd_clean() { rm -rf "$root"/build "$root"/build-*; }
 
 command=${1:-help}
 (($#)) && shift
 case $command in
-  help | --help | -h) usage ;;
+  help | --help | -h) usage | sed "s#\./sls#$self#g" ;;
   *)
+    ((is_installed == 0)) || [[ " ${source_commands[*]} " != *" $command "* ]] ||
+      fail "$command: needs the source tree; this sls is installed without it" 2
     if ! declare -F "cmd_$command" >/dev/null; then
       say "error: unknown command '$command'"
       usage >&2

@@ -1,0 +1,223 @@
+"""The Debian package in a clean Debian 12: installed, flown, removed without a trace.
+
+The system is a folder of the build tree that debootstrap fills once, with what the package depends on. Everything in
+it runs in mount and process namespaces of its own: no mount of ours is ever seen outside, none is left behind.
+Skipped where this needs more than the machine has: root, debootstrap, namespaces, a mirror of Debian."""
+
+import hashlib
+import os
+import re
+import shutil
+import subprocess
+import sys
+import unittest
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+BUILD = Path(sys.argv[1]).resolve()
+FOLDER = BUILD / "package_test"
+SYSTEM = FOLDER / "debian"
+WORK = "/tmp/work"  # of the user in the system
+USER = 1000
+# What apt and dpkg write down about their own work, and what lasts no longer than a run.
+JOURNALS = re.compile(r"/(proc|sys|tmp|run|dev/shm|var/(cache|log|lib/(apt|dpkg)))(/|$)|/etc/ld\.so\.cache$|"
+                      r"/var/lib/systemd/|/usr/share/man/.*index")
+
+
+def skip(reason):
+    print(f"skipped: {reason}")
+    sys.exit(77)
+
+
+def isolate(*command, system=None, user=None):
+    """The command with its own mounts, processes, network and shared memory; in the folder of a system, if given."""
+    place = str(system or "")
+    inside = ["setpriv", f"--reuid={user}", f"--regid={user}", "--clear-groups", "--"] if user else []
+    inside = ["chroot", place] + inside if system else inside
+    script = f"""set -e
+mount -t proc proc '{place}/proc'
+mkdir -p '{place}/dev/shm'
+mount -t tmpfs -o mode=1777 tmpfs '{place}/dev/shm'
+ip link set lo up
+exec "$@" """
+    return ["unshare", "--mount", "--propagation", "private", "--pid", "--fork", "--kill-child", "--net", "sh", "-c",
+            script, "sh", *inside, *map(str, command)]
+
+
+def run(command, expected=0, limit_s=120.0, **options):
+    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
+                          stdin=subprocess.DEVNULL, timeout=limit_s, check=False, **options)
+    if done.returncode != expected:
+        raise AssertionError(f"{' '.join(map(str, command[-6:]))}: expected exit code {expected}, got "
+                             f"{done.returncode}:\n{done.stdout[-4000:]}")
+    return done.stdout
+
+
+def run_apt(*command):
+    """In the system, with the network of this machine: apt needs the mirror."""
+    script = f"mount -t proc proc '{SYSTEM}/proc'; exec chroot '{SYSTEM}' \"$@\""
+    environment = {**os.environ, "PATH": "/usr/sbin:/usr/bin:/sbin:/bin", "DEBIAN_FRONTEND": "noninteractive",
+                   "LC_ALL": "C"}
+    return run(["unshare", "--mount", "--propagation", "private", "sh", "-c", script, "sh", *command], limit_s=200,
+               env=environment)
+
+
+def delete(folder):
+    """Never through a mount: there is none of ours, and should somebody have made one, we stop."""
+    if any(line.split()[1].startswith(f"{folder}/") for line in Path("/proc/mounts").read_text().splitlines()):
+        raise AssertionError(f"{folder}: something is mounted in it; see /proc/mounts")
+    subprocess.run(["rm", "-rf", "--one-file-system", "--", folder], check=True)
+
+
+def find_mirror():
+    """The one that apt uses here."""
+    sites = run(["apt-get", "indextargets", "--format", "$(SITE)", "Created-By: Packages", "Origin: Debian",
+                 "Codename: bookworm", "Component: main"]).split()
+    return sites[0] if sites else "http://deb.debian.org/debian"
+
+
+def make_package():
+    """As ./sls package, of what is built."""
+    folder = FOLDER / "package"
+    delete(folder)
+    said = run(["cpack", "--config", BUILD / "CPackConfig.cmake", "-B", folder], cwd=FOLDER)
+    return Path(re.search(r"^CPack: - package: (.*\.deb) generated\.$", said, re.MULTILINE)[1])
+
+
+def make_system(package):
+    """A minimal Debian 12 with what the package depends on, and nothing else."""
+    depends = run(["dpkg-deb", "--field", package, "Depends"]).strip()
+    stamp, wanted = FOLDER / "debian.stamp", hashlib.sha256(depends.encode()).hexdigest()
+    if stamp.is_file() and stamp.read_text() == wanted:
+        return
+    stamp.unlink(missing_ok=True)
+    if not (SYSTEM / "debootstrap.done").is_file():
+        delete(SYSTEM)
+        mirror = find_mirror()
+        made = subprocess.run(["unshare", "--mount", "--propagation", "private", "debootstrap", "--variant=minbase",
+                               "bookworm", SYSTEM, mirror], capture_output=True, text=True, timeout=200, check=False)
+        if made.returncode != 0:
+            skip(f"debootstrap from {mirror} failed: {made.stdout.strip().splitlines()[-1:]}")
+        (SYSTEM / "debootstrap.done").touch()
+    # Not waiting for the disk: this system can be made again.
+    (SYSTEM / "etc/dpkg/dpkg.cfg.d/no_sync").write_text("force-unsafe-io\n")
+    for file in (Path("/etc/resolv.conf"), Path("/etc/hosts"), *Path("/etc/apt/apt.conf.d").glob("*proxy*")):
+        shutil.copy(file, f"{SYSTEM}{file}")  # how this machine reaches the mirror
+    try:
+        run_apt("apt-get", "update", "--error-on=any")
+    except AssertionError as error:
+        skip(f"the mirror of Debian does not answer: {error}")
+    run_apt("apt-get", "satisfy", "-y", "--no-install-recommends", depends)
+    stamp.write_text(wanted)
+
+
+def list_files():
+    """Every file of the system, with its kind and size."""
+    found = {}
+    for folder, folders, names in os.walk(SYSTEM):
+        place = folder.removeprefix(str(SYSTEM))
+        folders[:] = [name for name in folders if not JOURNALS.match(f"{place}/{name}")]
+        for name in folders + names:
+            path = f"{place}/{name}"
+            if not JOURNALS.match(path):
+                status = os.lstat(os.path.join(folder, name))
+                found[path] = (status.st_mode, 0 if name in folders else status.st_size)
+    return found
+
+
+def fly(*command, expected=0):
+    """A command of the user in the system, in the user's folder."""
+    script = f"cd {WORK} && HOME={WORK} PATH=/usr/bin:/bin exec \"$@\""
+    return run(isolate("/bin/sh", "-c", script, "sh", *command, system=SYSTEM, user=USER), expected)
+
+
+class PackageTest(unittest.TestCase):
+    maxDiff = None
+
+    @classmethod
+    def setUpClass(cls):
+        cls.package = make_package()
+        make_system(cls.package)
+        delete(SYSTEM / WORK[1:])
+        subprocess.run(["chroot", SYSTEM, "dpkg", "--purge", "sls"], capture_output=True, check=False)
+        cls.before = list_files()
+        (SYSTEM / WORK[1:]).mkdir()
+        os.chown(SYSTEM / WORK[1:], USER, USER)
+        shutil.copy(cls.package, SYSTEM / "tmp/sls.deb")
+        # What it depends on is there: nothing else is installed, and there is no network to load it from.
+        said = run(isolate("apt-get", "install", "-y", "--no-install-recommends", "/tmp/sls.deb",
+                           system=SYSTEM))
+        assert "1 newly installed" in said, said
+
+    @classmethod
+    def tearDownClass(cls):
+        delete(SYSTEM / WORK[1:])
+        (SYSTEM / "tmp/sls.deb").unlink()
+        subprocess.run(["chroot", SYSTEM, "dpkg", "--purge", "sls"], capture_output=True, check=False)
+
+    def test_1_a_flight_is_that_of_the_build_tree_bit_for_bit(self):
+        said = fly("sls", "run", "short")
+        recording = re.search(r"^sls: recording: (recordings/short-\d{8}T\d{6}Z)$", said, re.MULTILINE)[1]
+        ours = FOLDER / "recording"
+        run(isolate(ROOT / "sls", "run", "short", "--out", ours, "--force"),
+            env={**os.environ, "SLS_BUILD": str(BUILD)})
+        verdict = run([BUILD / "bin/sls_verify", f"{SYSTEM}{WORK}/{recording}", ours])
+        self.assertIn("equal", verdict)
+        fly("sls", "verify", recording)
+        fly("sls", "plot", recording)
+        fly("sls", "report", recording)
+        self.assertTrue((Path(f"{SYSTEM}{WORK}") / recording / "report.html").is_file())
+
+    def test_2_the_commands_work_in_any_folder(self):
+        summary = fly("sls", "demo", "short", "--in-process", "--out", "demo")
+        self.assertIn("Files in demo", summary)
+        fly("sls", "convert", "demo")
+        for name in ("view", "ctl", "doctor", "campaign"):
+            fly("sls", name, "--help")
+        fly("sls", "keys", "keys")
+        flight = "import sls; print(sls.fly(sls.load_scenario('short')).certificate)"
+        self.assertEqual(fly("sls", "python", "-c", flight), fly("python3", "-c", flight))
+        fly("sls", "campaign", "gains", "--runs", "0-1", "--workers", "1", "--out", "campaign", "--verify", "1")
+        self.assertNotIn("./sls", fly("sls", "help"))
+
+    def test_3_commands_of_the_source_tree_say_that_they_need_it(self):
+        names = re.search(r"^readonly source_commands=\((.+)\)$", (ROOT / "sls").read_text(), re.MULTILINE)[1].split()
+        self.assertGreater(len(names), 10)
+        for name in names:
+            self.assertEqual(fly("sls", name, expected=2),
+                             f"sls: error: {name}: needs the source tree; this sls is installed without it\n")
+
+    def test_4_an_example_is_built_against_the_package_and_flown(self):
+        unpacked, example = FOLDER / "unpacked", FOLDER / "my_controller"
+        for folder in (unpacked, example):
+            delete(folder)
+        run(["dpkg-deb", "--extract", self.package, unpacked])
+        shutil.copytree(unpacked / "usr/share/doc/sls/examples/my_controller", example)
+        run(["cmake", "-S", example, "-B", example / "build", f"-DCMAKE_PREFIX_PATH={unpacked}/usr",
+             "-DCMAKE_C_FLAGS=-Werror"])
+        self.assertIn(f"{unpacked}/usr/", (example / "build/CMakeCache.txt").read_text())
+        run(["cmake", "--build", example / "build"])
+        place = Path(f"{SYSTEM}{WORK}/my_controller")
+        (place / "build").mkdir(parents=True)
+        shutil.copy(example / "build/my_controller.so", place / "build")
+        shutil.copy(example / "my_controller.yaml", place)
+        fly("sls", "run", "my_controller/my_controller.yaml", "--in-process", "--out", "own")
+
+    def test_5_it_is_removed_without_a_trace(self):
+        # Root's Python leaves compiled files, which have to go, too.
+        run(isolate("python3", "-c", "import sls; sls.lqr", system=SYSTEM))
+        run(isolate("apt-get", "purge", "-y", "sls", system=SYSTEM))
+        self.assertEqual({path: kind for path, kind in list_files().items() if self.before.get(path) != kind}, {})
+        self.assertEqual(self.before.keys() - list_files().keys(), set())
+
+
+if __name__ == "__main__":
+    if os.geteuid() != 0:
+        skip("only root can install a package")
+    for program in ("debootstrap", "cpack", "dpkg-shlibdeps", "unshare", "ip"):
+        if not shutil.which(program):
+            skip(f"{program} is missing")
+    if subprocess.run(isolate("true"), check=False).returncode != 0:
+        skip("this machine gives no namespaces, or no /proc in them")
+    FOLDER.mkdir(exist_ok=True)
+    unittest.main(argv=sys.argv[:1], verbosity=2, failfast=True)
