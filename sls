@@ -13,7 +13,7 @@ readonly packages=(g++ make cmake libeigen3-dev libsimbody-dev libfastrtps-dev l
 readonly fuzz_packages=(clang libclang-rt-14-dev)
 readonly fuzzers=(scenario qos_file csv recording samples foxglove web)
 readonly test_packages=(iproute2 nftables cyclonedds-dev cyclonedds-tools fastdds-tools libfaketime python3-kubernetes
-  python3-pytest slurm-wlm munge python3-distributed chromium)
+  python3-pytest slurm-wlm munge python3-distributed chromium git codespell)
 readonly python_packages=(python3-numpy python3-scipy python3-matplotlib python3-yaml)
 readonly bench_packages=(libbenchmark-dev python3-matplotlib)
 
@@ -213,7 +213,7 @@ build_programs() {
 # Processes this launcher started: name by process id.
 declare -A name_of=()
 
-# The kernel ends the process should this launcher be killed.
+# If this launcher is killed, the kernel ends the process.
 start() {
   local name=$1
   shift
@@ -320,7 +320,7 @@ fly() {
     return
   fi
 
-  # One line about a mistake, before three programs stumble over it.
+  # One line about a mistake, before three programs fail.
   "$build/bin/sim_server" --check --scenario "$file" "${qos[@]}" "${domain[@]}" "${timing[@]}" >/dev/null ||
     exit $?
   "$build/bin/recorder" --check --out "$recording" "${force[@]}" "${qos[@]}" "${domain[@]}" ||
@@ -446,7 +446,7 @@ cmd_convert() {
   exec "$build/bin/sls_convert" "$@"
 }
 
-# run_python COMMAND…: -P: nothing in the working folder is taken for a module of ours; -B: no files beside it.
+# run_python COMMAND…: -P: Python imports nothing from the working folder; -B: no files beside it.
 run_python() {
   install_missing "${python_packages[@]}"
   PYTHONPATH="$root/python:$build/python" exec /usr/bin/python3 -BP -m sls "$@"

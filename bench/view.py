@@ -20,8 +20,8 @@ LONGEST_WAIT_S = 30.0
 
 
 class Page:
-    """A browser's end of a viewer, as on another machine: takes what comes now and then and looks at
-    none of it, so that it costs nothing here."""
+    """A browser's end of a viewer, as on another machine: empties the socket from time to time and
+    decodes nothing, so that it costs nothing here."""
 
     def __init__(self, port: int):
         self.received = 0  # bytes
@@ -61,7 +61,7 @@ class Viewer:
         self.page = Page(int(found[1]))
 
     def wait_for_flight(self) -> None:
-        """Until its page gets more than the greeting and a status now and then."""
+        """Waits until its page gets more than the greeting and an occasional status."""
         deadline = time.monotonic() + LONGEST_WAIT_S
         while self.page and self.page.received < 200_000:
             if time.monotonic() > deadline:

@@ -31,7 +31,7 @@ struct MeasuredFlight {
   std::uint64_t steps = 0;     ///< answered, all that were flown
 };
 
-/// Called now and then while a flight is flown; may throw to end it.
+/// Called repeatedly during a flight; may throw to end it.
 using Poll = std::function<void()>;
 
 /// Flies `scenario`, of one vehicle. Measures are over the steps up to the loss, that step

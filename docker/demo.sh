@@ -82,7 +82,7 @@ start_service() {
   setpriv --pdeathsig TERM -- docker start --attach "$id" >&2 &
 }
 
-# Kills the first controller once the recording has 800 steps of his.
+# Kills the first controller once the recording has 800 of its steps.
 kill_in_flight() {
   local id
   id="$(container_of controller)"

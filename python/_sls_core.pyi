@@ -56,7 +56,7 @@ class Scenario:
         """Every vehicle, by id."""
     @property
     def controller_model(self) -> Vehicle:
-        """What the controller believes of the vehicle."""
+        """The vehicle parameters that the controller uses."""
     @property
     def force_limit_n(self) -> float: ...
     @property

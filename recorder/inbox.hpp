@@ -22,8 +22,8 @@ class Inbox {
   /// `may_be_opened` is asked about runs on the middleware's threads: others are not kept.
   Inbox(bus::Node& node, std::function<bool(std::uint64_t run_id)> may_be_opened);
 
-  /// From now on run `run_id` is recorded, what has come of it so far included. Samples count from
-  /// its `server` alone.
+  /// From now on run `run_id` is recorded, including its samples that have already arrived. Samples
+  /// count from its `server` alone.
   void open(std::uint64_t run_id, const bus::PeerId& server);
 
   /// All samples of the open run there are, oldest first.

@@ -52,8 +52,8 @@ int main(int argc, char** argv) {
     else
       record::prepare_recording_folder(recorder.folder, force);
     if (check) return;
-    // The loop waits for server and client, not for us: whoever answers a step goes first. Before
-    // any thread starts, as they inherit it. It does no harm where it is refused.
+    // The loop waits for server and client, not for the recorder, so those have priority. Set
+    // before any thread starts, because threads inherit it. A refusal does no harm.
     app::put_thread_last();
     bus::Node node(options.qos_file, options.domain, "recorder", kIdentity);
     record::Recorder(node, recorder).run();

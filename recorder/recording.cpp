@@ -70,7 +70,7 @@ void Recording::write_provisional_manifest() {
   stage_starts_ = manifest.stage_starts;
 }
 
-/// Certificate, log and gaps speak for the whole flight.
+/// Certificate, log and gaps cover the whole flight.
 void Recording::read_earlier_segments() {
   if (!segment_.earlier) return;
   log_.set_stage_starts(segment_.earlier->manifest().stage_starts);

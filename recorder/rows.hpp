@@ -92,7 +92,7 @@ struct ReferenceRow {
   std::uint64_t step = 0;
   double sim_time_s = 0;
   std::string stage_name;
-  Reference reference;  ///< but for its stage's name
+  Reference reference;  ///< without its stage's name
 
   template <class Row, class Visitor>
   static void visit(Row& row, Visitor& field) {

@@ -63,8 +63,8 @@ RunRecorder::RunRecorder(Surroundings& surroundings, const bus::Run& run, const 
 
 RunEnd RunRecorder::run() {
   announce(false);
-  // Who writes into a port of shared memory waits for its reader, should that lose its processor
-  // just then.
+  // A process that writes into a port of shared memory waits for its reader, even if the reader has
+  // just lost its processor.
   if (run_.parameters.mode() == MODE_REALTIME) app::put_process_first();
   std::thread writing([this] {
     app::put_thread_last();

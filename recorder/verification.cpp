@@ -50,7 +50,7 @@ void check_file(const fs::path& path, const ManifestFile::File& expected,
         fmt::format("{}: SHA-256 {}, manifest: {}", path.string(), found.sha256, expected.sha256));
 }
 
-/// A segment whose recorder was killed lists no files: the segment after it speaks for its rows.
+/// A segment whose recorder was killed lists no files: the segment after it covers its rows.
 void check_files(const RecordedSegment& segment, bool is_last, std::vector<std::string>& problems) {
   if (is_last && segment.manifest.files.empty())
     problems.push_back((segment.folder / "manifest.json").string() +

@@ -74,8 +74,7 @@ class CommandGate {
   /// The client whose answer is awaited: the strongest that is neither silent nor refused.
   std::optional<ReadyClient> awaited_client() const;
 
-  /// Who accepted the awaited step from whom, where the client is another than that of the last
-  /// accepted answer.
+  /// Set when the awaited step's answer came from another client than the last accepted answer.
   struct TakeOver {
     std::string from;
     std::string to;

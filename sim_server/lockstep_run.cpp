@@ -91,7 +91,7 @@ bool LockstepRun::attend_to_silence(Clock::time_point now) {
   is_late_ = true;
   for (const auto& vehicle : vehicles_)
     if (!vehicle->gate.accepted()) vehicle->note_waiting(sent_);
-  if (control_.holds()) note_rest(now - looked_);  // paused but for this step
+  if (control_.holds()) note_rest(now - looked_);  // paused except for this step
   looked_ = now;
   if (now >= resend_at_) resend(now);
   attend_now_and_then();

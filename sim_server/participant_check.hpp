@@ -27,7 +27,7 @@ struct Neighbourhood {
   std::map<bus::PeerId, std::string> command_writers;
   /// Those with a writer of sls/participant: an announcement may be on its way.
   std::set<bus::PeerId> announcement_writers;
-  /// Those whose writer does not for want of a DEADLINE (bus::Node::find_missing_deadlines).
+  /// Controllers whose writer offers no DEADLINE (bus::Node::find_missing_deadlines).
   std::map<bus::PeerId, std::string> missing_deadlines;
   /// Those with another problem in discovery: their silence has been explained.
   std::set<bus::PeerId> explained;
@@ -58,7 +58,7 @@ class ParticipantCheck {
   ParticipantCheck(std::uint64_t run_id, const config::Scenario& scenario,
                    const std::vector<std::uint32_t>& vehicle_ids);
 
-  /// Those of `entries` (of this run) that may take part: they speak this contract, and controllers
+  /// Those of `entries` (of this run) that may take part: they use this contract, and controllers
   /// have loaded the library with which their vehicles are flown.
   std::vector<Entry> admit_controllers(const std::vector<Entry>& entries);
   static std::vector<Entry> admit_recorders(const std::vector<Entry>& entries);

@@ -1,4 +1,4 @@
-/// Who takes part in a run: whom step 0 waits for, whom a step waits for, and how to name them.
+/// Participants of a run: those that step 0 or a step waits for, and their names in messages.
 #pragma once
 
 #include <chrono>
@@ -53,7 +53,7 @@ std::uint64_t calc_recorder_limit(const Roster& roster, int expected,
                                   std::int64_t window = kRecorderWindow);
 
 /// Which ready recorder has announced nothing since `since` although it lags behind `step`, in
-/// words; empty when none has, or another one is there in the place of one taken for dead.
+/// words; empty when none has, or another one is there in the place of one presumed dead.
 std::string name_silent_recorder(const Roster& roster, std::uint64_t step,
                                  std::chrono::steady_clock::time_point since);
 

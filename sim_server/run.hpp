@@ -70,7 +70,7 @@ class Run {
 
   /// Step 0 is about to be published.
   virtual void begin() {}
-  /// Publishes the states of the step in work, and settles what comes of it for each vehicle; false
+  /// Publishes the states of the step in work, and decides the force of each vehicle; false
   /// if the operator ended the run.
   virtual bool exchange() = 0;
   /// Whether the step in work may be published as far as the recorders are concerned; false if the
@@ -99,8 +99,8 @@ class Run {
   void check_refusals();
   /// Takes what was accepted, and says who takes over and who is back.
   void take_answers();
-  /// Says now and then who is missing since when, also in sls/status. @throws app::RunError to give
-  /// the run up.
+  /// Reports at intervals which participant is missing since when, also in sls/status. @throws
+  /// app::RunError to give the run up.
   void attend_to_absence(ControllerAbsence::Action action);
   /// The controllers whose answers are awaited, in words.
   std::string name_awaited_controllers() const;

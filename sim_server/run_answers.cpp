@@ -196,9 +196,8 @@ void Run::attend_to_absence(ControllerAbsence::Action action) {
   if (is_news) {
     absence_action_ = action;
     board_.announce(
-        fmt::format("step {}: {} for want of an answer of {}", board_.step,
-                    action == Action::kHold ? "holds the last force" : "fail-safe force",
-                    name_awaited_controllers()));
+        fmt::format("step {}: no answer from {}; {} force", board_.step, name_awaited_controllers(),
+                    action == Action::kHold ? "holding the last" : "applying the fail-safe"));
   }
   if (!is_report_due) return;
   board_.announce(fmt::format("step {}: waiting for: {} ({:.0f} s left){}", board_.step,

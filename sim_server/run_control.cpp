@@ -10,7 +10,7 @@
 namespace sls::sim {
 namespace {
 
-/// Who asks, fit for one line of a log.
+/// Name of the operator that sent `request`, fit for one line of a log.
 std::string name_operator(const SimControl& request) {
   std::string name = request.operator_name().to_string();
   std::replace_if(

@@ -61,7 +61,7 @@ class RunControl {
     std::uint64_t request_id = 0;
     std::uint64_t steps = 0;
     std::uint64_t done = 0;
-    std::string cut_short_by;  ///< who paused during it; the step after which it ends is its last
+    std::string cut_short_by;  ///< operator who paused during it: the run ends its step and pauses
   };
 
   /// Why `request` is refused in the present state; empty where it is accepted.

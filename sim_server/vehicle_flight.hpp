@@ -28,7 +28,7 @@ class VehicleFlight {
 
   /// What a step came to.
   struct Outcome {
-    Applied applied;           // but for the faults
+    Applied applied;           // before faults
     bool is_finished = false;  // the mission ends here
   };
 

@@ -64,8 +64,8 @@ class Mailbox {
     return has_news;
   }
 
-  /// All items there are, oldest first, without waiting. A thread that can afford to look only now
-  /// and then spares everybody a wake-up per item.
+  /// All items there are, oldest first, without waiting. A thread that polls from time to
+  /// time saves its writers a wake-up per item.
   std::deque<T> take_all() {
     const std::lock_guard lock(mutex_);
     return std::exchange(items_, {});

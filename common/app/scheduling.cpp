@@ -10,7 +10,7 @@
 namespace sls::app {
 namespace {
 
-constexpr int kPriority = 1;  // the lowest that goes before ordinary threads
+constexpr int kPriority = 1;  // the lowest real-time priority
 constexpr int kNiceness = 5;
 constexpr int kOnlookerNiceness = 10;  // further, a page stands still on a busy machine
 

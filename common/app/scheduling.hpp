@@ -1,4 +1,4 @@
-/// Who goes first on the processors of this machine. Where the system refuses (it takes root,
+/// Scheduling priority of processes and threads. Where the system refuses (it takes root,
 /// CAP_SYS_NICE or a limit RLIMIT_RTPRIO), everything works, and is late more often.
 #pragma once
 
@@ -14,7 +14,7 @@ bool put_process_first();
 void put_thread_last();
 
 /// The same for all threads that are started from now on, further back: they interrupt nobody when
-/// they wake (SCHED_BATCH). For a process that only looks on.
+/// they wake (SCHED_BATCH). For a process that only reads the flight.
 void put_onlooker_last();
 
 }  // namespace sls::app

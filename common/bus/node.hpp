@@ -29,8 +29,8 @@ class BusError : public std::runtime_error {
 };
 
 /// Makes the middleware ready and loads a QoS file into it: one for the whole process, because
-/// profiles are global there. A Node does it by itself; this is for who makes a participant of his
-/// own (tools/doctor/observer.cpp).
+/// profiles are global there. A Node calls it; call it yourself only to make a participant
+/// without a Node (tools/doctor/observer.cpp).
 /// @throws config::ConfigError as Node does.
 void load_profiles(const std::filesystem::path& file, const std::string& identity);
 

@@ -1,5 +1,6 @@
-/// Who is on the domain: controllers and recorders (sls/participant) and servers (sls/parameters,
-/// sls/status). Both classes listen on the middleware's threads and may be asked from any thread.
+/// Participants of the domain: controllers and recorders (sls/participant) and servers
+/// (sls/parameters, sls/status). Both classes listen on the middleware's threads and may be asked
+/// from any thread.
 #pragma once
 
 #include <atomic>
@@ -19,8 +20,8 @@
 
 namespace sls::bus {
 
-/// Somebody who announces himself at least every 0.5 s and has not for so long is taken for dead,
-/// until he is heard again. (The middleware's lease is much longer: config/qos/README.md.)
+/// Participants announce themselves at least every 0.5 s. One silent for this long is presumed dead
+/// until its next announcement. (The middleware's lease is much longer: config/qos/README.md.)
 inline constexpr auto kSilenceOfTheDead = std::chrono::seconds(2);
 
 /// The last announcement of every controller and recorder that is still there. Of 256 participants
@@ -33,8 +34,8 @@ class ParticipantDirectory {
     PeerId peer;
     Participant announcement;
     std::chrono::steady_clock::time_point heard;  ///< when it came
-    /// Age of the youngest announcement when it came, by his clock and ours: about 0 where they
-    /// agree, positive where his is behind.
+    /// Age of the youngest announcement when it came, by its clock and ours: about 0 where they
+    /// agree, positive where its clock is behind.
     std::chrono::nanoseconds age{0};
     /// When it first said it was ready.
     std::chrono::steady_clock::time_point ready_since{};
@@ -55,7 +56,7 @@ class ParticipantDirectory {
   /// left since.
   int count_done(ParticipantRole role, std::uint64_t run_id) const;
 
-  /// Changes with every announcement (not with departures: ask again now and then).
+  /// Changes with every announcement (not with departures: ask again from time to time).
   std::uint64_t version() const { return version_.load(std::memory_order_acquire); }
 
  private:
@@ -95,9 +96,9 @@ struct Run {
   std::chrono::steady_clock::time_point server_known_since;
 };
 
-/// The last parameters and status of every server that is still there and speaks this contract, of
+/// The last parameters and status of every server that is still there and uses this contract, of
 /// 64 at most: those that have left make room. A run is of the server that was the first to claim
-/// it; what others say of it is not believed.
+/// it; what other servers say of it is ignored.
 class ServerDirectory {
  public:
   /// `on_status`, where given, sees every status sample, on a thread of the middleware.
@@ -120,8 +121,8 @@ class ServerDirectory {
 
   /// The run to go on with for the first of `vehicle_ids` that has one, where `run` does not: its
   /// own server's after a reset or, where that is silent, one of another server that was not known
-  /// before it fell silent. Whoever was, had lost the vehicle to it and is no server in its place,
-  /// whatever he says.
+  /// before it fell silent. A server known before that had
+  /// lost the vehicle to ours and does not replace it.
   std::optional<Run> find_successor(const Run& run,
                                     const std::vector<std::uint32_t>& vehicle_ids) const;
 
@@ -131,7 +132,7 @@ class ServerDirectory {
   /// True until the server has left, or its lease has run out.
   bool is_present(const PeerId& server) const;
 
-  /// True when nothing was heard of run `run_id` for so long that its server is taken for dead.
+  /// True when nothing was heard of run `run_id` for so long that its server is presumed dead.
   bool is_silent(std::uint64_t run_id) const;
 
   /// When the last status of run `run_id` came; nothing before the first.

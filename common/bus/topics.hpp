@@ -5,8 +5,8 @@
 
 namespace sls::bus {
 
-/// SHA-256 of idl/sls.idl without comments and with white space collapsed: idl/README.md. Whoever
-/// was made from another one must not be believed a word.
+/// SHA-256 of idl/sls.idl without comments and with white space collapsed: idl/README.md. Samples
+/// of a program built from another contract are ignored.
 inline constexpr const char* kContractSha256 = SLS_CONTRACT_SHA256;
 
 /// What a topic is for decides its QoS profiles: config/qos/README.md.

@@ -260,7 +260,7 @@ std::string read_scenario_file(const std::filesystem::path& file) {
 
   std::ifstream stream(file, std::ios::binary);
   if (!stream) fail("a readable file", std::generic_category().message(errno));
-  std::string text(kMaxScenarioBytes + 1, '\0');  // one more, should it have grown meanwhile
+  std::string text(kMaxScenarioBytes + 1, '\0');  // one more, in case it has grown meanwhile
   stream.read(text.data(), static_cast<std::streamsize>(text.size()));
   if (stream.bad()) fail("a readable file", std::generic_category().message(errno));
   text.resize(static_cast<std::size_t>(stream.gcount()));

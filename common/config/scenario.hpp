@@ -127,7 +127,7 @@ struct Autopilot {
 
 enum class SyncMode { kLockstep, kRealtime };
 
-/// Who must be ready before step 0.
+/// Participants that must be ready before step 0.
 struct WaitFor {
   int controllers = 1;  ///< for each vehicle
   int recorders = 1;
@@ -149,8 +149,8 @@ enum class RecorderPolicy {
   kStop,  ///< ends the run as failed
 };
 
-/// Patience with a participant that is silent or gone. Who is missing is reported within 1 s and
-/// every 5 s whatever the policy.
+/// Time limits for a participant that is silent or gone. Every policy reports it within 1 s and
+/// then every 5 s.
 template <class Policy>
 struct Absence {
   Policy policy = Policy::kWait;
@@ -268,7 +268,7 @@ enum class StateWiring {
   kGazeboPlugin,  ///< the published plugin's permuted angle slots
 };
 
-/// What the controller believes; what the file leaves out equals the plant's truth.
+/// Vehicle parameters that the controller uses; those not in the file equal the plant's.
 struct ControllerModel {
   /// Which numbers the file leaves out: in a fleet they equal the truth of each vehicle.
   struct Follows {

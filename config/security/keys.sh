@@ -128,7 +128,7 @@ make_authority() {
 }
 
 # Two authorities, because Fast DDS 2.9.1 takes permissions that anyone with a certificate of the
-# permissions authority has signed: with one for both, a recorder could sign his own.
+# permissions authority has signed: with one for both, a recorder could sign its own.
 make_authorities() {
   mkdir -m 700 "$ca"
   local name
@@ -158,7 +158,7 @@ make_identity() {
 
 # --- command line ---------------------------------------------------------------------------------
 
-# replace NEW OLD: NEW takes the place of OLD, which is never there in part.
+# replace NEW OLD: NEW takes the place of OLD, which is never half written.
 replace() {
   if [[ -e $2 ]]; then
     mv -T -- "$2" "$work/replaced"

@@ -1,4 +1,4 @@
-/* An autopilot of one's own: a proportional-derivative law on the attitude's quaternion, and the
+/* Your own autopilot: a proportional-derivative law on the attitude's quaternion, and the
  * shares of four rotors in an X. The equations stand in README.md. */
 #include <math.h>
 #include <sls/sls_autopilot.h>

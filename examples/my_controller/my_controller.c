@@ -1,4 +1,4 @@
-/* A controller of one's own: position asks for a velocity, velocity for an acceleration, that for a
+/* Your own controller: position asks for a velocity, velocity for an acceleration, that for a
  * slope of the rod. What it remembers travels as memory numbers: see README.md. */
 #include <sls/sls_controller.h>
 #include <stdio.h>

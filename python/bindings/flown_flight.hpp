@@ -29,7 +29,7 @@ struct ColumnPlace {
 
 class FlownFlight {
  public:
-  /// Flies `ids` (ascending) of `scenario` to the end. `rest` is called now and then, and may throw
+  /// Flies `ids` (ascending) of `scenario` to the end. `rest` is called repeatedly and may throw
   /// to end the flight.
   /// @throws config::ConfigError as Flight does.
   /// @throws app::RunError where a control law is broken.
@@ -64,7 +64,7 @@ class FlownFlight {
   void list_columns(const closed_loop::Flight& flight);
   void keep(const closed_loop::FlownStep& flown, std::size_t index);
   void keep_remarks(closed_loop::Flight& flight);
-  /// Step `row` of the `index`th vehicle as it was flown, but for the numbers of the law's memory,
+  /// Step `row` of the `index`th vehicle as it was flown, without the numbers of the law's memory,
   /// which no file holds.
   closed_loop::FlownStep make_step(std::size_t index, std::size_t row) const;
 

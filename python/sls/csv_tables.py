@@ -11,7 +11,7 @@ import numpy as np
 
 from sls.input_error import InputError
 
-# Columns that hold text: their numpy types. Of who commanded nothing is shown.
+# Columns that hold text: their numpy types. The controller's name is not shown.
 TEXT_COLUMNS = {"stage_name": "U32", "fault": "U16", "controller": "U1"}
 
 

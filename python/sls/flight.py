@@ -90,7 +90,7 @@ class FlownVehicle:
 
     @cached_property
     def command(self) -> Columns:
-        """Those of command.csv, but for the controller's name and its compute time."""
+        """The columns of command.csv except the controller's name and its compute time."""
         return self._make_columns("command")
 
     @cached_property

@@ -129,7 +129,7 @@ class Recording:
 
     @property
     def manifest(self) -> dict[str, Any]:
-        """The last segment's, which speaks for the whole flight."""
+        """The last segment's, which covers the whole flight."""
         return self.segments[-1][1]
 
     @property

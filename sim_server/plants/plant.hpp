@@ -60,7 +60,7 @@ struct PlantSetup {
     model::SlungLoadParameters parameters;
     config::InitialState initial;
   };
-  config::Plant plant;            ///< but for `initial`, which each vehicle has of its own
+  config::Plant plant;            ///< except `initial`, which each vehicle has of its own
   config::Autopilot autopilot;    ///< of plants that take one
   std::filesystem::path folder;   ///< of the scenario file
   std::vector<Vehicle> vehicles;  ///< at least one, by ascending id

@@ -355,7 +355,7 @@ TEST(MeasuredFlightTest, AFleetIsRefused) {
   }
 }
 
-TEST(MeasuredFlightTest, IsAskedNowAndThenWhetherToGoOn) {
+TEST(MeasuredFlightTest, PollsDuringTheFlightAndStopsWhenThePollThrows) {
   const config::Scenario scenario = load("short");
   struct Stop {};
   int calls = 0;

@@ -198,7 +198,7 @@ TEST(FlightControllerTest, SaturatesOnlyWhereAsked) {
   EXPECT_LE(limited.f_Q_W.normalized().cross(free.f_Q_W.normalized()).norm(), 1e-15);
 }
 
-TEST(FlightControllerTest, FeedsForwardTheDragItBelievesIn) {
+TEST(FlightControllerTest, FeedsForwardTheDragOfItsModel) {
   config::Scenario scenario = make_figure_eight();
   std::mt19937 generator(2);
   const model::SlungLoadState state = draw_state(generator);
@@ -291,7 +291,7 @@ TEST(FlightControllerTest, AStageThatTimesOutFailsTheMission) {
 
 TEST(FlightControllerTest, RadiusStagesLookAtTheTrueLoadNotAtTheBelievedOne) {
   config::Scenario scenario = make_figure_eight();
-  scenario.vehicle.rod_length = 1.5;  // the controller believes 1.0
+  scenario.vehicle.rod_length = 1.5;  // the controller's model has 1.0
   config::Stage stage = make_hold({0.0, 0.0, -1.0}, 0);
   config::LeaveWithin leave;
   leave.radius_m = 0.1;

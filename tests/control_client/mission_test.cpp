@@ -119,7 +119,7 @@ TEST(MissionTest, ARadiusStageIsLeftStrictlyAfterAndStrictlyWithin) {
   EXPECT_EQ(mission.calc_progress(251, on_the_sphere, {}).phase, MissionPhase::kRunning);
 }
 
-TEST(MissionTest, WhoHasFinishedStaysSoWhereverTheBodyGoes) {
+TEST(MissionTest, AFinishedMissionStaysFinishedWhereverTheBodyGoes) {
   config::LeaveWithin leave;
   leave.radius_m = 0.25;
   leave.timeout_ns = 10 * kSecond;

@@ -126,8 +126,8 @@ class HostileTest : public testing::Test {
     expect_undisturbed(flight, 400);
   }
 
-  // Who forges packets under the sender's name can say anything; only security prevents that. But
-  // nobody may crash or hang over it.
+  // Packets forged under the sender's name can claim anything; only security prevents that. But
+  // no program may crash or hang.
   void expect_that_spoofed_packets_crash_nobody() {
     Flight flight(scenario("figure_eight"), options_);
     attack("spoof", flight, "server");
@@ -204,7 +204,7 @@ TEST_F(SecuredHostileTest, AnnouncementsOfThousandsThatDoNotExistDisturbNothing)
   expect_that_forgeries_disturb_nothing("announcements");
 }
 
-TEST_F(SecuredHostileTest, WhoHasNoKeysDisturbsNothingAndHearsNothing) {
+TEST_F(SecuredHostileTest, AProgramWithoutKeysDisturbsNothingAndReadsNothing) {
   Flight flight(scenario("figure_eight"), options_);
   attack("malformed", flight);
   deaf_ = &attack("readers", flight);

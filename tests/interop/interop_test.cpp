@@ -134,7 +134,7 @@ class InteropTest : public testing::Test {
     for (Process* process : processes) EXPECT_EQ(process->wait(seconds(0)), 0) << outputs;
   }
 
-  /// Both flew the same mission, but for rounding.
+  /// Both flew the same mission, apart from rounding.
   static void expect_same_flight(const std::filesystem::path& a, const std::filesystem::path& b) {
     const Table states_a(a / "state.csv"), states_b(b / "state.csv");
     ASSERT_EQ(states_a.rows(), states_b.rows());

@@ -1,4 +1,4 @@
-/// A flight of the three programs on hosts of their own, and what came of it beside a local one.
+/// A flight of the three programs on hosts of their own, and its result beside a local one.
 #pragma once
 
 #include <cstdint>

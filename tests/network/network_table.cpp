@@ -62,7 +62,7 @@ std::string format(const Figures& figures) {
   return text;
 }
 
-/// Columns 3 to 8 of the table: what came of `disturbance` with `profile`.
+/// Columns 3 to 8 of the table: the effect of `disturbance` with `profile`.
 std::string fly(const std::string& file, const std::string& profile, const Disturbance& disturbance,
                 const Flight& local) {
   Network network(kHosts);

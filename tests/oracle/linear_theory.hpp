@@ -52,8 +52,8 @@ using Transfer = std::function<std::complex<double>(const std::complex<double>& 
 ///     hold        Z = H(T) e^(−sd) G,   H(T) = (1 − e^(−sT)) / (sT)
 ///     sensing     F has p e^(−sa) H(P) for p, and q likewise
 ///
-/// M, S, I are the vehicle's mass and the pendulum's first and second moment about its joint; what
-/// the controller believes bears a dash. d is the delay of the node, P and a period and age of the
+/// M, S, I are the vehicle's mass and the pendulum's first and second moment about its joint; the
+/// controller's model has a dash. d is the delay of the node, P and a period and age of the
 /// samples. G, `horizontal_lag`, is what vehicle and autopilot make of a horizontal force. On
 /// s = iw, of each axis its own frequency.
 inline SteadyError calc_steady_error(const config::Scenario& scenario,

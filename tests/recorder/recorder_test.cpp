@@ -246,7 +246,7 @@ TEST_F(RecorderTest, ARunThatIsReplacedByAnotherServersEndsTheRecording) {
   EXPECT_EQ(read_manifest(out_).at("missing"), Json::array());
 }
 
-// A server that is overwhelmed falls silent too. Who was there before is then no successor.
+// An overloaded server falls silent, too. A server known before that is no successor.
 TEST_F(RecorderTest, AServerThatWasThereBeforeTakesNoSilentOnesPlace) {
   auto flight = std::make_unique<FakeFlight>(kRunId, 3);
   start();

@@ -68,7 +68,7 @@ TEST_F(SegmentsTest, AResumedRecordingEqualsTheUndisturbedOne) {
   expect_equal_to_the_undisturbed(segment.folder);
   EXPECT_EQ(read_manifest(segment.folder).at("segment"),
             Json({{"number", 2}, {"first_step", 151}}));
-  EXPECT_EQ(read_manifest(out_).at("complete"), false) << "the last segment speaks for all";
+  EXPECT_EQ(read_manifest(out_).at("complete"), false) << "the last segment covers all";
   const auto table = parse_csv(read_bytes(segment.folder / "state.csv"));
   EXPECT_EQ(table.text(0, "step"), "151");
 }

@@ -312,7 +312,7 @@ TEST_F(VerificationTest, WhatIsNoRecordingIsRefused) {
   }
 }
 
-// A manifest is opened by whoever verifies somebody else's recording.
+// The manifest of a recording to verify may come from anywhere.
 TEST_F(VerificationTest, AManifestNamesNoFilesElsewhereAndNoThousandsOfVehicles) {
   const std::string manifest = read_bytes(b_ / "manifest.json");
   for (const char* name : {"/dev/zero", "../a/state.csv", "..", "", "folder/"}) {

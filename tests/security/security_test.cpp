@@ -111,8 +111,8 @@ class IntruderTest : public testing::Test {
     return {"--scenario", (folder_ / "intruder.yaml").string(), "--strength", "1000"};
   }
 
-  /// Expects the server to name the intruder with `cause`, the flight to be the one without him,
-  /// and him to have seen nothing of it.
+  /// Expects the server to name the intruder with `cause`, the flight to be as without it,
+  /// and the intruder to have received nothing.
   void expect_harmless(const std::string& cause, const std::vector<std::string>& before,
                        const std::string& qos_file = qos("secure")) {
     const auto server = run_.start_server();

@@ -1,4 +1,4 @@
-/// What somebody on the network, without keys, hears and can do: three hosts of the flight and his.
+/// What a host without keys on the network can read and do: three hosts of the flight and that one.
 #include <gtest/gtest.h>
 
 #include <algorithm>

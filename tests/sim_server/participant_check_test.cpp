@@ -129,7 +129,7 @@ TEST_F(ParticipantCheckTest, ARunOfZeroIsNamedOnceItLasts) {
   EXPECT_EQ(look(1s), only(kFoo + "sls/participant run_id: expected 00000000000000ab, got 0"));
 }
 
-TEST_F(ParticipantCheckTest, WhoFliesOrAwaitsAnotherServerIsNoneOfOurs) {
+TEST_F(ParticipantCheckTest, AControllerOfAnotherServerIsNotOurs) {
   auto other = make_entry(1), waits = make_entry(2);
   other.announcement.run_id(0xcd);
   other.announcement.vehicle_ids({7});
@@ -199,7 +199,7 @@ TEST_F(ParticipantCheckTest, AnAnnouncementThatMayBeOnItsWayIsWaitedForLonger) {
   EXPECT_TRUE(look(6s).empty());
 }
 
-TEST_F(ParticipantCheckTest, AMissingDeadlineIsAMistakeOfThoseWhoFlyForUs) {
+TEST_F(ParticipantCheckTest, AMissingDeadlineIsReportedOnlyOfOurControllers) {
   neighbourhood_.missing_deadlines[make_peer(1)] = "sls/command of 'foo': DEADLINE";
   EXPECT_TRUE(look().empty());  // it has not said for whom it flies
   EXPECT_EQ(look(1s), only("sls/command of 'foo': DEADLINE"));

@@ -148,7 +148,7 @@ TEST(RosterTest, ARecorderThatIsNotReadyDoesNotBlockWhereNoneIsExpected) {
   EXPECT_EQ(name_blocking_recorder({{}, {make_recorder("tape", false)}}, 0, 100000), "");
 }
 
-TEST(RosterTest, AbsurdProgressIsTakenForWhatItCanMean) {
+TEST(RosterTest, ImpossibleProgressIsClampedToThePlausibleRange) {
   const auto lowest = std::numeric_limits<std::int64_t>::min();
   const auto highest = std::numeric_limits<std::int64_t>::max();
   EXPECT_NE(name_blocking_recorder({{}, {make_recorder_at(lowest)}}, 1, 2000), "");
@@ -166,7 +166,7 @@ TEST(RosterTest, TheServerWaitsForEveryRecorderThatIsThere) {
   EXPECT_TRUE(bus::are_recorders_done({}));
 }
 
-TEST(RosterTest, ARecorderThatIsTakenForDeadDoesNotBlockIfAnotherIsThere) {
+TEST(RosterTest, ARecorderPresumedDeadDoesNotBlockIfAnotherIsThere) {
   auto dead = make_recorder_at(10);
   dead.heard -= 2 * bus::kSilenceOfTheDead;
   EXPECT_EQ(name_blocking_recorder({{}, {dead, make_recorder_at(4999)}}, 1, 5000), "");

@@ -74,7 +74,7 @@ bool is_moment(const pthread_mutex_t* lock) {
   return is_over_messages(file, lock) == are_messages_wanted && !is_over.exchange(true);
 }
 
-// A signal stops all threads: none but the one that sends it may be in a lock, or that of another
+// A signal stops all threads: only the one that sends it may be in a lock, or that of another
 // port than the wanted one would be held, too.
 std::atomic<int> threads_inside{0};  // lock, or want to
 std::atomic<bool> is_stopping{false};

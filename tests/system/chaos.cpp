@@ -1,9 +1,9 @@
 /// Random disturbances of real flights: in every trial one process of a lockstep flight is stopped
 /// and continued, or killed and restarted, at a random moment. The flight must end well, its
-/// recording must be that of an undisturbed flight, and whoever kept the others waiting for 2 s
-/// must have been named by then. (A client killed for good before the flight began leaves a run
-/// that cannot begin, and must end naming him.) A seed repeats the choices (not the machine's own
-/// timing).
+/// recording must be that of an undisturbed flight, and a process that kept the others waiting for
+/// 2 s must have been named by then. (A client killed for good before the flight began leaves a run
+/// that cannot begin, and must end naming the client.) A seed repeats the choices (not the
+/// machine's own timing).
 #include <signal.h>
 #include <unistd.h>
 
@@ -95,7 +95,7 @@ std::string describe(const Disturbance& disturbance) {
   return line + text;
 }
 
-/// What became of a trial; empty `failure`: as it must be.
+/// Result of a trial; empty `failure`: passed.
 struct Result {
   std::string failure;
   std::string success = "recording equal";

@@ -52,7 +52,7 @@ Parameters load_parameters(const record::RecordedFlight& flight) {
   return parameters;
 }
 
-/// True if the manifest of that folder speaks for `file`.
+/// True if the manifest of its folder lists `file`.
 bool is_listed(const fs::path& file) {
   const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
   std::error_code error;

@@ -22,7 +22,7 @@ struct ClientOptions {
   int domain = 0;  ///< of the node, for messages
   std::uint32_t vehicle_id = 0;
   double timeout_s = 10.0;  ///< for a server to be found, and again for its reply
-  bool asks = true;         ///< false: only looks on, which the keys of every role allow
+  bool asks = true;         ///< false: only reads, which the keys of every role allow
 };
 
 /// A stop signal ends every wait early; nothing is returned then.

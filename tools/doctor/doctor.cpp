@@ -79,7 +79,7 @@ bool is_complete(const Observations& seen, bool is_echo_expected, Clock::duratio
          });
 }
 
-/// One examination: who asks, listens and watches, and what they have seen so far.
+/// One examination: prober, listener and observer, and their results so far.
 class Examination {
  public:
   explicit Examination(const DoctorOptions& options)

@@ -14,7 +14,8 @@ namespace sls::doctor {
 struct DoctorOptions {
   std::filesystem::path qos_file;
   int domain = 0;
-  std::string identity = "recorder";  ///< whose keys it uses on a secured domain: he may read all
+  std::string identity =
+      "recorder";  ///< role whose keys it uses on a secured domain: a recorder may read all
   std::string peer;                   ///< name or address of the other machine; empty: this one
 };
 

@@ -47,7 +47,7 @@ class ProbeAnswerer {
   std::vector<unsigned char> buffer_;
 };
 
-/// What became of the probes.
+/// Results of the probes.
 struct ProbeResults {
   bool is_tried = false;
   std::string own_address;      ///< towards the peer

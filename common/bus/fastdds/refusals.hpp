@@ -60,7 +60,7 @@ class Refusals {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::map<std::string, std::string> known_;  // descriptions, by GUID
-  std::map<std::string, Pending> pending_;    // who has not proven his identity yet
+  std::map<std::string, Pending> pending_;    // participants without a proven identity yet
   std::set<std::string> reported_;
   std::string cause_;  // the last that was logged
   Clock::time_point window_began_{};

@@ -49,8 +49,8 @@ constexpr int kRobustBit = 16;  // of the kind of a mutex in the C library
 
 /// Locks of the ports that threads of this process read, the latest of them. Two per port, taken
 /// one after the other when a reader has waited there. For them a reader waits as long as it takes:
-/// where it gives up, the library ends the process or replaces the port. So does who closes the
-/// port.
+/// where it gives up, the library ends the process or replaces the port. The same holds for
+/// a process that closes the port.
 std::array<std::atomic<const pthread_mutex_t*>, 16> own_locks{};
 thread_local int own_locks_to_come = 0;
 
@@ -138,8 +138,8 @@ int lock_own(decltype(pthread_mutex_timedlock)* lock_until, pthread_mutex_t* mut
 
 }  // namespace sls::bus
 
-// The middleware's library finds these before those of the C library. But for the unlocking it uses
-// them for what is between processes only (boost::interprocess with a time limit); the locks of its
+// The middleware's library finds these before those of the C library. Except for unlocking, it uses
+// them only for locks between processes (boost::interprocess with a time limit); the locks of its
 // own threads go another way and cost nothing more.
 
 int pthread_mutexattr_setpshared(pthread_mutexattr_t* attributes, int shared) noexcept {

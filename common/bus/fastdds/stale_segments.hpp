@@ -14,7 +14,7 @@ namespace sls::bus {
 /// Never throws.
 void remove_stale_segments(const std::filesystem::path& folder = "/dev/shm");
 
-/// The segments that `remove_stale_segments` would remove, whoever owns them.
+/// The segments that `remove_stale_segments` would remove, of all owners.
 std::vector<std::filesystem::path> find_stale_segments(
     const std::filesystem::path& folder = "/dev/shm");
 
@@ -29,9 +29,9 @@ bool is_port_read(int port, const std::filesystem::path& folder = "/dev/shm");
 
 /// The participant id to ask for, or −1 where any will do.
 ///
-/// A killed process leaves the lock files of its ports, and whoever takes such a port over replaces
-/// it without telling those who still have the old one open: they would never hear of each other
-/// (Fast DDS 2.9, #4728). So where there are such files, an id is chosen that has none.
+/// A killed process leaves the lock files of its ports, and the next process on such a port
+/// replaces it. A process that still has the old one open is not told: neither receives the other's
+/// data (Fast DDS 2.9, #4728). So where there are such files, an id is chosen that has none.
 int choose_participant_id(const ParticipantPorts& ports,
                           const std::filesystem::path& folder = "/dev/shm");
 

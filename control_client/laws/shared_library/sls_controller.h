@@ -1,4 +1,5 @@
-/* A control law of your own for SLS, in C11 or in what speaks C (MATLAB Coder, Simulink, CasADi, …).
+/* A control law of your own for SLS, in C11 or any language that exports C functions (MATLAB Coder,
+ * Simulink, CasADi, …).
  *
  * Build a shared library that defines sls_controller() and name it in a scenario:
  *
@@ -29,7 +30,7 @@ typedef struct {
   const char* parameters; /* `controller.parameters` as JSON, a map; "{}" where there is none */
   uint32_t vehicle_id;
   double period_s; /* control period in force */
-  /* What the controller is to believe of its vehicle (`controller.model`). */
+  /* The vehicle parameters that the controller uses (`controller.model`). */
   double quad_mass_kg, load_mass_kg, rod_length_m, gravity_m_s2;
   double force_limit_n; /* the server refuses a stronger force */
 } sls_controller_setup;

@@ -56,7 +56,7 @@ def calc_mass_ratio(load_mass_kg: float, believed_kg: float = LOAD_MASS_KG) -> f
 
 def make_chain(gains: Sequence[float], load_mass_kg: float,
                vertical: Sequence[float]) -> HorizontalChain:
-    """The horizontal loop about a hover in which the load sags, because the controller believes 0.2
+    """The horizontal loop about a hover in which the load sags, because the controller assumes 0.2
     kg: (1) of the page. `gains` position, velocity, acceleration, jerk; `vertical` position,
     velocity."""
     ratio = calc_mass_ratio(float(load_mass_kg))
@@ -173,7 +173,7 @@ def study_mass_and_delay(table: RunTable) -> tuple[Figure, dict[str, str]]:
     axes.axvline(sag_mass, color="#0b5394", linewidth=2, linestyle="--",
                  label="linear: sags by a rod length")
     axes.axvline(LOAD_MASS_KG, color="#444444", linewidth=0.8, linestyle=":")
-    axes.set_xlabel("mass of the load (kg); the controller believes 0.2")
+    axes.set_xlabel("mass of the load (kg); the controller assumes 0.2")
     axes.set_ylabel("delay of the command (s)")
     axes.legend(handles=[*list_class_handles(range(4)), *axes.lines[:2]], loc="upper left",
                 bbox_to_anchor=(1.0, 1.0))

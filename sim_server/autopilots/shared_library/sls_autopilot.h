@@ -1,4 +1,5 @@
-/* An autopilot of your own for SLS, in C11 or in what speaks C (MATLAB Coder, Simulink, …).
+/* An autopilot of your own for SLS, in C11 or any language that exports C functions (MATLAB Coder,
+ * Simulink, …).
  *
  * Build a shared library that defines sls_autopilot() and name it in a scenario:
  *

@@ -1,4 +1,4 @@
-/* A plant of your own for SLS, in C11 or in what speaks C.
+/* A plant of your own for SLS, in C11 or in a language that exports C functions.
  *
  * Build a shared library that defines sls_plant() and name it in a scenario:
  *

@@ -172,7 +172,7 @@ TEST(ServerDirectoryTest, FindsTheRunToJoin) {
     Writer<SimStatus> second_status(second_server);
     second_parameters.write(make_parameters(kLowerRun, {kVehicle}));
     second_status.write(make_status(kLowerRun, PHASE_WAITING));
-    // Both say again and again where they are: who is silent for 2 s is no server to join.
+    // Both say again and again where they are: a server silent for 2 s is not joined.
     const auto is_chosen = [&](std::uint64_t run_id, RunPhase phase) {
       return wait_until([&] {
         status.write(make_status(kRun, phase));
@@ -282,14 +282,15 @@ TEST(ServerWatchTest, ASilentServerIsNotJoinedIsGivenUpAndMayComeBack) {
     status.write(make_status(kRun, PHASE_RUNNING));
     return watch.look() == ServerWatch::Finding::kThere;
   }));
-  // Who does not look for a while, because it was stopped itself, does not blame the server.
+  // A watch that did not look for a while, because it was stopped itself, does not report the
+  // server.
   const auto later = ServerWatch::Clock::now() + std::chrono::milliseconds(1500);
   ASSERT_TRUE(wait_until([&] { return ServerWatch::Clock::now() > later; }));
   EXPECT_EQ(watch.look(), ServerWatch::Finding::kThere);
 }
 
-// A server whose samples are late, because this process or the network is overwhelmed, is taken for
-// dead as well: then whoever claims its vehicle all along must not have it.
+// A server whose samples are late, because this process or the network is overwhelmed, is presumed
+// dead as well: then a server that claimed its vehicle all along must not get it.
 TEST(ServerDirectoryTest, OnlyAServerThatComesAfterTheSilenceBeganIsASuccessor) {
   constexpr int kDomain = 78;
   Node node(kQosFile, kDomain, "directory");

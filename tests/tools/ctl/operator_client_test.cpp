@@ -186,7 +186,7 @@ TEST_F(OperatorClientTest, ARequestReachesTheServerAndItsReplyComesBack) {
 
 TEST_F(OperatorClientTest, ARefusalComesBackWithItsReason) {
   FakeServer server([](FakeServer& self, const SimControl& request) {
-    SimControl of_another = request;  // replies to others are not taken for one's own
+    SimControl of_another = request;  // replies to other clients are ignored
     of_another.request_id(request.request_id() + 1);
     self.reply(of_another, true);
     self.reply(request, false, "already paused");

@@ -59,7 +59,7 @@ TEST(DiagnosisTest, OfAHealthyNetworkFindsNothing) {
   EXPECT_EQ(find_faults(make_healthy_with_shared_memory()), Names{});
 }
 
-TEST(DiagnosisTest, MulticastIsBlamedOnlyWhereUnicastWorks) {
+TEST(DiagnosisTest, MulticastIsReportedOnlyWhereUnicastWorks) {
   Observations seen = make_healthy();
   seen.probes.is_multicast_answered = false;
   EXPECT_EQ(find_faults(seen), Names{"multicast"});
@@ -67,7 +67,7 @@ TEST(DiagnosisTest, MulticastIsBlamedOnlyWhereUnicastWorks) {
   EXPECT_EQ(find_faults(seen), Names{});
 }
 
-TEST(DiagnosisTest, PortsAreBlamedOnlyWhereTheHostIsUpAndNoDataPasses) {
+TEST(DiagnosisTest, PortsAreReportedOnlyWhereTheHostIsUpAndNoDataPasses) {
   Observations seen = make_healthy();
   seen.settings.uses_multicast = false;
   seen.probes = {};
@@ -123,7 +123,7 @@ TEST(DiagnosisTest, AnotherFlightOnAnotherDomainIsNobodysFault) {
   EXPECT_EQ(find_faults(seen), Names{"domain"}) << "it has lost its server";
 }
 
-TEST(DiagnosisTest, WhoAnswersNoHandshakeRejectsUs) {
+TEST(DiagnosisTest, AProgramThatAnswersNoHandshakeRejectsUs) {
   Observations seen = make_healthy();
   seen.settings.is_secured = seen.programs.front().is_secured = true;
   seen.refusal = "not allowed";

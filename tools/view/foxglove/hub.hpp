@@ -1,5 +1,5 @@
-/// What all sessions of the protocol share: the channels, who subscribes to them, and the work done
-/// once for each sample however many look on.
+/// Shared by all sessions of the protocol: the channels, their subscribers, and the work done once
+/// for each sample, however many subscribe.
 #pragma once
 
 #include <chrono>

@@ -1,4 +1,4 @@
-/// The mirrors of common/ros from batches of sls/record, thinned for people who look on.
+/// The mirrors of common/ros from batches of sls/record, thinned to a rate for display.
 #pragma once
 
 #include <chrono>

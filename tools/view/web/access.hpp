@@ -1,4 +1,4 @@
-/// Who may look and who may operate. Pure: no network.
+/// Permissions to view and to operate. Pure: no network.
 #pragma once
 
 #include <optional>

@@ -2,7 +2,7 @@
 
 Each process is `sls.campaign.worker --serve`: it reads the number of a chunk from a pipe and answers
 when the chunk is in the folder. A process that is killed closes its pipe; another one flies its
-chunk. The kernel ends the processes should this one be killed."""
+chunk. If this process is killed, the kernel ends them."""
 
 import json
 import os

@@ -232,7 +232,7 @@ def submit_round(folder: CampaignFolder, missing: Sequence[int], number: int,
     own = place / "slurm"
     own.mkdir(exist_ok=True)
     run_s = measure_run_s(folder, missing)
-    # Who says how many runs a chunk has, says it of a task, too.
+    # --chunk-runs sets the runs of a task, too.
     chunks_each = 1 if options.chunk_runs else max(
         1, -(-int(TASK_S / max(run_s, 1e-6)) // folder.plan.chunk_runs))
     tasks = make_tasks(missing, chunks_each)

@@ -192,7 +192,7 @@ TEST_P(ReceivingTest, TheSocketsOwnTimeLimitHolds) {
   EXPECT_GE(std::chrono::steady_clock::now() - start, std::chrono::milliseconds(200));
 }
 
-TEST_P(ReceivingTest, WhoDoesNotWaitGetsItsAnswerAtOnce) {
+TEST_P(ReceivingTest, ANonBlockingReceiveReturnsAtOnce) {
   const SocketPair sockets;
   EXPECT_EQ(sockets.receive(MSG_DONTWAIT), "error " + std::to_string(EAGAIN));
 }

@@ -59,7 +59,7 @@ TEST_F(RefusalsTest, AreAlsoReadFromTheLogAlone) {
             "refused 'recorder': its permissions are not signed by our permissions authority\n");
 }
 
-TEST_F(RefusalsTest, WhoeverProvesNothingIsNamedInTime) {
+TEST_F(RefusalsTest, AParticipantWithoutProofIsReportedInTime) {
   refusals_.note_discovered("01.0f", "'accepted'", "'CN=controller'");
   refusals_.note_discovered("02.0f", "'silent'", "'CN=recorder' of 'CN=another'");
   refusals_.note_accepted("01.0f");

@@ -59,7 +59,8 @@ class SharedLocksTest : public testing::Test {
     ASSERT_EQ(sem_init(&port_->semaphore, 1, 0), 0);
   }
 
-  // The port stays: a lock once known as a reader's own would be taken for it at the same place.
+  // The port stays: a lock once known as a reader's own would be mistaken for it at the same
+  // address.
   void TearDown() override {
     if (holder_ > 0) {
       kill(holder_, SIGKILL);
@@ -184,7 +185,7 @@ TEST_F(SharedLocksTest, AReaderLooksAtItsPortBeforeItsTime) {
   EXPECT_LT(seconds_since(start), kSlow_s);
 }
 
-TEST_F(SharedLocksTest, WhoWaitsForANamedSemaphoreWaitsToTheEnd) {
+TEST_F(SharedLocksTest, AWaitForANamedSemaphoreIsNotCutShort) {
   const std::string name = "/sls_test_" + std::to_string(getpid());
   sem_t* semaphore = sem_open(name.c_str(), O_CREAT | O_EXCL, 0600, 0);
   ASSERT_NE(semaphore, SEM_FAILED);

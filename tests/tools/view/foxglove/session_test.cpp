@@ -217,7 +217,7 @@ TEST_F(FoxgloveSessionTest, ANewRunIsANewSessionAndVanishedVehiclesAreUnadvertis
     EXPECT_TRUE(holds(topic, "vehicle_1")) << topic;
     EXPECT_EQ(come.count(sls::test::replace_once(topic, "vehicle_1", "vehicle_2")), 1U) << topic;
   }
-  // The client ends what it believes to be there: none of that is its mistake.
+  // The client ends subscriptions that may have ended already: none of that is its mistake.
   Json ids = Json::array();
   for (std::uint32_t i = 0; i < id; ++i) ids.push_back(i);
   send_json(Json{{"op", "unsubscribe"}, {"subscriptionIds", ids}});
@@ -362,7 +362,7 @@ TEST_F(FoxgloveServicesTest, MalformedCallsAreRefused) {
   EXPECT_TRUE(flight->requests.empty());
 }
 
-TEST_F(FoxgloveSessionTest, WhoMayNotOperateIsRefused) {
+TEST_F(FoxgloveSessionTest, ARequestWithoutPermissionToOperateIsRefused) {
   flight->begin_run(kRun, {0});
   connect();
   call(2, "{}");

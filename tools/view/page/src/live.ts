@@ -1,4 +1,4 @@
-/** The page on a flight: speaks subprotocol sls.view.1, connects again by itself. */
+/** The page on a flight: uses subprotocol sls.view.1 and reconnects. */
 import { OperatorBar } from "./operator";
 import {
   addEvent, clearEvents, showBanner, showEmpty, showLink, showPhase, showRun, showStage, showStatus, showTime, type Latency,

@@ -1,6 +1,6 @@
 /** What the page knows of a flight. Everything is in frame W (z down), SI units and radians, until frames.ts turns it for drawing. */
 
-/** What became of a step's answer: AnswerKind of idl/sls.idl. */
+/** Result of a step's answer: AnswerKind of idl/sls.idl. */
 export enum AnswerKind {
   None,
   Accepted,
@@ -70,7 +70,7 @@ export class Columns {
   }
 }
 
-/** One vehicle at one step. Whoever keeps one copies it: the arrays may be used again for the next step. */
+/** One vehicle at one step. Copy it to keep it: the arrays may be used again for the next step. */
 export interface Pose {
   vehicleId: number;
   kind: AnswerKind;
