@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The launcher: sets up what it needs, builds, flies, tests. `./sls help` lists the subcommands.
+# The launcher: sets up what it needs, builds, flies, tests. `./sls help` lists the commands.
 set -euo pipefail
 
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)"
@@ -15,7 +15,7 @@ readonly fuzzers=(scenario qos_file csv recording samples foxglove web)
 readonly test_packages=(iproute2 nftables cyclonedds-dev cyclonedds-tools fastdds-tools libfaketime python3-kubernetes
   python3-pytest slurm-wlm munge python3-distributed chromium git codespell)
 readonly python_packages=(python3-numpy python3-scipy python3-matplotlib python3-yaml)
-readonly bench_packages=(libbenchmark-dev python3-matplotlib)
+readonly bench_packages=(libbenchmark-dev python3-matplotlib chromium)
 
 say() { echo "sls: $*" >&2; }
 fail() { say "error: $1"; exit "${2:-1}"; }
@@ -23,100 +23,132 @@ fail() { say "error: $1"; exit "${2:-1}"; }
 usage() {
   cat <<'EOF'
 usage: ./sls COMMAND [OPTIONS]
+       ./sls COMMAND --help     options of a command
 
-  demo [SCENARIO]    set up, build, fly (default: figure_eight), print the summary
-  run SCENARIO       server, client and recorder on this machine; ends 0 when the mission finished
-                     and the recording is complete. SCENARIO is a name in config/scenarios or a path
-      --out DIR        folder of the recording (default: recordings/NAME-UTCTIME)
-      --force          replace the recording that is there
-      --qos FILE       QoS profiles (default: config/qos/default.xml)
-      --domain N       DDS domain, 0 to 232 (default: 0)
-      --period-s X     control period in force (default: the scenario's)
-      --mode MODE      lockstep or realtime (default: the scenario's)
-      --rtf X          of realtime: simulated over wall time (default: the scenario's)
-      --in-process     the same flight in one process without DDS: same data, same certificate
-      --view           with a page on which the flight happens; prints its address, ends with the flight
-      --view-port N    the same on port N; 0: any that is free (default: 8765)
-  view [DIR [DIR]]   a page in the browser: the flight on this domain, or a recording, or two overlaid; prints its
-                     address, lasts until it is interrupted
-      --port N         port of the page; 0: any that is free (default: 8765)
-      --qos FILE       QoS profiles (default: config/qos/default.xml)
-      --domain N       DDS domain, 0 to 232 (default: 0)
-      --listen ADDRESS where other machines can open it; needs --token-file FILE (default: 127.0.0.1)
-      --read-only      without buttons
-      --ros            the flight on ROS 2 topics, too
-      --export FILE    the page with the recordings in it as one file; with --help: all options
-  ctl COMMAND        talk to the run on this domain: pause, step N, resume, start, reset, stop or
-                     status [--watch] [--json]; with --help: its options
-  delay-margin SCENARIO
-                     the delay of the command at which the controller loses the load, with a table
-      --period-s X     control period in force (default: the scenario's)
-  doctor             why data does not flow: moves datagrams and samples over each path, one line per
-                     check; ends 1 where something is wrong
-      --qos FILE       QoS profiles (default: config/qos/default.xml)
-      --domain N       DDS domain, 0 to 232 (default: 0)
-      --peer HOST      another machine, where programs or `./sls doctor --answer` run
-      --json           JSON instead of lines
-      --answer         answer the doctor of another machine, for --for-s seconds (default: 60)
-  verify A [B]       compares the data of two recordings: equal, or the first difference; of one, its
-                     files with its manifest
-  convert DIR        a recording as one MCAP file, for Foxglove, Lichtblick, PlotJuggler and others
-      --out FILE       where it goes (default: DIR/sls.mcap)
-      --force          replace the file that is there
-  plot DIR…          figures of recordings, and of published logs (files), overlaid; PNG and PDF
-      --out DIR        where they go (default: DIR/figures of one recording, else figures)
-      --name NAME…     what each is called
-      --vehicle N      which vehicle of a fleet (default: 0); with --help: all options
-  report DIR         DIR/report.html: parameters, metrics of each stage, figures, events in one file
-      --vehicle N      which vehicle of a fleet (default: 0)
-  python [ARGS]      Debian's Python with the package `sls`: a script, -m MODULE, -c COMMAND, or none
-  study              flies the whole published comparison, writes docs/study.md and its pictures;
-                     with --help: its options
-  campaign FILE      flies a campaign: many runs of one scenario in which keys vary; DIR/runs.csv, report.html.
-                     FILE is a name in config/campaigns or a path
-      --out DIR        its folder (default: campaigns/NAME-UTCTIME)
-      --on ENGINE      local, slurm or dask (default: local)
-      --workers N      processes (default: one for each core)
-      --runs A-B       these runs alone (default: all)
-      --resume         fly what is missing or damaged in DIR; interrupted campaigns go on
-      --verify N       fly N runs again with the three programs over DDS, compare certificates
-      --sbatch "…"     options of the site for Slurm; --scheduler ADDRESS: of Dask; with --help: all options
-  campaign status DIR | report DIR | compare A B
-                     chunks, rate and outcomes so far; report.html again; two campaigns run by run
-  campaign-worker DIR --chunks A-B
-                     flies these chunks of a campaign's folder; what Slurm and Kubernetes start
-  bench              how fast everything is, each figure beside its bound in the same run; minutes, and
-                     an idle machine
-      --quick          one short round of everything: whether it works
-      --json FILE      the figures of every round
-      --only NAME…     lockstep, load, round-trip, realtime, plant, recorder, campaign, fleet, qos or view alone
-      --out DIR        plots
-  test               set up, build, run every test
-      --slow           the ones that take minutes, too; they need an idle machine
-      --sanitize KIND  the unit tests alone, built with a sanitizer: address; or thread, which
-                       runs those with several threads
-  keys DIR           identities and signed permissions for config/qos/secure.xml;
-                     with --help: its options
-  docker-demo [NAME] fly in containers: plain, discovery, standby or secure; with --help: its options
-  discovery-server   run a discovery server for config/qos/discovery_server.xml until it is stopped
-      --listen ADDRESS where (default: every address of this machine)
-      --port N         UDP port (default: 11811)
-  network-table      fly on test hosts with each QoS profile and each disturbance of their network, print
-                     a Markdown table; needs root and minutes. With --help: its options
-  chaos              disturb flights at random: stop, continue, kill and restart their processes
-      --trials N       how many flights (default: 10)
-      --seed S         decides process, moment and kind (default: 1)
-      --verbose        print what the processes said
-  fuzz               feed everything that reads files or samples with mutated ones, until one crashes
-      --seconds N      for all targets together (default: 60)
-      --target NAME    this one alone: scenario, qos_file, csv, recording, samples, foxglove or web
-  setup              install the packages that building and flying need
-  build              set up and build; the programs are in build/bin
-  clean              remove what was built
-  help               this text
+Fly
+  demo [SCENARIO]         set up, build, fly (default: figure_eight) and print a summary
+  run SCENARIO            fly a scenario on this machine and record it
+  view [DIR [DIR]]        show a live flight, a recording or two recordings in the browser
+  ctl COMMAND             pause, step, resume, start, reset or stop a run, or print its status
+  docker-demo [NAME]      fly in containers
+
+Recordings
+  verify A [B]            compare two recordings, or one recording with its manifest
+  convert DIR             write a recording as one MCAP file
+  plot DIR…               draw figures of recordings and of published logs
+  report DIR              write DIR/report.html: parameters, metrics, figures, events
+  python [ARGS]           run Python with the package `sls`
+
+Many flights
+  campaign FILE           fly many runs of one scenario with varied keys; also: status, report, compare
+  campaign-worker DIR     fly chunks of a campaign (started by Slurm and Kubernetes)
+  study                   repeat the published comparison and write docs/study.md
+  delay-margin SCENARIO   find the command delay at which the controller loses the load
+
+Network
+  doctor                  find out why data does not flow
+  keys DIR                make keys and signed permissions for config/qos/secure.xml
+  discovery-server        run a discovery server for config/qos/discovery_server.xml
+  network-table           fly each QoS profile through network disturbances; print a Markdown table
+
+Development
+  test                    set up, build and run the tests
+  bench                   measure speed, each figure beside its bound
+  chaos                   stop, continue, kill and restart processes of flights at random
+  fuzz                    feed mutated input to every reader of files and samples
+  setup | build | clean   install packages | build all programs | remove what was built
+  help [COMMAND]          this text, or the options of a command
 
 exit codes: 0 done; 1 the run or a test failed; 2 bad usage or bad configuration; 130/143 interrupted
 EOF
+}
+
+flight_usage() {
+  cat <<'EOF'
+
+SCENARIO is a name in config/scenarios or a path.
+
+  --out DIR        folder of the recording (default: recordings/NAME-UTCTIME)
+  --force          replace an existing recording
+  --qos FILE       QoS profiles (default: config/qos/default.xml)
+  --domain N       DDS domain, 0 to 232 (default: 0)
+  --period-s X     control period (default: the scenario's)
+  --mode MODE      lockstep or realtime (default: the scenario's)
+  --rtf X          real-time factor, realtime mode only (default: the scenario's)
+  --in-process     fly in one process without DDS: same data, same certificate
+  --view           also show the flight in the browser; prints the address of the page
+  --view-port N    like --view, on port N; 0: any free port (default: 8765)
+EOF
+}
+
+# command_usage COMMAND: help of a command that this launcher implements; false for the others.
+command_usage() {
+  case $1 in
+    demo)
+      echo 'usage: ./sls demo [SCENARIO] [OPTIONS]'
+      echo
+      echo 'Sets up, builds, flies a scenario (default: figure_eight) and prints a summary.'
+      flight_usage
+      ;;
+    run)
+      echo 'usage: ./sls run SCENARIO [OPTIONS]'
+      echo
+      echo 'Runs server, client and recorder on this machine. Exit code 0: the mission finished and the'
+      echo 'recording is complete.'
+      flight_usage
+      ;;
+    delay-margin)
+      cat <<'EOF'
+usage: ./sls delay-margin SCENARIO [--period-s X]
+
+Finds the command delay at which the controller loses the load; prints a table.
+
+  --period-s X     control period (default: the scenario's)
+EOF
+      ;;
+    discovery-server)
+      cat <<'EOF'
+usage: ./sls discovery-server [--listen ADDRESS] [--port N]
+
+Runs a discovery server for config/qos/discovery_server.xml until it is stopped.
+
+  --listen ADDRESS  address to listen on (default: every address of this machine)
+  --port N          UDP port (default: 11811)
+EOF
+      ;;
+    test)
+      cat <<'EOF'
+usage: ./sls test [--slow | --sanitize KIND]
+
+Sets up, builds and runs the tests.
+
+  --slow            also run the tests that take minutes; they need an idle machine
+  --sanitize KIND   run only the unit tests, built with a sanitizer: address; or thread, which runs those
+                    with several threads
+EOF
+      ;;
+    fuzz)
+      cat <<'EOF'
+usage: ./sls fuzz [--seconds N] [--target NAME]
+
+Feeds mutated input to every reader of files and samples until one crashes.
+
+  --seconds N      duration of all targets together (default: 60)
+  --target NAME    run only this target: scenario, qos_file, csv, recording, samples, foxglove or web
+EOF
+      ;;
+    setup) printf '%s\n\n%s\n' 'usage: ./sls setup' 'Installs the packages that building and flying need.' ;;
+    build) printf '%s\n\n%s\n' 'usage: ./sls build' 'Sets up and builds; the programs are in build/bin.' ;;
+    clean) printf '%s\n\n%s\n' 'usage: ./sls clean' 'Removes the folders build and build-*.' ;;
+    python)
+      cat <<'EOF'
+usage: ./sls python [ARGS]
+
+Runs Debian's Python with the package `sls`. ARGS: a script, -m MODULE, -c COMMAND, or none for a prompt.
+EOF
+      ;;
+    *) return 1 ;;
+  esac
 }
 
 # --- set-up and build -----------------------------------------------------------------------------
@@ -284,7 +316,7 @@ fly() {
       --in-process) is_in_process=1 ;;
       --view) ((${#view[@]})) || view=(--port 8765) ;;
       --view-port | --out | --qos | --domain | --period-s | --mode | --rtf)
-        (($# >= 2)) || fail "$1: expected a value (see ./sls help)" 2
+        (($# >= 2)) || fail "$1: expected a value (see ./sls $command --help)" 2
         case $1 in
           --view-port) view=(--port "$2") ;;
           --out) recording=$2 ;;
@@ -294,7 +326,7 @@ fly() {
         esac
         shift
         ;;
-      -*) fail "unknown option '$1' (see ./sls help)" 2 ;;
+      -*) fail "unknown option '$1' (see ./sls $command --help)" 2 ;;
       *)
         [[ -z $scenario ]] || fail "expected one scenario, got '$scenario' and '$1'" 2
         scenario=$1
@@ -302,7 +334,7 @@ fly() {
     esac
     shift
   done
-  [[ -n $scenario ]] || fail "expected a scenario (see ./sls help)" 2
+  [[ -n $scenario ]] || fail "expected a scenario (see ./sls $command --help)" 2
   local file
   file="$(find_scenario "$scenario")"
   if [[ -z $recording ]]; then
@@ -413,11 +445,11 @@ cmd_delay-margin() {
   while (($#)); do
     case $1 in
       --period-s)
-        (($# >= 2)) || fail "$1: expected a value (see ./sls help)" 2
+        (($# >= 2)) || fail "$1: expected a value (see ./sls $command --help)" 2
         period=(--period-s "$2")
         shift
         ;;
-      -*) fail "unknown option '$1' (see ./sls help)" 2 ;;
+      -*) fail "unknown option '$1' (see ./sls $command --help)" 2 ;;
       *)
         [[ -z $scenario ]] || fail "expected one scenario, got '$scenario' and '$1'" 2
         scenario=$1
@@ -425,14 +457,19 @@ cmd_delay-margin() {
     esac
     shift
   done
-  [[ -n $scenario ]] || fail "expected a scenario (see ./sls help)" 2
+  [[ -n $scenario ]] || fail "expected a scenario (see ./sls $command --help)" 2
   build_programs delay_margin
   exec "$build/bin/delay_margin" --scenario "$(find_scenario "$scenario")" "${period[@]}"
 }
 
 cmd_bench() {
-  [[ " $* " == *" --help "* || -n ${SLS_BUILD:-} ]] || setup "${bench_packages[@]}"
-  [[ " $* " == *" --help "* ]] || build_programs "${flying[@]}" sim_ctl sls_view sls_bench_probe sls_bench_spinning_probe sls_microbench
+  if [[ " $* " != *" --help "* ]]; then
+    if [[ -z ${SLS_BUILD:-} ]]; then
+      setup "${bench_packages[@]}"
+      install_node_modules "$root/tests/tools/view"
+    fi
+    build_programs "${flying[@]}" sim_ctl sls_view sls_bench_probe sls_bench_spinning_probe sls_microbench view_foxglove_publisher
+  fi
   PYTHONPATH="$root" exec /usr/bin/python3 -BP -m bench --build "$build" "$@"
 }
 
@@ -515,11 +552,11 @@ cmd_docker-demo() {
 cmd_discovery-server() {
   local listen=() port=11811
   while (($#)); do
-    (($# >= 2)) || fail "$1: expected a value (see ./sls help)" 2
+    (($# >= 2)) || fail "$1: expected a value (see ./sls $command --help)" 2
     case $1 in
       --listen) listen=(-l "$2") ;;
       --port) port=$2 ;;
-      *) fail "unknown option '$1' (see ./sls help)" 2 ;;
+      *) fail "unknown option '$1' (see ./sls $command --help)" 2 ;;
     esac
     shift 2
   done
@@ -539,7 +576,7 @@ cmd_network-table() {
 cmd_fuzz() {
   local seconds=60 targets=("${fuzzers[@]}") target
   while (($#)); do
-    (($# >= 2)) || fail "fuzz: $1: expected a value (see ./sls help)" 2
+    (($# >= 2)) || fail "fuzz: $1: expected a value (see ./sls $command --help)" 2
     case $1 in
       --seconds)
         [[ $2 =~ ^[1-9][0-9]{0,5}$ ]] || fail "fuzz: --seconds: expected a whole number, got '$2'" 2
@@ -550,7 +587,7 @@ cmd_fuzz() {
           fail "fuzz: --target: expected one of ${fuzzers[*]}, got '$2'" 2
         targets=("$2")
         ;;
-      *) fail "fuzz: unknown option '$1' (see ./sls help)" 2 ;;
+      *) fail "fuzz: unknown option '$1' (see ./sls $command --help)" 2 ;;
     esac
     shift 2
   done
@@ -612,16 +649,28 @@ cmd_test() {
 
 cmd_clean() { rm -rf "$root"/build "$root"/build-*; }
 
+# is_help_asked [ARGS…]: --help or -h among them; `python` takes only the first, the others are the script's.
+is_help_asked() {
+  [[ $command != python ]] || set -- "${1:-}"
+  [[ " $* " == *' --help '* || " $* " == *' -h '* ]]
+}
+
 command=${1:-help}
 (($#)) && shift
 case $command in
-  help | --help | -h) usage ;;
-  *)
-    if ! declare -F "cmd_$command" >/dev/null; then
-      say "error: unknown command '$command'"
-      usage >&2
-      exit 2
+  help | --help | -h)
+    if (($# == 0)); then
+      usage
+      exit
     fi
-    "cmd_$command" "$@"
+    command=$1
+    set -- --help
     ;;
 esac
+if ! declare -F "cmd_$command" >/dev/null; then
+  fail "unknown command '$command' (see ./sls help)" 2
+fi
+if is_help_asked "$@" && command_usage "$command"; then
+  exit
+fi
+"cmd_$command" "$@"

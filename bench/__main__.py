@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NoReturn
 
-from bench import campaign, loop, parts, view
+from bench import campaign, loop, page, parts, view
 from bench.machine import describe_machine, now
 from bench.programs import MeasurementError, Programs, make_scratch
 from bench.results import Figure, format_table
@@ -27,6 +27,7 @@ PARTS: dict[str, tuple[Measure, int]] = {  # and its rounds
     "fleet": (parts.measure_fleet, 3),
     "qos": (loop.measure_qos, 3),
     "view": (view.measure_view, 5),
+    "page": (page.measure_page, 3),
 }
 DOMAINS = range(61, 81)  # tests use those below
 

@@ -10,6 +10,7 @@ import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import BinaryIO
 
 from bench.loop import PERIOD_S, lasting
 from bench.programs import Flight, MeasurementError, Programs, end_all
@@ -17,14 +18,32 @@ from bench.results import LESS, Figure, Rounds
 
 VIEWERS = 3  # one of them is stopped once it has shown something
 LONGEST_WAIT_S = 30.0
+BINARY = 2  # opcode of poses and rows; text is greeting and status
+
+
+def read_frame(stream: BinaryIO) -> int:
+    """Reads one frame of a server (RFC 6455, section 5.2). @return its opcode."""
+    header = read_exactly(stream, 2)
+    size = header[1]
+    if size >= 126:
+        size = int.from_bytes(read_exactly(stream, 2 if size == 126 else 8), "big")
+    read_exactly(stream, size)
+    return header[0] & 0x0F
+
+
+def read_exactly(stream: BinaryIO, size: int) -> bytes:
+    data = stream.read(size)
+    if len(data) < size:
+        raise EOFError
+    return data
 
 
 class Page:
     """A browser's end of a viewer, as on another machine: empties the socket from time to time and
-    decodes nothing, so that it costs nothing here."""
+    decodes nothing once a flight is shown, so that it costs nothing here."""
 
     def __init__(self, port: int):
-        self.received = 0  # bytes
+        self.is_flight_shown = False
         self.socket = socket.create_connection(("127.0.0.1", port))
         key = base64.b64encode(os.urandom(16)).decode()
         self.socket.sendall((f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nConnection: Upgrade\r\n"
@@ -33,9 +52,13 @@ class Page:
         threading.Thread(target=self.receive, daemon=True).start()
 
     def receive(self) -> None:
-        with contextlib.suppress(OSError):
-            while data := self.socket.recv(1 << 20):
-                self.received += len(data)
+        with contextlib.suppress(OSError, EOFError):
+            stream = self.socket.makefile("rb")
+            while stream.readline().strip():  # the answer to the upgrade
+                pass
+            while not self.is_flight_shown:
+                self.is_flight_shown = read_frame(stream) == BINARY
+            while self.socket.recv(1 << 20):
                 time.sleep(0.05)
 
     def close(self) -> None:
@@ -61,11 +84,11 @@ class Viewer:
         self.page = Page(int(found[1]))
 
     def wait_for_flight(self) -> None:
-        """Waits until its page gets more than the greeting and an occasional status."""
+        """Waits until its page has a pose."""
         deadline = time.monotonic() + LONGEST_WAIT_S
-        while self.page and self.page.received < 200_000:
+        while self.page and not self.page.is_flight_shown:
             if time.monotonic() > deadline:
-                raise MeasurementError(f"sls_view: expected a flight on its page, got {self.page.received} bytes")
+                raise MeasurementError("sls_view: expected a flight on its page, got none")
             time.sleep(0.02)
 
 
@@ -105,7 +128,7 @@ def fly(programs: Programs, scenario: Path, viewers: list[Viewer]) -> Flight:
     return flight
 
 
-def measure_lookers(programs: Programs, rounds: int, is_quick: bool) -> list[Figure]:
+def measure_view(programs: Programs, rounds: int, is_quick: bool) -> list[Figure]:
     """Flights in lockstep, in alternation with and without viewers."""
     figures = Rounds("view")
     scenario = programs.scenario("figure_eight", lasting(16 if is_quick else 240))
@@ -125,7 +148,3 @@ def measure_lookers(programs: Programs, rounds: int, is_quick: bool) -> list[Fig
                     seen.steps_per_s, "the same without viewers", alone.steps_per_s, goal=0.95,
                     is_goal_of_ratio=True)
     return figures.make_figures()
-
-
-def measure_view(programs: Programs, rounds: int, is_quick: bool) -> list[Figure]:
-    return measure_lookers(programs, rounds, is_quick)

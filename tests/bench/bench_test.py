@@ -338,6 +338,12 @@ class ProgramTest(unittest.TestCase):
         self.assertEqual(len(beside), 1)
         self.assertEqual(beside[0]["goal"]["value"], 0.95)
 
+    def test_a_quick_page_part_measures_the_page_and_the_bridge(self):
+        file = self.folder / "bench.json"
+        bench("--quick", "--only", "page", "--json", file)
+        goals = {figure["goal"]["value"] for figure in self.check(file, "page")}
+        self.assertEqual(goals, {0, 1.5, 20, 40, 100, 1000, 50_000})
+
     def test_a_quick_lockstep_part_has_bounds_a_table_and_a_plot(self):
         file = self.folder / "bench.json"
         words = ["--quick", "--only", "lockstep", "--json", file]

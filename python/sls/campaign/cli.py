@@ -24,7 +24,7 @@ LEAST_CHUNKS = 16     # so that several workers end at about the same time
 
 class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
-        raise InputError(f"{self.prog}: {message} (see ./sls help)")
+        raise InputError(f"{self.prog.removeprefix('./sls ')}: {message} (see {self.prog} --help)")
 
 
 class Ended(KeyboardInterrupt):
@@ -40,7 +40,8 @@ def say(text: str) -> None:
 
 def make_parser() -> argparse.ArgumentParser:
     from sls.campaign.worker import parse_range
-    parser = Parser(prog="campaign", description="Flies a campaign: DIR/runs.csv, report.html.")
+    parser = Parser(prog="./sls campaign", formatter_class=argparse.RawDescriptionHelpFormatter,
+                    description="Flies a campaign: writes DIR/runs.csv and DIR/report.html.", epilog=COMMANDS)
     parser.add_argument("file", metavar="FILE",
                         help="a campaign file, or a name in config/campaigns")
     parser.add_argument("--out", type=Path, metavar="DIR",

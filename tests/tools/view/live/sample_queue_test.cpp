@@ -33,10 +33,10 @@ TEST(SampleQueueTest, TheFirstSampleIsAnnouncedAtOnceAndTheNextNotUntilAllAreTak
 
 TEST(SampleQueueTest, WhatComesTooSoonIsDueAfterThePeriod) {
   SampleQueue queue(1000);
-  queue.set_period(1h);
   const auto announced = SampleQueue::Clock::now();
   ASSERT_TRUE(queue.put(make_sample(TopicId::kRecord, 1)));
   queue.take_all();
+  queue.set_period(1h);
   EXPECT_FALSE(queue.put(make_sample(TopicId::kRecord, 2)));
   EXPECT_FALSE(queue.wait_until_due(SampleQueue::Clock::now()));
   queue.set_period(200ms);

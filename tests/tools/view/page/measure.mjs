@@ -1,12 +1,12 @@
-// Figures of the page, one JSON line: node measure.mjs load|latency|fleet BUILD [DOMAIN]
+// Figures of the page, one JSON line: node measure.mjs load|latency|fleet BUILD [DOMAIN [SECONDS]]
 import { statSync } from "node:fs";
 import { join } from "node:path";
 import { startBrowser, waitFor } from "./browser.mjs";
 import { startFakeServer } from "./fake_server.mjs";
 import { startFlight } from "./flight.mjs";
 
-const [what, build, domain = "141"] = process.argv.slice(2);
-const kMeasuredMs = 10_000;
+const [what, build, domain = "141", seconds = "10"] = process.argv.slice(2);
+const kMeasuredMs = Number(seconds) * 1000;
 const page_file = join(build, "tools/view/page/page.html");
 
 /** Time from the request until the page has drawn for the first time. */
@@ -63,7 +63,7 @@ async function measureFleet() {
 
 const measures = { load: measureLoad, latency: measureLatency, fleet: measureFleet };
 if (!measures[what] || !build) {
-  console.error("usage: node measure.mjs load|latency|fleet BUILD [DOMAIN]");
+  console.error("usage: node measure.mjs load|latency|fleet BUILD [DOMAIN [SECONDS]]");
   process.exit(2);
 }
 console.log(JSON.stringify(await measures[what]()));
