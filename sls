@@ -81,6 +81,9 @@ SCENARIO is a name in config/scenarios or a path.
 EOF
 }
 
+# Whether --help or -h is among the arguments of the command.
+is_help_asked() { [[ " ${arguments[*]} " == *' --help '* || " ${arguments[*]} " == *' -h '* ]]; }
+
 # command_usage COMMAND: help of a command that this launcher implements; false for the others.
 command_usage() {
   case $1 in
@@ -235,6 +238,9 @@ build_tree() {
 # (SLS_BUILD) is taken as it is.
 build_programs() {
   [[ -z ${SLS_BUILD:-} ]] || return 0
+  if is_help_asked && [[ -x $build/bin/${1:-} || -x $build/tests/${1:-} ]]; then
+    return  # as it is
+  fi
   (($#)) || set -- "${programs[@]}" _sls_core
   setup
   build_tree release "$build" "$@"
@@ -463,7 +469,7 @@ cmd_delay-margin() {
 }
 
 cmd_bench() {
-  if [[ " $* " != *" --help "* ]]; then
+  if ! is_help_asked; then
     if [[ -z ${SLS_BUILD:-} ]]; then
       setup "${bench_packages[@]}"
       install_node_modules "$root/tests/tools/view"
@@ -498,7 +504,7 @@ cmd_python() {
 cmd_plot() { run_python plot "$@"; }
 
 cmd_report() {
-  if [[ " $* " != *" --help "* ]]; then
+  if ! is_help_asked; then
     build_programs sls_view
     export SLS_VIEW="$build/bin/sls_view"  # draws the report's scene
   fi
@@ -506,7 +512,7 @@ cmd_report() {
 }
 
 cmd_study() {
-  if [[ " $* " != *" --help "* && " $* " != *" --reuse "* ]]; then
+  if ! is_help_asked && [[ " $* " != *" --reuse "* ]]; then
     build_programs "${flying[@]}" delay_margin
     export SLS_BUILD="$build"  # the flights of the study fly side by side and must not build
   fi
@@ -521,7 +527,7 @@ run_campaign() {
 }
 
 cmd_campaign() {
-  if [[ " status report compare " != *" ${1:-} "* && " $* " != *" --help "* ]]; then
+  if ! is_help_asked && [[ " status report compare " != *" ${1:-} "* ]]; then
     local targets=(_sls_core)
     [[ " $* " != *" --verify"* ]] || targets+=("${flying[@]}" sls_verify)
     build_programs "${targets[@]}"
@@ -530,7 +536,7 @@ cmd_campaign() {
 }
 
 cmd_campaign-worker() {
-  [[ " $* " == *" --help "* ]] || build_programs _sls_core
+  is_help_asked || build_programs _sls_core
   run_campaign sls.campaign.worker "$@"
 }
 
@@ -568,7 +574,7 @@ cmd_discovery-server() {
 }
 
 cmd_network-table() {
-  [[ -n ${SLS_BUILD:-} ]] || setup "${test_packages[@]}"
+  [[ -n ${SLS_BUILD:-} ]] || is_help_asked || setup "${test_packages[@]}"
   build_programs network_table
   exec "$build/tests/network_table" "$@"
 }
@@ -649,12 +655,6 @@ cmd_test() {
 
 cmd_clean() { rm -rf "$root"/build "$root"/build-*; }
 
-# is_help_asked [ARGS…]: --help or -h among them; `python` takes only the first, the others are the script's.
-is_help_asked() {
-  [[ $command != python ]] || set -- "${1:-}"
-  [[ " $* " == *' --help '* || " $* " == *' -h '* ]]
-}
-
 command=${1:-help}
 (($#)) && shift
 case $command in
@@ -667,10 +667,12 @@ case $command in
     set -- --help
     ;;
 esac
+arguments=("$@")
+[[ $command != python ]] || arguments=("${1:-}")  # the others are the script's
 if ! declare -F "cmd_$command" >/dev/null; then
   fail "unknown command '$command' (see ./sls help)" 2
 fi
-if is_help_asked "$@" && command_usage "$command"; then
+if is_help_asked && command_usage "$command"; then
   exit
 fi
 "cmd_$command" "$@"
