@@ -78,7 +78,7 @@ class Batch {
   /// One line; empty: it has not.
   const std::string& failure(std::size_t loop) const { return loops_[loop].failure; }
 
-  /// What the mission asks for `time_ns` after step 0 where stages follow each other by their time.
+  /// The mission's reference `time_ns` after step 0 where stages follow each other by their time.
   /// A stage that is left by a radius has no time to end at: it is the last one.
   model::Reference calc_reference(std::int64_t time_ns) const;
 

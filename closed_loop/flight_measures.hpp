@@ -1,4 +1,4 @@
-/// What a campaign measures of a flight, collected while it is flown: nothing of it is stored.
+/// Measures of a flight for a campaign, collected during the flight without storing it.
 /// README.md, "Measures".
 #pragma once
 
@@ -14,7 +14,7 @@
 
 namespace sls::closed_loop {
 
-/// What is measured of each flight of a campaign, and of which stages: those of its base scenario.
+/// The measures of each flight of a campaign, and their stages: those of its base scenario.
 class MeasureList {
  public:
   /// `names` are load_error_rms, load_error_max, settling, overshoot, tilt_max, force_max,

@@ -11,7 +11,7 @@
 
 namespace sls::record {
 
-/// What the topics bring of the open run, on its way from the middleware's threads to the writing
+/// Samples of the open run, on their way from the middleware's threads to the writing
 /// one. The readers live as long as the recorder: new ones would be sent all histories again, of
 /// earlier runs too. So samples of a run that may be opened next wait for that. Putting never
 /// blocks; what does not fit of the open run is counted.

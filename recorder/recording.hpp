@@ -44,7 +44,7 @@ class Recording {
   /// Tells how much time has passed: a lost batch is not waited for forever.
   void pass_time(Stream::Duration elapsed) { stream_.pass_time(elapsed); }
 
-  /// What it has waited for since `patience`: in words.
+  /// The sample that it has waited for since `patience`, in words.
   std::optional<std::string> describe_stuck(Stream::Duration patience) const {
     return stream_.describe_stuck(patience);
   }

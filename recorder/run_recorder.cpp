@@ -95,7 +95,7 @@ void RunRecorder::watch() {
     look_for_the_end(server);
     if (give_up_ && give_up_->is_over()) return;
     if (give_up_ && give_up_->is_report_due())
-      spdlog::info("waiting for: what comes after step {} of run {:016x} ({:.0f} s left)",
+      spdlog::info("waiting for: samples after step {} of run {:016x} ({:.0f} s left)",
                    last_complete_step_.load(), run_id_, give_up_->seconds_left());
     announce_news();
     std::this_thread::sleep_for(kPollTime);

@@ -92,7 +92,7 @@ class CommandGate {
   /// still come.
   std::optional<std::string> refusal() const;
 
-  /// What clients sent that was refused, in answer to the awaited step or to one that went by since
+  /// Refused answers of clients, in answer to the awaited step or to one that went by since
   /// the last accepted answer. Empty where the awaited step has its answer.
   std::string describe_refusals() const;
 

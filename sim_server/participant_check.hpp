@@ -40,7 +40,7 @@ class ParticipantCheck {
   /// Problems that hold, by a key that stays the same while one does.
   using Findings = std::map<std::string, std::string>;
 
-  /// What does not last longer is none: discovery takes its time.
+  /// A problem that is shorter is ignored: discovery takes its time.
   static constexpr std::chrono::milliseconds kPatience{1000};
   /// An announcement on a lossy network: a peer learns of a reader from discovery, which Fast DDS
   /// repeats once a second.
@@ -49,7 +49,7 @@ class ParticipantCheck {
   static constexpr std::chrono::milliseconds kPatienceWithRun{1400};
   /// Rejected answers without a taken one are none before.
   static constexpr std::chrono::milliseconds kPatienceWithAnswers{800};
-  /// What was seen in an answer holds so long after the last one like it.
+  /// A problem seen in an answer holds so long after the last answer like it.
   static constexpr std::chrono::milliseconds kMemory{2000};
   static constexpr std::size_t kMostSenders = 64;
   /// Load and quadrotor may be so many rod lengths from their reference.
@@ -82,7 +82,7 @@ class ParticipantCheck {
   /// When to look again, because something will then have lasted too long.
   const std::optional<Clock::time_point>& next_due() const { return next_due_; }
 
-  /// What is to be announced since the last call, such as a vehicle far from its reference.
+  /// News to announce since the last call, such as a vehicle far from its reference.
   std::vector<std::string> take_events();
 
  private:

@@ -25,7 +25,7 @@
 
 namespace sls::sim {
 
-/// What a server flies.
+/// The assignment of a server.
 struct Assignment {
   config::Scenario scenario;
   std::vector<std::uint32_t> vehicle_ids;  ///< of the scenario's, ascending; at least one
@@ -116,7 +116,7 @@ class Run {
   void refresh_roster();
   bool is_roster_due() const;
   /// Status, stop signal, claim: what needs a look a few times a second.
-  void attend_now_and_then();
+  void do_housekeeping();
   /// True where the participants should be looked at before the next status is due.
   bool is_look_due() const;
   std::string describe_problem() const;

@@ -83,7 +83,7 @@ bool Run::is_anybody_absent() const {
 }
 
 void Run::check_refusals() {
-  const double patience_s = std::chrono::duration<double>(bus::kSilenceOfTheDead).count();
+  const double patience_s = std::chrono::duration<double>(bus::kPresumedDeadAfter).count();
   for (const auto& vehicle : vehicles_) {
     const std::string refusals = describe_refusals(*vehicle);
     vehicle->note_refused(!refusals.empty());
@@ -127,7 +127,7 @@ void Run::take_answers() {
                         ? fmt::format("step {}: controller '{}' answers again after {:.1f} s",
                                       board_.step, vehicles_.front()->last_answer().controller_name,
                                       absence_s)
-                        : fmt::format("step {}: all vehicles are answered for again after {:.1f} s",
+                        : fmt::format("step {}: all vehicles get answers again after {:.1f} s",
                                       board_.step, absence_s));
   }
   absence_wait_.reset();

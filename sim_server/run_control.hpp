@@ -1,5 +1,5 @@
-/// What an operator's requests do to a run: pause, step, resume, reset, stop, with the semantics of
-/// the ROS simulation interfaces. The loop asks before every step. No network, no clock here.
+/// Effect of an operator's requests on a run: pause, step, resume, reset, stop, with the semantics
+/// of the ROS simulation interfaces. The loop asks before every step. No network, no clock here.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@
 
 namespace sls::sim {
 
-/// What is accepted when: README.md, "Operator control".
+/// Which request is accepted when: README.md, "Operator control".
 class RunControl {
  public:
   /// Controls run `run_id`, which begins unpaused unless `is_paused`.

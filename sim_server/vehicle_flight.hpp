@@ -26,7 +26,7 @@ class VehicleFlight {
 
   std::uint32_t id() const { return id_; }
 
-  /// What a step came to.
+  /// The result of a step.
   struct Outcome {
     Applied applied;           // before faults
     bool is_finished = false;  // the mission ends here
@@ -56,9 +56,9 @@ class VehicleFlight {
   /// A late answer has ended the mission.
   bool has_ended_late() const { return has_ended_late_; }
   const Applied& last_answer() const { return last_answer_; }
-  /// What the state of the step in work returned to the controllers.
+  /// The controller memory that the current step's state sent back.
   const ControllerState& returned() const { return applied_.memory; }
-  /// What the vehicle does at the step in work.
+  /// Motion of the vehicle at the current step.
   const model::Measurement& state() const { return state_; }
 
   /// The step in work was published at `time` and has no answer yet.

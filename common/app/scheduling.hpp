@@ -15,6 +15,6 @@ void put_thread_last();
 
 /// The same for all threads that are started from now on, further back: they interrupt nobody when
 /// they wake (SCHED_BATCH). For a process that only reads the flight.
-void put_onlooker_last();
+void put_viewer_last();
 
 }  // namespace sls::app

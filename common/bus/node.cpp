@@ -322,7 +322,7 @@ std::size_t Node::max_batch_bytes() const {
 
 std::size_t Node::max_sample_bytes() const { return impl_->max_datagram_bytes - kEnvelopeBytes; }
 
-std::string Node::describe_loneliness() const {
+std::string Node::describe_isolation() const {
   constexpr auto kUsualDiscoveryTime = std::chrono::seconds(3);
   const auto* participant = impl_->participant;
   const bool is_alone = participant->get_participant_names().size() <= 1;  // the first is our own
@@ -343,7 +343,7 @@ std::string Node::describe_loneliness() const {
            name_hosts(servers.front().metatrafficUnicastLocatorList) +
            " does not answer (SLS_DISCOVERY_SERVER; ./sls discovery-server starts one)";
   const std::string domain =
-      "; nobody else was discovered on domain " + std::to_string(participant->get_domain_id());
+      "; no other program discovered on domain " + std::to_string(participant->get_domain_id());
   if (!builtin.initialPeersList.empty())
     return domain + " at " + name_hosts(builtin.initialPeersList) +
            ": is SLS_PEERS right? (./sls doctor)";

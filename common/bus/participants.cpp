@@ -227,7 +227,7 @@ bool ServerDirectory::is_present_run(const PeerId& server, const Server& known,
   if (find_owner(run_id) != server) return false;
   const HeardStatus* heard = find_heard(run_id);
   return !heard || calc_progress(heard->status.phase()) <= 0 ||
-         std::chrono::steady_clock::now() - heard->time <= kSilenceOfTheDead;
+         std::chrono::steady_clock::now() - heard->time <= kPresumedDeadAfter;
 }
 
 std::vector<Run> ServerDirectory::runs() const {
@@ -293,7 +293,7 @@ bool ServerDirectory::is_present(const PeerId& server) const {
 
 bool ServerDirectory::is_silent(std::uint64_t run_id) const {
   const auto heard = find_last_heard(run_id);
-  return !heard || std::chrono::steady_clock::now() - *heard > kSilenceOfTheDead;
+  return !heard || std::chrono::steady_clock::now() - *heard > kPresumedDeadAfter;
 }
 
 std::optional<std::chrono::steady_clock::time_point> ServerDirectory::find_last_heard(

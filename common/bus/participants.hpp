@@ -22,7 +22,7 @@ namespace sls::bus {
 
 /// Participants announce themselves at least every 0.5 s. One silent for this long is presumed dead
 /// until its next announcement. (The middleware's lease is much longer: config/qos/README.md.)
-inline constexpr auto kSilenceOfTheDead = std::chrono::seconds(2);
+inline constexpr auto kPresumedDeadAfter = std::chrono::seconds(2);
 
 /// The last announcement of every controller and recorder that is still there. Of 256 participants
 /// at most, so that strangers cannot fill the memory: those that have left make room.
@@ -40,7 +40,7 @@ class ParticipantDirectory {
     /// When it first said it was ready.
     std::chrono::steady_clock::time_point ready_since{};
 
-    bool is_silent() const { return std::chrono::steady_clock::now() - heard > kSilenceOfTheDead; }
+    bool is_silent() const { return std::chrono::steady_clock::now() - heard > kPresumedDeadAfter; }
   };
 
   /// Present participants of `role` that serve run `run_id`.

@@ -11,7 +11,7 @@
 
 namespace sls::bus {
 
-/// What participants do wrong, as this program sees it. A mistake is one line on stderr when it
+/// Mistakes of participants, as seen by this program. A mistake is one line on stderr when it
 /// begins, and is listed while it holds. At most `kMostLines` lines in 10 s and `kMost` mistakes,
 /// whatever strangers send. May be used from any thread.
 class Problems {

@@ -54,7 +54,7 @@ class OwnValues {
   template <class Values, class = std::enable_if_t<!std::is_same_v<Values, OwnValues>>>
   OwnValues(Values values) : any_(std::move(values)) {}
 
-  /// What is held, or the defaults of `Values` where it is something else.
+  /// The values held, or the defaults of `Values` if another type is held.
   template <class Values>
   const Values& get() const {
     static const Values kDefaults{};
@@ -116,7 +116,7 @@ struct Plant {
   Eigen::Vector3d disturbance_W = Eigen::Vector3d::Zero();  ///< d, constant, on the quadrotor, N
 };
 
-/// What turns the force that a controller asks for into what the rotors do, inside the plant.
+/// The autopilot inside the plant: turns the controller's force into rotor speeds.
 struct Autopilot {
   ModelName model{"none", ""};
   OwnValues own;
@@ -134,7 +134,7 @@ struct WaitFor {
   double timeout_s = 30.0;
 };
 
-/// What the server does about a vehicle whose controllers stay silent in flight.
+/// Reaction of the server to a vehicle whose controllers stay silent in flight.
 enum class ControllerPolicy {
   kWait,      ///< lockstep: keeps waiting
   kHold,      ///< flies on with the last answer, after `max_hold_s` with the fail-safe force
@@ -142,7 +142,7 @@ enum class ControllerPolicy {
   kStop,      ///< ends the run as failed
 };
 
-/// What the server does about an expected recorder that is gone or too far behind.
+/// Reaction of the server to an expected recorder that is gone or too far behind.
 enum class RecorderPolicy {
   kWait,  ///< lockstep: keeps waiting
   kGoOn,  ///< flies on without it; its recording will have a gap

@@ -185,7 +185,7 @@ void read_value(const Value& value, std::vector<Element>& list, const ListRange&
   for (std::size_t i = 0; i < list.size(); ++i) read_value(value.at(i), list[i]);
 }
 
-/// What the file may leave out.
+/// Optional parts of the file.
 template <class Field, class... Rule>
 void read_value(const Value& value, std::optional<Field>& field, const Rule&... rule) {
   read_value(value, field.emplace(), rule...);

@@ -1,4 +1,4 @@
-/// What plants, laws and autopilots in shared libraries have in common: the check of a library's
+/// Common to plants, laws and autopilots in shared libraries: the check of a library's
 /// table of functions, the making of its object, vectors as C has them.
 #pragma once
 
@@ -66,7 +66,7 @@ const Functions& load_table(const SharedLibrary& library, const Call& call, std:
   return *functions;
 }
 
-/// What `create(error, error_size)` of a library returns. `place` is FILE:LINE: KEY.
+/// The result of `create(error, error_size)` of a library. `place` is FILE:LINE: KEY.
 /// @throws config::ConfigError `PLACE: LIBRARY: TEXT` where the library refuses.
 template <class Create>
 void* create_object(const SharedLibrary& library, const Call& call, const std::string& place,

@@ -1,4 +1,4 @@
-/// What a control law is: a pure function from what is measured, desired and remembered to a force.
+/// A control law: a pure function of measurement, reference and memory that returns a force.
 /// A new one is a folder beside this file and a line in laws.def: README.md, "Adding a law". No DDS
 /// here.
 #pragma once
@@ -48,7 +48,7 @@ class ControlLaw {
   virtual int memory_size() const { return 0; }
 };
 
-/// What a law is made from.
+/// The inputs from which a law is made.
 struct LawSetup {
   config::Controller controller;
   double period = 0.0;           ///< control period in force, s

@@ -58,7 +58,7 @@ class Verification:
     certificate: str
     """Of the rows; empty where they cannot be read."""
     problems: tuple[str, ...]
-    """Where a file is not what its manifest says, one line each."""
+    """Differences between files and their manifest, one line each."""
 
     @property
     def is_ok(self) -> bool:

@@ -1,4 +1,4 @@
-/// What the rotors of an airframe can do together: for autopilots that share torque and thrust out
+/// The wrenches of an airframe's rotors together: for autopilots that share torque and thrust out
 /// among them.
 #pragma once
 

@@ -214,7 +214,7 @@ void look_around(Node* node) {
   }
 }
 
-bool is_silent(dds_time_t heard) { return dds_time() - heard > kSilenceOfTheDead; }
+bool is_silent(dds_time_t heard) { return dds_time() - heard > kPresumedDeadAfter; }
 
 bool has_ended(const Run* run) {
   return run->status.phase == sls_PHASE_FINISHED || run->status.phase == sls_PHASE_FAILED;

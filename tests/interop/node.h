@@ -17,7 +17,7 @@ enum {
 
 /// A participant silent for this long is presumed dead; each announces itself at least every
 /// kAnnounceTime.
-#define kSilenceOfTheDead DDS_SECS(2)
+#define kPresumedDeadAfter DDS_SECS(2)
 #define kAnnounceTime DDS_MSECS(500)
 #define kPollTime DDS_MSECS(20)       ///< between two looks around
 #define kJoinTime DDS_SECS(30)        ///< until there must be a server to join

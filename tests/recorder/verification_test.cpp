@@ -146,7 +146,7 @@ TEST_F(VerificationTest, AShorterRecordingDiffersWhereItEnds) {
     recording.finish("interrupted by SIGINT", 0);
   }
   EXPECT_EQ(find_difference(), "vehicle 0, step 201: in A alone");
-  EXPECT_EQ(find_problems(b_), "") << "it is what its manifest says";
+  EXPECT_EQ(find_problems(b_), "") << "it matches its manifest";
   const auto notes = list_notes(open_recording(a_), open_recording(b_));
   ASSERT_EQ(notes.size(), 1u);
   EXPECT_EQ(notes[0], "B: not complete: interrupted: interrupted by SIGINT");

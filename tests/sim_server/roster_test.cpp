@@ -168,7 +168,7 @@ TEST(RosterTest, TheServerWaitsForEveryRecorderThatIsThere) {
 
 TEST(RosterTest, ARecorderPresumedDeadDoesNotBlockIfAnotherIsThere) {
   auto dead = make_recorder_at(10);
-  dead.heard -= 2 * bus::kSilenceOfTheDead;
+  dead.heard -= 2 * bus::kPresumedDeadAfter;
   EXPECT_EQ(name_blocking_recorder({{}, {dead, make_recorder_at(4999)}}, 1, 5000), "");
   EXPECT_NE(name_blocking_recorder({{}, {dead}}, 1, 20), "") << "one is expected";
 }
@@ -179,7 +179,7 @@ TEST(RosterTest, ARecorderThatComesDuringTheFlightStopsItOnlyInThePlaceOfOneThat
   roster.recorders[1].ready_since = *roster.began + std::chrono::seconds(1);
   EXPECT_EQ(name_blocking_recorder(roster, 1, 5000), "");
   EXPECT_NE(name_blocking_recorder(roster, 2, 5000), "") << "two are expected";
-  roster.recorders[0].heard -= 2 * bus::kSilenceOfTheDead;
+  roster.recorders[0].heard -= 2 * bus::kPresumedDeadAfter;
   EXPECT_NE(name_blocking_recorder(roster, 1, 5000), "") << "it is the only one now";
   // Of several the furthest takes the place.
   roster.recorders.push_back(make_recorder_at(4900));

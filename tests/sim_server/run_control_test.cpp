@@ -94,7 +94,7 @@ TEST_F(RunControlTest, TheReplyToAStepRequestComesWhenItsStepsAreDone) {
   ask(ACTION_PAUSE);
   const SimControl request = anna.ask(ACTION_STEP, 3);
   EXPECT_EQ(control.request(request, 40), std::nullopt);
-  EXPECT_EQ(control.last_event(), "3 steps asked for by anna@host");
+  EXPECT_EQ(control.last_event(), "3 steps requested by anna@host");
   for (const std::uint64_t step : {41, 42}) {
     EXPECT_FALSE(control.holds());
     EXPECT_EQ(control.stepped(step), std::nullopt);

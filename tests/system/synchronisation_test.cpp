@@ -378,7 +378,7 @@ TEST(WaitingTest, PolicyGoOnFliesToTheEndWithoutTheRecorder) {
   ASSERT_TRUE(flight.wait_for_steps(500)) << flight.outputs();
   flight.recorder->kill();
   EXPECT_EQ(flight.server->wait(), 0) << flight.outputs();
-  EXPECT_TRUE(holds(flight.server->output(), "goes on without")) << flight.server->output();
+  EXPECT_TRUE(holds(flight.server->output(), "continues without it")) << flight.server->output();
   EXPECT_EQ(flight.client->wait(), 0) << flight.outputs();
 }
 

@@ -47,7 +47,7 @@ class OperatorClient {
   std::optional<SimControlReply> ask(const bus::Run& run, ControlAction action,
                                      std::uint64_t steps = 0);
 
-  /// What is known of `run` now.
+  /// The present knowledge of `run`.
   Snapshot make_snapshot(const bus::Run& run) const;
 
  private:

@@ -144,8 +144,8 @@ std::string describe_duration(std::uint64_t nanoseconds) {
 
 std::string describe_wanted_factor(const Parameters& parameters) {
   return parameters.mode() == MODE_REALTIME
-             ? fmt::format("wanted {}", parameters.real_time_factor())
-             : "wanted any";
+             ? fmt::format("target {}", parameters.real_time_factor())
+             : "target none";
 }
 
 using bus::Count;

@@ -11,7 +11,7 @@
 
 namespace sls::ctl {
 
-/// What is known of a run at one moment.
+/// The data of a run at one moment.
 struct Snapshot {
   Parameters parameters;
   std::uint32_t vehicle_id = 0;

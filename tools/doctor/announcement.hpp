@@ -1,4 +1,4 @@
-/// What a DDS participant of any vendor says about itself by multicast (RTPS 2.x, SPDP).
+/// The multicast announcement of a DDS participant of any vendor (RTPS 2.x, SPDP).
 #pragma once
 
 #include <cstddef>

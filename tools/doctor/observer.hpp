@@ -61,7 +61,7 @@ class Observer {
   std::vector<Program> programs() const;
   /// Theirs.
   std::vector<Endpoint> endpoints() const;
-  /// What the profiles of the QoS file make, by topic.
+  /// Endpoints made from the profiles of the QoS file, by topic.
   std::vector<Endpoint> own_endpoints() const;
   /// Sample size, bytes → came back.
   std::map<std::uint32_t, bool> echoes() const;

@@ -45,7 +45,7 @@ class UdpSocket {
   /// False where the port is taken.
   bool bind(const std::string& address, int port, bool is_shared = false);
   void join(const std::string& group, const std::vector<Interface>& interfaces);
-  /// What goes to a group leaves by the interface of this address.
+  /// Datagrams to a group leave by the interface of this address.
   void send_multicast_by(const std::string& interface_address);
   bool connect(const sockaddr_in& peer);
   /// The own address towards the peer that it is connected to.

@@ -1,4 +1,4 @@
-/// What is flown, for the page: the same of a live run and of a recording.
+/// Description of a run for the page: the same of a live run and of a recording.
 #pragma once
 
 #include <string>

@@ -1,4 +1,5 @@
-/// What two endpoints of one topic must agree in. No Fast DDS here: neighbours.hpp fills it in.
+/// The properties in which two endpoints of one topic must agree. No Fast DDS here: neighbours.hpp
+/// fills it in.
 #pragma once
 
 #include <chrono>
@@ -8,7 +9,7 @@
 
 namespace sls::bus {
 
-/// What a writer or reader announces of itself.
+/// The announced properties of a writer or reader.
 struct EndpointFacts {
   std::string topic;
   std::string type;

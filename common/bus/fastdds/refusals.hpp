@@ -45,7 +45,7 @@ class Refusals {
   /// It was refused: for `cause`, or for what the middleware has just logged, as far as it did.
   void note_refused(const std::string& guid, const std::string& cause = {});
 
-  /// What the middleware logs about security: a refusal itself, or what `note_refused` is about.
+  /// A line of the middleware's security log: a refusal, or the cause of one in `note_refused`.
   void note_cause(const std::string& message);
 
  private:

@@ -1,6 +1,6 @@
-/// What killed processes leave in shared memory (README.md, trap 11). Upstream: #2790, and #4728
-/// for the ports. To be deleted when creating a participant removes stale segments and tells those
-/// who have a stale port open; stale_segments_test.cpp names the cases.
+/// Segments that killed processes leave in shared memory (README.md, trap 11). Upstream: #2790, and
+/// #4728 for the ports. To be deleted when creating a participant removes stale segments and tells
+/// those who have a stale port open; stale_segments_test.cpp names the cases.
 #pragma once
 
 #include <filesystem>

@@ -9,7 +9,7 @@
 
 namespace sls::sim::px4 {
 
-/// What a rotor's output gets of each normalised demand.
+/// Share of each normalised demand in a rotor's output.
 struct MixerRow {
   double roll = 0.0;
   double pitch = 0.0;

@@ -1,4 +1,4 @@
-/// What is under way: samples that were sent and can still be received.
+/// Samples under way: samples that were sent and can still be received.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,4 @@
-/// What a WebSocket protocol sees of the server: connections to send on, sessions to be called.
+/// The server as a WebSocket protocol sees it: connections to send on, sessions to be called.
 /// Everything here happens on the server's one thread.
 #pragma once
 
@@ -16,7 +16,7 @@ using Payload = std::shared_ptr<const std::string>;
 
 enum class MessageKind { kText, kBinary };
 
-/// What happens to a message while the browser is slower than what it is sent.
+/// Treatment of a message while the browser is slower than the data.
 enum class Delivery {
   kAlways,    ///< the connection is closed if its queue is full
   kNewest,    ///< replaces a queued message of the same `key` that is not being sent yet
