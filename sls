@@ -163,7 +163,7 @@ setup() {
   install_node_modules "$root/tools/view/page"
 }
 
-# What bundles the page: Debian's node and npm, unless there are others already.
+# Node and npm bundle the page: Debian's, unless others are installed.
 install_node() {
   local missing=()
   command -v node >/dev/null || missing+=(nodejs)

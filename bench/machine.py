@@ -1,4 +1,4 @@
-"""What was measured on, and how busy it was."""
+"""The measuring machine and its load."""
 
 import os
 import platform

@@ -25,7 +25,7 @@ constexpr std::array<std::string_view, 13> kRecordingFiles = {
     "state.csv",     "measured.csv",       "command.csv",   "reference.csv", "status.csv",
     "flight.csv",    "sls.mcap",           "sls.mcap.part", "flight.txt",    "scenario.yaml",
     "manifest.json", "manifest.json.part", "report.html"};
-// What `./sls plot` puts into the subfolder kFigureFolder, as .png and .pdf.
+// Figures that `./sls plot` puts into the subfolder kFigureFolder, as .png and .pdf.
 constexpr std::array<std::string_view, 11> kFigures = {
     "fleet",    "positions",     "errors",     "path",   "angles", "forces",
     "attitude", "body_attitude", "body_rates", "rotors", "thrust"};

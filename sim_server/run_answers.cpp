@@ -1,4 +1,4 @@
-// What becomes of the answers, and what to do where there are none: for both ways of stepping.
+// Handling of answers, and of missing ones, for both modes.
 #include <spdlog/spdlog.h>
 
 #include <algorithm>

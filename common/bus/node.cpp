@@ -176,7 +176,7 @@ struct Node::Impl {
     dds::DomainParticipantFactory::get_instance()->delete_participant(participant);
   }
 
-  /// What a handshake of DDS Security may take, which goes in no fragments: with the keys of
+  /// Largest handshake of DDS Security, which is never fragmented: with the keys of
   /// `./sls keys` 5,500 bytes, mostly certificate and signed permissions.
   static std::size_t calc_handshake_bytes(
       const eprosima::fastrtps::rtps::PropertyPolicy& properties) {

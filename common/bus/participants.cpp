@@ -33,7 +33,7 @@ bool make_room(std::map<PeerId, Known>& known, std::size_t most, const PeerId& s
   return true;
 }
 
-/// What is known of run `run_id` of a server, of whose runs the last are kept.
+/// The knowledge of run `run_id` of a server, of which the last runs are kept.
 template <class Known>
 Known& find_or_add(std::deque<Known>& runs, std::uint64_t run_id) {
   for (Known& run : runs)

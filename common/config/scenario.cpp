@@ -103,7 +103,7 @@ std::string to_too_long(std::int64_t period_ns) {
          to_seconds_text(kMaxDelayPeriods * period_ns) + " s)";
 }
 
-/// What only plants have whose vehicles turn, and their autopilot.
+/// Keys of plants whose vehicles turn, and of their autopilot.
 void check_autopilot(const Scenario& scenario, const Places& places) {
   const ModelName& model = scenario.plant.model;
   if (model.is_shared_library() || !find_model_keys(plant_keys(), model).has_attitude()) {

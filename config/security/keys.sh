@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # ./sls keys: certificate authorities, identities for the roles, and signed governance and permissions
-# documents, all by openssl. What each file is: README.md.
+# documents, all by openssl. The files are explained in README.md.
 set -euo pipefail
 
 here="$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)"

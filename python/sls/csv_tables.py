@@ -17,12 +17,12 @@ TEXT_COLUMNS = {"stage_name": "U32", "fault": "U16", "controller": "U1"}
 
 @dataclass(frozen=True)
 class Text:
-    """What a file holds, in whole lines."""
+    """The whole lines of a file."""
 
     path: Path
     lines: list[str]
     rest: str
-    """What follows the last line end; in a recording, of a row amid which its writer was killed."""
+    """Text after the last line end; in a recording, of a row amid which its writer was killed."""
 
 
 def read_text(path: Path) -> Text:

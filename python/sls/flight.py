@@ -173,7 +173,7 @@ class FlownVehicle:
 
     @cached_property
     def trajectory(self) -> Trajectory:
-        """What figures and metrics work on."""
+        """The trajectory, for figures and metrics."""
         return Trajectory(
             name=f"vehicle {self.vehicle_id}" if len(self.scenario.vehicles) > 1
             else self.scenario.name,

@@ -51,7 +51,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Verification:
-    """What re-reading every file of a recording gives."""
+    """The result of reading every file of a recording again."""
 
     steps: int
     """Of the vehicle that has most."""
@@ -72,7 +72,7 @@ class Comparison:
     difference: str | None
     """The first row or field that differs: file, vehicle, step, column and both values."""
     notes: tuple[str, ...]
-    """What differs or is missing according to the manifests; it need not make the data differ."""
+    """Differences and gaps according to the manifests; the data may be equal all the same."""
 
     @property
     def is_equal(self) -> bool:
@@ -289,13 +289,13 @@ class Recording:
         return find_stages(stage, time_s, names, plans, starts)
 
     def _find_plan(self, stage: int) -> dict[str, Any]:
-        """What the scenario says about a stage."""
+        """The scenario's keys of a stage."""
         mission = self.scenario["mission"]
         planned = mission[stage] if stage < len(mission) else {}
         return planned if isinstance(planned, dict) else {}
 
     def list_notes(self) -> tuple[str, ...]:
-        """What is missing, and what else the folder holds."""
+        """Missing samples, and other files in the folder."""
         manifest, notes = self.manifest, []
         if not manifest["complete"]:
             outcome = manifest["outcome"]

@@ -185,7 +185,7 @@ TEST(FlightMeasuresTest, AreThoseUpToTheLoss) {
   expect_measures_of_its_columns(delay_command(base, 65), base);  // loses the load at 20.396 s
 }
 
-TEST(FlightMeasuresTest, AreThoseUpToTheFailureAndNothingOfStagesThatWereNotFlown) {
+TEST(FlightMeasuresTest, CoverTheFlightUpToTheFailureOnly) {
   const config::Scenario base = load("setpoints");
   // Half a second after the second set point came the state freezes.
   const config::Scenario frozen = load_changed(

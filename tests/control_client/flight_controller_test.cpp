@@ -81,7 +81,7 @@ TEST(FlightControllerTest, AForceThatIsNoNumberIsAFaultAndNoImpurity) {
   expect_failed(controller.calc_answer(0, make_hanging({0.0, 0.0, -0.5}), {}), Fault::kNotFinite);
 }
 
-TEST(FlightControllerTest, IsAPureFunctionInWhateverOrderSamplesCome) {
+TEST(FlightControllerTest, IsAPureFunctionForSamplesInAnyOrder) {
   config::Scenario scenario = make_figure_eight();
   scenario.mission.insert(scenario.mission.begin(), make_hold({0.0, 0.0, -0.5}, 2 * kSecond));
   NamedGains gains = make_named_gains(LqrWeights{});
@@ -213,7 +213,7 @@ TEST(FlightControllerTest, FeedsForwardTheDragOfItsModel) {
   EXPECT_LE((force + drag - plain).norm(), 2e-12 * plain.norm());
 }
 
-TEST(FlightControllerTest, GazeboWiringUsesThePlantsRodAndTheLawTheBelievedOne) {
+TEST(FlightControllerTest, GazeboWiringUsesThePlantsRodAndTheLawItsModels) {
   config::Scenario scenario = make_figure_eight();
   scenario.vehicle.rod_length = 1.1;
   scenario.controller.state_wiring = config::StateWiring::kGazeboPlugin;
@@ -289,7 +289,7 @@ TEST(FlightControllerTest, AStageThatTimesOutFailsTheMission) {
   EXPECT_EQ(answer.reference.position, Vector3d(0.0, 0.0, -0.5));
 }
 
-TEST(FlightControllerTest, RadiusStagesLookAtTheTrueLoadNotAtTheBelievedOne) {
+TEST(FlightControllerTest, RadiusStagesUseTheTrueLoadNotTheModels) {
   config::Scenario scenario = make_figure_eight();
   scenario.vehicle.rod_length = 1.5;  // the controller's model has 1.0
   config::Stage stage = make_hold({0.0, 0.0, -1.0}, 0);

@@ -218,7 +218,7 @@ TEST(MissionTest, StagesOfNoDurationArePassedAtOnce) {
   EXPECT_EQ(progress.stage_start_step, 0u);
 }
 
-TEST(MissionTest, KnowsAMemoryThatCannotBe) {
+TEST(MissionTest, RejectsAnImpossibleMemory) {
   const Mission mission({make_hold({0, 0, -1}, kSecond)}, kPeriod);
   ControllerMemory memory;
   EXPECT_TRUE(mission.is_possible(0, memory));

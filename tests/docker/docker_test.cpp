@@ -126,7 +126,7 @@ class DockerTest : public ::testing::Test {
   std::vector<std::string> projects_;
 };
 
-TEST_F(DockerTest, RecordsInContainersWhatTheMachineItselfRecords) {
+TEST_F(DockerTest, RecordsTheSameInContainersAsOnTheMachine) {
   Flight native(scenario("short"));
   native.expect_success();
   for (const std::string name : {"plain", "discovery", "secure"}) {

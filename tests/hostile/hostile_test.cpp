@@ -144,11 +144,11 @@ class HostileTest : public testing::Test {
   std::unique_ptr<Profile> profile_;
 };
 
-TEST_F(HostileTest, PacketsThatNoFriendSendsDisturbNothing) {
+TEST_F(HostileTest, MalformedPacketsDisturbNothing) {
   expect_that_forgeries_disturb_nothing("packets");
 }
 
-TEST_F(HostileTest, AnnouncementsOfThousandsThatDoNotExistDisturbNothing) {
+TEST_F(HostileTest, AnnouncementsOfThousandsOfInventedParticipantsDisturbNothing) {
   expect_that_forgeries_disturb_nothing("announcements");
 }
 
@@ -159,7 +159,7 @@ TEST_F(HostileTest, ParticipantsThatComeAndGoDisturbNothing) {
   expect_undisturbed(flight, 400);
 }
 
-TEST_F(HostileTest, SamplesThatNoFriendWritesDisturbNothing) {
+TEST_F(HostileTest, InvalidSamplesDisturbNothing) {
   Flight flight(scenario("figure_eight"), options_);
   attack("malformed", flight);
   attack("control", flight);
@@ -169,7 +169,7 @@ TEST_F(HostileTest, SamplesThatNoFriendWritesDisturbNothing) {
   expect_undisturbed(flight, 400);
 }
 
-TEST_F(HostileTest, LiesAboutTheFlightAreNotBelieved) {
+TEST_F(HostileTest, FalseSamplesAboutTheFlightAreIgnored) {
   Flight flight(scenario("figure_eight"), options_);
   attack("commands", flight);
   attack("statements", flight);
@@ -185,7 +185,7 @@ TEST_F(HostileTest, AStrongerControllerThatIsOfNoUseIsPassedOver) {
   expect_undisturbed(flight, 400);
 }
 
-TEST_F(HostileTest, SpoofedPacketsOfTheFlightItselfCrashNobody) {
+TEST_F(HostileTest, PacketsSpoofedInTheFlightsNameCrashNoProgram) {
   expect_that_spoofed_packets_crash_nobody();
 }
 
@@ -196,11 +196,11 @@ class SecuredHostileTest : public HostileTest {
   SecuredHostileTest() : HostileTest("secure") {}
 };
 
-TEST_F(SecuredHostileTest, PacketsThatNoFriendSendsDisturbNothing) {
+TEST_F(SecuredHostileTest, MalformedPacketsDisturbNothing) {
   expect_that_forgeries_disturb_nothing("packets");
 }
 
-TEST_F(SecuredHostileTest, AnnouncementsOfThousandsThatDoNotExistDisturbNothing) {
+TEST_F(SecuredHostileTest, AnnouncementsOfThousandsOfInventedParticipantsDisturbNothing) {
   expect_that_forgeries_disturb_nothing("announcements");
 }
 
@@ -212,7 +212,7 @@ TEST_F(SecuredHostileTest, AProgramWithoutKeysDisturbsNothingAndReadsNothing) {
   expect_undisturbed(flight, 400);
 }
 
-TEST_F(SecuredHostileTest, SpoofedPacketsOfTheFlightItselfCrashNobody) {
+TEST_F(SecuredHostileTest, PacketsSpoofedInTheFlightsNameCrashNoProgram) {
   expect_that_spoofed_packets_crash_nobody();
 }
 

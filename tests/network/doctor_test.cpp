@@ -117,7 +117,7 @@ class DoctorTest : public testing::Test {
 
 class HealthyDoctorTest : public DoctorTest, public testing::WithParamInterface<const char*> {};
 
-TEST_P(HealthyDoctorTest, OnAnIdleMachineAndDuringAFlightItFindsNothing) {
+TEST_P(HealthyDoctorTest, FindsNoFaultOnAnIdleMachineOrDuringAFlight) {
   expect_healthy(examine(on("there") + doctor(GetParam())));
   FlightOptions options;
   options.qos_file = qos(GetParam());

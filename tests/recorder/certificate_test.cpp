@@ -111,7 +111,7 @@ TEST(CertificateTest, CoversEveryVehicle) {
   EXPECT_EQ(read_certificate(folder.path()), calc_certificate(folder.path()));
 }
 
-TEST(CertificateTest, LeavesOutWhatDiffersBetweenEqualFlights) {
+TEST(CertificateTest, LeavesOutFieldsThatDifferBetweenEqualFlights) {
   const std::string expected = certify({});
   EXPECT_EQ(certify([](RecordEntry& entry) {
               entry.measured({PlantState()});  // the truth is what counts
@@ -175,7 +175,7 @@ TEST(CertificateTest, CoversAttitudeRatesAndSignalsWhereTheRunHasThem) {
                 make_signal_parameters());
 }
 
-TEST(CertificateTest, NumbersThatAreNoneReadBackToTheSameCertificate) {
+TEST(CertificateTest, NanReadsBackToTheSameCertificate) {
   certify([](RecordEntry& entry) {
     const double nan = std::numeric_limits<double>::quiet_NaN();
     entry.truth().p_WQ_m({nan, -nan, std::numeric_limits<double>::infinity()});

@@ -294,7 +294,7 @@ TEST_F(RecorderTest, AServerThatStaysAwayIsGivenUp) {
 }
 
 // The last samples may have to be sent again and again. What is missing has 10 s step by step.
-TEST_F(RecorderTest, WhatComesLateAfterTheEndIsWaitedForWhileItComes) {
+TEST_F(RecorderTest, WaitsAfterTheEndAsLongAsLateSamplesCome) {
   FakeFlight flight(kRunId);
   start();
   ASSERT_TRUE(flight.wait_for_recorder());

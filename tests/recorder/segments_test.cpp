@@ -141,7 +141,7 @@ TEST_F(SegmentsTest, AnInterruptedRecordingCanBeResumedToo) {
   expect_equal_to_the_undisturbed(segment.folder);
 }
 
-TEST_F(SegmentsTest, WhatTheHistoriesNoLongerHoldIsNamedAsAGap) {
+TEST_F(SegmentsTest, StepsNoLongerInTheHistoriesAreNamedAsAGap) {
   record_until_killed(make_segment(out_), 0, 150);
   const Segment segment = resume();
   EXPECT_FALSE(record_to_the_end(segment, 200));
@@ -202,7 +202,7 @@ TEST_F(SegmentsTest, StatusSamplesOfAllSegmentsCountTogether) {
   }
 }
 
-TEST_F(SegmentsTest, StepsThatNobodyAnsweredAreWholeWithoutAReference) {
+TEST_F(SegmentsTest, UnansweredStepsAreWholeWithoutAReference) {
   const auto add = [](Recording& recording, std::uint64_t from, std::uint64_t to) {
     BatchFeeder feeder(recording, from);
     for (std::uint64_t step = from; step <= to; ++step)

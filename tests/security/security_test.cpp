@@ -49,7 +49,7 @@ TEST(SecureFlightTest, AStandbyTakesOverAndTheKilledClientIsLetInAgain) {
   EXPECT_NE(controllers.find("primary standby primary"), std::string::npos) << controllers;
 }
 
-TEST(SecureFlightTest, AnOperatorPausesAndResumesWhatAControllerMayNot) {
+TEST(SecureFlightTest, AnOperatorMayPauseAndResumeAndAControllerMayNot) {
   const SecuredRun run(12);
   const auto recorder = run.start_recorder(), server = run.start_server(),
              client = run.start_client();

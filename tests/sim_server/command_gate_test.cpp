@@ -189,7 +189,7 @@ TEST_F(CommandGateTest, AStepThatIsNotAwaitedIsRefusedAndNotCountedAgainstTheCli
   EXPECT_EQ(gate_.refusal(), std::nullopt);
 }
 
-TEST_F(CommandGateTest, AnAnswerOfNobodyAnnouncedIsRefused) {
+TEST_F(CommandGateTest, AnAnswerOfAnUnannouncedClientIsRefused) {
   EXPECT_EQ(gate_.offer(make_answer(0), kStranger), Verdict::kUnknownClient);
   EXPECT_FALSE(gate_.accepted());
   EXPECT_EQ(gate_.counters().rejected_client(), 1u);
@@ -235,7 +235,7 @@ TEST_F(CommandGateTest, AnotherAnswerToAnAnsweredStepIsNoCopy) {
   EXPECT_EQ(gate_.counters().superseded(), 0u);
 }
 
-TEST_F(CommandGateTest, AStrangersCopyOfAnAcceptedCommandIsNoDuplicate) {
+TEST_F(CommandGateTest, AnotherClientsCopyOfAnAcceptedCommandIsNoDuplicate) {
   gate_.offer(make_answer(0), kStrongPeer);
   gate_.offer(make_answer(0), kStranger);
   gate_.expect(1);
@@ -565,7 +565,7 @@ TEST_F(CommandGateTest, AHeldAnswerFliesWhenTheStrongerClientLeaves) {
   EXPECT_EQ(*gate_.accepted(), make_answer(0, -2.0));
 }
 
-TEST_F(CommandGateTest, WhatAClientAnsweredBeforeItLeftIsCounted) {
+TEST_F(CommandGateTest, AnswersOfAClientThatLeftAreCounted) {
   set_clients({kStrong, kWeak});
   gate_.offer(make_answer(0), kWeakPeer);
   set_clients({kStrong});
@@ -592,7 +592,7 @@ TEST_F(CommandGateTest, WithoutClientsNothingIsAwaitedAndNothingRefused) {
   EXPECT_EQ(gate_.offer(make_answer(0), kStrongPeer), Verdict::kUnknownClient);
 }
 
-TEST_F(CommandGateTest, EveryRejectionSaysWhy) {
+TEST_F(CommandGateTest, EveryRejectionHasAReason) {
   std::set<std::string> texts;
   for (const Verdict verdict : {Verdict::kNotFinite, Verdict::kForceLimit, Verdict::kOtherRun,
                                 Verdict::kEarly, Verdict::kWrongStep, Verdict::kContradiction,
@@ -647,7 +647,7 @@ class Junk {
   std::mt19937_64& random_;
 };
 
-TEST(CommandGatePropertyTest, JunkNeitherChangesWhatFliesNorEscapesTheCounters) {
+TEST(CommandGatePropertyTest, InvalidAnswersChangeNoForceAndAreCounted) {
   for (std::uint64_t seed = 0; seed < 40; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937_64 random(seed);

@@ -107,7 +107,7 @@ TEST_F(ParticipantCheckTest, AnotherContractIsNamedAtOnceAndNotAdmitted) {
   EXPECT_TRUE(ParticipantCheck::admit_recorders({recorder}).empty());
 }
 
-TEST_F(ParticipantCheckTest, ARunOfNobodyIsNamedOnceItLasts) {
+TEST_F(ParticipantCheckTest, AnUnknownRunIsReportedOnceItLasts) {
   auto entry = make_entry(1);
   entry.announcement.run_id(0xcd);
   neighbourhood_.participants = {entry};
@@ -145,7 +145,7 @@ TEST_F(ParticipantCheckTest, AControllerOfAnotherServerIsNotOurs) {
   EXPECT_TRUE(look(5s).empty());
 }
 
-TEST_F(ParticipantCheckTest, VehiclesOfNobodyAreNamedOnceThatLasts) {
+TEST_F(ParticipantCheckTest, UnknownVehiclesAreReportedOnceTheyLast) {
   auto entry = make_entry(1);
   entry.announcement.vehicle_ids({1, 7, 8, 20});
   neighbourhood_.other_vehicles = {20};
@@ -371,7 +371,7 @@ TEST_F(ParticipantCheckTest, AVehicleFarFromItsReferenceIsAnnouncedOnce) {
   EXPECT_TRUE(check_.take_events().empty());
 }
 
-TEST_F(ParticipantCheckTest, StrangersCannotFillTheMemory) {
+TEST_F(ParticipantCheckTest, UnknownParticipantsCannotFillTheMemory) {
   for (int i = 0; i < 100'000; ++i) {
     bus::PeerId peer;
     peer.bytes[0] = static_cast<std::uint8_t>(i);

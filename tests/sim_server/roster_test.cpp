@@ -50,7 +50,7 @@ bool contains(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
-TEST(RosterTest, NobodyIsMissingWhenAllExpectedAreReady) {
+TEST(RosterTest, NoParticipantIsMissingWhenAllAreReady) {
   const Roster roster = {{make_controller("pilot")}, {make_recorder("tape")}};
   EXPECT_EQ(name_missing(roster, make_wait_for(1, 1), kScenario), "");
 }
@@ -77,7 +77,7 @@ TEST(RosterTest, CountsWhereSeveralAreExpected) {
   EXPECT_TRUE(contains(missing, "2 recorders (1 ready)")) << missing;
 }
 
-TEST(RosterTest, NamesWhoIsThereButNotReady) {
+TEST(RosterTest, NamesParticipantsThatAreNotReady) {
   const Roster roster = {{make_controller("pilot", false)}, {make_recorder("tape", false)}};
   const std::string missing = name_missing(roster, make_wait_for(1, 1), kScenario);
   EXPECT_TRUE(contains(missing, "'pilot' on host-of-pilot is not ready")) << missing;

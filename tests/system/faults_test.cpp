@@ -224,7 +224,7 @@ INSTANTIATE_TEST_SUITE_P(, RefusalTest,
                                   (kind.param.second == kWaits ? "Waiting" : "Stopping");
                          });
 
-TEST(FaultsTest, FullDiskEndsTheRecordingNamingFileAndCauseAndNothingLooksWhole) {
+TEST(FaultsTest, AFullDiskEndsTheRecordingWithFileAndCauseAndNoFileLooksWhole) {
   TemporaryFolder folder;
   fs::create_directory(folder / "disk");
   const std::string disk = folder / "disk";

@@ -44,7 +44,7 @@ class FleetTest : public ::testing::Test {
   const OwnDomain domain_;
 };
 
-TEST_F(FleetTest, OfDifferentVehiclesRecordsForEachWhatARunOfItAloneRecords) {
+TEST_F(FleetTest, RecordsEachOfDifferentVehiclesAsARunOfItAlone) {
   const config::Scenario fleet = config::load_scenario(scenario("mixed_fleet"));
   Flight together(scenario("mixed_fleet"));
   std::vector<std::unique_ptr<Flight>> alone;

@@ -86,7 +86,7 @@ TEST_F(RestartTest, AKilledRecorderGoesOnInANewSegmentAndTogetherNothingIsMissin
   EXPECT_TRUE(equal) << said;
 }
 
-TEST_F(RestartTest, AKilledServerIsReplacedAndThoseWhoFollowFlyTheNewRun) {
+TEST_F(RestartTest, AKilledServerIsReplacedAndProgramsWithFollowFlyTheNewRun) {
   const auto recorder = start_recorder({"--follow"});
   auto server = start_server();
   const auto client = start_client({"--follow"});
@@ -109,7 +109,7 @@ TEST_F(RestartTest, AKilledServerIsReplacedAndThoseWhoFollowFlyTheNewRun) {
   EXPECT_TRUE(equal) << said;
 }
 
-TEST_F(RestartTest, ThoseWhoDoNotFollowEndWhenTheServerIsReplacedAndSayBy) {
+TEST_F(RestartTest, ProgramsWithoutFollowEndNamingTheNewServer) {
   const auto recorder = start_recorder();
   auto server = start_server();
   const auto client = start_client();

@@ -116,7 +116,7 @@ TEST(RealTimeTest, WithoutLateAnswersTheRecordingIsThatOfLockstep) {
   FAIL() << "late even at 200 ms per period";
 }
 
-TEST(RealTimeTest, TakesTheTimeItSays) {
+TEST(RealTimeTest, TakesTheSimulatedTime) {
   Flight flight(scenario("short"), {{}, {"--mode", "realtime", "--rtf", "0.5"}, {}});
   flight.expect_success();
   const Table status(flight.recording() / "status.csv");
@@ -243,7 +243,7 @@ class LongPeriodTest : public PausedTest {
   }
 };
 
-TEST_F(LongPeriodTest, TheServerIsHeardAndHearsUntilTheNextStateIsDue) {
+TEST_F(LongPeriodTest, TheServerAnnouncesAndReceivesUntilTheNextStateIsDue) {
   start();
   ASSERT_EQ(operator_->ask(ACTION_STEP, 1), "") << server_->output();
   ASSERT_EQ(operator_->ask(ACTION_RESUME), "") << server_->output();
@@ -252,7 +252,7 @@ TEST_F(LongPeriodTest, TheServerIsHeardAndHearsUntilTheNextStateIsDue) {
   EXPECT_EQ(server_->wait(std::chrono::seconds(60)), 143) << server_->output();
 }
 
-TEST_F(LongPeriodTest, TheServerIsHeardAndHearsWhileNobodyAnswers) {
+TEST_F(LongPeriodTest, TheServerAnnouncesAndReceivesWithoutAnswers) {
   start();
   stop_client();
   ASSERT_EQ(operator_->ask(ACTION_RESUME), "") << server_->output();

@@ -30,7 +30,7 @@ std::string read_text(const fs::path& file) {
   return text.str();
 }
 
-/// What the recorder had as parameters, as far as the file's content goes by them.
+/// The parameters that the recorder had, as far as the file's content depends on them.
 Parameters load_parameters(const record::RecordedFlight& flight) {
   const record::ManifestFile& manifest = flight.segments.front().manifest;
   constexpr double kMaxPeriodS = 1e6;

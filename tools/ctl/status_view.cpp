@@ -156,7 +156,7 @@ std::vector<Count> list_link_counts(const SyncCounters& counters) {
       {"resent", "late", "held", "fail-safe", "stale", "duplicate", "superseded", "take-overs"});
 }
 
-/// What a healthy run never counts.
+/// Counters that stay 0 in a healthy run.
 std::vector<Count> list_trouble_counts(const SyncCounters& counters) {
   return bus::list_counts(counters, "", {"deadline missed", "overflow", "slipped"});
 }

@@ -99,7 +99,7 @@ class Examination {
   }
 
  private:
-  /// What is to be seen without touching anything.
+  /// Checks that only read.
   static Observations look_at_settings(const DoctorOptions& options) {
     Observations seen;
     seen.qos_file = options.qos_file.filename().string();

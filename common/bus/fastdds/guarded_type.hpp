@@ -98,7 +98,7 @@ class GuardedType : public Generated {
 
   bool refuse(const eprosima::fastrtps::rtps::SerializedPayload_t& payload, void* data,
               const std::string& defect) const {
-    // What it claimed and did not hold may be a thousand times its size.
+    // The claimed but absent elements may be a thousand times its size.
     *static_cast<typename Generated::type*>(data) = typename Generated::type();
     if (misfit_report) misfit_report->report(payload, this->getName(), defect);
     return false;

@@ -90,7 +90,7 @@ timespec limit(const timespec& deadline, std::int64_t patience_ns) {
   return to_timespec(std::min(to_ns(deadline), now_ns() + patience_ns));
 }
 
-/// A lock that a dead process held is held by us now. What it guards in a port is a ring of
+/// A lock that a dead process held is held by us now. It guards, in a port, a ring of
 /// messages and who waits for them; only between two of the dead's instructions, which reserve a
 /// place in the ring and fill it, is there a state that its reader cannot go on from.
 int take_over(int result, pthread_mutex_t* mutex) {

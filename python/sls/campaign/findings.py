@@ -1,4 +1,4 @@
-"""What the shipped campaigns found: docs/campaigns.md and its pictures, from their folders.
+"""Findings of the shipped campaigns: docs/campaigns.md and its pictures, from their folders.
 
     ./sls python -m sls.campaign.findings DIR [--out docs]
 

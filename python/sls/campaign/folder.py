@@ -27,7 +27,7 @@ OWN_FILES = {"lock", "campaign.yaml", "base.yaml", "chunks", "kept"}  # before p
 
 @dataclass(frozen=True)
 class Plan:
-    """What was decided before the first run was flown: plan.json."""
+    """Decisions made before the first run: plan.json."""
 
     campaign: str        # its name
     sha256: str
@@ -44,7 +44,7 @@ class Plan:
 
 
 class DamagedChunk(Exception):
-    """What is wrong with a chunk's file; it counts as not flown."""
+    """A defect of a chunk's file; the chunk counts as not flown."""
 
 
 @dataclass(frozen=True)

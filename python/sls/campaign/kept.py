@@ -121,7 +121,7 @@ def list_kept(folder: "CampaignFolder", campaign: Campaign) -> Iterator[dict[str
 
 
 def keep_recordings(folder: "CampaignFolder") -> dict[str, Any]:
-    """Writes every recording that is asked for and not there. What the manifest says of them:
+    """Writes every recording that is requested and missing. The manifest's entries for them:
     their kind and number, and of the worst their runs."""
     campaign = folder.campaign
     kept: dict[str, Any] = {"kind": campaign.keep.kind, "count": 0}

@@ -175,7 +175,7 @@ def is_lost(table: RunTable) -> np.ndarray:
 
 
 def find_main_measure(table: RunTable) -> str | None:
-    """What heat maps show: the rms of the load's error where it was measured."""
+    """The measure in heat maps: the rms of the load's error where it was measured."""
     for name in ("load_error_rms_m", "load_error_max_m"):
         if name in table.measures:
             return name

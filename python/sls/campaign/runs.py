@@ -65,7 +65,7 @@ def to_one_line(text: str) -> str:
 
 
 def list_yaml_values(campaign: Campaign, values: list[Any]) -> list[str]:
-    """What the scenario's varied keys hold in a run."""
+    """Values of the scenario's varied keys in a run."""
     return [to_yaml_value(value) for value in campaign.pick_scenario_values(values)]
 
 

@@ -22,7 +22,7 @@ from sls.input_error import InputError
 
 
 class ChunkFlyer:
-    """What a process needs for the chunks of one folder, made once. Raises ConfigError where the
+    """The data that a process needs for the chunks of one folder, made once. Raises ConfigError where the
     campaign cannot be flown here, such as on a machine of another kind."""
 
     def __init__(self, folder: Path):

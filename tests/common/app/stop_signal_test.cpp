@@ -20,7 +20,7 @@ class StopSignalDeathTest : public testing::Test {
   void SetUp() override { GTEST_FLAG_SET(death_test_style, "threadsafe"); }
 };
 
-TEST_F(StopSignalDeathTest, ThereIsNoneBeforeOneCame) {
+TEST_F(StopSignalDeathTest, NoSignalIsReportedBeforeTheFirst) {
   EXPECT_EXIT(
       {
         install_stop_signals();

@@ -51,7 +51,7 @@ bool knows(const ServerDirectory& directory, std::uint64_t run_id) {
                      [&](const Run& run) { return run.parameters.run_id() == run_id; });
 }
 
-TEST(ParticipantDirectoryTest, KnowsWhoServesARunUntilTheyLeave) {
+TEST(ParticipantDirectoryTest, ListsTheParticipantsOfARunUntilTheyLeave) {
   constexpr int kDomain = 70;
   Node node(kQosFile, kDomain, "directory");
   const ParticipantDirectory directory(node);
@@ -127,7 +127,7 @@ TEST_F(RecorderPatienceTest, OneThatGetsNoFurtherIsNot) {
   EXPECT_FALSE(wait_for_recorder({0.5, 60}));
 }
 
-TEST(ServerDirectoryTest, AServerOfAnotherContractIsNotBelievedAndNamed) {
+TEST(ServerDirectoryTest, AServerOfAnotherContractIsIgnoredAndReported) {
   constexpr int kDomain = 71;
   Node node(kQosFile, kDomain, "directory");
   const ServerDirectory directory(node);
@@ -191,7 +191,7 @@ TEST(ServerDirectoryTest, FindsTheRunToJoin) {
   EXPECT_EQ(directory.find_status(kLowerRun + 1), std::nullopt);
 }
 
-TEST(ServerDirectoryTest, OnlyWhoClaimedARunFirstIsBelievedAboutIt) {
+TEST(ServerDirectoryTest, OnlyTheFirstServerOfARunCounts) {
   constexpr int kDomain = 79;
   Node node(kQosFile, kDomain, "directory");
   std::atomic<int> forged{0};

@@ -111,7 +111,7 @@ TEST(Px4KeysTest, EveryKeyIsReadAndSurvivesBeingWritten) {
   EXPECT_EQ(keys.speeds.speed_per_output, 900.0);
 }
 
-TEST(GeometricKeysTest, GainsFollowFromTheInertiaUnlessTheFileSaysThem) {
+TEST(GeometricKeysTest, GainsFollowFromTheInertiaUnlessTheFileSetsThem) {
   const config::Autopilot usual = read_twice("  model: geometric\n");
   EXPECT_EQ(usual.period_ns, 4'000'000);
   EXPECT_FALSE(usual.own.get<geometric::Keys>().attitude);

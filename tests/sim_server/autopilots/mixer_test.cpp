@@ -165,7 +165,7 @@ TEST(MixerTest, GivesYawUpBeforeRoll) {
   expect_outputs(mix(kQuadX, {std::sqrt(0.5), 0, 0.3}, 0.5), {0, 1, 1, 0});
 }
 
-TEST(MixerTest, SharesOutWhatIsTooMuchAtBothEnds) {
+TEST(MixerTest, SharesOutExcessDemandAtBothLimits) {
   // 0.5 ± √2 at two rotors. Taking all of it off the roll would be too much for the other two:
   // half of that is given back, and no roll is left. What pitch is too much follows: √½ is left.
   expect_outputs(mix(kQuadX, {1, 1, 0}, 0.5), {1, 0, 1, 0});

@@ -428,7 +428,7 @@ TEST(SlungLoadPlantTest, RefusesAForceThatIsNotFiniteByName) {
   EXPECT_EQ(calc_position_difference(plant.state(), before), 0.0);
 }
 
-TEST(SlungLoadPlantTest, NamesWhatOverflowsAndKeepsTheLastFiniteState) {
+TEST(SlungLoadPlantTest, NamesTheOverflowingValueAndKeepsTheLastFiniteState) {
   for (const double force : {1e160, 1e300, 1e308}) {
     SlungLoadPlant plant(kVehicle, make_swinging_plant());
     std::string error = "none";

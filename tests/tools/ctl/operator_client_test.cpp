@@ -310,7 +310,7 @@ TEST_F(OperatorClientTest, ASnapshotHoldsThePartiesOfTheRunAndTheServersSilence)
   EXPECT_FALSE(client.make_snapshot(run).server_is_gone);
 }
 
-TEST(OperatorNameTest, SaysWhoAndWhereAndFitsTheWire) {
+TEST(OperatorNameTest, HoldsUserAndHostAndFitsTheWire) {
   const std::string name = make_operator_name();
   EXPECT_NE(name.find('@'), std::string::npos);
   EXPECT_LE(name.size(), 64u);

@@ -140,7 +140,7 @@ TEST(StatusViewTest, OnlyFinishedAndFailedRunsHaveEnded) {
   EXPECT_FALSE(has_ended(std::nullopt));
 }
 
-TEST(StatusViewTest, WhatAParticipantDoesWrongIsShown) {
+TEST(StatusViewTest, AParticipantsMistakeIsShown) {
   Snapshot snapshot = make_snapshot();
   const std::string problem =
       "sls/command of 'foo' (10.0.0.2): DEADLINE: offered none, asked 0.1 s";
@@ -197,7 +197,7 @@ TEST(StatusViewTest, NoLineIsLongerThanTheTerminalIsWide) {
       ASSERT_LE(count_characters(line), columns) << line;
 }
 
-TEST(StatusViewTest, WhatATerminalWouldObeyIsNotPassedOn) {
+TEST(StatusViewTest, TerminalControlCharactersAreNotPassedOn) {
   Snapshot snapshot = make_snapshot();
   snapshot.status->reason("a\nb\x1b[2J\xc2\x9b\xff\xc3");
   snapshot.participants[0].name("p\xc3\xa4r\x07\xe2\x82");

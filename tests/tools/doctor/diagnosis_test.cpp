@@ -114,7 +114,7 @@ TEST(DiagnosisTest, TwoUsersShareNoMemory) {
   EXPECT_EQ(find_faults(seen), Names{});
 }
 
-TEST(DiagnosisTest, AnotherFlightOnAnotherDomainIsNobodysFault) {
+TEST(DiagnosisTest, AnotherFlightOnAnotherDomainIsNoFault) {
   Observations seen = make_healthy();
   Heard heard{5, seen.peer_address, {{}, "sim_server", false}};
   seen.heard = {heard};
@@ -160,7 +160,7 @@ TEST(CheckTest, ALineHoldsNameVerdictAndText) {
   EXPECT_EQ(to_line({"ports", Verdict::kFault, "blocked"}), "ports         FAULT    blocked");
 }
 
-TEST(CheckTest, JsonStaysJsonWhateverANameHolds) {
+TEST(CheckTest, JsonStaysValidWithAnyName) {
   const auto parsed = nlohmann::json::parse(
       to_json({{"data", Verdict::kOk, "from \"x\xff\""}, {"ports", Verdict::kFault, "blocked"}}));
   EXPECT_FALSE(parsed.at("ok").get<bool>());

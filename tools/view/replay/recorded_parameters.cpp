@@ -61,7 +61,7 @@ std::map<std::string, std::string> read_units(const fs::path& folder) {
   return units;
 }
 
-/// What state.csv has beyond the columns of a point mass.
+/// The columns of state.csv beyond those of a point mass.
 void set_columns(Parameters& message, const fs::path& folder) {
   const record::CsvReader file(folder / record::StateRow::kFile,
                                record::make_header<record::StateRow>(),

@@ -5,7 +5,7 @@
 namespace sls::view {
 namespace {
 
-/// What a message takes beside its payload: nodes of list and table, the payload's string.
+/// Overhead of a message beside its payload: nodes of list and table, the payload's string.
 constexpr std::size_t kMessageCost = 256;
 
 }  // namespace

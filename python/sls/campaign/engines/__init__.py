@@ -17,7 +17,7 @@ ENGINES = ("local", "slurm", "dask")
 
 
 class EngineError(RunError):
-    """One line: what keeps the campaign from its end. What was flown stays; `--resume` goes on."""
+    """Why the campaign cannot finish, in one line. Flown runs stay; `--resume` continues."""
 
 
 @dataclass(frozen=True)

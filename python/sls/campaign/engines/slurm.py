@@ -37,11 +37,11 @@ INSTALL = f"apt-get install slurm-client; {START}"
 
 
 class ControllerLost(Exception):
-    """What a command of Slurm said instead of an answer."""
+    """The error message of a Slurm command."""
 
 
 def ask(*command: str) -> str:
-    """What a command of Slurm prints. Raises EngineError where it is not installed,
+    """The output of a Slurm command. Raises EngineError where it is not installed,
     ControllerLost where it fails."""
     try:
         # A session of its own: Ctrl-C is for this process.
@@ -218,7 +218,7 @@ def find_largest_array() -> int:
 
 @dataclass
 class Round:
-    """What was submitted together: arrays, and the job that collects after them."""
+    """Jobs submitted together: arrays, and the job that collects after them."""
 
     number: int
     jobs: list[str] = field(default_factory=list)
@@ -257,7 +257,7 @@ def submit_round(folder: CampaignFolder, missing: Sequence[int], number: int,
 
 
 def find_reason(folder: CampaignFolder, jobs: Sequence[str]) -> str:
-    """What the last of the tasks of these jobs said that failed."""
+    """The last message of a failed task of these jobs."""
     logs = [log for job in jobs for log in (folder.folder / "slurm").glob(f"task-{job}-*.log")]
     for log in sorted(logs, key=lambda file: file.stat().st_mtime, reverse=True):
         errors = [line for line in log.read_text(errors="replace").splitlines() if "error" in line]

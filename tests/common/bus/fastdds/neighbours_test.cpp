@@ -49,7 +49,7 @@ class NeighboursTest : public testing::Test {
   const EndpointFacts own_ = make_endpoint("sls/command", "sls::Commands", false);
 };
 
-TEST_F(NeighboursTest, EveryPolicyIsNamedWithWhatIsOfferedAndAsked) {
+TEST_F(NeighboursTest, EveryPolicyIsNamedWithOfferedAndRequestedValue) {
   const std::string begin = "sls/command of 'foo' (10.0.0.2): ";
   const std::vector<std::pair<std::function<void(EndpointFacts&)>, std::string>> cases = {
       {[](auto& facts) { facts.is_reliable = false; },

@@ -151,7 +151,7 @@ TEST_F(SharedLocksTest, TheLockOfADeadProcessGoesToTheNext) {
   }
 }
 
-TEST_F(SharedLocksTest, NobodyWaitsForAStoppedProcess) {
+TEST_F(SharedLocksTest, NoProcessWaitsForAStoppedOne) {
   start_holder(SIGSTOP);
   const auto start = Clock::now();
   for (int time = 0; time < 2; ++time) EXPECT_EQ(lock_within(kLong_s), ETIMEDOUT);
@@ -164,7 +164,7 @@ TEST_F(SharedLocksTest, NobodyWaitsForAStoppedProcess) {
   EXPECT_EQ(pthread_mutex_unlock(&port_->mutex), 0);
 }
 
-TEST_F(SharedLocksTest, OneWhoIsOnlySlowIsWaitedFor) {
+TEST_F(SharedLocksTest, ASlowProcessIsWaitedFor) {
   ASSERT_EQ(pthread_mutex_lock(&port_->mutex), 0);
   Waiting waiting(*this);
   std::this_thread::sleep_for(std::chrono::milliseconds(300));  // longer than for a stopped one
@@ -172,7 +172,7 @@ TEST_F(SharedLocksTest, OneWhoIsOnlySlowIsWaitedFor) {
   EXPECT_EQ(waiting.finish(), 0);
 }
 
-TEST_F(SharedLocksTest, TheLockOfAProcessThatDiesGoesToOneWhoAlreadyWaits) {
+TEST_F(SharedLocksTest, TheLockOfADyingProcessGoesToAWaitingOne) {
   start_holder(0);
   Waiting waiting(*this);
   kill(holder_, SIGKILL);

@@ -240,7 +240,7 @@ TEST(ManyConnectionsTest, ThousandsComeAndGoWithoutALeak) {
   EXPECT_TRUE(server.ask([&] { return connections.empty(); }));
 }
 
-TEST(ManyConnectionsTest, CountsThoseThereAre) {
+TEST(ManyConnectionsTest, CountsOpenConnections) {
   ServerOptions options = test::make_options();
   options.limits.connections = 200;
   RunningServer server(options, test::add_echo_and_page);

@@ -198,7 +198,7 @@ class Live {
     this.shell.plots.append(rows);
   }
 
-  /** What is after the frame's last work on this thread comes through a channel: layout and paint are counted. */
+  /** The message after the frame's last work on this thread comes through a channel: layout and paint are counted. */
   private noteFrame(): void {
     if (!this.newest || this.newest.step === this.drawnStep) return;
     this.drawnStep = this.newest.step;

@@ -1,4 +1,4 @@
-/** What the page says in words and numbers: run, participants, events, what is missing. */
+/** The page's texts and numbers: run, participants, events, missing data. */
 import { find, make, setText } from "./dom";
 import type { FlightEvent, NoRun, Participant, Run, Status } from "./types";
 

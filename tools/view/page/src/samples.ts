@@ -1,4 +1,4 @@
-/** What is plotted of one vehicle: numbers by time, of bounded memory. */
+/** The plotted data of one vehicle: numbers by time, of bounded memory. */
 import type { PlotDescription } from "./series";
 import type { Rows } from "./types";
 

@@ -1,4 +1,4 @@
-/** What the page knows of a flight. Everything is in frame W (z down), SI units and radians, until frames.ts turns it for drawing. */
+/** The page's data. Everything is in frame W (z down), SI units and radians, until frames.ts turns it for drawing. */
 
 /** Result of a step's answer: AnswerKind of idl/sls.idl. */
 export enum AnswerKind {
@@ -36,7 +36,7 @@ export interface Column {
   unit: string;
 }
 
-/** What is flown: describe_run of tools/view/run_description.hpp. */
+/** Description of the run: describe_run of tools/view/run_description.hpp. */
 export interface Run {
   /** 16 hex digits. */
   run_id: string;
