@@ -1,4 +1,4 @@
-/// What the participants of a run do wrong, in words: README.md, "What a participant does wrong".
+/// Mistakes of the participants of a run, in words: README.md, "What a participant does wrong".
 /// No network and no clock here.
 #pragma once
 

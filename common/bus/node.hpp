@@ -81,7 +81,7 @@ class Node {
   /// added automatically.
   Problems& problems() const;
 
-  /// What a participant does wrong until it leaves: `text` is said behind its description, once for
+  /// A mistake of a participant until it leaves: `text` is logged behind its description, once for
   /// each `key`.
   void note_problem(const PeerId& peer, const std::string& key, const std::string& text) const;
 

@@ -145,7 +145,7 @@ class ClosedLoop:
         initial: where they begin, each of shape (n, k) or (k,) for all: quad_position or
             load_position (3, m), quad_velocity (3, m/s), angles and angle_rates (2, rad, rad/s);
             of plants with attitude attitude (4, unit quaternion), body_rates (3, rad/s).
-            What is left out is the scenario's.
+            Others stay the scenario's.
         Returns `state`. Raises ConfigError for what the plant does not take; then nothing changes.
         """
         which = self._to_indices(indices)

@@ -450,7 +450,7 @@ TEST(CampaignRunsTest, AnotherPeriodIsInEachRunsText) {
   EXPECT_EQ(fine.make_scenario({}).plant.step_ns, 500'000);
 }
 
-/// What the constructor or `work` says, called with runs of `file` that vary `path`.
+/// The error of the constructor or of `work`, called with runs of `file` that vary `path`.
 template <class Work>
 std::string find_error(const std::filesystem::path& file, const std::string& path,
                        const Work& work) {

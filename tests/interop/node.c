@@ -68,7 +68,7 @@ dds_entity_t make_writer(Node* node, const dds_topic_descriptor_t* type, const c
   dds_qset_reliability(qos, DDS_RELIABILITY_RELIABLE, DDS_SECS(5));
   dds_qset_durability(qos, DDS_DURABILITY_TRANSIENT_LOCAL);
   dds_qset_history(qos, DDS_HISTORY_KEEP_LAST, depth);
-  // What the server's reader of commands asks for in real time (profile
+  // The QoS that the server's reader of commands requests in real time (profile
   // sls_realtime_command_reader); a reader without a deadline takes it as well.
   if (strcmp(topic, "sls/command") == 0) dds_qset_deadline(qos, DDS_MSECS(100));
   const dds_entity_t writer =

@@ -1,4 +1,4 @@
-/// What linear theory says of a flight: judges that simulate nothing.
+/// Predictions of linear theory for a flight, without simulation.
 #pragma once
 
 #include <Eigen/LU>
@@ -40,7 +40,7 @@ struct SteadyError {
   Eigen::Array3d seen_rms() const { return (seen_amplitude.square() / 2 + mean.square()).sqrt(); }
 };
 
-/// What becomes of a sine on s = iw.
+/// Response to a sine on s = iw.
 using Transfer = std::function<std::complex<double>(const std::complex<double>& s)>;
 
 /// Small motions about hover of vehicle, drag and law, the force held over the period T:

@@ -148,7 +148,7 @@ struct State {
   std::vector<double> rotor_speeds;                          ///< rad/s
 };
 
-/// What is held during a step. A missing set-point means: no change of that rotor's speed.
+/// Inputs held during a step. A missing set-point means: no change of that rotor's speed.
 struct Inputs {
   std::vector<double> rotor_set_points;                            ///< rad/s, before clamping
   Eigen::Vector3d f_Q_W = Eigen::Vector3d::Zero();                 ///< direct force on Q, N

@@ -40,7 +40,7 @@ std::string from_hex(const std::string& hex) {
   return bytes;
 }
 
-/// What the README says a row adds. Kinds: n a number, i a stage, t a text, - nothing.
+/// The bytes of a row according to the README. Kinds: n a number, i a stage, t a text, - nothing.
 std::string to_certified_bytes(const std::string& topic, const std::string& kinds,
                                const std::vector<std::string>& row) {
   std::string bytes = length_and(topic) + little_endian(std::stoul(row.at(0)), 4) +

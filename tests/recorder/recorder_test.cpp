@@ -293,7 +293,7 @@ TEST_F(RecorderTest, AServerThatStaysAwayIsGivenUp) {
   EXPECT_EQ(read_manifest(out_).at("outcome"), "lost");
 }
 
-// The last samples may have to be sent again and again. What is missing has 10 s step by step.
+// The last samples may have to be sent again and again. Each missing step has 10 s.
 TEST_F(RecorderTest, WaitsAfterTheEndAsLongAsLateSamplesCome) {
   FakeFlight flight(kRunId);
   start();

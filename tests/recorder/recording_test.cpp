@@ -592,7 +592,7 @@ TEST_F(RecordingTest, AResetRunIsKeptAndItsLastStepNeedsNoAnswer) {
   EXPECT_EQ(manifest.at("complete"), false);
 }
 
-// What was not published is not in the recording.
+// Unpublished steps are not in the recording.
 TEST_F(RecordingTest, AServerKilledBetweenTwoBatchesLeavesItsPublishedSteps) {
   recording_->add(make_status(PHASE_RUNNING, 0));
   add_steps(0, 99);
@@ -677,7 +677,7 @@ TEST_F(RecordingTest, AManifestMarkedIncompleteExistsFromTheStart) {
 
 // --- a full disk ---------------------------------------------------------------------------------
 
-/// What `work` throws as a system_error, or "no error".
+/// The system_error that `work` throws, or "no error".
 std::string find_system_error(const std::function<void()>& work) {
   try {
     work();

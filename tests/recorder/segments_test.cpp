@@ -29,7 +29,7 @@ class SegmentsTest : public testing::Test {
 
   Segment resume() { return make_next_segment(open_recording(out_)); }
 
-  /// What a recorder gets that starts while the histories reach back to `oldest`.
+  /// The samples of a recorder that starts while the histories reach back to `oldest`.
   bool record_to_the_end(const Segment& segment, std::uint64_t oldest) {
     Recording recording(segment, make_parameters());
     EXPECT_EQ(recording.last_complete_step(), static_cast<std::int64_t>(segment.first_step) - 1);

@@ -1,4 +1,5 @@
-/// What a host without keys on the network can read and do: three hosts of the flight and that one.
+/// A host without keys on the network, what it can read and do: three hosts of the flight and that
+/// one.
 #include <gtest/gtest.h>
 
 #include <algorithm>

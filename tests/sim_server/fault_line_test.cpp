@@ -53,7 +53,7 @@ FaultLine make_line(const std::vector<config::Fault>& faults, std::uint32_t vehi
   return FaultLine(scenario, vehicle_id);
 }
 
-/// What acts at the steps 0, 1, … when the force at step k is meant to be (k, 0, 0): its x.
+/// The acting force's x at the steps 0, 1, …, when the commanded force at step k is (k, 0, 0).
 std::vector<double> actuate_steps(const std::vector<config::Fault>& faults, std::uint64_t steps) {
   FaultLine line = make_line(faults);
   std::vector<double> acting;

@@ -1,4 +1,4 @@
-// What server and client put into their samples, and that both read it back alike.
+// The samples of server and client, and that both read them back alike.
 #include "sim_server/messages.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// What a run hands to recorders arrives whole and in order, in batches that keep their limits.
+// Entries for recorders arrive whole and in order, in batches that keep their limits.
 #include "sim_server/record_stream.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-/// What goes wrong while flying, done for real: processes killed and interrupted, a full disk, a
+/// Real failures during a flight: processes killed and interrupted, a full disk, a
 /// singular state, a refused command.
 #include <gtest/gtest.h>
 #include <signal.h>

@@ -1,4 +1,4 @@
-/// What the real recorder leaves on the disk, and the real verifier makes of it.
+/// Files of the real recorder, and the real verifier's output for them.
 #include <gtest/gtest.h>
 #include <signal.h>
 

@@ -9,7 +9,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What `sls_verify` says about two recordings, and whether they are equal.
+/// The output of `sls_verify` for two recordings, and whether they are equal.
 std::pair<bool, std::string> verify(const fs::path& a, const fs::path& b) {
   Process process({program("sls_verify"), a.string(), b.string()});
   const auto code = process.wait();

@@ -13,7 +13,7 @@
 
 namespace sls::bus {
 
-/// What a reader in this thread is taking samples for; a sample that is refused is reported to it.
+/// The receiver of reports on samples that a reader in this thread refuses.
 class MisfitReport {
  public:
   virtual ~MisfitReport() = default;
@@ -61,8 +61,8 @@ class GuardedType : public Generated {
  public:
   bool deserialize(eprosima::fastrtps::rtps::SerializedPayload_t* payload, void* data) override {
     using eprosima::fastcdr::Cdr;
-    // What is longer than any sample may claim elements without end, which are made before they are
-    // read.
+    // A payload longer than any sample may claim elements without end, which are made before they
+    // are read.
     if (payload->length > this->m_typeSize)
       return refuse(*payload, data,
                     "expected at most " + std::to_string(this->m_typeSize) + " bytes, got " +

@@ -12,7 +12,7 @@
 namespace sls::bus {
 
 /// Says on stderr who was kept from a secured domain, and why: one line per participant, and no
-/// more than `kMostLines` in 10 s, whatever an attacker sends. What a participant is called is what
+/// more than `kMostLines` in 10 s, whatever an attacker sends. The name of a participant is what
 /// it says of itself.
 ///
 /// The middleware's events lack the reason, and at the end that began the handshake there is none

@@ -307,7 +307,7 @@ def study_integral(table: RunTable) -> tuple[Figure, dict[str, str]]:
     sag = (GRAVITY_M_S2 * (LOAD_MASS_KG - believed) / ((QUAD_MASS_KG + believed) * 2.2667))
     drift = (push * GRAVITY_M_S2 * (QUAD_MASS_KG + LOAD_MASS_KG)
              / ((QUAD_MASS_KG + believed) * QUAD_MASS_KG * rod * 3.2469))
-    # What 20 m·s times the integral gain can hold, as an error times the position gain.
+    # The largest output of the integral, 20 m·s times its gain, as an error times the position gain.
     clamp_x, clamp_z = 20.0 * 0.0316 / 3.2469, 20.0 * 0.0224 / 2.2667
     small, below = np.abs(sag) < 0.9 * clamp_z, horizontal & (drift < 0.9 * clamp_x)
     beyond = horizontal & (drift > 1.3 * clamp_x)

@@ -139,7 +139,7 @@ TEST_F(QosFileTest, EachMisspeltProfileOfOursIsNamed) {
 
 // --- invalid/: one file per defect, the message in the comment after the declaration
 
-/// What the comment of an invalid file promises: the message after the file's name.
+/// The expectation in the comment of an invalid file: the message after the file's name.
 std::string read_expectation(const fs::path& file) {
   const std::string text = sls::test::read_bytes(file);
   const std::string mark = "<!-- expect: ", end = " -->";

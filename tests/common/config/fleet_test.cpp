@@ -1,4 +1,4 @@
-// What `vehicles` means, and the scenario of one vehicle.
+// The key `vehicles`, and the scenario of one vehicle.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// What a file says and what it leaves out.
+// Keys that a file sets, and the defaults of others.
 #include "common/config/scenario.hpp"
 
 #include <gtest/gtest.h>

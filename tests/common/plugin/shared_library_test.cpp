@@ -13,7 +13,7 @@ namespace {
 
 const std::string kFolder = SLS_LIBRARIES "/";
 
-/// What is said about loading `file` and finding `symbol` in it; "no error".
+/// The error of loading `file` and finding `symbol` in it; "no error".
 std::string find_error(const std::string& file, const char* symbol = "sls_controller") {
   try {
     SharedLibrary(file, "flight.yaml:7: controller.law").find(symbol);

@@ -1,4 +1,4 @@
-// What a scenario says of `px4` and `geometric`: defaults, every key read, written and read again.
+// Scenario keys of `px4` and `geometric`: defaults, every key read, written and read again.
 #include <gtest/gtest.h>
 
 #include "common/config/scenario.hpp"

@@ -1,4 +1,4 @@
-// What is seen judged by the sentences of the README written out as loops over nanoseconds, and by
+// Measurements judged by the sentences of the README written out as loops over nanoseconds, and by
 // flights whose states are closed forms of time.
 #include "sim_server/plants/sensing/sensed_plant.hpp"
 

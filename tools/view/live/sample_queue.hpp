@@ -14,8 +14,9 @@
 namespace sls::view {
 
 /// Bounded: beyond `most_bytes` the oldest of the loop's topics and of sls/record are dropped;
-/// latched ones only where they alone are as many, as in a flood. Each topic keeps its order. What
-/// is put is announced once before it is taken, and at most once a period. Called from any thread.
+/// latched ones only where they alone are as many, as in a flood. Each topic keeps its order. New
+/// samples are announced once before they are taken, and at most once a period. Called from any
+/// thread.
 class SampleQueue {
  public:
   using Clock = std::chrono::steady_clock;

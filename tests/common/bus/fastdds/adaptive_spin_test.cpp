@@ -136,7 +136,7 @@ class SocketPair {
     EXPECT_EQ(::send(sender_, text.data(), text.size(), 0), static_cast<ssize_t>(text.size()));
   }
 
-  /// What came, and from which port; the error where nothing did.
+  /// The received datagram and its port, or the error.
   std::string receive(int flags, in_port_t* port = nullptr) const {
     std::string buffer(100, '\0');
     sockaddr_in from{};

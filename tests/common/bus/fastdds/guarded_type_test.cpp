@@ -95,7 +95,7 @@ TEST(GuardedTypeTest, ClaimedElementsThatDoNotFollowAreNotKept) {
   expect_nothing_kept<RecordBatchPubSubType, RecordBatch, Entries>(entry, &RecordBatch::entries);
 }
 
-/// What a reader is told of the samples that it cannot take.
+/// The reports to a reader on samples that it cannot take.
 class Report : public MisfitReport {
  public:
   void report(const rtps::SerializedPayload_t&, const char* type,

@@ -12,7 +12,7 @@
 namespace sls::bus {
 namespace {
 
-/// What refusals say, with the process's log in place of stderr.
+/// Log lines of refusals, with the process's log in place of stderr.
 class RefusalsTest : public testing::Test {
  protected:
   RefusalsTest() : logger_(spdlog::default_logger()) {

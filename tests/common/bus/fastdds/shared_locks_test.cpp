@@ -118,7 +118,7 @@ class SharedLocksTest : public testing::Test {
           }) {
       EXPECT_TRUE(test::wait_until([this] { return id_ != 0 && test::find_state(id_) == 'S'; }));
     }
-    /// What the lock said.
+    /// The result of the lock.
     int finish() {
       thread_.join();
       return result_;
