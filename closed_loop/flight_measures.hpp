@@ -42,7 +42,7 @@ class FlightMeasures {
   /// In step order, from step 0.
   void add(const FlownStep& step);
 
-  /// A value for each column of the list; NaN where it is not defined.
+  /// A value for each column of the list; NaN if it is not defined.
   std::vector<double> finish(std::optional<double> time_of_loss_s) const;
 
  private:

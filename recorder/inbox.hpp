@@ -32,7 +32,7 @@ class Inbox {
   /// Status samples and entries of the open run that were lost because there was no room.
   std::uint64_t refused() const;
 
-  /// True where the readers hear `server`.
+  /// True if the readers hear `server`.
   bool hears(const bus::PeerId& server) const;
 
  private:

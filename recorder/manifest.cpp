@@ -24,7 +24,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// The value of the first line "key : value" of /proc/cpuinfo; empty where there is none.
+/// The value of the first line "key : value" of /proc/cpuinfo; empty if there is none.
 std::string read_cpu_info(const std::string& key) {
   std::ifstream info("/proc/cpuinfo");
   for (std::string line; std::getline(info, line);) {

@@ -62,7 +62,7 @@ class Recording {
   std::int64_t last_complete_step() const { return stream_.last_step(); }
 
   /// Writes what is pending, flight.txt and the final manifest. `interruption` says why the
-  /// recorder stops early and `outcome` what that is called; empty where it did not. True if the
+  /// recorder stops early and `outcome` what that is called; empty if it did not. True if the
   /// recording is complete.
   bool finish(const std::string& interruption, std::uint64_t refused_samples,
               const std::string& outcome = "interrupted");

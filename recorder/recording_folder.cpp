@@ -45,7 +45,7 @@ bool is_figure(const fs::path& path) {
          is_among(kFigures, path.stem().string());
 }
 
-/// True where `name` is `prefix` and then `digits` alone.
+/// True if `name` is `prefix` and then `digits` alone.
 bool is_numbered(std::string_view name, std::string_view prefix, std::string_view digits) {
   return name.size() > prefix.size() && name.substr(0, prefix.size()) == prefix &&
          name.find_first_not_of(digits, prefix.size()) == name.npos;

@@ -77,7 +77,7 @@ void certify(const RecordedFlight& flight, Inspection& inspection) {
 
 // --- two recordings ------------------------------------------------------------------------------
 
-/// A row's fields as people read them; empty where equal flights may differ.
+/// A row's fields as people read them; empty if equal flights may differ.
 struct FieldLister {
   std::vector<std::string> texts;
   std::vector<bool> are_nan;

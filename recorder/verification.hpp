@@ -14,7 +14,7 @@ namespace sls::record {
 /// The result of reading every file of a recording again.
 struct Inspection {
   std::uint64_t steps = 0;            ///< of the vehicle that has most
-  std::string certificate;            ///< of the rows; empty where they cannot be read
+  std::string certificate;            ///< of the rows; empty if they cannot be read
   std::vector<std::string> problems;  ///< where a file differs from its manifest, one line each
 };
 Inspection inspect(const RecordedFlight& flight);
@@ -24,7 +24,7 @@ struct Difference {
   std::uint64_t step = 0;
   std::string text;  ///< file, vehicle, step, column and both values
 };
-/// @throws DamagedError where a row that is read before the first difference is damaged.
+/// @throws DamagedError if a row that is read before the first difference is damaged.
 std::optional<Difference> find_first_difference(const RecordedFlight& a, const RecordedFlight& b);
 
 /// Differences and gaps according to the manifests; the data may be equal all the same.

@@ -93,7 +93,7 @@ class CommandGate {
   std::optional<std::string> refusal() const;
 
   /// Refused answers of clients, in answer to the awaited step or to one that went by since
-  /// the last accepted answer. Empty where the awaited step has its answer.
+  /// the last accepted answer. Empty if the awaited step has its answer.
   std::string describe_refusals() const;
 
   const SyncCounters& counters() const { return counters_; }

@@ -29,7 +29,7 @@ class ControllerAbsence {
   /// An answer was accepted or, in real time, one came late that is newer than those before.
   void answered() { steps_without_answer_ = 0; }
 
-  /// True where the last step was flown without an answer, and none has come since.
+  /// True if the last step was flown without an answer, and none has come since.
   bool is_acting() const { return steps_without_answer_ > 0; }
 
   /// After so much absence decide() gives up, s.

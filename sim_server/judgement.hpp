@@ -21,7 +21,7 @@ struct JudgedAnswer {
   bool is_mission_failed = false;
 };
 
-/// Why `answer` may not fly; nothing where it may.
+/// Why `answer` may not fly; nothing if it may.
 std::optional<Defect> find_defect(const JudgedAnswer& answer, double force_limit);
 
 /// "a number that is not finite", "a force beyond controller.force_limit_n", "a fault".

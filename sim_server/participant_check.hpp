@@ -75,7 +75,7 @@ class ParticipantCheck {
   /// All that is wrong now. To be called a few times a second.
   Findings look(const Neighbourhood& neighbourhood);
 
-  /// " (its answers are rejected: 57 × …)", for messages about who is awaited; empty where the last
+  /// " (its answers are rejected: 57 × …)", for messages about who is awaited; empty if the last
   /// one was taken.
   std::string describe_rejections(const bus::PeerId& sender) const;
 
@@ -118,7 +118,7 @@ class ParticipantCheck {
   using Senders = std::map<bus::PeerId, const Entry*>;
 
   void find_first_libraries(const std::vector<Entry>& controllers);
-  /// The one that it should have loaded; nothing where all is well.
+  /// The one that it should have loaded; nothing if all is well.
   const Library* find_other_library(const Participant& controller) const;
 
   void check_memory(Vehicle& vehicle, const OfferedAnswer& answer, const bus::PeerId& sender,

@@ -47,7 +47,7 @@ std::int64_t calc_recorder_window(std::uint64_t history_steps);
 std::string name_blocking_recorder(const Roster& roster, int expected, std::uint64_t step,
                                    std::int64_t window = kRecorderWindow);
 
-/// The first step that some recorder keeps the server from publishing; 0 where fewer than
+/// The first step that some recorder keeps the server from publishing; 0 if fewer than
 /// `expected` are there.
 std::uint64_t calc_recorder_limit(const Roster& roster, int expected,
                                   std::int64_t window = kRecorderWindow);

@@ -91,11 +91,11 @@ class Run {
   /// A valid answer to a step that has gone by.
   virtual void note_late(VehicleFlight&, const OfferedAnswer&) {}
   VehicleFlight* find_vehicle(std::uint32_t id);
-  /// True where every vehicle's answer to the step in work was accepted.
+  /// True if every vehicle's answer to the step in work was accepted.
   bool are_all_accepted() const;
-  /// True where a vehicle's last step was flown without an answer, and none has come since.
+  /// True if a vehicle's last step was flown without an answer, and none has come since.
   bool is_anybody_absent() const;
-  /// @throws app::RunError where a client's answer was refused and no other client answers.
+  /// @throws app::RunError if a client's answer was refused and no other client answers.
   void check_refusals();
   /// Takes what was accepted, and says who takes over and who is back.
   void take_answers();
@@ -117,7 +117,7 @@ class Run {
   bool is_roster_due() const;
   /// Status, stop signal, claim: what needs a look a few times a second.
   void do_housekeeping();
-  /// True where the participants should be looked at before the next status is due.
+  /// True if the participants should be looked at before the next status is due.
   bool is_look_due() const;
   std::string describe_problem() const;
 

@@ -64,7 +64,7 @@ class RunControl {
     std::string cut_short_by;  ///< operator who paused during it: the run ends its step and pauses
   };
 
-  /// Why `request` is refused in the present state; empty where it is accepted.
+  /// Why `request` is refused in the present state; empty if it is accepted.
   std::string find_refusal(const SimControl& request) const;
   void act(const SimControl& request);
   static StepRequest make_step_request(const SimControl& request);

@@ -41,7 +41,7 @@ class StatusBoard {
   // Content of the samples; the loop keeps it up to date.
   std::uint64_t step = 0;
   std::string controller_name;  ///< whose command for `step` was accepted, of the first vehicle
-  std::string problem;          ///< what a participant does wrong; empty where none does
+  std::string problem;          ///< what a participant does wrong; empty if none does
   TimingRecord timing;
   RoundTrips round_trips;
 

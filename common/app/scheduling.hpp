@@ -6,7 +6,7 @@ namespace sls::app {
 
 /// Puts all threads that this process has, and those they start, before those of ordinary
 /// processes (SCHED_RR): a control loop in real time must not wait until others have used up their
-/// time slice. False where that is refused.
+/// time slice. False if that is refused.
 bool put_process_first();
 
 /// Puts the calling thread back among the ordinary ones, behind such as have the usual niceness.

@@ -198,7 +198,7 @@ class Reader {
   /// Times no sample came for the DEADLINE of the reader's profile.
   std::uint64_t missed_deadlines() const { return reader_.missed_deadlines(); }
 
-  /// LIFESPAN of the reader's profile; nothing where it is infinite.
+  /// LIFESPAN of the reader's profile; nothing if it is infinite.
   std::optional<std::chrono::nanoseconds> lifespan() const { return reader_.lifespan(); }
 
   /// From now on no sample expires. `lifespan()` stays what the profile says.

@@ -19,7 +19,7 @@ constexpr std::size_t kMaxParticipants = 256;
 constexpr std::size_t kMaxServers = 64;
 constexpr std::size_t kMaxRunsOfServer = 4;  // the one in work and those that resets ended
 
-/// True where `known` has, or now has, room for `sender`: who has left makes room. Only where it is
+/// True if `known` has, or now has, room for `sender`: who has left makes room. Only where it is
 /// full must it be known who is there.
 template <class Known, class FindPresent>
 bool make_room(std::map<PeerId, Known>& known, std::size_t most, const PeerId& sender,
@@ -43,7 +43,7 @@ Known& find_or_add(std::deque<Known>& runs, std::uint64_t run_id) {
   return runs.back();
 }
 
-/// True where one of `recorders` has completed steps since `last_steps`, which are brought up to
+/// True if one of `recorders` has completed steps since `last_steps`, which are brought up to
 /// date.
 bool get_further(const std::vector<ParticipantDirectory::Entry>& recorders,
                  std::map<PeerId, std::int64_t>& last_steps) {

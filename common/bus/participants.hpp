@@ -34,7 +34,7 @@ class ParticipantDirectory {
     PeerId peer;
     Participant announcement;
     std::chrono::steady_clock::time_point heard;  ///< when it came
-    /// Age of the youngest announcement when it came, by its clock and ours: about 0 where they
+    /// Age of the youngest announcement when it came, by its clock and ours: about 0 if they
     /// agree, positive where its clock is behind.
     std::chrono::nanoseconds age{0};
     /// When it first said it was ready.
@@ -108,10 +108,10 @@ class ServerDirectory {
   /// is silent is not present.
   std::vector<Run> runs() const;
 
-  /// True where `run_id` is among `runs()`.
+  /// True if `run_id` is among `runs()`.
   bool is_known(std::uint64_t run_id) const;
 
-  /// False where the server of run `run_id` is known, also one that has gone, and does not fly
+  /// False if the server of run `run_id` is known, also one that has gone, and does not fly
   /// `vehicle_id`.
   bool may_fly(std::uint64_t run_id, std::uint32_t vehicle_id) const;
 
@@ -206,16 +206,16 @@ int calc_progress(RunPhase phase);
 /// The same of a run that may not have a status yet (0).
 int calc_progress(const std::optional<SimStatus>& status);
 
-/// True where `vehicle_id` is among `parameters`' vehicles.
+/// True if `vehicle_id` is among `parameters`' vehicles.
 bool serves_vehicle(const Parameters& parameters, std::uint32_t vehicle_id);
 
 /// The vehicles that it claims.
 std::vector<std::uint32_t> list_vehicle_ids(const Parameters& parameters);
 
-/// True where the run of `parameters` is of several vehicles.
+/// True if the run of `parameters` is of several vehicles.
 bool is_fleet(const Parameters& parameters);
 
-/// True where the controller that announced itself so flies `vehicle_id`.
+/// True if the controller that announced itself so flies `vehicle_id`.
 bool flies_vehicle(const Participant& controller, std::uint32_t vehicle_id);
 
 /// This machine's name, at most 64 bytes, for sls/participant.

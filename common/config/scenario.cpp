@@ -124,7 +124,7 @@ void check_autopilot(const Scenario& scenario, const Places& places) {
     find_model_keys(autopilot_keys(), scenario.autopilot->model).check(scenario, places);
 }
 
-/// Nothing where `offset` says something to its channel, else the keys that could.
+/// Nothing if `offset` says something to its channel, else the keys that could.
 std::optional<std::string> find_missing_offset(const SampleOffset& offset, FaultChannel on) {
   const model::RodAngles& rod = offset.rod;
   if (on == FaultChannel::kCommand)

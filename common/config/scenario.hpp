@@ -379,7 +379,7 @@ Scenario load_scenario(const std::filesystem::path& file);
 Scenario parse_scenario(const std::string& text, const std::string& place);
 
 /// SHA-256 of the shared library that the plant loads: that of the plant itself or, where it is
-/// none, of its autopilot; empty where neither is one.
+/// none, of its autopilot; empty if neither is one.
 /// @throws std::system_error naming the file where it cannot be read.
 std::string calc_plant_library_sha256(const Scenario& scenario);
 
@@ -397,7 +397,7 @@ std::vector<VehicleVariant> make_vehicle_grid(std::size_t count);
 /// @throws std::out_of_range if there is no such vehicle.
 Scenario make_vehicle_scenario(const Scenario& scenario, std::uint32_t id);
 
-/// `seconds` in whole nanoseconds, or nothing where it is not a whole number of them (within 1e-3
+/// `seconds` in whole nanoseconds, or nothing if it is not a whole number of them (within 1e-3
 /// ns, so that 0.004 is exactly 4,000,000).
 std::optional<std::int64_t> to_nanoseconds(double seconds);
 

@@ -42,7 +42,7 @@ struct LawOutput {
 class ControlLaw {
  public:
   virtual ~ControlLaw() = default;
-  /// @throws std::runtime_error where the law is broken, which ends the client.
+  /// @throws std::runtime_error if the law is broken, which ends the client.
   virtual LawOutput calc(const LawInput& input) const = 0;
   /// How many numbers it remembers, at most `model::kMaxNumbers`.
   virtual int memory_size() const { return 0; }

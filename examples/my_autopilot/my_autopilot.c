@@ -41,7 +41,7 @@ static int read_parameters(const char* json, double* k, char* error, size_t erro
   return 1;
 }
 
-/* Eq. (4). False where the rotors are not an X about the centre of mass: one wish would then come
+/* Eq. (4). False if the rotors are not an X about the centre of mass: one wish would then come
  * with another. */
 static int find_shares(Autopilot* self) {
   double effect[kRotors][kWishes]; /* of 1 N of each rotor */

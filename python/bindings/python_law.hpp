@@ -25,7 +25,7 @@ class LawErrors {
   bool is_empty() const { return text_.empty(); }
 
   /// Raises sls.RunError with the text, `__cause__` the exception of the law; KeyboardInterrupt and
-  /// SystemExit as they are. Does nothing where none is kept.
+  /// SystemExit as they are. Does nothing if none is kept.
   /// @throws pybind11::error_already_set
   void raise_first();
 

@@ -114,7 +114,7 @@ class ClosedLoop:
 
     @property
     def truth(self) -> LoopState:
-        """The true states of the plants. `state` itself where nothing in the scenario disturbs it."""
+        """The true states of the plants. `state` itself if nothing in the scenario disturbs it."""
         return self._truth
 
     @property

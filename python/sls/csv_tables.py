@@ -26,7 +26,7 @@ class Text:
 
 
 def read_text(path: Path) -> Text:
-    """Raises InputError where `path` is no text file that can be read."""
+    """Raises InputError if `path` is no text file that can be read."""
     try:
         text = path.read_bytes().decode()
     except OSError as error:
@@ -43,7 +43,7 @@ def parse_rows(text: Text, columns: Sequence[str], first_line: int,
                delimiter: str | None = ",") -> np.ndarray:
     """The lines from `first_line` (from 1) on: a structured array with a field per column.
 
-    Raises InputError where a row has another number of columns, or a number is none."""
+    Raises InputError if a row has another number of columns, or a number is none."""
     kinds = np.dtype([(name, TEXT_COLUMNS.get(name, "f8")) for name in columns])
     lines = text.lines[first_line - 1:]
     if not lines:

@@ -210,7 +210,7 @@ class Flight(FlownVehicle):
 
     @property
     def failure(self) -> str:
-        """Why the flight failed, one line; empty where every mission was finished."""
+        """Why the flight failed, one line; empty if every mission was finished."""
         return self._core.failure
 
     @property
@@ -233,7 +233,7 @@ class Flight(FlownVehicle):
         """Writes the recording that `./sls run --in-process` would leave, into a new or empty
         folder; with `force`, instead of the recording that is there.
 
-        Raises ConfigError for the folder, OSError where the disk refuses."""
+        Raises ConfigError for the folder, OSError if the disk refuses."""
         from sls.recordings import Recording
         if not self._core.save(os.fspath(folder), force) and self.is_finished:
             raise RunError(f"{os.fspath(folder)}: the recording is not complete")

@@ -56,7 +56,7 @@ class Verification:
     steps: int
     """Of the vehicle that has most."""
     certificate: str
-    """Of the rows; empty where they cannot be read."""
+    """Of the rows; empty if they cannot be read."""
     problems: tuple[str, ...]
     """Differences between files and their manifest, one line each."""
 
@@ -331,13 +331,13 @@ class Recording:
         return events
 
     def read_last_status(self) -> dict[str, str]:
-        """The last row of status.csv; empty where there is none."""
+        """The last row of status.csv; empty if there is none."""
         rows = read_records(self.segments[-1][0] / "status.csv")
         return rows[-1] if rows else {}
 
 
 def align(steps: np.ndarray, table: np.ndarray, names: tuple[str, ...]) -> np.ndarray:
-    """The columns `names` of the rows of `table` with these steps; NaN where there is none."""
+    """The columns `names` of the rows of `table` with these steps; NaN if there is none."""
     values = np.full((len(steps), len(names)), np.nan)
     if len(table):
         place = np.minimum(np.searchsorted(table["step"], steps), len(table) - 1)

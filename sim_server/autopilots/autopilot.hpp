@@ -69,12 +69,12 @@ class Autopilot {
  public:
   virtual ~Autopilot() = default;
   /// One period. The output stays valid until the next step.
-  /// @throws std::runtime_error where it cannot go on; the text names the quantity.
+  /// @throws std::runtime_error if it cannot go on; the text names the quantity.
   virtual const AutopilotOutput& step(const AutopilotInput& input) = 0;
 };
 
 /// The autopilot that `setup.autopilot.model` names.
-/// @throws config::ConfigError where the setup contradicts it, or a library cannot be used.
+/// @throws config::ConfigError if the setup contradicts it, or a library cannot be used.
 std::unique_ptr<Autopilot> make_autopilot(const AutopilotSetup& setup);
 
 /// Attitude whose −z axis points along `f_W`, which is not zero, with the heading `yaw`:

@@ -19,7 +19,7 @@ Eigen::MatrixXd calc_pseudo_inverse(const Eigen::MatrixXd& matrix);
 bool has_yaw_authority(const Airframe& airframe);
 
 /// The same for an autopilot that needs roll and pitch.
-/// @throws config::ConfigError where they cannot roll or pitch it without changing the thrust;
+/// @throws config::ConfigError if they cannot roll or pitch it without changing the thrust;
 /// `setup` says where the scenario stands.
 bool find_yaw_authority(const AutopilotSetup& setup);
 

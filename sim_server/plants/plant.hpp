@@ -75,7 +75,7 @@ enum class Moves {
 /// An entry of the registry.
 struct PlantType {
   Moves moves = Moves::kOneVehicle;
-  /// @throws config::ConfigError where the setup contradicts the plant.
+  /// @throws config::ConfigError if the setup contradicts the plant.
   std::unique_ptr<Plant> (*make)(const PlantSetup& setup) = nullptr;
 };
 

@@ -22,7 +22,7 @@ LONGEST_SUBJECT = 72
 
 
 def git(*arguments):
-    """What git prints, or None where there is no repository."""
+    """What git prints, or None if there is no repository."""
     command = ["git", "-c", "safe.directory=*", "-C", ROOT, *arguments]
     try:
         return subprocess.run(command, check=True, capture_output=True, text=True).stdout

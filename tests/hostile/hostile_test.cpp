@@ -71,7 +71,7 @@ class HostileTest : public testing::Test {
     flight.client->send(SIGCONT);
   }
 
-  /// The most memory that a program has had, in MB; 0 where it has ended.
+  /// The most memory that a program has had, in MB; 0 if it has ended.
   static double find_peak_memory(const Process& program) {
     const std::string status = read_file("/proc/" + std::to_string(program.id()) + "/status");
     const auto at = status.find("VmHWM:");

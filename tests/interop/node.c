@@ -226,7 +226,7 @@ const Run* find_run(const Node* node, uint64_t run_id) {
   return NULL;
 }
 
-/// Position on the way waiting → running; 0 where there is nothing to join.
+/// Position on the way waiting → running; 0 if there is nothing to join.
 static int calc_progress(const Run* run) {
   if (!run->has_status || run->vehicle_count == 0 || is_silent(run->heard)) return 0;
   if (run->status.phase == sls_PHASE_WAITING) return 1;

@@ -219,7 +219,7 @@ inline std::vector<double> calc_rotor_speeds(const Vehicle& vehicle, std::vector
 }
 
 /// The smooth pieces of a rotor's loss over the velocity along its axis: −1 against the thrust,
-/// 1 along it, 0 where no thrust is left.
+/// 1 along it, 0 if no thrust is left.
 inline int calc_loss_piece(const Rotor& rotor, double axial_velocity) {
   if (!rotor.loss_speed) return 1;
   if (std::abs(axial_velocity) >= *rotor.loss_speed) return 0;

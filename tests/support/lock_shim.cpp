@@ -25,7 +25,7 @@ namespace {
 
 constexpr int kSharedBit = 128;  // of the kind of a mutex of glibc
 
-/// The file whose mapping holds the address; empty where there is none.
+/// The file whose mapping holds the address; empty if there is none.
 std::string find_file(const void* address) {
   const auto wanted = reinterpret_cast<std::uintptr_t>(address);
   std::ifstream maps("/proc/self/maps");
@@ -40,7 +40,7 @@ std::string find_file(const void* address) {
   return "";
 }
 
-/// True where this process has the file open by which the reader of the port excludes others.
+/// True if this process has the file open by which the reader of the port excludes others.
 bool is_read_here(const std::string& port) {
   for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
     std::error_code gone;

@@ -50,7 +50,7 @@ class LateController {
         stream_(node_, true, [this](const States& states, const bus::PeerId&) { answer(states); }) {
   }
 
-  /// False where there is no server.
+  /// False if there is no server.
   bool join() {
     std::optional<bus::Run> run;
     if (!wait_until([&] { return (run = servers_.find_joinable(0)).has_value(); }) ||

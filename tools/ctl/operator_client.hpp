@@ -71,7 +71,7 @@ class OperatorClient {
   std::optional<bus::Run> wait_for(const FindRun& find) const;
   std::optional<bus::Run> find_ended_run() const;
   void note_event(const SimStatus& status);
-  /// False where a stop signal came before the server of `run` could be reached.
+  /// False if a stop signal came before the server of `run` could be reached.
   bool wait_until_heard(const bus::Run& run, app::Wait& wait) const;
   void report_wait(const bus::Run& run, const SimControl& request, const app::Wait& wait) const;
 

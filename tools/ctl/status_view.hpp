@@ -25,7 +25,7 @@ struct Snapshot {
 /// Silence from which on a server that publishes every 0.5 s is worth a line.
 inline constexpr double kLongSilence = 1.0;  // s
 
-/// True where no more status will come: finished or failed. A reset run has a successor.
+/// True if no more status will come: finished or failed. A reset run has a successor.
 bool has_ended(const std::optional<SimStatus>& status);
 
 /// The whole of it, for people; no line is longer than `columns` characters.

@@ -114,7 +114,7 @@ class Examination {
     return seen;
   }
 
-  /// False where shared memory is too small: the middleware would kill this process.
+  /// False if shared memory is too small: the middleware would kill this process.
   bool is_room() const {
     return !seen_.settings.uses_shared_memory ||
            (seen_.shared_memory.is_there &&

@@ -21,7 +21,7 @@ struct DoctorOptions {
 
 /// Sends datagrams and samples over each path that the QoS file uses, listens, and says what it
 /// found; at most about 8 s. Ends early where `is_stopped`.
-/// @throws config::ConfigError where the QoS file cannot be used.
+/// @throws config::ConfigError if the QoS file cannot be used.
 std::vector<Check> examine(const DoctorOptions& options, const std::function<bool()>& is_stopped);
 
 /// Answers other doctors until `limit` is over, or `is_stopped`.

@@ -103,7 +103,7 @@ bool is_of_port(const sem_t* semaphore) {
   return reinterpret_cast<std::uintptr_t>(semaphore) % page_size != 0;
 }
 
-/// True where the thread that holds the mutex is stopped, by a signal or a debugger.
+/// True if the thread that holds the mutex is stopped, by a signal or a debugger.
 bool is_holder_stopped(const pthread_mutex_t& mutex) {
   // The first word of a robust mutex is the kernel's, and names the holder (futex(2), robust
   // lists).

@@ -24,10 +24,10 @@ struct ParticipantPorts {
   int gain = 2;
 };
 
-/// True where a living process reads the shared-memory port of that number, here in `folder`.
+/// True if a living process reads the shared-memory port of that number, here in `folder`.
 bool is_port_read(int port, const std::filesystem::path& folder = "/dev/shm");
 
-/// The participant id to ask for, or −1 where any will do.
+/// The participant id to ask for, or −1 if any will do.
 ///
 /// A killed process leaves the lock files of its ports, and the next process on such a port
 /// replaces it. A process that still has the old one open is not told: neither receives the other's

@@ -38,7 +38,7 @@ def is_kept(campaign: Campaign, row: dict[str, str]) -> bool:
 
 def keep_while_flying(folder: "CampaignFolder", campaign: Campaign, runs: "Runs",
                       cells: Sequence[str]) -> None:
-    """Raises EngineError where the recording cannot be written."""
+    """Raises EngineError if the recording cannot be written."""
     if campaign.keep.kind in ("none", "worst"):
         return
     row = dict(zip(folder.plan.columns, cells))
@@ -48,7 +48,7 @@ def keep_while_flying(folder: "CampaignFolder", campaign: Campaign, runs: "Runs"
 
 def keep_run(folder: "CampaignFolder", campaign: Campaign, runs: "Runs",
              row: dict[str, str]) -> None:
-    """Writes one recording whole, unless it is there. Raises EngineError where it cannot be
+    """Writes one recording whole, unless it is there. Raises EngineError if it cannot be
     written, or where the flight is another one than the row's."""
     index = int(row["run"])
     target = kept_folder(folder, index)

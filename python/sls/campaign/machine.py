@@ -75,7 +75,7 @@ def host_name() -> str:
 
 
 def find_difference(expected: dict[str, str], got: dict[str, str]) -> str:
-    """One phrase that names the first difference; empty where there is none."""
+    """One phrase that names the first difference; empty if there is none."""
     for name in sorted({*expected, *got}):
         if expected.get(name) != got.get(name):
             return f"{name}: expected {expected.get(name) or 'none'}, got {got.get(name) or 'none'}"

@@ -55,7 +55,7 @@ def to_cell(value: Any) -> str:
 
 
 def to_number(value: float) -> str:
-    """The shortest text that reads back as the same number; empty where there is none."""
+    """The shortest text that reads back as the same number; empty if there is none."""
     return "" if math.isnan(value) else repr(value)
 
 

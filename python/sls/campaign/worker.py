@@ -22,7 +22,7 @@ from sls.input_error import InputError
 
 
 class ChunkFlyer:
-    """The data that a process needs for the chunks of one folder, made once. Raises ConfigError where the
+    """The data that a process needs for the chunks of one folder, made once. Raises ConfigError if the
     campaign cannot be flown here, such as on a machine of another kind."""
 
     def __init__(self, folder: Path):
@@ -56,7 +56,7 @@ _one_at_a_time = threading.Lock()  # a Dask worker may have several threads
 
 
 def fly_chunk(folder: str, number: int) -> dict[str, int | float]:
-    """Flies one chunk and writes it whole; does nothing where it is there. Raises ConfigError,
+    """Flies one chunk and writes it whole; does nothing if it is there. Raises ConfigError,
     EngineError."""
     with _one_at_a_time:
         place = str(Path(folder).resolve())

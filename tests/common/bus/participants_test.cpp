@@ -94,7 +94,7 @@ class RecorderPatienceTest : public testing::Test {
     message.done(true);
     writer_.write(message);
   }
-  /// True where the recorder was done before.
+  /// True if the recorder was done before.
   bool wait_for_recorder(const RecorderPatience& patience) {
     EXPECT_TRUE(wait_until([&] { return directory_.find(ROLE_RECORDER, kRun).size() == 1; }));
     wait_for_recorders_to_end(directory_, kRun, 1, patience);

@@ -41,7 +41,7 @@ class Hub final : public Feed::Listener {
   void remove(Client& client);
   /// Begins to send; latched topics at once. Nothing, or what is wrong in words.
   std::optional<std::string> subscribe(Client& client, const Subscribe::Item& item);
-  /// False where there is no such subscription.
+  /// False if there is no such subscription.
   bool unsubscribe(Client& client, std::uint32_t subscription_id);
 
   FlightSource& source() { return *source_; }

@@ -27,7 +27,7 @@ class SampleQueue {
 
   explicit SampleQueue(std::size_t most_bytes) : most_bytes_(most_bytes) {}
 
-  /// True where the caller is to have the server's thread take what there is.
+  /// True if the caller is to have the server's thread take what there is.
   bool put(Sample sample);
   /// All there is, oldest first.
   std::vector<Sample> take_all();

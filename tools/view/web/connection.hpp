@@ -36,12 +36,12 @@ class Connection {
   /// Messages dropped or replaced since the beginning.
   virtual std::uint64_t dropped() const = 0;
 
-  /// True where this connection may operate a flight (web/access.hpp); `why_not` says in words why
+  /// True if this connection may operate a flight (web/access.hpp); `why_not` says in words why
   /// not: "expected a token", "started with --read-only".
   virtual bool may_operate() const = 0;
   virtual std::string why_not() const = 0;
 
-  /// Gives the token that a page was opened with; true where it is right.
+  /// Gives the token that a page was opened with; true if it is right.
   virtual bool authenticate(std::string_view token) = 0;
 
   /// Closes with a WebSocket close code (1008: policy) and reason, after what is queued.

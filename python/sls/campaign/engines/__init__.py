@@ -2,7 +2,7 @@
 
     def run(folder: CampaignFolder, options: EngineOptions) -> None
 
-that returns when every chunk is there, raises EngineError where that cannot be reached, and leaves
+that returns when every chunk is there, raises EngineError if that cannot be reached, and leaves
 a resumable folder when it is interrupted. It may have `CHUNK_S`, the seconds of work that a chunk
 should hold, and `describe_status(folder) -> list[str]`, lines for `./sls campaign status`."""
 

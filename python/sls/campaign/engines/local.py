@@ -104,7 +104,7 @@ def started(workers: list[Worker]) -> Iterator[None]:
 
 
 def run(folder: CampaignFolder, options: EngineOptions) -> None:
-    """Flies what is missing. Raises InputError where a run or the campaign is refused, EngineError
+    """Flies what is missing. Raises InputError if a run or the campaign is refused, EngineError
     where a chunk cannot be written or ends its process again and again."""
     work = Work(deque(folder.missing()))
     workers = list[Worker]()

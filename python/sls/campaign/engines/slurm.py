@@ -41,7 +41,7 @@ class ControllerLost(Exception):
 
 
 def ask(*command: str) -> str:
-    """The output of a Slurm command. Raises EngineError where it is not installed,
+    """The output of a Slurm command. Raises EngineError if it is not installed,
     ControllerLost where it fails."""
     try:
         # A session of its own: Ctrl-C is for this process.
@@ -184,7 +184,7 @@ def make_collect_script(folder: Path, number: int, options: EngineOptions) -> st
 
 
 def split_options(sbatch: str) -> list[str]:
-    """Raises InputError where a quote is open."""
+    """Raises InputError if a quote is open."""
     try:
         return shlex.split(sbatch)
     except ValueError as error:
@@ -276,7 +276,7 @@ def count_files(folder: CampaignFolder) -> set[int]:
 
 
 def wait(folder: CampaignFolder, missing: Sequence[int], progress: Progress) -> None:
-    """Until no task is queued or running but held ones, or all chunks have a file. Raises EngineError where the
+    """Until no task is queued or running but held ones, or all chunks have a file. Raises EngineError if the
     controller does not answer for LOST_AFTER_S."""
     missing = set(missing)
     # A damaged chunk has a file, too, until a task replaces it.
@@ -313,7 +313,7 @@ def describe_loss(folder: CampaignFolder, error: ControllerLost) -> str:
 
 
 def check(options: EngineOptions) -> None:
-    """Raises InputError, EngineError where nothing can be submitted from here."""
+    """Raises InputError, EngineError if nothing can be submitted from here."""
     split_options(options.sbatch)
     try:
         ask("sinfo", "--noheader")
@@ -368,7 +368,7 @@ def cancel_quietly(folder: CampaignFolder) -> None:
 
 
 def collect(folder: CampaignFolder, number: int, options: EngineOptions) -> None:
-    """Makes the table, or submits once more what is missing. Does nothing where a launcher waits
+    """Makes the table, or submits once more what is missing. Does nothing if a launcher waits
     for the campaign itself. Raises InputError, EngineError, ControllerLost."""
     try:
         folder.take_lock()

@@ -97,7 +97,7 @@ class SharedLocksTest : public testing::Test {
     return pthread_mutex_timedlock(&port_->mutex, &deadline);
   }
 
-  /// The error of a wait at the port, 0 where somebody woke it.
+  /// The error of a wait at the port, 0 if somebody woke it.
   int wait_within(double seconds) {
     const timespec deadline = after(seconds);
     return sem_timedwait(&port_->semaphore, &deadline) == 0 ? 0 : errno;

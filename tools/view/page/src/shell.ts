@@ -8,7 +8,7 @@ const kTableTime = 400; // ms between updates of the table
 const kTextTime = 2000; // of the text that stands for the scene
 
 export interface Shell {
-  /** Null where the browser has no WebGL: the table takes its place. */
+  /** Null if the browser has no WebGL: the table takes its place. */
   readonly scene: Scene | null;
   readonly plots: Plots;
   selected(): number;

@@ -79,9 +79,9 @@ export interface Pose {
   /** w, x, y, z. */
   attitude: ArrayLike<number>;
   load: ArrayLike<number>;
-  /** Desired position of the load; NaN where there is none. */
+  /** Desired position of the load; NaN if there is none. */
   reference: ArrayLike<number>;
-  /** Mean, rad/s; NaN where there is none. */
+  /** Mean, rad/s; NaN if there is none. */
   rotorRate: number;
 }
 
