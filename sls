@@ -156,7 +156,7 @@ EOF
 
 # --- set-up and build -----------------------------------------------------------------------------
 
-# setup [PACKAGE…]: what building and flying need, and the packages named.
+# setup [PACKAGE…]: installs the packages for building and flying, and those named.
 setup() {
   install_missing "${packages[@]}" "$@"
   install_node
@@ -176,8 +176,8 @@ install_node() {
   fi
 }
 
-# install_node_modules FOLDER: what its lock file names, where that has changed. Nothing where the folder is not
-# there: in docker/Dockerfile the launcher comes first.
+# install_node_modules FOLDER: installs the packages of its lock file if that has changed. Does nothing if the
+# folder is missing, as in docker/Dockerfile, which copies the launcher first.
 install_node_modules() {
   local lock="$1/package-lock.json" installed="$1/node_modules/.package-lock.json" log
   [[ -f $lock ]] || return 0
@@ -234,8 +234,8 @@ build_tree() {
   fi
 }
 
-# build_programs [TARGET…]: what is named, or all programs, up to date. A build made elsewhere
-# (SLS_BUILD) is taken as it is.
+# build_programs [TARGET…]: brings the targets, or all programs, up to date. A build made elsewhere
+# (SLS_BUILD) is used unchanged.
 build_programs() {
   [[ -z ${SLS_BUILD:-} ]] || return 0
   if is_help_asked && [[ -x $build/bin/${1:-} || -x $build/tests/${1:-} ]]; then
@@ -264,7 +264,7 @@ signal_all() {
   kill "-$1" "${!name_of[@]}" 2>/dev/null || true
 }
 
-# The page of a flight: no part of it, so nobody waits for it or asks how it ended.
+# The page of a flight is no part of the flight: the launcher ignores its end and its exit code.
 viewer=''
 start_viewer() {
   setpriv --pdeathsig TERM -- "$build/bin/sls_view" "$@" &
@@ -284,8 +284,8 @@ on_signal() {
   signal_all "$2"
 }
 
-# Waits for all processes; the exit code of the run is in `result`. When one ends badly, the others
-# cannot finish the run: they are asked to end, in order, and close their files.
+# Waits for all processes; the exit code of the run is in `result`. When one fails, the others
+# cannot finish the run: they get SIGTERM, close their files and end.
 wait_all() {
   result=0
   local finished code

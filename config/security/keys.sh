@@ -16,12 +16,12 @@ usage: ./sls keys DIR [--days N] [--force] [--other-vendors]
        ./sls keys DIR --add ROLE NAME [--days N] [--force]
 
 Makes DIR: certificate authorities (DIR/ca) and one folder for each role, server, controller, recorder,
-operator and viewer, with the identity and the signed documents that a host of that role needs.
+operator and viewer, with the identity and the signed documents of that role.
 
   --days N         valid for N days, 1 to 36500 (default: 365)
   --force          replace what is there
-  --other-vendors  for programs on another vendor's DDS, such as Cyclone DDS: submessages are
-                   encrypted, too, which costs up to a third of the speed
+  --other-vendors  for programs on another vendor's DDS, such as Cyclone DDS: also encrypts
+                   submessages, which costs up to a third of the speed
   --add ROLE NAME  one more identity of that role in DIR/NAME, signed by the authorities in DIR/ca
 
 Fly with them: SLS_KEYS=DIR ./sls run SCENARIO --qos config/qos/secure.xml
@@ -93,7 +93,7 @@ TEXT
 
 # --- openssl --------------------------------------------------------------------------------------
 
-# Says what openssl said only where it failed.
+# Prints the output of openssl only if it failed.
 run_openssl() {
   openssl "$@" >"$work/openssl.log" 2>&1 ||
     fail "openssl $1: $(grep -m 1 -E 'rror' "$work/openssl.log" || tail -n 1 "$work/openssl.log")"

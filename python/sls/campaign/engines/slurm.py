@@ -276,7 +276,7 @@ def count_files(folder: CampaignFolder) -> set[int]:
 
 
 def wait(folder: CampaignFolder, missing: Sequence[int], progress: Progress) -> None:
-    """Until no task is queued or running but held ones, or all chunks have a file. Raises EngineError if the
+    """Waits until only held tasks are queued, or all chunks have a file. Raises EngineError if the
     controller does not answer for LOST_AFTER_S."""
     missing = set(missing)
     # A damaged chunk has a file, too, until a task replaces it.

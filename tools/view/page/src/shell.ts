@@ -167,7 +167,7 @@ class Table {
     this.show(true);
     this.toggle.hidden = true;
     this.root.prepend(make("p", { class: "quiet", id: "no-webgl" },
-      "This browser draws no WebGL, so here are the positions (frame W, z down)."));
+      "This browser has no WebGL; this table shows the positions instead (frame W, z down)."));
   }
 
   onPick(act: (vehicleId: number) => void): void {
