@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The launcher: sets up what it needs, builds, flies, tests. `./sls help` lists the subcommands.
+# The launcher: sets up what it needs, builds, flies, tests. `./sls help` lists the commands.
 set -euo pipefail
 
 root="$(cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")" && pwd)"
@@ -21,7 +21,7 @@ readonly packages=(g++ make cmake libeigen3-dev libsimbody-dev libfastrtps-dev l
 readonly fuzz_packages=(clang libclang-rt-14-dev)
 readonly fuzzers=(scenario qos_file csv recording samples foxglove web)
 readonly test_packages=(iproute2 nftables cyclonedds-dev cyclonedds-tools fastdds-tools libfaketime python3-kubernetes
-  python3-pytest slurm-wlm munge python3-distributed chromium mandoc debootstrap)
+  python3-pytest slurm-wlm munge python3-distributed chromium mandoc debootstrap git codespell)
 readonly python_packages=(python3-numpy python3-scipy python3-matplotlib python3-yaml)
 readonly bench_packages=(libbenchmark-dev python3-matplotlib chromium)
 readonly doc_packages=(doxygen python3-sphinx)
@@ -33,102 +33,44 @@ fail() { say "error: $1"; exit "${2:-1}"; }
 usage() {
   cat <<'EOF'
 usage: ./sls COMMAND [OPTIONS]
+       ./sls COMMAND --help     options of a command
 
-  demo [SCENARIO]    set up, build, fly (default: figure_eight), print the summary
-  run SCENARIO       server, client and recorder on this machine; ends 0 when the mission finished
-                     and the recording is complete. SCENARIO is a name in config/scenarios or a path
-      --out DIR        folder of the recording (default: recordings/NAME-UTCTIME)
-      --force          replace the recording that is there
-      --qos FILE       QoS profiles (default: config/qos/default.xml)
-      --domain N       DDS domain, 0 to 232 (default: 0)
-      --period-s X     control period in force (default: the scenario's)
-      --mode MODE      lockstep or realtime (default: the scenario's)
-      --rtf X          of realtime: simulated over wall time (default: the scenario's)
-      --in-process     the same flight in one process without DDS: same data, same certificate
-      --view           with a page on which the flight happens; prints its address, ends with the flight
-      --view-port N    the same on port N; 0: any that is free (default: 8765)
-  view [DIR [DIR]]   a page in the browser: the flight on this domain, or a recording, or two overlaid; prints its
-                     address, lasts until it is interrupted
-      --port N         port of the page; 0: any that is free (default: 8765)
-      --qos FILE       QoS profiles (default: config/qos/default.xml)
-      --domain N       DDS domain, 0 to 232 (default: 0)
-      --listen ADDRESS where other machines can open it; needs --token-file FILE (default: 127.0.0.1)
-      --read-only      without buttons
-      --ros            the flight on ROS 2 topics, too
-      --export FILE    the page with the recordings in it as one file; with --help: all options
-  ctl COMMAND        talk to the run on this domain: pause, step N, resume, start, reset, stop or
-                     status [--watch] [--json]; with --help: its options
-  delay-margin SCENARIO
-                     the delay of the command at which the controller loses the load, with a table
-      --period-s X     control period in force (default: the scenario's)
-  doctor             why data does not flow: moves datagrams and samples over each path, one line per
-                     check; ends 1 where something is wrong
-      --qos FILE       QoS profiles (default: config/qos/default.xml)
-      --domain N       DDS domain, 0 to 232 (default: 0)
-      --peer HOST      another machine, where programs or `./sls doctor --answer` run
-      --json           JSON instead of lines
-      --answer         answer the doctor of another machine, for --for-s seconds (default: 60)
-  verify A [B]       compares the data of two recordings: equal, or the first difference; of one, its
-                     files with its manifest
-  convert DIR        a recording as one MCAP file, for Foxglove, Lichtblick, PlotJuggler and others
-      --out FILE       where it goes (default: DIR/sls.mcap)
-      --force          replace the file that is there
-  plot DIR…          figures of recordings, and of published logs (files), overlaid; PNG and PDF
-      --out DIR        where they go (default: DIR/figures of one recording, else figures)
-      --name NAME…     what each is called
-      --vehicle N      which vehicle of a fleet (default: 0); with --help: all options
-  report DIR         DIR/report.html: parameters, metrics of each stage, figures, events in one file
-      --vehicle N      which vehicle of a fleet (default: 0)
-  python [ARGS]      Debian's Python with the package `sls`: a script, -m MODULE, -c COMMAND, or none
-  study              flies the whole published comparison, writes docs/study.md and its pictures;
-                     with --help: its options
-  campaign FILE      flies a campaign: many runs of one scenario in which keys vary; DIR/runs.csv, report.html.
-                     FILE is a name in config/campaigns or a path
-      --out DIR        its folder (default: campaigns/NAME-UTCTIME)
-      --on ENGINE      local, slurm or dask (default: local)
-      --workers N      processes (default: one for each core)
-      --runs A-B       these runs alone (default: all)
-      --resume         fly what is missing or damaged in DIR; interrupted campaigns go on
-      --verify N       fly N runs again with the three programs over DDS, compare certificates
-      --sbatch "…"     options of the site for Slurm; --scheduler ADDRESS: of Dask; with --help: all options
-  campaign status DIR | report DIR | compare A B
-                     chunks, rate and outcomes so far; report.html again; two campaigns run by run
-  campaign-worker DIR --chunks A-B
-                     flies these chunks of a campaign's folder; what Slurm and Kubernetes start
-  bench              how fast everything is, each figure beside its bound in the same run; minutes, and
-                     an idle machine
-      --quick          one short round of everything: whether it works
-      --json FILE      the figures of every round
-      --only NAME…     lockstep, load, round-trip, realtime, plant, recorder, campaign, fleet, qos, view or page alone
-      --out DIR        plots
-  test               set up, build, run every test
-      --slow           the ones that take minutes, too; they need an idle machine
-      --sanitize KIND  the unit tests alone, built with a sanitizer: address; or thread, which
-                       runs those with several threads
-  keys DIR           identities and signed permissions for config/qos/secure.xml;
-                     with --help: its options
-  docker-demo [NAME] fly in containers: plain, discovery, standby or secure; with --help: its options
-  discovery-server   run a discovery server for config/qos/discovery_server.xml until it is stopped
-      --listen ADDRESS where (default: every address of this machine)
-      --port N         UDP port (default: 11811)
-  network-table      fly on test hosts with each QoS profile and each disturbance of their network, print
-                     a Markdown table; needs root and minutes. With --help: its options
-  chaos              disturb flights at random: stop, continue, kill and restart their processes
-      --trials N       how many flights (default: 10)
-      --seed S         decides process, moment and kind (default: 1)
-      --verbose        print what the processes said
-  fuzz               feed everything that reads files or samples with mutated ones, until one crashes
-      --seconds N      for all targets together (default: 60)
-      --target NAME    this one alone: scenario, qos_file, csv, recording, samples, foxglove or web
-  reference          write docs/reference and tools/completion again, from the code's own tables
-      --man DIR        write the man pages to DIR instead
-      --check          write nothing; ends 1 where a file is stale
-  docs               API pages of the C++ and C headers and of the Python package: build/docs/index.html
-  package            a Debian package of everything a user needs: build/package/sls_VERSION_ARCHITECTURE.deb
-  setup              install the packages that building and flying need
-  build              set up and build; the programs are in build/bin
-  clean              remove what was built
-  help               this text
+Fly
+  demo [SCENARIO]         set up, build, fly (default: figure_eight) and print a summary
+  run SCENARIO            fly a scenario on this machine and record it
+  view [DIR [DIR]]        show a live flight, a recording or two recordings in the browser
+  ctl COMMAND             pause, step, resume, start, reset or stop a run, or print its status
+  docker-demo [NAME]      fly in containers
+
+Recordings
+  verify A [B]            compare two recordings, or one recording with its manifest
+  convert DIR             write a recording as one MCAP file
+  plot DIR…               draw figures of recordings and of published logs
+  report DIR              write DIR/report.html: parameters, metrics, figures, events
+  python [ARGS]           run Python with the package `sls`
+
+Many flights
+  campaign FILE           fly many runs of one scenario with varied keys; also: status, report, compare
+  campaign-worker DIR     fly chunks of a campaign (started by Slurm and Kubernetes)
+  study                   repeat the published comparison and write docs/study.md
+  delay-margin SCENARIO   find the command delay at which the controller loses the load
+
+Network
+  doctor                  find out why data does not flow
+  keys DIR                make keys and signed permissions for config/qos/secure.xml
+  discovery-server        run a discovery server for config/qos/discovery_server.xml
+  network-table           fly each QoS profile through network disturbances; print a Markdown table
+
+Development
+  test                    set up, build and run the tests
+  bench                   measure speed, each figure beside its bound
+  chaos                   stop, continue, kill and restart processes of flights at random
+  fuzz                    feed mutated input to every reader of files and samples
+  reference               write docs/reference and the bash completion from the code's tables
+  docs                    build API pages of headers and Python package: build/docs/index.html
+  package                 build a Debian package: build/package/
+  setup | build | clean   install packages | build all programs | remove what was built
+  help [COMMAND]          this text, or the options of a command
 
 environment: SLS_DOMAIN is the DDS domain of every program that is not given --domain
 
@@ -136,9 +78,108 @@ exit codes: 0 done; 1 the run or a test failed; 2 bad usage or bad configuration
 EOF
 }
 
+flight_usage() {
+  cat <<'EOF'
+
+SCENARIO is a name in config/scenarios or a path.
+
+  --out DIR        folder of the recording (default: recordings/NAME-UTCTIME)
+  --force          replace an existing recording
+  --qos FILE       QoS profiles (default: config/qos/default.xml)
+  --domain N       DDS domain, 0 to 232 (default: 0)
+  --period-s X     control period (default: the scenario's)
+  --mode MODE      lockstep or realtime (default: the scenario's)
+  --rtf X          real-time factor, realtime mode only (default: the scenario's)
+  --in-process     fly in one process without DDS: same data, same certificate
+  --view           also show the flight in the browser; prints the address of the page
+  --view-port N    like --view, on port N; 0: any free port (default: 8765)
+EOF
+}
+
+# Whether --help or -h is among the arguments of the command.
+is_help_asked() { [[ " ${arguments[*]} " == *' --help '* || " ${arguments[*]} " == *' -h '* ]]; }
+
+# command_usage COMMAND: help of a command that this launcher implements; false for the others.
+command_usage() {
+  case $1 in
+    demo)
+      echo 'usage: ./sls demo [SCENARIO] [OPTIONS]'
+      echo
+      echo 'Sets up, builds, flies a scenario (default: figure_eight) and prints a summary.'
+      flight_usage
+      ;;
+    run)
+      echo 'usage: ./sls run SCENARIO [OPTIONS]'
+      echo
+      echo 'Runs server, client and recorder on this machine. Exit code 0: the mission finished and the'
+      echo 'recording is complete.'
+      flight_usage
+      ;;
+    delay-margin)
+      cat <<'EOF'
+usage: ./sls delay-margin SCENARIO [--period-s X]
+
+Finds the command delay at which the controller loses the load; prints a table.
+
+  --period-s X     control period (default: the scenario's)
+EOF
+      ;;
+    discovery-server)
+      cat <<'EOF'
+usage: ./sls discovery-server [--listen ADDRESS] [--port N]
+
+Runs a discovery server for config/qos/discovery_server.xml until it is stopped.
+
+  --listen ADDRESS  address to listen on (default: every address of this machine)
+  --port N          UDP port (default: 11811)
+EOF
+      ;;
+    test)
+      cat <<'EOF'
+usage: ./sls test [--slow | --sanitize KIND]
+
+Sets up, builds and runs the tests.
+
+  --slow            also run the tests that take minutes; they need an idle machine
+  --sanitize KIND   run only the unit tests, built with a sanitizer: address; or thread, which runs those
+                    with several threads
+EOF
+      ;;
+    fuzz)
+      cat <<'EOF'
+usage: ./sls fuzz [--seconds N] [--target NAME]
+
+Feeds mutated input to every reader of files and samples until one crashes.
+
+  --seconds N      duration of all targets together (default: 60)
+  --target NAME    run only this target: scenario, qos_file, csv, recording, samples, foxglove or web
+EOF
+      ;;
+    setup) printf '%s\n\n%s\n' 'usage: ./sls setup' 'Installs the packages that building and flying need.' ;;
+    build) printf '%s\n\n%s\n' 'usage: ./sls build' 'Sets up and builds; the programs are in build/bin.' ;;
+    clean) printf '%s\n\n%s\n' 'usage: ./sls clean' 'Removes the folders build and build-*.' ;;
+    docs)
+      printf '%s\n\n%s\n%s\n' 'usage: ./sls docs' \
+        'Builds API pages of the C++ and C headers and of the Python package:' 'build/docs/index.html.'
+      ;;
+    package)
+      printf '%s\n\n%s\n' 'usage: ./sls package' \
+        'Builds a Debian package of all that a user needs: build/package/sls_VERSION_ARCHITECTURE.deb.'
+      ;;
+    python)
+      cat <<'EOF'
+usage: ./sls python [ARGS]
+
+Runs Debian's Python with the package `sls`. ARGS: a script, -m MODULE, -c COMMAND, or none for a prompt.
+EOF
+      ;;
+    *) return 1 ;;
+  esac
+}
+
 # --- set-up and build -----------------------------------------------------------------------------
 
-# setup [PACKAGE…]: what building and flying need, and the packages named.
+# setup [PACKAGE…]: installs the packages for building and flying, and those named.
 setup() {
   if ((is_installed)); then
     install_missing "$@"
@@ -149,7 +190,7 @@ setup() {
   install_node_modules "$root/tools/view/page"
 }
 
-# What bundles the page: Debian's node and npm, unless there are others already.
+# Node and npm bundle the page: Debian's, unless others are installed.
 install_node() {
   local missing=()
   command -v node >/dev/null || missing+=(nodejs)
@@ -162,8 +203,8 @@ install_node() {
   fi
 }
 
-# install_node_modules FOLDER: what its lock file names, where that has changed. Nothing where the folder is not
-# there: in docker/Dockerfile the launcher comes first.
+# install_node_modules FOLDER: installs the packages of its lock file if that has changed. Does nothing if the
+# folder is missing, as in docker/Dockerfile, which copies the launcher first.
 install_node_modules() {
   local lock="$1/package-lock.json" installed="$1/node_modules/.package-lock.json" log
   [[ -f $lock ]] || return 0
@@ -221,10 +262,13 @@ build_tree() {
   fi
 }
 
-# build_programs [TARGET…]: what is named, or all programs, up to date. A build made elsewhere
-# (SLS_BUILD) is taken as it is.
+# build_programs [TARGET…]: brings the targets, or all programs, up to date. A build made elsewhere
+# (SLS_BUILD) is used unchanged.
 build_programs() {
   [[ -z ${SLS_BUILD:-} && $is_installed == 0 ]] || return 0
+  if is_help_asked && [[ -x $build/bin/${1:-} || -x $build/tests/${1:-} ]]; then
+    return  # as it is
+  fi
   (($#)) || set -- "${programs[@]}" _sls_core
   setup
   build_tree release "$build" "$@"
@@ -235,7 +279,7 @@ build_programs() {
 # Processes this launcher started: name by process id.
 declare -A name_of=()
 
-# The kernel ends the process should this launcher be killed.
+# If this launcher is killed, the kernel ends the process.
 start() {
   local name=$1
   shift
@@ -248,7 +292,7 @@ signal_all() {
   kill "-$1" "${!name_of[@]}" 2>/dev/null || true
 }
 
-# The page of a flight: no part of it, so nobody waits for it or asks how it ended.
+# The page of a flight is no part of the flight: the launcher ignores its end and its exit code.
 viewer=''
 start_viewer() {
   setpriv --pdeathsig TERM -- "$build/bin/sls_view" "$@" &
@@ -268,8 +312,8 @@ on_signal() {
   signal_all "$2"
 }
 
-# Waits for all processes; the exit code of the run is in `result`. When one ends badly, the others
-# cannot finish the run: they are asked to end, in order, and close their files.
+# Waits for all processes; the exit code of the run is in `result`. When one fails, the others
+# cannot finish the run: they get SIGTERM, close their files and end.
 wait_all() {
   result=0
   local finished code
@@ -306,7 +350,7 @@ fly() {
       --in-process) is_in_process=1 ;;
       --view) ((${#view[@]})) || view=(--port 8765) ;;
       --view-port | --out | --qos | --domain | --period-s | --mode | --rtf)
-        (($# >= 2)) || fail "$1: expected a value (see ./sls help)" 2
+        (($# >= 2)) || fail "$1: expected a value (see ./sls $command --help)" 2
         case $1 in
           --view-port) view=(--port "$2") ;;
           --out) recording=$2 ;;
@@ -316,7 +360,7 @@ fly() {
         esac
         shift
         ;;
-      -*) fail "unknown option '$1' (see ./sls help)" 2 ;;
+      -*) fail "unknown option '$1' (see ./sls $command --help)" 2 ;;
       *)
         [[ -z $scenario ]] || fail "expected one scenario, got '$scenario' and '$1'" 2
         scenario=$1
@@ -324,7 +368,7 @@ fly() {
     esac
     shift
   done
-  [[ -n $scenario ]] || fail "expected a scenario (see ./sls help)" 2
+  [[ -n $scenario ]] || fail "expected a scenario (see ./sls $command --help)" 2
   local file
   file="$(find_scenario "$scenario")"
   if [[ -z $recording ]]; then
@@ -342,7 +386,7 @@ fly() {
     return
   fi
 
-  # One line about a mistake, before three programs stumble over it.
+  # One line about a mistake, before three programs fail.
   "$build/bin/sim_server" --check --scenario "$file" "${qos[@]}" "${domain[@]}" "${timing[@]}" >/dev/null ||
     exit $?
   "$build/bin/recorder" --check --out "$recording" "${force[@]}" "${qos[@]}" "${domain[@]}" ||
@@ -435,11 +479,11 @@ cmd_delay-margin() {
   while (($#)); do
     case $1 in
       --period-s)
-        (($# >= 2)) || fail "$1: expected a value (see ./sls help)" 2
+        (($# >= 2)) || fail "$1: expected a value (see ./sls $command --help)" 2
         period=(--period-s "$2")
         shift
         ;;
-      -*) fail "unknown option '$1' (see ./sls help)" 2 ;;
+      -*) fail "unknown option '$1' (see ./sls $command --help)" 2 ;;
       *)
         [[ -z $scenario ]] || fail "expected one scenario, got '$scenario' and '$1'" 2
         scenario=$1
@@ -447,13 +491,13 @@ cmd_delay-margin() {
     esac
     shift
   done
-  [[ -n $scenario ]] || fail "expected a scenario (see ./sls help)" 2
+  [[ -n $scenario ]] || fail "expected a scenario (see ./sls $command --help)" 2
   build_programs delay_margin
   exec "$build/bin/delay_margin" --scenario "$(find_scenario "$scenario")" "${period[@]}"
 }
 
 cmd_bench() {
-  if [[ " $* " != *" --help "* ]]; then
+  if ! is_help_asked; then
     if [[ -z ${SLS_BUILD:-} ]]; then
       setup "${bench_packages[@]}"
       install_node_modules "$root/tests/tools/view"
@@ -473,7 +517,7 @@ cmd_convert() {
   exec "$build/bin/sls_convert" "$@"
 }
 
-# run_python COMMAND…: -P: nothing in the working folder is taken for a module of ours; -B: no files beside it.
+# run_python COMMAND…: -P: Python imports nothing from the working folder; -B: no files beside it.
 run_python() {
   install_missing "${python_packages[@]}"
   PYTHONPATH="$python_path" exec /usr/bin/python3 -BP -m sls "$@"
@@ -488,7 +532,7 @@ cmd_python() {
 cmd_plot() { run_python plot "$@"; }
 
 cmd_report() {
-  if [[ " $* " != *" --help "* ]]; then
+  if ! is_help_asked; then
     build_programs sls_view
     export SLS_VIEW="$build/bin/sls_view"  # draws the report's scene
   fi
@@ -496,7 +540,7 @@ cmd_report() {
 }
 
 cmd_study() {
-  if [[ " $* " != *" --help "* && " $* " != *" --reuse "* ]]; then
+  if ! is_help_asked && [[ " $* " != *" --reuse "* ]]; then
     build_programs "${flying[@]}" delay_margin
     export SLS_BUILD="$build"  # the flights of the study fly side by side and must not build
   fi
@@ -511,7 +555,7 @@ run_campaign() {
 }
 
 cmd_campaign() {
-  if [[ " status report compare " != *" ${1:-} "* && " $* " != *" --help "* ]]; then
+  if ! is_help_asked && [[ " status report compare " != *" ${1:-} "* ]]; then
     local targets=(_sls_core)
     [[ " $* " != *" --verify"* ]] || targets+=("${flying[@]}" sls_verify)
     build_programs "${targets[@]}"
@@ -520,7 +564,7 @@ cmd_campaign() {
 }
 
 cmd_campaign-worker() {
-  [[ " $* " == *" --help "* ]] || build_programs _sls_core
+  is_help_asked || build_programs _sls_core
   run_campaign sls.campaign.worker "$@"
 }
 
@@ -542,11 +586,11 @@ cmd_docker-demo() {
 cmd_discovery-server() {
   local listen=() port=11811
   while (($#)); do
-    (($# >= 2)) || fail "$1: expected a value (see ./sls help)" 2
+    (($# >= 2)) || fail "$1: expected a value (see ./sls $command --help)" 2
     case $1 in
       --listen) listen=(-l "$2") ;;
       --port) port=$2 ;;
-      *) fail "unknown option '$1' (see ./sls help)" 2 ;;
+      *) fail "unknown option '$1' (see ./sls $command --help)" 2 ;;
     esac
     shift 2
   done
@@ -558,7 +602,7 @@ cmd_discovery-server() {
 }
 
 cmd_network-table() {
-  [[ -n ${SLS_BUILD:-} ]] || setup "${test_packages[@]}"
+  [[ -n ${SLS_BUILD:-} ]] || is_help_asked || setup "${test_packages[@]}"
   build_programs network_table
   exec "$build/tests/network_table" "$@"
 }
@@ -566,7 +610,7 @@ cmd_network-table() {
 cmd_fuzz() {
   local seconds=60 targets=("${fuzzers[@]}") target
   while (($#)); do
-    (($# >= 2)) || fail "fuzz: $1: expected a value (see ./sls help)" 2
+    (($# >= 2)) || fail "fuzz: $1: expected a value (see ./sls $command --help)" 2
     case $1 in
       --seconds)
         [[ $2 =~ ^[1-9][0-9]{0,5}$ ]] || fail "fuzz: --seconds: expected a whole number, got '$2'" 2
@@ -577,7 +621,7 @@ cmd_fuzz() {
           fail "fuzz: --target: expected one of ${fuzzers[*]}, got '$2'" 2
         targets=("$2")
         ;;
-      *) fail "fuzz: unknown option '$1' (see ./sls help)" 2 ;;
+      *) fail "fuzz: unknown option '$1' (see ./sls $command --help)" 2 ;;
     esac
     shift 2
   done
@@ -665,15 +709,23 @@ cmd_clean() { rm -rf "$root"/build "$root"/build-*; }
 command=${1:-help}
 (($#)) && shift
 case $command in
-  help | --help | -h) usage | sed "s#\./sls#$self#g" ;;
-  *)
-    ((is_installed == 0)) || [[ " ${source_commands[*]} " != *" $command "* ]] ||
-      fail "$command: needs the source tree; this sls is installed without it" 2
-    if ! declare -F "cmd_$command" >/dev/null; then
-      say "error: unknown command '$command'"
-      usage >&2
-      exit 2
+  help | --help | -h)
+    if (($# == 0)); then
+      usage | sed "s#\./sls#$self#g"
+      exit
     fi
-    "cmd_$command" "$@"
+    command=$1
+    set -- --help
     ;;
 esac
+arguments=("$@")
+[[ $command != python ]] || arguments=("${1:-}")  # the others are the script's
+if ! declare -F "cmd_$command" >/dev/null; then
+  fail "unknown command '$command' (see ./sls help)" 2
+fi
+((is_installed == 0)) || [[ " ${source_commands[*]} " != *" $command "* ]] ||
+  fail "$command: needs the source tree; this sls is installed without it" 2
+if is_help_asked && command_usage "$command"; then
+  exit
+fi
+"cmd_$command" "$@"

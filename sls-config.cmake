@@ -1,4 +1,4 @@
-# What find_package(sls) reads. The libraries are static: whoever links them links what they use.
+# Read by find_package(sls). The libraries are static: a program that links them links what they use.
 include(CMakeFindDependencyMacro)
 find_dependency(Eigen3 NO_MODULE)
 find_dependency(Simbody)

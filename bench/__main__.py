@@ -46,14 +46,14 @@ def say(text: str) -> None:
 
 
 def parse_arguments() -> argparse.Namespace:
-    parser = Parser(prog="sls bench", description="Measures how fast everything is, each figure beside "
-                    "its bound in the same run: one table. Minutes, and an idle machine.")
+    parser = Parser(prog="./sls bench", description="Measures speed, each figure beside its bound from the same run, "
+                    "and prints a table. Takes minutes and needs an idle machine.")
     parser.add_argument("--quick", action="store_true",
-                        help="one short round of everything: whether it works, not how fast it is")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="the figures of every round")
+                        help="one short round of every part, to check that it works")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures of every round to FILE")
     parser.add_argument("--only", nargs="+", choices=PARTS, metavar="NAME",
-                        help=f"these parts alone: {', '.join(PARTS)}")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="a folder for plots (PNG and SVG)")
+                        help=f"run only these parts: {', '.join(PARTS)}")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="draw plots (PNG and SVG) into DIR")
     parser.add_argument("--build", type=Path, required=True, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.json and not options.json.resolve().parent.is_dir():

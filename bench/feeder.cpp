@@ -28,7 +28,7 @@ constexpr double kPatience_s = 60.0;
 constexpr auto kAnnounceTime = 500ms;
 constexpr std::size_t kRowsOfStep = 4;
 
-/// What the server announces, and what the recorder does.
+/// Announcements of the server and of the recorder.
 class Surroundings {
  public:
   Surroundings(bus::Node& node, const config::Scenario& scenario, std::uint32_t vehicles)

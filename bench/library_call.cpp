@@ -1,4 +1,4 @@
-// What the call of a controller in a shared library costs: the same trivial law built in and from
+// The cost of calling a controller in a shared library: the same trivial law built in and from
 // C.
 #include <benchmark/benchmark.h>
 

@@ -90,7 +90,7 @@ def calc_parts(step: float, work: dict[str, float], hand_over: float, raw: float
 
 
 class StepCosts:
-    """What a step costs at least, in µs: measured in each round."""
+    """Least cost of a step, in µs: measured in each round."""
 
     def __init__(self, programs: Programs, is_quick: bool):
         self.programs = programs

@@ -1,4 +1,4 @@
-// What one step is made of, each function by itself: Google Benchmark.
+// The functions of one step, each measured alone: Google Benchmark.
 #include <benchmark/benchmark.h>
 #include <slsPubSubTypes.h>
 

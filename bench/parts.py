@@ -48,7 +48,7 @@ def measure_plant(programs: Programs, rounds: int, is_quick: bool) -> list[Figur
 
 
 def split_name(name: str) -> tuple[str, int]:
-    """Of "plant_step/100": the function and how many vehicles; 0 where it has none."""
+    """Of "plant_step/100": the function and how many vehicles; 0 if it has none."""
     function, _, vehicles = name.partition("/")
     return function, int(vehicles or 0)
 

@@ -26,7 +26,7 @@ class MeasurementError(Exception):
 
 @dataclass
 class Flight:
-    """What came of a run of the three programs."""
+    """Result of a run of the three programs."""
 
     steps: int
     steps_per_s: float

@@ -114,7 +114,7 @@ double write_plain_files(std::vector<record::StepRows> steps, std::uint32_t vehi
   return calc_seconds(began);
 }
 
-/// What a server writes.
+/// The samples of a server.
 std::vector<RecordBatch> make_batches(const std::vector<RecordEntry>& entries,
                                       std::uint32_t vehicles) {
   constexpr std::size_t kEntries = 20;  // 12 KB

@@ -13,7 +13,7 @@ MORE = "more"
 class Figure:
     """One figure, measured once in each round, and in the same rounds what it could be at best.
 
-    `bounds` has one value for each of `values`, or none where there is no bound; both in `unit`.
+    `bounds` has one value for each of `values`, or none if there is no bound; both in `unit`.
     `goal` is of the ratio if `is_goal_of_ratio`, else of the figure. `parts` of a figure in steps/s or
     µs: where a step goes, in µs; they add up to it in each round.
     """

@@ -39,8 +39,8 @@ def read_exactly(stream: BinaryIO, size: int) -> bytes:
 
 
 class Page:
-    """A browser's end of a viewer, as on another machine: takes what comes now and then and looks at
-    none of it once a flight is shown, so that it costs nothing here."""
+    """A browser's end of a viewer, as on another machine: empties the socket from time to time and
+    decodes nothing once a flight is shown, so that it costs nothing here."""
 
     def __init__(self, port: int):
         self.is_flight_shown = False
@@ -84,7 +84,7 @@ class Viewer:
         self.page = Page(int(found[1]))
 
     def wait_for_flight(self) -> None:
-        """Until its page has got a pose."""
+        """Waits until its page has a pose."""
         deadline = time.monotonic() + LONGEST_WAIT_S
         while self.page and not self.page.is_flight_shown:
             if time.monotonic() > deadline:

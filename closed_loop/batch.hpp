@@ -58,7 +58,7 @@ class Batch {
   /// Whether what the controllers see can differ from the truth.
   bool can_measurement_differ() const { return can_measurement_differ_; }
 
-  /// Puts the loops `which` back to step 0 as `starts`, one for each, says. None where it throws.
+  /// Puts the loops `which` back to step 0 as `starts`, one for each, says. None if it throws.
   /// @throws config::ConfigError as the plant does, or for an attitude that the plant has not.
   void reset(const std::vector<std::size_t>& which, const std::vector<LoopStart>& starts);
 
@@ -78,8 +78,8 @@ class Batch {
   /// One line; empty: it has not.
   const std::string& failure(std::size_t loop) const { return loops_[loop].failure; }
 
-  /// What the mission asks for `time_ns` after step 0 where stages follow each other by their time.
-  /// A stage that is left by a radius has no time to end at: it is the last one.
+  /// The mission's reference `time_ns` after step 0, for stages that follow each other by their
+  /// time. A stage that is left by a radius has no time to end at: it is the last one.
   model::Reference calc_reference(std::int64_t time_ns) const;
 
  private:

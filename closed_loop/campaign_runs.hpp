@@ -32,7 +32,7 @@ class CampaignRuns {
   MeasuredFlight fly(const std::vector<std::string>& values, bool certify,
                      const Poll& poll = {}) const;
 
-  /// @throws config::ConfigError where `fly` does; flies nothing.
+  /// @throws config::ConfigError if `fly` does; flies nothing.
   void check(const std::vector<std::string>& values) const;
 
  private:

@@ -67,7 +67,7 @@ class Flight {
   /// That of the first vehicle.
   const sim::Plant& plant() const { return *plants_.front().plant; }
 
-  /// What the plants have to say of their vehicles since this was last asked.
+  /// Remarks of the plants on their vehicles since the last call.
   std::vector<std::string> take_remarks();
 
   /// Why the flight failed, once it has ended; empty if every mission was finished.

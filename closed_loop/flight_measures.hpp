@@ -1,4 +1,4 @@
-/// What a campaign measures of a flight, collected while it is flown: nothing of it is stored.
+/// Measures of a flight for a campaign, collected during the flight without storing it.
 /// README.md, "Measures".
 #pragma once
 
@@ -14,7 +14,7 @@
 
 namespace sls::closed_loop {
 
-/// What is measured of each flight of a campaign, and of which stages: those of its base scenario.
+/// The measures of each flight of a campaign, and their stages: those of its base scenario.
 class MeasureList {
  public:
   /// `names` are load_error_rms, load_error_max, settling, overshoot, tilt_max, force_max,
@@ -42,7 +42,7 @@ class FlightMeasures {
   /// In step order, from step 0.
   void add(const FlownStep& step);
 
-  /// A value for each column of the list; NaN where it is not defined.
+  /// A value for each column of the list; NaN if it is not defined.
   std::vector<double> finish(std::optional<double> time_of_loss_s) const;
 
  private:

@@ -34,7 +34,7 @@ class FlightRecorder {
   bool is_status_due() const { return board_.is_due(); }
   void announce(const std::vector<std::string>& remarks);
 
-  /// Ends the recording of a flight that ended by itself; `failure` is empty where its missions
+  /// Ends the recording of a flight that ended by itself; `failure` is empty if its missions
   /// were finished. True if the recording is complete.
   bool finish(const std::string& failure);
   /// Ends that of a flight that was broken off.

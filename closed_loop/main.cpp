@@ -10,7 +10,7 @@
 
 int main(int argc, char** argv) {
   using namespace sls;
-  CLI::App cli("Flies a scenario in one process, without DDS, as fast as it goes.");
+  CLI::App cli("Flies a scenario in one process without DDS, as fast as possible.");
   const app::CommonOptions options;  // no network here
   std::filesystem::path scenario_file, folder;
   std::optional<double> period_s;
@@ -18,15 +18,15 @@ int main(int argc, char** argv) {
   closed_loop::FlightOptions flight;
   cli.set_version_flag("--version", app::version());
   cli.add_option("--scenario", scenario_file, "scenario (YAML)")->type_name("FILE")->required();
-  cli.add_option("--out", folder, "folder of the recording, new or empty; default: no recording")
+  cli.add_option("--out", folder, "folder of the recording, new or empty (default: no recording)")
       ->type_name("DIR");
-  cli.add_flag("--force", force, "replace the recording that is there");
-  cli.add_option("--period-s", period_s, "control period in force; default: the scenario's")
+  cli.add_flag("--force", force, "replace an existing recording");
+  cli.add_option("--period-s", period_s, "control period (default: the scenario's)")
       ->type_name("X");
   cli.add_flag(
       "--check-purity", flight.checks_purity,
-      "compute every answer twice and refuse a law that gives two different ones; default: "
-      "in the first 100 steps");
+      "compute every answer twice and refuse a law whose answers differ (default: only in the "
+      "first 100 steps)");
 
   return app::run_main(argc, argv, cli, options, "closed_loop", [&] {
     config::Scenario scenario = config::load_scenario(scenario_file);

@@ -25,13 +25,13 @@ const char* to_string(Outcome outcome);
 
 struct MeasuredFlight {
   Outcome outcome = Outcome::kFinished;
-  std::string reason;          ///< and when; one line, empty where finished
+  std::string reason;          ///< and when; one line, empty if finished
   std::vector<double> values;  ///< of the columns of the measures; NaN: not defined
-  std::string certificate;     ///< empty where it was not asked for
+  std::string certificate;     ///< empty if it was not asked for
   std::uint64_t steps = 0;     ///< answered, all that were flown
 };
 
-/// Called now and then while a flight is flown; may throw to end it.
+/// Called repeatedly during a flight; may throw to end it.
 using Poll = std::function<void()>;
 
 /// Flies `scenario`, of one vehicle. Measures are over the steps up to the loss, that step
@@ -46,7 +46,7 @@ MeasuredFlight fly_measured(const config::Scenario& scenario, const MeasureList&
 void check_flight(const config::Scenario& scenario);
 
 /// Flies the base scenario of a campaign, by which the load of the others is lost or not.
-/// @throws config::ConfigError where it fails, and as fly_measured does.
+/// @throws config::ConfigError if it fails, and as fly_measured does.
 ErrorHistory fly_base(const config::Scenario& base, const Poll& poll = {});
 
 }  // namespace sls::closed_loop

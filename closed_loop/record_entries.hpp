@@ -1,4 +1,4 @@
-/// What a server would hand to recorders of a flight in one process.
+/// The entries that a server would send to recorders, for a flight in one process.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +23,7 @@ RecordEntry make_entry(std::uint32_t vehicle_id, const FlownStep& flown,
 /// Entries of the first `steps` steps of vehicle 0 of `scenario`.
 std::vector<RecordEntry> fly_entries(const config::Scenario& scenario, std::size_t steps);
 
-/// What a server of `vehicles` vehicles that are all like the first one claims.
+/// Parameters of a server of `vehicles` vehicles that are all like the first one.
 Parameters make_parameters(const config::Scenario& scenario, std::uint64_t run_id,
                            std::uint32_t vehicles);
 

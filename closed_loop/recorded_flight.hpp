@@ -9,7 +9,7 @@
 
 namespace sls::closed_loop {
 
-/// What became of a flight.
+/// Result of a flight.
 struct FlightEnd {
   std::uint64_t last_step = 0;
   std::string failure;       ///< why it failed; empty if every mission was finished

@@ -25,7 +25,7 @@ class AnswerStream {
   /// Publishes the answers to one sample of states.
   void write(const Commands& answers) { commands_.write(answers); }
 
-  /// True where `server` is heard and hears.
+  /// True if `server` is heard and hears.
   bool sees_server(const bus::PeerId& server) const {
     return states_.matched().count(server) > 0 && commands_.matched().count(server) > 0;
   }

@@ -73,10 +73,10 @@ std::optional<bus::Run> Client::find_first_run() {
     if (auto run = find_joinable_run()) return run;
     if (wait.is_over())
       throw app::RunError(fmt::format("no server for vehicle {} within {} s{}{}", vehicles,
-                                      timeout_s, describe_problem(), node_.describe_loneliness()));
+                                      timeout_s, describe_problem(), node_.describe_isolation()));
     if (wait.is_report_due())
       spdlog::info("waiting for: server of vehicle {} ({:.0f} s left){}{}", vehicles,
-                   wait.seconds_left(), describe_problem(), node_.describe_loneliness());
+                   wait.seconds_left(), describe_problem(), node_.describe_isolation());
     std::this_thread::sleep_for(kPollTime);
   }
   return std::nullopt;
@@ -213,7 +213,7 @@ std::optional<bus::Run> Client::find_successor() {
         fmt::format("run {:016x} was {} run {:016x}", run_->parameters.run_id(),
                     is_reset ? "reset to" : "replaced by", next->parameters.run_id());
     if (!is_reset && !options_.follows_servers) throw app::RunError(news + " (see --follow)");
-    spdlog::warn("{}: follows it", news);
+    spdlog::warn("{}: following it", news);
     return next;
   }
   if (finding == bus::ServerWatch::Finding::kLost)

@@ -82,7 +82,8 @@ class Client {
   void answer(const States& sample, const bus::PeerId& sender);
   const ControlCommand& answer(Pilot& pilot, std::uint64_t step, const VehicleState& state);
   void announce(bool ready, bool done);
-  /// Says who waits for a server: whoever has a writer of sls/command says who it is.
+  /// Announces this client while it waits for a server: each writer of sls/command announces
+  /// itself.
   void announce_waiting();
   Participant make_announcement(const std::vector<std::uint32_t>& vehicle_ids) const;
   std::int64_t find_last_step();

@@ -50,7 +50,7 @@ class FlightController {
   FlightController(FlightController&&) noexcept;
 
   /// Answer to the state of step `step`, given the memory accepted at step − 1.
-  /// @throws std::runtime_error where a law of a shared library is broken.
+  /// @throws std::runtime_error if a law of a shared library is broken.
   Answer calc_answer(std::uint64_t step, const model::Measurement& state,
                      const ControllerMemory& memory) const;
 

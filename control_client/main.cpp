@@ -13,34 +13,36 @@ constexpr const char* kIdentity = "controller";  // whose keys it uses on a secu
 
 int main(int argc, char** argv) {
   using namespace sls;
-  CLI::App cli("Flies a scenario's mission: answers every state sample with a control force.");
+  CLI::App cli("Flies a scenario's mission: answers every state with a control force.");
   app::CommonOptions options;
   options.qos_file = bus::default_qos_file();
   std::filesystem::path scenario_file;
   std::string vehicles = "all";
   control::ClientOptions client;
   app::add_common_options(cli, options);
-  cli.add_option("--scenario", scenario_file, "scenario (YAML), the same as the server's")
+  cli.add_option("--scenario", scenario_file, "scenario (YAML); must be the server's")
       ->type_name("FILE")
       ->required();
-  cli.add_option("--strength", client.strength, "among several clients the strongest flies")
+  cli.add_option("--strength", client.strength,
+                 "of several clients for a vehicle, the one with the highest strength flies")
       ->type_name("N");
   cli.add_option("--vehicles", vehicles,
-                 "of the fleet, such as 0-9,20; default: all that the server has")
+                 "vehicles of the fleet to control, such as 0-9,20; all: the server's")
       ->type_name("IDS");
   cli.add_flag("--follow", client.follows_servers,
-               "fly on with a server that replaces this one; else end with exit code 1");
+               "continue with a server that replaces the first (default: exit with code 1)");
   cli.add_flag(
       "--check-purity", client.checks_purity,
-      "compute every answer twice and refuse a law that gives two different ones; default: "
-      "in the first 100 steps");
-  cli.add_option("--name", client.name, "name in recordings and messages")
-      ->check(CLI::Validator(&control::describe_name_defect, "TEXT"));
+      "compute every answer twice and refuse a law whose answers differ (default: only in the "
+      "first 100 steps)");
+  cli.add_option("--name", client.name, "name of this client in recordings and messages")
+      ->check(CLI::Validator(&control::describe_name_defect, ""))
+      ->type_name("NAME");
 
   return app::run_main(argc, argv, cli, options, "control_client", [&] {
     const config::Scenario scenario = config::load_scenario(scenario_file);
     const auto vehicle_ids = config::parse_vehicle_ids(vehicles, scenario.vehicles.size());
-    // A law that cannot be made is refused before anybody waits for this client.
+    // A law that cannot be made is refused before other programs wait for this client.
     control::FlightController(config::make_vehicle_scenario(scenario, vehicle_ids.front()),
                               vehicle_ids.front());
     bus::Node node(options.qos_file, options.domain, "control_client", kIdentity);

@@ -6,8 +6,8 @@
 
 namespace sls::control {
 
-/// What the law's slots (α, β, α̇, β̇) receive for the true rod angles. `gazebo_plugin` reproduces
-/// the published plugin, `rod_length` being the plant's.
+/// The values that the law's slots (α, β, α̇, β̇) receive for the true rod angles. `gazebo_plugin`
+/// reproduces the published plugin, `rod_length` being the plant's.
 model::RodAngles calc_wired_angles(const model::RodAngles& rod, config::StateWiring wiring,
                                    double rod_length);
 

@@ -3,20 +3,19 @@
 docker_usage() {
   cat <<'TEXT'
 usage: ./sls docker-demo [NAME] [--scenario SCENARIO] [--out DIR]
-       ./sls docker-demo --build          only the image, such as for docker compose by hand
+       ./sls docker-demo --build          build only the image, for use with docker compose
 
-Builds the image and flies in containers; ends with the summary of ./sls demo. NAME is one of
+Builds the image, flies in containers and prints the summary of ./sls demo. NAME is one of
   plain      server, controller, recorder on a network of containers (default)
   discovery  the same through a discovery server
-  standby    two controllers, of which the first is killed in flight
+  standby    two controllers; the first is killed in flight
   secure     with DDS Security; SLS_KEYS: the folder that ./sls keys made (default: new keys)
-  fleet      eight vehicles, of which one server flies 0 to 3 and another 4 to 7 on the same domain
+  fleet      eight vehicles: one server flies 0 to 3, another 4 to 7, on the same domain
 
 SCENARIO is a name in config/scenarios or a path (default: figure_eight); DIR the folder of the
-recording, new or empty (default: recordings/docker-NAME-UTCTIME); of a fleet it has a folder for each
-server's vehicles, 0-3 and 4-7. SLS_IMAGE names an image to be used
-as it is; SLS_BASE what it is built upon (default: debian:bookworm-slim). It needs a Docker engine with
-docker compose or docker-compose.
+recording, new or empty (default: recordings/docker-NAME-UTCTIME); for a fleet it has a folder for each
+server's vehicles, 0-3 and 4-7. SLS_IMAGE names an existing image to use; SLS_BASE the base of a new one
+(default: debian:bookworm-slim). Needs a Docker engine with docker compose or docker-compose.
 TEXT
 }
 
@@ -85,7 +84,7 @@ start_service() {
   setpriv --pdeathsig TERM -- docker start --attach "$id" >&2 &
 }
 
-# Kills the first controller once the recording has 800 steps of his.
+# Kills the first controller once the recording has 800 of its steps.
 kill_in_flight() {
   local id
   id="$(container_of controller)"

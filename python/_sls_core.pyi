@@ -56,7 +56,7 @@ class Scenario:
         """Every vehicle, by id."""
     @property
     def controller_model(self) -> Vehicle:
-        """What the controller believes of the vehicle."""
+        """The vehicle parameters that the controller uses."""
     @property
     def force_limit_n(self) -> float: ...
     @property
@@ -64,7 +64,7 @@ class Scenario:
         """Of the mission: (kind, name, for_s, lap_s)."""
 
 class Reference(tuple[Vector, ...]):
-    """What the load is asked to do at one instant: vectors in W."""
+    """The desired motion of the load at one instant: vectors in W."""
 
     @property
     def position(self) -> Vector:
@@ -136,7 +136,7 @@ class Now(tuple[Any, ...]):
     def reference(self) -> Reference: ...
     @property
     def memory(self) -> tuple[float, ...]:
-        """What the law returned at the step before; zeros at step 0."""
+        """The law's result at the step before; zeros at step 0."""
 
 class FlownFlight:
     @property

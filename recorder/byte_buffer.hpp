@@ -37,7 +37,7 @@ class ByteBuffer {
   void append(double number) {
     std::uint64_t bits = 0;
     std::memcpy(&bits, &number, sizeof bits);
-    // What "nan" and "-nan" in a file read back to.
+    // The values that "nan" and "-nan" in a file read back to.
     if (std::isnan(number)) bits = std::signbit(number) ? 0xfff8000000000000 : 0x7ff8000000000000;
     append(bits);
   }

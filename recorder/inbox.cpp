@@ -44,7 +44,7 @@ void Inbox::put_locked(Received received) {
   } else if (closed_.count(received.run_id) == 0 && may_be_opened_(received.run_id)) {
     waiting_size_ += size;
     waiting_.push_back(std::move(received));
-    // What is pushed out, the recording names as missing.
+    // The recording names dropped samples as missing.
     for (; waiting_size_ > kMaxEntries; waiting_.pop_front())
       waiting_size_ -= count_entries(waiting_.front().sample);
   }

@@ -11,7 +11,7 @@
 
 namespace sls::record {
 
-/// What the topics bring of the open run, on its way from the middleware's threads to the writing
+/// Samples of the open run, on their way from the middleware's threads to the writing
 /// one. The readers live as long as the recorder: new ones would be sent all histories again, of
 /// earlier runs too. So samples of a run that may be opened next wait for that. Putting never
 /// blocks; what does not fit of the open run is counted.
@@ -22,8 +22,8 @@ class Inbox {
   /// `may_be_opened` is asked about runs on the middleware's threads: others are not kept.
   Inbox(bus::Node& node, std::function<bool(std::uint64_t run_id)> may_be_opened);
 
-  /// From now on run `run_id` is recorded, what has come of it so far included. Samples count from
-  /// its `server` alone.
+  /// From now on run `run_id` is recorded, including its samples that have already arrived. Samples
+  /// count from its `server` alone.
   void open(std::uint64_t run_id, const bus::PeerId& server);
 
   /// All samples of the open run there are, oldest first.
@@ -32,7 +32,7 @@ class Inbox {
   /// Status samples and entries of the open run that were lost because there was no room.
   std::uint64_t refused() const;
 
-  /// True where the readers hear `server`.
+  /// True if the readers hear `server`.
   bool hears(const bus::PeerId& server) const;
 
  private:

@@ -17,7 +17,7 @@ constexpr const char* kIdentity = "recorder";  // whose keys it uses on a secure
 
 int main(int argc, char** argv) {
   using namespace sls;
-  CLI::App cli("Writes every sample of a run to CSV files.");
+  CLI::App cli("Records every step of a run in CSV files.");
   app::CommonOptions options;
   options.qos_file = bus::default_qos_file();
   record::RecorderOptions recorder;
@@ -28,22 +28,21 @@ int main(int argc, char** argv) {
   cli.add_option("--out", recorder.folder, "folder of the recording, new or empty")
       ->type_name("DIR")
       ->required();
-  cli.add_option("--vehicle", recorder.vehicle,
-                 "of several servers, record the run of the one that flies vehicle N; default: 0")
+  cli.add_option("--vehicle", recorder.vehicle, "record the run of the server that flies vehicle N")
       ->type_name("N");
-  auto* force_flag = cli.add_flag("--force", force, "replace the recording that is there");
-  cli.add_flag("--resume", resume, "continue the unfinished recording that is there, if one is")
+  auto* force_flag = cli.add_flag("--force", force, "replace an existing recording");
+  cli.add_flag("--resume", resume, "continue an unfinished recording, if there is one")
       ->excludes(force_flag);
   cli.add_flag("--follow", recorder.follow,
-               "when another server takes the place of ours, record its run into a subfolder");
+               "when another server replaces the first, record its run in a subfolder");
   cli.add_flag_callback(
       "--columns",
       [] {
         std::cout << record::describe_columns();
         throw CLI::Success();
       },
-      "list the columns of every file as Markdown, then end");
-  cli.add_flag("--check", check, "only check QoS file and folder, then end");
+      "print the columns of every file as Markdown and exit");
+  cli.add_flag("--check", check, "check QoS file and folder and exit");
 
   return app::run_main(argc, argv, cli, options, "recorder", [&] {
     bus::check_security_files(bus::read_qos_file(options.qos_file, kIdentity));
@@ -52,8 +51,8 @@ int main(int argc, char** argv) {
     else
       record::prepare_recording_folder(recorder.folder, force);
     if (check) return;
-    // The loop waits for server and client, not for us: whoever answers a step goes first. Before
-    // any thread starts, as they inherit it. It does no harm where it is refused.
+    // The loop waits for server and client, not for the recorder, so those have priority. Set
+    // before any thread starts, because threads inherit it. A refusal does no harm.
     app::put_thread_last();
     bus::Node node(options.qos_file, options.domain, "recorder", kIdentity);
     record::Recorder(node, recorder).run();

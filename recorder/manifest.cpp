@@ -24,7 +24,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// The value of the first line "key : value" of /proc/cpuinfo; empty where there is none.
+/// The value of the first line "key : value" of /proc/cpuinfo; empty if there is none.
 std::string read_cpu_info(const std::string& key) {
   std::ifstream info("/proc/cpuinfo");
   for (std::string line; std::getline(info, line);) {
@@ -59,7 +59,7 @@ Json describe_machine() {
 /// Vehicles of one server (idl/sls.idl).
 constexpr std::size_t kMaxVehicles = 256;
 
-/// What a manifest speaks for must be there after a power cut too.
+/// The files that a manifest lists must survive a power cut, too.
 void sync_to_disk(const std::filesystem::path& path) {
   const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
   // EINVAL: what this file system cannot do for a file or a folder.
@@ -70,7 +70,7 @@ void sync_to_disk(const std::filesystem::path& path) {
     throw std::system_error(error, std::generic_category(), path.string() + ": cannot write");
 }
 
-/// Who verifies somebody else's recording opens the files of that folder and no others.
+/// The verification of a recording opens files of its folder only, whatever its manifest names.
 bool is_in_folder(const std::filesystem::path& name) {
   return name == name.filename() && name.has_filename() && name != "." && name != "..";
 }

@@ -36,9 +36,9 @@ struct StageStart {
 /// "3 samples missing, first sls/reference step 123 of vehicle 0".
 std::string describe(const std::vector<MissingSteps>& missing);
 
-/// What a recording is and whether it is whole. Of a segment after the first, `complete`,
-/// `missing`, `stage_starts` and `certificate` speak for all segments up to it, the rest for
-/// itself.
+/// Contents of a recording and whether it is whole. In a segment after the first, `complete`,
+/// `missing`, `stage_starts` and `certificate` cover all segments up to it, the other fields that
+/// segment alone.
 struct Manifest {
   Parameters parameters;
   std::string scenario_name;

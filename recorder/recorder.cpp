@@ -29,7 +29,7 @@ std::optional<bus::Run> wait_for_run(const bus::Node& node, const std::string& w
     if (auto run = find()) return run;
     if (wait.is_report_due())
       spdlog::info("waiting for: {} ({:.0f} s left){}", whom, wait.seconds_left(),
-                   node.describe_loneliness());
+                   node.describe_isolation());
     std::this_thread::sleep_for(kPollTime);
   }
   return std::nullopt;
@@ -56,7 +56,7 @@ void Recorder::run() {
   if (!run && app::stop_signal() == 0)
     throw app::RunError(fmt::format("{}: nothing recorded: no server within {} s{}",
                                     options_.folder.string(), kJoinTimeout,
-                                    node_.describe_loneliness()));
+                                    node_.describe_isolation()));
   while (run) {
     RunEnd end;
     try {

@@ -70,7 +70,7 @@ void Recording::write_provisional_manifest() {
   stage_starts_ = manifest.stage_starts;
 }
 
-/// Certificate, log and gaps speak for the whole flight.
+/// Certificate, log and gaps cover the whole flight.
 void Recording::read_earlier_segments() {
   if (!segment_.earlier) return;
   log_.set_stage_starts(segment_.earlier->manifest().stage_starts);
@@ -146,7 +146,7 @@ void Recording::note_missing_answers(std::uint32_t vehicle_id, std::uint64_t fro
   note_missing(vehicle_id, ReferenceRow::kTopic, from, to);
 }
 
-/// What a run that has ended had further.
+/// Steps after the last row of a run that has ended.
 void Recording::note_missing_end() {
   if (!has_ended()) return;
   // Of a failed run's last step there may be nothing: it need not have been published.

@@ -44,7 +44,7 @@ class Recording {
   /// Tells how much time has passed: a lost batch is not waited for forever.
   void pass_time(Stream::Duration elapsed) { stream_.pass_time(elapsed); }
 
-  /// What it has waited for since `patience`: in words.
+  /// The sample that it has waited for since `patience`, in words.
   std::optional<std::string> describe_stuck(Stream::Duration patience) const {
     return stream_.describe_stuck(patience);
   }
@@ -62,7 +62,7 @@ class Recording {
   std::int64_t last_complete_step() const { return stream_.last_step(); }
 
   /// Writes what is pending, flight.txt and the final manifest. `interruption` says why the
-  /// recorder stops early and `outcome` what that is called; empty where it did not. True if the
+  /// recorder stops early and `outcome` what that is called; empty if it did not. True if the
   /// recording is complete.
   bool finish(const std::string& interruption, std::uint64_t refused_samples,
               const std::string& outcome = "interrupted");

@@ -25,7 +25,7 @@ constexpr std::array<std::string_view, 13> kRecordingFiles = {
     "state.csv",     "measured.csv",       "command.csv",   "reference.csv", "status.csv",
     "flight.csv",    "sls.mcap",           "sls.mcap.part", "flight.txt",    "scenario.yaml",
     "manifest.json", "manifest.json.part", "report.html"};
-// What `./sls plot` puts into the subfolder kFigureFolder, as .png and .pdf.
+// Figures that `./sls plot` puts into the subfolder kFigureFolder, as .png and .pdf.
 constexpr std::array<std::string_view, 11> kFigures = {
     "fleet",    "positions",     "errors",     "path",   "angles", "forces",
     "attitude", "body_attitude", "body_rates", "rotors", "thrust"};
@@ -45,7 +45,7 @@ bool is_figure(const fs::path& path) {
          is_among(kFigures, path.stem().string());
 }
 
-/// True where `name` is `prefix` and then `digits` alone.
+/// True if `name` is `prefix` and then `digits` alone.
 bool is_numbered(std::string_view name, std::string_view prefix, std::string_view digits) {
   return name.size() > prefix.size() && name.substr(0, prefix.size()) == prefix &&
          name.find_first_not_of(digits, prefix.size()) == name.npos;

@@ -15,7 +15,7 @@ namespace sls::record {
 /// @throws config::ConfigError naming the folder and the cause.
 void prepare_recording_folder(const std::filesystem::path& folder, bool force);
 
-/// The recording in `folder` that a killed recorder has left, to be continued; nothing where there
+/// The recording in `folder` that a killed recorder has left, to be continued; nothing if there
 /// is none yet, and the folder is ready for a new one.
 /// @throws config::ConfigError naming the folder if its recording is complete, or it is not fit.
 std::optional<RecordedFlight> find_unfinished_recording(const std::filesystem::path& folder);

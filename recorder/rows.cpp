@@ -9,7 +9,7 @@ double calc_time(std::uint64_t step, const Parameters& parameters) {
   return static_cast<double>(static_cast<std::int64_t>(step) * parameters.period_ns()) / 1e9;
 }
 
-/// What is in `row`, or a new one.
+/// The value in `row`, or a new one.
 template <class Row>
 Row& reuse(std::optional<Row>& row) {
   return row ? *row : row.emplace();

@@ -83,7 +83,7 @@ struct CommandRow {
   }
 };
 
-/// What the answer to state k follows.
+/// The reference that the answer to state k follows.
 struct ReferenceRow {
   static constexpr const char* kTopic = "sls/reference";
   static constexpr const char* kFile = "reference.csv";
@@ -92,7 +92,7 @@ struct ReferenceRow {
   std::uint64_t step = 0;
   double sim_time_s = 0;
   std::string stage_name;
-  Reference reference;  ///< but for its stage's name
+  Reference reference;  ///< without its stage's name
 
   template <class Row, class Visitor>
   static void visit(Row& row, Visitor& field) {
@@ -191,8 +191,8 @@ struct StepRows {
   bool is_whole() const { return state && command && (reference || command->is_unanswered()); }
 };
 
-/// What an entry of any kind but ANSWER_LATE brings; `rows` may hold another one's, whose memory is
-/// used again.
+/// The rows of an entry of any kind except ANSWER_LATE; `rows` may hold another one's, whose memory
+/// is used again.
 void fill_rows(StepRows& rows, const RecordEntry& entry, const Parameters& parameters);
 StepRows make_rows(const RecordEntry& entry, const Parameters& parameters);
 /// Adds the reference of `entry`, the answer to that step.

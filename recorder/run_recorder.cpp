@@ -63,8 +63,8 @@ RunRecorder::RunRecorder(Surroundings& surroundings, const bus::Run& run, const 
 
 RunEnd RunRecorder::run() {
   announce(false);
-  // Who writes into a port of shared memory waits for its reader, should that lose its processor
-  // just then.
+  // A process that writes into a port of shared memory waits for its reader, even if the reader has
+  // just lost its processor.
   if (run_.parameters.mode() == MODE_REALTIME) app::put_process_first();
   std::thread writing([this] {
     app::put_thread_last();
@@ -95,7 +95,7 @@ void RunRecorder::watch() {
     look_for_the_end(server);
     if (give_up_ && give_up_->is_over()) return;
     if (give_up_ && give_up_->is_report_due())
-      spdlog::info("waiting for: what comes after step {} of run {:016x} ({:.0f} s left)",
+      spdlog::info("waiting for: samples after step {} of run {:016x} ({:.0f} s left)",
                    last_complete_step_.load(), run_id_, give_up_->seconds_left());
     announce_news();
     std::this_thread::sleep_for(kPollTime);

@@ -18,7 +18,7 @@
 
 namespace sls::record {
 
-/// What outlives a run.
+/// Objects that outlive a run.
 struct Surroundings {
   /// Runs that fly `flown_vehicle` are recorded.
   Surroundings(bus::Node& domain, std::uint32_t flown_vehicle)
@@ -92,7 +92,7 @@ class RunRecorder {
   std::atomic<bool> writing_failed_{false};
 };
 
-/// What a recorder announces of itself; `run` is the one it serves, where it knows one.
+/// Announcement of a recorder; `run` is the one it serves, where it knows one.
 Participant make_announcement(const bus::Run* run, bool ready, bool done, std::int64_t last_step);
 
 }  // namespace sls::record

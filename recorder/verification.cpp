@@ -50,7 +50,7 @@ void check_file(const fs::path& path, const ManifestFile::File& expected,
         fmt::format("{}: SHA-256 {}, manifest: {}", path.string(), found.sha256, expected.sha256));
 }
 
-/// A segment whose recorder was killed lists no files: the segment after it speaks for its rows.
+/// A segment whose recorder was killed lists no files: the segment after it covers its rows.
 void check_files(const RecordedSegment& segment, bool is_last, std::vector<std::string>& problems) {
   if (is_last && segment.manifest.files.empty())
     problems.push_back((segment.folder / "manifest.json").string() +
@@ -77,7 +77,7 @@ void certify(const RecordedFlight& flight, Inspection& inspection) {
 
 // --- two recordings ------------------------------------------------------------------------------
 
-/// A row's fields as people read them; empty where equal flights may differ.
+/// A row's fields as people read them; empty if equal flights may differ.
 struct FieldLister {
   std::vector<std::string> texts;
   std::vector<bool> are_nan;

@@ -1,4 +1,4 @@
-/// `sls verify`: is a recording what its manifest says, and are two recordings of the same flight?
+/// `sls verify`: does a recording match its manifest, and are two recordings of the same flight?
 #pragma once
 
 #include <cstdint>
@@ -11,11 +11,11 @@
 
 namespace sls::record {
 
-/// What re-reading every file of a recording gives.
+/// The result of reading every file of a recording again.
 struct Inspection {
   std::uint64_t steps = 0;            ///< of the vehicle that has most
-  std::string certificate;            ///< of the rows; empty where they cannot be read
-  std::vector<std::string> problems;  ///< where a file is not what its manifest says, one line each
+  std::string certificate;            ///< of the rows; empty if they cannot be read
+  std::vector<std::string> problems;  ///< where a file differs from its manifest, one line each
 };
 Inspection inspect(const RecordedFlight& flight);
 
@@ -24,10 +24,10 @@ struct Difference {
   std::uint64_t step = 0;
   std::string text;  ///< file, vehicle, step, column and both values
 };
-/// @throws DamagedError where a row that is read before the first difference is damaged.
+/// @throws DamagedError if a row that is read before the first difference is damaged.
 std::optional<Difference> find_first_difference(const RecordedFlight& a, const RecordedFlight& b);
 
-/// What differs or is missing according to the manifests; none of it need make the data differ.
+/// Differences and gaps according to the manifests; the data may be equal all the same.
 std::vector<std::string> list_notes(const RecordedFlight& a, const RecordedFlight& b);
 
 }  // namespace sls::record

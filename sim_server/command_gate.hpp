@@ -74,8 +74,7 @@ class CommandGate {
   /// The client whose answer is awaited: the strongest that is neither silent nor refused.
   std::optional<ReadyClient> awaited_client() const;
 
-  /// Who accepted the awaited step from whom, where the client is another than that of the last
-  /// accepted answer.
+  /// Set when the awaited step's answer came from another client than the last accepted answer.
   struct TakeOver {
     std::string from;
     std::string to;
@@ -93,8 +92,8 @@ class CommandGate {
   /// still come.
   std::optional<std::string> refusal() const;
 
-  /// What clients sent that was refused, in answer to the awaited step or to one that went by since
-  /// the last accepted answer. Empty where the awaited step has its answer.
+  /// Refused answers of clients, in answer to the awaited step or to one that went by since
+  /// the last accepted answer. Empty if the awaited step has its answer.
   std::string describe_refusals() const;
 
   const SyncCounters& counters() const { return counters_; }

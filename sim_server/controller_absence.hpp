@@ -1,4 +1,4 @@
-/// What to do about a vehicle nobody flies at the moment: the policy of `sync.wait.controller`.
+/// Policy for a vehicle without a controller: `sync.wait.controller`.
 /// Pure: told the times, it decides. Rules: README.md, "Waiting".
 #pragma once
 
@@ -19,7 +19,7 @@ class ControllerAbsence {
     kGiveUp,    ///< end the run as failed
   };
 
-  /// What to do about a step that has waited `step_wait_s` (wall time) for its answer, the first
+  /// Reaction to a step that has waited `step_wait_s` (wall time) for its answer, the first
   /// unanswered one having been published `absence_s` ago. In real time, asked when the step's
   /// period is over, it never says kWait.
   Action decide(double step_wait_s, double absence_s) const;
@@ -29,7 +29,7 @@ class ControllerAbsence {
   /// An answer was accepted or, in real time, one came late that is newer than those before.
   void answered() { steps_without_answer_ = 0; }
 
-  /// True where the last step was flown without an answer, and none has come since.
+  /// True if the last step was flown without an answer, and none has come since.
   bool is_acting() const { return steps_without_answer_ > 0; }
 
   /// After so much absence decide() gives up, s.

@@ -27,7 +27,7 @@ struct ReceivedCommands {
 /// Commands in.
 class CommandStream {
  public:
-  /// Sees a sample first, on a thread of the middleware; true where it has taken it, else it goes
+  /// Sees a sample first, on a thread of the middleware; true if it has taken it, else it goes
   /// into the mailbox.
   using Handler = std::function<bool(const Commands& sample, const bus::PeerId& sender)>;
 

@@ -96,7 +96,7 @@ class Receiver {
   Receiver(const config::Fault& fault, std::size_t index, const Timing& timing)
       : fault_(fault), index_(index), timing_(timing) {}
 
-  /// What is held at `step`, at which `sample` was sent.
+  /// The sample held at `step`, at which `sample` was sent.
   Sample take(std::uint64_t step, const Sample& sample) {
     if (!held_) held_ = sent_before_ = sample;  // nothing has arrived before the first
     const auto time_ns = static_cast<std::int64_t>(step) * timing_.period_ns;

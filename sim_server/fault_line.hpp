@@ -22,7 +22,7 @@ class FaultLine {
   /// Whether what is measured can differ from the truth at all.
   bool can_disturb_state() const;
 
-  /// What the controllers measure at `step`. Call once per step, in order, from step 0.
+  /// The controllers' measurement at `step`. Call once per step, in order, from step 0.
   model::Measurement measure(std::uint64_t step, const model::Measurement& truth);
 
   /// The force (N, in W) that acts on the quadrotor over [step, step + 1) where `f_Q_W` was meant

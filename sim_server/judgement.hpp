@@ -1,4 +1,4 @@
-/// What is wrong with an answer, for server and closed loop alike. No DDS and no Simbody here.
+/// Checks an answer, for server and closed loop alike. No DDS and no Simbody here.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,7 +13,7 @@ enum class Defect {
   kFault,       ///< an error code, or a failed mission
 };
 
-/// What is judged of an answer.
+/// The checked parts of an answer.
 struct JudgedAnswer {
   Eigen::Vector3d f_Q_W = Eigen::Vector3d::Zero();  ///< N
   bool is_memory_finite = true;
@@ -21,7 +21,7 @@ struct JudgedAnswer {
   bool is_mission_failed = false;
 };
 
-/// Why `answer` may not fly; nothing where it may.
+/// Why `answer` may not fly; nothing if it may.
 std::optional<Defect> find_defect(const JudgedAnswer& answer, double force_limit);
 
 /// "a number that is not finite", "a force beyond controller.force_limit_n", "a fault".

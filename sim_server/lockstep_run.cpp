@@ -91,10 +91,10 @@ bool LockstepRun::attend_to_silence(Clock::time_point now) {
   is_late_ = true;
   for (const auto& vehicle : vehicles_)
     if (!vehicle->gate.accepted()) vehicle->note_waiting(sent_);
-  if (control_.holds()) note_rest(now - looked_);  // paused but for this step
+  if (control_.holds()) note_rest(now - looked_);  // paused except for this step
   looked_ = now;
   if (now >= resend_at_) resend(now);
-  attend_now_and_then();
+  do_housekeeping();
   if (attend_to_operator()) return false;
   refresh_roster();
   take_over_if_silent(now);
@@ -208,14 +208,14 @@ bool LockstepRun::wait_for_recorders() {
   std::optional<app::Wait> wait;
   bool is_reported = false;
   for (; !blocking.empty(); blocking = name_blocking()) {
-    attend_now_and_then();
+    do_housekeeping();
     if (attend_to_operator()) return false;
     if (!wait) wait.emplace(patience.deadline_s);
     if (wait->is_over()) {
       const std::string waited =
           fmt::format("step {}: waited {} s for {}", step, patience.deadline_s, blocking);
       if (patience.policy != RecorderPolicy::kGoOn) throw app::RunError(waited);
-      board_.announce(waited + ": goes on without");
+      board_.announce(waited + ": continues without it");
       are_recorders_given_up_ = true;
       return true;
     }

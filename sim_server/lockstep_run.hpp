@@ -17,9 +17,9 @@ namespace sls::sim {
 ///
 /// An answer that leaves nothing to wait for is applied where it arrives, on the middleware's
 /// thread, and the next state published there: waking the main thread would make a step a fifth
-/// longer. The main thread holds `step_mutex_` but while it waits for answers; the middleware's
-/// only tries to take it, and leaves what comes meanwhile, and all that is not a plain step, to the
-/// main thread.
+/// longer. The main thread releases `step_mutex_` only while it waits for answers. The
+/// middleware's thread only tries to lock it; if that fails, or for anything but a plain step, it
+/// leaves the work to the main thread.
 class LockstepRun : public Run {
  public:
   using Run::Run;

@@ -19,7 +19,7 @@ constexpr const char* kIdentity = "server";  // whose keys it uses on a secured 
 
 int main(int argc, char** argv) {
   using namespace sls;
-  CLI::App cli("Integrates the plant of a scenario and serves its state on DDS topics.");
+  CLI::App cli("Simulates the vehicles of a scenario and publishes their states on DDS topics.");
   app::CommonOptions options;
   options.qos_file = bus::default_qos_file();
   std::filesystem::path scenario_file;
@@ -31,20 +31,21 @@ int main(int argc, char** argv) {
   bool check = false;
   app::add_common_options(cli, options);
   cli.add_option("--scenario", scenario_file, "scenario (YAML)")->type_name("FILE")->required();
-  cli.add_option("--period-s", period_s, "control period in force; default: the scenario's")
+  cli.add_option("--period-s", period_s, "control period (default: the scenario's)")
       ->type_name("X");
-  cli.add_option("--mode", mode, "synchronisation in force; default: the scenario's")
+  cli.add_option("--mode", mode, "lockstep or realtime (default: the scenario's)")
       ->type_name("MODE")
       ->check(CLI::IsMember({"lockstep", "realtime"}));
   cli.add_option("--rtf", real_time_factor,
-                 "simulated per wall time of real time; default: the scenario's")
+                 "real-time factor, realtime mode only (default: the scenario's)")
       ->type_name("X");
-  cli.add_option("--vehicles", vehicles, "of the fleet, such as 0-9,20; default: all")
+  cli.add_option("--vehicles", vehicles, "vehicles of the fleet to simulate, such as 0-9,20")
       ->type_name("IDS");
-  cli.add_option("--threads", threads, "that integrate vehicles; default: one per processor")
+  cli.add_option("--threads", threads,
+                 "threads that integrate vehicles (default: one per processor)")
       ->type_name("N")
       ->check(CLI::Range(1, 256));
-  cli.add_flag("--check", check, "only check scenario and QoS file, say what would fly, then end");
+  cli.add_flag("--check", check, "check scenario and QoS file, print a summary and exit");
 
   return app::run_main(argc, argv, cli, options, "sim_server", [&] {
     config::Scenario scenario = config::load_scenario(scenario_file);
@@ -55,7 +56,7 @@ int main(int argc, char** argv) {
     if (real_time_factor) config::override_real_time_factor(scenario, *real_time_factor);
     const sim::Assignment assignment = {
         scenario, config::parse_vehicle_ids(vehicles, scenario.vehicles.size())};
-    // A plant that cannot be made is refused before anybody waits for this server.
+    // A plant that cannot be made is refused before other programs wait for this server.
     sim::make_plants(sim::find_plant_type(scenario.plant.model), scenario, assignment.vehicle_ids);
     if (check) {
       bus::check_security_files(bus::read_qos_file(options.qos_file, kIdentity));

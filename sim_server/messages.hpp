@@ -13,7 +13,7 @@
 
 namespace sls::sim {
 
-/// What acted over a control period, and the controller memory in force after it.
+/// Force and fault that acted over a control period, and the controller memory in force after it.
 struct Applied {
   Eigen::Vector3d answer_f_Q_W = Eigen::Vector3d::Zero();  ///< as answered, N
   Eigen::Vector3d f_Q_W = Eigen::Vector3d::Zero();         ///< as it acted, after faults, N
@@ -28,7 +28,7 @@ inline constexpr const char* kFailSafeName = "fail-safe";
 /// A random id for a run, never 0.
 std::uint64_t make_run_id();
 
-/// What the controllers are to see of a vehicle: `measured`, and what acted in the period before.
+/// The state sample for the controllers: `measured`, and what acted in the period before.
 VehicleState make_state_message(std::uint32_t vehicle_id, const model::Measurement& measured,
                                 const Applied& applied);
 

@@ -314,7 +314,8 @@ ParticipantCheck::Findings ParticipantCheck::look(const Neighbourhood& neighbour
   return findings;
 }
 
-/// False for who has another server, or flies other vehicles and may wait for theirs.
+/// False for a controller that has another server, or flies other vehicles and may wait for their
+/// server.
 bool ParticipantCheck::may_fly_for_us(const Participant& controller,
                                       const Neighbourhood& neighbourhood) const {
   if (controller.run_id() == run_id_) return true;

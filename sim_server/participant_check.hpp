@@ -1,4 +1,4 @@
-/// What the participants of a run do wrong, in words: README.md, "What a participant does wrong".
+/// Mistakes of the participants of a run, in words: README.md, "What a participant does wrong".
 /// No network and no clock here.
 #pragma once
 
@@ -27,7 +27,7 @@ struct Neighbourhood {
   std::map<bus::PeerId, std::string> command_writers;
   /// Those with a writer of sls/participant: an announcement may be on its way.
   std::set<bus::PeerId> announcement_writers;
-  /// Those whose writer does not for want of a DEADLINE (bus::Node::find_missing_deadlines).
+  /// Controllers whose writer offers no DEADLINE (bus::Node::find_missing_deadlines).
   std::map<bus::PeerId, std::string> missing_deadlines;
   /// Those with another problem in discovery: their silence has been explained.
   std::set<bus::PeerId> explained;
@@ -40,7 +40,7 @@ class ParticipantCheck {
   /// Problems that hold, by a key that stays the same while one does.
   using Findings = std::map<std::string, std::string>;
 
-  /// What does not last longer is none: discovery takes its time.
+  /// A problem that is shorter is ignored: discovery takes its time.
   static constexpr std::chrono::milliseconds kPatience{1000};
   /// An announcement on a lossy network: a peer learns of a reader from discovery, which Fast DDS
   /// repeats once a second.
@@ -49,7 +49,7 @@ class ParticipantCheck {
   static constexpr std::chrono::milliseconds kPatienceWithRun{1400};
   /// Rejected answers without a taken one are none before.
   static constexpr std::chrono::milliseconds kPatienceWithAnswers{800};
-  /// What was seen in an answer holds so long after the last one like it.
+  /// A problem seen in an answer holds so long after the last answer like it.
   static constexpr std::chrono::milliseconds kMemory{2000};
   static constexpr std::size_t kMostSenders = 64;
   /// Load and quadrotor may be so many rod lengths from their reference.
@@ -58,7 +58,7 @@ class ParticipantCheck {
   ParticipantCheck(std::uint64_t run_id, const config::Scenario& scenario,
                    const std::vector<std::uint32_t>& vehicle_ids);
 
-  /// Those of `entries` (of this run) that may take part: they speak this contract, and controllers
+  /// Those of `entries` (of this run) that may take part: they use this contract, and controllers
   /// have loaded the library with which their vehicles are flown.
   std::vector<Entry> admit_controllers(const std::vector<Entry>& entries);
   static std::vector<Entry> admit_recorders(const std::vector<Entry>& entries);
@@ -75,14 +75,14 @@ class ParticipantCheck {
   /// All that is wrong now. To be called a few times a second.
   Findings look(const Neighbourhood& neighbourhood);
 
-  /// " (its answers are rejected: 57 × …)", for messages about who is awaited; empty where the last
+  /// " (its answers are rejected: 57 × …)", for messages about who is awaited; empty if the last
   /// one was taken.
   std::string describe_rejections(const bus::PeerId& sender) const;
 
   /// When to look again, because something will then have lasted too long.
   const std::optional<Clock::time_point>& next_due() const { return next_due_; }
 
-  /// What is to be announced since the last call, such as a vehicle far from its reference.
+  /// News to announce since the last call, such as a vehicle far from its reference.
   std::vector<std::string> take_events();
 
  private:
@@ -118,7 +118,7 @@ class ParticipantCheck {
   using Senders = std::map<bus::PeerId, const Entry*>;
 
   void find_first_libraries(const std::vector<Entry>& controllers);
-  /// The one that it should have loaded; nothing where all is well.
+  /// The one that it should have loaded; nothing if all is well.
   const Library* find_other_library(const Participant& controller) const;
 
   void check_memory(Vehicle& vehicle, const OfferedAnswer& answer, const bus::PeerId& sender,

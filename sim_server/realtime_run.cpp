@@ -37,7 +37,9 @@ RealtimeRun::RealtimeRun(Endpoints& endpoints, const Assignment& assignment, Wor
 
 void RealtimeRun::begin() {
   if (!app::put_process_first())
-    spdlog::info("the system lets no process go first here (root, CAP_SYS_NICE or RLIMIT_RTPRIO)");
+    spdlog::info(
+        "real-time priority refused (needs root, CAP_SYS_NICE or RLIMIT_RTPRIO): steps may be "
+        "late");
   schedule_ = Schedule(Clock::now(), calc_wall_period(scenario_.sync));
   missed_deadlines_ = endpoints_.command_stream.missed_deadlines();
 }
@@ -93,7 +95,7 @@ void RealtimeRun::publish() {
 bool RealtimeRun::wait_until_due() {
   while (Clock::now() + kPollTime < schedule_.due(board_.step)) {
     endpoints_.requests.wait(Clock::now() + kPollTime);
-    attend_now_and_then();
+    do_housekeeping();
     if (!rest() || !wait_for_recorders()) return false;
   }
   std::this_thread::sleep_until(schedule_.due(board_.step));
@@ -110,7 +112,7 @@ bool RealtimeRun::take_commands(Clock::time_point deadline) {
       board_.round_trips.add(Clock::now() - published_);
       return true;
     }
-    attend_now_and_then();
+    do_housekeeping();
     if (attend_to_operator()) return false;
   }
   return true;
@@ -160,11 +162,12 @@ void RealtimeRun::check_clocks() {
     is_lifespan_ignored_ = true;
     endpoints_.command_stream.ignore_lifespan();
     const double behind_s = std::chrono::duration<double>(client.age).count();
-    board_.announce(fmt::format(
-        "the clock of controller '{}' on {} is {:.1f} s {} ours: its commands do not expire by it "
-        "(LIFESPAN), only by their step; synchronise the clocks",
-        client.announcement.name().c_str(), client.announcement.host().c_str(), std::abs(behind_s),
-        behind_s > 0 ? "behind" : "ahead of"));
+    board_.announce(
+        fmt::format("the clock of controller '{}' on {} is {:.1f} s {} ours: synchronise the "
+                    "clocks; until then "
+                    "its commands expire by their step, not by LIFESPAN",
+                    client.announcement.name().c_str(), client.announcement.host().c_str(),
+                    std::abs(behind_s), behind_s > 0 ? "behind" : "ahead of"));
     return;
   }
 }
@@ -185,7 +188,7 @@ bool RealtimeRun::wait_for_recorders() {
     throw app::RunError(
         fmt::format("step {}: waited {} s for {}", board_.step, patience.deadline_s, blocking));
   if (recorder_wait_->is_report_due())
-    board_.announce(fmt::format("step {}: flies on without: {}", board_.step, blocking));
+    board_.announce(fmt::format("step {}: continues without: {}", board_.step, blocking));
   return true;
 }
 

@@ -36,12 +36,12 @@ class RealtimeRun : public Run {
 
   void publish();
   void note_late(VehicleFlight& vehicle, const OfferedAnswer& answer) override;
-  /// True where the mission is over for every vehicle, be it by an answer that came late.
+  /// True when the mission is over for every vehicle, also by an answer that came late.
   bool is_ending() const;
   void fly_without_answers();
   void count_missed_deadlines();
-  /// Says whose clock differs from ours by what would make his commands expire when they should
-  /// not, or never; from then on they are judged by their step alone.
+  /// Reports a client whose clock differs so much that its commands would expire wrongly or never;
+  /// from then on they are judged by their step alone.
   void check_clocks();
 
   StateStream::Queue state_queue_;

@@ -28,7 +28,7 @@ class RecordStream {
   RecordStream& operator=(const RecordStream&) = delete;
 
   /// Collects `count` entries of one step: `fill(i, entry)` fills the ith, which may hold an
-  /// earlier one. Never blocks but for the thread's swap of two pointers.
+  /// earlier one. Blocks only while the thread swaps two pointers.
   template <class Fill>
   void add_step(std::size_t count, const Fill& fill) {
     bool is_due = false;

@@ -11,7 +11,7 @@ namespace sls::sim {
 ///
 /// On a link that loses much, the second rule alone would double without end: at 20 % each way more
 /// than a third of the steps are ambiguous. So an answer that comes early after the last resend,
-/// within the undoubled timeout or a quarter of the doubled one, is taken for that resend's, and
+/// within the undoubled timeout or a quarter of the doubled one, is treated as that resend's, and
 /// ends the doubling; for a few steps in a row at most, because on a slower link it may be a
 /// coincidence that repeats itself.
 class RetransmissionTimer {

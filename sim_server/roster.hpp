@@ -1,4 +1,4 @@
-/// Who takes part in a run: whom step 0 waits for, whom a step waits for, and how to name them.
+/// Participants of a run: those that step 0 or a step waits for, and their names in messages.
 #pragma once
 
 #include <chrono>
@@ -47,13 +47,13 @@ std::int64_t calc_recorder_window(std::uint64_t history_steps);
 std::string name_blocking_recorder(const Roster& roster, int expected, std::uint64_t step,
                                    std::int64_t window = kRecorderWindow);
 
-/// The first step that some recorder keeps the server from publishing; 0 where fewer than
+/// The first step that some recorder keeps the server from publishing; 0 if fewer than
 /// `expected` are there.
 std::uint64_t calc_recorder_limit(const Roster& roster, int expected,
                                   std::int64_t window = kRecorderWindow);
 
 /// Which ready recorder has announced nothing since `since` although it lags behind `step`, in
-/// words; empty when none has, or another one is there in the place of one taken for dead.
+/// words; empty when none has, or another one is there in the place of one presumed dead.
 std::string name_silent_recorder(const Roster& roster, std::uint64_t step,
                                  std::chrono::steady_clock::time_point since);
 

@@ -130,17 +130,17 @@ bool Run::wait_for_participants() {
   std::string published;
   board_.publish(PHASE_WAITING, "participants are not ready");
   while (true) {
-    attend_now_and_then();
+    do_housekeeping();
     if (attend_to_operator()) return false;
     refresh_roster();
     const std::string missing = name_missing(roster_, expected, scenario_.sha256, vehicle_ids_);
     if (missing.empty()) return true;
     if (wait.is_over())
       throw app::RunError(fmt::format("not ready within {} s: {}{}{}", expected.timeout_s, missing,
-                                      describe_problem(), endpoints_.domain.describe_loneliness()));
+                                      describe_problem(), endpoints_.domain.describe_isolation()));
     if (wait.is_report_due()) {
       spdlog::info("waiting for: {} ({:.0f} s left){}{}{}", missing, wait.seconds_left(),
-                   describe_problem(), endpoints_.domain.describe_loneliness(),
+                   describe_problem(), endpoints_.domain.describe_isolation(),
                    Clock::now() - began > kLongStart ? "; run ./sls doctor" : "");
       if (missing != published) board_.publish(PHASE_WAITING, "missing: " + missing);
       published = missing;
@@ -164,7 +164,7 @@ bool Run::fly() {
     board_.controller_name = vehicles_.front()->outcome()->applied.controller_name;
     if (is_finished()) return true;
     advance();
-    attend_now_and_then();
+    do_housekeeping();
   }
 }
 
@@ -222,7 +222,7 @@ bool Run::rest() {
   bool is_ended = false;
   record_.flush();
   while (control_.holds() && !is_ended) {
-    attend_now_and_then();
+    do_housekeeping();
     if (is_roster_due()) refresh_roster();
     is_ended = attend_to_operator();
     if (!is_ended && control_.holds()) endpoints_.requests.wait(Clock::now() + kPollTime);
@@ -258,7 +258,7 @@ bool Run::attend_to_operator() {
   return control_.is_reset_requested() || control_.is_stop_requested();
 }
 
-void Run::attend_now_and_then() {
+void Run::do_housekeeping() {
   if (!board_.is_due() && !is_look_due()) return;
   const std::string problem = board_.problem;
   look_for_problems();

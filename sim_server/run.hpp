@@ -25,7 +25,7 @@
 
 namespace sls::sim {
 
-/// What a server flies.
+/// The assignment of a server.
 struct Assignment {
   config::Scenario scenario;
   std::vector<std::uint32_t> vehicle_ids;  ///< of the scenario's, ascending; at least one
@@ -70,7 +70,7 @@ class Run {
 
   /// Step 0 is about to be published.
   virtual void begin() {}
-  /// Publishes the states of the step in work, and settles what comes of it for each vehicle; false
+  /// Publishes the states of the step in work, and decides the force of each vehicle; false
   /// if the operator ended the run.
   virtual bool exchange() = 0;
   /// Whether the step in work may be published as far as the recorders are concerned; false if the
@@ -91,16 +91,16 @@ class Run {
   /// A valid answer to a step that has gone by.
   virtual void note_late(VehicleFlight&, const OfferedAnswer&) {}
   VehicleFlight* find_vehicle(std::uint32_t id);
-  /// True where every vehicle's answer to the step in work was accepted.
+  /// True if every vehicle's answer to the step in work was accepted.
   bool are_all_accepted() const;
-  /// True where a vehicle's last step was flown without an answer, and none has come since.
+  /// True if a vehicle's last step was flown without an answer, and none has come since.
   bool is_anybody_absent() const;
-  /// @throws app::RunError where a client's answer was refused and no other client answers.
+  /// @throws app::RunError if a client's answer was refused and no other client answers.
   void check_refusals();
   /// Takes what was accepted, and says who takes over and who is back.
   void take_answers();
-  /// Says now and then who is missing since when, also in sls/status. @throws app::RunError to give
-  /// the run up.
+  /// Reports at intervals which participant is missing since when, also in sls/status. @throws
+  /// app::RunError to give the run up.
   void attend_to_absence(ControllerAbsence::Action action);
   /// The controllers whose answers are awaited, in words.
   std::string name_awaited_controllers() const;
@@ -116,8 +116,8 @@ class Run {
   void refresh_roster();
   bool is_roster_due() const;
   /// Status, stop signal, claim: what needs a look a few times a second.
-  void attend_now_and_then();
-  /// True where the participants should be looked at before the next status is due.
+  void do_housekeeping();
+  /// True if the participants should be looked at before the next status is due.
   bool is_look_due() const;
   std::string describe_problem() const;
 

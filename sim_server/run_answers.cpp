@@ -1,4 +1,4 @@
-// What becomes of the answers, and what to do where there are none: for both ways of stepping.
+// Handling of answers, and of missing ones, for both modes.
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -83,7 +83,7 @@ bool Run::is_anybody_absent() const {
 }
 
 void Run::check_refusals() {
-  const double patience_s = std::chrono::duration<double>(bus::kSilenceOfTheDead).count();
+  const double patience_s = std::chrono::duration<double>(bus::kPresumedDeadAfter).count();
   for (const auto& vehicle : vehicles_) {
     const std::string refusals = describe_refusals(*vehicle);
     vehicle->note_refused(!refusals.empty());
@@ -127,7 +127,7 @@ void Run::take_answers() {
                         ? fmt::format("step {}: controller '{}' answers again after {:.1f} s",
                                       board_.step, vehicles_.front()->last_answer().controller_name,
                                       absence_s)
-                        : fmt::format("step {}: all vehicles are answered for again after {:.1f} s",
+                        : fmt::format("step {}: all vehicles get answers again after {:.1f} s",
                                       board_.step, absence_s));
   }
   absence_wait_.reset();
@@ -196,9 +196,8 @@ void Run::attend_to_absence(ControllerAbsence::Action action) {
   if (is_news) {
     absence_action_ = action;
     board_.announce(
-        fmt::format("step {}: {} for want of an answer of {}", board_.step,
-                    action == Action::kHold ? "holds the last force" : "fail-safe force",
-                    name_awaited_controllers()));
+        fmt::format("step {}: no answer from {}; {} force", board_.step, name_awaited_controllers(),
+                    action == Action::kHold ? "holding the last" : "applying the fail-safe"));
   }
   if (!is_report_due) return;
   board_.announce(fmt::format("step {}: waiting for: {} ({:.0f} s left){}", board_.step,

@@ -10,7 +10,7 @@
 namespace sls::sim {
 namespace {
 
-/// Who asks, fit for one line of a log.
+/// Name of the operator that sent `request`, fit for one line of a log.
 std::string name_operator(const SimControl& request) {
   std::string name = request.operator_name().to_string();
   std::replace_if(
@@ -112,7 +112,7 @@ void RunControl::act(const SimControl& request) {
       break;
     case ACTION_STEP:
       stepping_ = make_step_request(request);
-      last_event_ = fmt::format("{} steps asked for by {}", request.steps(), who);
+      last_event_ = fmt::format("{} steps requested by {}", request.steps(), who);
       break;
     case ACTION_RESET:
       is_reset_requested_ = true;

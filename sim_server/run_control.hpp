@@ -1,5 +1,5 @@
-/// What an operator's requests do to a run: pause, step, resume, reset, stop, with the semantics of
-/// the ROS simulation interfaces. The loop asks before every step. No network, no clock here.
+/// Effect of an operator's requests on a run: pause, step, resume, reset, stop, with the semantics
+/// of the ROS simulation interfaces. The loop asks before every step. No network, no clock here.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@
 
 namespace sls::sim {
 
-/// What is accepted when: README.md, "Operator control".
+/// Which request is accepted when: README.md, "Operator control".
 class RunControl {
  public:
   /// Controls run `run_id`, which begins unpaused unless `is_paused`.
@@ -61,10 +61,10 @@ class RunControl {
     std::uint64_t request_id = 0;
     std::uint64_t steps = 0;
     std::uint64_t done = 0;
-    std::string cut_short_by;  ///< who paused during it; the step after which it ends is its last
+    std::string cut_short_by;  ///< operator who paused during it: the run ends its step and pauses
   };
 
-  /// Why `request` is refused in the present state; empty where it is accepted.
+  /// Why `request` is refused in the present state; empty if it is accepted.
   std::string find_refusal(const SimControl& request) const;
   void act(const SimControl& request);
   static StepRequest make_step_request(const SimControl& request);

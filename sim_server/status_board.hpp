@@ -1,4 +1,4 @@
-/// What the server says about a run in sls/status and on stderr.
+/// The server's reports on a run in sls/status and on stderr.
 #pragma once
 
 #include <chrono>
@@ -38,10 +38,10 @@ class StatusBoard {
   /// True once anybody can have heard of the run.
   bool has_published() const { return samples_ > 0; }
 
-  // What the samples say; the loop keeps it up to date.
+  // Content of the samples; the loop keeps it up to date.
   std::uint64_t step = 0;
   std::string controller_name;  ///< whose command for `step` was accepted, of the first vehicle
-  std::string problem;          ///< what a participant does wrong; empty where none does
+  std::string problem;          ///< what a participant does wrong; empty if none does
   TimingRecord timing;
   RoundTrips round_trips;
 

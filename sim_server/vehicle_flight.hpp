@@ -26,14 +26,14 @@ class VehicleFlight {
 
   std::uint32_t id() const { return id_; }
 
-  /// What a step came to.
+  /// The result of a step.
   struct Outcome {
-    Applied applied;           // but for the faults
+    Applied applied;           // before faults
     bool is_finished = false;  // the mission ends here
   };
 
   /// The state of `step` as it is published, where the plant does `truth` and sensors and estimator
-  /// say `seen`; null where that cannot differ. Call once per step, in order, from step 0.
+  /// say `seen`; null if that cannot differ. Call once per step, in order, from step 0.
   VehicleState measure(std::uint64_t step, const model::Measurement& truth,
                        const model::Measurement* seen = nullptr);
   /// Takes the answer that the gate accepted for the step in work.
@@ -56,23 +56,23 @@ class VehicleFlight {
   /// A late answer has ended the mission.
   bool has_ended_late() const { return has_ended_late_; }
   const Applied& last_answer() const { return last_answer_; }
-  /// What the state of the step in work returned to the controllers.
+  /// The controller memory that the current step's state sent back.
   const ControllerState& returned() const { return applied_.memory; }
-  /// What the vehicle does at the step in work.
+  /// Motion of the vehicle at the current step.
   const model::Measurement& state() const { return state_; }
 
   /// The step in work was published at `time` and has no answer yet.
   void note_waiting(Clock::time_point time) {
     if (!absent_since_) absent_since_ = time;
   }
-  /// Since the first step without a fresh answer was published; 0 where the last one had one.
+  /// Since the first step without a fresh answer was published; 0 if the last one had one.
   double calc_absence_s() const;
   /// Answers were refused, or none is any more.
   void note_refused(bool is_refused) {
     if (is_refused != refused_since_.has_value())
       refused_since_ = is_refused ? std::optional(Clock::now()) : std::nullopt;
   }
-  /// Since answers are refused without a valid one; 0 where none is.
+  /// Since answers are refused without a valid one; 0 if none is.
   double calc_refused_s() const;
   /// The run was at rest for so long, which is no absence.
   void note_rest(Clock::duration rest);

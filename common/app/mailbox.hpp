@@ -17,7 +17,7 @@ class Mailbox {
  public:
   explicit Mailbox(std::size_t capacity) : capacity_(capacity) {}
 
-  /// False where the queue was full: `item` is lost and `refused()` counts it.
+  /// False if the queue was full: `item` is lost and `refused()` counts it.
   bool put(T item) {
     {
       const std::lock_guard lock(mutex_);
@@ -45,7 +45,7 @@ class Mailbox {
     return items_.empty();
   }
 
-  /// The oldest item, waiting for one until `deadline`; nothing where none came.
+  /// The oldest item, waiting for one until `deadline`; nothing if none came.
   std::optional<T> take(std::chrono::steady_clock::time_point deadline) {
     std::unique_lock lock(mutex_);
     if (!filled_.wait_until(lock, deadline, [this] { return !items_.empty(); }))
@@ -64,8 +64,8 @@ class Mailbox {
     return has_news;
   }
 
-  /// All items there are, oldest first, without waiting. A thread that can afford to look only now
-  /// and then spares everybody a wake-up per item.
+  /// All items there are, oldest first, without waiting. A thread that polls from time to
+  /// time saves its writers a wake-up per item.
   std::deque<T> take_all() {
     const std::lock_guard lock(mutex_);
     return std::exchange(items_, {});

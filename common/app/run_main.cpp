@@ -11,6 +11,7 @@ namespace sls::app {
 int run_main(int argc, char** argv, CLI::App& cli, const CommonOptions& options,
              const std::string& program, const std::function<void()>& work) {
   start_log(program, "info");
+  cli.name(program);
   try {
     cli.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -1,4 +1,4 @@
-/// What every main does around its own work: options, log, signals, exit codes.
+/// The common part of every main: options, log, signals, exit codes.
 #pragma once
 
 #include <functional>

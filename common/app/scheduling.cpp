@@ -10,9 +10,9 @@
 namespace sls::app {
 namespace {
 
-constexpr int kPriority = 1;  // the lowest that goes before ordinary threads
+constexpr int kPriority = 1;  // the lowest real-time priority
 constexpr int kNiceness = 5;
-constexpr int kOnlookerNiceness = 10;  // further, a page stands still on a busy machine
+constexpr int kViewerNiceness = 10;  // further, a page stands still on a busy machine
 
 void put_back(int policy, int niceness) {
   const sched_param parameters{};
@@ -36,6 +36,6 @@ bool put_process_first() {
 
 void put_thread_last() { put_back(SCHED_OTHER, kNiceness); }
 
-void put_onlooker_last() { put_back(SCHED_BATCH, kOnlookerNiceness); }
+void put_viewer_last() { put_back(SCHED_BATCH, kViewerNiceness); }
 
 }  // namespace sls::app

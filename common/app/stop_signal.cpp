@@ -25,8 +25,8 @@ extern "C" void remember_signal(int number) {
 /// In a handler only a few functions may be called, and none that allocates or locks.
 extern "C" void give_up(int) {
   for (const char* text : {const_cast<const char*>(program_invocation_short_name),
-                           ": error: hangs after the stop signal: ends as it is, what it was "
-                           "writing is not complete\n"})
+                           ": error: hangs after the stop signal: exits now, its files may be "
+                           "incomplete\n"})
     if (::write(STDERR_FILENO, text, std::strlen(text)) < 0) break;
   ::_exit(128 + received);
 }

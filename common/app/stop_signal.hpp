@@ -5,8 +5,8 @@
 namespace sls::app {
 
 /// From now on SIGINT and SIGTERM only set a flag; loops end their step and close their files.
-/// Who has not ended `patience` after the first of them is ended, with a line on stderr and exit
-/// code 130 or 143: a packet can leave the middleware with a lock held for good
+/// A program still running `patience` after the first signal exits with an error line on stderr and
+/// exit code 130 or 143: a packet can leave the middleware with a lock held for good
 /// (tests/hostile/README.md), and a program that cannot be stopped hides that.
 /// SIGPIPE and SIGXFSZ are ignored: the failing write reports them. SIGALRM is taken.
 void install_stop_signals(std::chrono::seconds patience = std::chrono::seconds(20));

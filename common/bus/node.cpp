@@ -176,7 +176,7 @@ struct Node::Impl {
     dds::DomainParticipantFactory::get_instance()->delete_participant(participant);
   }
 
-  /// What a handshake of DDS Security may take, which goes in no fragments: with the keys of
+  /// Largest handshake of DDS Security, which is never fragmented: with the keys of
   /// `./sls keys` 5,500 bytes, mostly certificate and signed permissions.
   static std::size_t calc_handshake_bytes(
       const eprosima::fastrtps::rtps::PropertyPolicy& properties) {
@@ -322,7 +322,7 @@ std::size_t Node::max_batch_bytes() const {
 
 std::size_t Node::max_sample_bytes() const { return impl_->max_datagram_bytes - kEnvelopeBytes; }
 
-std::string Node::describe_loneliness() const {
+std::string Node::describe_isolation() const {
   constexpr auto kUsualDiscoveryTime = std::chrono::seconds(3);
   const auto* participant = impl_->participant;
   const bool is_alone = participant->get_participant_names().size() <= 1;  // the first is our own
@@ -343,7 +343,7 @@ std::string Node::describe_loneliness() const {
            name_hosts(servers.front().metatrafficUnicastLocatorList) +
            " does not answer (SLS_DISCOVERY_SERVER; ./sls discovery-server starts one)";
   const std::string domain =
-      "; nobody else was discovered on domain " + std::to_string(participant->get_domain_id());
+      "; no other program discovered on domain " + std::to_string(participant->get_domain_id());
   if (!builtin.initialPeersList.empty())
     return domain + " at " + name_hosts(builtin.initialPeersList) +
            ": is SLS_PEERS right? (./sls doctor)";

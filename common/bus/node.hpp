@@ -29,8 +29,8 @@ class BusError : public std::runtime_error {
 };
 
 /// Makes the middleware ready and loads a QoS file into it: one for the whole process, because
-/// profiles are global there. A Node does it by itself; this is for who makes a participant of his
-/// own (tools/doctor/observer.cpp).
+/// profiles are global there. A Node calls it; call it yourself only to make a participant
+/// without a Node (tools/doctor/observer.cpp).
 /// @throws config::ConfigError as Node does.
 void load_profiles(const std::filesystem::path& file, const std::string& identity);
 
@@ -63,7 +63,7 @@ class Node {
   const char* choose_writer_profile(const char* profile, const char* fallback) const;
   const char* choose_reader_profile(const char* profile, const char* fallback) const;
 
-  /// What a sample of the loop that is made of many parts should not exceed to fit into one
+  /// Largest size of a sample of the loop that is made of many parts, so that it fits into one
   /// datagram, so that one lost packet does not lose the parts that came in others. The QoS file
   /// says how long a datagram may be (property sls.max_datagram_bytes of the participant).
   std::size_t max_sample_bytes() const;
@@ -73,15 +73,15 @@ class Node {
   /// none.
   std::size_t max_batch_bytes() const;
 
-  /// Where nobody else has been discovered 3 s after joining: "; " and that, with what to look at,
+  /// "; " and hints, if no other program has been discovered 3 s after joining,
   /// to be appended to a message about who is missing. Else empty.
-  std::string describe_loneliness() const;
+  std::string describe_isolation() const;
 
-  /// What the others on the domain do wrong. Endpoints and samples that do not fit ours are in it
-  /// by themselves.
+  /// Mistakes of the other programs on the domain. Endpoints and samples that do not match ours are
+  /// added automatically.
   Problems& problems() const;
 
-  /// What a participant does wrong until it leaves: `text` is said behind its description, once for
+  /// A mistake of a participant until it leaves: `text` is logged behind its description, once for
   /// each `key`.
   void note_problem(const PeerId& peer, const std::string& key, const std::string& text) const;
 
@@ -198,7 +198,7 @@ class Reader {
   /// Times no sample came for the DEADLINE of the reader's profile.
   std::uint64_t missed_deadlines() const { return reader_.missed_deadlines(); }
 
-  /// LIFESPAN of the reader's profile; nothing where it is infinite.
+  /// LIFESPAN of the reader's profile; nothing if it is infinite.
   std::optional<std::chrono::nanoseconds> lifespan() const { return reader_.lifespan(); }
 
   /// From now on no sample expires. `lifespan()` stays what the profile says.

@@ -19,7 +19,7 @@ constexpr std::size_t kMaxParticipants = 256;
 constexpr std::size_t kMaxServers = 64;
 constexpr std::size_t kMaxRunsOfServer = 4;  // the one in work and those that resets ended
 
-/// True where `known` has, or now has, room for `sender`: who has left makes room. Only where it is
+/// True if `known` has, or now has, room for `sender`: who has left makes room. Only where it is
 /// full must it be known who is there.
 template <class Known, class FindPresent>
 bool make_room(std::map<PeerId, Known>& known, std::size_t most, const PeerId& sender,
@@ -33,7 +33,7 @@ bool make_room(std::map<PeerId, Known>& known, std::size_t most, const PeerId& s
   return true;
 }
 
-/// What is known of run `run_id` of a server, of whose runs the last are kept.
+/// The knowledge of run `run_id` of a server, of which the last runs are kept.
 template <class Known>
 Known& find_or_add(std::deque<Known>& runs, std::uint64_t run_id) {
   for (Known& run : runs)
@@ -43,7 +43,7 @@ Known& find_or_add(std::deque<Known>& runs, std::uint64_t run_id) {
   return runs.back();
 }
 
-/// True where one of `recorders` has completed steps since `last_steps`, which are brought up to
+/// True if one of `recorders` has completed steps since `last_steps`, which are brought up to
 /// date.
 bool get_further(const std::vector<ParticipantDirectory::Entry>& recorders,
                  std::map<PeerId, std::int64_t>& last_steps) {
@@ -227,7 +227,7 @@ bool ServerDirectory::is_present_run(const PeerId& server, const Server& known,
   if (find_owner(run_id) != server) return false;
   const HeardStatus* heard = find_heard(run_id);
   return !heard || calc_progress(heard->status.phase()) <= 0 ||
-         std::chrono::steady_clock::now() - heard->time <= kSilenceOfTheDead;
+         std::chrono::steady_clock::now() - heard->time <= kPresumedDeadAfter;
 }
 
 std::vector<Run> ServerDirectory::runs() const {
@@ -293,7 +293,7 @@ bool ServerDirectory::is_present(const PeerId& server) const {
 
 bool ServerDirectory::is_silent(std::uint64_t run_id) const {
   const auto heard = find_last_heard(run_id);
-  return !heard || std::chrono::steady_clock::now() - *heard > kSilenceOfTheDead;
+  return !heard || std::chrono::steady_clock::now() - *heard > kPresumedDeadAfter;
 }
 
 std::optional<std::chrono::steady_clock::time_point> ServerDirectory::find_last_heard(

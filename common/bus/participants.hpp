@@ -1,5 +1,6 @@
-/// Who is on the domain: controllers and recorders (sls/participant) and servers (sls/parameters,
-/// sls/status). Both classes listen on the middleware's threads and may be asked from any thread.
+/// Participants of the domain: controllers and recorders (sls/participant) and servers
+/// (sls/parameters, sls/status). Both classes listen on the middleware's threads and may be asked
+/// from any thread.
 #pragma once
 
 #include <atomic>
@@ -19,9 +20,9 @@
 
 namespace sls::bus {
 
-/// Somebody who announces himself at least every 0.5 s and has not for so long is taken for dead,
-/// until he is heard again. (The middleware's lease is much longer: docs/networks.md.)
-inline constexpr auto kSilenceOfTheDead = std::chrono::seconds(2);
+/// Participants announce themselves at least every 0.5 s. One silent for this long is presumed dead
+/// until its next announcement. (The middleware's lease is much longer: docs/networks.md.)
+inline constexpr auto kPresumedDeadAfter = std::chrono::seconds(2);
 
 /// The last announcement of every controller and recorder that is still there. Of 256 participants
 /// at most, so that strangers cannot fill the memory: those that have left make room.
@@ -33,13 +34,13 @@ class ParticipantDirectory {
     PeerId peer;
     Participant announcement;
     std::chrono::steady_clock::time_point heard;  ///< when it came
-    /// Age of the youngest announcement when it came, by his clock and ours: about 0 where they
-    /// agree, positive where his is behind.
+    /// Age of the youngest announcement when it came, by its clock and ours: about 0 if they
+    /// agree, positive where its clock is behind.
     std::chrono::nanoseconds age{0};
     /// When it first said it was ready.
     std::chrono::steady_clock::time_point ready_since{};
 
-    bool is_silent() const { return std::chrono::steady_clock::now() - heard > kSilenceOfTheDead; }
+    bool is_silent() const { return std::chrono::steady_clock::now() - heard > kPresumedDeadAfter; }
   };
 
   /// Present participants of `role` that serve run `run_id`.
@@ -55,7 +56,7 @@ class ParticipantDirectory {
   /// left since.
   int count_done(ParticipantRole role, std::uint64_t run_id) const;
 
-  /// Changes with every announcement (not with departures: ask again now and then).
+  /// Changes with every announcement (not with departures: ask again from time to time).
   std::uint64_t version() const { return version_.load(std::memory_order_acquire); }
 
  private:
@@ -95,9 +96,9 @@ struct Run {
   std::chrono::steady_clock::time_point server_known_since;
 };
 
-/// The last parameters and status of every server that is still there and speaks this contract, of
+/// The last parameters and status of every server that is still there and uses this contract, of
 /// 64 at most: those that have left make room. A run is of the server that was the first to claim
-/// it; what others say of it is not believed.
+/// it; what other servers say of it is ignored.
 class ServerDirectory {
  public:
   /// `on_status`, where given, sees every status sample, on a thread of the middleware.
@@ -107,10 +108,10 @@ class ServerDirectory {
   /// is silent is not present.
   std::vector<Run> runs() const;
 
-  /// True where `run_id` is among `runs()`.
+  /// True if `run_id` is among `runs()`.
   bool is_known(std::uint64_t run_id) const;
 
-  /// False where the server of run `run_id` is known, also one that has gone, and does not fly
+  /// False if the server of run `run_id` is known, also one that has gone, and does not fly
   /// `vehicle_id`.
   bool may_fly(std::uint64_t run_id, std::uint32_t vehicle_id) const;
 
@@ -120,8 +121,8 @@ class ServerDirectory {
 
   /// The run to go on with for the first of `vehicle_ids` that has one, where `run` does not: its
   /// own server's after a reset or, where that is silent, one of another server that was not known
-  /// before it fell silent. Whoever was, had lost the vehicle to it and is no server in its place,
-  /// whatever he says.
+  /// before it fell silent. A server known before that had
+  /// lost the vehicle to ours and does not replace it.
   std::optional<Run> find_successor(const Run& run,
                                     const std::vector<std::uint32_t>& vehicle_ids) const;
 
@@ -131,7 +132,7 @@ class ServerDirectory {
   /// True until the server has left, or its lease has run out.
   bool is_present(const PeerId& server) const;
 
-  /// True when nothing was heard of run `run_id` for so long that its server is taken for dead.
+  /// True when nothing was heard of run `run_id` for so long that its server is presumed dead.
   bool is_silent(std::uint64_t run_id) const;
 
   /// When the last status of run `run_id` came; nothing before the first.
@@ -205,16 +206,16 @@ int calc_progress(RunPhase phase);
 /// The same of a run that may not have a status yet (0).
 int calc_progress(const std::optional<SimStatus>& status);
 
-/// True where `vehicle_id` is among `parameters`' vehicles.
+/// True if `vehicle_id` is among `parameters`' vehicles.
 bool serves_vehicle(const Parameters& parameters, std::uint32_t vehicle_id);
 
 /// The vehicles that it claims.
 std::vector<std::uint32_t> list_vehicle_ids(const Parameters& parameters);
 
-/// True where the run of `parameters` is of several vehicles.
+/// True if the run of `parameters` is of several vehicles.
 bool is_fleet(const Parameters& parameters);
 
-/// True where the controller that announced itself so flies `vehicle_id`.
+/// True if the controller that announced itself so flies `vehicle_id`.
 bool flies_vehicle(const Participant& controller, std::uint32_t vehicle_id);
 
 /// This machine's name, at most 64 bytes, for sls/participant.

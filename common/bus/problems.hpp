@@ -11,7 +11,7 @@
 
 namespace sls::bus {
 
-/// What participants do wrong, as this program sees it. A mistake is one line on stderr when it
+/// Mistakes of participants, as seen by this program. A mistake is one line on stderr when it
 /// begins, and is listed while it holds. At most `kMostLines` lines in 10 s and `kMost` mistakes,
 /// whatever strangers send. May be used from any thread.
 class Problems {
@@ -30,13 +30,13 @@ class Problems {
   /// Of the mistakes whose keys begin with `prefix`, those of `found` hold and no others.
   void replace(const std::string& prefix, const std::map<std::string, std::string>& found);
 
-  /// True where one holds whose key begins with `prefix`.
+  /// True if one holds whose key begins with `prefix`.
   bool has_any(const std::string& prefix) const;
 
   /// Changes when a mistake begins or ends (not when one that lasts for a time runs out).
   std::uint64_t version() const { return version_.load(std::memory_order_acquire); }
 
-  /// The mistakes that hold, oldest first, in at most `most` bytes; empty where none does.
+  /// The mistakes that hold, oldest first, in at most `most` bytes; empty if none does.
   std::string describe(std::size_t most = 255) const;
 
  private:

@@ -116,7 +116,7 @@ std::string find_value(const std::string& expression, const std::string& identit
                     "}: expected an environment variable of this name, got none");
 }
 
-/// `text` with every `${…}` replaced. What is put in is not looked at again.
+/// `text` with every `${…}` replaced. Inserted text is not expanded again.
 std::string expand(const std::string& text, const std::string& identity, const std::string& place) {
   std::string expanded;
   std::size_t from = 0;

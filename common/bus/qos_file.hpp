@@ -21,7 +21,7 @@ std::string read_qos_file(const std::filesystem::path& file, const std::string& 
 std::string find_identity(const std::string& role);
 
 /// The QoS file used without `--qos`: qos/default.xml of the folder SLS_CONFIG (environment), or of
-/// config/ of this installation. Programs of one's own stand in no installation.
+/// config/ of this installation. A program outside an installation has none.
 std::filesystem::path default_qos_file();
 
 }  // namespace sls::bus

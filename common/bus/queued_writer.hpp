@@ -12,8 +12,8 @@
 
 namespace sls::bus {
 
-/// Hands messages to `writer` in order, from a bounded queue. What does not fit, or what the
-/// middleware refuses, is counted and never published.
+/// Hands messages to `writer` in order, from a bounded queue. A message that does not fit, or that
+/// the middleware refuses, is counted and never published.
 template <class Message>
 class QueuedWriter {
  public:

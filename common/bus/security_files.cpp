@@ -40,7 +40,7 @@ constexpr const char* kAccess = "dds.sec.access.builtin.Access-Permissions.";
   throw ConfigError(file + ": " + what);
 }
 
-/// What openssl could not do, in its words.
+/// The error message of openssl.
 std::string find_openssl_error() {
   const char* reason = ERR_reason_error_string(ERR_peek_last_error());
   ERR_clear_error();

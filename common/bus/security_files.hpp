@@ -13,7 +13,7 @@ namespace sls::bus {
 /// @throws config::ConfigError `FILE: expected …, got …`.
 bool check_security_files(const std::string& profiles);
 
-/// True where a signed permissions document is of contract 1: it grants topics that contract 2 has
+/// True if a signed permissions document is of contract 1: it grants topics that contract 2 has
 /// not, and not sls/record.
 bool is_of_contract_1(const std::filesystem::path& permissions);
 

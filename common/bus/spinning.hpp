@@ -10,7 +10,7 @@ namespace sls::bus {
 inline std::atomic<bool> is_spinning{false};
 
 /// To be called by a program whose next message usually comes at once: in lockstep, by the server
-/// and by the controllers. Does nothing where the process may use one processor only, which
+/// and by the controllers. Does nothing if the process may use one processor only, which
 /// spinning would keep from the sender, or where the environment has SLS_SPIN=off.
 void start_spinning();
 void stop_spinning();

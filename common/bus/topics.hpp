@@ -5,11 +5,11 @@
 
 namespace sls::bus {
 
-/// SHA-256 of idl/sls.idl without comments and with white space collapsed: idl/README.md. Whoever
-/// was made from another one must not be believed a word.
+/// SHA-256 of idl/sls.idl without comments and with white space collapsed: idl/README.md. Samples
+/// of a program built from another contract are ignored.
 inline constexpr const char* kContractSha256 = SLS_CONTRACT_SHA256;
 
-/// What a topic is for decides its QoS profiles: config/qos/README.md.
+/// The purpose of a topic decides its QoS profiles: config/qos/README.md.
 enum class Flow {
   kLoop,     ///< the control loop: states and commands, one step at a time
   kRecord,   ///< batches of steps for recorders

@@ -1,4 +1,4 @@
-/// What a plant, an autopilot or a control law adds to the scenario file: keys of its own in the
+/// Additions of a plant, an autopilot or a control law to the scenario file: keys of its own in the
 /// section that names it. Each folder of sim_server/plants, sim_server/autopilots and
 /// control_client/laws describes them in its keys.hpp, without Simbody or DDS. Every program links
 /// all of them, so all accept and refuse the same file with the same line. How to describe keys:

@@ -13,7 +13,7 @@ inline constexpr double kMaxSeconds = 1e6;
 inline constexpr std::int64_t kMaxNanoseconds = 1'000'000'000'000'000;
 
 /// The number that `text` holds as a YAML scalar (1, -2.5, 1e-3, .inf, .nan), or nothing if it is
-/// none. What a double cannot hold comes back as an infinity.
+/// none. A number too large for a double becomes an infinity.
 std::optional<double> parse_number(std::string_view text);
 
 /// Shortest decimal that reads back to the same double, without exponent in the usual range.

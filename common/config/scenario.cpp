@@ -103,7 +103,7 @@ std::string to_too_long(std::int64_t period_ns) {
          to_seconds_text(kMaxDelayPeriods * period_ns) + " s)";
 }
 
-/// What only plants have whose vehicles turn, and their autopilot.
+/// Keys of plants whose vehicles turn, and of their autopilot.
 void check_autopilot(const Scenario& scenario, const Places& places) {
   const ModelName& model = scenario.plant.model;
   if (model.is_shared_library() || !find_model_keys(plant_keys(), model).has_attitude()) {
@@ -124,7 +124,7 @@ void check_autopilot(const Scenario& scenario, const Places& places) {
     find_model_keys(autopilot_keys(), scenario.autopilot->model).check(scenario, places);
 }
 
-/// Nothing where `offset` says something to its channel, else the keys that could.
+/// Nothing if `offset` says something to its channel, else the keys that could.
 std::optional<std::string> find_missing_offset(const SampleOffset& offset, FaultChannel on) {
   const model::RodAngles& rod = offset.rod;
   if (on == FaultChannel::kCommand)
@@ -260,7 +260,7 @@ std::string read_scenario_file(const std::filesystem::path& file) {
 
   std::ifstream stream(file, std::ios::binary);
   if (!stream) fail("a readable file", std::generic_category().message(errno));
-  std::string text(kMaxScenarioBytes + 1, '\0');  // one more, should it have grown meanwhile
+  std::string text(kMaxScenarioBytes + 1, '\0');  // one more, in case it has grown meanwhile
   stream.read(text.data(), static_cast<std::streamsize>(text.size()));
   if (stream.bad()) fail("a readable file", std::generic_category().message(errno));
   text.resize(static_cast<std::size_t>(stream.gcount()));

@@ -55,7 +55,7 @@ class OwnValues {
   template <class Values, class = std::enable_if_t<!std::is_same_v<Values, OwnValues>>>
   OwnValues(Values values) : any_(std::move(values)) {}
 
-  /// What is held, or the defaults of `Values` where it is something else.
+  /// The values held, or the defaults of `Values` if another type is held.
   template <class Values>
   const Values& get() const {
     static const Values kDefaults{};
@@ -117,7 +117,7 @@ struct Plant {
   Eigen::Vector3d disturbance_W = Eigen::Vector3d::Zero();  ///< d, constant, on the quadrotor, N
 };
 
-/// What turns the force that a controller asks for into what the rotors do, inside the plant.
+/// The autopilot inside the plant: turns the controller's force into rotor speeds.
 struct Autopilot {
   ModelName model{"none", ""};
   OwnValues own;
@@ -128,14 +128,14 @@ struct Autopilot {
 
 enum class SyncMode { kLockstep, kRealtime };
 
-/// Who must be ready before step 0.
+/// Participants that must be ready before step 0.
 struct WaitFor {
   int controllers = 1;  ///< for each vehicle
   int recorders = 1;
   double timeout_s = 30.0;
 };
 
-/// What the server does about a vehicle whose controllers stay silent in flight.
+/// Reaction of the server to a vehicle whose controllers stay silent in flight.
 enum class ControllerPolicy {
   kWait,      ///< lockstep: keeps waiting
   kHold,      ///< flies on with the last answer, after `max_hold_s` with the fail-safe force
@@ -143,15 +143,15 @@ enum class ControllerPolicy {
   kStop,      ///< ends the run as failed
 };
 
-/// What the server does about an expected recorder that is gone or too far behind.
+/// Reaction of the server to an expected recorder that is gone or too far behind.
 enum class RecorderPolicy {
   kWait,  ///< lockstep: keeps waiting
   kGoOn,  ///< flies on without it; its recording will have a gap
   kStop,  ///< ends the run as failed
 };
 
-/// Patience with a participant that is silent or gone. Who is missing is reported within 1 s and
-/// every 5 s whatever the policy.
+/// Time limits for a participant that is silent or gone. Every policy reports it within 1 s and
+/// then every 5 s.
 template <class Policy>
 struct Absence {
   Policy policy = Policy::kWait;
@@ -269,7 +269,7 @@ enum class StateWiring {
   kGazeboPlugin,  ///< the published plugin's permuted angle slots
 };
 
-/// What the controller believes; what the file leaves out equals the plant's truth.
+/// Vehicle parameters that the controller uses; those not in the file equal the plant's.
 struct ControllerModel {
   /// Which numbers the file leaves out: in a fleet they equal the truth of each vehicle.
   struct Follows {
@@ -380,7 +380,7 @@ Scenario load_scenario(const std::filesystem::path& file);
 Scenario parse_scenario(const std::string& text, const std::string& place);
 
 /// SHA-256 of the shared library that the plant loads: that of the plant itself or, where it is
-/// none, of its autopilot; empty where neither is one.
+/// none, of its autopilot; empty if neither is one.
 /// @throws std::system_error naming the file where it cannot be read.
 std::string calc_plant_library_sha256(const Scenario& scenario);
 
@@ -398,7 +398,7 @@ std::vector<VehicleVariant> make_vehicle_grid(std::size_t count);
 /// @throws std::out_of_range if there is no such vehicle.
 Scenario make_vehicle_scenario(const Scenario& scenario, std::uint32_t id);
 
-/// `seconds` in whole nanoseconds, or nothing where it is not a whole number of them (within 1e-3
+/// `seconds` in whole nanoseconds, or nothing if it is not a whole number of them (within 1e-3
 /// ns, so that 0.004 is exactly 4,000,000).
 std::optional<std::int64_t> to_nanoseconds(double seconds);
 

@@ -103,7 +103,7 @@ bool is_row(const YamlNode& node) {
 
 void write(const YamlNode& node, std::size_t depth, std::string& text);
 
-/// What stands after a key or a dash.
+/// The text after a key or a dash.
 void write_value(const YamlNode& node, std::size_t depth, std::string& text) {
   if (is_leaf(node)) {
     text += " " + to_leaf(node) + "\n";

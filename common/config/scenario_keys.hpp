@@ -29,7 +29,7 @@ enum class Presence { kRequired, kOptional };
 inline constexpr Presence kRequired = Presence::kRequired;
 inline constexpr Presence kOptional = Presence::kOptional;
 
-/// What a number must satisfy; `expectation` completes "expected …".
+/// Condition on a number; `expectation` completes "expected …".
 struct NumberRule {
   const char* expectation;
   bool (*holds)(double number);
@@ -52,7 +52,7 @@ inline constexpr NumberRule kRate{"from 0.001 to 1000",
 inline constexpr NumberRule kFlushInterval{"> 0 and <= 0.2",
                                            [](double x) { return x > 0.0 && x <= 0.2; }};
 
-/// What a text must satisfy.
+/// Condition on a text.
 struct TextRule {
   const char* expectation;
   bool (*holds)(std::string_view text);
@@ -184,7 +184,7 @@ void describe(Map& map, InitialState& initial) {
   map.key(kOptional, "body_rates_rad_s", initial.w_WB_B);
 }
 
-/// What acts on the quadrotor of a point-mass plant besides the control force.
+/// Effects on the quadrotor of a point-mass plant besides the control force.
 template <class Map>
 void describe_point_mass_loads(Map& map, Plant& plant) {
   describe(map, plant.air);
@@ -394,7 +394,7 @@ void describe_effect(Map& map, ReorderFault& reorder, FaultChannel) {
   map.key(kOptional, "seed", reorder.seed, kSeeds);
 }
 
-/// What the numbers of a bias or a noise must satisfy.
+/// Condition on the numbers of a bias or a noise.
 struct OffsetRules {
   NumberRule number;
   NumberRule alpha;

@@ -34,7 +34,7 @@ bool begins_with(const std::string& text, const std::string& beginning) {
   return text.compare(0, beginning.size(), beginning) == 0;
 }
 
-/// What the user may have meant by `key`: a slip of the fingers or a forgotten unit.
+/// A suggestion for an unknown `key`: a typing error or a forgotten unit.
 std::optional<std::string> find_similar(const std::string& key,
                                         const std::vector<std::string>& known) {
   constexpr std::size_t kLongestKey = 64;  // beyond, nothing is similar

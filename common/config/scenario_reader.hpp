@@ -98,7 +98,7 @@ int find_key(const YamlNode& map, const std::string& name);
 /// @throws ConfigError unless `value` is a map with no other keys than `known`, each at most once.
 void check_keys(const Value& value, const KeyNames& known);
 
-// One per type of field. @throws ConfigError where the node is something else or breaks the rule.
+// One per type of field. @throws ConfigError if the node is something else or breaks the rule.
 void read_value(const Value& value, double& number, const NumberRule& rule);
 void read_value(const Value& value, std::int64_t& nanoseconds, const NumberRule& rule);
 void read_value(const Value& value, int& number, const Range& range);
@@ -185,7 +185,7 @@ void read_value(const Value& value, std::vector<Element>& list, const ListRange&
   for (std::size_t i = 0; i < list.size(); ++i) read_value(value.at(i), list[i]);
 }
 
-/// What the file may leave out.
+/// Optional parts of the file.
 template <class Field, class... Rule>
 void read_value(const Value& value, std::optional<Field>& field, const Rule&... rule) {
   read_value(value, field.emplace(), rule...);

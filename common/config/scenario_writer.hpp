@@ -77,7 +77,7 @@ class MapWriter {
     }
   }
 
-  /// What the file may leave out.
+  /// Optional parts of the file.
   template <class Field, class... Rule>
   void key(Presence presence, const char* name, std::optional<Field>& field, const Rule&... rule) {
     if (field) key(presence, name, *field, rule...);

@@ -10,7 +10,7 @@
 
 namespace sls::config {
 
-/// What `--vehicles` stands for: `all`, or ids and ranges of them such as `0-9,20`. Sorted, each
+/// The ids that `--vehicles` names: `all`, or ids and ranges of them such as `0-9,20`. Sorted, each
 /// once.
 /// @throws ConfigError `--vehicles: expected …, got …` for anything else, a range that runs
 /// backwards, and a vehicle beyond the fleet.

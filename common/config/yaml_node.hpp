@@ -9,7 +9,7 @@
 
 namespace sls::config {
 
-/// What one place in the file holds.
+/// The content of one place in the file.
 struct YamlNode {
   enum class Kind { kNothing, kScalar, kList, kMap };
 
@@ -26,7 +26,7 @@ struct YamlNode {
 /// @throws ConfigError `PLACE:LINE: …`.
 YamlNode parse_yaml(const std::string& text, const std::string& place);
 
-/// What `node` holds, in a few printable characters: `-0.16`, `"abc"`, `a list of 2`, `nothing`.
+/// The content of `node` in a few printable characters: `-0.16`, `"abc"`, `a list of 2`, `nothing`.
 std::string to_brief(const YamlNode& node);
 
 /// `text` with what is not printable ASCII escaped, cut after about `most` characters.

@@ -1,4 +1,4 @@
-/// What a controller's answer says of the mission and of itself.
+/// Mission progress and error code in a controller's answer.
 #pragma once
 
 namespace sls::model {

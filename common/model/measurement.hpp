@@ -1,4 +1,4 @@
-/// What is measured of one vehicle at one instant.
+/// The measurements of one vehicle at one instant.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,4 @@
-/// What a slung load is made of. Symbols and frames: README.md.
+/// Parameters of a slung load. Symbols and frames: README.md.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,4 @@
-/// What the load is asked to do at one instant.
+/// The desired motion of the load at one instant.
 #pragma once
 
 #include <Eigen/Core>

@@ -26,7 +26,7 @@ constexpr auto kReportAfter = 2s;
 
 std::atomic<double> patience_s{60.0};
 
-/// What one thread is doing. Odd: inside a library. The watchdog reads it without a lock.
+/// State of one thread. Odd: inside a library. The watchdog reads it without a lock.
 struct ThreadRecord {
   std::atomic<std::uint64_t> calls{0};
   Call call;

@@ -1,4 +1,4 @@
-/// What plants, laws and autopilots in shared libraries have in common: the check of a library's
+/// Common to plants, laws and autopilots in shared libraries: the check of a library's
 /// table of functions, the making of its object, vectors as C has them.
 #pragma once
 
@@ -43,17 +43,17 @@ inline Eigen::Quaterniond to_quaternion(const double (&from)[4]) {
   return {from[0], from[1], from[2], from[3]};
 }
 
-/// Why `length` is not that of a unit vector or quaternion; empty where it is. A library may be off
+/// Why `length` is not that of a unit vector or quaternion; empty if it is. A library may be off
 /// by 1e-6.
 std::string find_length_defect(double length, const std::string& kind, const std::string& name);
 
-/// @throws config::ConfigError where a library was compiled against another header.
+/// @throws config::ConfigError if a library was compiled against another header.
 void check_version(const SharedLibrary& library, std::uint32_t expected, std::uint32_t got);
 void check_size(const SharedLibrary& library, const std::string& type, std::size_t expected,
                 std::size_t got);
 
 /// The table that the function `call.function` of a library returns.
-/// @throws config::ConfigError where there is none, or where it is one of another header.
+/// @throws config::ConfigError if there is none, or where it is one of another header.
 template <class Functions>
 const Functions& load_table(const SharedLibrary& library, const Call& call, std::uint32_t version) {
   const std::string function = call.function;
@@ -66,7 +66,7 @@ const Functions& load_table(const SharedLibrary& library, const Call& call, std:
   return *functions;
 }
 
-/// What `create(error, error_size)` of a library returns. `place` is FILE:LINE: KEY.
+/// The result of `create(error, error_size)` of a library. `place` is FILE:LINE: KEY.
 /// @throws config::ConfigError `PLACE: LIBRARY: TEXT` where the library refuses.
 template <class Create>
 void* create_object(const SharedLibrary& library, const Call& call, const std::string& place,

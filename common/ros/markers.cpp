@@ -12,7 +12,7 @@ struct Color {
   float r, g, b, a;
 };
 
-/// What tells one marker of a vehicle from the other, and how it is drawn.
+/// Distinguishes the markers of a vehicle and says how each is drawn.
 struct Style {
   std::int32_t id;
   Shape shape;

@@ -32,7 +32,7 @@ class VehicleMarkers {
 
   explicit VehicleMarkers(std::uint32_t vehicle_id);
 
-  /// True where the markers of this time are to be written: once in each period of simulation time.
+  /// True if the markers of this time are to be written: once in each period of simulation time.
   bool is_due(std::int64_t sim_time_ns) const { return sim_time_ns >= next_ns_; }
 
   /// Writes a MarkerArray. Positions in `world`.

@@ -50,7 +50,7 @@ class Mirrors {
   using Emit = std::function<void(std::size_t channel, std::int64_t sim_time_ns,
                                   const std::vector<std::uint8_t>& cdr)>;
 
-  /// What there is once: /tf_static. To be called first.
+  /// The messages written once: /tf_static. Call first.
   void emit_static(const Emit& emit);
   /// All messages of one sample: /clock (of a step once), /tf, odometry and poses of quadrotor and
   /// load; markers of rod, trail and reference, the latter at most every 50 ms of simulation time.

@@ -1,4 +1,4 @@
-/// What a reader must know of a message type: its definition and its hash.
+/// The description of a message type for readers: its definition and its hash.
 #pragma once
 
 #include <string>

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # ./sls keys: certificate authorities, identities for the roles, and signed governance and permissions
-# documents, all by openssl. What each file is: README.md.
+# documents, all by openssl. The files are explained in README.md.
 set -euo pipefail
 
 here="$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)"
@@ -16,12 +16,12 @@ usage: ./sls keys DIR [--days N] [--force] [--other-vendors]
        ./sls keys DIR --add ROLE NAME [--days N] [--force]
 
 Makes DIR: certificate authorities (DIR/ca) and one folder for each role, server, controller, recorder,
-operator and viewer, with the identity and the signed documents that a host of that role needs.
+operator and viewer, with the identity and the signed documents of that role.
 
   --days N         valid for N days, 1 to 36500 (default: 365)
   --force          replace what is there
-  --other-vendors  for programs on another vendor's DDS, such as Cyclone DDS: submessages are
-                   encrypted, too, which costs up to a third of the speed
+  --other-vendors  for programs on another vendor's DDS, such as Cyclone DDS: also encrypts
+                   submessages, which costs up to a third of the speed
   --add ROLE NAME  one more identity of that role in DIR/NAME, signed by the authorities in DIR/ca
 
 Fly with them: SLS_KEYS=DIR ./sls run SCENARIO --qos config/qos/secure.xml
@@ -93,7 +93,7 @@ TEXT
 
 # --- openssl --------------------------------------------------------------------------------------
 
-# Says what openssl said only where it failed.
+# Prints the output of openssl only if it failed.
 run_openssl() {
   openssl "$@" >"$work/openssl.log" 2>&1 ||
     fail "openssl $1: $(grep -m 1 -E 'rror' "$work/openssl.log" || tail -n 1 "$work/openssl.log")"
@@ -128,7 +128,7 @@ make_authority() {
 }
 
 # Two authorities, because Fast DDS 2.9.1 takes permissions that anyone with a certificate of the
-# permissions authority has signed: with one for both, a recorder could sign his own.
+# permissions authority has signed: with one for both, a recorder could sign its own.
 make_authorities() {
   mkdir -m 700 "$ca"
   local name
@@ -158,7 +158,7 @@ make_identity() {
 
 # --- command line ---------------------------------------------------------------------------------
 
-# replace NEW OLD: NEW takes the place of OLD, which is never there in part.
+# replace NEW OLD: NEW takes the place of OLD, which is never half written.
 replace() {
   if [[ -e $2 ]]; then
     mv -T -- "$2" "$work/replaced"

@@ -1,4 +1,4 @@
-/// What a control law is: a pure function from what is measured, desired and remembered to a force.
+/// A control law: a pure function of measurement, reference and memory that returns a force.
 /// A new one is a folder beside this file and a line in laws.def: README.md, "Adding a law". No DDS
 /// here.
 #pragma once
@@ -42,13 +42,13 @@ struct LawOutput {
 class ControlLaw {
  public:
   virtual ~ControlLaw() = default;
-  /// @throws std::runtime_error where the law is broken, which ends the client.
+  /// @throws std::runtime_error if the law is broken, which ends the client.
   virtual LawOutput calc(const LawInput& input) const = 0;
   /// How many numbers it remembers, at most `model::kMaxNumbers`.
   virtual int memory_size() const { return 0; }
 };
 
-/// What a law is made from.
+/// The inputs from which a law is made.
 struct LawSetup {
   config::Controller controller;
   double period = 0.0;           ///< control period in force, s

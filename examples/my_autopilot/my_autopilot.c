@@ -1,4 +1,4 @@
-/* An autopilot of one's own: a proportional-derivative law on the attitude's quaternion, and the
+/* Your own autopilot: a proportional-derivative law on the attitude's quaternion, and the
  * shares of four rotors in an X. The equations stand in README.md. */
 #include <math.h>
 #include <sls/sls_autopilot.h>
@@ -41,7 +41,7 @@ static int read_parameters(const char* json, double* k, char* error, size_t erro
   return 1;
 }
 
-/* Eq. (4). False where the rotors are not an X about the centre of mass: one wish would then come
+/* Eq. (4). False if the rotors are not an X about the centre of mass: one wish would then come
  * with another. */
 static int find_shares(Autopilot* self) {
   double effect[kRotors][kWishes]; /* of 1 N of each rotor */
@@ -119,7 +119,7 @@ static int step(void* autopilot, const sls_autopilot_input* input, sls_autopilot
   const double length = sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]);
   if (length > 0.0) find_attitude(f, length, output->attitude_wb); /* else level, as it begins */
 
-  /* What the force is along the rotors as they stand: z of the body, in the world, turned round. */
+  /* Direction of the rotors' thrust: minus the z axis of the body, in the world. */
   const double up[3] = {-2 * (q[1] * q[3] + q[0] * q[2]), -2 * (q[2] * q[3] - q[0] * q[1]),
                         2 * (q[1] * q[1] + q[2] * q[2]) - 1};
   double wish[kWishes], attitude_error[3];

@@ -1,5 +1,5 @@
-/* A controller of one's own: position asks for a velocity, velocity for an acceleration, that for a
- * slope of the rod. What it remembers travels as memory numbers: see README.md. */
+/* Your own controller: position asks for a velocity, velocity for an acceleration, that for a
+ * slope of the rod. Its memory travels as numbers: see README.md. */
 #include <sls/sls_controller.h>
 #include <stdio.h>
 #include <stdlib.h>

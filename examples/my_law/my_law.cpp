@@ -1,4 +1,4 @@
-// A control law of one's own in C++, flown in one process without DDS: force, error, done.
+// Your own control law in C++, flown in one process without DDS: force, error, done.
 #include <cmath>
 #include <cstdio>
 #include <exception>

@@ -1,4 +1,4 @@
-/* A plant of one's own: quadrotor and load as two points, joined by an elastic rope instead of a
+/* Your own plant: quadrotor and load as two points, joined by an elastic rope instead of a
  * rod. It publishes one signal, how far the rope is stretched. */
 #include <math.h>
 #include <sls/sls_plant.h>

@@ -21,7 +21,7 @@ def main() -> None:
 
     figure, axes = plt.subplots(figsize=(7, 3.5), layout="constrained")
     for mass in (0.1, 0.2, 0.3):
-        # The law believes what the file says of the load: without this it would know each mass.
+        # The law uses this mass of the load. Without this line it would use each true mass.
         flight = sls.fly(sls.load_scenario("short", vehicle__load_mass_kg=mass,
                                            controller__model__load_mass_kg=0.2))
         error = np.linalg.norm(flight.calc_load_error(), axis=1)

@@ -46,7 +46,7 @@ def calc_force(loop: sls.ClosedLoop, state: "sls.LoopState", wanted: np.ndarray,
 
 
 def fly(loop: sls.ClosedLoop, gains: np.ndarray) -> np.ndarray:
-    """Root mean square of the load's distance from its reference (count,), m; infinite where the
+    """Root mean square of the load's distance from its reference (count,), m; infinite if the
     load was lost."""
     state = loop.reset()
     steps = round(FLIGHT_S / loop.period_s)

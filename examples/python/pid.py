@@ -1,4 +1,4 @@
-"""A control law of one's own: the equations of control_client/laws/pid/README.md in plain floats.
+"""Your own control law: the equations of control_client/laws/pid/README.md in plain floats.
 
     ./sls python examples/python/pid.py [SCENARIO]
 

@@ -30,7 +30,7 @@ def full_name(name, package):
 
 
 def parse_field(line, package):
-    """The JSON of one field; nothing for a constant. Raises ValueError where the line is neither."""
+    """The JSON of one field; nothing for a constant. Raises ValueError if the line is neither."""
     match = FIELD.match(line)
     if not match:
         if re.match(r"[\w<=]+\s+[A-Z][A-Z0-9_]*\s*=", line):

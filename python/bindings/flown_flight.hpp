@@ -29,10 +29,10 @@ struct ColumnPlace {
 
 class FlownFlight {
  public:
-  /// Flies `ids` (ascending) of `scenario` to the end. `rest` is called now and then, and may throw
+  /// Flies `ids` (ascending) of `scenario` to the end. `rest` is called repeatedly and may throw
   /// to end the flight.
   /// @throws config::ConfigError as Flight does.
-  /// @throws app::RunError where a control law is broken.
+  /// @throws app::RunError if a control law is broken.
   FlownFlight(const config::Scenario& scenario, const std::vector<std::uint32_t>& ids,
               const closed_loop::FlightOptions& options, const std::function<void()>& rest);
 
@@ -41,7 +41,7 @@ class FlownFlight {
   /// The rows of the `index`th vehicle.
   const RowBuffer& rows(std::size_t index) const { return rows_[index]; }
 
-  /// Empty where every mission was finished.
+  /// Empty if every mission was finished.
   const std::string& failure() const { return failure_; }
   /// Whether what is measured of the `index`th vehicle can differ from the truth.
   bool can_measurement_differ(std::size_t index) const { return differs_[index]; }
@@ -51,7 +51,7 @@ class FlownFlight {
   /// That of the flight's recording. The first call hashes all rows; any thread may ask.
   const std::string& calc_certificate() const;
 
-  /// Writes the recording into `folder` as `closed_loop::fly_recorded` does. False where it is not
+  /// Writes the recording into `folder` as `closed_loop::fly_recorded` does. False if it is not
   /// complete.
   bool save(const std::filesystem::path& folder, bool force) const;
 
@@ -64,7 +64,7 @@ class FlownFlight {
   void list_columns(const closed_loop::Flight& flight);
   void keep(const closed_loop::FlownStep& flown, std::size_t index);
   void keep_remarks(closed_loop::Flight& flight);
-  /// Step `row` of the `index`th vehicle as it was flown, but for the numbers of the law's memory,
+  /// Step `row` of the `index`th vehicle as it was flown, without the numbers of the law's memory,
   /// which no file holds.
   closed_loop::FlownStep make_step(std::size_t index, std::size_t row) const;
 

@@ -12,7 +12,7 @@
 
 namespace sls::python {
 
-/// What the Python laws of a flight did wrong: a flight ends with a text, the user is raised the
+/// Errors of the Python laws of a flight: a flight ends with a text, the user is raised the
 /// exception itself. Shared by the laws of a flight and the code that flies them. Every member
 /// with the GIL alone.
 class LawErrors {
@@ -25,7 +25,7 @@ class LawErrors {
   bool is_empty() const { return text_.empty(); }
 
   /// Raises sls.RunError with the text, `__cause__` the exception of the law; KeyboardInterrupt and
-  /// SystemExit as they are. Does nothing where none is kept.
+  /// SystemExit as they are. Does nothing if none is kept.
   /// @throws pybind11::error_already_set
   void raise_first();
 
@@ -70,7 +70,7 @@ class PythonLaw : public control::ControlLaw {
 control::LawMaker make_python_law_maker(pybind11::object controller, bool has_attitude,
                                         std::shared_ptr<LawErrors> errors);
 
-/// What `controller` is called in messages: of a function or class its name, else that of its type.
+/// Name of `controller` in messages: of a function or class its name, else that of its type.
 std::string name_controller(pybind11::handle controller);
 
 /// Adds the types of what a law is given: sls.Now and sls.Reference.

@@ -115,7 +115,7 @@ void add_scenario(py::module_& module) {
       .def_property_readonly(
           "controller_model",
           [](const Scenario& scenario) { return scenario.controller.model.vehicle; },
-          "What the controller believes of the vehicle.")
+          "The vehicle parameters that the controller uses.")
       .def_property_readonly(
           "force_limit_n",
           [](const Scenario& scenario) { return scenario.controller.force_limit_n; },

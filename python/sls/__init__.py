@@ -4,8 +4,8 @@
     flight = sls.fly(sls.load_scenario("figure_eight", vehicle__load_mass_kg=0.3))
     flight.load_position, flight.state["alpha_rad"], flight.metrics, flight.certificate
 
-What each name does is said where it is defined. Figures, reports and recordings work without the
-extension module; what flies needs it (`./sls python` builds it). See python/README.md."""
+Each name is documented at its definition. Figures, reports and recordings work without the
+extension module; flights need it (`./sls python` builds it). See python/README.md."""
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any

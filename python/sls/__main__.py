@@ -18,8 +18,8 @@ from sls.report import make_report
 
 class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
-        place = f"{self.prog.removeprefix('sls ')}: " if self.prog != "sls" else ""
-        raise InputError(f"{place}{message} (see ./sls help)")
+        place = f"{self.prog.removeprefix('./sls ')}: " if self.prog != "./sls" else ""
+        raise InputError(f"{place}{message} (see {self.prog} --help)")
 
 
 def say(text: str) -> None:
@@ -88,41 +88,44 @@ def run_study(options: argparse.Namespace) -> None:
 
 def add_vehicle(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--vehicle", type=int, default=0, metavar="N",
-                        help="which vehicle of a fleet (default: 0)")
+                        help="vehicle of a fleet (default: 0)")
 
 
 def make_parser() -> argparse.ArgumentParser:
-    parser = Parser(prog="sls")
+    parser = Parser(prog="./sls")
     commands = parser.add_subparsers(dest="command", required=True)
 
-    plotting = commands.add_parser("plot", help="figures of recordings and published logs")
+    plotting = commands.add_parser("plot", description="Draws figures of recordings and published logs, overlaid: PNG "
+                                                   "and PDF.")
     plotting.add_argument("source", nargs="+", type=Path, metavar="DIR",
                           help="a recording's folder, or the file of a published log")
     plotting.add_argument("--out", type=Path, metavar="DIR",
-                          help="where the figures go (default: DIR/figures of one recording, "
+                          help="folder for the figures (default: DIR/figures for one recording, "
                                "else figures)")
-    plotting.add_argument("--name", nargs="+", help="what each is called in the figures "
+    plotting.add_argument("--name", nargs="+", help="name of each source in the figures "
                                                     "(default: its folder or file)")
     add_vehicle(plotting)
     plotting.add_argument("--format", choices=FORMATS,
-                          help="of the published logs (default: by their columns)")
+                          help="format of the published logs (default: detected from their columns)")
     plotting.add_argument("--rod-length-m", type=float, metavar="L",
-                          help="of published logs that do not hold the load's position "
+                          help="rod length for published logs without the load's position "
                                "(default: gazebo 1.1, px4 1)")
     plotting.set_defaults(run=plot)
 
-    reporting = commands.add_parser("report", help="DIR/report.html, one self-contained page")
+    reporting = commands.add_parser("report", description="Writes DIR/report.html, one self-contained page: parameters, metrics "
+                                                      "of each stage, figures and events.")
     reporting.add_argument("recording", type=Path, metavar="DIR", help="a recording's folder")
     add_vehicle(reporting)
     reporting.set_defaults(run=report)
 
-    studying = commands.add_parser("study", help="flies the published comparison, writes the page")
+    studying = commands.add_parser("study", description="Flies the published comparison; writes docs/study.md and its "
+                                                    "pictures.")
     studying.add_argument("--out", type=Path, default=study.ROOT / "docs", metavar="DIR",
-                          help="where study.md and its pictures go (default: docs)")
+                          help="folder for study.md and its pictures (default: docs)")
     studying.add_argument("--recordings", type=Path, default=Path("recordings/study"),
-                          metavar="DIR", help="where the flights go (default: recordings/study)")
+                          metavar="DIR", help="folder for the recordings (default: recordings/study)")
     studying.add_argument("--reuse", action="store_true",
-                          help="take complete recordings that are there instead of flying")
+                          help="use existing complete recordings instead of flying")
     studying.add_argument("--published", type=Path, metavar="DIR",
                           help="folder of the published matlab_setpoint1.csv, to compare with")
     studying.add_argument("--domain", type=int, default=0, metavar="N",

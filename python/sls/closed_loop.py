@@ -53,7 +53,7 @@ class LoopState:
 
 @dataclass(frozen=True, eq=False)
 class LoopReference:
-    """What the mission asks of the load at some times, in W: arrays of shape (…, 3)."""
+    """The mission's reference at some times, in W: arrays of shape (…, 3)."""
 
     position: NDArray[np.float64]  #: m
     velocity: NDArray[np.float64]  #: m/s
@@ -109,12 +109,12 @@ class ClosedLoop:
 
     @property
     def state(self) -> LoopState:
-        """What controllers see: by sensors, estimator and faults of the scenario."""
+        """The measured states: after sensors, estimator and faults of the scenario."""
         return self._state
 
     @property
     def truth(self) -> LoopState:
-        """What is: the plants' states. `state` itself where nothing in the scenario disturbs it."""
+        """The true states of the plants. `state` itself if nothing in the scenario disturbs it."""
         return self._truth
 
     @property
@@ -145,7 +145,7 @@ class ClosedLoop:
         initial: where they begin, each of shape (n, k) or (k,) for all: quad_position or
             load_position (3, m), quad_velocity (3, m/s), angles and angle_rates (2, rad, rad/s);
             of plants with attitude attitude (4, unit quaternion), body_rates (3, rad/s).
-            What is left out is the scenario's.
+            Others stay the scenario's.
         Returns `state`. Raises ConfigError for what the plant does not take; then nothing changes.
         """
         which = self._to_indices(indices)
@@ -158,7 +158,7 @@ class ClosedLoop:
         return self._state
 
     def reference(self, time_s: ArrayLike | None = None) -> LoopReference:
-        """What the mission asks of the load `time_s` (any shape, s) after step 0; None: now, of
+        """The mission's reference `time_s` (any shape, s) after step 0; None: now, of
         each loop.
 
         Stages follow each other by their time. A stage that is left by a radius has no time to end

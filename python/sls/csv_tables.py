@@ -11,22 +11,22 @@ import numpy as np
 
 from sls.input_error import InputError
 
-# Columns that hold text: their numpy types. Of who commanded nothing is shown.
+# Columns that hold text: their numpy types. The controller's name is not shown.
 TEXT_COLUMNS = {"stage_name": "U32", "fault": "U16", "controller": "U1"}
 
 
 @dataclass(frozen=True)
 class Text:
-    """What a file holds, in whole lines."""
+    """The whole lines of a file."""
 
     path: Path
     lines: list[str]
     rest: str
-    """What follows the last line end; in a recording, of a row amid which its writer was killed."""
+    """Text after the last line end; in a recording, of a row amid which its writer was killed."""
 
 
 def read_text(path: Path) -> Text:
-    """Raises InputError where `path` is no text file that can be read."""
+    """Raises InputError if `path` is no text file that can be read."""
     try:
         text = path.read_bytes().decode()
     except OSError as error:
@@ -43,7 +43,7 @@ def parse_rows(text: Text, columns: Sequence[str], first_line: int,
                delimiter: str | None = ",") -> np.ndarray:
     """The lines from `first_line` (from 1) on: a structured array with a field per column.
 
-    Raises InputError where a row has another number of columns, or a number is none."""
+    Raises InputError if a row has another number of columns, or a number is none."""
     kinds = np.dtype([(name, TEXT_COLUMNS.get(name, "f8")) for name in columns])
     lines = text.lines[first_line - 1:]
     if not lines:

@@ -1,4 +1,4 @@
-"""What a late and lagging force costs the QSF law, near hover. The equations are derived in
+"""Stability of the QSF law with a late and lagging force, near hover. The equations are derived in
 docs/study.md, "The linear formula"; s is the Laplace variable, 1/s."""
 
 from dataclasses import dataclass

@@ -8,7 +8,7 @@ class ConfigError(ValueError):
 
 
 class RunError(RuntimeError):
-    """What was begun could not be finished: a broken control law, a damaged recording. Exit code 1
+    """A run that could not finish: a broken control law, a damaged recording. Exit code 1
     of the programs. Where Python code was the reason, its exception is `__cause__`."""
 
 

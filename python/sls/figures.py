@@ -47,7 +47,7 @@ def colour_of(index: int) -> str:
 
 
 def break_at_gaps(time_s: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Puts NaN where steps are missing, so that no line is drawn across."""
+    """Puts NaN if steps are missing, so that no line is drawn across."""
     if len(time_s) < 3:
         return time_s, values
     spacing = np.diff(time_s)
@@ -56,7 +56,7 @@ def break_at_gaps(time_s: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, n
 
 
 def break_at_jumps(positions: np.ndarray) -> np.ndarray:
-    """Puts NaN where a reference jumps to the next set-point: no trajectory moves 10 cm a row."""
+    """Puts NaN if a reference jumps to the next set-point: no trajectory moves 10 cm a row."""
     far = np.linalg.norm(np.diff(positions, axis=0), axis=1) > 0.1
     return np.insert(positions, np.flatnonzero(far) + 1, np.nan, axis=0)
 
@@ -278,7 +278,7 @@ def list_attitudes(flight: Trajectory) -> tuple[np.ndarray, np.ndarray]:
 
 
 def break_at_turns(angles: np.ndarray) -> np.ndarray:
-    """Puts NaN where an angle (n, k) goes on at the other end of its range."""
+    """Puts NaN if an angle (n, k) goes on at the other end of its range."""
     jumps = np.abs(np.diff(angles, axis=0, prepend=angles[:1])) > np.pi
     return np.where(jumps, np.nan, angles)
 

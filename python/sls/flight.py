@@ -90,7 +90,7 @@ class FlownVehicle:
 
     @cached_property
     def command(self) -> Columns:
-        """Those of command.csv, but for the controller's name and its compute time."""
+        """The columns of command.csv except the controller's name and its compute time."""
         return self._make_columns("command")
 
     @cached_property
@@ -173,7 +173,7 @@ class FlownVehicle:
 
     @cached_property
     def trajectory(self) -> Trajectory:
-        """What figures and metrics work on."""
+        """The trajectory, for figures and metrics."""
         return Trajectory(
             name=f"vehicle {self.vehicle_id}" if len(self.scenario.vehicles) > 1
             else self.scenario.name,
@@ -210,7 +210,7 @@ class Flight(FlownVehicle):
 
     @property
     def failure(self) -> str:
-        """Why the flight failed, one line; empty where every mission was finished."""
+        """Why the flight failed, one line; empty if every mission was finished."""
         return self._core.failure
 
     @property
@@ -233,7 +233,7 @@ class Flight(FlownVehicle):
         """Writes the recording that `./sls run --in-process` would leave, into a new or empty
         folder; with `force`, instead of the recording that is there.
 
-        Raises ConfigError for the folder, OSError where the disk refuses."""
+        Raises ConfigError for the folder, OSError if the disk refuses."""
         from sls.recordings import Recording
         if not self._core.save(os.fspath(folder), force) and self.is_finished:
             raise RunError(f"{os.fspath(folder)}: the recording is not complete")

@@ -1,4 +1,4 @@
-"""What is wrong with what the user gave us."""
+"""Errors in the user's input."""
 
 from sls.errors import ConfigError
 

@@ -9,7 +9,7 @@ from sls.trajectory import Trajectory, Stage
 
 SETTLING_BAND = 0.02
 LEAST_STEP_M = 0.01
-"""What begins nearer than this to its target makes no step."""
+"""A stage that begins nearer than this to its target has no step response."""
 MOST_LAPS = 1000
 """Of a stage; flight.txt has no more either."""
 

@@ -58,7 +58,7 @@ def load_log(path: Path, name: str, format_name: str | None = None,
     """Reads `path`, in the format named or, without, the one it looks like. `rod_length_m` replaces
     the format's own where that has no load position. Raises InputError."""
     text = read_text(path)
-    if text.rest:  # whoever wrote these files need not have ended the last line
+    if text.rest:  # the last line of these files may lack its end
         text.lines.append(text.rest)
     if not text.lines:
         raise InputError(f"{path}:1: expected a log, got an empty file")

@@ -127,7 +127,7 @@ BOUGHT = (
     (Planned("fitted_first_order", "px4_fitted", (lag_first_order(ATTITUDE_LAG_S),)),
      f"a lag of {ATTITUDE_LAG_S} s for rotors and attitude loop, exact thrust"),
 )
-"""What px4_fitted is changed to, and in words."""
+"""Changes of px4_fitted, with a description each."""
 
 WITHOUT_LOSS = Planned("attitude_without_thrust_loss", "px4_attitude", (lose_no_thrust,))
 
@@ -190,7 +190,7 @@ def find_margin_file(planned: Planned, recordings: Path) -> Path:
 
 
 def run_launcher(planned: Planned, arguments: Sequence[str]) -> str:
-    """What `./sls` printed. Raises RunFailed."""
+    """The output of `./sls`. Raises RunFailed."""
     done = subprocess.run([str(ROOT / "sls"), *arguments], check=False, capture_output=True,
                           text=True)
     if done.returncode != 0:
@@ -492,7 +492,7 @@ def make_margin_table(recordings: Path) -> str:
 
 def make_values(flown: dict[str, Flown], recordings: Path,
                 published: Sequence[str]) -> dict[str, str]:
-    """What study_page.md has in its braces for this chapter."""
+    """Values for the braces of study_page.md in this chapter."""
     def describe_limit(gains: str, lag_s: float) -> str:
         late = Lateness(lag_s=lag_s)
         return f"{calc_stability_limit(make_chain(gains), lag_s) - calc_hold(late):.3f}"

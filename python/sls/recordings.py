@@ -51,14 +51,14 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Verification:
-    """What re-reading every file of a recording gives."""
+    """The result of reading every file of a recording again."""
 
     steps: int
     """Of the vehicle that has most."""
     certificate: str
-    """Of the rows; empty where they cannot be read."""
+    """Of the rows; empty if they cannot be read."""
     problems: tuple[str, ...]
-    """Where a file is not what its manifest says, one line each."""
+    """Differences between files and their manifest, one line each."""
 
     @property
     def is_ok(self) -> bool:
@@ -72,7 +72,7 @@ class Comparison:
     difference: str | None
     """The first row or field that differs: file, vehicle, step, column and both values."""
     notes: tuple[str, ...]
-    """What differs or is missing according to the manifests; it need not make the data differ."""
+    """Differences and gaps according to the manifests; the data may be equal all the same."""
 
     @property
     def is_equal(self) -> bool:
@@ -129,7 +129,7 @@ class Recording:
 
     @property
     def manifest(self) -> dict[str, Any]:
-        """The last segment's, which speaks for the whole flight."""
+        """The last segment's, which covers the whole flight."""
         return self.segments[-1][1]
 
     @property
@@ -289,13 +289,13 @@ class Recording:
         return find_stages(stage, time_s, names, plans, starts)
 
     def _find_plan(self, stage: int) -> dict[str, Any]:
-        """What the scenario says about a stage."""
+        """The scenario's keys of a stage."""
         mission = self.scenario["mission"]
         planned = mission[stage] if stage < len(mission) else {}
         return planned if isinstance(planned, dict) else {}
 
     def list_notes(self) -> tuple[str, ...]:
-        """What is missing, and what else the folder holds."""
+        """Missing samples, and other files in the folder."""
         manifest, notes = self.manifest, []
         if not manifest["complete"]:
             outcome = manifest["outcome"]
@@ -331,13 +331,13 @@ class Recording:
         return events
 
     def read_last_status(self) -> dict[str, str]:
-        """The last row of status.csv; empty where there is none."""
+        """The last row of status.csv; empty if there is none."""
         rows = read_records(self.segments[-1][0] / "status.csv")
         return rows[-1] if rows else {}
 
 
 def align(steps: np.ndarray, table: np.ndarray, names: tuple[str, ...]) -> np.ndarray:
-    """The columns `names` of the rows of `table` with these steps; NaN where there is none."""
+    """The columns `names` of the rows of `table` with these steps; NaN if there is none."""
     values = np.full((len(steps), len(names)), np.nan)
     if len(table):
         place = np.minimum(np.searchsorted(table["step"], steps), len(table) - 1)

@@ -147,7 +147,7 @@ def make_facts(recording: Recording, flight: Trajectory, vehicle_id: int) -> str
         ("flown", f"{flight.time_s[0]:g} s to {flight.time_s[-1]:g} s, "
                   f"{len(flight.time_s)} states"),
         ("vehicles", f"{len(recording.vehicle_ids)} ({describe_ids(recording.vehicle_ids)})"),
-        ("controller believes", ", ".join(f"{key}\u00a0{value}" for key, value in model.items())
+        ("controller assumes", ", ".join(f"{key}\u00a0{value}" for key, value in model.items())
          or "the vehicle as it is"),
         ("gains", describe_gains(scenario)),
         ("programs", describe_programs(manifest)),

@@ -9,7 +9,7 @@ AXES = "xyz"
 
 
 def format_error(metres: float) -> str:
-    """Three digits, short: 0.211, 0.0253, 4.10e-04. What is below a tenth of a nanometre depends on
+    """Three digits, short: 0.211, 0.0253, 4.10e-04. Digits below a tenth of a nanometre depend on
     how a processor rounds."""
     size = abs(metres)
     if math.isnan(metres):

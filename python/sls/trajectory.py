@@ -34,7 +34,7 @@ class Stage:
 
 @dataclass(frozen=True)
 class Body:
-    """What a plant with attitude and rotors does, beside what it was asked for."""
+    """Motion of a plant with attitude and rotors, beside its set-points."""
 
     q_WB: np.ndarray
     """Attitude, (n, 4), w x y z."""
@@ -78,7 +78,7 @@ class Trajectory:
     period_s: float = math.nan
     """Control period; NaN: not known."""
     notes: tuple[str, ...] = ()
-    """What is missing, a line each."""
+    """Missing parts, a line each."""
     body: Body | None = None
     """None: the source knows a point mass alone."""
 

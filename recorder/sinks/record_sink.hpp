@@ -26,7 +26,7 @@ class RecordSink {
  public:
   virtual ~RecordSink() = default;
 
-  /// What there is of a step; of each vehicle in step order.
+  /// The rows of a step; of each vehicle in step order.
   virtual void add(const StepRows& rows) = 0;
   virtual void add(const SimStatus& status) = 0;
 

@@ -1,4 +1,4 @@
-/// What an autopilot is: it turns the force that a controller asks for into what the rotors are to
+/// An autopilot: it turns the force that a controller commands into what the rotors are to
 /// do. A new one is a folder beside this file and a line in autopilots.def: README.md, "Adding an
 /// autopilot". No DDS and no Simbody here.
 #pragma once
@@ -37,7 +37,7 @@ struct Airframe {
   std::vector<Rotor> rotors;                              ///< at least one
 };
 
-/// What an autopilot is made from.
+/// The inputs from which an autopilot is made.
 struct AutopilotSetup {
   config::Autopilot autopilot;   ///< its period is at least a step
   std::filesystem::path folder;  ///< of the scenario file
@@ -46,7 +46,7 @@ struct AutopilotSetup {
   Airframe airframe;
 };
 
-/// What an autopilot sees at its step. Its world W is the one that its estimator takes for W: that
+/// Input of an autopilot's step. Its world W is the one of its estimator: that
 /// differs from the plant's where the scenario says `estimator.tilt_rad` or `yaw_rad`.
 struct AutopilotInput {
   Eigen::Vector3d f_Q_W;  ///< the force that is asked for, N
@@ -54,7 +54,7 @@ struct AutopilotInput {
   model::Attitude attitude;
 };
 
-/// What it wants until its next step.
+/// Its output until its next step.
 struct AutopilotOutput {
   Eigen::VectorXd rotor_speeds;  ///< set-points, rad/s; the plant keeps each to its rotor's limits
   Eigen::Quaterniond q_WB = Eigen::Quaterniond::Identity();  ///< attitude set-point, for the record
@@ -69,12 +69,12 @@ class Autopilot {
  public:
   virtual ~Autopilot() = default;
   /// One period. The output stays valid until the next step.
-  /// @throws std::runtime_error where it cannot go on; the text names the quantity.
+  /// @throws std::runtime_error if it cannot go on; the text names the quantity.
   virtual const AutopilotOutput& step(const AutopilotInput& input) = 0;
 };
 
 /// The autopilot that `setup.autopilot.model` names.
-/// @throws config::ConfigError where the setup contradicts it, or a library cannot be used.
+/// @throws config::ConfigError if the setup contradicts it, or a library cannot be used.
 std::unique_ptr<Autopilot> make_autopilot(const AutopilotSetup& setup);
 
 /// Attitude whose −z axis points along `f_W`, which is not zero, with the heading `yaw`:

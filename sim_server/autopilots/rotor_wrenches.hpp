@@ -1,4 +1,4 @@
-/// What the rotors of an airframe can do together: for autopilots that share torque and thrust out
+/// The wrenches of an airframe's rotors together: for autopilots that share torque and thrust out
 /// among them.
 #pragma once
 
@@ -19,7 +19,7 @@ Eigen::MatrixXd calc_pseudo_inverse(const Eigen::MatrixXd& matrix);
 bool has_yaw_authority(const Airframe& airframe);
 
 /// The same for an autopilot that needs roll and pitch.
-/// @throws config::ConfigError where they cannot roll or pitch it without changing the thrust;
+/// @throws config::ConfigError if they cannot roll or pitch it without changing the thrust;
 /// `setup` says where the scenario stands.
 bool find_yaw_authority(const AutopilotSetup& setup);
 

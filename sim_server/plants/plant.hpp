@@ -1,4 +1,4 @@
-/// What a plant is: moves one or several vehicles under held forces. A new one is a folder beside
+/// A plant: moves one or several vehicles under held forces. A new one is a folder beside
 /// this file and a line in plants.def: README.md, "Adding a plant". No DDS here.
 #pragma once
 
@@ -36,7 +36,7 @@ class Plant {
   /// The truth after the last step; finite.
   virtual const model::Measurement& measurement(std::size_t vehicle) const = 0;
 
-  /// What sensors and estimator say after the last step. A plant leaves this alone: `sensing` and
+  /// Output of sensors and estimator after the last step. A plant leaves this alone: `sensing` and
   /// `estimator` of the scenario are put around every plant alike (sensing/).
   virtual const model::Measurement& seen(std::size_t vehicle) const { return measurement(vehicle); }
 
@@ -49,18 +49,18 @@ class Plant {
   /// The signals in every measurement, in their order; at most `model::kMaxNumbers`.
   virtual std::vector<Signal> signals() const { return {}; }
 
-  /// What people should know of a vehicle's flight, since this was last asked: a few lines at most.
+  /// Remarks for the user on a vehicle's flight since the last call: a few lines at most.
   virtual std::vector<std::string> take_remarks(std::size_t) { return {}; }
 };
 
-/// What a plant is made from.
+/// The inputs from which a plant is made.
 struct PlantSetup {
   struct Vehicle {
     std::uint32_t id = 0;
     model::SlungLoadParameters parameters;
     config::InitialState initial;
   };
-  config::Plant plant;            ///< but for `initial`, which each vehicle has of its own
+  config::Plant plant;            ///< except `initial`, which each vehicle has of its own
   config::Autopilot autopilot;    ///< of plants that take one
   std::filesystem::path folder;   ///< of the scenario file
   std::vector<Vehicle> vehicles;  ///< at least one, by ascending id
@@ -75,7 +75,7 @@ enum class Moves {
 /// An entry of the registry.
 struct PlantType {
   Moves moves = Moves::kOneVehicle;
-  /// @throws config::ConfigError where the setup contradicts the plant.
+  /// @throws config::ConfigError if the setup contradicts the plant.
   std::unique_ptr<Plant> (*make)(const PlantSetup& setup) = nullptr;
 };
 
@@ -96,7 +96,7 @@ struct PlantOfVehicles {
 std::vector<PlantOfVehicles> make_plants(const PlantType& type, const config::Scenario& fleet,
                                          const std::vector<std::uint32_t>& ids);
 
-/// What a signal cannot be called: columns that state.csv has of every vehicle.
+/// Names that a signal cannot have: columns that state.csv has of every vehicle.
 const std::vector<std::string>& list_reserved_signal_names();
 
 /// @throws std::runtime_error `QUANTITY is not finite after step N of the plant`; quantities are

@@ -28,7 +28,7 @@ TEST(LatenciesTest, OneDurationIsAllOfThem) {
     EXPECT_EQ(latencies.to_json().at(key), 1.5) << key;
 }
 
-TEST(LatenciesTest, OfNoneThereIsNothingToSay) {
+TEST(LatenciesTest, SummaryOfNoLatenciesIsEmpty) {
   EXPECT_EQ(Latencies().to_json(), (nlohmann::json{{"count", 0}}));
 }
 

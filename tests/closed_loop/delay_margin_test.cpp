@@ -133,7 +133,7 @@ TEST(DelayMarginTest, ErrorsAreThoseOfTheFlight) {
   EXPECT_EQ(margin.flights[3].rms_error, std::sqrt(sum / static_cast<double>(flight.size())));
 }
 
-TEST(DelayMarginTest, SaysSoWhereTheLoadIsNeverLost) {
+TEST(DelayMarginTest, ReportsALoadThatIsNeverLost) {
   // Within two seconds the force held from the start does no harm.
   const DelayMargin margin = find_delay_margin(load("short"));
   EXPECT_EQ(margin.shortest_lost(), nullptr);

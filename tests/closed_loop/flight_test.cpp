@@ -100,7 +100,7 @@ TEST(FlightTest, TheShippedFaultsAreMildEnoughToFinish) {
   EXPECT_GT(worst, 0.05) << "the faults have no effect";
 }
 
-TEST(FlightTest, ControllerAnswersWhatItMeasuresAndStepsTellTheForceThatActed) {
+TEST(FlightTest, ControllerAnswersItsMeasurementAndStepsHoldTheForceThatActed) {
   config::Scenario scenario = load("short");
   config::BiasFault position, force;
   position.offset.position << 0.1, 0.0, 0.0;

@@ -185,7 +185,7 @@ TEST(FlightMeasuresTest, AreThoseUpToTheLoss) {
   expect_measures_of_its_columns(delay_command(base, 65), base);  // loses the load at 20.396 s
 }
 
-TEST(FlightMeasuresTest, AreThoseUpToTheFailureAndNothingOfStagesThatWereNotFlown) {
+TEST(FlightMeasuresTest, CoverTheFlightUpToTheFailureOnly) {
   const config::Scenario base = load("setpoints");
   // Half a second after the second set point came the state freezes.
   const config::Scenario frozen = load_changed(
@@ -355,7 +355,7 @@ TEST(MeasuredFlightTest, AFleetIsRefused) {
   }
 }
 
-TEST(MeasuredFlightTest, IsAskedNowAndThenWhetherToGoOn) {
+TEST(MeasuredFlightTest, PollsDuringTheFlightAndStopsWhenThePollThrows) {
   const config::Scenario scenario = load("short");
   struct Stop {};
   int calls = 0;
@@ -450,7 +450,7 @@ TEST(CampaignRunsTest, AnotherPeriodIsInEachRunsText) {
   EXPECT_EQ(fine.make_scenario({}).plant.step_ns, 500'000);
 }
 
-/// What the constructor or `work` says, called with runs of `file` that vary `path`.
+/// The error of the constructor or of `work`, called with runs of `file` that vary `path`.
 template <class Work>
 std::string find_error(const std::filesystem::path& file, const std::string& path,
                        const Work& work) {

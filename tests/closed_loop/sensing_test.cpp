@@ -104,7 +104,7 @@ TEST(SensingTest, TheEstimatorsErrorsAreTheFaultBiasOnState) {
   expect_equal_flights(fly(wrong), fly(biased));
 }
 
-TEST(SensingTest, FaultsActOnWhatTheSensorsSay) {
+TEST(SensingTest, FaultsActOnTheSensorsOutput) {
   config::Scenario scenario = age(load("short"), 3);
   config::BiasFault bias;
   bias.offset.position << 0.1, 0.0, 0.0;

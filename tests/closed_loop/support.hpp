@@ -1,4 +1,4 @@
-/// What the tests of the closed loop in one process share.
+/// Shared by the tests of the closed loop in one process.
 #pragma once
 
 #include <string>

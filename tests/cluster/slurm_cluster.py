@@ -116,7 +116,7 @@ class SlurmCluster:
         return {"SLURM_CONF": str(self.configuration)}
 
     def ask(self, *command: str) -> str:
-        """What a command of Slurm says on the head."""
+        """The output of a Slurm command on the head."""
         done = subprocess.run(self.hosts.on("head", *command), capture_output=True, text=True,
                               env={**os.environ, **self.environment}, timeout=START_S)
         return done.stdout

@@ -157,7 +157,7 @@ def test_a_run_that_ends_its_worker_is_named_after_the_last_submission(
         gate.write_text(text)
 
 
-def test_what_sbatch_refuses_is_said(slurm: SlurmCluster, campaign: TestCampaign) -> None:
+def test_a_refusal_of_sbatch_is_reported(slurm: SlurmCluster, campaign: TestCampaign) -> None:
     campaign.fly("refused", "--on", "slurm", "--sbatch=--partition=none",
                  **slurm.environment).expect(2, "--sbatch '--partition=none': ", "partition")
     campaign.fly("quoted", "--on", "slurm", "--sbatch=--comment='open",
@@ -174,7 +174,7 @@ def test_without_slurm_the_message_says_what_to_install_or_start(campaign: TestC
 
 
 def link_programs(folder: Path) -> None:
-    """What the test hosts need, without Slurm."""
+    """The test hosts' software without Slurm."""
     for name in ("ip", "unshare", "sh", "hostname", "setpriv"):
         place = subprocess.run(["which", name], capture_output=True, text=True, check=True).stdout
         (folder / name).symlink_to(place.strip())

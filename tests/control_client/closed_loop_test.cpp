@@ -107,7 +107,7 @@ TEST(ClosedLoopTest, DragFeedForwardRestoresTheTrackingWithoutDrag) {
   EXPECT_LE(compensated, 2.0 * clean);  // exact at the sample, held in between
 }
 
-TEST(ClosedLoopTest, ABelievedRodTooShortLeavesTheLoadTooLow) {
+TEST(ClosedLoopTest, ATooShortRodInTheModelLeavesTheLoadTooLow) {
   config::Scenario scenario = make_figure_eight(4'000'000);
   scenario.vehicle.rod_length = 1.1;
   scenario.mission = {make_hold({0.0, 0.0, -0.5}, 20 * kSecond)};

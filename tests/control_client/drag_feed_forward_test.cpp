@@ -16,7 +16,7 @@ Eigen::Vector3d draw_vector(std::mt19937& generator, double scale) {
   return {x, y, z};
 }
 
-TEST(DragFeedForwardTest, ForceAndItsDragAddUpToWhatTheLawAskedFor) {
+TEST(DragFeedForwardTest, ForceAndItsDragAddUpToTheLawsForce) {
   std::mt19937 generator(1);
   int judged = 0;
   while (judged < 2000) {

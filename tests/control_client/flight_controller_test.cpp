@@ -81,7 +81,7 @@ TEST(FlightControllerTest, AForceThatIsNoNumberIsAFaultAndNoImpurity) {
   expect_failed(controller.calc_answer(0, make_hanging({0.0, 0.0, -0.5}), {}), Fault::kNotFinite);
 }
 
-TEST(FlightControllerTest, IsAPureFunctionInWhateverOrderSamplesCome) {
+TEST(FlightControllerTest, IsAPureFunctionForSamplesInAnyOrder) {
   config::Scenario scenario = make_figure_eight();
   scenario.mission.insert(scenario.mission.begin(), make_hold({0.0, 0.0, -0.5}, 2 * kSecond));
   NamedGains gains = make_named_gains(LqrWeights{});
@@ -198,7 +198,7 @@ TEST(FlightControllerTest, SaturatesOnlyWhereAsked) {
   EXPECT_LE(limited.f_Q_W.normalized().cross(free.f_Q_W.normalized()).norm(), 1e-15);
 }
 
-TEST(FlightControllerTest, FeedsForwardTheDragItBelievesIn) {
+TEST(FlightControllerTest, FeedsForwardTheDragOfItsModel) {
   config::Scenario scenario = make_figure_eight();
   std::mt19937 generator(2);
   const model::SlungLoadState state = draw_state(generator);
@@ -213,7 +213,7 @@ TEST(FlightControllerTest, FeedsForwardTheDragItBelievesIn) {
   EXPECT_LE((force + drag - plain).norm(), 2e-12 * plain.norm());
 }
 
-TEST(FlightControllerTest, GazeboWiringUsesThePlantsRodAndTheLawTheBelievedOne) {
+TEST(FlightControllerTest, GazeboWiringUsesThePlantsRodAndTheLawItsModels) {
   config::Scenario scenario = make_figure_eight();
   scenario.vehicle.rod_length = 1.1;
   scenario.controller.state_wiring = config::StateWiring::kGazeboPlugin;
@@ -289,9 +289,9 @@ TEST(FlightControllerTest, AStageThatTimesOutFailsTheMission) {
   EXPECT_EQ(answer.reference.position, Vector3d(0.0, 0.0, -0.5));
 }
 
-TEST(FlightControllerTest, RadiusStagesLookAtTheTrueLoadNotAtTheBelievedOne) {
+TEST(FlightControllerTest, RadiusStagesUseTheTrueLoadNotTheModels) {
   config::Scenario scenario = make_figure_eight();
-  scenario.vehicle.rod_length = 1.5;  // the controller believes 1.0
+  scenario.vehicle.rod_length = 1.5;  // the controller's model has 1.0
   config::Stage stage = make_hold({0.0, 0.0, -1.0}, 0);
   config::LeaveWithin leave;
   leave.radius_m = 0.1;

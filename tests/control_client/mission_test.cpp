@@ -119,7 +119,7 @@ TEST(MissionTest, ARadiusStageIsLeftStrictlyAfterAndStrictlyWithin) {
   EXPECT_EQ(mission.calc_progress(251, on_the_sphere, {}).phase, MissionPhase::kRunning);
 }
 
-TEST(MissionTest, WhoHasFinishedStaysSoWhereverTheBodyGoes) {
+TEST(MissionTest, AFinishedMissionStaysFinishedWhereverTheBodyGoes) {
   config::LeaveWithin leave;
   leave.radius_m = 0.25;
   leave.timeout_ns = 10 * kSecond;
@@ -218,7 +218,7 @@ TEST(MissionTest, StagesOfNoDurationArePassedAtOnce) {
   EXPECT_EQ(progress.stage_start_step, 0u);
 }
 
-TEST(MissionTest, KnowsAMemoryThatCannotBe) {
+TEST(MissionTest, RejectsAnImpossibleMemory) {
   const Mission mission({make_hold({0, 0, -1}, kSecond)}, kPeriod);
   ControllerMemory memory;
   EXPECT_TRUE(mission.is_possible(0, memory));

@@ -34,7 +34,7 @@ Outcome run_command(const std::vector<std::string>& command,
 
 Outcome run_shell(const std::string& command) { return run_command({"sh", "-c", command}); }
 
-/// What keeps this machine from flying in containers; nothing where it can.
+/// Why this machine cannot fly in containers; empty if it can.
 std::optional<std::string> find_obstacle() {
   if (run_shell("timeout 1 docker version").code != 0) return "no Docker engine";
   if (run_shell("docker compose version || docker-compose version").code != 0)
@@ -126,7 +126,7 @@ class DockerTest : public ::testing::Test {
   std::vector<std::string> projects_;
 };
 
-TEST_F(DockerTest, RecordsInContainersWhatTheMachineItselfRecords) {
+TEST_F(DockerTest, RecordsTheSameInContainersAsOnTheMachine) {
   Flight native(scenario("short"));
   native.expect_success();
   for (const std::string name : {"plain", "discovery", "secure"}) {
@@ -149,7 +149,8 @@ TEST_F(DockerTest, AStandbyTakesOverFromAKilledControllerAndNothingChanges) {
       << output;
 }
 
-/// What the programs record on this machine itself of the vehicles `first` to `last` of a scenario.
+/// The recording of the programs on this machine itself, of the vehicles `first` to `last` of a
+/// scenario.
 void fly_natively(const std::string& scenario_file, int first, int last, const fs::path& out) {
   const OwnDomain domain;
   const std::string vehicles = std::to_string(first) + "-" + std::to_string(last);

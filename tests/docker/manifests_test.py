@@ -23,7 +23,7 @@ PLAIN = {"str": str, "int": int, "bool": bool, "float": (int, float), "datetime"
 
 
 def check(value, kind, place):
-    """Raises ValueError where `value` is not of the API's type `kind`."""
+    """Raises ValueError if `value` is not of the API's type `kind`."""
     if kind == "object":
         return
     if kind in PLAIN:

@@ -11,7 +11,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What `command` prints; it is expected to end with `exit_code`.
+/// The output of `command`; it is expected to end with `exit_code`.
 std::string run(const std::vector<std::string>& command, int exit_code = 0) {
   Process process(command);
   EXPECT_EQ(process.wait(), exit_code) << command[0] << "\n" << process.output();

@@ -50,7 +50,7 @@ struct Edit {
 };
 constexpr std::size_t kEnd = SIZE_MAX;
 
-/// What a compiler made of an IDL file in which a field was added or left out; or under another
+/// A type compiled from an IDL file in which a field was added or left out; or under another
 /// name, or with a key.
 template <class Generated>
 class OtherType : public Generated {

@@ -354,7 +354,7 @@ class ForeignAnswerTest : public ForeignTest {
         << outputs();
     EXPECT_EQ(line.substr(line.find(" answers")), end);
     EXPECT_EQ(ask_problem(), line);
-    // Who is waited for, and why: of the one that is awaited, or as the problem that it is.
+    // The participant waited for, and why: as the awaited one, or as a problem.
     EXPECT_TRUE(wait_until([&] {
       const bool is_of_awaited =
           has(*server, " of its answers rejected, none taken: " + cause + ") (");
@@ -424,7 +424,7 @@ TEST_F(ForeignAnswerTest, ThatFlyFarFromTheReferenceAreAnnouncedOnce) {
 
 // --- nobody --------------------------------------------------------------------------------------
 
-TEST_F(ForeignTest, WhoWaitsForLongIsSentToTheDoctor) {
+TEST_F(ForeignTest, ALongWaitSuggestsTheDoctor) {
   start();
   EXPECT_TRUE(wait_until([&] { return has(*server, " s left)"); }));
   EXPECT_FALSE(has(*server, "doctor")) << outputs();

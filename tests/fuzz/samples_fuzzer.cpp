@@ -18,7 +18,7 @@ namespace rtps = eprosima::fastrtps::rtps;
 
 constexpr std::uint64_t kRun = 1;
 
-/// The sample of these bytes as the middleware hands it to a reader; nothing where it does not.
+/// The sample of these bytes as the middleware hands it to a reader; nothing if it does not.
 template <class Type, class Message>
 std::optional<Message> deserialize(const std::uint8_t* data, std::uint32_t size) {
   rtps::SerializedPayload_t payload(size);

@@ -1,4 +1,4 @@
-/// What a hostile neighbour does. Every attack goes on until SIGTERM, at most `seconds`, and
+/// Attacks of a hostile neighbour. Every attack goes on until SIGTERM, at most `seconds`, and
 /// returns how many packets, samples or participants it fired.
 #pragma once
 

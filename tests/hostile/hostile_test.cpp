@@ -71,7 +71,7 @@ class HostileTest : public testing::Test {
     flight.client->send(SIGCONT);
   }
 
-  /// The most memory that a program has had, in MB; 0 where it has ended.
+  /// The most memory that a program has had, in MB; 0 if it has ended.
   static double find_peak_memory(const Process& program) {
     const std::string status = read_file("/proc/" + std::to_string(program.id()) + "/status");
     const auto at = status.find("VmHWM:");
@@ -126,8 +126,8 @@ class HostileTest : public testing::Test {
     expect_undisturbed(flight, 400);
   }
 
-  // Who forges packets under the sender's name can say anything; only security prevents that. But
-  // nobody may crash or hang over it.
+  // Packets forged under the sender's name can claim anything; only security prevents that. But
+  // no program may crash or hang.
   void expect_that_spoofed_packets_crash_nobody() {
     Flight flight(scenario("figure_eight"), options_);
     attack("spoof", flight, "server");
@@ -144,11 +144,11 @@ class HostileTest : public testing::Test {
   std::unique_ptr<Profile> profile_;
 };
 
-TEST_F(HostileTest, PacketsThatNoFriendSendsDisturbNothing) {
+TEST_F(HostileTest, MalformedPacketsDisturbNothing) {
   expect_that_forgeries_disturb_nothing("packets");
 }
 
-TEST_F(HostileTest, AnnouncementsOfThousandsThatDoNotExistDisturbNothing) {
+TEST_F(HostileTest, AnnouncementsOfThousandsOfInventedParticipantsDisturbNothing) {
   expect_that_forgeries_disturb_nothing("announcements");
 }
 
@@ -159,7 +159,7 @@ TEST_F(HostileTest, ParticipantsThatComeAndGoDisturbNothing) {
   expect_undisturbed(flight, 400);
 }
 
-TEST_F(HostileTest, SamplesThatNoFriendWritesDisturbNothing) {
+TEST_F(HostileTest, InvalidSamplesDisturbNothing) {
   Flight flight(scenario("figure_eight"), options_);
   attack("malformed", flight);
   attack("control", flight);
@@ -169,7 +169,7 @@ TEST_F(HostileTest, SamplesThatNoFriendWritesDisturbNothing) {
   expect_undisturbed(flight, 400);
 }
 
-TEST_F(HostileTest, LiesAboutTheFlightAreNotBelieved) {
+TEST_F(HostileTest, FalseSamplesAboutTheFlightAreIgnored) {
   Flight flight(scenario("figure_eight"), options_);
   attack("commands", flight);
   attack("statements", flight);
@@ -185,7 +185,7 @@ TEST_F(HostileTest, AStrongerControllerThatIsOfNoUseIsPassedOver) {
   expect_undisturbed(flight, 400);
 }
 
-TEST_F(HostileTest, SpoofedPacketsOfTheFlightItselfCrashNobody) {
+TEST_F(HostileTest, PacketsSpoofedInTheFlightsNameCrashNoProgram) {
   expect_that_spoofed_packets_crash_nobody();
 }
 
@@ -196,15 +196,15 @@ class SecuredHostileTest : public HostileTest {
   SecuredHostileTest() : HostileTest("secure") {}
 };
 
-TEST_F(SecuredHostileTest, PacketsThatNoFriendSendsDisturbNothing) {
+TEST_F(SecuredHostileTest, MalformedPacketsDisturbNothing) {
   expect_that_forgeries_disturb_nothing("packets");
 }
 
-TEST_F(SecuredHostileTest, AnnouncementsOfThousandsThatDoNotExistDisturbNothing) {
+TEST_F(SecuredHostileTest, AnnouncementsOfThousandsOfInventedParticipantsDisturbNothing) {
   expect_that_forgeries_disturb_nothing("announcements");
 }
 
-TEST_F(SecuredHostileTest, WhoHasNoKeysDisturbsNothingAndHearsNothing) {
+TEST_F(SecuredHostileTest, AProgramWithoutKeysDisturbsNothingAndReadsNothing) {
   Flight flight(scenario("figure_eight"), options_);
   attack("malformed", flight);
   deaf_ = &attack("readers", flight);
@@ -212,7 +212,7 @@ TEST_F(SecuredHostileTest, WhoHasNoKeysDisturbsNothingAndHearsNothing) {
   expect_undisturbed(flight, 400);
 }
 
-TEST_F(SecuredHostileTest, SpoofedPacketsOfTheFlightItselfCrashNobody) {
+TEST_F(SecuredHostileTest, PacketsSpoofedInTheFlightsNameCrashNoProgram) {
   expect_that_spoofed_packets_crash_nobody();
 }
 

@@ -80,7 +80,7 @@ class Sniffer {
     ::setsockopt(socket_.descriptor(), SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
   }
 
-  /// The next packet's UDP payload; empty where none came for a while, or it was another one.
+  /// The next packet's UDP payload; empty if none came for a while, or it was another one.
   Bytes next() {
     std::array<std::uint8_t, 65536> frame;
     const auto size = ::recv(socket_.descriptor(), frame.data(), frame.size(), 0);
@@ -129,7 +129,7 @@ Bytes make_random_bytes(std::mt19937_64& random) {
   return packet;
 }
 
-/// True where a GAP, or a HEARTBEAT's first sequence number, takes more samples off the stream than
+/// True if a GAP, or a HEARTBEAT's first sequence number, takes more samples off the stream than
 /// any of ours does. The middleware goes through them one by one, for hours, with its reader
 /// locked: README.md, what it found.
 bool has_endless_gap(const Bytes& packet) {
@@ -159,7 +159,7 @@ bool has_endless_gap(const Bytes& packet) {
   return false;
 }
 
-/// True where a packet holds tokens of DDS Security. With a changed length in them a secured
+/// True if a packet holds tokens of DDS Security. With a changed length in them a secured
 /// middleware reserves as much as it says, gigabytes: README.md, what it found.
 bool has_identity(const Bytes& packet) {
   const std::string kind = "DDS:Auth";

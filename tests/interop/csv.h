@@ -10,7 +10,7 @@ typedef struct CsvFile {
   bool is_in_row;
 } CsvFile;
 
-/// Makes `folder` where it is missing, and in it the file `name` anew. What the system refuses ends
+/// Makes `folder` where it is missing, and in it the file `name` anew. A refusal of the system ends
 /// the program with exit code 1, also in the functions below.
 void open_csv(CsvFile* file, const char* folder, const char* name, const char* header);
 void close_csv(CsvFile* file);

@@ -23,7 +23,7 @@ typedef struct Recorder {
   bool has_batch, has_last;   ///< any batch; the one that is_last
   uint64_t next_batch;        ///< index of the one after the last that came
   uint64_t batches, entries;  ///< how many came
-  uint64_t missing_batches;   ///< before the last that came
+  uint64_t missing_batches;   ///< before the last received
   /// Of each vehicle of the run the step after its last row, and how many steps before are missing.
   sls_VehicleParameters vehicles[kMaxVehicles];
   uint64_t next_step[kMaxVehicles];

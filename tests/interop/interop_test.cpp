@@ -134,7 +134,7 @@ class InteropTest : public testing::Test {
     for (Process* process : processes) EXPECT_EQ(process->wait(seconds(0)), 0) << outputs;
   }
 
-  /// Both flew the same mission, but for rounding.
+  /// Both flew the same mission, apart from rounding.
   static void expect_same_flight(const std::filesystem::path& a, const std::filesystem::path& b) {
     const Table states_a(a / "state.csv"), states_b(b / "state.csv");
     ASSERT_EQ(states_a.rows(), states_b.rows());
@@ -246,7 +246,7 @@ TEST_F(InteropTest, CycloneControllerAndRecorderFlyOnWithTheServerThatReplacesAK
   expect_same_rows(*cyclone_recorder, rows_, find_second_run(), kQuickSteps);
 }
 
-TEST_F(InteropTest, ACycloneRecorderThatComesLateGetsWhatItMissed) {
+TEST_F(InteropTest, ALateCycloneRecorderGetsTheMissedSamples) {
   const auto recorder = start_recorder();
   const auto server = start_server(), controller = start_cyclone("cyclone_controller");
   ASSERT_TRUE(wait_for_steps(100)) << server->output();
@@ -350,7 +350,7 @@ TEST_F(MyClientTest, HasNoMoreThan200Lines) {
 }
 
 /// Its memory, an integral, travels: neither loss nor a client that is killed changes a byte.
-TEST_F(MyClientTest, BringsTheLoadToItsPointWithTheSameBytesWhateverIsLost) {
+TEST_F(MyClientTest, BringsTheLoadToItsPointWithTheSameBytesDespiteLosses) {
   const std::string undisturbed = recording_ + "-undisturbed";
   for (const bool is_disturbed : {false, true}) {
     const Words loss = is_disturbed ? lossy(5) : Words{};

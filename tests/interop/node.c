@@ -68,7 +68,7 @@ dds_entity_t make_writer(Node* node, const dds_topic_descriptor_t* type, const c
   dds_qset_reliability(qos, DDS_RELIABILITY_RELIABLE, DDS_SECS(5));
   dds_qset_durability(qos, DDS_DURABILITY_TRANSIENT_LOCAL);
   dds_qset_history(qos, DDS_HISTORY_KEEP_LAST, depth);
-  // What the server's reader of commands asks for in real time (profile
+  // The QoS that the server's reader of commands requests in real time (profile
   // sls_realtime_command_reader); a reader without a deadline takes it as well.
   if (strcmp(topic, "sls/command") == 0) dds_qset_deadline(qos, DDS_MSECS(100));
   const dds_entity_t writer =
@@ -214,7 +214,7 @@ void look_around(Node* node) {
   }
 }
 
-bool is_silent(dds_time_t heard) { return dds_time() - heard > kSilenceOfTheDead; }
+bool is_silent(dds_time_t heard) { return dds_time() - heard > kPresumedDeadAfter; }
 
 bool has_ended(const Run* run) {
   return run->status.phase == sls_PHASE_FINISHED || run->status.phase == sls_PHASE_FAILED;
@@ -226,7 +226,7 @@ const Run* find_run(const Node* node, uint64_t run_id) {
   return NULL;
 }
 
-/// Position on the way waiting → running; 0 where there is nothing to join.
+/// Position on the way waiting → running; 0 if there is nothing to join.
 static int calc_progress(const Run* run) {
   if (!run->has_status || run->vehicle_count == 0 || is_silent(run->heard)) return 0;
   if (run->status.phase == sls_PHASE_WAITING) return 1;

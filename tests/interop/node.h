@@ -15,9 +15,9 @@ enum {
   kMaxVehicles = 256   ///< of a run
 };
 
-/// Who has not been heard for so long is taken for dead; who expects that of others announces
-/// himself at least every kAnnounceTime.
-#define kSilenceOfTheDead DDS_SECS(2)
+/// A participant silent for this long is presumed dead; each announces itself at least every
+/// kAnnounceTime.
+#define kPresumedDeadAfter DDS_SECS(2)
 #define kAnnounceTime DDS_MSECS(500)
 #define kPollTime DDS_MSECS(20)       ///< between two looks around
 #define kJoinTime DDS_SECS(30)        ///< until there must be a server to join
@@ -73,7 +73,7 @@ bool take(dds_entity_t reader, void* sample, dds_sample_info_t* info);
 /// Writes, or ends the program with exit code 1.
 void write_sample(dds_entity_t writer, const void* sample);
 
-/// Takes what has come of parameters and status. A server of another contract is named, and no run
+/// Takes new samples of parameters and status. A server of another contract is named, and no run
 /// of it joined.
 void look_around(Node* node);
 
@@ -87,7 +87,7 @@ const Run* find_run(const Node* node, uint64_t run_id);
 /// The run to go on with where `run` was reset, or its server is gone and another has its place.
 const Run* find_successor(const Node* node, const Run* run);
 bool is_silent(dds_time_t heard);
-/// True when the run was finished or has failed: whoever served it leaves.
+/// True when the run was finished or has failed: its server leaves.
 bool has_ended(const Run* run);
 
 /// True when `participant` has a matching reader of this writer, or writer of this reader.

@@ -1,4 +1,4 @@
-/// What a scenario of the shape of config/scenarios/setpoints.yaml says. A server sends the text in
+/// The values of a scenario like config/scenarios/setpoints.yaml. A server sends the text in
 /// sls/parameters, so that a client needs no file.
 #pragma once
 

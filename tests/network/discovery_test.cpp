@@ -38,7 +38,7 @@ std::string make_impatient_scenario(const TemporaryFolder& folder, int timeout_s
   return make_scenario(folder, {{"timeout_s: 30", "timeout_s: " + std::to_string(timeout_s)}});
 }
 
-TEST_F(NoMulticastTest, WithLanEachSaysWhoIsMissingAndThatItMayBeTheMulticast) {
+TEST_F(NoMulticastTest, WithLanEachProgramNamesTheMissingOneAndSuggestsMulticast) {
   const TemporaryFolder folder;
   const Profile profile(*network_, "lan");
   Flight flight(make_impatient_scenario(folder, 5), profile.flight_options());

@@ -21,7 +21,7 @@ Words operator+(Words left, const Words& right) {
   return left;
 }
 
-/// What a doctor said.
+/// The output of a doctor.
 struct Finding {
   int code = -1;
   std::string text;
@@ -74,7 +74,7 @@ class DoctorTest : public testing::Test {
     std::filesystem::permissions(memory_.path(), std::filesystem::perms(01777));
   }
 
-  /// What runs a command on `host` with another /dev/shm, of which `mount` makes it.
+  /// Prefix that runs a command on `host` with another /dev/shm, of which `mount` makes it.
   Words with_memory(const std::string& host, const std::string& mount) const {
     return network_->on(host) +
            Words{"unshare", "--mount", "sh", "-c", mount + " /dev/shm && exec \"$0\" \"$@\""};
@@ -117,7 +117,7 @@ class DoctorTest : public testing::Test {
 
 class HealthyDoctorTest : public DoctorTest, public testing::WithParamInterface<const char*> {};
 
-TEST_P(HealthyDoctorTest, OnAnIdleMachineAndDuringAFlightItFindsNothing) {
+TEST_P(HealthyDoctorTest, FindsNoFaultOnAnIdleMachineOrDuringAFlight) {
   expect_healthy(examine(on("there") + doctor(GetParam())));
   FlightOptions options;
   options.qos_file = qos(GetParam());

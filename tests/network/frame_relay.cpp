@@ -1,5 +1,5 @@
 /// A wire with faults: forwards Ethernet frames between two interfaces, both ways, each after a
-/// delay, some twice. The kernel here has no netem. What it did is printed when it is asked to end
+/// delay, some twice. The kernel here has no netem. Its counts are printed when it is asked to end
 /// (SIGTERM).
 #include <arpa/inet.h>
 #include <linux/if_packet.h>

@@ -1,4 +1,4 @@
-/// A flight of the three programs on hosts of their own, and what came of it beside a local one.
+/// A flight of the three programs on hosts of their own, and its result beside a local one.
 #pragma once
 
 #include <cstdint>
@@ -29,7 +29,7 @@ class Profile {
 
   /// Options of a flight with one program on each host.
   FlightOptions flight_options() const { return options_; }
-  /// What to put before a program on `host`; the same for one more of them.
+  /// Command prefix of a program on `host`; the same for one more of them.
   std::vector<std::string> before(const std::string& host) const;
 
  private:
@@ -40,7 +40,7 @@ class Profile {
   std::unique_ptr<Process> discovery_server_;
 };
 
-/// What a flight came to.
+/// Result of a flight.
 struct Figures {
   double wall_s = 0.0;  ///< from step 0 to the end
   double steps_per_s = 0.0;

@@ -22,7 +22,7 @@ class Network {
   /// The name of the switch where a host's is expected.
   static constexpr const char* kSwitch = "switch";
 
-  /// What keeps this machine from having such networks; nothing where they work.
+  /// Why this machine cannot have such networks; empty if it can.
   static std::optional<std::string> find_obstacle();
 
   /// @throws std::runtime_error with what the system said.
@@ -33,7 +33,7 @@ class Network {
 
   const std::string& address(const std::string& host) const { return addresses_.at(host); }
 
-  /// What runs a command on `host` when put before it; the process keeps its id.
+  /// Prefix that runs a command on `host`; the process keeps its id.
   std::vector<std::string> on(const std::string& host) const;
 
   /// Runs a shell command on `host` to its end, and returns what it printed.

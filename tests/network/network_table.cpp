@@ -62,7 +62,7 @@ std::string format(const Figures& figures) {
   return text;
 }
 
-/// Columns 3 to 8 of the table: what came of `disturbance` with `profile`.
+/// Columns 3 to 8 of the table: the effect of `disturbance` with `profile`.
 std::string fly(const std::string& file, const std::string& profile, const Disturbance& disturbance,
                 const Flight& local) {
   Network network(kHosts);
@@ -86,11 +86,14 @@ std::string fly(const std::string& file, const std::string& profile, const Distu
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App cli("Flies every QoS profile on test hosts through every disturbance of their network.");
+  CLI::App cli(
+      "Flies each QoS profile on test hosts through each network disturbance; prints a Markdown\n"
+      "table. Needs root and takes minutes.");
   std::vector<std::string> profiles = kProfiles, disturbances;
   int vehicles = 1;
-  cli.add_option("--profile", profiles, "only these (names in config/qos)");
-  cli.add_option("--disturbance", disturbances, "only these (names in the table)");
+  cli.add_option("--profile", profiles, "fly only these profiles (names in config/qos)");
+  cli.add_option("--disturbance", disturbances,
+                 "apply only these disturbances (names in the table)");
   cli.add_option("--vehicles", vehicles, "vehicles in each flight")->check(CLI::Range(1, 256));
   CLI11_PARSE(cli, argc, argv);
   if (const auto obstacle = Network::find_obstacle()) {

@@ -1,4 +1,4 @@
-/// What linear theory says of a flight: judges that simulate nothing.
+/// Predictions of linear theory for a flight, without simulation.
 #pragma once
 
 #include <Eigen/LU>
@@ -40,7 +40,7 @@ struct SteadyError {
   Eigen::Array3d seen_rms() const { return (seen_amplitude.square() / 2 + mean.square()).sqrt(); }
 };
 
-/// What becomes of a sine on s = iw.
+/// Response to a sine on s = iw.
 using Transfer = std::function<std::complex<double>(const std::complex<double>& s)>;
 
 /// Small motions about hover of vehicle, drag and law, the force held over the period T:
@@ -52,8 +52,8 @@ using Transfer = std::function<std::complex<double>(const std::complex<double>& 
 ///     hold        Z = H(T) e^(−sd) G,   H(T) = (1 − e^(−sT)) / (sT)
 ///     sensing     F has p e^(−sa) H(P) for p, and q likewise
 ///
-/// M, S, I are the vehicle's mass and the pendulum's first and second moment about its joint; what
-/// the controller believes bears a dash. d is the delay of the node, P and a period and age of the
+/// M, S, I are the vehicle's mass and the pendulum's first and second moment about its joint; the
+/// controller's model has a dash. d is the delay of the node, P and a period and age of the
 /// samples. G, `horizontal_lag`, is what vehicle and autopilot make of a horizontal force. On
 /// s = iw, of each axis its own frequency.
 inline SteadyError calc_steady_error(const config::Scenario& scenario,

@@ -148,7 +148,7 @@ struct State {
   std::vector<double> rotor_speeds;                          ///< rad/s
 };
 
-/// What is held during a step. A missing set-point means: no change of that rotor's speed.
+/// Inputs held during a step. A missing set-point means: no change of that rotor's speed.
 struct Inputs {
   std::vector<double> rotor_set_points;                            ///< rad/s, before clamping
   Eigen::Vector3d f_Q_W = Eigen::Vector3d::Zero();                 ///< direct force on Q, N
@@ -219,7 +219,7 @@ inline std::vector<double> calc_rotor_speeds(const Vehicle& vehicle, std::vector
 }
 
 /// The smooth pieces of a rotor's loss over the velocity along its axis: −1 against the thrust,
-/// 1 along it, 0 where no thrust is left.
+/// 1 along it, 0 if no thrust is left.
 inline int calc_loss_piece(const Rotor& rotor, double axial_velocity) {
   if (!rotor.loss_speed) return 1;
   if (std::abs(axial_velocity) >= *rotor.loss_speed) return 0;

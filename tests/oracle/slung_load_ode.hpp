@@ -86,7 +86,7 @@ inline State rk4_step(const State& state, const Eigen::Vector3d& f_Q_W, double h
       state, [&](double, const State&) { return f_Q_W; }, h, parameters);
 }
 
-/// What a state sample says about this state.
+/// The state sample of this state.
 inline model::SlungLoadState to_model_state(const State& state, double rod_length) {
   return model::make_state(state.p_WQ, state.v_WQ, state.p_WQ + rod_length * state.n_W,
                            state.v_WQ + rod_length * state.n_dot_W);

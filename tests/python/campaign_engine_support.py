@@ -1,4 +1,4 @@
-"""What the tests of a campaign's folder and engine share: a small campaign, and the command line in a
+"""Shared by the tests of a campaign's folder and engine: a small campaign, and the command line in a
 process of its own. `FAKE` is the folder of a stand-in for the extension module."""
 
 import os

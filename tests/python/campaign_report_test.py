@@ -186,7 +186,7 @@ class ReportTest(CampaignTest):
                                      rows=[[run, run, "finished", "", 1, ""] for run in range(9)])
         self.assertIn("Nothing was measured", make_campaign_report(folder))
 
-    def test_what_is_missing_or_damaged_is_refused_in_one_line(self):
+    def test_missing_and_damaged_files_are_refused_in_one_line(self):
         folder = self.write_campaign()
         (folder / "manifest.json").write_text("{")
         self.expect_input_error(lambda: make_campaign_report(folder),

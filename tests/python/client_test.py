@@ -23,7 +23,7 @@ LAWS = {name: client_program.LAWS[name] for name in ("pid", "counting")}
 
 @pytest.fixture
 def domain():
-    """A DDS domain of one's own, by the lock that the tests in C++ take, too."""
+    """A free DDS domain, by the lock that the tests in C++ take, too."""
     deadline = time.monotonic() + 240
     while time.monotonic() < deadline:
         for number in range(1, 61):
@@ -186,7 +186,7 @@ def test_a_standby_in_cpp_takes_over_from_a_killed_python_client(tmp_path, domai
         assert flight.wait("recorder") == 0 and flight.manifest["complete"], flight.logs()
         state = sls.Recording(flight.recording).state
         undisturbed = sls.fly(sls.load_scenario(flight.scenario))
-        # Either law flies the same path but for rounding.
+        # Both laws fly the same path, apart from rounding.
         assert np.abs(state["load_x_m"] - undisturbed.state["load_x_m"]).max() < 1e-12
 
 

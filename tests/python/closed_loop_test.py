@@ -77,7 +77,7 @@ def test_under_the_forces_of_a_flight_it_is_that_flight(name):
         loop.step(np.ascontiguousarray(np.vstack([answered[k]] * 2)))
 
 
-def test_what_controllers_see_is_not_the_truth_where_the_scenario_says_so():
+def test_measured_states_differ_from_the_truth_by_the_faults_of_the_scenario():
     biased = load_analytic(faults=[{"bias": {"on": "state", "position_m": [0.1, 0, 0]}}])
     loop = sls.ClosedLoop(biased)
     assert np.allclose(loop.state.load_position - loop.truth.load_position, [0.1, 0, 0])

@@ -31,7 +31,7 @@ def test_fly_and_plot_draws_what_it_flew(tmp_path):
     said = run_example("fly_and_plot.py", "--out", tmp_path, folder=tmp_path)
     rms = {mass: float(error) for mass, error in re.findall(r"(\S+) kg: .* rms (\S+) m", said)}
     assert list(rms) == ["0.1", "0.2", "0.3"]
-    assert rms["0.2"] < min(rms["0.1"], rms["0.3"])  # the mass that the law believes
+    assert rms["0.2"] < min(rms["0.1"], rms["0.3"])  # the mass that the law uses
     assert (tmp_path / "masses.png").read_bytes().startswith(b"\x89PNG")
 
 

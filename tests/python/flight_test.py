@@ -56,7 +56,7 @@ class FlightTest(support.FolderTest):
         page = (self.folder / "r/report.html").read_text()
         self.assertIn("finished: mission finished", page)
 
-        # What the recorder has written for people is a second opinion on the metrics.
+        # The recorder's text is an independent check of the metrics.
         flight = Recording(self.folder / "r").load_flight(0, "r")
         self.assertEqual(len(flight.time_s), 501)  # 2 s at 4 ms
         stage, lap = calc_stage_metrics(flight)

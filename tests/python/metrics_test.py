@@ -72,7 +72,7 @@ class StepMetricsTest(unittest.TestCase):
         last_crossing_s = 10 - math.asin(2 / 3) / (2 * math.pi)
         self.assertAlmostEqual(settled, last_crossing_s, delta=PERIOD_S)
 
-    def test_what_does_not_settle_is_infinite_and_no_step_is_not_a_number(self):
+    def test_settling_time_is_infinite_without_settling_and_nan_without_a_step(self):
         self.assertEqual(metrics.calc_settling_time(self.time_s, 0.1 * self.time_s, 1.0), math.inf)
         still = np.full_like(self.time_s, 0.995)
         self.assertTrue(math.isnan(metrics.calc_settling_time(self.time_s, still, 1.0)))

@@ -83,7 +83,7 @@ class PlotTest(support.FolderTest):
         self.assertEqual(self.run_sls("plot", "point", "r", "six", "--out", "o")[0], 0)
         self.assertEqual(names_of(self.folder / "o", "png"), BODY)
 
-    def test_what_was_commanded_is_drawn_beside_what_was_done(self):
+    def test_commanded_and_actual_motion_are_drawn_together(self):
         write_recording(self.folder / "r", last=50, rotors=4)
         flight = Recording(self.folder / "r").load_flight(0, "r")
         drawn = figures.make_figures([flight])

@@ -169,7 +169,7 @@ def test_an_exception_of_the_law_ends_the_flight_with_step_and_vehicle():
     (None, "force: expected 3 finite numbers (N), got None"),
     (np.zeros((3, 3)), "force: expected 3 finite numbers (N), got array([[0., 0., 0.],"),
 ])
-def test_what_is_no_force_is_named(answer, message):
+def test_an_invalid_force_is_named(answer, message):
     with pytest.raises(sls.RunError) as error:
         sls.fly(load_hover(), lambda now: answer)
     assert f"vehicle 0, step 0: {message}" in str(error.value)
@@ -182,7 +182,7 @@ def test_what_is_no_force_is_named(answer, message):
     (((0.0, 0.0, -1.0), (1.0, float("inf"))), "memory: expected 2 finite numbers, got (1.0, inf)"),
     (((0.0, 0.0), (1.0, 2.0)), "force: expected 3 finite numbers (N), got (0.0, 0.0)"),
 ])
-def test_what_is_no_memory_is_named(answer, message):
+def test_an_invalid_memory_is_named(answer, message):
     class Law:
         memory_size = 2
 
@@ -229,14 +229,14 @@ class TextMemory(NegativeMemory):
     (LargeMemory(), "LargeMemory.memory_size: expected a whole number from 0 to 64, got 65"),
     (TextMemory(), "TextMemory.memory_size: expected a whole number from 0 to 64, got '3'"),
 ])
-def test_what_is_no_law_is_refused_before_the_flight(controller, message):
+def test_an_invalid_law_is_refused_before_the_flight(controller, message):
     with pytest.raises(sls.ConfigError) as error:
         sls.fly(load_hover(), controller)
     assert message in str(error.value)
 
 
 @pytest.mark.parametrize("raised", [KeyboardInterrupt, SystemExit])
-def test_what_is_not_the_laws_fault_stays_what_it_is(raised):
+def test_exceptions_that_are_not_errors_of_the_law_pass_unchanged(raised):
     def law(now):
         if now.step == 150:
             raise raised()

@@ -41,7 +41,7 @@ class RecordingsTest(support.FolderTest):
                          [("set_point", 0, STEPS_PER_STAGE, None),
                           ('eight, "two laps"', STEPS_PER_STAGE, 2 * STEPS_PER_STAGE + 1, 2.0)])
 
-    def test_what_the_controller_saw_is_what_was_measured_or_else_the_truth(self):
+    def test_the_controllers_input_is_the_measurement_or_else_the_truth(self):
         write_recording(self.folder / "r", last=3, vehicles=(0, 1))
         seen = Recording(self.folder / "r").load_seen(1, "r")
         np.testing.assert_array_equal(seen.p_WL[3], load_of(3, 1))
@@ -82,7 +82,7 @@ class RecordingsTest(support.FolderTest):
         self.assertEqual(flight.body.rotor_speed.shape, (4, 0))
         self.assertTrue(np.isfinite(flight.body.q_WB).all())
         self.assertTrue(np.isnan(flight.body.w_WB_B).all())
-        # What its force asks of the attitude is still known.
+        # The attitude that its force asks for is still known.
         figure = make_figures([flight])["body_attitude"]
         self.assertEqual([len(axes.lines) for axes in figure.axes], [2, 2, 2])
 
@@ -131,7 +131,7 @@ class RecordingsTest(support.FolderTest):
             np.testing.assert_array_equal(values, expected)
         self.assertEqual(flight.notes, ())
 
-    def test_what_is_missing_is_told_and_not_invented(self):
+    def test_missing_samples_are_reported_and_not_invented(self):
         write_recording(self.folder / "r", complete=False, missing=[
             {"vehicle_id": 0, "topic": "sls/reference", "from": 200, "to": 202}])
         self.change("reference.csv", lambda text: "\n".join(
@@ -160,7 +160,7 @@ class RecordingsTest(support.FolderTest):
                          [(0, "waiting: waiting for: recorder, client"), (0, "running"),
                           (8.0, "finished: mission finished")])
 
-    def test_what_is_no_recording_is_refused(self):
+    def test_a_folder_that_is_no_recording_is_refused(self):
         (self.folder / "r").mkdir()
         self.refuse("r: expected a recording, got no manifest.json that can be read")
         (self.folder / "r/manifest.json").write_text("{")

@@ -1,4 +1,4 @@
-"""What the tests of the package share. A test is run with the build folder as its argument; without
+"""Shared by the tests of the package. A test is run with the build folder as its argument; without
 what the package needs it is skipped (exit code 77)."""
 
 import contextlib

@@ -40,7 +40,7 @@ std::string from_hex(const std::string& hex) {
   return bytes;
 }
 
-/// What the README says a row adds. Kinds: n a number, i a stage, t a text, - nothing.
+/// The bytes of a row according to the README. Kinds: n a number, i a stage, t a text, - nothing.
 std::string to_certified_bytes(const std::string& topic, const std::string& kinds,
                                const std::vector<std::string>& row) {
   std::string bytes = length_and(topic) + little_endian(std::stoul(row.at(0)), 4) +
@@ -111,7 +111,7 @@ TEST(CertificateTest, CoversEveryVehicle) {
   EXPECT_EQ(read_certificate(folder.path()), calc_certificate(folder.path()));
 }
 
-TEST(CertificateTest, LeavesOutWhatDiffersBetweenEqualFlights) {
+TEST(CertificateTest, LeavesOutFieldsThatDifferBetweenEqualFlights) {
   const std::string expected = certify({});
   EXPECT_EQ(certify([](RecordEntry& entry) {
               entry.measured({PlantState()});  // the truth is what counts
@@ -175,7 +175,7 @@ TEST(CertificateTest, CoversAttitudeRatesAndSignalsWhereTheRunHasThem) {
                 make_signal_parameters());
 }
 
-TEST(CertificateTest, NumbersThatAreNoneReadBackToTheSameCertificate) {
+TEST(CertificateTest, NanReadsBackToTheSameCertificate) {
   certify([](RecordEntry& entry) {
     const double nan = std::numeric_limits<double>::quiet_NaN();
     entry.truth().p_WQ_m({nan, -nan, std::numeric_limits<double>::infinity()});

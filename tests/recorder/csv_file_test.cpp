@@ -147,7 +147,7 @@ TEST_F(CsvFileTest, NumbersReadBackToTheSameDouble) {
   }
 }
 
-TEST_F(CsvFileTest, WhatIsNotFiniteIsStillAWord) {
+TEST_F(CsvFileTest, NonFiniteNumbersAreWrittenAsWords) {
   CsvFile file(path_, "h");
   file.add(std::numeric_limits<double>::infinity());
   file.add(-std::numeric_limits<double>::infinity());
@@ -157,7 +157,7 @@ TEST_F(CsvFileTest, WhatIsNotFiniteIsStillAWord) {
   EXPECT_EQ(read_bytes(path_), "h\ninf,-inf,nan\n");
 }
 
-TEST_F(CsvFileTest, TextsComeBackWhateverTheyHold) {
+TEST_F(CsvFileTest, AnyTextSurvivesWritingAndReading) {
   const std::vector<std::string> texts = {"plain", "a,b", "say \"hi\"", "two\nlines", "cr\rlf\r\n",
                                           "\"",    ",",   " spaces ",   "ä€",         "\",\"\n\""};
   CsvFile file(path_, "h");
@@ -231,7 +231,7 @@ TEST_F(CsvFileTest, WithoutFlushMemoryStaysBounded) {
   EXPECT_EQ(bytes.back(), '\n');
 }
 
-TEST_F(CsvFileTest, DestroyedWithoutFlushWhatIsThereParses) {
+TEST_F(CsvFileTest, DestroyedWithoutFlushTheFileStillParses) {
   {
     CsvFile file(path_, "a,b");
     file.add(1);
@@ -308,7 +308,7 @@ TEST_F(CsvFileTest, ARowTheDiskTookInPartIsCutBack) {
   }
 }
 
-TEST_F(CsvFileTest, WhatTheDiskHasTakenIsNotWrittenAgain) {
+TEST_F(CsvFileTest, BytesOnTheDiskAreNotWrittenAgain) {
   CsvFile file(path_, "number,text,again");
   ASSERT_TRUE(write_limited(file, 60, 20));
   file.flush();  // somebody made room

@@ -189,7 +189,7 @@ TEST(FlightLogLapTest, LapsOfANanosecondTakeNoMemory) {
   expect_statistics(out, "lap 1 ", calc_expected(100, 100));
 }
 
-TEST_F(FlightLogTest, AStageThatIsFlownAgainIsAStageOfItsOwn) {
+TEST_F(FlightLogTest, AStageThatIsFlownAgainIsListedAgain) {
   for (const std::uint64_t step : {0u, 1u, 100u, 101u}) log_.add(make_rows(step));
   StepRows again = make_rows(102);
   again.reference->reference.stage_index(0);
@@ -220,7 +220,7 @@ TEST_F(FlightLogTest, AStageTheScenarioDoesNotHaveIsListedWithoutLaps) {
   EXPECT_EQ(text.find("lap 1"), std::string::npos) << text;
 }
 
-TEST_F(FlightLogTest, TellsWhatWasFlownAndWhatHappened) {
+TEST_F(FlightLogTest, ListsStagesAndEvents) {
   log_.add(make_status(PHASE_WAITING, 0, "missing: recorder"));
   log_.add(make_status(PHASE_WAITING, 0, "missing: recorder"));
   log_.add(make_status(PHASE_RUNNING, 0));

@@ -246,7 +246,7 @@ TEST_F(RecorderTest, ARunThatIsReplacedByAnotherServersEndsTheRecording) {
   EXPECT_EQ(read_manifest(out_).at("missing"), Json::array());
 }
 
-// A server that is overwhelmed falls silent too. Who was there before is then no successor.
+// An overloaded server falls silent, too. A server known before that is no successor.
 TEST_F(RecorderTest, AServerThatWasThereBeforeTakesNoSilentOnesPlace) {
   auto flight = std::make_unique<FakeFlight>(kRunId, 3);
   start();
@@ -293,8 +293,8 @@ TEST_F(RecorderTest, AServerThatStaysAwayIsGivenUp) {
   EXPECT_EQ(read_manifest(out_).at("outcome"), "lost");
 }
 
-// The last samples may have to be sent again and again. What is missing has 10 s step by step.
-TEST_F(RecorderTest, WhatComesLateAfterTheEndIsWaitedForWhileItComes) {
+// The last samples may have to be sent again and again. Each missing step has 10 s.
+TEST_F(RecorderTest, WaitsAfterTheEndAsLongAsLateSamplesCome) {
   FakeFlight flight(kRunId);
   start();
   ASSERT_TRUE(flight.wait_for_recorder());

@@ -57,7 +57,7 @@ TEST_F(RecordingFolderTest, FoldersOnTheWayAreMadeToo) {
   EXPECT_EQ(find_error(out_ / "with/slash/"), "no error");
 }
 
-TEST_F(RecordingFolderTest, AnEmptyFolderIsTaken) {
+TEST_F(RecordingFolderTest, AnEmptyFolderIsAccepted) {
   fs::create_directory(out_);
   EXPECT_EQ(find_error(out_), "no error");
   fs::create_directory_symlink(out_, root_ / "link");
@@ -193,7 +193,7 @@ TEST_F(ResumeTest, ACompleteRecordingIsRefused) {
   EXPECT_NE(find_resume_error().find("got a complete one"), std::string::npos);
 }
 
-TEST_F(ResumeTest, WhatIsNoRecordingIsRefusedAndKept) {
+TEST_F(ResumeTest, AFolderThatIsNoRecordingIsRefusedAndKept) {
   fill(out_);
   EXPECT_NE(find_resume_error().find("manifest.json"), std::string::npos);
   fs::remove(out_ / "manifest.json");

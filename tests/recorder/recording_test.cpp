@@ -402,7 +402,7 @@ TEST_F(RecordingTest, SamplesTheQueueRefusedMakeItIncomplete) {
   EXPECT_NE(gaps.find("queue"), std::string::npos) << gaps;
 }
 
-TEST_F(RecordingTest, StepsThatNobodyAnsweredAreRowsAndNotMissing) {
+TEST_F(RecordingTest, UnansweredStepsAreRowsAndNotMissing) {
   add_steps(0, 9);
   for (std::uint64_t step = 10; step < 20; ++step)
     feeder_.add({make_unanswered_entry(step, step < 15 ? ANSWER_HELD : ANSWER_FAIL_SAFE)});
@@ -475,7 +475,7 @@ TEST(SignalsTest, AttitudeRatesAndSignalsAreTheLastColumnsAndInTheManifest) {
                                                  {{"name", "wind"}, {"unit", ""}}}));
 }
 
-TEST(SignalsTest, RowsHaveAsManyFieldsAsTheHeaderWhateverComes) {
+TEST(SignalsTest, RowsAlwaysHaveAsManyFieldsAsTheHeader) {
   const sls::test::TemporaryFolder folder;
   record_flight(
       folder.path(), [](RecordEntry& entry) { entry.truth().signals().resize(entry.step() % 5); },
@@ -485,7 +485,7 @@ TEST(SignalsTest, RowsHaveAsManyFieldsAsTheHeaderWhateverComes) {
   EXPECT_EQ(states.text(0, "tension_n"), "nan");
 }
 
-TEST_F(RecordingTest, WhatWasMeasuredHasAFileOfItsOwnFromItsFirstRowOn) {
+TEST_F(RecordingTest, MeasurementsHaveTheirOwnFileFromTheFirstRow) {
   add_steps(0, 49);
   EXPECT_FALSE(fs::exists(folder_ / "measured.csv"));
   for (std::uint64_t step = 50; step <= kLastStep; ++step) {
@@ -552,7 +552,7 @@ TEST_F(RecordingTest, ARunThatFailedBeforeItBeganMissesNothing) {
   EXPECT_NE(gaps.find("not ready within 30 s"), std::string::npos) << gaps;
 }
 
-TEST_F(RecordingTest, TheReasonOfAFailureComesBeforeWhatIsMissing) {
+TEST_F(RecordingTest, TheReasonOfAFailureComesBeforeTheMissingSteps) {
   add_steps(0, 20);
   add_steps(22, 30);
   recording_->add(make_status(PHASE_FAILED, 30, "the recorder was behind"));
@@ -563,7 +563,7 @@ TEST_F(RecordingTest, TheReasonOfAFailureComesBeforeWhatIsMissing) {
   EXPECT_EQ(gaps.find('\n'), std::string::npos) << gaps;
 }
 
-TEST_F(RecordingTest, AnInterruptedRunSaysSo) {
+TEST_F(RecordingTest, AnInterruptedRunIsReportedAsInterrupted) {
   recording_->add(make_status(PHASE_RUNNING, 0));
   add_steps(0, 99);
   EXPECT_FALSE(finish("interrupted by SIGINT"));
@@ -592,8 +592,8 @@ TEST_F(RecordingTest, AResetRunIsKeptAndItsLastStepNeedsNoAnswer) {
   EXPECT_EQ(manifest.at("complete"), false);
 }
 
-// What was not published is not in the recording.
-TEST_F(RecordingTest, AServerKilledBetweenTwoBatchesLeavesWhatItPublished) {
+// Unpublished steps are not in the recording.
+TEST_F(RecordingTest, AServerKilledBetweenTwoBatchesLeavesItsPublishedSteps) {
   recording_->add(make_status(PHASE_RUNNING, 0));
   add_steps(0, 99);
   recording_->add(make_status(PHASE_RUNNING, 120));
@@ -653,7 +653,7 @@ TEST_F(RecordingTest, ARunWithoutASingleSampleIsNotComplete) {
   for (const char* name : kCsvFiles) EXPECT_TRUE(read_table(name).rows.empty()) << name;
 }
 
-TEST_F(RecordingTest, KilledBeforeTheEndItsFilesParseAndDoNotClaimToBeWhole) {
+TEST_F(RecordingTest, KilledBeforeTheEndItsFilesParseAndAreMarkedIncomplete) {
   recording_->add(make_status(PHASE_RUNNING, 0));
   add_steps(0, 149);
   const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(10);
@@ -669,7 +669,7 @@ TEST_F(RecordingTest, KilledBeforeTheEndItsFilesParseAndDoNotClaimToBeWhole) {
   EXPECT_EQ(manifest.at("run_id"), "0123456789abcdef");
 }
 
-TEST_F(RecordingTest, FromTheFirstMomentThereIsAManifestThatSaysNotComplete) {
+TEST_F(RecordingTest, AManifestMarkedIncompleteExistsFromTheStart) {
   EXPECT_EQ(read_manifest().at("complete"), false);
   for (const char* name : kCsvFiles) EXPECT_EQ(read_table(name).rows.size(), 0u) << name;
   EXPECT_EQ(read_table("state.csv").header.size(), 22u) << "headers are on disk at once";
@@ -677,7 +677,7 @@ TEST_F(RecordingTest, FromTheFirstMomentThereIsAManifestThatSaysNotComplete) {
 
 // --- a full disk ---------------------------------------------------------------------------------
 
-/// What `work` throws as a system_error, or "no error".
+/// The system_error that `work` throws, or "no error".
 std::string find_system_error(const std::function<void()>& work) {
   try {
     work();
@@ -687,7 +687,7 @@ std::string find_system_error(const std::function<void()>& work) {
   return "no error";
 }
 
-TEST_F(RecordingTest, AFullDiskEndsTheRecordingAndWhatIsThereDoesNotClaimToBeWhole) {
+TEST_F(RecordingTest, AFullDiskEndsTheRecordingWhichIsMarkedIncomplete) {
   recording_->add(make_status(PHASE_RUNNING, 0));
   add_steps(0, kLastStep);
   recording_->add(make_status(PHASE_FINISHED, kLastStep));

@@ -29,7 +29,7 @@ class SegmentsTest : public testing::Test {
 
   Segment resume() { return make_next_segment(open_recording(out_)); }
 
-  /// What a recorder gets that starts while the histories reach back to `oldest`.
+  /// The samples of a recorder that starts while the histories reach back to `oldest`.
   bool record_to_the_end(const Segment& segment, std::uint64_t oldest) {
     Recording recording(segment, make_parameters());
     EXPECT_EQ(recording.last_complete_step(), static_cast<std::int64_t>(segment.first_step) - 1);
@@ -68,7 +68,7 @@ TEST_F(SegmentsTest, AResumedRecordingEqualsTheUndisturbedOne) {
   expect_equal_to_the_undisturbed(segment.folder);
   EXPECT_EQ(read_manifest(segment.folder).at("segment"),
             Json({{"number", 2}, {"first_step", 151}}));
-  EXPECT_EQ(read_manifest(out_).at("complete"), false) << "the last segment speaks for all";
+  EXPECT_EQ(read_manifest(out_).at("complete"), false) << "the last segment covers all";
   const auto table = parse_csv(read_bytes(segment.folder / "state.csv"));
   EXPECT_EQ(table.text(0, "step"), "151");
 }
@@ -141,7 +141,7 @@ TEST_F(SegmentsTest, AnInterruptedRecordingCanBeResumedToo) {
   expect_equal_to_the_undisturbed(segment.folder);
 }
 
-TEST_F(SegmentsTest, WhatTheHistoriesNoLongerHoldIsNamedAsAGap) {
+TEST_F(SegmentsTest, StepsNoLongerInTheHistoriesAreNamedAsAGap) {
   record_until_killed(make_segment(out_), 0, 150);
   const Segment segment = resume();
   EXPECT_FALSE(record_to_the_end(segment, 200));
@@ -202,7 +202,7 @@ TEST_F(SegmentsTest, StatusSamplesOfAllSegmentsCountTogether) {
   }
 }
 
-TEST_F(SegmentsTest, StepsThatNobodyAnsweredAreWholeWithoutAReference) {
+TEST_F(SegmentsTest, UnansweredStepsAreWholeWithoutAReference) {
   const auto add = [](Recording& recording, std::uint64_t from, std::uint64_t to) {
     BatchFeeder feeder(recording, from);
     for (std::uint64_t step = from; step <= to; ++step)

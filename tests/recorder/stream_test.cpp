@@ -147,7 +147,7 @@ TEST_F(StreamTest, HistoryBeforeTheFirstStepOfASegmentIsLeftOut) {
   EXPECT_TRUE(gaps_.empty());
 }
 
-TEST_F(StreamTest, AfterTheLastBatchNothingCounts) {
+TEST_F(StreamTest, SamplesAfterTheLastBatchAreIgnored) {
   add(0, true);
   add(1);
   EXPECT_EQ(steps(), list(0, 0));
@@ -160,7 +160,7 @@ TEST_F(StreamTest, AnEmptyLastBatchEndsTheRun) {
   EXPECT_TRUE(stream_.has_ended());
 }
 
-TEST_F(StreamTest, GivingUpHandsOnWhatWaits) {
+TEST_F(StreamTest, GivingUpReturnsTheWaitingBatches) {
   add(0);
   add(2);
   add(5);

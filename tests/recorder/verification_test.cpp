@@ -121,7 +121,7 @@ TEST_F(VerificationTest, ClientNamesComputeTimesAndWaysOfWritingANumberAreNoDiff
   EXPECT_EQ(find_problems(b_).find("certificate"), std::string::npos);
 }
 
-TEST_F(VerificationTest, ZerosOfBothSignsAndNumbersThatAreNoneAreToldApart) {
+TEST_F(VerificationTest, SignedZerosAndNanAreDistinguished) {
   change("state.csv", 2, 19, [](auto&) { return "-0"; });
   EXPECT_EQ(find_difference(), "state.csv, vehicle 0, step 0, force_x_n: 0 in A, -0 in B");
   change("state.csv", 2, 19, [](auto&) { return "nan"; });
@@ -146,7 +146,7 @@ TEST_F(VerificationTest, AShorterRecordingDiffersWhereItEnds) {
     recording.finish("interrupted by SIGINT", 0);
   }
   EXPECT_EQ(find_difference(), "vehicle 0, step 201: in A alone");
-  EXPECT_EQ(find_problems(b_), "") << "it is what its manifest says";
+  EXPECT_EQ(find_problems(b_), "") << "it matches its manifest";
   const auto notes = list_notes(open_recording(a_), open_recording(b_));
   ASSERT_EQ(notes.size(), 1u);
   EXPECT_EQ(notes[0], "B: not complete: interrupted: interrupted by SIGINT");
@@ -173,7 +173,7 @@ TEST_F(VerificationTest, ScenarioPeriodModeAndMissingStepsAreNoted) {
   EXPECT_EQ(find_difference(), "state.csv, vehicle 0, step 1, sim_time_s: 0.004 in A, 0.002 in B");
 }
 
-TEST_F(VerificationTest, FilesThatAreNotWhatTheManifestSaysAreNamed) {
+TEST_F(VerificationTest, FilesThatDifferFromTheManifestAreNamed) {
   write_bytes(b_ / "flight.txt", "forged");
   EXPECT_EQ(find_difference(), "equal");
   EXPECT_EQ(find_problems(b_).find((b_ / "flight.txt").string() + ": SHA-256"), 0u);
@@ -204,7 +204,7 @@ TEST_F(VerificationTest, RowsOutOfOrderAreDamage) {
 }
 
 // Which vehicle's rows come first, and by how much, is chance.
-TEST_F(VerificationTest, AFleetIsComparedInStepOrderWhateverTheOrderOfItsRows) {
+TEST_F(VerificationTest, AFleetIsComparedInStepOrderForAnyOrderOfRows) {
   constexpr std::uint32_t kIds[] = {7, 0, 3};
   const auto record = [&](const fs::path& folder, std::uint64_t steps_apart) {
     fs::remove_all(folder);
@@ -270,7 +270,7 @@ TEST_F(VerificationTest, SignalsAreComparedByTheirNames) {
             std::string::npos);
 }
 
-TEST_F(VerificationTest, WhatWasMeasuredIsCheckedAgainstTheManifestAndNotCertified) {
+TEST_F(VerificationTest, MeasurementsAreCheckedAgainstTheManifestAndNotCertified) {
   fs::remove_all(b_);
   fs::create_directory(b_);
   record_flight(b_, [](RecordEntry& entry) { entry.measured({entry.truth()}); });
@@ -295,7 +295,7 @@ TEST_F(VerificationTest, ARecordingOfAnEarlierVersionKeepsItsCertificate) {
   EXPECT_EQ(inspection.certificate, flight.manifest().certificate);
 }
 
-TEST_F(VerificationTest, AKilledRecordingIsReadAndSaidToBeUnfinished) {
+TEST_F(VerificationTest, AKilledRecordingIsReadAndReportedAsUnfinished) {
   fs::remove_all(b_);
   fs::create_directory(b_);
   record_until_killed(make_segment(b_), 0, 200);
@@ -303,7 +303,7 @@ TEST_F(VerificationTest, AKilledRecordingIsReadAndSaidToBeUnfinished) {
   EXPECT_NE(find_problems(b_).find("lists no files"), std::string::npos);
 }
 
-TEST_F(VerificationTest, WhatIsNoRecordingIsRefused) {
+TEST_F(VerificationTest, AFolderThatIsNoRecordingIsRefused) {
   EXPECT_THROW(open_recording(folder_ / "none"), config::ConfigError);
   EXPECT_THROW(open_recording(folder_.path()), config::ConfigError);
   for (const char* text : {"", "{", "[]", "{\"complete\": 3}", "null"}) {
@@ -312,7 +312,7 @@ TEST_F(VerificationTest, WhatIsNoRecordingIsRefused) {
   }
 }
 
-// A manifest is opened by whoever verifies somebody else's recording.
+// The manifest of a recording to verify may come from anywhere.
 TEST_F(VerificationTest, AManifestNamesNoFilesElsewhereAndNoThousandsOfVehicles) {
   const std::string manifest = read_bytes(b_ / "manifest.json");
   for (const char* name : {"/dev/zero", "../a/state.csv", "..", "", "folder/"}) {

@@ -24,8 +24,8 @@ class Keys {
 
   std::filesystem::path path() const { return folder_ / "keys"; }
 
-  /// What makes a program use `identity` of these keys, put before its command line; its role's by
-  /// default.
+  /// Command prefix that makes a program use `identity` of these keys, put before its command line;
+  /// its role's by default.
   std::vector<std::string> as(const std::string& identity = {}) const;
 
   /// One more identity in a folder of that name.

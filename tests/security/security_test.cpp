@@ -49,7 +49,7 @@ TEST(SecureFlightTest, AStandbyTakesOverAndTheKilledClientIsLetInAgain) {
   EXPECT_NE(controllers.find("primary standby primary"), std::string::npos) << controllers;
 }
 
-TEST(SecureFlightTest, AnOperatorPausesAndResumesWhatAControllerMayNot) {
+TEST(SecureFlightTest, AnOperatorMayPauseAndResumeAndAControllerMayNot) {
   const SecuredRun run(12);
   const auto recorder = run.start_recorder(), server = run.start_server(),
              client = run.start_client();
@@ -111,8 +111,8 @@ class IntruderTest : public testing::Test {
     return {"--scenario", (folder_ / "intruder.yaml").string(), "--strength", "1000"};
   }
 
-  /// Expects the server to name the intruder with `cause`, the flight to be the one without him,
-  /// and him to have seen nothing of it.
+  /// Expects the server to name the intruder with `cause`, the flight to be as without it,
+  /// and the intruder to have received nothing.
   void expect_harmless(const std::string& cause, const std::vector<std::string>& before,
                        const std::string& qos_file = qos("secure")) {
     const auto server = run_.start_server();

@@ -1,4 +1,5 @@
-/// What somebody on the network, without keys, hears and can do: three hosts of the flight and his.
+/// A host without keys on the network, what it can read and do: three hosts of the flight and that
+/// one.
 #include <gtest/gtest.h>
 
 #include <algorithm>

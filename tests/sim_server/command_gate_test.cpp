@@ -163,7 +163,7 @@ TEST_F(CommandGateTest, AnyNumberThatIsNotFiniteIsRefused) {
   EXPECT_EQ(gate_.counters().rejected_not_finite(), offered);
 }
 
-TEST_F(CommandGateTest, ACommandOfAnotherRunIsRefusedWithoutBlame) {
+TEST_F(CommandGateTest, ACommandOfAnotherRunIsRefusedAndNotCountedAgainstTheClient) {
   OfferedAnswer command = make_answer(0);
   command.run_id = kRun + 1;
   EXPECT_EQ(offer_bad(command), Verdict::kOtherRun);
@@ -171,7 +171,7 @@ TEST_F(CommandGateTest, ACommandOfAnotherRunIsRefusedWithoutBlame) {
   EXPECT_EQ(gate_.refusal(), std::nullopt);
 }
 
-TEST_F(CommandGateTest, ACommandForAnUnknownVehicleIsRefusedWithoutBlame) {
+TEST_F(CommandGateTest, ACommandForAnUnknownVehicleIsRefusedAndNotCountedAgainstTheClient) {
   OfferedAnswer command = make_answer(0);
   command.command.vehicle_id(kVehicle + 1);
   EXPECT_EQ(offer_bad(command), Verdict::kUnknownVehicle);
@@ -179,7 +179,7 @@ TEST_F(CommandGateTest, ACommandForAnUnknownVehicleIsRefusedWithoutBlame) {
   EXPECT_EQ(gate_.refusal(), std::nullopt);
 }
 
-TEST_F(CommandGateTest, AStepThatIsNotAwaitedIsRefusedWithoutBlame) {
+TEST_F(CommandGateTest, AStepThatIsNotAwaitedIsRefusedAndNotCountedAgainstTheClient) {
   std::uint64_t offered = 0;
   for (const std::uint64_t step :
        {std::uint64_t{1}, std::uint64_t{1000000}, std::numeric_limits<std::uint64_t>::max()}) {
@@ -189,7 +189,7 @@ TEST_F(CommandGateTest, AStepThatIsNotAwaitedIsRefusedWithoutBlame) {
   EXPECT_EQ(gate_.refusal(), std::nullopt);
 }
 
-TEST_F(CommandGateTest, AnAnswerOfNobodyAnnouncedIsRefused) {
+TEST_F(CommandGateTest, AnAnswerOfAnUnannouncedClientIsRefused) {
   EXPECT_EQ(gate_.offer(make_answer(0), kStranger), Verdict::kUnknownClient);
   EXPECT_FALSE(gate_.accepted());
   EXPECT_EQ(gate_.counters().rejected_client(), 1u);
@@ -235,7 +235,7 @@ TEST_F(CommandGateTest, AnotherAnswerToAnAnsweredStepIsNoCopy) {
   EXPECT_EQ(gate_.counters().superseded(), 0u);
 }
 
-TEST_F(CommandGateTest, AStrangersCopyOfAnAcceptedCommandIsNoDuplicate) {
+TEST_F(CommandGateTest, AnotherClientsCopyOfAnAcceptedCommandIsNoDuplicate) {
   gate_.offer(make_answer(0), kStrongPeer);
   gate_.offer(make_answer(0), kStranger);
   gate_.expect(1);
@@ -379,7 +379,7 @@ TEST_F(CommandGateTest, ABadCommandAfterAClientsValidAnswerIsOnlyCounted) {
 
 // --- several clients -----------------------------------------------------------------------------
 
-TEST_F(CommandGateTest, TheStrongestClientFliesWhoeverAnswersFirst) {
+TEST_F(CommandGateTest, TheStrongestClientFliesAlsoWhenAnotherAnswersFirst) {
   set_clients({kWeakest, kStrong, kWeak});
   EXPECT_EQ(gate_.offer(make_answer(0, -1.0), kWeakestPeer), Verdict::kHeld);
   EXPECT_EQ(gate_.offer(make_answer(0, -2.0), kWeakPeer), Verdict::kHeld);
@@ -565,7 +565,7 @@ TEST_F(CommandGateTest, AHeldAnswerFliesWhenTheStrongerClientLeaves) {
   EXPECT_EQ(*gate_.accepted(), make_answer(0, -2.0));
 }
 
-TEST_F(CommandGateTest, WhatAClientAnsweredBeforeItLeftIsCounted) {
+TEST_F(CommandGateTest, AnswersOfAClientThatLeftAreCounted) {
   set_clients({kStrong, kWeak});
   gate_.offer(make_answer(0), kWeakPeer);
   set_clients({kStrong});
@@ -592,7 +592,7 @@ TEST_F(CommandGateTest, WithoutClientsNothingIsAwaitedAndNothingRefused) {
   EXPECT_EQ(gate_.offer(make_answer(0), kStrongPeer), Verdict::kUnknownClient);
 }
 
-TEST_F(CommandGateTest, EveryRejectionSaysWhy) {
+TEST_F(CommandGateTest, EveryRejectionHasAReason) {
   std::set<std::string> texts;
   for (const Verdict verdict : {Verdict::kNotFinite, Verdict::kForceLimit, Verdict::kOtherRun,
                                 Verdict::kEarly, Verdict::kWrongStep, Verdict::kContradiction,
@@ -647,7 +647,7 @@ class Junk {
   std::mt19937_64& random_;
 };
 
-TEST(CommandGatePropertyTest, JunkNeitherChangesWhatFliesNorEscapesTheCounters) {
+TEST(CommandGatePropertyTest, InvalidAnswersChangeNoForceAndAreCounted) {
   for (std::uint64_t seed = 0; seed < 40; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937_64 random(seed);
@@ -701,7 +701,7 @@ TEST(CommandGatePropertyTest, JunkNeitherChangesWhatFliesNorEscapesTheCounters) 
   }
 }
 
-TEST(CommandGatePropertyTest, WhileOneClientLivesEveryStepIsAnsweredWhoeverComesAndGoes) {
+TEST(CommandGatePropertyTest, EveryStepIsAnsweredAsLongAsOneOfTheChangingClientsLives) {
   const std::vector<ReadyClient> everybody = {kStrong, kWeak, kWeakest};
   for (std::uint64_t seed = 0; seed < 40; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));

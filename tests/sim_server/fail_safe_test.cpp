@@ -21,7 +21,7 @@ TEST(FailSafeTest, StaysWithinTheForceLimitInItsDirection) {
   EXPECT_LT(f_Q_W.z(), 0.0);
 }
 
-/// What the weight-holding force leaves of the energy: kinetic, and that of the load below the
+/// The energy under the weight-holding force: kinetic, and that of the load below the
 /// quadrotor. Its rate is −(m + m_L) |v_WQ|² / τ.
 double calc_remaining_energy(const model::SlungLoadState& state) {
   const double below = (state.p_WL - state.p_WQ).z();

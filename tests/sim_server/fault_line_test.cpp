@@ -53,7 +53,7 @@ FaultLine make_line(const std::vector<config::Fault>& faults, std::uint32_t vehi
   return FaultLine(scenario, vehicle_id);
 }
 
-/// What acts at the steps 0, 1, … when the force at step k is meant to be (k, 0, 0): its x.
+/// The acting force's x at the steps 0, 1, …, when the commanded force at step k is (k, 0, 0).
 std::vector<double> actuate_steps(const std::vector<config::Fault>& faults, std::uint64_t steps) {
   FaultLine line = make_line(faults);
   std::vector<double> acting;
@@ -182,7 +182,7 @@ TEST(DelayTest, HoldsTheSampleOfThatManyPeriodsBeforeAndTheFirstUntilOneHasArriv
   }
 }
 
-TEST(DelayTest, KnowsWhatWasSentBeforeItsTimeAndEndsAtOnce) {
+TEST(DelayTest, StartsWithSamplesSentBeforeAndEndsAtOnce) {
   const auto acting = actuate_steps({during(5, 8, make_delay(3))}, 11);
   EXPECT_EQ(acting, (std::vector<double>{0, 1, 2, 3, 4, 2, 3, 4, 8, 9, 10}));
 }
@@ -317,7 +317,7 @@ TEST(BiasTest, RodAnglesMoveTheLoadAboutTheQuadrotor) {
   EXPECT_LT((measured.p_WL - measured.p_WQ - n_W).norm(), 1e-14);
 }
 
-TEST(BiasTest, RodRatesAreWhatTheLoadsVelocitySays) {
+TEST(BiasTest, RodRatesFollowFromTheLoadsVelocity) {
   config::BiasFault bias;
   bias.offset.rod.alpha_dot = 0.2;
   bias.offset.rod.beta_dot = -0.1;
@@ -448,7 +448,7 @@ TEST(RandomTest, LinesAndChannelsDoNotDisturbEachOther) {
   }
 }
 
-TEST(RandomTest, AFaultDrawsTheSameNumbersWhateverTheOthersAre) {
+TEST(RandomTest, AFaultDrawsTheSameNumbersBesideAnyOtherFaults) {
   const config::Fault noise = make_force_noise({1, 1, 1}, 9);
   const auto among = [&](const config::Fault& first, const config::Fault& last) {
     return draw_forces({first, noise, last}, 500);

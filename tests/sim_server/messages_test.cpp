@@ -1,4 +1,4 @@
-// What server and client put into their samples, and that both read it back alike.
+// The samples of server and client, and that both read them back alike.
 #include "sim_server/messages.hpp"
 
 #include <gtest/gtest.h>
@@ -50,7 +50,7 @@ Applied make_distinct_force() {
   return applied;
 }
 
-TEST(MessagesTest, AStateHoldsWhatIsMeasuredAndWhatWasApplied) {
+TEST(MessagesTest, AStateHoldsTheMeasurementAndTheAppliedForce) {
   const Applied applied = make_distinct_force();
   const VehicleState message = make_state_message(22, make_distinct_state(), applied);
   EXPECT_EQ(message.vehicle_id(), 22u);
@@ -70,7 +70,7 @@ TEST(MessagesTest, AtStepZeroNothingWasApplied) {
   EXPECT_EQ(message.measured().q_WB(), (std::array<double, 4>{1, 0, 0, 0})) << "level";
 }
 
-TEST(MessagesTest, ARecordEntryHoldsTheTruthAndWhereItDiffersWhatWasMeasured) {
+TEST(MessagesTest, ARecordEntryHoldsTheTruthAndADifferingMeasurement) {
   model::Measurement truth;
   truth.p_WQ = {27, 28, 29};
   RecordEntry entry;

@@ -107,7 +107,7 @@ TEST_F(ParticipantCheckTest, AnotherContractIsNamedAtOnceAndNotAdmitted) {
   EXPECT_TRUE(ParticipantCheck::admit_recorders({recorder}).empty());
 }
 
-TEST_F(ParticipantCheckTest, ARunOfNobodyIsNamedOnceItLasts) {
+TEST_F(ParticipantCheckTest, AnUnknownRunIsReportedOnceItLasts) {
   auto entry = make_entry(1);
   entry.announcement.run_id(0xcd);
   neighbourhood_.participants = {entry};
@@ -129,7 +129,7 @@ TEST_F(ParticipantCheckTest, ARunOfZeroIsNamedOnceItLasts) {
   EXPECT_EQ(look(1s), only(kFoo + "sls/participant run_id: expected 00000000000000ab, got 0"));
 }
 
-TEST_F(ParticipantCheckTest, WhoFliesOrAwaitsAnotherServerIsNoneOfOurs) {
+TEST_F(ParticipantCheckTest, AControllerOfAnotherServerIsNotOurs) {
   auto other = make_entry(1), waits = make_entry(2);
   other.announcement.run_id(0xcd);
   other.announcement.vehicle_ids({7});
@@ -145,7 +145,7 @@ TEST_F(ParticipantCheckTest, WhoFliesOrAwaitsAnotherServerIsNoneOfOurs) {
   EXPECT_TRUE(look(5s).empty());
 }
 
-TEST_F(ParticipantCheckTest, VehiclesOfNobodyAreNamedOnceThatLasts) {
+TEST_F(ParticipantCheckTest, UnknownVehiclesAreReportedOnceTheyLast) {
   auto entry = make_entry(1);
   entry.announcement.vehicle_ids({1, 7, 8, 20});
   neighbourhood_.other_vehicles = {20};
@@ -199,7 +199,7 @@ TEST_F(ParticipantCheckTest, AnAnnouncementThatMayBeOnItsWayIsWaitedForLonger) {
   EXPECT_TRUE(look(6s).empty());
 }
 
-TEST_F(ParticipantCheckTest, AMissingDeadlineIsAMistakeOfThoseWhoFlyForUs) {
+TEST_F(ParticipantCheckTest, AMissingDeadlineIsReportedOnlyOfOurControllers) {
   neighbourhood_.missing_deadlines[make_peer(1)] = "sls/command of 'foo': DEADLINE";
   EXPECT_TRUE(look().empty());  // it has not said for whom it flies
   EXPECT_EQ(look(1s), only("sls/command of 'foo': DEADLINE"));
@@ -371,7 +371,7 @@ TEST_F(ParticipantCheckTest, AVehicleFarFromItsReferenceIsAnnouncedOnce) {
   EXPECT_TRUE(check_.take_events().empty());
 }
 
-TEST_F(ParticipantCheckTest, StrangersCannotFillTheMemory) {
+TEST_F(ParticipantCheckTest, UnknownParticipantsCannotFillTheMemory) {
   for (int i = 0; i < 100'000; ++i) {
     bus::PeerId peer;
     peer.bytes[0] = static_cast<std::uint8_t>(i);

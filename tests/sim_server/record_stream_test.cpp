@@ -1,4 +1,4 @@
-// What a run hands to recorders arrives whole and in order, in batches that keep their limits.
+// Entries for recorders arrive whole and in order, in batches that keep their limits.
 #include "sim_server/record_stream.hpp"
 
 #include <gtest/gtest.h>
@@ -84,7 +84,7 @@ class RecordStreamTest : public testing::Test {
   std::unique_ptr<RecordStream> stream_;
 };
 
-TEST_F(RecordStreamTest, AllStepsArriveInOrderAndTheLastBatchSaysSo) {
+TEST_F(RecordStreamTest, AllStepsArriveInOrderAndTheLastBatchIsMarked) {
   begin(12'000);
   for (std::uint64_t step = 0; step < 5000; ++step) add(step);
   stream_->end();
@@ -148,7 +148,7 @@ TEST_F(RecordStreamTest, TheHistoryHoldsFewerStepsWhereEachTakesSeveralBatches) 
   EXPECT_EQ(stream_->history_steps(), 5000 / batches_of_step);
 }
 
-TEST_F(RecordStreamTest, WhatDoesNotFitIsCounted) {
+TEST_F(RecordStreamTest, EntriesThatDoNotFitAreCounted) {
   begin(12'000);
   for (std::uint64_t step = 0; step < 400; ++step) add(step, 1000);
   const std::uint64_t lost = stream_->lost();

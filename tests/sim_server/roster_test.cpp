@@ -50,7 +50,7 @@ bool contains(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
-TEST(RosterTest, NobodyIsMissingWhenAllExpectedAreReady) {
+TEST(RosterTest, NoParticipantIsMissingWhenAllAreReady) {
   const Roster roster = {{make_controller("pilot")}, {make_recorder("tape")}};
   EXPECT_EQ(name_missing(roster, make_wait_for(1, 1), kScenario), "");
 }
@@ -77,7 +77,7 @@ TEST(RosterTest, CountsWhereSeveralAreExpected) {
   EXPECT_TRUE(contains(missing, "2 recorders (1 ready)")) << missing;
 }
 
-TEST(RosterTest, NamesWhoIsThereButNotReady) {
+TEST(RosterTest, NamesParticipantsThatAreNotReady) {
   const Roster roster = {{make_controller("pilot", false)}, {make_recorder("tape", false)}};
   const std::string missing = name_missing(roster, make_wait_for(1, 1), kScenario);
   EXPECT_TRUE(contains(missing, "'pilot' on host-of-pilot is not ready")) << missing;
@@ -148,7 +148,7 @@ TEST(RosterTest, ARecorderThatIsNotReadyDoesNotBlockWhereNoneIsExpected) {
   EXPECT_EQ(name_blocking_recorder({{}, {make_recorder("tape", false)}}, 0, 100000), "");
 }
 
-TEST(RosterTest, AbsurdProgressIsTakenForWhatItCanMean) {
+TEST(RosterTest, ImpossibleProgressIsClampedToThePlausibleRange) {
   const auto lowest = std::numeric_limits<std::int64_t>::min();
   const auto highest = std::numeric_limits<std::int64_t>::max();
   EXPECT_NE(name_blocking_recorder({{}, {make_recorder_at(lowest)}}, 1, 2000), "");
@@ -166,9 +166,9 @@ TEST(RosterTest, TheServerWaitsForEveryRecorderThatIsThere) {
   EXPECT_TRUE(bus::are_recorders_done({}));
 }
 
-TEST(RosterTest, ARecorderThatIsTakenForDeadDoesNotBlockIfAnotherIsThere) {
+TEST(RosterTest, ARecorderPresumedDeadDoesNotBlockIfAnotherIsThere) {
   auto dead = make_recorder_at(10);
-  dead.heard -= 2 * bus::kSilenceOfTheDead;
+  dead.heard -= 2 * bus::kPresumedDeadAfter;
   EXPECT_EQ(name_blocking_recorder({{}, {dead, make_recorder_at(4999)}}, 1, 5000), "");
   EXPECT_NE(name_blocking_recorder({{}, {dead}}, 1, 20), "") << "one is expected";
 }
@@ -179,7 +179,7 @@ TEST(RosterTest, ARecorderThatComesDuringTheFlightStopsItOnlyInThePlaceOfOneThat
   roster.recorders[1].ready_since = *roster.began + std::chrono::seconds(1);
   EXPECT_EQ(name_blocking_recorder(roster, 1, 5000), "");
   EXPECT_NE(name_blocking_recorder(roster, 2, 5000), "") << "two are expected";
-  roster.recorders[0].heard -= 2 * bus::kSilenceOfTheDead;
+  roster.recorders[0].heard -= 2 * bus::kPresumedDeadAfter;
   EXPECT_NE(name_blocking_recorder(roster, 1, 5000), "") << "it is the only one now";
   // Of several the furthest takes the place.
   roster.recorders.push_back(make_recorder_at(4900));

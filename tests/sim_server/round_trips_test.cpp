@@ -7,7 +7,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-TEST(RoundTripsTest, BeforeTheFirstThereIsNone) {
+TEST(RoundTripsTest, IsEmptyBeforeTheFirstRoundTrip) {
   EXPECT_EQ(RoundTrips().calc_percentile(50), 0ns);
   EXPECT_EQ(RoundTrips().calc_percentile(99), 0ns);
 }

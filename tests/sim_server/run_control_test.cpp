@@ -71,7 +71,7 @@ TEST_F(RunControlTest, ARunGoesUntilItIsPausedAndOnWhenItIsResumed) {
   EXPECT_EQ(control.last_event(), "resumed by bob@lab");
 }
 
-TEST_F(RunControlTest, WhatTheStateDoesNotAllowIsRefusedWithIt) {
+TEST_F(RunControlTest, ARequestThatTheStateForbidsIsRefusedWithTheState) {
   expect_refused(ask(ACTION_RESUME), "not paused");
   expect_refused(ask(ACTION_START), "not paused");
   expect_refused(ask(ACTION_STEP, 1), "not paused");
@@ -94,7 +94,7 @@ TEST_F(RunControlTest, TheReplyToAStepRequestComesWhenItsStepsAreDone) {
   ask(ACTION_PAUSE);
   const SimControl request = anna.ask(ACTION_STEP, 3);
   EXPECT_EQ(control.request(request, 40), std::nullopt);
-  EXPECT_EQ(control.last_event(), "3 steps asked for by anna@host");
+  EXPECT_EQ(control.last_event(), "3 steps requested by anna@host");
   for (const std::uint64_t step : {41, 42}) {
     EXPECT_FALSE(control.holds());
     EXPECT_EQ(control.stepped(step), std::nullopt);
@@ -179,7 +179,7 @@ TEST_F(RunControlTest, ARunThatCarriesOutStepsIsAPausedOneForItsSuccessor) {
   expect_refused(open[0], "1 of 10 steps done: reset by anna@host");
 }
 
-TEST_F(RunControlTest, WhatIsAboutToEndTakesOnlyStopsAndResets) {
+TEST_F(RunControlTest, AnEndingRunAcceptsOnlyStopAndReset) {
   ask(ACTION_RESET);
   expect_refused(ask(ACTION_PAUSE), "the run is about to end: reset by anna@host");
   expect_accepted(ask(ACTION_RESET));
@@ -188,7 +188,7 @@ TEST_F(RunControlTest, WhatIsAboutToEndTakesOnlyStopsAndResets) {
   expect_accepted(ask(ACTION_STOP));
 }
 
-TEST_F(RunControlTest, TheEndOfARunAnswersWhatIsOpenAndRefusesWhatComesAfterIt) {
+TEST_F(RunControlTest, TheEndOfARunAnswersOpenRequestsAndRefusesLaterOnes) {
   EXPECT_TRUE(control.end(40, "mission finished").empty());
   expect_refused(ask(ACTION_STOP), "the run has ended: mission finished");
   EXPECT_TRUE(control.holds());
@@ -210,7 +210,7 @@ TEST_F(RunControlTest, RequestsForAnotherRunOrVehicleAreRefusedByName) {
   EXPECT_FALSE(control.is_stop_requested());
 }
 
-TEST_F(RunControlTest, AnActionThatTheWireAllowsAndNobodyKnowsIsRefused) {
+TEST_F(RunControlTest, AnUnknownActionIsRefused) {
   for (const std::uint32_t value : {6u, 17u, 0xffffffffu}) {
     expect_refused(ask(static_cast<ControlAction>(value)),
                    "action: expected one of 0 to 5, got " + std::to_string(value));

@@ -1,4 +1,4 @@
-// What flies a vehicle in real time where its answers come late, and what counts as absence.
+// The force on a vehicle in real time when answers are late, and the beginning of absence.
 #include "sim_server/vehicle_flight.hpp"
 
 #include <gtest/gtest.h>

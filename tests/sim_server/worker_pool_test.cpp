@@ -11,7 +11,7 @@
 namespace sls::sim {
 namespace {
 
-TEST(WorkerPoolTest, EveryItemIsWorkedOnOnceWhateverTheThreads) {
+TEST(WorkerPoolTest, EveryItemIsProcessedOnceByAnyNumberOfThreads) {
   for (const std::size_t threads : {1, 2, 3, 8}) {
     WorkerPool pool(threads);
     for (const std::size_t count : {0, 1, 2, 7, 1000}) {
@@ -22,7 +22,7 @@ TEST(WorkerPoolTest, EveryItemIsWorkedOnOnceWhateverTheThreads) {
   }
 }
 
-TEST(WorkerPoolTest, WhatOneCallWritesTheNextOneReads) {
+TEST(WorkerPoolTest, WritesOfOneCallAreVisibleToTheNext) {
   WorkerPool pool(4);
   std::vector<std::uint64_t> values(100, 1);
   for (int round = 0; round < 1000; ++round)

@@ -25,7 +25,7 @@ namespace {
 
 constexpr int kSharedBit = 128;  // of the kind of a mutex of glibc
 
-/// The file whose mapping holds the address; empty where there is none.
+/// The file whose mapping holds the address; empty if there is none.
 std::string find_file(const void* address) {
   const auto wanted = reinterpret_cast<std::uintptr_t>(address);
   std::ifstream maps("/proc/self/maps");
@@ -40,7 +40,7 @@ std::string find_file(const void* address) {
   return "";
 }
 
-/// True where this process has the file open by which the reader of the port excludes others.
+/// True if this process has the file open by which the reader of the port excludes others.
 bool is_read_here(const std::string& port) {
   for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
     std::error_code gone;
@@ -74,7 +74,7 @@ bool is_moment(const pthread_mutex_t* lock) {
   return is_over_messages(file, lock) == are_messages_wanted && !is_over.exchange(true);
 }
 
-// A signal stops all threads: none but the one that sends it may be in a lock, or that of another
+// A signal stops all threads: only the one that sends it may be in a lock, or that of another
 // port than the wanted one would be held, too.
 std::atomic<int> threads_inside{0};  // lock, or want to
 std::atomic<bool> is_stopping{false};

@@ -1,9 +1,9 @@
 /// Random disturbances of real flights: in every trial one process of a lockstep flight is stopped
 /// and continued, or killed and restarted, at a random moment. The flight must end well, its
-/// recording must be that of an undisturbed flight, and whoever kept the others waiting for 2 s
-/// must have been named by then. (A client killed for good before the flight began leaves a run
-/// that cannot begin, and must end naming him.) A seed repeats the choices (not the machine's own
-/// timing).
+/// recording must be that of an undisturbed flight, and a process that kept the others waiting for
+/// 2 s must have been named by then. (A client killed for good before the flight began leaves a run
+/// that cannot begin, and must end naming the client.) A seed repeats the choices (not the
+/// machine's own timing).
 #include <signal.h>
 #include <unistd.h>
 
@@ -95,7 +95,7 @@ std::string describe(const Disturbance& disturbance) {
   return line + text;
 }
 
-/// What became of a trial; empty `failure`: as it must be.
+/// Result of a trial; empty `failure`: passed.
 struct Result {
   std::string failure;
   std::string success = "recording equal";
@@ -329,17 +329,19 @@ int run_trials(int trials, std::uint64_t seed, bool is_verbose) {
 }  // namespace sls::test
 
 int main(int argc, char** argv) {
-  CLI::App cli("Disturbs real flights at random moments and judges what becomes of them.");
+  CLI::App cli(
+      "Stops, continues, kills and restarts processes of real flights at random and checks the "
+      "results.");
   int trials = 10;
   std::uint64_t seed = 1;
   bool is_verbose = false;
   cli.option_defaults()->always_capture_default();
-  cli.add_option("--trials", trials, "how many flights to disturb")
+  cli.add_option("--trials", trials, "number of flights")
       ->type_name("N")
       ->check(CLI::Range(1, 100000));
-  cli.add_option("--seed", seed, "decides process, moment and kind of each disturbance")
+  cli.add_option("--seed", seed, "seed of process, moment and kind of each disturbance")
       ->type_name("S");
-  cli.add_flag("--verbose", is_verbose, "print what the processes said");
+  cli.add_flag("--verbose", is_verbose, "print the output of the processes");
   CLI11_PARSE(cli, argc, argv);
   return sls::test::run_trials(trials, seed, is_verbose);
 }

@@ -36,7 +36,7 @@ class Stranger {
     return last_;
   }
 
-  /// A command that would be right but for what the caller changes.
+  /// A valid command, for the caller to change.
   Commands make_command(std::uint64_t ahead) {
     const States state = last_state();
     Commands command;

@@ -1,4 +1,4 @@
-/// What goes wrong while flying, done for real: processes killed and interrupted, a full disk, a
+/// Real failures during a flight: processes killed and interrupted, a full disk, a
 /// singular state, a refused command.
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -224,7 +224,7 @@ INSTANTIATE_TEST_SUITE_P(, RefusalTest,
                                   (kind.param.second == kWaits ? "Waiting" : "Stopping");
                          });
 
-TEST(FaultsTest, FullDiskEndsTheRecordingNamingFileAndCauseAndNothingLooksWhole) {
+TEST(FaultsTest, AFullDiskEndsTheRecordingWithFileAndCauseAndNoFileLooksWhole) {
   TemporaryFolder folder;
   fs::create_directory(folder / "disk");
   const std::string disk = folder / "disk";

@@ -25,7 +25,7 @@ std::string read_certificate(const fs::path& recording) {
   return read_manifest(recording).at("certificate").get<std::string>();
 }
 
-/// True where `rows` begins with `beginning`.
+/// True if `rows` begins with `beginning`.
 bool begin_with(const std::vector<std::string>& rows, const std::vector<std::string>& beginning) {
   return rows.size() >= beginning.size() &&
          std::equal(beginning.begin(), beginning.end(), rows.begin());
@@ -44,7 +44,7 @@ class FleetTest : public ::testing::Test {
   const OwnDomain domain_;
 };
 
-TEST_F(FleetTest, OfDifferentVehiclesRecordsForEachWhatARunOfItAloneRecords) {
+TEST_F(FleetTest, RecordsEachOfDifferentVehiclesAsARunOfItAlone) {
   const config::Scenario fleet = config::load_scenario(scenario("mixed_fleet"));
   Flight together(scenario("mixed_fleet"));
   std::vector<std::unique_ptr<Flight>> alone;

@@ -106,7 +106,7 @@ TEST_F(MultirotorSystemTest, RotorsAtTheirLargestSpeedAreAnEventOfTheRecording) 
   EXPECT_EQ(read_certificate(flight.recording()), read_certificate(in_process));
 }
 
-TEST_F(MultirotorSystemTest, WithoutAuthorityOverYawItSaysSoAndFlies) {
+TEST_F(MultirotorSystemTest, WithoutAuthorityOverYawItWarnsAndFlies) {
   for (const std::string name : {"multirotor_figure_eight", "multirotor_geometric"}) {
     SCOPED_TRACE(name);
     const TemporaryFolder folder;

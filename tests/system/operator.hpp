@@ -22,7 +22,7 @@ class Operator {
                          ++samples_;
                        }) {}
 
-  /// Empty where the server did what it was asked for; else why not.
+  /// Empty if the server did what it was asked for; else why not.
   std::string ask(ControlAction action, std::uint64_t steps = 0) {
     try {
       const auto reply = client_.ask(*client_.wait_for_run(), action, steps);
@@ -32,7 +32,7 @@ class Operator {
     }
   }
 
-  /// False where the server never says so.
+  /// False if the server never says so.
   bool wait_for(RunPhase phase) {
     return wait_until([&] {
       const std::lock_guard lock(mutex_);

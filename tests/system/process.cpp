@@ -59,7 +59,7 @@ void Process::kill() {
 std::vector<std::filesystem::path> find_shared_memory(pid_t id) {
   namespace fs = std::filesystem;
   // Fast DDS holds a lock file NAME_el open for its own segment NAME. Not so the ports: others have
-  // them open, and whoever is started next takes them over.
+  // them open, and the next process takes them over.
   const std::string prefix = "/dev/shm/fastrtps_", suffix = "_el";
   std::vector<fs::path> own;
   for (const auto& descriptor : fs::directory_iterator("/proc/" + std::to_string(id) + "/fd")) {

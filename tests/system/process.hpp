@@ -49,7 +49,7 @@ std::vector<std::filesystem::path> find_shared_memory(pid_t id);
 /// Ends any process for good, and removes its shared-memory segment, which it can no longer.
 void kill_process(pid_t id);
 
-/// The bytes of `file`; none where it does not exist (yet).
+/// The bytes of `file`; none if it does not exist (yet).
 std::string read_file(const std::filesystem::path& file);
 
 /// Path of one of the programs, of a shipped scenario (by name) or QoS file (by name).

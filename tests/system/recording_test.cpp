@@ -1,4 +1,4 @@
-/// What the real recorder leaves on the disk, and the real verifier makes of it.
+/// Files of the real recorder, and the real verifier's output for them.
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -119,7 +119,7 @@ TEST_F(RecordingFilesTest, WithoutAStepAreEqualToNothing) {
 
   Process alone({program("sls_verify"), recording()});
   EXPECT_EQ(alone.wait(), 0) << alone.output();
-  EXPECT_TRUE(holds(alone.output(), "as its manifest says: 0 steps")) << alone.output();
+  EXPECT_TRUE(holds(alone.output(), "matches its manifest: 0 steps")) << alone.output();
   fs::copy(recording(), folder_ / "copy");
   Process both({program("sls_verify"), recording(), folder_ / "copy"});
   EXPECT_EQ(both.wait(), 1) << both.output();

@@ -9,7 +9,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What `sls_verify` says about two recordings, and whether they are equal.
+/// The output of `sls_verify` for two recordings, and whether they are equal.
 std::pair<bool, std::string> verify(const fs::path& a, const fs::path& b) {
   Process process({program("sls_verify"), a.string(), b.string()});
   const auto code = process.wait();
@@ -86,7 +86,7 @@ TEST_F(RestartTest, AKilledRecorderGoesOnInANewSegmentAndTogetherNothingIsMissin
   EXPECT_TRUE(equal) << said;
 }
 
-TEST_F(RestartTest, AKilledServerIsReplacedAndThoseWhoFollowFlyTheNewRun) {
+TEST_F(RestartTest, AKilledServerIsReplacedAndProgramsWithFollowFlyTheNewRun) {
   const auto recorder = start_recorder({"--follow"});
   auto server = start_server();
   const auto client = start_client({"--follow"});
@@ -109,7 +109,7 @@ TEST_F(RestartTest, AKilledServerIsReplacedAndThoseWhoFollowFlyTheNewRun) {
   EXPECT_TRUE(equal) << said;
 }
 
-TEST_F(RestartTest, ThoseWhoDoNotFollowEndWhenTheServerIsReplacedAndSayBy) {
+TEST_F(RestartTest, ProgramsWithoutFollowEndNamingTheNewServer) {
   const auto recorder = start_recorder();
   auto server = start_server();
   const auto client = start_client();

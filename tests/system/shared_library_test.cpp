@@ -151,7 +151,7 @@ TEST(SharedLibraryProgramTest, ACrashWhileALibraryIsLoadedIsNamed) {
       "closed_loop: error: " + library + ": (loading), vehicle 0, step 0: crashed (signal 11)\n");
 }
 
-TEST(SharedLibraryProgramTest, WhatDestroyDoesWrongIsNamedAndHarmsNoFlight) {
+TEST(SharedLibraryProgramTest, AnErrorInDestroyIsNamedAndHarmsNoFlight) {
   TemporaryFolder folder;
   const Outcome outcome = run({program("closed_loop"), "--scenario",
                                make_controller_scenario(folder, "in: destroy, do: throw")});
@@ -172,7 +172,7 @@ TEST(SharedLibraryProgramTest, CheckPurityLooksBeyondTheFirst100Steps) {
       << outcome.output;
 }
 
-TEST(SharedLibraryProgramTest, AFailedRecordingSaysWhatTheLibrarySaid) {
+TEST(SharedLibraryProgramTest, AFailedRecordingHoldsTheLibrarysMessage) {
   TemporaryFolder folder;
   const Outcome outcome = run({program("closed_loop"), "--out", folder / "recording", "--scenario",
                                make_controller_scenario(folder, "in: answer, at: 5, do: fail")});

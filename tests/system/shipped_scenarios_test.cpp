@@ -19,7 +19,7 @@ namespace {
 using Eigen::Array3d;
 using Eigen::Vector3d;
 
-/// What was recorded of one vehicle at one step.
+/// The record of one vehicle at one step.
 struct Step {
   std::size_t stage;
   Vector3d error, v_WL;
@@ -242,8 +242,8 @@ void expect_height_of_wrong_mass(const Flown& flown) {
       ratio * Eigen::RowVector3d(z.integral, z.position, z.velocity),
       Vector3d(e, 0.0, -ratio * z.position * e - (ratio - 1.0) * truth.gravity), flown.period(),
       flown.steps.size());
-  // While the load swings, the wrong tension reaches the height; after 20 s it hangs still. What
-  // the hold then delays moves by 2.5e-4 m/s at most.
+  // While the load swings, the wrong tension reaches the height; after 20 s it hangs still. The
+  // delayed part of the hold then moves by 2.5e-4 m/s at most.
   for (std::size_t i = 5000; i < expected.size(); ++i)
     ASSERT_NEAR(flown.steps[i].error.z(), expected[i], 0.5 * flown.period() * 2.5e-4) << i;
 }
@@ -253,7 +253,7 @@ void expect_rest_with_wrong_mass(const Flown& flown) {
   const model::SlungLoadParameters& truth = flown.scenario.vehicle;
   const double believed = flown.scenario.controller.model.vehicle.total_mass();
   const Vector3d& error = flown.steps.back().error;
-  // What the designed height leaves 8 s after a step of 1.2 m: 2.6 e^(−1.175 · 8) of it.
+  // The remainder of the designed height 8 s after a step of 1.2 m: 2.6 e^(−1.175 · 8) of it.
   EXPECT_NEAR(
       error.z(),
       (truth.total_mass() - believed) * truth.gravity / (believed * flown.gains.vertical.position),
@@ -379,7 +379,7 @@ void expect_error_of_late_states(const Flown& flown) {
   const Array3d seen = calc_second_lap_error(flown, &Step::seen_error).rms;
   for (int axis = 0; axis < 3; ++axis)
     EXPECT_NEAR(rms[axis], expected.rms()[axis], 0.01 * expected.rms()[axis]) << "axis " << axis;
-  // What is seen has steps besides, each a sample's period of motion: a sawtooth about the mean.
+  // The measurement also has steps, each a sample's period of motion: a sawtooth about the mean.
   const config::FigureEightReference& eight = find_eight(flown);
   for (int axis = 0; axis < 3; ++axis) {
     const double w = 2.0 * M_PI * (axis == 1 ? 2 : 1) / eight.period_s;

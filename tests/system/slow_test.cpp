@@ -1,4 +1,4 @@
-/// What real time promises at 250 Hz, for a minute. `./sls test --slow`, on an idle machine.
+/// Real time at 250 Hz for a minute. `./sls test --slow`, on an idle machine.
 #include <gtest/gtest.h>
 
 #include <regex>

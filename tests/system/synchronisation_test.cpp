@@ -50,7 +50,7 @@ class LateController {
         stream_(node_, true, [this](const States& states, const bus::PeerId&) { answer(states); }) {
   }
 
-  /// False where there is no server.
+  /// False if there is no server.
   bool join() {
     std::optional<bus::Run> run;
     if (!wait_until([&] { return (run = servers_.find_joinable(0)).has_value(); }) ||
@@ -116,7 +116,7 @@ TEST(RealTimeTest, WithoutLateAnswersTheRecordingIsThatOfLockstep) {
   FAIL() << "late even at 200 ms per period";
 }
 
-TEST(RealTimeTest, TakesTheTimeItSays) {
+TEST(RealTimeTest, TakesTheSimulatedTime) {
   Flight flight(scenario("short"), {{}, {"--mode", "realtime", "--rtf", "0.5"}, {}});
   flight.expect_success();
   const Table status(flight.recording() / "status.csv");
@@ -152,7 +152,7 @@ TEST(RealTimeTest, AStoppedClientIsReplacedByTheFailSafeAndFliesAgainWhenItRetur
   // The load is not lost: within 2 m of its reference at the end.
   const TrackingError end = calc_tracking_error(flight.recording(), 3000, 3000);
   EXPECT_LT(end.max.maxCoeff(), 2.0);
-  EXPECT_GE(count_events(flight.recording(), "fail-safe force for want of an answer"), 1u);
+  EXPECT_GE(count_events(flight.recording(), "applying the fail-safe force"), 1u);
 }
 
 TEST(RealTimeTest, AControllerThatIsAlwaysOnePeriodLateFliesToTheEnd) {
@@ -243,7 +243,7 @@ class LongPeriodTest : public PausedTest {
   }
 };
 
-TEST_F(LongPeriodTest, TheServerIsHeardAndHearsUntilTheNextStateIsDue) {
+TEST_F(LongPeriodTest, TheServerAnnouncesAndReceivesUntilTheNextStateIsDue) {
   start();
   ASSERT_EQ(operator_->ask(ACTION_STEP, 1), "") << server_->output();
   ASSERT_EQ(operator_->ask(ACTION_RESUME), "") << server_->output();
@@ -252,7 +252,7 @@ TEST_F(LongPeriodTest, TheServerIsHeardAndHearsUntilTheNextStateIsDue) {
   EXPECT_EQ(server_->wait(std::chrono::seconds(60)), 143) << server_->output();
 }
 
-TEST_F(LongPeriodTest, TheServerIsHeardAndHearsWhileNobodyAnswers) {
+TEST_F(LongPeriodTest, TheServerAnnouncesAndReceivesWithoutAnswers) {
   start();
   stop_client();
   ASSERT_EQ(operator_->ask(ACTION_RESUME), "") << server_->output();
@@ -331,9 +331,7 @@ TEST(WaitingTest, PolicyHoldFliesOnFromADefiniteStepAndTheClientMayRejoin) {
       << flight.outputs();
   flight.client->send(SIGCONT);
   flight.expect_success();
-  EXPECT_TRUE(holds(flight.server->output(),
-                    "holds the last force for want of an answer of "
-                    "controller 'control_client'"))
+  EXPECT_TRUE(holds(flight.server->output(), "no answer from controller 'control_client'"))
       << flight.server->output();
   EXPECT_TRUE(holds(flight.server->output(), "answers again"));
   EXPECT_EQ(read_timing(flight.recording()).rfind("degraded: ", 0), 0u);
@@ -380,7 +378,7 @@ TEST(WaitingTest, PolicyGoOnFliesToTheEndWithoutTheRecorder) {
   ASSERT_TRUE(flight.wait_for_steps(500)) << flight.outputs();
   flight.recorder->kill();
   EXPECT_EQ(flight.server->wait(), 0) << flight.outputs();
-  EXPECT_TRUE(holds(flight.server->output(), "goes on without")) << flight.server->output();
+  EXPECT_TRUE(holds(flight.server->output(), "continues without it")) << flight.server->output();
   EXPECT_EQ(flight.client->wait(), 0) << flight.outputs();
 }
 

@@ -77,7 +77,7 @@ TEST(UsageTest, WrongFlagsAreRefused) {
         "--rtf");
 }
 
-TEST(UsageTest, OperatorAndVerifierRefuseWhatTheyCannotDo) {
+TEST(UsageTest, OperatorAndVerifierRefuseImpossibleRequests) {
   TemporaryFolder folder;
   expect_refused({program("sim_ctl")}, 2, "");
   expect_refused({program("sim_ctl"), "fly"}, 2, "fly");
@@ -161,7 +161,7 @@ TEST(UsageTest, RecorderRefusesAFolderThatIsNotEmptyAndReplacesARecordingWithFor
   EXPECT_FALSE(fs::exists(folder / "old/state.csv"));
 }
 
-TEST(UsageTest, ServerNamesWhoIsMissingAtTheStart) {
+TEST(UsageTest, ServerNamesMissingParticipantsAtTheStart) {
   TemporaryFolder folder;
   const std::string file = make_scenario(folder, {{"timeout_s: 30", "timeout_s: 3"}});
   OwnDomain domain;

@@ -30,7 +30,7 @@ std::string read_text(const fs::path& file) {
   return text.str();
 }
 
-/// What the recorder had as parameters, as far as the file's content goes by them.
+/// The parameters that the recorder had, as far as the file's content depends on them.
 Parameters load_parameters(const record::RecordedFlight& flight) {
   const record::ManifestFile& manifest = flight.segments.front().manifest;
   constexpr double kMaxPeriodS = 1e6;
@@ -52,7 +52,7 @@ Parameters load_parameters(const record::RecordedFlight& flight) {
   return parameters;
 }
 
-/// True if the manifest of that folder speaks for `file`.
+/// True if the manifest of its folder lists `file`.
 bool is_listed(const fs::path& file) {
   const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
   std::error_code error;

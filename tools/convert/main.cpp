@@ -8,14 +8,13 @@
 int main(int argc, char** argv) {
   using namespace sls;
   CLI::App cli(
-      "Writes a recording as one MCAP file: for Foxglove, Lichtblick, PlotJuggler and other "
-      "readers.\n"
-      "Exit codes: 0 done; 1 the recording is damaged, or the disk refuses; 2 not a recording.");
+      "Writes a recording as one MCAP file for Foxglove, Lichtblick, PlotJuggler and others.\n"
+      "Exit codes: 0 done; 1 recording damaged or file not writable; 2 not a recording.");
   std::filesystem::path folder, out;
   bool force = false;
-  cli.add_option("DIR", folder, "folder of a recording")->required();
-  cli.add_option("--out", out, "the file (default: DIR/sls.mcap)")->type_name("FILE");
-  cli.add_flag("--force", force, "replace a file that is there");
+  cli.add_option("DIR", folder, "folder of a recording")->type_name("")->required();
+  cli.add_option("--out", out, "MCAP file (default: DIR/sls.mcap)")->type_name("FILE");
+  cli.add_flag("--force", force, "replace an existing file");
   cli.set_version_flag("--version", app::version());
   return app::run_main(argc, argv, cli, {}, "sls_convert", [&] {
     const record::RecordedFlight flight = record::open_recording(folder);

@@ -34,7 +34,7 @@ void request(ctl::OperatorClient& client, ControlAction action, std::uint64_t st
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App cli("Controls the run of a vehicle, and shows it, from any machine of the domain.");
+  CLI::App cli("Controls a run and prints its status, from any machine on the domain.");
   ctl::Options options;
   options.common.qos_file = bus::default_qos_file();
   ctl::add_options(cli, options);

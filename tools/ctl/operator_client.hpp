@@ -22,7 +22,7 @@ struct ClientOptions {
   int domain = 0;  ///< of the node, for messages
   std::uint32_t vehicle_id = 0;
   double timeout_s = 10.0;  ///< for a server to be found, and again for its reply
-  bool asks = true;         ///< false: only looks on, which the keys of every role allow
+  bool asks = true;         ///< false: only reads, which the keys of every role allow
 };
 
 /// A stop signal ends every wait early; nothing is returned then.
@@ -47,7 +47,7 @@ class OperatorClient {
   std::optional<SimControlReply> ask(const bus::Run& run, ControlAction action,
                                      std::uint64_t steps = 0);
 
-  /// What is known of `run` now.
+  /// The present knowledge of `run`.
   Snapshot make_snapshot(const bus::Run& run) const;
 
  private:
@@ -71,7 +71,7 @@ class OperatorClient {
   std::optional<bus::Run> wait_for(const FindRun& find) const;
   std::optional<bus::Run> find_ended_run() const;
   void note_event(const SimStatus& status);
-  /// False where a stop signal came before the server of `run` could be reached.
+  /// False if a stop signal came before the server of `run` could be reached.
   bool wait_until_heard(const bus::Run& run, app::Wait& wait) const;
   void report_wait(const bus::Run& run, const SimControl& request, const app::Wait& wait) const;
 

@@ -30,8 +30,9 @@ std::string check_steps(const std::string& text) {
 
 void add_options(CLI::App& cli, Options& options) {
   app::add_common_options(cli, options.common);
-  cli.add_option("--vehicle", options.vehicle_id, "vehicle whose run is meant")->type_name("N");
-  cli.add_option("--timeout-s", options.timeout_s, "for a server to be found, and for its reply")
+  cli.add_option("--vehicle", options.vehicle_id, "control the run of vehicle N")->type_name("N");
+  cli.add_option("--timeout-s", options.timeout_s,
+                 "time limit for finding a server, and for its reply, s")
       ->type_name("X")
       ->check(check_timeout);
   cli.require_subcommand(0, 1);  // not 1: that would hide which word is no command
@@ -46,19 +47,19 @@ void add_options(CLI::App& cli, Options& options) {
     subcommand->callback([&options, action] { options.action = action; });
     return subcommand;
   };
-  add_action("pause", ACTION_PAUSE, "hold a running run after the step in work");
-  add_action("step", ACTION_STEP, "let a paused run go N steps and wait until they are done")
+  add_action("pause", ACTION_PAUSE, "pause a running run after its current step");
+  add_action("step", ACTION_STEP, "run N steps of a paused run and wait until they are done")
       ->add_option("N", options.steps, "control periods, at least 1")
       ->required()
       ->default_str("")
       ->check(check_steps);
-  add_action("resume", ACTION_RESUME, "let a paused run go on");
-  add_action("start", ACTION_START, "the same, for a run that is paused before its first step");
-  add_action("reset", ACTION_RESET, "begin again from step 0 with another run_id");
+  add_action("resume", ACTION_RESUME, "continue a paused run");
+  add_action("start", ACTION_START, "start a run that is paused before its first step");
+  add_action("reset", ACTION_RESET, "restart from step 0 with a new run_id");
   add_action("stop", ACTION_STOP, "end the run");
-  auto* status = cli.add_subcommand("status", "print what the run does");
-  status->add_flag("--watch", options.watch, "again and again, until the run has ended");
-  status->add_flag("--json", options.json, "one JSON object per line");
+  auto* status = cli.add_subcommand("status", "print the status of the run");
+  status->add_flag("--watch", options.watch, "repeat until the run has ended");
+  status->add_flag("--json", options.json, "print one JSON object per line");
 }
 
 }  // namespace sls::ctl

@@ -13,7 +13,7 @@ struct ScreenSize {
   std::size_t rows = 24;
 };
 
-/// True where standard output is a terminal.
+/// True if standard output is a terminal.
 bool is_terminal();
 
 /// That terminal's size; the default where it does not say.

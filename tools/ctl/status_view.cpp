@@ -144,8 +144,8 @@ std::string describe_duration(std::uint64_t nanoseconds) {
 
 std::string describe_wanted_factor(const Parameters& parameters) {
   return parameters.mode() == MODE_REALTIME
-             ? fmt::format("wanted {}", parameters.real_time_factor())
-             : "wanted any";
+             ? fmt::format("target {}", parameters.real_time_factor())
+             : "target none";
 }
 
 using bus::Count;
@@ -156,7 +156,7 @@ std::vector<Count> list_link_counts(const SyncCounters& counters) {
       {"resent", "late", "held", "fail-safe", "stale", "duplicate", "superseded", "take-overs"});
 }
 
-/// What a healthy run never counts.
+/// Counters that stay 0 in a healthy run.
 std::vector<Count> list_trouble_counts(const SyncCounters& counters) {
   return bus::list_counts(counters, "", {"deadline missed", "overflow", "slipped"});
 }

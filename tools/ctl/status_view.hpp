@@ -11,7 +11,7 @@
 
 namespace sls::ctl {
 
-/// What is known of a run at one moment.
+/// The data of a run at one moment.
 struct Snapshot {
   Parameters parameters;
   std::uint32_t vehicle_id = 0;
@@ -25,7 +25,7 @@ struct Snapshot {
 /// Silence from which on a server that publishes every 0.5 s is worth a line.
 inline constexpr double kLongSilence = 1.0;  // s
 
-/// True where no more status will come: finished or failed. A reset run has a successor.
+/// True if no more status will come: finished or failed. A reset run has a successor.
 bool has_ended(const std::optional<SimStatus>& status);
 
 /// The whole of it, for people; no line is longer than `columns` characters.

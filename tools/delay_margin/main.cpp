@@ -8,13 +8,13 @@
 
 int main(int argc, char** argv) {
   using namespace sls;
-  CLI::App cli("Finds the delay of the command with which a scenario's controller loses the load.");
+  CLI::App cli("Finds the command delay at which a scenario's controller loses the load.");
   const app::CommonOptions options;  // no network here, and nothing to log but errors
   std::filesystem::path scenario_file;
   std::optional<double> period_s;
   cli.set_version_flag("--version", app::version());
   cli.add_option("--scenario", scenario_file, "scenario (YAML)")->type_name("FILE")->required();
-  cli.add_option("--period-s", period_s, "control period in force; default: the scenario's")
+  cli.add_option("--period-s", period_s, "control period (default: the scenario's)")
       ->type_name("X");
 
   return app::run_main(argc, argv, cli, options, "delay_margin", [&] {

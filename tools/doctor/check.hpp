@@ -1,4 +1,4 @@
-/// What the doctor says: one line per check.
+/// The doctor's output: one line per check.
 #pragma once
 
 #include <string>

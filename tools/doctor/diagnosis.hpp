@@ -22,7 +22,7 @@ struct Observations {
   int domain = 0;
   std::string user;          ///< whose process this is
   std::string peer;          ///< as asked for; empty: this machine
-  std::string peer_address;  ///< empty where the name has none
+  std::string peer_address;  ///< empty if the name has none
   bool is_peer_here = true;  ///< the address is one of this machine
   bool is_peer_up = false;   ///< by TCP
 
@@ -32,7 +32,7 @@ struct Observations {
   std::vector<Heard> heard;
 
   bool is_joined = false;
-  std::string join_error;  ///< why not; empty where it was not tried
+  std::string join_error;  ///< why not; empty if it was not tried
   std::string other_end;   ///< how the other end on this machine died; empty: it did not
   std::string refusal;     ///< why there is no doctor's topic
   std::vector<Program> programs;

@@ -1,4 +1,4 @@
-/// What the checks of diagnosis.hpp have in common: verdicts, names for what was seen, and who is
+/// Common to the checks of diagnosis.hpp: verdicts, names for what was seen, and who is
 /// asked about.
 #pragma once
 

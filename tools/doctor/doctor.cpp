@@ -79,7 +79,7 @@ bool is_complete(const Observations& seen, bool is_echo_expected, Clock::duratio
          });
 }
 
-/// One examination: who asks, listens and watches, and what they have seen so far.
+/// One examination: prober, listener and observer, and their results so far.
 class Examination {
  public:
   explicit Examination(const DoctorOptions& options)
@@ -99,7 +99,7 @@ class Examination {
   }
 
  private:
-  /// What is to be seen without touching anything.
+  /// Checks that only read.
   static Observations look_at_settings(const DoctorOptions& options) {
     Observations seen;
     seen.qos_file = options.qos_file.filename().string();
@@ -114,7 +114,7 @@ class Examination {
     return seen;
   }
 
-  /// False where shared memory is too small: the middleware would kill this process.
+  /// False if shared memory is too small: the middleware would kill this process.
   bool is_room() const {
     return !seen_.settings.uses_shared_memory ||
            (seen_.shared_memory.is_there &&

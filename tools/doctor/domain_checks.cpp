@@ -1,4 +1,4 @@
-// Of the domain and of its samples: who is there, and whether what is said arrives.
+// Checks of the domain and its samples: which programs are there, and whether samples arrive.
 #include <algorithm>
 #include <chrono>
 #include <iomanip>
@@ -78,7 +78,7 @@ Check check_security(const Observations& seen) {
                             "./sls keys DIR");
   std::set<std::string> rejected, others;
   for (const Program& program : seen.programs) {
-    // Who rejects us does not say so: he tells nothing of his writers and readers.
+    // A program that rejects us does not announce its writers and readers.
     const bool is_silent = is_secured && program.is_secured && is_flying(program.name) &&
                            !seen.is_met(program.id) && seen.probes.is_there();
     if (program.is_rejected || is_silent) rejected.insert(name_program(program));

@@ -1,4 +1,4 @@
-/// What our own endpoints would announce. Internal to the doctor: it shows Fast DDS.
+/// The announcements of our own endpoints. Internal to the doctor: it shows Fast DDS.
 #pragma once
 
 #include <fastdds/dds/publisher/Publisher.hpp>

@@ -1,4 +1,4 @@
-/// Hears who announces himself by multicast, on every domain.
+/// Listens for multicast announcements on every domain.
 #pragma once
 
 #include <map>

@@ -9,7 +9,9 @@
 
 int main(int argc, char** argv) {
   using namespace sls;
-  CLI::App cli("Finds out why data does not flow: moves datagrams and samples over each path.");
+  CLI::App cli(
+      "Finds out why data does not flow: sends datagrams and samples over each path and prints\n"
+      "one line per check. Exit code 1: a check found a fault.");
   app::CommonOptions options;
   options.qos_file = bus::default_qos_file();
   doctor::DoctorOptions examination;
@@ -17,16 +19,16 @@ int main(int argc, char** argv) {
   int seconds = 60;
   app::add_common_options(cli, options);
   auto* peer = cli.add_option("--peer", examination.peer,
-                              "another machine, where programs or sls_doctor --answer run; "
-                              "without it: this machine")
+                              "another machine, running the programs or sls_doctor --answer "
+                              "(default: this machine)")
                    ->type_name("HOST");
-  cli.add_option("--identity", examination.identity, "whose keys it uses on a secured domain")
+  cli.add_option("--identity", examination.identity, "role whose keys to use on a secured domain")
       ->type_name("NAME");
-  auto* json = cli.add_flag("--json", is_json, "print JSON instead of lines");
+  auto* json = cli.add_flag("--json", is_json, "print JSON");
   auto* answer = cli.add_flag("--answer", is_answering, "answer the doctor of another machine")
                      ->excludes(peer)
                      ->excludes(json);
-  cli.add_option("--for-s", seconds, "how long --answer stays, s")
+  cli.add_option("--for-s", seconds, "duration of --answer, s")
       ->type_name("S")
       ->check(CLI::Range(1, 3600))
       ->needs(answer);
@@ -49,6 +51,6 @@ int main(int argc, char** argv) {
     std::vector<std::string> faults;
     for (const auto& check : checks)
       if (check.verdict == doctor::Verdict::kFault) faults.push_back(check.name);
-    if (!faults.empty()) throw app::RunError("something is wrong: " + doctor::join(faults));
+    if (!faults.empty()) throw app::RunError("failed checks: " + doctor::join(faults));
   });
 }

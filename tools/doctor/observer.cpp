@@ -43,7 +43,7 @@ using Clock = std::chrono::steady_clock;
 constexpr const char* kDoctorTopic = "sls/doctor";
 constexpr std::array<std::uint32_t, 3> kEchoSizes = {200, 8000, 60000};
 
-/// What a late joiner is told comes at once; a sample that arrives later was written meanwhile.
+/// Samples for a late joiner come at once; a sample that arrives later was written meanwhile.
 constexpr auto kHistoryTime = std::chrono::seconds(1);
 
 /// So that `peer` is found without multicast, too: otherwise a network without it would hide

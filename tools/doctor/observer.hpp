@@ -24,7 +24,7 @@ struct Program {
   bus::PeerId id;
   std::string name;
   std::string user;
-  std::string address;                             ///< one that it announces; empty where none
+  std::string address;                             ///< one that it announces; empty if none
   std::vector<std::uint32_t> udp_ports;            ///< on which it takes samples
   std::vector<std::uint32_t> shared_memory_ports;  ///< likewise
   bool is_on_this_host = false;
@@ -61,11 +61,11 @@ class Observer {
   std::vector<Program> programs() const;
   /// Theirs.
   std::vector<Endpoint> endpoints() const;
-  /// What the profiles of the QoS file make, by topic.
+  /// Endpoints made from the profiles of the QoS file, by topic.
   std::vector<Endpoint> own_endpoints() const;
   /// Sample size, bytes → came back.
   std::map<std::uint32_t, bool> echoes() const;
-  /// Why the doctor's own topic is refused; empty where it is not.
+  /// Why the doctor's own topic is refused; empty if it is not.
   const std::string& refusal() const;
 
  private:

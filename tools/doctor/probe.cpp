@@ -40,8 +40,8 @@ struct Probe {
   std::uint32_t is_unasked = 0;   ///< of an answer: it comes from another port than was asked
   std::uint64_t nonce = 0;
   std::uint64_t question = 0;
-  std::int64_t asked_ns = 0;     ///< wall clock of who asks
-  std::int64_t answered_ns = 0;  ///< wall clock of who answers
+  std::int64_t asked_ns = 0;     ///< wall clock of the asking doctor
+  std::int64_t answered_ns = 0;  ///< wall clock of the answering doctor
 };
 static_assert(sizeof(Probe) <= kSmall);
 
@@ -201,7 +201,7 @@ void Prober::take(UdpSocket& socket, Question* question) {
     if (!received) {
       if (error == EHOSTUNREACH || error == ENETUNREACH) results_.is_unreachable = true;
       if (error != ECONNREFUSED || !question) continue;
-      // It was whole when it was refused; and nobody answers on that port, unless he is starting.
+      // It was whole when it was refused; and nobody answers on that port, unless it is starting.
       results_.is_refused = true;
       ++question->refusals;
       if (!results_.is_answered) speaking_ = question->peer;

@@ -47,7 +47,7 @@ class ProbeAnswerer {
   std::vector<unsigned char> buffer_;
 };
 
-/// What became of the probes.
+/// Results of the probes.
 struct ProbeResults {
   bool is_tried = false;
   std::string own_address;      ///< towards the peer
@@ -99,7 +99,7 @@ class Prober {
   std::int64_t best_round_trip_ns_;
 };
 
-/// True where the host accepts or refuses a TCP connection, which shows that it is up.
+/// True if the host accepts or refuses a TCP connection, which shows that it is up.
 bool is_host_up(const std::string& address, std::chrono::milliseconds limit);
 
 }  // namespace sls::doctor

@@ -1,4 +1,4 @@
-/// What a QoS file decides about the ways that data takes.
+/// Settings of a QoS file that decide the path of data.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-/// What is in /dev/shm: how much room, and whose segments. It only looks, and removes nothing.
+/// The content of /dev/shm: free space and segments with their owners. Removes nothing.
 #pragma once
 
 #include <sys/types.h>

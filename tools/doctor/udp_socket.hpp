@@ -21,7 +21,7 @@ inline constexpr std::size_t kMaxDatagram = 65507;
 sockaddr_in make_address(const std::string& address, int port);
 std::string to_string(const in_addr& address);
 
-/// The IPv4 address of `host`, a name or an address; nothing where it has none.
+/// The IPv4 address of `host`, a name or an address; nothing if it has none.
 std::optional<std::string> find_address(const std::string& host);
 
 struct Interface {
@@ -42,10 +42,10 @@ class UdpSocket {
   UdpSocket(const UdpSocket&) = delete;
   UdpSocket& operator=(const UdpSocket&) = delete;
 
-  /// False where the port is taken.
+  /// False if the port is taken.
   bool bind(const std::string& address, int port, bool is_shared = false);
   void join(const std::string& group, const std::vector<Interface>& interfaces);
-  /// What goes to a group leaves by the interface of this address.
+  /// Datagrams to a group leave by the interface of this address.
   void send_multicast_by(const std::string& interface_address);
   bool connect(const sockaddr_in& peer);
   /// The own address towards the peer that it is connected to.

@@ -18,8 +18,8 @@ void verify_one(const RecordedFlight& flight) {
     std::cout << fmt::format("not complete: {}: {}\n", manifest.outcome, manifest.reason);
   if (!manifest.missing.empty()) std::cout << describe(manifest.missing) << '\n';
   if (!inspection.problems.empty())
-    throw app::RunError(flight.folder.string() + ": not what its manifest says");
-  std::cout << fmt::format("as its manifest says: {} steps, certificate {}\n", inspection.steps,
+    throw app::RunError(flight.folder.string() + ": differs from its manifest");
+  std::cout << fmt::format("matches its manifest: {} steps, certificate {}\n", inspection.steps,
                            inspection.certificate);
 }
 
@@ -40,11 +40,12 @@ void verify_two(const RecordedFlight& a, const RecordedFlight& b) {
 
 int main(int argc, char** argv) {
   CLI::App cli(
-      "Compares the data of two recordings, or a recording's files with its manifest.\n"
-      "Exit codes: 0 equal, or as the manifest says; 1 not so, or damaged; 2 not a recording.");
+      "Compares two recordings, or the files of one recording with its manifest.\n"
+      "Exit codes: 0 equal; 1 different or damaged; 2 not a recording.");
   std::filesystem::path a, b;
   cli.add_option("A", a, "folder of a recording")->type_name("DIR")->required();
-  cli.add_option("B", b, "folder of another one")->type_name("DIR");
+  cli.add_option("B", b, "folder of a second recording (default: check A against its manifest)")
+      ->type_name("DIR");
   cli.set_version_flag("--version", app::version());
   return app::run_main(argc, argv, cli, {}, "sls_verify", [&] {
     const RecordedFlight flight = record::open_recording(a);

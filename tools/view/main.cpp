@@ -91,7 +91,7 @@ void run(const view::Options& options) {
     watch(options);
 }
 
-/// What is wrong with a recording is a mistake in what the user asked for: exit code 2.
+/// A damaged recording counts as bad usage: exit code 2.
 void run_checked(const view::Options& options) {
   try {
     run(options);
@@ -103,7 +103,8 @@ void run_checked(const view::Options& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App cli("Shows a flight in the browser, and to Foxglove and ROS 2: live or recorded.");
+  CLI::App cli(
+      "Shows a live or recorded flight in the browser, and a live one in Foxglove and ROS 2.");
   view::Options options;
   options.common.qos_file = bus::default_qos_file();
   view::add_options(cli, options);
@@ -111,7 +112,7 @@ int main(int argc, char** argv) {
   return app::run_main(argc, argv, cli, options.common, "sls_view", [&] {
     options.complete();
     // Before any thread starts, as they inherit it.
-    app::put_onlooker_last();
+    app::put_viewer_last();
     run_checked(options);
   });
 }

@@ -1,4 +1,4 @@
-/// What is flown, for the page: the same of a live run and of a recording.
+/// Description of a run for the page: the same of a live run and of a recording.
 #pragma once
 
 #include <string>
@@ -26,7 +26,7 @@ inline const std::vector<std::string> kColumns = {
 /// "path_m":[[x,y,z],…]}      the planned path of vehicle 0's load, at most 2,000 points; frame W,
 /// z down Rotors of a point mass: four, drawn but not flown, with "is_drawn_only":true in the
 /// vehicle.
-/// @throws config::ConfigError where the scenario text is none.
+/// @throws config::ConfigError if the scenario text is none.
 std::string describe_run(const Parameters& parameters);
 
 }  // namespace sls::view

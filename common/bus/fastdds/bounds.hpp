@@ -9,7 +9,7 @@
 
 namespace sls::bus {
 
-/// "64 vehicles, got 65"; empty where there are no more.
+/// "64 vehicles, got 65"; empty if there are no more.
 template <class Element>
 std::string find_excess(const char* name, const std::vector<Element>& sequence, std::size_t most) {
   if (sequence.size() <= most) return "";

@@ -1,4 +1,5 @@
-/// What two endpoints of one topic must agree in. No Fast DDS here: neighbours.hpp fills it in.
+/// The properties in which two endpoints of one topic must agree. No Fast DDS here: neighbours.hpp
+/// fills it in.
 #pragma once
 
 #include <chrono>
@@ -8,7 +9,7 @@
 
 namespace sls::bus {
 
-/// What a writer or reader announces of itself.
+/// The announced properties of a writer or reader.
 struct EndpointFacts {
   std::string topic;
   std::string type;
@@ -33,14 +34,14 @@ struct Mismatch {
 };
 
 /// Why a writer of the topic does not reach the reader, or its samples cannot be read there: type,
-/// key, data representation, or the policies of the DDS standard. Empty where all is well.
+/// key, data representation, or the policies of the DDS standard. Empty if all is well.
 std::vector<Mismatch> find_mismatches(const EndpointFacts& writer, const EndpointFacts& reader);
 
 /// The same of an endpoint of our own and another one, of which one is a writer; of two writers or
 /// readers and of other topics nothing. A wrong type is named by what was expected of the other.
 std::vector<Mismatch> compare(const EndpointFacts& own, const EndpointFacts& other);
 
-/// True where only a program of the first contract has such an endpoint.
+/// True if only a program of the first contract has such an endpoint.
 bool is_of_contract_1(const EndpointFacts& endpoint);
 
 }  // namespace sls::bus

@@ -1,4 +1,4 @@
-/// What making a topic and deleting a writer must not leave to Fast DDS 2.9.
+/// Making a topic and deleting a writer without two defects of Fast DDS 2.9.
 #pragma once
 
 #include <fastdds/dds/publisher/DataWriter.hpp>

@@ -1,4 +1,4 @@
-/// What Fast DDS knows of an endpoint, as `EndpointFacts`.
+/// Converts an endpoint of Fast DDS to `EndpointFacts`.
 #pragma once
 
 #include <fastdds/rtps/common/Guid.h>

@@ -13,7 +13,7 @@
 
 namespace sls::bus {
 
-/// What a reader in this thread is taking samples for; a sample that is refused is reported to it.
+/// The receiver of reports on samples that a reader in this thread refuses.
 class MisfitReport {
  public:
   virtual ~MisfitReport() = default;
@@ -61,8 +61,8 @@ class GuardedType : public Generated {
  public:
   bool deserialize(eprosima::fastrtps::rtps::SerializedPayload_t* payload, void* data) override {
     using eprosima::fastcdr::Cdr;
-    // What is longer than any sample may claim elements without end, which are made before they are
-    // read.
+    // A payload longer than any sample may claim elements without end, which are made before they
+    // are read.
     if (payload->length > this->m_typeSize)
       return refuse(*payload, data,
                     "expected at most " + std::to_string(this->m_typeSize) + " bytes, got " +
@@ -98,7 +98,7 @@ class GuardedType : public Generated {
 
   bool refuse(const eprosima::fastrtps::rtps::SerializedPayload_t& payload, void* data,
               const std::string& defect) const {
-    // What it claimed and did not hold may be a thousand times its size.
+    // The claimed but absent elements may be a thousand times its size.
     *static_cast<typename Generated::type*>(data) = typename Generated::type();
     if (misfit_report) misfit_report->report(payload, this->getName(), defect);
     return false;

@@ -7,7 +7,7 @@
 
 namespace sls::bus {
 
-/// What Fast DDS logs: warnings and errors go to our log on stderr (by itself it prints to stdout,
+/// The log of Fast DDS: warnings and errors go to our log on stderr (by itself it prints to stdout,
 /// which is for data). The first error since `clear()` is kept: it names the cause where those that
 /// follow only say what failed because of it.
 ///

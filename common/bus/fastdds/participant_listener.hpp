@@ -96,7 +96,7 @@ class ParticipantListener : public eprosima::fastdds::dds::DomainParticipantList
            (address.empty() ? "" : ", ") + to_text(participant.m_guid.guidPrefix) + ")";
   }
 
-  /// The first IPv4 address at which it hears; empty where it has none.
+  /// The first IPv4 address at which it hears; empty if it has none.
   static std::string find_address(
       const eprosima::fastrtps::rtps::ParticipantProxyData& participant) {
     for (const auto& locator : participant.metatraffic_locators.unicast)

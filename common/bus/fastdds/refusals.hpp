@@ -12,7 +12,7 @@
 namespace sls::bus {
 
 /// Says on stderr who was kept from a secured domain, and why: one line per participant, and no
-/// more than `kMostLines` in 10 s, whatever an attacker sends. What a participant is called is what
+/// more than `kMostLines` in 10 s, whatever an attacker sends. The name of a participant is what
 /// it says of itself.
 ///
 /// The middleware's events lack the reason, and at the end that began the handshake there is none
@@ -45,7 +45,7 @@ class Refusals {
   /// It was refused: for `cause`, or for what the middleware has just logged, as far as it did.
   void note_refused(const std::string& guid, const std::string& cause = {});
 
-  /// What the middleware logs about security: a refusal itself, or what `note_refused` is about.
+  /// A line of the middleware's security log: a refusal, or the cause of one in `note_refused`.
   void note_cause(const std::string& message);
 
  private:
@@ -60,7 +60,7 @@ class Refusals {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::map<std::string, std::string> known_;  // descriptions, by GUID
-  std::map<std::string, Pending> pending_;    // who has not proven his identity yet
+  std::map<std::string, Pending> pending_;    // participants without a proven identity yet
   std::set<std::string> reported_;
   std::string cause_;  // the last that was logged
   Clock::time_point window_began_{};

@@ -49,8 +49,8 @@ constexpr int kRobustBit = 16;  // of the kind of a mutex in the C library
 
 /// Locks of the ports that threads of this process read, the latest of them. Two per port, taken
 /// one after the other when a reader has waited there. For them a reader waits as long as it takes:
-/// where it gives up, the library ends the process or replaces the port. So does who closes the
-/// port.
+/// where it gives up, the library ends the process or replaces the port. The same holds for
+/// a process that closes the port.
 std::array<std::atomic<const pthread_mutex_t*>, 16> own_locks{};
 thread_local int own_locks_to_come = 0;
 
@@ -90,7 +90,7 @@ timespec limit(const timespec& deadline, std::int64_t patience_ns) {
   return to_timespec(std::min(to_ns(deadline), now_ns() + patience_ns));
 }
 
-/// A lock that a dead process held is held by us now. What it guards in a port is a ring of
+/// A lock that a dead process held is held by us now. It guards, in a port, a ring of
 /// messages and who waits for them; only between two of the dead's instructions, which reserve a
 /// place in the ring and fill it, is there a state that its reader cannot go on from.
 int take_over(int result, pthread_mutex_t* mutex) {
@@ -103,7 +103,7 @@ bool is_of_port(const sem_t* semaphore) {
   return reinterpret_cast<std::uintptr_t>(semaphore) % page_size != 0;
 }
 
-/// True where the thread that holds the mutex is stopped, by a signal or a debugger.
+/// True if the thread that holds the mutex is stopped, by a signal or a debugger.
 bool is_holder_stopped(const pthread_mutex_t& mutex) {
   // The first word of a robust mutex is the kernel's, and names the holder (futex(2), robust
   // lists).
@@ -138,8 +138,8 @@ int lock_own(decltype(pthread_mutex_timedlock)* lock_until, pthread_mutex_t* mut
 
 }  // namespace sls::bus
 
-// The middleware's library finds these before those of the C library. But for the unlocking it uses
-// them for what is between processes only (boost::interprocess with a time limit); the locks of its
+// The middleware's library finds these before those of the C library. Except for unlocking, it uses
+// them only for locks between processes (boost::interprocess with a time limit); the locks of its
 // own threads go another way and cost nothing more.
 
 int pthread_mutexattr_setpshared(pthread_mutexattr_t* attributes, int shared) noexcept {

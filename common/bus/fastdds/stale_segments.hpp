@@ -1,6 +1,6 @@
-/// What killed processes leave in shared memory (README.md, trap 11). Upstream: #2790, and #4728
-/// for the ports. To be deleted when creating a participant removes stale segments and tells those
-/// who have a stale port open; stale_segments_test.cpp names the cases.
+/// Segments that killed processes leave in shared memory (README.md, trap 11). Upstream: #2790, and
+/// #4728 for the ports. To be deleted when creating a participant removes stale segments and tells
+/// those who have a stale port open; stale_segments_test.cpp names the cases.
 #pragma once
 
 #include <filesystem>
@@ -14,7 +14,7 @@ namespace sls::bus {
 /// Never throws.
 void remove_stale_segments(const std::filesystem::path& folder = "/dev/shm");
 
-/// The segments that `remove_stale_segments` would remove, whoever owns them.
+/// The segments that `remove_stale_segments` would remove, of all owners.
 std::vector<std::filesystem::path> find_stale_segments(
     const std::filesystem::path& folder = "/dev/shm");
 
@@ -24,14 +24,14 @@ struct ParticipantPorts {
   int gain = 2;
 };
 
-/// True where a living process reads the shared-memory port of that number, here in `folder`.
+/// True if a living process reads the shared-memory port of that number, here in `folder`.
 bool is_port_read(int port, const std::filesystem::path& folder = "/dev/shm");
 
-/// The participant id to ask for, or −1 where any will do.
+/// The participant id to ask for, or −1 if any will do.
 ///
-/// A killed process leaves the lock files of its ports, and whoever takes such a port over replaces
-/// it without telling those who still have the old one open: they would never hear of each other
-/// (Fast DDS 2.9, #4728). So where there are such files, an id is chosen that has none.
+/// A killed process leaves the lock files of its ports, and the next process on such a port
+/// replaces it. A process that still has the old one open is not told: neither receives the other's
+/// data (Fast DDS 2.9, #4728). So where there are such files, an id is chosen that has none.
 int choose_participant_id(const ParticipantPorts& ports,
                           const std::filesystem::path& folder = "/dev/shm");
 

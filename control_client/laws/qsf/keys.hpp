@@ -62,7 +62,7 @@ void describe(Map& map, Gains& gains) {
   }
 }
 
-/// What `gains` says.
+/// The values of `gains`.
 struct QsfKeys {
   Gains gains = LqrWeights{};
 };

@@ -15,7 +15,7 @@ inline constexpr double kMinSupportFraction = 1e-3;
 /// kRodLevel. So it does with the load above the quadrotor, where the cosines are negative.
 inline constexpr double kMinRodCosine = 1e-3;
 
-/// What the law looks at.
+/// The inputs of the law.
 struct QsfInput {
   Eigen::Vector3d p_WQ = Eigen::Vector3d::Zero();  ///< m
   Eigen::Vector3d v_WQ = Eigen::Vector3d::Zero();  ///< m/s

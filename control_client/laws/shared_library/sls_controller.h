@@ -1,4 +1,5 @@
-/* A control law of your own for SLS, in C11 or in what speaks C (MATLAB Coder, Simulink, CasADi, …).
+/* A control law of your own for SLS, in C11 or any language that exports C functions (MATLAB Coder,
+ * Simulink, CasADi, …).
  *
  * Build a shared library that defines sls_controller() and name it in a scenario:
  *
@@ -23,13 +24,13 @@ extern "C" {
 #define SLS_CONTROLLER_VERSION 1
 #define SLS_CONTROLLER_MAX_MEMORY 64
 
-/* What a controller is made from. What it points to lives until `create` returns. */
+/* The setup of a controller. Its pointers are valid until `create` returns. */
 typedef struct {
   size_t size;            /* of this struct */
   const char* parameters; /* `controller.parameters` as JSON, a map; "{}" where there is none */
   uint32_t vehicle_id;
   double period_s; /* control period in force */
-  /* What the controller is to believe of its vehicle (`controller.model`). */
+  /* The vehicle parameters that the controller uses (`controller.model`). */
   double quad_mass_kg, load_mass_kg, rod_length_m, gravity_m_s2;
   double force_limit_n; /* the server refuses a stronger force */
 } sls_controller_setup;
@@ -65,7 +66,7 @@ typedef struct {
   double* memory;    /* to be remembered: room for as many numbers as `create` asked for, zeros */
 } sls_controller_output;
 
-/* What `answer` returns. A fault fails the mission; the force is then not used. */
+/* The result of `answer`. A fault fails the mission; the force is then not used. */
 enum {
   SLS_CONTROLLER_OK = 0,
   SLS_CONTROLLER_FREE_FALL = 1,
@@ -88,7 +89,7 @@ typedef struct {
                 char* error, size_t error_size);
 } sls_controller_functions;
 
-/* The one symbol that a library defines. What it returns must live as long as the library. */
+/* The one symbol that a library defines. Its result must live as long as the library. */
 const sls_controller_functions* sls_controller(void);
 
 #ifdef __cplusplus

@@ -1,4 +1,4 @@
-"""What a campaign is: a base scenario, what varies from run to run, what is measured of each run.
+"""A campaign: a base scenario, the keys that vary from run to run, the measures of each run.
 
 Plain values alone. `campaign_file` reads them, `sampling` draws from them."""
 

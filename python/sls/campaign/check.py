@@ -15,7 +15,7 @@ MOST_LISTED = 100         # different values of a key that is no number, each ch
 
 
 class Checker(Protocol):
-    """What this module needs of `_sls_core.Runs`."""
+    """The part of `_sls_core.Runs` that this module needs."""
 
     def check(self, values: list[str]) -> None:
         """Raises ValueError as reading the scenario with these values does."""
@@ -43,7 +43,7 @@ def _find_first(campaign: Campaign, runs: Checker, end: int) -> tuple[int, str] 
 
 
 def _check_run(campaign: Campaign, runs: Checker, values: list[Any]) -> str:
-    """What is wrong with the scenario of a run with these values; empty if nothing is."""
+    """The error in the scenario of a run with these values; empty if there is none."""
     try:
         runs.check([to_yaml_value(value) for value in campaign.pick_scenario_values(values)])
     except ValueError as error:
@@ -84,7 +84,7 @@ def _fail(campaign: Campaign, run: int, message: str) -> None:
         if not varied.is_helper and key and (
                 key == path or key.startswith(path + ".") or path.startswith(key + ".")):
             place = "seeds" if varied.kind == "seed" else "vary"
-            # What holds the varied key, or is held by it, is named too.
+            # Keys that contain the varied key, or are contained in it, are named too.
             detail = "" if key == path else f"{found[2]}: "
             fail(campaign.file, varied.line, f"{place}.{path}", f"run {run}: {detail}{text}")
     fail(campaign.file, 0, "vary", f"run {run}: {message}")

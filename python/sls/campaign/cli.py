@@ -20,11 +20,18 @@ from sls.input_error import InputError
 ROOT = Path(__file__).resolve().parents[3]
 MOST_CHUNKS = 10_000  # files in a folder
 LEAST_CHUNKS = 16     # so that several workers end at about the same time
+DESCRIPTIONS = {"status": "Prints chunks, rate and outcomes of a campaign so far.",
+                "report": "Writes DIR/report.html again.",
+                "compare": "Compares two campaigns run by run."}
+OTHER_COMMANDS = """commands for flown campaigns:
+  ./sls campaign status DIR    print chunks, rate and outcomes so far
+  ./sls campaign report DIR    write DIR/report.html again
+  ./sls campaign compare A B   compare two campaigns run by run"""
 
 
 class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
-        raise InputError(f"{self.prog}: {message} (see ./sls help)")
+        raise InputError(f"{self.prog.removeprefix('./sls ')}: {message} (see {self.prog} --help)")
 
 
 class Ended(KeyboardInterrupt):
@@ -40,28 +47,30 @@ def say(text: str) -> None:
 
 def make_parser() -> argparse.ArgumentParser:
     from sls.campaign.worker import parse_range
-    parser = Parser(prog="campaign", description="Flies a campaign: DIR/runs.csv, report.html.")
+    parser = Parser(prog="./sls campaign", formatter_class=argparse.RawDescriptionHelpFormatter,
+                    description="Flies a campaign: many runs of one scenario in which keys vary. Writes\n"
+                                "DIR/runs.csv and DIR/report.html.", epilog=OTHER_COMMANDS)
     parser.add_argument("file", metavar="FILE",
                         help="a campaign file, or a name in config/campaigns")
     parser.add_argument("--out", type=Path, metavar="DIR",
                         help="folder of the campaign (default: campaigns/NAME-UTCTIME)")
     parser.add_argument("--on", default="local", metavar="ENGINE",
-                        help=f"{', '.join(ENGINES)} (default: local)")
+                        help=f"where the runs fly: {', '.join(ENGINES)} (default: local)")
     parser.add_argument("--workers", type=to_count, metavar="N",
-                        help="processes (default: one for each core)")
+                        help="number of processes (default: one per core)")
     parser.add_argument("--runs", type=parse_range, metavar="A-B",
-                        help="these runs alone, inclusive (default: all)")
+                        help="fly only runs A to B (default: all)")
     parser.add_argument("--resume", action="store_true",
-                        help="fly what is missing or damaged in DIR")
+                        help="fly the missing and damaged runs of an interrupted campaign in DIR")
     parser.add_argument("--verify", type=to_count, metavar="N",
                         help="fly N runs again over DDS and compare certificates")
     parser.add_argument("--domain", type=int, metavar="N",
                         help="DDS domain of --verify, 0 to 232 (default: a free one from 100)")
     parser.add_argument("--chunk-runs", type=to_count, metavar="N",
-                        help="runs of a chunk (default: by the time that a run takes)")
+                        help="runs per chunk (default: from the duration of a run)")
     parser.add_argument("--sbatch", default="", metavar="OPTIONS",
-                        help="options of the site for Slurm's sbatch, as one text")
-    parser.add_argument("--scheduler", default="", metavar="ADDRESS", help="of Dask's scheduler")
+                        help="further options for Slurm's sbatch, as one text")
+    parser.add_argument("--scheduler", default="", metavar="ADDRESS", help="address of Dask's scheduler")
     parser.add_argument("--allow-other-machines", action="store_true",
                         help="also fly on machines whose rows may differ in their last bits; "
                              "manifest.json names them")
@@ -207,7 +216,7 @@ def verify(folder: CampaignFolder, options: argparse.Namespace) -> bool:
 
 
 def parse_folders(command: str, arguments: Sequence[str], *names: str) -> list[Path]:
-    parser = Parser(prog=f"campaign {command}")
+    parser = Parser(prog=f"./sls campaign {command}", description=DESCRIPTIONS[command])
     for name in names:
         parser.add_argument(name, type=Path)
     options = vars(parser.parse_args(arguments))

@@ -206,7 +206,7 @@ def draw_shares(rows: Sequence[tuple[str, float, float, float, str]], label: str
 
 def draw_heat(values: np.ndarray, counts: np.ndarray, names: tuple[Sequence[str], Sequence[str]],
               labels: tuple[str, str], title: str, scale: tuple[float, float] | None = None) -> str:
-    """Of values (rows, columns), NaN where there is none; row 0 at the bottom. `names` and `labels`
+    """Of values (rows, columns), NaN if there is none; row 0 at the bottom. `names` and `labels`
     are those of columns, then rows; `counts` says how many runs each field holds."""
     rows, columns = values.shape
     width, left, right, top, bottom = 440.0, 74.0, 360.0, 28.0, 268.0

@@ -20,7 +20,7 @@ TOKEN = re.compile(r"\s+|(?P<name>[A-Za-z_][A-Za-z0-9_]*(?:\.[A-Za-z0-9_]+)*)"
 
 
 class ExpressionError(ValueError):
-    """What is wrong with an expression or with its value, without its place."""
+    """An error in an expression or its value, without its place."""
 
 
 class Expression:

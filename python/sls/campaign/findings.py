@@ -1,4 +1,4 @@
-"""What the shipped campaigns found: docs/campaigns.md and its pictures, from their folders.
+"""Findings of the shipped campaigns: docs/campaigns.md and its pictures, from their folders.
 
     ./sls python -m sls.campaign.findings DIR [--out docs]
 
@@ -56,7 +56,7 @@ def calc_mass_ratio(load_mass_kg: float, believed_kg: float = LOAD_MASS_KG) -> f
 
 def make_chain(gains: Sequence[float], load_mass_kg: float,
                vertical: Sequence[float]) -> HorizontalChain:
-    """The horizontal loop about a hover in which the load sags, because the controller believes 0.2
+    """The horizontal loop about a hover in which the load sags, because the controller assumes 0.2
     kg: (1) of the page. `gains` position, velocity, acceleration, jerk; `vertical` position,
     velocity."""
     ratio = calc_mass_ratio(float(load_mass_kg))
@@ -173,7 +173,7 @@ def study_mass_and_delay(table: RunTable) -> tuple[Figure, dict[str, str]]:
     axes.axvline(sag_mass, color="#0b5394", linewidth=2, linestyle="--",
                  label="linear: sags by a rod length")
     axes.axvline(LOAD_MASS_KG, color="#444444", linewidth=0.8, linestyle=":")
-    axes.set_xlabel("mass of the load (kg); the controller believes 0.2")
+    axes.set_xlabel("mass of the load (kg); the controller assumes 0.2")
     axes.set_ylabel("delay of the command (s)")
     axes.legend(handles=[*list_class_handles(range(4)), *axes.lines[:2]], loc="upper left",
                 bbox_to_anchor=(1.0, 1.0))
@@ -307,7 +307,7 @@ def study_integral(table: RunTable) -> tuple[Figure, dict[str, str]]:
     sag = (GRAVITY_M_S2 * (LOAD_MASS_KG - believed) / ((QUAD_MASS_KG + believed) * 2.2667))
     drift = (push * GRAVITY_M_S2 * (QUAD_MASS_KG + LOAD_MASS_KG)
              / ((QUAD_MASS_KG + believed) * QUAD_MASS_KG * rod * 3.2469))
-    # What 20 m·s times the integral gain can hold, as an error times the position gain.
+    # The largest output of the integral, 20 m·s times its gain, as an error times the position gain.
     clamp_x, clamp_z = 20.0 * 0.0316 / 3.2469, 20.0 * 0.0224 / 2.2667
     small, below = np.abs(sag) < 0.9 * clamp_z, horizontal & (drift < 0.9 * clamp_x)
     beyond = horizontal & (drift > 1.3 * clamp_x)

@@ -27,7 +27,7 @@ OWN_FILES = {"lock", "campaign.yaml", "base.yaml", "chunks", "kept"}  # before p
 
 @dataclass(frozen=True)
 class Plan:
-    """What was decided before the first run was flown: plan.json."""
+    """Decisions made before the first run: plan.json."""
 
     campaign: str        # its name
     sha256: str
@@ -44,7 +44,7 @@ class Plan:
 
 
 class DamagedChunk(Exception):
-    """What is wrong with a chunk's file; it counts as not flown."""
+    """A defect of a chunk's file; the chunk counts as not flown."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class CampaignFolder:
 
     @cached_property
     def plan(self) -> Plan:
-        """Raises InputError where there is none."""
+        """Raises InputError if there is none."""
         file = self.folder / "plan.json"
         try:
             return Plan(**json.loads(file.read_text()))
@@ -98,7 +98,7 @@ class CampaignFolder:
     def create(self, campaign: Campaign, engine: str, chunk_runs: int, first: int, last: int,
                resume: bool, columns: Sequence[str], allow_other_machines: bool = False) -> None:
         """Begins the folder, or with `resume` checks that it is this campaign's and takes the
-        chunks that are there. Holds the lock until `close`. Raises InputError where the folder is
+        chunks that are there. Holds the lock until `close`. Raises InputError if the folder is
         something else, is in use, or was begun on a machine of another kind."""
         self.refuse_foreign(campaign, resume)
         self.make_folders()
@@ -167,7 +167,7 @@ class CampaignFolder:
                              f"'{foreign[0]}'")
 
     def refuse_other_machine(self, plan: Plan) -> None:
-        """Raises InputError where this machine's rows could differ from the plan's machine."""
+        """Raises InputError if this machine's rows could differ from the plan's machine."""
         difference = find_difference(plan.machine, describe_machine())
         if difference and not plan.allow_other_machines:
             raise InputError(f"{self.folder}: machine {host_name()}: {difference}; equal "
@@ -250,7 +250,7 @@ class CampaignFolder:
         return to_line(self.plan.columns)
 
     def write_chunk(self, number: int, rows: Iterable[Sequence[str]], wall_s: float = 0.0) -> None:
-        """Writes a chunk whole, or leaves one with the same rows as it is. Raises EngineError where
+        """Writes a chunk whole, or leaves one with the same rows as it is. Raises EngineError if
         it cannot be written, or where the chunk is there with other rows."""
         first, last = self.find_chunk(number)
         table = b"".join(map(to_line, rows))
@@ -383,7 +383,7 @@ class CampaignFolder:
 
     @property
     def manifest(self) -> dict[str, Any]:
-        """Raises InputError where there is none."""
+        """Raises InputError if there is none."""
         file = self.folder / "manifest.json"
         try:
             return json.loads(file.read_text())

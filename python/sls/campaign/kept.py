@@ -38,7 +38,7 @@ def is_kept(campaign: Campaign, row: dict[str, str]) -> bool:
 
 def keep_while_flying(folder: "CampaignFolder", campaign: Campaign, runs: "Runs",
                       cells: Sequence[str]) -> None:
-    """Raises EngineError where the recording cannot be written."""
+    """Raises EngineError if the recording cannot be written."""
     if campaign.keep.kind in ("none", "worst"):
         return
     row = dict(zip(folder.plan.columns, cells))
@@ -48,7 +48,7 @@ def keep_while_flying(folder: "CampaignFolder", campaign: Campaign, runs: "Runs"
 
 def keep_run(folder: "CampaignFolder", campaign: Campaign, runs: "Runs",
              row: dict[str, str]) -> None:
-    """Writes one recording whole, unless it is there. Raises EngineError where it cannot be
+    """Writes one recording whole, unless it is there. Raises EngineError if it cannot be
     written, or where the flight is another one than the row's."""
     index = int(row["run"])
     target = kept_folder(folder, index)
@@ -121,7 +121,7 @@ def list_kept(folder: "CampaignFolder", campaign: Campaign) -> Iterator[dict[str
 
 
 def keep_recordings(folder: "CampaignFolder") -> dict[str, Any]:
-    """Writes every recording that is asked for and not there. What the manifest says of them:
+    """Writes every recording that is requested and missing. The manifest's entries for them:
     their kind and number, and of the worst their runs."""
     campaign = folder.campaign
     kept: dict[str, Any] = {"kind": campaign.keep.kind, "count": 0}

@@ -1,4 +1,4 @@
-"""What decides the bits of a flight beside its scenario: processor level, libraries, versions."""
+"""Decides the bits of a flight besides its scenario: processor level, libraries, versions."""
 
 import hashlib
 import os
@@ -16,7 +16,7 @@ LEVEL_FLAGS = (
     ("x86-64-v3", {"avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "abm", "movbe"}),
     ("x86-64-v4", {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"}),
 )
-# What glibc's sin and cos look at, which a processor may have without the whole level.
+# Features that glibc's sin and cos check, which a processor may have without the whole level.
 LIBM_FLAGS = {"fma", "fma4", "avx2", "avx"}
 
 
@@ -75,7 +75,7 @@ def host_name() -> str:
 
 
 def find_difference(expected: dict[str, str], got: dict[str, str]) -> str:
-    """One phrase that names the first difference; empty where there is none."""
+    """One phrase that names the first difference; empty if there is none."""
     for name in sorted({*expected, *got}):
         if expected.get(name) != got.get(name):
             return f"{name}: expected {expected.get(name) or 'none'}, got {got.get(name) or 'none'}"

@@ -13,7 +13,7 @@ LONGEST_ERROR = 300
 
 
 def load_function(own: OwnMeasure) -> Callable[..., Any]:
-    """Raises InputError where the file cannot be run or has no such function."""
+    """Raises InputError if the file cannot be run or has no such function."""
     place = f"{own.file}: {own.function}"
     spec = importlib.util.spec_from_file_location(f"own_measure_{own.file.stem}", own.file)
     if spec is None or spec.loader is None:
@@ -38,7 +38,7 @@ def describe(error: Exception) -> str:
 
 
 def to_columns(own: OwnMeasure, result: Any) -> list[float]:
-    """Raises TypeError or KeyError where the function returned something else."""
+    """Raises TypeError or KeyError if the function returned something else."""
     if isinstance(result, dict):
         if set(result) != set(own.columns):
             raise KeyError(f"expected {', '.join(own.columns)}, got {', '.join(map(str, result))}")

@@ -19,7 +19,7 @@ def describe_interval(count: int, total: int) -> str:
 
 def find_pairs(table: RunTable, key: str) -> tuple[list[str], Places, Places] | None:
     """Of a key with exactly two values: the values as text, and the runs with the first and with
-    the second whose other varied values are equal. None where fewer than half of the runs form
+    the second whose other varied values are equal. None if fewer than half of the runs form
     pairs."""
     if key in table.words:
         names, side = table.words[key]

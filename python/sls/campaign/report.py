@@ -175,7 +175,7 @@ def is_lost(table: RunTable) -> np.ndarray:
 
 
 def find_main_measure(table: RunTable) -> str | None:
-    """What heat maps show: the rms of the load's error where it was measured."""
+    """The measure in heat maps: the rms of the load's error where it was measured."""
     for name in ("load_error_rms_m", "load_error_max_m"):
         if name in table.measures:
             return name
@@ -276,7 +276,7 @@ def make_heat_maps(table: RunTable, x: str, y: str, measure: str | None) -> str:
 
 def calc_class_medians(table: RunTable, measure: str, place: np.ndarray,
                        shape: tuple[int, int]) -> np.ndarray:
-    """Of the runs that finished; NaN where none did."""
+    """Of the runs that finished; NaN if none did."""
     values = table.numbers[measure]
     use = table.is_outcome("finished") & np.isfinite(values)
     order = np.argsort(place[use], kind="stable")

@@ -55,7 +55,7 @@ def to_cell(value: Any) -> str:
 
 
 def to_number(value: float) -> str:
-    """The shortest text that reads back as the same number; empty where there is none."""
+    """The shortest text that reads back as the same number; empty if there is none."""
     return "" if math.isnan(value) else repr(value)
 
 
@@ -65,7 +65,7 @@ def to_one_line(text: str) -> str:
 
 
 def list_yaml_values(campaign: Campaign, values: list[Any]) -> list[str]:
-    """What the scenario's varied keys hold in a run."""
+    """Values of the scenario's varied keys in a run."""
     return [to_yaml_value(value) for value in campaign.pick_scenario_values(values)]
 
 

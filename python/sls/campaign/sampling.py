@@ -121,7 +121,7 @@ def _make_permutation(key: tuple[int, int], size: int) -> np.ndarray:
     return order
 
 
-# --- What is drawn ---------------------------------------------------------------------------
+# --- Drawn values ----------------------------------------------------------------------------
 
 def _draw(campaign: Campaign, varied: Varied, first: int, last: int) -> list[Any]:
     """The values of draws `first` to `last`."""

@@ -110,7 +110,7 @@ def calc_paired_difference(a: np.ndarray, b: np.ndarray, level: float = LEVEL) -
 
 
 def find_interval_rank(count: int, level: float = LEVEL) -> int:
-    """k of formula 4; 0 where even the extremes are no interval of this level."""
+    """k of formula 4; 0 if even the extremes are no interval of this level."""
     tail = (1.0 - level) / 2.0
     # ppf gives the smallest j with P(B ≤ j) ≥ tail, hence P(B < j) = P(B ≤ j − 1) < tail.
     rank = int(binom.ppf(tail, count, 0.5))

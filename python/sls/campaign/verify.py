@@ -68,7 +68,7 @@ def written_scenario(text: str, base: Path, folder: Path) -> Iterator[Path]:
 
 def fly_over_dds(scenario: Path, recording: Path, domain: int) -> str:
     """The certificate of the flight by sim_server, control_client and recorder, in lockstep. A
-    flight that fails has one, too. Raises EngineError where there is no recording."""
+    flight that fails has one, too. Raises EngineError if there is no recording."""
     command = [str(ROOT / "sls"), "run", str(scenario), "--out", str(recording), "--mode",
                "lockstep", "--domain", str(domain)]
     build = os.environ.get("SLS_BUILD", str(ROOT / "build"))
@@ -98,7 +98,7 @@ def find_certificate(campaign: Campaign, runs: "Runs", row: dict[str, str]) -> s
 def verify(folder: CampaignFolder, count: int, say: Callable[[str], None],
            domain: int | None = None, seed: int = SEED) -> bool:
     """Flies `count` runs of those in the folder, chosen by `seed`, in turn. Says each that differs
-    and a summary, puts them into the manifest. True where all are equal. Raises EngineError."""
+    and a summary, puts them into the manifest. True if all are equal. Raises EngineError."""
     campaign, plan = folder.campaign, folder.plan
     runs = make_runs(campaign)
     size = plan.last - plan.first + 1

@@ -22,7 +22,7 @@ from sls.input_error import InputError
 
 
 class ChunkFlyer:
-    """What a process needs for the chunks of one folder, made once. Raises ConfigError where the
+    """The data that a process needs for the chunks of one folder, made once. Raises ConfigError if the
     campaign cannot be flown here, such as on a machine of another kind."""
 
     def __init__(self, folder: Path):
@@ -56,7 +56,7 @@ _one_at_a_time = threading.Lock()  # a Dask worker may have several threads
 
 
 def fly_chunk(folder: str, number: int) -> dict[str, int | float]:
-    """Flies one chunk and writes it whole; does nothing where it is there. Raises ConfigError,
+    """Flies one chunk and writes it whole; does nothing if it is there. Raises ConfigError,
     EngineError."""
     with _one_at_a_time:
         place = str(Path(folder).resolve())
@@ -89,7 +89,7 @@ def answer(message: dict[str, int | float | str]) -> None:
 
 class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
-        raise InputError(f"{self.prog}: {message} (see ./sls help)")
+        raise InputError(f"{self.prog.removeprefix('./sls ')}: {message} (see {self.prog} --help)")
 
 
 def parse_range(text: str) -> tuple[int, int]:
@@ -127,16 +127,17 @@ def fly_listed(options: argparse.Namespace) -> None:
 
 def main(arguments: Sequence[str]) -> int:
     """The exit code."""
-    parser = Parser(prog="campaign-worker", description="Flies chunks of a campaign's folder.")
+    parser = Parser(prog="./sls campaign-worker",
+                    description="Flies chunks of a campaign. Slurm and Kubernetes start it.")
     parser.add_argument("folder", type=Path, metavar="DIR", help="folder of the campaign")
     which = parser.add_mutually_exclusive_group(required=True)
-    which.add_argument("--chunks", type=parse_range, metavar="A-B", help="which chunks, inclusive")
+    which.add_argument("--chunks", type=parse_range, metavar="A-B", help="fly chunks A to B")
     which.add_argument("--index-from", metavar="ENV", default="",
-                       help="environment variable with the index of this task, such as "
+                       help="environment variable that holds the index of this task, such as "
                             "JOB_COMPLETION_INDEX")
     which.add_argument("--serve", action="store_true", help=argparse.SUPPRESS)
     parser.add_argument("--chunks-each", type=int, default=1, metavar="N",
-                        help="of --index-from: chunks of each index (default: 1)")
+                        help="chunks per index of --index-from (default: 1)")
     serving = False
     try:
         options = parser.parse_args(arguments)

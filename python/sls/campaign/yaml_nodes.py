@@ -43,7 +43,7 @@ class Place:
 
     @property
     def brief(self) -> str:
-        """What stands here, in a few printable characters."""
+        """The text here, in a few printable characters."""
         if isinstance(self.node, yaml.SequenceNode):
             return f"a list of {len(self.node.value)}"
         if isinstance(self.node, yaml.MappingNode):
@@ -101,7 +101,7 @@ class Place:
         return values[key]
 
     def find_scalar(self) -> bool | int | float | str | None:
-        """What a scalar means; None for a list, a map, nothing and a number that is not finite."""
+        """The value of a scalar; None for a list, a map, nothing and a number that is not finite."""
         if not isinstance(self.node, yaml.ScalarNode) or self.is_nothing:
             return None
         text = self.node.value

@@ -37,7 +37,7 @@ class CsvFile {
   void flush();
 
   std::uint64_t rows() const { return rows_; }
-  /// What a flush would hand over.
+  /// Bytes that a flush would write.
   std::size_t pending_bytes() const { return finished_; }
   const std::filesystem::path& path() const { return path_; }
 

@@ -15,7 +15,7 @@ namespace {
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t kEncapsulationBytes = 4;
 
-/// What the number reads back to from a CSV file.
+/// The value that the number has when read from a CSV file.
 double as_in_file(double number) {
   if (!std::isnan(number)) return number;
   return std::copysign(kNone, std::signbit(number) ? -1.0 : 1.0);

@@ -9,7 +9,7 @@
 namespace sls::record {
 
 /// Makes of a step's rows a `RecordEntry` as CDR, little-endian, with its encapsulation header.
-/// What no row holds stays empty: README.md lists it.
+/// Fields that no row holds stay empty: README.md lists them.
 class EntryMessage {
  public:
   EntryMessage();

@@ -16,7 +16,7 @@
 
 namespace sls::record {
 
-/// What compresses the chunks: another version may give other bytes.
+/// The compressor of the chunks: another version may give other bytes.
 struct Compression {
   const char* library;  ///< "zstd"
   std::string version;
@@ -45,7 +45,7 @@ class McapFile {
   void add_message(std::uint16_t channel, std::uint32_t sequence, std::uint64_t time_ns,
                    std::string_view bytes);
 
-  /// What a flush would hand over.
+  /// Bytes that a flush would write.
   std::size_t pending_bytes() const { return out_.bytes().size(); }
   /// Hands what comes before the messages, and every full chunk, to the operating system.
   void flush();

@@ -19,7 +19,7 @@ constexpr std::int64_t kMirrorPeriodNs = 10'000'000;
 constexpr std::string_view kClockTopic = "/clock";
 constexpr std::uint16_t kLeftOut = 0;  // no channel
 
-/// What of manifest.json is the same for equal flights, on whatever machine and whenever.
+/// The fields of manifest.json that equal flights share, on every machine and at any time.
 std::string describe(const Parameters& parameters) {
   const Compression compression = describe_compression();
   Json json = {{"scenario_sha256", parameters.scenario_sha256().to_string()},

@@ -10,7 +10,7 @@ namespace sls::sim::geometric {
 /// README.md, "Allocation".
 class Allocation {
  public:
-  /// @throws config::ConfigError where the rotors cannot roll or pitch the body.
+  /// @throws config::ConfigError if the rotors cannot roll or pitch the body.
   explicit Allocation(const AutopilotSetup& setup);
 
   /// Thrust of each rotor (N), from 0 to its largest, that together make `moment` (in B about the

@@ -9,7 +9,7 @@
 
 namespace sls::sim::px4 {
 
-/// What a rotor's output gets of each normalised demand.
+/// Share of each normalised demand in a rotor's output.
 struct MixerRow {
   double roll = 0.0;
   double pitch = 0.0;
@@ -19,7 +19,7 @@ struct MixerRow {
 
 /// Rows that suit the rotors' places, axes and constants, scaled as PX4 scales them: README.md,
 /// eq. (12). Without authority over yaw its entries are 0.
-/// @throws config::ConfigError where the rotors cannot roll or pitch the body.
+/// @throws config::ConfigError if the rotors cannot roll or pitch the body.
 std::vector<MixerRow> make_mixer(const AutopilotSetup& setup);
 
 struct MixerOutput {

@@ -1,4 +1,5 @@
-/* An autopilot of your own for SLS, in C11 or in what speaks C (MATLAB Coder, Simulink, …).
+/* An autopilot of your own for SLS, in C11 or any language that exports C functions (MATLAB Coder,
+ * Simulink, …).
  *
  * Build a shared library that defines sls_autopilot() and name it in a scenario:
  *
@@ -6,7 +7,7 @@
  *
  * The body frame B and the world frame W have x forward, y right, z down. SI units, radians. Paths are
  * relative to the scenario file. There is one autopilot per vehicle; different ones are called on
- * different threads, each by one call at a time. What it puts out must be a function of the setup
+ * different threads, each by one call at a time. Its output must be a function of the setup
  * and the sequence of its inputs alone. Do not change the floating-point mode: link without
  * -ffast-math. */
 #ifndef SLS_AUTOPILOT_H
@@ -33,7 +34,7 @@ typedef struct {
   double min_speed_rad_s, max_speed_rad_s;
 } sls_autopilot_rotor;
 
-/* What an autopilot is made from. What it points to lives as long as the autopilot. */
+/* The setup of an autopilot. Its pointers are valid as long as the autopilot. */
 typedef struct {
   size_t size;            /* of this struct */
   const char* parameters; /* `autopilot.parameters` as JSON, a map; "{}" where there is none */
@@ -48,7 +49,7 @@ typedef struct {
   const sls_autopilot_rotor* rotors;
 } sls_autopilot_setup;
 
-/* What an autopilot sees at a step. Its W is the world as its estimator has it: the scenario may turn
+/* Input of an autopilot's step. Its W is the world as its estimator has it: the scenario may turn
  * that against the true one (`estimator`). */
 typedef struct {
   size_t size; /* of this struct */
@@ -60,7 +61,7 @@ typedef struct {
   double body_rates_rad_s[3]; /* in B */
 } sls_autopilot_input;
 
-/* What it wants until its next step. */
+/* Its output until its next step. */
 typedef struct {
   size_t size; /* of this struct */
   /* Set-points of the rotors, rad/s, >= 0. Room for `rotor_count` numbers, which begin as NaN: write
@@ -90,7 +91,7 @@ typedef struct {
               char* error, size_t error_size);
 } sls_autopilot_functions;
 
-/* The one symbol that a library defines. What it returns must live as long as the library. */
+/* The one symbol that a library defines. Its result must live as long as the library. */
 const sls_autopilot_functions* sls_autopilot(void);
 
 #ifdef __cplusplus

@@ -49,7 +49,7 @@ AnalyticPlant::Motion AnalyticPlant::calc_next(const Motion& start,
   const Motion k3 = calc_rate(add(start, h / 2, k2), f_Q_W);
   const Motion k4 = calc_rate(add(start, h, k3), f_Q_W);
   Motion next = add(add(add(add(start, h / 6, k1), h / 3, k2), h / 3, k3), h / 6, k4);
-  // What the step leaves of |n| = 1 and n·ω = 0, of order h⁵, is taken away.
+  // The step's errors in |n| = 1 and n·ω = 0, of order h⁵, are removed.
   next.n_W.normalize();
   next.w_W -= next.n_W * next.n_W.dot(next.w_W);
   return next;

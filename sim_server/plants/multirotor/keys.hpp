@@ -15,7 +15,7 @@ inline std::array<config::Name<Spin>, 2> names_of(Spin) {
   return {{{"ccw", Spin::kCounterClockwise}, {"cw", Spin::kClockwise}}};
 }
 
-/// What rotors have in common, and what one of them may have of its own.
+/// Values common to all rotors, and those that one rotor may set itself.
 template <class Number>
 struct RotorNumbers {
   Number thrust_constant{};    ///< N·s²

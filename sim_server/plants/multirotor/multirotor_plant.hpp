@@ -14,7 +14,7 @@ namespace sls::sim {
 class MultirotorPlant : public Plant {
  public:
   /// One vehicle, `setup.vehicles[0]`, at its initial state, its rotors as fast as hovering needs.
-  /// @throws config::ConfigError where the autopilot refuses.
+  /// @throws config::ConfigError if the autopilot refuses.
   explicit MultirotorPlant(const PlantSetup& setup);
   ~MultirotorPlant() override;
   MultirotorPlant(const MultirotorPlant&) = delete;

@@ -1,5 +1,5 @@
-/// What a rotor does: its lag, and the forces it exerts. Source: README.md, eqs. (1) to (5), (14),
-/// (15).
+/// The model of a rotor: its lag, and the forces it exerts. Source: README.md, eqs. (1) to (5),
+/// (14), (15).
 #pragma once
 
 #include <Eigen/Core>

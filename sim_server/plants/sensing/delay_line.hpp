@@ -1,4 +1,4 @@
-/// What is under way: samples that were sent and can still be received.
+/// Samples under way: samples that were sent and can still be received.
 #pragma once
 
 #include <cstddef>
@@ -22,7 +22,7 @@ class DelayLine {
     return sent_.front().sample;
   }
 
-  /// When the sample after the one taken last was sent; nothing where none was.
+  /// When the sample after the one taken last was sent; nothing if none was.
   std::optional<std::int64_t> find_next() const {
     return sent_.size() > 1 ? std::optional(sent_[1].step) : std::nullopt;
   }

@@ -33,7 +33,7 @@ class SensorGroup {
   /// Of which step it shows the state at `step`.
   std::int64_t find_seen(std::int64_t step) const { return clock_.find_seen(step); }
 
-  /// What it shows of a vehicle at `step`, to which the plant has come.
+  /// Its output for a vehicle at `step`, to which the plant has come.
   Sample show(const Plant& plant, std::size_t vehicle, std::int64_t step) {
     return next_step_ == SampleClock::kNever ? Sample(plant.measurement(vehicle))
                                              : lines_[vehicle].take(clock_.find_seen(step));

@@ -1,4 +1,4 @@
-/* A plant of your own for SLS, in C11 or in what speaks C.
+/* A plant of your own for SLS, in C11 or in a language that exports C functions.
  *
  * Build a shared library that defines sls_plant() and name it in a scenario:
  *
@@ -32,7 +32,7 @@ typedef struct {
   double signals[SLS_PLANT_MAX_SIGNALS];
 } sls_plant_state;
 
-/* What a plant is made from. What it points to lives until `create` returns. */
+/* The setup of a plant. Its pointers are valid until `create` returns. */
 typedef struct {
   size_t size;            /* of this struct */
   const char* parameters; /* `plant.parameters` as JSON, a map; "{}" where there is none */
@@ -63,7 +63,7 @@ typedef struct {
   void (*measure)(void* plant, sls_plant_state* state);
 } sls_plant_functions;
 
-/* The one symbol that a library defines. What it returns must live as long as the library. */
+/* The one symbol that a library defines. Its result must live as long as the library. */
 const sls_plant_functions* sls_plant(void);
 
 #ifdef __cplusplus

@@ -14,7 +14,7 @@ namespace sls::sim {
 class SlungLoadPlant : public Plant {
  public:
   /// Builds the multibody system at its initial state.
-  /// @throws config::ConfigError where `vehicle` contradicts the links of the rigid pendulum.
+  /// @throws config::ConfigError if `vehicle` contradicts the links of the rigid pendulum.
   SlungLoadPlant(const model::SlungLoadParameters& vehicle, const config::Plant& plant);
   ~SlungLoadPlant() override;
   SlungLoadPlant(const SlungLoadPlant&) = delete;

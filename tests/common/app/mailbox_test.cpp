@@ -23,7 +23,7 @@ TEST(MailboxTest, HandsItemsOutInTheOrderTheyCameIn) {
   EXPECT_EQ(mailbox.refused(), 0u);
 }
 
-TEST(MailboxTest, RefusesAndCountsWhatDoesNotFit) {
+TEST(MailboxTest, RefusesAndCountsItemsThatDoNotFit) {
   Mailbox<int> mailbox(2);
   EXPECT_TRUE(mailbox.put(1));
   EXPECT_TRUE(mailbox.put(2));
@@ -51,7 +51,7 @@ TEST(MailboxTest, GivesUpAtTheDeadlineAndNotBefore) {
   EXPECT_GE(Clock::now(), deadline);
 }
 
-TEST(MailboxTest, APastDeadlineStillHandsOutWhatIsThere) {
+TEST(MailboxTest, APastDeadlineStillReturnsAvailableItems) {
   Mailbox<int> mailbox(1);
   EXPECT_EQ(mailbox.take(Clock::now() - 1h), std::nullopt);
   mailbox.put(7);
@@ -108,7 +108,7 @@ TEST(MailboxTest, AnItemEndsTheWaitToo) {
   EXPECT_EQ(mailbox.take(soon()), 7);
 }
 
-TEST(MailboxTest, NothingOfManyProducersIsLostDoubledOrReordered) {
+TEST(MailboxTest, ItemsOfManyProducersAreNotLostDoubledOrReordered) {
   constexpr int kProducers = 8, kItems = 2000;
   struct Item {
     int producer;

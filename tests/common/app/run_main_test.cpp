@@ -54,7 +54,7 @@ bool is_one_line(const std::string& text) {
   return !text.empty() && text.find('\n') == text.size() - 1;
 }
 
-TEST(RunMainTest, DoneIsZeroAndSaysNothing) {
+TEST(RunMainTest, DoneIsExitCodeZeroWithoutOutput) {
   const Outcome outcome = run({});
   EXPECT_EQ(outcome.code, 0);
   EXPECT_TRUE(outcome.worked);

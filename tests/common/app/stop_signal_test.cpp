@@ -20,7 +20,7 @@ class StopSignalDeathTest : public testing::Test {
   void SetUp() override { GTEST_FLAG_SET(death_test_style, "threadsafe"); }
 };
 
-TEST_F(StopSignalDeathTest, ThereIsNoneBeforeOneCame) {
+TEST_F(StopSignalDeathTest, NoSignalIsReportedBeforeTheFirst) {
   EXPECT_EXIT(
       {
         install_stop_signals();
@@ -64,7 +64,7 @@ TEST_F(StopSignalDeathTest, ASignalThatAnotherThreadReceivesIsSeen) {
       testing::ExitedWithCode(SIGINT), "");
 }
 
-TEST_F(StopSignalDeathTest, WhoHangsAfterTheSignalIsEndedWithALine) {
+TEST_F(StopSignalDeathTest, AProgramThatHangsAfterTheSignalExitsWithAnErrorLine) {
   EXPECT_EXIT(
       {
         install_stop_signals(std::chrono::seconds(1));
@@ -90,7 +90,7 @@ TEST_F(StopSignalDeathTest, WorkThatMayTakeLongIsNotEnded) {
       testing::ExitedWithCode(SIGTERM), "");
 }
 
-TEST_F(StopSignalDeathTest, WhoHangsAfterSuchWorkIsEnded) {
+TEST_F(StopSignalDeathTest, AProgramThatHangsAfterSuchWorkExits) {
   EXPECT_EXIT(
       {
         install_stop_signals(std::chrono::seconds(1));

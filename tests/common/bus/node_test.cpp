@@ -134,7 +134,7 @@ TEST(NodeTest, ALateRecorderGetsTheStreamFromItsBeginningInOrder) {
   EXPECT_EQ(next, kBatches);
 }
 
-TEST(NodeTest, ALateJoinerLearnsWhatIsLatched) {
+TEST(NodeTest, ALateJoinerGetsLatchedSamples) {
   Node writing(kQosFile, 78, "writing");
   Writer<Parameters> writer(writing);
   writer.write(make_message<Parameters>(7));
@@ -216,7 +216,7 @@ TEST(RawReaderTest, GivesTheBytesOfEachSampleBesideATypedReader) {
   expect_raw_beside_typed<Parameters>(80, kLatchedReaderProfile);
 }
 
-TEST(RawReaderTest, WhatItGaveIsDecodedToTheSameMessage) {
+TEST(RawReaderTest, ItsBytesDecodeToTheSameMessage) {
   const auto states = make_message<States>(3);
   States decoded;
   ASSERT_TRUE(decode(serialize(states), decoded));

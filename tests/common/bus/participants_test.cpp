@@ -51,7 +51,7 @@ bool knows(const ServerDirectory& directory, std::uint64_t run_id) {
                      [&](const Run& run) { return run.parameters.run_id() == run_id; });
 }
 
-TEST(ParticipantDirectoryTest, KnowsWhoServesARunUntilTheyLeave) {
+TEST(ParticipantDirectoryTest, ListsTheParticipantsOfARunUntilTheyLeave) {
   constexpr int kDomain = 70;
   Node node(kQosFile, kDomain, "directory");
   const ParticipantDirectory directory(node);
@@ -94,7 +94,7 @@ class RecorderPatienceTest : public testing::Test {
     message.done(true);
     writer_.write(message);
   }
-  /// True where the recorder was done before.
+  /// True if the recorder was done before.
   bool wait_for_recorder(const RecorderPatience& patience) {
     EXPECT_TRUE(wait_until([&] { return directory_.find(ROLE_RECORDER, kRun).size() == 1; }));
     wait_for_recorders_to_end(directory_, kRun, 1, patience);
@@ -127,7 +127,7 @@ TEST_F(RecorderPatienceTest, OneThatGetsNoFurtherIsNot) {
   EXPECT_FALSE(wait_for_recorder({0.5, 60}));
 }
 
-TEST(ServerDirectoryTest, AServerOfAnotherContractIsNotBelievedAndNamed) {
+TEST(ServerDirectoryTest, AServerOfAnotherContractIsIgnoredAndReported) {
   constexpr int kDomain = 71;
   Node node(kQosFile, kDomain, "directory");
   const ServerDirectory directory(node);
@@ -172,7 +172,7 @@ TEST(ServerDirectoryTest, FindsTheRunToJoin) {
     Writer<SimStatus> second_status(second_server);
     second_parameters.write(make_parameters(kLowerRun, {kVehicle}));
     second_status.write(make_status(kLowerRun, PHASE_WAITING));
-    // Both say again and again where they are: who is silent for 2 s is no server to join.
+    // Both say again and again where they are: a server silent for 2 s is not joined.
     const auto is_chosen = [&](std::uint64_t run_id, RunPhase phase) {
       return wait_until([&] {
         status.write(make_status(kRun, phase));
@@ -191,7 +191,7 @@ TEST(ServerDirectoryTest, FindsTheRunToJoin) {
   EXPECT_EQ(directory.find_status(kLowerRun + 1), std::nullopt);
 }
 
-TEST(ServerDirectoryTest, OnlyWhoClaimedARunFirstIsBelievedAboutIt) {
+TEST(ServerDirectoryTest, OnlyTheFirstServerOfARunCounts) {
   constexpr int kDomain = 79;
   Node node(kQosFile, kDomain, "directory");
   std::atomic<int> forged{0};
@@ -282,14 +282,15 @@ TEST(ServerWatchTest, ASilentServerIsNotJoinedIsGivenUpAndMayComeBack) {
     status.write(make_status(kRun, PHASE_RUNNING));
     return watch.look() == ServerWatch::Finding::kThere;
   }));
-  // Who does not look for a while, because it was stopped itself, does not blame the server.
+  // A watch that did not look for a while, because it was stopped itself, does not report the
+  // server.
   const auto later = ServerWatch::Clock::now() + std::chrono::milliseconds(1500);
   ASSERT_TRUE(wait_until([&] { return ServerWatch::Clock::now() > later; }));
   EXPECT_EQ(watch.look(), ServerWatch::Finding::kThere);
 }
 
-// A server whose samples are late, because this process or the network is overwhelmed, is taken for
-// dead as well: then whoever claims its vehicle all along must not have it.
+// A server whose samples are late, because this process or the network is overwhelmed, is presumed
+// dead as well: then a server that claimed its vehicle all along must not get it.
 TEST(ServerDirectoryTest, OnlyAServerThatComesAfterTheSilenceBeganIsASuccessor) {
   constexpr int kDomain = 78;
   Node node(kQosFile, kDomain, "directory");

@@ -30,7 +30,7 @@ class ProblemsTest : public testing::Test {
   Problems problems_;
 };
 
-TEST_F(ProblemsTest, AProblemIsSaidOnceAndListedWhileItHolds) {
+TEST_F(ProblemsTest, AProblemIsLoggedOnceAndListedWhileItHolds) {
   EXPECT_EQ(problems_.describe(), "");
   const auto version = problems_.version();
   problems_.begin("a", "a is wrong");
@@ -43,7 +43,7 @@ TEST_F(ProblemsTest, AProblemIsSaidOnceAndListedWhileItHolds) {
   EXPECT_EQ(problems_.version(), version + 2);
 }
 
-TEST_F(ProblemsTest, AProblemThatComesBackIsSaidAgain) {
+TEST_F(ProblemsTest, ARecurringProblemIsLoggedAgain) {
   for (int i = 0; i < 2; ++i) {
     problems_.begin("a", "a is wrong");
     problems_.end("a");
@@ -61,7 +61,7 @@ TEST_F(ProblemsTest, ThoseThatArePutInForceReplaceTheOthersOfTheirKind) {
   EXPECT_EQ(problems_.describe(), "endpoint");
 }
 
-TEST_F(ProblemsTest, AProblemThatLastsForATimeRunsOutAndIsNotSaidAgain) {
+TEST_F(ProblemsTest, AProblemWithATimeLimitExpiresAndIsNotLoggedAgain) {
   problems_.begin("a", "a is wrong", 10ms);
   EXPECT_TRUE(test::wait_until([&] { return problems_.describe().empty(); }));
   problems_.begin("a", "a is wrong", 1h);
@@ -77,7 +77,7 @@ TEST_F(ProblemsTest, MoreThanFitAreCounted) {
   EXPECT_LE(problems_.describe(50).size(), 50u);
 }
 
-TEST_F(ProblemsTest, StrangersFloodNeitherLogNorMemory) {
+TEST_F(ProblemsTest, AFloodOfParticipantsFillsNeitherLogNorMemory) {
   for (int i = 0; i < 100'000; ++i) problems_.begin(std::to_string(i), "wrong");
   const std::string log = log_.str();
   EXPECT_EQ(std::count(log.begin(), log.end(), '\n'), Problems::kMostLines);

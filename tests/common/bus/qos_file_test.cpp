@@ -139,7 +139,7 @@ TEST_F(QosFileTest, EachMisspeltProfileOfOursIsNamed) {
 
 // --- invalid/: one file per defect, the message in the comment after the declaration
 
-/// What the comment of an invalid file promises: the message after the file's name.
+/// The expectation in the comment of an invalid file: the message after the file's name.
 std::string read_expectation(const fs::path& file) {
   const std::string text = sls::test::read_bytes(file);
   const std::string mark = "<!-- expect: ", end = " -->";
@@ -239,7 +239,7 @@ TEST_F(QosFileTest, PeersComeFromTheEnvironmentOneLocatorEach) {
             Texts({"10.0.0.1", "10.0.0.2", "127.0.0.1"}));
 }
 
-TEST_F(QosFileTest, AHostThatIsNoneIsNamedWithItsLine) {
+TEST_F(QosFileTest, AnInvalidHostIsNamedWithItsLine) {
   const Variable peers("SLS_PEERS", "10.0.0.1,no such host");
   const std::string error = find_error(kConfig / "qos/unicast.xml");
   EXPECT_NE(error.find("unicast.xml:3"), std::string::npos) << error;
@@ -248,7 +248,7 @@ TEST_F(QosFileTest, AHostThatIsNoneIsNamedWithItsLine) {
       << error;
 }
 
-TEST_F(QosFileTest, AVariableIsReplacedAndWhatItHoldsIsNotLookedAtAgain) {
+TEST_F(QosFileTest, AVariableIsReplacedAndItsValueIsNotExpandedAgain) {
   const std::string begin = "<dds><profiles><participant profile_name=\"sls_participant\"><x>",
                     end = "</x></participant></profiles></dds>";
   const Variable variable("SLS_TEST", "a ${b} <c>");
@@ -308,7 +308,7 @@ std::map<std::string, std::string> read_endpoint_profiles(const std::string& xml
   return profiles;
 }
 
-TEST(ShippedQosFilesTest, AFileThatSaysNothingAboutWritersAndReadersHasThoseOfEndpoints) {
+TEST(ShippedQosFilesTest, AFileWithoutWritersAndReadersUsesTheEndpointDefaults) {
   ::setenv("SLS_KEYS", "keys", 1);  // secure.xml needs it
   const auto shared = read_endpoint_profiles(sls::test::read_bytes(kConfig / "qos/endpoints.xml"));
   EXPECT_EQ(shared.size(), 8u);

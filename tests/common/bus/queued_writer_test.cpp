@@ -16,7 +16,7 @@ using sls::test::wait_until;
 const std::filesystem::path kQosFile = SLS_SOURCE_DIR "/config/qos/default.xml";
 const std::uint64_t kRun = static_cast<std::uint64_t>(::getpid()) * 1000 + 700;
 
-TEST(QueuedWriterTest, WritesInOrderAndFinishesWhatIsQueuedWhenItEnds) {
+TEST(QueuedWriterTest, WritesInOrderAndEmptiesItsQueueWhenItEnds) {
   constexpr int kDomain = 74;
   Node near(kQosFile, kDomain, "near"), far(kQosFile, kDomain, "far");
   std::mutex mutex;
@@ -46,7 +46,7 @@ TEST(QueuedWriterTest, WritesInOrderAndFinishesWhatIsQueuedWhenItEnds) {
   for (std::uint64_t index = 0; index < kCount; ++index) EXPECT_EQ(indices[index], index);
 }
 
-TEST(QueuedWriterTest, WhatDoesNotFitIsCountedAndNeverBlocks) {
+TEST(QueuedWriterTest, MessagesThatDoNotFitAreCountedAndNeverBlock) {
   constexpr int kDomain = 75;
   Node node(kQosFile, kDomain, "near");
   Writer<RecordBatch> writer(node);

@@ -1,4 +1,4 @@
-// What `vehicles` means, and the scenario of one vehicle.
+// The key `vehicles`, and the scenario of one vehicle.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -99,7 +99,7 @@ TEST(FleetTest, AVehicleAloneKeepsNameTextHashAndFaults) {
   EXPECT_THROW(make_vehicle_scenario(alone, 1), std::out_of_range);
 }
 
-TEST(FleetTest, AVehicleWithNothingOfItsOwnFliesThePlainScenarioBitForBit) {
+TEST(FleetTest, AVehicleWithoutOwnKeysFliesThePlainScenarioBitForBit) {
   const std::string text =
       replace_once(kMinimalScenario, "[0, 0, -0.5] }\nmission", "[-0.0, -0.0, -0.5] }\nmission");
   const Scenario plain = parse_scenario(text, "file");

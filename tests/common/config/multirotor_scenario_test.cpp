@@ -180,7 +180,7 @@ void expect_everything(const Scenario& scenario) {
   EXPECT_EQ(scenario.estimator.attitude.yaw, 0.055);
 }
 
-TEST(MultirotorScenarioTest, WithEveryKeyReadsAndReadsBackWhatWasWritten) {
+TEST(MultirotorScenarioTest, EveryKeyIsReadAndSurvivesWritingAndReading) {
   const Scenario scenario = parse_scenario(kEverything, "file");
   expect_everything(scenario);
   const std::string written = to_yaml(scenario);
@@ -203,7 +203,7 @@ TEST(MultirotorScenarioTest, ARoundedQuaternionIsMadeAUnitOne) {
   EXPECT_TRUE(are_equal(parse_scenario(to_yaml(scenario), "written"), scenario));
 }
 
-TEST(MultirotorScenarioTest, WhatLooksStrangeButMakesSenseIsAllowed) {
+TEST(MultirotorScenarioTest, UnusualButValidValuesAreAllowed) {
   // Rotors without lag; with no authority over yaw; that stand still at most; a flat rigid body; an
   // attachment at the end of the rod's reach.
   EXPECT_EQ(find_error(with("    lag_up_s: 0.0125\n", "    lag_up_s: 0\n")), "no error");

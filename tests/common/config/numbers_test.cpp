@@ -22,13 +22,13 @@ TEST(NumbersTest, ReadsWhatYamlCallsANumber) {
   EXPECT_TRUE(std::signbit(*parse_number("-0")));
 }
 
-TEST(NumbersTest, TakesNothingElseForANumber) {
+TEST(NumbersTest, RefusesOtherTextsAsNumbers) {
   for (const char* text : {"", "-", "+", ".", "--1", "+-1", "1 2", "1,5", "0x10", "1_000", "one",
                            "nan(1)", "infinity", "1e", "e3", " 1", "1 ", "1.2.3", "true"})
     EXPECT_FALSE(parse_number(text)) << text;
 }
 
-TEST(NumbersTest, MarksWhatADoubleCannotHold) {
+TEST(NumbersTest, MarksNumbersThatADoubleCannotHold) {
   for (const char* text : {".nan", ".inf", "-.inf", "+.inf", "nan", "inf", "1e999", "-1e999"})
     EXPECT_FALSE(std::isfinite(parse_number(text).value())) << text;
 }
@@ -63,7 +63,7 @@ TEST(NanosecondsTest, DecimalsAreExact) {
   EXPECT_EQ(to_nanoseconds(1e6), 1'000'000'000'000'000);
 }
 
-TEST(NanosecondsTest, FractionsAndWhatOverflowsAreRefused) {
+TEST(NanosecondsTest, FractionsAndOverflowsAreRefused) {
   for (const double seconds :
        {1.0 / 3.0, 1.5e-9, 0.00400000001234, 1e7, -1e300, std::numeric_limits<double>::quiet_NaN(),
         std::numeric_limits<double>::infinity()})

@@ -20,7 +20,7 @@ std::string find_override_error(SyncMode mode, double factor) {
   return "no error";
 }
 
-TEST(OverrideRealTimeFactorTest, TakesWhatTheKeyTakes) {
+TEST(OverrideRealTimeFactorTest, AcceptsTheValuesOfTheKey) {
   EXPECT_EQ(find_override_error(SyncMode::kRealtime, 0.5), "no error");
   EXPECT_EQ(find_override_error(SyncMode::kRealtime, 1000.0), "no error");
   for (const double factor : {0.0, -1.0, 1000.1, std::nan("")})

@@ -1,4 +1,4 @@
-// What a file says and what it leaves out.
+// Keys that a file sets, and the defaults of others.
 #include "common/config/scenario.hpp"
 
 #include <gtest/gtest.h>
@@ -23,7 +23,7 @@ sync: { mode: lockstep, period_s: 0.004, wait_for: { controllers: 1, recorders: 
 controller:
   gains: { lqr: { horizontal: 10, vertical: 5 } }   # or horizontal: { position, velocity, acceleration, jerk, integral }, vertical: …
   force_limit_n: 200                    # the first step of matlab_setpoint_3 needs 116 N
-  model: {}                             # what the controller believes, where it differs from vehicle
+  model: {}                             # what the controller assumes, where it differs from vehicle
 mission:
   - figure_eight: { amplitude_m: [1.5, 0.75, 0.5], offset_m: [0, 0, -0.5], period_s: 16 }
     for_s: 32
@@ -392,7 +392,7 @@ TEST(ScenarioTest, SensingIsFreshAndExactWhereTheFileIsSilent) {
   EXPECT_TRUE(scenario.estimator.attitude.is_zero());
 }
 
-TEST(ScenarioTest, ControllerBelievesThePlantsTruthWhereTheFileIsSilent) {
+TEST(ScenarioTest, ControllerModelEqualsThePlantWhereTheFileSetsNothing) {
   std::string text = replace_once(kMinimalScenario, "plant:", "plant:\n  rotor_drag_n_s_m: 0.3");
   text += "controller: { model: { load_mass_kg: 0.21 } }\n";
   const Scenario scenario = parse_scenario(text, "file");

@@ -151,7 +151,7 @@ TEST(ShippedScenariosTest, FitAOneMillisecondPeriod) {
   }
 }
 
-TEST(ShippedScenariosTest, ControllerKnowsTheTruthExceptWhereTheTableSaysSo) {
+TEST(ShippedScenariosTest, ControllerModelEqualsThePlantExceptWhereTheTableDiffers) {
   const std::set<std::string> mistaken{"gazebo_legacy",       "gazebo_correct_wiring",
                                        "integral_mass_error", "mass_error_without_integral",
                                        "px4_fitted",          "px4_published"};

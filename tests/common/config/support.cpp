@@ -309,7 +309,7 @@ VehicleVariant make_random_variant(Dice& dice) {
   return variant;
 }
 
-/// What the file leaves out is the truth.
+/// Values that the file leaves out equal the plant's.
 void follow_at_random(Dice& dice, ControllerModel& model, const model::SlungLoadParameters& truth) {
   model.follows = {dice.toss(), dice.toss(), dice.toss()};
   if (model.follows.quad_mass) model.vehicle.quad_mass = truth.quad_mass;

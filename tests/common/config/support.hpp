@@ -1,4 +1,4 @@
-/// What several tests of the configuration need.
+/// Shared by several tests of the configuration.
 #pragma once
 
 #include <filesystem>

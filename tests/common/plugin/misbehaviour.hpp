@@ -1,4 +1,4 @@
-/// What the libraries of the tests do wrong, inside any of their functions.
+/// Errors of the tests' libraries, inside any of their functions.
 #pragma once
 
 #include <unistd.h>

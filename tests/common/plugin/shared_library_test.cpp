@@ -13,7 +13,7 @@ namespace {
 
 const std::string kFolder = SLS_LIBRARIES "/";
 
-/// What is said about loading `file` and finding `symbol` in it; "no error".
+/// The error of loading `file` and finding `symbol` in it; "no error".
 std::string find_error(const std::string& file, const char* symbol = "sls_controller") {
   try {
     SharedLibrary(file, "flight.yaml:7: controller.law").find(symbol);
@@ -38,7 +38,7 @@ std::string expected(const std::string& file, const std::string& message) {
   return "flight.yaml:7: controller.law: " + file + ": " + message;
 }
 
-TEST(SharedLibraryTest, WhatIsNoFileIsRefused) {
+TEST(SharedLibraryTest, AMissingFileIsRefused) {
   const sls::test::TemporaryFolder folder;
   const std::string none = folder / "none.so", directory = folder.path();
   EXPECT_EQ(find_error(none),
@@ -47,7 +47,7 @@ TEST(SharedLibraryTest, WhatIsNoFileIsRefused) {
             expected(directory, "expected a shared library, got no file of this name"));
 }
 
-TEST(SharedLibraryTest, WhatIsNoLibraryIsRefusedWithTheSystemsReason) {
+TEST(SharedLibraryTest, AFileThatIsNoLibraryIsRefusedWithTheSystemsReason) {
   const std::string text = kFolder + "text.so", unresolved = kFolder + "unresolved.so";
   EXPECT_EQ(find_error(text), expected(text, "expected a shared library that loads, got: " + text +
                                                  ": file too short"));

@@ -1,4 +1,5 @@
-// What the libraries of others cannot see. Values and bytes: mirrors_judged_by_foxglove.mjs.
+// Properties that other vendors' libraries cannot check. Values and bytes:
+// mirrors_judged_by_foxglove.mjs.
 #include "common/ros/mirrors.hpp"
 
 #include <gtest/gtest.h>

@@ -100,7 +100,7 @@ TEST(LqrTest, ClosedLoopIsTheSpectralFactorOfTheCost) {
   }
 }
 
-TEST(LqrTest, RefusesWhatHasNoSolution) {
+TEST(LqrTest, RefusesProblemsWithoutASolution) {
   EXPECT_THROW(calc_lqr_chain_gains(0, 1.0), std::domain_error);
   for (const double weight : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN(),
                               std::numeric_limits<double>::infinity()}) {

@@ -125,7 +125,7 @@ TEST(SharedLibraryLawTest, AParameterAloneIsAnErrorWithoutThem) {
             refused(silent, "failed without saying why", "flight.yaml:6: controller"));
 }
 
-TEST(SharedLibraryLawTest, MemoryBeyondWhatCanBeCarriedIsRefused) {
+TEST(SharedLibraryLawTest, TooManyMemoryNumbersAreRefused) {
   EXPECT_EQ(fly(make_misbehaving("memory: 64")), "none");
   EXPECT_EQ(fly(make_misbehaving("memory: 65")),
             refused(kGood, "create: expected at most 64 memory numbers, got 65"));

@@ -1,4 +1,4 @@
-"""What a campaign file may say and what is refused."""
+"""Valid and refused campaign files."""
 
 import dataclasses
 import pickle

@@ -1,4 +1,4 @@
-"""What the tests of campaign files share."""
+"""Shared by the tests of campaign files."""
 
 import sys
 from pathlib import Path

@@ -85,7 +85,7 @@ def test_finds_the_one_run_of_a_normal_distribution_that_is_impossible(tmp_path)
     assert check(tmp_path, text.format(0.04))[0] == ""
     message, checked = check(tmp_path, text.format(0.08))
     run = int(message.split("run ")[1].split(":")[0])
-    # P(x <= 0) is 0.0062: the first one comes before run 2000, but for one in 250,000 campaigns.
+    # P(x <= 0) is 0.0062: the first one comes before run 2000, except in one of 250,000 campaigns.
     assert run < 2000
     assert "expected > 0, got -" in message
     assert checked <= run + 4

@@ -111,7 +111,7 @@ TEST(AttitudeControlTest, TakesBothQuaternionsOfARotationAsOne) {
   }
 }
 
-TEST(AttitudeControlTest, IsTheSameWhateverTheHeading) {
+TEST(AttitudeControlTest, IsTheSameForEveryHeading) {
   const AttitudeGains gains;
   std::mt19937_64 random(7);
   for (int i = 0; i < 100; ++i) {

@@ -125,7 +125,7 @@ TEST(AttitudeTrackingTest, FollowsAnAttitudeThatTurns) {
   EXPECT_LT(calc_rate_error({turning.R, turning.w}, make_wanted(5.0)).norm(), 1e-4);
 }
 
-TEST(AttitudeTrackingTest, IsTheSameWhateverTheHeading) {
+TEST(AttitudeTrackingTest, IsTheSameForEveryHeading) {
   const Gains gains = make_default_gains(kInertia);
   std::mt19937_64 random(43);
   for (int i = 0; i < 100; ++i) {

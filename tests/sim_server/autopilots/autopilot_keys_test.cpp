@@ -1,4 +1,4 @@
-// What a scenario says of `px4` and `geometric`: defaults, every key read, written and read again.
+// Scenario keys of `px4` and `geometric`: defaults, every key read, written and read again.
 #include <gtest/gtest.h>
 
 #include "common/config/scenario.hpp"
@@ -111,7 +111,7 @@ TEST(Px4KeysTest, EveryKeyIsReadAndSurvivesBeingWritten) {
   EXPECT_EQ(keys.speeds.speed_per_output, 900.0);
 }
 
-TEST(GeometricKeysTest, GainsFollowFromTheInertiaUnlessTheFileSaysThem) {
+TEST(GeometricKeysTest, GainsFollowFromTheInertiaUnlessTheFileSetsThem) {
   const config::Autopilot usual = read_twice("  model: geometric\n");
   EXPECT_EQ(usual.period_ns, 4'000'000);
   EXPECT_FALSE(usual.own.get<geometric::Keys>().attitude);

@@ -89,7 +89,7 @@ TEST(FirstOrderTest, TheThrustDoesNotLagAndEveryRotorGivesAnEqualShare) {
   }
 }
 
-TEST(FirstOrderTest, WithoutLagItDoesWhatNoneDoes) {
+TEST(FirstOrderTest, WithoutLagItEqualsNone) {
   const auto lagging = make_lagging(0.0), none = make_autopilot(make_setup("none"));
   for (int k = 0; k < 100; ++k) {
     const AutopilotInput input = make_input(make_force(0.03 * k, 0.1 * k));

@@ -24,7 +24,7 @@ void expect_outputs(const MixerOutput& mixed, const std::vector<double>& expecte
     EXPECT_NEAR(mixed.outputs[static_cast<Index>(i)], expected[i], 1e-12) << i;
 }
 
-/// What the outputs are of a demand, where the columns of `kQuadX` are orthogonal.
+/// The outputs for a demand, where the columns of `kQuadX` are orthogonal.
 Vector3d calc_torque(const VectorXd& outputs) {
   Vector3d torque = Vector3d::Zero();
   for (std::size_t i = 0; i < kQuadX.size(); ++i) {
@@ -165,9 +165,9 @@ TEST(MixerTest, GivesYawUpBeforeRoll) {
   expect_outputs(mix(kQuadX, {std::sqrt(0.5), 0, 0.3}, 0.5), {0, 1, 1, 0});
 }
 
-TEST(MixerTest, SharesOutWhatIsTooMuchAtBothEnds) {
+TEST(MixerTest, SharesOutExcessDemandAtBothLimits) {
   // 0.5 ± √2 at two rotors. Taking all of it off the roll would be too much for the other two:
-  // half of that is given back, and no roll is left. What pitch is too much follows: √½ is left.
+  // half of that is given back, and no roll is left. The excess of pitch follows: √½ is left.
   expect_outputs(mix(kQuadX, {1, 1, 0}, 0.5), {1, 0, 1, 0});
 }
 

@@ -146,7 +146,7 @@ TEST(SharedLibraryAutopilotTest, ErrorsAtCreationNameTheParameters) {
   EXPECT_EQ(fly(make_misbehaving("create", "round up")), refused(call, kModeChanged));
 }
 
-TEST(SharedLibraryAutopilotTest, WhatGoesWrongInFlightNamesFunctionVehicleAndStep) {
+TEST(SharedLibraryAutopilotTest, AnErrorInFlightNamesFunctionVehicleAndStep) {
   const auto expect = [](const std::string& what, const std::string& message) {
     EXPECT_EQ(fly(make_misbehaving("step", what)), kGood + ": step, vehicle 3, step 8: " + message);
   };
@@ -171,7 +171,7 @@ TEST(SharedLibraryAutopilotTest, WhatGoesWrongInFlightNamesFunctionVehicleAndSte
          "expected a unit vector as direction, got one of length 2.000000");
 }
 
-TEST(SharedLibraryAutopilotTest, WhatDestroyDoesWrongIsAWarning) {
+TEST(SharedLibraryAutopilotTest, AnErrorInDestroyIsAWarning) {
   testing::internal::CaptureStderr();
   EXPECT_EQ(fly(make_misbehaving("destroy", "throw")), "no error");
   EXPECT_EQ(testing::internal::GetCapturedStderr(),

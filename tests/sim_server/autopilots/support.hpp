@@ -1,4 +1,4 @@
-/// What the tests of autopilots fly: a body with unlike rotors and a wish.
+/// The vehicle of the autopilot tests: a body with unlike rotors, and a set-point.
 #pragma once
 
 #include "sim_server/autopilots/autopilot.hpp"

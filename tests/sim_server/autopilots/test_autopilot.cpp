@@ -50,7 +50,7 @@ struct Autopilot {
   double filtered = 0.0;  // N
 };
 
-/// What tells whether every number of the setup has arrived, as a text.
+/// A text that shows whether every number of the setup has arrived.
 void say_setup(const sls_autopilot_setup& setup, char* error, std::size_t error_size) {
   const sls_autopilot_rotor& rotor = setup.rotors[3];
   std::snprintf(error, error_size,

@@ -190,7 +190,7 @@ class Swarm : public Plant {
   std::vector<model::Measurement> vehicles_;
 };
 
-TEST(PlantTest, OneThatMovesAllVehiclesIsMadeOnceForTheWholeFleetAndRefusesAPart) {
+TEST(PlantTest, APlantOfAllVehiclesIsMadeOnceAndRefusesAPartOfTheFleet) {
   const PlantType swarm{Moves::kAllVehicles, [](const PlantSetup& setup) {
                           return std::unique_ptr<Plant>(std::make_unique<Swarm>(setup));
                         }};

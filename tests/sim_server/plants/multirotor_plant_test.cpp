@@ -224,7 +224,7 @@ INSTANTIATE_TEST_SUITE_P(Pendulums, MultirotorOracleTest,
 constexpr double kSixtyDegrees = M_PI / 3.0;
 
 TEST_P(MultirotorOracleTest, FollowsNewtonAndEulerForThirtyTwoSecondsBeyondSixtyDegrees) {
-  // What makes a hovering vehicle unstable by itself is left out: any error would grow a
+  // Effects that make a hovering vehicle unstable are left out: any error would grow a
   // thousandfold within 32 s. An error of attitude still moves the vehicle by g t²/2: at a step of
   // 1 ms by 4e-6 m.
   PlantSetup setup = make_full_setup(GetParam());

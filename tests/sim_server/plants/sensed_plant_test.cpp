@@ -1,4 +1,4 @@
-// What is seen judged by the sentences of the README written out as loops over nanoseconds, and by
+// Measurements judged by the sentences of the README written out as loops over nanoseconds, and by
 // flights whose states are closed forms of time.
 #include "sim_server/plants/sensing/sensed_plant.hpp"
 
@@ -193,7 +193,7 @@ TEST(SensedPlantTest, OfOneTimeEveryBitIsThatOfTheState) {
   }
 }
 
-TEST(SensedPlantTest, IsThePlantItselfWhereNothingIsAskedFor) {
+TEST(SensedPlantTest, IsThePlantItselfWithoutSensingKeys) {
   const auto is_wrapped = [](const config::Scenario& scenario) {
     const SensedCounter sensed(scenario);
     return sensed.plant.get() != sensed.counter;
@@ -276,7 +276,7 @@ TEST(SensedPlantTest, EveryVehicleOfAPlantOfAllHasItsOwnSamplesAndForces) {
   EXPECT_EQ(sensed.counter->acted[199][0].x(), 196);  // handed over at 196, 2.5 ms under way
 }
 
-TEST(SensorGroupTest, KeepsWhatIsUnderWayAndNoMore) {
+TEST(SensorGroupTest, KeepsOnlySamplesUnderWay) {
   for (const SampleTimes& times : kTimes) {
     Counter plant(1);
     SensorGroup<model::Measurement> group(SampleClock(times, kStepNs), plant, 1);
@@ -403,7 +403,7 @@ TEST(SensedPlantTest, AdvancesInAnyNumberOfCallsWithTheSameBits) {
   }
 }
 
-TEST(SensedPlantTest, AStepThatFailsLeavesTheStateAndWhatIsSeenThoseOfAnEarlierStep) {
+TEST(SensedPlantTest, AFailedStepLeavesStateAndMeasurementOfTheStepBefore) {
   for (const char* model : {"analytic", "slung_load"}) {
     auto plants = make(model, make_flight(kAwkward));
     Plant& plant = *plants[0].plant;

@@ -129,13 +129,13 @@ TEST(SharedLibraryPlantTest, ErrorsAtCreationNameTheParameters) {
                     "traps)"));
 }
 
-TEST(SharedLibraryPlantTest, AWrongFirstMeasurementIsSaidBeforeTheFlight) {
+TEST(SharedLibraryPlantTest, AWrongFirstMeasurementIsReportedBeforeTheFlight) {
   EXPECT_EQ(
       fly(make_misbehaving("do: position that is no number, in: measure")),
       kGood + ": measure, vehicle 2, step 0: quad_x_m is not finite after step 0 of the plant");
 }
 
-TEST(SharedLibraryPlantTest, WhatGoesWrongInFlightNamesFunctionVehicleAndStep) {
+TEST(SharedLibraryPlantTest, AnErrorInFlightNamesFunctionVehicleAndStep) {
   const auto fly_wrong = [](const std::string& function, const std::string& what) {
     return fly(make_misbehaving("at: 8, in: " + function + ", do: " + what));
   };

@@ -355,8 +355,8 @@ TEST(SlungLoadPlantTest, DriftsWithTheWindInTheEnd) {
   const Eigen::Vector3d f_Q_W = calc_weight_force(vehicle.total_mass(), vehicle.gravity);
   for (int k = 0; k < 15'000; ++k) {
     plant.step(f_Q_W);
-    // Drag is perpendicular to the vertical force: the wind's vertical part lifts nothing. What
-    // is left is the swing's truncation error at this step, (ωh)⁴/120 ≈ 1e-9.
+    // Drag is perpendicular to the vertical force: the wind's vertical part lifts nothing. The
+    // remainder is the swing's truncation error at this step, (ωh)⁴/120 ≈ 1e-9.
     ASSERT_NEAR(model::calc_momentum(plant.state(), vehicle).z(), 0.0, 1e-8) << "step " << k;
   }
   // Drift decays with D/(m + m_L) = 0.67/s, swing with D m_L/(2 m (m + m_L)) = 0.33/s: e⁻²⁰ · 4.
@@ -428,7 +428,7 @@ TEST(SlungLoadPlantTest, RefusesAForceThatIsNotFiniteByName) {
   EXPECT_EQ(calc_position_difference(plant.state(), before), 0.0);
 }
 
-TEST(SlungLoadPlantTest, NamesWhatOverflowsAndKeepsTheLastFiniteState) {
+TEST(SlungLoadPlantTest, NamesTheOverflowingValueAndKeepsTheLastFiniteState) {
   for (const double force : {1e160, 1e300, 1e308}) {
     SlungLoadPlant plant(kVehicle, make_swinging_plant());
     std::string error = "none";

@@ -186,7 +186,7 @@ TEST_F(OperatorClientTest, ARequestReachesTheServerAndItsReplyComesBack) {
 
 TEST_F(OperatorClientTest, ARefusalComesBackWithItsReason) {
   FakeServer server([](FakeServer& self, const SimControl& request) {
-    SimControl of_another = request;  // replies to others are not taken for one's own
+    SimControl of_another = request;  // replies to other clients are ignored
     of_another.request_id(request.request_id() + 1);
     self.reply(of_another, true);
     self.reply(request, false, "already paused");
@@ -310,7 +310,7 @@ TEST_F(OperatorClientTest, ASnapshotHoldsThePartiesOfTheRunAndTheServersSilence)
   EXPECT_FALSE(client.make_snapshot(run).server_is_gone);
 }
 
-TEST(OperatorNameTest, SaysWhoAndWhereAndFitsTheWire) {
+TEST(OperatorNameTest, HoldsUserAndHostAndFitsTheWire) {
   const std::string name = make_operator_name();
   EXPECT_NE(name.find('@'), std::string::npos);
   EXPECT_LE(name.size(), 64u);

@@ -66,7 +66,7 @@ TEST(OperatorOptionsTest, TheDefaultsAreTheDocumentedOnes) {
   EXPECT_EQ(options.timeout_s, 10.0);
 }
 
-TEST(OperatorOptionsTest, WhatIsNoCommandIsRefused) {
+TEST(OperatorOptionsTest, AnUnknownCommandIsRefused) {
   for (const char* line :
        {"", "halt", "pause resume", "pause --watch", "status pause", "step", "step 3 4", "pause 3"})
     EXPECT_NE(find_error(line), "no error") << line;

@@ -14,7 +14,7 @@ ScreenSize make_size(std::size_t columns, std::size_t rows) {
   return size;
 }
 
-/// What `draw` wrote since the last call.
+/// Output of `draw` since the last call.
 std::string take(std::ostringstream& out) {
   const std::string text = out.str();
   out.str("");

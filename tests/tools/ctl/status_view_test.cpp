@@ -69,7 +69,7 @@ TEST(StatusViewTest, ShowsTheWholeRun) {
             "figure_eight, vehicle 2, run 00c0ffee12345678, lockstep, period 0.004 s\n"
             "phase       paused: paused by anna@ground\n"
             "time        step 12345   49.380 s simulated\n"
-            "pace        real-time factor 12.3   wanted any\n"
+            "pace        real-time factor 12.3   target none\n"
             "timing      exact\n"
             "round trip  p50 108 µs   p99 2.3 ms\n"
             "answers     resent 3   late 0   held 0   fail-safe 0   stale 0   duplicate 2\n"
@@ -109,7 +109,7 @@ TEST(StatusViewTest, InRealTimeTheWantedFactorIsShown) {
   snapshot.parameters.mode(MODE_REALTIME);
   snapshot.parameters.real_time_factor(0.5);
   snapshot.status->real_time_factor(0.4987);
-  EXPECT_TRUE(contains(join(render(snapshot, 80)), "real-time factor 0.499   wanted 0.5"));
+  EXPECT_TRUE(contains(join(render(snapshot, 80)), "real-time factor 0.499   target 0.5"));
 }
 
 TEST(StatusViewTest, ASilentServerIsNamedUntilTheRunHasEnded) {
@@ -140,7 +140,7 @@ TEST(StatusViewTest, OnlyFinishedAndFailedRunsHaveEnded) {
   EXPECT_FALSE(has_ended(std::nullopt));
 }
 
-TEST(StatusViewTest, WhatAParticipantDoesWrongIsShown) {
+TEST(StatusViewTest, AParticipantsMistakeIsShown) {
   Snapshot snapshot = make_snapshot();
   const std::string problem =
       "sls/command of 'foo' (10.0.0.2): DEADLINE: offered none, asked 0.1 s";
@@ -197,7 +197,7 @@ TEST(StatusViewTest, NoLineIsLongerThanTheTerminalIsWide) {
       ASSERT_LE(count_characters(line), columns) << line;
 }
 
-TEST(StatusViewTest, WhatATerminalWouldObeyIsNotPassedOn) {
+TEST(StatusViewTest, TerminalControlCharactersAreNotPassedOn) {
   Snapshot snapshot = make_snapshot();
   snapshot.status->reason("a\nb\x1b[2J\xc2\x9b\xff\xc3");
   snapshot.participants[0].name("p\xc3\xa4r\x07\xe2\x82");

@@ -51,7 +51,7 @@ TEST(AnnouncementTest, IsReadFromAMessage) {
   EXPECT_TRUE(parse_announcement(secured.data(), secured.size())->is_secured);
 }
 
-TEST(AnnouncementTest, CutAnywhereItIsNone) {
+TEST(AnnouncementTest, ATruncatedAnnouncementIsRefused) {
   const Bytes message = make_message("sim_server", true);
   for (std::size_t size = 0; size < message.size(); ++size) {
     const Bytes cut(message.begin(), message.begin() + static_cast<std::ptrdiff_t>(size));
@@ -71,7 +71,7 @@ TEST(AnnouncementTest, WithAnyByteChangedItIsReadWithinItsBounds) {
   }
 }
 
-TEST(AnnouncementTest, WhatAnotherWriterSendsIsNone) {
+TEST(AnnouncementTest, SamplesOfAnotherWriterAreNoAnnouncements) {
   Bytes message = make_message("sim_server", false);
   message[20 + 12 + 4 + 11] = 0xc7;  // the writer's kind
   EXPECT_FALSE(parse_announcement(message.data(), message.size()));

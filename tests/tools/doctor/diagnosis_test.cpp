@@ -59,7 +59,7 @@ TEST(DiagnosisTest, OfAHealthyNetworkFindsNothing) {
   EXPECT_EQ(find_faults(make_healthy_with_shared_memory()), Names{});
 }
 
-TEST(DiagnosisTest, MulticastIsBlamedOnlyWhereUnicastWorks) {
+TEST(DiagnosisTest, MulticastIsReportedOnlyWhereUnicastWorks) {
   Observations seen = make_healthy();
   seen.probes.is_multicast_answered = false;
   EXPECT_EQ(find_faults(seen), Names{"multicast"});
@@ -67,7 +67,7 @@ TEST(DiagnosisTest, MulticastIsBlamedOnlyWhereUnicastWorks) {
   EXPECT_EQ(find_faults(seen), Names{});
 }
 
-TEST(DiagnosisTest, PortsAreBlamedOnlyWhereTheHostIsUpAndNoDataPasses) {
+TEST(DiagnosisTest, PortsAreReportedOnlyWhereTheHostIsUpAndNoDataPasses) {
   Observations seen = make_healthy();
   seen.settings.uses_multicast = false;
   seen.probes = {};
@@ -114,7 +114,7 @@ TEST(DiagnosisTest, TwoUsersShareNoMemory) {
   EXPECT_EQ(find_faults(seen), Names{});
 }
 
-TEST(DiagnosisTest, AnotherFlightOnAnotherDomainIsNobodysFault) {
+TEST(DiagnosisTest, AnotherFlightOnAnotherDomainIsNoFault) {
   Observations seen = make_healthy();
   Heard heard{5, seen.peer_address, {{}, "sim_server", false}};
   seen.heard = {heard};
@@ -123,7 +123,7 @@ TEST(DiagnosisTest, AnotherFlightOnAnotherDomainIsNobodysFault) {
   EXPECT_EQ(find_faults(seen), Names{"domain"}) << "it has lost its server";
 }
 
-TEST(DiagnosisTest, WhoAnswersNoHandshakeRejectsUs) {
+TEST(DiagnosisTest, AProgramThatAnswersNoHandshakeRejectsUs) {
   Observations seen = make_healthy();
   seen.settings.is_secured = seen.programs.front().is_secured = true;
   seen.refusal = "not allowed";
@@ -160,7 +160,7 @@ TEST(CheckTest, ALineHoldsNameVerdictAndText) {
   EXPECT_EQ(to_line({"ports", Verdict::kFault, "blocked"}), "ports         FAULT    blocked");
 }
 
-TEST(CheckTest, JsonStaysJsonWhateverANameHolds) {
+TEST(CheckTest, JsonStaysValidWithAnyName) {
   const auto parsed = nlohmann::json::parse(
       to_json({{"data", Verdict::kOk, "from \"x\xff\""}, {"ports", Verdict::kFault, "blocked"}}));
   EXPECT_FALSE(parsed.at("ok").get<bool>());

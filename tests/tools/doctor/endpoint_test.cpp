@@ -20,7 +20,7 @@ class EndpointTest : public testing::Test {
   Endpoint writer_ = make("sim_server", true), reader_ = make("recorder", false);
 };
 
-TEST_F(EndpointTest, AMismatchSaysWhoOffersWhatAndWhoAsks) {
+TEST_F(EndpointTest, AMismatchNamesOfferedAndRequestedValue) {
   reader_.is_reliable = true;
   EXPECT_EQ(find_policy_mismatches({writer_, reader_}).front().text,
             "RELIABILITY: offered best effort, asked reliable (sim_server, recorder)");

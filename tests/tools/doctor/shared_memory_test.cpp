@@ -33,7 +33,7 @@ TEST(SharedMemoryTest, StaleSegmentsAreCountedAndStay) {
   EXPECT_TRUE(std::filesystem::exists(lock));
 }
 
-TEST(SharedMemoryTest, OnlyPortsThatSomebodyHoldsAreRead) {
+TEST(SharedMemoryTest, OnlyPortsWithAHolderAreRead) {
   const TemporaryFolder folder;
   for (const char* name : {"fastrtps_port7411", "fastrtps_port7413"}) {
     test::write_bytes(folder / name, "");

@@ -1,4 +1,4 @@
-/// What sessions need of a flight: Feed and Operator, or a test's own.
+/// The parts of a flight that sessions need: Feed and Operator, or a test's own.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-/// What all sessions of the protocol share: the channels, who subscribes to them, and the work done
-/// once for each sample however many look on.
+/// Shared by all sessions of the protocol: the channels, their subscribers, and the work done once
+/// for each sample, however many subscribe.
 #pragma once
 
 #include <chrono>
@@ -41,7 +41,7 @@ class Hub final : public Feed::Listener {
   void remove(Client& client);
   /// Begins to send; latched topics at once. Nothing, or what is wrong in words.
   std::optional<std::string> subscribe(Client& client, const Subscribe::Item& item);
-  /// False where there is no such subscription.
+  /// False if there is no such subscription.
   bool unsubscribe(Client& client, std::uint32_t subscription_id);
 
   FlightSource& source() { return *source_; }

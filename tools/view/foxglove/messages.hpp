@@ -60,7 +60,7 @@ struct ServiceCall {
   std::string data;
 };
 
-/// What is wrong with a message, in words.
+/// The defect of a message, in words.
 struct Malformed {
   std::string text;
 };

@@ -1,4 +1,4 @@
-/// The mirrors of common/ros from batches of sls/record, thinned for people who look on.
+/// The mirrors of common/ros from batches of sls/record, thinned to a rate for display.
 #pragma once
 
 #include <chrono>
@@ -22,7 +22,7 @@ class MirrorSource {
   /// To be called first.
   void emit_static(const ros::Mirrors::Emit& emit) { mirrors_.emit_static(emit); }
 
-  /// True where some vehicle's next sample is due: each gets at most 100 a second of wall time, a
+  /// True if some vehicle's next sample is due: each gets at most 100 a second of wall time, a
   /// batch that comes late at most 4 at once. So most batches of a fast flight need no decoding.
   bool is_due(Time now) const;
   /// Emits the due ones of `batch`, evenly spaced, the newest always among them.

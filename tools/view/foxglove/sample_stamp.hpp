@@ -15,7 +15,7 @@ struct SampleStamp {
   std::optional<std::int64_t> sim_time_ns;  ///< sls/state alone carries it
 };
 
-/// Nothing where the bytes end too early or are no plain CDR (XCDR1, either byte order).
+/// Nothing if the bytes end too early or are no plain CDR (XCDR1, either byte order).
 std::optional<SampleStamp> read_stamp(TopicId topic, const std::vector<std::uint8_t>& cdr);
 
 /// step × period, ns; at most what a ROS message can tell, 2³¹ − 1 s.

@@ -37,7 +37,7 @@ using Put = std::function<void(Sample)>;
 
 /// Lets samples that come fast wait in the socket, so that the middleware's thread takes many of
 /// them at a time: in lockstep each time that it wakes takes a processor from the loop for longer
-/// than its work (README.md). What the socket cannot hold is lost to this reader alone.
+/// than its work (README.md). Samples that do not fit into the socket are lost to this reader only.
 class Rests {
  public:
   /// To be called for each sample, before it is handed on; from one thread.

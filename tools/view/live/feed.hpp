@@ -40,7 +40,7 @@ struct Sample {
   bus::PeerId sender;
 };
 
-/// What the page shows of the run that is looked at: of vehicle `--vehicle`, the one that can be
+/// The page's view of the run: of vehicle `--vehicle`, the one that can be
 /// joined, else the last one there was.
 struct RunView {
   bus::Run run;  ///< parameters and last status
@@ -71,7 +71,7 @@ class Feed {
     /// Every sample of a wanted topic, in the order it came; of sls/record all batches, too, unless
     /// the server's thread is behind: then the oldest are left out.
     virtual void note(const Sample& /*sample*/) {}
-    /// What has come was handed over. At least 1/60 s is between two of these, in lockstep 1/20 s.
+    /// New samples were handed over. At least 1/60 s is between two of these, in lockstep 1/20 s.
     /// For all who work on the newest alone.
     virtual void end_batch() {}
     /// The run, its status or its participants have changed; null: there is none.

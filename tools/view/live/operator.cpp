@@ -72,7 +72,7 @@ struct Operator::Impl {
     }
   }
 
-  /// With the first request: who only looks on has no writer of sls/control.
+  /// With the first request: a viewer that only reads has no writer of sls/control.
   void make_client() {
     ctl::ClientOptions options;
     options.vehicle_id = vehicle_id;

@@ -21,7 +21,7 @@ struct OperatorReply {
 
 class Operator {
  public:
-  /// `may_ask`: false where the keys of the secured domain are not an operator's.
+  /// `may_ask`: false if the keys of the secured domain are not an operator's.
   Operator(bus::Node& node, std::uint32_t vehicle_id, Feed::Post post, bool may_ask);
   ~Operator();
 
@@ -37,7 +37,7 @@ class Operator {
   std::unique_ptr<Impl> impl_;
 };
 
-/// False where the keys of a secured domain do not allow `node` to operate.
+/// False if the keys of a secured domain do not allow `node` to operate.
 bool may_write_requests(bus::Node& node);
 
 /// "pause" → ACTION_PAUSE; nothing for any other word.

@@ -31,16 +31,16 @@ class PageFrames {
   void clear_samples() { samples_.clear(); }
 
   /// Decodes of the samples added since the last frame the newest, until each vehicle is in them,
-  /// and of the others as many as a frame may cost. False where no state came.
+  /// and of the others as many as a frame may cost. False if no state came.
   bool decode();
 
   /// Of what was decoded last: the newest state of each vehicle.
   std::string make_poses() const;
-  /// Of what was decoded last: rows later than those of the message before, thinned; empty where
+  /// Of what was decoded last: rows later than those of the message before, thinned; empty if
   /// there are none.
   std::string make_rows(std::uint32_t vehicle_id);
 
-  /// Of what was decoded last: the stage that the vehicle of the lowest id flies; empty where no
+  /// Of what was decoded last: the stage that the vehicle of the lowest id flies; empty if no
   /// answer says it.
   std::string find_stage() const;
 

@@ -111,7 +111,7 @@ class PageHub : public Feed::Listener {
 
   const PageOptions& options() const { return options_; }
   Operator& requests() { return requests_; }
-  /// True where there is no run yet whose vehicles one could know.
+  /// True if there is no run yet whose vehicles one could know.
   bool may_select(std::uint32_t vehicle_id) const {
     return !has_run_ || frames_.has_vehicle(vehicle_id);
   }

@@ -11,7 +11,7 @@ namespace sls::view {
 
 inline constexpr const char* kPageProtocol = "sls.view.1";
 
-/// What the page is told of its viewer.
+/// The viewer's settings, for the page.
 struct PageOptions {
   int domain = 0;
   std::uint32_t vehicle_id = 0;

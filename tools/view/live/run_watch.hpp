@@ -34,13 +34,13 @@ class RunWatch {
 
   /// The view as it is now; null: there has been no run yet.
   std::shared_ptr<const RunView> look();
-  /// False where the last look found nothing that the one before had not.
+  /// False if the last look found nothing that the one before had not.
   bool has_changed() const { return has_changed_; }
   /// Events since the last call, oldest first.
   std::deque<RunEvent> take_events();
 
  private:
-  /// What a change of the view shows in.
+  /// The values whose change makes a new view.
   using Mark = std::tuple<std::uint64_t, std::uint64_t, std::uint64_t, std::size_t, bool, bool>;
 
   std::optional<bus::Run> choose_run() const;

@@ -14,8 +14,8 @@
 namespace sls::view {
 
 /// Bounded: beyond `most_bytes` the oldest of the loop's topics and of sls/record are dropped;
-/// latched ones only where they alone are as many, as in a flood. Each topic keeps its order. What
-/// is put is announced at most once until it is taken, and at most once a period. Called from any
+/// latched ones only where they alone are as many, as in a flood. Each topic keeps its order. New
+/// samples are announced once before they are taken, and at most once a period. Called from any
 /// thread.
 class SampleQueue {
  public:
@@ -27,7 +27,7 @@ class SampleQueue {
 
   explicit SampleQueue(std::size_t most_bytes) : most_bytes_(most_bytes) {}
 
-  /// True where the caller is to have the server's thread take what there is.
+  /// True if the caller is to have the server's thread take what there is.
   bool put(Sample sample);
   /// All there is, oldest first.
   std::vector<Sample> take_all();

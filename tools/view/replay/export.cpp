@@ -118,7 +118,7 @@ std::string make_export(std::string_view page_html, const std::vector<std::strin
 void export_page(const fs::path& file, std::string_view page_html_gz,
                  const std::vector<fs::path>& folders, std::size_t most_bytes) {
   const std::string page = unzip(page_html_gz);
-  // What is around the data, and its last, not full three bytes.
+  // The text around the data, and its last, incomplete three bytes.
   const std::size_t around =
       make_export(page, std::vector<std::string>(folders.size())).size() + 4 * folders.size();
   if (around > most_bytes || folders.empty())

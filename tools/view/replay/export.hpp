@@ -10,16 +10,16 @@
 namespace sls::view {
 
 /// The page with another text in its block `sls-mode`: how it learns what it is there for.
-/// @throws std::runtime_error where the page has no such block.
+/// @throws std::runtime_error if the page has no such block.
 std::string set_mode(std::string_view page_html, std::string_view mode_json);
 
 /// The page (gzip) as text, told to show /recording/0 and further ones of the server it is from.
-/// @throws std::runtime_error where it is not the page.
+/// @throws std::runtime_error if it is not the page.
 std::string make_replay_page(std::string_view page_html_gz, std::size_t recordings);
 
 /// The page with `recordings` (load_recorded_run) as data blocks in it; asks no server for
 /// anything.
-/// @throws std::runtime_error where `page_html` is not the page.
+/// @throws std::runtime_error if `page_html` is not the page.
 std::string make_export(std::string_view page_html, const std::vector<std::string>& recordings);
 
 /// Of a page with a recording in it, where nobody asked for another bound.

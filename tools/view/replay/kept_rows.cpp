@@ -76,7 +76,7 @@ bool KeptRows::fit(std::size_t most_bytes) {
   std::uint64_t last_step = 0;
   for (const auto& [id, vehicle] : vehicles_)
     if (!vehicle.steps.empty()) last_step = std::max(last_step, vehicle.steps.back());
-  const std::uint64_t most_times = last_step / every_ + 1;  // keeps none but first and last
+  const std::uint64_t most_times = last_step / every_ + 1;  // keeps only first and last
   std::uint64_t times = 1;
   while (count_bytes(times * every_) > most_bytes) {
     if (times == most_times) return false;

@@ -24,7 +24,7 @@ class KeptRows {
            const std::vector<float>& row);
 
   /// Thins the rows out until they fit into `most_bytes`. To be called once, after the last `add`.
-  /// False where the first and last rows alone do not fit.
+  /// False if the first and last rows alone do not fit.
   bool fit(std::size_t most_bytes);
 
   /// Each k-th step is kept, counted from step 0, with the first and the last of each vehicle.

@@ -1,4 +1,4 @@
-/// What happened in a recorded flight, for the marks of the slider.
+/// The events of a recorded flight, for the marks of the slider.
 #pragma once
 
 #include <cstdint>

@@ -46,7 +46,7 @@ std::uint64_t parse_run_id(const std::string& text, const fs::path& folder) {
   return run_id;
 }
 
-/// Units of the plant's signals by their names; empty where the manifest has none.
+/// Units of the plant's signals by their names; empty if the manifest has none.
 std::map<std::string, std::string> read_units(const fs::path& folder) {
   std::map<std::string, std::string> units;
   std::ifstream stream(folder / "manifest.json", std::ios::binary);
@@ -61,7 +61,7 @@ std::map<std::string, std::string> read_units(const fs::path& folder) {
   return units;
 }
 
-/// What state.csv has beyond the columns of a point mass.
+/// The columns of state.csv beyond those of a point mass.
 void set_columns(Parameters& message, const fs::path& folder) {
   const record::CsvReader file(folder / record::StateRow::kFile,
                                record::make_header<record::StateRow>(),

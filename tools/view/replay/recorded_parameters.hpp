@@ -1,4 +1,4 @@
-/// What a recording's files tell of the run, as the run itself published it.
+/// The parameters of a run from its recording, as the run itself published them.
 #pragma once
 
 #include "common/bus/topics.hpp"

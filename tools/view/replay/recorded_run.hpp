@@ -7,7 +7,7 @@
 
 namespace sls::view {
 
-/// What sls_view serves of a recording: more steps than a slider or a plot has pixels.
+/// Largest answer of sls_view for a recording: has more steps than a slider or a plot has pixels.
 inline constexpr std::size_t kMostServedBytes = 48 << 20;
 
 /// The bytes of GET /recording/0 and of the report's scene; README.md describes their format. Steps

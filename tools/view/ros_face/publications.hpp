@@ -28,7 +28,7 @@ class Publications {
   /// does not have end. @throws bus::BusError
   void begin(const std::vector<std::uint32_t>& vehicle_ids);
 
-  /// True where somebody reads any topic of the run.
+  /// True if somebody reads any topic of the run.
   bool has_readers() const;
 
   /// Writes the messages of `sample` that somebody reads. @throws bus::BusError

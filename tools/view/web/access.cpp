@@ -149,7 +149,7 @@ bool is_allowed(const Origin& origin, const std::vector<std::string>& allowed) {
 
 Access refuse(std::string reason) { return {false, false, std::move(reason)}; }
 
-/// What a request that may look may do beyond it.
+/// Further permissions of a request that may view.
 Access judge_operating(const RequestOrigin& request, const AccessOptions& options,
                        bool is_foreign) {
   if (options.is_read_only) return {true, false, "started with --read-only"};

@@ -1,4 +1,4 @@
-/// Who may look and who may operate. Pure: no network.
+/// Permissions to view and to operate. Pure: no network.
 #pragma once
 
 #include <optional>
@@ -15,7 +15,7 @@ struct AccessOptions {
   std::vector<std::string> allowed_origins;  ///< --allow-origin: foreign pages that may look
 };
 
-/// What a request says of its sender.
+/// A request's headers that identify its sender.
 struct RequestOrigin {
   std::string host;                   ///< header Host
   std::optional<std::string> origin;  ///< header Origin; browsers always send it with WebSockets

@@ -1,4 +1,4 @@
-/// What a WebSocket protocol sees of the server: connections to send on, sessions to be called.
+/// The server as a WebSocket protocol sees it: connections to send on, sessions to be called.
 /// Everything here happens on the server's one thread.
 #pragma once
 
@@ -16,7 +16,7 @@ using Payload = std::shared_ptr<const std::string>;
 
 enum class MessageKind { kText, kBinary };
 
-/// What happens to a message while the browser is slower than what it is sent.
+/// Treatment of a message while the browser is slower than the data.
 enum class Delivery {
   kAlways,    ///< the connection is closed if its queue is full
   kNewest,    ///< replaces a queued message of the same `key` that is not being sent yet
@@ -36,12 +36,12 @@ class Connection {
   /// Messages dropped or replaced since the beginning.
   virtual std::uint64_t dropped() const = 0;
 
-  /// True where this connection may operate a flight (web/access.hpp); `why_not` says in words why
+  /// True if this connection may operate a flight (web/access.hpp); `why_not` says in words why
   /// not: "expected a token", "started with --read-only".
   virtual bool may_operate() const = 0;
   virtual std::string why_not() const = 0;
 
-  /// Gives the token that a page was opened with; true where it is right.
+  /// Gives the token that a page was opened with; true if it is right.
   virtual bool authenticate(std::string_view token) = 0;
 
   /// Closes with a WebSocket close code (1008: policy) and reason, after what is queued.

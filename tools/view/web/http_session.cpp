@@ -85,7 +85,7 @@ void HttpSession::drop() {
   hub_.remove(this);
 }
 
-/// What is being read or written then ends with an error.
+/// Pending reads and writes then end with an error.
 void HttpSession::set_deadline(double seconds) {
   deadline_.expires_after(to_duration(seconds));
   deadline_.async_wait([self = weak_from_this()](Error) {

@@ -1,4 +1,4 @@
-/// What the connections of one server share. Everything on the server's thread but the counter.
+/// Shared by the connections of one server. All on the server's thread except the counter.
 #pragma once
 
 #include <atomic>

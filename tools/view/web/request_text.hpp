@@ -20,7 +20,7 @@ struct Target {
   std::optional<std::string> token;  ///< the first ?token=…, decoded
 };
 
-/// Nothing where it is not of the form /PATH[?QUERY], or the token's percent code is broken.
+/// Nothing if it is not of the form /PATH[?QUERY], or the token's percent code is broken.
 std::optional<Target> parse_target(std::string_view target);
 
 }  // namespace sls::view

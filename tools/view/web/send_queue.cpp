@@ -5,7 +5,7 @@
 namespace sls::view {
 namespace {
 
-/// What a message takes beside its payload: nodes of list and table, the payload's string.
+/// Overhead of a message beside its payload: nodes of list and table, the payload's string.
 constexpr std::size_t kMessageCost = 256;
 
 }  // namespace
@@ -25,7 +25,7 @@ bool SendQueue::push(MessageKind kind, Payload payload, Delivery delivery, std::
 }
 
 /// Puts a kNewest message where an older one of its key waits: a stream that is faster than its
-/// client does not push its own message to the end again and again. True where there was one; it
+/// client does not push its own message to the end again and again. True if there was one; it
 /// stays where the new one does not fit.
 bool SendQueue::replace(const QueuedMessage& message) {
   const auto found = newest_.find(message.key);
@@ -40,7 +40,7 @@ bool SendQueue::replace(const QueuedMessage& message) {
   return true;
 }
 
-/// Drops droppable messages until so many bytes fit; none where they never would.
+/// Drops droppable messages until so many bytes fit; none if they never would.
 bool SendQueue::make_room(std::size_t payload_bytes) {
   if (payload_bytes > capacity_) return false;
   while (!fits(payload_bytes))

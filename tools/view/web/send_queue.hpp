@@ -24,7 +24,7 @@ class SendQueue {
   /// `capacity`: bytes of the messages, with what each costs beside its payload.
   explicit SendQueue(std::size_t capacity) : capacity_(capacity) {}
 
-  /// False where a kAlways message does not fit, even without the droppable ones. A kNewest or
+  /// False if a kAlways message does not fit, even without the droppable ones. A kNewest or
   /// kDroppable message that does not fit so is left out.
   bool push(MessageKind kind, Payload payload, Delivery delivery, std::uint64_t key);
 

@@ -15,7 +15,7 @@
 
 namespace sls::view {
 
-/// What a path answers: bytes that do not change while the server runs.
+/// The answer of a path: bytes that do not change while the server runs.
 struct Resource {
   std::string content_type;      ///< "text/html; charset=utf-8"
   std::string content_encoding;  ///< "gzip", or empty

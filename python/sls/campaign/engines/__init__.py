@@ -2,7 +2,7 @@
 
     def run(folder: CampaignFolder, options: EngineOptions) -> None
 
-that returns when every chunk is there, raises EngineError where that cannot be reached, and leaves
+that returns when every chunk is there, raises EngineError if that cannot be reached, and leaves
 a resumable folder when it is interrupted. It may have `CHUNK_S`, the seconds of work that a chunk
 should hold, and `describe_status(folder) -> list[str]`, lines for `./sls campaign status`."""
 
@@ -17,7 +17,7 @@ ENGINES = ("local", "slurm", "dask")
 
 
 class EngineError(RunError):
-    """One line: what keeps the campaign from its end. What was flown stays; `--resume` goes on."""
+    """Why the campaign cannot finish, in one line. Flown runs stay; `--resume` continues."""
 
 
 @dataclass(frozen=True)

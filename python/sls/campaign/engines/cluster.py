@@ -1,4 +1,4 @@
-"""What the engines for clusters have in common. As a program: begins the folder of a campaign and flies
+"""Common to the engines for clusters. As a program: begins the folder of a campaign and flies
 nothing, for workers that are started by hand or by Kubernetes (docker/k8s/campaign)."""
 
 import os
@@ -32,7 +32,7 @@ def find_missing(folder: CampaignFolder) -> list[int]:
 
 
 def describe_rest(folder: CampaignFolder) -> str:
-    """What there is when an engine gives up."""
+    """The state when an engine gives up."""
     whole = len(folder.chunks) - len(folder.missing())
     return (f"{whole} of {len(folder.chunks)} chunks are in {folder.folder}; --resume flies the "
             "others")

@@ -32,7 +32,7 @@ def say(text: str) -> None:
 
 def fly(places: list[str], folder: str, number: int) -> dict[str, Any]:
     """Runs on a worker, to which it is sent as code: the package need not be on its path.
-    `places` are tried after what its own PYTHONPATH names. What the user must mend is
+    `places` are tried after what its own PYTHONPATH names. An error for the user to repair is
     answered as "error"; anything else may pass."""
     import platform
     import sys
@@ -52,7 +52,7 @@ def fly(places: list[str], folder: str, number: int) -> dict[str, Any]:
 
 
 def connect(address: str) -> Any:
-    """A client. Raises InputError where no address is given, EngineError where there is no Dask or
+    """A client. Raises InputError if no address is given, EngineError if there is no Dask or
     no scheduler."""
     try:
         import cloudpickle
@@ -75,7 +75,7 @@ def connect(address: str) -> Any:
 
 
 def check(options: EngineOptions) -> None:
-    """Raises InputError, EngineError where nothing can be submitted from here."""
+    """Raises InputError, EngineError if nothing can be submitted from here."""
     connect(options.scheduler).close()
 
 
@@ -153,9 +153,9 @@ def wait(flight: Flight, progress: Progress) -> None:
 
 
 def watch_workers(client: Any, without_since: float | None) -> float | None:
-    """Since when there is no worker; None where there are some. Raises EngineError after
+    """Since when there is no worker; None if there are some. Raises EngineError after
     WITHOUT_WORKERS_S."""
-    # What the client heard last: it asks every 2 s.
+    # The client's last answer: it asks every 2 s.
     if client.scheduler_info().get("workers"):
         return None
     now = time.monotonic()

@@ -2,7 +2,7 @@
 
 Each process is `sls.campaign.worker --serve`: it reads the number of a chunk from a pipe and answers
 when the chunk is in the folder. A process that is killed closes its pipe; another one flies its
-chunk. The kernel ends the processes should this one be killed."""
+chunk. If this process is killed, the kernel ends them."""
 
 import json
 import os
@@ -104,7 +104,7 @@ def started(workers: list[Worker]) -> Iterator[None]:
 
 
 def run(folder: CampaignFolder, options: EngineOptions) -> None:
-    """Flies what is missing. Raises InputError where a run or the campaign is refused, EngineError
+    """Flies what is missing. Raises InputError if a run or the campaign is refused, EngineError
     where a chunk cannot be written or ends its process again and again."""
     work = Work(deque(folder.missing()))
     workers = list[Worker]()

@@ -37,11 +37,11 @@ INSTALL = f"apt-get install slurm-client; {START}"
 
 
 class ControllerLost(Exception):
-    """What a command of Slurm said instead of an answer."""
+    """The error message of a Slurm command."""
 
 
 def ask(*command: str) -> str:
-    """What a command of Slurm prints. Raises EngineError where it is not installed,
+    """The output of a Slurm command. Raises EngineError if it is not installed,
     ControllerLost where it fails."""
     try:
         # A session of its own: Ctrl-C is for this process.
@@ -184,7 +184,7 @@ def make_collect_script(folder: Path, number: int, options: EngineOptions) -> st
 
 
 def split_options(sbatch: str) -> list[str]:
-    """Raises InputError where a quote is open."""
+    """Raises InputError if a quote is open."""
     try:
         return shlex.split(sbatch)
     except ValueError as error:
@@ -218,7 +218,7 @@ def find_largest_array() -> int:
 
 @dataclass
 class Round:
-    """What was submitted together: arrays, and the job that collects after them."""
+    """Jobs submitted together: arrays, and the job that collects after them."""
 
     number: int
     jobs: list[str] = field(default_factory=list)
@@ -232,7 +232,7 @@ def submit_round(folder: CampaignFolder, missing: Sequence[int], number: int,
     own = place / "slurm"
     own.mkdir(exist_ok=True)
     run_s = measure_run_s(folder, missing)
-    # Who says how many runs a chunk has, says it of a task, too.
+    # --chunk-runs sets the runs of a task, too.
     chunks_each = 1 if options.chunk_runs else max(
         1, -(-int(TASK_S / max(run_s, 1e-6)) // folder.plan.chunk_runs))
     tasks = make_tasks(missing, chunks_each)
@@ -257,7 +257,7 @@ def submit_round(folder: CampaignFolder, missing: Sequence[int], number: int,
 
 
 def find_reason(folder: CampaignFolder, jobs: Sequence[str]) -> str:
-    """What the last of the tasks of these jobs said that failed."""
+    """The last message of a failed task of these jobs."""
     logs = [log for job in jobs for log in (folder.folder / "slurm").glob(f"task-{job}-*.log")]
     for log in sorted(logs, key=lambda file: file.stat().st_mtime, reverse=True):
         errors = [line for line in log.read_text(errors="replace").splitlines() if "error" in line]
@@ -276,7 +276,7 @@ def count_files(folder: CampaignFolder) -> set[int]:
 
 
 def wait(folder: CampaignFolder, missing: Sequence[int], progress: Progress) -> None:
-    """Until no task is queued or running but held ones, or all chunks have a file. Raises EngineError where the
+    """Waits until only held tasks are queued, or all chunks have a file. Raises EngineError if the
     controller does not answer for LOST_AFTER_S."""
     missing = set(missing)
     # A damaged chunk has a file, too, until a task replaces it.
@@ -313,7 +313,7 @@ def describe_loss(folder: CampaignFolder, error: ControllerLost) -> str:
 
 
 def check(options: EngineOptions) -> None:
-    """Raises InputError, EngineError where nothing can be submitted from here."""
+    """Raises InputError, EngineError if nothing can be submitted from here."""
     split_options(options.sbatch)
     try:
         ask("sinfo", "--noheader")
@@ -368,7 +368,7 @@ def cancel_quietly(folder: CampaignFolder) -> None:
 
 
 def collect(folder: CampaignFolder, number: int, options: EngineOptions) -> None:
-    """Makes the table, or submits once more what is missing. Does nothing where a launcher waits
+    """Makes the table, or submits once more what is missing. Does nothing if a launcher waits
     for the campaign itself. Raises InputError, EngineError, ControllerLost."""
     try:
         folder.take_lock()

@@ -39,7 +39,7 @@ int count_skipped(AdaptiveSpin& spin, bool is_there) {
   return skipped;
 }
 
-TEST(AdaptiveSpinTest, WhatIsThereIsFoundAtTheFirstLook) {
+TEST(AdaptiveSpinTest, AnAvailableItemIsFoundAtTheFirstLook) {
   AdaptiveSpin spin(16);
   int count = 0;
   for (int i = 1; i <= 3; ++i) {
@@ -48,7 +48,7 @@ TEST(AdaptiveSpinTest, WhatIsThereIsFoundAtTheFirstLook) {
   }
 }
 
-TEST(AdaptiveSpinTest, WhatComesWhileItLooksIsFound) {
+TEST(AdaptiveSpinTest, AnItemThatComesDuringTheSpinIsFound) {
   AdaptiveSpin spin(16);
   int count = 0;
   EXPECT_TRUE(spin.wait_for([&] { return ++count == 10; }));
@@ -85,7 +85,7 @@ TEST(SpinningTest, TheEnvironmentSwitchesItOff) {
   unsetenv("SLS_SPIN");
 }
 
-TEST(SpinningTest, OnOneProcessorNobodySpins) {
+TEST(SpinningTest, NoThreadSpinsOnOneProcessor) {
   cpu_set_t before;
   ASSERT_EQ(sched_getaffinity(0, sizeof(before), &before), 0);
   cpu_set_t one;
@@ -136,7 +136,7 @@ class SocketPair {
     EXPECT_EQ(::send(sender_, text.data(), text.size(), 0), static_cast<ssize_t>(text.size()));
   }
 
-  /// What came, and from which port; the error where nothing did.
+  /// The received datagram and its port, or the error.
   std::string receive(int flags, in_port_t* port = nullptr) const {
     std::string buffer(100, '\0');
     sockaddr_in from{};
@@ -192,12 +192,12 @@ TEST_P(ReceivingTest, TheSocketsOwnTimeLimitHolds) {
   EXPECT_GE(std::chrono::steady_clock::now() - start, std::chrono::milliseconds(200));
 }
 
-TEST_P(ReceivingTest, WhoDoesNotWaitGetsItsAnswerAtOnce) {
+TEST_P(ReceivingTest, ANonBlockingReceiveReturnsAtOnce) {
   const SocketPair sockets;
   EXPECT_EQ(sockets.receive(MSG_DONTWAIT), "error " + std::to_string(EAGAIN));
 }
 
-TEST_P(ReceivingTest, ASocketThatIsNoneIsAnError) {
+TEST_P(ReceivingTest, AnInvalidSocketIsAnError) {
   char byte = 0;
   EXPECT_EQ(recvfrom(-1, &byte, 1, 0, nullptr, nullptr), -1);
   EXPECT_EQ(errno, EBADF);

@@ -59,7 +59,7 @@ const std::string kBeforeCommands = std::string(16, '\0') +  // run_id, step
                                     std::string("\1\0\0\0\0\0\0\0\0\0\0\0", 12);  // name, strength
 const std::string kBeforeEntries(20, '\0');  // run_id, batch_index, is_last
 
-TEST(GuardedTypeTest, WhatIsLongerThanAnySampleIsRefusedBeforeItsElementsAreMade) {
+TEST(GuardedTypeTest, AnOversizedSampleIsRefusedBeforeItsElementsAreMade) {
   constexpr std::uint32_t kCount = 1'000'000;  // each would be half a kilobyte
   constexpr std::size_t kSize = 2'000'000;
   EXPECT_FALSE((takes<StatesPubSubType, States>(make_claim(kBeforeVehicles, kCount, kSize))));
@@ -95,7 +95,7 @@ TEST(GuardedTypeTest, ClaimedElementsThatDoNotFollowAreNotKept) {
   expect_nothing_kept<RecordBatchPubSubType, RecordBatch, Entries>(entry, &RecordBatch::entries);
 }
 
-/// What a reader is told of the samples that it cannot take.
+/// The reports to a reader on samples that it cannot take.
 class Report : public MisfitReport {
  public:
   void report(const rtps::SerializedPayload_t&, const char* type,

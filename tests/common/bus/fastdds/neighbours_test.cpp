@@ -36,7 +36,7 @@ class NeighboursTest : public testing::Test {
     neighbours_.note_participant(make_peer(1), "foo", "10.0.0.2");
     neighbours_.add_own(own_);
   }
-  /// What is wrong with a writer of sls/command that is like ours but for a change.
+  /// Problems of a writer of sls/command that differs from ours by one change.
   std::string judge(const std::function<void(EndpointFacts&)>& change) {
     EndpointFacts facts = make_endpoint("sls/command", "sls::Commands", true);
     change(facts);
@@ -49,7 +49,7 @@ class NeighboursTest : public testing::Test {
   const EndpointFacts own_ = make_endpoint("sls/command", "sls::Commands", false);
 };
 
-TEST_F(NeighboursTest, EveryPolicyIsNamedWithWhatIsOfferedAndAsked) {
+TEST_F(NeighboursTest, EveryPolicyIsNamedWithOfferedAndRequestedValue) {
   const std::string begin = "sls/command of 'foo' (10.0.0.2): ";
   const std::vector<std::pair<std::function<void(EndpointFacts&)>, std::string>> cases = {
       {[](auto& facts) { facts.is_reliable = false; },
@@ -125,7 +125,7 @@ TEST_F(NeighboursTest, EndpointsOfOursThatComeLaterAreCompared) {
   EXPECT_EQ(problems_.describe(), "");
 }
 
-TEST_F(NeighboursTest, WhoLeavesTakesItsProblemsAlong) {
+TEST_F(NeighboursTest, ProblemsOfAParticipantEndWhenItLeaves) {
   judge([](auto& facts) { facts.is_exclusive = true; });
   EXPECT_EQ(neighbours_.find_misfits(), std::set<PeerId>{make_peer(1)});
   neighbours_.drop_participant(make_peer(1));

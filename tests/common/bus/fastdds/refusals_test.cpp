@@ -12,7 +12,7 @@
 namespace sls::bus {
 namespace {
 
-/// What refusals say, with the process's log in place of stderr.
+/// Log lines of refusals, with the process's log in place of stderr.
 class RefusalsTest : public testing::Test {
  protected:
   RefusalsTest() : logger_(spdlog::default_logger()) {
@@ -59,7 +59,7 @@ TEST_F(RefusalsTest, AreAlsoReadFromTheLogAlone) {
             "refused 'recorder': its permissions are not signed by our permissions authority\n");
 }
 
-TEST_F(RefusalsTest, WhoeverProvesNothingIsNamedInTime) {
+TEST_F(RefusalsTest, AParticipantWithoutProofIsReportedInTime) {
   refusals_.note_discovered("01.0f", "'accepted'", "'CN=controller'");
   refusals_.note_discovered("02.0f", "'silent'", "'CN=recorder' of 'CN=another'");
   refusals_.note_accepted("01.0f");

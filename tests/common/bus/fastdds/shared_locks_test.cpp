@@ -59,7 +59,8 @@ class SharedLocksTest : public testing::Test {
     ASSERT_EQ(sem_init(&port_->semaphore, 1, 0), 0);
   }
 
-  // The port stays: a lock once known as a reader's own would be taken for it at the same place.
+  // The port stays: a lock once known as a reader's own would be mistaken for it at the same
+  // address.
   void TearDown() override {
     if (holder_ > 0) {
       kill(holder_, SIGKILL);
@@ -96,7 +97,7 @@ class SharedLocksTest : public testing::Test {
     return pthread_mutex_timedlock(&port_->mutex, &deadline);
   }
 
-  /// The error of a wait at the port, 0 where somebody woke it.
+  /// The error of a wait at the port, 0 if somebody woke it.
   int wait_within(double seconds) {
     const timespec deadline = after(seconds);
     return sem_timedwait(&port_->semaphore, &deadline) == 0 ? 0 : errno;
@@ -117,7 +118,7 @@ class SharedLocksTest : public testing::Test {
           }) {
       EXPECT_TRUE(test::wait_until([this] { return id_ != 0 && test::find_state(id_) == 'S'; }));
     }
-    /// What the lock said.
+    /// The result of the lock.
     int finish() {
       thread_.join();
       return result_;
@@ -150,7 +151,7 @@ TEST_F(SharedLocksTest, TheLockOfADeadProcessGoesToTheNext) {
   }
 }
 
-TEST_F(SharedLocksTest, NobodyWaitsForAStoppedProcess) {
+TEST_F(SharedLocksTest, NoProcessWaitsForAStoppedOne) {
   start_holder(SIGSTOP);
   const auto start = Clock::now();
   for (int time = 0; time < 2; ++time) EXPECT_EQ(lock_within(kLong_s), ETIMEDOUT);
@@ -163,7 +164,7 @@ TEST_F(SharedLocksTest, NobodyWaitsForAStoppedProcess) {
   EXPECT_EQ(pthread_mutex_unlock(&port_->mutex), 0);
 }
 
-TEST_F(SharedLocksTest, OneWhoIsOnlySlowIsWaitedFor) {
+TEST_F(SharedLocksTest, ASlowProcessIsWaitedFor) {
   ASSERT_EQ(pthread_mutex_lock(&port_->mutex), 0);
   Waiting waiting(*this);
   std::this_thread::sleep_for(std::chrono::milliseconds(300));  // longer than for a stopped one
@@ -171,7 +172,7 @@ TEST_F(SharedLocksTest, OneWhoIsOnlySlowIsWaitedFor) {
   EXPECT_EQ(waiting.finish(), 0);
 }
 
-TEST_F(SharedLocksTest, TheLockOfAProcessThatDiesGoesToOneWhoAlreadyWaits) {
+TEST_F(SharedLocksTest, TheLockOfADyingProcessGoesToAWaitingOne) {
   start_holder(0);
   Waiting waiting(*this);
   kill(holder_, SIGKILL);
@@ -184,7 +185,7 @@ TEST_F(SharedLocksTest, AReaderLooksAtItsPortBeforeItsTime) {
   EXPECT_LT(seconds_since(start), kSlow_s);
 }
 
-TEST_F(SharedLocksTest, WhoWaitsForANamedSemaphoreWaitsToTheEnd) {
+TEST_F(SharedLocksTest, AWaitForANamedSemaphoreIsNotCutShort) {
   const std::string name = "/sls_test_" + std::to_string(getpid());
   sem_t* semaphore = sem_open(name.c_str(), O_CREAT | O_EXCL, 0600, 0);
   ASSERT_NE(semaphore, SEM_FAILED);

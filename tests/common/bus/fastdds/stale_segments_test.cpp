@@ -23,7 +23,7 @@ class StaleSegmentsTest : public ::testing::Test {
   test::TemporaryFolder folder_;
 };
 
-TEST_F(StaleSegmentsTest, ASegmentWhoseLockNobodyHoldsIsRemoved) {
+TEST_F(StaleSegmentsTest, ASegmentWithoutALockHolderIsRemoved) {
   make("fastrtps_0123456789abcdef", std::chrono::seconds(60));
   make("fastrtps_0123456789abcdef_el", std::chrono::seconds(60));
   remove_stale_segments(folder_.path());

@@ -71,7 +71,7 @@ TEST_F(McapFlightTest, EveryMessageOfAFigureEightIsItsCsvRowAndTheFileHasAThirdO
   }
 }
 
-TEST_F(McapFlightTest, SoItIsOfAFleetWhoseSensorsAndLinksHaveFaults) {
+TEST_F(McapFlightTest, HoldsForAFleetWithFaultySensorsAndLinks) {
   const fs::path recording = fly(make_file("short", R"(vehicles: 3
 faults:
   - noise: { on: state, seed: 3, position_m: [0.001, 0.001, 0.001] }
@@ -149,7 +149,7 @@ TEST_F(McapFlightTest, TheJudgesReaderNoticesAByteThatHasChanged) {
   EXPECT_EQ(process.wait(), 1) << process.output();
 }
 
-TEST(ConvertTest, SaysInOneLineWhatIsWrongAndEndsWithTheCodeForIt) {
+TEST(ConvertTest, PrintsOneErrorLineAndExitsWithItsCode) {
   const TemporaryFolder folder;
   const fs::path recording = folder / "recording";
   {

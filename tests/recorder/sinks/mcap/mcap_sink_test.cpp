@@ -75,7 +75,7 @@ TEST_F(McapSinkTest, ScenariosThatDoNotAskForItHaveNoSuchFile) {
   EXPECT_FALSE(holds(read_bytes(out_ / "manifest.json"), "zstd"));
 }
 
-TEST_F(McapSinkTest, TwoEqualFlightsGiveEqualFilesWhateverTheRunIdAndTheComputeTimes) {
+TEST_F(McapSinkTest, EqualFlightsGiveEqualFilesForAnyRunIdAndComputeTimes) {
   record_flight(out_, {}, ask_for_mcap(make_parameters()));
   fs::create_directory(other_);
   Parameters parameters = ask_for_mcap(make_parameters());
@@ -87,12 +87,12 @@ TEST_F(McapSinkTest, TwoEqualFlightsGiveEqualFilesWhateverTheRunIdAndTheComputeT
   EXPECT_EQ(read_bytes(out_ / "sls.mcap"), read_bytes(other_ / "sls.mcap"));
 }
 
-TEST_F(McapSinkTest, AConvertedRecordingIsByteForByteWhatTheRecorderWrote) {
+TEST_F(McapSinkTest, AConvertedRecordingEqualsTheRecordersFileByteForByte) {
   record_flight(out_, {}, ask_for_mcap(make_parameters()));
   expect_conversion_gives_the_bytes_of_the_sink();
 }
 
-TEST_F(McapSinkTest, SoItIsWithAttitudeSignalsMeasuredRowsAndNumbersThatAreNone) {
+TEST_F(McapSinkTest, ConvertsAttitudeSignalsMeasurementsAndNanByteForByte) {
   record_flight(
       out_,
       [](RecordEntry& entry) {
@@ -134,7 +134,7 @@ TEST_F(McapSinkTest, SoItIsOfAFleetWithUnansweredLateAndMissingSteps) {
   expect_conversion_gives_the_bytes_of_the_sink();
 }
 
-TEST_F(McapSinkTest, TheManifestListsTheFileAndWhatCompressedItAndVerifyChecksIt) {
+TEST_F(McapSinkTest, TheManifestListsTheFileAndItsCompressorAndVerifyChecksIt) {
   record_flight(out_, {}, ask_for_mcap(make_parameters()));
   const auto manifest = nlohmann::json::parse(read_bytes(out_ / "manifest.json"));
   EXPECT_EQ(manifest.at("files").at("sls.mcap").at("sha256"),
@@ -222,7 +222,7 @@ TEST_F(McapSinkTest, AFileThatCannotBeMadeIsNamed) {
 
 // --- conversion ----------------------------------------------------------------------------------
 
-TEST_F(McapSinkTest, ConvertingReplacesNoFileWithoutForceAndNoneThatAManifestLists) {
+TEST_F(McapSinkTest, ConvertingReplacesFilesOnlyWithForceAndNeverListedOnes) {
   record_flight(out_, {}, ask_for_mcap(make_parameters()));
   EXPECT_EQ(find_conversion_error(out_, converted_, false), "no error");
   EXPECT_TRUE(holds(find_conversion_error(out_, converted_, false), "--force"));

@@ -100,7 +100,7 @@ TEST_F(FoxgloveSessionTest, AClientIsGreetedWithServerAndEveryTopic) {
   EXPECT_TRUE(connection.find("advertiseServices").empty());
 }
 
-TEST_F(FoxgloveSessionTest, WithoutAFlightItSaysHowToStartOne) {
+TEST_F(FoxgloveSessionTest, WithoutAFlightItExplainsHowToStartOne) {
   connect();
   ASSERT_EQ(connection.find_statuses(0).size(), 1U);
   EXPECT_TRUE(holds(connection.find_statuses(0)[0], "./sls run"));
@@ -119,7 +119,7 @@ TEST_F(FoxgloveSessionTest, ASampleIsPassedOnAsItCameWithItsSimulationTime) {
   EXPECT_EQ(messages[0].substr(13), std::string(sample.cdr->begin(), sample.cdr->end()));
 }
 
-TEST_F(FoxgloveSessionTest, ATopicIsReadOnlyWhileSomebodySubscribes) {
+TEST_F(FoxgloveSessionTest, ATopicIsReadOnlyDuringSubscriptions) {
   flight->begin_run(kRun, {0});
   connect();
   EXPECT_EQ(flight->wanted[TopicId::kState], 0);
@@ -217,7 +217,7 @@ TEST_F(FoxgloveSessionTest, ANewRunIsANewSessionAndVanishedVehiclesAreUnadvertis
     EXPECT_TRUE(holds(topic, "vehicle_1")) << topic;
     EXPECT_EQ(come.count(sls::test::replace_once(topic, "vehicle_1", "vehicle_2")), 1U) << topic;
   }
-  // The client ends what it believes to be there: none of that is its mistake.
+  // The client ends subscriptions that may have ended already: none of that is its mistake.
   Json ids = Json::array();
   for (std::uint32_t i = 0; i < id; ++i) ids.push_back(i);
   send_json(Json{{"op", "unsubscribe"}, {"subscriptionIds", ids}});
@@ -225,7 +225,7 @@ TEST_F(FoxgloveSessionTest, ANewRunIsANewSessionAndVanishedVehiclesAreUnadvertis
   EXPECT_EQ(flight->wanted[TopicId::kState], 0);
 }
 
-TEST_F(FoxgloveSessionTest, EventsAndSilenceAreSaidInWords) {
+TEST_F(FoxgloveSessionTest, EventsAndSilenceAreReportedInWords) {
   flight->begin_run(kRun, {0});
   connect();
   hub->note_event(kRun, 250, "controller pilot took over");
@@ -244,7 +244,7 @@ TEST_F(FoxgloveSessionTest, EventsAndSilenceAreSaidInWords) {
   EXPECT_EQ(late.find_statuses(0).front(), "1.000 s: controller pilot took over");
 }
 
-TEST_F(FoxgloveSessionTest, DroppedMessagesAreSaidOnceASecond) {
+TEST_F(FoxgloveSessionTest, DroppedMessagesAreReportedOnceASecond) {
   flight->begin_run(kRun, {0});
   connect();
   for (int i = 0; i < 100; ++i, now += 25ms) {
@@ -257,7 +257,7 @@ TEST_F(FoxgloveSessionTest, DroppedMessagesAreSaidOnceASecond) {
                                                 "80 messages dropped: the client is slow"}));
 }
 
-TEST_F(FoxgloveSessionTest, HighRatesMayBeDroppedAndWordsMayNot) {
+TEST_F(FoxgloveSessionTest, SamplesOfHighRateMayBeDroppedAndTextsMayNot) {
   flight->begin_run(kRun, {0});
   connect();
   subscribe(1, find_channel("sls/state"));
@@ -362,7 +362,7 @@ TEST_F(FoxgloveServicesTest, MalformedCallsAreRefused) {
   EXPECT_TRUE(flight->requests.empty());
 }
 
-TEST_F(FoxgloveSessionTest, WhoMayNotOperateIsRefused) {
+TEST_F(FoxgloveSessionTest, ARequestWithoutPermissionToOperateIsRefused) {
   flight->begin_run(kRun, {0});
   connect();
   call(2, "{}");

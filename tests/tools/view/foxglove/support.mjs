@@ -1,4 +1,4 @@
-// What the tests of the Foxglove protocol share: processes, and a client by Foxglove's own code.
+// Shared by the tests of the Foxglove protocol: processes, and a client by Foxglove's own code.
 import { parseIDL } from "@foxglove/omgidl-parser";
 import { MessageReader as IdlReader } from "@foxglove/omgidl-serialization";
 import { parse as parseRos } from "@foxglove/rosmsg";
@@ -30,7 +30,7 @@ export async function waitFor(what, find, patience = kPatience) {
 /** A program that is ended with the test; `lines` and `errors` collect what it says. */
 export class Program {
   static all = [];
-  /** What the programs that run said last, for the message of a failure. */
+  /** The last output of the running programs, for the message of a failure. */
   static describeAll() {
     return Program.all.map((one) => `\n${one.name}: ${one.errors.slice(-3).join(" | ")}`).join("");
   }

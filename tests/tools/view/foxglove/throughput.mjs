@@ -1,5 +1,5 @@
 // Messages per second from a DDS publisher through sls_view to one client: prints one JSON line.
-// Exit code 1 where any was lost.
+// Exit code 1 if any was lost.
 //   SLS_BUILD=build node tests/tools/view/foxglove/throughput.mjs [RATE [SECONDS]]
 //   SLS_BUILD=build node tests/tools/view/foxglove/throughput.mjs fleet [VEHICLES [SECONDS]]
 // The second subscribes to all mirrors of a fleet that flies 200 steps a second.

@@ -59,7 +59,7 @@ class PageOfAViewerTest : public PageProtocolTest {
 
 // --- what a page sees ----------------------------------------------------------------------------
 
-TEST_F(PageProtocolTest, APageIsGreetedAndToldWhatIsMissing) {
+TEST_F(PageProtocolTest, APageGetsAGreetingAndTheMissingParticipants) {
   Page page(protocol);
   ASSERT_EQ(page.connection.texts.size(), 2u);
   const auto& hello = page.connection.texts[0];
@@ -182,7 +182,7 @@ TEST_F(PageProtocolTest, APageThatIsBehindGetsPosesAndNoRows) {
   EXPECT_FALSE(page.has_binary(2));
 }
 
-TEST_F(PageProtocolTest, AScenarioThatIsNoneIsSaid) {
+TEST_F(PageProtocolTest, AnInvalidScenarioIsReported) {
   Page page(protocol);
   FakeServer server(domain.number(), 1);
   auto parameters = make_parameters(2);
@@ -352,7 +352,7 @@ TEST_F(PageProtocolTest, StatesAreReadOnlyWhileTheyAreWanted) {
   feed.remove(counter);
 }
 
-TEST_F(PageProtocolTest, LatchedSamplesAreKeptForThoseWhoComeLate) {
+TEST_F(PageProtocolTest, LatchedSamplesAreKeptForLateReaders) {
   FakeServer server(domain.number(), 1);
   ASSERT_TRUE(wait_until([&] { return feed.latched(TopicId::kParameters).size() == 1; }));
   server.begin_run(make_parameters(2));

@@ -17,7 +17,7 @@ using test::make_parameters;
 
 json describe(const Parameters& parameters) { return json::parse(describe_run(parameters)); }
 
-TEST(RunDescriptionTest, TellsWhatIsFlown) {
+TEST(RunDescriptionTest, DescribesTheMission) {
   auto parameters = make_parameters(0xab);
   parameters.signals().emplace_back().name("wind_m_s");
   parameters.signals().front().unit("m/s");
@@ -42,8 +42,8 @@ TEST(RunDescriptionTest, TellsWhatIsFlown) {
   }
 }
 
-/// x = a_x sin s, y = a_y sin 2s: so y a_x² = 2 a_y x √(a_x² − x²) but for the sign.
-TEST(RunDescriptionTest, ThePathOfAFigureEightLiesOnIt) {
+/// x = a_x sin s, y = a_y sin 2s: so y a_x² = 2 a_y x √(a_x² − x²) apart from the sign.
+TEST(RunDescriptionTest, ThePathLiesOnTheFigureEight) {
   const json path = describe(make_parameters(1)).at("path_m");
   ASSERT_GT(path.size(), 100u);
   for (const json& point : path) {

@@ -31,7 +31,7 @@ TEST(SampleQueueTest, TheFirstSampleIsAnnouncedAtOnceAndTheNextNotUntilAllAreTak
   EXPECT_EQ(list(queue.take_all()), "");
 }
 
-TEST(SampleQueueTest, WhatComesTooSoonIsDueAfterThePeriod) {
+TEST(SampleQueueTest, AnEarlySampleIsDueAfterThePeriod) {
   SampleQueue queue(1000);
   const auto announced = SampleQueue::Clock::now();
   ASSERT_TRUE(queue.put(make_sample(TopicId::kRecord, 1)));

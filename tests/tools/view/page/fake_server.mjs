@@ -1,4 +1,4 @@
-// Speaks subprotocol sls.view.1 with a flight from closed forms: each load flies a figure eight about its own place,
+// Serves subprotocol sls.view.1 with a flight from closed forms: each load flies a figure eight about its own place,
 // the quadrotor one rod length above it. startFakeServer({ page, vehicles, … }) → { url, port, control, stop, … }.
 import { createServer } from "node:http";
 import { readFileSync } from "node:fs";

@@ -43,7 +43,7 @@ export async function startFlight({ build, domain, scenario = "figure_eight", ve
   start("recorder", "--out", join(folder, "recording"));
   return {
     url,
-    /** What sim_ctl says of the run: not the page's word for it. */
+    /** The run's status by sim_ctl, independent of the page. */
     status() {
       const result = spawnSync(join(build, "bin/sim_ctl"), ["--domain", String(domain), "status", "--json"], { encoding: "utf8" });
       if (result.status !== 0) throw new Error(`sim_ctl: ${result.stderr}`);

@@ -274,7 +274,7 @@ TEST_F(RecordedRunTest, ARowThatIsCutOffAtTheEndIsNoRow) {
   EXPECT_EQ(unpack(load_recorded_run(folder, kPlenty)).vehicles.at(0).times.size(), kLastStep);
 }
 
-TEST_F(RecordedRunTest, WhatIsDamagedIsNamedInOneLine) {
+TEST_F(RecordedRunTest, DamageIsNamedInOneLine) {
   const auto damage = [&](const std::string& name, auto change) {
     fs::remove_all(folder_ / "flight");
     const fs::path folder = record();

@@ -123,7 +123,7 @@ static int32_t expect(int32_t result, const char* call) {
   exit(1);
 }
 
-/// What rclcpp asks: of /clock best effort, of /tf_static what was written before, too.
+/// The QoS of rclcpp: of /clock best effort, of /tf_static what was written before, too.
 typedef enum Reading { kDefault, kClock, kStatic } Reading;
 
 static Reader make_reader(dds_entity_t participant, const char* topic,

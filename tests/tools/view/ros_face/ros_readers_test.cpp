@@ -70,7 +70,7 @@ Quaterniond to_quaternion(const json& list) {
 /// W (z down) → world (z up), and the body's frame likewise.
 Vector3d turn(const Vector3d& v) { return {v.x(), -v.y(), -v.z()}; }
 
-/// What was recorded of a vehicle at a step, in the frames of the recording.
+/// The record of a vehicle at a step, in the frames of the recording.
 struct Row {
   Vector3d p_WQ, v_WQ, p_WL, v_WL, w_WB_B;
   Quaterniond q_WB;

@@ -177,7 +177,7 @@ TEST(AccessTest, OperatingNeedsTheTokenWhereThereIsOne) {
   }
 }
 
-TEST(AccessTest, NobodyOperatesAReadOnlyViewer) {
+TEST(AccessTest, AReadOnlyViewerAllowsNoOperation) {
   AccessOptions options = make_options();
   options.is_read_only = true;
   options.token = kToken;
@@ -187,7 +187,7 @@ TEST(AccessTest, NobodyOperatesAReadOnlyViewer) {
   EXPECT_EQ(access.reason, "started with --read-only");
 }
 
-TEST(AccessTest, NobodyOperatesOnAnotherAddressWithoutAToken) {
+TEST(AccessTest, AnotherAddressNeedsATokenToOperate) {
   EXPECT_FALSE(judge({"192.168.1.5:8765", std::nullopt, std::nullopt}, make_options("192.168.1.5"))
                    .may_operate);
 }
@@ -264,7 +264,7 @@ TEST_F(TokenFileTest, RefusesOtherTokens) {
   }
 }
 
-TEST_F(TokenFileTest, RefusesWhatIsNoFile) {
+TEST_F(TokenFileTest, RefusesAPathThatIsNoFile) {
   EXPECT_NE(find_token_problem(folder_ / "none").find("No such file"), std::string::npos);
   EXPECT_NE(find_token_problem(folder_.path()).find("regular file"), std::string::npos);
   const std::string pipe = folder_ / "pipe";

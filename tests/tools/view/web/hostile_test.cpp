@@ -27,7 +27,7 @@ using test::to_bytes;
 
 constexpr std::size_t kMessageBytes = 1'000;
 
-/// What the server may hold beyond a queue: what is gathered, and what is with the system call.
+/// Bytes that the server may hold beyond a queue: gathered ones and those in the system call.
 constexpr std::size_t kMostGathered = 2 * 32 * 1024;
 
 std::string make_message(std::uint32_t number) {
@@ -240,7 +240,7 @@ TEST(ManyConnectionsTest, ThousandsComeAndGoWithoutALeak) {
   EXPECT_TRUE(server.ask([&] { return connections.empty(); }));
 }
 
-TEST(ManyConnectionsTest, CountsThoseThereAre) {
+TEST(ManyConnectionsTest, CountsOpenConnections) {
   ServerOptions options = test::make_options();
   options.limits.connections = 200;
   RunningServer server(options, test::add_echo_and_page);

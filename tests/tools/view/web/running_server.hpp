@@ -36,7 +36,7 @@ class RunningServer {
   view::Server* operator->() { return &server_; }
   std::uint16_t port() const { return server_.port(); }
 
-  /// What `task` returns on the server's thread.
+  /// The result of `task` on the server's thread.
   template <class Task>
   auto ask(Task task) {
     std::promise<decltype(task())> promise;

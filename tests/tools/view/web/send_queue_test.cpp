@@ -97,7 +97,7 @@ TEST(SendQueueTest, EmptyMessagesTakeRoom) {
 }
 
 /// Judged by a plain list of what must be there.
-TEST(SendQueueTest, NeverExceedsItsCapacityWhateverComes) {
+TEST(SendQueueTest, NeverExceedsItsCapacity) {
   constexpr std::size_t kCapacity = 50'000;
   std::mt19937 random(1);
   SendQueue queue(kCapacity);

@@ -151,7 +151,7 @@ TEST_F(ServerTest, RefusesLongHeaders) {
             431);
 }
 
-TEST_F(ServerTest, RefusesWhatIsNoRequest) {
+TEST_F(ServerTest, RefusesBytesThatAreNoRequest) {
   for (const std::string& bytes :
        {std::string("hello\r\n\r\n"), std::string("GET /\r\n\r\n"), std::string("\x16\x03\x01\x02"),
         std::string("GET / HTTP/3.0\r\nHost: localhost\r\n\r\n"),

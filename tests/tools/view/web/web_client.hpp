@@ -68,7 +68,7 @@ class RawClient {
 
   int socket() const { return socket_; }
 
-  /// False where the server has closed the connection.
+  /// False if the server has closed the connection.
   bool send(std::string_view bytes) {
     while (!bytes.empty()) {
       const ssize_t sent = ::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
@@ -109,7 +109,7 @@ class RawClient {
     return {std::move(header), std::move(body)};
   }
 
-  /// The next frame; opcode -1 where the connection ended.
+  /// The next frame; opcode -1 if the connection ended.
   Frame read_frame() {
     Frame frame;
     frame.opcode = -1;
@@ -134,7 +134,7 @@ class RawClient {
     return frame;
   }
 
-  /// The code of the close frame that comes, after whatever else; 0 where none comes.
+  /// The code of the close frame that comes, after whatever else; 0 if none comes.
   int read_close_code() {
     for (;;) {
       const Frame frame = read_frame();
@@ -146,7 +146,7 @@ class RawClient {
     }
   }
 
-  /// True where the connection ends within the deadline.
+  /// True if the connection ends within the deadline.
   bool ends() {
     while (read_some()) {
     }

@@ -194,7 +194,7 @@ TEST_F(WebSocketTest, AnswersACloseFrame) {
   EXPECT_TRUE(client.ends());
 }
 
-TEST_F(WebSocketTest, ClosesAfterWhatIsQueued) {
+TEST_F(WebSocketTest, ClosesAfterTheQueuedMessages) {
   RawClient client = open();
   client.send(to_bytes({kText, "close"}));
   for (const char* text : {"1", "2", "3"}) EXPECT_EQ(client.read_frame().payload, text);

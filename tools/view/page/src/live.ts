@@ -1,4 +1,4 @@
-/** The page on a flight: speaks subprotocol sls.view.1, connects again by itself. */
+/** The page on a flight: uses subprotocol sls.view.1 and reconnects. */
 import { OperatorBar } from "./operator";
 import {
   addEvent, clearEvents, showBanner, showEmpty, showLink, showPhase, showRun, showStage, showStatus, showTime, type Latency,
@@ -198,7 +198,7 @@ class Live {
     this.shell.plots.append(rows);
   }
 
-  /** What is after the frame's last work on this thread comes through a channel: layout and paint are counted. */
+  /** The message after the frame's last work on this thread comes through a channel: layout and paint are counted. */
   private noteFrame(): void {
     if (!this.newest || this.newest.step === this.drawnStep) return;
     this.drawnStep = this.newest.step;

@@ -63,7 +63,7 @@ export class OperatorBar {
     const groups = [["start", "resume", "pause", "step"], ["reset", "stop"]] as const;
     const [run, end] = groups.map((actions) =>
       make("div", { class: "group", role: "group" }, ...actions.map((action) => this.makeButton(action))));
-    run!.setAttribute("aria-label", "Let the run go on or hold it");
+    run!.setAttribute("aria-label", "Resume or pause the run");
     run!.append(this.steps);
     end!.setAttribute("aria-label", "End the run");
     this.bar.replaceChildren(run!, make("span", { class: "gap" }), end!, this.reply);
@@ -120,7 +120,7 @@ export class OperatorBar {
 
   private async request(action: Action): Promise<void> {
     if (!this.isPossible(action)) return;
-    if (action === "reset" && !(await confirmAction("Reset the run?", "It ends here and begins again from step 0 under another run id.", "Reset"))) return;
+    if (action === "reset" && !(await confirmAction("Reset the run?", "The run ends and restarts from step 0 with a new run id.", "Reset"))) return;
     if (action === "stop" && !(await confirmAction("Stop the run?", "It ends as failed. The server and its participants leave.", "Stop"))) return;
     if (!this.isPossible(action)) return this.say(`${action}: no longer possible, the run is ${this.phase}`, "bad");
     const id = this.nextId++;

@@ -1,4 +1,4 @@
-/** What the page says in words and numbers: run, participants, events, what is missing. */
+/** The page's texts and numbers: run, participants, events, missing data. */
 import { find, make, setText } from "./dom";
 import type { FlightEvent, NoRun, Participant, Run, Status } from "./types";
 
@@ -101,7 +101,7 @@ export function showStatus(status: Status, run: Run | null, drawn: Latency, fps:
   add("Reason", status.reason, status.phase === "failed" ? "bad" : undefined);
   const period = run ? `, period ${+(run.period_s * 1000).toPrecision(4)} ms` : "";
   add("Step", `${format(status.step)}${run ? ` · ${run.mode}${period}` : ""}`);
-  const wanted = run && run.real_time_factor > 0 ? ` (wanted ${run.real_time_factor})` : "";
+  const wanted = run && run.real_time_factor > 0 ? ` (target ${run.real_time_factor})` : "";
   add("Real-time factor", status.real_time_factor > 0 ? `${status.real_time_factor.toFixed(3)}${wanted}` : "");
   add("Timing", status.timing);
   add("Controller", status.controller);

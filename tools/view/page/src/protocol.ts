@@ -25,7 +25,7 @@ export function readKind(message: ArrayBuffer): number {
   return message.byteLength < 4 ? 0 : new DataView(message).getUint32(0, true);
 }
 
-/** @throws Error where the length does not fit the count. */
+/** @throws Error if the length does not fit the count. */
 export function readPoses(message: ArrayBuffer): Poses {
   const view = new DataView(message);
   const count = view.getUint32(4, true);
@@ -54,7 +54,7 @@ export function readPoses(message: ArrayBuffer): Poses {
   };
 }
 
-/** @throws Error where the length does not fit rows and columns. */
+/** @throws Error if the length does not fit rows and columns. */
 export function readRows(message: ArrayBuffer): RunRows {
   const view = new DataView(message);
   const rows = view.getUint32(8, true);

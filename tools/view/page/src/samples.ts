@@ -1,4 +1,4 @@
-/** What is plotted of one vehicle: numbers by time, of bounded memory. */
+/** The plotted data of one vehicle: numbers by time, of bounded memory. */
 import type { PlotDescription } from "./series";
 import type { Rows } from "./types";
 
@@ -81,7 +81,7 @@ export function thin(samples: Samples, place: number, series: number, from: numb
   return thinToGrid(samples.time, arrays, first, end, from, to, buckets);
 }
 
-/** Onto a grid of time that only the window gives, so that two recordings share it; null where a bucket is empty. */
+/** Onto a grid of time that only the window gives, so that two recordings share it; null if a bucket is empty. */
 export function thinToGrid(
   time: Float64Array, arrays: Float32Array[], first: number, end: number, from: number, to: number, buckets: number,
 ): [number[], ...(number | null)[][]] {

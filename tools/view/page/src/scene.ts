@@ -52,7 +52,7 @@ export class Scene {
   private readonly frameTimes: number[] = [];
   private readonly isSoftware: boolean;
 
-  /** @throws Error where the browser has no WebGL 2. */
+  /** @throws Error if the browser has no WebGL 2. */
   constructor(canvas: HTMLCanvasElement) {
     this.canvas = canvas;
     this.renderer = this.makeRenderer(true);

@@ -8,7 +8,7 @@ const kTableTime = 400; // ms between updates of the table
 const kTextTime = 2000; // of the text that stands for the scene
 
 export interface Shell {
-  /** Null where the browser has no WebGL: the table takes its place. */
+  /** Null if the browser has no WebGL: the table takes its place. */
   readonly scene: Scene | null;
   readonly plots: Plots;
   selected(): number;
@@ -167,7 +167,7 @@ class Table {
     this.show(true);
     this.toggle.hidden = true;
     this.root.prepend(make("p", { class: "quiet", id: "no-webgl" },
-      "This browser draws no WebGL, so here are the positions (frame W, z down)."));
+      "This browser has no WebGL; this table shows the positions instead (frame W, z down)."));
   }
 
   onPick(act: (vehicleId: number) => void): void {

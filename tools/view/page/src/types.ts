@@ -1,6 +1,6 @@
-/** What the page knows of a flight. Everything is in frame W (z down), SI units and radians, until frames.ts turns it for drawing. */
+/** The page's data. Everything is in frame W (z down), SI units and radians, until frames.ts turns it for drawing. */
 
-/** What became of a step's answer: AnswerKind of idl/sls.idl. */
+/** Result of a step's answer: AnswerKind of idl/sls.idl. */
 export enum AnswerKind {
   None,
   Accepted,
@@ -36,7 +36,7 @@ export interface Column {
   unit: string;
 }
 
-/** What is flown: describe_run of tools/view/run_description.hpp. */
+/** Description of the run: describe_run of tools/view/run_description.hpp. */
 export interface Run {
   /** 16 hex digits. */
   run_id: string;
@@ -70,7 +70,7 @@ export class Columns {
   }
 }
 
-/** One vehicle at one step. Whoever keeps one copies it: the arrays may be used again for the next step. */
+/** One vehicle at one step. Copy it to keep it: the arrays may be used again for the next step. */
 export interface Pose {
   vehicleId: number;
   kind: AnswerKind;
@@ -79,9 +79,9 @@ export interface Pose {
   /** w, x, y, z. */
   attitude: ArrayLike<number>;
   load: ArrayLike<number>;
-  /** Desired position of the load; NaN where there is none. */
+  /** Desired position of the load; NaN if there is none. */
   reference: ArrayLike<number>;
-  /** Mean, rad/s; NaN where there is none. */
+  /** Mean, rad/s; NaN if there is none. */
   rotorRate: number;
 }
 

@@ -42,7 +42,7 @@ export class Player {
     if (Number.isFinite(time)) this.time = Math.min(this.to, Math.max(this.from, time));
   }
 
-  /** `passed`: wall time since the last call, s. True where the time jumped back to the beginning. */
+  /** `passed`: wall time since the last call, s. True if the time jumped back to the beginning. */
   advance(passed: number): boolean {
     if (!this.isPlaying) return false;
     // After a tab was hidden the flight goes on where it was.

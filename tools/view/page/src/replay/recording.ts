@@ -11,7 +11,7 @@ export interface RecordedFault {
   from_s: number;
   to_s: number;
   kind: string;
-  /** state or command; empty where it is no fault of the scenario. */
+  /** state or command; empty if it is no fault of the scenario. */
   on: string;
   vehicle: number;
 }
@@ -148,7 +148,7 @@ export class Recording {
     return this.rows.get(vehicleId);
   }
 
-  /** The rows of a vehicle with the columns of another recording; NaN where this one has none. */
+  /** The rows of a vehicle with the columns of another recording; NaN if this one has none. */
   rowsAs(columns: Columns, vehicleId: number): Rows | undefined {
     const rows = this.rows.get(vehicleId);
     const isSame = columns.count === this.columns.count &&
@@ -211,7 +211,7 @@ export class Recording {
   }
 }
 
-/** Index of the last row that is not after `time`; 0 where all are. */
+/** Index of the last row that is not after `time`; 0 if all are. */
 export function findRow(times: Float64Array, time: number): number {
   let [low, high] = [0, times.length - 1];
   while (low < high) {

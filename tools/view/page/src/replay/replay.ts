@@ -102,7 +102,7 @@ class Replay {
     return list;
   }
 
-  /** What does not change with time. */
+  /** The parts that do not change with time. */
   private describe(): void {
     const { head, run } = this.main;
     showRun(run);
@@ -268,7 +268,7 @@ function describeFault({ kind, on }: RecordedFault): string {
   return kind === "fail_safe" ? "no answer: fail-safe force" : `controller reports ${kind}`;
 }
 
-/** What was flown until `time`. */
+/** The flight until `time`. */
 function makeTrail(recording: Recording, vehicleId: number, time: number): Trail {
   const rows = recording.rowsOf(vehicleId)!;
   const last = findRow(rows.time, time);
