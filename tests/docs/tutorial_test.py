@@ -18,7 +18,9 @@ The document marks its blocks with comments, which a reader does not see:
 Lines after `$ ` are commands, `^C` interrupts; the other lines are their output. A command without output lines is
 not compared. `…` stands for lines left out, or for any text in a line. Numbers of VARYING differ from flight to
 flight; everything else must be equal. Terminal 1 waits for each command. Other terminals run beside it; they are
-compared when the document comes back to them, and at the end of the chapter.
+compared when the document comes back to them, and at the end of the chapter. Certificates differ from one type of
+processor to another: what the document shows as one certificate must be one here, too, each time. Numbers of more than
+ten decimals are compared to nine digits.
 
 The programs fly on a DDS domain and with a port of their own (SLS_DOMAIN; 8765 is replaced).
 """
@@ -58,10 +60,25 @@ VARYING = [(re.compile(pattern), name) for pattern, name in (
 )]
 
 
+CERTIFICATE = re.compile(r"\b[0-9a-f]{64}\b")
+LONG_NUMBER = re.compile(r"\b\d+\.\d{11,}\b")
+own_certificates = {}  # on this machine, by the document's
+
+
 def make_comparable(line):
     for pattern, name in VARYING:
         line = pattern.sub(name, line)
-    return line.rstrip()
+    return LONG_NUMBER.sub(lambda number: f"{float(number[0]):.9g}", line).rstrip()
+
+
+def with_own_certificates(shown, came):
+    """The lines shown, with this machine's certificates. One that is shown for the first time is taken from the lines
+    that came, in their order."""
+    printed = [certificate for line in came for certificate in CERTIFICATE.findall(line)]
+    for certificate, own in zip((found for line in shown for found in CERTIFICATE.findall(line)), printed):
+        if own not in own_certificates.values():
+            own_certificates.setdefault(certificate, own)
+    return [CERTIFICATE.sub(lambda found: own_certificates.get(found[0], found[0]), line) for line in shown]
 
 
 # --- the document ---------------------------------------------------------------------------------
@@ -131,7 +148,8 @@ def to_pattern(line):
 
 
 def find_difference(shown, came, is_any_order):
-    """What is wrong with the lines that came, or None."""
+    """The difference of the lines that came, or None."""
+    shown = with_own_certificates(shown, came)
     came = [make_comparable(line) for line in came]
     if is_any_order:
         left = list(came)

@@ -19,7 +19,7 @@ FOLDER = BUILD / "package_test"
 SYSTEM = FOLDER / "debian"
 WORK = "/tmp/work"  # of the user in the system
 USER = 1000
-# What apt and dpkg write down about their own work, and what lasts no longer than a run.
+# Files in which apt and dpkg keep records of their own work, and files that last no longer than a run.
 JOURNALS = re.compile(r"/(proc|sys|tmp|run|dev/shm|var/(cache|log|lib/(apt|dpkg)))(/|$)|/etc/ld\.so\.cache$|"
                       r"/var/lib/systemd/|/usr/share/man/.*index")
 
@@ -144,7 +144,7 @@ class PackageTest(unittest.TestCase):
         (SYSTEM / WORK[1:]).mkdir()
         os.chown(SYSTEM / WORK[1:], USER, USER)
         shutil.copy(cls.package, SYSTEM / "tmp/sls.deb")
-        # What it depends on is there: nothing else is installed, and there is no network to load it from.
+        # Its dependencies are there: nothing else is installed, and no network could load it.
         said = run(isolate("apt-get", "install", "-y", "--no-install-recommends", "/tmp/sls.deb",
                            system=SYSTEM))
         assert "1 newly installed" in said, said
