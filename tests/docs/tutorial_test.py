@@ -47,6 +47,7 @@ COMMAND_S = 100  # more than any command of the document takes on a busy machine
 
 VARYING = [(re.compile(pattern), name) for pattern, name in (
     (r"\b[0-9a-f]{16}\b", "RUN_ID"),
+    (r"on domain \d+", "on domain N"),
     (r"[\d.,]+ steps/s", "RATE steps/s"),
     (r"[\d.]+ × real time", "RATE × real time"),
     (r"simulated in [\d.]+ s", "simulated in TIME s"),
