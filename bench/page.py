@@ -5,10 +5,10 @@ import os
 import subprocess
 from typing import Any
 
-from bench.programs import MeasurementError, Programs
+from bench.programs import ROOT, MeasurementError, Programs
 from bench.results import LESS, Figure, Rounds
 
-NODE_TESTS = "tests/tools/view"
+NODE_TESTS = ROOT / "tests/tools/view"
 SECONDS = 10.0
 QUICK_SECONDS = 1.0
 BRIDGE_RATE = 55_000  # samples/s that the publisher writes; the goal is 50,000
@@ -17,7 +17,7 @@ LONGEST_S = 120.0
 
 def run_node(programs: Programs, script: str, *words: object) -> Any:
     """The JSON line that a script of tests/tools/view prints."""
-    command = ["node", f"{NODE_TESTS}/{script}", *map(str, words)]
+    command = ["node", str(NODE_TESTS / script), *map(str, words)]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=LONGEST_S,
                           env={**os.environ, "SLS_BUILD": str(programs.build)})
     if not done.stdout.startswith("{"):

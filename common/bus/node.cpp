@@ -152,7 +152,8 @@ struct Node::Impl {
     MiddlewareLog::clear();
     remove_stale_segments();
     auto& wire = qos.wire_protocol();
-    if (wire.participant_id < 0)
+    // A node without shared memory has no port there: its id would look free to the next one.
+    if (wire.participant_id < 0 && has_shared_memory(qos))
       wire.participant_id = choose_participant_id(
           {wire.port.portBase + wire.port.domainIDGain * domain + wire.port.offsetd1,
            wire.port.participantIDGain});
@@ -216,17 +217,23 @@ struct Node::Impl {
       transport = send_small_datagrams(transport, static_cast<std::uint32_t>(sent));
   }
 
+  static bool is_shared_memory(
+      const std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface>& descriptor) {
+    return std::dynamic_pointer_cast<eprosima::fastdds::rtps::SharedMemTransportDescriptor>(
+               descriptor) != nullptr;
+  }
+
+  static bool has_shared_memory(const dds::DomainParticipantQos& qos) {
+    const auto& own = qos.transport().user_transports;
+    return qos.transport().use_builtin_transports ||
+           std::any_of(own.begin(), own.end(), is_shared_memory);
+  }
+
   static void leave_out_shared_memory(dds::DomainParticipantQos& qos) {
-    using eprosima::fastdds::rtps::SharedMemTransportDescriptor;
     using eprosima::fastdds::rtps::UDPv4TransportDescriptor;
     auto& transport = qos.transport();
     auto& own = transport.user_transports;
-    own.erase(std::remove_if(own.begin(), own.end(),
-                             [](const auto& descriptor) {
-                               return std::dynamic_pointer_cast<SharedMemTransportDescriptor>(
-                                          descriptor) != nullptr;
-                             }),
-              own.end());
+    own.erase(std::remove_if(own.begin(), own.end(), is_shared_memory), own.end());
     if (transport.use_builtin_transports || own.empty())
       own.push_back(std::make_shared<UDPv4TransportDescriptor>());
     transport.use_builtin_transports = false;

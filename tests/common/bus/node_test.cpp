@@ -6,6 +6,8 @@
 #include <fastcdr/FastBuffer.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <fstream>
 #include <mutex>
 #include <vector>
 
@@ -249,6 +251,15 @@ std::string find_error(const std::filesystem::path& file, int domain) {
     return error.what();
   }
   return "no error";
+}
+
+TEST(NodeTest, NodesWithoutSharedMemoryJoinBesideThePortOfAKilledProcess) {
+  constexpr int kDomain = 79;
+  const std::string stale = "/dev/shm/fastrtps_port" + std::to_string(7410 + 250 * kDomain) + "_el";
+  std::ofstream(stale) << "";
+  const Node first(kQosFile, kDomain, "first", "", Transports::kNetwork);
+  EXPECT_NO_THROW(Node(kQosFile, kDomain, "second", "", Transports::kNetwork));
+  std::filesystem::remove(stale);
 }
 
 TEST(NodeErrorTest, ADomainOutOfRangeIsRefusedWithItsRange) {
