@@ -41,6 +41,9 @@ import time
 import urllib.request
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tests/support"))
+from own_domain import OwnDomain  # noqa: E402
+
 DOCUMENT = ROOT / "docs/tutorial.md"
 PAGE_PORT = "8765"  # as the document has it
 COMMAND_S = 100  # more than any command of the document takes on a busy machine
@@ -336,26 +339,6 @@ def find_docker_obstacle():
     command = ["docker", "image", "inspect", image]
     has_image = shutil.which("docker") and subprocess.run(command, capture_output=True).returncode == 0
     return None if has_image else f"no Docker engine with the image {image}"
-
-
-class OwnDomain:
-    """A DDS domain that no other test flies on, by the lock that the others hold, too."""
-
-    def __enter__(self):
-        deadline = time.monotonic() + 60
-        while time.monotonic() < deadline:
-            for number in range(1, 61):
-                self.lock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-                try:
-                    self.lock.bind(f"\0sls-test-domain-{number}")
-                    return str(number)
-                except OSError:
-                    self.lock.close()
-            time.sleep(0.1)
-        raise Failure("no free DDS domain among 1 to 60")
-
-    def __exit__(self, *_):
-        self.lock.close()
 
 
 def find_free_port():

@@ -7,15 +7,13 @@ import json
 import os
 import pathlib
 import re
-import socket
 import sys
 import tempfile
-import time
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BUILD = pathlib.Path(sys.argv.pop(1)) if len(sys.argv) > 1 else ROOT / "build"
-sys.path.insert(0, str(ROOT / "python"))
+sys.path[:0] = [str(ROOT / "python"), str(ROOT / "tests/support")]
 CACHE = tempfile.TemporaryDirectory()
 os.environ.setdefault("MPLCONFIGDIR", CACHE.name)  # nothing is left in anybody's home
 
@@ -27,6 +25,8 @@ except ImportError as error:
     print(f"skipped: {error.name} is missing (apt-get install python3-numpy python3-matplotlib "
           "python3-yaml)")
     sys.exit(77)
+
+from own_domain import OwnDomain  # noqa: E402, F401
 
 
 class FolderTest(unittest.TestCase):
@@ -59,27 +59,6 @@ class FolderTest(unittest.TestCase):
         self.assertTrue(output.startswith("sls: error: "), output)
         for part in parts:
             self.assertIn(str(part), output)
-
-
-class OwnDomain:
-    """A DDS domain that no other test flies on, by the lock that those in C++ hold, too: a name
-    that leaves nothing behind."""
-
-    def __enter__(self):
-        deadline = time.monotonic() + 240
-        while time.monotonic() < deadline:
-            for number in range(1, 61):
-                self.lock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-                try:
-                    self.lock.bind(f"\0sls-test-domain-{number}")
-                    return str(number)
-                except OSError:
-                    self.lock.close()
-            time.sleep(0.1)
-        raise RuntimeError("no free DDS domain among 1 to 60")
-
-    def __exit__(self, *_):
-        self.lock.close()
 
 
 def read_header(file):
