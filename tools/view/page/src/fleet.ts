@@ -1,15 +1,19 @@
 /** All vehicles of one run: every part is one draw call, whatever their number. */
 import {
   BackSide,
+  BufferAttribute,
+  BufferGeometry,
   Color,
+  DataTexture,
   DoubleSide,
+  FloatType,
   Group,
-  InstancedMesh,
   Matrix4,
+  Mesh,
   MeshBasicMaterial,
   Quaternion,
+  RGBAFormat,
   Vector3,
-  type BufferGeometry,
   type Camera,
 } from "three";
 import { kLoadColour, kReferenceColour, type Theme } from "./colours";
@@ -48,29 +52,62 @@ export interface Body {
   rotorRate: number;
 }
 
+/** The same part of all vehicles: one mesh with `count` copies of the geometry, whose vertices look up the matrix of
+ * their copy in a texture. Instances would do the same, but software drawing takes each of them for a draw call. */
 class Part {
-  readonly mesh: InstancedMesh;
+  readonly mesh: Mesh<BufferGeometry, MeshBasicMaterial>;
+  private readonly matrices: DataTexture;
 
   constructor(group: Group, geometry: BufferGeometry, material: MeshBasicMaterial, count: number, order = 0) {
-    this.mesh = new InstancedMesh(geometry, material, count);
+    this.matrices = new DataTexture(new Float32Array(16 * count), 4, count, RGBAFormat, FloatType);
+    material.onBeforeCompile = (shader) => {
+      shader.uniforms.matrices = { value: this.matrices };
+      shader.vertexShader = `attribute float copy;\nuniform highp sampler2D matrices;\n${shader.vertexShader}`.replace(
+        "#include <begin_vertex>",
+        `#include <begin_vertex>
+        int row = int(copy);
+        mat4 place = mat4(texelFetch(matrices, ivec2(0, row), 0), texelFetch(matrices, ivec2(1, row), 0),
+                          texelFetch(matrices, ivec2(2, row), 0), texelFetch(matrices, ivec2(3, row), 0));
+        transformed = (place * vec4(transformed, 1.0)).xyz;`,
+      );
+    };
+    this.mesh = new Mesh(repeat(geometry, count), material);
     this.mesh.frustumCulled = false;
     this.mesh.renderOrder = order;
     group.add(this.mesh);
   }
 
   set(index: number, matrix: Matrix4): void {
-    matrix.toArray(this.mesh.instanceMatrix.array, 16 * index);
+    matrix.toArray(this.matrices.image.data as Float32Array, 16 * index);
   }
 
   commit(): void {
-    this.mesh.instanceMatrix.needsUpdate = true;
+    this.matrices.needsUpdate = true;
   }
 
   dispose(): void {
     this.mesh.geometry.dispose();
-    (this.mesh.material as MeshBasicMaterial).dispose();
-    this.mesh.dispose();
+    this.mesh.material.dispose();
+    this.matrices.dispose();
   }
+}
+
+/** `count` copies of a geometry, with the number of the copy in attribute `copy`. */
+function repeat(geometry: BufferGeometry, count: number): BufferGeometry {
+  const source = geometry.index ? geometry.toNonIndexed() : geometry;
+  const vertices = source.getAttribute("position").count;
+  const result = new BufferGeometry();
+  for (const name of ["position", "color"]) {
+    const attribute = source.getAttribute(name);
+    if (!attribute) continue;
+    const values = new Float32Array(count * attribute.array.length);
+    for (let copy = 0; copy < count; ++copy) values.set(attribute.array, copy * attribute.array.length);
+    result.setAttribute(name, new BufferAttribute(values, attribute.itemSize, attribute.normalized));
+  }
+  const copies = new Float32Array(count * vertices);
+  for (let copy = 0; copy < count; ++copy) copies.fill(copy, copy * vertices, (copy + 1) * vertices);
+  result.setAttribute("copy", new BufferAttribute(copies, 1));
+  return result;
 }
 
 export class Fleet {
@@ -90,7 +127,7 @@ export class Fleet {
   private spin = 0;
   private simTime = NaN;
 
-  constructor(run: Run, index: RunIndex, theme: Theme, isMany: boolean) {
+  constructor(run: Run, index: RunIndex, theme: Theme, isMany: boolean, isCoarse: boolean) {
     this.bodies = run.vehicles.map((vehicle) => ({
       vehicle,
       airframe: makeAirframe(vehicle),
@@ -108,25 +145,27 @@ export class Fleet {
     const count = this.bodies.length;
     const rotors = this.bodies.reduce((sum, { airframe }) => sum + airframe.rotors.length, 0);
 
-    this.shadows = this.add(makeShadowGeometry(), count, 1, { colour: "outline", opacity: 0.22 * opacity });
+    this.shadows = this.add(makeShadowGeometry(isCoarse), count, 1, { colour: "outline", opacity: 0.22 * opacity });
     for (const [key, members] of this.groupByAirframe()) {
       const { airframe } = this.bodies[members[0]!]!;
-      const geometry = makeFrameGeometry(airframe);
+      const geometry = makeFrameGeometry(airframe, isCoarse);
       const outline = this.add(geometry, members.length, 2, { colour: "outline", side: BackSide, opacity });
       const part = this.add(geometry, members.length, 3, { opacity, vertexColors: true });
       part.mesh.name = key;
+      outline.mesh.visible = !isCoarse;
       this.frames.push({ part, outline, members });
     }
     this.rods = this.add(makeRodGeometry(), count, 3, { colour: "frame", opacity });
-    this.outlines = this.add(makeBallGeometry(), count, 3, { colour: "outline", side: BackSide, opacity });
-    this.loads = this.add(makeBallGeometry(), count, 4, { fixed: kLoadColour, opacity });
+    this.outlines = this.add(makeBallGeometry(isCoarse), count, 3, { colour: "outline", side: BackSide, opacity });
+    for (const { mesh } of [this.shadows, this.outlines]) mesh.visible = !isCoarse;
+    this.loads = this.add(makeBallGeometry(isCoarse), count, 4, { fixed: kLoadColour, opacity });
     this.blades = this.add(makeBladeGeometry(), rotors, 5, { colour: "frame", side: DoubleSide, opacity: 0.85 * opacity });
-    this.discs = this.add(makeDiscGeometry(), rotors, 6, {
+    this.discs = this.add(makeDiscGeometry(isCoarse), rotors, 6, {
       colour: "frame",
       side: DoubleSide,
       opacity: (isMany ? 0.3 : 0.16) * opacity,
     });
-    this.reticles = this.add(makeReticleGeometry(), count, 7, { fixed: kReferenceColour, side: DoubleSide, opacity });
+    this.reticles = this.add(makeReticleGeometry(isCoarse), count, 7, { fixed: kReferenceColour, side: DoubleSide, opacity });
     this.setTheme(theme);
     this.group.visible = false;
   }
@@ -225,6 +264,7 @@ export class Fleet {
     let index = 0;
     // From afar blades would be noise: then the discs alone are drawn.
     const hasBlades = ((this.bodies[0]?.airframe.radius ?? 0) * scale) / metresPerPixel >= kLeastBladePixels;
+    this.blades.mesh.visible = hasBlades;
     for (const { quad, rotation, airframe, hasPose, rotorRate } of this.bodies) {
       const speed = Number.isFinite(rotorRate) ? rotorRate / kNominalRate : 1;
       const size = hasPose ? scale * airframe.rotorRadius : 0;
@@ -235,8 +275,7 @@ export class Fleet {
         // A positive sense is about the body's z axis, which points down.
         scratch.turn.setFromAxisAngle(kUp, -spin * this.spin * Math.max(0.15, speed) + index).premultiply(rotation);
         this.discs.set(index, compose(scratch.point, scratch.turn, size, size, size));
-        const blade = hasBlades ? size : 0;
-        this.blades.set(index, compose(scratch.point, scratch.turn, blade, blade, blade));
+        if (hasBlades) this.blades.set(index, scratch.matrix);
         ++index;
       }
     }

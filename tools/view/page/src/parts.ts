@@ -7,6 +7,7 @@ import {
   ConeGeometry,
   CylinderGeometry,
   IcosahedronGeometry,
+  PlaneGeometry,
   RingGeometry,
   type BufferGeometry,
 } from "three";
@@ -60,8 +61,10 @@ function paint(geometry: BufferGeometry, colour: Color): BufferGeometry {
   return result;
 }
 
+// `isCoarse`: with few triangles, for fleets that are drawn by software. Their number decides there.
+
 /** Hub in the quadrotor's colour, darker arms and motors, and a light wedge in front. */
-export function makeFrameGeometry({ rotors, radius }: Airframe): BufferGeometry {
+export function makeFrameGeometry({ rotors, radius }: Airframe, isCoarse: boolean): BufferGeometry {
   const hub = new Color(kQuadColour);
   const arm = hub.clone().multiplyScalar(0.45);
   const motor = hub.clone().multiplyScalar(0.22);
@@ -75,7 +78,7 @@ export function makeFrameGeometry({ rotors, radius }: Airframe): BufferGeometry 
     const beam = new BoxGeometry(length, 0.09 * radius, 0.07 * radius);
     beam.translate(length / 2, 0, 0).rotateY(-Math.atan2(z, length)).rotateZ(Math.atan2(y, x));
     parts.push(paint(beam, arm));
-    const pod = new CylinderGeometry(0.075 * radius, 0.075 * radius, 0.2 * radius, 8);
+    const pod = new CylinderGeometry(0.075 * radius, 0.075 * radius, 0.2 * radius, isCoarse ? 3 : 8);
     pod.rotateX(Math.PI / 2).translate(x, y, z);
     parts.push(paint(pod, motor));
   }
@@ -83,8 +86,8 @@ export function makeFrameGeometry({ rotors, radius }: Airframe): BufferGeometry 
 }
 
 /** A disc with a rim; radius 1. */
-export function makeDiscGeometry(): BufferGeometry {
-  return new CircleGeometry(1, 24);
+export function makeDiscGeometry(isCoarse: boolean): BufferGeometry {
+  return new CircleGeometry(1, isCoarse ? 9 : 24);
 }
 
 /** Two blades and the rim of their circle; radius 1. */
@@ -101,20 +104,20 @@ export function makeRodGeometry(): BufferGeometry {
   return new CylinderGeometry(1, 1, 1, 6, 1, true).rotateX(Math.PI / 2).translate(0, 0, 0.5);
 }
 
-export function makeBallGeometry(): BufferGeometry {
-  return new IcosahedronGeometry(1, 3);
+export function makeBallGeometry(isCoarse: boolean): BufferGeometry {
+  return new IcosahedronGeometry(1, isCoarse ? 1 : 3);
 }
 
 /** Reticle that faces the camera: a ring from 1.5 to 1.75 with four ticks. */
-export function makeReticleGeometry(): BufferGeometry {
-  const parts = [new RingGeometry(1.5, 1.78, 28).toNonIndexed()];
+export function makeReticleGeometry(isCoarse: boolean): BufferGeometry {
+  const parts = [new RingGeometry(1.5, 1.78, isCoarse ? 12 : 28).toNonIndexed()];
   for (let quarter = 0; quarter < 4; ++quarter) {
-    const tick = new BoxGeometry(0.75, 0.22, 0.01).translate(2.05, 0, 0).rotateZ((quarter * Math.PI) / 2);
+    const tick = new PlaneGeometry(0.75, 0.22).translate(2.05, 0, 0).rotateZ((quarter * Math.PI) / 2);
     parts.push(tick.toNonIndexed());
   }
   return mergeGeometries(parts);
 }
 
-export function makeShadowGeometry(): BufferGeometry {
-  return new CircleGeometry(1, 20);
+export function makeShadowGeometry(isCoarse: boolean): BufferGeometry {
+  return new CircleGeometry(1, isCoarse ? 8 : 20);
 }

@@ -14,7 +14,9 @@ export { toScene } from "./frames";
 const kManyVehicles = 10; // from here on no smooth edges
 const kSlowFrame = 40; // ms between frames above which fewer pixels are drawn
 const kQuickFrame = 22;
-const kScales = [1, 0.75, 0.5];
+const kRest = 100; // ms without a request after a frame: the next one follows none
+const kFramesJudged = 12;
+const kScales = [1, 0.75, 0.5, 0.4];
 const kPickPixels = 26;
 
 interface Layer {
@@ -47,6 +49,7 @@ export class Scene {
   private request = 0;
   private scale = 0; // index into kScales
   private lastFrame = 0;
+  private requested = 0; // when the frame that is drawn next was
   private intervals: number[] = [];
   private frameCount = 0;
   private readonly frameTimes: number[] = [];
@@ -82,7 +85,7 @@ export class Scene {
     }
     const isMany = run.vehicles.length > kManyVehicles;
     if (index === 0) this.useSmoothEdges(!isMany);
-    const fleet = new Fleet(run, index, this.theme, isMany);
+    const fleet = new Fleet(run, index, this.theme, isMany, isMany && this.isSoftware);
     const layer = { run, fleet, trails: new Trails(run, index), path: makePath(run, index), isFitted: false };
     this.layers[index] = layer;
     this.world.add(fleet.group, layer.trails.lines, layer.path);
@@ -170,7 +173,9 @@ export class Scene {
 
   /** Draws with the next frame. */
   invalidate(): void {
-    if (this.request === 0) this.request = requestAnimationFrame((now) => this.drawFrame(now));
+    if (this.request !== 0) return;
+    this.requested = performance.now();
+    this.request = requestAnimationFrame((now) => this.drawFrame(now));
   }
 
   /** Draws at once. */
@@ -236,10 +241,10 @@ export class Scene {
   private adapt(now: number): void {
     const interval = now - this.lastFrame;
     this.lastFrame = now;
-    if (interval > 250) return void (this.intervals = []); // nothing was to be drawn
+    if (interval > 0 && this.requested > now - interval + kRest) return void (this.intervals = []); // nothing was to be drawn
     this.intervals.push(interval);
-    if (this.intervals.length < 24) return;
-    const median = [...this.intervals].sort((a, b) => a - b)[12]!;
+    if (this.intervals.length < kFramesJudged) return;
+    const median = [...this.intervals].sort((a, b) => a - b)[kFramesJudged / 2]!;
     this.intervals = [];
     if (median > kSlowFrame && this.scale < kScales.length - 1) ++this.scale;
     else if (median < kQuickFrame && this.scale > 0) --this.scale;

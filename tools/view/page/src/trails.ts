@@ -5,7 +5,7 @@ import { toScene } from "./frames";
 import type { Pose, Run, RunIndex, Trail } from "./types";
 import { Vector3 } from "three";
 
-const kMostSegments = 60_000; // of all vehicles and both trails
+const kMostSegments = 12_000; // of all vehicles and both trails: software draws 20 frames a second with so many
 const kMostSlots = 1_500; // of one vehicle
 const kFloats = 12; // of one vehicle in one slot: two trails × two ends × xyz
 
@@ -17,6 +17,7 @@ export class Trails {
   private readonly last: Float32Array; // quad xyz, load xyz of each vehicle
   private readonly spacing: number;
   private next = 0;
+  private filled = 0; // slots that have ever been written
   private lastTime = NaN;
 
   constructor(run: Run, index: RunIndex) {
@@ -57,6 +58,8 @@ export class Trails {
       toScene(pose.load, point);
       write(values, at + 6, end, 3, isJump);
     }
+    this.filled = Math.max(this.filled, this.next + 1);
+    this.lines.geometry.setDrawRange(0, (this.filled * count * kFloats) / 3);
     this.next = (this.next + 1) % this.slots;
     this.positions.addUpdateRange(start, count * kFloats);
     this.positions.needsUpdate = true;
@@ -87,6 +90,8 @@ export class Trails {
     }
     this.positions.clearUpdateRanges();
     this.positions.needsUpdate = true;
+    this.filled = this.slots;
+    this.lines.geometry.setDrawRange(0, Infinity);
     this.lastTime = NaN;
   }
 
@@ -95,6 +100,8 @@ export class Trails {
     this.positions.clearUpdateRanges();
     this.positions.needsUpdate = true;
     this.next = 0;
+    this.filled = 0;
+    this.lines.geometry.setDrawRange(0, 0);
     this.lastTime = NaN;
   }
 
