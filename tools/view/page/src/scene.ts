@@ -16,7 +16,7 @@ const kSlowFrame = 40; // ms between frames above which fewer pixels are drawn
 const kQuickFrame = 22;
 const kRest = 100; // ms without a request after a frame: the next one follows none
 const kFramesJudged = 12;
-const kScales = [1, 0.75, 0.5, 0.4];
+const kScales = [1, 0.75, 0.5, 0.4]; // the last two of fleets alone
 const kPickPixels = 26;
 
 interface Layer {
@@ -246,7 +246,9 @@ export class Scene {
     if (this.intervals.length < kFramesJudged) return;
     const median = [...this.intervals].sort((a, b) => a - b)[kFramesJudged / 2]!;
     this.intervals = [];
-    if (median > kSlowFrame && this.scale < kScales.length - 1) ++this.scale;
+    const isFleet = (this.layers[0]?.run.vehicles.length ?? 0) > kManyVehicles;
+    const smallest = isFleet ? kScales.length - 1 : 1;
+    if (median > kSlowFrame && this.scale < smallest) ++this.scale;
     else if (median < kQuickFrame && this.scale > 0) --this.scale;
     else return;
     this.resize(false);
