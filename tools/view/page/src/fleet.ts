@@ -3,7 +3,6 @@ import {
   BackSide,
   BufferAttribute,
   BufferGeometry,
-  Color,
   DataTexture,
   DoubleSide,
   FloatType,
@@ -146,12 +145,11 @@ export class Fleet {
     const rotors = this.bodies.reduce((sum, { airframe }) => sum + airframe.rotors.length, 0);
 
     this.shadows = this.add(makeShadowGeometry(isCoarse), count, 1, { colour: "outline", opacity: 0.22 * opacity });
-    for (const [key, members] of this.groupByAirframe()) {
+    for (const members of this.groupByAirframe().values()) {
       const { airframe } = this.bodies[members[0]!]!;
       const geometry = makeFrameGeometry(airframe, isCoarse);
       const outline = this.add(geometry, members.length, 2, { colour: "outline", side: BackSide, opacity });
       const part = this.add(geometry, members.length, 3, { opacity, vertexColors: true });
-      part.mesh.name = key;
       outline.mesh.visible = !isCoarse;
       this.frames.push({ part, outline, members });
     }
@@ -316,7 +314,6 @@ const scratch = {
   turn: new Quaternion(),
   scale: new Vector3(),
   matrix: new Matrix4(),
-  colour: new Color(),
 };
 
 function compose(position: Vector3, rotation: Quaternion, x: number, y: number, z: number): Matrix4 {
