@@ -75,7 +75,7 @@ class ParticipantCheck {
   /// All that is wrong now. To be called a few times a second.
   Findings look(const Neighbourhood& neighbourhood);
 
-  /// " (its answers are rejected: 57 × …)", for messages about who is awaited; empty if the last
+  /// " (its answers are rejected: 57 × …)", for messages about an awaited client; empty if the last
   /// one was taken.
   std::string describe_rejections(const bus::PeerId& sender) const;
 

@@ -19,8 +19,8 @@ constexpr std::size_t kMaxParticipants = 256;
 constexpr std::size_t kMaxServers = 64;
 constexpr std::size_t kMaxRunsOfServer = 4;  // the one in work and those that resets ended
 
-/// True if `known` has, or now has, room for `sender`: who has left makes room. Only where it is
-/// full must it be known who is there.
+/// True if `known` has room for `sender`. A full one first drops the participants that have left;
+/// only then is the list of those present asked for.
 template <class Known, class FindPresent>
 bool make_room(std::map<PeerId, Known>& known, std::size_t most, const PeerId& sender,
                FindPresent find_present) {

@@ -1,5 +1,5 @@
-/// Common to the checks of diagnosis.hpp: verdicts, names for what was seen, and who is
-/// asked about.
+/// Common to the checks of diagnosis.hpp: verdicts, names of the programs seen, and
+/// the programs asked about.
 #pragma once
 
 #include <string>
