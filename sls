@@ -650,7 +650,7 @@ run_fuzzer() {
     -artifact_prefix="$crashes/" >"$log" 2>&1; then
     rm -rf "$scratch"
     grep -E 'ERROR|SUMMARY|runtime error|what\(\)' "$log" >&2 || true
-    fail "$2: crashed (log: $log) with the input $(grep -o "$crashes/.*" "$log" | tail -n 1)"
+    fail "$2: crashed (log: $log) with the input $(grep -o "$crashes/[^']\+" "$log" | tail -n 1)"
   fi
   rm -rf "$scratch"
   say "$2: $(tail -n 1 "$log")"

@@ -8,6 +8,7 @@
 #include <spdlog/fmt/fmt.h>
 #include <cerrno>
 #include <fstream>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <system_error>
 
@@ -75,6 +76,37 @@ bool is_in_folder(const std::filesystem::path& name) {
   return name == name.filename() && name.has_filename() && name != "." && name != "..";
 }
 
+/// `json` in an error line.
+std::string show(const Json& json) {
+  return json.is_primitive() ? json.dump() : std::string("an ") + json.type_name();
+}
+
+/// nlohmann itself would convert a number of any size, sign or fraction without a check.
+/// @throws config::ConfigError naming `key` if `value` is no whole number that `Whole` holds.
+template <typename Whole>
+Whole to_whole(const Json& value, const char* key) {
+  constexpr Whole kMax = std::numeric_limits<Whole>::max();
+  if (!value.is_number_unsigned() || value.get<std::uint64_t>() > kMax)
+    throw config::ConfigError(
+        fmt::format("{}: expected a whole number from 0 to {}, got {}", key, kMax, show(value)));
+  return value.get<Whole>();
+}
+
+template <typename Whole>
+Whole read_whole(const Json& json, const char* key) {
+  return to_whole<Whole>(json.at(key), key);
+}
+
+std::vector<std::uint32_t> read_vehicle_ids(const Json& ids) {
+  if (!ids.is_array() || ids.size() > kMaxVehicles)
+    throw config::ConfigError(fmt::format("vehicle_ids: expected a list of at most {}, got {}",
+                                          kMaxVehicles,
+                                          ids.is_array() ? std::to_string(ids.size()) : show(ids)));
+  std::vector<std::uint32_t> vehicle_ids;
+  for (const Json& id : ids) vehicle_ids.push_back(to_whole<std::uint32_t>(id, "vehicle_ids"));
+  return vehicle_ids;
+}
+
 ManifestFile to_manifest(const Json& json) {
   ManifestFile manifest;
   manifest.complete = json.at("complete");
@@ -84,12 +116,10 @@ ManifestFile to_manifest(const Json& json) {
   manifest.scenario_sha256 = json.at("scenario_sha256");
   manifest.mode = json.at("mode");
   manifest.period_s = json.at("period_s");
-  manifest.vehicle_ids = json.at("vehicle_ids").get<std::vector<std::uint32_t>>();
-  if (manifest.vehicle_ids.size() > kMaxVehicles)
-    throw config::ConfigError(fmt::format("vehicle_ids: expected at most {}, got {}", kMaxVehicles,
-                                          manifest.vehicle_ids.size()));
-  // Recordings of earlier versions have neither.
-  if (json.contains("segment")) manifest.first_step = json.at("segment").at("first_step");
+  manifest.vehicle_ids = read_vehicle_ids(json.at("vehicle_ids"));
+  // Recordings of earlier versions have none of these four.
+  if (json.contains("segment"))
+    manifest.first_step = read_whole<std::uint64_t>(json.at("segment"), "first_step");
   manifest.certificate = json.value("certificate", "");
   manifest.contract_sha256 = json.value("contract_sha256", "");
   for (const Json& signal : json.value("signals", Json::array()))
@@ -99,13 +129,16 @@ ManifestFile to_manifest(const Json& json) {
       throw config::ConfigError("files: expected names of files beside it, got '" + name + "'");
     ManifestFile::File& entry = manifest.files[name];
     entry.sha256 = file.at("sha256");
-    if (file.contains("rows")) entry.rows = file.at("rows").get<std::uint64_t>();
+    if (file.contains("rows")) entry.rows = read_whole<std::uint64_t>(file, "rows");
   }
   for (const Json& steps : json.at("missing"))
-    manifest.missing.push_back(
-        {steps.at("vehicle_id"), steps.at("topic"), steps.at("from"), steps.at("to")});
+    manifest.missing.push_back({read_whole<std::uint32_t>(steps, "vehicle_id"), steps.at("topic"),
+                                read_whole<std::uint64_t>(steps, "from"),
+                                read_whole<std::uint64_t>(steps, "to")});
   for (const Json& start : json.value("stage_starts", Json::array()))  // earlier versions: none
-    manifest.stage_starts.push_back({start.at("vehicle_id"), start.at("stage"), start.at("step")});
+    manifest.stage_starts.push_back({read_whole<std::uint32_t>(start, "vehicle_id"),
+                                     read_whole<std::uint32_t>(start, "stage"),
+                                     read_whole<std::uint64_t>(start, "step")});
   return manifest;
 }
 

@@ -328,6 +328,40 @@ TEST_F(VerificationTest, AManifestNamesNoFilesElsewhereAndNoThousandsOfVehicles)
   EXPECT_THROW(open_recording(b_), config::ConfigError);
 }
 
+// Found by the fuzzer: a number is converted to an integer only if it is one.
+TEST_F(VerificationTest, AManifestsNumbersAreWholeNumbersThatFit) {
+  struct Case {
+    std::string from, to, expected;
+  };
+  const std::string manifest = read_bytes(b_ / "manifest.json");
+  for (const Case& change : {
+           Case{"\"rows\": 301", "\"rows\": 3.77778e+70",
+                "rows: expected a whole number from 0 to 18446744073709551615, got 3.77778e+70"},
+           Case{"\"rows\": 301", "\"rows\": -1", "rows: expected a whole number from 0 to"},
+           Case{"\"rows\": 301", "\"rows\": [1]", "got an array"},
+           Case{"\"first_step\": 0", "\"first_step\": 0.5", "first_step: expected a whole number"},
+           Case{"\"missing\": []",
+                "\"missing\": [{\"vehicle_id\": 4294967296, \"topic\": \"\", \"from\": 0, \"to\": "
+                "0}]",
+                "vehicle_id: expected a whole number from 0 to 4294967295, got 4294967296"},
+           Case{"\"stage_starts\": []",
+                "\"stage_starts\": [{\"vehicle_id\": 0, \"stage\": \"1\", \"step\": 0}]",
+                "stage: expected a whole number from 0 to 4294967295, got \"1\""},
+       }) {
+    const auto at = manifest.find(change.from);
+    ASSERT_NE(at, std::string::npos) << change.from;
+    write_bytes(b_ / "manifest.json",
+                std::string(manifest).replace(at, change.from.size(), change.to));
+    try {
+      open_recording(b_);
+      ADD_FAILURE() << change.to << " was taken";
+    } catch (const config::ConfigError& error) {
+      EXPECT_NE(std::string(error.what()).find("manifest.json: "), std::string::npos);
+      EXPECT_NE(std::string(error.what()).find(change.expected), std::string::npos) << error.what();
+    }
+  }
+}
+
 TEST_F(VerificationTest, APipeInThePlaceOfAFileIsAProblem) {
   fs::remove(b_ / "status.csv");
   ASSERT_EQ(::mkfifo((b_ / "status.csv").c_str(), 0600), 0);
