@@ -10,8 +10,8 @@
 
 namespace sls::app {
 
-/// A bounded queue from the middleware's threads to the one thread that works. Putting never
-/// blocks: what does not fit is refused and counted, so that nothing is lost silently.
+/// A bounded queue from the middleware's threads to the one thread that works. `put` never blocks:
+/// it refuses and counts an item that does not fit, so no item is lost silently.
 template <class T>
 class Mailbox {
  public:
@@ -31,7 +31,7 @@ class Mailbox {
     return true;
   }
 
-  /// Ends the wait of a thread that waits, or that will wait next.
+  /// Ends the current `wait`, or the next one if no thread waits now.
   void interrupt() {
     {
       const std::lock_guard lock(mutex_);
@@ -45,7 +45,7 @@ class Mailbox {
     return items_.empty();
   }
 
-  /// The oldest item, waiting for one until `deadline`; nothing if none came.
+  /// The oldest item. Waits for one until `deadline`; nothing if none came.
   std::optional<T> take(std::chrono::steady_clock::time_point deadline) {
     std::unique_lock lock(mutex_);
     if (!filled_.wait_until(lock, deadline, [this] { return !items_.empty(); }))
@@ -55,7 +55,7 @@ class Mailbox {
     return item;
   }
 
-  /// Waits until there is an item, until `interrupt`, or until `deadline`: then it is false.
+  /// Waits for an item or for `interrupt`; false if `deadline` passes first.
   bool wait(std::chrono::steady_clock::time_point deadline) {
     std::unique_lock lock(mutex_);
     const bool has_news =
@@ -64,8 +64,8 @@ class Mailbox {
     return has_news;
   }
 
-  /// All items there are, oldest first, without waiting. A thread that polls from time to
-  /// time saves its writers a wake-up per item.
+  /// All items, oldest first, without waiting. A thread that polls saves its writers one wake-up
+  /// per item.
   std::deque<T> take_all() {
     const std::lock_guard lock(mutex_);
     return std::exchange(items_, {});

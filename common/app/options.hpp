@@ -14,8 +14,8 @@ struct CommonOptions {
   std::string log_level = "info";
 };
 
-/// Declares `--qos`, `--domain`, `--log-level` and `--version`; `--help` prints every default. Without
-/// `--domain` the domain is that of the environment variable SLS_DOMAIN, without both 0.
+/// Declares `--qos`, `--domain`, `--log-level` and `--version`; `--help` prints every default. The
+/// domain is that of `--domain`, else that of the environment variable SLS_DOMAIN, else 0.
 void add_common_options(CLI::App& cli, CommonOptions& options);
 
 /// "sls 0.1.0".

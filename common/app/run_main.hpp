@@ -21,8 +21,8 @@ class RunError : public std::runtime_error {
 };
 
 /// Parses the command line into `cli`, starts log and signal handling, calls `work` and returns the
-/// exit code of its outcome: 0, config::ConfigError → 2, any other exception → 1, each printed as
-/// one line on stderr; 130 or 143 where a stop signal ended it.
+/// exit code: 0 without an exception, 2 for config::ConfigError, 1 for any other exception, 130 or
+/// 143 after a stop signal. An exception is printed as one line on stderr.
 int run_main(int argc, char** argv, CLI::App& cli, const CommonOptions& options,
              const std::string& program, const std::function<void()>& work);
 

@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kPriority = 1;  // the lowest real-time priority
 constexpr int kNiceness = 5;
-constexpr int kViewerNiceness = 10;  // further, a page stands still on a busy machine
+constexpr int kViewerNiceness = 10;  // above it a page freezes on a busy machine
 
 void put_back(int policy, int niceness) {
   const sched_param parameters{};

@@ -11,7 +11,7 @@
 namespace sls::app {
 namespace {
 
-// Any thread may run the handlers, and others read; sig_atomic_t is for one thread only.
+// Any thread may run the handlers while others read; sig_atomic_t is safe in one thread only.
 std::atomic<int> received{0};
 std::atomic<unsigned> patience_s{0};
 std::atomic<int> unhurried{0};
@@ -22,7 +22,7 @@ extern "C" void remember_signal(int number) {
   if (received.compare_exchange_strong(none, number) && unhurried == 0) ::alarm(patience_s);
 }
 
-/// In a handler only a few functions may be called, and none that allocates or locks.
+/// A signal handler may call only a few functions, and none that allocates or locks.
 extern "C" void give_up(int) {
   for (const char* text : {const_cast<const char*>(program_invocation_short_name),
                            ": error: hangs after the stop signal: exits now, its files may be "

@@ -4,7 +4,7 @@
 
 namespace sls::app {
 
-/// A wait with a deadline: when to give up, and when to say for whom it is.
+/// The times of a wait: its deadline, and when to log a line about it.
 class Wait {
  public:
   using Clock = std::chrono::steady_clock;
@@ -16,10 +16,10 @@ class Wait {
         deadline_(Clock::now() + timeout_),
         next_report_(Clock::now() + quiet_time) {}
 
-  /// Something has come: lasts as long again from now on, and is reported as before.
+  /// Starts the timeout again. The times of the reports do not change.
   void renew() { deadline_ = Clock::now() + timeout_; }
 
-  /// For so long it was not to be waited.
+  /// Moves deadline and next report by `rest`, a time that does not count, such as a pause.
   void extend(Clock::duration rest) {
     deadline_ += rest;
     next_report_ += rest;
@@ -27,7 +27,7 @@ class Wait {
 
   bool is_over() const { return Clock::now() >= deadline_; }
 
-  /// True once after the quiet time and then every 5 s: time for a line about it.
+  /// True if a line about the wait is due: once after the quiet time, then every 5 s.
   bool is_report_due() {
     const auto now = Clock::now();
     if (now < next_report_) return false;

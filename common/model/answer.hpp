@@ -5,7 +5,8 @@ namespace sls::model {
 
 enum class MissionPhase { kRunning, kFinished, kFailed };
 
-/// Error code of a controller. With one the force is zero and the mission has failed.
+/// Error code of a controller. With any code except kNone the force is zero and the mission has
+/// failed.
 enum class Fault {
   kNone,
   kFreeFall,      ///< s → 0: the law asks the load to fall freely

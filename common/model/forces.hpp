@@ -8,7 +8,8 @@
 namespace sls::model {
 
 /// Linear rotor drag on the quadrotor, N: −D Π (v − v_wind), Π projecting onto the plane normal to
-/// the control force `f_Q_W`. Zero without a control force, whose direction Π needs. Eq. (7).
+/// the control force `f_Q_W`. Zero without a control force, because Π requires its direction.
+/// Eq. (7).
 Eigen::Vector3d calc_rotor_drag(const Eigen::Vector3d& f_Q_W, const Eigen::Vector3d& v_WQ,
                                 const Aerodynamics& air);
 

@@ -1,4 +1,4 @@
-/// Quantities that motion conserves or constrains: what tests and the server's self-check judge by.
+/// Quantities that motion conserves or constrains, for tests and the server's self-check.
 #pragma once
 
 #include <Eigen/Core>

@@ -8,10 +8,10 @@
 
 namespace sls::model {
 
-/// At most so many signals of a plant, and so many numbers of a controller's memory.
+/// Maximum number of signals of a plant, and of numbers in a controller's memory.
 inline constexpr int kMaxNumbers = 64;
 
-/// Up to 64 numbers, kept in place.
+/// Up to 64 numbers, stored without allocation.
 using Numbers = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxNumbers, 1>;
 
 /// Attitude of the quadrotor's body B (x forward, y right, z down) in W. A point mass stays level.
@@ -22,7 +22,7 @@ struct Attitude {
 
 struct Measurement : SlungLoadState {
   Measurement() = default;
-  /// Of a point mass: level, without signals.
+  /// The measurement of a point mass: level, without signals.
   Measurement(const SlungLoadState& state) : SlungLoadState(state) {}
 
   Attitude attitude;

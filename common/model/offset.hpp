@@ -1,5 +1,4 @@
-/// Errors of what is measured: numbers that are added, and an attitude that is turned. Source:
-/// README.md.
+/// Measurement errors: added numbers and a turned attitude. Source: README.md.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,11 +15,11 @@ struct StateOffset {
   RodAngles rod;                                       ///< rad, rad/s; the load moves accordingly
 };
 
-/// Whether any of `rod` is other than 0.
+/// True if any number of `rod` is not 0.
 bool moves_rod(const RodAngles& rod);
 
-/// `state` with `offset` added. Attitude and signals stay as they are, and so does every bit of the
-/// rod's where `offset.rod` is 0. `rod_length` (m) counts where it is not.
+/// `state` with `offset` added. Attitude and signals do not change. If `offset.rod` is 0, the rod's
+/// angles and rates keep every bit; else the load moves with the rod of length `rod_length` (m).
 Measurement add(const Measurement& state, const StateOffset& offset, double rod_length);
 
 /// Constant error of a measured attitude.
@@ -31,7 +30,7 @@ struct AttitudeError {
   bool is_zero() const { return tilt.isZero(0.0) && yaw == 0.0; }
 };
 
-/// The attitude that is measured where `q_WB` is true. Source: README.md, eq. (9).
+/// The measured attitude if the true one is `q_WB`. Source: README.md, eq. (9).
 Eigen::Quaterniond turn(const Eigen::Quaterniond& q_WB, const AttitudeError& error);
 
 }  // namespace sls::model

@@ -21,7 +21,7 @@ struct RodDirection {
   Eigen::Vector3d n_dot_W = Eigen::Vector3d::Zero();  ///< 1/s, n_W · n_dot_W = 0
 };
 
-/// Everything a state sample says about the bodies.
+/// The motion of both bodies, as a state sample carries it.
 struct SlungLoadState {
   Eigen::Vector3d p_WQ = Eigen::Vector3d::Zero();  ///< quadrotor position, m
   Eigen::Vector3d v_WQ = Eigen::Vector3d::Zero();  ///< quadrotor velocity, m/s

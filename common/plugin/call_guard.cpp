@@ -26,14 +26,15 @@ constexpr auto kReportAfter = 2s;
 
 std::atomic<double> patience_s{60.0};
 
-/// State of one thread. Odd: inside a library. The watchdog reads it without a lock.
+/// State of one thread. `calls` is odd while the thread is inside a library. The watchdog reads it
+/// without a lock.
 struct ThreadRecord {
   std::atomic<std::uint64_t> calls{0};
   Call call;
   std::array<char, 16384> signal_stack;  // a stack overflow leaves no room on the thread's own
 };
 
-/// Text of a call, without allocation: also for signal handlers.
+/// A line of text, built without allocation because signal handlers use it.
 class Line {
  public:
   Line& begin(std::string_view level) {
@@ -80,13 +81,14 @@ void report_crash(int number) {
         .add(static_cast<std::uint64_t>(number))
         .add(")\n")
         .write_to_stderr();
-  // SA_RESETHAND: what raised the signal raises it again, and now it ends the process.
+  // SA_RESETHAND has restored the default action, so the second signal ends the process. abort()
+  // itself raises SIGABRT again.
   if (number == SIGABRT) return;
   ::raise(number);
 }
 
-/// Watches every thread that has ever called a library. One thread of its own, because those that
-/// call hang with the library.
+/// Watches every thread that has called a library. It has its own thread, because a call that does
+/// not return blocks the calling thread.
 class Watchdog {
  public:
   static Watchdog& instance() {
@@ -150,11 +152,11 @@ class Watchdog {
     if (is_over) ::_exit(1);
   }
 
-  std::mutex mutex_;  // over watched_
+  std::mutex mutex_;  // guards watched_
   std::vector<Watched> watched_;
 };
 
-/// Registers the thread for as long as it lives.
+/// Registers the thread with the watchdog until the thread ends.
 struct Registration {
   Registration() {
     stack_t stack{};
@@ -170,7 +172,7 @@ struct Registration {
     Watchdog::instance().remove(&record);
   }
   ThreadRecord record;
-  stack_t others{};  // what the thread had before
+  stack_t others{};  // the thread's signal stack before
 };
 
 }  // namespace

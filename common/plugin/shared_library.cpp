@@ -44,7 +44,8 @@ SharedLibrary::SharedLibrary(const std::filesystem::path& file, const std::strin
   const std::uint64_t mode = floating_point_mode();
   {
     const CallGuard guard({name_.c_str(), "(loading)", 0, 0});
-    // An absolute path: without a slash the loader would search the system's folders.
+    // The path is absolute because the loader searches the system's folders for one without a
+    // slash.
     handle_ = ::dlopen(std::filesystem::absolute(file).c_str(), RTLD_NOW | RTLD_LOCAL);
   }
   if (floating_point_mode() != mode) {

@@ -1,5 +1,5 @@
-/// A shared library of the user's own. Every call into it is guarded: what it does wrong is named
-/// with library, function, vehicle and step.
+/// A shared library that the user supplies. Every call into it is guarded: error messages name
+/// library, function, vehicle and step.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace sls::plugin {
 
-/// Where a call into a library stands. `library` and `function` must outlive the call.
+/// Identifies a call into a library. `library` and `function` must outlive the call.
 struct Call {
   const char* library = "";
   const char* function = "";
@@ -21,9 +21,9 @@ struct Call {
   std::string describe() const;
 };
 
-/// Marks the thread as being inside a library while it lives. If the process crashes meanwhile, it
-/// says where on stderr before it ends; if the call does not return, it says so after 2 s, and ends
-/// the process with exit code 1 after 60 s, or what `set_patience` said last.
+/// Marks the thread as inside a library while the object exists. If the thread crashes meanwhile, a
+/// line on stderr names the call before the process ends. A call that does not return is reported
+/// after 2 s. After 60 s, or the time given to `set_patience`, the process ends with exit code 1.
 class CallGuard {
  public:
   explicit CallGuard(const Call& call);
@@ -32,19 +32,19 @@ class CallGuard {
   CallGuard& operator=(const CallGuard&) = delete;
 };
 
-/// How long a call may take from now on.
+/// Sets the longest time that a call may take from now on, in s.
 void set_patience(double seconds);
 
 /// The floating-point mode of this thread: rounding, flush to zero, traps; not the status flags.
 std::uint64_t floating_point_mode();
 void restore_floating_point_mode(std::uint64_t mode);
 
-/// One line on stderr.
+/// Prints a warning of one line on stderr.
 void warn(const char* message);
 
 /// Calls `work` inside a library.
 /// @throws std::runtime_error if the call throws, or changes the floating-point mode (which is then
-///   put back).
+///   restored).
 template <class Work>
 void call_guarded(const Call& call, const Work& work) {
   const std::uint64_t mode = floating_point_mode();
@@ -67,7 +67,7 @@ void call_guarded(const Call& call, const Work& work) {
   if (!defect.empty()) throw std::runtime_error(call.describe() + ": " + defect);
 }
 
-/// The same for `destroy`, after which nothing can be refused: what goes wrong is a warning.
+/// The same for `destroy`. An error is only a warning, because nothing can be refused any more.
 template <class Work>
 void call_at_end(const Call& call, const Work& work) noexcept {
   try {
@@ -79,15 +79,15 @@ void call_at_end(const Call& call, const Work& work) noexcept {
 
 class SharedLibrary {
  public:
-  /// Loads `file`. `place` is FILE:LINE: KEY of the scenario, for messages; it stays loaded.
-  /// @throws config::ConfigError if it is missing, cannot be loaded or changes the floating-point
-  ///   mode while it is.
+  /// Loads `file`, which stays loaded. `place` is FILE:LINE: KEY of the scenario, for messages.
+  /// @throws config::ConfigError if the file is missing, cannot be loaded or changes the
+  ///   floating-point mode while loading.
   SharedLibrary(const std::filesystem::path& file, const std::string& place);
 
   /// Address of `symbol`. @throws config::ConfigError if there is none.
   void* find(const char* symbol) const;
 
-  /// Calls `work` before the flight. @throws config::ConfigError `PLACE: …` as call_guarded.
+  /// Calls `work` before the flight. @throws config::ConfigError `PLACE: …` if call_guarded throws.
   template <class Work>
   void call(const Call& call, const Work& work) const {
     try {

@@ -1,5 +1,5 @@
-/// Common to plants, laws and autopilots in shared libraries: the check of a library's
-/// table of functions, the making of its object, vectors as C has them.
+/// Common to plants, laws and autopilots in shared libraries: checks a library's table of
+/// functions, creates its object, converts the vectors of C structs.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,16 +14,16 @@
 
 namespace sls::plugin {
 
-/// Room for the text with which a library refuses.
+/// Buffer for the error message of a library.
 class ErrorText {
  public:
   char* data() { return text_.data(); }
   std::size_t size() const { return text_.size() - 1; }
-  /// Ends at the first line's end; never empty.
+  /// The first line of the message; a default text if that is empty.
   std::string text() const;
 
  private:
-  std::array<char, 513> text_{};  // the last byte stays 0, whatever the library does
+  std::array<char, 513> text_{};  // the last byte stays 0: `size()` excludes it
 };
 
 /// Vectors as a C struct holds them.
@@ -43,8 +43,8 @@ inline Eigen::Quaterniond to_quaternion(const double (&from)[4]) {
   return {from[0], from[1], from[2], from[3]};
 }
 
-/// Why `length` is not that of a unit vector or quaternion; empty if it is. A library may be off
-/// by 1e-6.
+/// The error message if `length` is not that of a unit vector or quaternion within 1e-6; else
+/// empty.
 std::string find_length_defect(double length, const std::string& kind, const std::string& name);
 
 /// @throws config::ConfigError if a library was compiled against another header.
@@ -53,7 +53,7 @@ void check_size(const SharedLibrary& library, const std::string& type, std::size
                 std::size_t got);
 
 /// The table that the function `call.function` of a library returns.
-/// @throws config::ConfigError if there is none, or where it is one of another header.
+/// @throws config::ConfigError if there is none, or if it was compiled against another header.
 template <class Functions>
 const Functions& load_table(const SharedLibrary& library, const Call& call, std::uint32_t version) {
   const std::string function = call.function;
@@ -67,7 +67,7 @@ const Functions& load_table(const SharedLibrary& library, const Call& call, std:
 }
 
 /// The result of `create(error, error_size)` of a library. `place` is FILE:LINE: KEY.
-/// @throws config::ConfigError `PLACE: LIBRARY: TEXT` where the library refuses.
+/// @throws config::ConfigError `PLACE: LIBRARY: TEXT` if the library creates no object.
 template <class Create>
 void* create_object(const SharedLibrary& library, const Call& call, const std::string& place,
                     const Create& create) {
