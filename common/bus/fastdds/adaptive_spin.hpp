@@ -5,12 +5,12 @@
 
 namespace sls::bus {
 
-/// Looks for something for a while, before its caller sleeps until it is there. Waking a thread on
-/// a halted processor takes longer than a step of the loop.
+/// Polls a condition for a while before the caller sleeps, because waking a thread on a halted
+/// processor takes longer than a step of the loop.
 ///
-/// Looking in vain costs time that the sender may need. So after a failure the next wait sleeps at
-/// once, after a second one in a row the next three, and so on; each success halves their number.
-/// Where the sender shares our processor, is far away or has much to do, hardly anybody looks.
+/// Polling in vain takes time that the sender may need. So after a failure the next wait sleeps at
+/// once, after a second failure in a row the next three waits, and so on; each success halves this
+/// number. So there is hardly any polling if the sender shares our processor, is far away or busy.
 class AdaptiveSpin {
  public:
   using Clock = std::chrono::steady_clock;
@@ -18,7 +18,7 @@ class AdaptiveSpin {
   static constexpr std::chrono::microseconds kLongest{100};
   static constexpr int kMostSkipped = 1023;
 
-  /// `looks_per_time`: how often to look between two looks at the clock.
+  /// `looks_per_time`: number of polls between two readings of the clock.
   explicit AdaptiveSpin(int looks_per_time) : looks_per_time_(looks_per_time) {}
 
   /// True as soon as `is_there()` is; false after `kLongest`, or at once if this wait is skipped.
@@ -44,8 +44,8 @@ class AdaptiveSpin {
   }
 
  private:
-  /// Leaves the core to its other hardware thread for some ten cycles. Not sched_yield: where
-  /// others want the processor too, the thread then gets it back a time slice later.
+  /// Leaves the core to its other hardware thread for some ten cycles. Not sched_yield: if other
+  /// threads are ready, this thread would run again only a time slice later.
   static void rest() {
 #if defined(__x86_64__) || defined(__i386__)
     __builtin_ia32_pause();
@@ -55,7 +55,7 @@ class AdaptiveSpin {
   }
 
   int looks_per_time_;
-  int to_skip_ = 0;  ///< waits between two that look
+  int to_skip_ = 0;  ///< waits without polling between two with polling
   int skipped_ = 0;
 };
 

@@ -1,5 +1,5 @@
-/// The bounds of the sequences in idl/sls.idl, which the generated code does not check. A sequence
-/// beyond its bound cannot be sent on.
+/// Checks the bounds of the sequences in idl/sls.idl, because the generated code does not. A
+/// sequence beyond its bound cannot be sent again in another sample.
 #pragma once
 
 #include <sls.h>
@@ -9,14 +9,15 @@
 
 namespace sls::bus {
 
-/// "64 vehicles, got 65"; empty if there are no more.
+/// "64 vehicles, got 65"; empty if there are at most `most` elements.
 template <class Element>
 std::string find_excess(const char* name, const std::vector<Element>& sequence, std::size_t most) {
   if (sequence.size() <= most) return "";
   return std::to_string(most) + " " + name + ", got " + std::to_string(sequence.size());
 }
 
-/// Of the first sequence that is too long.
+/// The same for the first sequence of a message that is too long. This default is for messages
+/// without bounded sequences.
 template <class Message>
 std::string find_excess(const Message&) {
   return "";
@@ -42,7 +43,7 @@ inline std::string find_excess(const RecordEntry& entry) {
   return excess.empty() ? find_excess(entry.answer()) : excess;
 }
 
-/// Of the sequence, then of its elements.
+/// The same for a sequence and then for its elements.
 template <class Element>
 std::string find_excess_of_each(const char* name, const std::vector<Element>& sequence,
                                 std::size_t most) {

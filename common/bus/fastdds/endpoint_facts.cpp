@@ -58,7 +58,7 @@ std::string to_words(const std::vector<std::string>& partitions) {
   return words.empty() ? "none" : words;
 }
 
-/// Nothing stands for the default.
+/// An empty list means the default, XCDR1.
 std::vector<int> to_list(std::vector<int> representations) {
   if (representations.empty()) representations = {kXcdr1};
   return representations;
@@ -71,7 +71,7 @@ bool share_one(const std::vector<Value>& a, const std::vector<Value>& b) {
   });
 }
 
-/// A shorter period is the stricter one.
+/// True if the writer offers a longer period than the reader requests. No period: infinite.
 bool is_longer(const std::optional<std::chrono::nanoseconds>& offered,
                const std::optional<std::chrono::nanoseconds>& asked) {
   return asked && (!offered || *offered > *asked);

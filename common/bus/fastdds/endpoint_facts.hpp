@@ -1,5 +1,5 @@
-/// The properties in which two endpoints of one topic must agree. No Fast DDS here: neighbours.hpp
-/// fills it in.
+/// The properties in which two endpoints of one topic must agree. No Fast DDS here: facts_of.hpp
+/// fills them in.
 #pragma once
 
 #include <chrono>
@@ -27,18 +27,19 @@ struct EndpointFacts {
   std::vector<std::string> partitions;
 };
 
-/// One thing in which they differ, in words: "DEADLINE: offered none, asked 0.1 s".
+/// One difference; `text` is like "DEADLINE: offered none, asked 0.1 s".
 struct Mismatch {
   std::string policy;
   std::string text;
 };
 
-/// Why a writer of the topic does not reach the reader, or its samples cannot be read there: type,
-/// key, data representation, or the policies of the DDS standard. Empty if all is well.
+/// The reasons why the writer does not match the reader, or why its samples cannot be read there:
+/// data representation and the policies of the DDS standard. Empty if there are none.
 std::vector<Mismatch> find_mismatches(const EndpointFacts& writer, const EndpointFacts& reader);
 
-/// The same of an endpoint of our own and another one, of which one is a writer; of two writers or
-/// readers and of other topics nothing. A wrong type is named by what was expected of the other.
+/// The same for an endpoint of our own and another one; also compares type and key, of which the
+/// text names what was expected of the other endpoint. Empty for two writers, for two readers and
+/// for different topics.
 std::vector<Mismatch> compare(const EndpointFacts& own, const EndpointFacts& other);
 
 /// True if only a program of the first contract has such an endpoint.

@@ -35,7 +35,7 @@ inline std::optional<std::chrono::nanoseconds> to_period(
 
 namespace detail {
 
-/// `Qos`: what both writers and readers have, of this program or of another.
+/// Fills in the policies that writers and readers of this program and of others have.
 template <class Reliability, class Durability, class Deadline, class Liveliness, class Ownership>
 void fill(EndpointFacts& facts, const Reliability& reliability, const Durability& durability,
           const Deadline& deadline, const Liveliness& liveliness, const Ownership& ownership) {
@@ -49,7 +49,7 @@ void fill(EndpointFacts& facts, const Reliability& reliability, const Durability
 
 }  // namespace detail
 
-/// Of an endpoint of another participant: `Proxy` is what it announces.
+/// The facts of an endpoint of another participant. `Proxy` is the type of its announcement.
 template <class Proxy>
 EndpointFacts make_facts(const Proxy& proxy) {
   EndpointFacts facts;
@@ -65,7 +65,7 @@ EndpointFacts make_facts(const Proxy& proxy) {
   return facts;
 }
 
-/// Of one of our own, which are unkeyed.
+/// The facts of an endpoint of our own, which has no key.
 inline EndpointFacts make_facts(const eprosima::fastdds::dds::DataWriter& writer) {
   EndpointFacts facts;
   facts.topic = writer.get_topic()->get_name();

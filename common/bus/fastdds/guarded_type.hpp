@@ -22,10 +22,10 @@ class MisfitReport {
                       const char* type, const std::string& defect) = 0;
 };
 
-/// The one in force; none outside of a reader's `take`.
+/// The receiver in use; null outside of a reader's `take`.
 inline thread_local MisfitReport* misfit_report = nullptr;
 
-/// Puts `report` in force while it lives.
+/// Makes `report` the receiver in use while this object exists.
 class MisfitScope {
  public:
   explicit MisfitScope(MisfitReport& report) { misfit_report = &report; }
@@ -34,11 +34,11 @@ class MisfitScope {
   MisfitScope& operator=(const MisfitScope&) = delete;
 };
 
-/// Where a reader in this thread wants samples as they came, with their encapsulation header; null
-/// outside of a raw reader's `take`. They are not decoded then.
+/// Buffer for samples that a raw reader in this thread takes: their bytes with the encapsulation
+/// header, not decoded. Null outside of a raw reader's `take`.
 inline thread_local std::vector<std::uint8_t>* raw_target = nullptr;
 
-/// Puts `target` in force while it lives.
+/// Makes `target` the buffer in use while this object exists.
 class RawScope {
  public:
   explicit RawScope(std::vector<std::uint8_t>* target) { raw_target = target; }
@@ -47,22 +47,22 @@ class RawScope {
   RawScope& operator=(const RawScope&) = delete;
 };
 
-/// A generated type support whose `deserialize` refuses malformed samples. The generated one lets
-/// most exceptions of the serialisation library through, which end the process: one sample of any
-/// stranger would do (README.md, traps 15 and 23). And it takes samples with bytes left over:
-/// those of another type, whose fields it reads in the wrong places (trap 25), and sequences beyond
-/// their bounds, which cannot be sent on (bounds.hpp).
+/// A generated type support whose `deserialize` refuses malformed samples. The generated function
+/// does not catch most exceptions of the serialisation library: one malformed sample from any
+/// program ends the process (README.md, traps 15 and 23). It also accepts samples of another
+/// type, which have bytes left over, and reads their fields in the wrong places (trap 25). It
+/// accepts sequences beyond their bounds, too (bounds.hpp).
 ///
 /// Upstream: Fast-CDR #144; Fast DDS 2.11 catches more, but not std::bad_alloc. To be deleted when
-/// the generated function catches every exception, makes no more elements than a sample's length
-/// allows and refuses what is longer than its type; guarded_type_test.cpp then passes without.
+/// the generated function catches every exception, creates no more elements than a sample's length
+/// allows and refuses left-over bytes; guarded_type_test.cpp then passes without this class.
 template <class Generated>
 class GuardedType : public Generated {
  public:
   bool deserialize(eprosima::fastrtps::rtps::SerializedPayload_t* payload, void* data) override {
     using eprosima::fastcdr::Cdr;
-    // A payload longer than any sample may claim elements without end, which are made before they
-    // are read.
+    // A payload longer than any sample can claim a huge number of elements, and Fast CDR creates
+    // them before it reads them.
     if (payload->length > this->m_typeSize)
       return refuse(*payload, data,
                     "expected at most " + std::to_string(this->m_typeSize) + " bytes, got " +
@@ -71,7 +71,7 @@ class GuardedType : public Generated {
       raw_target->assign(payload->data, payload->data + payload->length);
       return true;
     }
-    // As the generated function, which does not say where it ended.
+    // The same as in the generated function, which does not return the number of bytes read.
     eprosima::fastcdr::FastBuffer buffer(reinterpret_cast<char*>(payload->data), payload->length);
     Cdr cdr(buffer, Cdr::DEFAULT_ENDIAN, Cdr::DDS_CDR);
     try {
@@ -98,7 +98,7 @@ class GuardedType : public Generated {
 
   bool refuse(const eprosima::fastrtps::rtps::SerializedPayload_t& payload, void* data,
               const std::string& defect) const {
-    // The claimed but absent elements may be a thousand times its size.
+    // Frees the elements that the sample claimed: up to a thousand times the sample's size.
     *static_cast<typename Generated::type*>(data) = typename Generated::type();
     if (misfit_report) misfit_report->report(payload, this->getName(), defect);
     return false;

@@ -5,8 +5,8 @@
 
 namespace sls::bus {
 
-/// True from then on: nothing reads this process's ports of shared memory any more, and a stopped
-/// process that holds a lock of one must not keep this one from ending (shared_locks.cpp).
+/// True from that time on. Nothing reads this process's ports of shared memory any more, so a
+/// stopped process that holds a lock of such a port must not block the exit (shared_locks.cpp).
 inline std::atomic<bool> is_leaving{false};
 
 }  // namespace sls::bus

@@ -105,7 +105,7 @@ void Neighbours::judge(const Endpoint& endpoint, const EndpointFacts& facts) {
                                                 "it was built from an older sls.idl)"}});
     return;
   }
-  if (is_of_contract_1(peer)) return;  // said once, and all that follows from it
+  if (is_of_contract_1(peer)) return;  // already reported; explains all other mismatches
   std::string text, missing_deadline;
   for (const EndpointFacts& own : own_)
     for (const Mismatch& mismatch : compare(own, facts)) {
@@ -119,7 +119,7 @@ void Neighbours::judge(const Endpoint& endpoint, const EndpointFacts& facts) {
     missing_deadlines_.erase(endpoint);
   else
     missing_deadlines_[endpoint] = missing_deadline;
-  // Types compiled wrongly are so on every topic: that is said once.
+  // Wrongly compiled types differ on every topic, so they are reported once per participant.
   const bool is_of_types = text.find("DATA_REPRESENTATION") != text.npos;
   const std::string key = (is_of_types ? make_key(peer) : make_key(peer, id)) + "fit";
   if (text.empty())

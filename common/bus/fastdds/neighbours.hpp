@@ -16,12 +16,12 @@
 
 namespace sls::bus {
 
-/// The participants that one participant of ours has discovered, and what of their endpoints does
-/// not fit ours: it begins and ends those `Problems`. Only topics that begin with "sls/" count.
+/// The participants that one participant of ours has discovered. Compares their endpoints with ours
+/// and adds mismatches to `Problems` while they last. Only topics that begin with "sls/" count.
 ///
-/// The middleware says no more than that some endpoint did not fit. Upstream: none reported; the
-/// standard's status of incompatible QoS names neither the other endpoint nor the values, and there
-/// is none for another type or representation. To be deleted when there is.
+/// The middleware only reports that some endpoint did not match. Upstream: none reported. The
+/// standard's status of incompatible QoS names neither the other endpoint nor the values, and no
+/// status reports another type or representation. To be deleted when the statuses contain these.
 class Neighbours {
  public:
   static constexpr std::size_t kMostParticipants = 1000;
@@ -32,7 +32,7 @@ class Neighbours {
 
   explicit Neighbours(Problems& problems) : problems_(problems) {}
 
-  /// Our own participant's endpoints are no neighbours.
+  /// Sets our own participant, whose endpoints are ignored.
   void set_self(const PeerId& self);
 
   void note_participant(const PeerId& peer, const std::string& name, const std::string& address);
@@ -40,7 +40,7 @@ class Neighbours {
   void note_endpoint(const PeerId& peer, const EntityId& id, const EndpointFacts& facts);
   void drop_endpoint(const PeerId& peer, const EntityId& id);
 
-  /// An endpoint of our own begins and ends.
+  /// Adds and removes an endpoint of our own.
   void add_own(const EndpointFacts& facts);
   void drop_own(const EndpointFacts& facts);
 
@@ -48,18 +48,18 @@ class Neighbours {
   void note_misfit(const PeerId& peer, const EntityId& writer, const std::string& topic,
                    const std::string& type, const std::string& defect);
 
-  /// Something else that a participant does wrong until it leaves.
+  /// Adds another mistake of a participant, which lasts until the participant leaves.
   void note_problem(const PeerId& peer, const std::string& key, const std::string& text);
 
-  /// 'foo' (10.0.0.2): what the participant says of itself.
+  /// 'foo' (10.0.0.2): name and address that the participant announces.
   std::string describe(const PeerId& peer) const;
 
-  /// Participants that a problem of ours names.
+  /// Participants for which `Problems` has an entry of this object.
   std::set<PeerId> find_misfits() const;
 
-  /// Writers of sls/command that offer a longer DEADLINE than ours asks, or none, in words; by
-  /// their participants. That is no mistake of those who fly for another server, in lockstep: the
-  /// server judges, who knows whom they serve.
+  /// Texts about the writers of sls/command that offer a longer DEADLINE than our reader requests,
+  /// or none; by participant. This is no mistake of a client that serves another server in
+  /// lockstep. The server decides, because it has the run that each client announces.
   std::map<PeerId, std::string> find_missing_deadlines() const;
 
  private:

@@ -16,12 +16,12 @@
 
 namespace sls::bus {
 
-/// Tells `Refusals` who was discovered, accepted and refused, and `Neighbours` which participants
-/// and endpoints there are. Our own endpoints have listeners of their own. To be deleted with
+/// Reports discovered, accepted and refused participants to `Refusals`, and all participants and
+/// endpoints to `Neighbours`. Our own endpoints have their own listeners. To be deleted with
 /// refusals.hpp and neighbours.hpp.
 class ParticipantListener : public eprosima::fastdds::dds::DomainParticipantListener {
  public:
-  /// `is_secured`: whether this participant is.
+  /// `is_secured`: true if this participant uses DDS Security.
   explicit ParticipantListener(bool is_secured, Neighbours* neighbours = nullptr)
       : is_secured_(is_secured), neighbours_(neighbours) {}
 
@@ -89,14 +89,15 @@ class ParticipantListener : public eprosima::fastdds::dds::DomainParticipantList
     return text.str();
   }
 
-  /// 'control_client' (10.77.0.2, 01.0f.…): what a participant says of itself.
+  /// 'control_client' (10.77.0.2, 01.0f.…): name, address and GUID prefix that a participant
+  /// announces.
   static std::string describe(const eprosima::fastrtps::rtps::ParticipantProxyData& participant) {
     const std::string address = find_address(participant);
     return "'" + config::to_printable(participant.m_participantName.to_string()) + "' (" + address +
            (address.empty() ? "" : ", ") + to_text(participant.m_guid.guidPrefix) + ")";
   }
 
-  /// The first IPv4 address at which it hears; empty if it has none.
+  /// The first IPv4 address at which it receives discovery data; empty if it has none.
   static std::string find_address(
       const eprosima::fastrtps::rtps::ParticipantProxyData& participant) {
     for (const auto& locator : participant.metatraffic_locators.unicast)
@@ -105,7 +106,7 @@ class ParticipantListener : public eprosima::fastdds::dds::DomainParticipantList
     return "";
   }
 
-  /// 'O=SLS, CN=…' of 'O=SLS, CN=identity authority …': what it says of its identity.
+  /// 'O=SLS, CN=…' of 'O=SLS, CN=identity authority …': certificate and authority that it claims.
   template <class Token>
   static std::string describe_identity(const Token& token) {
     std::string certificate, authority;

@@ -1,7 +1,7 @@
-/// Stands before a function of the C library in the programs that link it (sim_server,
-/// control_client, recorder): a thread that waits for a datagram looks for it for a while before it
-/// sleeps, where `is_spinning` (common/bus/spinning.hpp). shared_locks.cpp does the same for the
-/// semaphores of shared memory.
+/// Replaces `recvfrom` of the C library in the programs that link this file (sim_server,
+/// control_client, recorder). If `is_spinning` (common/bus/spinning.hpp), a thread that waits for a
+/// datagram polls for it before it sleeps. shared_locks.cpp does the same for the semaphores of
+/// shared memory.
 ///
 /// Upstream: none reported. To be deleted when a transport of Fast DDS can spin.
 #include <dlfcn.h>
@@ -15,7 +15,7 @@
 ssize_t recvfrom(int socket, void* buffer, std::size_t length, int flags, sockaddr* sender,
                  socklen_t* sender_length) {
   static const auto next = reinterpret_cast<decltype(&recvfrom)>(dlsym(RTLD_NEXT, "recvfrom"));
-  thread_local sls::bus::AdaptiveSpin spin(1);  // each look is a system call
+  thread_local sls::bus::AdaptiveSpin spin(1);  // each poll is a system call
   const bool waits = (flags & MSG_DONTWAIT) == 0;
   if (waits && sls::bus::is_spinning.load(std::memory_order_relaxed)) {
     ssize_t received = 0;

@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::chrono::seconds kWindow(10);
 
-/// In our words where those of Fast DDS leave the user without a hint.
+/// Replaces those messages of Fast DDS that give the user no hint.
 std::string explain(const std::string& message) {
   const auto has = [&](const char* text) { return message.find(text) != std::string::npos; };
   if (has("verification of the permissions file"))
@@ -76,7 +76,7 @@ void Refusals::note_refused(const std::string& guid, const std::string& cause) {
 }
 
 void Refusals::note_cause(const std::string& message) {
-  if (message.find("Error verifying certificate") == 0) return;  // why has just been logged
+  if (message.find("Error verifying certificate") == 0) return;  // the line before has the reason
   const std::lock_guard lock(mutex_);
   const auto named = std::find_if(known_.begin(), known_.end(), [&](const auto& participant) {
     return message.find(participant.first) != std::string::npos;
@@ -96,7 +96,7 @@ void Refusals::watch() {
     if (next == pending_.end()) {
       changed_.wait(lock);
     } else if (Clock::now() < next->second.deadline) {
-      const auto deadline = next->second.deadline;  // `next` may be gone meanwhile
+      const auto deadline = next->second.deadline;  // `next` may be erased meanwhile
       changed_.wait_until(lock, deadline);
     } else {
       report(next->first, "no proof of an identity that holds here within " +

@@ -11,12 +11,11 @@
 
 namespace sls::bus {
 
-/// Says on stderr who was kept from a secured domain, and why: one line per participant, and no
-/// more than `kMostLines` in 10 s, whatever an attacker sends. The name of a participant is what
-/// it says of itself.
+/// Logs which participants a secured domain refuses, and why: one line per participant, and at most
+/// `kMostLines` in 10 s even during an attack. The name of a participant is the one it announces.
 ///
-/// The middleware's events lack the reason, and at the end that began the handshake there is none
-/// at all (README.md, trap 17). Upstream: none reported. To be deleted when both ends get an event
+/// The middleware's events lack the reason, and the end that began the handshake gets no event at
+/// all (README.md, trap 17). Upstream: none reported. To be deleted when both ends get an event
 /// with the reason.
 class Refusals {
  public:
@@ -30,22 +29,23 @@ class Refusals {
   Refusals(const Refusals&) = delete;
   Refusals& operator=(const Refusals&) = delete;
 
-  /// The one of this process, because the log of the middleware is one; never destroyed, as the
-  /// middleware may still log while the process exits.
+  /// The only instance, because a process has only one log of the middleware. It is never
+  /// destroyed, because the middleware may still log while the process exits.
   static Refusals& of_process();
 
-  /// A participant was discovered, and is called `description`. Unless `note_accepted` comes in
-  /// time it is reported with `claim`, what it says of its identity; nothing is expected without
-  /// one.
+  /// Adds a discovered participant with its description. If it has a `claim`, the identity that it
+  /// announces, it is reported unless `note_accepted` is called within `kTimeToProve`.
   void note_discovered(const std::string& guid, const std::string& description,
                        const std::string& claim = {});
   void note_accepted(const std::string& guid);
   void note_gone(const std::string& guid);
 
-  /// It was refused: for `cause`, or for what the middleware has just logged, as far as it did.
+  /// Reports a refused participant with `cause` or, if that is empty, with the cause that the
+  /// middleware has just logged. Without any cause it reports nothing.
   void note_refused(const std::string& guid, const std::string& cause = {});
 
-  /// A line of the middleware's security log: a refusal, or the cause of one in `note_refused`.
+  /// Takes a line of the middleware's security log. If it names a known participant, it is reported
+  /// as a refusal; otherwise it is kept as the cause for `note_refused`.
   void note_cause(const std::string& message);
 
  private:

@@ -1,25 +1,25 @@
-/// Stands before four functions of the C library in the programs that link it (sim_server,
-/// control_client, recorder), so that they live with processes that are killed or stopped in the
-/// middle of a lock of shared memory.
+/// Replaces four functions of the C library in the programs that link this file (sim_server,
+/// control_client, recorder). These programs then keep working when another process is killed or
+/// stopped while it holds a lock in shared memory.
 ///
 /// Fast DDS 2.9 passes messages on one machine through shared-memory ports, each with a mutex and a
-/// semaphore. At 5,000 steps/s about one in fourteen SIGKILLs hit a process that held such a mutex,
-/// and then every write of every other process to that port took a second, until
-/// `healthy_check_timeout_ms` was over. So in these programs
-/// - a mutex made for several processes goes to the next that waits when its holder dies;
-/// - a thread that waits for a mutex whose holder is stopped gives up after 50 ms (of 1 s): that
-///   message is lost, and a reliable stream sends it again (a stopped process is found where both
-///   see the same process ids, so not from one container to another);
-/// - a reader looks at its port ten times a second, and not only when it is woken: a process that
-///   dies after a message and before the call that wakes the reader leaves a port that wakes
-///   nobody;
-/// - a reader waits for the locks of its own port as long as it takes: where it gives up after 1 s,
-///   the library ends its process. But a process that closes its ports goes on without a lock whose
-///   holder is stopped: nothing reads them any more.
+/// semaphore. At 5,000 steps/s about one in fourteen SIGKILLs hit a process that held such a mutex.
+/// Then every write of every other process to that port took 1 s, until `healthy_check_timeout_ms`
+/// was over. So in these programs
+/// - a mutex shared by several processes is robust: when its holder dies, the next waiting thread
+///   gets it;
+/// - a thread that waits for a mutex whose holder is stopped gives up after 50 ms instead of 1 s:
+///   that message is lost, and a reliable stream sends it again. This requires that both processes
+///   are in one PID namespace, so it does not work from one container to another;
+/// - a reader polls its port ten times a second, because a process may die after it has written a
+///   message and before it wakes the reader;
+/// - a reader waits for the locks of its own port without a time limit, because the library ends
+///   the process of a reader that gives up after 1 s. But a process that closes its ports goes on
+///   without a lock whose holder is stopped, because nothing reads these ports any more.
 ///
-/// Upstream: #5469 (open) has the symptom, none names the locks. To be deleted when the mutexes of
-/// ports are robust and a reader does not rely on being woken; tests/system/shared_lock_test.cpp
-/// then passes without.
+/// Upstream: #5469 (open) has the symptom; no issue names the locks. To be deleted when the mutexes
+/// of ports are robust and a reader does not rely on being woken; tests/system/shared_lock_test.cpp
+/// then passes without this file.
 #include <dlfcn.h>
 #include <linux/futex.h>
 #include <pthread.h>
@@ -47,10 +47,10 @@ constexpr std::int64_t kPatienceWithStopped_ns = kSecond_ns / 20;
 constexpr std::int64_t kLook_ns = kSecond_ns / 10;
 constexpr int kRobustBit = 16;  // of the kind of a mutex in the C library
 
-/// Locks of the ports that threads of this process read, the latest of them. Two per port, taken
-/// one after the other when a reader has waited there. For them a reader waits as long as it takes:
-/// where it gives up, the library ends the process or replaces the port. The same holds for
-/// a process that closes the port.
+/// The latest locks of the ports that threads of this process read. A port has two, which a reader
+/// takes one after the other after its wait for messages. A reader waits for them without a time
+/// limit: if it gives up, the library ends the process or replaces the port. The same holds for a
+/// process that closes the port.
 std::array<std::atomic<const pthread_mutex_t*>, 16> own_locks{};
 thread_local int own_locks_to_come = 0;
 
@@ -64,7 +64,7 @@ void remember_as_own(const pthread_mutex_t* mutex) {
   if (!is_own(mutex)) own_locks[count++ % own_locks.size()] = mutex;
 }
 
-/// The function of that name that ours stands before.
+/// The C library's function of that name, which ours replaces.
 template <class Function>
 Function* find_next(Function*, const char* name) {
   return reinterpret_cast<Function*>(dlsym(RTLD_NEXT, name));
@@ -85,19 +85,20 @@ std::int64_t now_ns() {  // of the clock of the deadlines
   return to_ns(now);
 }
 
-/// The earlier of the deadline and so long from now.
+/// The earlier of `deadline` and the time `patience_ns` from now.
 timespec limit(const timespec& deadline, std::int64_t patience_ns) {
   return to_timespec(std::min(to_ns(deadline), now_ns() + patience_ns));
 }
 
-/// A lock that a dead process held is held by us now. It guards, in a port, a ring of
-/// messages and who waits for them; only between two of the dead's instructions, which reserve a
-/// place in the ring and fill it, is there a state that its reader cannot go on from.
+/// Repairs a lock that this thread got because its holder died. The lock of a port guards a ring of
+/// messages and the list of waiting readers. Their state stays usable, except if the process died
+/// between the two instructions that reserve and fill a place in the ring.
 int take_over(int result, pthread_mutex_t* mutex) {
   return result == EOWNERDEAD ? pthread_mutex_consistent(mutex) : result;
 }
 
-/// Named semaphores have a mapping of their own; those of a port stand amid it.
+/// True for the semaphore of a port, which lies inside the port's memory. A named semaphore has its
+/// own mapping, so it begins a page.
 bool is_of_port(const sem_t* semaphore) {
   static const auto page_size = static_cast<std::uintptr_t>(sysconf(_SC_PAGESIZE));
   return reinterpret_cast<std::uintptr_t>(semaphore) % page_size != 0;
@@ -105,8 +106,8 @@ bool is_of_port(const sem_t* semaphore) {
 
 /// True if the thread that holds the mutex is stopped, by a signal or a debugger.
 bool is_holder_stopped(const pthread_mutex_t& mutex) {
-  // The first word of a robust mutex is the kernel's, and names the holder (futex(2), robust
-  // lists).
+  // The first word of a robust mutex has the thread id of the holder, for the kernel (futex(2),
+  // robust lists).
   const auto word =
       __atomic_load_n(reinterpret_cast<const std::uint32_t*>(&mutex), __ATOMIC_RELAXED);
   std::ifstream file("/proc/" + std::to_string(word & FUTEX_TID_MASK) + "/stat");
@@ -117,8 +118,8 @@ bool is_holder_stopped(const pthread_mutex_t& mutex) {
          (line[name_end + 2] == 'T' || line[name_end + 2] == 't');
 }
 
-/// Takes a lock of our own port, however long that lasts; or goes on without it where this process
-/// leaves and the holder is stopped.
+/// Takes a lock of our own port without a time limit. If this process is leaving and the holder is
+/// stopped, it goes on without the lock.
 int lock_own(decltype(pthread_mutex_timedlock)* lock_until, pthread_mutex_t* mutex) {
   while (true) {
     const timespec look = to_timespec(now_ns() + kPatienceWithStopped_ns);
@@ -127,7 +128,7 @@ int lock_own(decltype(pthread_mutex_timedlock)* lock_until, pthread_mutex_t* mut
     if (!is_leaving.load(std::memory_order_relaxed)) continue;
     static std::atomic<bool> is_forgone{false};
     if (is_forgone || is_holder_stopped(*mutex)) {
-      // The first one lets the others go ahead, before it unmaps what they look at.
+      // The first thread gives the others time to go on before it unmaps the memory they use.
       if (!is_forgone.exchange(true)) usleep(4 * kPatienceWithStopped_ns / 1000);
       return 0;
     }
@@ -138,9 +139,9 @@ int lock_own(decltype(pthread_mutex_timedlock)* lock_until, pthread_mutex_t* mut
 
 }  // namespace sls::bus
 
-// The middleware's library finds these before those of the C library. Except for unlocking, it uses
-// them only for locks between processes (boost::interprocess with a time limit); the locks of its
-// own threads go another way and cost nothing more.
+// The dynamic linker gives Fast DDS these functions instead of those of the C library. Except for
+// unlocking, Fast DDS uses them only for locks between processes (boost::interprocess with a time
+// limit). Locks between its own threads use other functions and do not get slower.
 
 int pthread_mutexattr_setpshared(pthread_mutexattr_t* attributes, int shared) noexcept {
   static const auto next =
@@ -160,8 +161,7 @@ int pthread_mutex_timedlock(pthread_mutex_t* mutex, const timespec* deadline) no
   if (is_own(mutex)) return lock_own(next, mutex);
   int result = take_over(pthread_mutex_trylock(mutex), mutex);
   if (result != EBUSY) return result;
-  // Where the holder was found stopped the last time, the next message is not to wait as long
-  // again.
+  // If the holder was stopped the last time, the next message does not wait for 50 ms again.
   thread_local const pthread_mutex_t* stopped = nullptr;
   if (mutex == stopped) {
     if (is_holder_stopped(*mutex)) return ETIMEDOUT;
@@ -181,7 +181,7 @@ int pthread_mutex_unlock(pthread_mutex_t* mutex) noexcept {
   using namespace sls::bus;
   static const auto next = find_next(&pthread_mutex_unlock, "pthread_mutex_unlock");
   const int result = next(mutex);
-  // A lock that this process went on without: boost::interprocess ends the process otherwise.
+  // EPERM: this process went on without the lock. boost::interprocess would end the process.
   return result == EPERM && is_leaving.load(std::memory_order_relaxed) ? 0 : result;
 }
 

@@ -18,12 +18,13 @@ struct SmallDatagrams : eprosima::fastdds::rtps::UDPv4TransportDescriptor {
 
 }  // namespace detail
 
-/// `transport`, or where it is UDP one that sends datagrams of at most `bytes`: larger samples go
-/// in fragments, which are repaired one by one, and repairs are not packed into datagrams that IP
-/// cuts into 45 packets, of which a link that loses a fifth delivers none (README.md, trap 27). It
-/// takes datagrams of any size: `maxMessageSize` in XML would also cut, silently, those of others.
+/// A transport like `transport` that, if it is UDP, sends datagrams of at most `bytes`. Larger
+/// samples are sent in fragments, which are repaired one by one. Without the limit, repairs are
+/// packed into datagrams that IP cuts into 45 packets; a link that loses a fifth of the packets
+/// delivers no such datagram (README.md, trap 27). Incoming datagrams may have any size;
+/// `maxMessageSize` in XML would silently cut them, too.
 ///
-/// Upstream: none reported. To be deleted when the XML limits what is sent alone.
+/// Upstream: none reported. To be deleted when XML can limit outgoing datagrams only.
 inline std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> send_small_datagrams(
     const std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface>& transport,
     std::uint32_t bytes) {

@@ -16,10 +16,10 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kPrefix = "fastrtps_", kLock = "_el";
 
-/// A segment is created a moment before its lock is taken.
+/// Younger segments may not be locked yet: a segment is created a moment before its lock is taken.
 constexpr auto kCreationTime = std::chrono::seconds(10);
 
-/// Beyond, the ports of one domain would run into those of the next.
+/// With more participants the ports of one domain would overlap those of the next.
 constexpr int kMaxParticipants = 110;
 
 /// "fastrtps_", sixteen hexadecimal digits, "_el": the lock file of a participant's segment.
@@ -32,7 +32,7 @@ bool is_segment_lock(std::string_view name) {
   return digits.find_first_not_of("0123456789abcdef") == digits.npos;
 }
 
-/// Holds a lock file's lock while it lives, if nobody else does.
+/// Locks a lock file while this object exists, unless another process holds the lock.
 class Lock {
  public:
   explicit Lock(const fs::path& file)
