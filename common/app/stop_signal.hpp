@@ -6,8 +6,8 @@ namespace sls::app {
 
 /// From now on SIGINT and SIGTERM only set a flag; loops end their step and close their files.
 /// A program still running `patience` after the first signal exits with an error line on stderr and
-/// exit code 130 or 143, because a hostile packet can leave a lock of the middleware locked for
-/// ever (tests/hostile/README.md).
+/// exit code 130 or 143. A hostile packet can keep a lock of the middleware locked for ever
+/// (tests/hostile/README.md), and a program that never ends would hide this.
 /// SIGPIPE and SIGXFSZ are ignored: the failing write reports them. SIGALRM is used for `patience`.
 void install_stop_signals(std::chrono::seconds patience = std::chrono::seconds(20));
 

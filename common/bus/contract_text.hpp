@@ -4,7 +4,7 @@
 
 namespace sls::bus {
 
-/// The text of idl/sls.idl as it was when this was built: the schema of MCAP and Foxglove channels.
+/// The text of idl/sls.idl at build time: the schema of MCAP and Foxglove channels.
 extern const std::string_view kContractText;
 
 }  // namespace sls::bus

@@ -1,4 +1,4 @@
-/// Between wire types and the model's types.
+/// Conversions between wire types and the model's types.
 #pragma once
 
 #include <Eigen/Core>

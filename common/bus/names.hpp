@@ -1,5 +1,5 @@
-/// The wire's enumerations as words, for messages and files. A value of a newer version that this
-/// one does not know reads "unknown".
+/// The wire's enumerations as words, for messages and files. A value that only a newer version has
+/// becomes "unknown".
 #pragma once
 
 #include "common/bus/topics.hpp"

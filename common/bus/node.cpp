@@ -53,12 +53,12 @@ using eprosima::fastrtps::types::ReturnCode_t;
 
 constexpr int kMaxDomain = 232;  // beyond, RTPS port numbers overflow
 
-/// On one domain. Each that is announced costs memory and packets, whether it exists or not: under
-/// 3,000 forged ones the middleware hangs (tests/hostile/README.md).
+/// On one domain. Each announced participant costs memory and packets, even a forged one: with
+/// 3,000 of these the middleware hangs (tests/hostile/README.md).
 constexpr std::size_t kMaxParticipants = 64;
 
-/// Of what a sample of the loop has around its vehicles on the wire: headers, a heartbeat, and what
-/// encryption adds.
+/// Bytes on the wire around the vehicles of a loop sample: headers, a heartbeat and the additions
+/// of encryption.
 constexpr std::size_t kEnvelopeBytes = 200;
 
 }  // namespace
@@ -71,11 +71,11 @@ void load_profiles(const std::filesystem::path& file, const std::string& identit
   const bool is_secured = check_security_files(profiles);
   const auto absolute = std::filesystem::canonical(file);
   if (absolute == loaded) return;
-  if (!loaded.empty())  // Fast DDS would go on with the profiles it has, without a word
+  if (!loaded.empty())  // Fast DDS would silently keep its profiles
     throw ConfigError(file.string() + ": expected the QoS file that this process already uses, " +
                       loaded.string());
-  // Only what the user names with --qos counts, not a stray DEFAULT_FASTRTPS_PROFILES.xml in the
-  // working folder or an exported FASTRTPS_DEFAULT_PROFILES_FILE.
+  // Only the file of --qos counts, not a stray DEFAULT_FASTRTPS_PROFILES.xml in the working folder
+  // or an exported FASTRTPS_DEFAULT_PROFILES_FILE.
   setenv("SKIP_DEFAULT_XML_FILE", "1", 1);
   unsetenv("FASTRTPS_DEFAULT_PROFILES_FILE");
   MiddlewareLog::start(is_secured);
@@ -96,18 +96,19 @@ PeerId to_peer(const dds::InstanceHandle_t& handle) {
   return bus::to_peer(guid);
 }
 
-/// The sample that `payload` is of. A reader of Fast DDS 2.9 hands no other to a type.
+/// The sample that contains `payload`. A reader of Fast DDS 2.9 passes only payloads inside a
+/// sample to a type.
 const eprosima::fastrtps::rtps::CacheChange_t& find_change(
     const eprosima::fastrtps::rtps::SerializedPayload_t& payload) {
   using Change = eprosima::fastrtps::rtps::CacheChange_t;
 #pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Winvalid-offsetof"  // it has bases neither virtual nor any
+#pragma GCC diagnostic ignored "-Winvalid-offsetof"  // it has no base class
   constexpr std::size_t kOffset = offsetof(Change, serializedPayload);
 #pragma GCC diagnostic pop
   return *reinterpret_cast<const Change*>(reinterpret_cast<const char*>(&payload) - kOffset);
 }
 
-/// Counts matched endpoints per participant, one of which may have several.
+/// Counts matched endpoints per participant; a participant may have several.
 class MatchedPeers {
  public:
   void update(const dds::InstanceHandle_t& endpoint, int change) {
@@ -152,7 +153,7 @@ struct Node::Impl {
     MiddlewareLog::clear();
     remove_stale_segments();
     auto& wire = qos.wire_protocol();
-    // A node without shared memory has no port there: its id would look free to the next one.
+    // A node without shared memory leaves no port files, so its id would look free to the next one.
     if (wire.participant_id < 0 && has_shared_memory(qos))
       wire.participant_id = choose_participant_id(
           {wire.port.portBase + wire.port.domainIDGain * domain + wire.port.offsetd1,
@@ -177,8 +178,8 @@ struct Node::Impl {
     dds::DomainParticipantFactory::get_instance()->delete_participant(participant);
   }
 
-  /// Largest handshake of DDS Security, which is never fragmented: with the keys of
-  /// `./sls keys` 5,500 bytes, mostly certificate and signed permissions.
+  /// Size of the largest handshake message of DDS Security, which is never fragmented. With the
+  /// keys of `./sls keys` it has 5,500 bytes, mostly certificate and signed permissions.
   static std::size_t calc_handshake_bytes(
       const eprosima::fastrtps::rtps::PropertyPolicy& properties) {
     constexpr std::size_t kLeast = 6'000, kBesides = 2'000;
@@ -196,7 +197,7 @@ struct Node::Impl {
     return std::max(kLeast, bytes);
   }
 
-  /// To what the profile says.
+  /// Limits outgoing datagrams to the property sls.max_datagram_bytes of the profile, if it is set.
   void limit_datagrams(dds::DomainParticipantQos& qos) {
     constexpr const char* kProperty = "sls.max_datagram_bytes";
     constexpr std::size_t kLeast = 600;  // a vehicle fits
@@ -243,7 +244,7 @@ struct Node::Impl {
     throw ConfigError(qos_place + ": profile '" + profile + "': expected a profile, got none");
   }
 
-  /// Of a secured participant.
+  /// The permissions document of this secured participant; empty if the property names no file.
   std::filesystem::path find_permissions_file() const {
     const std::string scheme = "file://";
     const auto* file = eprosima::fastrtps::rtps::PropertyPolicyHelper::find_property(
@@ -252,7 +253,8 @@ struct Node::Impl {
     return file && file->compare(0, scheme.size(), scheme) == 0 ? file->substr(scheme.size()) : "";
   }
 
-  /// Why the middleware made no writer or reader of `topic`; `verb` is "write" or "read".
+  /// Throws the reason why the middleware created no writer or reader of `topic`; `verb` is "write"
+  /// or "read".
   [[noreturn]] void throw_refused_endpoint(const char* verb, const char* topic,
                                            const char* profile) const {
     const std::string cause = MiddlewareLog::find_first_error();
@@ -275,7 +277,7 @@ struct Node::Impl {
   dds::Topic* find_or_create_topic(const char* name, dds::TypeSupport type) {
     if (auto* known = participant->lookup_topicdescription(name))
       return static_cast<dds::Topic*>(known);
-    // Topics of one type share its support: a second one of the same name is refused.
+    // Topics of one type share its type support: Fast DDS refuses a second one of the same name.
     const dds::TypeSupport known_type = participant->find_type(type.get_type_name());
     if (!known_type.empty()) type = known_type;
     leave_out_type_object(type);
@@ -377,8 +379,8 @@ std::map<PeerId, std::string> Node::find_missing_deadlines() const {
 
 namespace detail {
 
-// A DataWriter with a deadline needs a listener of its own, so every one has (fastdds/README.md,
-// trap 7).
+// A DataWriter with a deadline requires its own listener, so every writer has one
+// (fastdds/README.md, trap 7).
 struct AnyWriter::Impl : dds::DataWriterListener {
   void on_publication_matched(dds::DataWriter*,
                               const dds::PublicationMatchedStatus& status) override {

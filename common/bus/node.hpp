@@ -1,5 +1,5 @@
-/// The only door to Fast DDS: one domain participant configured by a QoS file, typed writers and
-/// readers on it. Nothing of Fast DDS shows through these headers. Traps it avoids:
+/// The only interface to Fast DDS: one domain participant configured by a QoS file, with typed
+/// writers and readers. This header uses no type of Fast DDS. Traps that it avoids:
 /// fastdds/README.md.
 #pragma once
 
@@ -22,34 +22,34 @@
 
 namespace sls::bus {
 
-/// The middleware refused or broke something while running (exit code 1).
+/// The middleware refused a call or failed during the run (exit code 1).
 class BusError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// Makes the middleware ready and loads a QoS file into it: one for the whole process, because
-/// profiles are global there. A Node calls it; call it yourself only to make a participant
-/// without a Node (tools/doctor/observer.cpp).
+/// Initialises the middleware and loads a QoS file into it. A process uses one file, because
+/// profiles are global in the middleware. Node calls this function; other code calls it only to
+/// create a participant without a Node (tools/doctor/observer.cpp).
 /// @throws config::ConfigError as Node does.
 void load_profiles(const std::filesystem::path& file, const std::string& identity);
 
 /// Which transports of its profile a participant uses.
 enum class Transports {
   kAll,
-  /// All but shared memory, whose ports have locks that a process which is stopped or starved may
-  /// hold: an onlooker on the network alone can make nobody wait.
+  /// All except shared memory. A stopped or starved process may hold the lock of a shared-memory
+  /// port; a viewer that uses only the network cannot block other programs.
   kNetwork
 };
 
 /// One DDS participant. Writers and readers must not outlive it.
 class Node {
  public:
-  /// Joins `domain` (0–232) with the profiles of `qos_file`; `name` shows in discovery, `identity`
-  /// is whose keys a secured domain sees (server, controller, recorder or operator).
-  /// @throws config::ConfigError naming the file, and the line where known, if it cannot be read,
-  ///   is malformed, lacks a profile, or holds what Fast DDS refuses; or if it is not the one file
-  ///   that this process uses; or for the domain.
+  /// Joins `domain` (0–232) with the profiles of `qos_file`. Discovery shows `name`. `identity`
+  /// selects the keys for a secured domain (server, controller, recorder or operator).
+  /// @throws config::ConfigError if the file cannot be read, is malformed, lacks a profile, has
+  ///   content that Fast DDS refuses, or is not the one that this process already uses. The message
+  ///   names the file and, if known, the line. Also thrown for a wrong domain.
   /// @throws BusError if the participant cannot be created.
   Node(const std::filesystem::path& qos_file, int domain, const std::string& name,
        const std::string& identity = {}, Transports transports = Transports::kAll);
@@ -63,33 +63,33 @@ class Node {
   const char* choose_writer_profile(const char* profile, const char* fallback) const;
   const char* choose_reader_profile(const char* profile, const char* fallback) const;
 
-  /// Largest size of a sample of the loop that is made of many parts, so that it fits into one
-  /// datagram, so that one lost packet does not lose the parts that came in others. The QoS file
-  /// says how long a datagram may be (property sls.max_datagram_bytes of the participant).
+  /// Largest size of a loop sample, which has many parts: it must fit into one datagram, because
+  /// one lost fragment would lose all its parts. The QoS file limits the length of a datagram
+  /// (property sls.max_datagram_bytes of the participant).
   std::size_t max_sample_bytes() const;
 
-  /// The same of a batch of sls/record: 12,000 bytes, which go in fragments that are repaired one
-  /// by one, so that a full history takes 64 MB at most; one datagram where DDS Security leaves
-  /// none.
+  /// The same for a batch of sls/record: 12,000 bytes, which limits a full history to 64 MB. A
+  /// batch is sent in fragments, which are repaired one by one; with DDS Security it is at most one
+  /// datagram, because datagrams are larger there.
   std::size_t max_batch_bytes() const;
 
-  /// "; " and hints, if no other program has been discovered 3 s after joining,
-  /// to be appended to a message about who is missing. Else empty.
+  /// "; " and hints, to be appended to a message about a missing participant, if no other program
+  /// has been discovered 3 s after joining; else empty.
   std::string describe_isolation() const;
 
   /// Mistakes of the other programs on the domain. Endpoints and samples that do not match ours are
   /// added automatically.
   Problems& problems() const;
 
-  /// A mistake of a participant until it leaves: `text` is logged behind its description, once for
-  /// each `key`.
+  /// Adds a mistake that lasts until the participant leaves. `text` is logged after the
+  /// participant's description, once for each `key`.
   void note_problem(const PeerId& peer, const std::string& key, const std::string& text) const;
 
-  /// 'foo' (10.0.0.2): what a participant says of itself in discovery.
+  /// 'foo' (10.0.0.2): name and address that a participant announces in discovery.
   std::string describe(const PeerId& peer) const;
 
-  /// Participants whose sls/command offers a longer DEADLINE than ours asks, in words: a mistake of
-  /// those who fly for us (fastdds/neighbours.hpp).
+  /// Participants whose sls/command offers a longer DEADLINE than our reader requests, with a text:
+  /// a mistake if the participant serves our run (fastdds/neighbours.hpp).
   std::map<PeerId, std::string> find_missing_deadlines() const;
 
   /// Participants that `problems` names for their endpoints or samples.
@@ -112,7 +112,7 @@ void* make_type_support();
 
 class AnyWriter {
  public:
-  /// `user_data`: what discovery shows of the writer (policy USER_DATA).
+  /// `user_data`: the policy USER_DATA, which discovery announces.
   AnyWriter(Node& node, const char* topic, const char* profile, void* type_support,
             const std::string& user_data = {});
   ~AnyWriter();
@@ -129,9 +129,8 @@ class AnyWriter {
 class AnyReader {
  public:
   using Take = std::function<void(const PeerId& sender)>;
-  /// `sample` is the buffer every sample is taken into; `take` is called after each, on a thread of
-  /// the middleware.
-  /// With `raw`, samples are put there as they came, and `sample` stays as it is.
+  /// Takes every sample into the buffer `sample` and then calls `take`, on a thread of the
+  /// middleware. With `raw`, the undecoded bytes go there and `sample` does not change.
   AnyReader(Node& node, const char* topic, const char* profile, void* type_support, void* sample,
             Take take, std::vector<std::uint8_t>* raw = nullptr);
   ~AnyReader();
@@ -151,12 +150,12 @@ class AnyReader {
 template <class Message>
 class Writer {
  public:
-  /// With the profile of the topic's flow, or `profile`.
+  /// `profile`: by default that of the topic's flow.
   explicit Writer(Node& node, const char* profile = find_writer_profile(Topic<Message>::kFlow))
       : writer_(node, Topic<Message>::kName, profile, detail::make_type_support<Message>()) {}
 
-  /// Hands `message` to the middleware; may block while a history is full, so it has no place in a
-  /// reader's handler (fastdds/README.md, trap 4).
+  /// Passes `message` to the middleware. It may block while a history is full, so a reader's
+  /// handler must not call it (fastdds/README.md, trap 4).
   /// @throws BusError if it was not taken: the history stayed full for `max_blocking_time`.
   void write(const Message& message) {
     if (!writer_.write(&message))
@@ -164,15 +163,15 @@ class Writer {
                      ": write refused: a reliable reader has not acknowledged for too long");
   }
 
-  /// Waits until every reliable reader has everything, at most `limit`; false if it ran out.
+  /// Waits until every reliable reader has acknowledged all samples; false after `limit`.
   bool wait_for_acknowledgments(std::chrono::milliseconds limit) {
     return writer_.wait_for_acknowledgments(limit);
   }
 
-  /// Participants with a reader of this topic that this writer serves.
+  /// Participants with a reader that is matched with this writer.
   std::set<PeerId> matched() const { return writer_.matched(); }
 
-  /// How many samples are kept for readers that are late.
+  /// Number of samples that are kept for late readers.
   int history_depth() const { return writer_.history_depth(); }
 
  private:
@@ -184,7 +183,7 @@ class Writer {
 template <class Message>
 class Reader {
  public:
-  /// May take over what `message` holds: the next sample finds other memory.
+  /// A handler may move the content of `message` away: the next sample replaces it.
   using Handler = std::function<void(Message& message, const PeerId& sender)>;
 
   Reader(Node& node, const char* profile, Handler handler)
@@ -192,10 +191,10 @@ class Reader {
         reader_(node, Topic<Message>::kName, profile, detail::make_type_support<Message>(),
                 buffer_.get(), [this](const PeerId& sender) { handler_(*buffer_, sender); }) {}
 
-  /// Participants with a writer of this topic that this reader hears.
+  /// Participants with a writer that is matched with this reader.
   std::set<PeerId> matched() const { return reader_.matched(); }
 
-  /// Times no sample came for the DEADLINE of the reader's profile.
+  /// Number of times that no sample came within the DEADLINE of the reader's profile.
   std::uint64_t missed_deadlines() const { return reader_.missed_deadlines(); }
 
   /// LIFESPAN of the reader's profile; nothing if it is infinite.
@@ -204,7 +203,7 @@ class Reader {
   /// From now on no sample expires. `lifespan()` stays what the profile says.
   void ignore_lifespan() { reader_.ignore_lifespan(); }
 
-  /// For the handler: when the sample it was given was written, by the writer's clock.
+  /// For the handler: the time at which its sample was written, by the writer's clock.
   std::chrono::system_clock::time_point written() const { return reader_.written(); }
 
  private:
@@ -213,12 +212,12 @@ class Reader {
   detail::AnyReader reader_;  // last: its callbacks use the members above
 };
 
-/// Like Reader, for samples as they came: plain CDR with its encapsulation header, not decoded and
-/// checked for nothing but their size.
+/// Like Reader, with undecoded samples: plain CDR with its encapsulation header. Only their size is
+/// checked.
 template <class Message>
 class RawReader {
  public:
-  /// May take over the bytes: the next sample finds other memory.
+  /// A handler may move the bytes away: the next sample replaces them.
   using Handler = std::function<void(std::vector<std::uint8_t>& cdr, const PeerId& sender)>;
 
   RawReader(Node& node, const char* profile, Handler handler)
@@ -227,10 +226,10 @@ class RawReader {
             node, Topic<Message>::kName, profile, detail::make_type_support<Message>(),
             unused_.get(), [this](const PeerId& sender) { handler_(cdr_, sender); }, &cdr_) {}
 
-  /// Participants with a writer of this topic that this reader hears.
+  /// Participants with a writer that is matched with this reader.
   std::set<PeerId> matched() const { return reader_.matched(); }
 
-  /// For the handler: when the sample it was given was written, by the writer's clock.
+  /// For the handler: the time at which its sample was written, by the writer's clock.
   std::chrono::system_clock::time_point written() const { return reader_.written(); }
 
  private:
@@ -240,7 +239,7 @@ class RawReader {
   detail::AnyReader reader_;  // last: its callbacks use the members above
 };
 
-/// Decodes what a RawReader was given. False, and `message` empty, where it is no such message.
+/// Decodes a sample of a RawReader. False, with an empty `message`, if it is malformed.
 template <class Message>
 bool decode(const std::vector<std::uint8_t>& cdr, Message& message);
 

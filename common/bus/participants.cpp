@@ -17,10 +17,10 @@ namespace {
 
 constexpr std::size_t kMaxParticipants = 256;
 constexpr std::size_t kMaxServers = 64;
-constexpr std::size_t kMaxRunsOfServer = 4;  // the one in work and those that resets ended
+constexpr std::size_t kMaxRunsOfServer = 4;  // the current one and those before resets
 
-/// True if `known` has room for `sender`. A full one first drops the participants that have left;
-/// only then is the list of those present asked for.
+/// True if `known` has room for `sender`. Only if `known` is full, it calls `find_present` and
+/// drops a participant that has left.
 template <class Known, class FindPresent>
 bool make_room(std::map<PeerId, Known>& known, std::size_t most, const PeerId& sender,
                FindPresent find_present) {
@@ -33,7 +33,7 @@ bool make_room(std::map<PeerId, Known>& known, std::size_t most, const PeerId& s
   return true;
 }
 
-/// The knowledge of run `run_id` of a server, of which the last runs are kept.
+/// The entry of run `run_id` in the last runs of a server.
 template <class Known>
 Known& find_or_add(std::deque<Known>& runs, std::uint64_t run_id) {
   for (Known& run : runs)
@@ -43,8 +43,7 @@ Known& find_or_add(std::deque<Known>& runs, std::uint64_t run_id) {
   return runs.back();
 }
 
-/// True if one of `recorders` has completed steps since `last_steps`, which are brought up to
-/// date.
+/// True if one of `recorders` has completed steps since `last_steps`; updates `last_steps`.
 bool get_further(const std::vector<ParticipantDirectory::Entry>& recorders,
                  std::map<PeerId, std::int64_t>& last_steps) {
   bool is_any_further = false;
@@ -56,7 +55,7 @@ bool get_further(const std::vector<ParticipantDirectory::Entry>& recorders,
   return is_any_further;
 }
 
-/// The furthest of the runs that may be joined for `vehicle_id`, then the one with the lowest id.
+/// The run to join for `vehicle_id`: the one with the most progress, then with the lowest run_id.
 std::optional<Run> find_best(const std::vector<Run>& runs, std::uint32_t vehicle_id) {
   std::optional<Run> best;
   for (const Run& run : runs) {

@@ -1,6 +1,6 @@
 /// Participants of the domain: controllers and recorders (sls/participant) and servers
-/// (sls/parameters, sls/status). Both classes listen on the middleware's threads and may be asked
-/// from any thread.
+/// (sls/parameters, sls/status). Both directories receive on the middleware's threads; any thread
+/// may call them.
 #pragma once
 
 #include <atomic>
@@ -24,8 +24,9 @@ namespace sls::bus {
 /// until its next announcement. (The middleware's lease is much longer: docs/networks.md.)
 inline constexpr auto kPresumedDeadAfter = std::chrono::seconds(2);
 
-/// The last announcement of every controller and recorder that is still there. Of 256 participants
-/// at most, so that strangers cannot fill the memory: those that have left make room.
+/// The last announcement of every controller and recorder that is still present. At most 256
+/// participants, because other programs must not fill the memory; a new one replaces one that has
+/// left.
 class ParticipantDirectory {
  public:
   explicit ParticipantDirectory(Node& node);
@@ -33,11 +34,11 @@ class ParticipantDirectory {
   struct Entry {
     PeerId peer;
     Participant announcement;
-    std::chrono::steady_clock::time_point heard;  ///< when it came
-    /// Age of the youngest announcement when it came, by its clock and ours: about 0 if they
-    /// agree, positive where its clock is behind.
+    std::chrono::steady_clock::time_point heard;  ///< time of arrival
+    /// Smallest age of an announcement on arrival, by the sender's clock and ours: about 0 if the
+    /// clocks agree, positive if the sender's clock is behind.
     std::chrono::nanoseconds age{0};
-    /// When it first said it was ready.
+    /// Time of the first announcement for this run with `ready`.
     std::chrono::steady_clock::time_point ready_since{};
 
     bool is_silent() const { return std::chrono::steady_clock::now() - heard > kPresumedDeadAfter; }
@@ -46,17 +47,17 @@ class ParticipantDirectory {
   /// Present participants of `role` that serve run `run_id`.
   std::vector<Entry> find(ParticipantRole role, std::uint64_t run_id) const;
 
-  /// Present participants, whatever their role and run.
+  /// Present participants of every role and run.
   std::vector<Entry> all() const;
 
-  /// Participants with a writer of sls/participant, whether they have announced anything or not.
+  /// Participants with a writer of sls/participant, also those without an announcement yet.
   std::set<PeerId> writers() const { return reader_.matched(); }
 
-  /// Participants of `role` that have said they are done with run `run_id`, also those that have
-  /// left since.
+  /// Number of participants of `role` that have announced `done` for run `run_id`, also of those
+  /// that have left since.
   int count_done(ParticipantRole role, std::uint64_t run_id) const;
 
-  /// Changes with every announcement (not with departures: ask again from time to time).
+  /// Changes with every announcement, but not when a participant leaves: poll for that.
   std::uint64_t version() const { return version_.load(std::memory_order_acquire); }
 
  private:
@@ -74,17 +75,17 @@ class ParticipantDirectory {
   Reader<Participant> reader_;
 };
 
-/// True when every one of `recorders` that is not silent says it is done.
+/// True if each of `recorders` has announced `done` or is silent.
 bool are_recorders_done(const std::vector<ParticipantDirectory::Entry>& recorders);
 
-/// How long recorders are waited for, s.
+/// Longest waits for recorders, s.
 struct RecorderPatience {
-  double without_news = 10;  ///< while none gets further, and after a stop signal
-  double longest = 60;       ///< anybody can announce steps
+  double without_news = 10;  ///< without a new complete step, or after a stop signal
+  double longest = 60;       ///< in total, because any program can announce steps
 };
 
-/// Waits until the recorders of run `run_id` that are there, and `expected` at least, are done:
-/// until then the server must keep its writers. Says for whom it waits.
+/// Waits until all present recorders of run `run_id`, and at least `expected`, are done: until then
+/// the server must keep its writers. Logs the recorders that are missing.
 void wait_for_recorders_to_end(const ParticipantDirectory& participants, std::uint64_t run_id,
                                int expected, const RecorderPatience& patience = {});
 
@@ -96,43 +97,43 @@ struct Run {
   std::chrono::steady_clock::time_point server_known_since;
 };
 
-/// The last parameters and status of every server that is still there and uses this contract, of
-/// 64 at most: those that have left make room. A run is of the server that was the first to claim
-/// it; what other servers say of it is ignored.
+/// The last parameters and status of every present server that uses this contract. At most 64
+/// servers; a new one replaces one that has left. A run belongs to the server that claimed it
+/// first; samples of other servers about this run are ignored.
 class ServerDirectory {
  public:
-  /// `on_status`, where given, sees every status sample, on a thread of the middleware.
+  /// `on_status`, if given, is called with every status sample, on a thread of the middleware.
   explicit ServerDirectory(Node& node, std::function<void(const SimStatus&)> on_status = {});
 
-  /// Runs of the servers present, other than this node's own. A server whose run goes on but that
-  /// is silent is not present.
+  /// Runs of the present servers, without this node's own. A server that is silent before its run
+  /// has ended does not count as present.
   std::vector<Run> runs() const;
 
   /// True if `run_id` is among `runs()`.
   bool is_known(std::uint64_t run_id) const;
 
-  /// False if the server of run `run_id` is known, also one that has gone, and does not fly
+  /// False if the server of run `run_id` is known, even if it has left, and does not fly
   /// `vehicle_id`.
   bool may_fly(std::uint64_t run_id, std::uint32_t vehicle_id) const;
 
-  /// The run to join for `vehicle_id`: present, settled, neither finished nor failed; among several
-  /// the one that is furthest, then the lowest run_id.
+  /// The run to join for `vehicle_id`: present, settled, neither finished nor failed. Among several
+  /// it is the one with the most progress (calc_progress), then with the lowest run_id.
   std::optional<Run> find_joinable(std::uint32_t vehicle_id) const;
 
-  /// The run to go on with for the first of `vehicle_ids` that has one, where `run` does not: its
-  /// own server's after a reset or, where that is silent, one of another server that was not known
-  /// before it fell silent. A server known before that had
-  /// lost the vehicle to ours and does not replace it.
+  /// The run that follows `run`, for the first of `vehicle_ids` that has one: the next run of the
+  /// same server after a reset or, if that server is silent, the run of a server that was
+  /// discovered after the last status. A server discovered earlier had lost the vehicle to ours, so
+  /// it is no replacement.
   std::optional<Run> find_successor(const Run& run,
                                     const std::vector<std::uint32_t>& vehicle_ids) const;
 
-  /// The last status of run `run_id`, also of a server that has gone.
+  /// The last status of run `run_id`, even if its server has left.
   std::optional<SimStatus> find_status(std::uint64_t run_id) const;
 
   /// True until the server has left, or its lease has run out.
   bool is_present(const PeerId& server) const;
 
-  /// True when nothing was heard of run `run_id` for so long that its server is presumed dead.
+  /// True if no status of run `run_id` came within kPresumedDeadAfter, or none ever.
   bool is_silent(std::uint64_t run_id) const;
 
   /// When the last status of run `run_id` came; nothing before the first.
@@ -141,15 +142,15 @@ class ServerDirectory {
  private:
   struct Claim {
     std::uint64_t run_id = 0;
-    std::uint64_t number = 0;  // counts the claims heard
+    std::uint64_t number = 0;  // counts the received claims
   };
   struct HeardStatus {
     std::uint64_t run_id = 0;
     SimStatus status;
     std::chrono::steady_clock::time_point time;
   };
-  // The two topics overtake each other: a late joiner may hear all of one before the other. So each
-  // keeps the last runs that it has told of, and neither pushes out what the other needs.
+  // A late joiner may receive all samples of one topic before those of the other. So each topic has
+  // its own list of last runs, and neither list displaces entries that the other one requires.
   struct Server {
     std::optional<Parameters> parameters;
     std::deque<Claim> claims;
@@ -167,25 +168,25 @@ class ServerDirectory {
 
   const PeerId self_;
   const std::function<void(const SimStatus&)> on_status_;
-  mutable std::mutex mutex_;  // over what follows
+  mutable std::mutex mutex_;  // guards the members below
   std::map<PeerId, Server> servers_;
   std::uint64_t claims_ = 0;
   Reader<Parameters> parameters_reader_;
   Reader<SimStatus> status_reader_;
 };
 
-/// Patience with the server of a run, which publishes a status at least every 0.5 s: says within
-/// 1 s and every 5 s that it is silent, and when it is back.
+/// Watches the server of a run, which publishes a status at least every 0.5 s. Logs within 1 s and
+/// then every 5 s that the server is silent, and when it is back.
 class ServerWatch {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// Watches `run` from now on; gives its server up after `deadline_s` of silence.
+  /// Watches `run` from now on; its server is lost after `deadline_s` of silence.
   ServerWatch(const ServerDirectory& servers, const Run& run, double deadline_s);
 
   enum class Finding { kThere, kSilent, kLost };
-  /// Call it several times a second: time without a look, in which this process was stopped itself,
-  /// is not held against the server.
+  /// Call it several times a second. After more than 0.5 s without a call this process itself was
+  /// stopped, so that time does not count as silence of the server.
   Finding look();
 
   /// For messages: "server of run … (silent for 3.1 s)".
@@ -201,21 +202,21 @@ class ServerWatch {
   bool is_reported_ = false;
 };
 
-/// Position of a phase on the way waiting → running → finished/failed.
+/// Progress of a run in this phase: 1 waiting, 2 running or paused, −1 ended.
 int calc_progress(RunPhase phase);
-/// The same of a run that may not have a status yet (0).
+/// The same for a run; 0 if it has no status yet.
 int calc_progress(const std::optional<SimStatus>& status);
 
 /// True if `vehicle_id` is among `parameters`' vehicles.
 bool serves_vehicle(const Parameters& parameters, std::uint32_t vehicle_id);
 
-/// The vehicles that it claims.
+/// Ids of the vehicles in `parameters`, which the server claims.
 std::vector<std::uint32_t> list_vehicle_ids(const Parameters& parameters);
 
-/// True if the run of `parameters` is of several vehicles.
+/// True if the run of `parameters` has several vehicles.
 bool is_fleet(const Parameters& parameters);
 
-/// True if the controller that announced itself so flies `vehicle_id`.
+/// True if the announcement `controller` includes `vehicle_id`.
 bool flies_vehicle(const Participant& controller, std::uint32_t vehicle_id);
 
 /// This machine's name, at most 64 bytes, for sls/participant.

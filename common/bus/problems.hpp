@@ -11,26 +11,26 @@
 
 namespace sls::bus {
 
-/// Mistakes of participants, as seen by this program. A mistake is one line on stderr when it
+/// Mistakes of participants that this program has detected. A mistake is logged in one line when it
 /// begins, and is listed while it holds. At most `kMostLines` lines in 10 s and `kMost` mistakes,
-/// whatever strangers send. May be used from any thread.
+/// because other programs may send anything. May be used from any thread.
 class Problems {
  public:
   using Clock = std::chrono::steady_clock;
   static constexpr int kMostLines = 5;
   static constexpr std::size_t kMost = 256;
 
-  /// The mistake `key` holds until `end`; or, where `lasting` is given, for so long from now. Only
-  /// its first text is said, and listed.
+  /// The mistake `key` holds until `end` or, if `lasting` is given, for that time from now. Only
+  /// its first text is logged and listed.
   void begin(const std::string& key, const std::string& text,
              std::optional<Clock::duration> lasting = std::nullopt);
   void end(const std::string& key);
-  /// Ends every mistake whose key begins so.
+  /// Ends every mistake whose key begins with `prefix`.
   void end_all(const std::string& prefix);
-  /// Of the mistakes whose keys begin with `prefix`, those of `found` hold and no others.
+  /// Makes `found` (text by key) the only mistakes whose keys begin with `prefix`.
   void replace(const std::string& prefix, const std::map<std::string, std::string>& found);
 
-  /// True if one holds whose key begins with `prefix`.
+  /// True if there is a mistake whose key begins with `prefix`.
   bool has_any(const std::string& prefix) const;
 
   /// Changes when a mistake begins or ends (not when one that lasts for a time runs out).

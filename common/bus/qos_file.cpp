@@ -27,7 +27,7 @@ constexpr std::uintmax_t kMaxBytes = 1 << 20;
 constexpr std::size_t kMaxHosts = 256;  // of one locator
 constexpr const char* kIdentityVariable = "SLS_IDENTITY";
 
-constexpr const char* kOurs = "sls_";  // what the names of our profiles begin with
+constexpr const char* kOurs = "sls_";  // prefix of the names of our profiles
 
 struct Profile {
   const char* element;
@@ -102,7 +102,7 @@ void parse(const std::string& text, const std::string& place, tinyxml2::XMLDocum
                       ": expected well-formed XML, got " + document.ErrorName());
 }
 
-// --- what depends on the process -----------------------------------------------------------------
+// --- parts that depend on the process ------------------------------------------------------------
 
 /// Value of the variable in `${…}`, which is NAME or NAME:-default.
 std::string find_value(const std::string& expression, const std::string& identity,
@@ -158,7 +158,7 @@ std::vector<std::string> split_hosts(const std::string& list) {
   return hosts;
 }
 
-/// Puts a locator for each host of its address in the place of `locator`; the last one is returned.
+/// Replaces `locator` with one locator for each host of its address; returns the last one.
 tinyxml2::XMLElement* expand_locator(tinyxml2::XMLElement& locator, const std::string& place) {
   auto* udp = locator.FirstChildElement("udpv4");
   auto* address = udp ? udp->FirstChildElement("address") : nullptr;
@@ -184,7 +184,7 @@ void complete(tinyxml2::XMLElement& element, const std::string& identity, const 
               bool is_in_locator = false) {
   const std::string where = place + ":" + std::to_string(element.GetLineNum());
   const bool is_locator = std::string(element.Name()) == "locator";
-  // One within another would be multiplied by the other's hosts, and so on.
+  // A nested locator would be copied for each host of the outer one, at every level.
   if (is_locator && is_in_locator)
     throw ConfigError(where + ": <locator>: expected none within another <locator>, got one");
   if (element.FirstChild() && element.FirstChild()->ToText())
@@ -195,9 +195,9 @@ void complete(tinyxml2::XMLElement& element, const std::string& identity, const 
   }
 }
 
-// --- what the middleware cannot do ---------------------------------------------------------------
+// --- limits of the middleware --------------------------------------------------------------------
 
-/// The first element of that name and text, in `element` or below; any text where it is empty.
+/// The first element of this name and text, in `element` or below; an empty `text` fits any text.
 const tinyxml2::XMLElement* find_element(const tinyxml2::XMLElement& element,
                                          const std::string& name, const std::string& text = {}) {
   const char* own = element.GetText();
@@ -207,7 +207,8 @@ const tinyxml2::XMLElement* find_element(const tinyxml2::XMLElement& element,
   return nullptr;
 }
 
-/// Fast DDS 2.9 authenticates nobody whom a discovery server names: all would wait for ever.
+/// Fast DDS 2.9 does not authenticate participants that a discovery server announces: all programs
+/// would wait for ever.
 void check_discovery(const tinyxml2::XMLElement& root, const std::string& place) {
   const auto* protocol = find_element(root, "discoveryProtocol");
   if (!protocol || std::string(protocol->GetText()) == "SIMPLE") return;
@@ -221,7 +222,7 @@ void check_discovery(const tinyxml2::XMLElement& root, const std::string& place)
 
 // --- profiles ------------------------------------------------------------------------------------
 
-/// A profile of ours that is misspelt would be left out without a word.
+/// Refuses misspelt names of our profiles, which would be ignored silently.
 void check_names(const std::map<std::string, Found>& found, const std::string& place) {
   for (const auto& [name, where] : found) {
     const std::string start =
@@ -244,7 +245,7 @@ void add_missing_endpoints(tinyxml2::XMLElement& root, std::map<std::string, Fou
   tinyxml2::XMLDocument shared;
   parse(read_file(file), file.string(), shared);
   auto* profiles = root.FirstChildElement("profiles");
-  if (!profiles) return;  // the participant's profile is missing, too, which will be said
+  if (!profiles) return;  // the participant's profile is missing, too, and is reported later
   const auto* shared_profiles = shared.RootElement()->FirstChildElement("profiles");
   for (auto* profile = shared_profiles->FirstChildElement(); profile;
        profile = profile->NextSiblingElement()) {

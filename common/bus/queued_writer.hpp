@@ -1,4 +1,4 @@
-/// A writer with a thread of its own, for loops that must never block on a reader.
+/// A writer with its own thread, for loops that must never block on a reader.
 #pragma once
 
 #include <atomic>
@@ -12,15 +12,16 @@
 
 namespace sls::bus {
 
-/// Hands messages to `writer` in order, from a bounded queue. A message that does not fit, or that
-/// the middleware refuses, is counted and never published.
+/// Passes messages to `writer` in order, from a bounded queue. A message that does not fit, or that
+/// the middleware refuses, is counted and not published.
 template <class Message>
 class QueuedWriter {
  public:
   QueuedWriter(Writer<Message>& writer, std::size_t capacity)
       : writer_(writer), queue_(capacity), thread_([this] { work(); }) {}
 
-  /// Ends after what is queued, unless a full history keeps it longer than `max_blocking_time`.
+  /// Writes the queued messages first. While a history is full, each write ends after
+  /// `max_blocking_time` and its message is lost.
   ~QueuedWriter() {
     stop_ = true;
     thread_.join();

@@ -1,4 +1,5 @@
-/// Writes bytes on any topic: of types that this project does not know, such as those of ROS 2.
+/// Writes serialised samples on any topic, for types that are not in sls.idl, such as those of
+/// ROS 2.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +14,7 @@ namespace sls::bus {
 struct RawTopic {
   std::string name;       ///< "rt/tf"
   std::string type;       ///< as readers must name it: "tf2_msgs::msg::dds_::TFMessage_"
-  std::string user_data;  ///< what discovery shows of the writer; may be empty
+  std::string user_data;  ///< policy USER_DATA of the writer; may be empty
 };
 
 /// Readers must have the same type name, and no key.
@@ -24,13 +25,12 @@ class RawWriter {
   /// `profile`: one of the QoS file.
   RawWriter(Node& node, const RawTopic& topic, const char* profile);
 
-  /// `cdr`: plain CDR, little-endian, with its encapsulation header. Like Writer::write, no call
-  /// for a reader's handler.
-  /// @throws BusError where it was not taken: it is longer than `kMostBytes`, or the history stayed
-  ///   full.
+  /// `cdr`: plain CDR, little-endian, with its encapsulation header. As with Writer::write, a
+  /// reader's handler must not call it.
+  /// @throws BusError if `cdr` is longer than `kMostBytes`, or if the history stayed full.
   void write(const std::vector<std::uint8_t>& cdr);
 
-  /// Participants with a reader that this writer serves.
+  /// Participants with a reader that is matched with this writer.
   std::set<PeerId> matched() const { return writer_.matched(); }
 
  private:

@@ -98,7 +98,7 @@ std::string find_subject(X509& certificate) {
 }
 
 Store make_store(const std::string& authority_file) {
-  open(authority_file);  // says what is wrong with it
+  open(authority_file);  // throws if it cannot be read
   Store store(X509_STORE_new());
   if (X509_STORE_load_file(store.get(), authority_file.c_str()) != 1)
     fail(authority_file, "expected certificates (PEM), got " + find_openssl_error());
@@ -141,7 +141,7 @@ std::string verify_document(const std::string& file, const std::string& authorit
   return {data, static_cast<std::size_t>(size)};
 }
 
-/// As Fast DDS reads it: in the time zone of this machine.
+/// Reads a time as Fast DDS does: in the time zone of this machine. 0 if it is malformed.
 std::time_t to_time(const tinyxml2::XMLElement* element) {
   std::tm time = {};
   std::istringstream stream(element && element->GetText() ? element->GetText() : "");
@@ -149,7 +149,7 @@ std::time_t to_time(const tinyxml2::XMLElement* element) {
   return stream.fail() ? 0 : std::mktime(&time);
 }
 
-/// Where `grant` is for `subject`: that it holds now.
+/// False if `grant` is for another subject. @throws ConfigError if it is not valid now.
 bool check_grant(const tinyxml2::XMLElement& grant, const std::string& subject,
                  const std::string& file) {
   const auto* name = grant.FirstChildElement("subject_name");

@@ -5,16 +5,19 @@
 
 namespace sls::bus {
 
-/// Checks the files that the DDS Security properties in `profiles` (a QoS file as `read_qos_file`
-/// completes it) name, because Fast DDS 2.9.1 only says "initialization error": readable; a
-/// certificate that is valid now and of the identity authority; the key of it; governance and
-/// permissions signed by the permissions authority; permissions for this certificate, valid now.
-/// @returns whether there are any, which makes a participant a secured one.
+/// Checks the files that the DDS Security properties in `profiles` name, because Fast DDS 2.9.1
+/// only reports "initialization error". `profiles` is a QoS file that `read_qos_file` has
+/// completed.
+/// - Every file is readable.
+/// - The certificate is valid now and signed by the identity authority; the key belongs to it.
+/// - The permissions authority has signed governance and permissions.
+/// - The permissions are for this certificate and valid now.
+/// @returns true if there are such properties: the participant is then secured.
 /// @throws config::ConfigError `FILE: expected …, got …`.
 bool check_security_files(const std::string& profiles);
 
-/// True if a signed permissions document is of contract 1: it grants topics that contract 2 has
-/// not, and not sls/record.
+/// True if a signed permissions document is of contract 1: it grants topics that contract 2 does
+/// not have, but not sls/record.
 bool is_of_contract_1(const std::filesystem::path& permissions);
 
 }  // namespace sls::bus

@@ -1,4 +1,4 @@
-/// The server's counters, each listed once: adding, recording and showing them goes by this table.
+/// A table of the server's counters. The code that adds, records and shows counters uses it.
 #pragma once
 
 #include <array>
@@ -47,13 +47,13 @@ struct Count {
   std::uint64_t value;
 };
 
-/// For texts, in their order: the counters whose names are `prefix` and one of `words`, with an
-/// underscore for each space and hyphen.
-/// @throws std::logic_error where there is none of that name.
+/// The counters for a text, in the order of `words`. The name of a counter is `prefix` and one of
+/// `words`, with an underscore for each space and hyphen.
+/// @throws std::logic_error if there is no counter of that name.
 std::vector<Count> list_counts(const SyncCounters& counters, const std::string& prefix,
                                std::initializer_list<const char*> words);
 
-/// "fail_safe" of "fail-safe".
+/// "fail-safe" → "fail_safe".
 std::string to_counter_name(std::string words);
 
 }  // namespace sls::bus

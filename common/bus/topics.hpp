@@ -1,4 +1,4 @@
-/// The topics of idl/sls.idl: name and QoS profiles of each type. The table in idl/README.md.
+/// The topics of idl/sls.idl: name and QoS profiles of each type. Table: idl/README.md.
 #pragma once
 
 #include <sls.h>  // generated from idl/sls.idl
@@ -13,8 +13,8 @@ inline constexpr const char* kContractSha256 = SLS_CONTRACT_SHA256;
 enum class Flow {
   kLoop,     ///< the control loop: states and commands, one step at a time
   kRecord,   ///< batches of steps for recorders
-  kLatched,  ///< what a late joiner must know: participant, parameters, status; and control, whose
-             ///< requests carry a run_id, so that none acts on a later run
+  kLatched,  ///< data that a late joiner requires: participant, parameters, status. Also control:
+             ///< its requests carry a run_id, so they cannot act on a later run
 };
 
 /// Profile names in a QoS file.
@@ -25,7 +25,8 @@ inline constexpr const char* kRecordWriterProfile = "sls_record_writer";
 inline constexpr const char* kRecordReaderProfile = "sls_record_reader";
 inline constexpr const char* kLatchedWriterProfile = "sls_latched_writer";
 inline constexpr const char* kLatchedReaderProfile = "sls_latched_reader";
-/// sls/command in real time, with DEADLINE and LIFESPAN; a file without them flies without these.
+/// sls/command in real time, with DEADLINE and LIFESPAN. These profiles are optional: without them
+/// sls/command has neither.
 inline constexpr const char* kRealtimeCommandWriterProfile = "sls_realtime_command_writer";
 inline constexpr const char* kRealtimeCommandReaderProfile = "sls_realtime_command_reader";
 

@@ -1,4 +1,4 @@
-/// The type supports of idl/sls.idl: what serialises each type.
+/// The type supports of idl/sls.idl, which serialise its types.
 #include <fastdds/dds/topic/TopicDataType.hpp>
 
 #include "common/bus/fastdds/guarded_type.hpp"
@@ -14,7 +14,7 @@ bool decode_by(const std::vector<std::uint8_t>& cdr, Message& message) {
   payload.data = const_cast<std::uint8_t*>(cdr.data());  // it is only read
   payload.length = static_cast<std::uint32_t>(cdr.size());
   const bool is_decoded = support.deserialize(&payload, &message);
-  payload.data = nullptr;  // it is not the payload's to free
+  payload.data = nullptr;  // the payload must not free it
   return is_decoded;
 }
 
