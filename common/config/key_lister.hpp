@@ -21,10 +21,10 @@ struct ListedKey {
   std::string range;          ///< empty: every value of the type
   std::string default_value;  ///< empty where there is none
   std::string presence;       ///< "required", "optional" or "one of a, b"
-  std::string condition;      ///< which value of another key it belongs to; empty: any
+  std::string condition;      ///< value of another key that it requires; empty: none
 };
 
-/// Which alternative each map.choose of one map takes, one combination after the other.
+/// The alternatives that the calls of map.choose in one map take. Goes through all combinations.
 class Alternatives {
  public:
   std::size_t take(std::size_t count) {
@@ -47,8 +47,8 @@ class Alternatives {
   std::size_t next_ = 0;
 };
 
-/// The `Map` that lists: describe(lister, field) appends the keys of `field`, whose values are
-/// their defaults.
+/// The `Map` that lists: describe(lister, field) appends the keys of `field`. The values in `field`
+/// are the defaults.
 class KeyLister {
  public:
   KeyLister(std::vector<ListedKey>& keys, std::string prefix, Alternatives& alternatives)
@@ -124,7 +124,7 @@ class KeyLister {
   }
 
  private:
-  /// The keys that go with one value of a key.
+  /// The keys that are allowed with one value of a key.
   struct Group {
     std::string value;
     std::vector<ListedKey> keys;
@@ -135,7 +135,7 @@ class KeyLister {
            a.default_value == b.default_value && a.presence == b.presence;
   }
 
-  /// Keys that go with every value have no condition.
+  /// Keys that are allowed with every value have no condition.
   void add_groups(const std::string& decider, const std::vector<Group>& groups) {
     std::vector<std::pair<ListedKey, std::vector<std::string>>> found;
     for (const Group& group : groups)

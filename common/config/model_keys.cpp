@@ -18,7 +18,7 @@ std::string ModelName::calc_library_sha256(const std::filesystem::path& folder) 
 
 namespace {
 
-/// Of every shared library. One that is a plant may have an attitude.
+/// The keys of every shared library. A plant in a library may have an attitude.
 template <class Section>
 class LibraryKeys : public OwnKeys<Section, LibraryParameters> {
   bool has_attitude() const override { return true; }

@@ -1,8 +1,8 @@
 /// Additions of a plant, an autopilot or a control law to the scenario file: keys of its own in the
 /// section that names it. Each folder of sim_server/plants, sim_server/autopilots and
 /// control_client/laws describes them in its keys.hpp, without Simbody or DDS. Every program links
-/// all of them, so all accept and refuse the same file with the same line. How to describe keys:
-/// own_keys.hpp.
+/// all of them, so all programs accept the same files and print the same errors. How to describe
+/// keys: own_keys.hpp.
 #pragma once
 
 #include <map>
@@ -18,7 +18,7 @@ class MapReader;
 class MapWriter;
 class Places;
 
-/// The keys of one model. `Section` is what they stand in: Plant, Autopilot or Controller.
+/// The keys of one model. `Section` is the section that has them: Plant, Autopilot or Controller.
 template <class Section>
 class ModelKeys {
  public:
@@ -29,12 +29,13 @@ class ModelKeys {
   virtual void describe(MapWriter& map, Section& section) const = 0;
   /// Rules between these keys and others of the scenario. @throws ConfigError.
   virtual void check(const Scenario&, const Places&) const {}
-  /// Of a plant: whether its vehicles turn. `initial` can then say how they are turned, and
-  /// `estimator` errors of their attitude; one of the project takes an `autopilot`.
+  /// True for a plant whose vehicles have an attitude. The scenario may then have an initial
+  /// attitude and attitude errors (`estimator`); a plant of the project also accepts an
+  /// `autopilot`.
   virtual bool has_attitude() const { return false; }
 };
 
-/// By name.
+/// The keys of each model, by name.
 template <class Section>
 using ModelRegistry = std::map<std::string, const ModelKeys<Section>*>;
 

@@ -2,7 +2,7 @@
 # KINDs.def that names the models, one line each, and a folder for each of them.
 #
 # sls_add_models(KIND SOURCES …): in the folder of the kind. Makes sls_KIND_keys, which every
-# program links, and sls_KINDs, for those that fly or control.
+# program links, and sls_KINDs, for the programs that fly or control.
 function(sls_add_models kind)
   add_library(sls_${kind}_keys STATIC keys.cpp)
   add_library(sls::${kind}_keys ALIAS sls_${kind}_keys)

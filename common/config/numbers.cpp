@@ -61,8 +61,8 @@ std::optional<std::int64_t> to_nanoseconds(double seconds) {
   const double exact = seconds * kNanosecondsPerSecond;
   if (!(std::abs(seconds) <= kMaxSeconds)) return std::nullopt;
   const double nearest = std::round(exact);
-  // Far from zero the spacing of doubles exceeds the tolerance: there a decimal that is a whole
-  // number of nanoseconds is the double nearest to it.
+  // For long times the spacing of doubles exceeds the tolerance. There `seconds` must be the double
+  // nearest to a whole number of nanoseconds.
   if (std::abs(exact - nearest) > 1e-3 && nearest / kNanosecondsPerSecond != seconds)
     return std::nullopt;
   return static_cast<std::int64_t>(nearest);

@@ -1,4 +1,4 @@
-/// How a folder of plants or laws describes the keys of its own:
+/// How the folder of a plant, an autopilot or a law describes its own keys:
 ///
 ///     struct PidKeys { … };                                     // keys.hpp: values with defaults
 ///     template <class Map>
@@ -36,7 +36,7 @@ void describe_own(Map& map, Section&, LibraryParameters& parameters) {
   map.key(kOptional, "parameters", parameters);
 }
 
-/// Of an autopilot in a shared library: its period besides.
+/// The keys of an autopilot in a shared library: also its period.
 template <class Map>
 void describe_own(Map& map, Autopilot& autopilot, LibraryParameters& parameters) {
   describe_period(map, autopilot);

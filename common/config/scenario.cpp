@@ -15,7 +15,7 @@
 namespace sls::config {
 namespace {
 
-/// A delay keeps that many samples in memory.
+/// Limits of delays, because a delay keeps its samples in memory.
 constexpr std::int64_t kMaxDelayPeriods = 100'000;
 constexpr std::int64_t kMaxSamplesUnderWay = 100'000;
 
@@ -26,14 +26,14 @@ void check_size(const std::string& text, const std::string& place) {
                          std::to_string(text.size()));
 }
 
-/// Puts the vehicle's own numbers in place of those of all.
+/// Replaces the numbers that all vehicles have by the vehicle's own.
 void put_own(const VehicleVariant& variant, model::SlungLoadParameters& vehicle) {
   vehicle.quad_mass = variant.quad_mass.value_or(vehicle.quad_mass);
   vehicle.load_mass = variant.load_mass.value_or(vehicle.load_mass);
   vehicle.rod_length = variant.rod_length.value_or(vehicle.rod_length);
 }
 
-/// Index of the first timed stage that does not end with a control period.
+/// Index of the first timed stage whose duration is not a multiple of the control period.
 std::optional<std::size_t> find_stage_off_period(const Scenario& scenario) {
   for (std::size_t i = 0; i < scenario.mission.size(); ++i) {
     const auto* timed = std::get_if<LeaveAfter>(&scenario.mission[i].leave);
@@ -42,7 +42,7 @@ std::optional<std::size_t> find_stage_off_period(const Scenario& scenario) {
   return std::nullopt;
 }
 
-/// Why the delays of the faults do not fit the control period, and which fault says so.
+/// A delay of a fault that does not fit the control period.
 struct DelayMismatch {
   std::size_t fault = 0;
   std::int64_t by_ns = 0;
@@ -103,7 +103,7 @@ std::string to_too_long(std::int64_t period_ns) {
          to_seconds_text(kMaxDelayPeriods * period_ns) + " s)";
 }
 
-/// Keys of plants whose vehicles turn, and of their autopilot.
+/// Checks the keys of plants whose vehicles have an attitude, and of their autopilot.
 void check_autopilot(const Scenario& scenario, const Places& places) {
   const ModelName& model = scenario.plant.model;
   if (model.is_shared_library() || !find_model_keys(plant_keys(), model).has_attitude()) {
@@ -124,7 +124,7 @@ void check_autopilot(const Scenario& scenario, const Places& places) {
     find_model_keys(autopilot_keys(), scenario.autopilot->model).check(scenario, places);
 }
 
-/// Nothing if `offset` says something to its channel, else the keys that could.
+/// Nothing if `offset` changes the samples of channel `on`; else the keys of which one is missing.
 std::optional<std::string> find_missing_offset(const SampleOffset& offset, FaultChannel on) {
   const model::RodAngles& rod = offset.rod;
   if (on == FaultChannel::kCommand)
@@ -168,8 +168,8 @@ void check_faults(const Scenario& scenario, const Places& places) {
   }
 }
 
-/// An age or a delay of `sensing`, and what keeps its samples few: its key, itself, and the time
-/// between samples.
+/// An age or a delay of `sensing`: its key, its value and the time between samples, which limits
+/// the number of samples.
 struct SensingTime {
   const char* key;
   std::int64_t age_ns;
@@ -183,7 +183,7 @@ std::array<SensingTime, 3> list_sensing_times(const Scenario& scenario) {
            {"sensing.node_delay_s", sensing.node_delay_ns, step}}};
 }
 
-/// Which of them means too many samples.
+/// The first of them that causes too many samples.
 std::optional<SensingTime> find_too_many_samples(const Scenario& scenario) {
   for (const SensingTime& time : list_sensing_times(scenario))
     if (time.age_ns / time.interval_ns > kMaxSamplesUnderWay) return time;
@@ -194,7 +194,7 @@ std::string to_too_many(const SensingTime& time) {
          to_seconds_text(time.interval_ns) + " s under way, got " + to_seconds_text(time.age_ns);
 }
 
-/// How long the flight can last.
+/// Longest possible duration of the flight.
 std::int64_t calc_longest_flight_ns(const Scenario& scenario) {
   std::int64_t sum = 0;
   for (const Stage& stage : scenario.mission) {
@@ -226,7 +226,8 @@ void check_estimator(const Scenario& scenario, const Places& places) {
           (is_tilted ? to_yaml_value(error.tilt) : to_yaml_value(error.yaw)));
 }
 
-/// Moves where the vehicle starts and what it follows. Leave conditions refer to the reference.
+/// Moves the start and the references of the vehicle. Leave conditions are relative to the
+/// reference, so they move too.
 void shift(Scenario& scenario, const Eigen::Vector3d& offset) {
   scenario.plant.initial.position += offset;
   for (Stage& stage : scenario.mission) {
@@ -335,7 +336,7 @@ Scenario make_vehicle_scenario(const Scenario& scenario, std::uint32_t id) {
   if (model.follows.quad_mass) model.vehicle.quad_mass = alone.vehicle.quad_mass;
   if (model.follows.load_mass) model.vehicle.load_mass = alone.vehicle.load_mass;
   if (model.follows.rod_length) model.vehicle.rod_length = alone.vehicle.rod_length;
-  if (!variant.offset.isZero(0.0)) shift(alone, variant.offset);  // −0 + 0 would be another bit
+  if (!variant.offset.isZero(0.0)) shift(alone, variant.offset);  // −0 + 0 would change a bit
   return alone;
 }
 

@@ -24,7 +24,7 @@
 
 namespace sls::config {
 
-/// A scenario travels whole in `sls/parameters`, whose string is bounded by this.
+/// Bound of the string in `sls/parameters` that carries the whole scenario.
 inline constexpr std::size_t kMaxScenarioBytes = 32768;
 
 /// Bound of the vehicle ids in `sls/parameters`.
@@ -48,7 +48,7 @@ struct ModelName {
   }
 };
 
-/// The values of the keys that belong to the named model alone, of a type that its folder defines.
+/// The values of the keys that only the named model has. The model's folder defines their type.
 class OwnValues {
  public:
   OwnValues() = default;
@@ -62,7 +62,7 @@ class OwnValues {
     const auto* held = std::any_cast<Values>(&any_);
     return held ? *held : kDefaults;
   }
-  /// The same to change.
+  /// The same values, to be changed.
   template <class Values>
   Values& edit() {
     if (!std::any_cast<Values>(&any_)) any_ = Values{};
@@ -89,7 +89,7 @@ struct LibraryParameters {
 /// How one vehicle of a fleet differs from `vehicle`, `plant.initial` and `mission`.
 struct VehicleVariant {
   Eigen::Vector3d offset = Eigen::Vector3d::Zero();  ///< of initial and reference positions, m
-  std::optional<double> quad_mass;                   ///< kg; none: as `vehicle` says
+  std::optional<double> quad_mass;                   ///< kg; none: that of `vehicle`
   std::optional<double> load_mass;                   ///< kg
   std::optional<double> rod_length;                  ///< m
 };
@@ -98,7 +98,8 @@ struct VehicleVariant {
 
 enum class Body { kQuadrotor, kLoad };
 
-/// Where the bodies are at step 0: one of them is placed, the rod angles give the other.
+/// State of the bodies at step 0. The file has the position of one body; the rod angles give that
+/// of the other.
 struct InitialState {
   Body placed = Body::kLoad;                           ///< `load_position_m` or `quad_position_m`
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< of the placed body, m
@@ -155,14 +156,14 @@ enum class RecorderPolicy {
 template <class Policy>
 struct Absence {
   Policy policy = Policy::kWait;
-  /// Under `wait`: after which the run fails; else after which the policy acts.
+  /// Time limit, after which the run fails (`wait`) or the policy acts (all others).
   double deadline_s = 30.0;
 };
 
 struct WaitPolicies {
   Absence<ControllerPolicy> controller;
   Absence<RecorderPolicy> recorder;
-  double server_deadline_s = 30.0;  ///< after which clients and recorders give a silent server up
+  double server_deadline_s = 30.0;  ///< after which clients and recorders give up a silent server
 };
 
 struct Sync {
@@ -185,20 +186,20 @@ struct Sync {
 
 // --- sensing -----------------------------------------------------------------------------------
 
-/// When a group of sensors samples, and when its samples are seen.
+/// Sampling period of a group of sensors, and age of its samples.
 struct SampleTimes {
   std::int64_t period_ns = 0;  ///< samples at its multiples from time 0; 0: at every plant step
-  std::int64_t age_ns = 0;     ///< and each is seen this much later
+  std::int64_t age_ns = 0;     ///< controllers receive each sample this much later
 };
 
-/// How old is what the controllers see, and how late is what they answer.
+/// Delays of the measurements and of the answers.
 struct Sensing {
   SampleTimes body;                ///< position, velocity, attitude, body rates, signals
   SampleTimes rod;                 ///< the rod's angles and rates
   std::int64_t node_delay_ns = 0;  ///< from an answer to the plant
 };
 
-/// Constant errors of what the controllers see.
+/// Constant errors of the measured state.
 struct Estimator {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< of quadrotor and load alike, m
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< of quadrotor and load alike, m/s
@@ -224,11 +225,11 @@ struct DropFault {
   std::uint64_t seed = 0;
 };
 
-/// The receiver keeps what arrived last before the fault.
+/// The receiver keeps the last sample that arrived before the fault.
 struct FreezeFault {};
 
-/// A sample is overtaken by its successor with this probability: it arrives one period later, after
-/// that one, and counts until the next arrives.
+/// With this probability a sample arrives one period later, after its successor. The receiver then
+/// uses it until the next sample arrives.
 struct ReorderFault {
   double probability = 0.0;
   std::uint64_t seed = 0;
@@ -271,7 +272,7 @@ enum class StateWiring {
 
 /// Vehicle parameters that the controller uses; those not in the file equal the plant's.
 struct ControllerModel {
-  /// Which numbers the file leaves out: in a fleet they equal the truth of each vehicle.
+  /// Numbers that the file leaves out: in a fleet they equal the true ones of each vehicle.
   struct Follows {
     bool quad_mass = false;
     bool load_mass = false;
@@ -364,7 +365,7 @@ struct Scenario {
   std::vector<Stage> mission;
   Sensing sensing;
   Estimator estimator;
-  std::vector<Fault> faults;  ///< of one channel, in the order in which they act
+  std::vector<Fault> faults;  ///< those of one channel act in this order
   Record record;
 
   std::string text;              ///< the file's bytes
@@ -379,13 +380,13 @@ Scenario load_scenario(const std::filesystem::path& file);
 /// The same from text that came over the wire; `place` stands for the file's name in messages.
 Scenario parse_scenario(const std::string& text, const std::string& place);
 
-/// SHA-256 of the shared library that the plant loads: that of the plant itself or, where it is
-/// none, of its autopilot; empty if neither is one.
+/// SHA-256 of the shared library of the plant or, if the plant is not in one, of its autopilot;
+/// empty if neither is in one.
 /// @throws std::system_error naming the file where it cannot be read.
 std::string calc_plant_library_sha256(const Scenario& scenario);
 
-/// Writes every value of `scenario` (not `text`) as YAML that reads back to the same values; what
-/// the controller's model follows is left out.
+/// Writes every value of `scenario` (not `text`) as YAML that reads back to the same values. Leaves
+/// out the numbers of the controller's model that equal those of the vehicle (`follows`).
 std::string to_yaml(const Scenario& scenario);
 
 /// `count` equal vehicles on a level square grid, 5 m apart: rows of ⌈√count⌉ along x, the first
@@ -393,8 +394,8 @@ std::string to_yaml(const Scenario& scenario);
 std::vector<VehicleVariant> make_vehicle_grid(std::size_t count);
 
 /// The scenario of vehicle `id` alone: its own parameters, initial position and references, and one
-/// entry in `vehicles`. An offset of zero leaves every bit as it is. Name, text and hash stay those
-/// of the fleet; so do the faults, whose `vehicle` still counts in it.
+/// entry in `vehicles`. An offset of zero changes no bit. Name, text, hash and faults are those of
+/// the fleet; `vehicle` of a fault is still an id in the fleet.
 /// @throws std::out_of_range if there is no such vehicle.
 Scenario make_vehicle_scenario(const Scenario& scenario, std::uint32_t id);
 
@@ -402,11 +403,11 @@ Scenario make_vehicle_scenario(const Scenario& scenario, std::uint32_t id);
 /// ns, so that 0.004 is exactly 4,000,000).
 std::optional<std::int64_t> to_nanoseconds(double seconds);
 
-/// Puts another control period in force: the step becomes the smaller of the file's and `period_s`.
+/// Replaces the control period; the plant step becomes the smaller of the file's and `period_s`.
 /// @throws ConfigError as for the key `sync.period_s`, with `place` = "--period-s".
 void override_period(Scenario& scenario, double period_s);
 
-/// Puts another real-time factor in force.
+/// Replaces the real-time factor.
 /// @throws ConfigError as for the key `sync.real_time_factor`, with `place` = "--rtf"; also in
 ///   lockstep, which has none.
 void override_real_time_factor(Scenario& scenario, double factor);

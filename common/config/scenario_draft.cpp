@@ -39,7 +39,7 @@ YamlNode make_key(const std::string& name, int line) {
   return key;
 }
 
-/// All lines of a value that replaces another are that one's.
+/// Gives every node of a replacing value the line of the replaced one.
 void place_at(YamlNode& node, int line) {
   node.line = line;
   for (YamlNode& key : node.keys) place_at(key, line);
@@ -66,7 +66,8 @@ std::string to_quoted(const std::string& text) {
   return quoted + '"';
 }
 
-/// In quotes exactly where the file has it in quotes, for a quoted number is a text.
+/// In quotes if the file has it in quotes, because a quoted number is a text, or if it has several
+/// lines.
 std::string to_scalar(const YamlNode& node) {
   return node.quoted || node.text.find('\n') != std::string::npos ? to_quoted(node.text)
                                                                   : node.text;
@@ -153,7 +154,7 @@ void ScenarioDraft::set(const std::string& path, const std::string& value) {
     } else if (node->kind == YamlNode::Kind::kScalar) {
       throw fail("expected a map or a list, got " + to_brief(*node));
     } else {
-      node->kind = YamlNode::Kind::kMap;  // which an empty value becomes
+      node->kind = YamlNode::Kind::kMap;  // an empty value becomes a map
       int index = find_key(*node, part);
       if (index < 0) {
         node->keys.push_back(make_key(part, node->line));

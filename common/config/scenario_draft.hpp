@@ -1,5 +1,4 @@
-/// A scenario file with some of its values replaced: what a campaign varies, what a Python call
-/// changes.
+/// A scenario file with some of its values replaced, by a campaign or by a Python call.
 #pragma once
 
 #include <filesystem>
@@ -21,9 +20,8 @@ class ScenarioDraft {
 
   /// Puts the YAML `value` at `path`: keys and, of a list, indices from 0, separated by dots, such
   /// as `vehicle.load_mass_kg` or `faults.0.delay.by_s`. Keys that the file leaves out are added.
-  /// @throws ConfigError naming file, line and path where a list has no such item, where a number
-  /// or
-  ///   a text stands on the way, or where `value` is no YAML.
+  /// @throws ConfigError naming file, line and path if a list has no such item, if a part of the
+  ///   path before the last is a number or a text, or if `value` is no YAML.
   void set(const std::string& path, const std::string& value);
 
   /// The scenario, checked like a file. Its `text` is `to_text()`, so that a file with this text is

@@ -6,7 +6,7 @@
 ///     map.choose(choice, {{value, {"key", …}}}); exactly one of several alternatives is there
 ///     map.decide("key", field, describe_others); a required key whose value decides on other keys
 ///     map.model("key", field, registry, section); a plant or law and the keys of its own
-///     map.by_default(field, value);              what holds if the file does not say
+///     map.by_default(field, value);              the value if the file has none
 #pragma once
 
 #include <algorithm>
@@ -81,7 +81,7 @@ inline constexpr Range kControllers{1, 100};
 inline constexpr Range kRecorders{0, 100};
 inline constexpr Range kVehicleIds{0, static_cast<int>(kMaxVehicles) - 1};
 
-/// Bounds of a number that needs more digits than an int has.
+/// Bounds of a number that does not fit an int.
 struct WideRange {
   std::uint64_t least;
   std::uint64_t most;
@@ -138,7 +138,7 @@ struct Alternative {
   std::vector<const char*> keys;
 };
 
-/// The `Type` inside `variant`, which becomes a default one if it holds something else.
+/// The `Type` inside `variant`. If `variant` holds another type, it first gets a default `Type`.
 template <class Type, class Variant>
 Type& as(Variant& variant) {
   if (!std::holds_alternative<Type>(variant)) variant = Type{};
@@ -198,7 +198,7 @@ void describe(Map& map, Plant& plant) {
   map.key(kRequired, "initial", plant.initial);
 }
 
-/// Of an autopilot with a rhythm of its own.
+/// The key of an autopilot with its own period.
 template <class Map>
 void describe_period(Map& map, Autopilot& autopilot) {
   constexpr std::int64_t kUsual = 4'000'000;  // ns
@@ -228,7 +228,7 @@ void describe(Map& map, Absence<Policy>& absence, double patience_s) {
   map.key(kOptional, "deadline_s", absence.deadline_s, kWait);
 }
 
-/// Patience with a server, of those who wait for it.
+/// Time limit of clients and recorders for a silent server.
 struct ServerAbsence {
   double& deadline_s;
 };
@@ -262,7 +262,7 @@ void describe(Map& map, Sync& sync) {
 
 // --- controller ----------------------------------------------------------------------------------
 
-/// A number that follows the truth unless the file says it.
+/// A number that equals the true one unless the file has it.
 template <class Map>
 void describe_believed(Map& map, const char* name, double& number, bool& follows) {
   std::optional<double> own = follows ? std::nullopt : std::optional(number);
@@ -426,7 +426,7 @@ void describe_effect(Map& map, NoiseFault& noise, FaultChannel on) {
   describe_offset(map, noise.deviation, on, {kNotNegative, kNotNegative, kNotNegative});
 }
 
-/// The map under a fault's kind: the keys of its effect beside those that every fault has.
+/// The map under a fault's kind: the keys of its effect and those that every fault has.
 template <class Effect>
 struct FaultBody {
   Fault& fault;

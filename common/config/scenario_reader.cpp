@@ -37,7 +37,7 @@ bool begins_with(const std::string& text, const std::string& beginning) {
 /// A suggestion for an unknown `key`: a typing error or a forgotten unit.
 std::optional<std::string> find_similar(const std::string& key,
                                         const std::vector<std::string>& known) {
-  constexpr std::size_t kLongestKey = 64;  // beyond, nothing is similar
+  constexpr std::size_t kLongestKey = 64;  // no suggestion for longer keys
   if (key.empty() || key.size() > kLongestKey) return std::nullopt;
   std::optional<std::string> similar;
   std::size_t least = std::max<std::size_t>(2, key.size() / 3) + 1;
@@ -110,7 +110,8 @@ void read_numbers(const Value& value, Vector& vector, const char* expectation,
 
 std::string to_json_text(const std::string& text) { return nlohmann::json(text).dump(); }
 
-/// Any value as JSON: a plain scalar that is a number, true, false or nothing stays that.
+/// Any value as JSON. Plain numbers, true, false and empty values keep their type; other scalars
+/// become strings.
 std::string to_json(const Value& value) {
   const YamlNode& node = value.node;
   std::string text;
@@ -157,7 +158,8 @@ ConfigError Places::make_error_at(const std::string& path, const std::string& me
 }
 
 Value Value::at(const std::string& key, const YamlNode& child, int key_line) const {
-  // yaml-cpp places a map, a list or nothing at what follows it, which may be lines further down.
+  // yaml-cpp gives a map, a list or an empty value the line of the next token, which may be lines
+  // below.
   const int child_line = child.kind == YamlNode::Kind::kScalar ? child.line : key_line;
   const std::string child_path = join_path(path, key);
   places.add(child_path, child_line);
@@ -254,8 +256,8 @@ void read_value(const Value& value, Eigen::Vector2d& vector, const NumberRule& o
 }
 
 void read_value(const Value& value, Eigen::Quaterniond& quaternion) {
-  constexpr double kUnitLength = 1e-6;  // what a rounded unit quaternion may be off
-  constexpr double kRounding = 1e-15;   // so that what is written reads back to the same bits
+  constexpr double kUnitLength = 1e-6;  // tolerance for rounded numbers
+  constexpr double kRounding = 1e-15;   // written quaternions must read back to the same bits
   if (value.node.kind != YamlNode::Kind::kList || value.node.items.size() != 4)
     value.fail_expecting("a unit quaternion, a list w, x, y, z");
   double wxyz[4];

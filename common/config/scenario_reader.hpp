@@ -16,7 +16,7 @@
 
 namespace sls::config {
 
-/// Where each key that was read stands, so that rules between keys can name a line too.
+/// The line of each key that was read, for error messages of rules between keys.
 class Places {
  public:
   explicit Places(std::string file) : file_(std::move(file)) {}
@@ -26,7 +26,7 @@ class Places {
   /// FILE:LINE.
   std::string describe(int line) const;
 
-  /// Error at `path`, or at what contains it where the file leaves it out.
+  /// Error at `path` or, if the file does not have it, at the innermost map or list around it.
   ConfigError make_error_at(const std::string& path, const std::string& message) const;
   ConfigError make_error_at(int line, const std::string& path, const std::string& message) const {
     return make_error(file_, line, path, message);
@@ -54,7 +54,7 @@ struct Value {
   Value at(std::size_t index) const;
 };
 
-/// A `Map` that only learns which keys there are.
+/// A `Map` that only collects the names of the keys.
 class KeyNames {
  public:
   explicit KeyNames(const Value& map) : map_(map) {}
@@ -68,10 +68,10 @@ class KeyNames {
     for (const auto& alternative : alternatives)
       for (const char* name : alternative.keys) add(name);
   }
-  /// The others are those that go with the value in the file; without it, those of any value.
+  /// Collects the keys that belong to the value in the file; without a value, those of all values.
   template <class Enum, class DescribeOthers>
   void decide(const char* name, Enum& field, const DescribeOthers& describe_others);
-  /// The keys of the model in the file; those of the other models are known as theirs.
+  /// Collects the keys of the model in the file, and notes which other models have which keys.
   template <class Section>
   void model(const char* name, ModelName& field, const ModelRegistry<Section>& registry,
              Section& section);
@@ -79,7 +79,7 @@ class KeyNames {
   void by_default(Field&, const Field&) {}
 
   const std::vector<std::string>& names() const { return names_; }
-  /// Why `name` is no key here although another model has it; else nothing.
+  /// The error message if only other models have the key `name`; else nothing.
   std::optional<std::string> find_owner(const std::string& name) const;
 
  private:
@@ -113,7 +113,7 @@ void read_value(const Value& value, Eigen::Quaterniond& quaternion);
 void read_value(const Value& value, std::vector<VehicleVariant>& fleet, const ListRange& range);
 /// A list of formats, each at most once, csv among them.
 void read_value(const Value& value, std::vector<RecordFormat>& formats);
-/// `names` are those of a registry, `expectation` what it lists.
+/// `names` are those of a registry; `expectation` lists them for the error message.
 void read_value(const Value& value, ModelName& model, const std::vector<std::string>& names,
                 const std::string& expectation);
 void read_value(const Value& value, LibraryParameters& parameters);
@@ -280,7 +280,7 @@ void KeyNames::model(const char* name, ModelName& field, const ModelRegistry<Sec
 /// @throws ConfigError for a file that cannot be read, or is larger than a scenario may be.
 std::string read_scenario_file(const std::filesystem::path& file);
 
-/// The scenario in the tree of a file with this text, checked as load_scenario does.
+/// The scenario in `root`, the tree of a file with this text; checked as load_scenario does.
 Scenario read_scenario(const YamlNode& root, const std::string& place, const std::string& text);
 
 }  // namespace sls::config

@@ -52,7 +52,7 @@ inline std::string to_yaml_value(const std::vector<RecordFormat>& formats) {
   return "[" + list + "]";
 }
 
-/// A field that stands on the line of its key.
+/// True for a field that is written on the line of its key.
 template <class Field>
 inline constexpr bool kOnOneLine =
     std::is_arithmetic_v<Field> || std::is_enum_v<Field> || std::is_same_v<Field, std::string> ||
@@ -123,8 +123,8 @@ class MapWriter {
   }
 
   std::string& text_;
-  std::string next_;         // what the next line begins with: a list's item begins with a dash
-  std::string indentation_;  // what the lines after it begin with
+  std::string next_;         // beginning of the next line: for an item of a list with a dash
+  std::string indentation_;  // beginning of the lines after it
 };
 
 }  // namespace sls::config

@@ -11,7 +11,7 @@ struct evp_md_ctx_st;  // OpenSSL's
 
 namespace sls::config {
 
-/// A SHA-256 that is fed piece by piece.
+/// Calculates a SHA-256 of data that comes in pieces.
 class Sha256 {
  public:
   using Digest = std::array<unsigned char, 32>;

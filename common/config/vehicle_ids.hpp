@@ -16,7 +16,7 @@ namespace sls::config {
 /// backwards, and a vehicle beyond the fleet.
 std::vector<std::uint32_t> parse_vehicle_ids(const std::string& text, std::size_t fleet_size);
 
-/// `ids` (sorted, each once) in the same words: `0-9,20`.
+/// `ids` (sorted, each once) in the same form: `0-9,20`.
 std::string to_vehicle_ranges(const std::vector<std::uint32_t>& ids);
 
 }  // namespace sls::config

@@ -1,4 +1,4 @@
-/// YAML text as a plain tree whose every node knows its line. The only code that sees yaml-cpp.
+/// YAML text as a plain tree; every node has its line. No other code uses yaml-cpp.
 #pragma once
 
 #include <cstddef>
@@ -22,14 +22,14 @@ struct YamlNode {
 };
 
 /// The tree of `text`, which must be UTF-8 and hold one document without anchors, aliases and tags.
-/// Nesting is limited; duplicate keys are kept for the reader to judge.
+/// Nesting is limited. Duplicate keys are kept: the reader refuses them.
 /// @throws ConfigError `PLACE:LINE: …`.
 YamlNode parse_yaml(const std::string& text, const std::string& place);
 
 /// The content of `node` in a few printable characters: `-0.16`, `"abc"`, `a list of 2`, `nothing`.
 std::string to_brief(const YamlNode& node);
 
-/// `text` with what is not printable ASCII escaped, cut after about `most` characters.
+/// `text`, cut after about `most` characters. Escapes all characters except printable ASCII.
 std::string to_printable(const std::string& text, std::size_t most = 40);
 
 /// `PLACE:LINE: PATH: MESSAGE`; a line below 1 and an empty path are left out.
