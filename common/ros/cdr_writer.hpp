@@ -1,4 +1,4 @@
-/// Writes plain CDR (XCDR1), little-endian, into memory that is used again for the next message.
+/// Writes plain CDR (XCDR1), little-endian, into a buffer that is reused for the next message.
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,5 @@
-/// The one place where vectors and attitudes of this project (z down) become those of ROS (z up,
-/// REP-103): README.md.
+/// Converts vectors and attitudes of this project (z down) to those of ROS (z up, REP-103):
+/// README.md. No other code converts them.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,7 +12,7 @@ namespace sls::ros {
 inline const std::string kWorld = "world";              ///< x forward, y left, z up
 inline const std::string kWorldZDown = "world_z_down";  ///< frame W of this project
 
-/// "vehicle_3": before names of topics, frames and markers.
+/// "vehicle_3": prefix of names of topics, frames and markers.
 inline std::string name_vehicle(std::uint32_t vehicle_id) {
   return "vehicle_" + std::to_string(vehicle_id);
 }

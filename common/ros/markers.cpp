@@ -12,7 +12,7 @@ struct Color {
   float r, g, b, a;
 };
 
-/// Distinguishes the markers of a vehicle and says how each is drawn.
+/// Id of a marker within its vehicle, and its appearance.
 struct Style {
   std::int32_t id;
   Shape shape;
@@ -54,7 +54,7 @@ void write_marker(CdrWriter& cdr, std::int64_t time_ns, const std::string& name,
   cdr.write(false);               // mesh_use_embedded_materials
 }
 
-/// `trail` up to `end`, where it is now; at least the two points that a line needs.
+/// The points of `trail` and then `end`, the current position: at least two, as a line requires.
 std::vector<Eigen::Vector3d> extend(const Trail& trail, const Eigen::Vector3d& end) {
   std::vector<Eigen::Vector3d> points = trail.points();
   points.push_back(end);

@@ -13,11 +13,11 @@
 
 namespace sls::ros {
 
-/// The last points that something passed, at least `kLeastStep` from one to the next.
+/// The last points of a path, at least `kLeastStep` apart.
 class Trail {
  public:
   static constexpr std::size_t kMostPoints = 128;
-  static constexpr double kLeastStep = 0.02;  ///< m; what hovers leaves no heap of points
+  static constexpr double kLeastStep = 0.02;  ///< m; a hovering body adds no points
 
   void add(const Eigen::Vector3d& point);
   const std::vector<Eigen::Vector3d>& points() const { return points_; }
@@ -32,7 +32,7 @@ class VehicleMarkers {
 
   explicit VehicleMarkers(std::uint32_t vehicle_id);
 
-  /// True if the markers of this time are to be written: once in each period of simulation time.
+  /// True if the markers must be written now: once in each period of simulation time.
   bool is_due(std::int64_t sim_time_ns) const { return sim_time_ns >= next_ns_; }
 
   /// Writes a MarkerArray. Positions in `world`.

@@ -12,7 +12,7 @@
 namespace sls::ros {
 namespace {
 
-/// Index into the channels: those of the run, then for each vehicle those of a vehicle.
+/// Index into the channels: first those of the run, then those of each vehicle.
 enum RunChannel : std::size_t { kClock, kTf, kTfStatic, kRunChannels };
 enum VehicleChannel : std::size_t {
   kQuadrotorOdometry,

@@ -1,5 +1,5 @@
-/// Standard ROS 2 messages that mirror a flight: what Foxglove, MCAP readers and ROS tools can draw
-/// without knowing this project. Frames after REP-103 and REP-105: README.md. No network here.
+/// Standard ROS 2 messages that mirror a flight. Foxglove, MCAP readers and ROS tools draw them
+/// without code of this project. Frames as in REP-103 and REP-105: README.md. No network here.
 #pragma once
 
 #include <Eigen/Core>
@@ -39,7 +39,7 @@ struct VehicleSample {
 /// Makes the messages of a run's vehicles; remembers their trails.
 class Mirrors {
  public:
-  /// By ascending id.
+  /// `vehicle_ids` must be in ascending order.
   explicit Mirrors(const std::vector<std::uint32_t>& vehicle_ids);
   ~Mirrors();
 
@@ -54,7 +54,7 @@ class Mirrors {
   void emit_static(const Emit& emit);
   /// All messages of one sample: /clock (of a step once), /tf, odometry and poses of quadrotor and
   /// load; markers of rod, trail and reference, the latter at most every 50 ms of simulation time.
-  /// Samples of a vehicle come in step order; which are left out is the caller's choice.
+  /// Samples of a vehicle must come in step order; the caller may leave out any of them.
   void emit(const VehicleSample& sample, const Emit& emit);
 
  private:

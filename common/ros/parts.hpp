@@ -1,4 +1,4 @@
-/// Parts that several messages have, as idl/ros/messages.msg orders their fields.
+/// Parts of several messages, with the fields in the order of idl/ros/messages.msg.
 #pragma once
 
 #include <Eigen/Core>

@@ -11,7 +11,7 @@ namespace {
 
 const std::string kSeparator = std::string(80, '=') + "\n";
 
-/// "geometry_msgs/Point" → its lines, of all in `kMessageDefinitions`.
+/// The lines of each definition in `kMessageDefinitions`, by name ("geometry_msgs/Point").
 std::map<std::string, std::string> split_definitions() {
   std::map<std::string, std::string> definitions;
   const std::string text = kMessageDefinitions;
@@ -25,7 +25,7 @@ std::map<std::string, std::string> split_definitions() {
   return definitions;
 }
 
-/// The types of the fields of a definition that are messages themselves: "package/Type".
+/// The field types of a definition that are messages: "package/Type".
 std::vector<std::string> list_parts(const std::string& definition) {
   std::vector<std::string> parts;
   std::istringstream lines(definition);

@@ -10,8 +10,8 @@ import re
 
 SEPARATOR = "=" * 80
 
-# type_description_interfaces/msg/FieldType. Arrays of a fixed length, bounded and unbounded sequences come 48, 96 and
-# 144 later.
+# type_description_interfaces/msg/FieldType. Arrays of a fixed length, bounded and unbounded sequences have numbers that
+# are 48, 96 and 144 higher.
 NESTED = 1
 FIELD_TYPES = {"int8": 2, "uint8": 3, "int16": 4, "uint16": 5, "int32": 6, "uint32": 7, "int64": 8, "uint64": 9,
                "float32": 10, "float64": 11, "char": 13, "wchar": 14, "bool": 15, "byte": 16, "string": 17,
@@ -24,7 +24,7 @@ FIELD = re.compile(r"(?P<base>[\w/]+)(?:<=(?P<string_bound>\d+))?(?:\[(?P<at_mos
 
 
 def full_name(name, package):
-    """geometry_msgs/msg/Point of geometry_msgs/Point, and of Point in `package`."""
+    """geometry_msgs/msg/Point for geometry_msgs/Point, and for Point in `package`."""
     parts = name.split("/")
     return f"{parts[0] if len(parts) > 1 else package}/msg/{parts[-1]}"
 
@@ -46,14 +46,14 @@ def parse_field(line, package):
 
 
 def parse_definition(name, text):
-    """The IndividualTypeDescription of `name`, without default values, which no hash has."""
+    """The IndividualTypeDescription of `name`, without default values, which do not count in a hash."""
     lines = (line.split("#")[0].strip() for line in text.splitlines())
     fields = [parse_field(line, name.split("/")[0]) for line in lines if line]
     return {"type_name": name, "fields": [field for field in fields if field]}
 
 
 def parse_definitions(text, first=""):
-    """All definitions of a ros2msg text by full name; `first`: of the one before the first separator."""
+    """All definitions of a ros2msg text by full name; `first`: name of the one before the first separator."""
     definitions = {}
     for part in re.split(f"^{SEPARATOR}\n", text, flags=re.MULTILINE):
         name = first
@@ -66,7 +66,7 @@ def parse_definitions(text, first=""):
 
 
 def find_nested(definitions, name):
-    """Names of all types that `name` is made of, and those of these."""
+    """Names of all types inside `name`, at every level."""
     found = set()
     waiting = [name]
     while waiting:
