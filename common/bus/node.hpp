@@ -88,8 +88,8 @@ class Node {
   /// 'foo' (10.0.0.2): name and address that a participant announces in discovery.
   std::string describe(const PeerId& peer) const;
 
-  /// Participants whose sls/command offers a longer DEADLINE than our reader requests, with a text:
-  /// a mistake if the participant serves our run (fastdds/neighbours.hpp).
+  /// Participants whose sls/command offers a longer DEADLINE than our reader requests, or none,
+  /// with a text: a mistake if the participant serves our run (fastdds/neighbours.hpp).
   std::map<PeerId, std::string> find_missing_deadlines() const;
 
   /// Participants that `problems` names for their endpoints or samples.

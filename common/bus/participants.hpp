@@ -185,8 +185,8 @@ class ServerWatch {
   ServerWatch(const ServerDirectory& servers, const Run& run, double deadline_s);
 
   enum class Finding { kThere, kSilent, kLost };
-  /// Call it several times a second. After more than 0.5 s without a call this process itself was
-  /// stopped, so that time does not count as silence of the server.
+  /// Call it several times a second. A gap of more than 0.5 s between calls means that this process
+  /// itself was stopped: the gap does not count as silence of the server.
   Finding look();
 
   /// For messages: "server of run … (silent for 3.1 s)".

@@ -1,4 +1,5 @@
-/// Switches polling on and off, which takes processor time and receives a message sooner.
+/// Switches polling for messages on and off. It receives a message sooner, but takes processor
+/// time.
 #pragma once
 
 #include <atomic>

@@ -10,7 +10,7 @@ namespace sls::bus {
 ///
 /// Polling in vain takes time that the sender may need. So after a failure the next wait sleeps at
 /// once, after a second failure in a row the next three waits, and so on; each success halves this
-/// number. So there is hardly any polling if the sender shares our processor, is far away or busy.
+/// number. There is hardly any polling if the sender shares our processor, is far away or is busy.
 class AdaptiveSpin {
  public:
   using Clock = std::chrono::steady_clock;

@@ -35,7 +35,7 @@ inline std::optional<std::chrono::nanoseconds> to_period(
 
 namespace detail {
 
-/// Fills in the policies that writers and readers of this program and of others have.
+/// Fills in the policies that both writers and readers have, in this program and in others.
 template <class Reliability, class Durability, class Deadline, class Liveliness, class Ownership>
 void fill(EndpointFacts& facts, const Reliability& reliability, const Durability& durability,
           const Deadline& deadline, const Liveliness& liveliness, const Ownership& ownership) {
