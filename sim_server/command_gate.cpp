@@ -36,7 +36,7 @@ Verdict to_verdict(Defect defect) {
   return Verdict::kFault;
 }
 
-/// Strongest first; equal strengths in an order that does not depend on who arrived first.
+/// Order by strength, strongest first; then by name and peer, not by time of arrival.
 bool is_stronger(const ReadyClient& a, const ReadyClient& b) {
   if (a.strength != b.strength) return a.strength > b.strength;
   if (a.name != b.name) return a.name < b.name;
@@ -86,7 +86,7 @@ void CommandGate::set_clients(const std::vector<ReadyClient>& clients) {
     client.identity = identity;
     updated.push_back(std::move(client));
   }
-  drop_held();  // of those that have left
+  drop_held();  // of clients that have left
   std::sort(updated.begin(), updated.end(),
             [](const Client& a, const Client& b) { return is_stronger(a.identity, b.identity); });
   clients_ = std::move(updated);
@@ -134,7 +134,7 @@ Verdict CommandGate::judge(const OfferedAnswer& answer, const bus::PeerId& sende
   }
   if (answer.step != step_) return judge_past(answer, sender);
   if (!client) return Verdict::kUnknownClient;
-  // A client's first answer counts; what it sends besides is a copy or belongs to no step.
+  // Only a client's first answer to a step counts; another one is a copy or a contradiction.
   const auto& first = accepted_ && accepted_from_ == sender ? accepted_ : client->held;
   if (first)
     return first->command.f_Q_W_n() == answer.command.f_Q_W_n() ? Verdict::kDuplicate
@@ -203,7 +203,7 @@ const CommandGate::Client* CommandGate::find_awaited() const {
     if (!client.silent) return &client;
     if (!silent) silent = &client;
   }
-  return silent;  // all are silent: the strongest may still come back
+  return silent;  // all are silent: await the strongest
 }
 
 std::optional<ReadyClient> CommandGate::awaited_client() const {
@@ -218,7 +218,7 @@ bool CommandGate::pass_over_silent_client() {
     return &client != awaited && !client.silent && !is_refused(client);
   });
   if (!has_next) return false;
-  if (!flyer_) flyer_ = awaited->identity;  // it was to fly first
+  if (!flyer_) flyer_ = awaited->identity;  // the first awaited client, for the take-over message
   find_client(awaited->identity.peer)->silent = true;
   settle();
   return true;
@@ -247,7 +247,7 @@ void CommandGate::count(Verdict verdict) {
   switch (verdict) {
     case Verdict::kAccepted:
     case Verdict::kHeld:
-    case Verdict::kLate:  // the step is counted, not what comes after it
+    case Verdict::kLate:  // the held or fail-safe step is counted instead
       return;
     case Verdict::kDuplicate:
       ++counters_.duplicate();

@@ -1,4 +1,5 @@
-/// Decides what becomes of every answer: the one that flies, or why not. No network here.
+/// Judges every answer: accepts one per step, and gives the cause if it rejects one. No network
+/// here.
 /// Rules: README.md, "Commands" and "Standby".
 #pragma once
 
@@ -32,7 +33,7 @@ enum class Verdict {
   kFault,
 };
 
-/// For messages: what is wrong with a rejected command. Empty for the first five verdicts.
+/// Defect of a rejected command, for messages. Empty for the first five verdicts.
 const char* to_string(Verdict verdict);
 
 /// One vehicle's part of a sample of sls/command.
@@ -55,11 +56,11 @@ class CommandGate {
  public:
   CommandGate(std::uint64_t run_id, std::uint32_t vehicle_id, double force_limit_n);
 
-  /// Puts the clients that may answer in force; what is known of those that stay is kept.
+  /// Sets the clients that may answer. Clients that stay keep their records.
   void set_clients(const std::vector<ReadyClient>& clients);
 
-  /// Awaits the answers to `step` from now on. Steps are awaited in order; one that went by without
-  /// an accepted answer (real time, or a vehicle nobody flew) may still get a late one.
+  /// Awaits the answers to `step` from now on. Steps are awaited in order. A step that went by
+  /// without an accepted answer (in real time, or without a controller) may still get a late one.
   void expect(std::uint64_t step);
 
   /// Judges one answer and counts it.
@@ -68,7 +69,7 @@ class CommandGate {
   /// The accepted answer to the awaited step, once there is one.
   const std::optional<OfferedAnswer>& accepted() const { return accepted_; }
 
-  /// The last answer to the awaited step that was refused for what it says.
+  /// The last answer to the awaited step that was refused because of its content.
   const std::optional<OfferedAnswer>& refused() const { return refused_; }
 
   /// The client whose answer is awaited: the strongest that is neither silent nor refused.
@@ -81,19 +82,20 @@ class CommandGate {
   };
   const std::optional<TakeOver>& take_over() const { return take_over_; }
 
-  /// Notes that the awaited client let the awaited step go by; how many in a row by now.
+  /// Counts a miss: the awaited client did not answer the awaited step. Returns its misses in a
+  /// row.
   int count_miss();
 
-  /// Declares the awaited client silent and awaits the next one's answer, if there is a next one
-  /// (true). It is skipped until it answers an awaited step again.
+  /// If there is another client to await: declares the awaited one silent, awaits the next one and
+  /// returns true. A silent client is skipped until it answers an awaited step again.
   bool pass_over_silent_client();
 
-  /// Why no client is left to answer the awaited step: what they sent. Nothing while an answer can
-  /// still come.
+  /// The refused answers of the clients, if none is left to answer the awaited step. Nothing while
+  /// an answer can still come.
   std::optional<std::string> refusal() const;
 
-  /// Refused answers of clients, in answer to the awaited step or to one that went by since
-  /// the last accepted answer. Empty if the awaited step has its answer.
+  /// Describes the refused answers to the awaited step and to steps that went by since the last
+  /// accepted answer. Empty if the awaited step has its answer.
   std::string describe_refusals() const;
 
   const SyncCounters& counters() const { return counters_; }
@@ -103,9 +105,9 @@ class CommandGate {
   struct Client {
     ReadyClient identity;
     bool silent = false;
-    int misses = 0;                     // steps in a row that it let go by
+    int misses = 0;                     // steps in a row that it did not answer
     std::string refusal;                // why its last answer was refused
-    std::uint64_t refused_step = 0;     // which that one answered
+    std::uint64_t refused_step = 0;     // the step of that answer
     std::optional<OfferedAnswer> held;  // its first valid answer to the awaited step
   };
 
@@ -131,13 +133,13 @@ class CommandGate {
   std::optional<OfferedAnswer> accepted_;
   std::optional<OfferedAnswer> refused_;
   bus::PeerId accepted_from_;
-  std::optional<ReadyClient> flyer_;  // of the last accepted answer
+  std::optional<ReadyClient> flyer_;  // sender of the last accepted answer
   std::optional<TakeOver> take_over_;
   struct Past {
     bus::PeerId sender;
     std::array<double, 3> force;
   };
-  // The first answers to the last steps, to tell copies from others; nothing for those without one.
+  // First answer to each of the last steps, to recognise copies; nothing for a step without one.
   std::map<std::uint64_t, std::optional<Past>> past_;
   SyncCounters counters_;
 };

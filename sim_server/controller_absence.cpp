@@ -20,8 +20,8 @@ ControllerAbsence::Action ControllerAbsence::decide(double step_wait_s, double a
   if (!is_realtime) {
     if (absence.policy == ControllerPolicy::kWait || absence.policy == ControllerPolicy::kStop)
       return Action::kWait;
-    // The first step waits for the deadline; those after it for one period each, so that time goes
-    // on no faster than it does for a client that wants to come back.
+    // The first step waits for the deadline, each later one for one period. Simulated time then
+    // passes no faster than in real time, so a client can return.
     if (step_wait_s < (is_acting() ? period_wall_s_ : absence.deadline_s)) return Action::kWait;
     if (absence.policy == ControllerPolicy::kFailsafe) return Action::kFailSafe;
   }

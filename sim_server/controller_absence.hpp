@@ -1,5 +1,5 @@
 /// Policy for a vehicle without a controller: `sync.wait.controller`.
-/// Pure: told the times, it decides. Rules: README.md, "Waiting".
+/// Reads no clock: the caller passes the times. Rules: README.md, "Waiting".
 #pragma once
 
 #include <cstdint>
@@ -13,26 +13,26 @@ class ControllerAbsence {
   explicit ControllerAbsence(const config::Sync& sync);
 
   enum class Action {
-    kWait,      ///< for the answer
+    kWait,      ///< wait for the answer
     kHold,      ///< fly this step with the last answer
     kFailSafe,  ///< fly this step with the fail-safe force
     kGiveUp,    ///< end the run as failed
   };
 
-  /// Reaction to a step that has waited `step_wait_s` (wall time) for its answer, the first
-  /// unanswered one having been published `absence_s` ago. In real time, asked when the step's
-  /// period is over, it never says kWait.
+  /// Reaction to a step that has waited `step_wait_s` (wall time) for its answer. The first
+  /// unanswered step was published `absence_s` ago. In real time the call comes when the step's
+  /// period is over, and the result is never kWait.
   Action decide(double step_wait_s, double absence_s) const;
 
   /// A step was flown without an answer to it.
   void flown_without_answer() { ++steps_without_answer_; }
-  /// An answer was accepted or, in real time, one came late that is newer than those before.
+  /// An answer was accepted or, in real time, a late one came that is newer than those before.
   void answered() { steps_without_answer_ = 0; }
 
   /// True if the last step was flown without an answer, and none has come since.
   bool is_acting() const { return steps_without_answer_ > 0; }
 
-  /// After so much absence decide() gives up, s.
+  /// Absence after which decide() returns kGiveUp, s.
   double give_up_s() const;
 
  private:

@@ -1,5 +1,5 @@
-/// Everything the server says and hears on the domain. The middleware's threads fill mailboxes,
-/// which the server's one thread empties; and they do, in lockstep, what an answer allows at once
+/// All endpoints of the server on the domain. The middleware's threads fill mailboxes; the server's
+/// main thread empties them. In lockstep the middleware's threads also apply answers
 /// (lockstep_run.hpp).
 #pragma once
 
@@ -24,19 +24,19 @@ struct ReceivedCommands {
   std::chrono::steady_clock::time_point arrived;
 };
 
-/// Commands in.
+/// Receives the commands.
 class CommandStream {
  public:
-  /// Sees a sample first, on a thread of the middleware; true if it has taken it, else it goes
-  /// into the mailbox.
+  /// Gets each sample first, on a thread of the middleware. Returns true if it has handled the
+  /// sample; otherwise the sample goes into the mailbox.
   using Handler = std::function<bool(const Commands& sample, const bus::PeerId& sender)>;
 
   CommandStream(bus::Node& node, config::SyncMode mode, app::Mailbox<ReceivedCommands>& mailbox);
 
-  /// Puts `handler` in place of the one there was, which is not called any more on return.
+  /// Replaces the handler. After the return the previous one is not called any more.
   void set_handler(Handler handler);
 
-  /// Participants with a writer that this hears.
+  /// Participants with a writer that this reader has matched.
   std::set<bus::PeerId> matched() const { return reader_.matched(); }
 
   std::uint64_t missed_deadlines() const { return reader_.missed_deadlines(); }
@@ -47,7 +47,7 @@ class CommandStream {
   void receive(const Commands& sample, const bus::PeerId& sender);
 
   app::Mailbox<ReceivedCommands>& mailbox_;
-  std::mutex mutex_;  // over handler_
+  std::mutex mutex_;  // protects handler_
   Handler handler_;
   bus::Reader<Commands> reader_;  // last: it calls `receive`
 };
@@ -56,7 +56,7 @@ struct Endpoints {
   static constexpr std::size_t kCommands = 4096;
   static constexpr std::size_t kRequests = 64;
 
-  /// In real time commands are read with DEADLINE and LIFESPAN, where the QoS file has them.
+  /// In real time commands are read with DEADLINE and LIFESPAN, if the QoS file has them.
   Endpoints(bus::Node& node, std::size_t vehicles, config::SyncMode mode)
       : domain(node),
         participants(node),

@@ -21,7 +21,7 @@ std::uint64_t mix(std::uint64_t x) {
 }
 
 /// Random numbers by counters: each is a pure function of seed, place in the file, step and
-/// component, so that no number depends on which others were drawn.
+/// component. It does not depend on earlier draws.
 class Dice {
  public:
   Dice(std::uint64_t seed, std::size_t fault_index, std::uint64_t step)
@@ -82,7 +82,7 @@ config::SampleOffset draw(const config::SampleOffset& deviation, const Dice& dic
 
 // --- receivers -----------------------------------------------------------------------------------
 
-/// Of one scenario.
+/// Constants of one scenario.
 struct Timing {
   std::int64_t period_ns;
   double rod_length;  ///< m
@@ -98,7 +98,7 @@ class Receiver {
 
   /// The sample held at `step`, at which `sample` was sent.
   Sample take(std::uint64_t step, const Sample& sample) {
-    if (!held_) held_ = sent_before_ = sample;  // nothing has arrived before the first
+    if (!held_) held_ = sent_before_ = sample;  // the first sample, until one arrives
     const auto time_ns = static_cast<std::int64_t>(step) * timing_.period_ns;
     const bool is_active = fault_.from_ns <= time_ns && time_ns < fault_.to_ns;
     std::visit([&](const auto& effect) { receive(effect, is_active, step, sample); },
@@ -134,7 +134,7 @@ class Receiver {
                const Sample& sample) {
     const bool is_late = is_active && happens(reorder.probability, reorder.seed, step);
     if (!is_late) held_ = sample;
-    if (was_late_) held_ = sent_before_;  // after that one
+    if (was_late_) held_ = sent_before_;  // it arrives after `sample`
     was_late_ = is_late;
   }
 
@@ -155,12 +155,12 @@ class Receiver {
   std::size_t index_;
   Timing timing_;
   std::optional<Sample> held_;
-  Sample sent_before_;           // at the step before
-  bool was_late_ = false;        // that one, by a reorder
-  DelayLine<Sample> under_way_;  // of a delay
+  Sample sent_before_;           // at the previous step
+  bool was_late_ = false;        // `sent_before_`, by a reorder
+  DelayLine<Sample> under_way_;  // samples in a delay
 };
 
-/// Receivers in a row: each gets what the one before holds.
+/// Receivers in series: each gets the sample that the previous one holds.
 template <class Sample>
 Sample pass(std::vector<Receiver<Sample>>& receivers, std::uint64_t step, Sample sample) {
   for (Receiver<Sample>& receiver : receivers) sample = receiver.take(step, sample);

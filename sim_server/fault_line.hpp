@@ -1,5 +1,6 @@
 /// The scenario's faults of one vehicle, in simulation time. A pure function of scenario and steps:
-/// same seed, same bytes, however fast the host runs. Semantics: README.md. No network here.
+/// the same seed gives the same bytes at any speed of the host. Semantics: README.md. No network
+/// here.
 #pragma once
 
 #include <Eigen/Core>
@@ -19,14 +20,14 @@ class FaultLine {
   ~FaultLine();
   FaultLine(FaultLine&&) noexcept;
 
-  /// Whether what is measured can differ from the truth at all.
+  /// True if the measurement can differ from the truth.
   bool can_disturb_state() const;
 
   /// The controllers' measurement at `step`. Call once per step, in order, from step 0.
   model::Measurement measure(std::uint64_t step, const model::Measurement& truth);
 
-  /// The force (N, in W) that acts on the quadrotor over [step, step + 1) where `f_Q_W` was meant
-  /// to. Call once per step, in order, from step 0.
+  /// The force (N, in W) that acts on the quadrotor over [step, step + 1) if `f_Q_W` is commanded.
+  /// Call once per step, in order, from step 0.
   Eigen::Vector3d actuate(std::uint64_t step, const Eigen::Vector3d& f_Q_W);
 
  private:

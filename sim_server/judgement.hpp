@@ -8,7 +8,7 @@
 namespace sls::sim {
 
 enum class Defect {
-  kNotFinite,   ///< a number of force or memory
+  kNotFinite,   ///< a number of force or memory is not finite
   kForceLimit,  ///< |F| beyond `controller.force_limit_n`
   kFault,       ///< an error code, or a failed mission
 };
@@ -17,11 +17,11 @@ enum class Defect {
 struct JudgedAnswer {
   Eigen::Vector3d f_Q_W = Eigen::Vector3d::Zero();  ///< N
   bool is_memory_finite = true;
-  const char* fault = nullptr;  ///< name of its error code, where it carries one
+  const char* fault = nullptr;  ///< name of its error code; null: none
   bool is_mission_failed = false;
 };
 
-/// Why `answer` may not fly; nothing if it may.
+/// The reason to refuse `answer`; nothing if it is valid.
 std::optional<Defect> find_defect(const JudgedAnswer& answer, double force_limit);
 
 /// "a number that is not finite", "a force beyond controller.force_limit_n", "a fault".

@@ -55,7 +55,8 @@ bool LockstepRun::exchange() {
       if (are_all_accepted()) continue;
     }
     main_lock_.unlock();
-    // Each step taken meanwhile moves the moment on: only the last one's is for us to look at.
+    // Each step that the middleware's thread takes meanwhile moves `wake_at_`: wait for its last
+    // value.
     while (!endpoints_.commands.wait(wake_at_) && Clock::now() < wake_at_.load()) {
     }
     main_lock_.lock();
@@ -67,7 +68,7 @@ void LockstepRun::publish() {
   sent_ = last_sent_ = looked_ = Clock::now();
   publish_states();
   resend_at_ = sent_ + timer_.timeout();
-  // While steps are flown without answers, each is given a period.
+  // While steps are flown without answers, each waits one period for its answer.
   const auto period = to_duration(static_cast<double>(scenario_.sync.period_ns) * 1e-9 /
                                   scenario_.sync.real_time_factor);
   wake_at_ = is_anybody_absent() ? std::min(resend_at_, sent_ + period) : resend_at_;
@@ -91,7 +92,7 @@ bool LockstepRun::attend_to_silence(Clock::time_point now) {
   is_late_ = true;
   for (const auto& vehicle : vehicles_)
     if (!vehicle->gate.accepted()) vehicle->note_waiting(sent_);
-  if (control_.holds()) note_rest(now - looked_);  // paused except for this step
+  if (control_.holds()) note_rest(now - looked_);  // a pause does not count as absence
   looked_ = now;
   if (now >= resend_at_) resend(now);
   do_housekeeping();
@@ -114,7 +115,7 @@ void LockstepRun::resend(Clock::time_point now) {
   resend_at_ = last_sent_ + timer_.timeout();
 }
 
-/// Where the policy says so of every vehicle that nobody answers for, settles the step.
+/// Settles the step unless, by the policy, a vehicle without an answer still waits for it.
 void LockstepRun::fly_without_answers(Clock::time_point now) {
   using Action = ControllerAbsence::Action;
   const double step_wait_s = std::chrono::duration<double>(now - sent_).count();
@@ -173,7 +174,7 @@ bool LockstepRun::receive(const Commands& sample, const bus::PeerId& sender) {
   return true;
 }
 
-/// Nothing but the answers stands between the step in work and the one after it.
+/// True if the server needs only the answers to go from the step in work to the next one.
 bool LockstepRun::is_plain_step() const {
   return !is_late_ && !is_anybody_absent() && !control_.is_paused() &&
          endpoints_.requests.is_empty() && !is_roster_due() && !board_.is_due() &&
@@ -196,7 +197,7 @@ void LockstepRun::roster_changed() {
 bool LockstepRun::wait_for_recorders() {
   using config::RecorderPolicy;
   const auto& patience = scenario_.sync.wait.recorder;
-  while (record_.is_full()) std::this_thread::sleep_for(1ms);  // its thread needs the processor
+  while (record_.is_full()) std::this_thread::sleep_for(1ms);  // lets its thread write
   if (is_roster_due()) refresh_roster();
   const std::uint64_t step = board_.step;
   std::string blocking = name_blocking();

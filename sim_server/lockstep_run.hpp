@@ -11,15 +11,15 @@
 
 namespace sls::sim {
 
-/// Stop-and-wait: a state is integrated only with an answer to it, and the answer is the
-/// acknowledgement. Without one the state is sent again. Nothing is lost by waiting, so the result
-/// depends on no clock, unless `sync.wait.controller` says to fly on.
+/// Stop-and-wait: the server integrates a state only with an answer to it. The answer is also the
+/// acknowledgement: without one the server sends the state again. The result depends on no clock,
+/// unless `sync.wait.controller` allows steps without an answer.
 ///
-/// An answer that leaves nothing to wait for is applied where it arrives, on the middleware's
-/// thread, and the next state published there: waking the main thread would make a step a fifth
-/// longer. The main thread releases `step_mutex_` only while it waits for answers. The
-/// middleware's thread only tries to lock it; if that fails, or for anything but a plain step, it
-/// leaves the work to the main thread.
+/// The last missing answer is applied on the middleware's thread that delivers it. This thread also
+/// publishes the next state, because waking the main thread would make a step a fifth longer. The
+/// main thread releases `step_mutex_` only while it waits for answers. The middleware's thread only
+/// tries to lock it. If that fails, or if the step is not a plain one, it leaves the work to the
+/// main thread.
 class LockstepRun : public Run {
  public:
   using Run::Run;
@@ -46,16 +46,16 @@ class LockstepRun : public Run {
 
   RetransmissionTimer timer_;
 
-  std::mutex step_mutex_;  // over what a step touches
+  std::mutex step_mutex_;  // protects the data of a step
   std::unique_lock<std::mutex> main_lock_{step_mutex_, std::defer_lock};
-  std::exception_ptr error_;            // of the middleware's thread
+  std::exception_ptr error_;            // from the middleware's thread
   std::uint64_t recorder_limit_ = 0;    // the first step that a recorder is not ready for
-  Clock::time_point sent_, last_sent_;  // the states of the step in work, first and last
+  Clock::time_point sent_, last_sent_;  // when its states were sent first and last
   Clock::time_point resend_at_;
-  std::atomic<Clock::time_point> wake_at_{Clock::time_point()};  // the main thread waits for it
+  std::atomic<Clock::time_point> wake_at_{Clock::time_point()};  // the main thread waits until then
   Clock::time_point take_over_at_;
-  Clock::time_point looked_;  // when the main thread last looked for what is late
-  bool is_late_ = false;      // most answers come before the first resend
+  Clock::time_point looked_;  // last check for missing answers
+  bool is_late_ = false;      // true after the first check of the step in work
 };
 
 }  // namespace sls::sim

@@ -13,7 +13,7 @@
 
 namespace {
 
-constexpr const char* kIdentity = "server";  // whose keys it uses on a secured domain
+constexpr const char* kIdentity = "server";  // name of its keys on a secured domain
 
 }  // namespace
 

@@ -13,7 +13,7 @@
 
 namespace sls::sim {
 
-/// Force and fault that acted over a control period, and the controller memory in force after it.
+/// Force that acted over a control period, its origin, and the controller memory after it.
 struct Applied {
   Eigen::Vector3d answer_f_Q_W = Eigen::Vector3d::Zero();  ///< as answered, N
   Eigen::Vector3d f_Q_W = Eigen::Vector3d::Zero();         ///< as it acted, after faults, N
@@ -22,24 +22,24 @@ struct Applied {
   ControllerState memory;
 };
 
-/// `controller_name` of a force the server made by itself.
+/// `controller_name` of the server's own force.
 inline constexpr const char* kFailSafeName = "fail-safe";
 
 /// A random id for a run, never 0.
 std::uint64_t make_run_id();
 
-/// The state sample for the controllers: `measured`, and what acted in the period before.
+/// The state sample for the controllers: `measured`, and `applied` of the previous period.
 VehicleState make_state_message(std::uint32_t vehicle_id, const model::Measurement& measured,
                                 const Applied& applied);
 
-/// `plant` moves one of the vehicles; the others' are like it.
+/// `plant` is that of one of the vehicles; those of the others have the same signals.
 Parameters make_parameters_message(std::uint64_t run_id,
                                    const std::vector<std::uint32_t>& vehicle_ids,
                                    const config::Scenario& scenario, const Plant& plant,
                                    const std::string& version);
 
-/// Puts the state of a step into `entry`, which may hold another one: `truth` is what the plant
-/// does; `measured`, where it can differ, what is measured of it.
+/// Writes the state of a step into `entry`, over any earlier content. `truth` is the state of the
+/// plant; `measured` is the measurement, or null if it cannot differ from the truth.
 void fill_state(RecordEntry& entry, std::uint32_t vehicle_id, std::uint64_t step,
                 const model::Measurement& truth, const model::Measurement* measured,
                 const Applied& applied);

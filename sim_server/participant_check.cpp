@@ -16,7 +16,7 @@ namespace sls::sim {
 namespace {
 
 constexpr std::int64_t kStageTolerance_ns = 1'000'000'000;
-/// Answers to steps that have gone by: a client that was stopped for a while sends some, too.
+/// Fewer answers to earlier steps are no mistake: a client that was stopped for a while sends some.
 constexpr std::uint64_t kFewOldAnswers = 3;
 
 std::string describe(const ParticipantCheck::Entry& entry) {
@@ -81,7 +81,7 @@ bool ParticipantCheck::is_own_vehicle(std::uint32_t id) const {
   return std::binary_search(vehicle_ids_.begin(), vehicle_ids_.end(), id);
 }
 
-// --- who may take part ---------------------------------------------------------------------------
+// --- admission -----------------------------------------------------------------------------------
 
 std::vector<ParticipantCheck::Entry> ParticipantCheck::admit_recorders(
     const std::vector<Entry>& entries) {
@@ -241,7 +241,7 @@ void ParticipantCheck::check_stage(Vehicle& vehicle, const OfferedAnswer& answer
     return;
   }
   if (answer.command.mission() != MISSION_RUNNING) return;
-  // Beyond the last stage the mission is over at once.
+  // Beyond the last stage the mission must be finished at once.
   const bool is_over = stage >= vehicle.stages_ns.size();
   const auto duration_ns = is_over ? std::optional<std::int64_t>(0) : vehicle.stages_ns[stage];
   if (!duration_ns || answer.step < vehicle.stage_start_step) return;
@@ -249,7 +249,7 @@ void ParticipantCheck::check_stage(Vehicle& vehicle, const OfferedAnswer& answer
   if (steps * period_ns_ <= *duration_ns + kStageTolerance_ns) return;
   const auto start_ns = static_cast<std::int64_t>(vehicle.stage_start_step) * period_ns_;
   const double end_s = static_cast<double>(start_ns + *duration_ns) * 1e-9;
-  // Whose memory was lost does not get further because of that.
+  // A client that lost the stage cannot advance: the same key prevents a second report.
   see(sender, vehicle.is_stage_lost ? "stage" : "mission", [&] {
     return is_over ? fmt::format(
                          "mission at step {}: expected finished after the last stage, "
@@ -287,7 +287,7 @@ std::string ParticipantCheck::describe_rejections(const bus::PeerId& sender) con
 
 std::vector<std::string> ParticipantCheck::take_events() { return std::exchange(events_, {}); }
 
-// --- all that is wrong ---------------------------------------------------------------------------
+// --- findings ------------------------------------------------------------------------------------
 
 bool ParticipantCheck::lasts(const std::string& key, Clock::time_point now,
                              Clock::duration patience) {
@@ -314,8 +314,8 @@ ParticipantCheck::Findings ParticipantCheck::look(const Neighbourhood& neighbour
   return findings;
 }
 
-/// False for a controller that has another server, or flies other vehicles and may wait for their
-/// server.
+/// False for a controller that has joined another server, or that flies other vehicles and may wait
+/// for their server.
 bool ParticipantCheck::may_fly_for_us(const Participant& controller,
                                       const Neighbourhood& neighbourhood) const {
   if (controller.run_id() == run_id_) return true;
@@ -331,7 +331,7 @@ void ParticipantCheck::look_at(const Entry& entry, const Neighbourhood& neighbou
     findings[make_key(entry.peer, "contract")] =
         describe_field(entry, "contract_sha256", bus::kContractSha256,
                        to_words(announcement.contract_sha256().to_string()));
-    return;  // the rest may mean something else
+    return;  // the other fields may have another meaning
   }
   if (announcement.role() != ROLE_CONTROLLER || announcement.done()) return;
   if (announcement.run_id() != run_id_) {
@@ -414,7 +414,7 @@ void ParticipantCheck::look_at_answers(const Neighbourhood& neighbourhood, const
   for (auto it = rejections_.begin(); it != rejections_.end();) {
     auto& [peer, rejections] = *it;
     const auto known = announced.find(peer);
-    if (known == announced.end()) {  // that is the mistake, or it is gone
+    if (known == announced.end()) {  // not announced, which is reported, or gone
       it = rejections_.erase(it);
       continue;
     }

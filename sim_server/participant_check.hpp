@@ -17,19 +17,19 @@
 
 namespace sls::sim {
 
-/// Everybody that the server sees at one moment.
+/// The participants and endpoints that the server has discovered at one moment.
 struct Neighbourhood {
   std::chrono::steady_clock::time_point now;
-  std::vector<bus::ParticipantDirectory::Entry> participants;  ///< whatever their run
-  std::set<std::uint64_t> other_runs;                          ///< those of other servers
-  std::set<std::uint32_t> other_vehicles;                      ///< and what they fly
-  /// Participants with a writer of sls/command that matches, in words.
+  std::vector<bus::ParticipantDirectory::Entry> participants;  ///< of any run
+  std::set<std::uint64_t> other_runs;                          ///< runs of other servers
+  std::set<std::uint32_t> other_vehicles;                      ///< vehicles of other servers
+  /// Participants with a matched writer of sls/command, as text.
   std::map<bus::PeerId, std::string> command_writers;
-  /// Those with a writer of sls/participant: an announcement may be on its way.
+  /// Participants with a writer of sls/participant: an announcement may still come.
   std::set<bus::PeerId> announcement_writers;
   /// Controllers whose writer offers no DEADLINE (bus::Node::find_missing_deadlines).
   std::map<bus::PeerId, std::string> missing_deadlines;
-  /// Those with another problem in discovery: their silence has been explained.
+  /// Participants with another problem in discovery, which explains why no announcement comes.
   std::set<bus::PeerId> explained;
 };
 
@@ -37,64 +37,64 @@ class ParticipantCheck {
  public:
   using Clock = std::chrono::steady_clock;
   using Entry = bus::ParticipantDirectory::Entry;
-  /// Problems that hold, by a key that stays the same while one does.
+  /// Current problems by key. A problem keeps its key while it lasts.
   using Findings = std::map<std::string, std::string>;
 
-  /// A problem that is shorter is ignored: discovery takes its time.
+  /// A shorter problem is ignored, because discovery takes time.
   static constexpr std::chrono::milliseconds kPatience{1000};
-  /// An announcement on a lossy network: a peer learns of a reader from discovery, which Fast DDS
-  /// repeats once a second.
+  /// Patience with a missing announcement on a lossy network: a peer learns of a reader from
+  /// discovery, which Fast DDS repeats once a second.
   static constexpr std::chrono::milliseconds kPatienceWithAnnouncement{5000};
-  /// An announcement of a run that has just ended is none: its client joins the next one.
+  /// Patience with an announcement of a run that has just ended: its client joins the next run.
   static constexpr std::chrono::milliseconds kPatienceWithRun{1400};
-  /// Rejected answers without a taken one are none before.
+  /// Patience with rejected answers while none is taken.
   static constexpr std::chrono::milliseconds kPatienceWithAnswers{800};
-  /// A problem seen in an answer holds so long after the last answer like it.
+  /// A problem of answers lasts this long after the last answer that shows it.
   static constexpr std::chrono::milliseconds kMemory{2000};
   static constexpr std::size_t kMostSenders = 64;
-  /// Load and quadrotor may be so many rod lengths from their reference.
+  /// Largest distance of load and quadrotor from the reference, in rod lengths.
   static constexpr double kMostRodLengths = 50.0;
 
   ParticipantCheck(std::uint64_t run_id, const config::Scenario& scenario,
                    const std::vector<std::uint32_t>& vehicle_ids);
 
-  /// Those of `entries` (of this run) that may take part: they use this contract, and controllers
-  /// have loaded the library with which their vehicles are flown.
+  /// The entries (of this run) that may take part: they use this contract, and a controller has
+  /// loaded the library with which its vehicles are flown.
   std::vector<Entry> admit_controllers(const std::vector<Entry>& entries);
   static std::vector<Entry> admit_recorders(const std::vector<Entry>& entries);
 
   /// The answer of `sender` was accepted, held, late, a copy or superseded. `returned` is the
-  /// controller state that the state of its step carried, where the step is in work; `state` what
-  /// the vehicle does there.
+  /// controller state in the state sample of the step in work; `state` is the state of the vehicle
+  /// at that step.
   void note_taken(const OfferedAnswer& answer, const bus::PeerId& sender, Verdict verdict,
                   const ControllerState& returned, const model::Measurement& state);
-  /// It was rejected while `step` was in work.
+  /// The answer of `sender` was rejected while `step` was in work.
   void note_rejected(const OfferedAnswer& answer, const bus::PeerId& sender, Verdict verdict,
                      std::uint64_t step);
 
-  /// All that is wrong now. To be called a few times a second.
+  /// All current problems. Call a few times a second.
   Findings look(const Neighbourhood& neighbourhood);
 
-  /// " (its answers are rejected: 57 × …)", for messages about an awaited client; empty if the last
-  /// one was taken.
+  /// " (57 of its answers rejected, none taken: …)", for messages about an awaited client; empty if
+  /// its last answer was taken.
   std::string describe_rejections(const bus::PeerId& sender) const;
 
-  /// When to look again, because something will then have lasted too long.
+  /// When `look` is due again, because a pending problem will then have lasted too long.
   const std::optional<Clock::time_point>& next_due() const { return next_due_; }
 
-  /// News to announce since the last call, such as a vehicle far from its reference.
+  /// Events since the last call, such as a vehicle far from its reference.
   std::vector<std::string> take_events();
 
  private:
   struct Rejections {
     std::uint64_t count = 0;
-    std::string defect;  // the last one
-    bool is_old = true;  // all answered steps that had gone by
+    std::string defect;  // of the last rejected answer
+    bool is_old = true;  // all were answers to earlier steps
     std::optional<Clock::time_point> since;
   };
-  /// Something seen in answers.
+  /// A mistake in answers.
   struct Seen {
-    std::string text;  // without who it was
+    std::string text;  // without the sender
     bool is_fresh = true;
     Clock::time_point last;
   };
@@ -105,20 +105,20 @@ class ParticipantCheck {
   struct Vehicle {
     std::uint32_t id = 0;
     double rod_length = 0.0;
-    std::vector<std::optional<std::int64_t>> stages_ns;  // how long each lasts, where that is fixed
+    std::vector<std::optional<std::int64_t>> stages_ns;  // durations; nothing if not fixed
     std::vector<std::string> stage_names;
     std::uint32_t stage = 0;             // in the last accepted answer
-    std::uint64_t stage_start_step = 0;  // the first that said so
-    bool is_stage_lost = false;          // it fell behind what the state said
-    std::size_t numbers = 0;             // the most that an accepted answer carried
+    std::uint64_t stage_start_step = 0;  // of the first answer with that stage
+    bool is_stage_lost = false;          // an answer was behind the state's stage
+    std::size_t numbers = 0;             // largest count in an answer so far
     bool is_far = false;
     bool has_flown = false;
-    std::optional<Library> library;  // of the client that flies it or, before, was ready first
+    std::optional<Library> library;  // of the client that flies, or before that of the first ready
   };
   using Senders = std::map<bus::PeerId, const Entry*>;
 
   void find_first_libraries(const std::vector<Entry>& controllers);
-  /// The one that it should have loaded; nothing if all is well.
+  /// The library that `controller` should have loaded; null if it has loaded the right one.
   const Library* find_other_library(const Participant& controller) const;
 
   void check_memory(Vehicle& vehicle, const OfferedAnswer& answer, const bus::PeerId& sender,
@@ -140,7 +140,7 @@ class ParticipantCheck {
                          Findings& findings);
   void look_at_answers(const Neighbourhood& neighbourhood, const Senders& announced,
                        Findings& findings);
-  /// Whether `key` has held for `patience` without a break.
+  /// True if the problem `key` has lasted for `patience` without a break.
   bool lasts(const std::string& key, Clock::time_point now, Clock::duration patience);
   bool is_own_vehicle(std::uint32_t id) const;
 
@@ -149,10 +149,10 @@ class ParticipantCheck {
   const std::vector<std::uint32_t> vehicle_ids_;
   const std::int64_t period_ns_;
   std::vector<Vehicle> vehicles_;                         // as vehicle_ids_
-  std::map<bus::PeerId, std::string> refused_libraries_;  // of those who are not admitted
+  std::map<bus::PeerId, std::string> refused_libraries_;  // of clients that are not admitted
   std::map<bus::PeerId, Rejections> rejections_;
   std::map<std::pair<bus::PeerId, std::string>, Seen> seen_;
-  std::map<std::string, Clock::time_point> pending_;  // since when
+  std::map<std::string, Clock::time_point> pending_;  // start of each problem
   std::set<std::string> pending_now_;
   std::optional<Clock::time_point> next_due_;
   std::vector<std::string> events_;

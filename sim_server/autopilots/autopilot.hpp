@@ -1,5 +1,5 @@
-/// An autopilot: it turns the force that a controller commands into what the rotors are to
-/// do. A new one is a folder beside this file and a line in autopilots.def: README.md, "Adding an
+/// An autopilot turns the force that a controller commands into set-points of the rotor speeds. To
+/// add one: a folder beside this file and a line in autopilots.def; README.md, "Adding an
 /// autopilot". No DDS and no Simbody here.
 #pragma once
 
@@ -17,8 +17,8 @@
 
 namespace sls::sim {
 
-/// A rotor as the autopilot knows it, turning at ω. Its thrust is T = `thrust_constant` ω² along
-/// `axis_B`, the torque of its drag on the body −`spin` × `torque_constant` × T about `axis_B`.
+/// The autopilot's model of a rotor. At the speed ω its thrust is T = `thrust_constant` ω² along
+/// `axis_B`. The torque of its drag on the body is −`spin` × `torque_constant` × T about `axis_B`.
 struct Rotor {
   Eigen::Vector3d p_BR = Eigen::Vector3d::Zero();      ///< hub, from the body's origin, in B, m
   Eigen::Vector3d axis_B = -Eigen::Vector3d::UnitZ();  ///< unit vector along the thrust
@@ -29,11 +29,11 @@ struct Rotor {
   double max_speed = 0.0;        ///< rad/s
 };
 
-/// The rigid body that is flown, with all that is fixed to it; without the pendulum.
+/// The rigid body of the vehicle with everything fixed to it, without the pendulum.
 struct Airframe {
   double mass = 0.0;                                      ///< kg
-  Eigen::Vector3d p_BC = Eigen::Vector3d::Zero();         ///< centre of mass from the origin, m
-  Eigen::Matrix3d inertia_C_B = Eigen::Matrix3d::Zero();  ///< about it, in B, kg·m²
+  Eigen::Vector3d p_BC = Eigen::Vector3d::Zero();         ///< centre of mass C from the origin, m
+  Eigen::Matrix3d inertia_C_B = Eigen::Matrix3d::Zero();  ///< about C, in B, kg·m²
   std::vector<Rotor> rotors;                              ///< at least one
 };
 
@@ -46,20 +46,20 @@ struct AutopilotSetup {
   Airframe airframe;
 };
 
-/// Input of an autopilot's step. Its world W is the one of its estimator: that
-/// differs from the plant's where the scenario says `estimator.tilt_rad` or `yaw_rad`.
+/// Input of an autopilot's step. W is the world frame of the autopilot's estimator. It differs from
+/// the plant's if the scenario sets `estimator.tilt_rad` or `yaw_rad`.
 struct AutopilotInput {
-  Eigen::Vector3d f_Q_W;  ///< the force that is asked for, N
+  Eigen::Vector3d f_Q_W;  ///< commanded force, N
   Eigen::Vector3d v_WQ;   ///< of the body's origin, m/s
   model::Attitude attitude;
 };
 
-/// Its output until its next step.
+/// Output of an autopilot, valid until its next step.
 struct AutopilotOutput {
-  Eigen::VectorXd rotor_speeds;  ///< set-points, rad/s; the plant keeps each to its rotor's limits
+  Eigen::VectorXd rotor_speeds;  ///< set-points, rad/s; the plant clamps each to its rotor's limits
   Eigen::Quaterniond q_WB = Eigen::Quaterniond::Identity();  ///< attitude set-point, for the record
-  double thrust = 0.0;  ///< collective thrust that is asked for along the rotors' axes, N
-  /// Set by an autopilot that turns the thrust and not the vehicle: all thrust then acts in this
+  double thrust = 0.0;  ///< commanded collective thrust along the rotors' axes, N
+  /// Set by an autopilot that turns the thrust instead of the vehicle. All thrust then acts in this
   /// direction (unit vector, in W) at the centre of mass, and no rotor turns the body.
   std::optional<Eigen::Vector3d> direction_W;
 };
@@ -69,20 +69,20 @@ class Autopilot {
  public:
   virtual ~Autopilot() = default;
   /// One period. The output stays valid until the next step.
-  /// @throws std::runtime_error if it cannot go on; the text names the quantity.
+  /// @throws std::runtime_error if it cannot continue; the text names the quantity.
   virtual const AutopilotOutput& step(const AutopilotInput& input) = 0;
 };
 
 /// The autopilot that `setup.autopilot.model` names.
-/// @throws config::ConfigError if the setup contradicts it, or a library cannot be used.
+/// @throws config::ConfigError if the setup contradicts the autopilot, or a library cannot be used.
 std::unique_ptr<Autopilot> make_autopilot(const AutopilotSetup& setup);
 
-/// Attitude whose −z axis points along `f_W`, which is not zero, with the heading `yaw`:
-/// design, section 4, "commanded attitude", turned about z by the yaw.
+/// Attitude with the heading `yaw` whose −z axis points along `f_W`. `f_W` must not be zero.
+/// Source: docs/design.md, section 4, "commanded attitude", turned about z by the yaw.
 Eigen::Quaterniond calc_attitude_for(const Eigen::Vector3d& f_W, double yaw = 0.0);
 
-/// Speeds at which the rotors give the thrust `thrust` (N) together without moment where they are
-/// alike: each the same share of it. No limits, no losses.
+/// Speeds at which each rotor gives the same share of `thrust` (N). Rotors that are alike then make
+/// no moment together. Without limits and losses.
 Eigen::VectorXd calc_equal_speeds(const std::vector<Rotor>& rotors, double thrust);
 
 }  // namespace sls::sim

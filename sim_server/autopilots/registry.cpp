@@ -29,7 +29,7 @@ std::unique_ptr<Autopilot> make_autopilot(const AutopilotSetup& setup) {
 
 Eigen::Quaterniond calc_attitude_for(const Eigen::Vector3d& f_W, double yaw) {
   using Eigen::AngleAxisd, Eigen::Vector3d;
-  // Seen from the heading, so that roll and pitch mean the same whatever the yaw.
+  // The force in the frame of the heading: roll and pitch do not depend on the yaw.
   const Vector3d f = AngleAxisd(-yaw, Vector3d::UnitZ()) * f_W.normalized();
   const double roll = std::asin(std::max(-1.0, std::min(1.0, f.y())));
   const double pitch = std::atan2(-f.x(), -f.z());

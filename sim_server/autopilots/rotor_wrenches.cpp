@@ -5,9 +5,9 @@
 namespace sls::sim {
 namespace {
 
-constexpr double kRelativeZero = 1e-9;  // of what rounding leaves of a zero
+constexpr double kRelativeZero = 1e-9;  // larger than the rounding error of a zero
 
-/// How many rows of `matrix` are independent. Lengths and forces are made alike first.
+/// Number of independent rows of `matrix`. Rows are normalised first, because their units differ.
 int count_independent(Eigen::MatrixXd matrix) {
   for (Eigen::Index row = 0; row < matrix.rows(); ++row)
     if (const double norm = matrix.row(row).norm(); norm > kRelativeZero) matrix.row(row) /= norm;
@@ -16,7 +16,7 @@ int count_independent(Eigen::MatrixXd matrix) {
   return static_cast<int>(svd.rank());
 }
 
-/// Rows of roll, pitch and thrust by rotor.
+/// Rows: roll, pitch, thrust. Columns: rotors.
 Eigen::MatrixXd list_tilting(const Airframe& airframe) {
   const auto wrenches = calc_rotor_wrenches(airframe);
   Eigen::MatrixXd rows(3, wrenches.cols());
@@ -24,7 +24,7 @@ Eigen::MatrixXd list_tilting(const Airframe& airframe) {
   return rows;
 }
 
-/// The same with yaw.
+/// The same rows, then yaw.
 Eigen::MatrixXd list_effects(const Airframe& airframe) {
   Eigen::MatrixXd rows = list_tilting(airframe);
   rows.conservativeResize(4, Eigen::NoChange);

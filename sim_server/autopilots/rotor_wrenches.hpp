@@ -1,5 +1,4 @@
-/// The wrenches of an airframe's rotors together: for autopilots that share torque and thrust out
-/// among them.
+/// Wrenches of all rotors of an airframe, for autopilots that allocate torque and thrust to them.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,12 +14,12 @@ Eigen::Matrix<double, 6, Eigen::Dynamic> calc_rotor_wrenches(const Airframe& air
 /// Moore–Penrose inverse. Singular values below 1e-9 of the largest count as zero.
 Eigen::MatrixXd calc_pseudo_inverse(const Eigen::MatrixXd& matrix);
 
-/// Whether the rotors can turn the body about z without changing roll, pitch and thrust.
+/// True if the rotors can turn the body about z without changing roll, pitch and thrust.
 bool has_yaw_authority(const Airframe& airframe);
 
-/// The same for an autopilot that needs roll and pitch.
-/// @throws config::ConfigError if they cannot roll or pitch it without changing the thrust;
-/// `setup` says where the scenario stands.
+/// The result of `has_yaw_authority`, for an autopilot that needs roll and pitch.
+/// @throws config::ConfigError if the rotors cannot roll or pitch the body without changing the
+/// thrust; `setup` gives the place in the scenario.
 bool find_yaw_authority(const AutopilotSetup& setup);
 
 /// The error at the key `key` of the scenario that `setup` comes from.

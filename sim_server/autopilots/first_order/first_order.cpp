@@ -1,4 +1,5 @@
-// The thrust's direction follows the force's with a lag of first order. README.md beside this file.
+// The direction of the thrust follows that of the force with a first-order lag. README.md beside
+// this file.
 #include <cmath>
 
 #include "sim_server/autopilots/autopilot.hpp"
@@ -24,13 +25,13 @@ class FirstOrder : public Autopilot {
     const Eigen::Vector3d wanted = input.f_Q_W / output_.thrust;
     Eigen::Vector3d& direction = *output_.direction_W;
     const Eigen::Vector3d next = wanted + kept_ * (direction - wanted);
-    // On the way to the opposite direction it can vanish: it then stays.
+    // `next` can vanish on the way to the opposite direction; then the direction stays.
     if (next.norm() > 0.0) direction = next.normalized();
     return output_;
   }
 
  private:
-  /// How much of a deviation is left after a period.
+  /// The fraction of a deviation that remains after one period.
   static double calc_kept(double period_s, double lag_s) {
     return lag_s > 0.0 ? std::exp(-period_s / lag_s) : 0.0;
   }

@@ -25,7 +25,8 @@ Allocation::Allocation(const AutopilotSetup& setup) : largest_(setup.airframe.ro
 VectorXd Allocation::calc_thrusts(const Eigen::Vector3d& moment, double thrust) const {
   const VectorXd tilting = shares_.leftCols<2>() * moment.head<2>();
   const VectorXd lifting = shares_.col(3), turning = shares_.col(2) * moment.z();
-  // Thrust that takes no rotor above its largest speed, or rather none below rest.
+  // `most`: `thrust`, or less if a rotor would exceed its largest thrust. `least`: below it a rotor
+  // would have to push down. `least` has priority.
   double most = thrust, least = 0.0;
   for (Index i = 0; i < lifting.size(); ++i) {
     if (!(lifting[i] > 0.0)) continue;
@@ -33,7 +34,7 @@ VectorXd Allocation::calc_thrusts(const Eigen::Vector3d& moment, double thrust) 
     least = std::max(least, -tilting[i] / lifting[i]);
   }
   const VectorXd level = tilting + std::max(least, most) * lifting;
-  // The part of the yaw moment for which there is room.
+  // The part of the yaw moment (0 … 1) that keeps every rotor within its limits.
   double part = 1.0;
   for (Index i = 0; i < turning.size(); ++i) {
     const double room = turning[i] > 0.0 ? largest_[i] - level[i] : level[i];

@@ -1,4 +1,4 @@
-/// Shares a moment and a thrust out among the rotors.
+/// Allocates a moment and a thrust to the rotors.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,9 +13,9 @@ class Allocation {
   /// @throws config::ConfigError if the rotors cannot roll or pitch the body.
   explicit Allocation(const AutopilotSetup& setup);
 
-  /// Thrust of each rotor (N), from 0 to its largest, that together make `moment` (in B about the
-  /// centre of mass, N·m) and `thrust` (along −z, N). Where they cannot: the moments of roll and
-  /// pitch come first, then the thrust, then yaw.
+  /// Thrusts of the rotors (N), each from 0 to its largest, that together make `moment` (in B about
+  /// the centre of mass, N·m) and `thrust` (along −z, N). If the limits do not allow both, roll and
+  /// pitch have priority, then the thrust, then yaw.
   Eigen::VectorXd calc_thrusts(const Eigen::Vector3d& moment, double thrust) const;
 
  private:

@@ -19,12 +19,12 @@ struct Rotation {
   Eigen::Matrix3d R_WB = Eigen::Matrix3d::Identity();
   Eigen::Vector3d w_WB_B = Eigen::Vector3d::Zero();  ///< rad/s
 };
-/// The wanted one: also the derivative of its rate.
+/// Set-point of the rotation, with the derivative of its rate.
 struct WantedRotation : Rotation {
   Eigen::Vector3d w_dot_WB_B = Eigen::Vector3d::Zero();  ///< rad/s²
 };
 
-/// Ψ, 0 … 2: 1 − cos of the angle between both. README.md, eq. (2).
+/// Ψ, 0 … 2: 1 − cos of the angle between the two attitudes. README.md, eq. (2).
 double calc_attitude_distance(const Eigen::Matrix3d& R_WB, const Eigen::Matrix3d& R_WB_wanted);
 
 /// e_R (3×1). README.md, eq. (3).

@@ -23,10 +23,10 @@ class Geometric : public Autopilot {
       : airframe_(setup.airframe), gains_(choose_gains(setup)), allocation_(setup) {}
 
   const AutopilotOutput& step(const AutopilotInput& input) override {
-    // No force has no direction: the attitude wanted before stays.
+    // A zero force has no direction: the previous attitude set-point stays.
     if (!input.f_Q_W.isZero(0.0)) output_.q_WB = calc_attitude_for(input.f_Q_W);
     const Rotation rotation{input.attitude.q_WB.toRotationMatrix(), input.attitude.w_WB_B};
-    WantedRotation wanted;  // held until the next step, so without a rate
+    WantedRotation wanted;  // held until the next step, therefore its rate is 0
     wanted.R_WB = output_.q_WB.toRotationMatrix();
     const Eigen::Vector3d moment = calc_moment(rotation, wanted, airframe_.inertia_C_B, gains_);
     // Eq. (7). Rotors do not push down.

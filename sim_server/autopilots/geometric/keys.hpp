@@ -9,7 +9,7 @@ namespace sls::sim::geometric {
 
 struct Keys {
   std::optional<double> attitude;  ///< k_R, N·m; none: from the inertia
-  std::optional<double> rate;      ///< k_Ω, N·m·s; none: the same
+  std::optional<double> rate;      ///< k_Ω, N·m·s; none: from the inertia
 };
 
 template <class Map>

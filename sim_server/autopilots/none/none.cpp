@@ -1,4 +1,4 @@
-// No autopilot: the thrust points where the force does, at once. README.md beside this file.
+// No autopilot: the thrust has the direction of the force, without lag. README.md beside this file.
 #include "sim_server/autopilots/autopilot.hpp"
 
 namespace sls::sim {

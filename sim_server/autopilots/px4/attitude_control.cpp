@@ -8,14 +8,14 @@ namespace {
 
 using Eigen::Quaterniond, Eigen::Vector3d;
 
-/// Of the two quaternions of a rotation the one that turns by at most half a turn.
+/// The quaternion of the same rotation, q or −q, that turns by at most half a turn.
 Quaterniond to_shorter(const Quaterniond& q) { return q.w() < 0.0 ? Quaterniond(-q.coeffs()) : q; }
 
 /// Eq. (3): the attitude with the wanted z axis that is nearest to `q_WB`.
 Quaterniond calc_reduced_attitude(const Quaterniond& q_WB, const Quaterniond& q_WB_wanted) {
   constexpr double kOpposite = 1e-10;
   const Vector3d from = q_WB * Vector3d::UnitZ(), to = q_WB_wanted * Vector3d::UnitZ();
-  // Half a turn has no unique axis: the whole attitude then says which.
+  // Half a turn has no unique axis: the desired attitude itself is then the result.
   if (1.0 + from.dot(to) < kOpposite) return q_WB_wanted;
   return Quaterniond::FromTwoVectors(from, to) * q_WB;
 }
@@ -25,14 +25,14 @@ Quaterniond calc_reduced_attitude(const Quaterniond& q_WB, const Quaterniond& q_
 Vector3d calc_rate_set_points(const Quaterniond& q_WB, const Quaterniond& q_WB_wanted,
                               const AttitudeGains& gains) {
   const Quaterniond reduced = calc_reduced_attitude(q_WB, q_WB_wanted);
-  // Eq. (4). Both z axes agree, so what is left is a turn about z.
+  // Eq. (4). Both z axes agree, so the remaining rotation is about z.
   const Quaterniond yaw = to_shorter(reduced.conjugate() * q_WB_wanted);
   const double half_angle = gains.yaw_weight * std::atan2(yaw.z(), yaw.w());
   const Quaterniond wanted =
       reduced * Quaterniond(std::cos(half_angle), 0.0, 0.0, std::sin(half_angle));
   // Eq. (5).
   const Vector3d error = 2.0 * to_shorter(q_WB.conjugate() * wanted).vec();
-  // Eq. (6). The weight makes the yaw slower only where it has to wait for roll and pitch.
+  // Eq. (6). The division cancels the weight for a small error of yaw alone.
   Vector3d per_rad = gains.per_rad;
   constexpr double kNoWeight = 1e-4;
   if (gains.yaw_weight > kNoWeight) per_rad.z() /= gains.yaw_weight;

@@ -8,7 +8,7 @@ namespace sls::sim::px4 {
 
 struct AttitudeGains {
   Eigen::Vector3d per_rad{6.5, 6.5, 2.8};  ///< rate per error, 1/s
-  double yaw_weight = 0.4;                 ///< 0 … 1: how much of the yaw error counts
+  double yaw_weight = 0.4;                 ///< weight of the yaw error, 0 … 1
   Eigen::Vector3d rate_limits{3.8397243543875251, 3.8397243543875251,
                               3.4906585039886591};  ///< 220, 220 and 200 °/s, in rad/s
 };

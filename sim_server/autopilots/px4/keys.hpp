@@ -1,4 +1,4 @@
-/// The scenario keys of the autopilot `px4`. The defaults are the published PX4 flight's.
+/// The scenario keys of the autopilot `px4`. The defaults are those of the published PX4 flight.
 #pragma once
 
 #include <optional>
@@ -22,7 +22,7 @@ struct Keys {
   std::optional<AffineThrust> affine_thrust;  ///< none: the published one
   AttitudeGains attitude;
   RateGains rates;
-  std::optional<std::vector<MixerRow>> mixer;  ///< of each rotor; none: from their geometry
+  std::optional<std::vector<MixerRow>> mixer;  ///< one per rotor; none: from their geometry
   SpeedMap speeds;
 };
 

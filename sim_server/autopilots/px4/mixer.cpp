@@ -15,12 +15,13 @@ struct Limits {
   double most;
 };
 constexpr Limits kOutputs{0.0, 1.0};
-// Yaw may push a rotor so far beyond its limit; thrust is then given up for it.
+// Yaw may exceed the upper limit by this much; the thrust is then reduced to make room.
 constexpr Limits kOutputsWithYaw{0.0, 1.15};
 
 enum class Direction { kBoth, kLessOnly };
 
-/// How much of `column` to add so that `outputs` are beyond their limits as little as possible.
+/// The multiple of `column` to add to `outputs` to bring them back between their limits: k of
+/// eq. (13).
 double calc_relief(const VectorXd& column, const VectorXd& outputs, const Limits& limits) {
   constexpr double kNoEffect = 1e-7;
   double least = 0.0, most = 0.0;
@@ -39,11 +40,11 @@ void relieve(const VectorXd& column, const Limits& limits, Direction direction, 
   const double relief = calc_relief(column, outputs, limits);
   if (direction == Direction::kLessOnly && relief > 0.0) return;
   outputs += relief * column;
-  // Where both ends are reached at once, the excess is shared out between them.
+  // If both ends exceed their limits at once, they share the excess equally.
   outputs += 0.5 * calc_relief(column, outputs, limits) * column;
 }
 
-/// Axes on which more would turn a rotor further below its lower limit.
+/// Axes and directions in which more torque would move a rotor further below its lower limit.
 Saturation find_saturation(const std::vector<MixerRow>& mixer, const VectorXd& outputs) {
   constexpr double kAtLowerLimit = 0.005;
   Saturation saturation;
@@ -69,14 +70,14 @@ std::vector<MixerRow> make_mixer(const AutopilotSetup& setup) {
   const bool has_yaw = find_yaw_authority(setup);
   Eigen::MatrixXd wrenches = calc_rotor_wrenches(setup.airframe);
   if (!has_yaw) wrenches.row(2).setZero();
-  // Outputs stand for speeds, whose thrust is in proportion to the rotors' constants.
+  // An output sets a speed. At equal speeds the thrusts are in proportion to the rotors' constants.
   double mean_constant = 0.0;
   for (const Rotor& rotor : rotors)
     mean_constant += rotor.thrust_constant / static_cast<double>(rotors.size());
   for (std::size_t i = 0; i < rotors.size(); ++i)
     wrenches.col(static_cast<Index>(i)) *= rotors[i].thrust_constant / mean_constant;
 
-  // Eq. (12). Column k: what makes torque or force k alone; thrust is along −z.
+  // Eq. (12). Column k: the outputs that make torque or force k alone; thrust is along −z.
   const Eigen::MatrixXd shares = calc_pseudo_inverse(wrenches);
   const VectorXd roll = shares.col(0), pitch = shares.col(1), yaw = shares.col(2),
                  thrust = -shares.col(5);

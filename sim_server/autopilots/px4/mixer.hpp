@@ -17,8 +17,8 @@ struct MixerRow {
   double thrust = 1.0;
 };
 
-/// Rows that suit the rotors' places, axes and constants, scaled as PX4 scales them: README.md,
-/// eq. (12). Without authority over yaw its entries are 0.
+/// Rows for the positions, axes and constants of the rotors, scaled as in PX4: README.md, eq. (12).
+/// If the rotors have no authority over yaw, the yaw entries are 0.
 /// @throws config::ConfigError if the rotors cannot roll or pitch the body.
 std::vector<MixerRow> make_mixer(const AutopilotSetup& setup);
 
@@ -27,7 +27,7 @@ struct MixerOutput {
   Saturation saturation;
 };
 
-/// README.md, "Mixer". `torque` (roll, pitch, yaw) counts up to ±1, `thrust` from 0 to 1.
+/// README.md, "Mixer". `torque` (roll, pitch, yaw) is clamped to ±1, `thrust` to 0 … 1.
 MixerOutput mix(const std::vector<MixerRow>& mixer, const Eigen::Vector3d& torque, double thrust);
 
 }  // namespace sls::sim::px4

@@ -36,7 +36,7 @@ class Px4 : public Autopilot {
 
   const AutopilotOutput& step(const AutopilotInput& input) override {
     output_.thrust = input.f_Q_W.norm();
-    // No force has no direction: the attitude wanted before stays.
+    // A zero force has no direction: the previous attitude set-point stays.
     if (output_.thrust > 0.0) output_.q_WB = calc_attitude_for(input.f_Q_W);
     const Eigen::Vector3d rate_set_points =
         calc_rate_set_points(input.attitude.q_WB, output_.q_WB, keys_.attitude);

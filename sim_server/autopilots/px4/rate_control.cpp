@@ -20,7 +20,7 @@ Vector3d RateControl::step(const Vector3d& rates, const Vector3d& rate_set_point
   // Eq. (9).
   const Vector3d acceleration = derivative_filter_.step((filtered - last_rates_) / period_s_);
   last_rates_ = filtered;
-  // Eq. (10): with the integral of the steps before.
+  // Eq. (10), with the integral up to the previous step.
   const Vector3d error = rate_set_points - filtered;
   const Vector3d torque = gains_.proportional.cwiseProduct(error) + integral_ -
                           gains_.derivative.cwiseProduct(acceleration);
@@ -34,7 +34,7 @@ void RateControl::integrate(const Vector3d& error, const Saturation& saturation)
     double e = error[axis];
     if (saturation.positive[i]) e = std::min(e, 0.0);
     if (saturation.negative[i]) e = std::max(e, 0.0);
-    // Eq. (11): a flip would fill the integrator and then overshoot.
+    // Eq. (11). Without the factor a flip would fill the integrator and then overshoot.
     const double part = e / gains_.integral_off_error;
     const double factor = std::max(0.0, 1.0 - part * part);
     const double next = integral_[axis] + factor * gains_.integral[axis] * e * period_s_;

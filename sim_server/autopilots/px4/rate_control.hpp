@@ -14,7 +14,7 @@ struct Saturation {
   std::array<bool, 3> negative{};
 };
 
-/// Per axis. A torque of 1 is what the mixer's row makes of 1.
+/// Gains per axis. Torques are normalised: ±1 is the range of the mixer's input.
 struct RateGains {
   Eigen::Vector3d proportional{0.15, 0.15, 0.2};   ///< per rad/s
   Eigen::Vector3d integral{0.2, 0.2, 0.1};         ///< per rad
@@ -30,8 +30,8 @@ class RateControl {
  public:
   RateControl(const RateGains& gains, double period_s);
 
-  /// Normalised torques about the axes of B. `rates` is the angular velocity in B (rad/s),
-  /// `saturation` what the mixer said of the last torques.
+  /// Normalised torques about the axes of B. `rates` is the angular velocity in B (rad/s);
+  /// `saturation` is that of the mixer at the previous torques.
   Eigen::Vector3d step(const Eigen::Vector3d& rates, const Eigen::Vector3d& rate_set_points,
                        const Saturation& saturation);
 

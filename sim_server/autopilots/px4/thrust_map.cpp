@@ -31,7 +31,7 @@ ExactThrust::ExactThrust(const std::vector<Rotor>& rotors, const std::vector<Mix
 double ExactThrust::calc_thrust(double force) const {
   const double missing = force - constant_;
   if (!(missing > 0.0)) return 0.0;
-  // The root without a difference of numbers that are nearly equal.
+  // This form of the root avoids the difference of nearly equal numbers.
   return limit(2.0 * missing / (linear_ + std::sqrt(linear_ * linear_ + 4.0 * square_ * missing)));
 }
 

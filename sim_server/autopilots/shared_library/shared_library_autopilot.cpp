@@ -1,4 +1,4 @@
-// An autopilot from a shared library of the user's own: sls_autopilot.h.
+// An autopilot from a shared library of the user: sls_autopilot.h.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -125,7 +125,7 @@ sls_autopilot_input SharedLibraryAutopilot::make_input(const AutopilotInput& inp
 }
 
 const AutopilotOutput& SharedLibraryAutopilot::step(const AutopilotInput& input) {
-  // More numbers than there are rotors: a library that fills them writes beyond its room.
+  // Guard values behind those of the rotors detect a library that writes too many speeds.
   constexpr std::size_t kBeyond = 8;
   constexpr double kUntouched = -7.25e300;
   speeds_.assign(rotors_.size(), std::numeric_limits<double>::quiet_NaN());

@@ -5,11 +5,11 @@
  *
  *     autopilot: { model: ./my_autopilot.so, period_s: 0.004, parameters: { roll: 6.5 } }
  *
- * The body frame B and the world frame W have x forward, y right, z down. SI units, radians. Paths are
- * relative to the scenario file. There is one autopilot per vehicle; different ones are called on
- * different threads, each by one call at a time. Its output must be a function of the setup
- * and the sequence of its inputs alone. Do not change the floating-point mode: link without
- * -ffast-math. */
+ * The body frame B and the world frame W have x forward, y right, z down. SI units, radians. Paths
+ * are relative to the scenario file. There is one autopilot per vehicle. Calls of different
+ * autopilots come on different threads; calls of one autopilot never overlap. Its output must
+ * depend only on the setup and the sequence of its inputs. Do not change the floating-point mode:
+ * link without -ffast-math. */
 #ifndef SLS_AUTOPILOT_H
 #define SLS_AUTOPILOT_H
 
@@ -22,8 +22,8 @@ extern "C" {
 
 #define SLS_AUTOPILOT_VERSION 1
 
-/* A rotor. Turning at w (rad/s) it pulls with thrust_constant_n_s2 * w * w along its axis, and its
- * drag turns the body with -spin * torque_constant_m * thrust about that axis. */
+/* A rotor. At the speed w (rad/s) its thrust is thrust_constant_n_s2 * w * w along its axis. The
+ * torque of its drag on the body is -spin * torque_constant_m * thrust about that axis. */
 typedef struct {
   size_t size;          /* of this struct */
   double position_m[3]; /* of the hub, from the body's origin, in B */
@@ -41,7 +41,7 @@ typedef struct {
   uint32_t vehicle_id;
   double period_s; /* from one step to the next */
   double quad_mass_kg, load_mass_kg, rod_length_m, gravity_m_s2; /* `vehicle` */
-  /* The body that is flown, with all that is fixed to it; without the pendulum. */
+  /* The rigid body of the vehicle with everything fixed to it, without the pendulum. */
   double body_mass_kg;
   double centre_of_mass_m[3]; /* from the body's origin, in B */
   double inertia_kg_m2[3][3]; /* about the centre of mass, in B */
@@ -49,28 +49,28 @@ typedef struct {
   const sls_autopilot_rotor* rotors;
 } sls_autopilot_setup;
 
-/* Input of an autopilot's step. Its W is the world as its estimator has it: the scenario may turn
- * that against the true one (`estimator`). */
+/* Input of an autopilot's step. W is the world frame of the estimator. The scenario may turn it
+ * against the true frame (`estimator`). */
 typedef struct {
   size_t size; /* of this struct */
-  uint64_t step; /* how many there were before */
-  double time_s; /* since the first */
-  double force_n[3];          /* that the controller asks for, on the body, in W */
+  uint64_t step; /* number of earlier steps */
+  double time_s; /* since the first step */
+  double force_n[3];          /* command of the controller, on the body, in W */
   double velocity_m_s[3];     /* of the body's origin, in W */
   double attitude_wb[4];      /* unit quaternion w, x, y, z: rotates body vectors into the world */
   double body_rates_rad_s[3]; /* in B */
 } sls_autopilot_input;
 
-/* Its output until its next step. */
+/* Output of an autopilot, valid until its next step. */
 typedef struct {
   size_t size; /* of this struct */
-  /* Set-points of the rotors, rad/s, >= 0. Room for `rotor_count` numbers, which begin as NaN: write
-   * them all. The plant keeps each between its rotor's smallest and largest speed. */
+  /* Set-points of the rotors, rad/s, >= 0: an array of `rotor_count` numbers, all NaN before the
+   * call. Write all of them. The plant clamps each to its rotor's smallest and largest speed. */
   double* rotor_speeds_rad_s;
   double attitude_wb[4]; /* set-point, for the record; unit quaternion, begins as (1, 0, 0, 0) */
-  double thrust_n; /* collective thrust that is asked for along the axes, for the record; begins as 0 */
-  /* Other than 0, which it begins as: the thrust of all rotors acts at the centre of mass along
-   * `direction`, a unit vector in W, and no rotor turns the body. For an autopilot that stands for a
+  double thrust_n; /* commanded collective thrust along the axes, for the record; begins as 0 */
+  /* Begins as 0. If it is not 0, the thrust of all rotors acts at the centre of mass along
+   * `direction`, a unit vector in W, and no rotor turns the body. For an autopilot that replaces a
    * whole attitude loop. */
   int has_direction;
   double direction[3];
@@ -82,11 +82,11 @@ typedef struct {
   /* sizeof of the structs above, as you compiled them */
   size_t setup_size, rotor_size, input_size, output_size;
 
-  /* Makes an autopilot. NULL with a text in `error`, which has room for `error_size` bytes, where it
-   * refuses: say which parameter, expected and got. */
+  /* Returns a new autopilot. If it refuses the setup, it returns NULL and writes a text of at most
+   * `error_size` bytes to `error`: the parameter, the expected value, the value it got. */
   void* (*create)(const sls_autopilot_setup* setup, char* error, size_t error_size);
   void (*destroy)(void* autopilot);
-  /* One period. 0, or 1 with a text in `error`, which ends the run. */
+  /* One period. Returns 0, or 1 with a text in `error`: then the run ends. */
   int (*step)(void* autopilot, const sls_autopilot_input* input, sls_autopilot_output* output,
               char* error, size_t error_size);
 } sls_autopilot_functions;
