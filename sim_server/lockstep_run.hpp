@@ -50,7 +50,7 @@ class LockstepRun : public Run {
   std::unique_lock<std::mutex> main_lock_{step_mutex_, std::defer_lock};
   std::exception_ptr error_;            // from the middleware's thread
   std::uint64_t recorder_limit_ = 0;    // the first step that a recorder is not ready for
-  Clock::time_point sent_, last_sent_;  // when its states were sent first and last
+  Clock::time_point sent_, last_sent_;  // when the step's states were sent, first and last
   Clock::time_point resend_at_;
   std::atomic<Clock::time_point> wake_at_{Clock::time_point()};  // the main thread waits until then
   Clock::time_point take_over_at_;

@@ -1,4 +1,4 @@
-/// How the load hangs: a key of several plants.
+/// Model of the pendulum: a key of several plants.
 #pragma once
 
 #include <array>

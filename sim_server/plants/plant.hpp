@@ -1,5 +1,5 @@
-/// A plant: moves one or several vehicles under held forces. A new one is a folder beside
-/// this file and a line in plants.def: README.md, "Adding a plant". No DDS here.
+/// A plant moves one or several vehicles under held forces. To add one: a folder beside this file
+/// and a line in plants.def; README.md, "Adding a plant". No DDS here.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,7 +15,7 @@
 
 namespace sls::sim {
 
-/// A number of its own that a plant publishes of each vehicle.
+/// A number that a plant publishes for each vehicle beyond position and velocity.
 struct Signal {
   std::string name;  ///< column of state.csv, such as rotor_1_rad_s
   std::string unit;  ///< such as rad/s
@@ -36,14 +36,14 @@ class Plant {
   /// The truth after the last step; finite.
   virtual const model::Measurement& measurement(std::size_t vehicle) const = 0;
 
-  /// Output of sensors and estimator after the last step. A plant leaves this alone: `sensing` and
-  /// `estimator` of the scenario are put around every plant alike (sensing/).
+  /// Output of sensors and estimator after the last step. Only SensedPlant overrides this:
+  /// make_plants() adds the scenario's `sensing` and `estimator` to every plant (sensing/).
   virtual const model::Measurement& seen(std::size_t vehicle) const { return measurement(vehicle); }
 
-  /// Whether `seen` is always the truth at the end of a control period.
+  /// True if `seen` always equals the truth at the end of a control period.
   virtual bool sees_truth() const { return true; }
 
-  /// Whether attitude and body rates say anything: false of point masses, which stay level.
+  /// True if attitude and body rates have a meaning; false for point masses, which stay level.
   virtual bool has_attitude() const { return false; }
 
   /// The signals in every measurement, in their order; at most `model::kMaxNumbers`.
@@ -60,15 +60,15 @@ struct PlantSetup {
     model::SlungLoadParameters parameters;
     config::InitialState initial;
   };
-  config::Plant plant;            ///< except `initial`, which each vehicle has of its own
-  config::Autopilot autopilot;    ///< of plants that take one
+  config::Plant plant;            ///< without `initial`, which each vehicle has
+  config::Autopilot autopilot;    ///< for plants that use one
   std::filesystem::path folder;   ///< of the scenario file
   std::vector<Vehicle> vehicles;  ///< at least one, by ascending id
-  config::Estimator estimator;    ///< for an autopilot inside the plant; `seen` is none of its work
+  config::Estimator estimator;    ///< for an autopilot inside the plant, not for `seen`
 };
 
 enum class Moves {
-  kOneVehicle,   ///< a plant for each vehicle: they do not touch each other
+  kOneVehicle,   ///< a plant for each vehicle: vehicles do not interact
   kAllVehicles,  ///< one plant for the whole fleet, which one server must fly
 };
 
@@ -82,21 +82,20 @@ struct PlantType {
 /// The type that `plant.model` names.
 const PlantType& find_plant_type(const config::ModelName& model);
 
-/// A plant, and which of a list of vehicles it moves.
+/// A plant and the vehicles of a list that it moves.
 struct PlantOfVehicles {
   std::unique_ptr<Plant> plant;
   std::vector<std::size_t> vehicles;    ///< indices into the list
-  std::vector<Eigen::Vector3d> forces;  ///< on them in the period in work; kept to spare allocation
+  std::vector<Eigen::Vector3d> forces;  ///< in this period; a member to avoid allocation
 };
 
-/// The plants that fly the vehicles `ids` (ascending) of `fleet`, seen as its `sensing` and
-/// `estimator` say.
-/// @throws config::ConfigError as `make`; also where a plant of all vehicles gets only some, or a
-///   signal's name or unit cannot be that of a column.
+/// The plants of the vehicles `ids` (ascending) of `fleet`, with its `sensing` and `estimator`.
+/// @throws config::ConfigError as `make`; also if a plant of all vehicles gets only some, or if the
+///   name or unit of a signal is not allowed in a column.
 std::vector<PlantOfVehicles> make_plants(const PlantType& type, const config::Scenario& fleet,
                                          const std::vector<std::uint32_t>& ids);
 
-/// Names that a signal cannot have: columns that state.csv has of every vehicle.
+/// Names that a signal must not have: the other columns of state.csv.
 const std::vector<std::string>& list_reserved_signal_names();
 
 /// @throws std::runtime_error `QUANTITY is not finite after step N of the plant`; quantities are

@@ -43,7 +43,7 @@ const std::vector<std::string>& list_reserved_signal_names() {
 
 namespace {
 
-/// Limits of sls/parameters and state.csv.
+/// Checks the limits of sls/parameters and state.csv.
 void check_signals(const std::vector<Signal>& signals, const config::ModelName& model) {
   constexpr std::size_t kMostLettersOfName = 32, kMostLettersOfUnit = 16;
   std::set<std::string> taken(list_reserved_signal_names().begin(),

@@ -20,7 +20,7 @@ class AnalyticPlant : public Plant {
   const model::Measurement& measurement(std::size_t) const override { return measurement_; }
 
  private:
-  /// Also the rate of change of each member.
+  /// The motion, or its rate of change.
   struct Motion {
     Eigen::Vector3d p_WC;  ///< centre of mass of both bodies, m
     Eigen::Vector3d v_WC;  ///< m/s

@@ -56,7 +56,8 @@ Airframe make_airframe(const MultirotorKeys& keys, double quad_mass) {
     bare_mass -= body.mass;
     airframe.p_BC += body.mass / quad_mass * body.position;
   }
-  // About the centre of mass: each part's own, and that of its mass at its place.
+  // Inertia about the centre of mass: of each part about its own centre, plus that of its mass at
+  // its position.
   airframe.inertia_C_B =
       make_tensor(keys.inertia, keys.products) + calc_point_inertia(bare_mass, -airframe.p_BC);
   for (const FixedBodyKeys& body : keys.bodies)
@@ -77,7 +78,7 @@ std::string find_inertia_defect(const Vector3d& moments, const Vector3d& product
   const Vector3d principal =
       Eigen::SelfAdjointEigenSolver<Matrix3d>(make_tensor(moments, products)).eigenvalues();
   std::ostringstream list;
-  list.precision(12);  // the digits beyond are the solver's
+  list.precision(12);  // further digits are errors of the solver
   list << principal[0] << ", " << principal[1] << ", " << principal[2];
   if (principal[0] < 0.0) return "expected principal moments >= 0, got " + list.str();
   const double rounding = 1e-12 * principal[2];

@@ -1,5 +1,5 @@
-/// The rigid body that a scenario describes: its mass properties and rotors, and what contradicts
-/// them. No Simbody here.
+/// The rigid body that a scenario describes: its mass properties, its rotors and checks of
+/// both. No Simbody here.
 #pragma once
 
 #include <string>
@@ -10,7 +10,7 @@
 
 namespace sls::sim {
 
-/// A rotor with what the autopilot does not know of it.
+/// A rotor with the parameters that the autopilot does not have.
 struct FlyingRotor : Rotor {
   double drag_constant = 0.0;      ///< N·s²/m
   double rolling_constant = 0.0;   ///< N·s²
@@ -22,14 +22,14 @@ struct FlyingRotor : Rotor {
 /// The rotors that the keys describe, their axes of length 1.
 std::vector<FlyingRotor> make_rotors(const MultirotorKeys& keys);
 
-/// The body with all that is fixed to it: `quad_mass` is the mass of the whole.
+/// The body with everything fixed to it. `quad_mass` is the mass of the whole.
 Airframe make_airframe(const MultirotorKeys& keys, double quad_mass);
 
 /// Largest collective thrust of a level vehicle at rest, N.
 double calc_largest_lift(const std::vector<FlyingRotor>& rotors);
 
 /// Triangle rule of a rigid body: no principal moment is larger than the sum of the others.
-/// Empty, or what is wrong.
+/// Returns the defect, or an empty text.
 std::string find_inertia_defect(const Eigen::Vector3d& moments, const Eigen::Vector3d& products);
 
 }  // namespace sls::sim

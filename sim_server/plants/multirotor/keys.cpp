@@ -64,7 +64,7 @@ class Keys : public config::OwnKeys<config::Plant, MultirotorKeys> {
       if (!is_there && is_rigid)
         throw places.make_error_at(path, "missing key; expected with pendulum 'rigid'");
     }
-    // Else nothing resists a spin about the rod, and the equations have no solution.
+    // With 0 nothing resists a spin about the rod, and the equations have no solution.
     if (is_rigid && !(keys.rod->inertia.z() + keys.load_inertia->z() > 0.0))
       throw places.make_error_at("plant.load_inertia_kg_m2",
                                  "expected an inertia > 0 about the rod, of rod or load, got 0");

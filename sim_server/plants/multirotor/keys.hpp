@@ -15,7 +15,7 @@ inline std::array<config::Name<Spin>, 2> names_of(Spin) {
   return {{{"ccw", Spin::kCounterClockwise}, {"cw", Spin::kClockwise}}};
 }
 
-/// Values common to all rotors, and those that one rotor may set itself.
+/// Parameters common to all rotors, or the values that one rotor overrides.
 template <class Number>
 struct RotorNumbers {
   Number thrust_constant{};    ///< N·s²
@@ -33,7 +33,7 @@ struct RotorKeys {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< in B, m
   Eigen::Vector3d axis = -Eigen::Vector3d::UnitZ();    ///< of the thrust, in B; any length but 0
   Spin spin = Spin::kCounterClockwise;
-  RotorNumbers<std::optional<double>> own;  ///< what differs from `plant.rotor`
+  RotorNumbers<std::optional<double>> own;  ///< overrides of `plant.rotor`
 };
 
 /// A rigid body fixed to the airframe.

@@ -1,5 +1,5 @@
 /// Accelerations of the body and its pendulum from Simbody's mass properties and orientations.
-/// Source: README.md, eqs. (7) to (12); "Integration" says why by hand.
+/// Source: README.md, eqs. (7) to (12). "Integration" explains why not by Simbody.
 #pragma once
 
 #include <Simbody.h>
@@ -10,7 +10,8 @@
 namespace sls::sim {
 
 /// The load hangs on a massless rod (`kPoint`), or rod and load are a rigid body (`kRigid`). Frame
-/// P is the pendulum's: its origin is the joint, its z axis the rod; axes of inertia are its axes.
+/// P is the pendulum's frame: its origin is the joint, its z axis is the rod, and its axes are the
+/// principal axes of inertia.
 enum class PendulumBody { kPoint, kRigid };
 
 class MultirotorDynamics {
@@ -35,7 +36,7 @@ class MultirotorDynamics {
         calc_mobility(pendulum_mass_, SimTK::Vec3(0, 0, -centre_), inverse_pendulum_inertia_P_);
   }
 
-  /// How the bodies are turned and turn.
+  /// Orientations and angular velocities of both bodies.
   struct Rotations {
     const SimTK::Rotation& R_WB;
     SimTK::Vec3 w_WB_W;  ///< rad/s
@@ -45,11 +46,11 @@ class MultirotorDynamics {
   struct Accelerations {
     SimTK::Vec3 b_WB_W;  ///< angular, of the body, rad/s²
     SimTK::Vec3 a_WQ;    ///< of the body's origin, m/s²
-    SimTK::Vec3 b_WP_W;  ///< angular, of the pendulum, rad/s²; of kPoint across the rod alone
+    SimTK::Vec3 b_WP_W;  ///< angular, of the pendulum, rad/s²; for kPoint only across the rod
     double tension;      ///< force of the joint along the rod, N
   };
 
-  /// Under `force_W` at the body's origin (N) and `torque_W` about it (N·m), gravity apart.
+  /// Accelerations under gravity, `force_W` at the body's origin (N) and `torque_W` about it (N·m).
   Accelerations calc_accelerations(const Rotations& at, const SimTK::Vec3& force_W,
                                    const SimTK::Vec3& torque_W) const {
     const SimTK::Rotation& R_WB = at.R_WB;
@@ -72,7 +73,7 @@ class MultirotorDynamics {
  private:
   struct JointForce {
     SimTK::Vec3 on_body_W;  // N
-    SimTK::Vec3 b_WP_W;     // of the pendulum that pulls so
+    SimTK::Vec3 b_WP_W;     // of the pendulum with this force
   };
 
   /// Eqs. (8) and (9): a point load, which can only be pulled along the rod.
@@ -86,7 +87,7 @@ class MultirotorDynamics {
     return {tension * n_W, n_W % n_ddot_W - (~at.w_WP_W * n_W) * (n_W % at.w_WP_W)};
   }
 
-  /// Eqs. (10) and (11): rod and load as one body. In P.
+  /// Eqs. (10) and (11): rod and load as one body. Computed in P.
   JointForce hold_rigid(const Rotations& at, const SimTK::Vec3& free_a_WA) const {
     const SimTK::Rotation R_PB = ~at.R_WP * at.R_WB;
     const SimTK::Vec3 w_P = ~at.R_WP * at.w_WP_W;
@@ -99,7 +100,7 @@ class MultirotorDynamics {
     return {at.R_WP * on_body_P, at.R_WP * b_P};
   }
 
-  /// Acceleration of a body's point `p` from its centre of mass per force on that point.
+  /// Acceleration of the point at `p` from a body's centre of mass, per force on that point.
   static SimTK::Mat33 calc_mobility(double mass, const SimTK::Vec3& p,
                                     const SimTK::Mat33& inverse_inertia) {
     Eigen::Matrix3d cross;
@@ -126,8 +127,8 @@ class MultirotorDynamics {
   const PendulumBody kind_;
   const SimTK::Vec3 gravity_W_;  // m/s²
   const double mass_;            // of the body, kg
-  const SimTK::Vec3 p_BC_;       // its centre of mass from its origin, m
-  const SimTK::Vec3 p_CA_B_;     // the joint from there, m
+  const SimTK::Vec3 p_BC_;       // its centre of mass C from its origin, m
+  const SimTK::Vec3 p_CA_B_;     // the joint from C, m
   const SimTK::Mat33 inertia_B_, inverse_inertia_B_;
   const SimTK::Mat33 mobility_B_;  // K of eq. (8), 1/kg
   const double pendulum_mass_;     // kg

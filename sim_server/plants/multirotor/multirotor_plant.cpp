@@ -24,8 +24,8 @@ namespace {
 
 using Eigen::Vector3d, Eigen::VectorXd;
 
-/// Coordinates and speeds as Simbody orders them. The body: quaternion and place; angular velocity
-/// and velocity, both in W. The pendulum, seen from the body: quaternion; two or three speeds.
+/// Coordinates and speeds in Simbody's order. Body: quaternion and position; angular velocity and
+/// velocity, both in W. Pendulum, relative to the body: quaternion; two or three speeds.
 constexpr int kCoordinates = 11, kMostSpeeds = 9;
 struct Motion {
   Eigen::Matrix<double, kCoordinates, 1> q;
@@ -48,7 +48,7 @@ SimTK::Rotation to_rod_frame(const model::RodAngles& rod) {
   return {SimTK::BodyRotationSequence, rod.alpha, SimTK::XAxis, rod.beta, SimTK::YAxis};
 }
 
-/// About the body's origin.
+/// Mass properties about the body's origin.
 SimTK::MassProperties make_mass_properties(const Airframe& airframe) {
   const Eigen::Matrix3d& J = airframe.inertia_C_B;
   const SimTK::Inertia central(J(0, 0), J(1, 1), J(2, 2), J(0, 1), J(0, 2), J(1, 2));
@@ -56,7 +56,7 @@ SimTK::MassProperties make_mass_properties(const Airframe& airframe) {
   return {airframe.mass, centre, central.shiftFromMassCenter(centre, airframe.mass)};
 }
 
-/// Rod and load about the joint; z along the rod.
+/// Mass properties of rod and load about the joint; z along the rod.
 SimTK::MassProperties make_pendulum_properties(const MultirotorKeys& keys,
                                                const model::SlungLoadParameters& vehicle) {
   const SimTK::Vec3 p_JL(0, 0, vehicle.rod_length);
@@ -104,7 +104,7 @@ using TurningRotors = std::vector<RotorSpeed>;
 
 }  // namespace
 
-/// The multibody system at one motion. README.md, "Integration", says what is Simbody's part.
+/// The multibody system at one motion. README.md, "Integration", lists Simbody's part.
 struct MultirotorPlant::Multibody {
   explicit Multibody(const PlantSetup& setup)
       : keys(setup.plant.own.get<MultirotorKeys>()),
@@ -159,7 +159,7 @@ struct MultirotorPlant::Multibody {
       p_WQ -= p_BA_W + vehicle.rod_length * to_simtk(rod.n_W);
     body.setQToFitTransform(state, SimTK::Transform(R_WB, p_WQ));
     body.setUToFitVelocity(state, SimTK::SpatialVec(w_WB_W, to_simtk(initial.v_WQ)));
-    // The joint's own motion is that of the rod beside the body.
+    // The joint's coordinates are those of the rod relative to the body.
     pendulum.setQToFitRotation(state, ~R_WB * to_rod_frame(initial.rod));
     pendulum.setUToFitAngularVelocity(state,
                                       ~R_WB * (to_simtk(rod.n_W.cross(rod.n_dot_W)) - w_WB_W));
@@ -179,7 +179,7 @@ struct MultirotorPlant::Multibody {
     rotor_speeds = set_points;
   }
 
-  /// To what the rotors can do.
+  /// Clamps speeds to the limits of the rotors.
   void limit(VectorXd& wanted) const {
     for (std::size_t i = 0; i < rotors.size(); ++i) {
       double& speed = wanted[static_cast<Eigen::Index>(i)];
@@ -198,7 +198,7 @@ struct MultirotorPlant::Multibody {
   }
 
   model::Attitude attitude() const {
-    // The coordinates hold it as a quaternion of length 1.
+    // The first four coordinates are a unit quaternion.
     const Eigen::Quaterniond q_WB(motion.q[0], motion.q[1], motion.q[2], motion.q[3]);
     return {q_WB, q_WB.conjugate() * Vector3d(motion.u.head<3>())};
   }
@@ -213,11 +213,11 @@ struct MultirotorPlant::Multibody {
       input.attitude.q_WB = attitude_error * input.attitude.q_WB;
       input.v_WQ = attitude_error * Vector3d(motion.u.segment<3>(3));
       const AutopilotOutput& wanted = autopilot->step(input);
-      check_finite(wanted, step);  // limit() would make the largest speed of a NaN
+      check_finite(wanted, step);  // limit() would turn a NaN into the largest speed
       output = wanted;
       set_points = output.rotor_speeds;
       limit(set_points);
-      // Rotors without a lag turn so from now on, not from the next step.
+      // Rotors without a lag have the new speed at once, not at the end of the step.
       for (std::size_t i = 0; i < rotors.size(); ++i) {
         double& speed = rotor_speeds[static_cast<Eigen::Index>(i)];
         speed = lags[i].begin(speed, set_points[static_cast<Eigen::Index>(i)]);
@@ -229,7 +229,7 @@ struct MultirotorPlant::Multibody {
 
   // --- dynamics ----------------------------------------------------------------------------------
 
-  /// Of the rotors on the body; README.md, eqs. (3) to (5).
+  /// Loads of the rotors on the body: README.md, eqs. (3) to (5).
   RotorLoads calc_rotor_loads(const Motion& at, const TurningRotors& turning) const {
     const SimTK::Rotation& R_WB = body.getBodyRotation(state);
     const SimTK::Vec3 v_WQ = SimTK::Vec3::getAs(at.u.data() + 3);
@@ -241,7 +241,7 @@ struct MultirotorPlant::Multibody {
         add_loads(rotors[i], turning[i], v_B + w_B.cross(rotors[i].p_BR), loads);
       return loads;
     }
-    // The autopilot turns the thrust and not the body: all rotors are at the centre of mass.
+    // The autopilot turns the thrust instead of the body: all rotors act at the centre of mass.
     const Vector3d axis_B = to_eigen(~R_WB * to_simtk(*output.direction_W));
     for (std::size_t i = 0; i < rotors.size(); ++i) {
       FlyingRotor turned = rotors[i];
@@ -253,7 +253,7 @@ struct MultirotorPlant::Multibody {
     return loads;
   }
 
-  /// How body and pendulum are turned where `at` is, whose positions are realized.
+  /// Orientations and angular velocities at `at`, whose positions must be realized.
   MultirotorDynamics::Rotations find_rotations(const Motion& at) const {
     const SimTK::Rotation &R_WB = body.getBodyRotation(state),
                           &R_WP = pendulum.getBodyRotation(state);
@@ -262,7 +262,7 @@ struct MultirotorPlant::Multibody {
     return {R_WB, w_WB_W, R_WP, w_WB_W + (is_ideal ? R_WP : R_WB) * beside};
   }
 
-  /// The same moment's accelerations under the rotors' loads.
+  /// Accelerations at `rotations` under the rotors' loads and the disturbances.
   MultirotorDynamics::Accelerations calc_accelerations(
       const MultirotorDynamics::Rotations& rotations, const RotorLoads& loads) const {
     const SimTK::Rotation& R_WB = rotations.R_WB;
@@ -271,12 +271,12 @@ struct MultirotorPlant::Multibody {
         R_WB * to_simtk(loads.torque_B) + to_simtk(keys.disturbance_torque));
   }
 
-  /// With the positions of `at` realized.
+  /// Rate of change of `at`, whose positions must be realized.
   Motion calc_rate(const Motion& at, const TurningRotors& turning) const {
     const MultirotorDynamics::Rotations rotations = find_rotations(at);
     const auto& [R_WB, w_WB_W, R_WP, w_WP_W] = rotations;
     const auto accelerations = calc_accelerations(rotations, calc_rotor_loads(at, turning));
-    // Eq. (13): the pendulum's speeds are those beside the body, of `ideal` in P, of `rigid` in B.
+    // Eq. (13): the pendulum's speeds are relative to the body; of `ideal` in P, of `rigid` in B.
     const SimTK::Vec3 beside_W = accelerations.b_WP_W - accelerations.b_WB_W;
     SimTK::Vec3 beside =
         is_ideal ? ~R_WP * (beside_W + w_WP_W % w_WB_W) : ~R_WB * (beside_W - w_WB_W % w_WP_W);
@@ -295,7 +295,7 @@ struct MultirotorPlant::Multibody {
     return rate;
   }
 
-  /// One step of the classical Runge-Kutta method of fourth order; the rotors are exact.
+  /// One step of the classical Runge-Kutta method of fourth order; the rotor speeds are exact.
   void fly_step(std::int64_t step) {
     const double h = step_s;
     for (std::size_t i = 0; i < rotors.size(); ++i) {
@@ -379,7 +379,7 @@ struct MultirotorPlant::Multibody {
   const double step_s;
   std::vector<RotorLag> lags;  ///< of the rotors
   const bool is_ideal;
-  const Eigen::Quaterniond attitude_error;  ///< what the estimator says is it times the truth
+  const Eigen::Quaterniond attitude_error;  ///< estimated attitude = this × true one
   std::int64_t steps = 0;
 
   SimTK::MultibodySystem system;
@@ -387,20 +387,20 @@ struct MultirotorPlant::Multibody {
   SimTK::MobilizedBody::Free body;
   SimTK::MobilizedBody pendulum;
   SimTK::State state;  ///< stays at Stage::Instance, with the positions of `motion` realized
-  int speeds = 0;      ///< how many the tree has
+  int speeds = 0;      ///< number of speeds of the tree
   double pendulum_mass = 0.0;
 
   std::optional<MultirotorDynamics> dynamics;
 
   std::unique_ptr<Autopilot> autopilot;
-  std::int64_t autopilot_steps = 1;  ///< of the plant, in a period
-  AutopilotOutput output;            ///< in force; its direction is in the plant's W
+  std::int64_t autopilot_steps = 1;  ///< plant steps per period
+  AutopilotOutput output;            ///< the last one; its direction is in the plant's W
   VectorXd set_points;               ///< of the rotors, within their limits, rad/s
   VectorXd rotor_speeds;             ///< rad/s
   Motion motion;
   SaturationWatch watch;
 
-  // Kept from step to step to spare their allocation.
+  // Members, to avoid an allocation in every step.
   TurningRotors starting, middle, ending;  // at the stages of a step
 
   model::Measurement held;

@@ -13,8 +13,8 @@ namespace sls::sim {
 
 class MultirotorPlant : public Plant {
  public:
-  /// One vehicle, `setup.vehicles[0]`, at its initial state, its rotors as fast as hovering needs.
-  /// @throws config::ConfigError if the autopilot refuses.
+  /// One vehicle, `setup.vehicles[0]`, at its initial state with its rotors at hover speed.
+  /// @throws config::ConfigError if the autopilot refuses the setup.
   explicit MultirotorPlant(const PlantSetup& setup);
   ~MultirotorPlant() override;
   MultirotorPlant(const MultirotorPlant&) = delete;

@@ -11,24 +11,24 @@
 
 namespace sls::sim {
 
-/// How fast a rotor turns, and the square that makes its thrust.
+/// Speed of a rotor, and the square of the speed from which its thrust is computed.
 struct RotorSpeed {
   double speed;   ///< rad/s
   double square;  ///< rad²/s²
 };
 
-/// A rotor that follows its set-point with a lag of first order, exactly, over steps of one length.
+/// First-order lag of a rotor behind its set-point, exact over steps of constant length.
 class RotorLag {
  public:
   RotorLag(const FlyingRotor& rotor, double step_s)
       : up_(rotor.lag_up, step_s), down_(rotor.lag_down, step_s) {}
 
-  /// The speed from now on, where the set-point has become `set_point`: without a lag it jumps.
+  /// The speed just after the set-point has changed to `set_point`: without a lag it jumps.
   double begin(double speed, double set_point) const {
     return choose(speed, set_point).lag > 0.0 ? speed : set_point;
   }
-  /// How it turns at the stages of a step, with the squares that give the step of Runge and Kutta
-  /// the exact impulse of the thrust and the exact way it makes: README.md, eqs. (14) and (15).
+  /// Speeds at the stages of a Runge-Kutta step. With these squares the impulse of the thrust and
+  /// the distance it causes are exact: README.md, eqs. (14) and (15).
   struct Stages {
     RotorSpeed start, middle, end;
   };
@@ -45,19 +45,20 @@ class RotorLag {
   }
 
  private:
-  /// Of e^(−a x) over x from 0 to 1: its mean, and the mean of (1 − x) times it.
+  /// Means over x from 0 to 1: `mean` of e^(−a x), `early` of (1 − x) e^(−a x).
   struct Means {
     Means() = default;
     explicit Means(double a) {
       mean = -std::expm1(-a) / a;
-      // The closed form loses its digits where a is small.
+      // The closed form loses digits for small a: use the series.
       constexpr double kSmall = 1e-2;
       early = a > kSmall ? (1.0 - mean) / a
                          : 1.0 / 2 - a * (1.0 / 6 - a * (1.0 / 24 - a * (1.0 / 120 - a / 720)));
     }
     double mean = 0.0, early = 0.0;
   };
-  /// Of a deviation that decays with `lag` from 1: what is left.
+  /// A deviation that decays from 1 with the time constant `lag`: its values after a step (`kept`)
+  /// and half a step (`kept_half`).
   struct Way {
     Way(double lag_s, double step_s) : lag(lag_s) {
       if (lag == 0.0) return;
@@ -77,7 +78,7 @@ class RotorLag {
   Way up_, down_;
 };
 
-/// Thrust of a rotor where the air passes with `axial_speed` along its axis, m/s, either way.
+/// Thrust of a rotor (N). The air passes along its axis with `axial_speed` (m/s, either sign).
 inline double calc_thrust(const FlyingRotor& rotor, const RotorSpeed& turning, double axial_speed) {
   const double thrust = rotor.thrust_constant * turning.square;
   if (rotor.thrust_loss_speed == 0.0) return thrust;
@@ -91,7 +92,7 @@ struct RotorLoads {
   double thrust = 0.0;                                 ///< of all rotors, each along its axis, N
 };
 
-/// Adds those of one rotor. `v_WR_B` is the velocity of its hub through the air, in B, m/s.
+/// Adds the loads of one rotor. `v_WR_B` is the velocity of its hub through the air, in B, m/s.
 inline void add_loads(const FlyingRotor& rotor, const RotorSpeed& turning,
                       const Eigen::Vector3d& v_WR_B, RotorLoads& loads) {
   const double axial_speed = v_WR_B.dot(rotor.axis_B);

@@ -1,4 +1,4 @@
-/// Lines for people about rotors that are asked for more than they can.
+/// Remarks on rotors with a set-point at or above their largest speed.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,13 +13,13 @@
 
 namespace sls::sim {
 
-/// Says when a rotor has been asked for all it can for more than a second.
+/// Makes a remark when the set-point of a rotor is at or above its largest speed for over 1 s.
 class SaturationWatch {
  public:
   SaturationWatch(std::size_t rotors, std::int64_t step_ns)
       : since_(rotors, -1), patient_steps_(kPatience_ns / step_ns) {}
 
-  /// After the set-points of `step` are known.
+  /// Call once the set-points of `step` are known.
   void look(const std::vector<FlyingRotor>& rotors, const Eigen::VectorXd& set_points,
             std::int64_t step, double step_s) {
     for (std::size_t i = 0; i < rotors.size(); ++i) {
@@ -45,7 +45,7 @@ class SaturationWatch {
   static constexpr std::int64_t kPatience_ns = 1'000'000'000;
   static constexpr int kMostRemarks = 20;  // in a flight
 
-  std::vector<std::int64_t> since_;  // of each rotor: step, or −1
+  std::vector<std::int64_t> since_;  // first saturated step of each rotor, or −1
   const std::int64_t patient_steps_;
   int remarks_said_ = 0;
   std::vector<std::string> remarks_;

@@ -12,22 +12,22 @@ namespace sls::sim {
 template <class Sample>
 class DelayLine {
  public:
-  /// Sends `sample` at `step`, later than all before.
+  /// Sends `sample` at `step`, which must be larger than those before.
   void put(std::int64_t step, Sample sample) { sent_.push_back({step, std::move(sample)}); }
 
-  /// The last sample sent at or before `step`; the first of all, where all came later. Forgets the
-  /// ones before it, so `step` never falls from call to call.
+  /// The last sample sent at or before `step`, or the first one if all were sent later. Removes the
+  /// samples before it, so `step` must not decrease from call to call.
   const Sample& take(std::int64_t step) {
     while (sent_.size() > 1 && sent_[1].step <= step) sent_.pop_front();
     return sent_.front().sample;
   }
 
-  /// When the sample after the one taken last was sent; nothing if none was.
+  /// The step at which the sample after the last taken one was sent; nothing if there is none.
   std::optional<std::int64_t> find_next() const {
     return sent_.size() > 1 ? std::optional(sent_[1].step) : std::nullopt;
   }
 
-  /// How many are kept.
+  /// Number of samples kept.
   std::size_t size() const { return sent_.size(); }
 
  private:

@@ -8,7 +8,7 @@ std::int64_t divide_up(std::int64_t number, std::int64_t by) { return (number + 
 }  // namespace
 
 std::int64_t SampleClock::find_seen(std::int64_t step) const {
-  const std::int64_t arrived_ns = step * step_ns_ - times_.age_ns;  // what was taken by then
+  const std::int64_t arrived_ns = step * step_ns_ - times_.age_ns;  // samples up to it have arrived
   if (arrived_ns < 0) return 0;
   if (times_.period_ns == 0) return arrived_ns / step_ns_;
   const std::int64_t sample = arrived_ns / times_.period_ns;  // Eq. (1)

@@ -84,7 +84,7 @@ class SensedPlant : public Plant {
     for (std::size_t i = 0; i < seen_.size(); ++i) {
       model::Measurement seen = body_.show(*plant_, i, step_);
       const RodSample rod = rod_.show(*plant_, i, step_);
-      if (!is_one_time) {  // else every bit is that of the state
+      if (!is_one_time) {  // if it is, `seen` stays that state bit for bit
         seen.rod = rod.rod;
         seen.p_WL = seen.p_WQ + rod.p_QL_W;
         seen.v_WL = seen.v_WQ + rod.v_QL_W;

@@ -1,4 +1,5 @@
-/// A plant with sensors and an estimator around it, and a delay before it. Semantics: README.md.
+/// A plant with sensors and an estimator at its output and a delay at its input. Semantics:
+/// README.md.
 #pragma once
 
 #include <memory>
@@ -7,8 +8,8 @@
 
 namespace sls::sim {
 
-/// `plant`, which was made from `setup`, with the `sensing` and `estimator` of `scenario`; itself
-/// where these change nothing.
+/// Adds the `sensing` and `estimator` of `scenario` to `plant`, which was made from `setup`.
+/// Returns `plant` itself if they change nothing.
 std::unique_ptr<Plant> make_sensed(std::unique_ptr<Plant> plant, const PlantSetup& setup,
                                    const config::Scenario& scenario);
 

@@ -11,7 +11,7 @@
 
 namespace sls::sim {
 
-/// A group of sensors: its samples of every vehicle that can still be seen.
+/// A group of sensors, with the samples of every vehicle that it can still show.
 template <class Sample>
 class SensorGroup {
  public:
@@ -20,33 +20,33 @@ class SensorGroup {
     if (next_step_ != SampleClock::kNever) put(plant, 0);
   }
 
-  /// When it samples next.
+  /// The step of the next sample.
   std::int64_t next_step() const { return next_step_; }
 
-  /// Takes the samples of `step`, to which the plant has come, where they are due.
+  /// Samples the plant, which is at `step`, if a sample is due.
   void sample(const Plant& plant, std::int64_t step) {
     if (step != next_step_) return;
     put(plant, step);
     next_step_ = clock_.find_next_sample(step);
   }
 
-  /// Of which step it shows the state at `step`.
+  /// The step whose state it shows at `step`.
   std::int64_t find_seen(std::int64_t step) const { return clock_.find_seen(step); }
 
-  /// Its output for a vehicle at `step`, to which the plant has come.
+  /// The output for a vehicle at `step`, where the plant is.
   Sample show(const Plant& plant, std::size_t vehicle, std::int64_t step) {
     return next_step_ == SampleClock::kNever ? Sample(plant.measurement(vehicle))
                                              : lines_[vehicle].take(clock_.find_seen(step));
   }
 
-  /// How many samples of a vehicle are kept.
+  /// Number of samples kept per vehicle.
   std::size_t kept() const { return lines_.front().size(); }
 
  private:
   void put(const Plant& plant, std::int64_t step) {
     for (std::size_t i = 0; i < lines_.size(); ++i) {
       lines_[i].put(step, Sample(plant.measurement(i)));
-      lines_[i].take(clock_.find_seen(step));  // forgets what nobody can see any more
+      lines_[i].take(clock_.find_seen(step));  // removes samples that are not shown any more
     }
   }
 

@@ -1,4 +1,4 @@
-// A plant from a shared library of the user's own: sls_plant.h.
+// A plant from a shared library of the user: sls_plant.h.
 #include <cmath>
 #include <memory>
 #include <stdexcept>

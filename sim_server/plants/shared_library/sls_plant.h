@@ -5,9 +5,9 @@
  *     plant: { model: ./my_plant.so, parameters: { drag: 0.1 }, step_s: 0.001, initial: { … } }
  *
  * Frame: x forward, y right, z down. SI units, radians. Paths are relative to the scenario file.
- * There is one plant per vehicle; different ones are called on different threads, each by one call at a
- * time. A flight must be a function of the setup and the sequence of forces alone, whatever the calls
- * of `advance` a sequence of steps is split into. Do not change the floating-point mode: link
+ * There is one plant per vehicle. Calls of different plants come on different threads; calls of one
+ * plant never overlap. A flight must depend only on the setup and the sequence of forces, not on
+ * how the steps are split into calls of `advance`. Do not change the floating-point mode: link
  * without -ffast-math. */
 #ifndef SLS_PLANT_H
 #define SLS_PLANT_H
@@ -22,7 +22,7 @@ extern "C" {
 #define SLS_PLANT_VERSION 1
 #define SLS_PLANT_MAX_SIGNALS 64
 
-/* Where the vehicle is and what it publishes. Vectors are in the world frame unless said otherwise. */
+/* State and signals of a vehicle. Vectors are in the world frame unless said otherwise. */
 typedef struct {
   size_t size; /* of this struct */
   double quad_position_m[3], quad_velocity_m_s[3];
@@ -47,19 +47,19 @@ typedef struct {
   uint32_t version; /* SLS_PLANT_VERSION */
   size_t setup_size, state_size; /* sizeof of the structs above, as you compiled them */
 
-  uint32_t signal_count; /* numbers of its own that the plant publishes */
+  uint32_t signal_count; /* signals that the plant publishes */
   const char* const* signal_names; /* columns of state.csv: lower-case letters, digits and '_' */
   const char* const* signal_units;
 
-  /* Makes a plant. NULL with a text in `error`, which has room for `error_size` bytes, where it
-   * refuses: say which parameter, expected and got. */
+  /* Returns a new plant. If it refuses the setup, it returns NULL and writes a text of at most
+   * `error_size` bytes to `error`: the parameter, the expected value, the value it got. */
   void* (*create)(const sls_plant_setup* setup, char* error, size_t error_size);
   void (*destroy)(void* plant);
-  /* Advances `steps` steps with the control force on the quadrotor held. 0, or 1 with a text in
-   * `error`, which ends the run. */
+  /* Advances `steps` steps with the control force on the quadrotor held. Returns 0, or 1 with a
+   * text in `error`: then the run ends. */
   int (*advance)(void* plant, const double force_n[3], int64_t steps, char* error,
                  size_t error_size);
-  /* Fills `state` with what the plant does now. */
+  /* Writes the current state of the plant to `state`. */
   void (*measure)(void* plant, sls_plant_state* state);
 } sls_plant_functions;
 

@@ -7,7 +7,7 @@ namespace sls::sim {
 namespace {
 
 class Keys : public config::OwnKeys<config::Plant, SlungLoadKeys> {
-  /// The rigid pendulum's links bring their own masses and length.
+  /// With `rigid` a vehicle must have the masses and length of the published links.
   void check(const config::Scenario& scenario, const config::Places& places) const override {
     if (scenario.plant.own.get<SlungLoadKeys>().pendulum != Pendulum::kRigid) return;
     const auto check_one = [&](const std::string& place, const model::SlungLoadParameters& flown) {

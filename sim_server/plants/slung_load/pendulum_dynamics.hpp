@@ -1,13 +1,14 @@
 /// Accelerations of a quadrotor, a point mass, and its pendulum from Simbody's mass properties and
-/// position kinematics. Source: README.md, eqs. (2) and (3); "Integration" says why by hand.
+/// position kinematics. Source: README.md, eqs. (2) and (3). "Integration" explains why
+/// not by Simbody.
 #pragma once
 
 #include <Simbody.h>
 
 namespace sls::sim {
 
-/// Frame L is the pendulum's: its origin is the joint, at the quadrotor, its z axis the rod; the
-/// axes are principal axes of inertia. C is the centre of mass of both bodies.
+/// Frame L is the pendulum's frame: its origin is the joint at the quadrotor, its z axis is the
+/// rod, and its axes are the principal axes of inertia. C is the centre of mass of both bodies.
 class PendulumDynamics {
  public:
   PendulumDynamics(const SimTK::MassProperties& quadrotor, const SimTK::MassProperties& pendulum,
@@ -15,11 +16,11 @@ class PendulumDynamics {
       : gravity_W_(0, 0, gravity), mass_(quadrotor.getMass() + pendulum.getMass()) {
     const SimTK::Vec3& centre = pendulum.getMassCenter();
     p_QC_L_ = pendulum.getMass() / mass_ * centre;
-    // The pendulum about its own centre, and both centres, which are `centre` apart.
+    // Inertia of the pendulum about its own centre, plus that of both masses, `centre` apart.
     const double reduced_mass = quadrotor.getMass() * pendulum.getMass() / mass_;
     inertia_C_ = (pendulum.calcCentralInertia() + SimTK::Inertia::pointMassAt(centre, reduced_mass))
                      .getMoments();
-    // A point load has no inertia about the rod, and its joint no speed there: ω̇ is zero.
+    // A point load has no inertia about the rod, and its joint has no such speed: ω̇_z = 0.
     for (int i = 0; i < 3; ++i)
       inverse_inertia_C_[i] = inertia_C_[i] > 0.0 ? 1.0 / inertia_C_[i] : 0.0;
   }
@@ -29,8 +30,8 @@ class PendulumDynamics {
     SimTK::Vec3 b_L;   ///< angular, of the pendulum in W, axes of L, rad/s²
   };
 
-  /// Under the force `force_W` on the quadrotor (N), gravity apart. `w_L` is the pendulum's angular
-  /// velocity in W, axes of L, rad/s.
+  /// Accelerations under gravity and the force `force_W` on the quadrotor (N). `w_L` is the
+  /// pendulum's angular velocity in W, axes of L, rad/s.
   Accelerations calc_accelerations(const SimTK::Rotation& R_WL, const SimTK::Vec3& w_L,
                                    const SimTK::Vec3& force_W) const {
     const SimTK::Vec3 torque_L =

@@ -1,4 +1,4 @@
-/// The published links that the `rigid` pendulum is made of, and what they allow in `vehicle`.
+/// The published links of the `rigid` pendulum, and the values that they require in `vehicle`.
 #pragma once
 
 #include <Eigen/Core>
@@ -29,7 +29,7 @@ struct RigidContradiction {
   std::string message;
 };
 
-/// The links bring their own masses and length, so `vehicle` must say the same: quad_mass_kg 1.5,
+/// The links have fixed masses and a fixed length, so `vehicle` must have quad_mass_kg 1.5,
 /// load_mass_kg 0.2 (the load) or 0.201 (load and rod), rod_length_m 1.1. Gravity is free.
 std::optional<RigidContradiction> find_rigid_contradiction(
     const model::SlungLoadParameters& vehicle);

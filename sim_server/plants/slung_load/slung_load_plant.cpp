@@ -47,7 +47,7 @@ SimTK::MassProperties weld(const SimTK::MassProperties& a, const SimTK::MassProp
   return {mass, p_JC, a.calcInertia() + b.calcInertia()};
 }
 
-/// Masses and length that fly: the vehicle's, or the links' for `rigid`.
+/// Masses and length of the plant: the vehicle's, or for `rigid` those of the links.
 model::SlungLoadParameters calc_flown_vehicle(const model::SlungLoadParameters& vehicle,
                                               Pendulum pendulum) {
   if (pendulum == Pendulum::kIdeal) return vehicle;
@@ -87,8 +87,8 @@ void check_finite(const Motion& motion, std::int64_t step) {
 
 }  // namespace
 
-/// The multibody system at one motion. README.md, "Integration", says what is left to Simbody and
-/// why. L is the pendulum's frame.
+/// The multibody system at one motion. README.md, "Integration", lists Simbody's part and gives
+/// the reason. L is the pendulum's frame.
 struct SlungLoadPlant::Multibody {
   Multibody(const model::SlungLoadParameters& vehicle, const config::Plant& plant)
       : config(plant),
@@ -117,7 +117,7 @@ struct SlungLoadPlant::Multibody {
     const Eigen::Vector3d p_WQ = initial.placed == config::Body::kQuadrotor
                                      ? initial.position
                                      : initial.position - rod_length * rod.n_W;
-    // Its z axis is the rod: common/model/README.md, eq. (1).
+    // The z axis of L is the rod: common/model/README.md, eq. (1).
     const SimTK::Rotation R_WL(SimTK::BodyRotationSequence, initial.rod.alpha, SimTK::XAxis,
                                initial.rod.beta, SimTK::YAxis);
     quadrotor.setQToFitTranslation(state, to_simtk(p_WQ));
@@ -147,7 +147,7 @@ struct SlungLoadPlant::Multibody {
     matter.realizeVelocityKinematics(state);
   }
 
-  /// README.md, eqs. (1) to (4), with the positions of `at` realized.
+  /// README.md, eqs. (1) to (4). The positions of `at` must be realized.
   Motion calc_rate(const Motion& at, const Eigen::Vector3d& f_Q_W) const {
     const SimTK::Rotation& R_WL = pendulum.getBodyRotation(state);
     const SimTK::Vec3 w_L = has_speeds_in_L ? at.rod_speeds : ~R_WL * at.rod_speeds;
@@ -162,8 +162,8 @@ struct SlungLoadPlant::Multibody {
             has_speeds_in_L ? b_L : R_WL * b_L};
   }
 
-  /// Classical Runge-Kutta step of fourth order from `start`, whose positions are realized, to a
-  /// motion whose positions are.
+  /// Classical Runge-Kutta step of fourth order from `start`, whose positions must be realized. On
+  /// return the positions of the result are realized.
   Motion calc_next(const Motion& start, const Eigen::Vector3d& f_Q_W, std::int64_t step) {
     const double h = step_s;
     const auto calc_rate_at = [&](const Motion& there) {
@@ -182,7 +182,7 @@ struct SlungLoadPlant::Multibody {
     return next;
   }
 
-  /// Steps of which one throws leave everything as it was.
+  /// If one of the steps throws, nothing changes.
   void advance(const Eigen::Vector3d& f_Q_W, std::int64_t count) {
     check_finite(f_Q_W, steps, "force_x_n", "force_y_n", "force_z_n");
     try {
@@ -222,7 +222,7 @@ struct SlungLoadPlant::Multibody {
   const PendulumDynamics dynamics;
   const SimTK::Vec3 p_QL_L;  ///< m
 
-  model::Measurement held;  ///< what `state` says
+  model::Measurement held;  ///< measurement of `state`
 };
 
 SlungLoadPlant::SlungLoadPlant(const model::SlungLoadParameters& vehicle,

@@ -9,8 +9,8 @@
 
 namespace sls::sim {
 
-/// Masses and length the plant really flies with: the vehicle's for `ideal`, the published links'
-/// for `rigid`.
+/// Its masses and length are those of the vehicle for `ideal`, and those of the published links for
+/// `rigid`.
 class SlungLoadPlant : public Plant {
  public:
   /// Builds the multibody system at its initial state.
