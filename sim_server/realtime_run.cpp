@@ -14,13 +14,13 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// Steps whose states may be between loop and writing thread: a second at 1 kHz.
+/// Capacity of the queue to the writer thread, in samples: a second at 1 kHz and one per step.
 constexpr std::size_t kQueuedSteps = 1024;
 
-/// Periods in a row that a client may let go by before another one's answer is taken.
+/// Periods in a row without an answer after which the next client's answer is used.
 constexpr int kMissesBeforeTakeOver = 3;
 
-constexpr auto kPollTime = 20ms;  // while nothing is in a hurry
+constexpr auto kPollTime = 20ms;  // interval of the waiting loops
 
 std::chrono::duration<double, std::nano> calc_wall_period(const config::Sync& sync) {
   return std::chrono::duration<double, std::nano>(static_cast<double>(sync.period_ns) /
@@ -47,7 +47,7 @@ void RealtimeRun::begin() {
 void RealtimeRun::note_rest(Clock::duration rest) {
   Run::note_rest(rest);
   schedule_.pause(rest);
-  missed_deadlines_ = endpoints_.command_stream.missed_deadlines();  // nobody was asked
+  missed_deadlines_ = endpoints_.command_stream.missed_deadlines();  // no command was due
 }
 
 bool RealtimeRun::exchange() {
@@ -182,7 +182,7 @@ bool RealtimeRun::wait_for_recorders() {
     recorder_wait_.reset();
     return true;
   }
-  // The flight does not wait; `stop` still ends it.
+  // In real time a flight does not wait for recorders; only the policy `stop` ends it.
   if (!recorder_wait_) recorder_wait_.emplace(patience.deadline_s);
   if (patience.policy == config::RecorderPolicy::kStop && recorder_wait_->is_over())
     throw app::RunError(

@@ -10,9 +10,10 @@
 namespace sls::sim {
 
 /// The server advances on the monotonic clock. A period is flown with the answer to the state at
-/// its beginning if that came before its end, else with the newest valid answer (zero-order hold),
-/// after `max_hold_s` with the fail-safe force. A run none of whose answers was late is the same,
-/// bit for bit, as in lockstep. Nothing here waits for a reader: states go through a queue.
+/// its beginning if the answer came before its end. Otherwise the newest valid answer is held
+/// (zero-order hold); after `max_hold_s` the fail-safe force acts. A run without late answers is
+/// the same, bit for bit, as in lockstep. States go through a queue, so the loop waits for no
+/// reader.
 class RealtimeRun : public Run {
  public:
   RealtimeRun(Endpoints& endpoints, const Assignment& assignment, WorkerPool& workers,
@@ -25,13 +26,13 @@ class RealtimeRun : public Run {
   void roster_changed() override { check_clocks(); }
   void note_rest(Clock::duration rest) override;
 
-  // Periods may be long: these attend to operator, signals and status meanwhile, and return false
-  // if the operator ended the run.
+  // Periods may be long. While these functions wait, they handle operator, signals and status. They
+  // return false if the operator ended the run.
   bool wait_until_due();
-  /// Takes commands until `deadline`, or until every vehicle has its answer: the period can then be
-  /// flown ahead of its end, and the next state is ready when it is due.
+  /// Takes commands until `deadline`, or until every vehicle has its answer. The period can then be
+  /// integrated before its end, so the next state is ready when it is due.
   bool take_commands(Clock::time_point deadline);
-  /// The answers to the last step, which are waited for: earlier ones said it is the last.
+  /// Waits for the answers to the last step, after late answers have ended the mission.
   bool wait_for_last_answers();
 
   void publish();
@@ -40,14 +41,14 @@ class RealtimeRun : public Run {
   bool is_ending() const;
   void fly_without_answers();
   void count_missed_deadlines();
-  /// Reports a client whose clock differs so much that its commands would expire wrongly or never;
-  /// from then on they are judged by their step alone.
+  /// Reports a client whose clock differs so much that its commands would expire wrongly or never.
+  /// From then on LIFESPAN is ignored: commands expire by their step alone.
   void check_clocks();
 
   StateStream::Queue state_queue_;
   Schedule schedule_;
-  Clock::time_point published_;         // when the state in work was
-  std::uint64_t missed_deadlines_ = 0;  // of the middleware, up to the last look
+  Clock::time_point published_;         // when the state in work was published
+  std::uint64_t missed_deadlines_ = 0;  // count of the middleware at the last check
   bool is_lifespan_ignored_ = false;
   std::optional<app::Wait> recorder_wait_;
 };

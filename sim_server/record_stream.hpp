@@ -1,5 +1,5 @@
-/// The steps of a run on their way to recorders: collected in the loop, made into batches of
-/// sls/record and written by a thread of its own.
+/// Sends the steps of a run to the recorders. The loop collects them; a separate thread writes them
+/// as batches of sls/record.
 #pragma once
 
 #include <atomic>
@@ -17,18 +17,18 @@ namespace sls::sim {
 
 class RecordStream {
  public:
-  /// Steps, and time, after which what was collected is written.
+  /// Number of steps, and time, after which the collected entries are written.
   static constexpr std::size_t kMostSteps = 64;
   static constexpr auto kLongestWait = std::chrono::milliseconds(20);
 
-  /// Of run `run_id`, in batches of at most `max_bytes`, unless one entry is larger.
+  /// Batches of run `run_id` have at most `max_bytes`, unless one entry is larger.
   RecordStream(bus::Writer<RecordBatch>& writer, std::size_t max_bytes, std::uint64_t run_id);
   ~RecordStream() { end(); }
   RecordStream(const RecordStream&) = delete;
   RecordStream& operator=(const RecordStream&) = delete;
 
-  /// Collects `count` entries of one step: `fill(i, entry)` fills the ith, which may hold an
-  /// earlier one. Blocks only while the thread swaps two pointers.
+  /// Collects `count` entries of one step: `fill(i, entry)` fills the ith, which may have
+  /// older content. Blocks only while the thread swaps two pointers.
   template <class Fill>
   void add_step(std::size_t count, const Fill& fill) {
     bool is_due = false;
@@ -49,16 +49,17 @@ class RecordStream {
     if (is_due) wake_.notify_one();
   }
 
-  /// Has all that was collected written now: the run rests.
+  /// Makes the thread write all collected entries now: for a run at rest.
   void flush();
-  /// Writes what there is, and the last batch of the run; nothing is collected any more.
+  /// Writes the remaining entries and the last batch of the run. Later entries are lost.
   void end();
 
-  /// True while the thread is so far behind that a loop that may wait should.
+  /// True while the thread is far behind: more than half of the room is used. The lockstep loop
+  /// then waits.
   bool is_full() const { return is_full_; }
   /// Entries that were lost because there was no room, or the middleware refused them.
   std::uint64_t lost() const { return lost_; }
-  /// Steps of which the writer keeps the batches for late recorders, at least.
+  /// Least number of steps whose batches the writer keeps for late recorders.
   std::uint64_t history_steps() const;
 
  private:
@@ -67,7 +68,7 @@ class RecordStream {
 
   struct Collected {
     std::vector<RecordEntry>
-        entries;  // the first `count` of them; the others' memory is used again
+        entries;  // only the first `count` are valid; the others keep their memory for reuse
     std::size_t count = 0;
     std::size_t steps = 0;
   };
@@ -87,7 +88,7 @@ class RecordStream {
   std::atomic<bool> is_full_{false};
   std::atomic<std::uint64_t> lost_{0};
   std::atomic<std::size_t> step_bytes_{0};  // of the largest step so far
-  RecordBatch batch_;                       // the thread's own
+  RecordBatch batch_;                       // used by the thread alone
   std::uint64_t next_batch_ = 0;            // likewise
   std::uint64_t step_ = 0;                  // likewise: of the last entry
   std::size_t bytes_of_step_ = 0;           // likewise

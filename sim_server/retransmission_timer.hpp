@@ -4,21 +4,22 @@
 
 namespace sls::sim {
 
-/// When to send a state again because no answer came: four times the smoothed round trip, doubling
-/// with every resend up to 100 ms. Karn's rules: only unambiguous round trips count, of a step that
-/// was sent once; and until there is one the doubled time stays in force for the steps that follow,
-/// or a link that has become slower than the timeout would never be measured again.
+/// Time after which a state is sent again because no answer came: four times the smoothed round
+/// trip, doubled with every resend up to 100 ms. Karn's rules: only unambiguous round trips count,
+/// those of a step that was sent once. Until there is one, the doubled time stays in force for the
+/// next steps; otherwise a link that has become slower than the timeout would never be measured
+/// again.
 ///
-/// On a link that loses much, the second rule alone would double without end: at 20 % each way more
-/// than a third of the steps are ambiguous. So an answer that comes early after the last resend,
-/// within the undoubled timeout or a quarter of the doubled one, is treated as that resend's, and
-/// ends the doubling; for a few steps in a row at most, because on a slower link it may be a
-/// coincidence that repeats itself.
+/// On a lossy link the second rule alone would double without end: at 20 % loss each way more than
+/// a third of the steps are ambiguous. Therefore an answer soon after the last resend, within the
+/// undoubled timeout or a quarter of the doubled one, counts as the answer to that resend and ends
+/// the doubling. This happens for at most kMostGuesses steps in a row, because on a slower link it
+/// may be a coincidence that repeats itself.
 class RetransmissionTimer {
  public:
   using Duration = std::chrono::nanoseconds;
 
-  /// A resend sooner than this would mostly repeat what a busy machine is about to answer.
+  /// A shorter timeout would mostly resend states that a busy machine is about to answer.
   static constexpr Duration kShortest = std::chrono::milliseconds(1);
   static constexpr Duration kLongest = std::chrono::milliseconds(100);
   /// Before the first round trip is known.

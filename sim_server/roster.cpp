@@ -24,8 +24,8 @@ std::string name_missing_role(const char* role, int expected, int ready,
   return details.empty() ? text : text + " [" + details + "]";
 }
 
-/// Those that were ready when the flight began and, in the place of such as are gone, the furthest
-/// of the others.
+/// The recorders that were ready when the flight began. The most advanced of the others replace
+/// those that are gone.
 std::vector<const Entry*> find_recorders_to_wait_for(const Roster& roster, int expected) {
   std::vector<const Entry*> found, late;
   for (const Entry& entry : roster.recorders) {
@@ -41,13 +41,13 @@ std::vector<const Entry*> find_recorders_to_wait_for(const Roster& roster, int e
   return found;
 }
 
-/// The first step of which the recorder does not have all, whatever number it announces.
+/// The first step that the recorder does not have completely; valid for any announced number.
 std::int64_t find_next_step(const Entry& recorder) {
   constexpr std::int64_t kLargest = std::numeric_limits<std::int64_t>::max();
   return std::clamp<std::int64_t>(recorder.announcement.last_complete_step(), -1, kLargest - 1) + 1;
 }
 
-/// The first step that must wait for a recorder that has all before `next`.
+/// The first step that must wait for a recorder that has all steps before `next`.
 std::int64_t find_limit(std::int64_t next, std::int64_t window) {
   return next + std::min(window, std::numeric_limits<std::int64_t>::max() - next);
 }

@@ -21,43 +21,42 @@ struct Roster {
   std::optional<std::chrono::steady_clock::time_point> began = std::nullopt;
 };
 
-/// Controllers that are ready to fly `vehicle_id` and use the run's scenario, as its command gate
-/// wants them.
+/// Controllers that are ready to fly `vehicle_id` and use the run's scenario, for its command gate.
 std::vector<ReadyClient> find_ready_clients(const Roster& roster,
                                             const std::string& scenario_sha256,
                                             std::uint32_t vehicle_id = 0);
 
-/// Whom the start still waits for, in words; empty when all expected are ready: as many controllers
-/// for each of the vehicles.
+/// Names the participants that the start still waits for; empty when all expected ones are ready.
+/// The expected number of controllers holds for each vehicle.
 std::string name_missing(const Roster& roster, const config::WaitFor& expected,
                          const std::string& scenario_sha256,
                          const std::vector<std::uint32_t>& vehicle_ids = {0});
 
-/// How far the slowest recorder may be behind the server, in steps, at most.
+/// Largest distance of the slowest recorder behind the server, in steps.
 inline constexpr std::int64_t kRecorderWindow = 2000;
 
-/// The same where the batches of `history_steps` steps are kept for late recorders: two fifths of
-/// them, so that nothing a recorder needs is overwritten.
+/// The same if the writer keeps the batches of `history_steps` steps for late recorders: two fifths
+/// of them, at most kRecorderWindow. No batch that a recorder still needs is then overwritten.
 std::int64_t calc_recorder_window(std::uint64_t history_steps);
 
-/// Which recorder keeps the server from publishing `step`, in words; empty when none does: fewer
-/// than `expected` are there and not silent, or one of these is `window` steps behind. One that
-/// was not ready when the flight began is waited for only in the place of one that was: a stranger
-/// must not stop the others.
+/// Names a recorder that prevents the server from publishing `step`; empty if there is none.
+/// Reasons: fewer than `expected` are present and not silent, or one of these is `window` steps
+/// behind. A recorder that was not ready when the flight began counts only as the replacement of an
+/// earlier one: an unexpected recorder must not stop the run.
 std::string name_blocking_recorder(const Roster& roster, int expected, std::uint64_t step,
                                    std::int64_t window = kRecorderWindow);
 
-/// The first step that some recorder keeps the server from publishing; 0 if fewer than
-/// `expected` are there.
+/// The first step that a recorder prevents the server from publishing; 0 if fewer than `expected`
+/// are present.
 std::uint64_t calc_recorder_limit(const Roster& roster, int expected,
                                   std::int64_t window = kRecorderWindow);
 
-/// Which ready recorder has announced nothing since `since` although it lags behind `step`, in
-/// words; empty when none has, or another one is there in the place of one presumed dead.
+/// Names a ready recorder that has announced nothing since `since` although it is behind `step`.
+/// Empty if there is none, or if another recorder has replaced one that is presumed dead.
 std::string name_silent_recorder(const Roster& roster, std::uint64_t step,
                                  std::chrono::steady_clock::time_point since);
 
-/// The host of the controller `peer`; "?" where it is not in the roster.
+/// The host of the controller `peer`; "?" if it is not in the roster.
 std::string find_host(const Roster& roster, const bus::PeerId& peer);
 
 }  // namespace sls::sim

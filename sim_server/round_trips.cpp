@@ -12,7 +12,7 @@ void RoundTrips::add(Duration round_trip) {
 
 RoundTrips::Duration RoundTrips::calc_percentile(int percent) const {
   if (count_ == 0) return Duration::zero();
-  auto sorted = values_;  // values_[0 … count_) are the ones held, in no useful order
+  auto sorted = values_;  // values_[0 … count_) are valid and unsorted
   const auto end = sorted.begin() + static_cast<std::ptrdiff_t>(count_);
   const auto share = static_cast<std::size_t>(std::clamp(percent, 1, 100));
   const std::size_t rank = (share * count_ + 99) / 100;  // from 1, rounded up

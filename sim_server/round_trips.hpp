@@ -6,8 +6,7 @@
 
 namespace sls::sim {
 
-/// The last 1,000 round trips. Adding costs nothing worth mentioning; a percentile looks at all of
-/// them.
+/// The last 1,000 round trips. `add` is cheap; a percentile reads all of them.
 class RoundTrips {
  public:
   using Duration = std::chrono::nanoseconds;
@@ -23,7 +22,7 @@ class RoundTrips {
  private:
   std::array<Duration, kCapacity> values_{};
   std::size_t count_ = 0;  // held, at most kCapacity
-  std::size_t next_ = 0;   // where the next one goes
+  std::size_t next_ = 0;   // index of the next one
 };
 
 }  // namespace sls::sim

@@ -18,13 +18,13 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto kUsualStartTime = 300ms;  // for discovery, after the claim: no news
-constexpr auto kRosterTime = 100ms;      // until a silent departure is looked for
-constexpr auto kPollTime = 20ms;         // while nothing is in a hurry
-constexpr auto kRecorderSilence = 1s;    // of one that should be announcing progress
-constexpr auto kReportInterval = 5s;     // of the same silence
-constexpr auto kLookInterval = 100ms;    // at least, between looks at what participants do
-constexpr auto kLongStart = 5s;          // from then on it may be the network
+constexpr auto kUsualStartTime = 300ms;  // of discovery after the claim: not reported
+constexpr auto kRosterTime = 100ms;      // between checks for silent departures
+constexpr auto kPollTime = 20ms;         // interval of the waiting loops
+constexpr auto kRecorderSilence = 1s;    // until a recorder that is behind is reported
+constexpr auto kReportInterval = 5s;     // between reports of the same silence
+constexpr auto kLookInterval = 100ms;    // least time between checks of participants
+constexpr auto kLongStart = 5s;          // after this the message names ./sls doctor
 
 }  // namespace
 
@@ -56,7 +56,7 @@ Run::Run(Endpoints& endpoints, const Assignment& assignment, WorkerPool& workers
 }
 
 Run::End Run::execute() {
-  endpoints_.commands.take_all();  // of an earlier run
+  endpoints_.commands.take_all();  // removes commands of an earlier run
   if (wait_for_participants() && fly()) {
     finish();
     return End::kFinished;
@@ -68,7 +68,7 @@ Run::End Run::execute() {
 
 void Run::fail(const std::string& reason) {
   close_requests(reason);
-  // Before the claim is settled nobody has joined, and there is nobody to tell.
+  // Before the claim is settled no participant has joined, so nothing is published.
   if (board_.has_published()) publish_end(PHASE_FAILED, reason);
 }
 
@@ -209,7 +209,7 @@ void Run::advance(PlantOfVehicles& group) {
   measure(group);
 }
 
-/// A vehicle whose mission is over flies on until the others' are, too.
+/// A vehicle whose mission is over flies on until all missions are over.
 bool Run::is_finished() const {
   return std::all_of(vehicles_.begin(), vehicles_.end(),
                      [](const auto& vehicle) { return vehicle->outcome()->is_finished; });

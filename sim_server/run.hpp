@@ -1,6 +1,6 @@
 /// One run of the server, from its run_id to its end: waits for the participants, flies the
-/// vehicles step by step, attends to operator and recorders. How a step gets its forces is what
-/// lockstep_run.hpp and realtime_run.hpp add.
+/// vehicles step by step, handles operator and recorders. The derived classes in lockstep_run.hpp
+/// and realtime_run.hpp decide how a step gets its forces.
 #pragma once
 
 #include <chrono>
@@ -25,7 +25,7 @@
 
 namespace sls::sim {
 
-/// The assignment of a server.
+/// The scenario and the vehicles of a server.
 struct Assignment {
   config::Scenario scenario;
   std::vector<std::uint32_t> vehicle_ids;  ///< of the scenario's, ascending; at least one
@@ -33,8 +33,8 @@ struct Assignment {
 
 class Run {
  public:
-  /// Announces run `run_id` of `assignment` in sls/parameters. It begins at rest if
-  /// `begins_paused`.
+  /// Announces run `run_id` of `assignment` in sls/parameters. The run begins paused
+  /// if `begins_paused`.
   Run(Endpoints& endpoints, const Assignment& assignment, WorkerPool& workers, std::uint64_t run_id,
       bool begins_paused);
   virtual ~Run() = default;
@@ -43,11 +43,11 @@ class Run {
 
   enum class End { kFinished, kReset };
 
-  /// Waits for the participants, then flies to the end and says so.
-  /// @throws std::exception saying why the run failed: then call `fail`.
+  /// Waits for the participants, flies to the end and publishes the end.
+  /// @throws std::exception with the reason if the run failed: then call `fail`.
   End execute();
 
-  /// Tells everybody that the run failed.
+  /// Publishes that the run failed.
   void fail(const std::string& reason);
 
   std::uint64_t run_id() const { return run_id_; }
@@ -55,7 +55,7 @@ class Run {
   bool is_known() const { return board_.has_published(); }
   bool is_paused() const { return control_.is_paused(); }
 
-  /// Recorders that are to have the whole run: those the scenario expects, unless given up.
+  /// Number of recorders that must get the whole run: as the scenario expects, or 0 once given up.
   int expected_recorders() const {
     return are_recorders_given_up_ ? 0 : scenario_.sync.wait_for.recorders;
   }
@@ -68,27 +68,27 @@ class Run {
  protected:
   using Clock = std::chrono::steady_clock;
 
-  /// Step 0 is about to be published.
+  /// Called before step 0 is published.
   virtual void begin() {}
   /// Publishes the states of the step in work, and decides the force of each vehicle; false
   /// if the operator ended the run.
   virtual bool exchange() = 0;
-  /// Whether the step in work may be published as far as the recorders are concerned; false if the
-  /// operator ended the run meanwhile.
+  /// Waits until the recorders allow the step in work to be published, if the mode waits for them;
+  /// false if the operator ended the run meanwhile.
   virtual bool wait_for_recorders() = 0;
-  /// The roster was looked at again.
+  /// Called after each update of the roster.
   virtual void roster_changed() {}
-  /// The run was at rest for so long: nobody was asked for anything.
+  /// Called when the run was at rest for `rest`, which counts neither as absence nor as delay.
   virtual void note_rest(Clock::duration rest);
 
   /// Publishes the states of the step in work.
   void publish_states();
 
   // For both ways of stepping (run_answers.cpp).
-  /// Judges the answers of one sample, and records those that are late; `is_early` where it came
+  /// Judges the answers of one sample, and records those that are late; `is_early`: it came
   /// before the states of its step were published.
   void judge(const Commands& sample, const bus::PeerId& sender, bool is_early = false);
-  /// A valid answer to a step that has gone by.
+  /// Called for a valid answer to an earlier step.
   virtual void note_late(VehicleFlight&, const OfferedAnswer&) {}
   VehicleFlight* find_vehicle(std::uint32_t id);
   /// True if every vehicle's answer to the step in work was accepted.
@@ -97,12 +97,12 @@ class Run {
   bool is_anybody_absent() const;
   /// @throws app::RunError if a client's answer was refused and no other client answers.
   void check_refusals();
-  /// Takes what was accepted, and says who takes over and who is back.
+  /// Takes the accepted answers. Announces take-overs and controllers that answer again.
   void take_answers();
-  /// Reports at intervals which participant is missing since when, also in sls/status. @throws
-  /// app::RunError to give the run up.
+  /// Reports absent controllers at intervals, also in sls/status.
+  /// @throws app::RunError if `action` is kGiveUp.
   void attend_to_absence(ControllerAbsence::Action action);
-  /// The controllers whose answers are awaited, in words.
+  /// Names the controllers whose answers are awaited.
   std::string name_awaited_controllers() const;
 
   /// Flies the period that begins with the step in work, and goes on to the next step.
@@ -111,13 +111,13 @@ class Run {
 
   /// Takes the operator's requests; true if one of them ended the run.
   bool attend_to_operator();
-  /// Takes them, and waits while the operator holds the run; false if a request ended it.
+  /// Takes the requests and waits while the operator holds the run; false if a request ended it.
   bool rest();
   void refresh_roster();
   bool is_roster_due() const;
-  /// Status, stop signal, claim: what needs a look a few times a second.
+  /// Publishes the status and checks signals, claim and participants; a few times a second.
   void do_housekeeping();
-  /// True if the participants should be looked at before the next status is due.
+  /// True if the participants should be checked before the next status is due.
   bool is_look_due() const;
   std::string describe_problem() const;
 
@@ -127,7 +127,7 @@ class Run {
   const std::uint64_t run_id_;
 
   std::vector<std::unique_ptr<VehicleFlight>> vehicles_;  // as vehicle_ids_
-  SyncCounters link_;                                     // what concerns no vehicle alone
+  SyncCounters link_;                                     // counts that belong to no single vehicle
   StatusBoard board_;
   RunControl control_;
   Roster roster_;
@@ -143,7 +143,7 @@ class Run {
   void measure(const PlantOfVehicles& group);
   /// Advances one plant over a period.
   void advance(PlantOfVehicles& group);
-  /// Hands the step in work to the recorders, where its states were published.
+  /// Sends the step in work to the recorders if its states were published.
   void record_step();
   void record_late(const VehicleFlight& vehicle, const OfferedAnswer& answer);
   void finish();
@@ -151,9 +151,9 @@ class Run {
   void publish_end(RunPhase phase, const std::string& reason);
   void close_requests(const std::string& reason);
   void report_silent_recorder();
-  /// Looks for what the participants do wrong.
+  /// Looks for mistakes of the participants.
   void look_for_problems();
-  /// Says what the plants have to say of their vehicles.
+  /// Announces the plants' remarks on their vehicles.
   void announce_remarks();
   SyncCounters sum_counters() const;
   std::string describe_refusals(const VehicleFlight& vehicle) const;
@@ -166,15 +166,15 @@ class Run {
   std::vector<PlantOfVehicles> plants_;
   const std::int64_t plant_steps_;  // per period
   bool is_step_published_ = false;
-  OfferedAnswer offered_;  // in work
+  OfferedAnswer offered_;  // reused for each answer
   std::uint64_t problems_version_ = 0;
-  std::uint64_t looked_at_version_ = 0;  // of the participants
+  std::uint64_t looked_at_version_ = 0;  // version of the participants
   Clock::time_point look_time_;
   std::uint64_t roster_version_ = 0;
   Clock::time_point roster_time_;
   std::optional<app::Wait> absence_wait_;
-  std::optional<Clock::time_point> announced_absence_;       // since when the one lasts that was
-  std::optional<ControllerAbsence::Action> absence_action_;  // announced last
+  std::optional<Clock::time_point> announced_absence_;       // start of the announced absence
+  std::optional<ControllerAbsence::Action> absence_action_;  // the last one that was announced
   std::optional<Clock::time_point> recorder_report_time_;
 };
 

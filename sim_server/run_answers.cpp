@@ -43,7 +43,7 @@ void Run::judge(const Commands& sample, const bus::PeerId& sender, bool is_early
   for (const ControlCommand& command : sample.vehicles()) {
     offered_.command = command;
     VehicleFlight* vehicle = find_vehicle(command.vehicle_id());
-    if (!vehicle) vehicle = vehicles_.front().get();  // whose gate refuses and counts it
+    if (!vehicle) vehicle = vehicles_.front().get();  // its gate refuses and counts the answer
     const Verdict verdict = vehicle->gate.offer(offered_, sender);
     if (verdict == Verdict::kLate) {
       record_late(*vehicle, offered_);
@@ -89,7 +89,7 @@ void Run::check_refusals() {
     vehicle->note_refused(!refusals.empty());
     if (refusals.empty()) continue;
     if (vehicle->gate.refusal()) throw app::RunError(refusals);
-    // The announcement of a client that died outlives it: only its silence says that it is gone.
+    // A client that died stays announced for a while: only its silence shows that it is gone.
     if (vehicle->calc_refused_s() >= patience_s) give_up(patience_s, refusals);
   }
 }
@@ -108,7 +108,7 @@ void Run::give_up(double waited_s, const std::string& refusals) const {
                                   name_awaited_controllers(), describe_problem()));
 }
 
-/// "; " and what a participant does wrong, to be appended to a message about who is missing.
+/// "; " and the mistake of a participant, for the end of a message about missing participants.
 std::string Run::describe_problem() const {
   return board_.problem.empty() ? "" : "; " + board_.problem;
 }
@@ -186,7 +186,7 @@ void Run::attend_to_absence(ControllerAbsence::Action action) {
         std::max(Clock::duration(0s), std::chrono::duration_cast<Clock::duration>(
                                           1s - std::chrono::duration<double>(absence_s))));
   const bool is_lockstep = scenario_.sync.mode == config::SyncMode::kLockstep;
-  // In real time a few held steps are no news: they are counted.
+  // In real time held steps are counted, not announced: a few of them are normal.
   const bool is_news = action != absence_action_ &&
                        (action == Action::kFailSafe || (action == Action::kHold && is_lockstep));
   const bool is_report_due = absence_wait_->is_report_due();

@@ -30,7 +30,7 @@ RunControl::RunControl(std::uint64_t run_id, const std::vector<std::uint32_t>& v
     : run_id_(run_id), vehicle_ids_(vehicle_ids), is_paused_(is_paused) {}
 
 std::optional<SimControlReply> RunControl::request(const SimControl& request, std::uint64_t step) {
-  // Neither of these concerns this run, so they leave no trace in it.
+  // Requests for another run or vehicle do not change this run.
   if (request.run_id() != run_id_)
     return make_reply(request.request_id(), step,
                       fmt::format("run: expected {:016x}, got {:016x}", run_id_, request.run_id()));
@@ -127,8 +127,8 @@ void RunControl::act(const SimControl& request) {
 
 bool RunControl::holds() const {
   if (end_reason_ || is_stop_requested_ || is_reset_requested_) return true;
-  // A pause during a step request lets one more of its steps happen: either it is under way, or
-  // there is none that could bring the reply.
+  // A pause during a step request takes effect after the step in work or, between steps, after the
+  // next one: the end of a step sends the reply.
   return is_paused_ && !stepping_;
 }
 

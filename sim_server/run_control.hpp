@@ -1,5 +1,6 @@
 /// Effect of an operator's requests on a run: pause, step, resume, reset, stop, with the semantics
-/// of the ROS simulation interfaces. The loop asks before every step. No network, no clock here.
+/// of the ROS simulation interfaces. The loop calls it before every step. No network, no clock
+/// here.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +13,7 @@
 
 namespace sls::sim {
 
-/// Which request is accepted when: README.md, "Operator control".
+/// Rules of acceptance: README.md, "Operator control".
 class RunControl {
  public:
   /// Controls run `run_id`, which begins unpaused unless `is_paused`.
@@ -20,19 +21,19 @@ class RunControl {
   RunControl(std::uint64_t run_id, const std::vector<std::uint32_t>& vehicle_ids, bool is_paused);
 
   /// Judges `request`, made while the loop is at `step` (published next, or awaiting its answer).
-  /// The reply, except where it comes later: that of an accepted step request, from `stepped` or
-  /// `end`. A repeated request (same operator, same request_id) is answered again and acts once.
+  /// Returns the reply. That of an accepted step request comes later, from `stepped` or `end`. A
+  /// repeated request (same operator, same request_id) is answered again and acts once.
   std::optional<SimControlReply> request(const SimControl& request, std::uint64_t step);
 
   /// True when the loop must not begin the next step.
   bool holds() const;
 
-  /// The run is at rest or about to be: what sls/status says. A run that carries out a step request
-  /// is a paused one: its successor after a reset begins paused, too.
+  /// True if the run is paused or about to pause, as in sls/status. A run that carries out a step
+  /// request counts as paused: its successor after a reset begins paused, too.
   bool is_paused() const { return is_paused_; }
 
-  /// A step was completed and the loop is now at `step`; the reply to a step request that this
-  /// fulfils, or that a pause ends here.
+  /// Call when a step was completed and the loop is now at `step`. Returns the reply to a step
+  /// request that is then complete, or that a pause ends here.
   std::optional<SimControlReply> stepped(std::uint64_t step);
 
   /// Replies to requests still open when the run ends at `step` (accepted: false, with `reason`).
@@ -42,10 +43,10 @@ class RunControl {
   bool is_reset_requested() const { return is_reset_requested_; }
   bool is_stop_requested() const { return is_stop_requested_; }
 
-  /// For events and reasons, who asked last for what: "paused by anna@host"; empty before.
+  /// The last accepted request, for events and reasons: "paused by anna@host"; empty before.
   const std::string& last_event() const { return last_event_; }
 
-  /// Events so far.
+  /// Number of accepted requests so far.
   std::uint64_t events() const { return events_; }
 
   /// Requests whose replies are remembered, for those that are repeated.

@@ -8,14 +8,13 @@
 
 namespace sls::sim {
 
-/// Absolute: step k is due k wall periods after the origin, however late earlier ones were, so that
-/// errors do not add up.
+/// An absolute schedule: step k is due k wall periods after the origin. Delays of earlier steps do
+/// not move it, so errors do not add up.
 class Schedule {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// A server that is behind by more periods, and by more time, has lost its schedule, which then
-  /// moves.
+  /// If the server is behind by more than both limits, the schedule moves.
   static constexpr int kMaxPeriodsBehind = 10;
   static constexpr auto kMaxTimeBehind = std::chrono::milliseconds(50);
 
@@ -28,14 +27,14 @@ class Schedule {
     return origin_ + std::chrono::duration_cast<Clock::duration>(period_ * step);
   }
 
-  /// When to close `step`, whose state was published at `published`: when the next one is due, but
-  /// an answer always gets a quarter of a period, also while the server catches up.
+  /// When to close `step`, whose state was published at `published`: when the next step is due, but
+  /// at least a quarter of a period after `published`, also while the server catches up.
   Clock::time_point close(std::uint64_t step, Clock::time_point published) const {
     return std::max(due(step + 1),
                     published + std::chrono::duration_cast<Clock::duration>(period_ / 4));
   }
 
-  /// Moves the schedule if `step` is to be published too far behind it: what was lost.
+  /// Moves the schedule if `step` is too late at `now`. Returns the lost time, or nothing.
   std::optional<Clock::duration> slip(std::uint64_t step, Clock::time_point now) {
     const auto behind = now - due(step);
     if (behind <= period_ * kMaxPeriodsBehind || behind <= kMaxTimeBehind) return std::nullopt;
@@ -43,7 +42,7 @@ class Schedule {
     return behind;
   }
 
-  /// The run rested for so long.
+  /// Moves the schedule by the time for which the run rested.
   void pause(Clock::duration rest) { origin_ += rest; }
 
  private:

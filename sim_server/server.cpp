@@ -13,7 +13,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto kClaimTime = 1s;  // how long a claim on the vehicles is open to objection
+constexpr auto kClaimTime = 1s;  // time for other servers to object to a claim
 constexpr auto kPollTime = 20ms;
 
 }  // namespace
@@ -27,7 +27,8 @@ void Server::run() {
   auto run = make_run(false);
   try {
     claim_vehicles(*run);
-    // A run lives until its successor is made: somebody must tell the participants if it cannot be.
+    // A run is kept until its successor is made: if that fails, the run reports it to the
+    // participants.
     while (run->execute() == Run::End::kReset) run = make_run(run->is_paused());
   } catch (const std::exception& error) {
     run->fail(error.what());
@@ -54,7 +55,7 @@ void Server::claim_vehicles(const Run& run) {
 }
 
 void Server::linger(const Run& run, int expected_recorders) {
-  // The recorders first: who of them keeps us waiting is named.
+  // The recorders first, because this wait names those that are not done.
   bus::wait_for_recorders_to_end(endpoints_.participants, run.run_id(), expected_recorders);
   endpoints_.record_writer.wait_for_acknowledgments(1s);
   endpoints_.status_writer.wait_for_acknowledgments(1s);

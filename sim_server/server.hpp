@@ -1,5 +1,4 @@
-/// The server: claims its vehicles, then flies one run after the other, as long as the operator
-/// resets.
+/// The server: claims its vehicles, then flies a run, and another one after each reset.
 #pragma once
 
 #include <cstdint>
@@ -13,18 +12,18 @@ namespace sls::sim {
 
 class Server {
  public:
-  /// Joins the domain of `node` with the scenario in force. `threads` ≥ 1 integrate the vehicles;
-  /// the result does not depend on how many.
+  /// Joins the domain of `node` with the scenario of `assignment`. `threads` ≥ 1 integrate the
+  /// vehicles; the result does not depend on their number.
   Server(bus::Node& node, const Assignment& assignment, std::size_t threads);
 
   /// Runs from the claim to the end. Returns when the recorders are done.
-  /// @throws app::RunError saying why the run failed, after the participants have been told.
+  /// @throws app::RunError with the reason if a run failed, after the failure was published.
   void run();
 
  private:
   std::unique_ptr<Run> make_run(bool begins_paused);
   void claim_vehicles(const Run& run);
-  /// Keeps the writers until the recorders, of which so many are expected, are done with `run`.
+  /// Keeps the writers until the recorders, at least `expected_recorders`, are done with `run`.
   void linger(const Run& run, int expected_recorders);
 
   const Assignment assignment_;

@@ -31,7 +31,7 @@ StateStream::Queue::Queue(StateStream& stream, std::size_t samples)
 }
 
 StateStream::Queue::~Queue() {
-  if (stream_.queue_ == this) stream_.queue_ = nullptr;  // else its successor is in place
+  if (stream_.queue_ == this) stream_.queue_ = nullptr;  // otherwise a newer queue is in use
 }
 
 }  // namespace sls::sim

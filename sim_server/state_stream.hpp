@@ -1,4 +1,4 @@
-/// The states of a run on their way out: as many vehicles in a sample of sls/state as fit into a
+/// Publishes the states of a run. A sample of sls/state holds as many vehicles as fit into a
 /// datagram.
 #pragma once
 
@@ -14,25 +14,25 @@ namespace sls::sim {
 
 class StateStream {
  public:
-  /// Of `vehicles` vehicles, at least one.
+  /// `vehicles`: their number, at least one.
   StateStream(bus::Node& node, std::size_t vehicles)
       : max_bytes_(node.max_sample_bytes()), writer_(node), vehicles_(vehicles) {}
 
   /// The state of the `index`th vehicle, to be filled before it is written.
   VehicleState& at(std::size_t index) { return vehicles_[index]; }
 
-  /// The step that the states are of.
+  /// Sets the step of the states.
   void set_step(std::uint64_t run_id, std::uint64_t step, std::int64_t sim_time_ns);
 
   /// Publishes the states of all vehicles.
   void write() {
     write_where([](std::size_t) { return true; });
   }
-  /// Publishes the samples that hold a vehicle of which `is_wanted(index)`.
+  /// Publishes the samples that hold a vehicle for which `is_wanted(index)` is true.
   void write_where(const std::function<bool(std::size_t)>& is_wanted);
 
-  /// While there is one, `write` hands samples to a thread of its own, by a queue for `samples` of
-  /// them, and never blocks.
+  /// While a Queue exists, `write` never blocks: it passes the samples to a separate thread, by a
+  /// queue with room for `samples` of them.
   class Queue {
    public:
     Queue(StateStream& stream, std::size_t samples);

@@ -18,34 +18,34 @@ class StatusBoard {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// Samples of a run are at most this far apart, so that silence says something.
+  /// Longest time between two samples of a run. A longer silence means that something is wrong.
   static constexpr auto kInterval = std::chrono::milliseconds(400);
 
-  /// Samples go out by `write`. `vehicle_id` is the first of the run's; `sum_counters` is asked for
-  /// every sample.
+  /// `write` publishes a sample. `vehicle_id` is the first of the run's; `sum_counters` is called
+  /// for every sample.
   StatusBoard(std::function<void(const SimStatus&)> write, std::uint64_t run_id,
               std::uint32_t vehicle_id, const config::Sync& sync,
               std::function<SyncCounters()> sum_counters);
 
   /// Publishes a sample now.
   void publish(RunPhase phase, const std::string& reason);
-  /// An event that does not change the phase: said on stderr and published as a reason.
+  /// Reports an event that does not change the phase: on stderr and as the reason of a sample.
   void announce(const std::string& event);
-  /// The last sample is so long ago.
+  /// True if the last sample is kInterval old or older.
   bool is_due() const { return Clock::now() - publish_time_ >= kInterval; }
 
   RunPhase phase() const { return phase_; }
-  /// True once anybody can have heard of the run.
+  /// True once a sample of the run was published.
   bool has_published() const { return samples_ > 0; }
 
   // Content of the samples; the loop keeps it up to date.
   std::uint64_t step = 0;
-  std::string controller_name;  ///< whose command for `step` was accepted, of the first vehicle
-  std::string problem;          ///< what a participant does wrong; empty if none does
+  std::string controller_name;  ///< controller of the first vehicle at `step`
+  std::string problem;          ///< mistakes of participants; empty if there are none
   TimingRecord timing;
   RoundTrips round_trips;
 
-  /// Step 0 is published now.
+  /// Call when step 0 is published.
   void start_clock() { start_time_ = Clock::now(); }
   /// Wall time since `start_clock`, less the pauses.
   double calc_wall_s() const;

@@ -1,4 +1,4 @@
-/// How well a run kept its time, in numbers and as the label of its end report. No clock here.
+/// Timing of a run, in numbers and as the label of its end report. No clock here.
 #pragma once
 
 #include <cstdint>
@@ -13,23 +13,23 @@ class TimingRecord {
  public:
   explicit TimingRecord(const config::Sync& sync) : sync_(sync) {}
 
-  /// A period was flown with a force of this origin, answered to a state `age` periods before that
-  /// period's own.
+  /// A period was flown with a force of this origin. The force answers a state that is `age`
+  /// periods older than the period's own.
   void add(ForceOrigin origin, std::uint64_t age);
   /// A state was published `delay_s` (wall time) after it was due. Real time only.
   void add_delay(double delay_s);
   /// The schedule was moved because the server was `lost_s` behind it. Real time only.
   void add_slip(double lost_s);
-  /// The states that could not be published so far. Real time only.
+  /// Number of states that could not be published so far. Real time only.
   void set_overflow(std::uint64_t states) { overflow_ = states; }
 
   /// "exact": lockstep, every force an answer to its own state.
   /// "real-time, k of n late, worst age A ms, states at most B ms late": every state published, the
   ///   schedule kept, no fail-safe.
-  /// "degraded: …": anything else, and what.
+  /// "degraded: …": anything else, with its causes.
   std::string label() const;
 
-  /// Puts what is counted here into `counters`.
+  /// Writes the counts into `counters`.
   void fill(SyncCounters& counters) const;
 
  private:

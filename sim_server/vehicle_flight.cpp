@@ -6,7 +6,7 @@
 namespace sls::sim {
 namespace {
 
-/// Without the text, of which every vehicle would keep a copy.
+/// Without the text of the scenario: otherwise every vehicle would keep a copy of it.
 config::Scenario make_own_scenario(const config::Scenario& fleet, std::uint32_t id) {
   config::Scenario scenario = config::make_vehicle_scenario(fleet, id);
   scenario.text.clear();

@@ -1,5 +1,4 @@
-/// One vehicle of a run: its faults, who may answer for it, and what flies it. No
-/// network here.
+/// One vehicle of a run: its faults, its command gate and the force of each step. No network here.
 #pragma once
 
 #include <chrono>
@@ -18,7 +17,7 @@ class VehicleFlight {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// Vehicle `id` of `fleet`, at rest where the scenario puts it.
+  /// Vehicle `id` of `fleet`, before step 0.
   VehicleFlight(const config::Scenario& fleet, std::uint32_t id, std::uint64_t run_id);
 
   VehicleFlight(const VehicleFlight&) = delete;
@@ -32,31 +31,32 @@ class VehicleFlight {
     bool is_finished = false;  // the mission ends here
   };
 
-  /// The state of `step` as it is published, where the plant does `truth` and sensors and estimator
-  /// say `seen`; null if that cannot differ. Call once per step, in order, from step 0.
+  /// The state sample of `step`. `truth` is the state of the plant; `seen` is the output of sensors
+  /// and estimator, or null if it cannot differ. Call once per step, in order, from step 0.
   VehicleState measure(std::uint64_t step, const model::Measurement& truth,
                        const model::Measurement* seen = nullptr);
   /// Takes the answer that the gate accepted for the step in work.
   void take_answer();
-  /// Keeps an answer that came too late for its step, to be held: fresh where it is newer than the
-  /// one that is held. Older ones do not count.
+  /// Holds an answer that came too late for its step, if it is newer than the held one. Notes if it
+  /// ends the mission.
   void keep_late_answer(const OfferedAnswer& answer);
   /// Flies the step in work without an answer of its own.
   void fly_without_answer(ControllerAbsence::Action action);
-  /// Flies the step in work with what it came to: the force (N, in W) that acts on the plant.
+  /// Applies the outcome of the step in work. Returns the force (N, in W) that acts on the plant.
   Eigen::Vector3d actuate();
 
-  /// Puts what is to be recorded of the step in work into `entry`, once all is known of it.
+  /// Writes the record of the step in work into `entry`. Call once its outcome is known or the run
+  /// ends.
   void fill_record(RecordEntry& entry) const;
 
   const std::optional<Outcome>& outcome() const { return outcome_; }
   bool is_settled() const { return outcome_.has_value(); }
-  /// Periods between the state that the force of the step in work answers and that step.
+  /// Age of the force of the step in work: periods since the state that it answers.
   std::uint64_t calc_age() const;
-  /// A late answer has ended the mission.
+  /// True if a late answer has ended the mission.
   bool has_ended_late() const { return has_ended_late_; }
   const Applied& last_answer() const { return last_answer_; }
-  /// The controller memory that the current step's state sent back.
+  /// The controller memory in the state sample of the current step.
   const ControllerState& returned() const { return applied_.memory; }
   /// Motion of the vehicle at the current step.
   const model::Measurement& state() const { return state_; }
@@ -65,16 +65,16 @@ class VehicleFlight {
   void note_waiting(Clock::time_point time) {
     if (!absent_since_) absent_since_ = time;
   }
-  /// Since the first step without a fresh answer was published; 0 if the last one had one.
+  /// Time since the first step without a fresh answer was published, s; 0 if the last step had one.
   double calc_absence_s() const;
-  /// Answers were refused, or none is any more.
+  /// Notes if answers are refused at present.
   void note_refused(bool is_refused) {
     if (is_refused != refused_since_.has_value())
       refused_since_ = is_refused ? std::optional(Clock::now()) : std::nullopt;
   }
-  /// Since answers are refused without a valid one; 0 if none is.
+  /// Time for which answers are refused without a valid one, s; 0 if none is refused.
   double calc_refused_s() const;
-  /// The run was at rest for so long, which is no absence.
+  /// The run was at rest for `rest`, which does not count as absence.
   void note_rest(Clock::duration rest);
 
   CommandGate gate;
@@ -88,13 +88,13 @@ class VehicleFlight {
   FaultLine faults_;
   std::uint64_t step_ = 0;              // in work
   model::Measurement state_;            // at that step
-  model::Measurement measured_;         // of it
+  model::Measurement measured_;         // of that state
   bool can_measured_differ_ = false;    // from that state
   Applied applied_;                     // over the period before it
   std::optional<Outcome> outcome_;      // of the step in work, once it is known
-  Applied last_answer_;                 // accepted, or late but valid; what is held
+  Applied last_answer_;                 // the held one: accepted, or late but valid
   std::uint64_t last_answer_step_ = 0;  // the step it answers
-  ControlCommand last_command_;         // as it came
+  ControlCommand last_command_;         // as received
   bool has_ended_late_ = false;
   std::optional<Clock::time_point> absent_since_;
   std::optional<Clock::time_point> refused_since_;

@@ -22,9 +22,10 @@ class WorkerPool {
   WorkerPool& operator=(const WorkerPool&) = delete;
 
   /// Calls `work(i)` once for each i below `count` and returns when all are done. Each thread has
-  /// an equal share of neighbours, the same in each call, whose data its processor's cache may
-  /// still hold; who has done its own helps the others, because processors are not equally fast.
-  /// @throws what `work` throws for the lowest i, after all have been worked on.
+  /// an equal share of consecutive i, the same in each call, because its processor's cache may
+  /// still hold their data. A thread that has finished its share helps the others, because
+  /// processors are not equally fast.
+  /// @throws the exception of `work` for the lowest i, after all calls.
   void for_each(std::size_t count, const std::function<void(std::size_t)>& work);
 
  private:
@@ -39,7 +40,7 @@ class WorkerPool {
   std::vector<std::thread> threads_;
   const std::function<void(std::size_t)>* work_ = nullptr;
 
-  std::mutex mutex_;  // over what follows
+  std::mutex mutex_;  // protects the members below
   std::condition_variable begun_, done_;
   std::uint64_t round_ = 0;
   std::size_t busy_ = 0;
