@@ -1,4 +1,4 @@
-/// Checks an answer, for server and closed loop alike. No DDS and no Simbody here.
+/// Checks an answer, for server and closed loop. No DDS and no Simbody here.
 #pragma once
 
 #include <Eigen/Core>

@@ -37,7 +37,7 @@ class RunControl {
   std::optional<SimControlReply> stepped(std::uint64_t step);
 
   /// Replies to requests still open when the run ends at `step` (accepted: false, with `reason`).
-  /// Requests that come after it are refused.
+  /// Later requests are refused.
   std::vector<SimControlReply> end(std::uint64_t step, const std::string& reason);
 
   bool is_reset_requested() const { return is_reset_requested_; }
@@ -49,7 +49,7 @@ class RunControl {
   /// Number of accepted requests so far.
   std::uint64_t events() const { return events_; }
 
-  /// Requests whose replies are remembered, for those that are repeated.
+  /// Number of replies that are kept for repeated requests.
   static constexpr std::size_t kRememberedReplies = 64;
 
  private:
