@@ -1,1 +1,1 @@
-"""`./sls bench`: how fast everything is, beside how fast it could be. See README.md."""
+"""`./sls bench`: measures the speed of each part and its bound. See README.md."""

@@ -16,7 +16,7 @@ from bench.programs import MeasurementError, Programs, make_scratch
 from bench.results import Figure, format_table
 
 Measure = Callable[[Programs, int, bool], list[Figure]]
-PARTS: dict[str, tuple[Measure, int]] = {  # and its rounds
+PARTS: dict[str, tuple[Measure, int]] = {  # int: number of rounds
     "lockstep": (loop.measure_lockstep, 3),
     "load": (loop.measure_load, 3),
     "round-trip": (loop.measure_round_trips, 3),
@@ -29,7 +29,7 @@ PARTS: dict[str, tuple[Measure, int]] = {  # and its rounds
     "view": (view.measure_view, 5),
     "page": (page.measure_page, 3),
 }
-DOMAINS = range(61, 81)  # tests use those below
+DOMAINS = range(61, 81)  # tests use the domains below 61
 
 
 class UsageError(Exception):
@@ -67,7 +67,7 @@ def parse_arguments() -> argparse.Namespace:
 
 
 def take_domain() -> tuple[int, socket.socket]:
-    """A DDS domain that no other bench uses, for as long as the socket is there."""
+    """A DDS domain that no other bench uses as long as the socket exists."""
     for domain in DOMAINS:
         lock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         try:
@@ -79,7 +79,7 @@ def take_domain() -> tuple[int, socket.socket]:
 
 
 def make_keys(programs: Programs) -> None:
-    """For config/qos/secure.xml."""
+    """Makes the keys for config/qos/secure.xml."""
     keys = programs.scratch / "keys"
     programs.run(Path(__file__).parents[1] / "config/security/keys.sh", keys)
     os.environ["SLS_KEYS"] = str(keys)

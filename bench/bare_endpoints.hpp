@@ -1,5 +1,5 @@
-/// Writers and readers on bare Fast DDS, with the profiles of a QoS file and nothing of common/bus
-/// around them: what the middleware itself can do. Only for measuring that.
+/// Writers and readers of bare Fast DDS, with the profiles of a QoS file but without common/bus.
+/// They only serve to measure the speed of Fast DDS itself.
 #pragma once
 
 #include <fastdds/dds/domain/DomainParticipant.hpp>

@@ -1,5 +1,5 @@
-"""A campaign on all cores, beside as many C++ processes that fly the same runs; and what a run is
-made of."""
+"""A campaign on all cores, compared with as many C++ processes that fly the same runs; and the CPU
+time of the parts of a run."""
 
 import json
 import os
@@ -33,7 +33,7 @@ def write_campaign(programs: Programs, scenario: Path, values: list[str], certif
 
 
 def time_campaign(programs: Programs, file: Path) -> tuple[float, int]:
-    """Flies a campaign by `./sls campaign` with its report: seconds, and how many runs came out."""
+    """Flies a campaign by `./sls campaign` with its report. Returns seconds and the number of its runs."""
     folder = programs.make_path("-runs")
     began = time.monotonic()
     programs.run("env", f"SLS_BUILD={programs.build}", ROOT / "sls", "campaign", file, "--out", folder,
@@ -45,7 +45,7 @@ def time_campaign(programs: Programs, file: Path) -> tuple[float, int]:
 
 def time_processes(programs: Programs, scenario: Path, values: list[str], certify: bool,
                    count: int) -> float:
-    """Flies the runs in so many C++ processes at once: seconds, from their start to the last end."""
+    """Flies the runs in `count` C++ processes at once. Returns seconds from their start to the last end."""
     processes, logs = [], []
     began = time.monotonic()
     try:

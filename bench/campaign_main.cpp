@@ -1,5 +1,5 @@
-// Flies the runs of a campaign in one C++ process, which `./sls campaign` stands beside; and what a
-// run is made of. Prints one line of JSON on stdout. README.md.
+// Flies the runs of a campaign in one C++ process, for comparison with `./sls campaign`, or
+// measures the parts of a run. Prints one line of JSON on stdout. README.md.
 #include <chrono>
 #include <cstdio>
 #include <ctime>
@@ -40,7 +40,7 @@ struct Options {
   bool certify = false;
 };
 
-/// All runs, as a worker of a campaign flies them.
+/// Flies all runs as a worker of a campaign does.
 nlohmann::json fly(const Options& options) {
   auto began = Clock::now();
   const closed_loop::CampaignRuns runs(options.scenario, {options.path}, kMeasures);
@@ -62,12 +62,12 @@ nlohmann::json fly(const Options& options) {
   return json;
 }
 
-/// CPU time of this process, s: other work on the machine is not in it.
+/// CPU time of this process, s. It does not include other work on the machine.
 double take_cpu_seconds() {
   return static_cast<double>(std::clock()) / static_cast<double>(CLOCKS_PER_SEC);
 }
 
-/// CPU seconds of each part of the runs; the parts of a run are timed in turn.
+/// CPU seconds of each part, summed over the runs. Each run is timed part after part.
 nlohmann::json time_parts(const Options& options) {
   const closed_loop::CampaignRuns runs(options.scenario, {options.path}, kMeasures);
   const std::vector<std::string> values = read_lines(options.values);

@@ -42,7 +42,8 @@ class Surroundings {
     announced_ = Clock::now();
   }
 
-  /// Returns when `is_over` holds of what the recorder announced last, and keeps the run alive.
+  /// Returns when `is_over` is true for the last announcement of the recorder. Until then it
+  /// publishes the status of the run when it is due.
   void wait(RunPhase phase, std::uint64_t step, const char* what,
             const std::function<bool(const Participant&)>& is_over) {
     const app::Wait wait(kPatience_s);

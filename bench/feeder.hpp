@@ -1,4 +1,5 @@
-/// A server without plant and clients: sends a recorder a finished flight as fast as it takes it.
+/// A server without plant and clients: sends a finished flight to a recorder, as fast as the
+/// recorder takes it.
 #pragma once
 
 #include <cstdint>
@@ -16,10 +17,10 @@ struct FeederOptions {
   std::size_t steps = 1000;
 };
 
-/// Keeps as far ahead of the recorder's last complete step as a server in lockstep may. Returns
-/// `rows` (of state.csv, command.csv, reference.csv and flight.csv together) and `seconds`, from
-/// the first sample until the recorder has announced the last step.
-/// @throws app::RunError if no recorder comes, or it does not come to the end.
+/// Stays ahead of the recorder's last complete step by as many steps as a server in lockstep may.
+/// Returns `rows` (of state.csv, command.csv, reference.csv and flight.csv together) and `seconds`,
+/// from the first sample until the recorder has announced the last step.
+/// @throws app::RunError if no recorder joins, or it does not announce the last step.
 nlohmann::json feed_recorder(const config::Scenario& scenario, const FeederOptions& options);
 
 }  // namespace sls::bench

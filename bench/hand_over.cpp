@@ -21,9 +21,9 @@ using Clock = std::chrono::steady_clock;
 using Microseconds = std::chrono::duration<double, std::micro>;
 
 constexpr auto kLongestSpin = std::chrono::microseconds(50);
-constexpr std::time_t kPatience_s = 60;  // with all rounds
+constexpr std::time_t kPatience_s = 60;  // for all rounds together
 
-/// True when it is this process's turn, false when the deadline is over.
+/// Returns true when it is this process's turn; false after the deadline or a stop signal.
 bool wait(sem_t& turn, bool may_spin, const timespec& deadline) {
   if (may_spin) {
     const auto end = Clock::now() + kLongestSpin;
@@ -38,8 +38,8 @@ bool wait(sem_t& turn, bool may_spin, const timespec& deadline) {
 
 }  // namespace
 
-/// Semaphores between processes are futexes with a count: a post calls the kernel only where
-/// somebody sleeps. Fast DDS wakes the readers of a shared-memory port by them, too.
+/// Semaphores between processes are futexes with a count: a post calls the kernel only if a
+/// process sleeps. Fast DDS also uses them to wake the readers of a shared-memory port.
 struct HandOver::Turns {
   sem_t ours, theirs;
 };

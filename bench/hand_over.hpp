@@ -1,5 +1,5 @@
-/// How fast two processes can take turns when nothing but the turn passes between them: the bound
-/// of every loop of two processes. README.md.
+/// Measures how fast two processes can take turns without exchanging data: the bound of every loop
+/// of two processes. README.md.
 #pragma once
 
 #include <cstdint>
@@ -11,11 +11,11 @@ namespace sls::bench {
 struct HandOverOptions {
   std::uint64_t rounds = 20000;  ///< measured
   std::uint64_t warm_up = 1000;  ///< before, not measured
-  double work_us = 0.0;          ///< of this process in each round, by the clock
-  bool may_spin = false;         ///< up to 50 µs before a wait blocks
+  double work_us = 0.0;          ///< wall time of this process's work in each round
+  bool may_spin = false;         ///< a wait spins for up to 50 µs before it blocks
 };
 
-/// The other process, which hands every turn back at once, and the memory that they share.
+/// The other process, which gives every turn back at once, and the shared memory.
 class HandOver {
  public:
   /// Starts the other process on the processors that this thread may use now.
@@ -24,7 +24,7 @@ class HandOver {
   HandOver(const HandOver&) = delete;
   HandOver& operator=(const HandOver&) = delete;
 
-  /// Returns `mean_us`, the time of a round with the work in it.
+  /// Returns `mean_us`, the mean time of a round, including the work.
   nlohmann::json measure();
 
  private:

@@ -1,4 +1,4 @@
-/* The least that a controller can do, to see what calling one costs: it holds the weight. */
+/* A minimal controller, to measure the cost of a call: its force only carries the weight. */
 #include <stdlib.h>
 
 #include "control_client/laws/shared_library/sls_controller.h"

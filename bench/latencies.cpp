@@ -14,7 +14,7 @@ nlohmann::json Latencies::to_json() const {
   std::sort(sorted.begin(), sorted.end());
   const auto to_us = [](Duration value) { return static_cast<double>(value.count()) / 1e3; };
   const auto percentile = [&](double share) {
-    const double rank = std::ceil(share * static_cast<double>(sorted.size()));  // from 1
+    const double rank = std::ceil(share * static_cast<double>(sorted.size()));  // counts from 1
     return to_us(sorted[static_cast<std::size_t>(rank) - 1]);
   };
   const Duration sum = std::accumulate(sorted.begin(), sorted.end(), Duration::zero());

@@ -6,7 +6,7 @@
 
 namespace sls::bench {
 
-/// Durations measured one by one, and what they come to.
+/// Single durations and their statistics.
 class Latencies {
  public:
   using Duration = std::chrono::nanoseconds;
@@ -15,8 +15,8 @@ class Latencies {
   void add(Duration value) { values_.push_back(value); }
   std::size_t count() const { return values_.size(); }
 
-  /// count, mean_us, min_us, p50_us, p99_us, p999_us and max_us (nearest rank); only the count
-  /// where there is none.
+  /// count, mean_us, min_us, p50_us, p99_us, p999_us and max_us (nearest rank). Without a duration
+  /// only count.
   nlohmann::json to_json() const;
 
  private:

@@ -1,5 +1,5 @@
-// The cost of calling a controller in a shared library: the same trivial law built in and from
-// C.
+// Cost of a call of a controller in a shared library: the same trivial law, built in and as a C
+// library.
 #include <benchmark/benchmark.h>
 
 #include <memory>

@@ -1,5 +1,5 @@
-"""The closed loop: its bounds and its speed in lockstep, where its time goes, its speed beside other
-work, its round trips, real time, QoS profiles."""
+"""The closed loop: its bounds and speed in lockstep, the parts of a step, its speed on a busy machine,
+its round trips, real time, QoS profiles."""
 
 import csv
 import itertools
@@ -30,13 +30,13 @@ def without_recorder(text: str) -> str:
 
 
 def lasting(seconds: float) -> Callable[[str], str]:
-    """figure_eight.yaml for so long."""
+    """Changes the duration of figure_eight.yaml to `seconds`."""
     return lambda text: text.replace("for_s: 32", f"for_s: {seconds:g}")
 
 
 @dataclass(frozen=True)
 class Loop:
-    """A way to fly the closed loop."""
+    """Settings of a flight of the closed loop."""
 
     qos: str = "default"
     is_recorded: bool = True
@@ -67,7 +67,7 @@ def fly_lockstep(programs: Programs, loop: Loop, seconds: float) -> Flight:
 # --- bounds ---------------------------------------------------------------------------------------
 
 
-Times = dict[tuple[bool, str], float]  # µs, by whether waiting threads may spin, and where
+Times = dict[tuple[bool, str], float]  # µs; key: True if waiting threads may spin, and the processors
 
 
 def find_fastest(times: Times, may_spin: bool) -> float:
@@ -75,22 +75,22 @@ def find_fastest(times: Times, may_spin: bool) -> float:
 
 
 def find_pairs() -> dict[str, tuple[int, int]]:
-    """Where two processes may run."""
+    """The processors on which two processes may run."""
     first, *others = sorted(os.sched_getaffinity(0))
     pairs = {"on one processor": (first, first)}
     return {**pairs, "on two processors": (first, others[0])} if others else pairs
 
 
 def calc_parts(step: float, work: dict[str, float], hand_over: float, raw: float) -> dict[str, float]:
-    """Of a step of two processes, µs. A raw round trip of Fast DDS is two hand-overs, too: what it
-    takes longer is Fast DDS."""
+    """Parts of a step of two processes, µs. A raw round trip of Fast DDS contains two hand-overs, too:
+    the remaining time of it is the part of Fast DDS."""
     parts = {"plant": work["plant_us"], "law": work["law_us"], "futex": hand_over,
              "Fast DDS": raw - hand_over}
     return {**parts, "rest": step - sum(parts.values())}
 
 
 class StepCosts:
-    """Least cost of a step, in µs: measured in each round."""
+    """The smallest possible cost of a step, µs; measured in each round."""
 
     def __init__(self, programs: Programs, is_quick: bool):
         self.programs = programs
@@ -100,12 +100,12 @@ class StepCosts:
         self.futex: Times = {}
 
     def measure_work(self, *flags: str | Path) -> None:
-        """Plant and law."""
+        """Measures plant and law."""
         self.work = self.programs.probe("fly", "--scenario", self.scenario, "--period-s", PERIOD_S,
                                         *flags)
 
     def measure(self, *flags: str | Path) -> None:
-        """And two processes that hand over by futex, with as much work."""
+        """Measures plant and law, then two processes that take turns by futex with the same work."""
         self.measure_work(*flags)
         for may_spin in WAITING:
             for place, (ours, theirs) in find_pairs().items():
@@ -115,15 +115,15 @@ class StepCosts:
 
     @property
     def in_process(self) -> float:
-        """Plant step and control law."""
+        """Time of plant step and control law, µs."""
         return self.work["plant_us"] + self.work["law_us"]
 
     def hand_over(self, may_spin: bool) -> float:
-        """Of a round, without the work."""
+        """Time of a round of the futex turns without the work, µs."""
         return find_fastest(self.futex, may_spin) - self.in_process
 
     def ping(self, qos: str, *flags: str) -> Times:
-        """Round trips of bare Fast DDS. On one processor nothing is gained by spinning."""
+        """Round trips of bare Fast DDS. On one processor it only blocks: spinning is of no use there."""
         programs, times = self.programs, Times()
         for may_spin, (place, pair) in itertools.product(WAITING, find_pairs().items()):
             if may_spin and len(set(pair)) == 1:
@@ -201,7 +201,7 @@ def measure_lockstep(programs: Programs, rounds: int, is_quick: bool) -> list[Fi
 
 
 def measure_load(programs: Programs, rounds: int, is_quick: bool) -> list[Figure]:
-    """Over shared memory, beside processes that only count."""
+    """Over shared memory, while other processes keep the processors busy."""
     figures, comparison = Rounds("load"), Rounds("load")
     loops = [loop for loop in LOOPS if loop.qos == "default"]
     for _ in range(rounds):
@@ -242,8 +242,8 @@ def parse_stamps(text: str) -> dict[int, int]:
 
 
 def calc_step_times(batches: list[dict[int, int]]) -> list[float]:
-    """µs from each state to the next. The run rested after the last state of a batch, and a batch
-    reaches back into the one before: no step is counted twice or with a rest in it."""
+    """µs from each state to the next. The run paused after the last state of a batch, and a batch
+    overlaps the previous one: each step counts once, and steps with a pause do not count."""
     times = []
     seen = -1
     for states in batches:
@@ -255,7 +255,7 @@ def calc_step_times(batches: list[dict[int, int]]) -> list[float]:
 
 
 def measure_round_trips(programs: Programs, rounds: int, is_quick: bool) -> list[Figure]:
-    """By the history that the writer keeps, asked for while the run is paused."""
+    """Measured from the history of the writer, which is read while the run is paused."""
     costs = StepCosts(programs, is_quick)
     pauses = 1 if is_quick else 8
     figures = Rounds("round-trip")
@@ -269,7 +269,7 @@ def measure_round_trips(programs: Programs, rounds: int, is_quick: bool) -> list
                    str(programs.domain)]
             wait_until_running(programs)
             for _ in range(pauses):
-                time.sleep(0.4)  # steps to look at
+                time.sleep(0.4)  # steps to measure
                 try:
                     programs.run(*ctl, "pause")
                 except MeasurementError:
@@ -303,7 +303,7 @@ def measure_round_trips(programs: Programs, rounds: int, is_quick: bool) -> list
 
 
 def with_history(programs: Programs) -> Path:
-    """default.xml, but the last 5,000 states are kept, not 64: that costs memory alone."""
+    """default.xml with a history of 5,000 states instead of 64; this only costs memory."""
     depth, longer = "<depth>64</depth></historyQos>", "<depth>5000</depth></historyQos>"
     limits = "".join(f"<{name}>5000</{name}>" for name in ("max_samples", "max_samples_per_instance"))
     profile = programs.qos("endpoints").read_text().split("<profiles>")[1].split("<data_reader")[0]
@@ -329,7 +329,7 @@ def wait_until_running(programs: Programs) -> None:
 
 
 def calc_lateness(states: dict[int, int], period_ns: int) -> list[float]:
-    """µs by which each state was published later, for its step, than the earliest was."""
+    """Delay of each state relative to the earliest one, µs, after subtraction of the step's due time."""
     offsets = [written - step * period_ns for step, written in states.items()]
     earliest = min(offsets)
     return [(offset - earliest) / 1e3 for offset in offsets]
@@ -363,7 +363,7 @@ def measure_realtime(programs: Programs, rounds: int, is_quick: bool) -> list[Fi
 
 
 def count_late(label: str) -> float:
-    """Of "real-time, 3 of 500 late, …" and "degraded: …, 3 of 500 late, …": 3."""
+    """The number of late steps in a label: 3 in "real-time, 3 of 500 late, …" and "degraded: …, 3 of 500 late, …"."""
     words = label.replace(",", " ").replace(";", " ").split()
     for index in range(len(words) - 3):
         if words[index + 1] == "of" and words[index + 3] == "late":
@@ -375,7 +375,7 @@ def count_late(label: str) -> float:
 
 
 def measure_qos(programs: Programs, rounds: int, is_quick: bool) -> list[Figure]:
-    """Each profile's closed loop beside its own bound, and a whole short flight, most of which is
+    """The closed loop of each profile with its own bound, and a whole short flight, which is mostly
     discovery and, with security, handshakes."""
     costs = StepCosts(programs, is_quick)
     figures, starts = Rounds("qos"), Rounds("qos")

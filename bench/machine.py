@@ -24,7 +24,7 @@ def now() -> str:
 
 
 def read_memory_kb(process_id: int) -> int:
-    """Resident memory; 0 if the process has gone."""
+    """Resident memory; 0 if the process has ended."""
     try:
         status = Path(f"/proc/{process_id}/status").read_text()
     except OSError:

@@ -1,4 +1,4 @@
-// The functions of one step, each measured alone: Google Benchmark.
+// Measures each function of a step alone, with Google Benchmark.
 #include <benchmark/benchmark.h>
 #include <slsPubSubTypes.h>
 
@@ -27,7 +27,7 @@ Eigen::Vector3d make_hover_force(const config::Scenario& scenario) {
   return {0.0, 0.0, -(vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity};
 }
 
-/// Time of one RK4 step of one vehicle, of a fleet of independent plants.
+/// Time of one RK4 step per vehicle, for a fleet of independent plants.
 template <class Plant>
 void step_plants(benchmark::State& run) {
   const config::Scenario scenario = load();
@@ -45,7 +45,7 @@ BENCHMARK(plant_step)->Arg(1)->Arg(2)->Arg(10)->Arg(100);
 void closed_form_step(benchmark::State& run) { step_plants<sim::AnalyticPlant>(run); }
 BENCHMARK(closed_form_step)->Arg(1)->Arg(2)->Arg(10)->Arg(100);
 
-/// The same of the multirotors of a scenario, with autopilot and signals, without its sensors.
+/// The same for the multirotors of a scenario, with autopilot and signals, without sensors.
 void step_multirotors(benchmark::State& run, const std::string& name) {
   config::Scenario scenario = load(name);
   scenario.sensing = {};
@@ -71,7 +71,7 @@ const std::vector<RecordEntry>& entries() {
 
 void control_law(benchmark::State& run) {
   const control::FlightController controller(load());
-  std::size_t i = entries().size();  // flies them before the clock runs
+  std::size_t i = entries().size();  // flies them before the measurement starts
   for (auto _ : run) {
     const RecordEntry& entry = entries()[i++ % entries().size()];
     benchmark::DoNotOptimize(controller.calc_answer(
@@ -80,7 +80,7 @@ void control_law(benchmark::State& run) {
 }
 BENCHMARK(control_law);
 
-/// There and back; `make` makes a sample of an entry.
+/// Time to serialise and deserialise a sample; `make` makes it from an entry.
 template <class Type, class Make>
 void serialize(benchmark::State& run, const Make& make) {
   using Message = typename Type::type;

@@ -1,4 +1,4 @@
-"""The page and the Foxglove bridge of sls_view, as Chromium and a client of npm's `ws` see them."""
+"""The page and the Foxglove bridge of sls_view, measured with Chromium and with a client of npm's `ws`."""
 
 import json
 import os
@@ -26,7 +26,7 @@ def run_node(programs: Programs, script: str, *words: object) -> Any:
 
 
 def measure_page(programs: Programs, rounds: int, is_quick: bool) -> list[Figure]:
-    """Chromium without a display draws by software."""
+    """Chromium runs without a display, so it draws in software."""
     figures = Rounds("page")
     seconds = QUICK_SECONDS if is_quick else SECONDS
     for _ in range(rounds):

@@ -1,4 +1,4 @@
-"""Everything beside the loop: plant, recorder, fleets."""
+"""Everything except the loop: plant, recorder, fleets."""
 
 import json
 import os
@@ -21,7 +21,7 @@ MULTIROTORS = {f"{name}_step": name for name in ("px4_published", "multirotor_fi
 
 
 def measure_plant(programs: Programs, rounds: int, is_quick: bool) -> list[Figure]:
-    """With Google Benchmark, which interleaves its repetitions at random."""
+    """Measured with Google Benchmark, which interleaves the repetitions at random."""
     output = programs.run(
         programs.build / "bin/sls_microbench", "--benchmark_format=json",
         f"--benchmark_repetitions={rounds}", "--benchmark_enable_random_interleaving=true",
@@ -48,7 +48,7 @@ def measure_plant(programs: Programs, rounds: int, is_quick: bool) -> list[Figur
 
 
 def split_name(name: str) -> tuple[str, int]:
-    """Of "plant_step/100": the function and how many vehicles; 0 if it has none."""
+    """Function and number of vehicles of a name such as "plant_step/100"; 0 vehicles if it has no number."""
     function, _, vehicles = name.partition("/")
     return function, int(vehicles or 0)
 
@@ -57,7 +57,7 @@ def split_name(name: str) -> tuple[str, int]:
 
 
 def measure_recorder(programs: Programs, rounds: int, is_quick: bool) -> list[Figure]:
-    """Rows of state.csv, command.csv, reference.csv and flight.csv, all four counted."""
+    """The rows are those of state.csv, command.csv, reference.csv and flight.csv together."""
     figures = []
     for vehicles, steps in ((1, 2000), (100, 20)) if is_quick else ((1, 32000), (100, 1000)):
         scenario = programs.scenario("figure_eight", of_fleet(vehicles))
@@ -81,7 +81,7 @@ def measure_recorder(programs: Programs, rounds: int, is_quick: bool) -> list[Fi
 
 
 def measure_mcap(programs: Programs, rounds: int, vehicles: int, steps: int) -> list[Figure]:
-    """The same with sls.mcap beside the CSV files; a row is one of these. And that file's size."""
+    """The same with sls.mcap in addition to the CSV files, whose rows are counted; and the size of sls.mcap."""
     of_both = programs.scenario("figure_eight", lambda text: of_fleet(vehicles)(text) + MCAP_TOO)
     alone = programs.scenario("figure_eight", of_fleet(vehicles))
     speeds, speeds_alone, ratios = [], [], []
@@ -129,7 +129,7 @@ def check_recording(folder: Path, code: int, log: Path) -> None:
 
 
 def of_fleet(vehicles: int, seconds: float = 32):
-    """figure_eight.yaml, flown by so many, with the step of the plant as long as the period."""
+    """Changes figure_eight.yaml to `vehicles` vehicles and to a plant step as long as the period."""
     def change(text: str) -> str:
         text = lasting(seconds)(text).replace("step_s: 0.001", "step_s: 0.004")
         return text if vehicles == 1 else f"{text}vehicles: {vehicles}\n"
@@ -138,7 +138,7 @@ def of_fleet(vehicles: int, seconds: float = 32):
 
 
 def choose_seconds(vehicles: int, is_quick: bool) -> float:
-    """Of simulated time, so that a lockstep flight takes some seconds."""
+    """Simulated time with which a flight in lockstep takes some seconds."""
     return 1.0 if is_quick else {1: 64, 2: 64, 5: 32, 10: 32, 20: 16}.get(vehicles, 8)
 
 
@@ -175,7 +175,7 @@ def measure_fleet(programs: Programs, rounds: int, is_quick: bool) -> list[Figur
         if 200 in fleets:
             times.add("time per step and vehicle, 200 over 10 vehicles", "1",
                       per_vehicle[200] / per_vehicle[10], better=LESS, goal=1.0)
-    least, most = (2, 10) if is_quick else (10, 200)  # fleets, which have other histories than one
+    least, most = (2, 10) if is_quick else (10, 200)  # fleets only: one vehicle has histories of another size
     figures = speeds.make_figures() + times.make_figures()
     figures.append(Figure("fleet", "server memory per vehicle", "kB", [
         (large - small) / (most - least) for large, small in zip(memory[most], memory[least])],
@@ -189,13 +189,13 @@ def holds_real_time(programs: Programs, vehicles: int, seconds: float) -> bool:
     try:
         flight = programs.fly(scenario, server=("--mode", "realtime", "--rtf", "1"))
     except MeasurementError:
-        return False  # a recorder that lost something ends with 1
+        return False  # a recorder that lost samples ends with exit code 1
     is_on_time = flight.label.startswith("real-time") and count_late(flight.label) == 0
     return is_on_time and flight.lost == 0 and flight.manifest["complete"]
 
 
 def find_most_in_real_time(programs: Programs, is_quick: bool) -> Figure:
-    """By bisection, to ten vehicles; each size has two attempts, as the machine has other work."""
+    """By bisection, to ten vehicles. Each size has two attempts, because other work can disturb one."""
     seconds = 1.0 if is_quick else 10.0
 
     def holds(vehicles: int) -> bool:

@@ -89,7 +89,7 @@ class Ping {
       const auto step = step_;
       over_.wait_for(lock, kResendTime, [this] { return is_done(); });
       if (step != step_) continue;
-      if (step_ == 0) check(wait);  // until both sides have discovered each other
+      if (step_ == 0) check(wait);  // a time limit for discovery by both sides
       if (app::stop_signal() != 0) throw app::RunError("ping: interrupted");
       lost_ += step_ > 0 ? 1 : 0;
       send();
@@ -116,7 +116,7 @@ class Ping {
     }
   }
 
-  /// On the middleware's thread.
+  /// Called on a thread of the middleware.
   void receive(const Commands& command) {
     const std::lock_guard lock(mutex_);
     if (command.step() != step_ || is_done() || ++answers_ < states_.size()) return;
@@ -130,7 +130,7 @@ class Ping {
 
   const PingPongOptions options_;
   std::vector<States> states_;
-  std::mutex mutex_;  // over what follows
+  std::mutex mutex_;  // guards step_ to latencies_
   std::uint64_t step_ = 0;
   std::size_t answers_ = 0;  // to this step
   Clock::time_point sent_;
@@ -149,9 +149,9 @@ nlohmann::json ping(const PingPongOptions& options) { return Ping(options).run()
 void answer(const PingPongOptions& options) {
   BareNode node(options.qos_file, options.domain, "controller");
   Writer<Commands, CommandsPubSubType> writer(node);
-  std::vector<Commands> answers;  // one for each size of sample
+  std::vector<Commands> answers;  // one for each state sample of a step
   for (const States& state : make_states(options.vehicles)) answers.push_back(make_answer(state));
-  bool is_heard = false;  // until then nothing is answered, and the state comes again
+  bool is_heard = false;  // before that no state is answered; the other side sends it again
   std::size_t next = 0;
   Reader<States, StatesPubSubType> reader(node, [&](const States& state) {
     is_heard = is_heard || writer.count_matched() > 0;

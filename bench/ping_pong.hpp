@@ -1,5 +1,5 @@
-/// How fast two processes can exchange the loop's samples over Fast DDS when nothing else is done:
-/// the middleware's share of the bound of `./sls bench`. README.md.
+/// Measures how fast two processes can exchange the loop's samples over Fast DDS without other
+/// work: the middleware's part of the bound of `./sls bench`. README.md.
 #pragma once
 
 #include <cstdint>
@@ -14,13 +14,14 @@ struct PingPongOptions {
   std::uint32_t vehicles = 1;         ///< up to 64 in each sample
   std::uint64_t round_trips = 20000;  ///< measured
   std::uint64_t warm_up = 2000;       ///< before, not measured
-  bool may_spin = false;              ///< both ends, where sls::shared_locks is linked
+  bool may_spin = false;              ///< at both ends; has an effect only with sls::shared_locks
 };
 
-/// States out, commands back, each state sent when the answer to the one before has come. Both ends
-/// work on the middleware's thread. The other end is a process of its own, which runs `answer`.
-/// Returns the round trips as Latencies does, and `lost`, the states that had to be sent again.
-/// @throws app::RunError if nobody answers.
+/// Sends states and receives commands: each state is sent after the answer to the previous one.
+/// Both ends work on the middleware's thread. The other end is a separate process, which runs
+/// `answer`. Returns the round trips as Latencies::to_json does, and `lost`, the number of times
+/// that the states of a step were sent again.
+/// @throws app::RunError if no process answers.
 nlohmann::json ping(const PingPongOptions& options);
 
 /// Answers states until a stop signal.

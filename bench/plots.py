@@ -6,7 +6,7 @@ from typing import Any
 import matplotlib
 
 matplotlib.use("Agg")
-from matplotlib import pyplot  # noqa: E402  (after the choice of how to draw)
+from matplotlib import pyplot  # noqa: E402  (after the choice of the backend)
 
 KINDS = ("png", "svg")
 

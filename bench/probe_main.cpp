@@ -1,5 +1,5 @@
-// The measurements of `./sls bench` that are neither programs of their own nor benchmarks of one
-// function. Each prints one line of JSON on stdout (stamps: CSV). README.md.
+// The measurements of `./sls bench` for which there is no other program: sls_microbench has those
+// of single functions. Each prints one line of JSON on stdout (stamps: CSV). README.md.
 #include <sched.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
@@ -33,7 +33,7 @@ using namespace sls;
 
 void print(const nlohmann::json& json) { std::puts(json.dump().c_str()); }
 
-/// The other process of the ping-pong, which ends with this one.
+/// The other process of the ping-pong. It ends with this process.
 class AnsweringProcess {
  public:
   explicit AnsweringProcess(const bench::PingPongOptions& options) {
@@ -63,10 +63,10 @@ class AnsweringProcess {
   pid_t id_ = -1;
 };
 
-/// Of two processes, where they were chosen: the first is this one.
+/// The processors of this process and of the other one; empty: no choice.
 using Processors = std::vector<int>;
 
-/// This thread and what it starts from now on.
+/// Sets the processor of this thread and of all that it starts later.
 void stay_on(const Processors& processors, std::size_t process) {
   if (processors.empty()) return;
   cpu_set_t set;
@@ -76,7 +76,8 @@ void stay_on(const Processors& processors, std::size_t process) {
     throw app::RunError("processor " + std::to_string(processors[process]) + ": cannot run there");
 }
 
-/// One process: the parts of a step, and a whole step with files where there is a folder for them.
+/// Times a flight in one process: the parts of a step and, if `folder` is not empty, a whole step
+/// with recorded files.
 nlohmann::json time_flight(const config::Scenario& scenario, const std::filesystem::path& folder) {
   using Clock = std::chrono::steady_clock;
   using Microseconds = std::chrono::duration<double, std::micro>;

@@ -1,4 +1,4 @@
-"""Starts the programs, waits for them with deadlines and leaves none behind."""
+"""Starts the programs, waits for them with deadlines and ends all of them."""
 
 import contextlib
 import json
@@ -21,7 +21,7 @@ LONGEST_S = 300.0  # of one flight
 
 
 class MeasurementError(Exception):
-    """A program did not do what was to be measured."""
+    """A program did not do what the measurement needs."""
 
 
 @dataclass
@@ -30,8 +30,8 @@ class Flight:
 
     steps: int
     steps_per_s: float
-    label: str  # timing, as the server says it
-    wall_s: float  # from starting the programs to the end of all
+    label: str  # timing, as the server prints it
+    wall_s: float  # from the start of the programs to the end of all
     server_memory_kb: int  # resident, the largest seen
     processor_s: dict[str, float]  # user and system time of each program, start and end included
     recording: Path | None
@@ -39,24 +39,24 @@ class Flight:
 
     @property
     def processor_us(self) -> dict[str, float]:
-        """Of each program, for a step."""
+        """Processor time of each program per step."""
         return {name: time * 1e6 / self.steps for name, time in self.processor_s.items()}
 
     @property
     def lost(self) -> int:
-        """Samples that the recording lacks."""
+        """Number of samples that are missing in the recording."""
         gaps = self.manifest.get("missing", [])
         return (sum(gap["to"] - gap["from"] + 1 for gap in gaps)
                 + self.manifest.get("refused_samples", 0))
 
 
 START = ["setpriv", "--pdeathsig", "TERM", "--"]
-# Ends by itself after ten minutes of processor time, should nobody end it.
+# The limit ends it after ten minutes of processor time, in case no program does.
 COUNTING = ["sh", "-c", "ulimit -t 600; while :; do n=$((n + 1)); done"]
 
 
 def wait_for(process: subprocess.Popen[bytes], deadline: float) -> float:
-    """Until it ends: s of processor time that it took."""
+    """Waits for the end of `process`. Returns its processor time, s."""
     while time.monotonic() < deadline:
         ended, status, usage = os.wait4(process.pid, os.WNOHANG)
         if ended:
@@ -79,7 +79,7 @@ class Programs:
         return self.scratch / f"{self.count}{suffix}"
 
     def scenario(self, name: str, change: Callable[[str], str] = lambda text: text) -> Path:
-        """A shipped scenario, changed."""
+        """A changed copy of a shipped scenario."""
         text = change((ROOT / "config/scenarios" / f"{name}.yaml").read_text())
         path = self.make_path(".yaml")
         path.write_text(text)
@@ -91,7 +91,7 @@ class Programs:
     # --- one program ------------------------------------------------------------------------------
 
     def start(self, command: list[str], log: Path, may_spin: bool = True) -> subprocess.Popen[bytes]:
-        """The kernel ends it should we be killed."""
+        """The kernel ends the process if this program is killed."""
         environment = {name: value for name, value in os.environ.items() if name != "SLS_SPIN"}
         if not may_spin:
             environment["SLS_SPIN"] = "off"
@@ -100,7 +100,7 @@ class Programs:
                                     stdin=subprocess.DEVNULL, env=environment)
 
     def run(self, *words: str | Path) -> str:
-        """stdout of a program that must end well."""
+        """Runs a program, which must end with exit code 0. Returns its stdout."""
         command = [str(word) for word in words]
         try:
             done = subprocess.run([*START, *command], capture_output=True, text=True,
@@ -114,13 +114,13 @@ class Programs:
         return done.stdout
 
     def probe(self, subcommand: str, *words: str | Path, may_spin: bool = False) -> Any:
-        """The JSON that bench's own program prints; `may_spin` where Fast DDS waits in it."""
+        """The JSON that sls_bench_probe prints; with `may_spin`, Fast DDS in it spins while it waits."""
         program = self.build / "bin/sls_bench_spinning_probe" if may_spin else self.probe_program
         return json.loads(self.run(program, subcommand, *["--spin"] * may_spin, *words))
 
     @contextlib.contextmanager
     def busy_loops(self, count: int) -> Iterator[list[subprocess.Popen[bytes]]]:
-        """Processes that only count, for as long as the context lasts."""
+        """Processes that only count, until the context ends."""
         loops: list[subprocess.Popen[bytes]] = []
         try:
             for _ in range(count):
@@ -134,8 +134,8 @@ class Programs:
     def fly(self, scenario: Path, *, qos: str | Path = "default", is_recorded: bool = True,
             server: tuple[str, ...] = (), during: Callable[[], None] | None = None,
             may_spin: bool = True) -> Flight:
-        """Flies `scenario`; `during` is called while it flies. Where they may not spin, the threads
-        of server and client that wait for an answer block at once."""
+        """Flies `scenario` and calls `during` in the flight. Without `may_spin`, the threads of server
+        and client that wait for an answer block at once."""
         common = ["--domain", str(self.domain), "--qos", str(self.qos(qos))]
         programs = {name: str(self.build / "bin" / name)
                     for name in ("recorder", "sim_server", "control_client")}
@@ -171,7 +171,7 @@ class Programs:
 
 
 class MemoryWatch:
-    """The largest resident memory of a process, looked at ten times a second."""
+    """The largest resident memory of a process, read ten times a second."""
 
     def __init__(self, process_id: int):
         self.largest = 0
@@ -196,7 +196,7 @@ def end_all(processes: list[subprocess.Popen[bytes]]) -> None:
             process.send_signal(signal.SIGTERM)
     for process in processes:
         try:
-            process.wait(timeout=30)  # longer than a program that hangs is patient with itself
+            process.wait(timeout=30)  # longer than a blocked program takes to end itself
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()

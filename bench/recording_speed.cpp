@@ -53,7 +53,7 @@ class ScratchFolder {
   const fs::path path_;
 };
 
-/// A CSV file with what the C library has for buffering.
+/// A CSV file with the buffer of the C library.
 class PlainFile {
  public:
   PlainFile(const fs::path& path, std::string_view header) {
@@ -114,7 +114,7 @@ double write_plain_files(std::vector<record::StepRows> steps, std::uint32_t vehi
   return calc_seconds(began);
 }
 
-/// The samples of a server.
+/// The samples that a server would publish.
 std::vector<RecordBatch> make_batches(const std::vector<RecordEntry>& entries,
                                       std::uint32_t vehicles) {
   constexpr std::size_t kEntries = 20;  // 12 KB

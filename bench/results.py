@@ -1,21 +1,21 @@
-"""Figures, their bounds and their ratios; as a table and as JSON. Nothing is measured here."""
+"""Figures, their bounds and their ratios, as a table and as JSON. This module measures nothing."""
 
 import math
 import statistics
 from dataclasses import dataclass, field
 from typing import Any
 
-LESS = "less"  # is better
+LESS = "less"  # a smaller value is better
 MORE = "more"
 
 
 @dataclass
 class Figure:
-    """One figure, measured once in each round, and in the same rounds what it could be at best.
+    """One figure, measured once in each round, and its bound, measured in the same rounds.
 
     `bounds` has one value for each of `values`, or none if there is no bound; both in `unit`.
-    `goal` is of the ratio if `is_goal_of_ratio`, else of the figure. `parts` of a figure in steps/s or
-    µs: where a step goes, in µs; they add up to it in each round.
+    `goal` is the goal of the ratio if `is_goal_of_ratio`, else of the figure. `parts` exist for a
+    figure in steps/s or µs: the parts of a step, in µs; in each round their sum is the step.
     """
 
     part: str
@@ -48,12 +48,12 @@ class Figure:
 
     @property
     def step_times(self) -> list[float]:
-        """µs, in each round."""
+        """Time of a step in each round, µs."""
         return [1e6 / value if self.unit == "steps/s" else value for value in self.values]
 
     @property
     def ratios(self) -> list[float]:
-        """Of each round: 1 at the bound, less where the figure falls short of it."""
+        """Ratio in each round: 1 at the bound, less if the figure is worse than its bound."""
         if self.better == MORE:
             return [value / bound for value, bound in zip(self.values, self.bounds)]
         return [bound / value for value, bound in zip(self.values, self.bounds)]
@@ -81,7 +81,7 @@ class Figure:
 
 
 class Rounds:
-    """The figures of a part in the making: each is added once in every round."""
+    """Collects the figures of a part: each is added once in every round."""
 
     def __init__(self, part: str):
         self.part = part
@@ -109,7 +109,7 @@ def summarize(values: list[float]) -> dict[str, Any]:
 
 
 def format_number(value: float) -> str:
-    """Three digits, or a whole number where that is more."""
+    """Three digits, or a whole number from 100 on."""
     if value == 0:
         return "0"
     if abs(value) >= 100:
@@ -147,7 +147,7 @@ def make_rows(figures: list[Figure]) -> list[tuple[str, ...]]:
 
 
 def format_lines(rows: list[tuple[str, ...]], left: tuple[int, ...]) -> list[str]:
-    """Columns as wide as they need, these set left."""
+    """Columns as wide as necessary; those of `left` are aligned left."""
     widths = [max(map(len, column)) for column in zip(*rows)]
     return ["  " + "  ".join(
         cell.ljust(width) if index in left else cell.rjust(width)
@@ -170,8 +170,8 @@ def format_parts(figures: list[Figure]) -> list[str]:
 
 
 def format_table(figures: list[Figure]) -> str:
-    """One line for each figure, a headed group of them for each part; bounds are named below each
-    group's head. Below all: where the steps go."""
+    """One line for each figure. The lines of a part form a group with a heading and the names of its
+    bounds. At the end: the parts of the steps."""
     header, *lines = format_lines([HEADER, *make_rows(figures)], left=(0, 1, 5))
     text = [header]
     part = ""

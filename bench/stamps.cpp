@@ -19,7 +19,7 @@ using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
 constexpr double kPatience_s = 20.0;       // for the first sample
-constexpr auto kSilenceOfHistory = 300ms;  // after which all of it has come
+constexpr auto kSilenceOfHistory = 300ms;  // after it, the history is complete
 constexpr auto kSilenceOfRun = 2s;
 
 struct Stamp {
@@ -37,7 +37,7 @@ class Listener {
           last_ = Clock::now();
         }) {}
 
-  /// Nothing has come for `silence`, but something before.
+  /// True if at least one sample came, and none for `silence`.
   bool is_over(Clock::duration silence) const {
     const std::lock_guard lock(mutex_);
     return !stamps_.empty() && Clock::now() - last_ > silence;
@@ -46,7 +46,9 @@ class Listener {
     const std::lock_guard lock(mutex_);
     return stamps_.empty();
   }
-  const std::vector<Stamp>& stamps() const { return stamps_; }  // when it is over
+  const std::vector<Stamp>& stamps() const {
+    return stamps_;
+  }  // without lock: call it when is_over
 
  private:
   mutable std::mutex mutex_;

@@ -4,8 +4,8 @@
 
 namespace sls::bench {
 
-/// How late a thread wakes that sleeps until each multiple of `period_s`, for `seconds`: the bound
-/// of a real-time loop that does nothing. As Latencies.
+/// Measures for `seconds` how late a thread wakes up that sleeps until each multiple of `period_s`:
+/// the bound of every real-time loop. Returns the same as Latencies::to_json.
 nlohmann::json measure_timer(double period_s, double seconds);
 
 }  // namespace sls::bench

@@ -1,4 +1,4 @@
-"""sls_view beside a flight: what looking costs."""
+"""The cost of sls_view during a flight."""
 
 import base64
 import contextlib
@@ -16,7 +16,7 @@ from bench.loop import PERIOD_S, lasting
 from bench.programs import Flight, MeasurementError, Programs, end_all
 from bench.results import LESS, Figure, Rounds
 
-VIEWERS = 3  # one of them is stopped once it has shown something
+VIEWERS = 3  # one of them is stopped after its first pose
 LONGEST_WAIT_S = 30.0
 BINARY = 2  # opcode of poses and rows; text is greeting and status
 
@@ -39,8 +39,8 @@ def read_exactly(stream: BinaryIO, size: int) -> bytes:
 
 
 class Page:
-    """A browser's end of a viewer, as on another machine: empties the socket from time to time and
-    decodes nothing once a flight is shown, so that it costs nothing here."""
+    """The browser's end of a viewer. It imitates a browser on another machine: it empties the socket
+    from time to time and decodes nothing after the first pose, so it costs nearly no time here."""
 
     def __init__(self, port: int):
         self.is_flight_shown = False
@@ -84,7 +84,7 @@ class Viewer:
         self.page = Page(int(found[1]))
 
     def wait_for_flight(self) -> None:
-        """Waits until its page has a pose."""
+        """Waits until the page has received a pose."""
         deadline = time.monotonic() + LONGEST_WAIT_S
         while self.page and not self.page.is_flight_shown:
             if time.monotonic() > deadline:
@@ -111,7 +111,7 @@ def look_on(programs: Programs, count: int) -> Iterator[list[Viewer]]:
 
 
 def read_processor_s(viewer: Viewer) -> float:
-    """So far: user and system time."""
+    """User and system time so far."""
     fields = Path(f"/proc/{viewer.process.pid}/stat").read_text().rpartition(") ")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
@@ -129,7 +129,7 @@ def fly(programs: Programs, scenario: Path, viewers: list[Viewer]) -> Flight:
 
 
 def measure_view(programs: Programs, rounds: int, is_quick: bool) -> list[Figure]:
-    """Flights in lockstep, in alternation with and without viewers."""
+    """Flights in lockstep, alternately with and without viewers."""
     figures = Rounds("view")
     scenario = programs.scenario("figure_eight", lasting(16 if is_quick else 240))
     for index in range(rounds):
