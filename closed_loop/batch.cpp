@@ -11,7 +11,7 @@
 namespace sls::closed_loop {
 namespace {
 
-constexpr std::size_t kBlock = 32;  // loops that a thread takes at once: some 10 µs of work
+constexpr std::size_t kBlock = 32;  // loops that a thread takes at once: about 10 µs of work
 
 void allocate(LoopStates& states, std::size_t count, bool has_attitude) {
   const auto rows = static_cast<Eigen::Index>(count);
@@ -67,7 +67,7 @@ Batch::Batch(const config::Scenario& scenario, std::size_t count, const BatchOpt
     stages_.push_back({start_ns, control::make_reference_trajectory(stage.reference)});
     const auto* leave = std::get_if<config::LeaveAfter>(&stage.leave);
     if (!leave) break;
-    // It ends at the first step that is so much later.
+    // The stage ends at the first step at or after its duration.
     const std::int64_t period_ns = scenario_.sync.period_ns;
     start_ns += (leave->duration_ns + period_ns - 1) / period_ns * period_ns;
   }

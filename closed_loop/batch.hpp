@@ -1,6 +1,6 @@
 /// Many loops of one scenario at once, without controllers: the caller gives the forces. For
-/// learning and optimisation. A loop is bit for bit a Flight whose controller answers those forces,
-/// however many loops and threads there are.
+/// learning and optimisation. Each loop has the same bits as a Flight whose controller returns
+/// these forces, for any number of loops and threads.
 #pragma once
 
 #include <Eigen/Core>
@@ -29,19 +29,19 @@ struct LoopStates {
   Vectors quad_position, quad_velocity, load_position, load_velocity;
   Pairs angles, angle_rates;  ///< (alpha, beta) of the rod
   Quaternions attitude;       ///< (w, x, y, z) of q_WB; no rows for plants without attitude
-  Vectors body_rates;         ///< w_WB_B; the same
+  Vectors body_rates;         ///< w_WB_B; no rows for plants without attitude
 };
 
-/// How a loop begins.
+/// Start of a loop.
 struct LoopStart {
   config::InitialState initial;
   std::uint64_t seed_shift = 0;  ///< added to each seed of the scenario's faults
 };
 
 struct BatchOptions {
-  std::uint32_t vehicle = 0;               ///< of the scenario's fleet; each loop flies this one
-  std::size_t threads = 1;                 ///< that share the work of a step, the caller included
-  std::string controller_name = "python";  ///< in reasons
+  std::uint32_t vehicle = 0;               ///< of the scenario's fleet; the same in all loops
+  std::size_t threads = 1;                 ///< share the work of a step; includes the caller's
+  std::string controller_name = "python";  ///< in the texts of `failure`
 };
 
 class Batch {
@@ -52,41 +52,42 @@ class Batch {
 
   std::size_t count() const { return loops_.size(); }
   std::int64_t period_ns() const { return scenario_.sync.period_ns; }
-  /// That of the vehicle alone.
+  /// The scenario of the one vehicle.
   const config::Scenario& scenario() const { return scenario_; }
   bool has_attitude() const { return has_attitude_; }
-  /// Whether what the controllers see can differ from the truth.
+  /// True if the measured state can differ from the truth.
   bool can_measurement_differ() const { return can_measurement_differ_; }
 
-  /// Puts the loops `which` back to step 0 as `starts`, one for each, says. None if it throws.
-  /// @throws config::ConfigError as the plant does, or for an attitude that the plant has not.
+  /// Resets the loops `which` to step 0, each with its element of `starts`. If it throws, no loop
+  /// is reset.
+  /// @throws config::ConfigError as the plant does, or for an attitude if the plant has none.
   void reset(const std::vector<std::size_t>& which, const std::vector<LoopStart>& starts);
 
-  /// Moves each loop over one period under its row of `forces` (count × 3, N, in W), held. A loop
-  /// whose force the server would refuse, or whose plant cannot go on, has failed: it stays where
-  /// it is until its reset.
+  /// Moves each loop by one period, with its row of `forces` (count × 3, N, in W) held constant. A
+  /// loop fails if the server would refuse its force or if its plant throws; its state then stays
+  /// the same until its reset.
   void step(const double* forces);
 
   const LoopStates& truth() const { return truth_; }
-  /// By sensors, estimator and faults: what controllers see.
+  /// The states after sensors, estimator and faults: the input of controllers.
   const LoopStates& measured() const { return can_measurement_differ_ ? measured_ : truth_; }
 
   // One entry for each loop.
   const std::vector<std::uint64_t>& steps() const { return steps_; }
   const std::vector<double>& times() const { return times_; }              ///< s
   const std::vector<std::uint8_t>& has_failed() const { return failed_; }  ///< 0 or 1
-  /// One line; empty: it has not.
+  /// Reason of the failure, one line; empty if the loop has not failed.
   const std::string& failure(std::size_t loop) const { return loops_[loop].failure; }
 
-  /// The mission's reference `time_ns` after step 0, for stages that follow each other by their
-  /// time. A stage that is left by a radius has no time to end at: it is the last one.
+  /// The mission's reference `time_ns` after step 0. A stage with a duration ends at its time. A
+  /// stage that ends by a radius has no known end, so it counts as the last one.
   model::Reference calc_reference(std::int64_t time_ns) const;
 
  private:
   struct Loop {
     std::unique_ptr<sim::Plant> plant;
     std::unique_ptr<sim::FaultLine> faults;
-    std::vector<Eigen::Vector3d> force;  // the one that acts; kept to spare allocation
+    std::vector<Eigen::Vector3d> force;  // the applied force; a member to avoid allocation
     std::string failure;
   };
   struct StageSpan {
@@ -96,7 +97,7 @@ class Batch {
 
   Loop make_loop(const LoopStart& start) const;
   void move(std::size_t index, const Eigen::Vector3d& f_Q_W);
-  /// Shows loop `index` at its step.
+  /// Copies the state of loop `index` into its rows of truth_ and measured_.
   void show(std::size_t index);
   void fail(std::size_t index, const std::string& reason);
 

@@ -7,8 +7,8 @@
 namespace sls::closed_loop {
 namespace {
 
-/// The scenario of `draft`, to which another control period is added. The step of the plant becomes
-/// at most as long, as with --period-s.
+/// The scenario of `draft`, after `period_s` is set in both. As with --period-s, the step of the
+/// plant then becomes at most as long as the period.
 config::Scenario put_in_force(std::optional<double> period_s, config::ScenarioDraft& draft) {
   config::Scenario scenario = draft.make_scenario();
   if (!period_s) return scenario;
@@ -18,7 +18,7 @@ config::Scenario put_in_force(std::optional<double> period_s, config::ScenarioDr
   return draft.make_scenario();
 }
 
-/// Calls `work`, whose errors do not name the file.
+/// Calls `work` and adds the name of the file to a ConfigError without it.
 template <class Work>
 auto name_file(const std::filesystem::path& file, const Work& work) {
   try {

@@ -23,16 +23,17 @@ class CampaignRuns {
 
   const std::vector<std::string>& columns() const { return measures_.columns(); }
 
-  /// The scenario with these YAML values, one for each path. A file in the folder of `base` with
-  /// its `text` is the same scenario.
-  /// @throws config::ConfigError as reading that file does; lines are those of `base`.
+  /// The scenario with these YAML values, one for each path. Its `text`, saved as a file in the
+  /// folder of `base`, gives the same scenario.
+  /// @throws config::ConfigError as reading that file does; line numbers are those of `base`.
   config::Scenario make_scenario(const std::vector<std::string>& values) const;
 
   /// @throws config::ConfigError as make_scenario and fly_measured do.
   MeasuredFlight fly(const std::vector<std::string>& values, bool certify,
                      const Poll& poll = {}) const;
 
-  /// @throws config::ConfigError if `fly` does; flies nothing.
+  /// Checks the values without a flight.
+  /// @throws config::ConfigError if `fly` would.
   void check(const std::vector<std::string>& values) const;
 
  private:

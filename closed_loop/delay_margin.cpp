@@ -22,12 +22,12 @@ config::Scenario make_delayed(config::Scenario scenario, std::int64_t periods) {
   fault.kind = "delay";
   fault.on = config::FaultChannel::kCommand;
   fault.effect = config::DelayFault{periods * scenario.sync.period_ns};
-  scenario.faults.push_back(fault);  // last: the numbers of random faults depend on their places
+  scenario.faults.push_back(fault);  // last: random numbers depend on a fault's place
   return scenario;
 }
 
-/// Flies until the end or the loss. `judge` says of a step and its error why the load is lost, or
-/// nothing.
+/// Flies until the end or the loss. `judge` returns the reason if the load is lost at this step,
+/// else an empty text.
 template <class Judge>
 DelayedFlight fly(const config::Scenario& scenario, std::int64_t periods, const Judge& judge) {
   Flight flight(make_delayed(scenario, periods));
@@ -50,7 +50,7 @@ DelayedFlight fly(const config::Scenario& scenario, std::int64_t periods, const 
   return result;
 }
 
-/// The flight without added delay, by which the others are judged.
+/// The flight without added delay, with which the others are compared.
 DelayedFlight fly_undelayed(const config::Scenario& scenario, ErrorHistory& errors) {
   DelayedFlight result = fly(scenario, 0, [&](const FlownStep& step, double error) {
     errors.add(step, error);

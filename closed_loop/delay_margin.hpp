@@ -1,5 +1,5 @@
-/// How much later than meant a force may act before the controller loses the load. README.md says
-/// what that means and how it is searched.
+/// Delay margin: the longest delay of the force at which the controller does not lose the load.
+/// Definition and search: README.md.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@ struct DelayedFlight {
   std::int64_t periods = 0;
   double worst_error = 0.0;  ///< largest distance of the load from its reference, m
   double rms_error = 0.0;    ///< over all steps flown, m
-  std::string loss;          ///< why and when the load was lost; empty if it was not
+  std::string loss;          ///< reason and time of the loss; empty if the load was not lost
   bool is_lost() const { return !loss.empty(); }
 };
 
@@ -24,15 +24,15 @@ struct DelayMargin {
   std::int64_t period_ns = 0;
   std::vector<DelayedFlight> flights;  ///< all that were flown, in order of delay
 
-  /// The longest delay below which no flight was lost, and the next longer one, which was. Without
-  /// one that was lost, the latter is null.
+  /// The flight with the longest delay below the shortest lost one, and the shortest lost one. If
+  /// no flight was lost, the latter is null.
   const DelayedFlight* longest_held() const;
   const DelayedFlight* shortest_lost() const;
 };
 
 /// Finds the margin to one control period by doubling and bisection, up to 10 s or 100,000 periods.
-/// The delay comes on top of the scenario's own faults. `after_flight` is called after each flight,
-/// and may throw to end the search.
+/// The delay is added to the scenario's own faults. `after_flight` is called after each flight and
+/// may throw to end the search.
 /// @throws std::runtime_error if the scenario loses the load without any added delay.
 DelayMargin find_delay_margin(const config::Scenario& scenario,
                               const std::function<void(const DelayedFlight&)>& after_flight = {});

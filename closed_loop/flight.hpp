@@ -1,6 +1,6 @@
 /// The closed loop in one process and one thread: plants, faults, missions, controllers and the
-/// judgement of their answers, with neither DDS nor a clock. A flight is bit for bit what the
-/// programs record in lockstep.
+/// judgement of their answers, without DDS and without a clock. A flight has the same bits as a
+/// recording of the programs in lockstep.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,16 +20,16 @@
 
 namespace sls::closed_loop {
 
-/// One control period of one vehicle: what was true, what was measured, what was answered.
+/// One control period of one vehicle: true state, measured state, answer.
 struct FlownStep {
   std::uint64_t step = 0;
   model::Measurement truth;
-  model::Measurement measured;  ///< by sensors, estimator and faults: what the controller answered
+  model::Measurement measured;  ///< after sensors, estimator and faults: the controller's input
   bool can_measurement_differ = false;                       ///< from the truth
   Eigen::Vector3d answered_f_Q_W = Eigen::Vector3d::Zero();  ///< for [step − 1, step), N; 0 at 0
   Eigen::Vector3d applied_f_Q_W = Eigen::Vector3d::Zero();   ///< the same after faults
   control::Answer answer;
-  std::chrono::nanoseconds compute_time{0};  ///< wall time of the answer, where it is measured
+  std::chrono::nanoseconds compute_time{0};  ///< wall time of the answer, if it is measured
 };
 
 struct FlightOptions {
@@ -41,36 +41,37 @@ struct FlightOptions {
 
 class Flight {
  public:
-  /// At step 0 of the vehicles `ids` (ascending) of `scenario`, whose period is the one in force.
+  /// Begins at step 0, with the vehicles `ids` (ascending) of `scenario`, whose period is the one
+  /// in force.
   /// @throws config::ConfigError as plant and controller do.
   Flight(const config::Scenario& scenario, const std::vector<std::uint32_t>& ids,
          const FlightOptions& options = {});
-  /// Of one vehicle.
+  /// A flight of one vehicle.
   explicit Flight(const config::Scenario& scenario, std::uint32_t vehicle = 0)
       : Flight(scenario, std::vector<std::uint32_t>{vehicle}) {}
 
-  /// Flies the next step of all vehicles, up to the one whose answers end the flight: that of the
-  /// first, by which `steps` has those of all. Null when the flight has ended.
+  /// Flies the next step of all vehicles; the last step is the one whose answers end the flight.
+  /// Returns the step of the first vehicle; `steps` has those of all. Null after the end.
   const FlownStep* fly_step();
 
   /// The last step of every vehicle, in the order of the ids.
   const std::vector<FlownStep>& steps() const { return steps_; }
 
-  /// Whether the last answer of the `index`th vehicle failed the flight.
+  /// True if the last answer of the vehicle with this index failed the flight.
   bool is_refused(std::size_t index) const { return refused_ == index; }
   /// The index of that vehicle.
   const std::optional<std::size_t>& refused() const { return refused_; }
 
-  /// Whether a law that is broken ended the flight: it threw, or answers equal inputs differently.
+  /// True if a broken law ended the flight: it threw, or gave different answers to equal inputs.
   bool is_law_broken() const { return is_law_broken_; }
 
-  /// That of the first vehicle.
+  /// The plant of the first vehicle.
   const sim::Plant& plant() const { return *plants_.front().plant; }
 
   /// Remarks of the plants on their vehicles since the last call.
   std::vector<std::string> take_remarks();
 
-  /// Why the flight failed, once it has ended; empty if every mission was finished.
+  /// After the end: why the flight failed; empty if every mission was finished.
   const std::string& failure() const { return failure_; }
 
  private:
@@ -80,9 +81,9 @@ class Flight {
     control::FlightController controller;
   };
 
-  /// Moves the plants over the period after the last step. False, with the failure, if one cannot.
+  /// Moves the plants by one period. If a plant throws, returns false and sets the failure.
   bool advance();
-  /// Whether the answers end the flight, judged as the server does.
+  /// True if the answers end the flight, judged as the server does.
   bool is_last();
   std::string name_vehicle(std::size_t index) const;
 

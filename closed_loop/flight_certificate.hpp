@@ -11,24 +11,24 @@
 
 namespace sls::closed_loop {
 
-/// That of the recording which fly_recorded leaves of the same flight: made of the recorder's own
-/// rows.
+/// Equal to the certificate of the recording that fly_recorded makes of the same flight, because
+/// both are made from the recorder's rows.
 class FlightCertificate {
  public:
-  /// Of vehicles that are moved by `plant` or ones like it, with the period in force.
+  /// For vehicles with `plant` or equal plants, and with the period in force.
   FlightCertificate(std::int64_t period_ns, const sim::Plant& plant);
-  /// Of the flight that a server announces with `parameters`.
+  /// For the flight that a server announces with `parameters`.
   explicit FlightCertificate(const Parameters& parameters) : parameters_(parameters) {}
 
-  /// Adds what was flown of a step; of one vehicle in step order.
+  /// Adds a step. The steps of each vehicle must come in order.
   void add(std::uint32_t vehicle_id, const FlownStep& flown, bool is_refused);
 
   /// 64 lower-case hex digits; nothing can be added after it.
   std::string finish() { return certificate_.finish(); }
 
  private:
-  Parameters parameters_;  // as far as rows depend on them
-  RecordEntry entry_;      // both used again and again, to keep their memory
+  Parameters parameters_;  // only the members on which rows depend
+  RecordEntry entry_;      // reused like rows_, to avoid allocation
   record::StepRows rows_;
   record::Certificate certificate_;
 };

@@ -12,7 +12,7 @@ namespace {
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kSettlingBand = 0.02;
-/// A stage that begins nearer than this to its target has no step response. m.
+/// A stage that begins closer than this to its target has no step response, m.
 constexpr double kLeastStep = 0.01;
 constexpr std::array<const char*, 3> kAxes = {"x", "y", "z"};
 constexpr std::array<const char*, 8> kMeasures = {"load_error_rms", "load_error_max", "settling",

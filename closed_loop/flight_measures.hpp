@@ -14,18 +14,18 @@
 
 namespace sls::closed_loop {
 
-/// The measures of each flight of a campaign, and their stages: those of its base scenario.
+/// The measures of each flight of a campaign, and the stages of its base scenario.
 class MeasureList {
  public:
   /// `names` are load_error_rms, load_error_max, settling, overshoot, tilt_max, force_max,
-  /// time_of_loss and outcome, which is no number and has no column.
+  /// time_of_loss and outcome. `outcome` is no number, so it has no column here.
   /// @throws config::ConfigError for another name.
   MeasureList(const config::Scenario& base, std::vector<std::string> names);
 
   const std::vector<std::string>& names() const { return names_; }
-  /// Whether the reference of each stage is constant.
+  /// For each stage: true if its reference is constant.
   const std::vector<bool>& stages() const { return stages_; }
-  /// Of all measures, in their order.
+  /// The columns of all measures, in order.
   const std::vector<std::string>& columns() const { return columns_; }
 
  private:
@@ -36,10 +36,10 @@ class MeasureList {
 
 class FlightMeasures {
  public:
-  /// Of a flight of one vehicle with this control period; `list` must outlive it.
+  /// For a flight of one vehicle with this control period. `list` must outlive it.
   FlightMeasures(const MeasureList& list, std::int64_t period_ns);
 
-  /// In step order, from step 0.
+  /// Adds a step, in order from step 0.
   void add(const FlownStep& step);
 
   /// A value for each column of the list; NaN if it is not defined.
@@ -49,7 +49,7 @@ class FlightMeasures {
   friend class MeasureList;
   using NamedValue = std::pair<std::string, double>;
 
-  /// Load position error over a stretch of the flight.
+  /// Load position error over a part of the flight.
   struct Errors {
     void add(const Eigen::Array3d& error);
     Eigen::Array3d calc_rms() const;
@@ -63,7 +63,7 @@ class FlightMeasures {
     double max_square_of_norm = 0.0;                         // m²
   };
 
-  /// How the load goes to a constant reference, per axis.
+  /// Step response of the load to a constant reference, per axis.
   struct Step {
     void add(const FlownStep& step, double time_s);
     double calc_settling_time(int axis) const;
@@ -75,7 +75,7 @@ class FlightMeasures {
     double start_s = 0.0;
     Eigen::Array3d target = Eigen::Array3d::Zero();           // m
     Eigen::Array3d size = Eigen::Array3d::Zero();             // d, m
-    Eigen::Array3d settled_since_s = Eigen::Array3d::Zero();  // NaN: outside of the band
+    Eigen::Array3d settled_since_s = Eigen::Array3d::Zero();  // NaN: outside the band
     Eigen::Array3d overshoot = Eigen::Array3d::Zero();
   };
 

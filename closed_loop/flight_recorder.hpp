@@ -16,28 +16,28 @@
 
 namespace sls::closed_loop {
 
-/// Takes the steps of a flight and writes what server, client and recorder of it would have left.
-/// Every member @throws std::system_error naming the file when the disk refuses.
+/// Writes the steps of a flight as a recording, as server, client and recorder would.
+/// Every member @throws std::system_error with the name of the file if it cannot be written.
 class FlightRecorder {
  public:
-  /// Opens the files in `folder`, new or empty; with `force`, instead of the recording that is
-  /// there. `parameters` are those that the flight's server would publish.
+  /// Opens the files in `folder`, which must be new or empty; with `force`, an old recording in it
+  /// is replaced. `parameters` are those that the flight's server would publish.
   /// @throws config::ConfigError for the folder.
   FlightRecorder(const std::filesystem::path& folder, bool force, const Parameters& parameters,
                  const config::Sync& sync, const std::string& controller_name);
 
-  /// One step of all vehicles, in the order of the parameters; the answer of the `refused`th failed
-  /// the flight.
+  /// Adds one step of all vehicles, in the order of the parameters. `refused` is the index of the
+  /// vehicle whose answer failed the flight.
   void add(const std::vector<FlownStep>& steps, std::optional<std::size_t> refused);
 
-  /// Whether the next sample of the status is due, with which remarks are announced.
+  /// True if the next status sample is due, before which remarks must be announced.
   bool is_status_due() const { return board_.is_due(); }
   void announce(const std::vector<std::string>& remarks);
 
-  /// Ends the recording of a flight that ended by itself; `failure` is empty if its missions
-  /// were finished. True if the recording is complete.
+  /// Ends the recording after the end of the flight; `failure` is empty if the missions were
+  /// finished. True if the recording is complete.
   bool finish(const std::string& failure);
-  /// Ends that of a flight that was broken off.
+  /// Ends the recording of an interrupted flight.
   void interrupt(const std::string& reason);
 
   std::uint64_t last_step() const { return board_.step; }

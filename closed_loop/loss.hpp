@@ -1,5 +1,4 @@
-/// When a flight has lost its load: the rule that delay margins and campaigns share. README.md says
-/// it.
+/// Loss of the load: the rule that delay margins and campaigns use. Definition: README.md.
 #pragma once
 
 #include <cstdint>
@@ -15,29 +14,28 @@ inline double calc_load_error(const FlownStep& step) {
   return (step.truth.p_WL - step.answer.reference.position).norm();
 }
 
-/// The load errors of a flight with which others are compared, by stage and step of the stage:
-/// another flight may leave a stage at another step, and is compared with the same moment of the
-/// same stage.
+/// The load errors of the flight with which others are compared, by stage and step in the stage.
+/// Another flight can leave a stage at another step, so it is compared at the same time since the
+/// start of the stage.
 class ErrorHistory {
  public:
   void add(const FlownStep& step, double error);
 
-  /// That at the moment of `step`, or at the end of its stage where that was shorter; 0 of a stage
-  /// that was never flown.
+  /// The error at the same stage and time as `step`; the last one of the stage if the stage was
+  /// shorter; 0 if the stage was never flown.
   double find(const FlownStep& step) const;
 
  private:
   std::vector<std::vector<double>> stages_;
 };
 
-/// Whether the load, `error` from its reference, is more than one rod length (m) further away than
-/// it was in the flight `base`.
+/// True if the load error `error` is more than one rod length (m) larger than in the flight `base`.
 inline bool is_load_lost(const FlownStep& step, double error, const ErrorHistory& base,
                          double rod_length) {
   return error - base.find(step) > rod_length;
 }
 
-/// Such a loss in words; `comparison` completes "further from its reference than …".
+/// A text for such a loss; `comparison` completes "further from its reference than …".
 std::string describe_loss(double rod_length, const std::string& comparison);
 
 /// Time of the last of `steps` answered steps, ns: when a flight ended or lost its load.

@@ -1,4 +1,4 @@
-/// A flight in one process that leaves the recording of a distributed one.
+/// A flight in one process with the same recording as a flight of the three programs.
 #pragma once
 
 #include <filesystem>
@@ -16,11 +16,11 @@ struct FlightEnd {
   bool is_complete = false;  ///< the recording
 };
 
-/// Flies all vehicles of `scenario` in lockstep and records them into `folder`, new or empty; with
-/// `force`, instead of the recording that is there. The files hold the same data, with the same
-/// certificate, as those of the three programs.
+/// Flies all vehicles of `scenario` in lockstep and records them in `folder`, which must be new or
+/// empty; with `force`, an old recording in it is replaced. The files hold the same data, with the
+/// same certificate, as those of the three programs.
 /// @throws config::ConfigError as Flight does, before the folder is touched, or for the folder.
-/// @throws std::system_error naming the file when the disk refuses.
+/// @throws std::system_error with the name of the file if it cannot be written.
 FlightEnd fly_recorded(const config::Scenario& scenario, const FlightOptions& options,
                        const std::filesystem::path& folder, bool force);
 

@@ -9,10 +9,11 @@ namespace sls::control {
 
 class AnswerStream {
  public:
-  /// Sees a sample of states, on a thread of the middleware.
+  /// Receives each sample of states, on a thread of the middleware.
   using Handler = std::function<void(const States& sample, const bus::PeerId& sender)>;
 
-  /// In real time commands are written with DEADLINE, where the QoS file has it.
+  /// If `is_realtime`, commands are written with DEADLINE, provided that the QoS file has that
+  /// profile.
   AnswerStream(bus::Node& node, bool is_realtime, Handler handler)
       : is_realtime_(is_realtime),
         commands_(node, is_realtime ? node.choose_writer_profile(bus::kRealtimeCommandWriterProfile,
@@ -25,7 +26,7 @@ class AnswerStream {
   /// Publishes the answers to one sample of states.
   void write(const Commands& answers) { commands_.write(answers); }
 
-  /// True if `server` is heard and hears.
+  /// True if reader and writer are both matched with `server`.
   bool sees_server(const bus::PeerId& server) const {
     return states_.matched().count(server) > 0 && commands_.matched().count(server) > 0;
   }

@@ -21,9 +21,9 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto kUsualJoinTime = 1500ms;      // a server's claim and discovery: no news
-constexpr double kAfterThePatience_s = 5.0;  // a law that does not return ends after the run
-constexpr auto kPollTime = 20ms;             // while nothing is in a hurry
+constexpr auto kUsualJoinTime = 1500ms;      // usual discovery and claim; no report before
+constexpr double kAfterThePatience_s = 5.0;  // so the run ends before a law that hangs
+constexpr auto kPollTime = 20ms;             // of the main thread, which is not urgent
 
 }  // namespace
 
@@ -82,7 +82,8 @@ std::optional<bus::Run> Client::find_first_run() {
   return std::nullopt;
 }
 
-/// "; " and what others on the domain do wrong, to be appended to a message about who is missing.
+/// "; " and the problems of other participants on the domain, to be appended to a message about a
+/// missing server. Empty without problems.
 std::string Client::describe_problem() const {
   const std::string problem = node_.problems().describe();
   return problem.empty() ? "" : "; " + problem;
@@ -111,7 +112,7 @@ void Client::begin(const bus::Run& run) {
     flown_ids_.push_back(id);
     pilots.try_emplace(id, config::make_vehicle_scenario(scenario, id), id, options_);
   }
-  // Made and destroyed outside the lock: the middleware waits for handlers meanwhile, and ours for
+  // Made and destroyed without the lock: both wait for running handlers, and our handler waits for
   // the lock.
   auto stream = stream_->is_realtime() == is_realtime ? nullptr : make_stream(is_realtime);
   {
@@ -249,7 +250,7 @@ Participant Client::make_announcement(const std::vector<std::uint32_t>& vehicle_
   return message;
 }
 
-/// The last step that all of our vehicles' states were answered of; −1: none.
+/// The last step of which the states of all our vehicles were answered; −1: none.
 std::int64_t Client::find_last_step() {
   const std::lock_guard lock(answer_mutex_);
   std::int64_t last = std::numeric_limits<std::int64_t>::max();

@@ -1,9 +1,9 @@
 /// The client: joins a server's run, answers every state sample, ends with the run.
 ///
-/// A sample is answered where it arrives, on the middleware's thread: the step waits for the
+/// A sample is answered on the middleware's thread, on which it arrives: the step waits for the
 /// answer, and handing the sample to another thread would make the round trip a quarter longer.
-/// Writing there must never block (common/bus/fastdds/README.md, trap 4): the profile of the loop's
-/// writers keeps the last samples rather than all of them.
+/// A write on that thread must never block (common/bus/fastdds/README.md, trap 4), so the profile
+/// of the loop's writers keeps only the last samples.
 #pragma once
 
 #include <chrono>
@@ -27,28 +27,29 @@
 
 namespace sls::control {
 
-/// "expected 1 to 32 letters, …, got 'NAME'" where `name` may not be that of a client; else empty.
+/// Returns "expected 1 to 32 letters, …, got 'NAME'" if a client cannot have this name; else empty.
 std::string describe_name_defect(const std::string& name);
 
 struct ClientOptions {
   std::string name = "control_client";  ///< in recordings and messages
   std::int32_t strength = 0;            ///< among several clients of a vehicle the strongest flies
-  /// When another server replaces the one it flies with, it flies on with that one; else it ends.
+  /// When another server replaces the present one: true: the client continues with it; false: the
+  /// client ends.
   bool follows_servers = false;
   bool checks_purity = false;  ///< as of FlightController
   LawMaker make_law = &make_control_law;
-  /// Asked 50 times a second: whether the client is to leave before the run has ended.
+  /// Called 50 times a second. True ends the client before the end of the run.
   std::function<bool()> is_stopped = [] { return app::stop_signal() != 0; };
 };
 
 class Client {
  public:
-  /// Will fly those of `vehicle_ids` (ascending, at least one) that the server it finds has.
+  /// Flies the vehicles of `vehicle_ids` (ascending, at least one) that its server has.
   /// @throws config::ConfigError if the law cannot be made.
   Client(bus::Node& node, const config::Scenario& scenario,
          const std::vector<std::uint32_t>& vehicle_ids, const ClientOptions& options);
 
-  /// Runs from joining to the end of the run, and of those that follow it after a reset.
+  /// Joins a run and answers its states until it ends; also the runs that follow it after a reset.
   /// @throws config::ConfigError if the server flies another scenario.
   /// @throws app::RunError if no server is found, it disappears, or the run fails.
   void run();
@@ -56,14 +57,15 @@ class Client {
  private:
   using Clock = std::chrono::steady_clock;
 
-  /// The run to begin with; nothing once it is stopped.
+  /// Waits for the first run to join; empty if the client is stopped.
   std::optional<bus::Run> find_first_run();
   std::unique_ptr<AnswerStream> make_stream(bool is_realtime);
   std::string describe_problem() const;
-  /// That of the first of our vehicles that has one.
+  /// The run of the first of our vehicles that has a joinable run.
   std::optional<bus::Run> find_joinable_run() const;
   void begin(const bus::Run& run);
-  /// Serves until the run has ended (nothing), or another one has taken its place.
+  /// Answers until the run has ended or the client is stopped (returns empty), or until another run
+  /// replaces it (returns that run).
   std::optional<bus::Run> serve();
   void leave();
 
@@ -78,7 +80,7 @@ class Client {
 
   /// Called by the middleware for every sample of states.
   void receive(const States& sample, const bus::PeerId& sender);
-  /// Answers states of the server whose run is joined; others' are nobody's business here.
+  /// Answers the states of the joined run and ignores those of other servers.
   void answer(const States& sample, const bus::PeerId& sender);
   const ControlCommand& answer(Pilot& pilot, std::uint64_t step, const VehicleState& state);
   void announce(bool ready, bool done);
@@ -87,10 +89,10 @@ class Client {
   void announce_waiting();
   Participant make_announcement(const std::vector<std::uint32_t>& vehicle_ids) const;
   std::int64_t find_last_step();
-  /// True when the run has ended, well or not.
+  /// True when the run has finished or failed.
   bool has_ended() const;
-  /// The run that has taken the place of ours: after a reset, or because the server was replaced.
-  /// @throws app::RunError if the server is gone for too long or was replaced, and not to follow.
+  /// The run that replaces ours, after a reset or with another server; empty if there is none.
+  /// @throws app::RunError if the server is lost, or is replaced without `follows_servers`.
   std::optional<bus::Run> find_successor();
   void rethrow_answer_error();
 
@@ -104,15 +106,15 @@ class Client {
   bus::Writer<Participant> participant_writer_;
   std::optional<bus::Run> run_;
   std::optional<bus::ServerWatch> watch_;
-  std::vector<std::uint32_t> flown_ids_;  // of vehicle_ids_, in this run
+  std::vector<std::uint32_t> flown_ids_;  // those of vehicle_ids_ that this run has
   bool ready_ = false;
 
   // Shared between the main thread and the middleware's.
-  std::mutex answer_mutex_;  // over all that `answer` touches
+  std::mutex answer_mutex_;  // guards all that `answer` uses
   std::map<std::uint32_t, Pilot> pilots_;
-  Commands answers_;  // to the sample in work
+  Commands answers_;  // to the current sample
   std::exception_ptr answer_error_;
-  /// Made for what the scenario says, and anew where the run is of another mode.
+  /// Made for the mode of the scenario, and made again if the run has another mode.
   std::unique_ptr<AnswerStream> stream_;  // last: its callbacks use the members above
 };
 

@@ -9,7 +9,7 @@ Eigen::Vector3d calc_drag_feed_forward(const Eigen::Vector3d& f_qsf_W, const Eig
   const double tolerance = kDragTolerance * f_qsf_W.norm();
   Eigen::Vector3d force = f_qsf_W;
   for (int iteration = 0; iteration < kMaxDragIterations; ++iteration) {
-    // Eq. (15). The change is the residual of the iterate before.
+    // Eq. (15). The change is the residual of the previous iterate.
     const Eigen::Vector3d next = f_qsf_W - model::calc_rotor_drag(force, v_WQ, air);
     const double change = (next - force).norm();
     force = next;

@@ -21,7 +21,7 @@ void fail(Answer& answer, Fault fault) {
   answer.fault = fault;
 }
 
-/// Bit for bit: a number that is not finite is no sign of impurity.
+/// Compares bits: NaN differs from itself, but is no sign of an impure law.
 bool are_equal(const double* a, const double* b, Eigen::Index count) {
   return std::memcmp(a, b, static_cast<std::size_t>(count) * sizeof(double)) == 0;
 }
@@ -59,7 +59,7 @@ struct FlightController::Parts {
 
   config::Controller controller;
   std::uint32_t vehicle_id;
-  double plant_rod_length;  ///< the truth, which only the gazebo wiring looks at
+  double plant_rod_length;  ///< true length; used only by the wiring `gazebo_plugin`
   double period;            ///< s
   Mission mission;
   std::unique_ptr<const ControlLaw> law;
@@ -115,7 +115,7 @@ Answer FlightController::calc_answer(std::uint64_t step, const model::Measuremen
   const Eigen::Index remembered = memory.numbers.size();
   if (!parts_->mission.is_possible(step, memory) ||
       (remembered != 0 && remembered != parts_->law->memory_size())) {
-    fail(answer, Fault::kNotFinite);  // a damaged sample: there is no stage to fly
+    fail(answer, Fault::kNotFinite);  // a damaged sample: its memory is impossible
     return answer;
   }
 

@@ -14,13 +14,12 @@
 
 namespace sls::control {
 
-/// All that a controller remembers. It travels in the command and comes back in the next state, so
-/// that any client can answer any sample. A run starts with the default,
-/// which stands for zeros.
+/// The memory of a controller. It travels in the command and comes back in the next state, so any
+/// client can answer any sample. A run starts with the default, which means zeros.
 struct ControllerMemory {
   std::uint32_t stage = 0;             ///< index into the mission; its size once it is over
   std::uint64_t stage_start_step = 0;  ///< step at which that stage began
-  model::Numbers numbers;              ///< the law's own; none yet where the run begins
+  model::Numbers numbers;              ///< those of the law; none at the start of a run
 };
 
 using model::Fault;
@@ -29,7 +28,7 @@ using model::MissionPhase;
 /// A pure function's result: equal inputs give equal bits.
 struct Answer {
   Eigen::Vector3d f_Q_W = Eigen::Vector3d::Zero();  ///< N; zero with a fault
-  ControllerMemory memory;                          ///< to be used at step + 1
+  ControllerMemory memory;                          ///< for step + 1
   MissionPhase mission = MissionPhase::kRunning;
   Fault fault = Fault::kNone;
   model::Reference reference;  ///< what the force follows
@@ -39,10 +38,10 @@ struct Answer {
 
 class FlightController {
  public:
-  /// Keeps what it needs of `scenario`; its period is the one in force.
+  /// Copies what it needs of `scenario`, whose period is the one in force. In the first 100 steps,
+  /// or in all if `checks_purity`, every answer is computed twice: a law that keeps a state between
+  /// calls is refused.
   /// @throws config::ConfigError if the LQR weights or the law have no solution.
-  /// In the first 100 steps, or in all if `checks_purity`, every answer is computed twice: a law
-  /// that keeps something between calls is refused.
   explicit FlightController(const config::Scenario& scenario, std::uint32_t vehicle_id = 0,
                             bool checks_purity = false,
                             const LawMaker& make_law = &make_control_law);
@@ -54,7 +53,7 @@ class FlightController {
   Answer calc_answer(std::uint64_t step, const model::Measurement& state,
                      const ControllerMemory& memory) const;
 
-  /// How many numbers the law remembers.
+  /// Number of memory numbers of the law.
   int memory_size() const;
 
  private:

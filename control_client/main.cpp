@@ -7,7 +7,7 @@
 
 namespace {
 
-constexpr const char* kIdentity = "controller";  // whose keys it uses on a secured domain
+constexpr const char* kIdentity = "controller";  // name of its keys on a secured domain
 
 }  // namespace
 
@@ -42,7 +42,7 @@ int main(int argc, char** argv) {
   return app::run_main(argc, argv, cli, options, "control_client", [&] {
     const config::Scenario scenario = config::load_scenario(scenario_file);
     const auto vehicle_ids = config::parse_vehicle_ids(vehicles, scenario.vehicles.size());
-    // A law that cannot be made is refused before other programs wait for this client.
+    // Refuses a law that cannot be made before other programs wait for this client.
     control::FlightController(config::make_vehicle_scenario(scenario, vehicle_ids.front()),
                               vehicle_ids.front());
     bus::Node node(options.qos_file, options.domain, "control_client", kIdentity);

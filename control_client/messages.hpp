@@ -1,4 +1,4 @@
-/// Between wire types and the controller's types.
+/// Conversion between wire types and the controller's types.
 #pragma once
 
 #include <chrono>
@@ -11,7 +11,7 @@ namespace sls::control {
 
 ControllerMemory to_memory(const ControllerState& message);
 
-/// Puts an answer into `message`, which may hold another one.
+/// Writes an answer into `message` and replaces all that it held.
 void fill_command_message(ControlCommand& message, std::uint32_t vehicle_id, const Answer& answer,
                           std::chrono::nanoseconds compute_time);
 

@@ -57,12 +57,13 @@ MissionProgress Mission::calc_progress(std::uint64_t step, const model::SlungLoa
   progress.stage = std::min(memory.stage, end - 1);
   progress.remembered_stage = memory.stage;
   progress.stage_start_step = memory.stage_start_step;
-  // A stage of no duration is left at the step it began: hence a loop, at most once per stage.
+  // A loop, because a stage without duration ends at the step at which it began; once per stage at
+  // most.
   while (true) {
     const FlownStage& stage = stages_[progress.stage];
     const std::int64_t elapsed_ns = calc_elapsed_ns(step, progress.stage_start_step);
     progress.reference = stage.trajectory->calc(to_seconds(elapsed_ns));
-    StageOutcome outcome = StageOutcome::kLeft;  // for good: a mission that is over stays so
+    StageOutcome outcome = StageOutcome::kLeft;  // a finished mission stays finished
     if (memory.stage < end)
       outcome = std::visit(
           [&](const auto& leave) { return judge(leave, elapsed_ns, state, progress.reference); },

@@ -1,4 +1,5 @@
-/// The mission: which stage is in force at a step, and what it asks. Source: README.md, "Mission".
+/// The mission: the stage in force at a step and its reference. Source: README.md, "References and
+/// mission".
 #pragma once
 
 #include <cstdint>
@@ -14,9 +15,9 @@
 
 namespace sls::control {
 
-/// Where the mission stands at one step.
+/// Progress of the mission at one step.
 struct MissionProgress {
-  std::uint32_t stage = 0;             ///< in force; the last one stays so when it is over
+  std::uint32_t stage = 0;             ///< in force; after the end of the mission the last one
   std::uint32_t remembered_stage = 0;  ///< `stage`, or the number of stages once all are over
   std::uint64_t stage_start_step = 0;
   MissionPhase phase = MissionPhase::kRunning;
@@ -31,9 +32,9 @@ class Mission {
   /// True if `memory` names a stage, or the end of the mission, that began at `step` or earlier.
   bool is_possible(std::uint64_t step, const ControllerMemory& memory) const;
 
-  /// Progress at `step`, from the memory accepted one step before. Finished: once and for all, even
-  /// if the body leaves the last stage's radius again. Failed: a stage timed out.
-  /// `memory` must be possible at `step`.
+  /// Progress at `step`, from the memory accepted one step before, which must be possible at
+  /// `step`. A finished mission stays finished, even if the body leaves the last stage's radius
+  /// again. The mission fails when a stage reaches its timeout.
   MissionProgress calc_progress(std::uint64_t step, const model::SlungLoadState& state,
                                 const ControllerMemory& memory) const;
 

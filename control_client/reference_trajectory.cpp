@@ -7,8 +7,8 @@ namespace {
 
 constexpr double kTwoPi = 6.283185307179586476925286766559;
 
-/// Eq. (13), the polynomial that rises from 0 to 1 on [0, 1]. Its upper half is its lower half
-/// turned about the middle, where nothing cancels.
+/// Eq. (13), the polynomial that rises from 0 to 1 on [0, 1]. The upper half is computed from the
+/// lower half by point symmetry, because cancellation of its terms would lose digits.
 double calc_blend(double tau) {
   if (tau > 0.5) return 1.0 - calc_blend(1.0 - tau);
   return std::pow(tau, 5) * (126.0 + tau * (-420.0 + tau * (540.0 + tau * (-315.0 + tau * 70.0))));

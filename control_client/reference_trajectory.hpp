@@ -27,7 +27,7 @@ class Constant : public ReferenceTrajectory {
   config::ConstantReference config_;
 };
 
-/// A lying eight, once around in `period_s`. Eq. (12).
+/// A figure eight (∞) with one lap per `period_s`. Eq. (12).
 class FigureEight : public ReferenceTrajectory {
  public:
   explicit FigureEight(const config::FigureEightReference& config) : config_(config) {}
@@ -37,8 +37,8 @@ class FigureEight : public ReferenceTrajectory {
   config::FigureEightReference config_;
 };
 
-/// From rest to rest on a straight line, velocity to snap zero at both ends; constant outside.
-/// Eq. (13).
+/// From rest to rest on a straight line. Velocity, acceleration, jerk and snap are zero at both
+/// ends. Before and after, the position is constant. Eq. (13).
 class RestToRest : public ReferenceTrajectory {
  public:
   explicit RestToRest(const config::RestToRestReference& config) : config_(config) {}

@@ -7,7 +7,7 @@ namespace sls::control {
 model::RodAngles calc_wired_angles(const model::RodAngles& rod, config::StateWiring wiring,
                                    double rod_length) {
   if (wiring == config::StateWiring::kCorrect) return rod;
-  // Eq. (14): angles exchanged, one sign lost, velocities of the load where rates belong.
+  // Eq. (14): angles exchanged, one sign wrong, velocities of the load instead of rates.
   model::RodAngles slots;
   slots.alpha = rod.beta;
   slots.beta = -rod.alpha;

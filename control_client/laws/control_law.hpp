@@ -1,6 +1,6 @@
 /// A control law: a pure function of measurement, reference and memory that returns a force.
-/// A new one is a folder beside this file and a line in laws.def: README.md, "Adding a law". No DDS
-/// here.
+/// A new law needs a folder beside this file and a line in laws.def: README.md, "Adding a law". No
+/// DDS here.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,31 +20,31 @@ namespace sls::control {
 using model::Fault;
 using model::MissionPhase;
 
-/// All that a law may look at.
+/// All inputs of a law.
 struct LawInput {
   model::Measurement state;  ///< rod angles as wired to the controller's slots
   model::Reference reference;
-  model::Numbers memory;  ///< what the law returned for the step before; zeros at step 0
+  model::Numbers memory;  ///< as returned by the law for the previous step; zeros at step 0
 
   std::uint64_t step = 0;
-  std::uint32_t stage = 0;  ///< of the mission, whose reference that is
+  std::uint32_t stage = 0;  ///< stage of the mission, to which `reference` belongs
   double stage_time = 0.0;  ///< s since the stage began
 };
 
 struct LawOutput {
   Eigen::Vector3d f_Q_W = Eigen::Vector3d::Zero();  ///< N; zero with a fault
-  model::Numbers memory;                            ///< to be used at step + 1; as many as ever
+  model::Numbers memory;                            ///< for step + 1; `memory_size()` numbers
   Fault fault = Fault::kNone;
 };
 
-/// It holds nothing that changes: what it must remember travels in `memory`, so that any client can
-/// answer any sample.
+/// A law has no state that changes: its memory travels in `memory`, so any client can answer any
+/// sample.
 class ControlLaw {
  public:
   virtual ~ControlLaw() = default;
   /// @throws std::runtime_error if the law is broken, which ends the client.
   virtual LawOutput calc(const LawInput& input) const = 0;
-  /// How many numbers it remembers, at most `model::kMaxNumbers`.
+  /// Number of memory numbers, at most `model::kMaxNumbers`.
   virtual int memory_size() const { return 0; }
 };
 
@@ -52,7 +52,7 @@ class ControlLaw {
 struct LawSetup {
   config::Controller controller;
   double period = 0.0;           ///< control period in force, s
-  std::uint32_t vehicle_id = 0;  ///< that it flies
+  std::uint32_t vehicle_id = 0;  ///< the vehicle that the law flies
   std::filesystem::path folder;  ///< of the scenario file
 };
 

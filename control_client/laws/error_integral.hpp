@@ -8,7 +8,7 @@ namespace sls::control {
 
 inline constexpr double kIntegralLimit = 20.0;  ///< m·s, each axis
 
-/// True when the integral is at its limit and `rate` pushes it further out: it does not move.
+/// True when the integral is at its limit and `rate` would move it beyond: it then stays constant.
 bool is_clamped(double integral, double rate);
 
 /// The integral one period later: a forward Euler step, clamped on each axis.

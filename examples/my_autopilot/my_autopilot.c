@@ -1,5 +1,5 @@
 /* Your own autopilot: a proportional-derivative law on the attitude's quaternion, and the
- * shares of four rotors in an X. The equations stand in README.md. */
+ * shares of four rotors in an X. The equations are in README.md. */
 #include <math.h>
 #include <sls/sls_autopilot.h>
 #include <stdio.h>
@@ -18,7 +18,7 @@ typedef struct {
   double share[kRotors][kWishes]; /* of each rotor's thrust in each wish */
 } Autopilot;
 
-/* Reads {"attitude_1_s2": 900, …} into `k`. False, with a text, where it holds something else. */
+/* Reads {"attitude_1_s2": 900, …} into `k`. Returns 0 and writes `error` if it cannot. */
 static int read_parameters(const char* json, double* k, char* error, size_t error_size) {
   char* end;
   for (const char* at = strchr(json, '"'); at; at = strchr(end, '"')) {
@@ -41,8 +41,8 @@ static int read_parameters(const char* json, double* k, char* error, size_t erro
   return 1;
 }
 
-/* Eq. (4). False if the rotors are not an X about the centre of mass: one wish would then come
- * with another. */
+/* Eq. (4). Returns 0 if the rotors are not an X about the centre of mass, because a change of one
+ * wish would then change another. */
 static int find_shares(Autopilot* self) {
   double effect[kRotors][kWishes]; /* of 1 N of each rotor */
   if (self->setup.rotor_count != kRotors) return 0;
@@ -75,7 +75,7 @@ static void* create(const sls_autopilot_setup* setup, char* error, size_t error_
   return memcpy(malloc(sizeof made), &made, sizeof made);
 }
 
-/* Eq. (1): the attitude without yaw whose rotors pull along `force`. */
+/* Eq. (1): the attitude without yaw in which the rotors pull along `force`. */
 static void find_attitude(const double force[3], double length, double q[4]) {
   const double roll = asin(force[1] / length), pitch = atan2(-force[0], -force[2]);
   q[0] = cos(pitch / 2) * cos(roll / 2);
@@ -117,7 +117,7 @@ static int step(void* autopilot, const sls_autopilot_input* input, sls_autopilot
   const Autopilot* self = autopilot;
   const double *f = input->force_n, *q = input->attitude_wb;
   const double length = sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]);
-  if (length > 0.0) find_attitude(f, length, output->attitude_wb); /* else level, as it begins */
+  if (length > 0.0) find_attitude(f, length, output->attitude_wb); /* else level, as at first */
 
   /* Direction of the rotors' thrust: minus the z axis of the body, in the world. */
   const double up[3] = {-2 * (q[1] * q[3] + q[0] * q[2]), -2 * (q[2] * q[3] - q[0] * q[1]),
@@ -134,7 +134,7 @@ static int step(void* autopilot, const sls_autopilot_input* input, sls_autopilot
     output->rotor_speeds_rad_s[i] =
         sqrt(fmax(0.0, thrust) / self->setup.rotors[i].thrust_constant_n_s2);
   }
-  (void)error, (void)error_size; /* it can always go on */
+  (void)error, (void)error_size; /* this step never fails */
   return 0;
 }
 

@@ -13,9 +13,9 @@ static const char* const kName = "my_client";
 static const double kLoadPoint[3] = {1, -1, -2};  // m; z down
 static const double kDuration = 20;               // s
 
-/// The force on the quadrotor (N; it carries the weight, too) from `time` (s) for a period (s), and
-/// what it follows. `memory` comes back at the next step, zeros at step 0. True once the mission is
-/// over. Equal arguments must give equal answers: no clock, no static variables.
+/// Sets `force` on the quadrotor (N, includes the weight) from `time` (s) for one `period` (s), and
+/// its reference. `memory` comes back at the next step; zeros at step 0. Returns true at the end of
+/// the mission. Equal arguments must give equal answers: no clock, no static variables.
 static bool answer(const sls_VehicleParameters* vehicle, const sls_PlantState* state, double time,
                    double period, double memory[], double force[3], sls_Reference* reference) {
   const double mass = vehicle->quad_mass_kg + vehicle->load_mass_kg;
@@ -35,12 +35,12 @@ static bool answer(const sls_VehicleParameters* vehicle, const sls_PlantState* s
 
 typedef struct Run {
   sls_Parameters parameters;
-  sls_SimStatus status;          // its run_id is 0 before the first
-  dds_time_t heard;              // when that came
-  dds_instance_handle_t server;  // its participant
+  sls_SimStatus status;          // its run_id is 0 before the first sample
+  dds_time_t heard;              // arrival time of `status`
+  dds_instance_handle_t server;  // participant of the server
 } Run;
 
-static Run runs[16], *run = NULL;  // of all the one that is flown
+static Run runs[16], *run = NULL;  // run: the one that is flown
 static dds_entity_t participant, parameters, status, presence, state, command;
 
 static dds_return_t expect(dds_return_t result, const char* what) {
@@ -49,15 +49,15 @@ static dds_return_t expect(dds_return_t result, const char* what) {
   exit(1);
 }
 
-/// A reader, or the writer of what a client says. Keeps the last `depth` samples, or all (0).
+/// Makes a reader, or a writer for a type that clients publish. Keeps `depth` samples; 0: all.
 static dds_entity_t make(const dds_topic_descriptor_t* type, const char* name, int depth) {
   const bool is_writer = type == &sls_Commands_desc || type == &sls_Participant_desc;
-  const bool is_reliable = type != &sls_States_desc;  // a state that is lost is sent again
+  const bool is_reliable = type != &sls_States_desc;  // a lost state is sent again
   dds_qos_t* qos = dds_create_qos();
   dds_qset_reliability(qos, (dds_reliability_kind_t)is_reliable, DDS_SECS(5));
   dds_qset_durability(qos, is_reliable ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
   dds_qset_history(qos, depth ? DDS_HISTORY_KEEP_LAST : DDS_HISTORY_KEEP_ALL, depth);
-  if (type == &sls_Commands_desc) dds_qset_deadline(qos, DDS_MSECS(100));  // asked in real time
+  if (type == &sls_Commands_desc) dds_qset_deadline(qos, DDS_MSECS(100));  // requested in real time
   const dds_entity_t topic = expect(dds_create_topic(participant, type, name, NULL, NULL), name);
   const dds_entity_t made =
       (is_writer ? dds_create_writer : dds_create_reader)(participant, topic, qos, NULL);
@@ -71,7 +71,7 @@ static bool take(dds_entity_t reader, void* sample, dds_sample_info_t* info) {
   return false;
 }
 
-/// The participant of an endpoint that matches `own`; 0: it has just left.
+/// The participant of an endpoint that matches `own`; 0 if it has just left.
 static dds_instance_handle_t find_participant(dds_entity_t own, dds_instance_handle_t handle) {
   dds_builtintopic_endpoint_t* other = dds_get_matched_publication_data(own, handle);
   if (!other) other = dds_get_matched_subscription_data(own, handle);
@@ -83,7 +83,7 @@ static dds_instance_handle_t find_participant(dds_entity_t own, dds_instance_han
 /// True when the run's server has an endpoint that matches `own`.
 static bool is_matched(dds_entity_t own) {
   dds_instance_handle_t handles[64];
-  int count = dds_get_matched_publications(own, handles, 64);  // of a reader
+  int count = dds_get_matched_publications(own, handles, 64);  // if `own` is a reader
   if (count < 0) count = dds_get_matched_subscriptions(own, handles, 64);
   for (int i = 0; i < count && i < 64; ++i)
     if (find_participant(own, handles[i]) == run->server) return true;
@@ -91,13 +91,13 @@ static bool is_matched(dds_entity_t own) {
 }
 
 static void listen_to_servers(void) {
-  static int next = 0;  // place of the next new run: that of the oldest
+  static int next = 0;  // index of the next new run, which replaces the oldest
   static sls_SimStatus news;
   dds_sample_info_t info;
   for (; take(parameters, &runs[next].parameters, &info); next = (next + 1) % 16) {
     sls_Parameters* claim = &runs[next].parameters;
     if (strcmp(claim->contract_sha256, SLS_CONTRACT_SHA256) != 0) {
-      claim->run_id = 0;  // it would be misread
+      claim->run_id = 0;  // its samples cannot be read correctly
       fprintf(stderr, "%s: contract of a server: expected %s, got %s\n", kName, SLS_CONTRACT_SHA256,
               claim->contract_sha256);
     }
@@ -110,7 +110,7 @@ static void listen_to_servers(void) {
       if (known->parameters.run_id == news.run_id) known->status = news, known->heard = dds_time();
 }
 
-/// A run to join: its server is alive, its claim on its vehicles is settled, it has not ended.
+/// A run to join: its server is alive and has claimed its vehicles, and the run has not ended.
 static Run* find_joinable(void) {
   for (Run* other = runs; other < runs + 16; ++other)
     if (other != run && other->status.run_id != 0 && other->status.phase <= sls_PHASE_PAUSED &&
@@ -184,7 +184,7 @@ int main(int argc, char** argv) {
     if (run) answer_states();
     listen_to_servers();
     const dds_duration_t silence = dds_time() - (run ? run->heard : began);
-    Run* next = find_joinable();  // a silent server is left only for another one
+    Run* next = find_joinable();  // a silent server is only left if there is another
     if (next && (!run || run->status.phase == sls_PHASE_RESET || silence > DDS_SECS(2))) {
       run = next;
       announce(is_ready = false, false);
@@ -195,6 +195,6 @@ int main(int argc, char** argv) {
     }
   }
   announce(false, true);
-  dds_delete(participant);  // once the writers' samples are acknowledged
+  dds_delete(participant);  // waits until the writers' samples are acknowledged
   return run->status.phase == sls_PHASE_FINISHED ? 0 : 1;
 }

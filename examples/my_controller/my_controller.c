@@ -1,5 +1,6 @@
-/* Your own controller: position asks for a velocity, velocity for an acceleration, that for a
- * slope of the rod. Its memory travels as numbers: see README.md. */
+/* Your own controller, a cascade: the position error gives a desired velocity, its error a desired
+ * acceleration, and that a desired slope of the rod. Its memory travels as numbers: see README.md.
+ */
 #include <sls/sls_controller.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -18,7 +19,7 @@ typedef struct {
   sls_controller_setup setup;
 } Controller;
 
-/* Reads {"velocity": 2.5, …} into `k`. False, with a text, where it holds something else. */
+/* Reads {"velocity": 2.5, …} into `k`. Returns 0 and writes `error` if it cannot. */
 static int read_parameters(const char* json, double* k, char* error, size_t error_size) {
   char* end;
   for (const char* at = strchr(json, '"'); at; at = strchr(end, '"')) {
@@ -80,7 +81,7 @@ static int answer(void* controller, const sls_controller_input* input,
     output->force_n[i] = -mass * support * slope - quad_mass * self->setup.rod_length_m * turn;
     output->memory[kSlopeRateX + i] = filtered;
   }
-  (void)error, (void)error_size; /* for answers with SLS_CONTROLLER_ERROR */
+  (void)error, (void)error_size; /* only for SLS_CONTROLLER_ERROR */
   return SLS_CONTROLLER_OK;
 }
 

@@ -1,4 +1,4 @@
-// Your own control law in C++, flown in one process without DDS: force, error, done.
+// Your own control law in C++, flown in one process without DDS.
 #include <cmath>
 #include <cstdio>
 #include <exception>
@@ -13,7 +13,7 @@ namespace {
 using namespace sls;
 using Eigen::Vector3d;
 
-/// Holds the load's place by the slope of the rod, for small angles.
+/// Controls the load position by the slope of the rod, for small angles.
 class MyLaw : public control::ControlLaw {
  public:
   explicit MyLaw(const model::SlungLoadParameters& vehicle) : vehicle_(vehicle) {}

@@ -1,5 +1,5 @@
-// A reader of a running flight of one vehicle: prints where the load is at every 25th step, and how
-// many states there were.   my_logger [DOMAIN]
+// Reads a running flight of one vehicle. Prints the load position at every 25th step, and the
+// number of states at the end.   my_logger [DOMAIN]
 #include <atomic>
 #include <chrono>
 #include <cstdio>
@@ -19,11 +19,11 @@ void log_flight(int domain) {
   std::uint64_t states = 0;
   std::atomic<bool> has_ended{false};
   bus::Node node(bus::default_qos_file(), domain, "my_logger");
-  // A recorder's profile: all batches, in order, from the first on.
+  // With the profile of a recorder, the reader gets all batches in order, from the first one.
   const bus::Reader<RecordBatch> reader(
       node, bus::kRecordReaderProfile, [&](const RecordBatch& batch, const bus::PeerId&) {
         for (const RecordEntry& entry : batch.entries()) {
-          if (entry.kind() == ANSWER_LATE) continue;  // to an earlier step: no further state
+          if (entry.kind() == ANSWER_LATE) continue;  // answers an earlier step; no new state
           ++states;
           const auto& p = entry.truth().p_WL_m();
           if (entry.step() % 25 == 0)

@@ -1,5 +1,5 @@
-/* Your own plant: quadrotor and load as two points, joined by an elastic rope instead of a
- * rod. It publishes one signal, how far the rope is stretched. */
+/* Your own plant: quadrotor and load are two point masses, joined by an elastic rope instead of a
+ * rod. It publishes one signal, the stretch of the rope. */
 #include <math.h>
 #include <sls/sls_plant.h>
 #include <stdio.h>
@@ -9,7 +9,7 @@
 enum { kStiffness, kDamping, kParameters };
 static const char* const kNames[] = {"stiffness_n_m", "damping_n_s_m"};
 
-/* Positions and velocities in the world: quadrotor, load, and the same two at speed. */
+/* Positions (m) and velocities (m/s) of quadrotor and load, in the world frame. */
 typedef struct {
   double p_quad[3], p_load[3], v_quad[3], v_load[3];
 } Motion;
@@ -21,7 +21,7 @@ typedef struct {
   Motion motion;
 } Plant;
 
-/* Reads {"stiffness_n_m": 2000, …} into `k`. False, with a text, where it holds something else. */
+/* Reads {"stiffness_n_m": 2000, …} into `k`. Returns 0 and writes `error` if it cannot. */
 static int read_parameters(const char* json, double* k, char* error, size_t error_size) {
   char* end;
   for (const char* at = strchr(json, '"'); at; at = strchr(end, '"')) {
@@ -130,7 +130,7 @@ static void measure(void* plant, sls_plant_state* state) {
   memcpy(state->quad_velocity_m_s, self->motion.v_quad, sizeof state->quad_velocity_m_s);
   memcpy(state->load_position_m, self->motion.p_load, sizeof state->load_position_m);
   memcpy(state->load_velocity_m_s, self->motion.v_load, sizeof state->load_velocity_m_s);
-  state->attitude_wb[0] = 1.0; /* level: it has no attitude */
+  state->attitude_wb[0] = 1.0; /* level: this plant has no attitude */
   state->signals[0] = calc_stretch(self, &self->motion, n, &speed);
 }
 

@@ -3,7 +3,7 @@
     ./sls python examples/python/learn.py
 
 Random search: each generation draws position and velocity gains around the best so far, closer and
-closer to it. A loop that loses its load counts as the worst. The winner then flies with the C++ law."""
+closer to it. A loop that loses its load counts as the worst. The C++ law then flies the best gains."""
 
 import time
 
@@ -29,7 +29,8 @@ def calc_force(loop: sls.ClosedLoop, state: "sls.LoopState", wanted: np.ndarray,
                gains: np.ndarray) -> np.ndarray:
     """The equations of control_client/laws/pid for all loops: force (count, 3), N.
 
-    wanted: position of the load (3,), m. gains: position and velocity, horizontal (count, 2), 1/s.
+    wanted: desired position of the load (3,), m. gains: horizontal position and velocity gains
+    (count, 2), 1/s.
     """
     k_p = np.column_stack([gains[:, 0], gains[:, 0], np.full(len(gains), 1.5)])
     k_v = np.column_stack([gains[:, 1], gains[:, 1], np.full(len(gains), 3.0)])
@@ -55,7 +56,7 @@ def fly(loop: sls.ClosedLoop, gains: np.ndarray) -> np.ndarray:
     for k in range(steps):
         distances = ((state.load_position - wanted[k]) ** 2).sum(axis=1)
         squares += np.where(distances < 10.0, distances, np.inf)
-        with np.errstate(all="ignore"):  # of loops that are lost
+        with np.errstate(all="ignore"):  # lost loops overflow
             state = loop.step(calc_force(loop, state, wanted[k], gains))
     return np.sqrt(np.where(loop.failed, np.inf, squares / steps))
 

@@ -2,7 +2,7 @@
 
     ./sls python examples/python/pid.py [SCENARIO]
 
-flies it and the same law in C++, and prints how far apart the flights are."""
+It flies this law and the same law in C++, and prints the largest distance between the flights."""
 
 import sys
 import time
@@ -16,8 +16,9 @@ INTEGRAL_LIMIT = 20.0  # m·s, of each axis
 
 
 class Pid:
-    """Position asks for a velocity, velocity for an acceleration, that for a slope of the rod. The
-    gains are (position, velocity, integral, rod_angle, rod_rate), the vertical axis has no rod."""
+    """A cascade: the position error gives a desired velocity, its error a desired acceleration, and that
+    a desired slope of the rod. The gains are (position, velocity, integral, rod_angle, rod_rate); the
+    vertical axis has no rod gains."""
 
     memory_size = 3
     """The integral of the position error, x, y, z, m·s."""
@@ -42,7 +43,7 @@ class Pid:
         rate_y = -cos_a * cos_b * alpha_rate + sin_a * sin_b * beta_rate
         rate_z = -sin_a * cos_b * alpha_rate - cos_a * sin_b * beta_rate
 
-        # (1): where the controller's own model sees the load.
+        # (1): position error and velocity of the load, by the controller's own model.
         x, y, z = now.quad_position
         v_x, v_y, v_z = now.quad_velocity
         ref_x, ref_y, ref_z = now.reference.position
@@ -53,7 +54,7 @@ class Pid:
         v_y += length * rate_y
         v_z += length * rate_z
 
-        # (2) and (3): the wanted acceleration.
+        # (2) and (3): the desired acceleration.
         sum_x, sum_y, sum_z = now.memory
         a_x = k_v * (k_p * error_x - v_x) + k_i * sum_x
         a_y = k_v * (k_p * error_y - v_y) + k_i * sum_y
@@ -64,7 +65,7 @@ class Pid:
         if support < 1e-3 * gravity:
             raise sls.LawFault("free_fall")
 
-        # (4): of the rod, slope and its rate; what acceleration of the slope is wanted.
+        # (4): the slope of the rod and its desired acceleration.
         w_x, w_y = n_x / n_z, n_y / n_z
         slope_x = k_angle * (-a_x / support - w_x) - k_rate * (rate_x - w_x * rate_z) / n_z
         slope_y = k_angle * (-a_y / support - w_y) - k_rate * (rate_y - w_y * rate_z) / n_z

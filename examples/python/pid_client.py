@@ -4,7 +4,7 @@
     build/bin/recorder --out recordings/pid &
     ./sls python examples/python/pid_client.py
 
-A second one with `--name standby --strength -1` stands by and takes over when this one is killed
+A second client with `--name standby --strength -1` waits and takes over when this one is killed
 (`sync.wait_for.controllers: 2` in the scenario makes the server wait for both)."""
 
 import argparse

@@ -28,13 +28,14 @@ LawOutput PidLaw::calc(const LawInput& input) const {
   const Vector3d integral = input.memory.head<3>();
   const double m = vehicle_.quad_mass, total_mass = vehicle_.total_mass();
 
-  // Eq. (1): where the controller's own model sees the load.
+  // Eq. (1): position error and velocity of the load by the controller's own model.
   const Vector3d error = input.reference.position - input.state.p_WQ - vehicle_.rod_length * q;
   const Vector3d velocity = input.state.v_WQ + vehicle_.rod_length * q_dot;
   if (std::cos(input.state.rod.alpha) < kMinCosine || std::cos(input.state.rod.beta) < kMinCosine)
     return fail(Fault::kRodLevel);
 
-  // Eqs. (2) and (3): position asks for a velocity, velocity for an acceleration.
+  // Eqs. (2) and (3): the position loop gives a desired velocity, the velocity loop a desired
+  // acceleration.
   const Vector3d k_p(xy.position, xy.position, z.position);
   const Vector3d k_v(xy.velocity, xy.velocity, z.velocity);
   const Vector3d k_i(xy.integral, xy.integral, z.integral);
@@ -44,7 +45,8 @@ LawOutput PidLaw::calc(const LawInput& input) const {
   if (!std::isfinite(support)) return fail(Fault::kNotFinite);
   if (support < kMinSupportFraction * vehicle_.gravity) return fail(Fault::kFreeFall);
 
-  // Eq. (4): the acceleration asks for a slope of the rod, the slope for its acceleration.
+  // Eq. (4): the acceleration gives a desired slope of the rod, and its error the acceleration of
+  // the slope.
   const Vector2d w = q.head<2>() / q.z();
   const Vector2d w_dot = (q_dot.head<2>() - w * q_dot.z()) / q.z();
   const Vector2d wanted_w = -acceleration.head<2>() / support;

@@ -1,5 +1,5 @@
-/// A cascaded law without feed-forward: position, velocity, rod angle. The usual
-/// law of multirotors with a load, for comparison with QSF. Source: README.md, eqs. (1)–(5).
+/// A cascaded law without feed-forward: position, velocity, rod angle. This is the usual law of
+/// multirotors with a load, for comparison with QSF. Source: README.md, eqs. (1)–(5).
 #pragma once
 
 #include "common/model/parameters.hpp"

@@ -16,8 +16,8 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 /// sign(H): the same eigenvectors, eigenvalues ±1 by the sign of the real part. Newton's iteration,
-/// scaled by the determinant. Unlike eigenvectors it survives double eigenvalues (a chain of two
-/// with weight 4 has them).
+/// scaled by the determinant. It also works with double eigenvalues, such as those of a chain of
+/// two with weight 4, where a computation by eigenvectors fails.
 MatrixXd calc_matrix_sign(const MatrixXd& H) {
   const double size = static_cast<double>(H.rows());
   MatrixXd Z = H;

@@ -70,7 +70,7 @@ QsfOutput calc_qsf(const QsfInput& input, const model::SlungLoadParameters& vehi
     return output;
   };
 
-  // Eq. (1): where the controller's own model sees the load.
+  // Eq. (1): error of the load position by the controller's own model.
   const model::RodDirection rod = model::to_direction(input.rod);
   const Vector3d& q = rod.n_W;
   const Vector3d& q_dot = rod.n_dot_W;
@@ -90,7 +90,7 @@ QsfOutput calc_qsf(const QsfInput& input, const model::SlungLoadParameters& vehi
   if (!std::isfinite(s)) return fail(Fault::kNotFinite);
   if (s < kMinSupportFraction * vehicle.gravity) return fail(Fault::kFreeFall);
 
-  // Eq. (5): the rod's slope decides the horizontal acceleration and jerk of the load.
+  // Eq. (5): the rod's slope determines the horizontal acceleration and jerk of the load.
   const Vector2d w = q.head<2>() / q.z();
   const Vector2d w_dot = (q_dot.head<2>() - w * q_dot.z()) / q.z();
   const Vector2d acceleration = -s * w;

@@ -12,7 +12,7 @@ namespace sls::control {
 inline constexpr double kMinSupportFraction = 1e-3;
 
 /// It is singular where the rod is level; below this cos α or cos β (0.06° from level) it reports
-/// kRodLevel. So it does with the load above the quadrotor, where the cosines are negative.
+/// kRodLevel. It does the same with the load above the quadrotor, where a cosine is negative.
 inline constexpr double kMinRodCosine = 1e-3;
 
 /// The inputs of the law.
@@ -25,20 +25,20 @@ struct QsfInput {
 };
 
 struct QsfOutput {
-  Eigen::Vector3d f_Q_W = Eigen::Vector3d::Zero();          ///< N; zero with a fault
-  Eigen::Vector3d load_error = Eigen::Vector3d::Zero();     ///< e = y − y_r as the law sees it, m
+  Eigen::Vector3d f_Q_W = Eigen::Vector3d::Zero();       ///< N; zero with a fault
+  Eigen::Vector3d load_error = Eigen::Vector3d::Zero();  ///< e = y − y_r by the law's own model, m
   Eigen::Vector3d integral_rate = Eigen::Vector3d::Zero();  ///< e where e is integrated, else 0, m
   Fault fault = Fault::kNone;
 };
 
 /// Force on the quadrotor that makes the load error obey the designed linear equations, for a
-/// vehicle with the parameters `vehicle`. Set-point, tracking and integral variant in one.
+/// vehicle with the parameters `vehicle`. Contains the set-point, tracking and integral variants.
 /// Holds for |α|, |β| < π/2 and s > 0; outside it reports a fault and no force, never NaN.
 /// Source: README.md, eqs. (1)–(9).
 QsfOutput calc_qsf(const QsfInput& input, const model::SlungLoadParameters& vehicle,
                    const NamedGains& gains);
 
-/// The same as a `ControlLaw`, which remembers the integral.
+/// The same as a `ControlLaw`. Its memory is the integral.
 class QsfLaw : public ControlLaw {
  public:
   QsfLaw(const model::SlungLoadParameters& vehicle, const NamedGains& gains, double period)

@@ -1,4 +1,4 @@
-// A law from a shared library of the user's own: sls_controller.h.
+// A law from a shared library of the user: sls_controller.h.
 #include <array>
 #include <cmath>
 #include <memory>
@@ -122,7 +122,8 @@ Fault to_fault(int code) {
 }
 
 LawOutput SharedLibraryLaw::calc(const LawInput& input) const {
-  // One more number than declared: a library that fills it writes beyond its memory.
+  // The numbers after the declared ones get a mark: a library that changes one has written beyond
+  // its memory.
   constexpr double kUntouched = -7.25e300;
   std::array<double, SLS_CONTROLLER_MAX_MEMORY + 1> memory;
   std::fill_n(memory.begin(), memory_count_, 0.0);

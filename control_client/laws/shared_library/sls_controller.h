@@ -1,4 +1,4 @@
-/* A control law of your own for SLS, in C11 or any language that exports C functions (MATLAB Coder,
+/* Your own control law for SLS, in C11 or any language that exports C functions (MATLAB Coder,
  * Simulink, CasADi, …).
  *
  * Build a shared library that defines sls_controller() and name it in a scenario:
@@ -6,11 +6,11 @@
  *     controller: { law: ./my_controller.so, parameters: { gain: 2.5 } }
  *
  * Frame: x forward, y right, z down. SI units, radians. Paths are relative to the scenario file.
- * There is one controller per vehicle; different ones are called on different threads, each by one
- * call at a time. An answer must be a function of the input alone: what the law has to remember
- * between steps (integrals, filter states) goes into the memory numbers, which travel with the
- * samples, so that another client can take over. Do not change the floating-point mode: link without
- * -ffast-math. */
+ * There is one controller per vehicle. Different controllers can be called on different threads at
+ * the same time, but each one has only one call at a time. An answer must be a function of the
+ * input alone. The state of the law (integrals, filter states) belongs in the memory numbers: they
+ * travel with the samples, so another client can take over. Do not change the floating-point mode:
+ * link without -ffast-math. */
 #ifndef SLS_CONTROLLER_H
 #define SLS_CONTROLLER_H
 
@@ -35,8 +35,8 @@ typedef struct {
   double force_limit_n; /* the server refuses a stronger force */
 } sls_controller_setup;
 
-/* The state that is answered, what is desired, and what was remembered. Vectors are in the world
- * frame unless said otherwise. */
+/* The measured state, the reference and the memory of one step. Vectors are in the world frame,
+ * except where another frame is given. */
 typedef struct {
   size_t size; /* of this struct */
   uint64_t step;
@@ -44,9 +44,9 @@ typedef struct {
 
   double quad_position_m[3], quad_velocity_m_s[3];
   double attitude_wb[4];         /* unit quaternion w, x, y, z: rotates body vectors into the world */
-  double body_rates_rad_s[3];    /* in the body frame; with the attitude: level and zero for a point mass */
+  double body_rates_rad_s[3];    /* in the body frame; a point mass is level, with zero rates */
   double load_position_m[3], load_velocity_m_s[3];
-  double alpha_rad, beta_rad;    /* rod angles about x and y; 0 hanging */
+  double alpha_rad, beta_rad;    /* rod angles about x and y; 0: load below */
   double alpha_dot_rad_s, beta_dot_rad_s;
   uint32_t signal_count;         /* of the plant */
   const double* signals;
@@ -56,14 +56,14 @@ typedef struct {
   double reference_position_m[3], reference_velocity_m_s[3], reference_acceleration_m_s2[3];
   double reference_jerk_m_s3[3], reference_snap_m_s4[3];
 
-  const double* memory;          /* what was remembered at the step before; zeros at step 0 */
+  const double* memory;          /* as returned for the previous step; zeros at step 0 */
 } sls_controller_input;
 
 /* The answer. */
 typedef struct {
   size_t size; /* of this struct */
   double force_n[3]; /* on the quadrotor */
-  double* memory;    /* to be remembered: room for as many numbers as `create` asked for, zeros */
+  double* memory;    /* for the next step: as many numbers as `create` requested, set to zero */
 } sls_controller_output;
 
 /* The result of `answer`. A fault fails the mission; the force is then not used. */
@@ -80,8 +80,9 @@ typedef struct {
   uint32_t version; /* SLS_CONTROLLER_VERSION */
   size_t setup_size, input_size, output_size; /* sizeof of the structs above, as you compiled them */
 
-  /* Makes a controller and says how many numbers it remembers. NULL with a text in `error`, which
-   * has room for `error_size` bytes, where it refuses: say which parameter, expected and got. */
+  /* Makes a controller and sets `memory_count` to the number of its memory numbers. To refuse, it
+   * returns NULL and writes a text into `error` (`error_size` bytes) with the parameter, the
+   * expectation and the value. */
   void* (*create)(const sls_controller_setup* setup, uint32_t* memory_count, char* error,
                   size_t error_size);
   void (*destroy)(void* controller);
@@ -89,7 +90,8 @@ typedef struct {
                 char* error, size_t error_size);
 } sls_controller_functions;
 
-/* The one symbol that a library defines. Its result must live as long as the library. */
+/* The only symbol that a library must define. Its result must be valid as long as the library is
+ * loaded. */
 const sls_controller_functions* sls_controller(void);
 
 #ifdef __cplusplus
