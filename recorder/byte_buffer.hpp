@@ -1,4 +1,4 @@
-/// Bytes in the making, whose memory is kept from one use to the next.
+/// A growing sequence of bytes, which keeps its memory when it is cleared.
 #pragma once
 
 #include <cmath>
@@ -10,8 +10,8 @@
 
 namespace sls::record {
 
-/// Numbers go in as little-endian bytes, texts after their length of 32 bits. There is always room
-/// for `kRoom` bytes, so that the few numbers of a row need no look at it each.
+/// Numbers are appended as little-endian bytes, texts after their length (32 bits). `make_room`
+/// leaves room for `kRoom` bytes, so the few numbers of a row need no check.
 class ByteBuffer {
  public:
   static constexpr std::size_t kRoom = 512;
@@ -24,20 +24,20 @@ class ByteBuffer {
     if (size_ + size + kRoom > bytes_.size()) bytes_.resize(2 * (size_ + size + kRoom));
   }
 
-  /// There must be room for it.
+  /// Does not check for room.
   template <class Integer, std::enable_if_t<std::is_integral_v<Integer>, int> = 0>
   void append(Integer value) {
     char* place = bytes_.data() + size_;
-    // Which compilers turn into one store.
+    // Compilers turn this loop into one store.
     for (std::size_t i = 0; i < sizeof value; ++i) place[i] = static_cast<char>(value >> (8 * i));
     size_ += sizeof value;
   }
 
-  /// There must be room for it.
+  /// Does not check for room.
   void append(double number) {
     std::uint64_t bits = 0;
     std::memcpy(&bits, &number, sizeof bits);
-    // The values that "nan" and "-nan" in a file read back to.
+    // The values that result from reading "nan" and "-nan" in a file.
     if (std::isnan(number)) bits = std::signbit(number) ? 0xfff8000000000000 : 0x7ff8000000000000;
     append(bits);
   }
@@ -48,14 +48,14 @@ class ByteBuffer {
     append_raw(text);
   }
 
-  /// Bytes alone, of another buffer.
+  /// Appends bytes of another buffer, without a length.
   void append_raw(std::string_view bytes) {
     make_room(bytes.size());
     if (!bytes.empty()) std::memcpy(bytes_.data() + size_, bytes.data(), bytes.size());
     size_ += bytes.size();
   }
 
-  /// Writes over what has been appended at `place`.
+  /// Overwrites appended bytes, from `place` on.
   template <class Integer>
   void replace(std::size_t place, Integer value) {
     const std::size_t size = size_;
@@ -66,7 +66,7 @@ class ByteBuffer {
 
  private:
   std::vector<char> bytes_;
-  std::size_t size_ = 0;  // of those in use
+  std::size_t size_ = 0;  // number of used bytes
 };
 
 }  // namespace sls::record

@@ -7,7 +7,7 @@
 namespace sls::record {
 namespace {
 
-/// Bytes that are hashed together: a call for each row would take as long as the hash itself.
+/// Bytes that are hashed in one call: a call for each row would cost as much as the hash itself.
 constexpr std::size_t kHashedTogether = 4096;
 
 struct Collector {
@@ -16,7 +16,7 @@ struct Collector {
   template <class Field>
   void operator()(const Column& column, const Field& field) {
     if (!column.is_certified) return;
-    // A sequence may be of any length; a row's other numbers have room.
+    // A sequence has any length; for the other numbers of a row there is room.
     if constexpr (std::is_same_v<Field, std::vector<double>>)
       bytes.make_room(field.size() * sizeof(double));
     for_each_component(field, [this](const auto& component) { bytes.append(component); });

@@ -1,5 +1,5 @@
-/// The certificate of a flight: one hash of everything about it that is a pure function of its
-/// scenario (README.md has its definition).
+/// The certificate of a flight: one hash of all recorded data that is a pure function of the
+/// scenario. Definition: README.md.
 #pragma once
 
 #include <cstdint>
@@ -12,15 +12,15 @@
 
 namespace sls::record {
 
-/// A row's fields as little-endian bytes, those that are not certified left out. Two rows are equal
-/// where their bytes are.
+/// The certified fields of a row as little-endian bytes. Two rows are equal if their bytes are
+/// equal.
 std::string to_bytes(const StateRow& row);
 std::string to_bytes(const CommandRow& row);
 std::string to_bytes(const ReferenceRow& row);
 
 class Certificate {
  public:
-  /// Adds what there is of a step; of one vehicle in step order.
+  /// Adds the rows of a step. The steps of each vehicle must come in order.
   void add(const StepRows& rows);
 
   /// 64 lower-case hex digits; nothing can be added after it.
@@ -31,7 +31,7 @@ class Certificate {
     void hash_bytes();
 
     config::Sha256 hash;
-    ByteBuffer bytes;  // that are not hashed yet
+    ByteBuffer bytes;  // not hashed yet
   };
 
   std::map<std::uint32_t, Vehicle> vehicles_;

@@ -16,7 +16,7 @@ bool can_be_column(const std::string& name) {
   return !name.empty() && name.find_first_not_of(kLetters) == name.npos;
 }
 
-/// Neighbours that are alike share a line.
+/// Adjacent columns with equal unit, meaning and source share a line.
 std::string describe(const std::string& files, const std::vector<ColumnLister::Entry>& columns) {
   std::string text =
       files + "\n\n| column | unit | meaning | source |\n| --- | --- | --- | --- |\n";

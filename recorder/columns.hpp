@@ -1,5 +1,5 @@
-/// One table of columns for all files: each row type of rows.hpp visits its fields with them, and
-/// header, row, reader, certificate and reference page go by that.
+/// The columns of all files. Each row type of rows.hpp visits its fields with their columns; this
+/// one list gives header, row, reader, certificate and reference page.
 #pragma once
 
 #include <string>
@@ -16,7 +16,7 @@ struct Column {
   const char* unit;
   const char* meaning;
   const char* source;        ///< field of idl/sls.idl, or of the other files
-  bool is_certified = true;  ///< not so where equal flights differ
+  bool is_certified = true;  ///< false if the field can differ between equal flights
 };
 
 /// Calls `work` with a scalar or text, or with each component of a vector.
@@ -28,7 +28,7 @@ void for_each_component(Field& field, Work work) {
     for (auto& component : field) work(component);
 }
 
-/// A visitor that lists the columns of a row, names with their '?' replaced.
+/// A visitor that lists the columns of a row, with '?' in names replaced.
 struct ColumnLister {
   struct Entry {
     Column column;
@@ -54,13 +54,14 @@ std::vector<ColumnLister::Entry> list_columns(const Row& row = Row()) {
 
 std::string join_names(const std::vector<ColumnLister::Entry>& columns);
 
-/// The first line of the row's file; of state.csv without what a run may have further.
+/// The first line of the row's file. For state.csv without attitude and signals.
 template <class Row>
 std::string make_header() {
   return join_names(list_columns<Row>());
 }
 
-/// That of state.csv and measured.csv: of a plant with attitude and signals these too.
+/// The first line of state.csv and measured.csv, with the attitude and signals of the plant, if
+/// any.
 /// @throws config::ConfigError if a signal's name cannot be a column.
 std::string make_state_header(const Parameters& parameters);
 std::string make_flight_header(bool is_of_fleet);

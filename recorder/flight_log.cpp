@@ -13,7 +13,7 @@
 namespace sls::record {
 namespace {
 
-/// Of one stage; they take memory and lines. More than anybody reads, of laps worth the name.
+/// Limit of the listed laps of one stage, because of memory and lines. Usual flights have fewer.
 constexpr std::size_t kMaxLaps = 1000;
 
 std::string format_errors(const ErrorStatistics& statistics) {
@@ -25,7 +25,7 @@ std::string format_errors(const ErrorStatistics& statistics) {
 
 std::int64_t calc_lap_ns(const config::Stage& stage) {
   const auto& eight = std::get<config::FigureEightReference>(stage.reference);
-  // Whole nanoseconds: quotients of seconds may fall just short of the next lap.
+  // Whole nanoseconds, because the rounded quotient of seconds can be just below the next lap.
   return std::max<std::int64_t>(std::llround(eight.period_s * 1e9), 1);
 }
 
@@ -86,7 +86,7 @@ std::int64_t FlightLog::calc_flown_ns(const Stage& stage, std::uint64_t step) co
   return static_cast<std::int64_t>(step - stage.start_step) * parameters_.period_ns();
 }
 
-/// A mission's last sample, at the very end of its last stage, belongs to the lap that ends there.
+/// The last sample of a mission, at the end of its last stage, belongs to the lap that ends there.
 std::size_t FlightLog::calc_lap(const Stage& stage, std::size_t index, std::uint64_t step) const {
   const auto& planned = scenario_.mission[index];
   std::int64_t flown_ns = calc_flown_ns(stage, step);
@@ -95,7 +95,7 @@ std::size_t FlightLog::calc_lap(const Stage& stage, std::size_t index, std::uint
   return static_cast<std::size_t>(std::max<std::int64_t>(flown_ns, 0) / calc_lap_ns(planned));
 }
 
-/// Neither begun before the first step recorded nor cut short by the last one.
+/// True if the recorded steps of the stage contain the whole lap.
 bool FlightLog::is_whole_lap(const Stage& stage, std::size_t index, std::size_t lap) const {
   const std::int64_t lap_ns = calc_lap_ns(scenario_.mission[index]);
   const std::int64_t begin_ns = static_cast<std::int64_t>(lap) * lap_ns;

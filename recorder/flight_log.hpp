@@ -1,4 +1,5 @@
-/// The flight for people: stages, tracking errors and events, collected while recording.
+/// flight.txt, a summary for people: stages, tracking errors and events, collected during the
+/// recording.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,7 +16,7 @@
 
 namespace sls::record {
 
-/// Load position error over a stretch of a flight, per axis, m.
+/// Load position error over a part of a flight, per axis, m.
 struct ErrorStatistics {
   std::uint64_t samples = 0;
   Eigen::Vector3d sum_of_squares = Eigen::Vector3d::Zero();
@@ -30,15 +31,15 @@ class FlightLog {
  public:
   FlightLog(const config::Scenario& scenario, const Parameters& parameters);
 
-  /// Of stages whose rows do not tell where they began.
+  /// Sets starts of stages, for rows that do not contain them.
   void set_stage_starts(const std::vector<StageStart>& starts) { known_starts_ = starts; }
-  /// Of stages of which the first step added is another one.
+  /// The starts of stages that began at another step than the first one added.
   std::vector<StageStart> list_stage_starts() const;
 
-  /// Adds a complete step; the others say nothing about errors.
+  /// Adds a step. Ignores one that is not complete, because it gives no error.
   void add(const StepRows& rows);
   void add(const SimStatus& status);
-  /// A line of the recorder's own, such as what is missing.
+  /// Adds a line of the recorder, for example a list of missing samples.
   void add_event(const std::string& text);
 
   void write(std::ostream& out) const;
@@ -47,7 +48,7 @@ class FlightLog {
   struct Stage {
     std::string name;
     std::uint64_t start_step = 0;  // of the stage; laps count from here
-    std::uint64_t first_step = 0;  // of which there are rows
+    std::uint64_t first_step = 0;  // the first one with rows
     std::uint64_t last_step = 0;
     ErrorStatistics all;
     std::vector<ErrorStatistics> laps;  // of a figure eight, the first ones

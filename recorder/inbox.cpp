@@ -6,11 +6,11 @@
 namespace sls::record {
 namespace {
 
-/// Entries of the open run, and of all others together: more than a server runs ahead of us, of 100
-/// vehicles at 250 Hz 10 s.
+/// Limit for the open run, and for all other runs together. It is larger than the lead of a server
+/// over its recorder. With 100 vehicles at 250 Hz it is 10 s.
 constexpr std::size_t kMaxEntries = 262'144;
 
-/// Also an empty batch takes memory.
+/// An empty batch counts as one entry, because it also needs memory.
 std::size_t count_entries(const Inbox::Sample& sample) {
   const auto* batch = std::get_if<RecordBatch>(&sample);
   return batch ? std::max<std::size_t>(batch->entries().size(), 1) : 1;
@@ -44,7 +44,7 @@ void Inbox::put_locked(Received received) {
   } else if (closed_.count(received.run_id) == 0 && may_be_opened_(received.run_id)) {
     waiting_size_ += size;
     waiting_.push_back(std::move(received));
-    // The recording names dropped samples as missing.
+    // The recording lists dropped samples as missing.
     for (; waiting_size_ > kMaxEntries; waiting_.pop_front())
       waiting_size_ -= count_entries(waiting_.front().sample);
   }

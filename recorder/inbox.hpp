@@ -11,28 +11,29 @@
 
 namespace sls::record {
 
-/// Samples of the open run, on their way from the middleware's threads to the writing
-/// one. The readers live as long as the recorder: new ones would be sent all histories again, of
-/// earlier runs too. So samples of a run that may be opened next wait for that. Putting never
-/// blocks; what does not fit of the open run is counted.
+/// A queue of samples of the open run, from the middleware's threads to the writing thread. The
+/// readers exist as long as the recorder: new readers would receive all histories again, also those
+/// of earlier runs. So samples of a run that may be opened next wait until it is opened. A sample
+/// is added without blocking; samples of the open run that find no room are counted and dropped.
 class Inbox {
  public:
   using Sample = std::variant<RecordBatch, SimStatus>;
 
-  /// `may_be_opened` is asked about runs on the middleware's threads: others are not kept.
+  /// Samples of other runs are only kept if `may_be_opened` returns true. It is called on the
+  /// middleware's threads.
   Inbox(bus::Node& node, std::function<bool(std::uint64_t run_id)> may_be_opened);
 
-  /// From now on run `run_id` is recorded, including its samples that have already arrived. Samples
-  /// count from its `server` alone.
+  /// Makes `run_id` the open run. Its samples that have already arrived are included. Samples from
+  /// other senders than its `server` are ignored.
   void open(std::uint64_t run_id, const bus::PeerId& server);
 
-  /// All samples of the open run there are, oldest first.
+  /// Takes all waiting samples of the open run, oldest first.
   std::deque<Sample> take_all();
 
   /// Status samples and entries of the open run that were lost because there was no room.
   std::uint64_t refused() const;
 
-  /// True if the readers hear `server`.
+  /// True if both readers are matched with `server`.
   bool hears(const bus::PeerId& server) const;
 
  private:
@@ -47,11 +48,11 @@ class Inbox {
   const std::function<bool(std::uint64_t)> may_be_opened_;
   mutable std::mutex mutex_;
   std::deque<Sample> samples_;    // of the open run
-  std::size_t size_ = 0;          // of those, counting entries
-  std::size_t refused_ = 0;       // likewise, of the open run
-  std::deque<Received> waiting_;  // of runs that may be opened
+  std::size_t size_ = 0;          // of samples_, in entries
+  std::size_t refused_ = 0;       // dropped ones of the open run, in entries
+  std::deque<Received> waiting_;  // samples of runs that may be opened
   std::size_t waiting_size_ = 0;
-  std::set<std::uint64_t> closed_;  // have been open
+  std::set<std::uint64_t> closed_;  // runs that were open earlier
   std::uint64_t open_ = 0;
   bus::PeerId server_;
   bus::Reader<RecordBatch> record_reader_;

@@ -11,7 +11,7 @@
 
 namespace {
 
-constexpr const char* kIdentity = "recorder";  // whose keys it uses on a secured domain
+constexpr const char* kIdentity = "recorder";  // name of its keys on a secured domain
 
 }  // namespace
 

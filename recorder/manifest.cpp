@@ -36,8 +36,8 @@ std::string read_cpu_info(const std::string& key) {
   return "";
 }
 
-/// Vector extensions that libc's sin and cos choose their code by: results are the same bytes on
-/// machines where these are the same.
+/// Vector extensions by which libc chooses its code for sin and cos. Machines with the same
+/// extensions give the same bytes.
 Json list_math_features() {
   const std::string flags = " " + read_cpu_info("flags") + " ";
   Json features = Json::array();
@@ -57,13 +57,13 @@ Json describe_machine() {
           {"kernel", name.release}};
 }
 
-/// Vehicles of one server (idl/sls.idl).
+/// Limit of vehicles of one server (idl/sls.idl).
 constexpr std::size_t kMaxVehicles = 256;
 
-/// The files that a manifest lists must survive a power cut, too.
+/// Synchronises a file or folder, because the files that a manifest lists must survive a power cut.
 void sync_to_disk(const std::filesystem::path& path) {
   const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  // EINVAL: what this file system cannot do for a file or a folder.
+  // EINVAL: the file system does not support it for this file or folder.
   const bool is_done = descriptor >= 0 && (::fsync(descriptor) == 0 || errno == EINVAL);
   const int error = errno;
   if (descriptor >= 0) ::close(descriptor);
@@ -71,7 +71,8 @@ void sync_to_disk(const std::filesystem::path& path) {
     throw std::system_error(error, std::generic_category(), path.string() + ": cannot write");
 }
 
-/// The verification of a recording opens files of its folder only, whatever its manifest names.
+/// The verification of a recording must open files of its folder only, so a manifest cannot name
+/// others.
 bool is_in_folder(const std::filesystem::path& name) {
   return name == name.filename() && name.has_filename() && name != "." && name != "..";
 }
@@ -81,7 +82,7 @@ std::string show(const Json& json) {
   return json.is_primitive() ? json.dump() : std::string("an ") + json.type_name();
 }
 
-/// nlohmann itself would convert a number of any size, sign or fraction without a check.
+/// Converts with a check: nlohmann itself would convert a number of any size, sign or fraction.
 /// @throws config::ConfigError naming `key` if `value` is no whole number that `Whole` holds.
 template <typename Whole>
 Whole to_whole(const Json& value, const char* key) {
@@ -219,7 +220,7 @@ void write_manifest(const std::filesystem::path& folder, const Manifest& manifes
   const auto part = folder / "manifest.json.part";
   try {
     std::ofstream stream(part, std::ios::binary | std::ios::trunc);
-    // Texts that came over the wire may be cut within a letter: no reason to have no manifest.
+    // Texts of samples can be cut within a UTF-8 character; the manifest must be written anyway.
     stream << json.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';
     stream.close();
     if (!stream)

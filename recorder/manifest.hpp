@@ -13,8 +13,8 @@
 
 namespace sls::record {
 
-/// Consecutive steps of one topic, of sls/status samples by their sample_index, that are not in the
-/// recording.
+/// Consecutive steps of one topic that are not in the recording. For sls/status, from and to are
+/// values of sample_index.
 struct MissingSteps {
   std::uint32_t vehicle_id = 0;
   std::string topic;
@@ -22,7 +22,7 @@ struct MissingSteps {
   std::uint64_t to = 0;  ///< inclusive
 };
 
-/// Where a stage began of which the first recorded step is another one.
+/// The start of a stage whose first recorded step is a later one.
 struct StageStart {
   std::uint32_t vehicle_id = 0;
   std::uint32_t stage = 0;
@@ -36,18 +36,18 @@ struct StageStart {
 /// "3 samples missing, first sls/reference step 123 of vehicle 0".
 std::string describe(const std::vector<MissingSteps>& missing);
 
-/// Contents of a recording and whether it is whole. In a segment after the first, `complete`,
-/// `missing`, `stage_starts` and `certificate` cover all segments up to it, the other fields that
-/// segment alone.
+/// Contents of a recording and its completeness. In a segment after the first, `complete`,
+/// `missing`, `stage_starts` and `certificate` cover all segments up to this one, the other fields
+/// only this segment.
 struct Manifest {
   Parameters parameters;
   std::string scenario_name;
   std::string outcome;  ///< recording, finished, failed, reset, interrupted, lost
   std::string reason;
-  std::string timing;  ///< the server's last label
+  std::string timing;  ///< the last timing label of the server
   std::string certificate;
   int segment = 1;
-  std::uint64_t first_step = 0;  ///< where the segment takes over from those before
+  std::uint64_t first_step = 0;  ///< where the segment continues the earlier ones
   std::uint64_t last_step = 0;
   std::vector<RecordedFile> files;
   std::vector<MissingSteps> missing;
@@ -56,16 +56,16 @@ struct Manifest {
   std::uint64_t refused_samples = 0;   ///< lost because the recorder's queue was full
   DroppedEntries dropped;
   std::map<std::string, std::string> libraries;  ///< SHA-256 of controllers' libraries, by name
-  std::map<std::string, std::string> format_versions;  ///< of what sinks use: "zstd"
+  std::map<std::string, std::string> format_versions;  ///< of libraries of the sinks: "zstd"
   bool complete = false;  ///< the mission finished and nothing is missing
 };
 
-/// Writes `folder`/manifest.json, replacing an earlier one at once: a reader sees the old or the
-/// new one, never half of one. The files that it lists are on the disk before it.
+/// Writes `folder`/manifest.json and replaces an earlier one atomically: a reader finds the old or
+/// the new one, never a part of it. The files that it lists are on the disk before it.
 /// @throws std::system_error naming the file.
 void write_manifest(const std::filesystem::path& folder, const Manifest& manifest);
 
-/// A manifest as it reads back.
+/// A manifest that was read from a file.
 struct ManifestFile {
   struct File {
     std::optional<std::uint64_t> rows;

@@ -16,11 +16,11 @@ namespace {
 using namespace std::chrono_literals;
 namespace fs = std::filesystem;
 
-constexpr auto kUsualJoinTime = 1500ms;  // a server's claim and discovery: no news
+constexpr auto kUsualJoinTime = 1500ms;  // usual discovery and claim; no report before
 constexpr auto kPollTime = 20ms;
 constexpr double kJoinTimeout = 60;  // until a run must be found, s
 
-/// Asks `find` until it finds a run, a stop signal comes or `limit_s` is over.
+/// Calls `find` until it returns a run, a stop signal comes or `limit_s` is over.
 template <class Find>
 std::optional<bus::Run> wait_for_run(const bus::Node& node, const std::string& whom, double limit_s,
                                      Find find) {
@@ -37,7 +37,7 @@ std::optional<bus::Run> wait_for_run(const bus::Node& node, const std::string& w
 
 std::string to_text(std::uint64_t run_id) { return fmt::format("{:016x}", run_id); }
 
-/// A recording that is continued has its vehicles, whichever the options name.
+/// The vehicle of the options; if a recording to be continued does not have it, its first vehicle.
 std::uint32_t choose_vehicle(const RecorderOptions& options) {
   const auto ids = options.unfinished ? options.unfinished->vehicle_ids()
                                       : std::vector<std::uint32_t>{options.vehicle};
@@ -65,7 +65,8 @@ void Recorder::run() {
       surroundings_.participant_writer.wait_for_acknowledgments(1s);
       throw;
     }
-    // The others wait for its last announcement before they leave; it must reach them before we do.
+    // Other programs wait for the last announcement of this recorder before they end, so it must
+    // reach them.
     surroundings_.participant_writer.wait_for_acknowledgments(1s);
     run = go_on_after(*run, end);
   }
@@ -82,7 +83,7 @@ std::optional<bus::Run> Recorder::wait_for_first_run() const {
   });
 }
 
-/// The run of which there is a recording here, also where it has just ended.
+/// The run of the unfinished recording, even if it has just ended.
 std::optional<bus::Run> Recorder::find_unfinished_run() const {
   if (!options_.unfinished) return std::nullopt;
   for (const bus::Run& run : surroundings_.servers.runs()) {

@@ -1,4 +1,4 @@
-/// The recorder: finds the runs there are to record, one after another, and where they go.
+/// The recorder: finds the runs to record, one after another, and chooses their folders.
 #pragma once
 
 #include <cstdint>
@@ -12,16 +12,16 @@ namespace sls::record {
 
 struct RecorderOptions {
   std::filesystem::path folder;              ///< ready for the first run
-  std::optional<RecordedFlight> unfinished;  ///< the recording in it that is to be continued
-  std::uint32_t vehicle = 0;  ///< the run that flies this one is recorded, with all its vehicles
-  bool follow = false;        ///< record the run of a server that takes the place of ours
+  std::optional<RecordedFlight> unfinished;  ///< the recording in `folder` to be continued
+  std::uint32_t vehicle = 0;  ///< the run with this vehicle is recorded, with all its vehicles
+  bool follow = false;        ///< continue with the run of a server that replaces ours
 };
 
 class Recorder {
  public:
   Recorder(bus::Node& node, const RecorderOptions& options);
 
-  /// Records the first run it finds and, where an operator resets it, those that follow.
+  /// Records the first run that it finds and, after a reset by an operator, the following runs.
   /// @throws app::RunError if there is no run, or the last recording is not complete.
   void run();
 
@@ -35,7 +35,7 @@ class Recorder {
 
   const RecorderOptions options_;
   const bus::Node& node_;
-  bool is_folder_used_ = false;  // by another run
+  bool is_folder_used_ = false;  // true after the first run
   Surroundings surroundings_;
 };
 

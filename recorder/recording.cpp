@@ -28,7 +28,7 @@ Segment make_only_segment(const std::filesystem::path& folder) {
   return segment;
 }
 
-/// A segment goes on with the run of those before it, which has one scenario.
+/// All segments are of one run, so they have the same scenario.
 config::Scenario parse_scenario(const Segment& segment, const Parameters& parameters) {
   if (segment.earlier &&
       segment.earlier->manifest().scenario_sha256 != parameters.scenario_sha256().to_string())
@@ -70,7 +70,7 @@ void Recording::write_provisional_manifest() {
   stage_starts_ = manifest.stage_starts;
 }
 
-/// Certificate, log and gaps cover the whole flight.
+/// Reads the earlier segments, because certificate, log and gaps cover the whole flight.
 void Recording::read_earlier_segments() {
   if (!segment_.earlier) return;
   log_.set_stage_starts(segment_.earlier->manifest().stage_starts);
@@ -95,7 +95,7 @@ void Recording::add(const RecordBatch& batch) {
 
 void Recording::add(const SimStatus& status) {
   if (status.run_id() != parameters_.run_id()) return;
-  // A server that is discovered again sends its past again.
+  // A server that is discovered again sends its history again.
   if (last_status_ && status.sample_index() <= last_status_->sample_index()) return;
   last_status_ = status;
   note_status(status.sample_index());
@@ -104,7 +104,7 @@ void Recording::add(const SimStatus& status) {
 }
 
 void Recording::note_library(const std::string& controller, const std::string& sha256) {
-  constexpr std::size_t kMaxNoted = 256;  // whatever announces itself
+  constexpr std::size_t kMaxNoted = 256;  // limits the memory for announcements
   if (libraries_.size() < kMaxNoted) libraries_.try_emplace(controller, sha256);
 }
 
@@ -122,7 +122,8 @@ void Recording::account(const StepRows& rows) {
   certificate_.add(rows);
   log_.add(rows);
   const std::uint32_t id = rows.vehicle_id;
-  // Of a run that failed the last step may have no answer; no other one may.
+  // Only the last step of a failed run may be without an answer. A later step shows that this one
+  // was not the last.
   if (!bare_steps_.empty())
     if (const auto bare = bare_steps_.extract(id))
       note_missing_answers(id, bare.mapped(), bare.mapped());
@@ -146,10 +147,10 @@ void Recording::note_missing_answers(std::uint32_t vehicle_id, std::uint64_t fro
   note_missing(vehicle_id, ReferenceRow::kTopic, from, to);
 }
 
-/// Steps after the last row of a run that has ended.
+/// Notes the missing steps after the last row of a run that has ended.
 void Recording::note_missing_end() {
   if (!has_ended()) return;
-  // Of a failed run's last step there may be nothing: it need not have been published.
+  // The last step of a failed run may be missing, because it is not always published.
   const std::uint64_t end = last_status_->step() + (is_finished() ? 1 : 0);
   for (const auto& [id, next] : stream_.next_steps())
     if (next < end) note_missing_steps(id, next, end - 1);
@@ -157,7 +158,7 @@ void Recording::note_missing_end() {
   for (const auto& [id, step] : bare_steps_) note_missing_answers(id, step, step);
 }
 
-/// Of status samples the server keeps the last ones alone.
+/// Notes missing status samples: the server keeps only the last ones for late readers.
 void Recording::note_status(std::uint64_t sample_index) {
   if (sample_index > next_status_)
     note_missing(stream_.next_steps().begin()->first, StatusRow::kTopic, next_status_,
@@ -177,7 +178,8 @@ void Recording::note_missing(std::uint32_t vehicle_id, const char* topic, std::u
 }
 
 void Recording::flush() {
-  // Before the rows, which do not tell it: a recorder may be killed at any moment.
+  // The manifest comes first: a recorder can be killed at any moment, and rows alone do not give
+  // the stage starts.
   if (log_.list_stage_starts() != stage_starts_) write_provisional_manifest();
   for (const auto& sink : sinks_) sink->flush();
   flush_time_ = std::chrono::steady_clock::now();

@@ -1,4 +1,4 @@
-/// One recording on disk: takes the batches and status samples of one run and keeps the files. No
+/// One recording on disk: takes the batches and status samples of one run and writes the files. No
 /// network here; used by one thread.
 #pragma once
 
@@ -24,50 +24,51 @@ namespace sls::record {
 
 class Recording {
  public:
-  /// Opens the files in the segment's folder, which is ready for them, reads the segments before it
-  /// and writes a manifest that says "recording", not complete.
+  /// Opens the files in the segment's folder, which must be ready, reads the earlier segments and
+  /// writes a manifest with the outcome "recording", not complete.
   /// @throws config::ConfigError if the scenario or the signals in `parameters` cannot be used, or
   ///   the scenario is not that of the earlier segments.
   /// @throws DamagedError if an earlier segment cannot be read.
-  /// Every member @throws std::system_error naming the file when the disk refuses.
+  /// Every member @throws std::system_error with the name of the file if it cannot be written.
   Recording(const Segment& segment, const Parameters& parameters);
-  /// The same for a recording of one segment.
+  /// For a recording of one segment.
   Recording(const std::filesystem::path& folder, const Parameters& parameters);
 
   /// Samples of other runs are ignored.
   void add(const RecordBatch& batch);
   void add(const SimStatus& status);
 
-  /// A controller of the run has loaded a shared library.
+  /// Notes that a controller of the run has loaded a shared library.
   void note_library(const std::string& controller, const std::string& sha256);
 
-  /// Tells how much time has passed: a lost batch is not waited for forever.
+  /// Adds elapsed time: after a limit, a lost batch is no longer waited for.
   void pass_time(Stream::Duration elapsed) { stream_.pass_time(elapsed); }
 
-  /// The sample that it has waited for since `patience`, in words.
+  /// A text with the missing batch, if the recording has waited for it at least `patience`.
   std::optional<std::string> describe_stuck(Stream::Duration patience) const {
     return stream_.describe_stuck(patience);
   }
 
-  /// Flushes the files if the last time is `record.flush_s` ago.
+  /// Flushes the files if the last flush is `record.flush_s` ago.
   void flush_if_due();
 
-  /// True when the run has ended and its last batch is in.
+  /// True when the run has ended and its last batch has been handled.
   bool has_all() const { return has_ended() && stream_.has_ended(); }
 
   /// True when the run was ended by an operator's reset.
   bool is_reset() const { return last_status_ && last_status_->phase() == PHASE_RESET; }
 
-  /// The last step of which, and of all before it, all vehicles' rows are in; −1: none.
+  /// The last step up to which all steps of all vehicles are written or known to be missing; −1:
+  /// none.
   std::int64_t last_complete_step() const { return stream_.last_step(); }
 
-  /// Writes what is pending, flight.txt and the final manifest. `interruption` says why the
-  /// recorder stops early and `outcome` what that is called; empty if it did not. True if the
-  /// recording is complete.
+  /// Writes pending rows, flight.txt and the final manifest. If the recorder stops early,
+  /// `interruption` is the reason and `outcome` the outcome in the manifest; else `interruption` is
+  /// empty. True if the recording is complete.
   bool finish(const std::string& interruption, std::uint64_t refused_samples,
               const std::string& outcome = "interrupted");
 
-  /// Why it is not complete, in one line; after `finish`.
+  /// After `finish`: why the recording is not complete, in one line.
   std::string describe_gaps() const;
 
  private:
@@ -96,14 +97,14 @@ class Recording {
   std::map<std::string, std::string> libraries_;  // of controllers, by name
   std::vector<MissingSteps> missing_;
   std::vector<StageStart> stage_starts_;  // those in the provisional manifest
-  // In missing_, the last ones of each vehicle and topic.
+  // Index in missing_ of the last gap of each vehicle and topic.
   std::map<std::pair<std::uint32_t, std::string>, std::size_t> last_gaps_;
-  std::map<std::uint32_t, std::uint64_t> bare_steps_;  // the last ones with a state alone
+  std::map<std::uint32_t, std::uint64_t> bare_steps_;  // last steps with a state but no answer
   std::uint64_t unanswered_steps_ = 0;
   std::optional<SimStatus> last_status_;
   std::uint64_t next_status_ = 0;      // sample_index after the last one of all segments
-  std::string interruption_;           // from `finish` on
-  std::uint64_t refused_samples_ = 0;  // likewise
+  std::string interruption_;           // set by `finish`
+  std::uint64_t refused_samples_ = 0;  // set by `finish`
   std::chrono::steady_clock::time_point flush_time_;
 };
 

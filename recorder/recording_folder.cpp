@@ -20,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 using config::ConfigError;
 
-// The last is what `./sls report` puts beside them.
+// The last one is a file of `./sls report`.
 constexpr std::array<std::string_view, 13> kRecordingFiles = {
     "state.csv",     "measured.csv",       "command.csv",   "reference.csv", "status.csv",
     "flight.csv",    "sls.mcap",           "sls.mcap.part", "flight.txt",    "scenario.yaml",
@@ -45,7 +45,7 @@ bool is_figure(const fs::path& path) {
          is_among(kFigures, path.stem().string());
 }
 
-/// True if `name` is `prefix` and then `digits` alone.
+/// True if `name` is `prefix`, followed only by `digits`.
 bool is_numbered(std::string_view name, std::string_view prefix, std::string_view digits) {
   return name.size() > prefix.size() && name.substr(0, prefix.size()) == prefix &&
          name.find_first_not_of(digits, prefix.size()) == name.npos;
@@ -64,8 +64,8 @@ fs::directory_iterator list(const std::string& place, const fs::path& folder) {
   return entries;
 }
 
-/// Everything in `folder`, of which `is_ours` says what files may be there, subfolders after what
-/// is in them.
+/// All files and subfolders of a recording in `folder`, each subfolder after its contents.
+/// `is_ours` is true for the allowed files.
 /// @throws ConfigError if something does not belong to a recording.
 std::vector<fs::path> list_recording(const std::string& place, const fs::path& folder,
                                      bool (*is_ours)(const fs::path&) = is_recording_file) {
@@ -98,7 +98,7 @@ void remove_recording(const std::string& place, const fs::path& folder) {
   }
 }
 
-/// A recorder that is killed at its very beginning has created files and written nothing yet.
+/// True if state.csv has no row: the recorder was killed after it had created the files.
 bool is_without_rows(const fs::path& folder) {
   std::ifstream file(folder / StateRow::kFile);
   std::string header;
@@ -144,7 +144,7 @@ Segment make_next_segment(const RecordedFlight& earlier) {
   segment.folder = earlier.folder / name_segment(segment.number);
   segment.first_step = find_next_step(earlier);
   segment.earlier = earlier;
-  // One without a manifest is of a recorder that was killed before it had written anything.
+  // A segment folder without a manifest is from a recorder that was killed before it wrote rows.
   prepare_recording_folder(segment.folder, true);
   return segment;
 }

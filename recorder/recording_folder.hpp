@@ -9,18 +9,19 @@
 
 namespace sls::record {
 
-/// Makes `folder` ready for a recording: creates it, or takes an empty one. One that is not empty
-/// is refused; with `force`, the files of an earlier recording in it are removed, those of its
-/// segments and further runs included, and anything else in it is still refused.
+/// Makes `folder` ready for a recording: creates it, or uses an empty one. A folder that is not
+/// empty is refused. With `force`, an earlier recording in it is removed, with its segments and
+/// further runs; a folder with other files is still refused.
 /// @throws config::ConfigError naming the folder and the cause.
 void prepare_recording_folder(const std::filesystem::path& folder, bool force);
 
-/// The recording in `folder` that a killed recorder has left, to be continued; nothing if there
-/// is none yet, and the folder is ready for a new one.
-/// @throws config::ConfigError naming the folder if its recording is complete, or it is not fit.
+/// The recording of a killed recorder in `folder`, to be continued. If there is none yet, makes the
+/// folder ready for a new one and returns nothing.
+/// @throws config::ConfigError naming the folder if its recording is complete, or if the folder
+///   cannot be used.
 std::optional<RecordedFlight> find_unfinished_recording(const std::filesystem::path& folder);
 
-/// Where a recording is written: all of it, or what follows `earlier` segments.
+/// The place of a recording, or of the part that follows the segments `earlier`.
 struct Segment {
   std::filesystem::path folder;
   int number = 1;
@@ -28,8 +29,8 @@ struct Segment {
   std::optional<RecordedFlight> earlier;
 };
 
-/// A folder of its own for what follows `earlier`.
-/// @throws DamagedError if that cannot be read.
+/// A new segment after `earlier`, in its own folder.
+/// @throws DamagedError if `earlier` cannot be read.
 Segment make_next_segment(const RecordedFlight& earlier);
 
 /// "run-0123456789abcdef": the subfolder of a further run.

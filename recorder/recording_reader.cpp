@@ -108,7 +108,7 @@ bool RowReader<Row>::is_left_out() const {
          !fs::exists(flight_.segments[segment_].folder / name_);
 }
 
-/// Reads one row, of whichever vehicle; false at the end.
+/// Reads one row of any vehicle; false at the end.
 template <class Row>
 bool RowReader<Row>::read_row() {
   for (; segment_ < flight_.segments.size(); ++segment_, file_.reset()) {

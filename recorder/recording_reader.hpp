@@ -1,6 +1,6 @@
-/// Reads recordings back: finds their segments and joins their rows step by step, in one pass over
-/// the files however many vehicles there are. Memory holds the rows that were read before they were
-/// asked for: as many as vehicles, or rows of one step, are apart in the files.
+/// Reads recordings: finds their segments and joins their rows step by step, in one pass over the
+/// files for any number of vehicles. Rows that were read before they are requested stay in memory.
+/// Their number is the distance in a file between the rows of one step.
 #pragma once
 
 #include <deque>
@@ -38,21 +38,21 @@ std::string name_segment(int number);
 ///   not of one run.
 RecordedFlight open_recording(const std::filesystem::path& folder);
 
-/// Rows of one kind, of all segments in order, asked for by vehicle. A segment's rows count up to
-/// the step with which the next one takes over.
+/// Rows of one kind, of all segments in order, requested by vehicle. The rows of a segment are used
+/// up to the first step of the next segment.
 /// Every member @throws DamagedError.
 template <class Row>
 class RowReader {
  public:
-  /// Of a file other than the row's own, segments may have none.
+  /// If `file` is not the row's usual file, it may be missing in segments.
   RowReader(const RecordedFlight& flight, std::uint64_t end, const char* file = Row::kFile);
 
-  /// The vehicle's row that comes next; null at the end.
+  /// The next row of the vehicle; null at the end.
   const Row* peek(std::uint32_t vehicle_id);
-  /// Takes that row, which there must be.
+  /// Takes that row, which must exist.
   Row take(std::uint32_t vehicle_id);
 
-  /// Reads one row on: of which vehicle it is; nothing at the end.
+  /// Reads one more row and returns its vehicle; nothing at the end.
   std::optional<std::uint32_t> read_on();
 
  private:
@@ -60,7 +60,7 @@ class RowReader {
   void keep(Row row);
 
   struct Vehicle {
-    std::deque<Row> rows;  // read, and not asked for yet
+    std::deque<Row> rows;  // read, but not taken yet
     std::uint64_t next_step = 0;
   };
 
@@ -70,35 +70,35 @@ class RowReader {
   const std::uint64_t end_;
   const char* const name_;
   std::map<std::uint32_t, Vehicle> vehicles_;
-  std::optional<std::uint32_t> kept_;  // vehicle of the row that was read last
+  std::optional<std::uint32_t> kept_;  // vehicle of the last row that was kept
   std::size_t segment_ = 0;
   std::unique_ptr<CsvReader> file_;
 };
 
-/// The steps before `end`, of each vehicle in order; such of which there is no row are left out.
+/// The steps before `end`, in order for each vehicle. Steps without any row are left out.
 class StepReader {
  public:
   explicit StepReader(const RecordedFlight& flight,
                       std::uint64_t end = std::numeric_limits<std::uint64_t>::max());
 
-  /// The next step of the vehicle whose turn it is; nothing after the last step of all.
-  /// @throws DamagedError, like the other one.
+  /// The next step; the vehicles take turns. Nothing after the last step of all.
+  /// @throws DamagedError, as all members do.
   std::optional<StepRows> next();
   /// The next step of that vehicle; nothing after its last one.
   std::optional<StepRows> next(std::uint32_t vehicle_id);
-  /// The next step in the order in which state.csv has them; steps without a state stand before a
-  /// later one of their vehicle, or at the end.
+  /// The next step in the order of state.csv. A step without a state comes before a later step of
+  /// its vehicle, or at the end.
   std::optional<StepRows> next_as_written();
 
  private:
   RowReader<StateRow> states_;
   RowReader<CommandRow> commands_;
   RowReader<ReferenceRow> references_;
-  std::deque<std::uint32_t> turns_;       // of vehicles that may have further steps
-  std::optional<std::uint32_t> written_;  // vehicle of the state that is next as written
+  std::deque<std::uint32_t> turns_;       // vehicles that may have further steps
+  std::optional<std::uint32_t> written_;  // vehicle of the next row of state.csv
 };
 
-/// The step after the last one that every vehicle has whole; 0: there is none.
+/// The step after the last one that is whole for every vehicle; 0: there is none.
 /// @throws DamagedError
 std::uint64_t find_next_step(const RecordedFlight& flight);
 

@@ -23,7 +23,7 @@ void fill(StateRow& row, const RecordEntry& entry, const PlantState& state,
   row.plant = state;
   row.f_Q_W = entry.f_Q_W_n();
   row.has_attitude = parameters.has_attitude();
-  // Rows have as many fields as the header, whatever came.
+  // Rows must have as many fields as the header, even if the sample has another number of signals.
   row.plant.signals().resize(parameters.signals().size(), std::numeric_limits<double>::quiet_NaN());
 }
 
@@ -76,7 +76,7 @@ void add_reference(StepRows& rows, const RecordEntry& entry, const Parameters& p
   row.sim_time_s = calc_time(entry.step(), parameters);
   row.reference = entry.answer().reference();
   row.stage_name = row.reference.stage_name().c_str();
-  // The controller may already be in the next stage, of which the reference is not.
+  // The controller may already be in the next stage, while the reference is of the previous one.
   const ControllerState& controller = entry.answer().controller();
   if (controller.stage_index() == row.reference.stage_index() &&
       controller.stage_start_step() <= row.step)

@@ -1,5 +1,5 @@
-/// The rows of the CSV files: what is recorded of a step, and what is compared and certified. Each
-/// row type lists its columns once, in their order.
+/// The rows of the CSV files, which hold the recorded, compared and certified data of a step. Each
+/// row type lists its columns once, in order.
 #pragma once
 
 #include <array>
@@ -19,11 +19,11 @@ namespace sls::record {
 
 using Numbers3 = std::array<double, 3>;
 
-/// State k: what quadrotor and load really do, and the force applied over [k − 1, k).
+/// State k: true motion of quadrotor and load, and the force applied over [k − 1, k).
 struct StateRow {
   static constexpr const char* kTopic = "sls/state";
   static constexpr const char* kFile = "state.csv";
-  static constexpr const char* kMeasuredFile = "measured.csv";  // the same of what was measured
+  static constexpr const char* kMeasuredFile = "measured.csv";  // same columns, measured state
 
   std::uint32_t vehicle_id = 0;
   std::uint64_t step = 0;
@@ -56,7 +56,7 @@ struct StateRow {
   }
 };
 
-/// The answer to state k, as it was answered.
+/// The answer to state k.
 struct CommandRow {
   static constexpr const char* kTopic = "sls/command";
   static constexpr const char* kFile = "command.csv";
@@ -66,7 +66,7 @@ struct CommandRow {
   std::string controller;
   Numbers3 f_Q_W{};
   double compute_us = 0;
-  std::string fault;  ///< the fault code; kHeld or kFailSafe where no answer was in force
+  std::string fault;  ///< the fault code; kHeld or kFailSafe if no answer was in force
 
   static constexpr std::string_view kHeld = "held";
   static constexpr std::string_view kFailSafe = "fail_safe";
@@ -117,7 +117,7 @@ struct FlightRow {
   const StateRow& state;
   const CommandRow& command;
   const ReferenceRow& reference;
-  bool is_of_fleet = false;  ///< whose rows one must be able to tell apart
+  bool is_of_fleet = false;  ///< true adds the column vehicle_id
 
   template <class Visitor>
   static void visit(const FlightRow& row, Visitor& field) {
@@ -174,28 +174,28 @@ struct StatusRow {
   }
 };
 
-/// The rows there are of one step of one vehicle.
+/// The existing rows of one step of one vehicle.
 struct StepRows {
   std::uint32_t vehicle_id = 0;
   std::uint64_t step = 0;
   std::optional<StateRow> state;
-  std::optional<StateRow> measured;  ///< where it can differ from the truth
+  std::optional<StateRow> measured;  ///< only if it can differ from the truth
   std::optional<CommandRow> command;
   std::optional<ReferenceRow> reference;
-  /// Step at which the stage of `reference` began; only samples tell, no file.
+  /// Step at which the stage of `reference` began. Only samples contain it, no file does.
   std::optional<std::uint64_t> stage_start_step;
 
-  /// All three: what a row of flight.csv is made of.
+  /// True if the three rows exist from which a row of flight.csv is made.
   bool is_complete() const { return state && command && reference; }
-  /// All that can be had: a step that nobody answered may have no reference.
+  /// True if no row is missing: a step without an answer may have no reference.
   bool is_whole() const { return state && command && (reference || command->is_unanswered()); }
 };
 
-/// The rows of an entry of any kind except ANSWER_LATE; `rows` may hold another one's, whose memory
-/// is used again.
+/// The rows of an entry of any kind except ANSWER_LATE. Rows that `rows` holds are replaced and
+/// their memory is used again.
 void fill_rows(StepRows& rows, const RecordEntry& entry, const Parameters& parameters);
 StepRows make_rows(const RecordEntry& entry, const Parameters& parameters);
-/// Adds the reference of `entry`, the answer to that step.
+/// Adds the reference of `entry`, which is the answer to that step.
 void add_reference(StepRows& rows, const RecordEntry& entry, const Parameters& parameters);
 
 }  // namespace sls::record

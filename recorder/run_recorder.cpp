@@ -15,18 +15,19 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto kPollTime = 5ms;            // between two looks at the run
-constexpr auto kNewsTime = 20ms;           // between two announcements of further steps,
-constexpr std::int64_t kManySteps = 500;   // but of so many at once: the server may wait for it
-constexpr auto kAnnounceTime = 500ms;      // between two announcements at the latest
-constexpr auto kWriteTime = 5ms;           // between two looks of the writing thread
-constexpr auto kBusyTime = 1ms;            // likewise while samples come
-constexpr auto kStuckTime = 1s;            // until it is said which batch is missing
-constexpr auto kCompletionTime = 10s;      // after the end of a finished run, for the next step
-constexpr auto kFailedTime = 1s;           // likewise of any other
-constexpr auto kInterruptionTime = 500ms;  // likewise after a stop signal
+constexpr auto kPollTime = 5ms;            // period of the main thread
+constexpr auto kNewsTime = 20ms;           // least time between two announcements of new steps
+constexpr std::int64_t kManySteps = 500;   // announced at once: the server may wait for it
+constexpr auto kAnnounceTime = 500ms;      // longest time between two announcements
+constexpr auto kWriteTime = 5ms;           // period of the writing thread
+constexpr auto kBusyTime = 1ms;            // the same while samples come
+constexpr auto kStuckTime = 1s;            // before a missing batch is reported
+constexpr auto kCompletionTime = 10s;      // wait for each step after the end of a finished run
+constexpr auto kFailedTime = 1s;           // wait after the end of any other run
+constexpr auto kInterruptionTime = 500ms;  // wait after a stop signal
 
-/// While this process was stopped nothing could arrive: that time does not count as waiting.
+/// Longest time that counts as waiting in one period: while this process is stopped, no sample can
+/// arrive.
 constexpr std::chrono::steady_clock::duration kLongestPass = 1s;
 
 }  // namespace
@@ -125,7 +126,7 @@ void RunRecorder::look_for_the_end(bus::ServerWatch& server) {
   }
 }
 
-/// Another run may be the end of this one: its own server's, or that of a server in its place.
+/// Ends this run if another one replaces it: of the same server, or of a server that replaces it.
 void RunRecorder::look_for_the_next_run() {
   const auto next = surroundings_.servers.find_successor(run_, {surroundings_.vehicle});
   if (!next) return;
@@ -165,7 +166,7 @@ void RunRecorder::write_samples() {
     bool is_stopped = false;
     auto time = Clock::now();
     while (!recording_.has_all() && !is_stopped) {
-      is_stopped = stop_writing_;  // what is there by now is still taken
+      is_stopped = stop_writing_;  // read first: samples that came before it are still written
       const std::deque<Inbox::Sample> samples = surroundings_.inbox.take_all();
       for (const Inbox::Sample& sample : samples)
         std::visit([this](const auto& message) { recording_.add(message); }, sample);
@@ -177,7 +178,8 @@ void RunRecorder::write_samples() {
       report_missing_batch();
       std::this_thread::sleep_for(samples.empty() ? kWriteTime : kBusyTime);
     }
-    const bool has_all = recording_.has_all();  // if so, the main thread may still be looking
+    const bool has_all =
+        recording_.has_all();  // if true, the main thread may still write interruption_
     end_.is_complete = recording_.finish(has_all ? "" : interruption_,
                                          surroundings_.inbox.refused(), has_all ? "" : outcome_);
     if (!end_.is_complete) end_.gaps = recording_.describe_gaps();

@@ -1,6 +1,6 @@
-/// Records one run, from joining it to its end. Two threads beside the middleware's: the main one
-/// watches the run and announces progress; the other one writes, because a slow disk must not delay
-/// the watching.
+/// Records one run, from joining it to its end. It has two threads in addition to those of the
+/// middleware: the main thread watches the run and announces progress; the other one writes,
+/// because a slow disk must not delay the main thread.
 #pragma once
 
 #include <atomic>
@@ -20,7 +20,7 @@ namespace sls::record {
 
 /// Objects that outlive a run.
 struct Surroundings {
-  /// Runs that fly `flown_vehicle` are recorded.
+  /// Runs with the vehicle `flown_vehicle` are recorded.
   Surroundings(bus::Node& domain, std::uint32_t flown_vehicle)
       : vehicle(flown_vehicle),
         participants(domain),
@@ -37,8 +37,8 @@ struct Surroundings {
 
 struct RunEnd {
   bool is_complete = false;
-  bool is_reset = false;                ///< by an operator: the same server goes on with a new run
-  std::optional<bus::Run> replacement;  ///< another server's, which has taken the place of this one
+  bool is_reset = false;                ///< by an operator: the same server begins a new run
+  std::optional<bus::Run> replacement;  ///< a run of another server that replaces this one
   std::string gaps;                     ///< why it is not complete, in one line
   std::int64_t last_step = -1;
 };
@@ -48,7 +48,10 @@ class RunRecorder {
   /// Opens the recording of `run` in `segment`.
   RunRecorder(Surroundings& surroundings, const bus::Run& run, const Segment& segment);
 
-  /// @throws what the disk refuses, after the others have been told.
+  /// Records until the end of the run.
+  /// @throws the error of the writing thread, such as std::system_error if a file cannot be
+  /// written,
+  ///   after it has announced the end to the other programs.
   RunEnd run();
 
  private:
@@ -71,7 +74,7 @@ class RunRecorder {
   const bus::Run run_;
   const std::uint64_t run_id_;
   const config::Scenario scenario_;
-  Recording recording_;  // the writing thread's while it runs
+  Recording recording_;  // used only by the writing thread while that runs
   std::optional<app::Wait> stuck_;
   std::uint64_t participants_version_ = 0;
 
@@ -79,20 +82,20 @@ class RunRecorder {
   std::int64_t announced_step_ = -1;
   Clock::time_point announced_time_;
   std::optional<app::Wait> give_up_;
-  std::int64_t step_after_end_ = -1;  // the last complete one when last looked at
+  std::int64_t step_after_end_ = -1;  // last complete step at the last check after the end
   RunEnd end_;
 
-  // Shared by the two.
+  // Shared by both threads.
   std::atomic<bool> stop_writing_{false};
   std::atomic<bool> has_all_{false};
   std::atomic<std::int64_t> last_complete_step_;
   std::string interruption_;             // set before stop_writing_
-  std::string outcome_ = "interrupted";  // likewise
+  std::string outcome_ = "interrupted";  // set before stop_writing_
   std::exception_ptr writing_error_;     // read after the thread has ended
   std::atomic<bool> writing_failed_{false};
 };
 
-/// Announcement of a recorder; `run` is the one it serves, where it knows one.
+/// Announcement of a recorder; `run` is the joined run, or null.
 Participant make_announcement(const bus::Run* run, bool ready, bool done, std::int64_t last_step);
 
 }  // namespace sls::record

@@ -13,15 +13,15 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// A batch that is missing while so many later ones are in, or for so long, is lost.
+/// A missing batch is lost when more than this many later ones wait, or after this time.
 constexpr std::size_t kMaxWaiting = 64;
 constexpr auto kMaxStuckTime = 10s;
 
-/// A late answer comes at most so many steps later (idl/sls.idl).
+/// A late answer comes at most this many steps later (idl/sls.idl).
 constexpr std::uint64_t kMaxLateness = 64;
 
-/// Steps that wait for late answers: more than 256 vehicles have. It bounds the memory that steps
-/// out of order can take.
+/// Limit of steps that wait for late answers; 256 vehicles need fewer. It limits the memory for
+/// steps out of order.
 constexpr std::size_t kMaxPending = 32768;
 
 }  // namespace

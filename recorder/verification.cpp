@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 // --- one recording -------------------------------------------------------------------------------
 
-/// Hash and rows of a file, in one go.
+/// Hash and number of rows of a file, in one pass.
 ManifestFile::File measure(const fs::path& path) {
   std::error_code error;
   std::ifstream stream;
@@ -77,7 +77,7 @@ void certify(const RecordedFlight& flight, Inspection& inspection) {
 
 // --- two recordings ------------------------------------------------------------------------------
 
-/// A row's fields as people read them; empty if equal flights may differ.
+/// The fields of a row as text for people; empty for a field that can differ between equal flights.
 struct FieldLister {
   std::vector<std::string> texts;
   std::vector<bool> are_nan;
@@ -134,7 +134,7 @@ std::optional<std::string> compare_steps(const StepRows& a, const StepRows& b,
   return compare_rows(a.reference, b.reference, a, flight);
 }
 
-/// Of what comes next of the vehicle in either recording.
+/// The first difference between `a` and `b`, the next steps of one vehicle in the two recordings.
 std::optional<Difference> compare_next(const std::optional<StepRows>& a,
                                        const std::optional<StepRows>& b,
                                        const RecordedFlight& flight) {

@@ -1,4 +1,4 @@
-/// `sls verify`: does a recording match its manifest, and are two recordings of the same flight?
+/// `sls verify`: compares a recording with its manifest, and two recordings with each other.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@ namespace sls::record {
 
 /// The result of reading every file of a recording again.
 struct Inspection {
-  std::uint64_t steps = 0;            ///< of the vehicle that has most
+  std::uint64_t steps = 0;            ///< of the vehicle with the most steps
   std::string certificate;            ///< of the rows; empty if they cannot be read
   std::vector<std::string> problems;  ///< where a file differs from its manifest, one line each
 };
@@ -27,7 +27,7 @@ struct Difference {
 /// @throws DamagedError if a row that is read before the first difference is damaged.
 std::optional<Difference> find_first_difference(const RecordedFlight& a, const RecordedFlight& b);
 
-/// Differences and gaps according to the manifests; the data may be equal all the same.
+/// Differences and gaps according to the manifests. The data can still be equal.
 std::vector<std::string> list_notes(const RecordedFlight& a, const RecordedFlight& b);
 
 }  // namespace sls::record

@@ -1,5 +1,4 @@
-/// A format that a recording is written in. To add one: a folder beside csv/ and a line in
-/// make_sinks().
+/// A file format of recordings. To add one, add a folder beside csv/ and a line in make_sinks().
 #pragma once
 
 #include <cstdint>
@@ -21,22 +20,22 @@ struct RecordedFile {
 };
 
 /// Made with the folder and the run's parameters; used by one thread.
-/// Every member @throws std::system_error naming the file when the disk refuses.
+/// Every member @throws std::system_error with the name of the file if it cannot be written.
 class RecordSink {
  public:
   virtual ~RecordSink() = default;
 
-  /// The rows of a step; of each vehicle in step order.
+  /// Adds the rows of a step. The steps of each vehicle come in order.
   virtual void add(const StepRows& rows) = 0;
   virtual void add(const SimStatus& status) = 0;
 
-  /// True when so much is pending that it must be flushed.
+  /// True when a flush is necessary because of the amount of pending data.
   virtual bool is_full() const = 0;
-  /// Hands what is pending to the operating system, such that a recorder killed amid it leaves
-  /// files that can be read and resumed.
+  /// Passes pending data to the operating system. If the recorder is killed during a flush, the
+  /// files can still be read and resumed.
   virtual void flush() = 0;
 
-  /// Libraries whose version decides on the bytes of the files, by name.
+  /// Versions of libraries that affect the bytes of the files, by name.
   virtual std::map<std::string, std::string> list_versions() const { return {}; }
 
   /// Flushes and ends the files, and lists them.
@@ -44,7 +43,7 @@ class RecordSink {
 };
 
 /// Creates the files of the scenario's formats in `folder`.
-/// @throws config::ConfigError, before any file is there, if `parameters` do not allow it.
+/// @throws config::ConfigError, before any file is created, if `parameters` do not allow it.
 std::vector<std::unique_ptr<RecordSink>> make_sinks(const std::filesystem::path& folder,
                                                     const Parameters& parameters,
                                                     const config::Record& record);

@@ -47,7 +47,7 @@ void CsvFile::add(std::string_view text) {
 }
 
 char* CsvFile::begin_field(std::size_t bytes) {
-  if (buffer_.size() < used_ + bytes + 2)  // and a comma before it, a line break after it
+  if (buffer_.size() < used_ + bytes + 2)  // 2: a comma before it, a line break after it
     buffer_.resize(std::max(2 * buffer_.size(), used_ + bytes + 2));
   if (row_begun_) buffer_[used_++] = ',';
   row_begun_ = true;
@@ -79,7 +79,7 @@ void CsvFile::flush() {
   forget(finished_);
 }
 
-/// A row the disk took only in part would look like data.
+/// Removes a row that was written only in part, because it would look like data.
 void CsvFile::cut_back_to_whole_rows(std::size_t written) {
   std::size_t whole = 0;
   bool is_quoted = false;
@@ -90,7 +90,7 @@ void CsvFile::cut_back_to_whole_rows(std::size_t written) {
   const off_t end = ::lseek(descriptor_, 0, SEEK_END);
   const auto surplus = static_cast<off_t>(written - whole);
   if (end >= surplus && ::ftruncate(descriptor_, end - surplus) != 0) {
-    // The caller reports the error that led here.
+    // The caller reports the earlier error.
   }
   forget(whole);
 }

@@ -9,9 +9,9 @@
 
 namespace sls::record {
 
-/// A CSV file that grows row by row. Numbers are written so that they read back to the same double;
-/// rows reach the disk with `flush()`, whole ones only.
-/// Every member @throws std::system_error naming the file when the disk refuses.
+/// A CSV file that grows row by row. Reading a number gives the same double that was written.
+/// `flush()` writes whole rows only.
+/// Every member @throws std::system_error with the name of the file if it cannot be written.
 class CsvFile {
  public:
   /// Creates `file`, which must not exist, and writes `header` as its first line.
@@ -21,7 +21,7 @@ class CsvFile {
   CsvFile& operator=(const CsvFile&) = delete;
 
   void add(double value);
-  void add(std::string_view text);  ///< quoted where it holds a comma, a quote or a line break
+  void add(std::string_view text);  ///< quoted if it has a comma, a quote or a line break
   template <class Integer, std::enable_if_t<std::is_integral_v<Integer>, int> = 0>
   void add(Integer value) {
     add_number(value);
@@ -33,7 +33,7 @@ class CsvFile {
   }
   void end_row();
 
-  /// Hands every finished row to the operating system.
+  /// Passes every finished row to the operating system.
   void flush();
 
   std::uint64_t rows() const { return rows_; }
@@ -42,7 +42,7 @@ class CsvFile {
   const std::filesystem::path& path() const { return path_; }
 
  private:
-  /// Room for a field of so many bytes, and for what separates it from the one before.
+  /// Makes room for a field of `bytes` bytes and its separator, and writes the separator.
   char* begin_field(std::size_t bytes);
   template <class Number>
   void add_number(Number value) {
@@ -58,8 +58,8 @@ class CsvFile {
   const std::filesystem::path path_;
   int descriptor_ = -1;
   std::vector<char> buffer_;
-  std::size_t used_ = 0;      // bytes of the buffer that are rows
-  std::size_t finished_ = 0;  // of those, whole ones
+  std::size_t used_ = 0;      // bytes of the buffer that are in use
+  std::size_t finished_ = 0;  // of those, bytes of whole rows
   bool row_begun_ = false;
   std::uint64_t rows_ = 0;
 };

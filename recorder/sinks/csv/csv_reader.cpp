@@ -8,7 +8,7 @@ namespace sls::record {
 namespace {
 
 constexpr std::size_t kBlock = 1 << 18;
-constexpr std::size_t kLongestRecord = 1 << 20;  // of a file that is what it should be: hundreds
+constexpr std::size_t kLongestRecord = 1 << 20;  // in a valid file: some hundred bytes
 
 }  // namespace
 
@@ -63,7 +63,7 @@ bool CsvReader::find_record() {
   }
 }
 
-/// Keeps what there is of the record in work.
+/// Reads the next block and keeps the part of the current record that was read before.
 bool CsvReader::read_more() {
   buffer_.erase(0, begin_);
   begin_ = 0;

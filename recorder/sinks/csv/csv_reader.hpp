@@ -11,19 +11,19 @@
 
 namespace sls::record {
 
-/// A recording's file is not what it should be; the message names file, line and cause.
+/// A file of a recording is damaged. The message names file, line and cause.
 class DamagedError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
 /// Reads a CSV file row by row (RFC 4180: quoted fields may hold line breaks). A last row without a
-/// line break was cut when its writer was killed: it is no row.
+/// line break is ignored: it was cut when its writer was killed.
 class CsvReader {
  public:
-  enum class Further { kNone, kAllowed };  ///< columns after those that are known
+  enum class Further { kNone, kAllowed };  ///< columns after the known ones
 
-  /// Opens `file`, whose first line must be `header`, or may go on after it.
+  /// Opens `file`. Its first line must be `header`; with `kAllowed`, more columns may follow.
   /// Every member @throws DamagedError.
   CsvReader(const std::filesystem::path& file, std::string_view header,
             Further further = Further::kNone);
@@ -31,10 +31,10 @@ class CsvReader {
   /// Reads the next row into `fields()`; false at the end.
   bool next();
 
-  /// Of the last row read; valid until the next one.
+  /// The fields of the last row read; valid until the next call of `next`.
   const std::vector<std::string_view>& fields() const { return fields_; }
 
-  /// A row has that many.
+  /// The names of the columns; each row has as many fields.
   const std::vector<std::string>& columns() const { return columns_; }
 
   /// "FILE:LINE: " of the last row read.
@@ -53,7 +53,7 @@ class CsvReader {
   bool is_at_end_ = false;
   std::vector<std::string> columns_;
   std::vector<std::string_view> fields_;
-  std::list<std::string> unquoted_;  // fields whose text is not in the buffer as it is
+  std::list<std::string> unquoted_;  // texts of the quoted fields
 };
 
 }  // namespace sls::record

@@ -7,7 +7,7 @@
 namespace sls::record {
 namespace {
 
-constexpr std::size_t kFlushBytes = 1 << 17;  // below that at which a file flushes on its own
+constexpr std::size_t kFlushBytes = 1 << 17;  // less than the size at which a file flushes itself
 
 struct FieldWriter {
   CsvFile& file;

@@ -27,9 +27,10 @@ class CsvSink : public RecordSink {
   const std::string state_header_;
   const bool is_of_fleet_;
   CsvFile states_, references_, flight_, statuses_, commands_;
-  /// Commands last: where a killed recorder leaves one, the step's other rows are there too.
+  /// Flushed in this order, commands last: if a recorder is killed, each step with a command row
+  /// also has its other rows.
   const std::array<CsvFile*, 5> files_{&states_, &references_, &flight_, &statuses_, &commands_};
-  std::optional<CsvFile> measured_;  // from its first row on
+  std::optional<CsvFile> measured_;  // created with its first row
 };
 
 }  // namespace sls::record

@@ -9,7 +9,7 @@ namespace {
 constexpr std::size_t kSlices = 8;
 using Tables = std::array<std::array<std::uint32_t, 256>, kSlices>;
 
-/// Slicing by eight: table s is the effect of a byte that s further bytes follow.
+/// Slicing by eight: table s has the effect of a byte that is followed by s more bytes.
 constexpr Tables make_tables() {
   Tables tables{};
   for (std::uint32_t byte = 0; byte < 256; ++byte) {

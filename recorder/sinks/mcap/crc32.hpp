@@ -5,11 +5,11 @@
 
 namespace sls::record {
 
-/// CRC-32 of ISO 3309, as zlib and MCAP have it, of bytes that come in pieces.
+/// CRC-32 of ISO 3309, as in zlib and MCAP, for bytes that are added in parts.
 class Crc32 {
  public:
   void add(std::string_view bytes);
-  /// Of all bytes so far; 0 of none.
+  /// The CRC of all bytes so far; 0 without bytes.
   std::uint32_t value() const { return ~state_; }
 
  private:

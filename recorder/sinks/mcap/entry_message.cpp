@@ -36,7 +36,7 @@ void fill(PlantState& state, const StateRow& row) {
   state.beta_rad(as_in_file(plant.beta_rad()));
   state.alpha_dot_rad_s(as_in_file(plant.alpha_dot_rad_s()));
   state.beta_dot_rad_s(as_in_file(plant.beta_dot_rad_s()));
-  state.q_WB({1, 0, 0, 0});  // level where state.csv has no attitude
+  state.q_WB({1, 0, 0, 0});  // level if state.csv has no attitude
   state.w_WB_B_rad_s({});
   if (row.has_attitude) {
     copy(plant.q_WB(), state.q_WB());
@@ -46,7 +46,7 @@ void fill(PlantState& state, const StateRow& row) {
   copy(plant.signals(), state.signals());
 }
 
-/// A state of which nothing is known.
+/// A state for a step without a state row: all numbers are NaN.
 PlantState make_unknown_state() {
   PlantState state;
   for (auto* numbers : {&state.p_WQ_m(), &state.v_WQ_m_s(), &state.w_WB_B_rad_s(), &state.p_WL_m(),
@@ -134,7 +134,7 @@ void EntryMessage::fill(const StepRows& rows) {
 
 std::string_view EntryMessage::serialize(const StepRows& rows) {
   fill(rows);
-  std::fill(bytes_.begin(), bytes_.end(), '\0');  // Fast CDR leaves padding as it was
+  std::fill(bytes_.begin(), bytes_.end(), '\0');  // Fast CDR does not write padding bytes
   eprosima::fastcdr::FastBuffer buffer(bytes_.data(), bytes_.size());
   eprosima::fastcdr::Cdr cdr(buffer, eprosima::fastcdr::Cdr::LITTLE_ENDIANNESS,
                              eprosima::fastcdr::Cdr::DDS_CDR);

@@ -8,8 +8,8 @@
 
 namespace sls::record {
 
-/// Makes of a step's rows a `RecordEntry` as CDR, little-endian, with its encapsulation header.
-/// Fields that no row holds stay empty: README.md lists them.
+/// Makes a `RecordEntry` from the rows of a step, as little-endian CDR with its encapsulation
+/// header. Fields that are in no row stay empty: README.md lists them.
 class EntryMessage {
  public:
   EntryMessage();

@@ -15,9 +15,9 @@ namespace {
 
 constexpr std::string_view kMagic = "\x89MCAP0\r\n";
 constexpr std::string_view kCompression = "zstd";
-// Figures of other levels: README.md.
+// Measurements with other levels: README.md.
 constexpr int kLevel = 3;
-/// A chunk is full with so many bytes before compression: what a killed recorder may lose.
+/// Size of a full chunk before compression. A killed recorder can lose this many bytes.
 constexpr std::size_t kChunkBytes = 1 << 20;
 
 enum Opcode : std::uint8_t {
@@ -46,7 +46,7 @@ constexpr std::size_t kOpcodeBytes = 1, kLengthBytes = 8;
 
 Compression describe_compression() { return {"zstd", ZSTD_versionString(), kLevel}; }
 
-/// Its memory is kept from one chunk to the next.
+/// Keeps its memory from one chunk to the next.
 struct McapFile::Compressor {
   Compressor() : context(ZSTD_createCCtx()) {
     if (context == nullptr) throw std::bad_alloc();
@@ -88,7 +88,7 @@ void McapFile::begin_record(std::uint8_t opcode) {
   out_.make_room(0);
   record_ = out_.bytes().size();
   out_.append(opcode);
-  out_.append(std::uint64_t{0});  // its length, when that is known
+  out_.append(std::uint64_t{0});  // length; end_record sets it
 }
 
 void McapFile::end_record() {
@@ -96,7 +96,7 @@ void McapFile::end_record() {
   out_.replace(record_ + kOpcodeBytes, std::uint64_t{out_.bytes().size() - content});
 }
 
-/// Where that fails, the file ends as it did before.
+/// If a write fails, the file is cut to its previous length.
 void McapFile::flush() {
   const std::string_view bytes = out_.bytes();
   std::size_t done = 0;
@@ -106,7 +106,7 @@ void McapFile::flush() {
     if (count < 0) {
       const int error = errno;
       if (::ftruncate(descriptor_, static_cast<off_t>(written_)) != 0) {
-        // The caller reports the error that led here.
+        // The earlier error is reported.
       }
       errno = error;
       throw_errno(path_, "cannot write");

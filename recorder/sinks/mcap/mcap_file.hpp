@@ -1,6 +1,6 @@
 /// Writes one MCAP file (https://mcap.dev/spec): schemas, channels and attachments first, then
-/// messages in compressed chunks with their indexes, at the end the summary. Borders of chunks
-/// depend on the messages alone: the same calls give the same bytes.
+/// messages in compressed chunks with their indexes, at the end the summary. The limits of chunks
+/// depend only on the messages, so the same calls give the same bytes.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@
 
 namespace sls::record {
 
-/// The compressor of the chunks: another version may give other bytes.
+/// The compression of the chunks; another version of the library can give other bytes.
 struct Compression {
   const char* library;  ///< "zstd"
   std::string version;
@@ -24,8 +24,8 @@ struct Compression {
 };
 Compression describe_compression();
 
-/// Every member that writes @throws std::system_error naming the file when the disk refuses; what
-/// had been written whole remains, and can be read up to there.
+/// Every member that writes @throws std::system_error with the name of the file if it cannot be
+/// written. Earlier whole records remain in the file and can be read.
 class McapFile {
  public:
   /// Creates `file`, which must not exist.
@@ -34,11 +34,11 @@ class McapFile {
   McapFile(const McapFile&) = delete;
   McapFile& operator=(const McapFile&) = delete;
 
-  /// Ids count from 1. To be called before the first message.
+  /// Ids count from 1. Call this before the first message.
   std::uint16_t add_schema(std::string_view name, std::string_view encoding, std::string_view text);
   std::uint16_t add_channel(std::uint16_t schema, std::string_view topic,
                             std::string_view message_encoding);
-  /// With times 0.
+  /// The attachment's log and create times are 0.
   void add_attachment(std::string_view name, std::string_view media_type, std::string_view bytes);
 
   /// Log and publish time are `time_ns`.
@@ -47,7 +47,7 @@ class McapFile {
 
   /// Bytes that a flush would write.
   std::size_t pending_bytes() const { return out_.bytes().size(); }
-  /// Hands what comes before the messages, and every full chunk, to the operating system.
+  /// Passes the records before the messages, and every full chunk, to the operating system.
   void flush();
 
   /// Writes the last chunk and the summary. Nothing may be added afterwards.
@@ -59,12 +59,12 @@ class McapFile {
  private:
   struct MessageIndex {
     std::vector<std::pair<std::uint64_t, std::uint64_t>> entries;  // time and place in the chunk
-    std::uint64_t messages = 0;                                    // of the whole file
+    std::uint64_t messages = 0;                                    // in the whole file
   };
   struct ChunkIndex {
     std::uint64_t first_time = 0, last_time = 0;
-    std::uint64_t begin = 0, size = 0;                             // of its record in the file
-    std::vector<std::pair<std::uint16_t, std::uint64_t>> indexes;  // of channels, where they are
+    std::uint64_t begin = 0, size = 0;                             // its record in the file
+    std::vector<std::pair<std::uint16_t, std::uint64_t>> indexes;  // channel, place in the file
     std::uint64_t indexes_size = 0, compressed_size = 0, size_before = 0;
   };
   struct AttachmentIndex {
@@ -84,9 +84,9 @@ class McapFile {
   const std::filesystem::path path_;
   int descriptor_ = -1;
   std::uint64_t written_ = 0;  // bytes in the file
-  Crc32 crc_;                  // of them
-  ByteBuffer out_;             // what comes next in the file: whole records
-  std::size_t record_ = 0;     // where the record in the making begins in out_
+  Crc32 crc_;                  // of these bytes
+  ByteBuffer out_;             // records that are not written yet
+  std::size_t record_ = 0;     // begin of the current record in out_
   struct Compressor;
   const std::unique_ptr<Compressor> compressor_;
 

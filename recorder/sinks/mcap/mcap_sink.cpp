@@ -12,14 +12,15 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// A vehicle is mirrored at its first step in each such time.
+/// A vehicle is mirrored at its first step in each period of this length.
 constexpr std::int64_t kMirrorPeriodNs = 10'000'000;
 
-/// The log time of every message is that of the simulation: a file needs no clock.
+/// Not in the file: the log time of every message is simulation time, so no clock is needed.
 constexpr std::string_view kClockTopic = "/clock";
 constexpr std::uint16_t kLeftOut = 0;  // no channel
 
-/// The fields of manifest.json that equal flights share, on every machine and at any time.
+/// The fields of manifest.json that are the same for equal flights, on every machine and at any
+/// time.
 std::string describe(const Parameters& parameters) {
   const Compression compression = describe_compression();
   Json json = {{"scenario_sha256", parameters.scenario_sha256().to_string()},
@@ -73,7 +74,7 @@ void McapSink::add_attachments(const Parameters& parameters) {
 
 void McapSink::add(const StepRows& rows) {
   const auto vehicle = vehicles_.find(rows.vehicle_id);
-  if (vehicle == vehicles_.end()) return;  // of no vehicle of the run
+  if (vehicle == vehicles_.end()) return;  // not a vehicle of the run
   const auto time_ns = static_cast<std::int64_t>(rows.step) * period_ns_;
   file_.add_message(vehicle->second.channel, static_cast<std::uint32_t>(rows.step),
                     static_cast<std::uint64_t>(time_ns), message_.serialize(rows));

@@ -12,9 +12,9 @@
 
 namespace sls::record {
 
-/// sls.mcap: one message per step and vehicle, made of what the CSV files hold and nothing else;
-/// beside them, at most 100 times a simulated second, standard ROS 2 messages that mirror it. Of
-/// equal rows and parameters it is the same bytes; status samples are not in it.
+/// sls.mcap: one message per step and vehicle, with the data of the CSV files only; and standard
+/// ROS 2 messages that mirror them, at most 100 times per simulated second. Equal rows and
+/// parameters give the same bytes. Status samples are not in it.
 class McapSink : public RecordSink {
  public:
   static constexpr const char* kFile = "sls.mcap";
@@ -26,8 +26,8 @@ class McapSink : public RecordSink {
   void add(const StepRows& rows) override;
   void add(const SimStatus&) override {}
   bool is_full() const override { return file_.pending_bytes() >= kFlushBytes; }
-  /// Of full chunks alone: what is in another one waits until it is full, so that no byte depends
-  /// on wall time.
+  /// Flushes full chunks only. The last chunk waits until it is full, so no byte depends on wall
+  /// time.
   void flush() override { file_.flush(); }
   std::map<std::string, std::string> list_versions() const override;
   std::vector<RecordedFile> finish() override;
@@ -37,7 +37,7 @@ class McapSink : public RecordSink {
  private:
   struct Vehicle {
     std::uint16_t channel = 0;
-    std::int64_t mirrored_slot = -1;  // the last one in which it was mirrored
+    std::int64_t mirrored_slot = -1;  // the last mirror period with a mirrored step
   };
 
   void add_channels();
