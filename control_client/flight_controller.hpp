@@ -31,7 +31,7 @@ struct Answer {
   ControllerMemory memory;                          ///< for step + 1
   MissionPhase mission = MissionPhase::kRunning;
   Fault fault = Fault::kNone;
-  model::Reference reference;  ///< what the force follows
+  model::Reference reference;  ///< of this step
   std::uint32_t stage = 0;     ///< stage in force at this step
   std::string stage_name;
 };

@@ -50,8 +50,7 @@ class RunRecorder {
 
   /// Records until the end of the run.
   /// @throws the error of the writing thread, such as std::system_error if a file cannot be
-  /// written,
-  ///   after it has announced the end to the other programs.
+  ///   written, after it has announced the end to the other programs.
   RunEnd run();
 
  private:

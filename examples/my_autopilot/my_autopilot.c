@@ -84,7 +84,7 @@ static void find_attitude(const double force[3], double length, double q[4]) {
   q[3] = -sin(pitch / 2) * sin(roll / 2);
 }
 
-/* Eq. (2): twice the vector part of wanted* q, on the shorter way round. */
+/* Eq. (2): twice the vector part of wanted* q, for the shorter of the two rotations. */
 static void calc_attitude_error(const double wanted[4], const double q[4], double error[3]) {
   const double *a = wanted, *b = q;
   const double w = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];

@@ -110,7 +110,7 @@ static Motion calc_next(const Plant* self, Motion start, const double force_n[3]
 static int advance(void* plant, const double force_n[3], int64_t steps, char* error,
                    size_t error_size) {
   Plant* self = plant;
-  Motion motion = self->motion; /* a step that fails leaves the plant as it was */
+  Motion motion = self->motion; /* a copy: a failed call does not change the plant */
   for (int64_t i = 0; i < steps; ++i) {
     double n[3], speed;
     motion = calc_next(self, motion, force_n);

@@ -7,9 +7,9 @@ namespace sls::control {
 
 /// Gains of one axis, from the outermost loop inwards. The vertical axis has no rod.
 struct PidAxisGains {
-  double position = 0.0;   ///< 1/s: velocity wanted per position error
-  double velocity = 0.0;   ///< 1/s: acceleration wanted per velocity error
-  double integral = 0.0;   ///< 1/s³: acceleration wanted per integral of the position error
+  double position = 0.0;   ///< 1/s: desired velocity per position error
+  double velocity = 0.0;   ///< 1/s: desired acceleration per velocity error
+  double integral = 0.0;   ///< 1/s³: desired acceleration per integral of the position error
   double rod_angle = 0.0;  ///< 1/s²: rod acceleration per error of its slope
   double rod_rate = 0.0;   ///< 1/s: rod acceleration per rate of its slope
 };

@@ -7,8 +7,8 @@
 
 namespace sls::control {
 
-/// Gains of one output axis, named by what they multiply. The vertical chain has no acceleration
-/// and jerk gain: they stay 0.
+/// Gains of one output axis, named after the error that they multiply. The vertical chain has no
+/// acceleration and jerk gain: they stay 0.
 struct AxisGains {
   double position = 0.0;
   double velocity = 0.0;
