@@ -1,5 +1,5 @@
-"""`./sls bench`: its arithmetic on given numbers; that it runs, prints and writes what it says; and what
-it answers to mistakes. How fast anything is, is no business of a test."""
+"""Tests of `./sls bench`: its arithmetic on given numbers, its output and files, and its error messages. No test
+judges a speed."""
 
 import json
 import os
@@ -111,7 +111,7 @@ class FigureTest(unittest.TestCase):
         figure = Figure("part", "speed", "steps/s", [80.0, 90.0, 50.0], "bound", [100.0, 100.0, 50.0])
         self.assertEqual(figure.ratios, [0.8, 0.9, 1.0])
         json_figure = figure.to_json()
-        self.assertEqual(json_figure["ratio"]["median"], 0.9)  # not that of the medians, 0.8
+        self.assertEqual(json_figure["ratio"]["median"], 0.9)  # the ratio of the medians is 0.8
         self.assertEqual((json_figure["median"], json_figure["min"], json_figure["max"]), (80, 50, 90))
         self.assertEqual(json_figure["bound"]["median"], 100)
 
@@ -282,7 +282,7 @@ class ProcessTest(unittest.TestCase):
                               stdout=subprocess.PIPE, env={**os.environ, "PYTHONPATH": str(ROOT)}
                               ) as process:
             counting = pathlib.Path(f"/proc/{int(process.stdout.readline())}")
-            wait_until(lambda: (counting / "comm").read_text() == "sh\n")  # past setpriv
+            wait_until(lambda: (counting / "comm").read_text() == "sh\n")  # setpriv has started the shell
             process.kill()
         wait_until(lambda: not is_alive(counting))
 
@@ -368,7 +368,7 @@ class ProgramTest(unittest.TestCase):
         futex = [name for name in names if name.startswith("two processes by futex")]
         self.assertEqual(len(futex), 2 * len(loop.find_pairs()))
         one = names["one process, without files"]
-        for name in futex:  # a round has all the work of a step in it, to a nanosecond
+        for name in futex:  # a round includes all the work of a step; 0.1 % for rounding
             self.assertLess(names[name]["median"], 1.001 * one["bound"]["median"])
         if "--out" in words:
             self.assertTrue((self.folder / "plots/lockstep.png").read_bytes().startswith(b"\x89PNG"))

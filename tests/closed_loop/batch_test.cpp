@@ -1,5 +1,4 @@
-// A batch is judged by flights that were flown with a controller: the same forces give the same
-// bits.
+// Compares a batch with flights under a controller: the same forces give the same bits.
 #include "closed_loop/batch.hpp"
 
 #include <gtest/gtest.h>
@@ -42,7 +41,7 @@ void expect_row(const LoopStates& states, Eigen::Index row, const model::Measure
   ASSERT_EQ(Vector3d(states.body_rates.row(row)), state.attitude.w_WB_B);
 }
 
-/// Flies `scenario`, then its forces in a batch of three on two threads.
+/// Flies `scenario` and applies its forces to a batch of three on two threads; expects equal bits.
 void expect_batch_equals_flight(const config::Scenario& scenario, std::uint32_t vehicle = 0) {
   constexpr std::size_t kCount = 3;
   constexpr std::uint64_t kSteps = 1500;
@@ -96,7 +95,7 @@ Forces make_forces(std::size_t count, int step) {
 
 TEST(BatchTest, TheNumberOfThreadsChangesNoBit) {
   const config::Scenario scenario = load_analytic("faulty_figure_eight");
-  constexpr std::size_t kCount = 133;  // no multiple of the block
+  constexpr std::size_t kCount = 133;  // not a multiple of the block size
   BatchOptions options;
   Batch one(scenario, kCount, options);
   for (const std::size_t threads : {2, 3, 7}) {
@@ -209,7 +208,7 @@ TEST(BatchTest, TheReferenceIsThatOfTheFlight) {
     Flight flight(scenario);
     while (const FlownStep* flown = flight.fly_step()) {
       if (!std::holds_alternative<config::LeaveAfter>(scenario.mission[flown->answer.stage].leave))
-        break;  // from here on it is the flight that decides
+        break;  // the later references depend on the flight
       const auto time_ns = static_cast<std::int64_t>(flown->step) * scenario.sync.period_ns;
       const model::Reference reference = batch.calc_reference(time_ns);
       ASSERT_EQ(reference.position, flown->answer.reference.position) << flown->step;

@@ -1,4 +1,5 @@
-// The margin judged by brute force and, for small motions about hover, by linear theory.
+// Compares the margin with flights at every shorter delay and, for small motions about hover, with
+// linear theory.
 #include "closed_loop/delay_margin.hpp"
 
 #include <gtest/gtest.h>
@@ -12,11 +13,12 @@
 namespace sls::closed_loop::test {
 namespace {
 
-/// Delay at which small horizontal motions about hover neither grow nor decay, s. With the force
-/// F delayed by τ, ÿ = −g β and m L β̈ = −(m + m_L) g β − F of the plant, and the law's
-/// F = −(m + m_L) g β + m L n / g, n = −k_j y⁽³⁾ − k_a ÿ − k_v ẏ − k_p y, it is
-///   s⁴ + ω² s² + e^(−sτ) (k_j s³ + (k_a − ω²) s² + k_v s + k_p) = 0,   ω² = (m + m_L) g / (m L),
-/// on s = iw: the quotient of both parts has magnitude 1 there, and the delay turns it to −1.
+/// Delay at which small horizontal motions about hover neither grow nor decay, s.
+/// Plant: ÿ = −g β, m L β̈ = −(m + m_L) g β − F.
+/// Law: F = −(m + m_L) g β + m L n / g, n = −k_j y⁽³⁾ − k_a ÿ − k_v ẏ − k_p y.
+/// With F delayed by τ the characteristic equation is
+///   s⁴ + ω² s² + e^(−sτ) (k_j s³ + (k_a − ω²) s² + k_v s + k_p) = 0,   ω² = (m + m_L) g / (m L).
+/// For s = iw the quotient of both parts has magnitude 1, and the delay turns it to −1.
 double calc_critical_delay(const model::SlungLoadParameters& vehicle) {
   // LQR with q = 10 on a chain of four: design, section 4.
   constexpr double kPosition = 3.1623, kVelocity = 8.4827, kAcceleration = 9.7962, kJerk = 5.4399;
@@ -51,9 +53,9 @@ TEST(DelayMarginTest, SmallMotionsAboutHoverGrowFromTheDelayOfLinearTheoryOn) {
   config::Scenario scenario = load("figure_eight");
   scenario.plant.initial.position << 1e-6, 0.0, -0.5;  // so small that the motion stays linear
   scenario.mission[0].reference = config::ConstantReference{{0.0, 0.0, -0.5}};
-  // By 20 s the other motions, with which the flight begins, have died away.
+  // The other motions at the start of the flight have decayed by 20 s.
   scenario.mission[0].leave = config::LeaveAfter{60'000'000'000};
-  // Holding the force for a period delays it by half a period more, on average.
+  // The hold over one period adds a delay of half a period on average.
   const double critical = calc_critical_delay(scenario.vehicle) - 0.002;
   const auto periods = static_cast<std::int64_t>(critical / 0.004);
   ASSERT_EQ(periods, 57) << critical;  // 0.232 s
@@ -62,7 +64,7 @@ TEST(DelayMarginTest, SmallMotionsAboutHoverGrowFromTheDelayOfLinearTheoryOn) {
     return calc_worst_error(flight, 40.0, 60.0) / calc_worst_error(flight, 20.0, 40.0);
   };
   EXPECT_LT(calc_growth(periods), 1.0);
-  // Not the next period: that the hold delays by half a period is true to first order only.
+  // Two periods more, not one: the hold delays by half a period to first order only.
   EXPECT_GT(calc_growth(periods + 2), 1.0);
 }
 
@@ -88,7 +90,7 @@ TEST(DelayMarginTest, TheScenariosOwnDelayIsPartOfIt) {
 }
 
 TEST(DelayMarginTest, LosesTheLoadWhenItIsARodsLengthFurtherAwayThanWithoutDelay) {
-  // With 0.26 s the figure eight ends in oscillations of bounded size, and no fault.
+  // With a delay of 0.26 s the figure eight ends in bounded oscillations without a fault.
   const config::Scenario scenario = load("figure_eight");
   const auto undelayed = fly(scenario), delayed = fly(delay_command(scenario, 65));
   ASSERT_EQ(undelayed.size(), delayed.size());
@@ -134,7 +136,7 @@ TEST(DelayMarginTest, ErrorsAreThoseOfTheFlight) {
 }
 
 TEST(DelayMarginTest, ReportsALoadThatIsNeverLost) {
-  // Within two seconds the force held from the start does no harm.
+  // The flight lasts two seconds: the force held from the start does not lose the load.
   const DelayMargin margin = find_delay_margin(load("short"));
   EXPECT_EQ(margin.shortest_lost(), nullptr);
   EXPECT_EQ(margin.longest_held()->periods, 2500);

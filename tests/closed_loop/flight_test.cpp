@@ -1,5 +1,5 @@
-// The flight in one process is the loop that the programs run: judged by that loop written out here
-// once more, bit for bit, with delays as a queue.
+// Compares the flight in one process, bit for bit, with a second implementation of the programs'
+// loop, in which a delay is a queue.
 #include "closed_loop/flight.hpp"
 
 #include <gtest/gtest.h>
@@ -14,8 +14,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// States of the plant at every step, where the force answered at a step acts `periods` later and
-/// the first one until then.
+/// States of the plant at every step. The force answered at a step acts `periods` later; until
+/// then the first force acts.
 std::vector<model::SlungLoadState> fly_by_hand(const config::Scenario& scenario, int periods) {
   sim::SlungLoadPlant plant(scenario.vehicle, scenario.plant);
   const control::FlightController controller(scenario);
@@ -118,7 +118,7 @@ TEST(FlightTest, ControllerAnswersItsMeasurementAndStepsHoldTheForceThatActed) {
   }
 }
 
-/// Flies to the end; how many steps there were and why it failed.
+/// Flies to the end. @returns the number of steps and the reason for the failure.
 std::pair<std::size_t, std::string> find_failure(const config::Scenario& scenario) {
   Flight flight(scenario);
   std::size_t steps = 0;

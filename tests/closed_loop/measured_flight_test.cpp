@@ -1,5 +1,5 @@
-// Measures judged by textbook formulas on the stored columns of the same flight; outcomes by the
-// delay margin's; certificates by those of recordings.
+// Compares measures with textbook formulas on the stored columns of the same flight, outcomes with
+// those of the delay margin, and certificates with those of recordings.
 #include "closed_loop/measured_flight.hpp"
 
 #include <gtest/gtest.h>
@@ -53,9 +53,9 @@ MeasuredFlight fly_all(const config::Scenario& scenario, const config::Scenario&
   return fly_measured(scenario, MeasureList(base, kAll), fly_base(base), certify);
 }
 
-// --- measures, once more -------------------------------------------------------------------------
+// --- measures, second implementation -------------------------------------------------------------
 
-/// One column of a stretch of a flight.
+/// One column over some steps of a flight.
 using Column = std::vector<double>;
 
 double calc_rms(const Column& values) {
@@ -70,7 +70,7 @@ double calc_max(const Column& values) {
   return largest;
 }
 
-/// Time from which on `values` stays within 2 % of the step: looked for from the end.
+/// Time after which `values` stays within 2 % of the step; searched from the end.
 double calc_settling(const Column& time, const Column& values, double target) {
   const double step = target - values.front();
   if (std::abs(step) < 0.01) return std::nan("");
@@ -88,7 +88,7 @@ double calc_overshoot(const Column& values, double target) {
   return most;
 }
 
-/// Everything of the stored steps of a flight, second pass over columns.
+/// All measures of a flight, from its stored steps.
 std::map<std::string, double> calc_measures(const std::vector<FlownStep>& steps,
                                             const config::Scenario& scenario) {
   const double period = static_cast<double>(scenario.sync.period_ns) / 1e9;
@@ -109,7 +109,7 @@ std::map<std::string, double> calc_measures(const std::vector<FlownStep>& steps,
   for (const FlownStep& step : steps) {
     norms.push_back((step.truth.p_WL - step.answer.reference.position).norm());
     forces.push_back(step.answer.f_Q_W.norm());
-    // The rod's direction by its angles; the code under test goes by the bodies' positions.
+    // From the rod's angles; the code under test uses the positions of the bodies.
     const double cosine = std::cos(step.truth.rod.alpha) * std::cos(step.truth.rod.beta);
     tilts.push_back(std::acos(std::min(cosine, 1.0)));
   }
@@ -150,7 +150,7 @@ void expect_equal_measures(const std::map<std::string, double>& ours,
     if (!std::isfinite(value))
       EXPECT_TRUE(std::isnan(value) ? std::isnan(ours.at(name)) : ours.at(name) == value)
           << name << ": " << ours.at(name) << ", expected " << value;
-    else  // sums in another order; an angle by the cosine of a small one
+    else  // sums in another order; acos loses digits near 1
       EXPECT_NEAR(ours.at(name), value, name == "tilt_max_rad" ? 1e-8 : 1e-12 * (1 + value))
           << name;
   }
@@ -161,7 +161,7 @@ void expect_measures_of_its_columns(const config::Scenario& scenario,
   const MeasuredFlight flown = fly_all(scenario, base);
   std::vector<FlownStep> steps = fly(scenario);
   ASSERT_GE(steps.size(), flown.steps);
-  steps.resize(flown.steps);  // those up to the loss
+  steps.resize(flown.steps);  // the steps up to the loss
   auto theirs = calc_measures(steps, scenario);
   theirs["time_of_loss_s"] = flown.outcome == Outcome::kFinished
                                  ? std::nan("")
@@ -187,12 +187,12 @@ TEST(FlightMeasuresTest, AreThoseUpToTheLoss) {
 
 TEST(FlightMeasuresTest, CoverTheFlightUpToTheFailureOnly) {
   const config::Scenario base = load("setpoints");
-  // Half a second after the second set point came the state freezes.
+  // The state freezes half a second after the second set point begins.
   const config::Scenario frozen = load_changed(
       "setpoints", {{"faults", "[{ freeze: { on: state, from_s: 15.5, to_s: 40 } }]"}});
   EXPECT_NE(fly_all(frozen, base).outcome, Outcome::kFinished);
   expect_measures_of_its_columns(frozen, base);
-  // The second stage cannot be left.
+  // The second stage never ends: its radius is too small.
   const config::Scenario stuck =
       load_changed("setpoints", {{"mission.1",
                                   "{ set_point: { position_m: [-1, -1, -4] }, until: { after_s: "
@@ -205,7 +205,7 @@ TEST(FlightMeasuresTest, CoverTheFlightUpToTheFailureOnly) {
 }
 
 TEST(FlightMeasuresTest, AStepByHandHasTheMeasuresOfItsFormulas) {
-  // Load 0 → 1 m by 0.5, 1.2, 0.99, 0.97, 1.01, 1 m: overshoot 20 %, settled from the fifth row on.
+  // Load from 0 to 1 m over 0.5, 1.2, 0.99, 0.97, 1.01, 1 m: overshoot 20 %, settled at step 5.
   const config::Scenario base = load("setpoints");
   const MeasureList list(base, {"settling", "overshoot", "force_max", "tilt_max"});
   FlightMeasures measures(list, 10'000'000);
@@ -276,7 +276,7 @@ TEST(FlightMeasuresTest, AnUnknownMeasureIsRefusedWithTheListOfThose) {
 
 // --- outcome -------------------------------------------------------------------------------------
 
-/// All flights of a delay margin, each flown again as a run of a campaign.
+/// Flies each delay of a delay margin again as a run of a campaign; expects the same outcome.
 void expect_outcomes_of_delay_margin(const config::Scenario& scenario) {
   const ErrorHistory base = fly_base(scenario);
   const MeasureList list(scenario, {"load_error_max", "load_error_rms"});
@@ -337,7 +337,7 @@ TEST(MeasuredFlightTest, MeasuresDoNotDependOnTheCertificate) {
   EXPECT_EQ(without.outcome, Outcome::kLost);
   EXPECT_EQ(with.outcome, Outcome::kLost);
   EXPECT_EQ(with.reason, without.reason);
-  EXPECT_LT(without.steps, with.steps);  // which goes on to its end
+  EXPECT_LT(without.steps, with.steps);  // with a certificate it flies to the end
   EXPECT_EQ(with.steps, 8001u);
   EXPECT_TRUE(without.certificate.empty());
   const auto a = name_values(base, without), b = name_values(base, with);
@@ -373,7 +373,7 @@ struct Certified {
   const char* name;
   const char* scenario;
   Values values;
-  bool is_complete = true;  ///< its recording: the flight finishes
+  bool is_complete = true;  ///< The flight finishes, and its recording is complete.
 };
 
 void PrintTo(const Certified& certified, std::ostream* out) { *out << certified.name; }
@@ -450,7 +450,7 @@ TEST(CampaignRunsTest, AnotherPeriodIsInEachRunsText) {
   EXPECT_EQ(fine.make_scenario({}).plant.step_ns, 500'000);
 }
 
-/// The error of the constructor or of `work`, called with runs of `file` that vary `path`.
+/// The error of the runs of `file` that vary `path`: of their constructor, or of `work` on them.
 template <class Work>
 std::string find_error(const std::filesystem::path& file, const std::string& path,
                        const Work& work) {

@@ -1,5 +1,5 @@
-// Sensing in flight, judged by the faults that do the same where ages and delays are whole control
-// periods, and by each vehicle's flight alone.
+// Sensing in flight: ages and delays of whole control periods act like the same faults, and a
+// vehicle of a fleet flies as it does alone.
 #include <gtest/gtest.h>
 
 #include "closed_loop/delay_margin.hpp"
@@ -65,7 +65,7 @@ TEST(SensingTest, ANodeDelayOfWholePeriodsIsTheFaultDelayOnCommand) {
     expect_equal_flights(node, fault);
     for (std::size_t k = 1; k < node.size(); ++k) {
       EXPECT_FALSE(node[k].can_measurement_differ);
-      // The force of state.csv is the one handed over, before this delay and after that fault.
+      // state.csv has the force before the delay of the node, but after the delay of the fault.
       ASSERT_EQ(node[k].applied_f_Q_W, node[k - 1].answer.f_Q_W);
       const std::size_t answered = k - 1 < static_cast<std::size_t>(periods) ? 0 : k - 1 - periods;
       ASSERT_EQ(fault[k].applied_f_Q_W, fault[answered].answer.f_Q_W);
@@ -134,7 +134,7 @@ TEST(SensingTest, AVehicleOfAFleetFliesAsItDoesAlone) {
   for (const std::uint32_t id : {0u, 3u}) {
     auto alone = fly(fleet, id);
     ASSERT_LE(alone.size(), flown[id].size());
-    flown[id].resize(alone.size());  // the fleet flies on until the last is done
+    flown[id].resize(alone.size());  // the fleet flies until its last vehicle finishes
     expect_equal_flights(alone, flown[id]);
   }
 }

@@ -1,4 +1,4 @@
-// Controller and mission fly the oracle ODE: what a run must show, with neither Simbody nor DDS.
+// Results of runs with controller and mission on the oracle ODE, without Simbody and DDS.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -62,8 +62,8 @@ double calc_largest_deviation(std::int64_t period_ns) {
 }
 
 TEST(ClosedLoopTest, SetPointFollowsTheDesignedLinearResponseUpToTheHold) {
-  // From rest the load's error is that of the designed equations, whatever the plant: with
-  // continuous control exactly, with a hold up to an error of first order in the period.
+  // From rest the load's error follows the designed equations for every plant: exactly under
+  // continuous control, and with an error of first order in the period under a hold.
   const double at_2 = calc_largest_deviation(2'000'000);
   const double at_1 = calc_largest_deviation(1'000'000);
   EXPECT_LE(at_1, 5e-4);  // the first-order term of poles up to 29 1/s at 1 ms
@@ -86,10 +86,10 @@ config::Scenario make_disturbed(bool with_integral) {
 TEST(ClosedLoopTest, IntegralVariantRemovesAConstantDisturbance) {
   const Vector3d plain = fly(make_disturbed(false)).back().load_error();
   const std::vector<FlownStep> flight = fly(make_disturbed(true));
-  EXPECT_GT(plain.cwiseAbs().minCoeff(), 5e-3);  // without it every axis stays off
-  // Poles about −2 decay to e⁻⁴⁰ t⁴ in 20 s; what is left is the hold's and the model's coupling.
+  EXPECT_GT(plain.cwiseAbs().minCoeff(), 5e-3);  // without the integral every axis keeps an error
+  // Poles about −2 decay to e⁻⁴⁰ t⁴ in 20 s; the hold and the model's coupling cause the rest.
   EXPECT_LE(flight.back().load_error().norm(), 1e-8);
-  // In rest nothing but the disturbance differs from hover: F + d = −(m + m_L) g e₃.
+  // At rest only the disturbance differs from hover: F + d = −(m + m_L) g e₃.
   EXPECT_LE((flight.back().answer.f_Q_W + Vector3d(0.3, -0.2, 0.4) + Vector3d(0.0, 0.0, 1.7 * 9.8))
                 .norm(),
             1e-6);
@@ -129,8 +129,8 @@ TEST(ClosedLoopTest, GazeboWiringReproducesThePublishedLogAndCorrectWiringCuresI
   const std::vector<FlownStep> flight = fly(make_gazebo_legacy(StateWiring::kGazeboPlugin));
   ASSERT_EQ(flight.back().answer.mission, MissionPhase::kFinished);
   const ErrorStatistics published = calc_second_lap_error(flight);
-  // Design 7, published: rms 0.211, 0.236, 0.098; max 0.388, 0.413. Our plant is not Gazebo's
-  // rigid bodies: within 2 mm.
+  // Design 7, published: rms 0.211, 0.236, 0.098; max 0.388, 0.413. Within 2 mm, because our plant
+  // differs from Gazebo's rigid bodies.
   EXPECT_NEAR(published.rms.x(), 0.211, 0.002);
   EXPECT_NEAR(published.rms.y(), 0.236, 0.002);
   EXPECT_NEAR(published.rms.z(), 0.098, 0.002);
@@ -141,7 +141,7 @@ TEST(ClosedLoopTest, GazeboWiringReproducesThePublishedLogAndCorrectWiringCuresI
       calc_second_lap_error(fly(make_gazebo_legacy(StateWiring::kCorrect)));
   EXPECT_NEAR(published.rms.x() / cured.rms.x(), 120.0, 5.0);  // design 7: about 120 and 50 times
   EXPECT_NEAR(published.rms.y() / cured.rms.y(), 50.0, 5.0);
-  EXPECT_NEAR(cured.rms.z(), 0.10, 0.005);  // the believed rod is still 0.1 m short
+  EXPECT_NEAR(cured.rms.z(), 0.10, 0.005);  // the model's rod is still 0.1 m too short
 }
 
 }  // namespace

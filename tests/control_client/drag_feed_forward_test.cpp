@@ -24,7 +24,7 @@ TEST(DragFeedForwardTest, ForceAndItsDragAddUpToTheLawsForce) {
     wanted.z() -= 17.0;
     const Eigen::Vector3d v = draw_vector(generator, 2.0);
     const model::Aerodynamics air{0.3, draw_vector(generator, 2.0)};
-    // Each iteration gains a factor of about D |v − v_wind| / |F|; 20 of them need it below 1/5.
+    // Each iteration multiplies the error by about D |v − v_wind| / |F|: 20 need it below 1/5.
     if (air.rotor_drag * (v - air.v_wind_W).norm() > 0.15 * wanted.norm()) continue;
     ++judged;
     const Eigen::Vector3d force = calc_drag_feed_forward(wanted, v, air);
@@ -35,8 +35,8 @@ TEST(DragFeedForwardTest, ForceAndItsDragAddUpToTheLawsForce) {
 }
 
 TEST(DragFeedForwardTest, AgreesWithTheClosedFormInThePlane) {
-  // Wanted force −N e₃, velocity u e₁: F = −|F| (sin θ, 0, cos θ) with, normal to F, the drag
-  // D u cos θ = N sin θ, and along F the strength N cos θ. Hence tan θ = D u / N.
+  // Wanted force −N e₃, velocity u e₁: F = |F| (sin θ, 0, −cos θ). Normal to F: the drag is
+  // D u cos θ = N sin θ, and tan θ = D u / N. Along F: |F| = N cos θ.
   const double N = 17.0, D = 0.4, u = 3.0;
   const double theta = std::atan2(D * u, N);
   const Eigen::Vector3d force =

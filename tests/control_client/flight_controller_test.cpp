@@ -153,7 +153,7 @@ TEST(FlightControllerTest, AdvancesTheIntegralAfterTheForceByForwardEuler) {
   const Answer answer = controller.calc_answer(5, state, memory);
   const Vector3d error(0.5, -0.25, -0.125);
   EXPECT_LE((answer.memory.numbers - memory.numbers - 0.004 * error).norm(), 1e-15);
-  // The force used the integral that came in.
+  // The force depends on the integral before its update.
   const QsfOutput law =
       calc_qsf({state.p_WQ, state.v_WQ, state.rod, answer.reference, memory.numbers},
                scenario.vehicle, gains);
@@ -203,7 +203,7 @@ TEST(FlightControllerTest, FeedsForwardTheDragOfItsModel) {
   std::mt19937 generator(2);
   const model::SlungLoadState state = draw_state(generator);
   const Vector3d plain = FlightController(scenario).calc_answer(0, state, {}).f_Q_W;
-  scenario.plant.air.rotor_drag = 9.0;  // the truth is not the controller's to know
+  scenario.plant.air.rotor_drag = 9.0;  // the controller must not use the true value
   scenario.controller.model.air.rotor_drag = 0.3;
   EXPECT_EQ(FlightController(scenario).calc_answer(0, state, {}).f_Q_W, plain);
   scenario.controller.drag_feed_forward = true;
@@ -236,7 +236,7 @@ TEST(FlightControllerTest, AFaultFailsTheMissionWithoutAForce) {
       model::make_state({0, 0, -1.5}, {0, 0, 0}, model::RodAngles{1.5707, 0.0, 0.0, 0.0}, 1.0);
   expect_failed(controller.calc_answer(0, level, {}), Fault::kRodLevel);
   expect_failed(controller.calc_answer(0, make_hanging({0.0, 0.0, -9.0}), {}), Fault::kFreeFall);
-  // Even at the step at which the mission would have finished.
+  // Also at the step at which the mission would finish.
   expect_failed(controller.calc_answer(8000, level, {}), Fault::kRodLevel);
 }
 
@@ -262,7 +262,7 @@ TEST(FlightControllerTest, AMemoryThatCannotBeIsAFaultNotACrash) {
   const FlightController controller(make_figure_eight());
   const model::SlungLoadState state = make_hanging({0.0, 0.0, -0.5});
   ControllerMemory memory;
-  for (const std::uint32_t stage : {2u, 0xffffffffu}) {  // 1: the mission of one is over
+  for (const std::uint32_t stage : {2u, 0xffffffffu}) {  // 1 is valid: the only stage is over
     memory.stage = stage;
     expect_failed(controller.calc_answer(100, state, memory), Fault::kNotFinite);
   }

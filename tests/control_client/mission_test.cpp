@@ -30,7 +30,7 @@ config::Stage make_within(const config::LeaveWithin& leave, const Vector3d& posi
   return stage;
 }
 
-/// Steps the mission with what `state_at(step)` says; the first step at which it is not running.
+/// Steps the mission with `state_at(step)`. @returns the first step at which it is not running.
 template <typename StateAt>
 std::uint64_t run(const Mission& mission, const StateAt& state_at, std::uint64_t limit,
                   MissionProgress& last, std::vector<std::uint64_t>* starts = nullptr) {
@@ -61,10 +61,10 @@ TEST(MissionTest, OneTimedStageFinishesAtItsDurationOverThePeriod) {
 }
 
 TEST(MissionTest, APeriodThatIsNoFiniteDecimalInSecondsCountsExactly) {
-  // 1 ns short of a multiple: whole nanoseconds decide, not seconds.
+  // Nine periods are 3 ns shorter than the stage: the mission counts whole nanoseconds.
   const Mission mission({make_hold({0, 0, -1}, 3'000'000'000)}, 333'333'333);
   MissionProgress last;
-  EXPECT_EQ(run(mission, kAnywhere, 100, last), 10u);  // 9 periods are 2,999,999,997 ns
+  EXPECT_EQ(run(mission, kAnywhere, 100, last), 10u);  // nine periods: 2,999,999,997 ns
 }
 
 TEST(MissionTest, AStageStartsAtTheFirstStepAtWhichThePreviousOneIsLeft) {
@@ -90,7 +90,7 @@ TEST(MissionTest, StageTimeCountsFromTheStagesStart) {
   const MissionProgress progress = mission.calc_progress(250 + 1000, {}, memory);
   EXPECT_EQ(progress.reference.position, eight.calc(4.0).position);
   EXPECT_EQ(progress.reference.snap, eight.calc(4.0).snap);
-  // At the switch itself the new stage is in force, at its time 0.
+  // At the step of the switch the new stage is active, at its time 0.
   const MissionProgress first = mission.calc_progress(250, {}, {});
   EXPECT_EQ(first.stage, 1u);
   EXPECT_EQ(first.reference.velocity, eight.calc(0.0).velocity);
@@ -153,7 +153,7 @@ TEST(MissionTest, ARadiusMayBeAroundTheQuadrotorWithAnOffset) {
   leave.timeout_ns = 60 * kSecond;
   const Mission mission({make_within(leave, {1, -1, -2})}, kPeriod);
   const std::uint64_t later = 3751;  // first step after 15 s
-  // √((x−x_d)² + (y−y_d)² + (z−z_d+0.95)²) < 0.2, whatever the load does.
+  // √((x−x_d)² + (y−y_d)² + (z−z_d+0.95)²) < 0.2, for any position of the load.
   EXPECT_EQ(mission.calc_progress(later, make_state_at({1.1, -1.1, -2.85}, {9, 9, 9}), {}).phase,
             MissionPhase::kFinished);
   EXPECT_EQ(mission.calc_progress(later, make_state_at({1.1, -1.1, -3.15}, {1, -1, -2}), {}).phase,
@@ -188,7 +188,7 @@ TEST(MissionTest, AStageWhoseRadiusIsNotReachedInTimeFails) {
             500u);
   EXPECT_EQ(last.phase, MissionPhase::kFailed);
   EXPECT_EQ(last.stage, 0u);
-  // Arriving at the very last moment counts.
+  // An arrival at the step of the timeout counts.
   EXPECT_EQ(mission.calc_progress(500, make_state_at({0, 0, 0}, {1, 0, -2}), {}).stage, 1u);
 }
 
@@ -225,7 +225,7 @@ TEST(MissionTest, RejectsAnImpossibleMemory) {
   memory.stage_start_step = 10;
   EXPECT_FALSE(mission.is_possible(9, memory));
   EXPECT_TRUE(mission.is_possible(10, memory));
-  memory.stage = 1;  // over
+  memory.stage = 1;  // the mission is over
   EXPECT_TRUE(mission.is_possible(10, memory));
   memory.stage = 2;
   EXPECT_FALSE(mission.is_possible(10, memory));

@@ -31,9 +31,9 @@ inline oracle::State make_initial_state(const config::Scenario& scenario) {
   return state;
 }
 
-/// Flies until the mission is finished or failed; the last element is that step, not applied.
-/// Plant: truth of `scenario`, step the smaller of 1 ms and the period, drag and disturbance
-/// included, the control force held over the period.
+/// Flies until the mission finishes or fails. The last element is that step; its force is not
+/// applied. The plant has the true parameters of `scenario`, its drag and its disturbance. Its
+/// integration step is at most 1 ms. The control force is held over the period.
 inline std::vector<FlownStep> fly(const config::Scenario& scenario) {
   const FlightController controller(scenario);
   const double period = static_cast<double>(scenario.sync.period_ns) / 1e9;

@@ -13,7 +13,7 @@ using Eigen::Vector3d;
 
 constexpr double kPi = 3.14159265358979323846;
 
-/// Eighth-order central difference of one derivative against the next one.
+/// Derivative of `function` at `t` by central differences of eighth order with step `h`.
 Vector3d differentiate(const std::function<Vector3d(double)>& function, double t, double h) {
   return (4.0 / 5.0 * (function(t + h) - function(t - h)) -
           1.0 / 5.0 * (function(t + 2 * h) - function(t - 2 * h)) +
@@ -102,15 +102,15 @@ TEST(ReferenceTrajectoryTest, RestToRestRestsAtBothEndsAndOutside) {
 
 TEST(ReferenceTrajectoryTest, RestToRestHasExactDerivatives) {
   const RestToRest trajectory(make_rest_to_rest());
-  // Rounding of a jerk of some 50 m/s³ at h = 0.01 s: 1e-12. A polynomial of degree 9 leaves the
-  // eighth-order formula h⁸ / 630 of its ninth derivative: 1e-14.
+  // Rounding of a jerk of some 50 m/s³ at h = 0.01 s: 1e-12. Truncation of the eighth-order formula
+  // for a polynomial of degree 9: h⁸ / 630 of the ninth derivative, 1e-14.
   for (double t = 0.06; t < 2.95; t += 0.05)
     expect_consistent_derivatives(trajectory, t, 0.01, 5e-11);
 }
 
 TEST(ReferenceTrajectoryTest, RestToRestIsTheNinthDegreePolynomialAndSmoothAtItsEnds) {
-  // The only polynomial of degree 9 with ten end conditions: position 0 and 1, and velocity,
-  // acceleration, jerk and snap zero at both ends. Solved for here.
+  // Solves the ten end conditions for the polynomial of degree 9: position 0 and 1, and velocity,
+  // acceleration, jerk and snap zero at both ends.
   Eigen::Matrix<double, 10, 10> conditions = Eigen::Matrix<double, 10, 10>::Zero();
   Eigen::Matrix<double, 10, 1> values = Eigen::Matrix<double, 10, 1>::Zero();
   for (int order = 0; order < 5; ++order) {
@@ -129,10 +129,10 @@ TEST(ReferenceTrajectoryTest, RestToRestIsTheNinthDegreePolynomialAndSmoothAtIts
     double blend = 0.0;
     for (int power = 9; power >= 0; --power) blend = blend * tau + polynomial[power];
     const Vector3d expected = config.from + blend * (config.to - config.from);
-    // The conditions are ill-conditioned (1e6), the coefficients up to 540.
+    // The system is ill-conditioned (1e6), and its coefficients are up to 540.
     EXPECT_LE((trajectory.calc(3.0 * tau).position - expected).norm(), 1e-9);
   }
-  // Nothing jumps at the ends: the snap grows there like 15120 τ · 3.6 m / (3 s)⁴.
+  // No derivative jumps at the ends: the snap grows there like 15120 τ · 3.6 m / (3 s)⁴.
   EXPECT_LE(trajectory.calc(1e-9).snap.norm(), 1e-6);
   EXPECT_LE(trajectory.calc(3.0 - 1e-9).snap.norm(), 1e-6);
 }

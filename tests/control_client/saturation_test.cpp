@@ -17,7 +17,7 @@ TEST(SaturationTest, KeepsTheDirectionAndNeverExceedsTheLimit) {
     const double x = normal(generator), y = normal(generator), z = normal(generator);
     const Eigen::Vector3d force(x, y, z);
     const Eigen::Vector3d limited = calc_saturated(force, 50.0);
-    // However the server rounds |F|: by squares or by hypot.
+    // The limit holds with both roundings of |F|: from squares and from hypot.
     ASSERT_LE(limited.norm(), 50.0);
     ASSERT_LE(std::hypot(limited.x(), limited.y(), limited.z()), 50.0);
     if (force.norm() > 50.0) {

@@ -1,4 +1,4 @@
-// The examples as a user has them: installed, built outside the tree, flown.
+// Builds the examples as a user does, against an installation and outside the tree, and flies them.
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -61,8 +61,8 @@ class Installation {
   int flights_ = 0;
 };
 
-/// Flies the example's scenario with the three programs and in one process: the same flight.
-/// @returns the recording in one process.
+/// Flies the example's scenario with the three programs and in one process; expects the same
+/// flight. @returns the recording of the one process.
 fs::path expect_same_flight(Installation& installation, const std::string& name) {
   SCOPED_TRACE(name);
   const std::string scenario = installation.scenario(name);
@@ -76,7 +76,7 @@ fs::path expect_same_flight(Installation& installation, const std::string& name)
   return one;
 }
 
-/// `name`'s scenario with the parameter `parameter` misspelt is refused with its line.
+/// Expects that the scenario of `name` with `parameter` misspelt is refused with its line.
 void expect_refused(const Installation& installation, const std::string& name,
                     const std::string& parameter, const std::string& section, int line,
                     const std::string& known) {
@@ -105,7 +105,7 @@ TEST(ExamplesTest, AreInstalledBuiltAndFlownAsByAUser) {
       config::calc_file_sha256(installation.example("my_autopilot") / "build/my_autopilot.so"));
   expect_refused(installation, "my_autopilot", "attitude_1_s2", "autopilot", 18,
                  "attitude_1_s2 or rate_1_s");
-  // 6 s after its reference came back there.
+  // 6 s after the reference returned to (0, 0, −1) m.
   const Table flown(turned / "state.csv");
   const Eigen::Vector3d end = flown.position(flown.rows() - 1, "load");
   EXPECT_LT((end - Eigen::Vector3d(0.0, 0.0, -1.0)).norm(), 1e-3);
@@ -118,8 +118,8 @@ TEST(ExamplesTest, AreInstalledBuiltAndFlownAsByAUser) {
                         &steps, &rms, &error_at_end),
             3)
       << said;
-  EXPECT_EQ(steps, 7501);  // 30 s at 4 ms
-  EXPECT_GT(rms, 0.5);     // it is told of set-points metres away, and goes there within seconds
+  EXPECT_EQ(steps, 7501);         // 30 s at 4 ms
+  EXPECT_GT(rms, 0.5);            // set-points metres apart, reached within seconds
   EXPECT_LT(error_at_end, 1e-3);  // poles of at most -0.7 1/s, 15 s
 
   const OwnDomain domain;

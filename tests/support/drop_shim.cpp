@@ -1,8 +1,8 @@
-/// LD_PRELOAD library that loses datagrams: of those a process sends over IPv4, SLS_DROP_PERCENT %
-/// never leave it, and of those sent to it, SLS_DROP_RECEIVED_PERCENT % never reach it, chosen by a
-/// generator seeded with SLS_DROP_SEED; where SLS_DROP_WHILE names a file, only while that exists.
-/// The sender is told they did, as on a real network. How many it lost is printed when the process
-/// ends.
+/// LD_PRELOAD library that drops IPv4 datagrams: SLS_DROP_PERCENT % of those that the process sends
+/// and SLS_DROP_RECEIVED_PERCENT % of those that it receives. A generator seeded with SLS_DROP_SEED
+/// selects them. If SLS_DROP_WHILE names a file, it drops only while that file exists. A send call
+/// of a dropped datagram returns success, as on a real network. When the process ends, the library
+/// prints the number of dropped datagrams.
 #include <dlfcn.h>
 #include <sys/socket.h>
 #include <sys/types.h>

@@ -1,8 +1,10 @@
-/// LD_PRELOAD library that ends or stops a process in the middle of a lock that it shares with
-/// others. After it has given back SLS_LOCK_COUNT of them, it sends itself SLS_LOCK_SIGNAL instead
-/// of giving back the next one of a shared-memory port
-/// - that it reads, with SLS_LOCK_PORT=own, or that another process reads, with other;
-/// - over the port's messages with SLS_LOCK_KIND=messages, over who waits for them with waiters.
+/// LD_PRELOAD library that ends or stops a process while it holds a lock that it shares with other
+/// processes. After SLS_LOCK_COUNT unlocks of shared locks, the process sends itself
+/// SLS_LOCK_SIGNAL just before the next unlock of a lock of a shared-memory port that fits both
+/// variables:
+/// - SLS_LOCK_PORT: `own` for a port that this process reads, `other` for one of another process;
+/// - SLS_LOCK_KIND: `messages` for the lock over the port's messages, `waiters` for the lock over
+///   its waiting readers.
 #include <dlfcn.h>
 #include <pthread.h>
 #include <signal.h>
@@ -23,7 +25,7 @@
 
 namespace {
 
-constexpr int kSharedBit = 128;  // of the kind of a mutex of glibc
+constexpr int kSharedBit = 128;  // in `__kind` of a glibc mutex
 
 /// The file whose mapping holds the address; empty if there is none.
 std::string find_file(const void* address) {
@@ -40,7 +42,7 @@ std::string find_file(const void* address) {
   return "";
 }
 
-/// True if this process has the file open by which the reader of the port excludes others.
+/// True if this process reads the port: it has open the lock file that excludes other readers.
 bool is_read_here(const std::string& port) {
   for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
     std::error_code gone;
@@ -49,8 +51,8 @@ bool is_read_here(const std::string& port) {
   return false;
 }
 
-/// True for the lock over a port's messages, false for that over who waits, which stands before it;
-/// of ports of which one was seen yet, nobody knows.
+/// True for the lock over a port's messages, false for the lock over its waiting readers, which has
+/// the lower address. Empty until both locks of the port have been seen.
 std::optional<bool> is_over_messages(const std::string& port, const pthread_mutex_t* lock) {
   static std::mutex mutex;
   static std::map<std::string, std::set<const pthread_mutex_t*>> seen;
@@ -74,15 +76,15 @@ bool is_moment(const pthread_mutex_t* lock) {
   return is_over_messages(file, lock) == are_messages_wanted && !is_over.exchange(true);
 }
 
-// A signal stops all threads: only the one that sends it may be in a lock, or that of another
-// port than the wanted one would be held, too.
-std::atomic<int> threads_inside{0};  // lock, or want to
+// The signal stops all threads. Only the thread that sends it may hold a lock: otherwise a lock of
+// another port would stay held, too.
+std::atomic<int> threads_inside{0};  // that hold or wait for a shared lock
 std::atomic<bool> is_stopping{false};
 thread_local int locks_here = 0;
 
 bool is_shared(const pthread_mutex_t* mutex) { return mutex->__data.__kind & kSharedBit; }
 
-/// Takes a shared lock by `take`, but not while the process is about to be stopped.
+/// Takes a shared lock by `take`; first waits while the process is about to stop.
 template <class Take>
 int lock_shared(const Take& take) {
   if (locks_here > 0) {

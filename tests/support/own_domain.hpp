@@ -15,8 +15,8 @@
 
 namespace sls::test {
 
-/// A DDS domain that no other test of this run uses at the same time (1 to 60): taken by a lock
-/// that the kernel releases with the process.
+/// A DDS domain (1 to 60) that no other test of this run uses at the same time. A lock reserves it,
+/// which the kernel releases with the process.
 class OwnDomain {
  public:
   OwnDomain();
@@ -51,8 +51,7 @@ inline OwnDomain::OwnDomain() {
 }
 
 inline OwnDomain::~OwnDomain() {
-  // The shared-memory ports of a domain outlive processes that were killed. Its ports: 7400 + 250
-  // N.
+  // The shared-memory ports of domain N, from 7400 + 250 N on, outlive processes that were killed.
   for (int port = 7400 + 250 * number_; port < 7400 + 250 * (number_ + 1); ++port) {
     const std::string name = "fastrtps_port" + std::to_string(port);
     for (const std::string& file : {name, name + "_el", name + "_sl", "sem." + name + "_mutex"}) {

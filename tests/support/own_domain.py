@@ -1,4 +1,4 @@
-"""A DDS domain of a test's own; own_domain.hpp is the same in C++."""
+"""A DDS domain for one test; own_domain.hpp is the same in C++."""
 
 import pathlib
 import socket

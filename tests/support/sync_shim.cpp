@@ -1,5 +1,5 @@
-/// LD_PRELOAD library that notes the order in which a process puts files on the disk and renames
-/// them. Each is a line of the file SLS_SYNC_LOG: "sync FILE BYTES" or "rename FROM TO".
+/// LD_PRELOAD library that logs the order of a process's calls of fsync and rename, one line each
+/// in the file SLS_SYNC_LOG: "sync FILE BYTES" or "rename FROM TO".
 #include <dlfcn.h>
 #include <sys/stat.h>
 

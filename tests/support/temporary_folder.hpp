@@ -10,7 +10,7 @@
 
 namespace sls::test {
 
-/// A new folder that is gone with this object.
+/// A new folder; the destructor removes it.
 class TemporaryFolder {
  public:
   TemporaryFolder() {

@@ -9,7 +9,7 @@ inline bool holds(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
-/// `text` with the one place where it holds `from` changed to `to`.
+/// `text` with its only occurrence of `from` replaced by `to`.
 /// @throws std::logic_error if there is not exactly one.
 inline std::string replace_once(std::string text, const std::string& from, const std::string& to) {
   const auto at = text.find(from);

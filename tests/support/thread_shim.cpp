@@ -1,5 +1,5 @@
-/// LD_PRELOAD library that lets a process's main thread start no further thread as long as the file
-/// SLS_NO_THREADS exists: as on a system that has no more of them.
+/// LD_PRELOAD library: while the file SLS_NO_THREADS exists, the main thread cannot start a thread
+/// (EAGAIN), as on a system without free threads.
 #include <dlfcn.h>
 #include <errno.h>
 #include <pthread.h>

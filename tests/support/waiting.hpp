@@ -10,8 +10,8 @@
 
 namespace sls::test {
 
-/// Waits until `is_met`, at most `limit`; false if it never was. The limit only says when to call
-/// it a failure, on a slow and busy machine too (discovery alone took more than 3 s once in 100
+/// Waits until `is_met`, at most `limit`. @returns false at the limit. The default is long, because
+/// a test must not fail on a slow and busy machine (discovery alone took more than 3 s once in 100
 /// runs).
 inline bool wait_until(const std::function<bool()>& is_met,
                        std::chrono::milliseconds limit = std::chrono::seconds(60)) {
@@ -23,7 +23,7 @@ inline bool wait_until(const std::function<bool()>& is_met,
   return true;
 }
 
-/// What a process or thread does: R runs, S sleeps, T is stopped; ? where there is none.
+/// State of a process or thread: R running, S sleeping, T stopped; ? if there is none.
 inline char find_state(pid_t id) {
   std::ifstream stat("/proc/" + std::to_string(id) + "/stat");
   std::string line;

@@ -65,7 +65,7 @@ TEST(LqrTest, SolvesTheRiccatiEquationWithASymmetricPositiveMatrix) {
       const MatrixXd P = solve_riccati(chain.A, chain.b, Q);
       const MatrixXd quadratic = P * chain.b * chain.b.transpose() * P;
       const MatrixXd residual = chain.A.transpose() * P + P * chain.A - quadratic + Q;
-      // Backward stable up to the size of the terms that cancel, times a few dozen roundings.
+      // The solver is backward stable: a few dozen roundings of the terms that cancel.
       EXPECT_LE(residual.norm(), 1e-12 * (quadratic.norm() + Q.norm() + P.norm()))
           << order << " " << weight;
       EXPECT_LE((P - P.transpose()).norm(), 1e-14 * P.norm());

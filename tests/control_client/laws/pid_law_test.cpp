@@ -38,8 +38,8 @@ TEST(PidLawTest, HoldsTheWeightAtRestOnItsReference) {
   EXPECT_EQ(output.memory, Vector3d::Zero());
 }
 
-/// Load accelerations under the law's force by the oracle, near hover, as a matrix over
-/// (position, velocity, rod slope, its rate) of one horizontal axis.
+/// System matrix of the oracle under the law's force near hover, for one horizontal axis. The state
+/// is (load position, velocity, rod slope, its rate).
 Eigen::Matrix4d calc_linearised_loop(const PidLaw& law, const model::SlungLoadParameters& vehicle) {
   const double d = 1e-6;
   Eigen::Matrix4d A;
@@ -48,7 +48,6 @@ Eigen::Matrix4d calc_linearised_loop(const PidLaw& law, const model::SlungLoadPa
     for (const int side : {0, 1}) {
       Eigen::Vector4d x = Eigen::Vector4d::Zero();
       x[column] = side == 0 ? d : -d;
-      // Load at x, velocity v, rod slope w and its rate.
       const Vector3d n_W = Vector3d(x[2], 0.0, 1.0).normalized();
       const oracle::State state{Vector3d(x[0], 0, 0) - vehicle.rod_length * n_W,
                                 Vector3d(x[1] - vehicle.rod_length * x[3], 0, 0), n_W,
@@ -77,7 +76,7 @@ TEST(PidLawTest, ClosesTheLoopThatItsGainsSay) {
     EXPECT_LT(s.real(), 0.0);
     const auto value =
         s * s * s * s + 12.0 * s * s * s + 36.0 * s * s + 36.0 * 1.5 * s + 36.0 * 1.5 * 0.6;
-    EXPECT_LE(std::abs(value), 1e-3 * 36.0 * 1.5);  // differences of 1e-6
+    EXPECT_LE(std::abs(value), 1e-3 * 36.0 * 1.5);  // central differences with step 1e-6
   }
 }
 
@@ -87,7 +86,7 @@ TEST(PidLawTest, ReachesASetPointAndRemovesAConstantDisturbance) {
   scenario.mission = {make_hold({0.5, -0.5, -1.0}, 90 * kSecond)};
   const auto flight = fly(scenario);
   EXPECT_EQ(flight.back().answer.mission, MissionPhase::kFinished);
-  // The integral's pole is slow: k_i / (k_v k_p) = 0.06 1/s, e^(−0.06 · 90 s) of some 0.3 m.
+  // The integral's pole is slow, k_i / (k_v k_p) = 0.06 1/s: 0.3 m · e^(−0.06 · 90 s) remain.
   EXPECT_LE(flight.back().load_error().norm(), 0.01);
 }
 

@@ -26,7 +26,7 @@ using Eigen::Vector3d;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// One situation: a plant and its controller, which knows it exactly.
+/// One case: a plant and its controller, which has the exact parameters of the plant.
 struct Case {
   model::SlungLoadParameters vehicle;
   NamedGains gains;
@@ -46,7 +46,7 @@ Vector3d draw_vector(std::mt19937& generator, double scale) {
   return {x, y, z};
 }
 
-/// A random situation in which the law asks for s > g / 20, rod up to 1.2 rad off on both axes.
+/// A random case with s > g / 20 and both rod angles up to 1.2 rad.
 Case draw_case(std::mt19937& generator, bool with_integral) {
   std::uniform_real_distribution<double> unit(0.0, 1.0);
   const auto between = [&](double low, double high) {
@@ -107,10 +107,11 @@ Series operator/(const Series& a, const Series& b) {
 }
 Series operator-(const Series& a) { return {{-a.c[0], -a.c[1], -a.c[2]}}; }
 
-/// The force that the design demands, without its formula: the designed vertical error comes from
-/// powers of its state matrix, the load's horizontal motion from Taylor series of Newton's law
-/// m_L p̈_L = m_L g e₃ − T n, the rod's acceleration from the three linear conditions "designed snap
-/// in x and y, |n| = 1", and the force from inverting the oracle, which is affine in it.
+/// The force that the design requires, without the law's formula:
+/// - the designed vertical error comes from powers of its state matrix;
+/// - the load's horizontal motion, from Taylor series of Newton's law m_L p̈_L = m_L g e₃ − T n;
+/// - the rod's acceleration, from three linear conditions: designed snap in x and y, and |n| = 1;
+/// - the force, from the inverse of the oracle, which is affine in the force.
 Vector3d solve_for_force(const Case& one) {
   const model::SlungLoadParameters& vehicle = one.vehicle;
   const Vector3d& n = one.state.n_W;
@@ -118,7 +119,7 @@ Vector3d solve_for_force(const Case& one) {
   const Vector3d e = one.state.p_WQ + vehicle.rod_length * n - one.reference.position;
   const Vector3d e_dot = one.state.v_WQ + vehicle.rod_length * n_dot - one.reference.velocity;
 
-  // Vertical: d/dt (∫e, e, ė) = A (∫e, e, ė), the integral at rest while it is clamped.
+  // Vertical: d/dt (∫e, e, ė) = A (∫e, e, ė); a clamped integral stays constant.
   const AxisGains& vertical = one.gains.vertical;
   const bool clamped =
       std::abs(one.integral.z()) == kIntegralLimit && one.integral.z() * e.z() > 0.0;
@@ -154,7 +155,7 @@ Vector3d solve_for_force(const Case& one) {
   for (int i = 0; i < 3; ++i) slope.col(i) = calc_residual(Vector3d::Unit(i)) - at_zero;
   const Vector3d n_ddot = -slope.fullPivLu().solve(at_zero);
 
-  // Force: (T, n̈) of the oracle must be the wanted ones; four equations of rank three.
+  // Force: the oracle must give the required (T, n̈); four equations of rank three.
   const auto calc_response = [&](const Vector3d& force) {
     const oracle::Accelerations a = oracle::calc_accelerations(one.state, force, vehicle);
     Eigen::Vector4d response;
@@ -169,8 +170,8 @@ Vector3d solve_for_force(const Case& one) {
   return effect.colPivHouseholderQr().solve(wanted - free);
 }
 
-/// Relative: 1e-16 times the conditioning of a rod 1.2 rad off on both axes (1 / q_z² = 58) and of
-/// s down to g / 20.
+/// Relative tolerance: 1.1e-16 times the condition number for a rod 1.2 rad off on both axes
+/// (1 / q_z² = 58) and for s down to g / 20.
 constexpr double kRounding = 1.1e-16 * 58 * 20;
 
 TEST(QsfLawTest, AgreesWithAnIndependentFormulation) {
@@ -199,7 +200,7 @@ TEST(QsfLawTest, AgreesWithAnIndependentFormulationWithIntegralsAlsoWhereTheyAre
     const Vector3d expected = solve_for_force(one);
     ASSERT_LE((output.f_Q_W - expected).norm(), kRounding * expected.norm());
   }
-  EXPECT_GT(clamped, 30);  // both kinds were judged
+  EXPECT_GT(clamped, 30);  // both cases occurred
   EXPECT_GT(held_back, 30);
 }
 
@@ -229,7 +230,7 @@ TEST(QsfLawTest, ErrorObeysTheDesignedLinearEquation) {
   double worst_vertical = 0.0, worst_horizontal = 0.0;
   int judged = 0;
   while (judged < 150) {
-    // Rod and support stay well off the singularities for the 0.2 s that the differences span.
+    // Rod and support stay far from the singularities during the 0.2 s of the differences.
     Case one = draw_case(generator, false);
     const model::RodAngles rod = one.input().rod;
     if (std::max(std::abs(rod.alpha), std::abs(rod.beta)) > 0.7) continue;
@@ -290,9 +291,10 @@ TEST(QsfLawTest, ErrorObeysTheDesignedLinearEquation) {
     worst_horizontal = std::max(worst_horizontal, residual.head<2>().norm() / size);
   }
   EXPECT_LE(worst_vertical, 1e-13);  // no differences here: rounding alone
-  // Rounding of an acceleration of some 20 m/s², 4e-15, over h² = 6e-4, of terms of some 10 m/s⁴:
-  // 1e-12 and mostly found so. Where the rod turns fast the integration leaves up to 4e-11, and 16
-  // times more at twice its step. Truncation is below: the load moves like exp 2.3 t at most.
+  // Rounding: 4e-15 for an acceleration of some 20 m/s², divided by h² = 6e-4, relative to terms of
+  // some 10 m/s⁴, is 1e-12, the error of most cases. With a fast rod the integration adds up to
+  // 4e-11, and 16 times more at twice its step. Truncation is smaller: the load moves like
+  // exp 2.3 t at most.
   EXPECT_LE(worst_horizontal, 1e-9);
 }
 
@@ -436,14 +438,14 @@ TEST(QsfLawTest, ReportsALevelRodAndALoadAboveTheQuadrotor) {
     for (double model::RodAngles::*slot : {&model::RodAngles::alpha, &model::RodAngles::beta}) {
       input.rod = {};
       input.rod.*slot = angle;
-      // The error of a load above is large; s must not hide the rod.
+      // Load at its reference: a large error could make s small and cause another fault.
       input.reference.position = model::to_direction(input.rod).n_W;
       const QsfOutput output = calc_qsf(input, one.vehicle, one.gains);
       EXPECT_EQ(output.fault, Fault::kRodLevel) << angle;
       EXPECT_EQ(output.f_Q_W, Vector3d::Zero());
     }
   }
-  // Both cosines negative: the load seems to hang again, but the angles are out of range.
+  // With both cosines negative the load hangs below again, but the angles are out of range.
   input.rod = {2.5, 2.5, 0.0, 0.0};
   EXPECT_EQ(calc_qsf(input, one.vehicle, one.gains).fault, Fault::kRodLevel);
   input.rod = {half_pi - 2.0 * kMinRodCosine, 0.0, 0.0, 0.0};

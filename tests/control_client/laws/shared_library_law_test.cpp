@@ -1,4 +1,4 @@
-// Controllers in shared libraries that do something wrong: the exact line of each.
+// Shared-library controllers that do something wrong: the exact error message of each.
 #include <gtest/gtest.h>
 
 #include "control_client/flight_controller.hpp"
@@ -31,8 +31,8 @@ config::Scenario make_misbehaving(const std::string& parameters) {
   return make_scenario(kGood, "  parameters: { " + parameters + " }\n");
 }
 
-/// Hovers until the mission is over: what is thrown, or the fault. A library that is refused has
-/// its line from config::ConfigError.
+/// Hovers until the mission is over. @returns the message of the exception, or the fault. The
+/// message of a refused library comes from config::ConfigError.
 std::string fly(const config::Scenario& scenario, bool checks_purity = false) {
   const auto hovering = model::make_state({0.0, 0.0, -1.5}, Eigen::Vector3d::Zero(), {}, 1.0);
   try {
@@ -53,7 +53,7 @@ std::string refused(const std::string& file, const std::string& message,
   return "refused: " + place + ": " + file + ": " + message;
 }
 
-/// Of something wrong at step 5.
+/// The message of an error at step 5.
 std::string in_answer(const std::string& message) {
   return kGood + ": answer, vehicle 3, step 5: " + message;
 }
@@ -172,7 +172,7 @@ TEST(SharedLibraryLawTest, MemoryOfItsOwnIsRefusedInTheFirst100Steps) {
   EXPECT_EQ(fly(remembering(100)), "none");
   EXPECT_EQ(fly(remembering(100), true), impure(100));
   EXPECT_EQ(fly(remembering(499), true), impure(499));
-  // Here the two answers differ in the number of their memory numbers, too.
+  // Here the two answers also differ in how many memory numbers they have.
   EXPECT_EQ(fly(make_misbehaving("do: fault every other time, in: answer, at: 7, memory: 3")),
             impure(7));
 }

@@ -1,6 +1,6 @@
-// A controller that hovers and, if `parameters` say so, does something wrong:
+// A controller that hovers and misbehaves as `parameters` require:
 //   { do: WHAT, in: create, answer or destroy, at: STEP, memory: COUNT }
-// Macros make the tables of functions that are to be refused.
+// Macros change its table of functions into invalid ones, which must be refused.
 #include <cstdio>
 #include <memory>
 

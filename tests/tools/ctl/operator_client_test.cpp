@@ -1,4 +1,4 @@
-// The operator's end against a server that is played by the test, on a domain of the test's own.
+// The operator's client against a fake server in the test, on a domain of the test's own.
 #include "tools/ctl/operator_client.hpp"
 
 #include <gtest/gtest.h>
@@ -22,11 +22,11 @@ using sls::test::wait_until;
 constexpr int kDomain = 78;
 const std::filesystem::path kQosFile = SLS_SOURCE_DIR "/config/qos/default.xml";
 
-// Another build's tests may use the same domain: numbers of this process alone.
+// Tests of another build may use the same domain: these numbers are unique to this process.
 const std::uint64_t kRun = static_cast<std::uint64_t>(::getpid()) * 1000 + 500;
 const std::uint32_t kVehicle = static_cast<std::uint32_t>(::getpid()) * 10 + 4;
 
-/// Publishes a status every 20 ms and answers requests as it is told to.
+/// Publishes a status every 20 ms and answers requests by `answer`.
 class FakeServer {
  public:
   using Answer = std::function<void(FakeServer&, const SimControl&)>;
@@ -130,7 +130,7 @@ ClientOptions make_options(double timeout_s) {
 
 class OperatorClientTest : public ::testing::Test {
  protected:
-  // The limit only says when to call it a failure; tests that expect silence take a short one.
+  // Only a failing test waits for this long limit; tests that expect no reply set a short one.
   explicit OperatorClientTest(double timeout_s = 60.0) : client(node, make_options(timeout_s)) {}
 
   std::string find_error(const std::function<void()>& act) {
@@ -150,7 +150,7 @@ class ImpatientClientTest : public OperatorClientTest {
  protected:
   ImpatientClientTest() : OperatorClientTest(1.0) {}
 
-  /// The run of a server that is there, however long its discovery takes.
+  /// The run of the server; tries again until discovery finds it.
   bus::Run find_run() {
     std::optional<bus::Run> run;
     EXPECT_TRUE(wait_until([&] {

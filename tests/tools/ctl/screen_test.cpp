@@ -42,7 +42,7 @@ TEST(ScreenTest, NoMoreIsDrawnThanThereAreRows) {
   EXPECT_EQ(take(out), "\x1b[?25l\rone\x1b[K\n\rtwo\x1b[K\n\x1b[J");
   screen.draw({"one", "two", "three"}, make_size(80, 3));
   EXPECT_EQ(take(out).substr(0, 4), "\x1b[2A");
-  screen.draw({"one", "two"}, make_size(80, 0));  // a terminal that does not know
+  screen.draw({"one", "two"}, make_size(80, 0));  // a terminal that reports no height
   EXPECT_EQ(take(out), "\x1b[H\x1b[J\rone\x1b[K\n\x1b[J");
 }
 

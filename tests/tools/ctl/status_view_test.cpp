@@ -53,7 +53,7 @@ std::string join(const std::vector<std::string>& lines) {
   return text;
 }
 
-/// Characters, not bytes: none of the texts here combines characters.
+/// Number of characters, not bytes; the texts here have no combining characters.
 std::size_t count_characters(const std::string& text) {
   std::size_t count = 0;
   for (const char letter : text) count += (static_cast<unsigned char>(letter) & 0xc0) != 0x80;

@@ -22,7 +22,7 @@ Bytes make_parameter(unsigned id, const Bytes& value) {
   return bytes;
 }
 
-/// An announcement by hand, after the specification (RTPS 2.3, 8.3.3, 9.4.5, 9.6.2).
+/// An announcement built by hand from the specification (RTPS 2.3, 8.3.3, 9.4.5, 9.6.2).
 Bytes make_message(const std::string& name, bool is_secured) {
   Bytes body = {0, 0, 16, 0, 0, 0, 0, 0, 0x00, 0x01, 0x00, 0xc2,
                 0, 0, 0,  0, 1, 0, 0, 0, 0,    3,    0,    0};

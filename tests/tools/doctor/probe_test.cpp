@@ -8,7 +8,7 @@
 namespace sls::doctor {
 namespace {
 
-/// Ports beyond those of all domains that are in use here.
+/// Ports above those of all domains that are in use here.
 Ports make_ports() {
   Ports ports;
   ports.domain = 101;
