@@ -1,4 +1,4 @@
-// Also a test for ThreadSanitizer: producers and consumer meet only in the mailbox.
+// Also a test for ThreadSanitizer: producers and consumer share only the mailbox.
 #include "common/app/mailbox.hpp"
 
 #include <gtest/gtest.h>
@@ -88,7 +88,7 @@ TEST(MailboxTest, AllItemsCanBeTakenAtOnceWithoutWaiting) {
 TEST(MailboxTest, AnInterruptEndsTheWaitThatIsThereOrTheNextOne) {
   Mailbox<int> mailbox(4);
   mailbox.interrupt();
-  EXPECT_TRUE(mailbox.wait(Clock::time_point::max()));  // returns
+  EXPECT_TRUE(mailbox.wait(Clock::time_point::max()));  // returns at once
   EXPECT_TRUE(mailbox.is_empty());
 
   std::thread interrupting([&] { mailbox.interrupt(); });
@@ -96,7 +96,7 @@ TEST(MailboxTest, AnInterruptEndsTheWaitThatIsThereOrTheNextOne) {
   interrupting.join();
 
   const auto deadline = Clock::now() + std::chrono::milliseconds(20);
-  EXPECT_FALSE(mailbox.wait(deadline));  // none is left over
+  EXPECT_FALSE(mailbox.wait(deadline));  // no interrupt is left
   EXPECT_GE(Clock::now(), deadline);
 }
 
@@ -114,7 +114,7 @@ TEST(MailboxTest, ItemsOfManyProducersAreNotLostDoubledOrReordered) {
     int producer;
     int number;
   };
-  Mailbox<Item> mailbox(64);  // small: producers meet a full one often
+  Mailbox<Item> mailbox(64);  // small, so often full
   std::atomic<std::uint64_t> refusals{0};
   std::vector<std::thread> producers;
   for (int producer = 0; producer < kProducers; ++producer)

@@ -1,4 +1,4 @@
-// Exit codes and what each outcome says on stderr and stdout.
+// Exit code and output on stderr and stdout of each outcome.
 #include "common/app/run_main.hpp"
 
 #include <gtest/gtest.h>
@@ -152,7 +152,7 @@ TEST(RunMainTest, VersionGoesToStdout) {
   EXPECT_EQ(version().rfind("sls ", 0), 0u);
 }
 
-// The flag of a signal lasts as long as its process, so each of these has one of its own.
+// The flag of a signal lasts as long as its process: each test runs in its own process.
 class RunMainDeathTest : public testing::Test {
  protected:
   void SetUp() override { GTEST_FLAG_SET(death_test_style, "threadsafe"); }

@@ -1,4 +1,4 @@
-// Real signals, each in a process of its own: the flag lasts as long as the process.
+// Real signals. The flag lasts as long as its process: each test runs in its own process.
 #include "common/app/stop_signal.hpp"
 
 #include <gtest/gtest.h>

@@ -11,7 +11,7 @@
 namespace sls::bus {
 namespace {
 
-/// Every value has a word of its own; the one after the last has none.
+/// Expects a different word for every value, and "unknown" after the last one.
 template <class Enum>
 void expect_words(const std::vector<Enum>& values) {
   std::set<std::string> words;

@@ -1,5 +1,5 @@
-// Two nodes on a domain of the test's own: what one writes, the other reads. Profiles are global to
-// a process; every test here uses the shipped default.
+// Two nodes on a domain of the test's own: one writes, the other reads. Profiles are global to a
+// process: every test here uses the shipped default.
 #include "common/bus/node.hpp"
 
 #include <fastcdr/Cdr.h>
@@ -24,7 +24,8 @@ using test::make_message;
 
 const std::filesystem::path kQosFile = SLS_SOURCE_DIR "/config/qos/default.xml";
 
-/// A reader that keeps what it hears from `sender`; another build's tests may use the same domain.
+/// A reader that keeps the messages of `sender` only: tests of another build may use the same
+/// domain.
 template <class Message>
 class Listener {
  public:
@@ -68,7 +69,7 @@ void expect_round_trip(int domain, const std::vector<const char*>& profiles) {
     SCOPED_TRACE(profile);
     Listener<Message> listener(reading, profile, writing);
     ASSERT_TRUE(wait_until([&] { return is_matched(writer, reading) && listener.is_matched(); }));
-    const std::size_t earlier = listener.count();  // a late joiner may get what went before
+    const std::size_t earlier = listener.count();  // a late joiner may get earlier samples
     const std::vector<Message> sent = {make_message<Message>(1), Message(),
                                        make_message<Message>(2)};
     for (const Message& message : sent) writer.write(message);
@@ -148,7 +149,7 @@ TEST(NodeTest, ALateJoinerGetsLatchedSamples) {
 
 // --- raw samples ---------------------------------------------------------------------------------
 
-/// As Fast CDR serialises it, behind the header of an encapsulation.
+/// `message` as Fast CDR serialises it, with the header of the encapsulation.
 template <class Message>
 std::vector<std::uint8_t> serialize(const Message& message) {
   using eprosima::fastcdr::Cdr;
@@ -161,7 +162,7 @@ std::vector<std::uint8_t> serialize(const Message& message) {
   return bytes;
 }
 
-/// Like Listener, of samples as they came.
+/// Like Listener, but keeps the serialised samples.
 template <class Message>
 class RawListener {
  public:
@@ -186,7 +187,7 @@ class RawListener {
   RawReader<Message> reader_;
 };
 
-/// Both readers are on one node, so that they share its topic and its type support.
+/// The raw and the typed readers are on one node: they share its topic and its type support.
 template <class Message>
 void expect_raw_beside_typed(int domain, const char* profile) {
   Node writing(kQosFile, domain, "writing");
@@ -274,7 +275,7 @@ TEST(NodeErrorTest, AMissingQosFileIsNamed) {
             "/nowhere/qos.xml: expected a QoS file, got no such file");
 }
 
-// Profiles are global to a process: another file would silently not be in force.
+// Profiles are global to a process: a second file would have no effect, without an error.
 TEST(NodeErrorTest, ASecondQosFileInOneProcessIsRefused) {
   const sls::test::TemporaryFolder folder;
   std::filesystem::copy_file(kQosFile, folder / "other.xml");

@@ -15,7 +15,7 @@ namespace {
 
 using sls::test::wait_until;
 
-// Another build's tests may use the same domain: numbers of this process alone.
+// Tests of another build may use the same domain: these numbers are unique to this process.
 const std::uint64_t kRun = static_cast<std::uint64_t>(::getpid()) * 1000 + 500;
 const std::uint64_t kLowerRun = kRun - 100;
 const std::uint32_t kVehicle = static_cast<std::uint32_t>(::getpid()) * 10 + 4;
@@ -60,7 +60,7 @@ TEST(ParticipantDirectoryTest, ListsTheParticipantsOfARunUntilTheyLeave) {
     Node other(kQosFile, kDomain, "other");
     Writer<Participant> writer(other);
     writer.write(make_announcement(ROLE_CONTROLLER, 0, "pilot"));
-    writer.write(make_announcement(ROLE_CONTROLLER, kRun, "pilot"));  // the last one counts
+    writer.write(make_announcement(ROLE_CONTROLLER, kRun, "pilot"));  // replaces the first
     ASSERT_TRUE(wait_until([&] { return directory.find(ROLE_CONTROLLER, kRun).size() == 1; }));
     const auto entry = directory.find(ROLE_CONTROLLER, kRun).front();
     EXPECT_EQ(entry.peer, other.id());
@@ -81,7 +81,8 @@ TEST(ParticipantDirectoryTest, ListsTheParticipantsOfARunUntilTheyLeave) {
 
 class RecorderPatienceTest : public testing::Test {
  protected:
-  /// Announces further steps until told to be done, or for good.
+  /// Announces further steps until `time` is over or wait_for_recorder() returned; then announces
+  /// that the recorder is done.
   void write_further_steps(std::chrono::steady_clock::duration time) {
     const auto end = std::chrono::steady_clock::now() + time;
     Participant message = make_announcement(ROLE_RECORDER, kRun, "recorder");
@@ -94,7 +95,7 @@ class RecorderPatienceTest : public testing::Test {
     message.done(true);
     writer_.write(message);
   }
-  /// True if the recorder was done before.
+  /// Waits for the recorder with `patience`. @returns true if the recorder was done before.
   bool wait_for_recorder(const RecorderPatience& patience) {
     EXPECT_TRUE(wait_until([&] { return directory_.find(ROLE_RECORDER, kRun).size() == 1; }));
     wait_for_recorders_to_end(directory_, kRun, 1, patience);
@@ -166,13 +167,13 @@ TEST(ServerDirectoryTest, FindsTheRunToJoin) {
   EXPECT_TRUE(directory.is_present(own_server.id()));
   EXPECT_EQ(statuses, 1);
 
-  {  // of two runs the lower run_id, then the one that is further
+  {  // chooses the run that is ahead; on a tie, the lower run_id
     Node second_server(kQosFile, kDomain, "second server");
     Writer<Parameters> second_parameters(second_server);
     Writer<SimStatus> second_status(second_server);
     second_parameters.write(make_parameters(kLowerRun, {kVehicle}));
     second_status.write(make_status(kLowerRun, PHASE_WAITING));
-    // Both say again and again where they are: a server silent for 2 s is not joined.
+    // Both servers repeat their status: a server silent for 2 s cannot be joined.
     const auto is_chosen = [&](std::uint64_t run_id, RunPhase phase) {
       return wait_until([&] {
         status.write(make_status(kRun, phase));
@@ -218,7 +219,7 @@ TEST(ServerDirectoryTest, OnlyTheFirstServerOfARunCounts) {
   EXPECT_EQ(runs.front().server, server.id());
 }
 
-// A late joiner is sent the history of each topic, whichever first.
+// A late joiner receives the history of each topic; either topic may come first.
 TEST(ServerDirectoryTest, AfterManyResetsTheLastRunIsFoundWhicheverTopicComesFirst) {
   constexpr int kDomain = 80;
   constexpr std::uint64_t kRuns = 9;
@@ -243,7 +244,7 @@ TEST(ServerDirectoryTest, AfterManyResetsTheLastRunIsFoundWhicheverTopicComesFir
         status.write(make_status(kRun + i, phase));
     ASSERT_TRUE(wait_until([&] { return last_status == last; }));
     if (!are_parameters_first) write_parameters();
-    // By its last status a recorder knows that its run was reset.
+    // A recorder reads from the last status of its run that the run was reset.
     ASSERT_TRUE(directory.find_status(last - 1));
     EXPECT_EQ(directory.find_status(last - 1)->phase(), PHASE_RESET);
     ASSERT_TRUE(wait_until([&] {
@@ -282,15 +283,14 @@ TEST(ServerWatchTest, ASilentServerIsNotJoinedIsGivenUpAndMayComeBack) {
     status.write(make_status(kRun, PHASE_RUNNING));
     return watch.look() == ServerWatch::Finding::kThere;
   }));
-  // A watch that did not look for a while, because it was stopped itself, does not report the
-  // server.
+  // A watch that was stopped itself and so did not look for a while does not report the server.
   const auto later = ServerWatch::Clock::now() + std::chrono::milliseconds(1500);
   ASSERT_TRUE(wait_until([&] { return ServerWatch::Clock::now() > later; }));
   EXPECT_EQ(watch.look(), ServerWatch::Finding::kThere);
 }
 
-// A server whose samples are late, because this process or the network is overwhelmed, is presumed
-// dead as well: then a server that claimed its vehicle all along must not get it.
+// A server is also presumed dead if its samples are late because this process or the network is
+// overloaded. A second server that claimed the same vehicle before must not take its place then.
 TEST(ServerDirectoryTest, OnlyAServerThatComesAfterTheSilenceBeganIsASuccessor) {
   constexpr int kDomain = 78;
   Node node(kQosFile, kDomain, "directory");
@@ -331,7 +331,7 @@ TEST(ServerDirectoryTest, OnlyAServerThatComesAfterTheSilenceBeganIsASuccessor) 
   EXPECT_TRUE(is_found(kRun + 1));
   EXPECT_EQ(directory.find_successor(run, {kVehicle + 1}), std::nullopt);
 
-  // Its own server may go on with another run whenever it likes.
+  // The run's own server may start another run at any time.
   parameters.write(make_parameters(kRun + 2, {kVehicle}));
   status.write(make_status(kRun + 2, PHASE_RUNNING));
   EXPECT_TRUE(is_found(kRun + 2));

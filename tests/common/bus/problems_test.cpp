@@ -14,7 +14,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// Keeps what is logged while it lives.
+/// Keeps the log lines of one test.
 class ProblemsTest : public testing::Test {
  protected:
   void SetUp() override {

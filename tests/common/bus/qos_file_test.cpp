@@ -1,4 +1,4 @@
-// A QoS file is judged before the middleware sees it, and every mistake has a place.
+// A QoS file is checked before the middleware reads it, and every error message names a place.
 #include "common/bus/qos_file.hpp"
 
 #include <gtest/gtest.h>
@@ -94,9 +94,10 @@ TEST_F(QosFileTest, AnUnreadableFileIsNamedWithTheCause) {
   fs::permissions(folder_ / "qos.xml", fs::perms::none);
   EXPECT_EXIT(
       {
-        if (::geteuid() == 0 && ::setuid(65534) != 0) ::_exit(1);  // nobody, in a child
+        if (::geteuid() == 0 && ::setuid(65534) != 0)
+          ::_exit(1);  // user nobody, in a child process
         std::cerr << find_error(folder_ / "qos.xml") << std::endl;
-        ::_exit(2);  // without the exit handlers of threads that only the parent has
+        ::_exit(2);  // skips exit handlers: the parent's threads do not exist here
       },
       testing::ExitedWithCode(2), "qos.xml: expected a readable QoS file, got Permission denied");
 }
@@ -137,9 +138,9 @@ TEST_F(QosFileTest, EachMisspeltProfileOfOursIsNamed) {
   }
 }
 
-// --- invalid/: one file per defect, the message in the comment after the declaration
+// --- invalid/: one file per defect; the comment after the XML declaration has the message
 
-/// The expectation in the comment of an invalid file: the message after the file's name.
+/// The expected message, without the file's name, from the comment of an invalid file.
 std::string read_expectation(const fs::path& file) {
   const std::string text = sls::test::read_bytes(file);
   const std::string mark = "<!-- expect: ", end = " -->";
@@ -156,7 +157,8 @@ std::vector<fs::path> list_invalid_files() {
   return files;
 }
 
-/// Uses `file` as a program does and ends the process: 2 and the message where it is refused.
+/// Uses `file` as a program does and ends the process; prints the message and exits with 2 if the
+/// file is refused.
 [[noreturn]] void use_file_and_exit(const fs::path& file) {
   int code = 0;
   try {
@@ -200,7 +202,7 @@ TEST(InvalidQosFilesDeathTest, EachFileGivesTheMessageInItsComment) {
   }
 }
 
-// --- what depends on the process -----------------------------------------------------------------
+// --- values that depend on the process -----------------------------------------------------------
 
 /// Sets an environment variable for one test.
 class Variable {
@@ -286,9 +288,9 @@ TEST_F(QosFileTest, ListsOfHostsDoNotMultiply) {
             std::string::npos);
 }
 
-// --- transport is a matter of the file, behaviour is not -----------------------------------------
+// --- a file sets the transport, not the behaviour of endpoints -----------------------------------
 
-/// Name of each profile of `xml` → its content without comments, the participant's left out.
+/// Name of each profile of `xml`, except the participant's → its content without comments.
 std::map<std::string, std::string> read_endpoint_profiles(const std::string& xml) {
   tinyxml2::XMLDocument document;
   EXPECT_EQ(document.Parse(xml.c_str()), tinyxml2::XML_SUCCESS) << xml;

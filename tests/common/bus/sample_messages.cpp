@@ -24,7 +24,7 @@ class Values {
     for (double& number : numbers) number = real();
     return numbers;
   }
-  /// With bytes beyond ASCII, which a string may hold.
+  /// Text with bytes beyond ASCII, which a string may contain.
   std::string text(std::size_t length) {
     std::string text = std::to_string(next_++) + " ä\n\"";
     while (text.size() < length) text += static_cast<char>('a' + (text.size() + next_) % 26);

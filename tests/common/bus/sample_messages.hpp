@@ -1,4 +1,4 @@
-/// Messages in which every field has a value of its own, different for each `seed`.
+/// Messages in which every field has a different value, which also depends on `seed`.
 #pragma once
 
 #include <cstdint>

@@ -11,7 +11,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Every kind of stage, and vehicles that differ; the reader's defaults elsewhere.
+/// Every kind of stage, and different vehicles; defaults for all other keys.
 constexpr const char* kFleet = R"(name: fleet
 vehicle: { quad_mass_kg: 1.5, load_mass_kg: 0.2, rod_length_m: 1.0, gravity_m_s2: 9.8 }
 vehicles:
@@ -82,7 +82,7 @@ TEST(FleetTest, EveryPlaceOfAVehicleMovesByItsOffset) {
   const auto& rest = std::get<RestToRestReference>(alone.mission[3].reference);
   EXPECT_EQ(rest.from, Vector3d(10, -20, -0.5));
   EXPECT_EQ(rest.to, Vector3d(11, -20, -0.5));
-  // Relative to the reference, which has moved.
+  // The offset is relative to the reference, which moved with the vehicle.
   EXPECT_EQ(std::get<LeaveWithin>(alone.mission[1].leave).offset, Vector3d(0, 0, 0.1));
 }
 
@@ -115,7 +115,7 @@ TEST(FleetTest, TheModelFollowsEachVehicleUnlessTheFileSaysOtherwise) {
   EXPECT_EQ(make_vehicle_scenario(silent, 1).controller.model.vehicle,
             (model::SlungLoadParameters{2.0, 0.3, 0.7, 9.8}));
 
-  // Said in so many words, also where it is what `vehicle` says.
+  // An explicit value stays, even if it equals the value of `vehicle`.
   const Scenario explicit_model = parse_scenario(
       std::string(kFleet) + "controller: { model: { load_mass_kg: 0.2, gravity_m_s2: 9.7 } }\n",
       "file");
@@ -127,7 +127,7 @@ TEST(FleetTest, TheModelFollowsEachVehicleUnlessTheFileSaysOtherwise) {
 
 TEST(FleetTest, AVehicleAloneWrittenAndReadIsEqual) {
   Scenario fleet = parse_scenario(kFleet, "file");
-  fleet.faults.clear();  // which refer to the fleet
+  fleet.faults.clear();  // they refer to the fleet
   for (const std::uint32_t id : {0u, 1u}) {
     const Scenario alone = make_vehicle_scenario(fleet, id);
     EXPECT_TRUE(are_equal(parse_scenario(to_yaml(alone), "file"), alone)) << to_yaml(alone);

@@ -1,4 +1,4 @@
-// Every mistake gives one line with place, key, expectation and what was found.
+// Every mistake gives one line with place, key, expected and found value.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -88,7 +88,7 @@ TEST_F(UnusableFileTest, UnreadableFile) {
   ASSERT_EQ(chmod(file.c_str(), 0), 0);
   ASSERT_EQ(chmod(folder_.c_str(), 0755), 0);
   const bool is_root = geteuid() == 0;
-  constexpr uid_t kNobody = 65534;  // root could read the file all the same
+  constexpr uid_t kNobody = 65534;  // root can read every file
   if (is_root) {
     ASSERT_EQ(seteuid(kNobody), 0);
   }

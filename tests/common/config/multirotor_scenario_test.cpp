@@ -1,4 +1,4 @@
-// Scenarios of the plant `multirotor` that are right: what is read, and what is written reads back.
+// Valid scenarios of the plant `multirotor`: their values, and a round trip through a written file.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -13,7 +13,7 @@ namespace {
 using Eigen::Vector3d;
 using sim::MultirotorKeys;
 
-/// Every key of the plant and of its autopilot `px4`, none with its default.
+/// Every key of the plant and of its autopilot `px4`, each with a value that is not its default.
 const char* const kEverything = R"(name: everything
 vehicle: { quad_mass_kg: 1.55, load_mass_kg: 0.15, rod_length_m: 0.9, gravity_m_s2: 9.8066 }
 plant:
@@ -190,7 +190,7 @@ TEST(MultirotorScenarioTest, EveryKeyIsReadAndSurvivesWritingAndReading) {
   EXPECT_EQ(to_yaml(again), written);
 }
 
-/// `kEverything` with another text in one place.
+/// `kEverything` with its only occurrence of `from` replaced by `to`.
 std::string with(const std::string& from, const std::string& to) {
   return replace_once(kEverything, from, to);
 }
@@ -204,8 +204,8 @@ TEST(MultirotorScenarioTest, ARoundedQuaternionIsMadeAUnitOne) {
 }
 
 TEST(MultirotorScenarioTest, UnusualButValidValuesAreAllowed) {
-  // Rotors without lag; with no authority over yaw; that stand still at most; a flat rigid body; an
-  // attachment at the end of the rod's reach.
+  // Rotors without lag; all rotors with the same spin; a smallest speed equal to the largest one; a
+  // flat rigid body; an attachment almost a rod's length from Q.
   EXPECT_EQ(find_error(with("    lag_up_s: 0.0125\n", "    lag_up_s: 0\n")), "no error");
   EXPECT_EQ(find_error(with("      lag_down_s: 0.026\n", "      lag_down_s: 0\n")), "no error");
   EXPECT_EQ(find_error(with("spin: cw", "spin: ccw")), "no error");

@@ -1,4 +1,4 @@
-// Properties over many scenarios; the seeds are fixed, so that a failure comes back.
+// Properties over many scenarios, with fixed seeds: a failure is reproducible.
 #include <gtest/gtest.h>
 
 #include "tests/common/config/support.hpp"
@@ -25,7 +25,8 @@ TEST(RoundTripTest, ShippedScenariosWrittenAndReadAreEqual) {
   }
 }
 
-/// Changes `text` in one random place: a byte set, taken out or put in, a piece copied or cut off.
+/// Changes `text` at one random place: sets or removes bytes, inserts or copies a piece, or cuts
+/// the rest off.
 void mutate(std::string& text, std::mt19937_64& random) {
   static const std::vector<std::string> kPieces = {
       "- ", "? ", ": ", "{",  "}",  "[",  "]",   "&a ",   "*a",       "!!",          "|\n", "'",
@@ -72,7 +73,7 @@ TEST(MutationTest, SpoiltScenariosGiveAScenarioOrOneLineOfError) {
       ++refused;
     }
   }
-  // Both kinds occur, or this test looks at one half only.
+  // Both outcomes must occur.
   EXPECT_GT(accepted, 100);
   EXPECT_GT(refused, 1000);
 }

@@ -1,4 +1,4 @@
-// Keys that a file sets, and the defaults of others.
+// Keys that a file sets, and the defaults of the other keys.
 #include "common/config/scenario.hpp"
 
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-// The example of the project's design, section 7, as it stands there.
+// The example of the project's design, section 7, unchanged.
 constexpr const char* kDesignExample = R"(name: figure_eight
 vehicle: { quad_mass_kg: 1.5, load_mass_kg: 0.2, rod_length_m: 1.0, gravity_m_s2: 9.8 }
 plant:
@@ -322,7 +322,7 @@ TEST(ScenarioTest, AnEmptyListOfFaultsIsNoFault) {
   EXPECT_TRUE(parse_scenario(std::string(kMinimalScenario) + "faults: []", "file").faults.empty());
 }
 
-/// Sync of the minimal scenario with this section.
+/// Sync of the minimal scenario with the section `sync: section`.
 Sync parse_sync(const std::string& section) {
   return parse_scenario(std::string(kMinimalScenario) + "sync: " + section, "file").sync;
 }

@@ -1,5 +1,5 @@
-// The shipped scenarios hold what the project's design, section 7, says; the values are written out
-// here once more, so that neither can change alone.
+// The shipped scenarios have the values of the project's design, section 7. The values are repeated
+// here: a change of a scenario alone fails the test.
 #include <gtest/gtest.h>
 
 #include <set>

@@ -151,7 +151,7 @@ bool are_equal(const Fault& a, const Fault& b) {
          a.from_ns == b.from_ns && a.to_ns == b.to_ns;
 }
 
-/// Numbers of every size, most of them with all their digits in use.
+/// Random numbers of every size, most of them with all their digits in use.
 class Dice {
  public:
   explicit Dice(std::mt19937_64& random) : random_(random) {}
@@ -273,8 +273,8 @@ Stage make_random_stage(Dice& dice, std::int64_t period_ns) {
   return stage;
 }
 
-/// Numbers for the keys that `on` allows, some of them 0; standard deviations where not
-/// `is_signed`.
+/// Numbers for the keys that `on` allows, some of them 0. Without `is_signed` they are standard
+/// deviations.
 SampleOffset make_random_offset(Dice& dice, FaultChannel on, bool is_signed) {
   const auto number = [&] { return is_signed ? dice.any() : std::abs(dice.any()); };
   const auto angle = [&] { return is_signed ? dice.between(-1.57, 1.57) : dice.between(0, 1.57); };
@@ -290,7 +290,7 @@ SampleOffset make_random_offset(Dice& dice, FaultChannel on, bool is_signed) {
   return offset;
 }
 
-/// With ages of a period at most, for which every flight is long enough.
+/// Ages and delays are at most one control period: every flight is long enough for them.
 Sensing make_random_sensing(Dice& dice, std::int64_t period_ns) {
   const auto times = [&](std::int64_t longest) {
     return dice.toss() ? 0 : dice.nanoseconds(1, longest);
@@ -309,7 +309,7 @@ VehicleVariant make_random_variant(Dice& dice) {
   return variant;
 }
 
-/// Values that the file leaves out equal the plant's.
+/// Leaves out some keys of the model at random; their values then equal the plant's.
 void follow_at_random(Dice& dice, ControllerModel& model, const model::SlungLoadParameters& truth) {
   model.follows = {dice.toss(), dice.toss(), dice.toss()};
   if (model.follows.quad_mass) model.vehicle.quad_mass = truth.quad_mass;

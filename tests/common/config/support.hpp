@@ -38,7 +38,7 @@ std::vector<std::filesystem::path> list_yaml_files(const std::string& folder);
 
 std::string read_text(const std::filesystem::path& file);
 
-/// A short valid scenario, one key per line, to be spoilt by tests.
+/// A short valid scenario, one key per line, in which tests replace parts.
 extern const char* const kMinimalScenario;
 
 }  // namespace sls::config::test

@@ -22,7 +22,7 @@ TEST(RotorDragTest, IsNormalToTheControlForceAndBrakesWithoutWind) {
     const Eigen::Vector3d drag = calc_rotor_drag(force, v, air);
     ASSERT_NEAR(drag.dot(force), 0.0, 1e-14 * v.norm() * force.norm());  // a few roundings
     ASSERT_LE(drag.dot(v), 1e-15 * v.squaredNorm());
-    // Pythagoras: what is braked and what is not make up the velocity.
+    // Pythagoras: the components normal to the force and along it give the whole velocity.
     const double along = v.dot(force) / force.norm();
     ASSERT_NEAR(drag.squaredNorm() / (0.3 * 0.3) + along * along, v.squaredNorm(),
                 1e-13 * v.squaredNorm());
@@ -62,7 +62,7 @@ TEST(CommandedAttitudeTest, ReproducesTheForceThroughRotationMatrices) {
                                Eigen::AngleAxisd(attitude.pitch, Eigen::Vector3d::UnitY()) *
                                Eigen::AngleAxisd(attitude.roll, Eigen::Vector3d::UnitX()))
                                   .toRotationMatrix();
-    // asin loses half the digits where the roll is a right angle; the force less so.
+    // Near a roll of a right angle asin loses half the digits; the force loses fewer.
     ASSERT_LE((-force.norm() * R * Eigen::Vector3d::UnitZ() - force).norm(), 1e-13 * force.norm());
     ASSERT_EQ(attitude.yaw, 0.0);
   }

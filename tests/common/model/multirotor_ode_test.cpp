@@ -1,5 +1,5 @@
-// The oracle of the multirotor is itself judged by closed forms, conserved quantities and the
-// oracles of the point mass.
+// Compares the oracle of the multirotor with closed forms, conserved quantities and the oracles of
+// the point mass.
 #include "tests/oracle/multirotor_ode.hpp"
 
 #include <gtest/gtest.h>
@@ -41,7 +41,7 @@ Pendulum make_pendulum(PendulumModel model) {
   return pendulum;
 }
 
-/// Nothing symmetric and nothing centred: a full inertia, a sensor, canted rotors with loss and
+/// A vehicle without symmetry and off centre: full inertia, a sensor, canted rotors with loss and
 /// drag.
 Vehicle make_vehicle(PendulumModel model) {
   Vehicle vehicle;
@@ -106,8 +106,8 @@ Inputs draw_inputs(std::mt19937& generator) {
   return inputs;
 }
 
-/// Derivative of `quantity` along the equations of motion, by a central difference; its error is
-/// about 1e-10 of the third derivative, and as much by rounding.
+/// Derivative of `quantity` along the equations of motion, by a central difference. Its truncation
+/// is about 1e-10 of the third derivative, and its rounding error is as large.
 template <typename Quantity>
 auto differentiate(const Quantity& quantity, const State& state, const Rate& rate)
     -> decltype(quantity(state)) {
@@ -131,14 +131,14 @@ TEST(MultirotorOdeTest, AssemblesBodiesByTheParallelAxisTheorem) {
   // 0.1 + 2·0.2² + 2·(0.5² + 0.2²); 0.1 + 2·0.2² + 2·0.2²; 0.1 + 2·0.5².
   const Vector3d expected(0.76, 0.26, 0.6);
   EXPECT_LE((whole.inertia_B - Matrix3d(expected.asDiagonal())).norm(), 1e-15);
-  // Order and grouping play no part.
+  // Order and grouping make no difference.
   const Body again = combine({right, combine({left, cube})});
   EXPECT_LE((again.inertia_B - whole.inertia_B).norm(), 1e-15);
 }
 
 TEST(MultirotorOdeTest, ObeysTheLawsOfMomentumAndEnergyInAnyState) {
-  // Momenta and energy are written from places and velocities, forces from the wrench: neither
-  // knows the solution for the joint's force.
+  // Momenta and energy are functions of positions and velocities, and forces come from the wrench:
+  // neither uses the solution for the joint's force.
   std::mt19937 generator(1);
   for (const PendulumModel model :
        {PendulumModel::kNone, PendulumModel::kIdeal, PendulumModel::kRigid}) {
@@ -174,7 +174,8 @@ TEST(MultirotorOdeTest, ObeysTheLawsOfMomentumAndEnergyInAnyState) {
       ASSERT_LE((differentiate(angular, state, rate) - torque).norm(), 1e-6);
       ASSERT_NEAR(differentiate(energy, state, rate), calc_power(state, inputs, vehicle), 1e-6);
 
-      // The pendulum feels its weight and the joint; about its centre the joint's force alone.
+      // Weight and joint force act on the pendulum; only the joint force has a moment about its
+      // centre.
       if (model == PendulumModel::kNone) continue;
       const auto rod_momentum = [&](const State& at) {
         return Vector3d(pendulum.mass * calc_rod_point(at, vehicle, pendulum.centre).v_W);
@@ -202,7 +203,7 @@ TEST(MultirotorOdeTest, KeepsMomentumAndEnergyWithoutForces) {
     const Vector3d angular = calc_angular_momentum(state, vehicle);
     const double energy = calc_energy(state, vehicle), spin = state.w_WP_P.z();
     state = step(state, {}, vehicle, 5.0, 10000);
-    // 5 s of a tumble at 10 rad/s; the method's error at h = 0.5 ms is below 1e-9.
+    // Tumbles for 5 s at 10 rad/s; the method's error at h = 0.5 ms is below 1e-9.
     EXPECT_LE((calc_linear_momentum(state, vehicle) - linear).norm(), 1e-10);
     EXPECT_LE((calc_angular_momentum(state, vehicle) - angular).norm(), 1e-9);
     EXPECT_NEAR(calc_energy(state, vehicle), energy, 1e-9);
@@ -220,7 +221,7 @@ TEST(MultirotorOdeTest, GainsTheEnergyThatItsForcesPutIn) {
     State state = draw_state(generator, 4);
     Inputs inputs = draw_inputs(generator);
     const double start = calc_energy(state, vehicle), h = 1e-3;
-    double work = 0.0;  // by Simpson's rule, which is of the order of the method
+    double work = 0.0;  // by Simpson's rule, of the same order as the method
     for (int i = 0; i < 1000; ++i) {
       const State middle = step(state, inputs, vehicle, h / 2, 1);
       const State end = step(middle, inputs, vehicle, h / 2, 1);
@@ -230,7 +231,7 @@ TEST(MultirotorOdeTest, GainsTheEnergyThatItsForcesPutIn) {
       state = end;
     }
     EXPECT_GT(std::abs(work), 5.0);
-    // Simpson's rule is not split where the loss has its kinks.
+    // Large, because Simpson's rule also integrates across the kinks of the loss.
     EXPECT_NEAR(calc_energy(state, vehicle) - start, work, 1e-6);
   }
 }
@@ -313,8 +314,8 @@ TEST(MultirotorOdeTest, EqualsThePointMassWithItsJointInTheCentre) {
   parameters.load_mass = vehicle.pendulum.load_mass;
   parameters.rod_length = vehicle.pendulum.load_distance;
   parameters.gravity = vehicle.gravity;
-  // The same motion, whatever the attitude does. They differ off |n| = 1, so inside a step: 5e-11
-  // at 1 ms, 2e-13 at 0.25 ms, by the fourth power.
+  // The same motion for any attitude. The equations differ for |n| ≠ 1, as inside a step: 5e-11 at
+  // 1 ms, 2e-13 at 0.25 ms, with the fourth power of the step.
   EXPECT_LE(calc_difference(vehicle, parameters, 16), 1e-11);
 }
 
@@ -328,7 +329,7 @@ TEST(MultirotorOdeTest, EqualsTheRigidPendulumWithItsJointInTheCentre) {
   parameters.mass = mass.mass;
   parameters.centre = mass.centre;
   parameters.inertia = mass.inertia_across;
-  // One integrates a quaternion, the other a direction: 2e-10 at 1 ms, 9e-13 at 0.25 ms.
+  // One oracle integrates a quaternion, the other a direction: 2e-10 at 1 ms, 9e-13 at 0.25 ms.
   EXPECT_LE(calc_difference(vehicle, parameters, 16), 1e-11);
 }
 
@@ -353,7 +354,7 @@ TEST(MultirotorOdeTest, RigidTendsToIdealWithTheLoadsInertia) {
 }
 
 TEST(MultirotorOdeTest, TiltsUntilTheWeightsHangBelowTheForce) {
-  // A held force −(m + M) g e₃ at Q: at rest m c + M a lies in the vertical below Q, T = M g.
+  // Under a constant force −(m + M) g e₃ at Q: at rest m c + M a is vertically below Q, T = M g.
   for (const PendulumModel model : {PendulumModel::kIdeal, PendulumModel::kRigid}) {
     Vehicle vehicle = make_bare_vehicle(model, {0.03, 0.04, 0.06});
     vehicle.body.p_QC_B << -0.01, 0.0, 0.005;
@@ -373,8 +374,8 @@ TEST(MultirotorOdeTest, TiltsUntilTheWeightsHangBelowTheForce) {
 }
 
 TEST(MultirotorOdeTest, SwingsInBothModesAtTheirClosedFormFrequencies) {
-  // Body tilt θ and rod angle φ in the plane x, z under a held hover force at Q, with
-  // u = (a − c) θ̇ + d φ̇ the velocity of the pendulum's centre relative to the body's:
+  // Body tilt θ and rod angle φ in the plane x, z under a constant hover force at Q. The velocity
+  // of the pendulum's centre relative to the body's is u = (a − c) θ̇ + d φ̇, and
   // 2 E = J θ̇² + μ u² + I φ̇² + g (m c + M a) θ² + g M d φ².
   for (const PendulumModel model : {PendulumModel::kIdeal, PendulumModel::kRigid}) {
     Vehicle vehicle = make_bare_vehicle(model, {0.03, 0.04, 0.06});
@@ -396,7 +397,8 @@ TEST(MultirotorOdeTest, SwingsInBothModesAtTheirClosedFormFrequencies) {
       state.q_WB = AngleAxisd(shape(0), Vector3d::UnitY());
       state = with_rod(state, {std::sin(shape(1)), 0.0, std::cos(shape(1))});
       const double period = 2.0 * kPi / std::sqrt(modes.eigenvalues()(mode));
-      // Half a period: on the other side; a whole one: back. The amplitude costs 1e-10 of itself.
+      // On the other side after half a period, back after a whole one. The finite amplitude causes
+      // a relative error of 1e-10.
       for (const double sign : {-1.0, 1.0}) {
         state = step(state, inputs, vehicle, period / 2, 2000);
         EXPECT_NEAR(2.0 * state.q_WB.y(), sign * shape(0), 1e-13);
@@ -494,14 +496,15 @@ TEST(MultirotorOdeTest, RisesAndSinksAsTheThrustLossSays) {
   Inputs inputs;
   inputs.v_wind_W << 0.0, 0.0, 1.0;
   const double thrust = 20.0 / 1.6, k = thrust / 25.0, b = thrust - 9.81, u_0 = -3.0;
-  // u = −b/k + (u_0 + b/k) e^(kt) crosses zero at t_0; a step that does not meet it shows the kink.
+  // u = −b/k + (u_0 + b/k) e^(kt) crosses zero at t_0. A step that does not end there has a larger
+  // error, because of the kink.
   const double t_0 = std::log(b / k / (u_0 + b / k)) / k;
   ASSERT_GT(t_0, 0.1);
   ASSERT_LT(t_0, 2.9);
   state = step(state, inputs, vehicle, 3.0, 487);
   const double u = b / k * (1.0 - std::exp(-k * (3.0 - t_0)));
   EXPECT_NEAR(state.v_WQ.z() - 1.0, -u, 1e-11);
-  // Beyond v_loss nothing is left.
+  // Beyond v_loss there is no thrust.
   state.v_WQ << 0.0, 0.0, -30.0;
   EXPECT_EQ(calc_rotor_forces(state, inputs, vehicle)[0].thrust, 0.0);
   EXPECT_NEAR(calc_rate(state, inputs, vehicle).a_WQ.z(), 9.81, 1e-14);
@@ -543,7 +546,7 @@ TEST(MultirotorOdeTest, TurnsTheBodyAsItsRotorsSay) {
   rotor.p_QR_B << 0.2, 0.0, 0.0;
   EXPECT_LE((calc_rate(state, inputs, vehicle).w_WB_B_dot - Vector3d(0, 4.0 / 0.04, 0)).norm(),
             1e-12);
-  // Rolling moment −|w| k_r v_⊥, here of a hub that a yaw rate of 3 rad/s carries along y.
+  // Rolling moment −|w| k_r v_⊥, here of a hub that moves along y at a yaw rate of 3 rad/s.
   rotor.thrust_constant = 0.0;
   rotor.rolling_constant = 1e-5;
   state.w_WB_B << 0.0, 0.0, 3.0;
@@ -581,7 +584,7 @@ TEST(MultirotorOdeTest, HoversLevelWithAnOffsetJoint) {
     Inputs inputs;
     inputs.rotor_set_points = state.rotor_speeds;
     state = step(state, inputs, vehicle, 1.0, 200);
-    // Nothing holds the attitude: rounding grows with time, and stays below this.
+    // No controller holds the attitude: rounding errors grow, but stay below this.
     EXPECT_LE(state.p_WQ.norm() + state.v_WQ.norm() + state.w_WB_B.norm(), 1e-11);
   }
 }
@@ -589,7 +592,7 @@ TEST(MultirotorOdeTest, HoversLevelWithAnOffsetJoint) {
 // The method.
 
 TEST(MultirotorOdeTest, ConvergesWithTheFourthPowerOfTheStep) {
-  // With everything at work, also hubs whose axial velocity changes sign on the way.
+  // With all effects, also hubs whose axial velocity changes its sign during the flight.
   for (const PendulumModel model :
        {PendulumModel::kNone, PendulumModel::kIdeal, PendulumModel::kRigid}) {
     const Vehicle vehicle = make_vehicle(model);

@@ -1,4 +1,4 @@
-// The oracle other tests judge by is itself judged by closed forms.
+// Compares with closed forms the oracle that other tests use.
 #include "tests/oracle/slung_load_ode.hpp"
 
 #include <gtest/gtest.h>
@@ -35,9 +35,9 @@ TEST(SlungLoadOdeTest, ObeysNewtonsLawsAndTheRodConstraint) {
     state.n_dot_W = state.n_W.cross(draw_vector(generator, 3.0));
     const Eigen::Vector3d force = draw_vector(generator, 20.0);
     const Accelerations a = calc_accelerations(state, force, vehicle);
-    // The centre of mass knows nothing of the rod.
+    // The rod does not act on the centre of mass.
     ASSERT_LE((1.3 * a.a_WQ + 0.4 * a.a_WL - 1.7 * g - force).norm(), 1e-12);
-    // The load feels its weight and a pull along the rod.
+    // Only its weight and a force along the rod act on the load.
     ASSERT_LE((0.4 * (a.a_WL - g)).cross(state.n_W).norm(), 1e-12);
     // n · n̈ = −|ṅ|² keeps the rod's length.
     ASSERT_NEAR(state.n_W.dot(a.a_WL - a.a_WQ) / 0.7, -state.n_dot_W.squaredNorm(), 1e-11);
@@ -55,7 +55,7 @@ TEST(SlungLoadOdeTest, SwingsAboutHoverAtTheClosedFormFrequency) {
   const double h = 2.0 * 3.14159265358979323846 / omega / steps;
   const Eigen::Vector3d hover(0.0, 0.0, -1.7 * 9.81);
   for (int i = 0; i < steps; ++i) state = rk4_step(state, hover, h, vehicle);
-  // One period later it is back; the finite amplitude lengthens the period by 1e-8 / 16.
+  // After one period the rod is back; the finite amplitude lengthens the period by 1e-8 / 16.
   EXPECT_NEAR(state.n_W.x(), amplitude, 1e-11);
   EXPECT_NEAR(state.n_dot_W.x(), 0.0, 1e-10 * omega);
 }
@@ -72,7 +72,7 @@ TEST(SlungLoadOdeTest, CirclesAsAConicalPendulum) {
   state.v_WQ = -0.4 / 1.7 * 0.7 * state.n_dot_W;
   const Eigen::Vector3d hover(0.0, 0.0, -1.7 * 9.81);
   for (int i = 0; i < 1000; ++i) {
-    // Its height stays, so the vertical acceleration is zero at all times.
+    // The height is constant: the vertical acceleration is always zero.
     ASSERT_NEAR(calc_accelerations(state, hover, vehicle).a_WQ.z(), 0.0, 1e-8);
     state = rk4_step(state, hover, 1e-3, vehicle);
   }

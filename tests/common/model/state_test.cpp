@@ -37,7 +37,7 @@ TEST(StateTest, AnglesSurviveTheWayOverDirectionsEvenNearTheLevelRod) {
     const RodAngles rod{draw_angle(generator), draw_angle(generator), rate(generator),
                         rate(generator)};
     const RodAngles back = to_angles(to_direction(rod));
-    // A few roundings; a β̇ next to a level rod hides α̇ behind cos β.
+    // A few roundings; near a level rod β̇ / cos β multiplies the rounding of α̇.
     ASSERT_NEAR(back.alpha, rod.alpha, 8 * kEps);
     ASSERT_NEAR(back.beta, rod.beta, 8 * kEps);
     ASSERT_NEAR(back.beta_dot, rod.beta_dot,
@@ -56,7 +56,7 @@ TEST(StateTest, DirectionsSurviveTheWayOverAnglesOnTheWholeSphere) {
     direction.n_W = draw_vector(generator, 1.0).normalized();
     direction.n_dot_W = direction.n_W.cross(angular_velocity);
     const RodDirection back = to_direction(to_angles(direction));
-    // A few roundings; β is rounded next to π/2, so that cos β α̇ loses digits near a level rod.
+    // A few roundings; near a level rod β is rounded near π/2, and cos β α̇ loses digits.
     const double cos_b = std::hypot(direction.n_W.y(), direction.n_W.z());
     ASSERT_LE((back.n_W - direction.n_W).norm(), 8 * kEps);
     ASSERT_LE((back.n_dot_W - direction.n_dot_W).norm(),
@@ -96,8 +96,8 @@ TEST(StateTest, AnglesAgreeWithTheLiteralFormulasOfTheDesign) {
     const double alpha_dot = (-q_dot.y() + std::sin(alpha) * std::sin(beta) * beta_dot) /
                              (std::cos(alpha) * std::cos(beta));
     const RodAngles angles = to_angles(direction);
-    // The literal form loses digits by asin at ±1 and by its divisions: cos 1.5 = 0.07, whose
-    // fourth power is 2.5e-5.
+    // The formulas of the design lose digits in asin near ±1 and in divisions: cos 1.5 = 0.07, and
+    // its fourth power is 2.5e-5.
     const double speed = std::abs(rod.alpha_dot) + std::abs(rod.beta_dot);
     ASSERT_NEAR(angles.beta, beta, 1e-13);
     ASSERT_NEAR(angles.alpha, alpha, 1e-11);
@@ -128,7 +128,7 @@ TEST(StateTest, RatesAreTheTimeDerivativesOfTheAngles) {
                         omega * (b * std::cos(omega * t) - a * std::sin(omega * t))});
     };
     const RodAngles now = angles_at(0.0);
-    if (std::abs(now.beta) > 1.3 || std::abs(now.alpha) > 3.0) continue;  // α turns over at ±π
+    if (std::abs(now.beta) > 1.3 || std::abs(now.alpha) > 3.0) continue;  // α jumps at ±π
     ++judged;
     const double h = 1e-4;
     // Rounding eps / h = 2e-12; truncation h⁴ / 30 of a fifth derivative of up to 300 (ω / cos β)⁵.

@@ -1,1 +1,1 @@
-// Nothing: how it is linked is what matters.
+// Empty: only the way it is linked matters.

@@ -1,4 +1,4 @@
-/// Errors of the tests' libraries, inside any of their functions.
+/// Errors that the tests' libraries make in any of their functions.
 #pragma once
 
 #include <unistd.h>
@@ -10,7 +10,7 @@
 
 namespace sls::test {
 
-/// The value of `key` in the JSON that we write: `"key": VALUE`, without its quotes; else "".
+/// The value of `key` in our JSON, `"key": VALUE`, without its quotes; "" if there is none.
 inline std::string find_parameter(const std::string& json, const std::string& key) {
   const std::string mark = "\"" + key + "\": ";
   const auto at = json.find(mark);
@@ -21,7 +21,7 @@ inline std::string find_parameter(const std::string& json, const std::string& ke
   return value.substr(0, value.find_first_of(is_text ? "\"" : ",}"));
 }
 
-/// Fills the stack. Not a tail call, and not without end for the compiler.
+/// Overflows the stack. The compiler can neither use a tail call nor find the recursion endless.
 inline int overflow_stack(volatile int depth) {
   volatile char frame[4096];
   frame[0] = static_cast<char>(depth);

@@ -13,7 +13,7 @@ namespace {
 
 const std::string kFolder = SLS_LIBRARIES "/";
 
-/// The error of loading `file` and finding `symbol` in it; "no error".
+/// The error of loading `file` and finding `symbol` in it, or "no error".
 std::string find_error(const std::string& file, const char* symbol = "sls_controller") {
   try {
     SharedLibrary(file, "flight.yaml:7: controller.law").find(symbol);
@@ -23,7 +23,7 @@ std::string find_error(const std::string& file, const char* symbol = "sls_contro
   return "no error";
 }
 
-/// The message of what calling `work` throws; "no error".
+/// The message of the exception that the call of `work` throws, or "no error".
 template <class Work>
 std::string find_call_error(const Work& work) {
   try {

@@ -1,4 +1,4 @@
-// The conversion z down → z up by closed forms.
+// Compares the conversion from z down to z up with closed forms.
 #include "common/ros/frames.hpp"
 
 #include <gtest/gtest.h>

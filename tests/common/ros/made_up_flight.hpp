@@ -1,4 +1,4 @@
-/// Samples that no simulation made: every number differs, so that none can stand for another.
+/// Made-up samples, not from a simulation: all numbers differ, and a test finds swapped fields.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -12,8 +12,8 @@ namespace sls::test {
 inline const std::vector<std::uint32_t> kMadeUpVehicles = {0, 3};
 inline constexpr std::int64_t kMadeUpPeriodNs = 4'000'000;
 
-/// A turn on a circle of 2 m about (1, 2, −3) + 10 m per vehicle id, one in 6 s, tumbling; no
-/// reference at steps 500 to 509.
+/// A tumbling flight on a circle with radius 2 m, one turn in 6 s. The centre is (1, 2, −3) m, plus
+/// 10 m in x per vehicle id. No reference at steps 500 to 509.
 inline ros::VehicleSample make_sample(std::uint32_t vehicle_id, std::uint64_t step) {
   ros::VehicleSample sample;
   sample.vehicle_id = vehicle_id;

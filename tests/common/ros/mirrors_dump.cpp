@@ -1,6 +1,5 @@
-/// Mirrors a made-up flight of the vehicles 0 and 3 and prints, as lines of JSON, the channels,
-/// then each sample (frame W, z down) followed by its messages (CDR in hexadecimal). For tests with
-/// the libraries of others.
+/// Mirrors a made-up flight of the vehicles 0 and 3 for tests with other libraries. It prints lines
+/// of JSON: the channels, then each sample (frame W, z down) and its messages (CDR in hexadecimal).
 #include <Eigen/Geometry>
 #include <cmath>
 #include <iostream>

@@ -1,5 +1,5 @@
-// Mirrors decoded by @foxglove/rosmsg and @foxglove/rosmsg2-serialization, values compared with the samples.
-// mirrors_dump, in the build tree SLS_BUILD, prints them; @foxglove/… is in node_modules of tests/tools/view.
+// Decodes mirrors with @foxglove/rosmsg and @foxglove/rosmsg2-serialization, and compares the values with the samples.
+// mirrors_dump, in the build tree SLS_BUILD, prints both; @foxglove/… is in node_modules of tests/tools/view.
 import assert from "node:assert/strict";
 import { spawnSync } from "node:child_process";
 import { createRequire } from "node:module";
@@ -168,7 +168,7 @@ test("markers draw body, rod, load and trails, every 50 ms of simulation time", 
   const [cube, sphere, lineStrip] = [1, 2, 4];
   const found = of(/vehicle_3\/markers$/);
   const fromStart = found.map(({ sim_time_ns }) => sim_time_ns / 1e6);
-  assert.deepEqual(fromStart.slice(0, 5), [0, 52, 100, 152, 200]); // the steps of 4 ms that come first
+  assert.deepEqual(fromStart.slice(0, 5), [0, 52, 100, 152, 200]); // the first 4 ms step of each 50 ms
   assert.equal(found.length, 80);
   for (const message of found) {
     const { sample, value } = message;

@@ -1,5 +1,5 @@
-// Properties that other vendors' libraries cannot check. Values and bytes:
-// mirrors_judged_by_foxglove.mjs.
+// Properties that libraries of other vendors cannot check. mirrors_judged_by_foxglove.mjs checks
+// values and bytes.
 #include "common/ros/mirrors.hpp"
 
 #include <gtest/gtest.h>

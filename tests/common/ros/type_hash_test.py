@@ -1,4 +1,4 @@
-"""Type hashes of common/ros: computed again from the schemas, and compared with published ones.
+"""Computes the type hashes of common/ros from the schemas, and compares them with published ones.
 type_hash_test.py MIRRORS_DUMP"""
 
 import json
@@ -15,7 +15,7 @@ import type_hash  # noqa: E402
 DEFINITIONS = type_hash.parse_definitions((ROOT / "idl/ros/messages.msg").read_text(encoding="utf-8"))
 DUMP = None
 
-# From ROS 2's own generator, as others published it.
+# Hashes from the generator of ROS 2, published by other projects.
 PUBLISHED = {
     # github.com/ros2/rmw_zenoh, docs/design.md
     "std_msgs/msg/String": "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18",

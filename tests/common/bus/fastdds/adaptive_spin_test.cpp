@@ -1,5 +1,5 @@
-// How often AdaptiveSpin looks, counted; and the calls of the C library that use it, which this
-// program replaces as the server does.
+// Counts the looks of AdaptiveSpin, and tests the functions of the C library that use it. This
+// program replaces them as the server does.
 #include "common/bus/fastdds/adaptive_spin.hpp"
 
 #include <arpa/inet.h>
@@ -32,7 +32,7 @@ bool looks(AdaptiveSpin& spin, bool is_there) {
   return count > 0;
 }
 
-/// How many waits sleep at once before one looks again.
+/// Number of waits that sleep at once before a wait looks again.
 int count_skipped(AdaptiveSpin& spin, bool is_there) {
   int skipped = 0;
   while (!looks(spin, is_there)) ++skipped;
@@ -101,7 +101,7 @@ TEST(SpinningTest, NoThreadSpinsOnOneProcessor) {
   EXPECT_FALSE(is_spinning);
 }
 
-/// With spinning and without: what a caller sees is the same.
+/// With and without spinning the caller gets the same results.
 class ReceivingTest : public testing::TestWithParam<bool> {
  protected:
   void SetUp() override { is_spinning = GetParam(); }
@@ -158,7 +158,7 @@ TEST_P(ReceivingTest, DatagramsArriveWholeWithTheirSender) {
   std::atomic<int> received{0};
   std::thread sender([&] {
     for (int i = 0; i < 1000; ++i) {
-      while (i - received > 50) std::this_thread::yield();  // what the socket surely holds
+      while (i - received > 50) std::this_thread::yield();  // the socket's buffer holds 50
       sockets.send("datagram " + std::to_string(i));
     }
   });
@@ -206,7 +206,8 @@ TEST_P(ReceivingTest, AnInvalidSocketIsAnError) {
 TEST_P(ReceivingTest, APortsSemaphoreIsTakenOncePerPost) {
   void* memory = mmap(nullptr, 4096, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   ASSERT_NE(memory, MAP_FAILED);
-  auto* semaphore = reinterpret_cast<sem_t*>(static_cast<char*>(memory) + 64);  // amid, as a port's
+  auto* semaphore =
+      reinterpret_cast<sem_t*>(static_cast<char*>(memory) + 64);  // inside a mapping, as in a port
   ASSERT_EQ(sem_init(semaphore, 1, 0), 0);
   constexpr int kPosts = 1000;
   std::thread poster([&] {
@@ -219,7 +220,7 @@ TEST_P(ReceivingTest, APortsSemaphoreIsTakenOncePerPost) {
     if (sem_timedwait(semaphore, &deadline) == 0) {
       ++taken;
     } else {
-      ASSERT_EQ(errno, ETIMEDOUT);  // a reader looks at its port before its time
+      ASSERT_EQ(errno, ETIMEDOUT);  // a reader's wait returns early
     }
   }
   poster.join();

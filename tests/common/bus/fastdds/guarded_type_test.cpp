@@ -25,7 +25,7 @@ bool takes(const std::string& bytes) {
   return takes<Type>(bytes, message);
 }
 
-// Found by tests/fuzz: the generated code throws, through the middleware's thread.
+// Found by tests/fuzz: the generated code throws an exception in the thread of the middleware.
 TEST(GuardedTypeTest, ASampleOfWrongEncapsulationIsRefused) {
   const std::string bytes(200, 'x');
   EXPECT_FALSE((takes<StatesPubSubType, States>(bytes)));
@@ -46,7 +46,7 @@ TEST(GuardedTypeTest, EndlessLengthsAreRefused) {
   }
 }
 
-/// A sample of `size` bytes that claims `count` elements behind `before`.
+/// A sample of `size` bytes that gives a sequence length of `count` after `before`.
 std::string make_claim(const std::string& before, std::uint32_t count, std::size_t size) {
   std::string bytes = std::string("\0\1\0\0", 4) + before;
   for (int shift = 0; shift < 32; shift += 8) bytes += static_cast<char>(count >> shift & 0xff);
@@ -60,7 +60,7 @@ const std::string kBeforeCommands = std::string(16, '\0') +  // run_id, step
 const std::string kBeforeEntries(20, '\0');  // run_id, batch_index, is_last
 
 TEST(GuardedTypeTest, AnOversizedSampleIsRefusedBeforeItsElementsAreMade) {
-  constexpr std::uint32_t kCount = 1'000'000;  // each would be half a kilobyte
+  constexpr std::uint32_t kCount = 1'000'000;  // of half a kilobyte each
   constexpr std::size_t kSize = 2'000'000;
   EXPECT_FALSE((takes<StatesPubSubType, States>(make_claim(kBeforeVehicles, kCount, kSize))));
   EXPECT_FALSE((takes<CommandsPubSubType, Commands>(make_claim(kBeforeCommands, kCount, kSize))));
@@ -68,8 +68,8 @@ TEST(GuardedTypeTest, AnOversizedSampleIsRefusedBeforeItsElementsAreMade) {
       (takes<RecordBatchPubSubType, RecordBatch>(make_claim(kBeforeEntries, kCount, kSize))));
 }
 
-/// A sample no longer than the longest, but with as many claimed elements as it has bytes, is
-/// refused and keeps none of their memory.
+/// Expects that a sample of the greatest size with a far too large sequence length is refused, and
+/// that the message keeps no memory for the elements.
 template <class Type, class Message, class Elements>
 void expect_nothing_kept(const std::string& before, Elements elements) {
   const auto size = Type().m_typeSize;
@@ -89,13 +89,13 @@ TEST(GuardedTypeTest, ClaimedElementsThatDoNotFollowAreNotKept) {
                                                                      &Commands::vehicles);
   expect_nothing_kept<RecordBatchPubSubType, RecordBatch, Entries>(kBeforeEntries,
                                                                    &RecordBatch::entries);
-  // One entry that claims as many measured states.
+  // One entry with a far too large number of measured states.
   std::string entry = make_claim(kBeforeEntries, 1, 28).substr(4);
   entry += std::string(24 + 23 * 8 + 4, '\0');  // vehicle_id, step, kind; truth without signals
   expect_nothing_kept<RecordBatchPubSubType, RecordBatch, Entries>(entry, &RecordBatch::entries);
 }
 
-/// The reports to a reader on samples that it cannot take.
+/// Keeps the report on a sample that a reader cannot take.
 class Report : public MisfitReport {
  public:
   void report(const rtps::SerializedPayload_t&, const char* type,
@@ -123,7 +123,7 @@ TEST(GuardedTypeTest, ASampleWithAFieldMoreOrLessIsRefusedAndReported) {
   const MisfitScope scope(report);
   EXPECT_TRUE((takes<CommandsPubSubType>(bytes, received)));
   EXPECT_EQ(received, sent);
-  for (int padding = 1; padding <= 3; ++padding)  // other vendors fill up to a multiple of four
+  for (int padding = 1; padding <= 3; ++padding)  // other vendors pad to a multiple of four
     EXPECT_TRUE((takes<CommandsPubSubType>(bytes + std::string(padding, '\0'), received)));
   EXPECT_EQ(report.text, "");
 
@@ -145,7 +145,8 @@ TEST(GuardedTypeTest, ASampleWithAFieldMoreOrLessIsRefusedAndReported) {
   EXPECT_EQ(report.text.find("sls::Commands: expected plain CDR of that type, got: "), 0u);
 }
 
-/// As many bytes as the sample needs, but longer sequences than the contract allows.
+/// True if `message` is taken after it is serialised. The payload has the size that the message
+/// needs, also for sequences longer than the contract allows.
 template <class Type, class Message>
 bool is_taken_back(Message message) {
   rtps::SerializedPayload_t payload(

@@ -36,7 +36,7 @@ class NeighboursTest : public testing::Test {
     neighbours_.note_participant(make_peer(1), "foo", "10.0.0.2");
     neighbours_.add_own(own_);
   }
-  /// Problems of a writer of sls/command that differs from ours by one change.
+  /// Problems of a writer of sls/command that differs from ours by `change`.
   std::string judge(const std::function<void(EndpointFacts&)>& change) {
     EndpointFacts facts = make_endpoint("sls/command", "sls::Commands", true);
     change(facts);

@@ -1,4 +1,4 @@
-// common/bus/fastdds/shared_locks.cpp, which this program links.
+// Tests common/bus/fastdds/shared_locks.cpp, which this program links.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <pthread.h>
@@ -21,10 +21,10 @@
 namespace sls::bus {
 namespace {
 
-using Clock = std::chrono::system_clock;  // that of the deadlines
+using Clock = std::chrono::system_clock;  // the deadlines use it
 
-constexpr double kLong_s = 60;  // nobody has waited for as long on purpose
-constexpr double kSlow_s = 30;  // nobody needs as long, on any machine
+constexpr double kLong_s = 60;  // no correct wait lasts as long
+constexpr double kSlow_s = 30;  // an early return takes less, on any machine
 
 timespec after(double seconds) {
   timespec time{};
@@ -59,8 +59,8 @@ class SharedLocksTest : public testing::Test {
     ASSERT_EQ(sem_init(&port_->semaphore, 1, 0), 0);
   }
 
-  // The port stays: a lock once known as a reader's own would be mistaken for it at the same
-  // address.
+  // The port stays mapped: shared_locks.cpp remembers a reader's own locks by address, and a later
+  // lock at the same address would count as one of them.
   void TearDown() override {
     if (holder_ > 0) {
       kill(holder_, SIGKILL);
@@ -68,8 +68,8 @@ class SharedLocksTest : public testing::Test {
     }
   }
 
-  /// A process that takes the lock, sends itself the signal, and gives the lock back; with signal 0
-  /// it keeps the lock.
+  /// Starts a process that takes the lock, sends itself the signal, and releases the lock. With
+  /// signal 0 it keeps the lock.
   void start_holder(int signal) {
     holder_ = fork();
     ASSERT_GE(holder_, 0);
@@ -97,14 +97,14 @@ class SharedLocksTest : public testing::Test {
     return pthread_mutex_timedlock(&port_->mutex, &deadline);
   }
 
-  /// The error of a wait at the port, 0 if somebody woke it.
+  /// The error of a wait at the port, 0 if it was woken.
   int wait_within(double seconds) {
     const timespec deadline = after(seconds);
     return sem_timedwait(&port_->semaphore, &deadline) == 0 ? 0 : errno;
   }
 
-  /// A thread that waits for the lock, or, as a reader of the port, for messages and then for the
-  /// lock that it takes again. Made when it waits there.
+  /// A thread that waits for the lock. As a reader of the port it first waits for messages. The
+  /// constructor returns when the thread waits for the lock.
   class Waiting {
    public:
     explicit Waiting(SharedLocksTest& test, bool is_reader = false, double patience_s = kLong_s)
@@ -118,7 +118,7 @@ class SharedLocksTest : public testing::Test {
           }) {
       EXPECT_TRUE(test::wait_until([this] { return id_ != 0 && test::find_state(id_) == 'S'; }));
     }
-    /// The result of the lock.
+    /// The result of the wait for the lock.
     int finish() {
       thread_.join();
       return result_;
@@ -130,7 +130,8 @@ class SharedLocksTest : public testing::Test {
     std::thread thread_;
   };
 
-  /// The reader's deadline is over when the stopped holder of its lock gets the signal.
+  /// The stopped holder of the reader's lock gets the signal after the reader's deadline; expects
+  /// that the reader waits until then and takes the lock.
   void expect_reader_waits_until(int signal) {
     start_holder(SIGSTOP);
     Waiting reader(*this, true, 0.2);
@@ -167,7 +168,7 @@ TEST_F(SharedLocksTest, NoProcessWaitsForAStoppedOne) {
 TEST_F(SharedLocksTest, ASlowProcessIsWaitedFor) {
   ASSERT_EQ(pthread_mutex_lock(&port_->mutex), 0);
   Waiting waiting(*this);
-  std::this_thread::sleep_for(std::chrono::milliseconds(300));  // longer than for a stopped one
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));  // longer than for a stopped process
   ASSERT_EQ(pthread_mutex_unlock(&port_->mutex), 0);
   EXPECT_EQ(waiting.finish(), 0);
 }

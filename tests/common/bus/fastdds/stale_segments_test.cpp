@@ -66,7 +66,7 @@ TEST_F(StaleSegmentsTest, EverythingElseStays) {
 
 TEST_F(StaleSegmentsTest, WithoutStalePortsAnyParticipantIdWillDo) {
   EXPECT_EQ(choose_participant_id({8160, 2}, folder_.path()), -1);
-  make("fastrtps_port8160", std::chrono::seconds(60));  // of somebody who ended in order
+  make("fastrtps_port8160", std::chrono::seconds(60));  // of a process that ended normally
   EXPECT_EQ(choose_participant_id({8160, 2}, folder_.path()), -1);
   EXPECT_EQ(choose_participant_id({8160, 2}, folder_ / "no such folder"), -1);
 }
@@ -79,7 +79,7 @@ TEST_F(StaleSegmentsTest, PortsOfKilledAndOfLivingProcessesAreAvoided) {
   ASSERT_EQ(flock(descriptor, LOCK_EX | LOCK_NB), 0);
   EXPECT_EQ(choose_participant_id({8160, 2}, folder_.path()), 2);
   close(descriptor);
-  // Another domain is not concerned.
+  // The ports of another domain do not matter.
   EXPECT_EQ(choose_participant_id({8410, 2}, folder_.path()), -1);
 }
 
