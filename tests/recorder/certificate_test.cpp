@@ -1,4 +1,4 @@
-// The certificate, against a second implementation that knows only the README and the CSV files.
+// Compares the certificate with a second implementation from the README and the CSV files alone.
 #include "recorder/certificate.hpp"
 
 #include <gtest/gtest.h>
@@ -54,7 +54,7 @@ std::string to_certified_bytes(const std::string& topic, const std::string& kind
 }
 
 std::string calc_certificate(const fs::path& folder) {
-  // Of each vehicle, by step: state, command, reference.
+  // Bytes by vehicle, step and file: state, command, reference.
   std::map<unsigned long, std::map<unsigned long long, std::map<int, std::string>>> vehicles;
   const auto add_file = [&](const char* file, int place, const char* topic,
                             const std::string& kinds) {
@@ -114,11 +114,11 @@ TEST(CertificateTest, CoversEveryVehicle) {
 TEST(CertificateTest, LeavesOutFieldsThatDifferBetweenEqualFlights) {
   const std::string expected = certify({});
   EXPECT_EQ(certify([](RecordEntry& entry) {
-              entry.measured({PlantState()});  // the truth is what counts
+              entry.measured({PlantState()});  // only the true state is certified
               entry.client_name("other");
               entry.answered_step(3);
               entry.answer().compute_time_ns(7);
-              entry.truth().q_WB({0, 1, 0, 0});  // of a plant that says it has none
+              entry.truth().q_WB({0, 1, 0, 0});  // the parameters announce no attitude
               entry.truth().signals({1, 2, 3});
             }),
             expected);

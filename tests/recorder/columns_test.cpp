@@ -1,4 +1,4 @@
-// The table of columns against what it is shown as.
+// Compares the table of columns with the reference page and with the headers of the files.
 #include "recorder/columns.hpp"
 
 #include <gtest/gtest.h>

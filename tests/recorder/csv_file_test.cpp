@@ -36,7 +36,7 @@ std::uint64_t to_bits(double value) {
   return bits;
 }
 
-/// The descriptor of this process on which `file` is open; −1: none.
+/// The descriptor on which this process has `file` open; −1 if there is none.
 int find_descriptor(const fs::path& file) {
   for (int descriptor = 3; descriptor < 1024; ++descriptor) {
     std::error_code error;
@@ -79,14 +79,14 @@ TEST_F(CsvFileTest, FieldsAndRowsMayBeOfAnyLength) {
   CsvFile file(path_, "h");
   std::string expected = "h\n";
   for (const std::size_t length : {0, 1, 30, 31, 32, 33, 1000, 100'000}) {
-    const std::string text(length, '"');  // doubled when it is quoted
+    const std::string text(length, '"');  // each is doubled inside quotes
     const std::string quoted = length == 0 ? "" : '"' + text + text + '"';
     file.add(text);
     file.add(-2.2250738585072014e-308);
     file.add(text);
     file.end_row();
     expected += quoted + ",-2.2250738585072014e-308," + quoted + '\n';
-    file.end_row();  // of no field at all
+    file.end_row();  // a row without fields
     expected += '\n';
   }
   file.flush();
@@ -252,7 +252,7 @@ TEST_F(CsvFileTest, AFullDiskIsReportedWithTheFilesName) {
   CsvFile file(path_, "h");
   const int full = ::open("/dev/full", O_WRONLY | O_CLOEXEC);
   ASSERT_GE(full, 0);
-  ASSERT_GE(::dup2(full, find_descriptor(path_)), 0);  // from now on its disk is full
+  ASSERT_GE(::dup2(full, find_descriptor(path_)), 0);  // from here its disk is full
   ::close(full);
   file.add(1);
   file.end_row();
@@ -268,8 +268,8 @@ TEST_F(CsvFileTest, AFullDiskIsReportedWithTheFilesName) {
   }
 }
 
-/// Writes `rows` rows into a file that may have `limit` bytes; true if that gave an error. The row
-/// with number i holds i, a text with commas, quotes and line breaks, and i again.
+/// Writes `rows` rows into a file that may have at most `limit` bytes. @returns true on an error.
+/// Row i has i, a text with commas, quotes and line breaks, and i again.
 bool write_limited(CsvFile& file, rlim_t limit, int rows) {
   const test::FileSizeLimit in_force(limit);
   try {
@@ -303,7 +303,7 @@ TEST_F(CsvFileTest, ARowTheDiskTookInPartIsCutBack) {
       EXPECT_EQ(table.rows[i][2], std::to_string(i));
     }
     EXPECT_EQ(table.header.size(), limit < 18 ? 0u : 3u);
-    // As many rows as fit: the next one would not have.
+    // The file has all rows that fit: one more would exceed the limit.
     EXPECT_GT(bytes.size() + 21, limit);
   }
 }
@@ -311,7 +311,7 @@ TEST_F(CsvFileTest, ARowTheDiskTookInPartIsCutBack) {
 TEST_F(CsvFileTest, BytesOnTheDiskAreNotWrittenAgain) {
   CsvFile file(path_, "number,text,again");
   ASSERT_TRUE(write_limited(file, 60, 20));
-  file.flush();  // somebody made room
+  file.flush();  // the disk has room again
   const auto table = parse_csv(read_bytes(path_));
   ASSERT_EQ(table.rows.size(), 20u);
   for (std::size_t i = 0; i < 20; ++i) EXPECT_EQ(table.rows[i][0], std::to_string(i));

@@ -10,7 +10,7 @@ namespace sls::record::test {
 struct CsvTable {
   std::vector<std::string> header;
   std::vector<std::vector<std::string>> rows;
-  bool is_whole = true;  ///< it ended with a line break outside quotes, or was empty
+  bool is_whole = true;  ///< ends with a line break outside quotes, or is empty
 
   std::size_t find_column(const std::string& name) const {
     for (std::size_t i = 0; i < header.size(); ++i)

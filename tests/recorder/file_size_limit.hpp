@@ -6,7 +6,7 @@
 
 namespace sls::record::test {
 
-/// Lets the files of this process grow to `bytes` only. SIGXFSZ, which would end it, is ignored.
+/// Limits the files of this process to `bytes`. Ignores SIGXFSZ, which would end the process.
 class FileSizeLimit {
  public:
   explicit FileSizeLimit(rlim_t bytes) {

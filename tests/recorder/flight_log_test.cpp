@@ -26,7 +26,7 @@ Eigen::Vector3d calc_error(std::uint64_t step) {
          bus::to_vector(entry.answer().reference().position_m());
 }
 
-/// rms, largest and last error over the steps [from, to], each summed up on its own.
+/// rms, largest and last error over the steps [from, to], from a direct sum.
 struct Expected {
   Eigen::Vector3d rms, max;
   double at_end = 0;
@@ -106,7 +106,7 @@ TEST(ErrorStatisticsTest, AgreesWithADirectSum) {
   EXPECT_EQ(statistics.samples, static_cast<std::uint64_t>(kCount));
   EXPECT_EQ(statistics.max_abs, max);
   EXPECT_EQ(statistics.last, last);
-  for (int axis = 0; axis < 3; ++axis)  // two orders of the same thousand additions
+  for (int axis = 0; axis < 3; ++axis)  // the same thousand additions in another order
     EXPECT_NEAR(statistics.calc_rms()[axis], std::sqrt(sum[axis] / kCount),
                 1e-13 * statistics.calc_rms()[axis]);
 }
@@ -155,7 +155,7 @@ TEST_F(FlightLogTest, LapsThatWereNotRecordedAreNotListed) {
   expect_statistics(text, "lap 2 (part)", calc_expected(210, kLastStep));
 }
 
-// 0.7 / 0.1 is less than 7 in doubles: a lap boundary must not depend on that.
+// In doubles 0.7 / 0.1 is less than 7: a lap boundary must not depend on such a rounding.
 TEST(FlightLogLapTest, ALapBeginsAtItsFirstSampleWhateverItsPeriod) {
   std::string text = kScenarioText;
   const auto replace = [&](const std::string& from, const std::string& to) {
@@ -171,7 +171,7 @@ TEST(FlightLogLapTest, ALapBeginsAtItsFirstSampleWhateverItsPeriod) {
                       calc_expected(100 + 25 * lap, 124 + 25 * lap));
 }
 
-// The second of these steps is in lap 4,000,001: with all laps before it, 320 MB.
+// The second step is in lap 4,000,001: a list of all laps before it would take 320 MB.
 TEST(FlightLogLapTest, LapsOfANanosecondTakeNoMemory) {
   const auto count_resident_pages = [] {
     long total = 0, resident = 0;

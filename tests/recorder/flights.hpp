@@ -1,4 +1,4 @@
-/// Recordings of the synthetic run on disk, for tests of what reads them.
+/// Recordings of the synthetic run on disk, for tests of programs that read recordings.
 #pragma once
 
 #include <filesystem>
@@ -31,13 +31,13 @@ inline void add_steps(Recording& recording, std::uint64_t from, std::uint64_t to
   BatchFeeder(recording, from).add_steps(from, to);
 }
 
-/// The final status and the end of the recording.
+/// Adds the final status and finishes the recording.
 inline bool finish_flight(Recording& recording) {
   recording.add(make_status(PHASE_FINISHED, kLastStep, "mission finished"));
   return recording.finish("", 0);
 }
 
-/// The whole synthetic run, each entry changed by `disturb`.
+/// Records the whole synthetic run; `disturb` changes each entry.
 inline void record_flight(const std::filesystem::path& folder,
                           const std::function<void(RecordEntry&)>& disturb = {},
                           const Parameters& parameters = make_parameters()) {
@@ -51,7 +51,7 @@ inline void record_flight(const std::filesystem::path& folder,
   finish_flight(recording);
 }
 
-/// Runs until flushed, then is killed: nothing of its end is written.
+/// Records the steps until they are flushed, then stops as if killed: it writes no end.
 inline void record_until_killed(const Segment& segment, std::uint64_t from, std::uint64_t to) {
   Recording recording(segment, make_parameters());
   add_steps(recording, from, to);

@@ -1,4 +1,4 @@
-// The recorder over DDS: a made-up server and its client on one node, the recorder on another.
+// The recorder over DDS: a fake server and its client on one node, the recorder on another.
 #include "recorder/recorder.hpp"
 
 #include <gtest/gtest.h>
@@ -57,7 +57,7 @@ class FakeFlight {
     publish(PHASE_WAITING, 0);
   }
 
-  /// True as soon as the recorder has all that a server says of itself.
+  /// Waits until the recorder has acknowledged the server's parameters and status samples.
   bool is_heard() {
     return wait_until([this] {
       return !parameters_writer_.matched().empty() && !status_writer_.matched().empty() &&
@@ -93,7 +93,8 @@ class FakeFlight {
     write(status_writer_, make_status(phase, step));
     publish_time_ = std::chrono::steady_clock::now();
   }
-  /// As often as servers do: a late recorder must find all samples in the history.
+  /// Publishes a status at most every 400 ms, as servers do: the history must still hold all
+  /// samples for a late recorder.
   void keep_alive(RunPhase phase) {
     if (std::chrono::steady_clock::now() - publish_time_ >= 400ms) publish(phase, 0);
   }
@@ -143,11 +144,11 @@ class RecorderTest : public testing::Test {
       has_ended_ = true;
     });
   }
-  /// Waits for its end; how it ended is in `error_`.
+  /// Waits for the end of the recorder; `error_` then has its error.
   void join() {
     if (thread_.joinable()) thread_.join();
   }
-  /// The same while `waiting` says again and again that it waits, as servers do.
+  /// The same; meanwhile `waiting` repeats the status of a waiting server.
   void join_beside(FakeFlight& waiting) {
     EXPECT_TRUE(wait_until([&] {
       waiting.keep_alive(PHASE_WAITING);
@@ -196,7 +197,7 @@ TEST_F(RecorderTest, RecordsARunToItsEnd) {
             Json({{"controllers", {{kPilot, std::string(64, 'b')}}}}));
 }
 
-// Anybody can write batches of the run; only the server knows where it is.
+// Every participant can write batches of the run; only those of its server count.
 TEST_F(RecorderTest, BatchesOfOtherSendersDoNotCount) {
   FakeFlight flight(kRunId);
   start();
@@ -246,7 +247,7 @@ TEST_F(RecorderTest, ARunThatIsReplacedByAnotherServersEndsTheRecording) {
   EXPECT_EQ(read_manifest(out_).at("missing"), Json::array());
 }
 
-// An overloaded server falls silent, too. A server known before that is no successor.
+// A silent server may only be overloaded: a server known before the silence is no successor.
 TEST_F(RecorderTest, AServerThatWasThereBeforeTakesNoSilentOnesPlace) {
   auto flight = std::make_unique<FakeFlight>(kRunId, 3);
   start();
@@ -293,7 +294,7 @@ TEST_F(RecorderTest, AServerThatStaysAwayIsGivenUp) {
   EXPECT_EQ(read_manifest(out_).at("outcome"), "lost");
 }
 
-// The last samples may have to be sent again and again. Each missing step has 10 s.
+// The last samples may be resent several times. The recorder waits 10 s for each missing step.
 TEST_F(RecorderTest, WaitsAfterTheEndAsLongAsLateSamplesCome) {
   FakeFlight flight(kRunId);
   start();
@@ -314,9 +315,9 @@ TEST_F(RecorderTest, WaitsAfterTheEndAsLongAsLateSamplesCome) {
 TEST_F(RecorderTest, AKilledRecorderIsResumedInMidFlight) {
   record_until_killed(make_segment(out_), 0, 100);
   FakeFlight flight(kRunId);
-  flight.fly(0, 200);  // the histories hold what the next recorder needs
+  flight.fly(0, 200);  // the histories have the samples for the next recorder
   options_.unfinished = find_unfinished_recording(out_);
-  options_.vehicle = 3;  // which vehicle it is of, the recording tells
+  options_.vehicle = 3;  // ignored: the recording names its vehicle
   start();
   ASSERT_TRUE(flight.is_recorded_up_to(199));
   flight.fly(201, kLastStep);

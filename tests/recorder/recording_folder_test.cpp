@@ -23,7 +23,7 @@ constexpr const char* kFiles[] = {"state.csv",     "measured.csv",      "command
 
 class RecordingFolderTest : public testing::Test {
  protected:
-  /// The message of the ConfigError, or "no error". Every message is one line and names the place.
+  /// The message of the ConfigError, or "no error". Expects one line that names the place.
   std::string find_error(const fs::path& folder, bool force = false) {
     try {
       prepare_recording_folder(folder, force);
@@ -151,7 +151,7 @@ TEST_F(RecordingFolderTest, ForceRefusesSubfoldersWithAnythingElseAndRemovesNoth
   }
 }
 
-// --- what can be resumed -------------------------------------------------------------------------
+// --- recordings that can be resumed --------------------------------------------------------------
 
 class ResumeTest : public RecordingFolderTest {
  protected:
@@ -220,7 +220,7 @@ TEST_F(RecordingFolderTest, AFileInsteadOfAFolderIsRefused) {
   EXPECT_EQ(sls::test::read_bytes(out_), "a file");
 }
 
-// Root ignores permission bits, so these are places where nobody can make a folder.
+// Root ignores permission bits: in these places root cannot create a folder either.
 TEST_F(RecordingFolderTest, APlaceWhereNoFolderCanBeIsRefused) {
   write_bytes(out_, "a file");
   EXPECT_NE(find_error(out_ / "below"), "no error");
@@ -239,7 +239,8 @@ TEST_F(RecordingFolderTest, AFolderThatCannotBeWrittenIsRefused) {
   fs::permissions(root_.path(), fs::perms(0755));
   EXPECT_EXIT(
       {
-        if (::geteuid() == 0 && ::setuid(65534) != 0) ::_exit(1);  // nobody, in a child
+        if (::geteuid() == 0 && ::setuid(65534) != 0)
+          ::_exit(1);  // user nobody, in a child process
         std::cerr << find_error(out_) << std::endl << find_error(out_ / "below") << std::endl;
         ::_exit(2);
       },

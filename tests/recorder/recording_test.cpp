@@ -1,4 +1,4 @@
-// A whole run through Recording, judged by the files alone (design 9).
+// Records a whole run with Recording and checks the files alone (design 9).
 #include "recorder/recording.hpp"
 
 #include <gtest/gtest.h>
@@ -230,7 +230,7 @@ TEST_F(RecordingTest, TheManifestDescribesTheRunTheMachineAndEveryFile) {
   EXPECT_NE(manifest.at("machine").at("libc").get<std::string>().find("glibc"), std::string::npos);
   EXPECT_TRUE(manifest.at("machine").contains("processor"));
 
-  // Exactly the files that are there, each with the hash of its bytes; CSV files with their rows.
+  // The manifest lists all files and no others, each with its hash; CSV files also with their rows.
   std::set<std::string> there, listed;
   for (const auto& entry : fs::directory_iterator(folder_.path()))
     there.insert(entry.path().filename());
@@ -255,7 +255,7 @@ TEST(RecordingLibraryTest, LibrariesAreInTheManifest) {
   Recording recording(folder.path(), parameters);
   recording.note_library("pilot", std::string(64, 'b'));
   recording.note_library("standby", std::string(64, 'd'));
-  recording.note_library("pilot", std::string(64, 'e'));  // another one cannot have flown
+  recording.note_library("pilot", std::string(64, 'e'));  // ignored: the first hash stays
   recording.finish("interrupted", 0);
   EXPECT_EQ(Json::parse(read_bytes(folder / "manifest.json")).at("libraries"),
             Json({{"plant", std::string(64, 'a')},
@@ -330,7 +330,7 @@ TEST_F(RecordingTest, StatusRowsKeepReasonsWithCommasQuotesAndLineBreaksAndEvery
   EXPECT_EQ(table.header.back(), "problem");
 }
 
-// --- what is missing is said ---------------------------------------------------------------------
+// --- missing samples are reported ----------------------------------------------------------------
 
 TEST_F(RecordingTest, StepsLostInOneStretchAreListedAndMakeItIncomplete) {
   recording_->add(make_status(PHASE_RUNNING, 0));
@@ -592,7 +592,7 @@ TEST_F(RecordingTest, AResetRunIsKeptAndItsLastStepNeedsNoAnswer) {
   EXPECT_EQ(manifest.at("complete"), false);
 }
 
-// Unpublished steps are not in the recording.
+// The recording has only published steps.
 TEST_F(RecordingTest, AServerKilledBetweenTwoBatchesLeavesItsPublishedSteps) {
   recording_->add(make_status(PHASE_RUNNING, 0));
   add_steps(0, 99);
@@ -731,7 +731,7 @@ TEST_F(RecordingTest, AManifestThatDoesNotFitLeavesTheEarlierOneWhole) {
   EXPECT_FALSE(fs::exists(folder_ / "manifest.json.part"));
 }
 
-// --- samples that do not belong here -------------------------------------------------------------
+// --- samples of other runs, and damaged texts ----------------------------------------------------
 
 TEST_F(RecordingTest, SamplesOfOtherRunsAreIgnored) {
   recording_->add(make_status(PHASE_RUNNING, 0));
@@ -755,7 +755,7 @@ TEST_F(RecordingTest, SamplesOfOtherRunsAreIgnored) {
 TEST_F(RecordingTest, TextsCutWithinALetterDoNotCostTheManifest) {
   add_steps(0, 10);
   std::string reason(254, 'x');
-  reason += "\xc3\xa4";  // "ä": its second byte does not fit into the 255 of the wire
+  reason += "\xc3\xa4";  // "ä": its second byte exceeds the 255 bytes of the contract
   recording_->add(make_status(PHASE_FAILED, 10, reason));
   EXPECT_FALSE(finish());
   const Json manifest = read_manifest();

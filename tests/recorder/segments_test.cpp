@@ -1,4 +1,4 @@
-// A recorder that is killed and started again, judged by the files.
+// Checks the files of a recorder that is killed and started again.
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
@@ -29,7 +29,7 @@ class SegmentsTest : public testing::Test {
 
   Segment resume() { return make_next_segment(open_recording(out_)); }
 
-  /// The samples of a recorder that starts while the histories reach back to `oldest`.
+  /// Records `segment` to the end of the run; the histories begin at step `oldest`.
   bool record_to_the_end(const Segment& segment, std::uint64_t oldest) {
     Recording recording(segment, make_parameters());
     EXPECT_EQ(recording.last_complete_step(), static_cast<std::int64_t>(segment.first_step) - 1);
@@ -77,7 +77,7 @@ TEST_F(SegmentsTest, TheLastSegmentsFlightTextIsThatOfTheWholeFlight) {
   record_until_killed(make_segment(out_), 0, 150);
   const Segment segment = resume();
   record_to_the_end(segment, 0);
-  const auto cut = [](const std::string& text) {  // events apart
+  const auto cut = [](const std::string& text) {  // without the events
     return text.substr(0, text.find("Events"));
   };
   EXPECT_EQ(cut(read_bytes(segment.folder / "flight.txt")), cut(read_bytes(whole_ / "flight.txt")));
@@ -101,7 +101,7 @@ TEST_F(SegmentsTest, LapsOfAStageJoinedLateCountFromItsStartAfterARestartToo) {
 TEST_F(SegmentsTest, ItMayBeKilledOftenAndAnywhere) {
   record_until_killed(make_segment(out_), 0, 100);
   record_until_killed(resume(), 50, 160);
-  {  // killed before it had written its manifest
+  {  // killed before it wrote its manifest
     Recording recording(resume(), make_parameters());
     fs::remove(out_ / "segment-3/manifest.json");
   }
@@ -181,7 +181,7 @@ TEST_F(SegmentsTest, StatusSamplesOfAllSegmentsCountTogether) {
   const Parameters parameters = make_parameters();
   for (int i = 0; i < 10; ++i) statuses.push_back(make_status(PHASE_RUNNING, 0));
   statuses.push_back(make_status(PHASE_FINISHED, kLastStep, "mission finished"));
-  for (const std::size_t oldest : {3, 6}) {  // of the samples that the server still keeps
+  for (const std::size_t oldest : {3, 6}) {  // oldest sample that the server still has
     SCOPED_TRACE(oldest);
     fs::remove_all(out_);
     fs::create_directory(out_);
@@ -219,7 +219,7 @@ TEST_F(SegmentsTest, UnansweredStepsAreWholeWithoutAReference) {
   }
   {
     Recording recording(out_, make_parameters());
-    add(recording, 0, 116);  // to the step 52 none can come late
+    add(recording, 0, 116);  // steps before 52 can get no late answer any more
     while (fs::file_size(out_ / "command.csv") < 200) recording.flush_if_due();
   }
   const Segment segment = resume();

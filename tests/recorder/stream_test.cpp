@@ -34,7 +34,7 @@ class StreamTest : public testing::Test {
     for (; from <= to; ++from) steps.push_back(from);
     return steps;
   }
-  /// Batch k has step k.
+  /// Adds batch `step`, which has only step `step`.
   void add(std::uint64_t step, bool is_last = false) {
     stream_.add(make_batch(step, {make_entry(step)}, is_last));
   }
@@ -78,7 +78,7 @@ TEST_F(StreamTest, BatchesMayComeInAnyOrderAndTwice) {
     rows_.clear();
     Stream stream = make_stream(parameters_);
     std::vector<std::uint64_t> order = list(0, 59);
-    std::shuffle(order.begin() + 1, order.end(), random);  // the first one tells the beginning
+    std::shuffle(order.begin() + 1, order.end(), random);  // the first batch sets the beginning
     for (const std::uint64_t index : order)
       for (int copy = 0; copy < 2; ++copy)
         stream.add(
@@ -116,7 +116,7 @@ TEST_F(StreamTest, SixtyFourBatchesWaitForAMissingOneAndNoMore) {
 
 TEST_F(StreamTest, AMissingBatchIsGivenUpAfterTenSecondsWithoutAnyInOrder) {
   add(0);
-  stream_.pass_time(100s);  // nothing waits
+  stream_.pass_time(100s);  // no batch waits yet
   add(3);
   stream_.pass_time(9s);
   add(1);

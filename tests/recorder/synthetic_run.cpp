@@ -12,11 +12,11 @@ namespace {
 
 constexpr std::int64_t kPeriod = 4'000'000;
 
-std::uint64_t status_samples = 0;  // of the run in work
+std::uint64_t status_samples = 0;  // of the current run
 
 double to_time(std::uint64_t step) { return static_cast<double>(step) * 0.004; }
 
-/// Three different functions of time, of the size `scale`.
+/// A vector of three different functions of time with amplitude `scale`.
 Eigen::Vector3d make_vector(std::uint64_t step, double phase, double scale) {
   const double t = to_time(step);
   return scale *
@@ -27,7 +27,7 @@ Eigen::Vector3d make_force(std::uint64_t step) {
   return make_vector(step, 0.5, 3.0) - Eigen::Vector3d(0, 0, 16.66);
 }
 
-/// As the answer to `step` leaves it.
+/// The controller's state after the answer to `step`.
 ControllerState make_controller(std::uint64_t step) {
   ControllerState message;
   message.stage_index(step < 100 ? 0 : 1);
@@ -136,7 +136,7 @@ RecordEntry make_unanswered_entry(std::uint64_t step, AnswerKind kind) {
   entry.kind(kind);
   entry.answered_step(step - 1);
   entry.answer().f_Q_W_n(bus::to_array(make_force(step + 1000)));
-  entry.answer().reference().position_m({1, 2, 3});  // of another step: not to be recorded
+  entry.answer().reference().position_m({1, 2, 3});  // of another step: must not be recorded
   return entry;
 }
 

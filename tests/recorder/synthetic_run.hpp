@@ -1,4 +1,4 @@
-/// A run as it comes over the wire, made up: every number is distinct, the physics is not.
+/// The messages of a made-up run: every number is distinct, but the motion is not physical.
 #pragma once
 
 #include <cstdint>
@@ -16,21 +16,21 @@ inline constexpr const char* kPilot = "pilot";
 /// Scenario text with a 0.4 s hold, then two laps of 0.4 s of a figure eight; period 4 ms.
 extern const char* const kScenarioText;
 
-/// A run begins with them: its status samples count from 0.
+/// Begins a run: its status samples count from 0.
 Parameters make_parameters();
 void set_vehicles(Parameters& parameters, const std::vector<std::uint32_t>& ids);
-/// Those of a plant with attitude, and of two signals.
+/// Parameters of a plant with attitude and two signals.
 Parameters make_signal_parameters();
 
-/// Step `step`, answered by the pilot.
+/// Step `step`, answered by `kPilot`.
 RecordEntry make_entry(std::uint64_t step, std::uint32_t vehicle_id = 0);
 
-/// Step `step` that went by with another force than the pilot's.
+/// Step `step` with another force than the answer of `kPilot`.
 RecordEntry make_unanswered_entry(std::uint64_t step, AnswerKind kind);
-/// The pilot's answer to it, which came late.
+/// The late answer of `kPilot` to step `step`.
 RecordEntry make_late_entry(std::uint64_t step, std::uint32_t vehicle_id = 0);
 
-/// The last step of a run that failed or was reset: nobody's answer is in force.
+/// The last step of a run that failed or was reset: it has no answer.
 RecordEntry make_bare_entry(std::uint64_t step);
 
 RecordBatch make_batch(std::uint64_t batch_index, const std::vector<RecordEntry>& entries,

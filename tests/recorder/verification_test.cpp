@@ -1,4 +1,4 @@
-// Differences are planted in the files themselves, as somebody else would.
+// These tests change the recorded files themselves.
 #include "recorder/verification.hpp"
 
 #include <gtest/gtest.h>
@@ -31,7 +31,7 @@ class VerificationTest : public testing::Test {
     }
   }
 
-  /// Changes the field in `line` (the header is 1) and `column` (from 0) of a file of B.
+  /// Applies `to` to the field in `line` (the header is 1) and `column` (from 0) of a file of B.
   void change(const std::string& file, std::size_t line, std::size_t column,
               const std::function<std::string(const std::string&)>& to) {
     std::string bytes = read_bytes(b_ / file);
@@ -203,7 +203,7 @@ TEST_F(VerificationTest, RowsOutOfOrderAreDamage) {
       << find_problems(b_);
 }
 
-// Which vehicle's rows come first, and by how much, is chance.
+// The order of rows of different vehicles may differ between recordings.
 TEST_F(VerificationTest, AFleetIsComparedInStepOrderForAnyOrderOfRows) {
   constexpr std::uint32_t kIds[] = {7, 0, 3};
   const auto record = [&](const fs::path& folder, std::uint64_t steps_apart) {
@@ -258,7 +258,8 @@ TEST_F(VerificationTest, SignalsAreComparedByTheirNames) {
   EXPECT_EQ(find_difference().find("state.csv, vehicle 0, step 50, att_w"), 0u);
   change("state.csv", 1, 29, [](auto&) { return "force_n"; });
   EXPECT_EQ(find_difference(), "state.csv: other columns in A than in B");
-  for (const char* header : {"att_w", "att_w,att_x,att_y,rate_z_rad_s"}) {  // signals, then
+  for (const char* header :
+       {"att_w", "att_w,att_x,att_y,rate_z_rad_s"}) {  // these columns count as signals
     std::string bytes = read_bytes(b_ / "state.csv");
     write_bytes(b_ / "state.csv",
                 bytes.replace(0, bytes.find('\n'), make_header<StateRow>() + "," + header));
@@ -281,7 +282,7 @@ TEST_F(VerificationTest, MeasurementsAreCheckedAgainstTheManifestAndNotCertified
   EXPECT_NE(find_problems(b_).find("measured.csv: 300 rows, manifest: 301"), std::string::npos);
 }
 
-// Three steps that a recorder of contract 1 wrote; of its files the fuzzer's corpus has four.
+// Three steps from a recorder of contract 1; the corpus of the fuzzer has four of its files.
 TEST_F(VerificationTest, ARecordingOfAnEarlierVersionKeepsItsCertificate) {
   std::istringstream corpus(read_bytes(SLS_SOURCE_DIR "/tests/fuzz/corpus/recording/three_steps"));
   for (const char* name : {"manifest.json", "state.csv", "command.csv", "reference.csv"}) {
@@ -312,7 +313,7 @@ TEST_F(VerificationTest, AFolderThatIsNoRecordingIsRefused) {
   }
 }
 
-// The manifest of a recording to verify may come from anywhere.
+// The manifest of a recording may come from an untrusted source.
 TEST_F(VerificationTest, AManifestNamesNoFilesElsewhereAndNoThousandsOfVehicles) {
   const std::string manifest = read_bytes(b_ / "manifest.json");
   for (const char* name : {"/dev/zero", "../a/state.csv", "..", "", "folder/"}) {
@@ -328,7 +329,7 @@ TEST_F(VerificationTest, AManifestNamesNoFilesElsewhereAndNoThousandsOfVehicles)
   EXPECT_THROW(open_recording(b_), config::ConfigError);
 }
 
-// Found by the fuzzer: a number is converted to an integer only if it is one.
+// Found by the fuzzer: only a whole number that fits is converted to an integer.
 TEST_F(VerificationTest, AManifestsNumbersAreWholeNumbersThatFit) {
   struct Case {
     std::string from, to, expected;

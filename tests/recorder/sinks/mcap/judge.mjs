@@ -2,8 +2,9 @@
 // the recording's CSV files:
 //     node judge.mjs FOLDER [--file FILE] [--cut] [--joined FOLDER2…]
 // --cut: the recorder was killed; the file has no summary, and the last steps may be missing.
-// --joined: segments that follow; FILE holds the steps of all.
-// Prints what it has read as JSON. Exit code 1: something differs, said on stderr.
+// --joined: the later segments; FILE has the steps of all.
+// Prints the numbers of messages and records as JSON. On a difference it prints the difference on
+// stderr and exits with code 1.
 import { createRequire } from "node:module";
 import { existsSync, readFileSync } from "node:fs";
 import { dirname, join } from "node:path";
@@ -31,7 +32,7 @@ function expectEqual(found, expected, text) {
 
 // --- CSV ---------------------------------------------------------------------------------------
 
-/** Rows by "vehicle step", in the file's order; a last line without its end is none. */
+/** Rows by "vehicle step", in the file's order; a last line without a line break does not count. */
 function readCsv(path) {
   const rows = new Map();
   if (!existsSync(path)) return rows;
@@ -51,7 +52,7 @@ const number = (text) => (text in kWords ? kWords[text] : Number(text));
 const vector = (row, names) => names.map((name) => number(row[name]));
 const xyz = (row, before, after) => vector(row, ["x", "y", "z"].map((axis) => before + axis + after));
 
-// --- what a message must hold ------------------------------------------------------------------
+// --- expected content of a message -------------------------------------------------------------
 
 const kStateColumns = 22;
 const none = (count) => Array(count).fill(NaN);
@@ -59,7 +60,7 @@ const none = (count) => Array(count).fill(NaN);
 function expectNumbers(found, expected, text) {
   expectEqual(found.length, expected.length, `${text}: length`);
   expected.forEach((value, i) => {
-    // Object.is tells −0 from 0; of NaN there is one.
+    // Object.is distinguishes −0 from 0, and NaN equals NaN.
     expect(Object.is(found[i], value), `${text}[${i}]: expected ${value}, got ${found[i]}`);
   });
 }
@@ -120,7 +121,7 @@ function makeDecoder(schema) {
   return (data) => reader.readMessage(data);
 }
 
-/** Takes the messages of either reader: decodes each, compares records with the CSV files. */
+/** Decodes the messages of either reader, and compares records with the CSV files. */
 class Messages {
   constructor(files, periodNs) {
     this.files = files;
@@ -190,7 +191,7 @@ async function readIndexed(bytes, messages) {
   return { attachments, chunks: reader.chunkIndexes.length };
 }
 
-/** In pieces, as from a network: up to the end of what is there. */
+/** Reads in pieces, as from a network, to the end of the bytes. */
 function readStream(bytes, messages) {
   const reader = new McapStreamReader({ decompressHandlers, validateCrcs: true });
   const schemas = new Map(), channels = new Map();
@@ -210,7 +211,7 @@ function readStream(bytes, messages) {
   return { done: reader.done(), counts };
 }
 
-// --- the whole ---------------------------------------------------------------------------------
+// --- whole recordings --------------------------------------------------------------------------
 
 function readFiles(folders) {
   const names = ["state.csv", "measured.csv", "command.csv", "reference.csv"];
@@ -225,7 +226,7 @@ function readFiles(folders) {
   });
 }
 
-/** A vehicle is mirrored at its first step in each 10 ms: with its position, y and z turned. */
+/** A vehicle is mirrored at its first step in each 10 ms; its position has y and z negated. */
 function expectMirrors(messages, vehicleIds, isCut) {
   for (const id of vehicleIds) {
     let slot = -1n;
@@ -238,7 +239,7 @@ function expectMirrors(messages, vehicleIds, isCut) {
     });
     const name = `/sls/vehicle_${id}/quadrotor/odometry`;
     const found = messages.mirrored.get(name) ?? [];
-    // Where the file is cut a chunk may end between a step and its mirrors.
+    // In a cut file the last chunk may end between a step and its mirrors.
     expect(found.length === steps.length || (isCut && found.length + 1 === steps.length), `${name}: count`);
     found.forEach(({ time, value }, i) => {
       const row = messages.files[0].get(steps[i]);

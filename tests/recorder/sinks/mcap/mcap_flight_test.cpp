@@ -1,5 +1,5 @@
-// sls.mcap of real flights, read by the libraries of MCAP and Foxglove: judge.mjs compares every
-// message with the CSV files. Without node and its packages the judged tests are skipped.
+// Reads sls.mcap of real flights with the libraries of MCAP and Foxglove: judge.mjs compares every
+// message with the CSV files. Without node and its packages these tests are skipped.
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -31,7 +31,7 @@ class McapFlightTest : public testing::Test {
     return file;
   }
 
-  /// Flies it in one process; returns the recording.
+  /// Flies the scenario `file` in one process. @returns the recording.
   fs::path fly(const std::string& file, const std::string& name = "in-process") {
     const fs::path out = folder_ / name;
     Process flight({program("closed_loop"), "--scenario", file, "--out", out});
@@ -47,7 +47,7 @@ class McapFlightTest : public testing::Test {
     return out;
   }
 
-  /// Expects that the judge finds nothing wrong; what it has read.
+  /// Expects that judge.mjs finds no difference. @returns its output.
   nlohmann::json judge(const fs::path& recording, const std::vector<std::string>& options = {}) {
     std::vector<std::string> command = {
         "node", SLS_SOURCE_DIR "/tests/recorder/sinks/mcap/judge.mjs", recording};

@@ -1,4 +1,5 @@
-// sls.mcap beside the CSV files, byte for byte; what is in it judges mcap_flight_test.
+// Compares sls.mcap with the converted CSV files, byte for byte. mcap_flight_test checks its
+// content.
 #include <gtest/gtest.h>
 
 #include <limits>
@@ -25,7 +26,7 @@ using sls::test::holds;
 using sls::test::read_bytes;
 using sls::test::write_bytes;
 
-/// The same run with another scenario text, which asks for the format.
+/// The same run with a scenario text that requests the format.
 Parameters ask_for_mcap(Parameters parameters) {
   const std::string text = kScenarioText + std::string("record: { format: [csv, mcap] }\n");
   parameters.scenario_text(text);
@@ -41,7 +42,7 @@ class McapSinkTest : public testing::Test {
     convert::write_mcap(open_recording(recording), converted_, force);
     return read_bytes(converted_);
   }
-  /// Of the recording in `out_`.
+  /// For the recording in `out_`.
   void expect_conversion_gives_the_bytes_of_the_sink() {
     const std::string bytes = read_bytes(out_ / "sls.mcap");
     EXPECT_GT(bytes.size(), 20'000u);
@@ -62,7 +63,7 @@ class McapSinkTest : public testing::Test {
 };
 
 TEST(Crc32Test, IsThatOfThePublishedCheckValueHoweverTheBytesCome) {
-  EXPECT_EQ(calc_crc32("123456789"), 0xcbf43926u);  // of CRC-32/ISO-HDLC
+  EXPECT_EQ(calc_crc32("123456789"), 0xcbf43926u);  // check value of CRC-32/ISO-HDLC
   EXPECT_EQ(calc_crc32(""), 0u);
   Crc32 crc;
   for (const char* piece : {"1", "2345678", "", "9"}) crc.add(piece);
@@ -205,7 +206,7 @@ TEST_F(McapSinkTest, AFileWhoseDiskIsFullKeepsItsWholeChunksAndTheErrorNamesIt) 
   }
   EXPECT_TRUE(holds(error, path.string() + ": cannot write")) << error;
   EXPECT_TRUE(holds(error, "File too large")) << error;
-  // Two chunks of eleven messages, which noise does not let shrink.
+  // Two chunks of eleven messages of noise, which do not compress.
   EXPECT_GT(fs::file_size(path), 2'200'000u);
   EXPECT_LT(fs::file_size(path), 2'300'000u);
 }

@@ -1,4 +1,4 @@
-// Channels, messages and times of a flight that publisher.cpp plays, seen by Foxglove's own client.
+// Channels, messages and times of the flight of publisher.cpp, read with Foxglove's own client.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { WebSocket } from "ws";
@@ -75,7 +75,7 @@ function judgeLatched(decoded) {
   assert.equal(reply.reason, "played");
 }
 
-/** REP-103: z up and y left there, z down and y right in sls/record. */
+/** Mirrors follow REP-103, with z up and y left; sls/record has z down and y right. */
 function judgeMirrors(decoded) {
   const odometry = decoded.get("/sls/vehicle_7/quadrotor/odometry");
   const { sec, nanosec } = odometry.value.header.stamp;
@@ -114,7 +114,7 @@ test("time comes from the simulation and a reset is a new session", async (t) =>
   assert.ok(client.unadvertised.includes("/sls/vehicle_7/load/pose"));
   assert.ok(!client.unadvertised.includes("/sls/vehicle_0/load/pose"));
   assert.equal(client.channels.get("sls/state").id, stateId);
-  // The subscription goes on, and time begins anew.
+  // The subscription stays active, and time starts again.
   const count = client.messages.get("sls/state").length;
   const next = await client.message("sls/state", count + 5);
   assert.equal(makeReader(client.channels.get("sls/state"))(next.data).run_id, 0x1112n);
@@ -146,7 +146,7 @@ test("a client that does not read loses messages and is told so", async (t) => {
   await slow.message("sls/state");
   slow.ws.pause();
   publisher.say("rest");
-  // More than its queue, and what the system's sockets hold, can take.
+  // More than the client's queue and the socket buffers can hold.
   for (let i = 0; i < 4; ++i) {
     publisher.say("burst 10000 1");
     await waitFor("the end of the burst", () => publisher.lines.shift());
@@ -177,7 +177,7 @@ test("bad messages are answered in words and end with 1008", async (t) => {
   for (let i = 0; i < 40; ++i) client.ws.send("nonsense");
   await waitFor("the end", () => client.closed);
   assert.equal(client.closed.code, 1008);
-  // Others are served as before.
+  // Other clients are still served.
   const other = new Client(t, view.url);
   await other.subscribe("sls/state");
   await other.message("sls/state");
@@ -189,7 +189,7 @@ test("a page of another origin looks only where it is allowed, and never operate
   const refused = new WebSocket(view.url, ["foxglove.sdk.v1"], { origin });
   const error = await new Promise((resolve) => refused.once("error", resolve));
   assert.match(error.message, /403/);
-  // Desktop programs made with Electron say file://.
+  // Desktop programs made with Electron send the origin file://.
   const open = await startView(t, publisher.domain, [
     "--allow-origin", origin, "--allow-origin", "file://"]);
   for (const page of [origin, "file://"]) {

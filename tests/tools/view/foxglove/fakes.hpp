@@ -1,4 +1,4 @@
-/// A connection and a flight that tests play themselves, and samples as Fast CDR writes them.
+/// A fake connection and a fake flight for tests, and samples as Fast CDR writes them.
 #pragma once
 
 #include <fastcdr/Cdr.h>

@@ -1,4 +1,4 @@
-// Services on a real flight: pause, steps, resume, as an operator in Foxglove sends them.
+// Pauses, steps and resumes a real flight with the services, as an operator in Foxglove does.
 import assert from "node:assert/strict";
 import { mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
@@ -21,7 +21,7 @@ async function startFlight(t, domain) {
   ];
 }
 
-/** The status as it is now, of `phase`. */
+/** Waits until the last status has the phase `wanted`; returns that status. */
 async function phase(client, wanted) {
   const read = makeReader(client.channels.get("sls/status"));
   return await waitFor(`phase ${wanted}`, () => {
@@ -50,7 +50,7 @@ test("an operator pauses, steps and resumes a flight", async (t) => {
   const stepped = await client.call("/sls/step", { steps: 3 });
   assert.equal(stepped.step, paused.step + 3);
   const read = makeReader(client.channels.get("sls/state"));
-  // The state of the step in work may not be published before the run goes on.
+  // The state of the current step may not be published before the run continues.
   const state = await waitFor("the state after three steps", () => {
     const last = read(client.messages.get("sls/state").at(-1).data);
     return Number(last.step) >= stepped.step - 1 ? last : undefined;

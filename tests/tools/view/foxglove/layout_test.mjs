@@ -1,4 +1,4 @@
-// Everything that config/foxglove/sls.json shows is there: topics, fields, services and frames.
+// All topics, fields, services and frames that config/foxglove/sls.json shows exist.
 import assert from "node:assert/strict";
 import { parseIDL } from "@foxglove/omgidl-parser";
 import { parse as parseRos } from "@foxglove/rosmsg";
@@ -36,7 +36,7 @@ function readSchema(channel) {
   return new Map(definitions.map((one) => [one.name ?? channel.schemaName, one.definitions]));
 }
 
-/** Throws where a field is not there, or is indexed without being an array, or the reverse. */
+/** Throws if a field does not exist, is indexed but no array, or is an array but not indexed. */
 function checkFields(channel, { names, fields }) {
   const schema = readSchema(channel);
   let type = schema.get(channel.schemaName) ?? schema.get(channel.schemaName.replace("/msg/", "/"));

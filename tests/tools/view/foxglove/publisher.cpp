@@ -1,7 +1,7 @@
-// Plays a server, a controller and a recorder of a domain that it holds for the test, with numbers
-// that foxglove_test.mjs knows by formulas. stdout: {"domain":N}; then one JSON line for each
-// command on stdin: "reset", "fleet VEHICLES", "pace MS", "rest", "burst RATE SECONDS". Ends with
-// stdin.
+// Reserves a domain for the test and publishes on it as a server, a controller and a recorder. The
+// numbers follow formulas that channels_test.mjs repeats. stdout: {"domain":N}; then one JSON line
+// for each command on stdin: "reset", "fleet VEHICLES", "pace MS", "rest", "burst RATE SECONDS".
+// Ends at the end of stdin.
 //   view_foxglove_publisher hold|publish
 #include <poll.h>
 #include <unistd.h>
@@ -99,7 +99,7 @@ class Publisher {
     return states;
   }
 
-  /// Publishes `rate` states a second for `seconds` on their own, each with its number as step.
+  /// Publishes only states, `rate` a second for `seconds`; the step of each is its number.
   std::uint64_t burst(double rate, double seconds) {
     States states = make_states();
     const auto begin = Clock::now();
@@ -166,7 +166,7 @@ class Publisher {
     return command;
   }
 
-  /// As many as fit into one sample of the loop.
+  /// The first vehicles, as many as fit into one sample of the loop.
   std::vector<std::uint32_t> list_first_vehicles() const {
     return {
         vehicles_.begin(),
@@ -174,7 +174,7 @@ class Publisher {
                                 SAMPLE_VEHICLES, static_cast<std::ptrdiff_t>(vehicles_.size()))};
   }
 
-  /// In batches of about 12,000 bytes, as a server writes them.
+  /// Writes batches of about 12,000 bytes, as a server does.
   void write_record() {
     constexpr std::size_t kEntries = 16;
     RecordBatch batch;
@@ -215,7 +215,7 @@ class Publisher {
   std::uint64_t samples_ = 0;
 };
 
-/// The next line of stdin within `limit`; "" where there is none, nothing at its end.
+/// The next line of stdin; "" if there is none within `limit`, nothing at the end of stdin.
 std::optional<std::string> read_line(std::chrono::milliseconds limit) {
   static std::string pending;
   for (;;) {

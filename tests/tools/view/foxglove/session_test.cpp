@@ -1,4 +1,4 @@
-// Sessions on a connection and a flight that the test plays.
+// Sessions on a fake connection and a fake flight.
 #include "tools/view/foxglove/session.hpp"
 
 #include <gtest/gtest.h>
@@ -51,7 +51,7 @@ class FoxgloveSessionTest : public ::testing::Test {
   void call(std::uint32_t service, const std::string& data, const std::string& encoding = "json") {
     session->receive(MessageKind::kBinary, test::to_service_call(service, 77, encoding, data));
   }
-  /// The id of the channel of `topic`; fails where it is not advertised.
+  /// The id of the channel of `topic`; fails the test if it is not advertised.
   std::uint32_t find_channel(const std::string& topic) const {
     for (const Json& advertise : connection.find("advertise"))
       for (const Json& channel : advertise.at("channels"))
@@ -70,7 +70,7 @@ class FoxgloveSessionTest : public ::testing::Test {
     return 0;
   }
 
-  test::FakeFlight* flight = new test::FakeFlight;  // the hub's
+  test::FakeFlight* flight = new test::FakeFlight;  // owned by `hub`
   std::chrono::steady_clock::time_point now{1h};
   std::shared_ptr<Hub> hub =
       std::make_shared<Hub>(std::unique_ptr<FlightSource>(flight), [this] { return now; });
@@ -96,7 +96,7 @@ TEST_F(FoxgloveSessionTest, AClientIsGreetedWithServerAndEveryTopic) {
                        "sls/record sls::RecordBatch", "sls/participant sls::Participant",
                        "sls/parameters sls::Parameters", "sls/status sls::SimStatus",
                        "sls/control sls::SimControl", "sls/control_reply sls::SimControlReply"}));
-  EXPECT_GT(channels.size(), 8U);  // the mirrors
+  EXPECT_GT(channels.size(), 8U);  // also the mirrors
   EXPECT_TRUE(connection.find("advertiseServices").empty());
 }
 
@@ -217,7 +217,7 @@ TEST_F(FoxgloveSessionTest, ANewRunIsANewSessionAndVanishedVehiclesAreUnadvertis
     EXPECT_TRUE(holds(topic, "vehicle_1")) << topic;
     EXPECT_EQ(come.count(sls::test::replace_once(topic, "vehicle_1", "vehicle_2")), 1U) << topic;
   }
-  // The client ends subscriptions that may have ended already: none of that is its mistake.
+  // The client may end subscriptions that have ended already: that is no error of the client.
   Json ids = Json::array();
   for (std::uint32_t i = 0; i < id; ++i) ids.push_back(i);
   send_json(Json{{"op", "unsubscribe"}, {"subscriptionIds", ids}});

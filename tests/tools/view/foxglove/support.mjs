@@ -1,4 +1,4 @@
-// Shared by the tests of the Foxglove protocol: processes, and a client by Foxglove's own code.
+// Shared by the tests of the Foxglove protocol: processes, and a client made with Foxglove's own code.
 import { parseIDL } from "@foxglove/omgidl-parser";
 import { MessageReader as IdlReader } from "@foxglove/omgidl-serialization";
 import { parse as parseRos } from "@foxglove/rosmsg";
@@ -14,9 +14,9 @@ import { WebSocket } from "ws";
 export const { FoxgloveClient } = wsProtocol;
 export const root = path.resolve(path.dirname(fileURLToPath(import.meta.url)), "../../../..");
 const build = process.env.SLS_BUILD ?? path.join(root, "build");
-const kPatience = 60_000; // says only when to call it a failure, on a busy machine too
+const kPatience = 60_000; // long: a test must not fail on a busy machine
 
-/** Waits for `find` to give something else than undefined or false. */
+/** Waits until `find` returns another value than undefined or false. */
 export async function waitFor(what, find, patience = kPatience) {
   const deadline = Date.now() + patience;
   for (;;) {
@@ -27,7 +27,7 @@ export async function waitFor(what, find, patience = kPatience) {
   }
 }
 
-/** A program that is ended with the test; `lines` and `errors` collect what it says. */
+/** A program that ends with the test; `lines` and `errors` collect its stdout and stderr. */
 export class Program {
   static all = [];
   /** The last output of the running programs, for the message of a failure. */
@@ -49,7 +49,7 @@ export class Program {
   say(line) {
     this.process.stdin.write(`${line}\n`);
   }
-  /** The first match of `pattern` in what it said on stderr. */
+  /** The first match of `pattern` in its stderr. */
   async find(pattern) {
     return await waitFor(`${pattern} in:\n${this.errors.join("\n")}`, () => {
       for (const line of this.errors) {
@@ -70,7 +70,7 @@ export class Program {
   }
 }
 
-/** Holds a DDS domain for the test, and with "publish" plays a flight on it: publisher.cpp. */
+/** Starts publisher.cpp: it reserves a DDS domain and, with `mode` "publish", publishes a flight on it. */
 export async function startPublisher(test, mode) {
   const publisher = new Program(test, "tests/view_foxglove_publisher", [mode]);
   const line = await waitFor("the publisher's domain", () => publisher.lines.shift());
@@ -88,7 +88,7 @@ export async function startView(test, domain, args = []) {
   return view;
 }
 
-/** A client that keeps what it is told. */
+/** A client that keeps all messages. */
 export class Client {
   constructor(test, url, protocol = "foxglove.websocket.v1", options = {}) {
     this.serverInfos = [];
@@ -130,7 +130,7 @@ export class Client {
     const topic = this.topics.get(subscriptionId);
     if (topic === undefined) throw new Error(`message of subscription ${subscriptionId}`);
     if (!this.messages.has(topic)) this.messages.set(topic, []);
-    // The library's view is into a buffer of its own for each message.
+    // No copy: the library gives each message its own buffer.
     this.messages.get(topic).push({ timestamp, data });
   }
   async channel(topic) {
@@ -145,7 +145,7 @@ export class Client {
   async message(topic, number = 0) {
     return await waitFor(`message ${number} of ${topic}`, () => this.messages.get(topic)?.[number]);
   }
-  /** Calls a service, gives its response or throws with its failure. */
+  /** Calls a service; returns its response, or throws its failure. */
   async call(name, request) {
     const service = await waitFor(`service ${name}`, () => this.services.get(name));
     const callId = (this.calls = (this.calls ?? 0) + 1);

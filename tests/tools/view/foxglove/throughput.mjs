@@ -1,5 +1,5 @@
-// Messages per second from a DDS publisher through sls_view to one client: prints one JSON line.
-// Exit code 1 if any was lost.
+// Measures messages per second from a DDS publisher through sls_view to one client; prints one JSON
+// line. Exit code 1 if a message was lost.
 //   SLS_BUILD=build node tests/tools/view/foxglove/throughput.mjs [RATE [SECONDS]]
 //   SLS_BUILD=build node tests/tools/view/foxglove/throughput.mjs fleet [VEHICLES [SECONDS]]
 // The second subscribes to all mirrors of a fleet that flies 200 steps a second.
@@ -15,7 +15,7 @@ const kHeader = 13, kStep = kHeader + 4 + 8; // opcode, subscription, time; enca
 const ends = [];
 const owner = { after: (end) => ends.unshift(end) };
 
-/** Counts data messages of `channels`; `judge` is given each. */
+/** Counts data messages of `channels`, and calls `judge` with each. */
 function count(view, channels, judge) {
   const counted = { received: 0, dropped: 0, bytes: 0, first: 0, last: 0 };
   const ws = new WebSocket(view.url, ["foxglove.sdk.v1"], { perMessageDeflate: false });
@@ -42,7 +42,7 @@ function describe({ received, dropped, bytes, first, last }) {
 
 const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
-/** Samples whose steps are 0, 1, 2, … */
+/** Measures with samples whose steps are 0, 1, 2, … */
 async function measureSamples(publisher, view, client) {
   let expected = 0n, gaps = 0;
   const counted = count(view, [await client.channel("sls/state")], (data) => {

@@ -1,4 +1,4 @@
-/// The page's binary messages, read back after tools/view/README.md and by nothing of the viewer.
+/// Reads the page's binary messages according to tools/view/README.md, without code of the viewer.
 #pragma once
 
 #include <cstdint>

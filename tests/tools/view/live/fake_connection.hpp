@@ -1,4 +1,4 @@
-/// A connection that keeps what it is given.
+/// A fake connection that keeps all messages.
 #pragma once
 
 #include <map>
@@ -42,7 +42,7 @@ class FakeConnection : public view::Connection {
 
   std::vector<nlohmann::json> texts;
   std::vector<std::string> binary;
-  std::string obstacle;  ///< to operating
+  std::string obstacle;  ///< reason why the client may not operate; "" if it may
   std::size_t queued = 0;
   int close_code = 0;
 };

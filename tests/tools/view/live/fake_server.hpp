@@ -1,4 +1,4 @@
-/// A server that the test plays: says what it is told to, on a node of its own.
+/// A fake server on its own node: publishes the messages that the test gives it.
 #pragma once
 
 #include <fstream>
@@ -14,7 +14,7 @@ namespace sls::test {
 
 inline const std::string kQosFile = SLS_SOURCE_DIR "/config/qos/default.xml";
 
-/// Of a run of a shipped scenario.
+/// Parameters of a run of a shipped scenario.
 inline Parameters make_parameters(std::uint64_t run_id,
                                   const std::vector<std::uint32_t>& vehicles = {0},
                                   const std::string& scenario = "figure_eight") {
@@ -35,7 +35,7 @@ inline Parameters make_parameters(std::uint64_t run_id,
   return parameters;
 }
 
-/// One answered step whose numbers say which they are: quad x is the step, load z the vehicle.
+/// One answered step. Quad x is the step, and load z is the vehicle's id.
 inline RecordEntry make_entry(std::uint32_t vehicle_id, std::uint64_t step,
                               AnswerKind kind = ANSWER_ACCEPTED) {
   RecordEntry entry;

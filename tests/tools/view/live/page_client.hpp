@@ -1,4 +1,4 @@
-/// A page of a real sls_view, played by the test: opens its WebSocket, keeps what comes.
+/// A fake page for a real sls_view: opens a WebSocket to it and keeps the messages.
 #pragma once
 
 #include <atomic>
@@ -18,7 +18,7 @@
 
 namespace sls::test {
 
-/// The port that a viewer says it listens on.
+/// The port on which a viewer listens, from its output.
 inline std::uint16_t wait_for_port(const Process& viewer) {
   std::smatch found;
   std::string output;
@@ -41,7 +41,7 @@ class PageClient {
 
   void say(const nlohmann::json& message) { client_.send(to_bytes({kText, message.dump()})); }
 
-  /// Asks for `action` and waits for the reply.
+  /// Requests `action` and waits for the reply.
   nlohmann::json control(const std::string& action, std::uint64_t steps = 0) {
     const int id = ++last_id_;
     say({{"op", "control"}, {"id", id}, {"action", action}, {"steps", steps}});
@@ -53,7 +53,7 @@ class PageClient {
     return reply;
   }
 
-  /// The last message with this `op`; null: none came.
+  /// The last message with this `op`; null if there is none.
   nlohmann::json last(const std::string& op) const {
     const std::lock_guard lock(mutex_);
     const auto found = texts_.find(op);
@@ -68,7 +68,7 @@ class PageClient {
     const std::lock_guard lock(mutex_);
     return poses_;
   }
-  /// Of all that came, those of the run that came last.
+  /// All received rows of the last run, by time.
   std::map<double, std::vector<float>> rows() const {
     const std::lock_guard lock(mutex_);
     return rows_;
@@ -113,7 +113,7 @@ class PageClient {
 
   RawClient client_;
   int last_id_ = 0;
-  mutable std::mutex mutex_;  // over what follows
+  mutable std::mutex mutex_;  // guards the members below
   std::map<std::string, std::vector<nlohmann::json>> texts_;
   std::optional<Poses> poses_;
   std::map<double, std::vector<float>> rows_;

@@ -20,7 +20,7 @@ using test::make_parameters;
 
 constexpr std::uint64_t kRun = 0x1234'5678'9abc'def0;
 
-/// As Fast CDR serialises it, with the header of an encapsulation.
+/// `batch` as Fast CDR serialises it, with the header of the encapsulation.
 Sample make_sample(const RecordBatch& batch, std::int64_t written_ns = 0) {
   std::vector<std::uint8_t> bytes(200'000);
   eprosima::fastcdr::FastBuffer buffer(reinterpret_cast<char*>(bytes.data()), bytes.size());
@@ -94,7 +94,7 @@ TEST(PageFramesTest, RowsAreAllStepsSinceTheLastMessageInOrder) {
   parameters.signals().emplace_back().name("a");
   frames.start_run(parameters);
   frames.add(make_sample(make_batch(kRun, 5, 9)));
-  frames.add(make_sample(make_batch(kRun, 0, 4)));  // they may overtake each other
+  frames.add(make_sample(make_batch(kRun, 0, 4)));  // batches may arrive out of order
   ASSERT_TRUE(frames.decode());
   auto rows = test::read_rows(frames.make_rows(0));
   EXPECT_EQ(rows.run_id, kRun);

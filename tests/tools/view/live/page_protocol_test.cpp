@@ -1,4 +1,4 @@
-// Feed, operator and sessions of pages, against a server that the test plays.
+// Feed, operator and sessions of pages, with a fake server.
 #include "tools/view/live/page_protocol.hpp"
 
 #include <gtest/gtest.h>
@@ -57,7 +57,7 @@ class PageOfAViewerTest : public PageProtocolTest {
   PageOfAViewerTest() : PageProtocolTest(false) {}
 };
 
-// --- what a page sees ----------------------------------------------------------------------------
+// --- messages to a page --------------------------------------------------------------------------
 
 TEST_F(PageProtocolTest, APageGetsAGreetingAndTheMissingParticipants) {
   Page page(protocol);
@@ -137,7 +137,7 @@ TEST_F(PageProtocolTest, AfterAResetTheNextRunIsShown) {
   EXPECT_EQ(page.connection.find("run").at(1).at("run").at("run_id"), "0000000000000002");
   ASSERT_TRUE(wait_for_record(server));
   page.connection.binary.clear();
-  server.write(make_batch(1, 8, 9));  // what is left of the first
+  server.write(make_batch(1, 8, 9));  // late steps of the first run
   server.write(make_batch(2, 0, 3));
   ASSERT_TRUE(wait_until([&] { return page.has_binary(1); }));
   for (const std::string& message : page.connection.binary) {

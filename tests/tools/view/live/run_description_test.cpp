@@ -42,7 +42,7 @@ TEST(RunDescriptionTest, DescribesTheMission) {
   }
 }
 
-/// x = a_x sin s, y = a_y sin 2s: so y a_x² = 2 a_y x √(a_x² − x²) apart from the sign.
+/// x = a_x sin s and y = a_y sin 2s give |y| a_x² = 2 a_y |x| √(a_x² − x²).
 TEST(RunDescriptionTest, ThePathLiesOnTheFigureEight) {
   const json path = describe(make_parameters(1)).at("path_m");
   ASSERT_GT(path.size(), 100u);

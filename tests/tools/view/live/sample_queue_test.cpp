@@ -10,7 +10,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// `written_ns` tells one from another.
+/// A sample with `number` as its `written_ns`.
 Sample make_sample(TopicId topic, std::int64_t number, std::size_t bytes = 10) {
   return {topic, std::make_shared<const std::vector<std::uint8_t>>(bytes), number, {}};
 }

@@ -1,4 +1,4 @@
-/// The server's thread, played by the test's own: runs what is posted while the test waits.
+/// Replaces the server's thread: the test's thread runs the posted tasks while it waits.
 #pragma once
 
 #include <functional>

@@ -101,12 +101,12 @@ TEST(ViewSystemTest, AKilledServerIsSilentAndTheNextRunIsShown) {
   EXPECT_EQ(client->wait(), 0) << client->output();
 }
 
-/// A stopped viewer is the worst one: it takes nothing from its sockets.
+/// A stopped viewer is the worst case: it reads nothing from its sockets.
 TEST(ViewSystemTest, ThreeViewersOfWhichOneIsStoppedChangeNothing) {
   Flight alone(scenario("figure_eight"));
   alone.expect_success();
 
-  const OwnDomain other;  // so that the flight below does not begin before its viewers
+  const OwnDomain other;  // the flight below must not begin before its viewers
   const TemporaryFolder folder;
   std::vector<std::unique_ptr<Process>> viewers;
   std::vector<std::unique_ptr<PageClient>> pages;

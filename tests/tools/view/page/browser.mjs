@@ -1,4 +1,4 @@
-// A headless Chromium with a folder of its own, and what tests ask of a page.
+// A headless Chromium with its own profile folder, and functions for tests of a page.
 import { mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -34,7 +34,7 @@ export async function startBrowser({ flags = [], width = 1366, height = 768, sch
   };
 }
 
-/** Waits until `check` gives something true. @throws Error after `limit` ms, with the last value. */
+/** Waits until `check` returns a true value. @throws Error after `limit` ms, with the last value. */
 export async function waitFor(what, check, limit = 30_000) {
   const end = performance.now() + limit;
   let last;

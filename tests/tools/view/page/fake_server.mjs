@@ -1,5 +1,5 @@
-// Serves subprotocol sls.view.1 with a flight from closed forms: each load flies a figure eight about its own place,
-// the quadrotor one rod length above it. startFakeServer({ page, vehicles, … }) → { url, port, control, stop, … }.
+// Serves the subprotocol sls.view.1 with a flight from closed forms: each load flies a figure eight about its own
+// centre, and its quadrotor is one rod length away. startFakeServer({ page, vehicles, … }) → { url, port, control, … }.
 import { createServer } from "node:http";
 import { readFileSync } from "node:fs";
 import { WebSocketServer } from "ws";
@@ -15,7 +15,7 @@ const kColumns = [
   "ref_x_m", "ref_y_m", "ref_z_m", "rotor_0_rad_s", "rotor_1_rad_s", "rotor_2_rad_s", "rotor_3_rad_s",
 ];
 
-/** Load of vehicle `id` at time t, frame W: vehicles stand 5 m apart in rows of ten. */
+/** Load of vehicle `id` at time t, frame W: the centres are 5 m apart, in rows of ten. */
 export function calcLoad(id, t, vehicles) {
   const w = (2 * Math.PI) / 16;
   const row = vehicles > 1 ? Math.floor(id / 10) - 4.5 : 0;
@@ -92,8 +92,8 @@ function packRows(vehicles, id, first, last) {
 }
 
 /**
- * `page`: the HTML file to serve. `hasRun` false: no flight. `token`: operating needs it. `control` holds the messages
- * that ask for something; `requests` the paths that were asked for over HTTP.
+ * `page`: the HTML file to serve. `hasRun` false: no flight. `token`: needed to operate. The result's `control` has the
+ * messages from pages, and `requests` the paths of HTTP requests.
  */
 export async function startFakeServer({ page, vehicles = 1, hasRun = true, token = null, readOnly = false, port = 0 }) {
   const html = readFileSync(page);
@@ -172,7 +172,7 @@ export async function startFakeServer({ page, vehicles = 1, hasRun = true, token
   await new Promise((resolve) => http.listen(port, "127.0.0.1", resolve));
   return {
     url: `http://127.0.0.1:${http.address().port}/`, port: http.address().port, control, requests, state,
-    /** Stands still at `step`, for pictures that can be computed. */
+    /** Stops the flight at `step`: a test can compute the picture. */
     freeze(step) {
       advance();
       for (const socket of sockets.clients) socket.send(packPoses(vehicles, step));

@@ -1,4 +1,4 @@
-// A flight of the real programs, in real time, with sls_view beside it.
+// A flight of the real programs in real time, with sls_view.
 import { spawn, spawnSync } from "node:child_process";
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
@@ -8,12 +8,12 @@ import { waitFor } from "./browser.mjs";
 
 const source = join(dirname(fileURLToPath(import.meta.url)), "../../../..");
 
-/** `build`: the build tree. `scenario`: name in config/scenarios. Gives { url, ctl, stop }. */
+/** `build`: the build tree. `scenario`: name in config/scenarios. Returns { url, status, stop, … }. */
 export async function startFlight({ build, domain, scenario = "figure_eight", vehicles = 1, port = 0 }) {
   const folder = mkdtempSync(join(tmpdir(), "sls-view-flight-"));
   const file = join(folder, "scenario.yaml");
   let text = readFileSync(join(source, "config/scenarios", `${scenario}.yaml`), "utf8");
-  text = text.replace("for_s: 32", "for_s: 3600"); // longer than any test or measurement, however slow the machine
+  text = text.replace("for_s: 32", "for_s: 3600"); // longer than any test or measurement, also on a slow machine
   if (vehicles > 1) text = text.replace(/^vehicles: .*$/m, `vehicles: ${vehicles}`);
   writeFileSync(file, text);
   const programs = [];
@@ -43,7 +43,7 @@ export async function startFlight({ build, domain, scenario = "figure_eight", ve
   start("recorder", "--out", join(folder, "recording"));
   return {
     url,
-    /** The run's status by sim_ctl, independent of the page. */
+    /** The run's status from sim_ctl, independent of the page. */
     status() {
       const result = spawnSync(join(build, "bin/sim_ctl"), ["--domain", String(domain), "status", "--json"], { encoding: "utf8" });
       if (result.status !== 0) throw new Error(`sim_ctl: ${result.stderr}`);

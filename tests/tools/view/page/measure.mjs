@@ -43,14 +43,14 @@ async function measureLatency() {
   }
 }
 
-/** 100 vehicles that fly by closed forms: how many frames a second Chromium draws by software. */
+/** Frames a second that Chromium draws in software, with 100 vehicles that fly by closed forms. */
 async function measureFleet() {
   const server = await startFakeServer({ page: page_file, vehicles: 100 });
   const chromium = await startBrowser();
   try {
     await chromium.page.goto(server.url);
     await waitFor("flight", () => chromium.page.evaluate(() => (window.slsView?.state().step ?? 0) > 250));
-    await new Promise((resolve) => setTimeout(resolve, 3000)); // the resolution adapts
+    await new Promise((resolve) => setTimeout(resolve, 3000)); // meanwhile the page adapts its resolution
     const begin = await chromium.page.evaluate(() => [window.slsView.frames(), performance.now()]);
     await new Promise((resolve) => setTimeout(resolve, kMeasuredMs));
     const end = await chromium.page.evaluate(() => [window.slsView.frames(), performance.now(), window.slsView.camera().resolution]);

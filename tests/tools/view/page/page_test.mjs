@@ -1,5 +1,5 @@
-// The page in Chromium beside a server with a flight from closed forms: node page_test.mjs PAGE_HTML FOLDER [WORD]
-// PAGE_HTML: the page as built; FOLDER: where screenshots go; WORD: only tests whose name has it.
+// The page in Chromium with a fake server and a flight from closed forms: node page_test.mjs PAGE_HTML FOLDER [WORD]
+// PAGE_HTML: the built page; FOLDER: for screenshots; WORD: run only tests with this word in their name.
 import assert from "node:assert/strict";
 import { mkdirSync } from "node:fs";
 import { join } from "node:path";
@@ -17,7 +17,7 @@ const state = (page) => page.evaluate(() => window.slsView.state());
 const untilFlies = (page) => waitFor("poses", () => page.evaluate(() => (window.slsView?.state().step ?? 0) > 0));
 const isColour = (pixel, expected) => pixel.every((value, index) => Math.abs(value - expected[index]) <= kTolerance);
 
-/** Starts server and browser, runs `body`, ends both; no error in the console, no request to another server. */
+/** Starts server and browser, runs `body`, ends both. Expects no console error and no request to another server. */
 async function withPage(serverOptions, browserOptions, body, { mayWarn = false, hash = "" } = {}) {
   const server = await startFakeServer({ page: html, ...serverOptions });
   const chromium = await startBrowser(browserOptions);
@@ -32,7 +32,10 @@ async function withPage(serverOptions, browserOptions, body, { mayWarn = false, 
   }
 }
 
-/** Pixel of a point of W in the drawings true to scale, by their definition alone: top shows y to the right and x up, side x right and height up. */
+/**
+ * Pixel of a point of W in the drawings to scale, from their definition alone: `top` has y to the right and x up,
+ * `side` has x to the right and height up.
+ */
 function projectFlat({ mode, target_m: [tx, ty, tz], height_m, area }, [x, y, z]) {
   const scale = area.height / height_m;
   const [right, up] = mode === "top" ? [y - ty, x - tx] : [x - tx, tz - z];

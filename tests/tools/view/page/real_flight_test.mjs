@@ -1,4 +1,4 @@
-// The page on a real flight of the real programs: node real_flight_test.mjs BUILD FOLDER [DOMAIN]
+// The page with a flight of the real programs: node real_flight_test.mjs BUILD FOLDER [DOMAIN]
 import assert from "node:assert/strict";
 import { mkdirSync } from "node:fs";
 import { join } from "node:path";

@@ -39,7 +39,7 @@ std::string zip(const std::string& text) {
   return bytes;
 }
 
-/// Of a data block of the page, decoded by OpenSSL.
+/// The bytes of data block `index` of the page, decoded with OpenSSL.
 std::string read_block(const std::string& html, int index) {
   const std::string begin = "<script type=\"application/octet-stream;base64\" id=\"sls-recording-" +
                             std::to_string(index) + "\">";

@@ -1,4 +1,4 @@
-/// A packed recording read by a parser of its own, after tools/view/replay/README.md.
+/// Reads a packed recording with an independent parser, according to tools/view/replay/README.md.
 #pragma once
 
 #include <cstring>

@@ -57,7 +57,7 @@ class RecordedRunTest : public ::testing::Test {
   sls::test::TemporaryFolder folder_;
 };
 
-/// Every row of `vehicle` is the CSV's of the same time, as a float.
+/// Expects that every row of `vehicle` equals the CSV row of the same time, rounded to float.
 void expect_same(const PackedRun& run, std::uint32_t vehicle, const fs::path& file,
                  const std::vector<std::string>& columns) {
   const CsvTable table = parse_csv(read_bytes(file));
@@ -119,7 +119,7 @@ TEST_F(RecordedRunTest, ThinningKeepsFirstAndLastAndTheBudget) {
     EXPECT_EQ(times.back(), 1.2);
     for (std::size_t i = 0; i + 1 < times.size(); ++i)
       EXPECT_DOUBLE_EQ(times[i], static_cast<double>(i * every) * 0.004);
-    // Not more steps than needed are left out: the next finer spacing would not fit.
+    // No more steps than necessary are left out: the next finer spacing would not fit.
     EXPECT_GT(bytes.size() - head, (most - head) * 45 / 100);
     expect_same(run, 0, folder / "state.csv", {"quad_x_m", "load_z_m"});
     EXPECT_EQ(run.head.at("steps_total"), kLastStep + 1);
@@ -190,7 +190,7 @@ TEST_F(RecordedRunTest, EventsStagesAndHeldStepsAreListed) {
   EXPECT_TRUE(has_event(0, "waiting: waiting for: \"one\", two")) << head.at("events");
   EXPECT_TRUE(has_event(0, "running"));
   EXPECT_TRUE(has_event(kLastStep, "finished: mission finished"));
-  // flight.txt tells the same ones, and what the recorder noticed itself.
+  // flight.txt has the same events, and those that the recorder detected.
   EXPECT_EQ(head.at("events").size(), 3u + (head.at("complete") ? 0u : 1u)) << head.at("events");
 
   ASSERT_EQ(head.at("stage_starts").size(), 2u);
@@ -219,8 +219,8 @@ TEST_F(RecordedRunTest, FaultsOfTheScenarioAreIntervals) {
   EXPECT_EQ(faults[1].at("to_s"), 1.2);
 }
 
-// Three steps that a recorder of contract 1 wrote; of its files the fuzzer's corpus has four. Its
-// state.csv has no attitude, its manifest no signals, no stage starts.
+// Three steps from a recorder of contract 1; the corpus of the fuzzer has four of its files. Its
+// state.csv has no attitude, and its manifest has neither signals nor stage starts.
 TEST_F(RecordedRunTest, ARecordingOfContract1Opens) {
   const fs::path folder = folder_ / "old";
   fs::create_directory(folder);
@@ -233,7 +233,7 @@ TEST_F(RecordedRunTest, ARecordingOfContract1Opens) {
   EXPECT_NE(find_error(folder).find("scenario.yaml: expected the recording's scenario"),
             std::string::npos);
   fs::copy(SLS_SOURCE_DIR "/config/scenarios/short.yaml", folder / "scenario.yaml");
-  // Its status samples had fewer counters.
+  // Status samples of contract 1 have fewer counters.
   write_bytes(folder / "status.csv",
               "sample_index,phase,reason,step,controller,real_time_factor,resent,late\n"
               "0,waiting,waiting for: recorder,0,,0,0,0\n1,running,,0,,0,0,0\n");
@@ -335,7 +335,7 @@ TEST_F(RecordedRunTest, IdsThatTheScenarioDoesNotHaveAreRefused) {
   EXPECT_NE(find_error(folder).find("vehicle_ids: expected at least one"), std::string::npos);
 }
 
-// Steps far apart make no loop over all of them.
+// Steps that are far apart must not cause a loop over all steps between them.
 TEST_F(RecordedRunTest, StepNumbersThatNoFlightHasDoNoHarm) {
   const fs::path folder = record();
   const std::string row = "0,0,0,0,0,-1.5,0,0,0,0,0,-0.5,0,0,0,0,0,0,0,0,0,0\n";

@@ -1,5 +1,5 @@
-// The exported page, the served one and the report in Chromium: node --test replay_test.mjs, with the build folder
-// in SLS_BUILD. Flights are flown in one process; positions on the screen are compared with the CSV files.
+// The exported page, the served page and the report in Chromium: node --test replay_test.mjs, with the build folder
+// in SLS_BUILD. closed_loop flies the flights; the tests compare positions on the screen with the CSV files.
 import assert from "node:assert/strict";
 import { execFileSync, spawn } from "node:child_process";
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
@@ -33,7 +33,7 @@ function readColumns(file) {
   return lines.map((fields) => Object.fromEntries(header.map((name, index) => [name, Number(fields[index])])));
 }
 
-/** A page that keeps what goes wrong in `problems` and what is asked for over a network in `requests`. */
+/** Opens a page; `problems` gets its console messages and errors, and `requests` its network requests. */
 async function open(address, { reducedMotion = true } = {}) {
   const page = await browser.newPage();
   const problems = [];
@@ -56,7 +56,7 @@ const drag = (page, time) => page.$eval("#time", (slider, value) => {
   slider.dispatchEvent(new Event("input"));
 }, String(time));
 
-/** Colour on the screen: red, green, blue. Decoded in a page of its own, because ours lets nothing be fetched. */
+/** Colour on the screen: red, green, blue. Decoded in another page, because the tested page forbids every fetch. */
 async function readPixel(page, [x, y]) {
   const picture = await page.screenshot({ encoding: "base64", clip: { x: Math.round(x), y: Math.round(y), width: 1, height: 1 } });
   const reader = await browser.newPage();
@@ -100,7 +100,7 @@ test("the slider shows the positions of the CSV file, and the load's colour is w
       assert.ok(Math.abs(pose.quad[axis] - row[`quad_${name}_m`]) < 1e-6, `quad ${name} at step ${step}`);
       assert.ok(Math.abs(pose.load[axis] - row[`load_${name}_m`]) < 1e-6, `load ${name} at step ${step}`);
     }
-    // From above: x up, y to the right; so many metres in the height of the picture.
+    // From above: x up, y to the right; the height of the picture is `height_m` metres.
     const { camera, projection } = await page.evaluate(() => ({
       camera: window.slsView.camera(), projection: window.slsView.projection(0) }));
     const scale = camera.area.height / camera.height_m;
@@ -136,7 +136,7 @@ test("it plays by itself, at the chosen speed, and by keys", async () => {
   await page.select(".timeline-controls select", "10");
   await page.keyboard.press("l");
   await page.click(".timeline-play");
-  await waitFor(page, () => window.slsView.state().sim_time_s < 20); // once round
+  await waitFor(page, () => window.slsView.state().sim_time_s < 20); // the flight began again
   assert.equal((await stateOf(page)).is_playing, true);
   assert.deepEqual(problems, []);
   await page.close();
@@ -166,7 +166,7 @@ test("two recordings are overlaid and their difference is that of the CSV files"
   const apart = first.map((row, step) => Math.hypot(
     ...["x", "y", "z"].map((axis) => row[`load_${axis}_m`] - second[step][`load_${axis}_m`])));
   const most = await page.$eval("#most-apart", ({ textContent }) => textContent);
-  // Of some thousand steps, to three digits.
+  // The page has some thousand of the steps and prints three digits.
   assert.ok(Math.abs(parseFloat(most) / Math.max(...apart) - 1) < 0.02, `${most}, ${Math.max(...apart)}`);
   await drag(page, first[3600].sim_time_s);
   const texts = await page.$$eval("#participants dd", (items) => items.map(({ textContent }) => textContent));

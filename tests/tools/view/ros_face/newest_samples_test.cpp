@@ -23,7 +23,7 @@ Parameters make_parameters(const std::vector<std::uint32_t>& vehicle_ids) {
   return parameters;
 }
 
-/// Every number follows from vehicle and step.
+/// An entry whose numbers all depend on vehicle and step.
 RecordEntry make_entry(std::uint32_t vehicle_id, std::uint64_t step,
                        AnswerKind kind = ANSWER_ACCEPTED) {
   const double number = 1000.0 * vehicle_id + static_cast<double>(step);

@@ -1,6 +1,6 @@
-/// Reads the rt/… topics of `sls_view --ros` as ROS 2 nodes do, on Eclipse Cyclone DDS with types
-/// of idl/ros/ros2.idl, until a stop signal: ros_reader DOMAIN VEHICLE… Prints lines of JSON: each
-/// message, and each endpoint that others announce.
+/// Reads the rt/… topics of `sls_view --ros` as ROS 2 nodes do, with Eclipse Cyclone DDS and the
+/// types of idl/ros/ros2.idl, until a stop signal: ros_reader DOMAIN VEHICLE… Prints lines of JSON:
+/// each message, and each endpoint that another participant announces.
 #include <dds/dds.h>
 #include <signal.h>
 #include <stdbool.h>
@@ -123,7 +123,7 @@ static int32_t expect(int32_t result, const char* call) {
   exit(1);
 }
 
-/// The QoS of rclcpp: of /clock best effort, of /tf_static what was written before, too.
+/// QoS profiles of rclcpp: best effort for /clock, transient local for /tf_static.
 typedef enum Reading { kDefault, kClock, kStatic } Reading;
 
 static Reader make_reader(dds_entity_t participant, const char* topic,
@@ -185,7 +185,7 @@ static void take_messages(const Reader* reader) {
   }
 }
 
-/// Prints endpoints of others as `{"KIND": topic, …}`.
+/// Prints endpoints of other participants as `{"KIND": topic, …}`.
 static void take_endpoints(dds_entity_t reader, const char* kind, const dds_guid_t* self) {
   void* sample = NULL;
   dds_sample_info_t info;

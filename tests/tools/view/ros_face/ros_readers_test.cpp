@@ -1,5 +1,5 @@
-/// Real flights on the rt/… topics of `sls_view --ros`, read by Eclipse Cyclone DDS as ROS 2 nodes
-/// read them (ros_reader.c), against what was recorded.
+/// Reads real flights on the rt/… topics of `sls_view --ros` with Eclipse Cyclone DDS, as ROS 2
+/// nodes do (ros_reader.c), and compares them with the recording.
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -23,13 +23,13 @@ using Words = std::vector<std::string>;
 constexpr double kRounding = 1e-12;  // of rotated velocities up to some m/s
 constexpr double kPeriodNs = 4e6;
 
-/// Cyclone on loopback alone, like the profile `default`.
+/// Cyclone DDS on loopback only, like the profile `default`.
 const Words kOnLoopback = {
     "env",
     "CYCLONEDDS_URI=<CycloneDDS><Domain><General><Interfaces><NetworkInterface name=\"lo\" "
     "multicast=\"true\"/></Interfaces></General></Domain></CycloneDDS>"};
 
-// As ROS 2 Iron to Kilted announce them. Sources: tests/common/ros/type_hash_test.py.
+// Hashes that ROS 2 Iron to Kilted announce. Sources: tests/common/ros/type_hash_test.py.
 const std::map<std::string, std::string> kTypeHashes = {
     {"rosgraph_msgs::msg::dds_::Clock_",
      "RIHS01_692f7a66e93a3c83e71765d033b60349ba68023a8c689a79e48078bcb5c58564"},
@@ -67,7 +67,7 @@ Quaterniond to_quaternion(const json& list) {
   return Quaterniond(list.at(0).get<double>(), list.at(1).get<double>(), list.at(2).get<double>(),
                      list.at(3).get<double>());
 }
-/// W (z down) → world (z up), and the body's frame likewise.
+/// From W (z down) to world (z up), or from the body's frame (z down) to the one with z up.
 Vector3d turn(const Vector3d& v) { return {v.x(), -v.y(), -v.z()}; }
 
 /// The record of a vehicle at a step, in the frames of the recording.
@@ -111,7 +111,7 @@ class RosReadersTest : public testing::Test {
     return std::make_unique<Process>(make_command(name, domain_.number(), flags));
   }
 
-  /// Viewer and reader, which know each other before anything flies.
+  /// Starts viewer and reader; they have discovered each other before a flight starts.
   void start_watching(const Words& vehicles) {
     view_ = start("sls_view", {"--ros", "--port", "0"});
     Words command = kOnLoopback;
@@ -144,7 +144,7 @@ class RosReadersTest : public testing::Test {
     return wait_until([&] { return reader_->output().find(text) != std::string::npos; });
   }
 
-  /// Whole lines of the reader that have `key`; of messages also a given topic.
+  /// Complete lines of the reader that begin with `key`, and have the value `topic` if it is given.
   std::vector<json> find_lines(const std::string& key, const std::string& topic = {}) const {
     std::vector<json> found;
     std::istringstream lines(reader_->output());
@@ -176,7 +176,7 @@ void expect_same_rotation(const json& actual, const Quaterniond& expected) {
   const Vector3d v(0.3, -0.5, 0.8);
   EXPECT_LT((to_quaternion(actual) * v - expected * v).norm(), kRounding) << actual;
 }
-/// From forward, left, up to world: by half turns about x of both ends.
+/// From the frame (forward, left, up) to world: rotates both frames by half a turn about x.
 Quaterniond turn(const Quaterniond& q_WB) {
   const Quaterniond half(0, 1, 0, 0);
   return half * q_WB * half.conjugate();
@@ -208,7 +208,7 @@ void expect_marker(const json& marker, const Row& row) {
     case 2:  // load
       expect_pose(marker, row, false);
       break;
-    case 3:  // its trail
+    case 3:  // trail of the load
       expect_near(marker.at("last"), turn(row.p_WL));
       break;
     default:

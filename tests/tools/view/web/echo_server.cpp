@@ -1,5 +1,5 @@
-/// A server for clients of others: the page, and protocols that echo. Prints its port; ends with
-/// its standard input.
+/// A server for clients of other projects: the page, and protocols that echo. Prints its port; ends
+/// at the end of its standard input.
 #include <cstdio>
 #include <iostream>
 

@@ -1,4 +1,4 @@
-/// Clients that do not read, come by the thousand, or flood: what they cost the others.
+/// Clients that do not read, thousands of connections, and floods: their effect on other clients.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -27,7 +27,7 @@ using test::to_bytes;
 
 constexpr std::size_t kMessageBytes = 1'000;
 
-/// Bytes that the server may hold beyond a queue: gathered ones and those in the system call.
+/// Bytes that the server may hold beside a queue: gathered ones and those in the system call.
 constexpr std::size_t kMostGathered = 2 * 32 * 1024;
 
 std::string make_message(std::uint32_t number) {
@@ -35,7 +35,7 @@ std::string make_message(std::uint32_t number) {
   return text + std::string(kMessageBytes - text.size(), ' ');
 }
 
-/// Two clients, the first of which does not read.
+/// Two clients; the first does not read.
 class StalledReaderTest : public testing::Test {
  protected:
   StalledReaderTest()
@@ -49,7 +49,8 @@ class StalledReaderTest : public testing::Test {
     return options;
   }
 
-  /// Sends each message to both, as fast as the second one reads, and counts what the first holds.
+  /// Sends each message to both, as fast as the second one reads. Keeps the largest number of bytes
+  /// queued for the first.
   void send_to_both(std::uint32_t count, Delivery delivery, std::uint32_t keys) {
     for (std::uint32_t number = 0; number < count;) {
       const bool has_room = server_.ask([&] {
@@ -82,7 +83,7 @@ class StalledReaderTest : public testing::Test {
     }
   }
 
-  static constexpr std::uint32_t kMessages = 30'000;  // 30 MB, more than the system's buffers hold
+  static constexpr std::uint32_t kMessages = 30'000;  // 30 MB, more than the socket buffers
   test::Listed::List connections_;
   RunningServer server_;
   std::vector<RawClient> clients_;
@@ -96,7 +97,7 @@ TEST_F(StalledReaderTest, KeepsOnlyTheNewestMessageOfEachKey) {
   send_to_both(kMessages, Delivery::kNewest, kKeys);
   reader.join();
   EXPECT_LE(most_queued_, kMostGathered + (kKeys + 1) * kMessageBytes);
-  // Now it reads: what the system had, then the newest of each key.
+  // Now the first reads: the socket buffers' messages, then the newest of each key.
   std::map<std::uint32_t, std::uint32_t> newest;
   std::uint32_t read = 0;
   for (std::uint32_t last = 0; last < kMessages - kKeys || newest.size() < kKeys; ++read) {
@@ -166,7 +167,7 @@ TEST(FloodTest, PingsThatAreNotReadAreNotAnsweredWithoutEnd) {
   RunningServer server(options, test::add_echo_and_page);
   RawClient flooding = test::open_websocket(server.port(), "other");
   RawClient other = test::open_websocket(server.port(), "other");
-  // Once its answers find no room the server reads no further: the flood stands still.
+  // When its answers find no room the server stops reading: the flood stops.
   ::fcntl(flooding.socket(), F_SETFL, O_NONBLOCK);
   std::string pings;
   for (int i = 0; i < 1'000; ++i) pings += to_bytes({kPing, std::string(125, 'p')});
@@ -255,7 +256,7 @@ TEST(ManyConnectionsTest, CountsOpenConnections) {
   }
 }
 
-/// Takes every file descriptor that this process may have, but one.
+/// Takes all file descriptors of this process except one.
 class TakenDescriptors {
  public:
   TakenDescriptors() {
@@ -287,7 +288,7 @@ double calc_thread_seconds() {
 TEST(ManyConnectionsTest, WaitsWithoutSpinningWhileThereAreNoFileDescriptors) {
   RunningServer server(test::make_options(), test::add_echo_and_page);
   auto taken = std::make_unique<TakenDescriptors>();
-  RawClient client(server.port());  // the last descriptor: the server has none for its end
+  RawClient client(server.port());  // takes the last descriptor; the server has none to accept with
   client.send(test::make_get("/", server.port()));
   const double cpu_before = server.ask(calc_thread_seconds);
   const auto begin = std::chrono::steady_clock::now();

@@ -1,4 +1,4 @@
-/// A server on a free port of 127.0.0.1, run by a thread of its own.
+/// A server on a free port of 127.0.0.1, in its own thread.
 #pragma once
 
 #include <functional>
@@ -36,7 +36,7 @@ class RunningServer {
   view::Server* operator->() { return &server_; }
   std::uint16_t port() const { return server_.port(); }
 
-  /// The result of `task` on the server's thread.
+  /// Runs `task` on the server's thread. @returns its result.
   template <class Task>
   auto ask(Task task) {
     std::promise<decltype(task())> promise;

@@ -96,7 +96,6 @@ TEST(SendQueueTest, EmptyMessagesTakeRoom) {
   while (push(queue, "", Delivery::kAlways)) ASSERT_LT(++taken, 10'000);
 }
 
-/// Judged by a plain list of what must be there.
 TEST(SendQueueTest, NeverExceedsItsCapacity) {
   constexpr std::size_t kCapacity = 50'000;
   std::mt19937 random(1);

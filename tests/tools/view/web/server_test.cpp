@@ -1,4 +1,4 @@
-/// HTTP: resources, refusals, where the server listens.
+/// HTTP: resources, refusals, addresses.
 #include "tools/view/web/server.hpp"
 
 #include <gtest/gtest.h>
@@ -28,7 +28,7 @@ class ServerTest : public testing::Test {
   std::string get(const std::string& target, const std::string& fields = "") {
     return test::make_get(target, server_.port(), fields);
   }
-  /// The status of the answer to these bytes, checked to have one plain line.
+  /// The status of the answer to these bytes. Expects that its body is one line of plain text.
   int find_status(const std::string& request) {
     const auto [header, body] = ask(request);
     if (header.size() < 12) return 0;
@@ -202,7 +202,7 @@ TEST(ServerLimitsTest, EndsConnectionsThatDoNotReadTheirAnswer) {
   options.limits.request_timeout_s = 0.3;
   options.limits.connections = 1;
   RunningServer server(options, [](Server& prepared) {
-    // More than the buffers of both ends hold, and small enough for a short deadline.
+    // The answers exceed the buffers of both ends; each is small enough for a short deadline.
     prepared.add_resource("/", {"text/plain", "", test::make_payload("short"), ""});
     prepared.add_resource("/large",
                           {"text/plain", "", test::make_payload(std::string(100'000, 'x')), ""});
@@ -238,7 +238,7 @@ TEST(ServerLimitsTest, ClosesConnectionsBeyondTheLimit) {
   EXPECT_EQ(clients[0].read_frame().payload, "still here");
 }
 
-// --- where it listens ----------------------------------------------------------------------------
+// --- addresses -----------------------------------------------------------------------------------
 
 std::string find_problem(const ServerOptions& options) {
   try {
@@ -262,7 +262,7 @@ TEST(ServerAddressTest, SaysThatThePortIsTakenAndWhatToDo) {
 TEST(ServerAddressTest, SaysThatTheAddressIsNotOfThisMachine) {
   ServerOptions options = test::make_options();
   options.access.token = "0123456789abcdef";
-  options.address = "192.0.2.1";  // for documents only: RFC 5737
+  options.address = "192.0.2.1";  // reserved for documentation: RFC 5737
   EXPECT_EQ(find_problem(options),
             "--listen: expected an address of this machine, got 192.0.2.1: Cannot assign requested "
             "address");

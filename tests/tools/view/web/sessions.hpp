@@ -16,8 +16,9 @@ inline view::Payload make_payload(std::string bytes) {
   return std::make_shared<const std::string>(std::move(bytes));
 }
 
-/// Answers each message with the same, "may" with what it may do, and "token …" with whether that
-/// is right; "close" closes after three more messages, "throw" throws.
+/// Returns each message, with these exceptions: "may" gets "yes" or the reason why the client may
+/// not operate, "token …" gets "right" or that reason, "close" closes after three more messages,
+/// and "throw" throws an exception.
 class Echo : public view::Session {
  public:
   explicit Echo(view::Connection& connection) : connection_(connection) {}
@@ -47,7 +48,7 @@ inline view::Protocol make_echo(std::vector<std::string> names) {
           [](view::Connection& connection) { return std::make_unique<Echo>(connection); }};
 }
 
-/// The connections there are, in the order they came; on the server's thread.
+/// Keeps a list of open connections in order of arrival; use the list on the server's thread only.
 class Listed : public view::Session {
  public:
   using List = std::vector<view::Connection*>;

@@ -17,16 +17,16 @@
 
 namespace sls::test {
 
-inline constexpr const char* kKey = "dGhlIHNhbXBsZSBub25jZQ==";  ///< of RFC 6455, section 1.3
+inline constexpr const char* kKey = "dGhlIHNhbXBsZSBub25jZQ==";  ///< from RFC 6455, section 1.3
 
 /// A frame as a client must send it; a mask of zeros leaves the payload readable.
 struct Frame {
   int opcode = 1;
   std::string payload;
   bool is_final = true;
-  int reserved = 0;  ///< the three bits
+  int reserved = 0;  ///< The three reserved bits.
   bool is_masked = true;
-  std::optional<std::uint64_t> declared_size = std::nullopt;  ///< where it is a lie
+  std::optional<std::uint64_t> declared_size = std::nullopt;  ///< A wrong size on purpose.
 };
 
 inline constexpr int kText = 1;
@@ -47,7 +47,7 @@ inline std::string to_bytes(const Frame& frame) {
   return bytes + frame.payload;
 }
 
-/// A TCP connection to 127.0.0.1 whose every call has a deadline.
+/// A TCP connection to 127.0.0.1; every call has a deadline.
 class RawClient {
  public:
   explicit RawClient(std::uint16_t port)
@@ -78,14 +78,14 @@ class RawClient {
     return true;
   }
 
-  /// Reads so many bytes, fewer where the connection ends before.
+  /// Reads `count` bytes, or fewer if the connection ends first.
   std::string read(std::size_t count) {
     while (input_.size() < count && read_some()) {
     }
     return take(std::min(count, input_.size()));
   }
 
-  /// Reads up to `end` and with it; all there is where the connection ends before.
+  /// Reads up to and including `end`, or all bytes if the connection ends first.
   std::string read_until(std::string_view end) {
     std::size_t place;
     while ((place = input_.find(end)) == std::string::npos)
@@ -134,7 +134,7 @@ class RawClient {
     return frame;
   }
 
-  /// The code of the close frame that comes, after whatever else; 0 if none comes.
+  /// Reads until a close frame. @returns its code; 0 if the connection ends without one.
   int read_close_code() {
     for (;;) {
       const Frame frame = read_frame();

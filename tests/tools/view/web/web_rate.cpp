@@ -1,5 +1,5 @@
-/// Measures messages to one client on loopback: `view_web_rate [SECONDS]` prints two lines, one at
-/// 50,000 messages a second, one as fast as they go; 700 bytes each, posted from another thread.
+/// Measures messages to one client on loopback: `view_web_rate [SECONDS]` prints two lines, one for
+/// 50,000 messages a second, one for the largest rate; 700 bytes each, posted from another thread.
 #include <pthread.h>
 #include <time.h>
 
@@ -33,7 +33,7 @@ double calc_thread_seconds() {
   return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
-/// Posts messages until `deadline`, `rate` a second or, where that is 0, while the queue has room.
+/// Posts messages until `deadline`: `rate` a second, or with `rate` 0 while the queue has room.
 std::uint64_t post_messages(test::RunningServer& server, view::Connection& connection, double rate,
                             Clock::time_point deadline) {
   const auto payload = std::make_shared<const std::string>(kMessageBytes, 'x');

@@ -1,4 +1,4 @@
-/// WebSockets: negotiation, frames that break the protocol, who may operate, the end.
+/// WebSockets: negotiation, frames that break the protocol, permission to operate, the end.
 #include <gtest/gtest.h>
 
 #include <set>
@@ -213,7 +213,7 @@ TEST_F(WebSocketTest, ASessionThatThrowsEndsItsConnectionOnly) {
   EXPECT_EQ(ask(other, "hello"), "hello");
 }
 
-// --- who may operate -----------------------------------------------------------------------------
+// --- permission to operate -----------------------------------------------------------------------
 
 TEST_F(WebSocketTest, TheTokenOfTheQueryOperatesAtOnce) {
   RawClient with = open("/?token=0123456789%61bcdef");

@@ -1,4 +1,4 @@
-// The server as the client of `ws` (npm) and fetch of Node see it. Usage: node ws_client_test.mjs ECHO_SERVER
+// The server with the client of `ws` (npm) and fetch of Node. Usage: node ws_client_test.mjs ECHO_SERVER
 import assert from "node:assert/strict";
 import { spawn } from "node:child_process";
 import { once } from "node:events";
@@ -23,14 +23,14 @@ async function findRefusal(protocols, options = {}) {
   return answer.statusCode;
 }
 
-// The subprotocol is the first of the server's that the client knows, too.
+// The subprotocol is the first in the server's list that the client offers, too.
 const socket = await open(["unknown", "echo.1", "echo.2"]);
 assert.equal(socket.protocol, "echo.2");
 assert.equal(await findRefusal(["unknown"]), 400);
 assert.equal(await findRefusal(["echo.1"], { origin: "http://evil.com" }), 403);
 assert.equal(await findRefusal(["echo.1"], { headers: { Host: "evil.com" } }), 403);
 
-// Messages come back as they were, whole and in order.
+// Messages come back unchanged and in order.
 const sent = [];
 for (let i = 0; i < 3000; ++i) {
   sent.push(i % 2 === 0 ? `grün ${i}` : Buffer.alloc((i * 37) % 65536, i));
@@ -44,7 +44,7 @@ const isComplete = new Promise((resolve) => {
 });
 for (const [i, message] of sent.entries()) {
   socket.send(message);
-  // More than 8 MiB on their way back would close the connection.
+  // More than 8 MiB in the send queue would close the connection.
   while (i - received.length > 50) await new Promise(setImmediate);
 }
 await isComplete;
@@ -53,7 +53,7 @@ assert.deepEqual(received, sent);
 socket.ping("are you there");
 assert.equal((await once(socket, "pong"))[0].toString(), "are you there");
 
-// A message beyond the bound is answered with its code.
+// A message that is too long closes the connection with code 1009.
 socket.send(Buffer.alloc(65537));
 assert.equal((await once(socket, "close"))[0], 1009);
 
@@ -63,7 +63,7 @@ assert.equal((await (await fetch(`http://${host}/recording/0`)).text()).length, 
 assert.equal((await fetch(`http://${host}/%2e%2e/etc/passwd`)).status, 404);
 assert.equal((await fetch(`http://${host}/recording/0`, { method: "POST", body: "x" })).status, 413);
 
-// The end of the server is told.
+// The server announces its end with code 1001.
 const last = await open(["other"]);
 server.stdin.end();
 assert.equal((await once(last, "close"))[0], 1001);
