@@ -29,7 +29,7 @@ TEST(ClosedLoopTest, FigureEightAtOneMillisecondErrsByTheHoldAlone) {
 }
 
 TEST(ClosedLoopTest, FigureEightErrorGrowsLinearlyWithThePeriod) {
-  // Zero-order hold delays by half a period on average, so that the error is of first order.
+  // Zero-order hold delays by half a period on average: the error is of first order.
   const auto calc_rms = [](std::int64_t period_ns) {
     return calc_error(fly(make_figure_eight(period_ns)), 16.0, 32.0).rms.matrix().norm();
   };

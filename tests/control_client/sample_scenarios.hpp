@@ -1,4 +1,4 @@
-/// Scenarios of design 7 as structs, so that these tests need no file and no reader.
+/// Scenarios of design 7 as structs: these tests need no file and no reader.
 #pragma once
 
 #include "common/config/scenario.hpp"

@@ -239,8 +239,7 @@ TEST_F(RecordingFolderTest, AFolderThatCannotBeWrittenIsRefused) {
   fs::permissions(root_.path(), fs::perms(0755));
   EXPECT_EXIT(
       {
-        if (::geteuid() == 0 && ::setuid(65534) != 0)
-          ::_exit(1);  // user nobody, in a child process
+        if (::geteuid() == 0 && ::setuid(65534) != 0) ::_exit(1);  // user nobody
         std::cerr << find_error(out_) << std::endl << find_error(out_ / "below") << std::endl;
         ::_exit(2);
       },

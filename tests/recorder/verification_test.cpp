@@ -258,8 +258,7 @@ TEST_F(VerificationTest, SignalsAreComparedByTheirNames) {
   EXPECT_EQ(find_difference().find("state.csv, vehicle 0, step 50, att_w"), 0u);
   change("state.csv", 1, 29, [](auto&) { return "force_n"; });
   EXPECT_EQ(find_difference(), "state.csv: other columns in A than in B");
-  for (const char* header :
-       {"att_w", "att_w,att_x,att_y,rate_z_rad_s"}) {  // these columns count as signals
+  for (const char* header : {"att_w", "att_w,att_x,att_y,rate_z_rad_s"}) {  // as signals
     std::string bytes = read_bytes(b_ / "state.csv");
     write_bytes(b_ / "state.csv",
                 bytes.replace(0, bytes.find('\n'), make_header<StateRow>() + "," + header));

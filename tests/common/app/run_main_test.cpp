@@ -22,7 +22,7 @@ struct Outcome {
   CommonOptions options;
 };
 
-/// Runs a program "program" with `arguments` whose work is `work`.
+/// Runs a program "program" with `arguments` and the work `work`.
 Outcome run(
     std::vector<std::string> arguments, const std::function<void()>& work = [] {}) {
   Outcome outcome;

@@ -94,8 +94,7 @@ TEST_F(QosFileTest, AnUnreadableFileIsNamedWithTheCause) {
   fs::permissions(folder_ / "qos.xml", fs::perms::none);
   EXPECT_EXIT(
       {
-        if (::geteuid() == 0 && ::setuid(65534) != 0)
-          ::_exit(1);  // user nobody, in a child process
+        if (::geteuid() == 0 && ::setuid(65534) != 0) ::_exit(1);  // user nobody
         std::cerr << find_error(folder_ / "qos.xml") << std::endl;
         ::_exit(2);  // skips exit handlers: the parent's threads do not exist here
       },
@@ -197,7 +196,7 @@ TEST(InvalidQosFilesDeathTest, EachFileGivesTheMessageInItsComment) {
     const std::string error = find_error(file);
     if (error != "no error")
       EXPECT_EQ(error, expected);
-    else  // only the middleware finds it
+    else  // only Fast DDS reports the error
       EXPECT_EXIT(use_file_and_exit(file), testing::ExitedWithCode(2), quote(expected));
   }
 }

@@ -26,7 +26,7 @@ struct Message {
   }
 };
 
-/// Keeps what is emitted.
+/// Keeps the emitted messages.
 struct Log {
   std::vector<Message> messages;
   Mirrors::Emit emit = [this](std::size_t channel, std::int64_t sim_time_ns, const auto& cdr) {

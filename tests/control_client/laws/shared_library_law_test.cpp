@@ -14,7 +14,7 @@ std::string library(const std::string& name) { return std::string(SLS_LIBRARIES)
 
 const std::string kGood = library("controller.so");
 
-/// A hover of two seconds whose law is `law`; `further` are lines of the section `controller`.
+/// A hover of two seconds with the law `law`; `further` are lines of the section `controller`.
 config::Scenario make_scenario(const std::string& law, const std::string& further = "") {
   return config::parse_scenario(
       "name: hover\n"

@@ -206,8 +206,7 @@ TEST_P(ReceivingTest, AnInvalidSocketIsAnError) {
 TEST_P(ReceivingTest, APortsSemaphoreIsTakenOncePerPost) {
   void* memory = mmap(nullptr, 4096, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   ASSERT_NE(memory, MAP_FAILED);
-  auto* semaphore =
-      reinterpret_cast<sem_t*>(static_cast<char*>(memory) + 64);  // inside a mapping, as in a port
+  auto* semaphore = reinterpret_cast<sem_t*>(static_cast<char*>(memory) + 64);  // as in a port
   ASSERT_EQ(sem_init(semaphore, 1, 0), 0);
   constexpr int kPosts = 1000;
   std::thread poster([&] {

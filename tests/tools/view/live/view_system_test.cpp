@@ -1,4 +1,4 @@
-/// The real sls_view beside flights of the real programs.
+/// The real sls_view with flights of the real programs.
 #include <gtest/gtest.h>
 #include <signal.h>
 

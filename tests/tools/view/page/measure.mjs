@@ -50,7 +50,7 @@ async function measureFleet() {
   try {
     await chromium.page.goto(server.url);
     await waitFor("flight", () => chromium.page.evaluate(() => (window.slsView?.state().step ?? 0) > 250));
-    await new Promise((resolve) => setTimeout(resolve, 3000)); // meanwhile the page adapts its resolution
+    await new Promise((resolve) => setTimeout(resolve, 3000)); // the page adapts its resolution
     const begin = await chromium.page.evaluate(() => [window.slsView.frames(), performance.now()]);
     await new Promise((resolve) => setTimeout(resolve, kMeasuredMs));
     const end = await chromium.page.evaluate(() => [window.slsView.frames(), performance.now(), window.slsView.camera().resolution]);
