@@ -205,7 +205,7 @@ TEST(MultirotorScenarioTest, ARoundedQuaternionIsMadeAUnitOne) {
 
 TEST(MultirotorScenarioTest, UnusualButValidValuesAreAllowed) {
   // Rotors without lag; all rotors with the same spin; a smallest speed equal to the largest one; a
-  // flat rigid body; an attachment almost a rod's length from Q.
+  // flat rigid body; an attachment a rod's length from Q.
   EXPECT_EQ(find_error(with("    lag_up_s: 0.0125\n", "    lag_up_s: 0\n")), "no error");
   EXPECT_EQ(find_error(with("      lag_down_s: 0.026\n", "      lag_down_s: 0\n")), "no error");
   EXPECT_EQ(find_error(with("spin: cw", "spin: ccw")), "no error");

@@ -37,7 +37,7 @@ TEST(StateTest, AnglesSurviveTheWayOverDirectionsEvenNearTheLevelRod) {
     const RodAngles rod{draw_angle(generator), draw_angle(generator), rate(generator),
                         rate(generator)};
     const RodAngles back = to_angles(to_direction(rod));
-    // A few roundings; near a level rod β̇ / cos β multiplies the rounding of α̇.
+    // A few roundings; near a level rod β̇ / cos β adds to the rounding of α̇.
     ASSERT_NEAR(back.alpha, rod.alpha, 8 * kEps);
     ASSERT_NEAR(back.beta, rod.beta, 8 * kEps);
     ASSERT_NEAR(back.beta_dot, rod.beta_dot,
