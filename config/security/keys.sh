@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # ./sls keys: certificate authorities, identities for the roles, and signed governance and permissions
-# documents, all by openssl. The files are explained in README.md.
+# documents, all made with openssl. README.md explains the files.
 set -euo pipefail
 
 here="$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)"
@@ -29,7 +29,7 @@ TEXT
 }
 
 # --- what a role may write and read ---------------------------------------------------------------
-# And everybody sls/doctor, on which ./sls doctor asks the doctors of other hosts.
+# Every role also writes and reads sls/doctor, through which ./sls doctor queries other hosts.
 
 writes_of() {
   case $1 in
@@ -46,7 +46,7 @@ reads_of() {
     server) echo sls/command sls/control sls/participant sls/parameters sls/status ;;
     controller) echo sls/state sls/participant sls/parameters sls/status ;;
     recorder) echo sls/record sls/participant sls/parameters sls/status ;;
-    # An operator's sls_view shows what a viewer's does.
+    # An operator can also run sls_view and reads the same topics as a viewer.
     operator | viewer)
       echo sls/state sls/command sls/record sls/control sls/control_reply sls/participant sls/parameters sls/status
       ;;
@@ -60,7 +60,7 @@ print_topics() {
   echo "          </topics>"
 }
 
-# print_permissions ROLE NAME: the document before it is signed.
+# print_permissions ROLE NAME: prints the document before it is signed.
 print_permissions() {
   cat <<TEXT
 <?xml version="1.0" encoding="UTF-8"?>
@@ -103,7 +103,7 @@ make_private_key() {
   (umask 077 && run_openssl genpkey -algorithm EC -pkeyopt ec_paramgen_curve:P-256 -out "$1")
 }
 
-# sign_certificate REQUEST CERTIFICATE OPTION…: `openssl ca`, because only it sets the first day.
+# sign_certificate REQUEST CERTIFICATE OPTION…: uses `openssl ca`, the only command that can set the first day.
 sign_certificate() {
   local request=$1 certificate=$2
   shift 2
@@ -118,7 +118,7 @@ sign_document() {
     -inkey "$ca/permissions_ca.key"
 }
 
-# make_authority KIND NAME: NAME tells this authority from others in messages.
+# make_authority KIND NAME: NAME distinguishes this authority from others in messages.
 make_authority() {
   make_private_key "$ca/$1_ca.key"
   run_openssl req -new -config "$here/openssl.cnf" -key "$ca/$1_ca.key" -out "$work/request.pem" \
@@ -127,16 +127,16 @@ make_authority() {
     -extensions authority_extensions
 }
 
-# Two authorities, because Fast DDS 2.9.1 takes permissions that anyone with a certificate of the
-# permissions authority has signed: with one for both, a recorder could sign its own.
+# Two authorities, because Fast DDS 2.9.1 accepts permissions signed with any certificate of the
+# permissions authority: with a single authority, a recorder could sign its own permissions.
 make_authorities() {
   mkdir -m 700 "$ca"
   local name
   name="$(openssl rand -hex 4)"
   make_authority identity "$name"
   make_authority permissions "$name"
-  # Other vendors' readers send keys only where submessages are protected, and without those keys Fast
-  # DDS sends them nothing: common/bus/fastdds/README.md, trap 28.
+  # Other vendors' readers send keys only if submessages are protected. Without those keys Fast DDS
+  # sends them no samples: common/bus/fastdds/README.md, trap 28.
   sed "s|<metadata_protection_kind>NONE<|<metadata_protection_kind>$submessages<|" \
     "$here/governance.xml" >"$work/governance.xml"
   sign_document "$work/governance.xml" "$ca/governance.p7s"
@@ -158,7 +158,7 @@ make_identity() {
 
 # --- command line ---------------------------------------------------------------------------------
 
-# replace NEW OLD: NEW takes the place of OLD, which is never half written.
+# replace NEW OLD: renames NEW to OLD. OLD is never partly written.
 replace() {
   if [[ -e $2 ]]; then
     mv -T -- "$2" "$work/replaced"
@@ -208,14 +208,14 @@ if [[ -e $target ]]; then
 fi
 
 mkdir -p -- "$(dirname "$target")" || fail "$folder: cannot be made"
-# Beside the target, so that a rename puts it in place; what was begun and not finished is removed.
+# In the target's parent folder: a rename then moves it into place. Unfinished work is removed at exit.
 work="$(mktemp -d -- "$(dirname "$target")/.sls-keys-XXXXXX")" || fail "$folder: cannot be written"
 trap 'rm -rf -- "$work"' EXIT
 trap 'exit 130' INT
 trap 'exit 143' TERM HUP
 export SLS_KEYS_WORK=$work
 
-# From yesterday on: hosts whose clocks are behind, or whose time zone differs, take them, too.
+# Valid from yesterday: hosts with a slow clock or another time zone also accept the certificates.
 begin=$(($(date +%s) - 86400))
 readonly made="$work/made"
 if [[ -n $name ]]; then
@@ -225,7 +225,7 @@ if [[ -n $name ]]; then
 else
   ca="$made/ca"
   mkdir "$made"
-  # The authorities outlive the identities, which they can renew (--add ROLE ROLE --force).
+  # The authorities are valid longer than the identities and can renew them (--add ROLE ROLE --force).
   end=$(($(date +%s) + (days > 3650 ? days : 3650) * 86400))
   make_authorities
   end=$(($(date +%s) + days * 86400))

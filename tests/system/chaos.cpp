@@ -1,9 +1,9 @@
 /// Random disturbances of real flights: in every trial one process of a lockstep flight is stopped
-/// and continued, or killed and restarted, at a random moment. The flight must end well, its
-/// recording must be that of an undisturbed flight, and a process that kept the others waiting for
-/// 2 s must have been named by then. (A client killed for good before the flight began leaves a run
-/// that cannot begin, and must end naming the client.) A seed repeats the choices (not the
-/// machine's own timing).
+/// and continued, or killed and restarted, at a random moment. The flight must succeed, and its
+/// recording must equal that of an undisturbed flight. If a process blocks the others for 2 s, they
+/// must have named it by then. (If a client is killed for good before the flight begins, the run
+/// cannot begin, and its error must name the missing client.) A seed repeats the random choices,
+/// but not the timing of the machine.
 #include <signal.h>
 #include <unistd.h>
 
@@ -52,7 +52,7 @@ const char* to_string(Role role) {
   return "?";
 }
 
-/// How the others name it.
+/// Name of the role in the messages of the other processes.
 const char* find_name(Role role) {
   switch (role) {
     case Role::kServer:
@@ -76,7 +76,7 @@ Disturbance choose(std::mt19937_64& random) {
   disturbance.kind = static_cast<Kind>(random() % 2);
   if (disturbance.role == Role::kPrimary && random() % 3 == 0)
     disturbance.kind = Kind::kKillForGood;
-  disturbance.at = Seconds(draw(0.1, 4.5));  // start, flight of about 3 s, end
+  disturbance.at = Seconds(draw(0.1, 4.5));  // during start, flight (about 3 s) or end
   disturbance.duration = Seconds(draw(0.2, 4.0));
   return disturbance;
 }
@@ -95,7 +95,7 @@ std::string describe(const Disturbance& disturbance) {
   return line + text;
 }
 
-/// Result of a trial; empty `failure`: passed.
+/// Result of a trial. An empty `failure` means passed.
 struct Result {
   std::string failure;
   std::string success = "recording equal";
@@ -162,14 +162,14 @@ class Trial {
     return false;
   }
 
-  /// True once somebody else has said the culprit's name since the disturbance.
+  /// True once another process has printed the disturbed role's name since the disturbance.
   bool is_named(const std::vector<std::size_t>& lengths) const {
     for (std::size_t i = 0; i < lengths.size(); ++i) {
       if (processes_[i].first == disturbance_.role) continue;
       const std::string output = processes_[i].second->output();
       std::istringstream news(output.substr(std::min(lengths[i], output.size())));
       for (std::string line; std::getline(news, line);) {
-        const auto message = line.find(": ");  // after the speaker's own name
+        const auto message = line.find(": ");  // after the program's own name
         if (message != line.npos && line.find(find_name(disturbance_.role), message) != line.npos)
           return true;
       }
@@ -187,7 +187,7 @@ class Trial {
     else
       victim.kill();
 
-    // A standby keeps nobody waiting.
+    // No process waits for a standby.
     const bool may_stall = disturbance_.role != Role::kStandby;
     const auto elapsed = [&] { return Seconds(Clock::now() - began); };
     wait_until(
@@ -208,7 +208,7 @@ class Trial {
       start(disturbance_.role);
   }
 
-  /// The recording that must equal the undisturbed one: of the last run.
+  /// Recording of the last run, which must equal the undisturbed one.
   fs::path find_recording() const {
     fs::path found = recording();
     fs::file_time_type newest = fs::file_time_type::min();
@@ -229,7 +229,7 @@ class Trial {
     return code == 0;
   }
 
-  /// A run that waits for two clients does not begin with one, and says so.
+  /// True if the run required two clients, had one, did not begin and printed the reason.
   bool has_rightly_not_begun() {
     return disturbance_.kind == Kind::kKillForGood && current(Role::kServer).wait(0s) == 1 &&
            current(Role::kServer).output().find("not ready within 30 s: 2 controllers (1 ready)") !=
@@ -238,7 +238,7 @@ class Trial {
   }
 
   void judge_end() {
-    // A process restarted just after the run's end finds no run: it is told to go.
+    // A process restarted just after the end of the run finds no run: SIGTERM below ends it.
     const auto is_over = [&] {
       return !current(Role::kServer).is_running() && !current(Role::kRecorder).is_running();
     };
@@ -268,7 +268,7 @@ class Trial {
   Result result_;
 };
 
-/// Processes of ours that outlived their trial: all that were started are our children.
+/// Number of processes that still run after their trial. All are children of this process.
 int count_orphans() {
   const std::string parent = "PPid:\t" + std::to_string(getpid()) + "\n";
   int orphans = 0;

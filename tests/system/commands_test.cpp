@@ -1,5 +1,5 @@
-/// Commands that must not fly: sent to a real server during a real flight by a stranger on the
-/// domain. The flight must stay the same to the bit and every one must be counted by its cause.
+/// Commands that the server must reject: an uninvited participant sends them during a real flight.
+/// The flight must stay the same to the bit, and the server must count each rejection by its cause.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -14,7 +14,7 @@
 namespace sls::test {
 namespace {
 
-/// A participant nobody invited: sees the states and writes whatever it likes to sls/command.
+/// An uninvited participant: reads the states and writes arbitrary commands to sls/command.
 class Stranger {
  public:
   explicit Stranger(int domain)
@@ -76,7 +76,7 @@ TEST(CommandsTest, ABadCommandIsCountedByItsCauseAndNeverDisturbsTheFlight) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const double infinity = std::numeric_limits<double>::infinity();
   for (int i = 0; i < kEach; ++i) {
-    for (std::uint64_t ahead : {0, 1, 2}) {  // one of them is the awaited step when it arrives
+    for (std::uint64_t ahead : {0, 1, 2}) {  // one is the awaited step on arrival
       Commands command = stranger.make_command(ahead);
       command.vehicles()[0].f_Q_W_n({nan, 0.0, 0.0});
       stranger.write(command);
@@ -94,7 +94,7 @@ TEST(CommandsTest, ABadCommandIsCountedByItsCauseAndNeverDisturbsTheFlight) {
       command = stranger.make_command(ahead);
       command.vehicles()[0].vehicle_id(7);
       stranger.write(command);
-      stranger.write(stranger.make_command(ahead));  // nothing wrong but who sends it
+      stranger.write(stranger.make_command(ahead));  // valid, apart from its sender
     }
     Commands command = stranger.make_command(1000000);
     stranger.write(command);
@@ -104,7 +104,7 @@ TEST(CommandsTest, ABadCommandIsCountedByItsCauseAndNeverDisturbsTheFlight) {
   EXPECT_TRUE(read_file(undisturbed.recording() / "state.csv") ==
               read_file(flight.recording() / "state.csv"));
 
-  // The loop's readers are best-effort: under load a few may never have arrived, but not none.
+  // The loop's readers are best effort: under load some commands may be lost, but not all.
   const Table status(flight.recording() / "status.csv");
   const std::size_t last = status.rows() - 1;
   const auto count = [&](const char* column) { return status.number(last, column); };

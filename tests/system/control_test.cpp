@@ -1,4 +1,4 @@
-/// Operator control of real flights: `sim_ctl`, and through it sls/control and sls/control_reply.
+/// Operator control of real flights with `sim_ctl`, through sls/control and sls/control_reply.
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -106,7 +106,7 @@ TEST(ResetTest, ASuccessorThatCannotBeMadeEndsTheRunWithItsCause) {
                                   "SLS_NO_THREADS=" + no_threads};
   Flight flight(scenario("figure_eight"), options);
   ASSERT_TRUE(flight.wait_for_steps(50)) << flight.outputs();
-  write_bytes(no_threads, "");  // the queue of the next run's states needs one
+  write_bytes(no_threads, "");  // the next run's state queue needs a thread
   Process reset({program("sim_ctl"), "--domain", flight.domain.text(), "reset"});
   EXPECT_EQ(reset.wait(), 0) << reset.output();
   flight.wait();

@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 constexpr std::array<const char*, 5> kTables = {"state.csv", "command.csv", "reference.csv",
                                                 "flight.csv", "status.csv"};
 
-/// SIGKILL may come amid a write: what stands behind the last line end is no row then.
+/// SIGKILL may interrupt a write: removes the incomplete row after the last line end.
 void cut_unfinished_rows(const fs::path& recording) {
   for (const char* name : kTables) {
     const std::string text = read_file(recording / name);
@@ -43,7 +43,7 @@ void expect_parsable(const fs::path& recording) {
     ASSERT_EQ(states.number(row, "step"), static_cast<double>(row));
 }
 
-/// The short flight with another text in it and quick time limits.
+/// The scenario `base` with `from` replaced by `to`, and with short time limits.
 std::string make_scenario(const TemporaryFolder& folder, const std::string& from,
                           const std::string& to, const std::string& base = "short") {
   std::vector<std::pair<std::string, std::string>> changes = {{"timeout_s: 30", "timeout_s: 4"}};
@@ -100,14 +100,14 @@ TEST(FaultsTest, KilledOnlyClientEndsTheRunAsFailedNamingItsRole) {
   const auto manifest = read_manifest(flight.recording());
   EXPECT_FALSE(manifest.at("complete").get<bool>());
   EXPECT_EQ(manifest.at("outcome"), "failed");
-  // Only of the step at which it died may the client have kept something back.
+  // A gap begins at the last step or the step before: only rows that the client had not yet sent.
   for (const auto& gap : manifest.at("missing"))
     EXPECT_GE(gap.at("from").get<int>() + 1, manifest.at("last_step").get<int>()) << gap;
 }
 
 TEST(FaultsTest, KilledServerEndsClientAndRecorderWithItsAbsenceNamed) {
   TemporaryFolder folder;
-  Flight flight(make_scenario(folder, "", "", "mission"));  // patience with a server: 4 s
+  Flight flight(make_scenario(folder, "", "", "mission"));  // waits 4 s for a server
   ASSERT_TRUE(flight.wait_for_steps(500)) << flight.outputs();
   flight.server->kill();
   EXPECT_EQ(flight.client->wait(), 1) << flight.outputs();
@@ -140,7 +140,7 @@ TEST(FaultsTest, KilledPrimaryIsReplacedByTheStandbyAndTheStatesStayIdentical) {
   std::size_t by_primary = 0;
   for (std::size_t row = 0; row < commands.rows(); ++row)
     by_primary += commands.text(row, "controller") == "primary" ? 1 : 0;
-  EXPECT_GT(by_primary, 0u);  // not all up to its end: on a busy machine it may be silent before
+  EXPECT_GT(by_primary, 0u);  // not exact: on a busy machine the standby may take over earlier
   EXPECT_EQ(commands.text(commands.rows() - 1, "controller"), "standby");
 }
 
@@ -179,8 +179,8 @@ TEST(FaultsTest, RefusedCommandOfTheOnlyClientEndsTheRunNamingForceAndClient) {
   EXPECT_EQ(read_manifest(flight.recording()).at("outcome"), "failed");
 }
 
-/// By mode, and by what is done about a controller that does not answer: the server must not wait
-/// for it that long, or waits less than it takes to presume it dead.
+/// Parameters: the mode, and the policy for a controller that does not answer. The server must end
+/// before the deadline of 600 s; the deadline of 1 s is shorter than the time to presume it dead.
 class RefusalTest : public testing::TestWithParam<std::pair<const char*, const char*>> {};
 
 TEST_P(RefusalTest, ARefusedControllerBesideAKilledStandbyIsNamedWithItsForce) {
@@ -201,7 +201,8 @@ TEST_P(RefusalTest, ARefusedControllerBesideAKilledStandbyIsNamedWithItsForce) {
   };
   Process primary(make_client("primary", "2")), standby(make_client("standby", "1"));
   ASSERT_TRUE(someone.wait_for(PHASE_PAUSED)) << server.output();
-  // The clients discover each other meanwhile: one that dies amid that can leave the other deaf.
+  // Time for the clients to discover each other: if one dies during discovery, the other may
+  // receive no samples.
   ASSERT_TRUE(someone.wait_for_statuses(2)) << server.output();
   standby.kill();
   ASSERT_EQ(someone.ask(ACTION_RESUME), "") << server.output();

@@ -1,4 +1,4 @@
-/// The figures the project promises, from recordings of the real programs.
+/// The published figures of the project, calculated from recordings of the real programs.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -15,7 +15,7 @@ TEST(FiguresTest, FigureEightAtOneMillisecondIsTrackedOnTheSecondLapAndLosesNoRo
   flight.expect_success();
   const TrackingError error = calc_tracking_error(flight.recording(), 16000, 32000);
   // docs/results.md, to its last digit. The hold alone explains 4.02e-4 m
-  // (tests/oracle/linear_theory.hpp); the rest is left of the first lap.
+  // (tests/oracle/linear_theory.hpp); the rest is the remaining transient of the first lap.
   EXPECT_NEAR(error.max.maxCoeff(), 4.06e-4, 0.005e-4);
   // Design, section 7: two digits.
   EXPECT_NEAR(error.rms.x(), 1.0e-4, 0.05e-4);
@@ -57,8 +57,8 @@ TEST(FiguresTest, MatlabSetpointConvergesToThePublishedRunWithThePeriod) {
   RecordProperty("distance_at_1_ms_m", std::to_string(full));
   RecordProperty("distance_at_half_ms_m", std::to_string(half));
   std::printf("distance from the published run: %.3e m at 1 ms, %.3e m at 0.5 ms\n", full, half);
-  // Half a period of the load's largest speed, 0.45 m/s in z, which the hold delays:
-  // docs/results.md, to its last digit.
+  // The hold delays the load by half a period; times its largest speed, 0.45 m/s in z, this is the
+  // distance. docs/results.md, to its last digit.
   EXPECT_NEAR(full, 2.27e-4, 0.005e-4);
   EXPECT_NEAR(half, 1.13e-4, 0.005e-4);
 }

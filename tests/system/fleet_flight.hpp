@@ -1,4 +1,4 @@
-/// Flights of several vehicles, judged vehicle by vehicle.
+/// Flights of several vehicles. Each vehicle is judged separately.
 #pragma once
 
 #include <cstdint>
@@ -10,22 +10,21 @@
 
 namespace sls::test {
 
-/// Writes a scenario of six different vehicles into `folder`, with `changes` to its text. Each goes
-/// to a place of its own, and on as soon as it is there: they finish at different steps, the last
-/// after about 4 s.
+/// Writes a scenario of six different vehicles into `folder`, with `changes` to its text. Each has
+/// its own set-points and starts the next stage on arrival: they finish at different steps, the
+/// last after about 4 s.
 std::string make_fleet_scenario(
     const TemporaryFolder& folder,
     const std::vector<std::pair<std::string, std::string>>& changes = {});
 
-/// Expects that every vehicle in `ids` of a recording of `scenario_file` flew bit for bit what the
-/// loop of that vehicle alone flies in one process, without DDS and without a fleet; and that the
-/// recording ends with the last of them to finish.
+/// Expects that the flight of every vehicle in `ids` equals, bit for bit, its flight alone in one
+/// process without DDS. Also expects that the recording ends when the last of them finishes.
 void expect_each_flies_as_alone(const std::filesystem::path& recording,
                                 const std::string& scenario_file,
                                 const std::vector<std::uint32_t>& ids);
 
 /// Rows of state.csv, command.csv and reference.csv of one vehicle, as text, without vehicle_id and
-/// what differs between equal flights (controller, compute_us).
+/// the columns that differ between equal flights (controller, compute_us).
 struct VehicleRows {
   std::vector<std::string> state, command, reference;
 };

@@ -1,5 +1,5 @@
-/// Fleets of the real programs: every vehicle flies what it would fly alone, however the fleet is
-/// spread over servers, clients, threads and transports.
+/// Fleets with the real programs. Every vehicle flies as it would alone, for every distribution of
+/// the fleet over servers, clients, threads and transports.
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -33,7 +33,7 @@ bool begin_with(const std::vector<std::string>& rows, const std::vector<std::str
 
 class FleetTest : public ::testing::Test {
  protected:
-  /// One of the programs in the test's own domain.
+  /// Starts one of the programs in the test's own domain.
   std::unique_ptr<Process> start(const char* name, const std::vector<std::string>& flags,
                                  const std::string& qos_file = {}) const {
     return std::make_unique<Process>(make_command(name, domain_.number(), flags, qos_file));
@@ -84,11 +84,11 @@ struct Spread {
   const char* name;
   std::string qos_file;
   const char* threads;
-  std::vector<std::string> clients;  ///< what each flies
-  std::string vehicles = {};         ///< instead of the six different ones: a grid of so many
+  std::vector<std::string> clients;  ///< vehicles of each client
+  std::string vehicles = {};         ///< instead of the six: number of vehicles in a grid
 };
 
-/// So many vehicles with the first 0.2 s of the figure eight.
+/// A grid of `vehicles` equal vehicles, each with the first 0.2 s of the figure eight.
 std::string make_grid_scenario(const TemporaryFolder& folder, const std::string& vehicles) {
   const std::string file = folder / "grid.yaml";
   write_bytes(file, replace_once(read_file(scenario("short")), "for_s: 2", "for_s: 0.2") +
@@ -163,7 +163,7 @@ TEST_F(FleetTest, InRealTimeWithoutLateAnswersHasTheCertificateOfLockstep) {
       folder_, {{"until: { within_m: 0.3 }", "for_s: 0.2"}, {"for_s: 0.4\n", "for_s: 0.2\n"}});
   Flight lockstep(file);
   lockstep.expect_success();
-  // A busy machine may be late; the slower the flight, the less.
+  // A busy machine may be late; a slower flight leaves more time per period.
   for (const char* real_time_factor : {"0.2", "0.1", "0.05", "0.02"}) {
     Flight flight(file, {{}, {"--mode", "realtime", "--rtf", real_time_factor}, {}});
     flight.expect_success();
@@ -178,7 +178,7 @@ TEST_F(FleetTest, InRealTimeWithoutLateAnswersHasTheCertificateOfLockstep) {
 
 // --- what goes wrong -----------------------------------------------------------------------------
 
-/// A fleet that flies for long, for tests that disturb or stop it.
+/// A long flight, for tests that disturb or stop it.
 const Changes kLong = {{"for_s: 0.4", "for_s: 60"}};
 
 TEST_F(FleetTest, AKilledClientOfOneHalfIsReplacedByAStandbyAndNothingElseChanges) {
@@ -334,7 +334,7 @@ Resources read_resources(pid_t id) {
 }
 
 TEST_F(FleetTest, NeitherMemoryNorDescriptorsGrowInFlightAndNothingIsLeftBehind) {
-  // A history of sls/record that is full soon, and does not grow then.
+  // A small history of sls/record: it is full soon and then no longer grows.
   const std::string file = make_fleet_scenario(folder_, kLong);
   Flight flight(file, {make_qos_with_history(folder_, "default", "100"), {}, {}});
   const auto control = [&](const std::vector<std::string>& words) {
@@ -345,7 +345,7 @@ TEST_F(FleetTest, NeitherMemoryNorDescriptorsGrowInFlightAndNothingIsLeftBehind)
   };
   ASSERT_TRUE(flight.wait_for_steps(6)) << flight.outputs();
   control({"pause"});
-  // By then every history is full.
+  // After these steps every history is full.
   control({"step", "1000"});
   Process* const programs[] = {flight.server.get(), flight.client.get(), flight.recorder.get()};
   std::vector<Resources> before;
@@ -359,7 +359,7 @@ TEST_F(FleetTest, NeitherMemoryNorDescriptorsGrowInFlightAndNothingIsLeftBehind)
   for (std::size_t i = 0; i < before.size(); ++i) {
     const Resources after = read_resources(programs[i]->id());
     EXPECT_EQ(after.descriptors, before[i].descriptors) << i;
-    // 18,000 states went by, of 300 bytes each: kept, they would be 5 MB.
+    // 18,000 states of 300 bytes each would take 5 MB if a program kept them.
     EXPECT_LT(after.resident_kb, before[i].resident_kb + 2500) << i;
   }
   control({"stop"});
@@ -381,13 +381,14 @@ TEST_F(FleetTest, ARecorderKeepsNothingOfAnotherRunOnItsDomain) {
     programs.push_back(start(name, {"--scenario", file, "--vehicles", "1-5"}));
   ASSERT_TRUE(wait_until([&] { return read_file(others + "/state.csv").size() > 1'000'000; }))
       << programs[0]->output();
-  // Its own run begins amid the other one, and waits for its client until that is over.
+  // The recorder's own run begins during the other one and waits for its client until the other
+  // ends.
   const auto server = start("sim_server", {"--scenario", file, "--vehicles", "0"});
   for (const auto& process : programs) EXPECT_EQ(process->wait(), 0) << process->output();
   ASSERT_TRUE(holds(recorder->output(), "records run")) << recorder->output();
-  // State, command and reference of five vehicles and 7,500 steps at least went by, of 200 bytes
-  // at least: kept, they would be 22 MB (and were 83). More participants and a run of its own take
-  // about 4 MB.
+  // The other run's state, command and reference samples (five vehicles, at least 7,500 steps, at
+  // least 200 bytes) would take 22 MB if kept; an earlier version took 83 MB. More participants and
+  // the recorder's own run take about 4 MB.
   EXPECT_LT(read_resources(recorder->id()).resident_kb, before_kb + 11'000);
   const auto client = start("control_client", {"--scenario", file, "--vehicles", "0"});
   for (Process* process : {server.get(), client.get(), recorder.get()})

@@ -128,7 +128,7 @@ std::string make_qos_with_history(const TemporaryFolder& folder, const std::stri
 TrackingError calc_tracking_error(const std::filesystem::path& recording, std::size_t first,
                                   std::size_t last) {
   const Table states(recording / "state.csv"), references(recording / "reference.csv");
-  std::map<std::size_t, std::size_t> rows;  // of references, which unanswered steps may not have
+  std::map<std::size_t, std::size_t> rows;  // of references; unanswered steps may have none
   for (std::size_t row = 0; row < references.rows(); ++row)
     rows[static_cast<std::size_t>(references.number(row, "step"))] = row;
   TrackingError error;

@@ -15,7 +15,7 @@
 namespace sls::test {
 
 struct FlightOptions {
-  std::string qos_file;             ///< default: the programs' own
+  std::string qos_file;             ///< default: the programs' default
   std::vector<std::string> server;  ///< further flags
   std::vector<std::string> client;
   /// Put before the command line of a program, such as `Network::on("server")` or {"env", "A=B"}.
@@ -29,12 +29,12 @@ class Flight {
 
   /// Waits for all three; fails the test if one does not end.
   void wait();
-  /// Waits for all three and expects them to end well with a complete recording.
+  /// Waits for all three; expects exit code 0 and a complete recording.
   void expect_success();
   /// Waits until at least `steps` rows of state.csv are on the disk.
   bool wait_for_steps(std::size_t steps) const;
 
-  /// Everything the three have printed, for messages.
+  /// Output of all three, for messages.
   std::string outputs() const;
 
   const std::filesystem::path& recording() const { return recording_; }
@@ -54,7 +54,7 @@ std::vector<std::string> make_command(const std::string& name, int domain,
                                       const std::vector<std::string>& flags,
                                       const std::string& qos_file = {});
 
-/// A QoS file in `folder`: the shipped `base` with a history of so many batches of sls/record.
+/// A QoS file in `folder`: the shipped `base` with a history of `batches` samples of sls/record.
 std::string make_qos_with_history(const TemporaryFolder& folder, const std::string& base,
                                   const std::string& batches);
 

@@ -12,7 +12,7 @@ namespace fs = std::filesystem;
 
 std::string launcher() { return std::string(SLS_SOURCE_DIR) + "/sls"; }
 
-/// True while a process runs whose command line holds `text`.
+/// True while a process runs that has `text` in its command line.
 bool is_anyone_running(const std::string& text) {
   for (const auto& entry : fs::directory_iterator("/proc")) {
     std::string command = read_file(entry.path() / "cmdline");

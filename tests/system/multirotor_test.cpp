@@ -1,4 +1,4 @@
-/// Multirotors in the real programs: one result however they fly, fleets, and what they say.
+/// Multirotors in the real programs: one result in every mode, fleets, and printed messages.
 #include <gtest/gtest.h>
 
 #include "tests/system/fleet_flight.hpp"
@@ -32,7 +32,7 @@ class MultirotorSystemTest : public ::testing::Test {
 };
 
 TEST_F(MultirotorSystemTest, ThePublishedFlightHasOneResult) {
-  // 3,700 periods, so that it still flies when its client is killed.
+  // 3,700 periods: the flight must still run when its client is killed.
   const Changes longer = {{"for_s: 32", "for_s: 64"}};
   const std::string file = make_scenario(folder_, longer, "px4_published");
   const fs::path once = fly_in_process(file, "once");
@@ -88,7 +88,7 @@ void expect_said(const fs::path& recording, const std::string& remark) {
 }
 
 TEST_F(MultirotorSystemTest, RotorsAtTheirLargestSpeedAreAnEventOfTheRecording) {
-  // Hovering takes 913 rad/s. The load begins 2 m below the eight.
+  // Hovering requires 913 rad/s. The load begins 2 m below the eight.
   const std::string file =
       make_scenario(folder_,
                     {{"max_speed_rad_s: 1100", "max_speed_rad_s: 950"},

@@ -1,5 +1,5 @@
-/// One scenario, one result: whatever happens around a lockstep flight, its certificate stays the
-/// same. And what a scenario's faults do depends on simulation time alone.
+/// One scenario, one result: no disturbance of a lockstep flight changes its certificate. The
+/// effect of a scenario's faults depends only on simulation time.
 #include <gtest/gtest.h>
 #include <sched.h>
 #include <signal.h>
@@ -17,7 +17,7 @@ std::string read_certificate(const std::filesystem::path& recording) {
   return read_manifest(recording).at("certificate").get<std::string>();
 }
 
-/// Starts what follows on the first core alone while it lives.
+/// While it exists, new processes run only on the first core.
 class OneCore {
  public:
   OneCore() {
@@ -85,14 +85,15 @@ TEST_F(OneResultTest, WithFivePercentOfAllDatagramsLost) {
   EXPECT_GT(std::stoi(flight.server->output().substr(at + 16)), 100) << flight.server->output();
 }
 
-/// Eight laps: lasts beyond the test's look at the first steps on the fastest machine.
+/// Eight laps: even on the fastest machine the flight must not end before the test has read the
+/// first steps.
 std::string make_long_scenario(const TemporaryFolder& folder, const std::string& controllers) {
   return make_scenario(
       folder, {{"for_s: 32", "for_s: 128"}, {"controllers: 1", "controllers: " + controllers}},
       "figure_eight");
 }
 
-/// Certificate of its flight in one process.
+/// Certificate of the flight of `file` in one process.
 std::string fly_in_process(const std::string& file, const TemporaryFolder& folder) {
   Process flight({program("closed_loop"), "--scenario", file, "--out", folder / "in-process"});
   EXPECT_EQ(flight.wait(), 0) << flight.output();
@@ -132,10 +133,10 @@ TEST_F(OneResultTest, WithThePrimaryKilled) {
   EXPECT_EQ(read_certificate(flight.recording()), fly_in_process(file, folder));
 }
 
-// --- sensing
-// ---------------------------------------------------------------------------------------
+// --- sensing -------------------------------------------------------------------------------------
 
-/// `figure_eight` with sensors that fit neither plant step nor control period, and late answers.
+/// `figure_eight` with late answers and with sensor periods that are no multiples of the plant step
+/// or the control period.
 std::string make_sensed_scenario(const TemporaryFolder& folder, const std::string& controllers) {
   return make_scenario(
       folder,

@@ -1,5 +1,5 @@
-/// An operator in the test's own process: asks a running server for things within milliseconds, and
-/// hears what it says in sls/status.
+/// An operator in the test's own process: sends requests to a running server within milliseconds,
+/// and reads sls/status.
 #pragma once
 
 #include <mutex>
@@ -22,7 +22,7 @@ class Operator {
                          ++samples_;
                        }) {}
 
-  /// Empty if the server did what it was asked for; else why not.
+  /// Empty if the server executed the request, otherwise the reason.
   std::string ask(ControlAction action, std::uint64_t steps = 0) {
     try {
       const auto reply = client_.ask(*client_.wait_for_run(), action, steps);
@@ -32,7 +32,7 @@ class Operator {
     }
   }
 
-  /// False if the server never says so.
+  /// False if the server does not report `phase` before the deadline.
   bool wait_for(RunPhase phase) {
     return wait_until([&] {
       const std::lock_guard lock(mutex_);
@@ -40,8 +40,7 @@ class Operator {
     });
   }
 
-  /// Waits for so many further statuses. While nothing happens they are 0.4 s apart, or more: so
-  /// much time has passed then.
+  /// Waits for `count` further statuses. Without events each takes at least 0.4 s.
   bool wait_for_statuses(std::size_t count) {
     const std::size_t before = samples();
     return wait_until([&] { return samples() >= before + count; });
@@ -55,7 +54,7 @@ class Operator {
 
   bus::Node node_;
   ctl::OperatorClient client_;
-  mutable std::mutex mutex_;  // over what follows
+  mutable std::mutex mutex_;  // protects the two members below
   RunPhase phase_ = PHASE_WAITING;
   std::size_t samples_ = 0;
   bus::Reader<SimStatus> status_reader_;  // last: its handler uses the members above

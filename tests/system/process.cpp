@@ -18,7 +18,7 @@ Process::Process(const std::vector<std::string>& command) {
   id_ = fork();
   if (id_ < 0) throw std::runtime_error("fork");
   if (id_ == 0) {
-    setpgid(0, 0);  // a signal to the test's terminal is not for it
+    setpgid(0, 0);  // signals of the test's terminal do not reach it
     const int output = open(output_file.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0644);
     dup2(output, STDOUT_FILENO);
     dup2(output, STDERR_FILENO);
@@ -29,7 +29,7 @@ Process::Process(const std::vector<std::string>& command) {
 
 Process::~Process() {
   if (!is_running()) return;
-  ::kill(-id_, SIGKILL);  // the group: a launcher's children too
+  ::kill(-id_, SIGKILL);  // the process group: also a launcher's children
   wait(std::chrono::seconds(10));
 }
 
@@ -58,8 +58,8 @@ void Process::kill() {
 
 std::vector<std::filesystem::path> find_shared_memory(pid_t id) {
   namespace fs = std::filesystem;
-  // Fast DDS holds a lock file NAME_el open for its own segment NAME. Not so the ports: others have
-  // them open, and the next process takes them over.
+  // Fast DDS holds a lock file NAME_el open for its own segment NAME. The ports are not
+  // among them: other processes have them open, and the next process takes them over.
   const std::string prefix = "/dev/shm/fastrtps_", suffix = "_el";
   std::vector<fs::path> own;
   for (const auto& descriptor : fs::directory_iterator("/proc/" + std::to_string(id) + "/fd")) {

@@ -1,5 +1,5 @@
-/// Real processes for system tests: started, waited for with a deadline, and never left behind,
-/// whatever the test does.
+/// Real processes for system tests: started, waited for with a deadline, and always ended with the
+/// test.
 #pragma once
 
 #include <sys/types.h>
@@ -22,7 +22,7 @@ namespace sls::test {
 class Process {
  public:
   explicit Process(const std::vector<std::string>& command);
-  ~Process();  // kills what still runs
+  ~Process();  // kills the process if it still runs
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
 
@@ -30,11 +30,12 @@ class Process {
   std::optional<int> wait(std::chrono::milliseconds limit = std::chrono::seconds(240));
   bool is_running();
   void send(int signal);
-  /// SIGKILL, and what it keeps the process from removing is removed. Waits for its end: a process
-  /// that is started while another one still dies may take over its ports, and is never discovered.
+  /// Sends SIGKILL, and removes the files that the killed process can no longer remove. Waits for
+  /// its end: a process that starts before that may take over its ports and is then never
+  /// discovered.
   void kill();
   pid_t id() const { return id_; }
-  /// Everything it has printed so far.
+  /// Its output so far.
   std::string output() const;
 
  private:
@@ -43,10 +44,10 @@ class Process {
   std::optional<int> exit_code_;
 };
 
-/// The segment in /dev/shm that a process has to itself: left behind when it is killed.
+/// Files of the process's own segment in /dev/shm. They remain if the process is killed.
 std::vector<std::filesystem::path> find_shared_memory(pid_t id);
 
-/// Ends any process for good, and removes its shared-memory segment, which it can no longer.
+/// Kills any process and removes its shared-memory segment.
 void kill_process(pid_t id);
 
 /// The bytes of `file`; none if it does not exist (yet).
@@ -57,7 +58,7 @@ std::string program(const std::string& name);
 std::string scenario(const std::string& name);
 std::string qos(const std::string& name);
 
-/// A shipped scenario, the short flight (2 s) or another, with `changes` to its text: a file in
+/// Writes a shipped scenario (the short flight of 2 s, or another) with `changes` to its text into
 /// `folder`.
 std::string make_scenario(const TemporaryFolder& folder,
                           const std::vector<std::pair<std::string, std::string>>& changes,

@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// How many bytes a process has read from files; also when it has ended, until it is waited for.
+/// Number of bytes a process has read from files. Also valid after its end, until it is waited for.
 std::uint64_t count_reads(const Process& process) {
   const std::string counters = read_file("/proc/" + std::to_string(process.id()) + "/io");
   const std::string key = "rchar: ";
@@ -38,7 +38,7 @@ class RecordingFilesTest : public testing::Test {
   const OwnDomain domain_;
 };
 
-// Not once for each of the 40 vehicles.
+// The files must not be read once for each of the 40 vehicles.
 TEST_F(RecordingFilesTest, OfAFleetAreReadAFewTimesToResumeAndToVerifyHoweverManyVehiclesFly) {
   const std::string file = make_scenario(folder_, {{"for_s: 2", "for_s: 8"}});
   write_bytes(file, read_file(file) + "vehicles: 40\n");
@@ -52,27 +52,27 @@ TEST_F(RecordingFilesTest, OfAFleetAreReadAFewTimesToResumeAndToVerifyHoweverMan
   for (const char* name : {"state.csv", "command.csv", "reference.csv"})
     rows += fs::file_size(fs::path(recording()) / name);
 
-  // For settings and the like: a recorder that finds no server reads 50 kB.
+  // Allowance for other files, such as settings: a recorder that finds no server reads 50 kB.
   constexpr std::uint64_t kStart = 1 << 20;
   recorder = start("recorder", {"--out", recording(), "--resume"});
   ASSERT_TRUE(wait_until([&] { return holds(recorder->output(), "segment-2, from step "); },
                          std::chrono::minutes(4)))
       << recorder->output();
-  // Twice: to find the step to go on with, and for the certificate.
+  // Reads twice: to find the step to resume from, and for the certificate.
   EXPECT_LT(count_reads(*recorder), kStart + 3 * rows);
   for (Process* process : {recorder.get(), server.get(), client.get()}) {
     process->send(SIGTERM);
     EXPECT_TRUE(process->wait().has_value()) << process->output();
   }
 
-  // Each of the two three times: for the hashes, for the certificate, for the comparison.
+  // Reads each of the two recordings three times: for checksums, certificate and comparison.
   Process verify({program("sls_verify"), recording(), recording()});
   ASSERT_TRUE(wait_until([&] { return find_state(verify.id()) == 'Z'; }, std::chrono::minutes(4)));
   EXPECT_LT(count_reads(verify), kStart + 6 * count_bytes(recording()));
   EXPECT_EQ(verify.wait(), 0) << verify.output();
 }
 
-// A power cut may leave any part of what is not on the disk yet, and the renaming too.
+// After a power cut, any part of the data not yet on the disk may be missing, also the renaming.
 TEST_F(RecordingFilesTest, AreOnTheDiskBeforeTheManifestThatListsThem) {
   const std::string log = folder_ / "log";
   FlightOptions options;
@@ -84,7 +84,7 @@ TEST_F(RecordingFilesTest, AreOnTheDiskBeforeTheManifestThatListsThem) {
   const std::string part = folder + "/manifest.json.part", manifest = folder + "/manifest.json";
 
   std::istringstream lines(read_file(log));
-  std::map<std::string, std::uint64_t> synced;  // since the last renaming; bytes
+  std::map<std::string, std::uint64_t> synced;  // bytes per file since the last renaming
   std::map<std::string, std::uint64_t> before_the_last;
   int renamings = 0;
   for (std::string what, from, to; lines >> what >> from >> to;) {

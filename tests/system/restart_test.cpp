@@ -1,4 +1,4 @@
-/// Any process is killed and started again, and nothing else has to be.
+/// Any process can be killed and restarted without a restart of the others.
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -9,7 +9,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The output of `sls_verify` for two recordings, and whether they are equal.
+/// True if `sls_verify` finds the two recordings equal, and its output.
 std::pair<bool, std::string> verify(const fs::path& a, const fs::path& b) {
   Process process({program("sls_verify"), a.string(), b.string()});
   const auto code = process.wait();
@@ -122,7 +122,7 @@ TEST_F(RestartTest, ProgramsWithoutFollowEndNamingTheNewServer) {
   EXPECT_TRUE(holds(recorder->output(), "was replaced by run")) << recorder->output();
 }
 
-/// A process that is killed cannot remove its shared memory; the next one must start all the same.
+/// A killed process cannot remove its shared memory. The next process must still start.
 TEST_F(RestartTest, StaleSharedMemoryStopsNoStart) {
   std::vector<fs::path> left;
   for (int i = 0; i < 3; ++i) {

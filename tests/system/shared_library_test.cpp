@@ -1,4 +1,4 @@
-/// Shared libraries that end, or would hang, the program that calls them.
+/// Shared libraries that end or block the program that calls them.
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -183,7 +183,7 @@ TEST(SharedLibraryProgramTest, AFailedRecordingHoldsTheLibrarysMessage) {
   EXPECT_TRUE(holds(statuses, message)) << statuses;
 }
 
-/// Flights without shared memory, of which a process that ends amid a call would leave its own.
+/// Without shared memory, because a process that ends during a call would leave its segment behind.
 FlightOptions over_udp() {
   FlightOptions options;
   options.qos_file = qos("udp");
@@ -221,7 +221,7 @@ TEST(SharedLibraryProgramTest, AControllerThatNeverReturnsIsNamedAndEndsAfterThe
   EXPECT_EQ(flight.client->wait(), 1);
   const std::string place = kController + ": answer, vehicle 0, step 5: has not returned for ";
   expect_line(flight.client->output(), "control_client: warning: " + place + "[0-9]+ s");
-  // Not the minute that a call may take in flight.
+  // Less than the minute that a call may take in flight.
   expect_line(flight.client->output(),
               "control_client: error: " + place + "[0-5]?[0-9] s: ends the program");
 }

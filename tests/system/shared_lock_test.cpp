@@ -1,5 +1,5 @@
-/// A client dies or stops while it holds a lock of a shared-memory port, its own or that of another
-/// process: the others go on, at the latest when the stopped one does, and nobody dies with it.
+/// A client dies or stops while it holds a lock of a shared-memory port (its own or that of another
+/// process). The others continue, at the latest when the stopped client continues, and none dies.
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -8,11 +8,11 @@
 namespace sls::test {
 namespace {
 
-/// By the kind of the lock: over a port's messages, or over who waits for them.
+/// Parameter: the lock of a port's messages, or the lock of the list of its waiting readers.
 class SharedLockTest : public testing::TestWithParam<const char*> {
  protected:
   /// Starts a flight of two clients. The primary sends itself `signal` in the middle of the flight,
-  /// while it holds a lock of its own port or of that of another process.
+  /// while it holds a lock of its own port or of another process's port.
   void start(int signal, const std::string& port) {
     const std::string file =
         make_scenario(folder_, {{"controllers: 1", "controllers: 2"}}, "figure_eight");
@@ -37,7 +37,7 @@ class SharedLockTest : public testing::TestWithParam<const char*> {
 
   bool is_primary_stopped() const { return find_state(flight_->client->id()) == 'T'; }
 
-  /// Of the flight without the primary.
+  /// Expects the result of the flight without the primary.
   void expect_result() {
     EXPECT_EQ(flight_->server->wait(), 0) << flight_->outputs();
     EXPECT_EQ(standby_->wait(), 0) << standby_->output();
@@ -48,7 +48,8 @@ class SharedLockTest : public testing::TestWithParam<const char*> {
                 read_file(flight_->recording() / "state.csv"));
   }
 
-  /// Nobody waits for the primary's lease to end, 2 s: a wait of 1 s would have been named.
+  /// No process waits until the primary is presumed dead (2 s): a wait of 1 s would print a
+  /// message.
   void expect_take_over() {
     expect_result();
     EXPECT_FALSE(is_said("waiting for: controller '")) << flight_->outputs();
@@ -80,7 +81,7 @@ TEST_P(SharedLockTest, OfItsOwnPortWithAStoppedClient) {
 TEST_P(SharedLockTest, OfAnotherPortWithAStoppedClient) {
   start(SIGSTOP, "other");
   ASSERT_TRUE(wait_until([&] { return is_primary_stopped(); })) << flight_->outputs();
-  // Nobody hears of the primary, or the standby or the recorder is cut off as well.
+  // The primary's samples no longer arrive, or the standby or the recorder is cut off as well.
   ASSERT_TRUE(wait_until([&] { return is_said("takes over") || is_said("silent since"); }))
       << flight_->outputs();
   flight_->client->send(SIGCONT);
@@ -88,7 +89,7 @@ TEST_P(SharedLockTest, OfAnotherPortWithAStoppedClient) {
   EXPECT_EQ(flight_->client->wait(), 0) << flight_->client->output();
 }
 
-/// The client stays stopped, mostly with a lock of the server's port.
+/// The client stays stopped. The lock that it holds is mostly that of the server's port.
 TEST_P(SharedLockTest, OfAnotherPortWithAStoppedClientDoesNotKeepTheServerFromEnding) {
   const std::string file =
       make_scenario(folder_,

@@ -1,5 +1,5 @@
 /// Every file of config/scenarios, flown by the real programs and judged by theory or by published
-/// figures. A new file fails until `kJudges` says what its flight must show.
+/// figures. `kJudges` must have an entry for each file.
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -23,7 +23,7 @@ using Eigen::Vector3d;
 struct Step {
   std::size_t stage;
   Vector3d error, v_WL;
-  Vector3d seen_error;  ///< that of the load that was measured
+  Vector3d seen_error;  ///< error of the measured load
   model::Reference reference;
 };
 
@@ -72,8 +72,8 @@ std::vector<Flown> read_flights(const std::string& scenario_file,
   return flights;
 }
 
-/// Where the vertical reference jumps, so do the load's acceleration and jerk: the rod's slope w
-/// and its rate stay, s = g − n₃ does not (the law's eq. (5)).
+/// If the vertical reference jumps, the load's acceleration and jerk also jump: s = g − n₃ changes,
+/// but the rod's slope w and its rate do not (the law's eq. (5)).
 void jump(const Flown& flown, const Step& start, Vector3d& acceleration, Vector3d& jerk) {
   const control::AxisGains& z = flown.gains.vertical;
   const double g = flown.scenario.vehicle.gravity, s_before = g - acceleration.z();
@@ -88,8 +88,8 @@ void jump(const Flown& flown, const Step& start, Vector3d& acceleration, Vector3
   jerk << n3_dot * w - (g - n3) * w_dot, n3_dot;
 }
 
-/// A controller that knows its vehicle makes the load's error that of the designed linear
-/// equations, however far it flies, up to the hold.
+/// If the controller's model is correct, the load's error follows the designed linear equations,
+/// for small and large motions. Only the hold adds a deviation.
 void expect_designed_response(const Flown& flown) {
   const auto& [xy, z] = flown.gains;
   const std::vector<Step>& steps = flown.steps;
@@ -97,7 +97,7 @@ void expect_designed_response(const Flown& flown) {
   for (std::size_t first = 0; first < steps.size(); first = last) {
     while (last < steps.size() && steps[last].stage == steps[first].stage) ++last;
     const Step& start = steps[first];
-    // The load moves as it was told before, and rests at first.
+    // The load begins a stage with the motion of the previous reference, the first one at rest.
     Vector3d acceleration(0, 0, 0), jerk(0, 0, 0);
     if (first > 0) {
       acceleration = steps[first - 1].reference.acceleration;
@@ -120,8 +120,8 @@ void expect_designed_response(const Flown& flown) {
       double deviation = 0.0;
       for (std::size_t i = first; i < last; ++i)
         deviation = std::max(deviation, std::abs(steps[i].error[axis] - designed[i - first]));
-      // A held force is late by half a period on average, and so is the load: by half a period
-      // times its speed. A fifth more for what overshoots.
+      // The hold delays force and load by half a period on average: the deviation is half a period
+      // times the speed. A fifth more allows for overshoot.
       EXPECT_LE(deviation, 0.6 * flown.period() * speed)
           << "stage " << start.stage << ", axis " << axis;
     }
@@ -156,9 +156,9 @@ LapError calc_second_lap_error(const Flown& flown, Vector3d Step::*of = &Step::e
   return lap_error;
 }
 
-/// Linear theory leaves out what is of second order in the rod's slope, 0.05 at most on the figure
-/// eight. Horizontally that is 0.25 %, and as much is left of the first lap; in height it is
-/// added to an error a hundred times smaller: 4 %.
+/// Linear theory neglects terms of second order in the rod's slope, which is at most 0.05 on the
+/// figure eight. Horizontally they are 0.25 %, and the remaining transient of the first lap is as
+/// large. In height they are added to an error a hundred times smaller: 4 %.
 void expect_steady_error(const Flown& flown, double tolerance_z = 0.05,
                          double tolerance_xy = 0.005) {
   const Array3d rms = calc_second_lap_error(flown).rms;
@@ -168,7 +168,7 @@ void expect_steady_error(const Flown& flown, double tolerance_z = 0.05,
         << "axis " << axis;
 }
 
-/// As printed in docs/results.md: to half a unit of the last digit.
+/// Expects the numbers of docs/results.md, to half a unit of the last digit.
 void expect_printed(const Array3d& error, const Vector3d& printed, const Vector3d& last_digit) {
   for (int axis = 0; axis < 3; ++axis)
     EXPECT_NEAR(error[axis], printed[axis], 0.5 * last_digit[axis]) << "axis " << axis;
@@ -189,7 +189,7 @@ void expect_demo(const Flown& flown) {
 
 void expect_published_gazebo_errors(const Flown& flown) {
   const LapError lap = calc_second_lap_error(flown);
-  // Design, section 7, published: our plant is not Gazebo's rigid bodies, hence 2 mm.
+  // Published: design, section 7. Tolerance 2 mm, because this plant is not Gazebo's rigid bodies.
   const Vector3d published(0.211, 0.236, 0.098);
   for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(lap.rms[axis], published[axis], 0.002) << axis;
   EXPECT_NEAR(lap.max.x(), 0.388, 0.002);
@@ -199,21 +199,22 @@ void expect_published_gazebo_errors(const Flown& flown) {
 
 void expect_wiring_alone_put_right(const Flown& flown) {
   const LapError lap = calc_second_lap_error(flown);
-  // In height the rod's missing 0.1 m and the missing weight: nearly all of the error, and a mean.
+  // In height nearly all of the error is constant: the rod in the controller's model is 0.1 m too
+  // short and the weight too small.
   const double height = oracle::calc_steady_error(flown.scenario, find_eight(flown)).mean.z();
-  EXPECT_NEAR(lap.rms.z(), height, 0.1 * (1 - std::cos(0.05)));  // of a rod that leans by 0.05
-  // Of this and of 0.2099 and 0.2366 with the published wiring: 118 and 48 times better.
+  EXPECT_NEAR(lap.rms.z(), height, 0.1 * (1 - std::cos(0.05)));  // rod slope 0.05
+  // With the published wiring 0.2099 and 0.2366, which is 118 and 48 times larger.
   expect_printed(lap.rms, {1.78e-3, 4.92e-3, 0.1039}, {1e-5, 1e-5, 1e-4});
 }
 
 void expect_wiring_and_model_put_right(const Flown& flown) {
   expect_eight(flown);
-  // 910 and 300 times better than with the published wiring.
+  // 910 and 300 times smaller than with the published wiring.
   expect_printed(calc_second_lap_error(flown).rms, {2.31e-4, 7.88e-4, 1.46e-5}, {1e-6, 1e-6, 1e-7});
 }
 
-/// A thrust that leans by D |v − v_wind| / (M g) carries the drag; drag across it lifts by that
-/// times D |v − v_wind|. It is all that the mean height shows.
+/// To balance the drag, the thrust leans by D |v − v_wind| / (M g). The drag acts across the thrust
+/// and has an upward part: this lean times D |v − v_wind|. Only this part changes the mean height.
 void expect_drag_of_wind(const Flown& flown) {
   expect_steady_error(flown, INFINITY);
   const config::FigureEightReference& eight = find_eight(flown);
@@ -226,13 +227,15 @@ void expect_drag_of_wind(const Flown& flown) {
   const double mass = flown.scenario.vehicle.total_mass();
   const double lift =
       air.rotor_drag * air.rotor_drag * speed_2 / (mass * flown.scenario.vehicle.gravity);
-  // 7.6 mm; the load's error is 0.2 of the reference's motion, whose speed is 7 % of speed_2.
+  // Expected: 7.6 mm. Tolerance: the load's error is 0.2 of the reference's motion, and the speed
+  // of this motion is 7 % of speed_2.
   EXPECT_NEAR(calc_second_lap_error(flown).mean.z(), -lift / (mass * flown.gains.vertical.position),
               4e-4);
 }
 
-/// The believed mass M′ closes the loop e⁽³⁾ = −(M′/M) (k_v ë + k_p ė + k_i e) of the height, whose
-/// error starts with ë = −(M′/M) (k_v ė + k_p e) − (M′ − M) g / M.
+/// With the mass M′ of the controller's model, the height error is the solution of
+/// e⁽³⁾ = −(M′/M) (k_v ë + k_p ė + k_i e). It starts with
+/// ë = −(M′/M) (k_v ė + k_p e) − (M′ − M) g / M.
 void expect_height_of_wrong_mass(const Flown& flown) {
   const model::SlungLoadParameters& truth = flown.scenario.vehicle;
   const double ratio = flown.scenario.controller.model.vehicle.total_mass() / truth.total_mass();
@@ -242,18 +245,20 @@ void expect_height_of_wrong_mass(const Flown& flown) {
       ratio * Eigen::RowVector3d(z.integral, z.position, z.velocity),
       Vector3d(e, 0.0, -ratio * z.position * e - (ratio - 1.0) * truth.gravity), flown.period(),
       flown.steps.size());
-  // While the load swings, the wrong tension reaches the height; after 20 s it hangs still. The
-  // delayed part of the hold then moves by 2.5e-4 m/s at most.
+  // While the load swings, the wrong tension disturbs the height. After 20 s the load hangs still;
+  // the height, which the hold delays, then moves at 2.5e-4 m/s at most.
   for (std::size_t i = 5000; i < expected.size(); ++i)
     ASSERT_NEAR(flown.steps[i].error.z(), expected[i], 0.5 * flown.period() * 2.5e-4) << i;
 }
 
-/// With a load believed too light or too heavy the height rests at e = (M − M′) g / (M′ k_p).
+/// If the load is too light or too heavy in the controller's model, the height error at rest is
+/// e = (M − M′) g / (M′ k_p).
 void expect_rest_with_wrong_mass(const Flown& flown) {
   const model::SlungLoadParameters& truth = flown.scenario.vehicle;
   const double believed = flown.scenario.controller.model.vehicle.total_mass();
   const Vector3d& error = flown.steps.back().error;
-  // The remainder of the designed height 8 s after a step of 1.2 m: 2.6 e^(−1.175 · 8) of it.
+  // Tolerance: the designed height error 8 s after a step of 1.2 m is 2.6 e^(−1.175 · 8) of the
+  // step.
   EXPECT_NEAR(
       error.z(),
       (truth.total_mass() - believed) * truth.gravity / (believed * flown.gains.vertical.position),
@@ -262,9 +267,9 @@ void expect_rest_with_wrong_mass(const Flown& flown) {
   EXPECT_LE(error.head<2>().norm(), 0.02);
 }
 
-/// A rod angle that is read b wrong holds the load off by b (L + g (ω² − k_a) / k_p): at rest the
+/// A bias b of the measured rod angle offsets the load by b (L + g (ω² − k_a) / k_p): at rest the
 /// force −(m + m_L) g b + m L n / g of small motions about hover must vanish. Noise, losses and
-/// delays have no mean.
+/// delays have zero mean.
 void expect_offset_of_biased_angle(const Flown& flown) {
   const model::SlungLoadParameters& vehicle = flown.scenario.vehicle;
   const control::AxisGains& xy = flown.gains.horizontal;
@@ -272,15 +277,15 @@ void expect_offset_of_biased_angle(const Flown& flown) {
       vehicle.total_mass() * vehicle.gravity / (vehicle.quad_mass * vehicle.rod_length);
   const double offset =
       0.01 * (vehicle.rod_length + vehicle.gravity * (omega_2 - xy.acceleration) / xy.position);
-  // The last 8 s are a period of the figure eight's y; the bias began 8 s before.
+  // The mean over the last 8 s, a period of the figure eight's y. The bias began 8 s before them.
   double mean = 0.0;
   for (std::size_t i = 6000; i < 8000; ++i) mean += flown.steps.at(i).error.y() / 2000;
-  // Noise of the velocities, 5 mm/s, in the mean of 2,000 samples, times k_v / k_p.
+  // Tolerance: velocity noise, 5 mm/s, in the mean of 2,000 samples, times k_v / k_p.
   EXPECT_NEAR(mean, offset, 4e-4);
 }
 
-/// The cascade without feed-forward follows a sine of frequency ω as its transfer function says,
-/// near hover: control_client/laws/pid/README.md, eqs. (2) to (5).
+/// Near hover, the cascade without feed-forward follows a sine of frequency ω with its transfer
+/// function: control_client/laws/pid/README.md, eqs. (2) to (5).
 void expect_lag_of_cascade(const Flown& flown) {
   const auto& gains = flown.scenario.controller.own.get<control::PidKeys>().gains;
   const auto& eight = std::get<config::FigureEightReference>(flown.scenario.mission[0].reference);
@@ -288,7 +293,7 @@ void expect_lag_of_cascade(const Flown& flown) {
   const auto calc_rms = [&](int axis, double frequency) {
     const std::complex<double> s(0.0, frequency);
     const auto& k = axis < 2 ? gains.horizontal : gains.vertical;
-    // How much later the acceleration that is asked for comes about: by the rod, or at once.
+    // Lag of the acceleration behind its command: horizontally through the rod, vertically none.
     const auto rod = axis < 2 ? (s * s + k.rod_rate * s + k.rod_angle) / k.rod_angle : 1.0;
     const auto followed =
         k.velocity * k.position / (s * s * rod + k.velocity * s + k.velocity * k.position);
@@ -299,14 +304,15 @@ void expect_lag_of_cascade(const Flown& flown) {
   const std::size_t lap = flown.steps.size() / 2;
   for (std::size_t i = lap; i < 2 * lap; ++i) squares += flown.steps[i].error.array().square();
   const Array3d rms = (squares / static_cast<double>(lap)).sqrt();
-  // The rod's slope stays below 0.06, whose square is 0.4 %; the hold adds half a period of lag.
+  // Tolerance: the square of the rod's slope, below 0.06, is 0.4 %; the hold delays by half a
+  // period.
   for (int axis = 0; axis < 3; ++axis)
     EXPECT_NEAR(rms[axis], expected[axis], 0.01 * expected[axis]) << "axis " << axis;
 }
 
 // --- multirotors ---------------------------------------------------------------------------------
 
-/// About the figure eight at −0.5 m by which the published PX4 flight is measured.
+/// Error from the figure eight at −0.5 m, the reference of the published PX4 flight.
 LapError calc_published_lap_error(const Flown& flown, Vector3d Step::*of) {
   return calc_second_lap_error(flown, of, Vector3d(0, 0, find_eight(flown).offset.z() + 0.5));
 }
@@ -342,7 +348,7 @@ void expect_px4_with_fitted_errors(const Flown& flown) {
                  Vector3d::Constant(2e-4));
 }
 
-/// The theory is one of continuous time, which at 50 Hz is 1 % off.
+/// The theory assumes continuous time; its error at 50 Hz is 1 %.
 void expect_hold_of_20_ms(const Flown& flown) {
   expect_designed_response(flown);
   expect_steady_error(flown, 0.05, 0.015);
@@ -354,9 +360,9 @@ void expect_offset_of_reference(const Flown& flown) {
   EXPECT_NEAR(calc_published_lap_error(flown, &Step::error).rms.z(), 0.100, 1e-4);
 }
 
-/// A vehicle whose autopilot takes W for turned pushes so too. The part M g θ of its weight that
-/// pushes aside is held by (m L / g) k_p of the error, and the force that holds it is turned by the
-/// yaw.
+/// An estimated attitude with the tilt θ and a yaw error turns the force. The tilt pushes the
+/// vehicle aside with M g θ, which (m L / g) k_p times the error balances. The yaw turns the
+/// balancing force.
 void expect_offset_of_tilt_and_yaw(const Flown& flown) {
   const model::SlungLoadParameters& vehicle = flown.scenario.vehicle;
   const auto& attitude = flown.scenario.estimator.attitude;
@@ -372,14 +378,15 @@ void expect_offset_of_tilt_and_yaw(const Flown& flown) {
   expect_near(lap.rms, {0.109, 0.232, 0.001}, Vector3d::Constant(0.005));  // design, section 11
 }
 
-/// The true load, and the load as the sensors tell it.
+/// Expects the steady errors of the true load and of the measured load.
 void expect_error_of_late_states(const Flown& flown) {
   const oracle::SteadyError expected = oracle::calc_steady_error(flown.scenario, find_eight(flown));
   const Array3d rms = calc_second_lap_error(flown).rms;
   const Array3d seen = calc_second_lap_error(flown, &Step::seen_error).rms;
   for (int axis = 0; axis < 3; ++axis)
     EXPECT_NEAR(rms[axis], expected.rms()[axis], 0.01 * expected.rms()[axis]) << "axis " << axis;
-  // The measurement also has steps, each a sample's period of motion: a sawtooth about the mean.
+  // The measurement stays constant for a sample period. This adds a sawtooth about the mean, as
+  // high as the motion in one sample period.
   const config::FigureEightReference& eight = find_eight(flown);
   for (int axis = 0; axis < 3; ++axis) {
     const double w = 2.0 * M_PI * (axis == 1 ? 2 : 1) / eight.period_s;
@@ -391,7 +398,8 @@ void expect_error_of_late_states(const Flown& flown) {
   }
 }
 
-/// The error that small motions have where vehicle and autopilot make `lag` of a horizontal force.
+/// Expects the error of small motions. `lag` is the transfer function of vehicle and autopilot from
+/// the commanded to the actual horizontal force.
 void expect_error_of_lag(const Flown& flown, const oracle::Transfer& lag, double tolerance) {
   const Array3d rms = calc_second_lap_error(flown).rms;
   const Array3d expected = oracle::calc_steady_error(flown.scenario, find_eight(flown), lag).rms();
@@ -399,8 +407,8 @@ void expect_error_of_lag(const Flown& flown, const oracle::Transfer& lag, double
     EXPECT_NEAR(rms[axis], expected[axis], tolerance * expected[axis]) << "axis " << axis;
 }
 
-/// Thrust lost to climbing with the speed v along the axis: v / thrust_loss_speed of it. On an
-/// eight the mean of |v| holds the height off by g mean(|v|) / (k_p thrust_loss_speed).
+/// A speed v along the rotor axis reduces the thrust by the fraction v / thrust_loss_speed. On a
+/// figure eight the mean of |v| offsets the height by g mean(|v|) / (k_p thrust_loss_speed).
 void expect_height_of_lost_thrust(const Flown& flown) {
   const config::FigureEightReference& eight = find_eight(flown);
   const auto& keys = flown.scenario.plant.own.get<sim::MultirotorKeys>();
@@ -410,8 +418,8 @@ void expect_height_of_lost_thrust(const Flown& flown) {
   EXPECT_NEAR(calc_second_lap_error(flown).mean.z(), expected, 0.1 * expected);
 }
 
-/// To quickly changing set-points PX4's attitude loop answers as its outer gain alone: the rates
-/// follow at once.
+/// With fast-changing set-points PX4's attitude loop responds like its outer gain alone: the rates
+/// follow immediately.
 void expect_lag_of_px4(const Flown& flown) {
   const auto& keys = flown.scenario.autopilot->own.get<sim::px4::Keys>();
   const double gain = keys.attitude.per_rad.x();
@@ -427,7 +435,7 @@ void expect_published_lag_of_px4(const Flown& flown) {
   EXPECT_NEAR(rms.y(), 0.074, 0.005);
 }
 
-/// k_R / (J s² (1 + τ s) + k_Ω s + k_R) with the default gains of 10 rad/s and no overshoot.
+/// The lag is k_R / (J s² (1 + τ s) + k_Ω s + k_R) with the default gains: 10 rad/s, no overshoot.
 void expect_lag_of_geometric(const Flown& flown) {
   const auto& keys = flown.scenario.plant.own.get<sim::MultirotorKeys>();
   constexpr double kRate = 10.0;
@@ -444,7 +452,7 @@ void expect_lag_of_geometric(const Flown& flown) {
   expect_height_of_lost_thrust(flown);
 }
 
-/// A vehicle that has to tilt comes to rest at the set-points all the same.
+/// A vehicle that must tilt also comes to rest at the set-points.
 void expect_rest_at_set_points(const Flown& flown) {
   std::size_t stages = 0;
   for (std::size_t i = 0; i < flown.steps.size(); ++i) {

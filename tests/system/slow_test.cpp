@@ -32,7 +32,7 @@ class RealTimeMinuteTest : public ::testing::Test {
     ADD_FAILURE() << label;
     return {};
   }
-  /// From the second lap on, in the flight whose every force comes `delay_ms` late.
+  /// From the second lap on, in m. Every force of the flight is `delay_ms` late.
   static double calc_largest_error(const std::string& file, double delay_ms) {
     config::Scenario scenario = config::load_scenario(file);
     config::Fault fault;
@@ -66,8 +66,9 @@ TEST_F(RealTimeMinuteTest, WithEveryCoreBusyTheLoadErrsNoMoreThanTheLabelExplain
   const double error = calc_tracking_error(flight.recording(), 4000, 15000).max.maxCoeff();
   const double undisturbed = calc_largest_error(file, 0.0);
   const double delayed = calc_largest_error(file, timing.worst_age_ms);
-  // As if every force had been as old as the oldest, in the share of late steps in 2 s, over which
-  // the loop averages (its slowest pole is −0.5 1/s). Twice that: it does not weigh all alike.
+  // Assumes that every late force had the age of the oldest, and that all late steps are in the 2 s
+  // over which the loop averages (its slowest pole is −0.5 1/s). Factor 2, because the loop does
+  // not weight all steps equally.
   const double share = std::min(1.0, 0.004 * timing.late / 2.0);
   const double bound = undisturbed + 2.0 * share * (delayed - undisturbed);
   std::printf("largest load position error from the second lap on: %.3g m, bound %.3g m\n", error,

@@ -1,4 +1,4 @@
-/// Real time, waiting policies and standby: processes stopped, continued and killed for real.
+/// Real time, waiting policies and standby. The tests stop, continue and kill real processes.
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -19,7 +19,7 @@ std::string read_timing(const std::filesystem::path& recording) {
   return read_manifest(recording).at("timing").get<std::string>();
 }
 
-/// Longest stretch of consecutive rows of command.csv that answer no state of their own.
+/// Largest number of consecutive rows of command.csv without an answer to their own state.
 std::size_t find_longest_gap(const Table& commands) {
   std::size_t longest = 0, gap = 0;
   for (std::size_t row = 0; row < commands.rows(); ++row) {
@@ -37,8 +37,8 @@ std::size_t count_events(const std::filesystem::path& recording, const std::stri
   return count;
 }
 
-/// A controller in this process that answers a state when the next one comes, and the last one when
-/// it is repeated: each answer is one period late.
+/// A controller in this process that answers each state when the next one arrives, or when the same
+/// state is sent again: each answer is one period late.
 class LateController {
  public:
   LateController(int domain, const std::string& scenario_file)
@@ -71,7 +71,7 @@ class LateController {
  private:
   void answer(const States& states) {
     const States answered = std::exchange(last_states_, states);
-    if (answered.run_id() != states.run_id()) return;  // there was none
+    if (answered.run_id() != states.run_id()) return;  // no earlier state
     const VehicleState& state = answered.vehicles().front();
     const auto result =
         controller_.calc_answer(answered.step(), bus::to_measurement(state.measured()),
@@ -101,7 +101,7 @@ TEST(RealTimeTest, WithoutLateAnswersTheRecordingIsThatOfLockstep) {
   Flight lockstep(file);
   lockstep.expect_success();
   EXPECT_EQ(read_timing(lockstep.recording()), "exact");
-  // A busy machine may be late; the slower the flight, the less.
+  // A busy machine may be late; a slower flight leaves more time per period.
   for (const char* real_time_factor : {"0.2", "0.1", "0.05", "0.02"}) {
     Flight flight(file, {{}, {"--mode", "realtime", "--rtf", real_time_factor}, {}});
     flight.expect_success();
@@ -139,7 +139,7 @@ TEST(RealTimeTest, AStoppedClientIsReplacedByTheFailSafeAndFliesAgainWhenItRetur
       << flight.server->output();
   const std::string timing = read_timing(flight.recording());
   EXPECT_EQ(timing.rfind("degraded: real-time, ", 0), 0u) << timing;
-  // Simulated time held before the fail-safe: max_hold_s, 0.5 s; then the weight alone remains.
+  // The last force is held for max_hold_s, 0.5 s of simulation time. Then the fail-safe force acts.
   const Table commands(flight.recording() / "command.csv");
   std::size_t held = 0, fail_safe = 0;
   for (std::size_t row = 0; row < commands.rows(); ++row) {
@@ -163,7 +163,7 @@ TEST(RealTimeTest, AControllerThatIsAlwaysOnePeriodLateFliesToTheEnd) {
                 "recorders: 0, timeout_s: 30 }, wait: { controller: { policy: wait, deadline_s: 3 "
                 "} }"}});
   OwnDomain domain;
-  // A quarter of real time: only after 2 s without the controller there is a fail-safe.
+  // A quarter of real time: the fail-safe begins only after 2 s without the controller.
   Process server(make_command("sim_server", domain.number(),
                               {"--scenario", file, "--mode", "realtime", "--rtf", "0.25"}));
   LateController controller(domain.number(), file);
@@ -230,7 +230,7 @@ TEST_F(PausedTest, APauseThatWaitsForTheStepInWorkIsNoAbsence) {
   EXPECT_EQ(server_->wait(), 0) << server_->output();
 }
 
-/// Steps of 1,000 s: the server is between two of them, or waits for an answer, all the time.
+/// Steps of 1,000 s of wall time: the server is always between two steps or waits for an answer.
 class LongPeriodTest : public PausedTest {
  protected:
   void start() {
@@ -269,7 +269,7 @@ TEST(RealTimeTest, ARecorderThatStopsDoesNotStopTheFlight) {
   ASSERT_TRUE(flight.wait_for_steps(250)) << flight.outputs();
   flight.recorder->send(SIGSTOP);
   ASSERT_TRUE(wait_until([&] { return holds(flight.server->output(), "recorder"); }));
-  // The mission ends while the recorder rests.
+  // The mission ends while the recorder is stopped.
   ASSERT_TRUE(wait_until([&] { return holds(flight.server->output(), "finished:"); }))
       << flight.outputs();
   flight.recorder->send(SIGCONT);
@@ -281,7 +281,7 @@ TEST(RealTimeTest, ATakeOverLeavesAtMostFivePeriodsWithoutAFreshCommand) {
   TemporaryFolder folder;
   const std::string file = make_scenario(
       folder, {{"controllers: 1", "controllers: 2"}, {"for_s: 32", "for_s: 4"}}, "figure_eight");
-  // A quarter of real time: 16 ms per period, of which the machine itself should lose none.
+  // A quarter of real time: 16 ms per period, which a busy machine should not exceed.
   Flight flight(
       file,
       {{}, {"--mode", "realtime", "--rtf", "0.25"}, {"--name", "primary", "--strength", "2"}});
@@ -382,7 +382,7 @@ TEST(WaitingTest, PolicyGoOnFliesToTheEndWithoutTheRecorder) {
   EXPECT_EQ(flight.client->wait(), 0) << flight.outputs();
 }
 
-// The history holds batches, which states that are sent again do not fill.
+// The history holds batches of records. States that are sent again add none.
 TEST(WaitingTest, StatesSentManyTimesCostARecorderThatIsBehindNothing) {
   TemporaryFolder folder;
   const std::string file =
@@ -392,8 +392,8 @@ TEST(WaitingTest, StatesSentManyTimesCostARecorderThatIsBehindNothing) {
                                          "SLS_DROP_SEED=1", "SLS_DROP_WHILE=" + condition};
   FlightOptions options;
   options.qos_file = make_qos_with_history(folder, "udp", "400");
-  // While the file is there, a state is sent 3.3 times on average until an answer arrives, and the
-  // recorder announces itself but hears nothing.
+  // While the file exists, a state is sent 3.3 times on average until an answer arrives, and the
+  // recorder sends its announcements but receives nothing.
   options.before["control_client"] = options.before["recorder"] = shim;
   options.before["control_client"].push_back("SLS_DROP_PERCENT=70");
   options.before["recorder"].push_back("SLS_DROP_RECEIVED_PERCENT=100");
@@ -425,7 +425,8 @@ TEST(StandbyTest, TakesOverAfterTheTimeOfTheScenarioWithOneEventForTheSwitch) {
   TemporaryFolder folder;
   const std::string file =
       make_scenario(folder, {{"controllers: 1", "controllers: 2"}}, "figure_eight");
-  // A busy machine may be late, or the primary silent before it is killed: not five times.
+  // On a busy machine the take-over may be late, or the primary silent before it is killed. Five
+  // failures in a row are unlikely.
   for (int attempt = 0; attempt < 5; ++attempt) {
     Flight flight(file, {{}, {"--period-s", "0.001"}, {"--name", "primary", "--strength", "2"}});
     Process standby(make_command("control_client", flight.domain.number(),
@@ -447,7 +448,7 @@ TEST(StandbyTest, TakesOverAfterTheTimeOfTheScenarioWithOneEventForTheSwitch) {
     EXPECT_EQ(status.number(status.rows() - 1, "take_overs"), static_cast<double>(events));
     std::printf("take-over in lockstep: %.0f ms after SIGKILL, %zu events\n", elapsed.count() * 1e3,
                 events);
-    // sync.take_over_s, 0.1 s, and 50 ms in which the server wakes and this test looks.
+    // sync.take_over_s is 0.1 s; the server's wake-up and this test's polling take up to 50 ms.
     if (elapsed.count() >= 0.1 && elapsed.count() <= 0.15 && events == 1) return;
   }
   FAIL() << "not once within 100 to 150 ms of SIGKILL and with one event";

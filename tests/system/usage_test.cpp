@@ -1,4 +1,4 @@
-/// Bad input, given to the real programs: one clear line, the documented exit code, nothing left.
+/// Bad input to the real programs: one clear line, the documented exit code, no files left behind.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -23,7 +23,7 @@ Outcome run(const std::vector<std::string>& command) {
   return {code.value_or(-1), process.output()};
 }
 
-/// One line that begins with the program's name and "error:", and holds `cause`.
+/// Expects one line that begins with the program's name and "error:" and contains `cause`.
 void expect_refused(const std::vector<std::string>& command, int exit_code,
                     const std::string& cause) {
   const Outcome outcome = run(command);
