@@ -1,4 +1,5 @@
-// The acceptance rules of design 6 ("Commands", "Standby"), judged from outside the gate.
+// The acceptance rules of design 6 ("Commands", "Standby"), tested through the interface of the
+// gate.
 #include "sim_server/command_gate.hpp"
 
 #include <gtest/gtest.h>
@@ -55,7 +56,7 @@ OfferedAnswer make_faulted(std::uint64_t step, FaultCode fault) {
   return command;
 }
 
-/// Commands that were not applied, each in exactly one counter.
+/// Number of rejected commands. Exactly one counter counts each.
 std::uint64_t sum_rejections(const SyncCounters& counters) {
   return counters.rejected_not_finite() + counters.rejected_force_limit() +
          counters.rejected_run() + counters.rejected_step() + counters.rejected_vehicle() +
@@ -74,8 +75,7 @@ class CommandGateTest : public testing::Test {
 
   void set_clients(const std::vector<ReadyClient>& clients) { gate_.set_clients(clients); }
 
-  /// Offers `command` from the only ready client and checks that it neither flies nor is lost from
-  /// the counters.
+  /// Offers `command` from the only ready client. Expects that the gate rejects and counts it.
   Verdict offer_bad(const OfferedAnswer& command) {
     const auto before = sum_rejections(gate_.counters());
     const Verdict verdict = gate_.offer(command, kStrongPeer);
@@ -104,7 +104,7 @@ TEST_F(CommandGateTest, AnAnswerToAStateThatWasNotPublishedYetIsRefused) {
   early.is_early = true;
   EXPECT_EQ(offer_bad(early), Verdict::kEarly);
   EXPECT_EQ(gate_.counters().rejected_step(), 1u);
-  OfferedAnswer late = make_answer(4);  // before the next state, as late answers come
+  OfferedAnswer late = make_answer(4);  // a late answer arrives before the next state
   late.is_early = true;
   EXPECT_EQ(gate_.offer(late, kStrongPeer), Verdict::kLate);
   EXPECT_EQ(gate_.offer(make_answer(5), kStrongPeer), Verdict::kAccepted);
@@ -131,7 +131,7 @@ TEST_F(CommandGateTest, AForceAtTheLimitIsAcceptedAndJustBeyondRefused) {
   OfferedAnswer beyond = make_answer(0);
   beyond.command.f_Q_W_n({0, 0, -std::nextafter(kForceLimit, 100.0)});
   EXPECT_EQ(offer_bad(beyond), Verdict::kForceLimit);
-  gate_.set_clients({});  // the refused client is gone, another one comes
+  gate_.set_clients({});  // the refused client leaves, another one joins
   gate_.set_clients({kWeak});
   OfferedAnswer at_limit = make_answer(0);
   at_limit.command.f_Q_W_n({30.0, 0.0, -40.0});
@@ -215,7 +215,7 @@ TEST_F(CommandGateTest, NothingThatAnUnannouncedSenderSendsEndsTheFlight) {
 TEST_F(CommandGateTest, ACopyOfAnAcceptedCommandIsCountedDuplicate) {
   gate_.offer(make_answer(0), kStrongPeer);
   OfferedAnswer again = make_answer(0);
-  again.command.compute_time_ns(12345);  // how long it took is not part of the answer
+  again.command.compute_time_ns(12345);  // the compute time is not part of the answer
   EXPECT_EQ(gate_.offer(again, kStrongPeer), Verdict::kDuplicate);
   gate_.expect(1);
   EXPECT_EQ(gate_.offer(again, kStrongPeer), Verdict::kDuplicate);
@@ -250,7 +250,7 @@ TEST_F(CommandGateTest, ACopyFromFarBackIsCountedAndMemoryStaysBounded) {
     gate_.offer(make_answer(step), kStrongPeer);
   }
   EXPECT_EQ(gate_.offer(make_answer(9998), kStrongPeer), Verdict::kDuplicate);
-  // Beyond what is remembered a copy cannot be told from a wrong step.
+  // The gate remembers few steps: an older copy counts as a wrong step.
   EXPECT_EQ(gate_.offer(make_answer(0), kStrongPeer), Verdict::kWrongStep);
 }
 
@@ -607,12 +607,12 @@ TEST_F(CommandGateTest, EveryRejectionHasAReason) {
 
 // --- properties ----------------------------------------------------------------------------------
 
-/// Commands that must never fly, of every kind there is.
+/// Invalid commands of every kind, which the gate must never accept.
 class Junk {
  public:
   explicit Junk(std::mt19937_64& random) : random_(random) {}
 
-  /// For the awaited step or not, depending on the kind.
+  /// One kind is for another step, the others are for the awaited step.
   OfferedAnswer make(std::uint64_t awaited) {
     OfferedAnswer command = make_answer(awaited, -static_cast<double>(pick(40)));
     switch (pick(7)) {
@@ -664,8 +664,9 @@ TEST(CommandGatePropertyTest, InvalidAnswersChangeNoForceAndAreCounted) {
         OfferedAnswer command;
         bus::PeerId sender;
       };
-      // Before the answers, in any order: strangers' junk, and clients' junk about other things
-      // than the awaited step. After the strongest's answer also anything from anybody.
+      // Before the strongest client's answer, in any order: invalid commands of strangers, and
+      // those of clients with another step, run or vehicle. After it, the clients' other invalid
+      // commands.
       std::vector<Offer> before, after;
       for (std::uint64_t i = junk.pick(6); i > 0; --i) {
         before.push_back({junk.make(step), kStranger});
@@ -711,7 +712,7 @@ TEST(CommandGatePropertyTest, EveryStepIsAnsweredAsLongAsOneOfTheChangingClients
     std::uint64_t offered = 0;
     for (std::uint64_t step = 0; step < 200; ++step) {
       gate.expect(step);
-      // Some announced clients are dead, some are not announced; one at least answers.
+      // Some announced clients are dead, some clients are not announced. At least one answers.
       std::vector<ReadyClient> announced, alive;
       while (alive.empty()) {
         announced.clear();

@@ -21,8 +21,8 @@ TEST(FailSafeTest, StaysWithinTheForceLimitInItsDirection) {
   EXPECT_LT(f_Q_W.z(), 0.0);
 }
 
-/// The energy under the weight-holding force: kinetic, and that of the load below the
-/// quadrotor. Its rate is −(m + m_L) |v_WQ|² / τ.
+/// Energy that remains if a force balances the weight: kinetic energy, and the potential energy of
+/// the load relative to the quadrotor. Its rate is −(m + m_L) |v_WQ|² / τ.
 double calc_remaining_energy(const model::SlungLoadState& state) {
   const double below = (state.p_WL - state.p_WQ).z();
   return 0.5 * kVehicle.quad_mass * state.v_WQ.squaredNorm() +

@@ -1,6 +1,7 @@
-// Faults judged by what the receiver must hold, written out by hand or as a closed form, and by the
-// statistics of independent draws: a count of N draws of probability p has the standard deviation
-// √(N p (1 − p)); bounds are five of those, which a right program misses once in two million.
+// Faults, judged by the samples that the receiver must hold (by hand or as a closed form) and by
+// the statistics of independent draws: a count of N draws of probability p has the standard
+// deviation √(N p (1 − p)). The bounds are five of these: a correct program misses them once in two
+// million.
 #include "sim_server/fault_line.hpp"
 
 #include <gtest/gtest.h>
@@ -35,7 +36,7 @@ config::Fault make_command_fault(const config::FaultEffect& effect) {
 config::Fault make_delay(std::int64_t periods) {
   return make_command_fault(config::DelayFault{periods * kPeriod});
 }
-/// The same during the steps [from, to).
+/// `fault`, active during the steps [from, to).
 config::Fault during(std::int64_t from, std::int64_t to, config::Fault fault) {
   fault.from_ns = from * kPeriod;
   fault.to_ns = to * kPeriod;
@@ -62,7 +63,7 @@ std::vector<double> actuate_steps(const std::vector<config::Fault>& faults, std:
   return acting;
 }
 
-/// The force noise of the steps 0, 1, …: what acts where no force is meant to.
+/// The force noise at the steps 0, 1, …: the acting force if the commanded force is zero.
 std::vector<Vector3d> draw_forces(const std::vector<config::Fault>& faults, std::uint64_t steps) {
   FaultLine line = make_line(faults);
   std::vector<Vector3d> forces;
@@ -157,17 +158,18 @@ TEST(FaultLineTest, ActsOnStepsFromItsStartToBeforeItsEnd) {
   const config::Fault bias = make_command_fault(make_force_bias(100.0));
   EXPECT_EQ(actuate_steps({during(2, 4, bias)}, 6), (Numbers{0, 1, 102, 103, 4, 5}));
   EXPECT_EQ(actuate_steps({during(0, 1, bias)}, 3), (Numbers{100, 1, 2}));
-  config::Fault between = bias;  // of the steps 1, 2, 3, 4 at 4, 8, 12 and 16 ms those at 8 and 12
+  config::Fault between = bias;  // contains steps 2 and 3, at 8 and 12 ms
   between.from_ns = 4'000'001;
   between.to_ns = 12'000'001;
   EXPECT_EQ(actuate_steps({between}, 6), (Numbers{0, 1, 102, 103, 4, 5}));
-  EXPECT_EQ(actuate_steps({bias}, 3), (Numbers{100, 101, 102}));  // by default always
+  EXPECT_EQ(actuate_steps({bias}, 3), (Numbers{100, 101, 102}));  // default: always active
 }
 
 TEST(FaultLineTest, FaultsOfAChannelActInTheOrderOfTheFile) {
   const config::Fault freeze = during(2, 9, make_command_fault(config::FreezeFault{}));
   const config::Fault bias = during(3, 9, make_command_fault(make_force_bias(100.0)));
-  // A force frozen at step 1 and then biased; or biased only from step 3 on, when it is frozen.
+  // Freeze first: the force of step 1, biased from step 3 on. Bias first: at step 3 the freeze
+  // already holds the force of step 1.
   EXPECT_EQ(actuate_steps({freeze, bias}, 5), (std::vector<double>{0, 1, 1, 101, 101}));
   EXPECT_EQ(actuate_steps({bias, freeze}, 5), (std::vector<double>{0, 1, 1, 1, 1}));
 }
@@ -218,7 +220,7 @@ TEST(DropTest, LosesTheShareOfItsProbabilityAndEachStepIndependently) {
   constexpr int kSteps = 200'000;
   for (const double p : {0.01, 0.2, 0.7}) {
     const auto acting = actuate_steps({make_command_fault(config::DropFault{p, 11})}, kSteps);
-    // The first is held either way, so it is left out.
+    // Not the first sample: it is held whether it is lost or not.
     std::vector<bool> lost;
     for (std::size_t k = 1; k < kSteps; ++k) lost.push_back(acting[k] != static_cast<double>(k));
     const double steps = static_cast<double>(lost.size());
@@ -231,7 +233,7 @@ TEST(DropTest, LosesTheShareOfItsProbabilityAndEachStepIndependently) {
     for (const std::size_t distance : {1, 2, 3}) {
       int both = 0;
       for (std::size_t k = distance; k < lost.size(); ++k) both += lost[k] && lost[k - distance];
-      // Neighbouring pairs share a draw, which widens the spread of their number by at most √3.
+      // Neighbouring pairs share a draw, which increases the standard deviation by at most √3.
       EXPECT_NEAR(both, steps * p * p, kSigmas * std::sqrt(3.0 * steps * p * p)) << p;
     }
   }
@@ -250,7 +252,7 @@ TEST(ReorderTest, AnOvertakenSampleCountsOnePeriodLate) {
   const config::Fault late = make_command_fault(config::ReorderFault{1.0, 3});
   // Sample 3 arrives at step 4 and after sample 4.
   EXPECT_EQ(actuate_steps({during(3, 4, late)}, 7), (std::vector<double>{0, 1, 2, 2, 3, 5, 6}));
-  // Two in a row: at step 4 only sample 3 arrives, at step 5 first sample 5, then sample 4.
+  // Two late samples: at step 4 only sample 3 arrives, at step 5 first sample 5, then sample 4.
   EXPECT_EQ(actuate_steps({during(3, 5, late)}, 7), (std::vector<double>{0, 1, 2, 2, 3, 4, 6}));
   EXPECT_EQ(actuate_steps({during(0, 1, late)}, 3), (std::vector<double>{0, 0, 2}));
   EXPECT_EQ(actuate_steps({late}, 50), actuate_steps({make_delay(1)}, 50));
@@ -268,13 +270,13 @@ TEST(ReorderTest, AgesOfTheHeldSampleOccurAsOftenAsIndependentOvertakingMakesThe
       ASSERT_TRUE(age == 0.0 || age == 1.0 || age == 2.0) << k;
       ++counts[static_cast<std::size_t>(age)];
     }
-    // Age 0: neither this sample nor the one before is late. Age 2: this one is late and so was the
-    // last but one, which arrived after its successor.
+    // Age 0: neither this sample k nor sample k − 1 is late. Age 2: sample k is late, and so was
+    // sample k − 2, which arrived after sample k − 1.
     const double share[] = {(1 - p) * (1 - p), 1 - (1 - p) * (1 - p) - p * p * (1 - p),
                             p * p * (1 - p)};
     for (std::size_t age = 0; age < 3; ++age)
-      // A step's age depends on three draws, so it is correlated with at most two on either side:
-      // that widens the spread by at most √5.
+      // A step's age depends on three draws and correlates with at most two neighbours on either
+      // side, which increases the standard deviation by at most √5.
       EXPECT_NEAR(counts[age], kSteps * share[age],
                   kSigmas * std::sqrt(5.0 * kSteps * share[age] * (1 - share[age])))
           << p << " age " << age;
@@ -309,11 +311,11 @@ TEST(BiasTest, RodAnglesMoveTheLoadAboutTheQuadrotor) {
   const SlungLoadState measured = measure_once(bias, state);
   EXPECT_EQ(measured.p_WQ, state.p_WQ);
   EXPECT_EQ(measured.v_WQ, state.v_WQ);
-  // Eq. (1) of the model's README, written out once more.
+  // Eq. (1) of the model's README, written independently.
   const double alpha = 0.3 + 0.02, beta = -0.4 - 0.03;
   const Vector3d n_W(std::sin(beta), -std::sin(alpha) * std::cos(beta),
                      std::cos(alpha) * std::cos(beta));
-  // Positions of a few metres: rounding is of 1e-15 m.
+  // Positions of a few metres have a rounding error of 1e-15 m.
   EXPECT_LT((measured.p_WL - measured.p_WQ - n_W).norm(), 1e-14);
 }
 
@@ -358,8 +360,8 @@ TEST(NoiseTest, IsNormalWithTheGivenDeviationsAndIndependentInTimeAndComponent) 
   EXPECT_TRUE(z.row(2).isZero(0.0));
   z.row(0) /= deviation.x();
   z.row(1) /= deviation.y();
-  // Of N standard normal numbers the mean of zⁿ has the variance (E z²ⁿ − (E zⁿ)²) / N: 1, 2, 15,
-  // 96 over N for n = 1 to 4. The product of independent ones has 1 / N.
+  // The mean of zⁿ over N standard normal numbers has the variance (E z²ⁿ − (E zⁿ)²) / N: 1, 2, 15,
+  // 96 over N for n = 1 to 4. The mean product of independent numbers has the variance 1 / N.
   const double root = std::sqrt(static_cast<double>(kSteps));
   for (int i = 0; i < 2; ++i) {
     const Eigen::ArrayXd x = z.row(i).transpose().array();
@@ -370,7 +372,7 @@ TEST(NoiseTest, IsNormalWithTheGivenDeviationsAndIndependentInTimeAndComponent) 
     for (const int lag : {1, 2, 10})
       EXPECT_NEAR((x.tail(kSteps - lag) * x.head(kSteps - lag)).mean(), 0.0,
                   kSigmas / std::sqrt(static_cast<double>(kSteps - lag)));
-    // 4.55 % lie beyond two deviations.
+    // 4.55 % exceed two standard deviations.
     const double beyond = static_cast<double>((x.abs() > 2.0).count()) / kSteps;
     const double share = std::erfc(std::sqrt(2.0));
     EXPECT_NEAR(beyond, share, kSigmas * std::sqrt(share * (1 - share)) / root);
@@ -398,27 +400,27 @@ TEST(NoiseTest, EveryNumberOfAStateHasItsOwnDeviation) {
         measured.rod.alpha_dot - truth.rod.alpha_dot, measured.rod.beta_dot - truth.rod.beta_dot;
     for (int i = 0; i < 10; ++i) z[i] /= 0.01 * (i + 1);
     covariance += z * z.transpose() / kSteps;
-    // The load is where the angles say: the sample is a possible one.
+    // The load's position fits the measured angles: the sample is consistent.
     EXPECT_NEAR((measured.p_WL - measured.p_WQ).norm(), 1.0, 1e-14);
   }
-  // Variances of the mean: 2 / N on the diagonal, 1 / N beside it.
+  // Variances of the mean: 2 / N on the diagonal, 1 / N elsewhere.
   const auto error = covariance - Eigen::Matrix<double, 10, 10>::Identity();
   EXPECT_LT(error.cwiseAbs().maxCoeff(), kSigmas * std::sqrt(2.0 / kSteps));
 }
 
 // --- reproducibility -----------------------------------------------------------------------------
 
-// Computed with Python from the definition in README.md, so that no change of the generator can
-// pass unnoticed: recordings of old versions must come out again.
+// Computed with Python from the definition in README.md. The test finds every change of the
+// generator, because recordings of old versions must stay reproducible.
 TEST(RandomTest, NumbersAreTheDocumentedFunctionOfSeedPlaceStepAndComponent) {
   const auto acting = actuate_steps({make_command_fault(config::DropFault{0.5, 7})}, 64);
   std::string pattern;
   for (std::size_t k = 1; k < 64; ++k) pattern += acting[k] == static_cast<double>(k) ? '.' : 'x';
   EXPECT_EQ(pattern, "x.xxx..xxx.x..x..xx..x.xxx....x.xx..x...xxx....x...xx...x....xx");
 
-  // The second fault of the file; the first does nothing.
+  // The noise is the second fault of the file. The first has no effect.
   const auto forces = draw_forces({make_delay(0), make_force_noise({1, 1, 1}, 3)}, 1001);
-  // A number is a few operations and two functions of libm: rounding of some 1e-16.
+  // A number needs a few operations and two functions of libm: a rounding error near 1e-16.
   EXPECT_LT((forces[0] - Vector3d(-0.08203744824885163, -0.055434045018384656, -0.3723660178681789))
                 .norm(),
             1e-14);
@@ -455,7 +457,7 @@ TEST(RandomTest, AFaultDrawsTheSameNumbersBesideAnyOtherFaults) {
   };
   const auto idle = during(9000, 9001, make_command_fault(config::DropFault{1.0, 9}));
   const auto alone = among(idle, idle);
-  // Where no force is meant to act, losing what comes before the noise changes nothing.
+  // If the commanded force is zero, a drop before the noise changes nothing.
   EXPECT_EQ(among(make_command_fault(config::DropFault{0.5, 9}), idle), alone);
   EXPECT_EQ(among(idle, make_fault("freeze", FaultChannel::kState, config::FreezeFault{})), alone);
   // The numbers of a step do not depend on whether earlier steps drew any.

@@ -1,4 +1,4 @@
-// The samples of server and client, and that both read them back alike.
+// The samples of server and client. Both programs must read the same values from them.
 #include "sim_server/messages.hpp"
 
 #include <gtest/gtest.h>

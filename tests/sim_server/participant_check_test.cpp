@@ -97,7 +97,8 @@ TEST_F(ParticipantCheckTest, AnotherContractIsNamedAtOnceAndNotAdmitted) {
   auto controller = make_entry(1), recorder = make_entry(2, "tape", ROLE_RECORDER);
   controller.announcement.contract_sha256(std::string(64, '1'));
   recorder.announcement.contract_sha256("");
-  controller.announcement.vehicle_ids({99});  // what else it says may mean something else
+  controller.announcement.vehicle_ids(
+      {99});  // other fields may have another meaning in that contract
   neighbourhood_.participants = {controller, recorder};
   const std::string field = "sls/participant contract_sha256: expected ";
   EXPECT_EQ(look(), (std::vector<std::string>{
@@ -185,7 +186,7 @@ TEST_F(ParticipantCheckTest, AWriterOfCommandsWithoutAnAnnouncementIsNamedOnceTh
   EXPECT_TRUE(look(900ms).empty());
   EXPECT_EQ(look(1s), only("'foo' (10.0.0.2): writes sls/command: expected an announcement in "
                            "sls/participant, got none"));
-  neighbourhood_.explained = {make_peer(1)};  // its announcement does not fit: that was said
+  neighbourhood_.explained = {make_peer(1)};  // its announcement does not fit: already reported
   EXPECT_TRUE(look(2s).empty());
 }
 
@@ -193,7 +194,7 @@ TEST_F(ParticipantCheckTest, AnAnnouncementThatMayBeOnItsWayIsWaitedForLonger) {
   neighbourhood_.command_writers[make_peer(1)] = "'foo' (10.0.0.2)";
   neighbourhood_.announcement_writers = {make_peer(1)};
   EXPECT_TRUE(look().empty());
-  EXPECT_TRUE(look(4900ms).empty());  // several losses in a row
+  EXPECT_TRUE(look(4900ms).empty());  // time for several losses in a row
   EXPECT_EQ(look(5s).size(), 1u);
   neighbourhood_.participants = {make_entry(1, "foo")};
   EXPECT_TRUE(look(6s).empty());
@@ -201,7 +202,7 @@ TEST_F(ParticipantCheckTest, AnAnnouncementThatMayBeOnItsWayIsWaitedForLonger) {
 
 TEST_F(ParticipantCheckTest, AMissingDeadlineIsReportedOnlyOfOurControllers) {
   neighbourhood_.missing_deadlines[make_peer(1)] = "sls/command of 'foo': DEADLINE";
-  EXPECT_TRUE(look().empty());  // it has not said for whom it flies
+  EXPECT_TRUE(look().empty());  // without an announcement its vehicles are unknown
   EXPECT_EQ(look(1s), only("sls/command of 'foo': DEADLINE"));
   neighbourhood_.missing_deadlines = {{make_peer(2), "sls/command of 'bar': DEADLINE"}};
   neighbourhood_.participants = {make_entry(2, "bar")};
@@ -219,7 +220,7 @@ TEST_F(ParticipantCheckTest, AnotherLibraryThanThatOfTheFirstIsRefused) {
   EXPECT_EQ(admitted[0].peer, first.peer);
   EXPECT_EQ(look(), only("controller 'second' on box: sls/participant library_sha256: expected " +
                          std::string(64, 'c') + " (that of 'first'), got none; it is refused"));
-  // Before a step is flown another one may be first.
+  // Before the first step another client may become the first.
   EXPECT_EQ(check_.admit_controllers({second}).size(), 1u);
   EXPECT_EQ(check_.admit_controllers({second, first}).size(), 1u);
 }
@@ -231,7 +232,7 @@ TEST_F(ParticipantCheckTest, TheLibraryThatHasFlownStaysInForceWhenItsClientIsGo
   check_.admit_controllers({first});
   take(make_answer(0));
   EXPECT_TRUE(check_.admit_controllers({second}).empty());
-  first.peer = make_peer(3);  // started again
+  first.peer = make_peer(3);  // restarted
   EXPECT_EQ(check_.admit_controllers({first, second}).size(), 1u);
 }
 
@@ -346,7 +347,7 @@ TEST_F(ParticipantCheckTest, AMissionThatAdvancesIsFine) {
   for (std::uint64_t step = 0; step < 500; ++step) take(make_answer(step, step < 200 ? 0 : 1));
   OfferedAnswer last = make_answer(500, 2);
   last.command.mission(MISSION_FINISHED);
-  for (int i = 0; i < 500; ++i, ++last.step) take(last);  // others of the fleet still fly
+  for (int i = 0; i < 500; ++i, ++last.step) take(last);  // other vehicles of the fleet still fly
   EXPECT_TRUE(look().empty());
 }
 
@@ -378,7 +379,7 @@ TEST_F(ParticipantCheckTest, UnknownParticipantsCannotFillTheMemory) {
     peer.bytes[1] = static_cast<std::uint8_t>(i >> 8);
     check_.note_rejected(make_answer(999), peer, Verdict::kWrongStep, 1);
   }
-  EXPECT_TRUE(look().empty());  // none of them is here
+  EXPECT_TRUE(look().empty());  // none of them is a participant
 }
 
 }  // namespace

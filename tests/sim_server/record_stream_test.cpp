@@ -1,4 +1,4 @@
-// Entries for recorders arrive whole and in order, in batches that keep their limits.
+// Entries for recorders arrive complete and in order, in batches within their limits.
 #include "sim_server/record_stream.hpp"
 
 #include <gtest/gtest.h>
@@ -52,7 +52,7 @@ class RecordStreamTest : public testing::Test {
     });
   }
 
-  /// Steps and vehicles in order, batches counted from 0, the last one alone marked.
+  /// Expects steps and vehicles in order, batches counted from 0, and only the last batch marked.
   void expect_whole(std::uint64_t steps, std::uint32_t vehicles) {
     std::uint64_t step = 0;
     std::uint32_t vehicle = 0;

@@ -75,14 +75,14 @@ TEST(RetransmissionTimerTest, ARoundTripWithAResendIsNotMeasured) {
   RetransmissionTimer timer = make_settled(2ms);
   for (int i = 0; i < 50; ++i) {
     timer.resent();
-    timer.answered(95ms, 95ms);  // of which copy?
+    timer.answered(95ms, 95ms);  // it may answer either copy
   }
   timer.answered(2ms, 2ms);
   EXPECT_EQ(timer.timeout(), 8ms);
 }
 
-// Karn's other rule: without it a link that has become slower than the timeout is never measured
-// again, and every state of the rest of the run is sent several times.
+// Karn's other rule, the doubling. Without it a link that became slower than the timeout is never
+// measured again, and every later state of the run is sent several times.
 TEST(RetransmissionTimerTest, LearnsARoundTripThatHasGrownBeyondTheTimeout) {
   RetransmissionTimer timer = make_settled(100us);
   ASSERT_EQ(timer.timeout(), 1ms);
@@ -128,9 +128,11 @@ RetransmissionTimer::Duration fly_with_loss(RoundTrip calc_round_trip) {
   return whole / kSteps;
 }
 
-// Karn's other rule alone doubles faster than answers end it: most steps would wait 100 ms.
+// With Karn's other rule alone the timeout doubles faster than answers end the doubling: most steps
+// would wait 100 ms.
 TEST(RetransmissionTimerTest, ALinkThatLosesAFifthEachWayCostsMillisecondsNotTheLongestTimeout) {
-  // Doubling within each step alone: 0.36 · 1 ms / (1 − 0.72) + 0.2 ms = 1.5 ms; some of it lasts.
+  // With doubling only within a step: 0.36 · 1 ms / (1 − 0.72) + 0.2 ms = 1.5 ms. Some of the
+  // doubling lasts longer.
   EXPECT_LT(fly_with_loss([](auto&) { return 200us; }), 2500us);
 }
 

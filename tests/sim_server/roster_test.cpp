@@ -106,7 +106,7 @@ TEST(RosterTest, OnlyReadyControllersWithThisScenarioMayAnswer) {
   EXPECT_EQ(clients[0].peer, roster.controllers[1].peer);
 }
 
-// The recorder's last complete step stays within 2,000 of the server's, the step being published.
+// The recorder's last complete step is at most 2,000 behind the step that the server publishes.
 TEST(RosterTest, ARecorderMayBeTwoThousandStepsBehindAndNoMore) {
   EXPECT_EQ(name_blocking_recorder({{}, {make_recorder_at(-1)}}, 1, 0), "");
   EXPECT_EQ(name_blocking_recorder({{}, {make_recorder_at(-1)}}, 1, 1999), "");
@@ -181,7 +181,7 @@ TEST(RosterTest, ARecorderThatComesDuringTheFlightStopsItOnlyInThePlaceOfOneThat
   EXPECT_NE(name_blocking_recorder(roster, 2, 5000), "") << "two are expected";
   roster.recorders[0].heard -= 2 * bus::kPresumedDeadAfter;
   EXPECT_NE(name_blocking_recorder(roster, 1, 5000), "") << "it is the only one now";
-  // Of several the furthest takes the place.
+  // The most advanced of several recorders counts as the replacement.
   roster.recorders.push_back(make_recorder_at(4900));
   roster.recorders[2].ready_since = roster.recorders[1].ready_since;
   EXPECT_EQ(name_blocking_recorder(roster, 1, 5000), "");

@@ -37,7 +37,7 @@ TEST(RoundTripsTest, OnlyTheLastThousandCount) {
   EXPECT_EQ(trips.calc_percentile(50), 500ns);
   EXPECT_EQ(trips.calc_percentile(99), 990ns);
   EXPECT_EQ(trips.calc_percentile(100), 1000ns);
-  trips.add(5000ns);  // takes the place of the oldest, 1 ns
+  trips.add(5000ns);  // replaces the oldest, 1 ns
   EXPECT_EQ(trips.calc_percentile(50), 501ns);
   EXPECT_EQ(trips.calc_percentile(100), 5000ns);
 }
@@ -46,7 +46,7 @@ TEST(RoundTripsTest, AskingChangesNothing) {
   RoundTrips trips;
   for (int i = 1000; i >= 1; --i) trips.add(std::chrono::nanoseconds(i));
   EXPECT_EQ(trips.calc_percentile(1), 10ns);
-  trips.add(2000ns);  // takes the place of the oldest, 1000 ns
+  trips.add(2000ns);  // replaces the oldest, 1000 ns
   EXPECT_EQ(trips.calc_percentile(100), 2000ns);
   EXPECT_EQ(trips.calc_percentile(99), 990ns);
 }

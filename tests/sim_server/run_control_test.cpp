@@ -10,7 +10,7 @@ namespace {
 constexpr std::uint64_t kRun = 0x00c0ffee12345678;
 constexpr std::uint32_t kVehicle = 3;
 
-/// Requests of one operator, each with an id of its own.
+/// Requests of one operator. Each has its own id.
 class Operator {
  public:
   explicit Operator(std::string name = "anna@host") : name_(std::move(name)) {}
@@ -33,7 +33,7 @@ class Operator {
 
 class RunControlTest : public ::testing::Test {
  protected:
-  /// The reply of `action`, asked for at step 40.
+  /// The reply to `action`, requested at step 40.
   std::optional<SimControlReply> ask(ControlAction action, std::uint64_t steps = 0) {
     return control.request(anna.ask(action, steps), 40);
   }
@@ -109,7 +109,7 @@ TEST_F(RunControlTest, TheReplyToAStepRequestComesWhenItsStepsAreDone) {
 
 TEST_F(RunControlTest, StepsOfAnUncontrolledRunBringNoReply) {
   EXPECT_EQ(control.stepped(1), std::nullopt);
-  ask(ACTION_PAUSE);  // while the answer to step 40 is awaited: that step is still completed
+  ask(ACTION_PAUSE);  // during the wait for the answer to step 40: the step is completed
   EXPECT_EQ(control.stepped(41), std::nullopt);
   EXPECT_TRUE(control.holds());
 }

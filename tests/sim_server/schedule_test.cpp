@@ -14,7 +14,7 @@ TEST(ScheduleTest, StepsAreDueAtMultiplesOfThePeriodWithoutDrift) {
   const Schedule schedule(kOrigin, 4ms);
   EXPECT_EQ(schedule.due(0), kOrigin);
   EXPECT_EQ(schedule.due(15'000), kOrigin + 60s);
-  // A period that is no whole number of nanoseconds does not add up errors: 1/3 ns per step.
+  // The period is no whole number of nanoseconds. Its error, 1/3 ns per step, must not accumulate.
   const Schedule thirds(kOrigin, std::chrono::duration<double, std::nano>(4e6 / 3.0));
   EXPECT_EQ(thirds.due(3'000'000), kOrigin + 4000s);
 }
@@ -31,7 +31,7 @@ TEST(ScheduleTest, ASmallDelayIsCaughtUpAndALargeOneMovesTheSchedule) {
   EXPECT_EQ(schedule.due(5), kOrigin + 50ms);
   EXPECT_EQ(schedule.slip(5, kOrigin + 50ms + 101ms), Clock::duration(101ms));
   EXPECT_EQ(schedule.due(5), kOrigin + 151ms);
-  Schedule fast(kOrigin, 1ms);  // and here less
+  Schedule fast(kOrigin, 1ms);  // ten periods are less than 50 ms
   EXPECT_FALSE(fast.slip(0, kOrigin + 50ms));
   EXPECT_EQ(fast.slip(0, kOrigin + 51ms), Clock::duration(51ms));
 }

@@ -32,7 +32,7 @@ class VehicleFlightTest : public testing::Test {
     return answer;
   }
 
-  /// Flies `step` without an answer to it, the answers to `late` having come during it.
+  /// Flies `step` without an answer to it. The answers to the steps `late` arrive during it.
   void fly(std::uint64_t step, const std::vector<std::uint64_t>& late) {
     flight_.measure(step, {});
     for (const std::uint64_t answered : late) flight_.keep_late_answer(make_answer(answered));
@@ -58,7 +58,7 @@ TEST_F(VehicleFlightTest, OnlyANewerAnswerIsFresh) {
   fly(1, {0});
   fly(2, {1});
   for (std::uint64_t step = 3; step < 2 + kHeldSteps; ++step) {
-    fly(step, {0, 1});  // what it has already
+    fly(step, {0, 1});  // answers it already has
     ASSERT_EQ(applied().origin, FORCE_HELD) << step;
   }
   fly(2 + kHeldSteps, {0, 1});

@@ -47,14 +47,14 @@ TEST(WorkerPoolTest, TheErrorOfTheLowestItemIsThrownAfterAllHaveEnded) {
     EXPECT_STREQ(error.what(), "4");
   }
   EXPECT_EQ(calls, 9);
-  pool.for_each(3, [&](std::size_t) { ++calls; });  // and the pool works on
+  pool.for_each(3, [&](std::size_t) { ++calls; });  // the pool still works
   EXPECT_EQ(calls, 12);
 }
 
 TEST(WorkerPoolTest, AThreadThatHasDoneItsShareHelpsTheOthers) {
   WorkerPool pool(2);
   std::atomic<int> others{0};
-  // The first item waits for all others, those of its own share included.
+  // The first item waits for all others, including those of its own share.
   pool.for_each(8, [&](std::size_t i) {
     if (i > 0) ++others;
     while (i == 0 && others < 7) std::this_thread::yield();

@@ -107,7 +107,7 @@ TEST(FaultsTest, KilledOnlyClientEndsTheRunAsFailedNamingItsRole) {
 
 TEST(FaultsTest, KilledServerEndsClientAndRecorderWithItsAbsenceNamed) {
   TemporaryFolder folder;
-  Flight flight(make_scenario(folder, "", "", "mission"));  // waits 4 s for a server
+  Flight flight(make_scenario(folder, "", "", "mission"));  // others wait 4 s for a server
   ASSERT_TRUE(flight.wait_for_steps(500)) << flight.outputs();
   flight.server->kill();
   EXPECT_EQ(flight.client->wait(), 1) << flight.outputs();

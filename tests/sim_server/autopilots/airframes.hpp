@@ -36,7 +36,7 @@ inline Airframe make_published_airframe() {
   return airframe;
 }
 
-/// `count` rotors on a circle, their spins in turn.
+/// `count` rotors on a circle with alternating spins.
 inline Airframe make_ring(int count) {
   Airframe airframe = make_published_airframe();
   airframe.rotors.clear();
@@ -66,7 +66,7 @@ inline Quaterniond make_random_attitude(std::mt19937_64& random) {
   return Quaterniond(any(random), any(random), any(random), any(random)).normalized();
 }
 
-/// Of all rotors at `speeds`: moment about the centre of mass, in B.
+/// Moment of all rotors at `speeds` about the centre of mass, in B.
 inline Vector3d calc_torque(const Airframe& airframe, const VectorXd& speeds) {
   Vector3d torque = Vector3d::Zero();
   for (std::size_t i = 0; i < airframe.rotors.size(); ++i) {
@@ -119,7 +119,7 @@ Turning turn(const Turning& from, const Matrix3d& inertia, double h,
   return to;
 }
 
-/// All bits alike.
+/// True if all bits are equal.
 inline bool is_same(const AutopilotOutput& a, const AutopilotOutput& b) {
   return a.rotor_speeds == b.rotor_speeds && a.q_WB.coeffs() == b.q_WB.coeffs() &&
          a.thrust == b.thrust && a.direction_W == b.direction_W;

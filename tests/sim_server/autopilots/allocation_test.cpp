@@ -1,4 +1,4 @@
-// The allocation of `geometric`: what the rotors make together is what was asked for.
+// The allocation of `geometric`: the rotors together produce the requested thrust and moment.
 #include "sim_server/autopilots/geometric/allocation.hpp"
 
 #include <gtest/gtest.h>
@@ -45,8 +45,8 @@ TEST(AllocationTest, MakesTheMomentAndTheThrustThatAreAskedFor) {
 }
 
 TEST(AllocationTest, MoreThanFourRotorsUseTheLeastThrusts) {
-  // Of all solutions the pseudo-inverse has the smallest sum of squares: adding any thrusts that
-  // make neither moment nor lift only raises it.
+  // The pseudo-inverse is the solution with the smallest sum of squares: it has no part in the
+  // space of thrusts that produce neither moment nor lift.
   const Airframe airframe = make_ring(6);
   const VectorXd thrusts = Allocation(make_setup(airframe)).calc_thrusts({0.1, -0.2, 0.02}, 12.0);
   Eigen::MatrixXd effects(4, 6);
@@ -66,7 +66,8 @@ TEST(AllocationTest, KeepsRollAndPitchWhereThrustOrYawDoNotFit) {
   const Airframe airframe = make_published_airframe();
   const Allocation allocation(make_setup(airframe));
   for (int i = 0; i < 10'000; ++i) {
-    const Vector3d moment = 0.9 * make_random_vector(random);  // nearly all that the arms can
+    const Vector3d moment =
+        0.9 * make_random_vector(random);  // near the largest that the arms allow
     const double thrust = any(random);
     const VectorXd thrusts = allocation.calc_thrusts(moment, thrust);
     ASSERT_GE(thrusts.minCoeff(), 0.0);

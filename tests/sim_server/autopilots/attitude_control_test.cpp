@@ -24,7 +24,7 @@ TEST(AttitudeControlTest, IsTheGainTimesTheErrorForSmallAngles) {
     const Quaterniond q = make_random_attitude(random);
     const Vector3d error = 1e-5 * make_random_vector(random);
     const Quaterniond wanted = q * Quaterniond(AngleAxisd(error.norm(), error.normalized()));
-    // Second order in the angle, times the gain.
+    // Tolerance: terms of second order in the angle, times the gain.
     EXPECT_NEAR((calc_rate_set_points(q, wanted, gains) - gains.per_rad.cwiseProduct(error)).norm(),
                 0.0, 1e-8);
   }

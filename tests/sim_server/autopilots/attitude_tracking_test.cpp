@@ -1,5 +1,5 @@
-// The law of Lee, Leok and McClamroch (2010) on a rigid body of the test's own: what the paper
-// proves of it.
+// The law of Lee, Leok and McClamroch (2010) on the test's own rigid body: the properties that the
+// paper proves.
 #include "sim_server/autopilots/geometric/attitude_tracking.hpp"
 
 #include <gtest/gtest.h>
@@ -18,8 +18,8 @@ const Matrix3d kInertia =
     (Matrix3d() << 0.0300, 0.001, 0.0005, 0.001, 0.0295, -0.0007, 0.0005, -0.0007, 0.0564)
         .finished();
 
-/// The bound of the paper's proposition 1, for a wanted attitude that Ψ never leaves beyond `psi`.
-/// Its c₂ is chosen here as half of the largest that is allowed.
+/// The bound of the paper's proposition 1 if Ψ never exceeds `psi`. The paper allows a range of c₂;
+/// here it is half of the largest allowed value.
 struct Bound {
   Bound(const Gains& gains, double psi) : k_R(gains.attitude), psi_2(psi) {
     const Vector3d moments = Eigen::SelfAdjointEigenSolver<Matrix3d>(kInertia).eigenvalues();
@@ -48,7 +48,7 @@ struct Bound {
   double rate;  ///< β₂, 1/s
 };
 
-/// A wanted attitude that turns: R_d = exp(a(t)) about a fixed axis, and its derivatives.
+/// A turning wanted attitude R_d = exp(a(t)) about a fixed axis, and its derivatives.
 WantedRotation make_wanted(double t) {
   const Vector3d axis = Vector3d(1, 2, -0.5).normalized();
   WantedRotation wanted;
@@ -88,7 +88,7 @@ TEST(AttitudeTrackingTest, ErrorDecaysAsTheProofSays) {
     const Vector3d axis = make_random_vector(random).normalized();
     Turning turning;
     turning.R = Eigen::AngleAxisd(angle * kPi / 180, axis).toRotationMatrix();
-    // Half of the kinetic energy that the proposition allows.
+    // The initial kinetic energy is half of that which the proposition allows.
     const double psi_0 = 1 - std::cos(angle * kPi / 180);
     const double w_most = std::sqrt(2 / kInertia.trace() * gains.attitude * (2 - psi_0));
     turning.w = std::sqrt(0.5) * w_most * make_random_vector(random).normalized();
@@ -120,7 +120,7 @@ TEST(AttitudeTrackingTest, FollowsAnAttitudeThatTurns) {
   Turning turning;
   turning.R = Eigen::AngleAxisd(2.0, Vector3d::UnitX()).toRotationMatrix();
   for (int n = 0; n < 5000; ++n) turning = turn_towards(turning, gains, kStep * n, true);
-  // The moment is held at the middle of each step: an error of second order in it.
+  // The moment is held at its value in the middle of each step: a second-order error.
   EXPECT_LT(calc_attitude_distance(turning.R, make_wanted(5.0).R_WB), 1e-9);
   EXPECT_LT(calc_rate_error({turning.R, turning.w}, make_wanted(5.0)).norm(), 1e-4);
 }
@@ -153,7 +153,7 @@ TEST(AttitudeTrackingTest, SmallErrorsDecayWithTheDocumentedFrequency) {
   turning.R = Eigen::AngleAxisd(kAngle, Vector3d::UnitY()).toRotationMatrix();
   for (int n = 0; n < 300; ++n) {
     const double t = kStep * n;
-    // Third order in the angle is left out.
+    // Terms of third order in the angle are neglected.
     ASSERT_NEAR(calc_attitude_error(turning.R, Matrix3d::Identity()).y(),
                 kAngle * (1 + 10 * t) * std::exp(-10 * t), 1e-11);
     turning = turn(turning, ball, kStep, [&](const Turning& at) {

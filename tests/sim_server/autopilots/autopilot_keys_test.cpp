@@ -32,7 +32,7 @@ config::Autopilot read(const std::string& autopilot) {
   return *config::parse_scenario(make_text(autopilot), "file").autopilot;
 }
 
-/// Read, written out and read again.
+/// Reads the keys, writes them and reads them again.
 config::Autopilot read_twice(const std::string& autopilot) {
   const config::Scenario scenario = config::parse_scenario(make_text(autopilot), "file");
   return *config::parse_scenario(config::to_yaml(scenario), "written").autopilot;

@@ -29,7 +29,7 @@ double calc_tilt(const Vector3d& direction) { return std::atan2(direction.x(), -
 
 TEST(FirstOrderTest, AStepOfTheDirectionDecaysExponentially) {
   const auto autopilot = make_lagging(kLag);
-  // Normalising changes an angle θ by less than θ³: with 1e-5 rad, by less than the rounding.
+  // Normalising changes an angle θ by less than θ³: for 1e-5 rad, less than the rounding.
   constexpr double kTilt = 1e-5;
   for (int k = 1; k <= 500; ++k) {
     const AutopilotOutput& output = autopilot->step(make_input(make_force(kTilt)));
@@ -39,7 +39,7 @@ TEST(FirstOrderTest, AStepOfTheDirectionDecaysExponentially) {
 }
 
 TEST(FirstOrderTest, TurnsInAPlaneByTheAngleOfTheNormalisedSum) {
-  // The angle θ that is left between directions of length 1, as plane trigonometry has it:
+  // The remaining angle θ between directions of length 1, by plane trigonometry:
   // tan θ' = κ sin θ / (1 − κ + κ cos θ).
   const double kept = std::exp(-kPeriod / kLag), heading = 0.7, tilt = 2.5;
   const auto autopilot = make_lagging(kLag);
@@ -57,7 +57,7 @@ TEST(FirstOrderTest, TurnsInAPlaneByTheAngleOfTheNormalisedSum) {
 }
 
 TEST(FirstOrderTest, FollowsASmallSineLikeTheDiscreteFilter) {
-  // Response of x' = u + κ (x − u) to a u that turns by z = e^(iωT) a step, once settled.
+  // Steady response of x' = u + κ (x − u) to a u that turns by z = e^(iωT) per step.
   const double kept = std::exp(-kPeriod / kLag), tilt = 1e-5, turn = 2.0 * M_PI * kPeriod;
   const auto autopilot = make_lagging(kLag);
   for (int k = 0; k <= 3000; ++k) {

@@ -1,4 +1,5 @@
-// The whole autopilot `geometric` on a rigid body of the test's own, rotors exact and at once.
+// The whole autopilot `geometric` on the test's own rigid body; the rotors are exact and have no
+// lag.
 #include <gtest/gtest.h>
 
 #include "sim_server/autopilots/geometric/attitude_tracking.hpp"
@@ -17,7 +18,7 @@ AutopilotSetup make_geometric_setup(const Keys& keys = {}) {
   return setup;
 }
 
-/// A period of 4 ms with the rotors as they are limited.
+/// A period of 4 ms with limited rotor speeds.
 Turning fly_period(Autopilot& autopilot, const Vector3d& f_Q_W, const Turning& turning) {
   const Airframe airframe = make_published_airframe();
   const VectorXd speeds =

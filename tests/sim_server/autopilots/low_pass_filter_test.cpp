@@ -22,7 +22,7 @@ TEST_P(LowPassFilterTest, ImpulseResponseIsThatOfTheTransformedPoles) {
   const auto [sample_rate, cut_off] = GetParam();
   const std::vector<double> expected = calc_impulse_response(sample_rate, cut_off, 500);
   LowPassFilter filter(sample_rate, cut_off);
-  filter.step(Vector3d::Zero());  // what it starts from
+  filter.step(Vector3d::Zero());  // initial value
   const Vector3d impulse(1.0, -2.0, 0.5);
   for (std::size_t n = 0; n < expected.size(); ++n) {
     const Vector3d filtered = filter.step(n == 0 ? impulse : Vector3d::Zero());
@@ -33,7 +33,7 @@ TEST_P(LowPassFilterTest, ImpulseResponseIsThatOfTheTransformedPoles) {
 TEST_P(LowPassFilterTest, HalvesThePowerAtTheCutOff) {
   const auto [sample_rate, cut_off] = GetParam();
   LowPassFilter filter(sample_rate, cut_off);
-  // Both phases, so that the amplitude follows from one sample.
+  // Sine and cosine together: the amplitude then follows from one sample.
   Vector3d filtered;
   for (int n = 0; n < 20'000; ++n) {
     const double phase = 2.0 * kPi * cut_off / sample_rate * n;

@@ -1,4 +1,4 @@
-// The mixer of `px4`: cases computed by hand, and what holds in every case.
+// The mixer of `px4`: cases computed by hand, and properties of every case.
 #include "sim_server/autopilots/px4/mixer.hpp"
 
 #include <gtest/gtest.h>
@@ -24,7 +24,7 @@ void expect_outputs(const MixerOutput& mixed, const std::vector<double>& expecte
     EXPECT_NEAR(mixed.outputs[static_cast<Index>(i)], expected[i], 1e-12) << i;
 }
 
-/// The outputs for a demand, where the columns of `kQuadX` are orthogonal.
+/// Torques that `outputs` produce; the columns of `kQuadX` are orthogonal.
 Vector3d calc_torque(const VectorXd& outputs) {
   Vector3d torque = Vector3d::Zero();
   for (std::size_t i = 0; i < kQuadX.size(); ++i) {
@@ -131,13 +131,13 @@ TEST(MixerTest, AddsUpWhereNothingSaturates) {
 }
 
 TEST(MixerTest, GivesThrustUpForRoll) {
-  // 0.9 ± 0.5 √½: 0.2536 too much, so thrust becomes 0.6464 and the roll stays.
+  // 0.9 ± 0.5 √½ exceeds 1 by 0.2536: thrust becomes 0.6464 and the roll stays.
   const double roll = 0.5 * std::sqrt(0.5);
   expect_outputs(mix(kQuadX, {0.5, 0, 0}, 0.9), {1 - 2 * roll, 1, 1, 1 - 2 * roll});
 }
 
 TEST(MixerTest, DoesNotRaiseThrustForRoll) {
-  // 0.1 − 0.5 √½ < 0: the roll is reduced to what 0.1 has room for.
+  // 0.1 − 0.5 √½ < 0: the roll is reduced until the thrust of 0.1 suffices.
   const MixerOutput mixed = mix(kQuadX, {0.5, 0, 0}, 0.1);
   expect_outputs(mixed, {0, 0.2, 0.2, 0});
   EXPECT_TRUE(mixed.saturation.positive[0]);
@@ -145,29 +145,29 @@ TEST(MixerTest, DoesNotRaiseThrustForRoll) {
 }
 
 TEST(MixerTest, ReportsTheDirectionsThatWouldLowerARotorThatStands) {
-  // Only the last rotor stands: less of all three would lift it.
+  // Only the last rotor is at 0: less roll, pitch or yaw would raise it.
   const Saturation last = mix(kQuadX, {0.2, 0.2, 0}, 0.2).saturation;
   EXPECT_EQ(last.positive, (std::array<bool, 3>{true, true, true}));
   EXPECT_EQ(last.negative, (std::array<bool, 3>{false, false, false}));
-  // Only the third: more roll, more pitch or less yaw.
+  // Only the third rotor is at 0: more roll, more pitch or less yaw would raise it.
   const Saturation third = mix(kQuadX, {-0.2, -0.2, 0}, 0.2).saturation;
   EXPECT_EQ(third.positive, (std::array<bool, 3>{false, false, true}));
   EXPECT_EQ(third.negative, (std::array<bool, 3>{true, true, false}));
 }
 
 TEST(MixerTest, GivesYawUpBeforeThrust) {
-  // 0.95 + 0.5 is more than 1.15: yaw 0.2 is left. Then 0.15 of thrust is given up.
+  // 0.95 + 0.5 exceeds 1.15: yaw is reduced to 0.2. Then thrust is reduced by 0.15.
   expect_outputs(mix(kQuadX, {0, 0, 0.5}, 0.95), {1.0, 1.0, 0.6, 0.6});
 }
 
 TEST(MixerTest, GivesYawUpBeforeRoll) {
-  // Roll alone takes the rotors to 0 and 1: no yaw fits below.
+  // Roll alone brings the rotors to 0 and 1: no yaw is possible.
   expect_outputs(mix(kQuadX, {std::sqrt(0.5), 0, 0.3}, 0.5), {0, 1, 1, 0});
 }
 
 TEST(MixerTest, SharesOutExcessDemandAtBothLimits) {
-  // 0.5 ± √2 at two rotors. Taking all of it off the roll would be too much for the other two:
-  // half of that is given back, and no roll is left. The excess of pitch follows: √½ is left.
+  // 0.5 ± √2 at two rotors. If the roll lost all of this excess, the other two would exceed their
+  // limits: half of it is given back, and no roll remains. Then pitch is reduced to √½.
   expect_outputs(mix(kQuadX, {1, 1, 0}, 0.5), {1, 0, 1, 0});
 }
 
@@ -186,8 +186,9 @@ TEST(MixerTest, KeepsToTheLimitsAndNeverRaisesThrustNorTurnsATorqueRound) {
     const VectorXd outputs = mix(kQuadX, wanted, thrust).outputs;
     ASSERT_GE(outputs.minCoeff(), 0.0);
     ASSERT_LE(outputs.maxCoeff(), 1.0);
-    ASSERT_LE(outputs.sum(), 4.0 * thrust + 0.3);  // the clamp at 0 after yaw took its 0.15
-    // Without yaw nothing is left to be clamped: roll and pitch are only made smaller.
+    ASSERT_LE(outputs.sum(),
+              4.0 * thrust + 0.3);  // after yaw took its 0.15, the clamp at 0 adds thrust
+    // Without yaw no output is clamped: roll and pitch are only reduced.
     const VectorXd level = mix(kQuadX, {wanted.x(), wanted.y(), 0.0}, thrust).outputs;
     ASSERT_LE(level.sum(), 4.0 * thrust + 1e-12);
     const Vector3d torque = calc_torque(level);

@@ -14,7 +14,7 @@ constexpr double kRounding = 1e-12;
 TEST(NoneTest, TheForceActsAtOnceAndEveryRotorGivesAnEqualShareOfIt) {
   const AutopilotSetup setup = make_setup("none");
   const auto autopilot = make_autopilot(setup);
-  // 3-4-12-13, 1-2-2-3, up, level and down.
+  // Forces of whole length (3-4-12-13, 1-2-2-3), up, level and down.
   for (const auto& [force, thrust] : std::vector<std::pair<Vector3d, double>>{{{3, 4, -12}, 13},
                                                                               {{-1, 2, -2}, 3},
                                                                               {{0, 0, -16}, 16},

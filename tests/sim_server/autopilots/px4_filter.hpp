@@ -7,8 +7,8 @@
 
 namespace sls::sim::test {
 
-/// First `count` answers to 1, 0, 0, …: the analogue poles through the bilinear transform, then
-/// partial fractions. No difference equation.
+/// First `count` outputs for the input 1, 0, 0, …: the bilinear transform of the analogue poles,
+/// then partial fractions. Uses no difference equation.
 inline std::vector<double> calc_impulse_response(double sample_rate, double cut_off,
                                                  std::size_t count) {
   using Complex = std::complex<double>;

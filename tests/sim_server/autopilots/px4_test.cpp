@@ -1,4 +1,4 @@
-// The whole autopilot `px4` on a rigid body of the test's own.
+// The whole autopilot `px4` on the test's own rigid body.
 #include <gtest/gtest.h>
 
 #include "sim_server/autopilots/px4/keys.hpp"
@@ -19,7 +19,7 @@ class Px4Test : public testing::Test {
     return setup;
   }
 
-  /// Turns the body for a period under rotors that start with `speeds_`.
+  /// Turns the body for a period; the rotors start with `speeds_`.
   void fly_period(Autopilot& autopilot, const Vector3d& f_Q_W) {
     const VectorXd wanted =
         autopilot.step({f_Q_W, Vector3d::Zero(), turning_.attitude()}).rotor_speeds;
@@ -55,7 +55,7 @@ class Px4Test : public testing::Test {
 
 TEST_F(Px4Test, ReachesSixtyThreePercentOfAStepInThePublishedTime) {
   const double up = -16.67 * std::cos(0.2), aside = 16.67 * std::sin(0.2);
-  // 0.17 s was found in the published log; the rotors' lag and the period are the tolerance.
+  // 0.17 s is from the published log; the tolerance is the rotors' lag and the period.
   EXPECT_NEAR(calc_rise_time({0, aside, up}), 0.17, 0.02);
   EXPECT_NEAR(calc_rise_time({0, -aside, up}), 0.17, 0.02);
   EXPECT_NEAR(calc_rise_time({aside, 0, up}), 0.17, 0.02);
@@ -71,7 +71,7 @@ TEST_F(Px4Test, ComesBackFromAnyAttitudeAndHoldsTheForceItIsAskedFor) {
     turning_.R = make_random_attitude(random).toRotationMatrix();
     turning_.w = 3.0 * make_random_vector(random);
     for (int n = 0; n < 5000; ++n) fly_period(*autopilot, f_Q_W);
-    // The integrators empty with 1.3 s: 1e-6 of the force are left.
+    // The integrators decay with 1.3 s: 1e-6 of the force remain.
     const Vector3d force = -calc_lift(airframe_, speeds_) * turning_.R.col(2);
     EXPECT_NEAR((force - f_Q_W).norm(), 0.0, 2e-5) << trial;
   }

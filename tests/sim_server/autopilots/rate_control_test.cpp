@@ -28,7 +28,7 @@ std::vector<Vector3d> make_rates(std::size_t count) {
   return rates;
 }
 
-/// Output of a filter with this impulse response for `inputs`, of which the first is 0.
+/// Output of a filter with this impulse response for `inputs`. The first input is 0.
 std::vector<Vector3d> convolve(const std::vector<double>& response,
                                const std::vector<Vector3d>& inputs) {
   std::vector<Vector3d> outputs(inputs.size(), Vector3d::Zero());

@@ -1,4 +1,4 @@
-// Autopilots in shared libraries that do something wrong: the exact line of each.
+// Autopilots in shared libraries with errors: the exact message of each.
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -25,7 +25,7 @@ AutopilotSetup make_misbehaving(const std::string& where, const std::string& wha
   return make_setup(kGood, config::LibraryParameters{json, "flight.yaml:11"});
 }
 
-/// Steps it 20 times: what is thrown. A library that is refused has its line from
+/// Steps the autopilot 20 times and returns the message of the exception. A refused library throws
 /// config::ConfigError.
 std::string fly(const AutopilotSetup& setup) {
   try {
@@ -95,7 +95,7 @@ TEST(SharedLibraryAutopilotTest, TwiceTheSameInputsGiveTheSameBits) {
   std::vector<Eigen::VectorXd> speeds;
   for (int k = 0; k < 50; ++k) speeds.push_back(one->step(make_input(make_force(k))).rotor_speeds);
   for (int k = 0; k < 50; ++k) {
-    one->step(make_input(kForce));  // another instance between them changes nothing
+    one->step(make_input(kForce));  // calls of another instance between the steps change nothing
     ASSERT_EQ(two->step(make_input(make_force(k))).rotor_speeds, speeds[k]) << k;
   }
 }
@@ -182,7 +182,7 @@ TEST(SharedLibraryAutopilotTest, AnErrorInDestroyIsAWarning) {
 class AutopilotCrashTest : public testing::TestWithParam<std::pair<const char*, int>> {};
 
 TEST_P(AutopilotCrashTest, IsNamedWithLibraryFunctionVehicleAndStep) {
-  // In a process of its own from the start: here the watchdog's thread may already run.
+  // The death test runs in a new process: in this one the watchdog's thread may already run.
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   const auto [how, signal] = GetParam();
   const std::string crashed = ": crashed \\(signal " + std::to_string(signal) + "\\)";

@@ -1,11 +1,11 @@
-/// The vehicle of the autopilot tests: a body with unlike rotors, and a set-point.
+/// The vehicle of the autopilot tests: a body with different rotors, and a set-point.
 #pragma once
 
 #include "sim_server/autopilots/autopilot.hpp"
 
 namespace sls::sim {
 
-/// Four rotors, no two alike, on a body whose centre of mass is off its origin.
+/// Four different rotors on a body with the centre of mass away from its origin.
 inline Airframe make_airframe() {
   Airframe airframe;
   airframe.mass = 1.55;

@@ -1,6 +1,6 @@
-// An autopilot that holds the thrust like `none` and, if `parameters` say so, does something wrong:
+// An autopilot that holds the thrust like `none`. `parameters` can select an error:
 //   { do: WHAT, in: create, step or destroy, at: STEP }
-// Macros make the tables of functions that are to be refused.
+// Macros define the invalid tables of functions.
 #include <cmath>
 #include <cstdio>
 #include <memory>
@@ -50,7 +50,7 @@ struct Autopilot {
   double filtered = 0.0;  // N
 };
 
-/// A text that shows whether every number of the setup has arrived.
+/// Writes every number of the setup into `error`, for comparison with the numbers sent.
 void say_setup(const sls_autopilot_setup& setup, char* error, std::size_t error_size) {
   const sls_autopilot_rotor& rotor = setup.rotors[3];
   std::snprintf(error, error_size,
@@ -68,7 +68,7 @@ void say_setup(const sls_autopilot_setup& setup, char* error, std::size_t error_
                 rotor.torque_constant_m, rotor.min_speed_rad_s, rotor.max_speed_rad_s);
 }
 
-/// The same of an input.
+/// Writes every number of an input.
 void say_input(const sls_autopilot_input& input, char* error, std::size_t error_size) {
   std::snprintf(error, error_size, "step %llu t %g F %g %g %g v %g %g %g q %g %g %g %g w %g %g %g",
                 static_cast<unsigned long long>(input.step), input.time_s, input.force_n[0],
@@ -99,7 +99,7 @@ void say_input(const sls_autopilot_input& input, char* error, std::size_t error_
   if (self->where == "destroy") sls::test::misbehave(self->what);
 }
 
-/// The thrust through a filter, so that there is a state; the setup is still there.
+/// Filters the thrust, which requires a state. The setup must still be accessible.
 void fly(Autopilot& self, const sls_autopilot_input& input, sls_autopilot_output* output) {
   const double* f = input.force_n;
   const double wanted = std::sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]);
@@ -123,7 +123,7 @@ void fly(Autopilot& self, const sls_autopilot_input& input, sls_autopilot_output
   if (what == "fail") std::snprintf(error, error_size, "the gyroscope is dead\nand more");
   if (what == "say the input") say_input(*input, error, error_size);
   if (what == "fail" || what == "fail without a word" || what == "say the input") return 1;
-  if (what == "three rotors") speeds[3] = nan;  // as it was handed over
+  if (what == "three rotors") speeds[3] = nan;  // the initial content of the buffer
   if (what == "five rotors") speeds[4] = 300.0;
   if (what == "speed that is no number") speeds[1] = nan;
   if (what == "speed without end") speeds[2] = HUGE_VAL;

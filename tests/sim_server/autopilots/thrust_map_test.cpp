@@ -1,4 +1,4 @@
-// The thrust maps of `px4` are the inverse of what the rotors do.
+// The thrust maps of `px4` are the inverse of the rotors' thrust.
 #include "sim_server/autopilots/px4/thrust_map.hpp"
 
 #include <gtest/gtest.h>
@@ -43,7 +43,7 @@ TEST(ThrustMapTest, ExactMapEndsAtZeroAndOne) {
   const Airframe airframe = make_published_airframe();
   const ExactThrust map(airframe.rotors, make_mixer(make_setup(airframe)), {});
   EXPECT_EQ(map.calc_thrust(0.0), 0.0);
-  EXPECT_EQ(map.calc_thrust(0.1), 0.0);  // at their slowest the rotors give 0.2 N
+  EXPECT_EQ(map.calc_thrust(0.1), 0.0);  // at least speed the rotors produce 0.2 N
   EXPECT_EQ(map.calc_thrust(30.0), 1.0);
 }
 

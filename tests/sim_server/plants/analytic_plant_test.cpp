@@ -24,7 +24,7 @@ config::Plant make_tilted_plant() {
   return plant;
 }
 
-/// Largest distance of any body over 32 s of shaking, m: `plant` against Simbody.
+/// Largest distance of any body between `plant` and Simbody during 32 s of shaking, m.
 double calc_largest_difference(const config::Plant& config) {
   AnalyticPlant plant(kVehicle, config);
   SlungLoadPlant simbody(kVehicle, config);
@@ -44,8 +44,8 @@ double calc_largest_difference(const config::Plant& config) {
 }
 
 TEST(AnalyticPlantTest, FollowsSimbodyForThirtyTwoSeconds) {
-  // Both are Runge-Kutta of fourth order at 1 ms with different coordinates: their truncation
-  // errors differ by some 1e-10 m.
+  // Both use fourth-order Runge-Kutta at 1 ms, but different coordinates: their truncation errors
+  // differ by about 1e-10 m.
   EXPECT_LE(calc_largest_difference(make_tilted_plant()), 1e-9);
 }
 
@@ -165,10 +165,9 @@ TEST(PlantTest, RefusesAForceThatIsNotFiniteAndKeepsItsState) {
   }
 }
 
-// --- plants that move all vehicles together
-// --------------------------------------------------------
+// --- plants that move all vehicles together ------------------------------------------------------
 
-/// Points that move by their force, all in one plant.
+/// Points that move in proportion to their force, all in one plant.
 class Swarm : public Plant {
  public:
   explicit Swarm(const PlantSetup& setup) {

@@ -53,7 +53,7 @@ struct Oracle {
   SimTK::State state;
 };
 
-/// A body whose axes of inertia are not its own and whose centre of mass is not its origin.
+/// A body with products of inertia and with the centre of mass away from its origin.
 MassProperties make_body(Numbers& numbers) {
   const double mass = numbers.scale(5.0);
   const Vec3 centre = numbers.vector(0.1);
@@ -85,7 +85,7 @@ void expect_same_accelerations(const MassProperties& body, const MassProperties&
   const Vec3 b_expected = oracle.body.getBodyAngularAcceleration(state);
   const Vec3 a_expected = oracle.body.getBodyOriginAcceleration(state);
   const Vec3 p_expected = oracle.pendulum.getBodyAngularAcceleration(state);
-  // Rounding of what is summed up: more where a light body is on a long lever.
+  // Rounding of the summed terms. It is larger for a light body on a long lever.
   const auto calc_lever = [](const MassProperties& of, double arm) {
     return 1.0 + of.getMass() * arm * arm / SimTK::min(of.calcCentralInertia().getMoments());
   };
@@ -98,13 +98,13 @@ void expect_same_accelerations(const MassProperties& body, const MassProperties&
   EXPECT_LE((found.a_WQ - a_expected).norm(), 1e-12 * a_size);
   const Vec3 n_W = R_WP.z();
   const Vec3 difference = found.b_WP_W - p_expected;
-  // A point load has no spin of its own: the frame that the joint keeps for it is not compared.
+  // The spin of a point load has no meaning: its joint frame's spin is not compared.
   const Vec3 compared =
       kind == PendulumBody::kPoint ? difference - (~difference * n_W) * n_W : difference;
   const double p_size =
       p_expected.norm() + a_size / links.getMassCenter().norm() + w_WP_W.normSqr();
   EXPECT_LE(compared.norm(), 1e-12 * p_size);
-  // The joint's force carries the pendulum: M (a_G − g) = −f on the body.
+  // The joint's force carries the pendulum: M (a_G − g) = −f, with f on the body.
   const Vec3 a_G = oracle.pendulum.findStationAccelerationInGround(state, links.getMassCenter());
   const double pull = links.getMass() * ~(Vec3(0, 0, gravity) - a_G) * n_W;
   EXPECT_NEAR(found.tension, pull, 1e-11 * links.getMass() * (a_size + p_size));

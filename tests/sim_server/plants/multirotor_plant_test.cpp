@@ -20,7 +20,7 @@ namespace {
 using Eigen::Matrix3d, Eigen::Quaterniond, Eigen::Vector3d;
 namespace ode = oracle::multirotor;
 
-constexpr double kWithoutLimit = 1e5;  // rad/s: more than any rotor here is asked for
+constexpr double kWithoutLimit = 1e5;  // rad/s: above every set-point of these tests
 
 /// A quadrotor of 1.5 kg in X, its load of 0.2 kg on 1 m; no lag, no losses, no limits.
 PlantSetup make_ideal_setup() {
@@ -60,7 +60,7 @@ PlantSetup with_autopilot(PlantSetup setup, const std::string& model, config::Ow
   return setup;
 }
 
-/// Everything that a multirotor can have: rod, offset, bodies, lag, losses, wind, disturbances.
+/// All features of a multirotor: rod, offset, bodies, lag, losses, wind, disturbances.
 PlantSetup make_full_setup(Pendulum pendulum) {
   PlantSetup setup = make_ideal_setup();
   MultirotorKeys& keys = keys_of(setup);
@@ -78,7 +78,7 @@ PlantSetup make_full_setup(Pendulum pendulum) {
   keys.attachment = {0.01, -0.02, 0.05};
   keys.disturbance_torque = {0.002, -0.001, 0.001};
   setup.plant.disturbance_W = {0.1, -0.2, 0.15};
-  // Hubs always meet the air from above: where they turn back, the slope of (3) jumps.
+  // The air always meets the hubs from above: if its direction reverses, the slope of (3) jumps.
   setup.plant.air.v_wind_W = {1.0, -0.5, 12.0};
   keys.pendulum = pendulum;
   if (pendulum == Pendulum::kRigid) {
@@ -146,8 +146,8 @@ ode::Vehicle make_oracle_vehicle(const PlantSetup& setup) {
   return vehicle;
 }
 
-/// The oracle's state where the plant is. A rigid rod does not spin about itself: it begins so, and
-/// nothing can turn it.
+/// The oracle's state equal to the plant's. A rigid rod has no spin about its own axis: it begins
+/// without spin, and no torque acts about this axis.
 ode::State make_oracle_state(const PlantSetup& setup, const model::Measurement& at) {
   ode::State state;
   state.p_WQ = at.p_WQ;
@@ -161,7 +161,7 @@ ode::State make_oracle_state(const PlantSetup& setup, const model::Measurement& 
   return ode::with_rod(state, rod.n_W, rod.n_dot_W);
 }
 
-/// Set-points in force of a vehicle with `rotors` rotors.
+/// Set-points that currently act on a vehicle with `rotors` rotors.
 std::vector<double> list_set_points(const model::Measurement& at, std::size_t rotors) {
   const double* first = at.signals.data() + rotors;
   return {first, first + rotors};
@@ -171,11 +171,11 @@ double calc_turn(const Quaterniond& a, const Quaterniond& b) { return a.angularD
 
 struct Differences {
   double position = 0.0, turn = 0.0, tension = 0.0;  // m, rad, N
-  double tilt = 0.0;                                 // largest of the flight, rad
+  double tilt = 0.0;                                 // largest of the flight, in rad
 };
 
-/// Manoeuvres of 32 s whose thrust leans beyond 60° to all sides. The oracle gets where the vehicle
-/// is every `section_s` seconds, and for the rest the set-points of the rotors alone.
+/// Manoeuvres of 32 s with a thrust that leans beyond 60° to all sides. The oracle gets the
+/// vehicle's state every `section_s` seconds, otherwise only the set-points of the rotors.
 Differences fly_beside_oracle(const PlantSetup& setup, double section_s, double lean_n) {
   MultirotorPlant plant(setup);
   const ode::Vehicle vehicle = make_oracle_vehicle(setup);
@@ -187,7 +187,7 @@ Differences fly_beside_oracle(const PlantSetup& setup, double section_s, double 
   const double weight = vehicle_of(setup).total_mass() * vehicle_of(setup).gravity;
   const double step_s = 1e-9 * static_cast<double>(setup.plant.step_ns);
   const auto section = static_cast<int>(std::lround(section_s / step_s));
-  // Of 0.05 ms, where the oracle's own error is below 1e-10 m.
+  // Substeps of 0.05 ms, for which the oracle's own error is below 1e-10 m.
   const int substeps = static_cast<int>(std::ceil(step_s / 0.00005));
   Differences largest;
   const auto steps = static_cast<int>(std::lround(32.0 / step_s));
@@ -224,9 +224,9 @@ INSTANTIATE_TEST_SUITE_P(Pendulums, MultirotorOracleTest,
 constexpr double kSixtyDegrees = M_PI / 3.0;
 
 TEST_P(MultirotorOracleTest, FollowsNewtonAndEulerForThirtyTwoSecondsBeyondSixtyDegrees) {
-  // Effects that make a hovering vehicle unstable are left out: any error would grow a
-  // thousandfold within 32 s. An error of attitude still moves the vehicle by g t²/2: at a step of
-  // 1 ms by 4e-6 m.
+  // Effects that make a hovering vehicle unstable are left out: any error would grow by a factor of
+  // 1000 within 32 s. An attitude error still moves the vehicle with g t²/2: 4e-6 m at a step of
+  // 1 ms.
   PlantSetup setup = make_full_setup(GetParam());
   MultirotorKeys& keys = keys_of(setup);
   keys.rotor.drag_constant = keys.rotor.rolling_constant = keys.rotor.thrust_loss_speed = 0.0;
@@ -251,7 +251,7 @@ TEST_P(MultirotorOracleTest, FollowsThemWithAllThatAMultirotorCanHave) {
 
 // --- conserved quantities and closed forms -------------------------------------------------------
 
-/// `setup` in space: no gravity, no air, rotors that stand still under a zero force.
+/// `setup` in space: no gravity, no air; with zero force the rotors stop.
 PlantSetup in_space(PlantSetup setup) {
   setup.vehicles[0].parameters.gravity = 0.0;
   setup.plant.air = {};
@@ -269,7 +269,7 @@ TEST_P(MultirotorOracleTest, KeepsMomentaAndEnergyWithoutForce) {
     return std::tuple{ode::calc_linear_momentum(state, vehicle),
                       ode::calc_angular_momentum(state, vehicle), ode::calc_energy(state, vehicle)};
   };
-  plant.advance({Vector3d::Zero()}, 500);  // until the rotors stand still
+  plant.advance({Vector3d::Zero()}, 500);  // until the rotors have stopped
   const auto [linear, angular, energy] = calc_all();
   plant.advance({Vector3d::Zero()}, 10'000);
   const auto [linear_after, angular_after, energy_after] = calc_all();
@@ -425,14 +425,14 @@ TEST(MultirotorPlantTest, ComesToThePointMassWithTheFirstOrderOfLags) {
 }
 
 TEST(MultirotorPlantTest, ComesToThePointMassWithTheFirstOrderOfAttitudeLoopAndLags) {
-  const auto fly_with_rate = [](double rate) {  // of the attitude loop, rad/s
+  const auto fly_with_rate = [](double rate) {  // rate of the attitude loop, rad/s
     PlantSetup setup = make_ideal_setup();
     MultirotorKeys& keys = keys_of(setup);
     keys.rotor.lag_up = keys.rotor.lag_down = 0.2 / rate;
     setup.plant.step_ns = 250'000;
     config::InitialState& initial = setup.vehicles[0].initial;
     initial.rod = {0.3, -0.2, 0.5, 0.4};
-    // Along the first force: a vehicle that has to jump there would need more than its thrust.
+    // Begins along the first force: to jump there, a vehicle would need more than its thrust.
     initial.q_WB = calc_attitude_for(calc_shaking_force(0.0, initial.position, initial.v_WQ,
                                                         vehicle_of(setup).total_mass(),
                                                         vehicle_of(setup).gravity));
@@ -519,7 +519,7 @@ TEST(MultirotorPlantTest, RefusesRotorSpeedsThatAreNotFinite) {
   MultirotorPlant plant(make_ideal_setup());
   plant.advance({Vector3d(0, 0, -16)}, 3);
   try {
-    plant.advance({Vector3d(0, 0, -1e200)}, 1);  // whose square is beyond every number
+    plant.advance({Vector3d(0, 0, -1e200)}, 1);  // its square overflows
     FAIL();
   } catch (const std::runtime_error& error) {
     EXPECT_STREQ(error.what(), "rotor_1_set_rad_s is not finite after step 3 of the plant");

@@ -29,7 +29,7 @@ class Numbers {
   std::mt19937 engine_{1};
 };
 
-/// A quadrotor under forces of Simbody's force subsystem, with one of the pendulums.
+/// A quadrotor with one of the pendulums, under forces of Simbody's force subsystem.
 struct Oracle {
   Oracle(Pendulum pendulum_of, double quad_mass, const MassProperties& links, double gravity)
       : matter(system),
@@ -71,7 +71,8 @@ MassProperties make_links() {
           Inertia(across, across, 5e-5 + 8e-4)};
 }
 
-/// Quadrotor and pendulum, m/s² and rad/s² in W, of the products and of Simbody.
+/// Expects equal accelerations of quadrotor and pendulum, in m/s² and rad/s² in W, from the
+/// products and from Simbody.
 void expect_same_accelerations(Pendulum pendulum, double quad_mass, const MassProperties& links,
                                double gravity, Numbers& numbers) {
   Oracle oracle(pendulum, quad_mass, links, gravity);
@@ -89,7 +90,7 @@ void expect_same_accelerations(Pendulum pendulum, double quad_mass, const MassPr
 
   const Vec3 a_expected = oracle.quadrotor.getBodyOriginAcceleration(oracle.state);
   const Vec3 b_expected = oracle.pendulum.getBodyAngularAcceleration(oracle.state);
-  // Rounding of what both sum up: weight, force and the rod's pull.
+  // Rounding of the terms that both sum: weight, force and the rod's tension.
   const double a_size = gravity + force_W.norm() / quad_mass + a_expected.norm();
   const double b_size = a_size / links.getMassCenter().norm() + w_L.normSqr();
   EXPECT_LE((a_WQ - a_expected).norm(), 1e-12 * a_size);
@@ -185,7 +186,7 @@ TEST(PendulumDynamicsTest, FliesAsSimbodyDoesWithDragAndDisturbance) {
                        model::calc_rotor_drag(f_Q_W, to_eigen(v), config.air));
       });
     }
-    // The same integrator over the same equations: 4,000 roundings of numbers up to 10.
+    // Same integrator and same equations: only 4,000 roundings of numbers up to 10 remain.
     EXPECT_LE(position_error, 1e-12);
     EXPECT_LE(velocity_error, 1e-12);
   }

@@ -40,8 +40,8 @@ inline double calc_velocity_difference(const model::SlungLoadState& a,
   return std::max((a.v_WQ - b.v_WQ).cwiseAbs().maxCoeff(), (a.v_WL - b.v_WL).cwiseAbs().maxCoeff());
 }
 
-/// Control force that keeps the quadrotor about the origin while it shakes the load in every
-/// direction near the swing's own frequency: a smooth flight with tilts beyond 20 degrees.
+/// Control force that keeps the quadrotor near the origin and shakes the load in every direction
+/// near its swing frequency: a smooth flight with tilts beyond 20 degrees.
 inline Eigen::Vector3d calc_shaking_force(double time, const Eigen::Vector3d& p_WQ,
                                           const Eigen::Vector3d& v_WQ, double total_mass,
                                           double gravity) {
@@ -50,11 +50,11 @@ inline Eigen::Vector3d calc_shaking_force(double time, const Eigen::Vector3d& p_
   return calc_weight_force(total_mass, gravity) + shake - 2.0 * p_WQ - 2.0 * v_WQ;
 }
 
-/// The oracle flies each of the plant's steps in this many: its truncation error is then 256 times
-/// smaller and what remains is the plant's.
+/// Number of oracle steps per plant step. The oracle's truncation error is then 256 times smaller,
+/// and the remaining difference is the plant's error.
 inline constexpr int kOracleSubsteps = 4;
 
-/// One step of the plant by the oracle, of the ideal load or of the rigid pendulum.
+/// The oracle's flight over one plant step, with the ideal load or the rigid pendulum.
 template <typename Parameters>
 oracle::State fly_oracle(oracle::State state, const Eigen::Vector3d& f_Q_W,
                          const Parameters& parameters) {
@@ -70,7 +70,7 @@ inline double calc_quarter_period(double omega, double amplitude) {
 }
 
 /// Time at which β of `plant` under the held force first changes its sign, s: cubic Hermite
-/// interpolation between the two steps around it, whose own error is of order h⁴.
+/// interpolation between the two steps around it, with an error of order h⁴.
 inline double find_first_hang(SlungLoadPlant& plant, const Eigen::Vector3d& f_Q_W) {
   model::RodAngles before = plant.state().rod;
   for (int k = 0; k < 60'000; ++k) {

@@ -1,5 +1,5 @@
-/// The rigid pendulum as a closed-form ODE: an axisymmetric body without spin on a joint in a free
-/// point mass, written from Newton and Euler alone. It shares no equation with the plant.
+/// The rigid pendulum as a closed-form ODE, derived only from Newton and Euler: an axisymmetric
+/// body without spin, joined to a free point mass. It shares no equation with the plant.
 ///
 ///     m a_Q = m g e₃ + F − R,   M a_C = M g e₃ + R,   a_C = a_Q + c n̈,   I_C n × n̈ = −c n × R
 ///

@@ -55,7 +55,7 @@ TEST(RigidPendulumTest, TakesTheLoadsMassAloneOrWithTheRod) {
   const Eigen::Vector3d f_Q_W(0.1, 0.2, -16.0);
   fly(alone, f_Q_W, 100);
   fly(together, f_Q_W, 100);
-  // The links decide what flies: the same plant to the last bit.
+  // Only the links define the pendulum: the plant is the same to the last bit.
   EXPECT_EQ(calc_position_difference(alone.state(), together.state()), 0.0);
 }
 
@@ -109,8 +109,8 @@ TEST(RigidPendulumTest, FollowsTheNewtonEulerEquationsForThirtyTwoSeconds) {
     tilt = std::max(tilt, calc_tilt(expected.n_W));
   }
   EXPECT_GT(tilt, 20.0 * M_PI / 180.0);
-  // The plant's truncation, (ωh)⁴/120 = 1e-12 per radian; as for the ideal load the errors are the
-  // same on every machine: 5.18e-11, 1.19e-10.
+  // The plant's truncation error is (ωh)⁴/120 = 1e-12 per radian. As for the ideal load, the errors
+  // are the same on every machine: 5.18e-11, 1.19e-10.
   EXPECT_LE(position_error, 5.2e-11);
   EXPECT_LE(velocity_error, 1.2e-10);
 }
@@ -127,7 +127,8 @@ TEST(RigidPendulumTest, KeepsEnergyLessTheHeldForcesWork) {
   };
   const double start = calc_invariant();
   fly(plant, f_Q_W, 8000);
-  // Runge-Kutta changes it by (ωh)⁶/72 ≈ 2e-17 of 1 J per step; 8,000 roundings of 600 J are more.
+  // Runge-Kutta changes the invariant by (ωh)⁶/72 ≈ 2e-17 of 1 J per step; 8,000 roundings of 600 J
+  // are larger.
   EXPECT_NEAR(calc_invariant(), start, 1e-10);
 }
 

@@ -1,5 +1,5 @@
-// Measurements judged by the sentences of the README written out as loops over nanoseconds, and by
-// flights whose states are closed forms of time.
+// Measurements, compared with the rules of the README (as loops over nanoseconds) and with flights
+// that have closed-form states.
 #include "sim_server/plants/sensing/sensed_plant.hpp"
 
 #include <gtest/gtest.h>
@@ -23,8 +23,8 @@ using Eigen::Vector3d;
 constexpr std::int64_t kStepNs = 1'000'000;  // config::Plant's default
 constexpr int kStepsPerPeriod = 4;           // config::Sync's default
 
-/// The step seen at `step`: the last not after the last sample time that is `age_ns` ago or more;
-/// the initial state before the first one.
+/// The step that is measured at `step`. It is the last step up to the last sample time that is at
+/// least `age_ns` ago; step 0, the initial state, before the first sample time.
 std::int64_t find_seen_by_hand(const SampleTimes& times, std::int64_t step_ns, std::int64_t step) {
   const std::int64_t now = step * step_ns;
   const std::int64_t between = times.period_ns > 0 ? times.period_ns : step_ns;
@@ -35,7 +35,7 @@ std::int64_t find_seen_by_hand(const SampleTimes& times, std::int64_t step_ns, s
   return seen;
 }
 
-/// Periods and ages that fit nothing, and those at the edges.
+/// Periods and ages that are no multiples of the step, and limiting cases.
 const std::vector<SampleTimes> kTimes = {
     {0, 0},          {0, 1},           {0, 20'000'000},         {0, 20'000'001},
     {1'000'000, 0},  {4'000'000, 0},   {33'333'333, 0},         {33'333'333, 20'000'000},
@@ -79,7 +79,7 @@ TEST(SampleClockTest, IsOldAtAControlPeriodUnlessItSamplesThereAndIsSeenAtOnce) 
 
 // --- plants --------------------------------------------------------------------------------------
 
-/// Vehicles whose every number tells the step and the vehicle.
+/// A plant in which every number encodes the step and the vehicle.
 class Counter : public Plant {
  public:
   explicit Counter(std::size_t vehicles) : measurements_(vehicles) { measure(); }
@@ -94,7 +94,7 @@ class Counter : public Plant {
   bool has_attitude() const override { return true; }
   std::vector<Signal> signals() const override { return {{"count", ""}}; }
 
-  std::vector<std::vector<Vector3d>> acted;  // in each step
+  std::vector<std::vector<Vector3d>> acted;  // forces in each step
 
  private:
   void measure() {
@@ -170,7 +170,7 @@ TEST(SensedPlantTest, ShowsBodyAndRodEachOfItsOwnStepInAnyCombinationOfTimes) {
         ASSERT_EQ(seen.signals[0], body_step);
         ASSERT_EQ(seen.rod.alpha, 1e-3 * rod_step);
         ASSERT_EQ(seen.rod.alpha_dot, 3.0 * rod_step);
-        // The load hangs where the rod of its time has it, from the quadrotor of its own.
+        // The load follows from the rod at the rod's sample time and the quadrotor at the body's.
         const auto expected = model::make_state(seen.p_WQ, seen.v_WQ, seen.rod, 1.0);
         const double rounding = 1e-12;  // of numbers up to 1000
         ASSERT_LE((seen.p_WL - expected.p_WL).norm(), rounding);
@@ -246,7 +246,7 @@ TEST(SensedPlantTest, AForceActsFromTheFirstStepNotBeforeItsArrivalAndTheFirstOn
     const auto& acted = sensed.counter->acted;
     ASSERT_EQ(acted.size(), 200u);
     for (std::int64_t step = 0; step < 200; ++step) {
-      int newest = 0;  // the first one, before any has arrived
+      int newest = 0;  // the first force acts until a force has arrived
       for (int k = 0; k < 50; ++k)
         if (k * kStepsPerPeriod * kStepNs + delay <= step * kStepNs) newest = k;
       ASSERT_EQ(acted[static_cast<std::size_t>(step)][0].x(), newest) << delay << ' ' << step;
@@ -273,7 +273,7 @@ TEST(SensedPlantTest, EveryVehicleOfAPlantOfAllHasItsOwnSamplesAndForces) {
     EXPECT_EQ(forces[0].x(), forces[2].z());
   }
   EXPECT_EQ(sensed.counter->acted[198][0].x(), 192);
-  EXPECT_EQ(sensed.counter->acted[199][0].x(), 196);  // handed over at 196, 2.5 ms under way
+  EXPECT_EQ(sensed.counter->acted[199][0].x(), 196);  // sent at step 196, delayed by 2.5 ms
 }
 
 TEST(SensorGroupTest, KeepsOnlySamplesUnderWay) {
@@ -284,7 +284,7 @@ TEST(SensorGroupTest, KeepsOnlySamplesUnderWay) {
     for (std::int64_t step = 1; step <= 20'000; ++step) {
       plant.advance({Vector3d::Zero()}, 1);
       group.sample(plant, step);
-      // Those on their way, the one that is seen, and one that is due now.
+      // Samples on the way, the sample in use, and one that is due now.
       ASSERT_LE(static_cast<std::int64_t>(group.kept()), times.age_ns / between + 3);
     }
   }
@@ -317,7 +317,7 @@ std::vector<PlantOfVehicles> make(const std::string& model, const config::Scenar
 const config::Sensing kAwkward{{33'333'333, 20'000'000}, {20'000'000, 11'000'001}, 10'500'000};
 
 TEST(SensedPlantTest, SeesAFreeFallAsOldAsItsSamplesAre) {
-  // No force: the centre of mass falls on a parabola, the rod turns at a constant rate.
+  // Without force the centre of mass falls on a parabola and the rod turns at a constant rate.
   const config::Scenario scenario = make_flight(kAwkward);
   const model::SlungLoadParameters& vehicle = scenario.vehicle;
   const double g = vehicle.gravity, length = vehicle.rod_length, rate = 0.5;
@@ -354,7 +354,7 @@ TEST(SensedPlantTest, SeesAFreeFallAsOldAsItsSamplesAre) {
 }
 
 TEST(SensedPlantTest, AForceThatSwitchesWithinAPeriodMovesADoubleIntegratorFromThere) {
-  // M r̈ = M g e₃ + F of the centre of mass, in each step of 1 ms exactly.
+  // The centre of mass obeys M r̈ = M g e₃ + F, exactly in each step of 1 ms.
   config::Sensing sensing;
   sensing.node_delay_ns = 2'500'000;  // acts 3 ms later: within the period of 4 ms
   const config::Scenario scenario = make_flight(sensing);

@@ -1,4 +1,4 @@
-// Plants in shared libraries that do something wrong: the exact line of each.
+// Plants in shared libraries with errors: the exact message of each.
 #include <gtest/gtest.h>
 
 #include "sim_server/plants/plant.hpp"
@@ -13,7 +13,7 @@ std::string library(const std::string& name) { return std::string(SLS_LIBRARIES)
 const std::string kGood = library("plant.so");
 const Eigen::Vector3d kForce(0.0, 0.0, -16.0);
 
-/// Four vehicles whose plant is `model`; `further` are lines of the section `plant`.
+/// Four vehicles with the plant `model`; `further` are lines of the section `plant`.
 config::Scenario make_scenario(const std::string& model, const std::string& further = "") {
   return config::parse_scenario(
       "name: hover\n"
@@ -36,8 +36,8 @@ std::vector<PlantOfVehicles> make_two(const config::Scenario& scenario) {
   return make_plants(find_plant_type(scenario.plant.model), scenario, {2, 3});
 }
 
-/// Flies 100 periods of four steps: what is thrown. A library that is refused has its line from
-/// config::ConfigError.
+/// Flies 100 periods of four steps and returns the message of the exception. A refused library
+/// throws config::ConfigError.
 std::string fly(const config::Scenario& scenario) {
   try {
     const auto plants = make_two(scenario);
@@ -66,7 +66,7 @@ TEST(SharedLibraryPlantTest, MovesAVehicleAndPublishesItsSignals) {
   plant.advance({kForce}, 1);
   const model::Measurement& measured = plant.measurement(0);
   EXPECT_EQ(measured.signals, Eigen::Vector2d(4.0, -16.0));
-  // Vehicle 3 of a grid of 5 m stands in its second row and column.
+  // Vehicle 3 of a grid of 5 m is in its second row and column.
   EXPECT_EQ(measured.p_WL, Eigen::Vector3d(5.0, 5.0, -0.5));
   EXPECT_EQ(measured.p_WQ, Eigen::Vector3d(5.0, 5.0, -1.5));
   EXPECT_EQ(measured.rod.alpha, 0.0);

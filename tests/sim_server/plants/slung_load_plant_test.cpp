@@ -24,7 +24,7 @@ Eigen::Vector3d calc_centre_of_mass(const model::SlungLoadState& state) {
          kVehicle.total_mass();
 }
 
-/// A plant that swings in every direction and moves.
+/// A moving plant with a swing in every direction.
 config::Plant make_swinging_plant() {
   config::Plant plant;
   plant.initial.rod = {0.5, -0.4, 0.7, 1.1};
@@ -104,19 +104,19 @@ TEST(SlungLoadPlantTest, FallsFreelyWithNoForce) {
   config::Plant config;
   config.initial.v_WQ = {0.5, 0.0, -1.0};
   config.initial.rod.beta = 0.6;
-  // Without gravity's help the rod keeps its attitude when both bodies move alike.
+  // In free fall the rod keeps its attitude if both bodies have the same velocity.
   SlungLoadPlant plant(kVehicle, config);
   const model::SlungLoadState start = plant.state();
   fly(plant, Eigen::Vector3d::Zero(), 2000);
   const Eigen::Vector3d fallen(0.5 * 2.0, 0.0, -1.0 * 2.0 + 0.5 * 9.8 * 4.0);
-  // Exact for Runge-Kutta: what is left are 2,000 roundings of numbers up to 20.
+  // Exact for Runge-Kutta: only 2,000 roundings of numbers up to 20 remain.
   EXPECT_LE((plant.state().p_WQ - start.p_WQ - fallen).norm(), 1e-12);
   EXPECT_LE((plant.state().p_WL - start.p_WL - fallen).norm(), 1e-12);
   EXPECT_NEAR(plant.state().rod.beta, 0.6, 1e-13);
 }
 
 TEST(SlungLoadPlantTest, FallsFreelyWhileItsRodTurnsUniformlyOverTheTop) {
-  // Plane of the turn: y = 0. The rod passes β = ±π/2 and the point above the quadrotor.
+  // The rod turns in the plane y = 0. It passes β = ±π/2 and the point above the quadrotor.
   const double rate = 7.0;
   config::Plant config;
   config.initial.rod.beta_dot = rate;
@@ -135,8 +135,8 @@ TEST(SlungLoadPlantTest, FallsFreelyWhileItsRodTurnsUniformlyOverTheTop) {
     ASSERT_LE((calc_centre_of_mass(state) - start - fallen).norm(), 1e-9) << "step " << k;
     ASSERT_NEAR(std::sin(state.rod.beta), n_W.x(), 1e-9);
     ASSERT_NEAR(std::abs(state.rod.alpha), n_W.z() > 0.0 ? 0.0 : M_PI, 1e-9);
-    // β falls back while the rod is above: α carries the turn. At 3e-4 rad from the level rod,
-    // the smallest distance met here, α̇ = −n_dot_y / cos β is still rounding only.
+    // While the load is above the quadrotor, β decreases and α has jumped by π. The rod comes
+    // within 3e-4 rad of level; even there α̇ = −n_dot_y / cos β is only rounding.
     ASSERT_NEAR(state.rod.beta_dot, n_W.z() > 0.0 ? rate : -rate, 1e-8);
     ASSERT_NEAR(state.rod.alpha_dot, 0.0, 1e-9);
     highest = std::max(highest, -state.rod.beta);
@@ -155,8 +155,9 @@ TEST(SlungLoadPlantTest, StaysWhereItHoversAtItsWeight) {
   EXPECT_EQ(plant.state().rod.alpha, 0.0);
 }
 
-// ω² = (m + m_L) g / (m L), not g/L: the quadrotor swings as well. Under a vertical force equal to
-// the weight the planar swing is exactly β̈ = −ω² sin β, so its period is known for any amplitude.
+// ω² = (m + m_L) g / (m L), not g/L, because the quadrotor also swings. Under a vertical force
+// equal to the weight the planar swing is exactly β̈ = −ω² sin β: its period is known for any
+// amplitude.
 TEST(SlungLoadPlantTest, SwingsAboutHoverWithItsPeriod) {
   const double omega = std::sqrt(1.7 * 9.8 / (1.5 * 1.0));
   for (const double amplitude : {0.01, 0.35, 1.5}) {
@@ -202,7 +203,7 @@ TEST(SlungLoadPlantTest, DisturbanceAcceleratesTheCentreOfMass) {
   fly(plant, calc_hover_force(), 4000);
   const Eigen::Vector3d expected =
       p_WC + v_WC * 4.0 + 0.5 * config.disturbance_W / kVehicle.total_mass() * 16.0;
-  // The internal swing's truncation error, (ωh)⁴/120 per radian, is all that reaches the centre.
+  // Only the truncation error of the internal swing, (ωh)⁴/120 per radian, affects the centre.
   EXPECT_LE((calc_centre_of_mass(plant.state()) - expected).norm(), 1e-11);
 }
 
@@ -212,7 +213,7 @@ TEST(SlungLoadPlantTest, KeepsEnergyWhenNoForceActs) {
   SlungLoadPlant plant(kVehicle, make_swinging_plant());
   const double start = model::calc_energy(plant.state(), kVehicle);
   fly(plant, Eigen::Vector3d::Zero(), 8000);
-  // 8,000 roundings, some up and some down, of energies that reach 5,000 J: √8000 · 1e-12.
+  // 8,000 random roundings of energies up to 5,000 J: √8000 · 1e-12.
   EXPECT_NEAR(model::calc_energy(plant.state(), kVehicle), start, 1e-10);
 }
 
@@ -226,7 +227,7 @@ TEST(SlungLoadPlantTest, KeepsEnergyLessTheHeldForcesWorkAndHorizontalMomentum) 
   const Eigen::Vector3d momentum = model::calc_momentum(plant.state(), kVehicle);
   fly(plant, f_Q_W, 16'000);
   // Runge-Kutta changes the energy by (ωh)⁶/72 ≈ 2e-17 of 1 J per step; 16,000 roundings of 15 J
-  // are more. The swing's truncation reaches the momentum, which must not depend on it, no further.
+  // are larger. The truncation error of the swing does not affect the momentum.
   EXPECT_NEAR(calc_invariant(), energy, 1e-11);
   EXPECT_LE((model::calc_momentum(plant.state(), kVehicle) - momentum).norm(), 1e-11);
 }
@@ -239,8 +240,8 @@ TEST(SlungLoadPlantTest, KeepsTheRodsLengthToRounding) {
     length_error = std::max(length_error, model::calc_rod_length_error(plant.state(), 1.0));
     stretch_rate = std::max(stretch_rate, model::calc_rod_stretch_rate(plant.state()));
   }
-  // The joint cannot stretch: half an ulp of each of two positions below 32 m, and some rounding of
-  // velocities below 10 m/s.
+  // The joint cannot stretch. Tolerance: half an ulp of each of two positions below 32 m, and
+  // rounding of velocities below 10 m/s.
   EXPECT_LE(length_error, 4e-15);
   EXPECT_LE(stretch_rate, 1e-14);
 }
@@ -260,7 +261,7 @@ TEST(SlungLoadPlantTest, ConvergesWithTheFourthOrderOfItsStep) {
   const model::SlungLoadState fine = fly_with_step(4'000'000);
   const double order =
       std::log2((coarse.p_WL - middle.p_WL).norm() / (middle.p_WL - fine.p_WL).norm());
-  // The next order of the error is about ωh = 0.05 of the first.
+  // The next order of the error is about ωh = 0.05 times the first.
   EXPECT_NEAR(order, 4.0, 0.2);
 }
 
@@ -271,7 +272,7 @@ TEST(SlungLoadPlantTest, FollowsTheClosedFormEquationsForThirtyTwoSeconds) {
   oracle::State expected = oracle::from_model_state(plant.state());
   double position_error = 0.0, velocity_error = 0.0, angle_error = 0.0, tilt = 0.0;
   for (int k = 0; k < 32'000; ++k) {
-    // The feedback sees the oracle only: the plant flies a recorded sequence.
+    // The feedback uses only the oracle's state: for the plant, the forces are a fixed sequence.
     const Eigen::Vector3d f_Q_W = calc_shaking_force(k * kStep, expected.p_WQ, expected.v_WQ,
                                                      kVehicle.total_mass(), kVehicle.gravity);
     plant.step(f_Q_W);
@@ -286,9 +287,9 @@ TEST(SlungLoadPlantTest, FollowsTheClosedFormEquationsForThirtyTwoSeconds) {
   }
   EXPECT_GT(tilt, 20.0 * M_PI / 180.0);
   EXPECT_LT(tilt, 70.0 * M_PI / 180.0);
-  // The plant's truncation: (ωh)⁴/120 = 1e-12 per radian, 100 radians, and a third of that again
-  // for the swing's and the shaking's higher harmonics. Rounding is a hundred times less, so that
-  // the errors are the same on every machine: 1.38e-10, 2.35e-10, 8.8e-11.
+  // The plant's truncation error is (ωh)⁴/120 = 1e-12 per radian, for 100 radians, and a third more
+  // for the higher harmonics of swing and shaking. Rounding is a hundred times smaller: the errors
+  // are the same on every machine, 1.38e-10, 2.35e-10, 8.8e-11.
   EXPECT_LE(position_error, 1.4e-10);
   EXPECT_LE(velocity_error, 2.4e-10);
   EXPECT_LE(angle_error, 9e-11);
@@ -296,7 +297,7 @@ TEST(SlungLoadPlantTest, FollowsTheClosedFormEquationsForThirtyTwoSeconds) {
 
 TEST(SlungLoadPlantTest, FollowsTheClosedFormEquationsFarAboveTheHorizontal) {
   config::Plant config;
-  config.initial.rod = {0.3, 1.2, 0.5, 9.0};  // faster than the 7 rad/s that carry it over the top
+  config.initial.rod = {0.3, 1.2, 0.5, 9.0};  // above 7 rad/s the load passes over the top
   SlungLoadPlant plant(kVehicle, config);
   oracle::State expected = oracle::from_model_state(plant.state());
   double error = 0.0, largest_beta = 0.0, highest = 1.0;
@@ -309,7 +310,7 @@ TEST(SlungLoadPlantTest, FollowsTheClosedFormEquationsFarAboveTheHorizontal) {
     highest = std::min(highest, expected.n_W.z());
   }
   EXPECT_GT(largest_beta, 1.2);
-  EXPECT_LT(highest, -0.9);  // the load was well above the quadrotor
+  EXPECT_LT(highest, -0.9);  // the load was far above the quadrotor
   // (ωh)⁴/120 with ω up to 12 rad/s is 2e-10 per radian, 80 radians.
   EXPECT_LE(error, 1e-7);
 }
@@ -341,13 +342,13 @@ TEST(SlungLoadPlantTest, FollowsTheClosedFormEquationsWithDragAndDisturbance) {
         std::max(position_error,
                  calc_position_difference(plant.state(), oracle::to_model_state(expected, 1.0)));
   }
-  // Half of that without drag in half the time.
+  // Half the error of the flight without drag, in half the time.
   EXPECT_LE(position_error, 0.7e-10);
 }
 
 TEST(SlungLoadPlantTest, DriftsWithTheWindInTheEnd) {
   model::SlungLoadParameters vehicle;
-  vehicle.load_mass = 1.5;  // a heavy load swings the quadrotor, whose drag then damps it soon
+  vehicle.load_mass = 1.5;  // a heavy load moves the quadrotor, and its drag damps the swing
   config::Plant config;
   config.step_ns = 4'000'000;
   config.air = {2.0, {3.0, -2.0, 1.5}};
@@ -355,7 +356,7 @@ TEST(SlungLoadPlantTest, DriftsWithTheWindInTheEnd) {
   const Eigen::Vector3d f_Q_W = calc_weight_force(vehicle.total_mass(), vehicle.gravity);
   for (int k = 0; k < 15'000; ++k) {
     plant.step(f_Q_W);
-    // Drag is perpendicular to the vertical force: the wind's vertical part lifts nothing. The
+    // Drag is perpendicular to the vertical force: the wind's vertical part has no effect. The
     // remainder is the swing's truncation error at this step, (ωh)⁴/120 ≈ 1e-9.
     ASSERT_NEAR(model::calc_momentum(plant.state(), vehicle).z(), 0.0, 1e-8) << "step " << k;
   }
@@ -402,7 +403,7 @@ TEST(SlungLoadPlantTest, TwoPlantsGiveTheSameBytes) {
     const Eigen::Vector3d f_Q_W =
         calc_hover_force() + Eigen::Vector3d(std::sin(0.003 * k), std::cos(0.002 * k), 0.0);
     first.step(f_Q_W);
-    // A look at the state, at any time, must not change the flight.
+    // Reading the state, at any time, must not change the flight.
     if (k % 3 == 0) (void)first.state();
   }
   for (int k = 0; k < 2000; ++k) {
@@ -439,8 +440,8 @@ TEST(SlungLoadPlantTest, NamesTheOverflowingValueAndKeepsTheLastFiniteState) {
 }
 
 TEST(SlungLoadPlantTest, FailsByNameWhereTheLevelRodHasNoAlphaRate) {
-  // At z = 0 the load is 1e-15 m below the quadrotor and α̇ is 0; at z = 1000 m that difference is
-  // rounded away, so that cos β = 0 and α̇ = 0/0.
+  // At z = 0 the load is 1e-15 m below the quadrotor and α̇ is 0. At z = 1000 m rounding removes
+  // this difference: cos β = 0 and α̇ = 0/0.
   config::Plant config;
   config.initial.placed = config::Body::kQuadrotor;
   config.initial.rod.beta = M_PI / 2 - 1e-15;

@@ -1,6 +1,6 @@
-// A plant that hangs where it began and, if `parameters` say so, does something wrong:
+// A plant that stays at its initial position. `parameters` can select an error:
 //   { do: WHAT, in: create, advance, measure or destroy, at: STEP }
-// Macros make the tables of functions that are to be refused.
+// Macros define the invalid tables of functions.
 #include <cstdio>
 #include <memory>
 
