@@ -97,8 +97,7 @@ TEST_F(ParticipantCheckTest, AnotherContractIsNamedAtOnceAndNotAdmitted) {
   auto controller = make_entry(1), recorder = make_entry(2, "tape", ROLE_RECORDER);
   controller.announcement.contract_sha256(std::string(64, '1'));
   recorder.announcement.contract_sha256("");
-  controller.announcement.vehicle_ids(
-      {99});  // other fields may have another meaning in that contract
+  controller.announcement.vehicle_ids({99});  // may have another meaning there
   neighbourhood_.participants = {controller, recorder};
   const std::string field = "sls/participant contract_sha256: expected ";
   EXPECT_EQ(look(), (std::vector<std::string>{

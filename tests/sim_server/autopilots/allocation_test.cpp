@@ -66,8 +66,7 @@ TEST(AllocationTest, KeepsRollAndPitchWhereThrustOrYawDoNotFit) {
   const Airframe airframe = make_published_airframe();
   const Allocation allocation(make_setup(airframe));
   for (int i = 0; i < 10'000; ++i) {
-    const Vector3d moment =
-        0.9 * make_random_vector(random);  // near the largest that the arms allow
+    const Vector3d moment = 0.9 * make_random_vector(random);  // near the largest possible
     const double thrust = any(random);
     const VectorXd thrusts = allocation.calc_thrusts(moment, thrust);
     ASSERT_GE(thrusts.minCoeff(), 0.0);

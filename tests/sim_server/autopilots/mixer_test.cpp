@@ -186,8 +186,7 @@ TEST(MixerTest, KeepsToTheLimitsAndNeverRaisesThrustNorTurnsATorqueRound) {
     const VectorXd outputs = mix(kQuadX, wanted, thrust).outputs;
     ASSERT_GE(outputs.minCoeff(), 0.0);
     ASSERT_LE(outputs.maxCoeff(), 1.0);
-    ASSERT_LE(outputs.sum(),
-              4.0 * thrust + 0.3);  // after yaw took its 0.15, the clamp at 0 adds thrust
+    ASSERT_LE(outputs.sum(), 4.0 * thrust + 0.3);  // the clamp at 0 after yaw (0.15) adds
     // Without yaw no output is clamped: roll and pitch are only reduced.
     const VectorXd level = mix(kQuadX, {wanted.x(), wanted.y(), 0.0}, thrust).outputs;
     ASSERT_LE(level.sum(), 4.0 * thrust + 1e-12);
