@@ -1,4 +1,4 @@
-// No file includes upwards: which folder may include which.
+// Rules for includes: which folders each folder may include.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -15,8 +15,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Files of `folder`, where no later rule names a folder below it, may include its own files and
-/// those of `others`: folders and files of this project, and libraries of others.
+/// Files of `folder` may include files of `folder` and of `others`: folders and files of this
+/// project, and external libraries. The rule of a subfolder takes precedence for its files.
 struct Rule {
   std::string folder;
   std::vector<std::string> others;
@@ -59,7 +59,7 @@ bool is_below(const std::string& path, const std::string& folder) {
   return path.rfind(folder + "/", 0) == 0;
 }
 
-/// The rule of the closest folder above the file.
+/// The rule of the closest folder above the file that has one.
 const Rule* find_rule(const std::string& file) {
   const Rule* found = nullptr;
   for (const Rule& rule : kRules)
@@ -68,7 +68,7 @@ const Rule* find_rule(const std::string& file) {
   return found;
 }
 
-/// The library that `header` belongs to where only some folders may see it, else empty.
+/// The library of `header` if only some folders may include it, otherwise empty.
 std::string find_library(const std::string& header) {
   if (header == "sls.h" || header.rfind("slsPubSubTypes", 0) == 0) return "Wire";
   if (std::regex_search(header, std::regex("^fast(dds|rtps|cdr)/"))) return "Fast DDS";
@@ -85,7 +85,7 @@ bool is_allowed(const std::string& file, const std::string& header, bool is_ours
   });
 }
 
-/// `FILE:LINE: includes HEADER` of each include that breaks a rule, in the product's folders of
+/// `FILE:LINE: includes HEADER` for each include that breaks a rule, in the product's folders of
 /// `root`.
 std::vector<std::string> find_faults(const fs::path& root) {
   const std::regex include(R"(^\s*#\s*include\s*([<"])([^>"]+)[>"])");

@@ -1,5 +1,5 @@
-"""The build context of docker/Dockerfile: .dockerignore lets through all that it copies and that CMake builds without
-tests. Needs no Docker engine."""
+"""Tests the build context of docker/Dockerfile: .dockerignore admits every path that the Dockerfile copies and every
+folder that CMake builds without tests. Needs no Docker engine."""
 
 import pathlib
 import re
@@ -9,7 +9,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 
 def list_allowed():
-    """Paths that .dockerignore lets through after its first pattern, which leaves out everything."""
+    """Paths that .dockerignore admits after its first pattern, which excludes everything."""
     lines = (ROOT / ".dockerignore").read_text(encoding="utf-8").split("\n")
     patterns = [line for line in lines if line and not line.startswith("#")]
     assert patterns[0] == "*"
@@ -22,7 +22,7 @@ def is_let_through(path):
 
 
 def list_folders_of_cmake():
-    """What the root CMakeLists.txt adds or installs where SLS_BUILD_TESTS and SLS_BUILD_FUZZERS are off."""
+    """Folders that the root CMakeLists.txt adds if SLS_BUILD_TESTS and SLS_BUILD_FUZZERS are off."""
     text = (ROOT / "CMakeLists.txt").read_text(encoding="utf-8")
     text = re.sub(r"if\(SLS_BUILD_(TESTS|FUZZERS).*?endif\(\)", "", text, flags=re.DOTALL)
     return re.findall(r"add_subdirectory\((\S+)\)", text)

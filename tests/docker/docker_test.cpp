@@ -1,5 +1,5 @@
-/// The image and the compose files, flown for real by the launcher, judged by flights of the
-/// programs on this machine itself.
+/// Real flights by the launcher with the image and the compose files, compared with flights of the
+/// programs outside containers.
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/stat.h>
@@ -34,7 +34,7 @@ Outcome run_command(const std::vector<std::string>& command,
 
 Outcome run_shell(const std::string& command) { return run_command({"sh", "-c", command}); }
 
-/// Why this machine cannot fly in containers; empty if it can.
+/// The reason why this machine cannot fly in containers; empty if it can.
 std::optional<std::string> find_obstacle() {
   if (run_shell("timeout 1 docker version").code != 0) return "no Docker engine";
   if (run_shell("docker compose version || docker-compose version").code != 0)
@@ -67,7 +67,7 @@ class DockerTest : public ::testing::Test {
     ASSERT_EQ(image.code, 0) << image.output;
   }
 
-  // A demo removes everything itself; this is for tests that failed.
+  // A demo removes everything itself. This removes what failed tests leave.
   void TearDown() override {
     for (const std::string& project : projects_) {
       const std::string filter = " --quiet --filter label=com.docker.compose.project=" + project;
@@ -81,8 +81,8 @@ class DockerTest : public ::testing::Test {
   }
   fs::path recording(const std::string& name) const { return folder / ("of_" + name); }
 
-  /// Flies with the launcher and expects complete recordings (in these folders of `recording`),
-  /// their summaries, and nothing left behind.
+  /// Flies with the launcher. Expects complete recordings in these folders of `recording`, their
+  /// summaries, and no container, network or volume left behind.
   std::string expect_demo(const std::string& name, const std::string& what,
                           const std::vector<std::string>& folders = {""}) {
     Process demo(make_demo(name, what));
@@ -111,7 +111,7 @@ class DockerTest : public ::testing::Test {
     EXPECT_EQ(run_shell("docker volume ls" + filter).output, "");
   }
 
-  /// The figure eight in real time, for long enough to look at it.
+  /// A long figure eight in real time: the test examines the containers during the flight.
   std::string make_slow_scenario() const {
     std::string text = read_file(scenario("figure_eight"));
     text = replace_once(text, "mode: lockstep", "mode: realtime");
@@ -149,8 +149,7 @@ TEST_F(DockerTest, AStandbyTakesOverFromAKilledControllerAndNothingChanges) {
       << output;
 }
 
-/// The recording of the programs on this machine itself, of the vehicles `first` to `last` of a
-/// scenario.
+/// Flies the vehicles `first` to `last` of a scenario outside containers and records into `out`.
 void fly_natively(const std::string& scenario_file, int first, int last, const fs::path& out) {
   const OwnDomain domain;
   const std::string vehicles = std::to_string(first) + "-" + std::to_string(last);
@@ -246,7 +245,7 @@ TEST_F(DockerTest, ServicesAreHealthyWhileTheyFlyAndRunAsTheUserTheyWereTold) {
                   .output,
               "[CMD sls-health]\n");
   }
-  // A program that hangs is not well.
+  // The health check must fail for a program that hangs.
   const std::string server = find_container("server");
   EXPECT_EQ(run_shell("docker kill --signal STOP " + server).code, 0);
   const Outcome health = run_shell("docker exec " + server + " sls-health");

@@ -1,6 +1,6 @@
-"""The manifests of docker/k8s against the API's own schema, as the models of python3-kubernetes hold
-it: every key known, every type right, nothing missing; and the names by which they refer to each
-other. Nothing here needs a cluster."""
+"""Tests of the manifests of docker/k8s against the API's schema, which the models of python3-kubernetes contain:
+all keys are known, all types are correct, no key is missing. Also tests the names by which the manifests refer to each
+other. Needs no cluster."""
 
 import datetime
 import json
@@ -103,7 +103,7 @@ class ManifestsTest(unittest.TestCase):
 
     def test_names_that_refer_to_something_find_it(self):
         names = {(m["kind"], m["metadata"]["name"]) for m in MANIFESTS.values()}
-        # The one that README.md makes of scenario and QoS file.
+        # README.md creates this one from the scenario and the QoS file.
         names.add(("ConfigMap", "sls-config"))
         for place, pod in PODS.items():
             volumes = {volume["name"] for volume in pod["spec"].get("volumes", [])}

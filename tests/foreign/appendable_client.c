@@ -1,4 +1,4 @@
-/// Somebody else's controller on Eclipse Cyclone DDS, whose types were compiled as @appendable. It
+/// A foreign controller on Eclipse Cyclone DDS, with types compiled as @appendable. It
 /// creates its endpoints, prints "begins" and waits for SIGTERM.
 #include <signal.h>
 #include <stdio.h>

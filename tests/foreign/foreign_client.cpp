@@ -1,6 +1,6 @@
-/// Somebody else's controller, on Fast DDS as it comes, that makes one mistake (--mistake) and does
-/// the rest as idl/README.md asks: it keeps a vehicle that hangs at rest where it is. Prints
-/// "begins" when its mistake can first be seen, and ends at SIGTERM.
+/// A foreign controller on plain Fast DDS. It makes one mistake (--mistake) and otherwise follows
+/// idl/README.md: it keeps a resting vehicle in place. It prints "begins" when its mistake first
+/// becomes visible, and ends at SIGTERM.
 #include <slsPubSubTypes.h>
 
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
@@ -43,15 +43,14 @@ struct Options {
   int strength = 0;
 };
 
-/// The bytes of a message, `count` of them put in (or, where negative, taken out) at `offset`.
+/// A change of a message's bytes: inserts `count` bytes at `offset`, or removes them if negative.
 struct Edit {
   std::size_t offset = 0;
   int count = 0;
 };
 constexpr std::size_t kEnd = SIZE_MAX;
 
-/// A type compiled from an IDL file in which a field was added or left out; or under another
-/// name, or with a key.
+/// A type as if compiled from another IDL file: with a field more or less, another name, or a key.
 template <class Generated>
 class OtherType : public Generated {
  public:
@@ -222,7 +221,7 @@ class ForeignClient {
         qos);
   }
 
-  // --- the life of a client ---
+  // --- joining and answering ---
 
   void look_for_run() {
     dds::SampleInfo info;
@@ -304,7 +303,7 @@ class ForeignClient {
     if (makes("wrong_vehicle")) command.vehicle_id(7);
     answers.vehicles().push_back(command);
     command_writer_->write(&answers);
-    if (makes("early")) {  // it guesses that nothing changes
+    if (makes("early")) {  // an answer to a state not yet published
       answers.step(step + 2);
       command_writer_->write(&answers);
     }

@@ -1,5 +1,5 @@
-/// Somebody else's clients, each with one mistake, meet our programs: the one that notices says in
-/// one line what is wrong, within 2 s, and `sim_ctl status` shows it.
+/// Foreign clients, each with one mistake, join the project's programs. The program that detects
+/// the mistake prints one line about it within 2 s, and `sim_ctl status` shows it.
 #include <gtest/gtest.h>
 
 #include <csignal>
@@ -17,7 +17,7 @@ using Words = std::vector<std::string>;
 
 constexpr auto kMostTime = 2000ms;
 
-/// The vehicle hangs at rest, and is to stay there: half a second of simulation, then ten minutes.
+/// The vehicle is at rest and must stay there: for half a second of simulation, then ten minutes.
 constexpr const char* kScenario =
     "name: hang\n"
     "vehicle: { quad_mass_kg: 1.5, load_mass_kg: 0.2, rod_length_m: 1.0, gravity_m_s2: 9.8 }\n"
@@ -51,7 +51,7 @@ class ForeignTest : public testing::Test {
   std::unique_ptr<Process> start_program(const std::string& name, const Words& flags) const {
     return std::make_unique<Process>(make_command(name, domain_.number(), flags));
   }
-  /// The client with `mistake`; returns once that can be seen.
+  /// Starts the client with `flags`; returns when its mistake becomes visible.
   std::unique_ptr<Process> start_foreign(const Words& flags) const {
     Words command = {SLS_FOREIGN_CLIENTS "/foreign_client", "--domain", domain_.text()};
     command.insert(command.end(), flags.begin(), flags.end());
@@ -68,7 +68,7 @@ class ForeignTest : public testing::Test {
   }
   std::string outputs() const { return server->output() + recorder->output(); }
 
-  /// `program` says one of `lines`, whole, once and in time.
+  /// Expects that `program` prints one of `lines` completely, once and in time.
   void expect_line(const std::string& name, const Process& program, const Words& lines,
                    std::chrono::milliseconds most_time = kMostTime) const {
     const auto began = std::chrono::steady_clock::now();
@@ -105,7 +105,7 @@ class ForeignTest : public testing::Test {
     return json.is_object() && json.contains("problem") ? json.at("problem").get<std::string>()
                                                         : text;
   }
-  /// Nobody else is blamed.
+  /// Expects that `program` has printed exactly `warnings` warnings.
   void expect_no_other_warnings(const Process& program, std::size_t warnings) const {
     const std::string text = program.output();
     std::size_t found = 0;
@@ -142,7 +142,7 @@ TEST_F(ForeignTest, AnotherContract) {
   const auto client = start_foreign({"--mistake", "other_contract"});
   expect_server_line(kWho + "sls/participant contract_sha256: expected " + bus::kContractSha256 +
                      ", got " + std::string(64, '0'));
-  expect_no_other_warnings(*server, 1);  // it is not counted ready: no step is flown
+  expect_no_other_warnings(*server, 1);  // the client is not counted as ready: no step is flown
   EXPECT_FALSE(wait_until([&] { return has(*server, "step 0: "); }, 1s)) << outputs();
 }
 
@@ -188,7 +188,7 @@ TEST_F(ForeignTest, NoAnnouncement) {
       "none");
 }
 
-/// An announcement may be on its way for 5 s on a lossy network.
+/// On a lossy network an announcement may need 5 s to arrive.
 TEST_F(ForeignTest, NoAnnouncementByAWriterOfAnnouncements) {
   start();
   const auto client = start_foreign({"--mistake", "unannounced_writer"});
@@ -215,7 +215,7 @@ TEST_F(ForeignTest, AnotherLibraryThanTheClientThatWasReadyFirst) {
 struct EndpointMistake {
   const char* name;
   const char* line;
-  bool is_recorders = false;  ///< the recorder has an endpoint of that topic, too
+  bool is_recorders = false;  ///< the recorder also has an endpoint of that topic
 };
 
 class ForeignEndpointTest : public ForeignTest,
@@ -293,7 +293,7 @@ TEST_F(ForeignTest, AppendableTypesOfCyclone) {
   const std::string written =
       " of 'appendable' (127.0.0.1): DATA_REPRESENTATION: offered XCDR2, "
       "asked XCDR1 (compile the types as @final)";
-  // Whichever of its endpoints is discovered first.
+  // The line names the endpoint that is discovered first.
   expect_server_line({"sls/participant" + written, "sls/command" + written,
                       "sls/state for 'appendable' (127.0.0.1): DATA_REPRESENTATION: offered XCDR1, "
                       "asked XCDR2 (compile the types as @final)"});
@@ -335,7 +335,7 @@ TEST_F(ForeignTest, CommandsWithAFieldOfAnotherType) {
 
 // --- answers -------------------------------------------------------------------------------------
 
-/// The line counts answers: how many depends on how often the state was sent again.
+/// The line contains the number of answers, which depends on how often the state was sent again.
 class ForeignAnswerTest : public ForeignTest {
  protected:
   void expect_rejected(const std::string& cause) {
@@ -354,7 +354,7 @@ class ForeignAnswerTest : public ForeignTest {
         << outputs();
     EXPECT_EQ(line.substr(line.find(" answers")), end);
     EXPECT_EQ(ask_problem(), line);
-    // The participant waited for, and why: as the awaited one, or as a problem.
+    // The waiting line names the awaited client and the cause, in its own text or as a problem.
     EXPECT_TRUE(wait_until([&] {
       const bool is_of_awaited =
           has(*server, " of its answers rejected, none taken: " + cause + ") (");
@@ -422,7 +422,7 @@ TEST_F(ForeignAnswerTest, ThatFlyFarFromTheReferenceAreAnnouncedOnce) {
   EXPECT_EQ(ask_problem(), "");
 }
 
-// --- nobody --------------------------------------------------------------------------------------
+// --- no mistake ----------------------------------------------------------------------------------
 
 TEST_F(ForeignTest, ALongWaitSuggestsTheDoctor) {
   start();

@@ -1,4 +1,5 @@
-/// Any file under the right columns is rows of that many fields, or a DamagedError.
+/// Any file after a correct header has rows with the right number of fields, or causes a
+/// DamagedError.
 #include <cstdint>
 #include <cstdlib>
 

@@ -1,5 +1,5 @@
-/// Any messages of a client of the Foxglove protocol, and any samples of the domain meanwhile, are
-/// answered or refused. An input is parts, each: kind, length (2 bytes, little-endian), bytes.
+/// Any messages of a Foxglove client, together with any samples of the domain, are answered or
+/// refused. An input consists of parts, each: kind, length (2 bytes, little-endian), bytes.
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>
@@ -11,7 +11,7 @@ namespace {
 using namespace sls;
 using namespace sls::view;
 
-constexpr int kMostRuns = 3;  // their channels take time
+constexpr int kMostRuns = 3;  // the channels of a run take time
 constexpr std::uint8_t kText = 0, kBinary = 1, kRun = 2, kReply = 3, kFirstTopic = 4;
 
 struct Bench {
@@ -37,7 +37,7 @@ struct Bench {
     for (Feed::Listener* listener : flight->listeners) listener->note(sample);
   }
 
-  /// Parses every text but the long advertisements: what is sent must be JSON.
+  /// Checks that every text sent is JSON, except the long advertisements.
   struct CheckedConnection {
     foxglove::test::FakeConnection connection;
     void check() {
@@ -50,7 +50,7 @@ struct Bench {
   };
 
   int runs = 0;
-  foxglove::test::FakeFlight* flight = new foxglove::test::FakeFlight;  // the hub's
+  foxglove::test::FakeFlight* flight = new foxglove::test::FakeFlight;  // owned by the hub
   std::chrono::steady_clock::time_point now{std::chrono::hours(1)};
   std::shared_ptr<foxglove::Hub> hub =
       std::make_shared<foxglove::Hub>(std::unique_ptr<foxglove::FlightSource>(flight),

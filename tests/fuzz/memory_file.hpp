@@ -10,7 +10,7 @@
 
 namespace sls::fuzz {
 
-/// A file of these bytes that lives in memory, for readers that want a path.
+/// A file in memory with these bytes, for readers that require a path.
 class MemoryFile {
  public:
   MemoryFile(const std::uint8_t* data, std::size_t size)

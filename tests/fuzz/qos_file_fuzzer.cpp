@@ -1,4 +1,4 @@
-/// Any file is a QoS file or a ConfigError; one that is taken is taken again as it was completed.
+/// Any file is a QoS file, which is completed, or causes a ConfigError.
 #include <netdb.h>
 
 #include <cstdint>
@@ -8,7 +8,8 @@
 #include "common/config/config_error.hpp"
 #include "tests/fuzz/memory_file.hpp"
 
-/// Stands for the system's (see CMakeLists.txt): a name in an input must not be looked up.
+/// Replaces the system's function (see CMakeLists.txt): host names of an input must not be looked
+/// up.
 extern "C" int __wrap_getaddrinfo(const char*, const char*, const addrinfo*, addrinfo**) {
   return EAI_NONAME;
 }

@@ -1,5 +1,6 @@
-/// A folder with any manifest and any rows is a recording that equals itself, or an error that says
-/// what is wrong with it. An input is the files of the folder, each ended by the byte 0x1e.
+/// A folder with any manifest and any rows is a recording that equals itself, or causes an error
+/// that names the defect. An input consists of the files of the folder, each ended by the byte
+/// 0x1e.
 #include <cstdint>
 #include <cstdlib>
 #include <string>

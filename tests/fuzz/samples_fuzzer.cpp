@@ -1,5 +1,6 @@
-/// Any bytes from the network are a sample or none, and no samples disturb what judges them. An
-/// input is samples, each: type, sender, length (2 bytes, little-endian), serialised payload.
+/// Any bytes from the network are a sample or are refused, and no sample breaks the code that
+/// checks samples. An input consists of samples, each: type, sender, length (2 bytes,
+/// little-endian), serialised payload.
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>
@@ -18,7 +19,7 @@ namespace rtps = eprosima::fastrtps::rtps;
 
 constexpr std::uint64_t kRun = 1;
 
-/// The sample of these bytes as the middleware hands it to a reader; nothing if it does not.
+/// The sample that Fast DDS passes to a reader for these bytes; empty if it passes none.
 template <class Type, class Message>
 std::optional<Message> deserialize(const std::uint8_t* data, std::uint32_t size) {
   rtps::SerializedPayload_t payload(size);
@@ -88,7 +89,7 @@ struct Judges {
     parameters.vehicles()[1].vehicle_id(1);
     return parameters;
   }
-  /// Every vehicle's rows are in order.
+  /// Aborts if a vehicle's rows are not in order.
   void check(const record::StepRows& rows) {
     const auto [last, is_first] = last_steps.try_emplace(rows.vehicle_id, rows.step);
     if (!is_first && rows.step <= last->second) std::abort();

@@ -1,4 +1,5 @@
-/// Any text is a scenario or a ConfigError; a scenario that is written out reads back the same.
+/// Any text is a scenario or causes a ConfigError. A scenario that is written and read again is the
+/// same.
 #include <cstdint>
 #include <cstdlib>
 #include <string>

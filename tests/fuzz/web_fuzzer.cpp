@@ -1,6 +1,7 @@
-/// Any bytes from a client are answered or refused, and its connection ends with them. An input is
-/// a mode (1 byte) and bytes: of mode 0 HTTP requests, of mode N the frames that follow an upgrade
-/// to the subprotocol N - 1 (modulo their count). A mask of zeros leaves a payload readable.
+/// Any bytes from a client are answered or refused, and the connection ends after the last one. An
+/// input is a mode (1 byte) and bytes. In mode 0 they are HTTP requests; in mode N they are frames
+/// after an upgrade to subprotocol N - 1 (modulo their count). A mask of zeros keeps a payload
+/// readable.
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -20,7 +21,7 @@ using namespace sls;
 
 constexpr std::chrono::milliseconds kPatience(10);
 
-/// Sends each message back in the manner that its first byte names.
+/// Sends each message back; its first byte selects delivery and key.
 class Mirror : public view::Session {
  public:
   explicit Mirror(view::Connection& connection) : connection_(connection) {}
@@ -57,7 +58,7 @@ std::unique_ptr<view::Hub> make_hub() {
   return hub;
 }
 
-/// A client's end of a socket pair, whose other end the hub serves.
+/// The client's end of a socket pair. The hub serves the other end.
 class Peer {
  public:
   explicit Peer(view::Hub& hub) : hub_(hub) {
@@ -89,7 +90,7 @@ class Peer {
   }
 
  private:
-  /// Serves, and reads what comes.
+  /// Runs the hub and reads its output.
   void work() {
     hub_.io.restart();
     hub_.io.poll();

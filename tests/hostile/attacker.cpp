@@ -59,7 +59,7 @@ int main(int argc, char** argv) {
       {"readers", [&] { return read_all(target); }},
       {"malformed", [&] { return write_malformed(target); }}};
   sls::app::install_stop_signals();
-  // A neighbour has processors of its own: here it must not take those of the flight.
+  // A real attacker has its own processors. Here it must not slow the flight down.
   setpriority(PRIO_PROCESS, 0, 10);
   try {
     const std::uint64_t count = attacks.at(attack)();

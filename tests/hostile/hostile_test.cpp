@@ -1,5 +1,5 @@
-/// A neighbour on the network attacks a flight with all it has. The flight must finish with the
-/// bytes of an undisturbed one, and the memory of the programs must stay bounded: README.md.
+/// A host on the network attacks a flight in many ways. The flight must finish with the bytes of an
+/// undisturbed one, and the memory of the programs must stay bounded: README.md.
 #include <gtest/gtest.h>
 
 #include <csignal>
@@ -15,7 +15,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// Attacks that have nothing to do with each other run side by side.
+/// Independent attacks run at the same time.
 class HostileTest : public testing::Test {
  protected:
   explicit HostileTest(const std::string& profile = "lan") : profile_name_(profile) {}
@@ -51,7 +51,7 @@ class HostileTest : public testing::Test {
     return *attackers_.back();
   }
 
-  /// Packets of a whole flight of the same programs, in `file`.
+  /// Captures the packets of a whole flight of the same programs in `file`.
   void capture(const std::filesystem::path& file) {
     Flight flight(scenario("short"), options_);
     Process& sniffer = attack("capture", flight, "server", {"--file", file});
@@ -60,7 +60,7 @@ class HostileTest : public testing::Test {
     ASSERT_EQ(sniffer.wait(30s), 0);
   }
 
-  /// Halts the flight until all attacks on it are under way: it could be over before.
+  /// Pauses the flight until all attacks are under way. Otherwise it could end before.
   void wait_until_all_fire(Flight& flight) {
     ASSERT_TRUE(flight.wait_for_steps(1)) << flight.outputs();
     flight.client->send(SIGSTOP);
@@ -71,14 +71,14 @@ class HostileTest : public testing::Test {
     flight.client->send(SIGCONT);
   }
 
-  /// The most memory that a program has had, in MB; 0 if it has ended.
+  /// Peak memory of a program, in MB; 0 if it has ended.
   static double find_peak_memory(const Process& program) {
     const std::string status = read_file("/proc/" + std::to_string(program.id()) + "/status");
     const auto at = status.find("VmHWM:");
     return at == std::string::npos ? 0 : std::atof(status.c_str() + at + 6) / 1024;
   }
 
-  /// Waits for the end of an attacked flight, which is as if there had been no attack.
+  /// Waits for the end of an attacked flight and expects the result of a flight without attack.
   void expect_undisturbed(Flight& flight, double most_mb) {
     std::map<std::string, double> peaks;
     wait_until([&] {
@@ -100,7 +100,7 @@ class HostileTest : public testing::Test {
           << file;
   }
 
-  /// Nobody crashes or hangs, whatever becomes of the flight.
+  /// Expects that no program crashes or hangs. The flight itself may fail.
   static void expect_orderly_end(Flight& flight) {
     const auto processes = {flight.server.get(), flight.client.get(), flight.recorder.get()};
     wait_until([&] { return !flight.server->is_running(); }, 10s);
@@ -112,11 +112,11 @@ class HostileTest : public testing::Test {
     }
   }
 
-  // --- attacks that the flight meets with and without keys ---
+  // --- attacks on flights with and without keys ---
 
-  /// Of an attack with packets of an earlier flight. It begins when this one is under way: before,
-  /// such packets bring back the earlier programs, or as many as keep friends out, and ours would
-  /// wait.
+  /// The attack sends packets of an earlier flight. It begins during this flight: earlier, such
+  /// packets simulate the programs of the earlier flight, or so many participants that the real
+  /// ones cannot join, and this flight would not start.
   void expect_that_forgeries_disturb_nothing(const std::string& what) {
     const TemporaryFolder folder;
     capture(folder / "packets");
@@ -126,7 +126,7 @@ class HostileTest : public testing::Test {
     expect_undisturbed(flight, 400);
   }
 
-  // Packets forged under the sender's name can claim anything; only security prevents that. But
+  // Packets forged in the sender's name can contain anything; only DDS Security prevents that. But
   // no program may crash or hang.
   void expect_that_spoofed_packets_crash_nobody() {
     Flight flight(scenario("figure_eight"), options_);
@@ -137,7 +137,7 @@ class HostileTest : public testing::Test {
   std::unique_ptr<Network> network_;
   FlightOptions options_;
   std::vector<std::unique_ptr<Process>> attackers_;
-  const Process* deaf_ = nullptr;  ///< the attacker that must hear nothing
+  const Process* deaf_ = nullptr;  ///< the attacker that must receive nothing
 
  private:
   const std::string profile_name_;
@@ -165,7 +165,7 @@ TEST_F(HostileTest, InvalidSamplesDisturbNothing) {
   attack("control", flight);
   Process& deaf = attack("readers", flight);
   wait_until_all_fire(flight);
-  deaf.send(SIGSTOP);  // acknowledges nothing any more
+  deaf.send(SIGSTOP);  // no longer acknowledges
   expect_undisturbed(flight, 400);
 }
 
@@ -189,7 +189,7 @@ TEST_F(HostileTest, PacketsSpoofedInTheFlightsNameCrashNoProgram) {
   expect_that_spoofed_packets_crash_nobody();
 }
 
-// --- the same against a flight with keys, by neighbours who have none ----------------------------
+// --- the same against a flight with keys, by attackers without keys ------------------------------
 
 class SecuredHostileTest : public HostileTest {
  protected:

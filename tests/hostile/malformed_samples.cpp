@@ -1,4 +1,4 @@
-// With Fast DDS itself: our own types cannot be malformed.
+// Uses Fast DDS directly: the project's own types cannot produce malformed samples.
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <fastdds/dds/publisher/DataWriter.hpp>
@@ -28,7 +28,7 @@ using Bytes = std::vector<std::uint8_t>;
 constexpr std::uint32_t kHuge = 8 << 20;
 constexpr std::size_t kMostHuge = 20;
 
-/// Bytes under the name of any type.
+/// Raw bytes, sent under the name of any type.
 class RawType : public dds::TopicDataType {
  public:
   explicit RawType(const std::string& name) {
@@ -59,14 +59,14 @@ const char* topic_of() {
 
 Bytes make_malformed(std::mt19937_64& random) {
   Bytes bytes(4 + random() % 2000);
-  const bool is_of_ones = random() % 2;  // every length in it is endless
+  const bool is_of_ones = random() % 2;  // every length field is huge
   for (auto& byte : bytes) byte = is_of_ones ? 0xff : static_cast<std::uint8_t>(random());
-  if (random() % 4) std::copy_n("\0\1\0\0", 4, bytes.begin());  // right encapsulation
+  if (random() % 4) std::copy_n("\0\1\0\0", 4, bytes.begin());  // valid encapsulation
   bytes.resize(random() % 8 ? bytes.size() : random() % 8);
   return bytes;
 }
 
-/// Zeros that claim as many vehicles, entries or numbers as they are long.
+/// Zeros with one length field: as many vehicles, entries or numbers as the sample has bytes.
 Bytes make_claim(std::mt19937_64& random) {
   Bytes bytes(1000 + random() % 140'000);
   bytes[1] = 1;                              // little-endian

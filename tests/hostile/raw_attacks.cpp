@@ -29,7 +29,7 @@ constexpr std::size_t kRtpsHeader = 20;  // "RTPS", version, vendor, GUID prefix
 constexpr std::size_t kPrefixAt = 8, kPrefixSize = 12;
 constexpr int kBurst = 20;  // packets between two pauses of 1 ms: some 15,000 in a second
 
-/// A socket that is closed with this object.
+/// A socket. The destructor closes it.
 class Socket {
  public:
   Socket(int family, int type, int protocol) : descriptor_(::socket(family, type, protocol)) {
@@ -44,7 +44,7 @@ class Socket {
   const int descriptor_;
 };
 
-/// Sends to every port on which a lone participant of the domain listens.
+/// Sends to every port on which the first participant of a host in the domain listens.
 class Gun {
  public:
   explicit Gun(const Target& target) : target_(target), socket_(AF_INET, SOCK_DGRAM, 0) {}
@@ -72,7 +72,7 @@ class Gun {
   std::uint64_t fired_ = 0;
 };
 
-/// Sees every RTPS packet that comes to or leaves this host.
+/// Reads every RTPS packet that arrives at or leaves this host.
 class Sniffer {
  public:
   Sniffer() : socket_(AF_PACKET, SOCK_DGRAM, htons(ETH_P_ALL)) {
@@ -80,7 +80,7 @@ class Sniffer {
     ::setsockopt(socket_.descriptor(), SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
   }
 
-  /// The next packet's UDP payload; empty if none came for a while, or it was another one.
+  /// The next RTPS packet's UDP payload; empty if none arrives within 50 ms, or for other packets.
   Bytes next() {
     std::array<std::uint8_t, 65536> frame;
     const auto size = ::recv(socket_.descriptor(), frame.data(), frame.size(), 0);
@@ -110,7 +110,7 @@ std::vector<Bytes> read_captured(const std::filesystem::path& file) {
   return packets;
 }
 
-/// Cut short, with bytes changed, or both; numbers that lengths are made of more often.
+/// Truncates the packet, changes bytes, or both. Byte values typical of lengths are more frequent.
 void mutate(Bytes& packet, std::size_t from, std::mt19937_64& random) {
   const auto kind = random() % 4;
   if (kind != 0 && packet.size() > from) {
@@ -129,9 +129,9 @@ Bytes make_random_bytes(std::mt19937_64& random) {
   return packet;
 }
 
-/// True if a GAP, or a HEARTBEAT's first sequence number, takes more samples off the stream than
-/// any of ours does. The middleware goes through them one by one, for hours, with its reader
-/// locked: README.md, what it found.
+/// True if a GAP, or a HEARTBEAT's first sequence number, skips more samples than the project's own
+/// packets do. Fast DDS processes them one by one, for hours, with its reader locked: README.md,
+/// what it found.
 bool has_endless_gap(const Bytes& packet) {
   constexpr std::uint8_t kHeartbeat = 0x07, kGap = 0x08;
   constexpr std::size_t kHeader = 4, kFirstAt = 12, kBaseAt = 20, kEnd = 28;
@@ -159,8 +159,8 @@ bool has_endless_gap(const Bytes& packet) {
   return false;
 }
 
-/// True if a packet holds tokens of DDS Security. With a changed length in them a secured
-/// middleware reserves as much as it says, gigabytes: README.md, what it found.
+/// True if a packet holds tokens of DDS Security. If a length in them is changed, a secured Fast
+/// DDS allocates that many bytes, up to gigabytes: README.md, what it found.
 bool has_identity(const Bytes& packet) {
   const std::string kind = "DDS:Auth";
   return std::search(packet.begin(), packet.end(), kind.begin(), kind.end()) != packet.end();
@@ -229,7 +229,7 @@ std::uint64_t spoof(const Target& target) {
   Gun gun(target);
   while (goes_on(target)) {
     Bytes packet = sniffer.next();
-    if (packet.empty() || random() % 8) continue;  // it sees what it sends, too
+    if (packet.empty() || random() % 8) continue;  // also reads its own packets
     if (!target.forged_identities && has_identity(packet)) continue;
     mutate(packet, kRtpsHeader, random);
     if (target.endless_gaps || !has_endless_gap(packet)) gun.fire(packet);

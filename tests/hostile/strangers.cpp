@@ -20,7 +20,7 @@ const std::string kQosFile = SLS_SOURCE_DIR "/config/qos/lan.xml";
 constexpr auto kPause = 1ms;
 constexpr const char* kPilot = "control_client";  // the real client's name
 
-/// Participates like anybody, and knows what everybody may know: the run, its scenario, its state.
+/// An ordinary participant, with the public data of a run: its parameters, scenario and state.
 class Stranger {
  public:
   explicit Stranger(const Target& target)
@@ -32,7 +32,7 @@ class Stranger {
                         state_ = sample;
                       }) {}
 
-  /// Waits until the server flies; false if the attack is over before.
+  /// Waits until the server flies; false if the attack ends before.
   bool wait_for_flight(const Target& target) {
     while (goes_on(target)) {
       run = servers.find_joinable(0);
@@ -85,7 +85,7 @@ class Stranger {
   bus::Reader<States> state_reader_;
 };
 
-/// `sample` with one thing or another wrong.
+/// Gives `sample` one of several errors.
 void spoil(Commands& sample, std::mt19937_64& random) {
   ControlCommand& command = sample.vehicles().front();
   switch (random() % 10) {
@@ -160,14 +160,15 @@ std::uint64_t forge_statements(const Target& target) {
   if (!stranger.wait_for_flight(target)) return 0;
   std::mt19937_64 random(target.seed);
   std::uint64_t count = 0;
-  // It stops with the flight: a recorder that is there and not done delays the end by up to 10 s.
+  // Stops with the flight, because a recorder that is present and not done delays the end by up to
+  // 10 s.
   for (; goes_on(target) && stranger.is_flying(); count += 6) {
-    States state = *stranger.state();  // the next one, where the load is somewhere else
+    States state = *stranger.state();  // the current or a next state, with another load position
     state.step(state.step() + random() % 3);
     VehicleState& vehicle = state.vehicles().front();
     vehicle.measured().p_WL_m({1e3, 1e3, 1e3});
     states.write(state);
-    RecordBatch batch;  // the same, for recorders, and often the last
+    RecordBatch batch;  // the same for recorders; often marked as the last batch
     batch.run_id(stranger.run_id());
     batch.batch_index(random() % 3 ? state.step() / 20 + random() % 3 : random());
     batch.is_last(random() % 2);
@@ -177,19 +178,19 @@ std::uint64_t forge_statements(const Target& target) {
     entry.truth(vehicle.measured());
     entry.client_name(kPilot);
     batches.write(batch);
-    SimStatus status;  // that the flight is over
+    SimStatus status;  // claims that the flight has ended
     status.run_id(stranger.run_id());
     status.sample_index(1 << 30);
     status.phase(random() % 2 ? PHASE_FINISHED : PHASE_FAILED);
     status.step(state.step());
     statuses.write(status);
-    Parameters claim = stranger.run->parameters;  // the same run, or another server's of a lower id
+    Parameters claim = stranger.run->parameters;  // of this run, or of a server with a lower run_id
     if (random() % 2) claim.run_id(1);
     parameters.write(claim);
     status.run_id(1);
     status.phase(PHASE_WAITING);
     statuses.write(status);
-    participants.write(stranger.make_announcement(ROLE_RECORDER));  // one that has nothing yet
+    participants.write(stranger.make_announcement(ROLE_RECORDER));  // has recorded nothing yet
     say_that_it_fires();
     std::this_thread::sleep_for(5 * kPause);
   }
@@ -246,7 +247,7 @@ std::uint64_t read_all(const Target& target) {
   bus::Node node(kQosFile, target.domain, "deaf");
   std::atomic<std::uint64_t> count{0};
   const auto hear = [&](const auto&, const bus::PeerId&) { ++count; };
-  // Reliable on the loop's topics too.
+  // Reads the loop's topics reliably as well.
   const bus::Reader<States> states(node, bus::kRecordReaderProfile, hear);
   const bus::Reader<Commands> commands(node, bus::kRecordReaderProfile, hear);
   const bus::Reader<RecordBatch> batches(node, bus::kRecordReaderProfile, hear);

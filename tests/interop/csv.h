@@ -1,4 +1,4 @@
-/// Files of comma-separated values, with numbers as short as they can be without losing a bit.
+/// Files of comma-separated values. Numbers have the fewest digits that keep every bit.
 #pragma once
 
 #include <stdbool.h>
@@ -10,14 +10,15 @@ typedef struct CsvFile {
   bool is_in_row;
 } CsvFile;
 
-/// Makes `folder` where it is missing, and in it the file `name` anew. A refusal of the system ends
-/// the program with exit code 1, also in the functions below.
+/// Creates `folder` if it is missing, and creates or replaces the file `name` in it. Here and in
+/// the functions below, a system error ends the program with exit code 1.
 void open_csv(CsvFile* file, const char* folder, const char* name, const char* header);
 void close_csv(CsvFile* file);
 
-/// The shortest digits that read back as `value`, in the shorter notation, plain or scientific.
+/// Adds the shortest digits that read back as `value`, in plain or scientific notation, whichever
+/// is shorter.
 void add_number(CsvFile* file, double value);
 void add_integer(CsvFile* file, uint64_t value);
-/// `text` is without commas, quotes and line breaks: a name.
+/// Adds `text`, which must contain no commas, quotes and line breaks, such as a name.
 void add_text(CsvFile* file, const char* text);
 void end_row(CsvFile* file);

@@ -3,8 +3,8 @@
 ///
 ///     cyclone_controller [--domain N] [--name TEXT] [--strength N]
 ///
-/// It flies all vehicles of its server, follows resets and servers that take another's place, and
-/// ends with its run: exit code 0 finished, 1 failed or nobody there, 2 bad usage.
+/// It flies all vehicles of its server, follows resets and replacement servers, and ends with its
+/// run. Exit code 0: finished; 1: failed or no server; 2: bad usage.
 #include <stdlib.h>
 #include <string.h>
 
@@ -17,7 +17,7 @@ typedef struct Controller {
   Options options;
   dds_entity_t state_reader, command_writer, waitset;
 
-  uint64_t run_id;  ///< of the run it flies; 0: none
+  uint64_t run_id;  ///< current run; 0: none
   bool is_ready;
   Scenario scenario;
   Gains horizontal, vertical;
@@ -54,8 +54,8 @@ static sls_FaultCode to_message(LawFault fault) {
   return sls_FAULT_NOT_FINITE;
 }
 
-/// The stage in force at `step`: one is left at the first step at which its time is over. True when
-/// that was the last one, which stays in force for this answer.
+/// Advances to the stage of `step`: a stage ends at the first step at which its time is over. True
+/// when the last stage has ended; this answer still uses it.
 static bool advance_mission(const Controller* self, uint64_t step, sls_ControllerState* memory) {
   while ((int64_t)(step - memory->stage_start_step) * self->period_ns >=
          self->scenario.stages[memory->stage_index].duration_ns) {
@@ -66,14 +66,14 @@ static bool advance_mission(const Controller* self, uint64_t step, sls_Controlle
   return false;
 }
 
-/// A pure function of `state`: the controller state that came with it is all the memory there is.
+/// A pure function of `state`. The only memory is the controller state in `state`.
 static sls_ControlCommand calc_answer(const Controller* self, const sls_VehicleParameters* vehicle,
                                       uint64_t step, const sls_VehicleState* state) {
   const dds_time_t began = dds_time();
   sls_ControlCommand command = {.vehicle_id = state->vehicle_id, .controller = state->controller};
-  LawFault fault = kNotFinite;  // also of a damaged sample, which names no stage that can be flown
+  LawFault fault = kNotFinite;  // also for a damaged sample, which has an invalid stage
   bool is_over = false;
-  sls_ControllerState* memory = &command.controller;  // this law has no numbers of its own
+  sls_ControllerState* memory = &command.controller;  // this law needs no memory numbers
   if (memory->stage_index < (uint32_t)self->scenario.stage_count &&
       memory->stage_start_step <= step) {
     is_over = advance_mission(self, step, memory);
@@ -107,7 +107,7 @@ static const sls_VehicleParameters* find_vehicle(const Run* run, uint32_t id) {
   return NULL;
 }
 
-/// Answers a sample of states with one of commands, also where it comes again.
+/// Answers a sample of states with a sample of commands, also if it was sent again.
 static void answer(const Controller* self, const Run* run, const sls_States* states) {
   static sls_ControlCommand answers[sls_SAMPLE_VEHICLES];
   sls_Commands commands = {.run_id = states->run_id,
@@ -135,9 +135,9 @@ static void answer_states(const Controller* self) {
     if (run && states.run_id == self->run_id) answer(self, run, &states);
 }
 
-// --- the life of a client ------------------------------------------------------------------------
+// --- joining and leaving a run -------------------------------------------------------------------
 
-/// Takes everything it needs to know of a run from what its server says.
+/// Reads the scenario and all settings of a run from the parameters that its server sent.
 static void join(Controller* self, const Run* run) {
   int line = 0;
   if (!parse_scenario(run->parameters.scenario_text, &self->scenario, &line)) {
@@ -154,7 +154,7 @@ static void join(Controller* self, const Run* run) {
   announce_controller(self, false, false);
 }
 
-/// Answers until the run has ended; false when its server is gone for good.
+/// Answers until the run has ended; false when its server is gone.
 static bool serve(Controller* self) {
   dds_time_t looked = 0;
   while (stop_signal == 0) {
@@ -180,7 +180,7 @@ static bool serve(Controller* self) {
   return true;
 }
 
-/// Says that it is done. Returns the exit code.
+/// Announces that it is done. Returns the exit code.
 static int leave(Controller* self, bool has_server) {
   announce_controller(self, false, true);
   const Run* run = current_run(self);

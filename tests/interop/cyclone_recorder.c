@@ -1,5 +1,5 @@
-/// A recorder on Eclipse Cyclone DDS: takes the batches of a run, keeps the server within its
-/// window, and writes the rows that this project's recorder does, of plants without attitude, noise
+/// A recorder on Eclipse Cyclone DDS: takes the batches of a run, announces its progress to the
+/// server, and writes the same rows as this project's recorder, for plants without attitude, noise
 /// and signals.
 ///
 ///     cyclone_recorder [--domain N] [--name TEXT] --out DIR
@@ -20,11 +20,12 @@ typedef struct Recorder {
   uint64_t run_id;
   int64_t period_ns;
   bool is_ready;
-  bool has_batch, has_last;   ///< any batch; the one that is_last
-  uint64_t next_batch;        ///< index of the one after the last that came
-  uint64_t batches, entries;  ///< how many came
+  bool has_batch, has_last;   ///< received: any batch; the last batch
+  uint64_t next_batch;        ///< index after the last received batch
+  uint64_t batches, entries;  ///< numbers received
   uint64_t missing_batches;   ///< before the last received
-  /// Of each vehicle of the run the step after its last row, and how many steps before are missing.
+  /// For each vehicle of the run: the step after its last row. `missing_steps` counts gaps before
+  /// it.
   sls_VehicleParameters vehicles[kMaxVehicles];
   uint64_t next_step[kMaxVehicles];
   uint32_t vehicle_count;
@@ -86,7 +87,7 @@ static void write_command(Recorder* self, const sls_RecordEntry* entry) {
   end_row(file);
 }
 
-/// A late answer's row comes after those of later steps; the project's recorder sorts it in.
+/// The row of a late answer follows rows of later steps. The project's recorder sorts it in.
 static void write_reference(Recorder* self, const sls_RecordEntry* entry) {
   CsvFile* file = &self->references;
   const sls_Reference* reference = &entry->answer.reference;
@@ -122,7 +123,8 @@ static void add_entry(Recorder* self, const sls_RecordEntry* entry) {
 
 // --- batches -------------------------------------------------------------------------------------
 
-/// A reliable reader gets the batches of a writer in order; a late one those that the writer keeps.
+/// A reliable reader gets the batches of a writer in order. A late reader gets those in its
+/// history.
 static void take_batches(Recorder* self) {
   static sls_RecordBatch batch;
   dds_sample_info_t info;
@@ -138,7 +140,7 @@ static void take_batches(Recorder* self) {
   }
 }
 
-/// All rows of all vehicles up to here are in; −1: none.
+/// Last step up to which all rows of all vehicles were received; −1: none.
 static int64_t find_last_step(const Recorder* self) {
   uint64_t next = self->vehicle_count > 0 ? self->next_step[0] : 0;
   for (uint32_t i = 1; i < self->vehicle_count; ++i)
@@ -176,9 +178,9 @@ static void close_files(Recorder* self) {
   close_csv(&self->references);
 }
 
-// --- the life of a recorder ----------------------------------------------------------------------
+// --- joining and recording a run -----------------------------------------------------------------
 
-/// Begins anew with a run: its files replace those of the one before.
+/// Starts to record `run`. Its files replace those of the previous run.
 static void join(Recorder* self, const Run* run) {
   if (self->run_id != 0) {
     close_files(self);
@@ -206,7 +208,7 @@ static void announce_recorder(Recorder* self, bool done) {
   announce(&self->node, find_run(&self->node, self->run_id), &announcement);
 }
 
-/// Takes batches until all are there, or nothing more can be expected.
+/// Takes batches until all are received, or until 10 s after the end of the run or its server.
 static void record(Recorder* self) {
   dds_time_t announced = 0, end = 0;
   while (stop_signal == 0) {

@@ -16,14 +16,14 @@ namespace {
 using Words = std::vector<std::string>;
 using std::chrono::seconds;
 
-/// Two implementations of one law round differently, 1e-15 of 17 N a step; the closed loop forgets
-/// each difference within seconds, so that they do not add up. Measured: 1e-15 m and 1.1e-14 N.
+/// Two implementations of one law round differently, by 1e-15 of 17 N per step. The closed loop
+/// removes each difference within seconds: they do not accumulate. Measured: 1e-15 m and 1.1e-14 N.
 constexpr double kPositionTolerance_m = 1e-12;
 constexpr double kForceTolerance_n = 1e-11;
 
 const Words kUdp = {"--qos", qos("udp")};
 
-/// Cyclone on loopback alone, like the profile `udp`; by itself it would take another interface.
+/// Cyclone on loopback only, like the profile `udp`. By default it would use another interface.
 const Words kOnLoopback = {
     "env",
     "CYCLONEDDS_URI=<CycloneDDS><Domain><General><Interfaces><NetworkInterface name=\"lo\" "
@@ -39,7 +39,7 @@ Words lossy(int percent) {
           "SLS_DROP_PERCENT=" + std::to_string(percent), "SLS_DROP_SEED=1"};
 }
 
-/// The result of a cyclone_recorder: the last line it printed.
+/// The result of a cyclone_recorder: the last line of its output.
 nlohmann::json read_result(const Process& recorder) {
   const std::string output = recorder.output();
   const auto begin = output.rfind("\n{");
@@ -52,7 +52,8 @@ std::size_t count_rows(const std::filesystem::path& file) {
   return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
 }
 
-/// A cyclone_recorder has every step, and wrote the bytes that our recorder wrote of that flight.
+/// Expects that the cyclone_recorder has every step and wrote the same bytes as the project's
+/// recorder.
 void expect_same_rows(const Process& recorder, const std::filesystem::path& rows,
                       const std::filesystem::path& ours, std::uint64_t last_step) {
   const auto result = read_result(recorder);
@@ -73,7 +74,7 @@ class InteropTest : public testing::Test {
     write_quick_scenario(1);
   }
 
-  /// Shaped like setpoints.yaml, but shorter: 4,000 steps.
+  /// Similar to setpoints.yaml, but shorter: 4,000 steps.
   void write_quick_scenario(int controllers, int recorders = 1, int vehicles = 1) const {
     std::ofstream(quick_) << "name: quick\n"
                           << (vehicles > 1 ? "vehicles: " + std::to_string(vehicles) + "\n" : "")
@@ -96,7 +97,7 @@ class InteropTest : public testing::Test {
                              "    for_s: 13.5\n";
   }
 
-  /// One of the project's programs, over UDP on loopback; `before` comes before its command line.
+  /// One of the project's programs, over UDP on loopback; its command line follows `before`.
   std::unique_ptr<Process> start(const std::string& name, const Words& flags,
                                  const Words& before = {}) const {
     return std::make_unique<Process>(before + make_command(name, domain_.number(), kUdp + flags));
@@ -134,7 +135,7 @@ class InteropTest : public testing::Test {
     for (Process* process : processes) EXPECT_EQ(process->wait(seconds(0)), 0) << outputs;
   }
 
-  /// Both flew the same mission, apart from rounding.
+  /// Expects that both flew the same mission, apart from rounding.
   static void expect_same_flight(const std::filesystem::path& a, const std::filesystem::path& b) {
     const Table states_a(a / "state.csv"), states_b(b / "state.csv");
     ASSERT_EQ(states_a.rows(), states_b.rows());
@@ -172,7 +173,7 @@ TEST_F(InteropTest, ACycloneControllerFliesSetpointsLikeOursAndACycloneRecorderW
   const auto cyclone_recorder = start_cyclone_recorder();
   const auto controller = start_cyclone("cyclone_controller", {"--name", "cyclone"});
   expect_success({server.get(), controller.get(), recorder.get(), cyclone_recorder.get()});
-  EXPECT_FALSE(holds(server->output(), "expected")) << server->output();  // they do nothing wrong
+  EXPECT_FALSE(holds(server->output(), "expected")) << server->output();  // no mistake
   const auto manifest = read_manifest(recording_);
   EXPECT_TRUE(manifest.at("complete").get<bool>()) << manifest;
   expect_same_rows(*cyclone_recorder, rows_, recording_, 11250);
@@ -184,7 +185,7 @@ TEST_F(InteropTest, ACycloneControllerFliesSetpointsLikeOursAndACycloneRecorderW
   expect_same_flight(recording_, own.recording());
 }
 
-/// Seventy: two samples a step.
+/// Seventy vehicles: two samples per step.
 TEST_F(InteropTest, ACycloneControllerFliesAFleetAndACycloneRecorderWritesTheSameRows) {
   write_quick_scenario(1, 2, 70);
   const std::string text = read_file(quick_);
@@ -217,8 +218,7 @@ TEST_F(InteropTest, ACycloneStandbyTakesOverFromAClientThatIsKilled) {
   expect_same_flight(recording_, own.recording());
 }
 
-/// Every twentieth datagram of server and controller is lost: states are resent, and answered
-/// again.
+/// Server and controller lose 5 % of their datagrams: states are sent and answered again.
 TEST_F(InteropTest, LossBetweenServerAndCycloneControllerChangesNoByte) {
   const std::string undisturbed = recording_ + "-undisturbed";
   for (const auto& [folder, loss] : {std::pair(undisturbed, 0), std::pair(recording_, 5)}) {
@@ -250,7 +250,7 @@ TEST_F(InteropTest, ALateCycloneRecorderGetsTheMissedSamples) {
   const auto recorder = start_recorder();
   const auto server = start_server(), controller = start_cyclone("cyclone_controller");
   ASSERT_TRUE(wait_for_steps(100)) << server->output();
-  controller->send(SIGSTOP);  // the flight stands still until it has come
+  controller->send(SIGSTOP);  // the flight pauses until the late recorder has joined
   const auto late_recorder = start_cyclone_recorder();
   EXPECT_TRUE(wait_until([&] { return holds(late_recorder->output(), " run "); }));
   controller->send(SIGCONT);
@@ -258,7 +258,7 @@ TEST_F(InteropTest, ALateCycloneRecorderGetsTheMissedSamples) {
   expect_same_rows(*late_recorder, rows_, recording_, kQuickSteps);
 }
 
-/// Without their submessages protected, Fast DDS sends no sample to a reader of Cyclone DDS.
+/// The keys must protect submessages: otherwise Fast DDS sends no samples to a Cyclone DDS reader.
 TEST_F(InteropTest, ACycloneControllerFliesOnASecuredDomainWithKeysForOtherVendors) {
   if (!std::filesystem::exists(SLS_CYCLONE_PLUGINS "/libdds_security_crypto.so"))
     GTEST_SKIP() << "expected Cyclone's security plugins in " SLS_CYCLONE_PLUGINS;
@@ -279,7 +279,7 @@ TEST_F(InteropTest, ACycloneControllerFliesOnASecuredDomainWithKeysForOtherVendo
   EXPECT_TRUE(read_manifest(recording_).at("complete").get<bool>());
 }
 
-/// On hosts of their own, where the programs of this project use `profile`.
+/// Expects success with each program on its own host. The project's programs use `profile`.
 void expect_flight_on_hosts(const Network& network, const std::string& profile,
                             const std::string& scenario_file, const std::string& recording,
                             const Words& configuration) {
@@ -297,7 +297,7 @@ void expect_flight_on_hosts(const Network& network, const std::string& profile,
   EXPECT_TRUE(read_manifest(recording).at("complete").get<bool>());
 }
 
-/// Without a configuration of its own Cyclone takes the host's network, as profile `lan` does.
+/// Without a configuration Cyclone uses the host's network, as profile `lan` does.
 TEST_F(InteropTest, ACycloneControllerOnAnotherHostFliesWithProfileLan) {
   if (const auto obstacle = Network::find_obstacle()) GTEST_SKIP() << *obstacle;
   expect_flight_on_hosts(Network(kHosts), "lan", quick_, recording_, {});
@@ -320,7 +320,7 @@ TEST_F(InteropTest, ACycloneControllerOnAnotherHostFliesWithProfileUnicast) {
 
 // --- examples/my_client --------------------------------------------------------------------------
 
-/// The template as a user has it: built outside the tree.
+/// The template, built outside the source tree as by a user.
 class MyClientTest : public InteropTest {
  protected:
   void SetUp() override {
@@ -349,7 +349,8 @@ TEST_F(MyClientTest, HasNoMoreThan200Lines) {
   EXPECT_LE(count_rows(folder_ / "my_client/my_client.c"), 200u);
 }
 
-/// Its memory, an integral, travels: neither loss nor a client that is killed changes a byte.
+/// Its memory, an integral, is part of states and answers: losses and a killed client change no
+/// byte.
 TEST_F(MyClientTest, BringsTheLoadToItsPointWithTheSameBytesDespiteLosses) {
   const std::string undisturbed = recording_ + "-undisturbed";
   for (const bool is_disturbed : {false, true}) {
@@ -363,7 +364,7 @@ TEST_F(MyClientTest, BringsTheLoadToItsPointWithTheSameBytesDespiteLosses) {
       client = start_client(loss);
     }
     expect_success({server.get(), client.get(), recorder.get()});
-    EXPECT_FALSE(holds(server->output(), "expected")) << server->output();  // it does nothing wrong
+    EXPECT_FALSE(holds(server->output(), "expected")) << server->output();  // no mistake
   }
   EXPECT_TRUE(read_manifest(recording_).at("complete").get<bool>());
   for (const char* file : {"state.csv", "reference.csv"})

@@ -31,7 +31,7 @@ void say(const char* format, ...) {
 
 void copy_text(char* to, size_t size, const char* text) { snprintf(to, size, "%s", text); }
 
-/// `result` of Cyclone's `call`, or the end of the program.
+/// Returns the `result` of Cyclone's `call`; an error ends the program.
 static int32_t expect(int32_t result, const char* call) {
   if (result >= 0) return result;
   say("%s: expected success, got %s", call, dds_strretcode(result));
@@ -69,7 +69,7 @@ dds_entity_t make_writer(Node* node, const dds_topic_descriptor_t* type, const c
   dds_qset_durability(qos, DDS_DURABILITY_TRANSIENT_LOCAL);
   dds_qset_history(qos, DDS_HISTORY_KEEP_LAST, depth);
   // The QoS that the server's reader of commands requests in real time (profile
-  // sls_realtime_command_reader); a reader without a deadline takes it as well.
+  // sls_realtime_command_reader); also matches a reader without a deadline.
   if (strcmp(topic, "sls/command") == 0) dds_qset_deadline(qos, DDS_MSECS(100));
   const dds_entity_t writer =
       expect(dds_create_writer(node->participant, make_topic(node, type, topic), qos, NULL), topic);
@@ -125,7 +125,7 @@ void write_sample(dds_entity_t writer, const void* sample) {
   expect(dds_write(writer, sample), "dds_write");
 }
 
-// --- who is there --------------------------------------------------------------------------------
+// --- participants and runs -----------------------------------------------------------------------
 
 static bool is_same(const dds_guid_t* a, const dds_guid_t* b) {
   return memcmp(a, b, sizeof *a) == 0;
@@ -158,7 +158,7 @@ bool hears(dds_entity_t reader, const dds_guid_t* participant) {
                     dds_get_matched_publication_data);
 }
 
-/// The DDS participant that wrote a sample; false when it has left since.
+/// Finds the DDS participant that wrote a sample; false when it has left.
 static bool find_sender(dds_entity_t reader, const dds_sample_info_t* info, dds_guid_t* sender) {
   dds_builtintopic_endpoint_t* writer =
       dds_get_matched_publication_data(reader, info->publication_handle);
@@ -198,7 +198,7 @@ static void note_parameters(Node* node, const sls_Parameters* parameters,
 }
 
 void look_around(Node* node) {
-  // Large, and Cyclone uses the buffers of their sequences again.
+  // Static, because they are large and Cyclone reuses the buffers of their sequences.
   static sls_Parameters parameters;
   static sls_SimStatus status;
   dds_sample_info_t info;
@@ -226,7 +226,7 @@ const Run* find_run(const Node* node, uint64_t run_id) {
   return NULL;
 }
 
-/// Position on the way waiting → running; 0 if there is nothing to join.
+/// Progress of a run: 1 waiting, 2 running or paused; 0 if it cannot be joined.
 static int calc_progress(const Run* run) {
   if (!run->has_status || run->vehicle_count == 0 || is_silent(run->heard)) return 0;
   if (run->status.phase == sls_PHASE_WAITING) return 1;

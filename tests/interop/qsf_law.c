@@ -6,7 +6,7 @@
 enum { kX, kY, kZ };
 
 static const double kMinRodCosine = 1e-3;        // of n_z: level is 0
-static const double kMinSupportFraction = 1e-3;  // of gravity, below which the load falls freely
+static const double kMinSupportFraction = 1e-3;  // of gravity; below it the load falls freely
 
 static double dot(const double a[3], const double b[3]) {
   return a[kX] * b[kX] + a[kY] * b[kY] + a[kZ] * b[kZ];
@@ -18,8 +18,8 @@ Gains calc_vertical_gains(double weight) {
 }
 
 /// The closed loop's polynomial c(s) = s⁴ + k_j s³ + k_a s² + k_v s + k_p has
-/// c(s) c(−s) = s⁸ + w (1 − s² + s⁴ − s⁶). Comparing powers leaves one equation for k_a, whose
-/// largest root is the stable loop's; Newton's iteration comes down to it from above.
+/// c(s) c(−s) = s⁸ + w (1 − s² + s⁴ − s⁶). Comparing powers gives one equation for k_a. Its largest
+/// root belongs to the stable loop; Newton's iteration converges to it from above.
 Gains calc_horizontal_gains(double weight) {
   const double position = sqrt(weight);
   double acceleration = 10.0 * (1.0 + weight);
@@ -47,7 +47,7 @@ LawFault calc_force(const Motion* motion, const double set_point[3], const Vehic
   }
   if (n[kZ] < kMinRodCosine) return kRodLevel;
 
-  // Vertical: the load's acceleration, jerk and snap along the closed loop of second order.
+  // Vertical: the load's acceleration, jerk and snap from the second-order closed loop.
   const double e_z = motion->p_WL[kZ] - set_point[kZ];
   const double a_z = -vertical->velocity * motion->v_WL[kZ] - vertical->position * e_z;
   const double j_z = -vertical->velocity * a_z - vertical->position * motion->v_WL[kZ];
@@ -56,7 +56,7 @@ LawFault calc_force(const Motion* motion, const double set_point[3], const Vehic
   if (!isfinite(support)) return kNotFinite;
   if (support < kMinSupportFraction * vehicle->gravity) return kFreeFall;
 
-  // Horizontal: the slope w of the rod is the load's acceleration; its second derivative the snap.
+  // Horizontal: the rod's slope w gives the load's acceleration, its second derivative the snap.
   double W[3] = {0, 0, 1}, W_dot[3] = {0}, W_ddot[3] = {0}, a_WL[3] = {0, 0, a_z};
   for (int i = kX; i <= kY; ++i) {
     W[i] = n[i] / n[kZ];
@@ -69,7 +69,7 @@ LawFault calc_force(const Motion* motion, const double set_point[3], const Vehic
     W_ddot[i] = (s_z * W[i] + 2.0 * j_z * W_dot[i] - snap) / support;
   }
 
-  // W = ρ n, twice differentiated, gives the rod's acceleration.
+  // The second derivative of W = ρ n gives the rod's acceleration.
   const double rho = sqrt(dot(W, W)), rho_dot = dot(n, W_dot);
   const double rho_ddot = dot(n_dot, W_dot) + dot(n, W_ddot);
   const double tension = vehicle->load_mass * support / n[kZ];

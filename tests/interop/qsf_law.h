@@ -1,5 +1,5 @@
-/// The QSF law for set-points, written from design section 4 a second time: in C, with the rod's
-/// direction from positions instead of angles, and its acceleration by projection.
+/// The QSF law for set-points: a second implementation of design section 4, in C. It calculates the
+/// rod's direction from positions instead of angles, and its acceleration by projection.
 #pragma once
 
 #include <stdbool.h>
@@ -11,7 +11,7 @@ typedef struct Vehicle {
   double gravity;     ///< m/s²
 } Vehicle;
 
-/// Named by what they multiply.
+/// Each gain has the name of the quantity that it multiplies.
 typedef struct Gains {
   double position, velocity, acceleration, jerk;
 } Gains;
@@ -23,12 +23,12 @@ typedef struct Motion {
 
 /// LQR gains of a chain of four integrators, all states weighted with `weight` > 0, R = 1.
 Gains calc_horizontal_gains(double weight);
-/// Of a chain of two: position and velocity.
+/// The same for a chain of two integrators: position and velocity.
 Gains calc_vertical_gains(double weight);
 
 typedef enum LawFault { kNoFault, kFreeFall, kRodLevel, kNotFinite } LawFault;
 
-/// Force on the quadrotor (N) that makes the load go to `set_point` (m) and stay; zero with a
-/// fault.
+/// Force on the quadrotor (N) that brings the load to `set_point` (m) and keeps it there; zero if a
+/// fault is returned.
 LawFault calc_force(const Motion* motion, const double set_point[3], const Vehicle* vehicle,
                     const Gains* horizontal, const Gains* vertical, double f_Q_W[3]);

@@ -4,7 +4,8 @@
 #include <stdio.h>
 #include <string.h>
 
-/// Lines that do not concern a controller of set-points, or come in sls/parameters as numbers.
+/// True for lines that a set-point controller does not need, or reads as numbers from
+/// sls/parameters.
 static bool is_of_no_concern(const char* line) {
   static const char* const beginnings[] = {
       "#",       "name: ",      "vehicles: ",        "vehicle: {",

@@ -1,5 +1,5 @@
 /// The values of a scenario like config/scenarios/setpoints.yaml. A server sends the text in
-/// sls/parameters, so that a client needs no file.
+/// sls/parameters: a client needs no file.
 #pragma once
 
 #include <stdbool.h>
@@ -18,6 +18,6 @@ typedef struct Scenario {
   int stage_count;
 } Scenario;
 
-/// Understands a list of set-points, each for a time, flown with LQR gains. A line that is anything
-/// else is refused: false, and `line` is its number (0: no stage, no gains or no end of a stage).
+/// Parses a list of set-points, each with a duration, and LQR gains. Returns false for any other
+/// line and sets `line` to its number (0: no stage, no gains or no end of a stage).
 bool parse_scenario(const char* text, Scenario* scenario, int* line);

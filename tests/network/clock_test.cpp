@@ -1,5 +1,5 @@
-/// Hosts whose clocks are an hour off, by Debian's libfaketime: the wall clock alone, as on a real
-/// host.
+/// Hosts with clocks that are wrong by an hour, set with Debian's libfaketime. Only the wall clock
+/// is wrong, as on a real host.
 #include <gtest/gtest.h>
 
 #include "tests/network/hosts_flight.hpp"
@@ -50,8 +50,8 @@ TEST_F(ClockTest, InLockstepItDoesNotMatter) {
 
 class RealtimeClockTest : public ClockTest, public testing::WithParamInterface<const char*> {};
 
-// The LIFESPAN of commands compares the clocks of two machines: each command of a client that is
-// behind would be dropped unseen.
+// The LIFESPAN of commands compares the clocks of two machines: it would drop every command of a
+// client with a slow clock, without a message.
 TEST_P(RealtimeClockTest, InRealTimeTheUserIsToldAndCommandsStillArrive) {
   const Profile profile(*network_, "lan");
   FlightOptions options = profile.flight_options();
@@ -65,7 +65,8 @@ TEST_P(RealtimeClockTest, InRealTimeTheUserIsToldAndCommandsStillArrive) {
             std::string::npos)
       << flight.server->output();
   EXPECT_NE(flight.server->output().find(expected), std::string::npos) << flight.server->output();
-  // Without a command that arrives it is each of the 500 steps; on a busy machine it may be some.
+  // If no command arrived, fail_safe would count all 500 steps; on a busy machine it may count
+  // some.
   const Table status(flight.recording() / "status.csv");
   EXPECT_LT(status.number(status.rows() - 1, "fail_safe"), 250) << flight.server->output();
 }

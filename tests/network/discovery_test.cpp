@@ -1,4 +1,4 @@
-/// A network without multicast: two profiles work on it, and the third says what is wrong.
+/// A network without multicast: two profiles work, and with the third the programs name the cause.
 #include <gtest/gtest.h>
 
 #include "tests/network/hosts_flight.hpp"
@@ -33,7 +33,7 @@ TEST_F(NoMulticastTest, ADiscoveryServerBringsThemTogether) {
   expect_same("discovery_server");
 }
 
-/// `short`, but it waits for the others only so long.
+/// The scenario `short` with the time limit `timeout_s` for the start.
 std::string make_impatient_scenario(const TemporaryFolder& folder, int timeout_s) {
   return make_scenario(folder, {{"timeout_s: 30", "timeout_s: " + std::to_string(timeout_s)}});
 }
@@ -55,7 +55,7 @@ TEST_F(NoMulticastTest, WithLanEachProgramNamesTheMissingOneAndSuggestsMulticast
   EXPECT_EQ(flight.client->wait(), 1);
   EXPECT_TRUE(says(*flight.client, "no server for vehicle 0 within 5 s"))
       << flight.client->output();
-  // A recorder waits for a minute; it says what it waits for before that.
+  // A recorder waits for a minute; it prints earlier that it waits for a server.
   EXPECT_TRUE(says(*flight.recorder, "waiting for: server")) << flight.recorder->output();
 }
 

@@ -1,4 +1,4 @@
-/// Faults seeded for real, on hosts of their own: the doctor names each, and nothing else.
+/// Real faults on separate hosts: the doctor names each fault, and nothing else.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -13,7 +13,7 @@ namespace {
 
 using Words = std::vector<std::string>;
 
-/// On an idle machine it is 10 s at most; this one may be busy.
+/// Longest time of a doctor. On an idle machine it is 10 s at most; this one may be busy.
 constexpr auto kMostTime = std::chrono::seconds(20);
 
 Words operator+(Words left, const Words& right) {
@@ -27,7 +27,7 @@ struct Finding {
   std::string text;
   std::set<std::string> faults;
 
-  /// The rest of the line about `check`.
+  /// The line about `check`; empty if there is none.
   std::string line(const std::string& check) const {
     std::istringstream lines(text);
     for (std::string line; std::getline(lines, line);)
@@ -58,14 +58,14 @@ void expect_healthy(const Finding& found) {
   EXPECT_TRUE(found.faults.empty()) << found.text;
 }
 
-/// Exactly `faults`, of which the first, whose line holds `words`, is the cause.
+/// Expects exactly `faults`. The first is the cause, and its line contains `words`.
 void expect_faults(const Finding& found, const Words& faults, const std::string& words) {
   EXPECT_EQ(found.code, 1) << found.text;
   EXPECT_EQ(found.faults, std::set<std::string>(faults.begin(), faults.end())) << found.text;
   EXPECT_NE(found.line(faults.front()).find(words), std::string::npos) << found.text;
 }
 
-/// Two hosts, `here` and `there`, whose /dev/shm is a folder of the test's.
+/// Two hosts, `here` and `there`. Their /dev/shm is a folder of the test.
 class DoctorTest : public testing::Test {
  protected:
   void SetUp() override {
@@ -74,7 +74,7 @@ class DoctorTest : public testing::Test {
     std::filesystem::permissions(memory_.path(), std::filesystem::perms(01777));
   }
 
-  /// Prefix that runs a command on `host` with another /dev/shm, of which `mount` makes it.
+  /// Prefix that runs a command on `host` with another /dev/shm, which the command `mount` mounts.
   Words with_memory(const std::string& host, const std::string& mount) const {
     return network_->on(host) +
            Words{"unshare", "--mount", "sh", "-c", mount + " /dev/shm && exec \"$0\" \"$@\""};
@@ -113,7 +113,7 @@ class DoctorTest : public testing::Test {
   std::unique_ptr<Network> network_;
 };
 
-// --- nothing is wrong ----------------------------------------------------------------------------
+// --- no fault ------------------------------------------------------------------------------------
 
 class HealthyDoctorTest : public DoctorTest, public testing::WithParamInterface<const char*> {};
 
@@ -121,7 +121,7 @@ TEST_P(HealthyDoctorTest, FindsNoFaultOnAnIdleMachineOrDuringAFlight) {
   expect_healthy(examine(on("there") + doctor(GetParam())));
   FlightOptions options;
   options.qos_file = qos(GetParam());
-  options.server = {"--mode", "realtime"};  // so that it lasts
+  options.server = {"--mode", "realtime"};  // makes the flight last longer
   for (const char* name : {"recorder", "sim_server", "control_client"})
     options.before[name] = on("there");
   const Flight flight(scenario("figure_eight"), options);
@@ -227,7 +227,7 @@ TEST_F(DoctorTest, NamesASharedMemoryThatIsNotShared) {
 
 TEST_F(DoctorTest, NamesSegmentsThatAKilledProcessLeft) {
   start_server(on("here"), qos("default"))->send(SIGKILL);
-  // The segment of a process that is just starting looks the same: it counts when it is older.
+  // The doctor ignores young segments, because a starting process has such a segment as well.
   ASSERT_TRUE(wait_until([&] {
     for (const auto& file : std::filesystem::directory_iterator(memory_.path()))
       std::filesystem::last_write_time(

@@ -1,6 +1,6 @@
-/// A wire with faults: forwards Ethernet frames between two interfaces, both ways, each after a
-/// delay, some twice. The kernel here has no netem. Its counts are printed when it is asked to end
-/// (SIGTERM).
+/// A wire with faults: forwards Ethernet frames between two interfaces in both directions, each
+/// after a delay, some twice. It replaces netem, which this kernel lacks. At SIGTERM it prints its
+/// counts and ends.
 #include <arpa/inet.h>
 #include <linux/if_packet.h>
 #include <net/ethernet.h>
@@ -30,7 +30,7 @@ volatile sig_atomic_t stop = 0;
 
 struct Faults {
   double delay_ms = 0.0;
-  double jitter_ms = 0.0;  // up to so much more, evenly distributed; frames overtake each other
+  double jitter_ms = 0.0;  // largest extra delay, uniform; frames overtake each other
   double duplicate_percent = 0.0;
   std::uint64_t seed = 1;
 };
@@ -39,7 +39,7 @@ struct Frame {
   Clock::time_point due;
   std::uint64_t number = 0;  // in the order of arrival
   int to = -1;               // socket
-  std::vector<char> bytes;   // with the header that carries unfinished checksums
+  std::vector<char> bytes;   // with the header for incomplete checksums
 };
 
 struct IsLater {
@@ -61,7 +61,7 @@ int open_interface(const std::string& name) {
   const auto set = [socket](int option, const auto& value) {
     return setsockopt(socket, SOL_PACKET, option, &value, sizeof value) == 0;
   };
-  // Between veth ends checksums are left unfinished; the header tells the kernel to finish them.
+  // Between veth ends checksums are incomplete; the header makes the kernel complete them.
   const bool is_open = socket >= 0 && set(PACKET_VNET_HDR, yes) &&
                        set(PACKET_IGNORE_OUTGOING, yes) &&
                        set(PACKET_ADD_MEMBERSHIP, promiscuous) &&
@@ -104,7 +104,7 @@ class Relay {
   }
 
   void receive(int from, int to) {
-    constexpr std::size_t kMostQueued = 20000;  // then the wire loses, as a switch does
+    constexpr std::size_t kMostQueued = 20000;  // beyond it frames are lost, as in a switch
     std::vector<char> bytes(70000);
     const ssize_t size = recv(from, bytes.data(), bytes.size(), MSG_DONTWAIT);
     if (size <= 0) return;
@@ -159,7 +159,7 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(0.0, 100.0));
   cli.add_option("--seed", faults.seed, "decides jitter and duplicates");
   CLI11_PARSE(cli, argc, argv);
-  prctl(PR_SET_PDEATHSIG, SIGTERM);  // not longer than the test
+  prctl(PR_SET_PDEATHSIG, SIGTERM);  // ends with the test
   signal(SIGTERM, [](int) { stop = 1; });
   try {
     Relay(a, b, faults).run();

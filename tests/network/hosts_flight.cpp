@@ -32,7 +32,7 @@ Profile::Profile(const Network& network, const std::string& name) : network_(net
 
 Profile::~Profile() {
   if (!discovery_server_) return;
-  discovery_server_->send(SIGINT);  // at anything else it leaves its shared memory behind
+  discovery_server_->send(SIGINT);  // other signals leave its shared memory behind
   discovery_server_->wait(std::chrono::seconds(10));
 }
 

@@ -1,4 +1,4 @@
-/// A flight of the three programs on hosts of their own, and its result beside a local one.
+/// A flight of the three programs on separate hosts, and its result compared with a local flight.
 #pragma once
 
 #include <cstdint>
@@ -13,15 +13,15 @@
 
 namespace sls::test {
 
-/// The hosts of a flight, in the order that `Network` wants them; the last is for a discovery
+/// The hosts of a flight, in the order of `Network`'s addresses. The last is for a discovery
 /// server.
 inline const std::vector<std::string> kHosts = {"server", "controller", "recorder", "directory"};
 
-/// The profile `config/qos/NAME.xml` on hosts that each know what it must be told in the
-/// environment: the others' addresses, the discovery server's, its keys.
+/// The profile `config/qos/NAME.xml` on hosts with the environment variables that it requires:
+/// addresses of the other hosts, address of the discovery server, keys.
 class Profile {
  public:
-  /// Starts the discovery server where the profile needs one, and makes keys.
+  /// Starts the discovery server if the profile needs one, and makes keys.
   Profile(const Network& network, const std::string& name);
   ~Profile();
   Profile(const Profile&) = delete;
@@ -29,7 +29,7 @@ class Profile {
 
   /// Options of a flight with one program on each host.
   FlightOptions flight_options() const { return options_; }
-  /// Command prefix of a program on `host`; the same for one more of them.
+  /// Command prefix of a program on `host`, also for further programs.
   std::vector<std::string> before(const std::string& host) const;
 
  private:
@@ -45,12 +45,13 @@ struct Figures {
   double wall_s = 0.0;  ///< from step 0 to the end
   double steps_per_s = 0.0;
   double round_trip_p50_us = 0.0, round_trip_p99_us = 0.0;  ///< of the last 1,000 steps
-  std::uint64_t resent = 0;                                 ///< states, by the server
+  std::uint64_t resent = 0;  ///< number of states that the server sent again
   std::uint64_t rows_lost = 0;
   bool is_identical = false;  ///< to the local flight: state.csv, reference.csv, certificate
 };
 
-/// Reads them from the recording of a flight that has ended. @throws std::exception if it has none.
+/// Reads the figures from the recording of a finished flight. @throws std::exception if there is
+/// none.
 Figures read_figures(const std::filesystem::path& recording, const std::filesystem::path& local);
 
 }  // namespace sls::test

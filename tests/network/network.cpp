@@ -32,7 +32,7 @@ std::string run_shell(const std::string& command) {
   return output;
 }
 
-/// Our namespaces whose process does not live any more.
+/// Removes the namespaces of tests whose process no longer runs.
 void remove_what_killed_tests_left() {
   std::error_code none;
   for (const auto& entry : fs::directory_iterator(kNamespaces, none)) {
@@ -145,7 +145,7 @@ void Network::set_mtu(int bytes) const {
 }
 
 void Network::limit_rate(int kbit_per_s) const {
-  // A burst of two large packets: what lies in the queue, not in the bucket, is what is shaped.
+  // A burst of two large packets only: the limit then acts on the queue, not on the bucket.
   const std::string limit =
       " root tbf burst 4kb latency 50ms rate " + std::to_string(kbit_per_s) + "kbit";
   for (const auto& [host, address] : addresses_) {

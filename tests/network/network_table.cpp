@@ -1,5 +1,5 @@
 /// ./sls network-table: flies every QoS profile through every disturbance of tests/network/ and
-/// prints what each cost, as a Markdown table.
+/// prints the effect of each as a Markdown table.
 #include <gtest/gtest.h>
 
 #include <CLI/CLI.hpp>
@@ -42,7 +42,7 @@ const std::vector<Disturbance> kDisturbances = {
 
 const std::vector<std::string> kProfiles = {"lan", "unicast", "discovery_server", "wifi", "secure"};
 
-/// The figure eight for 16 s, 4,000 steps, with patience for a start over a bad link.
+/// The figure eight for 16 s, 4,000 steps, with a long time limit for a start over a bad link.
 std::string make_scenario(const TemporaryFolder& folder, int vehicles) {
   return make_scenario(
       folder,
@@ -116,8 +116,8 @@ int main(int argc, char** argv) {
             disturbances.empty() ||
             std::count(disturbances.begin(), disturbances.end(), disturbance.name) > 0;
         if (!is_wanted) continue;
-        // With multicast blocked the profile that needs it waits for half a minute and a recorder
-        // for one: the tests look at what they say.
+        // With multicast blocked, programs with the profile that needs it wait for half a minute,
+        // a recorder for a minute. The tests check their messages.
         const bool flies = disturbance.name != "no multicast" || profile != "lan";
         std::printf(
             "| `%s` | %s | %s\n", profile.c_str(), disturbance.name.c_str(),

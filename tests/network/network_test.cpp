@@ -1,5 +1,5 @@
-/// The three programs on three hosts, and everything a network does to them: the recording is the
-/// one of a single machine, byte by byte.
+/// The three programs on three hosts with network disturbances: the recording equals that of a
+/// single machine, byte by byte.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -19,7 +19,7 @@ class NetworkTest : public testing::Test {
     network_ = std::make_unique<Network>(kHosts);
   }
 
-  /// Flies `file` on one machine and, with `profile`, on three, and compares.
+  /// Flies `file` on one machine and, with `profile`, on three hosts, and compares.
   Figures expect_same(const std::string& profile, const std::string& file = scenario("short")) {
     const Profile configured(*network_, profile);
     Flight local(file), flight(file, configured.flight_options());
@@ -55,7 +55,7 @@ TEST_F(NetworkTest, ALinkThatLosesFivePercent) {
 
 TEST_F(NetworkTest, ALinkThatLosesTwentyPercent) {
   network_->lose(20);
-  // The middleware's discovery repairs itself once a second: half a minute is not always enough.
+  // Fast DDS repeats lost discovery data once a second: half a minute is not always enough.
   const TemporaryFolder folder;
   expect_same("wifi", make_scenario(folder, {{"timeout_s: 30", "timeout_s: 120"}}));
   EXPECT_GT(network_->lost(), 200u);
@@ -64,7 +64,7 @@ TEST_F(NetworkTest, ALinkThatLosesTwentyPercent) {
 TEST_F(NetworkTest, AWireWithDelayAndJitterThatReorders) {
   network_->disturb_wire("controller", {1.0, 2.0, 0.0, 1});
   const Figures figures = expect_same("lan");
-  EXPECT_GT(figures.round_trip_p50_us, 2000);  // there and back
+  EXPECT_GT(figures.round_trip_p50_us, 2000);  // delay in both directions
   EXPECT_EQ(network_->end_wire("controller").find(" 0 overtaken"), std::string::npos);
 }
 
@@ -81,7 +81,7 @@ TEST_F(NetworkTest, PacketsThatComeTwiceAndOutOfOrder) {
 TEST_F(NetworkTest, ALinkOfFourMegabits) {
   network_->limit_rate(4000);
   const Figures figures = expect_same("lan");
-  EXPECT_LT(figures.steps_per_s, 1500);  // without the limit it would be twice that
+  EXPECT_LT(figures.steps_per_s, 1500);  // without the limit it is twice as fast
 }
 
 TEST_F(NetworkTest, PacketsOfAtMost576Bytes) {
@@ -97,7 +97,7 @@ TEST_F(NetworkTest, APartitionOfFiveSecondsCostsAtMostSix) {
   ASSERT_TRUE(flight.wait_for_steps(100)) << flight.outputs();
   const auto cut_at = std::chrono::steady_clock::now();
   network_->cut();
-  std::this_thread::sleep_for(5s);  // this is the disturbance, not a wait for something
+  std::this_thread::sleep_for(5s);  // the disturbance itself, not a wait
   const std::size_t before = Table(flight.recording() / "state.csv").rows();
   network_->heal();
   ASSERT_TRUE(flight.wait_for_steps(before + 100)) << flight.outputs();

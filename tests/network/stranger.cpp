@@ -1,4 +1,4 @@
-/// A program of somebody else: it writes sls/state with a type of another name, until it is ended.
+/// A foreign program: it writes sls/state with a type of another name, until SIGTERM.
 #include <pthread.h>
 #include <csignal>
 #include <cstdio>
@@ -12,7 +12,7 @@ int main(int argc, char** argv) {
   sigset_t ends;
   sigemptyset(&ends);
   sigaddset(&ends, SIGTERM);
-  pthread_sigmask(SIG_BLOCK, &ends, nullptr);  // before the middleware's threads, which inherit it
+  pthread_sigmask(SIG_BLOCK, &ends, nullptr);  // before Fast DDS's threads, which inherit it
   Node node(argv[1], std::atoi(argv[2]), "stranger");
   const detail::AnyWriter writer(node, Topic<sls::States>::kName, kLatchedWriterProfile,
                                  detail::make_type_support<sls::SimStatus>());

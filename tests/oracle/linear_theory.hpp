@@ -14,7 +14,7 @@
 
 namespace sls::oracle {
 
-/// The error e of the designed equation e⁽ⁿ⁾ = −Σ gains_i e⁽ⁱ⁾ that starts with
+/// The solution e of the designed equation e⁽ⁿ⁾ = −Σ gains_i e⁽ⁱ⁾ from
 /// `start` = (e, ė, …, e⁽ⁿ⁻¹⁾), at multiples of `h`.
 inline std::vector<double> calc_designed_error(const Eigen::RowVectorXd& gains,
                                                Eigen::VectorXd start, double h, std::size_t count) {
@@ -31,31 +31,31 @@ inline std::vector<double> calc_designed_error(const Eigen::RowVectorXd& gains,
   return error;
 }
 
-/// Load error of a figure eight once the transients have died away: sines about a mean.
+/// Steady load error of a figure eight, without transients: a sine about a mean on each axis.
 struct SteadyError {
   Eigen::Array3d amplitude = Eigen::Array3d::Zero();
-  Eigen::Array3d seen_amplitude = Eigen::Array3d::Zero();  ///< of the load that sensors tell
+  Eigen::Array3d seen_amplitude = Eigen::Array3d::Zero();  ///< of the measured load
   Eigen::Array3d mean = Eigen::Array3d::Zero();
   Eigen::Array3d rms() const { return (amplitude.square() / 2 + mean.square()).sqrt(); }
   Eigen::Array3d seen_rms() const { return (seen_amplitude.square() / 2 + mean.square()).sqrt(); }
 };
 
-/// Response to a sine on s = iw.
+/// Transfer function, evaluated at s = iw.
 using Transfer = std::function<std::complex<double>(const std::complex<double>& s)>;
 
-/// Small motions about hover of vehicle, drag and law, the force held over the period T:
+/// Steady error of small motions about hover, with drag, and with the force held over the period T:
 ///
 ///     horizontal  M p̈ + S q̈ = Z F − D (ṗ − v),   I q̈ + S p̈ + S g q = 0,   y = p + L q
 ///                 F = −M′ g′ q + (m′ L′ / g′) n [+ D (ṗ − v)],   n as in the law's (6) with
-///                 ÿ = −g′ q, y⁽³⁾ = −g′ q̇ and the load seen at p + L′ q
+///                 ÿ = −g′ q, y⁽³⁾ = −g′ q̇ and the measured load at p + L′ q
 ///     vertical    M z̈ = M g − Z M′ (g′ − z̈_r + k_v ė′ + k_p e′),   e′ = e − (L − L′)
 ///     hold        Z = H(T) e^(−sd) G,   H(T) = (1 − e^(−sT)) / (sT)
-///     sensing     F has p e^(−sa) H(P) for p, and q likewise
+///     sensing     F uses p e^(−sa) H(P) instead of p, and the same for q
 ///
-/// M, S, I are the vehicle's mass and the pendulum's first and second moment about its joint; the
-/// controller's model has a dash. d is the delay of the node, P and a period and age of the
-/// samples. G, `horizontal_lag`, is what vehicle and autopilot make of a horizontal force. On
-/// s = iw, of each axis its own frequency.
+/// M, S, I are the vehicle's mass and the pendulum's first and second moment about its joint. A
+/// dash marks values of the controller's model. d is the delay of the node; P and a are the period
+/// and age of the samples. G, `horizontal_lag`, is the response of vehicle and autopilot to a
+/// horizontal force. Evaluated at s = iw, with the frequency of each axis.
 inline SteadyError calc_steady_error(const config::Scenario& scenario,
                                      const config::FigureEightReference& eight,
                                      const Transfer& horizontal_lag = {}) {
@@ -95,7 +95,7 @@ inline SteadyError calc_steady_error(const config::Scenario& scenario,
     const Complex s(0.0, 2.0 * M_PI * (axis + 1) / eight.period_s);
     const Complex held = calc_hold(s) * (horizontal_lag ? horizontal_lag(s) : 1.0);
     const Complex seen_position = sample(s, sensing.body), seen_rod = sample(s, sensing.rod);
-    const Complex of_error = xy.velocity * s + xy.position;  // in −n
+    const Complex of_error = xy.velocity * s + xy.position;  // part of −n
     const Complex by_position =
         ((is_fed_forward ? drag * s : 0.0) - to_force * of_error) * seen_position;
     const Complex by_rod = (to_force * (believed.gravity * (xy.jerk * s + xy.acceleration) -

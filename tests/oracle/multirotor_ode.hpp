@@ -1,10 +1,10 @@
-/// A multirotor with a slung load as an ODE: an oracle for tests, written from Newton's and Euler's
-/// equations of each body alone. The joint's force is an unknown of a linear system, and no joint
+/// A multirotor with a slung load as an ODE: an oracle for tests, derived only from Newton's and
+/// Euler's equations of each body. The joint's force is an unknown of a linear system; no joint
 /// coordinates are used. It shares no equation with the plant.
 ///
-/// Frame W: x forward, y right, z down. Body B: axes alike, origin Q. Body with mass m, centre of
+/// Frame W: x forward, y right, z down. Body B: same axes, origin Q. Body with mass m, centre of
 /// mass C at c from Q, inertia J about C; joint A at a from Q; r = a − c; force f_A of the pendulum
-/// on the body; all in W here:
+/// on the body. All vectors here are in W:
 ///
 ///     m a_C = m g e₃ + F + d + Σ f_i + f_A
 ///     J ω̇   = t + Σ (τ_i + (r_i − c) × f_i) − c × (F + d) − ω × J ω + r × f_A
@@ -28,8 +28,8 @@
 ///     f_i = T_i a_i − |w| k_d v_⊥,     τ_i = −s k_m T_i a_i − |w| k_r v_⊥
 ///     w(t) = w_s + (w_0 − w_s) exp(−t / τ),   τ = τ_up if w_s > w_0, else τ_down
 ///
-/// s = +1: seen from the side that the thrust points to, the rotor turns counter-clockwise. Rotors
-/// have no inertia of their own: no gyroscopic torque and none of their acceleration.
+/// s = +1: the rotor turns counter-clockwise, seen from the side to which the thrust points. Rotors
+/// have no inertia: no gyroscopic torque and no torque from their acceleration.
 ///
 ///     using namespace sls::oracle::multirotor;
 ///     Vehicle vehicle;
@@ -105,7 +105,7 @@ struct Pendulum {
   double load_inertia_across = 0.0, load_inertia_along = 0.0;
 };
 
-/// Mass, centre below the joint and inertia about it of the whole pendulum.
+/// The whole pendulum: mass, distance of its centre below the joint, inertia about the centre.
 struct PendulumMass {
   double mass = 0.0, centre = 0.0, inertia_across = 0.0, inertia_along = 0.0;
 };
@@ -134,8 +134,8 @@ struct Vehicle {
   double gravity = 9.8;  ///< m/s²
 };
 
-/// `kIdeal` integrates n_W and n_dot_W, `kRigid` q_WP and w_WP_P; `with_rod` sets both, and after a
-/// step n_W and n_dot_W hold for both.
+/// `kIdeal` integrates n_W and n_dot_W, `kRigid` q_WP and w_WP_P. `with_rod` sets all four. After a
+/// step n_W and n_dot_W are valid for both models.
 struct State {
   Eigen::Vector3d p_WQ = Eigen::Vector3d::Zero();
   Eigen::Vector3d v_WQ = Eigen::Vector3d::Zero();
@@ -148,7 +148,7 @@ struct State {
   std::vector<double> rotor_speeds;                          ///< rad/s
 };
 
-/// Inputs held during a step. A missing set-point means: no change of that rotor's speed.
+/// Inputs held during a step. Without a set-point a rotor keeps its speed.
 struct Inputs {
   std::vector<double> rotor_set_points;                            ///< rad/s, before clamping
   Eigen::Vector3d f_Q_W = Eigen::Vector3d::Zero();                 ///< direct force on Q, N
@@ -174,7 +174,7 @@ struct Point {
   Eigen::Vector3d p_W, v_W;
 };
 
-/// The body's point that lies at `p_QX_B`.
+/// The body's point at `p_QX_B`.
 inline Point calc_body_point(const State& state, const Eigen::Vector3d& p_QX_B) {
   return {state.p_WQ + state.q_WB * p_QX_B, state.v_WQ + state.q_WB * state.w_WB_B.cross(p_QX_B)};
 }
@@ -189,8 +189,8 @@ inline Point calc_load(const State& state, const Vehicle& vehicle) {
   return calc_rod_point(state, vehicle, vehicle.pendulum.load_distance);
 }
 
-/// `state` with the rod along `n_W`, turning with `n_dot_W` (its part across n_W counts) and, where
-/// it is rigid, with `spin` about itself, rad/s.
+/// `state` with the rod along `n_W`. The rod turns with `n_dot_W` (only its part perpendicular to
+/// n_W counts) and, if it is rigid, with `spin` about its own axis, rad/s.
 inline State with_rod(State state, const Eigen::Vector3d& n_W,
                       const Eigen::Vector3d& n_dot_W = Eigen::Vector3d::Zero(), double spin = 0.0) {
   state.n_W = n_W.normalized();
@@ -203,7 +203,7 @@ inline State with_rod(State state, const Eigen::Vector3d& n_W,
 
 // Rotors.
 
-/// Speed of a rotor `t` seconds after `set_point` was given at the speed `start`.
+/// Speed of a rotor `t` seconds after it received `set_point` at the speed `start`.
 inline double calc_rotor_speed(const Rotor& rotor, double start, double set_point, double t) {
   const double target = std::clamp(set_point, rotor.min_speed, rotor.max_speed);
   const double lag = target > start ? rotor.lag_up : rotor.lag_down;
@@ -218,8 +218,8 @@ inline std::vector<double> calc_rotor_speeds(const Vehicle& vehicle, std::vector
   return speeds;
 }
 
-/// The smooth pieces of a rotor's loss over the velocity along its axis: −1 against the thrust,
-/// 1 along it, 0 if no thrust is left.
+/// The smooth piece of a rotor's loss for the velocity along its axis: −1 against the thrust, 1
+/// along it, 0 if no thrust remains.
 inline int calc_loss_piece(const Rotor& rotor, double axial_velocity) {
   if (!rotor.loss_speed) return 1;
   if (std::abs(axial_velocity) >= *rotor.loss_speed) return 0;
@@ -233,7 +233,7 @@ inline Eigen::Vector3d calc_hub_velocity(const State& state, const Inputs& input
          state.w_WB_B.cross(rotor.p_QR_B);
 }
 
-/// The piece of each rotor's loss that holds in this state.
+/// The piece of each rotor's loss in this state.
 inline std::vector<int> calc_loss_pieces(const State& state, const Inputs& inputs,
                                          const Vehicle& vehicle) {
   std::vector<int> pieces;
@@ -249,7 +249,8 @@ struct RotorForces {
   Eigen::Vector3d torque_B;  ///< N m
 };
 
-/// A rotor at `speed` whose hub moves with `v_B` through the air, on the given piece of its loss.
+/// Forces of a rotor at `speed`, with hub velocity `v_B` relative to the air, on the given piece of
+/// its loss.
 inline RotorForces calc_rotor_forces(const Rotor& rotor, double speed, const Eigen::Vector3d& v_B,
                                      int piece) {
   const double axial = v_B.dot(rotor.axis_B);
@@ -302,7 +303,7 @@ inline Rate calc_rate(const State& state, const Inputs& inputs, const Vehicle& v
   const Matrix3d R_WB = state.q_WB.normalized().toRotationMatrix();
   const Body& body = vehicle.body;
 
-  // Force and torque about C of everything but gravity and joint.
+  // Force and torque about C, without gravity and joint.
   const Vector3d on_origin_W = inputs.f_Q_W + inputs.disturbance_force_W;
   const Vector3d c_W = R_WB * body.p_QC_B;
   Vector3d force_W = on_origin_W;
@@ -314,7 +315,7 @@ inline Rate calc_rate(const State& state, const Inputs& inputs, const Vehicle& v
                         (vehicle.rotors[i].p_QR_B - body.p_QC_B).cross(rotors[i].force_B));
   }
 
-  // The body without the pendulum, and what a force at the joint adds to the joint's acceleration.
+  // Accelerations without the pendulum, and K: the joint's acceleration per force at the joint.
   const Vector3d w_W = R_WB * state.w_WB_B;
   const Matrix3d J_W = R_WB * body.inertia_B * R_WB.transpose();
   const Matrix3d J_inverse_W = R_WB * body.inertia_B.inverse() * R_WB.transpose();
@@ -372,7 +373,7 @@ inline Rate calc_rate(const State& state, const Inputs& inputs, const Vehicle& v
 
 // Integration.
 
-/// state + h · rate; neither unit lengths nor rotor speeds are touched.
+/// state + h · rate. Does not change rotor speeds and does not restore unit lengths.
 inline State advance(State state, const Rate& rate, double h) {
   state.p_WQ += h * rate.v_WQ;
   state.v_WQ += h * rate.a_WQ;
@@ -385,7 +386,7 @@ inline State advance(State state, const Rate& rate, double h) {
   return state;
 }
 
-/// Unit lengths as they should be, and n_W, n_dot_W of a rigid rod from its orientation.
+/// Restores unit lengths, and calculates n_W and n_dot_W of a rigid rod from its orientation.
 inline State restore(State state, const Vehicle& vehicle) {
   state.q_WB.normalize();
   if (vehicle.pendulum.model == PendulumModel::kIdeal) {
@@ -418,12 +419,13 @@ State rk4_step(const State& state, const SpeedsAt& speeds_at, double h, const In
 }
 
 /// `state` after `duration` seconds with `inputs` held, by `substeps` Runge-Kutta steps. Rotor
-/// speeds are exact at every stage. Where a hub's axial velocity changes sign, the slope of its
-/// loss jumps, which would cost the order of convergence: the step is split there.
+/// speeds are exact at every stage. The slope of a rotor's loss jumps where the hub's axial
+/// velocity changes sign; the step is split there, because the jump would reduce the order of
+/// convergence.
 ///
-/// Set-points given in advance hold no attitude, so differences grow: 32 s with steps of 0.125 and
-/// 0.0625 ms differed by 1e-3 to 1e-2 m. With set-points from each flight's own state: by
-/// 1.4e-9 m at most.
+/// With predefined set-points nothing controls the attitude and differences grow: 32 s with steps
+/// of 0.125 and 0.0625 ms differed by 1e-3 to 1e-2 m. With set-points calculated from each flight's
+/// own state they differed by 1.4e-9 m at most.
 inline State step(State state, const Inputs& inputs, const Vehicle& vehicle, double duration,
                   int substeps) {
   const std::vector<double> first_speeds = state.rotor_speeds;
@@ -475,7 +477,7 @@ inline double calc_energy(const State& state, const Vehicle& vehicle) {
   return energy;
 }
 
-/// Power of everything but gravity, W.
+/// Power of all forces and torques except gravity, W.
 inline double calc_power(const State& state, const Inputs& inputs, const Vehicle& vehicle) {
   double power = (inputs.f_Q_W + inputs.disturbance_force_W).dot(state.v_WQ) +
                  inputs.disturbance_torque_W.dot(state.q_WB * state.w_WB_B);
@@ -487,14 +489,14 @@ inline double calc_power(const State& state, const Inputs& inputs, const Vehicle
   return power;
 }
 
-/// Of body and pendulum, kg m/s.
+/// Linear momentum of body and pendulum, kg m/s.
 inline Eigen::Vector3d calc_linear_momentum(const State& state, const Vehicle& vehicle) {
   const PendulumMass pendulum = calc_mass(vehicle.pendulum);
   return vehicle.body.mass * calc_body_point(state, vehicle.body.p_QC_B).v_W +
          pendulum.mass * calc_rod_point(state, vehicle, pendulum.centre).v_W;
 }
 
-/// Of the pendulum alone, about its own centre, kg m²/s.
+/// Angular momentum of the pendulum about its own centre, kg m²/s.
 inline Eigen::Vector3d calc_pendulum_spin(const State& state, const Vehicle& vehicle) {
   const PendulumMass pendulum = calc_mass(vehicle.pendulum);
   const Eigen::Vector3d inertia(pendulum.inertia_across, pendulum.inertia_across,
@@ -502,7 +504,7 @@ inline Eigen::Vector3d calc_pendulum_spin(const State& state, const Vehicle& veh
   return state.q_WP * inertia.cwiseProduct(state.w_WP_P);
 }
 
-/// Of body and pendulum about the fixed point `p_WO`, kg m²/s.
+/// Angular momentum of body and pendulum about the fixed point `p_WO`, kg m²/s.
 inline Eigen::Vector3d calc_angular_momentum(
     const State& state, const Vehicle& vehicle,
     const Eigen::Vector3d& p_WO = Eigen::Vector3d::Zero()) {

@@ -1,14 +1,15 @@
-/// The ideal slung load as a closed-form ODE: an oracle for tests, written from Newton's equations
-/// and the rod constraint alone. It shares no equation with the plant (Simbody) or the controller.
+/// The ideal slung load as a closed-form ODE: an oracle for tests, derived only from Newton's
+/// equations and the rod constraint. It shares no equation with the plant (Simbody) or the
+/// controller.
 ///
 ///     m p̈ = m g e₃ + F + T n,   m_L p̈_L = m_L g e₃ − T n,   p_L = p + L n,   |n| = 1
 ///
-/// Twice the derivative of n·n = 1 gives n·n̈ = −|ṅ|², hence the tension and both accelerations:
+/// The second derivative of n·n = 1 gives n·n̈ = −|ṅ|². The tension and both accelerations follow:
 ///
 ///     T = μ (L |ṅ|² − n·F / m),   μ = m m_L / (m + m_L)
 ///     a_Q = g e₃ + F / m + T n / m,   a_L = g e₃ − T n / m_L
 ///
-/// F is everything that acts on the quadrotor besides gravity and rod: control, drag, disturbance.
+/// F is the sum of all other forces on the quadrotor: control, drag, disturbance.
 #pragma once
 
 #include <Eigen/Core>
@@ -46,7 +47,7 @@ inline Accelerations calc_accelerations(const State& state, const Eigen::Vector3
   return result;
 }
 
-/// Time derivative of a state; its members hold the derivatives of the members they are named for.
+/// Time derivative of a state: each member holds the derivative of the member with its name.
 inline State calc_derivative(const State& state, const Eigen::Vector3d& f_Q_W,
                              const model::SlungLoadParameters& parameters) {
   const Accelerations a = calc_accelerations(state, f_Q_W, parameters);
@@ -61,7 +62,7 @@ inline State advance(const State& state, const State& derivative, double h) {
 
 /// One classical fourth-order Runge-Kutta step of `h` seconds under a force that may depend on time
 /// and state: `force_at(tau, state)` is the total force `tau` seconds into the step.
-/// The rod constraint, which the step leaves to order h⁵, is restored at its end.
+/// The step violates the rod constraint to order h⁵ and restores it at its end.
 template <typename ForceAt>
 State rk4_step_with(const State& state, const ForceAt& force_at, double h,
                     const model::SlungLoadParameters& parameters) {
@@ -79,20 +80,20 @@ State rk4_step_with(const State& state, const ForceAt& force_at, double h,
   return next;
 }
 
-/// The same with the force held, as a zero-order hold does.
+/// The same with a constant force (zero-order hold).
 inline State rk4_step(const State& state, const Eigen::Vector3d& f_Q_W, double h,
                       const model::SlungLoadParameters& parameters) {
   return rk4_step_with(
       state, [&](double, const State&) { return f_Q_W; }, h, parameters);
 }
 
-/// The state sample of this state.
+/// Converts the oracle's state to the model's state.
 inline model::SlungLoadState to_model_state(const State& state, double rod_length) {
   return model::make_state(state.p_WQ, state.v_WQ, state.p_WQ + rod_length * state.n_W,
                            state.v_WQ + rod_length * state.n_dot_W);
 }
 
-/// The oracle's view of a state sample; the rod's length is the distance of the bodies.
+/// Converts the model's state to the oracle's; the rod's length is the distance of the bodies.
 inline State from_model_state(const model::SlungLoadState& sample) {
   const double length = (sample.p_WL - sample.p_WQ).norm();
   return {sample.p_WQ, sample.v_WQ, (sample.p_WL - sample.p_WQ) / length,

@@ -1,5 +1,5 @@
-/// capture FILE: writes every packet that the interfaces of this network namespace see to FILE,
-/// until SIGTERM or 256 MB.
+/// capture FILE: writes every packet on the interfaces of this network namespace to FILE, until
+/// SIGTERM or 256 MB.
 #include <arpa/inet.h>
 #include <linux/if_ether.h>
 #include <signal.h>

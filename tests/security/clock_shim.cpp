@@ -1,5 +1,5 @@
-/// LD_PRELOAD library that shifts the calendar by SLS_CLOCK_SHIFT_S seconds: what certificates are
-/// compared with. Nothing else of the process notices.
+/// LD_PRELOAD library that shifts the result of time(), with which certificates are compared, by
+/// SLS_CLOCK_SHIFT_S seconds. The other clocks of the process do not change.
 #include <sys/time.h>
 
 #include <cstdlib>

@@ -1,7 +1,7 @@
-/// forger VICTIM RECEIVER DOMAIN: somebody without keys who knows RTPS. Waits for an announcement
-/// of the participant at address VICTIM, then sends samples in its name, of every writer it may
-/// have, to the participants at RECEIVER: unprotected, with sequence numbers beyond the genuine
-/// ones.
+/// forger VICTIM RECEIVER DOMAIN: an attacker without keys that uses RTPS. Waits for an
+/// announcement of the participant at address VICTIM. Then sends samples in its name, for every
+/// writer that it may have, to the participants at RECEIVER: unprotected, with sequence numbers
+/// beyond the genuine ones.
 #include <arpa/inet.h>
 #include <linux/if_ether.h>
 #include <netinet/in.h>
@@ -49,8 +49,7 @@ std::string bytes(const char (&text)[kSize]) {
   return {text, kSize - 1};  // zeros included
 }
 
-/// A message of `sender` with one sample of its writer number `writer`, for every reader that hears
-/// it.
+/// A message of `sender` with one sample of its writer number `writer`, for every matching reader.
 std::string make_message(const Prefix& sender, char writer, char kind) {
   std::string message = bytes("RTPS\x02\x03\x01\x0f");
   add(message, std::string(sender.begin(), sender.end()));

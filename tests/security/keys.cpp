@@ -39,7 +39,8 @@ void Keys::add(const std::string& role, const std::string& name) const {
 }
 
 void Keys::add_expired(const std::string& role, const std::string& name) const {
-  // A `date` that is behind makes keys for one day; the authorities are valid since yesterday.
+  // Makes keys for one day with a `date` that is 36 hours slow. The authorities are valid from
+  // yesterday.
   const TemporaryFolder programs;
   write_bytes(programs / "date",
               "#!/bin/sh\n[ \"$1\" = +%s ] && exec /bin/date -d '36 hours ago' +%s\n"
@@ -62,7 +63,8 @@ void Keys::add_usurper(const std::string& name) const {
   run({"openssl", "smime", "-sign", "-text", "-in", (work / "wanted.xml").string(), "-out",
        (own / "permissions.p7s").string(), "-signer", (recorder / "certificate.pem").string(),
        "-inkey", (recorder / "key.pem").string()});
-  // Its own certificate is of the identity authority: with both it takes what it signed itself.
+  // The identity authority issued its own certificate: if it trusts both authorities, it accepts
+  // its own signature.
   write_bytes(own / "permissions_ca.pem", read_bytes(recorder / "permissions_ca.pem") +
                                               read_bytes(recorder / "identity_ca.pem"));
 }

@@ -1,4 +1,4 @@
-/// ./sls keys, and what the programs say of keys that will not do.
+/// ./sls keys, and the error messages of the programs for wrong keys.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Runs `command`, expects it to fail with `code`, and returns what it said.
+/// Runs `command`, expects it to fail with `code` and one line, and returns this line.
 std::string fail(const std::vector<std::string>& command, int code) {
   Process process(command);
   EXPECT_EQ(process.wait(), code) << process.output();
@@ -80,7 +80,7 @@ TEST(KeysTest, MistakesAreOneLine) {
   EXPECT_TRUE(list(folder.path()).empty());
 }
 
-/// A program that meets a mistake in its keys: exit 2, and one line.
+/// Programs with a mistake in their keys: exit code 2, and one line.
 class BadKeysTest : public testing::Test {
  protected:
   std::string start_server(std::vector<std::string> before) {

@@ -1,4 +1,4 @@
-/// The three programs on a secured domain, started one by one, so that somebody can come between.
+/// The three programs on a secured domain. They start separately: a test can start others between.
 #pragma once
 
 #include <memory>
@@ -16,7 +16,7 @@ std::vector<std::string> put_before(std::vector<std::string> before,
 
 class SecuredRun {
  public:
-  /// A figure eight of so many seconds of simulation, 250 steps each.
+  /// A figure eight of `seconds` s of simulation, with 250 steps per second.
   explicit SecuredRun(int seconds = 2);
 
   std::unique_ptr<Process> start_server() const;
@@ -24,12 +24,12 @@ class SecuredRun {
   std::unique_ptr<Process> start_client(const std::vector<std::string>& flags = {},
                                         const std::string& identity = {}) const;
 
-  /// Any program in this domain, in front of whose command line `before` is put.
+  /// Starts any program in this domain. Its command line follows `before`.
   std::unique_ptr<Process> start(const std::string& name, const std::vector<std::string>& flags,
                                  const std::vector<std::string>& before,
                                  const std::string& qos_file = qos("secure")) const;
 
-  /// Expects all three to end well, and the bytes of a flight without security.
+  /// Expects all three to succeed, with the same bytes as a flight without security.
   void expect_same_as_open(Process& server, Process& client, Process& recorder) const;
 
   std::filesystem::path recording() const { return folder_ / "recording"; }

@@ -1,4 +1,4 @@
-/// Flights on a secured domain, and those who do not belong there.
+/// Flights on a secured domain, and intruders.
 #include <gtest/gtest.h>
 
 #include "tests/security/secured_run.hpp"
@@ -19,7 +19,7 @@ bool wait_for_rows(const std::filesystem::path& recording, std::size_t rows) {
   });
 }
 
-// --- who belongs there ---------------------------------------------------------------------------
+// --- participants with keys ----------------------------------------------------------------------
 
 TEST(SecureFlightTest, RecordsTheBytesOfAnOpenOne) {
   const SecuredRun run;
@@ -42,7 +42,7 @@ TEST(SecureFlightTest, AStandbyTakesOverAndTheKilledClientIsLetInAgain) {
   EXPECT_EQ(standby->wait(), 0) << standby->output();
 
   const Table commands(run.recording() / "command.csv");
-  std::string controllers;  // in the order in which they flew
+  std::string controllers;  // in the order of their answers
   for (std::size_t row = 0; row < commands.rows(); ++row)
     if (row == 0 || commands.text(row, "controller") != commands.text(row - 1, "controller"))
       controllers += commands.text(row, "controller") + " ";
@@ -96,13 +96,13 @@ TEST(SecureFlightTest, AViewerWithAnOperatorsKeysOperates) {
   run.expect_same_as_open(*server, *client, *recorder);
 }
 
-// --- who does not --------------------------------------------------------------------------------
+// --- intruders -----------------------------------------------------------------------------------
 
-/// A server, and a stronger client than its own who must not be let in.
+/// A server, and an intruder: a client stronger than its own, which it must refuse.
 class IntruderTest : public testing::Test {
  protected:
   void SetUp() override {
-    // The scenario's, but an intruder who hears nothing gives up soon.
+    // The run's scenario with a short time limit: an intruder that receives nothing ends after 4 s.
     write_bytes(folder_ / "intruder.yaml",
                 replace_once(read_bytes(run_.scenario_file()), "timeout_s: 30", "timeout_s: 4"));
   }
@@ -111,8 +111,8 @@ class IntruderTest : public testing::Test {
     return {"--scenario", (folder_ / "intruder.yaml").string(), "--strength", "1000"};
   }
 
-  /// Expects the server to name the intruder with `cause`, the flight to be as without it,
-  /// and the intruder to have received nothing.
+  /// Expects that the server names the intruder with `cause`, that the flight is the same as
+  /// without it, and that the intruder received nothing.
   void expect_harmless(const std::string& cause, const std::vector<std::string>& before,
                        const std::string& qos_file = qos("secure")) {
     const auto server = run_.start_server();

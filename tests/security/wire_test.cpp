@@ -1,5 +1,5 @@
-/// A host without keys on the network, what it can read and do: three hosts of the flight and that
-/// one.
+/// Data that a host without keys can read on the network, and its attacks. The network has three
+/// hosts of the flight and that host.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -46,7 +46,7 @@ class WireTest : public testing::Test {
   std::unique_ptr<Network> network_;
 };
 
-/// How many of the positions of a recording, and of other secrets, stand in what was captured.
+/// Secrets of a flight that were found in captured packets: positions of the recording, and others.
 struct Heard {
   std::size_t packets_bytes = 0;
   std::size_t positions = 0;
@@ -81,7 +81,8 @@ TEST_F(WireTest, HoldsNoPlainTextOfASecuredFlight) {
     return find_secrets(flight, read_bytes(file));
   };
   const Heard open = listen("lan"), secured = listen("secure");
-  // Four rows beyond the first hundred, two columns: all on the wire, or the test proves nothing.
+  // Five rows (100, 200 … 500) of two columns: the open flight must show all of them, otherwise the
+  // test proves nothing.
   EXPECT_EQ(open.positions, 10u);
   EXPECT_TRUE(open.run_id);
   EXPECT_TRUE(open.scenario);
