@@ -28,7 +28,7 @@ Fly with them: SLS_KEYS=DIR ./sls run SCENARIO --qos config/qos/secure.xml
 TEXT
 }
 
-# --- what a role may write and read ---------------------------------------------------------------
+# --- topics that a role may write and read --------------------------------------------------------
 # Every role also writes and reads sls/doctor, through which ./sls doctor queries other hosts.
 
 writes_of() {

@@ -67,7 +67,7 @@ class DockerTest : public ::testing::Test {
     ASSERT_EQ(image.code, 0) << image.output;
   }
 
-  // A demo removes everything itself. This removes what failed tests leave.
+  // A demo removes everything itself. This removes the remains of failed tests.
   void TearDown() override {
     for (const std::string& project : projects_) {
       const std::string filter = " --quiet --filter label=com.docker.compose.project=" + project;

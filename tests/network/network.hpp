@@ -15,8 +15,8 @@ namespace sls::test {
 /// Hosts on one switch. Each host is a network namespace with loopback and one interface, `eth0`;
 /// the switch is a bridge `br0` in its own namespace, with a port for each host, named like the
 /// host. Addresses are 10.77.0.1, 10.77.0.2 … in the order of the names. The machine's own network
-/// is not affected. The destructor removes everything; the next test removes what a killed test
-/// left.
+/// is not affected. The destructor removes everything; the next test removes the remains of a
+/// killed test.
 class Network {
  public:
   /// The switch, as a host name for the functions below.

@@ -103,7 +103,7 @@ TEST(RetransmissionTimerTest, LearnsARoundTripThatHasGrownBeyondTheTimeout) {
   EXPECT_EQ(timer.timeout() / 1ms, 39);  // 40 ms, approached from below
 }
 
-/// Mean time per step over a link that loses a fifth each way, where answers take
+/// Mean time per step over a link that loses a fifth in each direction. Answers take
 /// `calc_round_trip()`.
 template <class RoundTrip>
 RetransmissionTimer::Duration fly_with_loss(RoundTrip calc_round_trip) {

@@ -176,7 +176,7 @@ TEST_F(FleetTest, InRealTimeWithoutLateAnswersHasTheCertificateOfLockstep) {
   FAIL() << "late even at 200 ms per period";
 }
 
-// --- what goes wrong -----------------------------------------------------------------------------
+// --- failures ------------------------------------------------------------------------------------
 
 /// A long flight, for tests that disturb or stop it.
 const Changes kLong = {{"for_s: 0.4", "for_s: 60"}};
@@ -334,7 +334,7 @@ Resources read_resources(pid_t id) {
 }
 
 TEST_F(FleetTest, NeitherMemoryNorDescriptorsGrowInFlightAndNothingIsLeftBehind) {
-  // A small history of sls/record: it is full soon and then no longer grows.
+  // A small history of sls/record: it fills quickly and then no longer grows.
   const std::string file = make_fleet_scenario(folder_, kLong);
   Flight flight(file, {make_qos_with_history(folder_, "default", "100"), {}, {}});
   const auto control = [&](const std::vector<std::string>& words) {

@@ -78,7 +78,7 @@ TEST_F(MultirotorSystemTest, InAFleetEachFliesAsAlone) {
   EXPECT_EQ(read_file(flight.recording() / "state.csv"), read_file(in_process / "state.csv"));
 }
 
-// --- what they say -------------------------------------------------------------------------------
+// --- messages ------------------------------------------------------------------------------------
 
 void expect_said(const fs::path& recording, const std::string& remark) {
   EXPECT_TRUE(holds(read_file(recording / "flight.txt"), remark))

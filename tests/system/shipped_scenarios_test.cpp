@@ -354,7 +354,8 @@ void expect_hold_of_20_ms(const Flown& flown) {
   expect_steady_error(flown, 0.05, 0.015);
 }
 
-/// The figure eight 0.1 m above the one it is measured against, and nothing else.
+/// The figure eight is 0.1 m above the reference of the published errors; that is the only
+/// difference.
 void expect_offset_of_reference(const Flown& flown) {
   expect_eight(flown);
   EXPECT_NEAR(calc_published_lap_error(flown, &Step::error).rms.z(), 0.100, 1e-4);

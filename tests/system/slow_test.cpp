@@ -17,7 +17,7 @@ class RealTimeMinuteTest : public ::testing::Test {
   std::string make_minute() const {
     return make_scenario(folder_, {{"for_s: 32", "for_s: 60"}}, "figure_eight");
   }
-  /// Numbers of the timing label, which must not say that the flight is degraded.
+  /// Numbers of the timing label. The label must not begin with "degraded".
   struct Timing {
     int late = -1;
     double worst_age_ms = 0.0;

@@ -484,7 +484,7 @@ TEST(MultirotorPlantTest, StepsInAttitudeAsFastAsThePublishedVehicle) {
   }
 }
 
-// --- what it must keep ---------------------------------------------------------------------------
+// --- determinism and errors ----------------------------------------------------------------------
 
 TEST(MultirotorPlantTest, AdvancesInAnyNumberOfCallsWithTheSameBits) {
   const PlantSetup setup = with_autopilot(make_full_setup(Pendulum::kRigid), "first_order",

@@ -86,7 +86,7 @@ TEST(RigidPendulumTest, SwingsWithTheCompoundPendulumsPeriod) {
     // Runge-Kutta's phase error is (ωh)⁴/120 ≈ 1e-12, the interpolation's h⁴ of the same size.
     EXPECT_NEAR(find_first_hang(plant, f_Q_W), calc_quarter_period(omega, amplitude), 1e-11);
   }
-  // The rod's and the load's inertia change the frequency by 3e-3, far beyond what is tested here.
+  // The rod's and the load's inertia change the frequency by 3e-3, far above the tolerance here.
   EXPECT_GT(std::abs(omega / std::sqrt(1.7 * 9.8 / (1.5 * 1.1)) - 1.0), 1e-4);
 }
 
