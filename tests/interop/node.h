@@ -25,8 +25,8 @@ enum {
 
 /// A server's run.
 typedef struct Run {
-  dds_guid_t server;          ///< its DDS participant
-  sls_Parameters parameters;  ///< without sequences; only run_id until received
+  dds_guid_t server;                             ///< its DDS participant
+  sls_Parameters parameters;                     ///< without sequences; only run_id until received
   sls_VehicleParameters vehicles[kMaxVehicles];  ///< by ascending id
   uint32_t vehicle_count;
   bool has_status;
