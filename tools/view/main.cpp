@@ -33,7 +33,7 @@ view::Resource make_page() {
   return page;
 }
 
-/// Until a stop signal.
+/// Serves until a stop signal.
 void serve(view::Server& server) {
   server.repeat(kSignalTime, [&server] {
     if (app::stop_signal() != 0) server.stop();
@@ -62,7 +62,7 @@ void watch(const view::Options& options) {
   serve(server);
 }
 
-/// Recordings do not change while they are shown: everything is read once.
+/// Reads everything once at the start, because recordings do not change while they are shown.
 void replay(const view::Options& options) {
   view::Server server(options.server);
   const std::size_t count = options.recordings.size();
@@ -111,7 +111,7 @@ int main(int argc, char** argv) {
 
   return app::run_main(argc, argv, cli, options.common, "sls_view", [&] {
     options.complete();
-    // Before any thread starts, as they inherit it.
+    // Before any thread starts, because threads inherit the priority.
     app::put_viewer_last();
     run_checked(options);
   });

@@ -14,18 +14,18 @@ namespace sls::view {
 
 struct Options {
   app::CommonOptions common;
-  std::vector<std::filesystem::path> recordings;  ///< none: live
-  std::filesystem::path export_file;              ///< empty: serve
-  std::size_t most_bytes = kMostExportedBytes;    ///< of that file
+  std::vector<std::filesystem::path> recordings;  ///< empty: live
+  std::filesystem::path export_file;              ///< empty: serve the page
+  std::size_t most_bytes = kMostExportedBytes;    ///< size limit of `export_file`
   std::uint32_t vehicle_id = 0;
-  std::string identity = "viewer";  ///< whose keys it uses on a secured domain
+  std::string identity = "viewer";  ///< role whose keys it uses on a secured domain
   bool has_ros_face = false;
   std::filesystem::path token_file;  ///< empty: no token
   ServerOptions server;
 
-  /// Brings the token and the address into `server`.
-  /// @throws config::ConfigError as load_token and `check` (web/access.hpp), and where two options
-  ///   do not go together.
+  /// Puts the token and the address into `server`.
+  /// @throws config::ConfigError as load_token and `check` (web/access.hpp), and if two options
+  ///   exclude each other.
   void complete();
 };
 

@@ -33,7 +33,7 @@ Json make_drawn_rotors() {
   return rotors;
 }
 
-/// `spin`: 1 counter-clockwise, −1 clockwise, as the scenario says it.
+/// `spin`: 1 counter-clockwise, −1 clockwise, as in the scenario.
 Json make_rotors(const std::vector<sim::RotorKeys>& keys) {
   Json rotors = Json::array();
   for (const sim::RotorKeys& rotor : keys)
@@ -84,8 +84,8 @@ Json describe_columns(const Parameters& parameters) {
 
 // --- mission -------------------------------------------------------------------------------------
 
-/// For how long the reference of a stage moves on, s: to the end of the stage, and of a figure
-/// eight one lap at most. 0: it does not move.
+/// Time for which the reference of a stage moves, s: until the end of the stage, for a figure eight
+/// at most one lap. 0: it does not move.
 double calc_moving_time(const config::Stage& stage) {
   double longest = 0;
   if (const auto* eight = std::get_if<config::FigureEightReference>(&stage.reference))

@@ -1,4 +1,4 @@
-/// Description of a run for the page: the same of a live run and of a recording.
+/// Description of a run for the page: the same for a live run and for a recording.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@
 namespace sls::view {
 
 /// Columns of the rows that the page gets, named as in state.csv and reference.csv, always in this
-/// order; then the plant's signals. A number that a run does not have is NaN.
+/// order; the plant's signals follow. A number that a run does not have is NaN.
 inline const std::vector<std::string> kColumns = {
     "quad_x_m",       "quad_y_m",    "quad_z_m",  "quad_vx_m_s",  "quad_vy_m_s",
     "quad_vz_m_s",    "load_x_m",    "load_y_m",  "load_z_m",     "load_vx_m_s",
@@ -23,10 +23,10 @@ inline const std::vector<std::string> kColumns = {
 /// "vehicles":[{"id":0,"quad_mass_kg":…,"load_mass_kg":…,"rod_length_m":…,"attachment_m":[x,y,z],
 ///              "rotors":[{"position_m":[x,y,z],"spin":1}]}],
 /// "columns":[{"name":"quad_x_m","unit":"m"},…],"stages":["climb",…],
-/// "path_m":[[x,y,z],…]}      the planned path of vehicle 0's load, at most 2,000 points; frame W,
-/// z down Rotors of a point mass: four, drawn but not flown, with "is_drawn_only":true in the
-/// vehicle.
-/// @throws config::ConfigError if the scenario text is none.
+/// "path_m":[[x,y,z],…]}
+/// `path_m`: the planned path of vehicle 0's load, at most 2,000 points; frame W, z down. A point
+/// mass has four rotors that are drawn but not simulated, and "is_drawn_only":true in its vehicle.
+/// @throws config::ConfigError if the scenario text is not a valid scenario.
 std::string describe_run(const Parameters& parameters);
 
 }  // namespace sls::view

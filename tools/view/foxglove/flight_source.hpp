@@ -1,4 +1,4 @@
-/// The parts of a flight that sessions need: Feed and Operator, or a test's own.
+/// Interface of Feed and Operator for sessions; tests implement their own.
 #pragma once
 
 #include <cstdint>
@@ -13,13 +13,13 @@ namespace sls::view::foxglove {
 class FlightSource {
  public:
   virtual ~FlightSource() = default;
-  /// As Feed has them.
+  /// The same functions as in Feed.
   virtual void add(Feed::Listener& listener) = 0;
   virtual void remove(Feed::Listener& listener) = 0;
   virtual void want(TopicId topic) = 0;
   virtual void unwant(TopicId topic) = 0;
   virtual std::vector<Sample> latched(TopicId topic) const = 0;
-  /// As Operator has them.
+  /// The same functions as in Operator.
   virtual bool may_ask() const = 0;
   virtual void request(ControlAction action, std::uint64_t steps,
                        std::function<void(const OperatorReply&)> done) = 0;

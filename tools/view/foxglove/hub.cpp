@@ -18,7 +18,7 @@ constexpr auto kDroppedSpacing = std::chrono::seconds(1);
 constexpr std::size_t kMostEvents = 32;
 constexpr const char* kNoFlight = "No flight on this domain. Start one: ./sls run";
 
-/// Read as long as there is a client: they tell the time.
+/// Read while there is a client, because their samples give the time.
 constexpr std::array kClockTopics = {TopicId::kRecord, TopicId::kStatus};
 
 std::vector<std::uint32_t> list_vehicles(const Parameters& parameters) {
@@ -74,7 +74,7 @@ void Hub::remove(Client& client) {
   if (!clients_.empty()) return;
   for (const TopicId topic : kClockTopics) source_->unwant(topic);
   source_->remove(*this);
-  events_.clear();  // told again to a new listener
+  events_.clear();  // the source sends them again to a new listener
 }
 
 std::optional<std::string> Hub::subscribe(Client& client, const Subscribe::Item& item) {
@@ -170,7 +170,8 @@ void Hub::close_subscriptions(OpenChannel& channel) {
   channel.subscribers.clear();
 }
 
-/// Mirrors of a vehicle that stays keep their channels.
+/// Opens channels for new mirrors. Mirrors of vehicles that the old run had, too, keep their
+/// channels.
 std::vector<const Channel*> Hub::open_mirrors(const std::vector<ros::Channel>& wanted) {
   std::map<std::string, OpenChannel*> there;
   for (auto& [id, open] : channels_)
@@ -205,9 +206,9 @@ void Hub::note(const RunView* run) {
   problem_ = problem;
 }
 
-/// Everything of the old run is over: sessions see another server (sessionId), its vehicles'
-/// channels go. The advertisement is sent even where it is empty: Lichtblick forgets the types of
-/// its channels with the session and collects them again with the next advertisement.
+/// Ends the old run: sessions get a new sessionId, and the channels of its vehicles are closed. The
+/// advertisement is sent even if it is empty, because Lichtblick forgets the types of its channels
+/// with the session and collects them again at the next advertisement.
 void Hub::begin_run(const RunView& run) {
   const Parameters& parameters = run.run.parameters;
   run_id_ = parameters.run_id();
@@ -299,8 +300,8 @@ void Hub::broadcast(const OpenChannel& channel, std::int64_t time_ns,
 
 // --- time ----------------------------------------------------------------------------------------
 
-/// Simulation time of a sample of the run that is looked at; of what has none, and of other runs,
-/// the time at which it came.
+/// Simulation time of a sample of the current run. For samples without a time and of other runs:
+/// the newest simulation time at their arrival.
 std::int64_t Hub::find_time(const Sample& sample) {
   const auto stamp = read_stamp(sample.topic, *sample.cdr);
   if (!stamp || run_id_ != stamp->run_id) return now_ns_;
@@ -322,7 +323,7 @@ void Hub::advance(std::int64_t time_ns) {
     client->connection().send(MessageKind::kBinary, payload, Delivery::kDroppable);
 }
 
-// --- words ---------------------------------------------------------------------------------------
+// --- status messages -----------------------------------------------------------------------------
 
 void Hub::say(StatusLevel level, const std::string& text) {
   const Payload payload = make_status(level, text);

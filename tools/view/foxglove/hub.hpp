@@ -1,5 +1,5 @@
-/// Shared by all sessions of the protocol: the channels, their subscribers, and the work done once
-/// for each sample, however many subscribe.
+/// Shared by all sessions of the protocol: the channels and their subscribers. Does the work for
+/// each sample once, for any number of subscribers.
 #pragma once
 
 #include <chrono>
@@ -36,10 +36,10 @@ class Hub final : public Feed::Listener {
   /// `source` must outlive the hub.
   explicit Hub(std::unique_ptr<FlightSource> source, Clock clock = std::chrono::steady_clock::now);
 
-  /// Tells a new client server, channels, time and what has happened.
+  /// Sends a new client the server, the channels, the status and the past events.
   void add(Client& client);
   void remove(Client& client);
-  /// Begins to send; latched topics at once. Nothing, or what is wrong in words.
+  /// Begins to send; sends latched topics at once. Returns nothing, or the error as text.
   std::optional<std::string> subscribe(Client& client, const Subscribe::Item& item);
   /// False if there is no such subscription.
   bool unsubscribe(Client& client, std::uint32_t subscription_id);
@@ -61,7 +61,7 @@ class Hub final : public Feed::Listener {
   };
   struct OpenChannel {
     Channel channel;
-    std::optional<TopicId> topic;  ///< nothing: a mirror
+    std::optional<TopicId> topic;  ///< none: a mirror
     bool is_latched = false;
     std::vector<Subscriber> subscribers;
     std::vector<Kept> kept;  ///< messages of a latched mirror
@@ -92,7 +92,7 @@ class Hub final : public Feed::Listener {
   const Clock clock_;
   std::map<std::uint32_t, OpenChannel> channels_;  // by id
   std::vector<OpenChannel*> natives_;              // by TopicId
-  std::vector<OpenChannel*> mirrors_;              // as MirrorSource::channels
+  std::vector<OpenChannel*> mirrors_;              // in the order of MirrorSource::channels
   Payload advertisement_;                          // of all channels; null: to be made
   std::uint32_t next_channel_id_ = 1;
   std::size_t subscribed_mirrors_ = 0;
@@ -104,10 +104,10 @@ class Hub final : public Feed::Listener {
   std::int64_t now_ns_ = 0;  // newest simulation time of the run
   bool has_time_ = false;
   Time time_sent_{};
-  bool has_left_ = false;  // the server of the run
+  bool has_left_ = false;  // the server of the run has left
   bool is_silent_ = false;
   std::string problem_;
-  std::deque<Payload> events_;  // for those who come late
+  std::deque<Payload> events_;  // for clients that join later
 
   struct Seen {
     std::uint64_t dropped = 0;

@@ -81,8 +81,8 @@ std::variant<Subscribe, Unsubscribe, Malformed> parse_unsubscribe(const Json& js
   return unsubscribe;
 }
 
-/// The capability that an operation of the protocol needs and this server does not have; null for
-/// any other word.
+/// The capability that operation `op` of the protocol requires and this server lacks; null for any
+/// other word.
 const char* find_missing_capability(std::string_view op) {
   static constexpr std::pair<std::string_view, const char*> kMissing[] = {
       {"advertise", "clientPublish"},

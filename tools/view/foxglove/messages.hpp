@@ -1,4 +1,4 @@
-/// The messages of the Foxglove WebSocket protocol: made and parsed. No network here.
+/// Makes and parses the messages of the Foxglove WebSocket protocol. No network here.
 /// Source: https://github.com/foxglove/ws-protocol/blob/main/docs/spec.md
 #pragma once
 
@@ -24,7 +24,7 @@ struct Channel {
 
 enum class StatusLevel { kInfo = 0, kWarning = 1, kError = 2 };
 
-/// With the capabilities `time` and, with `has_services`, `services` by JSON.
+/// Has the capability `time`; if `has_services`, also `services` with JSON.
 Payload make_server_info(const std::string& session_id, bool has_services);
 Payload make_status(StatusLevel level, const std::string& text);
 Payload make_advertise(const std::vector<const Channel*>& channels);
@@ -32,7 +32,7 @@ Payload make_unadvertise(const std::vector<std::uint32_t>& channel_ids);
 Payload make_service_call_failure(std::uint32_t service_id, std::uint32_t call_id,
                                   const std::string& text);
 
-/// Binary: opcode 1. `time_ns` of the run that is looked at: README.md.
+/// Binary: opcode 1. `time_ns`: simulation time of the current run, README.md.
 Payload make_message_data(std::uint32_t subscription_id, std::int64_t time_ns,
                           const std::vector<std::uint8_t>& cdr);
 /// Binary: opcode 2.
@@ -60,7 +60,7 @@ struct ServiceCall {
   std::string data;
 };
 
-/// The defect of a message, in words.
+/// The defect of a message, as text.
 struct Malformed {
   std::string text;
 };

@@ -15,7 +15,7 @@ constexpr std::int64_t kMostAtOnce = 4;
 /// Entries that hold a state; late answers come without one.
 bool has_state(const RecordEntry& entry) { return entry.kind() != ANSWER_LATE; }
 
-/// Only an accepted answer tells where the load should be at the entry's step.
+/// Only an accepted answer has the desired position of the load at the entry's step.
 bool has_reference(const RecordEntry& entry) { return entry.kind() == ANSWER_ACCEPTED; }
 
 }  // namespace

@@ -15,17 +15,18 @@ class MirrorSource {
  public:
   using Time = std::chrono::steady_clock::time_point;
 
-  /// Of vehicles by ascending id; steps are `period_ns` apart.
+  /// `vehicle_ids`: ascending. `period_ns`: time between two steps.
   MirrorSource(const std::vector<std::uint32_t>& vehicle_ids, std::int64_t period_ns);
 
   const std::vector<ros::Channel>& channels() const { return mirrors_.channels(); }
-  /// To be called first.
+  /// Call it first.
   void emit_static(const ros::Mirrors::Emit& emit) { mirrors_.emit_static(emit); }
 
-  /// True if some vehicle's next sample is due: each gets at most 100 a second of wall time, a
-  /// batch that comes late at most 4 at once. So most batches of a fast flight need no decoding.
+  /// True if the next sample of a vehicle is due: at most 100 per second of wall time for each
+  /// vehicle, at most 4 at once from a late batch. Most batches of a fast flight are therefore not
+  /// decoded.
   bool is_due(Time now) const;
-  /// Emits the due ones of `batch`, evenly spaced, the newest always among them.
+  /// Emits the due samples of `batch`, evenly spaced, always including the newest.
   void note(const RecordBatch& batch, Time now, const ros::Mirrors::Emit& emit);
 
  private:

@@ -1,4 +1,4 @@
-/// Sessions of Foxglove, Lichtblick and others that use the Foxglove WebSocket protocol.
+/// Sessions of Foxglove, Lichtblick and other clients of the Foxglove WebSocket protocol.
 /// Source: https://github.com/foxglove/ws-protocol/blob/main/docs/spec.md
 #pragma once
 

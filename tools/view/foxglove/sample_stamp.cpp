@@ -6,7 +6,7 @@ namespace sls::view::foxglove {
 
 namespace {
 
-/// Reads numbers of a CDR sample at offsets behind its encapsulation header, which has 4 bytes.
+/// Reads numbers of a CDR sample. Offsets count from the end of the encapsulation header (4 bytes).
 class Bytes {
  public:
   explicit Bytes(const std::vector<std::uint8_t>& cdr) : cdr_(cdr) {}

@@ -22,7 +22,7 @@ const Service* find_service(std::uint32_t id);
 /// The message `advertiseServices`.
 Payload make_advertise_services();
 
-/// Steps of a request (0 of all but /sls/step, there 1 if it names none), or what is wrong.
+/// Steps of a request, or its defect. 0 for services other than /sls/step, which has 1 by default.
 std::variant<std::uint64_t, Malformed> parse_request(const Service& service,
                                                      const std::string& json);
 

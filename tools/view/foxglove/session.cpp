@@ -28,7 +28,7 @@ void FoxgloveSession::forget(std::uint32_t subscription_id) {
 }
 
 void FoxgloveSession::receive(MessageKind kind, std::string_view message) {
-  if (errors_ > kMostErrors) return;  // closed
+  if (errors_ > kMostErrors) return;  // the connection is being closed
   kind == MessageKind::kText ? receive_text(message) : receive_binary(message);
 }
 

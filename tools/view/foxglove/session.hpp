@@ -15,8 +15,8 @@ namespace sls::view::foxglove {
 
 struct Service;
 
-/// Answers what a client asks; what is wrong is answered in words, and after kMostErrors of them
-/// the connection is closed (1008).
+/// Answers the messages of a client. A wrong message is answered with a text; after kMostErrors of
+/// them the connection is closed (1008).
 class FoxgloveSession final : public Session, public Client {
  public:
   static constexpr int kMostErrors = 32;
@@ -45,9 +45,9 @@ class FoxgloveSession final : public Session, public Client {
 
   const std::shared_ptr<Hub> hub_;
   Connection& connection_;
-  std::set<std::uint32_t> forgotten_;  // of channels that are gone: the client may not know yet
+  std::set<std::uint32_t> forgotten_;  // of closed channels: the client may still name them
   int errors_ = 0;
-  /// Replies of requests may come after the session has gone: they hold it weakly.
+  /// Replies may come after the session has ended, so requests hold a weak pointer to this.
   const std::shared_ptr<FoxgloveSession*> self_ = std::make_shared<FoxgloveSession*>(this);
 };
 

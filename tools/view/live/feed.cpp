@@ -16,11 +16,11 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using namespace std::chrono_literals;
 
-constexpr auto kLookTime = 100ms;   // between two looks at the run, where no status came
-constexpr auto kRestTime = 20ms;    // the least, however many came
-constexpr auto kLongestQuiet = 1s;  // the view is told that often without a change
-// Between two deliveries in lockstep, where each one takes time from the loop: it goes as fast as
-// the processors let it.
+constexpr auto kLookTime = 100ms;   // between two looks at the run if no status has come
+constexpr auto kRestTime = 20ms;    // least time between two looks, however many statuses come
+constexpr auto kLongestQuiet = 1s;  // period of the view without a change
+// Between two deliveries in lockstep. There the loop runs as fast as the processors allow, and each
+// delivery takes processor time from it.
 constexpr auto kLockstepPeriod = 50ms;
 constexpr std::size_t kPastEvents = 200;
 constexpr std::size_t kLatchedSamples = 256;  // of one topic
@@ -35,12 +35,12 @@ struct AnyTopicReader {
 
 using Put = std::function<void(Sample)>;
 
-/// Lets samples that come fast wait in the socket, so that the middleware's thread takes many of
-/// them at a time: in lockstep each time that it wakes takes a processor from the loop for longer
-/// than its work (README.md). Samples that do not fit into the socket are lost to this reader only.
+/// Makes fast samples wait in the socket, so that the middleware's thread takes many at a time. In
+/// lockstep each wake-up of that thread takes a processor from the loop for longer than its work
+/// (README.md). Samples that do not fit into the socket are lost to this reader only.
 class Rests {
  public:
-  /// To be called for each sample, before it is handed on; from one thread.
+  /// Call it for each sample, before passing the sample on; from one thread.
   void rest_if_busy() {
     const auto now = Clock::now();
     ++samples_;
@@ -54,17 +54,17 @@ class Rests {
  private:
   static constexpr int kMostSamples = 8;  // in a window
   static constexpr auto kWholeRest = 45ms;
-  static constexpr auto kWindow = 5ms;  // for what has gathered
+  static constexpr auto kWindow = 5ms;  // for samples that have waited
 
   Clock::time_point window_end_{};
   int samples_ = 0;
 };
 
-/// Hands every sample of a topic to `put`, on a thread of the middleware.
+/// Passes every sample of a topic to `put`, on a thread of the middleware.
 template <class Message>
 class TopicReader : public AnyTopicReader {
  public:
-  /// `may_rest`: set where nobody needs every sample of sls/record.
+  /// `may_rest`: true while no listener requires every sample of sls/record.
   TopicReader(bus::Node& node, TopicId topic, const Put& put, const std::atomic<bool>& may_rest)
       : reader_(node, is_latched(topic) ? bus::kLatchedReaderProfile : bus::kLoopReaderProfile,
                 [this, topic, &put, &may_rest](std::vector<std::uint8_t>& cdr,
@@ -138,10 +138,10 @@ struct Feed::Impl {
     is_ending = true;
     queue.interrupt();
     thread.join();
-    for (auto& reader : readers) reader.reset();  // before what their callbacks use
+    for (auto& reader : readers) reader.reset();  // before the members that their callbacks use
   }
 
-  // --- from the middleware's threads and our own ---
+  // --- on the middleware's threads and on `thread` ---
 
   void put(Sample sample) {
     if (queue.put(std::move(sample))) post_delivery();
@@ -157,7 +157,8 @@ struct Feed::Impl {
     post_guarded([this] { deliver(queue.take_all()); });
   }
 
-  /// The thread: delivers what came too soon after a delivery, and looks at the run.
+  /// Function of `thread`: delivers samples that came too soon after a delivery, and looks at the
+  /// run.
   void work() {
     auto next_look = Clock::now();
     while (!is_ending) {
@@ -214,7 +215,8 @@ struct Feed::Impl {
     });
   }
 
-  /// Of requests and replies the last ones, of other topics the last of each sender.
+  /// Keeps the last kLatchedSamples requests and replies; of other topics the last sample of each
+  /// sender.
   void keep(const Sample& sample) {
     std::vector<Sample>& kept = latched[static_cast<std::size_t>(sample.topic)];
     if (sample.topic != TopicId::kControl && sample.topic != TopicId::kControlReply)
@@ -243,7 +245,8 @@ struct Feed::Impl {
            (topic == TopicId::kRecord && !listeners.empty());
   }
 
-  /// Only pages read, which need no more than the newest samples, and the flight is in lockstep.
+  /// Readers may rest if the flight is in lockstep and only pages read, which need only the newest
+  /// samples.
   void update_rests() {
     const bool is_any_wanted =
         std::any_of(wanted.begin(), wanted.end(), [](int count) { return count > 0; });
@@ -266,7 +269,7 @@ struct Feed::Impl {
   std::atomic<bool> is_status_new{false};
   std::atomic<bool> is_ending{false};
   std::atomic<bool> may_rest{false};
-  RunWatch watch;              // the thread's
+  RunWatch watch;              // used by `thread` only
   Clock::time_point looked{};  // likewise
   Clock::time_point told{};    // likewise
 
@@ -277,7 +280,7 @@ struct Feed::Impl {
   std::deque<RunEvent> past_events;
 
   std::array<std::unique_ptr<AnyTopicReader>, kTopics> readers;
-  std::thread thread;  // delivers, looks; last: it uses the members above
+  std::thread thread;  // runs `work`; last: it uses the members above
 };
 
 Feed::Feed(bus::Node& node, std::uint32_t vehicle_id, Post post)

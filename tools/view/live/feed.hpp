@@ -1,4 +1,4 @@
-/// Samples of the domain on the server's thread: what sessions see of a flight.
+/// Passes the samples of the domain to the sessions, on the server's thread.
 #pragma once
 
 #include <chrono>
@@ -29,10 +29,11 @@ inline constexpr std::size_t kTopics = 8;
 const char* name_of(TopicId topic);  ///< "sls/state"
 const char* type_of(TopicId topic);  ///< "sls::States"
 
-/// True of the topics whose samples come seldom and must reach a late joiner: never left out.
+/// True for the topics whose samples are rare and must reach a late joiner. They are never dropped,
+/// except in a flood.
 bool is_latched(TopicId topic);
 
-/// A sample as it came over the wire.
+/// A sample as received.
 struct Sample {
   TopicId topic;
   std::shared_ptr<const std::vector<std::uint8_t>> cdr;  ///< with its encapsulation header
@@ -40,26 +41,26 @@ struct Sample {
   bus::PeerId sender;
 };
 
-/// The page's view of the run: of vehicle `--vehicle`, the one that can be
-/// joined, else the last one there was.
+/// The page's view of the run of vehicle `--vehicle`: the current run; after its end the run that
+/// can be joined, otherwise the last one.
 struct RunView {
   bus::Run run;  ///< parameters and last status
   std::vector<Participant> participants;
-  bool is_silent = false;  ///< its server, whose run goes on, has not been heard for 1 s
+  bool is_silent = false;  ///< the run goes on, but its server has not published for 1 s
   double silence_s = 0;
   bool is_gone = false;  ///< its server has left
 };
 
-/// Reads the domain best-effort and hands what comes to listeners on the server's thread, in
-/// batches: the first sample after a rest at once, then at most 60 batches a second, in
-/// lockstep 20. sls/record is read while there is a listener, sls/state and sls/command while
-/// somebody wants them, the latched topics always.
+/// Reads the domain best-effort and passes the samples to listeners on the server's thread, in
+/// batches. The first sample after a pause is passed at once, then at most 60 batches a second, 20
+/// in lockstep. Reads the latched topics always, sls/record while there is a listener, sls/state
+/// and sls/command while `want` requests them.
 class Feed {
  public:
   using Post = std::function<void(std::function<void()>)>;
 
-  /// Samples that wait for the server's thread, at most: then the oldest are left out, but none of
-  /// the latched topics.
+  /// Limit of the samples that wait for the server's thread. Beyond it the oldest are dropped;
+  /// samples of latched topics last.
   static constexpr std::size_t kMostQueuedBytes = 16 << 20;
 
   /// `post`: Server::post.
@@ -68,30 +69,30 @@ class Feed {
 
   struct Listener {
     virtual ~Listener() = default;
-    /// Every sample of a wanted topic, in the order it came; of sls/record all batches, too, unless
-    /// the server's thread is behind: then the oldest are left out.
+    /// Called for every sample of a topic that is read, each topic in order of arrival. If the
+    /// server's thread is behind, the oldest are dropped.
     virtual void note(const Sample& /*sample*/) {}
-    /// New samples were handed over. At least 1/60 s is between two of these, in lockstep 1/20 s.
-    /// For all who work on the newest alone.
+    /// Called after a batch of samples, at most every 1/60 s, in lockstep every 1/20 s. For
+    /// listeners that use only the newest samples.
     virtual void end_batch() {}
     /// The run, its status or its participants have changed; null: there is none.
     virtual void note(const RunView* /*run*/) {}
     virtual void note_event(std::uint64_t /*run_id*/, std::uint64_t /*step*/,
                             const std::string& /*text*/) {}
   };
-  /// All of these on the server's thread. A new listener is told the run and the past events at
-  /// once.
+  /// Call all these functions on the server's thread. A new listener gets the run and the past
+  /// events at once.
   void add(Listener& listener);
   void remove(Listener& listener);
-  /// Counted: the topic is read until as many `unwant`. Of topics that are read anyway nothing
-  /// changes.
+  /// Counted: the topic is read until `unwant` has been called as often. No effect on topics that
+  /// are always read.
   void want(TopicId topic);
   void unwant(TopicId topic);
-  /// The run that is looked at.
+  /// The current run.
   const RunView* run() const;
-  /// The last samples of a latched topic, for those who come late.
+  /// The last samples of a latched topic, for late subscribers.
   std::vector<Sample> latched(TopicId topic) const;
-  /// Samples left out so far, because the server's thread was behind.
+  /// Samples dropped so far because the server's thread was behind.
   std::uint64_t dropped() const;
 
  private:

@@ -20,7 +20,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr std::size_t kMostRequests = 8;
-constexpr double kTimeout = 5;  // s, for a run to be found and again for its reply
+constexpr double kTimeout = 5;  // s, to find a run and again for its reply
 
 }  // namespace
 
@@ -72,7 +72,7 @@ struct Operator::Impl {
     }
   }
 
-  /// With the first request: a viewer that only reads has no writer of sls/control.
+  /// Called at the first request, so that a viewer that only reads has no writer of sls/control.
   void make_client() {
     ctl::ClientOptions options;
     options.vehicle_id = vehicle_id;
@@ -100,8 +100,8 @@ struct Operator::Impl {
   std::size_t open_requests = 0;                                        // likewise
   app::Mailbox<Request> requests{kMostRequests + 1};
   std::atomic<bool> is_ending{false};
-  std::optional<ctl::OperatorClient> client;  // the thread's
-  std::thread thread;                         // asks, because a reply may take as long as its steps
+  std::optional<ctl::OperatorClient> client;  // used by `thread` only
+  std::thread thread;                         // a reply may take as long as its steps
 };
 
 Operator::Operator(bus::Node& node, std::uint32_t vehicle_id, Feed::Post post, bool may_ask)

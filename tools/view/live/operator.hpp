@@ -1,4 +1,4 @@
-/// Operator requests of browsers: one after another over sls/control.
+/// Sends operator requests of browsers one after another over sls/control.
 #pragma once
 
 #include <cstdint>
@@ -15,8 +15,8 @@ namespace sls::view {
 
 struct OperatorReply {
   bool is_accepted = false;
-  std::string reason;      ///< why not, in words
-  std::uint64_t step = 0;  ///< at which it took effect
+  std::string reason;      ///< reason of a refusal
+  std::uint64_t step = 0;  ///< step at which the request took effect
 };
 
 class Operator {
@@ -26,9 +26,9 @@ class Operator {
   ~Operator();
 
   bool may_ask() const;
-  /// Asks the run of the vehicle; `done` is called once, on the server's thread, but not any more
-  /// once this has been destroyed. At most 8 requests wait; one more is refused. Ends with the
-  /// reply that it waits for, at a stop signal at once.
+  /// Sends a request to the vehicle's run and calls `done` once, on the server's thread, unless
+  /// this object has been destroyed. At most 8 requests wait; further ones are refused. The
+  /// destructor waits for the open reply; a stop signal ends this wait.
   void request(ControlAction action, std::uint64_t steps,
                std::function<void(const OperatorReply&)> done);
 

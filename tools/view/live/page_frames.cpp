@@ -30,10 +30,10 @@ void append_floats(std::string& message, const std::array<double, n>& numbers) {
   for (const double number : numbers) append(message, static_cast<float>(number));
 }
 
-/// An entry of its own for a late answer has no state; kinds of later contracts are not known.
+/// False for the entry of a late answer, and for unknown kinds of later contracts.
 bool has_state(const RecordEntry& entry) { return entry.kind() < ANSWER_LATE; }
 
-/// The reference that the answer follows; also that of an older answer, where `may_be_held`.
+/// The reference that the answer follows; if `may_be_held`, also that of a held older answer.
 std::array<double, 3> find_reference(const RecordEntry& entry, bool may_be_held) {
   const AnswerKind kind = entry.kind();
   if (kind == ANSWER_ACCEPTED || kind == ANSWER_REFUSED || (may_be_held && kind == ANSWER_HELD))
@@ -49,7 +49,7 @@ std::vector<std::size_t> find_rotor_signals(const Parameters& parameters) {
   return found;
 }
 
-/// Of `count` indices at most `most`, evenly, the last always.
+/// At most `most` of `count` indices, evenly spaced, always including the last.
 std::vector<std::size_t> thin(std::size_t count, std::size_t most) {
   std::vector<std::size_t> kept;
   const std::size_t n = std::min(count, most);
@@ -173,7 +173,7 @@ std::vector<const RecordEntry*> PageFrames::find_rows(std::uint32_t vehicle_id,
   return rows;
 }
 
-/// In the order of kColumns.
+/// Appends the values in the order of kColumns, then the signals.
 void PageFrames::append_values(std::string& message, const RecordEntry& entry) const {
   const PlantState& state = entry.truth();
   append_floats(message, state.p_WQ_m());

@@ -1,5 +1,5 @@
-/// The binary messages of the page's protocol from batches of sls/record. Pure: no network, no
-/// clock.
+/// Makes the binary messages of the page's protocol from batches of sls/record. Pure: no network,
+/// no clock.
 #pragma once
 
 #include <cstddef>
@@ -15,37 +15,38 @@ namespace sls::view {
 
 class PageFrames {
  public:
-  /// Batches decoded for one frame, at most, so that it costs the same however fast the flight is:
-  /// for poses, which a fleet's step is spread over, and for rows.
+  /// Most batches decoded for one frame, so that its cost does not depend on the speed of the
+  /// flight. kMostBatches: for poses, because a fleet's step is spread over several batches;
+  /// kMostRowBatches: for rows.
   static constexpr std::size_t kMostBatches = 16;
   static constexpr std::size_t kMostRowBatches = 4;
-  /// Rows in one message, at most.
+  /// Most rows in one message.
   static constexpr std::size_t kMostRows = 256;
 
-  /// Forgets what there was.
+  /// Discards the data of the run before.
   void start_run(const Parameters& parameters);
 
-  /// A sample of sls/record; kept as it came.
+  /// Adds a sample of sls/record; it is not decoded yet.
   void add(const Sample& sample) { samples_.push_back(sample); }
-  /// Forgets the samples added since the last frame.
+  /// Discards the samples added since the last frame.
   void clear_samples() { samples_.clear(); }
 
-  /// Decodes of the samples added since the last frame the newest, until each vehicle is in them,
-  /// and of the others as many as a frame may cost. False if no state came.
+  /// Decodes samples added since the last frame: the newest, until each vehicle is among them, then
+  /// others up to kMostRowBatches in total. False if no state came.
   bool decode();
 
-  /// Of what was decoded last: the newest state of each vehicle.
+  /// The newest state of each vehicle that `decode` found.
   std::string make_poses() const;
-  /// Of what was decoded last: rows later than those of the message before, thinned; empty if
-  /// there are none.
+  /// The decoded rows that are later than those of the message before, thinned; empty if there are
+  /// none.
   std::string make_rows(std::uint32_t vehicle_id);
 
-  /// Of what was decoded last: the stage that the vehicle of the lowest id flies; empty if no
-  /// answer says it.
+  /// The stage of the vehicle with the lowest id in its newest decoded entry; empty if that entry
+  /// has no accepted answer.
   std::string find_stage() const;
 
   bool has_vehicle(std::uint32_t vehicle_id) const { return last_steps_.count(vehicle_id) > 0; }
-  /// Expects a run.
+  /// Requires a run.
   std::uint32_t lowest_vehicle() const { return last_steps_.begin()->first; }
   std::uint64_t run_id() const { return run_id_; }
 
@@ -67,9 +68,9 @@ class PageFrames {
   bool has_attitude_ = false;
   std::size_t signals_ = 0;
   std::vector<std::size_t> rotor_signals_;             // indices of the rotors' speeds
-  std::map<std::uint32_t, std::uint64_t> last_steps_;  // + 1, of the rows made; by vehicle
+  std::map<std::uint32_t, std::uint64_t> last_steps_;  // last step of the rows made + 1, by vehicle
   std::vector<Sample> samples_;
-  std::vector<Decoded> decoded_;  // the first `count_` of them; the others' memory is used again
+  std::vector<Decoded> decoded_;  // `count_` are valid; the memory of the others is reused
   std::size_t count_ = 0;
   std::map<std::uint32_t, RecordEntry> newest_;  // of the last frame, by vehicle
   std::int64_t newest_written_ns_ = 0;

@@ -26,10 +26,10 @@ constexpr std::uint64_t kStatusKey = 2;
 constexpr std::size_t kPastEvents = 200;
 constexpr std::size_t kMostQueuedBytes = 512 << 10;  // a page further behind gets no rows
 constexpr int kMostMistakes = 8;
-constexpr std::uint64_t kMostId = std::uint64_t{1} << 53;  // what a number of JavaScript holds
+constexpr std::uint64_t kMostId = std::uint64_t{1} << 53;  // integers that JavaScript holds exactly
 constexpr std::uint16_t kPolicyViolation = 1008;
 
-/// Texts from the network need not be UTF-8.
+/// Replaces bytes that are not UTF-8: texts come from the network.
 Payload to_payload(const Json& json) {
   return std::make_shared<const std::string>(
       json.dump(-1, ' ', false, Json::error_handler_t::replace));
@@ -93,7 +93,7 @@ Json describe_status(const RunView& view, const std::string& stage) {
 
 class PageSession;
 
-/// Decodes and formats once what all pages get. Listens while there is a page.
+/// Decodes and formats the messages once for all pages. Listens to the feed while there is a page.
 class PageHub : public Feed::Listener {
  public:
   PageHub(Feed& feed, Operator& requests, const PageOptions& options)
@@ -111,7 +111,7 @@ class PageHub : public Feed::Listener {
 
   const PageOptions& options() const { return options_; }
   Operator& requests() { return requests_; }
-  /// True if there is no run yet whose vehicles one could know.
+  /// True if the run has this vehicle, or if there is no run yet.
   bool may_select(std::uint32_t vehicle_id) const {
     return !has_run_ || frames_.has_vehicle(vehicle_id);
   }
@@ -161,7 +161,7 @@ class PageSession : public Session {
   void receive(MessageKind kind, std::string_view message) override;
 
   Connection& connection() { return connection_; }
-  /// Whose rows it gets; nothing: of the lowest id.
+  /// Vehicle whose rows the page gets; none: the one with the lowest id.
   std::optional<std::uint32_t> selected() const { return selected_; }
   void forget_selection() { selected_.reset(); }
 
@@ -183,7 +183,7 @@ class PageSession : public Session {
   int mistakes_ = 0;
 };
 
-/// Why this page may not operate; empty: it may.
+/// Reason why this page may not operate; empty if it may.
 std::string PageSession::find_obstacle() const {
   if (!connection_.may_operate()) return connection_.why_not();
   if (!hub_->requests().may_ask())
@@ -223,7 +223,7 @@ std::optional<std::string> find_text(const Json& message, const char* key) {
 }
 
 void PageSession::receive(MessageKind kind, std::string_view text) {
-  if (mistakes_ >= kMostMistakes) return;  // it is being closed
+  if (mistakes_ >= kMostMistakes) return;  // the connection is being closed
   if (kind != MessageKind::kText) return refuse("expected text, got a binary message");
   const Json message = Json::parse(text, nullptr, false);
   if (!message.is_object()) return refuse("expected a JSON object");
@@ -281,7 +281,7 @@ void PageSession::control(const Json& message) {
 void PageHub::join(PageSession& session) {
   sessions_.push_back(&session);
   if (sessions_.size() == 1)
-    feed_.add(*this);  // tells us, and so the session, all there is
+    feed_.add(*this);  // passes the run and the past events to us, and so to the session
   else
     send_past(session);
 }
@@ -339,7 +339,7 @@ void PageHub::send_status(const RunView& view) {
   send_all(status_message_, Delivery::kNewest, kStatusKey);
 }
 
-/// A status of its own, as the server publishes none when a stage begins.
+/// Sends a status when a stage begins, because the server publishes none then.
 void PageHub::note_stage() {
   const std::string stage = frames_.find_stage();
   if (stage.empty() || stage == stage_) return;
@@ -366,7 +366,7 @@ void PageHub::start_run(const Parameters& parameters) {
     if (event.run_id == frames_.run_id()) send_all(make_message(event), Delivery::kAlways);
 }
 
-/// Of an event of the run that is looked at.
+/// Message about an event of the current run.
 Payload PageHub::make_message(const Event& event) const {
   return to_payload({{"op", "event"},
                      {"run_id", to_hex(event.run_id)},

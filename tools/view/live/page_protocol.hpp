@@ -15,7 +15,7 @@ inline constexpr const char* kPageProtocol = "sls.view.1";
 struct PageOptions {
   int domain = 0;
   std::uint32_t vehicle_id = 0;
-  bool takes_token = false;  ///< a page that has none may ask its user for one
+  bool takes_token = false;  ///< a page without a token may ask its user for one
 };
 
 /// Feed and operator must outlive the sessions.

@@ -1,4 +1,4 @@
-/// Which run is looked at, and what is known of it.
+/// Chooses the current run and collects its data.
 #pragma once
 
 #include <chrono>
@@ -19,14 +19,14 @@
 
 namespace sls::view {
 
-/// Something that happened in a run: a new reason in its status.
+/// An event of a run: a new reason in its status.
 struct RunEvent {
   std::uint64_t run_id = 0;
   std::uint64_t step = 0;
   std::string text;
 };
 
-/// Asked from one thread; listens on the middleware's.
+/// Call the functions from one thread. Samples arrive on threads of the middleware.
 class RunWatch {
  public:
   /// `on_status`: called on a thread of the middleware at every status.
@@ -34,7 +34,7 @@ class RunWatch {
 
   /// The view as it is now; null: there has been no run yet.
   std::shared_ptr<const RunView> look();
-  /// False if the last look found nothing that the one before had not.
+  /// True if the last `look` found other data than the one before.
   bool has_changed() const { return has_changed_; }
   /// Events since the last call, oldest first.
   std::deque<RunEvent> take_events();
@@ -49,7 +49,7 @@ class RunWatch {
 
   const std::uint32_t vehicle_id_;
   const std::function<void()> on_status_;
-  std::mutex events_mutex_;  // over the two that follow
+  std::mutex events_mutex_;  // protects the next two members
   std::deque<RunEvent> events_;
   std::map<std::uint64_t, std::string> last_reasons_;  // by run_id
   std::optional<bus::Run> run_;

@@ -1,4 +1,4 @@
-/// Samples on their way from the middleware's threads to the server's.
+/// Passes samples from the middleware's threads to the server's thread.
 #pragma once
 
 #include <chrono>
@@ -13,10 +13,10 @@
 
 namespace sls::view {
 
-/// Bounded: beyond `most_bytes` the oldest of the loop's topics and of sls/record are dropped;
-/// latched ones only where they alone are as many, as in a flood. Each topic keeps its order. New
-/// samples are announced once before they are taken, and at most once a period. Called from any
-/// thread.
+/// Bounded: beyond `most_bytes` the oldest samples of the loop's topics and of sls/record are
+/// dropped. Latched samples are dropped only if they alone exceed the limit, as in a flood. Each
+/// topic keeps its order. New samples are announced once before they are taken, and at most once a
+/// period. All functions may be called from any thread.
 class SampleQueue {
  public:
   using Clock = std::chrono::steady_clock;
@@ -27,13 +27,14 @@ class SampleQueue {
 
   explicit SampleQueue(std::size_t most_bytes) : most_bytes_(most_bytes) {}
 
-  /// True if the caller is to have the server's thread take what there is.
+  /// If true, the caller must make the server's thread call `take_all`.
   bool put(Sample sample);
-  /// All there is, oldest first.
+  /// All samples, the latched ones first, each group oldest first.
   std::vector<Sample> take_all();
 
-  /// Waits until `deadline`, until `interrupt`, or until what was put inside of a period is due:
-  /// true then, and the caller is to have it taken.
+  /// Waits until `deadline`, until `interrupt`, or until samples put within a period are due.
+  /// Returns true only in the last case; the caller must then make the server's thread call
+  /// `take_all`.
   bool wait_until_due(Clock::time_point deadline);
   void interrupt();
 
@@ -47,11 +48,11 @@ class SampleQueue {
   void drop_oldest(std::deque<Sample>& queue);
 
   const std::size_t most_bytes_;
-  mutable std::mutex mutex_;  // over what follows
+  mutable std::mutex mutex_;  // protects the members below
   std::condition_variable changed_;
   std::deque<Sample> latched_;
   std::deque<Sample> others_;
-  std::size_t bytes_ = 0;  // of both
+  std::size_t bytes_ = 0;  // of both queues
   std::uint64_t dropped_ = 0;
   bool is_announced_ = false;
   bool is_interrupted_ = false;

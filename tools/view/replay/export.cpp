@@ -55,7 +55,7 @@ std::string to_base64(std::string_view bytes) {
   return text;
 }
 
-/// "A0B","A1B": as many as there are recordings, in JSON.
+/// `count` JSON strings of `before` and a number, such as "/recording/0","/recording/1".
 std::string list_sources(std::string_view before, std::size_t count) {
   std::string list;
   for (std::size_t index = 0; index < count; ++index)
@@ -111,14 +111,14 @@ std::string make_export(std::string_view page_html, const std::vector<std::strin
   std::string html =
       set_mode(page_html, fmt::format("{{\"mode\":\"embedded\",\"recordings\":[{}]}}",
                                       list_sources("#sls-recording-", recordings.size())));
-  // Before the script that reads them: it runs as soon as it is there.
+  // Before the script that reads them, because a script runs as soon as it is parsed.
   return html.insert(html.rfind('<', html.find(kModeId)), blocks);
 }
 
 void export_page(const fs::path& file, std::string_view page_html_gz,
                  const std::vector<fs::path>& folders, std::size_t most_bytes) {
   const std::string page = unzip(page_html_gz);
-  // The text around the data, and its last, incomplete three bytes.
+  // The text around the data, and 4 bytes for an incomplete last group in each recording's base64.
   const std::size_t around =
       make_export(page, std::vector<std::string>(folders.size())).size() + 4 * folders.size();
   if (around > most_bytes || folders.empty())

@@ -24,7 +24,7 @@ KeptRows::KeptRows(const std::vector<std::uint32_t>& vehicle_ids, std::size_t co
 void KeptRows::add(std::uint32_t vehicle_id, std::uint64_t step, double sim_time_s,
                    const std::vector<float>& row) {
   Vehicle& vehicle = vehicles_.at(vehicle_id);
-  // The last row so far stays only where its step is to be kept: a later one is the last now.
+  // The row added before is no longer the last. It stays only if its step is a multiple of every_.
   const std::size_t last = vehicle.steps.size() - 1;
   if (vehicle.steps.size() > 1 && vehicle.steps[last] % every_ != 0) {
     vehicle.steps.pop_back();
@@ -80,7 +80,8 @@ bool KeptRows::fit(std::size_t most_bytes) {
   std::uint64_t times = 1;
   while (count_bytes(times * every_) > most_bytes) {
     if (times == most_times) return false;
-    // Further than a few times the budget only where a folder's steps are not consecutive.
+    // The rows held exceed the budget only a few times, so `times` passes 16 only if the steps of a
+    // folder are not consecutive.
     times = std::min(times < 16 ? times + 1 : 2 * times, most_times);
   }
   if (times > 1) thin_out(times * every_);

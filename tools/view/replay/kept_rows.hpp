@@ -1,4 +1,4 @@
-/// Rows of a recording that are kept while it is read: few enough, evenly spaced, in one pass.
+/// Selects evenly spaced rows of a recording within a size limit, in one pass.
 #pragma once
 
 #include <cstddef>
@@ -11,30 +11,30 @@ namespace sls::view {
 
 class KeptRows {
  public:
-  /// `most_bytes`: of the result; three times as many are held while rows are added.
+  /// `most_bytes`: size of the result; up to three times as many are held while rows are added.
   KeptRows(const std::vector<std::uint32_t>& vehicle_ids, std::size_t columns,
            std::size_t most_bytes);
 
-  /// Steps beyond tell of no flight; k times them does not overflow.
+  /// No flight has more steps; a multiple of this number does not overflow.
   static constexpr std::uint64_t kMostSteps = std::uint64_t{1} << 53;
 
-  /// Rows of one vehicle in ascending order of steps, which are below kMostSteps; `row` has as many
-  /// numbers as columns.
+  /// Adds a row. Steps of one vehicle must ascend and be below kMostSteps; `row` has one number for
+  /// each column.
   void add(std::uint32_t vehicle_id, std::uint64_t step, double sim_time_s,
            const std::vector<float>& row);
 
-  /// Thins the rows out until they fit into `most_bytes`. To be called once, after the last `add`.
-  /// False if the first and last rows alone do not fit.
+  /// Thins the rows out until they fit into `most_bytes`. Call it once, after the last `add`. False
+  /// if the first and last rows alone do not fit.
   bool fit(std::size_t most_bytes);
 
-  /// Each k-th step is kept, counted from step 0, with the first and the last of each vehicle.
+  /// k: every k-th step is kept, counted from step 0, and the first and last of each vehicle.
   std::uint64_t every() const { return every_; }
-  /// Rows added of the vehicle that has most.
+  /// Number of rows added for the vehicle with the most rows.
   std::uint64_t steps_total() const;
   double last_time_s() const;
   std::vector<std::uint32_t> vehicle_ids() const;
   std::size_t count_rows(std::uint32_t vehicle_id) const;
-  /// Of each vehicle its times as f64, and its rows as f32, by ascending id; little-endian.
+  /// For each vehicle, by ascending id: its times as f64, then its rows as f32; little-endian.
   void append_to(std::string& bytes) const;
 
  private:

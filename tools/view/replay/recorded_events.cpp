@@ -15,7 +15,7 @@ namespace {
 namespace fs = std::filesystem;
 using record::CsvReader;
 
-constexpr std::size_t kMostLineBytes = 4096;  // of flight.txt; a recorder's are shorter
+constexpr std::size_t kMostLineBytes = 4096;  // of flight.txt; the recorder writes shorter lines
 
 double to_time(std::uint64_t step, double period_s) { return static_cast<double>(step) * period_s; }
 
@@ -29,7 +29,8 @@ std::optional<std::uint64_t> parse_step(std::string_view text) {
 void read_status(const fs::path& folder, double period_s, std::vector<RecordedEvent>& events) {
   const fs::path path = folder / record::StatusRow::kFile;
   if (!fs::exists(path)) return;
-  // Of sample_index, phase, reason and step; earlier contracts have other counters behind them.
+  // Reads only these columns, because recordings of earlier contracts have other counters after
+  // them.
   CsvReader file(path, "sample_index,phase,reason,step", CsvReader::Further::kAllowed);
   std::string last;
   while (file.next()) {
@@ -47,7 +48,7 @@ void read_status(const fs::path& folder, double period_s, std::vector<RecordedEv
   }
 }
 
-/// "  step 7 (0.028 s): text" under the line "Events".
+/// Reads lines such as "  step 7 (0.028 s): text" below the line "Events".
 void read_flight_log(const fs::path& folder, double period_s, std::vector<RecordedEvent>& events) {
   std::set<std::pair<std::uint64_t, std::string>> known;
   for (const RecordedEvent& event : events) known.emplace(event.step, event.text);

@@ -18,22 +18,22 @@ struct RecordedEvent {
   std::string text;
 };
 
-/// At most this many of each kind; a slider has no room for more.
+/// Most events of each kind; a slider has no room for more.
 inline constexpr std::size_t kMostMarks = 500;
 
-/// Changes of phase and reason in status.csv, and what flight.txt tells beyond them, by step. A
-/// recording that was cut off may have neither. @throws record::DamagedError
+/// Changes of phase and reason in status.csv and the other events of flight.txt, by step. An
+/// interrupted recording may have neither file. @throws record::DamagedError
 std::vector<RecordedEvent> read_events(const record::RecordedFlight& flight, double period_s);
 
-/// A stretch of time in which something was wrong.
+/// An interval of time with a fault, or without a good answer.
 struct FaultInterval {
   double from_s = 0, to_s = 0;
-  std::string kind;  ///< of the scenario's faults, or held, fail_safe, or an error code
-  std::string on;    ///< state, command; empty of those that are not the scenario's
+  std::string kind;  ///< kind of the scenario's fault, or held, fail_safe, or an error code
+  std::string on;    ///< state, command; empty if it is no fault of the scenario
   std::uint32_t vehicle_id = 0;
 };
 
-/// Those of the scenario that begin before `end_s`, cut off there.
+/// Faults of the scenario that begin before `end_s`; their intervals end there at the latest.
 std::vector<FaultInterval> list_faults(const config::Scenario& scenario, double end_s);
 
 struct StageStart {
@@ -42,14 +42,14 @@ struct StageStart {
   std::string name;
 };
 
-/// Finds stages, and steps without a good answer, in rows that come by.
+/// Finds stages, and steps without a good answer, in rows that are added one after another.
 class RowEvents {
  public:
   explicit RowEvents(double period_s) : period_s_(period_s) {}
 
-  /// Each vehicle's in step order.
+  /// Rows of each vehicle must come in step order.
   void add(const record::StepRows& rows);
-  /// Ends what is open.
+  /// Ends the open fault intervals.
   void finish();
 
   const std::vector<StageStart>& stages() const { return stages_; }

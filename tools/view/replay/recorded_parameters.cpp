@@ -46,7 +46,7 @@ std::uint64_t parse_run_id(const std::string& text, const fs::path& folder) {
   return run_id;
 }
 
-/// Units of the plant's signals by their names; empty if the manifest has none.
+/// Units of the plant's signals by name; empty if the manifest has no signals.
 std::map<std::string, std::string> read_units(const fs::path& folder) {
   std::map<std::string, std::string> units;
   std::ifstream stream(folder / "manifest.json", std::ios::binary);
@@ -61,7 +61,7 @@ std::map<std::string, std::string> read_units(const fs::path& folder) {
   return units;
 }
 
-/// The columns of state.csv beyond those of a point mass.
+/// Sets the attitude and the signals from the columns of state.csv beyond those of a point mass.
 void set_columns(Parameters& message, const fs::path& folder) {
   const record::CsvReader file(folder / record::StateRow::kFile,
                                record::make_header<record::StateRow>(),
@@ -116,7 +116,7 @@ RecordedParameters load_parameters(const record::RecordedFlight& flight) {
   message.run_id(parse_run_id(manifest.run_id, flight.folder));
   message.scenario_text(parameters.scenario.text);
   message.scenario_sha256(parameters.scenario.sha256);
-  // The command line may have put another period than the scenario's in force.
+  // The manifest has the period of the run: the command line may have replaced the scenario's.
   const auto period_ns = config::to_nanoseconds(manifest.period_s);
   if (!period_ns || *period_ns <= 0)
     throw config::ConfigError(fmt::format("{}: period_s: expected > 0, got {}",

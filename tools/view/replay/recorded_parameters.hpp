@@ -1,4 +1,4 @@
-/// The parameters of a run from its recording, as the run itself published them.
+/// Restores the parameters of a run from its recording.
 #pragma once
 
 #include "common/bus/topics.hpp"
@@ -8,12 +8,12 @@
 namespace sls::view {
 
 struct RecordedParameters {
-  Parameters message;  ///< with what the page needs: no hashes, no limits
+  Parameters message;  ///< only the fields that the page needs
   config::Scenario scenario;
 };
 
-/// From scenario.yaml, manifest.json and the header of state.csv; those of contract 1, whose
-/// manifest has no signals, have no attitude either.
+/// Reads scenario.yaml, manifest.json and the header of state.csv. Recordings of contract 1 have
+/// neither signals in the manifest nor an attitude.
 /// @throws config::ConfigError naming the file; record::DamagedError for the header of state.csv.
 RecordedParameters load_parameters(const record::RecordedFlight& flight);
 

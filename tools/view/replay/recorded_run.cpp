@@ -27,7 +27,7 @@ void append(std::vector<float>& row, const Numbers& numbers) {
   for (const double number : numbers) row.push_back(static_cast<float>(number));
 }
 
-/// The numbers of kColumns, then as many signals.
+/// Fills `row` with the numbers of kColumns, then with `signals` signals.
 void fill_row(std::vector<float>& row, const record::StepRows& rows, std::size_t signals) {
   const record::StateRow& state = *rows.state;
   const PlantState& plant = state.plant;
@@ -50,10 +50,10 @@ void fill_row(std::vector<float>& row, const record::StepRows& rows, std::size_t
   else
     row.resize(row.size() + 3, kNone);
   append(row, plant.signals());
-  row.resize(kColumns.size() + signals, kNone);  // a segment of another plant may have others
+  row.resize(kColumns.size() + signals, kNone);  // another plant in a segment may have others
 }
 
-/// All in one pass over the files.
+/// Reads rows and events in one pass over the files.
 void read_rows(const record::RecordedFlight& flight, std::size_t signals, KeptRows& kept,
                RowEvents& events) {
   record::StepReader reader(flight);
@@ -99,7 +99,7 @@ Json describe_stages(const RowEvents& events) {
   return list;
 }
 
-/// With the planned path to 0.1 mm: else its digits are half of a small page.
+/// Rounds the planned path to 0.1 mm; otherwise its digits take half of a small page.
 Json describe_flight(const Parameters& parameters) {
   Json run = Json::parse(describe_run(parameters));
   for (Json& point : run.at("path_m"))
@@ -117,7 +117,7 @@ std::string name_of(const fs::path& folder) {
   return (absolute.has_filename() ? absolute : absolute.parent_path()).filename().string();
 }
 
-/// With what depends on which rows are kept; the length of the rest does not.
+/// Completes `json` with the fields that depend on the rows kept, and returns the head of the file.
 std::string make_head(Json& json, const KeptRows& kept) {
   json["every"] = kept.every();
   json["steps_total"] = kept.steps_total();
@@ -162,7 +162,8 @@ std::string load_recorded_run(const fs::path& folder, std::size_t most_bytes) {
   json["faults"] = describe_faults(scenario, events, kept.last_time_s());
   json["stage_starts"] = describe_stages(events);
 
-  // Numbers of rows have fewer digits after thinning, `every` has a few more.
+  // After thinning the numbers of rows have fewer digits, and `every` has a few more: 64 bytes of
+  // reserve.
   const std::size_t head_bytes = make_head(json, kept).size() + 64;
   if (head_bytes > most_bytes || !kept.fit(most_bytes - head_bytes))
     throw config::ConfigError(

@@ -1,4 +1,4 @@
-/// A recording as the page replays it.
+/// A recording in the format that the page replays.
 #pragma once
 
 #include <cstddef>
@@ -7,12 +7,13 @@
 
 namespace sls::view {
 
-/// Largest answer of sls_view for a recording: has more steps than a slider or a plot has pixels.
+/// Largest answer of sls_view for a recording. It holds more steps than a slider or a plot has
+/// pixels.
 inline constexpr std::size_t kMostServedBytes = 48 << 20;
 
-/// The bytes of GET /recording/0 and of the report's scene; README.md describes their format. Steps
-/// are left out, every k-th kept and the first and last one too, so that at most `most_bytes`
-/// result. Recordings of contract 1 open, too.
+/// The bytes of GET /recording/0 and of the report's scene; README.md describes their format. To
+/// keep to `most_bytes`, only every k-th step and the first and last one are kept. Recordings of
+/// contract 1 can be opened, too.
 /// @throws config::ConfigError: no recording, or its first and last steps alone are longer than
 ///   `most_bytes`.
 /// @throws record::DamagedError naming file and line.

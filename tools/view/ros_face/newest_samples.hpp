@@ -1,4 +1,4 @@
-/// The newest state of each vehicle, out of batches of sls/record that are decoded only as far as
+/// Takes the newest state of each vehicle from batches of sls/record; decodes only as many as
 /// needed. No network here.
 #pragma once
 
@@ -17,10 +17,10 @@ using Bytes = std::shared_ptr<const std::vector<std::uint8_t>>;
 
 class NewestSamples {
  public:
-  /// Of the run and the vehicles of `parameters`.
+  /// For the run and the vehicles of `parameters`.
   explicit NewestSamples(const Parameters& parameters);
 
-  /// The newest sample of each vehicle that has a newer one than last time, by ascending id.
+  /// The newest sample of each vehicle that has a newer one than at the last call, by ascending id.
   /// `batches`: samples of sls/record as they came, oldest first.
   std::vector<ros::VehicleSample> take(const std::deque<Bytes>& batches);
 
@@ -29,7 +29,7 @@ class NewestSamples {
 
   std::uint64_t run_id_;
   std::int64_t period_ns_;
-  std::map<std::uint32_t, std::uint64_t> next_steps_;  // by vehicle; older ones are no news
+  std::map<std::uint32_t, std::uint64_t> next_steps_;  // by vehicle; older steps are ignored
 };
 
 }  // namespace sls::view

@@ -20,10 +20,11 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Between two messages of a vehicle, whatever the speed of the flight.
+/// Least time between two messages of a vehicle, for any speed of the flight.
 constexpr auto kPeriod = std::chrono::milliseconds(10);
 
-/// Batches that wait to be decoded; beyond, the oldest are dropped. Several steps of 256 vehicles.
+/// Most batches that wait to be decoded: several steps of 256 vehicles. Beyond it the oldest are
+/// dropped.
 constexpr std::size_t kMostBatches = 256;
 
 }  // namespace
@@ -68,7 +69,7 @@ struct RosFace::Impl : Feed::Listener {
     changed.notify_one();
   }
 
-  // --- on our own: writers take their time, and the browsers shall not wait for them ---
+  // --- on `thread`: writing takes time, and the browsers must not wait for it ---
 
   void work() {
     try {
@@ -110,13 +111,13 @@ struct RosFace::Impl : Feed::Listener {
   }
 
   Feed& feed;
-  std::uint64_t run_id = 0;             // of the server's thread
-  Publications publications;            // of our own, once it runs
+  std::uint64_t run_id = 0;             // used by the server's thread only
+  Publications publications;            // used by `thread` only, once it runs
   std::optional<NewestSamples> newest;  // likewise
-  std::mutex mutex;                     // over what follows
+  std::mutex mutex;                     // protects the members below
   std::condition_variable changed;
   bool is_ending = false;
-  std::optional<Parameters> new_run;  // whose vehicles have no writers yet
+  std::optional<Parameters> new_run;  // its vehicles have no writers yet
   std::deque<Bytes> batches;
   std::thread thread;
 };

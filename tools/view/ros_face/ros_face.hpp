@@ -1,5 +1,5 @@
-/// `sls_view --ros`: the mirrors of common/ros on rt/… topics, over UDP. It writes, and reads
-/// nothing of ROS: no topic or service of ROS moves a flight.
+/// `sls_view --ros`: the mirrors of common/ros on rt/… topics, over UDP. It only writes: no topic
+/// or service of ROS affects a flight.
 #pragma once
 
 #include <memory>

@@ -108,7 +108,7 @@ bool is_own_host(const Authority& host, const std::string& listened) {
 
 // --- origins -------------------------------------------------------------------------------------
 
-/// SCHEME://HOST[:PORT]; of a scheme other than http and https only the text counts.
+/// SCHEME://HOST[:PORT]. For a scheme other than http and https only the text is compared.
 struct Origin {
   std::string text;  ///< lower case
   std::optional<Authority> authority;
@@ -127,7 +127,7 @@ std::optional<Origin> parse_origin(std::string_view text) {
   return origin;
 }
 
-/// The same host and port; where a port is left out, it is the scheme's.
+/// True for the same host and port. A missing port is the default port of the scheme.
 bool is_at(const Origin& origin, const Authority& host, std::uint16_t default_port) {
   const Authority& page = *origin.authority;
   const bool is_same_host = page.ip || host.ip ? page.ip == host.ip : page.host == host.host;
@@ -188,7 +188,8 @@ class File {
       fmt::format("--token-file: {}: expected {}, got {}", path, expected, got));
 }
 
-/// The file's first line; of a longer one so much that it is seen to be too long.
+/// The file's first line. A line that is too long is cut, but only after the limit, so that the
+/// caller detects it.
 std::string read_first_line(const std::string& path) {
   const File file(path);
   if (file.descriptor() < 0) fail_token(path, "a file that can be read", std::strerror(errno));
@@ -238,7 +239,8 @@ Access judge(const RequestOrigin& request, const AccessOptions& options) {
 }
 
 bool is_same_token(std::string_view given, std::string_view expected) {
-  // Digests have one length, and their first difference says nothing about the token's.
+  // Digests have one length, and the place of their first difference gives no information about the
+  // tokens.
   config::Sha256 given_hash;
   config::Sha256 expected_hash;
   given_hash.add(given);

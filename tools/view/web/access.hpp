@@ -9,10 +9,10 @@
 namespace sls::view {
 
 struct AccessOptions {
-  std::string address = "127.0.0.1";  ///< listened on
+  std::string address = "127.0.0.1";  ///< address of the listening socket
   std::optional<std::string> token;   ///< from --token-file
   bool is_read_only = false;
-  std::vector<std::string> allowed_origins;  ///< --allow-origin: foreign pages that may look
+  std::vector<std::string> allowed_origins;  ///< --allow-origin: foreign pages that may view
 };
 
 /// A request's headers that identify its sender.
@@ -25,7 +25,8 @@ struct RequestOrigin {
 struct Access {
   bool may_look = false;
   bool may_operate = false;
-  /// Why not: of looking, the text of the 403; of operating, what the page shows.
+  /// Reason of a refusal: of viewing, the text of the answer 403; of operating, the text on the
+  /// page.
   std::string reason;
 };
 
@@ -33,14 +34,14 @@ struct Access {
 /// --allow-origin is SCHEME://HOST[:PORT], never `null`.
 void check(const AccessOptions& options);
 
-/// Host must be the address listened on (any IP address where that is 0.0.0.0 or ::), localhost or
-/// a loopback address, with any port (else a page of a foreign name could reach us: DNS
-/// rebinding); Origin, where there is one, the same or an allowed one. The same is the same host
-/// and port as in Host. Operating needs, where a token is set, that token. A token must be set for
-/// an address that is not loopback, and for an allowed page to operate.
+/// Host must be localhost, a loopback address, or the address of the listening socket (any IP
+/// address if that is 0.0.0.0 or ::), with any port. Otherwise a page of a foreign name could reach
+/// us (DNS rebinding). Origin, if present, must have the host and port of Host, or be an allowed
+/// one. If a token is set, operating requires it. A token must be set for an address that is not
+/// loopback, and for an allowed page to operate.
 Access judge(const RequestOrigin& request, const AccessOptions& options);
 
-/// In time that does not depend on where they differ.
+/// Compares in a time that does not depend on the place of the first difference.
 bool is_same_token(std::string_view given, std::string_view expected);
 
 /// The token of --token-file: its first line. @throws config::ConfigError: expected a file of mode

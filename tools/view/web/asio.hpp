@@ -20,7 +20,7 @@ namespace websocket = boost::beast::websocket;
 using Tcp = net::ip::tcp;
 using Error = boost::system::error_code;
 
-/// All with the one executor there is: a type-erased one costs an allocation per operation.
+/// All types use this executor, because a type-erased one costs an allocation per operation.
 using Executor = net::io_context::executor_type;
 using Socket = net::basic_stream_socket<Tcp, Executor>;
 using Timer = net::basic_waitable_timer<std::chrono::steady_clock,

@@ -1,5 +1,5 @@
-/// The server as a WebSocket protocol sees it: connections to send on, sessions to be called.
-/// Everything here happens on the server's one thread.
+/// Interface between the server and a WebSocket protocol: the protocol sends on connections, the
+/// server calls sessions. All functions run on the server's thread.
 #pragma once
 
 #include <cstdint>
@@ -20,35 +20,35 @@ enum class MessageKind { kText, kBinary };
 enum class Delivery {
   kAlways,    ///< the connection is closed if its queue is full
   kNewest,    ///< replaces a queued message of the same `key` that is not being sent yet
-  kDroppable  ///< of the queued droppable messages the oldest goes first, and is counted
+  kDroppable  ///< if the queue is full, the oldest droppable message is dropped and counted
 };
 
 class Connection {
  public:
   virtual ~Connection() = default;
 
-  /// Queues a message; never blocks. `key`: of kNewest alone.
+  /// Queues a message; never blocks. `key`: for kNewest only.
   virtual void send(MessageKind kind, Payload payload, Delivery delivery,
                     std::uint64_t key = 0) = 0;
 
-  /// Bytes queued and not handed to the system yet.
+  /// Bytes queued and not passed to the system yet.
   virtual std::size_t queued_bytes() const = 0;
-  /// Messages dropped or replaced since the beginning.
+  /// Messages dropped or replaced so far.
   virtual std::uint64_t dropped() const = 0;
 
-  /// True if this connection may operate a flight (web/access.hpp); `why_not` says in words why
+  /// True if this connection may operate a flight (web/access.hpp). `why_not` gives the reason if
   /// not: "expected a token", "started with --read-only".
   virtual bool may_operate() const = 0;
   virtual std::string why_not() const = 0;
 
-  /// Gives the token that a page was opened with; true if it is right.
+  /// Checks the token with which a page was opened; true if it is correct.
   virtual bool authenticate(std::string_view token) = 0;
 
-  /// Closes with a WebSocket close code (1008: policy) and reason, after what is queued.
+  /// Sends the queued messages, then closes with a WebSocket close code (1008: policy) and reason.
   virtual void close(std::uint16_t code, const std::string& reason) = 0;
 };
 
-/// One client's end of a protocol; lives as long as its connection.
+/// The protocol's part for one client; lives as long as its connection.
 class Session {
  public:
   virtual ~Session() = default;

@@ -44,12 +44,12 @@ void GatheringStream::State::note_flushed(Error result) {
     flush();
   else
     flush_soon();
-  // Either may end this stream: the rest touches only what `state` of the caller keeps alive.
+  // Both handlers may destroy this stream. `state` of the caller keeps the members used here alive.
   if (writer.has_value()) writer.invoke();
   if (leaving_bytes == 0 && gathered.empty() && drainer.has_value()) drainer.invoke();
 }
 
-/// Never within the call that started the operation.
+/// Posts the handler, because it must not run within the call that started the operation.
 void GatheringStream::State::invoke(beast::saved_handler& handler) {
   if (!handler.has_value()) return;
   net::post(socket.get_executor(),
@@ -62,7 +62,8 @@ void GatheringStream::State::close() {
   socket.close(ignored);
   flush_timer.cancel();
   gathered.clear();
-  // Moved out, because handlers hold what holds this: they would keep each other alive.
+  // Moves the handlers out: they hold the stream that holds this state, and each would keep the
+  // other alive.
   invoke(writer);
   invoke(drainer);
 }

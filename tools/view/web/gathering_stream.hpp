@@ -1,4 +1,4 @@
-/// The TCP socket under a WebSocket: gathers frames, so that many go out by one system call.
+/// The TCP socket under a WebSocket: gathers frames, so that one system call sends many.
 #pragma once
 
 #include <algorithm>
@@ -17,9 +17,10 @@
 
 namespace sls::view {
 
-/// An AsyncStream whose writes are done once their bytes are copied. They leave at once where
-/// nothing has left for a millisecond, else after that millisecond or once kMostGathered bytes are
-/// there. Writes wait while so many are there and as many more are with the system.
+/// An AsyncStream whose writes are complete once their bytes are copied. Bytes are sent at once if
+/// nothing was sent in the last millisecond; otherwise after that millisecond, or once there are
+/// kMostGathered of them. Writes wait while kMostGathered bytes are gathered and an earlier block
+/// is still being written.
 class GatheringStream {
  public:
   using executor_type = Executor;
@@ -35,9 +36,9 @@ class GatheringStream {
   next_layer_type& next_layer() noexcept { return state_->socket; }
   const next_layer_type& next_layer() const noexcept { return state_->socket; }
 
-  /// Bytes that the system does not have yet.
+  /// Bytes that the system has not accepted yet.
   std::size_t pending_bytes() const { return state_->gathered.size() + state_->leaving_bytes; }
-  /// Closes the socket; what waits ends with operation_aborted.
+  /// Closes the socket; waiting operations end with operation_aborted.
   void close() { state_->close(); }
 
   template <class Buffers, class Handler>
@@ -54,7 +55,7 @@ class GatheringStream {
         handler, buffers);
   }
 
-  /// Beast's: shuts the connection down, here after everything has left.
+  /// Customisation point of Beast: shuts the connection down, here after all bytes are sent.
   template <class Handler>
   friend void async_teardown(beast::role_type role, GatheringStream& stream, Handler&& handler) {
     const std::shared_ptr<State> state = stream.state_;
@@ -66,7 +67,7 @@ class GatheringStream {
  private:
   static constexpr std::size_t kMostGathered = 32 * 1024;
 
-  /// Lives as long as an operation on the socket.
+  /// Lives as long as the stream and every operation on the socket.
   struct State : std::enable_shared_from_this<State> {
     explicit State(Socket opened) : socket(std::move(opened)), flush_timer(socket.get_executor()) {}
 
@@ -83,13 +84,13 @@ class GatheringStream {
     Socket socket;
     Timer flush_timer;
     std::string gathered;
-    std::string leaving;  ///< with the system
+    std::string leaving;  ///< being written to the socket
     std::size_t leaving_bytes = 0;
     std::chrono::steady_clock::time_point last_flush;
     bool is_timer_set = false;
     Error error;
     beast::saved_handler writer;   ///< waits for room
-    beast::saved_handler drainer;  ///< waits until everything has left
+    beast::saved_handler drainer;  ///< waits until all bytes are sent
   };
 
   std::shared_ptr<State> state_;
@@ -102,7 +103,7 @@ void GatheringStream::State::write(const Buffers& buffers, Handler handler) {
               beast::bind_front_handler(std::move(handler), error, std::size_t{0}));
     return;
   }
-  const std::size_t before = gathered.size();  // below kMostGathered: else a writer waits
+  const std::size_t before = gathered.size();  // below kMostGathered: otherwise a writer waits
   const std::size_t count = std::min(net::buffer_size(buffers), kMostGathered - before);
   gathered.resize(before + count);
   net::buffer_copy(net::buffer(gathered.data() + before, count), buffers);

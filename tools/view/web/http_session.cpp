@@ -17,23 +17,23 @@
 namespace sls::view {
 namespace {
 
-/// A client must take an answer at least so fast, beside the time for a request.
+/// Least speed at which a client must take an answer, in addition to the time for a request.
 constexpr double kLeastBytesPerSecond = 64 * 1024;
 
-/// After an error: what the client still sends is read so long and so much, because an answer is
-/// lost where its connection is closed with bytes unread.
+/// After an error the rest of the client's data is read for this time and up to this size. If a
+/// connection is closed with unread bytes, its answer is lost.
 constexpr double kLingerTime = 1;
 constexpr std::size_t kMostDiscarded = 256 * 1024;
 
 std::string_view to_view(beast::string_view text) { return {text.data(), text.size()}; }
 
-/// A protocol and the name of it that both sides know.
+/// A protocol and the name that both sides use for it.
 struct Choice {
   const Protocol* protocol;
   std::string name;
 };
 
-/// In exactly this case: a browser compares the name that comes back.
+/// Upper and lower case must match, because a browser compares the name that it gets back.
 template <class Request>
 bool has_subprotocol(const Request& request, const std::string& name) {
   const auto fields = request.equal_range(http::field::sec_websocket_protocol);
@@ -65,7 +65,7 @@ void set_common_fields(Response& response) {
   response.set(http::field::cache_control, "no-store");
   response.set("X-Content-Type-Options", "nosniff");
   response.set("Referrer-Policy", "no-referrer");
-  // No other page may show ours in a frame, where its buttons could be clicked unseen.
+  // No other page may show ours in a frame: a user could click its buttons without seeing them.
   response.set("X-Frame-Options", "DENY");
   response.set("Cross-Origin-Resource-Policy", "same-origin");
 }
@@ -85,7 +85,7 @@ void HttpSession::drop() {
   hub_.remove(this);
 }
 
-/// Pending reads and writes then end with an error.
+/// At the deadline pending reads and writes end with an error.
 void HttpSession::set_deadline(double seconds) {
   deadline_.expires_after(to_duration(seconds));
   deadline_.async_wait([self = weak_from_this()](Error) {

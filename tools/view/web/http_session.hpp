@@ -1,4 +1,4 @@
-/// HTTP of one connection: resources from memory, errors, the way to a WebSocket.
+/// HTTP of one connection: resources from memory, errors, upgrade to a WebSocket.
 #pragma once
 
 #include <boost/beast/core/flat_buffer.hpp>

@@ -13,13 +13,13 @@ namespace {
 
 constexpr std::chrono::seconds kWarningInterval(10);
 
-/// Bytes in the system's buffer that have not left: what waits there can no longer be replaced by
-/// something newer, and costs memory for a client that does not read.
+/// Limit of unsent bytes in the system's buffer. Messages there can no longer be replaced by newer
+/// ones, and they take memory for a client that does not read.
 constexpr int kMostUnsent = 64 * 1024;
 
 void set_options(Socket& socket) {
   using UnsentLimit = net::detail::socket_option::integer<IPPROTO_TCP, TCP_NOTSENT_LOWAT>;
-  Error ignored;  // without them it is slower
+  Error ignored;  // without these options it is only slower
   socket.set_option(Tcp::no_delay(true), ignored);
   socket.set_option(UnsentLimit(kMostUnsent), ignored);
 }

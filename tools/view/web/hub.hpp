@@ -1,4 +1,4 @@
-/// Shared by the connections of one server. All on the server's thread except the counter.
+/// Shared by the connections of one server. Used on the server's thread only, except `websockets`.
 #pragma once
 
 #include <atomic>
@@ -14,11 +14,11 @@
 
 namespace sls::view {
 
-/// A TCP connection that is served.
+/// A TCP connection to a client.
 class Client {
  public:
   virtual ~Client() = default;
-  /// The server ends: says so where the protocol can.
+  /// Called when the server ends; tells the client if the protocol can.
   virtual void shut_down() = 0;
   /// Closes the socket and ends the session.
   virtual void drop() = 0;
@@ -29,7 +29,7 @@ class Hub {
   Hub(const AccessOptions& access_options, const ServerLimits& server_limits)
       : access(access_options), limits(server_limits) {}
 
-  /// First, so that it goes last: its handlers hold connections.
+  /// First member, so that it is destroyed last: its handlers hold connections.
   net::io_context io{1};
   const AccessOptions access;
   const ServerLimits limits;
@@ -37,13 +37,13 @@ class Hub {
   std::vector<Protocol> protocols;
   std::atomic<std::size_t> websockets{0};
 
-  /// Serves a connection that was accepted; beyond limits.connections it is closed.
+  /// Serves an accepted connection; closes it if there are limits.connections already.
   void adopt(Socket socket);
   void add(std::shared_ptr<Client> client);
   void remove(Client* client);
   std::size_t count_clients() const { return clients_.size(); }
 
-  /// Logs what clients cause, at most every 10 s: they must not fill the log.
+  /// Logs a problem of a client, at most every 10 s, because clients must not fill the log.
   void warn(const std::string& text);
 
   /// Shuts all down and calls `done` once they have ended.

@@ -26,7 +26,7 @@ std::optional<std::string> decode_percent(std::string_view text) {
   return decoded;
 }
 
-/// The value of the first parameter `name`, as it came.
+/// The value of the first parameter `name`, not decoded.
 std::optional<std::string_view> find_parameter(std::string_view query, std::string_view name) {
   while (!query.empty()) {
     const std::string_view parameter = query.substr(0, query.find('&'));

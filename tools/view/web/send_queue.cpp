@@ -24,9 +24,9 @@ bool SendQueue::push(MessageKind kind, Payload payload, Delivery delivery, std::
   return true;
 }
 
-/// Puts a kNewest message where an older one of its key waits: a stream that is faster than its
-/// client does not push its own message to the end again and again. True if there was one; it
-/// stays where the new one does not fit.
+/// Puts a kNewest message in the place of an older one with its key. A stream that is faster than
+/// its client thus keeps its place in the queue. True if there was an older one; it stays if the
+/// new one does not fit.
 bool SendQueue::replace(const QueuedMessage& message) {
   const auto found = newest_.find(message.key);
   if (found == newest_.end()) return false;
@@ -40,7 +40,7 @@ bool SendQueue::replace(const QueuedMessage& message) {
   return true;
 }
 
-/// Drops droppable messages until so many bytes fit; none if they never would.
+/// Drops droppable messages until `payload_bytes` fit; drops none if they exceed the capacity.
 bool SendQueue::make_room(std::size_t payload_bytes) {
   if (payload_bytes > capacity_) return false;
   while (!fits(payload_bytes))
@@ -61,10 +61,10 @@ bool SendQueue::drop_oldest() {
   return true;
 }
 
-/// Takes a message that goes out of the lists that name it.
+/// Removes a message that leaves the queue from the lists that refer to it.
 void SendQueue::forget(Place place) {
   bytes_ -= place->payload->size();
-  // Of the droppable ones the oldest always goes first.
+  // Droppable messages leave in order, the oldest first.
   if (place->delivery == Delivery::kDroppable) droppable_.pop_front();
   if (place->delivery == Delivery::kNewest) newest_.erase(place->key);
 }

@@ -16,23 +16,23 @@ struct QueuedMessage {
   MessageKind kind;
   Payload payload;
   Delivery delivery;
-  std::uint64_t key;  ///< of kNewest
+  std::uint64_t key;  ///< for kNewest only
 };
 
 class SendQueue {
  public:
-  /// `capacity`: bytes of the messages, with what each costs beside its payload.
+  /// `capacity`: bytes of the messages, including the overhead of each beside its payload.
   explicit SendQueue(std::size_t capacity) : capacity_(capacity) {}
 
   /// False if a kAlways message does not fit, even without the droppable ones. A kNewest or
-  /// kDroppable message that does not fit so is left out.
+  /// kDroppable message that does not fit then is dropped.
   bool push(MessageKind kind, Payload payload, Delivery delivery, std::uint64_t key);
 
   std::optional<QueuedMessage> pop();
   void clear();
 
   std::size_t bytes() const { return bytes_; }  ///< of payloads
-  /// Messages left out or replaced.
+  /// Messages dropped or replaced.
   std::uint64_t dropped() const { return dropped_; }
 
  private:

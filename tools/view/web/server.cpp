@@ -18,10 +18,10 @@
 namespace sls::view {
 namespace {
 
-/// Without file descriptors left, so long until the next try.
+/// Time until the next try if no file descriptors are left.
 constexpr std::chrono::milliseconds kAcceptPause(100);
 
-/// Connections that do not answer the close frame of `stop` are cut after it.
+/// Connections that do not answer the close frame of `stop` within this time are cut.
 constexpr std::chrono::seconds kStopPatience(1);
 
 AccessOptions with_address(AccessOptions options, const std::string& address) {
@@ -97,7 +97,7 @@ void Server::Impl::note_accepted(Error error, Socket socket) {
   if (is_stopping) return;
   if (!error) hub.adopt(std::move(socket));
   if (!error || error == net::error::connection_aborted) return accept();
-  // No descriptors or no memory: the connection waits with the system until some are free.
+  // No descriptors or no memory are left: the connection waits in the system's queue.
   accept_timer.expires_after(kAcceptPause);
   accept_timer.async_wait([this](Error) {
     if (!is_stopping) accept();

@@ -1,5 +1,5 @@
-/// The one port of sls_view: serves files from memory and WebSocket protocols, by Boost.Beast, on
-/// one thread.
+/// The server of sls_view: files from memory and WebSocket protocols on one port, by Boost.Beast,
+/// on one thread.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,7 @@
 
 namespace sls::view {
 
-/// The answer of a path: bytes that do not change while the server runs.
+/// The answer for a path: bytes that do not change while the server runs.
 struct Resource {
   std::string content_type;      ///< "text/html; charset=utf-8"
   std::string content_encoding;  ///< "gzip", or empty
@@ -23,9 +23,9 @@ struct Resource {
   std::string security_policy;  ///< Content-Security-Policy, or empty
 };
 
-/// Bounds of what one server gives to clients.
+/// Limits of one server for its clients.
 struct ServerLimits {
-  std::size_t connections = 256;          ///< at a time, HTTP and WebSocket; the rest is closed
+  std::size_t connections = 256;          ///< at a time, HTTP and WebSocket; others are closed
   std::size_t request_bytes = 8 * 1024;   ///< header of an HTTP request; bodies are refused
   std::size_t message_bytes = 64 * 1024;  ///< of a WebSocket message from a client
   std::size_t queue_bytes = 8 << 20;      ///< of one connection
@@ -35,16 +35,16 @@ struct ServerLimits {
 
 struct ServerOptions {
   std::string address = "127.0.0.1";
-  std::uint16_t port = 8765;  ///< 0: any that is free
+  std::uint16_t port = 8765;  ///< 0: any free port
   AccessOptions access;
   ServerLimits limits;
 };
 
 class Server {
  public:
-  /// Listens. @throws config::ConfigError "--port: …" where the port is taken, "--listen: …" where
-  /// the address is none of this machine, or needs a token (`check` of access.hpp). Of the two
-  /// addresses in `options` the server's own counts.
+  /// Listens on `options.address`; `options.access.address` is ignored. @throws config::ConfigError
+  /// "--port: …" if the port is in use, "--listen: …" if the address is none of this machine, or
+  /// needs a token (`check` of access.hpp).
   explicit Server(const ServerOptions& options);
   ~Server();
   Server(const Server&) = delete;
@@ -54,21 +54,21 @@ class Server {
   /// "http://127.0.0.1:8765/".
   std::string url() const;
 
-  /// Both before `run`. `path` begins with a slash.
+  /// Call both before `run`. `path` begins with a slash.
   void add_resource(const std::string& path, Resource resource);
   void add_protocol(Protocol protocol);
 
-  /// Calls `task` on the server's thread; from any thread.
+  /// Makes the server's thread call `task`. May be called from any thread.
   void post(std::function<void()> task);
   /// Calls `task` on the server's thread every `period_s`.
   void repeat(double period_s, std::function<void()> task);
 
   /// Serves until `stop`. No session outlives it.
   void run();
-  /// From any thread: closes all connections (1001) and ends `run`.
+  /// Closes all connections (1001) and ends `run`. May be called from any thread.
   void stop();
 
-  /// WebSocket connections there are.
+  /// Number of open WebSocket connections.
   std::size_t count_connections() const;
 
  private:

@@ -8,7 +8,7 @@ namespace {
 
 constexpr int kMostWrongTokens = 5;
 
-/// A client that does not answer a close frame so long, or does not take what is before it, is cut.
+/// A client that does not take the queued messages and answer the close frame in this time is cut.
 constexpr double kCloseTimeout = 5;
 
 /// The longest prefix of UTF-8 text that a close frame holds.

@@ -1,4 +1,4 @@
-/// One WebSocket of a client: its queue, its session, what it may do.
+/// One WebSocket of a client: its queue, its session, its permissions.
 #pragma once
 
 #include <boost/beast/core/flat_buffer.hpp>
@@ -17,7 +17,7 @@
 
 namespace sls::view {
 
-/// Its session is never destroyed within a call of the session's own.
+/// Never destroys its session within a call of that session.
 class WebSocketConnection : public Connection,
                             public Client,
                             public std::enable_shared_from_this<WebSocketConnection> {
