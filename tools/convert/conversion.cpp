@@ -30,7 +30,7 @@ std::string read_text(const fs::path& file) {
   return text.str();
 }
 
-/// The parameters that the recorder had, as far as the file's content depends on them.
+/// Those parameters of the recorder on which the content of the MCAP file depends.
 Parameters load_parameters(const record::RecordedFlight& flight) {
   const record::ManifestFile& manifest = flight.segments.front().manifest;
   constexpr double kMaxPeriodS = 1e6;
@@ -85,7 +85,7 @@ void sync_to_disk(const fs::path& file) {
     throw std::system_error(error, std::generic_category(), file.string() + ": cannot write");
 }
 
-/// Puts the measured row of the step beside the others.
+/// Adds the measured row of the step to `rows`.
 void add_measured(record::RowReader<StateRow>& measured, record::StepRows& rows) {
   for (const StateRow* row = measured.peek(rows.vehicle_id); row && row->step <= rows.step;
        row = measured.peek(rows.vehicle_id)) {
@@ -119,7 +119,7 @@ std::uint64_t write_mcap(const record::RecordedFlight& flight, const fs::path& o
   fs::path part = out;
   part += ".part";
   std::error_code ignored;
-  fs::remove(part, ignored);  // of a conversion that was killed
+  fs::remove(part, ignored);  // left by a conversion that was killed
   try {
     const std::uint64_t messages = write(flight, part);
     sync_to_disk(part);

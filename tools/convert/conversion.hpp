@@ -8,15 +8,15 @@
 
 namespace sls::convert {
 
-/// Where the file goes where the user does not say.
+/// Path of the file if the user does not give one.
 std::filesystem::path make_default_output(const record::RecordedFlight& flight);
 
-/// Converts all segments, joined, into `out`, which appears when it is whole. Returns the number of
-/// messages.
-/// @throws config::ConfigError if `out` exists and `force` does not hold, has no name *.mcap or is
-///   a file that the manifest beside it lists; also for a manifest that cannot be used.
+/// Joins all segments and converts them into `out`. The file appears only when it is complete.
+/// Returns the number of messages.
+/// @throws config::ConfigError if `out` exists and `force` is false, if its name does not end in
+///   .mcap, or if the manifest beside it lists it; also if a manifest cannot be used.
 /// @throws record::DamagedError if the recording cannot be read.
-/// @throws std::system_error naming the file when the disk refuses.
+/// @throws std::system_error naming the file if it cannot be written.
 std::uint64_t write_mcap(const record::RecordedFlight& flight, const std::filesystem::path& out,
                          bool force);
 

@@ -14,15 +14,15 @@ namespace {
 
 using namespace sls;
 
-constexpr const char* kIdentity = "operator";  // whose keys it uses on a secured domain
+constexpr const char* kIdentity = "operator";  // role whose keys it uses on a secured domain
 
-/// @throws app::RunError with the server's reason where it refuses.
+/// @throws app::RunError with the server's reason if it refuses.
 void request(ctl::OperatorClient& client, ControlAction action, std::uint64_t steps) {
   const auto run = client.wait_for_run();
   if (!run) return;  // interrupted
   const auto reply = client.ask(*run, action, steps);
   if (!reply) return;
-  // Steps may also have been begun and cut short.
+  // The server may also have begun the steps and ended them early.
   const char* outcome = action == ACTION_STEP ? "not carried out" : "refused";
   if (!reply->accepted())
     throw app::RunError(fmt::format("{} {} at step {}: {}", ctl::to_string(action), outcome,

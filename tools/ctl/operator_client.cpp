@@ -19,14 +19,14 @@ namespace {
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
-constexpr auto kUsualWait = 1500ms;  // discovery and a server's claim: no news
+constexpr auto kUsualWait = 1500ms;  // usual time of discovery and a server's claim: not reported
 constexpr auto kPollTime = 20ms;
-constexpr auto kLastReplyTime = 1s;  // replies to open requests come around the end of a run
+constexpr auto kLastReplyTime = 1s;  // a reply can arrive shortly after the run has ended
 constexpr std::size_t kMailboxSize = 256;
 constexpr std::size_t kEvents = 3;
 
 std::uint64_t make_request_id() {
-  std::random_device random;  // replies do not say to whom: ids must differ between operators, too
+  std::random_device random;  // replies name no operator: ids must differ between operators, too
   return (static_cast<std::uint64_t>(random()) << 32) | random();
 }
 
@@ -119,7 +119,7 @@ void OperatorClient::note_event(const SimStatus& status) {
   if (events.lines.size() > kEvents) events.lines.pop_front();
 }
 
-// --- asking --------------------------------------------------------------------------------------
+// --- requests ------------------------------------------------------------------------------------
 
 std::optional<SimControlReply> OperatorClient::ask(const bus::Run& run, ControlAction action,
                                                    std::uint64_t steps) {
@@ -183,7 +183,7 @@ void OperatorClient::report_wait(const bus::Run& run, const SimControl& request,
     spdlog::info("waiting for: reply of the server ({:.0f} s left)", wait.seconds_left());
     return;
   }
-  // A paused run's last status says where the steps began.
+  // The status before the request has the step at which the run was paused.
   const auto status = servers_.find_status(request.run_id());
   const std::uint64_t begin = run.status ? run.status->step() : 0;
   const std::uint64_t now = status ? std::max(status->step(), begin) : begin;

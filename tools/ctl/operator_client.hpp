@@ -1,4 +1,4 @@
-/// The operator's end of the domain: finds a run, asks for things, sees what becomes of it.
+/// The operator's access to the domain: finds a run, sends requests, reads replies and status.
 #pragma once
 
 #include <chrono>
@@ -19,13 +19,13 @@
 namespace sls::ctl {
 
 struct ClientOptions {
-  int domain = 0;  ///< of the node, for messages
+  int domain = 0;  ///< domain of the node, for log messages
   std::uint32_t vehicle_id = 0;
-  double timeout_s = 10.0;  ///< for a server to be found, and again for its reply
+  double timeout_s = 10.0;  ///< to find a server, and again for its reply
   bool asks = true;         ///< false: only reads, which the keys of every role allow
 };
 
-/// A stop signal ends every wait early; nothing is returned then.
+/// A stop signal ends every wait early; the function then returns nothing.
 class OperatorClient {
  public:
   OperatorClient(bus::Node& node, const ClientOptions& options);
@@ -34,20 +34,19 @@ class OperatorClient {
   /// @throws app::RunError if there is none in time.
   std::optional<bus::Run> wait_for_run() const;
 
-  /// The same, but a run that has ended will do while there is no other.
+  /// The same, but returns a run that has ended if there is no other.
   std::optional<bus::Run> wait_for_any_run() const;
 
-  /// `run` with its last status; or the vehicle's run that followed it after a reset or the end of
-  /// its server.
+  /// `run` with its last status; after a reset or the end of its server, the vehicle's next run.
   bus::Run refresh(const bus::Run& run) const;
 
-  /// Asks the server of `run` for `action` and waits for its reply; expects `asks`. Steps may take
-  /// as long as they take, as long as the server gives signs of life.
-  /// @throws app::RunError if no reply comes: server gone or deaf, run ended, out of time.
+  /// Requests `action` from the server of `run` and waits for its reply; requires `asks`.
+  /// ACTION_STEP has no timeout as long as the server publishes.
+  /// @throws app::RunError if no reply comes: server gone or not matched, run ended, timeout.
   std::optional<SimControlReply> ask(const bus::Run& run, ControlAction action,
                                      std::uint64_t steps = 0);
 
-  /// The present knowledge of `run`.
+  /// The data of `run` that have arrived so far.
   Snapshot make_snapshot(const bus::Run& run) const;
 
  private:
@@ -60,7 +59,7 @@ class OperatorClient {
     SimControlReply reply;
     bus::PeerId sender;
   };
-  /// sls/control, and sls/control_reply for `replies`.
+  /// Writer of sls/control, and reader of sls/control_reply that fills `replies`.
   struct Channel {
     Channel(bus::Node& node, app::Mailbox<Received>& replies);
     bus::Reader<SimControlReply> reply_reader;
@@ -71,12 +70,13 @@ class OperatorClient {
   std::optional<bus::Run> wait_for(const FindRun& find) const;
   std::optional<bus::Run> find_ended_run() const;
   void note_event(const SimStatus& status);
-  /// False if a stop signal came before the server of `run` could be reached.
+  /// Waits until both endpoints match those of the server of `run`. False if a stop signal came
+  /// first.
   bool wait_until_heard(const bus::Run& run, app::Wait& wait) const;
   void report_wait(const bus::Run& run, const SimControl& request, const app::Wait& wait) const;
 
   const ClientOptions options_;
-  mutable std::mutex events_mutex_;         // they come on a thread of the middleware
+  mutable std::mutex events_mutex_;         // events arrive on a thread of the middleware
   std::map<std::uint64_t, Events> events_;  // by run_id
   bus::ParticipantDirectory participants_;
   bus::ServerDirectory servers_;
@@ -87,7 +87,7 @@ class OperatorClient {
 /// USER@HOST, at most 64 bytes, for sls/control.
 std::string make_operator_name();
 
-/// "pause", "step", … of a request, for messages.
+/// Name of a request for messages: "pause", "step", …
 const char* to_string(ControlAction action);
 
 }  // namespace sls::ctl

@@ -19,7 +19,7 @@ std::string check_timeout(const std::string& text) {
 }
 
 std::string check_steps(const std::string& text) {
-  std::uint64_t steps = 0;  // CLI11 alone takes -1 for a very large number
+  std::uint64_t steps = 0;  // CLI11 alone reads -1 as a very large number
   const char* end = text.data() + text.size();
   const auto [rest, error] = std::from_chars(text.data(), end, steps);
   const bool is_count = error == std::errc() && rest == end && steps >= 1;
@@ -35,12 +35,12 @@ void add_options(CLI::App& cli, Options& options) {
                  "time limit for finding a server, and for its reply, s")
       ->type_name("X")
       ->check(check_timeout);
-  cli.require_subcommand(0, 1);  // not 1: that would hide which word is no command
+  cli.require_subcommand(0, 1);  // with 1 the error would not name the unknown command
   cli.callback([&cli] {
     if (cli.get_subcommands().empty())
       throw CLI::RequiredError("pause, step, resume, start, reset, stop or status");
   });
-  cli.fallthrough();  // the flags above may stand after the subcommand, too
+  cli.fallthrough();  // the flags above may also follow the subcommand
 
   const auto add_action = [&](const char* name, ControlAction action, const char* description) {
     auto* subcommand = cli.add_subcommand(name, description);

@@ -12,11 +12,11 @@ namespace sls::ctl {
 struct Options {
   app::CommonOptions common;
   std::uint32_t vehicle_id = 0;
-  double timeout_s = 10.0;              ///< for a server to be found, and again for its reply
-  std::optional<ControlAction> action;  ///< nothing: show the status
+  double timeout_s = 10.0;              ///< to find a server, and again for its reply
+  std::optional<ControlAction> action;  ///< none: show the status
   std::uint64_t steps = 0;              ///< of ACTION_STEP
-  bool watch = false;                   ///< of the status
-  bool json = false;                    ///< of the status
+  bool watch = false;                   ///< show the status until the run has ended
+  bool json = false;                    ///< print the status as JSON
 };
 
 /// Declares flags and subcommands; `options` must outlive `cli`'s parsing.

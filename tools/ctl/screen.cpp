@@ -8,7 +8,7 @@
 namespace sls::ctl {
 namespace {
 
-// ECMA-48 and the DEC cursor switch, which every terminal of today knows.
+// ECMA-48 and DEC's cursor switch, which all current terminals support.
 constexpr const char* kHideCursor = "\x1b[?25l";
 constexpr const char* kShowCursor = "\x1b[?25h";
 constexpr const char* kClearLine = "\x1b[K";   // from the cursor to the end of its line
@@ -36,11 +36,11 @@ Screen::~Screen() { out_ << kShowCursor << std::flush; }
 void Screen::draw(const std::vector<std::string>& lines, const ScreenSize& size) {
   std::string text;
   const bool is_resized = size.columns != size_.columns || size.rows != size_.rows;
-  if (rows_drawn_ > 0 && is_resized)  // the terminal has wrapped and moved what was drawn
+  if (rows_drawn_ > 0 && is_resized)  // the terminal has wrapped and moved the old lines
     text += kClearAll;
   else if (rows_drawn_ > 0)
     text += "\x1b[" + std::to_string(rows_drawn_) + "A";
-  // One row is the cursor's, below the last line.
+  // The cursor takes one row, below the last line.
   rows_drawn_ = std::min(lines.size(), std::max<std::size_t>(size.rows, 2) - 1);
   size_ = size;
   for (std::size_t i = 0; i < rows_drawn_; ++i) text += "\r" + lines[i] + kClearLine + "\n";

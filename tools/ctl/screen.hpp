@@ -16,11 +16,11 @@ struct ScreenSize {
 /// True if standard output is a terminal.
 bool is_terminal();
 
-/// That terminal's size; the default where it does not say.
+/// Size of that terminal; the default values if it reports none.
 ScreenSize find_screen_size();
 
-/// Draws lines in place: each drawing replaces the one before, in one piece and without clearing
-/// first, so that nothing flickers. The last one stays. The cursor is hidden meanwhile.
+/// Draws lines in place and hides the cursor. Each drawing replaces the one before in a single
+/// write, without clearing first, to avoid flicker. The last drawing stays.
 class Screen {
  public:
   explicit Screen(std::ostream& out);
@@ -34,7 +34,7 @@ class Screen {
  private:
   std::ostream& out_;
   ScreenSize size_{0, 0};       // at the last drawing
-  std::size_t rows_drawn_ = 0;  // then
+  std::size_t rows_drawn_ = 0;  // at the last drawing
 };
 
 }  // namespace sls::ctl

@@ -20,8 +20,9 @@ using Clock = std::chrono::steady_clock;
 constexpr auto kPollTime = 20ms;
 constexpr auto kRedrawTime = 250ms;
 constexpr auto kLineTime = 1s;
-constexpr auto kDiscoveryTime = 400ms;  // participants are found about when their server is
-constexpr auto kFreshTime = 1500ms;     // a server that is well says something within 0.5 s
+/// Discovery finds the participants of a run about as soon as their server.
+constexpr auto kDiscoveryTime = 400ms;
+constexpr auto kFreshTime = 1500ms;  // a healthy server publishes every 0.5 s
 constexpr std::size_t kFileColumns = 160;
 
 void check_written(const std::ostream& out) {
@@ -30,7 +31,8 @@ void check_written(const std::ostream& out) {
 
 bool is_interrupted() { return app::stop_signal() != 0; }
 
-/// `run` with a status that is not just what the server left for late joiners, if one comes.
+/// `run` with a status published after discovery, if one comes within kFreshTime; otherwise with
+/// the status that the server keeps for late joiners.
 bus::Run wait_for_fresh_status(const OperatorClient& client, bus::Run run) {
   const auto began = Clock::now();
   std::optional<std::uint64_t> left;  // sample_index when discovery was over
@@ -60,7 +62,7 @@ void show_once(const OperatorClient& client, const ShowOptions& options, bus::Ru
   check_written(out);
 }
 
-/// Writes one line when something has changed and when it is time.
+/// Writes one line at each change, and at least every kLineTime.
 class LineWriter {
  public:
   LineWriter(std::ostream& out, bool json) : out_(out), json_(json) {}
@@ -73,7 +75,8 @@ class LineWriter {
   }
 
  private:
-  /// Another run, phase, problem or reason; that a reason is not repeated is none.
+  /// True for another run, phase, problem or reason. An empty reason is no change, because each
+  /// reason is published once.
   bool is_news(const Snapshot& snapshot) {
     const std::uint64_t run_id = snapshot.parameters.run_id();
     std::string reason = snapshot.status ? snapshot.status->reason().to_string() : "";
@@ -98,7 +101,7 @@ class LineWriter {
   Clock::time_point last_time_;
 };
 
-/// Redraws the view at its own pace, and once more at the end.
+/// Redraws the view every kRedrawTime, and once more at the end.
 class ViewWriter {
  public:
   explicit ViewWriter(std::ostream& out) : screen_(out) {}

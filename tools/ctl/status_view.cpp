@@ -17,12 +17,12 @@ namespace {
 
 // --- text of a given width -----------------------------------------------------------------------
 
-/// One character as it shows on a terminal, in UTF-8.
+/// One character on the terminal, in UTF-8.
 using Cell = std::string;
 using Cells = std::vector<Cell>;
 
-/// The characters of `text`, which may come from anybody: what a terminal would obey, and what is
-/// not UTF-8, becomes a question mark.
+/// The characters of `text`, which any participant may have sent. Control characters and bytes that
+/// are not UTF-8 become question marks.
 Cells to_cells(const std::string& text) {
   const auto is_continuation = [&](std::size_t i) {
     return i < text.size() && (static_cast<unsigned char>(text[i]) & 0xc0) == 0x80;
@@ -71,7 +71,7 @@ std::string pad(const std::string& text, std::size_t width) {
 
 constexpr std::size_t kLabelWidth = 12;
 
-/// `label` and beside it `fields`, in as many lines as it takes.
+/// Adds `label` and beside it `fields`, in as many lines as needed.
 void add_fields(std::vector<std::string>& lines, std::size_t columns, const std::string& label,
                 const std::vector<std::string>& fields, const std::string& separator = "   ") {
   std::string line = pad(label, kLabelWidth);
@@ -101,14 +101,14 @@ void add_text(std::vector<std::string>& lines, std::size_t columns, const std::s
   add_fields(lines, columns, label, words, " ");
 }
 
-// --- what there is to say ------------------------------------------------------------------------
+// --- texts of the status -------------------------------------------------------------------------
 
 std::string find_scenario_name(const Parameters& parameters) {
   try {
     const auto root = config::parse_yaml(parameters.scenario_text().to_string(), "scenario");
     for (std::size_t i = 0; i < root.keys.size(); ++i)
       if (root.keys[i].text == "name" && !root.items[i].text.empty()) return root.items[i].text;
-  } catch (const config::ConfigError&) {  // of another version, perhaps
+  } catch (const config::ConfigError&) {  // perhaps of another version
   }
   return "unnamed scenario";
 }
@@ -127,7 +127,7 @@ std::string describe_phase(const SimStatus& status) {
   return bus::to_string(status.phase()) + (reason.empty() ? "" : ": " + reason);
 }
 
-/// Empty while the server is heard, and after the end, when nothing more is expected of it.
+/// Empty while the server publishes, and after the end, when no more status is expected.
 std::string describe_silence(const Snapshot& snapshot) {
   if (has_ended(snapshot.status) || snapshot.silence_s < kLongSilence) return "";
   return fmt::format("server {}silent for {:.1f} s", snapshot.server_is_gone ? "gone, " : "",
@@ -197,7 +197,7 @@ std::string describe_last_step(const Participant& participant) {
                                               : std::to_string(participant.last_complete_step());
 }
 
-/// A reason stands in one status only; the ones before it are still news.
+/// Adds the last reasons. Leaves out the newest if the line "phase" already shows it.
 void add_events(std::vector<std::string>& lines, std::size_t columns, const Snapshot& snapshot) {
   const std::string present =
       snapshot.status ? snapshot.status->reason().to_string() : std::string();
@@ -225,7 +225,7 @@ std::vector<TableRow> make_table(const std::vector<Participant>& participants) {
   return table;
 }
 
-/// Widths that hold everything, or, where `columns` are too few, shorten names and hosts.
+/// Widths that hold every text. If the row is longer than `columns`, names and hosts are shortened.
 std::array<std::size_t, kTableColumns> calc_widths(const std::vector<TableRow>& table,
                                                    std::size_t columns) {
   constexpr std::size_t kName = 1, kHost = 2, kShortest = 6, kGap = 2;
@@ -345,7 +345,7 @@ std::string to_json(const Snapshot& snapshot) {
   json["period_ns"] = parameters.period_ns();
   json["server_silent_s"] = snapshot.silence_s;
   json["server_is_gone"] = snapshot.server_is_gone;
-  // Lockstep goes as fast as it goes: nothing is wanted.
+  // Lockstep has no target.
   json["real_time_factor_wanted"] =
       parameters.mode() == MODE_REALTIME ? Json(parameters.real_time_factor()) : Json();
   if (snapshot.status) {

@@ -22,19 +22,19 @@ struct Snapshot {
   bool server_is_gone = false;
 };
 
-/// Silence from which on a server that publishes every 0.5 s is worth a line.
+/// A longer silence is shown. The server publishes every 0.5 s.
 inline constexpr double kLongSilence = 1.0;  // s
 
 /// True if no more status will come: finished or failed. A reset run has a successor.
 bool has_ended(const std::optional<SimStatus>& status);
 
-/// The whole of it, for people; no line is longer than `columns` characters.
+/// The whole snapshot as lines to read; no line is longer than `columns` characters.
 std::vector<std::string> render(const Snapshot& snapshot, std::size_t columns);
 
-/// The essence in one line.
+/// The main values in one line.
 std::string render_line(const Snapshot& snapshot);
 
-/// The whole of it as a JSON object in one line; run_id is a string of 16 hex digits.
+/// The whole snapshot as a JSON object in one line; run_id is a string of 16 hex digits.
 std::string to_json(const Snapshot& snapshot);
 
 }  // namespace sls::ctl

@@ -9,7 +9,7 @@
 int main(int argc, char** argv) {
   using namespace sls;
   CLI::App cli("Finds the command delay at which a scenario's controller loses the load.");
-  const app::CommonOptions options;  // no network here, and nothing to log but errors
+  const app::CommonOptions options;  // no network here; only errors are logged
   std::filesystem::path scenario_file;
   std::optional<double> period_s;
   cli.set_version_flag("--version", app::version());

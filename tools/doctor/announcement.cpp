@@ -16,7 +16,7 @@ constexpr std::uint8_t kLittleEndian = 0x01, kInlineQos = 0x02, kPayload = 0x04;
 constexpr std::array<unsigned char, 4> kParticipantWriter = {0x00, 0x01, 0x00, 0xc2};
 constexpr std::uint16_t kEntityName = 0x0062, kIdentityToken = 0x1001, kEnd = 0x0001;
 
-/// Reads forward and never beyond the end: past it everything is zero and `is_good()` false.
+/// Reads forward. A read past the end returns zero and makes `is_good()` false.
 class Cursor {
  public:
   Cursor(const unsigned char* data, std::size_t size, bool is_little)
@@ -109,7 +109,7 @@ std::optional<Announcement> parse_announcement(const unsigned char* message, std
     const unsigned char* length = rest.skip(2);
     const bool is_little = flags & kLittleEndian;
     std::size_t count = is_little ? length[0] | length[1] << 8 : length[0] << 8 | length[1];
-    if (count == 0) count = rest.left();  // the last one may leave its length out
+    if (count == 0) count = rest.left();  // length 0: up to the end of the message
     const Cursor body = rest.part(count, is_little);
     if (!rest.is_good()) return std::nullopt;
     if (kind != kDataSubmessage) continue;

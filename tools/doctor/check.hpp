@@ -9,13 +9,13 @@ namespace sls::doctor {
 enum class Verdict {
   kOk,
   kFault,
-  kSkipped,  ///< could not be tried, or does not matter to this QoS file
+  kSkipped,  ///< could not be tried, or does not apply to this QoS file
 };
 
 struct Check {
   std::string name;  ///< "multicast"
   Verdict verdict = Verdict::kOk;
-  std::string text;  ///< the fact; of a fault also what follows from it, and what to do
+  std::string text;  ///< the fact; for a fault also its consequence and the remedy
 };
 
 bool is_any_fault(const std::vector<Check>& checks);

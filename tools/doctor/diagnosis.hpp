@@ -1,4 +1,4 @@
-/// From what was seen to what is wrong: no network, no middleware.
+/// Derives the checks, with their faults, from observations: no network, no middleware.
 #pragma once
 
 #include <cstdint>
@@ -20,11 +20,11 @@ namespace sls::doctor {
 struct Observations {
   std::string qos_file;
   int domain = 0;
-  std::string user;          ///< whose process this is
-  std::string peer;          ///< as asked for; empty: this machine
+  std::string user;          ///< user of this process
+  std::string peer;          ///< as the user gave it; empty: this machine
   std::string peer_address;  ///< empty if the name has none
   bool is_peer_here = true;  ///< the address is one of this machine
-  bool is_peer_up = false;   ///< by TCP
+  bool is_peer_up = false;   ///< accepts or refuses a TCP connection
 
   Settings settings;
   SharedMemory shared_memory;  ///< before this process joined
@@ -32,24 +32,24 @@ struct Observations {
   std::vector<Heard> heard;
 
   bool is_joined = false;
-  std::string join_error;  ///< why not; empty if it was not tried
-  std::string other_end;   ///< how the other end on this machine died; empty: it did not
-  std::string refusal;     ///< why there is no doctor's topic
+  std::string join_error;  ///< why joining failed; empty if it did not fail or was not tried
+  std::string other_end;   ///< how the second doctor on this machine died; empty: it runs
+  std::string refusal;     ///< why Fast DDS refused the doctor's topic; empty: it did not
   std::vector<Program> programs;
-  std::vector<Endpoint> endpoints;      ///< theirs
-  std::vector<Endpoint> own_endpoints;  ///< of the QoS file
+  std::vector<Endpoint> endpoints;      ///< discovered
+  std::vector<Endpoint> own_endpoints;  ///< made from the QoS file
   std::map<std::uint32_t, bool> echoes;
 
-  /// A writer or reader of that participant is known.
+  /// True if a writer or reader of that participant was discovered.
   bool is_met(const bus::PeerId& id) const;
-  /// DDS Security keeps it out.
+  /// True if DDS Security rejected it.
   bool is_rejected(const bus::PeerId& id) const;
 };
 
 /// Room in /dev/shm that `programs` more programs need, bytes.
 std::uint64_t calc_shared_memory_need(const Settings& settings, int programs);
 
-/// True for a name that one of our programs gives its participant, the doctor's apart.
+/// True for the participant names of sim_server, control_client, recorder and sim_ctl.
 bool is_flying(const std::string& name);
 
 /// One line per check, in the order in which to read them.

@@ -17,13 +17,14 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Announcements come every 0.5 s.
+/// Shortest examination. Announcements come every 0.5 s.
 constexpr auto kLeastTime = std::chrono::milliseconds(1600);
-/// Discovery on a busy machine takes this long; beyond, something is wrong.
+/// Longest examination. Discovery takes this long on a busy machine; if it takes longer, there is a
+/// fault.
 constexpr auto kMostTime = std::chrono::milliseconds(5500);
-/// How long samples are waited for that show the other machine's clock.
+/// Time to wait for samples that show the other machine's clock.
 constexpr auto kClockTime = std::chrono::milliseconds(3500);
-/// For the datagrams that are sent before the middleware joins.
+/// Time for the probes that are sent before the middleware joins.
 constexpr auto kFirstProbesTime = std::chrono::milliseconds(1800);
 constexpr auto kConnectTime = std::chrono::seconds(1);
 constexpr auto kAskInterval = std::chrono::milliseconds(500);
@@ -35,7 +36,7 @@ std::string find_user() {
   return entry ? entry->pw_name : std::to_string(::geteuid());
 }
 
-/// Where programs of this machine are asked by datagrams.
+/// Address for probes to programs of this machine.
 std::string choose_own_address(const Settings& settings) {
   if (!settings.only_addresses.empty()) return settings.only_addresses.front();
   for (const Interface& interface : find_interfaces())
@@ -43,7 +44,7 @@ std::string choose_own_address(const Settings& settings) {
   return kLoopback;
 }
 
-/// The interfaces by which multicast goes.
+/// Addresses of the interfaces by which the multicast probes leave.
 std::vector<std::string> choose_multicast_interfaces(const Observations& seen) {
   if (!seen.settings.uses_multicast) return {};
   if (!seen.settings.only_addresses.empty()) return seen.settings.only_addresses;
@@ -53,7 +54,7 @@ std::vector<std::string> choose_multicast_interfaces(const Observations& seen) {
   return {towards.find_own_address()};
 }
 
-/// Everything that is expected has come.
+/// True if all expected samples, answers and endpoints have arrived.
 bool is_complete(const Observations& seen, bool is_echo_expected, Clock::duration time) {
   const bool is_all_back = std::all_of(seen.echoes.begin(), seen.echoes.end(),
                                        [](const auto& echo) { return echo.second; });
@@ -87,7 +88,8 @@ class Examination {
 
   std::vector<Check> run(const std::function<bool()>& is_stopped) {
     start_probes();
-    // Hosts refuse only so many datagrams: the middleware's come after those whose refusal counts.
+    // A host limits how many datagrams it refuses. The probes need these refusals, so they come
+    // before the middleware's datagrams.
     if (prober_ && !options_.peer.empty()) work(kFirstProbesTime, is_stopped);
     start_observer();
     work(kMostTime, is_stopped);
@@ -99,7 +101,7 @@ class Examination {
   }
 
  private:
-  /// Checks that only read.
+  /// Observations that send nothing to other programs.
   static Observations look_at_settings(const DoctorOptions& options) {
     Observations seen;
     seen.qos_file = options.qos_file.filename().string();
@@ -145,7 +147,7 @@ class Examination {
     }
   }
 
-  /// Goes on until everything has come, or the time since it began is over.
+  /// Works until everything expected has arrived, at most until `most` after the start.
   void work(Clock::duration most, const std::function<bool()>& is_stopped) {
     for (auto ask_time = Clock::now(); !is_stopped() && Clock::now() < began_ + most;) {
       listening_.work();

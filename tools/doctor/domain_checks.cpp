@@ -14,9 +14,9 @@ namespace {
 
 constexpr const char* kServer = "sim_server";
 
-/// More than the clocks of machines that are kept right differ, less than a command may be old.
+/// Larger than the difference of synchronised clocks, smaller than the greatest age of a command.
 constexpr std::chrono::nanoseconds kClockTolerance = std::chrono::milliseconds(100);
-/// Where the delay of samples is all there is, which a busy machine adds to.
+/// For the case that only the delay of samples is known, which is larger on a busy machine.
 constexpr std::chrono::nanoseconds kDelayTolerance = std::chrono::seconds(1);
 
 std::string name_seconds(std::chrono::nanoseconds time) {
@@ -28,7 +28,7 @@ std::string name_seconds(std::chrono::nanoseconds time) {
 
 // --- the domain ----------------------------------------------------------------------------------
 
-/// Names of our programs by domain, as announced by multicast and discovered.
+/// Names of our programs by domain, from multicast announcements and discovery.
 std::map<int, std::set<std::string>> find_flying(const Observations& seen) {
   std::map<int, std::set<std::string>> flying;
   for (const Heard& heard : seen.heard)
@@ -51,7 +51,8 @@ Check check_domain_number(const Observations& seen) {
   const std::set<std::string> here = flying[seen.domain];
   flying.erase(seen.domain);
   for (const auto& [domain, names] : flying) {
-    // A domain with a server may be a flight of its own; programs without one have lost theirs.
+    // A server and its programs on another domain may be a separate flight. A server on one domain
+    // and only programs without a server on the other show a wrong --domain.
     const bool is_lost = here.empty() || (here.count(kServer) == 0) != (names.count(kServer) == 0);
     if (!is_lost) continue;
     const std::string other = std::to_string(domain);
@@ -105,7 +106,7 @@ Check check_security(const Observations& seen) {
 
 // --- samples -------------------------------------------------------------------------------------
 
-/// Theirs, each with the name of its program.
+/// Discovered endpoints, each with the name of its program.
 std::vector<Endpoint> name_owners(const Observations& seen) {
   std::vector<Endpoint> endpoints = seen.endpoints;
   for (Endpoint& endpoint : endpoints) {

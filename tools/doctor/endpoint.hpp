@@ -1,4 +1,4 @@
-/// Writers and readers as discovery tells them, and why two of them do not match.
+/// Discovered writers and readers, and why two of them do not match.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@ namespace sls::doctor {
 struct Endpoint : bus::EndpointFacts {
   bus::PeerId participant;
   std::string owner;           ///< for people: "sim_server of 10.77.0.1", "this QoS file"
-  std::uint32_t max_size = 0;  ///< of a writer: bytes of its largest sample; 0 unknown
+  std::uint32_t max_size = 0;  ///< largest sample of a writer, bytes; 0: unknown
 };
 
 /// Why a writer and a reader of one topic do not match.
@@ -23,12 +23,12 @@ struct Mismatch {
   std::string text;  ///< "RELIABILITY: offered best effort, asked reliable (sim_server, recorder)"
 };
 
-/// All pairs of `endpoints` on the same topic, those of one participant with itself left out; each
-/// topic and policy once.
+/// Mismatches between endpoints of different participants on the same topic. Each topic and policy
+/// appears once.
 std::vector<Mismatch> find_policy_mismatches(const std::vector<Endpoint>& endpoints);
 
-/// Endpoints of one topic whose types have different names, or whose largest samples differ in
-/// size: another layout under the same name. Each topic once.
+/// Topics whose endpoints have types of different names, or largest samples of different sizes,
+/// which shows another layout under the same name. Each topic appears once.
 std::vector<Mismatch> find_type_mismatches(const std::vector<Endpoint>& endpoints);
 
 }  // namespace sls::doctor

@@ -51,7 +51,7 @@ class Maker {
     publisher_.get_datawriter_qos_from_profile(profile, qos);
     endpoint.is_writer = true;
     endpoint.owner = std::string(profile) + " of " + file_;
-    endpoint.participant.bytes[0] = 1;  // another one than the readers'
+    endpoint.participant.bytes[0] = 1;  // differs from the readers' participant
     fill(endpoint, qos.get_writerqos(publisher_.get_qos(), dds::TopicQos()));
     made.push_back(std::move(endpoint));
   }

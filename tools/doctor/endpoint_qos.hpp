@@ -1,4 +1,4 @@
-/// The announcements of our own endpoints. Internal to the doctor: it shows Fast DDS.
+/// The announcements of our own endpoints. Internal to the doctor, because it exposes Fast DDS.
 #pragma once
 
 #include <fastdds/dds/publisher/Publisher.hpp>
@@ -11,7 +11,7 @@
 
 namespace sls::doctor {
 
-/// The writers and readers that the programs make of the profiles in force, `file`'s, in lockstep.
+/// The writers and readers that the programs make in lockstep from the loaded profiles of `file`.
 std::vector<Endpoint> make_own_endpoints(eprosima::fastdds::dds::Publisher& publisher,
                                          eprosima::fastdds::dds::Subscriber& subscriber,
                                          const std::string& file);

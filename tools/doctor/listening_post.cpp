@@ -12,8 +12,8 @@ ListeningPost::ListeningPost(Ports ports) {
   for (ports.domain = 0; ports.domain <= kMaxDomain; ++ports.domain) {
     if (ports.multicast() > kMaxPort) break;
     UdpSocket socket;
-    if (!socket.bind(kMulticastGroup, ports.multicast(), true)) continue;  // somebody's alone
-    // The kernel hands a group to every socket on the port once one of them has joined it.
+    if (!socket.bind(kMulticastGroup, ports.multicast(), true)) continue;  // the port is not shared
+    // One socket is enough: the kernel delivers a joined group to all sockets (IP_MULTICAST_ALL).
     if (sockets_.empty()) socket.join(kMulticastGroup, interfaces);
     sockets_.emplace_back(ports.domain, std::move(socket));
   }

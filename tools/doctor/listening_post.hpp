@@ -14,17 +14,17 @@ namespace sls::doctor {
 
 struct Heard {
   int domain = 0;
-  std::string address;  ///< whence it came
+  std::string address;  ///< sender
   Announcement announcement;
 };
 
 class ListeningPost {
  public:
-  /// `ports` of any domain.
+  /// Listens on all domains: `ports.domain` does not matter.
   explicit ListeningPost(Ports ports);
-  /// Takes what has come.
+  /// Takes the announcements that have arrived.
   void work();
-  /// Each participant once.
+  /// The last announcement of each participant.
   std::vector<Heard> heard() const;
 
  private:

@@ -1,4 +1,4 @@
-// Of this machine and of the network: what carries the data.
+// Checks of this machine and of the network, which carry the data.
 #include <algorithm>
 #include <iomanip>
 #include <set>
@@ -40,14 +40,14 @@ bool is_any_data(const Observations& seen) {
 
 // --- this machine --------------------------------------------------------------------------------
 
-/// A program of this machine whose shared memory is not in our /dev/shm. The same port numbers may
-/// be there, of this process itself: what counts is what was there before it joined.
+/// A program of this machine whose shared memory is not in our /dev/shm. This process may use the
+/// same port numbers, so only ports that existed before it joined count.
 const Program* find_unshared(const Observations& seen) {
   const auto& visible = seen.shared_memory.read_ports;
   const auto found =
       std::find_if(seen.programs.begin(), seen.programs.end(), [&](const Program& program) {
         const auto& ports = program.shared_memory_ports;
-        if (program.name == kDoctorName) return false;  // ours, which has just started
+        if (program.name == kDoctorName) return false;  // our second one, just started
         return program.is_on_this_host && program.samples == 0 && !ports.empty() &&
                std::none_of(ports.begin(), ports.end(), [&](std::uint32_t port) {
                  return std::find(visible.begin(), visible.end(), port) != visible.end();

@@ -43,11 +43,11 @@ using Clock = std::chrono::steady_clock;
 constexpr const char* kDoctorTopic = "sls/doctor";
 constexpr std::array<std::uint32_t, 3> kEchoSizes = {200, 8000, 60000};
 
-/// Samples for a late joiner come at once; a sample that arrives later was written meanwhile.
+/// Samples kept for late joiners arrive within this time after matching; later ones are new.
 constexpr auto kHistoryTime = std::chrono::seconds(1);
 
-/// So that `peer` is found without multicast, too: otherwise a network without it would hide
-/// everything else that is to be seen.
+/// Makes discovery contact `peer` directly, too. Otherwise a network without multicast would hide
+/// all other faults.
 void add_peer(dds::DomainParticipantQos& qos, const Ports& ports, const std::string& peer) {
   auto& builtin = qos.wire_protocol().builtin;
   if (builtin.discovery_config.discoveryProtocol != rtps::DiscoveryProtocol::SIMPLE) return;
@@ -92,8 +92,7 @@ std::uint64_t choose_nonce() {
 }  // namespace
 
 struct Observer::Impl : bus::ParticipantListener {
-  /// A reader of one of the topics that tell a late joiner, and when each participant's was
-  /// matched.
+  /// Listener of a reader on a latched topic; notes when each participant's writer matched.
   struct Listener : dds::DataReaderListener {
     explicit Listener(Impl& observer) : impl(observer) {}
     void on_subscription_matched(dds::DataReader*,
@@ -212,7 +211,7 @@ struct Observer::Impl : bus::ParticipantListener {
                                 rtps::ParticipantDiscoveryInfo&& discovered) override {
     const auto& data = discovered.info;
     bus::ParticipantListener::on_participant_discovery(source, std::move(discovered));
-    const std::lock_guard lock(mutex);  // and not `participant`, which may not be there yet
+    const std::lock_guard lock(mutex);  // `participant` may not be set yet: not used here
     const bus::PeerId id = to_peer(data.m_guid);
     if (discovered.status == rtps::ParticipantDiscoveryInfo::REMOVED_PARTICIPANT ||
         discovered.status == rtps::ParticipantDiscoveryInfo::DROPPED_PARTICIPANT) {

@@ -1,5 +1,5 @@
-/// Joins the domain with a QoS file's own participant and sees who is there: programs, their
-/// writers and readers, what arrives from them; and exchanges samples with other doctors.
+/// Joins the domain with the participant of a QoS file. Observes programs, their writers and
+/// readers, and the samples that arrive from them; exchanges samples with other doctors.
 #pragma once
 
 #include <chrono>
@@ -25,16 +25,16 @@ struct Program {
   std::string name;
   std::string user;
   std::string address;                             ///< one that it announces; empty if none
-  std::vector<std::uint32_t> udp_ports;            ///< on which it takes samples
+  std::vector<std::uint32_t> udp_ports;            ///< on which it receives samples
   std::vector<std::uint32_t> shared_memory_ports;  ///< likewise
   bool is_on_this_host = false;
   bool is_secured = false;
   bool is_rejected = false;  ///< by DDS Security
   bool is_discovery_server = false;
-  int samples = 0;           ///< that came from it
-  bool is_expected = false;  ///< it has a latched writer that reaches us
-  /// The least time between writing and taking a sample that was written while we listened, by the
-  /// two clocks.
+  int samples = 0;           ///< received from it
+  bool is_expected = false;  ///< one of its latched writers matches our reader
+  /// Smallest difference between the times of receiving (our clock) and writing (its clock) a
+  /// sample that was written after matching.
   std::optional<std::chrono::nanoseconds> delay;
 };
 
@@ -44,22 +44,22 @@ class Observer {
     std::filesystem::path qos_file;
     int domain = 0;
     std::string identity;
-    std::string peer_address;  ///< who is asked directly, too; empty: nobody
+    std::string peer_address;  ///< host that discovery contacts directly, too; empty: none
     bool is_answering = false;
   };
-  /// @throws config::ConfigError as Node does; BusError where the domain cannot be joined.
+  /// @throws config::ConfigError as Node does; BusError if the domain cannot be joined.
   explicit Observer(const Options& options);
   ~Observer();
   Observer(const Observer&) = delete;
   Observer& operator=(const Observer&) = delete;
 
-  /// Asks the other doctors for samples of each size that has not come back yet.
+  /// Sends the other doctors a sample of each size that has not come back yet.
   void ask();
-  /// Answers those who asked. From one thread, which is not the middleware's.
+  /// Answers the doctors that have asked. Call it from one thread that is not the middleware's.
   void answer();
 
   std::vector<Program> programs() const;
-  /// Theirs.
+  /// Discovered endpoints.
   std::vector<Endpoint> endpoints() const;
   /// Endpoints made from the profiles of the QoS file, by topic.
   std::vector<Endpoint> own_endpoints() const;

@@ -35,7 +35,7 @@ OtherEnd::OtherEnd(const std::filesystem::path& qos_file, int domain, const std:
   if (id_ < 0) throw std::system_error(errno, std::generic_category(), "fork");
   if (id_ > 0) return;
   ::prctl(PR_SET_PDEATHSIG, SIGTERM);
-  if (::getppid() != parent) ::_exit(1);  // it was killed before this line
+  if (::getppid() != parent) ::_exit(1);  // the parent was killed before this line
   if (const int null = ::open("/dev/null", O_WRONLY); null >= 0) ::dup2(null, STDOUT_FILENO);
   ::execv(program.c_str(), arguments.data());
   ::_exit(127);

@@ -10,13 +10,13 @@ namespace sls::doctor {
 
 class OtherEnd {
  public:
-  /// Starts this very program with `--answer`.
+  /// Starts this program again, with `--answer`.
   OtherEnd(const std::filesystem::path& qos_file, int domain, const std::string& identity);
   ~OtherEnd();  // ends it
   OtherEnd(const OtherEnd&) = delete;
   OtherEnd& operator=(const OtherEnd&) = delete;
 
-  /// How it ended before its time, such as "signal 7 (Bus error)"; empty while it runs.
+  /// How it ended early, such as "signal 7 (Bus error)"; empty while it runs.
   std::string find_end();
 
  private:

@@ -1,4 +1,4 @@
-/// The participant's QoS as a QoS file gives it. Internal to the doctor: it shows Fast DDS.
+/// The participant's QoS of a QoS file. Internal to the doctor, because it exposes Fast DDS.
 #pragma once
 
 #include <fastdds/dds/domain/qos/DomainParticipantQos.hpp>
@@ -16,7 +16,7 @@ eprosima::fastdds::dds::DomainParticipantQos load_participant_qos(
 
 bool is_secured(const eprosima::fastdds::dds::DomainParticipantQos& qos);
 Ports find_ports(const eprosima::fastdds::dds::DomainParticipantQos& qos, int domain);
-/// Discovers by multicast because nothing else is asked for.
+/// True if discovery uses multicast because the QoS names no discovery server and no peers.
 bool uses_default_multicast(const eprosima::fastdds::dds::DomainParticipantQos& qos);
 
 }  // namespace sls::doctor

@@ -22,22 +22,22 @@ constexpr std::array<std::size_t, 3> kSizes = {1400, 8000, 60000};
 constexpr auto kInterval = std::chrono::milliseconds(250);
 constexpr int kAttempts = 8;
 constexpr int kSizeAttempts = 12;
-/// Hosts refuse only about one datagram a second once they have refused six: one that was lost
-/// counts where several of the smallest size, sent alternately, were refused.
+/// After six refusals a host refuses only about one datagram a second. A datagram without a refusal
+/// counts as lost only if several of the smallest size, sent alternately, were refused.
 constexpr int kRefusedSizeAttempts = 6, kLeastRefused = 3;
-/// An answerer that is started with us needs this long.
+/// Start-up time of an answerer that starts together with this process.
 constexpr auto kStartTime = std::chrono::milliseconds(1500);
 
-/// An RTPS message (no vendor, version 2.2) with a submessage of a vendor's own, which readers
-/// skip. Both ends are little-endian, as every machine is that this is built for.
+/// An RTPS message (no vendor, version 2.2) with one vendor-specific submessage, which participants
+/// skip. Both ends are little-endian, as all supported machines are.
 struct Probe {
   std::array<char, 4> protocol = {'R', 'T', 'P', 'S'};
   std::array<std::uint8_t, 4> version_and_vendor = {2, 2, 0, 0};
   std::array<char, 12> sender = {'s', 'l', 's', ' ', 'd', 'o', 'c', 't', 'o', 'r', ' ', ' '};
   std::array<std::uint8_t, 4> submessage = {0x80, 0x01, 0, 0};  // length 0: up to the end
   std::uint32_t is_answer = 0;
-  std::uint32_t answer_port = 0;  ///< where the asking host listens for unasked answers; 0: nowhere
-  std::uint32_t is_unasked = 0;   ///< of an answer: it comes from another port than was asked
+  std::uint32_t answer_port = 0;  ///< the asking host's port for unsolicited answers; 0: none
+  std::uint32_t is_unasked = 0;   ///< 1: an answer from another port than the one asked
   std::uint64_t nonce = 0;
   std::uint64_t question = 0;
   std::int64_t asked_ns = 0;     ///< wall clock of the asking doctor
@@ -75,10 +75,10 @@ std::uint64_t choose_nonce() {
 
 }  // namespace
 
-// --- who answers ---------------------------------------------------------------------------------
+// --- answerer ------------------------------------------------------------------------------------
 
 ProbeAnswerer::ProbeAnswerer(const Ports& ports) {
-  // Bound to the group, it hears multicast alone, and takes no unicast from a participant.
+  // Bound to the group, it receives only multicast and takes no unicast from a participant.
   multicast_.bind(kMulticastGroup, ports.multicast(), true);
   multicast_.join(kMulticastGroup, find_interfaces());
   for (int id = kHighestProbeId; id >= kLowestProbeId && unicast_.empty(); --id) {
@@ -117,7 +117,7 @@ void ProbeAnswerer::answer_from(UdpSocket& socket, UdpSocket& answering) {
   }
 }
 
-// --- who asks ------------------------------------------------------------------------------------
+// --- prober --------------------------------------------------------------------------------------
 
 struct Prober::Question {
   enum class Kind { kPort, kSize, kMulticast };
@@ -126,7 +126,7 @@ struct Prober::Question {
   sockaddr_in peer;
   UdpSocket socket;
   Clock::time_point due = Clock::now();
-  bool is_spare = false;  ///< asked where the others are silent
+  bool is_spare = false;  ///< asked only if the first ports are silent
   bool is_settled = false;
   int attempts = 0;
   int refusals = 0;
@@ -157,8 +157,8 @@ Prober::Prober(const Ports& ports, const std::string& peer,
     questions_.push_back(std::make_unique<Question>(Question{kind, size, to, {}}));
     return questions_.back().get();
   };
-  // A connected socket hears that nobody has the port. Further ports are tried where the first are
-  // silent: a participant may have them.
+  // A connected socket reports that a port is closed. Further ports are tried if the first are
+  // silent, because a participant may have the first ones.
   for (int id = kHighestProbeId; id >= kLowestProbeId; --id)
     for (const int port : {ports.metatraffic(id), ports.user(id)}) {
       auto* question = add(Question::Kind::kPort, kSmall, make_address(peer, port));
@@ -201,7 +201,7 @@ void Prober::take(UdpSocket& socket, Question* question) {
     if (!received) {
       if (error == EHOSTUNREACH || error == ENETUNREACH) results_.is_unreachable = true;
       if (error != ECONNREFUSED || !question) continue;
-      // It was whole when it was refused; and nobody answers on that port, unless it is starting.
+      // A refused datagram has arrived whole. Its port has no answerer, unless one is starting.
       results_.is_refused = true;
       ++question->refusals;
       if (!results_.is_answered) speaking_ = question->peer;
@@ -227,7 +227,7 @@ void Prober::take(UdpSocket& socket, Question* question) {
       results_.is_answered = true;
       speaking_ = question->peer;
     }
-    // The shortest round trip leaves the least doubt: its middle is when the answer was written.
+    // The shortest round trip gives the smallest error: the answer was written near its middle.
     const std::int64_t now = now_ns(), round_trip = now - probe->asked_ns;
     if (round_trip < best_round_trip_ns_) {
       best_round_trip_ns_ = round_trip;
@@ -256,7 +256,7 @@ bool Prober::is_due(const Question& question) const {
   switch (question.kind) {
     case Question::Kind::kPort:
       return !question.is_spare || (is_first_try_over && !results_.is_there());
-    case Question::Kind::kSize:  // to a port that answers, or to one that nobody has if none does
+    case Question::Kind::kSize:  // to a port that answers, otherwise to a closed one
       return speaking_ && !is_every_size_through() &&
              (results_.is_answered || is_every_first_port_tried());
     case Question::Kind::kMulticast:
@@ -293,14 +293,14 @@ ProbeResults Prober::results() const {
   for (const auto& question : questions_)
     if (question->kind == Question::Kind::kSize && question->size == kSizes.front() &&
         !results.is_answered && question->refusals < kLeastRefused && !is_every_size_through())
-      results.sizes.clear();  // nothing can be said
+      results.sizes.clear();  // too few refusals to judge
   return results;
 }
 
 bool is_host_up(const std::string& address, std::chrono::milliseconds limit) {
   const int descriptor = ::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   if (descriptor < 0) return false;
-  constexpr int kDiscardPort = 9;  // hardly ever open, nor guarded
+  constexpr int kDiscardPort = 9;  // rarely open, rarely blocked
   const sockaddr_in there = make_address(address, kDiscardPort);
   int error = 0;
   if (::connect(descriptor, reinterpret_cast<const sockaddr*>(&there), sizeof there) != 0) {

@@ -1,6 +1,5 @@
-/// Datagrams of the doctor's own on the ports of RTPS: they find out what the network does to them,
-/// without any middleware. Each is a valid RTPS message with one submessage that every participant
-/// skips.
+/// The doctor's own datagrams on the RTPS ports. Without middleware they show which datagrams the
+/// network carries. Each is a valid RTPS message with one submessage that every participant skips.
 #pragma once
 
 #include <chrono>
@@ -27,22 +26,22 @@ struct Ports {
   int user(int id) const { return metatraffic(id) + 1; }
 };
 
-/// Participant ids whose ports the probes use: the highest that Fast DDS looks for on a host, so
-/// that they neither take a port from a program nor lie outside what a firewall lets through.
+/// Participant ids whose ports the probes use: the highest that Fast DDS looks for on a host.
+/// Programs take lower ids first, and a firewall open for programs also passes these ports.
 inline constexpr int kHighestProbeId = 9, kLowestProbeId = 7;
 
 /// Answers the probes of other doctors.
 class ProbeAnswerer {
  public:
   explicit ProbeAnswerer(const Ports& ports);
-  /// Answers what has come, waiting for it at most `limit`.
+  /// Waits for probes, at most `limit`, and answers them.
   void answer(std::chrono::milliseconds limit);
 
  private:
   void answer_from(UdpSocket& socket, UdpSocket& answering);
 
   UdpSocket multicast_;
-  UdpSocket outgoing_;              ///< another port than the one that was asked: unsolicited
+  UdpSocket outgoing_;              ///< sends unsolicited answers: a port that was not asked
   std::vector<UdpSocket> unicast_;  ///< a metatraffic and a user port
   std::vector<unsigned char> buffer_;
 };
@@ -50,13 +49,13 @@ class ProbeAnswerer {
 /// Results of the probes.
 struct ProbeResults {
   bool is_tried = false;
-  std::string own_address;      ///< towards the peer
-  bool is_unreachable = false;  ///< the network says so
-  bool is_answered = false;     ///< by a doctor, from the port that was asked
-  bool is_refused = false;      ///< by the host: nobody has the port, but the datagram got there
+  std::string own_address;           ///< towards the peer
+  bool is_unreachable = false;       ///< reported by the network
+  bool is_answered = false;          ///< by a doctor, from the port that was asked
+  bool is_refused = false;           ///< by the host: the port is closed, but the datagram arrived
   bool is_answered_unasked = false;  ///< by a doctor, from another port to one of ours
   bool is_multicast_answered = false;
-  std::map<std::size_t, bool> sizes;  ///< datagram, bytes → came back, or was refused when whole
+  std::map<std::size_t, bool> sizes;  ///< size of datagram, bytes → was answered or refused
   std::optional<std::chrono::nanoseconds> clock_ahead;  ///< the peer's clock minus ours
 
   bool is_there() const { return is_answered || is_refused; }
@@ -65,15 +64,15 @@ struct ProbeResults {
 /// Asks a host: by unicast, by multicast, with datagrams of several sizes.
 class Prober {
  public:
-  /// `multicast_by`: addresses of the interfaces multicast leaves by; none: it is not tried.
-  /// `is_peer_starting`: who answers there is started just now.
+  /// `multicast_by`: addresses of the interfaces by which multicast leaves; none: it is not tried.
+  /// `is_peer_starting`: the answerer there is just starting.
   Prober(const Ports& ports, const std::string& peer, const std::vector<std::string>& multicast_by,
          bool is_peer_starting);
   ~Prober();
 
-  /// Sends what is due and takes what has come.
+  /// Sends the probes that are due and takes the answers that have arrived.
   void work();
-  /// True when every question is answered, or was asked often enough.
+  /// True when every question is answered or has used up its attempts.
   bool is_done() const;
   ProbeResults results() const;
 
@@ -90,8 +89,8 @@ class Prober {
   const bool is_peer_starting_;
   const std::uint64_t nonce_;
   const std::chrono::steady_clock::time_point began_;
-  std::optional<sockaddr_in> speaking_;  ///< a port that answered, else one that was refused
-  std::optional<UdpSocket> listening_;   ///< a port of RTPS, for answers from elsewhere
+  std::optional<sockaddr_in> speaking_;  ///< a port that answered, otherwise one that refused
+  std::optional<UdpSocket> listening_;   ///< an RTPS port for unsolicited answers
   int listening_port_ = 0;
   std::vector<std::unique_ptr<Question>> questions_;
   ProbeResults results_;

@@ -10,17 +10,17 @@
 
 namespace sls::doctor {
 
-/// Of the profile of the participant.
+/// From the profile of the participant.
 struct Settings {
   Ports ports;
   bool uses_shared_memory = false;
   std::uint32_t segment_size = 0;              ///< of shared memory, bytes
   std::vector<std::string> only_addresses;     ///< of interfaces; none: all
   bool uses_multicast = false;                 ///< for discovery
-  std::vector<std::string> discovery_servers;  ///< "10.0.0.1:11811"; none: it needs none
+  std::vector<std::string> discovery_servers;  ///< "10.0.0.1:11811"; empty: none is used
   bool is_secured = false;
 
-  /// Nothing leaves the machine.
+  /// True if no data leave the machine.
   bool is_local() const;
 };
 

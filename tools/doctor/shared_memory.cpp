@@ -33,7 +33,7 @@ SharedMemory survey_shared_memory(const std::filesystem::path& folder) {
     ++found.stale_segments;
     struct stat status {};
     if (::stat(segment.c_str(), &status) != 0) continue;
-    constexpr std::uint64_t kBlock = 512;  // of st_blocks, whatever the file system's is
+    constexpr std::uint64_t kBlock = 512;  // unit of st_blocks on every file system
     found.stale_size += static_cast<std::uint64_t>(status.st_blocks) * kBlock;
     const std::string owner = find_user_name(status.st_uid);
     auto& owners = found.stale_owners;
@@ -44,7 +44,7 @@ SharedMemory survey_shared_memory(const std::filesystem::path& folder) {
     int port = 0, length = 0;
     const std::string name = entry.path().filename();
     if (std::sscanf(name.c_str(), "fastrtps_port%d_el%n", &port, &length) != 1) continue;
-    if (length != static_cast<int>(name.size())) continue;  // the port itself, not its lock
+    if (length != static_cast<int>(name.size())) continue;  // not the lock of a port
     if (bus::is_port_read(port, folder))
       found.read_ports.push_back(static_cast<std::uint32_t>(port));
   }

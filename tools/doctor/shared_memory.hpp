@@ -17,7 +17,7 @@ struct SharedMemory {
   int stale_segments = 0;                 ///< left by processes that were killed
   std::uint64_t stale_size = 0;           ///< bytes
   std::vector<std::string> stale_owners;  ///< user names, each once
-  std::vector<std::uint32_t> read_ports;  ///< which living processes read
+  std::vector<std::uint32_t> read_ports;  ///< ports that running processes read
 };
 
 SharedMemory survey_shared_memory(const std::filesystem::path& folder = "/dev/shm");

@@ -1,4 +1,4 @@
-/// UDP as the raw probes need it: IPv4, never blocking, closed with the object.
+/// UDP socket for the probes: IPv4, non-blocking, closed by its destructor.
 #pragma once
 
 #include <netinet/in.h>
@@ -28,7 +28,7 @@ struct Interface {
   std::string address;
   bool is_loopback = false;
 };
-/// Those that are up and have an IPv4 address.
+/// Interfaces that are up and have an IPv4 address.
 std::vector<Interface> find_interfaces();
 
 /// True for an address of this host.
@@ -45,14 +45,13 @@ class UdpSocket {
   /// False if the port is taken.
   bool bind(const std::string& address, int port, bool is_shared = false);
   void join(const std::string& group, const std::vector<Interface>& interfaces);
-  /// Datagrams to a group leave by the interface of this address.
+  /// Multicast datagrams leave by the interface with this address.
   void send_multicast_by(const std::string& interface_address);
   bool connect(const sockaddr_in& peer);
-  /// The own address towards the peer that it is connected to.
+  /// Local address of the connected socket.
   std::string find_own_address() const;
 
-  /// 0, or the number of the error; one that an earlier datagram met (nobody there) is reported by
-  /// a later call.
+  /// Returns 0 or errno. A later call reports the error of an earlier datagram (port closed).
   int send(const void* data, std::size_t size);
   int send_to(const sockaddr_in& peer, const void* data, std::size_t size);
 
@@ -60,7 +59,7 @@ class UdpSocket {
     std::size_t size = 0;
     sockaddr_in sender{};
   };
-  /// A datagram if there is one; `error` is the number of the error, or 0.
+  /// A datagram if one has arrived; `error` is set to errno, or 0.
   std::optional<Received> receive(std::vector<unsigned char>& buffer, int* error = nullptr);
 
   int descriptor() const { return descriptor_; }

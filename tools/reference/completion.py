@@ -71,7 +71,7 @@ KINDS = {"FILE": "file", "DIR": "dir", "A": "dir", "B": "dir", "SCENARIO": "scen
 
 
 def find_kind(item, known):
-    """Of an option's argument: see _sls_values; empty: it takes none."""
+    """Kind of an option's argument, see _sls_values; empty if the option takes none."""
     if not item.argument:
         return ""
     if item.choices:
@@ -81,12 +81,12 @@ def find_kind(item, known):
     if item.argument == "FILE" and "config/campaigns" in item.text:
         return "campaign"
     first = item.argument.split()[0].strip("[]…")
-    # An enumeration that the launcher passes on to a program is listed there.
+    # If the launcher passes the option on to a program, the help of that program lists the values.
     return KINDS.get(first) or known.get(item.names[-1]) or "any"
 
 
 def find_positional(command, text):
-    """Kind of what stands behind the command without an option; empty: nothing does."""
+    """Kind of the command's positional argument; empty if it has none."""
     usage = help_text.parse(text).usage or [re.sub(r"\s{2,}.*", "", text.partition("\n")[0])]
     words = re.findall(r"\b[A-Z]+\b", re.sub(r"\[--?\w[^\]]*\]+|\[OPTIONS\]", " ", " ".join(usage)))
     if "config/campaigns" in text and "FILE" in words:
@@ -95,7 +95,7 @@ def find_positional(command, text):
 
 
 def make(page, programs):
-    """The file, from the text of docs/reference/commands.md and sources.load_programs()."""
+    """Text of the completion file, from the text of docs/reference/commands.md and sources.load_programs()."""
     known = {item.names[-1]: " ".join(item.choices)
              for main, _ in programs.values() for item in main.options if item.choices}
     overview = pages.find_block(page, "")

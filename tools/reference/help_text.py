@@ -8,7 +8,7 @@ import re
 class Item:
     """An option, a positional argument or a subcommand."""
 
-    names: list  # "-h", "--help"; of others the one name
+    names: list  # "-h", "--help"; one name if the item is no option
     argument: str = ""  # "FILE"; empty: a flag
     choices: list = dataclasses.field(default_factory=list)
     range: str = ""
@@ -21,7 +21,7 @@ class Item:
         return self.names[0].startswith("-")
 
     def spell(self):
-        """The item as one types it: "-h, --help", "--qos FILE"."""
+        """The item as a user types it: "-h, --help", "--qos FILE"."""
         return ", ".join(self.names) + (f" {self.argument}" if self.argument else "")
 
 
@@ -58,7 +58,7 @@ def _split_lines(text):
 def parse_item(spec, text):
     """An item from the two columns of its line."""
     notes, choices, default, limits = [], [], "", ""
-    spec = re.sub(r" \(Env:\w+\)$", "", spec)  # ./sls help says it once for all programs
+    spec = re.sub(r" \(Env:\w+\)$", "", spec)  # ./sls help has it once for all programs
     for word in ("Excludes", "Needs"):
         match = re.search(rf" {word}: ((?:--[\w-]+ ?)+)", spec + " ")
         if match:

@@ -1,4 +1,4 @@
-"""The man pages: sls(1) and one of each program."""
+"""The man pages: sls(1) and one for each program."""
 
 import datetime
 import os
@@ -9,7 +9,7 @@ import sources
 
 
 def escape(text):
-    """Text as roff shows it unchanged."""
+    """Escapes `text` so that roff prints it unchanged."""
     text = text.replace("\\", "\\e").replace("-", "\\-")
     return "\n".join("\\&" + line if line.startswith((".", "'")) else line for line in text.splitlines())
 
@@ -24,7 +24,7 @@ def make_date():
 def make_start(name, version, summary, synopsis):
     text = f'.TH {name.upper()} 1 {make_date()} "{version}" "User Commands"\n.SH NAME\n'
     summary = summary.rstrip(".")
-    # Neither a "-" nor a line break, so that apropos finds the whole line.
+    # The line has no other plain "-" and no line break, so that apropos finds all of it.
     text += f"{escape(name)} \\- {escape(summary[0].lower() + summary[1:])}\n.SH SYNOPSIS\n"
     for index, line in enumerate(synopsis):
         command, _, rest = line.partition(" ")
@@ -70,7 +70,7 @@ def make_program(name, parsed, subcommands, version, names):
 
 
 def make_launcher(page, version, names):
-    """From docs/reference/commands.md, so that no command has to run."""
+    """Made from docs/reference/commands.md, so that no command has to run."""
     overview = pages.find_block(page, "")
     usage = next((line.partition(":")[2].strip() for line in overview.splitlines()
                   if line.lower().startswith("usage:")), "./sls COMMAND [OPTIONS]")

@@ -73,7 +73,7 @@ Every key of a scenario file. [common/config](../../common/config/README.md) des
     sections = {}
     for key in sources.load_keys(build):
         section = sections.setdefault(re.split(r"[.\[]", key["path"])[0], {})
-        # Keys of a model have a table of their own; keys of a channel say so.
+        # Keys of a model have a table of their own; the meaning of other conditional keys ends with their condition.
         condition = to_condition(key) if key["condition"] else ""
         own_table = condition if key["condition"].startswith(("model", "law")) else ""
         meaning = key["meaning"] + (f" {condition}." if condition and not own_table else "")
@@ -102,7 +102,7 @@ def to_rows(items):
     rows = []
     for item in items:
         notes = ([item.range] if item.range else []) + [f"`{choice}`" for choice in item.choices]
-        # The default in the sentence is right on every machine; the number may not be.
+        # A default within the sentence holds on every machine; the value that --help prints may differ between them.
         default = "" if re.search(r"\bdefault:", item.text) else item.default
         default = "required" if "required" in item.notes else f"`{default}`" if default else ""
         extra = "; ".join(note for note in item.notes if note != "required")
@@ -150,7 +150,7 @@ def to_block(text):
 
 
 def find_block(page, command):
-    """The text of a command in docs/reference/commands.md; of "" that of ./sls help."""
+    """The text of a command in docs/reference/commands.md; for "" the text of ./sls help."""
     heading = re.escape(f"### ./sls {command}" if command else "## ./sls")
     match = re.search(rf"^{heading}\n\n```text\n(.*?)\n```$", page, re.MULTILINE | re.DOTALL)
     return match[1] if match else ""

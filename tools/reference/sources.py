@@ -1,4 +1,4 @@
-"""The tables of the code, as the pages need them."""
+"""Reads the tables of the code for the pages."""
 
 import json
 import os
@@ -15,7 +15,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 
 class StaleReference(Exception):
-    """A table and what describes it do not fit together."""
+    """A table and its description do not match."""
 
 
 def read(path):
@@ -44,13 +44,13 @@ def list_programs():
 
 def read_help(build, program, *arguments):
     text = run([build / "bin" / program, *arguments, "--help"])
-    # The folder of the tree and that of the programs differ from machine to machine.
+    # The paths of the tree and of the programs differ between machines.
     text = re.sub(r"=\S*/config/qos/", "=config/qos/", text)
     return re.sub(r"(Usage: )\S*/", r"\1", text)
 
 
 def load_programs(build):
-    """Help of each program; of one with subcommands, theirs too: {name: (Help, {subcommand: Help})}."""
+    """Help of each program and of its subcommands: {name: (Help, {subcommand: Help})}."""
     programs = {}
     for name in list_programs():
         main = help_text.parse(read_help(build, name))
@@ -74,8 +74,8 @@ def list_commands():
 def read_launcher(build):
     """{"": the text of ./sls help, command: that of ./sls COMMAND --help}.
 
-    Where ./sls help does not say that every command has --help, only the commands for which it does are asked:
-    another one might begin its work.
+    If ./sls help does not state that every command has --help, only the commands that it shows with --help are run:
+    another command might begin its work.
     """
     environment = dict(os.environ, SLS_BUILD=str(build), COLUMNS="100", LC_ALL="C.UTF-8")
 
@@ -101,7 +101,7 @@ def read_launcher(build):
 
 
 def find_usage_part(text, command):
-    """The lines of ./sls help about a command: where each command has its options there."""
+    """The lines of ./sls help about a command, for a help text that lists the options there."""
     lines, found = text.splitlines(), []
     for i, line in enumerate(lines):
         if re.match(rf"  {command}\b(?!-)", line):
@@ -114,7 +114,7 @@ def find_usage_part(text, command):
 
 # --- scenario -------------------------------------------------------------------------------------
 
-# The endings of names: style guide, "Frames and units". The longest that fits counts.
+# Endings of names: style guide, "Frames and units". The longest ending that matches is used.
 UNITS = {
     "kg_m2": "kg·m²", "kg": "kg", "m_s2": "m/s²", "m_s": "m/s", "m": "m", "per_rad_s2": "s²/rad", "per_rad_s": "s/rad",
     "per_rad": "1/rad", "per_s": "1/s", "rad_s": "rad/s", "rad": "rad", "s": "s", "hz": "Hz", "n_s_m": "N·s/m",
@@ -160,7 +160,7 @@ def load_keys(build):
         key["also"] = find(path, "range")
         words = find(path, "default") or (find(path, "none") if key["default"] == "none" else "")
         key["default_words"] = words
-        # One row where only a default differs that depends on another key.
+        # Keys that differ only in a default that depends on another key share one row.
         alike = (path, key["type"], key["range"], key["presence"], key["condition"])
         if words and alike in by_path:
             continue
