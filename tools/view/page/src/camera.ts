@@ -1,4 +1,4 @@
-/** Where the scene is seen from: an orbit about a target, or a true-to-scale drawing from above or from the side. */
+/** The camera: an orbit about a target, or a true-to-scale drawing from above or from the side. */
 import { OrthographicCamera, PerspectiveCamera, Vector3, type Box3, type Camera } from "three";
 import type { CameraMode } from "./types";
 
@@ -77,7 +77,7 @@ export class View {
     this.distance = this.clamp(this.distance * factor);
   }
 
-  /** Sets the cameras after the fields above. */
+  /** Updates the cameras from the fields above. */
   update(): void {
     const aspect = this.width / this.height;
     if (!this.isFlat) {
@@ -109,7 +109,7 @@ export class View {
     camera.updateMatrixWorld();
   }
 
-  /** Pixel of the picture, from its upper left corner; nothing for a point behind the camera. */
+  /** Pixel of the picture, from its upper left corner; null for a point behind the camera. */
   project(point: Vector3): [number, number] | null {
     const seen = point.clone().project(this.camera);
     if (seen.z > 1 || seen.z < -1) return null;
@@ -125,7 +125,7 @@ export class View {
   }
 }
 
-/** Drag turns, right button or shift moves, wheel and pinch zoom, arrows and +/− do the same by keyboard. */
+/** Drag turns, drag with the right button or shift moves, wheel and pinch zoom. The keys: arrows and +/−. */
 export function control(element: HTMLElement, view: View, changed: () => void, clicked: (x: number, y: number) => void) {
   const pointers = new Map<number, PointerEvent>();
   let moved = 0;

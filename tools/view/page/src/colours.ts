@@ -1,5 +1,5 @@
 /**
- * Colours of what is flown: the same in dark and light, unlit, so that a pixel of the screen tells what it shows.
+ * Colours of the vehicle's parts: the same in dark and light, unlit, so that the colour of a pixel identifies the part.
  * Shapes differ, too: a quadrotor is a frame with rotors, a load a sphere, a reference a reticle.
  */
 export const kQuadColour = 0x1f84d6;
@@ -41,7 +41,7 @@ export function readTheme(): Theme {
   };
 }
 
-/** Calls `act` when dark and light change. */
+/** Calls `act` when the theme changes between dark and light. */
 export function onThemeChange(act: () => void): void {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", act);
   new MutationObserver(act).observe(document.documentElement, { attributeFilter: ["data-theme"] });

@@ -33,7 +33,7 @@ export function makeIcon(path: string): SVGSVGElement {
   return icon;
 }
 
-/** Buttons of which one is chosen: arrow keys move, as in a group of radio buttons. */
+/** A group of buttons with one choice. Arrow keys move the choice, as in a group of radio buttons. */
 export function makeChoice(group: HTMLElement, choose: (button: HTMLButtonElement) => void): (value: HTMLElement) => void {
   const buttons = [...group.querySelectorAll<HTMLButtonElement>("[role=radio]")];
   const mark = (chosen: HTMLElement) => {
@@ -60,7 +60,7 @@ export function makeChoice(group: HTMLElement, choose: (button: HTMLButtonElemen
   return mark;
 }
 
-/** Asks before something that cannot be undone. */
+/** Asks the user to confirm an action that cannot be undone. */
 export function confirmAction(title: string, text: string, action: string): Promise<boolean> {
   const dialog = find<HTMLDialogElement>("confirm");
   const no = make("button", { type: "button", id: "confirm-no" }, "Cancel");
@@ -70,7 +70,7 @@ export function confirmAction(title: string, text: string, action: string): Prom
   dialog.showModal();
   no.focus();
   return new Promise((resolve) => {
-    // Not by the event `close`: it comes later, and may then meet the next question.
+    // The event `close` is not used: it comes later, and may then answer the next question.
     const settle = (answer: boolean) => {
       dialog.close();
       resolve(answer);

@@ -1,4 +1,4 @@
-/** All vehicles of one run: every part is one draw call, whatever their number. */
+/** All vehicles of one run. Every part is one draw call for any number of vehicles. */
 import {
   BackSide,
   BufferAttribute,
@@ -31,13 +31,13 @@ import {
 import { toScene, toSceneRotation } from "./frames";
 import type { Pose, Run, RunIndex, Vehicle } from "./types";
 
-const kNominalRate = 700; // rad/s, of rotors whose rate is unknown
-const kDrawnRate = 9; // rad/s at the nominal rate: faster ones seem to stand still on a screen
-const kLeastFramePixels = 9; // radius on the screen below which vehicles are drawn larger than they are
+const kNominalRate = 700; // rad/s, for rotors of unknown rate
+const kDrawnRate = 9; // rad/s at the nominal rate: faster rotors seem to stand still on a screen
+const kLeastFramePixels = 9; // least radius on the screen: smaller vehicles are drawn larger than they are
 const kLeastBladePixels = 16;
 const kLeastLoadPixels = 4.5;
 
-/** Where one vehicle is, in scene coordinates. */
+/** Position and attitude of one vehicle, in scene coordinates. */
 export interface Body {
   readonly vehicle: Vehicle;
   readonly airframe: Airframe;
@@ -52,7 +52,7 @@ export interface Body {
 }
 
 /** The same part of all vehicles: one mesh with `count` copies of the geometry, whose vertices look up the matrix of
- * their copy in a texture. Instances would do the same, but software drawing takes each of them for a draw call. */
+ * their copy in a texture. Instancing would do the same, but in software drawing each instance costs a draw call. */
 class Part {
   readonly mesh: Mesh<BufferGeometry, MeshBasicMaterial>;
   private readonly matrices: DataTexture;
@@ -195,7 +195,7 @@ export class Fleet {
     this.group.visible = true;
   }
 
-  /** How much larger than life vehicles are drawn, so that they can be seen from afar. */
+  /** Factors by which vehicles are drawn larger than they are, so that they are visible from a distance. */
   calcScales(metresPerPixel: number): { frame: number; load: number } {
     const radius = this.bodies[0]?.airframe.radius ?? 0.2;
     const load = this.bodies[0]?.loadRadius ?? 0.05;
@@ -203,7 +203,7 @@ export class Fleet {
     return { frame, load: Math.max(1, (kLeastLoadPixels * metresPerPixel) / load) };
   }
 
-  /** Sets every part to where the bodies are, as seen by `camera`. */
+  /** Moves every part to its body, for the view of `camera`. */
   update(camera: Camera, metresPerPixel: number): void {
     const scales = this.calcScales(metresPerPixel);
     this.updateFrames(scales.frame, metresPerPixel);
@@ -260,7 +260,7 @@ export class Fleet {
 
   private updateRotors(scale: number, metresPerPixel: number): void {
     let index = 0;
-    // From afar blades would be noise: then the discs alone are drawn.
+    // Blades of distant rotors would be noise, so only their discs are drawn.
     const hasBlades = ((this.bodies[0]?.airframe.radius ?? 0) * scale) / metresPerPixel >= kLeastBladePixels;
     this.blades.mesh.visible = hasBlades;
     for (const { quad, rotation, airframe, hasPose, rotorRate } of this.bodies) {

@@ -11,7 +11,7 @@ export interface Extent {
   back: number;
   front: number;
   step: number;
-  /** Lines of this many steps are stronger and have labels. */
+  /** Lines at multiples of this many steps are stronger and have labels. */
   major: number;
 }
 
@@ -27,7 +27,7 @@ export class Ground {
     this.build();
   }
 
-  /** Covers this area, in scene coordinates, with a margin. */
+  /** Makes the ground cover this area, in scene coordinates, with a margin. */
   cover(minimum: Vector3, maximum: Vector3): boolean {
     const size = Math.max(maximum.x - minimum.x, maximum.y - minimum.y, 2);
     const step = size <= 24 ? 1 : size <= 120 ? 5 : 50;
@@ -71,7 +71,7 @@ export class Ground {
   }
 }
 
-/** The path of the load as planned, dashed. */
+/** The planned path of the load, dashed. */
 export function makePath(run: Run, index: RunIndex): Line {
   const points = run.path_m.map((point) => toScene(point, new Vector3()));
   const material = new LineDashedMaterial({

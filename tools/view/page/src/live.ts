@@ -1,4 +1,4 @@
-/** The page on a flight: uses subprotocol sls.view.1 and reconnects. */
+/** The page for a live flight: uses subprotocol sls.view.1 and reconnects. */
 import { OperatorBar } from "./operator";
 import {
   addEvent, clearEvents, showBanner, showEmpty, showLink, showPhase, showRun, showStage, showStatus, showTime, type Latency,
@@ -25,7 +25,7 @@ export function startLive(): void {
   new Live(makeShell());
 }
 
-/** A token in the fragment never reaches a server; it leaves the address bar, too. */
+/** Takes the token from the fragment, which is never sent to a server, and removes it from the address bar. */
 function takeToken(): string {
   const token = new URLSearchParams(location.hash.slice(1)).get("token") ?? "";
   if (token) history.replaceState(null, "", location.pathname + location.search);
@@ -146,7 +146,7 @@ class Live {
 
   private setRun(run: Run): void {
     showRun(run);
-    if (this.run?.run_id === run.run_id) return; // the connection was lost and found
+    if (this.run?.run_id === run.run_id) return; // the same run after a reconnection
     this.run = run;
     this.status = null;
     this.newest = null;
@@ -175,7 +175,7 @@ class Live {
 
   private noteEvent(event: FlightEvent): void {
     const key = `${event.run_id} ${event.step} ${event.text}`;
-    if (this.events.has(key)) return; // past events come again with every connection
+    if (this.events.has(key)) return; // every connection sends the past events again
     this.events.add(key);
     addEvent(event);
     this.marks = [...this.marks.slice(1 - kMostMarks), { time: event.sim_time_s, text: event.text, kind: kindOf(event.text) }];
@@ -198,7 +198,7 @@ class Live {
     this.shell.plots.append(rows);
   }
 
-  /** The message after the frame's last work on this thread comes through a channel: layout and paint are counted. */
+  /** Measures the latency up to a message through a channel, which arrives after layout and paint of the frame. */
   private noteFrame(): void {
     if (!this.newest || this.newest.step === this.drawnStep) return;
     this.drawnStep = this.newest.step;

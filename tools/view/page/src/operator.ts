@@ -1,4 +1,4 @@
-/** Buttons that ask the server for something. Shows the reply; asks before what cannot be undone. */
+/** Buttons that send requests to the server. Shows the reply; asks the user before requests that cannot be undone. */
 import { confirmAction, find, isTyping, make, makeIcon, setText } from "./dom";
 import type { Action, Hello, Reply } from "./types";
 
@@ -11,7 +11,7 @@ const kIcons: Record<Action, string> = {
   stop: "M3 3h10v10H3z",
 };
 const kKeys: Record<Action, string> = { start: "Space", pause: "Space", resume: "Space", step: "N", reset: "Shift+R", stop: "Shift+S" };
-const kAnswerTime = 10_000; // ms after which a missing reply is said; steps may take longer
+const kAnswerTime = 10_000; // ms after which a missing reply is shown; steps may take longer
 
 export class OperatorBar {
   private readonly bar = find("bar");
@@ -38,7 +38,7 @@ export class OperatorBar {
     this.build();
   }
 
-  /** Buttons that the server would refuse are disabled. */
+  /** Disables buttons whose request the server would refuse. */
   setPhase(phase: string, step: number, isConnected: boolean): void {
     if (phase === this.phase && isConnected === this.isConnected && (step === 0) === (this.step === 0)) return;
     [this.phase, this.step, this.isConnected] = [phase, step, isConnected];

@@ -46,7 +46,7 @@ export function showBanner(text: string | null, kind: "bad" | "warn" = "bad"): v
   if (text !== null) setText(banner, text);
 }
 
-/** In place of the scene: there is no flight, and how to start one. */
+/** Shows in place of the scene that there is no flight, and how to start one. */
 export function showEmpty(missing: NoRun | null): void {
   const sheet = find("empty");
   sheet.hidden = missing === null;
@@ -76,7 +76,7 @@ interface Line {
   kind?: "warn" | "bad";
 }
 
-/** The list of the run; elements stay, only texts change. */
+/** Shows the list of the run. Elements stay, only their texts change. */
 export function showLines(lines: readonly Line[]): void {
   const list = find("status");
   while (list.children.length > 2 * lines.length) list.lastElementChild!.remove();
@@ -141,7 +141,7 @@ function showParticipants(participants: readonly Participant[]): void {
   place.replaceChildren(make("table", {}, make("thead", {}, make("tr", {}, ...head)), make("tbody", {}, ...body)));
 }
 
-/** Newest first; the oldest go. */
+/** Adds an event at the top and removes the oldest beyond the limit. */
 export function addEvent(event: Pick<FlightEvent, "sim_time_s" | "step" | "text">): void {
   const list = find("events");
   list.querySelector(".none")?.remove();

@@ -1,4 +1,4 @@
-/** Shapes of what is flown, in the scene's body frame: x forward, y left, z up, metres. */
+/** Shapes of the vehicle's parts, in the scene's body frame: x forward, y left, z up, metres. */
 import {
   BoxGeometry,
   BufferAttribute,
@@ -15,7 +15,7 @@ import { mergeGeometries } from "three/examples/jsm/utils/BufferGeometryUtils.js
 import { kQuadColour } from "./colours";
 import type { Rotor, Vehicle } from "./types";
 
-/** Rotors of a run that names none. */
+/** Rotors for a run without a description of rotors. */
 const kDrawnRotors: readonly Rotor[] = [
   { position_m: [0.16, 0.16, 0], spin: 1 },
   { position_m: [-0.16, -0.16, 0], spin: 1 },
@@ -27,7 +27,7 @@ export interface Airframe {
   /** Vehicles of the same key look the same. */
   key: string;
   rotors: readonly Rotor[];
-  /** Of the frame, to the rotors' axes. */
+  /** Radius of the frame, to the rotors' axes. */
   radius: number;
   rotorRadius: number;
 }
@@ -39,7 +39,7 @@ export function makeAirframe(vehicle: Vehicle): Airframe {
   rotors.forEach((one, index) =>
     rotors.slice(index + 1).forEach((other) => {
       const gap = Math.hypot(one.position_m[0] - other.position_m[0], one.position_m[1] - other.position_m[1]);
-      if (gap > 1e-3) nearest = Math.min(nearest, gap); // coaxial rotors share their place
+      if (gap > 1e-3) nearest = Math.min(nearest, gap); // coaxial rotors have the same position
     }),
   );
   return { key: JSON.stringify(rotors), rotors, radius, rotorRadius: Math.min(0.46 * nearest, 0.75 * radius) };
@@ -61,7 +61,7 @@ function paint(geometry: BufferGeometry, colour: Color): BufferGeometry {
   return result;
 }
 
-// `isCoarse`: with few triangles, for fleets that are drawn by software. Their number decides there.
+// `isCoarse`: with few triangles, for fleets drawn by software, where the number of triangles limits the frame rate.
 
 /** Hub in the quadrotor's colour, darker arms and motors, and a light wedge in front. */
 export function makeFrameGeometry({ rotors, radius }: Airframe, isCoarse: boolean): BufferGeometry {
@@ -99,7 +99,7 @@ export function makeBladeGeometry(): BufferGeometry {
   return mergeGeometries([blade, rim]);
 }
 
-/** From the origin along +z; radius and length 1. */
+/** A rod from the origin along +z; radius and length 1. */
 export function makeRodGeometry(): BufferGeometry {
   return new CylinderGeometry(1, 1, 1, 6, 1, true).rotateX(Math.PI / 2).translate(0, 0, 0.5);
 }

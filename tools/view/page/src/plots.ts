@@ -1,4 +1,4 @@
-/** Quantities of one vehicle by time. A plot that is folded or out of sight costs nothing. */
+/** Plots quantities of one vehicle over time. Plots that are folded or out of view are not drawn. */
 import uPlot from "uplot";
 import { onThemeChange, readTheme, type Theme } from "./colours";
 import { Samples, thin, thinToGrid } from "./samples";
@@ -11,7 +11,7 @@ const kDashes = [[], [7, 3], [2, 2], [9, 3, 2, 3], [], [7, 3], [2, 2], [9, 3, 2,
 
 interface Panel {
   description: PlotDescription;
-  /** Of its first series in Samples. */
+  /** Index of its first series in Samples. */
   place: number;
   root: HTMLDetailsElement;
   body: HTMLElement;
@@ -62,21 +62,21 @@ export class Plots {
     this.touch();
   }
 
-  /** All rows of a recording at once. */
+  /** Sets all rows of a recording at once. */
   replace(rows: Rows, index: RunIndex = 0): void {
     this.samples[index].clear();
     this.samples[index].append(rows);
-    if (index === 1) this.rebuild(); // its lines are drawn, too
+    if (index === 1) this.rebuild(); // now the lines of the second recording are drawn, too
     this.touch();
   }
 
-  /** The time that is shown in the scene; null: the newest. */
+  /** Sets the time that the scene shows; null: the newest. */
   setCursor(time: number | null): void {
     this.cursor = time;
     this.touch();
   }
 
-  /** Seconds; null: all there is. */
+  /** Sets the window in seconds; null: all data. */
   setWindow(seconds: number | null): void {
     this.window = seconds;
     this.touch();
@@ -121,7 +121,7 @@ export class Plots {
     }
   }
 
-  /** In a recording the window is about the cursor, in a flight it ends with the newest sample. */
+  /** In a recording the window is around the cursor; in a live flight it ends with the newest sample. */
   private calcWindow(): [number, number] {
     const filled = this.samples.filter(({ count }) => count > 0);
     const first = Math.min(...filled.map(({ time }) => time[0]!));
@@ -234,7 +234,7 @@ export class Plots {
     if (left >= 0) this.seek(plot.posToVal(left, "x"));
   }
 
-  /** Under the pointer; else at the time shown, or the newest. */
+  /** Shows the values under the pointer, otherwise those at the time shown, or the newest. */
   private showReadouts(panel: Panel, index: number | null): void {
     const { plot } = panel;
     const [samples] = this.samples;
@@ -290,7 +290,7 @@ export class Plots {
     this.schedule();
   }
 
-  /** Colours are part of a plot. */
+  /** Makes the plots again, because their colours cannot be changed. */
   private rebuild(): void {
     this.theme = readTheme();
     for (const panel of this.panels) {
@@ -307,7 +307,7 @@ export class Plots {
   }
 }
 
-/** Some room about the values, and none that shakes about a constant. */
+/** Range of an axis: some room around the values. A least size keeps it steady for a nearly constant value. */
 function calcRange(_: uPlot, least: number | null, greatest: number | null): uPlot.Range.MinMax {
   if (least === null || greatest === null) return [-1, 1];
   const size = Math.max(greatest - least, 1e-3 * Math.max(Math.abs(least), Math.abs(greatest)), 1e-6);

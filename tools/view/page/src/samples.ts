@@ -1,4 +1,4 @@
-/** The plotted data of one vehicle: numbers by time, of bounded memory. */
+/** The plotted data of one vehicle: numbers over time, in bounded memory. */
 import type { PlotDescription } from "./series";
 import type { Rows } from "./types";
 
@@ -16,7 +16,7 @@ export class Samples {
     this.values = this.calc.map(() => new Float32Array(1024));
   }
 
-  /** A row that is not later than the last one begins anew: the run was reset. */
+  /** Appends rows. If a row is not later than the last one (a reset), discards the samples from its time on. */
   append(rows: Rows): void {
     for (let i = 0; i < rows.time.length; ++i) {
       const time = rows.time[i]!;
@@ -52,7 +52,7 @@ export class Samples {
     this.count = this.find(time);
   }
 
-  /** Grows; when it is full, leaves out every second sample of the older half. */
+  /** Grows the memory. At the limit, drops every second sample of the older half. */
   private makeRoom(): void {
     if (this.time.length < kMostSamples) {
       const size = Math.min(kMostSamples, 2 * this.time.length);
@@ -71,7 +71,7 @@ export class Samples {
   }
 }
 
-/** A window of samples with at most two per pixel: of each bucket its least and its greatest value. */
+/** A window of samples with at most two per bucket (pixel): its least and its greatest value. */
 export function thin(samples: Samples, place: number, series: number, from: number, to: number, buckets: number) {
   const first = Math.max(0, samples.find(from) - 1);
   const end = Math.min(samples.count, samples.find(to) + 1);
@@ -81,7 +81,7 @@ export function thin(samples: Samples, place: number, series: number, from: numb
   return thinToGrid(samples.time, arrays, first, end, from, to, buckets);
 }
 
-/** Onto a grid of time that only the window gives, so that two recordings share it; null if a bucket is empty. */
+/** Thins onto a time grid that depends on the window only, so that two recordings share it; null: empty bucket. */
 export function thinToGrid(
   time: Float64Array, arrays: Float32Array[], first: number, end: number, from: number, to: number, buckets: number,
 ): [number[], ...(number | null)[][]] {

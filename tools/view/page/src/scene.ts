@@ -1,4 +1,4 @@
-/** The flight in three dimensions. Draws when something has changed, once a frame at most. */
+/** The flight in three dimensions. Draws after changes, at most once a frame. */
 import { Box3, Color, Scene as World, Vector3, WebGLRenderer, type Line } from "three";
 import { control, View } from "./camera";
 import { onThemeChange, readTheme, type Theme } from "./colours";
@@ -11,12 +11,12 @@ import type { CameraMode, Pose, Run, RunIndex, Trail } from "./types";
 
 export { toScene } from "./frames";
 
-const kManyVehicles = 10; // from here on no smooth edges
+const kManyVehicles = 10; // more vehicles are drawn without smooth edges
 const kSlowFrame = 40; // ms between frames above which fewer pixels are drawn
 const kQuickFrame = 22;
-const kRest = 100; // ms without a request after a frame: the next one follows none
+const kRest = 100; // ms: a frame requested later than this after the last one does not count for `adapt`
 const kFramesJudged = 12;
-const kScales = [1, 0.75, 0.5, 0.4]; // the last two of fleets alone
+const kScales = [1, 0.75, 0.5, 0.4]; // the last two for fleets only
 const kPickPixels = 26;
 
 interface Layer {
@@ -49,7 +49,7 @@ export class Scene {
   private request = 0;
   private scale = 0; // index into kScales
   private lastFrame = 0;
-  private requested = 0; // when the frame that is drawn next was
+  private requested = 0; // time of the request for the next frame
   private intervals: number[] = [];
   private frameCount = 0;
   private readonly frameTimes: number[] = [];
@@ -110,13 +110,13 @@ export class Scene {
     this.invalidate();
   }
 
-  /** Instead of what poses have left: for a recording whose time jumps. */
+  /** Replaces the trail that poses have left: for a jump in time of a recording. */
   setTrail(vehicleId: number, trail: Trail, index: RunIndex = 0): void {
     this.layers[index]?.trails.replace(vehicleId, trail);
     this.invalidate();
   }
 
-  /** Takes recording `index` out of the picture. */
+  /** Removes recording `index` from the picture. */
   clearRun(index: RunIndex): void {
     const layer = this.layers[index];
     if (!layer) return;
@@ -148,7 +148,7 @@ export class Scene {
     this.drawn = act;
   }
 
-  /** Puts path and vehicles into the picture. */
+  /** Moves the camera so that path and vehicles fit into the picture. */
   fit(): void {
     const box = new Box3();
     let pathTop = -Infinity;
@@ -163,7 +163,7 @@ export class Scene {
     }
     if (box.isEmpty()) box.set(new Vector3(-2, -2, 0), new Vector3(2, 2, 2));
     this.ground.cover(box.min, box.max);
-    // The rod above the planned path of the load.
+    // Includes the rod above the planned path of the load.
     const rod = Math.max(...(this.layers[0]?.run.vehicles.map((vehicle) => vehicle.rod_length_m) ?? [1]));
     box.expandByPoint(new Vector3(box.min.x, box.min.y, Math.max(box.max.z, pathTop + rod)));
     if (box.min.z > 0) box.min.z = 0;
@@ -216,7 +216,7 @@ export class Scene {
     return { quad, load, reference: body.hasReference ? place(body.reference) : null };
   }
 
-  /** Of the picture: mode, target in frame W, metres across its height at the target, area in CSS pixels. */
+  /** The camera: mode, target in frame W, metres across the picture's height at the target, area in CSS pixels. */
   camera() {
     const { left, top, width, height } = this.canvas.getBoundingClientRect();
     const { x, y, z } = this.view.target;
@@ -237,7 +237,7 @@ export class Scene {
     this.drawn();
   }
 
-  /** Fewer pixels while frames that follow one another take too long; more again when they do not. */
+  /** Draws fewer pixels while consecutive frames take too long, and more again when they do not. */
   private adapt(now: number): void {
     const interval = now - this.lastFrame;
     this.lastFrame = now;
@@ -260,7 +260,7 @@ export class Scene {
     return renderer;
   }
 
-  /** A context keeps its smooth edges, so that another canvas takes the place of this one. */
+  /** Replaces the canvas, because a WebGL context cannot change its smooth edges. */
   private useSmoothEdges(isSmooth: boolean): void {
     if (this.renderer.getContextAttributes().antialias === isSmooth) return;
     const canvas = this.canvas.cloneNode() as HTMLCanvasElement;

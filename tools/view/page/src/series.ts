@@ -1,4 +1,4 @@
-/** Which quantities are plotted, and how they follow from a row. */
+/** The plotted quantities, and their computation from a row. */
 import { Columns, type Run } from "./types";
 
 const kDegrees = 180 / Math.PI;
@@ -24,7 +24,7 @@ export function calcEuler(w: number, x: number, y: number, z: number): [number, 
   ];
 }
 
-/** The plots of a run; those for which it has no columns are left out. */
+/** The plots of a run, without those for which it has no columns. */
 export function describePlots(run: Run): PlotDescription[] {
   const columns = new Columns(run.columns);
   const plots: PlotDescription[] = [];

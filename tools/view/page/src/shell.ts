@@ -5,7 +5,7 @@ import { Scene } from "./scene";
 import type { CameraMode, Pose, Run, RunIndex } from "./types";
 
 const kTableTime = 400; // ms between updates of the table
-const kTextTime = 2000; // of the text that stands for the scene
+const kTextTime = 2000; // ms between updates of the text that describes the scene
 
 export interface Shell {
   /** Null if the browser has no WebGL: the table takes its place. */
@@ -118,7 +118,7 @@ function setUpTheme(): void {
     try {
       return localStorage.getItem(key);
     } catch {
-      return null; // not allowed in a file
+      return null; // not allowed on a page from a file
     }
   };
   const apply = () => void (root.dataset.theme = load() ?? (system.matches ? "light" : "dark"));
@@ -129,7 +129,7 @@ function setUpTheme(): void {
     try {
       localStorage.setItem(key, theme);
     } catch {
-      // Then it lasts as long as the page.
+      // The setting then lasts as long as the page.
     }
     root.dataset.theme = theme;
   });
@@ -147,7 +147,7 @@ function setUpKeys(): void {
   });
 }
 
-/** Positions in numbers: the scene's alternative. Costs nothing while it is hidden. */
+/** Positions as numbers, the alternative to the scene. Not updated while it is hidden. */
 class Table {
   private readonly root = find("table");
   private readonly toggle = find<HTMLButtonElement>("table-toggle");

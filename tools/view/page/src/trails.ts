@@ -1,11 +1,11 @@
-/** Where quadrotors and loads have been: one buffer of line segments for all vehicles, of bounded length. */
+/** Trails of quadrotors and loads: one buffer of line segments for all vehicles, of bounded length. */
 import { BufferAttribute, BufferGeometry, Color, DynamicDrawUsage, LineBasicMaterial, LineSegments } from "three";
 import { kLoadColour, kQuadColour } from "./colours";
 import { toScene } from "./frames";
 import type { Pose, Run, RunIndex, Trail } from "./types";
 import { Vector3 } from "three";
 
-const kMostSegments = 12_000; // of all vehicles and both trails: software draws 20 frames a second with so many
+const kMostSegments = 12_000; // of all vehicles and both trails: software then draws 20 frames a second
 const kMostSlots = 1_500; // of one vehicle
 const kFloats = 12; // of one vehicle in one slot: two trails × two ends × xyz
 
@@ -54,7 +54,7 @@ export class Trails {
       const end = this.last.subarray(6 * place, 6 * place + 6);
       const at = start + place * kFloats;
       toScene(pose.quad, point);
-      write(values, at, end, 0, isJump || this.next % 2 === 1); // the quadrotor's is dotted
+      write(values, at, end, 0, isJump || this.next % 2 === 1); // the quadrotor's trail is dotted
       toScene(pose.load, point);
       write(values, at + 6, end, 3, isJump);
     }
@@ -124,7 +124,7 @@ export class Trails {
 
 const point = new Vector3();
 
-/** Writes the segment from `end` to `point`, or none, and moves `end` there. */
+/** Writes the segment from `end` to `point`, or none for a gap, and moves `end` to `point`. */
 function write(values: Float32Array, at: number, end: Float32Array, offset: number, isGap: boolean): void {
   if (isGap) {
     values.fill(0, at, at + 6);

@@ -24,10 +24,10 @@ export interface Vehicle {
   quad_mass_kg: number;
   load_mass_kg: number;
   rod_length_m: number;
-  /** Where the rod begins, in the body frame. */
+  /** Attachment of the rod, in the body frame. */
   attachment_m: Vector3;
   rotors: Rotor[];
-  /** True of a point mass: it has no rotors, the page draws some. */
+  /** True for a point mass: it has no rotors, the page draws some. */
   is_drawn_only?: boolean;
 }
 
@@ -43,7 +43,7 @@ export interface Run {
   scenario: string;
   mode: string;
   period_s: number;
-  /** Wanted; 0 in lockstep. */
+  /** Target; 0 in lockstep. */
   real_time_factor: number;
   has_attitude: boolean;
   vehicles: Vehicle[];
@@ -54,7 +54,7 @@ export interface Run {
   path_m: Vector3[];
 }
 
-/** Where the columns of rows are. */
+/** Indices of the columns of rows. */
 export class Columns {
   readonly count: number;
   private readonly places = new Map<string, number>();
@@ -70,7 +70,7 @@ export class Columns {
   }
 }
 
-/** One vehicle at one step. Copy it to keep it: the arrays may be used again for the next step. */
+/** One vehicle at one step. Copy it to keep it: the arrays may be reused for the next step. */
 export interface Pose {
   vehicleId: number;
   kind: AnswerKind;
@@ -85,7 +85,7 @@ export interface Pose {
   rotorRate: number;
 }
 
-/** Where a vehicle has been: x, y, z of each point one after another, as many points in both. */
+/** Past positions of a vehicle: x, y, z of each point one after another; both arrays have the same length. */
 export interface Trail {
   quad: ArrayLike<number>;
   load: ArrayLike<number>;
@@ -107,7 +107,7 @@ export interface Participant {
   vehicle_ids: number[];
   ready: boolean;
   done: boolean;
-  /** Recorder: all rows up to here are in; −1: none. */
+  /** Recorder: it has all rows up to this step; −1: none. */
   last_complete_step: number;
 }
 
@@ -141,7 +141,7 @@ export interface FlightEvent {
   text: string;
 }
 
-/** A place in time that plots and slider show. */
+/** A mark at a time, shown by plots and slider. */
 export interface Mark {
   time: number;
   text: string;
@@ -178,7 +178,7 @@ export type CameraMode = "free" | "follow" | "top" | "side";
 /** 0: the flight or recording; 1: a second recording laid over it, drawn translucent. */
 export type RunIndex = 0 | 1;
 
-/** The data block `sls-mode` of the page: what the page is there for. */
+/** The data block `sls-mode` of the page: it selects what the page shows. */
 export interface PageMode {
   mode: "live" | "replay" | "embedded";
   /** Addresses, or `#id` of data blocks. */

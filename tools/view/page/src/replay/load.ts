@@ -1,7 +1,7 @@
-/** Gets the bytes of a recording: from sls_view, or out of the page itself. */
+/** Gets the bytes of a recording: from sls_view, or from the page itself. */
 import { parseRecording, type Recording } from "./recording";
 
-/** `source`: an address, or `#id` of a data block. @throws Error in words for the reader of the page. */
+/** `source`: an address, or `#id` of a data block. @throws Error with a text that the page shows. */
 export async function loadRecording(source: string): Promise<Recording> {
   const bytes = source.startsWith("#") ? readBlock(source.slice(1)) : await fetchBytes(source);
   try {

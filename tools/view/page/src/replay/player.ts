@@ -1,4 +1,4 @@
-/** Which simulated time is shown, and how it goes on. No drawing here. */
+/** The simulated time that is shown, and its progress. No drawing here. */
 
 export const kSpeeds = [0.1, 0.25, 0.5, 1, 2, 5, 10] as const;
 
@@ -28,7 +28,7 @@ export class Player {
     this.speedIndex = Math.min(kSpeeds.length - 1, Math.max(0, this.speedIndex + by));
   }
 
-  /** From the end it begins again. */
+  /** At the end, starts again from the beginning. */
   play(): void {
     if (this.time >= this.to) this.time = this.from;
     this.isPlaying = this.to > this.from;
@@ -45,7 +45,7 @@ export class Player {
   /** `passed`: wall time since the last call, s. True if the time jumped back to the beginning. */
   advance(passed: number): boolean {
     if (!this.isPlaying) return false;
-    // After a tab was hidden the flight goes on where it was.
+    // After the tab was hidden, the flight continues from the time where it stopped.
     const next = this.time + Math.min(passed, 0.25) * this.speed;
     if (next < this.to) {
       this.time = next;

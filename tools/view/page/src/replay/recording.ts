@@ -1,4 +1,4 @@
-/** A recording as sls_view packs it (tools/view/replay/README.md): parsed with care, and asked for poses at any time. */
+/** A recording as sls_view packs it (tools/view/replay/README.md): checks its bytes, gives poses at any time. */
 import { AnswerKind, Columns, type Pose, type Rows, type Run } from "../types";
 
 export interface RecordedEvent {
@@ -73,7 +73,7 @@ function keepGood<Item extends object>(list: Item[] | undefined, isGood: (item: 
   return Array.isArray(list) ? list.filter((item) => typeof item === "object" && item !== null && isGood(item)) : [];
 }
 
-/** @throws Error saying what is wrong with the bytes. */
+/** @throws Error that names the defect of the bytes. */
 export function parseRecording(bytes: ArrayBuffer): Recording {
   expect(bytes.byteLength >= 12, `a recording, got ${bytes.byteLength} bytes`);
   const text = new TextDecoder();
@@ -88,7 +88,7 @@ export function parseRecording(bytes: ArrayBuffer): Recording {
   for (const { id, rows: count } of head.vehicles) {
     const size = count * (8 + 4 * columns);
     expect(at + size <= bytes.byteLength, `${size} bytes of vehicle ${id}, got ${bytes.byteLength - at}`);
-    // Copied: times of a second vehicle may begin at any multiple of 4.
+    // Copied, because the times of a second vehicle may begin at any multiple of 4 bytes.
     const time = new Float64Array(bytes.slice(at, at + 8 * count));
     const values = new Float32Array(bytes.slice(at + 8 * count, at + size));
     expect(isAscending(time), `ascending times of vehicle ${id}`);
@@ -148,7 +148,7 @@ export class Recording {
     return this.rows.get(vehicleId);
   }
 
-  /** The rows of a vehicle with the columns of another recording; NaN if this one has none. */
+  /** The rows of a vehicle with the columns of another recording; NaN in columns that this one does not have. */
   rowsAs(columns: Columns, vehicleId: number): Rows | undefined {
     const rows = this.rows.get(vehicleId);
     const isSame = columns.count === this.columns.count &&
@@ -163,7 +163,7 @@ export class Recording {
     return { vehicleId, time: rows.time, values, columns: columns.count };
   }
 
-  /** Poses of all vehicles that have rows around `time`; of those before their first or after their last row, that. */
+  /** Poses of all vehicles at `time`; before the first and after the last row of a vehicle, the pose of that row. */
   posesAt(time: number): Pose[] {
     return this.vehicleIds.map((id) => this.poseAt(id, time));
   }
@@ -173,7 +173,7 @@ export class Recording {
     const before = findRow(rows.time, time);
     const after = Math.min(before + 1, rows.time.length - 1);
     const span = rows.time[after]! - rows.time[before]!;
-    // Between rows further apart than usual some are missing: the vehicle stays where it was.
+    // A larger distance between two rows shows missing rows: the vehicle then stays at its last position.
     const isGap = span > 1.5 * this.spacing + 1e-9;
     const u = span > 0 && !isGap ? Math.min(1, Math.max(0, (time - rows.time[before]!) / span)) : 0;
     const [a, b] = [before * rows.columns, after * rows.columns];
@@ -211,7 +211,7 @@ export class Recording {
   }
 }
 
-/** Index of the last row that is not after `time`; 0 if all are. */
+/** Index of the last row at or before `time`; 0 if there is none. */
 export function findRow(times: Float64Array, time: number): number {
   let [low, high] = [0, times.length - 1];
   while (low < high) {
@@ -228,7 +228,7 @@ export function distance(a: ArrayLike<number>, b: ArrayLike<number>): number {
 
 const mix = (a: number, b: number, u: number) => (u === 0 || !Number.isFinite(b) ? a : a + (b - a) * u);
 
-/** Cubic through both positions with both velocities: what lies between two kept steps. */
+/** Position between two kept steps: the cubic with both positions and both velocities. */
 function calcBetween(
   values: Float32Array, a: number, b: number, position: number, velocity: number, u: number, span: number,
 ): number[] {
@@ -242,7 +242,7 @@ function calcBetween(
   });
 }
 
-/** Between two attitudes w, x, y, z along the shorter way; level where there are none. */
+/** Attitude between two attitudes w, x, y, z along the shorter way; level if there is none. */
 function calcAttitude(a: ArrayLike<number>, b: ArrayLike<number>, u: number): number[] {
   const from = Array.from(a);
   const to = Array.from(b);

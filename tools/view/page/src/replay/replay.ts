@@ -1,4 +1,4 @@
-/** The page on one or two recordings: from sls_view, or out of the page itself. */
+/** The page for one or two recordings: from sls_view, or from the page itself. */
 import { find, make, setText } from "../dom";
 import { showBanner, showLines, showPhase, showRun, showStage, showTime } from "../panels";
 import { makeShell, type Shell } from "../shell";
@@ -27,7 +27,7 @@ const kKeys: [string, string][] = [
   ["?", "these keys"],
 ];
 
-/** Shows the recordings of `mode`; what is wrong with them, it says on the page. */
+/** Shows the recordings of `mode`, or on the page the error that they have. */
 export async function startReplay(mode: PageMode): Promise<void> {
   const shell = makeShell();
   find("link").hidden = true;
@@ -80,13 +80,13 @@ class Replay {
     this.showVehicle();
     this.jump();
     this.expose();
-    // A report has other things to read; and not everybody likes what moves by itself.
+    // No automatic start in a report, whose text is read first, or if the user prefers reduced motion.
     const isQuiet = window.parent !== window || matchMedia("(prefers-reduced-motion: reduce)").matches;
     if (!isQuiet) this.player.play();
     requestAnimationFrame((now) => this.drawFrame(now));
   }
 
-  /** Recordings in the place of participants, marks in that of live events. */
+  /** Shows recordings in place of participants, and marks in place of live events. */
   private makePanels(): HTMLElement {
     const panel = find("participants-panel");
     setText(panel.querySelector("h2")!, this.recordings.length > 1 ? "Recordings" : "Recording");
@@ -102,7 +102,7 @@ class Replay {
     return list;
   }
 
-  /** The parts that do not change with time. */
+  /** Shows the texts that do not change with time. */
   private describe(): void {
     const { head, run } = this.main;
     showRun(run);
@@ -121,7 +121,7 @@ class Replay {
     ]);
   }
 
-  /** Plots, marks and comparison of the vehicle that is selected. */
+  /** Shows plots, marks and comparison of the selected vehicle. */
   private showVehicle(): void {
     const vehicleId = this.shell.selected();
     this.shell.plots.setRun(this.main.run);
@@ -184,7 +184,7 @@ class Replay {
     requestAnimationFrame((next) => this.drawFrame(next));
   }
 
-  /** After a jump in time trails are what was flown until then. */
+  /** After a jump in time, sets the trails to the flight until that time. */
   private jump(): void {
     this.shownTime = NaN;
     this.show();
@@ -255,7 +255,7 @@ class Replay {
   }
 }
 
-/** By folders; of the same name by their runs, too. */
+/** Names by folder; recordings with the same name get numbers, too. */
 function nameRecordings(recordings: Recording[]): string[] {
   const names = recordings.map(({ head }) => head.name);
   const isUnique = new Set(names).size === names.length;
@@ -268,7 +268,7 @@ function describeFault({ kind, on }: RecordedFault): string {
   return kind === "fail_safe" ? "no answer: fail-safe force" : `controller reports ${kind}`;
 }
 
-/** The flight until `time`. */
+/** Trail of the flight until `time`. */
 function makeTrail(recording: Recording, vehicleId: number, time: number): Trail {
   const rows = recording.rowsOf(vehicleId)!;
   const last = findRow(rows.time, time);

@@ -3,19 +3,19 @@ import { isTyping, make } from "../dom";
 import { kSpeeds, type Player } from "./player";
 import type { Mark } from "../types";
 
-/** A mark that may last: `to` is its end. */
+/** A mark that may be an interval: `to` is its end. */
 export interface TimelineMark extends Mark {
   to?: number;
 }
 
 export interface TimelineOptions {
   player: Player;
-  /** Seconds of one press of an arrow key: the time between two rows. */
+  /** Seconds for one press of an arrow key: the time between two rows. */
   step: number;
-  /** Where the buttons of the marks go: a list. */
+  /** The list that holds the buttons of the marks. */
   list: HTMLElement;
   onSeek(): void;
-  /** In words, beside the time: the stage. */
+  /** Text beside the time: the stage. */
   describe(): string;
 }
 
@@ -92,7 +92,7 @@ export class Timeline {
     );
   }
 
-  /** Shows what the player's state is. */
+  /** Shows the state of the player. */
   update(): void {
     const { player } = this.options;
     const text = player.isPlaying ? "Pause" : "Play";
@@ -125,7 +125,7 @@ export class Timeline {
     this.update();
   }
 
-  /** To the mark before or after the time that is shown. */
+  /** Jumps to the mark before or after the time that is shown. */
   private seekMark(direction: 1 | -1): void {
     const { time } = this.options.player;
     const others = this.marks.filter((mark) => (mark.time - time) * direction > 1e-6);
@@ -157,7 +157,7 @@ export class Timeline {
   }
 }
 
-/** To a hundredth of a second. */
+/** Seconds with two decimals. */
 export function formatTime(seconds: number): string {
   return seconds.toFixed(2);
 }
