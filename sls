@@ -96,10 +96,10 @@ SCENARIO is a name in config/scenarios or a path.
 EOF
 }
 
-# Whether --help or -h is among the arguments of the command.
+# True if --help or -h is among the arguments of the command.
 is_help_asked() { [[ " ${arguments[*]} " == *' --help '* || " ${arguments[*]} " == *' -h '* ]]; }
 
-# command_usage COMMAND: help of a command that this launcher implements; false for the others.
+# command_usage COMMAND: prints the help of a command that this launcher implements; false for other commands.
 command_usage() {
   case $1 in
     demo)
@@ -179,7 +179,7 @@ EOF
 
 # --- set-up and build -----------------------------------------------------------------------------
 
-# setup [PACKAGE…]: installs the packages for building and flying, and those named.
+# setup [PACKAGE…]: installs the packages for building and flying, and the given ones.
 setup() {
   if ((is_installed)); then
     install_missing "$@"
@@ -190,7 +190,7 @@ setup() {
   install_node_modules "$root/tools/view/page"
 }
 
-# Node and npm bundle the page: Debian's, unless others are installed.
+# Node and npm bundle the page. Installs Debian's unless others are installed.
 install_node() {
   local missing=()
   command -v node >/dev/null || missing+=(nodejs)
@@ -203,8 +203,8 @@ install_node() {
   fi
 }
 
-# install_node_modules FOLDER: installs the packages of its lock file if that has changed. Does nothing if the
-# folder is missing, as in docker/Dockerfile, which copies the launcher first.
+# install_node_modules FOLDER: installs the packages of FOLDER's lock file if this file has changed. Does nothing if
+# FOLDER is missing, as in docker/Dockerfile, which copies the launcher first.
 install_node_modules() {
   local lock="$1/package-lock.json" installed="$1/node_modules/.package-lock.json" log
   [[ -f $lock ]] || return 0
@@ -279,7 +279,7 @@ build_programs() {
 # Processes this launcher started: name by process id.
 declare -A name_of=()
 
-# If this launcher is killed, the kernel ends the process.
+# start PROGRAM [ARGUMENTS…]. If this launcher is killed, the kernel ends the program.
 start() {
   local name=$1
   shift
@@ -292,7 +292,7 @@ signal_all() {
   kill "-$1" "${!name_of[@]}" 2>/dev/null || true
 }
 
-# The page of a flight is no part of the flight: the launcher ignores its end and its exit code.
+# The viewer is not part of the flight: the launcher ignores its end and its exit code.
 viewer=''
 start_viewer() {
   setpriv --pdeathsig TERM -- "$build/bin/sls_view" "$@" &
@@ -312,7 +312,7 @@ on_signal() {
   signal_all "$2"
 }
 
-# Waits for all processes; the exit code of the run is in `result`. When one fails, the others
+# Waits for all processes and puts the exit code of the run into `result`. When one fails, the others
 # cannot finish the run: they get SIGTERM, close their files and end.
 wait_all() {
   result=0
@@ -386,7 +386,7 @@ fly() {
     return
   fi
 
-  # One line about a mistake, before three programs fail.
+  # Checks first, so that a mistake gives one error line and not one from each program.
   "$build/bin/sim_server" --check --scenario "$file" "${qos[@]}" "${domain[@]}" "${timing[@]}" >/dev/null ||
     exit $?
   "$build/bin/recorder" --check --out "$recording" "${force[@]}" "${qos[@]}" "${domain[@]}" ||
@@ -402,7 +402,7 @@ fly() {
 
 # --- the summary of a flight ----------------------------------------------------------------------
 
-# Beside the published figures of the same figure eight, second lap.
+# Prints the errors of the second lap beside the published figures of the same figure eight.
 print_comparison() {
   local lap cells row='  %-34s %9s %9s %9s  %9s %9s\n'
   read -ra lap < <(awk '$1 == "lap" && $2 == "2" && $3 != "(part)" { print $3, $4, $5, $6, $7 }' \
@@ -517,7 +517,7 @@ cmd_convert() {
   exec "$build/bin/sls_convert" "$@"
 }
 
-# run_python COMMAND…: -P: Python imports nothing from the working folder; -B: no files beside it.
+# run_python COMMAND…. -P: Python imports nothing from the working folder; -B: it writes no compiled files.
 run_python() {
   install_missing "${python_packages[@]}"
   PYTHONPATH="$python_path" exec /usr/bin/python3 -BP -m sls "$@"
@@ -633,7 +633,7 @@ cmd_fuzz() {
   done
 }
 
-# run_fuzzer FOLDER TARGET SECONDS: what it finds new is kept in FOLDER/corpus, a crash ends us.
+# run_fuzzer FOLDER TARGET SECONDS: keeps new inputs in FOLDER/corpus; ends the launcher at a crash.
 run_fuzzer() {
   local corpus="$1/corpus/$2" crashes="$1/crashes/$2" log="$1/$2.log" seeds
   case $2 in
@@ -644,7 +644,7 @@ run_fuzzer() {
   mkdir -p "$corpus" "$crashes"
   local scratch
   scratch="$(mktemp -d)"  # a target that crashes does not tidy up
-  # The libraries from packages are not instrumented, so a container may not be watched in them.
+  # Libraries from packages are not instrumented, so overflow checks of containers would give false errors.
   if ! TMPDIR=$scratch ASAN_OPTIONS=detect_container_overflow=0 "$1/fuzz/$2_fuzzer" "$corpus" \
     "${seeds[@]}" -max_total_time="$3" -timeout=10 -rss_limit_mb=1024 -max_len=33000 \
     -artifact_prefix="$crashes/" >"$log" 2>&1; then
@@ -677,7 +677,7 @@ cmd_test() {
   install_node_modules "$root/tests/tools/view"
   build_tree "$preset" "$folder" "${targets[@]}"
   cd "$root"
-  # Nothing the middleware reads from the environment may reach the tests.
+  # The tests must not get variables that the middleware reads from the environment.
   env -u ROS_DISCOVERY_SERVER -u FASTRTPS_DEFAULT_PROFILES_FILE -u SLS_DOMAIN \
     ctest --preset "$preset" --parallel "$(nproc)" "${which[@]}"
 }

@@ -1,4 +1,4 @@
-# Read by find_package(sls). The libraries are static: a program that links them links what they use.
+# Read by find_package(sls). The libraries are static: a program that links them also links their dependencies.
 include(CMakeFindDependencyMacro)
 find_dependency(Eigen3 NO_MODULE)
 find_dependency(Simbody)

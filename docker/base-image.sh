@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Makes the base image of Dockerfile from Debian's packages, where no image registry is reachable.
-# Needs root, debootstrap and a Docker engine; the mirror is the one apt uses on this machine.
+# Makes the base image of Dockerfile from Debian's packages if no image registry is reachable.
+# Needs root, debootstrap and a Docker engine. Uses the mirror that apt uses on this machine.
 set -euo pipefail
 
 say() { echo "base-image.sh: $*" >&2; }
@@ -28,7 +28,7 @@ if ! debootstrap --variant=minbase bookworm "$folder/root" "$mirror" >"$folder/l
   tail -n 5 "$folder/log" >&2
   fail "debootstrap failed"
 fi
-# As the registry's slim image: no documentation, no package lists.
+# Like the slim image of the registry: no documentation, no package lists.
 rm -rf "$folder"/root/var/cache/apt/* "$folder"/root/var/lib/apt/lists/* \
   "$folder"/root/usr/share/{doc,info,locale,man}/*
 tar -C "$folder/root" -c . | docker import --change 'CMD ["bash"]' - "$image" >/dev/null

@@ -1,4 +1,4 @@
-# ./sls docker-demo, read by the launcher, whose functions it uses: flies one of the compose files.
+# ./sls docker-demo: flies one of the compose files. The launcher sources this file, which uses its functions.
 
 docker_usage() {
   cat <<'TEXT'
@@ -61,7 +61,7 @@ build_image() {
 
 # --- the flight -----------------------------------------------------------------------------------
 
-# Ends what is left: containers, their network, copies of keys; the caller owns the recording.
+# Removes containers, their network and copies of keys; makes root the owner of the recording if root is the caller.
 clean_up() {
   trap '' INT TERM HUP
   signal_all TERM
@@ -77,7 +77,7 @@ container_of() {
     --filter "label=com.docker.compose.service=$1"
 }
 
-# start_service NAME: a process of ours that hands signals, output and exit code of the container on.
+# start_service NAME: starts a process that passes on signals, output and exit code of the container.
 start_service() {
   local id
   id="$(container_of "$1")"
@@ -104,7 +104,7 @@ fly_in_containers() {
     fleet) services=({recorder,server,controller}-{0-3,4-7}) ;;
     discovery) docker start "$(container_of discovery)" >/dev/null ;;
     standby)
-      # Its end is not the flight's.
+      # Not in name_of, so that its end does not end the flight.
       start_service controller
       services=(recorder server standby)
       kill_in_flight &
@@ -118,7 +118,7 @@ fly_in_containers() {
   wait_all
 }
 
-# make_fleet_scenario FILE: FILE with eight vehicles, if it is of one.
+# make_fleet_scenario FILE: prints FILE; adds `vehicles: 8` if FILE does not have this key.
 make_fleet_scenario() {
   cat -- "$1"
   grep -q '^vehicles:' -- "$1" || printf '\nvehicles: 8\n'
@@ -172,7 +172,7 @@ docker_demo() {
   local parts=("$recording") part
   [[ $name != fleet ]] || parts+=("$recording"/{0-3,4-7})
   mkdir -p -- "${parts[@]}"
-  # No program runs as root: a caller who is root lends the folders to the image's user.
+  # No program runs as root. If the caller is root, the image's user owns the folders during the flight.
   local user
   user="$(id -u):$(id -g)"
   if ((EUID == 0)); then
