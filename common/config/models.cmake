@@ -1,5 +1,5 @@
-# How plants, autopilots and laws are built. Each kind has a folder with a registry, a file
-# KINDs.def that names the models, one line each, and a folder for each of them.
+# Build rules of plants, autopilots and laws. Each kind has a folder with a registry, a file
+# KINDs.def that names the models, one on each line, and a folder for each model.
 #
 # sls_add_models(KIND SOURCES …): in the folder of the kind. Makes sls_KIND_keys, which every
 # program links, and sls_KINDs, for the programs that fly or control.
@@ -21,7 +21,7 @@ function(sls_add_models kind)
   endforeach()
 endfunction()
 
-# sls_add_model(KIND KEYS … SOURCES … [LIBRARIES …]): in the folder of one model. KIND is plant,
+# sls_add_model(KIND KEYS … SOURCES … [LIBRARIES …]): call it in the folder of one model. KIND is plant,
 # autopilot or law.
 function(sls_add_model kind)
   cmake_parse_arguments(MODEL "" "" "KEYS;SOURCES;LIBRARIES" ${ARGN})
