@@ -4,7 +4,7 @@ set -euo pipefail
 
 root="$(cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")" && pwd)"
 readonly root
-# Installed, this file is PREFIX/share/sls/sls, beside `bin`, a link to the programs; nothing is built then.
+# If installed, this file is PREFIX/share/sls/sls, `bin` beside it is a link to the programs, and nothing is built.
 if [[ $root == */share/sls && ! -f $root/CMakeLists.txt ]]; then
   readonly is_installed=1 self=sls build="${SLS_BUILD:-$root}"
   readonly python_path="$root/python:$build/python:${root%/share/sls}/lib/python3/dist-packages"

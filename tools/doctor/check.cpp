@@ -41,7 +41,7 @@ std::string to_json(const std::vector<Check>& checks) {
   for (const Check& check : checks)
     list.push_back(
         {{"name", check.name}, {"verdict", to_string(check.verdict)}, {"text", check.text}});
-  // Names of programs and hosts come from the network: what is not UTF-8 is replaced.
+  // Names of programs and hosts come from the network: bytes that are not UTF-8 are replaced.
   return nlohmann::json{{"ok", !is_any_fault(checks)}, {"checks", list}}.dump(
       2, ' ', false, nlohmann::json::error_handler_t::replace);
 }

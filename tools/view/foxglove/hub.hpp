@@ -19,7 +19,7 @@
 
 namespace sls::view::foxglove {
 
-/// A session as the hub sees it.
+/// Interface of a session for the hub.
 class Client {
  public:
   virtual ~Client() = default;

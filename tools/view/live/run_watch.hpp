@@ -40,7 +40,7 @@ class RunWatch {
   std::deque<RunEvent> take_events();
 
  private:
-  /// The values whose change makes a new view.
+  /// The view has changed if one of these values has.
   using Mark = std::tuple<std::uint64_t, std::uint64_t, std::uint64_t, std::size_t, bool, bool>;
 
   std::optional<bus::Run> choose_run() const;

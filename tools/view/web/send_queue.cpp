@@ -24,8 +24,8 @@ bool SendQueue::push(MessageKind kind, Payload payload, Delivery delivery, std::
   return true;
 }
 
-/// Puts a kNewest message in the place of an older one with its key. A stream that is faster than
-/// its client thus keeps its place in the queue. True if there was an older one; it stays if the
+/// Puts a kNewest message in the place of an older one with its key, so a stream that is faster
+/// than its client keeps its place in the queue. True if there was an older one; it stays if the
 /// new one does not fit.
 bool SendQueue::replace(const QueuedMessage& message) {
   const auto found = newest_.find(message.key);
