@@ -24,7 +24,7 @@ using closed_loop::LoopStart;
 using closed_loop::LoopStates;
 using Numbers = py::array_t<double, py::array::c_style>;
 
-/// The memory of `data` as an array that its owner keeps alive and that Python must not write to.
+/// Read-only array on the memory of `data`. The array keeps `owner`, and so the memory, alive.
 template <class Number>
 py::array make_view(const Number* data, std::vector<py::ssize_t> shape, const py::dtype& type,
                     const py::object& owner) {
@@ -61,12 +61,12 @@ std::string describe_array(py::handle object) {
          std::string(py::str(array.attr("shape"))) + order;
 }
 
-/// Row `row` of the values that a reset replaces.
+/// Row `row` of an array of initial values.
 Eigen::Map<const Eigen::VectorXd> find_row(const Numbers& values, std::size_t row) {
   return {values.data(static_cast<py::ssize_t>(row), 0), values.shape(1)};
 }
 
-/// A batch for Python: one caller at a time, who does not hold the GIL while the loops move.
+/// A batch for Python. One thread may call it at a time; the GIL is released while the loops move.
 class PythonBatch {
  public:
   PythonBatch(const config::Scenario& scenario, std::size_t count, std::size_t threads,
@@ -98,7 +98,8 @@ class PythonBatch {
     batch_->step(forces);
   }
 
-  /// `values` holds arrays with a row for each of `which`; what it leaves out is the scenario's.
+  /// `values`: arrays by name, with a row for each loop in `which`. Other initial values are those
+  /// of the scenario.
   void reset(const std::vector<std::size_t>& which, const std::vector<std::uint64_t>& seeds,
              const std::map<std::string, Numbers>& values) {
     std::vector<LoopStart> starts(which.size());
@@ -156,7 +157,7 @@ class PythonBatch {
   }
 
   std::unique_lock<std::mutex> take_turn() {
-    if (::getpid() != process_)  // where a fork has left the threads behind
+    if (::getpid() != process_)  // a fork does not copy the threads of the batch
       throw config::ConfigError(
           "ClosedLoop: expected the process that made it, got a fork of that: make one there");
     std::unique_lock lock(mutex_, std::try_to_lock);

@@ -1,4 +1,4 @@
-// The runs of a campaign: `_sls_core.Runs`, which sls.campaign flies.
+// `_sls_core.Runs`: sls.campaign flies the runs of a campaign with it.
 #include <pybind11/stl.h>
 
 #include <chrono>
@@ -16,7 +16,7 @@ namespace {
 
 namespace py = pybind11;
 
-/// Looks for Ctrl-C ten times a second while C++ works without the interpreter's lock.
+/// Checks for Ctrl-C ten times a second while C++ code runs without the GIL.
 class SignalCheck {
  public:
   void operator()() {
@@ -58,7 +58,7 @@ class Runs {
 
  private:
   closed_loop::CampaignRuns runs_;
-  SignalCheck signals_;  // kept from run to run: most are shorter than its interval
+  SignalCheck signals_;  // one for all runs, because most runs are shorter than its interval
 };
 
 }  // namespace

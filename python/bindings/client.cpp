@@ -32,12 +32,12 @@ namespace {
 namespace py = pybind11;
 using namespace std::chrono_literals;
 
-constexpr const char* kIdentity = "controller";  // whose keys it uses on a secured domain
-constexpr auto kSignalInterval = 50ms;           // in which Python's signal handlers run
-constexpr auto kPatience = 20s;                  // after a signal, as of the programs
+constexpr const char* kIdentity = "controller";  // its keys are used on a secured domain
+constexpr auto kSignalInterval = 50ms;           // between runs of Python's signal handlers
+constexpr auto kPatience = 20s;  // after a stop signal, equal to that of the programs
 
-/// As the programs do where something hangs after a stop signal, such as a law that does not
-/// return.
+/// Ends a process that is still blocked after a stop signal, for example in a law that does not
+/// return. The programs do the same.
 [[noreturn]] void end_process(py::error_already_set& interruption) {
   std::fputs(
       "sls.Client: error: hangs after the stop signal: ends as it is, what it was writing is not "
@@ -46,7 +46,8 @@ constexpr auto kPatience = 20s;                  // after a signal, as of the pr
   ::_exit(interruption.matches(PyExc_KeyboardInterrupt) ? 128 + SIGINT : 128 + SIGTERM);
 }
 
-/// As the option of control_client, which the text of its errors names.
+/// Parses `vehicles` like the option `--vehicles` of control_client. The text of the errors begins
+/// with the name of this option.
 std::vector<std::uint32_t> parse_vehicles(const std::string& text, std::size_t fleet_size) {
   try {
     return config::parse_vehicle_ids(text, fleet_size);
@@ -55,7 +56,7 @@ std::vector<std::uint32_t> parse_vehicles(const std::string& text, std::size_t f
   }
 }
 
-/// A client whose law is a Python object. It installs no signal handlers: Python's count.
+/// A client whose law is a Python object. It installs no signal handlers and uses those of Python.
 class PythonClient {
  public:
   PythonClient(const py::object& law, const config::Scenario& scenario, const std::string& name,
@@ -74,14 +75,14 @@ class PythonClient {
     options_.follows_servers = follow;
     options_.is_stopped = [this] { return is_stopped_.load(); };
     prepare_law();
-    // A law that cannot be made is refused before anybody waits for this client.
+    // Makes a law and discards it: an invalid law is refused before a server waits for this client.
     control::FlightController(config::make_vehicle_scenario(scenario_, vehicle_ids_.front()),
                               vehicle_ids_.front(), false, options_.make_law);
   }
 
   void stop() { is_stopped_ = true; }
 
-  /// Flies in a thread of its own, so that this one can run Python's signal handlers.
+  /// Flies in a second thread, because the calling thread runs Python's signal handlers.
   void run() {
     if (is_running_.exchange(true))
       throw config::ConfigError("Client.run: expected one call at a time, another is at work");
@@ -114,7 +115,7 @@ class PythonClient {
  private:
   using Clock = std::chrono::steady_clock;
 
-  /// Each run has laws, and errors of laws, of its own.
+  /// Prepares new laws and a new list of their errors for the next run.
   void prepare_law() {
     const bool has_attitude =
         config::find_model_keys(config::plant_keys(), scenario_.plant.model).has_attitude();
@@ -139,7 +140,7 @@ class PythonClient {
     done_.notify_all();
   }
 
-  /// Waits for the end, a moment at most; true: it has come.
+  /// Waits for the end of the flight for kSignalInterval at most. True if the flight has ended.
   bool wait() {
     const py::gil_scoped_release release;
     std::unique_lock lock(mutex_);
@@ -157,7 +158,7 @@ class PythonClient {
   std::atomic<bool> is_stopped_{false};
   std::atomic<bool> is_running_{false};
 
-  std::mutex mutex_;  // over what follows
+  std::mutex mutex_;  // protects the members below
   std::condition_variable done_;
   bool is_done_ = false;
   std::exception_ptr failure_;

@@ -14,14 +14,16 @@ namespace {
 
 namespace py = pybind11;
 
-/// Of sls/errors.py: pure Python code raises the same classes where this module is not built.
+/// The class `name` of sls/errors.py. The classes are defined in Python, because code that runs
+/// without this module raises them, too.
 py::handle find_type(const char* name) {
   static const py::handle module = py::module_::import("sls.errors").release();
-  return py::object(module.attr(name)).release();  // lives as long as the interpreter
+  return py::object(module.attr(name)).release();  // never freed
 }
 
 void raise_os_error(const std::system_error& error) {
-  // One argument: the text alone, which has the place and the cause. Two would put [Errno …] first.
+  // The text, which has the place and the cause, is the only argument: with two arguments Python
+  // would print [Errno …] before it.
   const py::object raised = py::handle(PyExc_OSError)(error.what());
   raised.attr("errno") = error.code().value();
   PyErr_SetObject(PyExc_OSError, raised.ptr());

@@ -37,7 +37,7 @@ Ids list_ids(const config::Scenario& scenario, std::optional<std::uint32_t> vehi
 
 std::unique_ptr<FlownFlight> fly(config::Scenario scenario, const py::object& controller,
                                  std::optional<std::uint32_t> vehicle, bool check_purity) {
-  scenario.sync.mode = config::SyncMode::kLockstep;  // nothing here is ever late
+  scenario.sync.mode = config::SyncMode::kLockstep;  // no answer can be late in one process
   const Ids ids = list_ids(scenario, vehicle);
   closed_loop::FlightOptions options;
   options.checks_purity = check_purity;
@@ -54,9 +54,9 @@ std::unique_ptr<FlownFlight> fly(config::Scenario scenario, const py::object& co
   options.controller_name = "python";
   options.make_law =
       make_python_law_maker(controller, plants.front().plant->has_attitude(), errors);
-  scenario.controller.law.name = name_controller(controller);  // in messages
-  // The GIL stays held, for the law needs it at every step: others get it while the law runs, as
-  // under any Python code, and at every rest.
+  scenario.controller.law.name = name_controller(controller);  // for messages
+  // The flight holds the GIL, because the law needs it at every step. Other threads get it while
+  // the law runs, as during any Python code, and at each call of the lambda below.
   try {
     return std::make_unique<FlownFlight>(scenario, ids, options, [] {
       check_signals();
@@ -64,11 +64,11 @@ std::unique_ptr<FlownFlight> fly(config::Scenario scenario, const py::object& co
     });
   } catch (const app::RunError&) {
     errors->raise_first();
-    throw;  // refused by the check of purity
+    throw;  // the check of purity has refused the law
   }
 }
 
-/// The rows of a vehicle, (steps, columns), without a copy: they live as long as an array on them.
+/// The rows of a vehicle, (steps, columns), without a copy. The array keeps their memory alive.
 py::array make_rows(const py::object& self, std::size_t index) {
   const RowBuffer& rows = py::cast<const FlownFlight&>(self).rows(index);
   const auto to_size = [](std::size_t size) { return static_cast<py::ssize_t>(size); };

@@ -28,7 +28,7 @@ class Writer {
   explicit Writer(double* cell) : cell_(cell) {}
   void add(double value) { *cell_++ = value; }
   void add(std::uint64_t value) { std::memcpy(cell_++, &value, sizeof value); }
-  /// All numbers of an object that holds nothing else.
+  /// Adds all members of an object that consists of doubles only.
   template <class Doubles>
   void add_all(const Doubles& doubles) {
     static_assert(std::is_standard_layout_v<Doubles> && sizeof(Doubles) % sizeof(double) == 0);
@@ -43,7 +43,7 @@ class Writer {
   double* cell_;
 };
 
-/// Reads one, in the same order.
+/// Reads a row, in the order in which Writer wrote it.
 class Reader {
  public:
   explicit Reader(const double* cell) : cell_(cell) {}
@@ -67,7 +67,8 @@ class Reader {
   const double* cell_;
 };
 
-// The order is that of the columns in state.csv and reference.csv, and of the numbers in memory.
+// add_all copies these types as blocks: their members have the order of the columns in state.csv
+// and reference.csv, without gaps.
 static_assert(sizeof(model::SlungLoadState) == 16 * sizeof(double));
 static_assert(sizeof(model::Reference) == 15 * sizeof(double));
 
@@ -90,7 +91,7 @@ void read_attitude(Reader& row, model::Attitude& attitude) {
   row.take_all(attitude.w_WB_B);
 }
 
-/// Steps of the mission where every stage lasts as long as it must.
+/// Number of steps if each stage of the mission has its shortest duration; at most 1,000,000.
 std::size_t estimate_steps(const config::Scenario& scenario) {
   std::int64_t duration_ns = 0;
   for (const config::Stage& stage : scenario.mission)
@@ -98,12 +99,13 @@ std::size_t estimate_steps(const config::Scenario& scenario) {
       duration_ns += after->duration_ns;
     else
       duration_ns += std::get<config::LeaveWithin>(stage.leave).after_ns;
-  // A day of 1 ms is no flight: memory is taken as it is needed.
+  // The bound avoids a huge reservation for a very long mission: rows grow when they are needed.
   return static_cast<std::size_t>(
       std::min<std::int64_t>(duration_ns / scenario.sync.period_ns + 1, 1'000'000));
 }
 
-/// Says when it is time for a rest: at least 50 times a second, and never asks the clock often.
+/// Tells the loop when to call `rest`, about 50 times a second. It reads the clock only once in 64
+/// steps of a vehicle.
 class RestTimer {
  public:
   bool is_due(std::size_t vehicles) {
@@ -195,11 +197,11 @@ void FlownFlight::list_columns(const closed_loop::Flight& flight) {
       if (is_shared(name))
         share("reference", name);
       else if (name == "stage_name")
-        columns_.push_back({"reference", name, index - 1, Kind::kStageName});  // its stage's cell
+        columns_.push_back({"reference", name, index - 1, Kind::kStageName});  // cell of `stage`
       else
         add("reference", name, name == "stage" ? Kind::kInteger : Kind::kDouble);
   const std::size_t steps = estimate_steps(scenario_);
-  index += 3;  // what only the recorder is told: `keep`
+  index += 3;  // three cells without a column, for the recorder: the end of `keep`
   for (std::size_t i = 0; i < ids_.size(); ++i) rows_.emplace_back(index, steps);
 }
 
@@ -235,7 +237,7 @@ void FlownFlight::keep_remarks(closed_loop::Flight& flight) {
   if (!texts.empty()) remarks_.push_back({rows_.front().rows(), std::move(texts)});
 }
 
-// --- what its recording is -----------------------------------------------------------------------
+// --- recording and certificate -------------------------------------------------------------------
 
 FlownStep FlownFlight::make_step(std::size_t index, std::size_t number) const {
   Reader row(rows_[index].row(number));

@@ -1,4 +1,4 @@
-/// A flight in this process that is kept: the columns of its recording, in memory.
+/// A flight flown in this process, with the columns of its recording kept in memory.
 #pragma once
 
 #include <cstddef>
@@ -17,20 +17,21 @@
 
 namespace sls::python {
 
-/// Where a column of a recording's file is in the rows.
+/// Position of a column of a recording's file in the rows.
 struct ColumnPlace {
-  enum class Kind { kDouble, kInteger, kFault, kStageName };  ///< the latter two: integers, codes
+  /// kFault and kStageName: the cell holds an integer code.
+  enum class Kind { kDouble, kInteger, kFault, kStageName };
 
   std::string table;  ///< "state", "measured", "command" or "reference"
   std::string name;   ///< as in the file
-  std::size_t index;  ///< of its cell in a row
+  std::size_t index;  ///< of the column's cell in a row
   Kind kind = Kind::kDouble;
 };
 
 class FlownFlight {
  public:
-  /// Flies `ids` (ascending) of `scenario` to the end. `rest` is called repeatedly and may throw
-  /// to end the flight.
+  /// Flies the vehicles `ids` (ascending) of `scenario` to the end. `rest` is called repeatedly and
+  /// may throw to end the flight.
   /// @throws config::ConfigError as Flight does.
   /// @throws app::RunError if a control law is broken.
   FlownFlight(const config::Scenario& scenario, const std::vector<std::uint32_t>& ids,
@@ -43,12 +44,12 @@ class FlownFlight {
 
   /// Empty if every mission was finished.
   const std::string& failure() const { return failure_; }
-  /// Whether what is measured of the `index`th vehicle can differ from the truth.
+  /// True if the measured state of the `index`th vehicle can differ from the true state.
   bool can_measurement_differ(std::size_t index) const { return differs_[index]; }
-  /// The last one of which there are rows.
+  /// The last step that has rows.
   std::uint64_t last_step() const { return rows_.front().rows() - 1; }
 
-  /// That of the flight's recording. The first call hashes all rows; any thread may ask.
+  /// Certificate of the flight's recording. The first call hashes all rows. Any thread may call it.
   const std::string& calc_certificate() const;
 
   /// Writes the recording into `folder` as `closed_loop::fly_recorded` does. False if it is not
@@ -57,15 +58,15 @@ class FlownFlight {
 
  private:
   struct Remarks {
-    std::size_t row;  // before which they were made
+    std::size_t row;  // first row after the remarks
     std::vector<std::string> texts;
   };
 
   void list_columns(const closed_loop::Flight& flight);
   void keep(const closed_loop::FlownStep& flown, std::size_t index);
   void keep_remarks(closed_loop::Flight& flight);
-  /// Step `row` of the `index`th vehicle as it was flown, without the numbers of the law's memory,
-  /// which no file holds.
+  /// Row `row` of the `index`th vehicle as a step of the flight. The numbers of the law's memory
+  /// are missing, because no file of a recording holds them.
   closed_loop::FlownStep make_step(std::size_t index, std::size_t row) const;
 
   const config::Scenario scenario_;
@@ -73,8 +74,8 @@ class FlownFlight {
   const std::string controller_name_;
   Parameters parameters_;
   bool has_attitude_ = false;
-  std::vector<bool> differs_;  // by vehicle: whether what is measured can differ from the truth
-  bool has_measured_ = false;  // of one at least: all rows are alike
+  std::vector<bool> differs_;  // by vehicle: the measured state can differ from the true state
+  bool has_measured_ = false;  // true if it can for one vehicle: all vehicles have the same columns
   std::size_t signals_ = 0;
   std::vector<ColumnPlace> columns_;
   std::vector<RowBuffer> rows_;

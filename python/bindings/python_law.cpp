@@ -14,8 +14,9 @@ namespace py = pybind11;
 using control::LawInput;
 using control::LawOutput;
 
-// --- what a law is given -------------------------------------------------------------------------
-// Tuples with named fields, filled at once: a law reads most of them, and nothing is faster.
+// --- inputs of a law -----------------------------------------------------------------------------
+// Tuples with named fields. All fields are filled before the call: a law reads most of them, and no
+// other type is faster.
 
 PyStructSequence_Field kReferenceFields[] = {
     {"position", "Desired position of the load in W, (x, y, z), m."},
@@ -86,9 +87,9 @@ py::object make_reference(const model::Reference& reference) {
   return made;
 }
 
-// --- what it returns -----------------------------------------------------------------------------
+// --- answers of a law ----------------------------------------------------------------------------
 
-/// One line, for messages.
+/// `object` as one line of at most 80 bytes, for messages.
 std::string to_brief(py::handle object) {
   std::string text = py::repr(object);
   for (char& letter : text)
@@ -96,7 +97,8 @@ std::string to_brief(py::handle object) {
   return text.size() <= 80 ? text : text.substr(0, 77) + "...";
 }
 
-/// The numbers of a tuple, list or array. False, without a Python error, for anything else.
+/// Reads `size` finite numbers from a tuple, list or array. For any other object it returns false
+/// and sets no Python error.
 bool read_numbers(PyObject* object, double* numbers, Py_ssize_t size) {
   if (!PyTuple_Check(object) && !PyList_Check(object)) {
     const py::object list = py::reinterpret_steal<py::object>(PySequence_List(object));
@@ -116,7 +118,7 @@ bool read_numbers(PyObject* object, double* numbers, Py_ssize_t size) {
   return true;
 }
 
-/// A law's answer is not one; the text lacks law, vehicle and step.
+/// The answer of a law is not valid. The text does not name law, vehicle and step.
 class BadAnswer : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -139,7 +141,7 @@ int read_memory_size(py::handle controller, const std::string& name) {
   if (!py::hasattr(controller, "memory_size")) return 0;
   const py::object size = controller.attr("memory_size");
   const long number = PyLong_Check(size.ptr()) ? PyLong_AsLong(size.ptr()) : -1;
-  PyErr_Clear();  // of a number that is no long
+  PyErr_Clear();  // the error of a number that does not fit in a long
   if (number < 0 || number > model::kMaxNumbers)
     throw config::ConfigError(name + ".memory_size: expected a whole number from 0 to " +
                               std::to_string(model::kMaxNumbers) + ", got " + to_brief(size));
@@ -220,7 +222,7 @@ LawOutput PythonLaw::calc(const LawInput& input) const {
   } catch (const BadAnswer& error) {
     fail(error.what(), py::object());
   } catch (py::error_already_set& error) {
-    // As much memory as ever, for the answers to a sample must be alike in size.
+    // The memory keeps its size: all answers to a sample must have the same size.
     output.memory.setZero(memory_size_);
     if (error.matches(law_fault_type())) {
       output.fault = to_fault(py::str(error.value().attr("code")));
@@ -263,7 +265,7 @@ py::object PythonLaw::make_now(const LawInput& input) const {
   add(make_tuple(state.signals.data(), state.signals.size()));
   add(make_reference(input.reference).release().ptr());
   add(make_tuple(input.memory.data(), input.memory.size()));
-  if (PyErr_Occurred()) throw py::error_already_set();  // no memory
+  if (PyErr_Occurred()) throw py::error_already_set();  // out of memory
   return now;
 }
 

@@ -21,7 +21,7 @@ struct Block {
   std::size_t bytes = 0;
 };
 
-/// Blocks of memory that are free again, pages and all.
+/// Unused blocks of memory. Their pages are not returned to the system.
 class Pool {
  public:
   Block take(std::size_t bytes) {
@@ -38,7 +38,7 @@ class Pool {
     if (bytes < kHugePage) return check({std::malloc(bytes), bytes});
     bytes = (bytes + kHugePage - 1) / kHugePage * kHugePage;
     const Block block = check({std::aligned_alloc(kHugePage, bytes), bytes});
-    ::madvise(block.memory, bytes, MADV_HUGEPAGE);  // fewer and larger pages, where there are such
+    ::madvise(block.memory, bytes, MADV_HUGEPAGE);  // uses larger pages if the system has them
     return block;
   }
 
@@ -60,7 +60,7 @@ class Pool {
   std::size_t kept_ = 0;
 };
 
-/// Never destroyed: arrays of Python may outlive what this library has.
+/// The pool is never destroyed, because Python arrays may live longer than this library's objects.
 Pool& pool() {
   static Pool* const held = new Pool;
   return *held;

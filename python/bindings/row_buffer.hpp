@@ -1,15 +1,15 @@
-/// Rows of numbers that grow one by one, in one piece of memory.
+/// A table of numbers in one block of memory, to which rows are added one by one.
 #pragma once
 
 #include <cstddef>
 
 namespace sls::python {
 
-/// A cell is 8 bytes: a double or an integer. The memory of buffers that are gone is kept, up to a
-/// bound, for the next ones: to get fresh pages from the system takes as long as half a flight.
+/// A cell has 8 bytes: a double or an integer. The memory of destroyed buffers is kept, up to a
+/// bound, for the next buffers, because new pages from the system take as long as half a flight.
 class RowBuffer {
  public:
-  /// `rows`: how many are expected.
+  /// `rows`: expected number of rows.
   RowBuffer(std::size_t width, std::size_t rows);
   ~RowBuffer();
   RowBuffer(RowBuffer&& other) noexcept;
@@ -17,7 +17,7 @@ class RowBuffer {
   RowBuffer(const RowBuffer&) = delete;
   RowBuffer& operator=(const RowBuffer&) = delete;
 
-  /// A further row, whose cells hold anything; valid until the next one.
+  /// Adds a row with undefined cells and returns it. The pointer is valid until the next call.
   /// @throws std::bad_alloc
   double* add_row() {
     if (used_ + width_ > capacity_) grow();

@@ -19,8 +19,8 @@ namespace py = pybind11;
 using config::Scenario;
 using Changes = std::vector<std::pair<std::string, std::string>>;
 
-/// Of a file, or of a text that belongs to `folder`. Without changes its text stays as it is, to
-/// the byte.
+/// Reads a scenario from `file`, or from `text` with paths relative to `folder`. Without changes
+/// the scenario has exactly this text.
 Scenario make_scenario(const std::optional<std::string>& file, const std::string& text,
                        const std::string& folder, const Changes& changes) {
   if (changes.empty()) {
@@ -42,7 +42,7 @@ Changes to_changes(const py::dict& dict) {
   return changes;
 }
 
-/// As Python says it: positional arguments of sls.scenario.Stage.
+/// A stage as a tuple: kind, name, for_s (s or None), lap_s (s or None).
 py::tuple to_stage(const config::Stage& stage) {
   py::object for_s = py::none(), lap_s = py::none();
   if (const auto* after = std::get_if<config::LeaveAfter>(&stage.leave))
