@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from sls.scenario import load_scenario
     from sls.trajectory import Trajectory
 
-# Where each name is. Imported when first asked for: a program that only reads recordings needs
-# neither the extension module nor what the figures need.
+# The module of each name. It is imported on first use: a program that only reads recordings needs
+# neither the extension module nor the packages for figures.
 _PLACES = {
     "Client": "sls.client",
     "ClosedLoop": "sls.closed_loop",

@@ -1,4 +1,4 @@
-"""`./sls plot`, `./sls report` and `./sls study`: command lines. That of `./sls campaign` is in
+"""Command lines of `./sls plot`, `./sls report` and `./sls study`. That of `./sls campaign` is in
 campaign/cli.py."""
 
 import argparse
@@ -34,7 +34,7 @@ def make_folder(folder: Path) -> None:
 
 
 def load_recording(recording: Recording, name: str | None, vehicle_id: int) -> Trajectory:
-    """One vehicle's flight; says what is missing."""
+    """Loads the flight of one vehicle, and prints the notes on it, such as missing samples."""
     flight = recording.load_flight(vehicle_id, name or recording.folder.resolve().name)
     for note in flight.notes:
         say(f"{recording.folder}: {note}")
@@ -135,7 +135,7 @@ def make_parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """The exit code."""
+    """Runs the command and returns the exit code."""
     if arguments and arguments[0] == "campaign":
         from sls.campaign.cli import main as fly_campaign
         return fly_campaign(arguments[1:])

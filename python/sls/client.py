@@ -1,4 +1,4 @@
-"""A Python control law flies a running server over DDS, beside or instead of `control_client`.
+"""A Python control law for a running server over DDS, beside or instead of `control_client`.
 
     sls.Client(my_law, "figure_eight.yaml").run()        # with sim_server and recorder elsewhere
 """
@@ -24,7 +24,7 @@ LOG_LEVELS = ("debug", "info", "warning", "error")
 
 
 def read_domain() -> int:
-    """The domain of SLS_DOMAIN, without it 0."""
+    """The DDS domain in SLS_DOMAIN; 0 if it is not set."""
     text = os.environ.get("SLS_DOMAIN") or "0"
     if not (text.isascii() and text.isdecimal() and int(text) <= 232):
         raise ConfigError(f"SLS_DOMAIN: expected a DDS domain, 0 to 232, got {text!r}")
@@ -33,28 +33,29 @@ def read_domain() -> int:
 
 class Client:
     """Answers every state sample of a run with the force of a Python law, by the rules of
-    `control_client`: announced to the server, stateless (what the law remembers travels in its
-    memory), among several clients of a vehicle the strongest flies and the others stand by."""
+    `control_client`. It announces itself to the server. It is stateless: the law's memory travels in
+    the samples. Of several clients of a vehicle the strongest one flies, the others stand by."""
 
     def __init__(self, law: Law | LawWithMemory, scenario: Scenario | str | os.PathLike[str], *,
                  name: str = "python", strength: int = 0,
                  vehicles: Iterable[int] | str | None = None, follow: bool = False,
                  qos: str | os.PathLike[str] | None = None, domain: int | None = None,
                  log_level: str = "info"):
-        """Joins nothing yet: `run` does.
+        """Does not join the domain yet: `run` does.
 
-        law: as of `sls.fly`: called with sls.Now, returns the force (3 floats, N, in W) or, where
-            it has a `memory_size`, (force, memory). One law for all vehicles; called on a thread
-            of the middleware, with the GIL.
-        scenario: of `sls.load_scenario`, or what that takes; the same as the server's.
+        law: as in `sls.fly`: called with sls.Now, returns the force (3 floats, N, in W) or, if it
+            has a `memory_size`, (force, memory). One law for all vehicles. It is called on a thread
+            of the middleware, which then holds the GIL.
+        scenario: a scenario from `sls.load_scenario`, or an argument of that function; equal to the
+            server's scenario.
         name: in recordings and messages, 1 to 32 letters, digits, '_', '-' or '.'.
-        strength: among several clients the strongest flies.
-        vehicles: of the fleet, ids or text such as "0-9,20"; None: all that the server has.
-        follow: fly on with a server that replaces this one; else `run` raises RunError.
-        qos: QoS file; None: config/qos/default.xml. A process can use one only.
-        domain: DDS domain, 0 to 232; None: that of the environment variable SLS_DOMAIN, else 0.
-        log_level: of the lines on stderr: debug, info, warning or error.
-        Raises ConfigError for a mistake in any of these.
+        strength: of several clients the one with the largest strength flies.
+        vehicles: ids, or text such as "0-9,20"; None: all vehicles of the server.
+        follow: fly on with a server that replaces this one; without it `run` raises RunError.
+        qos: QoS file; None: config/qos/default.xml. A process can use only one.
+        domain: DDS domain, 0 to 232; None: that of the environment variable SLS_DOMAIN, or 0.
+        log_level: level of the lines on stderr: debug, info, warning or error.
+        Raises ConfigError if one of these is not valid.
         """
         if vehicles is None:
             vehicles = "all"
@@ -70,24 +71,24 @@ class Client:
             to_whole("domain", read_domain() if domain is None else domain, 0, 232), log_level)
 
     def run(self) -> None:
-        """Flies from joining to the end of the run, and the runs that follow it after a reset.
+        """Joins the run and flies to its end; after a reset it also flies the next run.
 
-        Ctrl-C and SIGTERM end it in order: the server is told, and KeyboardInterrupt or
-        SystemExit(143) is raised. (SIGTERM: where the program has no handler of its own.) Call it
-        from the main thread; in another one only `stop` ends it early.
-        Raises ConfigError if the server flies another scenario or for the QoS file; RunError if no
-        server is found, it disappears, the run fails or the law is broken.
+        Ctrl-C and SIGTERM end it in order: the client informs the server and raises
+        KeyboardInterrupt or SystemExit(143). (SIGTERM: if the program has no handler for it.) Call
+        it from the main thread; in another thread only `stop` ends it early.
+        Raises ConfigError if the server flies another scenario or the QoS file is not valid;
+        RunError if there is no server, the server disappears, the run fails or the law is broken.
         """
         with _terminable():
             self._client.run()
 
     def stop(self) -> None:
-        """Ends `run`, which is at work in another thread, in order. `run` then returns."""
+        """Ends in order a `run` in another thread. That `run` then returns."""
         self._client.stop()
 
 
 class _terminable:
-    """Inside, SIGTERM raises SystemExit(143) unless the program has a handler for it."""
+    """Context in which SIGTERM raises SystemExit(143) unless the program has a handler for it."""
 
     def __enter__(self) -> None:
         self._is_ours = (threading.current_thread() is threading.main_thread()

@@ -34,7 +34,7 @@ BOUNDS = {"angles": np.array([np.pi, np.pi / 2])}
 class LoopState:
     """The states of all loops, a row for each, in frame W (x forward, y right, z down).
 
-    The arrays are read-only and always show the last step: `copy()` what is to be kept.
+    The arrays are read-only and change with each step: use `copy()` to keep values.
     """
 
     quad_position: NDArray[np.float64]  #: (count, 3), m
@@ -46,14 +46,14 @@ class LoopState:
     step: NDArray[np.uint64]  #: (count,), control periods since the loop's reset
     time_s: NDArray[np.float64]  #: (count,), the same in s
     failed: NDArray[np.bool_]  #: (count,), see `ClosedLoop.reason`
-    #: (count, 4), unit quaternion w, x, y, z, body to W; None of a plant without attitude
+    #: (count, 4), unit quaternion w, x, y, z, body to W; None if the plant has no attitude
     attitude: NDArray[np.float64] | None = None
-    body_rates: NDArray[np.float64] | None = None  #: (count, 3), in the body, rad/s; the same
+    body_rates: NDArray[np.float64] | None = None  #: (count, 3), in the body frame, rad/s; or None
 
 
 @dataclass(frozen=True, eq=False)
 class LoopReference:
-    """The mission's reference at some times, in W: arrays of shape (…, 3)."""
+    """The mission's reference at given times, in W: arrays of shape (…, 3)."""
 
     position: NDArray[np.float64]  #: m
     velocity: NDArray[np.float64]  #: m/s
@@ -63,16 +63,16 @@ class LoopReference:
 
 
 class ClosedLoop:
-    """`count` loops of a scenario, each with its plant, faults and sensing as in a flight.
+    """`count` loops of a scenario, each with plant, faults and sensing as in a flight.
 
-    A loop is bit for bit the flight whose controller answers the same forces, however many loops
-    and threads there are. The GIL is free while the loops move.
+    A loop equals, bit for bit, the flight whose controller answers the same forces, for any number
+    of loops and threads. The GIL is free while the loops move.
 
-    A loop whose force the server would refuse (not finite, or beyond `force_limit_n`), or whose
-    plant cannot go on, has failed: it stays where it is until its reset, and nothing is raised.
+    A loop fails if the server would refuse its force (not finite, or larger than `force_limit_n`),
+    or if its plant cannot continue. It then keeps its state until its reset; no exception is raised.
     """
 
-    period_s: float  #: control period: a force is held for so long
+    period_s: float  #: control period: each force is held for this time
     force_limit_n: float  #: `controller.force_limit_n`
     quad_mass_kg: float
     load_mass_kg: float
@@ -81,13 +81,13 @@ class ClosedLoop:
 
     def __init__(self, scenario: Scenario | str | os.PathLike[str], count: int = 1, *,
                  threads: int | None = None, seeds: ArrayLike | None = None, vehicle: int = 0):
-        """All loops are at step 0 of `scenario` (of `sls.load_scenario`, or what that takes).
+        """Puts all loops at step 0 of `scenario` (from `sls.load_scenario`, or an argument of it).
 
-        threads: that share the work of a step; None: as many as there are processors and work.
+        threads: number of threads for a step; None: limited by the processors and the work.
         seeds: whole numbers ≥ 0, one for each loop, added to each seed of the scenario's faults.
-            None: zeros, which makes loops with equal forces equal.
-        vehicle: of the scenario's fleet; every loop flies this one.
-        Raises ConfigError as reading the scenario does.
+            None: zeros; loops with equal forces are then equal.
+        vehicle: id in the scenario's fleet; every loop flies this vehicle.
+        Raises ConfigError, also if the scenario cannot be read.
         """
         self._count = to_whole("count", count, 1, 10_000_000)
         if threads is None:
@@ -114,23 +114,23 @@ class ClosedLoop:
 
     @property
     def truth(self) -> LoopState:
-        """The true states of the plants. `state` itself if nothing in the scenario disturbs it."""
+        """The true states of the plants. Equal to `state` if the scenario does not disturb the measured states."""
         return self._truth
 
     @property
     def failed(self) -> NDArray[np.bool_]:
-        """(count,): which loops have failed. Read-only, always that of the last step."""
+        """(count,): true for each loop that has failed. Read-only; changes with each step."""
         return self._state.failed
 
     def reason(self, loop: int) -> str:
-        """Why a loop has failed, in one line; empty: it has not."""
+        """The reason why a loop has failed, in one line; empty if it has not failed."""
         return self._loops.failure(to_whole("loop", loop, 0, self._count - 1))
 
     def step(self, force: NDArray[np.float64]) -> LoopState:
-        """Moves each loop over one control period under its row of `force`, held.
+        """Moves each loop over one control period, with its row of `force` held constant.
 
         force: (count, 3), C-contiguous float64, on the quadrotor in W, N. Hovering needs
-            −(quad_mass_kg + load_mass_kg) × gravity_m_s2 along z. Rows of failed loops count not.
+            −(quad_mass_kg + load_mass_kg) × gravity_m_s2 along z. Rows of failed loops are ignored.
         Returns `state`. Raises ConfigError for another array.
         """
         self._loops.step(force)
@@ -141,12 +141,12 @@ class ClosedLoop:
         """Puts loops back to step 0.
 
         indices: whole numbers, or a mask (count,) such as `failed`; None: all.
-        seeds: as of the constructor, for these n loops; None: as before. New seeds, new noise.
-        initial: where they begin, each of shape (n, k) or (k,) for all: quad_position or
+        seeds: as in the constructor, for these n loops; None: unchanged. New seeds give new noise.
+        initial: initial values, each of shape (n, k) or (k,) for all: quad_position or
             load_position (3, m), quad_velocity (3, m/s), angles and angle_rates (2, rad, rad/s);
-            of plants with attitude attitude (4, unit quaternion), body_rates (3, rad/s).
-            Others stay the scenario's.
-        Returns `state`. Raises ConfigError for what the plant does not take; then nothing changes.
+            for plants with attitude also attitude (4, unit quaternion) and body_rates (3, rad/s).
+            Other values are those of the scenario.
+        Returns `state`. Raises ConfigError for values that the plant refuses; no loop changes then.
         """
         which = self._to_indices(indices)
         new_seeds = self._seeds[which] if seeds is None else _to_seeds(seeds, len(which))
@@ -158,11 +158,11 @@ class ClosedLoop:
         return self._state
 
     def reference(self, time_s: ArrayLike | None = None) -> LoopReference:
-        """The mission's reference `time_s` (any shape, s) after step 0; None: now, of
+        """The mission's reference `time_s` (any shape, s) after step 0; None: the present time of
         each loop.
 
-        Stages follow each other by their time. A stage that is left by a radius has no time to end
-        at: here it is the last one.
+        Stages follow each other by their time. A stage that ends within a radius has no known end:
+        here it is the last stage.
         """
         times = np.ascontiguousarray(self._state.time_s if time_s is None else time_s, np.float64)
         derivatives = self._loops.calc_reference(times.reshape(-1))
@@ -213,7 +213,7 @@ def _to_seeds(seeds: ArrayLike, count: int) -> NDArray[np.uint64]:
 
 
 def _to_rows(name: str, value: ArrayLike, count: int) -> NDArray[np.float64]:
-    """`value` as `count` rows of what `name` is."""
+    """`value` as an array (count, k), where k is the number of components of `name`."""
     if name not in WIDTHS:
         raise ConfigError(f"reset: {name}: expected one of {', '.join(WIDTHS)}")
     shape = (count, WIDTHS[name])

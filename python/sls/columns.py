@@ -1,4 +1,4 @@
-"""The columns of a recording's file, by the names that they have there."""
+"""The columns of a recording's file, by their names in that file."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
@@ -12,17 +12,17 @@ class Columns(Mapping[str, np.ndarray]):
     float64; `vehicle_id`, `step` and `stage` int64; `fault` and `stage_name` text."""
 
     def __init__(self, columns: Mapping[str, np.ndarray | Callable[[], np.ndarray]]):
-        """A column that is a function is called when the column is first asked for."""
+        """A function in place of an array is called on the first use of its column."""
         self._columns = dict(columns)
 
     @classmethod
     def of_rows(cls, rows: np.ndarray) -> "Columns":
-        """Of a structured array, whose numbers are all float64."""
+        """Columns of a structured array whose numbers are all float64."""
         return cls({name: rows[name].astype(np.int64) if name in INTEGERS else rows[name]
                     for name in rows.dtype.names or ()})
 
     def __getitem__(self, name: str) -> np.ndarray:
-        """Raises KeyError, with the names that there are, for another one."""
+        """The column `name`. Raises KeyError, with the known names, if there is none."""
         if name not in self._columns:
             raise KeyError(f"expected a column, one of {', '.join(self._columns)}; got {name!r}")
         column = self._columns[name]
@@ -43,5 +43,5 @@ class Columns(Mapping[str, np.ndarray]):
         return f"Columns({', '.join(self._columns)})"
 
     def stack(self, names: Sequence[str]) -> np.ndarray:
-        """The columns `names` side by side, (rows, len(names)): a copy."""
+        """A copy of the columns `names`, side by side, (rows, len(names))."""
         return np.column_stack([self[name] for name in names])

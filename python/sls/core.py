@@ -1,10 +1,10 @@
-"""The extension module, or one line that says how to get it."""
+"""Imports the extension module. The error has one line that tells how to build it."""
 
 from types import ModuleType
 
 
 def load_core() -> ModuleType:
-    """The module _sls_core. Raises ImportError where it is not built."""
+    """The module _sls_core. Raises ImportError if it is not built."""
     try:
         import _sls_core
     except ModuleNotFoundError as error:

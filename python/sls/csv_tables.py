@@ -1,4 +1,4 @@
-"""Tables of numbers as numpy arrays; what is wrong with a file is told with file and line."""
+"""Reads tables of numbers as numpy arrays. Errors name file and line."""
 
 import csv
 import io
@@ -11,7 +11,7 @@ import numpy as np
 
 from sls.input_error import InputError
 
-# Columns that hold text: their numpy types. The controller's name is not shown.
+# Numpy types of the columns that hold text. The controller's name is cut, because it is not shown.
 TEXT_COLUMNS = {"stage_name": "U32", "fault": "U16", "controller": "U1"}
 
 
@@ -26,7 +26,7 @@ class Text:
 
 
 def read_text(path: Path) -> Text:
-    """Raises InputError if `path` is no text file that can be read."""
+    """Reads the text file `path`. Raises InputError if it cannot be read as text."""
     try:
         text = path.read_bytes().decode()
     except OSError as error:
@@ -41,9 +41,9 @@ def read_text(path: Path) -> Text:
 
 def parse_rows(text: Text, columns: Sequence[str], first_line: int,
                delimiter: str | None = ",") -> np.ndarray:
-    """The lines from `first_line` (from 1) on: a structured array with a field per column.
+    """The lines from `first_line` (counted from 1) on, as a structured array with a field per column.
 
-    Raises InputError if a row has another number of columns, or a number is none."""
+    Raises InputError if a row has another number of columns, or if a field is not a number."""
     kinds = np.dtype([(name, TEXT_COLUMNS.get(name, "f8")) for name in columns])
     lines = text.lines[first_line - 1:]
     if not lines:
@@ -58,7 +58,7 @@ def parse_rows(text: Text, columns: Sequence[str], first_line: int,
 
 def find_bad_row(text: Text, columns: Sequence[str], first_line: int,
                  delimiter: str | None) -> InputError | None:
-    """The first row that numpy has refused, in our words."""
+    """An error that describes the first row that numpy could not parse."""
     for number, line in enumerate(text.lines[first_line - 1:], first_line):
         fields = line.split() if delimiter is None else next(csv.reader([line]), [])
         if fields and len(fields) != len(columns):
@@ -79,8 +79,8 @@ def is_number(text: str) -> bool:
 
 
 def read_table(path: Path, required: Sequence[str]) -> tuple[np.ndarray, bool]:
-    """A CSV file with a header that names at least the columns `required`, and whether its last row
-    was cut off. Raises InputError."""
+    """The rows of a CSV file with a header, and whether its last row was cut off. The header must have
+    the columns `required`. Raises InputError."""
     text = read_text(path)
     if not text.lines:
         raise InputError(f"{path}:1: expected a header, got an empty file")
@@ -92,7 +92,7 @@ def read_table(path: Path, required: Sequence[str]) -> tuple[np.ndarray, bool]:
 
 
 def read_records(path: Path) -> list[dict[str, str]]:
-    """A small CSV file whose fields may be any text, row by row. Raises InputError."""
+    """The rows of a small CSV file. Its fields may be any text. Raises InputError."""
     text = read_text(path)
     return list(csv.DictReader(io.StringIO("\n".join(text.lines))))
 

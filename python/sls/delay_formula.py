@@ -8,7 +8,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class HorizontalChain:
-    """Gains of the horizontal chain and the vehicle it is closed with."""
+    """Gains of the horizontal chain of integrators, and the swing frequency of the vehicle."""
 
     position: float
     velocity: float
@@ -24,7 +24,7 @@ class HorizontalChain:
 
 @dataclass(frozen=True)
 class Lateness:
-    """Of the force: a delay, then a lag of first order."""
+    """A delay of the force, followed by a lag of first order."""
 
     delay_s: float = 0.0
     lag_s: float = 0.0
@@ -43,9 +43,9 @@ def calc_error_ratio(chain: HorizontalChain, late: Lateness, s: complex) -> comp
 
 
 def calc_stability_limit(chain: HorizontalChain, lag_s: float) -> float:
-    """Smallest delay with a root of the denominator on the imaginary axis, s; the loop without
-    delay is taken to be stable. There e^(−sT) = −(1 + τ s) s² (s² + Ω²) / (K − Ω² s²): the sizes of
-    both sides give the frequency, the angles the delay."""
+    """Smallest delay T, in s, with a root of the denominator on the imaginary axis. The loop is assumed
+    to be stable without delay. At such a root e^(−sT) = −(1 + τ s) s² (s² + Ω²) / (K − Ω² s²): the
+    magnitudes of both sides give the frequency, the angles give the delay."""
     swing_2, x = chain.swing_rad_s**2, np.poly1d([1.0, 0.0])  # x = w², s = i w
     right = (1.0 + lag_s**2 * x) * x**2 * (x - swing_2)**2
     left = ((chain.position - (chain.acceleration - swing_2) * x)**2

@@ -1,6 +1,6 @@
-"""The figures of flights. Each function draws one and returns it; `save` writes it.
+"""The figures of flights. Each `plot_…` function draws one figure and returns it; `save` writes it.
 
-Times are simulated ones. Angles are drawn in degrees. Only `to_z_up` leaves frame W."""
+Times are simulation time. Angles are drawn in degrees. Only `to_z_up` leaves frame W."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -13,10 +13,10 @@ from matplotlib.ticker import MaxNLocator
 
 from sls.trajectory import Trajectory, calc_roll_pitch_yaw
 
-# Told apart by readers with any colour vision (Okabe and Ito).
+# Distinct for readers with any colour vision (Okabe and Ito).
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f7f7f", "#8c510a")
 SECOND_COLOUR = "#e69f00"
-# Wide and light, so that what follows it well is seen in its middle.
+# Wide and light: a curve that follows the reference well is visible in its middle.
 REFERENCE = {"linewidth": 3.4, "alpha": 0.3, "zorder": 1.5, "solid_capstyle": "butt"}
 REFERENCE_COLOUR = "#000000"
 
@@ -27,18 +27,18 @@ STYLE = {
     "legend.frameon": False, "svg.hashsalt": "sls", "path.simplify": True,
     "axes.axisbelow": True,
 }
-# Nothing in a file tells when or by which version it was written.
+# The files contain no date and no version of the program that wrote them.
 METADATA = {"png": {"Software": None}, "svg": {"Date": None, "Creator": None},
             "pdf": {"CreationDate": None, "Creator": None, "Producer": None}}
 
 
-# Of all vehicles together: more would only make the file large.
+# Most points of all vehicles together. More points would only make the file larger.
 FLEET_POINTS = 100_000
 
 
 def to_z_up(positions: np.ndarray) -> np.ndarray:
-    """Positions as a viewer wants them: x, then y to the left, then height. The only place where z
-    is turned up; y turns with it, so that the frame stays right-handed."""
+    """Positions with x forward, y to the left, z up. Only this function turns z up; y turns with it,
+    because the frame must stay right-handed."""
     return positions * np.array([1.0, -1.0, -1.0])
 
 
@@ -47,7 +47,7 @@ def colour_of(index: int) -> str:
 
 
 def break_at_gaps(time_s: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Puts NaN if steps are missing, so that no line is drawn across."""
+    """Puts NaN where steps are missing, because no line may be drawn across the gap."""
     if len(time_s) < 3:
         return time_s, values
     spacing = np.diff(time_s)
@@ -56,13 +56,13 @@ def break_at_gaps(time_s: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, n
 
 
 def break_at_jumps(positions: np.ndarray) -> np.ndarray:
-    """Puts NaN if a reference jumps to the next set-point: no trajectory moves 10 cm a row."""
+    """Puts NaN where a reference jumps to the next set-point. A move of 10 cm in one row is a jump."""
     far = np.linalg.norm(np.diff(positions, axis=0), axis=1) > 0.1
     return np.insert(positions, np.flatnonzero(far) + 1, np.nan, axis=0)
 
 
 def find_set_points(positions: np.ndarray) -> np.ndarray:
-    """Where a reference stays, each once."""
+    """The positions at which a reference rests, each once."""
     stays = np.all(positions[1:] == positions[:-1], axis=1)
     return np.unique(positions[1:][stays], axis=0)
 
@@ -72,7 +72,7 @@ def draw(axes: Axes, time_s: np.ndarray, values: np.ndarray, **style) -> None:
 
 
 def mark_stages(all_axes: Sequence[Axes], flights: Sequence[Trajectory]) -> None:
-    """Where the stages of a mission begin; of several flights it would only confuse."""
+    """Marks the start of each stage of the mission, if there is only one flight."""
     if len(flights) != 1 or not any(axes.lines for axes in all_axes):
         return
     flight = flights[0]
@@ -88,7 +88,7 @@ def name_figure(figure: Figure, title: str) -> None:
 
 def make_stack(rows: int, title: str, labels: Sequence[str], height: float = 1.75,
                columns: int = 1) -> tuple[Figure, np.ndarray]:
-    """Axes above each other with one axis of time: figure and axes (rows, columns)."""
+    """A figure with `rows` of axes that share one time axis. Returns figure and axes (rows, columns)."""
     figure = Figure(figsize=(8.6, 0.9 + height * rows), layout="constrained")
     axes = figure.subplots(rows, columns, sharex=True, squeeze=False)
     name_figure(figure, title)
@@ -103,7 +103,7 @@ def make_stack(rows: int, title: str, labels: Sequence[str], height: float = 1.7
 
 
 def add_legend(axes: Axes, columns: int = 4) -> None:
-    """Above the axes, where no line is."""
+    """Adds a legend above the axes, where it hides no line."""
     count = len(axes.get_legend_handles_labels()[1])
     if count:
         axes.legend(loc="lower left", bbox_to_anchor=(0, 1.0), ncol=min(count, columns),
@@ -111,7 +111,7 @@ def add_legend(axes: Axes, columns: int = 4) -> None:
 
 
 def list_references(flights: Sequence[Trajectory]) -> list[tuple[Trajectory, str, str]]:
-    """The references that differ: of which flight, its label and its colour."""
+    """The different references of `flights`: a flight with the reference, its label and its colour."""
     found: list[tuple[Trajectory, str, str]] = []
     for index, flight in enumerate(flights):
         if np.all(np.isnan(flight.p_WL_ref)) or any(is_same_reference(flight, other)
@@ -123,7 +123,8 @@ def list_references(flights: Sequence[Trajectory]) -> list[tuple[Trajectory, str
 
 
 def is_same_reference(a: Trajectory, b: Trajectory) -> bool:
-    """Where both are known, at the instants of `a`, within 1 cm (which no line shows)."""
+    """True if the references differ by less than 1 cm, which no line shows, in 99 % of the instants of `a` at which
+    both are known."""
     for axis in range(3):
         known = np.isfinite(b.p_WL_ref[:, axis])
         there = np.interp(a.time_s, b.time_s[known], b.p_WL_ref[known, axis])
@@ -174,8 +175,8 @@ def plot_errors(flights: Sequence[Trajectory]) -> Figure:
 
 
 def set_log_scale(axes: Axes, sizes: Sequence[np.ndarray]) -> None:
-    """Logarithmic, down to what but 2 % of the values exceed, and at most 6 decades: where errors
-    change their sign they pass zero, which would stretch the axis without end."""
+    """Sets a logarithmic scale from the decade of the 2nd percentile up, with at most 6 decades below the largest
+    value's decade. The limit is necessary because errors that change their sign pass zero."""
     values = np.concatenate(sizes)
     values = values[np.isfinite(values) & (values > 0)]
     if not len(values):
@@ -214,7 +215,7 @@ def plot_path(flights: Sequence[Trajectory]) -> Figure:
 
 
 def set_equal_scale(axes, points: np.ndarray) -> None:
-    """One metre is as long on each axis; no axis is shorter than a fourth of the longest."""
+    """Draws one metre equally long on each axis. No axis is shorter than a fourth of the longest."""
     low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
     centre, extent = (low + high) / 2, np.maximum(high - low, 1e-3)
     extent = 1.08 * np.maximum(extent, 0.25 * np.max(extent))
@@ -230,7 +231,7 @@ def set_equal_scale(axes, points: np.ndarray) -> None:
 
 def draw_columns(all_axes: Sequence[Axes], flights: Sequence[Trajectory],
                  calc_columns: Callable[[Trajectory], np.ndarray]) -> None:
-    """Column i of each flight's `calc_columns` on axes i; nothing of a flight that has no such data."""
+    """Draws column i of each flight's `calc_columns` on axes i. Leaves out flights without such data."""
     for index, flight in enumerate(flights):
         columns = calc_columns(flight)
         if np.all(np.isnan(columns)):
@@ -259,7 +260,8 @@ def plot_forces(flights: Sequence[Trajectory]) -> Figure:
 
 
 def plot_attitude(flights: Sequence[Trajectory]) -> Figure:
-    """Of point masses alone: where there is a body, `plot_body_attitude` shows both."""
+    """The commanded attitude of plants without attitude. For other plants `plot_body_attitude` draws
+    the attitude and its set-point."""
     figure, axes = make_stack(2, "Commanded attitude", ("roll (°)", "pitch (°)"))
     if all(np.all(np.isnan(list_attitudes(flight)[0])) for flight in flights):
         draw_columns(axes[:, 0], flights, lambda flight: np.degrees(flight.calc_attitude()))
@@ -267,8 +269,8 @@ def plot_attitude(flights: Sequence[Trajectory]) -> Figure:
 
 
 def list_attitudes(flight: Trajectory) -> tuple[np.ndarray, np.ndarray]:
-    """Roll, pitch and yaw, (n, 3), rad, and their set-points; of a flight whose plant has none,
-    those that realise the force."""
+    """Roll, pitch and yaw, (n, 3), rad, and their set-points. If the plant has no set-points, these are
+    the angles that realise the force."""
     force = np.column_stack([flight.calc_attitude(), np.zeros(len(flight.time_s))])
     if flight.body is None:
         return np.full(force.shape, np.nan), force
@@ -278,13 +280,13 @@ def list_attitudes(flight: Trajectory) -> tuple[np.ndarray, np.ndarray]:
 
 
 def break_at_turns(angles: np.ndarray) -> np.ndarray:
-    """Puts NaN if an angle (n, k) goes on at the other end of its range."""
+    """Puts NaN where an angle (n, k) wraps from one end of its range to the other."""
     jumps = np.abs(np.diff(angles, axis=0, prepend=angles[:1])) > np.pi
     return np.where(jumps, np.nan, angles)
 
 
 def widen(all_axes: Sequence[Axes], least: float) -> None:
-    """Gives the axes a range of at least `least`, so that rounding is not drawn as motion."""
+    """Gives the axes a range of at least `least`. With less, rounding would look like motion."""
     for axes in all_axes:
         low, high = axes.get_ylim()
         if axes.lines and high - low < least:
@@ -294,8 +296,8 @@ def widen(all_axes: Sequence[Axes], least: float) -> None:
 def draw_beside(all_axes: Sequence[Axes], flights: Sequence[Trajectory],
                 calc_both: Callable[[Trajectory], tuple[np.ndarray, np.ndarray] | None],
                 legend_columns: int = 4) -> None:
-    """Column i of what `calc_both` gives on axes i: what was done, over its set-point. None: the
-    flight has no such data."""
+    """Draws column i of both results of `calc_both` on axes i: the real values over their set-points.
+    `calc_both` returns None for a flight without such data."""
     for index, flight in enumerate(flights):
         alone = len(flights) == 1
         real, asked = calc_both(flight) or (np.empty((0, 0)), np.empty((0, 0)))
@@ -331,7 +333,7 @@ def plot_body_rates(flights: Sequence[Trajectory]) -> Figure:
 
 
 def plot_rotors(flights: Sequence[Trajectory]) -> Figure:
-    """One below the other up to four, more in two columns."""
+    """Rotor speeds, one axes for each rotor: up to four below each other, more in two columns."""
     count = max(flight.body.rotor_speed.shape[1] if flight.body else 0 for flight in flights)
     columns = 1 if count <= 4 else 2
     rows = max(-(-count // columns), 1)
@@ -355,7 +357,7 @@ def plot_thrust(flights: Sequence[Trajectory]) -> Figure:
 
 
 def plot_fleet(flights: Sequence[Trajectory]) -> Figure:
-    """All vehicles of a recording: their loads' paths from above, x up, and how far each is off."""
+    """All vehicles of a recording: the paths of the loads from above, x up, and the error of each."""
     figure = Figure(figsize=(8.6, 4.6), layout="constrained")
     plan, distance = figure.subplots(1, 2)
     name_figure(figure, f"Fleet of {len(flights)} vehicles")
@@ -388,7 +390,7 @@ FIGURES: dict[str, Callable[[Sequence[Trajectory]], Figure]] = {
 
 def make_figures(flights: Sequence[Trajectory],
                  fleet: Sequence[Trajectory] = ()) -> dict[str, Figure]:
-    """All figures that these flights have data for, by name; of a `fleet` its overview first."""
+    """All figures for which these flights have data, by name. The overview of a `fleet` comes first."""
     with matplotlib.rc_context(STYLE):
         figures = {"fleet": plot_fleet(fleet)} if len(fleet) > 1 else {}
         for name, plot in FIGURES.items():
@@ -399,6 +401,6 @@ def make_figures(flights: Sequence[Trajectory],
 
 
 def save(figure: Figure, path: Path, dpi: int = 150) -> None:
-    """Writes `path`, in the format its name says."""
+    """Writes `figure` to `path`, in the format of the file's suffix."""
     with matplotlib.rc_context(STYLE):
         figure.savefig(path, dpi=dpi, metadata=METADATA[path.suffix[1:]], facecolor="white")

@@ -1,4 +1,4 @@
-"""Flights that are flown in this process."""
+"""Flights in this process."""
 
 import os
 from collections.abc import Sequence
@@ -22,19 +22,19 @@ if TYPE_CHECKING:
 
 
 class Law(Protocol):
-    """A control law: what answers a force, (x, y, z) in W, N, to what is measured at a step.
+    """A control law: it returns a force, (x, y, z) in W, N, for the measured values of a step.
 
-    It keeps nothing between calls: equal `now` give equal answers. In the first 100 steps (with
-    `check_purity` in all) each answer is computed twice, and a law that gives two different ones is
-    refused. LawFault says that there is no force to answer."""
+    It keeps nothing between calls: equal `now` give equal answers. In the first 100 steps (in all
+    steps with `check_purity`) each answer is computed twice; a law with two different answers is
+    refused. It raises LawFault if it cannot compute a force."""
 
     def __call__(self, now: "Now") -> Sequence[float]:
         ...
 
 
 class LawWithMemory(Protocol):
-    """A control law that remembers: it returns (force, memory), and gets that memory back as
-    `now.memory` at the next step; zeros at step 0. For the rest it is like Law."""
+    """A control law with memory: it returns (force, memory). The next step has this memory as
+    `now.memory`; step 0 has zeros. The other rules are those of Law."""
 
     memory_size: int
     """How many numbers, 0 to 64."""
@@ -46,7 +46,7 @@ class LawWithMemory(Protocol):
 class FlownVehicle:
     """One vehicle of a flight. Arrays have a row for each step, from step 0 to the end of the
     flight; frame W (x forward, y right, z down), SI units, radians. They are read-only views of the
-    flight's memory, which lives as long as one of them; only text columns are copies."""
+    flight's memory and keep it alive; only text columns are copies."""
 
     def __init__(self, core: Any, index: int, scenario: "Scenario"):
         """The `index`-th vehicle of a _sls_core.FlownFlight."""
@@ -78,12 +78,13 @@ class FlownVehicle:
 
     @cached_property
     def state(self) -> Columns:
-        """The columns of state.csv: what quadrotor and load really do."""
+        """The columns of state.csv: the true state of quadrotor and load."""
         return self._make_columns("state")
 
     @cached_property
     def measured(self) -> Columns:
-        """Those of measured.csv: what the controller saw; the state where that is the truth."""
+        """The columns of measured.csv: the measured state, which the controller receives. The columns
+        of `state` if the two cannot differ."""
         if self._core.can_measurement_differ(self._index):
             return self._make_columns("measured")
         return self.state
@@ -95,21 +96,21 @@ class FlownVehicle:
 
     @cached_property
     def reference(self) -> Columns:
-        """Those of reference.csv: what the load is asked to do."""
+        """The columns of reference.csv: the desired motion of the load."""
         return self._make_columns("reference")
 
     def __getitem__(self, name: str) -> np.ndarray:
-        """A column of the state. Raises KeyError for another name."""
+        """The column `name` of `state`. Raises KeyError if there is none."""
         return self.state[name]
 
     def _view(self, table: str, first: str, size: int = 3) -> np.ndarray:
-        """The column `first` and those after it, (steps, size)."""
+        """`size` columns of `table`, from the column `first` on, (steps, size)."""
         index = self._places[table, first]
         return self._cells[:, index:index + size]
 
     @property
     def time_s(self) -> np.ndarray:
-        """Simulated time, (steps,), s."""
+        """Simulation time, (steps,), s."""
         return self.state["sim_time_s"]
 
     @property
@@ -149,12 +150,12 @@ class FlownVehicle:
 
     @property
     def attitude(self) -> np.ndarray | None:
-        """Unit quaternions w, x, y, z, body to W, (steps, 4); None of a plant without attitude."""
+        """Unit quaternions w, x, y, z, body to W, (steps, 4); None if the plant has no attitude."""
         return self._view("state", "att_w", 4) if "att_w" in self.state else None
 
     @property
     def body_rates(self) -> np.ndarray | None:
-        """In the body, (steps, 3), rad/s; None of a plant without attitude."""
+        """In the body frame, (steps, 3), rad/s; None if the plant has no attitude."""
         return self._view("state", "rate_x_rad_s") if "rate_x_rad_s" in self.state else None
 
     @property
@@ -164,11 +165,11 @@ class FlownVehicle:
 
     @property
     def reference_position(self) -> np.ndarray:
-        """Where the load should be, (steps, 3), m."""
+        """Desired position of the load, (steps, 3), m."""
         return self._view("reference", "ref_x_m")
 
     def calc_load_error(self) -> np.ndarray:
-        """Position of the load less its reference, (steps, 3), m."""
+        """Position of the load minus its reference, (steps, 3), m."""
         return self.load_position - self.reference_position
 
     @cached_property
@@ -190,7 +191,7 @@ class FlownVehicle:
 
     @cached_property
     def metrics(self) -> "list[StageMetrics]":
-        """Of every stage, and after it of its laps: sls.metrics.calc_stage_metrics."""
+        """Metrics of every stage, each followed by those of its laps (sls.metrics.calc_stage_metrics)."""
         from sls.metrics import calc_stage_metrics
         return calc_stage_metrics(self.trajectory)
 
@@ -206,41 +207,41 @@ class Flight(FlownVehicle):
     @property
     def vehicles(self) -> tuple[FlownVehicle, ...]:
         """All vehicles, by id; the first one is the flight itself."""
-        return (self, *self._others)  # not kept: a cycle would keep the flight's memory
+        return (self, *self._others)  # made on each call: a kept cycle of references would keep the memory
 
     @property
     def failure(self) -> str:
-        """Why the flight failed, one line; empty if every mission was finished."""
+        """The reason why the flight failed, in one line; empty if every mission was finished."""
         return self._core.failure
 
     @property
     def is_finished(self) -> bool:
-        """Whether every vehicle has finished its mission."""
+        """True if every vehicle has finished its mission."""
         return not self.failure
 
     @property
     def last_step(self) -> int:
-        """The last one that was answered."""
+        """The last step that has an answer of the controller."""
         return self._core.last_step
 
     @property
     def certificate(self) -> str:
-        """Hash of the flight, equal to that of its recording by the three programs: 64 lower-case
-        hex digits. Computed when first asked for."""
+        """Hash of the flight, 64 lower-case hex digits: equal to that of a recording of the same flight
+        by the three programs. Computed on first use."""
         return self._core.certificate
 
     def save(self, folder: str | os.PathLike[str], *, force: bool = False) -> "Recording":
-        """Writes the recording that `./sls run --in-process` would leave, into a new or empty
-        folder; with `force`, instead of the recording that is there.
+        """Writes the recording that `./sls run --in-process` would write, into a new or empty folder.
+        With `force` it replaces a recording in the folder.
 
-        Raises ConfigError for the folder, OSError if the disk refuses."""
+        Raises ConfigError if the folder cannot be used, OSError if the disk fails."""
         from sls.recordings import Recording
         if not self._core.save(os.fspath(folder), force) and self.is_finished:
             raise RunError(f"{os.fspath(folder)}: the recording is not complete")
         return Recording(Path(folder))
 
     def __len__(self) -> int:
-        """Steps that were answered."""
+        """Number of steps with an answer of the controller."""
         return len(self._cells)
 
     def __repr__(self) -> str:
@@ -253,12 +254,13 @@ def fly(scenario: "Scenario | str | os.PathLike[str]",
         check_purity: bool = False) -> Flight:
     """Flies a scenario in this process, bit for bit as the three programs do in lockstep.
 
-    `scenario` may also be what load_scenario takes. `controller` flies instead of the scenario's
-    law. Of a fleet all vehicles fly, or `vehicle` alone. `check_purity` computes each answer twice.
-    Ctrl-C ends the flight with KeyboardInterrupt; other Python threads run meanwhile.
+    `scenario` may also be an argument of load_scenario. `controller` replaces the scenario's law.
+    Without `vehicle` the whole fleet flies, otherwise only this vehicle. `check_purity` computes each
+    answer twice. Ctrl-C ends the flight with KeyboardInterrupt. Other Python threads can run during
+    the flight.
 
-    A mission that fails does not raise: the flight says so in `failure`. Raises ConfigError for
-    what cannot be flown, RunError for a control law that is broken."""
+    A mission that fails raises no exception: `failure` of the flight has the reason. Raises
+    ConfigError if the scenario cannot be flown, RunError if the control law is broken."""
     if isinstance(scenario, (str, os.PathLike)):
         scenario = load_scenario(scenario)
     return Flight(load_core().fly(scenario, controller, vehicle, check_purity), scenario)

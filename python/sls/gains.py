@@ -7,13 +7,13 @@ from sls.errors import ConfigError
 
 
 def lqr(horizontal: float, vertical: float) -> dict[str, dict[str, float]]:
-    """The gains that the law `qsf` gets from `controller.gains.lqr`: of chains of four (horizontal)
-    and two (vertical) integrators with Q = weight · I and R = 1.
+    """The LQR gains that the law `qsf` gets from `controller.gains.lqr`: for chains of four (horizontal)
+    and two (vertical) integrators, with Q = weight · I and R = 1.
 
     Returns `{"horizontal": {"position", "velocity", "acceleration", "jerk"}, "vertical":
-    {"position", "velocity"}}`, in 1/s⁴, 1/s³, 1/s², 1/s and 1/s², 1/s: what
-    `load_scenario(…, controller__gains=…)` takes. Raises ConfigError for weights that are not
-    positive or have no solution."""
+    {"position", "velocity"}}`, in 1/s⁴, 1/s³, 1/s², 1/s and 1/s², 1/s: an argument for
+    `load_scenario(…, controller__gains=…)`. Raises ConfigError if a weight is not positive or has
+    no solution."""
     for axis, weight in (("horizontal", horizontal), ("vertical", vertical)):
         if not (weight > 0.0 and math.isfinite(weight)):
             raise ConfigError(f"lqr: {axis}: expected > 0, got {weight}")

@@ -4,4 +4,4 @@ from sls.errors import ConfigError
 
 
 class InputError(ConfigError):
-    """One line that names the place, what was expected there and what was found."""
+    """An error with one line: place, expected value and found value."""

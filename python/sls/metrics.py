@@ -25,8 +25,8 @@ def calc_max(values: np.ndarray) -> np.ndarray:
 
 
 def calc_settling_time(time_s: np.ndarray, values: np.ndarray, target: float) -> float:
-    """Time after the first row from which on `values` stays within 2 % of the step, s. NaN: there
-    is no step; infinite: it is outside at the end."""
+    """Time from the first row until `values` stays within 2 % of the step, s. NaN: there is no step;
+    infinite: the last value is outside this band."""
     step = target - values[0]
     if abs(step) < LEAST_STEP_M:
         return math.nan
@@ -36,7 +36,7 @@ def calc_settling_time(time_s: np.ndarray, values: np.ndarray, target: float) ->
 
 
 def calc_overshoot(values: np.ndarray, target: float) -> float:
-    """How far `values` goes beyond its target, as a share of the step. NaN: there is no step."""
+    """Largest distance of `values` beyond its target, as a share of the step. NaN: there is no step."""
     step = target - values[0]
     if abs(step) < LEAST_STEP_M:
         return math.nan
@@ -51,7 +51,7 @@ def calc_steady_state_error(time_s: np.ndarray, errors: np.ndarray) -> np.ndarra
 
 @dataclass(frozen=True)
 class StepMetrics:
-    """Of a stage with a constant reference; per axis."""
+    """Metrics of a stage with a constant reference, per axis."""
 
     settling_time_s: np.ndarray
     overshoot: np.ndarray
@@ -71,7 +71,7 @@ class StageMetrics:
 
 
 def calc_stage_metrics(flight: Trajectory) -> list[StageMetrics]:
-    """Of every stage, and after it of its laps. Rows without a reference do not count."""
+    """Metrics of every stage, each followed by those of its laps. Rows without a reference are left out."""
     results = []
     for stage in flight.stages:
         rows = find_rows(flight, stage)
@@ -79,7 +79,7 @@ def calc_stage_metrics(flight: Trajectory) -> list[StageMetrics]:
             continue
         whole = calc_over(flight, rows, f"{stage.index} {stage.name}")
         if flight.time_s[stage.first] > stage.start_s:
-            whole = replace(whole, step=None)  # where the step began is not known
+            whole = replace(whole, step=None)  # the position at the start of the step is not known
         results.append(whole)
         results += [calc_over(flight, lap.rows, lap.label) for lap in split_laps(flight, stage)]
     return results
@@ -105,8 +105,8 @@ class Lap:
 
 
 def split_laps(flight: Trajectory, stage: Stage) -> list[Lap]:
-    """The laps there are rows of. The last row of a mission, at the very end of its last stage,
-    belongs to the lap that ends there: the rule of flight.txt (recorder/flight_log.cpp)."""
+    """The laps that have rows. The last row of a mission, at the end of its last stage, belongs to the
+    lap that ends there, as in flight.txt (recorder/flight_log.cpp)."""
     rows = find_rows(flight, stage)
     if stage.lap_s is None or not len(rows):
         return []

@@ -41,7 +41,7 @@ FORMATS = {layout.name: layout for layout in (
 
 
 def detect_format(text: Text, fields: list[str]) -> LogFormat:
-    """By the number of columns and whether there is a header. Raises InputError."""
+    """Finds the format by the number of columns and the presence of a header. Raises InputError."""
     has_header = not is_number(fields[0])
     for layout in FORMATS.values():
         if layout.has_header == has_header and len(layout.columns) == len(fields):
@@ -55,10 +55,10 @@ def detect_format(text: Text, fields: list[str]) -> LogFormat:
 
 def load_log(path: Path, name: str, format_name: str | None = None,
              rod_length_m: float | None = None) -> Trajectory:
-    """Reads `path`, in the format named or, without, the one it looks like. `rod_length_m` replaces
-    the format's own where that has no load position. Raises InputError."""
+    """Reads `path` in the format `format_name`; None: in the format that `detect_format` finds.
+    `rod_length_m` replaces the rod length of a format without load position. Raises InputError."""
     text = read_text(path)
-    if text.rest:  # the last line of these files may lack its end
+    if text.rest:  # the last line of these files may have no newline
         text.lines.append(text.rest)
     if not text.lines:
         raise InputError(f"{path}:1: expected a log, got an empty file")

@@ -1,5 +1,5 @@
-"""The study's chapter on the published PX4 flight: what is flown for it, its pictures, tables and
-numbers. Everything flies in one process (`./sls run --in-process`)."""
+"""The study's chapter on the published PX4 flight: its flights, pictures, tables and numbers. Each
+flight is flown in one process (`./sls run --in-process`)."""
 
 import copy
 import math
@@ -34,14 +34,14 @@ Change = Callable[[dict[str, Any]], None]
 
 @dataclass(frozen=True)
 class Planned:
-    """A shipped scenario, or one that differs from it by `changes`."""
+    """A flight of the shipped scenario `base`, with `changes`."""
 
     name: str
     base: str
     changes: tuple[Change, ...] = ()
 
 
-# --- what is changed ------------------------------------------------------------------------------
+# --- changes of scenarios -------------------------------------------------------------------------
 
 
 def use_right_gains(scenario: dict[str, Any]) -> None:
@@ -81,7 +81,8 @@ TIME_CONSTANT_SHARE = 1.0 - math.exp(-1.0)
 
 
 def step_force(axis: int, sign: float) -> Change:
-    """The load hangs at rest and the force is frozen, so that no controller answers the step."""
+    """A step of the force on a load at rest. The command is frozen, because the controller must not
+    react to the step."""
     def change(scenario: dict[str, Any]) -> None:
         vehicle = scenario["vehicle"]
         weight = (vehicle["quad_mass_kg"] + vehicle["load_mass_kg"]) * vehicle["gravity_m_s2"]
@@ -98,7 +99,7 @@ def step_gently(scenario: dict[str, Any]) -> None:
     scenario["mission"] = [{"set_point": {"position_m": [0.2, 0.2, -0.5]}, "for_s": 60}]
 
 
-# --- what is flown --------------------------------------------------------------------------------
+# --- flights --------------------------------------------------------------------------------------
 
 INGREDIENTS = (
     ("px4_ideal", "4 ms, the force acts at once", "0.0005, 0.0008, 0.0001"),
@@ -165,7 +166,7 @@ FLIGHTS = (*(Planned(name, name) for name, _, _ in INGREDIENTS), *(flight for fl
 
 
 class RunFailed(Exception):
-    """A flight or a search for a delay margin did not end well; the message names it."""
+    """A flight or a search for a delay margin failed; the message names it."""
 
 
 def load_base(name: str) -> dict[str, Any]:
@@ -173,7 +174,7 @@ def load_base(name: str) -> dict[str, Any]:
 
 
 def find_scenario(planned: Planned, recordings: Path) -> Path:
-    """The shipped file, or one written below `recordings`."""
+    """The scenario file: the shipped one, or, with changes, a new one below `recordings`."""
     if not planned.changes:
         return SCENARIOS / f"{planned.base}.yaml"
     scenario = copy.deepcopy(load_base(planned.base))
@@ -200,8 +201,8 @@ def run_launcher(planned: Planned, arguments: Sequence[str]) -> str:
 
 
 def fly_all(recordings: Path, say: Callable[[str], None]) -> None:
-    """Flies everything, on all processors, with programs that are built (`./sls study` has done
-    so and says it by SLS_BUILD). Raises RunFailed."""
+    """Flies everything, on all processors. The programs must be built already: `./sls study` builds
+    them and sets SLS_BUILD. Raises RunFailed."""
     def fly(planned: Planned) -> None:
         say(f"study: flying {planned.name} in process")
         run_launcher(planned, ["run", str(find_scenario(planned, recordings)), "--in-process",
@@ -223,7 +224,7 @@ def fly_all(recordings: Path, say: Callable[[str], None]) -> None:
 
 @dataclass(frozen=True)
 class Flown:
-    """A flight as it was, and as the controller saw it."""
+    """A flight with its true positions, and with the measured positions that the controller received."""
 
     true: Trajectory
     seen: Trajectory
@@ -254,7 +255,7 @@ class Margin:
 def load_margin(planned: Planned, recordings: Path) -> Margin:
     path = find_margin_file(planned, recordings)
     text = path.read_text() if path.exists() else ""
-    # delay, periods, worst error, rms error, outcome
+    # Columns: delay, periods, worst error, rms error, outcome.
     rows = {fields[0]: fields for line in text.splitlines()[1:-1] if (fields := line.split())}
     found = re.search(r"^holds with (\S+) s, loses the load with (\S+) s$", text, re.MULTILINE)
     if not found or found[2] not in rows or "0" not in rows:
@@ -275,19 +276,20 @@ def find_eight(base: str) -> dict[str, Any]:
 
 
 def shift_to_published(flight: Trajectory, base: str) -> Trajectory:
-    """The same beside the figure eight at z −0.5 that the published errors are measured from."""
+    """The flight with its reference shifted to the figure eight at z −0.5, to which the published errors
+    refer."""
     shift = np.array([0.0, 0.0, PUBLISHED_Z_M - find_eight(base)["offset_m"][2]])
     return replace(flight, p_WL_ref=flight.p_WL_ref + shift)
 
 
 def measure(flight: Trajectory, label: str = "") -> StageMetrics:
-    """Of the second lap."""
+    """Metrics of the second lap."""
     stage = next(stage for stage in flight.stages if stage.lap_s is not None)
     return calc_over(flight, split_laps(flight, stage)[1].rows, label)
 
 
 def make_chain(gains: str) -> HorizontalChain:
-    """Of px4_ideal."""
+    """The horizontal chain of px4_ideal. `gains`: "reversed", or in the right order."""
     scenario = load_base("px4_ideal")
     vehicle, listed = scenario["vehicle"], scenario["controller"]["gains"]["horizontal"]
     values = [listed[name] for name in ("position", "velocity", "acceleration", "jerk")]
@@ -298,15 +300,16 @@ def make_chain(gains: str) -> HorizontalChain:
 
 
 def calc_hold(late: Lateness) -> float:
-    """The delay by which px4_ideal's hold counts: half a control period; a lag of first order acts
-    over each step of the plant with the value of its end, which is half such a step early."""
+    """Delay that the hold of the force adds in px4_ideal, s: half a control period. With a lag of first
+    order it is half a plant step shorter, because the plant uses the lag's value at the end of a step
+    for the whole step."""
     scenario = load_base("px4_ideal")
     early_s = scenario["plant"]["step_s"] if late.lag_s else 0.0
     return (scenario["sync"]["period_s"] - early_s) / 2.0
 
 
 def calc_formula_rms(gains: str, late: Lateness) -> np.ndarray:
-    """Of x and y on the figure eight, by the linear formula, m."""
+    """rms errors in x and y on the figure eight, by the linear formula, m."""
     eight = find_eight("px4_ideal")
     late = replace(late, delay_s=late.delay_s + calc_hold(late))
     base = 2.0j * math.pi / eight["period_s"]
@@ -338,7 +341,7 @@ def measure_step(flight: Trajectory, angle: int) -> StepResponse:
 
 
 def cut_eight(flight: Trajectory, name: str) -> Trajectory:
-    """Both laps as a flight of their own, from time 0."""
+    """Both laps as a separate flight that starts at time 0."""
     stage = next(stage for stage in flight.stages if stage.lap_s is not None)
     rows = np.arange(stage.first, stage.end)
     return replace(flight, name=name, time_s=flight.time_s[rows] - flight.time_s[rows[0]],
@@ -348,7 +351,7 @@ def cut_eight(flight: Trajectory, name: str) -> Trajectory:
 
 
 def plot_plan(flights: Sequence[Trajectory]) -> Figure:
-    """Loads from above, lap by lap."""
+    """The paths of the loads from above, one picture for each lap."""
     figure = Figure(figsize=(8.6, 5.2), layout="constrained")
     laps = figure.subplots(1, 2, sharex=True, sharey=True)
     name_figure(figure, "The load from above, as the controller saw it")
@@ -368,7 +371,7 @@ def plot_plan(flights: Sequence[Trajectory]) -> Figure:
 
 
 def plot_lap_errors(flights: Sequence[Trajectory], published: Sequence[float]) -> Figure:
-    """Errors over both laps; on the second the published rms (shaded) and largest values."""
+    """Errors over both laps; on the second lap also the published rms (shaded) and largest errors."""
     figure, axes = make_stack(3, "Load position error, as the controller saw it",
                               ("x (m)", "y (m)", "z (m, about −0.5)"))
     for axis in range(3):
@@ -407,7 +410,7 @@ def plot_steps(flown: dict[str, Flown]) -> Figure:
 
 
 def plot_formula(flown: dict[str, Flown]) -> Figure:
-    """Curves of the formula, points of the flights."""
+    """The results of the formula as curves, those of the flights as points."""
     figure = Figure(figsize=(8.6, 3.9), layout="constrained")
     axes = figure.subplots(1, 2, sharey=True)
     name_figure(figure, "Error of the second lap: linear formula (lines), flights (points)")
@@ -431,7 +434,7 @@ def plot_formula(flown: dict[str, Flown]) -> Figure:
 
 
 def draw_pictures(flown: dict[str, Flown], published: Sequence[float]) -> dict[str, Figure]:
-    """By the names of their files."""
+    """All pictures of this chapter, by file name."""
     laps = [cut_eight(shift_to_published(flown[name].seen, name), name)
             for name in ("px4_fitted", "px4_published")]
     return {"px4_plan": plot_plan([cut_eight(flown[name].seen, name)
@@ -492,7 +495,7 @@ def make_margin_table(recordings: Path) -> str:
 
 def make_values(flown: dict[str, Flown], recordings: Path,
                 published: Sequence[str]) -> dict[str, str]:
-    """Values for the braces of study_page.md in this chapter."""
+    """Values for the names in braces in this chapter of study_page.md."""
     def describe_limit(gains: str, lag_s: float) -> str:
         late = Lateness(lag_s=lag_s)
         return f"{calc_stability_limit(make_chain(gains), lag_s) - calc_hold(late):.3f}"

@@ -1,4 +1,4 @@
-"""Recordings, as the recorder leaves them: whole, cut short, or in several segments."""
+"""Reads recordings: complete, cut short, or in several segments."""
 
 import json
 import os
@@ -67,7 +67,7 @@ class Verification:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Whether two recordings are of the same flight."""
+    """The result of a comparison of two recordings."""
 
     difference: str | None
     """The first row or field that differs: file, vehicle, step, column and both values."""
@@ -81,19 +81,20 @@ class Comparison:
 
 @dataclass(frozen=True)
 class RecordedVehicle:
-    """The columns of one vehicle, read when first asked for."""
+    """The columns of one vehicle, read on first use."""
 
     recording: "Recording"
     vehicle_id: int
 
     @cached_property
     def state(self) -> Columns:
-        """Of state.csv: what quadrotor and load really do."""
+        """The columns of state.csv: the true state of quadrotor and load."""
         return self._read("state.csv")
 
     @cached_property
     def measured(self) -> Columns:
-        """Of measured.csv: what the controller saw; the state where there is no such row."""
+        """The columns of measured.csv: the measured state, which the controller received. The columns of
+        state.csv if measured.csv has no rows."""
         if not (self.recording.folder / "measured.csv").exists():
             return self.state
         measured = self._read("measured.csv")
@@ -101,12 +102,12 @@ class RecordedVehicle:
 
     @cached_property
     def command(self) -> Columns:
-        """Of command.csv: what the controller answered."""
+        """The columns of command.csv: the answers of the controller."""
         return self._read("command.csv")
 
     @cached_property
     def reference(self) -> Columns:
-        """Of reference.csv: what the load is asked to do."""
+        """The columns of reference.csv: the desired motion of the load."""
         return self._read("reference.csv")
 
     def _read(self, name: str) -> Columns:
@@ -115,21 +116,21 @@ class RecordedVehicle:
 
 class Recording:
     """A recording's folder. `state`, `measured`, `command` and `reference` are the columns of the
-    files with these names, of the first vehicle; `vehicle(ID)` has those of another one. Arrays have
-    a row for each row of the file, SI units, radians. Every member raises InputError, which is a
-    ConfigError, for what it cannot read."""
+    files with these names, for the first vehicle; `vehicle(ID)` has those of another vehicle. Arrays
+    have a row for each row of the file, SI units, radians. Every member raises InputError, which is a
+    ConfigError, if it cannot read a file."""
 
     def __init__(self, folder: str | os.PathLike[str]):
         self.folder = folder = Path(folder)
         self.segments = [(folder, read_manifest(folder))]
         while (segment := folder / f"segment-{len(self.segments) + 1}").is_dir():
             if not (segment / "manifest.json").exists():
-                break  # of a recorder that was killed before it had written anything
+                break  # its recorder was killed before it wrote a file
             self.segments.append((segment, read_manifest(segment)))
 
     @property
     def manifest(self) -> dict[str, Any]:
-        """The last segment's, which covers the whole flight."""
+        """The manifest of the last segment, which covers the whole flight."""
         return self.segments[-1][1]
 
     @property
@@ -138,7 +139,7 @@ class Recording:
 
     @property
     def certificate(self) -> str:
-        """Hash of the flight, as the manifest says; empty in an earlier version's."""
+        """Hash of the flight, from the manifest; empty if an earlier version wrote the recording."""
         return str(self.manifest.get("certificate", ""))
 
     def vehicle(self, vehicle_id: int) -> RecordedVehicle:
@@ -167,19 +168,19 @@ class Recording:
 
     @cached_property
     def trajectory(self) -> Trajectory:
-        """The first vehicle's flight: what figures and metrics work on."""
+        """The first vehicle's flight, for figures and metrics."""
         return self.load_flight(self.vehicle_ids[0], self.folder.resolve().name)
 
     def verify(self) -> Verification:
         """Reads every file again, as `./sls verify DIR` does. Needs the extension module.
 
-        Raises RunError for a file that is damaged beyond reading."""
+        Raises RunError if a file is too damaged to be read."""
         steps, certificate, problems = load_core().inspect_recording(str(self.folder))
         return Verification(steps, certificate, tuple(problems))
 
     def compare(self, other: "Recording") -> Comparison:
         """Compares the data of two recordings, as `./sls verify A B` does. Needs the extension
-        module. Raises RunError for a file that is damaged beyond reading."""
+        module. Raises RunError if a file is too damaged to be read."""
         difference, notes = load_core().compare_recordings(str(self.folder), str(other.folder))
         return Comparison(difference, tuple(notes))
 
@@ -205,8 +206,8 @@ class Recording:
         return {name: self._join_segments(name) for name in COLUMNS}
 
     def _join_segments(self, name: str) -> tuple[np.ndarray, bool]:
-        """The rows of a file in all segments, each up to the step where the next one takes over;
-        and whether a row was cut off."""
+        """The rows of a file from all segments, and whether a row was cut off. A segment ends at the
+        first step of the next segment."""
         parts, is_cut = [], False
         for number, (folder, _) in enumerate(self.segments):
             columns = COLUMNS["state.csv" if name == "measured.csv" else name]
@@ -218,7 +219,7 @@ class Recording:
         return np.concatenate(parts), is_cut
 
     def rows_of(self, name: str, vehicle_id: int) -> np.ndarray:
-        """The rows of a file of one vehicle, in all segments: a structured array."""
+        """The rows of one vehicle in a file, from all segments, as a structured array."""
         table, _ = self._tables[name] if name in COLUMNS else self._join_segments(name)
         rows = table[table["vehicle_id"] == vehicle_id]
         falling = np.flatnonzero(np.diff(rows["step"]) <= 0)
@@ -229,7 +230,7 @@ class Recording:
         return rows
 
     def load_flight(self, vehicle_id: int, name: str) -> Trajectory:
-        """The steps of one vehicle of which there is a state."""
+        """The flight of one vehicle: the steps with a row in state.csv."""
         self._check_vehicle(vehicle_id)
         state = self.rows_of("state.csv", vehicle_id)
         if not len(state):
@@ -258,10 +259,10 @@ class Recording:
                              f"({describe_ids(self.vehicle_ids)}), got {vehicle_id}")
 
     def load_seen(self, vehicle_id: int, name: str) -> Trajectory:
-        """The same with the positions that the controller saw: what was measured."""
+        """As `load_flight`, with the measured positions and angles, which the controller received."""
         flight = self.load_flight(vehicle_id, name)
         if not (self.folder / "measured.csv").exists():
-            return flight  # the recorder writes that file only where it can differ
+            return flight  # the recorder writes measured.csv only if the measured state can differ
         rows = self.rows_of("measured.csv", vehicle_id)
         steps = self.rows_of("state.csv", vehicle_id)["step"]
         return replace(flight, p_WQ=align(steps, rows, ("quad_x_m", "quad_y_m", "quad_z_m")),
@@ -270,14 +271,14 @@ class Recording:
                        beta=align(steps, rows, ("beta_rad",))[:, 0])
 
     def load_fleet(self) -> list[Trajectory]:
-        """Every vehicle's, named by its id."""
+        """The flight of every vehicle, named by its id."""
         return [self.load_flight(vehicle_id, str(vehicle_id)) for vehicle_id in self.vehicle_ids]
 
     def _find_stages(self, stage: np.ndarray, reference: np.ndarray, time_s: np.ndarray,
                      vehicle_id: int) -> tuple[Stage, ...]:
         names = {int(index): str(name)
                  for index, name in zip(reference["stage"], reference["stage_name"])}
-        # Of stages of which the first recorded step is another one; earlier versions tell none.
+        # Starts of the stages that began before their first recorded step. Manifests of earlier versions have none.
         starts = {start["stage"]: start["step"] * self.manifest["period_s"]
                   for start in self.manifest.get("stage_starts", ())
                   if start["vehicle_id"] == vehicle_id}
@@ -289,13 +290,13 @@ class Recording:
         return find_stages(stage, time_s, names, plans, starts)
 
     def _find_plan(self, stage: int) -> dict[str, Any]:
-        """The scenario's keys of a stage."""
+        """The keys of a stage in the scenario."""
         mission = self.scenario["mission"]
         planned = mission[stage] if stage < len(mission) else {}
         return planned if isinstance(planned, dict) else {}
 
     def list_notes(self) -> tuple[str, ...]:
-        """Missing samples, and other files in the folder."""
+        """Notes on the recording: incomplete, samples missing, rows cut off, further runs in the folder."""
         manifest, notes = self.manifest, []
         if not manifest["complete"]:
             outcome = manifest["outcome"]
@@ -318,7 +319,7 @@ class Recording:
         return tuple(notes)
 
     def list_events(self) -> list[Event]:
-        """Changes of phase and reason, as the server told them."""
+        """Changes of phase and reason in the server's status."""
         events, last = [], None
         for folder, manifest in self.segments:
             for row in read_records(folder / "status.csv"):
@@ -337,7 +338,7 @@ class Recording:
 
 
 def align(steps: np.ndarray, table: np.ndarray, names: tuple[str, ...]) -> np.ndarray:
-    """The columns `names` of the rows of `table` with these steps; NaN if there is none."""
+    """The columns `names` of `table` at `steps`; NaN for a step without a row."""
     values = np.full((len(steps), len(names)), np.nan)
     if len(table):
         place = np.minimum(np.searchsorted(table["step"], steps), len(table) - 1)
@@ -347,5 +348,5 @@ def align(steps: np.ndarray, table: np.ndarray, names: tuple[str, ...]) -> np.nd
 
 
 def describe_ids(ids: list[int]) -> str:
-    """ "0" or "0 to 49"."""
+    """The range of ids as text, such as "0" or "0 to 49"."""
     return f"{ids[0]} to {ids[-1]}" if len(ids) > 1 else ", ".join(map(str, ids))

@@ -34,7 +34,7 @@ CAPTIONS = {
               "and the force of the rod on the quadrotor, along the rod.",
 }
 MOST_EVENTS = 200
-# Columns of status.csv that count nothing.
+# Columns of status.csv that are not counters.
 NO_COUNTERS = ("sample_index", "phase", "reason", "step", "controller", "real_time_factor",
                "round_trip_p50_us", "round_trip_p99_us", "timing", "problem")
 STYLE_SHEET = """
@@ -81,7 +81,7 @@ summary { cursor: pointer; font-weight: 600; font-size: 17px; }
 
 
 def make_report(recording: Recording, vehicle_id: int) -> str:
-    """The page as HTML, with the scene in what is left of its bytes. Raises InputError."""
+    """The page as HTML. The scene may use the rest of MOST_BYTES. Raises InputError."""
     name = recording.manifest["scenario"]
     flight = recording.load_flight(vehicle_id, name)
     fleet = recording.load_fleet()
@@ -160,7 +160,7 @@ def make_facts(recording: Recording, flight: Trajectory, vehicle_id: int) -> str
 
 
 def find_vehicle(scenario: dict[str, Any], vehicle_id: int) -> dict[str, Any]:
-    """The parameters of one vehicle: the scenario's, and its own of a list of vehicles."""
+    """The parameters of one vehicle: those of `vehicle`, replaced by its own in the list `vehicles`."""
     vehicle = dict(scenario.get("vehicle") or {})
     own = scenario.get("vehicles")
     if isinstance(own, list) and vehicle_id < len(own) and isinstance(own[vehicle_id], dict):
@@ -191,7 +191,7 @@ def describe_machine(machine: dict[str, Any]) -> str:
 
 
 def make_table(groups: Sequence[str], rows: Sequence[list[str]]) -> str:
-    """Of stages and laps: three columns, x y z, per group."""
+    """A table with a row for each stage or lap, and three columns, x y z, for each group."""
     top = "".join(f"<th colspan=\"3\">{group}</th>" for group in groups)
     axes = "<th>x</th><th>y</th><th>z</th>" * len(groups)
     body = "".join(

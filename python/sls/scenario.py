@@ -1,4 +1,4 @@
-"""Scenarios from files, with some values replaced."""
+"""Reads scenarios from files and replaces values in them."""
 
 import os
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ SHIPPED = Path(__file__).resolve().parents[2] / "config/scenarios"
 
 
 def find_scenario(path_or_name: str | os.PathLike[str]) -> Path:
-    """The file of a scenario: a name means SHIPPED/NAME.yaml, as for `./sls run`."""
+    """The file of a scenario. A name means the file NAME.yaml in SHIPPED, as for `./sls run`."""
     text = os.fspath(path_or_name)
     is_path = not isinstance(path_or_name, str) or "/" in text or text.endswith(".yaml")
     if is_path or Path(text).is_file():
@@ -26,15 +26,15 @@ def find_scenario(path_or_name: str | os.PathLike[str]) -> Path:
 
 def load_scenario(path_or_name: str | os.PathLike[str], *,
                   changes: Mapping[str, object] | None = None, **keys: object) -> "Scenario":
-    """Reads a scenario, with values replaced where asked for.
+    """Reads a scenario and replaces values in it.
 
-    `changes` names keys by path: keys and, of a list, indices from 0, separated by dots, such as
-    `{"vehicle.load_mass_kg": 0.3, "faults.0.delay.by_s": 0.008}`. A keyword does the same with two
-    underscores for a dot: `vehicle__load_mass_kg=0.3`. Values are numbers, texts, bools, lists and
-    maps, in the units of the file. A key that the file leaves out is added. Without changes the
-    scenario's text is the file's, to the byte.
+    `changes` names keys by path: keys, and for lists indices from 0, separated by dots, such as
+    `{"vehicle.load_mass_kg": 0.3, "faults.0.delay.by_s": 0.008}`. A keyword argument does the same,
+    with two underscores for each dot: `vehicle__load_mass_kg=0.3`. Values are numbers, texts, bools,
+    lists and maps, in the units of the file. A key that is not in the file is added. Without changes
+    the scenario's text equals the file's, byte for byte.
 
-    Raises ConfigError, with file, line and key, for what the programs refuse."""
+    Raises ConfigError, with file, line and key, if the programs would refuse the scenario."""
     replaced: dict[str, str] = {}
     named = {key.replace("__", "."): value for key, value in keys.items()}
     for path, value in {**(changes or {}), **named}.items():

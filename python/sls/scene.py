@@ -1,4 +1,4 @@
-"""The scene of a report: the page of sls_view with the recording in it."""
+"""The scene of a report: the page of sls_view, which contains the recording."""
 
 import html
 import os
@@ -16,14 +16,14 @@ MARGIN = 0.04
 
 
 def find_program() -> Path | None:
-    """sls_view, where `./sls report` has built it."""
+    """The program sls_view, if `./sls report` has built it."""
     program = Path(os.environ.get("SLS_VIEW", ""))
     return program if program.is_file() else None
 
 
 def make_scene(recording: Recording, most_bytes: int) -> str:
-    """A section of at most `most_bytes`, which come from steps that are left out; empty, and a line
-    on stderr, where there is none to be had."""
+    """A section of at most `most_bytes`; sls_view leaves out steps to reach this size. If there is no
+    scene, the section is empty and a line on stderr has the reason."""
     program = find_program()
     if program is None:
         return leave_out("expected the program sls_view, got none (./sls report builds it)")
@@ -40,7 +40,7 @@ def make_scene(recording: Recording, most_bytes: int) -> str:
             lines = done.stderr.strip().splitlines() or ["no message"]
             return leave_out(lines[-1])
         page = file.read_text(encoding="utf-8")
-    # Of an attribute in double quotes; html.escape would write more.
+    # An attribute in double quotes needs only these two; html.escape would replace more characters.
     source = page.replace("&", "&amp;").replace('"', "&quot;")
     section = ("<section><h2>Scene</h2><iframe class=\"scene\" title=\"The flight in three dimensions\" "
                f"loading=\"lazy\" srcdoc=\"{source}\"></iframe></section>\n")

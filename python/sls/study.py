@@ -1,4 +1,4 @@
-"""The published comparison with flights of our own: docs/study.md and its pictures."""
+"""The comparison of our flights with the published ones: docs/study.md and its pictures."""
 
 import csv
 import subprocess
@@ -51,13 +51,12 @@ FLIGHTS = (
 )
 
 # Load position error on the second lap, m, from the logs of the published MATLAB, Gazebo and PX4
-# flights of the same figure eight. The first row names the columns; the launcher reads it, too.
+# flights of the same figure eight. The first row names the columns. The launcher reads this file, too.
 PUBLISHED_LAP_2 = list(csv.reader((HERE / "published_lap_2.csv").read_text().splitlines()))
 
 
 def fly_all(recordings: Path, domain: int, say: Callable[[str], None]) -> None:
-    """Flies everything, one after the other, then the chapter on PX4. Raises
-    RunFailed."""
+    """Flies all flights, one after the other, then those of the chapter on PX4. Raises RunFailed."""
     launcher = ROOT / "sls"
     for planned in FLIGHTS:
         say(f"study: flying {planned.name}, period {planned.period_s} s")
@@ -88,7 +87,7 @@ def load_flights(recordings: Path) -> dict[str, Trajectory]:
 
 
 def cut(flight: Trajectory, stage_name: str, lap: int, name: str) -> Trajectory:
-    """One lap of a flight as a flight of its own, from time 0."""
+    """One lap of a flight as a separate flight that starts at time 0."""
     stage = next(stage for stage in flight.stages if stage.name == stage_name)
     rows = split_laps(flight, stage)[lap - 1].rows
     return replace(flight, name=name, time_s=flight.time_s[rows] - flight.time_s[rows[0]],
@@ -98,7 +97,7 @@ def cut(flight: Trajectory, stage_name: str, lap: int, name: str) -> Trajectory:
 
 
 def plot_error_sizes(flights: Sequence[Trajectory], title: str) -> Figure:
-    """Sizes of the load position errors over time, logarithmic."""
+    """Absolute values of the load position errors over time, logarithmic."""
     figure, axes = make_stack(3, title, ("|x| (m)", "|y| (m)", "|z| (m)"), height=1.55)
     for axis in range(3):
         sizes = [np.abs(flight.calc_error()[:, axis]) for flight in flights]
@@ -123,7 +122,7 @@ def plot_height_error(flights: Sequence[Trajectory]) -> Figure:
 
 
 def plot_set_points(flights: Sequence[Trajectory]) -> Figure:
-    """The steps of several legs, each as a share of its way, with the band of ±2 %."""
+    """The steps of several legs, each as a share of its distance, with the band of ±2 %."""
     figure, axes = make_stack(3, "Load position as a share of the step; shaded: ±2 %",
                               ("x / step", "y / step", "z / step"), height=1.55)
     for index, flight in enumerate(flights):
@@ -140,7 +139,7 @@ def plot_set_points(flights: Sequence[Trajectory]) -> Figure:
 
 
 def draw_pictures(flights: dict[str, Trajectory]) -> dict[str, Figure]:
-    """By the names of their files."""
+    """All pictures except those of the chapter on PX4, by file name."""
     wirings = [cut(flights[name], "figure_eight", 2, label) for name, label in (
         ("gazebo_legacy", "published wiring"), ("gazebo_correct_wiring", "correct wiring"),
         ("gazebo_corrected", "and correct model"))]
@@ -169,7 +168,7 @@ def draw_pictures(flights: dict[str, Trajectory]) -> dict[str, Figure]:
 
 
 def measure_lap_2(flight: Trajectory, label: str) -> StageMetrics:
-    """Of the figure eight of a mission."""
+    """Metrics of the second lap of a mission's figure eight."""
     stage = next(stage for stage in flight.stages if stage.lap_s is not None)
     return calc_over(flight, split_laps(flight, stage)[1].rows, label)
 
@@ -179,7 +178,7 @@ def make_lap_row(metrics: StageMetrics) -> list[str]:
 
 
 def measure_about(flight: Trajectory, z_offset_m: float, label: str) -> StageMetrics:
-    """As `measure_lap_2`, about a figure eight that is shifted by `z_offset_m`."""
+    """As `measure_lap_2`, with the reference shifted by `z_offset_m`."""
     shifted = replace(flight, p_WL_ref=flight.p_WL_ref + np.array([0.0, 0.0, z_offset_m]))
     return measure_lap_2(shifted, label)
 
@@ -223,14 +222,15 @@ def make_drag_table(flights: dict[str, Trajectory]) -> str:
 
 def describe_gain(flights: dict[str, Trajectory], worse: str, better: str, axes: str,
                   digits: int) -> str:
-    """How many times smaller the rms of `better` is on the second lap: "118 (x) and 48 (y)"."""
+    """Ratio of the rms errors of `worse` and `better` on the second lap: "118 (x) and 48 (y)"."""
     ratios = measure_lap_2(flights[worse], "").rms_m / measure_lap_2(flights[better], "").rms_m
     *most, last = [f"{ratio:.{digits}f} ({axis})" for ratio, axis in zip(ratios, axes)]
     return f"{', '.join(most)} and {last}"
 
 
 def calc_distance(flight: Trajectory, published: Trajectory) -> float:
-    """Largest distance per axis, of quadrotor and load, at the instants published, m."""
+    """Largest distance along an axis between the flights, for quadrotor and load, at the published
+    instants, m."""
     step = np.searchsorted(flight.time_s, published.time_s - 1e-6)
     return float(max(np.max(np.abs(flight.p_WQ[step] - published.p_WQ)),
                      np.max(np.abs(flight.p_WL[step] - published.p_WL))))
@@ -251,7 +251,7 @@ PUBLISHED_PX4 = PUBLISHED_LAP_2[-1][1:]
 
 def make_page(flights: dict[str, Trajectory], px4_values: dict[str, str],
               published: Path | None) -> str:
-    """study_page.md with the numbers and tables that belong there."""
+    """study_page.md, with the numbers and tables filled in."""
     def describe_height(name: str, digits: int) -> str:
         metrics = calc_stage_metrics(flights[name])[0]
         return f"{abs(1000.0 * metrics.step.steady_state_error_m[2]):.{digits}f}"

@@ -9,8 +9,8 @@ AXES = "xyz"
 
 
 def format_error(metres: float) -> str:
-    """Three digits, short: 0.211, 0.0253, 4.10e-04. Digits below a tenth of a nanometre depend on
-    how a processor rounds."""
+    """A length with three digits: 0.211, 0.0253, 4.10e-04. Lengths below a tenth of a nanometre are not
+    printed, because they depend on the rounding of the processor."""
     size = abs(metres)
     if math.isnan(metres):
         return "–"
@@ -31,7 +31,7 @@ def format_share(share: float) -> str:
 
 
 def list_step_cells(metrics: StageMetrics) -> list[str]:
-    """Settling time, overshoot and steady-state error, each of x, y and z."""
+    """Settling time, overshoot and steady-state error, each for x, y and z."""
     if metrics.step is None:
         return ["–"] * 9
     return [*map(format_settling_time, metrics.step.settling_time_s),
@@ -40,7 +40,7 @@ def list_step_cells(metrics: StageMetrics) -> list[str]:
 
 
 def list_error_cells(metrics: StageMetrics) -> list[str]:
-    """rms and max, each of x, y and z."""
+    """rms and max, each for x, y and z."""
     return [*map(format_error, metrics.rms_m), *map(format_error, metrics.max_m)]
 
 

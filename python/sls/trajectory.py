@@ -1,7 +1,7 @@
-"""A flight as figures and metrics see it, whatever file it comes from.
+"""A flight in the form that figures and metrics use, for all sources of flights.
 
 Frame W everywhere: x forward, y right, z down; SI units, radians. Arrays have a row per instant;
-what a source does not hold is NaN."""
+values that a source does not hold are NaN."""
 
 import math
 from collections.abc import Mapping
@@ -34,7 +34,7 @@ class Stage:
 
 @dataclass(frozen=True)
 class Body:
-    """Motion of a plant with attitude and rotors, beside its set-points."""
+    """Motion of a plant with attitude and rotors, and its set-points."""
 
     q_WB: np.ndarray
     """Attitude, (n, 4), w x y z."""
@@ -109,8 +109,8 @@ def calc_rod(alpha: np.ndarray, beta: np.ndarray) -> np.ndarray:
 
 
 def read_body(state: Columns) -> Body | None:
-    """From the columns of a plant that has attitude or rotors: those that are there. At step 0 the
-    autopilot has not been asked yet."""
+    """Reads the body from the columns of a plant with attitude or rotors; None if there are no such columns.
+    At step 0 the set-points are NaN, because the autopilot has not run yet."""
     def columns(*names: str) -> np.ndarray:
         if names and set(names) <= set(state):
             return state.stack(names)
@@ -139,9 +139,9 @@ def read_body(state: Columns) -> Body | None:
 def find_stages(stage: np.ndarray, time_s: np.ndarray, names: Mapping[int, str],
                 plans: Mapping[int, tuple[float | None, float | None]],
                 starts_s: Mapping[int, float]) -> tuple[Stage, ...]:
-    """Consecutive rows with one stage index, (n,), in `stage`; rows without one, NaN, belong to the
-    stage before. By index: the stages' names, what is planned (duration, lap, s) and, where it is
-    not at the first row, the start."""
+    """Divides rows into stages. `stage` (n,): index of the stage of each row; rows with NaN belong to
+    the stage before. By index of the stage: `names`; `plans` (duration and lap, s); `starts_s` of the
+    stages that start before their first row."""
     known = np.flatnonzero(np.isfinite(stage))
     if not len(known):
         return ()

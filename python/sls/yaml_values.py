@@ -8,10 +8,10 @@ import numpy as np
 
 
 def to_yaml(value: object) -> str:
-    """`value` as YAML in one line: numbers so that they read back to the same number, texts in
-    quotes, lists and maps in brackets; numpy's numbers and arrays like Python's.
+    """`value` as YAML in one line. Numbers have enough digits to read back the same number; texts are in
+    quotes, lists and maps in brackets; numpy's numbers and arrays are treated like Python's.
 
-    Raises TypeError for anything else, ValueError for a number that is not finite."""
+    Raises TypeError for other types, ValueError for a number that is not finite."""
     if isinstance(value, (np.generic, np.ndarray)):
         value = value.tolist()
     if value is None:
