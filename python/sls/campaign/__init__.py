@@ -1,3 +1,3 @@
-"""Campaigns: one file that asks a statistical question, answered by many flights.
+"""Campaigns: one file describes many flights, which answer a statistical question.
 
-See config/campaigns/README.md for what a campaign file holds."""
+config/campaigns/README.md describes the campaign file."""

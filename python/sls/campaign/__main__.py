@@ -1,4 +1,4 @@
-"""`python3 -m sls.campaign`: without what figures and the study need."""
+"""`python3 -m sls.campaign`. It does not import the packages that figures and the study need."""
 
 import sys
 

@@ -1,6 +1,6 @@
 """A campaign: a base scenario, the keys that vary from run to run, the measures of each run.
 
-Plain values alone. `campaign_file` reads them, `sampling` draws from them."""
+This module holds values only. `campaign_file` reads them, `sampling` draws from them."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,18 +10,18 @@ MOST_RUNS = 10_000_000
 MEASURES = ("load_error_rms", "load_error_max", "settling", "overshoot", "tilt_max", "force_max",
             "outcome", "time_of_loss")
 DISTRIBUTIONS = ("uniform", "normal", "log_uniform")
-# Of a column that stands for the whole flight: what follows the measure's name.
+# Suffixes that follow the measure's name in a column for the whole flight.
 UNITS = ("", "_m", "_s", "_n", "_rad")
 
 
 @dataclass(frozen=True)
 class Varied:
-    """A key of the scenario, or a helper variable, that has another value in each run.
+    """A key of the scenario, or a helper variable, whose value varies from run to run.
 
     `grid` and `list` hold their `items`. `uniform`, `normal`, `log_uniform`, `sobol` and
     `latin_hypercube` hold a `distribution` of DISTRIBUTIONS with its two `parameters`: bounds, or
-    mean and standard deviation; a normal one may be cut off `within` bounds.
-    `derived` holds `expressions`: an Expression, or a list of these and lists.
+    mean and standard deviation; a normal distribution may be limited to the bounds `within`.
+    `derived` holds `expressions`: an Expression, or a nested list of expressions.
     `seed` is a noise seed, drawn by counting up from `seed`."""
 
     path: str
@@ -32,44 +32,44 @@ class Varied:
     parameters: tuple[float, float] = (0.0, 0.0)
     seed: int = 0
     expressions: Any = None
-    constants: tuple[tuple[str, float], ...] = ()  # of `derived`: names that stand in the base file
+    constants: tuple[tuple[str, float], ...] = ()  # of `derived`: names and numbers from the base file
     within: tuple[float, float] | None = None
     multiple_of: int | float | None = None  # values are rounded to a multiple of it
 
     @property
     def is_helper(self) -> bool:
-        """Sampled and written to runs.csv, but no key of the scenario: `_speed`."""
+        """True for a helper variable, such as `_speed`: it is in runs.csv, but not in the scenario."""
         return self.path.startswith("_")
 
     @property
     def is_crossed(self) -> bool:
-        """Each of its items is flown with each item of the other crossed keys."""
+        """True if each of its items is flown with each item of the other crossed keys."""
         return self.kind in ("grid", "list")
 
     @property
     def is_drawn(self) -> bool:
-        """Has another value in each draw, so that the campaign must say how many runs it has."""
+        """True if each draw has another value. The campaign file must then state the number of runs."""
         return self.kind not in ("grid", "list", "derived")
 
 
 @dataclass(frozen=True)
 class Keep:
-    """Which recordings a campaign keeps: "none", "failed", "all" or "worst" (`count` runs with the
-    largest value of the column `by`)."""
+    """The recordings that a campaign keeps: "none", "failed", "all" or "worst" (`count` runs with the
+    largest values in the column `by`)."""
 
     kind: str = "none"
     count: int = 0
     by: str = ""
 
     def find_column(self, columns: list[str]) -> str | None:
-        """The column of `columns` that `by` names: itself, or with a unit after it, such as
-        load_error_max_m for load_error_max."""
+        """The column of `columns` that `by` names, with or without its unit: load_error_max means
+        load_error_max_m."""
         return next((self.by + unit for unit in UNITS if self.by + unit in columns), None)
 
 
 @dataclass(frozen=True)
 class Certify:
-    """Which runs get a certificate: "all", "none" or "some" (`count` runs, chosen by `seed`)."""
+    """The runs that get a certificate: "all", "none" or "some" (`count` runs, chosen by `seed`)."""
 
     kind: str = "all"
     count: int = 0
@@ -89,8 +89,8 @@ class OwnMeasure:
 
 @dataclass(frozen=True)
 class Campaign:
-    """A campaign file, read and checked. `varied` ends with a member of kind "seed" for each of
-    `seeds`, so that it holds everything that differs between runs."""
+    """A campaign file, read and checked. `varied` holds everything that differs between runs; it ends
+    with a member of kind "seed" for each of `seeds`."""
 
     file: Path
     text: str
@@ -109,8 +109,8 @@ class Campaign:
 
     @property
     def points(self) -> int:
-        """How many combinations the grids and lists have: 1 without any. Run i flies draw
-        i // points at point i % points."""
+        """Number of combinations of all grids and lists; 1 without any. Run i flies draw i // points
+        at point i % points."""
         points = 1
         for varied in self.varied:
             points *= len(varied.items) if varied.is_crossed else 1
@@ -118,19 +118,19 @@ class Campaign:
 
     @property
     def draws(self) -> int:
-        """How many draws `runs` runs need; the last one may be incomplete."""
+        """Number of draws that `runs` runs need; the last draw may be incomplete."""
         return -(-self.runs // self.points)
 
     @property
     def paths(self) -> list[str]:
-        """Of everything varied: the columns of runs.csv."""
+        """The paths of everything that varies, which are columns of runs.csv."""
         return [varied.path for varied in self.varied]
 
     @property
     def scenario_paths(self) -> list[str]:
-        """Of what is set in the scenario: all but the helper variables."""
+        """The paths of everything that is set in the scenario: all except the helper variables."""
         return [varied.path for varied in self.varied if not varied.is_helper]
 
     def pick_scenario_values(self, values: list[Any]) -> list[Any]:
-        """Of `values`, one for each of `paths`, those for `scenario_paths`."""
+        """Picks the values of `scenario_paths` from `values`, which has one for each of `paths`."""
         return [value for varied, value in zip(self.varied, values) if not varied.is_helper]

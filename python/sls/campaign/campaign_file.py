@@ -1,5 +1,5 @@
-"""Reads a campaign file strictly: what is unknown, missing, of the wrong type or impossible is
-refused with file, line and key. The keys are described in config/campaigns/README.md."""
+"""Reads a campaign file strictly: keys and values that are unknown, missing, of the wrong type or
+impossible are refused with file, line and key. config/campaigns/README.md describes the keys."""
 
 import hashlib
 import math
@@ -15,12 +15,12 @@ from sls.campaign.sampling import list_expressions, order_derived, to_fraction
 from sls.campaign.yaml_nodes import Place, fail, parse_yaml, read_bytes, to_printable
 
 KEYS = ("name", "base", "runs", "vary", "seeds", "measure", "keep", "certify", "period_s")
-SPREADS = ("sobol", "latin_hypercube")  # the ways to spread draws that take any distribution
+SPREADS = ("sobol", "latin_hypercube")  # methods to spread draws; each takes any distribution
 KINDS = ("grid", "list", *DISTRIBUTIONS, *SPREADS, "derived")
 OPTIONS = {"grid": (), "list": (), "derived": ("multiple_of",)}  # all others: DRAW_OPTIONS
 DRAW_OPTIONS = ("seed", "multiple_of", "within")
 MOST_SEED = 2**63 - 1
-MOST_ITEMS = 100_000  # of one grid or list
+MOST_ITEMS = 100_000  # in one grid or list
 MOST_BYTES = 2**20
 PATH = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*(\.[A-Za-z0-9][A-Za-z0-9_-]*)*|_[A-Za-z0-9_]+")
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,63}")
@@ -30,8 +30,8 @@ FIXED_COLUMNS = ("run", "outcome", "reason", "steps", "certificate", "own_error"
 
 def load_campaign(file: Path, *, base: Path | None = None,
                   folder: Path | None = None) -> Campaign:
-    """Reads and checks a campaign file. Relative paths begin at `folder`, by default the file's;
-    `base` is read in place of the base scenario that the file names.
+    """Reads and checks a campaign file. Relative paths begin at `folder`, by default that of the file.
+    `base` replaces the base scenario that the file names.
 
     Raises InputError `FILE:LINE: key: expected …, got …`."""
     file = Path(file)
@@ -40,7 +40,7 @@ def load_campaign(file: Path, *, base: Path | None = None,
 
 
 class _Reader:
-    """One reading of one file."""
+    """Reads one file once."""
 
     def __init__(self, root: Place, data: bytes, base: Path | None, folder: Path):
         self.root, self.data, self.folder = root, data, folder
@@ -176,7 +176,7 @@ class _Reader:
                       multiple_of=multiple_of, within=within)
 
     def _resolve_names(self, varied: list[Varied], places: dict[str, Place]) -> list[Varied]:
-        """Gives derived values the numbers of the base scenario that they name."""
+        """Adds the numbers of the base scenario that derived values name, as their `constants`."""
         members = {member.path: member for member in varied}
         resolved = []
         for member in varied:
@@ -374,8 +374,8 @@ def _read_bounds(place: Place) -> tuple[float, float]:
 
 
 def _read_distribution(kind: str, place: Place) -> tuple[str, tuple[float, float]]:
-    """The distribution's name and its two parameters. `sobol` and `latin_hypercube` take bounds, or
-    a map with a distribution of its own."""
+    """The distribution's name and its two parameters. `sobol` and `latin_hypercube` take bounds, or a
+    map with one distribution."""
     if kind in SPREADS and place.is_map:
         values = place.read_map(known=DISTRIBUTIONS)
         if len(values) != 1:

@@ -8,23 +8,23 @@ from sls.campaign.campaign import Campaign
 from sls.campaign.sampling import make_values, to_yaml_value
 from sls.campaign.yaml_nodes import fail
 
-MOST_LOOKED_AT = 100_000  # runs whose values are compared, to find the extreme ones
-MOST_SEARCHED = 20_000    # runs that are checked one by one, to name the first that fails
-BLOCK = 1000              # of them, whose values are held at once
-MOST_LISTED = 100         # different values of a key that is no number, each checked
+MOST_LOOKED_AT = 100_000  # runs whose values are compared to find the extreme values
+MOST_SEARCHED = 20_000    # runs that are checked one by one to find the first that fails
+BLOCK = 1000              # number of these runs whose values are in memory at once
+MOST_LISTED = 100         # checked values of a key that does not hold numbers
 
 
 class Checker(Protocol):
     """The part of `_sls_core.Runs` that this module needs."""
 
     def check(self, values: list[str]) -> None:
-        """Raises ValueError as reading the scenario with these values does."""
+        """Raises ValueError if the scenario reader refuses the scenario with these values."""
 
 
 def check_campaign(campaign: Campaign, runs: Checker) -> None:
-    """Checks run 0 and, for each varied key, the runs with its least and its largest value (of a
-    key that is no number: with each value) among the first 100,000. If one fails, the first of the
-    campaign that fails is searched.
+    """Checks run 0 and, for each varied key, the runs with its smallest and its largest value among the
+    first 100,000 runs. For a key that does not hold numbers it checks a run with each value. If a run
+    fails, it searches the first run of the campaign that fails.
 
     Raises InputError `FILE:LINE: vary.PATH: run I: …`."""
     for run in _list_extreme_runs(campaign):
@@ -76,7 +76,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _fail(campaign: Campaign, run: int, message: str) -> None:
-    """Says the scenario reader's message `FILE:LINE: KEY: …` about the campaign's key."""
+    """Raises the scenario reader's message `FILE:LINE: KEY: …` with the place of the campaign's key."""
     found = re.fullmatch(r"(.*?:\d+|[^:]*): ([^:\s]+): (.*)", message, re.DOTALL)
     key, text = (_to_path(found[2]), found[3]) if found else ("", message)
     for varied in campaign.varied:
@@ -84,12 +84,12 @@ def _fail(campaign: Campaign, run: int, message: str) -> None:
         if not varied.is_helper and key and (
                 key == path or key.startswith(path + ".") or path.startswith(key + ".")):
             place = "seeds" if varied.kind == "seed" else "vary"
-            # Keys that contain the varied key, or are contained in it, are named too.
+            # The message may be about a key that contains the varied key or is part of it; it is then named, too.
             detail = "" if key == path else f"{found[2]}: "
             fail(campaign.file, varied.line, f"{place}.{path}", f"run {run}: {detail}{text}")
     fail(campaign.file, 0, "vary", f"run {run}: {message}")
 
 
 def _to_path(key: str) -> str:
-    """`faults.0.delay` of `faults[0].delay`."""
+    """Converts `faults[0].delay` to `faults.0.delay`."""
     return re.sub(r"\[(\d+)\]", r".\1", key)

@@ -1,4 +1,4 @@
-"""`./sls campaign`: its command lines."""
+"""Command lines of `./sls campaign`."""
 
 import argparse
 import shlex
@@ -19,7 +19,7 @@ from sls.input_error import InputError
 
 ROOT = Path(__file__).resolve().parents[3]
 MOST_CHUNKS = 10_000  # files in a folder
-LEAST_CHUNKS = 16     # so that several workers end at about the same time
+LEAST_CHUNKS = 16     # with fewer chunks, workers would end at very different times
 DESCRIPTIONS = {"status": "Prints chunks, rate and outcomes of a campaign so far.",
                 "report": "Writes DIR/report.html again.",
                 "compare": "Compares two campaigns run by run."}
@@ -91,7 +91,7 @@ def find_file(name: str) -> Path:
 
 
 def fly(options: argparse.Namespace) -> None:
-    """Flies, collects and verifies. Raises ConfigError, EngineError."""
+    """Flies the campaign, collects its table and verifies runs. Raises ConfigError, EngineError."""
     from sls.campaign.campaign_file import load_campaign
     campaign = load_campaign(find_file(options.file))
     engine = load_engine(options.on)
@@ -102,7 +102,7 @@ def fly(options: argparse.Namespace) -> None:
     engine_options = EngineOptions(options.workers, options.sbatch, options.scheduler,
                                    options.chunk_runs, progress=True)
     if hasattr(engine, "check"):
-        engine.check(engine_options)  # a cluster that is missing leaves no folder behind
+        engine.check(engine_options)  # before the folder is made: without a cluster there is no folder
     with opened(out) as folder:
         try:
             prepare(folder, campaign, engine, options)
@@ -118,7 +118,7 @@ def fly(options: argparse.Namespace) -> None:
 
 
 def join_sbatch(arguments: Sequence[str]) -> list[str]:
-    """`--sbatch --partition=x` as one argument: argparse takes the second for an option of ours."""
+    """Joins `--sbatch --partition=x` to one argument: argparse would treat the second as an own option."""
     joined: list[str] = []
     for argument in arguments:
         if joined and joined[-1] == "--sbatch":
@@ -130,7 +130,7 @@ def join_sbatch(arguments: Sequence[str]) -> list[str]:
 
 @contextmanager
 def report_imported() -> Iterator[None]:
-    """Imports what makes the page while the workers fly: it takes most of a second."""
+    """Imports the module of the report while the workers fly, because this takes most of a second."""
     importing = threading.Thread(target=import_module, args=("sls.campaign.report",))
     importing.start()
     try:
@@ -141,7 +141,7 @@ def report_imported() -> Iterator[None]:
 
 def prepare(folder: CampaignFolder, campaign: Any, engine: Any,
             options: argparse.Namespace) -> None:
-    """Checks the campaign, then begins or takes up its folder."""
+    """Checks the campaign, then begins or resumes its folder."""
     from sls.campaign.check import check_campaign
     from sls.campaign.runs import list_columns, list_yaml_values, make_runs
     from sls.campaign.own_measures import load_own_measures
@@ -167,7 +167,7 @@ def prepare(folder: CampaignFolder, campaign: Any, engine: Any,
 
 def find_range(folder: CampaignFolder, campaign: Any, options: argparse.Namespace,
                is_begun: bool) -> tuple[int, int]:
-    """The runs that are asked for. Raises InputError for those that the campaign has not."""
+    """First and last run to fly. Raises InputError if the campaign does not have these runs."""
     if options.runs is None:
         return (folder.plan.first, folder.plan.last) if is_begun else (0, campaign.runs - 1)
     if options.runs[1] >= campaign.runs:
@@ -177,8 +177,8 @@ def find_range(folder: CampaignFolder, campaign: Any, options: argparse.Namespac
 
 
 def choose_chunk_runs(chunk_s: float, run_s: float, count: int) -> int:
-    """Runs of a chunk that flies for about `chunk_s`; not so many that workers wait for the last
-    chunk, nor so few that a folder holds very many files."""
+    """Number of runs in a chunk, for about `chunk_s` of work. It is limited upwards, because workers
+    must not wait long for the last chunk, and downwards, because of the number of files."""
     wanted = min(round(chunk_s / max(run_s, 1e-6)), -(-count // LEAST_CHUNKS))
     return max(wanted, -(-count // MOST_CHUNKS), 1)
 
@@ -212,7 +212,7 @@ def verify(folder: CampaignFolder, options: argparse.Namespace) -> bool:
     return verify_runs(folder, options.verify, say, options.domain)
 
 
-# --- about a folder -------------------------------------------------------------------------------
+# --- other commands -------------------------------------------------------------------------------
 
 
 def parse_folders(command: str, arguments: Sequence[str], *names: str) -> list[Path]:
@@ -230,7 +230,7 @@ def show_status(arguments: Sequence[str]) -> None:
 
 
 def describe_status(folder: CampaignFolder) -> list[str]:
-    """Lines for a person: chunks, rate, outcomes. Reads every chunk once."""
+    """Lines for the user: chunks, rate, outcomes. Reads every chunk once."""
     plan = folder.plan
     whole, flying_s, damaged, missing = 0, 0.0, list[str](), list[int]()
     runs, counts = 0, dict[str, int]()
@@ -290,9 +290,9 @@ def raise_ended(*_: object) -> None:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """The exit code."""
+    """Runs the command and returns the exit code."""
     for number in (signal.SIGTERM, signal.SIGHUP):
-        if signal.getsignal(number) is not signal.SIG_IGN:  # as under nohup
+        if signal.getsignal(number) is not signal.SIG_IGN:  # nohup ignores SIGHUP: leave it so
             signal.signal(number, raise_ended)
     try:
         if arguments and arguments[0] in COMMANDS:

@@ -1,7 +1,7 @@
-"""Two campaigns beside each other: `./sls campaign compare A B`.
+"""Compares two campaigns: `./sls campaign compare A B`.
 
-Both must have flown the same values of the same keys; what differs is the rest: the base scenario
-(another law, other gains), the version, the machine. Runs of the same index form pairs."""
+Both must have flown the same values of the same keys. The base scenario (another law, other gains),
+the version and the machine may differ. Runs of the same index form pairs."""
 
 import filecmp
 from pathlib import Path
@@ -21,9 +21,8 @@ MOST_RUNS = 10
 
 
 def compare(a: Path, b: Path) -> str:
-    """The comparison as text. Raises InputError for folders that are no campaigns with results, and
-    for campaigns that varied different keys or flew different values, naming the first
-    difference."""
+    """The comparison as text. Raises InputError if a folder is not a campaign with results, or if the
+    campaigns varied different keys or flew different values; the error names the first difference."""
     lines = [f"A: {a}", f"B: {b}", ""]
     lines += compare_manifests(read_manifest(a / "manifest.json"),
                                read_manifest(b / "manifest.json"))
@@ -60,7 +59,7 @@ def compare_manifests(a: dict[str, Any], b: dict[str, Any]) -> list[str]:
     return [*lines, ""]
 
 
-# --- what must be equal ---------------------------------------------------------------------------
+# --- checks of equal keys and values --------------------------------------------------------------
 
 
 def check_keys(a: RunTable, b: RunTable) -> None:
@@ -73,7 +72,7 @@ def check_keys(a: RunTable, b: RunTable) -> None:
 
 
 def match_runs(a: RunTable, b: RunTable) -> tuple[np.ndarray, np.ndarray]:
-    """Places of the runs that both have."""
+    """Places in both tables of the runs that both have."""
     common, in_a, in_b = np.intersect1d(a.run, b.run, return_indices=True)
     if not len(common):
         raise InputError(f"{b.file}: expected runs that {a.file} has, too, got none")
@@ -85,7 +84,8 @@ def check_values(a: RunTable, b: RunTable, in_a: np.ndarray, in_b: np.ndarray) -
     for key in a.keys:
         values = [read_values(table, key)[places] for table, places in ((a, in_a), (b, in_b))]
         if values[0].dtype != values[1].dtype:
-            # Text beside numbers: numbers as text, as `read_runs` has them in a column with text.
+            # One column has text, the other only numbers: compare the numbers as text, in the form that
+            # `read_runs` gives numbers in a column with text.
             values = [value if value.dtype == object
                       else np.array([repr(float(number)) for number in value], dtype=object)
                       for value in values]
@@ -106,7 +106,7 @@ def read_values(table: RunTable, key: str) -> np.ndarray:
     return np.array(words, dtype=object)[places]
 
 
-# --- what may differ ------------------------------------------------------------------------------
+# --- differences ----------------------------------------------------------------------------------
 
 
 def describe_runs(a: RunTable, b: RunTable, common: int) -> list[str]:
@@ -136,7 +136,8 @@ def compare_measures(a: RunTable, b: RunTable, in_a: np.ndarray, in_b: np.ndarra
 
 
 def list_most_different(a: RunTable, b: RunTable, in_a: np.ndarray, in_b: np.ndarray) -> list[str]:
-    """Runs with another outcome first, then those whose first shared measure differs most."""
+    """First the runs with another outcome, then the runs that differ most in one measure of both: the
+    load error's rms or maximum, or else the first common measure."""
     changed = np.flatnonzero(a.outcome[in_a] != b.outcome[in_b])[:MOST_RUNS]
     lines = []
     if len(changed):
@@ -171,7 +172,7 @@ def describe_values(table: RunTable, place: int) -> str:
 
 
 def make_text_table(rows: list[list[str]]) -> list[str]:
-    """Columns as wide as their cells, numbers to the right, the first and last to the left."""
+    """Pads the columns to equal width. The first and last are aligned to the left, the others to the right."""
     last = len(rows[0]) - 1
     widths = [max(len(row[place]) for row in rows) for place in range(last + 1)]
     lines = []

@@ -1,6 +1,6 @@
-"""Small pictures as SVG text, for a page that must stay small and equal for equal numbers.
+"""Small pictures as SVG text. The page must stay small, and be equal for equal numbers.
 
-A picture has a size in pixels and a y axis that points down, as SVG has it; `Scale` leads from
+A picture has a size in pixels and, as always in SVG, a y axis that points down. `Scale` converts
 values to pixels. Coordinates are written to a tenth of a pixel."""
 
 import html
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 OUTCOME_COLOURS = {"finished": "#0072b2", "lost": "#d55e00", "failed": "#7f7f7f"}
-# Of equal steps in brightness and told apart with any colour vision (viridis), dark is little.
+# Colours of the map viridis: equal steps in brightness, distinct with any colour vision; dark means low values.
 HEAT = np.array([[68, 1, 84], [71, 44, 122], [59, 81, 139], [44, 113, 142], [33, 144, 141],
                  [39, 173, 129], [92, 200, 99], [170, 220, 50], [253, 231, 37]], dtype=float)
 MISSING_COLOUR = "#e4e7eb"
@@ -19,7 +19,7 @@ MISSING_COLOUR = "#e4e7eb"
 
 @dataclass(frozen=True)
 class Scale:
-    """From values [low, high] to pixels [first, last], linear or logarithmic."""
+    """Maps values [low, high] to pixels [first, last], linear or logarithmic."""
 
     low: float
     high: float
@@ -33,7 +33,7 @@ class Scale:
         return self.first + (self.last - self.first) * (value - low) / (high - low)
 
     def list_ticks(self, most: int = 5) -> list[float]:
-        """At most about `most` round values within the range."""
+        """About `most` round values within the range, or fewer."""
         if self.is_log:
             first, last = math.ceil(math.log10(self.low) - 1e-9), math.floor(
                 math.log10(self.high) + 1e-9)
@@ -49,7 +49,7 @@ class Scale:
 
 
 def make_scale(values: np.ndarray, first: float, last: float, is_log: bool = False) -> Scale:
-    """Over all finite values, of which a single one gets some room."""
+    """A scale over all `values`, which are finite. Equal values get some room on both sides."""
     low, high = float(np.min(values)), float(np.max(values))
     if not high > low:
         room = abs(low) * 0.05 or 1.0
@@ -58,8 +58,8 @@ def make_scale(values: np.ndarray, first: float, last: float, is_log: bool = Fal
 
 
 def deserves_log(values: np.ndarray) -> bool:
-    """Whether positive values are spread over more than two decades, and not mostly near the upper
-    end, as evenly spread numbers that begin near 0 are."""
+    """True if the values are positive, span more than two decades, and have a median below a fifth of the
+    maximum. The median excludes evenly spread numbers that begin near 0."""
     low, middle, high = np.min(values), np.median(values), np.max(values)
     return bool(low > 0.0 and high > 100.0 * low and high > 5.0 * middle)
 
@@ -70,7 +70,7 @@ def px(value: float) -> str:
 
 
 def format_number(value: float) -> str:
-    """Four digits, without an exponent where a reader needs none."""
+    """Four digits; whole numbers below 10^6 in full, with an exponent only if necessary."""
     if value is None or math.isnan(value):
         return "–"
     if math.isinf(value):
@@ -85,7 +85,7 @@ def format_number(value: float) -> str:
 
 
 def format_share(share: float) -> str:
-    """In percent."""
+    """A share in percent."""
     return f"{100.0 * share:.3g} %" if share < 0.9995 else "100 %"
 
 
@@ -121,7 +121,7 @@ def wrap(width: float, height: float, parts: Sequence[str], label: str) -> str:
 
 
 def colour_of_heat(share: float) -> str:
-    """Of a share from 0 to 1 of the scale."""
+    """The colour at a share, 0 to 1, of the scale."""
     place = min(max(share, 0.0), 1.0) * (len(HEAT) - 1)
     low = min(int(place), len(HEAT) - 2)
     red, green, blue = HEAT[low] + (place - low) * (HEAT[low + 1] - HEAT[low])
@@ -142,7 +142,7 @@ def draw_x_axis(scale: Scale, bottom: float, label: str, top: float | None = Non
 
 def draw_y_axis(scale: Scale, left: float, label: str, right: float | None = None,
                 ticks: Sequence[tuple[float, str]] | None = None) -> list[str]:
-    """`first` of the scale is its lower end."""
+    """Draws a y axis. `first` of the scale is the lower end of the axis."""
     parts = [line(left, scale.first, left, scale.last)]
     for tick, name in ticks or [(tick, format_number(tick)) for tick in scale.list_ticks(4)]:
         y = scale.place(tick)
@@ -156,7 +156,7 @@ def draw_y_axis(scale: Scale, left: float, label: str, right: float | None = Non
 
 
 def draw_distribution(values: np.ndarray, label: str) -> str:
-    """Histogram and, beside it, the empirical distribution of finite values, at most 400 points."""
+    """A histogram of finite values, and beside it their empirical distribution with at most 400 points."""
     width, height, top, bottom = 760.0, 190.0, 12.0, 150.0
     is_log = deserves_log(values)
     left = make_scale(values, 52, 372, is_log)
@@ -186,7 +186,7 @@ def draw_distribution(values: np.ndarray, label: str) -> str:
 
 
 def draw_shares(rows: Sequence[tuple[str, float, float, float, str]], label: str) -> str:
-    """Share lost with its interval over the bins of one key: name, share, low, high, title."""
+    """The share lost, with its interval, over the bins of one key. A row: name, share, low, high, title."""
     width, height, top, bottom = 372.0, 200.0, 12.0, 150.0
     y = Scale(0, 1, bottom, top)
     parts = draw_y_axis(y, 52, "share lost", 362, [(i / 4, f"{25 * i} %") for i in range(5)])
@@ -206,8 +206,8 @@ def draw_shares(rows: Sequence[tuple[str, float, float, float, str]], label: str
 
 def draw_heat(values: np.ndarray, counts: np.ndarray, names: tuple[Sequence[str], Sequence[str]],
               labels: tuple[str, str], title: str, scale: tuple[float, float] | None = None) -> str:
-    """Of values (rows, columns), NaN if there is none; row 0 at the bottom. `names` and `labels`
-    are those of columns, then rows; `counts` says how many runs each field holds."""
+    """A heat map of `values` (rows, columns), NaN if there is none; row 0 is at the bottom. `names` and
+    `labels` are those of the columns, then of the rows; `counts` has the number of runs of each field."""
     rows, columns = values.shape
     width, left, right, top, bottom = 440.0, 74.0, 360.0, 28.0, 268.0
     finite = values[np.isfinite(values)]
@@ -247,8 +247,8 @@ def draw_heat(values: np.ndarray, counts: np.ndarray, names: tuple[Sequence[str]
 
 def draw_parallel(axes: Sequence[tuple[str, np.ndarray, Sequence[str] | None]],
                   colours: Sequence[str]) -> str:
-    """One line per run over axes of (label, values, names of the values 0, 1, … or None). A line is
-    broken where a value is not finite."""
+    """Parallel coordinates: one line per run. An axis: label, values, names of the values 0, 1, … or
+    None. A line is broken at values that are not finite."""
     top, bottom, step = 44.0, 280.0, max(110.0, min(190.0, 1000.0 / max(1, len(axes) - 1)))
     width = 140 + step * (len(axes) - 1)
     places = []
@@ -285,7 +285,7 @@ def draw_parallel(axes: Sequence[tuple[str, np.ndarray, Sequence[str] | None]],
 
 
 def split_label(label: str, most: int = 19) -> list[str]:
-    """A path or column name in at most two lines."""
+    """Splits a path or column name into at most two lines."""
     if len(label) <= most:
         return [label]
     cut = max((label.rfind(mark, 0, most) for mark in "._"), default=-1)

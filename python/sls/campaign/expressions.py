@@ -1,6 +1,6 @@
 """Arithmetic of campaign files: `vehicle.load_mass_kg * 1.1 + 0.01`.
 
-A small language: numbers, names with dots, `+ - * / **`, parentheses, `pi` and the functions of
+The language has numbers, names with dots, `+ - * / **`, parentheses, `pi` and the functions of
 FUNCTIONS. Nothing else is evaluated."""
 
 import ast
@@ -20,17 +20,17 @@ TOKEN = re.compile(r"\s+|(?P<name>[A-Za-z_][A-Za-z0-9_]*(?:\.[A-Za-z0-9_]+)*)"
 
 
 class ExpressionError(ValueError):
-    """An error in an expression or its value, without its place."""
+    """An error in an expression or its value. The message does not name file and line."""
 
 
 class Expression:
     """A parsed expression. Every number in it is a float.
 
-    Raises ExpressionError for anything that is not arithmetic."""
+    Raises ExpressionError if the text is not arithmetic."""
 
     def __init__(self, text: str):
         text = self.text = " ".join(text.split())  # in one line, for messages
-        self.names: list[str] = []  # of other values, each once, in order of appearance
+        self.names: list[str] = []  # names in the expression, each once, in order of appearance
         if len(text) > MOST_LETTERS:
             raise ExpressionError(f"expected at most {MOST_LETTERS} letters, got {len(text)}")
         try:
@@ -43,7 +43,7 @@ class Expression:
             raise ExpressionError(f"expected arithmetic, got '{text}'") from None
 
     def __reduce__(self) -> tuple[type, tuple[str]]:
-        """Pickled as its text: compiled code cannot be sent to another process."""
+        """Pickles the text, because compiled code cannot be sent to another process."""
         return Expression, (self.text,)
 
     def __eq__(self, other: object) -> bool:
@@ -53,7 +53,7 @@ class Expression:
         return hash(self.text)
 
     def _to_python(self) -> str:
-        """The same with a plain identifier for each name: Python reads dots otherwise."""
+        """The text with a plain identifier for each name, because a dot has another meaning in Python."""
         parts, at = [], 0
         text = self.text
         while at < len(text):
@@ -102,9 +102,9 @@ class Expression:
             self._check(part)
 
     def evaluate(self, values: Mapping[str, float]) -> float:
-        """The value with `values` for the names.
+        """The value of the expression with `values` for the names.
 
-        Raises ExpressionError if it is no finite number, or if one of `values` is no number."""
+        Raises ExpressionError if it is not a finite number, or if one of `values` is not a number."""
         floats = []
         for name in self.names:
             value = values[name]
@@ -113,12 +113,12 @@ class Expression:
             floats.append(float(value))
         names = {f"name_{i}": value for i, value in enumerate(floats)}
         try:
-            result = eval(self._code, SCOPE, names)  # of nothing but arithmetic: see _check
+            result = eval(self._code, SCOPE, names)  # arithmetic only: see _check
         except ZeroDivisionError:
             raise ExpressionError(f"division by zero in '{self.text}'") from None
         except OverflowError:
             raise ExpressionError(f"'{self.text}' is too large") from None
-        except (ValueError, TypeError):  # such as the least of complex numbers
+        except (ValueError, TypeError):  # for example min of complex numbers
             raise ExpressionError(f"'{self.text}' is not defined") from None
         if isinstance(result, complex):  # the root of a negative number
             raise ExpressionError(f"'{self.text}' is not defined")

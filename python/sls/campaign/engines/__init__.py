@@ -2,9 +2,9 @@
 
     def run(folder: CampaignFolder, options: EngineOptions) -> None
 
-that returns when every chunk is there, raises EngineError if that cannot be reached, and leaves
-a resumable folder when it is interrupted. It may have `CHUNK_S`, the seconds of work that a chunk
-should hold, and `describe_status(folder) -> list[str]`, lines for `./sls campaign status`."""
+that returns when every chunk is in the folder, raises EngineError if a chunk cannot be flown, and
+leaves a folder that can be resumed when it is interrupted. It may have `CHUNK_S`, the seconds of
+work in a chunk, and `describe_status(folder) -> list[str]`, lines for `./sls campaign status`."""
 
 from dataclasses import dataclass
 from importlib import import_module
@@ -17,20 +17,20 @@ ENGINES = ("local", "slurm", "dask")
 
 
 class EngineError(RunError):
-    """Why the campaign cannot finish, in one line. Flown runs stay; `--resume` continues."""
+    """The reason why the campaign cannot finish, in one line. Flown runs are kept for `--resume`."""
 
 
 @dataclass(frozen=True)
 class EngineOptions:
-    workers: int | None = None     # None: as many as there are cores
+    workers: int | None = None     # None: one for each core
     sbatch: str = ""               # options of the site, for Slurm
     scheduler: str = ""            # address, for Dask
-    chunk_runs: int | None = None  # None: by the time that a run takes
+    chunk_runs: int | None = None  # None: chosen by the measured time of a run
     progress: bool = False         # draw a bar on stderr
 
 
 def load_engine(name: str) -> ModuleType:
-    """Raises InputError for a name that is none."""
+    """The module of an engine. Raises InputError if there is no engine `name`."""
     if name not in ENGINES:
         raise InputError(f"--on: expected one of {', '.join(ENGINES)}, got '{name}'")
     return import_module(f"sls.campaign.engines.{name}")

@@ -1,5 +1,5 @@
-"""Common to the engines for clusters. As a program: begins the folder of a campaign and flies
-nothing, for workers that are started by hand or by Kubernetes (docker/k8s/campaign)."""
+"""Functions of all engines for clusters. As a program this module begins the folder of a campaign
+without flights, for workers that are started by hand or by Kubernetes (docker/k8s/campaign)."""
 
 import os
 import sys
@@ -14,8 +14,8 @@ EVERY_S = 0.5
 
 
 def find_places() -> list[str]:
-    """Folders that hold the package, the compiled module and what the user put on PYTHONPATH: with
-    them another machine's Python finds the same modules."""
+    """Folders of the package, of the compiled module and of the user's PYTHONPATH. With these folders
+    Python finds the same modules on another machine."""
     import _sls_core
     import sls
     own = [Path(sls.__file__).parents[1], Path(_sls_core.__file__).parent]
@@ -24,7 +24,7 @@ def find_places() -> list[str]:
 
 
 def find_missing(folder: CampaignFolder) -> list[int]:
-    """Chunks that are missing for good, after the last worker has ended."""
+    """Chunks that are still missing FILES_LATE_S after the last worker has ended."""
     deadline = time.monotonic() + FILES_LATE_S
     while (missing := folder.missing()) and time.monotonic() < deadline:
         time.sleep(EVERY_S)
@@ -32,14 +32,14 @@ def find_missing(folder: CampaignFolder) -> list[int]:
 
 
 def describe_rest(folder: CampaignFolder) -> str:
-    """The state when an engine gives up."""
+    """Describes the state of the folder, for the message of an engine that gives up."""
     whole = len(folder.chunks) - len(folder.missing())
     return (f"{whole} of {len(folder.chunks)} chunks are in {folder.folder}; --resume flies the "
             "others")
 
 
 def plan(arguments: Sequence[str]) -> int:
-    """Command line of `./sls campaign`. The exit code."""
+    """Begins the folder; `arguments` are those of `./sls campaign`. Returns the exit code."""
     from sls.campaign.campaign_file import load_campaign
     from sls.campaign.cli import find_file, make_parser, prepare, say
     from sls.campaign.engines import local

@@ -1,8 +1,8 @@
 """Flies a campaign on the workers of a Dask scheduler. See README.md beside this file.
 
 A task is one chunk. The worker writes it into the campaign's folder, which must be on a file system
-that all machines share; only a small dict comes back through Dask. A worker that is killed costs its
-chunk a try: the scheduler gives it to another one."""
+that all machines share; only a small dict returns through Dask. If a worker is killed, the scheduler
+gives its chunk to another worker; after several killed workers it gives the chunk up."""
 
 import logging
 import queue
@@ -18,8 +18,8 @@ from sls.campaign.folder import CampaignFolder
 from sls.campaign.progress import Progress
 from sls.input_error import InputError
 
-CHUNK_S = 5.0            # of work in a chunk
-MOST_TRIES = 3           # of a chunk whose worker has an error that may pass
+CHUNK_S = 5.0            # work in a chunk, s
+MOST_TRIES = 3           # tries of a chunk after errors that may be temporary
 CONNECT_S = 10.0
 WITHOUT_WORKERS_S = 60.0
 EVERY_S = 0.5
@@ -31,9 +31,9 @@ def say(text: str) -> None:
 
 
 def fly(places: list[str], folder: str, number: int) -> dict[str, Any]:
-    """Runs on a worker, to which it is sent as code: the package need not be on its path.
-    `places` are tried after what its own PYTHONPATH names. An error for the user to repair is
-    answered as "error"; anything else may pass."""
+    """Runs on a worker. Dask sends it as code, because the package may not be on the worker's path.
+    Python searches `places` after the worker's own PYTHONPATH. An error that the user must repair
+    returns as "error"; an exception means an error that may be temporary."""
     import platform
     import sys
     for place in places:
@@ -52,8 +52,8 @@ def fly(places: list[str], folder: str, number: int) -> dict[str, Any]:
 
 
 def connect(address: str) -> Any:
-    """A client. Raises InputError if no address is given, EngineError if there is no Dask or
-    no scheduler."""
+    """Connects a client. Raises InputError if `address` is not valid, EngineError if Dask is not
+    installed or no scheduler answers."""
     try:
         import cloudpickle
         from distributed import Client
@@ -65,7 +65,7 @@ def connect(address: str) -> Any:
                          f"tcp://HOST:8786, got "
                          f"{repr(address) if address else 'none'}; {START}")
     cloudpickle.register_pickle_by_value(sys.modules[__name__])
-    # It tells in many lines what is told here in one.
+    # Dask logs many lines about errors that this engine reports in one line.
     logging.disable(logging.CRITICAL)
     try:
         return Client(address, timeout=CONNECT_S, set_as_default=False, name="sls-campaign")
@@ -75,19 +75,19 @@ def connect(address: str) -> Any:
 
 
 def check(options: EngineOptions) -> None:
-    """Raises InputError, EngineError if nothing can be submitted from here."""
+    """Raises InputError or EngineError if this process cannot submit tasks."""
     connect(options.scheduler).close()
 
 
 class Flight:
-    """The chunks that are on their way."""
+    """The chunks that are submitted."""
 
     def __init__(self, client: Any, folder: CampaignFolder):
         self.client = client
         self.folder = folder
         self.place = str(folder.folder.resolve())
         self.places = find_places()
-        # No other launcher's keys: the scheduler shares results of equal ones.
+        # The keys must differ from those of other launchers: for equal keys the scheduler returns the same result.
         self.prefix = f"sls-{folder.plan.sha256[:16]}-{uuid.uuid4().hex[:8]}"
         self.ended: queue.Queue[tuple[int, Any]] = queue.Queue()
         self.futures = dict[int, Any]()
@@ -102,8 +102,9 @@ class Flight:
         future.add_done_callback(lambda done: self.ended.put((number, done)))
 
     def hear(self, number: int, future: Any) -> bool:
-        """Whether the chunk is flown. One that failed is submitted again, or after MOST_TRIES given
-        up, which ends the campaign when all others are flown. Raises InputError, EngineError."""
+        """Handles a task that has ended; True if its chunk is flown. A chunk that failed is submitted
+        again. After MOST_TRIES it is given up, and the campaign fails when all others are flown.
+        Raises InputError, EngineError."""
         if future is not self.futures.get(number):
             return False
         del self.futures[number]
@@ -129,7 +130,7 @@ class SchedulerLost(Exception):
 
 
 def describe(error: BaseException) -> str:
-    """One line. A KilledWorker is a chunk that took several workers with it."""
+    """The error in one line. Dask raises KilledWorker when several workers were killed with a chunk."""
     if type(error).__name__ == "KilledWorker":
         worker = getattr(getattr(error, "last_worker", None), "address", "unknown")
         return f"the workers that flew them were killed again and again, the last one at {worker}"
@@ -137,7 +138,7 @@ def describe(error: BaseException) -> str:
 
 
 def wait(flight: Flight, progress: Progress) -> None:
-    """Until every chunk that was submitted is flown or given up. Raises InputError, EngineError,
+    """Waits until every submitted chunk is flown or given up. Raises InputError, EngineError,
     SchedulerLost."""
     without_since = None
     while flight.futures:
@@ -153,9 +154,9 @@ def wait(flight: Flight, progress: Progress) -> None:
 
 
 def watch_workers(client: Any, without_since: float | None) -> float | None:
-    """Since when there is no worker; None if there are some. Raises EngineError after
-    WITHOUT_WORKERS_S."""
-    # The client's last answer: it asks every 2 s.
+    """The time since which there is no worker; None if there are workers. Raises EngineError after
+    WITHOUT_WORKERS_S without workers."""
+    # The client holds the scheduler's last answer; it sends a request every 2 s.
     if client.scheduler_info().get("workers"):
         return None
     now = time.monotonic()
@@ -169,7 +170,7 @@ def watch_workers(client: Any, without_since: float | None) -> float | None:
 
 
 def run(folder: CampaignFolder, options: EngineOptions) -> None:
-    """Flies what is missing. Ctrl-C takes back what no worker has begun. Raises InputError,
+    """Flies the missing chunks. Ctrl-C withdraws the chunks that no worker has begun. Raises InputError,
     EngineError."""
     client = connect(options.scheduler)
     try:
@@ -192,8 +193,8 @@ def run(folder: CampaignFolder, options: EngineOptions) -> None:
 
 
 def close(client: Any) -> None:
-    """The scheduler forgets the futures of a client that is gone."""
+    """Closes the client. The scheduler then drops the client's futures."""
     try:
         client.close(timeout=2)
-    except Exception:  # a scheduler that is lost
+    except Exception:  # the scheduler is lost
         pass

@@ -1,8 +1,8 @@
 """Flies a campaign in processes of this machine.
 
 Each process is `sls.campaign.worker --serve`: it reads the number of a chunk from a pipe and answers
-when the chunk is in the folder. A process that is killed closes its pipe; another one flies its
-chunk. If this process is killed, the kernel ends them."""
+when the chunk is in the folder. The pipe of a killed process closes; another process then flies its
+chunk. If this process is killed, the kernel ends its worker processes."""
 
 import json
 import os
@@ -21,18 +21,18 @@ from sls.campaign.folder import CampaignFolder
 from sls.campaign.progress import Progress
 from sls.input_error import InputError
 
-CHUNK_S = 0.5       # of work in a chunk: little is lost with a process, and little time between two
-MOST_TRIES = 3      # of a chunk whose process ends without an answer
-END_WITHIN_S = 5.0  # of a process that was asked to end
+CHUNK_S = 0.5       # work in a chunk, s: a killed process loses little, and the time between chunks is small
+MOST_TRIES = 3      # tries of a chunk whose process ends without an answer
+END_WITHIN_S = 5.0  # time limit between SIGTERM and SIGKILL for a worker process
 
 
 @dataclass
 class Worker:
-    """One process and what it does."""
+    """One process, with the chunk and the run that it flies."""
 
     process: subprocess.Popen[bytes]
     chunk: int | None = None
-    run: int | None = None  # which it announced last
+    run: int | None = None  # the last run that it announced
     is_ready: bool = False
     unread: bytes = b""
 
@@ -43,7 +43,7 @@ class Worker:
             self.process.stdin.write(b"%d%s\n" % (chunk, b" announce" if announce else b""))
             self.process.stdin.flush()
         except BrokenPipeError:
-            pass  # its end is noticed on the other pipe
+            pass  # the process has ended: `run` finds this by the end of its stdout
 
     def describe_end(self) -> str:
         code = self.process.wait()
@@ -54,11 +54,11 @@ class Worker:
 
 @dataclass
 class Work:
-    """The chunks that are not flown."""
+    """The chunks that are not flown yet, or were given up."""
 
     waiting: deque[int]
     tries: dict[int, int] = field(default_factory=dict)
-    failed_starts: int = 0  # in a row
+    failed_starts: int = 0  # without a successful start between them
     given_up: list[str] = field(default_factory=list)
 
 
@@ -67,7 +67,7 @@ def count_cores() -> int:
 
 
 def start_worker(folder: CampaignFolder) -> Worker:
-    # A session of its own: Ctrl-C reaches this process alone, which ends the others.
+    # The worker gets its own session: Ctrl-C reaches only this process, which ends its workers.
     command = ["setpriv", "--pdeathsig", "TERM", "--", sys.executable, "-BP", "-m",
                "sls.campaign.worker", str(folder.folder.resolve()), "--serve"]
     one_thread = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
@@ -84,7 +84,7 @@ def find_path() -> str:
 
 @contextmanager
 def started(workers: list[Worker]) -> Iterator[None]:
-    """In the end every process of `workers` is gone."""
+    """Ends every process of `workers` when the context ends."""
     try:
         yield
     finally:
@@ -104,8 +104,8 @@ def started(workers: list[Worker]) -> Iterator[None]:
 
 
 def run(folder: CampaignFolder, options: EngineOptions) -> None:
-    """Flies what is missing. Raises InputError if a run or the campaign is refused, EngineError
-    where a chunk cannot be written or ends its process again and again."""
+    """Flies the missing chunks. Raises InputError if a run or the campaign is refused, EngineError if a
+    chunk cannot be written or ended its process MOST_TRIES times."""
     work = Work(deque(folder.missing()))
     workers = list[Worker]()
     with started(workers), selectors.DefaultSelector() as selector, \
@@ -131,7 +131,7 @@ def run(folder: CampaignFolder, options: EngineOptions) -> None:
                 if note_end(worker, work, folder):
                     add_worker()
             progress.draw()
-            # A process without work ends with its pipe.
+            # A process ends when its stdin is closed: at the end of the campaign, when no chunk is waiting or flying.
             for worker in workers:
                 if worker.is_ready and worker.chunk is None and not worker.process.stdin.closed:
                     if work.waiting:
@@ -171,8 +171,8 @@ def close(worker: Worker) -> None:
 
 
 def note_end(worker: Worker, work: Work, folder: CampaignFolder) -> bool:
-    """Whether another process is needed in its place. Its chunk waits again, or after MOST_TRIES is
-    given up, which ends the campaign when all others are flown."""
+    """Handles the end of a worker process; True if a new process must replace it. Its chunk waits again.
+    After MOST_TRIES it is given up, and the campaign fails when all others are flown."""
     end = worker.describe_end()
     chunk = worker.chunk
     if not worker.is_ready:

@@ -1,8 +1,8 @@
 """Flies a campaign as job arrays of Slurm. See README.md beside this file.
 
 A task of an array flies a few chunks, which together take at least a minute. Slurm queues a task
-again when its node is lost; chunks that are missing after all tasks have ended are submitted again
-here. A collect job waits for the array: it goes on when this process is gone by then."""
+again when its node is lost. This process submits chunks again that are missing after all tasks have
+ended. A collect job waits for the array; it does the rest if this process has ended by then."""
 
 import getpass
 import hashlib
@@ -24,12 +24,12 @@ from sls.campaign.progress import Progress
 from sls.campaign.whole_files import write_whole
 from sls.input_error import InputError
 
-CHUNK_S = 60.0         # of work in a chunk
-TASK_S = 60.0          # of work in a task, at least: Slurm starts few tasks a second
-MOST_ROUNDS = 3        # how often a chunk is submitted
-LOST_AFTER_S = 60.0    # without an answer of the controller
+CHUNK_S = 60.0         # work in a chunk, s
+TASK_S = 60.0          # least work in a task, s, because Slurm starts only a few tasks per second
+MOST_ROUNDS = 3        # submissions of a chunk
+LOST_AFTER_S = 60.0    # a controller without an answer for this time is lost
 FIRST_POLL_S = 0.5
-LAST_POLL_S = 15.0     # the controller serves the whole site
+LAST_POLL_S = 15.0     # long, because the controller serves the whole site
 COMMAND_LIMIT_S = 60.0
 WORKER_ERROR = "campaign-worker: error:"
 START = "`sinfo` must show the nodes of a running cluster; SLURM_CONF names its slurm.conf"
@@ -41,10 +41,10 @@ class ControllerLost(Exception):
 
 
 def ask(*command: str) -> str:
-    """The output of a Slurm command. Raises EngineError if it is not installed,
-    ControllerLost where it fails."""
+    """The output of a Slurm command. Raises EngineError if it is not installed, ControllerLost if it
+    fails."""
     try:
-        # A session of its own: Ctrl-C is for this process.
+        # The command gets its own session: Ctrl-C reaches only this process.
         done = subprocess.run(command, capture_output=True, text=True, timeout=COMMAND_LIMIT_S,
                               start_new_session=True)
     except FileNotFoundError:
@@ -66,7 +66,7 @@ def say(text: str) -> None:
 
 
 def name_job(folder: CampaignFolder) -> str:
-    """The same for a folder whenever it is asked, and no other folder's."""
+    """The name of the folder's jobs: always the same for a folder, and different for other folders."""
     place = str(folder.folder.resolve())
     return f"sls-{folder.plan.campaign}-{hashlib.sha256(place.encode()).hexdigest()[:8]}"
 
@@ -81,7 +81,7 @@ def user() -> str:
 
 
 def list_states(name: str) -> Counter[str]:
-    """How many tasks of our jobs of this name are in which state. Raises ControllerLost."""
+    """The number of tasks in each state, for the user's jobs of this name. Raises ControllerLost."""
     lines = ask("squeue", "--noheader", "--array", f"--user={user()}", f"--name={name}",
                 "--format=%T %r").splitlines()
     return Counter(line.removesuffix(" None").strip() for line in lines)
@@ -93,7 +93,7 @@ def describe(states: Counter[str]) -> str:
 
 
 def describe_state(state: str) -> str:
-    """`PENDING Resources` is pending (Resources)."""
+    """Converts `PENDING Resources` to `pending (Resources)`."""
     name, _, reason = state.partition(" ")
     return f"{name.lower()} ({reason})"
 
@@ -111,7 +111,7 @@ def describe_status(folder: CampaignFolder) -> list[str]:
 
 
 def cancel(folder: CampaignFolder) -> None:
-    """Ends what was submitted for this folder. Raises ControllerLost."""
+    """Cancels all jobs of this folder. Raises ControllerLost."""
     for name in (name_collect_job(folder), name_job(folder)):
         ask("scancel", f"--user={user()}", f"--name={name}")
 
@@ -120,7 +120,7 @@ def cancel(folder: CampaignFolder) -> None:
 
 
 def measure_run_s(folder: CampaignFolder, missing: Sequence[int]) -> float:
-    """How long a run takes: by chunks that are there, else by flying some."""
+    """The time of a run, s: from chunks in the folder, or, if there are none, from up to three flights."""
     runs = wall_s = 0.0
     for number, first, last in folder.chunks[:20]:
         try:
@@ -140,13 +140,13 @@ def measure_run_s(folder: CampaignFolder, missing: Sequence[int]) -> float:
 
 
 def make_tasks(missing: Sequence[int], chunks_each: int) -> list[list[int]]:
-    """Which chunks each task flies."""
+    """The chunks of each task."""
     return [list(missing[begin:begin + chunks_each])
             for begin in range(0, len(missing), chunks_each)]
 
 
 def to_ranges(numbers: Sequence[int]) -> str:
-    """3, 4, 5, 9 is `3-5 9`."""
+    """Writes numbers as ranges: 3, 4, 5, 9 as `3-5 9`."""
     ranges = list[list[int]]()
     for number in numbers:
         if ranges and number == ranges[-1][1] + 1:
@@ -157,7 +157,7 @@ def to_ranges(numbers: Sequence[int]) -> str:
 
 
 def export_environment() -> str:
-    """Lines of a script: a compute node finds the modules of this process, and builds nothing."""
+    """Lines of a script. With them a compute node finds the modules of this process and builds nothing."""
     values = {"PYTHONPATH": os.pathsep.join(find_places()), "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
     if build := os.environ.get("SLS_BUILD"):
         values["SLS_BUILD"] = str(Path(build).resolve())
@@ -165,7 +165,7 @@ def export_environment() -> str:
 
 
 def make_task_script(folder: Path, tasks: Path) -> str:
-    """Flies the chunks of one line of `tasks`."""
+    """The script of a task, which flies the chunks of one line of the file `tasks`."""
     worker = shlex.join([sys.executable, "-BP", "-m", "sls.campaign.worker", str(folder)])
     return f"""\
 #!/bin/sh
@@ -184,7 +184,7 @@ def make_collect_script(folder: Path, number: int, options: EngineOptions) -> st
 
 
 def split_options(sbatch: str) -> list[str]:
-    """Raises InputError if a quote is open."""
+    """Splits options as a shell does. Raises InputError if a quote is not closed."""
     try:
         return shlex.split(sbatch)
     except ValueError as error:
@@ -193,11 +193,12 @@ def split_options(sbatch: str) -> list[str]:
 
 
 def submit(script: Path, name: str, log: Path, sbatch: str, *options: str) -> str:
-    """The job's number. Raises InputError for what sbatch refuses, ControllerLost."""
+    """Submits a job and returns its number. Raises InputError if sbatch refuses its options,
+    ControllerLost."""
     own = [f"--job-name={name}", f"--output={log}", "--open-mode=append", "--ntasks=1",
            "--cpus-per-task=1"]
     try:
-        # A name of `squeue` is that of a folder: a site may not replace it.
+        # The name comes last, because `squeue` finds the folder's jobs by it: --sbatch must not replace it.
         answer = ask("sbatch", "--parsable", *own, *split_options(sbatch), f"--job-name={name}",
                      *options, str(script))
     except ControllerLost as error:
@@ -208,7 +209,7 @@ def submit(script: Path, name: str, log: Path, sbatch: str, *options: str) -> st
 
 
 def find_largest_array() -> int:
-    """Tasks that a job array may have here."""
+    """The largest number of tasks in a job array of this cluster."""
     for line in ask("scontrol", "show", "config").splitlines():
         name, _, value = line.partition("=")
         if name.strip() == "MaxArraySize" and value.strip().isdecimal():
@@ -218,7 +219,7 @@ def find_largest_array() -> int:
 
 @dataclass
 class Round:
-    """Jobs submitted together: arrays, and the job that collects after them."""
+    """The job arrays of one submission; `number` counts submissions from 1."""
 
     number: int
     jobs: list[str] = field(default_factory=list)
@@ -226,13 +227,13 @@ class Round:
 
 def submit_round(folder: CampaignFolder, missing: Sequence[int], number: int,
                  options: EngineOptions) -> Round:
-    """Submits chunks as one array, or as several where it would be too large for this cluster.
-    Raises InputError, EngineError, ControllerLost."""
+    """Submits chunks as one array, or as several if one would be too large for this cluster, and the
+    collect job. Raises InputError, EngineError, ControllerLost."""
     place = folder.folder.resolve()
     own = place / "slurm"
     own.mkdir(exist_ok=True)
     run_s = measure_run_s(folder, missing)
-    # --chunk-runs sets the runs of a task, too.
+    # With --chunk-runs a task flies one chunk.
     chunks_each = 1 if options.chunk_runs else max(
         1, -(-int(TASK_S / max(run_s, 1e-6)) // folder.plan.chunk_runs))
     tasks = make_tasks(missing, chunks_each)
@@ -270,7 +271,7 @@ def find_reason(folder: CampaignFolder, jobs: Sequence[str]) -> str:
 
 
 def count_files(folder: CampaignFolder) -> set[int]:
-    """Numbers of the chunks that have a file; whether it is whole is checked in the end."""
+    """Numbers of the chunks that have a file. `find_missing` checks later if these files are whole."""
     names = os.listdir(folder.folder / "chunks")
     return {int(name[6:-4]) for name in names if name.startswith("chunk-") and name[6:-4].isdecimal()}
 
@@ -279,7 +280,7 @@ def wait(folder: CampaignFolder, missing: Sequence[int], progress: Progress) -> 
     """Waits until only held tasks are queued, or all chunks have a file. Raises EngineError if the
     controller does not answer for LOST_AFTER_S."""
     missing = set(missing)
-    # A damaged chunk has a file, too, until a task replaces it.
+    # A damaged chunk also has a file, until a task replaces it.
     damaged = missing & count_files(folder)
     seen, poll_s, answered = set(damaged), FIRST_POLL_S, time.monotonic()
     while True:
@@ -304,7 +305,7 @@ def wait(folder: CampaignFolder, missing: Sequence[int], progress: Progress) -> 
 
 
 def is_held(state: str) -> bool:
-    """Whether Slurm does not start the task by itself any more, as after a failed launch."""
+    """True if Slurm holds the task and will not start it by itself, for example after a failed launch."""
     return state.startswith("PENDING") and "held" in state.lower()
 
 
@@ -313,7 +314,7 @@ def describe_loss(folder: CampaignFolder, error: ControllerLost) -> str:
 
 
 def check(options: EngineOptions) -> None:
-    """Raises InputError, EngineError if nothing can be submitted from here."""
+    """Raises InputError or EngineError if this process cannot submit jobs."""
     split_options(options.sbatch)
     try:
         ask("sinfo", "--noheader")
@@ -322,11 +323,11 @@ def check(options: EngineOptions) -> None:
 
 
 def run(folder: CampaignFolder, options: EngineOptions) -> None:
-    """Flies what is missing. Ctrl-C cancels the jobs; after SIGTERM and SIGHUP they go on, and the
+    """Flies the missing chunks. Ctrl-C cancels the jobs. After SIGTERM and SIGHUP they continue, and the
     collect job makes the table. Raises InputError, EngineError."""
     check(options)
     try:
-        cancel(folder)  # of a launcher that was killed
+        cancel(folder)  # jobs of an earlier launcher that was killed
         missing = folder.missing()
         with Progress(folder, len(missing), options.progress) as progress:
             for number in range(1, MOST_ROUNDS + 1):
@@ -337,8 +338,8 @@ def run(folder: CampaignFolder, options: EngineOptions) -> None:
                 wait(folder, missing, progress)
                 missing = find_missing(folder)
                 if len(missing) == before and WORKER_ERROR in find_reason(folder, submitted.jobs):
-                    break  # a mistake that another try does not mend
-        cancel(folder)  # the collect job: this process collects
+                    break  # a mistake of the user: another try would fail, too
+        cancel(folder)  # ends the collect job, because this process collects
     except ControllerLost as error:
         raise EngineError(describe_loss(folder, error)) from None
     except KeyboardInterrupt as interrupt:
@@ -368,8 +369,8 @@ def cancel_quietly(folder: CampaignFolder) -> None:
 
 
 def collect(folder: CampaignFolder, number: int, options: EngineOptions) -> None:
-    """Makes the table, or submits once more what is missing. Does nothing if a launcher waits
-    for the campaign itself. Raises InputError, EngineError, ControllerLost."""
+    """Makes the table, or submits the missing chunks again. Does nothing if a launcher still waits for
+    the campaign. Raises InputError, EngineError, ControllerLost."""
     try:
         folder.take_lock()
     except InputError as error:
@@ -386,7 +387,7 @@ def collect(folder: CampaignFolder, number: int, options: EngineOptions) -> None
 
 
 def main(arguments: Sequence[str]) -> int:
-    """The exit code of a collect job."""
+    """Runs a collect job and returns its exit code."""
     place, number, sbatch, workers, chunk_runs = arguments
     folder = CampaignFolder(place)
     try:
