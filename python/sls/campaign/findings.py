@@ -38,27 +38,27 @@ CLASS_NAMES = ("finishes, small motions decay", "finishes, small motions grow", 
 
 
 def calc_lqr_gains(weight: float, order: int) -> list[float]:
-    """Gains of a chain of integrators with Q = weight·I and R = 1, from position on."""
+    """LQR gains of a chain of integrators with Q = weight·I and R = 1, that of the position first."""
     a, b = np.eye(order, k=1), np.eye(order)[:, -1:]
     return (b.T @ linalg.solve_continuous_are(a, b, weight * np.eye(order), np.eye(1)))[0].tolist()
 
 
 def calc_swing(load_mass_kg: float) -> float:
-    """ω of the rod about hover, rad/s."""
+    """ω of the swing of the rod about hover, rad/s."""
     return float(np.sqrt((QUAD_MASS_KG + load_mass_kg) * GRAVITY_M_S2
                          / (QUAD_MASS_KG * ROD_LENGTH_M)))
 
 
 def calc_mass_ratio(load_mass_kg: float, believed_kg: float = LOAD_MASS_KG) -> float:
-    """r: true by believed mass of everything."""
+    """r: the total mass divided by the total mass that the controller assumes."""
     return (QUAD_MASS_KG + load_mass_kg) / (QUAD_MASS_KG + believed_kg)
 
 
 def make_chain(gains: Sequence[float], load_mass_kg: float,
                vertical: Sequence[float]) -> HorizontalChain:
-    """The horizontal loop about a hover in which the load sags, because the controller assumes 0.2
-    kg: (1) of the page. `gains` position, velocity, acceleration, jerk; `vertical` position,
-    velocity."""
+    """The horizontal loop about a hover in which the load sags, because the controller assumes a load of
+    0.2 kg: formula (1) of the page. `gains`: position, velocity, acceleration, jerk; `vertical`:
+    position, velocity."""
     ratio = calc_mass_ratio(float(load_mass_kg))
     slope = vertical[1] * (ratio - 1.0)
     bend = (vertical[1]**2 - vertical[0]) * (1.0 - ratio)
@@ -69,14 +69,14 @@ def make_chain(gains: Sequence[float], load_mass_kg: float,
 
 def calc_delay_limit(gains: Sequence[float], load_mass_kg: float = LOAD_MASS_KG,
                      lag_s: float = 0.0, vertical: Sequence[float] = (0.0, 0.0)) -> float:
-    """The delay from which small motions grow, s, less half a period for the hold. Of the right
-    mass, `vertical` does not matter."""
+    """The delay above which small motions grow, s, minus half a period for the hold. If the assumed mass
+    is right, `vertical` has no effect."""
     chain = make_chain(gains, load_mass_kg, vertical)
     return calc_stability_limit(chain, float(lag_s)) - PERIOD_S / 2
 
 
 def calc_vertical_limit(vertical: Sequence[float]) -> float:
-    """The same of the vertical loop: (2) of the page."""
+    """As `calc_delay_limit`, for the vertical loop: formula (2) of the page."""
     position, velocity = vertical
     w = np.sqrt((velocity**2 + np.sqrt(velocity**4 + 4.0 * position**2)) / 2.0)
     return float(np.arctan2(velocity * w, position) / w) - PERIOD_S / 2
@@ -101,7 +101,7 @@ def calc_pulse_peak(gains: Sequence[float], duration_s: float = 1.0) -> float:
 
 
 def to_map(table: RunTable, name: str, shape: tuple[int, ...]) -> np.ndarray:
-    """A column of a campaign of grids alone, in their shape."""
+    """A column as an array with the shape of the grids. The campaign must vary only grids."""
     values = table.outcome if name == "outcome" else table.numbers[name]
     return values.reshape(shape)
 
@@ -111,14 +111,14 @@ def list_values(table: RunTable, *keys: str) -> list[np.ndarray]:
 
 
 def calc_share(table: RunTable, chosen: np.ndarray) -> tuple[float, float, float]:
-    """Share of runs that did not finish among those chosen, and its interval."""
+    """Share of the chosen runs that did not finish, and its interval."""
     count, total = int(np.sum(table.outcome[chosen] != 0)), int(np.sum(chosen))
     return count / max(total, 1), *calc_wilson_interval(count, total)
 
 
 def draw_share(axes: Axes, table: RunTable, key: str, edges: np.ndarray, chosen: np.ndarray,
                colour: str, label: str) -> None:
-    """Share not finished in classes of `key`, with Wilson's intervals."""
+    """Draws the share of runs that did not finish in classes of `key`, with Wilson's intervals."""
     values = table.numbers[key]
     places, shares = [], []
     for low, high in zip(edges, edges[1:]):
@@ -139,7 +139,7 @@ def make_figure(columns: int, title: str, width: float = 9.0,
 
 
 def draw_classes(axes: Axes, x: np.ndarray, y: np.ndarray, classes: np.ndarray) -> None:
-    """A map of CLASS_NAMES over x (columns) and y (rows)."""
+    """Draws a map of classes (CLASS_NAMES) over x (columns) and y (rows)."""
     axes.pcolormesh(x, y, classes, cmap=ListedColormap(CLASS_COLOURS), vmin=-0.5, vmax=3.5,
                     shading="nearest", edgecolors="none", rasterized=True)
     axes.grid(False)
@@ -307,7 +307,8 @@ def study_integral(table: RunTable) -> tuple[Figure, dict[str, str]]:
     sag = (GRAVITY_M_S2 * (LOAD_MASS_KG - believed) / ((QUAD_MASS_KG + believed) * 2.2667))
     drift = (push * GRAVITY_M_S2 * (QUAD_MASS_KG + LOAD_MASS_KG)
              / ((QUAD_MASS_KG + believed) * QUAD_MASS_KG * rod * 3.2469))
-    # The largest output of the integral, 20 m·s times its gain, as an error times the position gain.
+    # Largest error, m, that each integral can remove: its largest output, 20 m·s times its gain, divided by the
+    # position gain.
     clamp_x, clamp_z = 20.0 * 0.0316 / 3.2469, 20.0 * 0.0224 / 2.2667
     small, below = np.abs(sag) < 0.9 * clamp_z, horizontal & (drift < 0.9 * clamp_x)
     beyond = horizontal & (drift > 1.3 * clamp_x)
@@ -437,7 +438,7 @@ def write_findings(campaigns: Path, out: Path) -> Path:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """The exit code."""
+    """Runs the command and returns the exit code."""
     parser = argparse.ArgumentParser(prog="python -m sls.campaign.findings", description=__doc__)
     parser.add_argument("campaigns", type=Path, metavar="DIR")
     parser.add_argument("--out", type=Path, default=HERE.parents[2] / "docs", metavar="DIR")

@@ -1,4 +1,4 @@
-"""The folder of a campaign, which planner, workers and engines share. README.md, "The folder"."""
+"""The folder of a campaign, shared by planner, workers and engines. README.md, "The folder"."""
 
 import csv
 import errno
@@ -22,21 +22,21 @@ from sls.campaign.machine import describe_machine, find_difference, host_name
 from sls.campaign.whole_files import WholeFile, is_left_over, write_whole
 from sls.input_error import InputError
 
-OWN_FILES = {"lock", "campaign.yaml", "base.yaml", "chunks", "kept"}  # before plan.json is there
+OWN_FILES = {"lock", "campaign.yaml", "base.yaml", "chunks", "kept"}  # files that may exist before plan.json
 
 
 @dataclass(frozen=True)
 class Plan:
     """Decisions made before the first run: plan.json."""
 
-    campaign: str        # its name
+    campaign: str        # name
     sha256: str
-    file: str            # where the campaign file was; own measures are relative to it
-    base: str            # where the base scenario was
+    file: str            # original path of the campaign file; paths of own measures are relative to it
+    base: str            # original path of the base scenario
     engine: str
     first: int
     last: int            # inclusive
-    campaign_runs: int   # of the whole campaign
+    campaign_runs: int   # number of runs of the whole campaign
     chunk_runs: int
     columns: list[str]   # of runs.csv
     machine: dict[str, str]
@@ -49,7 +49,7 @@ class DamagedChunk(Exception):
 
 @dataclass(frozen=True)
 class Chunk:
-    """A whole chunk: its rows as they stand in runs.csv, and how they came about."""
+    """A whole chunk: its rows, equal to those in runs.csv, and facts about its flights."""
 
     rows: bytes
     flown: dict[str, Any]  # host, machine, wall_s
@@ -64,7 +64,7 @@ class CampaignFolder:
 
     @cached_property
     def plan(self) -> Plan:
-        """Raises InputError if there is none."""
+        """The plan of the folder. Raises InputError if there is none."""
         file = self.folder / "plan.json"
         try:
             return Plan(**json.loads(file.read_text()))
@@ -78,10 +78,10 @@ class CampaignFolder:
 
     @cached_property
     def campaign(self) -> Campaign:
-        """As it was planned: editing the campaign file or its base does no harm. Raises InputError
-        where one of the copies or an own measure is another one by now."""
+        """The campaign at the time of planning, from copies of its file and base. Edits of the originals
+        have no effect. Raises InputError if a copy or an own measure has changed."""
         from sls.campaign.campaign_file import load_campaign
-        # Libraries in the base scenario are relative to where it was.
+        # The original base is preferred, because paths of libraries in it are relative to its folder.
         base, copy = Path(self.plan.base), self.folder / "base.yaml"
         try:
             is_same = base.read_bytes() == copy.read_bytes()
@@ -97,9 +97,9 @@ class CampaignFolder:
 
     def create(self, campaign: Campaign, engine: str, chunk_runs: int, first: int, last: int,
                resume: bool, columns: Sequence[str], allow_other_machines: bool = False) -> None:
-        """Begins the folder, or with `resume` checks that it is this campaign's and takes the
-        chunks that are there. Holds the lock until `close`. Raises InputError if the folder is
-        something else, is in use, or was begun on a machine of another kind."""
+        """Begins the folder. With `resume` it checks that the folder belongs to this campaign, and keeps
+        its chunks. Holds the lock until `close`. Raises InputError if the folder is not one of this
+        campaign, is in use, or was begun on a machine of another kind."""
         self.refuse_foreign(campaign, resume)
         self.make_folders()
         self.take_lock()
@@ -119,7 +119,7 @@ class CampaignFolder:
 
     def take_up(self, campaign: Campaign, engine: str, first: int, last: int, columns: list[str],
                 allow_other_machines: bool) -> None:
-        """Goes on with the plan that is there."""
+        """Resumes the plan in the folder."""
         plan = self.plan
         if (plan.first, plan.last) != (first, last):
             raise InputError(f"--runs: expected {plan.first}-{plan.last}, with which {self.folder} "
@@ -135,7 +135,7 @@ class CampaignFolder:
         self.remove_leftovers()
 
     def forget_plan(self) -> None:
-        """Reads it again when it is needed."""
+        """Makes the next use of `plan` read plan.json again."""
         self.__dict__.pop("plan", None)
 
     def write_plan(self, plan: Plan) -> None:
@@ -144,7 +144,7 @@ class CampaignFolder:
         self.__dict__["plan"] = plan
 
     def refuse_foreign(self, campaign: Campaign, resume: bool) -> None:
-        """Raises InputError unless the folder is new, or resumes this very campaign."""
+        """Raises InputError unless the folder is new or empty, or `resume` continues this campaign."""
         if (self.folder / "plan.json").exists():
             if self.plan.sha256 != campaign.sha256:
                 raise InputError(
@@ -167,7 +167,7 @@ class CampaignFolder:
                              f"'{foreign[0]}'")
 
     def refuse_other_machine(self, plan: Plan) -> None:
-        """Raises InputError if this machine's rows could differ from the plan's machine."""
+        """Raises InputError if rows of this machine could differ from those of the plan's machine."""
         difference = find_difference(plan.machine, describe_machine())
         if difference and not plan.allow_other_machines:
             raise InputError(f"{self.folder}: machine {host_name()}: {difference}; equal "
@@ -183,8 +183,8 @@ class CampaignFolder:
                              f"{error.strerror}") from None
 
     def remove_leftovers(self) -> None:
-        """Temporary files of processes that were killed: those of this machine whose process is
-        gone, and any that nobody has written for a day."""
+        """Removes temporary files of killed processes: those of a process of this machine that has ended,
+        and those of other machines that were not written for a day."""
         for folder in (self.folder, self.folder / "chunks"):
             for file in folder.glob(".*.tmp"):
                 with suppress(FileNotFoundError):
@@ -194,7 +194,8 @@ class CampaignFolder:
     # --- the lock ---------------------------------------------------------------------------------
 
     def take_lock(self) -> None:
-        """One process plans and collects. The kernel frees the lock when that process ends."""
+        """Locks the folder, because only one process may plan and collect. The kernel frees the lock when
+        that process ends. Raises InputError if another process holds it."""
         if self._lock is not None:
             return
         file = self.folder / "lock"
@@ -214,7 +215,7 @@ class CampaignFolder:
         try:
             os.ftruncate(lock, 0)
             os.pwrite(lock, f"process {os.getpid()} on {host_name()}\n".encode(), 0)
-        except OSError:  # a full disk: it is locked all the same
+        except OSError:  # the disk is full: the lock holds without this text
             pass
         self._lock = lock
 
@@ -228,13 +229,13 @@ class CampaignFolder:
 
     @property
     def chunks(self) -> list[tuple[int, int, int]]:
-        """Number, first and last run (inclusive) of each."""
+        """Number, first and last run (inclusive) of each chunk."""
         plan = self.plan
         return [(number, begin, min(begin + plan.chunk_runs - 1, plan.last))
                 for number, begin in enumerate(range(plan.first, plan.last + 1, plan.chunk_runs))]
 
     def find_chunk(self, number: int) -> tuple[int, int]:
-        """First and last run. Raises InputError for a number there is none of."""
+        """First and last run of a chunk. Raises InputError if there is no chunk `number`."""
         plan = self.plan
         count = -(-(plan.last - plan.first + 1) // plan.chunk_runs)
         if not 0 <= number < count:
@@ -250,8 +251,8 @@ class CampaignFolder:
         return to_line(self.plan.columns)
 
     def write_chunk(self, number: int, rows: Iterable[Sequence[str]], wall_s: float = 0.0) -> None:
-        """Writes a chunk whole, or leaves one with the same rows as it is. Raises EngineError if
-        it cannot be written, or where the chunk is there with other rows."""
+        """Writes a chunk whole. A whole chunk with the same rows stays unchanged. Raises EngineError if the
+        chunk cannot be written, or if there is one with other rows."""
         first, last = self.find_chunk(number)
         table = b"".join(map(to_line, rows))
         flown = {"host": host_name(), "machine": describe_machine(), "wall_s": round(wall_s, 6)}
@@ -260,7 +261,7 @@ class CampaignFolder:
             f"# flown {json.dumps(flown, sort_keys=True)}\n").encode()
         text = body + f"# sha256 {hashlib.sha256(body).hexdigest()}\n".encode()
         file = self.chunk_file(number)
-        self.parse_chunk(number, text)  # a mistake of the caller ends here
+        self.parse_chunk(number, text)  # finds mistakes of the caller
         with WholeFile(file) as writing:
             writing.write(text)
             if writing.finish_new():
@@ -277,7 +278,7 @@ class CampaignFolder:
                     f"{first + find_first_difference(there.rows, table)}")
 
     def read_whole_chunk(self, number: int) -> Chunk:
-        """Raises DamagedChunk, which says what is wrong, also where there is no such file."""
+        """Reads a chunk. Raises DamagedChunk with the defect, also if there is no file."""
         try:
             text = self.chunk_file(number).read_bytes()
         except FileNotFoundError:
@@ -304,11 +305,11 @@ class CampaignFolder:
         return Chunk(rows, json.loads(flown))
 
     def read_chunk(self, number: int) -> list[list[str]]:
-        """The cells of its rows. Raises DamagedChunk."""
+        """The cells of the chunk's rows. Raises DamagedChunk."""
         return list(csv.reader(io.StringIO(self.read_whole_chunk(number).rows.decode())))
 
     def check_chunks(self) -> Iterator[tuple[int, str]]:
-        """Number and what is wrong of every chunk: "" is whole, "missing" has no file."""
+        """Number and defect of every chunk: "" if it is whole, "missing" if it has no file."""
         for number, _, _ in self.chunks:
             try:
                 self.read_whole_chunk(number)
@@ -317,7 +318,7 @@ class CampaignFolder:
                 yield number, str(defect)
 
     def missing(self) -> list[int]:
-        """Chunks that are to be flown: without a file or damaged."""
+        """Numbers of the chunks that must be flown, because they have no file or are damaged."""
         return [number for number, defect in self.check_chunks() if defect]
 
     # --- the table --------------------------------------------------------------------------------
@@ -332,15 +333,15 @@ class CampaignFolder:
                 continue
 
     def read_row(self, index: int) -> dict[str, str]:
-        """Raises DamagedChunk."""
+        """The row of run `index`. Raises DamagedChunk."""
         number = (index - self.plan.first) // self.plan.chunk_runs
         cells = self.read_chunk(number)[index - self.find_chunk(number)[0]]
         return dict(zip(self.plan.columns, cells))
 
     def collect(self, engine: str) -> Path:
-        """Writes runs.csv and manifest.json from the chunks, keeps the recordings that the campaign
-        asks for, writes report.html. Streams: never holds more than one chunk. Raises EngineError
-        where a chunk is missing or something cannot be written."""
+        """Writes runs.csv and manifest.json from the chunks, the recordings that the campaign keeps, and
+        report.html. Only one chunk is in memory at a time while it writes runs.csv. Raises EngineError if
+        a chunk is missing or a file cannot be written."""
         from sls.campaign.kept import keep_recordings
         self.take_lock()
         counts, machines, flying_s = {}, {}, 0.0
@@ -383,7 +384,7 @@ class CampaignFolder:
 
     @property
     def manifest(self) -> dict[str, Any]:
-        """Raises InputError if there is none."""
+        """The manifest in the folder. Raises InputError if there is none."""
         file = self.folder / "manifest.json"
         try:
             return json.loads(file.read_text())
@@ -401,21 +402,21 @@ class CampaignFolder:
 
 
 def to_line(cells: Sequence[str]) -> bytes:
-    """A row of CSV: fields with a comma or quote are quoted, a line ends with one line feed."""
+    """A row of CSV. Fields with a comma or a quote are quoted; the line ends with one line feed."""
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerow(cells)
     return text.getvalue().encode()
 
 
 def find_first_difference(rows: bytes, others: bytes) -> int:
-    """Number of the first line that differs."""
+    """Index, from 0, of the first line that differs."""
     pairs = zip(rows.splitlines(), others.splitlines())
     return next((number for number, (one, other) in enumerate(pairs) if one != other), 0)
 
 
 @contextmanager
 def opened(folder: str | Path) -> Iterator[CampaignFolder]:
-    """A folder whose lock is freed in the end."""
+    """Context with a folder, whose lock is freed at its end."""
     campaign_folder = CampaignFolder(folder)
     try:
         yield campaign_folder

@@ -1,7 +1,8 @@
 """Recordings that a campaign keeps: DIR/kept/run-NNNNNN.
 
-Those of failed or of all runs are written while their chunk is flown; the worst are known only when
-the table is. Each is flown again and must have the certificate of its row."""
+Recordings of failed or of all runs are written while their chunk is flown. The worst runs are known
+only when the table is complete. For its recording a run is flown again; the recording must have the
+certificate of the run's row."""
 
 import heapq
 import json
@@ -31,14 +32,15 @@ def kept_folder(folder: "CampaignFolder", index: int) -> Path:
 
 
 def is_kept(campaign: Campaign, row: dict[str, str]) -> bool:
-    """Whether this row alone says that its recording is kept."""
+    """True if the recording of this row is kept, whatever the other rows contain."""
     kind = campaign.keep.kind
     return kind == "all" or kind == "failed" and row["outcome"] != "finished"
 
 
 def keep_while_flying(folder: "CampaignFolder", campaign: Campaign, runs: "Runs",
                       cells: Sequence[str]) -> None:
-    """Raises EngineError if the recording cannot be written."""
+    """Writes the recording of a run just flown, if the campaign keeps it. Raises EngineError if it cannot
+    be written."""
     if campaign.keep.kind in ("none", "worst"):
         return
     row = dict(zip(folder.plan.columns, cells))
@@ -48,8 +50,8 @@ def keep_while_flying(folder: "CampaignFolder", campaign: Campaign, runs: "Runs"
 
 def keep_run(folder: "CampaignFolder", campaign: Campaign, runs: "Runs",
              row: dict[str, str]) -> None:
-    """Writes one recording whole, unless it is there. Raises EngineError if it cannot be
-    written, or where the flight is another one than the row's."""
+    """Writes one recording whole, unless the folder has it already. Raises EngineError if it cannot be
+    written, or if its certificate differs from the row's."""
     index = int(row["run"])
     target = kept_folder(folder, index)
     if is_whole(target, row["certificate"]):
@@ -63,11 +65,11 @@ def keep_run(folder: "CampaignFolder", campaign: Campaign, runs: "Runs",
         if row["certificate"] not in ("", certificate):
             raise EngineError(f"{target}: expected certificate {row['certificate']} of runs.csv, "
                               f"got {certificate}")
-        shutil.rmtree(target, ignore_errors=True)  # damaged, or not there
+        shutil.rmtree(target, ignore_errors=True)  # a damaged recording, if there is one
         os.rename(temporary, target)
         sync_folder(target.parent)
     except OSError as error:
-        if not is_whole(target, row["certificate"]):  # else another worker was faster
+        if not is_whole(target, row["certificate"]):  # a whole one was written by another worker
             raise EngineError(f"{target}: expected to write a recording, got: "
                               f"{error.strerror or error}") from None
     finally:
@@ -75,8 +77,8 @@ def keep_run(folder: "CampaignFolder", campaign: Campaign, runs: "Runs",
 
 
 def save(flight: "Flight", recording: Path) -> None:
-    """Raises RunError for a flight that finished and whose recording is not complete; that of one
-    that failed never is."""
+    """Saves the recording. Raises RunError if the flight finished and its recording is not complete. The
+    recording of a failed flight is never complete."""
     try:
         flight.save(recording)
     except RunError:
@@ -93,8 +95,8 @@ def is_whole(recording: Path, certificate: str) -> bool:
 
 
 def list_worst(folder: "CampaignFolder", campaign: Campaign) -> list[dict[str, str]]:
-    """The rows with the largest values in the column, the largest first; of equal ones those with
-    the lower index. Rows without a value are left out."""
+    """The rows with the largest values in the column, the largest first. Of equal values the lower index
+    comes first. Rows without a value are left out."""
     column = campaign.keep.find_column(folder.plan.columns)
     if column is None:
         raise EngineError(f"{campaign.file}: keep.by: expected a column of runs.csv, got "
@@ -121,8 +123,8 @@ def list_kept(folder: "CampaignFolder", campaign: Campaign) -> Iterator[dict[str
 
 
 def keep_recordings(folder: "CampaignFolder") -> dict[str, Any]:
-    """Writes every recording that is requested and missing. The manifest's entries for them:
-    their kind and number, and of the worst their runs."""
+    """Writes every recording that the campaign keeps and that is missing. Returns the manifest's entries
+    for them: kind and number, and for "worst" the runs."""
     campaign = folder.campaign
     kept: dict[str, Any] = {"kind": campaign.keep.kind, "count": 0}
     if campaign.keep.kind == "none":

@@ -1,4 +1,5 @@
-"""Decides the bits of a flight besides its scenario: processor level, libraries, versions."""
+"""Properties of a machine that, besides the scenario, determine the bits of a flight: processor level,
+libraries, versions."""
 
 import hashlib
 import os
@@ -10,18 +11,18 @@ from pathlib import Path
 from sls.core import load_core
 
 # Flags of /proc/cpuinfo that each level of the x86-64 psABI adds. The mathematical library chooses
-# its sin and cos by them, so that equal bits are promised for one level only.
+# its sin and cos by them. For this reason equal bits are promised only within one level.
 LEVEL_FLAGS = (
     ("x86-64-v2", {"cx16", "lahf_lm", "popcnt", "sse4_1", "sse4_2", "ssse3"}),
     ("x86-64-v3", {"avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "abm", "movbe"}),
     ("x86-64-v4", {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"}),
 )
-# Features that glibc's sin and cos check, which a processor may have without the whole level.
+# Features that glibc's sin and cos check. A processor may have some of them without the whole level.
 LIBM_FLAGS = {"fma", "fma4", "avx2", "avx"}
 
 
 def calc_level(architecture: str, flags: set[str]) -> str:
-    """The feature level, such as `x86-64-v3`; of another architecture its name."""
+    """The feature level, such as `x86-64-v3`; for other architectures the architecture's name."""
     if architecture != "x86_64":
         return architecture
     level = "x86-64-v1"
@@ -51,8 +52,8 @@ def find_version(package: str) -> str:
 
 @cache
 def describe_machine() -> dict[str, str]:
-    """Everything that could change a bit of the table, by name. Equal descriptions promise equal
-    rows. `core` names the bytes of the compiled module `_sls_core`."""
+    """Everything that could change a bit of the table, by name. Machines with equal descriptions give
+    equal rows. `core`: hash of the compiled module `_sls_core`."""
     flags = read_flags()
     return {
         "level": calc_level(platform.machine(), flags),
@@ -75,7 +76,7 @@ def host_name() -> str:
 
 
 def find_difference(expected: dict[str, str], got: dict[str, str]) -> str:
-    """One phrase that names the first difference; empty if there is none."""
+    """A phrase that describes the first difference; empty if there is none."""
     for name in sorted({*expected, *got}):
         if expected.get(name) != got.get(name):
             return f"{name}: expected {expected.get(name) or 'none'}, got {got.get(name) or 'none'}"

@@ -1,4 +1,4 @@
-"""Measures of the user's own: functions of a Python file, called with each run's flight."""
+"""Measures that the user defines: functions of a Python file, called with the flight of each run."""
 
 import importlib.util
 import traceback
@@ -13,7 +13,7 @@ LONGEST_ERROR = 300
 
 
 def load_function(own: OwnMeasure) -> Callable[..., Any]:
-    """Raises InputError if the file cannot be run or has no such function."""
+    """Loads the function of a measure. Raises InputError if its file cannot be run or has no such function."""
     place = f"{own.file}: {own.function}"
     spec = importlib.util.spec_from_file_location(f"own_measure_{own.file.stem}", own.file)
     if spec is None or spec.loader is None:
@@ -31,14 +31,14 @@ def load_function(own: OwnMeasure) -> Callable[..., Any]:
 
 
 def describe(error: Exception) -> str:
-    """Kind, text and line of the user's file, in one line."""
+    """Type and text of the error, and the line of the user's file, in one line."""
     where = traceback.extract_tb(error.__traceback__)
     line = f" (line {where[-1].lineno})" if where else ""
     return to_one_line(f"{type(error).__name__}: {error}"[:LONGEST_ERROR] + line)
 
 
 def to_columns(own: OwnMeasure, result: Any) -> list[float]:
-    """Raises TypeError or KeyError if the function returned something else."""
+    """The result as numbers for the measure's columns. Raises TypeError or KeyError if it does not fit them."""
     if isinstance(result, dict):
         if set(result) != set(own.columns):
             raise KeyError(f"expected {', '.join(own.columns)}, got {', '.join(map(str, result))}")
@@ -56,8 +56,8 @@ class OwnMeasures:
         self.measures = [(own, load_function(own)) for own in campaign.own_measures]
 
     def measure(self, scenario_text: str) -> list[str]:
-        """Flies the scenario and calls each function with the flight: cells of their columns, then
-        what went wrong; columns of a function that raises are empty."""
+        """Flies the scenario and calls each function with the flight. Returns the cells of their columns
+        and a last cell with the errors. Columns of a function that raises are empty."""
         flight = fly_text(scenario_text, self.campaign)
         cells, errors = list[str](), list[str]()
         for own, function in self.measures:

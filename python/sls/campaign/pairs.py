@@ -1,5 +1,5 @@
-"""Runs that form pairs: of two campaigns those of equal index, of one campaign those that differ in
-one key alone. Tables of how their outcomes and measures differ."""
+"""Pairs of runs: runs of two campaigns with equal index, or runs of one campaign that differ in only
+one key. Tables show the differences of their outcomes and measures."""
 
 import numpy as np
 
@@ -8,19 +8,19 @@ from sls.campaign.run_table import OUTCOMES, RunTable
 from sls.campaign.statistics import (calc_mcnemar_p, calc_paired_difference, calc_quantiles,
                                      calc_wilson_interval)
 
-Places = np.ndarray  # of runs in their table, (pairs,)
+Places = np.ndarray  # places of runs in their table, (pairs,)
 
 
 def describe_interval(count: int, total: int) -> str:
-    """Wilson's, in percent."""
+    """Wilson's interval, in percent."""
     low, high = calc_wilson_interval(count, total)
     return f"{100 * low:.2f} % to {100 * high:.2f} %"
 
 
 def find_pairs(table: RunTable, key: str) -> tuple[list[str], Places, Places] | None:
-    """Of a key with exactly two values: the values as text, and the runs with the first and with
-    the second whose other varied values are equal. None if fewer than half of the runs form
-    pairs."""
+    """Pairs of runs that differ only in `key`, which must have exactly two values. Returns the values as
+    text, the runs with the first value and those with the second. None if the key has another number of
+    values, or if fewer than half of the runs form pairs."""
     if key in table.words:
         names, side = table.words[key]
     else:
@@ -46,7 +46,7 @@ def find_pairs(table: RunTable, key: str) -> tuple[list[str], Places, Places] | 
 
 
 def count_changes(a: RunTable, b: RunTable, in_a: Places, in_b: Places) -> np.ndarray:
-    """How often each outcome in `a` (rows) met each in `b` (columns), in the order of OUTCOMES."""
+    """Number of pairs with each outcome in `a` (rows) and in `b` (columns), in the order of OUTCOMES."""
     counts = np.zeros((len(OUTCOMES), len(OUTCOMES)), dtype=int)
     np.add.at(counts, (a.outcome[in_a], b.outcome[in_b]), 1)
     return counts
@@ -70,13 +70,13 @@ def describe_changes(counts: np.ndarray, name_a: str, name_b: str) -> str:
 
 
 def find_finished(a: RunTable, b: RunTable, in_a: Places, in_b: Places) -> np.ndarray:
-    """Which pairs finished on both sides."""
+    """True for each pair whose runs both finished."""
     return a.is_outcome("finished")[in_a] & b.is_outcome("finished")[in_b]
 
 
 def make_measure_rows(a: RunTable, b: RunTable, in_a: Places, in_b: Places, name_a: str,
                       name_b: str) -> list[list[str]]:
-    """Header and rows, one for each measure of both, of the pairs that finished on both sides."""
+    """Header, and a row for each measure of both tables. Only pairs whose runs both finished count."""
     both = find_finished(a, b, in_a, in_b)
     rows = [["measure", "pairs", f"median {name_a}", f"median {name_b}",
              f"median {name_b} − {name_a}", "95 % interval", f"{name_b} less", f"{name_b} more",

@@ -1,4 +1,4 @@
-"""The progress bar: one line of a terminal, none anywhere else."""
+"""The progress bar: one line, on a terminal only."""
 
 import sys
 import time

@@ -1,8 +1,8 @@
 """One self-contained page about a campaign: report.html.
 
-Made from runs.csv, campaign.yaml and manifest.json alone, so that it can be made again wherever the
-folder is; equal files give equal bytes. Its size does not grow with the number of runs: everything
-is counted into bins or taken as a sample."""
+It uses only runs.csv, campaign.yaml and manifest.json. For this reason it can be made again in any
+place of the folder, and equal files give equal bytes. Its size does not grow with the number of runs,
+because pictures show bins or samples."""
 
 import json
 import math
@@ -24,12 +24,12 @@ from sls.campaign.statistics import calc_quantiles, calc_wilson_interval
 from sls.input_error import InputError
 from sls.report import STYLE_SHEET, escape, make_section
 
-MOST_VALUES = 41  # of a key that get a bin each; of more values these are bins of equal width
+MOST_VALUES = 41  # a key with more values gets bins of equal width instead of one bin per value
 BINS = 20
-MOST_WORDS = 12  # of a key that is drawn: more are those of derived lists, which nobody could read
-MOST_PAIRS = 10  # of varied keys that are drawn
-MOST_LINES = 400  # of parallel coordinates
-MOST_COLUMNS = 80  # distributions that are drawn
+MOST_WORDS = 12  # texts of a drawn key; keys with more are derived lists, whose pictures would be unreadable
+MOST_PAIRS = 10  # drawn pairs of varied keys
+MOST_LINES = 400  # lines in the picture of parallel coordinates
+MOST_COLUMNS = 80  # drawn distributions
 MOST_REASONS = 20
 WORST = 10
 SHARES = (0.05, 0.5, 0.95)
@@ -47,7 +47,7 @@ code { font-size: 12.5px; }
 
 @dataclass(frozen=True)
 class Bins:
-    """A varied key in classes."""
+    """The classes of a varied key."""
 
     label: str
     names: list[str]
@@ -81,7 +81,7 @@ def make_campaign_report(folder: Path) -> str:
             f"<body><main>\n{''.join(sections)}</main></body>\n</html>\n")
 
 
-# --- what is read ---------------------------------------------------------------------------------
+# --- input files ----------------------------------------------------------------------------------
 
 
 def read_text(file: Path) -> str:
@@ -103,7 +103,7 @@ def read_manifest(file: Path) -> dict[str, Any]:
 
 
 def describe_name(folder: Path, campaign_text: str, manifest: dict[str, Any]) -> str:
-    """From the manifest, else from the file, else the folder's."""
+    """The campaign's name: from the manifest, or from its file, or the name of that file or of the folder."""
     try:
         own = yaml.safe_load(campaign_text)
     except yaml.YAMLError as error:
@@ -118,7 +118,7 @@ def describe_name(folder: Path, campaign_text: str, manifest: dict[str, Any]) ->
 
 
 def find_file(manifest: dict[str, Any]) -> str:
-    """The campaign file that a command names: the manifest says from where it was read."""
+    """The path of the campaign file for commands, from the manifest; "FILE" if it has none."""
     file = manifest.get("file")
     return file if isinstance(file, str) else "FILE"
 
@@ -127,13 +127,13 @@ def find_file(manifest: dict[str, Any]) -> str:
 
 
 def make_bins(table: RunTable, key: str, most_values: int = MOST_VALUES) -> Bins:
-    """A class for each value; of many values, classes of equal width (or ratio, of wide ranges)."""
+    """A class for each value. Many values get classes of equal width, or of equal ratio in a wide range."""
     if key in table.words:
         words, places = table.words[key]
         names = list(map(name_word, words))
         if len(words) <= most_values:
             return Bins(key, names, places)
-        # More words than can be drawn: all but the first ones are one class.
+        # Too many words to draw: those after the first ones form one class.
         return Bins(key, [*names[:most_values - 1], "others"],
                     np.minimum(places, most_values - 1))
     values = table.numbers[key]
@@ -149,8 +149,7 @@ def make_bins(table: RunTable, key: str, most_values: int = MOST_VALUES) -> Bins
 
 
 def list_drawn_keys(table: RunTable) -> list[str]:
-    """Varied keys that pictures show: several values, and no more texts than a reader can take in;
-    no seeds."""
+    """Varied keys that pictures show: those with several values, and at most MOST_WORDS texts; no seeds."""
     return [key for key in table.keys
             if not key.endswith(".seed")
             and (1 < len(table.words[key][0]) <= MOST_WORDS if key in table.words
@@ -158,7 +157,8 @@ def list_drawn_keys(table: RunTable) -> list[str]:
 
 
 def name_word(word: str) -> str:
-    """Of a map, its first value: `qsf` of {law: "qsf", gains: …}; of other text its beginning."""
+    """A short name: of a map its first value, such as `qsf` of {law: "qsf", gains: …}; of other text its
+    beginning."""
     if word.startswith("{"):
         try:
             values = list(yaml.safe_load(word).values())
@@ -175,7 +175,7 @@ def is_lost(table: RunTable) -> np.ndarray:
 
 
 def find_main_measure(table: RunTable) -> str | None:
-    """The measure in heat maps: the rms of the load's error where it was measured."""
+    """The measure in heat maps: the load error's rms, or its maximum, or else the first other measure."""
     for name in ("load_error_rms_m", "load_error_max_m"):
         if name in table.measures:
             return name
@@ -184,8 +184,8 @@ def find_main_measure(table: RunTable) -> str | None:
 
 
 def find_values(table: RunTable, name: str) -> np.ndarray:
-    """Of a measure, the runs that finished; of one that only others have, such as the time of the
-    loss, all that have it. NaN left out."""
+    """Values of a measure in the runs that finished. If these have none, as for the time of the loss,
+    the values of all runs. NaN is left out."""
     values = table.numbers[name]
     finished = values[table.is_outcome("finished")]
     finished = finished[~np.isnan(finished)]
@@ -206,7 +206,7 @@ def make_head(name: str, table: RunTable) -> str:
 
 
 def make_plain_table(header: Sequence[str], rows: Sequence[Sequence[str]], style: str = "") -> str:
-    """`header` and `rows` hold HTML."""
+    """An HTML table. `header` and `rows` hold HTML."""
     head = "".join(f"<th>{cell}</th>" for cell in header)
     body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows)
     return (f"<div class=\"scroll\"><table{style}><thead><tr>{head}</tr></thead><tbody>{body}"
@@ -254,7 +254,7 @@ def make_key_section(table: RunTable) -> str:
 
 
 def make_heat_maps(table: RunTable, x: str, y: str, measure: str | None) -> str:
-    """Share lost and median of `measure` in the classes of two keys."""
+    """Heat maps of the share lost, and of the median of `measure`, in the classes of two keys."""
     columns, rows = make_bins(table, x), make_bins(table, y)
     shape = (len(rows.names), len(columns.names))
     place = rows.places * shape[1] + columns.places
@@ -276,7 +276,7 @@ def make_heat_maps(table: RunTable, x: str, y: str, measure: str | None) -> str:
 
 def calc_class_medians(table: RunTable, measure: str, place: np.ndarray,
                        shape: tuple[int, int]) -> np.ndarray:
-    """Of the runs that finished; NaN if none did."""
+    """Median of `measure` in each class over the runs that finished; NaN if none did."""
     values = table.numbers[measure]
     use = table.is_outcome("finished") & np.isfinite(values)
     order = np.argsort(place[use], kind="stable")
@@ -302,7 +302,7 @@ def make_pair_section(table: RunTable) -> str:
 
 
 def make_paired_section(table: RunTable, key: str) -> str:
-    """Of a key with two values: runs that differ in it alone, beside each other."""
+    """Compares runs that differ only in `key`, if this key has two values."""
     found = find_pairs(table, key)
     if found is None:
         return ""
@@ -356,8 +356,8 @@ def make_measures(table: RunTable) -> str:
 
 
 def choose_sample(table: RunTable) -> np.ndarray:
-    """Places of at most MOST_LINES runs, half of them lost where there are as many, evenly
-    spaced."""
+    """Places of at most MOST_LINES runs, evenly spaced. Half of them are lost runs, if there are
+    enough runs of both kinds."""
     lost, finished = np.flatnonzero(is_lost(table)), np.flatnonzero(~is_lost(table))
     half = MOST_LINES // 2
     take_lost = min(len(lost), max(half, MOST_LINES - len(finished)))
@@ -388,8 +388,8 @@ def make_parallel(table: RunTable) -> str:
 
 
 def list_worst(table: RunTable) -> list[tuple[str, np.ndarray]]:
-    """Titles and places in the table: failed, lost earliest, largest errors of those that
-    finished."""
+    """Groups of the worst runs, by title and places in the table: failed, lost earliest, and finished
+    with the largest errors."""
     groups = [("Failed", np.flatnonzero(table.is_outcome("failed"))[:WORST])]
     lost = np.flatnonzero(table.is_outcome("lost"))
     moment = table.numbers.get("time_of_loss_s", table.numbers["steps"])[lost]
@@ -433,7 +433,7 @@ def make_worst(table: RunTable, file: str) -> str:
 
 
 def shorten(cell: str) -> str:
-    """A number with four digits; of text the first 40 characters."""
+    """A number with four digits, or the first 40 characters of a text."""
     try:
         return format_number(float(cell))
     except ValueError:
@@ -447,7 +447,7 @@ def make_facts(manifest: dict[str, Any]) -> str:
 
 
 def flatten(value: Any, place: str = "") -> list[tuple[str, str]]:
-    """Leaves of the manifest by their paths, in its order, long ones cut."""
+    """Path and text of each value in the manifest, in its order. Long texts are cut."""
     if isinstance(value, dict):
         return [leaf for key, item in value.items()
                 for leaf in flatten(item, f"{place}.{key}" if place else str(key))]

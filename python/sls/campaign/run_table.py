@@ -1,9 +1,9 @@
 """runs.csv of a campaign as columns.
 
-Numbers are kept as arrays of doubles, text as numbers of a list of words, certificates not at all:
-a campaign of 100,000 runs takes some 40 MB. Columns in the order of the file: `run`, the varied
-keys by their paths, `outcome`, `reason`, the measures, `own_error` where the user's own functions
-measure, `steps`, `certificate`."""
+Numbers are arrays of doubles, texts are indices into a list of words, certificates are left out. A
+campaign of 100,000 runs takes some 40 MB. Columns in the order of the file: `run`, the varied keys by
+their paths, `outcome`, `reason`, the measures, `own_error` (if the user defines measures), `steps`,
+`certificate`."""
 
 import csv
 import re
@@ -25,13 +25,13 @@ NUMBER = re.compile(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?")
 @dataclass(frozen=True)
 class RunTable:
     file: Path
-    keys: tuple[str, ...]  # paths of what was varied
+    keys: tuple[str, ...]  # paths of the varied keys
     measures: tuple[str, ...]  # column names
     run: np.ndarray  # (n,) run indices
-    numbers: dict[str, np.ndarray]  # varied keys that hold numbers alone, measures and steps, (n,)
-    words: dict[str, tuple[list[str], np.ndarray]]  # other varied keys: values, which, (n,)
-    outcome: np.ndarray  # (n,) place in OUTCOMES
-    reasons: Counter  # how often each reason, without its numbers, after the outcome
+    numbers: dict[str, np.ndarray]  # varied keys with numbers only, measures and steps, (n,)
+    words: dict[str, tuple[list[str], np.ndarray]]  # other varied keys: values, and index of the value, (n,)
+    outcome: np.ndarray  # (n,) index in OUTCOMES
+    reasons: Counter  # number of runs by "OUTCOME: REASON", without the numbers in the reason
 
     def __len__(self) -> int:
         return len(self.run)
@@ -44,8 +44,8 @@ class RunTable:
 
 
 class Column:
-    """Of a varied key: doubles as long as every cell is a number, words from the first other
-    one."""
+    """The cells of a varied key: doubles as long as every cell is a number. After the first other cell
+    all are words."""
 
     def __init__(self) -> None:
         self.cells = array("d")
@@ -65,7 +65,7 @@ class Column:
 
 
 def read_rows(file: Path) -> Iterator[list[str]]:
-    """Header and rows; raises InputError."""
+    """Header and rows. Raises InputError."""
     try:
         with file.open(newline="") as lines:
             yield from csv.reader(lines)
@@ -75,7 +75,7 @@ def read_rows(file: Path) -> Iterator[list[str]]:
 
 
 def split_header(file: Path, header: list[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Varied keys and measures; raises InputError."""
+    """Names of the varied keys and of the measures. Raises InputError."""
     if (header[:1] != ["run"] or "outcome" not in header
             or header[header.index("outcome"):][:2] != ["outcome", "reason"]
             or header[-2:] != ["steps", "certificate"]):
@@ -88,7 +88,7 @@ def split_header(file: Path, header: list[str]) -> tuple[tuple[str, ...], tuple[
 
 
 def read_runs(file: Path) -> RunTable:
-    """One pass over the file. Raises InputError with file and line."""
+    """Reads the table in one pass over the file. Raises InputError with file and line."""
     rows = read_rows(file)
     header = next(rows, [])
     keys, measures = split_header(file, header)
@@ -126,13 +126,13 @@ def read_runs(file: Path) -> RunTable:
 
 
 def leave_out_numbers(reason: str) -> str:
-    """So that reasons that only differ in a moment or a size count as one. A number is kept where
-    it belongs to a name, such as `figure_eight_2`."""
+    """Replaces numbers by "…": reasons that differ only in a time or a size then count as one. A number in
+    a name, such as `figure_eight_2`, stays."""
     return re.sub(rf"(?<![\w.-]){NUMBER.pattern}(?![\w])", "…", reason)
 
 
 def find_rows(file: Path, runs: Iterable[int]) -> dict[int, dict[str, str]]:
-    """The rows of some runs, as text, by run index: a second pass."""
+    """The rows of some runs, as text, by run index. This is a second pass over the file."""
     wanted = {str(run) for run in runs}
     rows = read_rows(file)
     header = next(rows, [])

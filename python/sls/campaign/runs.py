@@ -1,4 +1,4 @@
-"""Rows of runs.csv: one run each, a pure function of its index."""
+"""Rows of runs.csv. A row is one run, and depends only on the campaign and the run's index."""
 
 import math
 import re
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from sls import Flight
     from sls.campaign.own_measures import OwnMeasures
 
-BLOCK = 1000  # runs whose values are held at once
+BLOCK = 1000  # number of runs whose values are in memory at once
 
 
 @dataclass(frozen=True)
@@ -26,11 +26,11 @@ class Row:
 
 
 class RefusedRun(Exception):
-    """A run whose scenario is refused: one line that names its index."""
+    """The scenario of a run is refused. The message is one line with the run's index."""
 
 
 def make_runs(campaign: Campaign) -> "Runs":
-    """Flies the base scenario once. Raises sls.ConfigError."""
+    """The object that flies the runs. It flies the base scenario once. Raises sls.ConfigError."""
     from _sls_core import Runs
     from sls import Flight
     return Runs(str(campaign.base), campaign.scenario_paths, list(campaign.measures),
@@ -49,29 +49,29 @@ def list_columns(campaign: Campaign, runs: "Runs") -> list[str]:
 
 
 def to_cell(value: Any) -> str:
-    """A varied value as text: that of the scenario's YAML, a text of one line without its quotes."""
+    """A varied value as YAML, as in the scenario. A printable text has no quotes."""
     is_plain = isinstance(value, str) and value.isprintable()
     return value if is_plain else to_yaml_value(value)
 
 
 def to_number(value: float) -> str:
-    """The shortest text that reads back as the same number; empty if there is none."""
+    """The shortest text that reads back as the same number; empty for NaN."""
     return "" if math.isnan(value) else repr(value)
 
 
 def to_one_line(text: str) -> str:
-    """Without line breaks, and without addresses, which differ from process to process."""
+    """Removes line breaks, and addresses in memory, which differ from process to process."""
     return re.sub(r"0x[0-9a-f]{6,}", "0x…", " ".join(text.split()))
 
 
 def list_yaml_values(campaign: Campaign, values: list[Any]) -> list[str]:
-    """Values of the scenario's varied keys in a run."""
+    """Values of the varied keys of the scenario, as YAML."""
     return [to_yaml_value(value) for value in campaign.pick_scenario_values(values)]
 
 
 def fly_run(campaign: Campaign, runs: "Runs", index: int, values: list[Any],
             own: "OwnMeasures | None" = None) -> Row:
-    """Flies one run. Raises RefusedRun where its scenario is refused."""
+    """Flies one run. Raises RefusedRun if its scenario is refused."""
     texts = list_yaml_values(campaign, values)
     try:
         outcome, reason, measures, certificate, steps = runs.fly(
@@ -84,7 +84,7 @@ def fly_run(campaign: Campaign, runs: "Runs", index: int, values: list[Any],
 
 
 def fly_whole(campaign: Campaign, runs: "Runs", values: list[Any]) -> "Flight":
-    """The same flight with all its columns. Raises ConfigError, RunError."""
+    """Flies one run and returns the flight with all columns. Raises ConfigError, RunError."""
     return fly_text(runs.scenario_text(list_yaml_values(campaign, values)), campaign)
 
 
@@ -95,7 +95,7 @@ def fly_text(scenario_text: str, campaign: Campaign) -> "Flight":
 
 
 def list_values(campaign: Campaign, first: int, last: int) -> Iterator[tuple[int, list[Any]]]:
-    """Index and values of each run, in order, without holding all."""
+    """Index and values of each run, in order, with at most BLOCK runs in memory."""
     for begin in range(first, last + 1, BLOCK):
         block = make_values(campaign, begin, min(begin + BLOCK - 1, last))
         yield from enumerate(block, begin)
@@ -107,7 +107,7 @@ Announce = Callable[[int], None]
 def fly_range(campaign: Campaign, runs: "Runs", first: int, last: int,
               own: "OwnMeasures | None" = None,
               announce: Announce | None = None) -> Iterator[Sequence[str]]:
-    """The cells of each run's row. `announce` hears each index before it is flown."""
+    """The cells of each run's row. `announce` is called with each index before the run is flown."""
     for index, values in list_values(campaign, first, last):
         if announce:
             announce(index)

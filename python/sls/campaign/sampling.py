@@ -1,11 +1,11 @@
-"""The values of each run: functions of the campaign and of the run's index alone.
+"""The values of each run. They depend only on the campaign and the run's index.
 
-Whatever is drawn for run i stays the same if other runs are flown, if they are flown in other
-chunks, and if other keys are varied. The numbers come from Philox, a generator that counts: the
-i-th number of a stream is had without the ones before it. A stream is named by seed and path.
+The values of run i do not change if other runs are flown, if chunks are different, or if other keys
+are varied. The numbers come from Philox, a counter-based generator: it gives the i-th number of a
+stream without those before it. A stream is identified by seed and path.
 
-Functions of `math` draw one number at a time, never those of numpy over an array: these round
-differently at an array's end, so that values would depend on the chunk."""
+Numbers are transformed one at a time, with functions of `math`. Functions of numpy over an array round
+differently at the array's end, and values would then depend on the chunk."""
 
 import hashlib
 import json
@@ -24,7 +24,7 @@ from sls.campaign.expressions import Expression, ExpressionError
 from sls.input_error import InputError
 
 SOBOL_BITS = 30
-# With a stratum's number below 2^24 the sum of both is exact.
+# The sum of a stratum's number (below 2^24) and a jitter with so many bits is exact.
 JITTER_BITS = 28
 STANDARD_NORMAL = NormalDist()
 
@@ -33,14 +33,14 @@ def make_values(campaign: Campaign, first: int, last: int) -> list[list[Any]]:
     """The values of runs `first` to `last` inclusive, for each run in the order of
     `campaign.varied`.
 
-    Raises InputError naming the run for a derived value that is no number."""
+    Raises InputError, which names the run, if a derived value is not a number."""
     if not 0 <= first <= last < campaign.runs:
         raise InputError(f"{campaign.file}: expected runs within 0 to {campaign.runs - 1}, got "
                          f"{first} to {last}")
     points = campaign.points
     first_draw, last_draw = first // points, last // points
     columns: dict[str, list[Any]] = {}
-    stride = points  # of the crossed keys the last one changes with every run
+    stride = points  # the last crossed key changes with every run
     for varied in campaign.varied:
         if varied.is_crossed:
             stride //= len(varied.items)
@@ -56,18 +56,18 @@ def make_values(campaign: Campaign, first: int, last: int) -> list[list[Any]]:
 
 
 def to_yaml_value(value: Any) -> str:
-    """`value` as YAML in one line that reads back to the same bits: a number, a truth value, a
-    text, a list or a map of such."""
+    """`value` as YAML in one line that reads back to the same bits. `value`: a number, a truth value, a
+    text, or a list or map of these."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, int):
         return str(value)
     if isinstance(value, float):
         text = repr(value)
-        # YAML 1.1 readers, Python's among them, take 1e-07 for text and 1.0e-07 for a number.
+        # Readers of YAML 1.1, such as Python's, read 1e-07 as text and 1.0e-07 as a number.
         return text if "." in text or "e" not in text else text.replace("e", ".0e")
     if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False)  # YAML reads JSON
+        return json.dumps(value, ensure_ascii=False)  # JSON is valid YAML
     if isinstance(value, Sequence):
         return "[" + ", ".join(to_yaml_value(item) for item in value) + "]"
     keys = [key if key.isidentifier() else json.dumps(key, ensure_ascii=False) for key in value]
@@ -76,13 +76,13 @@ def to_yaml_value(value: Any) -> str:
 
 
 def choose_runs(runs: int, count: int, seed: int, purpose: str = "certify") -> list[int]:
-    """`count` of the runs 0 to `runs` - 1, ascending, without repetition, chosen by `seed`. Another
-    `purpose` chooses others."""
+    """Chooses `count` of the runs 0 to `runs` - 1 by `seed`: ascending, without repetition. Another
+    `purpose` gives another choice."""
     return sorted(_make_permutation(_make_key(purpose, seed, ""), runs)[:count].tolist())
 
 
 def is_certified(campaign: Campaign, run: int) -> bool:
-    """Whether this run gets a certificate."""
+    """True if this run gets a certificate."""
     certify = campaign.certify
     if certify.kind != "some":
         return certify.kind == "all"
@@ -97,25 +97,26 @@ def _choose_certified(runs: int, count: int, seed: int) -> frozenset[int]:
 # --- Streams of random bits ----------------------------------------------------------------------
 
 def _make_key(purpose: str, seed: int, path: str) -> tuple[int, int]:
-    """Of the stream: 128 bits. The purpose keeps two uses of one seed and path apart."""
+    """The key of a stream, 128 bits. Streams with equal seed and path differ if their purpose differs."""
     digest = hashlib.sha256(f"sls campaign 1\0{purpose}\0{seed}\0{path}".encode()).digest()
     return int.from_bytes(digest[:8], "little"), int.from_bytes(digest[8:16], "little")
 
 
 def _draw_words(key: tuple[int, int], first: int, count: int) -> np.ndarray:
-    """Words `first` … of the stream, 64 bits each; the generator makes four with each count."""
+    """`count` words of the stream from word `first` on, 64 bits each. Each value of the generator's
+    counter gives four words."""
     generator = np.random.Philox(key=np.array(key, dtype=np.uint64), counter=first // 4)
     return generator.random_raw(first % 4 + count)[first % 4:]
 
 
 def _draw_unit(key: tuple[int, int], first: int, count: int) -> np.ndarray:
-    """Numbers in (0, 1), neither end included: the middles of 2^52 equal intervals."""
+    """Numbers in (0, 1) without both ends: the middles of 2^52 equal intervals."""
     return ((_draw_words(key, first, count) >> np.uint64(12)) + 0.5) * 2.0**-52
 
 
 @lru_cache(maxsize=32)
 def _make_permutation(key: tuple[int, int], size: int) -> np.ndarray:
-    """Of 0 … size - 1."""
+    """A permutation of 0 … size - 1."""
     order = np.argsort(_draw_words(key, 0, size), kind="stable").astype(np.int32)
     order.setflags(write=False)
     return order
@@ -138,7 +139,7 @@ def _draw(campaign: Campaign, varied: Varied, first: int, last: int) -> list[Any
 
 
 def _draw_latin(varied: Varied, first: int, count: int, draws: int) -> np.ndarray:
-    """Of as many equal intervals as there are draws, each draw lies in another one."""
+    """Divides (0, 1) into as many equal intervals as there are draws; each draw lies in another one."""
     strata = _make_permutation(_make_key("strata", varied.seed, varied.path), draws)
     words = _draw_words(_make_key("jitter", varied.seed, varied.path), first, count)
     jitter = ((words >> np.uint64(64 - JITTER_BITS)) + 0.5) * 2.0**-JITTER_BITS
@@ -146,8 +147,8 @@ def _draw_latin(varied: Varied, first: int, count: int, draws: int) -> np.ndarra
 
 
 def _draw_sobol(campaign: Campaign, varied: Varied, first: int, count: int) -> np.ndarray:
-    """One coordinate of Sobol's sequence with a digital shift (bits flipped alike in all points),
-    which keeps its balance. All sobol keys with one seed are coordinates of one sequence."""
+    """One coordinate of Sobol's sequence with a digital shift: the same bits are flipped in all points,
+    which keeps the balance of the sequence. All sobol keys with one seed are coordinates of one sequence."""
     try:
         from scipy.stats import qmc
     except ImportError:
@@ -158,7 +159,7 @@ def _draw_sobol(campaign: Campaign, varied: Varied, first: int, count: int) -> n
     coordinate = same.index(varied.path)
     sequence = qmc.Sobol(coordinate + 1, scramble=False, bits=SOBOL_BITS)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # about numbers of points other than a power of 2
+        warnings.simplefilter("ignore")  # warnings that the number of points is not a power of 2
         if first:
             sequence.fast_forward(first)
         points = sequence.random(count)[:, coordinate]
@@ -169,7 +170,7 @@ def _draw_sobol(campaign: Campaign, varied: Varied, first: int, count: int) -> n
 
 
 def _transform(varied: Varied, u: float) -> float:
-    """From a number in (0, 1) to the distribution: its inverse cumulative distribution function."""
+    """Transforms a number in (0, 1) by the distribution's inverse cumulative distribution function."""
     a, b = varied.parameters
     if varied.distribution == "normal":
         if varied.within is None:
@@ -184,17 +185,17 @@ def _transform(varied: Varied, u: float) -> float:
 
 
 def _cut_normal(low: float, high: float, u: float) -> float:
-    """Of the standard normal distribution between `low` and `high`: its inverse at `u`."""
-    if low > 0:  # the lower tail has more digits: 1e-19 is a number, and 1 - 1e-19 is 1
+    """Inverse, at `u`, of the standard normal distribution limited to `low` … `high`."""
+    if low > 0:  # the lower tail is more exact: a double can hold 1e-19, but 1 - 1e-19 is rounded to 1
         return -_cut_normal(-high, -low, 1 - u)
     below, above = (math.erfc(-bound / math.sqrt(2)) / 2 for bound in (low, high))
     probability = below + u * (above - below)
-    # Both bounds may be so far away that nothing is left: the caller's bounds hold then.
+    # If both bounds are far out, the probability may round to 0 or 1. The caller then applies its bounds.
     return STANDARD_NORMAL.inv_cdf(min(max(probability, 1e-300), 1 - 2.0**-53))
 
 
 def _round(varied: Varied, value: float) -> int | float:
-    """To the nearest multiple, where the campaign asks for it."""
+    """Rounds to the nearest multiple of `multiple_of`, if the campaign has it."""
     unit = varied.multiple_of
     if unit is None:
         return value
@@ -203,14 +204,14 @@ def _round(varied: Varied, value: float) -> int | float:
 
 
 def to_fraction(number: int | float) -> Fraction:
-    """The decimal that was written: 1/10 for 0.1."""
+    """The exact value of the decimal number as written: 1/10 for 0.1."""
     return Fraction(repr(number))
 
 
 # --- Derived values --------------------------------------------------------------------------
 
 def list_expressions(varied: Varied) -> list[Expression]:
-    """All of a derived value, those in lists included."""
+    """All expressions of a derived value, also those in lists."""
     def flatten(part: Any) -> list[Expression]:
         return [part] if isinstance(part, Expression) else [
             expression for item in part for expression in flatten(item)]
@@ -218,9 +219,9 @@ def list_expressions(varied: Varied) -> list[Expression]:
 
 
 def order_derived(varied: Sequence[Varied]) -> list[Varied]:
-    """The derived values, each after those it depends on.
+    """The derived values in an order in which each comes after those that it uses.
 
-    Raises ExpressionError naming a cycle."""
+    Raises ExpressionError, which names the cycle, if there is a cycle."""
     derived = {member.path: member for member in varied if member.kind == "derived"}
     ordered: dict[str, Varied] = {}
 

@@ -1,8 +1,7 @@
 """The statistics of a campaign: shares, distributions and paired differences.
 
-Nothing here is random: intervals are by formula, so that the same runs give the same page. With Φ
-the standard normal distribution, z = Φ⁻¹((1 + level)/2) and B(n) the number of heads of n fair
-coins:
+Intervals come from formulas, not from random numbers: the same runs give the same page. Φ is the
+standard normal distribution, z = Φ⁻¹((1 + level)/2), B(n) the number of heads of n fair coins:
 
     (1)  Wilson score interval of a share p = k/n:
          (p + z²/2n ± z √(p (1 − p)/n + z²/4n²)) / (1 + z²/n)
@@ -30,7 +29,7 @@ LEVEL = 0.95
 
 
 def calc_wilson_interval(count: int, total: int, level: float = LEVEL) -> tuple[float, float]:
-    """Low and high end of the share `count`/`total`, formula 1; (0, 1) of no runs at all."""
+    """Low and high end of the interval of the share `count`/`total`, formula 1; (0, 1) without runs."""
     if not 0 <= count <= total:
         raise ValueError(f"count: expected from 0 to {total}, got {count}")
     if total == 0:
@@ -39,23 +38,22 @@ def calc_wilson_interval(count: int, total: int, level: float = LEVEL) -> tuple[
     share = count / total
     centre = share + z_2 / (2 * total)
     spread = (z_2 * (share * (1.0 - share) / total + z_2 / (4.0 * total**2))) ** 0.5
-    # Rounding must not leave the range: the ends are exact where nothing or everything counts.
+    # The ends 0 and 1 are set exactly, because rounding must not leave the range.
     low = 0.0 if count == 0 else (centre - spread) / (1.0 + z_2 / total)
     high = 1.0 if count == total else (centre + spread) / (1.0 + z_2 / total)
     return low, high
 
 
 def calc_ecdf(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where the empirical distribution (2) steps, ascending, and its value from there on. NaN is
-    left out."""
+    """The steps of the empirical distribution (2): their places, ascending, and the values after them. NaN
+    is left out."""
     values = np.asarray(values, dtype=float)
     places, counts = np.unique(values[~np.isnan(values)], return_counts=True)
     return places, np.cumsum(counts) / max(1, counts.sum())
 
 
 def calc_quantiles(values: np.ndarray, shares: tuple[float, ...]) -> np.ndarray:
-    """Quantiles (3), one per share; NaN is left out, and all are NaN of no values. Infinite values
-    are values."""
+    """Quantiles (3), one per share; NaN without values. NaN is left out, infinite values are not."""
     values = np.sort(values[~np.isnan(values)])
     if not len(values):
         return np.full(len(shares), np.nan)
@@ -63,38 +61,37 @@ def calc_quantiles(values: np.ndarray, shares: tuple[float, ...]) -> np.ndarray:
     low = np.floor(ranks).astype(int)
     high = np.minimum(low + 1, len(values) - 1)
     part = ranks - low
-    with np.errstate(invalid="ignore"):  # infinity beside infinity
+    with np.errstate(invalid="ignore"):  # infinity minus infinity
         between = values[low] + part * (values[high] - values[low])
     return np.where((part == 0.0) | (values[low] == values[high]), values[low], between)
 
 
 @dataclass(frozen=True)
 class PairedDifference:
-    """Of b − a, run by run, where both are defined."""
+    """Statistics of b − a, run by run, where both are defined."""
 
     count: int
     median: float
-    low: float  # of the interval of the median (4); −inf where there are too few pairs for one
+    low: float  # low end of the median's interval (4); −inf if there are too few pairs for an interval
     high: float
-    smaller: int  # how often b < a
+    smaller: int  # number of pairs with b < a
     larger: int
     p: float  # of the sign test (5)
 
 
 def calc_sign_p(one: int, other: int) -> float:
-    """p of formula 5, where one sign occurs `one` and the other `other` times; 1 if neither
-    occurs."""
+    """p of formula 5, if one sign occurs `one` times and the other `other` times; 1 if neither occurs."""
     return float(min(1.0, 2.0 * binom.cdf(min(one, other), one + other, 0.5)))
 
 
 def calc_mcnemar_p(to_one: int, to_other: int) -> float:
-    """p of formula 6: that so unequal numbers of changes in both directions come about by
-    chance."""
+    """p of formula 6: the probability that chance makes the numbers of changes in both directions differ
+    at least as much."""
     return calc_sign_p(to_one, to_other)
 
 
 def calc_paired_difference(a: np.ndarray, b: np.ndarray, level: float = LEVEL) -> PairedDifference:
-    """Of arrays of equal length; pairs with a NaN, or with two equal infinities, are left out."""
+    """Statistics of two arrays of equal length. Pairs with a NaN or with two equal infinities are left out."""
     with np.errstate(invalid="ignore"):
         differences = np.asarray(b, dtype=float) - np.asarray(a, dtype=float)
     differences = np.sort(differences[~np.isnan(differences)])
@@ -110,9 +107,9 @@ def calc_paired_difference(a: np.ndarray, b: np.ndarray, level: float = LEVEL) -
 
 
 def find_interval_rank(count: int, level: float = LEVEL) -> int:
-    """k of formula 4; 0 if even the extremes are no interval of this level."""
+    """k of formula 4; 0 if even the smallest and largest difference do not reach this level."""
     tail = (1.0 - level) / 2.0
-    # ppf gives the smallest j with P(B ≤ j) ≥ tail, hence P(B < j) = P(B ≤ j − 1) < tail.
+    # ppf gives the smallest j with P(B ≤ j) ≥ tail. It follows that P(B < j) = P(B ≤ j − 1) < tail.
     rank = int(binom.ppf(tail, count, 0.5))
     while rank > 0 and binom.cdf(rank - 1, count, 0.5) > tail:
         rank -= 1

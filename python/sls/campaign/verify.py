@@ -25,14 +25,15 @@ ROOT = Path(__file__).resolve().parents[3]
 SEED = 1
 DOMAINS = range(100, 161)
 LONGEST_FLIGHT_S = 1800.0
-# The flight begins with its recorder, whatever the scenario says: no certificate depends on it.
+# Every flight waits for its controller and recorder, also if the scenario does not. Certificates do not
+# depend on this.
 ALL_TAKE_PART = {"sync.wait_for": "{ controllers: 1, recorders: 1, timeout_s: 60 }"}
 
 
 @contextmanager
 def own_domain() -> Iterator[int]:
-    """A DDS domain that no other campaign of this machine flies on now, by the name of a socket
-    that leaves nothing behind."""
+    """Context with a DDS domain that no other campaign on this machine uses. An abstract socket with the
+    domain's number marks it as used; the socket disappears with its process."""
     for number in DOMAINS:
         lock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         try:
@@ -51,8 +52,8 @@ def own_domain() -> Iterator[int]:
 
 @contextmanager
 def written_scenario(text: str, base: Path, folder: Path) -> Iterator[Path]:
-    """A file with this scenario; beside the base where it names a library, whose path is relative
-    to the file."""
+    """Context with a file that holds this scenario. If the scenario names a library, the file is beside the
+    base scenario, because the library's path is relative to the file."""
     if re.search(r"\.so\b", text):
         folder = base.parent
     file = folder / f".verify-{os.getpid()}.yaml"
@@ -67,8 +68,8 @@ def written_scenario(text: str, base: Path, folder: Path) -> Iterator[Path]:
 
 
 def fly_over_dds(scenario: Path, recording: Path, domain: int) -> str:
-    """The certificate of the flight by sim_server, control_client and recorder, in lockstep. A
-    flight that fails has one, too. Raises EngineError if there is no recording."""
+    """Flies with sim_server, control_client and recorder in lockstep, and returns the certificate. A flight
+    that fails has a certificate, too. Raises EngineError if there is no recording."""
     command = [str(ROOT / "sls"), "run", str(scenario), "--out", str(recording), "--mode",
                "lockstep", "--domain", str(domain)]
     build = os.environ.get("SLS_BUILD", str(ROOT / "build"))
@@ -88,7 +89,7 @@ def fly_over_dds(scenario: Path, recording: Path, domain: int) -> str:
 
 
 def find_certificate(campaign: Campaign, runs: "Runs", row: dict[str, str]) -> str:
-    """That of the table; of a run that has none there from a flight in this process."""
+    """The certificate in the table. If the run has none there, that of a flight in this process."""
     if row["certificate"]:
         return row["certificate"]
     index = int(row["run"])
@@ -97,8 +98,8 @@ def find_certificate(campaign: Campaign, runs: "Runs", row: dict[str, str]) -> s
 
 def verify(folder: CampaignFolder, count: int, say: Callable[[str], None],
            domain: int | None = None, seed: int = SEED) -> bool:
-    """Flies `count` runs of those in the folder, chosen by `seed`, in turn. Says each that differs
-    and a summary, puts them into the manifest. True if all are equal. Raises EngineError."""
+    """Flies `count` runs of the folder, chosen by `seed`, one after the other. Prints each run that differs
+    and a summary, and writes them into the manifest. True if all are equal. Raises EngineError."""
     campaign, plan = folder.campaign, folder.plan
     runs = make_runs(campaign)
     size = plan.last - plan.first + 1

@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all."""
+"""Writes files atomically: a file is complete, or it does not exist."""
 
 import os
 import time
@@ -11,14 +11,14 @@ DAY_S = 86400.0
 
 
 def name_temporary(file: Path) -> Path:
-    """In the same folder, so that the rename stays in one file system; no other process of any
-    machine has the same."""
+    """The temporary name of a file. It is in the same folder, because a rename must stay in one file
+    system. No other process on any machine uses this name."""
     return file.with_name(f".{file.name}.{host_name()}.{os.getpid()}.tmp")
 
 
 def is_left_over(temporary: Path) -> bool:
-    """Whether its process is gone, where it was one of this machine; else by age. Raises
-    FileNotFoundError."""
+    """True if the process of this machine that wrote the file has ended. A file of another machine is left
+    over if it is older than a day. Raises FileNotFoundError."""
     name, process = temporary.name.removesuffix(".tmp").rsplit(".", 1)
     if name.endswith(f".{host_name()}") and process.isdecimal():
         return not Path(f"/proc/{process}").exists()
@@ -26,7 +26,7 @@ def is_left_over(temporary: Path) -> bool:
 
 
 def sync_folder(folder: Path) -> None:
-    """Makes a rename in `folder` last through a power cut."""
+    """Syncs `folder`: a rename in it then survives a power failure."""
     handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         os.fsync(handle)
@@ -35,8 +35,8 @@ def sync_folder(folder: Path) -> None:
 
 
 class WholeFile:
-    """Writes `file` piece by piece under a temporary name; `finish` renames it. Without `finish`
-    nothing is left. Raises EngineError, which names the file, where the disk is full."""
+    """Writes `file` piece by piece under a temporary name; `finish` renames it. Without `finish` the
+    temporary file is removed. Raises EngineError, which names the file, if it cannot be written."""
 
     def __init__(self, file: Path):
         self.file = file
@@ -56,7 +56,7 @@ class WholeFile:
             raise self._explain(error) from None
 
     def sync(self) -> None:
-        """The data are on the disk, still under the temporary name."""
+        """Writes the data to the disk, still under the temporary name."""
         try:
             self.stream.flush()
             os.fsync(self.stream.fileno())
@@ -64,7 +64,7 @@ class WholeFile:
             raise self._explain(error) from None
 
     def finish(self) -> None:
-        """Replaces what is there under the file's name."""
+        """Gives the file its name. Replaces a file with this name."""
         self.sync()
         try:
             os.replace(self.temporary, self.file)
@@ -73,7 +73,7 @@ class WholeFile:
             raise self._explain(error) from None
 
     def finish_new(self) -> bool:
-        """False, and nothing changed, where there is such a file."""
+        """As `finish`, but returns False and changes nothing if a file with this name exists."""
         self.sync()
         try:
             os.link(self.temporary, self.file)
@@ -96,7 +96,7 @@ class WholeFile:
     def __exit__(self, *_: object) -> None:
         try:
             self.stream.close()
-        except OSError:  # the rest of the buffer does not fit, either; said already
+        except OSError:  # the disk is full: `write` or `sync` has already raised the error
             pass
         self.temporary.unlink(missing_ok=True)
 

@@ -1,5 +1,5 @@
-"""Flies chunks of a campaign's folder: `./sls campaign-worker DIR --chunks A-B`, the processes of
-the local engine, and `fly_chunk` for Slurm and Dask."""
+"""Flies chunks of a campaign's folder: `./sls campaign-worker DIR --chunks A-B`, which Slurm and
+Kubernetes also start, the processes of the local engine, and `fly_chunk` for Dask."""
 
 import argparse
 import json
@@ -23,7 +23,7 @@ from sls.input_error import InputError
 
 class ChunkFlyer:
     """The data that a process needs for the chunks of one folder, made once. Raises ConfigError if the
-    campaign cannot be flown here, such as on a machine of another kind."""
+    campaign cannot be flown here, for example on a machine of another kind."""
 
     def __init__(self, folder: Path):
         self.folder = CampaignFolder(folder)
@@ -33,8 +33,8 @@ class ChunkFlyer:
         self.own = load_own_measures(self.campaign)
 
     def fly(self, number: int, announce: Announce | None = None) -> dict[str, int | float]:
-        """Flies a chunk unless it is there whole; `runs` are those that were flown. Raises
-        EngineError, RefusedRun."""
+        """Flies a chunk unless the folder has it whole. `runs` of the result is the number of flown runs.
+        Raises EngineError, RefusedRun."""
         first, last = self.folder.find_chunk(number)
         begin = time.monotonic()
         try:
@@ -56,7 +56,7 @@ _one_at_a_time = threading.Lock()  # a Dask worker may have several threads
 
 
 def fly_chunk(folder: str, number: int) -> dict[str, int | float]:
-    """Flies one chunk and writes it whole; does nothing if it is there. Raises ConfigError,
+    """Flies one chunk and writes it whole. Does nothing if the folder has it whole. Raises ConfigError,
     EngineError."""
     with _one_at_a_time:
         place = str(Path(folder).resolve())
@@ -65,7 +65,7 @@ def fly_chunk(folder: str, number: int) -> dict[str, int | float]:
             _flyers.clear()
             _flyers[key] = ChunkFlyer(Path(place))
         flyer = _flyers[key]
-        flyer.folder.forget_plan()  # its permissions may have changed
+        flyer.folder.forget_plan()  # plan.json may have changed, for example allow_other_machines
         try:
             return flyer.fly(number)
         except RefusedRun as error:
@@ -73,9 +73,9 @@ def fly_chunk(folder: str, number: int) -> dict[str, int | float]:
 
 
 def serve(folder: Path) -> None:
-    """A process of the local engine: reads `CHUNK` or `CHUNK announce` from stdin, answers one line
-    of JSON each; with `announce` a line before each run, too, so that a run that ends the process
-    is known. Ends with stdin."""
+    """A process of the local engine. It reads lines `CHUNK` or `CHUNK announce` from stdin, and prints one
+    line of JSON for each. With `announce` it also prints a line before each run; if a run ends the
+    process, the engine has its index from this line. The process ends when stdin is closed."""
     flyer = ChunkFlyer(folder)
     answer({"ready": os.getpid()})
     for line in sys.stdin:
@@ -93,7 +93,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def parse_range(text: str) -> tuple[int, int]:
-    """`A-B` or `A`. Raises ArgumentTypeError."""
+    """Parses `A-B` or `A`. Raises ArgumentTypeError."""
     match = re.fullmatch(r"(\d{1,12})(?:-(\d{1,12}))?", text)
     if not match or int(match[2] or match[1]) < int(match[1]):
         raise argparse.ArgumentTypeError(f"expected A-B with A ≤ B, got '{text}'")
@@ -101,7 +101,7 @@ def parse_range(text: str) -> tuple[int, int]:
 
 
 def list_numbers(options: argparse.Namespace) -> list[int]:
-    """The chunks that the command line asks for. Raises InputError."""
+    """Numbers of the chunks in the command line. Raises InputError."""
     if options.chunks:
         first, last = options.chunks
         return list(range(first, last + 1))
@@ -119,14 +119,14 @@ def fly_listed(options: argparse.Namespace) -> None:
     count = len(flyer.folder.chunks)
     for number in numbers:
         if number >= count and options.index_from:
-            break  # the last index has fewer
+            break  # the last index has fewer chunks
         done = flyer.fly(number)
         print(f"campaign-worker: chunk {number}: {done['runs']} runs in {done['wall_s']:.3f} s",
               file=sys.stderr)
 
 
 def main(arguments: Sequence[str]) -> int:
-    """The exit code."""
+    """Runs the command and returns the exit code."""
     parser = Parser(prog="./sls campaign-worker",
                     description="Flies chunks of a campaign. Slurm and Kubernetes start it.")
     parser.add_argument("folder", type=Path, metavar="DIR", help="folder of the campaign")

@@ -1,6 +1,6 @@
-"""YAML as a tree whose every place knows its line, and what the strict readers of the package say
-about a place. The rules are those of scenarios: config_error messages with file, line and key, no
-anchors, aliases and tags, `true` and `false` alone as truth values, a number in quotes is text."""
+"""YAML as a tree of places with line numbers, and the errors of the package's strict readers. The rules
+are those of scenarios: error messages have file, line and key; anchors, aliases and tags are refused;
+only `true` and `false` are truth values; a number in quotes is text."""
 
 import difflib
 import re
@@ -20,7 +20,7 @@ NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 
 @dataclass(frozen=True)
 class Place:
-    """A value in a file, with the path of keys that leads to it."""
+    """A value in a file, with its path of keys."""
 
     file: Path
     node: yaml.Node
@@ -28,7 +28,7 @@ class Place:
 
     @property
     def line(self) -> int:
-        """From 1."""
+        """Line of the value, from 1."""
         return self.node.start_mark.line + 1
 
     def fail(self, message: str) -> NoReturn:
@@ -43,7 +43,7 @@ class Place:
 
     @property
     def brief(self) -> str:
-        """The text here, in a few printable characters."""
+        """The value as text of a few printable characters."""
         if isinstance(self.node, yaml.SequenceNode):
             return f"a list of {len(self.node.value)}"
         if isinstance(self.node, yaml.MappingNode):
@@ -67,13 +67,13 @@ class Place:
                 and self.node.value in ("", "~", "null"))
 
     def list_items(self) -> list["Place"]:
-        """Of a list; their path ends with their index in brackets."""
+        """The items of a list. The path of an item ends with its index in brackets."""
         return [Place(self.file, item, f"{self.path}[{i}]")
                 for i, item in enumerate(self.node.value)]
 
     def read_map(self, expected: str = "a map",
                  known: Collection[str] | None = None) -> dict[str, "Place"]:
-        """Its values by key. Refuses keys that are not `known`, and any key that comes twice."""
+        """The values of a map by key. Refuses keys that are not in `known`, and duplicate keys."""
         if not self.is_map:
             self.fail_expected(expected)
         values: dict[str, Place] = {}
@@ -95,7 +95,7 @@ class Place:
         return values
 
     def require(self, values: dict[str, "Place"], key: str, expected: str) -> "Place":
-        """The value of `key` of this map, which was read as `values`."""
+        """The value of `key` in `values`, which `read_map` has read from this map. Refuses a missing key."""
         if key not in values:
             self.at(key, self.node).fail(f"missing key; expected {expected}")
         return values[key]
@@ -118,7 +118,7 @@ class Place:
         return text
 
     def read_number(self, expected: str = "a number") -> int | float:
-        """A whole number stays an int."""
+        """The value of a number; a whole number is an int."""
         value = self.find_scalar()
         if isinstance(value, bool) or not isinstance(value, int | float):
             self.fail_expected(expected)
@@ -137,7 +137,7 @@ class Place:
         return value
 
     def read_value(self) -> Any:
-        """Whatever a scenario may hold: scalars, lists (as tuples), maps."""
+        """Any value that a scenario may hold: scalars, lists (as tuples), maps."""
         if self.is_list:
             return tuple(item.read_value() for item in self.list_items())
         if self.is_map:
@@ -148,7 +148,8 @@ class Place:
         return value
 
     def find(self, path: str) -> "Place | None":
-        """The place below this one that keys and indices, separated by dots, lead to."""
+        """The place below this one at `path`, which has keys and indices separated by dots; None if there
+        is none."""
         place: Place | None = self
         for part in path.split("."):
             if place is None:
@@ -163,8 +164,7 @@ class Place:
 
 
 def fail(file: Path, line: int, path: str, message: str) -> NoReturn:
-    """Raises InputError `FILE:LINE: PATH: message`; a line below 1 and an empty path are left
-    out."""
+    """Raises InputError `FILE:LINE: PATH: message`, without a line below 1 and without an empty path."""
     place = f"{file}:{line}" if line > 0 else str(file)
     raise InputError(": ".join(part for part in (place, path, message) if part))
 
@@ -176,7 +176,7 @@ def to_printable(text: str, most: int = 40) -> str:
 
 
 def read_bytes(file: Path, what: str, most: int) -> bytes:
-    """Raises InputError if the file cannot be read or holds more than `most` bytes."""
+    """The bytes of a file. Raises InputError if it cannot be read or has more than `most` bytes."""
     try:
         with file.open("rb") as stream:
             data = stream.read(most + 1)
@@ -188,8 +188,8 @@ def read_bytes(file: Path, what: str, most: int) -> bytes:
 
 
 def parse_yaml(data: bytes, file: Path) -> Place:
-    """The one document in `data`. Raises InputError for what is no UTF-8, no YAML, nested too
-    deeply, or holds anchors, aliases and tags."""
+    """The only document in `data`. Raises InputError if `data` is not UTF-8 or not YAML, is nested too
+    deeply, or has anchors, aliases or tags."""
     try:
         text = data.decode()
     except UnicodeDecodeError as error:
