@@ -1,4 +1,4 @@
-"""A short campaign that a test can hold in flight, and `./sls campaign` on a test host."""
+"""A short campaign whose runs a test can hold, and `./sls campaign` on a test host."""
 
 import os
 import subprocess
@@ -24,7 +24,7 @@ measure:
   - { python: gate.py, function: gate, columns: [gate] }
 """
 
-# The table is the same, held or not: the measure is 0.
+# A measure that waits while the file `hold` exists. It is always 0: held runs give the same table.
 GATE = """\
 import platform
 import time
@@ -60,7 +60,7 @@ mission:
     for_s: 2
 """
 
-# As `./sls campaign`, with shorter patience where a test asks for it.
+# As `./sls campaign`, with changes of constants of the engines, such as shorter time limits.
 LAUNCH = """\
 import importlib, sys
 for change in sys.argv[1].split():
@@ -73,9 +73,9 @@ sys.exit(main(sys.argv[2:]))
 
 
 class TestCampaign:
-    """In `folder`, flown by a launcher on the test host `head`."""
+    """The campaign in `folder`, flown by a launcher on the test host `head`."""
 
-    __test__ = False  # not for pytest
+    __test__ = False  # pytest must not collect this class
 
     def __init__(self, hosts: TestHosts, folder: Path):
         self.hosts = hosts
@@ -101,12 +101,12 @@ class TestCampaign:
         return (self.folder / out / "runs.csv").read_bytes()
 
     def machines(self, out: str) -> set[str]:
-        """Which of them flew chunks, as their files tell."""
+        """The hosts that flew chunks, from the files of the chunks."""
         return {host for file in (self.folder / out / "chunks").glob("chunk-*.csv")
                 for host in self.hosts.address if f'"host": "{host}"' in file.read_text()}
 
     def hold(self) -> None:
-        """From now on, runs wait."""
+        """Makes the runs wait from now on."""
         for file in self.folder.glob("flying-*"):
             file.unlink()
         self.hold_file.touch()
@@ -120,7 +120,7 @@ class TestCampaign:
 
 
 class Launched:
-    """A launcher that runs."""
+    """A launcher process."""
 
     def __init__(self, process: subprocess.Popen):
         self.process = process
@@ -130,8 +130,8 @@ class Launched:
         return self.process.poll() is None
 
     def expect(self, code: int, *texts: str) -> str:
-        """Waits for its end. Raises AssertionError with its output for another exit code, or where
-        a text is missing; an error is one line."""
+        """Waits for the launcher's end. Raises AssertionError with its output if the exit code differs,
+        if a text is missing, or if an error has more than one line."""
         try:
             self.output, _ = self.process.communicate(timeout=LIMIT_S)
         except subprocess.TimeoutExpired:

@@ -1,5 +1,5 @@
-"""A real Dask of Debian's packages: the scheduler on the test host `head`, a worker on each of the
-others."""
+"""A real Dask cluster from Debian's packages: the scheduler on the test host `head`, a worker on each
+of the other hosts."""
 
 import re
 import sys
@@ -13,8 +13,7 @@ WORKERS = ("n1", "n2")
 
 
 class DaskCluster:
-    """`with DaskCluster(hosts, folder) as dask`: in the end every process is gone. Raises
-    Obstacle."""
+    """`with DaskCluster(hosts, folder) as dask`: every process is ended at its end. Raises Obstacle."""
 
     def __init__(self, hosts: TestHosts, folder: Path, port: int = 8786):
         try:
@@ -49,8 +48,8 @@ class DaskCluster:
         self.wait_for("scheduler", r"Scheduler at:")
 
     def start_worker(self, name: str) -> None:
-        # No path of ours: the worker finds the package as it was told with its task. Without a
-        # nanny, which would start it again.
+        # The worker gets no PYTHONPATH: it must find the package by the places in its task. No nanny,
+        # because a nanny starts a killed worker again.
         self.start(name, name, "dask_worker", self.address, "--nthreads", "1", "--no-nanny",
                    "--host", self.hosts.address[name], "--local-directory",
                    str(self.folder / f"of-{name}"), "--memory-limit", "0")

@@ -1,4 +1,4 @@
-"""Campaigns on a real Dask: the table of the local engine, whatever is killed meanwhile."""
+"""Campaigns on a real Dask cluster give the table of the local engine, also if processes are killed."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -75,7 +75,7 @@ def test_a_lost_scheduler_ends_the_campaign_with_a_line_and_resume_goes_on(
     campaign.wait_until_held("n1", "n2")
     dask.processes.kill("scheduler")
     launched.expect(1, "is lost; 0 of 6 chunks are in", "--resume")
-    for worker in ("n1", "n2"):  # they would end themselves
+    for worker in ("n1", "n2"):  # without a scheduler they would end later
         dask.processes.kill(worker)
     campaign.release()
     dask.start_scheduler()

@@ -1,7 +1,7 @@
-"""Hosts for tests: network namespaces on a bridge, each with a host name of its own.
+"""Hosts for tests: network namespaces on a bridge, each with its own host name.
 
-Nothing of the machine's own network changes: the bridge is in a namespace, too. Every process runs
-on one of the hosts, the launcher as well."""
+The machine's network does not change, because the bridge is in a namespace, too. Every process, also
+the launcher, runs on one of the hosts."""
 
 import os
 import shutil
@@ -10,11 +10,11 @@ from pathlib import Path
 
 from processes import kill
 
-OURS = "sls-test-"  # as tests/network: what killed tests left is removed by either
+OURS = "sls-test-"  # prefix, shared with tests/network: both remove namespaces that killed tests left behind
 
 
 class Obstacle(Exception):
-    """Why there can be no such hosts, or no such cluster, on this machine."""
+    """The reason why this machine cannot run these hosts or the cluster."""
 
 
 def run(*command: str) -> str:
@@ -25,7 +25,7 @@ def run(*command: str) -> str:
 
 
 def need_programs(package: str, *programs: str) -> None:
-    """Raises Obstacle where one of them is not installed."""
+    """Raises Obstacle if one of `programs` is not installed."""
     for program in programs:
         if not shutil.which(program):
             raise Obstacle(f"{program} is missing (apt-get install {package})")
@@ -44,16 +44,16 @@ def list_processes(namespace: str) -> list[int]:
 
 
 def remove_namespace(namespace: str) -> None:
-    """With what still runs there."""
+    """Removes a namespace and kills the processes in it."""
     for process in list_processes(namespace):
         kill(process)
     subprocess.run(["ip", "netns", "delete", namespace], capture_output=True)
 
 
 class TestHosts:
-    """`with TestHosts("head", "n1") as hosts`: in the end they are gone. Raises Obstacle."""
+    """`with TestHosts("head", "n1") as hosts`: the hosts are removed at its end. Raises Obstacle."""
 
-    __test__ = False  # not for pytest
+    __test__ = False  # pytest must not collect this class
     _count = 0
 
     def __init__(self, *names: str):
@@ -93,16 +93,16 @@ class TestHosts:
             remove_namespace(self.prefix + name)
 
     def processes(self, host: str) -> list[int]:
-        """Ids of what runs there, daemons included."""
+        """Ids of all processes on a host, daemons included."""
         return list_processes(self.prefix + host)
 
     def lose_power(self, host: str) -> None:
-        """Everything that runs there is gone at once."""
+        """Kills all processes on a host at once."""
         for process in self.processes(host):
             kill(process)
 
     def on(self, host: str, *command: str) -> list[str]:
-        """A command that runs there. Each part of the prefix is replaced by the next, so that the
-        process has the id of what was started."""
+        """The command that runs `command` on a host. Each program of its prefix replaces itself by the
+        next one: the process id does not change."""
         return ["ip", "netns", "exec", self.prefix + host, "unshare", "--uts", "sh", "-c",
                 'hostname "$0" && exec "$@"', host, *command]

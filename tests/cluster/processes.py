@@ -1,4 +1,4 @@
-"""Processes of a test: started together, ended by their ids, and every condition with a deadline."""
+"""Starts the processes of a test, ends them by their ids, and waits for conditions with a deadline."""
 
 import os
 import signal
@@ -11,7 +11,7 @@ EVERY_S = 0.05
 
 
 def wait_until(condition: Callable[[], object], limit_s: float, what: str) -> None:
-    """Raises AssertionError, which names `what`, when the time is over."""
+    """Waits for a condition. Raises AssertionError, which names `what`, after `limit_s`."""
     deadline = time.monotonic() + limit_s
     while not condition():
         if time.monotonic() > deadline:
@@ -27,14 +27,14 @@ def kill(process: int) -> None:
 
 
 class Processes:
-    """Ended in the opposite order in which they were started."""
+    """Processes that are ended in the reverse order of their start."""
 
     def __init__(self, folder: Path):
         self.folder = folder
         self.started: dict[str, subprocess.Popen] = {}
 
     def start(self, name: str, command: list[str], **environment: str) -> subprocess.Popen:
-        """Its output is in the file NAME.txt of the folder."""
+        """Starts a process. Its output goes to the file NAME.txt in the folder."""
         with open(self.folder / f"{name}.txt", "ab") as output:
             self.started[name] = subprocess.Popen(
                 command, stdin=subprocess.DEVNULL, stdout=output, stderr=output,

@@ -1,5 +1,5 @@
-"""A real Slurm of Debian's packages without systemd, in a temporary folder: munged and slurmctld on
-the test host `head`, a slurmd on each of the others."""
+"""A real Slurm cluster from Debian's packages, without systemd, in a temporary folder: munged and
+slurmctld on the test host `head`, a slurmd on each of the other hosts."""
 
 import os
 import secrets
@@ -12,9 +12,9 @@ from hosts import TestHosts, need_programs
 START_S = 30.0
 NODES = ("n1", "n2")
 
-# Process groups instead of cgroups, no accounting: neither systemd nor a data base is needed. A node
-# that is silent for SlurmdTimeout is down, and its tasks are queued again. sched/builtin tries every
-# second.
+# With process groups instead of cgroups, and without accounting, the cluster needs neither systemd nor a
+# data base. A node that is silent for SlurmdTimeout is down, and its tasks are queued again. The
+# scheduler runs every second.
 CONFIGURATION = """\
 ClusterName=sls
 SlurmctldHost=head({head})
@@ -47,8 +47,7 @@ PartitionName=all Nodes=ALL Default=YES MaxTime=INFINITE State=UP
 
 
 class SlurmCluster:
-    """`with SlurmCluster(hosts, folder) as slurm`: in the end every process is gone. Raises
-    Obstacle."""
+    """`with SlurmCluster(hosts, folder) as slurm`: every process is ended at its end. Raises Obstacle."""
 
     def __init__(self, hosts: TestHosts, folder: Path):
         need_programs("slurm-wlm munge", "munged", "slurmctld", "slurmd", "sbatch", "squeue",
@@ -60,13 +59,13 @@ class SlurmCluster:
 
     def __enter__(self) -> "SlurmCluster":
         folder = self.folder
-        folder.chmod(0o755)  # munged insists
+        folder.chmod(0o755)  # munged requires it
         (folder / "state").mkdir(exist_ok=True)
         key = folder / "munge.key"
         key.write_bytes(secrets.token_bytes(128))
         key.chmod(0o400)
         (folder / "cgroup.conf").write_text("CgroupPlugin=cgroup/v1\n")
-        # Two cores each, whatever the machine has.
+        # Each node has two cores, independent of the machine's cores.
         nodes = "\n".join(f"NodeName={node} NodeAddr={self.hosts.address[node]} CPUs=2"
                           for node in NODES)
         self.configuration.write_text(CONFIGURATION.format(
@@ -87,7 +86,7 @@ class SlurmCluster:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.processes.end_all()  # tasks that still run end with their hosts
+        self.processes.end_all()  # tasks that still run are killed when their hosts are removed
 
     def start(self, name: str, host: str, *command: str) -> None:
         self.processes.start(name, self.hosts.on(host, *command), **self.environment)
@@ -96,13 +95,13 @@ class SlurmCluster:
         self.start("slurmctld", "head", "slurmctld", "-D", "-f", str(self.configuration))
 
     def end_controller(self) -> None:
-        """It saves its state: one that forgets its jobs gives their numbers again, and drains the
-        nodes that still run them."""
+        """Ends the controller with SIGTERM, and it saves its state. Without its state it would assign job
+        numbers again, and drain the nodes that still run the old jobs."""
         self.processes.end("slurmctld")
 
     def lose_node(self, node: str) -> None:
-        """As when its power fails, and slurmctld has noticed: which it does by itself when the node
-        has been silent for SlurmdTimeout."""
+        """Kills everything on a node and sets it down, as after a power failure. Without this command
+        slurmctld would set it down after SlurmdTimeout."""
         self.hosts.lose_power(node)
         self.processes.kill(node)
         self.ask("scontrol", "update", f"NodeName={node}", "State=DOWN", "Reason=killed")
@@ -112,7 +111,7 @@ class SlurmCluster:
 
     @property
     def environment(self) -> dict[str, str]:
-        """With which Slurm's commands find this cluster."""
+        """The environment with which Slurm's commands find this cluster."""
         return {"SLURM_CONF": str(self.configuration)}
 
     def ask(self, *command: str) -> str:
@@ -122,6 +121,6 @@ class SlurmCluster:
         return done.stdout
 
     def list_states(self) -> dict[str, str]:
-        """Of each node."""
+        """State of each node, by name."""
         lines = self.ask("sinfo", "--noheader", "--Node", "--format=%N %t").splitlines()
         return dict(line.split() for line in lines)

@@ -1,4 +1,4 @@
-"""Campaigns on a real Slurm: the table of the local engine, whatever is killed meanwhile."""
+"""Campaigns on a real Slurm cluster give the table of the local engine, also if processes are killed."""
 
 import signal
 import subprocess
@@ -13,7 +13,7 @@ from slurm_cluster import SlurmCluster
 
 LIMIT_S = 60.0
 
-# A gate that ends the process, but not the launcher, which tries a run.
+# A gate that ends the process of a worker. On `head` it does not, because the launcher flies a run there first.
 DEADLY = """
 
 def gate(flight):
@@ -59,12 +59,12 @@ def test_slurm_makes_the_table_of_the_local_engine(slurm: SlurmCluster,
 def test_short_chunks_share_a_task(slurm: SlurmCluster, campaign: TestCampaign) -> None:
     output = campaign.start(campaign.file.name, "--out", "shared", "--on", "slurm",
                             "--sbatch=--comment='two words' --nice", **slurm.environment).expect(0)
-    assert "tasks: 1\n" in output  # together they take less than a minute
+    assert "tasks: 1\n" in output  # all chunks together take less than a minute
     assert campaign.table("shared") == campaign.table("local")
 
 
 def find_worker(slurm: SlurmCluster, node: str) -> int:
-    """The process on that node that flies a chunk."""
+    """Id of the process on `node` that flies a chunk."""
     for process in slurm.hosts.processes(node):
         command = Path(f"/proc/{process}/cmdline").read_bytes().split(b"\0")
         if b"sls.campaign.worker" in command:
@@ -73,7 +73,7 @@ def find_worker(slurm: SlurmCluster, node: str) -> int:
 
 
 def skip_delay(slurm: SlurmCluster) -> None:
-    """Slurm waits 120 s before it starts the tasks of a lost node again."""
+    """Starts the tasks of a lost node again at once; Slurm would wait 120 s."""
     for line in slurm.ask("squeue", "--noheader", "--array", "--format=%i %r").splitlines():
         job, _, reason = line.partition(" ")
         if reason == "BeginTime":
@@ -174,7 +174,7 @@ def test_without_slurm_the_message_says_what_to_install_or_start(campaign: TestC
 
 
 def link_programs(folder: Path) -> None:
-    """The test hosts' software without Slurm."""
+    """Links the programs that the test hosts need, without Slurm, into `folder`."""
     for name in ("ip", "unshare", "sh", "hostname", "setpriv"):
         place = subprocess.run(["which", name], capture_output=True, text=True, check=True).stdout
         (folder / name).symlink_to(place.strip())

@@ -1,5 +1,5 @@
-"""The documents name what there is: diagrams are drawn from the sources beside them, and files and functions
-that docs/architecture.md and the diagrams name exist."""
+"""Diagrams are drawn from the sources beside them, and files and functions that docs/architecture.md and the
+diagrams name exist."""
 
 import importlib.util
 import pathlib

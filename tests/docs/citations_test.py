@@ -1,5 +1,5 @@
-"""What comments, scenarios and documents cite is there: sections of docs/design.md, equations and
-headings of a README. A citation may run over the end of a line."""
+"""Every citation in comments, scenarios and documents exists: sections of docs/design.md, equations and
+headings of a README. A citation may continue on the next line."""
 
 import os
 import pathlib
@@ -9,7 +9,7 @@ import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 SUFFIXES = {".cpp", ".hpp", ".c", ".h", ".idl", ".py", ".sh", ".yaml", ".xml", ".md", ".def"}
-SKIPPED = ("build", "recordings", ".")  # how folders begin that are not the project's
+SKIPPED = ("build", "recordings", ".")  # prefixes of folders that are not part of the project
 
 # 'design, section 7', 'design 6 ("Commands", "Standby")', 'design section 6, Identity'
 DESIGN = re.compile(
@@ -22,12 +22,12 @@ HEADING = re.compile(r'([\w./]*README\.md), "([^"]+)"')
 
 
 def flatten(text):
-    """Each line end, with the comment mark after it, as one space."""
+    """Replaces each line end, with the comment mark after it, by one space."""
     return re.sub(r"[ \t]*\n[ \t]*(?:///?<?|#|\*)?[ \t]*", " ", text)
 
 
 def read_files():
-    """(path, flat text) of every file that may cite."""
+    """(path, flat text) of every file that may have citations."""
     for folder, folders, names in os.walk(ROOT):
         folders[:] = sorted(name for name in folders if not name.startswith(SKIPPED))
         for path in (pathlib.Path(folder, name) for name in sorted(names)):
@@ -42,7 +42,7 @@ def split_sections(design):
 
 
 def find_design_defects(text, sections):
-    """What `text` cites and `sections` do not have."""
+    """Citations in `text` that `sections` do not have."""
     for found in DESIGN.finditer(text):
         names = [found[3]] if found[3] else re.split(", ", (found[2] or "").replace('"', ""))
         for number in map(int, re.findall(r"\d+", found[1])):
@@ -60,7 +60,7 @@ def find_readme(path, cited):
 
 
 def find_readme_defects(path, text):
-    is_test = ROOT / "tests" in path.parents  # whose "Eq. (1)" is that of the README in its text
+    is_test = ROOT / "tests" in path.parents  # its "Eq. (1)" belongs to a README that its text names
     for found in EQUATION.finditer(text):
         if is_test and not found[1]:
             continue

@@ -1,4 +1,4 @@
-"""tools/completion/sls.bash completes the command line in a bash, as the launcher and the folders say."""
+"""tools/completion/sls.bash completes command lines in bash with the launcher's commands and the files in folders."""
 
 import os
 import pathlib
@@ -87,7 +87,7 @@ class Completion(unittest.TestCase):
                 if select.select([terminal], [], [], 0.2)[0]:
                     shown += os.read(terminal, 65536)
         finally:
-            os.close(terminal)  # hangs up
+            os.close(terminal)  # ends the bash by SIGHUP
             os.waitpid(process, 0)
         self.assertIn(b"./sls discovery-server X", shown)
 

@@ -10,7 +10,7 @@ import unittest
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BUILD = pathlib.Path(sys.argv[1]).resolve() if len(sys.argv) > 1 else ROOT / "build"
 COMMANDS = re.findall(r"^cmd_([\w-]+)\(\)", (ROOT / "sls").read_text(), re.MULTILINE)
-LONGEST_HELP = 50  # lines: a screen
+LONGEST_HELP = 50  # lines, about one screen
 
 
 def run(*arguments):

@@ -1,5 +1,5 @@
-"""Every relative link of every Markdown document leads to a file or folder that exists, and to a heading where it
-names one."""
+"""Every relative link of every Markdown document leads to a file or folder that exists. If the link names a heading,
+the heading exists, too."""
 
 import os
 import re
@@ -10,7 +10,7 @@ from pathlib import Path
 from urllib.parse import unquote
 
 ROOT = Path(__file__).resolve().parents[2]
-SKIPPED = ("build", "recordings", "campaigns-", "node_modules", ".")  # how folders begin that are not the project's
+SKIPPED = ("build", "recordings", "campaigns-", "node_modules", ".")  # prefixes of folders outside the project
 
 FENCED = re.compile(r"^( *)(```|~~~).*?^ *\2[^\n]*$", re.MULTILINE | re.DOTALL)
 CODE = re.compile(r"(`+)(?!`).+?(?<!`)\1(?!`)", re.DOTALL)
@@ -40,13 +40,13 @@ def without_fences(text):
 
 
 def list_links(text):
-    """Where the links and pictures of a document lead; code has none."""
+    """Targets of the links and pictures of a document. Code is left out."""
     prose = CODE.sub("`code`", INDENTED.sub("\n", without_fences(text)))
     return [found[1] for kind in (LINK, DEFINITION, TAG) for found in kind.finditer(prose)]
 
 
 def to_anchor(heading):
-    """As GitHub and Forgejo make it: lower case, no punctuation, hyphens for spaces."""
+    """The anchor that GitHub and Forgejo make of a heading: lower case, no punctuation, hyphens for spaces."""
     shown = re.sub(r"!?\[([^\]]*)\]\([^)]*\)", r"\1", heading).replace("`", "")
     return re.sub(r"[^\w\- ]", "", shown.strip().lower()).replace(" ", "-")
 
@@ -61,7 +61,7 @@ def list_anchors(text):
 
 
 def find_defects(document, text):
-    """The links of a document that lead nowhere, and why."""
+    """The broken links of a document, each with the reason."""
     for link in list_links(text):
         if EXTERNAL.match(link):
             continue

@@ -1,6 +1,6 @@
 """Spelling (codespell), and words to avoid (words_to_avoid.txt).
 
-`prose_test.py FILE…` lists what is to change in these files."""
+`prose_test.py FILE…` lists the words to change in these files."""
 
 import fnmatch
 import pathlib
@@ -11,15 +11,15 @@ import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 FOLDER = pathlib.Path(__file__).resolve().parent
-# Texts of others, data, and the list itself.
+# Texts of other authors, data, and the list itself.
 SKIPPED = ["LICENSE", "*.png", "*.csv", "*package-lock.json", "tests/fuzz/corpus/*", "tests/docs/*", "*.svg"]
-# What a space of a phrase stands for: a gap, or a line's end with the marks of comment and string around it.
+# A space in a phrase matches a gap, or a line's end with the marks of comment and string around it.
 GAP = r'(?:[ \t]+|[ \t]*"?[ \t]*\n[ \t]*(?:///?<?|[#*"])?[ \t]*)'
 TEST_NAME = re.compile(r"\bTEST\w*\(\w+,\s*(\w+)\)|\bdef test_(\w+)")
 
 
 def git(*arguments):
-    """What git prints, or None if there is no repository."""
+    """The output of git, or None if there is no repository."""
     command = ["git", "-c", "safe.directory=*", "-C", ROOT, *arguments]
     try:
         return subprocess.run(command, check=True, capture_output=True, text=True).stdout
@@ -40,7 +40,7 @@ PHRASES = list(load_phrases((FOLDER / "words_to_avoid.txt").read_text()))
 
 
 def find_phrases(text):
-    """(offset, what is there, what to write) of each phrase to avoid."""
+    """(offset, found text, replacement) of each phrase to avoid."""
     for phrase, replacement in PHRASES:
         for found in phrase.finditer(text):
             yield found.start(), " ".join(found[0].split()), replacement
@@ -61,7 +61,7 @@ def matches(path, patterns):
 
 
 def list_files(listing):
-    """Files of the repository, also those that are not added yet, but not what it ignores."""
+    """Files of the repository, also those not added yet. Ignored files are left out."""
     return [path for path in sorted(set(listing.split("\0"))) if path and (ROOT / path).is_file()]
 
 

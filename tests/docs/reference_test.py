@@ -1,4 +1,4 @@
-"""docs/reference is what the built programs say; the man pages are well formed.
+"""docs/reference equals the help texts of the built programs; the man pages are well formed.
 
 Its argument is the build tree.
 """

@@ -1,28 +1,28 @@
-"""Runs docs/tutorial.md as a reader does: every listing is written to its file, every command is run in its
-terminal, and what it prints is compared with what the document shows.
+"""Follows docs/tutorial.md like a reader: it writes every listing to its file, runs every command in its terminal, and
+compares the output with the document.
 
     tests/docs/tutorial_test.py BUILD [--verbose]
 
-The document marks its blocks with comments, which a reader does not see:
+Comments in the document, which are not visible in a browser, mark its blocks:
 
     <!-- file: mine/hop.yaml -->           the block below is written to this file
     <!-- terminal: 2 -->                   its commands run in terminal 2 (default: 1)
-    <!-- host: recorder -->                on a host of its own, a network namespace: with root alone
-    <!-- needs: hosts -->                  runs only where these hosts are; `docker`: where an engine and image are
-    <!-- exit: 2 -->                       its last command ends with 2 (default: 0)
-    <!-- any order -->                     its lines come in any order: several programs print them
-    <!-- waits -->                         the document goes on when its commands have ended, as those of terminal 1
+    <!-- host: recorder -->                on its own host, a network namespace: only with root
+    <!-- needs: hosts -->                  runs only with these hosts; `docker`: only with an engine and image
+    <!-- exit: 2 -->                       its last command ends with exit code 2 (default: 0)
+    <!-- any order -->                     its lines come in any order, because several programs print them
+    <!-- waits -->                         the next block waits for the end of its commands, as in terminal 1
     <!-- when 2 shows: TEXT -->            runs only after terminal 2 has printed TEXT
-    <!-- checked: page -->                 after it, the page's address must answer; `foxglove`: as a Foxglove server
+    <!-- checked: page -->                 then the page's address must answer; `foxglove`: as a Foxglove server
 
-Lines after `$ ` are commands, `^C` interrupts; the other lines are their output. A command without output lines is
-not compared. `…` stands for lines left out, or for any text in a line. Numbers of VARYING differ from flight to
-flight; everything else must be equal. Terminal 1 waits for each command. Other terminals run beside it; they are
-compared when the document comes back to them, and at the end of the chapter. Certificates differ from one type of
-processor to another: what the document shows as one certificate must be one here, too, each time. Numbers of more than
-ten decimals are compared to nine digits.
+Lines that begin with `$ ` are commands, `^C` interrupts; the other lines are their output. The output of a command
+without output lines is not compared. `…` matches left-out lines, or any text in a line. Numbers in VARYING differ from
+flight to flight; everything else must be equal. Terminal 1 waits for each command. Other terminals run at the same
+time; they are compared at their next command, and at the end of the chapter. Certificates depend on the type of
+processor: a certificate that occurs several times in the document must be the same each time here, too. Numbers of
+more than ten decimals are compared to nine digits.
 
-The programs fly on a DDS domain and with a port of their own (SLS_DOMAIN; 8765 is replaced).
+The programs use their own DDS domain (SLS_DOMAIN) and their own port, which replaces 8765.
 """
 
 import base64
@@ -45,8 +45,8 @@ sys.path.insert(0, str(ROOT / "tests/support"))
 from own_domain import OwnDomain  # noqa: E402
 
 DOCUMENT = ROOT / "docs/tutorial.md"
-PAGE_PORT = "8765"  # as the document has it
-COMMAND_S = 100  # more than any command of the document takes on a busy machine
+PAGE_PORT = "8765"  # the port in the document
+COMMAND_S = 100  # time limit: longer than any command of the document takes on a busy machine
 
 VARYING = [(re.compile(pattern), name) for pattern, name in (
     (r"\b[0-9a-f]{16}\b", "RUN_ID"),
@@ -66,7 +66,7 @@ VARYING = [(re.compile(pattern), name) for pattern, name in (
 
 CERTIFICATE = re.compile(r"\b[0-9a-f]{64}\b")
 LONG_NUMBER = re.compile(r"\b\d+\.\d{11,}\b")
-own_certificates = {}  # on this machine, by the document's
+own_certificates = {}  # certificates of this machine, by those of the document
 
 
 def make_comparable(line):
@@ -76,8 +76,8 @@ def make_comparable(line):
 
 
 def with_own_certificates(shown, came):
-    """The lines shown, with this machine's certificates. One that is shown for the first time is taken from the lines
-    that came, in their order."""
+    """The shown lines with this machine's certificates. The first time that the document shows a certificate, this
+    machine's comes from the printed lines, in their order."""
     printed = [certificate for line in came for certificate in CERTIFICATE.findall(line)]
     for certificate, own in zip((found for line in shown for found in CERTIFICATE.findall(line)), printed):
         if own not in own_certificates.values():
@@ -119,7 +119,7 @@ class Block:
 
 
 def read_document(text):
-    """Its blocks in order; a chapter's heading is None."""
+    """The blocks of the document in order. A chapter's heading is None."""
     steps, marks, lines = [], {}, text.split("\n")
     at = 0
     while at < len(lines):
@@ -144,7 +144,7 @@ def read_document(text):
     return steps
 
 
-# --- what came, beside what is shown --------------------------------------------------------------
+# --- comparison of output and document ------------------------------------------------------------
 
 
 def to_pattern(line):
@@ -152,7 +152,7 @@ def to_pattern(line):
 
 
 def find_difference(shown, came, is_any_order):
-    """The difference of the lines that came, or None."""
+    """The first difference between printed and shown lines, or None."""
     shown = with_own_certificates(shown, came)
     came = [make_comparable(line) for line in came]
     if is_any_order:
@@ -167,7 +167,7 @@ def find_difference(shown, came, is_any_order):
         if left and "…" not in (line.strip() for line in shown):
             return f"not shown: '{left[0]}'"
         return None
-    # Dynamic in small: which lines of `came` may have been reached after each shown line.
+    # Dynamic programming: the set of positions in `came` that are possible after each shown line.
     reached = {0}
     for line in shown:
         if line.strip() == "…":
@@ -183,7 +183,7 @@ def find_difference(shown, came, is_any_order):
 
 # --- terminals ------------------------------------------------------------------------------------
 
-# Reads commands, each ended by a zero byte, from descriptor 3, and says after each how it ended.
+# Reads commands, each ended by a zero byte, from descriptor 3, and prints the exit code after each.
 SHELL = r"""
 while IFS= read -r -d '' -u 3 command; do
   eval "$command" 3<&-
@@ -193,7 +193,7 @@ done
 
 
 class Terminal:
-    """A shell that lives as long as the document needs it."""
+    """A shell, which runs until the end of the document."""
 
     def __init__(self, name, folder, environment, before=()):
         self.name, self.lines, self.begin, self.pending = name, [], 0, []
@@ -242,7 +242,7 @@ class Terminal:
                 came = self.lines[self.begin:end]
                 code = int(self.lines[end].split()[1])
             self.begin = end + 1
-            if came and came[-1] == "":  # of the line that ends it
+            if came and came[-1] == "":  # the shell prints this line end before the exit code
                 came.pop()
             while came and not came[-1].strip():
                 came.pop()
@@ -255,7 +255,7 @@ class Terminal:
                     raise Failure(said + f"{difference}; it printed\n" + "\n".join(came))
 
     def wait_for(self, text, begin, timeout_s=COMMAND_S):
-        """Waits until a line from `begin` on holds `text`."""
+        """Waits until a line from index `begin` on contains `text`."""
         with self.changed:
             if not self.changed.wait_for(lambda: any(text in (line or "") for line in self.lines[begin:]),
                                          timeout_s):
@@ -293,7 +293,7 @@ class Terminal:
 
 
 class Hosts:
-    """Network namespaces on one bridge, named as tests/network/network.cpp names and clears away its own."""
+    """Network namespaces on one bridge. tests/network/network.cpp uses names of the same form, and removes leftovers."""
 
     NAMES = ("server", "controller", "recorder")
 
@@ -354,7 +354,7 @@ def expect_page(port):
 
 
 def expect_foxglove(port):
-    """Connects as Foxglove does: the handshake, and the first message."""
+    """Connects like Foxglove: does the handshake and receives the first message."""
     key = base64.b64encode(secrets.token_bytes(16)).decode()
     with socket.create_connection(("127.0.0.1", int(port)), 20) as connection:
         connection.sendall((f"GET / HTTP/1.1\r\nHost: localhost:{port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
@@ -376,7 +376,7 @@ CHECKS = {"page": expect_page, "foxglove": expect_foxglove}
 
 
 class Reader:
-    """Follows the document in a folder that looks like the repository and keeps what the reader makes."""
+    """Follows the document in a folder with links to the repository. The reader's files stay in this folder."""
 
     def __init__(self, folder, build, domain, hosts, is_verbose):
         self.folder, self.hosts, self.is_verbose = folder, hosts, is_verbose
@@ -443,7 +443,7 @@ class Reader:
     def end_chapter(self):
         for terminal in self.terminals.values():
             terminal.finish()
-            deadline = time.monotonic() + 20  # for what runs in the background
+            deadline = time.monotonic() + 20  # for processes in the background
             while (left := terminal.find_descendants()) and time.monotonic() < deadline:
                 time.sleep(0.02)
             if left:
@@ -468,7 +468,7 @@ class Reader:
 
 
 def test_the_comparison_itself():
-    """Each case: lines shown, lines that came, whether in any order, whether they are equal."""
+    """Each case: shown lines, printed lines, is any order allowed, are they equal."""
     for shown, came, is_any_order, is_equal in (
             (["a", "b"], ["a", "b"], False, True),
             (["a", "b"], ["b", "a"], False, False),

@@ -1,8 +1,8 @@
-"""The Debian package in a clean Debian 12: installed, flown, removed without a trace.
+"""The Debian package in a clean Debian 12: it is installed, flies, and is removed without a trace.
 
-The system is a folder of the build tree that debootstrap fills once, with what the package depends on. Everything in
-it runs in mount and process namespaces of its own: no mount of ours is ever seen outside, none is left behind.
-Skipped where this needs more than the machine has: root, debootstrap, namespaces, a mirror of Debian."""
+The system is a folder of the build tree. debootstrap fills it once, with the packages that the package depends on.
+Everything in it runs in its own mount and process namespaces: its mounts are not visible outside, and none is left
+behind. Skipped if the machine lacks root, debootstrap, namespaces or a mirror of Debian."""
 
 import hashlib
 import os
@@ -17,9 +17,9 @@ ROOT = Path(__file__).resolve().parents[2]
 BUILD = Path(sys.argv[1]).resolve()
 FOLDER = BUILD / "package_test"
 SYSTEM = FOLDER / "debian"
-WORK = "/tmp/work"  # of the user in the system
+WORK = "/tmp/work"  # the user's folder in the system
 USER = 1000
-# Files in which apt and dpkg keep records of their own work, and files that last no longer than a run.
+# Files in which apt and dpkg record their own work, and temporary files.
 JOURNALS = re.compile(r"/(proc|sys|tmp|run|dev/shm|var/(cache|log|lib/(apt|dpkg)))(/|$)|/etc/ld\.so\.cache$|"
                       r"/var/lib/systemd/|/usr/share/man/.*index")
 
@@ -54,7 +54,7 @@ def run(command, expected=0, limit_s=120.0, **options):
 
 
 def run_apt(*command):
-    """In the system, with the network of this machine: apt needs the mirror."""
+    """Runs a command in the system with the network of this machine, because apt needs the mirror."""
     script = f"mount -t proc proc '{SYSTEM}/proc'; exec chroot '{SYSTEM}' \"$@\""
     environment = {**os.environ, "PATH": "/usr/sbin:/usr/bin:/sbin:/bin", "DEBIAN_FRONTEND": "noninteractive",
                    "LC_ALL": "C"}
@@ -63,21 +63,21 @@ def run_apt(*command):
 
 
 def delete(folder):
-    """Never through a mount: there is none of ours, and should somebody have made one, we stop."""
+    """Deletes a folder. Raises AssertionError if something is mounted in it: the test itself leaves no mount there."""
     if any(line.split()[1].startswith(f"{folder}/") for line in Path("/proc/mounts").read_text().splitlines()):
         raise AssertionError(f"{folder}: something is mounted in it; see /proc/mounts")
     subprocess.run(["rm", "-rf", "--one-file-system", "--", folder], check=True)
 
 
 def find_mirror():
-    """The one that apt uses here."""
+    """The mirror that apt of this machine uses."""
     sites = run(["apt-get", "indextargets", "--format", "$(SITE)", "Created-By: Packages", "Origin: Debian",
                  "Codename: bookworm", "Component: main"]).split()
     return sites[0] if sites else "http://deb.debian.org/debian"
 
 
 def make_package():
-    """As ./sls package, of what is built."""
+    """Makes the package from the build tree, as ./sls package does."""
     folder = FOLDER / "package"
     delete(folder)
     said = run(["cpack", "--config", BUILD / "CPackConfig.cmake", "-B", folder], cwd=FOLDER)
@@ -85,7 +85,7 @@ def make_package():
 
 
 def make_system(package):
-    """A minimal Debian 12 with what the package depends on, and nothing else."""
+    """Makes a minimal Debian 12 with only the packages that the package depends on."""
     depends = run(["dpkg-deb", "--field", package, "Depends"]).strip()
     stamp, wanted = FOLDER / "debian.stamp", hashlib.sha256(depends.encode()).hexdigest()
     if stamp.is_file() and stamp.read_text() == wanted:
@@ -99,10 +99,10 @@ def make_system(package):
         if made.returncode != 0:
             skip(f"debootstrap from {mirror} failed: {made.stdout.strip().splitlines()[-1:]}")
         (SYSTEM / "debootstrap.done").touch()
-    # Not waiting for the disk: this system can be made again.
+    # dpkg need not sync to the disk, because this system can be made again.
     (SYSTEM / "etc/dpkg/dpkg.cfg.d/no_sync").write_text("force-unsafe-io\n")
     for file in (Path("/etc/resolv.conf"), Path("/etc/hosts"), *Path("/etc/apt/apt.conf.d").glob("*proxy*")):
-        shutil.copy(file, f"{SYSTEM}{file}")  # how this machine reaches the mirror
+        shutil.copy(file, f"{SYSTEM}{file}")  # settings with which this machine reaches the mirror
     try:
         run_apt("apt-get", "update", "--error-on=any")
     except AssertionError as error:
@@ -126,7 +126,7 @@ def list_files():
 
 
 def fly(*command, expected=0):
-    """A command of the user in the system, in the user's folder."""
+    """Runs a command as the user in the system, in the user's folder."""
     script = f"cd {WORK} && HOME={WORK} PATH=/usr/bin:/bin exec \"$@\""
     return run(isolate("/bin/sh", "-c", script, "sh", *command, system=SYSTEM, user=USER), expected)
 
@@ -144,7 +144,7 @@ class PackageTest(unittest.TestCase):
         (SYSTEM / WORK[1:]).mkdir()
         os.chown(SYSTEM / WORK[1:], USER, USER)
         shutil.copy(cls.package, SYSTEM / "tmp/sls.deb")
-        # Its dependencies are there: nothing else is installed, and no network could load it.
+        # The dependencies are installed already: apt installs only the package, without a network.
         said = run(isolate("apt-get", "install", "-y", "--no-install-recommends", "/tmp/sls.deb",
                            system=SYSTEM))
         assert "1 newly installed" in said, said
@@ -204,7 +204,7 @@ class PackageTest(unittest.TestCase):
         fly("sls", "run", "my_controller/my_controller.yaml", "--in-process", "--out", "own")
 
     def test_5_it_is_removed_without_a_trace(self):
-        # Root's Python leaves compiled files, which have to go, too.
+        # Python run by root leaves compiled files, which the removal must delete, too.
         run(isolate("python3", "-c", "import sls; sls.lqr", system=SYSTEM))
         run(isolate("apt-get", "purge", "-y", "sls", system=SYSTEM))
         self.assertEqual({path: kind for path, kind in list_files().items() if self.before.get(path) != kind}, {})

@@ -1,4 +1,4 @@
-"""Chromium without a window, to see that a page renders."""
+"""Renders pages in Chromium without a window."""
 
 import pathlib
 import re
@@ -9,7 +9,8 @@ import tempfile
 PROGRAM = shutil.which("chromium")
 MISSING = "skipped: no Chromium (apt-get install chromium)"
 
-# Put into the page's copy: tells, once everything is loaded, what a reader would see.
+# Added to a copy of the page. After loading it writes its findings into attributes of <body>: number of images, of
+# broken images and of requests, and the overflow in px.
 PROBE = """<script>
 addEventListener("load", () => {
   const images = [...document.images];
@@ -24,7 +25,7 @@ addEventListener("load", () => {
 
 
 def run(page: pathlib.Path, *flags: str) -> tuple[str, str]:
-    """The page's document and what the browser logged."""
+    """The browser's output (for --dump-dom the page's document) and its log."""
     with tempfile.TemporaryDirectory() as profile:
         done = subprocess.run(
             [PROGRAM, "--headless", "--no-sandbox", "--use-angle=swiftshader",
@@ -35,8 +36,8 @@ def run(page: pathlib.Path, *flags: str) -> tuple[str, str]:
 
 
 def render(page: pathlib.Path) -> tuple[str, list[str]]:
-    """The document after loading, with the probe's findings and without its pictures, and what the
-    page put on the console."""
+    """The document after loading, with the probe's findings and without its pictures, and the page's
+    messages on the console."""
     with tempfile.TemporaryDirectory() as folder:
         copy = pathlib.Path(folder) / page.name
         copy.write_text(page.read_text().replace("</body>", f"{PROBE}</body>"))

@@ -1,5 +1,5 @@
 """Shared by the tests of a campaign's folder and engine: a small campaign, and the command line in a
-process of its own. `FAKE` is the folder of a stand-in for the extension module."""
+separate process. `FAKE` is the folder of a replacement for the extension module."""
 
 import os
 import pathlib
@@ -29,7 +29,7 @@ measure: [load_error_rms, load_error_max, outcome]
 
 
 class CampaignTest(support.FolderTest):
-    core = FAKE  # or the build's
+    core = FAKE  # subclasses may use the folder of the build
 
     def write_campaign(self, runs=40, extra="", name="campaign.yaml"):
         self.write("base.yaml", BASE)
@@ -40,20 +40,20 @@ class CampaignTest(support.FolderTest):
         return {**os.environ, "PYTHONPATH": path, "SLS_BUILD": str(support.BUILD.resolve()), **more}
 
     def start(self, *arguments, fake="", **options):
-        """The command line in a process of its own, in the test's folder."""
+        """Starts the command line in a separate process, in the test's folder."""
         command = [sys.executable, "-BP", "-m", "sls.campaign", *map(str, arguments)]
         return subprocess.Popen(command, cwd=self.folder, env=self.environment(SLS_FAKE=fake),
                                 stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
 
     def fly(self, *arguments, fake="", code=0):
-        """Its stdout and stderr, after it ended with `code`."""
+        """Runs the command line. Returns stdout and stderr; the exit code must be `code`."""
         process = self.start(*arguments, fake=fake)
         out, said = process.communicate(timeout=240)
         self.assertEqual(process.returncode, code, said)
         return out + said
 
     def expect_line(self, said, *parts):
-        """One line on stderr that begins as errors do and holds `parts`."""
+        """Checks that `said` is one line with an error that contains `parts`."""
         self.assertEqual(said.count("\n"), 1, said)
         self.assertTrue(said.startswith("sls: error: "), said)
         for part in parts:
@@ -67,7 +67,7 @@ class CampaignTest(support.FolderTest):
             time.sleep(0.01)
 
     def list_workers(self, process):
-        """Ids of the processes that `process` started and that live."""
+        """Ids of the running processes that `process` has started."""
         text = pathlib.Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text()
         return [int(child) for child in text.split()]
 

@@ -1,4 +1,4 @@
-"""Campaigns of real flights: own measures, recordings that are kept, and runs flown again by the three
+"""Campaigns of real flights: measures of the user, kept recordings, and runs flown again by the three
 programs over DDS."""
 
 import csv
@@ -63,7 +63,7 @@ class FlightsTest(CampaignTest):
             return list(csv.DictReader(file))
 
     def fly_row(self, row):
-        """The same flight by the package alone."""
+        """Flies the run of `row` with the package, without a campaign."""
         import sls
         paths = ("faults.1.bias.force_n", "controller.force_limit_n", "faults.0.noise.seed")
         return sls.fly(sls.load_scenario(self.folder / "base.yaml", changes={
@@ -149,13 +149,13 @@ class FlightsTest(CampaignTest):
                                     .read_text())["certificate"], rows[2]["certificate"])
 
     def test_runs_flown_over_dds_have_the_same_certificates(self):
-        self.write_campaign("certify: { some: 3, seed: 1 }\n")  # others are certified when verified
+        self.write_campaign("certify: { some: 3, seed: 1 }\n")  # other runs get a certificate in the verification
         with support.OwnDomain() as domain:
             said = self.fly("campaign.yaml", "--out", "out", "--verify", 4, "--domain", domain)
             self.assertIn("verify: 4 of 4 runs have the same certificate when flown over DDS", said)
             verified = json.loads((self.folder / "out/manifest.json").read_text())["verified"]
             self.assertEqual(len(set(verified["runs"])), 4)
-            # A table that says something else is found.
+            # Wrong certificates in the table are found.
             from sls.campaign.folder import CampaignFolder
             folder = CampaignFolder(self.folder / "out")
             for number, _, _ in folder.chunks:

@@ -1,5 +1,5 @@
-"""The local engine and the command line, with runs that cost nothing: what is flown, what happens when
-workers die, disks are full or somebody presses Ctrl-C."""
+"""The local engine and the command line, with runs that take no time: the flown chunks, killed workers, full
+disks, and Ctrl-C."""
 
 import csv
 import io
@@ -70,7 +70,7 @@ class LocalEngineTest(CampaignTest):
         process = self.start("campaign.yaml", "--out", "killed", "--workers", 3, "--chunk-runs", 5,
                              fake="sleep=0.01")
         dice, killed = random.Random(7), 0
-        for chunks in range(2, 38, 8):  # 5 of 40 tasks
+        for chunks in range(2, 38, 8):  # kills a worker at 5 of 40 chunks
             self.wait_until(lambda: self.count_chunks("killed") >= chunks, process)
             for worker in dice.sample(self.list_workers(process), 1):
                 os.kill(worker, signal.SIGKILL)
@@ -98,7 +98,7 @@ class LocalEngineTest(CampaignTest):
                          "killed", "--resume flies what is missing")
         self.fly("campaign.yaml", "--out", "killed", "--resume")
         self.assertEqual(self.read_table("killed"), self.read_table("whole"))
-        for file, time_ns in files.items():  # what was there was not flown again
+        for file, time_ns in files.items():  # existing chunks were not flown again
             self.assertEqual(file.stat().st_mtime_ns, time_ns)
         self.assertEqual(list((self.folder / "killed/chunks").glob("*.tmp")), [])
 
@@ -170,7 +170,7 @@ class LocalEngineTest(CampaignTest):
         rows = folder.read_chunk(2)
         file = folder.chunk_file(2)
         before = file.read_bytes()
-        folder.write_chunk(2, rows)  # a second execution
+        folder.write_chunk(2, rows)  # as from a second flight of the chunk
         self.assertEqual(file.read_bytes(), before)
         rows[3][-1] = "0" * 64
         with self.assertRaises(EngineError) as raised:
@@ -264,7 +264,7 @@ class LocalEngineTest(CampaignTest):
         work("--chunks", "0-3")
         self.assertEqual(self.count_chunks("out"), 4)
         work("--index-from", "INDEX", "--chunks-each", "3", INDEX="1")
-        work("--index-from", "INDEX", "--chunks-each", "3", INDEX="2")  # has two alone
+        work("--index-from", "INDEX", "--chunks-each", "3", INDEX="2")  # this index has only two chunks
         self.assertEqual(self.count_chunks("out"), 8)
         self.assertIn("expected this environment variable",
                       work("--index-from", "INDEX", code=2))
@@ -284,7 +284,7 @@ class FullDiskTest(CampaignTest):
         self.write_campaign(400)
         self.fly("campaign.yaml", "--out", "whole")
         process = self.start("campaign.yaml", "--out", "out", "--chunk-runs", 100,
-                             preexec_fn=self.limit_files(8000))  # a chunk has some 15,000 bytes
+                             preexec_fn=self.limit_files(8000))  # a chunk has about 15,000 bytes
         said = process.communicate(timeout=120)[1]
         self.assertEqual(process.returncode, 1, said)
         self.expect_line(said, "chunks/chunk-00000", "expected to write it, got: File too large")
@@ -322,7 +322,7 @@ class ManyRunsTest(CampaignTest):
             return process.poll() is not None
         try:
             self.wait_until(is_over)
-        except FileNotFoundError:  # it ended between two looks
+        except FileNotFoundError:  # the process has ended between two reads of /proc
             pass
         said = process.communicate(timeout=60)[1]
         self.assertEqual(process.returncode, 0, said)
@@ -332,7 +332,7 @@ class ManyRunsTest(CampaignTest):
 
 
 def read_peak_mb(process):
-    """Most memory that was resident, MB."""
+    """Peak of the resident memory, MB."""
     try:
         for line in Path(f"/proc/{process}/status").read_text().splitlines():
             if line.startswith("VmHWM"):

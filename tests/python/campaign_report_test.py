@@ -24,7 +24,7 @@ CAMPAIGN = "base: eight.yaml\nvary: {}\n# <script>alert(1)</script>\n"
 
 
 def make_rows(count, seed=1):
-    """Pairs of runs with both laws: lost where the delay is above 0.2 s, or 0.3 s with `pid`."""
+    """Pairs of runs with both laws. A run is lost if its delay is above 0.2 s, or 0.3 s with `pid`."""
     random = np.random.default_rng(seed)
     masses = random.normal(0.2, 0.05, count)
     for run in range(count):
@@ -42,7 +42,7 @@ def make_rows(count, seed=1):
 
 
 class Reader(HTMLParser):
-    """Tags that a reader would see, their attributes, and whether all are closed."""
+    """Parses a page into its tags, attributes and words. `open` lists the tags that are not closed."""
 
     VOID = {"meta", "link", "img", "br", "rect", "line", "path", "circle"}
 
@@ -161,7 +161,7 @@ class ReportTest(CampaignTest):
         page = make_campaign_report(self.write_campaign(rows=[
             [run, "0.2", "0.1", LAWS[0], "lost" if run < 3 else "finished", "", "1", "1", "1", "",
              1, ""] for run in range(10)]))
-        # 3 of 10: Wilson's interval of textbooks, 10.78 % to 60.32 %.
+        # 3 of 10: Wilson's interval is 10.78 % to 60.32 %, as in textbooks.
         self.assertIn("<td>lost</td><td>3</td><td>30 %</td><td>10.78 % to 60.32 %</td>", page)
 
     def test_it_refers_to_nothing_outside_itself_and_text_is_no_markup(self):

@@ -1,5 +1,5 @@
-"""Runs of a campaign from Python: measures as those of the metrics of a recording of the same
-flight, its certificate, mistakes, Ctrl-C and other threads."""
+"""Runs of a campaign from Python: measures and certificate equal those of a recording of the same flight;
+mistakes, Ctrl-C and other threads."""
 
 import json
 import math
@@ -33,7 +33,8 @@ LONG = ("{ model: analytic, step_s: 0.004, initial: { load_position_m: [0, 0, -0
 
 class CampaignRunsTest(support.FolderTest):
     def fly_and_record(self, name, path, value):
-        """A run by column, and the recording of its scenario by the program `closed_loop`."""
+        """Flies a run, and records its scenario with the program `closed_loop`. Returns the measures by
+        column, the outcome and the reason."""
         runs = _sls_core.Runs(str(SCENARIOS / f"{name}.yaml"), [path], MEASURES)
         outcome, reason, values, certificate, steps = runs.fly([value], True)
         scenario = self.write("run.yaml", runs.scenario_text([value]))
@@ -79,7 +80,7 @@ class CampaignRunsTest(support.FolderTest):
         fault = "[{ delay: { on: command, by_s: 0.26 } }]"
         ours, outcome, reason = self.fly_and_record("figure_eight", "faults", fault)
         self.assertEqual(outcome, "lost")
-        # Where `./sls delay-margin figure_eight` loses it.
+        # The time at which `./sls delay-margin figure_eight` loses the load.
         self.assertEqual(reason, "load more than 1 m further from its reference than in the base "
                          "flight, at 20.396 s")
         self.assertEqual(ours["time_of_loss_s"], 20.396)
@@ -136,7 +137,7 @@ class CampaignRunsTest(support.FolderTest):
         self.assertGreater(sum(began < at < ended for at in ticks), 3)
 
     def test_ctrl_c_ends_a_flight(self):
-        """Where the flight takes longer than the test waits."""
+        """The flight takes longer than the test waits."""
         paths = [str(support.BUILD / "python"), str(support.ROOT / "python")]
         program = f"""
 import sys, threading

@@ -83,11 +83,11 @@ class PairedTest(unittest.TestCase):
     def test_the_interval_of_the_median_covers_at_least_its_level(self):
         for n in range(1, 200):
             rank = find_interval_rank(n)
-            # P(B < k) of n fair coins, by integers.
+            # 2^n P(B < k) of n fair coins, a whole number.
             below = sum(math.comb(n, i) for i in range(rank))
             self.assertLessEqual(40 * below, 2**n, n)
-            self.assertGreater(40 * (below + math.comb(n, rank)), 2**n, n)  # k + 1 would not do
-        self.assertEqual([find_interval_rank(n) for n in (5, 6, 20)], [0, 1, 6])  # tables of signs
+            self.assertGreater(40 * (below + math.comb(n, rank)), 2**n, n)  # k + 1 would be too large
+        self.assertEqual([find_interval_rank(n) for n in (5, 6, 20)], [0, 1, 6])  # from tables of the sign test
 
     def test_differences_are_taken_pair_by_pair(self):
         a = np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, np.nan, np.inf])

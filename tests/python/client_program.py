@@ -1,4 +1,4 @@
-"""A client as a user writes one: `client_program.py SCENARIO DOMAIN NAME STRENGTH LAW`."""
+"""A client program, written like a user's: `client_program.py SCENARIO DOMAIN NAME STRENGTH LAW`."""
 
 import sys
 import time
@@ -40,7 +40,7 @@ def sleepy(now):
 
 
 class Counting:
-    """Integrates the error in its memory, as a law must that remembers anything."""
+    """A law that integrates the error. The integral is in its memory, because a law has no other state."""
 
     memory_size = 2
 

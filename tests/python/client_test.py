@@ -1,4 +1,4 @@
-"""sls.Client: real flights, with server, recorder and Python clients as processes of their own."""
+"""sls.Client: real flights, with server, recorder and Python clients in separate processes."""
 
 import contextlib
 import json
@@ -23,7 +23,7 @@ LAWS = {name: client_program.LAWS[name] for name in ("pid", "counting")}
 
 @pytest.fixture
 def domain():
-    """A free DDS domain, by the lock that the tests in C++ take, too."""
+    """A free DDS domain, reserved by the same lock as in the C++ tests."""
     deadline = time.monotonic() + 240
     while time.monotonic() < deadline:
         for number in range(1, 61):
@@ -33,7 +33,7 @@ def domain():
                 except OSError:
                     continue
                 yield number
-                # The shared-memory ports outlive processes that were killed.
+                # Killed processes leave their shared-memory ports behind.
                 for port in range(7400 + 250 * number, 7650 + 250 * number):
                     for file in (f"fastrtps_port{port}", f"fastrtps_port{port}_el",
                                  f"fastrtps_port{port}_sl", f"sem.fastrtps_port{port}_mutex"):
@@ -44,7 +44,7 @@ def domain():
 
 
 class Flight:
-    """Server, recorder and clients; what is still there at the end is killed."""
+    """Server, recorder and clients. Processes that still run at the end are killed."""
 
     def __init__(self, folder, domain, scenario):
         self.folder, self.domain, self.scenario = folder, domain, scenario
@@ -78,7 +78,7 @@ class Flight:
         return "\n".join(f"--- {name}\n{self.log(name)}" for name in self.processes)
 
     def wait(self, name):
-        """The exit code."""
+        """Waits for the end of a process and returns its exit code."""
         try:
             return self.processes[name].wait(DEADLINE_S)
         except subprocess.TimeoutExpired:
@@ -92,7 +92,7 @@ class Flight:
             time.sleep(0.01)
 
     def wait_for_steps(self):
-        """Until some of the flight is recorded."""
+        """Waits until a part of the flight is recorded."""
         file = self.recording / "state.csv"
         self.wait_until(lambda: file.exists() and file.stat().st_size > 100_000, "steps")
 
@@ -109,7 +109,7 @@ class Flight:
 
 @contextlib.contextmanager
 def make_flight(folder, domain, for_s=32, controllers=1):
-    """A figure eight of so many seconds with so many clients; server and recorder are started."""
+    """A figure eight of `for_s` seconds with `controllers` clients. Server and recorder are started."""
     text = sls.load_scenario("figure_eight_pid", changes={
         "mission.0.for_s": for_s, "sync.wait_for.controllers": controllers}).text
     scenario = folder / "scenario.yaml"
@@ -124,7 +124,7 @@ def make_flight(folder, domain, for_s=32, controllers=1):
 
 
 def expect_flown(flight, law):
-    """Complete, and bit for bit what the same law flies undisturbed in this process."""
+    """Checks that the flight is complete, and equal, bit for bit, to one of the same law in this process."""
     assert flight.wait("server") == 0, flight.logs()
     assert flight.wait("recorder") == 0, flight.logs()
     assert flight.manifest["complete"], flight.logs()
@@ -151,14 +151,14 @@ def test_the_example_flies_a_server(tmp_path, domain):
         assert flight.manifest["complete"]
         load = sls.Recording(flight.recording).state["load_x_m"]
         built_in = sls.fly(sls.load_scenario(flight.scenario))
-        # Python's sines are the C library's, as those of C++ are; sums are in another order.
+        # Python and C++ use the same sines of the C library. Sums have another order.
         assert np.abs(load - built_in.state["load_x_m"]).max() < 1e-12
 
 
 def test_the_python_law_flies_as_the_law_in_cpp_does():
     scenario = sls.load_scenario("figure_eight_pid")
     ours, theirs = sls.fly(scenario, client_program.pid), sls.fly(scenario)
-    # The same equations in another order of operations: rounding, damped by the loop.
+    # The same equations in another order of operations: only rounding differs, and the loop damps it.
     assert np.abs(ours.load_position - theirs.load_position).max() < 1e-12
 
 

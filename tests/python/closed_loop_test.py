@@ -1,4 +1,4 @@
-"""sls.ClosedLoop: judged by closed forms, and by flights whose forces it is given."""
+"""sls.ClosedLoop, compared with closed forms and with flights that have the same forces."""
 
 import os
 import re
@@ -52,7 +52,7 @@ def test_a_small_swing_about_hover_has_its_period():
     omega = np.sqrt((1.5 + 0.2) * 9.8 / (1.5 * 1.0))
     for k in range(1, 500):
         state = loop.step(hover(loop, 1))
-        # Off by the pendulum's nonlinearity, of order angle², and by RK4 at 4 ms.
+        # Errors: the pendulum's nonlinearity, of order angle², and RK4 at 4 ms.
         assert abs(state.angles[0, 1] - 1e-3 * np.cos(omega * k * loop.period_s)) < 1e-8
 
 
@@ -247,5 +247,5 @@ def test_the_example_learns_gains_with_which_the_law_in_cpp_flies_as_well():
                           env={**os.environ, "PYTHONPATH": PYTHON_PATH}).stdout
     errors = [float(number) for number in re.findall(r"rms error ([0-9.]+) m", said)]
     assert errors[-1] < 0.6 * errors[0], said
-    assert errors[-1] == errors[-2], said  # to the millimetre: the batch and the law in C++
+    assert errors[-1] == errors[-2], said  # the batch and the law in C++, printed to the millimetre
     assert float(re.search(r"flights of 8 s in ([0-9.]+) s", said)[1]) < 60, said

@@ -1,4 +1,4 @@
-"""For the tests that pytest runs: where the package and the programs are."""
+"""Shared by the tests that pytest runs: places of the package and the programs."""
 
 import os
 import subprocess
@@ -15,7 +15,7 @@ PYTHON_PATH = os.pathsep.join(sys.path[:2])
 
 @pytest.fixture
 def run_python():
-    """Runs code in a Python of its own, with the package: the finished process."""
+    """A function that runs code in another Python with the package. It returns the finished process."""
     def run(code, path=PYTHON_PATH, **options):
         return subprocess.run(["/usr/bin/python3", "-B", "-c", code], capture_output=True, text=True,
                               timeout=100, env={**os.environ, "PYTHONPATH": path}, **options)
@@ -24,10 +24,10 @@ def run_python():
 
 @pytest.fixture
 def fly_with_program(tmp_path):
-    """Flies a scenario with the program `closed_loop`: the folder of its recording, and the finished
-    process."""
+    """A function that flies a scenario with the program `closed_loop`. It returns the folder of the
+    recording and the finished process."""
     def fly(scenario, name="program"):
-        # Beside the file that it is from: paths in it are relative to that.
+        # The file is in the folder to which paths in the scenario are relative.
         file = tmp_path / f"{name}.yaml"
         file.write_text(scenario.text)
         done = subprocess.run([BUILD / "bin/closed_loop", "--scenario", file, "--out",

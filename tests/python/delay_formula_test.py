@@ -1,4 +1,4 @@
-"""The linear formula against the equations it is derived from."""
+"""The linear formula, compared with the equations from which it is derived."""
 
 import unittest
 
@@ -19,7 +19,8 @@ def make_chain(gains):
 
 
 def solve_error_ratio(gains, late, s, rod_m=ROD_M):
-    """From Newton's equations of quadrotor and load and the law, unknowns x_Q, y, F; y_r = 1."""
+    """The error ratio from Newton's equations of quadrotor and load, and the law. Unknowns: x_Q, y, F;
+    y_r = 1."""
     swing_2 = (1 + LOAD_KG / QUAD_KG) * GRAVITY / rod_m
     feedback = sum(gain * s**power for power, gain in enumerate(gains))
     late_force = np.exp(-s * late.delay_s) / (1 + late.lag_s * s) * QUAD_KG * rod_m / GRAVITY
@@ -31,8 +32,8 @@ def solve_error_ratio(gains, late, s, rod_m=ROD_M):
 
 
 def count_unstable_roots(gains, late):
-    """Turns of the denominator about 0 along the edge of the right half plane (argument
-    principle), out to |s| = 200: beyond it s⁴ outweighs all else."""
+    """Number of roots of the denominator in the right half plane, by the argument principle: its turns
+    about 0 along the edge, up to |s| = 200. For larger |s| the term s⁴ dominates."""
     edge = np.concatenate([1j * np.linspace(-200, 200, 400001),
                            200 * np.exp(1j * np.linspace(np.pi / 2, -np.pi / 2, 40001))])
     transfer = np.exp(-edge * late.delay_s) / (1 + late.lag_s * edge)

@@ -1,4 +1,4 @@
-"""The examples in Python, as a user runs them."""
+"""Runs the examples in Python like a user."""
 
 import os
 import re
@@ -38,7 +38,7 @@ def test_fly_and_plot_draws_what_it_flew(tmp_path):
 def test_compare_laws_leaves_recordings_that_verify(tmp_path):
     said = run_example("compare_laws.py", "--flights", 2, "--recordings", tmp_path, folder=tmp_path)
     mean = dict(re.findall(r"(\w+): mean (\S+),", said))
-    assert float(mean["qsf"]) < float(mean["pid"])  # what QSF is for
+    assert float(mean["qsf"]) < float(mean["pid"])  # QSF follows the reference better
     for law in mean:
         assert sls.Recording(tmp_path / law).verify().is_ok
 

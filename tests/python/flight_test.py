@@ -1,4 +1,4 @@
-"""A real flight, plotted and reported; the programs are those of this build."""
+"""A real flight of the programs of this build, with its figures and its report."""
 
 import os
 import re
@@ -56,7 +56,7 @@ class FlightTest(support.FolderTest):
         page = (self.folder / "r/report.html").read_text()
         self.assertIn("finished: mission finished", page)
 
-        # The recorder's text is an independent check of the metrics.
+        # The text that the recorder writes is an independent check of the metrics.
         flight = Recording(self.folder / "r").load_flight(0, "r")
         self.assertEqual(len(flight.time_s), 501)  # 2 s at 4 ms
         stage, lap = calc_stage_metrics(flight)
@@ -66,7 +66,7 @@ class FlightTest(support.FolderTest):
         np.testing.assert_allclose([*stage.rms_m, *stage.max_m], numbers, rtol=5e-3)
         np.testing.assert_array_equal(lap.rms_m, stage.rms_m)
 
-        # The attitude is the recorder's, too.
+        # The attitude is equal to the recorder's.
         table = np.genfromtxt(self.folder / "r/flight.csv", delimiter=",", names=True)
         np.testing.assert_allclose(flight.calc_attitude()[:, 0], table["roll_rad"], atol=1e-12)
         np.testing.assert_allclose(flight.calc_attitude()[:, 1], table["pitch_rad"], atol=1e-12)
@@ -80,7 +80,7 @@ class FlightTest(support.FolderTest):
         self.write("hover.yaml", HOVER)
         self.run_launcher("run", "hover.yaml", "--in-process", "--out", "r")
         flight = Recording(self.folder / "r").load_flight(0, "r")
-        # m g, m_L g; each of four rotors lifts a fourth with k w².
+        # Thrust m g, tension m_L g; each of the four rotors gives a fourth of the thrust, k w².
         np.testing.assert_allclose(flight.body.thrust, 1.7 * 9.8, rtol=1e-9)
         np.testing.assert_allclose(flight.body.thrust_set[1:], 1.7 * 9.8, rtol=1e-9)
         np.testing.assert_allclose(flight.body.rod_tension, 0.2 * 9.8, rtol=1e-9)
@@ -123,7 +123,7 @@ class FlightTest(support.FolderTest):
             text = text.replace(old, new)
         self.write("s.yaml", text)
         same = ("--scenario", "s.yaml", "--domain", domain)
-        # A history of 180 batches of 27 steps at most: it does not reach back to step 0.
+        # The writer keeps 180 batches of at most 27 steps: step 0 is lost for a late recorder.
         profiles = (support.ROOT / "config/qos/endpoints.xml").read_text()
         begin = profiles.index('<data_writer profile_name="sls_record_writer">')
         end = profiles.index("</data_writer>", begin) + len("</data_writer>")
@@ -134,7 +134,7 @@ class FlightTest(support.FolderTest):
         operator = ("ctl", "--domain", domain, "--timeout-s", "100")
         self.run_launcher(*operator, "pause")  # the flight begins paused
         client = self.start("control_client", *same)
-        self.run_launcher(*operator, "step", "5500")  # of the first lap's 6,000
+        self.run_launcher(*operator, "step", "5500")  # the first lap has 6,000 steps
         recorder = self.start("recorder", "--out", "r", "--domain", domain)
         deadline = time.monotonic() + 100
         while len(self.read_rows("command")) < 2000 and time.monotonic() < deadline:
@@ -163,7 +163,7 @@ class FlightTest(support.FolderTest):
         self.assertEqual(page.count("<td>lap "), 4)
 
     def read_rows(self, name):
-        """The rows that are on the disk by now."""
+        """The rows that are on the disk at this time."""
         path = self.folder / "r" / f"{name}.csv"
         lines = path.read_text().split("\n")[:-1] if path.exists() else []
         return np.genfromtxt(lines, delimiter=",", names=True) if len(lines) > 2 else []

@@ -1,4 +1,4 @@
-"""sls.fly, judged by the files that the program `closed_loop` writes of the same flight."""
+"""sls.fly, compared with the files that the program `closed_loop` writes for the same flight."""
 
 import csv
 import gc
@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import sls
 
-# A gust of noise on what is measured, a delay of what is commanded.
+# Noise on the measured state, and a delay of the command.
 FAULTS = [{"noise": {"on": "state", "position_m": [0.01, 0.02, 0.03], "seed": 7}},
           {"delay": {"on": "command", "by_s": 0.008}}]
 TWO_STAGES = [{"set_point": {"position_m": [0.1, 0, -0.5]}, "for_s": 0.8},
@@ -54,7 +54,7 @@ def test_a_flight_has_the_columns_of_the_programs_files(name, fly_with_program, 
                 continue
             written = read_rows(file, vehicle.vehicle_id)
             if table == "measured" and not written["step"]:
-                continue  # of a fleet, of vehicles whose measurement is the truth
+                continue  # the file has rows only of those vehicles whose measured state can differ
             columns = getattr(vehicle, table)
             left_out = {"controller", "compute_us"} if table == "command" else set()
             assert list(columns) == [column for column in written if column not in left_out]
@@ -68,7 +68,7 @@ def test_a_flight_has_the_columns_of_the_programs_files(name, fly_with_program, 
     assert flight.certificate == manifest["certificate"]
     assert [vehicle.vehicle_id for vehicle in flight.vehicles] == manifest["vehicle_ids"]
 
-    # Saved, it is the program's recording.
+    # The saved flight equals the program's recording.
     recording = flight.save(tmp_path / "saved")
     assert recording.certificate == manifest["certificate"]
     for folders in ((tmp_path / "saved",), (tmp_path / "saved", folder)):
@@ -107,7 +107,7 @@ def test_columns_are_views_of_one_memory_that_outlive_the_flight():
     kept, copy = flight["load_x_m"], flight["load_x_m"].copy()
     del flight, columns
     gc.collect()
-    for mass in (0.1, 0.4):  # others take what memory is free
+    for mass in (0.1, 0.4):  # these flights would use the memory if it were free
         sls.fly(sls.load_scenario("short", vehicle__load_mass_kg=mass))
     assert np.array_equal(kept, copy)
 
@@ -123,7 +123,7 @@ def test_many_flights_need_no_more_memory_than_one():
     before = read_pages()
     for _ in range(200):
         sls.fly(scenario).certificate
-    assert (read_pages() - before) * 4096 < 2 << 20  # one of them alone is 0.18 MB
+    assert (read_pages() - before) * 4096 < 2 << 20  # one flight has 0.18 MB
 
 
 def test_flights_repeat_to_the_bit_and_changes_change_them():
@@ -159,7 +159,7 @@ def test_one_vehicle_of_a_fleet_flies_alone():
 
 
 def test_a_failed_mission_is_told_and_does_not_raise(fly_with_program, tmp_path):
-    # More force than allowed is refused: at once.
+    # The first force is larger than the limit and is refused.
     scenario = sls.load_scenario("short", controller__force_limit_n=1.0)
     flight = sls.fly(scenario)
     assert not flight.is_finished and "controller.force_limit_n" in flight.failure
@@ -210,7 +210,7 @@ def test_a_disk_that_refuses_is_an_os_error(run_python, tmp_path):
 
 
 def load_long(seconds):
-    """A flight of so much simulated time, in which nothing happens."""
+    """The scenario of a hover for `seconds` of simulation time."""
     return sls.load_scenario("figure_eight", changes={
         "mission": [{"hold": {"position_m": [0, 0, -0.5]}, "for_s": seconds}]})
 
@@ -266,7 +266,7 @@ def test_ctrl_c_ends_a_flight_within_a_fifth_of_a_second(law):
 
 
 def wait_for_work(pid):
-    """Waits until the process has computed for a while since now; its clock ticks."""
+    """Waits until the process has used 10 more clock ticks of processor time. Returns all its ticks."""
     def read_ticks():
         with open(f"/proc/{pid}/stat") as file:
             return int(file.read().rsplit(")", 1)[1].split()[11])

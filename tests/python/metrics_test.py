@@ -40,7 +40,7 @@ class StepMetricsTest(unittest.TestCase):
         for damping in (0.1, 0.3, 0.5, 0.7, 0.9):
             response = 3.0 - 5.0 * respond(self.time_s, damping, 2.0)
             expected = math.exp(-math.pi * damping / math.sqrt(1 - damping**2))
-            # Around its peak the response is flat: a sample is short of it by (ω T)² / 8 at most.
+            # The response is flat around its peak: the nearest sample is at most (ω T)² / 8 below the peak.
             self.assertAlmostEqual(metrics.calc_overshoot(response, -2.0), expected, delta=1e-6)
 
     def test_a_response_that_only_approaches_its_target_has_no_overshoot(self):
@@ -50,14 +50,14 @@ class StepMetricsTest(unittest.TestCase):
         for constant_s in (0.2, 1.0, 3.0):
             response = -4.0 + 7.0 * np.exp(-self.time_s / constant_s)
             settled = metrics.calc_settling_time(self.time_s, response, -4.0)
-            # To 2 % takes ln 50 time constants; the first sample after is at most a period later.
+            # The error is 2 % after ln 50 time constants; the next sample is at most a period later.
             self.assertGreaterEqual(settled, constant_s * math.log(50))
             self.assertLessEqual(settled, constant_s * math.log(50) + PERIOD_S)
 
     def test_settling_time_of_a_critically_damped_response_is_known(self):
         frequency = 2.0
         response = 1 - (1 + frequency * self.time_s) * np.exp(-frequency * self.time_s)
-        low, high = 0.0, 20.0  # (1 + x) exp(-x) = 0.02 falls in x
+        low, high = 0.0, 20.0  # bisection of (1 + x) exp(-x) = 0.02, whose left side falls with x
         for _ in range(60):
             middle = (low + high) / 2
             low, high = (middle, high) if (1 + middle) * math.exp(-middle) > 0.02 else (low, middle)
@@ -65,7 +65,7 @@ class StepMetricsTest(unittest.TestCase):
         self.assertAlmostEqual(settled, high / frequency, delta=PERIOD_S)
 
     def test_settling_time_waits_for_the_last_swing_out_of_the_band(self):
-        # Undamped for 10 s inside 3 %, then still: it has left the band at each peak until then.
+        # An undamped swing of 3 % for 10 s, then rest: the swing leaves the band of 2 % at each peak.
         response = np.where(self.time_s < 10, 1 + 0.03 * np.sin(2 * np.pi * self.time_s), 1.0)
         response[0] = 0.0
         settled = metrics.calc_settling_time(self.time_s, response, 1.0)
@@ -85,7 +85,7 @@ class StepMetricsTest(unittest.TestCase):
                                delta=1.01 * PERIOD_S)
 
     def test_steady_state_error_is_the_mean_of_the_last_tenth(self):
-        # 0.25 with a swing of whole periods over the last 2 s; what was before does not count.
+        # The last 2 s hold 0.25 and whole periods of a sine. Earlier values do not count.
         errors = np.where(self.time_s < 17.9, 9.0, 0.25 + np.sin(np.pi * self.time_s))
         steady = metrics.calc_steady_state_error(self.time_s, np.column_stack([errors, -errors]))
         np.testing.assert_allclose(steady, [0.25, -0.25], atol=1e-3)
@@ -100,7 +100,7 @@ class StageMetricsTest(unittest.TestCase):
         np.testing.assert_allclose(metrics.calc_max(values), [3, 1, 2], rtol=1e-12)
 
     def test_laps_are_those_of_the_recorder(self):
-        # Two laps of 16 s at 4 ms from 0.004 s · 100 on; the very last row ends the second lap.
+        # Two laps of 16 s at 4 ms, from 0.004 s · 100 on. The last row belongs to the second lap.
         time_s = np.arange(100, 8101) * 0.004
         zeros = np.zeros((8001, 3))
         flight = make_flight(time_s, zeros, zeros, (Stage(0, "eight", 0, 8001, 0.4, 32, 16),))
@@ -117,7 +117,7 @@ class StageMetricsTest(unittest.TestCase):
                          [("lap 1", 0, 3999), ("lap 2 (part)", 4000, 6000)])
         self.assertEqual(list_of(0, 3999, 24), [("lap 1", 0, 3999)])
         self.assertEqual(list_of(0, 3998, 24), [("lap 1 (part)", 0, 3998)])
-        # Of a recorder that joined 20 s after the stage began, and one that began with a lap.
+        # A recorder that joined 20 s after the stage began, and recorders that joined at the start of a lap.
         self.assertEqual(list_of(5000, 12000, 48),
                          [("lap 2 (part)", 0, 2999), ("lap 3", 3000, 7000)])
         self.assertEqual(list_of(4000, 6000, 24), [("lap 2 (part)", 0, 2000)])

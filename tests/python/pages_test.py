@@ -18,7 +18,7 @@ from support import write_recording
 
 NO_SCENE = "sls: report without its scene: "
 VIEWER, FLYER = support.BUILD / "bin/sls_view", support.BUILD / "bin/closed_loop"
-os.environ.pop("SLS_VIEW", None)  # only tests of the scene have one
+os.environ.pop("SLS_VIEW", None)  # only tests of the scene use sls_view
 
 ALL = {"positions", "errors", "path", "angles", "forces", "attitude"}
 BODY = ALL - {"attitude"} | {"body_attitude", "body_rates", "rotors", "thrust"}
@@ -54,7 +54,7 @@ class PlotTest(support.FolderTest):
         self.assertEqual(code, 0, output)
         self.assertIn("sls: r: incomplete: its recorder was killed", output)
         self.assertEqual(names_of(self.folder / "o", "png"), ALL)
-        # A log alone has neither errors nor forces.
+        # Without a recording there is neither an error nor a force.
         self.assertEqual(self.run_sls("plot", "log.csv", "--out", "p")[0], 0)
         self.assertEqual(names_of(self.folder / "p", "png"), {"positions", "path", "angles"})
 
@@ -79,7 +79,7 @@ class PlotTest(support.FolderTest):
         self.assertEqual(self.run_sls("report", "r")[0], 0)
         page = (self.folder / "r/report.html").read_text()
         self.assertEqual(set(re.findall(r'<figure id="(\w+)">', page)), BODY | {"fleet"})
-        # Beside a point mass, and with another number of rotors.
+        # Together with a point mass, and with a vehicle that has another number of rotors.
         self.assertEqual(self.run_sls("plot", "point", "r", "six", "--out", "o")[0], 0)
         self.assertEqual(names_of(self.folder / "o", "png"), BODY)
 
@@ -236,7 +236,7 @@ class SceneTest(support.FolderTest):
         return page, output
 
     def fly(self, name, text=None):
-        """A real flight of a shipped scenario, or of `text`: a recording's folder."""
+        """Flies a shipped scenario, or `text`. Returns the recording's folder."""
         text = text or (support.ROOT / f"config/scenarios/{name}.yaml").read_text()
         scenario = self.write(f"{name}.yaml", text)
         subprocess.run([FLYER, "--scenario", scenario, "--out", self.folder / name], check=True,
@@ -279,7 +279,7 @@ class SceneTest(support.FolderTest):
         for name in (self.fly("fleet"), self.fly("long", long)):
             page, output = self.make_report(name, VIEWER)
             self.assertEqual(page.read_text().count("<iframe"), 1, output)
-            self.assertGreater(page.stat().st_size, 2_000_000)  # what is left is used
+            self.assertGreater(page.stat().st_size, 2_000_000)  # the scene uses the allowed bytes
 
     @unittest.skipUnless(browser.PROGRAM, browser.MISSING)
     @unittest.skipUnless(VIEWER.exists() and FLYER.exists(), "skipped: no sls_view in this build")

@@ -1,4 +1,4 @@
-"""The published formats, from small files written here with independent formulas."""
+"""Reads the published formats from small files, which this test writes with independent formulas."""
 
 import math
 import unittest
@@ -46,7 +46,7 @@ class PublishedLogsTest(support.FolderTest):
         self.expect_flight(load_log(file, "a"), 1.0, REFERENCE, [math.nan] * 3)
 
     def gazebo_row(self, time_s=7.0):
-        # As published: the sign of alpha is wrong.
+        # As in the published file: the sign of alpha is wrong.
         return join(time_s, *REFERENCE, *QUAD, 0.01, 0.02, 0.03, *VELOCITY, -ALPHA, BETA, 0.4, 0.5,
                     *FORCE)
 
@@ -55,7 +55,7 @@ class PublishedLogsTest(support.FolderTest):
         flight = load_log(file, "a")
         self.expect_flight(flight, 1.1)
         self.assertEqual(list(flight.time_s), [0.0, 0.5])
-        # Read as it stands the load would be on the other side of the quadrotor.
+        # With the sign of the file the load would be on the other side of the quadrotor.
         self.assertLess(flight.p_WL[0, 1], flight.p_WQ[0, 1])
 
     def test_a_px4_log_has_no_attitude_and_a_rod_of_1_metre_or_another(self):

@@ -1,4 +1,4 @@
-"""Control laws written in Python: what they are given, what becomes of their answers."""
+"""Control laws written in Python: their inputs and the use of their answers."""
 
 import importlib.util
 import threading
@@ -105,7 +105,7 @@ class Counter:
 
     def __call__(self, now):
         count, steps = now.memory
-        assert count == now.step  # zeros at step 0, then what was returned
+        assert count == now.step  # zero at step 0, then the returned memory
         return [0.0, 0.0, -WEIGHT_N], [count + 1, steps]
 
 
@@ -144,7 +144,7 @@ def test_a_law_that_keeps_something_is_refused():
             return count(now)
         return 0.0, 0.0, -WEIGHT_N
 
-    assert sls.fly(load_hover(), late)  # in the first 100 steps it kept nothing
+    assert sls.fly(load_hover(), late)  # in the first 100 steps its answers are equal
     with pytest.raises(sls.RunError, match="late: vehicle 0, step 200: expected equal answers"):
         sls.fly(load_hover(), late, check_purity=True)
 

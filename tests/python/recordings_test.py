@@ -1,4 +1,5 @@
-"""Recordings as the recorder leaves them, written here: whole, cut short, segmented, of fleets."""
+"""Reads recordings that this test writes in the recorder's format: complete, cut short, in segments, of
+fleets."""
 
 import json
 import shutil
@@ -45,7 +46,7 @@ class RecordingsTest(support.FolderTest):
         write_recording(self.folder / "r", last=3, vehicles=(0, 1))
         seen = Recording(self.folder / "r").load_seen(1, "r")
         np.testing.assert_array_equal(seen.p_WL[3], load_of(3, 1))
-        # As from a sensor that shows step 0 for ever; its last row is missing.
+        # Every measured row has the values of step 0, as from a frozen sensor. The last row is missing.
         state = (self.folder / "r/state.csv").read_text().splitlines()
         old = {row.split(",")[0]: row.split(",")[3:] for row in state[:0:-1]}
         rows = [",".join(row.split(",")[:3] + old[row.split(",")[0]]) for row in state[1:-1]]
@@ -68,7 +69,7 @@ class RecordingsTest(support.FolderTest):
         np.testing.assert_array_equal(body.rotor_speed[3], body.rotor_speed_set[3] - 5)
         self.assertEqual((body.thrust[3], body.thrust_set[3], body.rod_tension[3]),
                          (15.5, 16, 1.96))
-        # Before the autopilot was asked there is no set-point.
+        # There is no set-point before the first step of the autopilot.
         self.assertTrue(np.isnan(body.q_WB_set[0]).all() and np.isnan(body.thrust_set[0]))
 
     def test_of_a_plant_with_attitude_alone_that_is_all_there_is(self):
@@ -82,7 +83,7 @@ class RecordingsTest(support.FolderTest):
         self.assertEqual(flight.body.rotor_speed.shape, (4, 0))
         self.assertTrue(np.isfinite(flight.body.q_WB).all())
         self.assertTrue(np.isnan(flight.body.w_WB_B).all())
-        # The attitude that its force asks for is still known.
+        # The attitude that realises its force is still known.
         figure = make_figures([flight])["body_attitude"]
         self.assertEqual([len(axes.lines) for axes in figure.axes], [2, 2, 2])
 
@@ -99,7 +100,7 @@ class RecordingsTest(support.FolderTest):
     def test_its_metrics_are_what_was_put_into_it(self):
         write_recording(self.folder / "r")
         stage, eight, first, second = calc_stage_metrics(self.load())
-        # exp(−2 t) of the way is left: 2 % after ln 50 / 2 = 1.956 s.
+        # The remaining share of the step is exp(−2 t): 2 % after ln 50 / 2 = 1.956 s.
         np.testing.assert_array_equal(stage.step.settling_time_s, [np.nan, np.nan, 1.96])
         self.assertEqual(stage.max_m[2], 1.0)
         np.testing.assert_allclose(first.rms_m, 0.01, rtol=1e-9)
@@ -124,7 +125,7 @@ class RecordingsTest(support.FolderTest):
         write_recording(self.folder / "r", last=150, complete=False)
         write_recording(self.folder / "r/segment-2", first=140, last=500, complete=False, segment=2)
         write_recording(self.folder / "r/segment-3", first=501, segment=3)
-        (self.folder / "r/segment-4").mkdir()  # of a recorder killed before it had written anything
+        (self.folder / "r/segment-4").mkdir()  # its recorder was killed before it wrote a file
         flight, whole = self.load(), Recording(self.folder / "whole").load_flight(0, "w")
         for values, expected in ((flight.time_s, whole.time_s), (flight.p_WL, whole.p_WL),
                                  (flight.p_WL_ref, whole.p_WL_ref), (flight.f_Q_W, whole.f_Q_W)):

@@ -1,4 +1,4 @@
-"""The campaigns of config/campaigns: files, bases, first and last runs; the predictions beside
+"""The campaigns of config/campaigns: files, bases, first and last runs, and the linear predictions for
 them."""
 
 import sys
@@ -67,10 +67,10 @@ class ShippedCampaignsTest(unittest.TestCase):
 
 
 class PredictionTest(unittest.TestCase):
-    """Against flights, not against the page."""
+    """Compares the linear predictions with flights, not with the page."""
 
     def fly(self, name, **values):
-        """Measures of one flight of a campaign's base, by column."""
+        """Flies a campaign's base with `values`. Returns the outcome and the measures by column."""
         campaign = load_campaign(FOLDER / f"{name}.yaml")
         paths = [path.replace("__", ".") for path in values]
         runs = _sls_core.Runs(str(campaign.base), paths, list(campaign.measures), None)
@@ -92,23 +92,23 @@ class PredictionTest(unittest.TestCase):
 
     def test_the_right_mass_is_the_formula_of_the_readme(self):
         gains = findings.calc_lqr_gains(10, 4)
-        # closed_loop/README.md: 0.234 s, less half a period for the hold.
+        # closed_loop/README.md: 0.234 s, minus half a period for the hold.
         self.assertAlmostEqual(findings.calc_delay_limit(gains), 0.232, delta=5e-4)
         np.testing.assert_allclose(gains, [3.1623, 8.4827, 9.7962, 5.4399], atol=5e-5)
 
     def test_the_load_sags_as_predicted(self):
-        # After 12 s of settling what is left of the transient is below a millimetre.
+        # After 12 s the transient is below a millimetre.
         _, found = self.fly("mass_and_delay", vehicle__load_mass_kg=0.3)
         sag = findings.calc_sag(0.3, 0.2, findings.calc_lqr_gains(5, 2)[0])
         self.assertAlmostEqual(found["stage_2_load_error_rms_z_m"], sag, delta=1e-3)
 
     def test_a_gust_moves_the_load_as_predicted(self):
-        force = 0.2  # small, so that what is not linear stays below 1 %
+        force = 0.2  # small: nonlinear effects stay below 1 %
         outcome, found = self.fly("wind", faults__0__bias__force_n=f"[{force}, 0, 0]",
                                   plant__rotor_drag_n_s_m=0)
         self.assertEqual(outcome, "finished")
         peak = force * findings.calc_pulse_peak(findings.calc_lqr_gains(10, 4))
-        # Beside what the start leaves: a few millimetres.
+        # The tolerance includes the transient of the start, a few millimetres.
         self.assertAlmostEqual(found["load_error_max_x_m"], peak, delta=0.01 * peak + 0.005)
 
     def test_the_vertical_loop_ends_where_its_root_is_imaginary(self):

@@ -1,5 +1,5 @@
-"""The study flown again gives the page that is committed, and its chapter on PX4 says what its
-flights did. Takes minutes: `./sls test --slow`."""
+"""The study flown again gives the committed page, and the numbers of its chapter on PX4 agree with its
+flights. Takes minutes: `./sls test --slow`."""
 
 import contextlib
 import csv
@@ -27,7 +27,7 @@ def read_rows(path, names, from_s=-math.inf, to_s=math.inf):
 
 
 def calc_lap_errors(folder, file, z_shift=0.0):
-    """Errors of the second lap, its first and last row included, as the page's."""
+    """Errors of the second lap, with its first and last row, as in the page."""
     names = ("load_x_m", "load_y_m", "load_z_m")
     load = read_rows(folder / file, ("step", *names), LAP_FROM_S, LAP_TO_S)
     reference = read_rows(folder / "reference.csv", ("step", "ref_x_m", "ref_y_m", "ref_z_m"),
@@ -52,7 +52,7 @@ class StudyTest(unittest.TestCase):
         cls.page = (cls.folder / "s/study.md").read_text()
 
     def find_cells(self, begin, table=0):
-        """Of the row that begins so, in the table that is the `table`th to have one."""
+        """The cells of a row that begins with `begin`: that in the `table`th table with such a row."""
         rows = [line for line in self.page.splitlines() if line.startswith(f"| {begin}")]
         return [cell.strip() for cell in rows[table].strip("|").split("|")][1:]
 
@@ -71,13 +71,13 @@ class StudyTest(unittest.TestCase):
                 np.testing.assert_allclose([float(cell) for cell in cells], expected, rtol=6e-3)
 
     def test_flights_with_a_late_force_follow_the_linear_formula(self):
-        """The errors of the second lap against a solution of the equations of motion for each
-        frequency. 0.5 %: the law is exact, the attitude of its force is not small-angled."""
+        """Compares the errors of the second lap with the solution of the linear equations of motion for
+        each frequency. The tolerance is 0.5 %, because the law is exact but the angles of the flight are not small."""
         for gains, name in ((GAINS, "reversed"), (GAINS[::-1], "right")):
             for delay_ms in (40, 120, 200):
                 folder = self.folder / f"r/ideal_{name}_delay_{delay_ms}ms"
                 rms = np.sqrt(np.mean(calc_lap_errors(folder, "state.csv")**2, axis=0))
-                late = Lateness(1e-3 * delay_ms + 0.002)  # and half the hold of 4 ms
+                late = Lateness(1e-3 * delay_ms + 0.002)  # plus half the hold of 4 ms
                 for axis, amplitude in ((0, 1.5), (1, 0.75)):
                     s = 2j * math.pi / 16 * (axis + 1)
                     expected = amplitude / math.sqrt(2) * abs(solve_error_ratio(gains, late, s, rod_m=1.0))
@@ -87,7 +87,7 @@ class StudyTest(unittest.TestCase):
         for name in ("roll", "pitch"):
             rows = read_rows(self.folder / f"r/attitude_step_{name}/state.csv",
                              ("sim_time_s", "att_w", "att_x", "att_y"))
-            tilt = 2 * np.hypot(rows[:, 2], rows[:, 3])  # small, without yaw
+            tilt = 2 * np.hypot(rows[:, 2], rows[:, 3])  # holds for small angles without yaw
             first = np.flatnonzero(tilt >= 0.632 * 0.1)[0]
             self.assertAlmostEqual(rows[first, 0] - 2.0, 0.17, delta=0.02)
         said = float(self.page.split("reaches 63 % after ")[1].split(" s")[0])

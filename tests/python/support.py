@@ -1,5 +1,5 @@
-"""Shared by the tests of the package. A test is run with the build folder as its argument; without
-what the package needs it is skipped (exit code 77)."""
+"""Shared by the tests of the package. The argument of a test is the build folder. If a module that the
+package needs is missing, the test is skipped (exit code 77)."""
 
 import contextlib
 import io
@@ -15,7 +15,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 BUILD = pathlib.Path(sys.argv.pop(1)) if len(sys.argv) > 1 else ROOT / "build"
 sys.path[:0] = [str(ROOT / "python"), str(ROOT / "tests/support")]
 CACHE = tempfile.TemporaryDirectory()
-os.environ.setdefault("MPLCONFIGDIR", CACHE.name)  # nothing is left in anybody's home
+os.environ.setdefault("MPLCONFIGDIR", CACHE.name)  # matplotlib must not write into the home folder
 
 try:
     import matplotlib  # noqa: F401
@@ -30,7 +30,7 @@ from own_domain import OwnDomain  # noqa: E402, F401
 
 
 class FolderTest(unittest.TestCase):
-    """A test with a folder of its own."""
+    """A test with its own folder."""
 
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
@@ -44,7 +44,7 @@ class FolderTest(unittest.TestCase):
         return path
 
     def run_sls(self, *arguments):
-        """The command line in the test's folder: exit code and what it said."""
+        """Runs the command line in the test's folder. Returns exit code and output."""
         from sls.__main__ import main
         with contextlib.chdir(self.folder), io.StringIO() as said:
             with contextlib.redirect_stderr(said):
@@ -52,7 +52,7 @@ class FolderTest(unittest.TestCase):
             return code, said.getvalue()
 
     def expect_refused(self, arguments, *parts):
-        """One line that holds `parts`, and exit code 2."""
+        """Checks that the command prints one line that contains `parts`, and ends with exit code 2."""
         code, output = self.run_sls(*arguments)
         self.assertEqual(code, 2, output)
         self.assertEqual(output.count("\n"), 1, output)
@@ -62,7 +62,7 @@ class FolderTest(unittest.TestCase):
 
 
 def read_header(file):
-    """The columns of a file of the recorder, of a plant without signals."""
+    """The header of a file of the recorder for a plant without signals."""
     page = (ROOT / "docs/reference/recordings.md").read_text()
     table = page[page.index(f"\n## {file}"):].split("\n\n")[1].rstrip()
     rows = [line.split(" | ") for line in table.split("\n")[2:]]
@@ -86,7 +86,7 @@ STEPS_PER_STAGE = 400
 
 
 def reference_of(step):
-    """Stage, name and position: a set-point for 4 s, then two laps of 2 s."""
+    """Stage, name and position of the synthetic reference: a set-point for 4 s, then two laps of 2 s."""
     if step < STEPS_PER_STAGE:
         return 0, "set_point", np.array([1.0, -1.0, -2.0])
     time_s = (step - STEPS_PER_STAGE) * PERIOD_S
@@ -96,7 +96,8 @@ def reference_of(step):
 
 
 def load_of(step, vehicle_id):
-    """At first 1 m above the set-point, then nearer; on the laps 1 cm, then 1 mm off."""
+    """Position of the load: 1 m above the set-point at first, then nearer; the error is 1 cm on the first
+    lap and 1 mm on the second."""
     _, _, reference = reference_of(step)
     if step < STEPS_PER_STAGE:
         return reference + np.array([0, 0, -np.exp(-2 * step * PERIOD_S)]) * (1 + vehicle_id)
@@ -104,7 +105,7 @@ def load_of(step, vehicle_id):
 
 
 def multiply(*quaternions):
-    """Hamilton's product of w x y z."""
+    """Hamilton's product of quaternions w x y z."""
     product = np.array([1.0, 0, 0, 0])
     for w, *v in quaternions:
         a, u = product[0], product[1:]
@@ -113,19 +114,19 @@ def multiply(*quaternions):
 
 
 def angles_of(step):
-    """Roll, pitch, yaw of the synthetic vehicle's set-point; it follows 0.01 rad behind in each."""
+    """Roll, pitch, yaw of the synthetic vehicle's set-point. The vehicle is 0.01 rad behind in each angle."""
     time_s = step * PERIOD_S
     return 0.4 * np.sin(time_s), -0.3 * np.cos(time_s), 0.1 * time_s
 
 
 def quaternion_of(roll, pitch, yaw):
-    """About z, then y, then x."""
+    """Unit quaternion of rotations about z, then y, then x."""
     return multiply(*([np.cos(angle / 2), *(np.sin(angle / 2) * np.eye(3)[axis])]
                       for angle, axis in ((yaw, 2), (pitch, 1), (roll, 0))))
 
 
 def list_body_columns(rotors):
-    """Of a plant with attitude and signals: sim_server/plants/multirotor/README.md, "Signals"."""
+    """Columns of a plant with attitude and signals: sim_server/plants/multirotor/README.md, "Signals"."""
     return ["att_w", "att_x", "att_y", "att_z", "rate_x_rad_s", "rate_y_rad_s", "rate_z_rad_s",
             *(f"rotor_{n}_rad_s" for n in range(1, rotors + 1)),
             *(f"rotor_{n}_set_rad_s" for n in range(1, rotors + 1)),
@@ -136,7 +137,7 @@ def list_body_columns(rotors):
 def list_body_values(step, rotors):
     asked = angles_of(step)
     set_points = [900 + 10 * n + step for n in range(1, rotors + 1)]
-    # At step 0 the plant has not asked its autopilot yet.
+    # At step 0 the autopilot has not run yet.
     att_set, thrust_set = (quaternion_of(*asked), 16) if step else ([1, 0, 0, 0], 0)
     return [*quaternion_of(*(angle - 0.01 for angle in asked)), 0.1, -0.2, 0.3,
             *(speed - 5 for speed in set_points), *set_points, *att_set, thrust_set, 15.5, 1.96]
@@ -144,8 +145,8 @@ def list_body_values(step, rotors):
 
 def write_recording(folder, first=0, last=2 * STEPS_PER_STAGE, vehicles=(0,), complete=True,
                     missing=(), segment=1, rotors=0):
-    """A recording of steps `first` to `last`, with the columns of design and recorder; of a body
-    with `rotors` where there are any."""
+    """Writes a recording of steps `first` to `last` with the recorder's columns. With `rotors` it is that of
+    a plant with attitude."""
     folder.mkdir(parents=True, exist_ok=True)
     header = ",".join([STATE_HEADER, *(list_body_columns(rotors) if rotors else ())])
     rows = {"state.csv": [header], "command.csv": [COMMAND_HEADER],

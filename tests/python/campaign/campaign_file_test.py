@@ -88,7 +88,7 @@ def test_the_examples_of_the_readme_are_campaigns(tmp_path):
 
 def test_has_defaults(tmp_path):
     campaign = support.make_campaign(tmp_path, SEEDS)
-    assert len(campaign.measures) == 7  # all but the outcome, which is always there
+    assert len(campaign.measures) == 7  # without the outcome, which every campaign has
     assert campaign.keep == Keep("none")
     assert campaign.certify == Certify("all")
     assert campaign.period_s is None

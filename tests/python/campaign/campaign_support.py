@@ -8,7 +8,7 @@ sys.path.insert(0, str(HERE.parents[2] / "python"))
 
 
 def write_campaign(folder, text, name="campaign.yaml"):
-    """A campaign file with the base scenario of these tests."""
+    """Writes a campaign file that uses the base scenario of these tests."""
     file = Path(folder) / name
     file.write_text(f"base: {HERE / 'base.yaml'}\n" + text)
     return file

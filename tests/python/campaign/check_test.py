@@ -9,7 +9,7 @@ from sls.input_error import InputError
 
 
 class Checker:
-    """In place of `_sls_core.Runs`: knows two rules of the scenario reader, and counts."""
+    """Replaces `_sls_core.Runs`: it has some rules of the scenario reader, and counts checks."""
 
     def __init__(self, campaign):
         self.paths = campaign.scenario_paths
@@ -36,7 +36,7 @@ class Checker:
 
 
 def check(folder, text):
-    """The message without the file, and how many runs were checked; no message: all is well."""
+    """The message without the file (empty if the campaign is accepted), and the number of checked runs."""
     campaign = support.make_campaign(folder, text)
     checker = Checker(campaign)
     try:
@@ -92,7 +92,7 @@ def test_finds_the_one_run_of_a_normal_distribution_that_is_impossible(tmp_path)
 
 
 def test_the_extension_knows_the_rules(tmp_path):
-    """With the real checker, where it is built."""
+    """Uses the real checker, if it is built."""
     core = pytest.importorskip("_sls_core")
     if not hasattr(core, "Runs"):
         pytest.skip("no Runs in this build")

@@ -1,4 +1,4 @@
-"""Arithmetic of campaign files, judged by Python's own and by closed forms."""
+"""Arithmetic of campaign files, compared with Python's arithmetic and with closed forms."""
 
 import math
 import pickle

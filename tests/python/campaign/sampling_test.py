@@ -1,5 +1,5 @@
-"""The values of runs: distributions against closed forms, the generator against its definition, and
-that run i has the same values whatever else is asked for."""
+"""The values of runs: distributions agree with closed forms and the generator with its definition. Run i
+always has the same values, independent of other runs, chunks and keys."""
 
 import hashlib
 import itertools
@@ -18,8 +18,8 @@ from sls.campaign.yaml_nodes import parse_yaml
 from sls.input_error import InputError
 
 DRAWS = 20_000
-# A Kolmogorov-Smirnov distance of n true samples is above 1.95 / √n once in a thousand times
-# (Kolmogorov's distribution); the seeds are fixed, so these tests pass always or never.
+# The Kolmogorov-Smirnov distance of n samples of the true distribution is above 1.95 / √n once in a
+# thousand times (Kolmogorov's distribution). The seeds are fixed: each test always has the same result.
 LARGEST_DISTANCE = 1.95 / math.sqrt(DRAWS)
 EVERYTHING = """
   _uniform: { uniform: [-1, 3], seed: 1 }
@@ -52,7 +52,7 @@ def calc_phi(x):
 
 
 def calc_distance(samples, calc_cdf):
-    """Kolmogorov-Smirnov: largest distance between the samples' distribution and the exact one."""
+    """Kolmogorov-Smirnov distance: the largest one between the samples' distribution and the exact one."""
     exact = np.array([calc_cdf(x) for x in np.sort(samples)])
     steps = np.arange(len(samples) + 1) / len(samples)
     return max(np.max(exact - steps[:-1]), np.max(steps[1:] - exact))
@@ -100,7 +100,7 @@ def test_the_distance_tells_distributions_apart(tmp_path):
 ])
 def test_has_the_moments_of_its_closed_form(tmp_path, spec, mean, deviation):
     samples = draw(tmp_path, spec)
-    error = deviation / math.sqrt(DRAWS)  # of the mean
+    error = deviation / math.sqrt(DRAWS)  # standard error of the mean
     assert abs(samples.mean() - mean) < 4 * error
     # The variance of the sample deviation is below 1/n times the variance for all three.
     assert abs(samples.std() - deviation) < 4 * error
@@ -127,7 +127,7 @@ def test_different_keys_and_seeds_are_independent(tmp_path):
                for kind in ("uniform", "latin_hypercube") for seed in (0, 1)
                for path in ("_x", "_y")]
     for a, b in itertools.combinations(columns, 2):
-        # Of independent samples the correlation has standard deviation 1/√n; 28 pairs.
+        # The correlation of independent samples has standard deviation 1/√n; there are 28 pairs.
         assert abs(np.corrcoef(a, b)[0, 1]) < 4 / math.sqrt(DRAWS)
 
 
@@ -160,7 +160,7 @@ def test_each_elementary_interval_holds_one_point_of_sobol(tmp_path):
 
 
 def test_sobol_integrates_better_than_chance(tmp_path):
-    """Of Π (1 + (x_i - 1/2)) over six coordinates, which is 1."""
+    """The integral is that of Π (1 + (x_i - 1/2)) over six coordinates; its value is 1."""
     runs = 4096
     vary = "\n".join(f"  _{i}: {{ %s: [0, 1], seed: 2 }}" for i in range(6))
     errors = {}
@@ -168,7 +168,7 @@ def test_sobol_integrates_better_than_chance(tmp_path):
         campaign = make(tmp_path, vary.replace("%s", kind), runs)
         points = np.array(make_values(campaign, 0, runs - 1))
         errors[kind] = abs(np.mean(np.prod(0.5 + points, axis=1)) - 1)
-    # Chance alone: standard deviation √((13/12)^6 - 1) / √4096 = 0.0125.
+    # Independent samples: standard deviation √((13/12)^6 - 1) / √4096 = 0.0125.
     assert errors["uniform"] < 4 * 0.0125
     assert errors["sobol"] < 0.001
 
@@ -218,7 +218,7 @@ def test_another_key_changes_no_other(tmp_path):
     more = "  _new: { uniform: [0, 1], seed: 1 }\n  _newer: { latin_hypercube: [0, 1], seed: 1 }"
     changed = [
         "\n".join([more, *lines]),
-        "\n".join(reversed(lines)).replace("_sobol", "_sobel"),  # Sobol's go by their order
+        "\n".join(reversed(lines)).replace("_sobol", "_sobel"),  # values of sobol keys depend on their order
         *("\n".join(lines[:i] + lines[i + 1:]) for i in (1, 2, 3, 4, 5, 7, 8, 9, 10)),
     ]
     for vary in changed:
@@ -285,11 +285,11 @@ seeds: [faults.0.noise.seed]""", 20)
     for run, (law, x, mass, seed) in enumerate(make_values(campaign, 0, 19)):
         assert (law, mass) == points[run % 6]
         assert [x] == make_values(alone, run // 6, run // 6)[0]
-        assert seed == 3 + run // 6  # 3 stands in the base scenario
+        assert seed == 3 + run // 6  # 3 is the seed in the base scenario
 
 
 def test_a_grid_is_rounded_once(tmp_path):
-    """Whole nanoseconds: a delay must be a multiple of the period."""
+    """A delay must be a multiple of the period, in whole nanoseconds."""
     campaign = make(tmp_path, "  faults.2.delay.by_s: { grid: [0, 0.4, 101] }", None)
     assert [row[0] for row in make_values(campaign, 0, 100)] == [i * 4 / 1000 for i in range(101)]
 
@@ -320,7 +320,7 @@ def test_rounds_to_multiples(tmp_path):
     samples = draw(tmp_path, "uniform: [0, 0.08], multiple_of: 0.004")
     counts = dict(zip(*np.unique(samples, return_counts=True)))
     assert sorted(counts) == [i * 4 / 1000 for i in range(21)]
-    # The ends are hit half as often: binomial, n = 20,000, p = 1/40 and 1/20.
+    # The ends occur half as often: binomial, n = 20,000, p = 1/40 (ends) and 1/20.
     assert abs(counts[0.0] - 500) < 4 * math.sqrt(500)
     assert abs(counts[0.04] - 1000) < 4 * math.sqrt(1000)
     whole = make(tmp_path, "  _x: { uniform: [0, 9], multiple_of: 3 }", 50)
@@ -367,7 +367,7 @@ def test_derives_values_in_any_order(tmp_path):
         wind, speed, half, angle, length, controllers = row
         assert speed == 2 * half
         assert wind == [speed * math.cos(angle), speed * math.sin(angle), 0.0]
-        assert length == 1.0 * 1.1  # of the base scenario
+        assert length == 1.0 * 1.1  # 1.0: the value in the base scenario
         assert isinstance(controllers, int) and abs(controllers - 1 - 3 * half) <= 0.5
         assert campaign.pick_scenario_values(row) == [wind, length, controllers]
 

@@ -1,9 +1,9 @@
-"""Stands for the extension module where a test is about chunks and processes, not about flights: a run
-costs nothing and its measures are simple functions of its values.
+"""Replaces the extension module in tests of chunks and processes. A run takes no time, and its measures are
+simple functions of its values.
 
-SLS_FAKE holds words: `kill=17` ends the process in run 17 each time, `kill-once=17:FILE` only where FILE
-is not there yet, `sleep=0.01` makes a run last, `refuse=17` refuses run 17 when it is flown,
-`other=1` gives other measures. The run is the value of the key `index`."""
+SLS_FAKE holds words: `kill=17` ends the process in run 17 each time, `kill-once=17:FILE` only if FILE does
+not exist yet, `sleep=0.01` makes a run last 0.01 s, `refuse=17` refuses run 17 when it is flown, `other=1`
+gives other measures. The number of a run is the value of its last key, `index`."""
 
 import hashlib
 import math
