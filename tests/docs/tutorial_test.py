@@ -293,7 +293,7 @@ class Terminal:
 
 
 class Hosts:
-    """Network namespaces on one bridge. tests/network/network.cpp uses names of the same form, and removes leftovers."""
+    """Network namespaces on one bridge. tests/network/network.cpp uses such names, too, and removes leftovers."""
 
     NAMES = ("server", "controller", "recorder")
 

@@ -32,7 +32,7 @@ def kept_folder(folder: "CampaignFolder", index: int) -> Path:
 
 
 def is_kept(campaign: Campaign, row: dict[str, str]) -> bool:
-    """True if the recording of this row is kept, whatever the other rows contain."""
+    """True if the recording of this row is kept because of its outcome (`keep: all` or `keep: failed`)."""
     kind = campaign.keep.kind
     return kind == "all" or kind == "failed" and row["outcome"] != "finished"
 
