@@ -1,4 +1,4 @@
-"""Types of the extension module. The package sls is its face: what each name does is said there."""
+"""Types of the extension module. Users import the package sls, which documents each name."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -24,13 +24,13 @@ class Vehicle:
     def gravity_m_s2(self) -> float: ...
 
 class Scenario:
-    """Everything that decides a flight. Made by sls.load_scenario."""
+    """All parameters of a flight. Made by sls.load_scenario."""
 
     def __init__(self, file: str | None = None, text: str = "", folder: str = "",
                  changes: Mapping[str, str] = ...) -> None: ...
     @property
     def text(self) -> str:
-        """YAML: a file with this text is the same scenario."""
+        """The scenario as YAML. A file with this text in `folder` gives the same scenario."""
     def to_text(self) -> str: ...
     @property
     def sha256(self) -> str: ...
@@ -61,10 +61,10 @@ class Scenario:
     def force_limit_n(self) -> float: ...
     @property
     def stages(self) -> tuple[tuple[str, str, float | None, float | None], ...]:
-        """Of the mission: (kind, name, for_s, lap_s)."""
+        """The stages of the mission: (kind, name, for_s, lap_s) each."""
 
 class Reference(tuple[Vector, ...]):
-    """The desired motion of the load at one instant: vectors in W."""
+    """The desired motion of the load at one instant, as vectors in W."""
 
     @property
     def position(self) -> Vector:
@@ -83,11 +83,11 @@ class Reference(tuple[Vector, ...]):
         """m/s⁴"""
 
 class Now(tuple[Any, ...]):
-    """All that a control law may look at, of one vehicle at one step. Frame W, z down."""
+    """The inputs of a control law, for one vehicle at one step. Frame W, z down."""
 
     @property
     def step(self) -> int:
-        """k, counts control periods from 0."""
+        """Number k of the control period, from 0."""
     @property
     def time_s(self) -> float: ...
     @property
@@ -125,18 +125,18 @@ class Now(tuple[Any, ...]):
         """rad/s"""
     @property
     def attitude(self) -> tuple[float, float, float, float] | None:
-        """Unit quaternion (w, x, y, z), body to W; None of a plant without attitude."""
+        """Unit quaternion (w, x, y, z), body to W; None if the plant has no attitude."""
     @property
     def body_rates(self) -> Vector | None:
-        """In the body, rad/s; None of a plant without attitude."""
+        """In the body frame, rad/s; None if the plant has no attitude."""
     @property
     def signals(self) -> tuple[float, ...]:
-        """Of the plant, in its order."""
+        """Signals of the plant, in the plant's order."""
     @property
     def reference(self) -> Reference: ...
     @property
     def memory(self) -> tuple[float, ...]:
-        """The law's result at the step before; zeros at step 0."""
+        """The memory that the law returned at the step before; zeros at step 0."""
 
 class FlownFlight:
     @property

@@ -22,7 +22,7 @@ class Text:
     path: Path
     lines: list[str]
     rest: str
-    """Text after the last line end; in a recording, of a row amid which its writer was killed."""
+    """Text after the last line end. In a recording this is a row whose writer was killed."""
 
 
 def read_text(path: Path) -> Text:

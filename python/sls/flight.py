@@ -37,7 +37,7 @@ class LawWithMemory(Protocol):
     `now.memory`; step 0 has zeros. The other rules are those of Law."""
 
     memory_size: int
-    """How many numbers, 0 to 64."""
+    """Number of memory values, 0 to 64."""
 
     def __call__(self, now: "Now") -> tuple[Sequence[float], Sequence[float]]:
         ...

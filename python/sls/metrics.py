@@ -9,9 +9,9 @@ from sls.trajectory import Trajectory, Stage
 
 SETTLING_BAND = 0.02
 LEAST_STEP_M = 0.01
-"""A stage that begins nearer than this to its target has no step response."""
+"""A stage that begins at a smaller distance from its target has no step response."""
 MOST_LAPS = 1000
-"""Of a stage; flight.txt has no more either."""
+"""Largest number of laps of a stage, as in flight.txt."""
 
 
 def calc_rms(values: np.ndarray) -> np.ndarray:
@@ -97,7 +97,7 @@ class Lap:
     """From 1."""
     rows: np.ndarray
     is_whole: bool
-    """Neither begun before the first row of its stage nor cut short by the last one."""
+    """True if the rows of the stage contain the start and the end of the lap."""
 
     @property
     def label(self) -> str:

@@ -23,10 +23,10 @@ class LogFormat:
     name: str
     has_header: bool
     columns: tuple[str, ...]
-    """By what they hold: headings in the files may say otherwise."""
+    """Names by content; headings in the files may differ."""
     alpha_sign: float = 1.0
     rod_length_m: float = 1.0
-    """Of a format without the load's position."""
+    """Rod length for a format without the load's position, m."""
 
 
 FORMATS = {layout.name: layout for layout in (

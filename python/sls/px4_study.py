@@ -111,7 +111,7 @@ INGREDIENTS = (
     ("px4_published", "all but tilt and yaw error", "0.037, 0.156, 0.097"),
     ("px4_fitted", "all", "0.118, 0.285, 0.097"),
 )
-"""Scenario, what it adds to the first, and what a prototype gave: rms x, y, z, m."""
+"""Scenario, its additions to the first one, and the rms errors x, y, z of a prototype, m."""
 
 ATTITUDE_LAG_S = 0.154
 
@@ -128,7 +128,7 @@ BOUGHT = (
     (Planned("fitted_first_order", "px4_fitted", (lag_first_order(ATTITUDE_LAG_S),)),
      f"a lag of {ATTITUDE_LAG_S} s for rotors and attitude loop, exact thrust"),
 )
-"""Changes of px4_fitted, with a description each."""
+"""Flights of px4_fitted with changes, each with a description."""
 
 WITHOUT_LOSS = Planned("attitude_without_thrust_loss", "px4_attitude", (lose_no_thrust,))
 
@@ -143,11 +143,11 @@ LATE = tuple((gains, Lateness(delay_s=delay_s),
      Planned(f"ideal_{gains}_lag_{1000 * lag_s:.0f}ms", "px4_ideal",
              (*changes, lag_first_order(lag_s))))
     for gains, changes in GAINS for lag_s in LAGS_S)
-"""Gains, how late the force is, and the flight."""
+"""Gains, lateness of the force, and the flight."""
 
 STEPS = (("roll", 0, Planned("attitude_step_roll", "px4_attitude", (step_force(1, 1.0),))),
          ("pitch", 1, Planned("attitude_step_pitch", "px4_attitude", (step_force(0, -1.0),))))
-"""Name and index of the angle, and the flight: to the right it rolls, backwards it pitches up."""
+"""Name and index of the angle, and the flight. A force to the right gives roll, a force backwards pitch."""
 
 MARGINS = tuple(
     (vehicle, gains, mission, Planned(f"margin_{vehicle}_{gains}{suffix}", vehicle,
@@ -158,7 +158,7 @@ MARGINS = tuple(
         ("px4_attitude", "a step of 0.2 m", "_step", (step_gently,)),
         ("px4_fitted", "a step of 0.2 m", "_step", (step_gently,)))
     for gains, gain_changes in GAINS)
-"""Vehicle, gains, mission in words, and the scenario whose delay margin is looked for."""
+"""Vehicle, gains, mission in words, and the scenario whose delay margin is searched."""
 
 FLIGHTS = (*(Planned(name, name) for name, _, _ in INGREDIENTS), *(flight for flight, _ in BOUGHT),
            WITHOUT_LOSS, *(flight for _, _, flight in LATE),
@@ -247,9 +247,9 @@ class Margin:
     holds_s: float
     loses_s: float
     lost_at_s: float
-    """When the load is lost with `loses_s`."""
+    """Time of the loss with the delay `loses_s`."""
     worst_error_m: float
-    """Without added delay."""
+    """Largest error without added delay."""
 
 
 def load_margin(planned: Planned, recordings: Path) -> Margin:
@@ -321,11 +321,11 @@ def calc_formula_rms(gains: str, late: Lateness) -> np.ndarray:
 @dataclass(frozen=True)
 class StepResponse:
     time_s: np.ndarray
-    """Since the step."""
+    """Time since the step."""
     share: np.ndarray
-    """Of the set-point."""
+    """Angle as a share of its set-point."""
     rise_s: float
-    """When it first reaches 63 %."""
+    """Time at which the angle first reaches 63 % of its set-point."""
 
 
 def measure_step(flight: Trajectory, angle: int) -> StepResponse:

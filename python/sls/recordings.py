@@ -54,9 +54,9 @@ class Verification:
     """The result of reading every file of a recording again."""
 
     steps: int
-    """Of the vehicle that has most."""
+    """Number of steps, of the vehicle that has most."""
     certificate: str
-    """Of the rows; empty if they cannot be read."""
+    """Certificate of the rows; empty if they cannot be read."""
     problems: tuple[str, ...]
     """Differences between files and their manifest, one line each."""
 
@@ -72,7 +72,7 @@ class Comparison:
     difference: str | None
     """The first row or field that differs: file, vehicle, step, column and both values."""
     notes: tuple[str, ...]
-    """Differences and gaps according to the manifests; the data may be equal all the same."""
+    """Differences and gaps according to the manifests. The data may be equal nevertheless."""
 
     @property
     def is_equal(self) -> bool:

@@ -10,9 +10,9 @@ from pathlib import Path
 from sls.recordings import Recording
 
 MOST_BYTES = 4_000_000
-"""Of a whole report."""
+"""Limit for a whole report."""
 MARGIN = 0.04
-"""Of the page: letters that stand for themselves in a file of its own, but not in an attribute."""
+"""Share of the scene's bytes that is reserved for escaped characters: the page becomes an HTML attribute."""
 
 
 def find_program() -> Path | None:

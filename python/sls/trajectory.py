@@ -21,11 +21,11 @@ class Stage:
     first: int
     end: int
     start_s: float
-    """When the stage began: before its first row where the recorder joined later."""
+    """Start of the stage. It is before the first row if the recorder joined later."""
     duration_s: float = math.inf
-    """As planned, of a timed stage."""
+    """Planned duration of a timed stage."""
     lap_s: float | None = None
-    """Duration of a lap, of a figure eight."""
+    """Duration of a lap of a figure eight."""
 
     @property
     def rows(self) -> slice:
@@ -47,9 +47,9 @@ class Body:
     rotor_speed_set: np.ndarray
     """Set-points, (n, rotors), rad/s."""
     thrust: np.ndarray
-    """Of all rotors, (n,), N."""
+    """Thrust of all rotors, (n,), N."""
     thrust_set: np.ndarray
-    """Thrust asked for, (n,), N."""
+    """Set-point of the thrust, (n,), N."""
     rod_tension: np.ndarray
     """(n,), N."""
 
@@ -67,7 +67,7 @@ class Trajectory:
     p_WL: np.ndarray
     """Load position, (n, 3), m."""
     p_WL_ref: np.ndarray
-    """Where the load should be, (n, 3), m."""
+    """Desired position of the load, (n, 3), m."""
     alpha: np.ndarray
     """Rod angle about x, (n,), rad."""
     beta: np.ndarray
@@ -80,7 +80,7 @@ class Trajectory:
     notes: tuple[str, ...] = ()
     """Missing parts, a line each."""
     body: Body | None = None
-    """None: the source knows a point mass alone."""
+    """None if the source has no attitude and no rotors."""
 
     def calc_error(self) -> np.ndarray:
         """Load position error, (n, 3), m."""
