@@ -76,7 +76,7 @@ struct CommandRow {
   static void visit(Row& row, Visitor& field) {
     field({"vehicle_id", "", "vehicle", "vehicle_id"}, row.vehicle_id);
     field({"step", "", "k", "step"}, row.step);
-    field({"controller", "", "whose answer", "client_name", false}, row.controller);
+    field({"controller", "", "client that sent the answer", "client_name", false}, row.controller);
     field({"force_?_n", "N", "force answered for [k, k+1)", "answer"}, row.f_Q_W);
     field({"compute_us", "µs", "wall time it took; 0 where held", "answer", false}, row.compute_us);
     field({"fault", "", "error code, or `held`, `fail_safe`", "kind"}, row.fault);
@@ -158,9 +158,11 @@ struct StatusRow {
     const auto to_us = [](std::uint64_t ns) { return static_cast<double>(ns) / 1e3; };
     field({"sample_index", "", "counts samples", "sample_index"}, status.sample_index());
     field({"phase", "", "", "phase"}, std::string_view(bus::to_string(status.phase())));
-    field({"reason", "", "why, and what happened", "reason"}, text(status.reason()));
+    field({"reason", "", "of the phase; missing participants, take-overs", "reason"},
+          text(status.reason()));
     field({"step", "", "in work", "step"}, status.step());
-    field({"controller", "", "who flies", "controller_name"}, text(status.controller_name()));
+    field({"controller", "", "client in control", "controller_name"},
+          text(status.controller_name()));
     field({"real_time_factor", "", "simulated over wall time", "real_time_factor"},
           status.real_time_factor());
     for (const bus::SyncCounter& counter : bus::kSyncCounters)
@@ -170,7 +172,7 @@ struct StatusRow {
     field({"round_trip_p99_us", "µs", "99th percentile", "round_trip_p99_ns"},
           to_us(status.round_trip_p99_ns()));
     field({"timing", "", "label", "timing"}, text(status.timing()));
-    field({"problem", "", "what a participant does wrong", "problem"}, text(status.problem()));
+    field({"problem", "", "mistakes of participants", "problem"}, text(status.problem()));
   }
 };
 

@@ -26,32 +26,33 @@ PyStructSequence_Field kReferenceFields[] = {
     {"snap", "Its fourth derivative, m/s⁴."},
     {nullptr, nullptr}};
 PyStructSequence_Desc kReference{"sls.Reference",
-                                 "What the load is asked to do at one instant: five vectors in W.",
+                                 "Reference of the load at one instant: five vectors in W.",
                                  kReferenceFields, 5};
 
 PyStructSequence_Field kNowFields[] = {
     {"step", "k, counts control periods from 0."},
     {"time_s", "k × period, s."},
     {"period_s", "Control period in force, s."},
-    {"vehicle_id", "Of the vehicle that the force is for."},
+    {"vehicle_id", "Vehicle that the force is for."},
     {"stage", "Index into the mission."},
-    {"stage_time_s", "Since that stage began, s."},
-    {"quad_position", "Of the quadrotor in W, (x, y, z), z down, m."},
-    {"quad_velocity", "Of the quadrotor in W, m/s."},
-    {"load_position", "Of the load in W, m."},
-    {"load_velocity", "Of the load in W, m/s."},
+    {"stage_time_s", "Time since that stage began, s."},
+    {"quad_position", "Position of the quadrotor in W, (x, y, z), z down, m."},
+    {"quad_velocity", "Velocity of the quadrotor in W, m/s."},
+    {"load_position", "Position of the load in W, m."},
+    {"load_velocity", "Velocity of the load in W, m/s."},
     {"alpha", "Angle of the rod about x, rad."},
     {"beta", "Angle of the rod about y, rad."},
     {"alpha_rate", "Its rate, rad/s."},
     {"beta_rate", "Its rate, rad/s."},
-    {"attitude", "Unit quaternion (w, x, y, z), body to W; None of a plant without attitude."},
-    {"body_rates", "In the body, (x, y, z), rad/s; None of a plant without attitude."},
-    {"signals", "Of the plant, in its order; empty where it has none."},
+    {"attitude", "Unit quaternion (w, x, y, z), body to W; None if the plant has no attitude."},
+    {"body_rates",
+     "Angular velocity in body axes, (x, y, z), rad/s; None if the plant has no attitude."},
+    {"signals", "Signals of the plant, in its order; empty if it has none."},
     {"reference", "sls.Reference: desired position of the load and its derivatives."},
-    {"memory", "What the law returned at the step before; zeros at step 0."},
+    {"memory", "Memory that the law returned at the step before; zeros at step 0."},
     {nullptr, nullptr}};
 PyStructSequence_Desc kNow{"sls.Now",
-                           "All that a control law may look at, of one vehicle at one step: plain "
+                           "Input of a control law: one vehicle at one step, as plain "
                            "floats, in SI units and radians, and tuples of them.",
                            kNowFields, 19};
 
