@@ -40,7 +40,7 @@ std::string TimingRecord::describe_defects() const {
     append(fmt::format("{} steps held", held_));
   if (fail_safe_ > 0) append(fmt::format("{} fail-safe", fail_safe_));
   if (slips_ > 0) append(fmt::format("{:.3g} s lost in {} slips", lost_s_, slips_));
-  if (overflow_ > 0) append(fmt::format("{} states unpublished", overflow_));
+  if (overflow_ > 0) append(fmt::format("{} samples unpublished", overflow_));
   return text;
 }
 

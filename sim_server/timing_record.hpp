@@ -20,8 +20,8 @@ class TimingRecord {
   void add_delay(double delay_s);
   /// The schedule was moved because the server was `lost_s` behind it. Real time only.
   void add_slip(double lost_s);
-  /// Number of states that could not be published so far. Real time only.
-  void set_overflow(std::uint64_t states) { overflow_ = states; }
+  /// Number of states and record entries that could not be published so far. Real time only.
+  void set_overflow(std::uint64_t samples) { overflow_ = samples; }
 
   /// "exact": lockstep, every force an answer to its own state.
   /// "real-time, k of n late, worst age A ms, states at most B ms late": every state published, the

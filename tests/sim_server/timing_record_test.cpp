@@ -52,7 +52,7 @@ TEST(TimingRecordTest, RealTimeIsDegradedByFailSafeSlipsAndStatesThatWereNotPubl
     if (defect == 1) record.add_slip(0.25);
     if (defect == 2) record.set_overflow(3);
     EXPECT_EQ(record.label().rfind("degraded: real-time, ", 0), 0u) << record.label();
-    const char* words[] = {"1 fail-safe", "0.25 s lost in 1 slips", "3 states unpublished"};
+    const char* words[] = {"1 fail-safe", "0.25 s lost in 1 slips", "3 samples unpublished"};
     EXPECT_NE(record.label().find(words[defect]), std::string::npos) << record.label();
   }
 }
