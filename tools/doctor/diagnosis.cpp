@@ -8,8 +8,8 @@
 namespace sls::doctor {
 namespace {
 
-constexpr std::array<const char*, 4> kFlying = {"sim_server", "control_client", "recorder",
-                                                "sim_ctl"};
+constexpr std::array<const char*, 5> kFlying = {"sim_server", "control_client", "recorder",
+                                                "sim_ctl", "sls_view"};
 
 }  // namespace
 

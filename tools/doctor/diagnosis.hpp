@@ -49,7 +49,7 @@ struct Observations {
 /// Room in /dev/shm that `programs` more programs need, bytes.
 std::uint64_t calc_shared_memory_need(const Settings& settings, int programs);
 
-/// True for the participant names of sim_server, control_client, recorder and sim_ctl.
+/// True for the participant names of sim_server, control_client, recorder, sim_ctl and sls_view.
 bool is_flying(const std::string& name);
 
 /// One line per check, in the order in which to read them.
