@@ -24,9 +24,10 @@ extern "C" void remember_signal(int number) {
 
 /// A signal handler may call only a few functions, and none that allocates or locks.
 extern "C" void give_up(int) {
-  for (const char* text : {const_cast<const char*>(program_invocation_short_name),
-                           ": error: hangs after the stop signal: exits now, its files may be "
-                           "incomplete\n"})
+  for (const char* text :
+       {const_cast<const char*>(program_invocation_short_name),
+        ": error: did not end after the stop signal: ended at once, its files may be "
+        "incomplete\n"})
     if (::write(STDERR_FILENO, text, std::strlen(text)) < 0) break;
   ::_exit(128 + received);
 }

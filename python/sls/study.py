@@ -239,7 +239,7 @@ def calc_distance(flight: Trajectory, published: Trajectory) -> float:
 def make_published_note(flights: dict[str, Trajectory], published: Path | None) -> str:
     if published is None:
         return ("`./sls study --published DIR` adds how far `matlab_setpoint_1` is from the "
-                "published run, where somebody has its file.")
+                "published run, if you have its file.")
     distance = calc_distance(flights["matlab_setpoint_1"],
                              load_log(published / "matlab_setpoint1.csv", "published"))
     return (f"`matlab_setpoint_1` is at most {distance:.2e} m from the published MATLAB run, "

@@ -250,7 +250,7 @@ TEST_F(DoctorTest, NamesAProgramOfAnotherUser) {
 TEST_F(DoctorTest, NamesTheDomainWhereTheOthersAre) {
   const auto server = start_server(on("here"), qos("default"), 5);
   expect_faults(examine(on("here") + doctor("default")), {"domain"},
-                "sim_server is on domain 5, and nobody is on domain 0");
+                "sim_server is on domain 5, and no program is on domain 0");
 }
 
 TEST_F(DoctorTest, NamesTheTopicAndThePolicyOfAQosMismatch) {

@@ -57,12 +57,12 @@ Check check_domain_number(const Observations& seen) {
     if (!is_lost) continue;
     const std::string other = std::to_string(domain);
     return fault(kName, list_flying(names) + " on domain " + other + ", and " +
-                            (here.empty() ? "nobody is" : list_flying(here)) + " on domain " + own +
-                            ": they never meet: start all with --domain " + other +
+                            (here.empty() ? "no program is" : list_flying(here)) + " on domain " +
+                            own + ": they never meet: start all with --domain " + other +
                             ", or all with --domain " + own);
   }
   if (!here.empty()) return ok(kName, list_flying(here) + " on domain " + own);
-  if (!seen.peer.empty() && !seen.probes.is_there()) return skipped(kName, "nobody is heard");
+  if (!seen.peer.empty() && !seen.probes.is_there()) return skipped(kName, "no program is heard");
   if (!seen.peer.empty() && !seen.is_peer_here && !seen.probes.is_answered)
     return fault(kName, "no program of sls is at " + seen.peer + " on domain " + own +
                             ": start it, or sls_doctor --answer there to try the way to it");
@@ -101,7 +101,7 @@ Check check_security(const Observations& seen) {
                             " and the doctor reject each other: not the same authority, or an "
                             "identity that is not valid: give every machine keys of one ./sls keys "
                             "DIR, and see that they are not expired");
-  return ok(kName, is_secured ? "everybody has a valid identity" : "nobody uses it");
+  return ok(kName, is_secured ? "all programs have a valid identity" : "no program uses it");
 }
 
 // --- samples -------------------------------------------------------------------------------------
@@ -184,7 +184,7 @@ Check check_data(const Observations& seen, bool is_explained) {
     return fault(kName, "samples of " + join(lost) + " bytes did not come back from a doctor at " +
                             name_peer(seen) + cause);
   if (is_asked && seen.refusal.empty()) arrived.push_back("a doctor at " + name_peer(seen));
-  if (arrived.empty()) return skipped(kName, "nobody to exchange samples with");
+  if (arrived.empty()) return skipped(kName, "no program to exchange samples with");
   return ok(kName, "samples arrive from " + join(arrived));
 }
 

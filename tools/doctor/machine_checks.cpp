@@ -100,7 +100,7 @@ Check check_users(const Observations& seen) {
     if (program.user.empty() || !users.insert(program.user).second) continue;
     others.push_back(name_program(program) + " as " + config::to_printable(program.user));
   }
-  if (others.empty()) return ok(kName, "everybody on this machine is " + seen.user);
+  if (others.empty()) return ok(kName, "all programs on this machine run as " + seen.user);
   return fault(kName, join(others) + " and the doctor as " + seen.user +
                           ": users cannot open each other's shared memory, so nothing passes: run "
                           "all as one user, or use config/qos/udp.xml");
@@ -171,8 +171,8 @@ Check check_multicast(const Observations& seen) {
   if (!seen.peer.empty() && is_any_discovered(seen))
     return fault(kName, "nothing that " + seen.peer + " sends to " + name_group(seen) +
                             " arrives, though it is found by unicast" + what_to_do);
-  return skipped(
-      kName, "nobody at " + name_peer(seen) + " to try it with: start sls_doctor --answer there");
+  return skipped(kName, "no program at " + name_peer(seen) +
+                            " to try it with: start sls_doctor --answer there");
 }
 
 Check check_datagrams(const Observations& seen) {
@@ -194,9 +194,10 @@ Check check_discovery(const Observations& seen) {
   if (servers.empty()) return skipped(kName, "this QoS file needs no discovery server");
   if (!seen.programs.empty())
     return ok(kName, "the discovery server at " + join(servers) + " answers");
-  return fault(kName, "no discovery server answers at " + join(servers) +
-                          ": nobody finds anybody: start fast-discovery-server there, or correct "
-                          "SLS_DISCOVERY_SERVER");
+  return fault(kName,
+               "no discovery server answers at " + join(servers) +
+                   ": no program finds another: start fast-discovery-server there, or correct "
+                   "SLS_DISCOVERY_SERVER");
 }
 
 }  // namespace
