@@ -113,6 +113,8 @@ TEST_F(WireTest, SamplesForgedInTheControllersNameStopAnOpenFlightAndNotASecured
   };
   Flight local(scenario("figure_eight"));
   local.expect_success();
+  // Some 1,000 steps/s: the flight outlasts the forger, which sends for a second.
+  network_->limit_rate(10000);
   {
     Flight open(scenario("figure_eight"), options("lan"));
     ASSERT_TRUE(open.wait_for_steps(300)) << open.outputs();
@@ -124,6 +126,7 @@ TEST_F(WireTest, SamplesForgedInTheControllersNameStopAnOpenFlightAndNotASecured
   ASSERT_TRUE(secured.wait_for_steps(300)) << secured.outputs();
   const auto forger = start_forger(secured);
   EXPECT_EQ(forger->wait(), 0) << forger->output();
+  EXPECT_TRUE(secured.server->is_running()) << "over before the attack\n" << secured.outputs();
   secured.expect_success();
   EXPECT_TRUE(read_bytes(secured.recording() / "state.csv") ==
               read_bytes(local.recording() / "state.csv"));
