@@ -52,7 +52,7 @@ int main(int argc, char** argv) {
       throw app::RunError(fmt::format("{}: the recording is not complete", folder.string()));
     const auto steps = static_cast<double>(end.last_step);
     spdlog::info("finished: {} steps, {} s simulated in {:.2f} s, {:.0f} steps/s", end.last_step,
-                 steps * static_cast<double>(scenario.sync.period_ns) * 1e-9, wall_s,
+                 steps * static_cast<double>(scenario.sync.period_ns) / 1e9, wall_s,
                  steps / wall_s);
   });
 }

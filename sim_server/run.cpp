@@ -52,7 +52,7 @@ Run::Run(Endpoints& endpoints, const Assignment& assignment, WorkerPool& workers
                                : fmt::format("real time × {}", sync.real_time_factor);
   spdlog::info("run {:016x}: {}, vehicle{} {}, {}, period {} s, step {} s", run_id, scenario_.name,
                vehicle_ids_.size() > 1 ? "s" : "", config::to_vehicle_ranges(vehicle_ids_), mode,
-               sync.period_ns * 1e-9, scenario_.plant.step_ns * 1e-9);
+               sync.period_ns / 1e9, scenario_.plant.step_ns / 1e9);
 }
 
 Run::End Run::execute() {
@@ -77,9 +77,10 @@ void Run::finish() {
   publish_end(PHASE_FINISHED, "mission finished");
   const double wall_s = board_.calc_wall_s();
   const auto step = static_cast<double>(board_.step);
+  const double simulated_s = step * static_cast<double>(scenario_.sync.period_ns) / 1e9;
   spdlog::info("finished: {} steps, {} s simulated in {:.2f} s, {:.0f} steps/s, {} resent, {}",
-               board_.step, step * scenario_.sync.period_ns * 1e-9, wall_s, step / wall_s,
-               link_.resent(), board_.timing.label());
+               board_.step, simulated_s, wall_s, step / wall_s, link_.resent(),
+               board_.timing.label());
 }
 
 void Run::reset() {

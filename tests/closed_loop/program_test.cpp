@@ -50,6 +50,21 @@ INSTANTIATE_TEST_SUITE_P(Scenarios, ClosedLoopProgramTest,
                                            "figure_eight_pid"),
                          [](const auto& info) { return std::string(info.param); });
 
+// 11 ms and 182 of them have no exact double: times are printed with the digits that they have.
+TEST(ClosedLoopTimesTest, TimesArePrintedWithoutRoundingErrors) {
+  TemporaryFolder folder;
+  const std::string file = make_scenario(
+      folder, {{"period_s: 0.004", "period_s: 0.011"}, {"for_s: 2", "for_s: 2.002"}}, "short");
+  Flight flight(file);
+  flight.expect_success();
+  EXPECT_TRUE(holds(flight.server->output(), "period 0.011 s, step 0.001 s\n"));
+  EXPECT_TRUE(holds(flight.server->output(), "finished: 182 steps, 2.002 s simulated in "));
+  Process alone(fly_in_process(file, folder / "recording"));
+  EXPECT_EQ(alone.wait(), 0) << alone.output();
+  EXPECT_TRUE(holds(alone.output(), "finished: 182 steps, 2.002 s simulated in "))
+      << alone.output();
+}
+
 TEST(ClosedLoopErrorsTest, AFlightThatFailsSaysWhyAndItsRecordingIsNotComplete) {
   TemporaryFolder folder;
   const std::string file =
