@@ -5,14 +5,12 @@
 #include <Eigen/Geometry>
 #include <random>
 
+#include "tests/support/random_vectors.hpp"
+
 namespace sls::model {
 namespace {
 
-Eigen::Vector3d draw_vector(std::mt19937& generator, double scale) {
-  std::normal_distribution<double> normal(0.0, scale);
-  const double x = normal(generator), y = normal(generator), z = normal(generator);
-  return {x, y, z};
-}
+using test::draw_vector;
 
 TEST(RotorDragTest, IsNormalToTheControlForceAndBrakesWithoutWind) {
   std::mt19937 generator(1);

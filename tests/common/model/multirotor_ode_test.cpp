@@ -10,6 +10,7 @@
 
 #include "tests/oracle/slung_load_ode.hpp"
 #include "tests/sim_server/plants/rigid_pendulum_ode.hpp"
+#include "tests/support/random_vectors.hpp"
 
 namespace sls::oracle::multirotor {
 namespace {
@@ -20,11 +21,7 @@ using Eigen::Vector3d;
 
 constexpr double kPi = 3.14159265358979323846;
 
-Vector3d draw_vector(std::mt19937& generator, double scale) {
-  std::normal_distribution<double> normal(0.0, scale);
-  const double x = normal(generator), y = normal(generator), z = normal(generator);
-  return {x, y, z};
-}
+using test::draw_vector;
 
 Pendulum make_pendulum(PendulumModel model) {
   Pendulum pendulum;

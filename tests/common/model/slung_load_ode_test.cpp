@@ -7,6 +7,8 @@
 #include <cmath>
 #include <random>
 
+#include "tests/support/random_vectors.hpp"
+
 namespace sls::oracle {
 namespace {
 
@@ -19,11 +21,7 @@ model::SlungLoadParameters make_vehicle() {
   return vehicle;
 }
 
-Eigen::Vector3d draw_vector(std::mt19937& generator, double scale) {
-  std::normal_distribution<double> normal(0.0, scale);
-  const double x = normal(generator), y = normal(generator), z = normal(generator);
-  return {x, y, z};
-}
+using test::draw_vector;
 
 TEST(SlungLoadOdeTest, ObeysNewtonsLawsAndTheRodConstraint) {
   std::mt19937 generator(1);

@@ -7,6 +7,8 @@
 #include <limits>
 #include <random>
 
+#include "tests/support/random_vectors.hpp"
+
 namespace sls::model {
 namespace {
 
@@ -24,11 +26,7 @@ double draw_angle(std::mt19937& generator) {
   return sign * kHalfPi * unit(generator);
 }
 
-Eigen::Vector3d draw_vector(std::mt19937& generator, double scale) {
-  std::normal_distribution<double> normal(0.0, scale);
-  const double x = normal(generator), y = normal(generator), z = normal(generator);
-  return {x, y, z};
-}
+using test::draw_vector;
 
 TEST(StateTest, AnglesSurviveTheWayOverDirectionsEvenNearTheLevelRod) {
   std::mt19937 generator(1);

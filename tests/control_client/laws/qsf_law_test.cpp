@@ -40,7 +40,7 @@ struct Case {
   }
 };
 
-Vector3d draw_vector(std::mt19937& generator, double scale) {
+Vector3d draw_uniform_vector(std::mt19937& generator, double scale) {
   std::uniform_real_distribution<double> uniform(-scale, scale);
   const double x = uniform(generator), y = uniform(generator), z = uniform(generator);
   return {x, y, z};
@@ -62,21 +62,21 @@ Case draw_case(std::mt19937& generator, bool with_integral) {
     if (with_integral) {
       one.gains.horizontal.integral = between(0.01, 0.5);
       one.gains.vertical.integral = between(0.01, 0.5);
-      one.integral = draw_vector(generator, 5.0);
+      one.integral = draw_uniform_vector(generator, 5.0);
       const double z = unit(generator);  // also at either end of its range
       if (z < 0.4) one.integral.z() = z < 0.2 ? kIntegralLimit : -kIntegralLimit;
     }
     const model::RodAngles rod{between(-1.2, 1.2), between(-1.2, 1.2), between(-2.0, 2.0),
                                between(-2.0, 2.0)};
     const model::RodDirection direction = model::to_direction(rod);
-    one.state = {draw_vector(generator, 3.0), draw_vector(generator, 2.0), direction.n_W,
-                 direction.n_dot_W};
-    one.reference.position =
-        one.state.p_WQ + one.vehicle.rod_length * direction.n_W + draw_vector(generator, 1.0);
-    one.reference.velocity = draw_vector(generator, 1.0);
-    one.reference.acceleration = draw_vector(generator, 1.0);
-    one.reference.jerk = draw_vector(generator, 1.0);
-    one.reference.snap = draw_vector(generator, 1.0);
+    one.state = {draw_uniform_vector(generator, 3.0), draw_uniform_vector(generator, 2.0),
+                 direction.n_W, direction.n_dot_W};
+    one.reference.position = one.state.p_WQ + one.vehicle.rod_length * direction.n_W +
+                             draw_uniform_vector(generator, 1.0);
+    one.reference.velocity = draw_uniform_vector(generator, 1.0);
+    one.reference.acceleration = draw_uniform_vector(generator, 1.0);
+    one.reference.jerk = draw_uniform_vector(generator, 1.0);
+    one.reference.snap = draw_uniform_vector(generator, 1.0);
     const double e =
         (one.state.p_WQ + one.vehicle.rod_length * direction.n_W - one.reference.position).z();
     const double e_dot =
@@ -235,7 +235,8 @@ TEST(QsfLawTest, ErrorObeysTheDesignedLinearEquation) {
     const model::RodAngles rod = one.input().rod;
     if (std::max(std::abs(rod.alpha), std::abs(rod.beta)) > 0.7) continue;
     one.gains = make_named_gains(LqrWeights{});  // moderate: |poles| up to 2.3
-    const Vector3d amplitude = draw_vector(generator, 0.5), omega = draw_vector(generator, 1.5);
+    const Vector3d amplitude = draw_uniform_vector(generator, 0.5),
+                   omega = draw_uniform_vector(generator, 1.5);
     const Vector3d centre = one.reference.position;
     const auto calc_force = [&](double t, const oracle::State& state) -> Vector3d {
       Case now = one;
