@@ -21,7 +21,7 @@ using Clock = std::chrono::steady_clock;
 using Microseconds = std::chrono::duration<double, std::micro>;
 
 constexpr auto kLongestSpin = std::chrono::microseconds(50);
-constexpr std::time_t kPatience_s = 60;  // for all rounds together
+constexpr std::time_t kRoundsLimit_s = 60;
 
 /// Returns true when it is this process's turn; false after the deadline or a stop signal.
 bool wait(sem_t& turn, bool may_spin, const timespec& deadline) {
@@ -52,7 +52,7 @@ HandOver::HandOver(const HandOverOptions& options) : options_(options) {
   sem_init(&turns_->ours, 1, 0);
   sem_init(&turns_->theirs, 1, 0);
   clock_gettime(CLOCK_REALTIME, &deadline_);
-  deadline_.tv_sec += kPatience_s;
+  deadline_.tv_sec += kRoundsLimit_s;
   other_ = fork();
   if (other_ < 0) throw app::RunError("hand-over: cannot start another process");
   if (other_ > 0) return;

@@ -21,8 +21,8 @@ namespace {
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
-constexpr double kPatience_s = 20.0;  // for discovery
-constexpr auto kResendTime = 100ms;   // best-effort readers may lose a sample
+constexpr double kDiscoveryLimit_s = 20.0;
+constexpr auto kResendTime = 100ms;  // best-effort readers may lose a sample
 
 // --- the samples ---------------------------------------------------------------------------------
 
@@ -78,7 +78,7 @@ class Ping {
   }
 
   nlohmann::json run() {
-    app::Wait wait(kPatience_s);
+    app::Wait wait(kDiscoveryLimit_s);
     while (writer_.count_matched() == 0 || reader_.count_matched() == 0) {
       check(wait);
       std::this_thread::sleep_for(1ms);

@@ -26,7 +26,7 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-constexpr std::uint64_t kRunId = 1;
+constexpr std::uint64_t kRecordedRun = 1;
 constexpr std::array<const char*, 4> kFiles = {"state.csv", "command.csv", "reference.csv",
                                                "flight.csv"};
 
@@ -126,7 +126,7 @@ std::vector<RecordBatch> make_batches(const std::vector<RecordEntry>& entries,
       batches.back().entries().back().vehicle_id(id);
     }
   for (std::size_t i = 0; i < batches.size(); ++i) {
-    batches[i].run_id(kRunId);
+    batches[i].run_id(kRecordedRun);
     batches[i].batch_index(i);
   }
   batches.back().is_last(true);
@@ -139,20 +139,20 @@ nlohmann::json measure_recording(const config::Scenario& scenario, std::uint32_t
                                  std::size_t steps, const fs::path& folder) {
   std::vector<RecordEntry> entries = closed_loop::fly_entries(scenario, steps);
   entries.back().answer().mission(MISSION_FINISHED);
-  const Parameters parameters = closed_loop::make_parameters(scenario, kRunId, vehicles);
+  const Parameters parameters = closed_loop::make_parameters(scenario, kRecordedRun, vehicles);
   const ScratchFolder ours(folder), plain(folder);
   nlohmann::json json;
   json["rows"] = kFiles.size() * entries.size() * vehicles;
   {
     const auto batches = make_batches(entries, vehicles);
     record::Recording recording(ours.path(), parameters);
-    recording.add(closed_loop::make_status(kRunId, 0, PHASE_RUNNING, 0));
+    recording.add(closed_loop::make_status(kRecordedRun, 0, PHASE_RUNNING, 0));
     auto began = Clock::now();
     for (const RecordBatch& batch : batches) {
       recording.add(batch);
       recording.flush_if_due();
     }
-    recording.add(closed_loop::make_status(kRunId, 1, PHASE_FINISHED, entries.size() - 1));
+    recording.add(closed_loop::make_status(kRecordedRun, 1, PHASE_FINISHED, entries.size() - 1));
     json["recording_s"] = calc_seconds(began);
     began = Clock::now();
     if (!recording.finish("", 0)) throw app::RunError("recording: " + recording.describe_gaps());

@@ -18,7 +18,7 @@ namespace {
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
-constexpr double kPatience_s = 20.0;       // for the first sample
+constexpr double kFirstSampleLimit_s = 20.0;
 constexpr auto kSilenceOfHistory = 300ms;  // after it, the history is complete
 constexpr auto kSilenceOfRun = 2s;
 
@@ -65,7 +65,7 @@ void print_stamps(const StampsOptions& options) {
   {
     Listener listener(node, options.is_live ? bus::kLoopReaderProfile : bus::kRecordReaderProfile);
     const auto silence = options.is_live ? Clock::duration(kSilenceOfRun) : kSilenceOfHistory;
-    const app::Wait wait(kPatience_s);
+    const app::Wait wait(kFirstSampleLimit_s);
     while (!listener.is_over(silence) && app::stop_signal() == 0) {
       if (listener.is_empty() && wait.is_over()) throw app::RunError("stamps: no samples");
       std::this_thread::sleep_for(10ms);

@@ -20,8 +20,6 @@ constexpr std::size_t kQueuedSteps = 1024;
 /// Periods in a row without an answer after which the next client's answer is used.
 constexpr int kMissesBeforeTakeOver = 3;
 
-constexpr auto kPollTime = 20ms;  // interval of the waiting loops
-
 std::chrono::duration<double, std::nano> calc_wall_period(const config::Sync& sync) {
   return std::chrono::duration<double, std::nano>(static_cast<double>(sync.period_ns) /
                                                   sync.real_time_factor);

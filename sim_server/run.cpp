@@ -20,7 +20,6 @@ using namespace std::chrono_literals;
 
 constexpr auto kUsualStartTime = 300ms;  // of discovery after the claim: not reported
 constexpr auto kRosterTime = 100ms;      // between checks for silent departures
-constexpr auto kPollTime = 20ms;         // interval of the waiting loops
 constexpr auto kRecorderSilence = 1s;    // until a recorder that is behind is reported
 constexpr auto kReportInterval = 5s;     // between reports of the same silence
 constexpr auto kLookInterval = 100ms;    // least time between checks of participants

@@ -14,7 +14,6 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto kClaimTime = 1s;  // time for other servers to object to a claim
-constexpr auto kPollTime = 20ms;
 
 }  // namespace
 

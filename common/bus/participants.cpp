@@ -15,7 +15,7 @@
 namespace sls::bus {
 namespace {
 
-constexpr std::size_t kMaxParticipants = 256;
+constexpr std::size_t kMaxSenders = 256;
 constexpr std::size_t kMaxServers = 64;
 constexpr std::size_t kMaxRunsOfServer = 4;  // the current one and those before resets
 
@@ -79,7 +79,7 @@ void ParticipantDirectory::note(const Participant& sample, const PeerId& sender)
   const std::chrono::nanoseconds age = std::chrono::system_clock::now() - reader_.written();
   const auto now = std::chrono::steady_clock::now();
   const std::lock_guard lock(mutex_);
-  if (!make_room(last_, kMaxParticipants, sender, [this] { return reader_.matched(); })) return;
+  if (!make_room(last_, kMaxSenders, sender, [this] { return reader_.matched(); })) return;
   Heard& heard = last_[sender];
   const bool is_same_run = heard.announcement.run_id() == sample.run_id();
   if (!is_same_run || !sample.ready()) heard.ready_since.reset();

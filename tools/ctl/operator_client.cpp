@@ -20,7 +20,6 @@ using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
 constexpr auto kUsualWait = 1500ms;  // usual time of discovery and a server's claim: not reported
-constexpr auto kPollTime = 20ms;
 constexpr auto kLastReplyTime = 1s;  // a reply can arrive shortly after the run has ended
 constexpr std::size_t kMailboxSize = 256;
 constexpr std::size_t kEvents = 3;

@@ -17,7 +17,6 @@ namespace {
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
-constexpr auto kPollTime = 20ms;
 constexpr auto kRedrawTime = 250ms;
 constexpr auto kLineTime = 1s;
 /// Discovery finds the participants of a run about as soon as their server.

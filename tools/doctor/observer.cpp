@@ -30,6 +30,7 @@
 #include "common/config/config_error.hpp"
 #include "tools/doctor/endpoint_qos.hpp"
 #include "tools/doctor/participant_qos.hpp"
+#include "tools/doctor/probe.hpp"
 #include "tools/doctor/udp_socket.hpp"
 
 namespace sls::doctor {
@@ -82,11 +83,6 @@ std::string find_property(const rtps::ParticipantProxyData& data, const char* na
   for (auto property = properties.begin(); property != properties.end(); ++property)
     if (property->first() == name) return property->second();
   return {};
-}
-
-std::uint64_t choose_nonce() {
-  std::random_device source;
-  return std::uint64_t{source()} << 32 | source();
 }
 
 }  // namespace

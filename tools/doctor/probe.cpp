@@ -68,12 +68,12 @@ std::vector<unsigned char> make_datagram(const Probe& probe, std::size_t size) {
   return bytes;
 }
 
+}  // namespace
+
 std::uint64_t choose_nonce() {
   std::random_device source;
   return std::uint64_t{source()} << 32 | source();
 }
-
-}  // namespace
 
 // --- answerer ------------------------------------------------------------------------------------
 

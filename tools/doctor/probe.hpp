@@ -30,6 +30,9 @@ struct Ports {
 /// Programs take lower ids first, and a firewall open for programs also passes these ports.
 inline constexpr int kHighestProbeId = 9, kLowestProbeId = 7;
 
+/// A random number that marks the datagrams or samples of one doctor.
+std::uint64_t choose_nonce();
+
 /// Answers the probes of other doctors.
 class ProbeAnswerer {
  public:

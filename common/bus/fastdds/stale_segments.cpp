@@ -20,7 +20,7 @@ constexpr std::string_view kPrefix = "fastrtps_", kLock = "_el";
 constexpr auto kCreationTime = std::chrono::seconds(10);
 
 /// With more participants the ports of one domain would overlap those of the next.
-constexpr int kMaxParticipants = 110;
+constexpr int kMaxParticipantIds = 110;
 
 /// "fastrtps_", sixteen hexadecimal digits, "_el": the lock file of a participant's segment.
 bool is_segment_lock(std::string_view name) {
@@ -100,7 +100,7 @@ bool is_port_read(int port, const fs::path& folder) {
 int choose_participant_id(const ParticipantPorts& ports, const fs::path& folder) {
   bool is_any_stale = false;
   int first_free = -1;
-  for (int id = 0; id < kMaxParticipants; ++id) {
+  for (int id = 0; id < kMaxParticipantIds; ++id) {
     const int port = ports.base + id * ports.gain;
     const PortState meta = find_state(port, folder), user = find_state(port + 1, folder);
     if (meta == PortState::kStale || user == PortState::kStale) is_any_stale = true;

@@ -10,9 +10,6 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double kMinCosine = 1e-3;           // of the rod's angles; below, the rod counts as level
-constexpr double kMinSupportFraction = 1e-3;  // of g; below, the load falls freely
-
 }  // namespace
 
 LawOutput PidLaw::calc(const LawInput& input) const {
@@ -31,7 +28,8 @@ LawOutput PidLaw::calc(const LawInput& input) const {
   // Eq. (1): position error and velocity of the load by the controller's own model.
   const Vector3d error = input.reference.position - input.state.p_WQ - vehicle_.rod_length * q;
   const Vector3d velocity = input.state.v_WQ + vehicle_.rod_length * q_dot;
-  if (std::cos(input.state.rod.alpha) < kMinCosine || std::cos(input.state.rod.beta) < kMinCosine)
+  if (std::cos(input.state.rod.alpha) < kMinRodCosine ||
+      std::cos(input.state.rod.beta) < kMinRodCosine)
     return fail(Fault::kRodLevel);
 
   // Eqs. (2) and (3): the position loop gives a desired velocity, the velocity loop a desired

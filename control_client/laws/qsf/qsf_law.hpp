@@ -8,13 +8,6 @@
 
 namespace sls::control {
 
-/// The law is singular where s = g − n₃ vanishes; below this fraction of g it reports kFreeFall.
-inline constexpr double kMinSupportFraction = 1e-3;
-
-/// It is singular where the rod is level; below this cos α or cos β (0.06° from level) it reports
-/// kRodLevel. It does the same with the load above the quadrotor, where a cosine is negative.
-inline constexpr double kMinRodCosine = 1e-3;
-
 /// The inputs of the law.
 struct QsfInput {
   Eigen::Vector3d p_WQ = Eigen::Vector3d::Zero();  ///< m

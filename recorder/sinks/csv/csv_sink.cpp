@@ -7,7 +7,7 @@
 namespace sls::record {
 namespace {
 
-constexpr std::size_t kFlushBytes = 1 << 17;  // less than the size at which a file flushes itself
+constexpr std::size_t kPendingBytes = 1 << 17;  // less than the size at which a file flushes itself
 
 struct FieldWriter {
   CsvFile& file;
@@ -53,7 +53,7 @@ void CsvSink::add(const SimStatus& status) { write_row(statuses_, StatusRow{stat
 
 bool CsvSink::is_full() const {
   return std::any_of(files_.begin(), files_.end(),
-                     [](const CsvFile* file) { return file->pending_bytes() >= kFlushBytes; });
+                     [](const CsvFile* file) { return file->pending_bytes() >= kPendingBytes; });
 }
 
 void CsvSink::flush() {

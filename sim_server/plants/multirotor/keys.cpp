@@ -8,7 +8,7 @@ namespace {
 
 using config::to_text;
 
-class Keys : public config::OwnKeys<config::Plant, MultirotorKeys> {
+class MultirotorOwnKeys : public config::OwnKeys<config::Plant, MultirotorKeys> {
  public:
   bool has_attitude() const override { return true; }
 
@@ -99,7 +99,7 @@ class Keys : public config::OwnKeys<config::Plant, MultirotorKeys> {
 }  // namespace
 
 const config::ModelKeys<config::Plant>& multirotor_keys() {
-  static const Keys keys;
+  static const MultirotorOwnKeys keys;
   return keys;
 }
 

@@ -6,7 +6,7 @@
 namespace sls::sim {
 namespace {
 
-class Keys : public config::OwnKeys<config::Plant, SlungLoadKeys> {
+class SlungLoadOwnKeys : public config::OwnKeys<config::Plant, SlungLoadKeys> {
   /// With `rigid` a vehicle must have the masses and length of the published links.
   void check(const config::Scenario& scenario, const config::Places& places) const override {
     if (scenario.plant.own.get<SlungLoadKeys>().pendulum != Pendulum::kRigid) return;
@@ -24,7 +24,7 @@ class Keys : public config::OwnKeys<config::Plant, SlungLoadKeys> {
 }  // namespace
 
 const config::ModelKeys<config::Plant>& slung_load_keys() {
-  static const Keys keys;
+  static const SlungLoadOwnKeys keys;
   return keys;
 }
 

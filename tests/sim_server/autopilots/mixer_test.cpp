@@ -25,7 +25,7 @@ void expect_outputs(const MixerOutput& mixed, const std::vector<double>& expecte
 }
 
 /// Torques that `outputs` produce; the columns of `kQuadX` are orthogonal.
-Vector3d calc_torque(const VectorXd& outputs) {
+Vector3d calc_output_torque(const VectorXd& outputs) {
   Vector3d torque = Vector3d::Zero();
   for (std::size_t i = 0; i < kQuadX.size(); ++i) {
     const double output = outputs[static_cast<Index>(i)];
@@ -190,7 +190,7 @@ TEST(MixerTest, KeepsToTheLimitsAndNeverRaisesThrustNorTurnsATorqueRound) {
     // Without yaw no output is clamped: roll and pitch are only reduced.
     const VectorXd level = mix(kQuadX, {wanted.x(), wanted.y(), 0.0}, thrust).outputs;
     ASSERT_LE(level.sum(), 4.0 * thrust + 1e-12);
-    const Vector3d torque = calc_torque(level);
+    const Vector3d torque = calc_output_torque(level);
     ASSERT_NEAR(torque.z(), 0.0, 1e-12);
     for (int axis = 0; axis < 2; ++axis) {
       ASSERT_GE(torque[axis] * wanted[axis], -1e-12);
@@ -205,7 +205,7 @@ TEST(MixerTest, WhereThereIsRoomTheSumIsTheThrustAndTheTorqueTheWantedOne) {
     const Vector3d wanted = 0.15 * make_random_vector(random);
     const VectorXd outputs = mix(kQuadX, wanted, 0.5).outputs;
     ASSERT_NEAR(outputs.sum(), 2.0, 1e-12);
-    ASSERT_NEAR((calc_torque(outputs) - wanted).norm(), 0.0, 1e-12);
+    ASSERT_NEAR((calc_output_torque(outputs) - wanted).norm(), 0.0, 1e-12);
   }
 }
 

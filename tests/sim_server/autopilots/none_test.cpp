@@ -9,7 +9,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kRounding = 1e-12;
+constexpr double kTolerance = 1e-12;
 
 TEST(NoneTest, TheForceActsAtOnceAndEveryRotorGivesAnEqualShareOfIt) {
   const AutopilotSetup setup = make_setup("none");
@@ -21,13 +21,13 @@ TEST(NoneTest, TheForceActsAtOnceAndEveryRotorGivesAnEqualShareOfIt) {
                                                                               {{0, 5, 0}, 5},
                                                                               {{0, 0, 2}, 2}}) {
     const AutopilotOutput& output = autopilot->step(make_input(force));
-    EXPECT_NEAR(output.thrust, thrust, kRounding);
+    EXPECT_NEAR(output.thrust, thrust, kTolerance);
     ASSERT_TRUE(output.direction_W);
-    EXPECT_LT((output.thrust * *output.direction_W - force).norm(), kRounding);
+    EXPECT_LT((output.thrust * *output.direction_W - force).norm(), kTolerance);
     ASSERT_EQ(output.rotor_speeds.size(), 4);
     for (int i = 0; i < 4; ++i) {
       const double speed = output.rotor_speeds[i];
-      EXPECT_NEAR(setup.airframe.rotors[i].thrust_constant * speed * speed, thrust / 4, kRounding);
+      EXPECT_NEAR(setup.airframe.rotors[i].thrust_constant * speed * speed, thrust / 4, kTolerance);
     }
   }
 }
@@ -36,8 +36,8 @@ TEST(NoneTest, TheAttitudeSetPointHasTheThrustAlongTheForceAndNoYaw) {
   const auto autopilot = make_autopilot(make_setup("none"));
   for (const Vector3d& force : {Vector3d(3, 4, -12), Vector3d(-1, 2, -2), Vector3d(0, 0, -16)}) {
     const Eigen::Matrix3d R_WB = autopilot->step(make_input(force)).q_WB.toRotationMatrix();
-    EXPECT_LT((-R_WB.col(2) - force.normalized()).norm(), kRounding);
-    EXPECT_NEAR(R_WB(1, 0), 0.0, kRounding);  // x of the body points north or south
+    EXPECT_LT((-R_WB.col(2) - force.normalized()).norm(), kTolerance);
+    EXPECT_NEAR(R_WB(1, 0), 0.0, kTolerance);  // x of the body points north or south
     EXPECT_GT(R_WB(0, 0), 0.0);
   }
 }

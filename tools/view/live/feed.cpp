@@ -22,7 +22,6 @@ constexpr auto kLongestQuiet = 1s;  // period of the view without a change
 // Between two deliveries in lockstep. There the loop runs as fast as the processors allow, and each
 // delivery takes processor time from it.
 constexpr auto kLockstepPeriod = 50ms;
-constexpr std::size_t kPastEvents = 200;
 constexpr std::size_t kLatchedSamples = 256;  // of one topic
 
 std::int64_t to_ns(std::chrono::system_clock::time_point time) {

@@ -14,6 +14,9 @@
 
 namespace sls::view {
 
+/// Number of the newest events that a page gets when it connects.
+inline constexpr std::size_t kPastEvents = 200;
+
 enum class TopicId {
   kState,
   kCommand,

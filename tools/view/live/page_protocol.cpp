@@ -23,7 +23,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::uint64_t kPosesKey = 1;
 constexpr std::uint64_t kStatusKey = 2;
-constexpr std::size_t kPastEvents = 200;
 constexpr std::size_t kMostQueuedBytes = 512 << 10;  // a page further behind gets no rows
 constexpr int kMostMistakes = 8;
 constexpr std::uint64_t kMostId = std::uint64_t{1} << 53;  // integers that JavaScript holds exactly

@@ -11,7 +11,7 @@
 namespace sls::view {
 namespace {
 
-constexpr const char* kToken = "0123456789abcdef";
+constexpr const char* kAccessToken = "0123456789abcdef";
 
 AccessOptions make_options(const std::string& address = "127.0.0.1") {
   AccessOptions options;
@@ -164,7 +164,7 @@ TEST(AccessTest, AllowedPagesOperateWithTheToken) {
 TEST(AccessTest, OperatingNeedsTheTokenWhereThereIsOne) {
   for (const char* address : {"127.0.0.1", "192.168.1.5"}) {
     AccessOptions options = make_options(address);
-    options.token = kToken;
+    options.token = kAccessToken;
     const std::string host = options.address + ":8765";
     const Access without = judge({host, std::nullopt, std::nullopt}, options);
     EXPECT_TRUE(without.may_look);
@@ -173,15 +173,15 @@ TEST(AccessTest, OperatingNeedsTheTokenWhereThereIsOne) {
     const Access wrong = judge({host, std::nullopt, "0123456789abcdeF"}, options);
     EXPECT_FALSE(wrong.may_operate);
     EXPECT_EQ(wrong.reason, "wrong token");
-    EXPECT_TRUE(judge({host, std::nullopt, kToken}, options).may_operate);
+    EXPECT_TRUE(judge({host, std::nullopt, kAccessToken}, options).may_operate);
   }
 }
 
 TEST(AccessTest, AReadOnlyViewerAllowsNoOperation) {
   AccessOptions options = make_options();
   options.is_read_only = true;
-  options.token = kToken;
-  const Access access = judge({"127.0.0.1:8765", std::nullopt, kToken}, options);
+  options.token = kAccessToken;
+  const Access access = judge({"127.0.0.1:8765", std::nullopt, kAccessToken}, options);
   EXPECT_TRUE(access.may_look);
   EXPECT_FALSE(access.may_operate);
   EXPECT_EQ(access.reason, "started with --read-only");
@@ -193,12 +193,12 @@ TEST(AccessTest, AnotherAddressNeedsATokenToOperate) {
 }
 
 TEST(AccessTest, ComparesTokensOfAnyLength) {
-  EXPECT_TRUE(is_same_token(kToken, kToken));
+  EXPECT_TRUE(is_same_token(kAccessToken, kAccessToken));
   EXPECT_TRUE(is_same_token("", ""));
-  EXPECT_FALSE(is_same_token("", kToken));
-  EXPECT_FALSE(is_same_token(std::string(kToken) + "0", kToken));
-  EXPECT_FALSE(is_same_token(std::string_view("0123456789abcde\0", 16), kToken));
-  EXPECT_FALSE(is_same_token(std::string(1 << 20, 'x'), kToken));
+  EXPECT_FALSE(is_same_token("", kAccessToken));
+  EXPECT_FALSE(is_same_token(std::string(kAccessToken) + "0", kAccessToken));
+  EXPECT_FALSE(is_same_token(std::string_view("0123456789abcde\0", 16), kAccessToken));
+  EXPECT_FALSE(is_same_token(std::string(1 << 20, 'x'), kAccessToken));
 }
 
 // --- options -------------------------------------------------------------------------------------
@@ -209,7 +209,7 @@ TEST(AccessTest, AnotherAddressNeedsAToken) {
   EXPECT_EQ(find_problem([] { check(make_options("0.0.0.0")); }),
             "--listen: expected a loopback address, or --token-file with it, got 0.0.0.0");
   AccessOptions options = make_options("0.0.0.0");
-  options.token = kToken;
+  options.token = kAccessToken;
   EXPECT_NO_THROW(check(options));
 }
 
@@ -240,8 +240,8 @@ class TokenFileTest : public testing::Test {
 };
 
 TEST_F(TokenFileTest, TakesTheFirstLine) {
-  EXPECT_EQ(load_token(write("0123456789abcdef\nmore\n")), kToken);
-  EXPECT_EQ(load_token(write("0123456789abcdef\r\n", 0400)), kToken);
+  EXPECT_EQ(load_token(write("0123456789abcdef\nmore\n")), kAccessToken);
+  EXPECT_EQ(load_token(write("0123456789abcdef\r\n", 0400)), kAccessToken);
   EXPECT_EQ(load_token(write(std::string(256, '~'))), std::string(256, '~'));
   EXPECT_EQ(load_token(write(std::string(256, '~') + "\r\n")), std::string(256, '~'));
 }
