@@ -74,8 +74,10 @@ class InteropTest : public testing::Test {
     write_quick_scenario(1);
   }
 
-  /// Similar to setpoints.yaml, but shorter: 4,000 steps.
-  void write_quick_scenario(int controllers, int recorders = 1, int vehicles = 1) const {
+  /// Similar to setpoints.yaml, but shorter: 4,000 steps. With a period of 1 ms it has 16,000,
+  /// which leaves time for events in flight.
+  void write_quick_scenario(int controllers, int recorders = 1, int vehicles = 1,
+                            const char* period_s = "0.004") const {
     std::ofstream(quick_) << "name: quick\n"
                           << (vehicles > 1 ? "vehicles: " + std::to_string(vehicles) + "\n" : "")
                           << "vehicle: { quad_mass_kg: 1.5, load_mass_kg: 0.2, rod_length_m: 1.0, "
@@ -84,8 +86,9 @@ class InteropTest : public testing::Test {
                              "  pendulum: ideal\n"
                              "  step_s: 0.001\n"
                              "  initial: { load_position_m: [0, 0, -1.5] }\n"
-                             "sync: { mode: lockstep, period_s: 0.004, wait_for: { controllers: "
-                          << controllers << ", recorders: " << recorders
+                             "sync: { mode: lockstep, period_s: "
+                          << period_s << ", wait_for: { controllers: " << controllers
+                          << ", recorders: " << recorders
                           << ", timeout_s: 60 } }\n"
                              "controller:\n"
                              "  gains: { lqr: { horizontal: 10, vertical: 5 } }\n"
@@ -155,7 +158,8 @@ class InteropTest : public testing::Test {
     EXPECT_EQ(read_file(a / "reference.csv"), read_file(b / "reference.csv"));
   }
 
-  static constexpr std::uint64_t kQuickSteps = 4000;
+  static constexpr const char* kShortPeriod = "0.001";
+  static constexpr std::uint64_t kLongSteps = 16000;
   TemporaryFolder folder_;
   OwnDomain domain_;
   const std::string quick_ = folder_ / "quick.yaml";
@@ -200,7 +204,7 @@ TEST_F(InteropTest, ACycloneControllerFliesAFleetAndACycloneRecorderWritesTheSam
 }
 
 TEST_F(InteropTest, ACycloneStandbyTakesOverFromAClientThatIsKilled) {
-  write_quick_scenario(2);
+  write_quick_scenario(2, 1, 1, kShortPeriod);
   const auto recorder = start_recorder(), server = start_server();
   const auto primary =
       start("control_client", {"--scenario", quick_, "--strength", "1", "--name", "primary"});
@@ -211,8 +215,8 @@ TEST_F(InteropTest, ACycloneStandbyTakesOverFromAClientThatIsKilled) {
   EXPECT_TRUE(read_manifest(recording_).at("complete").get<bool>());
   const Table commands(recording_ + "/command.csv");
   EXPECT_EQ(commands.text(0, "controller"), "primary");
-  EXPECT_EQ(commands.text(kQuickSteps, "controller"), "standby");
-  write_quick_scenario(1);
+  EXPECT_EQ(commands.text(kLongSteps, "controller"), "standby");
+  write_quick_scenario(1, 1, 1, kShortPeriod);
   Flight own(quick_);
   own.expect_success();
   expect_same_flight(recording_, own.recording());
@@ -235,6 +239,7 @@ TEST_F(InteropTest, LossBetweenServerAndCycloneControllerChangesNoByte) {
 }
 
 TEST_F(InteropTest, CycloneControllerAndRecorderFlyOnWithTheServerThatReplacesAKilledOne) {
+  write_quick_scenario(1, 1, 1, kShortPeriod);
   const auto recorder = start_recorder({"--follow"});
   auto server = start_server();
   const auto controller = start_cyclone("cyclone_controller"),
@@ -243,10 +248,11 @@ TEST_F(InteropTest, CycloneControllerAndRecorderFlyOnWithTheServerThatReplacesAK
   server->kill();
   server = start_server();
   expect_success({server.get(), controller.get(), recorder.get(), cyclone_recorder.get()});
-  expect_same_rows(*cyclone_recorder, rows_, find_second_run(), kQuickSteps);
+  expect_same_rows(*cyclone_recorder, rows_, find_second_run(), kLongSteps);
 }
 
 TEST_F(InteropTest, ALateCycloneRecorderGetsTheMissedSamples) {
+  write_quick_scenario(1, 1, 1, kShortPeriod);
   const auto recorder = start_recorder();
   const auto server = start_server(), controller = start_cyclone("cyclone_controller");
   ASSERT_TRUE(wait_for_steps(100)) << server->output();
@@ -255,7 +261,7 @@ TEST_F(InteropTest, ALateCycloneRecorderGetsTheMissedSamples) {
   EXPECT_TRUE(wait_until([&] { return holds(late_recorder->output(), " run "); }));
   controller->send(SIGCONT);
   expect_success({server.get(), controller.get(), recorder.get(), late_recorder.get()});
-  expect_same_rows(*late_recorder, rows_, recording_, kQuickSteps);
+  expect_same_rows(*late_recorder, rows_, recording_, kLongSteps);
 }
 
 /// The keys must protect submessages: otherwise Fast DDS sends no samples to a Cyclone DDS reader.
@@ -333,8 +339,9 @@ class MyClientTest : public InteropTest {
                        "/idl/sls.idl -DCMAKE_C_FLAGS=-Werror && " SLS_CMAKE " --build build"});
     ASSERT_EQ(build.wait(), 0) << build.output();
   }
-  std::unique_ptr<Process> start_server(const Words& before = {}) const {
-    return start("sim_server", {"--scenario", folder_ / "my_client/my_client.yaml"}, before);
+  std::unique_ptr<Process> start_server(const Words& before = {}, const Words& further = {}) const {
+    return start("sim_server", Words{"--scenario", folder_ / "my_client/my_client.yaml"} + further,
+                 before);
   }
   std::unique_ptr<Process> start_client(const Words& before = {}) const {
     return std::make_unique<Process>(
@@ -375,16 +382,20 @@ TEST_F(MyClientTest, BringsTheLoadToItsPointWithTheSameBytesDespiteLosses) {
 }
 
 TEST_F(MyClientTest, FollowsAResetAndTheServerThatReplacesAKilledOne) {
+  const Words longer = {"--period-s", "0.001"};  // 20,000 steps: neither run may be over too soon
   const auto recorder = start_recorder({"--follow"});
-  auto server = start_server();
+  auto server = start_server({}, longer);
   const auto client = start_client();
   ASSERT_TRUE(wait_for_steps(100)) << server->output();
+  client->send(SIGSTOP);  // holds the flight until sim_ctl has joined
   const auto reset = start("sim_ctl", {"reset"});
   ASSERT_EQ(reset->wait(), 0) << reset->output() << server->output();
+  client->send(SIGCONT);
   ASSERT_TRUE(wait_until([&] { return count_rows(find_second_run() / "state.csv") > 100; }))
       << server->output() << client->output();
+  ASSERT_TRUE(server->is_running()) << "over before the kill\n" << server->output();
   server->kill();
-  server = start_server();
+  server = start_server({}, longer);
   expect_success({server.get(), client.get(), recorder.get()});
 }
 

@@ -91,9 +91,12 @@ TEST_F(NetworkTest, PacketsOfAtMost576Bytes) {
 
 TEST_F(NetworkTest, APartitionOfFiveSecondsCostsAtMostSix) {
   const Profile profile(*network_, "lan");
-  Flight local(scenario("figure_eight"));
+  // 32,000 steps: a flight of 8,000 may be over before the cut.
+  FlightOptions longer = profile.flight_options();
+  longer.server = {"--period-s", "0.001"};
+  Flight local(scenario("figure_eight"), {{}, longer.server, {}});
   local.expect_success();
-  Flight flight(scenario("figure_eight"), profile.flight_options());
+  Flight flight(scenario("figure_eight"), longer);
   ASSERT_TRUE(flight.wait_for_steps(100)) << flight.outputs();
   const auto cut_at = std::chrono::steady_clock::now();
   network_->cut();

@@ -29,7 +29,7 @@ TEST(SecureFlightTest, RecordsTheBytesOfAnOpenOne) {
 }
 
 TEST(SecureFlightTest, AStandbyTakesOverAndTheKilledClientIsLetInAgain) {
-  const SecuredRun run(32);
+  const SecuredRun run(64);
   run.keys.add("controller", "standby");
   const auto recorder = run.start_recorder(), server = run.start_server();
   const auto standby = run.start_client({"--name", "standby", "--strength", "1"}, "standby");
@@ -37,7 +37,10 @@ TEST(SecureFlightTest, AStandbyTakesOverAndTheKilledClientIsLetInAgain) {
   ASSERT_TRUE(wait_for_rows(run.recording(), 500)) << server->output();
   primary->kill();
   ASSERT_TRUE(wait_for_rows(run.recording(), 1000)) << server->output();
+  standby->send(SIGSTOP);  // holds the flight until the primary has joined again
   primary = run.start_client({"--name", "primary", "--strength", "2"});
+  ASSERT_TRUE(wait_for_text(*primary, "joins run")) << primary->output();
+  standby->send(SIGCONT);
   run.expect_same_as_open(*server, *primary, *recorder);
   EXPECT_EQ(standby->wait(), 0) << standby->output();
 
@@ -50,12 +53,14 @@ TEST(SecureFlightTest, AStandbyTakesOverAndTheKilledClientIsLetInAgain) {
 }
 
 TEST(SecureFlightTest, AnOperatorMayPauseAndResumeAndAControllerMayNot) {
-  const SecuredRun run(12);
+  const SecuredRun run(64);
   const auto recorder = run.start_recorder(), server = run.start_server(),
              client = run.start_client();
   ASSERT_TRUE(wait_for_rows(run.recording(), 100)) << server->output();
+  client->send(SIGSTOP);  // holds the flight until sim_ctl has joined
   const auto pause = run.start("sim_ctl", {"pause"}, run.keys.as());
   ASSERT_EQ(pause->wait(), 0) << pause->output();
+  client->send(SIGCONT);
   const auto controller = run.start("sim_ctl", {"resume"}, run.keys.as("controller"));
   EXPECT_EQ(controller->wait(), 2);
   EXPECT_NE(controller->output().find("identity 'controller': expected permission to"),
@@ -68,7 +73,7 @@ TEST(SecureFlightTest, AnOperatorMayPauseAndResumeAndAControllerMayNot) {
 }
 
 TEST(SecureFlightTest, AViewerSeesTheFlightAndMayNotOperateIt) {
-  const SecuredRun run(32);
+  const SecuredRun run(64);
   const auto viewer = run.start("sls_view", {"--port", "0"}, run.keys.as());
   PageClient page(wait_for_port(*viewer));
   const auto recorder = run.start_recorder(), server = run.start_server(),
@@ -82,7 +87,7 @@ TEST(SecureFlightTest, AViewerSeesTheFlightAndMayNotOperateIt) {
 }
 
 TEST(SecureFlightTest, AViewerWithAnOperatorsKeysOperates) {
-  const SecuredRun run(32);
+  const SecuredRun run(64);
   const auto viewer =
       run.start("sls_view", {"--port", "0", "--identity", "operator"}, run.keys.as());
   PageClient page(wait_for_port(*viewer));

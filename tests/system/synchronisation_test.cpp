@@ -301,9 +301,11 @@ TEST(RealTimeTest, ATakeOverLeavesAtMostFivePeriodsWithoutAFreshCommand) {
 // --- lockstep ------------------------------------------------------------------------------------
 
 TEST(WaitingTest, AStoppedClientIsNamedAndTheRecordingIsThatOfAnUndisturbedFlight) {
-  Flight undisturbed(scenario("figure_eight"));
+  // 32,000 steps: a flight of 8,000 may be over before the client is stopped.
+  const FlightOptions longer{{}, {"--period-s", "0.001"}, {}};
+  Flight undisturbed(scenario("figure_eight"), longer);
   undisturbed.expect_success();
-  Flight flight(scenario("figure_eight"));
+  Flight flight(scenario("figure_eight"), longer);
   ASSERT_TRUE(flight.wait_for_steps(500)) << flight.outputs();
   flight.client->send(SIGSTOP);
   ASSERT_TRUE(wait_until([&] {
