@@ -5,6 +5,8 @@ import pathlib
 import re
 import unittest
 
+import yaml
+
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 
@@ -44,6 +46,13 @@ class ContextTest(unittest.TestCase):
         copied = list_copied()
         self.assertIn("config", copied)
         self.assertEqual([path for path in copied if not is_let_through(path)], [])
+
+    def test_no_service_of_a_campaign_ends_before_the_campaign(self):
+        # Compose stops all services as soon as one of them ends.
+        services = yaml.safe_load((ROOT / "docker/compose.dask.yaml").read_text(encoding="utf-8"))["services"]
+        self.assertEqual(sorted(services), ["campaign", "scheduler", "worker"])
+        self.assertEqual(services["scheduler"]["command"][0], "dask-scheduler")
+        self.assertEqual(services["worker"]["command"][0], "dask-worker")
 
 
 if __name__ == "__main__":
