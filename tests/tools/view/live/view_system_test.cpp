@@ -3,6 +3,7 @@
 #include <signal.h>
 
 #include <cmath>
+#include <map>
 
 #include "tests/system/flight.hpp"
 #include "tests/tools/view/live/page_client.hpp"
@@ -34,15 +35,23 @@ TEST(ViewSystemTest, APageSeesTheFlightThatIsRecorded) {
   ASSERT_GT(rows.size(), 100u);
   const Table states(flight.recording() / "state.csv");
   const Table references(flight.recording() / "reference.csv");
+  std::map<std::size_t, std::size_t> row_of;  // of reference.csv, by step
+  for (std::size_t i = 0; i < references.rows(); ++i)
+    row_of[static_cast<std::size_t>(references.number(i, "step"))] = i;
+  int compared = 0;
   for (const auto& [time, row] : rows) {
     const auto step = static_cast<std::size_t>(std::lround(time / 0.004));
     ASSERT_LT(step, states.rows());
     ASSERT_NEAR(states.number(step, "sim_time_s"), time, 1e-9);
     ASSERT_FLOAT_EQ(row[0], static_cast<float>(states.number(step, "quad_x_m")));
     ASSERT_FLOAT_EQ(row[8], static_cast<float>(states.number(step, "load_z_m")));
-    if (step >= references.rows()) continue;
-    ASSERT_FLOAT_EQ(row[26], static_cast<float>(references.number(step, "ref_x_m")));
+    // On a busy machine answers may be late: their steps have no reference.
+    const auto reference = row_of.find(step);
+    if (reference == row_of.end() || std::isnan(row[26])) continue;
+    ASSERT_FLOAT_EQ(row[26], static_cast<float>(references.number(reference->second, "ref_x_m")));
+    ++compared;
   }
+  EXPECT_GT(compared, 10);
 }
 
 TEST(ViewSystemTest, APagePausesStepsResumesAndResets) {
