@@ -677,10 +677,10 @@ cmd_test() {
   install_node_modules "$root/tests/tools/view"
   build_tree "$preset" "$folder" "${targets[@]}"
   cd "$root"
-  # Most tests wait for processes and discovery: two for each core use it well.
+  # Most tests wait for processes and discovery: one more than there are cores leaves none idle.
   # They must not get variables that the middleware reads from the environment.
   env -u ROS_DISCOVERY_SERVER -u FASTRTPS_DEFAULT_PROFILES_FILE -u SLS_DOMAIN \
-    ctest --preset "$preset" --parallel "$((2 * $(nproc)))" "${which[@]}"
+    ctest --preset "$preset" --parallel "$(($(nproc) + 1))" "${which[@]}"
 }
 
 cmd_reference() {
