@@ -37,6 +37,7 @@
 #include "common/bus/fastdds/leaving.hpp"
 #include "common/bus/fastdds/middleware_log.hpp"
 #include "common/bus/fastdds/neighbours.hpp"
+#include "common/bus/fastdds/participant_ids.hpp"
 #include "common/bus/fastdds/participant_listener.hpp"
 #include "common/bus/fastdds/small_datagrams.hpp"
 #include "common/bus/fastdds/stale_segments.hpp"
@@ -157,7 +158,8 @@ struct Node::Impl {
     if (wire.participant_id < 0 && has_shared_memory(qos))
       wire.participant_id = choose_participant_id(
           {wire.port.portBase + wire.port.domainIDGain * domain + wire.port.offsetd1,
-           wire.port.participantIDGain});
+           wire.port.participantIDGain},
+          find_own_participant_ids());
     listener = std::make_unique<ParticipantListener>(is_secured, &neighbours);
     participant = factory->create_participant(static_cast<std::uint32_t>(domain), qos,
                                               listener.get(), dds::StatusMask::none());

@@ -16,13 +16,13 @@
 #include <algorithm>
 #include <array>
 #include <mutex>
-#include <random>
 #include <set>
 #include <utility>
 
 #include "common/bus/fastdds/endpoints.hpp"
 #include "common/bus/fastdds/facts_of.hpp"
 #include "common/bus/fastdds/middleware_log.hpp"
+#include "common/bus/fastdds/participant_ids.hpp"
 #include "common/bus/fastdds/participant_listener.hpp"
 #include "common/bus/fastdds/stale_segments.hpp"
 #include "common/bus/node.hpp"
@@ -139,8 +139,8 @@ struct Observer::Impl : bus::ParticipantListener {
     if (!options.peer_address.empty()) add_peer(qos, ports, options.peer_address);
     auto& wire = qos.wire_protocol();
     if (wire.participant_id < 0)
-      wire.participant_id =
-          bus::choose_participant_id({ports.metatraffic(0), ports.participant_gain});
+      wire.participant_id = bus::choose_participant_id(
+          {ports.metatraffic(0), ports.participant_gain}, bus::find_own_participant_ids());
     bus::MiddlewareLog::clear();
     auto* factory = dds::DomainParticipantFactory::get_instance();
     participant = factory->create_participant(static_cast<std::uint32_t>(options.domain), qos, this,

@@ -97,14 +97,17 @@ bool is_port_read(int port, const fs::path& folder) {
   return find_state(port, folder) == PortState::kInUse;
 }
 
-int choose_participant_id(const ParticipantPorts& ports, const fs::path& folder) {
+int choose_participant_id(const ParticipantPorts& ports, const std::set<int>& own_ids,
+                          const fs::path& folder) {
   bool is_any_stale = false;
   int first_free = -1;
   for (int id = 0; id < kMaxParticipantIds; ++id) {
     const int port = ports.base + id * ports.gain;
     const PortState meta = find_state(port, folder), user = find_state(port + 1, folder);
     if (meta == PortState::kStale || user == PortState::kStale) is_any_stale = true;
-    if (meta == PortState::kFree && user == PortState::kFree && first_free < 0) first_free = id;
+    const bool is_free =
+        meta == PortState::kFree && user == PortState::kFree && own_ids.count(id) == 0;
+    if (is_free && first_free < 0) first_free = id;
   }
   return is_any_stale ? first_free : -1;
 }

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <filesystem>
+#include <set>
 #include <vector>
 
 namespace sls::bus {
@@ -31,8 +32,9 @@ bool is_port_read(int port, const std::filesystem::path& folder = "/dev/shm");
 ///
 /// A killed process leaves the lock files of its ports, and the next process on such a port
 /// replaces the port. A process that has the old port open gets no notice: neither process receives
-/// the other's data (Fast DDS 2.9, #4728). So if there are such files, an id without any is chosen.
-int choose_participant_id(const ParticipantPorts& ports,
+/// the other's data (Fast DDS 2.9, #4728). So if there are such files, an id without any is chosen,
+/// which is not in `own_ids`, those of this process (participant_ids.hpp).
+int choose_participant_id(const ParticipantPorts& ports, const std::set<int>& own_ids,
                           const std::filesystem::path& folder = "/dev/shm");
 
 }  // namespace sls::bus

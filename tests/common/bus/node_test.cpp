@@ -263,6 +263,21 @@ TEST(NodeTest, NodesWithoutSharedMemoryJoinBesideThePortOfAKilledProcess) {
   std::filesystem::remove(stale);
 }
 
+// Participant ids are unique in a process, but ports are in use or stale per domain.
+TEST(NodeTest, ANodeBesideThePortOfAKilledProcessSparesTheIdsOfItsProcess) {
+  constexpr int kDomain = 81;
+  Node first(kQosFile, 79, "first");
+  const std::string stale =
+      "/dev/shm/fastrtps_port" + std::to_string(7410 + 250 * kDomain + 20) + "_el";
+  std::ofstream(stale) << "";
+  EXPECT_NO_THROW(Node(kQosFile, kDomain, "second"));
+  std::filesystem::remove(stale);
+  Node third(kQosFile, 79, "third");
+  Writer<States> writer(third);
+  Listener<States> listener(first, kLoopReaderProfile, third);
+  EXPECT_TRUE(wait_until([&] { return listener.is_matched(); }));
+}
+
 TEST(NodeErrorTest, ADomainOutOfRangeIsRefusedWithItsRange) {
   for (const int domain : {-1, 233, 100000, -2147483647 - 1}) {
     const std::string error = find_error(kQosFile, domain);

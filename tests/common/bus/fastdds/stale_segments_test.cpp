@@ -65,10 +65,10 @@ TEST_F(StaleSegmentsTest, EverythingElseStays) {
 }
 
 TEST_F(StaleSegmentsTest, WithoutStalePortsAnyParticipantIdWillDo) {
-  EXPECT_EQ(choose_participant_id({8160, 2}, folder_.path()), -1);
+  EXPECT_EQ(choose_participant_id({8160, 2}, {}, folder_.path()), -1);
   make("fastrtps_port8160", std::chrono::seconds(60));  // of a process that ended normally
-  EXPECT_EQ(choose_participant_id({8160, 2}, folder_.path()), -1);
-  EXPECT_EQ(choose_participant_id({8160, 2}, folder_ / "no such folder"), -1);
+  EXPECT_EQ(choose_participant_id({8160, 2}, {}, folder_.path()), -1);
+  EXPECT_EQ(choose_participant_id({8160, 2}, {}, folder_ / "no such folder"), -1);
 }
 
 TEST_F(StaleSegmentsTest, PortsOfKilledAndOfLivingProcessesAreAvoided) {
@@ -77,10 +77,11 @@ TEST_F(StaleSegmentsTest, PortsOfKilledAndOfLivingProcessesAreAvoided) {
   const fs::path lock = folder_ / "fastrtps_port8162_el";
   const int descriptor = open(lock.c_str(), O_RDONLY);
   ASSERT_EQ(flock(descriptor, LOCK_EX | LOCK_NB), 0);
-  EXPECT_EQ(choose_participant_id({8160, 2}, folder_.path()), 2);
+  EXPECT_EQ(choose_participant_id({8160, 2}, {}, folder_.path()), 2);
+  EXPECT_EQ(choose_participant_id({8160, 2}, {2, 3}, folder_.path()), 4) << "ids of this process";
   close(descriptor);
   // The ports of another domain do not matter.
-  EXPECT_EQ(choose_participant_id({8410, 2}, folder_.path()), -1);
+  EXPECT_EQ(choose_participant_id({8410, 2}, {}, folder_.path()), -1);
 }
 
 }  // namespace
