@@ -26,7 +26,7 @@ extern "C" void remember_signal(int number) {
 extern "C" void give_up(int) {
   for (const char* text :
        {const_cast<const char*>(program_invocation_short_name),
-        ": error: did not end after the stop signal: ended at once, its files may be "
+        ": error: did not end after the stop signal: exits now, its files may be "
         "incomplete\n"})
     if (::write(STDERR_FILENO, text, std::strlen(text)) < 0) break;
   ::_exit(128 + received);

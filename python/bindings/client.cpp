@@ -40,7 +40,7 @@ constexpr auto kPatience = 20s;  // after a stop signal, equal to that of the pr
 /// return. The programs do the same.
 [[noreturn]] void end_process(py::error_already_set& interruption) {
   std::fputs(
-      "sls.Client: error: did not end after the stop signal: ended at once, its files may be "
+      "sls.Client: error: did not end after the stop signal: exits now, its files may be "
       "incomplete\n",
       stderr);
   ::_exit(interruption.matches(PyExc_KeyboardInterrupt) ? 128 + SIGINT : 128 + SIGTERM);
