@@ -19,11 +19,7 @@
 namespace sls::control {
 namespace {
 
-using namespace std::chrono_literals;
-
-constexpr auto kUsualJoinTime = 1500ms;      // usual discovery and claim; no report before
 constexpr double kAfterThePatience_s = 5.0;  // so the run ends before a law that hangs
-constexpr auto kPollTime = 20ms;             // of the main thread, which is not urgent
 
 }  // namespace
 
@@ -67,7 +63,7 @@ void Client::run() {
 std::optional<bus::Run> Client::find_first_run() {
   const double timeout_s = scenario_.sync.wait_for.timeout_s;
   const std::string vehicles = config::to_vehicle_ranges(vehicle_ids_);
-  app::Wait wait(timeout_s, kUsualJoinTime);
+  app::Wait wait(timeout_s, app::kUsualJoinTime);
   announce_waiting();
   while (!options_.is_stopped()) {
     if (auto run = find_joinable_run()) return run;
@@ -77,7 +73,7 @@ std::optional<bus::Run> Client::find_first_run() {
     if (wait.is_report_due())
       spdlog::info("waiting for: server of vehicle {} ({:.0f} s left){}{}", vehicles,
                    wait.seconds_left(), describe_problem(), node_.describe_isolation());
-    std::this_thread::sleep_for(kPollTime);
+    std::this_thread::sleep_for(app::kPollTime);
   }
   return std::nullopt;
 }
@@ -156,7 +152,7 @@ std::optional<bus::Run> Client::serve() {
       ready_ = true;
       announce(true, false);
     }
-    std::this_thread::sleep_for(kPollTime);
+    std::this_thread::sleep_for(app::kPollTime);
   }
   return std::nullopt;
 }

@@ -16,21 +16,19 @@ namespace {
 using namespace std::chrono_literals;
 namespace fs = std::filesystem;
 
-constexpr auto kUsualJoinTime = 1500ms;  // usual discovery and claim; no report before
-constexpr auto kPollTime = 20ms;
 constexpr double kJoinTimeout = 60;  // until a run must be found, s
 
 /// Calls `find` until it returns a run, a stop signal comes or `limit_s` is over.
 template <class Find>
 std::optional<bus::Run> wait_for_run(const bus::Node& node, const std::string& whom, double limit_s,
                                      Find find) {
-  app::Wait wait(limit_s, kUsualJoinTime);
+  app::Wait wait(limit_s, app::kUsualJoinTime);
   while (app::stop_signal() == 0 && !wait.is_over()) {
     if (auto run = find()) return run;
     if (wait.is_report_due())
       spdlog::info("waiting for: {} ({:.0f} s left){}", whom, wait.seconds_left(),
                    node.describe_isolation());
-    std::this_thread::sleep_for(kPollTime);
+    std::this_thread::sleep_for(app::kPollTime);
   }
   return std::nullopt;
 }

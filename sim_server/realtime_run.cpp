@@ -8,6 +8,7 @@
 
 #include "common/app/run_main.hpp"
 #include "common/app/scheduling.hpp"
+#include "common/app/wait.hpp"
 
 namespace sls::sim {
 namespace {
@@ -91,8 +92,8 @@ void RealtimeRun::publish() {
 }
 
 bool RealtimeRun::wait_until_due() {
-  while (Clock::now() + kPollTime < schedule_.due(board_.step)) {
-    endpoints_.requests.wait(Clock::now() + kPollTime);
+  while (Clock::now() + app::kPollTime < schedule_.due(board_.step)) {
+    endpoints_.requests.wait(Clock::now() + app::kPollTime);
     do_housekeeping();
     if (!rest() || !wait_for_recorders()) return false;
   }
@@ -102,7 +103,7 @@ bool RealtimeRun::wait_until_due() {
 
 bool RealtimeRun::take_commands(Clock::time_point deadline) {
   while (!are_all_accepted() && Clock::now() < deadline) {
-    endpoints_.commands.wait(std::min(deadline, Clock::now() + kPollTime));
+    endpoints_.commands.wait(std::min(deadline, Clock::now() + app::kPollTime));
     for (const ReceivedCommands& received : endpoints_.commands.take_all())
       judge(received.sample, received.sender, received.arrived < published_);
     check_refusals();

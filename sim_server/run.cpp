@@ -145,7 +145,7 @@ bool Run::wait_for_participants() {
       if (missing != published) board_.publish(PHASE_WAITING, "missing: " + missing);
       published = missing;
     }
-    std::this_thread::sleep_for(kPollTime);
+    std::this_thread::sleep_for(app::kPollTime);
   }
 }
 
@@ -225,7 +225,7 @@ bool Run::rest() {
     do_housekeeping();
     if (is_roster_due()) refresh_roster();
     is_ended = attend_to_operator();
-    if (!is_ended && control_.holds()) endpoints_.requests.wait(Clock::now() + kPollTime);
+    if (!is_ended && control_.holds()) endpoints_.requests.wait(Clock::now() + app::kPollTime);
   }
   note_rest(Clock::now() - began);
   return !is_ended;

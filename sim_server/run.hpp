@@ -25,9 +25,6 @@
 
 namespace sls::sim {
 
-/// Interval of the server's waiting loops.
-inline constexpr auto kPollTime = std::chrono::milliseconds(20);
-
 /// The scenario and the vehicles of a server.
 struct Assignment {
   config::Scenario scenario;

@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "common/app/run_main.hpp"
+#include "common/app/wait.hpp"
 #include "sim_server/lockstep_run.hpp"
 #include "sim_server/realtime_run.hpp"
 
@@ -49,7 +50,7 @@ void Server::claim_vehicles(const Run& run) {
   while (std::chrono::steady_clock::now() < settled) {
     Run::check_stop();
     run.check_claim();
-    std::this_thread::sleep_for(kPollTime);
+    std::this_thread::sleep_for(app::kPollTime);
   }
 }
 

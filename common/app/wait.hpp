@@ -4,6 +4,13 @@
 
 namespace sls::app {
 
+/// Interval of the waiting loops of the programs, which are not urgent.
+inline constexpr auto kPollTime = std::chrono::milliseconds(20);
+
+/// Discovery and claim usually take less: a program that joins a run reports its waiting after
+/// this.
+inline constexpr auto kUsualJoinTime = std::chrono::milliseconds(1500);
+
 /// The times of a wait: its deadline, and when to log a line about it.
 class Wait {
  public:

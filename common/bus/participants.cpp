@@ -128,7 +128,6 @@ bool are_recorders_done(const std::vector<ParticipantDirectory::Entry>& recorder
 
 void wait_for_recorders_to_end(const ParticipantDirectory& participants, std::uint64_t run_id,
                                int expected, const RecorderPatience& patience) {
-  constexpr auto kPollTime = std::chrono::milliseconds(20);
   app::Wait wait(patience.without_news);
   const app::Wait longest(patience.longest);
   std::map<PeerId, std::int64_t> last_steps;
@@ -146,7 +145,7 @@ void wait_for_recorders_to_end(const ParticipantDirectory& participants, std::ui
       spdlog::info("waiting for: recorder{} to finish ({:.0f} s left)",
                    names.empty() ? " (gone)" : names, wait.seconds_left());
     }
-    std::this_thread::sleep_for(kPollTime);
+    std::this_thread::sleep_for(app::kPollTime);
   }
 }
 

@@ -69,7 +69,7 @@ std::optional<bus::Run> OperatorClient::wait_for(const FindRun& find) const {
     if (wait.is_report_due())
       spdlog::info("waiting for: server of vehicle {} on domain {} ({:.0f} s left)",
                    options_.vehicle_id, options_.domain, wait.seconds_left());
-    std::this_thread::sleep_for(kPollTime);
+    std::this_thread::sleep_for(app::kPollTime);
   }
   return std::nullopt;
 }
@@ -137,7 +137,7 @@ std::optional<SimControlReply> OperatorClient::ask(const bus::Run& run, ControlA
   bus::ServerWatch server(servers_, run, options_.timeout_s);
   std::optional<Clock::time_point> give_up;  // once the run has ended
   while (app::stop_signal() == 0) {
-    const auto received = replies_.take(Clock::now() + kPollTime);
+    const auto received = replies_.take(Clock::now() + app::kPollTime);
     if (received && received->sender == run.server &&
         received->reply.request_id() == request.request_id())
       return received->reply;
@@ -171,7 +171,7 @@ bool OperatorClient::wait_until_heard(const bus::Run& run, app::Wait& wait) cons
     if (wait.is_report_due())
       spdlog::info("waiting for: server of run {:016x} to take requests ({:.0f} s left)",
                    run.parameters.run_id(), wait.seconds_left());
-    std::this_thread::sleep_for(kPollTime);
+    std::this_thread::sleep_for(app::kPollTime);
   }
   return true;
 }

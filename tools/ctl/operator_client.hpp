@@ -18,9 +18,6 @@
 
 namespace sls::ctl {
 
-/// Interval of the waiting loops.
-inline constexpr auto kPollTime = std::chrono::milliseconds(20);
-
 struct ClientOptions {
   int domain = 0;  ///< domain of the node, for log messages
   std::uint32_t vehicle_id = 0;

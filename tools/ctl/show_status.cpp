@@ -9,6 +9,7 @@
 
 #include "common/app/run_main.hpp"
 #include "common/app/stop_signal.hpp"
+#include "common/app/wait.hpp"
 #include "tools/ctl/screen.hpp"
 
 namespace sls::ctl {
@@ -36,7 +37,7 @@ bus::Run wait_for_fresh_status(const OperatorClient& client, bus::Run run) {
   const auto began = Clock::now();
   std::optional<std::uint64_t> left;  // sample_index when discovery was over
   while (!is_interrupted() && Clock::now() - began < kFreshTime) {
-    std::this_thread::sleep_for(kPollTime);
+    std::this_thread::sleep_for(app::kPollTime);
     run = client.refresh(run);
     if (Clock::now() - began < kDiscoveryTime) continue;
     if (has_ended(run.status)) break;
@@ -130,7 +131,7 @@ void watch(const OperatorClient& client, double timeout_s, bus::Run run, OutputW
     if (snapshot.server_is_gone && snapshot.silence_s > timeout_s)
       throw app::RunError(fmt::format("the server of run {:016x} is gone, silent for {:.1f} s",
                                       run.parameters.run_id(), snapshot.silence_s));
-    std::this_thread::sleep_for(kPollTime);
+    std::this_thread::sleep_for(app::kPollTime);
   }
 }
 
