@@ -46,9 +46,8 @@ class Listener {
     const std::lock_guard lock(mutex_);
     return stamps_.empty();
   }
-  const std::vector<Stamp>& stamps() const {
-    return stamps_;
-  }  // without lock: call it when is_over
+  /// Without lock: call it when is_over.
+  const std::vector<Stamp>& stamps() const { return stamps_; }
 
  private:
   mutable std::mutex mutex_;

@@ -178,8 +178,8 @@ void RunRecorder::write_samples() {
       report_missing_batch();
       std::this_thread::sleep_for(samples.empty() ? kWriteTime : kBusyTime);
     }
-    const bool has_all =
-        recording_.has_all();  // if true, the main thread may still write interruption_
+    // If it has all, the main thread may still write interruption_.
+    const bool has_all = recording_.has_all();
     end_.is_complete = recording_.finish(has_all ? "" : interruption_,
                                          surroundings_.inbox.refused(), has_all ? "" : outcome_);
     if (!end_.is_complete) end_.gaps = recording_.describe_gaps();
