@@ -1,5 +1,5 @@
-"""Tests the build context of docker/Dockerfile: .dockerignore admits every path that the Dockerfile copies and every
-folder that CMake builds without tests. Needs no Docker engine."""
+"""Tests the files of docker/ without a Docker engine: .dockerignore admits every path that the Dockerfile copies and
+every folder that CMake builds without tests, and compose.dask.yaml has no service besides those of a campaign."""
 
 import pathlib
 import re

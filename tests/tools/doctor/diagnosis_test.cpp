@@ -119,8 +119,10 @@ TEST(DiagnosisTest, AnotherFlightOnAnotherDomainIsNoFault) {
   Heard heard{5, seen.peer_address, {{}, "sim_server", false}};
   seen.heard = {heard};
   EXPECT_EQ(find_faults(seen), Names{});
-  seen.heard.front().announcement.name = "recorder";
-  EXPECT_EQ(find_faults(seen), Names{"domain"}) << "it has lost its server";
+  for (const char* name : {"recorder", "control_client", "sls_view"}) {
+    seen.heard.front().announcement.name = name;
+    EXPECT_EQ(find_faults(seen), Names{"domain"}) << name << " has lost its server";
+  }
 }
 
 TEST(DiagnosisTest, AProgramThatAnswersNoHandshakeRejectsUs) {
