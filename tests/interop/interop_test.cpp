@@ -382,9 +382,8 @@ TEST_F(MyClientTest, BringsTheLoadToItsPointWithTheSameBytesDespiteLosses) {
 }
 
 TEST_F(MyClientTest, FollowsAResetAndTheServerThatReplacesAKilledOne) {
-  const Words longer = {"--period-s", "0.001"};  // 20,000 steps: neither run may be over too soon
   const auto recorder = start_recorder({"--follow"});
-  auto server = start_server({}, longer);
+  auto server = start_server({}, kManySteps);
   const auto client = start_client();
   ASSERT_TRUE(wait_for_steps(100)) << server->output();
   client->send(SIGSTOP);  // holds the flight until sim_ctl has joined
@@ -395,7 +394,7 @@ TEST_F(MyClientTest, FollowsAResetAndTheServerThatReplacesAKilledOne) {
       << server->output() << client->output();
   ASSERT_TRUE(server->is_running()) << "over before the kill\n" << server->output();
   server->kill();
-  server = start_server({}, longer);
+  server = start_server({}, kManySteps);
   expect_success({server.get(), client.get(), recorder.get()});
 }
 

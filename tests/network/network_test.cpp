@@ -91,10 +91,9 @@ TEST_F(NetworkTest, PacketsOfAtMost576Bytes) {
 
 TEST_F(NetworkTest, APartitionOfFiveSecondsCostsAtMostSix) {
   const Profile profile(*network_, "lan");
-  // 32,000 steps: a flight of 8,000 may be over before the cut.
   FlightOptions longer = profile.flight_options();
-  longer.server = {"--period-s", "0.001"};
-  Flight local(scenario("figure_eight"), {{}, longer.server, {}});
+  longer.server = kManySteps;
+  Flight local(scenario("figure_eight"), {{}, kManySteps, {}});
   local.expect_success();
   Flight flight(scenario("figure_eight"), longer);
   ASSERT_TRUE(flight.wait_for_steps(100)) << flight.outputs();

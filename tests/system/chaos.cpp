@@ -283,7 +283,7 @@ int run_trials(int trials, std::uint64_t seed, bool is_verbose) {
       folder, {{"controllers: 1", "controllers: 2"}, {"for_s: 32", "for_s: 16"}}, "figure_eight");
   // Undisturbed: the same scenario, both clients.
   FlightOptions options;
-  options.server = {"--period-s", "0.001"};
+  options.server = kManySteps;
   options.client = {"--name", "primary", "--strength", "2"};
   Flight undisturbed(file, options);
   Process standby(make_command("control_client", undisturbed.domain.number(),

@@ -124,11 +124,9 @@ TEST(FaultsTest, KilledPrimaryIsReplacedByTheStandbyAndTheStatesStayIdentical) {
   TemporaryFolder folder;
   const std::string file =
       make_scenario(folder, "controllers: 1", "controllers: 2", "figure_eight");
-  // 32,000 steps: a flight of 8,000 may be over before the primary is killed.
-  const std::vector<std::string> longer = {"--period-s", "0.001"};
-  Flight undisturbed(scenario("figure_eight"), {{}, longer, {}});
+  Flight undisturbed(scenario("figure_eight"), {{}, kManySteps, {}});
   undisturbed.expect_success();
-  Flight flight(file, {{}, longer, {"--name", "primary", "--strength", "2"}});
+  Flight flight(file, {{}, kManySteps, {"--name", "primary", "--strength", "2"}});
   Process standby(make_command("control_client", flight.domain.number(),
                                {"--scenario", file, "--name", "standby", "--strength", "1"}));
   ASSERT_TRUE(flight.wait_for_steps(500)) << flight.outputs() << standby.output();

@@ -12,8 +12,8 @@ class Load {
  public:
   explicit Load(unsigned cores) {
     for (unsigned i = 0; i < cores; ++i)
-      burners_.push_back(std::make_unique<Process>(
-          std::vector<std::string>{"sh", "-c", "while :; do :; done"}));
+      burners_.push_back(
+          std::make_unique<Process>(std::vector<std::string>{"sh", "-c", "while :; do :; done"}));
   }
 
  private:

@@ -19,8 +19,8 @@ std::pair<bool, std::string> verify(const fs::path& a, const fs::path& b) {
 class RestartTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    undisturbed_ = std::make_unique<Flight>(scenario("figure_eight"),
-                                            FlightOptions{{}, {"--period-s", "0.001"}, {}});
+    undisturbed_ =
+        std::make_unique<Flight>(scenario("figure_eight"), FlightOptions{{}, kManySteps, {}});
     undisturbed_->expect_success();
   }
   static void TearDownTestSuite() { undisturbed_.reset(); }
@@ -29,7 +29,9 @@ class RestartTest : public ::testing::Test {
     return std::make_unique<Process>(make_command(name, domain_.number(), flags));
   }
   std::unique_ptr<Process> start_server() const {
-    return start("sim_server", {"--scenario", scenario("figure_eight"), "--period-s", "0.001"});
+    std::vector<std::string> flags = {"--scenario", scenario("figure_eight")};
+    flags.insert(flags.end(), kManySteps.begin(), kManySteps.end());
+    return start("sim_server", flags);
   }
   std::unique_ptr<Process> start_client(const std::vector<std::string>& further = {}) const {
     std::vector<std::string> flags = {"--scenario", scenario("figure_eight")};

@@ -301,8 +301,7 @@ TEST(RealTimeTest, ATakeOverLeavesAtMostFivePeriodsWithoutAFreshCommand) {
 // --- lockstep ------------------------------------------------------------------------------------
 
 TEST(WaitingTest, AStoppedClientIsNamedAndTheRecordingIsThatOfAnUndisturbedFlight) {
-  // 32,000 steps: a flight of 8,000 may be over before the client is stopped.
-  const FlightOptions longer{{}, {"--period-s", "0.001"}, {}};
+  const FlightOptions longer{{}, kManySteps, {}};
   Flight undisturbed(scenario("figure_eight"), longer);
   undisturbed.expect_success();
   Flight flight(scenario("figure_eight"), longer);
@@ -376,7 +375,7 @@ TEST(WaitingTest, PolicyGoOnFliesToTheEndWithoutTheRecorder) {
                     {{"timeout_s: 30 }",
                       "timeout_s: 30 }, wait: { recorder: { policy: go_on, deadline_s: 1 } }"}},
                     "figure_eight");
-  Flight flight(file, {{}, {"--period-s", "0.001"}, {}});
+  Flight flight(file, {{}, kManySteps, {}});
   ASSERT_TRUE(flight.wait_for_steps(500)) << flight.outputs();
   flight.recorder->kill();
   EXPECT_EQ(flight.server->wait(), 0) << flight.outputs();
@@ -412,7 +411,7 @@ TEST(WaitingTest, StatesSentManyTimesCostARecorderThatIsBehindNothing) {
 }
 
 TEST(WaitingTest, AStoppedServerIsNamedByClientAndRecorderAndTheFlightGoesOn) {
-  Flight flight(scenario("figure_eight"), {{}, {"--period-s", "0.001"}, {}});
+  Flight flight(scenario("figure_eight"), {{}, kManySteps, {}});
   ASSERT_TRUE(flight.wait_for_steps(500)) << flight.outputs();
   flight.server->send(SIGSTOP);
   for (const Process* process : {flight.client.get(), flight.recorder.get()})
@@ -430,7 +429,7 @@ TEST(StandbyTest, TakesOverAfterTheTimeOfTheScenarioWithOneEventForTheSwitch) {
   // On a busy machine the take-over may be late, or the primary silent before it is killed. Five
   // failures in a row are unlikely.
   for (int attempt = 0; attempt < 5; ++attempt) {
-    Flight flight(file, {{}, {"--period-s", "0.001"}, {"--name", "primary", "--strength", "2"}});
+    Flight flight(file, {{}, kManySteps, {"--name", "primary", "--strength", "2"}});
     Process standby(make_command("control_client", flight.domain.number(),
                                  {"--scenario", file, "--name", "standby", "--strength", "1"}));
     ASSERT_TRUE(wait_until([&] {

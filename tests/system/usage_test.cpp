@@ -60,8 +60,9 @@ TEST(UsageTest, WrongFlagsAreRefused) {
     for (const char* domain : {"233", "-1", "one"})
       expect_refused({program(name), "--scenario", scenario("short"), "--domain", domain}, 2,
                      "--domain");
-  expect_refused({"/usr/bin/env", "SLS_DOMAIN=233", program("sim_server"), "--scenario", scenario("short")}, 2,
-                 "--domain");
+  expect_refused(
+      {"/usr/bin/env", "SLS_DOMAIN=233", program("sim_server"), "--scenario", scenario("short")}, 2,
+      "--domain");
   expect_refused(server_with({"--scenario", scenario("short"), "--period-s", "0.0035"}), 2,
                  "--period-s");
   expect_refused(server_with({"--scenario", scenario("short"), "--period-s", "nan"}), 2,
