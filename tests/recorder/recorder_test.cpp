@@ -22,15 +22,12 @@ namespace {
 namespace fs = std::filesystem;
 using namespace std::chrono_literals;
 using namespace test;
+using sls::test::own_domain;
 using sls::test::read_bytes;
 using sls::test::wait_until;
 using Json = nlohmann::json;
 
 const fs::path kQosFile = SLS_SOURCE_DIR "/config/qos/default.xml";
-int own_domain() {
-  static const sls::test::OwnDomain domain;
-  return domain.number();
-}
 constexpr std::uint64_t kOtherRun = 0xfedcba9876543210;
 
 /// A server of the synthetic run and its only client.

@@ -31,6 +31,12 @@ class OwnDomain {
   int lock_ = -1;
 };
 
+/// The domain of this process, for tests that need only one.
+inline int own_domain() {
+  static const OwnDomain domain;
+  return domain.number();
+}
+
 inline OwnDomain::OwnDomain() {
   // A name in the abstract socket namespace is a lock that leaves nothing behind.
   const bool found = wait_until([this] {

@@ -17,19 +17,20 @@
 
 #include "common/config/config_error.hpp"
 #include "tests/common/bus/sample_messages.hpp"
+#include "tests/support/own_domain.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/support/waiting.hpp"
 
 namespace sls::bus {
 namespace {
 
+using sls::test::own_domain;
 using sls::test::wait_until;
 using test::make_message;
 
 const std::filesystem::path kQosFile = SLS_SOURCE_DIR "/config/qos/default.xml";
 
-/// A reader that keeps the messages of `sender` only: tests of another build may use the same
-/// domain.
+/// A reader that keeps the messages of `sender`.
 template <class Message>
 class Listener {
  public:
@@ -65,13 +66,13 @@ bool is_matched(const Writer<Message>& writer, const Node& reader_node) {
 
 /// Writes messages in which every field is filled and reads them through each of `profiles`.
 template <class Message>
-void expect_round_trip(int domain, const std::vector<const char*>& profiles) {
-  Node writing(kQosFile, domain, "writing"), reading(kQosFile, domain, "reading");
+void expect_round_trip(const std::vector<const char*>& profiles) {
+  Node writing(kQosFile, own_domain(), "writing"), reading(kQosFile, own_domain(), "reading");
   EXPECT_NE(writing.id(), reading.id());
   Writer<Message> writer(writing);
   for (const char* profile : profiles) {
     SCOPED_TRACE(profile);
-    // Until the reader before is forgotten, is_matched() would speak of that one.
+    // Until the reader before is forgotten, is_matched() would be true because of that one.
     ASSERT_TRUE(wait_until([&] { return !is_matched(writer, reading); }));
     Listener<Message> listener(reading, profile, writing);
     ASSERT_TRUE(wait_until([&] { return is_matched(writer, reading) && listener.is_matched(); }));
@@ -88,28 +89,26 @@ void expect_round_trip(int domain, const std::vector<const char*>& profiles) {
   }
 }
 
-TEST(NodeTest, StatesArriveUnchanged) { expect_round_trip<States>(70, {kLoopReaderProfile}); }
-TEST(NodeTest, CommandsArriveUnchanged) { expect_round_trip<Commands>(71, {kLoopReaderProfile}); }
+TEST(NodeTest, StatesArriveUnchanged) { expect_round_trip<States>({kLoopReaderProfile}); }
+TEST(NodeTest, CommandsArriveUnchanged) { expect_round_trip<Commands>({kLoopReaderProfile}); }
 TEST(NodeTest, BatchesArriveUnchanged) {
-  expect_round_trip<RecordBatch>(72, {kRecordReaderProfile, kLoopReaderProfile});
+  expect_round_trip<RecordBatch>({kRecordReaderProfile, kLoopReaderProfile});
 }
 TEST(NodeTest, ParticipantsArriveUnchanged) {
-  expect_round_trip<Participant>(73, {kLatchedReaderProfile});
+  expect_round_trip<Participant>({kLatchedReaderProfile});
 }
 TEST(NodeTest, ParametersArriveUnchanged) {
-  expect_round_trip<Parameters>(74, {kLatchedReaderProfile});
+  expect_round_trip<Parameters>({kLatchedReaderProfile});
 }
-TEST(NodeTest, StatusesArriveUnchanged) {
-  expect_round_trip<SimStatus>(75, {kLatchedReaderProfile});
-}
+TEST(NodeTest, StatusesArriveUnchanged) { expect_round_trip<SimStatus>({kLatchedReaderProfile}); }
 
 TEST(NodeTest, MatchesComeAndGoOnBothSides) {
-  Node near(kQosFile, 76, "near");
+  Node near(kQosFile, own_domain(), "near");
   Writer<States> writer(near);
   Reader<Commands> reader(near, kLoopReaderProfile, [](const auto&, const PeerId&) {});
   PeerId gone;
   {
-    Node far(kQosFile, 76, "far");
+    Node far(kQosFile, own_domain(), "far");
     gone = far.id();
     EXPECT_FALSE(is_matched(writer, far));
     Listener<States> far_listener(far, kLoopReaderProfile, near);
@@ -127,7 +126,7 @@ TEST(NodeTest, MatchesComeAndGoOnBothSides) {
 }
 
 TEST(NodeTest, ALateRecorderGetsTheStreamFromItsBeginningInOrder) {
-  Node writing(kQosFile, 77, "writing"), reading(kQosFile, 77, "reading");
+  Node writing(kQosFile, own_domain(), "writing"), reading(kQosFile, own_domain(), "reading");
   Writer<RecordBatch> writer(writing);
   constexpr std::uint64_t kBatches = 1500;
   RecordBatch batch;
@@ -144,10 +143,10 @@ TEST(NodeTest, ALateRecorderGetsTheStreamFromItsBeginningInOrder) {
 }
 
 TEST(NodeTest, ALateJoinerGetsLatchedSamples) {
-  Node writing(kQosFile, 78, "writing");
+  Node writing(kQosFile, own_domain(), "writing");
   Writer<Parameters> writer(writing);
   writer.write(make_message<Parameters>(7));
-  Node reading(kQosFile, 78, "reading");
+  Node reading(kQosFile, own_domain(), "reading");
   Listener<Parameters> listener(reading, kLatchedReaderProfile, writing);
   ASSERT_TRUE(wait_until([&] { return listener.count() > 0; }));
   EXPECT_EQ(listener.messages().front(), make_message<Parameters>(7));
@@ -230,10 +229,10 @@ std::vector<std::size_t> find_each(const std::vector<Heard>& heard, const std::v
 /// node. A best-effort reader gets nothing before it is known, and a datagram may be lost. So the
 /// messages are repeated until each reader has heard all of them.
 template <class Message>
-void expect_raw_beside_typed(int domain, const char* profile) {
+void expect_raw_beside_typed(const char* profile) {
   SCOPED_TRACE(Topic<Message>::kName);
-  Node writing(kQosFile, domain, "writing");
-  Node reading(kQosFile, domain, "reading", "", Transports::kNetwork);
+  Node writing(kQosFile, own_domain(), "writing");
+  Node reading(kQosFile, own_domain(), "reading", "", Transports::kNetwork);
   Writer<Message> writer(writing);
   RawListener<Message> raw(reading, profile, writing);
   Listener<Message> typed(reading, profile, writing);
@@ -270,10 +269,10 @@ void expect_raw_beside_typed(int domain, const char* profile) {
 }
 
 TEST(RawReaderTest, GivesTheBytesOfEachSampleBesideATypedReader) {
-  expect_raw_beside_typed<States>(80, kLoopReaderProfile);
-  expect_raw_beside_typed<RecordBatch>(80, kLoopReaderProfile);
-  expect_raw_beside_typed<SimStatus>(80, kLatchedReaderProfile);
-  expect_raw_beside_typed<Parameters>(80, kLatchedReaderProfile);
+  expect_raw_beside_typed<States>(kLoopReaderProfile);
+  expect_raw_beside_typed<RecordBatch>(kLoopReaderProfile);
+  expect_raw_beside_typed<SimStatus>(kLatchedReaderProfile);
+  expect_raw_beside_typed<Parameters>(kLatchedReaderProfile);
 }
 
 TEST(RawReaderTest, ItsBytesDecodeToTheSameMessage) {
@@ -312,24 +311,24 @@ std::string find_error(const std::filesystem::path& file, int domain) {
 }
 
 TEST(NodeTest, NodesWithoutSharedMemoryJoinBesideThePortOfAKilledProcess) {
-  constexpr int kDomain = 79;
-  const std::string stale = "/dev/shm/fastrtps_port" + std::to_string(7410 + 250 * kDomain) + "_el";
+  const std::string stale =
+      "/dev/shm/fastrtps_port" + std::to_string(7410 + 250 * own_domain()) + "_el";
   std::ofstream(stale) << "";
-  const Node first(kQosFile, kDomain, "first", "", Transports::kNetwork);
-  EXPECT_NO_THROW(Node(kQosFile, kDomain, "second", "", Transports::kNetwork));
+  const Node first(kQosFile, own_domain(), "first", "", Transports::kNetwork);
+  EXPECT_NO_THROW(Node(kQosFile, own_domain(), "second", "", Transports::kNetwork));
   std::filesystem::remove(stale);
 }
 
 // Participant ids are unique in a process, but ports are in use or stale per domain.
 TEST(NodeTest, ANodeBesideThePortOfAKilledProcessSparesTheIdsOfItsProcess) {
-  constexpr int kDomain = 81;
-  Node first(kQosFile, 79, "first");
+  const sls::test::OwnDomain other;
+  Node first(kQosFile, own_domain(), "first");
   const std::string stale =
-      "/dev/shm/fastrtps_port" + std::to_string(7410 + 250 * kDomain + 20) + "_el";
+      "/dev/shm/fastrtps_port" + std::to_string(7410 + 250 * other.number() + 20) + "_el";
   std::ofstream(stale) << "";
-  EXPECT_NO_THROW(Node(kQosFile, kDomain, "second"));
+  EXPECT_NO_THROW(Node(kQosFile, other.number(), "second"));
   std::filesystem::remove(stale);
-  Node third(kQosFile, 79, "third");
+  Node third(kQosFile, own_domain(), "third");
   Writer<States> writer(third);
   Listener<States> listener(first, kLoopReaderProfile, third);
   EXPECT_TRUE(wait_until([&] { return listener.is_matched(); }));
@@ -343,7 +342,7 @@ TEST(NodeErrorTest, ADomainOutOfRangeIsRefusedWithItsRange) {
 }
 
 TEST(NodeErrorTest, AMissingQosFileIsNamed) {
-  EXPECT_EQ(find_error("/nowhere/qos.xml", 79),
+  EXPECT_EQ(find_error("/nowhere/qos.xml", own_domain()),
             "/nowhere/qos.xml: expected a QoS file, got no such file");
 }
 
@@ -351,9 +350,9 @@ TEST(NodeErrorTest, AMissingQosFileIsNamed) {
 TEST(NodeErrorTest, ASecondQosFileInOneProcessIsRefused) {
   const sls::test::TemporaryFolder folder;
   std::filesystem::copy_file(kQosFile, folder / "other.xml");
-  Node first(kQosFile, 79, "first");
-  EXPECT_EQ(find_error(kQosFile, 79), "no error");
-  EXPECT_NE(find_error(folder / "other.xml", 79), "no error");
+  Node first(kQosFile, own_domain(), "first");
+  EXPECT_EQ(find_error(kQosFile, own_domain()), "no error");
+  EXPECT_NE(find_error(folder / "other.xml", own_domain()), "no error");
 }
 
 TEST(NodeTest, TheMiddlewaresVersionIsAVersion) {

@@ -1,24 +1,23 @@
 #include "common/bus/participants.hpp"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
 #include <optional>
 #include <thread>
 
+#include "tests/support/own_domain.hpp"
 #include "tests/support/waiting.hpp"
 
 namespace sls::bus {
 namespace {
 
+using sls::test::own_domain;
 using sls::test::wait_until;
 
-// Tests of another build may use the same domain: these numbers are unique to this process.
-const std::uint64_t kRun = static_cast<std::uint64_t>(::getpid()) * 1000 + 500;
-const std::uint64_t kLowerRun = kRun - 100;
-const std::uint32_t kVehicle = static_cast<std::uint32_t>(::getpid()) * 10 + 4;
+constexpr std::uint64_t kRun = 500, kLowerRun = 400;
+constexpr std::uint32_t kVehicle = 4;
 
 const std::filesystem::path kQosFile = SLS_SOURCE_DIR "/config/qos/default.xml";
 
@@ -52,12 +51,11 @@ bool knows(const ServerDirectory& directory, std::uint64_t run_id) {
 }
 
 TEST(ParticipantDirectoryTest, ListsTheParticipantsOfARunUntilTheyLeave) {
-  constexpr int kDomain = 70;
-  Node node(kQosFile, kDomain, "directory");
+  Node node(kQosFile, own_domain(), "directory");
   const ParticipantDirectory directory(node);
   const auto version = directory.version();
   {
-    Node other(kQosFile, kDomain, "other");
+    Node other(kQosFile, own_domain(), "other");
     Writer<Participant> writer(other);
     writer.write(make_announcement(ROLE_CONTROLLER, 0, "pilot"));
     writer.write(make_announcement(ROLE_CONTROLLER, kRun, "pilot"));  // replaces the first
@@ -104,8 +102,7 @@ class RecorderPatienceTest : public testing::Test {
     return was_done;
   }
 
-  static constexpr int kDomain = 77;
-  Node node_{kQosFile, kDomain, "directory"}, recorder_{kQosFile, kDomain, "recorder"};
+  Node node_{kQosFile, own_domain(), "directory"}, recorder_{kQosFile, own_domain(), "recorder"};
   const ParticipantDirectory directory_{node_};
   Writer<Participant> writer_{recorder_};
   std::atomic<bool> is_done_{false}, has_given_up_{false};
@@ -129,10 +126,9 @@ TEST_F(RecorderPatienceTest, OneThatGetsNoFurtherIsNot) {
 }
 
 TEST(ServerDirectoryTest, AServerOfAnotherContractIsIgnoredAndReported) {
-  constexpr int kDomain = 71;
-  Node node(kQosFile, kDomain, "directory");
+  Node node(kQosFile, own_domain(), "directory");
   const ServerDirectory directory(node);
-  Node other(kQosFile, kDomain, "other");
+  Node other(kQosFile, own_domain(), "other");
   Writer<Parameters> parameters(other);
   Parameters sample = make_parameters(kRun, {kVehicle});
   sample.contract_sha256(std::string(64, '0'));
@@ -145,13 +141,12 @@ TEST(ServerDirectoryTest, AServerOfAnotherContractIsIgnoredAndReported) {
 }
 
 TEST(ServerDirectoryTest, FindsTheRunToJoin) {
-  constexpr int kDomain = 71;
-  Node node(kQosFile, kDomain, "directory");
+  Node node(kQosFile, own_domain(), "directory");
   std::atomic<int> statuses{0};
   const ServerDirectory directory(node, [&](const SimStatus& status) {
     if (status.run_id() == kRun) ++statuses;
   });
-  Node own_server(kQosFile, kDomain, "server");
+  Node own_server(kQosFile, own_domain(), "server");
   Writer<Parameters> parameters(own_server);
   Writer<SimStatus> status(own_server);
 
@@ -168,7 +163,7 @@ TEST(ServerDirectoryTest, FindsTheRunToJoin) {
   EXPECT_EQ(statuses, 1);
 
   {  // chooses the run that is ahead; on a tie, the lower run_id
-    Node second_server(kQosFile, kDomain, "second server");
+    Node second_server(kQosFile, own_domain(), "second server");
     Writer<Parameters> second_parameters(second_server);
     Writer<SimStatus> second_status(second_server);
     second_parameters.write(make_parameters(kLowerRun, {kVehicle}));
@@ -193,13 +188,12 @@ TEST(ServerDirectoryTest, FindsTheRunToJoin) {
 }
 
 TEST(ServerDirectoryTest, OnlyTheFirstServerOfARunCounts) {
-  constexpr int kDomain = 79;
-  Node node(kQosFile, kDomain, "directory");
+  Node node(kQosFile, own_domain(), "directory");
   std::atomic<int> forged{0};
   const ServerDirectory directory(node, [&](const SimStatus& status) {
     if (status.run_id() == kRun && status.phase() == PHASE_FINISHED) ++forged;
   });
-  Node server(kQosFile, kDomain, "server"), stranger(kQosFile, kDomain, "stranger");
+  Node server(kQosFile, own_domain(), "server"), stranger(kQosFile, own_domain(), "stranger");
   Writer<Parameters> parameters(server), strangers_parameters(stranger);
   Writer<SimStatus> status(server), strangers_status(stranger);
   parameters.write(make_parameters(kRun, {kVehicle}));
@@ -221,15 +215,14 @@ TEST(ServerDirectoryTest, OnlyTheFirstServerOfARunCounts) {
 
 // A late joiner receives the history of each topic; either topic may come first.
 TEST(ServerDirectoryTest, AfterManyResetsTheLastRunIsFoundWhicheverTopicComesFirst) {
-  constexpr int kDomain = 80;
   constexpr std::uint64_t kRuns = 9;
   for (const bool are_parameters_first : {true, false}) {
     SCOPED_TRACE(are_parameters_first);
-    Node node(kQosFile, kDomain, "directory");
+    Node node(kQosFile, own_domain(), "directory");
     std::atomic<std::uint64_t> last_status{0};
     const ServerDirectory directory(
         node, [&](const SimStatus& status) { last_status = status.run_id(); });
-    Node server(kQosFile, kDomain, "server");
+    Node server(kQosFile, own_domain(), "server");
     Writer<Parameters> parameters(server);
     Writer<SimStatus> status(server);
     const std::uint64_t last = kRun + kRuns - 1;
@@ -256,10 +249,9 @@ TEST(ServerDirectoryTest, AfterManyResetsTheLastRunIsFoundWhicheverTopicComesFir
 }
 
 TEST(ServerWatchTest, ASilentServerIsNotJoinedIsGivenUpAndMayComeBack) {
-  constexpr int kDomain = 73;
-  Node node(kQosFile, kDomain, "directory");
+  Node node(kQosFile, own_domain(), "directory");
   const ServerDirectory directory(node);
-  Node server(kQosFile, kDomain, "server");
+  Node server(kQosFile, own_domain(), "server");
   Writer<Parameters> parameters(server);
   Writer<SimStatus> status(server);
   parameters.write(make_parameters(kRun, {kVehicle}));
@@ -292,10 +284,9 @@ TEST(ServerWatchTest, ASilentServerIsNotJoinedIsGivenUpAndMayComeBack) {
 // A server is also presumed dead if its samples are late because this process or the network is
 // overloaded. A second server that claimed the same vehicle before must not take its place then.
 TEST(ServerDirectoryTest, OnlyAServerThatComesAfterTheSilenceBeganIsASuccessor) {
-  constexpr int kDomain = 78;
-  Node node(kQosFile, kDomain, "directory");
+  Node node(kQosFile, own_domain(), "directory");
   const ServerDirectory directory(node);
-  Node server(kQosFile, kDomain, "server"), stranger(kQosFile, kDomain, "stranger");
+  Node server(kQosFile, own_domain(), "server"), stranger(kQosFile, own_domain(), "stranger");
   Writer<Parameters> parameters(server), strangers_parameters(stranger);
   Writer<SimStatus> status(server), strangers_status(stranger);
   parameters.write(make_parameters(kRun, {kVehicle}));
@@ -309,6 +300,11 @@ TEST(ServerDirectoryTest, OnlyAServerThatComesAfterTheSilenceBeganIsASuccessor) 
   }));
   const auto run = *joined;
   EXPECT_EQ(directory.find_successor(run, {kVehicle}), std::nullopt);
+  // The server is heard once more: the stranger was there before the silence begins.
+  SimStatus last = make_status(kRun, PHASE_RUNNING);
+  last.sample_index(1);
+  status.write(last);
+  ASSERT_TRUE(wait_until([&] { return directory.find_status(kRun)->sample_index() == 1; }));
 
   ASSERT_TRUE(wait_until([&] {
     strangers_status.write(make_status(kLowerRun, PHASE_WAITING));
@@ -316,7 +312,7 @@ TEST(ServerDirectoryTest, OnlyAServerThatComesAfterTheSilenceBeganIsASuccessor) 
   }));
   EXPECT_EQ(directory.find_successor(run, {kVehicle}), std::nullopt);
 
-  Node replacement(kQosFile, kDomain, "replacement");
+  Node replacement(kQosFile, own_domain(), "replacement");
   Writer<Parameters> next_parameters(replacement);
   Writer<SimStatus> next_status(replacement);
   next_parameters.write(make_parameters(kRun + 1, {kVehicle}));
@@ -338,8 +334,7 @@ TEST(ServerDirectoryTest, OnlyAServerThatComesAfterTheSilenceBeganIsASuccessor) 
 }
 
 TEST(ServerDirectoryTest, AServerDoesNotMeetItself) {
-  constexpr int kDomain = 72;
-  Node node(kQosFile, kDomain, "server");
+  Node node(kQosFile, own_domain(), "server");
   const ServerDirectory directory(node);
   Writer<Parameters> parameters(node);
   Writer<SimStatus> status(node);

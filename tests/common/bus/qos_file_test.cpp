@@ -14,6 +14,7 @@
 
 #include "common/bus/node.hpp"
 #include "common/config/config_error.hpp"
+#include "tests/support/own_domain.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace sls::bus {
@@ -161,7 +162,7 @@ std::vector<fs::path> list_invalid_files() {
 [[noreturn]] void use_file_and_exit(const fs::path& file) {
   int code = 0;
   try {
-    Node node(file, 79, "test_bus");
+    Node node(file, test::own_domain(), "test_bus");
     Writer<States> loop_writer(node);
     Writer<RecordBatch> record_writer(node);
     Writer<Parameters> latched_writer(node);

@@ -1,24 +1,24 @@
 #include "common/bus/queued_writer.hpp"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <mutex>
 #include <vector>
 
+#include "tests/support/own_domain.hpp"
 #include "tests/support/waiting.hpp"
 
 namespace sls::bus {
 namespace {
 
+using sls::test::own_domain;
 using sls::test::wait_until;
 
 const std::filesystem::path kQosFile = SLS_SOURCE_DIR "/config/qos/default.xml";
-const std::uint64_t kRun = static_cast<std::uint64_t>(::getpid()) * 1000 + 700;
+constexpr std::uint64_t kRun = 700;
 
 TEST(QueuedWriterTest, WritesInOrderAndEmptiesItsQueueWhenItEnds) {
-  constexpr int kDomain = 74;
-  Node near(kQosFile, kDomain, "near"), far(kQosFile, kDomain, "far");
+  Node near(kQosFile, own_domain(), "near"), far(kQosFile, own_domain(), "far");
   std::mutex mutex;
   std::vector<std::uint64_t> indices;
   Reader<RecordBatch> reader(far, kRecordReaderProfile,
@@ -47,8 +47,7 @@ TEST(QueuedWriterTest, WritesInOrderAndEmptiesItsQueueWhenItEnds) {
 }
 
 TEST(QueuedWriterTest, MessagesThatDoNotFitAreCountedAndNeverBlock) {
-  constexpr int kDomain = 75;
-  Node node(kQosFile, kDomain, "near");
+  Node node(kQosFile, own_domain(), "near");
   Writer<RecordBatch> writer(node);
   QueuedWriter<RecordBatch> queue(writer, 0);  // room for nothing
   for (int i = 0; i < 10; ++i) queue.write(RecordBatch());

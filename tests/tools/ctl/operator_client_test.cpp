@@ -2,7 +2,6 @@
 #include "tools/ctl/operator_client.hpp"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <atomic>
 #include <functional>
@@ -10,6 +9,7 @@
 #include <thread>
 
 #include "common/app/run_main.hpp"
+#include "tests/support/own_domain.hpp"
 #include "tests/support/waiting.hpp"
 #include "tools/ctl/show_status.hpp"
 
@@ -17,14 +17,13 @@ namespace sls::ctl {
 namespace {
 
 using namespace std::chrono_literals;
+using sls::test::own_domain;
 using sls::test::wait_until;
 
-constexpr int kDomain = 78;
 const std::filesystem::path kQosFile = SLS_SOURCE_DIR "/config/qos/default.xml";
 
-// Tests of another build may use the same domain: these numbers are unique to this process.
-const std::uint64_t kRun = static_cast<std::uint64_t>(::getpid()) * 1000 + 500;
-const std::uint32_t kVehicle = static_cast<std::uint32_t>(::getpid()) * 10 + 4;
+constexpr std::uint64_t kRun = 500;
+constexpr std::uint32_t kVehicle = 4;
 
 /// Publishes a status every 20 ms and answers requests by `answer`.
 class FakeServer {
@@ -32,7 +31,7 @@ class FakeServer {
   using Answer = std::function<void(FakeServer&, const SimControl&)>;
 
   explicit FakeServer(Answer answer, bool listens = true)
-      : node_(kQosFile, kDomain, "fake server"),
+      : node_(kQosFile, own_domain(), "fake server"),
         parameters_writer_(node_),
         status_writer_(node_),
         reply_writer_(node_),
@@ -122,7 +121,7 @@ const FakeServer::Answer kKeepSilent = [](FakeServer&, const SimControl&) {};
 
 ClientOptions make_options(double timeout_s) {
   ClientOptions options;
-  options.domain = kDomain;
+  options.domain = own_domain();
   options.vehicle_id = kVehicle;
   options.timeout_s = timeout_s;
   return options;
@@ -142,7 +141,7 @@ class OperatorClientTest : public ::testing::Test {
     return "no error";
   }
 
-  bus::Node node{kQosFile, kDomain, "operator"};
+  bus::Node node{kQosFile, own_domain(), "operator"};
   OperatorClient client;
 };
 
@@ -242,7 +241,8 @@ TEST_F(ImpatientClientTest, StepsMayTakeLongerThanTheTimeout) {
 
 TEST_F(ImpatientClientTest, WithoutAServerDomainAndVehicleAreNamed) {
   EXPECT_EQ(find_error([&] { client.wait_for_run(); }),
-            "no server for vehicle " + std::to_string(kVehicle) + " on domain 78 within 1 s");
+            "no server for vehicle " + std::to_string(kVehicle) + " on domain " +
+                std::to_string(own_domain()) + " within 1 s");
 }
 
 TEST_F(OperatorClientTest, AnEndedRunTakesNoRequestsButHasAStatus) {
