@@ -5,7 +5,6 @@ import { Samples, thin, thinToGrid } from "./samples";
 import { describePlots, type PlotDescription } from "./series";
 import type { Mark, Rows, Run, RunIndex } from "./types";
 
-const kRedrawTime = 50; // ms
 const kPlotHeight = 128;
 const kDashes = [[], [7, 3], [2, 2], [9, 3, 2, 3], [], [7, 3], [2, 2], [9, 3, 2, 3]];
 
@@ -35,7 +34,8 @@ export class Plots {
   private readonly folded = new Set(["speed"]);
   private readonly watcher = new IntersectionObserver((entries) => this.noteVisible(entries), { rootMargin: "40px" });
 
-  constructor(private readonly element: HTMLElement) {
+  /** `redrawTime`: least time between redraws, ms. */
+  constructor(private readonly element: HTMLElement, private readonly redrawTime: number) {
     new ResizeObserver(() => this.resize()).observe(element);
     onThemeChange(() => this.rebuild());
     document.addEventListener("visibilitychange", () => this.schedule());
@@ -99,7 +99,7 @@ export class Plots {
 
   private schedule(): void {
     if (this.timer !== 0 || document.hidden) return;
-    const wait = Math.max(0, this.lastDraw + kRedrawTime - performance.now());
+    const wait = Math.max(0, this.lastDraw + this.redrawTime - performance.now());
     this.timer = window.setTimeout(() => {
       this.timer = 0;
       this.lastDraw = performance.now();

@@ -53,7 +53,8 @@ export class Scene {
   private intervals: number[] = [];
   private frameCount = 0;
   private readonly frameTimes: number[] = [];
-  private readonly isSoftware: boolean;
+  /** True if the browser draws without a graphics processor. */
+  readonly isSoftware: boolean;
 
   /** @throws Error if the browser has no WebGL 2. */
   constructor(canvas: HTMLCanvasElement) {

@@ -5,6 +5,8 @@ import { Scene } from "./scene";
 import type { CameraMode, Pose, Run, RunIndex } from "./types";
 
 const kTableTime = 400; // ms between updates of the table
+const kRedrawTime = 50; // ms between redraws of the plots
+const kSoftwareRedrawTime = 200; // the same without a graphics processor: then one costs as much as a frame of 100 vehicles
 const kTextTime = 2000; // ms between updates of the text that describes the scene
 
 export interface Shell {
@@ -34,8 +36,8 @@ const kKeys: [string, string][] = [
 export function makeShell(): Shell {
   setUpTheme();
   setUpKeys();
-  const plots = new Plots(find("plots"));
   const scene = makeScene();
+  const plots = new Plots(find("plots"), scene?.isSoftware ? kSoftwareRedrawTime : kRedrawTime);
   const table = new Table(scene !== null);
   const picker = find<HTMLSelectElement>("vehicle");
   let selected = 0;
