@@ -109,7 +109,8 @@ class LocalEngineTest(CampaignTest):
             out = f"stopped-{code}"
             process = self.start("campaign.yaml", "--out", out, "--workers", 2, "--chunk-runs", 5,
                                  fake="sleep=0.01")
-            self.wait_until(lambda: self.count_chunks(out) >= 3, process)
+            chunks = self.folder / out / "chunks"
+            self.wait_until(lambda: self.count_chunks(out) >= 3 and any(chunks.glob(".*.tmp")), process)
             workers = self.list_workers(process)
             process.send_signal(number)
             said = process.communicate(timeout=60)[1]
@@ -118,6 +119,7 @@ class LocalEngineTest(CampaignTest):
             self.assertRegex(said, r"interrupted with \d+ of 40 chunks flown; to go on: ./sls campaign "
                                    rf"campaign.yaml --out {out} --resume")
             self.assertFalse(any(Path(f"/proc/{worker}").exists() for worker in workers))
+            self.assertEqual(list(chunks.glob(".*")), [])
             self.fly("campaign.yaml", "--out", out, "--resume")
             self.assertEqual(self.read_table(out), self.read_table("whole"))
 

@@ -187,7 +187,7 @@ class CampaignFolder:
         and those of other machines that were not written for a day."""
         for folder in (self.folder, self.folder / "chunks"):
             for file in folder.glob(".*.tmp"):
-                with suppress(FileNotFoundError):
+                with suppress(OSError):  # it is gone already, or the disk fails: the next write says so
                     if is_left_over(file):
                         file.unlink()
 

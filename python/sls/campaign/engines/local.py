@@ -83,8 +83,8 @@ def find_path() -> str:
 
 
 @contextmanager
-def started(workers: list[Worker]) -> Iterator[None]:
-    """Ends every process of `workers` when the context ends."""
+def started(workers: list[Worker], folder: CampaignFolder) -> Iterator[None]:
+    """When the context ends, ends every process of `workers` and removes the chunks that they did not finish."""
     try:
         yield
     finally:
@@ -101,6 +101,7 @@ def started(workers: list[Worker]) -> Iterator[None]:
                     pipe.close()
                 except BrokenPipeError:
                     pass
+        folder.remove_leftovers()
 
 
 def run(folder: CampaignFolder, options: EngineOptions) -> None:
@@ -108,7 +109,7 @@ def run(folder: CampaignFolder, options: EngineOptions) -> None:
     chunk cannot be written or ended its process MOST_TRIES times."""
     work = Work(deque(folder.missing()))
     workers = list[Worker]()
-    with started(workers), selectors.DefaultSelector() as selector, \
+    with started(workers, folder), selectors.DefaultSelector() as selector, \
             Progress(folder, len(work.waiting), options.progress) as progress:
         def add_worker() -> None:
             worker = start_worker(folder)
