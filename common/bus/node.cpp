@@ -44,6 +44,7 @@
 #include "common/bus/qos_file.hpp"
 #include "common/bus/security_files.hpp"
 #include "common/config/config_error.hpp"
+#include "common/config/domain.hpp"
 
 namespace sls::bus {
 namespace {
@@ -51,8 +52,6 @@ namespace {
 namespace dds = eprosima::fastdds::dds;
 using config::ConfigError;
 using eprosima::fastrtps::types::ReturnCode_t;
-
-constexpr int kMaxDomain = 232;  // beyond, RTPS port numbers overflow
 
 /// On one domain. Each announced participant costs memory and packets, even a forged one: with
 /// 3,000 of these the middleware hangs (tests/hostile/README.md).
@@ -135,8 +134,8 @@ struct Node::Impl {
   Impl(const std::filesystem::path& qos_file, int domain, const std::string& name,
        const std::string& role, Transports transports)
       : qos_place(qos_file.string()), own_role(role), identity(find_identity(role)) {
-    if (domain < 0 || domain > kMaxDomain)
-      throw ConfigError("--domain: expected 0 to " + std::to_string(kMaxDomain) + ", got " +
+    if (domain < 0 || domain > config::kMaxDomain)
+      throw ConfigError("--domain: expected 0 to " + std::to_string(config::kMaxDomain) + ", got " +
                         std::to_string(domain));
     load_profiles(qos_file, role);
     auto* factory = dds::DomainParticipantFactory::get_instance();

@@ -1,15 +1,17 @@
 #include "tools/doctor/listening_post.hpp"
 
+#include "common/config/domain.hpp"
+
 namespace sls::doctor {
 namespace {
 
-constexpr int kMaxDomain = 232, kMaxPort = 65535;
+constexpr int kMaxPort = 65535;
 
 }  // namespace
 
 ListeningPost::ListeningPost(Ports ports) {
   const auto interfaces = find_interfaces();
-  for (ports.domain = 0; ports.domain <= kMaxDomain; ++ports.domain) {
+  for (ports.domain = 0; ports.domain <= config::kMaxDomain; ++ports.domain) {
     if (ports.multicast() > kMaxPort) break;
     UdpSocket socket;
     if (!socket.bind(kMulticastGroup, ports.multicast(), true)) continue;  // the port is not shared

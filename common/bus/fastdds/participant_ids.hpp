@@ -7,15 +7,16 @@
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <set>
 
+#include "common/config/domain.hpp"
+
 namespace sls::bus {
 
 /// Ids of the participants of this process on all domains: bytes 8 to 11 of their GUID, least
 /// significant first.
 inline std::set<int> find_own_participant_ids() {
   namespace dds = eprosima::fastdds::dds;
-  constexpr dds::DomainId_t kMaxDomain = 232;
   std::set<int> ids;
-  for (dds::DomainId_t domain = 0; domain <= kMaxDomain; ++domain)
+  for (dds::DomainId_t domain = 0; domain <= config::kMaxDomain; ++domain)
     for (const dds::DomainParticipant* participant :
          dds::DomainParticipantFactory::get_instance()->lookup_participants(domain)) {
       const auto& prefix = participant->guid().guidPrefix.value;
