@@ -42,9 +42,7 @@ class ForeignTest : public testing::Test {
   void start(const Words& server_flags = {}) {
     std::ofstream(scenario_) << kScenario;
     recorder = start_program("recorder", {"--out", folder_ / "recording"});
-    Words flags = {"--scenario", scenario_};
-    flags.insert(flags.end(), server_flags.begin(), server_flags.end());
-    server = start_program("sim_server", flags);
+    server = start_program("sim_server", Words{"--scenario", scenario_} + server_flags);
     ASSERT_TRUE(wait_until([this] { return has(*server, "waiting for: controller ("); }))
         << server->output();
   }

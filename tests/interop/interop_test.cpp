@@ -29,11 +29,6 @@ const Words kOnLoopback = {
     "CYCLONEDDS_URI=<CycloneDDS><Domain><General><Interfaces><NetworkInterface name=\"lo\" "
     "multicast=\"true\"/></Interfaces></General></Domain></CycloneDDS>"};
 
-Words operator+(Words words, const Words& more) {
-  words.insert(words.end(), more.begin(), more.end());
-  return words;
-}
-
 Words lossy(int percent) {
   return {"env", std::string("LD_PRELOAD=") + SLS_DROP_SHIM,
           "SLS_DROP_PERCENT=" + std::to_string(percent), "SLS_DROP_SEED=1"};

@@ -16,11 +16,6 @@ using Words = std::vector<std::string>;
 /// Longest time of a doctor. On an idle machine it is 10 s at most; this one may be busy.
 constexpr auto kMostTime = std::chrono::seconds(20);
 
-Words operator+(Words left, const Words& right) {
-  left.insert(left.end(), right.begin(), right.end());
-  return left;
-}
-
 /// The output of a doctor.
 struct Finding {
   int code = -1;

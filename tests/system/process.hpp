@@ -18,6 +18,13 @@
 
 namespace sls::test {
 
+/// `words`, then `more`: of command lines.
+inline std::vector<std::string> operator+(std::vector<std::string> words,
+                                          const std::vector<std::string>& more) {
+  words.insert(words.end(), more.begin(), more.end());
+  return words;
+}
+
 /// One process. Its stdout and stderr go to a file, which `output()` reads.
 class Process {
  public:

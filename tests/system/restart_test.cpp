@@ -16,6 +16,8 @@ std::pair<bool, std::string> verify(const fs::path& a, const fs::path& b) {
   return {code == 0, process.output()};
 }
 
+const std::vector<std::string> kScenario = {"--scenario", scenario("figure_eight")};
+
 class RestartTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -29,19 +31,13 @@ class RestartTest : public ::testing::Test {
     return std::make_unique<Process>(make_command(name, domain_.number(), flags));
   }
   std::unique_ptr<Process> start_server() const {
-    std::vector<std::string> flags = {"--scenario", scenario("figure_eight")};
-    flags.insert(flags.end(), kManySteps.begin(), kManySteps.end());
-    return start("sim_server", flags);
+    return start("sim_server", kScenario + kManySteps);
   }
   std::unique_ptr<Process> start_client(const std::vector<std::string>& further = {}) const {
-    std::vector<std::string> flags = {"--scenario", scenario("figure_eight")};
-    flags.insert(flags.end(), further.begin(), further.end());
-    return start("control_client", flags);
+    return start("control_client", kScenario + further);
   }
   std::unique_ptr<Process> start_recorder(const std::vector<std::string>& further = {}) const {
-    std::vector<std::string> flags = {"--out", recording()};
-    flags.insert(flags.end(), further.begin(), further.end());
-    return start("recorder", flags);
+    return start("recorder", std::vector<std::string>{"--out", recording()} + further);
   }
   std::string recording() const { return folder_ / "recording"; }
   /// Waits for whole steps: commands are flushed last.

@@ -122,11 +122,10 @@ class RosReadersTest : public testing::Test {
   }
 
   void start_flight(const std::string& scenario_file, const Words& server_flags) {
-    Words flags = {"--scenario", scenario_file};
+    const Words flags = {"--scenario", scenario_file};
     client_ = start("control_client", flags);
     recorder_ = start("recorder", {"--out", recording_});
-    flags.insert(flags.end(), server_flags.begin(), server_flags.end());
-    server_ = start("sim_server", flags);
+    server_ = start("sim_server", flags + server_flags);
   }
 
   void expect_flight_to_end_well() {
