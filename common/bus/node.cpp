@@ -2,7 +2,6 @@
 
 #include <fastdds/rtps/attributes/PropertyPolicy.h>
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
-#include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
 #include <fastrtps/config.h>
 #include <fastrtps/utils/IPLocator.h>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
@@ -41,6 +40,7 @@
 #include "common/bus/fastdds/participant_listener.hpp"
 #include "common/bus/fastdds/small_datagrams.hpp"
 #include "common/bus/fastdds/stale_segments.hpp"
+#include "common/bus/fastdds/transports.hpp"
 #include "common/bus/qos_file.hpp"
 #include "common/bus/security_files.hpp"
 #include "common/config/config_error.hpp"
@@ -147,6 +147,7 @@ struct Node::Impl {
     is_secured = eprosima::fastrtps::rtps::PropertyPolicyHelper::find_property(
                      qos.properties(), "dds.sec.auth.plugin") != nullptr;
     if (transports == Transports::kNetwork) leave_out_shared_memory(qos);
+    is_on_this_machine = are_local(qos.transport());
     limit_datagrams(qos);
     auto& participants = qos.allocation().participants;
     participants.maximum = std::min(participants.maximum, kMaxParticipants);
@@ -219,12 +220,6 @@ struct Node::Impl {
       transport = send_small_datagrams(transport, static_cast<std::uint32_t>(sent));
   }
 
-  static bool is_shared_memory(
-      const std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface>& descriptor) {
-    return std::dynamic_pointer_cast<eprosima::fastdds::rtps::SharedMemTransportDescriptor>(
-               descriptor) != nullptr;
-  }
-
   static bool has_shared_memory(const dds::DomainParticipantQos& qos) {
     const auto& own = qos.transport().user_transports;
     return qos.transport().use_builtin_transports ||
@@ -295,6 +290,7 @@ struct Node::Impl {
   const std::string own_role;
   std::string identity;
   bool is_secured = false;
+  bool is_on_this_machine = false;
   std::size_t max_datagram_bytes = 60'000;  // of UDP on loopback, and of shared memory
   std::chrono::steady_clock::time_point joined;
   Problems problems;
@@ -324,6 +320,8 @@ const char* Node::choose_reader_profile(const char* profile, const char* fallbac
              ? profile
              : fallback;
 }
+
+bool Node::stays_on_this_machine() const { return impl_->is_on_this_machine; }
 
 std::size_t Node::max_batch_bytes() const {
   constexpr std::size_t kMost = 12'000;

@@ -77,6 +77,10 @@ class Node {
   /// has been discovered 3 s after joining; else empty.
   std::string describe_isolation() const;
 
+  /// True if the QoS file restricts this node to its own machine: shared memory, and UDP on loopback
+  /// addresses alone. Other programs then discover it within milliseconds, and no packet is lost.
+  bool stays_on_this_machine() const;
+
   /// Mistakes of the other programs on the domain. Endpoints and samples that do not match ours are
   /// added automatically.
   Problems& problems() const;

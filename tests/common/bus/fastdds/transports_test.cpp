@@ -1,0 +1,50 @@
+#include "common/bus/fastdds/transports.hpp"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace sls::bus {
+namespace {
+
+using eprosima::fastdds::dds::TransportConfigQos;
+
+TransportConfigQos make_transports(const std::vector<TransportDescriptor>& own) {
+  TransportConfigQos transports;
+  transports.use_builtin_transports = false;
+  transports.user_transports = own;
+  return transports;
+}
+
+TransportDescriptor make_shared_memory() {
+  return std::make_shared<eprosima::fastdds::rtps::SharedMemTransportDescriptor>();
+}
+
+TransportDescriptor make_udp(const std::vector<std::string>& addresses) {
+  auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
+  udp->interfaceWhiteList = addresses;
+  return udp;
+}
+
+TEST(TransportsTest, SharedMemoryAndLoopbackStayOnThisMachine) {
+  EXPECT_TRUE(are_local(make_transports({make_shared_memory()})));
+  EXPECT_TRUE(are_local(make_transports({make_udp({"127.0.0.1"})})));
+  EXPECT_TRUE(
+      are_local(make_transports({make_shared_memory(), make_udp({"127.0.0.1", "127.1.2.3"})})));
+}
+
+TEST(TransportsTest, AnyOtherInterfaceLeavesThisMachine) {
+  EXPECT_FALSE(are_local(make_transports({make_udp({})})));  // every interface
+  EXPECT_FALSE(are_local(make_transports({make_udp({"127.0.0.1", "10.0.0.1"})})));
+  EXPECT_FALSE(are_local(make_transports({make_udp({"12.7.0.1"})})));
+  EXPECT_FALSE(are_local(make_transports({make_shared_memory(), make_udp({"10.0.0.1"})})));
+  EXPECT_FALSE(are_local(make_transports({})));
+  TransportConfigQos builtin = make_transports({make_shared_memory()});
+  builtin.use_builtin_transports = true;
+  EXPECT_FALSE(are_local(builtin));
+}
+
+}  // namespace
+}  // namespace sls::bus
