@@ -58,8 +58,8 @@ class Recording {
   /// True when the run was ended by an operator's reset.
   bool is_reset() const { return last_status_ && last_status_->phase() == PHASE_RESET; }
 
-  /// The last step up to which all steps of all vehicles are written or known to be missing; −1:
-  /// none.
+  /// The last step up to which all steps of all vehicles have come or are known to be missing; −1:
+  /// none. The last 64 of them may wait for late answers before they are written.
   std::int64_t last_complete_step() const { return stream_.last_step(); }
 
   /// Writes pending rows, flight.txt and the final manifest. If the recorder stops early,

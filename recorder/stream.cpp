@@ -134,7 +134,6 @@ void Stream::hand_on_settled_steps() {
 std::int64_t Stream::last_step() const {
   std::uint64_t next = next_steps_.empty() ? 0 : next_steps_.begin()->second;
   for (const auto& [id, step] : next_steps_) next = std::min(next, step);
-  if (!pending_.empty()) next = std::min(next, pending_.front().step);
   return static_cast<std::int64_t>(next) - 1;
 }
 

@@ -51,7 +51,8 @@ class Stream {
   /// Passes on all that has arrived, without waiting for missing batches and answers.
   void give_up();
 
-  /// The step up to which all vehicles' steps have been passed on or are missing; −1: none.
+  /// The step up to which all vehicles' steps have come or are missing; −1: none. Steps that are
+  /// kept for late answers have come: the server need not wait for them.
   std::int64_t last_step() const;
 
   /// For each vehicle, the step after the last one that came.

@@ -235,7 +235,6 @@ class LateAnswerTest : public StreamTest {
 TEST_F(LateAnswerTest, AStepWithoutAnAnswerWaitsForALateOneAndTheOthersWithIt) {
   add_all(11, 20);
   EXPECT_EQ(steps(), list(0, 9));
-  EXPECT_EQ(stream_.last_step(), 9);
   stream_.add(make_batch(21, {make_late_entry(10), make_entry(21)}));
   EXPECT_EQ(steps(), list(0, 21));
   const StepRows& rows = rows_[10];
@@ -247,6 +246,19 @@ TEST_F(LateAnswerTest, AStepWithoutAnAnswerWaitsForALateOneAndTheOthersWithIt) {
   EXPECT_EQ(rows.reference->reference.position_m(),
             make_entry(10).answer().reference().position_m());
   EXPECT_EQ(rows.stage_start_step, 0u);
+}
+
+// The server stops where a recorder is too far behind. It must not stop for steps that the recorder
+// keeps for late answers, which only the server could send.
+TEST_F(LateAnswerTest, StepsThatWaitForALateAnswerCountAsReceived) {
+  EXPECT_EQ(stream_.last_step(), 10);
+  for (std::uint64_t step = 11; step <= 200; ++step) {
+    stream_.add(make_batch(step, {make_unanswered_entry(step, ANSWER_HELD)}));
+    EXPECT_EQ(stream_.last_step(), static_cast<std::int64_t>(step));
+  }
+  EXPECT_EQ(steps(), list(0, 135)) << "the others are kept for late answers";
+  stream_.add(make_batch(202, {make_entry(202)}));
+  EXPECT_EQ(stream_.last_step(), 200) << "a batch is missing";
 }
 
 TEST_F(LateAnswerTest, ItIsGivenUpWhenAStepMoreThan64LaterIsIn) {
