@@ -194,35 +194,47 @@ void LockstepRun::roster_changed() {
                                         calc_recorder_window(record_.history_steps()));
 }
 
+std::string LockstepRun::name_full_queue() const {
+  return record_.is_full() ? std::string("recorder: the queue of sls/record is full")
+                           : std::string();
+}
+
 bool LockstepRun::wait_for_recorders() {
+  if (is_roster_due()) refresh_roster();
+  return wait_while(&LockstepRun::name_full_queue, is_queue_given_up_) &&
+         wait_while(&LockstepRun::name_blocking, are_recorders_given_up_);
+}
+
+bool LockstepRun::wait_while(std::string (LockstepRun::*name_cause)() const, bool& is_given_up) {
   using config::RecorderPolicy;
   const auto& patience = scenario_.sync.wait.recorder;
-  while (record_.is_full()) std::this_thread::sleep_for(1ms);  // lets its thread write
-  if (is_roster_due()) refresh_roster();
   const std::uint64_t step = board_.step;
-  std::string blocking = name_blocking();
-  if (blocking.empty() && are_recorders_given_up_) {
-    are_recorders_given_up_ = false;
+  std::string cause = (this->*name_cause)();
+  if (cause.empty() && is_given_up) {
+    is_given_up = false;
     board_.announce(fmt::format("step {}: the recorders are back", step));
   }
-  if (are_recorders_given_up_) return true;
+  if (is_given_up) return true;
   std::optional<app::Wait> wait;
+  std::uint64_t written = record_.written();
   bool is_reported = false;
-  for (; !blocking.empty(); blocking = name_blocking()) {
+  for (; !cause.empty(); cause = (this->*name_cause)()) {
     do_housekeeping();
     if (attend_to_operator()) return false;
     if (!wait) wait.emplace(patience.deadline_s);
+    // While the queue gets shorter, only the network is slow.
+    if (std::exchange(written, record_.written()) != written) wait->renew();
     if (wait->is_over()) {
       const std::string waited =
-          fmt::format("step {}: waited {} s for {}", step, patience.deadline_s, blocking);
+          fmt::format("step {}: waited {} s for {}", step, patience.deadline_s, cause);
       if (patience.policy != RecorderPolicy::kGoOn) throw app::RunError(waited);
       board_.announce(waited + ": continues without it");
-      are_recorders_given_up_ = true;
+      is_given_up = true;
       return true;
     }
     if (wait->is_report_due()) {
       is_reported = true;
-      board_.announce(fmt::format("step {}: waiting for: {} ({:.0f} s left)", step, blocking,
+      board_.announce(fmt::format("step {}: waiting for: {} ({:.0f} s left)", step, cause,
                                   wait->seconds_left()));
     }
     std::this_thread::sleep_for(1ms);

@@ -42,7 +42,14 @@ class LockstepRun : public Run {
   void resend(Clock::time_point now);
   void fly_without_answers(Clock::time_point now);
   void take_over_if_silent(Clock::time_point now);
+  /// Names the recorder that prevents the next step; empty if there is none.
   std::string name_blocking() const;
+  /// The same for the queue of entries that the record stream has not written.
+  std::string name_full_queue() const;
+  /// Waits while `name_cause` names a cause, by the policy `sync.wait.recorder`; false if the
+  /// operator ended the run. `is_given_up`: the policy `go_on` ended the wait; true until the cause
+  /// is gone.
+  bool wait_while(std::string (LockstepRun::*name_cause)() const, bool& is_given_up);
 
   RetransmissionTimer timer_;
 
@@ -54,8 +61,9 @@ class LockstepRun : public Run {
   Clock::time_point resend_at_;
   std::atomic<Clock::time_point> wake_at_{Clock::time_point()};  // the main thread waits until then
   Clock::time_point take_over_at_;
-  Clock::time_point looked_;  // last check for missing answers
-  bool is_late_ = false;      // true after the first check of the step in work
+  Clock::time_point looked_;        // last check for missing answers
+  bool is_queue_given_up_ = false;  // policy go_on
+  bool is_late_ = false;            // true after the first check of the step in work
 };
 
 }  // namespace sls::sim

@@ -48,6 +48,8 @@ void RecordStream::work() {
     write(writing, is_last);
     writing.count = writing.steps = 0;
   }
+  if (has_given_up_)
+    spdlog::warn("sls/record: the run has ended, {} entries were not published", lost_.load());
 }
 
 void RecordStream::write(const Collected& collected, bool is_last) {
@@ -77,10 +79,13 @@ void RecordStream::write_batch(bool is_last) {
   batch_.batch_index(next_batch_++);
   batch_.is_last(is_last);
   try {
-    writer_.write(batch_);
+    if (!has_given_up_) writer_.write(batch_);
+    (has_given_up_ ? lost_ : written_) += batch_.entries().size();
   } catch (const bus::BusError& error) {
     lost_ += batch_.entries().size();
     spdlog::warn("{}", error.what());
+    const std::lock_guard lock(mutex_);
+    has_given_up_ = is_ended_;  // each further batch would block as long
   }
   batch_.entries().clear();
 }

@@ -51,12 +51,15 @@ class RecordStream {
 
   /// Makes the thread write all collected entries now: for a run at rest.
   void flush();
-  /// Writes the remaining entries and the last batch of the run. Later entries are lost.
+  /// Writes the remaining entries and the last batch of the run. If the middleware refuses a batch,
+  /// after `max_blocking_time`, the rest is lost. Later entries are lost, too.
   void end();
 
   /// True while the thread is far behind: more than half of the room is used. The lockstep loop
   /// then waits.
   bool is_full() const { return is_full_; }
+  /// Entries that were written so far: shows that the thread gets on.
+  std::uint64_t written() const { return written_; }
   /// Entries that were lost because there was no room, or the middleware refused them.
   std::uint64_t lost() const { return lost_; }
   /// Least number of steps whose batches the writer keeps for late recorders.
@@ -86,10 +89,12 @@ class RecordStream {
   bool is_due_ = false;    // likewise
   bool is_ended_ = false;  // likewise
   std::atomic<bool> is_full_{false};
+  std::atomic<std::uint64_t> written_{0};
   std::atomic<std::uint64_t> lost_{0};
   std::atomic<std::size_t> step_bytes_{0};  // of the largest step so far
   RecordBatch batch_;                       // used by the thread alone
   std::uint64_t next_batch_ = 0;            // likewise
+  bool has_given_up_ = false;               // likewise: a batch was refused after the end
   std::uint64_t step_ = 0;                  // likewise: of the last entry
   std::size_t bytes_of_step_ = 0;           // likewise
   std::thread thread_;                      // last: it uses the members above

@@ -20,8 +20,8 @@ class QueuedWriter {
   QueuedWriter(Writer<Message>& writer, std::size_t capacity)
       : writer_(writer), queue_(capacity), thread_([this] { work(); }) {}
 
-  /// Writes the queued messages first. While a history is full, each write ends after
-  /// `max_blocking_time` and its message is lost.
+  /// Writes the queued messages first. If the middleware refuses one, after `max_blocking_time`,
+  /// the rest is lost.
   ~QueuedWriter() {
     stop_ = true;
     thread_.join();
@@ -48,6 +48,7 @@ class QueuedWriter {
         writer_.write(*message);
       } catch (const BusError&) {
         ++refused_by_middleware_;
+        if (stop_) return;  // each further message would block as long
       }
     }
   }
