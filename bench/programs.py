@@ -47,6 +47,7 @@ class Flight:
         """Number of samples that are missing in the recording."""
         gaps = self.manifest.get("missing", [])
         return (sum(gap["to"] - gap["from"] + 1 for gap in gaps)
+                + self.manifest.get("further_missing", {}).get("samples", 0)
                 + self.manifest.get("refused_samples", 0))
 
 

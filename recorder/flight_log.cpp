@@ -16,6 +16,12 @@ namespace {
 /// Limit of the listed laps of one stage, because of memory and lines. Usual flights have fewer.
 constexpr std::size_t kMaxLaps = 1000;
 
+/// The same of the stages of one vehicle: a faulty controller can begin a new one at every step.
+constexpr std::size_t kMaxStages = 1000;
+
+/// Limit of the listed events: a link that is bad for days causes new ones every few seconds.
+constexpr std::size_t kMaxEvents = 1000;
+
 std::string format_errors(const ErrorStatistics& statistics) {
   const Eigen::Vector3d rms = statistics.calc_rms();
   return fmt::format("{:9.2e} {:9.2e} {:9.2e}  {:9.2e} {:9.2e} {:9.2e}  {:9.2e}", rms.x(), rms.y(),
@@ -50,10 +56,14 @@ double FlightLog::to_time(std::uint64_t step) const {
   return static_cast<double>(step) * static_cast<double>(parameters_.period_ns()) / 1e9;
 }
 
-FlightLog::Stage& FlightLog::find_or_begin_stage(const StepRows& rows) {
-  auto& stages = stages_[rows.vehicle_id];
+FlightLog::Stage* FlightLog::find_or_begin_stage(const StepRows& rows) {
+  auto& [stages, left_out, current] = stages_[rows.vehicle_id];
   const std::uint32_t index = rows.reference->reference.stage_index();
-  if (stages.empty() || stages.back().first != index) {
+  const bool begins = current != index;
+  current = index;
+  if (begins && stages.size() == kMaxStages) ++left_out;
+  if (left_out > 0) return nullptr;
+  if (begins) {
     Stage stage;
     stage.name = rows.reference->stage_name;
     stage.first_step = rows.step;
@@ -62,7 +72,7 @@ FlightLog::Stage& FlightLog::find_or_begin_stage(const StepRows& rows) {
   }
   Stage& stage = stages.back().second;
   stage.start_step = rows.stage_start_step.value_or(stage.start_step);
-  return stage;
+  return &stage;
 }
 
 std::uint64_t FlightLog::find_start(std::uint32_t vehicle_id, std::uint32_t index,
@@ -76,7 +86,7 @@ std::uint64_t FlightLog::find_start(std::uint32_t vehicle_id, std::uint32_t inde
 std::vector<StageStart> FlightLog::list_stage_starts() const {
   std::vector<StageStart> starts;
   for (const auto& [vehicle_id, stages] : stages_)
-    for (const auto& [index, stage] : stages)
+    for (const auto& [index, stage] : stages.listed)
       if (stage.start_step != stage.first_step)
         starts.push_back({vehicle_id, index, stage.start_step});
   return starts;
@@ -105,7 +115,9 @@ bool FlightLog::is_whole_lap(const Stage& stage, std::size_t index, std::size_t 
 
 void FlightLog::add(const StepRows& rows) {
   if (!rows.is_complete()) return;
-  Stage& stage = find_or_begin_stage(rows);
+  Stage* const listed = find_or_begin_stage(rows);
+  if (!listed) return;
+  Stage& stage = *listed;
   stage.last_step = rows.step;
   const Eigen::Vector3d error = bus::to_vector(rows.state->plant.p_WL_m()) -
                                 bus::to_vector(rows.reference->reference.position_m());
@@ -121,7 +133,7 @@ void FlightLog::add(const StepRows& rows) {
 }
 
 void FlightLog::add(const SimStatus& status) {
-  const bool is_news = events_.empty() || status.phase() != last_status_.phase() ||
+  const bool is_news = first_events_.empty() || status.phase() != last_status_.phase() ||
                        status.reason() != last_status_.reason();
   last_status_ = status;
   if (is_news)
@@ -133,7 +145,11 @@ void FlightLog::add_event(const std::string& text) {
   std::string line =
       fmt::format("step {} ({} s): {}", last_status_.step(), to_time(last_status_.step()), text);
   std::replace(line.begin(), line.end(), '\n', ' ');
-  events_.push_back(std::move(line));
+  if (first_events_.size() < kMaxEvents / 2) return first_events_.push_back(std::move(line));
+  last_events_.push_back(std::move(line));
+  if (last_events_.size() <= kMaxEvents / 2) return;
+  last_events_.pop_front();
+  ++left_out_events_;
 }
 
 void FlightLog::write(std::ostream& out) const {
@@ -162,7 +178,7 @@ void FlightLog::write(std::ostream& out) const {
         "  {:<24} {:>9} {:>9}  {:>9} {:>9} {:>9}  {:>9} {:>9} {:>9}  {:>9}\n",
         vehicle_id, "stage", "from s", "to s", "rms x", "rms y", "rms z", "max x", "max y", "max z",
         "at end");
-    for (const auto& [index, stage] : stages) {
+    for (const auto& [index, stage] : stages.listed) {
       out << fmt::format("  {:<24} {:>9} {:>9}  {}\n", fmt::format("{} {}", index, stage.name),
                          to_time(stage.first_step), to_time(stage.last_step),
                          format_errors(stage.all));
@@ -173,12 +189,16 @@ void FlightLog::write(std::ostream& out) const {
                            "", "", format_errors(stage.laps[lap]));
       }
     }
+    if (stages.left_out > 0) out << fmt::format("  ({} more stages)\n", stages.left_out);
     out << '\n';
   }
 
   write_counters(out);
   out << "\nEvents\n";
-  for (const auto& event : events_) out << "  " << event << '\n';
+  for (const auto& event : first_events_) out << "  " << event << '\n';
+  if (left_out_events_ > 0)
+    out << fmt::format("  ({} events left out here; status.csv has them)\n", left_out_events_);
+  for (const auto& event : last_events_) out << "  " << event << '\n';
 }
 
 void FlightLog::write_counters(std::ostream& out) const {

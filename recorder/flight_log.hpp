@@ -4,9 +4,12 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <deque>
 #include <map>
+#include <optional>
 #include <ostream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/bus/topics.hpp"
@@ -54,7 +57,15 @@ class FlightLog {
     std::vector<ErrorStatistics> laps;  // of a figure eight, the first ones
   };
 
-  Stage& find_or_begin_stage(const StepRows& rows);
+  /// Of one vehicle, in the order of their beginning.
+  struct Stages {
+    std::vector<std::pair<std::uint32_t, Stage>> listed;  // by index in the mission
+    std::uint64_t left_out = 0;                           // later ones
+    std::optional<std::uint32_t> current;
+  };
+
+  /// Null if the stage is left out.
+  Stage* find_or_begin_stage(const StepRows& rows);
   void write_counters(std::ostream& out) const;
   std::uint64_t find_start(std::uint32_t vehicle_id, std::uint32_t index,
                            std::uint64_t first_step) const;
@@ -65,9 +76,11 @@ class FlightLog {
 
   const config::Scenario scenario_;
   const Parameters parameters_;
-  std::map<std::uint32_t, std::vector<std::pair<std::uint32_t, Stage>>> stages_;  // by vehicle
+  std::map<std::uint32_t, Stages> stages_;  // by vehicle
   std::vector<StageStart> known_starts_;
-  std::vector<std::string> events_;
+  std::vector<std::string> first_events_;
+  std::deque<std::string> last_events_;  // after those left out
+  std::uint64_t left_out_events_ = 0;
   SimStatus last_status_;
 };
 

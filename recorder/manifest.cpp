@@ -133,9 +133,14 @@ ManifestFile to_manifest(const Json& json) {
     if (file.contains("rows")) entry.rows = read_whole<std::uint64_t>(file, "rows");
   }
   for (const Json& steps : json.at("missing"))
-    manifest.missing.push_back({read_whole<std::uint32_t>(steps, "vehicle_id"), steps.at("topic"),
-                                read_whole<std::uint64_t>(steps, "from"),
-                                read_whole<std::uint64_t>(steps, "to")});
+    manifest.missing.listed.push_back({read_whole<std::uint32_t>(steps, "vehicle_id"),
+                                       steps.at("topic"), read_whole<std::uint64_t>(steps, "from"),
+                                       read_whole<std::uint64_t>(steps, "to")});
+  if (json.contains("further_missing")) {
+    const Json& further = json.at("further_missing");
+    manifest.missing.further_gaps = read_whole<std::uint64_t>(further, "gaps");
+    manifest.missing.further_samples = read_whole<std::uint64_t>(further, "samples");
+  }
   for (const Json& start : json.value("stage_starts", Json::array()))  // earlier versions: none
     manifest.stage_starts.push_back({read_whole<std::uint32_t>(start, "vehicle_id"),
                                      read_whole<std::uint32_t>(start, "stage"),
@@ -145,11 +150,11 @@ ManifestFile to_manifest(const Json& json) {
 
 }  // namespace
 
-std::string describe(const std::vector<MissingSteps>& missing) {
+std::string describe(const MissingSamples& missing) {
   if (missing.empty()) return "nothing missing";
-  std::uint64_t steps = 0;
-  for (const MissingSteps& gap : missing) steps += gap.to - gap.from + 1;
-  const MissingSteps& first = missing.front();
+  std::uint64_t steps = missing.further_samples;
+  for (const MissingSteps& gap : missing.listed) steps += gap.to - gap.from + 1;
+  const MissingSteps& first = missing.listed.front();
   const char* unit = first.topic == StatusRow::kTopic ? "sample" : "step";
   return fmt::format("{} samples missing, first {} {} {} of vehicle {}", steps, first.topic, unit,
                      first.from, first.vehicle_id);
@@ -167,7 +172,7 @@ void write_manifest(const std::filesystem::path& folder, const Manifest& manifes
     files[file.path.filename().string()] = entry;
   }
   Json missing = Json::array();
-  for (const MissingSteps& steps : manifest.missing)
+  for (const MissingSteps& steps : manifest.missing.listed)
     missing.push_back({{"vehicle_id", steps.vehicle_id},
                        {"topic", steps.topic},
                        {"from", steps.from},
@@ -205,6 +210,9 @@ void write_manifest(const std::filesystem::path& folder, const Manifest& manifes
       {"refused_samples", manifest.refused_samples},
       {"dropped",
        {{"repeated", manifest.dropped.repeated}, {"out_of_range", manifest.dropped.out_of_range}}}};
+  if (manifest.missing.further_gaps > 0)
+    json["further_missing"] = {{"gaps", manifest.missing.further_gaps},
+                               {"samples", manifest.missing.further_samples}};
   Json libraries;
   if (parameters.library_sha256().size() > 0)
     libraries["plant"] = parameters.library_sha256().to_string();

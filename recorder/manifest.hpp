@@ -33,8 +33,19 @@ struct StageStart {
   }
 };
 
+/// The gaps of a recording. Only the first ones are listed: a bad link can cause new ones for days.
+struct MissingSamples {
+  static constexpr std::size_t kMaxListed = 1000;
+
+  std::vector<MissingSteps> listed;
+  std::uint64_t further_gaps = 0;     ///< not listed
+  std::uint64_t further_samples = 0;  ///< missing in these
+
+  bool empty() const { return listed.empty(); }
+};
+
 /// "3 samples missing, first sls/reference step 123 of vehicle 0".
-std::string describe(const std::vector<MissingSteps>& missing);
+std::string describe(const MissingSamples& missing);
 
 /// Contents of a recording and its completeness. In a segment after the first, `complete`,
 /// `missing`, `stage_starts` and `certificate` cover all segments up to this one, the other fields
@@ -50,7 +61,7 @@ struct Manifest {
   std::uint64_t first_step = 0;  ///< where the segment continues the earlier ones
   std::uint64_t last_step = 0;
   std::vector<RecordedFile> files;
-  std::vector<MissingSteps> missing;
+  MissingSamples missing;
   std::vector<StageStart> stage_starts;
   std::uint64_t unanswered_steps = 0;  ///< flown with a held answer or the fail-safe force
   std::uint64_t refused_samples = 0;   ///< lost because the recorder's queue was full
@@ -82,7 +93,7 @@ struct ManifestFile {
   std::uint64_t first_step = 0;
   std::string certificate;  ///< empty while recording
   std::map<std::string, File> files;
-  std::vector<MissingSteps> missing;
+  MissingSamples missing;
   std::vector<StageStart> stage_starts;
   std::vector<Signal> signals;
 };

@@ -168,13 +168,19 @@ void Recording::note_status(std::uint64_t sample_index) {
 
 void Recording::note_missing(std::uint32_t vehicle_id, const char* topic, std::uint64_t from,
                              std::uint64_t to) {
-  const auto [last, is_first] = last_gaps_.try_emplace({vehicle_id, topic}, missing_.size());
-  if (!is_first && missing_[last->second].to + 1 == from) {
-    missing_[last->second].to = to;
-    return;
+  const auto [last, is_first] = last_gaps_.try_emplace({vehicle_id, topic});
+  LastGap& gap = last->second;
+  const bool is_new = is_first || gap.to + 1 != from;
+  gap.to = to;
+  if (is_new) gap.index = missing_.listed.size();
+  if (gap.index == MissingSamples::kMaxListed) {
+    missing_.further_gaps += is_new ? 1 : 0;
+    missing_.further_samples += to - from + 1;
+  } else if (is_new) {
+    missing_.listed.push_back({vehicle_id, topic, from, to});
+  } else {
+    missing_.listed[gap.index].to = to;
   }
-  last->second = missing_.size();
-  missing_.push_back({vehicle_id, topic, from, to});
 }
 
 void Recording::flush() {

@@ -95,10 +95,13 @@ class Recording {
   Certificate certificate_;
   Stream stream_;
   std::map<std::string, std::string> libraries_;  // of controllers, by name
-  std::vector<MissingSteps> missing_;
+  MissingSamples missing_;
   std::vector<StageStart> stage_starts_;  // those in the provisional manifest
-  // Index in missing_ of the last gap of each vehicle and topic.
-  std::map<std::pair<std::uint32_t, std::string>, std::size_t> last_gaps_;
+  struct LastGap {
+    std::uint64_t to = 0;
+    std::size_t index = 0;  // in missing_.listed; its greatest size if it is not listed
+  };
+  std::map<std::pair<std::uint32_t, std::string>, LastGap> last_gaps_;  // of vehicle and topic
   std::map<std::uint32_t, std::uint64_t> bare_steps_;  // last steps with a state but no answer
   std::uint64_t unanswered_steps_ = 0;
   std::optional<SimStatus> last_status_;

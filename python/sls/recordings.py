@@ -306,7 +306,8 @@ class Recording:
                 outcome += f", {manifest['reason']}"
             notes.append(f"incomplete: {outcome}")
         if manifest["missing"]:
-            count = sum(gap["to"] - gap["from"] + 1 for gap in manifest["missing"])
+            count = (sum(gap["to"] - gap["from"] + 1 for gap in manifest["missing"])
+                     + manifest.get("further_missing", {}).get("samples", 0))
             first = manifest["missing"][0]
             unit = "sample" if first["topic"] == "sls/status" else "step"
             notes.append(f"{count} samples missing, first {first['topic']} {unit} {first['from']} "

@@ -238,5 +238,32 @@ TEST_F(FlightLogTest, ListsStagesAndEvents) {
   EXPECT_EQ(std::count(events.begin(), events.end(), '\n'), 4) << events;
 }
 
+// A link that fails every few seconds for days.
+TEST_F(FlightLogTest, OfManyEventsTheFirstAndTheLastAreListed) {
+  for (int i = 0; i < 5000; ++i)
+    log_.add(make_status(PHASE_RUNNING, 0, "event " + std::to_string(i) + "."));
+  const std::string text = write(log_);
+  const auto events = text.substr(text.find("Events\n") + 7);
+  EXPECT_EQ(std::count(events.begin(), events.end(), '\n'), 1001);
+  for (const char* part : {"event 0.", "event 499.", "event 4500.", "event 4999.",
+                           "\n  (4000 events left out here; status.csv has them)\n"})
+    EXPECT_NE(events.find(part), std::string::npos) << part;
+  for (const char* part : {"event 500.", "event 4499."})
+    EXPECT_EQ(events.find(part), std::string::npos) << part;
+}
+
+TEST_F(FlightLogTest, StagesOfAControllerThatChangesThemAtEveryStepAreCounted) {
+  StepRows rows = make_rows(0);
+  for (std::uint64_t step = 0; step < 5000; ++step) {
+    rows.step = step;
+    rows.reference->reference.stage_index(static_cast<std::uint32_t>(step % 2));
+    log_.add(rows);
+  }
+  const std::string text = write(log_);
+  EXPECT_LT(std::count(text.begin(), text.end(), '\n'), 2100)
+      << "a line of a stage, one of its lap";
+  EXPECT_NE(text.find("  (4000 more stages)\n"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace sls::record

@@ -391,6 +391,31 @@ TEST_F(RecordingTest, TheLostEndOfAFinishedRunIsListed) {
   EXPECT_EQ(manifest.at("last_step"), kLastStep);
 }
 
+// A network that loses steps for days.
+TEST_F(RecordingTest, OfManyGapsTheFirstAreListedAndTheOthersCounted) {
+  constexpr std::uint64_t kGaps = 3000;  // of one step, in each of three topics
+  for (std::uint64_t i = 0; i < kGaps; ++i) feeder_.add({make_entry(2 * i + 1)});
+  recording_->add(make_status(PHASE_FINISHED, 2 * kGaps - 1));
+  EXPECT_FALSE(finish());
+  const Json manifest = read_manifest();
+  ASSERT_EQ(manifest.at("missing").size(), 1000u);
+  EXPECT_EQ(manifest.at("missing").back().at("to"), 666);
+  EXPECT_EQ(manifest.at("further_missing"),
+            Json({{"gaps", 3 * kGaps - 1000}, {"samples", 3 * kGaps - 1000}}));
+  const ManifestFile read = record::read_manifest(folder_.path());
+  EXPECT_EQ(describe(read.missing), "9000 samples missing, first sls/state step 0 of vehicle 0");
+  EXPECT_EQ(recording_->describe_gaps(), describe(read.missing));
+}
+
+TEST_F(RecordingTest, AGapThatIsNotListedMayBeLong) {
+  for (std::uint64_t i = 0; i < 400; ++i) feeder_.add({make_entry(2 * i + 1)});
+  recording_->add(make_status(PHASE_FINISHED, 2000));  // steps 800 to 2000 are missing
+  EXPECT_FALSE(finish());
+  const Json further = read_manifest().at("further_missing");
+  EXPECT_EQ(further.at("gaps"), 3 * 401 - 1000);
+  EXPECT_EQ(further.at("samples"), 3 * (400 + 1201) - 1000);
+}
+
 TEST_F(RecordingTest, SamplesTheQueueRefusedMakeItIncomplete) {
   fly_to_the_end();
   EXPECT_FALSE(finish("", 3));

@@ -23,6 +23,7 @@ constexpr auto kUsualWait = 1500ms;  // usual time of discovery and a server's c
 constexpr auto kLastReplyTime = 1s;  // a reply can arrive shortly after the run has ended
 constexpr std::size_t kMailboxSize = 256;
 constexpr std::size_t kEvents = 3;
+constexpr std::size_t kRunsWithEvents = 64;  // more than the servers of a domain fly at a time
 
 std::uint64_t make_request_id() {
   std::random_device random;  // replies name no operator: ids must differ between operators, too
@@ -98,9 +99,8 @@ Snapshot OperatorClient::make_snapshot(const bus::Run& run) const {
     snapshot.silence_s = std::chrono::duration<double>(Clock::now() - *heard).count();
   {
     const std::lock_guard lock(events_mutex_);
-    const auto events = events_.find(run_id);
-    if (events != events_.end())
-      snapshot.events.assign(events->second.lines.begin(), events->second.lines.end());
+    for (const Events& events : events_)
+      if (events.run_id == run_id) snapshot.events.assign(events.lines.begin(), events.lines.end());
   }
   for (const auto role : {ROLE_CONTROLLER, ROLE_RECORDER})
     for (const auto& entry : participants_.find(role, run_id))
@@ -108,10 +108,22 @@ Snapshot OperatorClient::make_snapshot(const bus::Run& run) const {
   return snapshot;
 }
 
+OperatorClient::Events& OperatorClient::find_or_add_events(std::uint64_t run_id) {
+  const auto known = std::find_if(events_.begin(), events_.end(), [run_id](const Events& events) {
+    return events.run_id == run_id;
+  });
+  if (known != events_.end()) {
+    events_.splice(events_.end(), events_, known);
+    return events_.back();
+  }
+  if (events_.size() == kRunsWithEvents) events_.pop_front();
+  return events_.emplace_back(Events{run_id, {}, {}});
+}
+
 void OperatorClient::note_event(const SimStatus& status) {
   const std::string reason = status.reason().to_string();
   const std::lock_guard lock(events_mutex_);
-  Events& events = events_[status.run_id()];
+  Events& events = find_or_add_events(status.run_id());
   if (reason.empty() || reason == events.last_reason) return;
   events.last_reason = reason;
   events.lines.push_back(fmt::format("step {}: {}", status.step(), reason));

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
-#include <map>
+#include <list>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -52,6 +52,7 @@ class OperatorClient {
  private:
   /// The last reasons of one run.
   struct Events {
+    std::uint64_t run_id = 0;
     std::string last_reason;
     std::deque<std::string> lines;
   };
@@ -70,14 +71,15 @@ class OperatorClient {
   std::optional<bus::Run> wait_for(const FindRun& find) const;
   std::optional<bus::Run> find_ended_run() const;
   void note_event(const SimStatus& status);
+  Events& find_or_add_events(std::uint64_t run_id);
   /// Waits until both endpoints match those of the server of `run`. False if a stop signal came
   /// first.
   bool wait_until_heard(const bus::Run& run, app::Wait& wait) const;
   void report_wait(const bus::Run& run, const SimControl& request, const app::Wait& wait) const;
 
   const ClientOptions options_;
-  mutable std::mutex events_mutex_;         // events arrive on a thread of the middleware
-  std::map<std::uint64_t, Events> events_;  // by run_id
+  mutable std::mutex events_mutex_;  // events arrive on a thread of the middleware
+  std::list<Events> events_;         // of the last runs, the one heard last at the end
   bus::ParticipantDirectory participants_;
   bus::ServerDirectory servers_;
   app::Mailbox<Received> replies_;

@@ -310,6 +310,27 @@ TEST_F(OperatorClientTest, ASnapshotHoldsThePartiesOfTheRunAndTheServersSilence)
   EXPECT_FALSE(client.make_snapshot(run).server_is_gone);
 }
 
+// A view runs for days, and each reset begins a run.
+TEST_F(OperatorClientTest, OnlyTheLastRunsKeepTheirEvents) {
+  bus::Writer<SimStatus> writer(node);
+  constexpr std::uint64_t kFirst = 1'000, kRuns = 100;
+  for (std::uint64_t i = 0; i < kRuns; ++i) {
+    SimStatus status;
+    status.run_id(kFirst + i);
+    status.reason("reset");
+    writer.write(status);
+  }
+  const auto count_events = [&](std::uint64_t run_id) {
+    bus::Run run;
+    run.parameters.run_id(run_id);
+    return client.make_snapshot(run).events.size();
+  };
+  EXPECT_TRUE(wait_until([&] { return count_events(kFirst + kRuns - 1) == 1; }));
+  EXPECT_EQ(count_events(kFirst + kRuns - 64), 1u);
+  EXPECT_EQ(count_events(kFirst + kRuns - 65), 0u);
+  EXPECT_EQ(count_events(kFirst), 0u);
+}
+
 TEST(OperatorNameTest, HoldsUserAndHostAndFitsTheWire) {
   const std::string name = make_operator_name();
   EXPECT_NE(name.find('@'), std::string::npos);
