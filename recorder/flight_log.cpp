@@ -132,11 +132,11 @@ void FlightLog::add(const StepRows& rows) {
   stage.laps[lap].add(error);
 }
 
-void FlightLog::add(const SimStatus& status) {
+void FlightLog::add(const SimStatus& status, bool is_repeated) {
   const bool is_news = first_events_.empty() || status.phase() != last_status_.phase() ||
                        status.reason() != last_status_.reason();
   last_status_ = status;
-  if (is_news)
+  if (is_news && !is_repeated)
     add_event(fmt::format("{}{}{}", bus::to_string(status.phase()),
                           status.reason().size() > 0 ? ": " : "", status.reason().c_str()));
 }

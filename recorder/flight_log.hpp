@@ -41,7 +41,8 @@ class FlightLog {
 
   /// Adds a step. Ignores one that is not complete, because it gives no error.
   void add(const StepRows& rows);
-  void add(const SimStatus& status);
+  /// `is_repeated`: an earlier segment has its event.
+  void add(const SimStatus& status, bool is_repeated = false);
   /// Adds a line of the recorder, for example a list of missing samples.
   void add_event(const std::string& text);
 

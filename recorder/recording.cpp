@@ -98,9 +98,12 @@ void Recording::add(const SimStatus& status) {
   // A server that is discovered again sends its history again.
   if (last_status_ && status.sample_index() <= last_status_->sample_index()) return;
   last_status_ = status;
+  // The server's history begins before this segment.
+  const bool is_repeated = status.sample_index() < next_status_;
+  log_.add(status, is_repeated);
+  if (is_repeated) return;
   note_status(status.sample_index());
   for (const auto& sink : sinks_) sink->add(status);
-  log_.add(status);
 }
 
 void Recording::note_library(const std::string& controller, const std::string& sha256) {

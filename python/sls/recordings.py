@@ -333,9 +333,11 @@ class Recording:
         return events
 
     def read_last_status(self) -> dict[str, str]:
-        """The last row of status.csv; empty if there is none."""
-        rows = read_records(self.segments[-1][0] / "status.csv")
-        return rows[-1] if rows else {}
+        """The last row of status.csv; empty if there is none. The last segments may have no rows."""
+        for folder, _ in reversed(self.segments):
+            if rows := read_records(folder / "status.csv"):
+                return rows[-1]
+        return {}
 
 
 def align(steps: np.ndarray, table: np.ndarray, names: tuple[str, ...]) -> np.ndarray:

@@ -142,6 +142,22 @@ class RecordingsTest(support.FolderTest):
         self.assertEqual(list(np.flatnonzero(np.isnan(flight.p_WL_ref[:, 0]))), [200, 201, 202])
         self.assertEqual(len(flight.stages), 2)
 
+    def test_gaps_that_the_manifest_does_not_list_are_counted(self):
+        write_recording(self.folder / "r", complete=False, missing=[
+            {"vehicle_id": 0, "topic": "sls/reference", "from": 200, "to": 202}])
+        file = self.folder / "r/manifest.json"
+        manifest = json.loads(file.read_text())
+        file.write_text(json.dumps({**manifest, "further_missing": {"gaps": 2, "samples": 40}}))
+        self.assertIn("43 samples missing, first sls/reference step 200 of vehicle 0",
+                      self.load().notes)
+
+    def test_the_last_status_may_be_in_an_earlier_segment(self):
+        write_recording(self.folder / "r", last=150, complete=False)
+        write_recording(self.folder / "r/segment-2", first=151, segment=2)
+        status = self.folder / "r/segment-2/status.csv"
+        status.write_text(status.read_text().split("\n")[0] + "\n")
+        self.assertEqual(Recording(self.folder / "r").read_last_status()["phase"], "finished")
+
     def test_further_runs_in_the_folder_are_named(self):
         write_recording(self.folder / "r")
         write_recording(self.folder / "r/run-00000000000000aa")

@@ -40,6 +40,13 @@ class SegmentsTest : public testing::Test {
   Json read_manifest(const fs::path& folder) {
     return Json::parse(read_bytes(folder / "manifest.json"));
   }
+  std::vector<std::string> list_status_samples(const fs::path& folder) {
+    const CsvTable table = parse_csv(read_bytes(folder / "status.csv"));
+    std::vector<std::string> indices;
+    for (std::size_t row = 0; row < table.rows.size(); ++row)
+      indices.push_back(table.text(row, "sample_index"));
+    return indices;
+  }
   std::string find_difference() {
     const auto difference = find_first_difference(open_recording(whole_), open_recording(out_));
     return difference ? difference->text : "equal";
@@ -199,7 +206,54 @@ TEST_F(SegmentsTest, StatusSamplesOfAllSegmentsCountTogether) {
     const Json gap = {{"vehicle_id", 0}, {"topic", "sls/status"}, {"from", 5}, {"to", 5}};
     EXPECT_EQ(read_manifest(segment.folder).at("missing"),
               oldest <= 5 ? Json::array() : Json::array({gap}));
+    EXPECT_EQ(list_status_samples(segment.folder).front(),
+              std::to_string(std::max<std::size_t>(oldest, 5)));
   }
+}
+
+// A late reader of sls/status gets the samples of the past again.
+TEST_F(SegmentsTest, EachStatusSampleHasOneRowAndOneEvent) {
+  const Parameters parameters = make_parameters();
+  const std::vector<SimStatus> statuses = {
+      make_status(PHASE_WAITING, 0, "missing: controller"), make_status(PHASE_RUNNING, 0),
+      make_status(PHASE_RUNNING, 150), make_status(PHASE_FINISHED, kLastStep, "mission finished")};
+  {
+    Recording recording(out_, parameters);
+    for (std::size_t i = 0; i < 3; ++i) recording.add(statuses[i]);
+    add_steps(recording, 0, 150);
+    recording.finish("interrupted by SIGTERM", 0);
+  }
+  const Segment segment = resume();
+  Recording recording(segment, parameters);
+  add_steps(recording, 0, kLastStep);
+  for (const SimStatus& status : statuses) recording.add(status);
+  EXPECT_TRUE(recording.finish("", 0));
+  EXPECT_EQ(list_status_samples(out_), (std::vector<std::string>{"0", "1", "2"}));
+  EXPECT_EQ(list_status_samples(segment.folder), (std::vector<std::string>{"3"}));
+  const std::string text = read_bytes(segment.folder / "flight.txt");
+  EXPECT_EQ(text.find("missing: controller"), text.npos) << text;
+  EXPECT_NE(text.find("finished: mission finished"), text.npos) << text;
+}
+
+TEST_F(SegmentsTest, AFinalStatusThatAnEarlierSegmentHasEndsTheRun) {
+  const Parameters parameters = make_parameters();
+  const SimStatus end = make_status(PHASE_FINISHED, kLastStep, "mission finished");
+  {
+    Recording recording(out_, parameters);
+    recording.add(end);
+    add_steps(recording, 0, 150);
+    recording.finish("interrupted by SIGTERM", 0);
+  }
+  const Segment segment = resume();
+  Recording recording(segment, parameters);
+  recording.add(end);
+  add_steps(recording, 0, kLastStep);
+  EXPECT_TRUE(recording.has_all());
+  EXPECT_TRUE(recording.finish("", 0));
+  EXPECT_TRUE(list_status_samples(segment.folder).empty());
+  EXPECT_EQ(read_manifest(segment.folder).at("reason"), "mission finished");
+  const std::string text = read_bytes(segment.folder / "flight.txt");
+  EXPECT_EQ(text.rfind("synthetic: finished\n", 0), 0u) << text;
 }
 
 TEST_F(SegmentsTest, UnansweredStepsAreWholeWithoutAReference) {
