@@ -9,10 +9,10 @@ import { createRequire } from "node:module";
 import { existsSync, readFileSync } from "node:fs";
 import { dirname, join } from "node:path";
 import { fileURLToPath } from "node:url";
-import zlib from "node:zlib";
 
 const here = dirname(fileURLToPath(import.meta.url));
 const require = createRequire(join(here, "../../../tools/view/package.json"));
+const { crc32 } = require("@foxglove/crc");
 const { McapIndexedReader, McapStreamReader } = require("@mcap/core");
 const { parseIDL } = require("@foxglove/omgidl-parser");
 const { MessageReader: IdlReader } = require("@foxglove/omgidl-serialization");
@@ -181,7 +181,7 @@ async function readIndexed(bytes, messages) {
     expectEqual(of, found.get(id) ?? 0n, `statistics: messages of channel ${id}`);
   expect(reader.summaryOffsetsByOpcode.size > 0, "no summary offsets");
   const end = Number(reader.dataEndOffset);
-  expectEqual(zlib.crc32(bytes.subarray(0, end)), reader.dataSectionCrc, "CRC of the data section");
+  expectEqual(crc32(bytes.subarray(0, end)), reader.dataSectionCrc, "CRC of the data section");
   const attachments = {};
   for await (const attachment of reader.readAttachments({ validateCrcs: true })) {
     attachments[attachment.name] = Buffer.from(attachment.data);
