@@ -15,7 +15,7 @@ fi
 readonly source_commands=(bench build chaos clean docker-demo docs fuzz network-table package reference setup study test)
 readonly flying=(sim_server control_client recorder closed_loop)
 readonly programs=("${flying[@]}" sim_ctl sls_verify sls_convert delay_margin sls_doctor sls_view)
-readonly packages=(g++ make cmake libeigen3-dev libsimbody-dev libfastrtps-dev libfastcdr-dev
+readonly packages=(g++ make ninja-build cmake libeigen3-dev libsimbody-dev libfastrtps-dev libfastcdr-dev
   fastddsgen default-jre-headless libyaml-cpp-dev libcli11-dev libspdlog-dev nlohmann-json3-dev libgtest-dev libssl-dev
   libtinyxml2-dev openssl pybind11-dev python3-dev python3-numpy libboost-dev libzstd-dev zlib1g-dev)
 readonly fuzz_packages=(clang libclang-rt-14-dev)
@@ -220,10 +220,10 @@ install_node_modules() {
 }
 
 install_missing() {
-  local missing=() package
+  local missing=() package installed
+  installed=" $(dpkg-query -W -f='${Package}=${db:Status-Status} ' "$@" 2>/dev/null || true)"
   for package in "$@"; do
-    [[ "$(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null)" == installed ]] ||
-      missing+=("$package")
+    [[ $installed == *" $package=installed "* ]] || missing+=("$package")
   done
   ((${#missing[@]})) || return 0
   ((is_installed == 0)) || fail "this needs packages that are not installed: apt-get install ${missing[*]}"
@@ -244,20 +244,33 @@ install_missing() {
   rm -f "$log"
 }
 
-# build_tree PRESET FOLDER [TARGET…]: configures where needed and builds; all targets by default.
+# has_tree FOLDER: true if it is a build tree of this checkout made with Ninja, false if none, copied or moved.
+has_tree() {
+  [[ -f $1/build.ninja && -f $1/CMakeCache.txt ]] &&
+    [[ $(grep -cxF -e "CMAKE_HOME_DIRECTORY:INTERNAL=$root" -e CMAKE_GENERATOR:INTERNAL=Ninja "$1/CMakeCache.txt") == 2 ]]
+}
+
+# is_built FOLDER TARGET…: true if building would do nothing. Ninja compares every file that the build has read, system
+# headers and CMake's files among them, in a twentieth of the time that CMake takes.
+is_built() {
+  has_tree "$1" && [[ $(ninja -C "$1" -n "${@:2}" 2>/dev/null) == *'ninja: no work to do.' ]]
+}
+
+# build_tree PRESET FOLDER [TARGET…]: configures and builds; all targets by default.
 build_tree() {
   local preset=$1 folder=$2 targets=()
   shift 2
   (($#)) && targets=(--target "$@")
-  local cache="$folder/CMakeCache.txt" fresh=()
-  if [[ -f $cache ]] && ! grep -qxF "CMAKE_HOME_DIRECTORY:INTERNAL=$root" "$cache"; then
-    fresh=(--fresh)  # the tree was copied or moved
-  fi
+  local fresh=()
   mkdir -p "$folder"
-  [[ -f $cache ]] || say "building for the first time, which takes minutes (log: $folder/build.log)"
+  if ! has_tree "$folder"; then
+    fresh=(--fresh)
+    rm -f "$folder/Makefile"  # of earlier versions, which built with make
+    say "building for the first time, which takes minutes (log: $folder/build.log)"
+  fi
   if ! { (cd "$root" && cmake --preset "$preset" "${fresh[@]}") &&
     cmake --build "$folder" --parallel "$(nproc)" "${targets[@]}"; } >"$folder/build.log" 2>&1; then
-    grep -E -m 20 'error|Error' "$folder/build.log" >&2 || tail -n 20 "$folder/build.log" >&2
+    grep -E -m 20 'error:|Error |ERROR|undefined reference' "$folder/build.log" >&2 || tail -n 20 "$folder/build.log" >&2
     fail "the build failed (whole log: $folder/build.log)"
   fi
 }
@@ -270,6 +283,7 @@ build_programs() {
     return  # as it is
   fi
   (($#)) || set -- "${programs[@]}" _sls_core
+  ! is_built "$build" "$@" || return 0
   setup
   build_tree release "$build" "$@"
 }

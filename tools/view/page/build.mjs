@@ -1,4 +1,5 @@
-// Makes the page: node build.mjs FOLDER writes page.html (one self-contained file) and page.html.gz there.
+// Makes the page: node build.mjs FOLDER writes page.html (one self-contained file), page.html.gz and page.html.d, which
+// names the files that the page was made of, there.
 import { build } from "esbuild";
 import { createHash } from "node:crypto";
 import { mkdirSync, readFileSync, writeFileSync } from "node:fs";
@@ -14,17 +15,22 @@ if (!target) {
   process.exit(2);
 }
 
+const template = join(here, "src/index.html");
+const sources = [template];
+
 async function bundle(entry, options = {}) {
   const result = await build({
     entryPoints: [join(here, entry)],
     bundle: true,
     minify: true,
     write: false,
+    metafile: true,
     legalComments: "none",
     logLevel: "warning",
     absWorkingDir: here,
     ...options,
   });
+  sources.push(...Object.keys(result.metafile.inputs).map((input) => join(here, input)));
   return result.outputFiles[0].text;
 }
 
@@ -45,7 +51,7 @@ const policy = [
 ].join("; ");
 
 const parts = { POLICY: policy, STYLE: style, SCRIPT: script };
-const html = readFileSync(join(here, "src/index.html"), "utf8").replace(/\{\{(\w+)\}\}/g, (_, name) => parts[name]);
+const html = readFileSync(template, "utf8").replace(/\{\{(\w+)\}\}/g, (_, name) => parts[name]);
 const bytes = Buffer.from(html, "utf8");
 if (bytes.length > kMostBytes) {
   console.error(`build.mjs: page.html: expected at most ${kMostBytes} bytes, got ${bytes.length}`);
@@ -55,3 +61,5 @@ if (bytes.length > kMostBytes) {
 mkdirSync(target, { recursive: true });
 writeFileSync(join(target, "page.html"), bytes);
 writeFileSync(join(target, "page.html.gz"), gzipSync(bytes, { level: 9 }));
+const escape = (file) => file.replace(/[ #]/g, "\\$&").replaceAll("$", "$$$$");
+writeFileSync(join(target, "page.html.d"), `${escape(join(target, "page.html"))}: ${sources.map(escape).join(" ")}\n`);

@@ -1,0 +1,181 @@
+"""`./sls run` never flies a stale build, and starts neither CMake nor a compiler if nothing has changed.
+
+The launcher runs in a small checkout, whose programs print a text of their sources. Stand-ins before the real cmake
+and ninja record how these are called."""
+
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+BUILD = pathlib.Path(sys.argv[1]).resolve() if len(sys.argv) > 1 else ROOT / "build"
+FLYING = re.search(r"readonly flying=\((.*)\)", (ROOT / "sls").read_text()).group(1).split()
+CMAKE = """cmake_minimum_required(VERSION 3.25)
+project(small LANGUAGES C)
+set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
+set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS CMakePresets.json)
+foreach(program IN ITEMS %s)
+  add_executable(${program} main.c)
+endforeach()
+""" % " ".join(FLYING)
+MAIN = """#include <stdio.h>
+#include "text.h"
+int main(void) { return puts(TEXT) < 0; }
+"""
+
+
+class BuildTest(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+        self.root = self.folder / "checkout"
+        self.root.mkdir()
+        for name in ("sls", "CMakePresets.json"):
+            shutil.copy(ROOT / name, self.root)
+        self.write("CMakeLists.txt", CMAKE)
+        self.write("main.c", MAIN)
+        self.write("text.h", '#define TEXT "first"\n')
+        self.calls = self.folder / "calls"
+        stand_ins = self.folder / "bin"
+        stand_ins.mkdir()
+        for name in ("cmake", "ninja", "make", "dpkg-query", "node", "npm"):
+            action = {"dpkg-query": 'for name; do printf "%s=installed " "$name"; done', "node": "echo v18.0.0",
+                      "npm": "false"}.get(name, f"exec {shutil.which(name)} \"$@\"")
+            (stand_ins / name).write_text(f'#!/bin/sh\necho {name} "$*" >>{self.calls}\n{action}\n')
+            (stand_ins / name).chmod(0o755)
+        self.environment = {name: value for name, value in os.environ.items() if name not in (
+            "SLS_BUILD", "CMAKE_GENERATOR")} | {"PATH": f"{stand_ins}:{os.environ['PATH']}"}
+
+    def write(self, name, text):
+        (self.root / name).write_text(text)
+
+    def launch(self, root=None):
+        self.calls.write_text("")
+        done = subprocess.run([(root or self.root) / "sls", "run", "hover", "--in-process"], env=self.environment,
+                              cwd=self.folder, capture_output=True, text=True, timeout=120, check=False)
+        return done, self.calls.read_text().splitlines()
+
+    def expect_flight(self, text, root=None):
+        """Flies; returns the calls of the tools."""
+        done, calls = self.launch(root)
+        self.assertEqual((done.returncode, done.stdout), (0, text + "\n"), done.stderr)
+        return calls
+
+    def expect_built(self, text, root=None):
+        calls = self.expect_flight(text, root)
+        self.assertTrue(any(call.startswith("cmake --build") for call in calls), calls)
+
+    def expect_not_built(self, text):
+        calls = self.expect_flight(text)
+        self.assertEqual([re.sub(r" -C \S+", "", call) for call in calls], ["ninja -n " + " ".join(FLYING)])
+
+    def git(self, *words):
+        subprocess.run(["git", "-c", "user.name=a", "-c", "user.email=a@example.org", *words], cwd=self.root, check=True,
+                       capture_output=True)
+
+    def test_a_flight_after_a_change_is_of_the_changed_sources(self):
+        self.expect_built("first")
+        self.expect_not_built("first")
+        self.write("text.h", '#define TEXT "header"\n')
+        self.expect_built("header")
+        self.write("main.c", MAIN.replace("TEXT)", '"source")'))
+        self.expect_built("source")
+        self.write("text.c", 'const char* text(void) { return "new file"; }\n')
+        self.write("main.c", MAIN.replace("int main", "const char* text(void);\nint main").replace("TEXT)", "text())"))
+        self.write("CMakeLists.txt", CMAKE.replace("main.c", "main.c text.c"))
+        self.expect_built("new file")
+        self.write("CMakeLists.txt", CMAKE.replace("main.c", "main.c text.c") + "add_compile_definitions(UNUSED)\n")
+        self.expect_built("new file")
+        self.expect_not_built("new file")
+
+    def test_a_deleted_program_is_made_again(self):
+        self.expect_built("first")
+        (self.root / "build/bin/closed_loop").unlink()
+        self.expect_built("first")
+        (self.root / "build/bin/recorder").unlink()
+        self.expect_built("first")
+        shutil.rmtree(self.root / "build")
+        self.expect_built("first")
+        self.expect_not_built("first")
+
+    def test_another_branch_is_another_build(self):
+        self.write(".gitignore", "build\n")
+        self.git("init", "-q", "-b", "one")
+        self.git("add", ".")
+        self.git("commit", "-q", "-m", "One")
+        self.expect_built("first")
+        self.git("switch", "-q", "-c", "two")
+        self.expect_not_built("first")
+        self.write("text.h", '#define TEXT "second"\n')
+        self.git("commit", "-q", "-a", "-m", "Two")
+        self.expect_built("second")
+        self.git("switch", "-q", "one")
+        self.expect_built("first")
+
+    def test_another_preset_is_applied(self):
+        self.expect_built("first")
+        presets = (self.root / "CMakePresets.json").read_text()
+        self.assertIn('"CMAKE_BUILD_TYPE": "Release"', presets)
+        self.write("CMakePresets.json", presets.replace('"CMAKE_BUILD_TYPE": "Release"',
+                                                        r'"CMAKE_C_FLAGS": "-DTEXT=\\\"flag\\\""'))
+        self.write("text.h", "")
+        self.expect_built("flag")
+        self.expect_not_built("flag")
+
+    def test_a_tree_that_was_made_with_make_or_copied_is_made_anew(self):
+        subprocess.run(["cmake", "-G", "Unix Makefiles", "-S", self.root, "-B", self.root / "build"], check=True,
+                       capture_output=True)
+        self.expect_built("first")
+        self.expect_not_built("first")
+        copy = self.folder / "copy"
+        shutil.copytree(self.root, copy)
+        (copy / "text.h").write_text('#define TEXT "copy"\n')
+        self.expect_built("copy", copy)
+        self.assertEqual(self.expect_flight("first")[1:], [])
+
+    def test_a_failed_build_does_not_fly_and_names_the_error(self):
+        self.expect_built("first")
+        self.write("text.h", "#error no text\n")
+        for _ in range(2):
+            done, _ = self.launch()
+            self.assertEqual((done.returncode, done.stdout), (1, ""))
+            self.assertIn("text.h:1:2: error: #error no text", done.stderr)
+            self.assertRegex(done.stderr, r"sls: error: the build failed \(whole log: \S+/build\.log\)\n$")
+        self.write("text.h", '#define TEXT "mended"\n')
+        self.expect_built("mended")
+
+    def test_finding_that_nothing_changed_writes_nothing(self):
+        # Flights that start together over one tree do not disturb each other.
+        def list_times():
+            return {path: path.stat().st_mtime_ns for path in (self.root / "build").rglob("*")}
+
+        self.expect_built("first")
+        before = list_times()
+        self.expect_not_built("first")
+        self.assertEqual(list_times(), before)
+
+
+class RealTreeTest(unittest.TestCase):
+    def setUp(self):
+        if not (BUILD / "build.ninja").exists():
+            self.skipTest(f"{BUILD} was not made with Ninja")
+
+    def test_a_built_tree_has_nothing_to_do(self):
+        # A target that is always out of date would start CMake and Ninja before every flight.
+        done = subprocess.run(["ninja", "-C", BUILD, "-n", *FLYING, "sls_view", "_sls_core"], capture_output=True,
+                              text=True, timeout=60, check=True)
+        self.assertTrue(done.stdout.endswith("ninja: no work to do.\n"), "build first; then: " + done.stdout[-2000:])
+
+    def test_cmake_runs_again_when_a_preset_changes(self):
+        rule = re.search(r"^build build\.ninja.*?: RERUN_CMAKE.*$", (BUILD / "build.ninja").read_text(), re.MULTILINE)
+        self.assertTrue(f" {ROOT}/CMakePresets.json " in rule.group(0), "no rule depends on CMakePresets.json")
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])
