@@ -4,7 +4,8 @@ has nothing else, also if this machine has more packages.
 The closure is what apt-get installs on a minimal Debian for the launcher's lists of packages: their dependencies
 without recommendations, essential and required packages, and apt. Each of these must be in the closure: the owners of
 headers that the sources include, of what CMake found, of Python modules that are imported, of programs that sources
-and scripts start, and of files that they name by path. Node and npm may come from elsewhere, as in `install_node`."""
+and scripts start, and of files that they name by path. Node and npm may come from elsewhere, as in `install_node`;
+scripts use nothing newer than Debian's Node."""
 
 import ast
 import functools
@@ -32,6 +33,10 @@ SHELL_COMMAND = re.compile(rf"(?:^|[;|&({{!`'\"]|\b(?:then|do|else|exec|if|while
                            re.MULTILINE)
 CPP_LITERAL = re.compile(r'"((?:[^"\\\n]|\\.)*)"')
 SYSTEM_PATH = re.compile(r"(?<![\w.}/>])(?:/usr/|/bin/|/sbin/|/lib/|/etc/)[\w./+-]*\w")
+# Functions that Debian's Node 18 lacks.
+NEWER_THAN_NODE_18 = re.compile(
+    r"\bzlib\.crc32|\b(?:crc32|globSync)\b.*\bnode:|\.(?:toSorted|toReversed|toSpliced|groupBy|withResolvers|fromAsync|"
+    r"isWellFormed|isSubsetOf|symmetricDifference)\(|\bAbortSignal\.any|\bimport\.meta\.(?:dirname|filename)")
 # Python functions whose first argument is a command.
 STARTS = re.compile("_?(which|run|Popen|call|start|isolate|system|check|exec)")
 
@@ -227,7 +232,7 @@ class PackagesTest(unittest.TestCase):
                                 if not is_for_tests(source) and "fuzzer" not in name
                                 and not owners_of(header) & closure_of_build()), [], "needed by ./sls build")
 
-    def test_what_cmake_found_is_of_named_packages(self):
+    def test_files_that_cmake_found_are_of_named_packages(self):
         cache = BUILD / "CMakeCache.txt"
         found = re.findall(r"^(\w+):(?:FILEPATH|PATH)=(/usr/[^;\n]+)$", read(cache), re.MULTILINE)
         self.expect_in_closure({(name, path, ROOT / "CMakeLists.txt") for name, path in found
@@ -245,6 +250,12 @@ class PackagesTest(unittest.TestCase):
                 place = f"/usr/lib/python3/dist-packages/{name}"
                 needed.add((name, place if os.path.isdir(place) else f"{place}.py", source))
         self.expect_in_closure(needed, 5)
+
+    def test_scripts_use_nothing_newer_than_the_node_of_debian(self):
+        scripts = list_sources(".mjs")
+        self.assertGreater(len(scripts), 10)
+        self.assertEqual([f"{script.relative_to(ROOT)}: {found.group(0)}" for script in scripts
+                          for found in NEWER_THAN_NODE_18.finditer(read(script))], [])
 
     def test_programs_and_paths_are_of_named_packages(self):
         programs = {name: f"{folder}/{name}" for folder in ("/usr/sbin", "/usr/bin") for name in os.listdir(folder)}
