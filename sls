@@ -261,8 +261,10 @@ build_tree() {
   local preset=$1 folder=$2 targets=()
   shift 2
   (($#)) && targets=(--target "$@")
-  local fresh=()
+  local fresh=() lock
   mkdir -p "$folder"
+  exec {lock}>"$folder/lock"
+  flock "$lock"  # Ninja's files do not survive two builds of one folder at once
   if ! has_tree "$folder"; then
     fresh=(--fresh)
     rm -f "$folder/Makefile"  # of earlier versions, which built with make
@@ -273,6 +275,7 @@ build_tree() {
     grep -E -m 20 'error:|Error |ERROR|undefined reference' "$folder/build.log" >&2 || tail -n 20 "$folder/build.log" >&2
     fail "the build failed (whole log: $folder/build.log)"
   fi
+  exec {lock}>&-
 }
 
 # build_programs [TARGET…]: brings the targets, or all programs, up to date. A build made elsewhere
