@@ -251,6 +251,13 @@ class PackagesTest(unittest.TestCase):
                 needed.add((name, place if os.path.isdir(place) else f"{place}.py", source))
         self.expect_in_closure(needed, 5)
 
+    def test_packages_without_which_a_test_is_skipped_are_named(self):
+        needed = {package for source in list_sources(".cpp") if is_for_tests(source)
+                  for names in re.findall("GTEST_SKIP.*(?:Debian package|apt-get install) ([a-z0-9.+ -]+)", read(source))
+                  for package in names.split()}
+        self.assertGreaterEqual(needed, {"cyclonedds-dev", "libfaketime"})
+        self.assertEqual(needed - set(list_named()), set())
+
     def test_scripts_use_nothing_newer_than_the_node_of_debian(self):
         scripts = list_sources(".mjs")
         self.assertGreater(len(scripts), 10)
