@@ -41,13 +41,15 @@ void VehicleFlight::take_answer() {
   Outcome outcome;
   outcome.is_finished = answer.command.mission() == MISSION_FINISHED;
   hold(answer);
+  has_ended_late_ = false;
   outcome.applied = last_answer_;
   outcome_ = std::move(outcome);
 }
 
 void VehicleFlight::keep_late_answer(const OfferedAnswer& answer) {
-  if (answer.command.mission() == MISSION_FINISHED) has_ended_late_ = true;
-  if (last_answer_.origin == FORCE_NONE || answer.step > last_answer_step_) hold(answer);
+  if (last_answer_.origin != FORCE_NONE && answer.step <= last_answer_step_) return;
+  hold(answer);
+  has_ended_late_ = answer.command.mission() == MISSION_FINISHED;
 }
 
 void VehicleFlight::hold(const OfferedAnswer& answer) {

@@ -37,8 +37,7 @@ class VehicleFlight {
                        const model::Measurement* seen = nullptr);
   /// Takes the answer that the gate accepted for the step in work.
   void take_answer();
-  /// Holds an answer that came too late for its step, if it is newer than the held one. Notes if it
-  /// ends the mission.
+  /// Holds an answer that came too late for its step, if it is newer than the held one.
   void keep_late_answer(const OfferedAnswer& answer);
   /// Flies the step in work without an answer of its own.
   void fly_without_answer(ControllerAbsence::Action action);
@@ -53,7 +52,7 @@ class VehicleFlight {
   bool is_settled() const { return outcome_.has_value(); }
   /// Age of the force of the step in work: periods since the state that it answers.
   std::uint64_t calc_age() const;
-  /// True if a late answer has ended the mission.
+  /// True if the newest answer was late and says that the mission is finished.
   bool has_ended_late() const { return has_ended_late_; }
   const Applied& last_answer() const { return last_answer_; }
   /// The controller memory in the state sample of the current step.

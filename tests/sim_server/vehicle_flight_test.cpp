@@ -114,6 +114,24 @@ TEST_F(VehicleFlightTest, ALateAnswerEndsTheAbsence) {
   EXPECT_EQ(flight_.calc_absence_s(), 0.0);
 }
 
+TEST_F(VehicleFlightTest, ALateEndIsWithdrawnByANewerAnswer) {
+  const bus::PeerId peer{};
+  flight_.gate.set_clients({{peer, "late", 0}});
+  OfferedAnswer last = make_answer(0);
+  last.command.mission(MISSION_FINISHED);
+  fly(0, {});
+  EXPECT_FALSE(flight_.has_ended_late());
+  flight_.gate.expect(1);
+  flight_.measure(1, {});
+  flight_.keep_late_answer(last);
+  EXPECT_TRUE(flight_.has_ended_late());
+  ASSERT_EQ(flight_.gate.offer(make_answer(1), peer), Verdict::kAccepted);
+  flight_.take_answer();
+  EXPECT_FALSE(flight_.has_ended_late()) << "a newer answer says that the mission goes on";
+  flight_.keep_late_answer(last);
+  EXPECT_FALSE(flight_.has_ended_late()) << "an older one does not";
+}
+
 TEST_F(VehicleFlightTest, APauseIsNoAbsence) {
   flight_.note_rest(std::chrono::hours(1));
   EXPECT_EQ(flight_.calc_absence_s(), 0.0);
