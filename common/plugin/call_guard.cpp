@@ -98,7 +98,7 @@ class Watchdog {
 
   void add(ThreadRecord* record) {
     const std::lock_guard lock(mutex_);
-    watched_.push_back({record, 0, std::chrono::steady_clock::now(), false});
+    watched_.push_back({record, 0, watched_for_, false});
   }
   void remove(ThreadRecord* record) {
     const std::lock_guard lock(mutex_);
@@ -107,10 +107,12 @@ class Watchdog {
   }
 
  private:
+  using Clock = std::chrono::steady_clock;
+
   struct Watched {
     ThreadRecord* record;
     std::uint64_t calls;
-    std::chrono::steady_clock::time_point since;
+    Clock::duration since;  // in terms of watched_for_
     bool is_reported;
   };
 
@@ -124,20 +126,25 @@ class Watchdog {
   }
 
   void watch() {
+    auto last = Clock::now();
     while (true) {
       std::this_thread::sleep_for(kLookEvery);
+      const auto now = Clock::now();
       const std::lock_guard lock(mutex_);
-      for (Watched& one : watched_) look(one, std::chrono::steady_clock::now());
+      // A much longer interval means that the whole process was stopped (SIGSTOP, a debugger).
+      watched_for_ += std::min<Clock::duration>(now - last, 2 * kLookEvery);
+      last = now;
+      for (Watched& one : watched_) look(one);
     }
   }
 
-  static void look(Watched& one, std::chrono::steady_clock::time_point now) {
+  void look(Watched& one) const {
     const std::uint64_t calls = one.record->calls.load(std::memory_order_acquire);
     if (calls != one.calls || calls % 2 == 0) {
-      one = {one.record, calls, now, false};
+      one = {one.record, calls, watched_for_, false};
       return;
     }
-    const auto silence = now - one.since;
+    const auto silence = watched_for_ - one.since;
     const bool is_over = silence >= std::chrono::duration<double>(patience_s);
     if (silence < kReportAfter || (one.is_reported && !is_over)) return;
     one.is_reported = true;
@@ -152,8 +159,9 @@ class Watchdog {
     if (is_over) ::_exit(1);
   }
 
-  std::mutex mutex_;  // guards watched_
+  std::mutex mutex_;  // guards the members below
   std::vector<Watched> watched_;
+  Clock::duration watched_for_{0};  // time since the start, without times when stopped
 };
 
 /// Registers the thread with the watchdog until the thread ends.

@@ -1,15 +1,23 @@
 #include "common/plugin/shared_library.hpp"
 
 #include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <cfenv>
+#include <chrono>
+#include <thread>
 
 #include "common/config/config_error.hpp"
+#include "common/config/sha256.hpp"
 #include "tests/common/plugin/misbehaviour.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace sls::plugin {
 namespace {
+
+using namespace std::chrono_literals;
 
 const std::string kFolder = SLS_LIBRARIES "/";
 
@@ -92,6 +100,32 @@ TEST(CallTest, AChangedFloatingPointModeIsNamedAndPutBack) {
     EXPECT_EQ(floating_point_mode(), mode) << how;
     EXPECT_EQ(std::fegetround(), FE_TONEAREST) << how;
   }
+}
+
+/// Stops this process for `time`, as a debugger or SIGSTOP does.
+void be_stopped_for(std::chrono::milliseconds time) {
+  const pid_t helper = ::fork();
+  if (helper == 0) {
+    ::kill(::getppid(), SIGSTOP);
+    std::this_thread::sleep_for(time);
+    ::kill(::getppid(), SIGCONT);
+    ::_exit(0);
+  }
+  ::waitpid(helper, nullptr, 0);
+}
+
+TEST(CallTest, ACallInAStoppedProcessIsNotTakenForOneThatHangs) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  const auto be_stopped = [] {
+    set_patience(4.0);
+    call_guarded({"./mine.so", "answer", 3, 41}, [] {
+      std::this_thread::sleep_for(600ms);  // the watchdog sees the call
+      be_stopped_for(4500ms);
+      std::this_thread::sleep_for(600ms);  // and looks again
+    });
+    ::_exit(0);
+  };
+  EXPECT_EXIT(be_stopped(), testing::ExitedWithCode(0), "");
 }
 
 TEST(CallTest, FlagsOfTheFloatingPointUnitAreNoMode) {
