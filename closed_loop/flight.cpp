@@ -3,8 +3,6 @@
 #include <exception>
 #include <utility>
 
-#include "sim_server/judgement.hpp"
-
 namespace sls::closed_loop {
 namespace {
 
@@ -17,7 +15,7 @@ Flight::Flight(const config::Scenario& scenario, const std::vector<std::uint32_t
     : controller_name_(options.controller_name),
       measures_compute_time_(options.measures_compute_time),
       steps_per_period_(scenario.sync.period_ns / scenario.plant.step_ns),
-      force_limit_(scenario.controller.force_limit_n),
+      limits_(sim::make_answer_limits(scenario)),
       is_fleet_(scenario.vehicles.size() > 1),
       plants_(sim::make_plants(sim::find_plant_type(scenario.plant.model), scenario, ids)),
       steps_(ids.size()) {
@@ -84,17 +82,20 @@ bool Flight::is_last() {
   for (std::size_t i = 0; i < steps_.size(); ++i) {
     const control::Answer& answer = steps_[i].answer;
     sim::JudgedAnswer judged;
+    judged.step = steps_[i].step;
     judged.f_Q_W = answer.f_Q_W;
     judged.is_memory_finite = answer.memory.numbers.allFinite();
     if (answer.fault != control::Fault::kNone) judged.fault = to_string(answer.fault);
     judged.is_mission_failed = answer.mission == control::MissionPhase::kFailed;
-    if (const auto defect = sim::find_defect(judged, force_limit_)) {
+    judged.is_mission_finished = answer.mission == control::MissionPhase::kFinished;
+    judged.stage = answer.memory.stage;
+    if (const auto defect = sim::find_defect(judged, limits_)) {
       refused_ = i;
-      failure_ = name_vehicle(i) + sim::describe_refusal(*defect, judged, force_limit_,
-                                                         controller_name_, steps_[i].step);
+      failure_ =
+          name_vehicle(i) + sim::describe_refusal(*defect, judged, limits_, controller_name_);
       return true;
     }
-    is_finished = is_finished && answer.mission == control::MissionPhase::kFinished;
+    is_finished = is_finished && judged.is_mission_finished;
   }
   return is_finished;
 }

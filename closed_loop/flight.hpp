@@ -16,6 +16,7 @@
 #include "control_client/flight_controller.hpp"
 #include "control_client/laws/control_law.hpp"
 #include "sim_server/fault_line.hpp"
+#include "sim_server/judgement.hpp"
 #include "sim_server/plants/plant.hpp"
 
 namespace sls::closed_loop {
@@ -90,7 +91,7 @@ class Flight {
   const std::string controller_name_;
   const bool measures_compute_time_;
   const std::int64_t steps_per_period_;
-  const double force_limit_;
+  const sim::AnswerLimits limits_;
   const bool is_fleet_;
   std::vector<sim::PlantOfVehicles> plants_;
   std::vector<Vehicle> vehicles_;

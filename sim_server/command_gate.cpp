@@ -13,14 +13,26 @@ namespace {
 constexpr std::size_t kRememberedAnswers =
     64;  // copies older than that are rejected as wrong steps
 
-JudgedAnswer to_judged(const ControlCommand& command) {
+/// The first undefined enumerator: Fast CDR takes any number for one.
+std::optional<JudgedAnswer::Undefined> find_undefined(const ControlCommand& command) {
+  if (command.mission() > MISSION_FAILED) return {{"mission", command.mission()}};
+  if (command.fault() > FAULT_STAGE_TIMEOUT) return {{"fault", command.fault()}};
+  return std::nullopt;
+}
+
+JudgedAnswer to_judged(const OfferedAnswer& answer) {
+  const ControlCommand& command = answer.command;
   const auto& memory = command.controller().numbers();
   JudgedAnswer judged;
+  judged.step = answer.step;
   judged.f_Q_W = bus::to_vector(command.f_Q_W_n());
   judged.is_memory_finite =
       std::all_of(memory.begin(), memory.end(), [](double x) { return std::isfinite(x); });
+  judged.undefined = find_undefined(command);
   if (command.fault() != FAULT_NONE) judged.fault = bus::to_string(command.fault());
   judged.is_mission_failed = command.mission() == MISSION_FAILED;
+  judged.is_mission_finished = command.mission() == MISSION_FINISHED;
+  judged.stage = command.controller().stage_index();
   return judged;
 }
 
@@ -30,8 +42,14 @@ Verdict to_verdict(Defect defect) {
       return Verdict::kNotFinite;
     case Defect::kForceLimit:
       return Verdict::kForceLimit;
+    case Defect::kUndefined:
+      return Verdict::kUndefined;
     case Defect::kFault:
       return Verdict::kFault;
+    case Defect::kUnknownStage:
+      return Verdict::kUnknownStage;
+    case Defect::kEarlyEnd:
+      return Verdict::kEarlyEnd;
   }
   return Verdict::kFault;
 }
@@ -69,14 +87,20 @@ const char* to_string(Verdict verdict) {
       return "a vehicle_id of no vehicle here";
     case Verdict::kUnknownClient:
       return "a sender that is not announced as a ready controller";
+    case Verdict::kUndefined:
+      return to_string(Defect::kUndefined);
     case Verdict::kFault:
       return to_string(Defect::kFault);
+    case Verdict::kUnknownStage:
+      return to_string(Defect::kUnknownStage);
+    case Verdict::kEarlyEnd:
+      return to_string(Defect::kEarlyEnd);
   }
   return "";
 }
 
-CommandGate::CommandGate(std::uint64_t run_id, std::uint32_t vehicle_id, double force_limit_n)
-    : run_id_(run_id), vehicle_id_(vehicle_id), force_limit_n_(force_limit_n) {}
+CommandGate::CommandGate(std::uint64_t run_id, std::uint32_t vehicle_id, const AnswerLimits& limits)
+    : run_id_(run_id), vehicle_id_(vehicle_id), limits_(limits) {}
 
 void CommandGate::set_clients(const std::vector<ReadyClient>& clients) {
   std::vector<Client> updated;
@@ -126,9 +150,9 @@ Verdict CommandGate::judge(const OfferedAnswer& answer, const bus::PeerId& sende
   if (answer.command.vehicle_id() != vehicle_id_) return Verdict::kUnknownVehicle;
   if (answer.is_early && answer.step >= step_) return Verdict::kEarly;
 
-  const JudgedAnswer judged = to_judged(answer.command);
+  const JudgedAnswer judged = to_judged(answer);
   Client* client = find_client(sender);
-  if (const auto defect = find_defect(judged, force_limit_n_)) {
+  if (const auto defect = find_defect(judged, limits_)) {
     if (client) note_refusal(*client, answer, judged, *defect);
     return to_verdict(*defect);
   }
@@ -158,7 +182,7 @@ void CommandGate::note_refusal(Client& client, const OfferedAnswer& answer,
   if (!is_open || !is_newer) return;
   if (step == step_) refused_ = answer;
   client.refused_step = step;
-  client.refusal = describe_refusal(defect, judged, force_limit_n_, client.identity.name, step);
+  client.refusal = describe_refusal(defect, judged, limits_, client.identity.name);
   settle();
 }
 
@@ -275,7 +299,10 @@ void CommandGate::count(Verdict verdict) {
     case Verdict::kUnknownClient:
       ++counters_.rejected_client();
       return;
+    case Verdict::kUndefined:
     case Verdict::kFault:
+    case Verdict::kUnknownStage:
+    case Verdict::kEarlyEnd:
       ++counters_.rejected_fault();
       return;
   }

@@ -30,7 +30,10 @@ enum class Verdict {
   kContradiction,  ///< another answer of the same client to the same step
   kUnknownVehicle,
   kUnknownClient,
+  kUndefined,  ///< this and the next three are counted as faults
   kFault,
+  kUnknownStage,
+  kEarlyEnd,  ///< of the mission
 };
 
 /// Defect of a rejected command, for messages. Empty for the first five verdicts.
@@ -54,7 +57,7 @@ struct ReadyClient {
 
 class CommandGate {
  public:
-  CommandGate(std::uint64_t run_id, std::uint32_t vehicle_id, double force_limit_n);
+  CommandGate(std::uint64_t run_id, std::uint32_t vehicle_id, const AnswerLimits& limits);
 
   /// Sets the clients that may answer. Clients that stay keep their records.
   void set_clients(const std::vector<ReadyClient>& clients);
@@ -126,7 +129,7 @@ class CommandGate {
 
   const std::uint64_t run_id_;
   const std::uint32_t vehicle_id_;
-  const double force_limit_n_;
+  const AnswerLimits limits_;
 
   std::uint64_t step_ = 0;
   std::vector<Client> clients_;  // strongest first

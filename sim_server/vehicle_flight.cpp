@@ -20,7 +20,7 @@ double calc_elapsed_s(const std::optional<VehicleFlight::Clock::time_point>& sin
 }  // namespace
 
 VehicleFlight::VehicleFlight(const config::Scenario& fleet, std::uint32_t id, std::uint64_t run_id)
-    : gate(run_id, id, fleet.controller.force_limit_n),
+    : gate(run_id, id, make_answer_limits(fleet)),
       absence(fleet.sync),
       id_(id),
       scenario_(make_own_scenario(fleet, id)),

@@ -97,7 +97,7 @@ struct Judges {
   }
 
   std::uint64_t step = 0;
-  sim::CommandGate gate{kRun, 0, 200.0};
+  sim::CommandGate gate{kRun, 0, {200.0}};
   sim::RunControl control{kRun, {0}, false};
   const Parameters parameters = make_parameters();
   std::map<std::uint32_t, std::uint64_t> last_steps;

@@ -85,7 +85,7 @@ class CommandGateTest : public testing::Test {
     return verdict;
   }
 
-  CommandGate gate_{kRun, kVehicle, kForceLimit};
+  CommandGate gate_{kRun, kVehicle, {kForceLimit}};
 };
 
 TEST_F(CommandGateTest, TheAwaitedAnswerOfAReadyClientIsAccepted) {
@@ -281,7 +281,7 @@ TEST_F(CommandGateTest, AFaultOfTheOnlyClientIsNamed) {
        {std::pair{FAULT_FREE_FALL, "free_fall"}, std::pair{FAULT_ROD_LEVEL, "rod_level"},
         std::pair{FAULT_NOT_FINITE, "not_finite"},
         std::pair{FAULT_STAGE_TIMEOUT, "stage_timeout"}}) {
-    CommandGate gate(kRun, kVehicle, kForceLimit);
+    CommandGate gate(kRun, kVehicle, {kForceLimit});
     gate.set_clients({kStrong});
     gate.expect(2);
     EXPECT_EQ(gate.offer(make_faulted(2, fault), kStrongPeer), Verdict::kFault);
@@ -296,6 +296,56 @@ TEST_F(CommandGateTest, AFailedMissionWithoutAFaultCodeIsRefusedToo) {
   EXPECT_EQ(offer_bad(make_faulted(0, FAULT_NONE)), Verdict::kFault);
   ASSERT_TRUE(gate_.refusal());
   EXPECT_EQ(gate_.refusal()->find("none"), std::string::npos) << *gate_.refusal();
+}
+
+/// A gate of a mission of two stages that cannot be over before step 500, which awaits `step`.
+class MissionGateTest : public testing::Test {
+ protected:
+  Verdict offer(std::uint64_t step, std::uint32_t stage, MissionPhase mission,
+                FaultCode fault = FAULT_NONE) {
+    gate_.emplace(kRun, kVehicle, AnswerLimits{kForceLimit, 2, 500});
+    gate_->set_clients({kStrong});
+    gate_->expect(step);
+    OfferedAnswer answer = make_answer(step);
+    answer.command.controller().stage_index(stage);
+    answer.command.mission(mission);
+    answer.command.fault(fault);
+    return gate_->offer(answer, kStrongPeer);
+  }
+  std::string refusal() const {
+    EXPECT_EQ(gate_->counters().rejected_fault(), 1u);
+    return gate_->refusal().value_or("none");
+  }
+
+  std::optional<CommandGate> gate_;
+};
+
+TEST_F(MissionGateTest, AStageBeyondTheMissionIsRefused) {
+  EXPECT_EQ(offer(600, 4'000'000'000, MISSION_RUNNING), Verdict::kUnknownStage);
+  EXPECT_EQ(refusal(),
+            "controller 'strong' answered step 600 with a stage beyond its mission: stage_index "
+            "4000000000 > 2");
+  EXPECT_EQ(offer(600, 3, MISSION_FINISHED), Verdict::kUnknownStage);
+  EXPECT_EQ(offer(600, 2, MISSION_FINISHED), Verdict::kAccepted);
+  EXPECT_EQ(offer(600, 2, MISSION_RUNNING), Verdict::kAccepted) << "reported by ParticipantCheck";
+  EXPECT_EQ(offer(0, 1, MISSION_RUNNING), Verdict::kAccepted) << "as if the first stage were over";
+}
+
+TEST_F(MissionGateTest, AnEndBeforeTheEarliestStepIsRefused) {
+  EXPECT_EQ(offer(499, 1, MISSION_FINISHED), Verdict::kEarlyEnd);
+  EXPECT_EQ(refusal(),
+            "controller 'strong' answered step 499 with an early end of its mission: expected at "
+            "step 500 or later");
+  EXPECT_EQ(offer(499, 2, MISSION_RUNNING), Verdict::kEarlyEnd) << "the next client would finish";
+  EXPECT_EQ(offer(500, 1, MISSION_FINISHED), Verdict::kAccepted);
+  EXPECT_EQ(offer(500, 2, MISSION_FINISHED), Verdict::kAccepted);
+}
+
+TEST_F(MissionGateTest, ValuesThatTheContractDoesNotDefineAreRefused) {
+  EXPECT_EQ(offer(600, 1, static_cast<MissionPhase>(7)), Verdict::kUndefined);
+  EXPECT_EQ(refusal(), "controller 'strong' answered step 600 with an undefined value: mission 7");
+  EXPECT_EQ(offer(600, 1, MISSION_FAILED, static_cast<FaultCode>(5)), Verdict::kUndefined);
+  EXPECT_EQ(refusal(), "controller 'strong' answered step 600 with an undefined value: fault 5");
 }
 
 TEST_F(CommandGateTest, AFaultInAnswerToAnotherStepEndsNothing) {
@@ -410,7 +460,7 @@ TEST_F(CommandGateTest, EqualStrengthsAreOrderedByNameNotByArrival) {
   const ReadyClient alpha = {make_peer(200), "alpha", 5};
   const ReadyClient beta = {make_peer(1), "beta", 5};
   for (const auto& clients : {std::vector{alpha, beta}, std::vector{beta, alpha}}) {
-    CommandGate gate(kRun, kVehicle, kForceLimit);
+    CommandGate gate(kRun, kVehicle, {kForceLimit});
     gate.set_clients(clients);
     gate.expect(0);
     EXPECT_EQ(gate.awaited_client()->name, "alpha");
@@ -424,7 +474,7 @@ TEST_F(CommandGateTest, EqualStrengthsAndNamesAreStillOrdered) {
   const ReadyClient second = {make_peer(2), "same", 5};
   std::set<bus::PeerId> chosen;
   for (const auto& clients : {std::vector{first, second}, std::vector{second, first}}) {
-    CommandGate gate(kRun, kVehicle, kForceLimit);
+    CommandGate gate(kRun, kVehicle, {kForceLimit});
     gate.set_clients(clients);
     gate.expect(0);
     chosen.insert(gate.awaited_client()->peer);
@@ -539,7 +589,7 @@ TEST_F(CommandGateTest, MissesAreCountedInARowAndForgottenWithAnAnswer) {
 
 TEST_F(CommandGateTest, WhenAllAreSilentAnyOfThemMayComeBack) {
   for (const auto& back : {kStrong, kWeak, kWeakest}) {
-    CommandGate gate(kRun, kVehicle, kForceLimit);
+    CommandGate gate(kRun, kVehicle, {kForceLimit});
     gate.set_clients({kStrong, kWeak, kWeakest});
     gate.expect(0);
     while (gate.pass_over_silent_client()) {
@@ -594,11 +644,13 @@ TEST_F(CommandGateTest, WithoutClientsNothingIsAwaitedAndNothingRefused) {
 
 TEST_F(CommandGateTest, EveryRejectionHasAReason) {
   std::set<std::string> texts;
-  for (const Verdict verdict : {Verdict::kNotFinite, Verdict::kForceLimit, Verdict::kOtherRun,
-                                Verdict::kEarly, Verdict::kWrongStep, Verdict::kContradiction,
-                                Verdict::kUnknownVehicle, Verdict::kUnknownClient, Verdict::kFault})
+  for (const Verdict verdict :
+       {Verdict::kNotFinite, Verdict::kForceLimit, Verdict::kOtherRun, Verdict::kEarly,
+        Verdict::kWrongStep, Verdict::kContradiction, Verdict::kUnknownVehicle,
+        Verdict::kUnknownClient, Verdict::kUndefined, Verdict::kFault, Verdict::kUnknownStage,
+        Verdict::kEarlyEnd})
     texts.insert(to_string(verdict));
-  EXPECT_EQ(texts.size(), 9u);
+  EXPECT_EQ(texts.size(), 12u);
   EXPECT_EQ(texts.count(""), 0u);
   for (const Verdict verdict :
        {Verdict::kAccepted, Verdict::kHeld, Verdict::kDuplicate, Verdict::kSuperseded})
@@ -653,7 +705,7 @@ TEST(CommandGatePropertyTest, InvalidAnswersChangeNoForceAndAreCounted) {
     std::mt19937_64 random(seed);
     Junk junk(random);
     const std::vector<ReadyClient> clients = {kWeak, kStrong, kWeakest};
-    CommandGate gate(kRun, kVehicle, kForceLimit);
+    CommandGate gate(kRun, kVehicle, {kForceLimit});
     gate.set_clients(clients);
     std::uint64_t offered = 0, accepted = 0;
     constexpr std::uint64_t kSteps = 150;
@@ -707,7 +759,7 @@ TEST(CommandGatePropertyTest, EveryStepIsAnsweredAsLongAsOneOfTheChangingClients
   for (std::uint64_t seed = 0; seed < 40; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937_64 random(seed);
-    CommandGate gate(kRun, kVehicle, kForceLimit);
+    CommandGate gate(kRun, kVehicle, {kForceLimit});
     gate.set_clients(everybody);
     std::uint64_t offered = 0;
     for (std::uint64_t step = 0; step < 200; ++step) {
