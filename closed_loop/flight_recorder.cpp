@@ -1,6 +1,7 @@
 #include "closed_loop/flight_recorder.hpp"
 
 #include "closed_loop/record_entries.hpp"
+#include "common/plugin/shared_library.hpp"
 #include "recorder/recording_folder.hpp"
 
 namespace sls::closed_loop {
@@ -26,6 +27,12 @@ FlightRecorder::FlightRecorder(const std::filesystem::path& folder, bool force,
   board_.start_clock();
   board_.publish(PHASE_RUNNING, "");
   batch_.run_id(parameters.run_id());
+}
+
+void FlightRecorder::note_law_library(const config::Scenario& scenario) {
+  const config::ModelName& law = scenario.controller.law;
+  const std::string sha256 = plugin::find_loaded_sha256(law.find_library(scenario.folder));
+  if (!sha256.empty()) recording_.note_library(controller_name_, sha256);
 }
 
 void FlightRecorder::hand_on() {

@@ -26,6 +26,9 @@ class FlightRecorder {
   FlightRecorder(const std::filesystem::path& folder, bool force, const Parameters& parameters,
                  const config::Sync& sync, const std::string& controller_name);
 
+  /// Notes the shared library of the law of `scenario`, if it has one that is loaded.
+  void note_law_library(const config::Scenario& scenario);
+
   /// Adds one step of all vehicles, in the order of the parameters. `refused` is the index of the
   /// vehicle whose answer failed the flight.
   void add(const std::vector<FlownStep>& steps, std::optional<std::size_t> refused);

@@ -18,6 +18,7 @@ FlightEnd fly_recorded(const config::Scenario& scenario, const FlightOptions& op
                           sim::make_parameters_message(sim::make_run_id(), ids, scenario,
                                                        flight.plant(), app::version()),
                           scenario.sync, options.controller_name);
+  recorder.note_law_library(scenario);
   while (app::stop_signal() == 0 && flight.fly_step()) {
     if (recorder.is_status_due()) recorder.announce(flight.take_remarks());
     recorder.add(flight.steps(), flight.refused());

@@ -3,6 +3,7 @@
 #include <random>
 
 #include "common/bus/convert.hpp"
+#include "common/plugin/shared_library.hpp"
 
 namespace sls::sim {
 
@@ -35,7 +36,7 @@ Parameters make_parameters_message(std::uint64_t run_id,
   message.version(version);
   message.scenario_sha256(scenario.sha256);
   message.scenario_text(scenario.text);
-  message.library_sha256(config::calc_plant_library_sha256(scenario));
+  message.library_sha256(plugin::find_loaded_sha256(config::find_plant_library(scenario)));
   for (const std::uint32_t id : vehicle_ids) {
     VehicleParameters& item = message.vehicles().emplace_back();
     item.vehicle_id(id);

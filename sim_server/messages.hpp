@@ -32,7 +32,8 @@ std::uint64_t make_run_id();
 VehicleState make_state_message(std::uint32_t vehicle_id, const model::Measurement& measured,
                                 const Applied& applied);
 
-/// `plant` is that of one of the vehicles; those of the others have the same signals.
+/// `plant` is that of one of the vehicles; those of the others have the same signals. Call once the
+/// plants are made: the library's hash is that of the one that is loaded.
 Parameters make_parameters_message(std::uint64_t run_id,
                                    const std::vector<std::uint32_t>& vehicle_ids,
                                    const config::Scenario& scenario, const Plant& plant,

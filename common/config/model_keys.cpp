@@ -1,7 +1,5 @@
 #include "common/config/model_keys.hpp"
 
-#include "common/config/sha256.hpp"
-
 #include "common/config/own_keys.hpp"
 
 namespace sls::config {
@@ -12,8 +10,8 @@ bool ModelName::is_shared_library() const {
          name.compare(name.size() - kEnding.size(), kEnding.size(), kEnding) == 0;
 }
 
-std::string ModelName::calc_library_sha256(const std::filesystem::path& folder) const {
-  return is_shared_library() ? calc_file_sha256(folder / name) : std::string();
+std::filesystem::path ModelName::find_library(const std::filesystem::path& folder) const {
+  return is_shared_library() ? folder / name : std::filesystem::path();
 }
 
 namespace {

@@ -299,11 +299,11 @@ Scenario read_scenario(const YamlNode& root, const std::string& place, const std
   return scenario;
 }
 
-std::string calc_plant_library_sha256(const Scenario& scenario) {
+std::filesystem::path find_plant_library(const Scenario& scenario) {
   // A plant in a library has no autopilot of ours.
   const bool is_autopilot = !scenario.plant.model.is_shared_library() && scenario.autopilot;
   const ModelName& model = is_autopilot ? scenario.autopilot->model : scenario.plant.model;
-  return model.calc_library_sha256(scenario.folder);
+  return model.find_library(scenario.folder);
 }
 
 std::string to_yaml(const Scenario& scenario) {

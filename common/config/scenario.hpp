@@ -38,10 +38,9 @@ struct ModelName {
   std::string place;  ///< FILE:LINE of the key, for messages; empty: not in the file
 
   bool is_shared_library() const;  ///< ends with ".so"
-  /// SHA-256 of the shared library, whose path is relative to `folder`; empty for a registered
+  /// Path of the shared library, which the file names relative to `folder`; empty for a registered
   /// name.
-  /// @throws std::system_error naming the file where it cannot be read.
-  std::string calc_library_sha256(const std::filesystem::path& folder) const;
+  std::filesystem::path find_library(const std::filesystem::path& folder) const;
   /// FILE:LINE: `key`.
   std::string describe_place(const std::string& key) const {
     return place.empty() ? key : place + ": " + key;
@@ -380,10 +379,9 @@ Scenario load_scenario(const std::filesystem::path& file);
 /// The same from text that came over the wire; `place` stands for the file's name in messages.
 Scenario parse_scenario(const std::string& text, const std::string& place);
 
-/// SHA-256 of the shared library of the plant or, if the plant is not in one, of its autopilot;
-/// empty if neither is in one.
-/// @throws std::system_error naming the file where it cannot be read.
-std::string calc_plant_library_sha256(const Scenario& scenario);
+/// The shared library of the plant or, if the plant is not in one, of its autopilot; empty if
+/// neither is in one.
+std::filesystem::path find_plant_library(const Scenario& scenario);
 
 /// Writes every value of `scenario` (not `text`) as YAML that reads back to the same values. Leaves
 /// out the numbers of the controller's model that equal those of the vehicle (`follows`).

@@ -2,14 +2,37 @@
 
 #include <dlfcn.h>
 
+#include <map>
+#include <mutex>
 #include <system_error>
 #if defined(__x86_64__)
 #include <xmmintrin.h>
 #endif
 
 #include "common/config/config_error.hpp"
+#include "common/config/sha256.hpp"
 
 namespace sls::plugin {
+namespace {
+
+struct Loaded {
+  void* handle;
+  std::string sha256;
+};
+
+/// The loaded libraries by absolute path. Like dlopen, which does not open a path again while its
+/// library is loaded, even if another file has taken its place.
+struct LoadedLibraries {
+  std::mutex mutex;  // guards `by_path`
+  std::map<std::string, Loaded> by_path;
+};
+
+LoadedLibraries& loaded_libraries() {
+  static LoadedLibraries libraries;
+  return libraries;
+}
+
+}  // namespace
 
 std::uint64_t floating_point_mode() {
 #if defined(__x86_64__)
@@ -38,23 +61,53 @@ void restore_floating_point_mode(std::uint64_t mode) {
 
 SharedLibrary::SharedLibrary(const std::filesystem::path& file, const std::string& place)
     : name_(file.lexically_normal().string()), place_(place) {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(file, error))
+  LoadedLibraries& libraries = loaded_libraries();
+  const std::lock_guard lock(libraries.mutex);
+  // The path is absolute because the loader searches the system's folders for one without a slash.
+  const std::string path = std::filesystem::absolute(file).string();
+  const auto known = libraries.by_path.find(path);
+  if (known != libraries.by_path.end()) {
+    handle_ = known->second.handle;
+    return;
+  }
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(file, ignored))
     fail("expected a shared library, got no file of this name");
+  try {
+    const std::string sha256 = config::calc_file_sha256(path);
+    load(path);
+    if (config::calc_file_sha256(path) != sha256) {
+      ::dlclose(handle_);
+      fail("expected a file that does not change while it is loaded");
+    }
+    libraries.by_path[path] = {handle_, sha256};
+  } catch (const std::system_error& error) {
+    fail(std::string("expected a file that can be read, got: ") + error.what());
+  }
+}
+
+void SharedLibrary::load(const std::string& path) {
   const std::uint64_t mode = floating_point_mode();
   {
     const CallGuard guard({name_.c_str(), "(loading)", 0, 0});
-    // The path is absolute because the loader searches the system's folders for one without a
-    // slash.
-    handle_ = ::dlopen(std::filesystem::absolute(file).c_str(), RTLD_NOW | RTLD_LOCAL);
+    handle_ = ::dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
   }
   if (floating_point_mode() != mode) {
     restore_floating_point_mode(mode);
+    if (handle_) ::dlclose(handle_);
     fail(
         "changes the floating-point mode of the whole process when it is loaded; link it without "
         "-ffast-math");
   }
   if (!handle_) fail(std::string("expected a shared library that loads, got: ") + ::dlerror());
+}
+
+std::string find_loaded_sha256(const std::filesystem::path& file) {
+  if (file.empty()) return "";
+  LoadedLibraries& libraries = loaded_libraries();
+  const std::lock_guard lock(libraries.mutex);
+  const auto known = libraries.by_path.find(std::filesystem::absolute(file).string());
+  return known == libraries.by_path.end() ? "" : known->second.sha256;
 }
 
 void* SharedLibrary::find(const char* symbol) const {

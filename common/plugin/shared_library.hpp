@@ -78,10 +78,15 @@ void call_at_end(const Call& call, const Work& work) noexcept {
   }
 }
 
+/// SHA-256 of `file` at the time when this process loaded it as a SharedLibrary, 64 hex digits;
+/// empty if it has not. The file may have been replaced since; the loaded library stays in use.
+std::string find_loaded_sha256(const std::filesystem::path& file);
+
 class SharedLibrary {
  public:
-  /// Loads `file`, which stays loaded. `place` is FILE:LINE: KEY of the scenario, for messages.
-  /// @throws config::ConfigError if the file is missing, cannot be loaded or changes the
+  /// Loads `file`, which stays loaded: later objects of the same path use it again. `place` is
+  /// FILE:LINE: KEY of the scenario, for messages.
+  /// @throws config::ConfigError if the file is missing, cannot be loaded, or changes itself or the
   ///   floating-point mode while loading.
   SharedLibrary(const std::filesystem::path& file, const std::string& place);
 
@@ -104,6 +109,7 @@ class SharedLibrary {
   [[noreturn]] void fail(const std::string& message) const;
 
  private:
+  void load(const std::string& path);
   [[noreturn]] void fail_at_place(const std::string& message) const;
 
   std::string name_;

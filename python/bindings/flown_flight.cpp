@@ -286,6 +286,7 @@ const std::string& FlownFlight::calc_certificate() const {
 bool FlownFlight::save(const std::filesystem::path& folder, bool force) const {
   closed_loop::FlightRecorder recorder(folder, force, parameters_, scenario_.sync,
                                        controller_name_);
+  recorder.note_law_library(scenario_);
   auto remarks = remarks_.begin();
   std::vector<FlownStep> steps(ids_.size());
   for (std::size_t row = 0; row < rows_.front().rows(); ++row) {

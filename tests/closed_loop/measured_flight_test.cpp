@@ -12,6 +12,7 @@
 #include "closed_loop/delay_margin.hpp"
 #include "closed_loop/recorded_flight.hpp"
 #include "common/config/scenario_draft.hpp"
+#include "common/config/sha256.hpp"
 #include "recorder/manifest.hpp"
 #include "tests/closed_loop/support.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -420,6 +421,18 @@ TEST_P(CertificateOfFlightTest, IsThatOfItsRecording) {
 
 INSTANTIATE_TEST_SUITE_P(Scenarios, CertificateOfFlightTest, ::testing::ValuesIn(kCertified),
                          [](const auto& certified) { return std::string(certified.param.name); });
+
+TEST(LibraryOfFlightTest, TheManifestHasTheHashOfTheLaw) {
+  const std::string law = SLS_LIBRARIES "/controller.so";
+  const config::Scenario scenario =
+      load_changed("short", {{"controller", "{ law: " + law + ", force_limit_n: 200 }"}});
+  const TemporaryFolder folder;
+  fly_recorded(scenario, {}, folder / "recording", false);
+  const std::string manifest = sls::test::read_bytes(folder / "recording/manifest.json");
+  EXPECT_NE(manifest.find("\"control_client\": \"" + config::calc_file_sha256(law) + "\""),
+            manifest.npos)
+      << manifest;
+}
 
 // --- runs ----------------------------------------------------------------------------------------
 

@@ -4,7 +4,10 @@
 #include <gtest/gtest.h>
 
 #include "common/bus/convert.hpp"
+#include "common/config/sha256.hpp"
+#include "common/plugin/shared_library.hpp"
 #include "control_client/messages.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace sls::sim {
 namespace {
@@ -114,6 +117,24 @@ class TurningPlant : public Plant {
  private:
   model::Measurement measurement_;
 };
+
+TEST(MessagesTest, TheLibraryIsTheLoadedOneWhenAnotherHasTakenTheFilesPlace) {
+  const sls::test::TemporaryFolder folder;
+  config::Scenario scenario = config::load_scenario(SLS_SOURCE_DIR "/config/scenarios/short.yaml");
+  scenario.folder = folder.path();
+  scenario.plant.model.name = "mine.so";
+  std::filesystem::copy(SLS_LIBRARIES "/empty.so", folder / "mine.so");
+  const std::string flown = config::calc_file_sha256(folder / "mine.so");
+  const plugin::SharedLibrary library(folder / "mine.so", "plant.model");
+  for (int reset = 0; reset < 2; ++reset) {
+    EXPECT_EQ(make_parameters_message(31, {0}, scenario, TurningPlant(), "sls 9.9")
+                  .library_sha256()
+                  .to_string(),
+              flown);
+    sls::test::write_bytes(folder / "repaired.so", "another");
+    std::filesystem::rename(folder / "repaired.so", folder / "mine.so");
+  }
+}
 
 TEST(MessagesTest, ParametersAreThoseInForce) {
   config::Scenario scenario =

@@ -79,6 +79,37 @@ TEST(SharedLibraryTest, FastMathIsRefusedWhenItIsLoadedAndTheModePutBack) {
                      "changes the floating-point mode of the whole process when it is "
                      "loaded; link it without -ffast-math"));
   EXPECT_EQ(floating_point_mode(), mode);
+  EXPECT_NE(find_error(file), "no error") << "also the second time";
+}
+
+TEST(SharedLibraryTest, TheHashIsThatOfTheLoadedFileWhenAnotherTakesItsPlace) {
+  const sls::test::TemporaryFolder folder;
+  const std::filesystem::path file = folder / "mine.so", next = folder / "next.so";
+  std::filesystem::copy(kFolder + "empty.so", file);
+  EXPECT_EQ(find_loaded_sha256(file), "");
+  EXPECT_EQ(find_loaded_sha256({}), "");
+  const SharedLibrary loaded(file, "place");
+  const std::string sha256 = config::calc_file_sha256(kFolder + "empty.so");
+  EXPECT_EQ(find_loaded_sha256(file), sha256);
+
+  std::filesystem::copy(kFolder + "other.so", next);
+  std::filesystem::rename(next, file);
+  const SharedLibrary again(file, "place");  // as after a reset
+  EXPECT_THROW(again.find("sls_test_is_other"), config::ConfigError) << "the old one flies";
+  EXPECT_EQ(find_loaded_sha256(file), sha256);
+  std::filesystem::remove(file);
+  EXPECT_NO_THROW(SharedLibrary(file, "place"));
+  EXPECT_EQ(find_loaded_sha256(file), sha256);
+}
+
+TEST(SharedLibraryTest, AFileThatChangesWhileItIsLoadedIsRefused) {
+  const sls::test::TemporaryFolder folder;
+  const std::string file = folder / "mine.so";
+  std::filesystem::copy(kFolder + "growing.so", file);
+  for (int i = 0; i < 2; ++i)
+    EXPECT_EQ(find_error(file),
+              expected(file, "expected a file that does not change while it is loaded"));
+  EXPECT_EQ(find_loaded_sha256(file), "");
 }
 
 TEST(CallTest, AnExceptionOfALibraryIsNamedWithItsPlace) {

@@ -1,0 +1,1 @@
+extern "C" void sls_test_is_other() {}
