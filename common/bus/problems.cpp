@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <iterator>
 #include <vector>
 
 namespace sls::bus {
@@ -24,15 +25,25 @@ void Problems::begin(const std::string& key, const std::string& text,
 
 void Problems::add(const std::string& key, const std::string& text,
                    std::optional<Clock::duration> lasting) {
-  const auto end = lasting ? std::optional(Clock::now() + *lasting) : std::nullopt;
+  const auto now = Clock::now();
+  const auto end = lasting ? std::optional(now + *lasting) : std::nullopt;
   if (const auto known = problems_.find(key); known != problems_.end()) {
-    known->second.end = end;
-    return;
+    if (known->second.holds(now)) {
+      known->second.end = end;
+      return;
+    }
+    problems_.erase(known);
   }
+  if (problems_.size() >= kMost) drop_expired(now);
   if (problems_.size() >= kMost) return;
   problems_.emplace(key, Problem{text, ++count_, end});
   version_.fetch_add(1, std::memory_order_release);
   say(text);
+}
+
+void Problems::drop_expired(Clock::time_point now) {
+  for (auto it = problems_.begin(); it != problems_.end();)
+    it = it->second.holds(now) ? std::next(it) : problems_.erase(it);
 }
 
 void Problems::end(const std::string& key) {
@@ -58,8 +69,24 @@ void Problems::replace(const std::string& prefix, const std::map<std::string, st
 
 bool Problems::has_any(const std::string& prefix) const {
   const std::lock_guard lock(mutex_);
-  const auto problem = problems_.lower_bound(prefix);
-  return problem != problems_.end() && begins_with(problem->first, prefix);
+  const auto now = Clock::now();
+  auto problem = problems_.lower_bound(prefix);
+  while (problem != problems_.end() && begins_with(problem->first, prefix)) {
+    if (problem->second.holds(now)) return true;
+    ++problem;
+  }
+  return false;
+}
+
+void Problems::rename(const std::string& part, const std::string& from, const std::string& to) {
+  const std::lock_guard lock(mutex_);
+  for (auto& [key, problem] : problems_) {
+    const auto place = problem.text.find(from);
+    if (key.find(part) == key.npos || place == problem.text.npos) continue;
+    problem.text.replace(place, from.size(), to);
+    version_.fetch_add(1, std::memory_order_release);
+    say(problem.text);
+  }
 }
 
 void Problems::say(const std::string& text) {
@@ -79,7 +106,7 @@ std::string Problems::describe(std::size_t most) const {
   const auto now = Clock::now();
   std::vector<const Problem*> held;
   for (const auto& [key, problem] : problems_)
-    if (!problem.end || *problem.end > now) held.push_back(&problem);
+    if (problem.holds(now)) held.push_back(&problem);
   std::sort(held.begin(), held.end(),
             [](const Problem* a, const Problem* b) { return a->number < b->number; });
   std::string text;

@@ -61,12 +61,35 @@ TEST_F(ProblemsTest, ThoseThatArePutInForceReplaceTheOthersOfTheirKind) {
   EXPECT_EQ(problems_.describe(), "endpoint");
 }
 
-TEST_F(ProblemsTest, AProblemWithATimeLimitExpiresAndIsNotLoggedAgain) {
+TEST_F(ProblemsTest, AProblemWithATimeLimitExpiresAndIsLoggedAgainWhenItRecurs) {
   problems_.begin("a", "a is wrong", 10ms);
   EXPECT_TRUE(test::wait_until([&] { return problems_.describe().empty(); }));
-  problems_.begin("a", "a is wrong", 1h);
-  EXPECT_EQ(problems_.describe(), "a is wrong");
-  EXPECT_EQ(log_.str(), "a is wrong\n");
+  EXPECT_FALSE(problems_.has_any("a"));
+  const auto version = problems_.version();
+  problems_.begin("a", "a is wrong again", 1h);
+  EXPECT_EQ(problems_.describe(), "a is wrong again");
+  EXPECT_TRUE(problems_.has_any("a"));
+  EXPECT_EQ(problems_.version(), version + 1);
+  EXPECT_EQ(log_.str(), "a is wrong\na is wrong again\n");
+}
+
+TEST_F(ProblemsTest, ThoseThatHaveExpiredTakeNoRoom) {
+  for (std::size_t i = 0; i < Problems::kMost; ++i) problems_.begin(std::to_string(i), "old", 10ms);
+  EXPECT_TRUE(test::wait_until([&] { return problems_.describe().empty(); }));
+  problems_.begin("new", "new");
+  EXPECT_EQ(problems_.describe(), "new");
+}
+
+TEST_F(ProblemsTest, AnAuthorThatIsNamedLaterIsNamedInTheListAndInTheLog) {
+  problems_.begin("dds 1 fit", "topic of somebody: wrong");
+  problems_.begin("dds 2 fit", "topic of somebody: wrong, too");
+  const auto version = problems_.version();
+  problems_.rename(" 1 ", "somebody", "'foo'");
+  EXPECT_EQ(problems_.describe(), "topic of 'foo': wrong; topic of somebody: wrong, too");
+  EXPECT_NE(problems_.version(), version);
+  problems_.rename(" 1 ", "somebody", "'bar'");
+  EXPECT_EQ(log_.str(),
+            "topic of somebody: wrong\ntopic of somebody: wrong, too\ntopic of 'foo': wrong\n");
 }
 
 TEST_F(ProblemsTest, MoreThanFitAreCounted) {
