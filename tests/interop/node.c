@@ -188,6 +188,7 @@ static void note_parameters(Node* node, const sls_Parameters* parameters,
     return;
   }
   Run* run = find_or_add_run(node, parameters->run_id);
+  if (run->vehicle_count > 0 && !is_same(&run->server, server)) return;  // another's run
   run->server = *server;
   run->heard = dds_time();
   run->parameters = *parameters;
@@ -208,6 +209,9 @@ void look_around(Node* node) {
       note_parameters(node, &parameters, &sender);
   while (take(node->status_reader, &status, &info)) {
     Run* run = find_or_add_run(node, status.run_id);
+    // The sender is unknown once it has left, and the server before the parameters have come.
+    const bool has_sender = find_sender(node->status_reader, &info, &sender);
+    if (run->vehicle_count > 0 && has_sender && !is_same(&run->server, &sender)) continue;
     run->status = status;
     run->has_status = true;
     run->heard = dds_time();
