@@ -67,6 +67,7 @@ std::optional<bus::Run> Client::find_first_run() {
   app::Wait wait(timeout_s, app::kUsualJoinTime);
   announce_waiting();
   while (!options_.is_stopped()) {
+    servers_.look_for_impostors();
     if (auto run = find_joinable_run()) return run;
     if (wait.is_over())
       throw app::RunError(fmt::format("no server for vehicle {} within {} s{}{}", vehicles,
@@ -148,6 +149,7 @@ std::optional<bus::Run> Client::serve() {
   while (!options_.is_stopped()) {
     rethrow_answer_error();
     if (has_ended()) return std::nullopt;
+    servers_.look_for_impostors();
     if (auto next = find_successor()) return next;
     if (!ready_ && stream_->sees_server(run_->server)) {
       ready_ = true;
@@ -168,7 +170,8 @@ void Client::receive(const States& sample, const bus::PeerId& sender) {
 }
 
 void Client::answer(const States& sample, const bus::PeerId& sender) {
-  if (!run_ || !(sender == run_->server) || sample.run_id() != run_->parameters.run_id()) return;
+  if (!run_ || sample.run_id() != run_->parameters.run_id()) return;
+  if (!(sender == run_->server)) return note_impostor(sender);
   answers_.run_id(sample.run_id());
   answers_.step(sample.step());
   answers_.vehicles().clear();
@@ -178,6 +181,13 @@ void Client::answer(const States& sample, const bus::PeerId& sender) {
       answers_.vehicles().push_back(answer(pilot->second, sample.step(), state));
   }
   if (!answers_.vehicles().empty()) stream_->write(answers_);
+}
+
+void Client::note_impostor(const bus::PeerId& sender) {
+  if (impostor_ == sender) return;  // it may send many samples
+  impostor_ = sender;
+  servers_.note_impostor(sender, bus::Topic<States>::kName, run_->parameters.run_id(),
+                         run_->server);
 }
 
 const ControlCommand& Client::answer(Pilot& pilot, std::uint64_t step, const VehicleState& state) {

@@ -82,6 +82,8 @@ class Client {
   void receive(const States& sample, const bus::PeerId& sender);
   /// Answers the states of the joined run and ignores those of other servers.
   void answer(const States& sample, const bus::PeerId& sender);
+  /// Reports that `sender`, which is not our server, has sent states of our run.
+  void note_impostor(const bus::PeerId& sender);
   const ControlCommand& answer(Pilot& pilot, std::uint64_t step, const VehicleState& state);
   void announce(bool ready, bool done);
   /// Announces this client while it waits for a server: each writer of sls/command announces
@@ -114,6 +116,7 @@ class Client {
   std::map<std::uint32_t, Pilot> pilots_;
   Commands answers_;  // to the current sample
   std::exception_ptr answer_error_;
+  bus::PeerId impostor_;  // the last one that was reported
   /// Made for the mode of the scenario, and made again if the run has another mode.
   std::unique_ptr<AnswerStream> stream_;  // last: its callbacks use the members above
 };

@@ -94,6 +94,7 @@ void RunRecorder::watch() {
   bus::ServerWatch server(surroundings_.servers, run_, scenario_.sync.wait.server_deadline_s);
   while (!has_all_ && !writing_failed_) {
     look_for_the_end(server);
+    surroundings_.servers.look_for_impostors();
     if (give_up_ && give_up_->is_over()) return;
     if (give_up_ && give_up_->is_report_due())
       spdlog::info("waiting for: samples after step {} of run {:016x} ({:.0f} s left)",

@@ -59,11 +59,11 @@ struct Endpoints {
   /// In real time commands are read with DEADLINE and LIFESPAN, if the QoS file has them.
   Endpoints(bus::Node& node, std::size_t vehicles, config::SyncMode mode)
       : domain(node),
+        parameters_writer(node),
         participants(node),
         servers(node),
         states(node, vehicles),
         record_writer(node),
-        parameters_writer(node),
         status_writer(node),
         reply_writer(node),
         commands(kCommands),
@@ -74,11 +74,13 @@ struct Endpoints {
             [this](const SimControl& request, const bus::PeerId&) { requests.put(request); }) {}
 
   bus::Node& domain;
+  /// The first: a participant with the other writers, but without this one, is no server
+  /// (bus::ServerDirectory::look_for_impostors).
+  bus::Writer<Parameters> parameters_writer;
   bus::ParticipantDirectory participants;
   bus::ServerDirectory servers;
   StateStream states;
   bus::Writer<RecordBatch> record_writer;
-  bus::Writer<Parameters> parameters_writer;
   bus::Writer<SimStatus> status_writer;
   bus::Writer<SimControlReply> reply_writer;
   app::Mailbox<ReceivedCommands> commands;

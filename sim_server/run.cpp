@@ -309,6 +309,7 @@ void Run::look_for_problems() {
   for (const bus::PeerId& peer : endpoints_.command_stream.matched())
     neighbourhood.command_writers[peer] = domain.describe(peer);
   neighbourhood.announcement_writers = endpoints_.participants.writers();
+  endpoints_.servers.look_for_impostors();
   neighbourhood.missing_deadlines = domain.find_missing_deadlines();
   neighbourhood.explained = domain.find_misfits();
   bus::Problems& problems = endpoints_.domain.problems();

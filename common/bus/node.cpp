@@ -61,6 +61,9 @@ constexpr std::size_t kMaxParticipants = 64;
 /// of encryption.
 constexpr std::size_t kEnvelopeBytes = 200;
 
+constexpr const char* kGovernance = "dds.sec.access.builtin.Access-Permissions.governance";
+constexpr const char* kPermissions = "dds.sec.access.builtin.Access-Permissions.permissions";
+
 }  // namespace
 
 void load_profiles(const std::filesystem::path& file, const std::string& identity) {
@@ -160,7 +163,10 @@ struct Node::Impl {
           {wire.port.portBase + wire.port.domainIDGain * domain + wire.port.offsetd1,
            wire.port.participantIDGain},
           find_own_participant_ids());
-    listener = std::make_unique<ParticipantListener>(is_secured, &neighbours);
+    const bool has_plain_submessages =
+        is_secured && !are_submessages_protected(find_file(qos, kGovernance));
+    listener =
+        std::make_unique<ParticipantListener>(is_secured, &neighbours, has_plain_submessages);
     participant = factory->create_participant(static_cast<std::uint32_t>(domain), qos,
                                               listener.get(), dds::StatusMask::none());
     if (participant)
@@ -182,18 +188,12 @@ struct Node::Impl {
 
   /// Size of the largest handshake message of DDS Security, which is never fragmented. With the
   /// keys of `./sls keys` it has 5,500 bytes, mostly certificate and signed permissions.
-  static std::size_t calc_handshake_bytes(
-      const eprosima::fastrtps::rtps::PropertyPolicy& properties) {
+  static std::size_t calc_handshake_bytes(const dds::DomainParticipantQos& qos) {
     constexpr std::size_t kLeast = 6'000, kBesides = 2'000;
-    constexpr std::string_view kFile = "file://";
     std::size_t bytes = kBesides;
-    for (const char* name : {"dds.sec.auth.builtin.PKI-DH.identity_certificate",
-                             "dds.sec.access.builtin.Access-Permissions.permissions"}) {
-      const auto* place =
-          eprosima::fastrtps::rtps::PropertyPolicyHelper::find_property(properties, name);
-      if (!place || place->rfind(kFile, 0) != 0) continue;
+    for (const char* name : {"dds.sec.auth.builtin.PKI-DH.identity_certificate", kPermissions}) {
       std::error_code error;
-      const auto size = std::filesystem::file_size(place->substr(kFile.size()), error);
+      const auto size = std::filesystem::file_size(find_file(qos, name), error);
       if (!error) bytes += static_cast<std::size_t>(size);
     }
     return std::max(kLeast, bytes);
@@ -214,10 +214,18 @@ struct Node::Impl {
                         std::to_string(kLeast) + " to " + std::to_string(max_datagram_bytes) +
                         ", got '" + *text + "'");
     max_datagram_bytes = bytes;
-    const std::size_t sent =
-        is_secured ? std::max(bytes, calc_handshake_bytes(qos.properties())) : bytes;
+    const std::size_t sent = is_secured ? std::max(bytes, calc_handshake_bytes(qos)) : bytes;
     for (auto& transport : qos.transport().user_transports)
       transport = send_small_datagrams(transport, static_cast<std::uint32_t>(sent));
+  }
+
+  /// The file that a property of DDS Security names as file://…; empty if it names none.
+  static std::filesystem::path find_file(const dds::DomainParticipantQos& qos,
+                                         const char* property) {
+    constexpr std::string_view kScheme = "file://";
+    const auto* place =
+        eprosima::fastrtps::rtps::PropertyPolicyHelper::find_property(qos.properties(), property);
+    return place && place->rfind(kScheme, 0) == 0 ? place->substr(kScheme.size()) : "";
   }
 
   static bool has_shared_memory(const dds::DomainParticipantQos& qos) {
@@ -240,15 +248,6 @@ struct Node::Impl {
     throw ConfigError(qos_place + ": profile '" + profile + "': expected a profile, got none");
   }
 
-  /// The permissions document of this secured participant; empty if the property names no file.
-  std::filesystem::path find_permissions_file() const {
-    const std::string scheme = "file://";
-    const auto* file = eprosima::fastrtps::rtps::PropertyPolicyHelper::find_property(
-        participant->get_qos().properties(),
-        "dds.sec.access.builtin.Access-Permissions.permissions");
-    return file && file->compare(0, scheme.size(), scheme) == 0 ? file->substr(scheme.size()) : "";
-  }
-
   /// Throws the reason why the middleware created no writer or reader of `topic`; `verb` is "write"
   /// or "read".
   [[noreturn]] void throw_refused_endpoint(const char* verb, const char* topic,
@@ -256,7 +255,7 @@ struct Node::Impl {
     const std::string cause = MiddlewareLog::find_first_error();
     if (cause.find("topic not found in allow rule") != std::string::npos ||
         cause.find("topic denied by deny rule") != std::string::npos) {
-      const std::filesystem::path permissions = find_permissions_file();
+      const std::filesystem::path permissions = find_file(participant->get_qos(), kPermissions);
       if (is_of_contract_1(permissions))
         throw ConfigError(permissions.string() + ": expected permission to " + verb + " " + topic +
                           ", got a document of contract 1; renew it where the authorities are: " +
@@ -366,6 +365,18 @@ Problems& Node::problems() const { return impl_->problems; }
 
 void Node::note_problem(const PeerId& peer, const std::string& key, const std::string& text) const {
   impl_->neighbours.note_problem(peer, key, text);
+}
+
+void Node::end_problem(const PeerId& peer, const std::string& key) const {
+  impl_->neighbours.end_problem(peer, key);
+}
+
+void Node::note_announced_name(const PeerId& peer, const std::string& name) const {
+  impl_->neighbours.note_announced_name(peer, name);
+}
+
+std::map<PeerId, std::set<std::string>> Node::find_writers_of_servers() const {
+  return impl_->neighbours.find_writers_of_servers();
 }
 
 std::string Node::describe(const PeerId& peer) const { return impl_->neighbours.describe(peer); }

@@ -77,8 +77,9 @@ class Node {
   /// has been discovered 3 s after joining; else empty.
   std::string describe_isolation() const;
 
-  /// True if the QoS file restricts this node to its own machine: shared memory, and UDP on loopback
-  /// addresses alone. Other programs then discover it within milliseconds, and no packet is lost.
+  /// True if the QoS file restricts this node to its own machine: shared memory, and UDP on
+  /// loopback addresses alone. Other programs then discover it within milliseconds, and no packet
+  /// is lost.
   bool stays_on_this_machine() const;
 
   /// Mistakes of the other programs on the domain. Endpoints and samples that do not match ours are
@@ -89,8 +90,18 @@ class Node {
   /// participant's description, once for each `key`.
   void note_problem(const PeerId& peer, const std::string& key, const std::string& text) const;
 
-  /// 'foo' (10.0.0.2): name and address that a participant announces in discovery.
+  void end_problem(const PeerId& peer, const std::string& key) const;
+
+  /// 'foo' (10.0.0.2): name and address that a participant announces in discovery. The name of
+  /// `note_announced_name` replaces that of discovery.
   std::string describe(const PeerId& peer) const;
+
+  /// The participant calls itself `name` in sls/participant: see Neighbours.
+  void note_announced_name(const PeerId& peer, const std::string& name) const;
+
+  /// Participants with a writer of sls/state, sls/status or sls/record, which only servers have;
+  /// with the names of these topics.
+  std::map<PeerId, std::set<std::string>> find_writers_of_servers() const;
 
   /// Participants whose sls/command offers a longer DEADLINE than our reader requests, or none,
   /// with a text: a mistake if the participant serves our run (fastdds/neighbours.hpp).

@@ -73,7 +73,10 @@ std::optional<Run> find_best(const std::vector<Run>& runs, std::uint32_t vehicle
 
 ParticipantDirectory::ParticipantDirectory(Node& node)
     : reader_(node, kLatchedReaderProfile,
-              [this](const Participant& sample, const PeerId& sender) { note(sample, sender); }) {}
+              [this, &node](const Participant& sample, const PeerId& sender) {
+                node.note_announced_name(sender, sample.name().to_string());
+                note(sample, sender);
+              }) {}
 
 void ParticipantDirectory::note(const Participant& sample, const PeerId& sender) {
   const std::chrono::nanoseconds age = std::chrono::system_clock::now() - reader_.written();
@@ -150,7 +153,8 @@ void wait_for_recorders_to_end(const ParticipantDirectory& participants, std::ui
 }
 
 ServerDirectory::ServerDirectory(Node& node, std::function<void(const SimStatus&)> on_status)
-    : self_(node.id()),
+    : node_(node),
+      self_(node.id()),
       on_status_(std::move(on_status)),
       parameters_reader_(
           node, kLatchedReaderProfile,
@@ -164,8 +168,7 @@ ServerDirectory::ServerDirectory(Node& node, std::function<void(const SimStatus&
           }),
       status_reader_(node, kLatchedReaderProfile,
                      [this](const SimStatus& sample, const PeerId& sender) {
-                       note(sample, sender);
-                       if (on_status_) on_status_(sample);
+                       if (note(sample, sender) && on_status_) on_status_(sample);
                      }) {}
 
 void ServerDirectory::note(const Parameters& sample, const PeerId& sender) {
@@ -175,15 +178,82 @@ void ServerDirectory::note(const Parameters& sample, const PeerId& sender) {
   Claim& claim = find_or_add(server->claims, sample.run_id());
   if (claim.number == 0) claim.number = ++claims_;
   server->parameters = sample;
+  report_impostors(sample.run_id());
 }
 
-void ServerDirectory::note(const SimStatus& sample, const PeerId& sender) {
+bool ServerDirectory::note(const SimStatus& sample, const PeerId& sender) {
   const std::lock_guard lock(mutex_);
   Server* server = find_or_add_server(sender);
-  if (!server) return;
+  if (!server) return false;
   HeardStatus& heard = find_or_add(server->statuses, sample.run_id());
   heard.status = sample;
   heard.time = std::chrono::steady_clock::now();
+  const auto owner = find_owner(sample.run_id());
+  if (owner && !(*owner == sender)) report_impostors(sample.run_id());
+  return !owner || *owner == sender;
+}
+
+/// Reports each server that has claimed run `run_id`, or has sent a status of it, although it
+/// belongs to another.
+void ServerDirectory::report_impostors(std::uint64_t run_id) {
+  const auto owner = find_owner(run_id);
+  const auto is_about_run = [run_id](const auto& item) { return item.run_id == run_id; };
+  for (auto& [peer, server] : servers_) {
+    if (peer == *owner || server.is_reported) continue;
+    const bool has_claim = std::any_of(server.claims.begin(), server.claims.end(), is_about_run);
+    const bool has_status =
+        std::any_of(server.statuses.begin(), server.statuses.end(), is_about_run);
+    if (!has_claim && !has_status) continue;
+    server.is_reported = true;
+    note_impostor(peer, has_status ? Topic<SimStatus>::kName : Topic<Parameters>::kName, run_id,
+                  *owner);
+  }
+}
+
+void ServerDirectory::note_impostor(const PeerId& sender, const char* topic, std::uint64_t run_id,
+                                    const PeerId& owner) const {
+  const std::string name = owner == self_ ? "this server" : node_.describe(owner);
+  node_.note_problem(sender, "impostor",
+                     fmt::format("{} run_id: expected that of a run of its own, got {:016x}, a run "
+                                 "of {}; its samples are ignored",
+                                 topic, run_id, name));
+}
+
+void ServerDirectory::look_for_impostors() {
+  constexpr auto kInterval = std::chrono::milliseconds(100);
+  // Discovery delivers the writers of a participant in the order in which they were made, and a
+  // server makes that of sls/parameters first.
+  constexpr auto kPatience = std::chrono::seconds(1);
+  // On a lossy network the claim itself may need seconds.
+  constexpr auto kPatienceWithWriter = std::chrono::seconds(10);
+  const auto now = std::chrono::steady_clock::now();
+  {
+    const std::lock_guard lock(mutex_);
+    if (now - impostors_looked_for_ < kInterval) return;
+    impostors_looked_for_ = now;
+  }
+  const auto writers = node_.find_writers_of_servers();
+  const auto claimants = parameters_reader_.matched();
+  const auto misfits = node_.find_misfits();
+  const std::lock_guard lock(mutex_);
+  for (auto it = unclaimed_since_.begin(); it != unclaimed_since_.end();)
+    it = writers.count(it->first) > 0 ? std::next(it) : unclaimed_since_.erase(it);
+  for (const auto& [peer, topics] : writers) {
+    const auto known = servers_.find(peer);
+    if (known != servers_.end() && known->second.parameters) {
+      if (unclaimed_since_.erase(peer) > 0) node_.end_problem(peer, "claim");
+      continue;
+    }
+    const auto since = unclaimed_since_.try_emplace(peer, now).first->second;
+    const auto patience = claimants.count(peer) > 0 ? kPatienceWithWriter : kPatience;
+    if (misfits.count(peer) > 0 || now - since < patience) continue;
+    std::string names;
+    for (const std::string& topic : topics) names += (names.empty() ? "" : ", ") + topic;
+    node_.note_problem(peer, "claim",
+                       fmt::format("writes {}: expected a claim in sls/parameters, got none; its "
+                                   "samples are ignored",
+                                   names));
+  }
 }
 
 ServerDirectory::Server* ServerDirectory::find_or_add_server(const PeerId& sender) {

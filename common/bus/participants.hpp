@@ -99,10 +99,11 @@ struct Run {
 
 /// The last parameters and status of every present server that uses this contract. At most 64
 /// servers; a new one replaces one that has left. A run belongs to the server that claimed it
-/// first; samples of other servers about this run are ignored.
+/// first; samples of others about this run are ignored, and their authors are reported.
 class ServerDirectory {
  public:
-  /// `on_status`, if given, is called with every status sample, on a thread of the middleware.
+  /// `on_status`, if given, is called with every status sample that is not ignored, on a thread of
+  /// the middleware.
   explicit ServerDirectory(Node& node, std::function<void(const SimStatus&)> on_status = {});
 
   /// Runs of the present servers, without this node's own. A server that is silent before its run
@@ -139,6 +140,15 @@ class ServerDirectory {
   /// When the last status of run `run_id` came; nothing before the first.
   std::optional<std::chrono::steady_clock::time_point> find_last_heard(std::uint64_t run_id) const;
 
+  /// Reports participants that write what only servers write, but have claimed no vehicle. Call it
+  /// at least twice a second; it does nothing more often than ten times.
+  void look_for_impostors();
+
+  /// Reports that `sender` has sent a sample of `topic` about run `run_id`, which belongs to
+  /// `owner`.
+  void note_impostor(const PeerId& sender, const char* topic, std::uint64_t run_id,
+                     const PeerId& owner) const;
+
  private:
   struct Claim {
     std::uint64_t run_id = 0;
@@ -155,21 +165,27 @@ class ServerDirectory {
     std::optional<Parameters> parameters;
     std::deque<Claim> claims;
     std::deque<HeardStatus> statuses;
+    bool is_reported = false;  // as an impostor
     std::chrono::steady_clock::time_point known_since;
   };
 
   void note(const Parameters& sample, const PeerId& sender);
-  void note(const SimStatus& sample, const PeerId& sender);
+  /// False if the sample is ignored.
+  bool note(const SimStatus& sample, const PeerId& sender);
+  void report_impostors(std::uint64_t run_id);
   Server* find_or_add_server(const PeerId& sender);
   std::optional<PeerId> find_owner(std::uint64_t run_id) const;
   const HeardStatus* find_heard(std::uint64_t run_id) const;
   bool is_present_run(const PeerId& server, const Server& known,
                       const std::set<PeerId>& present) const;
 
+  const Node& node_;
   const PeerId self_;
   const std::function<void(const SimStatus&)> on_status_;
   mutable std::mutex mutex_;  // guards the members below
   std::map<PeerId, Server> servers_;
+  std::map<PeerId, std::chrono::steady_clock::time_point> unclaimed_since_;
+  std::chrono::steady_clock::time_point impostors_looked_for_;
   std::uint64_t claims_ = 0;
   Reader<Parameters> parameters_reader_;
   Reader<SimStatus> status_reader_;

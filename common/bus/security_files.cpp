@@ -182,12 +182,21 @@ void check_permissions(const std::string& file, const std::string& authority_fil
   fail(file, "expected permissions for " + subject + ", got none");
 }
 
+/// A signed document in plain text, and its signature.
+std::string read_text(const std::filesystem::path& document) {
+  std::ostringstream text;
+  text << std::ifstream(document).rdbuf();
+  return text.str();
+}
+
 }  // namespace
 
+bool are_submessages_protected(const std::filesystem::path& governance) {
+  return read_text(governance).find("<metadata_protection_kind>NONE<") == std::string::npos;
+}
+
 bool is_of_contract_1(const std::filesystem::path& permissions) {
-  std::ostringstream text;  // the document in plain text, and its signature
-  text << std::ifstream(permissions).rdbuf();
-  const auto grants = [text = text.str()](const char* topic) {
+  const auto grants = [text = read_text(permissions)](const char* topic) {
     return text.find(std::string("<topic>") + topic) != std::string::npos;
   };
   return (grants("sls/reference<") || grants("sls/fleet_")) && !grants("sls/record<");

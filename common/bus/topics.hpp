@@ -82,4 +82,10 @@ struct Topic<SimControlReply> {
   static constexpr Flow kFlow = Flow::kLatched;
 };
 
+/// The names of all topics of the contract.
+inline constexpr const char* kTopicNames[] = {
+    Topic<States>::kName,      Topic<Commands>::kName,       Topic<RecordBatch>::kName,
+    Topic<Participant>::kName, Topic<Parameters>::kName,     Topic<SimStatus>::kName,
+    Topic<SimControl>::kName,  Topic<SimControlReply>::kName};
+
 }  // namespace sls::bus

@@ -3,7 +3,12 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <cctype>
+#include <cstring>
+#include <iterator>
 
+#include "common/bus/topics.hpp"
+#include "common/config/edit_distance.hpp"
 #include "common/config/yaml_node.hpp"
 
 namespace sls::bus {
@@ -77,6 +82,22 @@ bool is_longer(const std::optional<std::chrono::nanoseconds>& offered,
   return asked && (!offered || *offered > *asked);
 }
 
+/// Lower case, each run of separators as one '/', none at the ends, and no "rt/" of ROS 2 before.
+std::string simplify(const std::string& name) {
+  std::string simple;
+  for (const char letter : name) {
+    const bool is_separator = std::strchr("/_.:- ", letter) != nullptr;
+    if (!is_separator)
+      simple += static_cast<char>(std::tolower(static_cast<unsigned char>(letter)));
+    else if (!simple.empty() && simple.back() != '/')
+      simple += '/';
+  }
+  if (!simple.empty() && simple.back() == '/') simple.pop_back();
+  return simple.compare(0, 3, "rt/") == 0 ? simple.substr(3) : simple;
+}
+
+bool is_of_sls(const std::string& simple_name) { return simple_name.compare(0, 3, "sls") == 0; }
+
 }  // namespace
 
 std::vector<Mismatch> find_mismatches(const EndpointFacts& writer, const EndpointFacts& reader) {
@@ -121,6 +142,29 @@ std::vector<Mismatch> compare(const EndpointFacts& own, const EndpointFacts& oth
                                                     own.is_keyed ? "a keyed type" : "none",
                                                     other.is_keyed ? "a keyed type" : "none")});
   return found;
+}
+
+std::optional<std::string> find_meant_topic(const EndpointFacts& endpoint) {
+  constexpr std::size_t kLongest = 64, kMostEdits = 1;
+  const auto& known = kTopicNames;
+  const std::string& topic = endpoint.topic;
+  if (topic.size() > kLongest ||
+      std::find(std::begin(known), std::end(known), topic) != std::end(known))
+    return std::nullopt;
+  std::string simple = simplify(topic);
+  if (!is_of_sls(simple)) {
+    if (!is_of_sls(simplify(endpoint.type))) return std::nullopt;
+    simple = "sls/" + simple;
+  }
+  std::optional<std::string> meant;
+  std::size_t least = kMostEdits + 1;
+  for (const char* name : known) {
+    const std::size_t edits = config::calc_edit_distance(simple, simplify(name));
+    if (edits >= least) continue;
+    least = edits;
+    meant = name;
+  }
+  return meant;
 }
 
 bool is_of_contract_1(const EndpointFacts& endpoint) {

@@ -42,6 +42,11 @@ std::vector<Mismatch> find_mismatches(const EndpointFacts& writer, const Endpoin
 /// for different topics.
 std::vector<Mismatch> compare(const EndpointFacts& own, const EndpointFacts& other);
 
+/// The topic of ours that an endpoint's topic most likely means: "sls/command" for "sls/commands",
+/// "/sls/command", "sls_command" and, as ROS 2 names it, "rt/sls/command"; also for "command" if
+/// its type is ours. Nothing for a topic of ours, and for a topic of others.
+std::optional<std::string> find_meant_topic(const EndpointFacts& endpoint);
+
 /// True if only a program of the first contract has such an endpoint.
 bool is_of_contract_1(const EndpointFacts& endpoint);
 

@@ -3,6 +3,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "common/bus/topics.hpp"
 #include "common/config/yaml_node.hpp"
@@ -18,15 +19,19 @@ std::string to_hex(const std::uint8_t* bytes, std::size_t count) {
   return text;
 }
 
+std::string to_text(const PeerId& peer) { return to_hex(peer.bytes.data(), peer.bytes.size()); }
+
 /// Keys of problems: "dds PARTICIPANT ENDPOINT WHAT".
-std::string make_key(const PeerId& peer) {
-  return "dds " + to_hex(peer.bytes.data(), peer.bytes.size()) + " ";
-}
+std::string make_key(const PeerId& peer) { return "dds " + to_text(peer) + " "; }
 std::string make_key(const PeerId& peer, const Neighbours::EntityId& id) {
   return make_key(peer) + to_hex(id.data(), id.size()) + " ";
 }
 
-bool is_ours(const std::string& topic) { return topic.compare(0, 4, "sls/") == 0; }
+bool begins_with(const std::string& text, const std::string& prefix) {
+  return text.compare(0, prefix.size(), prefix) == 0;
+}
+
+bool is_ours(const std::string& topic) { return begins_with(topic, "sls/"); }
 
 bool is_same(const EndpointFacts& a, const EndpointFacts& b) {
   return a.topic == b.topic && a.is_writer == b.is_writer;
@@ -40,13 +45,36 @@ void Neighbours::set_self(const PeerId& self) {
 }
 
 void Neighbours::note_participant(const PeerId& peer, const std::string& name,
-                                  const std::string& address) {
+                                  const std::string& address, const std::string& obstacle) {
   const std::lock_guard lock(mutex_);
   if (participants_.size() >= kMostParticipants && participants_.count(peer) == 0) return;
-  std::string text = name.empty() ? std::string("a participant without a name")
-                                  : "'" + config::to_printable(name) + "'";
-  if (!address.empty()) text += " (" + config::to_printable(address) + ")";
-  participants_[peer].description = text;
+  Participant& participant = participants_[peer];
+  participant.name = name;
+  participant.address = address;
+  participant.obstacle = obstacle;
+  describe_anew(peer, participant);
+}
+
+void Neighbours::note_announced_name(const PeerId& peer, const std::string& name) {
+  const std::lock_guard lock(mutex_);
+  const auto known = participants_.find(peer);
+  if (name.empty() || known == participants_.end() || known->second.announced_name == name) return;
+  known->second.announced_name = name;
+  describe_anew(peer, known->second);
+}
+
+void Neighbours::describe_anew(const PeerId& peer, Participant& participant) {
+  const std::string& name =
+      participant.announced_name.empty() ? participant.name : participant.announced_name;
+  std::string text = describe_name(name);
+  if (!participant.address.empty()) text += " (" + config::to_printable(participant.address) + ")";
+  const std::string before = std::exchange(participant.description, text);
+  if (before.empty() || before == text) return;
+  for (auto& [endpoint, words] : missing_deadlines_) {
+    const auto place = endpoint.first == peer ? words.find(before) : words.npos;
+    if (place != words.npos) words.replace(place, before.size(), text);
+  }
+  problems_.rename(" " + to_text(peer) + " ", before, text);  // also of other keys than ours
 }
 
 void Neighbours::drop_participant(const PeerId& peer) {
@@ -61,12 +89,16 @@ void Neighbours::drop_participant(const PeerId& peer) {
 }
 
 void Neighbours::note_endpoint(const PeerId& peer, const EntityId& id, const EndpointFacts& facts) {
-  if (!is_ours(facts.topic)) return;
+  if (!is_ours(facts.topic) && !find_meant_topic(facts)) return;
   const std::lock_guard lock(mutex_);
   if (peer == self_) return;
   const Endpoint endpoint(peer, id);
   if (endpoints_.size() >= kMostEndpoints && endpoints_.count(endpoint) == 0) return;
   endpoints_[endpoint] = facts;
+  const auto known = participants_.find(peer);
+  if (known != participants_.end() && !known->second.obstacle.empty())
+    problems_.begin(make_key(peer) + "obstacle",
+                    known->second.description + ": " + known->second.obstacle);
   judge(endpoint, facts);
 }
 
@@ -106,6 +138,14 @@ void Neighbours::judge(const Endpoint& endpoint, const EndpointFacts& facts) {
     return;
   }
   if (is_of_contract_1(peer)) return;  // already reported; explains all other mismatches
+  if (const auto meant = find_meant_topic(facts)) {
+    // ROS 2 changes the names of all topics, so this is reported once per participant.
+    const bool is_of_ros = begins_with(facts.topic, "rt/");
+    problems_.begin(
+        (is_of_ros ? make_key(peer) : make_key(peer, id)) + "topic",
+        place + ": expected topic " + *meant + (is_of_ros ? " (without the prefix of ROS 2)" : ""));
+    return;
+  }
   std::string text, missing_deadline;
   for (const EndpointFacts& own : own_)
     for (const Mismatch& mismatch : compare(own, facts)) {
@@ -143,6 +183,10 @@ void Neighbours::note_problem(const PeerId& peer, const std::string& key, const 
     problems_.begin(make_key(peer) + key, describe_held(peer) + ": " + text);
 }
 
+void Neighbours::end_problem(const PeerId& peer, const std::string& key) {
+  problems_.end(make_key(peer) + key);
+}
+
 std::string Neighbours::describe(const PeerId& peer) const {
   const std::lock_guard lock(mutex_);
   return describe_held(peer);
@@ -171,6 +215,20 @@ std::map<PeerId, std::string> Neighbours::find_missing_deadlines() const {
   std::map<PeerId, std::string> found;
   for (const auto& [endpoint, text] : missing_deadlines_) found.emplace(endpoint.first, text);
   return found;
+}
+
+std::map<PeerId, std::set<std::string>> Neighbours::find_writers_of_servers() const {
+  const std::lock_guard lock(mutex_);
+  std::map<PeerId, std::set<std::string>> found;
+  for (const auto& [endpoint, facts] : endpoints_)
+    for (const char* topic :
+         {Topic<States>::kName, Topic<SimStatus>::kName, Topic<RecordBatch>::kName})
+      if (facts.is_writer && facts.topic == topic) found[endpoint.first].insert(topic);
+  return found;
+}
+
+std::string describe_name(const std::string& name) {
+  return name.empty() ? "a participant without a name" : "'" + config::to_printable(name) + "'";
 }
 
 }  // namespace sls::bus

@@ -21,9 +21,14 @@ namespace sls::bus {
 /// refusals.hpp and neighbours.hpp.
 class ParticipantListener : public eprosima::fastdds::dds::DomainParticipantListener {
  public:
-  /// `is_secured`: true if this participant uses DDS Security.
-  explicit ParticipantListener(bool is_secured, Neighbours* neighbours = nullptr)
-      : is_secured_(is_secured), neighbours_(neighbours) {}
+  /// `is_secured`: true if this participant uses DDS Security; `has_plain_submessages`: and if its
+  /// keys do not protect submessages, so that other vendors' readers get nothing (README.md, trap
+  /// 28).
+  explicit ParticipantListener(bool is_secured, Neighbours* neighbours = nullptr,
+                               bool has_plain_submessages = false)
+      : is_secured_(is_secured),
+        has_plain_submessages_(has_plain_submessages),
+        neighbours_(neighbours) {}
 
   void on_participant_discovery(
       eprosima::fastdds::dds::DomainParticipant*,
@@ -38,7 +43,7 @@ class ParticipantListener : public eprosima::fastdds::dds::DomainParticipantList
     }
     if (neighbours_)
       neighbours_->note_participant(peer, info.info.m_participantName.to_string(),
-                                    find_address(info.info));
+                                    find_address(info.info), find_obstacle(info.info));
     if (info.status != Info::DISCOVERED_PARTICIPANT) return;
     const auto& token = info.info.identity_token_;
     const bool is_other_secured = !token.class_id().empty();
@@ -93,8 +98,19 @@ class ParticipantListener : public eprosima::fastdds::dds::DomainParticipantList
   /// announces.
   static std::string describe(const eprosima::fastrtps::rtps::ParticipantProxyData& participant) {
     const std::string address = find_address(participant);
-    return "'" + config::to_printable(participant.m_participantName.to_string()) + "' (" + address +
+    return describe_name(participant.m_participantName.to_string()) + " (" + address +
            (address.empty() ? "" : ", ") + to_text(participant.m_guid.guidPrefix) + ")";
+  }
+
+  /// Why it gets no samples of ours although both are authorised; empty if there is no reason.
+  std::string find_obstacle(
+      const eprosima::fastrtps::rtps::ParticipantProxyData& participant) const {
+    const bool is_of_other_vendor =
+        participant.m_VendorId != eprosima::fastrtps::rtps::c_VendorId_eProsima;
+    return has_plain_submessages_ && is_of_other_vendor
+               ? "another vendor's DDS: expected keys of ./sls keys DIR --other-vendors, got keys "
+                 "without it"
+               : "";
   }
 
   /// The first IPv4 address at which it receives discovery data; empty if it has none.
@@ -119,6 +135,7 @@ class ParticipantListener : public eprosima::fastdds::dds::DomainParticipantList
   }
 
   const bool is_secured_;
+  const bool has_plain_submessages_;
   Neighbours* const neighbours_;
 };
 

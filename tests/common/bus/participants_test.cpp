@@ -50,6 +50,21 @@ bool knows(const ServerDirectory& directory, std::uint64_t run_id) {
                      [&](const Run& run) { return run.parameters.run_id() == run_id; });
 }
 
+TEST(ParticipantDirectoryTest, ReplacesTheNameOfDiscoveryByTheAnnouncedOne) {
+  Node node(kQosFile, own_domain(), "directory");
+  const ParticipantDirectory directory(node);
+  Node other(kQosFile, own_domain(), "");
+  Writer<Participant> writer(other);
+  ASSERT_TRUE(wait_until([&] { return !directory.writers().empty(); }));
+  node.note_problem(other.id(), "key", "is wrong");
+  EXPECT_EQ(node.problems().describe(), "a participant without a name (127.0.0.1): is wrong");
+  writer.write(make_announcement(ROLE_CONTROLLER, 0, "pilot"));
+  EXPECT_TRUE(wait_until([&] {
+    return node.problems().describe() == "'pilot' (127.0.0.1): is wrong";
+  })) << node.problems().describe();
+  EXPECT_EQ(node.describe(other.id()), "'pilot' (127.0.0.1)");
+}
+
 TEST(ParticipantDirectoryTest, ListsTheParticipantsOfARunUntilTheyLeave) {
   Node node(kQosFile, own_domain(), "directory");
   const ParticipantDirectory directory(node);
@@ -193,6 +208,7 @@ TEST(ServerDirectoryTest, OnlyTheFirstServerOfARunCounts) {
   const ServerDirectory directory(node, [&](const SimStatus& status) {
     if (status.run_id() == kRun && status.phase() == PHASE_FINISHED) ++forged;
   });
+  const auto problem = [&] { return node.problems().describe(); };
   Node server(kQosFile, own_domain(), "server"), stranger(kQosFile, own_domain(), "stranger");
   Writer<Parameters> parameters(server), strangers_parameters(stranger);
   Writer<SimStatus> status(server), strangers_status(stranger);
@@ -200,17 +216,63 @@ TEST(ServerDirectoryTest, OnlyTheFirstServerOfARunCounts) {
   status.write(make_status(kRun, PHASE_RUNNING));
   ASSERT_TRUE(wait_until([&] { return directory.find_status(kRun).has_value(); }));
 
+  strangers_status.write(make_status(kRun, PHASE_FINISHED));
+  ASSERT_TRUE(wait_until([&] { return !problem().empty(); }));
+  EXPECT_EQ(problem(),
+            "'stranger' (127.0.0.1): sls/status run_id: expected that of a run of its own, got "
+            "00000000000001f4, a run of 'server' (127.0.0.1); its samples are ignored");
+  EXPECT_EQ(forged, 0);
   strangers_parameters.write(make_parameters(kRun, {kVehicle}));
   strangers_parameters.write(make_parameters(kLowerRun, {kVehicle}));
   strangers_parameters.write(make_parameters(kRun, {kVehicle}));
-  strangers_status.write(make_status(kRun, PHASE_FINISHED));
-  ASSERT_TRUE(wait_until([&] { return forged == 1; }));
+  ASSERT_TRUE(wait_until([&] { return !directory.may_fly(kLowerRun, kVehicle + 1); }));
+  ASSERT_TRUE(wait_until([&] { return directory.runs().size() == 1; }));
   EXPECT_EQ(directory.find_status(kRun)->phase(), PHASE_RUNNING);
   EXPECT_TRUE(directory.is_known(kRun));
   EXPECT_FALSE(directory.is_known(kRun + 1));
-  const auto runs = directory.runs();
-  ASSERT_EQ(runs.size(), 1u);
-  EXPECT_EQ(runs.front().server, server.id());
+  EXPECT_EQ(directory.runs().front().server, server.id());
+}
+
+TEST(ServerDirectoryTest, AStatusThatComesBeforeTheClaimOfItsServerIsReportedOnceThatComes) {
+  Node node(kQosFile, own_domain(), "directory");
+  std::atomic<int> statuses{0};
+  const ServerDirectory directory(node, [&](const SimStatus&) { ++statuses; });
+  Node server(kQosFile, own_domain(), "server"), stranger(kQosFile, own_domain(), "stranger");
+  Writer<SimStatus> strangers_status(stranger);
+  strangers_status.write(make_status(kRun, PHASE_FINISHED));
+  ASSERT_TRUE(wait_until([&] { return statuses == 1; }));
+  EXPECT_EQ(node.problems().describe(), "");
+  Writer<Parameters> parameters(server);
+  parameters.write(make_parameters(kRun, {kVehicle}));
+  ASSERT_TRUE(wait_until([&] { return !node.problems().describe().empty(); }));
+  EXPECT_EQ(directory.find_status(kRun), std::nullopt);
+}
+
+TEST(ServerDirectoryTest, AWriterOfStatesWithoutAClaimIsAnImpostor) {
+  Node node(kQosFile, own_domain(), "directory");
+  ServerDirectory directory(node);
+  Node server(kQosFile, own_domain(), "server"), stranger(kQosFile, own_domain(), "stranger");
+  Writer<Parameters> parameters(server);
+  Writer<States> states(server), strangers_states(stranger);
+  Writer<RecordBatch> strangers_batches(stranger);
+  parameters.write(make_parameters(kRun, {kVehicle}));
+  const auto began = std::chrono::steady_clock::now();
+  ASSERT_TRUE(wait_until([&] {
+    directory.look_for_impostors();
+    return !node.problems().describe().empty();
+  }));
+  EXPECT_GE(std::chrono::steady_clock::now() - began, std::chrono::milliseconds(900));
+  const std::string expected =
+      "'stranger' (127.0.0.1): writes sls/record, sls/state: expected a claim in sls/parameters, "
+      "got none; its samples are ignored";
+  EXPECT_EQ(node.problems().describe(), expected);
+
+  Writer<Parameters> strangers_parameters(stranger);
+  strangers_parameters.write(make_parameters(kLowerRun, {kVehicle + 1}));
+  EXPECT_TRUE(wait_until([&] {
+    directory.look_for_impostors();
+    return node.problems().describe().empty();
+  })) << node.problems().describe();
 }
 
 // A late joiner receives the history of each topic; either topic may come first.

@@ -4,6 +4,8 @@
 
 #include <functional>
 
+#include "common/bus/topics.hpp"
+
 namespace sls::bus {
 namespace {
 
@@ -138,6 +140,97 @@ TEST_F(NeighboursTest, TopicsOfOthersAndOurOwnEndpointsDoNotCount) {
   neighbours_.note_endpoint(make_peer(1), kFirst, make_endpoint("other", "Wrong", true));
   neighbours_.note_endpoint(make_peer(9), kFirst, make_endpoint("sls/command", "Wrong", true));
   EXPECT_EQ(problems_.describe(), "");
+}
+
+TEST_F(NeighboursTest, TopicsThatResembleOursAreNamedWithTheOneThatIsMeant) {
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {"sls/commands", "sls/command"},
+      {"/sls/command", "sls/command"},
+      {"sls_command", "sls/command"},
+      {"SLS/Command", "sls/command"},
+      {"sls/comand", "sls/command"},
+      {"sls/states", "sls/state"},
+      {"sls/control-reply", "sls/control_reply"},
+      {"slscommand", "sls/command"},
+      {"command", "sls/command"}};
+  for (const auto& [topic, meant] : cases) {
+    neighbours_.note_endpoint(make_peer(1), kFirst, make_endpoint(topic, "sls::Commands", true));
+    EXPECT_EQ(problems_.describe(), topic + " of 'foo' (10.0.0.2): expected topic " + meant);
+    neighbours_.drop_endpoint(make_peer(1), kFirst);
+    EXPECT_EQ(problems_.describe(), "");
+  }
+}
+
+TEST_F(NeighboursTest, TheNamesOfRos2AreReportedOncePerParticipant) {
+  neighbours_.note_endpoint(make_peer(1), kFirst,
+                            make_endpoint("rt/sls/state", "sls::msg::dds_::States_", false));
+  neighbours_.note_endpoint(make_peer(1), kSecond,
+                            make_endpoint("rt/sls/command", "sls::msg::dds_::Commands_", true));
+  EXPECT_EQ(problems_.describe(),
+            "rt/sls/state for 'foo' (10.0.0.2): expected topic sls/state (without the prefix of "
+            "ROS 2)");
+  EXPECT_EQ(neighbours_.find_misfits(), std::set<PeerId>{make_peer(1)});
+}
+
+/// Topics of other applications, of sls_view --ros, of the doctor, and of a user beside ours.
+TEST_F(NeighboursTest, TopicsThatMeanSomethingElseAreNoMistake) {
+  for (const char* topic :
+       {"rt/tf", "rt/sls/vehicle_0/load/pose", "rt/sls/vehicle_0/markers", "ros_discovery_info",
+        "rt/command", "command", "state", "rt/robot/state", "status", "sls/doctor", "sls/wind"})
+    neighbours_.note_endpoint(make_peer(1), kFirst, make_endpoint(topic, "other::Type", true));
+  EXPECT_EQ(problems_.describe(), "");
+  for (const char* topic : kTopicNames)
+    EXPECT_FALSE(find_meant_topic(make_endpoint(topic, "sls::Type", true))) << topic;
+}
+
+TEST_F(NeighboursTest, TheNameThatAParticipantAnnouncesReplacesThatOfDiscovery) {
+  neighbours_.note_participant(make_peer(1), "", "10.0.0.2");
+  judge([](auto& facts) { facts.is_exclusive = true; });
+  const std::string mistake = ": OWNERSHIP: offered exclusive, asked shared";
+  EXPECT_EQ(problems_.describe(),
+            "sls/command of a participant without a name (10.0.0.2)" + mistake);
+  neighbours_.note_announced_name(make_peer(1), "");
+  neighbours_.note_announced_name(make_peer(1), "bar");
+  EXPECT_EQ(problems_.describe(), "sls/command of 'bar' (10.0.0.2)" + mistake);
+  neighbours_.note_problem(make_peer(1), "key", "text");
+  EXPECT_EQ(problems_.describe(),
+            "sls/command of 'bar' (10.0.0.2)" + mistake + "; 'bar' (10.0.0.2): text");
+  neighbours_.note_participant(make_peer(1), "entity", "10.0.0.2");  // discovered again
+  EXPECT_EQ(neighbours_.describe(make_peer(1)), "'bar' (10.0.0.2)");
+}
+
+TEST_F(NeighboursTest, AMissingDeadlineIsOfTheAnnouncedName) {
+  EndpointFacts own = own_;
+  own.deadline = 100ms;
+  neighbours_.add_own(own);
+  judge([](auto&) {});
+  problems_.begin("run 010101010101010101010101 deadline",  // as the server reports it
+                  neighbours_.find_missing_deadlines().at(make_peer(1)));
+  neighbours_.note_announced_name(make_peer(1), "bar");
+  const std::string expected =
+      "sls/command of 'bar' (10.0.0.2): DEADLINE: offered none, asked 0.1 s";
+  EXPECT_EQ(neighbours_.find_missing_deadlines().at(make_peer(1)), expected);
+  EXPECT_EQ(problems_.describe(), expected);
+}
+
+TEST_F(NeighboursTest, WritersOfWhatServersWriteAreFound) {
+  neighbours_.note_endpoint(make_peer(1), kFirst, make_endpoint("sls/state", "sls::States", true));
+  neighbours_.note_endpoint(make_peer(1), kSecond,
+                            make_endpoint("sls/status", "sls::SimStatus", true));
+  neighbours_.note_endpoint(make_peer(2), kFirst,
+                            make_endpoint("sls/record", "sls::RecordBatch", false));
+  const std::map<PeerId, std::set<std::string>> expected = {
+      {make_peer(1), {"sls/state", "sls/status"}}};
+  EXPECT_EQ(neighbours_.find_writers_of_servers(), expected);
+}
+
+TEST_F(NeighboursTest, AnObstacleIsNamedOnceTheParticipantHasEndpointsOfOurs) {
+  neighbours_.note_participant(make_peer(2), "bar", "", "another vendor's DDS");
+  EXPECT_EQ(problems_.describe(), "");
+  neighbours_.note_endpoint(make_peer(2), kFirst, make_endpoint("other", "Type", true));
+  EXPECT_EQ(problems_.describe(), "");
+  neighbours_.note_endpoint(make_peer(2), kFirst, own_);
+  EXPECT_EQ(problems_.describe(), "'bar': another vendor's DDS");
 }
 
 TEST_F(NeighboursTest, AMissingDeadlineIsForTheServerToJudge) {
