@@ -166,7 +166,10 @@ Verdict CommandGate::judge(const OfferedAnswer& answer, const bus::PeerId& sende
   client->silent = false;
   client->misses = 0;
   if (!is_refused(*client)) client->refusal.clear();  // of an earlier step
-  if (accepted_) return Verdict::kSuperseded;
+  if (accepted_) {
+    superseded_by_ = accepted_from_;
+    return Verdict::kSuperseded;
+  }
   client->held = answer;
   settle();
   return accepted_ && accepted_from_ == sender ? Verdict::kAccepted : Verdict::kHeld;
@@ -195,7 +198,10 @@ Verdict CommandGate::judge_past(const OfferedAnswer& answer, const bus::PeerId& 
     return first->force == force ? Verdict::kDuplicate : Verdict::kContradiction;
   Client* client = find_client(sender);
   if (!client) return Verdict::kWrongStep;
-  if (first) return Verdict::kSuperseded;
+  if (first) {
+    superseded_by_ = first->sender;
+    return Verdict::kSuperseded;
+  }
   client->refusal.clear();
   first = Past{sender, force};
   return Verdict::kLate;

@@ -85,6 +85,9 @@ class CommandGate {
   };
   const std::optional<TakeOver>& take_over() const { return take_over_; }
 
+  /// After the verdict kSuperseded: the client whose answer to that step was taken.
+  const bus::PeerId& superseded_by() const { return superseded_by_; }
+
   /// Counts a miss: the awaited client did not answer the awaited step. Returns its misses in a
   /// row.
   int count_miss();
@@ -138,6 +141,7 @@ class CommandGate {
   bus::PeerId accepted_from_;
   std::optional<ReadyClient> flyer_;  // sender of the last accepted answer
   std::optional<TakeOver> take_over_;
+  bus::PeerId superseded_by_;
   struct Past {
     bus::PeerId sender;
     std::array<double, 3> force;

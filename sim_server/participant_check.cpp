@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <tuple>
 #include <utility>
 
 #include "common/bus/convert.hpp"
@@ -49,6 +50,13 @@ std::string make_key(const bus::PeerId& peer, const std::string& what) {
 bool flies_any(const Participant& controller, const std::vector<std::uint32_t>& ids) {
   return std::any_of(ids.begin(), ids.end(),
                      [&](std::uint32_t id) { return bus::flies_vehicle(controller, id); });
+}
+
+/// True if nothing but chance decides which of the two flies a vehicle.
+bool are_alike(const Participant& a, const Participant& b) {
+  const auto& ids = a.vehicle_ids();
+  return a.name() == b.name() && a.strength() == b.strength() &&
+         flies_any(b, {ids.begin(), ids.end()});
 }
 
 bool has_this_contract(const Participant& participant) {
@@ -307,6 +315,7 @@ ParticipantCheck::Findings ParticipantCheck::look(const Neighbourhood& neighbour
     announced[entry.peer] = &entry;
     look_at(entry, neighbourhood, findings);
   }
+  look_for_twins(neighbourhood, findings);
   look_at_strangers(neighbourhood, announced, findings);
   look_at_answers(neighbourhood, announced, findings);
   for (auto it = pending_.begin(); it != pending_.end();)
@@ -368,6 +377,41 @@ std::optional<std::string> ParticipantCheck::find_wrong_vehicles(
   std::sort(wrong.begin(), wrong.end());
   wrong.erase(std::unique(wrong.begin(), wrong.end()), wrong.end());
   return config::to_vehicle_ranges(wrong);
+}
+
+/// A client that was killed stays listed until its lease ends, and one that replaces it under the
+/// same name is no mistake. So the earlier of two twins must have announced itself since the later
+/// one was ready, or both must have answered a step.
+void ParticipantCheck::look_for_twins(const Neighbourhood& neighbourhood, Findings& findings) {
+  const auto now = neighbourhood.now;
+  if (superseded_) rivals_[*superseded_] = now;
+  superseded_.reset();
+  for (auto it = rivals_.begin(); it != rivals_.end();)
+    it = now - it->second <= kMemory ? std::next(it) : rivals_.erase(it);
+  const auto are_rivals = [&](const Entry& earlier, const Entry& later) {
+    return rivals_.count({earlier.peer, later.peer}) > 0 ||
+           rivals_.count({later.peer, earlier.peer}) > 0 ||
+           (earlier.heard >= later.ready_since && now - earlier.heard <= bus::kPresumedDeadAfter);
+  };
+  for (const Entry& later : neighbourhood.participants)
+    for (const Entry& earlier : neighbourhood.participants) {
+      const bool is_later =
+          std::tie(later.ready_since, later.peer) > std::tie(earlier.ready_since, earlier.peer);
+      if (!is_later || !flies(later.announcement) || !flies(earlier.announcement) ||
+          !are_alike(earlier.announcement, later.announcement) || !are_rivals(earlier, later))
+        continue;
+      findings[make_key(later.peer, "twin")] = fmt::format(
+          "{}: sls/participant name and strength: expected others than those of {}, got the same: "
+          "which of the two flies is arbitrary",
+          describe(later), describe(earlier));
+    }
+}
+
+/// True if the controller is ready to fly in this run.
+bool ParticipantCheck::flies(const Participant& controller) const {
+  return controller.role() == ROLE_CONTROLLER && controller.run_id() == run_id_ &&
+         controller.ready() && !controller.done() && has_this_contract(controller) &&
+         controller.scenario_sha256() == scenario_sha256_;
 }
 
 void ParticipantCheck::look_at_strangers(const Neighbourhood& neighbourhood,

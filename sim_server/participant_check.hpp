@@ -68,6 +68,10 @@ class ParticipantCheck {
   /// at that step.
   void note_taken(const OfferedAnswer& answer, const bus::PeerId& sender, Verdict verdict,
                   const ControllerState& returned, const model::Measurement& state);
+  /// Answers of both clients to one step arrived; that of `winner` was taken.
+  void note_superseded(const bus::PeerId& loser, const bus::PeerId& winner) {
+    superseded_.emplace(loser, winner);
+  }
   /// The answer of `sender` was rejected while `step` was in work.
   void note_rejected(const OfferedAnswer& answer, const bus::PeerId& sender, Verdict verdict,
                      std::uint64_t step);
@@ -136,6 +140,9 @@ class ParticipantCheck {
   bool may_fly_for_us(const Participant& controller, const Neighbourhood& neighbourhood) const;
   std::optional<std::string> find_wrong_vehicles(const Participant& announcement,
                                                  const Neighbourhood& neighbourhood) const;
+  /// Reports clients of one name and strength that fly the same vehicle.
+  void look_for_twins(const Neighbourhood& neighbourhood, Findings& findings);
+  bool flies(const Participant& controller) const;
   void look_at_strangers(const Neighbourhood& neighbourhood, const Senders& announced,
                          Findings& findings);
   void look_at_answers(const Neighbourhood& neighbourhood, const Senders& announced,
@@ -152,6 +159,9 @@ class ParticipantCheck {
   std::map<bus::PeerId, std::string> refused_libraries_;  // of clients that are not admitted
   std::map<bus::PeerId, Rejections> rejections_;
   std::map<std::pair<bus::PeerId, std::string>, Seen> seen_;
+  using Pair = std::pair<bus::PeerId, bus::PeerId>;
+  std::optional<Pair> superseded_;                    // since the last look
+  std::map<Pair, Clock::time_point> rivals_;          // pairs that answered the same step; when
   std::map<std::string, Clock::time_point> pending_;  // start of each problem
   std::set<std::string> pending_now_;
   std::optional<Clock::time_point> next_due_;

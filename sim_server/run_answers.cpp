@@ -52,6 +52,8 @@ void Run::judge(const Commands& sample, const bus::PeerId& sender, bool is_early
     const char* defect = to_string(verdict);
     if (*defect == '\0') {
       check_.note_taken(offered_, sender, verdict, vehicle->returned(), vehicle->state());
+      if (verdict == Verdict::kSuperseded)
+        check_.note_superseded(sender, vehicle->gate.superseded_by());
     } else {
       check_.note_rejected(offered_, sender, verdict, board_.step);
       spdlog::debug("command for step {} of vehicle {} from '{}' rejected: {}", offered_.step,

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <functional>
 
 namespace sls::sim {
 namespace {
@@ -174,6 +175,57 @@ TEST_F(ParticipantCheckTest, NamesAreShownPrintable) {
   const auto found = look(1s);
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].find_first_of("\n\x1b"), std::string::npos) << found[0];
+}
+
+TEST_F(ParticipantCheckTest, TwoClientsOfOneNameAndStrengthAreNamed) {
+  auto first = make_entry(1), second = make_entry(2);
+  second.announcement.host("desk");
+  second.announcement.vehicle_ids({1});
+  const auto later = ParticipantCheck::Clock::time_point(1h + 500ms);
+  first.heard = later;
+  second.heard = second.ready_since = later - 400ms;
+  neighbourhood_.participants = {second, first};
+  EXPECT_EQ(look(600ms),
+            only("controller 'foo' on desk: sls/participant name and strength: expected others "
+                 "than those of controller 'foo' on box, got the same: which of the two flies is "
+                 "arbitrary"));
+  EXPECT_TRUE(look(3s).empty()) << "the first one is silent";
+
+  const auto expect_none = [&](const std::function<void(Participant&)>& change) {
+    auto other = second;
+    change(other.announcement);
+    neighbourhood_.participants = {first, other};
+    EXPECT_TRUE(look(600ms).empty());
+  };
+  expect_none([](Participant& other) { other.name("bar"); });
+  expect_none([](Participant& other) { other.strength(1); });
+  expect_none([](Participant& other) {
+    other.vehicle_ids({2});
+    other.run_id(0xcd);
+  });
+  expect_none([](Participant& other) { other.ready(false); });
+  expect_none([](Participant& other) { other.done(true); });
+}
+
+/// It stays listed until its lease ends.
+TEST_F(ParticipantCheckTest, AClientThatReplacesAKilledOneOfTheSameNameIsNoMistake) {
+  auto killed = make_entry(1), next = make_entry(2);
+  killed.heard = ParticipantCheck::Clock::time_point(1h);
+  next.heard = next.ready_since = killed.heard + 100ms;
+  neighbourhood_.participants = {killed, next};
+  for (const auto time : {100ms, 600ms, 1100ms, 5000ms}) EXPECT_TRUE(look(time).empty());
+}
+
+/// They may announce themselves only once.
+TEST_F(ParticipantCheckTest, TwoClientsOfOneNameThatAnswerTheSameStepAreNamed) {
+  auto first = make_entry(1), second = make_entry(2);
+  second.ready_since = first.ready_since + 1h;
+  neighbourhood_.participants = {first, second};
+  EXPECT_TRUE(look().empty());
+  check_.note_superseded(make_peer(1), make_peer(2));
+  EXPECT_EQ(look(100ms).size(), 1u);
+  EXPECT_EQ(look(2s).size(), 1u);
+  EXPECT_TRUE(look(2200ms).empty());
 }
 
 // --- strangers -----------------------------------------------------------------------------------
