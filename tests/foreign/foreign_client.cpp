@@ -114,7 +114,8 @@ class ForeignClient {
     if (is_visible_by_itself()) say_that_it_begins();
     while (app::stop_signal() == 0) {
       look_for_run();
-      if (parameters_) fly();
+      if (parameters_ && makes("impostor")) play_the_server();
+      if (parameters_ && state_reader_) fly();
       std::this_thread::sleep_for(1ms);
     }
   }
@@ -126,7 +127,8 @@ class ForeignClient {
     for (const char* mistake :
          {"volatile_announcement", "best_effort_announcement", "exclusive_command",
           "state_deadline", "other_type", "keyed_command", "no_deadline", "contract_1",
-          "contract_1_state", "record_deadline", "unannounced", "unannounced_writer"})
+          "contract_1_state", "record_deadline", "unannounced", "unannounced_writer",
+          "similar_topic", "ros_topic", "states_without_claim"})
       if (makes(mistake)) return true;
     return false;
   }
@@ -188,11 +190,23 @@ class ForeignClient {
       create_reader(create_topic<RecordBatchPubSubType>("sls/record"), true);
       return;
     }
+    if (makes("impostor") || makes("states_without_claim")) {
+      create_writers_of_a_server();
+      return;
+    }
     if (!makes("unannounced")) create_announcement_writer();
     create_command_writer();
     parameters_reader_ = create_reader(create_topic<ParametersPubSubType>("sls/parameters"), true);
     status_reader_ = create_reader(create_topic<SimStatusPubSubType>("sls/status"), true);
     state_reader_ = create_reader(create_topic<StatesPubSubType>("sls/state"), false);
+  }
+
+  void create_writers_of_a_server() {
+    states_writer_ = publisher_->create_datawriter(create_topic<StatesPubSubType>("sls/state"),
+                                                   make_writer_qos());
+    auto* status_topic = create_topic<SimStatusPubSubType>("sls/status");
+    status_writer_ = publisher_->create_datawriter(status_topic, make_writer_qos());
+    parameters_reader_ = create_reader(create_topic<ParametersPubSubType>("sls/parameters"), true);
   }
 
   void create_announcement_writer() {
@@ -215,8 +229,10 @@ class ForeignClient {
                       : makes("retyped_field") ? Edit{12, -4}
                                                : Edit{};
     command_writer_ = publisher_->create_datawriter(
-        create_topic<CommandsPubSubType>("sls/command", edit,
-                                         makes("other_type") ? "mine::Commands" : "",
+        create_topic<CommandsPubSubType>(makes("similar_topic") ? "sls/commands"
+                                         : makes("ros_topic")   ? "rt/sls/command"
+                                                                : "sls/command",
+                                         edit, makes("other_type") ? "mine::Commands" : "",
                                          makes("keyed_command")),
         qos);
   }
@@ -238,8 +254,23 @@ class ForeignClient {
     }
   }
 
+  /// Says that the run of the server has failed, and sends a state of it.
+  void play_the_server() {
+    if (has_begun_) return;
+    SimStatus status;
+    status.run_id(parameters_->run_id());
+    status.sample_index(1'000'000);
+    status.phase(PHASE_FAILED);
+    status.reason("forged");
+    status_writer_->write(&status);
+    states_.run_id(parameters_->run_id());
+    states_.vehicles().resize(1);
+    states_writer_->write(&states_);
+    say_that_it_begins();
+  }
+
   void announce() {
-    if (makes("unannounced") || makes("unannounced_writer")) return;
+    if (!participant_writer_ || makes("unannounced") || makes("unannounced_writer")) return;
     Participant message;
     message.run_id(makes("zero_run_id")    ? 0
                    : makes("other_run_id") ? 0x1234
@@ -329,6 +360,8 @@ class ForeignClient {
   dds::Subscriber* subscriber_ = nullptr;
   dds::DataWriter* participant_writer_ = nullptr;
   dds::DataWriter* command_writer_ = nullptr;
+  dds::DataWriter* states_writer_ = nullptr;
+  dds::DataWriter* status_writer_ = nullptr;
   dds::DataReader* parameters_reader_ = nullptr;
   dds::DataReader* status_reader_ = nullptr;
   dds::DataReader* state_reader_ = nullptr;

@@ -255,6 +255,12 @@ INSTANTIATE_TEST_SUITE_P(
         EndpointMistake{"keyed_command",
                         "sls/command of 'foreign' (127.0.0.1): key: expected none, got a keyed "
                         "type"},
+        EndpointMistake{"similar_topic",
+                        "sls/commands of 'foreign' (127.0.0.1): expected topic sls/command", true},
+        EndpointMistake{"ros_topic",
+                        "rt/sls/command of 'foreign' (127.0.0.1): expected topic sls/command "
+                        "(without the prefix of ROS 2)",
+                        true},
         EndpointMistake{"contract_1",
                         "sls/reference of 'foreign' (127.0.0.1): expected contract 2, got contract "
                         "1 (it was built from an older sls.idl)",
@@ -264,6 +270,32 @@ INSTANTIATE_TEST_SUITE_P(
                         "(it was built from an older sls.idl)",
                         true}),
     [](const auto& mistake) { return std::string(mistake.param.name); });
+
+TEST_F(ForeignTest, StatesWithoutAClaim) {
+  start();
+  const auto client = start_foreign({"--mistake", "states_without_claim"});
+  expect_server_line(
+      "'foreign' (127.0.0.1): writes sls/state, sls/status: expected a claim in sls/parameters, "
+      "got none; its samples are ignored");
+}
+
+/// It says that the run has failed. Server and client name it and fly on.
+TEST_F(ForeignTest, StatusAndStatesOfAnotherServersRun) {
+  start();
+  const auto client = start_program("control_client", {"--scenario", scenario_});
+  ASSERT_TRUE(wait_until([&] { return has(*client, "joins run"); })) << client->output();
+  const auto impostor = start_foreign({"--mistake", "impostor"});
+  const auto line = [this](const char* topic, const char* owner) {
+    return std::string("'foreign' (127.0.0.1): ") + topic +
+           " run_id: expected that of a run of its own, got " + run_id() + ", a run of " + owner +
+           "; its samples are ignored";
+  };
+  expect_server_line(line("sls/status", "this server"));
+  expect_line("control_client", *client,
+              {line("sls/status", "'sim_server' (127.0.0.1)"),
+               line("sls/state", "'sim_server' (127.0.0.1)")});
+  EXPECT_TRUE(server->is_running() && client->is_running()) << outputs() << client->output();
+}
 
 TEST_F(ForeignTest, NoDeadlineInRealTime) {
   start({"--mode", "realtime"});
