@@ -259,25 +259,55 @@ TEST_F(InteropTest, ALateCycloneRecorderGetsTheMissedSamples) {
   expect_same_rows(*late_recorder, rows_, recording_, kLongSteps);
 }
 
+/// On a secured domain.
+class SecuredInteropTest : public InteropTest {
+ protected:
+  void SetUp() override {
+    InteropTest::SetUp();
+    if (!IsSkipped() && !std::filesystem::exists(SLS_CYCLONE_PLUGINS "/libdds_security_crypto.so"))
+      GTEST_SKIP() << "expected Cyclone's security plugins in " SLS_CYCLONE_PLUGINS;
+  }
+  void make_keys(const Words& flags) const {
+    Process process(Words{SLS_SOURCE_DIR "/sls", "keys", keys_} + flags);
+    ASSERT_EQ(process.wait(), 0) << process.output();
+  }
+  Process start_secured(const std::string& name, const Words& flags) const {
+    return Process(with_keys_ + make_command(name, domain_.number(), flags, qos("secure")));
+  }
+  Process start_secured_cyclone() const {
+    return Process(with_keys_ +
+                   Words{"SLS_IDENTITY=controller", "SLS_CYCLONE_PLUGINS=" SLS_CYCLONE_PLUGINS,
+                         "CYCLONEDDS_URI=file://" SLS_SOURCE_DIR
+                         "/tests/interop/cyclone_secure.xml",
+                         SLS_INTEROP_DIR "/cyclone_controller", "--domain", domain_.text()});
+  }
+
+  const std::string keys_ = folder_ / "keys";
+  const Words with_keys_ = {"env", "SLS_KEYS=" + keys_};
+};
+
 /// The keys must protect submessages: otherwise Fast DDS sends no samples to a Cyclone DDS reader.
-TEST_F(InteropTest, ACycloneControllerFliesOnASecuredDomainWithKeysForOtherVendors) {
-  if (!std::filesystem::exists(SLS_CYCLONE_PLUGINS "/libdds_security_crypto.so"))
-    GTEST_SKIP() << "expected Cyclone's security plugins in " SLS_CYCLONE_PLUGINS;
-  const std::string keys = folder_ / "keys";
-  Process make_keys({SLS_SOURCE_DIR "/sls", "keys", keys, "--other-vendors"});
-  ASSERT_EQ(make_keys.wait(), 0) << make_keys.output();
-  const Words with_keys = {"env", "SLS_KEYS=" + keys};
-  const auto secured = [&](const std::string& name, const Words& flags) {
-    return Process(with_keys + make_command(name, domain_.number(), flags, qos("secure")));
-  };
-  Process recorder = secured("recorder", {"--out", recording_});
-  Process server = secured("sim_server", {"--scenario", quick_});
-  Process controller(
-      with_keys + Words{"SLS_IDENTITY=controller", "SLS_CYCLONE_PLUGINS=" SLS_CYCLONE_PLUGINS,
-                        "CYCLONEDDS_URI=file://" SLS_SOURCE_DIR "/tests/interop/cyclone_secure.xml",
-                        SLS_INTEROP_DIR "/cyclone_controller", "--domain", domain_.text()});
+TEST_F(SecuredInteropTest, ACycloneControllerFliesWithKeysForOtherVendors) {
+  make_keys({"--other-vendors"});
+  Process recorder = start_secured("recorder", {"--out", recording_});
+  Process server = start_secured("sim_server", {"--scenario", quick_});
+  Process controller = start_secured_cyclone();
   expect_success({&server, &controller, &recorder});
   EXPECT_TRUE(read_manifest(recording_).at("complete").get<bool>());
+  EXPECT_FALSE(holds(server.output(), "expected")) << server.output();  // no mistake
+}
+
+TEST_F(SecuredInteropTest, ACycloneControllerWithOtherKeysIsNamedWithTheReason) {
+  make_keys({});
+  Process server = start_secured("sim_server", {"--scenario", quick_});
+  Process controller = start_secured_cyclone();
+  EXPECT_TRUE(wait_until([&] {
+    return holds(server.output(),
+                 "): another vendor's DDS: expected keys of ./sls keys DIR --other-vendors, got "
+                 "keys without it\n");
+  })) << server.output();
+  EXPECT_TRUE(holds(server.output(), "warning: 'cyclone_controller' (")) << server.output();
+  EXPECT_FALSE(holds(server.output(), "expected an announcement")) << server.output();
 }
 
 /// Expects success with each program on its own host. The project's programs use `profile`.
