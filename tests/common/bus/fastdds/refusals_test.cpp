@@ -6,7 +6,9 @@
 
 #include <algorithm>
 #include <sstream>
+#include <utility>
 
+#include "common/bus/fastdds/participant_listener.hpp"
 #include "tests/support/waiting.hpp"
 
 namespace sls::bus {
@@ -76,6 +78,51 @@ TEST_F(RefusalsTest, AFloodOfThemIsFiveLines) {
     refusals_.note_refused(guid, "it has no identity");
   }
   EXPECT_EQ(lines(), static_cast<std::size_t>(Refusals::kMostLines));
+}
+
+/// Discovers a participant without a name, at an unknown address.
+void discover(ParticipantListener& listener, std::uint8_t number, const std::string& identity,
+              const eprosima::fastrtps::rtps::VendorId_t& vendor) {
+  using Info = eprosima::fastrtps::rtps::ParticipantDiscoveryInfo;
+  eprosima::fastrtps::rtps::ParticipantProxyData participant({});
+  participant.m_guid.guidPrefix.value[0] = number;
+  participant.m_VendorId = vendor;
+  participant.identity_token_.class_id(identity);
+  Info info(participant);
+  info.status = Info::DISCOVERED_PARTICIPANT;
+  listener.on_participant_discovery(nullptr, std::move(info));
+}
+
+constexpr eprosima::fastrtps::rtps::VendorId_t kFastDds = {1, 15}, kCyclone = {1, 16};
+
+TEST_F(RefusalsTest, AParticipantWithoutANameIsDescribedAsSuch) {
+  ParticipantListener listener(false);
+  discover(listener, 1, "DDS:Auth:PKI-DH", kFastDds);
+  EXPECT_EQ(said_.str(),
+            "refused a participant without a name (01.00.00.00.00.00.00.00.00.00.00.00): it is "
+            "secured, this is not (--qos config/qos/secure.xml)\n");
+}
+
+TEST_F(RefusalsTest, OnlyAnotherVendorsParticipantNeedsKeysThatProtectSubmessages) {
+  for (const bool has_plain_submessages : {false, true}) {
+    Problems problems;
+    Neighbours neighbours(problems);
+    ParticipantListener listener(true, &neighbours, has_plain_submessages);
+    discover(listener, 2, "", kFastDds);
+    discover(listener, 3, "", kCyclone);
+    for (const std::uint8_t number : {2, 3}) {
+      EndpointFacts facts;
+      facts.topic = "sls/command";
+      PeerId peer;
+      peer.bytes[0] = number;
+      neighbours.note_endpoint(peer, {}, facts);
+    }
+    EXPECT_EQ(problems.describe(),
+              has_plain_submessages
+                  ? "a participant without a name: another vendor's DDS: expected keys of ./sls "
+                    "keys DIR --other-vendors, got keys without it"
+                  : "");
+  }
 }
 
 }  // namespace
