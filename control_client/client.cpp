@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cctype>
-#include <limits>
 #include <thread>
 
 #include "common/app/run_main.hpp"
@@ -40,7 +39,7 @@ Client::Client(bus::Node& node, const config::Scenario& scenario,
           plugin::find_loaded_sha256(scenario.controller.law.find_library(scenario.folder))),
       vehicle_ids_(vehicle_ids),
       servers_(node),
-      participant_writer_(node),
+      announcer_(node),
       stream_(make_stream(scenario.sync.mode == config::SyncMode::kRealtime)) {
   answers_.client_name(options.name);
   answers_.strength(options.strength);
@@ -69,6 +68,7 @@ std::optional<bus::Run> Client::find_first_run() {
   while (!options_.is_stopped()) {
     servers_.look_for_impostors();
     if (auto run = find_joinable_run()) return run;
+    announcer_.repeat_if_due();
     if (wait.is_over())
       throw app::RunError(fmt::format("no server for vehicle {} within {} s{}{}", vehicles,
                                       timeout_s, describe_problem(), node_.describe_isolation()));
@@ -155,6 +155,7 @@ std::optional<bus::Run> Client::serve() {
       ready_ = true;
       announce(true, false);
     }
+    announcer_.repeat_if_due();
     std::this_thread::sleep_for(app::kPollTime);
   }
   return std::nullopt;
@@ -204,8 +205,8 @@ const ControlCommand& Client::answer(Pilot& pilot, std::uint64_t step, const Veh
 }
 
 void Client::rethrow_answer_error() {
-  const std::lock_guard lock(answer_mutex_);
-  if (answer_error_) std::rethrow_exception(answer_error_);
+  const std::unique_lock lock(answer_mutex_, std::try_to_lock);
+  if (lock && answer_error_) std::rethrow_exception(answer_error_);
 }
 
 bool Client::has_ended() const {
@@ -229,19 +230,14 @@ std::optional<bus::Run> Client::find_successor() {
   return std::nullopt;
 }
 
-void Client::announce_waiting() {
-  Participant message = make_announcement(vehicle_ids_);
-  message.last_complete_step(-1);
-  participant_writer_.write(message);
-}
+void Client::announce_waiting() { announcer_.announce(make_announcement(vehicle_ids_)); }
 
 void Client::announce(bool ready, bool done) {
   Participant message = make_announcement(flown_ids_);
   message.run_id(run_->parameters.run_id());
   message.ready(ready);
   message.done(done);
-  message.last_complete_step(find_last_step());
-  participant_writer_.write(message);
+  announcer_.announce(message);
 }
 
 Participant Client::make_announcement(const std::vector<std::uint32_t>& vehicle_ids) const {
@@ -254,16 +250,8 @@ Participant Client::make_announcement(const std::vector<std::uint32_t>& vehicle_
   message.strength(options_.strength);
   message.scenario_sha256(scenario_.sha256);
   message.library_sha256(library_sha256_);
+  message.last_complete_step(-1);
   return message;
-}
-
-/// The last step of which the states of all our vehicles were answered; −1: none.
-std::int64_t Client::find_last_step() {
-  const std::lock_guard lock(answer_mutex_);
-  std::int64_t last = std::numeric_limits<std::int64_t>::max();
-  for (const auto& [id, pilot] : pilots_)
-    last = std::min(last, pilot.last_step ? static_cast<std::int64_t>(*pilot.last_step) : -1);
-  return last;
 }
 
 }  // namespace sls::control

@@ -85,17 +85,18 @@ class Client {
   /// Reports that `sender`, which is not our server, has sent states of our run.
   void note_impostor(const bus::PeerId& sender);
   const ControlCommand& answer(Pilot& pilot, std::uint64_t step, const VehicleState& state);
+  /// Must not wait for `answer_mutex_`: a law may compute for long.
   void announce(bool ready, bool done);
   /// Announces this client while it waits for a server: each writer of sls/command announces
   /// itself.
   void announce_waiting();
   Participant make_announcement(const std::vector<std::uint32_t>& vehicle_ids) const;
-  std::int64_t find_last_step();
   /// True when the run has finished or failed.
   bool has_ended() const;
   /// The run that replaces ours, after a reset or with another server; empty if there is none.
   /// @throws app::RunError if the server is lost, or is replaced without `follows_servers`.
   std::optional<bus::Run> find_successor();
+  /// Tries again at the next call if an answer is being computed.
   void rethrow_answer_error();
 
   bus::Node& node_;
@@ -105,7 +106,7 @@ class Client {
   const std::vector<std::uint32_t> vehicle_ids_;
 
   bus::ServerDirectory servers_;
-  bus::Writer<Participant> participant_writer_;
+  bus::Announcer announcer_;
   std::optional<bus::Run> run_;
   std::optional<bus::ServerWatch> watch_;
   std::vector<std::uint32_t> flown_ids_;  // those of vehicle_ids_ that this run has

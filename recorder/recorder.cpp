@@ -20,11 +20,12 @@ constexpr double kJoinTimeout = 60;  // until a run must be found, s
 
 /// Calls `find` until it returns a run, a stop signal comes or `limit_s` is over.
 template <class Find>
-std::optional<bus::Run> wait_for_run(const bus::Node& node, const std::string& whom, double limit_s,
-                                     Find find) {
+std::optional<bus::Run> wait_for_run(const bus::Node& node, bus::Announcer& announcer,
+                                     const std::string& whom, double limit_s, Find find) {
   app::Wait wait(limit_s, app::kUsualJoinTime);
   while (app::stop_signal() == 0 && !wait.is_over()) {
     if (auto run = find()) return run;
+    announcer.repeat_if_due();
     if (wait.is_report_due())
       spdlog::info("waiting for: {} ({:.0f} s left){}", whom, wait.seconds_left(),
                    node.describe_isolation());
@@ -49,7 +50,7 @@ Recorder::Recorder(bus::Node& node, const RecorderOptions& options)
     : options_(options), node_(node), surroundings_(node, choose_vehicle(options)) {}
 
 void Recorder::run() {
-  surroundings_.participant_writer.write(make_announcement(nullptr, false, false, -1));
+  surroundings_.announcer.announce(make_announcement(nullptr, false, false, -1));
   auto run = wait_for_first_run();
   if (!run && app::stop_signal() == 0)
     throw app::RunError(fmt::format("{}: nothing recorded: no server within {} s{}",
@@ -60,22 +61,22 @@ void Recorder::run() {
     try {
       end = RunRecorder(surroundings_, *run, open_segment(*run)).run();
     } catch (...) {
-      surroundings_.participant_writer.wait_for_acknowledgments(1s);
+      surroundings_.announcer.wait_for_acknowledgments(1s);
       throw;
     }
     // Other programs wait for the last announcement of this recorder before they end, so it must
     // reach them.
-    surroundings_.participant_writer.wait_for_acknowledgments(1s);
+    surroundings_.announcer.wait_for_acknowledgments(1s);
     run = go_on_after(*run, end);
   }
 }
 
 // --- which run -----------------------------------------------------------------------------------
 
-std::optional<bus::Run> Recorder::wait_for_first_run() const {
+std::optional<bus::Run> Recorder::wait_for_first_run() {
   const std::string whom =
       options_.unfinished ? "server of run " + options_.unfinished->manifest().run_id : "server";
-  return wait_for_run(node_, whom, kJoinTimeout, [this] {
+  return wait_for_run(node_, surroundings_.announcer, whom, kJoinTimeout, [this] {
     const auto unfinished = find_unfinished_run();
     return unfinished ? unfinished : surroundings_.servers.find_joinable(surroundings_.vehicle);
   });
@@ -93,7 +94,7 @@ std::optional<bus::Run> Recorder::find_unfinished_run() const {
   return std::nullopt;
 }
 
-std::optional<bus::Run> Recorder::go_on_after(const bus::Run& run, const RunEnd& end) const {
+std::optional<bus::Run> Recorder::go_on_after(const bus::Run& run, const RunEnd& end) {
   const std::string place = options_.folder.string();
   if (end.is_complete) {
     spdlog::info("{}: complete, {} steps", place, end.last_step);
@@ -118,8 +119,9 @@ std::optional<bus::Run> Recorder::go_on_after(const bus::Run& run, const RunEnd&
   return next;
 }
 
-std::optional<bus::Run> Recorder::wait_for_next_run(const bus::Run& ended, double limit_s) const {
-  return wait_for_run(node_, "the run after the reset of run " + to_text(ended.parameters.run_id()),
+std::optional<bus::Run> Recorder::wait_for_next_run(const bus::Run& ended, double limit_s) {
+  return wait_for_run(node_, surroundings_.announcer,
+                      "the run after the reset of run " + to_text(ended.parameters.run_id()),
                       limit_s, [&] { return find_follower(ended); });
 }
 

@@ -26,11 +26,11 @@ class Recorder {
   void run();
 
  private:
-  std::optional<bus::Run> wait_for_first_run() const;
+  std::optional<bus::Run> wait_for_first_run();
   std::optional<bus::Run> find_unfinished_run() const;
-  std::optional<bus::Run> wait_for_next_run(const bus::Run& ended, double limit_s) const;
+  std::optional<bus::Run> wait_for_next_run(const bus::Run& ended, double limit_s);
   std::optional<bus::Run> find_follower(const bus::Run& ended) const;
-  std::optional<bus::Run> go_on_after(const bus::Run& run, const RunEnd& end) const;
+  std::optional<bus::Run> go_on_after(const bus::Run& run, const RunEnd& end);
   Segment open_segment(const bus::Run& run);
 
   const RecorderOptions options_;

@@ -156,7 +156,7 @@ void RunRecorder::announce_news() {
 void RunRecorder::announce(bool done) {
   announced_step_ = last_complete_step_;
   announced_time_ = Clock::now();
-  surroundings_.participant_writer.write(
+  surroundings_.announcer.announce(
       make_announcement(&run_, ready_ && !writing_failed_, done, announced_step_));
 }
 

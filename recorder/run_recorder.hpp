@@ -25,13 +25,13 @@ struct Surroundings {
       : vehicle(flown_vehicle),
         participants(domain),
         servers(domain),
-        participant_writer(domain),
+        announcer(domain),
         inbox(domain, [this](std::uint64_t run_id) { return servers.may_fly(run_id, vehicle); }) {}
 
   const std::uint32_t vehicle;
   bus::ParticipantDirectory participants;
   bus::ServerDirectory servers;
-  bus::Writer<Participant> participant_writer;
+  bus::Announcer announcer;
   Inbox inbox;
 };
 

@@ -15,6 +15,15 @@
 namespace sls::bus {
 namespace {
 
+using namespace std::chrono_literals;
+
+constexpr auto kRepeatAfter = 400ms;  // with the time between two calls, less than 0.5 s
+// A participant that repeats an announcement twice at such intervals goes on with it. One that
+// repeats it in a burst, or for another reason, need not.
+constexpr auto kLeastInterval = 100ms, kLongestInterval = 1000ms;
+constexpr int kRepeats = 2;
+constexpr std::size_t kAges = 4;  // announcements: one of them was hardly delayed
+
 constexpr std::size_t kMaxSenders = 256;
 constexpr std::size_t kMaxServers = 64;
 constexpr std::size_t kMaxRunsOfServer = 4;  // the current one and those before resets
@@ -79,17 +88,27 @@ ParticipantDirectory::ParticipantDirectory(Node& node)
               }) {}
 
 void ParticipantDirectory::note(const Participant& sample, const PeerId& sender) {
-  const std::chrono::nanoseconds age = std::chrono::system_clock::now() - reader_.written();
+  const auto written = reader_.written();
+  const std::chrono::nanoseconds age = std::chrono::system_clock::now() - written;
   const auto now = std::chrono::steady_clock::now();
   const std::lock_guard lock(mutex_);
   if (!make_room(last_, kMaxSenders, sender, [this] { return reader_.matched(); })) return;
-  Heard& heard = last_[sender];
+  const auto [known, is_new] = last_.try_emplace(sender);
+  Heard& heard = known->second;
   const bool is_same_run = heard.announcement.run_id() == sample.run_id();
   if (!is_same_run || !sample.ready()) heard.ready_since.reset();
   if (sample.ready() && !heard.ready_since) heard.ready_since = now;
-  heard.announcement = sample;
+  const auto interval = written - std::exchange(heard.written, written);
   heard.time = now;
-  heard.age = std::min(heard.age, age);
+  heard.ages.push_back(age);
+  if (heard.ages.size() > kAges) heard.ages.pop_front();
+  if (!is_new && heard.announcement == sample) {
+    if (interval >= kLeastInterval)
+      heard.repeats = interval <= kLongestInterval ? heard.repeats + 1 : 0;
+    return;
+  }
+  heard.repeats = 0;
+  heard.announcement = sample;
   version_.fetch_add(1, std::memory_order_release);
 }
 
@@ -109,8 +128,9 @@ std::vector<ParticipantDirectory::Entry> ParticipantDirectory::all() const {
   std::vector<Entry> found;
   for (const auto& [peer, heard] : last_)
     if (present.count(peer) > 0)
-      found.push_back({peer, heard.announcement, heard.time, heard.age,
-                       heard.ready_since.value_or(heard.time)});
+      found.push_back({peer, heard.announcement, heard.time,
+                       *std::min_element(heard.ages.begin(), heard.ages.end()),
+                       heard.ready_since.value_or(heard.time), heard.repeats >= kRepeats});
   return found;
 }
 
@@ -120,6 +140,17 @@ int ParticipantDirectory::count_done(ParticipantRole role, std::uint64_t run_id)
     const Participant& announcement = item.second.announcement;
     return announcement.role() == role && announcement.run_id() == run_id && announcement.done();
   }));
+}
+
+void Announcer::announce(const Participant& message) {
+  last_ = message;
+  time_ = std::chrono::steady_clock::now();
+  writer_.write(message);
+}
+
+void Announcer::repeat_if_due() {
+  if (last_ && std::chrono::steady_clock::now() - time_ >= kRepeatAfter)
+    announce(Participant(*last_));
 }
 
 bool are_recorders_done(const std::vector<ParticipantDirectory::Entry>& recorders) {

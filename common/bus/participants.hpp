@@ -35,11 +35,16 @@ class ParticipantDirectory {
     PeerId peer;
     Participant announcement;
     std::chrono::steady_clock::time_point heard;  ///< time of arrival
-    /// Smallest age of an announcement on arrival, by the sender's clock and ours: about 0 if the
-    /// clocks agree, positive if the sender's clock is behind.
+    /// Smallest age of its last announcements on arrival, by the sender's clock and ours: the delay
+    /// of the network and of discovery, and how far the sender's clock is behind.
     std::chrono::nanoseconds age{0};
     /// Time of the first announcement for this run with `ready`.
     std::chrono::steady_clock::time_point ready_since{};
+    /// The sender repeats this announcement about every 0.5 s: then its silence means that it is
+    /// gone. Clients of this contract need not repeat it.
+    bool is_repeated = false;
+    /// The server sets this, for it knows the answers too (sim_server/presence.hpp).
+    bool is_gone = false;
 
     bool is_silent() const { return std::chrono::steady_clock::now() - heard > kPresumedDeadAfter; }
   };
@@ -57,7 +62,8 @@ class ParticipantDirectory {
   /// that have left since.
   int count_done(ParticipantRole role, std::uint64_t run_id) const;
 
-  /// Changes with every announcement, but not when a participant leaves: poll for that.
+  /// Changes with every announcement that differs from the one before it. Poll for what else may
+  /// happen: a participant leaves, falls silent, or is heard again.
   std::uint64_t version() const { return version_.load(std::memory_order_acquire); }
 
  private:
@@ -67,12 +73,33 @@ class ParticipantDirectory {
   struct Heard {
     Participant announcement;
     std::chrono::steady_clock::time_point time;
-    std::chrono::nanoseconds age = std::chrono::nanoseconds::max();
+    std::deque<std::chrono::nanoseconds> ages;  // of the last announcements
     std::optional<std::chrono::steady_clock::time_point> ready_since;
+    std::chrono::system_clock::time_point written;  // by the sender's clock
+    int repeats = 0;  // announcements without a change at about the usual interval, in a row
   };
   std::map<PeerId, Heard> last_;
   std::atomic<std::uint64_t> version_{0};
   Reader<Participant> reader_;
+};
+
+/// Announces a participant, and repeats the announcement: its silence then means that it is gone.
+class Announcer {
+ public:
+  explicit Announcer(Node& node) : writer_(node) {}
+
+  void announce(const Participant& message);
+  /// Call it at least every 0.1 s. Does nothing before the first announcement.
+  void repeat_if_due();
+
+  bool wait_for_acknowledgments(std::chrono::milliseconds limit) {
+    return writer_.wait_for_acknowledgments(limit);
+  }
+
+ private:
+  Writer<Participant> writer_;
+  std::optional<Participant> last_;
+  std::chrono::steady_clock::time_point time_;
 };
 
 /// True if each of `recorders` has announced `done` or is silent.

@@ -92,6 +92,61 @@ TEST(ParticipantDirectoryTest, ListsTheParticipantsOfARunUntilTheyLeave) {
   EXPECT_EQ(directory.count_done(ROLE_CONTROLLER, kRun), 1) << "also after it has left";
 }
 
+/// One participant that announces itself.
+class AnnouncementTest : public testing::Test {
+ protected:
+  std::optional<ParticipantDirectory::Entry> find() const {
+    const auto found = directory_.find(ROLE_CONTROLLER, kRun);
+    return found.empty() ? std::nullopt : std::optional(found.front());
+  }
+  /// Writes `message` and waits until the directory has heard it.
+  void write(Writer<Participant>& writer, const Participant& message) {
+    const auto before = find() ? find()->heard : std::chrono::steady_clock::time_point();
+    writer.write(message);
+    ASSERT_TRUE(wait_until([&] { return find() && find()->heard > before; }));
+  }
+
+  Node node_{kQosFile, own_domain(), "directory"}, other_{kQosFile, own_domain(), "other"};
+  const ParticipantDirectory directory_{node_};
+};
+
+TEST_F(AnnouncementTest, ARepeatedAnnouncementIsHeardButChangesNoVersion) {
+  Writer<Participant> writer(other_);
+  Participant message = make_announcement(ROLE_CONTROLLER, kRun, "pilot");
+  write(writer, message);
+  const auto version = directory_.version();
+  write(writer, message);
+  EXPECT_EQ(directory_.version(), version);
+  message.ready(true);
+  write(writer, message);
+  EXPECT_NE(directory_.version(), version);
+}
+
+TEST_F(AnnouncementTest, AnAnnouncerRepeatsItselfAndTheDirectoryNoticesThat) {
+  Announcer announcer(other_);
+  announcer.repeat_if_due();  // nothing to repeat
+  announcer.announce(make_announcement(ROLE_CONTROLLER, kRun, "pilot"));
+  ASSERT_TRUE(wait_until([&] { return find().has_value(); }));
+  EXPECT_FALSE(find()->is_repeated);
+  EXPECT_TRUE(wait_until([&] {
+    announcer.repeat_if_due();
+    return find()->is_repeated;
+  }));
+  Participant ready = make_announcement(ROLE_CONTROLLER, kRun, "pilot");
+  ready.ready(true);
+  announcer.announce(ready);
+  ASSERT_TRUE(wait_until([&] { return find()->announcement.ready(); }));
+  EXPECT_FALSE(find()->is_repeated) << "this one is new";
+}
+
+TEST_F(AnnouncementTest, AFewAnnouncementsInABurstAreNoRepetition) {
+  Writer<Participant> writer(other_);
+  const Participant message = make_announcement(ROLE_CONTROLLER, kRun, "pilot");
+  for (int i = 0; i < 5; ++i) writer.write(message);
+  write(writer, message);
+  EXPECT_FALSE(find()->is_repeated);
+}
+
 class RecorderPatienceTest : public testing::Test {
  protected:
   /// Announces further steps until `time` is over or wait_for_recorder() returned; then announces
