@@ -126,6 +126,7 @@ void CommandGate::expect(std::uint64_t step) {
   }
   while (past_.size() > kRememberedAnswers) past_.erase(past_.begin());
   step_ = step;
+  has_begun_ = true;
   accepted_.reset();
   refused_.reset();
   take_over_.reset();
@@ -148,10 +149,11 @@ Verdict CommandGate::offer(const OfferedAnswer& answer, const bus::PeerId& sende
 Verdict CommandGate::judge(const OfferedAnswer& answer, const bus::PeerId& sender) {
   if (answer.run_id != run_id_) return Verdict::kOtherRun;
   if (answer.command.vehicle_id() != vehicle_id_) return Verdict::kUnknownVehicle;
+  Client* client = find_client(sender);
+  if (client) ++client->answers;
   if (answer.is_early && answer.step >= step_) return Verdict::kEarly;
 
   const JudgedAnswer judged = to_judged(answer);
-  Client* client = find_client(sender);
   if (const auto defect = find_defect(judged, limits_)) {
     if (client) note_refusal(*client, answer, judged, *defect);
     return to_verdict(*defect);
@@ -165,6 +167,8 @@ Verdict CommandGate::judge(const OfferedAnswer& answer, const bus::PeerId& sende
                                                                 : Verdict::kContradiction;
   client->silent = false;
   client->misses = 0;
+  client->identity.is_gone = false;
+  client->answered_end = step_ + 1;
   if (!is_refused(*client)) client->refusal.clear();  // of an earlier step
   if (accepted_) {
     superseded_by_ = accepted_from_;
@@ -228,12 +232,14 @@ int CommandGate::count_miss() {
 
 const CommandGate::Client* CommandGate::find_awaited() const {
   const Client* silent = nullptr;
+  const Client* gone = nullptr;
   for (const Client& client : clients_) {
     if (is_refused(client)) continue;
-    if (!client.silent) return &client;
-    if (!silent) silent = &client;
+    const Client*& first = client.identity.is_gone ? gone : silent;
+    if (!client.silent && !client.identity.is_gone) return &client;
+    if (!first) first = &client;
   }
-  return silent;  // all are silent: await the strongest
+  return silent ? silent : gone;  // all are silent: await the strongest
 }
 
 std::optional<ReadyClient> CommandGate::awaited_client() const {
@@ -245,7 +251,7 @@ bool CommandGate::pass_over_silent_client() {
   const Client* awaited = find_awaited();
   if (!awaited || accepted_) return false;
   const bool has_next = std::any_of(clients_.begin(), clients_.end(), [&](const Client& client) {
-    return &client != awaited && !client.silent && !is_refused(client);
+    return &client != awaited && !client.silent && !client.identity.is_gone && !is_refused(client);
   });
   if (!has_next) return false;
   if (!flyer_) flyer_ = awaited->identity;  // the first awaited client, for the take-over message
@@ -255,7 +261,12 @@ bool CommandGate::pass_over_silent_client() {
 }
 
 std::optional<std::string> CommandGate::refusal() const {
-  if (find_awaited() || clients_.empty() || accepted_) return std::nullopt;
+  const Client* awaited = find_awaited();
+  const bool can_answer = awaited && !awaited->identity.is_gone;
+  const bool is_any_refused =
+      std::any_of(clients_.begin(), clients_.end(),
+                  [this](const Client& client) { return is_refused(client); });
+  if (can_answer || !is_any_refused || accepted_) return std::nullopt;
   return describe_refusals();
 }
 

@@ -53,6 +53,7 @@ struct ReadyClient {
   bus::PeerId peer;
   std::string name;
   std::int32_t strength = 0;
+  bool is_gone = false;  ///< awaited only if no other client is there; its next answer counts
 };
 
 class CommandGate {
@@ -75,7 +76,8 @@ class CommandGate {
   /// The last answer to the awaited step that was refused because of its content.
   const std::optional<OfferedAnswer>& refused() const { return refused_; }
 
-  /// The client whose answer is awaited: the strongest that is neither silent nor refused.
+  /// The client whose answer is awaited: the strongest that is neither gone, silent nor refused. If
+  /// there is none, the strongest that is not refused, of those that are not gone first.
   std::optional<ReadyClient> awaited_client() const;
 
   /// Set when the awaited step's answer came from another client than the last accepted answer.
@@ -104,6 +106,14 @@ class CommandGate {
   /// accepted answer. Empty if the awaited step has its answer.
   std::string describe_refusals() const;
 
+  /// Calls `note(peer, answers, is_missing)` for each client: the number of its answers so far, and
+  /// whether its answer to the last awaited step is missing.
+  template <class Note>
+  void for_each_client(Note note) const {
+    for (const Client& client : clients_)
+      note(client.identity.peer, client.answers, has_begun_ && client.answered_end <= step_);
+  }
+
   const SyncCounters& counters() const { return counters_; }
   SyncCounters& counters() { return counters_; }
 
@@ -112,6 +122,8 @@ class CommandGate {
     ReadyClient identity;
     bool silent = false;
     int misses = 0;                     // steps in a row that it did not answer
+    std::uint64_t answers = 0;          // received, also refused ones
+    std::uint64_t answered_end = 0;     // the first step after the last one with a valid answer
     std::string refusal;                // why its last answer was refused
     std::uint64_t refused_step = 0;     // the step of that answer
     std::optional<OfferedAnswer> held;  // its first valid answer to the awaited step
@@ -135,6 +147,7 @@ class CommandGate {
   const AnswerLimits limits_;
 
   std::uint64_t step_ = 0;
+  bool has_begun_ = false;       // a step has been awaited
   std::vector<Client> clients_;  // strongest first
   std::optional<OfferedAnswer> accepted_;
   std::optional<OfferedAnswer> refused_;

@@ -106,7 +106,7 @@ std::vector<ParticipantCheck::Entry> ParticipantCheck::admit_controllers(
   refused_libraries_.clear();
   const auto is_refused = [this](const Entry& entry) {
     const Library* library = find_other_library(entry.announcement);
-    if (library)
+    if (library && !entry.is_gone)
       refused_libraries_[entry.peer] =
           describe_field(entry, "library_sha256",
                          fmt::format("{} (that of '{}')", to_words(library->sha256),
@@ -128,7 +128,7 @@ void ParticipantCheck::find_first_libraries(const std::vector<Entry>& controller
     const Entry* first = nullptr;
     for (const Entry& entry : controllers) {
       const Participant& announcement = entry.announcement;
-      const bool is_ready = announcement.ready() &&
+      const bool is_ready = announcement.ready() && !entry.is_gone &&
                             announcement.scenario_sha256() == scenario_sha256_ &&
                             bus::flies_vehicle(announcement, vehicle.id);
       if (is_ready && (!first || is_earlier(entry, *first))) first = &entry;

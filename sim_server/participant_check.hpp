@@ -117,7 +117,8 @@ class ParticipantCheck {
     std::size_t numbers = 0;             // largest count in an answer so far
     bool is_far = false;
     bool has_flown = false;
-    std::optional<Library> library;  // of the client that flies, or before that of the first ready
+    // Of the client that flies or, before that, of the first one that is ready and not gone.
+    std::optional<Library> library;
   };
   using Senders = std::map<bus::PeerId, const Entry*>;
 

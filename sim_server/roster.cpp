@@ -17,6 +17,10 @@ std::string describe(const Entry& entry) {
                      entry.announcement.host().c_str());
 }
 
+std::string describe_gone(const Entry& entry) {
+  return fmt::format("'{}' (gone)", entry.announcement.name().c_str());
+}
+
 /// "controller", "2 controllers (1 ready; 'client' on host: not ready)" …
 std::string name_missing_role(const char* role, int expected, int ready,
                               const std::string& details) {
@@ -66,8 +70,8 @@ std::vector<ReadyClient> find_ready_clients(const Roster& roster,
   for (const Entry& entry : roster.controllers)
     if (entry.announcement.ready() && entry.announcement.scenario_sha256() == scenario_sha256 &&
         bus::flies_vehicle(entry.announcement, vehicle_id))
-      clients.push_back(
-          {entry.peer, entry.announcement.name().to_string(), entry.announcement.strength()});
+      clients.push_back({entry.peer, entry.announcement.name().to_string(),
+                         entry.announcement.strength(), entry.is_gone});
   return clients;
 }
 
@@ -78,14 +82,18 @@ std::string name_missing(const Roster& roster, const config::WaitFor& expected,
   int controllers = std::numeric_limits<int>::max();  // of the vehicle that has the fewest
   std::vector<std::uint32_t> without;
   for (const std::uint32_t id : vehicle_ids) {
-    const int ready = static_cast<int>(find_ready_clients(roster, scenario_sha256, id).size());
+    const auto clients = find_ready_clients(roster, scenario_sha256, id);
+    const auto ready = static_cast<int>(std::count_if(
+        clients.begin(), clients.end(), [](const ReadyClient& client) { return !client.is_gone; }));
     controllers = std::min(controllers, ready);
     if (ready < expected.controllers) without.push_back(id);
   }
   if (!without.empty()) {
     std::string details;
     for (const Entry& entry : roster.controllers) {
-      if (!(entry.announcement.scenario_sha256() == scenario_sha256))
+      if (entry.is_gone)
+        append(details, describe_gone(entry));
+      else if (!(entry.announcement.scenario_sha256() == scenario_sha256))
         append(details, describe(entry) + " has another scenario");
       else if (!entry.announcement.ready())
         append(details, describe(entry) + " is not ready");
@@ -97,7 +105,9 @@ std::string name_missing(const Roster& roster, const config::WaitFor& expected,
   int recorders = 0;
   std::string details;
   for (const Entry& entry : roster.recorders) {
-    if (entry.announcement.ready())
+    if (entry.is_silent())
+      append(details, describe_gone(entry));
+    else if (entry.announcement.ready())
       ++recorders;
     else
       append(details, describe(entry) + " is not ready");
@@ -149,10 +159,11 @@ std::string name_silent_recorder(const Roster& roster, std::uint64_t step,
   return "";
 }
 
-std::string find_host(const Roster& roster, const bus::PeerId& peer) {
+std::string describe_place(const Roster& roster, const bus::PeerId& peer) {
   for (const Entry& entry : roster.controllers)
-    if (entry.peer == peer) return entry.announcement.host().to_string();
-  return "?";
+    if (entry.peer == peer)
+      return entry.is_gone ? " (gone)" : " on " + entry.announcement.host().to_string();
+  return " on ?";
 }
 
 }  // namespace sls::sim

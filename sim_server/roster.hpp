@@ -21,12 +21,14 @@ struct Roster {
   std::optional<std::chrono::steady_clock::time_point> began = std::nullopt;
 };
 
-/// Controllers that are ready to fly `vehicle_id` and use the run's scenario, for its command gate.
+/// Controllers that are ready to fly `vehicle_id` and use the run's scenario, for its command gate;
+/// also those that are gone, because they may come back with an answer.
 std::vector<ReadyClient> find_ready_clients(const Roster& roster,
                                             const std::string& scenario_sha256,
                                             std::uint32_t vehicle_id = 0);
 
 /// Names the participants that the start still waits for; empty when all expected ones are ready.
+/// Participants that are gone do not count.
 /// The expected number of controllers holds for each vehicle.
 std::string name_missing(const Roster& roster, const config::WaitFor& expected,
                          const std::string& scenario_sha256,
@@ -56,7 +58,8 @@ std::uint64_t calc_recorder_limit(const Roster& roster, int expected,
 std::string name_silent_recorder(const Roster& roster, std::uint64_t step,
                                  std::chrono::steady_clock::time_point since);
 
-/// The host of the controller `peer`; "?" if it is not in the roster.
-std::string find_host(const Roster& roster, const bus::PeerId& peer);
+/// The host of the controller `peer` as " on box", or " (gone)"; " on ?" if it is not in the
+/// roster.
+std::string describe_place(const Roster& roster, const bus::PeerId& peer);
 
 }  // namespace sls::sim

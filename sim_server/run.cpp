@@ -19,7 +19,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto kUsualStartTime = 300ms;  // of discovery after the claim: not reported
-constexpr auto kRosterTime = 100ms;      // between checks for silent departures
+constexpr auto kRosterTime = 100ms;      // between checks for departure and silence
 constexpr auto kRecorderSilence = 1s;    // until a recorder that is behind is reported
 constexpr auto kReportInterval = 5s;     // between reports of the same silence
 constexpr auto kLookInterval = 100ms;    // least time between checks of participants
@@ -269,11 +269,28 @@ void Run::do_housekeeping() {
   report_silent_recorder();
 }
 
+std::map<bus::PeerId, Answering> Run::collect_answering() {
+  // A client that has not answered need not do so while the run rests or waits for a recorder.
+  const bool is_flying = is_step_published_ || roster_step_ != board_.step;
+  roster_step_ = board_.step;
+  std::map<bus::PeerId, Answering> answering;
+  for (const auto& vehicle : vehicles_)
+    vehicle->gate.for_each_client(
+        [&](const bus::PeerId& peer, std::uint64_t answers, bool is_missing) {
+          Answering& sum = answering[peer];
+          sum.answers += answers;
+          sum.is_asked = sum.is_asked || (is_missing && is_flying);
+        });
+  return answering;
+}
+
 void Run::refresh_roster() {
   roster_version_ = endpoints_.participants.version();
   roster_time_ = Clock::now();
+  auto controllers = endpoints_.participants.find(ROLE_CONTROLLER, run_id_);
+  presence_.look(controllers, collect_answering(), roster_time_);
   roster_ = {
-      check_.admit_controllers(endpoints_.participants.find(ROLE_CONTROLLER, run_id_)),
+      check_.admit_controllers(controllers),
       ParticipantCheck::admit_recorders(endpoints_.participants.find(ROLE_RECORDER, run_id_)),
       began_};
   for (const auto& vehicle : vehicles_)

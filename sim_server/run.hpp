@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -16,6 +17,7 @@
 #include "sim_server/endpoints.hpp"
 #include "sim_server/participant_check.hpp"
 #include "sim_server/plants/plant.hpp"
+#include "sim_server/presence.hpp"
 #include "sim_server/record_stream.hpp"
 #include "sim_server/roster.hpp"
 #include "sim_server/run_control.hpp"
@@ -113,6 +115,7 @@ class Run {
   bool attend_to_operator();
   /// Takes the requests and waits while the operator holds the run; false if a request ended it.
   bool rest();
+  /// Also finds participants that have fallen silent or come back: call it several times a second.
   void refresh_roster();
   bool is_roster_due() const;
   /// Publishes the status and checks signals, claim and participants; a few times a second.
@@ -132,12 +135,14 @@ class Run {
   RunControl control_;
   Roster roster_;
   ParticipantCheck check_;
+  Presence presence_;
   RecordStream record_;
   bool are_recorders_given_up_ = false;     // policy go_on
   std::optional<Clock::time_point> began_;  // when step 0 was about to be published
 
  private:
   bool is_meant_for_another_server(const SimControl& request) const;
+  std::map<bus::PeerId, Answering> collect_answering();
   bool wait_for_participants();
   bool fly();
   void measure(const PlantOfVehicles& group);
@@ -172,6 +177,7 @@ class Run {
   Clock::time_point look_time_;
   std::uint64_t roster_version_ = 0;
   Clock::time_point roster_time_;
+  std::uint64_t roster_step_ = 0;
   std::optional<app::Wait> absence_wait_;
   std::optional<Clock::time_point> announced_absence_;       // start of the announced absence
   std::optional<ControllerAbsence::Action> absence_action_;  // the last one that was announced

@@ -159,9 +159,10 @@ std::string Run::name_awaited_controllers() const {
     if (vehicle->gate.accepted()) continue;
     const auto client = vehicle->gate.awaited_client();
     const std::string& last = vehicle->last_answer().controller_name;
-    awaited[client ? fmt::format(
-                         "controller '{}' on {}{}", client->name, find_host(roster_, client->peer),
-                         board_.problem.empty() ? check_.describe_rejections(client->peer) : "")
+    const bool is_there = client && !client->is_gone && board_.problem.empty();
+    awaited[client         ? fmt::format("controller '{}'{}{}", client->name,
+                                         describe_place(roster_, client->peer),
+                                 is_there ? check_.describe_rejections(client->peer) : "")
             : last.empty() ? std::string("controller (none is ready)")
                            : fmt::format("controller '{}' (gone)", last)]
         .push_back(vehicle->id());

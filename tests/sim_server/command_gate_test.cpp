@@ -791,5 +791,75 @@ TEST(CommandGatePropertyTest, EveryStepIsAnsweredAsLongAsOneOfTheChangingClients
   }
 }
 
+// --- gone ----------------------------------------------------------------------------------------
+
+ReadyClient make_gone(ReadyClient client) {
+  client.is_gone = true;
+  return client;
+}
+
+TEST_F(CommandGateTest, AClientThatIsGoneIsAwaitedOnlyIfNoOtherIsThere) {
+  set_clients({make_gone(kStrong), kWeak});
+  EXPECT_EQ(gate_.awaited_client()->name, "weak");
+  EXPECT_EQ(gate_.offer(make_answer(0), kWeakPeer), Verdict::kAccepted);
+  set_clients({make_gone(kStrong)});
+  EXPECT_EQ(gate_.awaited_client()->name, "strong");
+  EXPECT_TRUE(gate_.awaited_client()->is_gone);
+}
+
+TEST_F(CommandGateTest, AHeldAnswerIsTakenWhenTheAwaitedClientIsGone) {
+  set_clients({kStrong, kWeak});
+  EXPECT_EQ(gate_.offer(make_answer(0), kWeakPeer), Verdict::kHeld);
+  set_clients({make_gone(kStrong), kWeak});
+  EXPECT_TRUE(gate_.accepted());
+}
+
+TEST_F(CommandGateTest, ASilentClientIsAwaitedRatherThanOneThatIsGone) {
+  set_clients({kStrong, kWeak});
+  EXPECT_TRUE(gate_.pass_over_silent_client());
+  EXPECT_FALSE(gate_.pass_over_silent_client());
+  set_clients({make_gone(kStrong), kWeak});
+  EXPECT_EQ(gate_.awaited_client()->name, "weak");
+}
+
+TEST_F(CommandGateTest, AnAnswerBringsAClientBackThatWasGone) {
+  set_clients({make_gone(kStrong), kWeak});
+  EXPECT_EQ(gate_.offer(make_answer(0), kStrongPeer), Verdict::kAccepted);
+  EXPECT_FALSE(gate_.awaited_client()->is_gone);
+}
+
+TEST_F(CommandGateTest, ARefusalEndsTheRunAtOnceIfAllOthersAreGone) {
+  set_clients({make_gone(kStrong), kWeak});
+  gate_.offer(make_faulted(0, FAULT_FREE_FALL), kWeakPeer);
+  ASSERT_TRUE(gate_.refusal());
+  EXPECT_NE(gate_.refusal()->find("'weak'"), std::string::npos) << *gate_.refusal();
+  set_clients({make_gone(kStrong)});
+  EXPECT_FALSE(gate_.refusal()) << "it may come back";
+}
+
+TEST_F(CommandGateTest, ItCountsTheAnswersOfEachClientAndKnowsWhichAreMissing) {
+  const auto find = [](const CommandGate& gate, const bus::PeerId& sought) {
+    std::pair<std::uint64_t, bool> found;
+    gate.for_each_client([&](const bus::PeerId& peer, std::uint64_t answers, bool is_missing) {
+      if (peer == sought) found = {answers, is_missing};
+    });
+    return found;
+  };
+  using Known = std::pair<std::uint64_t, bool>;
+  CommandGate waiting(kRun, kVehicle, kForceLimit);
+  waiting.set_clients({kStrong});
+  EXPECT_EQ(find(waiting, kStrongPeer), Known(0, false)) << "no state is published yet";
+  set_clients({kStrong, kWeak});
+  EXPECT_EQ(find(gate_, kStrongPeer), Known(0, true));
+  gate_.offer(make_answer(0), kStrongPeer);
+  gate_.offer(make_answer(0), kWeakPeer);  // superseded
+  EXPECT_EQ(find(gate_, kStrongPeer), Known(1, false));
+  EXPECT_EQ(find(gate_, kWeakPeer), Known(1, false));
+  gate_.expect(1);
+  gate_.expect(2);
+  gate_.offer(make_answer(1), kWeakPeer);  // late
+  EXPECT_EQ(find(gate_, kWeakPeer), Known(2, true));
+}
+
 }  // namespace
 }  // namespace sls::sim

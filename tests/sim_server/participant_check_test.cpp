@@ -276,6 +276,18 @@ TEST_F(ParticipantCheckTest, AnotherLibraryThanThatOfTheFirstIsRefused) {
   EXPECT_EQ(check_.admit_controllers({second, first}).size(), 1u);
 }
 
+TEST_F(ParticipantCheckTest, TheLibraryOfAClientThatIsGoneBindsNobody) {
+  auto dead = make_entry(1, "dead"), repaired = make_entry(2, "repaired");
+  dead.announcement.library_sha256(std::string(64, 'c'));
+  repaired.announcement.library_sha256(std::string(64, 'd'));
+  dead.is_gone = true;
+  neighbourhood_.participants = {dead, repaired};
+  const auto admitted = check_.admit_controllers(neighbourhood_.participants);
+  ASSERT_EQ(admitted.size(), 1u);
+  EXPECT_EQ(admitted[0].peer, repaired.peer);
+  EXPECT_TRUE(look().empty()) << "and nobody is refused by name";
+}
+
 TEST_F(ParticipantCheckTest, TheLibraryThatHasFlownStaysInForceWhenItsClientIsGone) {
   auto first = make_entry(1, "first"), second = make_entry(2, "second");
   first.announcement.library_sha256(std::string(64, 'c'));

@@ -106,6 +106,25 @@ TEST(RosterTest, OnlyReadyControllersWithThisScenarioMayAnswer) {
   EXPECT_EQ(clients[0].peer, roster.controllers[1].peer);
 }
 
+TEST(RosterTest, AControllerThatIsGoneDoesNotCountAndIsNamed) {
+  Roster roster = {{make_controller("pilot")}, {}};
+  roster.controllers[0].is_gone = true;
+  EXPECT_EQ(name_missing(roster, make_wait_for(1, 0), kScenario), "controller ['pilot' (gone)]");
+  const auto clients = find_ready_clients(roster, kScenario);
+  ASSERT_EQ(clients.size(), 1u) << "it may come back with an answer";
+  EXPECT_TRUE(clients[0].is_gone);
+  roster.controllers.push_back(make_controller("other"));
+  EXPECT_EQ(name_missing(roster, make_wait_for(1, 0), kScenario), "");
+}
+
+TEST(RosterTest, ARecorderThatIsGoneDoesNotCountAndIsNamed) {
+  Roster roster = {{}, {make_recorder("tape")}};
+  roster.recorders[0].heard -= 2 * bus::kPresumedDeadAfter;
+  EXPECT_EQ(name_missing(roster, make_wait_for(0, 1), kScenario), "recorder ['tape' (gone)]");
+  roster.recorders.push_back(make_recorder("other"));
+  EXPECT_EQ(name_missing(roster, make_wait_for(0, 1), kScenario), "");
+}
+
 // The recorder's last complete step is at most 2,000 behind the step that the server publishes.
 TEST(RosterTest, ARecorderMayBeTwoThousandStepsBehindAndNoMore) {
   EXPECT_EQ(name_blocking_recorder({{}, {make_recorder_at(-1)}}, 1, 0), "");
@@ -199,10 +218,12 @@ TEST(RosterTest, ARecorderThatLagsAndAnnouncesNothingIsNamedAsSilent) {
   EXPECT_EQ(name_silent_recorder(roster, 101, now - second), "") << "nothing to announce";
 }
 
-TEST(RosterTest, TheHostOfAControllerIsFoundByItsPeer) {
-  const auto pilot = make_controller("pilot");
-  EXPECT_EQ(find_host({{pilot}, {}}, pilot.peer), "host-of-pilot");
-  EXPECT_EQ(find_host({}, pilot.peer), "?");
+TEST(RosterTest, ThePlaceOfAControllerIsItsHostUntilItIsGone) {
+  auto pilot = make_controller("pilot");
+  EXPECT_EQ(describe_place({{pilot}, {}}, pilot.peer), " on host-of-pilot");
+  pilot.is_gone = true;
+  EXPECT_EQ(describe_place({{pilot}, {}}, pilot.peer), " (gone)");
+  EXPECT_EQ(describe_place({}, pilot.peer), " on ?");
 }
 
 // --- fleets --------------------------------------------------------------------------------------
