@@ -23,7 +23,7 @@ void CommandStream::set_handler(Handler handler) {
 void CommandStream::receive(const Commands& sample, const bus::PeerId& sender) {
   const std::lock_guard lock(mutex_);
   if (handler_ && handler_(sample, sender)) return;
-  mailbox_.put({sample, sender, std::chrono::steady_clock::now()});
+  mailbox_.put({sample, sender, std::chrono::steady_clock::now(), reader_.written()});
 }
 
 }  // namespace sls::sim

@@ -22,6 +22,7 @@ struct ReceivedCommands {
   Commands sample;
   bus::PeerId sender;
   std::chrono::steady_clock::time_point arrived;
+  std::chrono::system_clock::time_point written;  ///< by the sender's clock
 };
 
 /// Receives the commands.
@@ -41,7 +42,7 @@ class CommandStream {
 
   std::uint64_t missed_deadlines() const { return reader_.missed_deadlines(); }
   std::optional<std::chrono::nanoseconds> lifespan() const { return reader_.lifespan(); }
-  void ignore_lifespan() { reader_.ignore_lifespan(); }
+  void ignore_lifespan(bool is_ignored) { reader_.ignore_lifespan(is_ignored); }
 
  private:
   void receive(const Commands& sample, const bus::PeerId& sender);

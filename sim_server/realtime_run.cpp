@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <thread>
+#include <utility>
 
 #include "common/app/run_main.hpp"
 #include "common/app/scheduling.hpp"
@@ -20,6 +21,12 @@ constexpr std::size_t kQueuedSteps = 1024;
 
 /// Periods in a row without an answer after which the next client's answer is used.
 constexpr int kMissesBeforeTakeOver = 3;
+
+/// A client that sends no answer for this long may have a clock for which LIFESPAN drops them all.
+constexpr auto kMeasured = 1s;
+
+/// Longer computing times in answers are not credible.
+constexpr std::uint64_t kLongestComputing_ns = 60'000'000'000;
 
 std::chrono::duration<double, std::nano> calc_wall_period(const config::Sync& sync) {
   return std::chrono::duration<double, std::nano>(static_cast<double>(sync.period_ns) /
@@ -88,6 +95,7 @@ void RealtimeRun::publish() {
     board_.timing.add_slip(std::chrono::duration<double>(*lost).count());
   board_.timing.add_delay(std::chrono::duration<double>(now - schedule_.due(board_.step)).count());
   published_ = now;
+  published_stamps_[board_.step % published_stamps_.size()] = std::chrono::system_clock::now();
   publish_states();
 }
 
@@ -104,14 +112,17 @@ bool RealtimeRun::wait_until_due() {
 bool RealtimeRun::take_commands(Clock::time_point deadline) {
   while (!are_all_accepted() && Clock::now() < deadline) {
     endpoints_.commands.wait(std::min(deadline, Clock::now() + app::kPollTime));
-    for (const ReceivedCommands& received : endpoints_.commands.take_all())
+    for (const ReceivedCommands& received : endpoints_.commands.take_all()) {
       judge(received.sample, received.sender, received.arrived < published_);
+      note_clock(received);
+    }
     check_refusals();
     if (are_all_accepted()) {
       board_.round_trips.add(Clock::now() - published_);
       return true;
     }
     do_housekeeping();
+    if (is_roster_due()) refresh_roster();
     if (attend_to_operator()) return false;
   }
   return true;
@@ -153,22 +164,59 @@ void RealtimeRun::count_missed_deadlines() {
   missed_deadlines_ = missed;
 }
 
+void RealtimeRun::note_clock(const ReceivedCommands& received) {
+  const Commands& sample = received.sample;
+  const auto client = clocks_.find(received.sender);
+  const bool is_known =
+      sample.step() <= board_.step && board_.step - sample.step() < published_stamps_.size();
+  if (client == clocks_.end() || sample.run_id() != run_id_ || !is_known) return;
+  ClockOffset::Exchange exchange;
+  exchange.published = published_stamps_[sample.step() % published_stamps_.size()];
+  exchange.computing = std::chrono::nanoseconds(0);
+  for (const ControlCommand& command : sample.vehicles())
+    exchange.computing +=
+        std::chrono::nanoseconds(std::min(command.compute_time_ns(), kLongestComputing_ns));
+  exchange.written = received.written;
+  exchange.arrived = std::chrono::system_clock::now() - (Clock::now() - received.arrived);
+  client->second.offset.note(exchange);
+  client->second.noted = Clock::now();
+}
+
 void RealtimeRun::check_clocks() {
   const auto lifespan = endpoints_.command_stream.lifespan();
-  if (!lifespan || is_lifespan_ignored_) return;
+  if (!lifespan) return;
+  std::map<bus::PeerId, ClientClock> present;
+  bool is_any_wrong = false;
   for (const auto& client : roster_.controllers) {
-    if (std::chrono::abs(client.age) <= *lifespan / 2) continue;
-    is_lifespan_ignored_ = true;
-    endpoints_.command_stream.ignore_lifespan();
-    const double behind_s = std::chrono::duration<double>(client.age).count();
-    board_.announce(
-        fmt::format("the clock of controller '{}' on {} is {:.1f} s {} ours: synchronise the "
-                    "clocks; until then "
-                    "its commands expire by their step, not by LIFESPAN",
-                    client.announcement.name().c_str(), client.announcement.host().c_str(),
-                    std::abs(behind_s), behind_s > 0 ? "behind" : "ahead of"));
-    return;
+    ClientClock& clock = present[client.peer];
+    const auto known = clocks_.find(client.peer);
+    if (known != clocks_.end()) clock = known->second;
+    if (Clock::now() - clock.noted > kMeasured) clock.offset = ClockOffset();
+    const auto offset = clock.offset.offset();
+    // A clock near the limit must not be reported again and again.
+    const auto limit = clock.is_wrong ? *lifespan * 2 / 5 : *lifespan / 2;
+    const bool is_wrong = offset ? std::chrono::abs(*offset) > limit : clock.is_wrong;
+    if (is_wrong != std::exchange(clock.is_wrong, is_wrong))
+      announce_clock(client, *offset, is_wrong);
+    is_any_wrong = is_any_wrong || is_wrong || (!offset && client.age > *lifespan);
   }
+  clocks_ = std::move(present);
+  if (is_any_wrong != std::exchange(is_lifespan_ignored_, is_any_wrong))
+    endpoints_.command_stream.ignore_lifespan(is_any_wrong);
+}
+
+void RealtimeRun::announce_clock(const bus::ParticipantDirectory::Entry& client,
+                                 std::chrono::nanoseconds offset, bool is_wrong) {
+  const double ahead_s = std::chrono::duration<double>(offset).count();
+  const std::string clock =
+      fmt::format("the clock of controller '{}' on {}", client.announcement.name().c_str(),
+                  client.announcement.host().c_str());
+  board_.announce(
+      is_wrong
+          ? fmt::format("{} is {:.2f} s {} ours: synchronise the clocks; until then its commands "
+                        "expire by their step, not by LIFESPAN",
+                        clock, std::abs(ahead_s), ahead_s < 0 ? "behind" : "ahead of")
+          : clock + " agrees with ours again: its commands expire by LIFESPAN again");
 }
 
 bool RealtimeRun::wait_for_recorders() {

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
-#include <memory>
+#include <map>
 #include <optional>
 
+#include "sim_server/clock_offset.hpp"
 #include "sim_server/run.hpp"
 #include "sim_server/schedule.hpp"
 
@@ -41,14 +43,29 @@ class RealtimeRun : public Run {
   bool is_ending() const;
   void fly_without_answers();
   void count_missed_deadlines();
-  /// Reports a client whose clock differs so much that its commands would expire wrongly or never.
-  /// From then on LIFESPAN is ignored: commands expire by their step alone.
+  /// Measures the clock of the sender.
+  void note_clock(const ReceivedCommands& received);
+  /// Reports a client whose clock differs so much that its commands would expire wrongly or never,
+  /// and when the clocks agree again. Meanwhile LIFESPAN is ignored: commands expire by their step
+  /// alone. It is also ignored where old announcements suggest a wrong clock: if it is wrong, no
+  /// answer arrives that would show it.
   void check_clocks();
+  void announce_clock(const bus::ParticipantDirectory::Entry& client,
+                      std::chrono::nanoseconds offset, bool is_wrong);
 
   StateStream::Queue state_queue_;
   Schedule schedule_;
   Clock::time_point published_;         // when the state in work was published
   std::uint64_t missed_deadlines_ = 0;  // count of the middleware at the last check
+  /// A ready controller's clock.
+  struct ClientClock {
+    ClockOffset offset;
+    Clock::time_point noted;
+    bool is_wrong = false;
+  };
+  std::map<bus::PeerId, ClientClock> clocks_;
+  /// When the states of the last steps were published, by the clock that sample stamps use.
+  std::array<std::chrono::system_clock::time_point, 64> published_stamps_;
   bool is_lifespan_ignored_ = false;
   std::optional<app::Wait> recorder_wait_;
 };

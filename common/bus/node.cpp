@@ -521,9 +521,13 @@ std::uint64_t AnyReader::missed_deadlines() const { return impl_->missed_deadlin
 std::optional<std::chrono::nanoseconds> AnyReader::lifespan() const { return impl_->lifespan; }
 std::chrono::system_clock::time_point AnyReader::written() const { return impl_->written; }
 
-void AnyReader::ignore_lifespan() {
+void AnyReader::ignore_lifespan(bool is_ignored) {
+  if (!impl_->lifespan) return;
   dds::DataReaderQos qos = impl_->reader->get_qos();
-  qos.lifespan().duration = eprosima::fastrtps::c_TimeInfinite;
+  qos.lifespan().duration =
+      is_ignored
+          ? eprosima::fastrtps::c_TimeInfinite
+          : eprosima::fastrtps::Duration_t(std::chrono::duration<double>(*impl_->lifespan).count());
   impl_->reader->set_qos(qos);
 }
 

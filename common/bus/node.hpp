@@ -152,7 +152,7 @@ class AnyReader {
   std::set<PeerId> matched() const;
   std::uint64_t missed_deadlines() const;
   std::optional<std::chrono::nanoseconds> lifespan() const;
-  void ignore_lifespan();
+  void ignore_lifespan(bool is_ignored);
   std::chrono::system_clock::time_point written() const;
 
  private:
@@ -215,8 +215,9 @@ class Reader {
   /// LIFESPAN of the reader's profile; nothing if it is infinite.
   std::optional<std::chrono::nanoseconds> lifespan() const { return reader_.lifespan(); }
 
-  /// From now on no sample expires. `lifespan()` stays what the profile says.
-  void ignore_lifespan() { reader_.ignore_lifespan(); }
+  /// From now on no sample expires, or samples expire again. `lifespan()` stays what the profile
+  /// says.
+  void ignore_lifespan(bool is_ignored) { reader_.ignore_lifespan(is_ignored); }
 
   /// For the handler: the time at which its sample was written, by the writer's clock.
   std::chrono::system_clock::time_point written() const { return reader_.written(); }
