@@ -147,10 +147,10 @@ Verdict CommandGate::offer(const OfferedAnswer& answer, const bus::PeerId& sende
 }
 
 Verdict CommandGate::judge(const OfferedAnswer& answer, const bus::PeerId& sender) {
-  if (answer.run_id != run_id_) return Verdict::kOtherRun;
-  if (answer.command.vehicle_id() != vehicle_id_) return Verdict::kUnknownVehicle;
   Client* client = find_client(sender);
   if (client) ++client->answers;
+  if (answer.run_id != run_id_) return Verdict::kOtherRun;
+  if (answer.command.vehicle_id() != vehicle_id_) return Verdict::kUnknownVehicle;
   if (answer.is_early && answer.step >= step_) return Verdict::kEarly;
 
   const JudgedAnswer judged = to_judged(answer);

@@ -859,6 +859,10 @@ TEST_F(CommandGateTest, ItCountsTheAnswersOfEachClientAndKnowsWhichAreMissing) {
   gate_.expect(2);
   gate_.offer(make_answer(1), kWeakPeer);  // late
   EXPECT_EQ(find(gate_, kWeakPeer), Known(2, true));
+  OfferedAnswer wrong = make_answer(2);
+  wrong.run_id = kRun + 1;
+  gate_.offer(wrong, kWeakPeer);
+  EXPECT_EQ(find(gate_, kWeakPeer), Known(3, true)) << "refused, but its sender is there";
 }
 
 }  // namespace
