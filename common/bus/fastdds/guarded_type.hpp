@@ -51,7 +51,7 @@ class RawScope {
 /// does not catch most exceptions of the serialisation library: one malformed sample from any
 /// program ends the process (README.md, traps 15 and 23). It also accepts samples of another
 /// type, which have bytes left over, and reads their fields in the wrong places (trap 25). It
-/// accepts sequences beyond their bounds, too (bounds.hpp).
+/// accepts sequences and names beyond their bounds, too (bounds.hpp).
 ///
 /// Upstream: Fast-CDR #144; Fast DDS 2.11 catches more, but not std::bad_alloc. To be deleted when
 /// the generated function catches every exception, creates no more elements than a sample's length
@@ -89,7 +89,12 @@ class GuardedType : public Generated {
       return refuse(
           *payload, data,
           "expected " + std::to_string(used) + " bytes, got " + std::to_string(payload->length));
-    const std::string excess = find_excess(*static_cast<const typename Generated::type*>(data));
+    const auto& message = *static_cast<const typename Generated::type*>(data);
+    std::string excess = find_excess(message);
+    if (excess.empty())
+      excess =
+          find_cut_name(message, {reinterpret_cast<const char*>(payload->data), payload->length},
+                        cdr.endianness() != Cdr::DEFAULT_ENDIAN);
     return excess.empty() || refuse(*payload, data, "expected at most " + excess);
   }
 

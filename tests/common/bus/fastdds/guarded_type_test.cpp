@@ -176,6 +176,42 @@ TEST(GuardedTypeTest, SequencesBeyondTheirBoundsAreRefused) {
   EXPECT_FALSE(is_taken_back<RecordBatchPubSubType>(batch));
 }
 
+/// `bytes` with `name` instead of the one-letter name at `at`, its length before it, and the
+/// padding of four bytes after it.
+std::string rename(std::string bytes, std::size_t at, const std::string& name) {
+  std::string text;
+  for (int shift = 0; shift < 32; shift += 8)
+    text += static_cast<char>((name.size() + 1) >> shift & 0xff);
+  text += name;
+  text.resize((text.size() + 4) / 4 * 4, '\0');
+  return bytes.replace(at - 4, 8, text);
+}
+
+TEST(GuardedTypeTest, NamesBeyondTheirBoundsAreRefusedAndReported) {
+  Commands sent, received;
+  sent.client_name("c");
+  sent.vehicles().resize(1);
+  sent.vehicles()[0].reference().stage_name("s");
+  const std::string bytes = serialize(sent);
+  Report report;
+  const MisfitScope scope(report);
+  for (const auto& [letter, field] :
+       {std::pair("c", "client_name"), std::pair("s", "reference.stage_name")}) {
+    SCOPED_TRACE(field);
+    const std::string pattern = std::string("\2\0\0\0", 4) + letter;
+    const std::size_t at = bytes.find(pattern) + 4;
+    report.text.clear();
+    EXPECT_TRUE((takes<CommandsPubSubType>(rename(bytes, at, std::string(32, 'x')), received)));
+    for (const std::size_t length : {33, 35, 40, 56}) {
+      EXPECT_EQ(report.text, "");
+      EXPECT_FALSE(
+          (takes<CommandsPubSubType>(rename(bytes, at, std::string(length, 'x')), received)));
+      EXPECT_EQ(std::exchange(report.text, ""),
+                std::string("sls::Commands: expected at most 32 bytes in ") + field + ", got more");
+    }
+  }
+}
+
 TEST(GuardedTypeTest, RandomBytesThrowNothing) {
   std::mt19937_64 random(4);
   for (int i = 0; i < 20000; ++i) {
