@@ -8,6 +8,12 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+bool is_finite(const model::Reference& reference) {
+  return reference.position.allFinite() && reference.velocity.allFinite() &&
+         reference.acceleration.allFinite() && reference.jerk.allFinite() &&
+         reference.snap.allFinite();
+}
+
 }  // namespace
 
 Flight::Flight(const config::Scenario& scenario, const std::vector<std::uint32_t>& ids,
@@ -85,6 +91,7 @@ bool Flight::is_last() {
     judged.step = steps_[i].step;
     judged.f_Q_W = answer.f_Q_W;
     judged.is_memory_finite = answer.memory.numbers.allFinite();
+    judged.is_reference_finite = is_finite(answer.reference);
     if (answer.fault != control::Fault::kNone) judged.fault = to_string(answer.fault);
     judged.is_mission_failed = answer.mission == control::MissionPhase::kFailed;
     judged.is_mission_finished = answer.mission == control::MissionPhase::kFinished;

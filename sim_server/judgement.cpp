@@ -36,6 +36,7 @@ std::optional<Defect> find_defect(const JudgedAnswer& answer, const AnswerLimits
   if (calc_norm(answer.f_Q_W) > limits.force) return Defect::kForceLimit;
   if (answer.undefined) return Defect::kUndefined;
   if (answer.fault || answer.is_mission_failed) return Defect::kFault;
+  if (!answer.is_reference_finite) return Defect::kNotFinite;  // its fault would say why
   if (answer.stage > limits.stages) return Defect::kUnknownStage;
   const bool is_over = answer.is_mission_finished || answer.stage == limits.stages;
   if (is_over && answer.step < limits.earliest_end) return Defect::kEarlyEnd;
@@ -66,7 +67,8 @@ std::string describe_refusal(Defect defect, const JudgedAnswer& answer, const An
                                        answer.step, to_string(defect));
   switch (defect) {
     case Defect::kNotFinite:
-      return text;
+      if (!answer.f_Q_W.allFinite()) return text;
+      return text + (answer.is_memory_finite ? " in reference" : " in controller.numbers");
     case Defect::kForceLimit:
       return text + fmt::format(": {:.6g} N > {:.6g} N", calc_norm(answer.f_Q_W), limits.force);
     case Defect::kUndefined:

@@ -12,7 +12,7 @@
 namespace sls::sim {
 
 enum class Defect {
-  kNotFinite,     ///< a number of force or memory is not finite
+  kNotFinite,     ///< a number of force, memory or reference is not finite
   kForceLimit,    ///< |F| beyond `controller.force_limit_n`
   kUndefined,     ///< an enumerator that the contract does not define
   kFault,         ///< an error code, or a failed mission
@@ -41,6 +41,7 @@ struct JudgedAnswer {
   std::uint64_t step = 0;
   Eigen::Vector3d f_Q_W = Eigen::Vector3d::Zero();  ///< N
   bool is_memory_finite = true;
+  bool is_reference_finite = true;
   std::optional<Undefined> undefined;
   const char* fault = nullptr;  ///< name of its error code; null: none
   bool is_mission_failed = false;
@@ -54,7 +55,8 @@ std::optional<Defect> find_defect(const JudgedAnswer& answer, const AnswerLimits
 /// "a number that is not finite", "a force beyond controller.force_limit_n", "a fault" …
 const char* to_string(Defect defect);
 
-/// `controller 'NAME' answered step N with …`, with the value and the limit, or the error code.
+/// `controller 'NAME' answered step N with …`, with the place of the number if it is not in the
+/// force, the value and the limit, or the error code.
 std::string describe_refusal(Defect defect, const JudgedAnswer& answer, const AnswerLimits& limits,
                              const std::string& controller);
 
