@@ -20,6 +20,16 @@ std::optional<JudgedAnswer::Undefined> find_undefined(const ControlCommand& comm
   return std::nullopt;
 }
 
+/// True if no number is infinite or NaN: the product of such a number with zero is NaN.
+bool is_finite(const Reference& reference) {
+  double sum = 0.0;
+  for (const std::array<double, 3>* vector :
+       {&reference.position_m(), &reference.velocity_m_s(), &reference.acceleration_m_s2(),
+        &reference.jerk_m_s3(), &reference.snap_m_s4()})
+    for (const double x : *vector) sum += 0.0 * x;
+  return sum == 0.0;
+}
+
 JudgedAnswer to_judged(const OfferedAnswer& answer) {
   const ControlCommand& command = answer.command;
   const auto& memory = command.controller().numbers();
@@ -29,6 +39,7 @@ JudgedAnswer to_judged(const OfferedAnswer& answer) {
   judged.is_memory_finite =
       std::all_of(memory.begin(), memory.end(), [](double x) { return std::isfinite(x); });
   judged.undefined = find_undefined(command);
+  judged.is_reference_finite = is_finite(command.reference());
   if (command.fault() != FAULT_NONE) judged.fault = bus::to_string(command.fault());
   judged.is_mission_failed = command.mission() == MISSION_FAILED;
   judged.is_mission_finished = command.mission() == MISSION_FINISHED;
@@ -195,7 +206,8 @@ void CommandGate::note_refusal(Client& client, const OfferedAnswer& answer,
 
 Verdict CommandGate::judge_past(const OfferedAnswer& answer, const bus::PeerId& sender) {
   const auto past = past_.find(answer.step);
-  if (past == past_.end()) return Verdict::kWrongStep;
+  if (past == past_.end())
+    return is_of_distant_standby(answer, sender) ? Verdict::kSuperseded : Verdict::kWrongStep;
   const auto& force = answer.command.f_Q_W_n();
   std::optional<Past>& first = past->second;
   if (first && first->sender == sender)
@@ -209,6 +221,14 @@ Verdict CommandGate::judge_past(const OfferedAnswer& answer, const bus::PeerId& 
   client->refusal.clear();
   first = Past{sender, force};
   return Verdict::kLate;
+}
+
+/// True for an answer older than the remembered ones while another client flies: its sender is far
+/// away, which is no mistake of a standby.
+bool CommandGate::is_of_distant_standby(const OfferedAnswer& answer, const bus::PeerId& sender) {
+  if (past_.empty() || answer.step >= past_.begin()->first || !find_client(sender)) return false;
+  const std::optional<Past>& last = past_.rbegin()->second;
+  return last && last->sender != sender;
 }
 
 void CommandGate::settle() {

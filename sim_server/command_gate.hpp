@@ -20,7 +20,7 @@ enum class Verdict {
   kAccepted,    ///< the answer to the awaited step; it will be applied
   kHeld,        ///< a valid answer of a client that is not the awaited one: kept for a take-over
   kDuplicate,   ///< copy of an accepted or held command
-  kSuperseded,  ///< valid, but a stronger client's answer was taken
+  kSuperseded,  ///< valid, but another client's answer was taken
   kLate,        ///< the first valid answer to a step that went by without one
   kNotFinite,
   kForceLimit,
@@ -131,6 +131,7 @@ class CommandGate {
 
   Verdict judge(const OfferedAnswer& answer, const bus::PeerId& sender);
   Verdict judge_past(const OfferedAnswer& answer, const bus::PeerId& sender);
+  bool is_of_distant_standby(const OfferedAnswer& answer, const bus::PeerId& sender);
   void count(Verdict verdict);
   bool is_refused(const Client& client) const {  // for the awaited step
     return !client.refusal.empty() && client.refused_step == step_;

@@ -20,8 +20,14 @@ void CommandStream::set_handler(Handler handler) {
   handler_ = std::move(handler);
 }
 
+std::map<bus::PeerId, double> CommandStream::take_stamps_ahead() {
+  const std::lock_guard lock(mutex_);
+  return stamps_.take();
+}
+
 void CommandStream::receive(const Commands& sample, const bus::PeerId& sender) {
   const std::lock_guard lock(mutex_);
+  stamps_.note(sender, reader_.written(), std::chrono::system_clock::now);
   if (handler_ && handler_(sample, sender)) return;
   mailbox_.put({sample, sender, std::chrono::steady_clock::now(), reader_.written()});
 }

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cstddef>
 #include <functional>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <set>
@@ -14,6 +15,7 @@
 #include "common/bus/node.hpp"
 #include "common/bus/participants.hpp"
 #include "common/config/scenario.hpp"
+#include "sim_server/stamp_check.hpp"
 #include "sim_server/state_stream.hpp"
 
 namespace sls::sim {
@@ -44,12 +46,17 @@ class CommandStream {
   std::optional<std::chrono::nanoseconds> lifespan() const { return reader_.lifespan(); }
   void ignore_lifespan(bool is_ignored) { reader_.ignore_lifespan(is_ignored); }
 
+  /// Senders of commands with a source timestamp in the future since the last call: how far ahead
+  /// of our clock, s.
+  std::map<bus::PeerId, double> take_stamps_ahead();
+
  private:
   void receive(const Commands& sample, const bus::PeerId& sender);
 
   app::Mailbox<ReceivedCommands>& mailbox_;
-  std::mutex mutex_;  // protects handler_
+  std::mutex mutex_;  // protects the members below
   Handler handler_;
+  StampCheck stamps_;
   bus::Reader<Commands> reader_;  // last: it calls `receive`
 };
 

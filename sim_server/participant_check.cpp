@@ -20,8 +20,11 @@ constexpr std::int64_t kStageTolerance_ns = 1'000'000'000;
 /// Fewer answers to earlier steps are no mistake: a client that was stopped for a while sends some.
 constexpr std::uint64_t kFewOldAnswers = 3;
 
+bool is_defined(ParticipantRole role) { return role == ROLE_CONTROLLER || role == ROLE_RECORDER; }
+
 std::string describe(const ParticipantCheck::Entry& entry) {
-  return fmt::format("{} '{}' on {}", bus::to_string(entry.announcement.role()),
+  const ParticipantRole role = entry.announcement.role();
+  return fmt::format("{} '{}' on {}", is_defined(role) ? bus::to_string(role) : "participant",
                      config::to_printable(entry.announcement.name().to_string(), 32),
                      config::to_printable(entry.announcement.host().to_string(), 64));
 }
@@ -45,6 +48,18 @@ std::string make_key(const bus::PeerId& peer, const std::string& what) {
   std::string key = "run ";
   for (const std::uint8_t byte : peer.bytes) key += fmt::format("{:02x}", byte);
   return key + " " + what;
+}
+
+/// True if there is a problem of `peer` already, which may explain others.
+bool is_named(const ParticipantCheck::Findings& findings, const bus::PeerId& peer) {
+  const std::string prefix = make_key(peer, "");
+  const auto own = findings.lower_bound(prefix);
+  return own != findings.end() && own->first.compare(0, prefix.size(), prefix) == 0;
+}
+
+std::chrono::milliseconds choose_patience(const Neighbourhood& neighbourhood) {
+  return neighbourhood.is_on_network ? ParticipantCheck::kPatienceOnNetwork
+                                     : ParticipantCheck::kPatience;
 }
 
 bool flies_any(const Participant& controller, const std::vector<std::uint32_t>& ids) {
@@ -155,6 +170,7 @@ void ParticipantCheck::note_taken(const OfferedAnswer& answer, const bus::PeerId
                                   Verdict verdict, const ControllerState& returned,
                                   const model::Measurement& state) {
   if (!rejections_.empty()) rejections_.erase(sender);
+  count(answer, sender, verdict);
   if (verdict != Verdict::kAccepted && verdict != Verdict::kHeld) return;
   const auto id =
       std::lower_bound(vehicle_ids_.begin(), vehicle_ids_.end(), answer.command.vehicle_id());
@@ -163,7 +179,23 @@ void ParticipantCheck::note_taken(const OfferedAnswer& answer, const bus::PeerId
   if (verdict != Verdict::kAccepted) return;
   flown.has_flown = true;
   check_stage(flown, answer, sender);
+  check_stage_name(flown, answer, sender);
   check_distance(flown, answer, state);
+}
+
+void ParticipantCheck::count(const OfferedAnswer& answer, const bus::PeerId& sender,
+                             Verdict verdict) {
+  const auto known = answers_.find(sender);
+  if (known == answers_.end() && answers_.size() >= kMostSenders) return;
+  Answers& answers = known != answers_.end() ? known->second : answers_[sender];
+  ++(verdict == Verdict::kDuplicate ? answers.copies : answers.steps);
+  if (answers.client_name != answer.client_name) answers.client_name = answer.client_name;
+}
+
+void ParticipantCheck::note_empty(const bus::PeerId& sender, std::uint64_t step) {
+  see(sender, "empty", [&] {
+    return fmt::format("vehicles at step {}: expected at least one answer, got none", step);
+  });
 }
 
 void ParticipantCheck::note_rejected(const OfferedAnswer& answer, const bus::PeerId& sender,
@@ -271,6 +303,20 @@ void ParticipantCheck::check_stage(Vehicle& vehicle, const OfferedAnswer& answer
   });
 }
 
+void ParticipantCheck::check_stage_name(Vehicle& vehicle, const OfferedAnswer& answer,
+                                        const bus::PeerId& sender) {
+  const auto& name = answer.command.reference().stage_name();
+  if (name.compare(vehicle.stage_name) != 0) {
+    vehicle.stage_name = name.to_string();
+    vehicle.is_stage_name_text = config::is_utf8(vehicle.stage_name);
+  }
+  if (!vehicle.is_stage_name_text)
+    see(sender, "stage name", [&] {
+      return fmt::format("reference.stage_name at step {}: expected UTF-8, got '{}'", answer.step,
+                         config::to_printable(vehicle.stage_name, 64));
+    });
+}
+
 void ParticipantCheck::check_distance(Vehicle& vehicle, const OfferedAnswer& answer,
                                       const model::Measurement& state) {
   const Eigen::Vector3d reference = bus::to_vector(answer.command.reference().position_m());
@@ -317,6 +363,7 @@ ParticipantCheck::Findings ParticipantCheck::look(const Neighbourhood& neighbour
   }
   look_for_twins(neighbourhood, findings);
   look_at_strangers(neighbourhood, announced, findings);
+  look_at_valid_answers(neighbourhood, announced, findings);
   look_at_answers(neighbourhood, announced, findings);
   for (auto it = pending_.begin(); it != pending_.end();)
     it = pending_now_.count(it->first) > 0 ? std::next(it) : pending_.erase(it);
@@ -342,10 +389,13 @@ void ParticipantCheck::look_at(const Entry& entry, const Neighbourhood& neighbou
                        to_words(announcement.contract_sha256().to_string()));
     return;  // the other fields may have another meaning
   }
+  look_at_role(entry, neighbourhood, findings);
   if (announcement.role() != ROLE_CONTROLLER || announcement.done()) return;
+  const std::chrono::milliseconds usual_patience = choose_patience(neighbourhood);
   if (announcement.run_id() != run_id_) {
     const std::string key = make_key(entry.peer, "run_id " + to_words(announcement.run_id()));
-    const Clock::duration patience = announcement.run_id() == 0 ? kPatience : kPatienceWithRun;
+    const auto patience =
+        announcement.run_id() == 0 ? usual_patience : std::max(usual_patience, kPatienceWithRun);
     if (may_fly_for_us(announcement, neighbourhood) && lasts(key, neighbourhood.now, patience))
       findings[key] =
           describe_field(entry, "run_id", to_words(run_id_), to_words(announcement.run_id()));
@@ -357,13 +407,49 @@ void ParticipantCheck::look_at(const Entry& entry, const Neighbourhood& neighbou
                        to_words(announcement.scenario_sha256().to_string()));
   if (const auto vehicles = find_wrong_vehicles(announcement, neighbourhood)) {
     const std::string key = make_key(entry.peer, "vehicle_ids " + *vehicles);
-    if (lasts(key, neighbourhood.now, kPatience))
+    if (lasts(key, neighbourhood.now, usual_patience))
       findings[key] =
           describe_field(entry, "vehicle_ids", config::to_vehicle_ranges(vehicle_ids_), *vehicles);
   }
   const auto library = refused_libraries_.find(entry.peer);
   if (library != refused_libraries_.end())
     findings[make_key(entry.peer, "library")] = library->second;
+  look_at_readiness(entry, neighbourhood, findings);
+}
+
+void ParticipantCheck::look_at_role(const Entry& entry, const Neighbourhood& neighbourhood,
+                                    Findings& findings) {
+  const Participant& announcement = entry.announcement;
+  const std::string name = announcement.name().to_string(), host = announcement.host().to_string();
+  for (const auto& [field, text] : {std::pair("name", name), std::pair("host", host)})
+    if (!config::is_utf8(text))
+      findings[make_key(entry.peer, field)] =
+          describe_field(entry, field, "UTF-8", "'" + config::to_printable(text, 64) + "'");
+  if (!is_defined(announcement.role()))
+    findings[make_key(entry.peer, "role")] =
+        describe_field(entry, "role", "controller or recorder",
+                       fmt::format("{}", static_cast<int>(announcement.role())));
+  if (announcement.role() == ROLE_RECORDER && neighbourhood.command_writers.count(entry.peer) > 0)
+    findings[make_key(entry.peer, "role")] =
+        describe_field(entry, "role", "controller, as it writes sls/command", "recorder");
+}
+
+/// Says why a client is not ready, or cannot be.
+void ParticipantCheck::look_at_readiness(const Entry& entry, const Neighbourhood& neighbourhood,
+                                         Findings& findings) {
+  if (neighbourhood.explained.count(entry.peer) > 0 || is_named(findings, entry.peer)) return;
+  const bool reads = neighbourhood.state_readers.count(entry.peer) > 0;
+  const bool writes = neighbourhood.command_writers.count(entry.peer) > 0;
+  if (entry.announcement.ready() && reads && writes) return;
+  const std::string missing = reads && writes ? ""
+                              : reads         ? "a writer of sls/command"
+                              : writes        ? "a reader of sls/state"
+                                              : "a reader of sls/state and a writer of sls/command";
+  const std::string key = make_key(entry.peer, "ready " + missing);
+  if (!lasts(key, neighbourhood.now, choose_patience(neighbourhood))) return;
+  findings[key] = missing.empty() ? describe_field(entry, "ready",
+                                                   "true, as its endpoints are matched", "false")
+                                  : describe(entry) + ": expected " + missing + ", got none";
 }
 
 /// The announced vehicles that no server flies, in words.
@@ -419,8 +505,7 @@ void ParticipantCheck::look_at_strangers(const Neighbourhood& neighbourhood,
   for (const auto& [peer, description] : neighbourhood.command_writers) {
     const std::string key = make_key(peer, "announcement");
     if (announced.count(peer) > 0 || neighbourhood.explained.count(peer) > 0) continue;
-    const bool may_announce = neighbourhood.announcement_writers.count(peer) > 0;
-    if (lasts(key, neighbourhood.now, may_announce ? kPatienceWithAnnouncement : kPatience))
+    if (lasts(key, neighbourhood.now, choose_patience(neighbourhood)))
       findings[key] = description +
                       ": writes sls/command: expected an announcement in sls/participant, got none";
   }
@@ -431,7 +516,37 @@ void ParticipantCheck::look_at_strangers(const Neighbourhood& neighbourhood,
     if (announcement && !may_fly_for_us(*announcement, neighbourhood)) continue;
     const bool is_certain = announcement && announcement->run_id() == run_id_;
     const std::string key = make_key(peer, "deadline");
-    if (is_certain || lasts(key, neighbourhood.now, kPatience)) findings[key] = text;
+    if (is_certain || lasts(key, neighbourhood.now, choose_patience(neighbourhood)))
+      findings[key] = text;
+  }
+}
+
+void ParticipantCheck::look_at_valid_answers(const Neighbourhood& neighbourhood,
+                                             const Senders& announced, Findings& findings) {
+  for (auto it = answers_.begin(); it != answers_.end();) {
+    auto& [peer, answers] = *it;
+    const auto known = announced.find(peer);
+    if (known == announced.end()) {
+      it = answers_.erase(it);
+      continue;
+    }
+    ++it;
+    const Entry& entry = *known->second;
+    const std::uint64_t steps = std::exchange(answers.steps, 0),
+                        copies = std::exchange(answers.copies, 0);
+    if (!(entry.announcement.name() == answers.client_name))
+      findings[make_key(peer, "client_name")] =
+          fmt::format("{}: sls/command client_name: expected '{}', as announced, got '{}'",
+                      describe(entry), config::to_printable(entry.announcement.name().to_string()),
+                      config::to_printable(answers.client_name));
+    const std::string done = make_key(peer, "done"), flood = make_key(peer, "copies");
+    if (entry.announcement.done() && steps > 0 && lasts(done, neighbourhood.now, kPatience))
+      findings[done] = describe_field(entry, "done", "false, as it still answers", "true");
+    const std::uint64_t each = copies / std::max<std::uint64_t>(steps, 1);
+    if (each > kMostCopies && lasts(flood, neighbourhood.now, kPatience))
+      findings[flood] =
+          fmt::format("{}: sls/command: expected one answer to each state, got {} copies of each",
+                      describe(entry), each);
   }
 }
 
@@ -444,6 +559,17 @@ void ParticipantCheck::look_at_answers(const Neighbourhood& neighbourhood, const
     const auto writer = neighbourhood.command_writers.find(peer);
     return writer != neighbourhood.command_writers.end() ? writer->second : std::string();
   };
+  for (const auto& [peer, ahead_s] : neighbourhood.stamps_ahead_s) {
+    const auto known = announced.find(peer);
+    if (known != announced.end() &&
+        neighbourhood.other_runs.count(known->second->announcement.run_id()) > 0)
+      continue;
+    see(peer, "stamp", [seconds = ahead_s] {
+      return fmt::format(
+          "source timestamp: expected none in the future, got {:.1f} s ahead of our clock",
+          seconds);
+    });
+  }
   for (auto it = seen_.begin(); it != seen_.end();) {
     auto& [key, seen] = *it;
     if (std::exchange(seen.is_fresh, false)) seen.last = now;
@@ -463,12 +589,8 @@ void ParticipantCheck::look_at_answers(const Neighbourhood& neighbourhood, const
       continue;
     }
     if (!rejections.since) rejections.since = now;
-    const auto own = findings.lower_bound(make_key(peer, ""));
-    const bool is_explained =
-        own != findings.end() &&
-        own->first.compare(0, make_key(peer, "").size(), make_key(peer, "")) == 0;
     const bool is_few = rejections.is_old && rejections.count < kFewOldAnswers;
-    if (!is_explained && !is_few && now - *rejections.since >= kPatienceWithAnswers)
+    if (!is_named(findings, peer) && !is_few && now - *rejections.since >= kPatienceWithAnswers)
       findings[make_key(peer, "rejected")] =
           fmt::format("{}: sls/command: {} answers rejected, none taken: {}",
                       describe(*known->second), rejections.count, rejections.defect);

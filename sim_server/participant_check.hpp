@@ -23,10 +23,14 @@ struct Neighbourhood {
   std::vector<bus::ParticipantDirectory::Entry> participants;  ///< of any run
   std::set<std::uint64_t> other_runs;                          ///< runs of other servers
   std::set<std::uint32_t> other_vehicles;                      ///< vehicles of other servers
+  /// On a network packets are lost, and discovery needs longer.
+  bool is_on_network = false;
   /// Participants with a matched writer of sls/command, as text.
   std::map<bus::PeerId, std::string> command_writers;
-  /// Participants with a writer of sls/participant: an announcement may still come.
-  std::set<bus::PeerId> announcement_writers;
+  std::set<bus::PeerId> state_readers;  ///< participants with a matched reader of sls/state
+  /// Participants whose commands carry a source timestamp in the future: how far ahead of our
+  /// clock, s.
+  std::map<bus::PeerId, double> stamps_ahead_s;
   /// Controllers whose writer offers no DEADLINE (bus::Node::find_missing_deadlines).
   std::map<bus::PeerId, std::string> missing_deadlines;
   /// Participants with another problem in discovery, which explains why no announcement comes.
@@ -42,9 +46,9 @@ class ParticipantCheck {
 
   /// A shorter problem is ignored, because discovery takes time.
   static constexpr std::chrono::milliseconds kPatience{1000};
-  /// Patience with a missing announcement on a lossy network: a peer learns of a reader from
-  /// discovery, which Fast DDS repeats once a second.
-  static constexpr std::chrono::milliseconds kPatienceWithAnnouncement{5000};
+  /// The same on a network that may lose packets: Fast DDS repeats lost discovery data once a
+  /// second.
+  static constexpr std::chrono::milliseconds kPatienceOnNetwork{5000};
   /// Patience with an announcement of a run that has just ended: its client joins the next run.
   static constexpr std::chrono::milliseconds kPatienceWithRun{1400};
   /// Patience with rejected answers while none is taken.
@@ -52,6 +56,8 @@ class ParticipantCheck {
   /// A problem of answers lasts this long after the last answer that shows it.
   static constexpr std::chrono::milliseconds kMemory{2000};
   static constexpr std::size_t kMostSenders = 64;
+  /// More copies of each answer are a flood. States that are sent again cause some.
+  static constexpr std::uint64_t kMostCopies = 30;
   /// Largest distance of load and quadrotor from the reference, in rod lengths.
   static constexpr double kMostRodLengths = 50.0;
 
@@ -76,6 +82,9 @@ class ParticipantCheck {
   void note_rejected(const OfferedAnswer& answer, const bus::PeerId& sender, Verdict verdict,
                      std::uint64_t step);
 
+  /// A sample of `sender` for this run and `step` answers no vehicle.
+  void note_empty(const bus::PeerId& sender, std::uint64_t step);
+
   /// All current problems. Call a few times a second.
   Findings look(const Neighbourhood& neighbourhood);
 
@@ -96,6 +105,12 @@ class ParticipantCheck {
     bool is_old = true;  // all were answers to earlier steps
     std::optional<Clock::time_point> since;
   };
+  /// The answers of a client that were not rejected.
+  struct Answers {
+    std::string client_name;   // in the last one
+    std::uint64_t steps = 0;   // since the last look, times vehicles
+    std::uint64_t copies = 0;  // since the last look
+  };
   /// A mistake in answers.
   struct Seen {
     std::string text;  // without the sender
@@ -115,6 +130,8 @@ class ParticipantCheck {
     std::uint64_t stage_start_step = 0;  // of the first answer with that stage
     bool is_stage_lost = false;          // an answer was behind the state's stage
     std::size_t numbers = 0;             // largest count in an answer so far
+    std::string stage_name;              // in the last accepted answer
+    bool is_stage_name_text = true;
     bool is_far = false;
     bool has_flown = false;
     // Of the client that flies or, before that, of the first one that is ready and not gone.
@@ -126,6 +143,8 @@ class ParticipantCheck {
   /// The library that `controller` should have loaded; null if it has loaded the right one.
   const Library* find_other_library(const Participant& controller) const;
 
+  void count(const OfferedAnswer& answer, const bus::PeerId& sender, Verdict verdict);
+  void check_stage_name(Vehicle& vehicle, const OfferedAnswer& answer, const bus::PeerId& sender);
   void check_memory(Vehicle& vehicle, const OfferedAnswer& answer, const bus::PeerId& sender,
                     const ControllerState& returned);
   void check_stage(Vehicle& vehicle, const OfferedAnswer& answer, const bus::PeerId& sender);
@@ -138,6 +157,11 @@ class ParticipantCheck {
                               std::uint64_t step) const;
 
   void look_at(const Entry& entry, const Neighbourhood& neighbourhood, Findings& findings);
+  void look_at_role(const Entry& entry, const Neighbourhood& neighbourhood, Findings& findings);
+  void look_at_readiness(const Entry& entry, const Neighbourhood& neighbourhood,
+                         Findings& findings);
+  void look_at_valid_answers(const Neighbourhood& neighbourhood, const Senders& announced,
+                             Findings& findings);
   bool may_fly_for_us(const Participant& controller, const Neighbourhood& neighbourhood) const;
   std::optional<std::string> find_wrong_vehicles(const Participant& announcement,
                                                  const Neighbourhood& neighbourhood) const;
@@ -159,6 +183,7 @@ class ParticipantCheck {
   std::vector<Vehicle> vehicles_;                         // as vehicle_ids_
   std::map<bus::PeerId, std::string> refused_libraries_;  // of clients that are not admitted
   std::map<bus::PeerId, Rejections> rejections_;
+  std::map<bus::PeerId, Answers> answers_;
   std::map<std::pair<bus::PeerId, std::string>, Seen> seen_;
   using Pair = std::pair<bus::PeerId, bus::PeerId>;
   std::optional<Pair> superseded_;                    // since the last look

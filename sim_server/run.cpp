@@ -325,7 +325,9 @@ void Run::look_for_problems() {
   }
   for (const bus::PeerId& peer : endpoints_.command_stream.matched())
     neighbourhood.command_writers[peer] = domain.describe(peer);
-  neighbourhood.announcement_writers = endpoints_.participants.writers();
+  neighbourhood.is_on_network = !domain.stays_on_this_machine();
+  neighbourhood.state_readers = endpoints_.states.matched();
+  neighbourhood.stamps_ahead_s = endpoints_.command_stream.take_stamps_ahead();
   endpoints_.servers.look_for_impostors();
   neighbourhood.missing_deadlines = domain.find_missing_deadlines();
   neighbourhood.explained = domain.find_misfits();

@@ -40,6 +40,8 @@ void Run::judge(const Commands& sample, const bus::PeerId& sender, bool is_early
   offered_.step = sample.step();
   offered_.client_name = sample.client_name().c_str();
   offered_.is_early = is_early;
+  if (sample.vehicles().empty() && sample.run_id() == run_id_)
+    check_.note_empty(sender, sample.step());
   for (const ControlCommand& command : sample.vehicles()) {
     offered_.command = command;
     VehicleFlight* vehicle = find_vehicle(command.vehicle_id());

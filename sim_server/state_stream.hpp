@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <set>
 #include <vector>
 
 #include "common/bus/node.hpp"
@@ -30,6 +31,9 @@ class StateStream {
   }
   /// Publishes the samples that hold a vehicle for which `is_wanted(index)` is true.
   void write_where(const std::function<bool(std::size_t)>& is_wanted);
+
+  /// Participants with a reader that is matched with this writer.
+  std::set<bus::PeerId> matched() const { return writer_.matched(); }
 
   /// While a Queue exists, `write` never blocks: it passes the samples to a separate thread, by a
   /// queue with room for `samples` of them.

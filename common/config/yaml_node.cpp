@@ -163,6 +163,16 @@ YamlNode parse_yaml(const std::string& text, const std::string& place) {
   return builder.root().value_or(nothing);
 }
 
+bool is_utf8(const std::string& text) {
+  std::size_t at = 0;
+  while (at < text.size()) {
+    const std::size_t length = calc_utf8_length(text, at);
+    if (length == 0) return false;
+    at += length;
+  }
+  return true;
+}
+
 std::string to_printable(const std::string& text, std::size_t most) {
   std::string printable;
   for (const char c : text) {

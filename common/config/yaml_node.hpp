@@ -29,6 +29,9 @@ YamlNode parse_yaml(const std::string& text, const std::string& place);
 /// The content of `node` in a few printable characters: `-0.16`, `"abc"`, `a list of 2`, `nothing`.
 std::string to_brief(const YamlNode& node);
 
+/// True if `text` is well-formed UTF-8.
+bool is_utf8(const std::string& text);
+
 /// `text`, cut after about `most` characters. Escapes all characters except printable ASCII.
 std::string to_printable(const std::string& text, std::size_t most = 40);
 

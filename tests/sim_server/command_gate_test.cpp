@@ -163,6 +163,36 @@ TEST_F(CommandGateTest, AnyNumberThatIsNotFiniteIsRefused) {
   EXPECT_EQ(gate_.counters().rejected_not_finite(), offered);
 }
 
+TEST_F(CommandGateTest, AReferenceThatIsNotFiniteIsRefusedAndNamed) {
+  const double infinity = std::numeric_limits<double>::infinity();
+  for (const double bad : {std::numeric_limits<double>::quiet_NaN(), infinity, -infinity})
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      std::array<OfferedAnswer, 5> answers;
+      answers.fill(make_answer(0));
+      answers[0].command.reference().position_m()[axis] = bad;
+      answers[1].command.reference().velocity_m_s()[axis] = bad;
+      answers[2].command.reference().acceleration_m_s2()[axis] = bad;
+      answers[3].command.reference().jerk_m_s3()[axis] = bad;
+      answers[4].command.reference().snap_m_s4()[axis] = bad;
+      for (const OfferedAnswer& answer : answers) EXPECT_EQ(offer_bad(answer), Verdict::kNotFinite);
+    }
+  EXPECT_EQ(gate_.refusal(),
+            "controller 'strong' answered step 0 with a number that is not finite in reference");
+}
+
+TEST_F(CommandGateTest, TheLargestNumbersOfAReferenceAreFinite) {
+  OfferedAnswer answer = make_answer(0);
+  answer.command.reference().snap_m_s4().fill(std::numeric_limits<double>::max());
+  answer.command.reference().jerk_m_s3().fill(std::numeric_limits<double>::lowest());
+  EXPECT_EQ(gate_.offer(answer, kStrongPeer), Verdict::kAccepted);
+}
+
+TEST_F(CommandGateTest, AFaultIsNamedRatherThanItsReference) {
+  OfferedAnswer answer = make_faulted(0, FAULT_FREE_FALL);
+  answer.command.reference().jerk_m_s3().fill(std::numeric_limits<double>::quiet_NaN());
+  EXPECT_EQ(offer_bad(answer), Verdict::kFault);
+}
+
 TEST_F(CommandGateTest, ACommandOfAnotherRunIsRefusedAndNotCountedAgainstTheClient) {
   OfferedAnswer command = make_answer(0);
   command.run_id = kRun + 1;
@@ -252,6 +282,32 @@ TEST_F(CommandGateTest, ACopyFromFarBackIsCountedAndMemoryStaysBounded) {
   EXPECT_EQ(gate_.offer(make_answer(9998), kStrongPeer), Verdict::kDuplicate);
   // The gate remembers few steps: an older copy counts as a wrong step.
   EXPECT_EQ(gate_.offer(make_answer(0), kStrongPeer), Verdict::kWrongStep);
+}
+
+// A standby that is further away than the remembered steps answers every state too late.
+TEST_F(CommandGateTest, OldAnswersOfADistantStandbyAreSupersededWhileAnotherClientFlies) {
+  set_clients({kStrong, kWeak});
+  for (std::uint64_t step = 0; step < 300; ++step) {
+    gate_.expect(step);
+    if (step >= 100)
+      EXPECT_EQ(gate_.offer(make_answer(step - 100), kWeakPeer), Verdict::kSuperseded);
+    gate_.offer(make_answer(step), kStrongPeer);
+  }
+  EXPECT_EQ(gate_.counters().superseded(), 200u);
+  EXPECT_EQ(sum_rejections(gate_.counters()), 0u);
+  gate_.expect(300);
+  EXPECT_EQ(gate_.offer(make_answer(100), kStranger), Verdict::kWrongStep);    // not a client
+  EXPECT_EQ(gate_.offer(make_answer(100), kStrongPeer), Verdict::kWrongStep);  // the one that flies
+  EXPECT_EQ(gate_.offer(make_answer(400), kWeakPeer), Verdict::kWrongStep);    // of the future
+  OfferedAnswer bad = make_answer(100);
+  bad.command.f_Q_W_n({0.0, 0.0, 300.0});
+  EXPECT_EQ(gate_.offer(bad, kWeakPeer), Verdict::kForceLimit);
+}
+
+TEST_F(CommandGateTest, OldAnswersOfTheOnlyClientThatAnswersAreWrongSteps) {
+  set_clients({kStrong, kWeak});
+  for (std::uint64_t step = 0; step < 300; ++step) gate_.expect(step);  // none came in time
+  EXPECT_EQ(gate_.offer(make_answer(100), kWeakPeer), Verdict::kWrongStep);
 }
 
 // --- refusals ------------------------------------------------------------------------------------

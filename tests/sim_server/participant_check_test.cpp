@@ -56,6 +56,12 @@ class ParticipantCheckTest : public testing::Test {
  protected:
   std::vector<std::string> look(std::chrono::milliseconds time = 0ms) {
     neighbourhood_.now = ParticipantCheck::Clock::time_point(1h + time);
+    if (are_matched_)
+      for (const Entry& entry : neighbourhood_.participants) {
+        if (entry.announcement.role() != ROLE_CONTROLLER) continue;
+        neighbourhood_.state_readers.insert(entry.peer);
+        neighbourhood_.command_writers.emplace(entry.peer, "'foo' (10.0.0.2)");
+      }
     std::vector<std::string> texts;
     for (const auto& [key, text] : check_.look(neighbourhood_)) texts.push_back(text);
     return texts;
@@ -80,6 +86,7 @@ class ParticipantCheckTest : public testing::Test {
 
   ParticipantCheck check_{kRun, make_scenario(), {0, 1}};
   Neighbourhood neighbourhood_;
+  bool are_matched_ = true;  // the endpoints of every controller
   model::Measurement state_;
 };
 
@@ -167,6 +174,75 @@ TEST_F(ParticipantCheckTest, AnotherScenarioIsNamedWithBoth) {
                          ", got " + std::string(64, 'b')));
 }
 
+TEST_F(ParticipantCheckTest, ARunIsWaitedForLongerOnANetwork) {
+  auto entry = make_entry(1), earlier = make_entry(2);
+  entry.announcement.run_id(0);
+  earlier.announcement.run_id(0xcd);
+  neighbourhood_.is_on_network = true;
+  neighbourhood_.participants = {entry, earlier};
+  EXPECT_TRUE(look().empty());
+  EXPECT_TRUE(look(4900ms).empty());
+  EXPECT_EQ(look(5s).size(), 2u);
+}
+
+TEST_F(ParticipantCheckTest, ARoleThatIsNotDefinedIsNamed) {
+  neighbourhood_.participants = {make_entry(1, "foo", static_cast<ParticipantRole>(7))};
+  EXPECT_EQ(look(), only("participant 'foo' on box: sls/participant role: expected controller or "
+                         "recorder, got 7"));
+}
+
+TEST_F(ParticipantCheckTest, ARecorderThatWritesCommandsIsNamed) {
+  neighbourhood_.participants = {make_entry(1, "foo", ROLE_RECORDER)};
+  EXPECT_TRUE(look().empty());
+  neighbourhood_.command_writers[make_peer(1)] = "'foo' (10.0.0.2)";
+  EXPECT_EQ(look(), only("recorder 'foo' on box: sls/participant role: expected controller, as it "
+                         "writes sls/command, got recorder"));
+}
+
+TEST_F(ParticipantCheckTest, AClientThatIsNeverReadyIsNamedWithItsEndpoints) {
+  auto entry = make_entry(1);
+  entry.announcement.ready(false);
+  neighbourhood_.participants = {entry};
+  EXPECT_TRUE(look().empty());
+  EXPECT_TRUE(look(900ms).empty());
+  EXPECT_EQ(look(1s), only(kFoo + "sls/participant ready: expected true, as its endpoints are "
+                                  "matched, got false"));
+  neighbourhood_.participants[0].announcement.ready(true);
+  EXPECT_TRUE(look(2s).empty());
+}
+
+TEST_F(ParticipantCheckTest, AMissingEndpointIsNamed) {
+  are_matched_ = false;
+  neighbourhood_.participants = {make_entry(1)};
+  look();
+  EXPECT_EQ(look(1s), only(kFoo + "expected a reader of sls/state and a writer of sls/command, got "
+                                  "none"));
+  neighbourhood_.command_writers[make_peer(1)] = "'foo' (10.0.0.2)";
+  EXPECT_TRUE(look(2s).empty());
+  EXPECT_EQ(look(3s), only(kFoo + "expected a reader of sls/state, got none"));
+  neighbourhood_.command_writers.clear();
+  neighbourhood_.state_readers = {make_peer(1)};
+  look(4s);
+  EXPECT_EQ(look(5s), only(kFoo + "expected a writer of sls/command, got none"));
+  neighbourhood_.explained = {make_peer(1)};  // its writer has other QoS: already reported
+  EXPECT_TRUE(look(6s).empty());
+}
+
+TEST_F(ParticipantCheckTest, EndpointsAreWaitedForLongerOnANetwork) {
+  are_matched_ = false;
+  neighbourhood_.is_on_network = true;
+  neighbourhood_.participants = {make_entry(1)};
+  look();
+  EXPECT_TRUE(look(4900ms).empty());
+  EXPECT_EQ(look(5s).size(), 1u);
+}
+
+TEST_F(ParticipantCheckTest, ANameThatIsNotUtf8IsNamed) {
+  neighbourhood_.participants = {make_entry(1, "f\xfc\xfc"), make_entry(2, "f\xc3\xbc")};
+  EXPECT_EQ(look(), only("controller 'f\\xfc\\xfc' on box: sls/participant name: expected UTF-8, "
+                         "got 'f\\xfc\\xfc'"));
+}
+
 TEST_F(ParticipantCheckTest, NamesAreShownPrintable) {
   auto entry = make_entry(1, "evil\n\x1b[2J");
   entry.announcement.run_id(0);
@@ -241,9 +317,9 @@ TEST_F(ParticipantCheckTest, AWriterOfCommandsWithoutAnAnnouncementIsNamedOnceTh
   EXPECT_TRUE(look(2s).empty());
 }
 
-TEST_F(ParticipantCheckTest, AnAnnouncementThatMayBeOnItsWayIsWaitedForLonger) {
+TEST_F(ParticipantCheckTest, AnAnnouncementIsWaitedForLongerOnANetwork) {
   neighbourhood_.command_writers[make_peer(1)] = "'foo' (10.0.0.2)";
-  neighbourhood_.announcement_writers = {make_peer(1)};
+  neighbourhood_.is_on_network = true;
   EXPECT_TRUE(look().empty());
   EXPECT_TRUE(look(4900ms).empty());  // time for several losses in a row
   EXPECT_EQ(look(5s).size(), 1u);
@@ -369,6 +445,96 @@ TEST_F(ParticipantCheckTest, TwoAnswersToOneStepAreNamed) {
   take(make_answer(12));
   reject(make_answer(12), Verdict::kContradiction, 12);
   EXPECT_EQ(look(), only(kFoo + "sls/command step 12: expected one answer, got two that differ"));
+}
+
+TEST_F(ParticipantCheckTest, AnAnswerForNoVehicleIsNamed) {
+  neighbourhood_.participants = {make_entry(1)};
+  check_.note_empty(make_peer(1), 3);
+  EXPECT_EQ(look(), only(kFoo + "sls/command vehicles at step 3: expected at least one answer, got "
+                                "none"));
+  EXPECT_TRUE(look(3s).empty());
+}
+
+TEST_F(ParticipantCheckTest, AnswersOfAClientUnderAnotherNameAreNamed) {
+  neighbourhood_.participants = {make_entry(1)};
+  take(make_answer(0));
+  EXPECT_TRUE(look().empty());
+  OfferedAnswer answer = make_answer(1);
+  answer.client_name = "bar";
+  take(answer);
+  const auto expected =
+      only(kFoo + "sls/command client_name: expected 'foo', as announced, got 'bar'");
+  EXPECT_EQ(look(), expected);
+  EXPECT_EQ(look(9s), expected);  // also while the flight is paused
+  neighbourhood_.participants = {};
+  EXPECT_TRUE(look(10s).empty());
+}
+
+TEST_F(ParticipantCheckTest, AClientThatIsDoneAndStillAnswersIsNamed) {
+  neighbourhood_.participants = {make_entry(1)};
+  neighbourhood_.participants[0].announcement.done(true);
+  take(make_answer(0));
+  EXPECT_TRUE(look().empty());  // it may have been sent before
+  EXPECT_TRUE(look(500ms).empty());
+  for (std::uint64_t step = 1; step < 10; ++step) {
+    take(make_answer(step));
+    const auto found = look(500ms + step * 200ms);
+    if (step < 6)
+      EXPECT_TRUE(found.empty()) << step;
+    else
+      EXPECT_EQ(found, only(kFoo + "sls/participant done: expected false, as it still answers, got "
+                                   "true"));
+  }
+  EXPECT_TRUE(look(5s).empty());
+}
+
+TEST_F(ParticipantCheckTest, AFloodOfCopiesIsNamed) {
+  neighbourhood_.participants = {make_entry(1)};
+  const auto answer_steps = [&](int copies) {
+    for (std::uint64_t step = 0; step < 10; ++step) {
+      take(make_answer(step));
+      for (int i = 0; i < copies; ++i) take(make_answer(step), {}, Verdict::kDuplicate);
+    }
+  };
+  for (int i = 0; i < 20; ++i) {  // of states that were sent again
+    answer_steps(20);
+    EXPECT_TRUE(look(i * 100ms).empty());
+  }
+  for (int i = 0; i <= 10; ++i) {
+    answer_steps(99);
+    EXPECT_EQ(look(2s + i * 100ms),
+              i < 10 ? std::vector<std::string>()
+                     : only(kFoo + "sls/command: expected one answer to each state, got 99 copies "
+                                   "of each"));
+  }
+}
+
+TEST_F(ParticipantCheckTest, AStampInTheFutureIsNamedForATime) {
+  neighbourhood_.participants = {make_entry(1), make_entry(2, "bar")};
+  neighbourhood_.participants[1].announcement.run_id(0xcd);
+  neighbourhood_.other_runs = {0xcd};
+  neighbourhood_.stamps_ahead_s = {{make_peer(1), 5.04}, {make_peer(2), 5.04}};
+  const auto expected = only(kFoo +
+                             "sls/command source timestamp: expected none in the future, got "
+                             "5.0 s ahead of our clock");
+  EXPECT_EQ(look(), expected);
+  neighbourhood_.stamps_ahead_s.clear();
+  EXPECT_EQ(look(2s), expected);
+  EXPECT_TRUE(look(2001ms).empty());
+}
+
+TEST_F(ParticipantCheckTest, AStageNameThatIsNotUtf8IsNamed) {
+  neighbourhood_.participants = {make_entry(1)};
+  OfferedAnswer answer = make_answer(4);
+  answer.command.reference().stage_name("h\xf6he");
+  for (int i = 0; i < 3; ++i, ++answer.step) {
+    take(answer);
+    EXPECT_EQ(look(i * 2s), only(kFoo + "sls/command reference.stage_name at step 4: expected "
+                                        "UTF-8, got 'h\\xf6he'"));
+  }
+  answer.command.reference().stage_name("h\xc3\xb6he");
+  take(answer);
+  EXPECT_TRUE(look(7s).empty());
 }
 
 TEST_F(ParticipantCheckTest, AStageThatIsNotReturnedIsNamed) {
