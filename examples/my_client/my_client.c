@@ -1,5 +1,7 @@
 // A client in C on Eclipse Cyclone DDS: write `answer`, leave the rest.  my_client [DOMAIN]
 #include <dds/dds.h>
+#include <math.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,8 +16,8 @@ static const double kLoadPoint[3] = {1, -1, -2};  // m; z down
 static const double kDuration = 20;               // s
 
 /// Sets `force` on the quadrotor (N, includes the weight) from `time` (s) for one `period` (s), and
-/// its reference. `memory` comes back at the next step; zeros at step 0. Returns true at the end of
-/// the mission. Equal arguments must give equal answers: no clock, no static variables.
+/// always its reference. `memory` comes back at the next step; zeros at step 0. Returns true at the
+/// end of the mission. Equal arguments, equal answers: no clock, no static variables.
 static bool answer(const sls_VehicleParameters* vehicle, const sls_PlantState* state, double time,
                    double period, double memory[], double force[3], sls_Reference* reference) {
   const double mass = vehicle->quad_mass_kg + vehicle->load_mass_kg;
@@ -42,6 +44,10 @@ typedef struct Run {
 
 static Run runs[16], *run = NULL;  // run: the one that is flown
 static dds_entity_t participant, parameters, status, presence, state, command;
+static dds_time_t announced;  // time of the last announcement
+static volatile sig_atomic_t is_stopped = 0;
+
+static void stop(int signal) { is_stopped = signal; }
 
 static dds_return_t expect(dds_return_t result, const char* what) {
   if (result >= 0) return result;
@@ -57,7 +63,7 @@ static dds_entity_t make(const dds_topic_descriptor_t* type, const char* name, i
   dds_qset_reliability(qos, (dds_reliability_kind_t)is_reliable, DDS_SECS(5));
   dds_qset_durability(qos, is_reliable ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
   dds_qset_history(qos, depth ? DDS_HISTORY_KEEP_LAST : DDS_HISTORY_KEEP_ALL, depth);
-  if (type == &sls_Commands_desc) dds_qset_deadline(qos, DDS_MSECS(100));  // requested in real time
+  if (type == &sls_Commands_desc) dds_qset_deadline(qos, DDS_MSECS(100));  // also in lockstep
   const dds_entity_t topic = expect(dds_create_topic(participant, type, name, NULL, NULL), name);
   const dds_entity_t made =
       (is_writer ? dds_create_writer : dds_create_reader)(participant, topic, qos, NULL);
@@ -105,9 +111,12 @@ static void listen_to_servers(void) {
     runs[next].status.run_id = 0;
     if (&runs[(next + 1) % 16] == run) ++next;
   }
-  while (take(status, &news, &info))
+  while (take(status, &news, &info)) {
+    const dds_instance_handle_t sender = find_participant(status, info.publication_handle);
     for (Run* known = runs; known < runs + 16; ++known)
-      if (known->parameters.run_id == news.run_id) known->status = news, known->heard = dds_time();
+      if (known->parameters.run_id == news.run_id && (known->server == sender || !sender))
+        known->status = news, known->heard = dds_time();
+  }
 }
 
 /// A run to join: its server is alive and has claimed its vehicles, and the run has not ended.
@@ -135,41 +144,69 @@ static void announce(bool ready, bool done) {
   strcpy(self.contract_sha256, SLS_CONTRACT_SHA256);
   strcpy(self.scenario_sha256, run->parameters.scenario_sha256);
   expect(dds_write(presence, &self), "sls/participant");
+  announced = dds_time();
 }
 
-static void answer_states(void) {
-  static sls_States states;
+/// Answers every vehicle in the sample `states`.
+static void answer_sample(const sls_States* states) {
   static sls_ControlCommand answers[64];
   static double memory[64][kMemory];
   const double period = 1e-9 * (double)run->parameters.period_ns;
-  for (dds_sample_info_t info; take(state, &states, &info);) {
-    if (states.run_id != run->parameters.run_id) continue;
-    const double time = 1e-9 * (double)states.sim_time_ns;
-    const sls_VehicleParameters* vehicle = run->parameters.vehicles._buffer;  // by ascending id
-    for (uint32_t i = 0; i < states.vehicles._length; ++i) {
-      const dds_time_t began = dds_time();
-      const sls_VehicleState* asked = &states.vehicles._buffer[i];
-      while (vehicle->vehicle_id != asked->vehicle_id) ++vehicle;
-      const dds_sequence_double* earlier = &asked->controller.numbers;  // none at step 0
-      for (uint32_t k = 0; k < kMemory; ++k)
-        memory[i][k] = k < earlier->_length ? earlier->_buffer[k] : 0;
-      sls_ControlCommand* out = &answers[i];
-      *out = (sls_ControlCommand){.vehicle_id = asked->vehicle_id};
-      if (answer(vehicle, &asked->measured, time, period, memory[i], out->f_Q_W_n, &out->reference))
-        out->mission = sls_MISSION_FINISHED;
-      out->controller.numbers = (dds_sequence_double){kMemory, kMemory, memory[i], false};
-      out->compute_time_ns = (uint64_t)(dds_time() - began);
+  const double time = 1e-9 * (double)states->sim_time_ns;
+  const sls_VehicleParameters* vehicle = run->parameters.vehicles._buffer;  // by ascending id
+  for (uint32_t i = 0; i < states->vehicles._length; ++i) {
+    const dds_time_t began = dds_time();
+    const sls_VehicleState* asked = &states->vehicles._buffer[i];
+    while (vehicle->vehicle_id != asked->vehicle_id) ++vehicle;
+    const dds_sequence_double* earlier = &asked->controller.numbers;  // none at step 0
+    for (uint32_t k = 0; k < kMemory; ++k)
+      memory[i][k] = k < earlier->_length ? earlier->_buffer[k] : 0;
+    sls_ControlCommand* out = &answers[i];
+    *out = (sls_ControlCommand){.vehicle_id = asked->vehicle_id};
+    if (answer(vehicle, &asked->measured, time, period, memory[i], out->f_Q_W_n, &out->reference))
+      out->mission = sls_MISSION_FINISHED;
+    if (!isfinite(out->f_Q_W_n[0] + out->f_Q_W_n[1] + out->f_Q_W_n[2])) {  // never send NaN
+      *out = (sls_ControlCommand){.vehicle_id = asked->vehicle_id, .mission = sls_MISSION_FAILED};
+      out->fault = sls_FAULT_NOT_FINITE;
+      memset(memory[i], 0, sizeof memory[i]);
     }
-    sls_Commands said = {states.run_id, states.step, "", kStrength, {64, 0, answers, false}};
-    said.vehicles._length = states.vehicles._length;
-    strcpy(said.client_name, kName);
-    expect(dds_write(command, &said), "sls/command");
+    out->controller.numbers = (dds_sequence_double){kMemory, kMemory, memory[i], false};
+    out->compute_time_ns = (uint64_t)(dds_time() - began);
   }
+  sls_Commands said = {states->run_id, states->step, "", kStrength, {64, 0, answers, false}};
+  said.vehicles._length = states->vehicles._length;
+  strcpy(said.client_name, kName);
+  expect(dds_write(command, &said), "sls/command");
+}
+
+/// Answers the newest of the states that have arrived, once. In a fleet: of each group of vehicles.
+static void answer_states(void) {
+  static dds_instance_handle_t writer, sender;  // the participant of the writer heard last
+  void* samples[64] = {NULL};                   // lent by the reader
+  dds_sample_info_t infos[64];
+  const int count = expect(dds_take(state, samples, infos, 64, 64), "sls/state");
+  for (int i = count - 1; i >= 0; --i) {
+    const sls_States* states = samples[i];
+    if (infos[i].publication_handle != writer || !sender)
+      sender = find_participant(state, writer = infos[i].publication_handle);
+    bool is_newest = infos[i].valid_data && sender == run->server &&  // not of another program
+                     states->run_id == run->parameters.run_id && states->vehicles._length > 0;
+    infos[i].valid_data = is_newest;
+    for (int k = i + 1; k < count && is_newest; ++k)
+      is_newest = !infos[k].valid_data || ((sls_States*)samples[k])->vehicles._buffer->vehicle_id !=
+                                              states->vehicles._buffer->vehicle_id;
+    if (is_newest) answer_sample(states);
+  }
+  if (count > 0) dds_return_loan(state, samples, count);
 }
 
 int main(int argc, char** argv) {
-  participant =
-      expect(dds_create_participant(argc > 1 ? (uint32_t)atoi(argv[1]) : 0, NULL, NULL), "DDS");
+  signal(SIGINT, stop), signal(SIGTERM, stop);
+  const uint32_t domain = argc > 1 ? (uint32_t)atoi(argv[1]) : 0;
+  dds_qos_t* qos = dds_create_qos();
+  dds_qset_entity_name(qos, kName);  // names this client before it has announced itself
+  participant = expect(dds_create_participant(domain, qos, NULL), "DDS");
+  dds_delete_qos(qos);
   parameters = make(&sls_Parameters_desc, "sls/parameters", 0);
   status = make(&sls_SimStatus_desc, "sls/status", 0);
   presence = make(&sls_Participant_desc, "sls/participant", 32);
@@ -179,7 +216,8 @@ int main(int argc, char** argv) {
   dds_waitset_attach(arrival, dds_create_readcondition(state, DDS_ANY_STATE), 0);
   const dds_time_t began = dds_time();
   bool is_ready = false;
-  while (!run || run->status.phase <= sls_PHASE_PAUSED || run->status.phase == sls_PHASE_RESET) {
+  while (!is_stopped &&
+         (!run || run->status.phase <= sls_PHASE_PAUSED || run->status.phase == sls_PHASE_RESET)) {
     dds_waitset_wait(arrival, NULL, 0, DDS_MSECS(20));
     if (run) answer_states();
     listen_to_servers();
@@ -192,9 +230,11 @@ int main(int argc, char** argv) {
       expect(DDS_RETCODE_TIMEOUT, "no server");
     } else if (run && !is_ready && is_matched(state) && is_matched(command)) {
       announce(is_ready = true, false);
+    } else if (run && dds_time() - announced > DDS_MSECS(500)) {
+      announce(is_ready, false);
     }
   }
-  announce(false, true);
+  if (run) announce(false, true);
   dds_delete(participant);  // waits until the writers' samples are acknowledged
-  return run->status.phase == sls_PHASE_FINISHED ? 0 : 1;
+  return run && run->status.phase == sls_PHASE_FINISHED ? 0 : 1;
 }
