@@ -37,6 +37,7 @@ using namespace std::chrono_literals;
 
 struct Options {
   int domain = 0;
+  std::string interface = "127.0.0.1";
   std::string mistake = "none";
   std::string name = "foreign";
   std::string library;
@@ -94,7 +95,7 @@ class ForeignClient {
     qos.name(options.name.c_str());
     qos.transport().use_builtin_transports = false;
     const auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
-    udp->interfaceWhiteList.push_back("127.0.0.1");
+    udp->interfaceWhiteList.push_back(options.interface);
     qos.transport().user_transports.push_back(udp);
     participant_ = dds::DomainParticipantFactory::get_instance()->create_participant(
         static_cast<std::uint32_t>(options.domain), qos);
@@ -198,7 +199,8 @@ class ForeignClient {
     create_command_writer();
     parameters_reader_ = create_reader(create_topic<ParametersPubSubType>("sls/parameters"), true);
     status_reader_ = create_reader(create_topic<SimStatusPubSubType>("sls/status"), true);
-    state_reader_ = create_reader(create_topic<StatesPubSubType>("sls/state"), false);
+    if (!makes("no_state_reader"))
+      state_reader_ = create_reader(create_topic<StatesPubSubType>("sls/state"), false);
   }
 
   void create_writers_of_a_server() {
@@ -278,7 +280,7 @@ class ForeignClient {
     message.contract_sha256(makes("other_contract") ? std::string(64, '0')
                             : makes("no_contract")  ? std::string()
                                                     : SLS_CONTRACT_SHA256);
-    message.role(ROLE_CONTROLLER);
+    message.role(makes("role_recorder") ? ROLE_RECORDER : ROLE_CONTROLLER);
     message.name(options_.name);
     message.host("elsewhere");
     message.vehicle_ids({makes("unknown_vehicle") ? 7u : 0u});
@@ -286,18 +288,21 @@ class ForeignClient {
     message.scenario_sha256(makes("other_scenario") ? std::string(64, 'f')
                                                     : parameters_->scenario_sha256().to_string());
     message.library_sha256(options_.library);
-    message.ready(true);
+    message.ready(!makes("never_ready"));
+    message.done(makes("done"));
     message.last_complete_step(-1);
     participant_writer_->write(&message);
     for (const char* mistake : {"zero_run_id", "other_run_id", "other_contract", "no_contract",
-                                "unknown_vehicle", "other_scenario", "announcement_extra_field"})
+                                "unknown_vehicle", "other_scenario", "announcement_extra_field",
+                                "role_recorder", "never_ready", "no_state_reader"})
       if (makes(mistake)) say_that_it_begins();
     if (!options_.library.empty()) say_that_it_begins();
   }
 
   void fly() {
     dds::SampleInfo info;
-    while (state_reader_->take_next_sample(&states_, &info) == ReturnCode_t::RETCODE_OK)
+    while (state_reader_ &&
+           state_reader_->take_next_sample(&states_, &info) == ReturnCode_t::RETCODE_OK)
       if (info.valid_data && states_.run_id() == parameters_->run_id()) answer();
   }
 
@@ -329,11 +334,11 @@ class ForeignClient {
     Commands answers;
     answers.run_id(makes("wrong_run") ? 0x1234 : parameters_->run_id());
     answers.step(step);
-    answers.client_name(options_.name);
+    answers.client_name(makes("other_name") ? "another" : options_.name);
     answers.strength(options_.strength);
     if (makes("wrong_vehicle")) command.vehicle_id(7);
-    answers.vehicles().push_back(command);
-    command_writer_->write(&answers);
+    if (!makes("empty")) answers.vehicles().push_back(command);
+    for (int i = makes("flood") ? 100 : 1; i > 0; --i) command_writer_->write(&answers);
     if (makes("early")) {  // an answer to a state not yet published
       answers.step(step + 2);
       command_writer_->write(&answers);
@@ -342,8 +347,9 @@ class ForeignClient {
       answers.vehicles().front().f_Q_W_n()[0] += 1e-3;
       command_writer_->write(&answers);
     }
-    for (const char* mistake : {"extra_field", "missing_field", "retyped_field", "wrong_run",
-                                "wrong_vehicle", "two_answers", "early"})
+    for (const char* mistake :
+         {"extra_field", "missing_field", "retyped_field", "wrong_run", "wrong_vehicle",
+          "two_answers", "early", "empty", "flood", "done", "other_name"})
       if (makes(mistake)) say_that_it_begins();
     if ((makes("numbers_lost") && step >= 250) || (makes("memory_lost") && time_s >= 1.0) ||
         (makes("stuck") && time_s >= 1.5) || (makes("far") && is_far(state)))
@@ -377,6 +383,7 @@ int main(int argc, char** argv) {
   CLI::App cli("A foreign controller with a mistake, for tests.");
   Options options;
   cli.add_option("--domain", options.domain);
+  cli.add_option("--interface", options.interface, "address");
   cli.add_option("--mistake", options.mistake);
   cli.add_option("--name", options.name);
   cli.add_option("--library", options.library, "SHA-256 of the library it says it has loaded");

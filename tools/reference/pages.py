@@ -215,7 +215,16 @@ The server counts these events in `counters` of `sls/status`; `status.csv` has a
 """
     text += make_table(["counter", "meaning"],
                        [[f"`{field}`", comment] for _, field, comment in structs["SyncCounters"]])
-    text += "\n## Kinds of an entry in sls/record\n\n"
+    text += """
+`stale` counts answers that reached the server. Fast DDS drops an expired answer earlier and without a count: then only
+`late` and `held` grow, as without a client. Its cause is the network, or a clock that is behind the server's.
+
+`rejected_not_finite` counts NaN and infinity in the force, the controller's numbers or the reference. A client that
+cannot compute an answer sends the error code `not_finite` instead.
+
+## Kinds of an entry in sls/record
+
+"""
     text += make_table(["number", "value", "meaning"],
                        [[str(number), f"`{value}`", comment]
                         for number, (value, comment) in enumerate(enums["AnswerKind"])])

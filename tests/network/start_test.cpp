@@ -1,0 +1,87 @@
+/// Starts of flights on a network that loses a fifth of its packets: discovery then takes seconds,
+/// and no program may take that for a mistake of another one.
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cstdlib>
+
+#include "tests/network/hosts_flight.hpp"
+
+namespace sls::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+class StartTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (const auto obstacle = Network::find_obstacle()) GTEST_SKIP() << *obstacle;
+    network_ = std::make_unique<Network>(kHosts);
+  }
+
+  /// The lines of `text` that name a mistake.
+  static std::string find_mistakes(const std::string& text) {
+    std::istringstream lines(text);
+    std::string mistakes;
+    for (std::string line; std::getline(lines, line);)
+      if (line.find(": warning: ") != line.npos && line.find("expected") != line.npos)
+        mistakes += line + "\n";
+    return mistakes;
+  }
+
+  std::unique_ptr<Network> network_;
+};
+
+/// SLS_LOSSY_STARTS=100 makes it a measurement; five at a time.
+TEST_F(StartTest, HealthyStartsWithTwentyPercentLossGiveNoFalseLine) {
+  const char* const wanted = std::getenv("SLS_LOSSY_STARTS");
+  const int starts = wanted ? std::atoi(wanted) : 3;
+  network_->lose(20);
+  const Profile profile(*network_, "wifi");
+  const TemporaryFolder folder;
+  const std::string file = make_scenario(folder, {{"timeout_s: 30", "timeout_s: 120"}});
+  for (int first = 0; first < starts; first += 5) {
+    std::vector<std::unique_ptr<Flight>> flights;
+    for (int i = first; i < std::min(first + 5, starts); ++i)
+      flights.push_back(std::make_unique<Flight>(file, profile.flight_options()));
+    for (const auto& flight : flights) {
+      EXPECT_TRUE(wait_until([&] { return flight->wait_for_steps(1); }, 120s)) << flight->outputs();
+      EXPECT_EQ(find_mistakes(flight->outputs()), "") << flight->outputs();
+    }
+  }
+  EXPECT_GT(network_->lost(), 100u);
+}
+
+/// The client that makes the mistake is on another host.
+TEST_F(StartTest, AMissingAnnouncementIsNamedWithin6sWithTwentyPercentLoss) {
+  network_->lose(20);
+  const Profile profile(*network_, "wifi");
+  const FlightOptions options = profile.flight_options();
+  const OwnDomain domain;
+  Process server(profile.before("server") + make_command("sim_server", domain.number(),
+                                                         {"--scenario", scenario("short")},
+                                                         options.qos_file));
+  const auto has = [](const Process& process, const char* text) {
+    return process.output().find(text) != std::string::npos;
+  };
+  ASSERT_TRUE(wait_until([&] { return has(server, "waiting for: "); })) << server.output();
+  Process client(network_->on("controller") +
+                 std::vector<std::string>{SLS_FOREIGN_CLIENT, "--domain", domain.text(),
+                                          "--interface", network_->address("controller"),
+                                          "--mistake", "unannounced_writer"});
+  ASSERT_TRUE(wait_until([&] { return has(client, "begins\n"); })) << client.output();
+  const auto began = std::chrono::steady_clock::now();
+  EXPECT_TRUE(wait_until(
+      [&] {
+        return has(server,
+                   "writes sls/command: expected an announcement in sls/participant, got none");
+      },
+      30s))
+      << server.output();
+  const std::chrono::duration<double> time = std::chrono::steady_clock::now() - began;
+  RecordProperty("seconds", std::to_string(time.count()));
+  EXPECT_LE(time.count(), 12.0) << server.output();
+}
+
+}  // namespace
+}  // namespace sls::test
