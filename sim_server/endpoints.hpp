@@ -67,6 +67,8 @@ struct Endpoints {
   /// In real time commands are read with DEADLINE and LIFESPAN, if the QoS file has them.
   Endpoints(bus::Node& node, std::size_t vehicles, config::SyncMode mode)
       : domain(node),
+        commands(kCommands),
+        command_stream(node, mode, commands),
         parameters_writer(node),
         participants(node),
         servers(node),
@@ -74,16 +76,17 @@ struct Endpoints {
         record_writer(node),
         status_writer(node),
         reply_writer(node),
-        commands(kCommands),
         requests(kRequests),
-        command_stream(node, mode, commands),
         request_reader(
             node, bus::kLatchedReaderProfile,
             [this](const SimControl& request, const bus::PeerId&) { requests.put(request); }) {}
 
   bus::Node& domain;
-  /// The first: a participant with the other writers, but without this one, is no server
-  /// (bus::ServerDirectory::look_for_impostors).
+  // The order is that in which another program discovers the endpoints. One that knows the writer
+  // of status knows all those before it. A participant with one of the other writers, but without
+  // that of parameters, is no server (bus::ServerDirectory::look_for_impostors).
+  app::Mailbox<ReceivedCommands> commands;
+  CommandStream command_stream;
   bus::Writer<Parameters> parameters_writer;
   bus::ParticipantDirectory participants;
   bus::ServerDirectory servers;
@@ -91,9 +94,7 @@ struct Endpoints {
   bus::Writer<RecordBatch> record_writer;
   bus::Writer<SimStatus> status_writer;
   bus::Writer<SimControlReply> reply_writer;
-  app::Mailbox<ReceivedCommands> commands;
   app::Mailbox<SimControl> requests;
-  CommandStream command_stream;
   bus::Reader<SimControl> request_reader;
 };
 

@@ -57,11 +57,6 @@ bool is_named(const ParticipantCheck::Findings& findings, const bus::PeerId& pee
   return own != findings.end() && own->first.compare(0, prefix.size(), prefix) == 0;
 }
 
-std::chrono::milliseconds choose_patience(const Neighbourhood& neighbourhood) {
-  return neighbourhood.is_on_network ? ParticipantCheck::kPatienceOnNetwork
-                                     : ParticipantCheck::kPatience;
-}
-
 bool flies_any(const Participant& controller, const std::vector<std::uint32_t>& ids) {
   return std::any_of(ids.begin(), ids.end(),
                      [&](std::uint32_t id) { return bus::flies_vehicle(controller, id); });
@@ -352,6 +347,15 @@ bool ParticipantCheck::lasts(const std::string& key, Clock::time_point now,
   return false;
 }
 
+bool ParticipantCheck::lasts_despite_losses(const std::string& key,
+                                            const Neighbourhood& neighbourhood, bool is_informed,
+                                            Clock::duration if_informed) {
+  if (!neighbourhood.is_on_network) return lasts(key, neighbourhood.now, kPatience);
+  // Another key, because the shorter patience begins when the participant is informed.
+  return is_informed ? lasts(key + " informed", neighbourhood.now, if_informed)
+                     : lasts(key, neighbourhood.now, kPatienceWithUninformed);
+}
+
 ParticipantCheck::Findings ParticipantCheck::look(const Neighbourhood& neighbourhood) {
   Findings findings;
   Senders announced;
@@ -391,12 +395,14 @@ void ParticipantCheck::look_at(const Entry& entry, const Neighbourhood& neighbou
   }
   look_at_role(entry, neighbourhood, findings);
   if (announcement.role() != ROLE_CONTROLLER || announcement.done()) return;
-  const std::chrono::milliseconds usual_patience = choose_patience(neighbourhood);
   if (announcement.run_id() != run_id_) {
     const std::string key = make_key(entry.peer, "run_id " + to_words(announcement.run_id()));
-    const auto patience =
-        announcement.run_id() == 0 ? usual_patience : std::max(usual_patience, kPatienceWithRun);
-    if (may_fly_for_us(announcement, neighbourhood) && lasts(key, neighbourhood.now, patience))
+    const bool is_informed = neighbourhood.informed.count(entry.peer) > 0;
+    const bool may_be_of_run_before = announcement.run_id() != 0 && !neighbourhood.is_on_network;
+    if (may_fly_for_us(announcement, neighbourhood) &&
+        (may_be_of_run_before
+             ? lasts(key, neighbourhood.now, kPatienceWithRun)
+             : lasts_despite_losses(key, neighbourhood, is_informed, kPatienceWithAnnouncement)))
       findings[key] =
           describe_field(entry, "run_id", to_words(run_id_), to_words(announcement.run_id()));
     return;
@@ -407,7 +413,7 @@ void ParticipantCheck::look_at(const Entry& entry, const Neighbourhood& neighbou
                        to_words(announcement.scenario_sha256().to_string()));
   if (const auto vehicles = find_wrong_vehicles(announcement, neighbourhood)) {
     const std::string key = make_key(entry.peer, "vehicle_ids " + *vehicles);
-    if (lasts(key, neighbourhood.now, usual_patience))
+    if (lasts_despite_losses(key, neighbourhood, true))
       findings[key] =
           describe_field(entry, "vehicle_ids", config::to_vehicle_ranges(vehicle_ids_), *vehicles);
   }
@@ -446,7 +452,10 @@ void ParticipantCheck::look_at_readiness(const Entry& entry, const Neighbourhood
                               : writes        ? "a reader of sls/state"
                                               : "a reader of sls/state and a writer of sls/command";
   const std::string key = make_key(entry.peer, "ready " + missing);
-  if (!lasts(key, neighbourhood.now, choose_patience(neighbourhood))) return;
+  // One that is informed knows our endpoints (endpoints.hpp).
+  const bool is_informed = neighbourhood.informed.count(entry.peer) > 0;
+  const auto patience = missing.empty() ? kPatienceWithAnnouncement : kPatienceOnNetwork;
+  if (!lasts_despite_losses(key, neighbourhood, is_informed, patience)) return;
   findings[key] = missing.empty() ? describe_field(entry, "ready",
                                                    "true, as its endpoints are matched", "false")
                                   : describe(entry) + ": expected " + missing + ", got none";
@@ -505,7 +514,7 @@ void ParticipantCheck::look_at_strangers(const Neighbourhood& neighbourhood,
   for (const auto& [peer, description] : neighbourhood.command_writers) {
     const std::string key = make_key(peer, "announcement");
     if (announced.count(peer) > 0 || neighbourhood.explained.count(peer) > 0) continue;
-    if (lasts(key, neighbourhood.now, choose_patience(neighbourhood)))
+    if (lasts_despite_losses(key, neighbourhood, neighbourhood.informed.count(peer) > 0))
       findings[key] = description +
                       ": writes sls/command: expected an announcement in sls/participant, got none";
   }
@@ -516,8 +525,8 @@ void ParticipantCheck::look_at_strangers(const Neighbourhood& neighbourhood,
     if (announcement && !may_fly_for_us(*announcement, neighbourhood)) continue;
     const bool is_certain = announcement && announcement->run_id() == run_id_;
     const std::string key = make_key(peer, "deadline");
-    if (is_certain || lasts(key, neighbourhood.now, choose_patience(neighbourhood)))
-      findings[key] = text;
+    const bool is_informed = neighbourhood.informed.count(peer) > 0;
+    if (is_certain || lasts_despite_losses(key, neighbourhood, is_informed)) findings[key] = text;
   }
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <csignal>
+#include <iterator>
 #include <thread>
 #include <utility>
 
@@ -327,6 +328,7 @@ void Run::look_for_problems() {
     neighbourhood.command_writers[peer] = domain.describe(peer);
   neighbourhood.is_on_network = !domain.stays_on_this_machine();
   neighbourhood.state_readers = endpoints_.states.matched();
+  neighbourhood.informed = find_informed();
   neighbourhood.stamps_ahead_s = endpoints_.command_stream.take_stamps_ahead();
   endpoints_.servers.look_for_impostors();
   neighbourhood.missing_deadlines = domain.find_missing_deadlines();
@@ -337,6 +339,19 @@ void Run::look_for_problems() {
   board_.problem = problems.describe();
   for (const std::string& event : check_.take_events()) board_.announce(event);
   announce_remarks();
+}
+
+/// Participants that have acknowledged the parameters and a status of this run.
+const std::set<bus::PeerId>& Run::find_informed() {
+  const auto has_all = [](auto& writer) { return writer.wait_for_acknowledgments(0ms); };
+  const auto readers = endpoints_.status_writer.matched();
+  const auto of_parameters = endpoints_.parameters_writer.matched();
+  if (!board_.has_published() || !has_all(endpoints_.status_writer) ||
+      !has_all(endpoints_.parameters_writer))
+    return informed_;
+  std::set_intersection(readers.begin(), readers.end(), of_parameters.begin(), of_parameters.end(),
+                        std::inserter(informed_, informed_.end()));
+  return informed_;
 }
 
 void Run::announce_remarks() {

@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -158,6 +159,7 @@ class Run {
   void report_silent_recorder();
   /// Looks for mistakes of the participants.
   void look_for_problems();
+  const std::set<bus::PeerId>& find_informed();
   /// Announces the plants' remarks on their vehicles.
   void announce_remarks();
   SyncCounters sum_counters() const;
@@ -173,6 +175,7 @@ class Run {
   bool is_step_published_ = false;
   OfferedAnswer offered_;  // reused for each answer
   std::uint64_t problems_version_ = 0;
+  std::set<bus::PeerId> informed_;  // participants that have acknowledged parameters and status
   std::uint64_t looked_at_version_ = 0;  // version of the participants
   Clock::time_point look_time_;
   std::uint64_t roster_version_ = 0;

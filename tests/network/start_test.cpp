@@ -53,7 +53,7 @@ TEST_F(StartTest, HealthyStartsWithTwentyPercentLossGiveNoFalseLine) {
 }
 
 /// The client that makes the mistake is on another host.
-TEST_F(StartTest, AMissingAnnouncementIsNamedWithin6sWithTwentyPercentLoss) {
+TEST_F(StartTest, AMissingAnnouncementIsNamedDespiteTwentyPercentLoss) {
   network_->lose(20);
   const Profile profile(*network_, "wifi");
   const FlightOptions options = profile.flight_options();
@@ -80,7 +80,9 @@ TEST_F(StartTest, AMissingAnnouncementIsNamedWithin6sWithTwentyPercentLoss) {
       << server.output();
   const std::chrono::duration<double> time = std::chrono::steady_clock::now() - began;
   RecordProperty("seconds", std::to_string(time.count()));
-  EXPECT_LE(time.count(), 12.0) << server.output();
+  // 5 s after the client has the parameters; with 20 % loss that takes another second or more.
+  EXPECT_GE(time.count(), 4.0) << server.output();
+  EXPECT_LE(time.count(), 20.0) << server.output();
 }
 
 }  // namespace

@@ -174,15 +174,19 @@ TEST_F(ParticipantCheckTest, AnotherScenarioIsNamedWithBoth) {
                          ", got " + std::string(64, 'b')));
 }
 
-TEST_F(ParticipantCheckTest, ARunIsWaitedForLongerOnANetwork) {
+TEST_F(ParticipantCheckTest, OnANetworkARunIsAskedForOnceTheClientHasParametersAndStatus) {
   auto entry = make_entry(1), earlier = make_entry(2);
   entry.announcement.run_id(0);
   earlier.announcement.run_id(0xcd);
   neighbourhood_.is_on_network = true;
   neighbourhood_.participants = {entry, earlier};
   EXPECT_TRUE(look().empty());
-  EXPECT_TRUE(look(4900ms).empty());
-  EXPECT_EQ(look(5s).size(), 2u);
+  neighbourhood_.informed = {make_peer(2)};
+  EXPECT_TRUE(look(5s).empty());
+  EXPECT_TRUE(look(7400ms).empty());
+  EXPECT_EQ(look(7500ms).size(), 1u);  // of the client that has them
+  EXPECT_EQ(look(14900ms).size(), 1u);
+  EXPECT_EQ(look(15s).size(), 2u);
 }
 
 TEST_F(ParticipantCheckTest, ARoleThatIsNotDefinedIsNamed) {
@@ -235,6 +239,15 @@ TEST_F(ParticipantCheckTest, EndpointsAreWaitedForLongerOnANetwork) {
   look();
   EXPECT_TRUE(look(4900ms).empty());
   EXPECT_EQ(look(5s).size(), 1u);
+}
+
+TEST_F(ParticipantCheckTest, OnANetworkAClientThatIsNeverReadyIsNamedWithin3s) {
+  neighbourhood_.is_on_network = true;
+  neighbourhood_.participants = {make_entry(1)};
+  neighbourhood_.participants[0].announcement.ready(false);
+  look();
+  EXPECT_TRUE(look(2400ms).empty());
+  EXPECT_EQ(look(2500ms).size(), 1u);
 }
 
 TEST_F(ParticipantCheckTest, ANameThatIsNotUtf8IsNamed) {
@@ -321,10 +334,16 @@ TEST_F(ParticipantCheckTest, AnAnnouncementIsWaitedForLongerOnANetwork) {
   neighbourhood_.command_writers[make_peer(1)] = "'foo' (10.0.0.2)";
   neighbourhood_.is_on_network = true;
   EXPECT_TRUE(look().empty());
-  EXPECT_TRUE(look(4900ms).empty());  // time for several losses in a row
-  EXPECT_EQ(look(5s).size(), 1u);
+  EXPECT_TRUE(look(8s).empty());  // its discovery is not complete
+  neighbourhood_.informed = {make_peer(1)};
+  EXPECT_TRUE(look(9s).empty());
+  EXPECT_TRUE(look(13900ms).empty());  // time for several losses in a row
+  EXPECT_EQ(look(14s).size(), 1u);
+  neighbourhood_.informed.clear();
+  EXPECT_TRUE(look(15s).empty());
+  EXPECT_EQ(look(30s).size(), 1u);
   neighbourhood_.participants = {make_entry(1, "foo")};
-  EXPECT_TRUE(look(6s).empty());
+  EXPECT_TRUE(look(31s).empty());
 }
 
 TEST_F(ParticipantCheckTest, AMissingDeadlineIsReportedOnlyOfOurControllers) {
