@@ -5,6 +5,7 @@
 
 #include "common/app/run_main.hpp"
 #include "common/bus/node.hpp"
+#include "common/bus/participants.hpp"
 #include "common/bus/qos_file.hpp"
 #include "common/bus/security_files.hpp"
 #include "common/config/scenario.hpp"
@@ -67,7 +68,7 @@ int main(int argc, char** argv) {
                  scenario.sync.period_ns * 1e-9);
       return;
     }
-    bus::Node node(options.qos_file, options.domain, "sim_server", kIdentity);
+    bus::Node node(options.qos_file, options.domain, bus::kServerNode, kIdentity);
     sim::Server(node, assignment, threads).run();
   });
 }

@@ -6,17 +6,13 @@
 
 #include "common/app/run_main.hpp"
 #include "common/app/wait.hpp"
+#include "sim_server/claim.hpp"
 #include "sim_server/lockstep_run.hpp"
 #include "sim_server/realtime_run.hpp"
 
 namespace sls::sim {
-namespace {
 
 using namespace std::chrono_literals;
-
-constexpr auto kClaimTime = 1s;  // time for other servers to object to a claim
-
-}  // namespace
 
 Server::Server(bus::Node& node, const Assignment& assignment, std::size_t threads)
     : assignment_(assignment),
@@ -46,10 +42,16 @@ std::unique_ptr<Run> Server::make_run(bool begins_paused) {
 }
 
 void Server::claim_vehicles(const Run& run) {
-  const auto settled = std::chrono::steady_clock::now() + kClaimTime;
-  while (std::chrono::steady_clock::now() < settled) {
+  const auto began = std::chrono::steady_clock::now();
+  while (true) {
+    // Of two servers the one that looks later finds the port of the other open and waits for its
+    // claim, however slow discovery is.
+    const bool is_settled = is_claim_settled(std::chrono::steady_clock::now() - began,
+                                             endpoints_.domain.stays_on_this_machine(),
+                                             endpoints_.servers.has_heard_every_claim());
     Run::check_stop();
-    run.check_claim();
+    run.check_claim();  // after the look at the claims: one may have come since
+    if (is_settled) return;
     std::this_thread::sleep_for(app::kPollTime);
   }
 }

@@ -30,6 +30,7 @@
 #include <system_error>
 #include <utility>
 
+#include "common/bus/fastdds/discovered_participants.hpp"
 #include "common/bus/fastdds/endpoints.hpp"
 #include "common/bus/fastdds/facts_of.hpp"
 #include "common/bus/fastdds/guarded_type.hpp"
@@ -158,15 +159,14 @@ struct Node::Impl {
     remove_stale_segments();
     auto& wire = qos.wire_protocol();
     // A node without shared memory leaves no port files, so its id would look free to the next one.
+    ports = {wire.port.portBase + wire.port.domainIDGain * domain + wire.port.offsetd1,
+             wire.port.participantIDGain};
     if (wire.participant_id < 0 && has_shared_memory(qos))
-      wire.participant_id = choose_participant_id(
-          {wire.port.portBase + wire.port.domainIDGain * domain + wire.port.offsetd1,
-           wire.port.participantIDGain},
-          find_own_participant_ids());
+      wire.participant_id = choose_participant_id(ports, find_own_participant_ids());
     const bool has_plain_submessages =
         is_secured && !are_submessages_protected(find_file(qos, kGovernance));
-    listener =
-        std::make_unique<ParticipantListener>(is_secured, &neighbours, has_plain_submessages);
+    listener = std::make_unique<ParticipantListener>(is_secured, &neighbours, &discovered,
+                                                     has_plain_submessages);
     participant = factory->create_participant(static_cast<std::uint32_t>(domain), qos,
                                               listener.get(), dds::StatusMask::none());
     if (participant)
@@ -294,6 +294,8 @@ struct Node::Impl {
   std::chrono::steady_clock::time_point joined;
   Problems problems;
   Neighbours neighbours{problems};
+  ParticipantPorts ports;
+  DiscoveredParticipants discovered;
   std::unique_ptr<ParticipantListener> listener;
   dds::DomainParticipant* participant = nullptr;
   dds::Publisher* publisher = nullptr;
@@ -321,6 +323,16 @@ const char* Node::choose_reader_profile(const char* profile, const char* fallbac
 }
 
 bool Node::stays_on_this_machine() const { return impl_->is_on_this_machine; }
+
+bool Node::has_discovered_this_machine() const {
+  // One is our own: it need not follow from our participant id, because of two processes that start
+  // together one gets the next port.
+  return impl_->discovered.find_unknown(find_open_ports(impl_->ports)).size() <= 1;
+}
+
+std::set<PeerId> Node::find_named(const std::string& name) const {
+  return impl_->discovered.find_named(name);
+}
 
 std::size_t Node::max_batch_bytes() const {
   constexpr std::size_t kMost = 12'000;

@@ -82,6 +82,13 @@ class Node {
   /// is lost.
   bool stays_on_this_machine() const;
 
+  /// True if each participant that has a discovery port of this domain open on this machine
+  /// (network namespace) has been discovered. It takes a system call or two.
+  bool has_discovered_this_machine() const;
+
+  /// Discovered participants with this name.
+  std::set<PeerId> find_named(const std::string& name) const;
+
   /// Mistakes of the other programs on the domain. Endpoints and samples that do not match ours are
   /// added automatically.
   Problems& problems() const;

@@ -386,6 +386,18 @@ std::optional<SimStatus> ServerDirectory::find_status(std::uint64_t run_id) cons
   return heard ? std::optional(heard->status) : std::nullopt;
 }
 
+bool ServerDirectory::has_heard_every_claim() const {
+  if (!node_.has_discovered_this_machine()) return false;
+  std::set<PeerId> servers = node_.find_named(kServerNode);
+  servers.merge(parameters_reader_.matched());
+  servers.erase(self_);
+  const std::lock_guard lock(mutex_);
+  return std::all_of(servers.begin(), servers.end(), [this](const PeerId& server) {
+    const auto known = servers_.find(server);
+    return known != servers_.end() && known->second.parameters;
+  });
+}
+
 bool ServerDirectory::is_present(const PeerId& server) const {
   return parameters_reader_.matched().count(server) > 0;
 }

@@ -113,6 +113,9 @@ struct RecorderPatience {
 void wait_for_recorders_to_end(const ParticipantDirectory& participants, std::uint64_t run_id,
                                int expected, const RecorderPatience& patience = {});
 
+/// Name of a server's node: others recognise it before they hear its claim.
+inline constexpr const char* kServerNode = "sim_server";
+
 /// A server's run as its samples describe it.
 struct Run {
   PeerId server;
@@ -154,6 +157,11 @@ class ServerDirectory {
 
   /// The last status of run `run_id`, even if its server has left.
   std::optional<SimStatus> find_status(std::uint64_t run_id) const;
+
+  /// True if this node has discovered every participant on this machine and heard the claim of
+  /// every server that it has discovered: of each writer of sls/parameters and each node
+  /// kServerNode.
+  bool has_heard_every_claim() const;
 
   /// True until the server has left, or its lease has run out.
   bool is_present(const PeerId& server) const;

@@ -202,26 +202,5 @@ TEST(UsageTest, SecondServerForAVehicleRefusesAndTheFirstFliesOn) {
   flight.expect_success();
 }
 
-TEST(UsageTest, OfTwoServersStartedTogetherOneFlies) {
-  OwnDomain domain;
-  const auto command =
-      make_command("sim_server", domain.number(), {"--scenario", scenario("short")});
-  Process one(command), two(command);
-  ASSERT_TRUE(wait_until([&] { return !one.is_running() || !two.is_running(); }))
-      << one.output() << two.output();
-  Process& loser = one.is_running() ? two : one;
-  Process& winner = one.is_running() ? one : two;
-  EXPECT_EQ(loser.wait(), 1) << loser.output();
-  EXPECT_NE(loser.output().find("vehicle 0: expected no other server"), std::string::npos)
-      << loser.output();
-  TemporaryFolder folder;
-  Process recorder(make_command("recorder", domain.number(), {"--out", folder / "recording"}));
-  Process client(
-      make_command("control_client", domain.number(), {"--scenario", scenario("short")}));
-  EXPECT_EQ(winner.wait(), 0) << winner.output();
-  EXPECT_EQ(client.wait(), 0) << client.output();
-  EXPECT_EQ(recorder.wait(), 0) << recorder.output();
-}
-
 }  // namespace
 }  // namespace sls::test

@@ -5,10 +5,12 @@
 
 #include <algorithm>
 #include <iterator>
+#include <set>
 #include <sstream>
 #include <string>
 #include <utility>
 
+#include "common/bus/fastdds/discovered_participants.hpp"
 #include "common/bus/fastdds/facts_of.hpp"
 #include "common/bus/fastdds/neighbours.hpp"
 #include "common/bus/fastdds/refusals.hpp"
@@ -17,18 +19,20 @@
 namespace sls::bus {
 
 /// Reports discovered, accepted and refused participants to `Refusals`, and all participants and
-/// endpoints to `Neighbours`. Our own endpoints have their own listeners. To be deleted with
-/// refusals.hpp and neighbours.hpp.
+/// endpoints to `Neighbours`, and all participants to `DiscoveredParticipants`. Our own endpoints
+/// have their own listeners. To be deleted with refusals.hpp and neighbours.hpp.
 class ParticipantListener : public eprosima::fastdds::dds::DomainParticipantListener {
  public:
   /// `is_secured`: true if this participant uses DDS Security; `has_plain_submessages`: and if its
   /// keys do not protect submessages, so that other vendors' readers get nothing (README.md, trap
   /// 28).
   explicit ParticipantListener(bool is_secured, Neighbours* neighbours = nullptr,
+                               DiscoveredParticipants* discovered = nullptr,
                                bool has_plain_submessages = false)
       : is_secured_(is_secured),
         has_plain_submessages_(has_plain_submessages),
-        neighbours_(neighbours) {}
+        neighbours_(neighbours),
+        discovered_(discovered) {}
 
   void on_participant_discovery(
       eprosima::fastdds::dds::DomainParticipant*,
@@ -39,11 +43,14 @@ class ParticipantListener : public eprosima::fastdds::dds::DomainParticipantList
     auto& refusals = Refusals::of_process();
     if (info.status == Info::DROPPED_PARTICIPANT || info.status == Info::REMOVED_PARTICIPANT) {
       if (neighbours_) neighbours_->drop_participant(peer);
+      if (discovered_) discovered_->drop(peer);
       return refusals.note_gone(guid);
     }
     if (neighbours_)
       neighbours_->note_participant(peer, info.info.m_participantName.to_string(),
                                     find_address(info.info), find_obstacle(info.info));
+    if (discovered_)
+      discovered_->note(peer, info.info.m_participantName.to_string(), find_ports(info.info));
     if (info.status != Info::DISCOVERED_PARTICIPANT) return;
     const auto& token = info.info.identity_token_;
     const bool is_other_secured = !token.class_id().empty();
@@ -122,6 +129,16 @@ class ParticipantListener : public eprosima::fastdds::dds::DomainParticipantList
     return "";
   }
 
+  /// The UDP ports at which it receives discovery data.
+  static std::set<int> find_ports(
+      const eprosima::fastrtps::rtps::ParticipantProxyData& participant) {
+    std::set<int> ports;
+    for (const auto& locator : participant.metatraffic_locators.unicast)
+      if (locator.kind == LOCATOR_KIND_UDPv4)
+        ports.insert(eprosima::fastrtps::rtps::IPLocator::getPhysicalPort(locator));
+    return ports;
+  }
+
   /// 'O=SLS, CN=…' of 'O=SLS, CN=identity authority …': certificate and authority that it claims.
   template <class Token>
   static std::string describe_identity(const Token& token) {
@@ -137,6 +154,7 @@ class ParticipantListener : public eprosima::fastdds::dds::DomainParticipantList
   const bool is_secured_;
   const bool has_plain_submessages_;
   Neighbours* const neighbours_;
+  DiscoveredParticipants* const discovered_;
 };
 
 }  // namespace sls::bus

@@ -19,9 +19,6 @@ constexpr std::string_view kPrefix = "fastrtps_", kLock = "_el";
 /// Younger segments may not be locked yet: a segment is created a moment before its lock is taken.
 constexpr auto kCreationTime = std::chrono::seconds(10);
 
-/// With more participants the ports of one domain would overlap those of the next.
-constexpr int kMaxParticipantIds = 110;
-
 /// "fastrtps_", sixteen hexadecimal digits, "_el": the lock file of a participant's segment.
 bool is_segment_lock(std::string_view name) {
   constexpr std::size_t kDigits = 16;

@@ -18,6 +18,9 @@ void remove_stale_segments(const std::filesystem::path& folder = "/dev/shm");
 std::vector<std::filesystem::path> find_stale_segments(
     const std::filesystem::path& folder = "/dev/shm");
 
+/// With more participants the ports of one domain would overlap those of the next.
+inline constexpr int kMaxParticipantIds = 110;
+
 /// Port numbers of RTPS participants: participant `id` has base + id × gain and the number after
 /// it.
 struct ParticipantPorts {

@@ -1,6 +1,9 @@
 #include "common/bus/participants.hpp"
 
 #include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
@@ -208,6 +211,49 @@ TEST(ServerDirectoryTest, AServerOfAnotherContractIsIgnoredAndReported) {
             "'other' (127.0.0.1): sls/parameters contract_sha256: expected " +
                 std::string(kContractSha256) + ", got " + std::string(64, '0'));
   EXPECT_FALSE(knows(directory, kRun));
+}
+
+TEST(ServerDirectoryTest, AServerIsAwaitedFromItsDiscoveryToItsClaim) {
+  Node node(kQosFile, own_domain(), "directory");
+  const ServerDirectory directory(node);
+  EXPECT_TRUE(directory.has_heard_every_claim());
+  Node client(kQosFile, own_domain(), "control_client"),
+      server(kQosFile, own_domain(), kServerNode);
+  ASSERT_TRUE(wait_until([&] { return !node.find_named(kServerNode).empty(); }));
+  EXPECT_FALSE(directory.has_heard_every_claim()) << "discovered without a writer";
+  Writer<Parameters> parameters(server);
+  ASSERT_TRUE(wait_until([&] { return directory.is_present(server.id()); }));
+  EXPECT_FALSE(directory.has_heard_every_claim()) << "matched without a sample";
+  parameters.write(make_parameters(kRun, {kVehicle}));
+  EXPECT_TRUE(wait_until([&] { return directory.has_heard_every_claim(); }));
+}
+
+TEST(ServerDirectoryTest, AWriterOfClaimsIsAwaitedUnderAnyName) {
+  Node node(kQosFile, own_domain(), "directory");
+  const ServerDirectory directory(node);
+  Node server(kQosFile, own_domain(), "another server");
+  Writer<Parameters> parameters(server);
+  ASSERT_TRUE(wait_until([&] { return directory.is_present(server.id()); }));
+  EXPECT_FALSE(directory.has_heard_every_claim());
+  parameters.write(make_parameters(kRun, {kVehicle}));
+  EXPECT_TRUE(wait_until([&] { return directory.has_heard_every_claim(); }));
+}
+
+TEST(ServerDirectoryTest, AProgramOfThisMachineIsAwaitedBeforeItIsDiscovered) {
+  Node node(kQosFile, own_domain(), "directory");
+  const ServerDirectory directory(node);
+  EXPECT_TRUE(directory.has_heard_every_claim());
+  {  // another process that has opened its port but has not been discovered
+    const int port = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    address.sin_port = htons(static_cast<std::uint16_t>(7410 + 250 * own_domain() + 2 * 100));
+    ASSERT_EQ(bind(port, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+    EXPECT_FALSE(directory.has_heard_every_claim());
+    close(port);
+  }
+  EXPECT_TRUE(directory.has_heard_every_claim());
 }
 
 TEST(ServerDirectoryTest, FindsTheRunToJoin) {
