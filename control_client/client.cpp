@@ -75,7 +75,7 @@ std::optional<bus::Run> Client::find_first_run() {
     if (wait.is_report_due())
       spdlog::info("waiting for: server of vehicle {} ({:.0f} s left){}{}", vehicles,
                    wait.seconds_left(), describe_problem(), node_.describe_isolation());
-    std::this_thread::sleep_for(app::kPollTime);
+    std::this_thread::sleep_for(app::kShortPollTime);
   }
   return std::nullopt;
 }

@@ -1,8 +1,10 @@
 #include "common/app/run_main.hpp"
+#include "common/bus/end_process.hpp"
 #include "common/bus/node.hpp"
 #include "common/bus/qos_file.hpp"
 #include "common/config/scenario.hpp"
 #include "common/config/vehicle_ids.hpp"
+#include "common/plugin/shared_library.hpp"
 #include "control_client/client.hpp"
 
 namespace {
@@ -39,7 +41,7 @@ int main(int argc, char** argv) {
       ->check(CLI::Validator(&control::describe_name_defect, ""))
       ->type_name("NAME");
 
-  return app::run_main(argc, argv, cli, options, "control_client", [&] {
+  const int code = app::run_main(argc, argv, cli, options, "control_client", [&] {
     const config::Scenario scenario = config::load_scenario(scenario_file);
     const auto vehicle_ids = config::parse_vehicle_ids(vehicles, scenario.vehicles.size());
     // Refuses a law that cannot be made before other programs wait for this client.
@@ -48,4 +50,6 @@ int main(int argc, char** argv) {
     bus::Node node(options.qos_file, options.domain, "control_client", kIdentity);
     control::Client(node, scenario, vehicle_ids, client).run();
   });
+  if (!plugin::is_any_loaded()) bus::end_process(code);
+  return code;
 }

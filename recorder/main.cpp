@@ -2,6 +2,7 @@
 
 #include "common/app/run_main.hpp"
 #include "common/app/scheduling.hpp"
+#include "common/bus/end_process.hpp"
 #include "common/bus/node.hpp"
 #include "common/bus/qos_file.hpp"
 #include "common/bus/security_files.hpp"
@@ -44,7 +45,7 @@ int main(int argc, char** argv) {
       "print the columns of every file as Markdown and exit");
   cli.add_flag("--check", check, "check QoS file and folder and exit");
 
-  return app::run_main(argc, argv, cli, options, "recorder", [&] {
+  const int code = app::run_main(argc, argv, cli, options, "recorder", [&] {
     bus::check_security_files(bus::read_qos_file(options.qos_file, kIdentity));
     if (resume)
       recorder.unfinished = record::find_unfinished_recording(recorder.folder);
@@ -57,4 +58,5 @@ int main(int argc, char** argv) {
     bus::Node node(options.qos_file, options.domain, "recorder", kIdentity);
     record::Recorder(node, recorder).run();
   });
+  bus::end_process(code);
 }

@@ -60,6 +60,14 @@ Json describe_machine() {
 /// Limit of vehicles of one server (idl/sls.idl).
 constexpr std::size_t kMaxVehicles = 256;
 
+/// Begins to write a file to the disk, without waiting for it.
+void begin_sync(const std::filesystem::path& path) {
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) return;                                  // sync_to_disk reports it
+  ::sync_file_range(descriptor, 0, 0, SYNC_FILE_RANGE_WRITE);  // only a hint
+  ::close(descriptor);
+}
+
 /// Synchronises a file or folder, because the files that a manifest lists must survive a power cut.
 void sync_to_disk(const std::filesystem::path& path) {
   const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
@@ -164,13 +172,14 @@ void write_manifest(const std::filesystem::path& folder, const Manifest& manifes
   const Parameters& parameters = manifest.parameters;
   const app::Unhurried unhurried;  // the files are synchronised and read once more
   Json files = Json::object();
+  for (const RecordedFile& file : manifest.files) begin_sync(file.path);
   for (const RecordedFile& file : manifest.files) {
-    sync_to_disk(file.path);
     Json entry;
     if (file.has_rows) entry["rows"] = file.rows;
     entry["sha256"] = config::calc_file_sha256(file.path);
     files[file.path.filename().string()] = entry;
   }
+  for (const RecordedFile& file : manifest.files) sync_to_disk(file.path);
   Json missing = Json::array();
   for (const MissingSteps& steps : manifest.missing.listed)
     missing.push_back({{"vehicle_id", steps.vehicle_id},

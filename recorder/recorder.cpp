@@ -29,7 +29,7 @@ std::optional<bus::Run> wait_for_run(const bus::Node& node, bus::Announcer& anno
     if (wait.is_report_due())
       spdlog::info("waiting for: {} ({:.0f} s left){}", whom, wait.seconds_left(),
                    node.describe_isolation());
-    std::this_thread::sleep_for(app::kPollTime);
+    std::this_thread::sleep_for(app::kShortPollTime);
   }
   return std::nullopt;
 }

@@ -4,12 +4,14 @@
 #include <thread>
 
 #include "common/app/run_main.hpp"
+#include "common/bus/end_process.hpp"
 #include "common/bus/node.hpp"
 #include "common/bus/participants.hpp"
 #include "common/bus/qos_file.hpp"
 #include "common/bus/security_files.hpp"
 #include "common/config/scenario.hpp"
 #include "common/config/vehicle_ids.hpp"
+#include "common/plugin/shared_library.hpp"
 #include "sim_server/server.hpp"
 
 namespace {
@@ -48,7 +50,7 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1, 256));
   cli.add_flag("--check", check, "check scenario and QoS file, print a summary and exit");
 
-  return app::run_main(argc, argv, cli, options, "sim_server", [&] {
+  const int code = app::run_main(argc, argv, cli, options, "sim_server", [&] {
     config::Scenario scenario = config::load_scenario(scenario_file);
     if (period_s) config::override_period(scenario, *period_s);
     if (!mode.empty())
@@ -71,4 +73,6 @@ int main(int argc, char** argv) {
     bus::Node node(options.qos_file, options.domain, bus::kServerNode, kIdentity);
     sim::Server(node, assignment, threads).run();
   });
+  if (!plugin::is_any_loaded()) bus::end_process(code);
+  return code;
 }

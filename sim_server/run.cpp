@@ -146,7 +146,7 @@ bool Run::wait_for_participants() {
       if (missing != published) board_.publish(PHASE_WAITING, "missing: " + missing);
       published = missing;
     }
-    std::this_thread::sleep_for(app::kPollTime);
+    std::this_thread::sleep_for(app::kShortPollTime);
   }
 }
 

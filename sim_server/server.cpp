@@ -52,7 +52,7 @@ void Server::claim_vehicles(const Run& run) {
     Run::check_stop();
     run.check_claim();  // after the look at the claims: one may have come since
     if (is_settled) return;
-    std::this_thread::sleep_for(app::kPollTime);
+    std::this_thread::sleep_for(app::kShortPollTime);
   }
 }
 

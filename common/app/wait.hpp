@@ -7,6 +7,9 @@ namespace sls::app {
 /// Interval of the waiting loops of the programs, which are not urgent.
 inline constexpr auto kPollTime = std::chrono::milliseconds(20);
 
+/// The same before the first step and after the last one: a flight can be shorter than these waits.
+inline constexpr auto kShortPollTime = std::chrono::milliseconds(5);
+
 /// Discovery and claim usually take less: a program that joins a run reports its waiting after
 /// this.
 inline constexpr auto kUsualJoinTime = std::chrono::milliseconds(1500);

@@ -179,7 +179,7 @@ void wait_for_recorders_to_end(const ParticipantDirectory& participants, std::ui
       spdlog::info("waiting for: recorder{} to finish ({:.0f} s left)",
                    names.empty() ? " (gone)" : names, wait.seconds_left());
     }
-    std::this_thread::sleep_for(app::kPollTime);
+    std::this_thread::sleep_for(app::kShortPollTime);
   }
 }
 

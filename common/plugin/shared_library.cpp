@@ -59,6 +59,12 @@ void restore_floating_point_mode(std::uint64_t mode) {
 #endif
 }
 
+bool is_any_loaded() {
+  LoadedLibraries& libraries = loaded_libraries();
+  const std::lock_guard lock(libraries.mutex);
+  return !libraries.by_path.empty();
+}
+
 SharedLibrary::SharedLibrary(const std::filesystem::path& file, const std::string& place)
     : name_(file.lexically_normal().string()), place_(place) {
   LoadedLibraries& libraries = loaded_libraries();

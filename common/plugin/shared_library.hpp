@@ -82,6 +82,9 @@ void call_at_end(const Call& call, const Work& work) noexcept {
 /// empty if it has not. The file may have been replaced since; the loaded library stays in use.
 std::string find_loaded_sha256(const std::filesystem::path& file);
 
+/// True once a SharedLibrary was loaded. Its static objects may have destructors that matter.
+bool is_any_loaded();
+
 class SharedLibrary {
  public:
   /// Loads `file`, which stays loaded: later objects of the same path use it again. `place` is

@@ -3,6 +3,7 @@
 #include <iostream>
 
 #include "common/app/run_main.hpp"
+#include "common/bus/end_process.hpp"
 #include "common/bus/node.hpp"
 #include "common/bus/qos_file.hpp"
 #include "tools/ctl/operator_client.hpp"
@@ -39,7 +40,7 @@ int main(int argc, char** argv) {
   options.common.qos_file = bus::default_qos_file();
   ctl::add_options(cli, options);
 
-  return app::run_main(argc, argv, cli, options.common, "sim_ctl", [&] {
+  const int code = app::run_main(argc, argv, cli, options.common, "sim_ctl", [&] {
     bus::Node node(options.common.qos_file, options.common.domain, "sim_ctl", kIdentity);
     ctl::ClientOptions client_options;
     client_options.domain = options.common.domain;
@@ -55,4 +56,5 @@ int main(int argc, char** argv) {
     show_options.timeout_s = options.timeout_s;
     ctl::show_status(client, show_options, std::cout);
   });
+  bus::end_process(code);
 }

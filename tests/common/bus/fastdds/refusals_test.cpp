@@ -107,7 +107,7 @@ TEST_F(RefusalsTest, OnlyAnotherVendorsParticipantNeedsKeysThatProtectSubmessage
   for (const bool has_plain_submessages : {false, true}) {
     Problems problems;
     Neighbours neighbours(problems);
-    ParticipantListener listener(true, &neighbours, has_plain_submessages);
+    ParticipantListener listener(true, &neighbours, nullptr, has_plain_submessages);
     discover(listener, 2, "", kFastDds);
     discover(listener, 3, "", kCyclone);
     for (const std::uint8_t number : {2, 3}) {

@@ -1,0 +1,15 @@
+#include "common/bus/end_process.hpp"
+
+#include <cstdio>
+#include <cstdlib>
+#include <iostream>
+
+namespace sls::bus {
+
+void end_process(int code) {
+  std::cout.flush();
+  std::fflush(nullptr);
+  std::_Exit(code);
+}
+
+}  // namespace sls::bus
