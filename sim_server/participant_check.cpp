@@ -348,12 +348,11 @@ bool ParticipantCheck::lasts(const std::string& key, Clock::time_point now,
 }
 
 bool ParticipantCheck::lasts_despite_losses(const std::string& key,
-                                            const Neighbourhood& neighbourhood, bool is_informed,
-                                            Clock::duration if_informed) {
+                                            const Neighbourhood& neighbourhood, bool is_informed) {
   if (!neighbourhood.is_on_network) return lasts(key, neighbourhood.now, kPatience);
   // Another key, because the shorter patience begins when the participant is informed.
-  return is_informed ? lasts(key + " informed", neighbourhood.now, if_informed)
-                     : lasts(key, neighbourhood.now, kPatienceWithUninformed);
+  return is_informed ? lasts(key + " informed", neighbourhood.now, kPatienceWithInformed)
+                     : lasts(key, neighbourhood.now, kPatienceOnNetwork);
 }
 
 ParticipantCheck::Findings ParticipantCheck::look(const Neighbourhood& neighbourhood) {
@@ -400,9 +399,8 @@ void ParticipantCheck::look_at(const Entry& entry, const Neighbourhood& neighbou
     const bool is_informed = neighbourhood.informed.count(entry.peer) > 0;
     const bool may_be_of_run_before = announcement.run_id() != 0 && !neighbourhood.is_on_network;
     if (may_fly_for_us(announcement, neighbourhood) &&
-        (may_be_of_run_before
-             ? lasts(key, neighbourhood.now, kPatienceWithRun)
-             : lasts_despite_losses(key, neighbourhood, is_informed, kPatienceWithAnnouncement)))
+        (may_be_of_run_before ? lasts(key, neighbourhood.now, kPatienceWithRun)
+                              : lasts_despite_losses(key, neighbourhood, is_informed)))
       findings[key] =
           describe_field(entry, "run_id", to_words(run_id_), to_words(announcement.run_id()));
     return;
@@ -413,7 +411,7 @@ void ParticipantCheck::look_at(const Entry& entry, const Neighbourhood& neighbou
                        to_words(announcement.scenario_sha256().to_string()));
   if (const auto vehicles = find_wrong_vehicles(announcement, neighbourhood)) {
     const std::string key = make_key(entry.peer, "vehicle_ids " + *vehicles);
-    if (lasts_despite_losses(key, neighbourhood, true))
+    if (lasts_despite_losses(key, neighbourhood))
       findings[key] =
           describe_field(entry, "vehicle_ids", config::to_vehicle_ranges(vehicle_ids_), *vehicles);
   }
@@ -453,9 +451,8 @@ void ParticipantCheck::look_at_readiness(const Entry& entry, const Neighbourhood
                                               : "a reader of sls/state and a writer of sls/command";
   const std::string key = make_key(entry.peer, "ready " + missing);
   // One that is informed knows our endpoints (endpoints.hpp).
-  const bool is_informed = neighbourhood.informed.count(entry.peer) > 0;
-  const auto patience = missing.empty() ? kPatienceWithAnnouncement : kPatienceOnNetwork;
-  if (!lasts_despite_losses(key, neighbourhood, is_informed, patience)) return;
+  const bool is_informed = missing.empty() && neighbourhood.informed.count(entry.peer) > 0;
+  if (!lasts_despite_losses(key, neighbourhood, is_informed)) return;
   findings[key] = missing.empty() ? describe_field(entry, "ready",
                                                    "true, as its endpoints are matched", "false")
                                   : describe(entry) + ": expected " + missing + ", got none";
@@ -514,7 +511,11 @@ void ParticipantCheck::look_at_strangers(const Neighbourhood& neighbourhood,
   for (const auto& [peer, description] : neighbourhood.command_writers) {
     const std::string key = make_key(peer, "announcement");
     if (announced.count(peer) > 0 || neighbourhood.explained.count(peer) > 0) continue;
-    if (lasts_despite_losses(key, neighbourhood, neighbourhood.informed.count(peer) > 0))
+    // In the usual order of creation the other writer would have been discovered first.
+    const bool has_other_writer = neighbourhood.announcement_writers.count(peer) > 0;
+    if (neighbourhood.is_on_network && !has_other_writer
+            ? lasts(key, neighbourhood.now, kPatienceWithoutWriter)
+            : lasts_despite_losses(key, neighbourhood))
       findings[key] = description +
                       ": writes sls/command: expected an announcement in sls/participant, got none";
   }
@@ -525,8 +526,7 @@ void ParticipantCheck::look_at_strangers(const Neighbourhood& neighbourhood,
     if (announcement && !may_fly_for_us(*announcement, neighbourhood)) continue;
     const bool is_certain = announcement && announcement->run_id() == run_id_;
     const std::string key = make_key(peer, "deadline");
-    const bool is_informed = neighbourhood.informed.count(peer) > 0;
-    if (is_certain || lasts_despite_losses(key, neighbourhood, is_informed)) findings[key] = text;
+    if (is_certain || lasts_despite_losses(key, neighbourhood)) findings[key] = text;
   }
 }
 

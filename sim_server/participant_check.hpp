@@ -27,6 +27,8 @@ struct Neighbourhood {
   bool is_on_network = false;
   /// Participants with a matched writer of sls/command, as text.
   std::map<bus::PeerId, std::string> command_writers;
+  /// Participants with a matched writer of sls/participant: an announcement may still come.
+  std::set<bus::PeerId> announcement_writers;
   std::set<bus::PeerId> state_readers;  ///< participants with a matched reader of sls/state
   /// Participants that have acknowledged the parameters and a status of this run.
   std::set<bus::PeerId> informed;
@@ -48,13 +50,13 @@ class ParticipantCheck {
 
   /// A shorter problem is ignored, because discovery takes time.
   static constexpr std::chrono::milliseconds kPatience{1000};
-  /// The same on a network that may lose packets, once the participant has acknowledged parameters
-  /// and status: Fast DDS repeats lost discovery data once a second.
-  static constexpr std::chrono::milliseconds kPatienceOnNetwork{5000};
-  /// The same before that: with 20 % loss one in a hundred participants needs more than 7 s.
-  static constexpr std::chrono::milliseconds kPatienceWithUninformed{15000};
-  /// The same where only an announcement can still be lost, which is repeated ten times a second.
-  static constexpr std::chrono::milliseconds kPatienceWithAnnouncement{2500};
+  /// The same on a network that may lose packets: Fast DDS repeats lost discovery data once a
+  /// second. With 20 % loss one in a hundred participants needs 8 to 10 s.
+  static constexpr std::chrono::milliseconds kPatienceOnNetwork{15000};
+  /// The same of a client without a writer of sls/participant.
+  static constexpr std::chrono::milliseconds kPatienceWithoutWriter{5000};
+  /// The same if only an announcement can still be lost, which is repeated ten times a second.
+  static constexpr std::chrono::milliseconds kPatienceWithInformed{2500};
   /// Patience with an announcement of a run that has just ended: its client joins the next run.
   static constexpr std::chrono::milliseconds kPatienceWithRun{1400};
   /// Patience with rejected answers while none is taken.
@@ -180,9 +182,10 @@ class ParticipantCheck {
                        Findings& findings);
   /// True if the problem `key` has lasted for `patience` without a break.
   bool lasts(const std::string& key, Clock::time_point now, Clock::duration patience);
-  /// The same with the patience that the network needs; `if_informed` if the participant is.
+  /// The same with the patience that the network needs. `is_informed`: the participant has
+  /// discovered all of us and has the parameters, so it could know better.
   bool lasts_despite_losses(const std::string& key, const Neighbourhood& neighbourhood,
-                            bool is_informed, Clock::duration if_informed = kPatienceOnNetwork);
+                            bool is_informed = false);
   bool is_own_vehicle(std::uint32_t id) const;
 
   const std::uint64_t run_id_;

@@ -327,6 +327,7 @@ void Run::look_for_problems() {
   for (const bus::PeerId& peer : endpoints_.command_stream.matched())
     neighbourhood.command_writers[peer] = domain.describe(peer);
   neighbourhood.is_on_network = !domain.stays_on_this_machine();
+  neighbourhood.announcement_writers = endpoints_.participants.writers();
   neighbourhood.state_readers = endpoints_.states.matched();
   neighbourhood.informed = find_informed();
   neighbourhood.stamps_ahead_s = endpoints_.command_stream.take_stamps_ahead();

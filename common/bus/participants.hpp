@@ -55,6 +55,9 @@ class ParticipantDirectory {
   /// Present participants of every role and run.
   std::vector<Entry> all() const;
 
+  /// Participants with a writer of sls/participant, also those without an announcement yet.
+  std::set<PeerId> writers() const { return reader_.matched(); }
+
   /// Number of participants of `role` that have announced `done` for run `run_id`, also of those
   /// that have left since.
   int count_done(ParticipantRole role, std::uint64_t run_id) const;
