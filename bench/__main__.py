@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NoReturn
 
-from bench import campaign, loop, page, parts, view
+from bench import campaign, loop, page, parts, start, view
 from bench.machine import describe_machine, now
 from bench.programs import MeasurementError, Programs, make_scratch
 from bench.results import Figure, format_table
@@ -26,6 +26,7 @@ PARTS: dict[str, tuple[Measure, int]] = {  # int: number of rounds
     "campaign": (campaign.measure_campaign, 2),
     "fleet": (parts.measure_fleet, 3),
     "qos": (loop.measure_qos, 3),
+    "start": (start.measure_start, 9),
     "view": (view.measure_view, 5),
     "page": (page.measure_page, 3),
 }

@@ -316,7 +316,7 @@ class ProgramTest(unittest.TestCase):
     def test_help_names_every_part(self):
         said = bench("--help").stdout
         for part in ("lockstep", "load", "round-trip", "realtime", "plant", "recorder", "campaign", "fleet",
-                     "qos", "view"):
+                     "qos", "start", "view"):
             self.assertIn(part, said)
 
     def check(self, file, part):
@@ -337,6 +337,15 @@ class ProgramTest(unittest.TestCase):
         beside = [figure for figure in self.check(file, "view") if "ratio" in figure]
         self.assertEqual(len(beside), 1)
         self.assertEqual(beside[0]["goal"]["value"], 0.95)
+
+    def test_a_quick_start_part_measures_a_short_flight_with_the_launcher_and_without(self):
+        file = self.folder / "bench.json"
+        bench("--quick", "--only", "start", "--json", file)
+        figures = {figure["name"]: figure for figure in self.check(file, "start")}
+        self.assertEqual({figure["goal"]["value"] for figure in figures.values() if "goal" in figure},
+                         {0.8, 0.7, 0.6, 0.9})
+        self.assertEqual(len(figures), 5)
+        self.assertTrue(all(0 < figure["min"] < 60 for figure in figures.values()))
 
     def test_a_quick_page_part_measures_the_page_and_the_bridge(self):
         file = self.folder / "bench.json"
