@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/network/hosts_flight.hpp"
+#include "tests/support/faketime.hpp"
 
 namespace sls::test {
 namespace {
@@ -404,6 +405,25 @@ TEST_F(MyClientTest, BringsTheLoadToItsPointWithTheSameBytesDespiteLosses) {
   const Table states(recording_ + "/state.csv");
   ASSERT_EQ(states.rows(), kLastStep + 1);
   EXPECT_LE((states.position(kLastStep, "load") - Eigen::Vector3d(1, -1, -2)).norm(), 0.05);
+}
+
+/// LIFESPAN would drop all its commands. Its repeated announcements show the clock.
+TEST_F(MyClientTest, IsNamedAndFliesOnInRealTimeWhenItsClockIsSetBack) {
+  if (find_faketime().empty()) GTEST_SKIP() << kNoFaketime;
+  const std::filesystem::path clock = folder_ / "clock";
+  std::ofstream(clock) << "+0s";
+  const auto recorder = start_recorder();
+  const auto server = start_server({}, {"--mode", "realtime"});
+  const auto client =
+      start_client(Words{"env"} + make_clock_words("FAKETIME_TIMESTAMP_FILE=" + clock.string()));
+  ASSERT_TRUE(wait_for_steps(100)) << server->output();
+  std::ofstream(clock.string() + ".new") << "-1s";
+  std::filesystem::rename(clock.string() + ".new", clock);
+  EXPECT_TRUE(wait_until([&] { return holds(server->output(), "s behind ours"); }))
+      << server->output();
+  EXPECT_TRUE(holds(server->output(), "the clock of controller 'my_client' on "))
+      << server->output();
+  expect_success({server.get(), client.get(), recorder.get()});
 }
 
 TEST_F(MyClientTest, FollowsAResetAndTheServerThatReplacesAKilledOne) {

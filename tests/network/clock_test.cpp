@@ -3,37 +3,25 @@
 #include <gtest/gtest.h>
 
 #include "tests/network/hosts_flight.hpp"
+#include "tests/support/faketime.hpp"
 
 namespace sls::test {
 namespace {
-
-namespace fs = std::filesystem;
-
-std::string find_faketime() {
-  for (const auto& folder : fs::directory_iterator("/usr/lib")) {
-    std::error_code none;
-    const fs::path library = folder.path() / "faketime/libfaketimeMT.so.1";
-    if (fs::exists(library, none)) return library;
-  }
-  return "";
-}
 
 class ClockTest : public testing::Test {
  protected:
   void SetUp() override {
     if (const auto obstacle = Network::find_obstacle()) GTEST_SKIP() << *obstacle;
-    faketime_ = find_faketime();
-    if (faketime_.empty()) GTEST_SKIP() << "no libfaketime (Debian package libfaketime)";
+    if (find_faketime().empty()) GTEST_SKIP() << kNoFaketime;
     network_ = std::make_unique<Network>(kHosts);
   }
 
   void shift(FlightOptions& options, const std::string& program, const std::string& offset) const {
     auto& before = options.before.at(program);
-    before.insert(before.end(), {"LD_PRELOAD=" + faketime_, "FAKETIME=" + offset,
-                                 "FAKETIME_DONT_FAKE_MONOTONIC=1"});
+    const auto words = make_clock_words("FAKETIME=" + offset);
+    before.insert(before.end(), words.begin(), words.end());
   }
 
-  std::string faketime_;
   std::unique_ptr<Network> network_;
 };
 
