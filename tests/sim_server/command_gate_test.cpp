@@ -902,7 +902,7 @@ TEST_F(CommandGateTest, ItCountsTheAnswersOfEachClientAndKnowsWhichAreMissing) {
     return found;
   };
   using Known = std::pair<std::uint64_t, bool>;
-  CommandGate waiting(kRun, kVehicle, kForceLimit);
+  CommandGate waiting(kRun, kVehicle, {kForceLimit});
   waiting.set_clients({kStrong});
   EXPECT_EQ(find(waiting, kStrongPeer), Known(0, false)) << "no state is published yet";
   set_clients({kStrong, kWeak});

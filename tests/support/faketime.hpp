@@ -1,5 +1,5 @@
-/// A wrong wall clock for a program, set with Debian's libfaketime. Its monotonic clock stays right,
-/// as on a real host.
+/// A wrong wall clock for a program, set with Debian's libfaketime. Its monotonic clock stays
+/// right, as on a real host.
 #pragma once
 
 #include <filesystem>

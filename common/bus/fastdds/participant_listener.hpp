@@ -50,7 +50,8 @@ class ParticipantListener : public eprosima::fastdds::dds::DomainParticipantList
       neighbours_->note_participant(peer, info.info.m_participantName.to_string(),
                                     find_address(info.info), find_obstacle(info.info));
     if (discovered_)
-      discovered_->note(peer, info.info.m_participantName.to_string(), find_ports(info.info));
+      discovered_->note(peer, info.info.m_participantName.to_string(),
+                        find_discovery_ports(info.info));
     if (info.status != Info::DISCOVERED_PARTICIPANT) return;
     const auto& token = info.info.identity_token_;
     const bool is_other_secured = !token.class_id().empty();
@@ -130,7 +131,7 @@ class ParticipantListener : public eprosima::fastdds::dds::DomainParticipantList
   }
 
   /// The UDP ports at which it receives discovery data.
-  static std::set<int> find_ports(
+  static std::set<int> find_discovery_ports(
       const eprosima::fastrtps::rtps::ParticipantProxyData& participant) {
     std::set<int> ports;
     for (const auto& locator : participant.metatraffic_locators.unicast)
