@@ -9,7 +9,7 @@ namespace sls::bus {
 void end_process(int code) {
   std::cout.flush();
   std::fflush(nullptr);
-  std::_Exit(code);
+  std::quick_exit(code);
 }
 
 }  // namespace sls::bus

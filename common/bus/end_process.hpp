@@ -3,8 +3,8 @@
 namespace sls::bus {
 
 /// Ends this process with exit code `code`, once its nodes are destroyed. Writes out the standard
-/// streams, but calls no destructor of a static object: that of Fast DDS sleeps for 0.1 s
-/// (fastdds/README.md, trap 31).
+/// streams and calls what is registered with at_quick_exit, but no destructor of a static object:
+/// that of Fast DDS sleeps for 0.1 s (fastdds/README.md, trap 31).
 [[noreturn]] void end_process(int code);
 
 }  // namespace sls::bus

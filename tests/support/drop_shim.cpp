@@ -53,12 +53,13 @@ Function find_original(const char* name) {
   return reinterpret_cast<Function>(dlsym(RTLD_NEXT, name));
 }
 
-struct Report {
-  ~Report() {
-    std::fprintf(stderr, "drop_shim: lost %llu of %llu datagrams\n",
-                 static_cast<unsigned long long>(lost), static_cast<unsigned long long>(passed));
-  }
-} report;
+void report() {
+  std::fprintf(stderr, "drop_shim: lost %llu of %llu datagrams\n",
+               static_cast<unsigned long long>(lost), static_cast<unsigned long long>(passed));
+}
+
+/// Reports when the process ends, in either way (common/bus/end_process.hpp).
+[[maybe_unused]] const bool reports = std::atexit(report) == 0 && std::at_quick_exit(report) == 0;
 
 }  // namespace
 

@@ -111,7 +111,8 @@ TEST(ViewSystemTest, AKilledServerIsSilentAndTheNextRunIsShown) {
     return std::make_unique<Process>(make_command(name, flight.domain.number(), flags));
   };
   const auto recorder = start("recorder", {"--out", (folder / "next").string()});
-  const auto server = start("sim_server", {"--scenario", scenario("short")});
+  // In lockstep this flight could be over before the viewer has discovered its server.
+  const auto server = start("sim_server", {"--scenario", scenario("short"), "--mode", "realtime"});
   const auto client = start("control_client", {"--scenario", scenario("short")});
   ASSERT_TRUE(wait_until([&] { return page.last("run").at("run").at("run_id") != run_id; }))
       << server->output();
