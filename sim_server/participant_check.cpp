@@ -513,9 +513,12 @@ void ParticipantCheck::look_at_strangers(const Neighbourhood& neighbourhood,
     if (announced.count(peer) > 0 || neighbourhood.explained.count(peer) > 0) continue;
     // In the usual order of creation the other writer would have been discovered first.
     const bool has_other_writer = neighbourhood.announcement_writers.count(peer) > 0;
-    if (neighbourhood.is_on_network && !has_other_writer
-            ? lasts(key, neighbourhood.now, kPatienceWithoutWriter)
-            : lasts_despite_losses(key, neighbourhood))
+    const bool is_informed = neighbourhood.informed.count(peer) > 0;
+    const auto patience = neighbourhood.is_on_network
+                              ? (has_other_writer ? kPatienceOnNetwork : kPatienceWithLoss)
+                              : (has_other_writer && !is_informed ? kPatienceWithLoss : kPatience);
+    // Another key, because the shorter patience begins when the participant is informed.
+    if (lasts(is_informed ? key + " informed" : key, neighbourhood.now, patience))
       findings[key] = description +
                       ": writes sls/command: expected an announcement in sls/participant, got none";
   }

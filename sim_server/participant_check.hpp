@@ -53,8 +53,10 @@ class ParticipantCheck {
   /// The same on a network that may lose packets: Fast DDS repeats lost discovery data once a
   /// second. With 20 % loss one in a hundred participants needs 8 to 10 s.
   static constexpr std::chrono::milliseconds kPatienceOnNetwork{15000};
-  /// The same of a client without a writer of sls/participant.
-  static constexpr std::chrono::milliseconds kPatienceWithoutWriter{5000};
+  /// Patience with an announcement: on a network of a client without a writer for it, on this
+  /// machine of one that has not acknowledged parameters and status. A busy machine loses
+  /// datagrams, too.
+  static constexpr std::chrono::milliseconds kPatienceWithLoss{5000};
   /// The same if only an announcement can still be lost, which is repeated ten times a second.
   static constexpr std::chrono::milliseconds kPatienceWithInformed{2500};
   /// Patience with an announcement of a run that has just ended: its client joins the next run.

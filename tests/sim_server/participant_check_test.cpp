@@ -333,6 +333,18 @@ TEST_F(ParticipantCheckTest, AWriterOfCommandsWithoutAnAnnouncementIsNamedOnceTh
   EXPECT_TRUE(look(2s).empty());
 }
 
+TEST_F(ParticipantCheckTest, AnAnnouncementIsWaitedForUntilTheClientHasParametersAndStatus) {
+  neighbourhood_.command_writers[make_peer(1)] = "'foo' (10.0.0.2)";
+  neighbourhood_.announcement_writers = {make_peer(1)};
+  EXPECT_TRUE(look().empty());
+  EXPECT_TRUE(look(4900ms).empty());  // a busy machine may have lost them
+  EXPECT_EQ(look(5s).size(), 1u);
+  neighbourhood_.informed = {make_peer(1)};
+  EXPECT_TRUE(look(6s).empty());
+  EXPECT_TRUE(look(6900ms).empty());
+  EXPECT_EQ(look(7s).size(), 1u);
+}
+
 TEST_F(ParticipantCheckTest, AnAnnouncementIsWaitedForLongerOnANetwork) {
   neighbourhood_.command_writers[make_peer(1)] = "'foo' (10.0.0.2)";
   neighbourhood_.is_on_network = true;
