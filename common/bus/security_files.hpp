@@ -20,8 +20,8 @@ bool check_security_files(const std::string& profiles);
 /// not have, but not sls/record.
 bool is_of_contract_1(const std::filesystem::path& permissions);
 
-/// True if a signed governance document protects submessages, as keys of
-/// `./sls keys DIR --other-vendors` do (fastdds/README.md, trap 28).
+/// True if a signed governance document protects submessages, as keys made with `--other-vendors`
+/// do (fastdds/README.md, trap 28).
 bool are_submessages_protected(const std::filesystem::path& governance);
 
 }  // namespace sls::bus

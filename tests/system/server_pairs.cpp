@@ -64,7 +64,7 @@ int fly_pairs(int pairs, std::uint64_t seed) {
                 failure.c_str());
     std::fflush(stdout);
   }
-  std::printf("%d pairs of servers with seed %llu: one of each pair flew, but for %d\n", pairs,
+  std::printf("%d pairs of servers with seed %llu: one of each pair flew, except %d\n", pairs,
               static_cast<unsigned long long>(seed), failed);
   return failed == 0 ? 0 : 1;
 }

@@ -148,7 +148,7 @@ TEST_F(NeighboursTest, TopicsThatResembleOursAreNamedWithTheOneThatIsMeant) {
       {"/sls/command", "sls/command"},
       {"sls_command", "sls/command"},
       {"SLS/Command", "sls/command"},
-      {"sls/comand", "sls/command"},
+      {"sls/commandd", "sls/command"},
       {"sls/states", "sls/state"},
       {"sls/control-reply", "sls/control_reply"},
       {"slscommand", "sls/command"},
