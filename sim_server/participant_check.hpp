@@ -56,7 +56,7 @@ class ParticipantCheck {
   /// Patience with an announcement: on a network of a client without a writer for it, on this
   /// machine of one that has not acknowledged parameters and status. A busy machine loses
   /// datagrams, too.
-  static constexpr std::chrono::milliseconds kPatienceWithLoss{5000};
+  static constexpr std::chrono::milliseconds kPatienceWithLoss{4000};
   /// The same if only an announcement can still be lost, which is repeated ten times a second.
   static constexpr std::chrono::milliseconds kPatienceWithInformed{2500};
   /// Patience with an announcement of a run that has just ended: its client joins the next run.
