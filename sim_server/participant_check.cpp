@@ -441,7 +441,9 @@ void ParticipantCheck::look_at_role(const Entry& entry, const Neighbourhood& nei
 /// Says why a client is not ready, or cannot be.
 void ParticipantCheck::look_at_readiness(const Entry& entry, const Neighbourhood& neighbourhood,
                                          Findings& findings) {
-  if (neighbourhood.explained.count(entry.peer) > 0 || is_named(findings, entry.peer)) return;
+  if (neighbourhood.explained.count(entry.peer) > 0 || is_named(findings, entry.peer) ||
+      neighbourhood.missing_deadlines.count(entry.peer) > 0)
+    return;
   const bool reads = neighbourhood.state_readers.count(entry.peer) > 0;
   const bool writes = neighbourhood.command_writers.count(entry.peer) > 0;
   if (entry.announcement.ready() && reads && writes) return;
@@ -556,9 +558,9 @@ void ParticipantCheck::look_at_valid_answers(const Neighbourhood& neighbourhood,
       findings[done] = describe_field(entry, "done", "false, as it still answers", "true");
     const std::uint64_t each = copies / std::max<std::uint64_t>(steps, 1);
     if (each > kMostCopies && lasts(flood, neighbourhood.now, kPatience))
-      findings[flood] =
-          fmt::format("{}: sls/command: expected one answer to each state, got {} copies of each",
-                      describe(entry), each);
+      findings[flood] = fmt::format(
+          "{}: sls/command: expected one answer to each state, got over {} copies of each",
+          describe(entry), kMostCopies);
   }
 }
 

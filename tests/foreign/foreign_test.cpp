@@ -447,11 +447,8 @@ TEST_F(ForeignTest, ARecorderThatWritesCommands) {
 TEST_F(ForeignAnswerTest, InAHundredCopies) {
   start();
   const auto client = start_foreign({"--mistake", "flood"});
-  Words lines;  // a look may fall between the copies of an answer
-  for (const char* copies : {"97", "98", "99", "100", "101"})
-    lines.push_back(kWho + "sls/command: expected one answer to each state, got " + copies +
-                    " copies of each");
-  expect_server_line(lines);
+  expect_server_line(kWho +
+                     "sls/command: expected one answer to each state, got over 30 copies of each");
 }
 
 TEST_F(ForeignAnswerTest, TwoToOneStep) {
