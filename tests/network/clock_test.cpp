@@ -16,6 +16,8 @@ class ClockTest : public testing::Test {
     network_ = std::make_unique<Network>(kHosts);
   }
 
+  void TearDown() override { remove_faketime_files(); }
+
   void shift(FlightOptions& options, const std::string& program, const std::string& offset) const {
     auto& before = options.before.at(program);
     const auto words = make_clock_words("FAKETIME=" + offset);

@@ -29,4 +29,18 @@ inline std::vector<std::string> make_clock_words(const std::string& setting) {
           "FAKETIME_DONT_FAKE_MONOTONIC=1"};
 }
 
+/// Removes the files in shared memory that ended processes with a wrong clock have left:
+/// libfaketime removes them in a static destructor (common/bus/end_process.hpp).
+inline void remove_faketime_files() {
+  namespace fs = std::filesystem;
+  std::error_code none;
+  for (const auto& file : fs::directory_iterator("/dev/shm", none)) {
+    const std::string name = file.path().filename().string();
+    const bool is_of_faketime =
+        name.rfind("faketime_shm_", 0) == 0 || name.rfind("sem.faketime_sem_", 0) == 0;
+    const std::string process = name.substr(name.rfind('_') + 1);
+    if (is_of_faketime && !fs::exists("/proc/" + process, none)) fs::remove(file.path(), none);
+  }
+}
+
 }  // namespace sls::test
