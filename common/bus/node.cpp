@@ -422,9 +422,7 @@ AnyWriter::~AnyWriter() {
   delete_writer(*impl_->publisher, impl_->writer);
 }
 
-bool AnyWriter::write(const void* sample) {
-  return write_sample(*impl_->writer, sample);
-}
+bool AnyWriter::write(const void* sample) { return write_sample(*impl_->writer, sample); }
 
 bool AnyWriter::wait_for_acknowledgments(std::chrono::milliseconds limit) {
   const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(limit);
@@ -497,8 +495,7 @@ AnyReader::AnyReader(Node& node, const char* topic, const char* profile, void* t
   if (!is_ok(impl_->subscriber->get_datareader_qos_from_profile(profile, qos)))
     node.impl().throw_unknown_profile(profile);
   const auto& lifespan = qos.lifespan().duration;
-  if (!(lifespan == kInfinite))
-    impl_->lifespan = std::chrono::nanoseconds(lifespan.to_ns());
+  if (!(lifespan == kInfinite)) impl_->lifespan = std::chrono::nanoseconds(lifespan.to_ns());
   MiddlewareLog::clear();
   impl_->reader = impl_->subscriber->create_datareader(dds_topic, qos, impl_.get());
   if (!impl_->reader) node.impl().throw_refused_endpoint("read", topic, profile);
@@ -521,9 +518,7 @@ void AnyReader::ignore_lifespan(bool is_ignored) {
   if (!impl_->lifespan) return;
   dds::DataReaderQos qos = impl_->reader->get_qos();
   qos.lifespan().duration =
-      is_ignored
-          ? kInfinite
-          : Duration(std::chrono::duration<double>(*impl_->lifespan).count());
+      is_ignored ? kInfinite : Duration(std::chrono::duration<double>(*impl_->lifespan).count());
   impl_->reader->set_qos(qos);
 }
 

@@ -1,4 +1,5 @@
 #include "tests/system/process.hpp"
+#include "fastdds_files.hpp"
 
 #include <fcntl.h>
 #include <signal.h>
@@ -60,7 +61,7 @@ std::vector<std::filesystem::path> find_shared_memory(pid_t id) {
   namespace fs = std::filesystem;
   // Fast DDS holds a lock file NAME_el open for its own segment NAME. The ports are not
   // among them: other processes have them open, and the next process takes them over.
-  const std::string prefix = "/dev/shm/fastrtps_", suffix = "_el";
+  const std::string prefix = std::string("/dev/shm/") + bus::kSharedMemoryPrefix, suffix = "_el";
   std::vector<fs::path> own;
   for (const auto& descriptor : fs::directory_iterator("/proc/" + std::to_string(id) + "/fd")) {
     std::error_code gone;

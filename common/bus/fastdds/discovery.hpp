@@ -1,4 +1,5 @@
-/// What discovery tells of participants and endpoints, in the same form for each version of Fast DDS.
+/// What discovery tells of participants and endpoints, in the same form for each version of Fast
+/// DDS.
 #pragma once
 
 #include <cstdint>

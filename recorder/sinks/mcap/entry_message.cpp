@@ -80,24 +80,24 @@ void fill(Reference& reference, const std::optional<ReferenceRow>& row) {
 }
 
 AnswerKind find_kind(const StepRows& rows) {
-  if (!rows.command) return rows.state ? ANSWER_NONE : ANSWER_LATE;
-  if (rows.command->fault == CommandRow::kHeld) return ANSWER_HELD;
-  if (rows.command->fault == CommandRow::kFailSafe) return ANSWER_FAIL_SAFE;
-  return ANSWER_ACCEPTED;
+  if (!rows.command) return rows.state ? AnswerKind::ANSWER_NONE : AnswerKind::ANSWER_LATE;
+  if (rows.command->fault == CommandRow::kHeld) return AnswerKind::ANSWER_HELD;
+  if (rows.command->fault == CommandRow::kFailSafe) return AnswerKind::ANSWER_FAIL_SAFE;
+  return AnswerKind::ANSWER_ACCEPTED;
 }
 
 FaultCode find_fault(const CommandRow& row) {
-  for (const FaultCode fault :
-       {FAULT_FREE_FALL, FAULT_ROD_LEVEL, FAULT_NOT_FINITE, FAULT_STAGE_TIMEOUT})
+  for (const FaultCode fault : {FaultCode::FAULT_FREE_FALL, FaultCode::FAULT_ROD_LEVEL,
+                                FaultCode::FAULT_NOT_FINITE, FaultCode::FAULT_STAGE_TIMEOUT})
     if (row.fault == bus::to_string(fault)) return fault;
-  return FAULT_NONE;
+  return FaultCode::FAULT_NONE;
 }
 
 void fill(RecordEntry& entry, const std::optional<CommandRow>& row) {
   ControlCommand& answer = entry.answer();
   if (!row) {
     answer.f_Q_W_n().fill(kNone);
-    answer.fault(FAULT_NONE);
+    answer.fault(FaultCode::FAULT_NONE);
     entry.client_name("");
     entry.answered_step(0);
     return;

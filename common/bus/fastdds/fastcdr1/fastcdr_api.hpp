@@ -1,4 +1,5 @@
-/// Calls of Fast CDR 1 and of the code that is generated for it; fastcdr2/ has the same for Fast CDR 2. CMake chooses.
+/// Calls of Fast CDR 1 and of the code that is generated for it; fastcdr2/ has the same for Fast
+/// CDR 2. CMake chooses.
 #pragma once
 
 #include <fastcdr/Cdr.h>

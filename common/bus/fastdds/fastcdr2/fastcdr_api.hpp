@@ -1,4 +1,5 @@
-/// Calls of Fast CDR 2 and of the code that is generated for it; fastcdr1/ has the same for Fast CDR 1. CMake chooses.
+/// Calls of Fast CDR 2 and of the code that is generated for it; fastcdr1/ has the same for Fast
+/// CDR 1. CMake chooses.
 #pragma once
 
 #include <fastcdr/Cdr.h>

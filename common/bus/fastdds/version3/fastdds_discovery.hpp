@@ -1,4 +1,5 @@
-/// What Fast DDS 3 tells of discovered participants and endpoints; version2/ has the same for Fast DDS 2.
+/// What Fast DDS 3 tells of discovered participants and endpoints; version2/ has the same for Fast
+/// DDS 2.
 #pragma once
 
 #include <fastdds/dds/domain/DomainParticipantListener.hpp>
@@ -20,7 +21,8 @@ namespace sls::bus {
 class DiscoveryListener : public dds::DomainParticipantListener {
  public:
   /// `source`: the participant of ours that has discovered the other one.
-  virtual void on_participant(const dds::DomainParticipant* source, const ParticipantNews& news) = 0;
+  virtual void on_participant(const dds::DomainParticipant* source,
+                              const ParticipantNews& news) = 0;
   virtual void on_endpoint(const EndpointNews& news) = 0;
   virtual void on_authentication(const rtps::GUID_t& participant, bool is_accepted) = 0;
 
