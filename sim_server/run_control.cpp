@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/bus/names.hpp"
 #include "common/config/vehicle_ids.hpp"
 
 namespace sls::sim {

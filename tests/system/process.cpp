@@ -1,5 +1,4 @@
 #include "tests/system/process.hpp"
-#include "fastdds_files.hpp"
 
 #include <fcntl.h>
 #include <signal.h>
@@ -8,6 +7,8 @@
 
 #include <fstream>
 #include <sstream>
+
+#include "fastdds_files.hpp"
 
 namespace sls::test {
 

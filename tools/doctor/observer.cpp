@@ -130,7 +130,7 @@ struct Observer::Impl : bus::ParticipantListener {
   };
 
   Impl(const Options& wanted, dds::DomainParticipantQos qos)
-      : bus::ParticipantListener(is_secured(qos)), options(wanted) {
+      : bus::ParticipantListener({is_secured(qos)}), options(wanted) {
     const Ports ports = find_ports(qos, options.domain);
     qos.name(kDoctorName);
     if (!options.peer_address.empty()) add_peer(qos, ports, options.peer_address);

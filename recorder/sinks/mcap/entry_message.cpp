@@ -1,5 +1,7 @@
 #include "recorder/sinks/mcap/entry_message.hpp"
 
+#include <slsPubSubTypes.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -7,12 +9,12 @@
 
 #include "common/bus/names.hpp"
 #include "fastcdr_api.hpp"
+#include "fastdds_types.hpp"
 
 namespace sls::record {
 namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-constexpr std::size_t kEncapsulationBytes = 4;
 
 /// The value that the number has when read from a CSV file.
 double as_in_file(double number) {
@@ -111,7 +113,7 @@ void fill(RecordEntry& entry, const std::optional<CommandRow>& row) {
 }  // namespace
 
 EntryMessage::EntryMessage()
-    : bytes_(kEncapsulationBytes + RecordEntry::getMaxCdrSerializedSize()) {}
+    : bytes_(bus::max_size_of(RecordEntryPubSubType())) {}
 
 void EntryMessage::fill(const StepRows& rows) {
   entry_.vehicle_id(rows.vehicle_id);

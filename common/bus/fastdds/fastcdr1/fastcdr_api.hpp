@@ -20,6 +20,12 @@ inline Cdr make_cdr(eprosima::fastcdr::FastBuffer& buffer,
 /// Bytes read or written, with the encapsulation header.
 inline std::size_t count_bytes(const Cdr& cdr) { return cdr.getSerializedDataLength(); }
 
+/// See common/bus/message_size.hpp.
+template <class Message>
+std::size_t calc_cdr_size(const Message& message, std::size_t before) {
+  return Message::getCdrSerializedSize(message, before);
+}
+
 template <class Message>
 void write_message(const Message& message, Cdr& cdr) {
   message.serialize(cdr);

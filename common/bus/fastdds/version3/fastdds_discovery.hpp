@@ -46,7 +46,11 @@ class DiscoveryListener : public dds::DomainParticipantListener {
     news.discovery_addresses.assign(discovery.begin(), discovery.end());
     const auto& user = data.default_locators.unicast;
     news.addresses.assign(user.begin(), user.end());
-    news.is_identity_known = false;
+    // The middleware does not tell the identity token.
+    const auto certificate = news.properties.find(kCertificateProperty);
+    if (certificate != news.properties.end())
+      news.identity = {certificate->second, news.properties[kAuthorityProperty]};
+    news.is_identity_known = news.identity || news.properties.count(kVersionProperty) > 0;
     on_participant(source, news);
   }
 

@@ -93,7 +93,7 @@ void discover(ParticipantListener& listener, std::uint8_t number, bool is_secure
 constexpr rtps::VendorId_t kFastDds = {1, 15}, kCyclone = {1, 16};
 
 TEST_F(RefusalsTest, AParticipantWithoutANameIsDescribedAsSuch) {
-  ParticipantListener listener(false);
+  ParticipantListener listener({false});
   discover(listener, 1, true, kFastDds);
   EXPECT_EQ(said_.str(),
             "refused a participant without a name (01.00.00.00.00.00.00.00.00.00.00.00): it is "
@@ -104,7 +104,7 @@ TEST_F(RefusalsTest, OnlyAnotherVendorsParticipantNeedsKeysThatProtectSubmessage
   for (const bool has_plain_submessages : {false, true}) {
     Problems problems;
     Neighbours neighbours(problems);
-    ParticipantListener listener(true, &neighbours, nullptr, has_plain_submessages);
+    ParticipantListener listener({true, has_plain_submessages}, &neighbours);
     discover(listener, 2, false, kFastDds);
     discover(listener, 3, false, kCyclone);
     for (const std::uint8_t number : {2, 3}) {
