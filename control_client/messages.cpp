@@ -24,13 +24,13 @@ FaultCode to_message(Fault fault) {
 ::sls::MissionPhase to_message(MissionPhase phase) {
   switch (phase) {
     case MissionPhase::kRunning:
-      return MissionPhase::MISSION_RUNNING;
+      return sls::MissionPhase::MISSION_RUNNING;
     case MissionPhase::kFinished:
-      return MissionPhase::MISSION_FINISHED;
+      return sls::MissionPhase::MISSION_FINISHED;
     case MissionPhase::kFailed:
-      return MissionPhase::MISSION_FAILED;
+      return sls::MissionPhase::MISSION_FAILED;
   }
-  return MissionPhase::MISSION_FAILED;
+  return sls::MissionPhase::MISSION_FAILED;
 }
 
 void fill(ControllerState& message, const ControllerMemory& memory) {

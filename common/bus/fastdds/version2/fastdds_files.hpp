@@ -3,6 +3,8 @@
 
 namespace sls::bus {
 
+inline constexpr int kFastDdsMajor = 2;
+
 /// Beginning of the names of its files in /dev/shm: PREFIXportN of a port, PREFIX and sixteen
 /// hexadecimal digits of a participant's segment.
 inline constexpr const char* kSharedMemoryPrefix = "fastrtps_";
