@@ -69,7 +69,9 @@ class KeyLister {
   void key(Presence presence, const char* name, std::optional<Field>& field, const Rule&... rule) {
     if constexpr (kOnOneLine<Field>) {
       add(presence, name, type_of(Field{}), to_range(rule...),
-          !field ? "none" : presence == kOptional ? to_yaml_value(*field) : std::string());
+          !field                  ? "none"
+          : presence == kOptional ? to_yaml_value(*field)
+                                  : std::string());
     } else {
       Field value = field.value_or(Field{});
       const std::size_t before = keys_.size();
