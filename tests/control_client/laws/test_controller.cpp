@@ -1,6 +1,7 @@
 // A controller that hovers and misbehaves as `parameters` require:
 //   { do: WHAT, in: create, answer or destroy, at: STEP, memory: COUNT }
 // Macros change its table of functions into invalid ones, which must be refused.
+#include <cstdint>
 #include <cstdio>
 #include <memory>
 

@@ -2,6 +2,7 @@
 //   { do: WHAT, in: create, step or destroy, at: STEP }
 // Macros define the invalid tables of functions.
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <memory>
 

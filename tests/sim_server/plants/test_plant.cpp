@@ -1,6 +1,7 @@
 // A plant that stays at its initial position. `parameters` can select an error:
 //   { do: WHAT, in: create, advance, measure or destroy, at: STEP }
 // Macros define the invalid tables of functions.
+#include <cstdint>
 #include <cstdio>
 #include <memory>
 
