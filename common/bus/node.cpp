@@ -27,7 +27,6 @@
 #include <utility>
 
 #include "common/bus/fastdds/discovered_participants.hpp"
-#include "common/bus/fastdds/endpoints.hpp"
 #include "common/bus/fastdds/facts_of.hpp"
 #include "common/bus/fastdds/guarded_type.hpp"
 #include "common/bus/fastdds/leaving.hpp"
