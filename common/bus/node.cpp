@@ -159,8 +159,7 @@ struct Node::Impl {
         is_secured && !are_submessages_protected(find_file(qos, kGovernance));
     announce_what_discovery_lacks(qos);
     listener = std::make_unique<ParticipantListener>(
-        ParticipantListener::Own{is_secured, has_plain_submessages, has_shared_memory(qos)},
-        &neighbours, &discovered);
+        ParticipantListener::Own{is_secured, has_plain_submessages}, &neighbours, &discovered);
     participant = factory->create_participant(static_cast<std::uint32_t>(domain), qos,
                                               listener.get(), dds::StatusMask::none());
     if (participant)
@@ -180,10 +179,12 @@ struct Node::Impl {
     dds::DomainParticipantFactory::get_instance()->delete_participant(participant);
   }
 
+  /// Adds properties about this participant that others need.
   void announce_what_discovery_lacks(dds::DomainParticipantQos& qos) const {
     auto& properties = qos.properties().properties();
     properties.emplace_back(kVersionProperty, kMiddlewareVersion, true);
     if (!is_secured) return;
+    use_common_algorithms(qos);
     const IdentityNames names =
         find_identity_names(find_file(qos, kCertificate), find_file(qos, kIdentityAuthority));
     properties.emplace_back(kCertificateProperty, names.certificate, true);

@@ -67,10 +67,17 @@ class KeyLister {
 
   template <class Field, class... Rule>
   void key(Presence presence, const char* name, std::optional<Field>& field, const Rule&... rule) {
-    Field value = field.value_or(Field{});
-    const std::size_t before = keys_.size();
-    key(presence, name, value, rule...);
-    if (!field && keys_.size() > before) keys_[before].default_value = "none";
+    if constexpr (kOnOneLine<Field>) {
+      add(presence, name, type_of(Field{}), to_range(rule...),
+          !field                  ? "none"
+          : presence == kOptional ? to_yaml_value(*field)
+                                  : std::string());
+    } else {
+      Field value = field.value_or(Field{});
+      const std::size_t before = keys_.size();
+      list_block(presence, name, value, rule...);
+      if (!field && keys_.size() > before) keys_[before].default_value = "none";
+    }
   }
 
   template <class Choice>

@@ -117,12 +117,12 @@ TEST_P(MixedTest, EachVerifiesTheRecordingOfTheOther) {
   }
 }
 
-TEST_P(MixedTest, SharedMemoryOfTwoVersionsIsNamedWithTheRemedy) {
-  const TemporaryFolder folder;
-  Flight flight(make_scenario(folder, {{"timeout_s: 30", "timeout_s: 10"}}), mix({}));
-  EXPECT_EQ(flight.server->wait(), 1);
-  EXPECT_NE(flight.server->output().find("config/qos/udp.xml"), std::string::npos)
-      << flight.outputs();
+TEST_P(MixedTest, WithTheDefaultProfileTheyUseTheNetworkOfTheMachine) {
+  Flight local(scenario("short")), flight(scenario("short"), mix({}));
+  local.expect_success();
+  flight.expect_success();
+  ASSERT_FALSE(HasFailure());
+  expect_same(flight, local);
 }
 
 /// The same on hosts of their own.

@@ -11,6 +11,7 @@ from typing import Any
 from sls.campaign.campaign import (DISTRIBUTIONS, MEASURES, MOST_RUNS, Campaign, Certify, Keep,
                                    OwnMeasure, Varied)
 from sls.campaign.expressions import Expression, ExpressionError
+from sls.campaign.portable_math import exp, log
 from sls.campaign.sampling import list_expressions, order_derived, to_fraction
 from sls.campaign.yaml_nodes import Place, fail, parse_yaml, read_bytes, to_printable
 
@@ -346,8 +347,8 @@ def _read_grid(place: Place) -> tuple[int | float, ...]:
     if is_log:
         if not (start > 0 and end > 0):
             place.fail(f"expected ends > 0 of a logarithmic grid, got {start} and {end}")
-        ratio = math.log(end / start)
-        inner = [start * math.exp(ratio * i / (count - 1)) for i in range(1, count - 1)]
+        ratio = log(end / start)
+        inner = [start * exp(ratio * i / (count - 1)) for i in range(1, count - 1)]
         return (float(start), *inner, float(end))[:count]
     first, last = to_fraction(start), to_fraction(end)
     exact = [first + (last - first) * Fraction(i, max(count - 1, 1)) for i in range(count)]

@@ -1,18 +1,20 @@
 """Arithmetic of campaign files: `vehicle.load_mass_kg * 1.1 + 0.01`.
 
 The language has numbers, names with dots, `+ - * / **`, parentheses, `pi` and the functions of
-FUNCTIONS. Nothing else is evaluated."""
+FUNCTIONS. Nothing else is evaluated. Values have the same bits on every machine: portable_math.py."""
 
 import ast
 import math
 import re
 from collections.abc import Callable, Mapping
 
+from sls.campaign import portable_math
+
 FUNCTIONS: dict[str, Callable[..., float]] = {
-    "abs": abs, "cos": math.cos, "exp": math.exp, "log": math.log, "max": max, "min": min,
-    "sin": math.sin, "sqrt": math.sqrt, "tan": math.tan}
+    "abs": abs, "cos": portable_math.cos, "exp": portable_math.exp, "log": portable_math.log,
+    "max": max, "min": min, "sin": portable_math.sin, "sqrt": math.sqrt, "tan": portable_math.tan}
 FEWEST_ARGUMENTS = {"max": 2, "min": 2}  # all others take exactly one
-SCOPE = {"__builtins__": {}, **FUNCTIONS}
+SCOPE = {"__builtins__": {}, "power": portable_math.power, **FUNCTIONS}
 MOST_LETTERS = 1000
 TOKEN = re.compile(r"\s+|(?P<name>[A-Za-z_][A-Za-z0-9_]*(?:\.[A-Za-z0-9_]+)*)"
                    r"|(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)"
@@ -36,7 +38,8 @@ class Expression:
         try:
             tree = ast.parse(self._to_python(), mode="eval")
             self._check(tree.body)
-            self._code = compile(tree, "expression", "eval")
+            self._code = compile(ast.fix_missing_locations(_CallPower().visit(tree)),
+                                 "expression", "eval")
         except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
             if isinstance(error, ExpressionError):
                 raise
@@ -118,10 +121,19 @@ class Expression:
             raise ExpressionError(f"division by zero in '{self.text}'") from None
         except OverflowError:
             raise ExpressionError(f"'{self.text}' is too large") from None
-        except (ValueError, TypeError):  # for example min of complex numbers
+        except ValueError:  # for example the root of a negative number
             raise ExpressionError(f"'{self.text}' is not defined") from None
-        if isinstance(result, complex):  # the root of a negative number
-            raise ExpressionError(f"'{self.text}' is not defined")
         if not math.isfinite(result):
             raise ExpressionError(f"'{self.text}' is not a finite number")
         return result
+
+
+class _CallPower(ast.NodeTransformer):
+    """Replaces `a ** b` by `power(a, b)`: Python's operator calls the C library."""
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
+        self.generic_visit(node)
+        if not isinstance(node.op, ast.Pow):
+            return node
+        return ast.Call(func=ast.Name(id="power", ctx=ast.Load()), args=[node.left, node.right],
+                        keywords=[])

@@ -4,29 +4,29 @@ The values of run i do not change if other runs are flown, if chunks are differe
 are varied. The numbers come from Philox, a counter-based generator: it gives the i-th number of a
 stream without those before it. A stream is identified by seed and path.
 
-Numbers are transformed one at a time, with functions of `math`. Functions of numpy over an array round
-differently at the array's end, and values would then depend on the chunk."""
+They do not depend on the machine either. Of numpy's generators the raw words alone are promised to stay
+(NEP 19); they become numbers with exact operations, which are then transformed one at a time by
+`portable_math`. Functions of numpy over an array round differently at the array's end and with other
+processors."""
 
 import hashlib
 import json
-import math
 import warnings
 from collections.abc import Sequence
 from fractions import Fraction
 from functools import lru_cache
-from statistics import NormalDist
 from typing import Any
 
 import numpy as np
 
 from sls.campaign.campaign import Campaign, Varied
 from sls.campaign.expressions import Expression, ExpressionError
+from sls.campaign.portable_math import calc_normal_cdf, calc_normal_quantile, exp, log
 from sls.input_error import InputError
 
 SOBOL_BITS = 30
 # The sum of a stratum's number (below 2^24) and a jitter with so many bits is exact.
 JITTER_BITS = 28
-STANDARD_NORMAL = NormalDist()
 
 
 def make_values(campaign: Campaign, first: int, last: int) -> list[list[Any]]:
@@ -174,11 +174,11 @@ def _transform(varied: Varied, u: float) -> float:
     a, b = varied.parameters
     if varied.distribution == "normal":
         if varied.within is None:
-            return a + b * STANDARD_NORMAL.inv_cdf(u)
+            return a + b * calc_normal_quantile(u)
         low, high = varied.within
         return min(max(a + b * _cut_normal((low - a) / b, (high - a) / b, u), low), high)
     if varied.distribution == "log_uniform":
-        value = math.exp(math.log(a) + u * (math.log(b) - math.log(a)))
+        value = exp(log(a) + u * (log(b) - log(a)))
     else:
         value = a + u * (b - a)
     return min(max(value, a), b)
@@ -188,10 +188,10 @@ def _cut_normal(low: float, high: float, u: float) -> float:
     """Inverse, at `u`, of the standard normal distribution limited to `low` … `high`."""
     if low > 0:  # the lower tail is more exact: a double can hold 1e-19, but 1 - 1e-19 is rounded to 1
         return -_cut_normal(-high, -low, 1 - u)
-    below, above = (math.erfc(-bound / math.sqrt(2)) / 2 for bound in (low, high))
+    below, above = calc_normal_cdf(low), calc_normal_cdf(high)
     probability = below + u * (above - below)
     # If both bounds are far out, the probability may round to 0 or 1. The caller then applies its bounds.
-    return STANDARD_NORMAL.inv_cdf(min(max(probability, 1e-300), 1 - 2.0**-53))
+    return calc_normal_quantile(min(max(probability, 1e-300), 1 - 2.0**-53))
 
 
 def _round(varied: Varied, value: float) -> int | float:

@@ -72,8 +72,8 @@ void destroy(void* controller) {
   if (self->where == "destroy") sls::test::misbehave(self->what);
 }
 
-int answer(void* controller, const sls_controller_input* input, sls_controller_output* output,
-           char* error, std::size_t error_size) {
+[[maybe_unused]] int answer(void* controller, const sls_controller_input* input,
+                            sls_controller_output* output, char* error, std::size_t error_size) {
   Controller& self = *static_cast<Controller*>(controller);
   ++self.calls;
   output->force_n[2] = -self.weight_n;
@@ -101,7 +101,7 @@ int answer(void* controller, const sls_controller_input* input, sls_controller_o
 }  // namespace
 
 extern "C" const sls_controller_functions* sls_controller(void) {
-  static const sls_controller_functions functions = {
+  [[maybe_unused]] static const sls_controller_functions functions = {
       TEST_TABLE_SIZE,  TEST_VERSION, TEST_SETUP_SIZE, TEST_INPUT_SIZE,
       TEST_OUTPUT_SIZE, &create,      &destroy,        TEST_ANSWER};
   return TEST_RESULT;

@@ -4,8 +4,11 @@ always has the same values, independent of other runs, chunks and keys."""
 import hashlib
 import itertools
 import math
+import os
 import random
 import struct
+import subprocess
+import sys
 import tracemalloc
 
 import campaign_support as support
@@ -13,6 +16,7 @@ import numpy as np
 import pytest
 import yaml
 
+from sls.campaign.portable_math import calc_normal_cdf, calc_normal_quantile, exp, log
 from sls.campaign.sampling import choose_runs, is_certified, make_values, to_yaml_value
 from sls.campaign.yaml_nodes import parse_yaml
 from sls.input_error import InputError
@@ -187,13 +191,91 @@ def calc_philox(key, counter):
     return words
 
 
+def calc_word(purpose, path, number, seed=1):
+    digest = hashlib.sha256("\0".join(["sls campaign 1", purpose, str(seed), path]).encode()).digest()
+    return calc_philox(struct.unpack("<2Q", digest[:16]), number // 4 + 1)[number % 4]
+
+
+def calc_unit(path, number, seed=1):
+    return ((calc_word("unit", path, number, seed) >> 12) + 0.5) / 2**52
+
+
+def calc_sobol(coordinate, number):
+    """30 digits of a point of Sobol's sequence in the order of the Gray code. Primitive polynomials and
+    first direction numbers of the first four coordinates: Joe and Kuo (2008), new-joe-kuo-6."""
+    degree, inner, m = ((0, 0, [1] * 30), (1, 0, [1]), (2, 1, [1, 3]), (3, 1, [1, 3, 1]))[coordinate]
+    while len(m) < 30:
+        new = m[-degree] ^ m[-degree] << degree
+        for k in range(1, degree):
+            new ^= (inner >> degree - 1 - k & 1) * m[-k] << k
+        m = [*m, new]
+    gray, point = number ^ number >> 1, 0
+    for bit in range(30):
+        if gray >> bit & 1:
+            point ^= m[bit] << 29 - bit
+    return point
+
+
 def test_uniform_numbers_are_those_of_philox(tmp_path):
     campaign = make(tmp_path, "  _x: { uniform: [0, 1], seed: 42 }", 10_000_000)
-    digest = hashlib.sha256("\0".join(["sls campaign 1", "unit", "42", "_x"]).encode()).digest()
-    key = struct.unpack("<2Q", digest[:16])
     for run in (0, 1, 2, 3, 4, 5, 1001, 9_999_999):
-        word = calc_philox(key, run // 4 + 1)[run % 4]
-        assert make_values(campaign, run, run) == [[((word >> 12) + 0.5) / 2**52]]
+        assert make_values(campaign, run, run) == [[calc_unit("_x", run, 42)]]
+
+
+def test_each_kind_transforms_the_words_of_philox_by_its_formula(tmp_path):
+    runs = 200
+    campaign = make(tmp_path, EVERYTHING, runs)
+    values = dict(zip(campaign.paths, zip(*make_values(campaign, 0, runs - 1))))
+    strata = sorted(range(runs), key=lambda run: calc_word("strata", "_latin", run))
+    shift = {path: calc_word("shift", path, 0) >> 34 for path in ("_sobol", "_sobol_log")}
+    below, above = calc_normal_cdf((0.1 - 0.2) / 0.1), calc_normal_cdf((0.5 - 0.2) / 0.1)
+    for run in range(runs):
+        u = {path: calc_unit(path, run) for path in values}
+        assert values["_uniform"][run] == -1 + u["_uniform"] * 4
+        assert values["_normal"][run] == 0.2 + 0.02 * calc_normal_quantile(u["_normal"])
+        share = below + u["_cut"] * (above - below)
+        assert values["_cut"][run] == 0.2 + 0.1 * calc_normal_quantile(share)
+        assert values["_log"][run] == exp(log(0.01) + u["_log"] * (log(100.0) - log(0.01)))
+        jitter = ((calc_word("jitter", "_latin", run) >> 36) + 0.5) / 2**28
+        assert values["_latin"][run] == 2 + (strata[run] + jitter) / runs * 3
+        first, second = (((calc_sobol(coordinate, run) ^ shift[path]) + 0.5) / 2**30
+                         for coordinate, path in enumerate(("_sobol", "_sobol_log")))
+        assert values["_sobol"][run] == first
+        assert values["_sobol_log"][run] == exp(second * log(10.0))
+
+
+@pytest.mark.parametrize("coordinate", range(4))
+def test_points_of_sobol_do_not_depend_on_the_version_of_scipy(tmp_path, coordinate):
+    vary = "\n".join(f"  _{i}: {{ sobol: [0, 1], seed: 1 }}" for i in range(4))
+    values = make_values(make(tmp_path, vary, 5000), 0, 4999)
+    shift = calc_word("shift", f"_{coordinate}", 0) >> 34
+    for run in (*range(70), 4095, 4096, 4999):
+        assert values[run][coordinate] == ((calc_sobol(coordinate, run) ^ shift) + 0.5) / 2**30
+
+
+PRINT_DIGEST = """
+import hashlib, sys
+from pathlib import Path
+from sls.campaign.campaign_file import load_campaign
+from sls.campaign.sampling import make_values, to_yaml_value
+text = "".join(map(to_yaml_value, make_values(load_campaign(Path(sys.argv[1])), 0, 1999)))
+print(hashlib.sha256(text.encode()).hexdigest())
+"""
+
+
+@pytest.mark.parametrize("tunables", ["", "glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4,-AVX"])
+def test_all_values_are_the_same_on_every_machine(tmp_path, tunables):
+    """The C library chooses its functions by the processor; the second time it is told to use others.
+    The functions behind the values are judged in portable_math_test.py, the streams above."""
+    file = support.write_campaign(tmp_path, "runs: 2000\nvary:\n" + EVERYTHING.replace("\nseeds", """
+  _gust: { derived: "[_log * sin(9 * _uniform), exp(_normal), tan(_cut), log(_log), _latin ** 1.5]" }
+  _grid: { grid: { from: 0.001, to: 3, values: 5, log: true } }
+seeds""").replace('"[', "[").replace(']"', "]"))
+    result = subprocess.run([sys.executable, "-B", "-c", PRINT_DIGEST, file], text=True, timeout=60,
+                            env={**os.environ, "GLIBC_TUNABLES": tunables, "PYTHONPATH":
+                                 str(support.HERE.parents[2] / "python")}, stdout=subprocess.PIPE)
+    assert result.stdout.strip() == (
+        "7d0f1f306245b5daa9633af2d67381030f46f3082562d413ee2837135b74cea6")
 
 
 # --- Run i is run i ------------------------------------------------------------------------------

@@ -77,7 +77,7 @@ int advance(void* plant, const double force_n[3], std::int64_t steps, char* erro
   return 0;
 }
 
-void measure(void* plant, sls_plant_state* state) {
+[[maybe_unused]] void measure(void* plant, sls_plant_state* state) {
   const Plant& self = *static_cast<Plant*>(plant);
   *state = self.state;
   state->signals[0] = static_cast<double>(self.step);
@@ -96,7 +96,7 @@ void measure(void* plant, sls_plant_state* state) {
 extern "C" const sls_plant_functions* sls_plant(void) {
   static const char* const names[65] = {TEST_SIGNAL_NAME, "held_force_z_n"};
   static const char* const units[65] = {"1", "N"};
-  static const sls_plant_functions functions = {
+  [[maybe_unused]] static const sls_plant_functions functions = {
       TEST_TABLE_SIZE, TEST_VERSION, TEST_SETUP_SIZE, TEST_STATE_SIZE, TEST_SIGNAL_COUNT, names,
       units,           &create,      &destroy,        &advance,        TEST_MEASURE};
   return TEST_RESULT;

@@ -69,6 +69,9 @@ inline void leave_out_type_object(dds::TypeSupport& type) {
   type->auto_fill_type_information(false);
 }
 
+/// Nothing to do: see version 3.
+inline void use_common_algorithms(dds::DomainParticipantQos&) {}
+
 /// Addresses of the discovery servers that a client of theirs asks.
 inline std::vector<rtps::Locator_t> find_discovery_servers(const dds::DomainParticipantQos& qos) {
   std::vector<rtps::Locator_t> addresses;

@@ -54,6 +54,14 @@ inline void delete_writer(dds::Publisher& publisher, dds::DataWriter* writer) {
 /// Nothing to do: the types are generated without a TypeObject.
 inline void leave_out_type_object(dds::TypeSupport&) {}
 
+/// Names the algorithms of DDS Security as version 2 does, which refuses the names of the standard.
+inline void use_common_algorithms(dds::DomainParticipantQos& qos) {
+  for (const char* plugin :
+       {"dds.sec.auth.builtin.PKI-DH.", "dds.sec.access.builtin.Access-Permissions."})
+    qos.properties().properties().emplace_back(
+        std::string(plugin) + "transmit_algorithms_as_legacy", "true");
+}
+
 /// Addresses of the discovery servers that a client of theirs asks.
 inline std::vector<rtps::Locator_t> find_discovery_servers(const dds::DomainParticipantQos& qos) {
   const auto& servers = qos.wire_protocol().builtin.discovery_config.m_DiscoveryServers;
