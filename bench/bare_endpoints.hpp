@@ -21,8 +21,8 @@
 #include <memory>
 #include <string>
 
-#include "common/bus/fastdds/endpoints.hpp"
 #include "common/bus/node.hpp"
+#include "fastdds_api.hpp"
 
 namespace sls::bench {
 

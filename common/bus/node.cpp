@@ -27,7 +27,6 @@
 #include <utility>
 
 #include "common/bus/fastdds/discovered_participants.hpp"
-#include "common/bus/fastdds/endpoints.hpp"
 #include "common/bus/fastdds/facts_of.hpp"
 #include "common/bus/fastdds/guarded_type.hpp"
 #include "common/bus/fastdds/leaving.hpp"
@@ -83,8 +82,7 @@ void load_profiles(const std::filesystem::path& file, const std::string& identit
   auto* factory = dds::DomainParticipantFactory::get_instance();
   factory->load_profiles();
   if (!is_ok(factory->load_XML_profiles_string(profiles.data(), profiles.size())))
-    throw ConfigError(file.string() + ": expected profiles that Fast DDS takes, got: " +
-                      MiddlewareLog::find_first_error());
+    throw ConfigError(describe_refusal(file, MiddlewareLog::find_first_error()));
   loaded = absolute;
 }
 

@@ -12,12 +12,13 @@
 #include <memory>
 #include <sstream>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <vector>
 
 #include "common/bus/topics.hpp"
 #include "common/config/config_error.hpp"
-#include "fastdds_files.hpp"
+#include "fastdds_api.hpp"
 
 namespace sls::bus {
 namespace {
@@ -210,6 +211,13 @@ constexpr std::array<std::array<const char*, 2>, 7> kRenamed = {
 
 /// Gives the elements the names of the version in use: a QoS file may have those of either.
 void rename(tinyxml2::XMLElement& element) {
+  // Version 3 lists the addresses of discovery servers without the servers.
+  if (kFastDdsMajor == 3 && std::string(element.Name()) == "discoveryServersList")
+    while (auto* server = element.FirstChildElement("RemoteServer")) {
+      if (auto* addresses = server->FirstChildElement("metatrafficUnicastLocatorList"))
+        while (auto* address = addresses->FirstChildElement()) element.InsertEndChild(address);
+      element.DeleteChild(server);
+    }
   for (const auto& names : kRenamed)
     if (element.Name() == std::string(names[3 - kFastDdsMajor]))
       element.SetName(names[kFastDdsMajor - 2]);
@@ -227,6 +235,15 @@ const tinyxml2::XMLElement* find_element(const tinyxml2::XMLElement& element,
   for (auto* child = element.FirstChildElement(); child; child = child->NextSiblingElement())
     if (const auto* found = find_element(*child, name, text)) return found;
   return nullptr;
+}
+
+/// The line of the only element of this name in `element` and below; 0 if there is none, −1 if
+/// there are several.
+int find_line(const tinyxml2::XMLElement& element, const std::string& name) {
+  int line = element.Name() == name ? element.GetLineNum() : 0;
+  for (auto* child = element.FirstChildElement(); child; child = child->NextSiblingElement())
+    if (const int found = find_line(*child, name)) line = line == 0 ? found : -1;
+  return line;
 }
 
 /// Fast DDS 2.9 does not authenticate participants that a discovery server announces: all programs
@@ -306,6 +323,21 @@ std::string read_qos_file(const std::filesystem::path& file, const std::string& 
   tinyxml2::XMLPrinter printer;
   document.Print(&printer);
   return printer.CStr();
+}
+
+std::string describe_refusal(const std::filesystem::path& file, const std::string& cause) {
+  const std::string version = std::string("Fast DDS ") + kMiddlewareVersion;
+  constexpr std::string_view kBefore = ". Name: ";  // "Invalid element found into 'x'. Name: y"
+  const auto at = cause.rfind(kBefore);
+  if (at == cause.npos)
+    return file.string() + ": expected profiles that " + version + " takes, got: " + cause;
+  const std::string key = cause.substr(at + kBefore.size());
+  tinyxml2::XMLDocument document;
+  parse(read_file(file), file.string(), document);
+  const int line = find_line(*document.RootElement(), key);
+  return file.string() + (line > 0 ? ":" + std::to_string(line) : "") + ": <" + key +
+         ">: expected a key of " + version + ", got a misspelt one or one of another version (" +
+         cause.substr(0, at) + ")";
 }
 
 std::filesystem::path default_qos_file() {

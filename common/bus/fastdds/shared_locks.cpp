@@ -34,6 +34,7 @@
 #include <ctime>
 #include <fstream>
 #include <string>
+#include <utility>
 
 #include "common/bus/fastdds/adaptive_spin.hpp"
 #include "common/bus/fastdds/leaving.hpp"
@@ -97,6 +98,11 @@ int take_over(int result, pthread_mutex_t* mutex) {
   return result == EOWNERDEAD ? pthread_mutex_consistent(mutex) : result;
 }
 
+/// The latest lock between processes that this thread has taken. Fast DDS takes the lock of a port
+/// twice when it replaces the port of a process that was killed inside a message (#6484).
+thread_local const pthread_mutex_t* held = nullptr;
+thread_local bool is_held_twice = false;
+
 /// True for the semaphore of a port, which lies inside the port's memory. A named semaphore has its
 /// own mapping, so it begins a page.
 bool is_of_port(const sem_t* semaphore) {
@@ -124,7 +130,11 @@ int lock_own(decltype(pthread_mutex_timedlock)* lock_until, pthread_mutex_t* mut
   while (true) {
     const timespec look = to_timespec(now_ns() + kPatienceWithStopped_ns);
     const int result = take_over(lock_until(mutex, &look), mutex);
-    if (result != ETIMEDOUT) return result;
+    // A process without this file was the first to get the lock of a dead one. Boost 1.83 then
+    // makes it useless to everybody. Setting the owner makes it usable, as pthread_mutex_consistent
+    // does.
+    if (result == ENOTRECOVERABLE) __atomic_store_n(&mutex->__data.__owner, 0, __ATOMIC_RELAXED);
+    if (result != ETIMEDOUT && result != ENOTRECOVERABLE) return result;
     if (!is_leaving.load(std::memory_order_relaxed)) continue;
     static std::atomic<bool> is_forgone{false};
     if (is_forgone || is_holder_stopped(*mutex)) {
@@ -135,8 +145,30 @@ int lock_own(decltype(pthread_mutex_timedlock)* lock_until, pthread_mutex_t* mut
   }
 }
 
-}  // namespace
+/// Takes a lock of another process's port, with little patience with a stopped holder.
+int lock_other(decltype(pthread_mutex_timedlock)* lock_until, pthread_mutex_t* mutex,
+               const timespec& deadline) {
+  // Not trylock, which leaves a lock that was made useless locked for ever (C library 2.36, 2.41).
+  const timespec past{};
+  int result = take_over(lock_until(mutex, &past), mutex);
+  if (result != ETIMEDOUT) return result;
+  // If the holder was stopped the last time, the next message does not wait for 50 ms again.
+  thread_local const pthread_mutex_t* stopped = nullptr;
+  if (mutex == stopped) {
+    if (is_holder_stopped(*mutex)) return ETIMEDOUT;
+    stopped = nullptr;
+  }
+  const timespec look = limit(deadline, kPatienceWithStopped_ns);
+  result = take_over(lock_until(mutex, &look), mutex);
+  if (result != ETIMEDOUT) return result;
+  if (is_holder_stopped(*mutex)) {
+    stopped = mutex;
+    return result;
+  }
+  return take_over(lock_until(mutex, &deadline), mutex);
+}
 
+}  // namespace
 }  // namespace sls::bus
 
 // The dynamic linker gives Fast DDS these functions instead of those of the C library. Except for
@@ -158,28 +190,22 @@ int pthread_mutex_timedlock(pthread_mutex_t* mutex, const timespec* deadline) no
   if (is_next_own) --own_locks_to_come;
   if ((mutex->__data.__kind & kRobustBit) == 0) return next(mutex, deadline);
   if (is_next_own) remember_as_own(mutex);
-  if (is_own(mutex)) return lock_own(next, mutex);
-  int result = take_over(pthread_mutex_trylock(mutex), mutex);
-  if (result != EBUSY) return result;
-  // If the holder was stopped the last time, the next message does not wait for 50 ms again.
-  thread_local const pthread_mutex_t* stopped = nullptr;
-  if (mutex == stopped) {
-    if (is_holder_stopped(*mutex)) return ETIMEDOUT;
-    stopped = nullptr;
+  if (mutex == held) {
+    is_held_twice = true;
+    return 0;
   }
-  const timespec look = limit(*deadline, kPatienceWithStopped_ns);
-  result = take_over(next(mutex, &look), mutex);
-  if (result != ETIMEDOUT) return result;
-  if (is_holder_stopped(*mutex)) {
-    stopped = mutex;
-    return result;
-  }
-  return take_over(next(mutex, deadline), mutex);
+  const int result = is_own(mutex) ? lock_own(next, mutex) : lock_other(next, mutex, *deadline);
+  if (result == 0) held = mutex;
+  return result;
 }
 
 int pthread_mutex_unlock(pthread_mutex_t* mutex) noexcept {
   using namespace sls::bus;
   static const auto next = find_next(&pthread_mutex_unlock, "pthread_mutex_unlock");
+  if (mutex == held) {
+    if (std::exchange(is_held_twice, false)) return 0;
+    held = nullptr;
+  }
   const int result = next(mutex);
   // EPERM: this process went on without the lock. boost::interprocess would end the process.
   return result == EPERM && is_leaving.load(std::memory_order_relaxed) ? 0 : result;

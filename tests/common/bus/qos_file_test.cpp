@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <iostream>
 #include <map>
@@ -140,13 +141,19 @@ TEST_F(QosFileTest, EachMisspeltProfileOfOursIsNamed) {
 
 // --- invalid/: one file per defect; the comment after the XML declaration has the message
 
-/// The expected message, without the file's name, from the comment of an invalid file.
+/// The expected message, without the file's name, from the comment of an invalid file. VERSION in
+/// it is that of Fast DDS.
 std::string read_expectation(const fs::path& file) {
   const std::string text = sls::test::read_bytes(file);
   const std::string mark = "<!-- expect: ", end = " -->";
   const auto begin = text.find(mark);
   if (begin == std::string::npos) return "no expectation in " + file.string();
-  return text.substr(begin + mark.size(), text.find(end, begin) - begin - mark.size());
+  std::string message =
+      text.substr(begin + mark.size(), text.find(end, begin) - begin - mark.size());
+  const std::string version = "VERSION";
+  if (const auto at = message.find(version); at != std::string::npos)
+    message.replace(at, version.size(), middleware_version());
+  return message;
 }
 
 std::vector<fs::path> list_invalid_files() {
@@ -200,6 +207,61 @@ TEST(InvalidQosFilesDeathTest, EachFileGivesTheMessageInItsComment) {
     else  // only Fast DDS reports the error
       EXPECT_EXIT(use_file_and_exit(file), testing::ExitedWithCode(2), quote(expected));
   }
+}
+
+TEST(ShippedQosFilesDeathTest, TheMiddlewareTakesEachShippedFile) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  for (const char* name : {"default", "discovery_server", "lan", "udp", "unicast", "wifi"})
+    EXPECT_EXIT(use_file_and_exit(kConfig / "qos" / (std::string(name) + ".xml")),
+                testing::ExitedWithCode(0), "")
+        << name;
+}
+
+class QosKeysTest : public QosFileTest {
+ protected:
+  /// Writes a QoS file with these elements in the participant, and these profiles besides.
+  fs::path make_file(const std::string& elements, const std::string& profiles) const {
+    const fs::path file = folder_ / "qos.xml";
+    test::write_bytes(
+        file, "<dds>\n<profiles>\n<participant profile_name='sls_participant'>\n<rtps>\n" +
+                  elements + "\n</rtps></participant>\n" + profiles + "</profiles></dds>\n");
+    return file;
+  }
+};
+using QosKeysDeathTest = QosKeysTest;
+
+/// Each key has another name in Fast DDS 2 than in Fast DDS 3.
+TEST_F(QosKeysDeathTest, KeysWithTheNamesOfEitherVersionAreTaken) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  using Keys = std::array<std::string, 5>;
+  for (const Keys& keys :
+       {Keys{"heartbeatPeriod", "initialHeartbeatDelay", "nackSupressionDuration",
+             "initialAcknackDelay", "heartbeatResponseDelay"},
+        Keys{"heartbeat_period", "initial_heartbeat_delay", "nack_supression_duration",
+             "initial_acknack_delay", "heartbeat_response_delay"}}) {
+    std::string writer, reader;
+    for (std::size_t i = 0; i < keys.size(); ++i)
+      (i < 3 ? writer : reader) += "<" + keys[i] + "><sec>1</sec></" + keys[i] + ">";
+    const fs::path file = make_file(
+        "", "<data_writer profile_name='sls_loop_writer'><times>" + writer +
+                "</times></data_writer><data_reader profile_name='sls_loop_reader'><times>" +
+                reader + "</times></data_reader>");
+    EXPECT_EXIT(use_file_and_exit(file), testing::ExitedWithCode(0), "");
+  }
+}
+
+/// The first key exists in Fast DDS 2 only, the second in Fast DDS 3 only.
+TEST_F(QosKeysDeathTest, AKeyThatOnlyTheOtherVersionHasIsNamedWithItsLine) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  const fs::path file = make_file(
+      "<throughputController><bytesPerPeriod>1</bytesPerPeriod></throughputController>\n"
+      "<builtinTransports>UDPv4</builtinTransports>",
+      "");
+  EXPECT_EXIT(
+      use_file_and_exit(file), testing::ExitedWithCode(2),
+      quote(file.string()) +
+          ":(5: <throughputController>|6: <builtinTransports>): expected a key of Fast DDS " +
+          quote(middleware_version()) + ", got a misspelt one or one of another version");
 }
 
 // --- values that depend on the process -----------------------------------------------------------

@@ -12,9 +12,11 @@
 #include <fastrtps/utils/IPLocator.h>
 #include <fastdds/dds/domain/qos/DomainParticipantQos.hpp>
 #include <fastdds/dds/publisher/DataWriter.hpp>
+#include <fastdds/dds/publisher/Publisher.hpp>
 #include <fastdds/dds/topic/TypeSupport.hpp>
 #include <fastrtps/utils/fixed_size_string.hpp>
 
+#include <cstddef>
 #include <vector>
 
 #include "fastdds_files.hpp"
@@ -49,6 +51,15 @@ inline bool write_sample(dds::DataWriter& writer, const void* sample) {
 
 inline bool write_sample(dds::DataWriter& writer, const void* sample, const Time& time) {
   return is_ok(writer.write_w_timestamp(const_cast<void*>(sample), dds::HANDLE_NIL, time));
+}
+
+/// Deletes a writer of `publisher` after its history: otherwise a heartbeat to a dead reader may
+/// find a half-deleted history and loop for ever (README.md, trap 13).
+inline void delete_writer(dds::Publisher& publisher, dds::DataWriter* writer) {
+  writer->set_listener(nullptr);
+  std::size_t removed = 0;
+  writer->clear_history(&removed);
+  publisher.delete_datawriter(writer);
 }
 
 /// Call it before the type is registered: a TypeObject on the wire crashes peers that do not know

@@ -5,6 +5,7 @@
 #include <fastdds/config.hpp>
 #include <fastdds/dds/domain/qos/DomainParticipantQos.hpp>
 #include <fastdds/dds/publisher/DataWriter.hpp>
+#include <fastdds/dds/publisher/Publisher.hpp>
 #include <fastdds/dds/topic/TypeSupport.hpp>
 #include <fastdds/rtps/attributes/PropertyPolicy.hpp>
 #include <fastdds/rtps/common/CacheChange.hpp>
@@ -43,6 +44,11 @@ inline bool write_sample(dds::DataWriter& writer, const void* sample) {
 
 inline bool write_sample(dds::DataWriter& writer, const void* sample, const Time& time) {
   return is_ok(writer.write_w_timestamp(sample, dds::HANDLE_NIL, time));
+}
+
+inline void delete_writer(dds::Publisher& publisher, dds::DataWriter* writer) {
+  writer->set_listener(nullptr);
+  publisher.delete_datawriter(writer);
 }
 
 /// Nothing to do: the types are generated without a TypeObject.

@@ -198,6 +198,33 @@ TEST_F(SharedLocksTest, AWaitForANamedSemaphoreIsNotCutShort) {
   sem_close(semaphore);
 }
 
+// Fast DDS #6484: a thread that replaces the port of a process killed inside a message.
+TEST_F(SharedLocksTest, AThreadMayTakeALockTwice) {
+  const auto start = Clock::now();
+  for (int time = 0; time < 2; ++time) ASSERT_EQ(lock_within(kLong_s), 0);
+  EXPECT_LT(seconds_since(start), kSlow_s);
+  ASSERT_EQ(pthread_mutex_unlock(&port_->mutex), 0);
+  Waiting waiting(*this);  // still locked
+  ASSERT_EQ(pthread_mutex_unlock(&port_->mutex), 0);
+  EXPECT_EQ(waiting.finish(), 0);
+}
+
+// Boost 1.83 in a program without shared_locks.cpp does so with the lock of a dead process.
+TEST_F(SharedLocksTest, AReaderRepairsALockThatAnotherProcessHasMadeUseless) {
+  start_holder(SIGKILL);
+  ASSERT_EQ(pthread_mutex_lock(&port_->mutex), EOWNERDEAD);
+  ASSERT_EQ(pthread_mutex_unlock(&port_->mutex), 0);
+  ASSERT_EQ(lock_within(kLong_s), ENOTRECOVERABLE);
+  std::thread reader([this] {
+    EXPECT_EQ(wait_within(kLong_s), ETIMEDOUT);
+    EXPECT_EQ(lock_within(kLong_s), 0);
+    EXPECT_EQ(pthread_mutex_unlock(&port_->mutex), 0);
+  });
+  reader.join();
+  ASSERT_EQ(lock_within(kLong_s), 0);
+  EXPECT_EQ(pthread_mutex_unlock(&port_->mutex), 0);
+}
+
 TEST_F(SharedLocksTest, AReaderWaitsForItsOwnPortUntilAStoppedProcessGoesOn) {
   expect_reader_waits_until(SIGCONT);
 }
