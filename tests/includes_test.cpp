@@ -71,7 +71,7 @@ const Rule* find_rule(const std::string& file) {
 /// The library of `header` if only some folders may include it, otherwise empty.
 std::string find_library(const std::string& header) {
   if (header == "sls.h" || header.rfind("slsPubSubTypes", 0) == 0) return "Wire";
-  if (std::regex_search(header, std::regex("^fast(dds|rtps|cdr)/"))) return "Fast DDS";
+  if (std::regex_search(header, std::regex("^fast(dds|rtps|cdr)[/_]"))) return "Fast DDS";
   if (std::regex_search(header, std::regex("^(Simbody|SimTK|simbody/)"))) return "Simbody";
   return "";
 }

@@ -1,9 +1,5 @@
 #include "common/bus/node.hpp"
 
-#include <fastdds/rtps/attributes/PropertyPolicy.h>
-#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
-#include <fastrtps/config.h>
-#include <fastrtps/utils/IPLocator.h>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <fastdds/dds/publisher/DataWriter.hpp>
@@ -46,13 +42,12 @@
 #include "common/bus/security_files.hpp"
 #include "common/config/config_error.hpp"
 #include "common/config/domain.hpp"
+#include "fastdds_api.hpp"
 
 namespace sls::bus {
 namespace {
 
-namespace dds = eprosima::fastdds::dds;
 using config::ConfigError;
-using eprosima::fastrtps::types::ReturnCode_t;
 
 /// On one domain. Each announced participant costs memory and packets, even a forged one: with
 /// 3,000 of these the middleware hangs (tests/hostile/README.md).
@@ -78,15 +73,14 @@ void load_profiles(const std::filesystem::path& file, const std::string& identit
   if (!loaded.empty())  // Fast DDS would silently keep its profiles
     throw ConfigError(file.string() + ": expected the QoS file that this process already uses, " +
                       loaded.string());
-  // Only the file of --qos counts, not a stray DEFAULT_FASTRTPS_PROFILES.xml in the working folder
-  // or an exported FASTRTPS_DEFAULT_PROFILES_FILE.
+  // Only the file of --qos counts, not a stray file with default profiles in the working folder or
+  // one that the environment names.
   setenv("SKIP_DEFAULT_XML_FILE", "1", 1);
-  unsetenv("FASTRTPS_DEFAULT_PROFILES_FILE");
+  unsetenv(kProfilesVariable);
   MiddlewareLog::start(is_secured);
   auto* factory = dds::DomainParticipantFactory::get_instance();
   factory->load_profiles();
-  if (factory->load_XML_profiles_string(profiles.data(), profiles.size()) !=
-      ReturnCode_t::RETCODE_OK)
+  if (!is_ok(factory->load_XML_profiles_string(profiles.data(), profiles.size())))
     throw ConfigError(file.string() + ": expected profiles that Fast DDS takes, got: " +
                       MiddlewareLog::find_first_error());
   loaded = absolute;
@@ -95,16 +89,15 @@ void load_profiles(const std::filesystem::path& file, const std::string& identit
 namespace {
 
 PeerId to_peer(const dds::InstanceHandle_t& handle) {
-  eprosima::fastrtps::rtps::GUID_t guid;
-  eprosima::fastrtps::rtps::iHandle2GUID(guid, handle);
+  rtps::GUID_t guid;
+  rtps::iHandle2GUID(guid, handle);
   return bus::to_peer(guid);
 }
 
-/// The sample that contains `payload`. A reader of Fast DDS 2.9 passes only payloads inside a
-/// sample to a type.
-const eprosima::fastrtps::rtps::CacheChange_t& find_change(
-    const eprosima::fastrtps::rtps::SerializedPayload_t& payload) {
-  using Change = eprosima::fastrtps::rtps::CacheChange_t;
+/// The sample that contains `payload`. A reader of Fast DDS passes only payloads inside a sample to
+/// a type.
+const rtps::CacheChange_t& find_change(const rtps::SerializedPayload_t& payload) {
+  using Change = rtps::CacheChange_t;
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Winvalid-offsetof"  // it has no base class
   constexpr std::size_t kOffset = offsetof(Change, serializedPayload);
@@ -144,12 +137,11 @@ struct Node::Impl {
     load_profiles(qos_file, role);
     auto* factory = dds::DomainParticipantFactory::get_instance();
     dds::DomainParticipantQos qos;
-    if (factory->get_participant_qos_from_profile(kParticipantProfile, qos) !=
-        ReturnCode_t::RETCODE_OK)
+    if (!is_ok(factory->get_participant_qos_from_profile(kParticipantProfile, qos)))
       throw_unknown_profile(kParticipantProfile);
     qos.name(name.c_str());
-    is_secured = eprosima::fastrtps::rtps::PropertyPolicyHelper::find_property(
-                     qos.properties(), "dds.sec.auth.plugin") != nullptr;
+    is_secured = rtps::PropertyPolicyHelper::find_property(qos.properties(),
+                                                           "dds.sec.auth.plugin") != nullptr;
     if (transports == Transports::kNetwork) leave_out_shared_memory(qos);
     is_on_this_machine = are_local(qos.transport());
     limit_datagrams(qos);
@@ -203,8 +195,7 @@ struct Node::Impl {
   void limit_datagrams(dds::DomainParticipantQos& qos) {
     constexpr const char* kProperty = "sls.max_datagram_bytes";
     constexpr std::size_t kLeast = 600;  // a vehicle fits
-    const auto* text =
-        eprosima::fastrtps::rtps::PropertyPolicyHelper::find_property(qos.properties(), kProperty);
+    const auto* text = rtps::PropertyPolicyHelper::find_property(qos.properties(), kProperty);
     if (!text) return;
     std::size_t bytes = 0;
     const char* end = text->data() + text->size();
@@ -223,8 +214,7 @@ struct Node::Impl {
   static std::filesystem::path find_file(const dds::DomainParticipantQos& qos,
                                          const char* property) {
     constexpr std::string_view kScheme = "file://";
-    const auto* place =
-        eprosima::fastrtps::rtps::PropertyPolicyHelper::find_property(qos.properties(), property);
+    const auto* place = rtps::PropertyPolicyHelper::find_property(qos.properties(), property);
     return place && place->rfind(kScheme, 0) == 0 ? place->substr(kScheme.size()) : "";
   }
 
@@ -235,12 +225,11 @@ struct Node::Impl {
   }
 
   static void leave_out_shared_memory(dds::DomainParticipantQos& qos) {
-    using eprosima::fastdds::rtps::UDPv4TransportDescriptor;
     auto& transport = qos.transport();
     auto& own = transport.user_transports;
     own.erase(std::remove_if(own.begin(), own.end(), is_shared_memory), own.end());
     if (transport.use_builtin_transports || own.empty())
-      own.push_back(std::make_shared<UDPv4TransportDescriptor>());
+      own.push_back(std::make_shared<rtps::UDPv4TransportDescriptor>());
     transport.use_builtin_transports = false;
   }
 
@@ -277,7 +266,7 @@ struct Node::Impl {
     if (!known_type.empty()) type = known_type;
     leave_out_type_object(type);
     dds::Topic* topic = nullptr;
-    if (type.register_type(participant) == ReturnCode_t::RETCODE_OK)
+    if (is_ok(type.register_type(participant)))
       topic = participant->create_topic(name, type.get_type_name(), dds::TOPIC_QOS_DEFAULT);
     if (!topic)
       throw BusError(std::string(name) +
@@ -309,17 +298,14 @@ Node::~Node() { is_leaving = true; }
 
 const char* Node::choose_writer_profile(const char* profile, const char* fallback) const {
   dds::DataWriterQos qos;
-  return impl_->publisher->get_datawriter_qos_from_profile(profile, qos) == ReturnCode_t::RETCODE_OK
-             ? profile
-             : fallback;
+  return is_ok(impl_->publisher->get_datawriter_qos_from_profile(profile, qos)) ? profile
+                                                                                : fallback;
 }
 
 const char* Node::choose_reader_profile(const char* profile, const char* fallback) const {
   dds::DataReaderQos qos;
-  return impl_->subscriber->get_datareader_qos_from_profile(profile, qos) ==
-                 ReturnCode_t::RETCODE_OK
-             ? profile
-             : fallback;
+  return is_ok(impl_->subscriber->get_datareader_qos_from_profile(profile, qos)) ? profile
+                                                                                 : fallback;
 }
 
 bool Node::stays_on_this_machine() const { return impl_->is_on_this_machine; }
@@ -351,15 +337,14 @@ std::string Node::describe_isolation() const {
   const auto name_hosts = [](const auto& locators) {
     std::string hosts;
     for (const auto& locator : locators) {
-      const std::string host = eprosima::fastrtps::rtps::IPLocator::toIPv4string(locator);
+      const std::string host = rtps::IPLocator::toIPv4string(locator);
       if (hosts.find(host) == hosts.npos) hosts += (hosts.empty() ? "" : ", ") + host;
     }
     return hosts;
   };
-  const auto& servers = builtin.discovery_config.m_DiscoveryServers;
+  const auto servers = find_discovery_servers(participant->get_qos());
   if (!servers.empty())
-    return "; the discovery server at " +
-           name_hosts(servers.front().metatrafficUnicastLocatorList) +
+    return "; the discovery server at " + name_hosts(servers) +
            " does not answer (SLS_DISCOVERY_SERVER; ./sls discovery-server starts one)";
   const std::string domain =
       "; no other program discovered on domain " + std::to_string(participant->get_domain_id());
@@ -421,7 +406,7 @@ AnyWriter::AnyWriter(Node& node, const char* topic, const char* profile, void* t
   auto* dds_topic = node.impl().find_or_create_topic(topic, type);
   impl_->publisher = node.impl().publisher;
   dds::DataWriterQos qos;
-  if (impl_->publisher->get_datawriter_qos_from_profile(profile, qos) != ReturnCode_t::RETCODE_OK)
+  if (!is_ok(impl_->publisher->get_datawriter_qos_from_profile(profile, qos)))
     node.impl().throw_unknown_profile(profile);
   if (!user_data.empty()) qos.user_data().data_vec({user_data.begin(), user_data.end()});
   MiddlewareLog::clear();
@@ -438,15 +423,14 @@ AnyWriter::~AnyWriter() {
 }
 
 bool AnyWriter::write(const void* sample) {
-  return impl_->writer->write(const_cast<void*>(sample));  // Fast DDS only reads it
+  return write_sample(*impl_->writer, sample);
 }
 
 bool AnyWriter::wait_for_acknowledgments(std::chrono::milliseconds limit) {
   const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(limit);
   const auto rest = std::chrono::nanoseconds(limit - seconds);
-  return impl_->writer->wait_for_acknowledgments({static_cast<std::int32_t>(seconds.count()),
-                                                  static_cast<std::uint32_t>(rest.count())}) ==
-         ReturnCode_t::RETCODE_OK;
+  return is_ok(impl_->writer->wait_for_acknowledgments(
+      {static_cast<std::int32_t>(seconds.count()), static_cast<std::uint32_t>(rest.count())}));
 }
 
 std::set<PeerId> AnyWriter::matched() const { return impl_->peers.peers(); }
@@ -463,7 +447,7 @@ struct AnyReader::Impl : dds::DataReaderListener, MisfitReport {
     dds::SampleInfo info;
     const MisfitScope scope(*this);
     const RawScope raw_scope(raw);
-    while (source->take_next_sample(sample, &info) == ReturnCode_t::RETCODE_OK)
+    while (is_ok(source->take_next_sample(sample, &info)))
       if (info.valid_data) {
         written = std::chrono::system_clock::time_point(
             std::chrono::nanoseconds(info.source_timestamp.to_ns()));
@@ -478,7 +462,7 @@ struct AnyReader::Impl : dds::DataReaderListener, MisfitReport {
                                     const dds::RequestedDeadlineMissedStatus& status) override {
     missed_deadlines = status.total_count;
   }
-  void report(const eprosima::fastrtps::rtps::SerializedPayload_t& payload, const char* type,
+  void report(const rtps::SerializedPayload_t& payload, const std::string& type,
               const std::string& defect) override {
     const auto& guid = find_change(payload).writerGUID;
     Neighbours::EntityId writer;
@@ -510,10 +494,10 @@ AnyReader::AnyReader(Node& node, const char* topic, const char* profile, void* t
   impl_->take = std::move(take);
   impl_->subscriber = node.impl().subscriber;
   dds::DataReaderQos qos;
-  if (impl_->subscriber->get_datareader_qos_from_profile(profile, qos) != ReturnCode_t::RETCODE_OK)
+  if (!is_ok(impl_->subscriber->get_datareader_qos_from_profile(profile, qos)))
     node.impl().throw_unknown_profile(profile);
   const auto& lifespan = qos.lifespan().duration;
-  if (!(lifespan == eprosima::fastrtps::c_TimeInfinite))
+  if (!(lifespan == kInfinite))
     impl_->lifespan = std::chrono::nanoseconds(lifespan.to_ns());
   MiddlewareLog::clear();
   impl_->reader = impl_->subscriber->create_datareader(dds_topic, qos, impl_.get());
@@ -538,13 +522,13 @@ void AnyReader::ignore_lifespan(bool is_ignored) {
   dds::DataReaderQos qos = impl_->reader->get_qos();
   qos.lifespan().duration =
       is_ignored
-          ? eprosima::fastrtps::c_TimeInfinite
-          : eprosima::fastrtps::Duration_t(std::chrono::duration<double>(*impl_->lifespan).count());
+          ? kInfinite
+          : Duration(std::chrono::duration<double>(*impl_->lifespan).count());
   impl_->reader->set_qos(qos);
 }
 
 }  // namespace detail
 
-std::string middleware_version() { return FASTRTPS_VERSION_STR; }
+std::string middleware_version() { return kMiddlewareVersion; }
 
 }  // namespace sls::bus

@@ -1,43 +1,35 @@
 #include "common/bus/raw_writer.hpp"
 
-#include <fastdds/dds/topic/TopicDataType.hpp>
-
 #include <algorithm>
+
+#include "fastdds_types.hpp"
 
 namespace sls::bus {
 namespace {
 
-namespace rtps = eprosima::fastrtps::rtps;
-
 using Bytes = std::vector<std::uint8_t>;
 
 /// A type whose samples are serialised already.
-class RawType : public eprosima::fastdds::dds::TopicDataType {
+class RawType : public WrittenType {
  public:
-  explicit RawType(const std::string& name) {
-    setName(name.c_str());
-    m_typeSize = RawWriter::kMostBytes;
-    m_isGetKeyDefined = false;
-  }
-  bool serialize(void* data, rtps::SerializedPayload_t* payload) override {
+  explicit RawType(const std::string& name) : WrittenType(name, RawWriter::kMostBytes) {}
+
+ protected:
+  bool write(const void* data, rtps::SerializedPayload_t& payload) const override {
     const Bytes& cdr = *static_cast<const Bytes*>(data);
-    if (cdr.size() > payload->max_size) return false;
-    std::copy(cdr.begin(), cdr.end(), payload->data);
-    payload->length = static_cast<std::uint32_t>(cdr.size());
-    payload->encapsulation = CDR_LE;
+    if (cdr.size() > payload.max_size) return false;
+    std::copy(cdr.begin(), cdr.end(), payload.data);
+    payload.length = static_cast<std::uint32_t>(cdr.size());
+    payload.encapsulation = CDR_LE;
     return true;
   }
-  std::function<std::uint32_t()> getSerializedSizeProvider(void* data) override {
-    return [data] { return static_cast<std::uint32_t>(static_cast<const Bytes*>(data)->size()); };
+  std::uint32_t size(const void* data) const override {
+    return static_cast<std::uint32_t>(static_cast<const Bytes*>(data)->size());
   }
-  bool deserialize(rtps::SerializedPayload_t*, void*) override { return false; }  // no reader
-  bool getKey(void*, rtps::InstanceHandle_t*, bool) override { return false; }
-  void* createData() override { return new Bytes; }
-  void deleteData(void* data) override { delete static_cast<Bytes*>(data); }
 };
 
 void* make_raw_type(const std::string& name) {
-  return static_cast<eprosima::fastdds::dds::TopicDataType*>(new RawType(name));
+  return static_cast<dds::TopicDataType*>(new RawType(name));
 }
 
 }  // namespace

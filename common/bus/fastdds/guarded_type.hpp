@@ -1,7 +1,5 @@
 #pragma once
 
-#include <fastcdr/Cdr.h>
-#include <fastcdr/FastBuffer.h>
 #include <slsPubSubTypes.h>
 
 #include <cstdint>
@@ -10,6 +8,8 @@
 #include <vector>
 
 #include "common/bus/fastdds/bounds.hpp"
+#include "fastcdr_api.hpp"
+#include "fastdds_types.hpp"
 
 namespace sls::bus {
 
@@ -18,8 +18,8 @@ class MisfitReport {
  public:
   virtual ~MisfitReport() = default;
   /// `payload` does not fit `type`, because of `defect`.
-  virtual void report(const eprosima::fastrtps::rtps::SerializedPayload_t& payload,
-                      const char* type, const std::string& defect) = 0;
+  virtual void report(const rtps::SerializedPayload_t& payload, const std::string& type,
+                      const std::string& defect) = 0;
 };
 
 /// The receiver in use; null outside of a reader's `take`.
@@ -57,55 +57,54 @@ class RawScope {
 /// the generated function catches every exception, creates no more elements than a sample's length
 /// allows and refuses left-over bytes; guarded_type_test.cpp then passes without this class.
 template <class Generated>
-class GuardedType : public Generated {
- public:
-  bool deserialize(eprosima::fastrtps::rtps::SerializedPayload_t* payload, void* data) override {
-    using eprosima::fastcdr::Cdr;
+class GuardedType : public ReadType<Generated> {
+ protected:
+  bool read(rtps::SerializedPayload_t& payload, void* data) override {
     // A payload longer than any sample can claim a huge number of elements, and Fast CDR creates
     // them before it reads them.
-    if (payload->length > this->m_typeSize)
-      return refuse(*payload, data,
-                    "expected at most " + std::to_string(this->m_typeSize) + " bytes, got " +
-                        std::to_string(payload->length));
+    if (payload.length > max_size_of(*this))
+      return refuse(payload, data,
+                    "expected at most " + std::to_string(max_size_of(*this)) + " bytes, got " +
+                        std::to_string(payload.length));
     if (raw_target) {
-      raw_target->assign(payload->data, payload->data + payload->length);
+      raw_target->assign(payload.data, payload.data + payload.length);
       return true;
     }
     // The same as in the generated function, which does not return the number of bytes read.
-    eprosima::fastcdr::FastBuffer buffer(reinterpret_cast<char*>(payload->data), payload->length);
-    Cdr cdr(buffer, Cdr::DEFAULT_ENDIAN, Cdr::DDS_CDR);
+    eprosima::fastcdr::FastBuffer buffer(reinterpret_cast<char*>(payload.data), payload.length);
+    Cdr cdr = make_cdr(buffer);
     try {
       cdr.read_encapsulation();
-      payload->encapsulation = cdr.endianness() == Cdr::BIG_ENDIANNESS ? CDR_BE : CDR_LE;
-      static_cast<typename Generated::type*>(data)->deserialize(cdr);
+      payload.encapsulation = cdr.endianness() == Cdr::BIG_ENDIANNESS ? CDR_BE : CDR_LE;
+      read_message(cdr, *static_cast<typename Generated::type*>(data));
     } catch (const eprosima::fastcdr::exception::NotEnoughMemoryException&) {
-      return refuse(*payload, data, "expected more bytes, got " + std::to_string(payload->length));
+      return refuse(payload, data, "expected more bytes, got " + std::to_string(payload.length));
     } catch (const std::exception& error) {
-      return refuse(*payload, data,
+      return refuse(payload, data,
                     std::string("expected plain CDR of that type, got: ") + error.what());
     }
-    const std::size_t used = cdr.getSerializedDataLength();
-    if (payload->length - used > kMostPadding)
+    const std::size_t used = count_bytes(cdr);
+    if (payload.length - used > kMostPadding)
       return refuse(
-          *payload, data,
-          "expected " + std::to_string(used) + " bytes, got " + std::to_string(payload->length));
+          payload, data,
+          "expected " + std::to_string(used) + " bytes, got " + std::to_string(payload.length));
     const auto& message = *static_cast<const typename Generated::type*>(data);
     std::string excess = find_excess(message);
     if (excess.empty())
       excess =
-          find_cut_name(message, {reinterpret_cast<const char*>(payload->data), payload->length},
+          find_cut_name(message, {reinterpret_cast<const char*>(payload.data), payload.length},
                         cdr.endianness() != Cdr::DEFAULT_ENDIAN);
-    return excess.empty() || refuse(*payload, data, "expected at most " + excess);
+    return excess.empty() || refuse(payload, data, "expected at most " + excess);
   }
 
  private:
   static constexpr std::size_t kMostPadding = 3;  // to a multiple of four
 
-  bool refuse(const eprosima::fastrtps::rtps::SerializedPayload_t& payload, void* data,
+  bool refuse(const rtps::SerializedPayload_t& payload, void* data,
               const std::string& defect) const {
     // Frees the elements that the sample claimed: up to a thousand times the sample's size.
     *static_cast<typename Generated::type*>(data) = typename Generated::type();
-    if (misfit_report) misfit_report->report(payload, this->getName(), defect);
+    if (misfit_report) misfit_report->report(payload, name_of(*this), defect);
     return false;
   }
 };

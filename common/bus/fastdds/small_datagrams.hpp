@@ -1,15 +1,15 @@
 #pragma once
 
-#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
-
 #include <cstdint>
 #include <memory>
+
+#include "fastdds_api.hpp"
 
 namespace sls::bus {
 
 namespace detail {
 
-struct SmallDatagrams : eprosima::fastdds::rtps::UDPv4TransportDescriptor {
+struct SmallDatagrams : rtps::UDPv4TransportDescriptor {
   SmallDatagrams(const UDPv4TransportDescriptor& other, std::uint32_t bytes)
       : UDPv4TransportDescriptor(other), max_sent(bytes) {}
   std::uint32_t max_message_size() const override { return max_sent; }
@@ -25,11 +25,11 @@ struct SmallDatagrams : eprosima::fastdds::rtps::UDPv4TransportDescriptor {
 /// `maxMessageSize` in XML would silently cut them, too.
 ///
 /// Upstream: none reported. To be deleted when XML can limit outgoing datagrams only.
-inline std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> send_small_datagrams(
-    const std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface>& transport,
+inline std::shared_ptr<rtps::TransportDescriptorInterface> send_small_datagrams(
+    const std::shared_ptr<rtps::TransportDescriptorInterface>& transport,
     std::uint32_t bytes) {
   const auto* udp =
-      dynamic_cast<const eprosima::fastdds::rtps::UDPv4TransportDescriptor*>(transport.get());
+      dynamic_cast<const rtps::UDPv4TransportDescriptor*>(transport.get());
   if (!udp) return transport;
   return std::make_shared<detail::SmallDatagrams>(*udp, bytes);
 }

@@ -9,17 +9,19 @@
 #include <string_view>
 #include <system_error>
 
+#include "fastdds_api.hpp"
+
 namespace sls::bus {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::string_view kPrefix = "fastrtps_", kLock = "_el";
+constexpr std::string_view kPrefix = kSharedMemoryPrefix, kLock = "_el";
 
 /// Younger segments may not be locked yet: a segment is created a moment before its lock is taken.
 constexpr auto kCreationTime = std::chrono::seconds(10);
 
-/// "fastrtps_", sixteen hexadecimal digits, "_el": the lock file of a participant's segment.
+/// The prefix, sixteen hexadecimal digits, "_el": the lock file of a participant's segment.
 bool is_segment_lock(std::string_view name) {
   constexpr std::size_t kDigits = 16;
   if (name.size() != kPrefix.size() + kDigits + kLock.size()) return false;

@@ -1,20 +1,19 @@
 /// Questions about the transports of a participant.
 #pragma once
 
-#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
-#include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
-
 #include <algorithm>
 #include <fastdds/dds/core/policy/QosPolicies.hpp>
 #include <memory>
 #include <string>
 
+#include "fastdds_api.hpp"
+
 namespace sls::bus {
 
-using TransportDescriptor = std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface>;
+using TransportDescriptor = std::shared_ptr<rtps::TransportDescriptorInterface>;
 
 inline bool is_shared_memory(const TransportDescriptor& descriptor) {
-  return std::dynamic_pointer_cast<eprosima::fastdds::rtps::SharedMemTransportDescriptor>(
+  return std::dynamic_pointer_cast<rtps::SharedMemTransportDescriptor>(
              descriptor) != nullptr;
 }
 
@@ -22,7 +21,7 @@ inline bool is_shared_memory(const TransportDescriptor& descriptor) {
 inline bool is_local(const TransportDescriptor& descriptor) {
   if (is_shared_memory(descriptor)) return true;
   const auto udp =
-      std::dynamic_pointer_cast<eprosima::fastdds::rtps::UDPv4TransportDescriptor>(descriptor);
+      std::dynamic_pointer_cast<rtps::UDPv4TransportDescriptor>(descriptor);
   if (!udp || udp->interfaceWhiteList.empty()) return false;
   const auto& addresses = udp->interfaceWhiteList;
   return std::all_of(addresses.begin(), addresses.end(),
@@ -30,7 +29,7 @@ inline bool is_local(const TransportDescriptor& descriptor) {
 }
 
 /// The same for all transports of a participant. The built-in ones use every interface.
-inline bool are_local(const eprosima::fastdds::dds::TransportConfigQos& transports) {
+inline bool are_local(const dds::TransportConfigQos& transports) {
   const auto& own = transports.user_transports;
   return !transports.use_builtin_transports && !own.empty() &&
          std::all_of(own.begin(), own.end(), is_local);

@@ -1,13 +1,12 @@
 #include "recorder/sinks/mcap/entry_message.hpp"
 
-#include <fastcdr/Cdr.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 
 #include "common/bus/names.hpp"
+#include "fastcdr_api.hpp"
 
 namespace sls::record {
 namespace {
@@ -136,11 +135,10 @@ std::string_view EntryMessage::serialize(const StepRows& rows) {
   fill(rows);
   std::fill(bytes_.begin(), bytes_.end(), '\0');  // Fast CDR does not write padding bytes
   eprosima::fastcdr::FastBuffer buffer(bytes_.data(), bytes_.size());
-  eprosima::fastcdr::Cdr cdr(buffer, eprosima::fastcdr::Cdr::LITTLE_ENDIANNESS,
-                             eprosima::fastcdr::Cdr::DDS_CDR);
+  bus::Cdr cdr = bus::make_cdr(buffer, bus::Cdr::LITTLE_ENDIANNESS);
   cdr.serialize_encapsulation();
-  entry_.serialize(cdr);
-  return {bytes_.data(), cdr.getSerializedDataLength()};
+  bus::write_message(entry_, cdr);
+  return {bytes_.data(), bus::count_bytes(cdr)};
 }
 
 }  // namespace sls::record

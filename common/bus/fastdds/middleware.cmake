@@ -1,0 +1,77 @@
+# Finds Fast DDS 2 (2.9 to 2.14) or 3, with the Fast CDR that belongs to it. What differs between them in C++ is in
+# version2/ and version3/, fastcdr1/ and fastcdr2/; the includes of one of each are found.
+set(SLS_FASTDDS "" CACHE STRING "Major version of Fast DDS, 2 or 3; empty: 3 if it is installed, else 2")
+if(NOT SLS_FASTDDS MATCHES "^[23]?$")
+  message(FATAL_ERROR "SLS_FASTDDS: expected 2, 3 or nothing, got '${SLS_FASTDDS}'")
+endif()
+if(NOT SLS_FASTDDS STREQUAL "2")
+  find_package(fastdds 3 QUIET)
+endif()
+if(NOT fastdds_FOUND AND NOT SLS_FASTDDS STREQUAL "3")
+  find_package(fastrtps 2.9 QUIET)
+endif()
+if(fastdds_FOUND)
+  set(sls_fastdds_version 3)
+  set(sls_fastdds_target fastdds)
+elseif(fastrtps_FOUND)
+  set(sls_fastdds_version 2)
+  set(sls_fastdds_target fastrtps)
+else()
+  message(FATAL_ERROR "Fast DDS: expected its headers and library, version 2.9 to 2.14 (Debian 12: libfastrtps-dev) or 3 \
+(Debian 13: libfastdds-dev), got none that CMake finds")
+endif()
+message(STATUS "Fast DDS: ${sls_fastdds_target} ${${sls_fastdds_target}_VERSION}")
+find_package(fastcdr REQUIRED)
+if(fastcdr_VERSION VERSION_LESS 2)
+  set(sls_fastcdr_version 1)
+else()
+  set(sls_fastcdr_version 2)
+endif()
+if(sls_fastdds_version EQUAL 3 AND sls_fastcdr_version EQUAL 1)
+  message(FATAL_ERROR "Fast CDR: expected version 2, as Fast DDS ${fastdds_VERSION} needs, got ${fastcdr_VERSION} in \
+${fastcdr_DIR}")
+endif()
+find_program(FASTDDSGEN fastddsgen REQUIRED)
+set(sls_fastdds_includes ${CMAKE_CURRENT_LIST_DIR}/version${sls_fastdds_version}
+                         ${CMAKE_CURRENT_LIST_DIR}/fastcdr${sls_fastcdr_version})
+
+# sls_add_wire_types(LIBRARY NAME): the static library of the C++ types of NAME.idl and their serialisation, in the build
+# tree only. Headers: NAME.h and NAMEPubSubTypes.h. No type announces a TypeObject: in Fast DDS 2.9 one crashes peers
+# that do not know the type (Fast-DDS #3296).
+function(sls_add_wire_types library name)
+  set(generated ${CMAKE_CURRENT_BINARY_DIR}/generated)
+  file(MAKE_DIRECTORY ${generated})
+  # fastddsgen 4.0 computes no size of a sequence whose bound is the name of a constant, so the number takes its place.
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${name}.idl)
+  file(READ ${name}.idl text)
+  string(REGEX MATCHALL "const unsigned long [A-Z_]+ = [0-9]+" constants "${text}")
+  foreach(constant IN LISTS constants)
+    string(REGEX REPLACE "const unsigned long ([A-Z_]+) = ([0-9]+)" "\\1;\\2" constant "${constant}")
+    list(GET constant 0 constant_name)
+    list(GET constant 1 number)
+    string(REGEX REPLACE ", *${constant_name}>" ", ${number}>" text "${text}")
+  endforeach()
+  file(CONFIGURE OUTPUT ${CMAKE_CURRENT_BINARY_DIR}/${name}.idl CONTENT "${text}" @ONLY)
+  if(sls_fastdds_version EQUAL 2)
+    set(sources ${generated}/${name}.cxx ${generated}/${name}PubSubTypes.cxx)
+    set(headers ${generated}/${name}.h ${generated}/${name}PubSubTypes.h)
+  else()
+    set(options -no-typeobjectsupport)
+    set(sources ${generated}/${name}PubSubTypes.cxx)
+    set(headers ${generated}/${name}.hpp ${generated}/${name}PubSubTypes.hpp ${generated}/${name}CdrAux.hpp
+                ${generated}/${name}CdrAux.ipp)
+    file(CONFIGURE OUTPUT ${generated}/${name}.h CONTENT "#include \"${name}.hpp\"\n")
+    file(CONFIGURE OUTPUT ${generated}/${name}PubSubTypes.h CONTENT "#include \"${name}PubSubTypes.hpp\"\n")
+  endif()
+  add_custom_command(
+    OUTPUT ${sources} ${headers}
+    COMMAND ${FASTDDSGEN} -replace -cs ${options} -d ${generated} ${CMAKE_CURRENT_BINARY_DIR}/${name}.idl
+    DEPENDS ${CMAKE_CURRENT_BINARY_DIR}/${name}.idl
+    WORKING_DIRECTORY ${generated}
+    COMMENT "Generating the wire types of ${name}.idl")
+  add_library(${library} STATIC ${sources})
+  target_include_directories(${library} SYSTEM PUBLIC $<BUILD_INTERFACE:${generated}>)
+  target_include_directories(${library} PUBLIC "$<BUILD_INTERFACE:${sls_fastdds_includes}>")
+  target_link_libraries(${library} PUBLIC ${sls_fastdds_target} fastcdr)
+  target_compile_options(${library} PRIVATE -w)  # generated code warns
+endfunction()

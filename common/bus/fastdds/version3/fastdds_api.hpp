@@ -1,0 +1,58 @@
+/// Names and calls of Fast DDS 3 that are others in Fast DDS 2. version2/ has the same for that one;
+/// CMake chooses the folder. Other files use these names and do not know the version.
+#pragma once
+
+#include <fastdds/config.hpp>
+#include <fastdds/dds/domain/qos/DomainParticipantQos.hpp>
+#include <fastdds/dds/publisher/DataWriter.hpp>
+#include <fastdds/dds/topic/TypeSupport.hpp>
+#include <fastdds/rtps/attributes/PropertyPolicy.hpp>
+#include <fastdds/rtps/common/CacheChange.hpp>
+#include <fastdds/rtps/common/Guid.hpp>
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.hpp>
+#include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.hpp>
+#include <fastdds/utils/IPLocator.hpp>
+
+#include <fastcdr/cdr/fixed_size_string.hpp>
+
+#include <vector>
+
+namespace sls::bus {
+
+namespace dds = eprosima::fastdds::dds;
+namespace rtps = eprosima::fastdds::rtps;
+
+template <std::size_t kMost>
+using FixedString = eprosima::fastcdr::fixed_string<kMost>;
+using Duration = dds::Duration_t;
+using Time = dds::Time_t;
+inline const Duration kInfinite = dds::c_TimeInfinite;
+
+inline constexpr const char* kMiddlewareVersion = FASTDDS_VERSION_STR;
+
+/// Beginning of the names of its files in /dev/shm.
+inline constexpr const char* kSharedMemoryPrefix = "fastdds_";
+
+/// Environment variable that names a file of profiles.
+inline constexpr const char* kProfilesVariable = "FASTDDS_DEFAULT_PROFILES_FILE";
+
+inline bool is_ok(dds::ReturnCode_t code) { return code == dds::RETCODE_OK; }
+
+inline bool write_sample(dds::DataWriter& writer, const void* sample) {
+  return is_ok(writer.write(sample));
+}
+
+inline bool write_sample(dds::DataWriter& writer, const void* sample, const Time& time) {
+  return is_ok(writer.write_w_timestamp(sample, dds::HANDLE_NIL, time));
+}
+
+/// Nothing to do: the types are generated without a TypeObject.
+inline void leave_out_type_object(dds::TypeSupport&) {}
+
+/// Addresses of the discovery servers that a client of theirs asks.
+inline std::vector<rtps::Locator_t> find_discovery_servers(const dds::DomainParticipantQos& qos) {
+  const auto& servers = qos.wire_protocol().builtin.discovery_config.m_DiscoveryServers;
+  return {servers.begin(), servers.end()};
+}
+
+}  // namespace sls::bus
