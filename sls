@@ -12,7 +12,7 @@ else
   readonly is_installed=0 self=./sls build="${SLS_BUILD:-$root/build}"
   readonly python_path="$root/python:$build/python"
 fi
-readonly source_commands=(bench build chaos clean docker-demo docs fuzz network-table package reference setup study test)
+readonly source_commands=(bench build chaos clean docker-demo docs fuzz network-table package reference setup study systems test)
 readonly flying=(sim_server control_client recorder closed_loop)
 readonly programs=("${flying[@]}" sim_ctl sls_verify sls_convert delay_margin sls_doctor sls_view)
 readonly packages=(g++ make ninja-build cmake libeigen3-dev libsimbody-dev libfastcdr-dev
@@ -141,13 +141,14 @@ EOF
       ;;
     test)
       cat <<'EOF'
-usage: ./sls test [--slow | --sanitize KIND]
+usage: ./sls test [--slow | --sanitize KIND] [--only REGEX]
 
-Sets up, builds and runs the tests.
+Sets up, builds and runs the tests. build/test.xml has the output of each.
 
   --slow            also run the tests that take minutes; they need an idle machine
   --sanitize KIND   run only the unit tests, built with a sanitizer: address; or thread, which runs those
                     with several threads
+  --only REGEX      run only the tests whose names match
 EOF
       ;;
     fuzz)
@@ -168,8 +169,14 @@ EOF
         'Builds API pages of the C++ and C headers and of the Python package:' 'build/docs/index.html.'
       ;;
     package)
-      printf '%s\n\n%s\n' 'usage: ./sls package' \
-        'Builds a Debian package of all that a user needs: build/package/sls_VERSION_ARCHITECTURE.deb.'
+      cat <<'EOF'
+usage: ./sls package [--system NAME]
+
+Builds a Debian package of all that a user needs: build/package/sls_VERSION_ARCHITECTURE.deb. The version ends with the
+name of the system, such as debian12.
+
+  --system NAME    build it in a clean tree of another system, debian12 or debian13, as ./sls systems does
+EOF
       ;;
     python)
       cat <<'EOF'
@@ -712,16 +719,18 @@ cmd_chaos() {
 }
 
 cmd_test() {
-  local preset=release folder=$build which=(--label-exclude slow) targets=()
-  if [[ $# == 1 && $1 == --slow ]]; then
-    which=()
-  elif (($#)); then
-    [[ $# == 2 && $1 == --sanitize && ($2 == address || $2 == thread) ]] ||
-      fail "test: expected nothing, --slow or --sanitize address|thread, got '$*'" 2
-    preset=asan
-    [[ $2 == thread ]] && preset=tsan which=(--label-regex threaded) targets=(threaded_tests)
-    folder="$root/build-$preset"
-  fi
+  local preset=release folder=$build which=(--label-exclude slow) targets=() only=()
+  while (($#)); do
+    case "$1 ${2:-}" in
+      '--slow '*) which=() ;;
+      '--sanitize address') preset=asan; shift ;;
+      '--sanitize thread') preset=tsan which=(--label-regex threaded) targets=(threaded_tests); shift ;;
+      '--only '?*) only=(--tests-regex "$2"); shift ;;
+      *) fail "test: expected --slow, --sanitize address|thread or --only REGEX, got '$*'" 2 ;;
+    esac
+    shift
+  done
+  [[ $preset == release ]] || folder="$root/build-$preset"
   setup "${test_packages[@]}" "${python_packages[@]}" "${bench_packages[@]}" \
     "${doc_packages[@]}" "${package_packages[@]}"
   install_node_modules "$root/tests/tools/view"
@@ -730,7 +739,7 @@ cmd_test() {
   # Most tests wait for processes and discovery: one more than there are cores leaves none idle.
   # They must not get variables that the middleware reads from the environment.
   env -u ROS_DISCOVERY_SERVER -u FASTRTPS_DEFAULT_PROFILES_FILE -u SLS_DOMAIN \
-    ctest --preset "$preset" --parallel "$(($(nproc) + 1))" "${which[@]}"
+    ctest --preset "$preset" --parallel "$(($(nproc) + 1))" --output-junit "$folder/test.xml" "${which[@]}" "${only[@]}"
 }
 
 cmd_reference() {
@@ -746,7 +755,13 @@ cmd_docs() {
   say "pages: $build/docs/index.html"
 }
 
+cmd_systems() { exec /usr/bin/python3 -B "$root/tools/systems" "$@"; }
+
 cmd_package() {
+  if (($#)); then
+    [[ $# == 2 && $1 == --system ]] || fail "package: expected nothing or --system NAME, got '$*'" 2
+    cmd_systems --commands package -- "$2"
+  fi
   setup "${package_packages[@]}"
   build_tree release "$build" package_contents
   local log="$build/package.log"
