@@ -26,7 +26,7 @@
 
 namespace sls::bench {
 
-namespace dds = eprosima::fastdds::dds;
+namespace dds = bus::dds;
 
 class BareNode {
  public:
@@ -56,7 +56,7 @@ class BareWriter : dds::DataWriterListener {
   }
   ~BareWriter() override { bus::delete_writer(*publisher_, writer_); }
 
-  void write(Message& message) { writer_->write(&message); }
+  void write(Message& message) { bus::write_sample(*writer_, &message); }
   std::size_t count_matched() const { return static_cast<std::size_t>(matched_); }
 
  private:
@@ -93,8 +93,7 @@ class BareReader : dds::DataReaderListener {
  private:
   void on_data_available(dds::DataReader* source) override {
     dds::SampleInfo info;
-    while (source->take_next_sample(buffer_.get(), &info) ==
-           eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK)
+    while (bus::is_ok(source->take_next_sample(buffer_.get(), &info)))
       if (info.valid_data) handler_(*buffer_);
   }
   void on_subscription_matched(dds::DataReader*,

@@ -34,7 +34,7 @@ class Surroundings {
   Surroundings(bus::Node& node, const config::Scenario& scenario, std::uint32_t vehicles)
       : participants_(node), parameters_(node), statuses_(node) {
     parameters_.write(closed_loop::make_parameters(scenario, kRunId, vehicles));
-    announce(PHASE_WAITING, 0);
+    announce(RunPhase::PHASE_WAITING, 0);
   }
 
   void announce(RunPhase phase, std::uint64_t step) {
@@ -50,7 +50,7 @@ class Surroundings {
     while (true) {
       if (participants_.version() != version_) {
         version_ = participants_.version();
-        recorders_ = participants_.find(ROLE_RECORDER, kRunId);
+        recorders_ = participants_.find(ParticipantRole::ROLE_RECORDER, kRunId);
       }
       if (!recorders_.empty() && is_over(recorders_.front().announcement)) return;
       if (app::stop_signal() != 0) throw app::RunError("feeder: interrupted");
@@ -78,20 +78,20 @@ class Surroundings {
 
 nlohmann::json feed_recorder(const config::Scenario& scenario, const FeederOptions& options) {
   std::vector<RecordEntry> entries = closed_loop::fly_entries(scenario, options.steps);
-  entries.back().answer().mission(MISSION_FINISHED);
+  entries.back().answer().mission(MissionPhase::MISSION_FINISHED);
   bus::Node node(options.qos_file, options.domain, "bench", "server");
   bus::Writer<RecordBatch> writer(node);
   Surroundings surroundings(node, scenario, options.vehicles);
   sim::RecordStream stream(writer, node.max_batch_bytes(), kRunId);
   const std::uint64_t last = entries.size() - 1;
-  surroundings.wait(PHASE_WAITING, 0, "a recorder that is ready",
+  surroundings.wait(RunPhase::PHASE_WAITING, 0, "a recorder that is ready",
                     [](const Participant& recorder) { return recorder.ready(); });
-  surroundings.announce(PHASE_RUNNING, 0);
+  surroundings.announce(RunPhase::PHASE_RUNNING, 0);
   const auto began = Clock::now();
   for (const RecordEntry& flown : entries) {
     const auto step = static_cast<std::int64_t>(flown.step());
     surroundings.wait(
-        PHASE_RUNNING, flown.step(), "the recorder", [&](const Participant& recorder) {
+        RunPhase::PHASE_RUNNING, flown.step(), "the recorder", [&](const Participant& recorder) {
           return !stream.is_full() && step - 1 - recorder.last_complete_step() <
                                           sim::calc_recorder_window(stream.history_steps());
         });
@@ -99,16 +99,16 @@ nlohmann::json feed_recorder(const config::Scenario& scenario, const FeederOptio
       entry = flown;
       entry.vehicle_id(static_cast<std::uint32_t>(i));
     });
-    surroundings.announce_if_due(PHASE_RUNNING, flown.step());
+    surroundings.announce_if_due(RunPhase::PHASE_RUNNING, flown.step());
   }
   stream.end();
-  surroundings.announce(PHASE_FINISHED, last);
-  surroundings.wait(PHASE_FINISHED, last, "the recorder's last step",
+  surroundings.announce(RunPhase::PHASE_FINISHED, last);
+  surroundings.wait(RunPhase::PHASE_FINISHED, last, "the recorder's last step",
                     [&](const Participant& recorder) {
                       return recorder.last_complete_step() == static_cast<std::int64_t>(last);
                     });
   const std::chrono::duration<double> elapsed = Clock::now() - began;
-  surroundings.wait(PHASE_FINISHED, last, "the recorder's end",
+  surroundings.wait(RunPhase::PHASE_FINISHED, last, "the recorder's end",
                     [](const Participant& recorder) { return recorder.done(); });
   return {{"rows", kRowsOfStep * entries.size() * options.vehicles}, {"seconds", elapsed.count()}};
 }

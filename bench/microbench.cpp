@@ -11,6 +11,7 @@
 #include "common/config/scenario.hpp"
 #include "control_client/flight_controller.hpp"
 #include "control_client/messages.hpp"
+#include "fastdds_types.hpp"
 #include "sim_server/plants/analytic/analytic_plant.hpp"
 #include "sim_server/plants/plant.hpp"
 #include "sim_server/plants/slung_load/slung_load_plant.hpp"
@@ -87,12 +88,12 @@ void serialize(benchmark::State& run, const Make& make) {
   Type type;
   std::vector<Message> samples;
   for (const RecordEntry& entry : entries()) samples.push_back(make(entry));
-  eprosima::fastrtps::rtps::SerializedPayload_t payload(type.m_typeSize);
+  bus::rtps::SerializedPayload_t payload(bus::max_size_of(type));
   Message back;
   std::size_t i = 0;
   for (auto _ : run) {
-    type.serialize(&samples[i++ % samples.size()], &payload);
-    type.deserialize(&payload, &back);
+    bus::serialize(type, &samples[i++ % samples.size()], payload);
+    bus::deserialize(type, payload, &back);
     benchmark::DoNotOptimize(back);
   }
 }

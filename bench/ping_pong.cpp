@@ -32,7 +32,7 @@ std::vector<States> make_states(std::uint32_t vehicles) {
     if (id % SAMPLE_VEHICLES == 0) samples.emplace_back().run_id(1);
     VehicleState& state = samples.back().vehicles().emplace_back();
     state.vehicle_id(id);
-    state.force_origin(FORCE_ANSWERED);
+    state.force_origin(ForceOrigin::FORCE_ANSWERED);
     state.controller_name("control_client");
   }
   return samples;

@@ -138,7 +138,7 @@ std::vector<RecordBatch> make_batches(const std::vector<RecordEntry>& entries,
 nlohmann::json measure_recording(const config::Scenario& scenario, std::uint32_t vehicles,
                                  std::size_t steps, const fs::path& folder) {
   std::vector<RecordEntry> entries = closed_loop::fly_entries(scenario, steps);
-  entries.back().answer().mission(MISSION_FINISHED);
+  entries.back().answer().mission(MissionPhase::MISSION_FINISHED);
   const Parameters parameters = closed_loop::make_parameters(scenario, kRecordedRun, vehicles);
   const ScratchFolder ours(folder), plain(folder);
   nlohmann::json json;
@@ -146,13 +146,14 @@ nlohmann::json measure_recording(const config::Scenario& scenario, std::uint32_t
   {
     const auto batches = make_batches(entries, vehicles);
     record::Recording recording(ours.path(), parameters);
-    recording.add(closed_loop::make_status(kRecordedRun, 0, PHASE_RUNNING, 0));
+    recording.add(closed_loop::make_status(kRecordedRun, 0, RunPhase::PHASE_RUNNING, 0));
     auto began = Clock::now();
     for (const RecordBatch& batch : batches) {
       recording.add(batch);
       recording.flush_if_due();
     }
-    recording.add(closed_loop::make_status(kRecordedRun, 1, PHASE_FINISHED, entries.size() - 1));
+    recording.add(
+        closed_loop::make_status(kRecordedRun, 1, RunPhase::PHASE_FINISHED, entries.size() - 1));
     json["recording_s"] = calc_seconds(began);
     began = Clock::now();
     if (!recording.finish("", 0)) throw app::RunError("recording: " + recording.describe_gaps());

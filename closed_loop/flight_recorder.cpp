@@ -25,7 +25,7 @@ FlightRecorder::FlightRecorder(const std::filesystem::path& folder, bool force,
     ids_.push_back(vehicle.vehicle_id());
   board_.controller_name = controller_name;
   board_.start_clock();
-  board_.publish(PHASE_RUNNING, "");
+  board_.publish(RunPhase::PHASE_RUNNING, "");
   batch_.run_id(parameters.run_id());
 }
 
@@ -48,8 +48,8 @@ void FlightRecorder::add(const std::vector<FlownStep>& steps, std::optional<std:
   }
   board_.step = steps.front().step;
   if (board_.step > 0)
-    for (std::size_t i = 0; i < ids_.size(); ++i) board_.timing.add(FORCE_ANSWERED, 0);
-  if (board_.is_due()) board_.publish(PHASE_RUNNING, "");
+    for (std::size_t i = 0; i < ids_.size(); ++i) board_.timing.add(ForceOrigin::FORCE_ANSWERED, 0);
+  if (board_.is_due()) board_.publish(RunPhase::PHASE_RUNNING, "");
   recording_.flush_if_due();
 }
 
@@ -60,7 +60,7 @@ void FlightRecorder::announce(const std::vector<std::string>& remarks) {
 bool FlightRecorder::finish(const std::string& failure) {
   batch_.is_last(true);
   hand_on();
-  board_.publish(failure.empty() ? PHASE_FINISHED : PHASE_FAILED,
+  board_.publish(failure.empty() ? RunPhase::PHASE_FINISHED : RunPhase::PHASE_FAILED,
                  failure.empty() ? "mission finished" : failure);
   return recording_.finish("", 0);
 }

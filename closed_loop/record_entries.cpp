@@ -18,7 +18,7 @@ void fill_entry(RecordEntry& entry, std::uint32_t vehicle_id, const FlownStep& f
   applied.f_Q_W = flown.applied_f_Q_W;
   sim::fill_state(entry, vehicle_id, flown.step, flown.truth,
                   flown.can_measurement_differ ? &flown.measured : nullptr, applied);
-  entry.kind(is_refused ? ANSWER_REFUSED : ANSWER_ACCEPTED);
+  entry.kind(is_refused ? AnswerKind::ANSWER_REFUSED : AnswerKind::ANSWER_ACCEPTED);
   entry.answered_step(flown.step);
   entry.client_name(controller_name);
   control::fill_command_message(entry.answer(), vehicle_id, flown.answer, flown.compute_time);

@@ -99,7 +99,7 @@ void Client::begin(const bus::Run& run) {
     throw config::ConfigError(
         fmt::format("scenario '{}': expected the server's, SHA-256 {}, got {}", scenario_.name,
                     parameters.scenario_sha256().c_str(), scenario_.sha256));
-  const bool is_realtime = parameters.mode() == MODE_REALTIME;
+  const bool is_realtime = parameters.mode() == SyncMode::MODE_REALTIME;
   config::Scenario scenario = scenario_;
   scenario.sync.period_ns = parameters.period_ns();
   scenario.plant.step_ns = parameters.step_ns();
@@ -141,7 +141,7 @@ void Client::leave() {
   const std::uint64_t run_id = run_->parameters.run_id();
   const auto status = servers_.find_status(run_id);
   announce(false, true);
-  if (status && status->phase() == PHASE_FAILED)
+  if (status && status->phase() == RunPhase::PHASE_FAILED)
     throw app::RunError(fmt::format("the run failed: {}", status->reason().c_str()));
 }
 
@@ -211,7 +211,8 @@ void Client::rethrow_answer_error() {
 
 bool Client::has_ended() const {
   const auto status = servers_.find_status(run_->parameters.run_id());
-  return status && (status->phase() == PHASE_FINISHED || status->phase() == PHASE_FAILED);
+  return status &&
+         (status->phase() == RunPhase::PHASE_FINISHED || status->phase() == RunPhase::PHASE_FAILED);
 }
 
 std::optional<bus::Run> Client::find_successor() {
@@ -244,7 +245,7 @@ Participant Client::make_announcement(const std::vector<std::uint32_t>& vehicle_
   Participant message;
   message.contract_sha256(bus::kContractSha256);
   message.vehicle_ids(vehicle_ids);
-  message.role(ROLE_CONTROLLER);
+  message.role(ParticipantRole::ROLE_CONTROLLER);
   message.name(options_.name);
   message.host(bus::host_name());
   message.strength(options_.strength);

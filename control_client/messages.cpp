@@ -8,29 +8,29 @@ namespace {
 FaultCode to_message(Fault fault) {
   switch (fault) {
     case Fault::kNone:
-      return FAULT_NONE;
+      return FaultCode::FAULT_NONE;
     case Fault::kFreeFall:
-      return FAULT_FREE_FALL;
+      return FaultCode::FAULT_FREE_FALL;
     case Fault::kRodLevel:
-      return FAULT_ROD_LEVEL;
+      return FaultCode::FAULT_ROD_LEVEL;
     case Fault::kNotFinite:
-      return FAULT_NOT_FINITE;
+      return FaultCode::FAULT_NOT_FINITE;
     case Fault::kStageTimeout:
-      return FAULT_STAGE_TIMEOUT;
+      return FaultCode::FAULT_STAGE_TIMEOUT;
   }
-  return FAULT_NOT_FINITE;
+  return FaultCode::FAULT_NOT_FINITE;
 }
 
 ::sls::MissionPhase to_message(MissionPhase phase) {
   switch (phase) {
     case MissionPhase::kRunning:
-      return MISSION_RUNNING;
+      return sls::MissionPhase::MISSION_RUNNING;
     case MissionPhase::kFinished:
-      return MISSION_FINISHED;
+      return sls::MissionPhase::MISSION_FINISHED;
     case MissionPhase::kFailed:
-      return MISSION_FAILED;
+      return sls::MissionPhase::MISSION_FAILED;
   }
-  return MISSION_FAILED;
+  return sls::MissionPhase::MISSION_FAILED;
 }
 
 void fill(ControllerState& message, const ControllerMemory& memory) {

@@ -202,11 +202,12 @@ void Recording::flush_if_due() {
 // --- how far it is -------------------------------------------------------------------------------
 
 bool Recording::is_finished() const {
-  return last_status_ && last_status_->phase() == PHASE_FINISHED;
+  return last_status_ && last_status_->phase() == RunPhase::PHASE_FINISHED;
 }
 
 bool Recording::has_ended() const {
-  return is_finished() || is_reset() || (last_status_ && last_status_->phase() == PHASE_FAILED);
+  return is_finished() || is_reset() ||
+         (last_status_ && last_status_->phase() == RunPhase::PHASE_FAILED);
 }
 
 // --- the end -------------------------------------------------------------------------------------

@@ -56,7 +56,7 @@ class Recording {
   bool has_all() const { return has_ended() && stream_.has_ended(); }
 
   /// True when the run was ended by an operator's reset.
-  bool is_reset() const { return last_status_ && last_status_->phase() == PHASE_RESET; }
+  bool is_reset() const { return last_status_ && last_status_->phase() == RunPhase::PHASE_RESET; }
 
   /// The last step up to which all steps of all vehicles have come or are known to be missing; −1:
   /// none. The last 64 of them may wait for late answers before they are written.

@@ -33,9 +33,9 @@ void fill(CommandRow& row, const RecordEntry& entry) {
   row.step = entry.step();
   row.controller = entry.client_name().c_str();
   row.f_Q_W = answer.f_Q_W_n();
-  if (entry.kind() == ANSWER_HELD)
+  if (entry.kind() == AnswerKind::ANSWER_HELD)
     row.fault = CommandRow::kHeld;
-  else if (entry.kind() == ANSWER_FAIL_SAFE)
+  else if (entry.kind() == AnswerKind::ANSWER_FAIL_SAFE)
     row.fault = CommandRow::kFailSafe;
   else
     row.fault = bus::to_string(answer.fault());
@@ -53,7 +53,7 @@ void fill_rows(StepRows& rows, const RecordEntry& entry, const Parameters& param
     rows.measured.reset();
   else
     fill(reuse(rows.measured), entry, entry.measured().front(), parameters);
-  if (entry.kind() == ANSWER_NONE)
+  if (entry.kind() == AnswerKind::ANSWER_NONE)
     rows.command.reset();
   else
     fill(reuse(rows.command), entry);

@@ -193,8 +193,8 @@ struct StepRows {
   bool is_whole() const { return state && command && (reference || command->is_unanswered()); }
 };
 
-/// The rows of an entry of any kind except ANSWER_LATE. Rows that `rows` holds are replaced and
-/// their memory is used again.
+/// The rows of an entry of any kind except AnswerKind::ANSWER_LATE. Rows that `rows` holds are
+/// replaced and their memory is used again.
 void fill_rows(StepRows& rows, const RecordEntry& entry, const Parameters& parameters);
 StepRows make_rows(const RecordEntry& entry, const Parameters& parameters);
 /// Adds the reference of `entry`, which is the answer to that step.

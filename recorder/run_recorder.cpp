@@ -35,7 +35,7 @@ constexpr std::chrono::steady_clock::duration kLongestPass = 1s;
 Participant make_announcement(const bus::Run* run, bool ready, bool done, std::int64_t last_step) {
   Participant message;
   message.contract_sha256(bus::kContractSha256);
-  message.role(ROLE_RECORDER);
+  message.role(ParticipantRole::ROLE_RECORDER);
   message.name("recorder");
   message.host(bus::host_name());
   if (run) {
@@ -66,7 +66,7 @@ RunEnd RunRecorder::run() {
   announce(false);
   // A process that writes into a port of shared memory waits for its reader, even if the reader has
   // just lost its processor.
-  if (run_.parameters.mode() == MODE_REALTIME) app::put_process_first();
+  if (run_.parameters.mode() == SyncMode::MODE_REALTIME) app::put_process_first();
   std::thread writing([this] {
     app::put_thread_last();
     write_samples();
@@ -110,11 +110,12 @@ void RunRecorder::look_for_the_end(bus::ServerWatch& server) {
     interruption_ =
         app::stop_signal() == SIGINT ? "interrupted by SIGINT" : "interrupted by SIGTERM";
     end_within(kInterruptionTime);
-  } else if (status && status->phase() == PHASE_FINISHED) {
+  } else if (status && status->phase() == RunPhase::PHASE_FINISHED) {
     end_within(kCompletionTime);
     const std::int64_t step = last_complete_step_;
     if (step > std::exchange(step_after_end_, step)) give_up_->renew();
-  } else if (status && (status->phase() == PHASE_FAILED || status->phase() == PHASE_RESET)) {
+  } else if (status && (status->phase() == RunPhase::PHASE_FAILED ||
+                        status->phase() == RunPhase::PHASE_RESET)) {
     end_within(kFailedTime);
   } else if (!give_up_) {
     const auto finding = server.look();
@@ -195,7 +196,8 @@ void RunRecorder::write_samples() {
 void RunRecorder::note_libraries() {
   const std::uint64_t version = surroundings_.participants.version();
   if (std::exchange(participants_version_, version) == version) return;
-  for (const auto& entry : surroundings_.participants.find(ROLE_CONTROLLER, run_id_))
+  for (const auto& entry :
+       surroundings_.participants.find(ParticipantRole::ROLE_CONTROLLER, run_id_))
     if (entry.announcement.library_sha256().size() > 0)
       recording_.note_library(entry.announcement.name().to_string(),
                               entry.announcement.library_sha256().to_string());

@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "common/bus/names.hpp"
 #include "common/bus/participants.hpp"
 
 namespace sls::record {
@@ -89,11 +90,12 @@ void Stream::handle(const RecordBatch& batch) {
 
 void Stream::handle(const RecordEntry& entry) {
   const auto vehicle = next_steps_.find(entry.vehicle_id());
-  if (vehicle == next_steps_.end() || entry.step() > max_step_ || entry.kind() > ANSWER_LATE) {
+  if (vehicle == next_steps_.end() || entry.step() > max_step_ ||
+      bus::to_number(entry.kind()) > bus::to_number(AnswerKind::ANSWER_LATE)) {
     ++dropped_.out_of_range;
     return;
   }
-  if (entry.kind() == ANSWER_LATE) return handle_late(entry);
+  if (entry.kind() == AnswerKind::ANSWER_LATE) return handle_late(entry);
   std::uint64_t& next = vehicle->second;
   if (entry.step() < next) {
     ++dropped_.repeated;

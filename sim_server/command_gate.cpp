@@ -15,8 +15,10 @@ constexpr std::size_t kRememberedAnswers =
 
 /// The first undefined enumerator: Fast CDR takes any number for one.
 std::optional<JudgedAnswer::Undefined> find_undefined(const ControlCommand& command) {
-  if (command.mission() > MISSION_FAILED) return {{"mission", command.mission()}};
-  if (command.fault() > FAULT_STAGE_TIMEOUT) return {{"fault", command.fault()}};
+  using bus::to_number;
+  const std::uint32_t mission = to_number(command.mission()), fault = to_number(command.fault());
+  if (mission > to_number(MissionPhase::MISSION_FAILED)) return {{"mission", mission}};
+  if (fault > to_number(FaultCode::FAULT_STAGE_TIMEOUT)) return {{"fault", fault}};
   return std::nullopt;
 }
 
@@ -40,9 +42,9 @@ JudgedAnswer to_judged(const OfferedAnswer& answer) {
       std::all_of(memory.begin(), memory.end(), [](double x) { return std::isfinite(x); });
   judged.undefined = find_undefined(command);
   judged.is_reference_finite = is_finite(command.reference());
-  if (command.fault() != FAULT_NONE) judged.fault = bus::to_string(command.fault());
-  judged.is_mission_failed = command.mission() == MISSION_FAILED;
-  judged.is_mission_finished = command.mission() == MISSION_FINISHED;
+  if (command.fault() != FaultCode::FAULT_NONE) judged.fault = bus::to_string(command.fault());
+  judged.is_mission_failed = command.mission() == MissionPhase::MISSION_FAILED;
+  judged.is_mission_finished = command.mission() == MissionPhase::MISSION_FINISHED;
   judged.stage = command.controller().stage_index();
   return judged;
 }

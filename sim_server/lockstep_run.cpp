@@ -158,7 +158,7 @@ bool LockstepRun::receive(const Commands& sample, const bus::PeerId& sender) {
     }
     const bool is_news = std::any_of(vehicles_.begin(), vehicles_.end(), [](const auto& vehicle) {
       return vehicle->gate.take_over() ||
-             vehicle->gate.accepted()->command.mission() == MISSION_FINISHED;
+             vehicle->gate.accepted()->command.mission() == MissionPhase::MISSION_FINISHED;
     });
     if (is_news) {
       endpoints_.commands.interrupt();

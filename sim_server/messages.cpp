@@ -53,7 +53,7 @@ Parameters make_parameters_message(std::uint64_t run_id,
   message.period_ns(scenario.sync.period_ns);
   message.step_ns(scenario.plant.step_ns);
   const bool lockstep = scenario.sync.mode == config::SyncMode::kLockstep;
-  message.mode(lockstep ? MODE_LOCKSTEP : MODE_REALTIME);
+  message.mode(lockstep ? SyncMode::MODE_LOCKSTEP : SyncMode::MODE_REALTIME);
   message.real_time_factor(lockstep ? 0.0 : scenario.sync.real_time_factor);
   return message;
 }

@@ -17,7 +17,7 @@ namespace sls::sim {
 struct Applied {
   Eigen::Vector3d answer_f_Q_W = Eigen::Vector3d::Zero();  ///< as answered, N
   Eigen::Vector3d f_Q_W = Eigen::Vector3d::Zero();         ///< as it acted, after faults, N
-  ForceOrigin origin = FORCE_NONE;
+  ForceOrigin origin = ForceOrigin::FORCE_NONE;
   std::string controller_name;
   ControllerState memory;
 };

@@ -20,7 +20,9 @@ constexpr std::int64_t kStageTolerance_ns = 1'000'000'000;
 /// Fewer answers to earlier steps are no mistake: a client that was stopped for a while sends some.
 constexpr std::uint64_t kFewOldAnswers = 3;
 
-bool is_defined(ParticipantRole role) { return role == ROLE_CONTROLLER || role == ROLE_RECORDER; }
+bool is_defined(ParticipantRole role) {
+  return role == ParticipantRole::ROLE_CONTROLLER || role == ParticipantRole::ROLE_RECORDER;
+}
 
 std::string describe(const ParticipantCheck::Entry& entry) {
   const ParticipantRole role = entry.announcement.role();
@@ -275,7 +277,7 @@ void ParticipantCheck::check_stage(Vehicle& vehicle, const OfferedAnswer& answer
     vehicle.stage_start_step = answer.step;
     return;
   }
-  if (answer.command.mission() != MISSION_RUNNING) return;
+  if (answer.command.mission() != MissionPhase::MISSION_RUNNING) return;
   // Beyond the last stage the mission must be finished at once.
   const bool is_over = stage >= vehicle.stages_ns.size();
   const auto duration_ns = is_over ? std::optional<std::int64_t>(0) : vehicle.stages_ns[stage];
@@ -393,7 +395,7 @@ void ParticipantCheck::look_at(const Entry& entry, const Neighbourhood& neighbou
     return;  // the other fields may have another meaning
   }
   look_at_role(entry, neighbourhood, findings);
-  if (announcement.role() != ROLE_CONTROLLER || announcement.done()) return;
+  if (announcement.role() != ParticipantRole::ROLE_CONTROLLER || announcement.done()) return;
   if (announcement.run_id() != run_id_) {
     const std::string key = make_key(entry.peer, "run_id " + to_words(announcement.run_id()));
     const bool is_informed = neighbourhood.informed.count(entry.peer) > 0;
@@ -433,7 +435,8 @@ void ParticipantCheck::look_at_role(const Entry& entry, const Neighbourhood& nei
     findings[make_key(entry.peer, "role")] =
         describe_field(entry, "role", "controller or recorder",
                        fmt::format("{}", static_cast<int>(announcement.role())));
-  if (announcement.role() == ROLE_RECORDER && neighbourhood.command_writers.count(entry.peer) > 0)
+  if (announcement.role() == ParticipantRole::ROLE_RECORDER &&
+      neighbourhood.command_writers.count(entry.peer) > 0)
     findings[make_key(entry.peer, "role")] =
         describe_field(entry, "role", "controller, as it writes sls/command", "recorder");
 }
@@ -503,7 +506,7 @@ void ParticipantCheck::look_for_twins(const Neighbourhood& neighbourhood, Findin
 
 /// True if the controller is ready to fly in this run.
 bool ParticipantCheck::flies(const Participant& controller) const {
-  return controller.role() == ROLE_CONTROLLER && controller.run_id() == run_id_ &&
+  return controller.role() == ParticipantRole::ROLE_CONTROLLER && controller.run_id() == run_id_ &&
          controller.ready() && !controller.done() && has_this_contract(controller) &&
          controller.scenario_sha256() == scenario_sha256_;
 }

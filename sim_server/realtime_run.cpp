@@ -131,7 +131,8 @@ bool RealtimeRun::take_commands(Clock::time_point deadline) {
 bool RealtimeRun::is_ending() const {
   return std::all_of(vehicles_.begin(), vehicles_.end(), [](const auto& vehicle) {
     const auto& answer = vehicle->gate.accepted();
-    return answer ? answer->command.mission() == MISSION_FINISHED : vehicle->has_ended_late();
+    return answer ? answer->command.mission() == MissionPhase::MISSION_FINISHED
+                  : vehicle->has_ended_late();
   });
 }
 

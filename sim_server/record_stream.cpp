@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/bus/message_size.hpp"
+
 namespace sls::sim {
 
 RecordStream::RecordStream(bus::Writer<RecordBatch>& writer, std::size_t max_bytes,
@@ -53,11 +55,11 @@ void RecordStream::work() {
 }
 
 void RecordStream::write(const Collected& collected, bool is_last) {
-  const std::size_t header = RecordBatch::getCdrSerializedSize(batch_);
+  const std::size_t header = bus::calc_size(batch_);
   std::size_t bytes = header;
   for (std::size_t i = 0; i < collected.count; ++i) {
     const RecordEntry& entry = collected.entries[i];
-    std::size_t more = RecordEntry::getCdrSerializedSize(entry, bytes);
+    std::size_t more = bus::calc_size(entry, bytes);
     if (entry.step() != step_) bytes_of_step_ = 0;
     step_ = entry.step();
     bytes_of_step_ += more;
@@ -66,7 +68,7 @@ void RecordStream::write(const Collected& collected, bool is_last) {
     if (is_full && !batch_.entries().empty()) {
       write_batch(false);
       bytes = header;
-      more = RecordEntry::getCdrSerializedSize(entry, bytes);
+      more = bus::calc_size(entry, bytes);
     }
     batch_.entries().push_back(entry);
     bytes += more;

@@ -69,12 +69,12 @@ Run::End Run::execute() {
 void Run::fail(const std::string& reason) {
   close_requests(reason);
   // Before the claim is settled no participant has joined, so nothing is published.
-  if (board_.has_published()) publish_end(PHASE_FAILED, reason);
+  if (board_.has_published()) publish_end(RunPhase::PHASE_FAILED, reason);
 }
 
 void Run::finish() {
   close_requests("mission finished");
-  publish_end(PHASE_FINISHED, "mission finished");
+  publish_end(RunPhase::PHASE_FINISHED, "mission finished");
   const double wall_s = board_.calc_wall_s();
   const auto step = static_cast<double>(board_.step);
   const double simulated_s = step * static_cast<double>(scenario_.sync.period_ns) / 1e9;
@@ -85,7 +85,7 @@ void Run::finish() {
 
 void Run::reset() {
   close_requests(control_.last_event());
-  publish_end(PHASE_RESET, control_.last_event());
+  publish_end(RunPhase::PHASE_RESET, control_.last_event());
 }
 
 void Run::publish_end(RunPhase phase, const std::string& reason) {
@@ -129,7 +129,7 @@ bool Run::wait_for_participants() {
   app::Wait wait(expected.timeout_s, kUsualStartTime);
   const auto began = Clock::now();
   std::string published;
-  board_.publish(PHASE_WAITING, "participants are not ready");
+  board_.publish(RunPhase::PHASE_WAITING, "participants are not ready");
   while (true) {
     do_housekeeping();
     if (attend_to_operator()) return false;
@@ -143,7 +143,7 @@ bool Run::wait_for_participants() {
       spdlog::info("waiting for: {} ({:.0f} s left){}{}{}", missing, wait.seconds_left(),
                    describe_problem(), endpoints_.domain.describe_isolation(),
                    Clock::now() - began > kLongStart ? "; run ./sls doctor" : "");
-      if (missing != published) board_.publish(PHASE_WAITING, "missing: " + missing);
+      if (missing != published) board_.publish(RunPhase::PHASE_WAITING, "missing: " + missing);
       published = missing;
     }
     std::this_thread::sleep_for(app::kShortPollTime);
@@ -155,7 +155,8 @@ bool Run::wait_for_participants() {
 bool Run::fly() {
   board_.start_clock();
   began_ = Clock::now();
-  board_.publish(control_.is_paused() ? PHASE_PAUSED : PHASE_RUNNING, control_.last_event());
+  board_.publish(control_.is_paused() ? RunPhase::PHASE_PAUSED : RunPhase::PHASE_RUNNING,
+                 control_.last_event());
   begin();
   for (const PlantOfVehicles& group : plants_) measure(group);
   while (true) {
@@ -250,9 +251,9 @@ bool Run::attend_to_operator() {
     if (const auto reply = control_.request(request, board_.step))
       endpoints_.reply_writer.write(*reply);
     if (control_.events() == events) continue;
-    const RunPhase phase = board_.phase() == PHASE_WAITING ? PHASE_WAITING
-                           : control_.is_paused()          ? PHASE_PAUSED
-                                                           : PHASE_RUNNING;
+    const RunPhase phase = board_.phase() == RunPhase::PHASE_WAITING ? RunPhase::PHASE_WAITING
+                           : control_.is_paused()                    ? RunPhase::PHASE_PAUSED
+                                                                     : RunPhase::PHASE_RUNNING;
     spdlog::info("step {}: {}", board_.step, control_.last_event());
     board_.publish(phase, control_.last_event());
   }
@@ -288,12 +289,12 @@ std::map<bus::PeerId, Answering> Run::collect_answering() {
 void Run::refresh_roster() {
   roster_version_ = endpoints_.participants.version();
   roster_time_ = Clock::now();
-  auto controllers = endpoints_.participants.find(ROLE_CONTROLLER, run_id_);
+  auto controllers = endpoints_.participants.find(ParticipantRole::ROLE_CONTROLLER, run_id_);
   presence_.look(controllers, collect_answering(), roster_time_);
-  roster_ = {
-      check_.admit_controllers(controllers),
-      ParticipantCheck::admit_recorders(endpoints_.participants.find(ROLE_RECORDER, run_id_)),
-      began_};
+  roster_ = {check_.admit_controllers(controllers),
+             ParticipantCheck::admit_recorders(
+                 endpoints_.participants.find(ParticipantRole::ROLE_RECORDER, run_id_)),
+             began_};
   for (const auto& vehicle : vehicles_)
     vehicle->gate.set_clients(find_ready_clients(roster_, scenario_.sha256, vehicle->id()));
   roster_changed();
@@ -363,7 +364,7 @@ void Run::announce_remarks() {
 }
 
 void Run::report_silent_recorder() {
-  if (board_.phase() != PHASE_RUNNING) return;
+  if (board_.phase() != RunPhase::PHASE_RUNNING) return;
   const auto now = Clock::now();
   if (recorder_report_time_ && now - *recorder_report_time_ < kReportInterval) return;
   const std::string silent = name_silent_recorder(roster_, board_.step, now - kRecorderSilence);

@@ -69,7 +69,7 @@ void Run::record_late(const VehicleFlight& vehicle, const OfferedAnswer& answer)
     entry = RecordEntry();
     entry.vehicle_id(vehicle.id());
     entry.step(answer.step);
-    entry.kind(ANSWER_LATE);
+    entry.kind(AnswerKind::ANSWER_LATE);
     entry.answered_step(answer.step);
     entry.client_name(answer.client_name);
     entry.answer(answer.command);

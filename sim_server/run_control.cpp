@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/bus/names.hpp"
 #include "common/config/vehicle_ids.hpp"
 
 namespace sls::sim {
@@ -53,36 +54,37 @@ std::optional<SimControlReply> RunControl::request(const SimControl& request, st
 
   const std::string refusal = find_refusal(request);
   if (refusal.empty()) act(request);
-  if (refusal.empty() && request.action() == ACTION_STEP) return std::nullopt;
+  if (refusal.empty() && request.action() == ControlAction::ACTION_STEP) return std::nullopt;
   return remember(operator_name, make_reply(request.request_id(), step, refusal));
 }
 
 std::string RunControl::find_refusal(const SimControl& request) const {
   if (end_reason_) return "the run has ended: " + *end_reason_;
-  if (is_stop_requested_ && request.action() != ACTION_STOP)
+  if (is_stop_requested_ && request.action() != ControlAction::ACTION_STOP)
     return "the run is about to end: " + last_event_;
-  if (is_reset_requested_ && request.action() != ACTION_STOP && request.action() != ACTION_RESET)
+  if (is_reset_requested_ && request.action() != ControlAction::ACTION_STOP &&
+      request.action() != ControlAction::ACTION_RESET)
     return "the run is about to end: " + last_event_;
   const std::string busy = stepping_ ? "a step request is being carried out: " +
                                            describe_progress(stepping_->done, stepping_->steps)
                                      : "";
   switch (request.action()) {
-    case ACTION_START:
-    case ACTION_RESUME:
+    case ControlAction::ACTION_START:
+    case ControlAction::ACTION_RESUME:
       return is_paused_ ? busy : "not paused";
-    case ACTION_PAUSE:
+    case ControlAction::ACTION_PAUSE:
       if (stepping_) return stepping_->cut_short_by.empty() ? "" : "already paused";
       return is_paused_ ? "already paused" : "";
-    case ACTION_STEP:
+    case ControlAction::ACTION_STEP:
       if (!is_paused_) return "not paused";
       return request.steps() < 1 ? "steps: expected at least 1, got 0" : busy;
-    case ACTION_RESET:
-    case ACTION_STOP:
+    case ControlAction::ACTION_RESET:
+    case ControlAction::ACTION_STOP:
       return "";
   }
-  return fmt::format(
-      "action: expected one of {} to {}, got {}", static_cast<std::uint32_t>(ACTION_START),
-      static_cast<std::uint32_t>(ACTION_STOP), static_cast<std::uint32_t>(request.action()));
+  return fmt::format("action: expected one of {} to {}, got {}",
+                     bus::to_number(ControlAction::ACTION_START),
+                     bus::to_number(ControlAction::ACTION_STOP), bus::to_number(request.action()));
 }
 
 RunControl::StepRequest RunControl::make_step_request(const SimControl& request) {
@@ -97,28 +99,28 @@ void RunControl::act(const SimControl& request) {
   ++events_;
   const std::string who = name_operator(request);
   switch (request.action()) {
-    case ACTION_START:
+    case ControlAction::ACTION_START:
       is_paused_ = false;
       last_event_ = "started by " + who;
       break;
-    case ACTION_RESUME:
+    case ControlAction::ACTION_RESUME:
       is_paused_ = false;
       last_event_ = "resumed by " + who;
       break;
-    case ACTION_PAUSE:
+    case ControlAction::ACTION_PAUSE:
       is_paused_ = true;
       if (stepping_) stepping_->cut_short_by = who;
       last_event_ = "paused by " + who;
       break;
-    case ACTION_STEP:
+    case ControlAction::ACTION_STEP:
       stepping_ = make_step_request(request);
       last_event_ = fmt::format("{} steps requested by {}", request.steps(), who);
       break;
-    case ACTION_RESET:
+    case ControlAction::ACTION_RESET:
       is_reset_requested_ = true;
       last_event_ = "reset by " + who;
       break;
-    case ACTION_STOP:
+    case ControlAction::ACTION_STOP:
       is_stop_requested_ = true;
       last_event_ = "stopped by " + who;
       break;

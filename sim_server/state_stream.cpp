@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "common/bus/message_size.hpp"
+
 namespace sls::sim {
 
 void StateStream::set_step(std::uint64_t run_id, std::uint64_t step, std::int64_t sim_time_ns) {
@@ -11,7 +13,7 @@ void StateStream::set_step(std::uint64_t run_id, std::uint64_t step, std::int64_
 }
 
 void StateStream::write_where(const std::function<bool(std::size_t)>& is_wanted) {
-  const std::size_t bytes = VehicleState::getCdrSerializedSize(vehicles_.front());
+  const std::size_t bytes = bus::calc_size(vehicles_.front());
   const std::size_t most =
       std::clamp<std::size_t>(max_bytes_ / bytes, 1, std::size_t{SAMPLE_VEHICLES});
   for (std::size_t first = 0; first < vehicles_.size(); first += most) {

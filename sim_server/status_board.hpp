@@ -59,7 +59,7 @@ class StatusBoard {
   const std::uint32_t vehicle_id_;
   const std::int64_t period_ns_;
   const std::function<SyncCounters()> sum_counters_;
-  RunPhase phase_ = PHASE_WAITING;
+  RunPhase phase_ = RunPhase::PHASE_WAITING;
   std::uint64_t samples_ = 0;
   Clock::time_point publish_time_;
   Clock::time_point start_time_;

@@ -8,11 +8,11 @@ namespace sls::sim {
 
 void TimingRecord::add(ForceOrigin origin, std::uint64_t age) {
   ++periods_;
-  if (origin == FORCE_HELD) {
+  if (origin == ForceOrigin::FORCE_HELD) {
     ++held_;
     worst_age_ = std::max(worst_age_, age);
   }
-  if (origin == FORCE_FAIL_SAFE) ++fail_safe_;
+  if (origin == ForceOrigin::FORCE_FAIL_SAFE) ++fail_safe_;
 }
 
 void TimingRecord::add_delay(double delay_s) { worst_delay_s_ = std::max(worst_delay_s_, delay_s); }

@@ -39,7 +39,7 @@ VehicleState VehicleFlight::measure(std::uint64_t step, const model::Measurement
 void VehicleFlight::take_answer() {
   const OfferedAnswer& answer = *gate.accepted();
   Outcome outcome;
-  outcome.is_finished = answer.command.mission() == MISSION_FINISHED;
+  outcome.is_finished = answer.command.mission() == MissionPhase::MISSION_FINISHED;
   hold(answer);
   has_ended_late_ = false;
   outcome.applied = last_answer_;
@@ -47,14 +47,14 @@ void VehicleFlight::take_answer() {
 }
 
 void VehicleFlight::keep_late_answer(const OfferedAnswer& answer) {
-  if (last_answer_.origin != FORCE_NONE && answer.step <= last_answer_step_) return;
+  if (last_answer_.origin != ForceOrigin::FORCE_NONE && answer.step <= last_answer_step_) return;
   hold(answer);
-  has_ended_late_ = answer.command.mission() == MISSION_FINISHED;
+  has_ended_late_ = answer.command.mission() == MissionPhase::MISSION_FINISHED;
 }
 
 void VehicleFlight::hold(const OfferedAnswer& answer) {
   last_answer_.answer_f_Q_W = bus::to_vector(answer.command.f_Q_W_n());
-  last_answer_.origin = FORCE_ANSWERED;
+  last_answer_.origin = ForceOrigin::FORCE_ANSWERED;
   last_answer_.controller_name = answer.client_name;
   last_answer_.memory = answer.command.controller();
   last_answer_step_ = answer.step;
@@ -67,10 +67,11 @@ void VehicleFlight::hold(const OfferedAnswer& answer) {
 void VehicleFlight::fly_without_answer(ControllerAbsence::Action action) {
   Outcome outcome;
   outcome.applied = last_answer_;
-  if (action == ControllerAbsence::Action::kHold && last_answer_.origin != FORCE_NONE) {
-    outcome.applied.origin = FORCE_HELD;
+  if (action == ControllerAbsence::Action::kHold &&
+      last_answer_.origin != ForceOrigin::FORCE_NONE) {
+    outcome.applied.origin = ForceOrigin::FORCE_HELD;
   } else {  // also before the first answer, when there is nothing to hold
-    outcome.applied.origin = FORCE_FAIL_SAFE;
+    outcome.applied.origin = ForceOrigin::FORCE_FAIL_SAFE;
     outcome.applied.controller_name = kFailSafeName;
     outcome.applied.answer_f_Q_W =
         calc_fail_safe_force(scenario_.vehicle, state_, scenario_.controller.force_limit_n);
@@ -91,22 +92,26 @@ void VehicleFlight::fill_record(RecordEntry& entry) const {
   entry.answered_step(last_answer_step_);
   if (outcome_) {
     const Applied& applied = outcome_->applied;
-    entry.kind(applied.origin == FORCE_ANSWERED ? ANSWER_ACCEPTED
-               : applied.origin == FORCE_HELD   ? ANSWER_HELD
-                                                : ANSWER_FAIL_SAFE);
+    entry.kind(applied.origin == ForceOrigin::FORCE_ANSWERED ? AnswerKind::ANSWER_ACCEPTED
+               : applied.origin == ForceOrigin::FORCE_HELD   ? AnswerKind::ANSWER_HELD
+                                                             : AnswerKind::ANSWER_FAIL_SAFE);
     entry.client_name(applied.controller_name);
     entry.answer().f_Q_W_n(bus::to_array(applied.answer_f_Q_W));
     return;
   }
   const auto& answer = gate.accepted() ? gate.accepted() : gate.refused();
-  entry.kind(gate.accepted() ? ANSWER_ACCEPTED : answer ? ANSWER_REFUSED : ANSWER_NONE);
+  entry.kind(gate.accepted() ? AnswerKind::ANSWER_ACCEPTED
+             : answer        ? AnswerKind::ANSWER_REFUSED
+                             : AnswerKind::ANSWER_NONE);
   entry.answered_step(step_);
   entry.client_name(answer ? answer->client_name : std::string());
   entry.answer(answer ? answer->command : ControlCommand());
 }
 
 std::uint64_t VehicleFlight::calc_age() const {
-  return outcome_ && outcome_->applied.origin == FORCE_ANSWERED ? 0 : step_ - last_answer_step_;
+  return outcome_ && outcome_->applied.origin == ForceOrigin::FORCE_ANSWERED
+             ? 0
+             : step_ - last_answer_step_;
 }
 
 double VehicleFlight::calc_absence_s() const { return calc_elapsed_s(absent_since_); }

@@ -2,23 +2,32 @@
 /// becomes "unknown".
 #pragma once
 
+#include <cstdint>
+
 #include "common/bus/topics.hpp"
 
 namespace sls::bus {
 
+/// The number of an enumerator on the wire. A sample can hold any number, also one that is not
+/// defined; compare it by this function, because the enumerations of Fast DDS 3 have a sign.
+template <class Enumeration>
+constexpr std::uint32_t to_number(Enumeration value) {
+  return static_cast<std::uint32_t>(value);
+}
+
 inline const char* to_string(RunPhase phase) {
   switch (phase) {
-    case PHASE_WAITING:
+    case RunPhase::PHASE_WAITING:
       return "waiting";
-    case PHASE_RUNNING:
+    case RunPhase::PHASE_RUNNING:
       return "running";
-    case PHASE_PAUSED:
+    case RunPhase::PHASE_PAUSED:
       return "paused";
-    case PHASE_FINISHED:
+    case RunPhase::PHASE_FINISHED:
       return "finished";
-    case PHASE_FAILED:
+    case RunPhase::PHASE_FAILED:
       return "failed";
-    case PHASE_RESET:
+    case RunPhase::PHASE_RESET:
       return "reset";
   }
   return "unknown";
@@ -26,15 +35,15 @@ inline const char* to_string(RunPhase phase) {
 
 inline const char* to_string(FaultCode fault) {
   switch (fault) {
-    case FAULT_NONE:
+    case FaultCode::FAULT_NONE:
       return "none";
-    case FAULT_FREE_FALL:
+    case FaultCode::FAULT_FREE_FALL:
       return "free_fall";
-    case FAULT_ROD_LEVEL:
+    case FaultCode::FAULT_ROD_LEVEL:
       return "rod_level";
-    case FAULT_NOT_FINITE:
+    case FaultCode::FAULT_NOT_FINITE:
       return "not_finite";
-    case FAULT_STAGE_TIMEOUT:
+    case FaultCode::FAULT_STAGE_TIMEOUT:
       return "stage_timeout";
   }
   return "unknown";
@@ -42,9 +51,9 @@ inline const char* to_string(FaultCode fault) {
 
 inline const char* to_string(SyncMode mode) {
   switch (mode) {
-    case MODE_LOCKSTEP:
+    case SyncMode::MODE_LOCKSTEP:
       return "lockstep";
-    case MODE_REALTIME:
+    case SyncMode::MODE_REALTIME:
       return "realtime";
   }
   return "unknown";
@@ -52,9 +61,9 @@ inline const char* to_string(SyncMode mode) {
 
 inline const char* to_string(ParticipantRole role) {
   switch (role) {
-    case ROLE_CONTROLLER:
+    case ParticipantRole::ROLE_CONTROLLER:
       return "controller";
-    case ROLE_RECORDER:
+    case ParticipantRole::ROLE_RECORDER:
       return "recorder";
   }
   return "unknown";

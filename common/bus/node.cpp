@@ -57,6 +57,8 @@ constexpr std::size_t kMaxParticipants = 64;
 /// of encryption.
 constexpr std::size_t kEnvelopeBytes = 200;
 
+constexpr const char* kCertificate = "dds.sec.auth.builtin.PKI-DH.identity_certificate";
+constexpr const char* kIdentityAuthority = "dds.sec.auth.builtin.PKI-DH.identity_ca";
 constexpr const char* kGovernance = "dds.sec.access.builtin.Access-Permissions.governance";
 constexpr const char* kPermissions = "dds.sec.access.builtin.Access-Permissions.permissions";
 
@@ -157,8 +159,10 @@ struct Node::Impl {
       wire.participant_id = choose_participant_id(ports, find_own_participant_ids());
     const bool has_plain_submessages =
         is_secured && !are_submessages_protected(find_file(qos, kGovernance));
-    listener = std::make_unique<ParticipantListener>(is_secured, &neighbours, &discovered,
-                                                     has_plain_submessages);
+    announce_what_discovery_lacks(qos);
+    listener = std::make_unique<ParticipantListener>(
+        ParticipantListener::Own{is_secured, has_plain_submessages, has_shared_memory(qos)},
+        &neighbours, &discovered);
     participant = factory->create_participant(static_cast<std::uint32_t>(domain), qos,
                                               listener.get(), dds::StatusMask::none());
     if (participant)
@@ -178,12 +182,22 @@ struct Node::Impl {
     dds::DomainParticipantFactory::get_instance()->delete_participant(participant);
   }
 
+  void announce_what_discovery_lacks(dds::DomainParticipantQos& qos) const {
+    auto& properties = qos.properties().properties();
+    properties.emplace_back(kVersionProperty, kMiddlewareVersion, true);
+    if (!is_secured) return;
+    const IdentityNames names =
+        find_identity_names(find_file(qos, kCertificate), find_file(qos, kIdentityAuthority));
+    properties.emplace_back(kCertificateProperty, names.certificate, true);
+    properties.emplace_back(kAuthorityProperty, names.authority, true);
+  }
+
   /// Size of the largest handshake message of DDS Security, which is never fragmented. With the
   /// keys of `./sls keys` it has 5,500 bytes, mostly certificate and signed permissions.
   static std::size_t calc_handshake_bytes(const dds::DomainParticipantQos& qos) {
     constexpr std::size_t kLeast = 6'000, kBesides = 2'000;
     std::size_t bytes = kBesides;
-    for (const char* name : {"dds.sec.auth.builtin.PKI-DH.identity_certificate", kPermissions}) {
+    for (const char* name : {kCertificate, kPermissions}) {
       std::error_code error;
       const auto size = std::filesystem::file_size(find_file(qos, name), error);
       if (!error) bytes += static_cast<std::size_t>(size);
@@ -422,9 +436,7 @@ AnyWriter::~AnyWriter() {
   delete_writer(*impl_->publisher, impl_->writer);
 }
 
-bool AnyWriter::write(const void* sample) {
-  return write_sample(*impl_->writer, sample);
-}
+bool AnyWriter::write(const void* sample) { return write_sample(*impl_->writer, sample); }
 
 bool AnyWriter::wait_for_acknowledgments(std::chrono::milliseconds limit) {
   const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(limit);
@@ -497,8 +509,7 @@ AnyReader::AnyReader(Node& node, const char* topic, const char* profile, void* t
   if (!is_ok(impl_->subscriber->get_datareader_qos_from_profile(profile, qos)))
     node.impl().throw_unknown_profile(profile);
   const auto& lifespan = qos.lifespan().duration;
-  if (!(lifespan == kInfinite))
-    impl_->lifespan = std::chrono::nanoseconds(lifespan.to_ns());
+  if (!(lifespan == kInfinite)) impl_->lifespan = std::chrono::nanoseconds(lifespan.to_ns());
   MiddlewareLog::clear();
   impl_->reader = impl_->subscriber->create_datareader(dds_topic, qos, impl_.get());
   if (!impl_->reader) node.impl().throw_refused_endpoint("read", topic, profile);
@@ -521,9 +532,7 @@ void AnyReader::ignore_lifespan(bool is_ignored) {
   if (!impl_->lifespan) return;
   dds::DataReaderQos qos = impl_->reader->get_qos();
   qos.lifespan().duration =
-      is_ignored
-          ? kInfinite
-          : Duration(std::chrono::duration<double>(*impl_->lifespan).count());
+      is_ignored ? kInfinite : Duration(std::chrono::duration<double>(*impl_->lifespan).count());
   impl_->reader->set_qos(qos);
 }
 

@@ -166,9 +166,9 @@ void wait_for_recorders_to_end(const ParticipantDirectory& participants, std::ui
   const app::Wait longest(patience.longest);
   std::map<PeerId, std::int64_t> last_steps;
   while (!wait.is_over() && !longest.is_over()) {
-    const auto recorders = participants.find(ROLE_RECORDER, run_id);
+    const auto recorders = participants.find(ParticipantRole::ROLE_RECORDER, run_id);
     if (get_further(recorders, last_steps) && app::stop_signal() == 0) wait.renew();
-    const int missing = expected - participants.count_done(ROLE_RECORDER, run_id);
+    const int missing = expected - participants.count_done(ParticipantRole::ROLE_RECORDER, run_id);
     if (are_recorders_done(recorders) && missing <= 0) return;
     if (wait.is_report_due()) {
       std::string names;
@@ -450,14 +450,14 @@ std::string ServerWatch::describe() const {
 
 int calc_progress(RunPhase phase) {
   switch (phase) {
-    case PHASE_WAITING:
+    case RunPhase::PHASE_WAITING:
       return 1;
-    case PHASE_RUNNING:
-    case PHASE_PAUSED:
+    case RunPhase::PHASE_RUNNING:
+    case RunPhase::PHASE_PAUSED:
       return 2;
-    case PHASE_FINISHED:
-    case PHASE_FAILED:
-    case PHASE_RESET:
+    case RunPhase::PHASE_FINISHED:
+    case RunPhase::PHASE_FAILED:
+    case RunPhase::PHASE_RESET:
       break;
   }
   return -1;

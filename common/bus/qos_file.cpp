@@ -17,6 +17,7 @@
 
 #include "common/bus/topics.hpp"
 #include "common/config/config_error.hpp"
+#include "fastdds_files.hpp"
 
 namespace sls::bus {
 namespace {
@@ -195,6 +196,27 @@ void complete(tinyxml2::XMLElement& element, const std::string& identity, const 
   }
 }
 
+// --- versions of the middleware ------------------------------------------------------------------
+
+/// Elements that Fast DDS 3 renamed: the names in version 2 and in version 3.
+constexpr std::array<std::array<const char*, 2>, 7> kRenamed = {
+    {{"heartbeatPeriod", "heartbeat_period"},
+     {"heartbeatResponseDelay", "heartbeat_response_delay"},
+     {"initialAcknackDelay", "initial_acknack_delay"},
+     {"initialHeartbeatDelay", "initial_heartbeat_delay"},
+     {"nackResponseDelay", "nack_response_delay"},
+     {"nackSupressionDuration", "nack_supression_duration"},
+     {"expectsInlineQos", "expects_inline_qos"}}};
+
+/// Gives the elements the names of the version in use: a QoS file may have those of either.
+void rename(tinyxml2::XMLElement& element) {
+  for (const auto& names : kRenamed)
+    if (element.Name() == std::string(names[3 - kFastDdsMajor]))
+      element.SetName(names[kFastDdsMajor - 2]);
+  for (auto* child = element.FirstChildElement(); child; child = child->NextSiblingElement())
+    rename(*child);
+}
+
 // --- limits of the middleware --------------------------------------------------------------------
 
 /// The first element of this name and text, in `element` or below; an empty `text` fits any text.
@@ -280,6 +302,7 @@ std::string read_qos_file(const std::filesystem::path& file, const std::string& 
     if (profile.is_required && found.count(profile.name) == 0)
       throw ConfigError(place + ": profile '" + profile.name + "': expected a <" + profile.element +
                         "> of this name, got only: " + join_names(own));
+  if (auto* root = document.RootElement()) rename(*root);
   tinyxml2::XMLPrinter printer;
   document.Print(&printer);
   return printer.CStr();

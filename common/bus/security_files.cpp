@@ -195,6 +195,12 @@ bool are_submessages_protected(const std::filesystem::path& governance) {
   return read_text(governance).find("<metadata_protection_kind>NONE<") == std::string::npos;
 }
 
+IdentityNames find_identity_names(const std::filesystem::path& certificate,
+                                  const std::filesystem::path& authority) {
+  return {find_subject(*read_certificate(certificate.string())),
+          find_subject(*read_certificate(authority.string()))};
+}
+
 bool is_of_contract_1(const std::filesystem::path& permissions) {
   const auto grants = [text = read_text(permissions)](const char* topic) {
     return text.find(std::string("<topic>") + topic) != std::string::npos;

@@ -16,6 +16,15 @@ namespace sls::bus {
 /// @throws config::ConfigError `FILE: expected …, got …`.
 bool check_security_files(const std::string& profiles);
 
+/// Subjects of a certificate and of the authority's, in RFC 2253 order.
+struct IdentityNames {
+  std::string certificate, authority;
+};
+
+/// @throws config::ConfigError if one of the files cannot be read or holds no certificate.
+IdentityNames find_identity_names(const std::filesystem::path& certificate,
+                                  const std::filesystem::path& authority);
+
 /// True if a signed permissions document is of contract 1: it grants topics that contract 2 does
 /// not have, but not sls/record.
 bool is_of_contract_1(const std::filesystem::path& permissions);

@@ -45,13 +45,11 @@ void* make_type_support<Commands>() {
 }
 template <>
 void* make_type_support<RecordBatch>() {
-  return static_cast<dds::TopicDataType*>(
-      new GuardedType<RecordBatchPubSubType>);
+  return static_cast<dds::TopicDataType*>(new GuardedType<RecordBatchPubSubType>);
 }
 template <>
 void* make_type_support<Participant>() {
-  return static_cast<dds::TopicDataType*>(
-      new GuardedType<ParticipantPubSubType>);
+  return static_cast<dds::TopicDataType*>(new GuardedType<ParticipantPubSubType>);
 }
 template <>
 void* make_type_support<Parameters>() {
@@ -67,8 +65,7 @@ void* make_type_support<SimControl>() {
 }
 template <>
 void* make_type_support<SimControlReply>() {
-  return static_cast<dds::TopicDataType*>(
-      new GuardedType<SimControlReplyPubSubType>);
+  return static_cast<dds::TopicDataType*>(new GuardedType<SimControlReplyPubSubType>);
 }
 
 }  // namespace sls::bus::detail

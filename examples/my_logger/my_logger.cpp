@@ -23,7 +23,8 @@ void log_flight(int domain) {
   const bus::Reader<RecordBatch> reader(
       node, bus::kRecordReaderProfile, [&](const RecordBatch& batch, const bus::PeerId&) {
         for (const RecordEntry& entry : batch.entries()) {
-          if (entry.kind() == ANSWER_LATE) continue;  // answers an earlier step; no new state
+          if (entry.kind() == AnswerKind::ANSWER_LATE)
+            continue;  // answers an earlier step; no new state
           ++states;
           const auto& p = entry.truth().p_WL_m();
           if (entry.step() % 25 == 0)

@@ -60,7 +60,7 @@ class ClientTest : public testing::Test {
     parameters.contract_sha256(bus::kContractSha256);
     parameters.run_id(kRun);
     parameters.vehicles().emplace_back().vehicle_id(0);
-    parameters.mode(MODE_LOCKSTEP);
+    parameters.mode(SyncMode::MODE_LOCKSTEP);
     parameters.period_ns(4'000'000);
     parameters.step_ns(1'000'000);
     parameters_writer_.write(parameters);
@@ -69,7 +69,7 @@ class ClientTest : public testing::Test {
   void publish_status() {
     SimStatus status;
     status.run_id(kRun);
-    status.phase(PHASE_WAITING);
+    status.phase(RunPhase::PHASE_WAITING);
     status_writer_.write(status);
   }
   /// In a thread, because the client may answer in it.
@@ -86,7 +86,7 @@ class ClientTest : public testing::Test {
   }
 
   std::optional<bus::ParticipantDirectory::Entry> find(std::uint64_t run_id) const {
-    const auto found = participants_.find(ROLE_CONTROLLER, run_id);
+    const auto found = participants_.find(ParticipantRole::ROLE_CONTROLLER, run_id);
     return found.empty() ? std::nullopt : std::optional(found.front());
   }
   /// Waits for `count` further announcements of the same content.

@@ -3,7 +3,6 @@
 /// becomes visible, and ends at SIGTERM.
 #include <slsPubSubTypes.h>
 
-#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <CLI/CLI.hpp>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
@@ -18,7 +17,6 @@
 #include <array>
 #include <chrono>
 #include <csignal>
-#include <cstring>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -26,13 +24,18 @@
 #include <thread>
 
 #include "common/app/stop_signal.hpp"
+#include "other_type.hpp"
 
 namespace {
 
-namespace dds = eprosima::fastdds::dds;
-namespace rtps = eprosima::fastrtps::rtps;
-using eprosima::fastrtps::types::ReturnCode_t;
 using namespace sls;
+namespace dds = bus::dds;
+namespace rtps = bus::rtps;
+using bus::is_ok;
+using bus::write_sample;
+using foreign::Edit;
+using foreign::kEnd;
+using foreign::OtherType;
 using namespace std::chrono_literals;
 
 struct Options {
@@ -44,57 +47,13 @@ struct Options {
   int strength = 0;
 };
 
-/// A change of a message's bytes: inserts `count` bytes at `offset`, or removes them if negative.
-struct Edit {
-  std::size_t offset = 0;
-  int count = 0;
-};
-constexpr std::size_t kEnd = SIZE_MAX;
-
-/// A type as if compiled from another IDL file: with a field more or less, another name, or a key.
-template <class Generated>
-class OtherType : public Generated {
- public:
-  explicit OtherType(const Edit& edit) : edit_(edit) {
-    this->m_typeSize += 16;
-    this->auto_fill_type_object(false);
-    this->auto_fill_type_information(false);
-  }
-  void set_keyed() { this->m_isGetKeyDefined = true; }
-
-  bool serialize(void* data, rtps::SerializedPayload_t* payload) override {
-    if (!Generated::serialize(data, payload)) return false;
-    const std::size_t offset = std::min<std::size_t>(edit_.offset, payload->length);
-    char* const begin = reinterpret_cast<char*>(payload->data) + offset;
-    const std::size_t rest = payload->length - offset;
-    if (edit_.count >= 0) {
-      std::memmove(begin + edit_.count, begin, rest);
-      std::memset(begin, 0, static_cast<std::size_t>(edit_.count));
-    } else {
-      std::memmove(begin, begin - edit_.count, rest + edit_.count);
-    }
-    payload->length = static_cast<std::uint32_t>(static_cast<int>(payload->length) + edit_.count);
-    return true;
-  }
-  std::function<std::uint32_t()> getSerializedSizeProvider(void* data) override {
-    return [size = Generated::getSerializedSizeProvider(data)] { return size() + 16; };
-  }
-  bool getKey(void*, rtps::InstanceHandle_t* handle, bool) override {
-    handle->value[0] = 1;
-    return true;
-  }
-
- private:
-  const Edit edit_;
-};
-
 class ForeignClient {
  public:
   explicit ForeignClient(const Options& options) : options_(options) {
     dds::DomainParticipantQos qos = dds::PARTICIPANT_QOS_DEFAULT;
     qos.name(options.name.c_str());
     qos.transport().use_builtin_transports = false;
-    const auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
+    const auto udp = std::make_shared<rtps::UDPv4TransportDescriptor>();
     udp->interfaceWhiteList.push_back(options.interface);
     qos.transport().user_transports.push_back(udp);
     participant_ = dds::DomainParticipantFactory::get_instance()->create_participant(
@@ -144,7 +103,7 @@ class ForeignClient {
   dds::Topic* create_topic(const char* name, const Edit& edit = {},
                            const std::string& type_name = {}, bool is_keyed = false) {
     auto* type = new OtherType<Generated>(edit);
-    if (!type_name.empty()) type->setName(type_name.c_str());
+    if (!type_name.empty()) type->set_type_name(type_name);
     if (is_keyed) type->set_keyed();
     const dds::TypeSupport support(type);
     support.register_type(participant_);
@@ -161,9 +120,9 @@ class ForeignClient {
     qos.data_sharing().off();
     qos.endpoint().history_memory_policy = rtps::DYNAMIC_REUSABLE_MEMORY_MODE;
     if (makes("state_deadline") && topic->get_name() == "sls/state")
-      qos.deadline().period = eprosima::fastrtps::Duration_t(0.01);
+      qos.deadline().period = bus::Duration(0.01);
     if (makes("record_deadline") && topic->get_name() == "sls/record")
-      qos.deadline().period = eprosima::fastrtps::Duration_t(0.01);
+      qos.deadline().period = bus::Duration(0.01);
     return subscriber_->create_datareader(topic, qos);
   }
 
@@ -223,7 +182,7 @@ class ForeignClient {
 
   void create_command_writer() {
     dds::DataWriterQos qos = make_writer_qos();
-    if (!makes("no_deadline")) qos.deadline().period = eprosima::fastrtps::Duration_t(0.1);
+    if (!makes("no_deadline")) qos.deadline().period = bus::Duration(0.1);
     if (makes("exclusive_command")) qos.ownership().kind = dds::EXCLUSIVE_OWNERSHIP_QOS;
     // After the encapsulation (4), run_id (8) and step (8).
     const Edit edit = makes("extra_field")     ? Edit{20, 8}
@@ -244,15 +203,13 @@ class ForeignClient {
   void look_for_run() {
     dds::SampleInfo info;
     Parameters parameters;
-    while (parameters_reader_ &&
-           parameters_reader_->take_next_sample(&parameters, &info) == ReturnCode_t::RETCODE_OK)
+    while (parameters_reader_ && is_ok(parameters_reader_->take_next_sample(&parameters, &info)))
       if (info.valid_data && parameters.vehicles().size() > 0) {
         parameters_ = parameters;
         announce();
       }
     SimStatus status;
-    while (status_reader_ &&
-           status_reader_->take_next_sample(&status, &info) == ReturnCode_t::RETCODE_OK) {
+    while (status_reader_ && is_ok(status_reader_->take_next_sample(&status, &info))) {
     }
   }
 
@@ -262,12 +219,12 @@ class ForeignClient {
     SimStatus status;
     status.run_id(parameters_->run_id());
     status.sample_index(1'000'000);
-    status.phase(PHASE_FAILED);
+    status.phase(RunPhase::PHASE_FAILED);
     status.reason("forged");
-    status_writer_->write(&status);
+    write_sample(*status_writer_, &status);
     states_.run_id(parameters_->run_id());
     states_.vehicles().resize(1);
-    states_writer_->write(&states_);
+    write_sample(*states_writer_, &states_);
     say_that_it_begins();
   }
 
@@ -280,7 +237,8 @@ class ForeignClient {
     message.contract_sha256(makes("other_contract") ? std::string(64, '0')
                             : makes("no_contract")  ? std::string()
                                                     : SLS_CONTRACT_SHA256);
-    message.role(makes("role_recorder") ? ROLE_RECORDER : ROLE_CONTROLLER);
+    message.role(makes("role_recorder") ? ParticipantRole::ROLE_RECORDER
+                                        : ParticipantRole::ROLE_CONTROLLER);
     message.name(options_.name);
     message.host("elsewhere");
     message.vehicle_ids({makes("unknown_vehicle") ? 7u : 0u});
@@ -291,7 +249,7 @@ class ForeignClient {
     message.ready(!makes("never_ready"));
     message.done(makes("done"));
     message.last_complete_step(-1);
-    participant_writer_->write(&message);
+    write_sample(*participant_writer_, &message);
     for (const char* mistake : {"zero_run_id", "other_run_id", "other_contract", "no_contract",
                                 "unknown_vehicle", "other_scenario", "announcement_extra_field",
                                 "role_recorder", "never_ready", "no_state_reader"})
@@ -301,8 +259,7 @@ class ForeignClient {
 
   void fly() {
     dds::SampleInfo info;
-    while (state_reader_ &&
-           state_reader_->take_next_sample(&states_, &info) == ReturnCode_t::RETCODE_OK)
+    while (state_reader_ && is_ok(state_reader_->take_next_sample(&states_, &info)))
       if (info.valid_data && states_.run_id() == parameters_->run_id()) answer();
   }
 
@@ -329,7 +286,7 @@ class ForeignClient {
     command.reference().stage_index(memory.stage_index());
     if (makes("memory_lost") && time_s >= 1.0) memory = ControllerState();
     command.controller(memory);
-    command.mission(MISSION_RUNNING);
+    command.mission(MissionPhase::MISSION_RUNNING);
 
     Commands answers;
     answers.run_id(makes("wrong_run") ? 0x1234 : parameters_->run_id());
@@ -338,14 +295,14 @@ class ForeignClient {
     answers.strength(options_.strength);
     if (makes("wrong_vehicle")) command.vehicle_id(7);
     if (!makes("empty")) answers.vehicles().push_back(command);
-    for (int i = makes("flood") ? 100 : 1; i > 0; --i) command_writer_->write(&answers);
+    for (int i = makes("flood") ? 100 : 1; i > 0; --i) write_sample(*command_writer_, &answers);
     if (makes("early")) {  // an answer to a state not yet published
       answers.step(step + 2);
-      command_writer_->write(&answers);
+      write_sample(*command_writer_, &answers);
     }
     if (makes("two_answers")) {
       answers.vehicles().front().f_Q_W_n()[0] += 1e-3;
-      command_writer_->write(&answers);
+      write_sample(*command_writer_, &answers);
     }
     for (const char* mistake :
          {"extra_field", "missing_field", "retyped_field", "wrong_run", "wrong_vehicle",

@@ -15,7 +15,7 @@
 namespace {
 
 using namespace sls;
-namespace rtps = eprosima::fastrtps::rtps;
+namespace rtps = bus::rtps;
 
 constexpr std::uint64_t kRun = 1;
 
@@ -27,7 +27,7 @@ std::optional<Message> deserialize(const std::uint8_t* data, std::uint32_t size)
   payload.length = size;
   Message message;
   bus::GuardedType<Type> type;
-  if (!type.deserialize(&payload, &message)) return std::nullopt;
+  if (!bus::deserialize(type, payload, &message)) return std::nullopt;
   return message;
 }
 

@@ -4,7 +4,6 @@
 #include <fastdds/dds/publisher/DataWriter.hpp>
 #include <fastdds/dds/publisher/Publisher.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
-#include <fastdds/dds/topic/TopicDataType.hpp>
 
 #include <algorithm>
 #include <chrono>
@@ -15,41 +14,35 @@
 #include <vector>
 
 #include "common/bus/topics.hpp"
+#include "fastdds_types.hpp"
 #include "tests/hostile/attack.hpp"
 
 namespace sls::hostile {
 namespace {
 
 using namespace std::chrono_literals;
-namespace dds = eprosima::fastdds::dds;
-namespace rtps = eprosima::fastrtps::rtps;
+namespace dds = bus::dds;
+namespace rtps = bus::rtps;
 using Bytes = std::vector<std::uint8_t>;
 
 constexpr std::uint32_t kHuge = 8 << 20;
 constexpr std::size_t kMostHuge = 20;
 
 /// Raw bytes, sent under the name of any type.
-class RawType : public dds::TopicDataType {
+class RawType : public bus::WrittenType {
  public:
-  explicit RawType(const std::string& name) {
-    setName(name.c_str());
-    m_typeSize = kHuge;
-    auto_fill_type_object(false);
-    auto_fill_type_information(false);
-  }
-  bool serialize(void* data, rtps::SerializedPayload_t* payload) override {
-    const auto& bytes = *static_cast<Bytes*>(data);
-    std::copy(bytes.begin(), bytes.end(), payload->data);
-    payload->length = static_cast<std::uint32_t>(bytes.size());
+  explicit RawType(const std::string& name) : WrittenType(name, kHuge) {}
+
+ protected:
+  bool write(const void* data, rtps::SerializedPayload_t& payload) const override {
+    const auto& bytes = *static_cast<const Bytes*>(data);
+    std::copy(bytes.begin(), bytes.end(), payload.data);
+    payload.length = static_cast<std::uint32_t>(bytes.size());
     return true;
   }
-  bool deserialize(rtps::SerializedPayload_t*, void*) override { return false; }
-  std::function<std::uint32_t()> getSerializedSizeProvider(void* data) override {
-    return [data] { return static_cast<std::uint32_t>(static_cast<Bytes*>(data)->size()); };
+  std::uint32_t size(const void* data) const override {
+    return static_cast<std::uint32_t>(static_cast<const Bytes*>(data)->size());
   }
-  void* createData() override { return new Bytes; }
-  void deleteData(void* data) override { delete static_cast<Bytes*>(data); }
-  bool getKey(void*, rtps::InstanceHandle_t*, bool) override { return false; }
 };
 
 template <class Message>
@@ -102,6 +95,7 @@ std::uint64_t write_malformed(const Target& target) {
   std::vector<dds::DataWriter*> writers;
   for (const auto& [topic, type] : types) {
     dds::TypeSupport support(new RawType(type));
+    bus::leave_out_type_object(support);
     support.register_type(participant);
     writers.push_back(publisher->create_datawriter(
         participant->create_topic(topic, type, dds::TOPIC_QOS_DEFAULT), qos));
@@ -119,7 +113,7 @@ std::uint64_t write_malformed(const Target& target) {
       std::copy_n("\0\1\0\0", 4, bytes.begin());
       ++huge;
     }
-    if (writer->write(&bytes)) ++count;
+    if (bus::write_sample(*writer, &bytes)) ++count;
     say_that_it_fires();
     std::this_thread::sleep_for(500us);
   }

@@ -36,14 +36,14 @@ class Stranger {
   bool wait_for_flight(const Target& target) {
     while (goes_on(target)) {
       run = servers.find_joinable(0);
-      if (run && run->status->phase() == PHASE_RUNNING && state()) return true;
+      if (run && run->status->phase() == RunPhase::PHASE_RUNNING && state()) return true;
       std::this_thread::sleep_for(5ms);
     }
     return false;
   }
   bool is_flying() const {
     const auto status = servers.find_status(run->parameters.run_id());
-    return status && status->phase() == PHASE_RUNNING;
+    return status && status->phase() == RunPhase::PHASE_RUNNING;
   }
   std::optional<States> state() const {
     const std::lock_guard lock(mutex_);
@@ -98,8 +98,8 @@ void spoil(Commands& sample, std::mt19937_64& random) {
     case 3:
       return command.vehicle_id(static_cast<std::uint32_t>(random()));
     case 4:
-      command.mission(MISSION_FAILED);
-      return command.fault(FAULT_FREE_FALL);
+      command.mission(MissionPhase::MISSION_FAILED);
+      return command.fault(FaultCode::FAULT_FREE_FALL);
     case 5:
       return sample.step(random());
     case 6:
@@ -109,7 +109,7 @@ void spoil(Commands& sample, std::mt19937_64& random) {
     case 8:
       return command.controller().numbers().resize(MOST_NUMBERS);
     default:
-      return command.mission(MISSION_FINISHED);
+      return command.mission(MissionPhase::MISSION_FINISHED);
   }
 }
 
@@ -124,7 +124,7 @@ std::uint64_t come_and_go(const Target& target) {
                                     [](const RecordBatch&, const bus::PeerId&) {});
     Participant message;
     message.name("passer-by");
-    message.role(count % 2 ? ROLE_CONTROLLER : ROLE_RECORDER);
+    message.role(count % 2 ? ParticipantRole::ROLE_CONTROLLER : ParticipantRole::ROLE_RECORDER);
     writer.write(message);
     say_that_it_fires();
     writer.wait_for_acknowledgments(50ms);
@@ -181,16 +181,17 @@ std::uint64_t forge_statements(const Target& target) {
     SimStatus status;  // claims that the flight has ended
     status.run_id(stranger.run_id());
     status.sample_index(1 << 30);
-    status.phase(random() % 2 ? PHASE_FINISHED : PHASE_FAILED);
+    status.phase(random() % 2 ? RunPhase::PHASE_FINISHED : RunPhase::PHASE_FAILED);
     status.step(state.step());
     statuses.write(status);
     Parameters claim = stranger.run->parameters;  // of this run, or of a server with a lower run_id
     if (random() % 2) claim.run_id(1);
     parameters.write(claim);
     status.run_id(1);
-    status.phase(PHASE_WAITING);
+    status.phase(RunPhase::PHASE_WAITING);
     statuses.write(status);
-    participants.write(stranger.make_announcement(ROLE_RECORDER));  // has recorded nothing yet
+    participants.write(
+        stranger.make_announcement(ParticipantRole::ROLE_RECORDER));  // has recorded nothing yet
     say_that_it_fires();
     std::this_thread::sleep_for(5 * kPause);
   }
@@ -208,8 +209,9 @@ std::uint64_t flood_control(const Target& target) {
     request.run_id(random() % 2 ? stranger.run_id() : random());
     request.request_id(random());
     request.operator_name("mallory");
-    request.action(random() % 2 ? ACTION_STEP : ACTION_START);  // refused: it is not paused
-    if (request.run_id() != stranger.run_id()) request.action(ACTION_STOP);
+    request.action(random() % 2 ? ControlAction::ACTION_STEP
+                                : ControlAction::ACTION_START);  // refused: it is not paused
+    if (request.run_id() != stranger.run_id()) request.action(ControlAction::ACTION_STOP);
     if (random() % 4 == 0) request.action(static_cast<ControlAction>(random() % 1000 + 100));
     request.steps(random());
     requests.write(request);
@@ -224,7 +226,7 @@ std::uint64_t pose_as_controller(const Target& target, bool answers) {
   bus::Writer<Participant> participants(stranger.node);
   bus::Writer<Commands> commands(stranger.node);
   if (!stranger.wait_for_flight(target)) return 0;
-  participants.write(stranger.make_announcement(ROLE_CONTROLLER));
+  participants.write(stranger.make_announcement(ParticipantRole::ROLE_CONTROLLER));
   say_that_it_fires();
   std::uint64_t count = 1;
   std::uint64_t answered = 0;

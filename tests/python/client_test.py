@@ -35,9 +35,9 @@ def domain():
                 yield number
                 # Killed processes leave their shared-memory ports behind.
                 for port in range(7400 + 250 * number, 7650 + 250 * number):
-                    for file in (f"fastrtps_port{port}", f"fastrtps_port{port}_el",
-                                 f"fastrtps_port{port}_sl", f"sem.fastrtps_port{port}_mutex"):
-                        pathlib.Path("/dev/shm", file).unlink(missing_ok=True)
+                    for name in (f"fastrtps_port{port}", f"fastdds_port{port}"):  # of Fast DDS 2 and 3
+                        for file in (name, f"{name}_el", f"{name}_sl", f"sem.{name}_mutex"):
+                            pathlib.Path("/dev/shm", file).unlink(missing_ok=True)
                 return
         time.sleep(0.1)
     pytest.fail("no free DDS domain among 1 to 60")

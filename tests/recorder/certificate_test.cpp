@@ -131,7 +131,7 @@ TEST(CertificateTest, LeavesOutFieldsThatDifferBetweenEqualFlights) {
     batch.run_id(5);
     recording.add(batch);
   }
-  SimStatus end = make_status(PHASE_FINISHED, kLastStep);
+  SimStatus end = make_status(RunPhase::PHASE_FINISHED, kLastStep);
   end.run_id(5);
   end.counters().duplicate(99);
   recording.add(end);
@@ -158,8 +158,8 @@ TEST(CertificateTest, ChangesWithEveryFieldThatIsPartOfTheFlight) {
                  [](RecordEntry& entry) { entry.truth().beta_dot_rad_s(-0.0); },
                  [](RecordEntry& entry) { entry.f_Q_W_n()[1] = 17; },
                  [](RecordEntry& entry) { entry.answer().f_Q_W_n()[1] = 17; },
-                 [](RecordEntry& entry) { entry.answer().fault(FAULT_STAGE_TIMEOUT); },
-                 [](RecordEntry& entry) { entry.kind(ANSWER_HELD); },
+                 [](RecordEntry& entry) { entry.answer().fault(FaultCode::FAULT_STAGE_TIMEOUT); },
+                 [](RecordEntry& entry) { entry.kind(AnswerKind::ANSWER_HELD); },
                  [](RecordEntry& entry) { entry.answer().reference().stage_index(2); },
                  [](RecordEntry& entry) { entry.answer().reference().stage_name("a, \"b\"\n"); },
                  [](RecordEntry& entry) { entry.answer().reference().snap_m_s4()[2] += 1e-12; }},

@@ -221,11 +221,11 @@ TEST_F(FlightLogTest, AStageTheScenarioDoesNotHaveIsListedWithoutLaps) {
 }
 
 TEST_F(FlightLogTest, ListsStagesAndEvents) {
-  log_.add(make_status(PHASE_WAITING, 0, "missing: recorder"));
-  log_.add(make_status(PHASE_WAITING, 0, "missing: recorder"));
-  log_.add(make_status(PHASE_RUNNING, 0));
-  log_.add(make_status(PHASE_RUNNING, 50));
-  log_.add(make_status(PHASE_FINISHED, kLastStep, "mission\nfinished"));
+  log_.add(make_status(RunPhase::PHASE_WAITING, 0, "missing: recorder"));
+  log_.add(make_status(RunPhase::PHASE_WAITING, 0, "missing: recorder"));
+  log_.add(make_status(RunPhase::PHASE_RUNNING, 0));
+  log_.add(make_status(RunPhase::PHASE_RUNNING, 50));
+  log_.add(make_status(RunPhase::PHASE_FINISHED, kLastStep, "mission\nfinished"));
   log_.add_event("recorder: all is well");
   const std::string text = write(log_);
   for (const char* part :
@@ -241,7 +241,7 @@ TEST_F(FlightLogTest, ListsStagesAndEvents) {
 // A link that fails every few seconds for days.
 TEST_F(FlightLogTest, OfManyEventsTheFirstAndTheLastAreListed) {
   for (int i = 0; i < 5000; ++i)
-    log_.add(make_status(PHASE_RUNNING, 0, "event " + std::to_string(i) + "."));
+    log_.add(make_status(RunPhase::PHASE_RUNNING, 0, "event " + std::to_string(i) + "."));
   const std::string text = write(log_);
   const auto events = text.substr(text.find("Events\n") + 7);
   EXPECT_EQ(std::count(events.begin(), events.end(), '\n'), 1001);

@@ -33,7 +33,7 @@ inline void add_steps(Recording& recording, std::uint64_t from, std::uint64_t to
 
 /// Adds the final status and finishes the recording.
 inline bool finish_flight(Recording& recording) {
-  recording.add(make_status(PHASE_FINISHED, kLastStep, "mission finished"));
+  recording.add(make_status(RunPhase::PHASE_FINISHED, kLastStep, "mission finished"));
   return recording.finish("", 0);
 }
 

@@ -51,7 +51,7 @@ class FakeFlight {
     }
     parameters_writer_.write(parameters);
     next_batch_ = 0;
-    publish(PHASE_WAITING, 0);
+    publish(RunPhase::PHASE_WAITING, 0);
   }
 
   /// Waits until the recorder has acknowledged the server's parameters and status samples.
@@ -65,22 +65,22 @@ class FakeFlight {
 
   bool wait_for_recorder() {
     return wait_until([this] {
-      keep_alive(PHASE_WAITING);
-      const auto recorders = participants_.find(ROLE_RECORDER, run_id_);
+      keep_alive(RunPhase::PHASE_WAITING);
+      const auto recorders = participants_.find(ParticipantRole::ROLE_RECORDER, run_id_);
       return !recorders.empty() && recorders.front().announcement.ready();
     });
   }
 
   void fly(std::uint64_t from, std::uint64_t to) {
     for (std::uint64_t step = from; step <= to; ++step) write_step(step);
-    publish(PHASE_RUNNING, to);
+    publish(RunPhase::PHASE_RUNNING, to);
   }
   void write_step(std::uint64_t step) {
     write(record_writer_, make_batch(next_batch_++, {make_entry(step)}, step == kLastStep));
   }
   void announce_library(const std::string& sha256) {
     Participant pilot;
-    pilot.role(ROLE_CONTROLLER);
+    pilot.role(ParticipantRole::ROLE_CONTROLLER);
     pilot.name(kPilot);
     pilot.library_sha256(sha256);
     write(participant_writer_, pilot);
@@ -98,8 +98,8 @@ class FakeFlight {
 
   bool is_recorded_up_to(std::int64_t step) {
     return wait_until([&] {
-      keep_alive(PHASE_RUNNING);
-      const auto recorders = participants_.find(ROLE_RECORDER, run_id_);
+      keep_alive(RunPhase::PHASE_RUNNING);
+      const auto recorders = participants_.find(ParticipantRole::ROLE_RECORDER, run_id_);
       return !recorders.empty() && recorders.front().announcement.last_complete_step() >= step;
     });
   }
@@ -148,7 +148,7 @@ class RecorderTest : public testing::Test {
   /// The same; meanwhile `waiting` repeats the status of a waiting server.
   void join_beside(FakeFlight& waiting) {
     EXPECT_TRUE(wait_until([&] {
-      waiting.keep_alive(PHASE_WAITING);
+      waiting.keep_alive(RunPhase::PHASE_WAITING);
       return has_ended_.load();
     }));
     join();
@@ -186,7 +186,7 @@ TEST_F(RecorderTest, RecordsARunToItsEnd) {
   flight.fly(0, kLastStep - 1);
   ASSERT_TRUE(flight.is_recorded_up_to(kLastStep - 1));
   flight.write_step(kLastStep);
-  flight.publish(PHASE_FINISHED, kLastStep);
+  flight.publish(RunPhase::PHASE_FINISHED, kLastStep);
   join();
   EXPECT_EQ(error_, "no error");
   expect_whole(out_);
@@ -205,7 +205,7 @@ TEST_F(RecorderTest, BatchesOfOtherSendersDoNotCount) {
   writer.write(make_batch(0, {make_entry(200)}, true));
   ASSERT_TRUE(writer.wait_for_acknowledgments(5s));
   flight.fly(0, kLastStep);
-  flight.publish(PHASE_FINISHED, kLastStep);
+  flight.publish(RunPhase::PHASE_FINISHED, kLastStep);
   join();
   EXPECT_EQ(error_, "no error");
   expect_whole(out_);
@@ -216,11 +216,11 @@ TEST_F(RecorderTest, AResetsNewRunGoesIntoASubfolder) {
   start();
   ASSERT_TRUE(flight.wait_for_recorder());
   flight.fly(0, 100);
-  flight.publish(PHASE_RESET, 100);
+  flight.publish(RunPhase::PHASE_RESET, 100);
   flight.begin_run(kOtherRun);
   ASSERT_TRUE(flight.wait_for_recorder());
   flight.fly(0, kLastStep);
-  flight.publish(PHASE_FINISHED, kLastStep);
+  flight.publish(RunPhase::PHASE_FINISHED, kLastStep);
   join();
   EXPECT_EQ(error_, "no error");
   EXPECT_EQ(read_manifest(out_).at("outcome"), "reset");
@@ -252,7 +252,7 @@ TEST_F(RecorderTest, AServerThatWasThereBeforeTakesNoSilentOnesPlace) {
   flight->fly(0, 100);
   FakeFlight other(kOtherRun);
   ASSERT_TRUE(other.is_heard());
-  flight->publish(PHASE_RUNNING, 100);
+  flight->publish(RunPhase::PHASE_RUNNING, 100);
   ASSERT_TRUE(flight->is_heard());
   ASSERT_TRUE(flight->is_recorded_up_to(99));
   flight.reset();
@@ -272,7 +272,7 @@ TEST_F(RecorderTest, ARecorderThatFollowsRecordsTheOtherServersRun) {
   FakeFlight other(kOtherRun);
   ASSERT_TRUE(other.wait_for_recorder());
   other.fly(0, kLastStep);
-  other.publish(PHASE_FINISHED, kLastStep);
+  other.publish(RunPhase::PHASE_FINISHED, kLastStep);
   join();
   EXPECT_EQ(error_, "no error");
   EXPECT_EQ(read_manifest(out_).at("outcome"), "lost");
@@ -297,7 +297,7 @@ TEST_F(RecorderTest, WaitsAfterTheEndAsLongAsLateSamplesCome) {
   start();
   ASSERT_TRUE(flight.wait_for_recorder());
   flight.fly(0, 10);
-  flight.publish(PHASE_FINISHED, kLastStep);
+  flight.publish(RunPhase::PHASE_FINISHED, kLastStep);
   for (std::uint64_t step = 11; step <= 13; ++step) {
     const auto next = std::chrono::steady_clock::now() + 4s;
     EXPECT_TRUE(wait_until([&] { return std::chrono::steady_clock::now() > next; }));
@@ -318,7 +318,7 @@ TEST_F(RecorderTest, AKilledRecorderIsResumedInMidFlight) {
   start();
   ASSERT_TRUE(flight.is_recorded_up_to(199));
   flight.fly(201, kLastStep);
-  flight.publish(PHASE_FINISHED, kLastStep);
+  flight.publish(RunPhase::PHASE_FINISHED, kLastStep);
   join();
   EXPECT_EQ(error_, "no error");
   expect_whole(out_);

@@ -34,9 +34,9 @@ class RecordingTest : public testing::Test {
 
   void add_steps(std::uint64_t from, std::uint64_t to) { feeder_.add_steps(from, to); }
   void fly_to_the_end() {
-    recording_->add(make_status(PHASE_RUNNING, 0));
+    recording_->add(make_status(RunPhase::PHASE_RUNNING, 0));
     add_steps(0, kLastStep);
-    recording_->add(make_status(PHASE_FINISHED, kLastStep, "mission finished"));
+    recording_->add(make_status(RunPhase::PHASE_FINISHED, kLastStep, "mission finished"));
   }
   bool finish(const std::string& interruption = "", std::uint64_t refused = 0) {
     return recording_->finish(interruption, refused);
@@ -278,7 +278,7 @@ TEST_F(RecordingTest, FlightTextNamesTheOutcomeAndTheStages) {
 }
 
 TEST_F(RecordingTest, StatusRowsKeepReasonsWithCommasQuotesAndLineBreaksAndEveryCounter) {
-  SimStatus status = make_status(PHASE_PAUSED, 7, "a, \"b\"\nc");
+  SimStatus status = make_status(RunPhase::PHASE_PAUSED, 7, "a, \"b\"\nc");
   status.problem("client 'x': run_id: expected 1, got 0");
   SyncCounters& counters = status.counters();
   counters.resent(1);
@@ -333,11 +333,11 @@ TEST_F(RecordingTest, StatusRowsKeepReasonsWithCommasQuotesAndLineBreaksAndEvery
 // --- missing samples are reported ----------------------------------------------------------------
 
 TEST_F(RecordingTest, StepsLostInOneStretchAreListedAndMakeItIncomplete) {
-  recording_->add(make_status(PHASE_RUNNING, 0));
+  recording_->add(make_status(RunPhase::PHASE_RUNNING, 0));
   add_steps(0, 49);
   feeder_.add({make_entry(60)});
   add_steps(61, kLastStep);
-  recording_->add(make_status(PHASE_FINISHED, kLastStep));
+  recording_->add(make_status(RunPhase::PHASE_FINISHED, kLastStep));
   EXPECT_TRUE(recording_->has_all()) << "what is lost is not waited for";
   EXPECT_FALSE(finish());
   const Json manifest = read_manifest();
@@ -359,7 +359,7 @@ TEST_F(RecordingTest, AStepAmidARunWithoutAnAnswerMissesIt) {
   add_steps(0, 49);
   feeder_.add({make_bare_entry(50)});
   add_steps(51, kLastStep);
-  recording_->add(make_status(PHASE_FINISHED, kLastStep));
+  recording_->add(make_status(RunPhase::PHASE_FINISHED, kLastStep));
   EXPECT_FALSE(finish());
   const auto gap = [](const char* topic) {
     return Json({{"vehicle_id", 0}, {"topic", topic}, {"from", 50}, {"to", 50}});
@@ -370,14 +370,14 @@ TEST_F(RecordingTest, AStepAmidARunWithoutAnAnswerMissesIt) {
 TEST_F(RecordingTest, AFinishedRunWithoutItsLastAnswerMissesIt) {
   add_steps(0, kLastStep - 1);
   feeder_.add({make_bare_entry(kLastStep)}, true);
-  recording_->add(make_status(PHASE_FINISHED, kLastStep));
+  recording_->add(make_status(RunPhase::PHASE_FINISHED, kLastStep));
   EXPECT_FALSE(finish());
   EXPECT_EQ(read_manifest().at("missing").size(), 2u);
 }
 
 TEST_F(RecordingTest, TheLostEndOfAFinishedRunIsListed) {
   add_steps(0, 200);
-  recording_->add(make_status(PHASE_FINISHED, kLastStep));
+  recording_->add(make_status(RunPhase::PHASE_FINISHED, kLastStep));
   EXPECT_FALSE(recording_->has_all());
   EXPECT_FALSE(finish());
   std::set<std::string> topics;
@@ -395,7 +395,7 @@ TEST_F(RecordingTest, TheLostEndOfAFinishedRunIsListed) {
 TEST_F(RecordingTest, OfManyGapsTheFirstAreListedAndTheOthersCounted) {
   constexpr std::uint64_t kGaps = 3000;  // of one step, in each of three topics
   for (std::uint64_t i = 0; i < kGaps; ++i) feeder_.add({make_entry(2 * i + 1)});
-  recording_->add(make_status(PHASE_FINISHED, 2 * kGaps - 1));
+  recording_->add(make_status(RunPhase::PHASE_FINISHED, 2 * kGaps - 1));
   EXPECT_FALSE(finish());
   const Json manifest = read_manifest();
   ASSERT_EQ(manifest.at("missing").size(), 1000u);
@@ -409,7 +409,7 @@ TEST_F(RecordingTest, OfManyGapsTheFirstAreListedAndTheOthersCounted) {
 
 TEST_F(RecordingTest, AGapThatIsNotListedMayBeLong) {
   for (std::uint64_t i = 0; i < 400; ++i) feeder_.add({make_entry(2 * i + 1)});
-  recording_->add(make_status(PHASE_FINISHED, 2000));  // steps 800 to 2000 are missing
+  recording_->add(make_status(RunPhase::PHASE_FINISHED, 2000));  // steps 800 to 2000 are missing
   EXPECT_FALSE(finish());
   const Json further = read_manifest().at("further_missing");
   EXPECT_EQ(further.at("gaps"), 3 * 401 - 1000);
@@ -430,11 +430,12 @@ TEST_F(RecordingTest, SamplesTheQueueRefusedMakeItIncomplete) {
 TEST_F(RecordingTest, UnansweredStepsAreRowsAndNotMissing) {
   add_steps(0, 9);
   for (std::uint64_t step = 10; step < 20; ++step)
-    feeder_.add({make_unanswered_entry(step, step < 15 ? ANSWER_HELD : ANSWER_FAIL_SAFE)});
+    feeder_.add({make_unanswered_entry(
+        step, step < 15 ? AnswerKind::ANSWER_HELD : AnswerKind::ANSWER_FAIL_SAFE)});
   feeder_.add({make_late_entry(12)});
   EXPECT_EQ(recording_->last_complete_step(), 19) << "late answers may still come";
   add_steps(20, kLastStep);
-  recording_->add(make_status(PHASE_FINISHED, kLastStep));
+  recording_->add(make_status(RunPhase::PHASE_FINISHED, kLastStep));
   EXPECT_TRUE(recording_->has_all());
   EXPECT_TRUE(finish());
   const Json manifest = read_manifest();
@@ -447,7 +448,7 @@ TEST_F(RecordingTest, UnansweredStepsAreRowsAndNotMissing) {
     EXPECT_EQ(commands.text(step, "controller"), kPilot);
     EXPECT_EQ(commands.text(step, "compute_us"), "0");
     EXPECT_EQ(commands.number(step, "force_x_n"),
-              make_unanswered_entry(step, ANSWER_HELD).answer().f_Q_W_n()[0]);
+              make_unanswered_entry(step, AnswerKind::ANSWER_HELD).answer().f_Q_W_n()[0]);
   }
   ASSERT_EQ(references.rows.size(), kLastStep + 1 - 9);
   EXPECT_EQ(references.text(10, "step"), "12");
@@ -457,7 +458,7 @@ TEST_F(RecordingTest, UnansweredStepsAreRowsAndNotMissing) {
 
 TEST_F(RecordingTest, ALateJoinerListsWhatItHasMissed) {
   add_steps(100, kLastStep);
-  recording_->add(make_status(PHASE_FINISHED, kLastStep));
+  recording_->add(make_status(RunPhase::PHASE_FINISHED, kLastStep));
   EXPECT_FALSE(finish());
   const Json manifest = read_manifest();
   ASSERT_EQ(manifest.at("missing").size(), 3u);
@@ -473,7 +474,7 @@ TEST_F(RecordingTest, DroppedEntriesAreCountedInTheManifest) {
   recording_->add(make_batch(3, {make_entry(3), make_entry(200)}));
   feeder_.add({make_entry(5), make_entry(11, 9)});
   add_steps(11, kLastStep);
-  recording_->add(make_status(PHASE_FINISHED, kLastStep));
+  recording_->add(make_status(RunPhase::PHASE_FINISHED, kLastStep));
   EXPECT_TRUE(finish());
   EXPECT_EQ(read_manifest().at("dropped"), Json({{"repeated", 3}, {"out_of_range", 1}}));
 }
@@ -519,7 +520,7 @@ TEST_F(RecordingTest, MeasurementsHaveTheirOwnFileFromTheFirstRow) {
     entry.measured()[0].p_WQ_m()[0] += 1;
     feeder_.add({entry}, step == kLastStep);
   }
-  recording_->add(make_status(PHASE_FINISHED, kLastStep));
+  recording_->add(make_status(RunPhase::PHASE_FINISHED, kLastStep));
   finish();
   const CsvTable measured = read_table("measured.csv"), states = read_table("state.csv");
   EXPECT_EQ(measured.header, states.header);
@@ -535,14 +536,15 @@ TEST_F(RecordingTest, MeasurementsHaveTheirOwnFileFromTheFirstRow) {
 // --- runs that did not finish --------------------------------------------------------------------
 
 TEST_F(RecordingTest, AFailedRunIsKeptWithItsCauseAndNeverComplete) {
-  recording_->add(make_status(PHASE_RUNNING, 0));
+  recording_->add(make_status(RunPhase::PHASE_RUNNING, 0));
   add_steps(0, 149);
   RecordEntry faulted = make_entry(150);
-  faulted.kind(ANSWER_REFUSED);
-  faulted.answer().fault(FAULT_FREE_FALL);
-  faulted.answer().mission(MISSION_FAILED);
+  faulted.kind(AnswerKind::ANSWER_REFUSED);
+  faulted.answer().fault(FaultCode::FAULT_FREE_FALL);
+  faulted.answer().mission(MissionPhase::MISSION_FAILED);
   feeder_.add({faulted}, true);
-  recording_->add(make_status(PHASE_FAILED, 150, "controller 'pilot' answered with a fault"));
+  recording_->add(
+      make_status(RunPhase::PHASE_FAILED, 150, "controller 'pilot' answered with a fault"));
   EXPECT_FALSE(finish());
   const Json manifest = read_manifest();
   EXPECT_EQ(manifest.at("complete"), false);
@@ -560,7 +562,7 @@ TEST_F(RecordingTest, AFailedRunIsKeptWithItsCauseAndNeverComplete) {
 TEST_F(RecordingTest, AFailedRunsLastStepNeedsNoAnswer) {
   add_steps(0, 149);
   feeder_.add({make_bare_entry(150)}, true);
-  recording_->add(make_status(PHASE_FAILED, 150, "no answer to step 150"));
+  recording_->add(make_status(RunPhase::PHASE_FAILED, 150, "no answer to step 150"));
   EXPECT_FALSE(finish());
   EXPECT_EQ(read_manifest().at("missing"), Json::array());
   EXPECT_EQ(read_table("state.csv").rows.size(), 151u);
@@ -568,8 +570,8 @@ TEST_F(RecordingTest, AFailedRunsLastStepNeedsNoAnswer) {
 }
 
 TEST_F(RecordingTest, ARunThatFailedBeforeItBeganMissesNothing) {
-  recording_->add(make_status(PHASE_WAITING, 0, "missing: controller"));
-  recording_->add(make_status(PHASE_FAILED, 0, "not ready within 30 s: controller"));
+  recording_->add(make_status(RunPhase::PHASE_WAITING, 0, "missing: controller"));
+  recording_->add(make_status(RunPhase::PHASE_FAILED, 0, "not ready within 30 s: controller"));
   EXPECT_FALSE(finish());
   EXPECT_EQ(read_manifest().at("missing"), Json::array());
   EXPECT_EQ(read_manifest().at("outcome"), "failed");
@@ -580,7 +582,7 @@ TEST_F(RecordingTest, ARunThatFailedBeforeItBeganMissesNothing) {
 TEST_F(RecordingTest, TheReasonOfAFailureComesBeforeTheMissingSteps) {
   add_steps(0, 20);
   add_steps(22, 30);
-  recording_->add(make_status(PHASE_FAILED, 30, "the recorder was behind"));
+  recording_->add(make_status(RunPhase::PHASE_FAILED, 30, "the recorder was behind"));
   EXPECT_FALSE(finish());
   const std::string gaps = recording_->describe_gaps();
   EXPECT_NE(gaps.find("the recorder was behind"), std::string::npos) << gaps;
@@ -589,7 +591,7 @@ TEST_F(RecordingTest, TheReasonOfAFailureComesBeforeTheMissingSteps) {
 }
 
 TEST_F(RecordingTest, AnInterruptedRunIsReportedAsInterrupted) {
-  recording_->add(make_status(PHASE_RUNNING, 0));
+  recording_->add(make_status(RunPhase::PHASE_RUNNING, 0));
   add_steps(0, 99);
   EXPECT_FALSE(finish("interrupted by SIGINT"));
   const Json manifest = read_manifest();
@@ -605,10 +607,10 @@ TEST_F(RecordingTest, AnInterruptedRunIsReportedAsInterrupted) {
 }
 
 TEST_F(RecordingTest, AResetRunIsKeptAndItsLastStepNeedsNoAnswer) {
-  recording_->add(make_status(PHASE_RUNNING, 0));
+  recording_->add(make_status(RunPhase::PHASE_RUNNING, 0));
   add_steps(0, 99);
   feeder_.add({make_bare_entry(100)}, true);
-  recording_->add(make_status(PHASE_RESET, 100, "reset by nina@lab"));
+  recording_->add(make_status(RunPhase::PHASE_RESET, 100, "reset by nina@lab"));
   EXPECT_FALSE(finish());
   const Json manifest = read_manifest();
   EXPECT_EQ(manifest.at("outcome"), "reset");
@@ -619,9 +621,9 @@ TEST_F(RecordingTest, AResetRunIsKeptAndItsLastStepNeedsNoAnswer) {
 
 // The recording has only published steps.
 TEST_F(RecordingTest, AServerKilledBetweenTwoBatchesLeavesItsPublishedSteps) {
-  recording_->add(make_status(PHASE_RUNNING, 0));
+  recording_->add(make_status(RunPhase::PHASE_RUNNING, 0));
   add_steps(0, 99);
-  recording_->add(make_status(PHASE_RUNNING, 120));
+  recording_->add(make_status(RunPhase::PHASE_RUNNING, 120));
   EXPECT_FALSE(recording_->has_all());
   EXPECT_FALSE(recording_->finish("the server is gone", 0, "lost"));
   EXPECT_EQ(read_manifest().at("outcome"), "lost");
@@ -633,7 +635,7 @@ TEST_F(RecordingTest, AServerKilledBetweenTwoBatchesLeavesItsPublishedSteps) {
 
 TEST_F(RecordingTest, TheEndTakesBothTheStatusAndTheLastBatch) {
   add_steps(0, kLastStep - 1);
-  recording_->add(make_status(PHASE_FINISHED, kLastStep));
+  recording_->add(make_status(RunPhase::PHASE_FINISHED, kLastStep));
   EXPECT_FALSE(recording_->has_all());
   feeder_.add({make_entry(kLastStep)});
   EXPECT_FALSE(recording_->has_all());
@@ -643,10 +645,10 @@ TEST_F(RecordingTest, TheEndTakesBothTheStatusAndTheLastBatch) {
 }
 
 TEST_F(RecordingTest, StatusSamplesThatComeAgainAreOneRow) {
-  const SimStatus first = make_status(PHASE_WAITING, 0, "missing: controller"),
-                  second = make_status(PHASE_RUNNING, 0);
+  const SimStatus first = make_status(RunPhase::PHASE_WAITING, 0, "missing: controller"),
+                  second = make_status(RunPhase::PHASE_RUNNING, 0);
   for (const SimStatus& status : {first, second, first, second}) recording_->add(status);
-  recording_->add(make_status(PHASE_RUNNING, 10));
+  recording_->add(make_status(RunPhase::PHASE_RUNNING, 10));
   recording_->add(first);
   finish();
   EXPECT_EQ(read_table("status.csv").rows.size(), 3u);
@@ -655,7 +657,7 @@ TEST_F(RecordingTest, StatusSamplesThatComeAgainAreOneRow) {
 TEST_F(RecordingTest, MissingStatusSamplesAreNamedAndTheRecordingIsNotComplete) {
   std::vector<SimStatus> statuses;
   for (int i = 0; i < 40; ++i)
-    statuses.push_back(make_status(PHASE_WAITING, 0, "missing: recorder"));
+    statuses.push_back(make_status(RunPhase::PHASE_WAITING, 0, "missing: recorder"));
   for (int i = 23; i < 40; ++i)
     if (i != 30 && i != 31) recording_->add(statuses[i]);
   fly_to_the_end();
@@ -679,7 +681,7 @@ TEST_F(RecordingTest, ARunWithoutASingleSampleIsNotComplete) {
 }
 
 TEST_F(RecordingTest, KilledBeforeTheEndItsFilesParseAndAreMarkedIncomplete) {
-  recording_->add(make_status(PHASE_RUNNING, 0));
+  recording_->add(make_status(RunPhase::PHASE_RUNNING, 0));
   add_steps(0, 149);
   const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(10);
   while (read_table("state.csv").rows.empty() && std::chrono::steady_clock::now() < deadline)
@@ -713,9 +715,9 @@ std::string find_system_error(const std::function<void()>& work) {
 }
 
 TEST_F(RecordingTest, AFullDiskEndsTheRecordingWhichIsMarkedIncomplete) {
-  recording_->add(make_status(PHASE_RUNNING, 0));
+  recording_->add(make_status(RunPhase::PHASE_RUNNING, 0));
   add_steps(0, kLastStep);
-  recording_->add(make_status(PHASE_FINISHED, kLastStep));
+  recording_->add(make_status(RunPhase::PHASE_FINISHED, kLastStep));
   const std::string error = find_system_error([&] {
     const FileSizeLimit limit(20000);
     finish();
@@ -759,14 +761,14 @@ TEST_F(RecordingTest, AManifestThatDoesNotFitLeavesTheEarlierOneWhole) {
 // --- samples of other runs, and damaged texts ----------------------------------------------------
 
 TEST_F(RecordingTest, SamplesOfOtherRunsAreIgnored) {
-  recording_->add(make_status(PHASE_RUNNING, 0));
+  recording_->add(make_status(RunPhase::PHASE_RUNNING, 0));
   for (std::uint64_t step = 0; step <= kLastStep; ++step) {
     RecordBatch other = make_batch(step, {make_entry(step + 1)}, true);
     other.run_id(kRunId + 1);
     recording_->add(other);
     add_steps(step, step);
   }
-  const SimStatus end = make_status(PHASE_FINISHED, kLastStep);
+  const SimStatus end = make_status(RunPhase::PHASE_FINISHED, kLastStep);
   SimStatus other = end;
   other.run_id(kRunId + 1);
   recording_->add(other);
@@ -781,7 +783,7 @@ TEST_F(RecordingTest, TextsCutWithinALetterDoNotCostTheManifest) {
   add_steps(0, 10);
   std::string reason(254, 'x');
   reason += "\xc3\xa4";  // "ä": its second byte exceeds the 255 bytes of the contract
-  recording_->add(make_status(PHASE_FAILED, 10, reason));
+  recording_->add(make_status(RunPhase::PHASE_FAILED, 10, reason));
   EXPECT_FALSE(finish());
   const Json manifest = read_manifest();
   EXPECT_EQ(manifest.at("outcome"), "failed");
@@ -793,7 +795,7 @@ TEST_F(RecordingTest, EveryVehicleOfTheRunIsWaitedFor) {
   Parameters parameters = make_parameters();
   set_vehicles(parameters, {0, 7});
   Recording recording(folder.path(), parameters);
-  recording.add(make_status(PHASE_FINISHED, kLastStep));
+  recording.add(make_status(RunPhase::PHASE_FINISHED, kLastStep));
   BatchFeeder feeder(recording);
   for (const std::uint32_t id : {0u, 7u}) {
     EXPECT_FALSE(recording.has_all());

@@ -186,8 +186,8 @@ TEST_F(SegmentsTest, AnEarlierSegmentsGapKeepsTheWholeFromBeingComplete) {
 TEST_F(SegmentsTest, StatusSamplesOfAllSegmentsCountTogether) {
   std::vector<SimStatus> statuses;
   const Parameters parameters = make_parameters();
-  for (int i = 0; i < 10; ++i) statuses.push_back(make_status(PHASE_RUNNING, 0));
-  statuses.push_back(make_status(PHASE_FINISHED, kLastStep, "mission finished"));
+  for (int i = 0; i < 10; ++i) statuses.push_back(make_status(RunPhase::PHASE_RUNNING, 0));
+  statuses.push_back(make_status(RunPhase::PHASE_FINISHED, kLastStep, "mission finished"));
   for (const std::size_t oldest : {3, 6}) {  // oldest sample that the server still has
     SCOPED_TRACE(oldest);
     fs::remove_all(out_);
@@ -215,8 +215,9 @@ TEST_F(SegmentsTest, StatusSamplesOfAllSegmentsCountTogether) {
 TEST_F(SegmentsTest, EachStatusSampleHasOneRowAndOneEvent) {
   const Parameters parameters = make_parameters();
   const std::vector<SimStatus> statuses = {
-      make_status(PHASE_WAITING, 0, "missing: controller"), make_status(PHASE_RUNNING, 0),
-      make_status(PHASE_RUNNING, 150), make_status(PHASE_FINISHED, kLastStep, "mission finished")};
+      make_status(RunPhase::PHASE_WAITING, 0, "missing: controller"),
+      make_status(RunPhase::PHASE_RUNNING, 0), make_status(RunPhase::PHASE_RUNNING, 150),
+      make_status(RunPhase::PHASE_FINISHED, kLastStep, "mission finished")};
   {
     Recording recording(out_, parameters);
     for (std::size_t i = 0; i < 3; ++i) recording.add(statuses[i]);
@@ -237,7 +238,7 @@ TEST_F(SegmentsTest, EachStatusSampleHasOneRowAndOneEvent) {
 
 TEST_F(SegmentsTest, AFinalStatusThatAnEarlierSegmentHasEndsTheRun) {
   const Parameters parameters = make_parameters();
-  const SimStatus end = make_status(PHASE_FINISHED, kLastStep, "mission finished");
+  const SimStatus end = make_status(RunPhase::PHASE_FINISHED, kLastStep, "mission finished");
   {
     Recording recording(out_, parameters);
     recording.add(end);
@@ -260,9 +261,9 @@ TEST_F(SegmentsTest, UnansweredStepsAreWholeWithoutAReference) {
   const auto add = [](Recording& recording, std::uint64_t from, std::uint64_t to) {
     BatchFeeder feeder(recording, from);
     for (std::uint64_t step = from; step <= to; ++step)
-      feeder.add(
-          {step < 40 || step >= 60 ? make_entry(step) : make_unanswered_entry(step, ANSWER_HELD)},
-          step == kLastStep);
+      feeder.add({step < 40 || step >= 60 ? make_entry(step)
+                                          : make_unanswered_entry(step, AnswerKind::ANSWER_HELD)},
+                 step == kLastStep);
   };
   fs::remove_all(whole_);
   fs::create_directory(whole_);

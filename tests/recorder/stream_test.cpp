@@ -212,8 +212,8 @@ TEST_F(StreamTest, TheLastStepMayHaveNoAnswer) {
 
 TEST_F(StreamTest, ARefusedAnswerIsRecordedAsItWasSent) {
   RecordEntry entry = make_entry(0);
-  entry.kind(ANSWER_REFUSED);
-  entry.answer().fault(FAULT_FREE_FALL);
+  entry.kind(AnswerKind::ANSWER_REFUSED);
+  entry.answer().fault(FaultCode::FAULT_FREE_FALL);
   entry.answer().f_Q_W_n({1e9, 0, 0});
   stream_.add(make_batch(0, {entry}, true));
   ASSERT_EQ(rows_.size(), 1u);
@@ -228,7 +228,7 @@ class LateAnswerTest : public StreamTest {
  protected:
   LateAnswerTest() {
     add_all(0, 9);
-    stream_.add(make_batch(10, {make_unanswered_entry(10, ANSWER_HELD)}));
+    stream_.add(make_batch(10, {make_unanswered_entry(10, AnswerKind::ANSWER_HELD)}));
   }
 };
 
@@ -241,7 +241,8 @@ TEST_F(LateAnswerTest, AStepWithoutAnAnswerWaitsForALateOneAndTheOthersWithIt) {
   EXPECT_EQ(rows.command->fault, "held");
   EXPECT_EQ(rows.command->controller, kPilot);
   EXPECT_EQ(rows.command->compute_us, 0);
-  EXPECT_EQ(rows.command->f_Q_W, make_unanswered_entry(10, ANSWER_HELD).answer().f_Q_W_n());
+  EXPECT_EQ(rows.command->f_Q_W,
+            make_unanswered_entry(10, AnswerKind::ANSWER_HELD).answer().f_Q_W_n());
   ASSERT_TRUE(rows.reference);
   EXPECT_EQ(rows.reference->reference.position_m(),
             make_entry(10).answer().reference().position_m());
@@ -253,7 +254,7 @@ TEST_F(LateAnswerTest, AStepWithoutAnAnswerWaitsForALateOneAndTheOthersWithIt) {
 TEST_F(LateAnswerTest, StepsThatWaitForALateAnswerCountAsReceived) {
   EXPECT_EQ(stream_.last_step(), 10);
   for (std::uint64_t step = 11; step <= 200; ++step) {
-    stream_.add(make_batch(step, {make_unanswered_entry(step, ANSWER_HELD)}));
+    stream_.add(make_batch(step, {make_unanswered_entry(step, AnswerKind::ANSWER_HELD)}));
     EXPECT_EQ(stream_.last_step(), static_cast<std::int64_t>(step));
   }
   EXPECT_EQ(steps(), list(0, 135)) << "the others are kept for late answers";
@@ -277,7 +278,7 @@ TEST_F(LateAnswerTest, TheLastBatchOrTheEndOfPatienceEndsTheWaiting) {
   stream_.add(make_batch(11, {}, true));
   EXPECT_EQ(steps(), list(0, 10));
   rows_.clear();
-  other.add(make_batch(0, {make_unanswered_entry(0, ANSWER_FAIL_SAFE)}));
+  other.add(make_batch(0, {make_unanswered_entry(0, AnswerKind::ANSWER_FAIL_SAFE)}));
   EXPECT_TRUE(rows_.empty());
   other.give_up();
   ASSERT_EQ(steps(), list(0, 0));
@@ -285,7 +286,7 @@ TEST_F(LateAnswerTest, TheLastBatchOrTheEndOfPatienceEndsTheWaiting) {
 }
 
 TEST_F(LateAnswerTest, EachOfSeveralWaitsForItsOwn) {
-  stream_.add(make_batch(11, {make_unanswered_entry(11, ANSWER_FAIL_SAFE)}));
+  stream_.add(make_batch(11, {make_unanswered_entry(11, AnswerKind::ANSWER_FAIL_SAFE)}));
   stream_.add(make_batch(12, {make_late_entry(11), make_late_entry(11)}));
   EXPECT_EQ(steps(), list(0, 9));
   EXPECT_EQ(stream_.dropped().repeated, 1u);
@@ -307,7 +308,7 @@ TEST_F(LateAnswerTest, StepsOutOfOrderTakeBoundedMemory) {
   set_vehicles(parameters, {0, 1});
   rows_.clear();
   Stream stream = make_stream(parameters);
-  stream.add(make_batch(0, {make_unanswered_entry(1'000'000, ANSWER_HELD)}));
+  stream.add(make_batch(0, {make_unanswered_entry(1'000'000, AnswerKind::ANSWER_HELD)}));
   for (std::uint64_t step = 0; step < 40'000; ++step)
     stream.add(make_batch(step + 1, {make_entry(step, 1)}));
   EXPECT_GT(rows_.size(), 7'000u);

@@ -72,7 +72,7 @@ Parameters make_parameters() {
   message.contract_sha256(bus::kContractSha256);
   message.period_ns(kPeriod);
   message.step_ns(1'000'000);
-  message.mode(MODE_LOCKSTEP);
+  message.mode(SyncMode::MODE_LOCKSTEP);
   message.version("sls 0.0.test");
   return message;
 }
@@ -97,7 +97,7 @@ RecordEntry make_entry(std::uint64_t step, std::uint32_t vehicle_id) {
   RecordEntry entry;
   entry.vehicle_id(vehicle_id);
   entry.step(step);
-  entry.kind(ANSWER_ACCEPTED);
+  entry.kind(AnswerKind::ANSWER_ACCEPTED);
   PlantState& truth = entry.truth();
   truth.p_WQ_m(bus::to_array(state.p_WQ));
   truth.v_WQ_m_s(bus::to_array(state.v_WQ));
@@ -117,8 +117,9 @@ RecordEntry make_entry(std::uint64_t step, std::uint32_t vehicle_id) {
   answer.vehicle_id(vehicle_id);
   answer.f_Q_W_n(bus::to_array(make_force(step)));
   answer.controller(make_controller(step));
-  answer.mission(step == kLastStep ? MISSION_FINISHED : MISSION_RUNNING);
-  answer.fault(FAULT_NONE);
+  answer.mission(step == kLastStep ? MissionPhase::MISSION_FINISHED
+                                   : MissionPhase::MISSION_RUNNING);
+  answer.fault(FaultCode::FAULT_NONE);
   answer.compute_time_ns(12345 + step);
   Reference& reference = answer.reference();
   reference.stage_index(step < 100 ? 0 : 1);
@@ -142,7 +143,7 @@ RecordEntry make_unanswered_entry(std::uint64_t step, AnswerKind kind) {
 
 RecordEntry make_late_entry(std::uint64_t step, std::uint32_t vehicle_id) {
   RecordEntry entry = make_entry(step, vehicle_id);
-  entry.kind(ANSWER_LATE);
+  entry.kind(AnswerKind::ANSWER_LATE);
   entry.truth(PlantState());
   entry.f_Q_W_n({0, 0, 0});
   return entry;
@@ -150,7 +151,7 @@ RecordEntry make_late_entry(std::uint64_t step, std::uint32_t vehicle_id) {
 
 RecordEntry make_bare_entry(std::uint64_t step) {
   RecordEntry entry = make_entry(step);
-  entry.kind(ANSWER_NONE);
+  entry.kind(AnswerKind::ANSWER_NONE);
   entry.client_name("");
   entry.answer(ControlCommand());
   return entry;
@@ -173,7 +174,7 @@ SimStatus make_status(RunPhase phase, std::uint64_t step, const std::string& rea
   message.phase(phase);
   message.reason(reason);
   message.step(step);
-  message.controller_name(step > 0 || phase == PHASE_FINISHED ? kPilot : "");
+  message.controller_name(step > 0 || phase == RunPhase::PHASE_FINISHED ? kPilot : "");
   message.real_time_factor(1.5);
   message.round_trip_p50_ns(81'250);
   message.round_trip_p99_ns(140'000);

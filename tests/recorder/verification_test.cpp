@@ -157,7 +157,7 @@ TEST_F(VerificationTest, ScenarioPeriodModeAndMissingStepsAreNoted) {
   fs::create_directory(b_);
   Parameters parameters = make_parameters();
   parameters.period_ns(2'000'000);
-  parameters.mode(MODE_REALTIME);
+  parameters.mode(SyncMode::MODE_REALTIME);
   parameters.scenario_sha256(std::string(64, 'f'));
   Recording recording(b_, parameters);
   BatchFeeder feeder(recording);
@@ -217,7 +217,7 @@ TEST_F(VerificationTest, AFleetIsComparedInStepOrderForAnyOrderOfRows) {
       for (const std::uint32_t id : kIds)
         for (auto step = first; step < std::min(first + steps_apart, kLastStep + 1); ++step) {
           RecordEntry entry = make_entry(step, id);
-          if (id == 3 && step % 2 == 1) entry.kind(ANSWER_HELD);
+          if (id == 3 && step % 2 == 1) entry.kind(AnswerKind::ANSWER_HELD);
           feeder.add({entry});
         }
     feeder.add({}, true);

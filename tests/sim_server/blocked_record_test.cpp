@@ -209,7 +209,7 @@ TEST_F(BlockedFlightTest, TheServerReportsTheWaitAndObeysAnOperatorMeanwhile) {
     request.run_id(waiting->run_id());
     request.request_id(1);
     request.operator_name("anna@test");
-    request.action(ACTION_STOP);
+    request.action(ControlAction::ACTION_STOP);
     requests.write(request);
     requests.wait_for_acknowledgments(10s);
   });

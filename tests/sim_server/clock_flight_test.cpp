@@ -8,12 +8,12 @@
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <fastdds/dds/publisher/DataWriter.hpp>
 #include <fastdds/dds/publisher/Publisher.hpp>
-#include <fastdds/dds/topic/TypeSupport.hpp>
 #include <mutex>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "fastdds_api.hpp"
 #include "sim_server/server.hpp"
 #include "tests/support/own_domain.hpp"
 #include "tests/support/waiting.hpp"
@@ -22,7 +22,7 @@ namespace sls::sim {
 namespace {
 
 using namespace std::chrono_literals;
-namespace dds = eprosima::fastdds::dds;
+namespace dds = bus::dds;
 using sls::test::own_domain;
 using sls::test::wait_until;
 
@@ -67,8 +67,7 @@ class StampedWriters {
   dds::DataWriter* make_writer() {
     dds::TypeSupport type(
         static_cast<dds::TopicDataType*>(bus::detail::make_type_support<Message>()));
-    type->auto_fill_type_object(false);
-    type->auto_fill_type_information(false);
+    bus::leave_out_type_object(type);
     type.register_type(participant_);
     auto* topic = participant_->create_topic(bus::Topic<Message>::kName, type.get_type_name(),
                                              dds::TOPIC_QOS_DEFAULT);
@@ -82,9 +81,9 @@ class StampedWriters {
   static void write(dds::DataWriter& writer, void* message, std::chrono::nanoseconds ahead) {
     const std::chrono::nanoseconds now = std::chrono::system_clock::now().time_since_epoch();
     const auto stamp = (now + ahead).count();
-    const eprosima::fastrtps::Time_t time(static_cast<std::int32_t>(stamp / 1'000'000'000),
-                                          static_cast<std::uint32_t>(stamp % 1'000'000'000));
-    writer.write_w_timestamp(message, dds::HANDLE_NIL, time);
+    const bus::Time time(static_cast<std::int32_t>(stamp / 1'000'000'000),
+                         static_cast<std::uint32_t>(stamp % 1'000'000'000));
+    bus::write_sample(writer, message, time);
   }
 
   dds::DomainParticipant* participant_ = nullptr;
@@ -120,7 +119,7 @@ class ClockFlightTest : public testing::Test {
     Participant message;
     message.run_id(run_->parameters.run_id());
     message.contract_sha256(bus::kContractSha256);
-    message.role(ROLE_CONTROLLER);
+    message.role(ParticipantRole::ROLE_CONTROLLER);
     message.name("pilot");
     message.host("box");
     message.vehicle_ids({0});
@@ -133,7 +132,7 @@ class ClockFlightTest : public testing::Test {
   void stop_server() {
     SimControl request;
     request.run_id(run_->parameters.run_id());
-    request.action(ACTION_STOP);
+    request.action(ControlAction::ACTION_STOP);
     bus::Writer<SimControl> requests(node_);
     requests.write(request);
     EXPECT_TRUE(wait_until([&] {

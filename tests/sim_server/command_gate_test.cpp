@@ -44,15 +44,15 @@ OfferedAnswer make_answer(std::uint64_t step, double force_z = -10.0) {
   command.step = step;
   command.command.f_Q_W_n({0.01 * static_cast<double>(step % 1000), 1.0, force_z});
   command.client_name = "named by nobody";
-  command.command.mission(MISSION_RUNNING);
-  command.command.fault(FAULT_NONE);
+  command.command.mission(MissionPhase::MISSION_RUNNING);
+  command.command.fault(FaultCode::FAULT_NONE);
   return command;
 }
 
 OfferedAnswer make_faulted(std::uint64_t step, FaultCode fault) {
   OfferedAnswer command = make_answer(step);
   command.command.fault(fault);
-  command.command.mission(MISSION_FAILED);
+  command.command.mission(MissionPhase::MISSION_FAILED);
   return command;
 }
 
@@ -112,7 +112,7 @@ TEST_F(CommandGateTest, AnAnswerToAStateThatWasNotPublishedYetIsRefused) {
 
 TEST_F(CommandGateTest, TheRefusedAnswerToTheAwaitedStepIsKept) {
   EXPECT_FALSE(gate_.refused());
-  const OfferedAnswer faulted = make_faulted(0, FAULT_FREE_FALL);
+  const OfferedAnswer faulted = make_faulted(0, FaultCode::FAULT_FREE_FALL);
   gate_.offer(faulted, kStrongPeer);
   ASSERT_TRUE(gate_.refused());
   EXPECT_EQ(*gate_.refused(), faulted);
@@ -188,7 +188,7 @@ TEST_F(CommandGateTest, TheLargestNumbersOfAReferenceAreFinite) {
 }
 
 TEST_F(CommandGateTest, AFaultIsNamedRatherThanItsReference) {
-  OfferedAnswer answer = make_faulted(0, FAULT_FREE_FALL);
+  OfferedAnswer answer = make_faulted(0, FaultCode::FAULT_FREE_FALL);
   answer.command.reference().jerk_m_s3().fill(std::numeric_limits<double>::quiet_NaN());
   EXPECT_EQ(offer_bad(answer), Verdict::kFault);
 }
@@ -231,7 +231,8 @@ TEST_F(CommandGateTest, NothingThatAnUnannouncedSenderSendsEndsTheFlight) {
   not_finite.command.f_Q_W_n()[0] = std::numeric_limits<double>::quiet_NaN();
   OfferedAnswer excessive = make_answer(0);
   excessive.command.f_Q_W_n()[0] = 1e6;
-  const std::vector<OfferedAnswer> bad = {not_finite, excessive, make_faulted(0, FAULT_FREE_FALL),
+  const std::vector<OfferedAnswer> bad = {not_finite, excessive,
+                                          make_faulted(0, FaultCode::FAULT_FREE_FALL),
                                           make_answer(0), make_answer(77)};
   for (const OfferedAnswer& command : bad) {
     gate_.offer(command, kStranger);
@@ -333,10 +334,10 @@ TEST_F(CommandGateTest, AnExcessiveForceIsNamedWithItsLimit) {
 }
 
 TEST_F(CommandGateTest, AFaultOfTheOnlyClientIsNamed) {
-  for (const auto& [fault, name] :
-       {std::pair{FAULT_FREE_FALL, "free_fall"}, std::pair{FAULT_ROD_LEVEL, "rod_level"},
-        std::pair{FAULT_NOT_FINITE, "not_finite"},
-        std::pair{FAULT_STAGE_TIMEOUT, "stage_timeout"}}) {
+  for (const auto& [fault, name] : {std::pair{FaultCode::FAULT_FREE_FALL, "free_fall"},
+                                    std::pair{FaultCode::FAULT_ROD_LEVEL, "rod_level"},
+                                    std::pair{FaultCode::FAULT_NOT_FINITE, "not_finite"},
+                                    std::pair{FaultCode::FAULT_STAGE_TIMEOUT, "stage_timeout"}}) {
     CommandGate gate(kRun, kVehicle, {kForceLimit});
     gate.set_clients({kStrong});
     gate.expect(2);
@@ -349,7 +350,7 @@ TEST_F(CommandGateTest, AFaultOfTheOnlyClientIsNamed) {
 }
 
 TEST_F(CommandGateTest, AFailedMissionWithoutAFaultCodeIsRefusedToo) {
-  EXPECT_EQ(offer_bad(make_faulted(0, FAULT_NONE)), Verdict::kFault);
+  EXPECT_EQ(offer_bad(make_faulted(0, FaultCode::FAULT_NONE)), Verdict::kFault);
   ASSERT_TRUE(gate_.refusal());
   EXPECT_EQ(gate_.refusal()->find("none"), std::string::npos) << *gate_.refusal();
 }
@@ -358,7 +359,7 @@ TEST_F(CommandGateTest, AFailedMissionWithoutAFaultCodeIsRefusedToo) {
 class MissionGateTest : public testing::Test {
  protected:
   Verdict offer(std::uint64_t step, std::uint32_t stage, MissionPhase mission,
-                FaultCode fault = FAULT_NONE) {
+                FaultCode fault = FaultCode::FAULT_NONE) {
     gate_.emplace(kRun, kVehicle, AnswerLimits{kForceLimit, 2, 500});
     gate_->set_clients({kStrong});
     gate_->expect(step);
@@ -377,42 +378,46 @@ class MissionGateTest : public testing::Test {
 };
 
 TEST_F(MissionGateTest, AStageBeyondTheMissionIsRefused) {
-  EXPECT_EQ(offer(600, 4'000'000'000, MISSION_RUNNING), Verdict::kUnknownStage);
+  EXPECT_EQ(offer(600, 4'000'000'000, MissionPhase::MISSION_RUNNING), Verdict::kUnknownStage);
   EXPECT_EQ(refusal(),
             "controller 'strong' answered step 600 with a stage beyond its mission: stage_index "
             "4000000000 > 2");
-  EXPECT_EQ(offer(600, 3, MISSION_FINISHED), Verdict::kUnknownStage);
-  EXPECT_EQ(offer(600, 2, MISSION_FINISHED), Verdict::kAccepted);
-  EXPECT_EQ(offer(600, 2, MISSION_RUNNING), Verdict::kAccepted) << "reported by ParticipantCheck";
-  EXPECT_EQ(offer(0, 1, MISSION_RUNNING), Verdict::kAccepted) << "as if the first stage were over";
+  EXPECT_EQ(offer(600, 3, MissionPhase::MISSION_FINISHED), Verdict::kUnknownStage);
+  EXPECT_EQ(offer(600, 2, MissionPhase::MISSION_FINISHED), Verdict::kAccepted);
+  EXPECT_EQ(offer(600, 2, MissionPhase::MISSION_RUNNING), Verdict::kAccepted)
+      << "reported by ParticipantCheck";
+  EXPECT_EQ(offer(0, 1, MissionPhase::MISSION_RUNNING), Verdict::kAccepted)
+      << "as if the first stage were over";
 }
 
 TEST_F(MissionGateTest, AnEndBeforeTheEarliestStepIsRefused) {
-  EXPECT_EQ(offer(499, 1, MISSION_FINISHED), Verdict::kEarlyEnd);
+  EXPECT_EQ(offer(499, 1, MissionPhase::MISSION_FINISHED), Verdict::kEarlyEnd);
   EXPECT_EQ(refusal(),
             "controller 'strong' answered step 499 with an early end of its mission: expected at "
             "step 500 or later");
-  EXPECT_EQ(offer(499, 2, MISSION_RUNNING), Verdict::kEarlyEnd) << "the next client would finish";
-  EXPECT_EQ(offer(500, 1, MISSION_FINISHED), Verdict::kAccepted);
-  EXPECT_EQ(offer(500, 2, MISSION_FINISHED), Verdict::kAccepted);
+  EXPECT_EQ(offer(499, 2, MissionPhase::MISSION_RUNNING), Verdict::kEarlyEnd)
+      << "the next client would finish";
+  EXPECT_EQ(offer(500, 1, MissionPhase::MISSION_FINISHED), Verdict::kAccepted);
+  EXPECT_EQ(offer(500, 2, MissionPhase::MISSION_FINISHED), Verdict::kAccepted);
 }
 
 TEST_F(MissionGateTest, ValuesThatTheContractDoesNotDefineAreRefused) {
   EXPECT_EQ(offer(600, 1, static_cast<MissionPhase>(7)), Verdict::kUndefined);
   EXPECT_EQ(refusal(), "controller 'strong' answered step 600 with an undefined value: mission 7");
-  EXPECT_EQ(offer(600, 1, MISSION_FAILED, static_cast<FaultCode>(5)), Verdict::kUndefined);
+  EXPECT_EQ(offer(600, 1, MissionPhase::MISSION_FAILED, static_cast<FaultCode>(5)),
+            Verdict::kUndefined);
   EXPECT_EQ(refusal(), "controller 'strong' answered step 600 with an undefined value: fault 5");
 }
 
 TEST_F(CommandGateTest, AFaultInAnswerToAnotherStepEndsNothing) {
-  EXPECT_EQ(gate_.offer(make_faulted(1, FAULT_FREE_FALL), kStrongPeer), Verdict::kFault);
+  EXPECT_EQ(gate_.offer(make_faulted(1, FaultCode::FAULT_FREE_FALL), kStrongPeer), Verdict::kFault);
   EXPECT_EQ(gate_.refusal(), std::nullopt);
   EXPECT_EQ(gate_.offer(make_answer(0), kStrongPeer), Verdict::kAccepted);
 }
 
 TEST_F(CommandGateTest, ARefusalDoesNotOutliveItsStep) {
   gate_.set_clients({kStrong, kWeak});
-  gate_.offer(make_faulted(0, FAULT_ROD_LEVEL), kStrongPeer);
+  gate_.offer(make_faulted(0, FaultCode::FAULT_ROD_LEVEL), kStrongPeer);
   EXPECT_EQ(gate_.offer(make_answer(0), kWeakPeer), Verdict::kAccepted);
   gate_.expect(1);
   EXPECT_EQ(gate_.offer(make_answer(1), kStrongPeer), Verdict::kAccepted);
@@ -420,11 +425,11 @@ TEST_F(CommandGateTest, ARefusalDoesNotOutliveItsStep) {
 
 TEST_F(CommandGateTest, NoRefusalWhileAnotherReadyClientCanAnswer) {
   set_clients({kStrong, kWeak});
-  gate_.offer(make_faulted(0, FAULT_ROD_LEVEL), kStrongPeer);
+  gate_.offer(make_faulted(0, FaultCode::FAULT_ROD_LEVEL), kStrongPeer);
   EXPECT_EQ(gate_.refusal(), std::nullopt);
   ASSERT_TRUE(gate_.awaited_client());
   EXPECT_EQ(gate_.awaited_client()->name, "weak");
-  gate_.offer(make_faulted(0, FAULT_FREE_FALL), kWeakPeer);
+  gate_.offer(make_faulted(0, FaultCode::FAULT_FREE_FALL), kWeakPeer);
   ASSERT_TRUE(gate_.refusal());
   EXPECT_NE(gate_.refusal()->find("answered step 0"), std::string::npos);
 }
@@ -447,7 +452,7 @@ TEST_F(CommandGateTest, ARefusalIsKnownWhileASilentStandbyIsAwaited) {
 
 TEST_F(CommandGateTest, ALateAnswerThatIsRefusedIsKnownUntilItsClientGivesAValidOne) {
   gate_.expect(1);
-  gate_.offer(make_faulted(0, FAULT_ROD_LEVEL), kStrongPeer);
+  gate_.offer(make_faulted(0, FaultCode::FAULT_ROD_LEVEL), kStrongPeer);
   EXPECT_NE(gate_.describe_refusals().find("rod_level"), std::string::npos);
   EXPECT_EQ(gate_.refusal(), std::nullopt) << "the awaited step may still get its answer";
   gate_.expect(2);
@@ -457,7 +462,7 @@ TEST_F(CommandGateTest, ALateAnswerThatIsRefusedIsKnownUntilItsClientGivesAValid
 
 TEST_F(CommandGateTest, TheRefusedClientsStandbyLeavingEndsTheWait) {
   set_clients({kStrong, kWeak});
-  gate_.offer(make_faulted(0, FAULT_ROD_LEVEL), kStrongPeer);
+  gate_.offer(make_faulted(0, FaultCode::FAULT_ROD_LEVEL), kStrongPeer);
   EXPECT_EQ(gate_.refusal(), std::nullopt);
   set_clients({kStrong});
   ASSERT_TRUE(gate_.refusal());
@@ -468,7 +473,7 @@ TEST_F(CommandGateTest, TheAnswerAStandbyHasGivenIsTakenWhenTheStrongerOneIsRefu
   set_clients({kStrong, kWeak});
   EXPECT_EQ(gate_.offer(make_answer(0), kWeakPeer), Verdict::kHeld);
   EXPECT_FALSE(gate_.accepted());
-  EXPECT_EQ(gate_.offer(make_faulted(0, FAULT_FREE_FALL), kStrongPeer), Verdict::kFault);
+  EXPECT_EQ(gate_.offer(make_faulted(0, FaultCode::FAULT_FREE_FALL), kStrongPeer), Verdict::kFault);
   ASSERT_TRUE(gate_.accepted());
   EXPECT_EQ(*gate_.accepted(), make_answer(0));
   EXPECT_EQ(gate_.refusal(), std::nullopt);
@@ -477,8 +482,8 @@ TEST_F(CommandGateTest, TheAnswerAStandbyHasGivenIsTakenWhenTheStrongerOneIsRefu
 TEST_F(CommandGateTest, ABadCommandAfterAClientsValidAnswerIsOnlyCounted) {
   set_clients({kStrong, kWeak});
   gate_.offer(make_answer(0), kWeakPeer);
-  EXPECT_EQ(gate_.offer(make_faulted(0, FAULT_FREE_FALL), kWeakPeer), Verdict::kFault);
-  gate_.offer(make_faulted(0, FAULT_FREE_FALL), kStrongPeer);
+  EXPECT_EQ(gate_.offer(make_faulted(0, FaultCode::FAULT_FREE_FALL), kWeakPeer), Verdict::kFault);
+  gate_.offer(make_faulted(0, FaultCode::FAULT_FREE_FALL), kStrongPeer);
   ASSERT_TRUE(gate_.accepted()) << "the standby's valid answer was there first";
   EXPECT_EQ(gate_.refusal(), std::nullopt);
 }
@@ -579,7 +584,7 @@ TEST_F(CommandGateTest, WithoutAnotherClientThereIsNoTakeOver) {
 
 TEST_F(CommandGateTest, ARefusedClientDoesNotTakeOver) {
   set_clients({kStrong, kWeak});
-  gate_.offer(make_faulted(0, FAULT_FREE_FALL), kWeakPeer);
+  gate_.offer(make_faulted(0, FaultCode::FAULT_FREE_FALL), kWeakPeer);
   EXPECT_FALSE(gate_.pass_over_silent_client());
   EXPECT_EQ(gate_.awaited_client()->name, "strong");
 }
@@ -886,7 +891,7 @@ TEST_F(CommandGateTest, AnAnswerBringsAClientBackThatWasGone) {
 
 TEST_F(CommandGateTest, ARefusalEndsTheRunAtOnceIfAllOthersAreGone) {
   set_clients({make_gone(kStrong), kWeak});
-  gate_.offer(make_faulted(0, FAULT_FREE_FALL), kWeakPeer);
+  gate_.offer(make_faulted(0, FaultCode::FAULT_FREE_FALL), kWeakPeer);
   ASSERT_TRUE(gate_.refusal());
   EXPECT_NE(gate_.refusal()->find("'weak'"), std::string::npos) << *gate_.refusal();
   set_clients({make_gone(kStrong)});

@@ -46,7 +46,7 @@ Applied make_distinct_force() {
   Applied applied;
   applied.f_Q_W = {17, 18, 19};
   applied.answer_f_Q_W = {24, 25, 26};
-  applied.origin = FORCE_HELD;
+  applied.origin = ForceOrigin::FORCE_HELD;
   applied.controller_name = "pilot";
   applied.memory.stage_index(20);
   applied.memory.numbers({1.5, 2.5});
@@ -59,7 +59,7 @@ TEST(MessagesTest, AStateHoldsTheMeasurementAndTheAppliedForce) {
   EXPECT_EQ(message.vehicle_id(), 22u);
   expect_distinct_state(message.measured());
   EXPECT_EQ(message.f_Q_W_n(), (Array{17, 18, 19}));
-  EXPECT_EQ(message.force_origin(), FORCE_HELD);
+  EXPECT_EQ(message.force_origin(), ForceOrigin::FORCE_HELD);
   EXPECT_STREQ(message.controller_name().c_str(), "pilot");
   EXPECT_EQ(message.controller(), applied.memory);
 }
@@ -67,7 +67,7 @@ TEST(MessagesTest, AStateHoldsTheMeasurementAndTheAppliedForce) {
 TEST(MessagesTest, AtStepZeroNothingWasApplied) {
   const VehicleState message = make_state_message(0, {}, {});
   EXPECT_EQ(message.f_Q_W_n(), (Array{0, 0, 0}));
-  EXPECT_EQ(message.force_origin(), FORCE_NONE);
+  EXPECT_EQ(message.force_origin(), ForceOrigin::FORCE_NONE);
   EXPECT_EQ(message.controller_name().size(), 0u);
   EXPECT_EQ(message.controller(), ControllerState());
   EXPECT_EQ(message.measured().q_WB(), (std::array<double, 4>{1, 0, 0, 0})) << "level";
@@ -160,7 +160,7 @@ TEST(MessagesTest, ParametersAreThoseInForce) {
   EXPECT_EQ(message.expected_recorders(), 1u);
   EXPECT_EQ(message.period_ns(), 1'000'000);
   EXPECT_EQ(message.step_ns(), 1'000'000);
-  EXPECT_EQ(message.mode(), MODE_LOCKSTEP);
+  EXPECT_EQ(message.mode(), SyncMode::MODE_LOCKSTEP);
   EXPECT_EQ(message.real_time_factor(), 0.0);
   EXPECT_STREQ(message.version().c_str(), "sls 9.9");
 }
@@ -191,8 +191,8 @@ TEST(MessagesTest, ACommandIsTheWholeAnswer) {
   EXPECT_EQ(message.controller().stage_index(), 4u);
   EXPECT_EQ(message.controller().stage_start_step(), 5u);
   EXPECT_EQ(message.controller().numbers(), (std::vector<double>{6, 7, 8}));
-  EXPECT_EQ(message.mission(), MISSION_RUNNING);
-  EXPECT_EQ(message.fault(), FAULT_NONE);
+  EXPECT_EQ(message.mission(), MissionPhase::MISSION_RUNNING);
+  EXPECT_EQ(message.fault(), FaultCode::FAULT_NONE);
   EXPECT_EQ(message.compute_time_ns(), 12345u);
   const Reference& reference = message.reference();
   EXPECT_EQ(reference.stage_index(), 24u);
@@ -214,15 +214,16 @@ TEST(MessagesTest, EveryFaultAndMissionPhaseHasItsCode) {
   };
   using control::Fault;
   using Phase = control::MissionPhase;
-  EXPECT_EQ(translate(Fault::kNone, Phase::kFinished), std::pair(FAULT_NONE, MISSION_FINISHED));
+  EXPECT_EQ(translate(Fault::kNone, Phase::kFinished),
+            std::pair(FaultCode::FAULT_NONE, MissionPhase::MISSION_FINISHED));
   EXPECT_EQ(translate(Fault::kFreeFall, Phase::kFailed),
-            std::pair(FAULT_FREE_FALL, MISSION_FAILED));
+            std::pair(FaultCode::FAULT_FREE_FALL, MissionPhase::MISSION_FAILED));
   EXPECT_EQ(translate(Fault::kRodLevel, Phase::kFailed),
-            std::pair(FAULT_ROD_LEVEL, MISSION_FAILED));
+            std::pair(FaultCode::FAULT_ROD_LEVEL, MissionPhase::MISSION_FAILED));
   EXPECT_EQ(translate(Fault::kNotFinite, Phase::kFailed),
-            std::pair(FAULT_NOT_FINITE, MISSION_FAILED));
+            std::pair(FaultCode::FAULT_NOT_FINITE, MissionPhase::MISSION_FAILED));
   EXPECT_EQ(translate(Fault::kStageTimeout, Phase::kFailed),
-            std::pair(FAULT_STAGE_TIMEOUT, MISSION_FAILED));
+            std::pair(FaultCode::FAULT_STAGE_TIMEOUT, MissionPhase::MISSION_FAILED));
 }
 
 TEST(MessagesTest, ControllerMemorySurvivesTheWayThroughCommandAndState) {

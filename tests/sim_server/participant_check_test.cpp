@@ -37,7 +37,7 @@ bus::PeerId make_peer(std::uint8_t number) {
 }
 
 Entry make_entry(std::uint8_t number, const std::string& name = "foo",
-                 ParticipantRole role = ROLE_CONTROLLER) {
+                 ParticipantRole role = ParticipantRole::ROLE_CONTROLLER) {
   Entry entry;
   entry.peer = make_peer(number);
   entry.announcement.run_id(kRun);
@@ -58,7 +58,7 @@ class ParticipantCheckTest : public testing::Test {
     neighbourhood_.now = ParticipantCheck::Clock::time_point(1h + time);
     if (are_matched_)
       for (const Entry& entry : neighbourhood_.participants) {
-        if (entry.announcement.role() != ROLE_CONTROLLER) continue;
+        if (entry.announcement.role() != ParticipantRole::ROLE_CONTROLLER) continue;
         neighbourhood_.state_readers.insert(entry.peer);
         neighbourhood_.command_writers.emplace(entry.peer, "'foo' (10.0.0.2)");
       }
@@ -95,14 +95,15 @@ const std::string kFoo = "controller 'foo' on box: ";
 // --- announcements -------------------------------------------------------------------------------
 
 TEST_F(ParticipantCheckTest, OursDoNothingWrong) {
-  neighbourhood_.participants = {make_entry(1), make_entry(2, "tape", ROLE_RECORDER)};
+  neighbourhood_.participants = {make_entry(1),
+                                 make_entry(2, "tape", ParticipantRole::ROLE_RECORDER)};
   neighbourhood_.command_writers[make_peer(1)] = "'foo' (10.0.0.2)";
   for (int i = 0; i < 10; ++i) EXPECT_EQ(look(i * 1s), std::vector<std::string>());
   EXPECT_EQ(check_.admit_controllers(neighbourhood_.participants).size(), 2u);
 }
 
 TEST_F(ParticipantCheckTest, AnotherContractIsNamedAtOnceAndNotAdmitted) {
-  auto controller = make_entry(1), recorder = make_entry(2, "tape", ROLE_RECORDER);
+  auto controller = make_entry(1), recorder = make_entry(2, "tape", ParticipantRole::ROLE_RECORDER);
   controller.announcement.contract_sha256(std::string(64, '1'));
   recorder.announcement.contract_sha256("");
   controller.announcement.vehicle_ids({99});  // may have another meaning there
@@ -196,7 +197,7 @@ TEST_F(ParticipantCheckTest, ARoleThatIsNotDefinedIsNamed) {
 }
 
 TEST_F(ParticipantCheckTest, ARecorderThatWritesCommandsIsNamed) {
-  neighbourhood_.participants = {make_entry(1, "foo", ROLE_RECORDER)};
+  neighbourhood_.participants = {make_entry(1, "foo", ParticipantRole::ROLE_RECORDER)};
   EXPECT_TRUE(look().empty());
   neighbourhood_.command_writers[make_peer(1)] = "'foo' (10.0.0.2)";
   EXPECT_EQ(look(), only("recorder 'foo' on box: sls/participant role: expected controller, as it "
@@ -615,7 +616,7 @@ TEST_F(ParticipantCheckTest, AMissionThatAdvancesIsFine) {
   neighbourhood_.participants = {make_entry(1)};
   for (std::uint64_t step = 0; step < 500; ++step) take(make_answer(step, step < 200 ? 0 : 1));
   OfferedAnswer last = make_answer(500, 2);
-  last.command.mission(MISSION_FINISHED);
+  last.command.mission(MissionPhase::MISSION_FINISHED);
   for (int i = 0; i < 500; ++i, ++last.step) take(last);  // other vehicles of the fleet still fly
   EXPECT_TRUE(look().empty());
 }

@@ -7,6 +7,7 @@
 #include <mutex>
 #include <vector>
 
+#include "common/bus/message_size.hpp"
 #include "common/bus/qos_file.hpp"
 #include "tests/support/own_domain.hpp"
 #include "tests/support/waiting.hpp"
@@ -100,7 +101,7 @@ TEST_F(RecordStreamTest, NoBatchIsLargerThanTheLimit) {
   ASSERT_TRUE(wait_for_last());
   expect_whole(100, 7);
   for (const RecordBatch& batch : batches())
-    EXPECT_LE(RecordBatch::getCdrSerializedSize(batch), 1'400u);
+    EXPECT_LE(bus::calc_size(batch), 1'400u);
 }
 
 TEST_F(RecordStreamTest, AnEntryThatIsLargerThanTheLimitIsABatchOfItsOwn) {
@@ -142,7 +143,7 @@ TEST_F(RecordStreamTest, TheHistoryHoldsFewerStepsWhereEachTakesSeveralBatches) 
   ASSERT_TRUE(wait_for_last());
   for (const RecordBatch& batch : batches())
     for (const RecordEntry& entry : batch.entries())
-      if (entry.step() == 0) bytes_of_step += RecordEntry::getCdrSerializedSize(entry);
+      if (entry.step() == 0) bytes_of_step += bus::calc_size(entry);
   const std::uint64_t batches_of_step = (bytes_of_step + 11'999) / 12'000;
   EXPECT_GE(batches_of_step, 3u);
   EXPECT_EQ(stream_->history_steps(), 5000 / batches_of_step);

@@ -26,12 +26,12 @@ bus::ParticipantDirectory::Entry make_entry(ParticipantRole role, const std::str
 }
 
 bus::ParticipantDirectory::Entry make_controller(const std::string& name, bool ready = true) {
-  auto entry = make_entry(ROLE_CONTROLLER, name, ready);
+  auto entry = make_entry(ParticipantRole::ROLE_CONTROLLER, name, ready);
   entry.announcement.vehicle_ids({0});
   return entry;
 }
 bus::ParticipantDirectory::Entry make_recorder(const std::string& name, bool ready = true) {
-  return make_entry(ROLE_RECORDER, name, ready);
+  return make_entry(ParticipantRole::ROLE_RECORDER, name, ready);
 }
 bus::ParticipantDirectory::Entry make_recorder_at(std::int64_t last_complete_step) {
   auto entry = make_recorder("tape");

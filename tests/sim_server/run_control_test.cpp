@@ -60,24 +60,24 @@ TEST_F(RunControlTest, ARunGoesUntilItIsPausedAndOnWhenItIsResumed) {
   EXPECT_FALSE(control.is_paused());
   EXPECT_EQ(control.last_event(), "");
 
-  expect_accepted(ask(ACTION_PAUSE));
+  expect_accepted(ask(ControlAction::ACTION_PAUSE));
   EXPECT_TRUE(control.holds());
   EXPECT_TRUE(control.is_paused());
   EXPECT_EQ(control.last_event(), "paused by anna@host");
 
-  expect_accepted(control.request(bob.ask(ACTION_RESUME), 40));
+  expect_accepted(control.request(bob.ask(ControlAction::ACTION_RESUME), 40));
   EXPECT_FALSE(control.holds());
   EXPECT_FALSE(control.is_paused());
   EXPECT_EQ(control.last_event(), "resumed by bob@lab");
 }
 
 TEST_F(RunControlTest, ARequestThatTheStateForbidsIsRefusedWithTheState) {
-  expect_refused(ask(ACTION_RESUME), "not paused");
-  expect_refused(ask(ACTION_START), "not paused");
-  expect_refused(ask(ACTION_STEP, 1), "not paused");
-  expect_accepted(ask(ACTION_PAUSE));
-  expect_refused(ask(ACTION_PAUSE), "already paused");
-  expect_refused(ask(ACTION_STEP, 0), "steps: expected at least 1, got 0");
+  expect_refused(ask(ControlAction::ACTION_RESUME), "not paused");
+  expect_refused(ask(ControlAction::ACTION_START), "not paused");
+  expect_refused(ask(ControlAction::ACTION_STEP, 1), "not paused");
+  expect_accepted(ask(ControlAction::ACTION_PAUSE));
+  expect_refused(ask(ControlAction::ACTION_PAUSE), "already paused");
+  expect_refused(ask(ControlAction::ACTION_STEP, 0), "steps: expected at least 1, got 0");
   EXPECT_EQ(control.last_event(), "paused by anna@host") << "a refused request is no event";
 }
 
@@ -85,14 +85,14 @@ TEST_F(RunControlTest, ARunThatBeginsPausedIsStarted) {
   RunControl successor(kRun, {kVehicle}, true);
   EXPECT_TRUE(successor.holds());
   EXPECT_TRUE(successor.is_paused());
-  expect_accepted(successor.request(anna.ask(ACTION_START), 0), 0);
+  expect_accepted(successor.request(anna.ask(ControlAction::ACTION_START), 0), 0);
   EXPECT_FALSE(successor.holds());
   EXPECT_EQ(successor.last_event(), "started by anna@host");
 }
 
 TEST_F(RunControlTest, TheReplyToAStepRequestComesWhenItsStepsAreDone) {
-  ask(ACTION_PAUSE);
-  const SimControl request = anna.ask(ACTION_STEP, 3);
+  ask(ControlAction::ACTION_PAUSE);
+  const SimControl request = anna.ask(ControlAction::ACTION_STEP, 3);
   EXPECT_EQ(control.request(request, 40), std::nullopt);
   EXPECT_EQ(control.last_event(), "3 steps requested by anna@host");
   for (const std::uint64_t step : {41, 42}) {
@@ -109,30 +109,31 @@ TEST_F(RunControlTest, TheReplyToAStepRequestComesWhenItsStepsAreDone) {
 
 TEST_F(RunControlTest, StepsOfAnUncontrolledRunBringNoReply) {
   EXPECT_EQ(control.stepped(1), std::nullopt);
-  ask(ACTION_PAUSE);  // during the wait for the answer to step 40: the step is completed
+  ask(ControlAction::ACTION_PAUSE);  // during the wait for the answer to step 40: the step is
+                                     // completed
   EXPECT_EQ(control.stepped(41), std::nullopt);
   EXPECT_TRUE(control.holds());
 }
 
 TEST_F(RunControlTest, WhileStepsAreCarriedOutOthersAndResumeAreRefused) {
-  ask(ACTION_PAUSE);
-  ask(ACTION_STEP, 10);
+  ask(ControlAction::ACTION_PAUSE);
+  ask(ControlAction::ACTION_STEP, 10);
   control.stepped(41);
   const std::string busy = "a step request is being carried out: 1 of 10 steps done";
-  expect_refused(ask(ACTION_STEP, 1), busy);
-  expect_refused(ask(ACTION_RESUME), busy);
-  expect_refused(control.request(bob.ask(ACTION_START), 41), busy);
+  expect_refused(ask(ControlAction::ACTION_STEP, 1), busy);
+  expect_refused(ask(ControlAction::ACTION_RESUME), busy);
+  expect_refused(control.request(bob.ask(ControlAction::ACTION_START), 41), busy);
   EXPECT_FALSE(control.holds());
 }
 
 TEST_F(RunControlTest, APauseEndsAStepRequestAfterTheStepInWork) {
-  ask(ACTION_PAUSE);
-  const SimControl steps = anna.ask(ACTION_STEP, 1000);
+  ask(ControlAction::ACTION_PAUSE);
+  const SimControl steps = anna.ask(ControlAction::ACTION_STEP, 1000);
   control.request(steps, 40);
   control.stepped(41);
-  expect_accepted(control.request(bob.ask(ACTION_PAUSE), 41), 41);
+  expect_accepted(control.request(bob.ask(ControlAction::ACTION_PAUSE), 41), 41);
   EXPECT_FALSE(control.holds()) << "the step that brings the reply is still to come";
-  expect_refused(control.request(bob.ask(ACTION_PAUSE), 41), "already paused");
+  expect_refused(control.request(bob.ask(ControlAction::ACTION_PAUSE), 41), "already paused");
   const auto reply = control.stepped(42);
   expect_refused(reply, "paused by bob@lab: 2 of 1000 steps done");
   EXPECT_EQ(reply->request_id(), steps.request_id());
@@ -142,36 +143,37 @@ TEST_F(RunControlTest, APauseEndsAStepRequestAfterTheStepInWork) {
 }
 
 TEST_F(RunControlTest, APauseDuringTheLastStepLeavesTheRequestFulfilled) {
-  ask(ACTION_PAUSE);
-  ask(ACTION_STEP, 1);
-  expect_accepted(control.request(bob.ask(ACTION_PAUSE), 40));
+  ask(ControlAction::ACTION_PAUSE);
+  ask(ControlAction::ACTION_STEP, 1);
+  expect_accepted(control.request(bob.ask(ControlAction::ACTION_PAUSE), 40));
   expect_accepted(control.stepped(41), 41);
 }
 
 TEST_F(RunControlTest, AnyNumberOfStepsMayBeAskedFor) {
-  ask(ACTION_PAUSE);
-  EXPECT_EQ(ask(ACTION_STEP, std::numeric_limits<std::uint64_t>::max()), std::nullopt);
+  ask(ControlAction::ACTION_PAUSE);
+  EXPECT_EQ(ask(ControlAction::ACTION_STEP, std::numeric_limits<std::uint64_t>::max()),
+            std::nullopt);
   EXPECT_FALSE(control.holds());
   EXPECT_EQ(control.stepped(41), std::nullopt);
 }
 
 TEST_F(RunControlTest, ResetAndStopAreAcceptedAtAnyTime) {
-  for (const auto action : {ACTION_RESET, ACTION_STOP})
+  for (const auto action : {ControlAction::ACTION_RESET, ControlAction::ACTION_STOP})
     for (const bool is_paused : {false, true}) {
       RunControl run(kRun, {kVehicle}, is_paused);
       expect_accepted(run.request(anna.ask(action), 40));
-      EXPECT_EQ(run.is_reset_requested(), action == ACTION_RESET);
-      EXPECT_EQ(run.is_stop_requested(), action == ACTION_STOP);
+      EXPECT_EQ(run.is_reset_requested(), action == ControlAction::ACTION_RESET);
+      EXPECT_EQ(run.is_stop_requested(), action == ControlAction::ACTION_STOP);
       EXPECT_EQ(run.is_paused(), is_paused) << "what the successor of a reset run begins with";
       EXPECT_TRUE(run.holds());
     }
 }
 
 TEST_F(RunControlTest, ARunThatCarriesOutStepsIsAPausedOneForItsSuccessor) {
-  ask(ACTION_PAUSE);
-  ask(ACTION_STEP, 10);
+  ask(ControlAction::ACTION_PAUSE);
+  ask(ControlAction::ACTION_STEP, 10);
   control.stepped(41);
-  expect_accepted(ask(ACTION_RESET));
+  expect_accepted(ask(ControlAction::ACTION_RESET));
   EXPECT_TRUE(control.is_paused());
   EXPECT_TRUE(control.holds());
   const auto open = control.end(41, "reset by anna@host");
@@ -180,27 +182,27 @@ TEST_F(RunControlTest, ARunThatCarriesOutStepsIsAPausedOneForItsSuccessor) {
 }
 
 TEST_F(RunControlTest, AnEndingRunAcceptsOnlyStopAndReset) {
-  ask(ACTION_RESET);
-  expect_refused(ask(ACTION_PAUSE), "the run is about to end: reset by anna@host");
-  expect_accepted(ask(ACTION_RESET));
-  expect_accepted(control.request(bob.ask(ACTION_STOP), 40));
-  expect_refused(ask(ACTION_RESET), "the run is about to end: stopped by bob@lab");
-  expect_accepted(ask(ACTION_STOP));
+  ask(ControlAction::ACTION_RESET);
+  expect_refused(ask(ControlAction::ACTION_PAUSE), "the run is about to end: reset by anna@host");
+  expect_accepted(ask(ControlAction::ACTION_RESET));
+  expect_accepted(control.request(bob.ask(ControlAction::ACTION_STOP), 40));
+  expect_refused(ask(ControlAction::ACTION_RESET), "the run is about to end: stopped by bob@lab");
+  expect_accepted(ask(ControlAction::ACTION_STOP));
 }
 
 TEST_F(RunControlTest, TheEndOfARunAnswersOpenRequestsAndRefusesLaterOnes) {
   EXPECT_TRUE(control.end(40, "mission finished").empty());
-  expect_refused(ask(ACTION_STOP), "the run has ended: mission finished");
+  expect_refused(ask(ControlAction::ACTION_STOP), "the run has ended: mission finished");
   EXPECT_TRUE(control.holds());
   EXPECT_FALSE(control.is_stop_requested());
 }
 
 TEST_F(RunControlTest, RequestsForAnotherRunOrVehicleAreRefusedByName) {
-  SimControl other_run = anna.ask(ACTION_STOP);
+  SimControl other_run = anna.ask(ControlAction::ACTION_STOP);
   other_run.run_id(kRun + 1);
   expect_refused(control.request(other_run, 40),
                  "run: expected 00c0ffee12345678, got 00c0ffee12345679");
-  SimControl other_vehicle = anna.ask(ACTION_STOP);
+  SimControl other_vehicle = anna.ask(ControlAction::ACTION_STOP);
   other_vehicle.vehicle_id(kVehicle + 1);
   const auto reply = control.request(other_vehicle, 40);
   expect_refused(reply, "vehicle: expected 3, got 4");
@@ -219,9 +221,9 @@ TEST_F(RunControlTest, AnUnknownActionIsRefused) {
 }
 
 TEST_F(RunControlTest, ARepeatedRequestIsAnsweredAgainAndActsOnce) {
-  const SimControl pause = anna.ask(ACTION_PAUSE);
+  const SimControl pause = anna.ask(ControlAction::ACTION_PAUSE);
   const auto first = control.request(pause, 40);
-  ask(ACTION_RESUME);
+  ask(ControlAction::ACTION_RESUME);
   const auto again = control.request(pause, 55);
   EXPECT_EQ(again, first);
   EXPECT_FALSE(control.is_paused());
@@ -233,8 +235,8 @@ TEST_F(RunControlTest, ARepeatedRequestIsAnsweredAgainAndActsOnce) {
 }
 
 TEST_F(RunControlTest, ARepeatedStepRequestStepsOnce) {
-  ask(ACTION_PAUSE);
-  const SimControl steps = anna.ask(ACTION_STEP, 2);
+  ask(ControlAction::ACTION_PAUSE);
+  const SimControl steps = anna.ask(ControlAction::ACTION_STEP, 2);
   EXPECT_EQ(control.request(steps, 40), std::nullopt);
   control.stepped(41);
   EXPECT_EQ(control.request(steps, 41), std::nullopt) << "its reply is still to come";
@@ -245,19 +247,20 @@ TEST_F(RunControlTest, ARepeatedStepRequestStepsOnce) {
 }
 
 TEST_F(RunControlTest, OnlyTheLastRepliesAreRemembered) {
-  const SimControl pause = anna.ask(ACTION_PAUSE);
+  const SimControl pause = anna.ask(ControlAction::ACTION_PAUSE);
   control.request(pause, 40);
-  for (std::size_t i = 0; i + 1 < RunControl::kRememberedReplies; ++i) ask(ACTION_PAUSE);
+  for (std::size_t i = 0; i + 1 < RunControl::kRememberedReplies; ++i)
+    ask(ControlAction::ACTION_PAUSE);
   expect_accepted(control.request(pause, 41));
-  ask(ACTION_PAUSE);
+  ask(ControlAction::ACTION_PAUSE);
   expect_refused(control.request(pause, 41), "already paused");
 }
 
 TEST_F(RunControlTest, AnOperatorsNameFitsOneLine) {
   Operator evil("eve\n\x1b[2J"), nameless("");
-  control.request(evil.ask(ACTION_PAUSE), 40);
+  control.request(evil.ask(ControlAction::ACTION_PAUSE), 40);
   EXPECT_EQ(control.last_event(), "paused by eve??[2J");
-  control.request(nameless.ask(ACTION_RESUME), 40);
+  control.request(nameless.ask(ControlAction::ACTION_RESUME), 40);
   EXPECT_EQ(control.last_event(), "resumed by an operator without a name");
 }
 
@@ -266,7 +269,7 @@ TEST_F(RunControlTest, OfAFleetAnyVehicleMayBeNamed) {
   SimControl request;
   request.run_id(kRun);
   request.request_id(1);
-  request.action(ACTION_PAUSE);
+  request.action(ControlAction::ACTION_PAUSE);
   request.vehicle_id(6);
   const auto accepted = fleet.request(request, 0);
   ASSERT_TRUE(accepted);

@@ -28,7 +28,7 @@ class VehicleFlightTest : public testing::Test {
     answer.client_name = "late";
     answer.command.f_Q_W_n({0.0, 0.0, -16.0 - 0.001 * static_cast<double>(step)});
     answer.command.reference().stage_index(7);
-    answer.command.mission(MISSION_RUNNING);
+    answer.command.mission(MissionPhase::MISSION_RUNNING);
     return answer;
   }
 
@@ -47,7 +47,7 @@ TEST_F(VehicleFlightTest, AnswersThatAreAllOnePeriodLateFlyItWithoutEnd) {
   fly(0, {});
   for (std::uint64_t step = 1; step < 4 * kHeldSteps; ++step) {
     fly(step, {step - 1});
-    ASSERT_EQ(applied().origin, FORCE_HELD) << step;
+    ASSERT_EQ(applied().origin, ForceOrigin::FORCE_HELD) << step;
     ASSERT_EQ(applied().answer_f_Q_W.z(), make_answer(step - 1).command.f_Q_W_n()[2]) << step;
     ASSERT_EQ(flight_.calc_age(), 1u) << step;
   }
@@ -59,12 +59,13 @@ TEST_F(VehicleFlightTest, OnlyANewerAnswerIsFresh) {
   fly(2, {1});
   for (std::uint64_t step = 3; step < 2 + kHeldSteps; ++step) {
     fly(step, {0, 1});  // answers it already has
-    ASSERT_EQ(applied().origin, FORCE_HELD) << step;
+    ASSERT_EQ(applied().origin, ForceOrigin::FORCE_HELD) << step;
   }
   fly(2 + kHeldSteps, {0, 1});
-  EXPECT_EQ(applied().origin, FORCE_FAIL_SAFE);
+  EXPECT_EQ(applied().origin, ForceOrigin::FORCE_FAIL_SAFE);
   fly(3 + kHeldSteps, {2});
-  EXPECT_EQ(applied().origin, FORCE_HELD) << "a newer one, however late, ends the fail-safe";
+  EXPECT_EQ(applied().origin, ForceOrigin::FORCE_HELD)
+      << "a newer one, however late, ends the fail-safe";
 }
 
 TEST_F(VehicleFlightTest, TheRecordSaysWhichAnswerIsInForce) {
@@ -76,7 +77,7 @@ TEST_F(VehicleFlightTest, TheRecordSaysWhichAnswerIsInForce) {
   ASSERT_EQ(flight_.gate.offer(make_answer(0), peer), Verdict::kAccepted);
   flight_.take_answer();
   flight_.fill_record(entry);
-  EXPECT_EQ(entry.kind(), ANSWER_ACCEPTED);
+  EXPECT_EQ(entry.kind(), AnswerKind::ANSWER_ACCEPTED);
   EXPECT_EQ(entry.step(), 0u);
   EXPECT_EQ(entry.answered_step(), 0u);
   EXPECT_STREQ(entry.client_name().c_str(), "late");
@@ -86,7 +87,7 @@ TEST_F(VehicleFlightTest, TheRecordSaysWhichAnswerIsInForce) {
   flight_.gate.expect(1);
   fly(1, {});
   flight_.fill_record(entry);
-  EXPECT_EQ(entry.kind(), ANSWER_HELD);
+  EXPECT_EQ(entry.kind(), AnswerKind::ANSWER_HELD);
   EXPECT_EQ(entry.step(), 1u);
   EXPECT_EQ(entry.answered_step(), 0u);
   EXPECT_EQ(entry.answer(), make_answer(0).command);
@@ -96,12 +97,12 @@ TEST_F(VehicleFlightTest, TheRecordSaysWhichAnswerIsInForce) {
   flight_.gate.expect(2);
   flight_.measure(2, {});
   flight_.fill_record(entry);
-  EXPECT_EQ(entry.kind(), ANSWER_NONE);
+  EXPECT_EQ(entry.kind(), AnswerKind::ANSWER_NONE);
   OfferedAnswer refused = make_answer(2);
-  refused.command.fault(FAULT_FREE_FALL);
+  refused.command.fault(FaultCode::FAULT_FREE_FALL);
   flight_.gate.offer(refused, peer);
   flight_.fill_record(entry);
-  EXPECT_EQ(entry.kind(), ANSWER_REFUSED);
+  EXPECT_EQ(entry.kind(), AnswerKind::ANSWER_REFUSED);
   EXPECT_EQ(entry.answered_step(), 2u);
   EXPECT_EQ(entry.answer(), refused.command);
 }
@@ -118,7 +119,7 @@ TEST_F(VehicleFlightTest, ALateEndIsWithdrawnByANewerAnswer) {
   const bus::PeerId peer{};
   flight_.gate.set_clients({{peer, "late", 0}});
   OfferedAnswer last = make_answer(0);
-  last.command.mission(MISSION_FINISHED);
+  last.command.mission(MissionPhase::MISSION_FINISHED);
   fly(0, {});
   EXPECT_FALSE(flight_.has_ended_late());
   flight_.gate.expect(1);

@@ -23,6 +23,8 @@
 #include <set>
 #include <string>
 
+#include "fastdds_files.hpp"
+
 namespace {
 
 constexpr int kSharedBit = 128;  // in `__kind` of a glibc mutex
@@ -71,7 +73,8 @@ bool is_moment(const pthread_mutex_t* lock) {
   static std::atomic<bool> is_over{false};
   if (++given_back <= count || is_over) return false;
   const std::string file = find_file(lock);
-  if (file.find("/fastrtps_port") == std::string::npos || is_read_here(file) != is_own_wanted)
+  if (file.find(std::string("/") + sls::bus::kSharedMemoryPrefix + "port") == std::string::npos ||
+      is_read_here(file) != is_own_wanted)
     return false;
   return is_over_messages(file, lock) == are_messages_wanted && !is_over.exchange(true);
 }

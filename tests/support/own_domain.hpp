@@ -11,6 +11,7 @@
 #include <string>
 #include <system_error>
 
+#include "fastdds_files.hpp"
 #include "tests/support/waiting.hpp"
 
 namespace sls::test {
@@ -59,7 +60,7 @@ inline OwnDomain::OwnDomain() {
 inline OwnDomain::~OwnDomain() {
   // The shared-memory ports of domain N, from 7400 + 250 N on, outlive processes that were killed.
   for (int port = 7400 + 250 * number_; port < 7400 + 250 * (number_ + 1); ++port) {
-    const std::string name = "fastrtps_port" + std::to_string(port);
+    const std::string name = std::string(bus::kSharedMemoryPrefix) + "port" + std::to_string(port);
     for (const std::string& file : {name, name + "_el", name + "_sl", "sem." + name + "_mutex"}) {
       std::error_code ignored;
       std::filesystem::remove("/dev/shm/" + file, ignored);

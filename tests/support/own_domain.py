@@ -28,7 +28,7 @@ class OwnDomain:
     def __exit__(self, *_):
         # The shared-memory ports of a domain outlive processes that were killed.
         for port in range(7400 + 250 * self.number, 7400 + 250 * (self.number + 1)):
-            name = f"fastrtps_port{port}"
-            for file in (name, f"{name}_el", f"{name}_sl", f"sem.{name}_mutex"):
-                pathlib.Path("/dev/shm", file).unlink(missing_ok=True)
+            for name in (f"fastrtps_port{port}", f"fastdds_port{port}"):  # of Fast DDS 2 and 3
+                for file in (name, f"{name}_el", f"{name}_sl", f"sem.{name}_mutex"):
+                    pathlib.Path("/dev/shm", file).unlink(missing_ok=True)
         self.lock.close()

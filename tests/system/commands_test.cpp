@@ -85,8 +85,8 @@ TEST(CommandsTest, ABadCommandIsCountedByItsCauseAndNeverDisturbsTheFlight) {
       command.vehicles()[0].f_Q_W_n({0.0, 0.0, -1e6});
       stranger.write(command);
       command = stranger.make_command(ahead);
-      command.vehicles()[0].fault(FAULT_FREE_FALL);
-      command.vehicles()[0].mission(MISSION_FAILED);
+      command.vehicles()[0].fault(FaultCode::FAULT_FREE_FALL);
+      command.vehicles()[0].mission(MissionPhase::MISSION_FAILED);
       stranger.write(command);
       command = stranger.make_command(ahead);
       command.run_id(command.run_id() + 1);

@@ -194,18 +194,18 @@ TEST_P(RefusalTest, ARefusedControllerBesideAKilledStandbyIsNamedWithItsForce) {
   Process server(make_command("sim_server", domain.number(),
                               {"--scenario", file, "--mode", GetParam().first}));
   Operator someone(domain.number());
-  ASSERT_EQ(someone.ask(ACTION_PAUSE), "") << server.output();
+  ASSERT_EQ(someone.ask(ControlAction::ACTION_PAUSE), "") << server.output();
   const auto make_client = [&](const char* name, const char* strength) {
     return make_command("control_client", domain.number(),
                         {"--scenario", file, "--name", name, "--strength", strength});
   };
   Process primary(make_client("primary", "2")), standby(make_client("standby", "1"));
-  ASSERT_TRUE(someone.wait_for(PHASE_PAUSED)) << server.output();
+  ASSERT_TRUE(someone.wait_for(RunPhase::PHASE_PAUSED)) << server.output();
   // Time for the clients to discover each other: if one dies during discovery, the other may
   // receive no samples.
   ASSERT_TRUE(someone.wait_for_statuses(2)) << server.output();
   standby.kill();
-  ASSERT_EQ(someone.ask(ACTION_RESUME), "") << server.output();
+  ASSERT_EQ(someone.ask(ControlAction::ACTION_RESUME), "") << server.output();
   EXPECT_EQ(server.wait(std::chrono::seconds(60)), 1) << server.output();
   // It ends after the wait or, if that is later, once the standby counts as gone.
   for (const char* words : {"error: controller 'primary' answered step ",

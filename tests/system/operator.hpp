@@ -55,7 +55,7 @@ class Operator {
   bus::Node node_;
   ctl::OperatorClient client_;
   mutable std::mutex mutex_;  // protects the two members below
-  RunPhase phase_ = PHASE_WAITING;
+  RunPhase phase_ = RunPhase::PHASE_WAITING;
   std::size_t samples_ = 0;
   bus::Reader<SimStatus> status_reader_;  // last: its handler uses the members above
 };

@@ -8,6 +8,8 @@
 #include <fstream>
 #include <sstream>
 
+#include "fastdds_files.hpp"
+
 namespace sls::test {
 
 Process::Process(const std::vector<std::string>& command) {
@@ -60,7 +62,7 @@ std::vector<std::filesystem::path> find_shared_memory(pid_t id) {
   namespace fs = std::filesystem;
   // Fast DDS holds a lock file NAME_el open for its own segment NAME. The ports are not
   // among them: other processes have them open, and the next process takes them over.
-  const std::string prefix = "/dev/shm/fastrtps_", suffix = "_el";
+  const std::string prefix = std::string("/dev/shm/") + bus::kSharedMemoryPrefix, suffix = "_el";
   std::vector<fs::path> own;
   for (const auto& descriptor : fs::directory_iterator("/proc/" + std::to_string(id) + "/fd")) {
     std::error_code gone;

@@ -59,7 +59,7 @@ class LateController {
     Participant message;
     message.run_id(run->parameters.run_id());
     message.contract_sha256(bus::kContractSha256);
-    message.role(ROLE_CONTROLLER);
+    message.role(ParticipantRole::ROLE_CONTROLLER);
     message.vehicle_ids({0});
     message.name("late");
     message.scenario_sha256(scenario_.sha256);
@@ -186,10 +186,11 @@ class PausedTest : public testing::Test {
     server_flags.insert(server_flags.begin(), {"--scenario", file});
     server_ = std::make_unique<Process>(make_command("sim_server", domain_.number(), server_flags));
     operator_ = std::make_unique<Operator>(domain_.number());
-    ASSERT_EQ(operator_->ask(ACTION_PAUSE), "") << server_->output();
+    ASSERT_EQ(operator_->ask(ControlAction::ACTION_PAUSE), "") << server_->output();
     client_ = std::make_unique<Process>(
         make_command("control_client", domain_.number(), {"--scenario", file}));
-    ASSERT_TRUE(operator_->wait_for(PHASE_PAUSED)) << server_->output() << client_->output();
+    ASSERT_TRUE(operator_->wait_for(RunPhase::PHASE_PAUSED))
+        << server_->output() << client_->output();
   }
 
   void stop_client() {
@@ -211,22 +212,22 @@ constexpr std::size_t kStatusesOf6s = 15;
 TEST_F(PausedTest, APauseInRealTimeIsNoAbsence) {
   start({{kTimeLimit, kGivesUpAfter4s}}, {"--mode", "realtime"});
   stop_client();
-  ASSERT_EQ(operator_->ask(ACTION_STEP, 1), "") << server_->output();
+  ASSERT_EQ(operator_->ask(ControlAction::ACTION_STEP, 1), "") << server_->output();
   ASSERT_TRUE(operator_->wait_for_statuses(kStatusesOf6s)) << server_->output();
-  ASSERT_EQ(operator_->ask(ACTION_STEP, 1), "") << server_->output();
+  ASSERT_EQ(operator_->ask(ControlAction::ACTION_STEP, 1), "") << server_->output();
   client_->send(SIGCONT);
-  EXPECT_EQ(operator_->ask(ACTION_RESUME), "") << server_->output();
+  EXPECT_EQ(operator_->ask(ControlAction::ACTION_RESUME), "") << server_->output();
   EXPECT_EQ(server_->wait(), 0) << server_->output();
 }
 
 TEST_F(PausedTest, APauseThatWaitsForTheStepInWorkIsNoAbsence) {
   start({{kTimeLimit, kGivesUpAfter4s}}, {});
   stop_client();
-  ASSERT_EQ(operator_->ask(ACTION_RESUME), "") << server_->output();
-  ASSERT_EQ(operator_->ask(ACTION_PAUSE), "") << server_->output();
+  ASSERT_EQ(operator_->ask(ControlAction::ACTION_RESUME), "") << server_->output();
+  ASSERT_EQ(operator_->ask(ControlAction::ACTION_PAUSE), "") << server_->output();
   ASSERT_TRUE(operator_->wait_for_statuses(kStatusesOf6s)) << server_->output();
   client_->send(SIGCONT);
-  EXPECT_EQ(operator_->ask(ACTION_RESUME), "") << server_->output();
+  EXPECT_EQ(operator_->ask(ControlAction::ACTION_RESUME), "") << server_->output();
   EXPECT_EQ(server_->wait(), 0) << server_->output();
 }
 
@@ -238,15 +239,15 @@ class LongPeriodTest : public PausedTest {
   }
   void expect_signs_of_life() {
     ASSERT_TRUE(operator_->wait_for_statuses(5)) << server_->output();
-    ASSERT_EQ(operator_->ask(ACTION_PAUSE), "") << server_->output();
-    ASSERT_EQ(operator_->ask(ACTION_RESUME), "") << server_->output();
+    ASSERT_EQ(operator_->ask(ControlAction::ACTION_PAUSE), "") << server_->output();
+    ASSERT_EQ(operator_->ask(ControlAction::ACTION_RESUME), "") << server_->output();
   }
 };
 
 TEST_F(LongPeriodTest, TheServerAnnouncesAndReceivesUntilTheNextStateIsDue) {
   start();
-  ASSERT_EQ(operator_->ask(ACTION_STEP, 1), "") << server_->output();
-  ASSERT_EQ(operator_->ask(ACTION_RESUME), "") << server_->output();
+  ASSERT_EQ(operator_->ask(ControlAction::ACTION_STEP, 1), "") << server_->output();
+  ASSERT_EQ(operator_->ask(ControlAction::ACTION_RESUME), "") << server_->output();
   expect_signs_of_life();
   server_->send(SIGTERM);
   EXPECT_EQ(server_->wait(std::chrono::seconds(60)), 143) << server_->output();
@@ -255,9 +256,9 @@ TEST_F(LongPeriodTest, TheServerAnnouncesAndReceivesUntilTheNextStateIsDue) {
 TEST_F(LongPeriodTest, TheServerAnnouncesAndReceivesWithoutAnswers) {
   start();
   stop_client();
-  ASSERT_EQ(operator_->ask(ACTION_RESUME), "") << server_->output();
+  ASSERT_EQ(operator_->ask(ControlAction::ACTION_RESUME), "") << server_->output();
   expect_signs_of_life();
-  EXPECT_EQ(operator_->ask(ACTION_STOP), "") << server_->output();
+  EXPECT_EQ(operator_->ask(ControlAction::ACTION_STOP), "") << server_->output();
   EXPECT_EQ(server_->wait(std::chrono::seconds(60)), 1) << server_->output();
   EXPECT_TRUE(holds(server_->output(), "stopped by ")) << server_->output();
 }

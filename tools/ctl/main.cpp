@@ -24,7 +24,7 @@ void request(ctl::OperatorClient& client, ControlAction action, std::uint64_t st
   const auto reply = client.ask(*run, action, steps);
   if (!reply) return;
   // The server may also have begun the steps and ended them early.
-  const char* outcome = action == ACTION_STEP ? "not carried out" : "refused";
+  const char* outcome = action == ControlAction::ACTION_STEP ? "not carried out" : "refused";
   if (!reply->accepted())
     throw app::RunError(fmt::format("{} {} at step {}: {}", ctl::to_string(action), outcome,
                                     reply->step(), reply->reason().c_str()));

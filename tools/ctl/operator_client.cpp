@@ -102,7 +102,7 @@ Snapshot OperatorClient::make_snapshot(const bus::Run& run) const {
     for (const Events& events : events_)
       if (events.run_id == run_id) snapshot.events.assign(events.lines.begin(), events.lines.end());
   }
-  for (const auto role : {ROLE_CONTROLLER, ROLE_RECORDER})
+  for (const auto role : {ParticipantRole::ROLE_CONTROLLER, ParticipantRole::ROLE_RECORDER})
     for (const auto& entry : participants_.find(role, run_id))
       snapshot.participants.push_back(entry.announcement);
   return snapshot;
@@ -145,7 +145,7 @@ std::optional<SimControlReply> OperatorClient::ask(const bus::Run& run, ControlA
   app::Wait wait(options_.timeout_s, kUsualWait);
   if (!wait_until_heard(run, wait)) return std::nullopt;
   channel_->request_writer.write(request);
-  const bool takes_its_time = action == ACTION_STEP;
+  const bool takes_its_time = action == ControlAction::ACTION_STEP;
   bus::ServerWatch server(servers_, run, options_.timeout_s);
   std::optional<Clock::time_point> give_up;  // once the run has ended
   while (app::stop_signal() == 0) {
@@ -190,7 +190,7 @@ bool OperatorClient::wait_until_heard(const bus::Run& run, app::Wait& wait) cons
 
 void OperatorClient::report_wait(const bus::Run& run, const SimControl& request,
                                  const app::Wait& wait) const {
-  if (request.action() != ACTION_STEP) {
+  if (request.action() != ControlAction::ACTION_STEP) {
     spdlog::info("waiting for: reply of the server ({:.0f} s left)", wait.seconds_left());
     return;
   }
@@ -210,17 +210,17 @@ std::string make_operator_name() {
 
 const char* to_string(ControlAction action) {
   switch (action) {
-    case ACTION_START:
+    case ControlAction::ACTION_START:
       return "start";
-    case ACTION_PAUSE:
+    case ControlAction::ACTION_PAUSE:
       return "pause";
-    case ACTION_STEP:
+    case ControlAction::ACTION_STEP:
       return "step";
-    case ACTION_RESUME:
+    case ControlAction::ACTION_RESUME:
       return "resume";
-    case ACTION_RESET:
+    case ControlAction::ACTION_RESET:
       return "reset";
-    case ACTION_STOP:
+    case ControlAction::ACTION_STOP:
       return "stop";
   }
   return "unknown";

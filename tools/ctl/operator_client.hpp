@@ -41,7 +41,7 @@ class OperatorClient {
   bus::Run refresh(const bus::Run& run) const;
 
   /// Requests `action` from the server of `run` and waits for its reply; requires `asks`.
-  /// ACTION_STEP has no timeout as long as the server publishes.
+  /// ControlAction::ACTION_STEP has no timeout as long as the server publishes.
   /// @throws app::RunError if no reply comes: server gone or not matched, run ended, timeout.
   std::optional<SimControlReply> ask(const bus::Run& run, ControlAction action,
                                      std::uint64_t steps = 0);

@@ -47,16 +47,18 @@ void add_options(CLI::App& cli, Options& options) {
     subcommand->callback([&options, action] { options.action = action; });
     return subcommand;
   };
-  add_action("pause", ACTION_PAUSE, "pause a running run after its current step");
-  add_action("step", ACTION_STEP, "run N steps of a paused run and wait until they are done")
+  add_action("pause", ControlAction::ACTION_PAUSE, "pause a running run after its current step");
+  add_action("step", ControlAction::ACTION_STEP,
+             "run N steps of a paused run and wait until they are done")
       ->add_option("N", options.steps, "control periods, at least 1")
       ->required()
       ->default_str("")
       ->check(check_steps);
-  add_action("resume", ACTION_RESUME, "continue a paused run");
-  add_action("start", ACTION_START, "start a run that is paused before its first step");
-  add_action("reset", ACTION_RESET, "restart from step 0 with a new run_id");
-  add_action("stop", ACTION_STOP, "end the run");
+  add_action("resume", ControlAction::ACTION_RESUME, "continue a paused run");
+  add_action("start", ControlAction::ACTION_START,
+             "start a run that is paused before its first step");
+  add_action("reset", ControlAction::ACTION_RESET, "restart from step 0 with a new run_id");
+  add_action("stop", ControlAction::ACTION_STOP, "end the run");
   auto* status = cli.add_subcommand("status", "print the status of the run");
   status->add_flag("--watch", options.watch, "repeat until the run has ended");
   status->add_flag("--json", options.json, "print one JSON object per line");

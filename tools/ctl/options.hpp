@@ -14,7 +14,7 @@ struct Options {
   std::uint32_t vehicle_id = 0;
   double timeout_s = 10.0;              ///< to find a server, and again for its reply
   std::optional<ControlAction> action;  ///< none: show the status
-  std::uint64_t steps = 0;              ///< of ACTION_STEP
+  std::uint64_t steps = 0;              ///< of ControlAction::ACTION_STEP
   bool watch = false;                   ///< show the status until the run has ended
   bool json = false;                    ///< print the status as JSON
 };

@@ -143,7 +143,7 @@ std::string describe_duration(std::uint64_t nanoseconds) {
 }
 
 std::string describe_wanted_factor(const Parameters& parameters) {
-  return parameters.mode() == MODE_REALTIME
+  return parameters.mode() == SyncMode::MODE_REALTIME
              ? fmt::format("target {}", parameters.real_time_factor())
              : "target none";
 }
@@ -217,11 +217,12 @@ using TableRow = std::array<std::string, kTableColumns>;
 std::vector<TableRow> make_table(const std::vector<Participant>& participants) {
   std::vector<TableRow> table = {{"role", "name", "host", "strength", "ready", "last step"}};
   for (const Participant& participant : participants)
-    table.push_back(
-        {bus::to_string(participant.role()), participant.name().to_string(),
-         participant.host().to_string(),
-         participant.role() == ROLE_CONTROLLER ? std::to_string(participant.strength()) : "-",
-         describe_readiness(participant), describe_last_step(participant)});
+    table.push_back({bus::to_string(participant.role()), participant.name().to_string(),
+                     participant.host().to_string(),
+                     participant.role() == ParticipantRole::ROLE_CONTROLLER
+                         ? std::to_string(participant.strength())
+                         : "-",
+                     describe_readiness(participant), describe_last_step(participant)});
   return table;
 }
 
@@ -263,7 +264,8 @@ void add_participants(std::vector<std::string>& lines, std::size_t columns,
 }  // namespace
 
 bool has_ended(const std::optional<SimStatus>& status) {
-  return status && (status->phase() == PHASE_FINISHED || status->phase() == PHASE_FAILED);
+  return status &&
+         (status->phase() == RunPhase::PHASE_FINISHED || status->phase() == RunPhase::PHASE_FAILED);
 }
 
 std::vector<std::string> render(const Snapshot& snapshot, std::size_t columns) {
@@ -347,7 +349,7 @@ std::string to_json(const Snapshot& snapshot) {
   json["server_is_gone"] = snapshot.server_is_gone;
   // Lockstep has no target.
   json["real_time_factor_wanted"] =
-      parameters.mode() == MODE_REALTIME ? Json(parameters.real_time_factor()) : Json();
+      parameters.mode() == SyncMode::MODE_REALTIME ? Json(parameters.real_time_factor()) : Json();
   if (snapshot.status) {
     const SimStatus& status = *snapshot.status;
     json["phase"] = bus::to_string(status.phase());

@@ -6,21 +6,22 @@
 #include <fastdds/dds/publisher/qos/PublisherQos.hpp>
 #include <fastdds/dds/subscriber/qos/DataReaderQos.hpp>
 #include <fastdds/dds/subscriber/qos/SubscriberQos.hpp>
-#include <fastdds/dds/topic/qos/TopicQos.hpp>
 
 #include "common/bus/fastdds/facts_of.hpp"
 #include "common/bus/topics.hpp"
+#include "fastdds_types.hpp"
 
 namespace sls::doctor {
 namespace {
 
 namespace dds = eprosima::fastdds::dds;
 
-template <class Qos>
-void fill(Endpoint& endpoint, const Qos& qos) {
-  bus::detail::fill(endpoint, qos.m_reliability, qos.m_durability, qos.m_deadline, qos.m_liveliness,
-                    qos.m_ownership);
-  endpoint.partitions = qos.m_partition.names();
+/// `group`: the QoS of the endpoint's publisher or subscriber.
+template <class Qos, class GroupQos>
+void fill(Endpoint& endpoint, const Qos& qos, const GroupQos& group) {
+  bus::detail::fill(endpoint, qos.reliability(), qos.durability(), qos.deadline(), qos.liveliness(),
+                    qos.ownership());
+  endpoint.partitions = group.partition().names();
 }
 
 /// Makes the endpoints of one topic after another.
@@ -34,8 +35,8 @@ class Maker {
     PubSubType type;
     Endpoint endpoint;
     endpoint.topic = bus::Topic<Message>::kName;
-    endpoint.type = type.getName();
-    endpoint.max_size = type.m_typeSize;
+    endpoint.type = bus::name_of(type);
+    endpoint.max_size = bus::max_size_of(type);
     const bus::Flow flow = bus::Topic<Message>::kFlow;
     add_writer(endpoint, bus::find_writer_profile(flow));
     add_reader(endpoint, flow == bus::Flow::kLoop     ? bus::kLoopReaderProfile
@@ -52,7 +53,7 @@ class Maker {
     endpoint.is_writer = true;
     endpoint.owner = std::string(profile) + " of " + file_;
     endpoint.participant.bytes[0] = 1;  // differs from the readers' participant
-    fill(endpoint, qos.get_writerqos(publisher_.get_qos(), dds::TopicQos()));
+    fill(endpoint, qos, publisher_.get_qos());
     made.push_back(std::move(endpoint));
   }
 
@@ -61,7 +62,7 @@ class Maker {
     subscriber_.get_datareader_qos_from_profile(profile, qos);
     endpoint.owner = std::string(profile) + " of " + file_;
     endpoint.max_size = 0;
-    fill(endpoint, qos.get_readerqos(subscriber_.get_qos()));
+    fill(endpoint, qos, subscriber_.get_qos());
     made.push_back(std::move(endpoint));
   }
 

@@ -1,7 +1,6 @@
 #include "tools/doctor/observer.hpp"
 
 #include <doctorPubSubTypes.h>
-#include <fastrtps/utils/IPLocator.h>
 #include <slsPubSubTypes.h>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
@@ -36,9 +35,9 @@
 namespace sls::doctor {
 namespace {
 
-namespace dds = eprosima::fastdds::dds;
-namespace rtps = eprosima::fastrtps::rtps;
-using eprosima::fastrtps::types::ReturnCode_t;
+namespace dds = bus::dds;
+namespace rtps = bus::rtps;
+using bus::is_ok;
 using Clock = std::chrono::steady_clock;
 
 constexpr const char* kDoctorTopic = "sls/doctor";
@@ -78,11 +77,9 @@ bus::PeerId to_peer(const dds::InstanceHandle_t& handle) {
   return to_peer(guid);
 }
 
-std::string find_property(const rtps::ParticipantProxyData& data, const char* name) {
-  auto& properties = const_cast<dds::ParameterPropertyList_t&>(data.m_properties);  // no const find
-  for (auto property = properties.begin(); property != properties.end(); ++property)
-    if (property->first() == name) return property->second();
-  return {};
+std::string find_property(const bus::ParticipantNews& news, const char* name) {
+  const auto property = news.properties.find(name);
+  return property == news.properties.end() ? "" : property->second;
 }
 
 }  // namespace
@@ -106,7 +103,7 @@ struct Observer::Impl : bus::ParticipantListener {
     using Listener::Listener;
     void on_data_available(dds::DataReader* reader) override {
       dds::SampleInfo info;
-      while (reader->take_next_sample(&buffer, &info) == ReturnCode_t::RETCODE_OK) {
+      while (is_ok(reader->take_next_sample(&buffer, &info))) {
         if (!info.valid_data) continue;
         const std::lock_guard lock(this->impl.mutex);
         this->impl.note_sample(*this, info);
@@ -119,7 +116,7 @@ struct Observer::Impl : bus::ParticipantListener {
     explicit Echo(Impl& observer) : impl(observer) {}
     void on_data_available(dds::DataReader* reader) override {
       dds::SampleInfo info;
-      while (reader->take_next_sample(&buffer, &info) == ReturnCode_t::RETCODE_OK) {
+      while (is_ok(reader->take_next_sample(&buffer, &info))) {
         if (!info.valid_data || buffer.payload().size() != buffer.size()) continue;
         const std::lock_guard lock(impl.mutex);
         if (!buffer.is_answer() && impl.options.is_answering)
@@ -133,7 +130,7 @@ struct Observer::Impl : bus::ParticipantListener {
   };
 
   Impl(const Options& wanted, dds::DomainParticipantQos qos)
-      : bus::ParticipantListener(is_secured(qos)), options(wanted) {
+      : bus::ParticipantListener({is_secured(qos)}), options(wanted) {
     const Ports ports = find_ports(qos, options.domain);
     qos.name(kDoctorName);
     if (!options.peer_address.empty()) add_peer(qos, ports, options.peer_address);
@@ -203,27 +200,25 @@ struct Observer::Impl : bus::ParticipantListener {
     if (!least || std::chrono::abs(delay) < std::chrono::abs(*least)) least = delay;
   }
 
-  void on_participant_discovery(dds::DomainParticipant* source,
-                                rtps::ParticipantDiscoveryInfo&& discovered) override {
-    const auto& data = discovered.info;
-    bus::ParticipantListener::on_participant_discovery(source, std::move(discovered));
+  void on_participant(const dds::DomainParticipant* source,
+                      const bus::ParticipantNews& news) override {
+    bus::ParticipantListener::on_participant(source, news);
     const std::lock_guard lock(mutex);  // `participant` may not be set yet: not used here
-    const bus::PeerId id = to_peer(data.m_guid);
-    if (discovered.status == rtps::ParticipantDiscoveryInfo::REMOVED_PARTICIPANT ||
-        discovered.status == rtps::ParticipantDiscoveryInfo::DROPPED_PARTICIPANT) {
+    const bus::PeerId id = to_peer(news.guid);
+    if (news.kind == bus::ParticipantNews::Kind::kGone) {
       programs.erase(id);
       return;
     }
     Program& program = programs[id];
     program.id = id;
-    program.name = data.m_participantName.to_string();
-    program.user = find_property(data, dds::parameter_policy_physical_data_user);
-    program.is_discovery_server = find_property(data, "PARTICIPANT_TYPE") == "SERVER";
-    program.is_on_this_host = data.m_guid.is_on_same_host_as(source->guid());
-    program.is_secured = !data.identity_token_.class_id().empty();
+    program.name = news.name;
+    program.user = find_property(news, dds::parameter_policy_physical_data_user);
+    program.is_discovery_server = find_property(news, "PARTICIPANT_TYPE") == "SERVER";
+    program.is_on_this_host = news.guid.is_on_same_host_as(source->guid());
+    program.is_secured = news.identity.has_value();
     program.udp_ports.clear();
     program.shared_memory_ports.clear();
-    for (const auto& locator : data.default_locators.unicast) {
+    for (const auto& locator : news.addresses) {
       if (locator.kind == LOCATOR_KIND_SHM) program.shared_memory_ports.push_back(locator.port);
       if (locator.kind != LOCATOR_KIND_UDPv4) continue;
       program.udp_ports.push_back(locator.port);
@@ -231,34 +226,18 @@ struct Observer::Impl : bus::ParticipantListener {
     }
   }
 
-  void onParticipantAuthentication(dds::DomainParticipant* source,
-                                   rtps::ParticipantAuthenticationInfo&& info) override {
+  void on_authentication(const rtps::GUID_t& other, bool is_accepted) override {
     const std::lock_guard lock(mutex);
-    if (info.status == rtps::ParticipantAuthenticationInfo::UNAUTHORIZED_PARTICIPANT)
-      rejected.insert(to_peer(info.guid));
-    bus::ParticipantListener::onParticipantAuthentication(source, std::move(info));
+    if (!is_accepted) rejected.insert(to_peer(other));
+    bus::ParticipantListener::on_authentication(other, is_accepted);
   }
 
-  void on_publisher_discovery(dds::DomainParticipant*,
-                              rtps::WriterDiscoveryInfo&& discovered) override {
-    note_endpoint(discovered.info, discovered.status == rtps::WriterDiscoveryInfo::REMOVED_WRITER,
-                  discovered.info.typeMaxSerialized());
-  }
-
-  void on_subscriber_discovery(dds::DomainParticipant*,
-                               rtps::ReaderDiscoveryInfo&& discovered) override {
-    note_endpoint(discovered.info, discovered.status == rtps::ReaderDiscoveryInfo::REMOVED_READER,
-                  0);
-  }
-
-  /// `size`: the largest sample in bytes, which only writers announce.
-  template <class Data>
-  void note_endpoint(const Data& data, bool is_gone, std::uint32_t size) {
+  void on_endpoint(const bus::EndpointNews& news) override {
     const std::lock_guard lock(mutex);
-    if (is_gone)
-      endpoints.erase(data.guid());
+    if (news.is_gone)
+      endpoints.erase(news.guid);
     else
-      endpoints[data.guid()] = {bus::make_facts(data), to_peer(data.guid()), {}, size};
+      endpoints[news.guid] = {news.facts, to_peer(news.guid), {}, news.max_size};
   }
 
   const Options options;
@@ -295,7 +274,7 @@ void Observer::ask() {
     probe.nonce(impl_->nonce);
     probe.size(size);
     probe.payload().resize(size);
-    impl_->writer->write(&probe);
+    bus::write_sample(*impl_->writer, &probe);
   }
 }
 
@@ -307,7 +286,7 @@ void Observer::answer() {
   }
   for (DoctorProbe& probe : questions) {
     probe.is_answer(true);
-    if (impl_->writer) impl_->writer->write(&probe);
+    if (impl_->writer) bus::write_sample(*impl_->writer, &probe);
   }
 }
 

@@ -1,24 +1,21 @@
 #include "tools/doctor/settings.hpp"
 
-#include <fastdds/rtps/attributes/PropertyPolicy.h>
-#include <fastdds/rtps/transport/UDPTransportDescriptor.h>
-#include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
-#include <fastrtps/utils/IPLocator.h>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 
 #include <algorithm>
 
 #include "common/bus/node.hpp"
 #include "common/bus/topics.hpp"
+#include "fastdds_api.hpp"
 #include "tools/doctor/participant_qos.hpp"
 
 namespace sls::doctor {
 namespace {
 
-namespace dds = eprosima::fastdds::dds;
-namespace rtps = eprosima::fastrtps::rtps;
-using eprosima::fastdds::rtps::SharedMemTransportDescriptor;
-using eprosima::fastdds::rtps::UDPTransportDescriptor;
+namespace dds = bus::dds;
+namespace rtps = bus::rtps;
+using rtps::SharedMemTransportDescriptor;
+using rtps::UDPTransportDescriptor;
 
 bool is_multicast(const rtps::Locator_t& locator) { return rtps::IPLocator::isMulticast(locator); }
 
@@ -76,10 +73,9 @@ Settings load_settings(const std::filesystem::path& qos_file, int domain,
   settings.uses_multicast =
       uses_default_multicast(qos) ||
       std::any_of(peers.begin(), peers.end(), [](const auto& peer) { return is_multicast(peer); });
-  for (const auto& server : builtin.discovery_config.m_DiscoveryServers)
-    for (const auto& locator : server.metatrafficUnicastLocatorList)
-      settings.discovery_servers.push_back(rtps::IPLocator::ip_to_string(locator) + ":" +
-                                           std::to_string(locator.port));
+  for (const auto& locator : bus::find_discovery_servers(qos))
+    settings.discovery_servers.push_back(rtps::IPLocator::ip_to_string(locator) + ":" +
+                                         std::to_string(locator.port));
   settings.is_secured = is_secured(qos);
   return settings;
 }

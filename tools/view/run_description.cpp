@@ -122,7 +122,7 @@ std::string describe_run(const Parameters& parameters) {
       config::parse_scenario(parameters.scenario_text().to_string(), "scenario of run " + run_id);
   Json stages = Json::array();
   for (const config::Stage& stage : scenario.mission) stages.push_back(stage.name);
-  const bool is_realtime = parameters.mode() == MODE_REALTIME;
+  const bool is_realtime = parameters.mode() == SyncMode::MODE_REALTIME;
   const Json run = {{"run_id", run_id},
                     {"scenario", scenario.name},
                     {"mode", bus::to_string(parameters.mode())},

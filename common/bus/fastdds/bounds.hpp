@@ -78,8 +78,7 @@ inline std::string find_excess(const Parameters& message) {
 /// True if `cdr` contains a string that is longer than `kMost` bytes and begins with `text`, the
 /// part of it that was kept. `is_swapped`: the lengths in `cdr` have the other byte order.
 template <std::size_t kMost>
-bool is_cut(const FixedString<kMost>& text, std::string_view cdr,
-            bool is_swapped) {
+bool is_cut(const FixedString<kMost>& text, std::string_view cdr, bool is_swapped) {
   if (text.size() < kMost) return false;
   for (auto at = cdr.find(text.c_str()); at != cdr.npos; at = cdr.find(text.c_str(), at + 1)) {
     if (at < sizeof(std::uint32_t)) continue;

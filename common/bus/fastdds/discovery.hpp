@@ -1,4 +1,5 @@
-/// What discovery tells of participants and endpoints, in the same form for each version of Fast DDS.
+/// What discovery tells of participants and endpoints, in the same form for each version of Fast
+/// DDS.
 #pragma once
 
 #include <cstdint>
@@ -11,6 +12,13 @@
 #include "fastdds_api.hpp"
 
 namespace sls::bus {
+
+/// Properties that our participants announce, because discovery does not tell them in each version:
+/// the version of Fast DDS; and of a secured participant, the subjects of its certificate and of
+/// its authority.
+inline constexpr const char* kVersionProperty = "sls.fastdds";
+inline constexpr const char* kCertificateProperty = "sls.certificate";
+inline constexpr const char* kAuthorityProperty = "sls.authority";
 
 /// A participant that was discovered, changed or left.
 struct ParticipantNews {
@@ -27,7 +35,7 @@ struct ParticipantNews {
     std::string certificate, authority;  ///< subjects, in RFC 2253 order; empty if not announced
   };
   std::optional<Identity> identity;
-  /// False if this version does not tell whether the participant has an identity.
+  /// False if nothing tells whether the participant has an identity.
   bool is_identity_known = true;
 };
 

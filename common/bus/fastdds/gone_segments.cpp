@@ -25,13 +25,17 @@
 #include <string>
 #include <string_view>
 
+#include "fastdds_files.hpp"
+
 namespace sls::bus {
 namespace {
 
-/// "/fastrtps_" and sixteen hexadecimal digits: a participant's segment.
+/// True for the name of a participant's segment: "/", the prefix and sixteen hexadecimal digits.
 bool is_segment(std::string_view name) {
-  constexpr std::string_view kPrefix = "/fastrtps_";
+  constexpr std::string_view kPrefix = kSharedMemoryPrefix;
   constexpr std::size_t kDigits = 16;
+  if (name.empty() || name.front() != '/') return false;
+  name.remove_prefix(1);
   return name.size() == kPrefix.size() + kDigits && name.substr(0, kPrefix.size()) == kPrefix &&
          name.find_first_not_of("0123456789abcdef", kPrefix.size()) == name.npos;
 }

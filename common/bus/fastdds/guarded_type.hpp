@@ -91,9 +91,8 @@ class GuardedType : public ReadType<Generated> {
     const auto& message = *static_cast<const typename Generated::type*>(data);
     std::string excess = find_excess(message);
     if (excess.empty())
-      excess =
-          find_cut_name(message, {reinterpret_cast<const char*>(payload.data), payload.length},
-                        cdr.endianness() != Cdr::DEFAULT_ENDIAN);
+      excess = find_cut_name(message, {reinterpret_cast<const char*>(payload.data), payload.length},
+                             cdr.endianness() != Cdr::DEFAULT_ENDIAN);
     return excess.empty() || refuse(payload, data, "expected at most " + excess);
   }
 

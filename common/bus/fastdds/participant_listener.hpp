@@ -1,5 +1,7 @@
 #pragma once
 
+#include <fastdds/dds/domain/DomainParticipant.hpp>
+
 #include <algorithm>
 #include <iterator>
 #include <set>
@@ -19,18 +21,20 @@ namespace sls::bus {
 /// have their own listeners. To be deleted with refusals.hpp and neighbours.hpp.
 class ParticipantListener : public DiscoveryListener {
  public:
-  /// `is_secured`: true if this participant uses DDS Security; `has_plain_submessages`: and if its
-  /// keys do not protect submessages, so that other vendors' readers get nothing (README.md, trap
-  /// 28).
-  explicit ParticipantListener(bool is_secured, Neighbours* neighbours = nullptr,
-                               DiscoveredParticipants* discovered = nullptr,
-                               bool has_plain_submessages = false)
-      : is_secured_(is_secured),
-        has_plain_submessages_(has_plain_submessages),
-        neighbours_(neighbours),
-        discovered_(discovered) {}
+  /// About the participant that this object listens to.
+  struct Own {
+    bool is_secured = false;
+    /// Its keys do not protect submessages, so that other vendors' readers get nothing (README.md,
+    /// trap 28).
+    bool has_plain_submessages = false;
+    bool has_shared_memory = false;
+  };
 
-  void on_participant(const dds::DomainParticipant*, const ParticipantNews& news) override {
+  explicit ParticipantListener(const Own& own, Neighbours* neighbours = nullptr,
+                               DiscoveredParticipants* discovered = nullptr)
+      : own_(own), neighbours_(neighbours), discovered_(discovered) {}
+
+  void on_participant(const dds::DomainParticipant* source, const ParticipantNews& news) override {
     const std::string guid = to_text(news.guid);
     const PeerId peer = to_peer(news.guid);
     auto& refusals = Refusals::of_process();
@@ -40,14 +44,16 @@ class ParticipantListener : public DiscoveryListener {
       return refusals.note_gone(guid);
     }
     if (neighbours_)
-      neighbours_->note_participant(peer, news.name, find_address(news), find_obstacle(news));
+      neighbours_->note_participant(peer, news.name, find_address(news),
+                                    find_obstacle(source, news));
     if (discovered_) discovered_->note(peer, news.name, find_discovery_ports(news));
     if (news.kind != ParticipantNews::Kind::kNew) return;
-    refusals.note_discovered(guid, describe(news),
-                             is_secured_ && news.identity ? describe_identity(*news.identity) : "");
-    if (is_secured_ && !news.identity && news.is_identity_known)
+    refusals.note_discovered(
+        guid, describe(news),
+        own_.is_secured && news.identity ? describe_identity(*news.identity) : "");
+    if (own_.is_secured && !news.identity && news.is_identity_known)
       refusals.note_refused(guid, "it has no identity (its QoS file is not config/qos/secure.xml)");
-    if (!is_secured_ && news.identity)
+    if (!own_.is_secured && news.identity)
       refusals.note_refused(guid, "it is secured, this is not (--qos config/qos/secure.xml)");
   }
 
@@ -85,11 +91,26 @@ class ParticipantListener : public DiscoveryListener {
   }
 
   /// Why it gets no samples of ours although both are authorised; empty if there is no reason.
-  std::string find_obstacle(const ParticipantNews& news) const {
-    return has_plain_submessages_ && news.vendor != rtps::c_VendorId_eProsima
-               ? "another vendor's DDS: expected keys of ./sls keys DIR --other-vendors, got keys "
-                 "without it"
-               : "";
+  std::string find_obstacle(const dds::DomainParticipant* source,
+                            const ParticipantNews& news) const {
+    if (own_.has_plain_submessages && news.vendor != rtps::c_VendorId_eProsima)
+      return "another vendor's DDS: expected keys of ./sls keys DIR --other-vendors, got keys "
+             "without it";
+    const auto version = news.properties.find(kVersionProperty);
+    if (!own_.has_shared_memory || version == news.properties.end() ||
+        find_major(version->second) == find_major(kMiddlewareVersion) ||
+        !source->guid().is_on_same_host_as(news.guid) ||
+        std::none_of(news.addresses.begin(), news.addresses.end(),
+                     [](const auto& locator) { return locator.kind == LOCATOR_KIND_SHM; }))
+      return "";
+    return "expected Fast DDS " + find_major(kMiddlewareVersion) +
+           " for shared memory on one machine, got " + config::to_printable(version->second, 20) +
+           " (--qos config/qos/udp.xml for both)";
+  }
+
+  /// "2" of "2.9.1".
+  static std::string find_major(const std::string& version) {
+    return config::to_printable(version.substr(0, version.find('.')), 20);
   }
 
   /// The first IPv4 address at which it receives discovery data; empty if it has none.
@@ -114,8 +135,7 @@ class ParticipantListener : public DiscoveryListener {
            config::to_printable(identity.authority, 80) + "'";
   }
 
-  const bool is_secured_;
-  const bool has_plain_submessages_;
+  const Own own_;
   Neighbours* const neighbours_;
   DiscoveredParticipants* const discovered_;
 };

@@ -26,10 +26,8 @@ struct SmallDatagrams : rtps::UDPv4TransportDescriptor {
 ///
 /// Upstream: none reported. To be deleted when XML can limit outgoing datagrams only.
 inline std::shared_ptr<rtps::TransportDescriptorInterface> send_small_datagrams(
-    const std::shared_ptr<rtps::TransportDescriptorInterface>& transport,
-    std::uint32_t bytes) {
-  const auto* udp =
-      dynamic_cast<const rtps::UDPv4TransportDescriptor*>(transport.get());
+    const std::shared_ptr<rtps::TransportDescriptorInterface>& transport, std::uint32_t bytes) {
+  const auto* udp = dynamic_cast<const rtps::UDPv4TransportDescriptor*>(transport.get());
   if (!udp) return transport;
   return std::make_shared<detail::SmallDatagrams>(*udp, bytes);
 }

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <system_error>
 
-#include "fastdds_api.hpp"
+#include "fastdds_files.hpp"
 
 namespace sls::bus {
 namespace {

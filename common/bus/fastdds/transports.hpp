@@ -13,15 +13,13 @@ namespace sls::bus {
 using TransportDescriptor = std::shared_ptr<rtps::TransportDescriptorInterface>;
 
 inline bool is_shared_memory(const TransportDescriptor& descriptor) {
-  return std::dynamic_pointer_cast<rtps::SharedMemTransportDescriptor>(
-             descriptor) != nullptr;
+  return std::dynamic_pointer_cast<rtps::SharedMemTransportDescriptor>(descriptor) != nullptr;
 }
 
 /// True if no packet leaves this machine: shared memory, and UDP on loopback addresses alone.
 inline bool is_local(const TransportDescriptor& descriptor) {
   if (is_shared_memory(descriptor)) return true;
-  const auto udp =
-      std::dynamic_pointer_cast<rtps::UDPv4TransportDescriptor>(descriptor);
+  const auto udp = std::dynamic_pointer_cast<rtps::UDPv4TransportDescriptor>(descriptor);
   if (!udp || udp->interfaceWhiteList.empty()) return false;
   const auto& addresses = udp->interfaceWhiteList;
   return std::all_of(addresses.begin(), addresses.end(),

@@ -1,5 +1,7 @@
 #include "recorder/sinks/mcap/entry_message.hpp"
 
+#include <slsPubSubTypes.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -7,12 +9,12 @@
 
 #include "common/bus/names.hpp"
 #include "fastcdr_api.hpp"
+#include "fastdds_types.hpp"
 
 namespace sls::record {
 namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-constexpr std::size_t kEncapsulationBytes = 4;
 
 /// The value that the number has when read from a CSV file.
 double as_in_file(double number) {
@@ -80,24 +82,24 @@ void fill(Reference& reference, const std::optional<ReferenceRow>& row) {
 }
 
 AnswerKind find_kind(const StepRows& rows) {
-  if (!rows.command) return rows.state ? ANSWER_NONE : ANSWER_LATE;
-  if (rows.command->fault == CommandRow::kHeld) return ANSWER_HELD;
-  if (rows.command->fault == CommandRow::kFailSafe) return ANSWER_FAIL_SAFE;
-  return ANSWER_ACCEPTED;
+  if (!rows.command) return rows.state ? AnswerKind::ANSWER_NONE : AnswerKind::ANSWER_LATE;
+  if (rows.command->fault == CommandRow::kHeld) return AnswerKind::ANSWER_HELD;
+  if (rows.command->fault == CommandRow::kFailSafe) return AnswerKind::ANSWER_FAIL_SAFE;
+  return AnswerKind::ANSWER_ACCEPTED;
 }
 
 FaultCode find_fault(const CommandRow& row) {
-  for (const FaultCode fault :
-       {FAULT_FREE_FALL, FAULT_ROD_LEVEL, FAULT_NOT_FINITE, FAULT_STAGE_TIMEOUT})
+  for (const FaultCode fault : {FaultCode::FAULT_FREE_FALL, FaultCode::FAULT_ROD_LEVEL,
+                                FaultCode::FAULT_NOT_FINITE, FaultCode::FAULT_STAGE_TIMEOUT})
     if (row.fault == bus::to_string(fault)) return fault;
-  return FAULT_NONE;
+  return FaultCode::FAULT_NONE;
 }
 
 void fill(RecordEntry& entry, const std::optional<CommandRow>& row) {
   ControlCommand& answer = entry.answer();
   if (!row) {
     answer.f_Q_W_n().fill(kNone);
-    answer.fault(FAULT_NONE);
+    answer.fault(FaultCode::FAULT_NONE);
     entry.client_name("");
     entry.answered_step(0);
     return;
@@ -111,7 +113,7 @@ void fill(RecordEntry& entry, const std::optional<CommandRow>& row) {
 }  // namespace
 
 EntryMessage::EntryMessage()
-    : bytes_(kEncapsulationBytes + RecordEntry::getMaxCdrSerializedSize()) {}
+    : bytes_(bus::max_size_of(RecordEntryPubSubType())) {}
 
 void EntryMessage::fill(const StepRows& rows) {
   entry_.vehicle_id(rows.vehicle_id);

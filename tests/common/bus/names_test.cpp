@@ -23,19 +23,22 @@ void expect_words(const std::vector<Enum>& values) {
 }
 
 TEST(NamesTest, EveryRunPhaseHasAWord) {
-  expect_words<RunPhase>(
-      {PHASE_WAITING, PHASE_RUNNING, PHASE_PAUSED, PHASE_FINISHED, PHASE_FAILED, PHASE_RESET});
+  expect_words<RunPhase>({RunPhase::PHASE_WAITING, RunPhase::PHASE_RUNNING, RunPhase::PHASE_PAUSED,
+                          RunPhase::PHASE_FINISHED, RunPhase::PHASE_FAILED, RunPhase::PHASE_RESET});
 }
 
 TEST(NamesTest, EveryFaultHasAWord) {
-  expect_words<FaultCode>(
-      {FAULT_NONE, FAULT_FREE_FALL, FAULT_ROD_LEVEL, FAULT_NOT_FINITE, FAULT_STAGE_TIMEOUT});
+  expect_words<FaultCode>({FaultCode::FAULT_NONE, FaultCode::FAULT_FREE_FALL,
+                           FaultCode::FAULT_ROD_LEVEL, FaultCode::FAULT_NOT_FINITE,
+                           FaultCode::FAULT_STAGE_TIMEOUT});
 }
 
-TEST(NamesTest, EveryModeHasAWord) { expect_words<SyncMode>({MODE_LOCKSTEP, MODE_REALTIME}); }
+TEST(NamesTest, EveryModeHasAWord) {
+  expect_words<SyncMode>({SyncMode::MODE_LOCKSTEP, SyncMode::MODE_REALTIME});
+}
 
 TEST(NamesTest, EveryRoleHasAWord) {
-  expect_words<ParticipantRole>({ROLE_CONTROLLER, ROLE_RECORDER});
+  expect_words<ParticipantRole>({ParticipantRole::ROLE_CONTROLLER, ParticipantRole::ROLE_RECORDER});
 }
 
 TEST(NamesTest, VectorsKeepTheirOrder) {

@@ -2,8 +2,6 @@
 // process: every test here uses the shipped default.
 #include "common/bus/node.hpp"
 
-#include <fastcdr/Cdr.h>
-#include <fastcdr/FastBuffer.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -16,6 +14,8 @@
 #include <vector>
 
 #include "common/config/config_error.hpp"
+#include "fastcdr_api.hpp"
+#include "fastdds_api.hpp"
 #include "tests/common/bus/sample_messages.hpp"
 #include "tests/support/own_domain.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -158,13 +158,12 @@ TEST(NodeTest, ALateJoinerGetsLatchedSamples) {
 /// CDR leaves undefined, are `padding`.
 template <class Message>
 std::vector<std::uint8_t> serialize(const Message& message, std::uint8_t padding = 0) {
-  using eprosima::fastcdr::Cdr;
   std::vector<std::uint8_t> bytes(4'000'000, padding);
   eprosima::fastcdr::FastBuffer buffer(reinterpret_cast<char*>(bytes.data()), bytes.size());
-  Cdr cdr(buffer, Cdr::DEFAULT_ENDIAN, Cdr::DDS_CDR);
+  Cdr cdr = make_cdr(buffer);
   cdr.serialize_encapsulation();
-  message.serialize(cdr);
-  bytes.resize(cdr.getSerializedDataLength());
+  write_message(message, cdr);
+  bytes.resize(count_bytes(cdr));
   return bytes;
 }
 
@@ -311,8 +310,8 @@ std::string find_error(const std::filesystem::path& file, int domain) {
 }
 
 TEST(NodeTest, NodesWithoutSharedMemoryJoinBesideThePortOfAKilledProcess) {
-  const std::string stale =
-      "/dev/shm/fastrtps_port" + std::to_string(7410 + 250 * own_domain()) + "_el";
+  const std::string stale = std::string("/dev/shm/") + kSharedMemoryPrefix + "port" +
+                            std::to_string(7410 + 250 * own_domain()) + "_el";
   std::ofstream(stale) << "";
   const Node first(kQosFile, own_domain(), "first", "", Transports::kNetwork);
   EXPECT_NO_THROW(Node(kQosFile, own_domain(), "second", "", Transports::kNetwork));
@@ -323,8 +322,8 @@ TEST(NodeTest, NodesWithoutSharedMemoryJoinBesideThePortOfAKilledProcess) {
 TEST(NodeTest, ANodeBesideThePortOfAKilledProcessSparesTheIdsOfItsProcess) {
   const sls::test::OwnDomain other;
   Node first(kQosFile, own_domain(), "first");
-  const std::string stale =
-      "/dev/shm/fastrtps_port" + std::to_string(7410 + 250 * other.number() + 20) + "_el";
+  const std::string stale = std::string("/dev/shm/") + kSharedMemoryPrefix + "port" +
+                            std::to_string(7410 + 250 * other.number() + 20) + "_el";
   std::ofstream(stale) << "";
   EXPECT_NO_THROW(Node(kQosFile, other.number(), "second"));
   std::filesystem::remove(stale);

@@ -61,7 +61,7 @@ TEST(ParticipantDirectoryTest, ReplacesTheNameOfDiscoveryByTheAnnouncedOne) {
   ASSERT_TRUE(wait_until([&] { return !directory.writers().empty(); }));
   node.note_problem(other.id(), "key", "is wrong");
   EXPECT_EQ(node.problems().describe(), "a participant without a name (127.0.0.1): is wrong");
-  writer.write(make_announcement(ROLE_CONTROLLER, 0, "pilot"));
+  writer.write(make_announcement(ParticipantRole::ROLE_CONTROLLER, 0, "pilot"));
   EXPECT_TRUE(wait_until([&] {
     return node.problems().describe() == "'pilot' (127.0.0.1): is wrong";
   })) << node.problems().describe();
@@ -75,31 +75,36 @@ TEST(ParticipantDirectoryTest, ListsTheParticipantsOfARunUntilTheyLeave) {
   {
     Node other(kQosFile, own_domain(), "other");
     Writer<Participant> writer(other);
-    writer.write(make_announcement(ROLE_CONTROLLER, 0, "pilot"));
-    writer.write(make_announcement(ROLE_CONTROLLER, kRun, "pilot"));  // replaces the first
-    ASSERT_TRUE(wait_until([&] { return directory.find(ROLE_CONTROLLER, kRun).size() == 1; }));
-    const auto entry = directory.find(ROLE_CONTROLLER, kRun).front();
+    writer.write(make_announcement(ParticipantRole::ROLE_CONTROLLER, 0, "pilot"));
+    writer.write(
+        make_announcement(ParticipantRole::ROLE_CONTROLLER, kRun, "pilot"));  // replaces the first
+    ASSERT_TRUE(wait_until(
+        [&] { return directory.find(ParticipantRole::ROLE_CONTROLLER, kRun).size() == 1; }));
+    const auto entry = directory.find(ParticipantRole::ROLE_CONTROLLER, kRun).front();
     EXPECT_EQ(entry.peer, other.id());
     EXPECT_STREQ(entry.announcement.name().c_str(), "pilot");
-    EXPECT_TRUE(directory.find(ROLE_RECORDER, kRun).empty());
-    EXPECT_TRUE(directory.find(ROLE_CONTROLLER, kRun + 1).empty());
+    EXPECT_TRUE(directory.find(ParticipantRole::ROLE_RECORDER, kRun).empty());
+    EXPECT_TRUE(directory.find(ParticipantRole::ROLE_CONTROLLER, kRun + 1).empty());
     EXPECT_NE(directory.version(), version);
     EXPECT_FALSE(entry.is_silent());
-    Participant done = make_announcement(ROLE_CONTROLLER, kRun, "pilot");
+    Participant done = make_announcement(ParticipantRole::ROLE_CONTROLLER, kRun, "pilot");
     done.done(true);
-    EXPECT_EQ(directory.count_done(ROLE_CONTROLLER, kRun), 0);
+    EXPECT_EQ(directory.count_done(ParticipantRole::ROLE_CONTROLLER, kRun), 0);
     writer.write(done);
-    EXPECT_TRUE(wait_until([&] { return directory.count_done(ROLE_CONTROLLER, kRun) == 1; }));
+    EXPECT_TRUE(wait_until(
+        [&] { return directory.count_done(ParticipantRole::ROLE_CONTROLLER, kRun) == 1; }));
   }
-  EXPECT_TRUE(wait_until([&] { return directory.find(ROLE_CONTROLLER, kRun).empty(); }));
-  EXPECT_EQ(directory.count_done(ROLE_CONTROLLER, kRun), 1) << "also after it has left";
+  EXPECT_TRUE(
+      wait_until([&] { return directory.find(ParticipantRole::ROLE_CONTROLLER, kRun).empty(); }));
+  EXPECT_EQ(directory.count_done(ParticipantRole::ROLE_CONTROLLER, kRun), 1)
+      << "also after it has left";
 }
 
 /// One participant that announces itself.
 class AnnouncementTest : public testing::Test {
  protected:
   std::optional<ParticipantDirectory::Entry> find() const {
-    const auto found = directory_.find(ROLE_CONTROLLER, kRun);
+    const auto found = directory_.find(ParticipantRole::ROLE_CONTROLLER, kRun);
     return found.empty() ? std::nullopt : std::optional(found.front());
   }
   /// Writes `message` and waits until the directory has heard it.
@@ -115,7 +120,7 @@ class AnnouncementTest : public testing::Test {
 
 TEST_F(AnnouncementTest, ARepeatedAnnouncementIsHeardButChangesNoVersion) {
   Writer<Participant> writer(other_);
-  Participant message = make_announcement(ROLE_CONTROLLER, kRun, "pilot");
+  Participant message = make_announcement(ParticipantRole::ROLE_CONTROLLER, kRun, "pilot");
   write(writer, message);
   const auto version = directory_.version();
   write(writer, message);
@@ -128,14 +133,14 @@ TEST_F(AnnouncementTest, ARepeatedAnnouncementIsHeardButChangesNoVersion) {
 TEST_F(AnnouncementTest, AnAnnouncerRepeatsItselfAndTheDirectoryNoticesThat) {
   Announcer announcer(other_);
   announcer.repeat_if_due();  // nothing to repeat
-  announcer.announce(make_announcement(ROLE_CONTROLLER, kRun, "pilot"));
+  announcer.announce(make_announcement(ParticipantRole::ROLE_CONTROLLER, kRun, "pilot"));
   ASSERT_TRUE(wait_until([&] { return find().has_value(); }));
   EXPECT_FALSE(find()->is_repeated);
   EXPECT_TRUE(wait_until([&] {
     announcer.repeat_if_due();
     return find()->is_repeated;
   }));
-  Participant ready = make_announcement(ROLE_CONTROLLER, kRun, "pilot");
+  Participant ready = make_announcement(ParticipantRole::ROLE_CONTROLLER, kRun, "pilot");
   ready.ready(true);
   announcer.announce(ready);
   ASSERT_TRUE(wait_until([&] { return find()->announcement.ready(); }));
@@ -144,7 +149,7 @@ TEST_F(AnnouncementTest, AnAnnouncerRepeatsItselfAndTheDirectoryNoticesThat) {
 
 TEST_F(AnnouncementTest, AFewAnnouncementsInABurstAreNoRepetition) {
   Writer<Participant> writer(other_);
-  const Participant message = make_announcement(ROLE_CONTROLLER, kRun, "pilot");
+  const Participant message = make_announcement(ParticipantRole::ROLE_CONTROLLER, kRun, "pilot");
   for (int i = 0; i < 5; ++i) writer.write(message);
   write(writer, message);
   EXPECT_FALSE(find()->is_repeated);
@@ -156,7 +161,7 @@ class RecorderPatienceTest : public testing::Test {
   /// that the recorder is done.
   void write_further_steps(std::chrono::steady_clock::duration time) {
     const auto end = std::chrono::steady_clock::now() + time;
-    Participant message = make_announcement(ROLE_RECORDER, kRun, "recorder");
+    Participant message = make_announcement(ParticipantRole::ROLE_RECORDER, kRun, "recorder");
     wait_until([&] {
       message.last_complete_step(message.last_complete_step() + 1);
       writer_.write(message);
@@ -168,7 +173,8 @@ class RecorderPatienceTest : public testing::Test {
   }
   /// Waits for the recorder with `patience`. @returns true if the recorder was done before.
   bool wait_for_recorder(const RecorderPatience& patience) {
-    EXPECT_TRUE(wait_until([&] { return directory_.find(ROLE_RECORDER, kRun).size() == 1; }));
+    EXPECT_TRUE(wait_until(
+        [&] { return directory_.find(ParticipantRole::ROLE_RECORDER, kRun).size() == 1; }));
     wait_for_recorders_to_end(directory_, kRun, 1, patience);
     const bool was_done = is_done_;
     has_given_up_ = true;
@@ -194,7 +200,7 @@ TEST_F(RecorderPatienceTest, ButNotForEver) {
 }
 
 TEST_F(RecorderPatienceTest, OneThatGetsNoFurtherIsNot) {
-  writer_.write(make_announcement(ROLE_RECORDER, kRun, "recorder"));
+  writer_.write(make_announcement(ParticipantRole::ROLE_RECORDER, kRun, "recorder"));
   EXPECT_FALSE(wait_for_recorder({0.5, 60}));
 }
 
@@ -270,7 +276,7 @@ TEST(ServerDirectoryTest, FindsTheRunToJoin) {
   ASSERT_TRUE(wait_until([&] { return knows(directory, kRun); }));
   EXPECT_EQ(directory.find_joinable(kVehicle), std::nullopt) << "the claim is not settled";
 
-  status.write(make_status(kRun, PHASE_WAITING));
+  status.write(make_status(kRun, RunPhase::PHASE_WAITING));
   ASSERT_TRUE(wait_until([&] { return directory.find_joinable(kVehicle).has_value(); }));
   EXPECT_EQ(directory.find_joinable(kVehicle)->parameters.run_id(), kRun);
   EXPECT_EQ(directory.find_joinable(kVehicle)->server, own_server.id());
@@ -283,23 +289,23 @@ TEST(ServerDirectoryTest, FindsTheRunToJoin) {
     Writer<Parameters> second_parameters(second_server);
     Writer<SimStatus> second_status(second_server);
     second_parameters.write(make_parameters(kLowerRun, {kVehicle}));
-    second_status.write(make_status(kLowerRun, PHASE_WAITING));
+    second_status.write(make_status(kLowerRun, RunPhase::PHASE_WAITING));
     // Both servers repeat their status: a server silent for 2 s cannot be joined.
     const auto is_chosen = [&](std::uint64_t run_id, RunPhase phase) {
       return wait_until([&] {
         status.write(make_status(kRun, phase));
-        second_status.write(make_status(kLowerRun, PHASE_WAITING));
+        second_status.write(make_status(kLowerRun, RunPhase::PHASE_WAITING));
         const auto run = directory.find_joinable(kVehicle);
         return run && run->parameters.run_id() == run_id;
       });
     };
-    EXPECT_TRUE(is_chosen(kLowerRun, PHASE_WAITING));
-    EXPECT_TRUE(is_chosen(kRun, PHASE_RUNNING));
-    EXPECT_TRUE(is_chosen(kLowerRun, PHASE_FINISHED));
+    EXPECT_TRUE(is_chosen(kLowerRun, RunPhase::PHASE_WAITING));
+    EXPECT_TRUE(is_chosen(kRun, RunPhase::PHASE_RUNNING));
+    EXPECT_TRUE(is_chosen(kLowerRun, RunPhase::PHASE_FINISHED));
   }
   EXPECT_TRUE(wait_until([&] { return !directory.find_joinable(kVehicle); }));
   ASSERT_TRUE(directory.find_status(kLowerRun)) << "also of a server that has gone";
-  EXPECT_EQ(directory.find_status(kLowerRun)->phase(), PHASE_WAITING);
+  EXPECT_EQ(directory.find_status(kLowerRun)->phase(), RunPhase::PHASE_WAITING);
   EXPECT_EQ(directory.find_status(kLowerRun + 1), std::nullopt);
 }
 
@@ -307,17 +313,17 @@ TEST(ServerDirectoryTest, OnlyTheFirstServerOfARunCounts) {
   Node node(kQosFile, own_domain(), "directory");
   std::atomic<int> forged{0};
   const ServerDirectory directory(node, [&](const SimStatus& status) {
-    if (status.run_id() == kRun && status.phase() == PHASE_FINISHED) ++forged;
+    if (status.run_id() == kRun && status.phase() == RunPhase::PHASE_FINISHED) ++forged;
   });
   const auto problem = [&] { return node.problems().describe(); };
   Node server(kQosFile, own_domain(), "server"), stranger(kQosFile, own_domain(), "stranger");
   Writer<Parameters> parameters(server), strangers_parameters(stranger);
   Writer<SimStatus> status(server), strangers_status(stranger);
   parameters.write(make_parameters(kRun, {kVehicle}));
-  status.write(make_status(kRun, PHASE_RUNNING));
+  status.write(make_status(kRun, RunPhase::PHASE_RUNNING));
   ASSERT_TRUE(wait_until([&] { return directory.find_status(kRun).has_value(); }));
 
-  strangers_status.write(make_status(kRun, PHASE_FINISHED));
+  strangers_status.write(make_status(kRun, RunPhase::PHASE_FINISHED));
   ASSERT_TRUE(wait_until([&] { return !problem().empty(); }));
   EXPECT_EQ(problem(),
             "'stranger' (127.0.0.1): sls/status run_id: expected that of a run of its own, got "
@@ -328,7 +334,7 @@ TEST(ServerDirectoryTest, OnlyTheFirstServerOfARunCounts) {
   strangers_parameters.write(make_parameters(kRun, {kVehicle}));
   ASSERT_TRUE(wait_until([&] { return !directory.may_fly(kLowerRun, kVehicle + 1); }));
   ASSERT_TRUE(wait_until([&] { return directory.runs().size() == 1; }));
-  EXPECT_EQ(directory.find_status(kRun)->phase(), PHASE_RUNNING);
+  EXPECT_EQ(directory.find_status(kRun)->phase(), RunPhase::PHASE_RUNNING);
   EXPECT_TRUE(directory.is_known(kRun));
   EXPECT_FALSE(directory.is_known(kRun + 1));
   EXPECT_EQ(directory.runs().front().server, server.id());
@@ -340,7 +346,7 @@ TEST(ServerDirectoryTest, AStatusThatComesBeforeTheClaimOfItsServerIsReportedOnc
   const ServerDirectory directory(node, [&](const SimStatus&) { ++statuses; });
   Node server(kQosFile, own_domain(), "server"), stranger(kQosFile, own_domain(), "stranger");
   Writer<SimStatus> strangers_status(stranger);
-  strangers_status.write(make_status(kRun, PHASE_FINISHED));
+  strangers_status.write(make_status(kRun, RunPhase::PHASE_FINISHED));
   ASSERT_TRUE(wait_until([&] { return statuses == 1; }));
   EXPECT_EQ(node.problems().describe(), "");
   Writer<Parameters> parameters(server);
@@ -396,15 +402,16 @@ TEST(ServerDirectoryTest, AfterManyResetsTheLastRunIsFoundWhicheverTopicComesFir
     };
     if (are_parameters_first) write_parameters();
     for (std::uint64_t i = 0; i < kRuns; ++i)
-      for (const RunPhase phase : {PHASE_WAITING, i + 1 < kRuns ? PHASE_RESET : PHASE_RUNNING})
+      for (const RunPhase phase : {RunPhase::PHASE_WAITING,
+                                   i + 1 < kRuns ? RunPhase::PHASE_RESET : RunPhase::PHASE_RUNNING})
         status.write(make_status(kRun + i, phase));
     ASSERT_TRUE(wait_until([&] { return last_status == last; }));
     if (!are_parameters_first) write_parameters();
     // A recorder reads from the last status of its run that the run was reset.
     ASSERT_TRUE(directory.find_status(last - 1));
-    EXPECT_EQ(directory.find_status(last - 1)->phase(), PHASE_RESET);
+    EXPECT_EQ(directory.find_status(last - 1)->phase(), RunPhase::PHASE_RESET);
     ASSERT_TRUE(wait_until([&] {
-      status.write(make_status(last, PHASE_RUNNING));
+      status.write(make_status(last, RunPhase::PHASE_RUNNING));
       return directory.find_joinable(kVehicle).has_value();
     }));
     EXPECT_EQ(directory.find_joinable(kVehicle)->parameters.run_id(), last);
@@ -419,7 +426,7 @@ TEST(ServerWatchTest, ASilentServerIsNotJoinedIsGivenUpAndMayComeBack) {
   Writer<SimStatus> status(server);
   parameters.write(make_parameters(kRun, {kVehicle}));
   const auto is_there = [&] {
-    status.write(make_status(kRun, PHASE_RUNNING));
+    status.write(make_status(kRun, RunPhase::PHASE_RUNNING));
     return directory.find_joinable(kVehicle).has_value();
   };
   ASSERT_TRUE(wait_until(is_there));
@@ -435,7 +442,7 @@ TEST(ServerWatchTest, ASilentServerIsNotJoinedIsGivenUpAndMayComeBack) {
 
   ASSERT_TRUE(wait_until(is_there));
   EXPECT_TRUE(wait_until([&] {
-    status.write(make_status(kRun, PHASE_RUNNING));
+    status.write(make_status(kRun, RunPhase::PHASE_RUNNING));
     return watch.look() == ServerWatch::Finding::kThere;
   }));
   // A watch that was stopped itself and so did not look for a while does not report the server.
@@ -456,21 +463,21 @@ TEST(ServerDirectoryTest, OnlyAServerThatComesAfterTheSilenceBeganIsASuccessor) 
   strangers_parameters.write(make_parameters(kLowerRun, {kVehicle}));
   auto joined = directory.find_joinable(kVehicle);
   ASSERT_TRUE(wait_until([&] {
-    status.write(make_status(kRun, PHASE_RUNNING));
-    strangers_status.write(make_status(kLowerRun, PHASE_WAITING));
+    status.write(make_status(kRun, RunPhase::PHASE_RUNNING));
+    strangers_status.write(make_status(kLowerRun, RunPhase::PHASE_WAITING));
     joined = directory.find_joinable(kVehicle);
     return joined && joined->server == server.id() && knows(directory, kLowerRun);
   }));
   const auto run = *joined;
   EXPECT_EQ(directory.find_successor(run, {kVehicle}), std::nullopt);
   // The server is heard once more: the stranger was there before the silence begins.
-  SimStatus last = make_status(kRun, PHASE_RUNNING);
+  SimStatus last = make_status(kRun, RunPhase::PHASE_RUNNING);
   last.sample_index(1);
   status.write(last);
   ASSERT_TRUE(wait_until([&] { return directory.find_status(kRun)->sample_index() == 1; }));
 
   ASSERT_TRUE(wait_until([&] {
-    strangers_status.write(make_status(kLowerRun, PHASE_WAITING));
+    strangers_status.write(make_status(kLowerRun, RunPhase::PHASE_WAITING));
     return directory.is_silent(kRun) && knows(directory, kLowerRun);
   }));
   EXPECT_EQ(directory.find_successor(run, {kVehicle}), std::nullopt);
@@ -481,8 +488,8 @@ TEST(ServerDirectoryTest, OnlyAServerThatComesAfterTheSilenceBeganIsASuccessor) 
   next_parameters.write(make_parameters(kRun + 1, {kVehicle}));
   const auto is_found = [&](std::uint64_t run_id) {
     return wait_until([&] {
-      strangers_status.write(make_status(kLowerRun, PHASE_WAITING));
-      next_status.write(make_status(kRun + 1, PHASE_WAITING));
+      strangers_status.write(make_status(kLowerRun, RunPhase::PHASE_WAITING));
+      next_status.write(make_status(kRun + 1, RunPhase::PHASE_WAITING));
       const auto next = directory.find_successor(run, {kVehicle});
       return next && next->parameters.run_id() == run_id;
     });
@@ -492,7 +499,7 @@ TEST(ServerDirectoryTest, OnlyAServerThatComesAfterTheSilenceBeganIsASuccessor) 
 
   // The run's own server may start another run at any time.
   parameters.write(make_parameters(kRun + 2, {kVehicle}));
-  status.write(make_status(kRun + 2, PHASE_RUNNING));
+  status.write(make_status(kRun + 2, RunPhase::PHASE_RUNNING));
   EXPECT_TRUE(is_found(kRun + 2));
 }
 
@@ -502,7 +509,7 @@ TEST(ServerDirectoryTest, AServerDoesNotMeetItself) {
   Writer<Parameters> parameters(node);
   Writer<SimStatus> status(node);
   parameters.write(make_parameters(kRun, {kVehicle}));
-  status.write(make_status(kRun, PHASE_RUNNING));
+  status.write(make_status(kRun, RunPhase::PHASE_RUNNING));
   ASSERT_TRUE(wait_until([&] { return directory.find_status(kRun).has_value(); }));
   ASSERT_TRUE(wait_until([&] { return directory.is_present(node.id()); }));
   EXPECT_FALSE(knows(directory, kRun));
@@ -511,11 +518,11 @@ TEST(ServerDirectoryTest, AServerDoesNotMeetItself) {
 
 TEST(ParticipantsTest, ARunningServerIsFurtherThanAWaitingOneAndAnEndedOneIsNoServer) {
   const auto progress = [](RunPhase phase) { return calc_progress(make_status(1, phase)); };
-  EXPECT_LT(calc_progress(std::nullopt), progress(PHASE_WAITING));
-  EXPECT_LT(progress(PHASE_WAITING), progress(PHASE_RUNNING));
-  EXPECT_EQ(progress(PHASE_RUNNING), progress(PHASE_PAUSED));
-  EXPECT_LT(progress(PHASE_FINISHED), 0);
-  EXPECT_LT(progress(PHASE_FAILED), 0);
+  EXPECT_LT(calc_progress(std::nullopt), progress(RunPhase::PHASE_WAITING));
+  EXPECT_LT(progress(RunPhase::PHASE_WAITING), progress(RunPhase::PHASE_RUNNING));
+  EXPECT_EQ(progress(RunPhase::PHASE_RUNNING), progress(RunPhase::PHASE_PAUSED));
+  EXPECT_LT(progress(RunPhase::PHASE_FINISHED), 0);
+  EXPECT_LT(progress(RunPhase::PHASE_FAILED), 0);
 }
 
 TEST(ParticipantsTest, AServerServesTheVehiclesItNames) {

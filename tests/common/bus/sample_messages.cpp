@@ -76,7 +76,7 @@ VehicleState make_vehicle_state(Values& values) {
   state.vehicle_id(values.small());
   state.measured(make_plant_state(values));
   state.f_Q_W_n(values.vector());
-  state.force_origin(FORCE_FAIL_SAFE);
+  state.force_origin(ForceOrigin::FORCE_FAIL_SAFE);
   state.controller_name(values.text(32));
   state.controller(make_controller_state(values));
   return state;
@@ -88,8 +88,8 @@ ControlCommand make_command(Values& values) {
   command.f_Q_W_n(values.vector());
   command.reference(make_reference(values));
   command.controller(make_controller_state(values));
-  command.mission(MISSION_FAILED);
-  command.fault(FAULT_STAGE_TIMEOUT);
+  command.mission(MissionPhase::MISSION_FAILED);
+  command.fault(FaultCode::FAULT_STAGE_TIMEOUT);
   command.compute_time_ns(values.count());
   return command;
 }
@@ -132,7 +132,7 @@ RecordBatch make_message(std::uint64_t seed) {
     RecordEntry& entry = message.entries().emplace_back();
     entry.vehicle_id(values.small());
     entry.step(values.count());
-    entry.kind(ANSWER_LATE);
+    entry.kind(AnswerKind::ANSWER_LATE);
     entry.truth(make_plant_state(values));
     entry.measured().push_back(make_plant_state(values));
     entry.f_Q_W_n(values.vector());
@@ -150,7 +150,7 @@ Participant make_message(std::uint64_t seed) {
   message.run_id(values.count());
   message.contract_sha256(values.text(64));
   for (int i = 0; i < 256; ++i) message.vehicle_ids().push_back(values.small());
-  message.role(ROLE_RECORDER);
+  message.role(ParticipantRole::ROLE_RECORDER);
   message.name(values.text(32));
   message.host(values.text(64));
   message.strength(std::numeric_limits<std::int32_t>::max());
@@ -190,7 +190,7 @@ Parameters make_message(std::uint64_t seed) {
   message.expected_recorders(values.small());
   message.period_ns(values.number());
   message.step_ns(values.number());
-  message.mode(MODE_REALTIME);
+  message.mode(SyncMode::MODE_REALTIME);
   message.real_time_factor(values.real());
   return message;
 }
@@ -202,7 +202,7 @@ SimStatus make_message(std::uint64_t seed) {
   message.run_id(values.count());
   message.vehicle_id(values.small());
   message.sample_index(values.count());
-  message.phase(PHASE_FAILED);
+  message.phase(RunPhase::PHASE_FAILED);
   message.reason(values.text(255));
   message.step(values.count());
   message.controller_name(values.text(32));

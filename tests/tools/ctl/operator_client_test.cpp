@@ -84,7 +84,7 @@ class FakeServer {
     status_writer_.write(status);
   }
 
-  std::atomic<RunPhase> phase{PHASE_RUNNING};
+  std::atomic<RunPhase> phase{RunPhase::PHASE_RUNNING};
   std::atomic<bool> is_silent{false};
   std::atomic<int> answered{0};
 
@@ -171,14 +171,14 @@ TEST_F(OperatorClientTest, ARequestReachesTheServerAndItsReplyComesBack) {
   });
   const auto run = client.wait_for_run();
   ASSERT_TRUE(run);
-  const auto reply = client.ask(*run, ACTION_STEP, 25);
+  const auto reply = client.ask(*run, ControlAction::ACTION_STEP, 25);
   ASSERT_TRUE(reply);
   EXPECT_TRUE(reply->accepted());
   EXPECT_GE(reply->step(), 100u);
   ASSERT_TRUE(wait_until([&] { return server.answered == 1; }));
   EXPECT_EQ(seen.run_id(), kRun);
   EXPECT_EQ(seen.vehicle_id(), kVehicle);
-  EXPECT_EQ(seen.action(), ACTION_STEP);
+  EXPECT_EQ(seen.action(), ControlAction::ACTION_STEP);
   EXPECT_EQ(seen.steps(), 25u);
   EXPECT_EQ(seen.operator_name().to_string(), make_operator_name());
 }
@@ -190,37 +190,38 @@ TEST_F(OperatorClientTest, ARefusalComesBackWithItsReason) {
     self.reply(of_another, true);
     self.reply(request, false, "already paused");
   });
-  const auto reply = client.ask(client.wait_for_run().value(), ACTION_PAUSE);
+  const auto reply = client.ask(client.wait_for_run().value(), ControlAction::ACTION_PAUSE);
   ASSERT_TRUE(reply);
   EXPECT_FALSE(reply->accepted());
   EXPECT_EQ(reply->reason().to_string(), "already paused");
 }
 
 TEST_F(OperatorClientTest, ARunThatEndsBeforeItsReplyIsReported) {
-  FakeServer server([](FakeServer& self, const SimControl&) { self.phase = PHASE_FAILED; });
+  FakeServer server(
+      [](FakeServer& self, const SimControl&) { self.phase = RunPhase::PHASE_FAILED; });
   const auto run = client.wait_for_run().value();
-  EXPECT_EQ(find_error([&] { client.ask(run, ACTION_STEP, 10); }),
+  EXPECT_EQ(find_error([&] { client.ask(run, ControlAction::ACTION_STEP, 10); }),
             "no reply to step: the run has ended: failed, as told");
 }
 
 TEST_F(ImpatientClientTest, AServerThatDoesNotReplyIsReported) {
   FakeServer server(kKeepSilent);
   const auto run = find_run();
-  const std::string error = find_error([&] { client.ask(run, ACTION_PAUSE); });
+  const std::string error = find_error([&] { client.ask(run, ControlAction::ACTION_PAUSE); });
   EXPECT_EQ(error.rfind("no reply to pause from the server of run ", 0), 0u) << error;
 }
 
 TEST_F(ImpatientClientTest, AServerThatTakesNoRequestsIsReported) {
   FakeServer server(kKeepSilent, false);
   const auto run = find_run();
-  const std::string error = find_error([&] { client.ask(run, ACTION_PAUSE); });
+  const std::string error = find_error([&] { client.ask(run, ControlAction::ACTION_PAUSE); });
   EXPECT_NE(error.find("takes no requests: expected it on sls/control"), error.npos) << error;
 }
 
 TEST_F(ImpatientClientTest, StepsEndWithAServerThatFallsSilent) {
   FakeServer server([](FakeServer& self, const SimControl&) { self.is_silent = true; });
   const auto run = find_run();
-  const std::string error = find_error([&] { client.ask(run, ACTION_STEP, 10); });
+  const std::string error = find_error([&] { client.ask(run, ControlAction::ACTION_STEP, 10); });
   EXPECT_EQ(error.rfind("no reply to step: server of run ", 0), 0u) << error;
   EXPECT_NE(error.find("silent for "), error.npos) << error;
 }
@@ -228,13 +229,13 @@ TEST_F(ImpatientClientTest, StepsEndWithAServerThatFallsSilent) {
 TEST_F(ImpatientClientTest, StepsMayTakeLongerThanTheTimeout) {
   FakeServer server([](FakeServer& self, const SimControl& request) {
     for (int i = 0; i < 100; ++i) {  // 2 s, twice the client's timeout
-      self.publish(PHASE_PAUSED, "stepping");
+      self.publish(RunPhase::PHASE_PAUSED, "stepping");
       std::this_thread::sleep_for(20ms);
     }
     self.reply(request, true);
   });
   const auto run = find_run();
-  const auto reply = client.ask(run, ACTION_STEP, 10);
+  const auto reply = client.ask(run, ControlAction::ACTION_STEP, 10);
   ASSERT_TRUE(reply);
   EXPECT_TRUE(reply->accepted());
 }
@@ -247,7 +248,7 @@ TEST_F(ImpatientClientTest, WithoutAServerDomainAndVehicleAreNamed) {
 
 TEST_F(OperatorClientTest, AnEndedRunTakesNoRequestsButHasAStatus) {
   FakeServer server(kAccept);
-  server.phase = PHASE_FINISHED;
+  server.phase = RunPhase::PHASE_FINISHED;
   ASSERT_TRUE(wait_until([&] {
     const auto run = client.wait_for_any_run();
     return run && has_ended(run->status);
@@ -268,7 +269,7 @@ TEST_F(OperatorClientTest, AWatchWithoutTerminalWritesLinesUntilTheRunHasEnded) 
     is_over = true;
   });
   EXPECT_TRUE(wait_until([&] { return client.wait_for_run().has_value(); }));
-  server.phase = PHASE_FINISHED;
+  server.phase = RunPhase::PHASE_FINISHED;
   EXPECT_TRUE(wait_until([&] { return is_over.load(); }));
   watching.join();
   const std::string text = out.str();
@@ -280,16 +281,16 @@ TEST_F(OperatorClientTest, AWatchWithoutTerminalWritesLinesUntilTheRunHasEnded) 
 TEST_F(OperatorClientTest, AWatchFollowsAResetToItsSuccessor) {
   FakeServer server(kAccept);
   bus::Run run = client.wait_for_run().value();
-  server.phase = PHASE_RESET;
+  server.phase = RunPhase::PHASE_RESET;
   ASSERT_TRUE(wait_until([&] {
     run = client.refresh(run);
-    return run.status->phase() == PHASE_RESET;
+    return run.status->phase() == RunPhase::PHASE_RESET;
   }));
   server.begin_run(kRun + 1);
-  server.phase = PHASE_PAUSED;
+  server.phase = RunPhase::PHASE_PAUSED;
   EXPECT_TRUE(wait_until([&] {
     run = client.refresh(run);
-    return run.parameters.run_id() == kRun + 1 && run.status->phase() == PHASE_PAUSED;
+    return run.parameters.run_id() == kRun + 1 && run.status->phase() == RunPhase::PHASE_PAUSED;
   }));
 }
 
@@ -299,7 +300,7 @@ TEST_F(OperatorClientTest, ASnapshotHoldsThePartiesOfTheRunAndTheServersSilence)
   bus::Writer<Participant> writer(node);
   Participant participant;
   participant.run_id(kRun);
-  participant.role(ROLE_RECORDER);
+  participant.role(ParticipantRole::ROLE_RECORDER);
   participant.name("tape");
   writer.write(participant);
   ASSERT_TRUE(wait_until([&] { return client.make_snapshot(run).participants.size() == 1; }));

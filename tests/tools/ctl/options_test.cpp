@@ -25,13 +25,13 @@ std::string find_error(const std::string& command_line) {
 }
 
 TEST(OperatorOptionsTest, EverySubcommandIsAnAction) {
-  EXPECT_EQ(parse("pause").action, ACTION_PAUSE);
-  EXPECT_EQ(parse("resume").action, ACTION_RESUME);
-  EXPECT_EQ(parse("start").action, ACTION_START);
-  EXPECT_EQ(parse("reset").action, ACTION_RESET);
-  EXPECT_EQ(parse("stop").action, ACTION_STOP);
+  EXPECT_EQ(parse("pause").action, ControlAction::ACTION_PAUSE);
+  EXPECT_EQ(parse("resume").action, ControlAction::ACTION_RESUME);
+  EXPECT_EQ(parse("start").action, ControlAction::ACTION_START);
+  EXPECT_EQ(parse("reset").action, ControlAction::ACTION_RESET);
+  EXPECT_EQ(parse("stop").action, ControlAction::ACTION_STOP);
   const Options step = parse("step 25");
-  EXPECT_EQ(step.action, ACTION_STEP);
+  EXPECT_EQ(step.action, ControlAction::ACTION_STEP);
   EXPECT_EQ(step.steps, 25u);
 }
 

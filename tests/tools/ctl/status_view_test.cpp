@@ -28,9 +28,9 @@ Snapshot make_snapshot() {
   parameters.run_id(0x00c0ffee12345678);
   parameters.scenario_text("vehicle: { quad_mass_kg: 1.5 }\nname: figure_eight  # the eight\n");
   parameters.period_ns(4'000'000);
-  parameters.mode(MODE_LOCKSTEP);
+  parameters.mode(SyncMode::MODE_LOCKSTEP);
   SimStatus& status = snapshot.status.emplace();
-  status.phase(PHASE_PAUSED);
+  status.phase(RunPhase::PHASE_PAUSED);
   status.reason("paused by anna@ground");
   status.step(12345);
   status.real_time_factor(12.345);
@@ -39,8 +39,8 @@ Snapshot make_snapshot() {
   status.timing("exact");
   status.counters().resent(3);
   status.counters().duplicate(2);
-  snapshot.participants = {make_participant(ROLE_CONTROLLER, "pilot", "ground"),
-                           make_participant(ROLE_RECORDER, "tape", "shelf")};
+  snapshot.participants = {make_participant(ParticipantRole::ROLE_CONTROLLER, "pilot", "ground"),
+                           make_participant(ParticipantRole::ROLE_RECORDER, "tape", "shelf")};
   snapshot.participants[0].strength(-5);
   snapshot.participants[1].ready(false);
   snapshot.participants[1].last_complete_step(-1);
@@ -106,7 +106,7 @@ TEST(StatusViewTest, EveryCounterIsShown) {
 
 TEST(StatusViewTest, InRealTimeTheWantedFactorIsShown) {
   Snapshot snapshot = make_snapshot();
-  snapshot.parameters.mode(MODE_REALTIME);
+  snapshot.parameters.mode(SyncMode::MODE_REALTIME);
   snapshot.parameters.real_time_factor(0.5);
   snapshot.status->real_time_factor(0.4987);
   EXPECT_TRUE(contains(join(render(snapshot, 80)), "real-time factor 0.499   target 0.5"));
@@ -121,7 +121,7 @@ TEST(StatusViewTest, ASilentServerIsNamedUntilTheRunHasEnded) {
   EXPECT_TRUE(contains(render_line(snapshot), "server silent for 2.3 s"));
   snapshot.server_is_gone = true;
   EXPECT_TRUE(contains(join(render(snapshot, 80)), "server gone, silent for 2.3 s\n"));
-  for (const auto phase : {PHASE_FINISHED, PHASE_FAILED}) {
+  for (const auto phase : {RunPhase::PHASE_FINISHED, RunPhase::PHASE_FAILED}) {
     snapshot.status->phase(phase);
     EXPECT_FALSE(contains(join(render(snapshot, 80)), "silent"));
   }
@@ -129,11 +129,12 @@ TEST(StatusViewTest, ASilentServerIsNamedUntilTheRunHasEnded) {
 
 TEST(StatusViewTest, OnlyFinishedAndFailedRunsHaveEnded) {
   Snapshot snapshot = make_snapshot();
-  for (const auto phase : {PHASE_WAITING, PHASE_RUNNING, PHASE_PAUSED, PHASE_RESET}) {
+  for (const auto phase : {RunPhase::PHASE_WAITING, RunPhase::PHASE_RUNNING, RunPhase::PHASE_PAUSED,
+                           RunPhase::PHASE_RESET}) {
     snapshot.status->phase(phase);
     EXPECT_FALSE(has_ended(snapshot.status));
   }
-  for (const auto phase : {PHASE_FINISHED, PHASE_FAILED}) {
+  for (const auto phase : {RunPhase::PHASE_FINISHED, RunPhase::PHASE_FAILED}) {
     snapshot.status->phase(phase);
     EXPECT_TRUE(has_ended(snapshot.status));
   }
@@ -175,8 +176,8 @@ TEST(StatusViewTest, EventsAreShownBeyondTheirStatusButNotTwice) {
 
 TEST(StatusViewTest, LongNamesAreShortenedToTheTerminalsWidth) {
   Snapshot snapshot = make_snapshot();
-  snapshot.participants[0] =
-      make_participant(ROLE_CONTROLLER, std::string(32, 'n'), std::string(64, 'h'));
+  snapshot.participants[0] = make_participant(ParticipantRole::ROLE_CONTROLLER,
+                                              std::string(32, 'n'), std::string(64, 'h'));
   const auto lines = render(snapshot, 80);
   EXPECT_EQ(lines[lines.size() - 2],
             "controller  nnnnnnnnnnnnnnnnnn…  hhhhhhhhhhhhhhhhhh…  0         yes    12344");
@@ -188,8 +189,8 @@ TEST(StatusViewTest, NoLineIsLongerThanTheTerminalIsWide) {
   snapshot.status->reason(std::string(200, 'r'));
   snapshot.status->timing("degraded: überlastet, " + std::string(100, 't'));
   snapshot.silence_s = 12345.6;
-  snapshot.participants[0] =
-      make_participant(ROLE_CONTROLLER, std::string(32, 'n'), std::string(64, 'h'));
+  snapshot.participants[0] = make_participant(ParticipantRole::ROLE_CONTROLLER,
+                                              std::string(32, 'n'), std::string(64, 'h'));
   snapshot.participants[0].strength(std::numeric_limits<std::int32_t>::min());
   snapshot.participants[0].last_complete_step(std::numeric_limits<std::int64_t>::max());
   for (std::size_t columns = 0; columns <= 200; ++columns)

@@ -5,6 +5,7 @@
 #include <sys/file.h>
 #include <unistd.h>
 
+#include "fastdds_files.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace sls::doctor {
@@ -19,8 +20,9 @@ TEST(SharedMemoryTest, AFolderThatIsMissingIsNotThere) {
 
 TEST(SharedMemoryTest, StaleSegmentsAreCountedAndStay) {
   const TemporaryFolder folder;
-  const auto lock = folder / "fastrtps_0123456789abcdef_el";
-  test::write_bytes(folder / "fastrtps_0123456789abcdef", std::string(100'000, 'x'));
+  const auto lock = folder / (bus::kSharedMemoryPrefix + std::string("0123456789abcdef_el"));
+  test::write_bytes(folder / (bus::kSharedMemoryPrefix + std::string("0123456789abcdef")),
+                    std::string(100'000, 'x'));
   test::write_bytes(lock, "");
   EXPECT_EQ(survey_shared_memory(folder.path()).stale_segments, 0) << "it may be starting";
   std::filesystem::last_write_time(
@@ -35,11 +37,14 @@ TEST(SharedMemoryTest, StaleSegmentsAreCountedAndStay) {
 
 TEST(SharedMemoryTest, OnlyPortsWithAHolderAreRead) {
   const TemporaryFolder folder;
-  for (const char* name : {"fastrtps_port7411", "fastrtps_port7413"}) {
+  for (const char* name : {(bus::kSharedMemoryPrefix + std::string("port7411")),
+                           (bus::kSharedMemoryPrefix + std::string("port7413"))}) {
     test::write_bytes(folder / name, "");
     test::write_bytes(folder / (std::string(name) + "_el"), "");
   }
-  const int held = ::open((folder / "fastrtps_port7413_el").c_str(), O_RDONLY | O_CLOEXEC);
+  const int held =
+      ::open((folder / (bus::kSharedMemoryPrefix + std::string("port7413_el"))).c_str(),
+             O_RDONLY | O_CLOEXEC);
   ASSERT_EQ(::flock(held, LOCK_EX), 0);
   EXPECT_EQ(survey_shared_memory(folder.path()).read_ports, std::vector<std::uint32_t>{7413});
   ::close(held);

@@ -13,10 +13,10 @@ constexpr auto kSpacing = std::chrono::milliseconds(10);
 constexpr std::int64_t kMostAtOnce = 4;
 
 /// Entries that hold a state; late answers come without one.
-bool has_state(const RecordEntry& entry) { return entry.kind() != ANSWER_LATE; }
+bool has_state(const RecordEntry& entry) { return entry.kind() != AnswerKind::ANSWER_LATE; }
 
 /// Only an accepted answer has the desired position of the load at the entry's step.
-bool has_reference(const RecordEntry& entry) { return entry.kind() == ANSWER_ACCEPTED; }
+bool has_reference(const RecordEntry& entry) { return entry.kind() == AnswerKind::ANSWER_ACCEPTED; }
 
 }  // namespace
 

@@ -9,12 +9,12 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::array<Service, 6> kServices = {{{1, "/sls/start", ACTION_START},
-                                               {2, "/sls/pause", ACTION_PAUSE},
-                                               {3, "/sls/step", ACTION_STEP},
-                                               {4, "/sls/resume", ACTION_RESUME},
-                                               {5, "/sls/reset", ACTION_RESET},
-                                               {6, "/sls/stop", ACTION_STOP}}};
+constexpr std::array<Service, 6> kServices = {{{1, "/sls/start", ControlAction::ACTION_START},
+                                               {2, "/sls/pause", ControlAction::ACTION_PAUSE},
+                                               {3, "/sls/step", ControlAction::ACTION_STEP},
+                                               {4, "/sls/resume", ControlAction::ACTION_RESUME},
+                                               {5, "/sls/reset", ControlAction::ACTION_RESET},
+                                               {6, "/sls/stop", ControlAction::ACTION_STOP}}};
 
 std::string dump(const Json& json) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
@@ -31,7 +31,7 @@ Json make_part(const std::string& schema_name, const Json& properties) {
 Json make_service(const Service& service) {
   const std::string type = std::string("sls/") + (service.name + sizeof("/sls/") - 1);
   Json request = Json::object();
-  if (service.action == ACTION_STEP)
+  if (service.action == ControlAction::ACTION_STEP)
     request["steps"] = {{"type", "integer"}, {"minimum", 1}, {"default", 1}};
   const Json response = {{"accepted", {{"type", "boolean"}}},
                          {"reason", {{"type", "string"}}},
@@ -60,7 +60,7 @@ Payload make_advertise_services() {
 
 std::variant<std::uint64_t, Malformed> parse_request(const Service& service,
                                                      const std::string& text) {
-  const bool has_steps = service.action == ACTION_STEP;
+  const bool has_steps = service.action == ControlAction::ACTION_STEP;
   const Json json = text.empty() ? Json::object() : Json::parse(text, nullptr, false);
   if (!json.is_object())
     return Malformed{std::string(service.name) + ": expected a JSON object, got " + quote(text)};

@@ -175,7 +175,7 @@ struct Feed::Impl {
 
   void look() {
     auto found = watch.look();
-    const bool is_lockstep = found && found->run.parameters.mode() == MODE_LOCKSTEP;
+    const bool is_lockstep = found && found->run.parameters.mode() == SyncMode::MODE_LOCKSTEP;
     queue.set_period(is_lockstep ? Clock::duration(kLockstepPeriod)
                                  : Clock::duration(SampleQueue::kPeriod));
     auto events = watch.take_events();
@@ -249,7 +249,7 @@ struct Feed::Impl {
   void update_rests() {
     const bool is_any_wanted =
         std::any_of(wanted.begin(), wanted.end(), [](int count) { return count > 0; });
-    may_rest = !is_any_wanted && view && view->run.parameters.mode() == MODE_LOCKSTEP;
+    may_rest = !is_any_wanted && view && view->run.parameters.mode() == SyncMode::MODE_LOCKSTEP;
   }
 
   void update_reader(TopicId topic) {

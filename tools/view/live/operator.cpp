@@ -26,7 +26,8 @@ constexpr double kTimeout = 5;  // s, to find a run and again for its reply
 
 std::optional<ControlAction> find_action(std::string_view word) {
   for (const ControlAction action :
-       {ACTION_START, ACTION_PAUSE, ACTION_STEP, ACTION_RESUME, ACTION_RESET, ACTION_STOP})
+       {ControlAction::ACTION_START, ControlAction::ACTION_PAUSE, ControlAction::ACTION_STEP,
+        ControlAction::ACTION_RESUME, ControlAction::ACTION_RESET, ControlAction::ACTION_STOP})
     if (word == ctl::to_string(action)) return action;
   return std::nullopt;
 }

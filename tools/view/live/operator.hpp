@@ -40,7 +40,7 @@ class Operator {
 /// False if the keys of a secured domain do not allow `node` to operate.
 bool may_write_requests(bus::Node& node);
 
-/// "pause" → ACTION_PAUSE; nothing for any other word.
+/// "pause" → ControlAction::ACTION_PAUSE; nothing for any other word.
 std::optional<ControlAction> find_action(std::string_view word);
 
 }  // namespace sls::view

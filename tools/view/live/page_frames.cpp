@@ -8,6 +8,7 @@
 #include <optional>
 #include <regex>
 
+#include "common/bus/names.hpp"
 #include "common/bus/node.hpp"
 #include "tools/view/run_description.hpp"
 
@@ -31,12 +32,13 @@ void append_floats(std::string& message, const std::array<double, n>& numbers) {
 }
 
 /// False for the entry of a late answer, and for unknown kinds of later contracts.
-bool has_state(const RecordEntry& entry) { return entry.kind() < ANSWER_LATE; }
+bool has_state(const RecordEntry& entry) { return bus::to_number(entry.kind()) < bus::to_number(AnswerKind::ANSWER_LATE); }
 
 /// The reference that the answer follows; if `may_be_held`, also that of a held older answer.
 std::array<double, 3> find_reference(const RecordEntry& entry, bool may_be_held) {
   const AnswerKind kind = entry.kind();
-  if (kind == ANSWER_ACCEPTED || kind == ANSWER_REFUSED || (may_be_held && kind == ANSWER_HELD))
+  if (kind == AnswerKind::ANSWER_ACCEPTED || kind == AnswerKind::ANSWER_REFUSED ||
+      (may_be_held && kind == AnswerKind::ANSWER_HELD))
     return entry.answer().reference().position_m();
   return {kNaN, kNaN, kNaN};
 }
@@ -118,7 +120,7 @@ bool PageFrames::decode() {
 
 std::string PageFrames::find_stage() const {
   const auto newest = newest_.find(lowest_vehicle());
-  if (newest == newest_.end() || newest->second.kind() != ANSWER_ACCEPTED) return {};
+  if (newest == newest_.end() || newest->second.kind() != AnswerKind::ANSWER_ACCEPTED) return {};
   return newest->second.answer().reference().stage_name().to_string();
 }
 

@@ -44,7 +44,7 @@ std::string describe_waiting(const RunView& view) {
     return fmt::format("the server (silent for {:.1f} s{})", view.silence_s,
                        view.is_gone ? ", gone" : "");
   if (!status) return "the server's first status";
-  if (status->phase() == PHASE_WAITING) return status->reason().to_string();
+  if (status->phase() == RunPhase::PHASE_WAITING) return status->reason().to_string();
   if (bus::calc_progress(status->phase()) < 0 && view.is_gone) return "another flight";
   return {};
 }

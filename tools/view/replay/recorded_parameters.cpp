@@ -124,8 +124,8 @@ RecordedParameters load_parameters(const record::RecordedFlight& flight) {
                                           manifest.period_s));
   message.period_ns(*period_ns);
   message.step_ns(std::min(parameters.scenario.plant.step_ns, *period_ns));
-  const bool is_lockstep = manifest.mode != bus::to_string(MODE_REALTIME);
-  message.mode(is_lockstep ? MODE_LOCKSTEP : MODE_REALTIME);
+  const bool is_lockstep = manifest.mode != bus::to_string(SyncMode::MODE_REALTIME);
+  message.mode(is_lockstep ? SyncMode::MODE_LOCKSTEP : SyncMode::MODE_REALTIME);
   message.real_time_factor(is_lockstep ? 0 : parameters.scenario.sync.real_time_factor);
   set_vehicles(message, parameters.scenario, flight);
   set_columns(message, flight.folder);

@@ -19,7 +19,7 @@ ros::VehicleSample make_sample(const RecordEntry& entry, std::int64_t period_ns)
   sample.p_WL = truth.p_WL;
   sample.v_WL = truth.v_WL;
   // The reference of an older answer belongs to an older step.
-  if (entry.kind() == ANSWER_ACCEPTED)
+  if (entry.kind() == AnswerKind::ANSWER_ACCEPTED)
     sample.reference = bus::to_vector(entry.answer().reference().position_m());
   return sample;
 }
@@ -52,7 +52,7 @@ void NewestSamples::note(const RecordBatch& batch,
   for (auto entry = batch.entries().rbegin(); entry != batch.entries().rend(); ++entry) {
     const auto next = next_steps_.find(entry->vehicle_id());
     const bool is_news = next != next_steps_.end() && entry->step() >= next->second;
-    if (is_news && entry->kind() != ANSWER_LATE)  // a late answer has no state
+    if (is_news && entry->kind() != AnswerKind::ANSWER_LATE)  // a late answer has no state
       newest.emplace(entry->vehicle_id(), make_sample(*entry, period_ns_));
   }
 }

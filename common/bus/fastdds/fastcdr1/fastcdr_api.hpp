@@ -1,4 +1,5 @@
-/// Calls of Fast CDR 1 and of the code that is generated for it; fastcdr2/ has the same for Fast CDR 2. CMake chooses.
+/// Calls of Fast CDR 1 and of the code that is generated for it; fastcdr2/ has the same for Fast
+/// CDR 2. CMake chooses.
 #pragma once
 
 #include <fastcdr/Cdr.h>
@@ -18,6 +19,12 @@ inline Cdr make_cdr(eprosima::fastcdr::FastBuffer& buffer,
 
 /// Bytes read or written, with the encapsulation header.
 inline std::size_t count_bytes(const Cdr& cdr) { return cdr.getSerializedDataLength(); }
+
+/// See common/bus/message_size.hpp.
+template <class Message>
+std::size_t calc_cdr_size(const Message& message, std::size_t before) {
+  return Message::getCdrSerializedSize(message, before);
+}
 
 template <class Message>
 void write_message(const Message& message, Cdr& cdr) {

@@ -1,7 +1,9 @@
-/// Calls of Fast CDR 2 and of the code that is generated for it; fastcdr1/ has the same for Fast CDR 1. CMake chooses.
+/// Calls of Fast CDR 2 and of the code that is generated for it; fastcdr1/ has the same for Fast
+/// CDR 1. CMake chooses.
 #pragma once
 
 #include <fastcdr/Cdr.h>
+#include <fastcdr/CdrSizeCalculator.hpp>
 #include <fastcdr/FastBuffer.h>
 
 #include <cstddef>
@@ -18,6 +20,13 @@ inline Cdr make_cdr(eprosima::fastcdr::FastBuffer& buffer,
 
 /// Bytes read or written, with the encapsulation header.
 inline std::size_t count_bytes(const Cdr& cdr) { return cdr.get_serialized_data_length(); }
+
+/// See common/bus/message_size.hpp.
+template <class Message>
+std::size_t calc_cdr_size(const Message& message, std::size_t before) {
+  eprosima::fastcdr::CdrSizeCalculator calculator(eprosima::fastcdr::CdrVersion::XCDRv1);
+  return calculator.calculate_serialized_size(message, before);
+}
 
 template <class Message>
 void write_message(const Message& message, Cdr& cdr) {

@@ -1,5 +1,6 @@
-/// Names and calls of Fast DDS 2 (2.9 to 2.14) that are others in Fast DDS 3. version3/ has the same for that one;
-/// CMake chooses the folder. Other files use these names and do not know the version.
+/// Names and calls of Fast DDS 2 (2.9 to 2.14) that are others in Fast DDS 3. version3/ has the
+/// same for that one; CMake chooses the folder. Other files use these names and do not know the
+/// version.
 #pragma once
 
 #include <fastdds/rtps/attributes/PropertyPolicy.h>
@@ -9,12 +10,14 @@
 #include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
 #include <fastrtps/config.h>
 #include <fastrtps/utils/IPLocator.h>
-#include <fastrtps/utils/fixed_size_string.hpp>
 #include <fastdds/dds/domain/qos/DomainParticipantQos.hpp>
 #include <fastdds/dds/publisher/DataWriter.hpp>
 #include <fastdds/dds/topic/TypeSupport.hpp>
+#include <fastrtps/utils/fixed_size_string.hpp>
 
 #include <vector>
+
+#include "fastdds_files.hpp"
 
 namespace sls::bus {
 
@@ -32,9 +35,6 @@ using Time = eprosima::fastrtps::Time_t;
 inline const Duration kInfinite = eprosima::fastrtps::c_TimeInfinite;
 
 inline constexpr const char* kMiddlewareVersion = FASTRTPS_VERSION_STR;
-
-/// Beginning of the names of its files in /dev/shm.
-inline constexpr const char* kSharedMemoryPrefix = "fastrtps_";
 
 /// Environment variable that names a file of profiles.
 inline constexpr const char* kProfilesVariable = "FASTRTPS_DEFAULT_PROFILES_FILE";

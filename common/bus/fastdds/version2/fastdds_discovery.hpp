@@ -1,4 +1,5 @@
-/// What Fast DDS 2 tells of discovered participants and endpoints; version3/ has the same for Fast DDS 3.
+/// What Fast DDS 2 tells of discovered participants and endpoints; version3/ has the same for Fast
+/// DDS 3.
 #pragma once
 
 #include <fastdds/rtps/reader/ReaderDiscoveryInfo.h>
@@ -16,7 +17,8 @@ namespace sls::bus {
 class DiscoveryListener : public dds::DomainParticipantListener {
  public:
   /// `source`: the participant of ours that has discovered the other one.
-  virtual void on_participant(const dds::DomainParticipant* source, const ParticipantNews& news) = 0;
+  virtual void on_participant(const dds::DomainParticipant* source,
+                              const ParticipantNews& news) = 0;
   virtual void on_endpoint(const EndpointNews& news) = 0;
   virtual void on_authentication(const rtps::GUID_t& participant, bool is_accepted) = 0;
 
@@ -24,7 +26,8 @@ class DiscoveryListener : public dds::DomainParticipantListener {
   void on_participant_discovery(dds::DomainParticipant* source,
                                 rtps::ParticipantDiscoveryInfo&& info) final {
     using Kind = ParticipantNews::Kind;
-    auto& data = const_cast<rtps::ParticipantProxyData&>(info.info);  // its properties: no const find
+    auto& data =
+        const_cast<rtps::ParticipantProxyData&>(info.info);  // its properties: no const find
     ParticipantNews news;
     news.kind = info.status == info.DISCOVERED_PARTICIPANT    ? Kind::kNew
                 : info.status == info.CHANGED_QOS_PARTICIPANT ? Kind::kChanged

@@ -1,5 +1,5 @@
-/// Names and calls of Fast DDS 3 that are others in Fast DDS 2. version2/ has the same for that one;
-/// CMake chooses the folder. Other files use these names and do not know the version.
+/// Names and calls of Fast DDS 3 that are others in Fast DDS 2. version2/ has the same for that
+/// one; CMake chooses the folder. Other files use these names and do not know the version.
 #pragma once
 
 #include <fastdds/config.hpp>
@@ -17,6 +17,8 @@
 
 #include <vector>
 
+#include "fastdds_files.hpp"
+
 namespace sls::bus {
 
 namespace dds = eprosima::fastdds::dds;
@@ -29,9 +31,6 @@ using Time = dds::Time_t;
 inline const Duration kInfinite = dds::c_TimeInfinite;
 
 inline constexpr const char* kMiddlewareVersion = FASTDDS_VERSION_STR;
-
-/// Beginning of the names of its files in /dev/shm.
-inline constexpr const char* kSharedMemoryPrefix = "fastdds_";
 
 /// Environment variable that names a file of profiles.
 inline constexpr const char* kProfilesVariable = "FASTDDS_DEFAULT_PROFILES_FILE";

@@ -1,4 +1,5 @@
-/// What Fast DDS 3 tells of discovered participants and endpoints; version2/ has the same for Fast DDS 2.
+/// What Fast DDS 3 tells of discovered participants and endpoints; version2/ has the same for Fast
+/// DDS 2.
 #pragma once
 
 #include <fastdds/dds/domain/DomainParticipantListener.hpp>
@@ -20,7 +21,8 @@ namespace sls::bus {
 class DiscoveryListener : public dds::DomainParticipantListener {
  public:
   /// `source`: the participant of ours that has discovered the other one.
-  virtual void on_participant(const dds::DomainParticipant* source, const ParticipantNews& news) = 0;
+  virtual void on_participant(const dds::DomainParticipant* source,
+                              const ParticipantNews& news) = 0;
   virtual void on_endpoint(const EndpointNews& news) = 0;
   virtual void on_authentication(const rtps::GUID_t& participant, bool is_accepted) = 0;
 
@@ -44,7 +46,11 @@ class DiscoveryListener : public dds::DomainParticipantListener {
     news.discovery_addresses.assign(discovery.begin(), discovery.end());
     const auto& user = data.default_locators.unicast;
     news.addresses.assign(user.begin(), user.end());
-    news.is_identity_known = false;
+    // The middleware does not tell the identity token.
+    const auto certificate = news.properties.find(kCertificateProperty);
+    if (certificate != news.properties.end())
+      news.identity = {certificate->second, news.properties[kAuthorityProperty]};
+    news.is_identity_known = news.identity || news.properties.count(kVersionProperty) > 0;
     on_participant(source, news);
   }
 

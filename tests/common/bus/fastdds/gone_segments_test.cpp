@@ -11,15 +11,17 @@
 #include <cstdio>
 #include <string>
 
+#include "fastdds_files.hpp"
+
 namespace sls::bus {
 namespace {
 
 /// Name of a segment of this process, as Fast DDS makes them.
 std::string make_name(unsigned number) {
-  std::array<char, 40> name{};
-  std::snprintf(name.data(), name.size(), "/fastrtps_%08x%08x", static_cast<unsigned>(::getpid()),
+  std::array<char, 20> digits{};
+  std::snprintf(digits.data(), digits.size(), "%08x%08x", static_cast<unsigned>(::getpid()),
                 number);
-  return name.data();
+  return std::string("/") + kSharedMemoryPrefix + digits.data();
 }
 
 std::string read_all(int descriptor) {
@@ -56,7 +58,9 @@ TEST_F(GoneSegmentsTest, OneOfAProcessThatHasLeftOpensAsACopyOfOurOwn) {
 
 TEST_F(GoneSegmentsTest, OtherFilesAreMissingAsEver) {
   make_own();
-  for (const char* name : {"/fastrtps_port7411", "/fastrtps_0123456789abcdeg", "/else"}) {
+  const std::string begin = std::string("/") + kSharedMemoryPrefix;
+  for (const std::string& name :
+       {begin + "port7411", begin + "0123456789abcdeg", std::string("/else")}) {
     EXPECT_EQ(::shm_open(name, O_RDWR, 0600), -1) << name;
     EXPECT_EQ(errno, ENOENT) << name;
   }

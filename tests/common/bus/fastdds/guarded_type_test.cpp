@@ -8,15 +8,13 @@
 namespace sls::bus {
 namespace {
 
-namespace rtps = eprosima::fastrtps::rtps;
-
 template <class Type, class Message>
 bool takes(const std::string& bytes, Message& message) {
   rtps::SerializedPayload_t payload(static_cast<std::uint32_t>(bytes.size()));
   std::copy(bytes.begin(), bytes.end(), payload.data);
   payload.length = static_cast<std::uint32_t>(bytes.size());
   GuardedType<Type> type;
-  return type.deserialize(&payload, &message);
+  return deserialize(type, payload, &message);
 }
 
 template <class Type, class Message>
@@ -72,7 +70,7 @@ TEST(GuardedTypeTest, AnOversizedSampleIsRefusedBeforeItsElementsAreMade) {
 /// that the message keeps no memory for the elements.
 template <class Type, class Message, class Elements>
 void expect_nothing_kept(const std::string& before, Elements elements) {
-  const auto size = Type().m_typeSize;
+  const auto size = max_size_of(Type());
   for (const std::uint32_t count : {0xffffffffU, 0x7fffffffU, size - 1000}) {
     Message message;
     EXPECT_FALSE((takes<Type>(make_claim(before, count, size), message))) << count;
@@ -98,18 +96,17 @@ TEST(GuardedTypeTest, ClaimedElementsThatDoNotFollowAreNotKept) {
 /// Keeps the report on a sample that a reader cannot take.
 class Report : public MisfitReport {
  public:
-  void report(const rtps::SerializedPayload_t&, const char* type,
+  void report(const rtps::SerializedPayload_t&, const std::string& type,
               const std::string& defect) override {
-    text = std::string(type) + ": " + defect;
+    text = type + ": " + defect;
   }
   std::string text;
 };
 
 std::string serialize(const Commands& message) {
   CommandsPubSubType type;
-  Commands copy = message;
-  rtps::SerializedPayload_t payload(type.getSerializedSizeProvider(&copy)());
-  EXPECT_TRUE(type.serialize(&copy, &payload));
+  rtps::SerializedPayload_t payload;
+  EXPECT_TRUE(bus::serialize(type, &message, payload));
   return {reinterpret_cast<const char*>(payload.data), payload.length};
 }
 
@@ -137,7 +134,7 @@ TEST(GuardedTypeTest, ASampleWithAFieldMoreOrLessIsRefusedAndReported) {
     EXPECT_EQ(report.text,
               "sls::Commands: expected more bytes, got " + std::to_string(bytes.size() - less));
   }
-  const auto type_size = CommandsPubSubType().m_typeSize;
+  const auto type_size = max_size_of(CommandsPubSubType());
   EXPECT_FALSE((takes<CommandsPubSubType>(std::string(type_size + 1, '\0'), received)));
   EXPECT_EQ(report.text, "sls::Commands: expected at most " + std::to_string(type_size) +
                              " bytes, got " + std::to_string(type_size + 1));
@@ -149,11 +146,12 @@ TEST(GuardedTypeTest, ASampleWithAFieldMoreOrLessIsRefusedAndReported) {
 /// needs, also for sequences longer than the contract allows.
 template <class Type, class Message>
 bool is_taken_back(Message message) {
-  rtps::SerializedPayload_t payload(
-      static_cast<std::uint32_t>(Message::getCdrSerializedSize(message)) + 4);
-  EXPECT_TRUE(Type().serialize(&message, &payload));
+  rtps::SerializedPayload_t payload;
+  Type writing;
+  EXPECT_TRUE(bus::serialize(writing, &message, payload));
   Message back;
-  return GuardedType<Type>().deserialize(&payload, &back);
+  GuardedType<Type> reading;
+  return deserialize(reading, payload, &back);
 }
 
 TEST(GuardedTypeTest, SequencesBeyondTheirBoundsAreRefused) {

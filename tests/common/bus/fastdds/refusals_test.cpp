@@ -81,23 +81,20 @@ TEST_F(RefusalsTest, AFloodOfThemIsFiveLines) {
 }
 
 /// Discovers a participant without a name, at an unknown address.
-void discover(ParticipantListener& listener, std::uint8_t number, const std::string& identity,
-              const eprosima::fastrtps::rtps::VendorId_t& vendor) {
-  using Info = eprosima::fastrtps::rtps::ParticipantDiscoveryInfo;
-  eprosima::fastrtps::rtps::ParticipantProxyData participant({});
-  participant.m_guid.guidPrefix.value[0] = number;
-  participant.m_VendorId = vendor;
-  participant.identity_token_.class_id(identity);
-  Info info(participant);
-  info.status = Info::DISCOVERED_PARTICIPANT;
-  listener.on_participant_discovery(nullptr, std::move(info));
+void discover(ParticipantListener& listener, std::uint8_t number, bool is_secured,
+              const rtps::VendorId_t& vendor) {
+  ParticipantNews news;
+  news.guid.guidPrefix.value[0] = number;
+  news.vendor = vendor;
+  if (is_secured) news.identity.emplace();
+  listener.on_participant(nullptr, news);
 }
 
-constexpr eprosima::fastrtps::rtps::VendorId_t kFastDds = {1, 15}, kCyclone = {1, 16};
+constexpr rtps::VendorId_t kFastDds = {1, 15}, kCyclone = {1, 16};
 
 TEST_F(RefusalsTest, AParticipantWithoutANameIsDescribedAsSuch) {
-  ParticipantListener listener(false);
-  discover(listener, 1, "DDS:Auth:PKI-DH", kFastDds);
+  ParticipantListener listener({false});
+  discover(listener, 1, true, kFastDds);
   EXPECT_EQ(said_.str(),
             "refused a participant without a name (01.00.00.00.00.00.00.00.00.00.00.00): it is "
             "secured, this is not (--qos config/qos/secure.xml)\n");
@@ -107,9 +104,9 @@ TEST_F(RefusalsTest, OnlyAnotherVendorsParticipantNeedsKeysThatProtectSubmessage
   for (const bool has_plain_submessages : {false, true}) {
     Problems problems;
     Neighbours neighbours(problems);
-    ParticipantListener listener(true, &neighbours, nullptr, has_plain_submessages);
-    discover(listener, 2, "", kFastDds);
-    discover(listener, 3, "", kCyclone);
+    ParticipantListener listener({true, has_plain_submessages}, &neighbours);
+    discover(listener, 2, false, kFastDds);
+    discover(listener, 3, false, kCyclone);
     for (const std::uint8_t number : {2, 3}) {
       EndpointFacts facts;
       facts.topic = "sls/command";

@@ -5,12 +5,16 @@
 #include <sys/file.h>
 #include <unistd.h>
 
+#include "fastdds_files.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace sls::bus {
 namespace {
 
 namespace fs = std::filesystem;
+
+/// Name of a file of the middleware.
+std::string name(const std::string& rest) { return kSharedMemoryPrefix + rest; }
 
 class StaleSegmentsTest : public ::testing::Test {
  protected:
@@ -24,40 +28,40 @@ class StaleSegmentsTest : public ::testing::Test {
 };
 
 TEST_F(StaleSegmentsTest, ASegmentWithoutALockHolderIsRemoved) {
-  make("fastrtps_0123456789abcdef", std::chrono::seconds(60));
-  make("fastrtps_0123456789abcdef_el", std::chrono::seconds(60));
+  make(name("0123456789abcdef"), std::chrono::seconds(60));
+  make(name("0123456789abcdef_el"), std::chrono::seconds(60));
   remove_stale_segments(folder_.path());
-  EXPECT_FALSE(exists("fastrtps_0123456789abcdef"));
-  EXPECT_FALSE(exists("fastrtps_0123456789abcdef_el"));
+  EXPECT_FALSE(exists(name("0123456789abcdef")));
+  EXPECT_FALSE(exists(name("0123456789abcdef_el")));
 }
 
 TEST_F(StaleSegmentsTest, ASegmentInUseStays) {
-  make("fastrtps_0123456789abcdef", std::chrono::seconds(60));
-  make("fastrtps_0123456789abcdef_el", std::chrono::seconds(60));
-  const fs::path lock = folder_ / "fastrtps_0123456789abcdef_el";
+  make(name("0123456789abcdef"), std::chrono::seconds(60));
+  make(name("0123456789abcdef_el"), std::chrono::seconds(60));
+  const fs::path lock = folder_ / name("0123456789abcdef_el");
   const int descriptor = open(lock.c_str(), O_RDONLY);
   ASSERT_EQ(flock(descriptor, LOCK_EX | LOCK_NB), 0);
   remove_stale_segments(folder_.path());
-  EXPECT_TRUE(exists("fastrtps_0123456789abcdef"));
-  EXPECT_TRUE(exists("fastrtps_0123456789abcdef_el"));
+  EXPECT_TRUE(exists(name("0123456789abcdef")));
+  EXPECT_TRUE(exists(name("0123456789abcdef_el")));
   close(descriptor);
 }
 
 TEST_F(StaleSegmentsTest, ASegmentThatIsJustBeingMadeStays) {
-  make("fastrtps_0123456789abcdef_el", std::chrono::seconds(0));
+  make(name("0123456789abcdef_el"), std::chrono::seconds(0));
   remove_stale_segments(folder_.path());
-  EXPECT_TRUE(exists("fastrtps_0123456789abcdef_el"));
+  EXPECT_TRUE(exists(name("0123456789abcdef_el")));
 }
 
 TEST_F(StaleSegmentsTest, EverythingElseStays) {
-  const char* names[] = {"fastrtps_port8160_el",
-                         "fastrtps_port8160",
-                         "other_0123456789abcdef_el",
-                         "fastrtps_0123456789abcdeg_el",
-                         "fastrtps_0123456789abcdef0_el",
-                         "fastrtps_0123456789abcdef",
-                         "fastrtps__el",
-                         "sem.fastrtps_port8160_mutex"};
+  const std::string names[] = {name("port8160_el"),
+                               name("port8160"),
+                               "other_0123456789abcdef_el",
+                               name("0123456789abcdeg_el"),
+                               name("0123456789abcdef0_el"),
+                               name("0123456789abcdef"),
+                               name("_el"),
+                               "sem." + name("port8160_mutex")};
   for (const char* name : names) make(name, std::chrono::seconds(60));
   remove_stale_segments(folder_.path());
   for (const char* name : names) EXPECT_TRUE(exists(name)) << name;
@@ -66,15 +70,15 @@ TEST_F(StaleSegmentsTest, EverythingElseStays) {
 
 TEST_F(StaleSegmentsTest, WithoutStalePortsAnyParticipantIdWillDo) {
   EXPECT_EQ(choose_participant_id({8160, 2}, {}, folder_.path()), -1);
-  make("fastrtps_port8160", std::chrono::seconds(60));  // of a process that ended normally
+  make(name("port8160"), std::chrono::seconds(60));  // of a process that ended normally
   EXPECT_EQ(choose_participant_id({8160, 2}, {}, folder_.path()), -1);
   EXPECT_EQ(choose_participant_id({8160, 2}, {}, folder_ / "no such folder"), -1);
 }
 
 TEST_F(StaleSegmentsTest, PortsOfKilledAndOfLivingProcessesAreAvoided) {
-  make("fastrtps_port8161_el", std::chrono::seconds(60));  // participant 0: killed
-  make("fastrtps_port8162_el", std::chrono::seconds(60));  // participant 1: alive
-  const fs::path lock = folder_ / "fastrtps_port8162_el";
+  make(name("port8161_el"), std::chrono::seconds(60));  // participant 0: killed
+  make(name("port8162_el"), std::chrono::seconds(60));  // participant 1: alive
+  const fs::path lock = folder_ / name("port8162_el");
   const int descriptor = open(lock.c_str(), O_RDONLY);
   ASSERT_EQ(flock(descriptor, LOCK_EX | LOCK_NB), 0);
   EXPECT_EQ(choose_participant_id({8160, 2}, {}, folder_.path()), 2);

@@ -9,7 +9,7 @@
 namespace sls::bus {
 namespace {
 
-using eprosima::fastdds::dds::TransportConfigQos;
+using dds::TransportConfigQos;
 
 TransportConfigQos make_transports(const std::vector<TransportDescriptor>& own) {
   TransportConfigQos transports;
@@ -19,11 +19,11 @@ TransportConfigQos make_transports(const std::vector<TransportDescriptor>& own) 
 }
 
 TransportDescriptor make_shared_memory() {
-  return std::make_shared<eprosima::fastdds::rtps::SharedMemTransportDescriptor>();
+  return std::make_shared<rtps::SharedMemTransportDescriptor>();
 }
 
 TransportDescriptor make_udp(const std::vector<std::string>& addresses) {
-  auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
+  auto udp = std::make_shared<rtps::UDPv4TransportDescriptor>();
   udp->interfaceWhiteList = addresses;
   return udp;
 }

@@ -81,7 +81,7 @@ TEST_F(McapSinkTest, EqualFlightsGiveEqualFilesForAnyRunIdAndComputeTimes) {
   fs::create_directory(other_);
   Parameters parameters = ask_for_mcap(make_parameters());
   parameters.version("sls 9.9");
-  parameters.mode(MODE_REALTIME);
+  parameters.mode(SyncMode::MODE_REALTIME);
   record_flight(
       other_, [](RecordEntry& entry) { entry.answer().compute_time_ns(7); }, parameters);
   EXPECT_NE(read_bytes(out_ / "command.csv"), read_bytes(other_ / "command.csv"));
@@ -122,14 +122,15 @@ TEST_F(McapSinkTest, SoItIsOfAFleetWithUnansweredLateAndMissingSteps) {
         if (step == 33 && id == 4) continue;  // lost
         RecordEntry entry = make_entry(step, id);
         if (id == 7 && step >= 10 && step < 20)
-          entry = make_unanswered_entry(step, step < 15 ? ANSWER_HELD : ANSWER_FAIL_SAFE);
+          entry = make_unanswered_entry(
+              step, step < 15 ? AnswerKind::ANSWER_HELD : AnswerKind::ANSWER_FAIL_SAFE);
         entry.vehicle_id(id);
         if (step == kLastStep && id == 7) entry = make_bare_entry(step);
         entry.vehicle_id(id);
         feeder.add({entry});
         if (step == 22 && id == 1) feeder.add({make_late_entry(12, 7)});
       }
-    recording.add(make_status(PHASE_FAILED, kLastStep, "made to"));
+    recording.add(make_status(RunPhase::PHASE_FAILED, kLastStep, "made to"));
     EXPECT_FALSE(recording.finish("", 0));
   }
   expect_conversion_gives_the_bytes_of_the_sink();

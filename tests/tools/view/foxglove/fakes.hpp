@@ -1,8 +1,6 @@
 /// A fake connection and a fake flight for tests, and samples as Fast CDR writes them.
 #pragma once
 
-#include <fastcdr/Cdr.h>
-
 #include <algorithm>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -11,22 +9,23 @@
 #include <vector>
 
 #include "common/bus/topics.hpp"
+#include "fastcdr_api.hpp"
 #include "tools/view/foxglove/session.hpp"
 
 namespace sls::view::foxglove::test {
 
 using Json = nlohmann::json;
-using Endianness = eprosima::fastcdr::Cdr::Endianness;
+using Endianness = bus::Cdr::Endianness;
 
 template <class Message>
 std::vector<std::uint8_t> to_cdr(const Message& message,
                                  Endianness endianness = Endianness::LITTLE_ENDIANNESS) {
   eprosima::fastcdr::FastBuffer buffer;
-  eprosima::fastcdr::Cdr cdr(buffer, endianness, eprosima::fastcdr::Cdr::DDS_CDR);
+  bus::Cdr cdr = bus::make_cdr(buffer, endianness);
   cdr.serialize_encapsulation();
-  message.serialize(cdr);
+  bus::write_message(message, cdr);
   const auto* begin = reinterpret_cast<const std::uint8_t*>(buffer.getBuffer());
-  return {begin, begin + cdr.getSerializedDataLength()};
+  return {begin, begin + bus::count_bytes(cdr)};
 }
 
 struct Sent {

@@ -41,7 +41,7 @@ class Publisher {
     parameters.contract_sha256(bus::kContractSha256);
     parameters.scenario_text("name: played");
     parameters.period_ns(kPeriod);
-    parameters.mode(MODE_REALTIME);
+    parameters.mode(SyncMode::MODE_REALTIME);
     parameters.real_time_factor(1);
     for (const std::uint32_t id : vehicles_) parameters.vehicles().emplace_back().vehicle_id(id);
     parameters_.write(parameters);
@@ -61,7 +61,7 @@ class Publisher {
     Participant participant;
     participant.run_id(run_id_);
     participant.contract_sha256(bus::kContractSha256);
-    participant.role(ROLE_CONTROLLER);
+    participant.role(ParticipantRole::ROLE_CONTROLLER);
     participant.name("pilot");
     participant.host("here");
     participant.vehicle_ids(vehicles_);
@@ -71,7 +71,7 @@ class Publisher {
     control.run_id(run_id_);
     control.request_id(step_);
     control.operator_name("anna@ground");
-    control.action(ACTION_STEP);
+    control.action(ControlAction::ACTION_STEP);
     control.steps(5);
     controls_.write(control);
     SimControlReply reply;
@@ -92,7 +92,7 @@ class Publisher {
       VehicleState& vehicle = states.vehicles().emplace_back();
       vehicle.vehicle_id(id);
       vehicle.measured(make_plant_state(id));
-      vehicle.force_origin(FORCE_ANSWERED);
+      vehicle.force_origin(ForceOrigin::FORCE_ANSWERED);
       vehicle.controller_name("pilot");
       vehicle.controller().numbers({static_cast<double>(step_), 2.5});
     }
@@ -139,7 +139,7 @@ class Publisher {
     status.run_id(run_id_);
     status.vehicle_id(vehicles_.front());
     status.sample_index(samples_++);
-    status.phase(PHASE_RUNNING);
+    status.phase(RunPhase::PHASE_RUNNING);
     status.step(step_);
     status.timing("real-time, 0 of 7 late");
     status.counters().resent(3);
@@ -192,7 +192,7 @@ class Publisher {
     RecordEntry entry;
     entry.vehicle_id(id);
     entry.step(step_);
-    entry.kind(ANSWER_ACCEPTED);
+    entry.kind(AnswerKind::ANSWER_ACCEPTED);
     entry.truth(make_plant_state(id));
     entry.client_name("pilot");
     entry.answer(make_command(id));

@@ -57,7 +57,7 @@ TEST_P(SampleStampTest, OfABatchHasTheStepOfTheFirstEntry) {
 TEST_P(SampleStampTest, StepsBehindTextsOfAnyLengthAreFound) {
   for (std::size_t length = 0; length < 20; ++length) {
     SimStatus status;
-    status.phase(PHASE_PAUSED);
+    status.phase(RunPhase::PHASE_PAUSED);
     status.reason(std::string(length, 'x'));
     status.step(4711);
     EXPECT_EQ(read(TopicId::kStatus, status)->step, 4711U) << length;

@@ -34,7 +34,7 @@ RecordBatch make_batch(std::uint64_t first_step, std::size_t steps,
       RecordEntry& entry = batch.entries().emplace_back();
       entry.vehicle_id(id);
       entry.step(first_step + i);
-      entry.kind(ANSWER_ACCEPTED);
+      entry.kind(AnswerKind::ANSWER_ACCEPTED);
       entry.truth().q_WB({1, 0, 0, 0});
     }
   return batch;
@@ -305,7 +305,7 @@ TEST_F(FoxgloveServicesTest, AnOperatorIsOfferedThemByJson) {
 TEST_F(FoxgloveServicesTest, ACallAsksTheFlightAndItsReplyComesBack) {
   call(find_service("/sls/step"), R"({"steps": 25})");
   ASSERT_EQ(flight->requests.size(), 1U);
-  EXPECT_EQ(flight->requests[0].action, ACTION_STEP);
+  EXPECT_EQ(flight->requests[0].action, ControlAction::ACTION_STEP);
   EXPECT_EQ(flight->requests[0].steps, 25U);
   OperatorReply reply;
   reply.is_accepted = true;

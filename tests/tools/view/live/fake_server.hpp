@@ -37,7 +37,7 @@ inline Parameters make_parameters(std::uint64_t run_id,
 
 /// One answered step. Quad x is the step, and load z is the vehicle's id.
 inline RecordEntry make_entry(std::uint32_t vehicle_id, std::uint64_t step,
-                              AnswerKind kind = ANSWER_ACCEPTED) {
+                              AnswerKind kind = AnswerKind::ANSWER_ACCEPTED) {
   RecordEntry entry;
   entry.vehicle_id(vehicle_id);
   entry.step(step);
@@ -80,7 +80,7 @@ class FakeServer {
     run_id_ = parameters.run_id();
     samples_ = 0;
     parameters_writer_.write(parameters);
-    publish(PHASE_WAITING, "waiting for: controller");
+    publish(RunPhase::PHASE_WAITING, "waiting for: controller");
   }
 
   void publish(RunPhase phase, const std::string& reason = "", std::uint64_t step = 0) {

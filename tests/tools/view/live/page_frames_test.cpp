@@ -1,12 +1,11 @@
 #include "tools/view/live/page_frames.hpp"
 
-#include <fastcdr/Cdr.h>
-#include <fastcdr/FastBuffer.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <tuple>
 
+#include "fastcdr_api.hpp"
 #include "tests/tools/view/live/binary_message.hpp"
 #include "tests/tools/view/live/fake_server.hpp"
 #include "tools/view/run_description.hpp"
@@ -24,11 +23,10 @@ constexpr std::uint64_t kRun = 0x1234'5678'9abc'def0;
 Sample make_sample(const RecordBatch& batch, std::int64_t written_ns = 0) {
   std::vector<std::uint8_t> bytes(200'000);
   eprosima::fastcdr::FastBuffer buffer(reinterpret_cast<char*>(bytes.data()), bytes.size());
-  eprosima::fastcdr::Cdr cdr(buffer, eprosima::fastcdr::Cdr::DEFAULT_ENDIAN,
-                             eprosima::fastcdr::Cdr::DDS_CDR);
+  bus::Cdr cdr = bus::make_cdr(buffer);
   cdr.serialize_encapsulation();
-  batch.serialize(cdr);
-  bytes.resize(cdr.getSerializedDataLength());
+  bus::write_message(batch, cdr);
+  bytes.resize(bus::count_bytes(cdr));
   return {TopicId::kRecord,
           std::make_shared<const std::vector<std::uint8_t>>(std::move(bytes)),
           written_ns,
@@ -60,7 +58,7 @@ TEST(PageFramesTest, PosesAreTheNewestStepWithEveryFieldInItsPlace) {
   ASSERT_EQ(poses.vehicles.size(), 1u);
   const auto& pose = poses.vehicles[0];
   EXPECT_EQ(pose.vehicle_id, 0u);
-  EXPECT_EQ(pose.kind, static_cast<std::uint32_t>(ANSWER_ACCEPTED));
+  EXPECT_EQ(pose.kind, static_cast<std::uint32_t>(AnswerKind::ANSWER_ACCEPTED));
   EXPECT_EQ(pose.quad, (std::vector<float>{20, 2, 3}));
   EXPECT_EQ(pose.attitude, (std::vector<float>{0.5, -0.5, 0.5, -0.5}));
   EXPECT_EQ(pose.load, (std::vector<float>{4, 5, 0}));
@@ -159,11 +157,11 @@ TEST(PageFramesTest, AReferenceIsThatOfAnAnswerAndOfAHeldOneOnlyDrawn) {
     return std::pair(test::read_poses(frames.make_poses()).vehicles.at(0).reference[0],
                      test::read_rows(frames.make_rows(0)).rows.at(0)[kColumns.size() - 3]);
   };
-  EXPECT_EQ(make_frame(ANSWER_ACCEPTED), std::pair(7.f, 7.f));
-  EXPECT_EQ(make_frame(ANSWER_HELD).first, 7);
-  EXPECT_TRUE(std::isnan(make_frame(ANSWER_HELD).second));
-  EXPECT_TRUE(std::isnan(make_frame(ANSWER_NONE).first));
-  EXPECT_TRUE(std::isnan(make_frame(ANSWER_FAIL_SAFE).first));
+  EXPECT_EQ(make_frame(AnswerKind::ANSWER_ACCEPTED), std::pair(7.f, 7.f));
+  EXPECT_EQ(make_frame(AnswerKind::ANSWER_HELD).first, 7);
+  EXPECT_TRUE(std::isnan(make_frame(AnswerKind::ANSWER_HELD).second));
+  EXPECT_TRUE(std::isnan(make_frame(AnswerKind::ANSWER_NONE).first));
+  EXPECT_TRUE(std::isnan(make_frame(AnswerKind::ANSWER_FAIL_SAFE).first));
 }
 
 TEST(PageFramesTest, TheStageIsThatOfTheNewestAnswerOfTheLowestVehicle) {
@@ -182,15 +180,15 @@ TEST(PageFramesTest, TheStageIsThatOfTheNewestAnswerOfTheLowestVehicle) {
     EXPECT_TRUE(frames.decode());
     return frames.find_stage();
   };
-  EXPECT_EQ(decode(ANSWER_ACCEPTED), "eight");
-  EXPECT_EQ(decode(ANSWER_NONE), "");
+  EXPECT_EQ(decode(AnswerKind::ANSWER_ACCEPTED), "eight");
+  EXPECT_EQ(decode(AnswerKind::ANSWER_NONE), "");
 }
 
 TEST(PageFramesTest, AnAnswerThatCameLateIsNoState) {
   PageFrames frames;
   frames.start_run(make_parameters(kRun));
   auto batch = make_batch(kRun, 3, 3);
-  batch.entries().push_back(make_entry(0, 9, ANSWER_LATE));
+  batch.entries().push_back(make_entry(0, 9, AnswerKind::ANSWER_LATE));
   frames.add(make_sample(batch));
   ASSERT_TRUE(frames.decode());
   EXPECT_EQ(test::read_poses(frames.make_poses()).step, 3u);

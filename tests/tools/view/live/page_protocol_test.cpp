@@ -92,7 +92,7 @@ TEST_F(PageProtocolTest, ARunItsStatusItsEventsAndItsStatesCome) {
   EXPECT_EQ(waiting.at("phase"), "waiting");
   EXPECT_EQ(waiting.at("waiting_for"), "waiting for: controller");
 
-  server.publish(PHASE_RUNNING, "participants are ready", 50);
+  server.publish(RunPhase::PHASE_RUNNING, "participants are ready", 50);
   ASSERT_TRUE(wait_until([&] {
     return page.connection.find("status").back().at("phase") == "running" &&
            page.count("event") == 2;
@@ -140,7 +140,7 @@ TEST_F(PageProtocolTest, AfterAResetTheNextRunIsShown) {
   Page page(protocol);
   FakeServer server(domain.number(), 1);
   ASSERT_TRUE(wait_until([&] { return page.count("run") == 1; }));
-  server.publish(PHASE_RESET, "reset by an operator", 7);
+  server.publish(RunPhase::PHASE_RESET, "reset by an operator", 7);
   server.begin_run(make_parameters(2));
   ASSERT_TRUE(wait_until([&] { return page.count("run") == 2; }));
   EXPECT_EQ(page.connection.find("run").at(1).at("run").at("run_id"), "0000000000000002");
@@ -204,13 +204,13 @@ TEST_F(PageProtocolTest, AnInvalidScenarioIsReported) {
 TEST_F(PageProtocolTest, ARequestReachesTheServerAndItsReplyThePage) {
   Page page(protocol);
   FakeServer server(domain.number(), 5);
-  server.publish(PHASE_PAUSED);
+  server.publish(RunPhase::PHASE_PAUSED);
   ASSERT_TRUE(wait_until([&] { return page.count("status") > 0; }));
   page.say(R"({"op":"control","id":7,"action":"step","steps":3})");
   ASSERT_TRUE(wait_until([&] { return !server.requests.is_empty(); }));
   const auto request = server.requests.take_all().front();
   EXPECT_EQ(request.run_id(), 5u);
-  EXPECT_EQ(request.action(), ACTION_STEP);
+  EXPECT_EQ(request.action(), ControlAction::ACTION_STEP);
   EXPECT_EQ(request.steps(), 3u);
   server.reply(request, false, "not while it lands");
   ASSERT_TRUE(wait_until([&] { return page.count("reply") == 1; }));
@@ -242,7 +242,7 @@ TEST_F(PageProtocolTest, OnlySoManyRequestsWait) {
 
 TEST_F(PageProtocolTest, APageThatLeftIsNotRepliedTo) {
   FakeServer server(domain.number(), 5);
-  server.publish(PHASE_RUNNING);
+  server.publish(RunPhase::PHASE_RUNNING);
   auto page = std::make_unique<Page>(protocol);
   page->say(R"({"op":"control","id":1,"action":"pause"})");
   ASSERT_TRUE(wait_until([&] { return !server.requests.is_empty(); }));

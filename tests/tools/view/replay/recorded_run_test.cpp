@@ -172,12 +172,14 @@ TEST_F(RecordedRunTest, EventsStagesAndHeldStepsAreListed) {
   fs::create_directory(folder);
   {
     record::Recording recording(folder, record::test::make_parameters());
-    recording.add(record::test::make_status(PHASE_WAITING, 0, "waiting for: \"one\", two"));
-    recording.add(record::test::make_status(PHASE_RUNNING, 0));
+    recording.add(
+        record::test::make_status(RunPhase::PHASE_WAITING, 0, "waiting for: \"one\", two"));
+    recording.add(record::test::make_status(RunPhase::PHASE_RUNNING, 0));
     record::test::BatchFeeder feeder(recording);
     for (std::uint64_t step = 0; step <= kLastStep; ++step)
-      feeder.add({step >= 50 && step < 60 ? record::test::make_unanswered_entry(step, ANSWER_HELD)
-                                          : record::test::make_entry(step)},
+      feeder.add({step >= 50 && step < 60
+                      ? record::test::make_unanswered_entry(step, AnswerKind::ANSWER_HELD)
+                      : record::test::make_entry(step)},
                  step == kLastStep);
     record::test::finish_flight(recording);
   }

@@ -1,10 +1,9 @@
 #include "tools/view/ros_face/newest_samples.hpp"
 
-#include <fastcdr/Cdr.h>
-#include <fastcdr/FastBuffer.h>
 #include <gtest/gtest.h>
 
 #include "common/bus/convert.hpp"
+#include "fastcdr_api.hpp"
 
 namespace sls::view {
 namespace {
@@ -25,7 +24,7 @@ Parameters make_parameters(const std::vector<std::uint32_t>& vehicle_ids) {
 
 /// An entry whose numbers all depend on vehicle and step.
 RecordEntry make_entry(std::uint32_t vehicle_id, std::uint64_t step,
-                       AnswerKind kind = ANSWER_ACCEPTED) {
+                       AnswerKind kind = AnswerKind::ANSWER_ACCEPTED) {
   const double number = 1000.0 * vehicle_id + static_cast<double>(step);
   RecordEntry entry;
   entry.vehicle_id(vehicle_id);
@@ -46,12 +45,11 @@ Bytes serialize(const std::vector<RecordEntry>& entries, std::uint64_t run_id = 
   batch.run_id(run_id);
   batch.entries(entries);
   eprosima::fastcdr::FastBuffer buffer;
-  eprosima::fastcdr::Cdr cdr(buffer, eprosima::fastcdr::Cdr::LITTLE_ENDIANNESS,
-                             eprosima::fastcdr::Cdr::DDS_CDR);
+  bus::Cdr cdr = bus::make_cdr(buffer, bus::Cdr::LITTLE_ENDIANNESS);
   cdr.serialize_encapsulation();
-  batch.serialize(cdr);
-  return std::make_shared<std::vector<std::uint8_t>>(
-      buffer.getBuffer(), buffer.getBuffer() + cdr.getSerializedDataLength());
+  bus::write_message(batch, cdr);
+  return std::make_shared<std::vector<std::uint8_t>>(buffer.getBuffer(),
+                                                     buffer.getBuffer() + bus::count_bytes(cdr));
 }
 
 using Steps = std::vector<std::pair<std::uint32_t, std::uint64_t>>;
@@ -87,7 +85,8 @@ TEST(NewestSamplesTest, HoldTheNumbersOfTheStep) {
 }
 
 TEST(NewestSamplesTest, HaveNoReferenceWhereTheAnswerIsOfAnotherStep) {
-  for (const AnswerKind kind : {ANSWER_NONE, ANSWER_HELD, ANSWER_FAIL_SAFE, ANSWER_REFUSED}) {
+  for (const AnswerKind kind : {AnswerKind::ANSWER_NONE, AnswerKind::ANSWER_HELD,
+                                AnswerKind::ANSWER_FAIL_SAFE, AnswerKind::ANSWER_REFUSED}) {
     NewestSamples newest(make_parameters({0}));
     const auto samples = newest.take({serialize({make_entry(0, 1, kind)})});
     ASSERT_EQ(samples.size(), 1U);
@@ -97,7 +96,7 @@ TEST(NewestSamplesTest, HaveNoReferenceWhereTheAnswerIsOfAnotherStep) {
 
 TEST(NewestSamplesTest, LateAnswersAreNoStates) {
   NewestSamples newest(make_parameters({0}));
-  const Bytes batch = serialize({make_entry(0, 5), make_entry(0, 4, ANSWER_LATE)});
+  const Bytes batch = serialize({make_entry(0, 5), make_entry(0, 4, AnswerKind::ANSWER_LATE)});
   EXPECT_EQ(list_steps(newest.take({batch})), (Steps{{0, 5}}));
 }
 

@@ -10,6 +10,7 @@
 #include <set>
 #include <sstream>
 
+#include "fastdds_files.hpp"
 #include "tests/system/flight.hpp"
 
 namespace sls::test {
@@ -297,7 +298,7 @@ TEST_F(RosReadersTest, EndpointsAreAnnouncedAsThoseOfRos2AndNoneReadsRos) {
   std::ifstream maps("/proc/" + std::to_string(view_->id()) + "/maps");
   const std::string mapped((std::istreambuf_iterator<char>(maps)), {});
   EXPECT_FALSE(mapped.empty());
-  EXPECT_EQ(mapped.find("fastrtps_"), std::string::npos) << "expected UDP alone";
+  EXPECT_EQ(mapped.find(bus::kSharedMemoryPrefix), std::string::npos) << "expected UDP alone";
   stop_watching();
   std::map<std::string, std::string> types;
   for (const json& writer : find_lines("publication")) {
