@@ -755,7 +755,10 @@ cmd_docs() {
   say "pages: $build/docs/index.html"
 }
 
-cmd_systems() { exec /usr/bin/python3 -B "$root/tools/systems" "$@"; }
+cmd_systems() {
+  [[ " $* " != *' aarch64 '* ]] || is_help_asked || build_programs "${flying[@]}"  # the other side of its flights
+  exec /usr/bin/python3 -B "$root/tools/systems" "$@"
+}
 
 cmd_package() {
   if (($#)); then

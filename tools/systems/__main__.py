@@ -40,7 +40,7 @@ every command ended with 0, and all demos had one certificate.""")
     parser.add_argument("--limit-minutes", type=float, default=180, metavar="X",
                         help="stop the commands of a system after this time (default: 180)")
     parser.add_argument("--need-gib", type=float, metavar="X",
-                        help="free disk that a system must find (default: 16 with test, else 8)")
+                        help="free disk that each system must find (default: 16 with test, else 8)")
     parser.add_argument("--folder", type=pathlib.Path, default=tree.ROOT / "build/systems", metavar="DIR",
                         help="folder of the systems, their logs and bases (default: build/systems)")
     parser.add_argument("--keep", action="store_true", help="do not delete the systems")
@@ -100,13 +100,12 @@ def look_at_commands(system, arguments, column):
             column.rows["package"] = str(place.relative_to(tree.ROOT))
 
 
-def look_at(name, arguments):
-    """Makes the tree of a system, runs the commands in it and deletes it. Returns the column of the table."""
-    column = results.Column(name)
-    system = tree.Tree(name, arguments.folder, time.monotonic() + arguments.limit_minutes * 60)
+def look_at(system, arguments):
+    """Makes a tree and runs the commands in it. Returns the column of the table."""
+    column = results.Column(system.system)
     try:
         tree.check_disk(arguments.folder, arguments.need_gib)
-        say(f"{name}: making a clean system in {system.path}")
+        say(f"{system.system}: making a clean system in {system.path}")
         start = time.monotonic()
         system.make()
         column.rows["commit"] = system.copy_checkout()
@@ -117,14 +116,38 @@ def look_at(name, arguments):
             for row, command in VERSIONS.items():
                 column.rows[row] = system.ask(command)
     except tree.Failure as failure:
-        say(f"error: {name}: {failure}")
+        say(f"error: {system.system}: {failure}")
         column.is_good = False
-    finally:
-        if arguments.keep:
-            say(f"{name}: kept {system.path}")
-        else:
-            tree.remove(system.path)
     return column
+
+
+def look_at_all(names, arguments):
+    """The columns of these systems, one after the other. The tests of the second fly with programs of the first."""
+    columns, systems = [], []
+    try:
+        for name in names:
+            other = systems[-1] if systems and columns[-1].is_good and "test" in arguments.commands else None
+            systems.append(tree.Tree(name, arguments.folder, time.monotonic() + arguments.limit_minutes * 60, other))
+            columns.append(look_at(systems[-1], arguments))
+    finally:
+        for system in systems:
+            if arguments.keep:
+                say(f"{system.system}: kept {system.path}")
+            else:
+                tree.remove(system.path)
+    return columns
+
+
+def look_at_aarch64(arguments):
+    """aarch64.py prints its own table. True if it ended with 0."""
+    with subprocess.Popen([sys.executable, "-B", HERE / "aarch64.py"]) as process:
+        try:
+            return process.wait(timeout=arguments.limit_minutes * 60) == 0
+        except (subprocess.TimeoutExpired, tree.Interrupted) as error:
+            process.terminate()  # it deletes its tree
+            if isinstance(error, tree.Interrupted):
+                raise
+            raise tree.Failure("aarch64: stopped at the limit of time") from None
 
 
 def main():
@@ -137,7 +160,7 @@ def main():
             tree.check_machine()
             arguments.folder.mkdir(parents=True, exist_ok=True)
             with tree.lock(arguments.folder):
-                columns = [look_at(name, arguments) for name in trees]
+                columns = look_at_all(trees, arguments)
             if any(column.rows for column in columns):
                 print(results.make_table(columns))
             is_good = all(column.is_good for column in columns)
@@ -145,8 +168,7 @@ def main():
                 say("error: the demos have different certificates")
                 is_good = False
         if "aarch64" in arguments.system:
-            command = [sys.executable, "-B", HERE / "aarch64.py", "--limit-minutes", f"{arguments.limit_minutes:g}"]
-            is_good &= subprocess.run(command, check=False).returncode == 0
+            is_good &= look_at_aarch64(arguments)
     except (tree.Failure, OSError, subprocess.CalledProcessError) as failure:
         fail(f"systems: {failure}")
     except tree.Interrupted as signal:

@@ -23,7 +23,8 @@ RESERVE_GIB = 1  # a command is stopped where less is left
 # Settings with which this machine reaches mirrors and registries, if it has them.
 PASSED_ON = re.compile("(https?|no|all)_proxy|npm_config_.*", re.IGNORECASE)
 APT_SETTING = re.compile(r"Acquire::(https?::|Check-|ForceIPv|Retries)")
-# The tree is bound to itself, because namespaces need a root that is a mount point.
+# $1 is the tree, $2 another one that it sees as OTHER, or empty; the command follows. The tree is bound to itself, because
+# namespaces need a root that is a mount point.
 ENTER = """set -e
 mount --bind "$1" "$1"
 cd "$1"
@@ -32,8 +33,12 @@ mount -t sysfs sysfs sys
 mount --rbind /dev dev
 mount -t tmpfs -o mode=1777 tmpfs dev/shm
 mount -t tmpfs -o mode=755 tmpfs run
+if [ -n "$2" ]; then
+  mkdir -p other
+  mount --bind "$2" other
+fi
 tree=$1
-shift
+shift 2
 exec chroot "$tree" "$@"
 """
 
@@ -193,6 +198,7 @@ class Tree:
     system: str  # a key of CODENAMES
     folder: pathlib.Path  # of all trees, absolute; the tree is a folder in it
     deadline: float  # of time.monotonic()
+    other: "Tree | None" = None  # a tree in which the commands have run: tests of mixed flights use its programs
 
     def __post_init__(self):
         self.variables = {}
@@ -262,10 +268,13 @@ class Tree:
         @throws Failure at the limits of run_bounded."""
         variables = {"HOME": "/root", "LANG": "C.UTF-8", "TERM": "dumb", "PATH": "/usr/local/sbin:/usr/local/bin:/usr/sbin:"
                      "/usr/bin:/sbin:/bin", **self.variables}
+        if self.other:
+            variables |= {"SLS_OTHER_TREE": "/other", "SLS_OTHER_BUILD": f"/other/{CHECKOUT}/build"}
         # The first process of a process namespace must wait for those that lose their parents: bash does.
         inside = ["env", "-i", *(f"{key}={value}" for key, value in variables.items()), "bash", "-c",
                   'cd "$0" && "$@"; exit $?', f"/{CHECKOUT}", *command]
-        return run_bounded(isolate("sh", "-c", ENTER, "sh", self.path, *inside), self.log(name), self.deadline,
+        return run_bounded(isolate("sh", "-c", ENTER, "sh", self.path, self.other.path if self.other else "",
+                                   *inside), self.log(name), self.deadline,
                            self.folder)
 
     def ask(self, command):

@@ -142,6 +142,9 @@ class SystemsTest(unittest.TestCase):
             "failed: A.Bad", "skipped: 1: no Docker engine: A.Docker", "skipped: 1: no reason: mute")])
         said = (self.trees / "debian12-demo.log").read_text()
         self.assertIn("as it is now\n", said)
+        self.assertNotIn("SLS_OTHER", said)
+        said = (self.trees / "debian13-demo.log").read_text()
+        self.assertNotIn("SLS_OTHER", said)  # the stand-in's test failed
         self.assertNotIn("no namespaces", said)
         self.expect_nothing_left()
 
@@ -164,6 +167,16 @@ class SystemsTest(unittest.TestCase):
             code, _, errors = self.run_systems("debian13", "--commands", "demo")
             self.assertEqual(code, 0, errors)
         self.assertEqual(self.calls.read_text().split(), ["trixie"])
+
+    def test_the_second_system_sees_the_first_and_only_while_it_is_there(self):
+        self.write_launcher("#!/bin/bash\nmkdir -p build\ntouch here-$1\nls $SLS_OTHER_BUILD/..; env\n")
+        code, _, errors = self.run_systems("debian13", "debian12")
+        self.assertEqual(code, 0, errors)
+        self.assertNotIn("SLS_OTHER", (self.trees / "debian13-test.log").read_text())
+        said = (self.trees / "debian12-demo.log").read_text()
+        self.assertIn("SLS_OTHER_TREE=/other\n", said)
+        self.assertIn("here-test\n", said)
+        self.expect_nothing_left()
 
     def test_a_package_is_copied_out(self):
         code, _, errors = self.run_systems("debian13", "--commands", "package")
