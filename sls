@@ -12,13 +12,13 @@ else
   readonly is_installed=0 self=./sls build="${SLS_BUILD:-$root/build}"
   readonly python_path="$root/python:$build/python"
 fi
-readonly source_commands=(bench build chaos clean docker-demo docs fuzz network-table package reference setup study test)
+readonly source_commands=(bench build chaos clean docker-demo docs fuzz network-table package reference setup study systems test)
 readonly flying=(sim_server control_client recorder closed_loop)
 readonly programs=("${flying[@]}" sim_ctl sls_verify sls_convert delay_margin sls_doctor sls_view)
-readonly packages=(g++ make ninja-build cmake libeigen3-dev libsimbody-dev libfastrtps-dev libfastcdr-dev
+readonly packages=(g++ make ninja-build cmake libeigen3-dev libsimbody-dev libfastcdr-dev
   fastddsgen default-jre-headless libyaml-cpp-dev libcli11-dev libspdlog-dev nlohmann-json3-dev libgtest-dev libssl-dev
   libtinyxml2-dev openssl pybind11-dev python3-dev python3-numpy libboost-dev libzstd-dev zlib1g-dev)
-readonly fuzz_packages=(clang libclang-rt-14-dev)
+readonly fuzz_packages=(clang libclang-rt-dev)
 readonly fuzzers=(scenario qos_file csv recording samples foxglove web)
 readonly test_packages=(libgmock-dev iproute2 nftables cyclonedds-dev cyclonedds-tools fastdds-tools libfaketime
   python3-kubernetes python3-pytest slurm-wlm munge python3-distributed chromium mandoc debootstrap git codespell)
@@ -26,6 +26,10 @@ readonly python_packages=(python3-numpy python3-scipy python3-matplotlib python3
 readonly bench_packages=(libbenchmark-dev python3-matplotlib chromium)
 readonly doc_packages=(doxygen python3-sphinx)
 readonly package_packages=(dpkg-dev file)
+# What only one system has. The launcher installs packages on these systems alone.
+readonly systems=(debian12 debian13)
+readonly debian12_packages=(libfastrtps-dev)
+readonly debian13_packages=(libfastdds-dev)
 
 say() { local text="$*"; echo "sls: ${text//see .\/sls/see $self}" >&2; }
 fail() { say "error: $1"; exit "${2:-1}"; }
@@ -69,11 +73,12 @@ Development
   reference               write docs/reference and the bash completion from the code's tables
   docs                    build API pages of headers and Python package: build/docs/index.html
   package                 build a Debian package: build/package/
+  systems [NAME…]         run the two commands in clean Debian systems and print a table
   setup | build | clean   install packages | build all programs | remove what was built
   help [COMMAND]          this text, or the options of a command
 
 environment: SLS_DOMAIN is the DDS domain of every program that is not given --domain
-
+--no-install with any command: install no Debian packages, use what is there
 exit codes: 0 done; 1 the run or a test failed; 2 bad usage or bad configuration; 130/143 interrupted
 EOF
 }
@@ -136,13 +141,14 @@ EOF
       ;;
     test)
       cat <<'EOF'
-usage: ./sls test [--slow | --sanitize KIND]
+usage: ./sls test [--slow | --sanitize KIND] [--only REGEX]
 
-Sets up, builds and runs the tests.
+Sets up, builds and runs the tests. build/test.xml has the output of each.
 
   --slow            also run the tests that take minutes; they need an idle machine
   --sanitize KIND   run only the unit tests, built with a sanitizer: address; or thread, which runs those
                     with several threads
+  --only REGEX      run only the tests whose names match
 EOF
       ;;
     fuzz)
@@ -163,8 +169,14 @@ EOF
         'Builds API pages of the C++ and C headers and of the Python package:' 'build/docs/index.html.'
       ;;
     package)
-      printf '%s\n\n%s\n' 'usage: ./sls package' \
-        'Builds a Debian package of all that a user needs: build/package/sls_VERSION_ARCHITECTURE.deb.'
+      cat <<'EOF'
+usage: ./sls package [--system NAME]
+
+Builds a Debian package of all that a user needs: build/package/sls_VERSION_ARCHITECTURE.deb. The version ends with the
+name of the system, such as debian12.
+
+  --system NAME    build it in a clean tree of another system, debian12 or debian13, as ./sls systems does
+EOF
       ;;
     python)
       cat <<'EOF'
@@ -179,13 +191,29 @@ EOF
 
 # --- set-up and build -----------------------------------------------------------------------------
 
+# Puts the name of this system into `system`: one of `systems`. Fails on another.
+expect_system() {
+  local name
+  IFS=/ read -r system name < <(
+    unset ID VERSION_ID PRETTY_NAME
+    [[ ! -r /etc/os-release ]] || . /etc/os-release
+    echo "${ID:-}${VERSION_ID:-}/${PRETTY_NAME:-unknown (no /etc/os-release)}"
+  )
+  [[ " ${systems[*]} " == *" $system "* ]] ||
+    fail "this system is $name; tried are Debian 12 and 13. Elsewhere install by hand what the lists at the top of $root/sls name, then add --no-install"
+}
+
 # setup [PACKAGE…]: installs the packages for building and flying, and the given ones.
 setup() {
   if ((is_installed)); then
     install_missing "$@"
     return
   fi
-  install_missing "${packages[@]}" "$@"
+  if ((is_installing)); then
+    expect_system
+    local -n own="${system}_packages"
+    install_missing "${packages[@]}" "${own[@]}" "$@"
+  fi
   install_node
   install_node_modules "$root/tools/view/page"
 }
@@ -212,14 +240,21 @@ install_node_modules() {
   say "installing with npm: what $lock names"
   log="$(mktemp)"
   if ! npm ci --prefix "$1" --no-audit --no-fund >"$log" 2>&1; then
-    tail -n 15 "$log" >&2
-    fail "npm ci failed (whole log: $log)"
+    fail "npm ci: $(sed -nE 's/^npm (ERR!|error) //p' "$log" | head -n 4 | paste -sd ' ') (whole log: $log)"
   fi
   rm -f "$log"
   touch "$installed"  # npm leaves it older than the lock file where nothing had to change
 }
 
+# find_line START FILE [TEXT]: prints TEXT and the rest of the first line that begins with START.
+find_line() {
+  local line
+  line="$(sed -nE "s/$1//p" "$2" | head -n 1)"
+  [[ -z $line ]] || echo -n "${3:-}$line"
+}
+
 install_missing() {
+  ((is_installing)) || return 0
   local missing=() package installed
   installed=" $(dpkg-query -W -f='${Package}=${db:Status-Status} ' "$@" 2>/dev/null || true)"
   for package in "$@"; do
@@ -227,6 +262,7 @@ install_missing() {
   done
   ((${#missing[@]})) || return 0
   ((is_installed == 0)) || fail "this needs packages that are not installed: apt-get install ${missing[*]}"
+  expect_system
   say "installing with apt-get: ${missing[*]}"
   local sudo=()
   if ((EUID != 0)); then
@@ -238,8 +274,8 @@ install_missing() {
   if ! { "${sudo[@]}" apt-get update &&
     "${sudo[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends \
       "${missing[@]}"; } >"$log" 2>&1; then
-    tail -n 15 "$log" >&2
-    fail "apt-get failed (whole log: $log)"
+    # apt-get update only warns where the network is missing; then packages are unknown.
+    fail "apt-get: $(find_line '^E: ' "$log")$(find_line '^W: Failed to fetch ' "$log" '; ') (whole log: $log)"
   fi
   rm -f "$log"
 }
@@ -272,6 +308,10 @@ build_tree() {
   fi
   if ! { (cd "$root" && cmake --preset "$preset" "${fresh[@]}") &&
     cmake --build "$folder" --parallel "$(nproc)" "${targets[@]}"; } >"$folder/build.log" 2>&1; then
+    local reason
+    reason="$(awk '/^CMake Error/ { found = 1; next } found && NF { sub(/^ +/, ""); text = text " " $0 }
+      found && !NF && text { print text; exit }' "$folder/build.log")"
+    [[ -z $reason ]] || fail "CMake:$reason (whole log: $folder/build.log)"
     grep -E -m 20 'error:|Error |ERROR|undefined reference' "$folder/build.log" >&2 || tail -n 20 "$folder/build.log" >&2
     fail "the build failed (whole log: $folder/build.log)"
   fi
@@ -679,16 +719,18 @@ cmd_chaos() {
 }
 
 cmd_test() {
-  local preset=release folder=$build which=(--label-exclude slow) targets=()
-  if [[ $# == 1 && $1 == --slow ]]; then
-    which=()
-  elif (($#)); then
-    [[ $# == 2 && $1 == --sanitize && ($2 == address || $2 == thread) ]] ||
-      fail "test: expected nothing, --slow or --sanitize address|thread, got '$*'" 2
-    preset=asan
-    [[ $2 == thread ]] && preset=tsan which=(--label-regex threaded) targets=(threaded_tests)
-    folder="$root/build-$preset"
-  fi
+  local preset=release folder=$build which=(--label-exclude slow) targets=() only=()
+  while (($#)); do
+    case "$1 ${2:-}" in
+      '--slow '*) which=() ;;
+      '--sanitize address') preset=asan; shift ;;
+      '--sanitize thread') preset=tsan which=(--label-regex threaded) targets=(threaded_tests); shift ;;
+      '--only '?*) only=(--tests-regex "$2"); shift ;;
+      *) fail "test: expected --slow, --sanitize address|thread or --only REGEX, got '$*'" 2 ;;
+    esac
+    shift
+  done
+  [[ $preset == release ]] || folder="$root/build-$preset"
   setup "${test_packages[@]}" "${python_packages[@]}" "${bench_packages[@]}" \
     "${doc_packages[@]}" "${package_packages[@]}"
   install_node_modules "$root/tests/tools/view"
@@ -697,7 +739,7 @@ cmd_test() {
   # Most tests wait for processes and discovery: one more than there are cores leaves none idle.
   # They must not get variables that the middleware reads from the environment.
   env -u ROS_DISCOVERY_SERVER -u FASTRTPS_DEFAULT_PROFILES_FILE -u SLS_DOMAIN \
-    ctest --preset "$preset" --parallel "$(($(nproc) + 1))" "${which[@]}"
+    ctest --preset "$preset" --parallel "$(($(nproc) + 1))" --output-junit "$folder/test.xml" "${which[@]}" "${only[@]}"
 }
 
 cmd_reference() {
@@ -713,7 +755,16 @@ cmd_docs() {
   say "pages: $build/docs/index.html"
 }
 
+cmd_systems() {
+  [[ " $* " != *' aarch64 '* ]] || is_help_asked || build_programs "${flying[@]}"  # the other side of its flights
+  exec /usr/bin/python3 -B "$root/tools/systems" "$@"
+}
+
 cmd_package() {
+  if (($#)); then
+    [[ $# == 2 && $1 == --system ]] || fail "package: expected nothing or --system NAME, got '$*'" 2
+    cmd_systems --commands package -- "$2"
+  fi
   setup "${package_packages[@]}"
   build_tree release "$build" package_contents
   local log="$build/package.log"
@@ -724,8 +775,17 @@ cmd_package() {
 
 cmd_clean() { rm -rf "$root"/build "$root"/build-*; }
 
+is_installing=1
+[[ ${1:-} != --no-install ]] || { is_installing=0; shift; }
 command=${1:-help}
 (($#)) && shift
+if [[ $command != python ]]; then  # its options are the script's
+  options=()
+  for option; do
+    [[ $option == --no-install ]] && is_installing=0 || options+=("$option")
+  done
+  set -- "${options[@]}"
+fi
 case $command in
   help | --help | -h)
     if (($# == 0)); then

@@ -1,4 +1,7 @@
-"""The Debian package in a clean Debian 12: it is installed, flies, and is removed without a trace.
+"""The Debian package in a clean system: it is installed, flies, and is removed without a trace.
+
+package_test.py BUILD tests the package of the build tree in the system of this machine; package_test.py BUILD SYSTEM what
+./sls package --system SYSTEM builds, in that system.
 
 The system is a folder of the build tree. debootstrap fills it once, with the packages that the package depends on.
 Everything in it runs in its own mount and process namespaces: its mounts are not visible outside, and none is left
@@ -15,7 +18,13 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 BUILD = Path(sys.argv[1]).resolve()
-FOLDER = BUILD / "package_test"
+sys.path.insert(0, str(ROOT / "tools/systems"))
+import tree  # noqa: E402
+
+OWN = "".join(re.findall(r'^(?:ID|VERSION_ID)="?(\w+)"?$', "\n".join(sorted(
+    Path("/etc/os-release").read_text(encoding="utf-8").splitlines())), re.MULTILINE))  # such as debian12
+NAME = sys.argv[2] if len(sys.argv) > 2 else OWN
+FOLDER = BUILD / ("package_test" if NAME == OWN else f"package_test_{NAME}")
 SYSTEM = FOLDER / "debian"
 WORK = "/tmp/work"  # the user's folder in the system
 USER = 1000
@@ -62,47 +71,34 @@ def run_apt(*command):
                env=environment)
 
 
-def delete(folder):
-    """Deletes a folder. Raises AssertionError if something is mounted in it: the test itself leaves no mount there."""
-    if any(line.split()[1].startswith(f"{folder}/") for line in Path("/proc/mounts").read_text().splitlines()):
-        raise AssertionError(f"{folder}: something is mounted in it; see /proc/mounts")
-    subprocess.run(["rm", "-rf", "--one-file-system", "--", folder], check=True)
-
-
-def find_mirror():
-    """The mirror that apt of this machine uses."""
-    sites = run(["apt-get", "indextargets", "--format", "$(SITE)", "Created-By: Packages", "Origin: Debian",
-                 "Codename: bookworm", "Component: main"]).split()
-    return sites[0] if sites else "http://deb.debian.org/debian"
-
-
 def make_package():
-    """Makes the package from the build tree, as ./sls package does."""
+    """Makes the package, from the build tree as ./sls package does."""
+    if NAME != OWN:
+        run([ROOT / "sls", "package", "--system", NAME], limit_s=6000)
+        made = sorted((ROOT / "build/package").glob(f"sls_*+{NAME}_*.deb"), key=os.path.getmtime)
+        return made[-1]
     folder = FOLDER / "package"
-    delete(folder)
+    tree.remove(folder)
     said = run(["cpack", "--config", BUILD / "CPackConfig.cmake", "-B", folder], cwd=FOLDER)
     return Path(re.search(r"^CPack: - package: (.*\.deb) generated\.$", said, re.MULTILINE)[1])
 
 
 def make_system(package):
-    """Makes a minimal Debian 12 with only the packages that the package depends on."""
+    """Makes a minimal system with only the packages that the package depends on."""
     depends = run(["dpkg-deb", "--field", package, "Depends"]).strip()
     stamp, wanted = FOLDER / "debian.stamp", hashlib.sha256(depends.encode()).hexdigest()
     if stamp.is_file() and stamp.read_text() == wanted:
         return
     stamp.unlink(missing_ok=True)
     if not (SYSTEM / "debootstrap.done").is_file():
-        delete(SYSTEM)
-        mirror = find_mirror()
+        tree.remove(SYSTEM)
+        mirror = tree.find_mirror()
         made = subprocess.run(["unshare", "--mount", "--propagation", "private", "debootstrap", "--variant=minbase",
-                               "bookworm", SYSTEM, mirror], capture_output=True, text=True, timeout=200, check=False)
+                               tree.CODENAMES[NAME], SYSTEM, mirror], capture_output=True, text=True, timeout=200, check=False)
         if made.returncode != 0:
             skip(f"debootstrap from {mirror} failed: {made.stdout.strip().splitlines()[-1:]}")
         (SYSTEM / "debootstrap.done").touch()
-    # dpkg need not sync to the disk, because this system can be made again.
-    (SYSTEM / "etc/dpkg/dpkg.cfg.d/no_sync").write_text("force-unsafe-io\n")
-    for file in (Path("/etc/resolv.conf"), Path("/etc/hosts"), *Path("/etc/apt/apt.conf.d").glob("*proxy*")):
-        shutil.copy(file, f"{SYSTEM}{file}")  # settings with which this machine reaches the mirror
+    tree.copy_settings(SYSTEM)
     try:
         run_apt("apt-get", "update", "--error-on=any")
     except AssertionError as error:
@@ -138,7 +134,7 @@ class PackageTest(unittest.TestCase):
     def setUpClass(cls):
         cls.package = make_package()
         make_system(cls.package)
-        delete(SYSTEM / WORK[1:])
+        tree.remove(SYSTEM / WORK[1:])
         subprocess.run(["chroot", SYSTEM, "dpkg", "--purge", "sls"], capture_output=True, check=False)
         cls.before = list_files()
         (SYSTEM / WORK[1:]).mkdir()
@@ -151,9 +147,16 @@ class PackageTest(unittest.TestCase):
 
     @classmethod
     def tearDownClass(cls):
-        delete(SYSTEM / WORK[1:])
+        tree.remove(SYSTEM / WORK[1:])
         (SYSTEM / "tmp/sls.deb").unlink()
         subprocess.run(["chroot", SYSTEM, "dpkg", "--purge", "sls"], capture_output=True, check=False)
+
+    def test_0_the_package_names_its_system(self):
+        version = run(["dpkg-deb", "--field", self.package, "Version"]).strip()
+        self.assertRegex(version, rf"^\d+\.\d+\.\d+\+{NAME}$")
+        self.assertRegex(self.package.name, rf"^sls_{re.escape(version)}_\w+\.deb$")
+        text = run(["sh", "-c", 'zcat "$1/usr/share/doc/sls/changelog.gz"', "sh", SYSTEM])
+        self.assertTrue(text.startswith(f"sls ({version}) "), text)
 
     def test_1_a_flight_is_that_of_the_build_tree_bit_for_bit(self):
         said = fly("sls", "run", "short")
@@ -187,10 +190,11 @@ class PackageTest(unittest.TestCase):
             self.assertEqual(fly("sls", name, expected=2),
                              f"sls: error: {name}: needs the source tree; this sls is installed without it\n")
 
+    @unittest.skipIf(NAME != OWN, "skipped: this machine has the compilers of another system")
     def test_4_an_example_is_built_against_the_package_and_flown(self):
         unpacked, example = FOLDER / "unpacked", FOLDER / "my_controller"
         for folder in (unpacked, example):
-            delete(folder)
+            tree.remove(folder)
         run(["dpkg-deb", "--extract", self.package, unpacked])
         shutil.copytree(unpacked / "usr/share/doc/sls/examples/my_controller", example)
         run(["cmake", "-S", example, "-B", example / "build", f"-DCMAKE_PREFIX_PATH={unpacked}/usr",
@@ -217,6 +221,8 @@ if __name__ == "__main__":
     for program in ("debootstrap", "cpack", "dpkg-shlibdeps", "unshare", "ip"):
         if not shutil.which(program):
             skip(f"{program} is missing")
+    if NAME not in tree.CODENAMES:
+        skip(f"no clean {NAME} can be made: expected one of {', '.join(tree.CODENAMES)}")
     if subprocess.run(isolate("true"), check=False).returncode != 0:
         skip("this machine gives no namespaces, or no /proc in them")
     FOLDER.mkdir(exist_ok=True)

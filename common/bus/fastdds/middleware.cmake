@@ -1,37 +1,6 @@
-# Finds Fast DDS 2 (2.9 to 2.14) or 3, with the Fast CDR that belongs to it. What differs between them in C++ is in
-# version2/ and version3/, fastcdr1/ and fastcdr2/; the includes of one of each are found.
-set(SLS_FASTDDS "" CACHE STRING "Major version of Fast DDS, 2 or 3; empty: 3 if it is installed, else 2")
-if(NOT SLS_FASTDDS MATCHES "^[23]?$")
-  message(FATAL_ERROR "SLS_FASTDDS: expected 2, 3 or nothing, got '${SLS_FASTDDS}'")
-endif()
-if(NOT SLS_FASTDDS STREQUAL "2")
-  find_package(fastdds 3 QUIET)
-endif()
-if(NOT fastdds_FOUND AND NOT SLS_FASTDDS STREQUAL "3")
-  find_package(fastrtps 2.9 QUIET)
-endif()
-if(fastdds_FOUND)
-  set(sls_fastdds_version 3)
-  set(sls_fastdds_target fastdds)
-elseif(fastrtps_FOUND)
-  set(sls_fastdds_version 2)
-  set(sls_fastdds_target fastrtps)
-else()
-  message(FATAL_ERROR "Fast DDS: expected its headers and library, version 2.9 to 2.14 (Debian 12: libfastrtps-dev) or 3 \
-(Debian 13: libfastdds-dev), got none that CMake finds")
-endif()
-message(STATUS "Fast DDS: ${sls_fastdds_target} ${${sls_fastdds_target}_VERSION}")
-find_package(fastcdr REQUIRED)
-if(fastcdr_VERSION VERSION_LESS 2)
-  set(sls_fastcdr_version 1)
-else()
-  set(sls_fastcdr_version 2)
-endif()
-if(sls_fastdds_version EQUAL 3 AND sls_fastcdr_version EQUAL 1)
-  message(FATAL_ERROR "Fast CDR: expected version 2, as Fast DDS ${fastdds_VERSION} needs, got ${fastcdr_VERSION} in \
-${fastcdr_DIR}")
-endif()
-find_program(FASTDDSGEN fastddsgen REQUIRED)
+# Fast DDS 2 or 3: what differs between them in C++ is in version2/ and version3/, fastcdr1/ and fastcdr2/; the includes of
+# one of each are found.
+include(${CMAKE_CURRENT_LIST_DIR}/find.cmake)
 set(sls_fastdds_includes ${CMAKE_CURRENT_LIST_DIR}/version${sls_fastdds_version}
                          ${CMAKE_CURRENT_LIST_DIR}/fastcdr${sls_fastcdr_version})
 

@@ -1,0 +1,132 @@
+"""What the launcher installs on which system, and its one line where it cannot.
+
+A copy of the launcher reads the test's own os-release. Stand-ins for dpkg-query, apt-get and npm record their calls."""
+
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+DEBIAN = 'PRETTY_NAME="Debian GNU/Linux {0} ({1})"\nNAME="Debian GNU/Linux"\nVERSION_ID="{0}"\nID=debian\n'
+BOOKWORM, TRIXIE = DEBIAN.format(12, "bookworm"), DEBIAN.format(13, "trixie")
+NOT_TRIED = {
+    "Debian GNU/Linux 11 (bullseye)": DEBIAN.format(11, "bullseye"),
+    "Debian GNU/Linux forky/sid": 'PRETTY_NAME="Debian GNU/Linux forky/sid"\nID=debian\n',
+    "Ubuntu 24.04.1 LTS": 'PRETTY_NAME="Ubuntu 24.04.1 LTS"\nID=ubuntu\nID_LIKE=debian\nVERSION_ID="24.04"\n',
+    "Fedora Linux 41": "ID=fedora\nVERSION_ID=41\nPRETTY_NAME='Fedora Linux 41'\n",
+    "Mint 12": 'ID=linuxmint\nID_LIKE=debian\nVERSION_ID="12"\nPRETTY_NAME="Mint 12"\n',
+    "unknown (no /etc/os-release)": None,
+}
+# What apt-get of Debian 12 says without a network, shortened.
+OFFLINE = """W: Failed to fetch http://deb.debian.org/debian/dists/bookworm/InRelease  Temporary failure resolving 'deb.debian.org'
+W: Some index files failed to download. They have been ignored, or old ones used instead.
+E: Unable to locate package g++
+E: Unable to locate package ninja-build
+"""
+
+
+class SetupTest(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+        self.root = self.folder / "checkout"
+        self.root.mkdir()
+        text = (ROOT / "sls").read_text(encoding="utf-8")
+        self.release = self.folder / "os-release"
+        self.assertIn("/etc/os-release", text)
+        (self.root / "sls").write_text(text.replace(" /etc/os-release", f" {self.release}"), encoding="utf-8")
+        (self.root / "sls").chmod(0o755)
+        self.calls = self.folder / "calls"
+        self.said = self.folder / "said"
+        for name, action in (("dpkg-query", "exit 1"), ("node", "echo v18.0.0"), ("sudo", 'exec "$@"'),
+                             ("apt-get", f"test ! -f {self.said} || {{ cat {self.said}; exit 100; }}"),
+                             ("npm", f"cat {self.said} >&2; exit 1")):
+            self.stand_in(name, action)
+
+    def stand_in(self, name, action):
+        path = self.folder / "bin" / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(f'#!/bin/sh\necho {name} "$*" >>{self.calls}\n{action}\n')
+        path.chmod(0o755)
+
+    def launch(self, release, *words):
+        """Starts the launcher on a system with this os-release; returns code, output and the calls of stand-ins."""
+        self.release.unlink(missing_ok=True)
+        if release is not None:
+            self.release.write_text(release)
+        self.calls.write_text("")
+        environment = {**os.environ, "PATH": f"{self.folder}/bin:{os.environ['PATH']}", "TMPDIR": str(self.folder)}
+        environment.pop("SLS_BUILD", None)
+        done = subprocess.run([self.root / "sls", *words], env=environment, cwd=self.folder, capture_output=True,
+                              text=True, timeout=60, check=False)
+        return done.returncode, done.stdout + done.stderr, self.calls.read_text()
+
+    def test_each_system_gets_its_own_names(self):
+        for release, own, other in ((BOOKWORM, "libfastrtps-dev", "libfastdds-dev"),
+                                    (TRIXIE, "libfastdds-dev", "libfastrtps-dev")):
+            code, said, calls = self.launch(release, "setup")
+            self.assertEqual(code, 0, said)
+            install = [line for line in calls.splitlines() if line.startswith("apt-get install")]
+            self.assertEqual(len(install), 1, calls)
+            self.assertIn(own, install[0].split())
+            self.assertIn("libsimbody-dev", install[0].split())
+            self.assertNotIn(other, install[0].split())
+
+    def test_another_system_is_refused_in_one_line_and_nothing_is_installed(self):
+        for name, release in NOT_TRIED.items():
+            for command in ("setup", "demo", "report"):
+                with self.subTest(name, command=command):
+                    code, said, calls = self.launch(release, command)
+                    said = said.replace(str(self.release), "/etc/os-release")
+                    self.assertEqual((code, said), (1, (
+                        f"sls: error: this system is {name}; tried are Debian 12 and 13. Elsewhere install by hand "
+                        f"what the lists at the top of {self.root}/sls name, then add --no-install\n")))
+                    self.assertNotIn("apt-get", calls)
+
+    def test_variables_of_the_caller_are_no_system(self):
+        os.environ |= {"ID": "debian", "VERSION_ID": "12"}
+        self.addCleanup(lambda: [os.environ.pop(name) for name in ("ID", "VERSION_ID")])
+        self.assertEqual(self.launch(None, "setup")[0], 1)
+
+    def test_no_install_installs_nothing_on_any_system(self):
+        for release in (BOOKWORM, NOT_TRIED["Ubuntu 24.04.1 LTS"], None):
+            for words in (("setup", "--no-install"), ("--no-install", "setup")):
+                code, said, calls = self.launch(release, *words)
+                self.assertEqual((code, said), (0, ""))
+                self.assertNotIn("apt-get", calls)
+
+    def test_a_missing_network_is_one_line_with_the_reason(self):
+        self.said.write_text(OFFLINE)
+        code, said, _ = self.launch(BOOKWORM, "setup")
+        first, error, *rest = said.splitlines()
+        self.assertEqual((code, rest), (1, []), said)
+        self.assertTrue(first.startswith("sls: installing with apt-get: "))
+        self.assertRegex(error, r"^sls: error: apt-get: Unable to locate package g\+\+; http://deb\.debian\.org/\S+  "
+                                r"Temporary failure resolving 'deb\.debian\.org' \(whole log: \S+\)$")
+
+    def test_a_package_that_is_half_configured_is_one_line_with_the_way_out(self):
+        self.said.write_text("E: dpkg was interrupted, you must manually run 'dpkg --configure -a' to correct the "
+                             "problem. \n")
+        code, said, _ = self.launch(TRIXIE, "setup")
+        self.assertEqual(code, 1)
+        self.assertIn("error: apt-get: dpkg was interrupted, you must manually run 'dpkg --configure -a'", said)
+        self.assertEqual(len(said.splitlines()), 2, said)
+
+    def test_npm_without_a_network_is_one_line_with_the_reason(self):
+        page = self.root / "tools/view/page"
+        page.mkdir(parents=True)
+        (page / "package-lock.json").write_text("{}")
+        for mark in ("ERR!", "error"):
+            self.said.write_text(f"npm {mark} code ENOTFOUND\nnpm {mark} syscall getaddrinfo\nnpm {mark} errno ENOTFOUND\n"
+                                 f"npm {mark} network request to https://registry.npmjs.org/three failed\n")
+            code, said, _ = self.launch(BOOKWORM, "setup", "--no-install")
+            self.assertEqual(code, 1)
+            self.assertRegex(said.splitlines()[-1], "^sls: error: npm ci: code ENOTFOUND .* failed .whole log: ")
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])
