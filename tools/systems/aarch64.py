@@ -8,6 +8,7 @@ import argparse
 import hashlib
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -178,6 +179,14 @@ def fly_over_dds(build: Path, tree: Path, scenario: Path, log: Path) -> str:
     return manifest["certificate"]
 
 
+def count_fused(tree: Path) -> int:
+    """Number of fused multiply-adds in closed_loop for ARM. Its own code must have none: `-ffp-contract=off` and Eigen
+    without vector instructions."""
+    said = subprocess.run(enter(tree, "aarch64-linux-gnu-objdump -d build-aarch64/bin/closed_loop\n"), check=True,
+                          capture_output=True, text=True, env=clean_environment(), timeout=LIMITS_S["flight"]).stdout
+    return len(re.findall(r"\tf(?:n?m(?:add|sub)|ml[as])\t", said))
+
+
 def print_flights(build: Path, tree: Path, log: Path) -> bool:
     """Flies DDS_SCENARIOS with the client on ARM; true if their certificates are those of this machine."""
     is_equal = True
@@ -241,9 +250,11 @@ def main() -> int:
             make_tree(tree, log)
             print("building for ARM", flush=True)
             run("build", enter(tree, read_commands()[1]), log, clean_environment())
+            fused = count_fused(tree)
+            print(f"fused instructions in closed_loop for ARM: {fused}, expected 0", flush=True)
             processors = certificates.list_processors(build, BUILD, tree)
             is_one = certificates.print_table(processors, arguments.scenarios)
-            return 0 if print_flights(build, tree, log) and is_one else 1
+            return 0 if print_flights(build, tree, log) and is_one and fused == 0 else 1
     except StepError as error:
         print(f"sls: error: {error}", file=sys.stderr)
         return 1
