@@ -1,5 +1,6 @@
 #include "common/model/math.hpp"
 
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <limits>
@@ -310,6 +311,18 @@ double tan(double x) {
 }
 
 double asin(double x) { return atan2(x, std::sqrt((1.0 - x) * (1.0 + x))); }
+
+double hypot(double x, double y) {
+  constexpr double kMost = 0x1p500, kLeast = 0x1p-400;
+  const double abs_x = std::abs(x), abs_y = std::abs(y);
+  const double greater = abs_x < abs_y ? abs_y : abs_x;
+  if (abs_x == kInfinity || abs_y == kInfinity) return kInfinity;
+  if (greater > kMost)
+    return std::sqrt((x * 0x1p-600) * (x * 0x1p-600) + (y * 0x1p-600) * (y * 0x1p-600)) * 0x1p600;
+  if (greater < kLeast)
+    return std::sqrt((x * 0x1p600) * (x * 0x1p600) + (y * 0x1p600) * (y * 0x1p600)) * 0x1p-600;
+  return std::sqrt(x * x + y * y);
+}
 
 double expm1(double x) {
   // W. Kahan: what rounding of u does to u − 1, it does to log u.

@@ -4,8 +4,6 @@
 // these, not those of <cmath>.
 #pragma once
 
-#include <cmath>
-
 namespace sls::math {
 
 // Errors of sin, cos, exp, log and atan2 are below 1 unit in the last place (`sls_math_error`
@@ -31,7 +29,7 @@ double asin(double x);
 /// e^x − 1.
 double expm1(double x);
 
-/// Length of (x, y). Exact operations of the formula as written: overflows from 1e154 on.
-inline double hypot(double x, double y) { return std::sqrt(x * x + y * y); }
+/// Length of (x, y), without overflow or underflow of the squares.
+double hypot(double x, double y);
 
 }  // namespace sls::math

@@ -158,6 +158,10 @@ const Function kFunctions[] = {
      }},
     {"tan", draw_angle, [](const Point& p) { return math::tan(p.x); }, of_one<mpfr_tan>},
     {"asin", draw_sine, [](const Point& p) { return math::asin(p.x); }, of_one<mpfr_asin>},
+    {"hypot", draw_vector, [](const Point& p) { return math::hypot(p.x, p.y); },
+     [](mpfr_ptr result, mpfr_srcptr x, mpfr_srcptr y) {
+       return mpfr_hypot(result, x, y, MPFR_RNDN);
+     }},
     {"expm1", draw_exponent, [](const Point& p) { return math::expm1(p.x); }, of_one<mpfr_expm1>},
 };
 

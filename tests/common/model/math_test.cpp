@@ -26,8 +26,8 @@ constexpr double kPi = 3.14159265358979323846;
 
 TEST(MathTest, ErrorsAgainstMpfrAreBelowTheirBounds) {
   for (const test::GreatestError& error : test::find_greatest_errors(100'000, 7)) {
-    const bool is_by_identity =
-        error.function == "tan" || error.function == "asin" || error.function == "expm1";
+    const bool is_by_identity = error.function == "tan" || error.function == "asin" ||
+                                error.function == "hypot" || error.function == "expm1";
     EXPECT_LE(error.ulps, is_by_identity ? 3.0 : 1.0)
         << error.function << " at x = " << error.x << ", y = " << error.y;
   }
@@ -124,6 +124,15 @@ TEST(MathTest, ArcTangentOfSpecialArgumentsIsThatOfC99) {
   }
   EXPECT_TRUE(std::isnan(atan2(kNan, 1.0)));
   EXPECT_TRUE(std::isnan(atan2(1.0, kNan)));
+}
+
+TEST(MathTest, LengthOfSpecialArgumentsIsThatOfC99) {
+  EXPECT_TRUE(is_same(hypot(-0.0, -0.0), 0.0));
+  EXPECT_TRUE(is_same(hypot(kInf, kNan), kInf));
+  EXPECT_TRUE(is_same(hypot(kNan, -kInf), kInf));
+  EXPECT_TRUE(std::isnan(hypot(kNan, 1.0)));
+  EXPECT_TRUE(is_same(hypot(3e300, -4e300), 5e300));
+  EXPECT_TRUE(is_same(hypot(kTiny, 0.0), kTiny));
 }
 
 TEST(MathTest, ArcSineOfSpecialArgumentsIsThatOfC99) {
