@@ -6,6 +6,8 @@
 #include <limits>
 #include <variant>
 
+#include "common/model/math.hpp"
+
 namespace sls::closed_loop {
 namespace {
 
@@ -129,7 +131,7 @@ void FlightMeasures::add(const FlownStep& step) {
     }
   }
   const Eigen::Vector3d p_QL_W = step.truth.p_WL - step.truth.p_WQ;
-  tilt_max_ = std::max(tilt_max_, std::atan2(p_QL_W.head<2>().norm(), p_QL_W.z()));
+  tilt_max_ = std::max(tilt_max_, math::atan2(p_QL_W.head<2>().norm(), p_QL_W.z()));
   max_square_of_force_ = std::max(max_square_of_force_, step.answer.f_Q_W.squaredNorm());
 }
 

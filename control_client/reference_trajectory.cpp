@@ -1,6 +1,6 @@
 #include "control_client/reference_trajectory.hpp"
 
-#include <cmath>
+#include "common/model/math.hpp"
 
 namespace sls::control {
 namespace {
@@ -11,7 +11,9 @@ constexpr double kTwoPi = 6.283185307179586476925286766559;
 /// lower half by point symmetry, because cancellation of its terms would lose digits.
 double calc_blend(double tau) {
   if (tau > 0.5) return 1.0 - calc_blend(1.0 - tau);
-  return std::pow(tau, 5) * (126.0 + tau * (-420.0 + tau * (540.0 + tau * (-315.0 + tau * 70.0))));
+  const double square = tau * tau;
+  return square * square * tau *
+         (126.0 + tau * (-420.0 + tau * (540.0 + tau * (-315.0 + tau * 70.0))));
 }
 
 std::unique_ptr<const ReferenceTrajectory> make(const config::ConstantReference& config) {
@@ -37,7 +39,9 @@ model::Reference FigureEight::calc(double time) const {
   const Eigen::Array3d amplitude = config_.amplitude.array();
   const double base = kTwoPi / config_.period_s;
   const Eigen::Array3d omega(base, 2.0 * base, base);
-  const Eigen::Array3d sine = (omega * time).sin(), cosine = (omega * time).cos();
+  const math::SineCosine once = math::sincos(base * time), twice = math::sincos(2.0 * base * time);
+  const Eigen::Array3d sine(once.sine, twice.sine, once.sine);
+  const Eigen::Array3d cosine(once.cosine, twice.cosine, once.cosine);
   model::Reference reference;
   reference.position = config_.offset + (amplitude * sine).matrix();
   reference.velocity = amplitude * omega * cosine;
@@ -58,12 +62,12 @@ model::Reference RestToRest::calc(double time) const {
   const double tau = time / duration;
   const double u = tau * (1.0 - tau), u_dot = 1.0 - 2.0 * tau;
   const Eigen::Vector3d way = config_.to - config_.from;
-  const double rate = 1.0 / duration;
+  const double u2 = u * u, rate = 1.0 / duration, rate2 = rate * rate;
   reference.position = config_.from + way * calc_blend(tau);
-  reference.velocity = way * (rate * 630.0 * std::pow(u, 4));
-  reference.acceleration = way * (std::pow(rate, 2) * 2520.0 * std::pow(u, 3) * u_dot);
-  reference.jerk = way * (std::pow(rate, 3) * 2520.0 * u * u * (3.0 * u_dot * u_dot - 2.0 * u));
-  reference.snap = way * (std::pow(rate, 4) * 15120.0 * u * u_dot * (u_dot * u_dot - 3.0 * u));
+  reference.velocity = way * (rate * 630.0 * u2 * u2);
+  reference.acceleration = way * (rate2 * 2520.0 * u2 * u * u_dot);
+  reference.jerk = way * (rate2 * rate * 2520.0 * u2 * (3.0 * u_dot * u_dot - 2.0 * u));
+  reference.snap = way * (rate2 * rate2 * 15120.0 * u * u_dot * (u_dot * u_dot - 3.0 * u));
   return reference;
 }
 

@@ -1,6 +1,6 @@
 #include "control_client/state_wiring.hpp"
 
-#include <cmath>
+#include "common/model/math.hpp"
 
 namespace sls::control {
 
@@ -12,7 +12,7 @@ model::RodAngles calc_wired_angles(const model::RodAngles& rod, config::StateWir
   slots.alpha = rod.beta;
   slots.beta = -rod.alpha;
   slots.alpha_dot = rod_length * rod.alpha_dot -
-                    2.0 * rod_length * std::tan(rod.alpha) * std::tan(rod.beta) * rod.beta_dot;
+                    2.0 * rod_length * math::tan(rod.alpha) * math::tan(rod.beta) * rod.beta_dot;
   slots.beta_dot = rod_length * rod.beta_dot;
   return slots;
 }

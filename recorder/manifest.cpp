@@ -36,8 +36,8 @@ std::string read_cpu_info(const std::string& key) {
   return "";
 }
 
-/// Vector extensions by which libc chooses its code for sin and cos. Machines with the same
-/// extensions give the same bytes.
+/// Extensions by which the C library chooses its code. Only plug-ins that call its elementary
+/// functions depend on them.
 Json list_math_features() {
   const std::string flags = " " + read_cpu_info("flags") + " ";
   Json features = Json::array();

@@ -5,6 +5,7 @@
 #include <optional>
 #include <variant>
 
+#include "common/model/math.hpp"
 #include "common/model/offset.hpp"
 #include "sim_server/plants/sensing/delay_line.hpp"
 
@@ -36,8 +37,8 @@ class Dice {
   /// Standard normal, by Box and Muller.
   double calc_normal(std::uint64_t component) const {
     constexpr double kFullTurn = 6.283185307179586;
-    const double radius = std::sqrt(-2.0 * std::log(calc_uniform(2 * component)));
-    return radius * std::cos(kFullTurn * calc_uniform(2 * component + 1));
+    const double radius = std::sqrt(-2.0 * math::log(calc_uniform(2 * component)));
+    return radius * math::cos(kFullTurn * calc_uniform(2 * component + 1));
   }
 
   Eigen::Vector3d calc_normals(std::uint64_t component) const {

@@ -1,6 +1,6 @@
 #include "common/model/forces.hpp"
 
-#include <cmath>
+#include "common/model/math.hpp"
 
 namespace sls::model {
 
@@ -16,8 +16,8 @@ CommandedAttitude calc_commanded_attitude(const Eigen::Vector3d& f_Q_W) {
   CommandedAttitude attitude;
   if (f_Q_W.isZero(0.0)) return attitude;
   // asin(F_y / |F|) without the square of a tiny or huge force.
-  attitude.roll = std::atan2(f_Q_W.y(), std::hypot(f_Q_W.x(), f_Q_W.z()));
-  attitude.pitch = std::atan2(-f_Q_W.x(), -f_Q_W.z());
+  attitude.roll = math::atan2(f_Q_W.y(), math::hypot(f_Q_W.x(), f_Q_W.z()));
+  attitude.pitch = math::atan2(-f_Q_W.x(), -f_Q_W.z());
   return attitude;
 }
 

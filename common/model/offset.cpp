@@ -1,5 +1,7 @@
 #include "common/model/offset.hpp"
 
+#include "common/model/rotation.hpp"
+
 namespace sls::model {
 
 bool moves_rod(const RodAngles& rod) {
@@ -22,10 +24,10 @@ Measurement add(const Measurement& state, const StateOffset& offset, double rod_
 }
 
 Eigen::Quaterniond turn(const Eigen::Quaterniond& q_WB, const AttitudeError& error) {
-  using Eigen::AngleAxisd, Eigen::Vector3d;
-  const Eigen::Quaterniond seen_from_true(AngleAxisd(error.yaw, Vector3d::UnitZ()) *
-                                          AngleAxisd(error.tilt.y(), Vector3d::UnitY()) *
-                                          AngleAxisd(error.tilt.x(), Vector3d::UnitX()));
+  using Eigen::Vector3d;
+  const Eigen::Quaterniond seen_from_true = make_turn(error.yaw, Vector3d::UnitZ()) *
+                                            make_turn(error.tilt.y(), Vector3d::UnitY()) *
+                                            make_turn(error.tilt.x(), Vector3d::UnitX());
   return seen_from_true * q_WB;  // Eq. (9)
 }
 

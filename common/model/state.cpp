@@ -2,11 +2,13 @@
 
 #include <cmath>
 
+#include "common/model/math.hpp"
+
 namespace sls::model {
 
 RodDirection to_direction(const RodAngles& angles) {
-  const double sin_a = std::sin(angles.alpha), cos_a = std::cos(angles.alpha);
-  const double sin_b = std::sin(angles.beta), cos_b = std::cos(angles.beta);
+  const auto [sin_a, cos_a] = math::sincos(angles.alpha);
+  const auto [sin_b, cos_b] = math::sincos(angles.beta);
   RodDirection direction;
   direction.n_W << sin_b, -sin_a * cos_b, cos_a * cos_b;  // Eq. (1)
   direction.n_dot_W << cos_b * angles.beta_dot,           // Eq. (2)
@@ -21,12 +23,12 @@ RodAngles to_angles(const RodDirection& direction) {
   RodAngles angles;
   // Eq. (3): asin(n_x) and asin(−n_y / cos β), written so that they keep full precision near ±π/2
   // and stay right when the load is above the quadrotor.
-  const double cos_b = std::hypot(n.y(), n.z());
-  angles.beta = std::atan2(n.x(), cos_b);
-  angles.alpha = std::atan2(0.0 - n.y(), n.z());  // 0 − x: a hanging rod has no −0
+  const double cos_b = math::hypot(n.y(), n.z());
+  angles.beta = math::atan2(n.x(), cos_b);
+  angles.alpha = math::atan2(0.0 - n.y(), n.z());  // 0 − x: a hanging rod has no −0
   // Eq. (4), with the divisions by cos α and, for β̇, by cos β removed by (2).
-  const double sin_a = std::sin(angles.alpha), cos_a = std::cos(angles.alpha);
-  const double sin_b = std::sin(angles.beta);
+  const auto [sin_a, cos_a] = math::sincos(angles.alpha);
+  const double sin_b = math::sin(angles.beta);
   angles.beta_dot = cos_b * n_dot.x() + sin_b * (sin_a * n_dot.y() - cos_a * n_dot.z());
   angles.alpha_dot = (0.0 - cos_a * n_dot.y() - sin_a * n_dot.z()) / cos_b;
   return angles;

@@ -1,7 +1,10 @@
 #include "common/plugin/shared_library.hpp"
 
 #include <dlfcn.h>
+#include <elf.h>
 
+#include <cstring>
+#include <fstream>
 #include <map>
 #include <mutex>
 #include <system_error>
@@ -30,6 +33,46 @@ struct LoadedLibraries {
 LoadedLibraries& loaded_libraries() {
   static LoadedLibraries libraries;
   return libraries;
+}
+
+#if defined(__x86_64__)
+constexpr unsigned kOwnMachine = EM_X86_64;
+#elif defined(__aarch64__)
+constexpr unsigned kOwnMachine = EM_AARCH64;
+#endif
+
+std::string to_name(unsigned machine) {
+  switch (machine) {
+    case EM_X86_64:
+      return "x86-64";
+    case EM_AARCH64:
+      return "aarch64";
+    case EM_386:
+      return "i386";
+    case EM_ARM:
+      return "32-bit ARM";
+    case EM_RISCV:
+      return "RISC-V";
+    default:
+      return "ELF machine " + std::to_string(machine);
+  }
+}
+
+/// The machine of an ELF file of this byte order; ours for any other file, which dlopen refuses.
+unsigned read_machine(const std::string& path) {
+  // e_machine has the same place in files of 32 and of 64 bits.
+  Elf64_Ehdr header{};
+  std::ifstream(path, std::ios::binary).read(reinterpret_cast<char*>(&header), sizeof(header));
+  const bool is_elf = std::memcmp(header.e_ident, ELFMAG, SELFMAG) == 0;
+  return is_elf && header.e_ident[EI_DATA] == ELFDATA2LSB && header.e_machine != EM_NONE
+             ? header.e_machine
+             : kOwnMachine;
+}
+
+/// True if the library needs a newer C or C++ library than this system has.
+bool is_for_newer_system(const std::string& error) {
+  return error.find(": version `") != std::string::npos &&
+         error.find(" not found (required by ") != std::string::npos;
 }
 
 }  // namespace
@@ -93,6 +136,10 @@ SharedLibrary::SharedLibrary(const std::filesystem::path& file, const std::strin
 }
 
 void SharedLibrary::load(const std::string& path) {
+  // dlopen says "No such file or directory" of a library for another machine.
+  if (const unsigned machine = read_machine(path); machine != kOwnMachine)
+    fail("expected a shared library for " + to_name(kOwnMachine) + ", got one for " +
+         to_name(machine));
   const std::uint64_t mode = floating_point_mode();
   {
     const CallGuard guard({name_.c_str(), "(loading)", 0, 0});
@@ -105,7 +152,12 @@ void SharedLibrary::load(const std::string& path) {
         "changes the floating-point mode of the whole process when it is loaded; link it without "
         "-ffast-math");
   }
-  if (!handle_) fail(std::string("expected a shared library that loads, got: ") + ::dlerror());
+  if (handle_) return;
+  const std::string error = ::dlerror();
+  fail((is_for_newer_system(error) ? "expected a shared library built on this system or an older "
+                                     "one, got: "
+                                   : "expected a shared library that loads, got: ") +
+       error);
 }
 
 std::string find_loaded_sha256(const std::filesystem::path& file) {

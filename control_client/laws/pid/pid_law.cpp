@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "common/model/math.hpp"
 #include "control_client/laws/error_integral.hpp"
 
 namespace sls::control {
@@ -28,8 +29,8 @@ LawOutput PidLaw::calc(const LawInput& input) const {
   // Eq. (1): position error and velocity of the load by the controller's own model.
   const Vector3d error = input.reference.position - input.state.p_WQ - vehicle_.rod_length * q;
   const Vector3d velocity = input.state.v_WQ + vehicle_.rod_length * q_dot;
-  if (std::cos(input.state.rod.alpha) < kMinRodCosine ||
-      std::cos(input.state.rod.beta) < kMinRodCosine)
+  if (math::cos(input.state.rod.alpha) < kMinRodCosine ||
+      math::cos(input.state.rod.beta) < kMinRodCosine)
     return fail(Fault::kRodLevel);
 
   // Eqs. (2) and (3): the position loop gives a desired velocity, the velocity loop a desired

@@ -8,6 +8,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "common/model/math.hpp"
+
 namespace sls::control {
 namespace {
 
@@ -23,8 +25,8 @@ MatrixXd calc_matrix_sign(const MatrixXd& H) {
   MatrixXd Z = H;
   for (int iteration = 0; iteration < 100; ++iteration) {
     const Eigen::PartialPivLU<MatrixXd> lu(Z);
-    const double log_determinant = lu.matrixLU().diagonal().cwiseAbs().array().log().sum();
-    const double scale = std::exp(-log_determinant / size);
+    const double log_determinant = lu.matrixLU().diagonal().cwiseAbs().unaryExpr(&math::log).sum();
+    const double scale = math::exp(-log_determinant / size);
     const MatrixXd next = 0.5 * (scale * Z + lu.inverse() / scale);
     if (!next.allFinite()) break;
     const double change = (next - Z).norm();

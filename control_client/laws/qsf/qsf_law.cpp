@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "common/model/math.hpp"
 #include "control_client/laws/error_integral.hpp"
 #include "control_client/laws/qsf/lqr.hpp"
 
@@ -81,7 +82,7 @@ QsfOutput calc_qsf(const QsfInput& input, const model::SlungLoadParameters& vehi
   output.integral_rate << (gains.horizontal.integral != 0.0 ? e.x() : 0.0),
       (gains.horizontal.integral != 0.0 ? e.y() : 0.0),
       (gains.vertical.integral != 0.0 ? e.z() : 0.0);
-  if (std::cos(input.rod.alpha) < kMinRodCosine || std::cos(input.rod.beta) < kMinRodCosine) {
+  if (math::cos(input.rod.alpha) < kMinRodCosine || math::cos(input.rod.beta) < kMinRodCosine) {
     return fail(Fault::kRodLevel);
   }
 

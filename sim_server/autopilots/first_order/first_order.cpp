@@ -1,7 +1,6 @@
 // The direction of the thrust follows that of the force with a first-order lag. README.md beside
 // this file.
-#include <cmath>
-
+#include "common/model/math.hpp"
 #include "sim_server/autopilots/autopilot.hpp"
 #include "sim_server/autopilots/first_order/keys.hpp"
 
@@ -33,7 +32,7 @@ class FirstOrder : public Autopilot {
  private:
   /// The fraction of a deviation that remains after one period.
   static double calc_kept(double period_s, double lag_s) {
-    return lag_s > 0.0 ? std::exp(-period_s / lag_s) : 0.0;
+    return lag_s > 0.0 ? math::exp(-period_s / lag_s) : 0.0;
   }
 
   const std::vector<Rotor> rotors_;

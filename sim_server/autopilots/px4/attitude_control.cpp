@@ -1,7 +1,8 @@
 #include "sim_server/autopilots/px4/attitude_control.hpp"
 
 #include <algorithm>
-#include <cmath>
+
+#include "common/model/math.hpp"
 
 namespace sls::sim::px4 {
 namespace {
@@ -27,9 +28,9 @@ Vector3d calc_rate_set_points(const Quaterniond& q_WB, const Quaterniond& q_WB_w
   const Quaterniond reduced = calc_reduced_attitude(q_WB, q_WB_wanted);
   // Eq. (4). Both z axes agree, so the remaining rotation is about z.
   const Quaterniond yaw = to_shorter(reduced.conjugate() * q_WB_wanted);
-  const double half_angle = gains.yaw_weight * std::atan2(yaw.z(), yaw.w());
-  const Quaterniond wanted =
-      reduced * Quaterniond(std::cos(half_angle), 0.0, 0.0, std::sin(half_angle));
+  const double half_angle = gains.yaw_weight * math::atan2(yaw.z(), yaw.w());
+  const auto [sine, cosine] = math::sincos(half_angle);
+  const Quaterniond wanted = reduced * Quaterniond(cosine, 0.0, 0.0, sine);
   // Eq. (5).
   const Vector3d error = 2.0 * to_shorter(q_WB.conjugate() * wanted).vec();
   // Eq. (6). The division cancels the weight for a small error of yaw alone.

@@ -3,13 +3,14 @@
 #include <cmath>
 
 #include "common/config/scenario_keys.hpp"
+#include "common/model/math.hpp"
 
 namespace sls::sim::px4 {
 
 LowPassFilter::LowPassFilter(double sample_rate, double cut_off) : is_off_(cut_off == 0.0) {
   if (is_off_) return;
   // Eq. (7).
-  const double w = std::tan(config::kPi * cut_off / sample_rate);
+  const double w = math::tan(config::kPi * cut_off / sample_rate);
   const double scale = 1.0 / (1.0 + std::sqrt(2.0) * w + w * w);
   gain_ = w * w * scale;
   a1_ = 2.0 * (w * w - 1.0) * scale;

@@ -18,6 +18,7 @@
 #include "sim_server/plants/multirotor/multirotor_dynamics.hpp"
 #include "sim_server/plants/multirotor/rotor_model.hpp"
 #include "sim_server/plants/multirotor/saturation_watch.hpp"
+#include "sim_server/plants/rod_frame.hpp"
 
 namespace sls::sim {
 namespace {
@@ -41,11 +42,6 @@ Vector3d to_eigen(const SimTK::Vec3& v) { return {v[0], v[1], v[2]}; }
 
 SimTK::Rotation to_simtk(const Eigen::Quaterniond& q) {
   return SimTK::Rotation(SimTK::Quaternion(q.w(), q.x(), q.y(), q.z()));
-}
-
-/// Rotation whose z axis is the rod: common/model/README.md, eq. (1).
-SimTK::Rotation to_rod_frame(const model::RodAngles& rod) {
-  return {SimTK::BodyRotationSequence, rod.alpha, SimTK::XAxis, rod.beta, SimTK::YAxis};
 }
 
 /// Mass properties about the body's origin.
@@ -160,7 +156,7 @@ struct MultirotorPlant::Multibody {
     body.setQToFitTransform(state, SimTK::Transform(R_WB, p_WQ));
     body.setUToFitVelocity(state, SimTK::SpatialVec(w_WB_W, to_simtk(initial.v_WQ)));
     // The joint's coordinates are those of the rod relative to the body.
-    pendulum.setQToFitRotation(state, ~R_WB * to_rod_frame(initial.rod));
+    pendulum.setQToFitRotation(state, ~R_WB * make_rod_frame(initial.rod));
     pendulum.setUToFitAngularVelocity(state,
                                       ~R_WB * (to_simtk(rod.n_W.cross(rod.n_dot_W)) - w_WB_W));
     const SimTK::Vector &q = state.getQ(), &u = state.getU();

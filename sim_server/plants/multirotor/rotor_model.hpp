@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/model/math.hpp"
 #include "sim_server/plants/multirotor/airframe.hpp"
 
 namespace sls::sim {
@@ -49,7 +50,7 @@ class RotorLag {
   struct Means {
     Means() = default;
     explicit Means(double a) {
-      mean = -std::expm1(-a) / a;
+      mean = -math::expm1(-a) / a;
       // The closed form loses digits for small a: use the series.
       constexpr double kSmall = 1e-2;
       early = a > kSmall ? (1.0 - mean) / a
@@ -62,8 +63,8 @@ class RotorLag {
   struct Way {
     Way(double lag_s, double step_s) : lag(lag_s) {
       if (lag == 0.0) return;
-      kept = std::exp(-step_s / lag);
-      kept_half = std::exp(-0.5 * step_s / lag);
+      kept = math::exp(-step_s / lag);
+      kept_half = math::exp(-0.5 * step_s / lag);
       once = Means(step_s / lag);
       twice = Means(2.0 * step_s / lag);
     }

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "common/model/forces.hpp"
+#include "sim_server/plants/rod_frame.hpp"
 #include "sim_server/plants/slung_load/keys.hpp"
 #include "sim_server/plants/slung_load/pendulum_dynamics.hpp"
 #include "sim_server/plants/slung_load/rigid_links.hpp"
@@ -117,12 +118,9 @@ struct SlungLoadPlant::Multibody {
     const Eigen::Vector3d p_WQ = initial.placed == config::Body::kQuadrotor
                                      ? initial.position
                                      : initial.position - rod_length * rod.n_W;
-    // The z axis of L is the rod: common/model/README.md, eq. (1).
-    const SimTK::Rotation R_WL(SimTK::BodyRotationSequence, initial.rod.alpha, SimTK::XAxis,
-                               initial.rod.beta, SimTK::YAxis);
     quadrotor.setQToFitTranslation(state, to_simtk(p_WQ));
     quadrotor.setUToFitLinearVelocity(state, to_simtk(initial.v_WQ));
-    pendulum.setQToFitRotation(state, R_WL);
+    pendulum.setQToFitRotation(state, make_rod_frame(initial.rod));
     pendulum.setUToFitAngularVelocity(state, to_simtk(rod.n_W.cross(rod.n_dot_W)));  // no spin
     motion.p_WQ = SimTK::Vec3::getAs(&state.getQ()[0]);
     motion.rod = SimTK::Vec4::getAs(&state.getQ()[3]);

@@ -7,6 +7,8 @@
 
 #include <cfenv>
 #include <chrono>
+#include <filesystem>
+#include <fstream>
 #include <thread>
 
 #include "common/config/config_error.hpp"
@@ -62,6 +64,47 @@ TEST(SharedLibraryTest, AFileThatIsNoLibraryIsRefusedWithTheSystemsReason) {
   EXPECT_EQ(find_error(unresolved),
             expected(unresolved, "expected a shared library that loads, got: " + unresolved +
                                      ": undefined symbol: sls_test_defined_nowhere"));
+}
+
+/// A copy of `empty.so` whose header names another machine, as if it had been built for it.
+void write_library_for(unsigned char machine, const std::string& file) {
+  std::filesystem::copy(kFolder + "empty.so", file);
+  constexpr int kPlaceOfMachine = 18;  // of the ELF header
+  std::fstream(file, std::ios::in | std::ios::out | std::ios::binary)
+      .seekp(kPlaceOfMachine)
+      .put(static_cast<char>(machine))
+      .put('\0');
+}
+
+TEST(SharedLibraryTest, ALibraryForAnotherProcessorIsRefusedByName) {
+#if defined(__x86_64__)
+  constexpr unsigned char kOther = 183;
+  const std::string own = "x86-64", other = "aarch64";
+#else
+  constexpr unsigned char kOther = 62;
+  const std::string own = "aarch64", other = "x86-64";
+#endif
+  const sls::test::TemporaryFolder folder;
+  const std::string file = folder / "mine.so", unknown = folder / "unknown.so";
+  write_library_for(kOther, file);
+  EXPECT_EQ(find_error(file),
+            expected(file, "expected a shared library for " + own + ", got one for " + other));
+  write_library_for(77, unknown);
+  EXPECT_EQ(find_error(unknown), expected(unknown, "expected a shared library for " + own +
+                                                       ", got one for ELF machine 77"));
+}
+
+TEST(SharedLibraryTest, ALibraryThatNeedsANewerSystemIsRefusedWithTheVersion) {
+  const std::string file = kFolder + "newer.so";
+  const std::string error = find_error(file);
+  EXPECT_EQ(error.find(expected(
+                file, "expected a shared library built on this system or an older one, got: ")),
+            0U)
+      << error;
+  EXPECT_NE(error.find("libm.so.6: version `GLIBC_9.9' not found (required by " + file + ")"),
+            std::string::npos)
+      << error;
+  EXPECT_EQ(error.find('\n'), std::string::npos) << error;
 }
 
 TEST(SharedLibraryTest, ALibraryWithoutTheSymbolIsRefused) {

@@ -1,0 +1,112 @@
+"""Recorded numbers depend neither on the C library's elementary functions nor on the processor.
+
+usage: same_bits_test.py CHECK BUILD
+  symbols       programs and Python module need no function of libm but exact ones
+  instructions  neither they nor Simbody hold fused instructions
+  flights       every shipped scenario: no call of an inexact function of libm, the same certificate with the
+                processor's features masked
+"""
+
+import json
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+CHECK, BUILD = sys.argv[1], Path(sys.argv[2])
+ROOT = Path(__file__).resolve().parents[2]
+SHIM = BUILD / "tests/libraries/math_shim.so"
+
+# IEEE 754 asks for the nearest result of the square root; the others only select, round or scale, and so have one result.
+EXACT = {"sqrt", "fabs", "floor", "ceil", "trunc", "round", "lround", "llround", "rint", "lrint", "llrint", "nearbyint",
+         "fmod", "remainder", "ldexp", "frexp", "scalbn", "modf", "nextafter", "fmax", "fmin", "copysign"}
+# Masks of features by which glibc and others choose their code.
+MASKS = ("", "-AVX2,-FMA,-FMA4", "-AVX,-AVX2,-FMA,-FMA4,-AVX512F,-AVX512VL,-AVX512DQ,-AVX512BW,-AVX512CD,-SSE4_1,-SSE4_2")
+# Simbody asks for the decimal digits of a double when it is loaded; they serve its text.
+HARMLESS = ("log10", "1", "libSimTKcommon")
+
+
+def list_programs() -> list[Path]:
+    programs = [BUILD / "bin" / name for name in ("closed_loop", "sim_server", "control_client", "recorder")]
+    return programs + sorted((BUILD / "python").glob("_sls_core.*.so"))
+
+
+def list_symbols(file: Path, which: str) -> set[str]:
+    """Names of a file's dynamic symbols without their versions."""
+    lines = subprocess.run(["nm", "-D", which, file], check=True, capture_output=True, text=True).stdout.splitlines()
+    return {line.split()[-1].split("@")[0] for line in lines if line}
+
+
+def find_library(program: Path, name: str) -> Path:
+    lines = subprocess.run(["ldd", program], check=True, capture_output=True, text=True).stdout.splitlines()
+    return Path(next(line.split("=>")[1].split()[0] for line in lines if line.strip().startswith(name)))
+
+
+def check_symbols() -> list[str]:
+    libm = list_symbols(find_library(BUILD / "bin/closed_loop", "libm.so"), "--defined-only")
+    assert {"sin", "cos", "pow", "hypotf"} <= libm, "expected the symbols of libm"
+    errors = []
+    for program in list_programs():
+        inexact = sorted(list_symbols(program, "--undefined-only") & libm - EXACT)
+        if inexact:
+            errors.append(f"{program.name}: expected functions of common/model/math.hpp, got calls of {', '.join(inexact)}")
+    return errors
+
+
+def check_instructions() -> list[str]:
+    if platform.machine() != "x86_64":
+        return []
+    simbody = [find_library(BUILD / "bin/closed_loop", name) for name in ("libSimTKcommon", "libSimTKmath", "libSimTKsimbody")]
+    errors = []
+    for file in list_programs() + simbody:
+        found = subprocess.run(["sh", "-c", r"objdump -d --no-show-raw-insn -- '" + str(file) + r"' | grep -cE 'vfn?m(add|sub)'"],
+                               check=False, capture_output=True, text=True).stdout.strip()
+        if found != "0":
+            errors.append(f"{file.name}: expected no fused instruction, got {found}")
+    return errors
+
+
+def fly(scenario: Path, mask: str, folder: Path) -> tuple[str, list[str]]:
+    """Certificate of a flight in process, and the inexact functions that it called."""
+    out, calls = folder / "recording", folder / "calls"
+    environment = os.environ | {"LD_PRELOAD": str(SHIM), "SLS_MATH_CALLS": str(calls)}
+    if mask:
+        environment["GLIBC_TUNABLES"] = f"glibc.cpu.hwcaps={mask}"
+    subprocess.run([BUILD / "bin/closed_loop", "--scenario", scenario, "--out", out], check=True, env=environment,
+                   capture_output=True, text=True)
+    found = [line.split(maxsplit=2) for line in calls.read_text(encoding="utf-8").splitlines()]
+    return (json.loads((out / "manifest.json").read_text(encoding="utf-8"))["certificate"],
+            [" ".join(call) for call in found
+             if call[:2] != list(HARMLESS[:2]) or not Path(call[2]).name.startswith(HARMLESS[2])])
+
+
+def check_flight(scenario: Path) -> list[str]:
+    certificates, errors = {}, []
+    for mask in MASKS if platform.machine() == "x86_64" else MASKS[:1]:
+        with tempfile.TemporaryDirectory() as folder:
+            certificates[mask], calls = fly(scenario, mask, Path(folder))
+        if calls:
+            errors.append(f"{scenario.stem}: expected no inexact function of libm, got {'; '.join(calls)}")
+    if len(set(certificates.values())) != 1:
+        errors.append(f"{scenario.stem}: expected one certificate, got {certificates}")
+    return errors
+
+
+def check_flights() -> list[str]:
+    with tempfile.TemporaryDirectory() as folder:  # the shim counts
+        calls = Path(folder) / "calls"
+        subprocess.run(["/usr/bin/python3", "-c", "import math, sys; math.sin(len(sys.argv))"], check=True,
+                       env=os.environ | {"LD_PRELOAD": str(SHIM), "SLS_MATH_CALLS": str(calls)})
+        assert "sin 1 " in calls.read_text(encoding="utf-8"), "expected a call of sin by Python"
+    scenarios = sorted((ROOT / "config/scenarios").glob("*.yaml"))
+    assert scenarios, "expected scenarios"
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return [error for errors in pool.map(check_flight, scenarios) for error in errors]
+
+
+failures = {"symbols": check_symbols, "instructions": check_instructions, "flights": check_flights}[CHECK]()
+if failures:
+    sys.exit("\n".join(failures))
