@@ -59,7 +59,7 @@ class GatheringStream {
   template <class Handler>
   friend void async_teardown(beast::role_type role, GatheringStream& stream, Handler&& handler) {
     const std::shared_ptr<State> state = stream.state_;
-    state->drain([state, role, completion = std::forward<Handler>(handler)]() mutable {
+    state->drain([state, role, completion = std::forward<Handler>(handler)](Error = {}) mutable {
       beast::websocket::async_teardown(role, state->socket, std::move(completion));
     });
   }
@@ -89,6 +89,8 @@ class GatheringStream {
     std::chrono::steady_clock::time_point last_flush;
     bool is_timer_set = false;
     Error error;
+    // Newer versions of Beast also call a handler with the error of a cancelled operation. Nothing
+    // cancels these.
     beast::saved_handler writer;   ///< waits for room
     beast::saved_handler drainer;  ///< waits until all bytes are sent
   };
@@ -114,7 +116,7 @@ void GatheringStream::State::write(const Buffers& buffers, Handler handler) {
   if (gathered.size() < kMostGathered)
     net::post(socket.get_executor(), beast::bind_front_handler(std::move(handler), error, count));
   else
-    writer.emplace([this, count, completion = std::move(handler)]() mutable {
+    writer.emplace([this, count, completion = std::move(handler)](Error = {}) mutable {
       completion(error, error ? 0 : count);
     });
 }

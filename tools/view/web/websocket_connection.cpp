@@ -13,7 +13,7 @@ constexpr double kCloseTimeout = 5;
 
 /// The longest prefix of UTF-8 text that a close frame holds.
 std::string shorten(const std::string& text) {
-  std::size_t size = std::min<std::size_t>(text.size(), websocket::reason_string::max_size_n);
+  std::size_t size = std::min<std::size_t>(text.size(), websocket::reason_string().max_size());
   const auto is_inside = [&text](std::size_t i) { return (text[i] & 0xc0) == 0x80; };
   while (size < text.size() && size > 0 && is_inside(size)) --size;
   return text.substr(0, size);
