@@ -144,6 +144,13 @@ void check_is_text(const std::string& text, const std::string& place) {
   }
 }
 
+/// The message of the library without the anchor's name, which yaml-cpp 0.8 adds.
+std::string to_message(const YAML::Exception& error) {
+  const std::string undefined = "the referenced anchor is not defined";
+  const bool is_undefined = error.msg.compare(0, undefined.size(), undefined) == 0;
+  return is_undefined ? undefined : to_printable(error.msg, 100);
+}
+
 }  // namespace
 
 YamlNode parse_yaml(const std::string& text, const std::string& place) {
@@ -156,7 +163,7 @@ YamlNode parse_yaml(const std::string& text, const std::string& place) {
     }
   } catch (const YAML::Exception& error) {
     throw make_error(place, error.mark.is_null() ? 0 : to_line(error.mark), "",
-                     "expected YAML, got a syntax error: " + to_printable(error.msg, 100));
+                     "expected YAML, got a syntax error: " + to_message(error));
   }
   YamlNode nothing;
   nothing.line = 1;
