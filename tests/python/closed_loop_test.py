@@ -229,6 +229,7 @@ def test_something_else_than_a_scenario_is_refused():
         sls.ClosedLoop(7)
 
 
+@pytest.mark.filterwarnings("ignore:.*use of fork:DeprecationWarning")  # of Python 3.12, for what this test does
 def test_a_fork_is_told_to_make_its_own():
     loop = sls.ClosedLoop(load_analytic(), 100, threads=2)
     child = os.fork()
