@@ -1,5 +1,6 @@
 # Finds Fast DDS 2 (2.9 to 2.14) or 3 with the Fast CDR and the code generator that belong to it. Stops with one line if
-# they do not fit together. Sets sls_fastdds_version, sls_fastdds_target, sls_fastcdr_version and FASTDDSGEN.
+# they do not fit together. Sets sls_fastdds_version, sls_fastdds_target, FASTDDSGEN and sls_fastdds_includes, the folders
+# here with what differs in C++: version2 or version3, fastcdr1 or fastcdr2.
 set(SLS_FASTDDS "" CACHE STRING "Major version of Fast DDS, 2 or 3; empty: 3 if it is installed, else 2")
 if(NOT SLS_FASTDDS MATCHES "^[23]?$")
   message(FATAL_ERROR "SLS_FASTDDS: expected 2, 3 or nothing, got '${SLS_FASTDDS}'")
@@ -82,3 +83,5 @@ if(NOT SLS_FASTDDS_CHECKED STREQUAL checked)
   set(SLS_FASTDDS_CHECKED "${checked}" CACHE INTERNAL "what has been found to fit together")
 endif()
 message(STATUS "Fast DDS: takes ${version} in ${place}")
+set(sls_fastdds_includes ${CMAKE_CURRENT_LIST_DIR}/version${sls_fastdds_version}
+                         ${CMAKE_CURRENT_LIST_DIR}/fastcdr${sls_fastcdr_version})

@@ -1,9 +1,3 @@
-# Fast DDS 2 or 3: what differs between them in C++ is in version2/ and version3/, fastcdr1/ and fastcdr2/; the includes of
-# one of each are found.
-include(${CMAKE_CURRENT_LIST_DIR}/find.cmake)
-set(sls_fastdds_includes ${CMAKE_CURRENT_LIST_DIR}/version${sls_fastdds_version}
-                         ${CMAKE_CURRENT_LIST_DIR}/fastcdr${sls_fastcdr_version})
-
 # sls_add_wire_types(LIBRARY NAME): the static library of the C++ types of NAME.idl and their serialisation, in the build
 # tree only. Headers: NAME.h and NAMEPubSubTypes.h. No type announces a TypeObject: in Fast DDS 2.9 one crashes peers
 # that do not know the type (Fast-DDS #3296).
