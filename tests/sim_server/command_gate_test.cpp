@@ -290,8 +290,9 @@ TEST_F(CommandGateTest, OldAnswersOfADistantStandbyAreSupersededWhileAnotherClie
   set_clients({kStrong, kWeak});
   for (std::uint64_t step = 0; step < 300; ++step) {
     gate_.expect(step);
-    if (step >= 100)
+    if (step >= 100) {
       EXPECT_EQ(gate_.offer(make_answer(step - 100), kWeakPeer), Verdict::kSuperseded);
+    }
     gate_.offer(make_answer(step), kStrongPeer);
   }
   EXPECT_EQ(gate_.counters().superseded(), 200u);
