@@ -404,11 +404,11 @@ TEST_F(MissionGateTest, AnEndBeforeTheEarliestStepIsRefused) {
 
 TEST_F(MissionGateTest, ValuesThatTheContractDoesNotDefineAreRefused) {
   EXPECT_EQ(offer(600, 1, static_cast<MissionPhase>(7)), Verdict::kUndefined);
-  EXPECT_EQ(offer(600, 1, static_cast<MissionPhase>(0xffffffffU)), Verdict::kUndefined);
   EXPECT_EQ(refusal(), "controller 'strong' answered step 600 with an undefined value: mission 7");
   EXPECT_EQ(offer(600, 1, MissionPhase::MISSION_FAILED, static_cast<FaultCode>(5)),
             Verdict::kUndefined);
   EXPECT_EQ(refusal(), "controller 'strong' answered step 600 with an undefined value: fault 5");
+  EXPECT_EQ(offer(600, 1, static_cast<MissionPhase>(0xffffffffU)), Verdict::kUndefined);
 }
 
 TEST_F(CommandGateTest, AFaultInAnswerToAnotherStepEndsNothing) {
