@@ -27,7 +27,7 @@ void call_law(benchmark::State& run, const control::ControlLaw& law) {
   control::LawInput input;
   input.memory.setZero(law.memory_size());
   for (auto _ : run) {
-    const control::LawOutput output = law.calc(input);
+    control::LawOutput output = law.calc(input);
     input.memory = output.memory;
     ++input.step;
     benchmark::DoNotOptimize(output);

@@ -10,10 +10,6 @@
 namespace sls::test {
 namespace {
 
-std::string certificate_of(const std::filesystem::path& recording) {
-  return read_manifest(recording).at("certificate").get<std::string>();
-}
-
 std::vector<std::string> fly_in_process(const std::string& file,
                                         const std::filesystem::path& folder,
                                         std::vector<std::string> flags = {}) {
@@ -48,7 +44,7 @@ TEST_P(ClosedLoopProgramTest, RecordsTheFilesAndTheCertificateOfTheThreePrograms
 INSTANTIATE_TEST_SUITE_P(Scenarios, ClosedLoopProgramTest,
                          ::testing::Values("short", "mixed_fleet", "faulty_figure_eight",
                                            "figure_eight_pid"),
-                         [](const auto& info) { return std::string(info.param); });
+                         [](const auto& flown) { return std::string(flown.param); });
 
 // 11 ms and 182 of them have no exact double: times are printed with the digits that they have.
 TEST(ClosedLoopTimesTest, TimesArePrintedWithoutRoundingErrors) {

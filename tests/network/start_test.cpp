@@ -95,7 +95,7 @@ TEST_P(UnannouncedTest, IsNamedDespiteTwentyPercentLoss) {
 INSTANTIATE_TEST_SUITE_P(Mistakes, UnannouncedTest,
                          testing::Values(Unannounced{"unannounced", 4.0},
                                          Unannounced{"unannounced_writer", 15.0}),
-                         [](const auto& info) { return std::string(info.param.mistake); });
+                         [](const auto& made) { return std::string(made.param.mistake); });
 
 }  // namespace
 }  // namespace sls::test

@@ -37,10 +37,10 @@ TEST(SharedMemoryTest, StaleSegmentsAreCountedAndStay) {
 
 TEST(SharedMemoryTest, OnlyPortsWithAHolderAreRead) {
   const TemporaryFolder folder;
-  for (const char* name : {(bus::kSharedMemoryPrefix + std::string("port7411")),
-                           (bus::kSharedMemoryPrefix + std::string("port7413"))}) {
+  for (const char* port : {"port7411", "port7413"}) {
+    const std::string name = bus::kSharedMemoryPrefix + std::string(port);
     test::write_bytes(folder / name, "");
-    test::write_bytes(folder / (std::string(name) + "_el"), "");
+    test::write_bytes(folder / (name + "_el"), "");
   }
   const int held =
       ::open((folder / (bus::kSharedMemoryPrefix + std::string("port7413_el"))).c_str(),
