@@ -20,12 +20,13 @@ using Endianness = bus::Cdr::Endianness;
 template <class Message>
 std::vector<std::uint8_t> to_cdr(const Message& message,
                                  Endianness endianness = Endianness::LITTLE_ENDIANNESS) {
-  eprosima::fastcdr::FastBuffer buffer;
+  std::vector<std::uint8_t> bytes(100'000);
+  eprosima::fastcdr::FastBuffer buffer(reinterpret_cast<char*>(bytes.data()), bytes.size());
   bus::Cdr cdr = bus::make_cdr(buffer, endianness);
   cdr.serialize_encapsulation();
   bus::write_message(message, cdr);
-  const auto* begin = reinterpret_cast<const std::uint8_t*>(buffer.getBuffer());
-  return {begin, begin + bus::count_bytes(cdr)};
+  bytes.resize(bus::count_bytes(cdr));
+  return bytes;
 }
 
 struct Sent {

@@ -44,12 +44,13 @@ Bytes serialize(const std::vector<RecordEntry>& entries, std::uint64_t run_id = 
   RecordBatch batch;
   batch.run_id(run_id);
   batch.entries(entries);
-  eprosima::fastcdr::FastBuffer buffer;
+  auto bytes = std::make_shared<std::vector<std::uint8_t>>(100'000);
+  eprosima::fastcdr::FastBuffer buffer(reinterpret_cast<char*>(bytes->data()), bytes->size());
   bus::Cdr cdr = bus::make_cdr(buffer, bus::Cdr::LITTLE_ENDIANNESS);
   cdr.serialize_encapsulation();
   bus::write_message(batch, cdr);
-  return std::make_shared<std::vector<std::uint8_t>>(buffer.getBuffer(),
-                                                     buffer.getBuffer() + bus::count_bytes(cdr));
+  bytes->resize(bus::count_bytes(cdr));
+  return bytes;
 }
 
 using Steps = std::vector<std::pair<std::uint32_t, std::uint64_t>>;
