@@ -206,7 +206,7 @@ TEST(StatusViewTest, TerminalControlCharactersAreNotPassedOn) {
   EXPECT_TRUE(contains(text, "paused: a?b?[2J???\n")) << text;
   EXPECT_TRUE(contains(text, " pär??? ")) << text;
   EXPECT_TRUE(contains(render_line(snapshot), "paused: a?b?[2J??? "));
-  EXPECT_NO_THROW(nlohmann::json::parse(to_json(snapshot)));
+  EXPECT_TRUE(nlohmann::json::accept(to_json(snapshot)));
 }
 
 TEST(StatusViewTest, ValuesOfANewerVersionReadUnknown) {
@@ -232,7 +232,7 @@ TEST(StatusViewTest, ARunWithoutStatusParticipantsAndRoundTripsIsShownToo) {
   snapshot.status.reset();
   EXPECT_TRUE(contains(join(render(snapshot, 80)), "no status yet"));
   EXPECT_EQ(render_line(snapshot), "figure_eight 00c0ffee12345678");
-  EXPECT_NO_THROW(nlohmann::json::parse(to_json(snapshot)));
+  EXPECT_TRUE(nlohmann::json::accept(to_json(snapshot)));
 }
 
 TEST(StatusViewTest, OneLineHoldsTheEssence) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "common/bus/convert.hpp"
+#include "common/bus/names.hpp"
 #include "fastcdr_api.hpp"
 
 namespace sls::view {
@@ -91,7 +92,7 @@ TEST(NewestSamplesTest, HaveNoReferenceWhereTheAnswerIsOfAnotherStep) {
     NewestSamples newest(make_parameters({0}));
     const auto samples = newest.take({serialize({make_entry(0, 1, kind)})});
     ASSERT_EQ(samples.size(), 1U);
-    EXPECT_FALSE(samples[0].reference) << kind;
+    EXPECT_FALSE(samples[0].reference) << bus::to_number(kind);
   }
 }
 
