@@ -20,11 +20,12 @@ CHECK, BUILD = sys.argv[1], Path(sys.argv[2])
 ROOT = Path(__file__).resolve().parents[2]
 SHIM = BUILD / "tests/libraries/math_shim.so"
 
-# IEEE 754 asks for the nearest result of the square root; the others only select, round or scale, and so have one result.
+# IEEE 754 asks for the nearest result of the square root; the others only select, round or scale: they have one result.
 EXACT = {"sqrt", "fabs", "floor", "ceil", "trunc", "round", "lround", "llround", "rint", "lrint", "llrint", "nearbyint",
          "fmod", "remainder", "ldexp", "frexp", "scalbn", "modf", "nextafter", "fmax", "fmin", "copysign"}
 # Masks of features by which glibc and others choose their code.
-MASKS = ("", "-AVX2,-FMA,-FMA4", "-AVX,-AVX2,-FMA,-FMA4,-AVX512F,-AVX512VL,-AVX512DQ,-AVX512BW,-AVX512CD,-SSE4_1,-SSE4_2")
+MASKS = ("", "-AVX2,-FMA,-FMA4",
+         "-AVX,-AVX2,-FMA,-FMA4,-AVX512F,-AVX512VL,-AVX512DQ,-AVX512BW,-AVX512CD,-SSE4_1,-SSE4_2")
 # Simbody asks for the decimal digits of a double when it is loaded; they serve its text.
 HARMLESS = ("log10", "1", "libSimTKcommon")
 
@@ -52,17 +53,17 @@ def check_symbols() -> list[str]:
     for program in list_programs():
         inexact = sorted(list_symbols(program, "--undefined-only") & libm - EXACT)
         if inexact:
-            errors.append(f"{program.name}: expected functions of common/model/math.hpp, got calls of {', '.join(inexact)}")
+            errors.append(f"{program.name}: expected functions of common/model/math.hpp, got {', '.join(inexact)}")
     return errors
 
 
 def check_instructions() -> list[str]:
     if platform.machine() != "x86_64":
         return []
-    simbody = [find_library(BUILD / "bin/closed_loop", name) for name in ("libSimTKcommon", "libSimTKmath", "libSimTKsimbody")]
+    simbody = [find_library(BUILD / "bin/closed_loop", f"libSimTK{name}") for name in ("common", "math", "simbody")]
     errors = []
     for file in list_programs() + simbody:
-        found = subprocess.run(["sh", "-c", r"objdump -d --no-show-raw-insn -- '" + str(file) + r"' | grep -cE 'vfn?m(add|sub)'"],
+        found = subprocess.run(["sh", "-c", 'objdump -d --no-show-raw-insn "$1" | grep -cE "vfn?m(add|sub)"', "sh", file],
                                check=False, capture_output=True, text=True).stdout.strip()
         if found != "0":
             errors.append(f"{file.name}: expected no fused instruction, got {found}")
