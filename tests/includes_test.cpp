@@ -39,7 +39,7 @@ const std::vector<Rule> kRules = {
     {"control_client/laws", {"common/config", "common/model", "common/plugin"}},
     {"python", {"closed_loop", "common", "control_client", "recorder", "sim_server"}},
     {"recorder", {"common"}},
-    {"recorder/sinks/mcap", {"common", "recorder", "Fast DDS"}},
+    {"recorder/sinks/mcap", {"common", "recorder", "Wire", "Fast DDS"}},
     {"sim_server", {"common", "Wire"}},
     {"sim_server/autopilots", {"common/config", "common/model", "common/plugin"}},
     {"sim_server/plants",
