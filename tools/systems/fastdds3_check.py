@@ -22,8 +22,9 @@ NEEDED = re.compile(r"(lib(fastdds|fastcdr|foonathan-memory)[\w.+-]*|libeprosima
                     r"|libgson-java|libicu4j-java|libtreelayout-java|fastddsgen)")
 FOLDERS = ("common/bus", "idl", "tools/doctor")  # all their files; of others those whose text names Fast DDS
 NAMES_FAST_DDS = re.compile(r"eprosima|fastdds|fastrtps|fastcdr")
+# The generator's own class path names the parser of this machine: the unpacked one must come first.
 GENERATOR = """#!/bin/sh
-exec java -cp '{unpacked}/usr/share/fastddsgen/fastddsgen.jar:{unpacked}/usr/share/java/*' com.eprosima.fastdds.fastddsgen "$@"
+exec java -cp '{unpacked}/usr/share/java/*:{unpacked}/usr/share/fastddsgen/fastddsgen.jar' com.eprosima.fastdds.fastddsgen "$@"
 """
 
 
