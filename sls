@@ -26,7 +26,7 @@ readonly python_packages=(python3-numpy python3-scipy python3-matplotlib python3
 readonly bench_packages=(libbenchmark-dev python3-matplotlib chromium)
 readonly doc_packages=(doxygen python3-sphinx)
 readonly package_packages=(dpkg-dev file)
-# What only one system has. The launcher installs packages on these systems alone.
+# Packages that only one system has. The launcher installs packages on these systems alone.
 readonly systems=(debian12 debian13)
 readonly debian12_packages=(libfastrtps-dev)
 readonly debian13_packages=(libfastdds-dev)

@@ -7,24 +7,26 @@ say() { echo "base-image.sh: $*" >&2; }
 fail() { say "error: $1"; exit "${2:-1}"; }
 
 if [[ ${1:-} == --help || ${1:-} == -h || $# -gt 1 ]]; then
-  echo "usage: docker/base-image.sh [IMAGE]      (default: debian:bookworm-slim)" >&2
+  echo "usage: docker/base-image.sh [IMAGE]      debian:bookworm-slim (default) or debian:trixie-slim" >&2
   [[ $# == 1 ]] && exit 0 || exit 2
 fi
 image=${1:-debian:bookworm-slim}
+codename=bookworm
+[[ $image != *trixie* ]] || codename=trixie
 
 ((EUID == 0)) || fail "debootstrap needs root"
 command -v debootstrap >/dev/null || fail "debootstrap is missing: apt-get install debootstrap"
 docker version >/dev/null 2>&1 || fail "no Docker engine answers (see: docker version)"
 
 # shellcheck disable=SC2016  # apt's variable, not the shell's
-mirror="$(apt-get indextargets --format '$(SITE)' 'Created-By: Packages' 'Origin: Debian' \
-  'Codename: bookworm' 'Component: main' 2>/dev/null | head -n 1)"
+mirror="$(apt-get indextargets --format '$(CODENAME) $(SITE)' 'Created-By: Packages' 'Origin: Debian' \
+  'Component: main' 2>/dev/null | awk '$1 !~ /-/ { print $2; exit }')"
 mirror=${mirror:-http://deb.debian.org/debian}
 
 folder="$(mktemp -d)"
 trap 'rm -rf --one-file-system "$folder"' EXIT
 say "making $image with debootstrap from $mirror, half a minute or more"
-if ! debootstrap --variant=minbase bookworm "$folder/root" "$mirror" >"$folder/log" 2>&1; then
+if ! debootstrap --variant=minbase "$codename" "$folder/root" "$mirror" >"$folder/log" 2>&1; then
   tail -n 5 "$folder/log" >&2
   fail "debootstrap failed"
 fi

@@ -14,8 +14,9 @@ Builds the image, flies in containers and prints the summary of ./sls demo. NAME
 
 SCENARIO is a name in config/scenarios or a path (default: figure_eight); DIR the folder of the
 recording, new or empty (default: recordings/docker-NAME-UTCTIME); for a fleet it has a folder for each
-server's vehicles, 0-3 and 4-7. SLS_IMAGE names an existing image to use; SLS_BASE the base of a new one
-(default: debian:bookworm-slim). Needs a Docker engine with docker compose or docker-compose.
+server's vehicles, 0-3 and 4-7. SLS_IMAGE names an existing image to use; SLS_SYSTEM the system of a new
+one, debian12 or debian13 (default: debian12); SLS_BASE its base (default: debian:bookworm-slim or
+debian:trixie-slim). Needs a Docker engine with docker compose or docker-compose.
 TEXT
 }
 
@@ -45,14 +46,22 @@ make_base() {
 
 build_image() {
   [[ -z ${SLS_IMAGE:-} ]] || return 0
-  local base=${SLS_BASE:-debian:bookworm-slim} log
+  local system=${SLS_SYSTEM:-debian12} log base
+  case $system in
+    debian12) base=debian:bookworm-slim ;;
+    debian13) base=debian:trixie-slim ;;
+    *) fail "SLS_SYSTEM: expected one of ${systems[*]}, got '$system'" 2 ;;
+  esac
+  base=${SLS_BASE:-$base}
   make_base "$base"
   if command -v npm >/dev/null; then
     install_node_modules "$root/tools/view/page"  # this machine may trust a proxy that the base image does not
   fi
   log="$(mktemp)"
-  say "building the image sls, for the first time some minutes (log: $log)"
-  if ! docker build --build-arg "BASE=$base" -f "$root/docker/Dockerfile" -t sls "$root" >"$log" 2>&1; then
+  say "building the image sls for $system, for the first time some minutes (log: $log)"
+  # An engine without BuildKit pulls the base of both systems, so both are the one that is here.
+  if ! docker build --build-arg "SYSTEM=$system" --build-arg "DEBIAN12=$base" --build-arg "DEBIAN13=$base" \
+    -f "$root/docker/Dockerfile" -t sls -t "sls:$system" "$root" >"$log" 2>&1; then
     grep -E -m 20 'error|Error' "$log" >&2 || tail -n 20 "$log" >&2
     fail "the image was not built (whole log: $log)"
   fi

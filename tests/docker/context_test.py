@@ -47,6 +47,20 @@ class ContextTest(unittest.TestCase):
         self.assertIn("config", copied)
         self.assertEqual([path for path in copied if not is_let_through(path)], [])
 
+    def test_the_system_chooses_the_base_in_dockerfile_compose_and_launcher(self):
+        dockerfile = (ROOT / "docker/Dockerfile").read_text(encoding="utf-8")
+        build = yaml.safe_load((ROOT / "docker/service.yaml").read_text(encoding="utf-8"))["services"]["service"]["build"]
+        demo = (ROOT / "docker/demo.sh").read_text(encoding="utf-8")
+        self.assertEqual(build["args"]["SYSTEM"], "${SLS_SYSTEM:-debian12}")
+        self.assertEqual(set(re.findall(r"^FROM (\S+)", dockerfile, re.MULTILINE)), {"$DEBIAN12", "$DEBIAN13", "$SYSTEM"})
+        self.assertIn("ARG SYSTEM=debian12\n", dockerfile)
+        for system, base in (("debian12", "debian:bookworm-slim"), ("debian13", "debian:trixie-slim")):
+            self.assertIn(f"ARG {system.upper()}={base}\nFROM" if system == "debian13" else f"ARG {system.upper()}={base}\n",
+                          dockerfile)
+            self.assertIn(f"FROM ${system.upper()} AS {system}\n", dockerfile)
+            self.assertEqual(build["args"][system.upper()], f"${{SLS_BASE:-{base}}}")
+            self.assertIn(f"    {system}) base={base} ;;\n", demo)
+
     def test_no_service_of_a_campaign_ends_before_the_campaign(self):
         # Compose stops all services as soon as one of them ends.
         services = yaml.safe_load((ROOT / "docker/compose.dask.yaml").read_text(encoding="utf-8"))["services"]

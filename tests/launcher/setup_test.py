@@ -20,7 +20,7 @@ NOT_TRIED = {
     "Mint 12": 'ID=linuxmint\nID_LIKE=debian\nVERSION_ID="12"\nPRETTY_NAME="Mint 12"\n',
     "unknown (no /etc/os-release)": None,
 }
-# What apt-get of Debian 12 says without a network, shortened.
+# The output of apt-get of Debian 12 without a network, shortened.
 OFFLINE = """W: Failed to fetch http://deb.debian.org/debian/dists/bookworm/InRelease  Temporary failure resolving 'deb.debian.org'
 W: Some index files failed to download. They have been ignored, or old ones used instead.
 E: Unable to locate package g++

@@ -1,5 +1,5 @@
 """`./sls systems` in small: a small checkout, and a stand-in for debootstrap that fills a tree with programs of this
-machine. What runs in the tree, the limits, the cleaning up and the namespaces are real. Needs root and namespaces."""
+machine. The commands in the tree, the limits, the cleaning up and the namespaces are real. Needs root and namespaces."""
 
 import json
 import os
@@ -268,7 +268,7 @@ class SystemsTest(unittest.TestCase):
         self.expect_error(2, "systems: unrecognized arguments: --fast", "--fast")
         self.assertEqual(self.calls.read_text(), "")
 
-    def test_what_is_missing_is_one_line(self):
+    def test_each_missing_thing_is_one_line(self):
         self.expect_error(1, "systems: expected root, which debootstrap and namespaces need: try sudo", before=[
             "unshare", "--user"])
         self.expect_error(1, r"debian12: /trees: expected 1e\+06 GiB free on this disk, got [\d.]+ GiB", "debian12",
