@@ -42,6 +42,7 @@
 #include "common/config/config_error.hpp"
 #include "common/config/domain.hpp"
 #include "fastdds_api.hpp"
+#include "older_peers_transport.hpp"
 
 namespace sls::bus {
 namespace {
@@ -155,11 +156,17 @@ struct Node::Impl {
              wire.port.participantIDGain};
     if (wire.participant_id < 0 && has_shared_memory(qos))
       wire.participant_id = choose_participant_id(ports, find_own_participant_ids());
-    const bool has_plain_submessages =
-        is_secured && !are_submessages_protected(find_file(qos, kGovernance));
+    ParticipantListener::Own own;
+    if (is_secured) {
+      const std::filesystem::path governance = find_file(qos, kGovernance);
+      own = {true, !are_submessages_protected(governance), is_discovery_protected(governance)};
+    }
     announce_what_discovery_lacks(qos);
-    listener = std::make_unique<ParticipantListener>(
-        ParticipantListener::Own{is_secured, has_plain_submessages}, &neighbours, &discovered);
+    listener = std::make_unique<ParticipantListener>(own, &neighbours, &discovered);
+    if (is_secured)
+      hear_older_peers(qos, [this](const OlderAnnouncement& older, const std::string& address) {
+        listener->on_older_announcement(older, address);
+      });
     participant = factory->create_participant(static_cast<std::uint32_t>(domain), qos,
                                               listener.get(), dds::StatusMask::none());
     if (participant)

@@ -33,4 +33,8 @@ bool is_of_contract_1(const std::filesystem::path& permissions);
 /// do (fastdds/README.md, trap 28).
 bool are_submessages_protected(const std::filesystem::path& governance);
 
+/// True if a signed governance document protects discovery, as keys made with `--mixed-versions` do
+/// not (fastdds/README.md, trap 38).
+bool is_discovery_protected(const std::filesystem::path& governance);
+
 }  // namespace sls::bus

@@ -12,7 +12,7 @@ fail() { say "error: $1"; exit "${2:-1}"; }
 
 usage() {
   cat <<'TEXT'
-usage: ./sls keys DIR [--days N] [--force] [--other-vendors]
+usage: ./sls keys DIR [--days N] [--force] [--other-vendors] [--mixed-versions]
        ./sls keys DIR --add ROLE NAME [--days N] [--force]
 
 Makes DIR: certificate authorities (DIR/ca) and one folder for each role, server, controller, recorder,
@@ -22,6 +22,8 @@ operator and viewer, with the identity and the signed documents of that role.
   --force          replace what is there
   --other-vendors  for programs on another vendor's DDS, such as Cyclone DDS: also encrypts
                    submessages, which costs up to a third of the speed
+  --mixed-versions for programs of Debian 12 and of Debian 13 in one flight: does not encrypt
+                   discovery (topic names, types, QoS)
   --add ROLE NAME  one more identity of that role in DIR/NAME, signed by the authorities in DIR/ca
 
 Fly with them: SLS_KEYS=DIR ./sls run SCENARIO --qos config/qos/secure.xml
@@ -137,7 +139,9 @@ make_authorities() {
   make_authority permissions "$name"
   # Other vendors' readers send keys only if submessages are protected. Without those keys Fast DDS
   # sends them no samples: common/bus/fastdds/README.md, trap 28.
-  sed "s|<metadata_protection_kind>NONE<|<metadata_protection_kind>$submessages<|" \
+  # Fast DDS 2.9 and 3 discover each other only if discovery is not protected: trap 38 there.
+  sed -e "s|<metadata_protection_kind>NONE<|<metadata_protection_kind>$submessages<|" \
+    -e "s|<discovery_protection_kind>ENCRYPT<|<discovery_protection_kind>$discovery<|" \
     "$here/governance.xml" >"$work/governance.xml"
   sign_document "$work/governance.xml" "$ca/governance.p7s"
 }
@@ -166,7 +170,7 @@ replace() {
   mv -T -- "$1" "$2"
 }
 
-folder='' days=365 force='' role='' name='' submessages=NONE
+folder='' days=365 force='' role='' name='' submessages=NONE discovery=ENCRYPT
 while (($#)); do
   case $1 in
     --days)
@@ -177,6 +181,7 @@ while (($#)); do
       ;;
     --force) force=yes ;;
     --other-vendors) submessages=ENCRYPT ;;
+    --mixed-versions) discovery=NONE ;;
     --add)
       role=${2:-} name=${3:-}
       [[ " ${roles[*]} " == *" $role "* && -n $role ]] ||

@@ -135,8 +135,9 @@ class MixedNetworkTest : public MixedTest {
     network_ = std::make_unique<Network>(kHosts);
   }
 
-  void fly(const std::string& profile, const std::string& file = scenario("short")) {
-    const Profile configured(*network_, profile);
+  void fly(const std::string& profile, const std::vector<std::string>& key_options = {}) {
+    const std::string file = scenario("short");
+    const Profile configured(*network_, profile, key_options);
     Flight local(file), flight(file, mix(configured.flight_options()));
     local.expect_success();
     flight.expect_success();
@@ -154,7 +155,16 @@ TEST_P(MixedNetworkTest, OnALinkThatLosesFivePercent) {
   EXPECT_GT(network_->lost(), 50u);
 }
 
-TEST_P(MixedNetworkTest, WithSecurity) { fly("secure"); }
+TEST_P(MixedNetworkTest, WithSecurity) { fly("secure", {"--mixed-versions"}); }
+
+TEST_P(MixedNetworkTest, OtherKeysAreNamed) {
+  const Profile configured(*network_, "secure");
+  Flight flight(scenario("short"), mix(configured.flight_options()));
+  for (auto* program : {&*flight.server, &*flight.client, &*flight.recorder})
+    EXPECT_TRUE(program->wait_for_output(
+        "expected keys of ./sls keys DIR --mixed-versions, got keys without it"))
+        << flight.outputs();
+}
 
 TEST_P(MixedNetworkTest, WithADiscoveryServer) {
   if (Process({"sh", "-c", "command -v fast-discovery-server"}).wait() != 0)

@@ -8,6 +8,7 @@
 
 #include "common/bus/fastdds/discovered_participants.hpp"
 #include "common/bus/fastdds/neighbours.hpp"
+#include "common/bus/fastdds/older_peers.hpp"
 #include "common/bus/fastdds/refusals.hpp"
 #include "common/config/yaml_node.hpp"
 #include "fastdds_discovery.hpp"
@@ -25,6 +26,9 @@ class ParticipantListener : public DiscoveryListener {
     /// Its keys do not protect submessages, so that other vendors' readers get nothing (README.md,
     /// trap 28).
     bool has_plain_submessages = false;
+    /// Its keys protect discovery, so that versions of Fast DDS before and since 2.13 do not discover
+    /// each other (README.md, trap 38).
+    bool has_protected_discovery = false;
   };
 
   explicit ParticipantListener(const Own& own, Neighbours* neighbours = nullptr,
@@ -45,12 +49,25 @@ class ParticipantListener : public DiscoveryListener {
     if (discovered_) discovered_->note(peer, news.name, find_discovery_ports(news));
     if (news.kind != ParticipantNews::Kind::kNew) return;
     refusals.note_discovered(
-        guid, describe(news),
+        guid, describe(news.name, find_address(news), news.guid.guidPrefix),
         own_.is_secured && news.identity ? describe_identity(*news.identity) : "");
     if (own_.is_secured && !news.identity && news.is_identity_known)
       refusals.note_refused(guid, "it has no identity (its QoS file is not config/qos/secure.xml)");
     if (!own_.is_secured && news.identity)
       refusals.note_refused(guid, "it is secured, this is not (--qos config/qos/secure.xml)");
+    const auto version = news.properties.find(kVersionProperty);
+    if (version != news.properties.end()) judge_version(guid, version->second);
+  }
+
+  /// A secured participant of an older Fast DDS announced itself from `address`.
+  void on_older_announcement(const OlderAnnouncement& older, const std::string& address) {
+    if (!own_.has_protected_discovery || older.version.empty()) return;
+    rtps::GUID_t guid;
+    std::copy(older.guid_prefix.begin(), older.guid_prefix.end(), guid.guidPrefix.value);
+    guid.entityId = rtps::c_EntityId_RTPSParticipant;
+    Refusals::of_process().note_discovered(to_text(guid),
+                                           describe(older.name, address, guid.guidPrefix));
+    judge_version(to_text(guid), older.version);
   }
 
   void on_endpoint(const EndpointNews& news) override {
@@ -80,10 +97,20 @@ class ParticipantListener : public DiscoveryListener {
 
   /// 'control_client' (10.77.0.2, 01.0f.…): name, address and GUID prefix that a participant
   /// announces.
-  static std::string describe(const ParticipantNews& news) {
-    const std::string address = find_address(news);
-    return describe_name(news.name) + " (" + address + (address.empty() ? "" : ", ") +
-           to_text(news.guid.guidPrefix) + ")";
+  static std::string describe(const std::string& name, const std::string& address,
+                              const rtps::GuidPrefix_t& prefix) {
+    return describe_name(name) + " (" + address + (address.empty() ? "" : ", ") + to_text(prefix) +
+           ")";
+  }
+
+  /// Reports a participant of a version with which ours does not discover anything.
+  void judge_version(const std::string& guid, const std::string& version) const {
+    if (own_.has_protected_discovery &&
+        has_secure_announcements(version) != has_secure_announcements(kMiddlewareVersion))
+      Refusals::of_process().note_refused(
+          guid, "its Fast DDS is " + config::to_printable(version, 20) + ", this one " +
+                    kMiddlewareVersion +
+                    ": expected keys of ./sls keys DIR --mixed-versions, got keys without it");
   }
 
   /// Why it gets no samples of ours although both are authorised; empty if there is no reason.
