@@ -30,25 +30,32 @@ def say(text: str) -> None:
     print(f"sls: dask: {text}", file=sys.stderr, flush=True)
 
 
-def fly(places: list[str], folder: str, number: int) -> dict[str, Any]:
-    """Runs on a worker. Dask sends it as code, because the package may not be on the worker's path.
-    Python searches `places` after the worker's own PYTHONPATH. An error that the user must repair
-    returns as "error"; an exception means an error that may be temporary."""
-    import platform
-    import sys
-    for place in places:
-        if place not in sys.path:
-            sys.path.append(place)
-    try:
-        from sls.campaign.worker import fly_chunk
-        from sls.errors import ConfigError
-    except ImportError as error:
-        return {"error": f"machine {platform.node()}: {error}; its dask-worker needs this Python, "
-                         "and PYTHONPATH with python/ and BUILD/python of this version", "code": 1}
-    try:
-        return {**fly_chunk(folder, number), "host": platform.node()}
-    except ConfigError as error:
-        return {"error": str(error), "code": 2}
+def make_task() -> Any:
+    """The function that flies a chunk on a worker. Newer versions of Dask send a function by its
+    name, also to the scheduler, which need not have the package. A function within a function has no
+    such name and is sent as code."""
+    def fly(places: list[str], folder: str, number: int) -> dict[str, Any]:
+        """Runs on a worker. The package may not be on the worker's path.
+        Python searches `places` after the worker's own PYTHONPATH. An error that the user must repair
+        returns as "error"; an exception means an error that may be temporary."""
+        import platform
+        import sys
+        for place in places:
+            if place not in sys.path:
+                sys.path.append(place)
+        try:
+            from sls.campaign.worker import fly_chunk
+            from sls.errors import ConfigError
+        except ImportError as error:
+            return {"error": f"machine {platform.node()}: {error}; its dask-worker needs this "
+                             "Python, and PYTHONPATH with python/ and BUILD/python of this "
+                             "version", "code": 1}
+        try:
+            return {**fly_chunk(folder, number), "host": platform.node()}
+        except ConfigError as error:
+            return {"error": str(error), "code": 2}
+
+    return fly
 
 
 def connect(address: str) -> Any:
@@ -96,7 +103,7 @@ class Flight:
 
     def submit(self, number: int) -> None:
         tries = self.tries[number] = self.tries.get(number, 0) + 1
-        future = self.client.submit(fly, self.places, self.place, number, pure=False,
+        future = self.client.submit(make_task(), self.places, self.place, number, pure=False,
                                     key=f"{self.prefix}-{number:06d}-{tries}")
         self.futures[number] = future
         future.add_done_callback(lambda done: self.ended.put((number, done)))

@@ -8,6 +8,7 @@ import getpass
 import hashlib
 import os
 import shlex
+import shutil
 import subprocess
 import sys
 import time
@@ -316,6 +317,10 @@ def describe_loss(folder: CampaignFolder, error: ControllerLost) -> str:
 def check(options: EngineOptions) -> None:
     """Raises InputError or EngineError if this process cannot submit jobs."""
     split_options(options.sbatch)
+    file = os.environ.get("SLURM_CONF")
+    if shutil.which("sinfo") and file and not os.path.isfile(file):  # Slurm 24 would wait 60 s for it
+        raise EngineError(f"slurm: no cluster answers (SLURM_CONF: expected a file, got {file}): "
+                          f"{START}")
     try:
         ask("sinfo", "--noheader")
     except ControllerLost as error:
