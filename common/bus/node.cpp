@@ -26,6 +26,7 @@
 #include <system_error>
 #include <utility>
 
+#include "announcements.hpp"
 #include "common/bus/fastdds/discovered_participants.hpp"
 #include "common/bus/fastdds/facts_of.hpp"
 #include "common/bus/fastdds/guarded_type.hpp"
@@ -183,6 +184,7 @@ struct Node::Impl {
     if (!participant) return;
     participant->set_listener(nullptr);
     participant->delete_contained_entities();
+    const LeavingScope leaving;
     dds::DomainParticipantFactory::get_instance()->delete_participant(participant);
   }
 

@@ -22,9 +22,9 @@ Profile::Profile(const Network& network, const std::string& name,
     discovery_server_ = std::make_unique<Process>(command);
   } else if (name == "secure") {
     const std::string keys = folder_ / "keys";
-    Process maker(std::vector<std::string>{
-                      std::string(SLS_SOURCE_DIR) + "/config/security/keys.sh", keys} +
-                  key_options);
+    Process maker(
+        std::vector<std::string>{std::string(SLS_SOURCE_DIR) + "/config/security/keys.sh", keys} +
+        key_options);
     if (maker.wait() != 0) throw std::runtime_error("keys.sh: " + maker.output());
     environment_.push_back("SLS_KEYS=" + keys);
   }

@@ -18,6 +18,7 @@
 #include <set>
 #include <utility>
 
+#include "announcements.hpp"
 #include "common/bus/fastdds/facts_of.hpp"
 #include "common/bus/fastdds/middleware_log.hpp"
 #include "common/bus/fastdds/participant_ids.hpp"
@@ -166,6 +167,7 @@ struct Observer::Impl : bus::ParticipantListener {
   ~Impl() override {
     participant->set_listener(nullptr);
     participant->delete_contained_entities();
+    const bus::LeavingScope leaving;
     dds::DomainParticipantFactory::get_instance()->delete_participant(participant);
   }
 

@@ -26,8 +26,8 @@ class ParticipantListener : public DiscoveryListener {
     /// Its keys do not protect submessages, so that other vendors' readers get nothing (README.md,
     /// trap 28).
     bool has_plain_submessages = false;
-    /// Its keys protect discovery, so that versions of Fast DDS before and since 2.13 do not discover
-    /// each other (README.md, trap 38).
+    /// Its keys protect discovery, so that versions of Fast DDS before and since 2.13 do not
+    /// discover each other (README.md, trap 38).
     bool has_protected_discovery = false;
   };
 

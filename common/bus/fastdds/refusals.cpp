@@ -49,7 +49,11 @@ void Refusals::note_discovered(const std::string& guid, const std::string& descr
                                const std::string& claim) {
   const std::lock_guard lock(mutex_);
   if (known_.size() >= kMostKnown) return;
-  known_.emplace(guid, description);
+  const auto [known, is_new] = known_.emplace(guid, description);
+  if (!is_new && known->second.empty()) {  // Fast DDS 3 accepts a participant, then discovers it
+    known->second = description;
+    return;
+  }
   if (claim.empty()) return;
   pending_.emplace(guid, Pending{Clock::now() + kTimeToProve, claim});
   if (!watcher_.joinable()) watcher_ = std::thread([this] { watch(); });
@@ -59,6 +63,7 @@ void Refusals::note_discovered(const std::string& guid, const std::string& descr
 void Refusals::note_accepted(const std::string& guid) {
   const std::lock_guard lock(mutex_);
   pending_.erase(guid);
+  if (known_.size() < kMostKnown) known_.emplace(guid, "");
 }
 
 void Refusals::note_gone(const std::string& guid) {
@@ -121,8 +126,8 @@ void Refusals::report(const std::string& participant, const std::string& cause) 
     return;
   }
   const auto found = known_.find(guid);
-  spdlog::warn("refused {}: {}", found == known_.end() ? "participant " + guid : found->second,
-               cause);
+  const bool is_described = found != known_.end() && !found->second.empty();
+  spdlog::warn("refused {}: {}", is_described ? found->second : "participant " + guid, cause);
 }
 
 }  // namespace sls::bus

@@ -2,12 +2,12 @@
 /// control_client, recorder). These programs then keep receiving when another process has left
 /// before they read its first message.
 ///
-/// Fast DDS before 2.13 puts a message into a segment of the sender, and a descriptor into the port of the
-/// receiver, which opens the segment at the first descriptor. If the sender has left by then,
-/// opening fails, the descriptor stays in the port, and the thread that reads the port tries again
-/// for ever: this process receives nothing more over shared memory (README.md, trap 32). So such a
-/// segment opens as a copy of a segment of this process. Its buffers are those of old messages of
-/// our own, which the middleware ignores, and mostly already invalid.
+/// Fast DDS before 2.13 puts a message into a segment of the sender, and a descriptor into the port
+/// of the receiver, which opens the segment at the first descriptor. If the sender has left by
+/// then, opening fails, the descriptor stays in the port, and the thread that reads the port tries
+/// again for ever: this process receives nothing more over shared memory (README.md, trap 32). So
+/// such a segment opens as a copy of a segment of this process. Its buffers are those of old
+/// messages of our own, which the middleware ignores, and mostly already invalid.
 ///
 /// Upstream: #3992, in 2.13 and 3. To be deleted when 2.9 is no longer supported.
 #include <dlfcn.h>

@@ -65,6 +65,8 @@ TEST_F(RefusalsTest, AParticipantWithoutProofIsReportedInTime) {
   refusals_.note_discovered("01.0f", "'accepted'", "'CN=controller'");
   refusals_.note_discovered("02.0f", "'silent'", "'CN=recorder' of 'CN=another'");
   refusals_.note_accepted("01.0f");
+  refusals_.note_accepted("03.0f");  // Fast DDS 3 tells both in this order
+  refusals_.note_discovered("03.0f", "'accepted first'", "'CN=recorder'");
   ASSERT_TRUE(test::wait_until([&] { return lines() > 0; }));
   EXPECT_EQ(said_.str(),
             "refused 'silent': no proof of an identity that holds here within 5 s; it claims "
@@ -98,6 +100,26 @@ TEST_F(RefusalsTest, AParticipantWithoutANameIsDescribedAsSuch) {
   EXPECT_EQ(said_.str(),
             "refused a participant without a name (01.00.00.00.00.00.00.00.00.00.00.00): it is "
             "secured, this is not (--qos config/qos/secure.xml)\n");
+}
+
+TEST_F(RefusalsTest, OnlyKeysThatProtectDiscoverySeparateVersions) {
+  const bool is_old = !has_secure_announcements(kMiddlewareVersion);
+  std::uint8_t number = 4;
+  for (const bool is_protected : {false, true})
+    for (const char* version : {"2.9.1", "3.1.2"}) {
+      said_.str("");
+      ParticipantListener listener({true, false, is_protected});
+      ParticipantNews news;
+      news.guid.guidPrefix.value[0] = ++number;
+      news.identity.emplace();
+      news.properties[kVersionProperty] = version;
+      listener.on_participant(nullptr, news);
+      const bool is_apart = is_protected && is_old != (version[0] == '2');
+      EXPECT_EQ(
+          said_.str().find("expected keys of ./sls keys DIR --mixed-versions") != std::string::npos,
+          is_apart)
+          << said_.str();
+    }
 }
 
 TEST_F(RefusalsTest, OnlyAnotherVendorsParticipantNeedsKeysThatProtectSubmessages) {
