@@ -1,4 +1,4 @@
-/// What discovery tells of participants and endpoints, in the same form for each version of Fast
+/// News of discovery about participants and endpoints, in the same form for each version of Fast
 /// DDS.
 #pragma once
 

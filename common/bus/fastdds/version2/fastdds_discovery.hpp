@@ -1,4 +1,4 @@
-/// What Fast DDS 2 tells of discovered participants and endpoints; version3/ has the same for Fast
+/// News of Fast DDS 2 about discovered participants and endpoints; version3/ has the same for Fast
 /// DDS 3.
 #pragma once
 

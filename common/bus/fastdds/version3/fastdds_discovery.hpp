@@ -1,4 +1,4 @@
-/// What Fast DDS 3 tells of discovered participants and endpoints; version2/ has the same for Fast
+/// News of Fast DDS 3 about discovered participants and endpoints; version2/ has the same for Fast
 /// DDS 2.
 #pragma once
 
