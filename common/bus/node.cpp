@@ -165,8 +165,8 @@ struct Node::Impl {
     announce_what_discovery_lacks(qos);
     listener = std::make_unique<ParticipantListener>(own, &neighbours, &discovered);
     if (is_secured)
-      hear_older_peers(qos, [this](const OlderAnnouncement& older, const std::string& address) {
-        listener->on_older_announcement(older, address);
+      hear_announcements(qos, [this](const PlainAnnouncement& other, const std::string& address) {
+        if (is_self_known && !is_self(other)) listener->on_announcement(other, address);
       });
     participant = factory->create_participant(static_cast<std::uint32_t>(domain), qos,
                                               listener.get(), dds::StatusMask::none());
@@ -176,7 +176,9 @@ struct Node::Impl {
     if (!participant || !publisher || !subscriber)
       throw BusError("domain " + std::to_string(domain) +
                      ": cannot join: " + MiddlewareLog::find_first_error());
-    neighbours.set_self(to_peer(participant->get_instance_handle()));
+    self = to_peer(participant->get_instance_handle());
+    is_self_known = true;
+    neighbours.set_self(self);
     joined = std::chrono::steady_clock::now();
   }
 
@@ -238,6 +240,10 @@ struct Node::Impl {
     constexpr std::string_view kScheme = "file://";
     const auto* place = rtps::PropertyPolicyHelper::find_property(qos.properties(), property);
     return place && place->rfind(kScheme, 0) == 0 ? place->substr(kScheme.size()) : "";
+  }
+
+  bool is_self(const PlainAnnouncement& other) const {
+    return std::equal(other.guid_prefix.begin(), other.guid_prefix.end(), self.bytes.begin());
   }
 
   static bool has_shared_memory(const dds::DomainParticipantQos& qos) {
@@ -307,6 +313,8 @@ struct Node::Impl {
   Neighbours neighbours{problems};
   ParticipantPorts ports;
   DiscoveredParticipants discovered;
+  PeerId self;
+  std::atomic<bool> is_self_known{false};
   std::unique_ptr<ParticipantListener> listener;
   dds::DomainParticipant* participant = nullptr;
   dds::Publisher* publisher = nullptr;

@@ -15,7 +15,7 @@ constexpr std::array<std::uint8_t, 4> kSecureReader = {0xff, 1, 1, 0xc7};
 constexpr std::uint8_t kData = 0x15, kGap = 0x08;
 constexpr std::uint8_t kLittleEndian = 1, kInlineQos = 2, kSample = 4;
 constexpr std::uint16_t kSentinel = 0x0001, kProperties = 0x0059, kEntityName = 0x0062,
-                        kProductVersion = 0x8000;
+                        kIdentityToken = 0x1001, kProductVersion = 0x8000;
 
 /// A part of a message. What lies beyond its end reads as zeros and ends it.
 class Bytes {
@@ -86,11 +86,10 @@ std::vector<std::uint8_t> make_gap(std::uint32_t high, std::uint32_t low) {
 
 }  // namespace
 
-std::optional<OlderAnnouncement> find_older_announcement(const std::uint8_t* message,
-                                                         std::size_t size) {
+std::optional<PlainAnnouncement> find_announcement(const std::uint8_t* message, std::size_t size) {
   constexpr std::array<std::uint8_t, 4> kMagic = {'R', 'T', 'P', 'S'};
   if (size < kHeader || !std::equal(kMagic.begin(), kMagic.end(), message)) return {};
-  if (message[6] != 1 || message[7] != 15) return {};  // eProsima
+  const bool is_of_eprosima = message[6] == 1 && message[7] == 15;
   Bytes rest(message, size, true);
   rest.skip(kHeader);
   while (rest.left() >= 4) {
@@ -113,25 +112,30 @@ std::optional<OlderAnnouncement> find_older_announcement(const std::uint8_t* mes
     if (submessage.is_short() || !std::equal(kPlainWriter.begin(), kPlainWriter.end(), ids + 4))
       return {};
 
-    OlderAnnouncement found;
+    PlainAnnouncement found;
+    bool is_new = false;
     if ((flags & kInlineQos) && !read_parameters(sample, [](auto...) {})) return {};
     if (flags & kSample) {
       const bool is_little = sample.left() > 1 && (sample.at()[1] & 1) != 0;
       Bytes list(sample.at(), sample.left(), is_little);
       list.skip(4);
-      bool is_new = false;
       const bool is_whole = read_parameters(list, [&](std::uint16_t id, Bytes value) {
         if (id == kProductVersion) is_new = true;
+        if (id == kIdentityToken) found.is_secured = true;
         if (id == kEntityName) found.name = value.read_string();
         if (id != kProperties) return;
         for (std::uint32_t count = value.read(4); count > 0 && !value.is_short(); --count) {
           const std::string key = value.read_string(), text = value.read_string();
           if (key == "sls.fastdds") found.version = text;
+          if (key == "sls.certificate") found.certificate = text;
+          if (key == "sls.authority") found.authority = text;
         }
       });
-      if (is_new || !is_whole) return {};
+      if (!is_whole) return {};
     }
+    found.is_leaving = (flags & kSample) == 0;
     found.guid_prefix.assign(message + kPrefix, message + kPrefix + kPrefixSize);
+    if (is_new || !is_of_eprosima) return found;
     auto& copy = found.as_secure;
     copy.assign(message, message + size);
     const auto at = copy.begin() + (ids - message);

@@ -52,22 +52,24 @@ class ParticipantListener : public DiscoveryListener {
         guid, describe(news.name, find_address(news), news.guid.guidPrefix),
         own_.is_secured && news.identity ? describe_identity(*news.identity) : "");
     if (own_.is_secured && !news.identity && news.is_identity_known)
-      refusals.note_refused(guid, "it has no identity (its QoS file is not config/qos/secure.xml)");
+      refusals.note_refused(guid, kNoIdentity);
     if (!own_.is_secured && news.identity)
       refusals.note_refused(guid, "it is secured, this is not (--qos config/qos/secure.xml)");
     const auto version = news.properties.find(kVersionProperty);
     if (version != news.properties.end()) judge_version(guid, version->second);
   }
 
-  /// A secured participant of an older Fast DDS announced itself from `address`.
-  void on_older_announcement(const OlderAnnouncement& older, const std::string& address) {
-    if (!own_.has_protected_discovery || older.version.empty()) return;
+  /// Another participant announced itself from `address`, perhaps once more. Only Fast DDS 3 tells
+  /// this, and only to a secured participant: it discovers no participant that it refuses.
+  void on_announcement(const PlainAnnouncement& other, const std::string& address) {
     rtps::GUID_t guid;
-    std::copy(older.guid_prefix.begin(), older.guid_prefix.end(), guid.guidPrefix.value);
+    std::copy(other.guid_prefix.begin(), other.guid_prefix.end(), guid.guidPrefix.value);
     guid.entityId = rtps::c_EntityId_RTPSParticipant;
-    Refusals::of_process().note_discovered(to_text(guid),
-                                           describe(older.name, address, guid.guidPrefix));
-    judge_version(to_text(guid), older.version);
+    Refusals::of_process().note_discovered(
+        to_text(guid), describe(other.name, address, guid.guidPrefix),
+        other.certificate.empty() ? "" : describe_identity({other.certificate, other.authority}));
+    if (!other.is_secured) Refusals::of_process().note_refused(to_text(guid), kNoIdentity);
+    if (!other.version.empty()) judge_version(to_text(guid), other.version);
   }
 
   void on_endpoint(const EndpointNews& news) override {
@@ -88,6 +90,9 @@ class ParticipantListener : public DiscoveryListener {
   }
 
  private:
+  static constexpr const char* kNoIdentity =
+      "it has no identity (its QoS file is not config/qos/secure.xml)";
+
   template <class Value>
   static std::string to_text(const Value& value) {
     std::ostringstream text;

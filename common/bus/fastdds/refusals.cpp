@@ -50,8 +50,8 @@ void Refusals::note_discovered(const std::string& guid, const std::string& descr
   const std::lock_guard lock(mutex_);
   if (known_.size() >= kMostKnown) return;
   const auto [known, is_new] = known_.emplace(guid, description);
-  if (!is_new && known->second.empty()) {  // Fast DDS 3 accepts a participant, then discovers it
-    known->second = description;
+  if (!is_new) {  // Fast DDS 3 accepts a participant, then discovers it; announcements recur
+    if (known->second.empty()) known->second = description;
     return;
   }
   if (claim.empty()) return;

@@ -9,10 +9,11 @@
 
 namespace sls::bus {
 
-using OlderPeerHandler = std::function<void(const OlderAnnouncement&, const std::string& address)>;
+using AnnouncementHandler =
+    std::function<void(const PlainAnnouncement&, const std::string& address)>;
 
 /// Nothing to do: see version 3.
-inline void hear_older_peers(eprosima::fastdds::dds::DomainParticipantQos&,
-                             const OlderPeerHandler&) {}
+inline void hear_announcements(eprosima::fastdds::dds::DomainParticipantQos&,
+                               const AnnouncementHandler&) {}
 
 }  // namespace sls::bus

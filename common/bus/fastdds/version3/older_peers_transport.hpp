@@ -13,8 +13,10 @@
 
 namespace sls::bus {
 
-/// Is told an announcement and the address from which it came, on threads of the middleware.
-using OlderPeerHandler = std::function<void(const OlderAnnouncement&, const std::string& address)>;
+/// Is told an announcement and the address from which it came, on threads of the middleware, before
+/// the middleware gets it.
+using AnnouncementHandler =
+    std::function<void(const PlainAnnouncement&, const std::string& address)>;
 
 namespace detail {
 
@@ -22,7 +24,8 @@ namespace rtps = eprosima::fastdds::rtps;
 
 class OlderPeersTransport : public rtps::ChainingTransport {
  public:
-  OlderPeersTransport(const rtps::ChainingTransportDescriptor& descriptor, OlderPeerHandler handle)
+  OlderPeersTransport(const rtps::ChainingTransportDescriptor& descriptor,
+                      AnnouncementHandler handle)
       : ChainingTransport(descriptor), handle_(std::move(handle)) {}
 
   rtps::TransportDescriptorInterface* get_configuration() override {
@@ -38,35 +41,35 @@ class OlderPeersTransport : public rtps::ChainingTransport {
   void receive(rtps::TransportReceiverInterface* next, const rtps::octet* message,
                std::uint32_t size, const rtps::Locator_t& local,
                const rtps::Locator_t& remote) override {
+    const auto found = find_announcement(message, size);
+    if (found && !found->is_leaving) handle_(*found, rtps::IPLocator::toIPv4string(remote));
     next->OnDataReceived(message, size, local, remote);
-    const auto found = find_older_announcement(message, size);
-    if (!found) return;
-    handle_(*found, rtps::IPLocator::toIPv4string(remote));
-    next->OnDataReceived(found->as_secure.data(),
-                         static_cast<std::uint32_t>(found->as_secure.size()), local, remote);
+    if (found && !found->as_secure.empty())
+      next->OnDataReceived(found->as_secure.data(),
+                           static_cast<std::uint32_t>(found->as_secure.size()), local, remote);
   }
 
  private:
-  const OlderPeerHandler handle_;
+  const AnnouncementHandler handle_;
 };
 
 struct OlderPeersDescriptor : rtps::ChainingTransportDescriptor {
   OlderPeersDescriptor(std::shared_ptr<rtps::TransportDescriptorInterface> transport,
-                       OlderPeerHandler handler)
+                       AnnouncementHandler handler)
       : ChainingTransportDescriptor(std::move(transport)), handle(std::move(handler)) {}
   rtps::TransportInterface* create_transport() const override {
     return new OlderPeersTransport(*this, handle);
   }
-  const OlderPeerHandler handle;
+  const AnnouncementHandler handle;
 };
 
 }  // namespace detail
 
 /// Lets a secured participant discover those of Fast DDS before 2.13 (older_peers.hpp): each of its
 /// transports also passes on their announcements as the secure ones that they do not send. `handle`
-/// is told each one.
-inline void hear_older_peers(eprosima::fastdds::dds::DomainParticipantQos& qos,
-                             const OlderPeerHandler& handle) {
+/// is told the announcements of all participants, also our own.
+inline void hear_announcements(eprosima::fastdds::dds::DomainParticipantQos& qos,
+                               const AnnouncementHandler& handle) {
   for (auto& transport : qos.transport().user_transports)
     transport = std::make_shared<detail::OlderPeersDescriptor>(transport, handle);
 }

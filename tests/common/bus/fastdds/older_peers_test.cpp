@@ -50,8 +50,8 @@ Bytes make_message(const Bytes& parameters, std::uint8_t number = 1, const Bytes
   return header + time + Bytes{0x15, 5, static_cast<std::uint8_t>(body.size()), 0} + body;
 }
 
-std::optional<OlderAnnouncement> find(const Bytes& message) {
-  return find_older_announcement(message.data(), message.size());
+std::optional<PlainAnnouncement> find(const Bytes& message) {
+  return find_announcement(message.data(), message.size());
 }
 
 TEST(OlderPeersTest, AnAnnouncementIsRepeatedWithTheIdsOfTheSecureWriter) {
@@ -73,9 +73,20 @@ TEST(OlderPeersTest, ALaterAnnouncementSaysThatThoseBeforeDoNotExist) {
                                   Bytes(expected.begin() + 20, expected.end()));
 }
 
+TEST(OlderPeersTest, AnnouncementsOfOthersAreNotRepeated) {
+  const Bytes token = parameter(0x1001, word(0));
+  const auto of_3 = find(make_message(kName + kProductVersion + token));
+  ASSERT_TRUE(of_3);
+  EXPECT_EQ(of_3->name, "control_client");
+  EXPECT_TRUE(of_3->is_secured);
+  EXPECT_EQ(of_3->as_secure, Bytes());
+  const auto of_cyclone = find(make_message(kName, 1, kPlainIds, 16));
+  ASSERT_TRUE(of_cyclone);
+  EXPECT_FALSE(of_cyclone->is_secured);
+  EXPECT_EQ(of_cyclone->as_secure, Bytes());
+}
+
 TEST(OlderPeersTest, OtherMessagesContainNone) {
-  EXPECT_FALSE(find(make_message(kName + kProductVersion)));             // Fast DDS 3
-  EXPECT_FALSE(find(make_message(kName, 1, kPlainIds, 16)));             // Cyclone DDS
   EXPECT_FALSE(find(make_message(kName, 1, {0, 0, 0, 0, 0, 0, 1, 3})));  // samples of a topic
   EXPECT_FALSE(find({}));
 }
