@@ -26,7 +26,6 @@
 #include <system_error>
 #include <utility>
 
-#include "announcements.hpp"
 #include "common/bus/fastdds/discovered_participants.hpp"
 #include "common/bus/fastdds/facts_of.hpp"
 #include "common/bus/fastdds/guarded_type.hpp"
@@ -42,8 +41,9 @@
 #include "common/bus/security_files.hpp"
 #include "common/config/config_error.hpp"
 #include "common/config/domain.hpp"
+#include "fastdds_announcements.hpp"
 #include "fastdds_api.hpp"
-#include "older_peers_transport.hpp"
+#include "fastdds_older_peers.hpp"
 
 namespace sls::bus {
 namespace {

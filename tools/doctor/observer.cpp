@@ -18,7 +18,6 @@
 #include <set>
 #include <utility>
 
-#include "announcements.hpp"
 #include "common/bus/fastdds/facts_of.hpp"
 #include "common/bus/fastdds/middleware_log.hpp"
 #include "common/bus/fastdds/participant_ids.hpp"
@@ -27,6 +26,7 @@
 #include "common/bus/node.hpp"
 #include "common/bus/topics.hpp"
 #include "common/config/config_error.hpp"
+#include "fastdds_announcements.hpp"
 #include "fastdds_api.hpp"
 #include "tools/doctor/endpoint_qos.hpp"
 #include "tools/doctor/participant_qos.hpp"

@@ -9,7 +9,7 @@
 ///
 /// Upstream: #6502 (open, 3.6 has it, too). To be deleted when the timer's thread does not wait for
 /// that lock.
-#include "announcements.hpp"
+#include "fastdds_announcements.hpp"
 
 #include <dlfcn.h>
 #include <pthread.h>

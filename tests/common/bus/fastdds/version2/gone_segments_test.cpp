@@ -60,7 +60,7 @@ TEST_F(GoneSegmentsTest, OtherFilesAreMissingAsEver) {
   make_own();
   const std::string begin = std::string("/") + kSharedMemoryPrefix;
   for (const std::string& name :
-       {begin + "port7411", begin + "0123456789abcdeg", std::string("/else")}) {
+       {begin + "port1", begin + "0123456789abcdeg", std::string("/else")}) {
     EXPECT_EQ(::shm_open(name.c_str(), O_RDWR, 0600), -1) << name;
     EXPECT_EQ(errno, ENOENT) << name;
   }
