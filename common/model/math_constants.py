@@ -3,7 +3,7 @@
 
 Polynomials have the least greatest error (Remez's exchange) before their coefficients are rounded to double; the
 greatest relative error of each stands beside it. A constant in parts is the sum of them.
-usage: math_constants.py | clang-format --assume-filename=math_constants.hpp > math_constants.hpp
+usage: math_constants.py > math_constants.hpp   # then format it
 """
 import mpmath as mp
 

@@ -17,7 +17,7 @@ constexpr std::uint8_t kLittleEndian = 1, kInlineQos = 2, kSample = 4;
 constexpr std::uint16_t kSentinel = 0x0001, kProperties = 0x0059, kEntityName = 0x0062,
                         kIdentityToken = 0x1001, kProductVersion = 0x8000;
 
-/// A part of a message. What lies beyond its end reads as zeros and ends it.
+/// A part of a message. The bytes beyond its end read as zeros and end it.
 class Bytes {
  public:
   Bytes(const std::uint8_t* begin, std::size_t size, bool is_little)

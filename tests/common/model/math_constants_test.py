@@ -1,4 +1,4 @@
-"""math_constants.hpp is what math_constants.py writes, but for white space. usage: math_constants_test.py FOLDER"""
+"""math_constants.hpp is what math_constants.py writes, except for white space. usage: math_constants_test.py FOLDER"""
 
 import subprocess
 import sys

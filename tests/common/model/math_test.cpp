@@ -11,7 +11,7 @@
 namespace sls::math {
 namespace {
 
-constexpr double kInf = std::numeric_limits<double>::infinity();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kTiny = std::numeric_limits<double>::denorm_min();
 constexpr double kMax = std::numeric_limits<double>::max();
@@ -40,7 +40,7 @@ TEST(MathTest, SineAndCosineOfSpecialArgumentsAreThoseOfC99) {
   EXPECT_TRUE(is_same(sin(-1e-310), -1e-310));
   EXPECT_TRUE(is_same(cos(0.0), 1.0));
   EXPECT_TRUE(is_same(cos(-0.0), 1.0));
-  for (const double x : {kInf, -kInf, kNan}) {
+  for (const double x : {kInfinity, -kInfinity, kNan}) {
     EXPECT_TRUE(std::isnan(sin(x)));
     EXPECT_TRUE(std::isnan(cos(x)));
     EXPECT_TRUE(std::isnan(sincos(x).sine));
@@ -78,28 +78,28 @@ TEST(MathTest, FunctionsAreOddOrEven) {
 TEST(MathTest, ExponentialOfSpecialArgumentsIsThatOfC99) {
   EXPECT_TRUE(is_same(exp(0.0), 1.0));
   EXPECT_TRUE(is_same(exp(-0.0), 1.0));
-  EXPECT_TRUE(is_same(exp(kInf), kInf));
-  EXPECT_TRUE(is_same(exp(-kInf), 0.0));
+  EXPECT_TRUE(is_same(exp(kInfinity), kInfinity));
+  EXPECT_TRUE(is_same(exp(-kInfinity), 0.0));
   EXPECT_TRUE(std::isnan(exp(kNan)));
   EXPECT_TRUE(is_same(exp(kTiny), 1.0));
-  EXPECT_TRUE(is_same(exp(710.0), kInf));
-  EXPECT_TRUE(is_same(exp(kMax), kInf));
+  EXPECT_TRUE(is_same(exp(710.0), kInfinity));
+  EXPECT_TRUE(is_same(exp(kMax), kInfinity));
   EXPECT_TRUE(is_same(exp(-745.1), kTiny));
   EXPECT_TRUE(is_same(exp(-746.0), 0.0));
   EXPECT_TRUE(is_same(exp(-kMax), 0.0));
   EXPECT_TRUE(is_same(expm1(-0.0), -0.0));
   EXPECT_TRUE(is_same(expm1(kTiny), kTiny));
-  EXPECT_TRUE(is_same(expm1(-kInf), -1.0));
-  EXPECT_TRUE(is_same(expm1(kInf), kInf));
+  EXPECT_TRUE(is_same(expm1(-kInfinity), -1.0));
+  EXPECT_TRUE(is_same(expm1(kInfinity), kInfinity));
   EXPECT_TRUE(std::isnan(expm1(kNan)));
 }
 
 TEST(MathTest, LogarithmOfSpecialArgumentsIsThatOfC99) {
   EXPECT_TRUE(is_same(log(1.0), 0.0));
-  EXPECT_TRUE(is_same(log(0.0), -kInf));
-  EXPECT_TRUE(is_same(log(-0.0), -kInf));
-  EXPECT_TRUE(is_same(log(kInf), kInf));
-  for (const double x : {-1.0, -kInf, -kTiny, kNan}) EXPECT_TRUE(std::isnan(log(x)));
+  EXPECT_TRUE(is_same(log(0.0), -kInfinity));
+  EXPECT_TRUE(is_same(log(-0.0), -kInfinity));
+  EXPECT_TRUE(is_same(log(kInfinity), kInfinity));
+  for (const double x : {-1.0, -kInfinity, -kTiny, kNan}) EXPECT_TRUE(std::isnan(log(x)));
   EXPECT_TRUE(is_same(log(2.0), 0.69314718055994530942));
   EXPECT_TRUE(is_same(log(kTiny), -744.44007192138126231));
 }
@@ -113,11 +113,11 @@ TEST(MathTest, ArcTangentOfSpecialArgumentsIsThatOfC99) {
     EXPECT_TRUE(is_same(atan2(sign * 0.0, 2.0), sign * 0.0));
     EXPECT_TRUE(is_same(atan2(sign * 2.0, 0.0), sign * kPi / 2));
     EXPECT_TRUE(is_same(atan2(sign * 2.0, -0.0), sign * kPi / 2));
-    EXPECT_TRUE(is_same(atan2(sign * 2.0, -kInf), sign * kPi));
-    EXPECT_TRUE(is_same(atan2(sign * 2.0, kInf), sign * 0.0));
-    EXPECT_TRUE(is_same(atan2(sign * kInf, 2.0), sign * kPi / 2));
-    EXPECT_TRUE(is_same(atan2(sign * kInf, -kInf), sign * 3 * kPi / 4));
-    EXPECT_TRUE(is_same(atan2(sign * kInf, kInf), sign * kPi / 4));
+    EXPECT_TRUE(is_same(atan2(sign * 2.0, -kInfinity), sign * kPi));
+    EXPECT_TRUE(is_same(atan2(sign * 2.0, kInfinity), sign * 0.0));
+    EXPECT_TRUE(is_same(atan2(sign * kInfinity, 2.0), sign * kPi / 2));
+    EXPECT_TRUE(is_same(atan2(sign * kInfinity, -kInfinity), sign * 3 * kPi / 4));
+    EXPECT_TRUE(is_same(atan2(sign * kInfinity, kInfinity), sign * kPi / 4));
     EXPECT_TRUE(is_same(atan2(sign * kTiny, kMax), sign * 0.0));
     EXPECT_TRUE(is_same(atan2(sign * kTiny, kTiny), sign * kPi / 4));
     EXPECT_TRUE(is_same(atan2(sign * kMax, kMax), sign * kPi / 4));
@@ -128,8 +128,8 @@ TEST(MathTest, ArcTangentOfSpecialArgumentsIsThatOfC99) {
 
 TEST(MathTest, LengthOfSpecialArgumentsIsThatOfC99) {
   EXPECT_TRUE(is_same(hypot(-0.0, -0.0), 0.0));
-  EXPECT_TRUE(is_same(hypot(kInf, kNan), kInf));
-  EXPECT_TRUE(is_same(hypot(kNan, -kInf), kInf));
+  EXPECT_TRUE(is_same(hypot(kInfinity, kNan), kInfinity));
+  EXPECT_TRUE(is_same(hypot(kNan, -kInfinity), kInfinity));
   EXPECT_TRUE(std::isnan(hypot(kNan, 1.0)));
   EXPECT_TRUE(is_same(hypot(3e300, -4e300), 5e300));
   EXPECT_TRUE(is_same(hypot(kTiny, 0.0), kTiny));
