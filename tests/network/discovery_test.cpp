@@ -17,9 +17,7 @@ class NoMulticastTest : public testing::Test {
   void expect_same(const std::string& profile) {
     const Profile configured(*network_, profile);
     Flight local(scenario("short")), flight(scenario("short"), configured.flight_options());
-    local.expect_success();
-    flight.expect_success();
-    EXPECT_TRUE(read_figures(flight.recording(), local.recording()).is_identical);
+    test::expect_same(flight, local);
   }
 
   std::unique_ptr<Network> network_;

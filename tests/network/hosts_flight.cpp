@@ -1,5 +1,7 @@
 #include "tests/network/hosts_flight.hpp"
 
+#include <gtest/gtest.h>
+
 #include <csignal>
 
 namespace sls::test {
@@ -67,6 +69,16 @@ Figures read_figures(const std::filesystem::path& recording, const std::filesyst
     figures.is_identical &= read_file(recording / file) == read_file(local / file);
   Process verify({program("sls_verify"), recording.string(), local.string()});
   figures.is_identical &= verify.wait() == 0;
+  return figures;
+}
+
+Figures expect_same(Flight& flight, Flight& local) {
+  local.expect_success();
+  flight.expect_success();
+  if (testing::Test::HasFailure()) return {};
+  const Figures figures = read_figures(flight.recording(), local.recording());
+  EXPECT_TRUE(figures.is_identical) << flight.outputs();
+  EXPECT_EQ(figures.rows_lost, 0u);
   return figures;
 }
 

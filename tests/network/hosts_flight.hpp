@@ -56,4 +56,7 @@ struct Figures {
 /// none.
 Figures read_figures(const std::filesystem::path& recording, const std::filesystem::path& local);
 
+/// Waits for both flights. Expects success, the recording of `local` byte by byte, and no lost row.
+Figures expect_same(Flight& flight, Flight& local);
+
 }  // namespace sls::test

@@ -23,17 +23,7 @@ class NetworkTest : public testing::Test {
   Figures expect_same(const std::string& profile, const std::string& file = scenario("short")) {
     const Profile configured(*network_, profile);
     Flight local(file), flight(file, configured.flight_options());
-    return compare(flight, local);
-  }
-
-  static Figures compare(Flight& flight, Flight& local) {
-    local.expect_success();
-    flight.expect_success();
-    if (testing::Test::HasFailure()) return {};
-    const Figures figures = read_figures(flight.recording(), local.recording());
-    EXPECT_TRUE(figures.is_identical);
-    EXPECT_EQ(figures.rows_lost, 0u);
-    return figures;
+    return test::expect_same(flight, local);
   }
 
   std::unique_ptr<Network> network_;
@@ -104,7 +94,7 @@ TEST_F(NetworkTest, APartitionOfFiveSecondsCostsAtMostSix) {
   network_->heal();
   ASSERT_TRUE(flight.wait_for_steps(before + 100)) << flight.outputs();
   const std::chrono::duration<double> stood = std::chrono::steady_clock::now() - cut_at;
-  compare(flight, local);
+  test::expect_same(flight, local);
   ASSERT_LT(before + 200, Table(local.recording() / "state.csv").rows()) << "cut too late";
   EXPECT_LT(stood.count(), 6.0) << flight.outputs();
 }
