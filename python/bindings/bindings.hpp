@@ -5,7 +5,6 @@
 
 namespace sls::python {
 
-void add_math(pybind11::module_& module);
 void add_scenario(pybind11::module_& module);
 void add_flight(pybind11::module_& module);
 void add_recording(pybind11::module_& module);

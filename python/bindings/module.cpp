@@ -6,7 +6,6 @@ PYBIND11_MODULE(_sls_core, module) {
   using namespace sls::python;
   module.doc() = "The simulator in this process. The package sls is its face.";
   add_errors(module);
-  add_math(module);
   add_python_law(module);
   add_scenario(module);
   add_flight(module);
