@@ -20,6 +20,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import certificates
+import tree as trees
 
 ROOT = certificates.ROOT
 DOCUMENT = ROOT / "docs/arm.md"
@@ -85,10 +86,6 @@ def read_commands() -> tuple[str, str]:
     return packages, cmake + build
 
 
-def is_mounted_in(folder: Path) -> bool:
-    return any(line.split()[1].startswith(f"{folder}/") for line in Path("/proc/mounts").read_text().splitlines())
-
-
 @contextmanager
 def system_tree(named: Path | None) -> Iterator[Path]:
     """The folder of the tree: the named one, which stays, or a temporary one."""
@@ -99,10 +96,10 @@ def system_tree(named: Path | None) -> Iterator[Path]:
     try:
         yield folder
     finally:
-        if is_mounted_in(folder):  # never by this program
-            print(f"sls: {folder}: left in place, because something is mounted in it", file=sys.stderr)
-        else:
-            subprocess.run(["rm", "-rf", "--one-file-system", "--", str(folder)], check=False)
+        try:
+            trees.remove(folder)
+        except trees.Failure as failure:  # mounted, but never by this program
+            print(f"sls: {failure}", file=sys.stderr)
 
 
 @contextmanager
@@ -121,16 +118,6 @@ def log_file() -> Iterator[Path]:
             os.unlink(name)
 
 
-def find_mirror() -> str:
-    """The mirror that apt of this machine uses."""
-    try:
-        said = subprocess.run(["apt-get", "indextargets", "--format", "$(SITE)", "Created-By: Packages",
-                               "Origin: Debian", "Component: main"], capture_output=True, text=True, check=False).stdout
-    except OSError:
-        said = ""
-    return (said.split() or ["http://deb.debian.org/debian"])[0]
-
-
 def make_tree(tree: Path, log: Path) -> None:
     """Makes a Debian 12 with the packages of docs/arm.md, unless the folder holds it."""
     packages = read_commands()[0]
@@ -142,7 +129,7 @@ def make_tree(tree: Path, log: Path) -> None:
         if any(tree.iterdir()):
             raise StepError(f"--tree: {tree}: expected a tree of this command, or an empty folder, got other files")
         print("making a Debian 12 with debootstrap", flush=True)
-        run("debootstrap", [*ISOLATED, "debootstrap", "--variant=minbase", "bookworm", str(tree), find_mirror()],
+        run("debootstrap", [*ISOLATED, "debootstrap", "--variant=minbase", "bookworm", str(tree), trees.find_mirror()],
             log)
         (tree / "debootstrap.done").touch()
     (tree / "etc/dpkg/dpkg.cfg.d/no_sync").write_text("force-unsafe-io\n", encoding="utf-8")
