@@ -90,12 +90,6 @@ void load_profiles(const std::filesystem::path& file, const std::string& identit
 
 namespace {
 
-PeerId to_peer(const dds::InstanceHandle_t& handle) {
-  rtps::GUID_t guid;
-  rtps::iHandle2GUID(guid, handle);
-  return bus::to_peer(guid);
-}
-
 /// The sample that contains `payload`. A reader of Fast DDS passes only payloads inside a sample to
 /// a type.
 const rtps::CacheChange_t& find_change(const rtps::SerializedPayload_t& payload) {

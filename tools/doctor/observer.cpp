@@ -39,6 +39,7 @@ namespace {
 namespace dds = bus::dds;
 namespace rtps = bus::rtps;
 using bus::is_ok;
+using bus::to_peer;
 using Clock = std::chrono::steady_clock;
 
 constexpr const char* kDoctorTopic = "sls/doctor";
@@ -64,18 +65,6 @@ void add_peer(dds::DomainParticipantQos& qos, const Ports& ports, const std::str
     locator.port = static_cast<std::uint32_t>(ports.metatraffic(id));
     builtin.initialPeersList.push_back(locator);
   }
-}
-
-bus::PeerId to_peer(const rtps::GUID_t& guid) {
-  bus::PeerId peer;
-  std::copy(std::begin(guid.guidPrefix.value), std::end(guid.guidPrefix.value), peer.bytes.begin());
-  return peer;
-}
-
-bus::PeerId to_peer(const dds::InstanceHandle_t& handle) {
-  rtps::GUID_t guid;
-  rtps::iHandle2GUID(guid, handle);
-  return to_peer(guid);
 }
 
 std::string find_property(const bus::ParticipantNews& news, const char* name) {

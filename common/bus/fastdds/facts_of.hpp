@@ -23,6 +23,13 @@ inline PeerId to_peer(const rtps::GUID_t& guid) {
   return peer;
 }
 
+/// The participant of an endpoint.
+inline PeerId to_peer(const dds::InstanceHandle_t& endpoint) {
+  rtps::GUID_t guid;
+  rtps::iHandle2GUID(guid, endpoint);
+  return to_peer(guid);
+}
+
 inline std::optional<std::chrono::nanoseconds> to_period(const Duration& duration) {
   if (duration == kInfinite) return std::nullopt;
   return std::chrono::nanoseconds(duration.to_ns());
