@@ -25,7 +25,7 @@ readonly test_packages=(libgmock-dev libmpfr-dev python3-mpmath iproute2 nftable
 readonly python_packages=(python3-numpy python3-scipy python3-matplotlib python3-yaml)
 readonly bench_packages=(libbenchmark-dev python3-matplotlib chromium)
 readonly doc_packages=(doxygen python3-sphinx)
-readonly package_packages=(dpkg-dev file)
+readonly package_packages=(dpkg-dev file python3-yaml)
 # Packages that only one system has. The launcher installs packages on these systems alone.
 readonly systems=(debian12 debian13)
 readonly debian12_packages=(libfastrtps-dev)

@@ -43,7 +43,6 @@
 #include "common/config/domain.hpp"
 #include "fastdds_announcements.hpp"
 #include "fastdds_api.hpp"
-#include "fastdds_older_peers.hpp"
 
 namespace sls::bus {
 namespace {
@@ -158,10 +157,7 @@ struct Node::Impl {
     }
     announce_what_discovery_lacks(qos);
     listener = std::make_unique<ParticipantListener>(own, &neighbours, &discovered);
-    if (is_secured)
-      hear_announcements(qos, [this](const PlainAnnouncement& other, const std::string& address) {
-        if (is_self_known && !is_self(other)) listener->on_announcement(other, address);
-      });
+    listener->hear(qos);
     participant = factory->create_participant(static_cast<std::uint32_t>(domain), qos,
                                               listener.get(), dds::StatusMask::none());
     if (participant)
@@ -171,8 +167,7 @@ struct Node::Impl {
       throw BusError("domain " + std::to_string(domain) +
                      ": cannot join: " + MiddlewareLog::find_first_error());
     self = to_peer(participant->get_instance_handle());
-    is_self_known = true;
-    neighbours.set_self(self);
+    listener->set_self(self);
     joined = std::chrono::steady_clock::now();
   }
 
@@ -234,10 +229,6 @@ struct Node::Impl {
     constexpr std::string_view kScheme = "file://";
     const auto* place = rtps::PropertyPolicyHelper::find_property(qos.properties(), property);
     return place && place->rfind(kScheme, 0) == 0 ? place->substr(kScheme.size()) : "";
-  }
-
-  bool is_self(const PlainAnnouncement& other) const {
-    return std::equal(other.guid_prefix.begin(), other.guid_prefix.end(), self.bytes.begin());
   }
 
   static bool has_shared_memory(const dds::DomainParticipantQos& qos) {
@@ -308,7 +299,6 @@ struct Node::Impl {
   ParticipantPorts ports;
   DiscoveredParticipants discovered;
   PeerId self;
-  std::atomic<bool> is_self_known{false};
   std::unique_ptr<ParticipantListener> listener;
   dds::DomainParticipant* participant = nullptr;
   dds::Publisher* publisher = nullptr;

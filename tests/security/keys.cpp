@@ -63,10 +63,11 @@ void Keys::add_usurper(const std::string& name) const {
   run({"openssl", "smime", "-sign", "-text", "-in", (work / "wanted.xml").string(), "-out",
        (own / "permissions.p7s").string(), "-signer", (recorder / "certificate.pem").string(),
        "-inkey", (recorder / "key.pem").string()});
-  // The identity authority issued its own certificate: if it trusts both authorities, it accepts
-  // its own signature.
+  // The identity authority issued its own certificate: if it trusts both authorities (2.9) or that
+  // certificate (3.1), it accepts its own signature.
   write_bytes(own / "permissions_ca.pem", read_bytes(recorder / "permissions_ca.pem") +
-                                              read_bytes(recorder / "identity_ca.pem"));
+                                              read_bytes(recorder / "identity_ca.pem") +
+                                              read_bytes(recorder / "certificate.pem"));
 }
 
 void Keys::make_contract_1(const std::string& role) const {

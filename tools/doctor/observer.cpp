@@ -128,6 +128,7 @@ struct Observer::Impl : bus::ParticipantListener {
     if (wire.participant_id < 0)
       wire.participant_id = bus::choose_participant_id(
           {ports.metatraffic(0), ports.participant_gain}, bus::find_own_participant_ids());
+    hear(qos);
     bus::MiddlewareLog::clear();
     auto* factory = dds::DomainParticipantFactory::get_instance();
     participant = factory->create_participant(static_cast<std::uint32_t>(options.domain), qos, this,
@@ -135,6 +136,7 @@ struct Observer::Impl : bus::ParticipantListener {
     if (!participant)
       throw bus::BusError("domain " + std::to_string(options.domain) +
                           ": cannot join: " + bus::MiddlewareLog::find_first_error());
+    set_self(to_peer(participant->get_instance_handle()));
     publisher = participant->create_publisher(dds::PUBLISHER_QOS_DEFAULT);
     subscriber = participant->create_subscriber(dds::SUBSCRIBER_QOS_DEFAULT);
     if (!options.is_answering) {
@@ -215,6 +217,18 @@ struct Observer::Impl : bus::ParticipantListener {
       program.udp_ports.push_back(locator.port);
       program.address = rtps::IPLocator::ip_to_string(locator);
     }
+  }
+
+  void on_announcement(const bus::PlainAnnouncement& other, const std::string& address) override {
+    bus::ParticipantListener::on_announcement(other, address);
+    bus::PeerId id;
+    std::copy(other.guid_prefix.begin(), other.guid_prefix.end(), id.bytes.begin());
+    const std::lock_guard lock(mutex);
+    Program& program = programs[id];  // of one that is discovered: nothing new
+    program.id = id;
+    program.name = other.name;
+    program.is_secured = other.is_secured;
+    if (program.address.empty()) program.address = address;
   }
 
   void on_authentication(const rtps::GUID_t& other, bool is_accepted) override {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 #include <iterator>
 #include <set>
 #include <sstream>
@@ -12,6 +13,7 @@
 #include "common/bus/fastdds/refusals.hpp"
 #include "common/config/yaml_node.hpp"
 #include "fastdds_discovery.hpp"
+#include "fastdds_older_peers.hpp"
 
 namespace sls::bus {
 
@@ -34,6 +36,21 @@ class ParticipantListener : public DiscoveryListener {
   explicit ParticipantListener(const Own& own, Neighbours* neighbours = nullptr,
                                DiscoveredParticipants* discovered = nullptr)
       : own_(own), neighbours_(neighbours), discovered_(discovered) {}
+
+  /// Lets this object hear what others announce to a secured participant with these settings.
+  void hear(dds::DomainParticipantQos& qos) {
+    if (!own_.is_secured) return;
+    hear_announcements(qos, [this](const PlainAnnouncement& other, const std::string& address) {
+      if (is_self_known_ && !is_self(other)) on_announcement(other, address);
+    });
+  }
+
+  /// The participant that this object listens to: until it is known, nothing is heard.
+  void set_self(const PeerId& self) {
+    self_ = self;
+    is_self_known_ = true;
+    if (neighbours_) neighbours_->set_self(self);
+  }
 
   void on_participant(const dds::DomainParticipant*, const ParticipantNews& news) override {
     const std::string guid = to_text(news.guid);
@@ -61,7 +78,7 @@ class ParticipantListener : public DiscoveryListener {
 
   /// Another participant announced itself from `address`, perhaps once more. Only Fast DDS 3 tells
   /// this, and only to a secured participant: it discovers no participant that it refuses.
-  void on_announcement(const PlainAnnouncement& other, const std::string& address) {
+  virtual void on_announcement(const PlainAnnouncement& other, const std::string& address) {
     rtps::GUID_t guid;
     std::copy(other.guid_prefix.begin(), other.guid_prefix.end(), guid.guidPrefix.value);
     guid.entityId = rtps::c_EntityId_RTPSParticipant;
@@ -108,6 +125,10 @@ class ParticipantListener : public DiscoveryListener {
            ")";
   }
 
+  bool is_self(const PlainAnnouncement& other) const {
+    return std::equal(other.guid_prefix.begin(), other.guid_prefix.end(), self_.bytes.begin());
+  }
+
   /// Reports a participant of a version with which ours does not discover anything.
   void judge_version(const std::string& guid, const std::string& version) const {
     if (own_.has_protected_discovery &&
@@ -149,6 +170,8 @@ class ParticipantListener : public DiscoveryListener {
   }
 
   const Own own_;
+  PeerId self_;
+  std::atomic<bool> is_self_known_{false};
   Neighbours* const neighbours_;
   DiscoveredParticipants* const discovered_;
 };

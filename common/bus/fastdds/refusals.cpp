@@ -15,7 +15,8 @@ constexpr std::chrono::seconds kWindow(10);
 /// Replaces those messages of Fast DDS that give the user no hint.
 std::string explain(const std::string& message) {
   const auto has = [&](const char* text) { return message.find(text) != std::string::npos; };
-  if (has("verification of the permissions file"))
+  if (has("verification of the permissions file") ||     // 2.9
+      has("Cannot read as PKCS7 the permissions file"))  // 3.1, also of one without a signature
     return "its permissions are not signed by our permissions authority";
   if (has("doesn't found in its permissions file"))
     return "its permissions are not for its certificate, or not valid now";
