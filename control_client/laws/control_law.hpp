@@ -4,6 +4,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -12,6 +13,7 @@
 
 #include "common/config/scenario.hpp"
 #include "common/model/answer.hpp"
+#include "common/model/math.hpp"
 #include "common/model/measurement.hpp"
 #include "common/model/reference.hpp"
 
@@ -26,6 +28,14 @@ inline constexpr double kMinSupportFraction = 1e-3;
 /// It is singular where the rod is level; below this cos α or cos β (0.06° from level) it reports
 /// kRodLevel. It does the same with the load above the quadrotor, where a cosine is negative.
 inline constexpr double kMinRodCosine = 1e-3;
+
+inline bool is_level(const model::RodAngles& rod) {
+  // Near the vertical, where rods usually are, no cosine is needed.
+  const auto is_level = [](double angle) {
+    return std::abs(angle) > 1.0 && math::cos(angle) < kMinRodCosine;
+  };
+  return is_level(rod.alpha) || is_level(rod.beta);
+}
 
 /// All inputs of a law.
 struct LawInput {

@@ -29,9 +29,7 @@ LawOutput PidLaw::calc(const LawInput& input) const {
   // Eq. (1): position error and velocity of the load by the controller's own model.
   const Vector3d error = input.reference.position - input.state.p_WQ - vehicle_.rod_length * q;
   const Vector3d velocity = input.state.v_WQ + vehicle_.rod_length * q_dot;
-  if (math::cos(input.state.rod.alpha) < kMinRodCosine ||
-      math::cos(input.state.rod.beta) < kMinRodCosine)
-    return fail(Fault::kRodLevel);
+  if (is_level(input.state.rod)) return fail(Fault::kRodLevel);
 
   // Eqs. (2) and (3): the position loop gives a desired velocity, the velocity loop a desired
   // acceleration.

@@ -82,9 +82,7 @@ QsfOutput calc_qsf(const QsfInput& input, const model::SlungLoadParameters& vehi
   output.integral_rate << (gains.horizontal.integral != 0.0 ? e.x() : 0.0),
       (gains.horizontal.integral != 0.0 ? e.y() : 0.0),
       (gains.vertical.integral != 0.0 ? e.z() : 0.0);
-  if (math::cos(input.rod.alpha) < kMinRodCosine || math::cos(input.rod.beta) < kMinRodCosine) {
-    return fail(Fault::kRodLevel);
-  }
+  if (is_level(input.rod)) return fail(Fault::kRodLevel);
 
   const VerticalMotion z = calc_vertical(input, e, e_dot, gains.vertical);
   const double s = vehicle.gravity - z.n;

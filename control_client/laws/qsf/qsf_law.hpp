@@ -13,7 +13,7 @@ struct QsfInput {
   Eigen::Vector3d p_WQ = Eigen::Vector3d::Zero();  ///< m
   Eigen::Vector3d v_WQ = Eigen::Vector3d::Zero();  ///< m/s
   model::RodAngles rod;                            ///< as wired to the controller's slots
-  model::Reference reference;
+  const model::Reference& reference;
   Eigen::Vector3d integral = Eigen::Vector3d::Zero();  ///< ∫e dt, m·s
 };
 

@@ -440,7 +440,7 @@ TEST(QsfLawTest, ReportsALevelRodAndALoadAboveTheQuadrotor) {
       input.rod = {};
       input.rod.*slot = angle;
       // Load at its reference: a large error could make s small and cause another fault.
-      input.reference.position = model::to_direction(input.rod).n_W;
+      one.reference.position = model::to_direction(input.rod).n_W;
       const QsfOutput output = calc_qsf(input, one.vehicle, one.gains);
       EXPECT_EQ(output.fault, Fault::kRodLevel) << angle;
       EXPECT_EQ(output.f_Q_W, Vector3d::Zero());
@@ -450,7 +450,7 @@ TEST(QsfLawTest, ReportsALevelRodAndALoadAboveTheQuadrotor) {
   input.rod = {2.5, 2.5, 0.0, 0.0};
   EXPECT_EQ(calc_qsf(input, one.vehicle, one.gains).fault, Fault::kRodLevel);
   input.rod = {half_pi - 2.0 * kMinRodCosine, 0.0, 0.0, 0.0};
-  input.reference.position = model::to_direction(input.rod).n_W;
+  one.reference.position = model::to_direction(input.rod).n_W;
   EXPECT_EQ(calc_qsf(input, one.vehicle, one.gains).fault, Fault::kNone);
 }
 
@@ -494,12 +494,13 @@ TEST(QsfLawTest, NeverGivesANumberThatIsNotFinite) {
   };
   const NamedGains gains = make_named_gains(LqrWeights{});
   for (int i = 0; i < 50000; ++i) {
-    QsfInput input;
+    model::Reference reference;
+    QsfInput input{{}, {}, {}, reference, Vector3d::Zero()};
     input.p_WQ = draw3();
     input.v_WQ = draw3();
     input.rod = {draw(), draw(), draw(), draw()};
-    if (i % 2 == 0) input.reference.position = draw3();
-    if (i % 3 == 0) input.reference.snap = draw3();
+    if (i % 2 == 0) reference.position = draw3();
+    if (i % 3 == 0) reference.snap = draw3();
     if (i % 5 == 0) input.integral = draw3();
     const QsfOutput output = calc_qsf(input, {}, gains);
     ASSERT_TRUE(output.f_Q_W.allFinite());
