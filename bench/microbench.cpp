@@ -8,6 +8,7 @@
 
 #include "closed_loop/record_entries.hpp"
 #include "common/bus/convert.hpp"
+#include "common/bus/fastdds/guarded_type.hpp"
 #include "common/config/scenario.hpp"
 #include "control_client/flight_controller.hpp"
 #include "control_client/messages.hpp"
@@ -98,7 +99,7 @@ void serialize(benchmark::State& run, const Make& make) {
   }
 }
 void serialize_state(benchmark::State& run) {
-  serialize<StatesPubSubType>(run, [](const RecordEntry& entry) {
+  serialize<bus::GuardedType<StatesPubSubType>>(run, [](const RecordEntry& entry) {
     States sample;
     VehicleState& state = sample.vehicles().emplace_back();
     state.measured(entry.truth());
@@ -107,14 +108,14 @@ void serialize_state(benchmark::State& run) {
   });
 }
 void serialize_command(benchmark::State& run) {
-  serialize<CommandsPubSubType>(run, [](const RecordEntry& entry) {
+  serialize<bus::GuardedType<CommandsPubSubType>>(run, [](const RecordEntry& entry) {
     Commands sample;
     sample.vehicles().push_back(entry.answer());
     return sample;
   });
 }
 void serialize_batch_of_16_entries(benchmark::State& run) {
-  serialize<RecordBatchPubSubType>(run, [](const RecordEntry& entry) {
+  serialize<bus::GuardedType<RecordBatchPubSubType>>(run, [](const RecordEntry& entry) {
     RecordBatch sample;
     sample.entries().assign(16, entry);
     return sample;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/bus/fastdds/bounds.hpp"
+#include "common/bus/fastdds/plain_cdr.hpp"
 #include "fastcdr_api.hpp"
 #include "fastdds_types.hpp"
 
@@ -57,8 +58,22 @@ class RawScope {
 /// the generated function catches every exception, creates no more elements than a sample's length
 /// allows and refuses left-over bytes; guarded_type_test.cpp then passes without this class.
 template <class Generated>
-class GuardedType : public ReadType<Generated> {
+class GuardedType : public CodedType<Generated> {
+  using Message = typename Generated::type;
+
  protected:
+  std::uint32_t find_size(const void* data) const override {
+    if constexpr (plain_cdr::kIsCoded<Message>)
+      return plain_cdr::calc_size(*static_cast<const Message*>(data));
+    return 0;
+  }
+
+  bool write(const void* data, rtps::SerializedPayload_t& payload) const override {
+    if constexpr (plain_cdr::kIsCoded<Message>)
+      return plain_cdr::write(*static_cast<const Message*>(data), payload);
+    return false;
+  }
+
   bool read(rtps::SerializedPayload_t& payload, void* data) override {
     // A payload longer than any sample can claim a huge number of elements, and Fast CDR creates
     // them before it reads them.
@@ -70,13 +85,15 @@ class GuardedType : public ReadType<Generated> {
       raw_target->assign(payload.data, payload.data + payload.length);
       return true;
     }
+    if constexpr (plain_cdr::kIsCoded<Message>)
+      if (plain_cdr::read(payload, *static_cast<Message*>(data), kMostPadding)) return true;
     // The same as in the generated function, which does not return the number of bytes read.
     eprosima::fastcdr::FastBuffer buffer(reinterpret_cast<char*>(payload.data), payload.length);
     Cdr cdr = make_cdr(buffer);
     try {
       cdr.read_encapsulation();
       payload.encapsulation = cdr.endianness() == Cdr::BIG_ENDIANNESS ? CDR_BE : CDR_LE;
-      read_message(cdr, *static_cast<typename Generated::type*>(data));
+      read_message(cdr, *static_cast<Message*>(data));
     } catch (const eprosima::fastcdr::exception::NotEnoughMemoryException&) {
       return refuse(payload, data, "expected more bytes, got " + std::to_string(payload.length));
     } catch (const std::exception& error) {
@@ -88,7 +105,7 @@ class GuardedType : public ReadType<Generated> {
       return refuse(
           payload, data,
           "expected " + std::to_string(used) + " bytes, got " + std::to_string(payload.length));
-    const auto& message = *static_cast<const typename Generated::type*>(data);
+    const auto& message = *static_cast<const Message*>(data);
     std::string excess = find_excess(message);
     if (excess.empty())
       excess = find_cut_name(message, {reinterpret_cast<const char*>(payload.data), payload.length},
@@ -102,7 +119,7 @@ class GuardedType : public ReadType<Generated> {
   bool refuse(const rtps::SerializedPayload_t& payload, void* data,
               const std::string& defect) const {
     // Frees the elements that the sample claimed: up to a thousand times the sample's size.
-    *static_cast<typename Generated::type*>(data) = typename Generated::type();
+    *static_cast<Message*>(data) = Message();
     if (misfit_report) misfit_report->report(payload, name_of(*this), defect);
     return false;
   }

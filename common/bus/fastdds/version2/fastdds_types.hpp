@@ -29,15 +29,27 @@ inline bool deserialize(dds::TopicDataType& type, rtps::SerializedPayload_t& pay
   return type.deserialize(&payload, sample);
 }
 
-/// A generated type support whose samples `read` decodes.
+/// A generated type support whose samples `read` decodes and `write` encodes.
 template <class Generated>
-class ReadType : public Generated {
+class CodedType : public Generated {
  public:
+  bool serialize(void* data, rtps::SerializedPayload_t* payload) final {
+    return write(data, *payload) || Generated::serialize(data, payload);
+  }
+  std::function<std::uint32_t()> getSerializedSizeProvider(void* data) final {
+    const std::uint32_t size = find_size(data);
+    if (size == 0) return Generated::getSerializedSizeProvider(data);
+    return [size] { return size; };
+  }
   bool deserialize(rtps::SerializedPayload_t* payload, void* data) final {
     return read(*payload, data);
   }
 
  protected:
+  /// Size of a sample in bytes, with the encapsulation header; 0: as generated.
+  virtual std::uint32_t find_size(const void* data) const = 0;
+  /// False: as generated.
+  virtual bool write(const void* data, rtps::SerializedPayload_t& payload) const = 0;
   virtual bool read(rtps::SerializedPayload_t& payload, void* data) = 0;
 };
 

@@ -29,16 +29,29 @@ inline bool deserialize(dds::TopicDataType& type, rtps::SerializedPayload_t& pay
   return type.deserialize(payload, sample);
 }
 
-/// A generated type support whose samples `read` decodes.
+/// A generated type support whose samples `read` decodes and `write` encodes.
 template <class Generated>
-class ReadType : public Generated {
+class CodedType : public Generated {
  public:
+  bool serialize(const void* const data, rtps::SerializedPayload_t& payload,
+                 dds::DataRepresentationId_t representation) final {
+    return write(data, payload) || Generated::serialize(data, payload, representation);
+  }
+  std::uint32_t calculate_serialized_size(const void* const data,
+                                          dds::DataRepresentationId_t representation) final {
+    const std::uint32_t size = find_size(data);
+    return size != 0 ? size : Generated::calculate_serialized_size(data, representation);
+  }
   bool deserialize(rtps::SerializedPayload_t& payload, void* data) final {
     return read(payload, data);
   }
   void register_type_object_representation() final {}  // the generated one logs a warning
 
  protected:
+  /// Size of a sample in bytes, with the encapsulation header; 0: as generated.
+  virtual std::uint32_t find_size(const void* data) const = 0;
+  /// False: as generated.
+  virtual bool write(const void* data, rtps::SerializedPayload_t& payload) const = 0;
   virtual bool read(rtps::SerializedPayload_t& payload, void* data) = 0;
 };
 
