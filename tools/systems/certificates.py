@@ -63,7 +63,9 @@ def list_processors(build: Path, arm_build: Path | None, tree: Path | None) -> l
         found += [Processor(model, programs, (emulator, "-cpu", model)) for model in MODELS]
     emulator = find_emulator("aarch64", tree)
     if arm_build and emulator:
-        libraries = ("-L", str(tree)) if tree else ()
+        # Debian's links to BLAS and LAPACK are absolute: from outside the tree they lead to this machine's.
+        places = ":".join(f"/usr/lib/aarch64-linux-gnu/{name}" for name in ("blas", "lapack"))
+        libraries = ("-L", str(tree), "-E", f"LD_LIBRARY_PATH={places}") if tree else ()
         found.append(Processor("aarch64", arm_build / "bin", (emulator, *libraries), is_arm=True))
     return found
 
