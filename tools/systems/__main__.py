@@ -12,8 +12,7 @@ import tree
 from results import say
 
 COMMANDS = ("demo", "test", "package")
-SYSTEMS = tuple(tree.CODENAMES)
-DEFAULT = ("debian12", "debian13")
+SYSTEMS = (*tree.CODENAMES, tree.ARM)
 VERSIONS = {
     "Debian": "cat /etc/debian_version",
     "Fast DDS": "dpkg-query -W -f '${Version}' libfastdds-dev 2>/dev/null || dpkg-query -W -f '${Version}' libfastrtps-dev",
@@ -31,7 +30,7 @@ table. In aarch64 it builds for ARM instead, and flies under qemu. Needs root. T
 machine: do not fly on it meanwhile. Nothing is mounted outside the systems, and they are deleted, also after Ctrl-C.
 Exit code 0: every command ended with 0, and the certificates are as they must be.""")
     parser.add_argument("system", nargs="*", metavar="SYSTEM",
-                        help=f"{', '.join(SYSTEMS[:-1])} or {SYSTEMS[-1]} (default: {' and '.join(DEFAULT)})")
+                        help=f"{', '.join(SYSTEMS[:-1])} or {SYSTEMS[-1]} (default: {' and '.join(tree.CODENAMES)})")
     parser.add_argument("--commands", default="demo,test", metavar="LIST",
                         help=f"the commands, of {', '.join(COMMANDS)} (default: demo,test)")
     parser.add_argument("--only", metavar="REGEX",
@@ -45,8 +44,8 @@ Exit code 0: every command ended with 0, and the certificates are as they must b
     parser.add_argument("--keep", action="store_true", help="do not delete the systems")
     parser.error = lambda message: fail(f"systems: {message}", 2)
     arguments = parser.parse_args(words)
-    # The tests of a system fly with programs of the one before: aarch64 is the last.
-    arguments.system = sorted(dict.fromkeys(arguments.system or DEFAULT), key="aarch64".__eq__)
+    # The tests of a system fly with programs of the one before: ARM is the last.
+    arguments.system = sorted(dict.fromkeys(arguments.system or tree.CODENAMES), key=tree.ARM.__eq__)
     arguments.commands = arguments.commands.split(",")
     for name, values, known in (("SYSTEM", arguments.system, SYSTEMS), ("--commands", arguments.commands, COMMANDS)):
         for value in values:
@@ -54,7 +53,7 @@ Exit code 0: every command ended with 0, and the certificates are as they must b
                 fail(f"systems: {name}: expected one of {', '.join(known)}, got '{value}'", 2)
     if not arguments.limit_minutes > 0:
         fail(f"systems: --limit-minutes: expected > 0, got {arguments.limit_minutes:g}", 2)
-    if "package" in arguments.commands and "aarch64" in arguments.system:
+    if "package" in arguments.commands and tree.ARM in arguments.system:
         fail("systems: --commands: expected no package for aarch64, got 'package'", 2)
     arguments.folder = arguments.folder.absolute()
     return arguments
@@ -89,7 +88,7 @@ def look_at_commands(system, arguments, column):
 def look_at(system, arguments):
     """Makes a tree and runs the commands in it. Returns the column of the table."""
     column = results.Column(system.system)
-    is_arm = system.system == "aarch64"
+    is_arm = system.system == tree.ARM
     needed_gib = 8 if is_arm or "test" not in arguments.commands else 16
     try:
         tree.check_disk(arguments.folder, needed_gib if arguments.need_gib is None else arguments.need_gib)
@@ -131,7 +130,7 @@ def main():
     try:
         tree.handle_signals()
         tree.check_machine()
-        if "aarch64" in arguments.system:
+        if tree.ARM in arguments.system:
             aarch64.check(arguments)
         arguments.folder.mkdir(parents=True, exist_ok=True)
         with tree.lock(arguments.folder):

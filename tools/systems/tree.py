@@ -15,7 +15,8 @@ import subprocess
 import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-CODENAMES = {"debian12": "bookworm", "debian13": "trixie", "aarch64": "bookworm"}
+CODENAMES = {"debian12": "bookworm", "debian13": "trixie"}
+ARM = "aarch64"  # a system, too: a Debian 12 that builds for ARM
 CHECKOUT = "sls"  # folder of the checkout in a tree; not in /root, which other users cannot enter
 BASE_DAYS = 30  # age at which a kept base is made anew
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -195,7 +196,7 @@ def remove(folder):
 class Tree:
     """A clean system in a folder; also the log files of its commands, beside the folder."""
 
-    system: str  # a key of CODENAMES
+    system: str  # a key of CODENAMES, or ARM
     folder: pathlib.Path  # of all trees, absolute; the tree is a folder in it
     deadline: float  # of time.monotonic()
     other: "Tree | None" = None  # a tree in which the commands have run: tests of mixed flights use its programs
@@ -219,13 +220,13 @@ class Tree:
 
         @throws Failure with the reason of debootstrap, such as no network."""
         remove(self.path)
-        base = self.folder / f"{CODENAMES[self.system]}.tar"
+        codename = CODENAMES["debian12" if self.system == ARM else self.system]
+        base = self.folder / f"{codename}.tar"
         if base.is_file() and time.time() - base.stat().st_mtime < BASE_DAYS * 86400:
             self.path.mkdir()
             self._make_here("unpacking", "tar", "-C", self.path, "-xf", base)
         else:
-            self._make_here("debootstrap", "debootstrap", "--variant=minbase", CODENAMES[self.system], self.path,
-                            find_mirror())
+            self._make_here("debootstrap", "debootstrap", "--variant=minbase", codename, self.path, find_mirror())
             part = base.with_suffix(".part")
             self._make_here("packing", "tar", "-C", self.path, "-cf", part, ".")
             part.rename(base)
