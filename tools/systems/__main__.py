@@ -18,7 +18,7 @@ VERSIONS = {
     "Fast DDS": "dpkg-query -W -f '${Version}' libfastdds-dev 2>/dev/null || dpkg-query -W -f '${Version}' libfastrtps-dev",
     "g++": "{ g++ -dumpfullversion || aarch64-linux-gnu-g++ -dumpfullversion; } 2>/dev/null",
     "CMake": "cmake --version | sed -n 's/cmake version //p'",
-    "Python": "python3 --version | sed 's/Python //'",
+    "Python": "python3 --version 2>/dev/null | sed 's/Python //'",
 }
 
 
