@@ -738,7 +738,7 @@ cmd_test() {
   cd "$root"
   # Most tests wait for processes and discovery: one more than there are cores leaves none idle.
   # They must not get variables that the middleware reads from the environment.
-  env -u ROS_DISCOVERY_SERVER -u FASTRTPS_DEFAULT_PROFILES_FILE -u SLS_DOMAIN \
+  env -u ROS_DISCOVERY_SERVER -u FASTRTPS_DEFAULT_PROFILES_FILE -u FASTDDS_DEFAULT_PROFILES_FILE -u SLS_DOMAIN \
     ctest --preset "$preset" --parallel "$(($(nproc) + 1))" --output-junit "$folder/test.xml" "${which[@]}" "${only[@]}"
 }
 
@@ -756,7 +756,10 @@ cmd_docs() {
 }
 
 cmd_systems() {
-  [[ " $* " != *' aarch64 '* ]] || is_help_asked || build_programs "${flying[@]}"  # the other side of its flights
+  if [[ " $* " == *' aarch64 '* ]] && ! is_help_asked; then
+    install_missing "${python_packages[@]}"
+    build_programs "${flying[@]}"  # the other side of its flights
+  fi
   exec /usr/bin/python3 -B "$root/tools/systems" "$@"
 }
 

@@ -6,37 +6,35 @@ import subprocess
 import sys
 import time
 
+import aarch64
 import results
 import tree
+from results import say
 
-HERE = pathlib.Path(__file__).resolve().parent
 COMMANDS = ("demo", "test", "package")
-SYSTEMS = (*tree.CODENAMES, "aarch64")
+SYSTEMS = (*tree.CODENAMES, tree.ARM)
 VERSIONS = {
     "Debian": "cat /etc/debian_version",
     "Fast DDS": "dpkg-query -W -f '${Version}' libfastdds-dev 2>/dev/null || dpkg-query -W -f '${Version}' libfastrtps-dev",
-    "g++": "g++ -dumpfullversion",
+    "g++": "{ g++ -dumpfullversion || aarch64-linux-gnu-g++ -dumpfullversion; } 2>/dev/null",
     "CMake": "cmake --version | sed -n 's/cmake version //p'",
-    "Python": "python3 --version | sed 's/Python //'",
+    "Python": "python3 --version 2>/dev/null | sed 's/Python //'",
 }
-
-
-def say(text):
-    print(f"sls: {text}", file=sys.stderr, flush=True)
 
 
 def parse(words):
     parser = argparse.ArgumentParser(prog="./sls systems", usage="./sls systems [OPTIONS] [SYSTEM…]",
                                      formatter_class=argparse.RawDescriptionHelpFormatter, description="""\
 Makes clean Debian systems with debootstrap, copies this checkout into each, runs the two commands in it and prints a
-table. aarch64 cross-builds and flies under qemu instead. Needs root. The systems use the network of this machine: do
-not fly on it meanwhile. Nothing is mounted outside the systems, and they are deleted, also after Ctrl-C. Exit code 0:
-every command ended with 0, and all demos had one certificate.""")
+table. In aarch64 it builds for ARM instead, and flies under qemu. Needs root. The systems use the network of this
+machine: do not fly on it meanwhile. Nothing is mounted outside the systems, and they are deleted, also after Ctrl-C.
+Exit code 0: every command ended with 0, and the certificates are as they must be.""")
     parser.add_argument("system", nargs="*", metavar="SYSTEM",
                         help=f"{', '.join(SYSTEMS[:-1])} or {SYSTEMS[-1]} (default: {' and '.join(tree.CODENAMES)})")
     parser.add_argument("--commands", default="demo,test", metavar="LIST",
                         help=f"the commands, of {', '.join(COMMANDS)} (default: demo,test)")
-    parser.add_argument("--only", metavar="REGEX", help="run only the tests whose names match")
+    parser.add_argument("--only", metavar="REGEX",
+                        help="run only the tests, in aarch64 fly only the scenarios, whose names match")
     parser.add_argument("--limit-minutes", type=float, default=180, metavar="X",
                         help="stop the commands of a system after this time (default: 180)")
     parser.add_argument("--need-gib", type=float, metavar="X",
@@ -46,7 +44,8 @@ every command ended with 0, and all demos had one certificate.""")
     parser.add_argument("--keep", action="store_true", help="do not delete the systems")
     parser.error = lambda message: fail(f"systems: {message}", 2)
     arguments = parser.parse_args(words)
-    arguments.system = list(dict.fromkeys(arguments.system)) or list(tree.CODENAMES)
+    # The tests of a system fly with programs of the one before: ARM is the last.
+    arguments.system = sorted(dict.fromkeys(arguments.system or tree.CODENAMES), key=tree.ARM.__eq__)
     arguments.commands = arguments.commands.split(",")
     for name, values, known in (("SYSTEM", arguments.system, SYSTEMS), ("--commands", arguments.commands, COMMANDS)):
         for value in values:
@@ -54,8 +53,8 @@ every command ended with 0, and all demos had one certificate.""")
                 fail(f"systems: {name}: expected one of {', '.join(known)}, got '{value}'", 2)
     if not arguments.limit_minutes > 0:
         fail(f"systems: --limit-minutes: expected > 0, got {arguments.limit_minutes:g}", 2)
-    if arguments.need_gib is None:
-        arguments.need_gib = 16 if "test" in arguments.commands else 8
+    if "package" in arguments.commands and tree.ARM in arguments.system:
+        fail("systems: --commands: expected no package for aarch64, got 'package'", 2)
     arguments.folder = arguments.folder.absolute()
     return arguments
 
@@ -65,34 +64,20 @@ def fail(text, code=1):
     sys.exit(code)
 
 
-def run_command(system, name, words, column):
-    """Runs ./sls with `words` in the tree; puts how it ended into a row."""
-    say(f"{system.system}: ./sls {' '.join(words)} (log: {system.log(name)})")
-    ended, start = results.Ended(), time.monotonic()
-    try:
-        ended.code = system.run(name, "./sls", *words)
-    except tree.Failure as failure:
-        ended.stopped = str(failure)
-        raise
-    finally:
-        ended.seconds = time.monotonic() - start
-        column.is_good &= ended.code == 0
-        column.rows[f"./sls {name}"] = str(ended)
-
-
 def look_at_commands(system, arguments, column):
     """Runs the commands in a tree and reads what they left there."""
     if "demo" in arguments.commands:
-        run_command(system, "demo", ["demo"], column)
+        column.run("./sls demo", system, "demo", "./sls", "demo")
         column.certificate = results.find_certificate(system.checkout)
         column.rows["certificate"] = column.certificate[:16]
     if "test" in arguments.commands:
-        run_command(system, "test", ["test", *(["--only", arguments.only] if arguments.only else [])], column)
+        column.run("./sls test", system, "test", "./sls", "test",
+                   *(["--only", arguments.only] if arguments.only else []))
         if (file := system.checkout / "build/test.xml").is_file():
             column.tests = results.read_tests(file)
             column.rows["tests"] = str(column.tests)
     if "package" in arguments.commands:
-        run_command(system, "package", ["package"], column)
+        column.run("./sls package", system, "package", "./sls", "package")
         for file in system.checkout.glob("build/package/*.deb"):
             place = tree.ROOT / "build/package" / file.name
             place.parent.mkdir(parents=True, exist_ok=True)
@@ -103,15 +88,17 @@ def look_at_commands(system, arguments, column):
 def look_at(system, arguments):
     """Makes a tree and runs the commands in it. Returns the column of the table."""
     column = results.Column(system.system)
+    is_arm = system.system == tree.ARM
+    needed_gib = 8 if is_arm or "test" not in arguments.commands else 16
     try:
-        tree.check_disk(arguments.folder, arguments.need_gib)
+        tree.check_disk(arguments.folder, needed_gib if arguments.need_gib is None else arguments.need_gib)
         say(f"{system.system}: making a clean system in {system.path}")
         start = time.monotonic()
         system.make()
         column.rows["commit"] = system.copy_checkout()
         column.rows["clean system"] = f"{time.monotonic() - start:.0f} s"
         try:
-            look_at_commands(system, arguments, column)
+            (aarch64.look_at if is_arm else look_at_commands)(system, arguments, column)
         finally:
             for row, command in VERSIONS.items():
                 column.rows[row] = system.ask(command)
@@ -138,37 +125,22 @@ def look_at_all(names, arguments):
     return columns
 
 
-def look_at_aarch64(arguments):
-    """aarch64.py prints its own table. True if it ended with 0."""
-    with subprocess.Popen([sys.executable, "-B", HERE / "aarch64.py"]) as process:
-        try:
-            return process.wait(timeout=arguments.limit_minutes * 60) == 0
-        except (subprocess.TimeoutExpired, tree.Interrupted) as error:
-            process.terminate()  # it deletes its tree
-            if isinstance(error, tree.Interrupted):
-                raise
-            raise tree.Failure("aarch64: stopped at the limit of time") from None
-
-
 def main():
     arguments = parse(sys.argv[1:])
-    columns, is_good = [], True
     try:
         tree.handle_signals()
-        trees = [name for name in arguments.system if name in tree.CODENAMES]
-        if trees:
-            tree.check_machine()
-            arguments.folder.mkdir(parents=True, exist_ok=True)
-            with tree.lock(arguments.folder):
-                columns = look_at_all(trees, arguments)
-            if any(column.rows for column in columns):
-                print(results.make_table(columns))
-            is_good = all(column.is_good for column in columns)
-            if len({column.certificate for column in columns if column.certificate}) > 1:
-                say("error: the demos have different certificates")
-                is_good = False
-        if "aarch64" in arguments.system:
-            is_good &= look_at_aarch64(arguments)
+        tree.check_machine()
+        if tree.ARM in arguments.system:
+            aarch64.check(arguments)
+        arguments.folder.mkdir(parents=True, exist_ok=True)
+        with tree.lock(arguments.folder):
+            columns = look_at_all(arguments.system, arguments)
+        if any(column.rows for column in columns):
+            print(results.make_table(columns))
+        is_good = all(column.is_good for column in columns)
+        if len({column.certificate for column in columns if column.certificate}) > 1:
+            say("error: the demos have different certificates")
+            is_good = False
     except (tree.Failure, OSError, subprocess.CalledProcessError) as failure:
         fail(f"systems: {failure}")
     except tree.Interrupted as signal:

@@ -2,7 +2,8 @@
 
 The processors are those of this machine with features of its C library masked (GLIBC_TUNABLES), models that qemu-x86_64
 emulates, and ARM, emulated by qemu-aarch64. The certificate of every scenario must be the same on all of them. The one
-exception is the plant slung_load on ARM, because Debian's Simbody for ARM uses fused instructions: docs/arm.md."""
+exception are plants that Simbody integrates on ARM, because Debian's Simbody for ARM uses fused instructions:
+docs/arm.md."""
 
 import argparse
 import concurrent.futures
@@ -23,6 +24,7 @@ LONGEST_FLIGHT_S = 900.0  # of one scenario, on a busy machine
 NO_FMA = "-FMA,-FMA4,-AVX512F,-AVX512VL,-AVX512DQ,-AVX512BW"
 MASKS = {"no AVX": f"-AVX,-AVX2,{NO_FMA}", "AVX, no FMA": NO_FMA}
 MODELS = ("qemu64", "Nehalem", "Haswell")  # without AVX: the first two; the last has AVX2 and FMA
+WITHOUT_SIMBODY = ("analytic",)  # plants
 DIGITS = 8  # of a certificate, in the table
 COLUMNS = 31
 
@@ -46,9 +48,9 @@ class Flight:
 
 def find_emulator(name: str, tree: Path | None) -> str | None:
     """qemu-NAME of the tree or of this machine."""
-    inside = [str(tree / "usr/bin")] if tree else []
-    path = os.pathsep.join([*inside, os.environ.get("PATH", "")])
-    return shutil.which(f"qemu-{name}-static", path=path) or shutil.which(f"qemu-{name}", path=path)
+    places = [str(tree / "usr/bin")] if tree else []
+    return next(filter(None, (shutil.which(f"qemu-{name}{ending}", path=place)
+                              for place in [*places, os.environ.get("PATH", "")] for ending in ("", "-static"))), None)
 
 
 def list_processors(build: Path, arm_build: Path | None, tree: Path | None) -> list[Processor]:
@@ -61,7 +63,9 @@ def list_processors(build: Path, arm_build: Path | None, tree: Path | None) -> l
         found += [Processor(model, programs, (emulator, "-cpu", model)) for model in MODELS]
     emulator = find_emulator("aarch64", tree)
     if arm_build and emulator:
-        libraries = ("-L", str(tree)) if tree else ()
+        # Debian's links to BLAS and LAPACK are absolute: from outside the tree they lead to this machine's.
+        places = ":".join(f"/usr/lib/aarch64-linux-gnu/{name}" for name in ("blas", "lapack"))
+        libraries = ("-L", str(tree), "-E", f"LD_LIBRARY_PATH={places}") if tree else ()
         found.append(Processor("aarch64", arm_build / "bin", (emulator, *libraries), is_arm=True))
     return found
 
@@ -149,7 +153,7 @@ def judge(flights: dict[Processor, Flight], plant: str) -> tuple[dict[str, str],
             defects.append(f"{processor.name}: {flight.error}")
         elif flight.certificate == reference.certificate:
             continue
-        elif processor.is_arm and plant == "slung_load":
+        elif processor.is_arm and plant not in WITHOUT_SIMBODY:
             is_fused = True
             cells[processor.name] = f"{calc_difference(flight, reference):.1e} m"
         else:
@@ -164,7 +168,7 @@ def print_table(processors: list[Processor], names: list[str] | None = None, job
     with tempfile.TemporaryDirectory(prefix="sls-scenarios-") as folder, \
             concurrent.futures.ThreadPoolExecutor(jobs or os.cpu_count()) as pool:
         scenarios = list_scenarios(names or [], Path(folder))
-        flying = {name: {processor: pool.submit(fly, processor, file, plant == "slung_load")
+        flying = {name: {processor: pool.submit(fly, processor, file, plant not in WITHOUT_SIMBODY)
                          for processor in processors
                          if processor.is_arm or not processor.prefix or file.parent != Path(folder)}
                   for name, (file, plant) in scenarios.items()}
@@ -182,7 +186,7 @@ def print_table(processors: list[Processor], names: list[str] | None = None, job
         print(f"error: {defect}")
     print(f"{len(scenarios)} scenarios on {len(processors)} processors: " +
           (f"{len(all_defects)} without one certificate" if all_defects else "one certificate each") +
-          (f"; {fused} of slung_load differ on ARM, by the length in the table (docs/arm.md)" if fused else ""))
+          (f"; {fused} of Simbody's differ on ARM, by the length in the table (docs/arm.md)" if fused else ""))
     return not all_defects
 
 

@@ -3,7 +3,15 @@
 import dataclasses
 import json
 import re
+import sys
+import time
 import xml.etree.ElementTree
+
+import tree
+
+
+def say(text):
+    print(f"sls: {text}", file=sys.stderr, flush=True)
 
 
 @dataclasses.dataclass
@@ -59,6 +67,21 @@ class Column:
     tests: Tests | None = None
     certificate: str | None = None
     is_good: bool = True
+
+    def run(self, row, system, name, *command, here=False):
+        """Runs a command in the tree `system`, or on this machine; puts how it ended into a row. True if with 0."""
+        say(f"{self.system}: {row} (log: {system.log(name)})")
+        ended, start = Ended(), time.monotonic()
+        try:
+            ended.code = (system.run_here if here else system.run)(name, *command)
+        except tree.Failure as failure:
+            ended.stopped = str(failure)
+            raise
+        finally:
+            ended.seconds = time.monotonic() - start
+            self.is_good &= ended.code == 0
+            self.rows[row] = str(ended)
+        return ended.code == 0
 
 
 def make_table(columns):

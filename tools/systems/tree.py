@@ -16,6 +16,7 @@ import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 CODENAMES = {"debian12": "bookworm", "debian13": "trixie"}
+ARM = "aarch64"  # a system, too: a Debian 12 that builds for ARM
 CHECKOUT = "sls"  # folder of the checkout in a tree; not in /root, which other users cannot enter
 BASE_DAYS = 30  # age at which a kept base is made anew
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -195,7 +196,7 @@ def remove(folder):
 class Tree:
     """A clean system in a folder; also the log files of its commands, beside the folder."""
 
-    system: str  # a key of CODENAMES
+    system: str  # a key of CODENAMES, or ARM
     folder: pathlib.Path  # of all trees, absolute; the tree is a folder in it
     deadline: float  # of time.monotonic()
     other: "Tree | None" = None  # a tree in which the commands have run: tests of mixed flights use its programs
@@ -219,25 +220,32 @@ class Tree:
 
         @throws Failure with the reason of debootstrap, such as no network."""
         remove(self.path)
-        base = self.folder / f"{self.system}.tar"
+        codename = CODENAMES["debian12" if self.system == ARM else self.system]
+        base = self.folder / f"{codename}.tar"
         if base.is_file() and time.time() - base.stat().st_mtime < BASE_DAYS * 86400:
             self.path.mkdir()
-            self._run_here("unpacking", ["tar", "-C", self.path, "-xf", base])
+            self._make_here("unpacking", "tar", "-C", self.path, "-xf", base)
         else:
-            self._run_here("debootstrap", ["debootstrap", "--variant=minbase", CODENAMES[self.system], self.path,
-                                           find_mirror()])
+            self._make_here("debootstrap", "debootstrap", "--variant=minbase", codename, self.path, find_mirror())
             part = base.with_suffix(".part")
-            self._run_here("packing", ["tar", "-C", self.path, "-cf", part, "."])
+            self._make_here("packing", "tar", "-C", self.path, "-cf", part, ".")
             part.rename(base)
         self.variables = copy_settings(self.path)
 
-    def _run_here(self, name, command):
-        code = run_bounded(isolate(*command), self.log(name), self.deadline, self.folder)
+    def _make_here(self, name, *command):
+        self.check(name, self.run_here(name, *command))
+        self.log(name).unlink()
+
+    def check(self, name, code):
+        """@throws Failure with the reason in log(name) if the exit code is not 0."""
         if code != 0:
             text = self.log(name).read_text(encoding="utf-8", errors="replace")
             errors = re.findall("^E: .*", text, re.MULTILINE)
             raise Failure(f"{name} failed: {errors[0] if errors else _last_line(text)} (log: {self.log(name)})")
-        self.log(name).unlink()
+
+    def run_here(self, name, *command):
+        """Runs a command on this machine with its own mounts and processes; otherwise as run()."""
+        return run_bounded(isolate(*command), self.log(name), self.deadline, self.folder)
 
     def copy_checkout(self):
         """Clones HEAD of this checkout and repeats what has changed since. Returns the commit in words.
@@ -273,9 +281,7 @@ class Tree:
         # The first process of a process namespace must wait for those that lose their parents: bash does.
         inside = ["env", "-i", *(f"{key}={value}" for key, value in variables.items()), "bash", "-c",
                   'cd "$0" && "$@"; exit $?', f"/{CHECKOUT}", *command]
-        return run_bounded(isolate("sh", "-c", ENTER, "sh", self.path, self.other.path if self.other else "",
-                                   *inside), self.log(name), self.deadline,
-                           self.folder)
+        return self.run_here(name, "sh", "-c", ENTER, "sh", self.path, self.other.path if self.other else "", *inside)
 
     def ask(self, command):
         """What a short command prints in the tree, in one line; "?" if it fails."""

@@ -1,93 +1,93 @@
-"""./sls systems aarch64 refuses in a line, and leaves no process, mount or folder behind. The tree and the flights on
-emulated ARM take 20 minutes: only the command makes them. Skipped without root."""
+"""The steps of ./sls systems aarch64 without its tree: the flight over DDS, with a client of this machine, and what is
+read of docs/arm.md. The tree and emulated ARM take half an hour: only the command makes them. Needs root and
+namespaces."""
 
 import json
 import os
 import re
-import signal
 import subprocess
 import sys
 import tempfile
 import time
 import unittest
 from pathlib import Path
+from unittest import mock
 
 ROOT = Path(__file__).resolve().parents[3]
 BUILD = Path(sys.argv.pop(1)).resolve() if len(sys.argv) > 1 else ROOT / "build"
 sys.path.insert(0, str(ROOT / "tools/systems"))
 import aarch64  # noqa: E402
+import results  # noqa: E402
+import tree  # noqa: E402
 
 
-class AArch64Test(unittest.TestCase):
+class FlightTest(unittest.TestCase):
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
-        self.folder = Path(folder.name)
-        (self.folder / "bin").mkdir()
-        (self.folder / "tmp").mkdir()
+        self.folder = Path(folder.name).resolve()
+        self.root = self.folder / "checkout"
+        self.root.mkdir()
+        (self.root / "build").symlink_to(BUILD)
+        (self.root / "config").symlink_to(ROOT / "config")
+        self.system = tree.Tree("aarch64", self.folder, time.monotonic() + 300)
+        self.column = results.Column("aarch64")
 
-    def fake_debootstrap(self, script):
-        """Makes a debootstrap that runs `script` instead."""
-        program = self.folder / "bin/debootstrap"
-        program.write_text(f"#!/bin/sh\n{script}\n")
-        program.chmod(0o755)
+    def fly(self, *client):
+        with mock.patch.object(aarch64, "ROOT", self.root):
+            aarch64.fly_over_dds(self.system, "short", client, self.column)
+        return self.column.rows["over DDS: short"]
 
-    def start(self, *arguments, build=BUILD):
-        environment = {**os.environ, "TMPDIR": str(self.folder / "tmp"),
-                       "PATH": f"{self.folder / 'bin'}:{os.environ['PATH']}"}
-        return subprocess.Popen(["/usr/bin/python3", "-B", ROOT / "tools/systems/aarch64.py", "--build", build,
-                                 *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-                                env=environment)
+    def test_a_flight_over_dds_has_the_certificate_of_the_flight_in_process(self):
+        variables = {"SLS_DOMAIN": "77", "ROS_DISCOVERY_SERVER": "127.0.0.1:1",
+                     "FASTRTPS_DEFAULT_PROFILES_FILE": "/none", "FASTDDS_DEFAULT_PROFILES_FILE": "/none"}
+        with mock.patch.dict(os.environ, variables):
+            said = self.fly(BUILD / "bin/control_client")
+        self.assertRegex(said, r"^exit 0, 0 min \d+ s, [0-9a-f]{8}$", self.system.log("dds-short").read_text())
+        self.assertTrue(self.column.is_good)
+        manifest = json.loads((self.folder / "aarch64/recordings/short/dds/manifest.json").read_text())
+        self.assertTrue(manifest["certificate"].startswith(said[-8:]))
 
-    def expect_error(self, started, code, pattern):
-        _, said = started.communicate(timeout=60)
-        self.assertEqual(started.returncode, code, said)
-        self.assertRegex(said, rf"\Asls: error: {pattern}\n\Z")
-        # The log of a command that failed stays, and the line names it.
-        self.assertEqual([str(path) for path in (self.folder / "tmp").iterdir() if str(path) not in said], [])
-        self.assertNotIn(str(self.folder), Path("/proc/mounts").read_text())
+    def test_another_flight_is_a_defect_with_both_certificates(self):
+        (self.root / "build").unlink()
+        (self.root / "build/bin").mkdir(parents=True)
+        for program in "recorder", "sim_server":
+            (self.root / "build/bin" / program).symlink_to(BUILD / "bin" / program)
+        other = self.root / "build/bin/closed_loop"
+        other.write_text(f"#!/bin/sh\nshift 2\nexec {BUILD}/bin/closed_loop --scenario config/scenarios/setpoints.yaml"
+                         " \"$@\"\n")
+        other.chmod(0o755)
+        self.assertRegex(self.fly(BUILD / "bin/control_client"),
+                         r", ([0-9a-f]{8}) and missing: \[\], expected (?!\1)[0-9a-f]{8} and nothing missing$")
+        self.assertFalse(self.column.is_good)
 
-    def test_mistakes_are_refused_in_a_line(self):
-        self.expect_error(self.start("nix"), 2, "SCENARIO: expected a name in config/scenarios, got 'nix'")
-        self.expect_error(self.start(build=self.folder), 2,
-                          f"{self.folder}: expected the programs of this machine, got none; run ./sls build")
-        (self.folder / "other/tree").mkdir(parents=True)
-        self.expect_error(self.start("--tree", str(self.folder / "other")), 1,
-                          f"--tree: {self.folder}/other: expected a tree of this command, or an empty folder, got "
-                          "other files")
-        self.assertTrue((self.folder / "other/tree").is_dir())
+    def test_a_client_that_fails_ends_the_flight_and_its_processes(self):
+        self.assertRegex(self.fly("false"), "^exit 1, 0 min ")
+        self.assertFalse(self.column.is_good)
+        left = subprocess.run(["pgrep", "-fa", str(self.folder)], capture_output=True, text=True, check=False).stdout
+        self.assertEqual(left, "")
 
-    def test_a_step_that_fails_ends_with_its_last_line(self):
-        self.fake_debootstrap("echo first; echo 'E: no mirror'; touch $3/half; exit 7")
-        self.expect_error(self.start(), 1, r"debootstrap: expected exit code 0, got exit code 7: E: no mirror \(whole "
-                                           r"log: .*/tmp/sls-aarch64-.*\.log\)")
 
-    def test_a_signal_ends_the_step_and_removes_the_tree(self):
-        mark = self.folder / "process"
-        self.fake_debootstrap(f"touch $3/half; touch {mark}; exec sleep 1234.5")
-        started = self.start()
-        deadline = time.monotonic() + 60
-        while not mark.exists() and time.monotonic() < deadline:
-            time.sleep(0.01)
-        self.assertTrue(mark.exists())
-        started.send_signal(signal.SIGTERM)
-        started.communicate(timeout=60)
-        self.assertEqual(started.returncode, 143)
-        self.assertEqual(list((self.folder / "tmp").iterdir()), [])
-        sleeping = subprocess.run(["pgrep", "-f", "^sleep 1234.5$"], capture_output=True, text=True, check=False).stdout
-        self.assertEqual(sleeping, "")
-
+class DocumentTest(unittest.TestCase):
     def test_the_document_names_the_preset_and_its_folder(self):
         packages, build = aarch64.read_commands()
         presets = json.loads((ROOT / "CMakePresets.json").read_text())["configurePresets"]
         preset = next(one for one in presets if one["name"] == "aarch64")
-        self.assertEqual(preset["binaryDir"], f"${{sourceDir}}/{aarch64.BUILD.name}")
-        self.assertEqual(build, f"cmake --preset aarch64\nninja -C {aarch64.BUILD.name}\n")
-        self.assertTrue(re.match(r"dpkg --add-architecture arm64\napt-get update\napt-get install ", packages))
+        self.assertEqual(preset["binaryDir"], f"${{sourceDir}}/{aarch64.BUILD}")
+        self.assertEqual(build, f"cmake --preset aarch64\nninja -C {aarch64.BUILD}\n")
+        self.assertTrue(re.match("echo .*\ndpkg --add-architecture arm64\napt-get update\napt-get install -y ", packages))
+
+    def test_fused_instructions_are_found(self):
+        lines = ["  1:\t1f420820 \tfmadd\td0, d1, d2, d2", "\tfnmsub\td0, d1, d2, d3", "\tfmls\tv0.2d, v1.2d, v2.2d",
+                 "\tfmla\tv0.2d, v1.2d, v2.d[0]", "\tfmul\td0, d1, d2", "\tfadd\td0, d1, d2", "\tbl\t<fmadd_all>"]
+        found = subprocess.run(["grep", "-cE", aarch64.FUSED], input="\n".join(lines), capture_output=True, text=True,
+                               check=True).stdout
+        self.assertEqual(found, "4\n")
 
 
 if __name__ == "__main__":
-    if os.geteuid() != 0:
-        print("skipped: needs root")
+    networks = tree.isolate("unshare", "--net", "ip", "link", "set", "lo", "up")
+    if os.geteuid() != 0 or subprocess.run(networks, check=False).returncode != 0:
+        print("skipped: needs root, namespaces and ip")
         sys.exit(77)
     unittest.main(verbosity=2)

@@ -2,10 +2,12 @@
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
 import unittest
+import unittest.mock
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -31,20 +33,34 @@ class JudgeTest(unittest.TestCase):
     def test_another_certificate_is_a_defect_with_both(self):
         for processor in OTHER, ARM:
             _, defects, is_fused = certificates.judge({HERE: make_flight("a" * 64), processor: make_flight("b" * 64)},
-                                                      "multirotor")
+                                                      "analytic")
             self.assertEqual(defects, [f"{processor.name}: expected certificate aaaaaaaa…, got bbbbbbbb…"])
             self.assertFalse(is_fused)
 
     def test_only_arm_may_differ_with_simbody_and_the_table_has_the_length(self):
         first = make_flight("a" * 64)
-        cells, defects, is_fused = certificates.judge({HERE: first, ARM: make_flight("b" * 64, x=-3e-13)}, "slung_load")
-        self.assertEqual((cells["arm"], defects, is_fused), ("3.0e-13 m", [], True))
-        self.assertEqual(len(certificates.judge({HERE: first, OTHER: make_flight("b" * 64)}, "slung_load")[1]), 1)
+        for plant in "slung_load", "multirotor":
+            cells, defects, is_fused = certificates.judge({HERE: first, ARM: make_flight("b" * 64, x=-3e-13)}, plant)
+            self.assertEqual((cells["arm"], defects, is_fused), ("3.0e-13 m", [], True))
+            self.assertEqual(len(certificates.judge({HERE: first, OTHER: make_flight("b" * 64)}, plant)[1]), 1)
 
     def test_a_flight_that_fails_is_a_defect(self):
         cells, defects, _ = certificates.judge({HERE: make_flight("a" * 64), ARM: make_flight("", "exit code 1: no")},
                                                "slung_load")
         self.assertEqual((cells["arm"], defects), ("failed", ["arm: exit code 1: no"]))
+
+
+class EmulatorTest(unittest.TestCase):
+    def test_the_tree_s_emulator_comes_first_whatever_its_name(self):
+        with tempfile.TemporaryDirectory() as folder, \
+                unittest.mock.patch.dict(os.environ, {"PATH": f"{folder}/usr/bin"}):
+            (Path(folder) / "usr/bin").mkdir(parents=True)
+            tree = Path(folder) / "tree"
+            shutil.copytree(Path(folder) / "usr", tree / "usr")
+            self.assertIsNone(certificates.find_emulator("aarch64", tree))
+            for program in Path(folder) / "usr/bin/qemu-aarch64-static", tree / "usr/bin/qemu-aarch64":
+                program.touch(mode=0o755)
+                self.assertEqual(certificates.find_emulator("aarch64", tree), str(program))
 
 
 class FlightTest(unittest.TestCase):

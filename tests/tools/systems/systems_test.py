@@ -78,7 +78,6 @@ class SystemsTest(unittest.TestCase):
         self.git("commit", "-q", "-m", "One")
         self.calls = self.folder / "calls"
         self.calls.write_text("")
-        (self.folder / "bin").mkdir()
         self.write_program("debootstrap", DEBOOTSTRAP.replace("CALLS", str(self.calls))
                            .replace("PROGRAMS", " ".join(PROGRAMS)))
         self.environment = {**os.environ, "PATH": f"{self.folder}/bin:{os.environ['PATH']}"}
@@ -90,13 +89,16 @@ class SystemsTest(unittest.TestCase):
         subprocess.run(["git", "-c", "user.name=a", "-c", "user.email=a@example.org", *words], cwd=self.root, check=True,
                        capture_output=True)
 
+    def write(self, file, text):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text)
+        file.chmod(0o755)
+
     def write_launcher(self, text):
-        (self.root / "sls").write_text(text)
-        (self.root / "sls").chmod(0o755)
+        self.write(self.root / "sls", text)
 
     def write_program(self, name, text):
-        (self.folder / "bin" / name).write_text(text)
-        (self.folder / "bin" / name).chmod(0o755)
+        self.write(self.folder / "bin" / name, text)
 
     def start(self, *words, before=()):
         return subprocess.Popen([*before, "/usr/bin/python3", "-B", self.root / "tools/systems", "--folder", self.trees,
@@ -243,13 +245,14 @@ class SystemsTest(unittest.TestCase):
         self.assertEqual(self.find_processes(), [])
 
     def test_a_command_past_its_time_or_on_a_full_disk_is_killed_with_its_children(self):
-        script = "sleep 4321 & sleep 4321"
+        mark = str(self.folder)  # other processes of this machine may sleep, too
+        script = f"exec -a {mark} sleep 4321 & exec -a {mark} sleep 4321"
         for reserve, seconds, reason in ((0, 0.2, "stopped at the limit of time"), (1e9, 1000, "stopped: less than")):
             with unittest.mock.patch.object(tree, "RESERVE_GIB", reserve):
                 with self.assertRaisesRegex(tree.Failure, reason):
-                    tree.run_bounded(tree.isolate("sh", "-c", script), self.folder / "log", time.monotonic() + seconds,
+                    tree.run_bounded(tree.isolate("bash", "-c", script), self.folder / "log", time.monotonic() + seconds,
                                      self.folder)
-            self.assertNotIn("4321", subprocess.run(["ps", "-e", "-o", "args"], capture_output=True, text=True,
+            self.assertNotIn(mark, subprocess.run(["ps", "-e", "-o", "args"], capture_output=True, text=True,
                                                     check=True).stdout)
 
     def test_a_folder_with_a_mount_in_it_is_not_deleted(self):
@@ -284,6 +287,35 @@ class SystemsTest(unittest.TestCase):
         for name in ("setpriv", "git", "unshare", "true"):
             (self.folder / "bin" / name).symlink_to(shutil.which(name))
         self.expect_error(1, "systems: debootstrap is missing: apt-get install debootstrap")
+
+    def test_arm_is_refused_before_a_tree_is_made(self):
+        self.expect_error(2, "systems: --commands: expected no package for aarch64, got 'package'", "aarch64",
+                          "--commands", "package")
+        self.expect_error(1, "systems: /checkout/build/bin/closed_loop: expected a program of this machine, got none; run "
+                             "./sls build", "aarch64")
+        for program in "closed_loop", "recorder", "sim_server":
+            self.write(self.root / "build/bin" / program, "")
+        self.expect_error(1, "systems: --only: expected to match a name in config/scenarios, got 'short'", "aarch64",
+                          "--only", "short")
+        self.write(self.root / "config/scenarios/short.yaml", "")
+        self.expect_error(1, r"systems: --only: expected a regular expression, got '\(': missing .*", "aarch64", "--only",
+                          "(")
+        self.assertEqual(self.calls.read_text(), "")
+
+    def test_arm_runs_the_commands_of_its_document_in_a_debian12_and_stops_at_the_first_that_fails(self):
+        for program in "closed_loop", "recorder", "sim_server":
+            self.write(self.root / "build/bin" / program, "")
+        self.write(self.root / "config/scenarios/short.yaml", "")
+        self.write(self.root / "docs/arm.md", "\n## Building\n\nText.\n\n    echo $DEBIAN_FRONTEND; touch packages\n"
+                                              "    cmake --preset aarch64\n\n## Flying\n\n    no command\n")
+        code, output, errors = self.run_systems("aarch64", "--keep")
+        self.assertEqual(code, 1)
+        self.assertRegex(errors, r"\nsls: error: aarch64: build failed: sh: .*cmake: not found \(log: .*/aarch64-build.log\)"
+                                 r"\n")
+        self.assertRegex(output, r"\n\| packages \| exit 0, 0 min \d s \|\n\| build \| exit 127, ")
+        self.assertEqual((self.trees / "aarch64-packages.log").read_text(), "noninteractive\n")
+        self.assertTrue((self.trees / "aarch64/sls/packages").exists())
+        self.assertEqual(self.calls.read_text().split(), ["bookworm"])
 
     def test_a_folder_in_use_is_one_line(self):
         self.write_launcher(SLOW)
