@@ -93,6 +93,7 @@ def find_file(name: str) -> Path:
 def fly(options: argparse.Namespace) -> None:
     """Flies the campaign, collects its table and verifies runs. Raises ConfigError, EngineError."""
     from sls.campaign.campaign_file import load_campaign
+    from sls.campaign.collect import collect
     campaign = load_campaign(find_file(options.file))
     engine = load_engine(options.on)
     if options.resume and options.out is None:
@@ -108,7 +109,7 @@ def fly(options: argparse.Namespace) -> None:
             prepare(folder, campaign, engine, options)
             with report_imported():
                 engine.run(folder, engine_options)
-            folder.collect(options.on)
+            collect(folder, options.on)
         except KeyboardInterrupt:
             say_how_to_resume(folder, options)
             raise
@@ -158,7 +159,7 @@ def prepare(folder: CampaignFolder, campaign: Any, engine: Any,
         values = list_yaml_values(campaign, make_values(campaign, first, first)[0])
         runs.fly(values, is_certified(campaign, first))
         if own:
-            own.measure(runs.scenario_text(values))
+            own(runs.scenario_text(values))
         chunk_runs = options.chunk_runs or choose_chunk_runs(
             getattr(engine, "CHUNK_S", 1.0), time.monotonic() - begin, last - first + 1)
     folder.create(campaign, options.on, chunk_runs, first, last, options.resume,
@@ -272,8 +273,9 @@ def list_some(items: list[str], most: int = 10) -> str:
 
 
 def make_report(arguments: Sequence[str]) -> None:
+    from sls.campaign.collect import write_report
     folder = CampaignFolder(*parse_folders("report", arguments, "DIR"))
-    folder.write_report()
+    write_report(folder.folder)
     say(f"report: {folder.folder / 'report.html'}")
 
 

@@ -8,7 +8,6 @@ import io
 import json
 import os
 import re
-import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
@@ -338,50 +337,6 @@ class CampaignFolder:
         cells = self.read_chunk(number)[index - self.find_chunk(number)[0]]
         return dict(zip(self.plan.columns, cells))
 
-    def collect(self, engine: str) -> Path:
-        """Writes runs.csv and manifest.json from the chunks, the recordings that the campaign keeps, and
-        report.html. Only one chunk is in memory at a time while it writes runs.csv. Raises EngineError if
-        a chunk is missing or a file cannot be written."""
-        from sls.campaign.kept import keep_recordings
-        self.take_lock()
-        counts, machines, flying_s = {}, {}, 0.0
-        table, sha256 = self.folder / "runs.csv", hashlib.sha256(self.header)
-        outcome = self.plan.columns.index("outcome")
-        with WholeFile(table) as writing:
-            writing.write(self.header)
-            for number, first, last in self.chunks:
-                try:
-                    chunk = self.read_whole_chunk(number)
-                except DamagedChunk as defect:
-                    raise EngineError(f"{self.chunk_file(number)}: expected runs {first}-{last}, "
-                                      f"got: {defect}; --resume flies them again") from None
-                sha256.update(chunk.rows)
-                writing.write(chunk.rows)
-                for cells in csv.reader(io.StringIO(chunk.rows.decode())):
-                    counts[cells[outcome]] = counts.get(cells[outcome], 0) + 1
-                flying_s += chunk.flown["wall_s"]
-                machine = machines.setdefault(chunk.flown["host"], {**chunk.flown["machine"],
-                                                                    "chunks": 0})
-                machine["chunks"] += 1
-            writing.finish()
-        plan = self.plan
-        self.write_manifest({
-            "campaign": plan.campaign, "campaign_sha256": plan.sha256, "file": plan.file,
-            "engine": engine, "runs": plan.last - plan.first + 1, "first": plan.first,
-            "last": plan.last, "campaign_runs": plan.campaign_runs,
-            "complete": plan.last - plan.first + 1 == plan.campaign_runs,
-            "outcomes": dict(sorted(counts.items())), "runs_csv_sha256": sha256.hexdigest(),
-            "machines": dict(sorted(machines.items())),
-            "other_machines": any(find_difference(plan.machine, {
-                name: value for name, value in machine.items() if name != "chunks"})
-                for machine in machines.values()),
-            "versions": plan.machine, "flying_s": round(flying_s, 3),
-            "collected_utc": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
-            "kept": keep_recordings(self),
-        })
-        self.write_report()
-        return table
-
     @property
     def manifest(self) -> dict[str, Any]:
         """The manifest in the folder. Raises InputError if there is none."""
@@ -395,10 +350,6 @@ class CampaignFolder:
 
     def write_manifest(self, manifest: dict[str, Any]) -> None:
         write_whole(self.folder / "manifest.json", (json.dumps(manifest, indent=1) + "\n").encode())
-
-    def write_report(self) -> None:
-        from sls.campaign.report import make_campaign_report
-        write_whole(self.folder / "report.html", make_campaign_report(self.folder).encode())
 
 
 def to_line(cells: Sequence[str]) -> bytes:

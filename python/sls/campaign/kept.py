@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from sls.campaign.campaign import Campaign
 from sls.campaign.engines import EngineError
+from sls.campaign.folder import CampaignFolder
 from sls.campaign.runs import fly_whole, make_runs
 from sls.campaign.sampling import make_values
 from sls.campaign.whole_files import name_temporary, sync_folder
@@ -24,10 +25,9 @@ if TYPE_CHECKING:
     from _sls_core import Runs
 
     from sls import Flight
-    from sls.campaign.folder import CampaignFolder
 
 
-def kept_folder(folder: "CampaignFolder", index: int) -> Path:
+def kept_folder(folder: CampaignFolder, index: int) -> Path:
     return folder.folder / "kept" / f"run-{index:06d}"
 
 
@@ -37,7 +37,7 @@ def is_kept(campaign: Campaign, row: dict[str, str]) -> bool:
     return kind == "all" or kind == "failed" and row["outcome"] != "finished"
 
 
-def keep_while_flying(folder: "CampaignFolder", campaign: Campaign, runs: "Runs",
+def keep_while_flying(folder: CampaignFolder, campaign: Campaign, runs: "Runs",
                       cells: Sequence[str]) -> None:
     """Writes the recording of a run just flown, if the campaign keeps it. Raises EngineError if it cannot
     be written."""
@@ -48,7 +48,7 @@ def keep_while_flying(folder: "CampaignFolder", campaign: Campaign, runs: "Runs"
         keep_run(folder, campaign, runs, row)
 
 
-def keep_run(folder: "CampaignFolder", campaign: Campaign, runs: "Runs",
+def keep_run(folder: CampaignFolder, campaign: Campaign, runs: "Runs",
              row: dict[str, str]) -> None:
     """Writes one recording whole, unless the folder has it already. Raises EngineError if it cannot be
     written, or if its certificate differs from the row's."""
@@ -94,7 +94,7 @@ def is_whole(recording: Path, certificate: str) -> bool:
     return certificate in ("", manifest.get("certificate"))
 
 
-def list_worst(folder: "CampaignFolder", campaign: Campaign) -> list[dict[str, str]]:
+def list_worst(folder: CampaignFolder, campaign: Campaign) -> list[dict[str, str]]:
     """The rows with the largest values in the column, the largest first. Of equal values the lower index
     comes first. Rows without a value are left out."""
     column = campaign.keep.find_column(folder.plan.columns)
@@ -115,14 +115,14 @@ def is_number(text: str) -> bool:
         return False
 
 
-def list_kept(folder: "CampaignFolder", campaign: Campaign) -> Iterator[dict[str, str]]:
+def list_kept(folder: CampaignFolder, campaign: Campaign) -> Iterator[dict[str, str]]:
     if campaign.keep.kind == "worst":
         yield from list_worst(folder, campaign)
     else:
         yield from (row for row in folder.read_rows() if is_kept(campaign, row))
 
 
-def keep_recordings(folder: "CampaignFolder") -> dict[str, Any]:
+def keep_recordings(folder: CampaignFolder) -> dict[str, Any]:
     """Writes every recording that the campaign keeps and that is missing. Returns the manifest's entries
     for them: kind and number, and for "worst" the runs."""
     campaign = folder.campaign

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from sls.campaign.campaign import Campaign, OwnMeasure
-from sls.campaign.runs import fly_text, to_number, to_one_line
+from sls.campaign.runs import OwnCells, fly_text, to_number, to_one_line
 from sls.input_error import InputError
 
 LONGEST_ERROR = 300
@@ -69,5 +69,6 @@ class OwnMeasures:
         return [*cells, "; ".join(errors)]
 
 
-def load_own_measures(campaign: Campaign) -> OwnMeasures | None:
-    return OwnMeasures(campaign) if campaign.own_measures else None
+def load_own_measures(campaign: Campaign) -> OwnCells | None:
+    """Loads the own measures, if the campaign has any. Raises InputError."""
+    return OwnMeasures(campaign).measure if campaign.own_measures else None

@@ -14,9 +14,10 @@ from sls.errors import ConfigError
 if TYPE_CHECKING:
     from _sls_core import Runs
     from sls import Flight
-    from sls.campaign.own_measures import OwnMeasures
 
 BLOCK = 1000  # number of runs whose values are in memory at once
+OwnCells = Callable[[str], list[str]]  # from a scenario's text to the cells of all own measures
+Announce = Callable[[int], None]
 
 
 @dataclass(frozen=True)
@@ -70,13 +71,13 @@ def list_yaml_values(campaign: Campaign, values: list[Any]) -> list[str]:
 
 
 def fly_run(campaign: Campaign, runs: "Runs", index: int, values: list[Any],
-            own: "OwnMeasures | None" = None) -> Row:
+            own: OwnCells | None = None) -> Row:
     """Flies one run. Raises RefusedRun if its scenario is refused."""
     texts = list_yaml_values(campaign, values)
     try:
         outcome, reason, measures, certificate, steps = runs.fly(
             texts, is_certified(campaign, index))
-        own_cells = own.measure(runs.scenario_text(texts)) if own else []
+        own_cells = own(runs.scenario_text(texts)) if own else []
     except ConfigError as error:
         raise RefusedRun(f"run {index}: {error}") from None
     return Row(index, (str(index), *map(to_cell, values), outcome, to_one_line(reason),
@@ -101,11 +102,8 @@ def list_values(campaign: Campaign, first: int, last: int) -> Iterator[tuple[int
         yield from enumerate(block, begin)
 
 
-Announce = Callable[[int], None]
-
-
 def fly_range(campaign: Campaign, runs: "Runs", first: int, last: int,
-              own: "OwnMeasures | None" = None,
+              own: OwnCells | None = None,
               announce: Announce | None = None) -> Iterator[Sequence[str]]:
     """The cells of each run's row. `announce` is called with each index before the run is flown."""
     for index, values in list_values(campaign, first, last):

@@ -376,6 +376,7 @@ def cancel_quietly(folder: CampaignFolder) -> None:
 def collect(folder: CampaignFolder, number: int, options: EngineOptions) -> None:
     """Makes the table, or submits the missing chunks again. Does nothing if a launcher still waits for
     the campaign. Raises InputError, EngineError, ControllerLost."""
+    from sls.campaign.collect import collect as collect_folder
     try:
         folder.take_lock()
     except InputError as error:
@@ -383,7 +384,7 @@ def collect(folder: CampaignFolder, number: int, options: EngineOptions) -> None
         return
     missing = find_missing(folder)
     if not missing:
-        folder.collect("slurm")
+        collect_folder(folder, "slurm")
         say(f"{folder.folder}/runs.csv")
     elif number < MOST_ROUNDS:
         submit_round(folder, missing, number + 1, options)
