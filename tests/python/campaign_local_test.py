@@ -150,6 +150,13 @@ class LocalEngineTest(CampaignTest):
         self.assertEqual(self.read_table("out"), table)
         self.assertIn("6 flown, 0 missing, 0 damaged", self.fly("status", "out"))
 
+    def test_what_a_run_prints_goes_to_stderr_and_changes_nothing(self):
+        self.write_campaign(40)
+        self.fly("campaign.yaml", "--out", "whole")
+        said = self.fly("campaign.yaml", "--out", "out", "--chunk-runs", 5, fake="print=1")
+        self.assertIn("printed by a library\n", said)
+        self.assertEqual(self.read_table("out"), self.read_table("whole"))
+
     def test_a_run_that_kills_its_worker_once_is_flown_again(self):
         self.write_campaign(40)
         self.fly("campaign.yaml", "--out", "whole")
@@ -219,6 +226,25 @@ class LocalEngineTest(CampaignTest):
         manifest = json.loads((self.folder / "out/manifest.json").read_text())
         self.assertTrue(manifest["other_machines"])
 
+    def test_a_host_of_two_descriptions_is_two_machines(self):
+        from sls.campaign.collect import collect
+        from sls.campaign.folder import opened
+        from sls.campaign.machine import host_name
+        self.write_campaign(40)
+        self.fly("campaign.yaml", "--out", "out", "--chunk-runs", 5)
+        with opened(self.folder / "out") as folder:
+            rows = folder.read_chunk(7)
+            folder.chunk_file(7).unlink()
+            with unittest.mock.patch("sls.campaign.folder.describe_machine",
+                                     return_value={**folder.plan.machine, "level": "x86-64-v9"}):
+                folder.write_chunk(7, rows)
+            collect(folder, "local")
+            self.assertTrue(folder.manifest["other_machines"])
+            machines = folder.manifest["machines"]
+        self.assertEqual(sorted(machines), [host_name(), f"{host_name()} (2)"])
+        self.assertEqual(sorted((machine["chunks"], machine["level"] == "x86-64-v9")
+                                for machine in machines.values()), [(1, True), (7, False)])
+
     def test_a_c_library_that_is_told_to_use_other_instructions_is_another_machine(self):
         self.write_campaign(40)
         self.fly("campaign.yaml", "--out", "out", "--chunk-runs", 5)
@@ -245,6 +271,7 @@ class LocalEngineTest(CampaignTest):
                 (("campaign.yaml", "--resume"), "--resume: expected --out DIR"),
                 (("campaign.yaml", "--workers", "0"), "--workers: expected a whole number"),
                 (("campaign.yaml", "--runs", "9-3"), "--runs: expected A-B"),
+                (("campaign.yaml", "--chunk-runs", "0"), "--chunk-runs: expected a whole number"),
                 (("status", "."), "plan.json")):
             self.expect_line(self.fly(*arguments, code=2), part)
 
@@ -254,6 +281,13 @@ class LocalEngineTest(CampaignTest):
                                     "{ list: [0.2, -0.1] }\nseeds: [faults.0.noise.seed]\n")
         said = self.fly("campaign.yaml", "--out", "out", code=2)
         self.expect_line(said, "campaign.yaml:4: vary.vehicle.load_mass_kg: run 1")
+        self.assertFalse((self.folder / "out").exists())
+
+    def test_keep_by_a_column_that_no_run_measures_is_refused_before_anything_flies(self):
+        self.write_campaign(40, "keep: { worst: 2, by: load_error_max_of_all }\n")
+        said = self.fly("campaign.yaml", "--out", "out", code=2)
+        self.expect_line(said, "campaign.yaml:7: keep.by: expected a measured column, such as load_error_max_m",
+                         ", got load_error_max_of_all")
         self.assertFalse((self.folder / "out").exists())
 
     def test_worker_flies_listed_chunks_and_those_of_its_index(self):
@@ -277,6 +311,8 @@ class LocalEngineTest(CampaignTest):
         self.assertIn("expected this environment variable",
                       work("--index-from", "INDEX", code=2))
         self.assertIn("expected a chunk from 0 to 7, got 8", work("--chunks", "8", code=2))
+        self.assertIn("--chunks-each: expected a whole number of at least 1, got '0'",
+                      work("--index-from", "INDEX", "--chunks-each", "0", code=2, INDEX="1"))
         self.fly("campaign.yaml", "--out", "out", "--resume")
         self.assertEqual(self.read_table("out"), self.read_table("whole"))
 

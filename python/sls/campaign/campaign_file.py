@@ -17,6 +17,7 @@ from sls.campaign.yaml_nodes import Place, fail, parse_yaml, read_bytes, to_prin
 
 KEYS = ("name", "base", "runs", "vary", "seeds", "measure", "keep", "certify", "period_s")
 SPREADS = ("sobol", "latin_hypercube")  # methods to spread draws; each takes any distribution
+PYTHON_MEASURE = "{ python: FILE, function: NAME, columns: [NAME] }"
 KINDS = ("grid", "list", *DISTRIBUTIONS, *SPREADS, "derived")
 OPTIONS = {"grid": (), "list": (), "derived": ("multiple_of",)}  # all others: DRAW_OPTIONS
 DRAW_OPTIONS = ("seed", "multiple_of", "within")
@@ -251,7 +252,7 @@ class _Reader:
                 continue
             name = item.read_text("a measure, or a map with python, function and columns")
             if name not in MEASURES:
-                item.fail_expected(f"one of {', '.join(MEASURES)}")
+                item.fail_expected(f"one of {', '.join(MEASURES)} or {PYTHON_MEASURE}")
             if name in names:
                 item.fail(f"expected each measure once, got {name} twice")
             names.append(name)
@@ -302,7 +303,7 @@ class _Reader:
         if not is_measured and by not in own_columns:
             by_place.fail_expected("a column of this campaign's measures, "
                                    + ", ".join((*measures, *own_columns)))
-        return Keep("worst", count, by)
+        return Keep("worst", count, by, by_place.line)
 
     def _read_certify(self, runs: int) -> Certify:
         if "certify" not in self.values:

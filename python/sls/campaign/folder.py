@@ -8,6 +8,7 @@ import io
 import json
 import os
 import re
+import shutil
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
@@ -184,11 +185,11 @@ class CampaignFolder:
     def remove_leftovers(self) -> None:
         """Removes temporary files of killed processes: those of a process of this machine that has ended,
         and those of other machines that were not written for a day."""
-        for folder in (self.folder, self.folder / "chunks"):
+        for folder in (self.folder, self.folder / "chunks", self.folder / "kept"):
             for file in folder.glob(".*.tmp"):
                 with suppress(OSError):  # it is gone already, or the disk fails: the next write says so
                     if is_left_over(file):
-                        file.unlink()
+                        shutil.rmtree(file) if file.is_dir() else file.unlink()
 
     # --- the lock ---------------------------------------------------------------------------------
 

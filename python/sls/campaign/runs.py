@@ -39,14 +39,14 @@ def make_runs(campaign: Campaign) -> "Runs":
 
 
 def list_own_columns(campaign: Campaign) -> list[str]:
-    names = [column for own in campaign.own_measures for column in own.columns]
-    return [*names, "own_error"] if names else []
+    return [column for own in campaign.own_measures for column in own.columns]
 
 
 def list_columns(campaign: Campaign, runs: "Runs") -> list[str]:
     """The columns of runs.csv."""
-    return ["run", *campaign.paths, "outcome", "reason", *runs.columns,
-            *list_own_columns(campaign), "steps", "certificate"]
+    own = list_own_columns(campaign)
+    return ["run", *campaign.paths, "outcome", "reason", *runs.columns, *own,
+            *(["own_error"] if own else []), "steps", "certificate"]
 
 
 def to_cell(value: Any) -> str:

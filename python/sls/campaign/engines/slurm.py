@@ -376,7 +376,7 @@ def cancel_quietly(folder: CampaignFolder) -> None:
 def collect(folder: CampaignFolder, number: int, options: EngineOptions) -> None:
     """Makes the table, or submits the missing chunks again. Does nothing if a launcher still waits for
     the campaign. Raises InputError, EngineError, ControllerLost."""
-    from sls.campaign.collect import collect as collect_folder
+    from sls.campaign.collect import collect as collect_folder, describe_broken_measures
     try:
         folder.take_lock()
     except InputError as error:
@@ -386,6 +386,8 @@ def collect(folder: CampaignFolder, number: int, options: EngineOptions) -> None
     if not missing:
         collect_folder(folder, "slurm")
         say(f"{folder.folder}/runs.csv")
+        if broken := describe_broken_measures(folder.manifest):
+            say(f"error: {broken}")
     elif number < MOST_ROUNDS:
         submit_round(folder, missing, number + 1, options)
     else:
