@@ -134,6 +134,17 @@ class FlightsTest(CampaignTest):
         self.write_measure("def f(flight):\n    return 1 / (len(flight) > 10)\n")  # some runs fail at once
         self.fly("campaign.yaml", "--out", "some")
 
+    def test_a_changed_module_of_an_own_measure_is_refused(self):
+        self.write_measure("import pathlib, sys\nsys.path.append(str(pathlib.Path(__file__).parent))\n"
+                           "def f(flight):\n    import helper\n    return helper.VALUE\n")
+        helper = self.write("helper.py", "VALUE = 1\n")
+        self.fly("campaign.yaml", "--out", "out")
+        plan = json.loads((self.folder / "out/plan.json").read_text())
+        self.assertEqual(sorted(plan["used_files"]), ["helper.py", "own.py"])
+        helper.write_text("VALUE = 2\n")
+        said = self.fly("campaign.yaml", "--out", "out", "--resume", code=2)
+        self.expect_line(said, "helper.py: expected the file with which the campaign was begun")
+
     def test_own_measures_may_have_dataclasses_with_annotations_as_texts(self):
         self.write_measure("from __future__ import annotations\nfrom dataclasses import dataclass\n"
                            "@dataclass\nclass Sum:\n    value: float = 3.0\n\n"

@@ -103,7 +103,7 @@ class LocalEngineTest(CampaignTest):
         self.assertEqual(list((self.folder / "killed/chunks").glob("*.tmp")), [])
 
     def test_ctrl_c_leaves_a_folder_that_resumes(self):
-        from sls.campaign.machine import host_name
+        from sls.campaign.whole_files import name_place
 
         self.write_campaign(200)
         self.fly("campaign.yaml", "--out", "whole")
@@ -117,7 +117,7 @@ class LocalEngineTest(CampaignTest):
             # As of a worker that ends while it writes: where the disk is fast, no other exists for long.
             ended = subprocess.Popen(["true"])
             ended.wait()
-            (chunks / f".chunk-000039.csv.{host_name()}.{ended.pid}.tmp").touch()
+            (chunks / f".chunk-000039.csv.{name_place()}.{ended.pid}.tmp").touch()
             process.send_signal(number)
             said = process.communicate(timeout=60)[1]
             self.assertEqual(process.returncode, code, said)
@@ -253,6 +253,24 @@ class LocalEngineTest(CampaignTest):
             said = self.fly("campaign.yaml", "--out", "out", "--resume", code=2)
         self.expect_line(said, "tunables: expected none, got glibc.cpu.hwcaps=-FMA")
 
+    def test_a_rebuilt_library_is_refused_until_its_bytes_are_those_of_the_plan(self):
+        self.write_campaign(40)
+        self.write("base.yaml", BASE + "controller: { law: libraries/law.so }\n")
+        self.write("libraries/law.so", "built")
+        self.fly("campaign.yaml", "--out", "out", "--chunk-runs", 5)
+        table = self.read_table("out")
+        (self.folder / "out/chunks/chunk-000001.csv").unlink()
+        self.write("libraries/law.so", "rebuilt")
+        said = self.fly("campaign.yaml", "--out", "out", "--resume", code=2)
+        self.expect_line(said, "libraries/law.so: expected the file with which the campaign was begun (sha256 ")
+        done = subprocess.run([sys.executable, "-BP", "-m", "sls.campaign.worker", "out", "--chunks", "1"],
+                              cwd=self.folder, text=True, capture_output=True, env=self.environment())
+        self.assertEqual(done.returncode, 2, done.stderr)
+        self.assertIn("law.so: expected the file with which", done.stderr)
+        self.write("libraries/law.so", "built")
+        self.fly("campaign.yaml", "--out", "out", "--resume")
+        self.assertEqual(self.read_table("out"), table)
+
     def test_levels_follow_the_flags_of_the_processor(self):
         from sls.campaign.machine import LEVEL_FLAGS, calc_level
         flags = set()
@@ -315,6 +333,47 @@ class LocalEngineTest(CampaignTest):
                       work("--index-from", "INDEX", "--chunks-each", "0", code=2, INDEX="1"))
         self.fly("campaign.yaml", "--out", "out", "--resume")
         self.assertEqual(self.read_table("out"), self.read_table("whole"))
+
+
+class SharedFolderTest(CampaignTest):
+    """What a shared file system and containers do to the folder."""
+
+    def test_a_file_that_nfs_shows_after_a_minute_is_waited_for_in_the_last_try(self):
+        from sls.campaign.engines import cluster
+        from sls.campaign.folder import CampaignFolder
+        folder, clock = CampaignFolder(self.folder), [0.0]
+        (self.folder / "chunks").mkdir()
+        with (unittest.mock.patch.object(cluster.time, "monotonic", lambda: clock[0]),
+              unittest.mock.patch.object(cluster.time, "sleep",
+                                         lambda seconds: clock.__setitem__(0, clock[0] + seconds)),
+              unittest.mock.patch.object(folder, "missing", lambda: [] if clock[0] > 60 else [3])):
+            self.assertEqual(cluster.find_missing(folder, is_last_try=False), [3])
+            self.assertEqual(cluster.find_missing(folder), [])
+        self.assertEqual(list((self.folder / "chunks").iterdir()), [])
+
+    def test_temporary_files_of_a_container_with_this_host_name_are_others(self):
+        program = ("import pathlib, sys; from sls.campaign.whole_files import *; "
+                   "mine = name_temporary(pathlib.Path('x')); print(mine); mine.touch(); "
+                   "print([is_left_over(pathlib.Path(other)) for other in sys.argv[1:]])")
+        from sls.campaign.whole_files import is_left_over, name_temporary
+        ours = name_temporary(self.folder / "x")
+        ours.touch()
+        done = subprocess.run(["unshare", "--pid", "--fork", "--mount-proc", sys.executable, "-BP", "-c",
+                               program, ours.name], cwd=self.folder, env=self.environment(),
+                              capture_output=True, text=True)
+        if "unshare" in done.stderr:
+            self.skipTest(f"expected root to make a PID namespace: {done.stderr.strip()}")
+        theirs, left_over = done.stdout.splitlines()
+        self.assertEqual(left_over, "[False]")  # our process does not exist there, but lives
+        self.assertFalse(is_left_over(self.folder / theirs))
+
+    def test_a_campaign_of_any_name_has_a_name_for_its_jobs(self):
+        from sls.campaign.engines import slurm
+        from sls.campaign.folder import CampaignFolder
+        self.write_campaign(40, name="a,b c'.yaml")
+        self.fly("a,b c'.yaml", "--out", "out")
+        self.assertRegex(slurm.name_job(CampaignFolder(self.folder / "out")), r"^sls-a_b_c_-[0-9a-f]{8}$")
+        self.assertIn("./sls campaign &#x27;", (self.folder / "out/report.html").read_text())
 
 
 class FullDiskTest(CampaignTest):

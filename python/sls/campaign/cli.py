@@ -139,6 +139,7 @@ def prepare(folder: CampaignFolder, campaign: Any, engine: Any,
     from sls.campaign.runs import list_columns, list_own_columns, list_yaml_values, make_runs
     from sls.campaign.own_measures import load_own_measures
     from sls.campaign.sampling import is_certified, make_values
+    from sls.campaign.used_files import hash_used_files
     folder.refuse_foreign(campaign, options.resume)
     is_begun = (folder.folder / "plan.json").exists()
     first, last = find_range(folder, campaign, options, is_begun)
@@ -156,7 +157,8 @@ def prepare(folder: CampaignFolder, campaign: Any, engine: Any,
         chunk_runs = options.chunk_runs or choose_chunk_runs(
             getattr(engine, "CHUNK_S", 1.0), time.monotonic() - begin, last - first + 1)
     folder.create(campaign, options.on, chunk_runs, first, last, options.resume,
-                  list_columns(campaign, runs), options.allow_other_machines)
+                  list_columns(campaign, runs), {} if is_begun else hash_used_files(campaign),
+                  options.allow_other_machines)
 
 
 def find_range(folder: CampaignFolder, campaign: Any, options: argparse.Namespace,

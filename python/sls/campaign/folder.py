@@ -11,7 +11,7 @@ import re
 import shutil
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from typing import Any
 from sls.campaign.campaign import Campaign
 from sls.campaign.engines import EngineError
 from sls.campaign.machine import describe_machine, find_difference, host_name
+from sls.campaign.used_files import refuse_changed_files
 from sls.campaign.whole_files import WholeFile, is_left_over, write_whole
 from sls.input_error import InputError
 
@@ -41,6 +42,7 @@ class Plan:
     columns: list[str]   # of runs.csv
     machine: dict[str, str]
     allow_other_machines: bool
+    used_files: dict[str, str] = field(default_factory=dict)  # used_files.py
 
 
 class DamagedChunk(Exception):
@@ -89,6 +91,7 @@ class CampaignFolder:
             is_same = False
         campaign = load_campaign(self.folder / "campaign.yaml", base=base if is_same else copy,
                                  folder=Path(self.plan.file).parent)
+        refuse_changed_files(self.plan.used_files, Path(self.plan.file).parent)
         if campaign.sha256 != self.plan.sha256:
             raise InputError(f"{self.folder}: expected the campaign that it was begun with (sha256 "
                              f"{self.plan.sha256}), got sha256 {campaign.sha256}: campaign.yaml, "
@@ -96,7 +99,8 @@ class CampaignFolder:
         return campaign
 
     def create(self, campaign: Campaign, engine: str, chunk_runs: int, first: int, last: int,
-               resume: bool, columns: Sequence[str], allow_other_machines: bool = False) -> None:
+               resume: bool, columns: Sequence[str], used_files: dict[str, str],
+               allow_other_machines: bool = False) -> None:
         """Begins the folder. With `resume` it checks that the folder belongs to this campaign, and keeps
         its chunks. Holds the lock until `close`. Raises InputError if the folder is not one of this
         campaign, is in use, or was begun on a machine of another kind."""
@@ -115,7 +119,7 @@ class CampaignFolder:
             base=str(campaign.base.resolve()), engine=engine, first=first, last=last,
             campaign_runs=campaign.runs,
             chunk_runs=chunk_runs, columns=list(columns), machine=describe_machine(),
-            allow_other_machines=allow_other_machines))
+            allow_other_machines=allow_other_machines, used_files=used_files))
 
     def take_up(self, campaign: Campaign, engine: str, first: int, last: int, columns: list[str],
                 allow_other_machines: bool) -> None:
@@ -131,6 +135,7 @@ class CampaignFolder:
                        base=str(campaign.base.resolve()),
                        allow_other_machines=plan.allow_other_machines or allow_other_machines)
         self.refuse_other_machine(plan)
+        refuse_changed_files(plan.used_files, Path(plan.file).parent)
         self.write_plan(plan)
         self.remove_leftovers()
 

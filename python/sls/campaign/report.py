@@ -6,6 +6,7 @@ because pictures show bins or samples."""
 
 import json
 import math
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -406,7 +407,7 @@ def list_worst(table: RunTable) -> list[tuple[str, np.ndarray]]:
 
 
 def make_command(file: str, run: int) -> str:
-    return f"./sls campaign {file} --runs {run}-{run} --out /tmp/run-{run}"
+    return f"./sls campaign {shlex.quote(file)} --runs {run}-{run} --out /tmp/run-{run}"
 
 
 def make_worst(table: RunTable, file: str) -> str:
