@@ -8,7 +8,7 @@ import json
 import math
 import shlex
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -18,10 +18,10 @@ import yaml
 
 from sls.campaign import drawing
 from sls.campaign.drawing import OUTCOME_COLOURS, format_number, format_share
-from sls.campaign.pairs import (count_changes, describe_changes, describe_interval, find_finished,
-                                find_pairs, make_measure_rows, make_outcome_rows)
+from sls.campaign.pairs import (describe_changes, describe_interval, find_pairs, make_measure_rows,
+                                make_outcome_rows)
 from sls.campaign.run_table import OUTCOMES, RunTable, find_rows, read_runs
-from sls.campaign.statistics import calc_quantiles, calc_wilson_interval
+from sls.campaign.statistics import calc_quantiles, calc_share_interval
 from sls.input_error import InputError
 from sls.report import STYLE_SHEET, escape, make_section
 
@@ -217,7 +217,7 @@ def make_plain_table(header: Sequence[str], rows: Sequence[Sequence[str]], style
 def make_outcomes(table: RunTable) -> str:
     rows = [[escape(outcome), str(table.count(outcome)),
              format_share(table.count(outcome) / len(table)),
-             describe_interval(table.count(outcome), len(table))] for outcome in OUTCOMES]
+             describe_interval(table.is_outcome(outcome), table.draw)] for outcome in OUTCOMES]
     page = make_plain_table(("outcome", "runs", "share", "95 % interval (Wilson)"), rows)
     if table.reasons:
         common = sorted(table.reasons.items(), key=lambda item: (-item[1], item[0]))
@@ -235,11 +235,15 @@ def make_share_picture(table: RunTable, key: str) -> str:
     totals = np.bincount(bins.places, minlength=len(bins.names))
     counts = np.bincount(bins.places[is_lost(table)], minlength=len(bins.names))
     rows = []
-    for name, count, total in zip(bins.names, counts, totals):
+    for place, (name, count, total) in enumerate(zip(bins.names, counts, totals)):
         if total:
-            low, high = calc_wilson_interval(int(count), int(total))
-            rows.append((name, count / total, low, high,
-                         f"{name}: {count} of {total}, {100 * low:.1f} % to {100 * high:.1f} %"))
+            low = high = count / total
+            title = f"{name}: {count} of {total}"
+            if table.draw is not None:
+                here = bins.places == place
+                low, high = calc_share_interval(is_lost(table)[here], table.draw[here])
+                title += f", {100 * low:.1f} % to {100 * high:.1f} %"
+            rows.append((name, count / total, low, high, title))
     return f"<div>{drawing.draw_shares(rows, key)}</div>"
 
 
@@ -251,7 +255,8 @@ def make_key_section(table: RunTable) -> str:
     return make_section(
         "Share lost along each varied key",
         f"<div class=\"pair\">{pictures}</div><p class=\"small\">Over all values of the other "
-        "keys; runs that failed count as lost. Lines: 95 % interval (Wilson).</p>")
+        "keys; runs that failed count as lost."
+        f"{' Lines: 95 % interval (Wilson).' if table.draw is not None else ''}</p>")
 
 
 def make_heat_maps(table: RunTable, x: str, y: str, measure: str | None) -> str:
@@ -307,18 +312,16 @@ def make_paired_section(table: RunTable, key: str) -> str:
     found = find_pairs(table, key)
     if found is None:
         return ""
-    (a, b), in_a, in_b = found
-    a, b = name_word(a), name_word(b)
-    counts = count_changes(table, table, in_a, in_b)
-    outcomes = [[escape(cell) for cell in row] for row in make_outcome_rows(counts, a, b)]
-    measures = [[escape(cell) for cell in row]
-                for row in make_measure_rows(table, table, in_a, in_b, a, b)]
+    a, b = name_word(found.name_a), name_word(found.name_b)
+    pairs = replace(found, name_a=a, name_b=b)
+    outcomes = [[escape(cell) for cell in row] for row in make_outcome_rows(pairs)]
+    measures = [[escape(cell) for cell in row] for row in make_measure_rows(pairs)]
     page = (make_plain_table(outcomes[0], outcomes[1:])
-            + f"<p class=\"small\">{len(in_a)} pairs of runs that differ in {escape(key)} alone. "
-            f"{escape(describe_changes(counts, a, b))}.</p>")
+            + f"<p class=\"small\">{len(pairs.in_a)} pairs of runs that differ in {escape(key)} alone. "
+            f"{escape(describe_changes(pairs))}.</p>")
     if len(measures) > 1:
         page += ("<h3>Measures, of the "
-                 f"{int(find_finished(table, table, in_a, in_b).sum())} pairs that finish with "
+                 f"{int(pairs.find_finished().sum())} pairs that finish with "
                  f"both</h3>{make_plain_table(measures[0], measures[1:])}")
     return make_section(f"{escape(key)}: {escape(a)} against {escape(b)}", page)
 
