@@ -8,8 +8,8 @@ import support  # noqa: F401  (paths)
 import numpy as np
 from scipy import optimize, stats
 
-from sls.campaign.statistics import (calc_ecdf, calc_mcnemar_p, calc_medians, calc_paired_difference,
-                                     calc_quantiles, calc_share_interval, calc_sign_p,
+from sls.campaign.statistics import (calc_mcnemar_p, calc_medians, calc_paired_difference, calc_quantiles,
+                                     calc_share_interval, calc_sign_p,
                                      calc_wilson_interval, find_interval_rank)
 
 
@@ -80,13 +80,6 @@ class DrawsTest(unittest.TestCase):
 
 
 class DistributionTest(unittest.TestCase):
-    def test_the_empirical_distribution_counts_values_up_to_each_place(self):
-        places, shares = calc_ecdf(np.array([3.0, 1.0, np.nan, 1.0, 2.0]))
-        np.testing.assert_array_equal(places, [1, 2, 3])
-        np.testing.assert_array_equal(shares, [0.5, 0.75, 1])
-        places, shares = calc_ecdf(np.array([np.nan]))
-        self.assertEqual((len(places), len(shares)), (0, 0))
-
     def test_quantiles_agree_with_numpy(self):
         values = np.random.default_rng(1).normal(size=137)
         shares = (0.0, 0.05, 0.5, 0.9, 1.0)

@@ -82,12 +82,6 @@ def calc_vertical_limit(vertical: Sequence[float]) -> float:
     return float(np.arctan2(velocity * w, position) / w) - PERIOD_S / 2
 
 
-def calc_sag(load_mass_kg: float, believed_kg: float, position_gain: float) -> float:
-    """Height error at rest without integral, m, positive down."""
-    return (GRAVITY_M_S2 * (load_mass_kg - believed_kg)
-            / ((QUAD_MASS_KG + believed_kg) * position_gain))
-
-
 def calc_pulse_peak(gains: Sequence[float], duration_s: float = 1.0) -> float:
     """Largest error of the load for a force of 1 N on the quadrotor over `duration_s`, m."""
     time_s = np.linspace(0.0, 30.0, 30001)

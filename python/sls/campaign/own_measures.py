@@ -54,19 +54,16 @@ def to_columns(own: OwnMeasure, result: Any) -> list[float]:
     return [float(result)]
 
 
-class OwnMeasures:
-    """All own measures of a campaign, loaded once in each process. Raises InputError."""
+def load_own_measures(campaign: Campaign) -> OwnCells | None:
+    """The own measures of a campaign, loaded once in each process; None if it has none. Raises InputError."""
+    measures = [(own, load_function(own)) for own in campaign.own_measures]
 
-    def __init__(self, campaign: Campaign):
-        self.campaign = campaign
-        self.measures = [(own, load_function(own)) for own in campaign.own_measures]
-
-    def measure(self, scenario_text: str) -> list[str]:
+    def measure(scenario_text: str) -> list[str]:
         """Flies the scenario and calls each function with the flight. Returns the cells of their columns
         and a last cell with the errors. Columns of a function that raises are empty."""
-        flight = fly_text(scenario_text, self.campaign)
+        flight = fly_text(scenario_text, campaign)
         cells, errors = list[str](), list[str]()
-        for own, function in self.measures:
+        for own, function in measures:
             try:
                 cells += map(to_number, to_columns(own, function(flight)))
             except Exception as error:
@@ -74,7 +71,4 @@ class OwnMeasures:
                 errors.append(f"{own.function}: {describe(error, own.file)}")
         return [*cells, "; ".join(errors)]
 
-
-def load_own_measures(campaign: Campaign) -> OwnCells | None:
-    """Loads the own measures, if the campaign has any. Raises InputError."""
-    return OwnMeasures(campaign).measure if campaign.own_measures else None
+    return measure if measures else None

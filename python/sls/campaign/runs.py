@@ -3,7 +3,6 @@
 import math
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from sls.campaign.campaign import Campaign
@@ -18,12 +17,6 @@ if TYPE_CHECKING:
 BLOCK = 1000  # number of runs whose values are in memory at once
 OwnCells = Callable[[str], list[str]]  # from a scenario's text to the cells of all own measures
 Announce = Callable[[int], None]
-
-
-@dataclass(frozen=True)
-class Row:
-    index: int
-    cells: tuple[str, ...]  # one for each of `list_columns`
 
 
 class RefusedRun(Exception):
@@ -71,8 +64,8 @@ def list_yaml_values(campaign: Campaign, values: list[Any]) -> list[str]:
 
 
 def fly_run(campaign: Campaign, runs: "Runs", index: int, values: list[Any],
-            own: OwnCells | None = None) -> Row:
-    """Flies one run. Raises RefusedRun if its scenario is refused."""
+            own: OwnCells | None = None) -> list[str]:
+    """Flies one run. Returns the cells of its row. Raises RefusedRun if its scenario is refused."""
     texts = list_yaml_values(campaign, values)
     try:
         outcome, reason, measures, certificate, steps = runs.fly(
@@ -80,8 +73,8 @@ def fly_run(campaign: Campaign, runs: "Runs", index: int, values: list[Any],
         own_cells = own(runs.scenario_text(texts)) if own else []
     except ConfigError as error:
         raise RefusedRun(f"run {index}: {error}") from None
-    return Row(index, (str(index), *map(to_cell, values), outcome, to_one_line(reason),
-                       *map(to_number, measures), *own_cells, str(steps), certificate))
+    return [str(index), *map(to_cell, values), outcome, to_one_line(reason), *map(to_number, measures),
+            *own_cells, str(steps), certificate]
 
 
 def fly_whole(campaign: Campaign, runs: "Runs", values: list[Any]) -> "Flight":
@@ -109,4 +102,4 @@ def fly_range(campaign: Campaign, runs: "Runs", first: int, last: int,
     for index, values in list_values(campaign, first, last):
         if announce:
             announce(index)
-        yield fly_run(campaign, runs, index, values, own).cells
+        yield fly_run(campaign, runs, index, values, own)

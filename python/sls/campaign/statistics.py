@@ -1,29 +1,6 @@
-"""The statistics of a campaign: shares, distributions and paired differences.
+"""The statistics of a campaign: shares, distributions and paired differences. README.md, "Statistics".
 
-Intervals come from formulas, not from random numbers: the same runs give the same page. Φ is the
-standard normal distribution, z = Φ⁻¹((1 + level)/2), B(n) the number of heads of n fair coins:
-
-    (1)  Wilson score interval of a share p = k/n:
-         (p + z²/2n ± z √(p (1 − p)/n + z²/4n²)) / (1 + z²/n)
-    (2)  empirical distribution: E(x) = number of values ≤ x, divided by their number
-    (3)  quantile of share p: the sorted values x₀ … x₍ₙ₋₁₎, linear between them, at rank p (n − 1)
-    (4)  median of paired differences, interval without assumption on their distribution: from
-         the k-th smallest to the k-th largest, k the largest number with
-         P(B(n) < k) ≤ (1 − level)/2
-    (5)  sign test: of n differences other than 0, the smaller of both signs occurs k times;
-         p = min(1, 2 P(B(n) ≤ k))
-    (6)  McNemar's exact test of changed outcomes: (5) with the draws in which more runs changed to one
-         outcome and those in which more changed to the other
-    (7)  (1) of runs of which several share a draw, and so are not independent: n is replaced by
-         n′ = min(n, p (1 − p)/V · (z/t)²), V = Σ (k_d − p m_d)²/n² over the D draws, of which each has k_d
-         of m_d runs, t the quantile of Student's distribution with D − 1 degrees of freedom; n′ = D
-         if V = 0
-
-(4) and (5) take one difference of each draw: the median of its pairs.
-
-Sources: Wilson (1927), J. Am. Stat. Assoc. 22, 209; Hyndman and Fan (1996), Am. Stat. 50, 361, type
-7, for (3); Hahn and Meeker, Statistical Intervals, section 5.2, for (4); McNemar (1947),
-Psychometrika 12, 153; Korn and Graubard (1998), Survey Methodology 24, 193, for (7)."""
+Intervals come from formulas, not from random numbers: the same runs give the same page."""
 
 from dataclasses import dataclass
 from statistics import NormalDist
@@ -54,7 +31,7 @@ def calc_wilson_interval(count: float, total: float, level: float = LEVEL) -> tu
 def calc_share_interval(is_counted: np.ndarray, draw: np.ndarray,
                         level: float = LEVEL) -> tuple[float, float]:
     """The interval of the share of `is_counted` (n,) for runs of the draws `draw` (n,): formula 1 if each run
-    has its own draw, else formula 7; (0, 1) for one draw of several runs."""
+    has its own draw, else formula 2; (0, 1) for one draw of several runs."""
     total, count = len(draw), int(np.sum(is_counted))
     places = np.unique(draw, return_inverse=True)[1]
     runs = np.bincount(places)
@@ -69,14 +46,6 @@ def calc_share_interval(is_counted: np.ndarray, draw: np.ndarray,
     factor = (NormalDist().inv_cdf(upper) / student.ppf(upper, draws - 1)) ** 2
     effective = min(total, share * (1.0 - share) / variance * factor) if variance > 0.0 else draws
     return calc_wilson_interval(share * effective, effective, level)
-
-
-def calc_ecdf(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The steps of the empirical distribution (2): their places, ascending, and the values after them. NaN
-    is left out."""
-    values = np.asarray(values, dtype=float)
-    places, counts = np.unique(values[~np.isnan(values)], return_counts=True)
-    return places, np.cumsum(counts) / max(1, counts.sum())
 
 
 def calc_quantiles(values: np.ndarray, shares: tuple[float, ...]) -> np.ndarray:
