@@ -201,7 +201,7 @@ class FlightsTest(CampaignTest):
         self.fly("campaign.yaml", "--out", "out", "--resume")
         self.assertEqual(folder.manifest["kept"], {**kept, "other_certificates": kept["runs"]})
 
-    def test_what_a_killed_process_left_of_a_recording_is_removed(self):
+    def test_the_rest_of_a_recording_of_a_killed_process_is_removed(self):
         from sls.campaign.whole_files import name_temporary
         self.write_campaign("keep: all\n")
         self.fly("campaign.yaml", "--out", "out")

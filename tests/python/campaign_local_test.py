@@ -150,7 +150,7 @@ class LocalEngineTest(CampaignTest):
         self.assertEqual(self.read_table("out"), table)
         self.assertIn("6 flown, 0 missing, 0 damaged", self.fly("status", "out"))
 
-    def test_what_a_run_prints_goes_to_stderr_and_changes_nothing(self):
+    def test_the_output_of_a_run_goes_to_stderr_and_changes_nothing(self):
         self.write_campaign(40)
         self.fly("campaign.yaml", "--out", "whole")
         said = self.fly("campaign.yaml", "--out", "out", "--chunk-runs", 5, fake="print=1")
@@ -336,7 +336,7 @@ class LocalEngineTest(CampaignTest):
 
 
 class SharedFolderTest(CampaignTest):
-    """What a shared file system and containers do to the folder."""
+    """Folders on a shared file system, and containers."""
 
     def test_a_file_that_nfs_shows_after_a_minute_is_waited_for_in_the_last_try(self):
         from sls.campaign.engines import cluster

@@ -102,8 +102,8 @@ def serve(folder: Path) -> int:
 
 
 def take_pipes() -> tuple[TextIO, TextIO]:
-    """stdin and stdout under descriptors that no own measure and no library knows. What these print on
-    stdout goes to stderr; they read an empty stdin."""
+    """stdin and stdout under descriptors that no own measure and no library knows. Their own output on stdout
+    goes to stderr; they read an empty stdin."""
     pipes = os.fdopen(os.dup(0)), os.fdopen(os.dup(1), "w")
     nothing = os.open(os.devnull, os.O_RDONLY)
     os.dup2(nothing, 0)

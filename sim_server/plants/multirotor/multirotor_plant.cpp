@@ -98,7 +98,7 @@ void check_finite(const AutopilotOutput& wanted, std::int64_t step) {
 
 using TurningRotors = std::vector<RotorSpeed>;
 
-/// What a step changes.
+/// The values that a step changes.
 struct Flown {
   std::int64_t steps = 0;
   AutopilotOutput output;  ///< the last one; its direction is in the plant's W
