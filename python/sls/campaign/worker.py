@@ -84,7 +84,8 @@ def fly_chunk(folder: str, number: int) -> dict[str, int | float]:
 def serve(folder: Path) -> int:
     """A process of the local engine. It reads lines `CHUNK` or `CHUNK announce` from stdin, and answers one
     line of JSON for each on stdout. With `announce` it also writes a line before each run; if a run ends
-    the process, the engine has its index from this line. The process ends when stdin is closed. Returns its exit code."""
+    the process, the engine has its index from this line. It ends when stdin is closed, and returns its exit
+    code."""
     def answer(message: dict[str, int | float | str]) -> None:
         print(json.dumps(message), file=answers, flush=True)
 
