@@ -219,10 +219,9 @@ class ReportTest(CampaignTest):
                                 "manifest.json: expected JSON")
         (folder / "manifest.json").unlink()
         self.expect_input_error(lambda: make_campaign_report(folder), "manifest.json", "No such")
-        (folder / "campaign.yaml").write_text("a: [")
         (folder / "manifest.json").write_text("{}")
-        self.expect_input_error(lambda: make_campaign_report(folder), "campaign.yaml",
-                                "expected YAML")
+        self.expect_input_error(lambda: make_campaign_report(folder),
+                                "manifest.json: expected the manifest of a campaign, got {}")
 
     def test_a_hundred_thousand_runs_make_a_small_page_in_little_memory(self):
         folder = self.folder / "c"
@@ -319,7 +318,7 @@ class CompareTest(CampaignTest):
             row[6] = repr(float(row[6]) + 0.25)
         rows[1][7] = "100.0"
         b = self.write_campaign("b", rows=rows,
-                                manifest={"campaign": "synthetic", "engine": "dask"})
+                                manifest={"campaign": "synthetic", "file": "here.yaml", "engine": "dask"})
         text = compare(a, b)
         for part in ("engine: local | dask", "runs.csv: 400 runs in both",
                      # The 12 runs are of 6 draws, of two runs each: p = 2 / 2^6.

@@ -41,8 +41,6 @@ def keep_while_flying(folder: CampaignFolder, campaign: Campaign, runs: "Runs",
                       cells: Sequence[str]) -> None:
     """Writes the recording of a run just flown, if the campaign keeps it. Raises EngineError if it cannot
     be written."""
-    if campaign.keep.kind in ("none", "worst"):
-        return
     row = dict(zip(folder.plan.columns, cells))
     if is_kept(campaign, row):
         keep_run(folder, campaign, runs, row)

@@ -60,7 +60,7 @@ def make_campaign_report(folder: Path) -> str:
     campaign_text = read_text(folder / "campaign.yaml")
     manifest = read_manifest(folder / "manifest.json")
     table = read_runs(folder / "runs.csv")
-    name = describe_name(folder, campaign_text, manifest)
+    name = manifest["campaign"]
     sections = [make_head(name, table)]
     if len(table):
         sections += [
@@ -70,7 +70,7 @@ def make_campaign_report(folder: Path) -> str:
             *(make_paired_section(table, key) for key in table.keys),
             make_section("Measures", make_measures(table)),
             make_section("All together", make_parallel(table)),
-            make_section("Worst runs", make_worst(table, find_file(manifest))),
+            make_section("Worst runs", make_worst(table, manifest["file"])),
         ]
     sections += [make_section("Campaign", make_facts(manifest)),
                  "<section><details><summary>Campaign file</summary>"
@@ -98,30 +98,9 @@ def read_manifest(file: Path) -> dict[str, Any]:
         manifest = json.loads(read_text(file))
     except ValueError as error:
         raise InputError(f"{file}: expected JSON, got: {error}") from None
-    if not isinstance(manifest, dict):
-        raise InputError(f"{file}: expected a map, got {type(manifest).__name__}")
+    if not isinstance(manifest, dict) or not {"campaign", "file"} <= manifest.keys():
+        raise InputError(f"{file}: expected the manifest of a campaign, got {str(manifest):.40}")
     return manifest
-
-
-def describe_name(folder: Path, campaign_text: str, manifest: dict[str, Any]) -> str:
-    """The campaign's name: from the manifest, or from its file, or the name of that file or of the folder."""
-    try:
-        own = yaml.safe_load(campaign_text)
-    except yaml.YAMLError as error:
-        raise InputError(f"{folder / 'campaign.yaml'}: expected YAML, got: "
-                         f"{' '.join(str(error).split())}") from None
-    if isinstance(manifest.get("campaign"), str):
-        return manifest["campaign"]
-    if isinstance(own, dict) and isinstance(own.get("name"), str):
-        return own["name"]
-    file = manifest.get("file")
-    return Path(file).stem if isinstance(file, str) else folder.resolve().name
-
-
-def find_file(manifest: dict[str, Any]) -> str:
-    """The path of the campaign file for commands, from the manifest; "FILE" if it has none."""
-    file = manifest.get("file")
-    return file if isinstance(file, str) else "FILE"
 
 
 # --- classes of a varied key ----------------------------------------------------------------------

@@ -5,9 +5,7 @@ import hashlib
 import os
 import sys
 import sysconfig
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import yaml
 
@@ -20,22 +18,11 @@ STARTED = {"__main__", "sitecustomize", "usercustomize"}  # what Python itself s
 PACKAGES = {"site-packages", "dist-packages"}  # folders of installed packages
 
 
-def list_texts(value: Any) -> Iterator[str]:
-    """All texts in a value of YAML."""
-    if isinstance(value, str):
-        yield value
-    elif isinstance(value, dict):
-        for item in value.values():
-            yield from list_texts(item)
-    elif isinstance(value, list | tuple):
-        for item in value:
-            yield from list_texts(item)
-
-
 def list_libraries(campaign: Campaign) -> set[Path]:
-    """The shared libraries that the base scenario and the varied values name."""
-    values = [yaml.safe_load(campaign.base_text), *(varied.items for varied in campaign.varied)]
-    return {(campaign.base.parent / text).resolve() for text in list_texts(values) if text.endswith(".so")}
+    """The shared libraries that the base scenario and the campaign name."""
+    texts = [token.value for text in (campaign.base_text, campaign.text) for token in yaml.scan(text)
+             if isinstance(token, yaml.ScalarToken)]
+    return {(campaign.base.parent / text).resolve() for text in texts if text.endswith(".so")}
 
 
 def list_modules() -> set[Path]:
