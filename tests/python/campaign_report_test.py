@@ -270,7 +270,7 @@ class PairsTest(CampaignTest):
             header=["run", "_u", "k", "law", "outcome", "reason", "e_m", "steps", "certificate"],
             rows=[[run, draw / draws, point, law,
                    "lost" if (shift[draw] > 0) == (law == "pid") else "finished", "",
-                   repr(1.0 + shift[draw] * (law == "pid")), 1, ""]
+                   repr(float(1.0 + shift[draw] * (law == "pid"))), 1, ""]
                   for run, (draw, point, law) in enumerate(
                       (draw, point, law) for draw in range(draws) for point in range(points)
                       for law in ("qsf", "pid"))], campaign=campaign), int(np.sum(shift > 0))
