@@ -87,8 +87,7 @@ Batch::Loop Batch::make_loop(const LoopStart& start) const {
   alone.plant.initial = start.initial;
   for (config::Fault& fault : alone.faults)
     std::visit([&](auto& effect) { shift(effect, start.seed_shift); }, fault.effect);
-  auto plants = sim::make_plants(sim::find_plant_type(alone.plant.model), alone, {0});
-  return {std::move(plants[0].plant),
+  return {sim::make_plant(sim::find_plant_type(alone.plant.model), alone, vehicle_),
           std::make_unique<sim::FaultLine>(alone, vehicle_),
           std::vector<Eigen::Vector3d>(1),
           {}};

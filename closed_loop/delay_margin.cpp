@@ -63,8 +63,8 @@ DelayedFlight fly_undelayed(const config::Scenario& scenario, ErrorHistory& erro
 
 DelayedFlight fly_delayed(const config::Scenario& scenario, std::int64_t periods,
                           const ErrorHistory& undelayed) {
+  const double rod_length = config::make_vehicle_scenario(scenario, 0).vehicle.rod_length;
   return fly(scenario, periods, [&](const FlownStep& step, double error) {
-    const double rod_length = scenario.vehicle.rod_length;
     return is_load_lost(step, error, undelayed, rod_length)
                ? describe_loss(rod_length, "without delay")
                : std::string();

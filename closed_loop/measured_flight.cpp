@@ -36,7 +36,7 @@ MeasuredFlight fly_measured(const config::Scenario& scenario, const MeasureList&
                             const Poll& poll) {
   check_vehicles(scenario);
   const std::int64_t period_ns = scenario.sync.period_ns;
-  const double rod_length = scenario.vehicle.rod_length;
+  const double rod_length = config::make_vehicle_scenario(scenario, 0).vehicle.rod_length;
   Flight flight(scenario, {0}, options);
   FlightMeasures measured(measures, period_ns);
   std::optional<FlightCertificate> certificate;

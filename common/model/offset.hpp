@@ -19,7 +19,8 @@ struct StateOffset {
 bool moves_rod(const RodAngles& rod);
 
 /// `state` with `offset` added. Attitude and signals do not change. If `offset.rod` is 0, the rod's
-/// angles and rates keep every bit; else the load moves with the rod of length `rod_length` (m).
+/// angles and rates keep every bit; else the load moves with the rod of length `rod_length` (m),
+/// whose joint stays where it is relative to the quadrotor.
 Measurement add(const Measurement& state, const StateOffset& offset, double rod_length);
 
 /// Constant error of a measured attitude.

@@ -95,6 +95,11 @@ struct PlantOfVehicles {
 std::vector<PlantOfVehicles> make_plants(const PlantType& type, const config::Scenario& fleet,
                                          const std::vector<std::uint32_t>& ids);
 
+/// The plant of vehicle `id` alone, whose own scenario is `alone` (config::make_vehicle_scenario).
+/// @throws config::ConfigError as `make_plants`.
+std::unique_ptr<Plant> make_plant(const PlantType& type, const config::Scenario& alone,
+                                  std::uint32_t id);
+
 /// Names that a signal must not have: the other columns of state.csv.
 const std::vector<std::string>& list_reserved_signal_names();
 

@@ -61,18 +61,33 @@ void check_signals(const std::vector<Signal>& signals, const config::ModelName& 
   }
 }
 
+/// A plant that moves `vehicles`.
+std::unique_ptr<Plant> make_plant_of(const PlantType& type, const config::Scenario& scenario,
+                                     const std::vector<PlantSetup::Vehicle>& vehicles) {
+  PlantSetup setup;
+  setup.plant = scenario.plant;
+  setup.autopilot = scenario.autopilot.value_or(config::Autopilot());
+  setup.folder = scenario.folder;
+  setup.estimator = scenario.estimator;
+  setup.vehicles = vehicles;
+  auto plant = make_sensed(type.make(setup), setup, scenario);
+  check_signals(plant->signals(), scenario.plant.model);
+  return plant;
+}
+
 }  // namespace
+
+std::unique_ptr<Plant> make_plant(const PlantType& type, const config::Scenario& alone,
+                                  std::uint32_t id) {
+  return make_plant_of(type, alone, {{id, alone.vehicle, alone.plant.initial}});
+}
 
 std::vector<PlantOfVehicles> make_plants(const PlantType& type, const config::Scenario& fleet,
                                          const std::vector<std::uint32_t>& ids) {
-  PlantSetup setup;
-  setup.plant = fleet.plant;
-  setup.autopilot = fleet.autopilot.value_or(config::Autopilot());
-  setup.folder = fleet.folder;
-  setup.estimator = fleet.estimator;
+  std::vector<PlantSetup::Vehicle> vehicles;
   for (const std::uint32_t id : ids) {
     const config::Scenario alone = config::make_vehicle_scenario(fleet, id);
-    setup.vehicles.push_back({id, alone.vehicle, alone.plant.initial});
+    vehicles.push_back({id, alone.vehicle, alone.plant.initial});
   }
   std::vector<PlantOfVehicles> plants;
   if (type.moves == Moves::kAllVehicles) {
@@ -82,17 +97,12 @@ std::vector<PlantOfVehicles> make_plants(const PlantType& type, const config::Sc
                                 fleet.plant.model.name + "' moves together, got one of " +
                                 config::to_vehicle_ranges(ids));
     plants.push_back(
-        {make_sensed(type.make(setup), setup, fleet), std::vector<std::size_t>(ids.size()), {}});
+        {make_plant_of(type, fleet, vehicles), std::vector<std::size_t>(ids.size()), {}});
     std::iota(plants[0].vehicles.begin(), plants[0].vehicles.end(), 0);
-    check_signals(plants[0].plant->signals(), fleet.plant.model);
     return plants;
   }
-  for (std::size_t i = 0; i < ids.size(); ++i) {
-    PlantSetup one = setup;
-    one.vehicles = {setup.vehicles[i]};
-    plants.push_back({make_sensed(type.make(one), one, fleet), {i}, {}});
-    check_signals(plants.back().plant->signals(), fleet.plant.model);
-  }
+  for (std::size_t i = 0; i < ids.size(); ++i)
+    plants.push_back({make_plant_of(type, fleet, {vehicles[i]}), {i}, {}});
   return plants;
 }
 

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "closed_loop/flight.hpp"
+#include "common/config/scenario_draft.hpp"
 #include "tests/closed_loop/support.hpp"
 
 namespace sls::closed_loop::test {
@@ -82,6 +83,19 @@ TEST(BatchTest, FaultsAndSensingActAsInAFlight) {
 
 TEST(BatchTest, AVehicleOfAFleetFliesAsInItsFleet) {
   expect_batch_equals_flight(load("mixed_fleet"), 3);
+}
+
+TEST(BatchTest, ALibraryIsToldTheNumberOfItsVehicle) {
+  config::ScenarioDraft draft(SLS_SOURCE_DIR "/config/scenarios/fleet.yaml");
+  draft.set("plant", "{ model: " SLS_LIBRARIES
+                     "/plant.so, step_s: 0.001, parameters: "
+                     "{ in: advance, do: fail }, initial: { load_position_m: [0, 0, 0] } }");
+  BatchOptions options;
+  options.vehicle = 3;
+  Batch batch(draft.make_scenario(), 1, options);
+  batch.step(repeat(Vector3d(0, 0, -16), 1).data());
+  EXPECT_EQ(batch.failure(0),
+            SLS_LIBRARIES "/plant.so: advance, vehicle 3, step 0: the rope is torn");
 }
 
 /// Forces that differ from loop to loop and from step to step.

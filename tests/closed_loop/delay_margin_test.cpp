@@ -111,6 +111,18 @@ TEST(DelayMarginTest, LosesTheLoadWhenItIsARodsLengthFurtherAwayThanWithoutDelay
       << flight.loss;
 }
 
+TEST(DelayMarginTest, LosesTheLoadByTheRodOfTheVehicleNotOfItsTemplate) {
+  config::Scenario own = load("figure_eight");
+  own.plant.model.name = "analytic";
+  own.plant.own = {};
+  config::Scenario varied = own;
+  own.vehicle.rod_length = own.controller.model.vehicle.rod_length = 0.5;
+  varied.vehicles[0].rod_length = 0.5;
+  const std::string table = to_text(find_delay_margin(own));
+  EXPECT_NE(table.find("load more than 0.5 m"), table.npos) << table;
+  EXPECT_EQ(to_text(find_delay_margin(varied)), table);
+}
+
 TEST(DelayMarginTest, RepeatsExactlyAndListsFlightsInOrderOfDelay) {
   const config::Scenario scenario = load("matlab_setpoint_3");
   const DelayMargin margin = find_delay_margin(scenario);

@@ -277,6 +277,16 @@ TEST(FlightMeasuresTest, AnUnknownMeasureIsRefusedWithTheListOfThose) {
 
 // --- outcome -------------------------------------------------------------------------------------
 
+TEST(OutcomeTest, TheLoadIsLostByTheRodOfTheVehicleNotOfItsTemplate) {
+  config::Scenario scenario = load("short");
+  scenario.vehicles[0].rod_length = 0.5;
+  scenario.plant.initial.position.x() += 0.7;
+  const MeasuredFlight flown = fly_measured(scenario, MeasureList(scenario, {}), {}, false);
+  EXPECT_EQ(flown.outcome, Outcome::kLost);
+  EXPECT_EQ(flown.reason,
+            "load more than 0.5 m further from its reference than in the base flight, at 0 s");
+}
+
 /// Flies each delay of a delay margin again as a run of a campaign; expects the same outcome.
 void expect_outcomes_of_delay_margin(const config::Scenario& scenario) {
   const ErrorHistory base = fly_base(scenario);

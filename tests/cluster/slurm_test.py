@@ -63,6 +63,19 @@ def test_short_chunks_share_a_task(slurm: SlurmCluster, campaign: TestCampaign) 
     assert campaign.table("shared") == campaign.table("local")
 
 
+def test_workers_limit_the_campaign_also_if_it_needs_several_arrays(
+        slurm: SlurmCluster, campaign: TestCampaign) -> None:
+    campaign.hold()
+    launched = campaign.fly("limited", "--on", "slurm", "--workers", "1",
+                            changes="slurm.find_largest_array=lambda:2", **slurm.environment)
+    wait_until(lambda: list(campaign.folder.glob("flying-*")), LIMIT_S, "a run waits")
+    status = campaign.start("status", "limited", **slurm.environment).expect(0)
+    assert "1 running" in status and "4 pending (Dependency)" in status, status
+    campaign.release()
+    launched.expect(0)
+    assert campaign.table("limited") == campaign.table("local")
+
+
 def find_worker(slurm: SlurmCluster, node: str) -> int:
     """Id of the process on `node` that flies a chunk."""
     for process in slurm.hosts.processes(node):

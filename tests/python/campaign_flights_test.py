@@ -4,8 +4,10 @@ programs over DDS."""
 import csv
 import json
 import math
+import subprocess
 import sys
 import unittest
+import unittest.mock
 
 import support
 import yaml
@@ -113,6 +115,43 @@ class FlightsTest(CampaignTest):
         self.expect_line(said, "out: expected a folder of campaign", "sha256")
         self.assertEqual(self.read_table("out"), before)
 
+    def write_measure(self, text):
+        """A campaign of one own measure, `f`, of a file with this text."""
+        self.write("own.py", text)
+        self.write_campaign()
+        self.write("campaign.yaml", (self.folder / "campaign.yaml").read_text().replace(
+            "time_of_loss]", "{ python: own.py, function: f, columns: [f] }]"))
+
+    def test_an_own_measure_that_raises_in_every_run_is_an_error_that_names_its_line(self):
+        self.write_measure("import math\nimport statistics\n\ndef f(flight):\n"
+                           "    return statistics.mean([])\n")
+        said = self.fly("campaign.yaml", "--out", "out", code=1)
+        self.assertIn("out: measure f: expected a value of at least one run, got an error in each of 6, "
+                      "first: StatisticsError: mean requires at least one data point (line 5)",
+                      said.splitlines()[-1])
+        self.assertEqual(len(self.read_rows("out")), 6)
+        self.fly("campaign.yaml", "--out", "out", "--resume", "--allow-broken-measures")
+        self.write_measure("def f(flight):\n    return 1 / (len(flight) > 10)\n")  # some runs fail at once
+        self.fly("campaign.yaml", "--out", "some")
+
+    def test_a_changed_module_of_an_own_measure_is_refused(self):
+        self.write_measure("import pathlib, sys\nsys.path.append(str(pathlib.Path(__file__).parent))\n"
+                           "def f(flight):\n    import helper\n    return helper.VALUE\n")
+        helper = self.write("helper.py", "VALUE = 1\n")
+        self.fly("campaign.yaml", "--out", "out")
+        plan = json.loads((self.folder / "out/plan.json").read_text())
+        self.assertEqual(sorted(plan["used_files"]), ["helper.py", "own.py"])
+        helper.write_text("VALUE = 2\n")
+        said = self.fly("campaign.yaml", "--out", "out", "--resume", code=2)
+        self.expect_line(said, "helper.py: expected the file with which the campaign was begun")
+
+    def test_own_measures_may_have_dataclasses_with_annotations_as_texts(self):
+        self.write_measure("from __future__ import annotations\nfrom dataclasses import dataclass\n"
+                           "@dataclass\nclass Sum:\n    value: float = 3.0\n\n"
+                           "def f(flight):\n    return Sum().value\n")
+        self.fly("campaign.yaml", "--out", "out")
+        self.assertEqual({row["f"] for row in self.read_rows("out")}, {"3.0"})
+
     def test_an_own_measure_that_cannot_be_loaded_is_refused_before_anything_flies(self):
         self.write("own.py", "import nothing_of_this_name\n")
         self.write_campaign()
@@ -147,6 +186,34 @@ class FlightsTest(CampaignTest):
         self.fly("campaign.yaml", "--out", "out-all", "--resume")
         self.assertEqual(json.loads((self.folder / "out-all/kept/run-000002/manifest.json")
                                     .read_text())["certificate"], rows[2]["certificate"])
+
+    def test_a_kept_run_that_another_machine_flew_may_have_another_certificate(self):
+        from sls.campaign.folder import CampaignFolder
+        self.write_campaign("keep: { worst: 1, by: load_error_max }\n")
+        self.fly("campaign.yaml", "--out", "out", "--allow-other-machines")
+        folder = CampaignFolder(self.folder / "out")
+        kept = folder.manifest["kept"]
+        self.assertNotIn("other_certificates", kept)
+        for number, _, _ in folder.chunks:  # as of a machine with another C library
+            rows = [[*cells[:-1], "0" * 64] for cells in folder.read_chunk(number)]
+            folder.chunk_file(number).unlink()
+            folder.write_chunk(number, rows)
+        self.fly("campaign.yaml", "--out", "out", "--resume")
+        self.assertEqual(folder.manifest["kept"], {**kept, "other_certificates": kept["runs"]})
+
+    def test_the_rest_of_a_recording_of_a_killed_process_is_removed(self):
+        from sls.campaign.whole_files import name_temporary
+        self.write_campaign("keep: all\n")
+        self.fly("campaign.yaml", "--out", "out")
+        ended = subprocess.Popen(["true"])
+        ended.wait()
+        kept = self.folder / "out/kept/run-000003"
+        with unittest.mock.patch("os.getpid", return_value=ended.pid):
+            left = name_temporary(kept)
+        kept.rename(left)
+        self.fly("campaign.yaml", "--out", "out", "--resume")
+        self.assertTrue(kept.exists())
+        self.assertFalse(left.exists())
 
     def test_runs_flown_over_dds_have_the_same_certificates(self):
         self.write_campaign("certify: { some: 3, seed: 1 }\n")  # other runs get a certificate in the verification

@@ -103,7 +103,7 @@ class LocalEngineTest(CampaignTest):
         self.assertEqual(list((self.folder / "killed/chunks").glob("*.tmp")), [])
 
     def test_ctrl_c_leaves_a_folder_that_resumes(self):
-        from sls.campaign.machine import host_name
+        from sls.campaign.whole_files import name_place
 
         self.write_campaign(200)
         self.fly("campaign.yaml", "--out", "whole")
@@ -117,7 +117,7 @@ class LocalEngineTest(CampaignTest):
             # As of a worker that ends while it writes: where the disk is fast, no other exists for long.
             ended = subprocess.Popen(["true"])
             ended.wait()
-            (chunks / f".chunk-000039.csv.{host_name()}.{ended.pid}.tmp").touch()
+            (chunks / f".chunk-000039.csv.{name_place()}.{ended.pid}.tmp").touch()
             process.send_signal(number)
             said = process.communicate(timeout=60)[1]
             self.assertEqual(process.returncode, code, said)
@@ -149,6 +149,13 @@ class LocalEngineTest(CampaignTest):
         self.fly("campaign.yaml", "--out", "out", "--resume")
         self.assertEqual(self.read_table("out"), table)
         self.assertIn("6 flown, 0 missing, 0 damaged", self.fly("status", "out"))
+
+    def test_the_output_of_a_run_goes_to_stderr_and_changes_nothing(self):
+        self.write_campaign(40)
+        self.fly("campaign.yaml", "--out", "whole")
+        said = self.fly("campaign.yaml", "--out", "out", "--chunk-runs", 5, fake="print=1")
+        self.assertIn("printed by a library\n", said)
+        self.assertEqual(self.read_table("out"), self.read_table("whole"))
 
     def test_a_run_that_kills_its_worker_once_is_flown_again(self):
         self.write_campaign(40)
@@ -219,6 +226,25 @@ class LocalEngineTest(CampaignTest):
         manifest = json.loads((self.folder / "out/manifest.json").read_text())
         self.assertTrue(manifest["other_machines"])
 
+    def test_a_host_of_two_descriptions_is_two_machines(self):
+        from sls.campaign.collect import collect
+        from sls.campaign.folder import opened
+        from sls.campaign.machine import host_name
+        self.write_campaign(40)
+        self.fly("campaign.yaml", "--out", "out", "--chunk-runs", 5)
+        with opened(self.folder / "out") as folder:
+            rows = folder.read_chunk(7)
+            folder.chunk_file(7).unlink()
+            with unittest.mock.patch("sls.campaign.folder.describe_machine",
+                                     return_value={**folder.plan.machine, "level": "x86-64-v9"}):
+                folder.write_chunk(7, rows)
+            collect(folder, "local")
+            self.assertTrue(folder.manifest["other_machines"])
+            machines = folder.manifest["machines"]
+        self.assertEqual(sorted(machines), [host_name(), f"{host_name()} (2)"])
+        self.assertEqual(sorted((machine["chunks"], machine["level"] == "x86-64-v9")
+                                for machine in machines.values()), [(1, True), (7, False)])
+
     def test_a_c_library_that_is_told_to_use_other_instructions_is_another_machine(self):
         self.write_campaign(40)
         self.fly("campaign.yaml", "--out", "out", "--chunk-runs", 5)
@@ -226,6 +252,24 @@ class LocalEngineTest(CampaignTest):
         with unittest.mock.patch.dict(os.environ, GLIBC_TUNABLES="glibc.cpu.hwcaps=-FMA"):
             said = self.fly("campaign.yaml", "--out", "out", "--resume", code=2)
         self.expect_line(said, "tunables: expected none, got glibc.cpu.hwcaps=-FMA")
+
+    def test_a_rebuilt_library_is_refused_until_its_bytes_are_those_of_the_plan(self):
+        self.write_campaign(40)
+        self.write("base.yaml", BASE + "controller: { law: libraries/law.so }\n")
+        self.write("libraries/law.so", "built")
+        self.fly("campaign.yaml", "--out", "out", "--chunk-runs", 5)
+        table = self.read_table("out")
+        (self.folder / "out/chunks/chunk-000001.csv").unlink()
+        self.write("libraries/law.so", "rebuilt")
+        said = self.fly("campaign.yaml", "--out", "out", "--resume", code=2)
+        self.expect_line(said, "libraries/law.so: expected the file with which the campaign was begun (sha256 ")
+        done = subprocess.run([sys.executable, "-BP", "-m", "sls.campaign.worker", "out", "--chunks", "1"],
+                              cwd=self.folder, text=True, capture_output=True, env=self.environment())
+        self.assertEqual(done.returncode, 2, done.stderr)
+        self.assertIn("law.so: expected the file with which", done.stderr)
+        self.write("libraries/law.so", "built")
+        self.fly("campaign.yaml", "--out", "out", "--resume")
+        self.assertEqual(self.read_table("out"), table)
 
     def test_levels_follow_the_flags_of_the_processor(self):
         from sls.campaign.machine import LEVEL_FLAGS, calc_level
@@ -245,6 +289,7 @@ class LocalEngineTest(CampaignTest):
                 (("campaign.yaml", "--resume"), "--resume: expected --out DIR"),
                 (("campaign.yaml", "--workers", "0"), "--workers: expected a whole number"),
                 (("campaign.yaml", "--runs", "9-3"), "--runs: expected A-B"),
+                (("campaign.yaml", "--chunk-runs", "0"), "--chunk-runs: expected a whole number"),
                 (("status", "."), "plan.json")):
             self.expect_line(self.fly(*arguments, code=2), part)
 
@@ -254,6 +299,13 @@ class LocalEngineTest(CampaignTest):
                                     "{ list: [0.2, -0.1] }\nseeds: [faults.0.noise.seed]\n")
         said = self.fly("campaign.yaml", "--out", "out", code=2)
         self.expect_line(said, "campaign.yaml:4: vary.vehicle.load_mass_kg: run 1")
+        self.assertFalse((self.folder / "out").exists())
+
+    def test_keep_by_a_column_that_no_run_measures_is_refused_before_anything_flies(self):
+        self.write_campaign(40, "keep: { worst: 2, by: load_error_max_of_all }\n")
+        said = self.fly("campaign.yaml", "--out", "out", code=2)
+        self.expect_line(said, "campaign.yaml:7: keep.by: expected a measured column, such as load_error_max_m",
+                         ", got load_error_max_of_all")
         self.assertFalse((self.folder / "out").exists())
 
     def test_worker_flies_listed_chunks_and_those_of_its_index(self):
@@ -277,8 +329,51 @@ class LocalEngineTest(CampaignTest):
         self.assertIn("expected this environment variable",
                       work("--index-from", "INDEX", code=2))
         self.assertIn("expected a chunk from 0 to 7, got 8", work("--chunks", "8", code=2))
+        self.assertIn("--chunks-each: expected a whole number of at least 1, got '0'",
+                      work("--index-from", "INDEX", "--chunks-each", "0", code=2, INDEX="1"))
         self.fly("campaign.yaml", "--out", "out", "--resume")
         self.assertEqual(self.read_table("out"), self.read_table("whole"))
+
+
+class SharedFolderTest(CampaignTest):
+    """Folders on a shared file system, and containers."""
+
+    def test_a_file_that_nfs_shows_after_a_minute_is_waited_for_in_the_last_try(self):
+        from sls.campaign.engines import cluster
+        from sls.campaign.folder import CampaignFolder
+        folder, clock = CampaignFolder(self.folder), [0.0]
+        (self.folder / "chunks").mkdir()
+        with (unittest.mock.patch.object(cluster.time, "monotonic", lambda: clock[0]),
+              unittest.mock.patch.object(cluster.time, "sleep",
+                                         lambda seconds: clock.__setitem__(0, clock[0] + seconds)),
+              unittest.mock.patch.object(folder, "missing", lambda: [] if clock[0] > 60 else [3])):
+            self.assertEqual(cluster.find_missing(folder, is_last_try=False), [3])
+            self.assertEqual(cluster.find_missing(folder), [])
+        self.assertEqual(list((self.folder / "chunks").iterdir()), [])
+
+    def test_temporary_files_of_a_container_with_this_host_name_are_others(self):
+        program = ("import pathlib, sys; from sls.campaign.whole_files import *; "
+                   "mine = name_temporary(pathlib.Path('x')); print(mine); mine.touch(); "
+                   "print([is_left_over(pathlib.Path(other)) for other in sys.argv[1:]])")
+        from sls.campaign.whole_files import is_left_over, name_temporary
+        ours = name_temporary(self.folder / "x")
+        ours.touch()
+        done = subprocess.run(["unshare", "--pid", "--fork", "--mount-proc", sys.executable, "-BP", "-c",
+                               program, ours.name], cwd=self.folder, env=self.environment(),
+                              capture_output=True, text=True)
+        if "unshare" in done.stderr:
+            self.skipTest(f"expected root to make a PID namespace: {done.stderr.strip()}")
+        theirs, left_over = done.stdout.splitlines()
+        self.assertEqual(left_over, "[False]")  # our process does not exist there, but lives
+        self.assertFalse(is_left_over(self.folder / theirs))
+
+    def test_a_campaign_of_any_name_has_a_name_for_its_jobs(self):
+        from sls.campaign.engines import slurm
+        from sls.campaign.folder import CampaignFolder
+        self.write_campaign(40, name="a,b c'.yaml")
+        self.fly("a,b c'.yaml", "--out", "out")
+        self.assertRegex(slurm.name_job(CampaignFolder(self.folder / "out")), r"^sls-a_b_c_-[0-9a-f]{8}$")
+        self.assertIn("./sls campaign &#x27;", (self.folder / "out/report.html").read_text())
 
 
 class FullDiskTest(CampaignTest):

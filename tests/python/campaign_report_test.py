@@ -10,17 +10,27 @@ from html.parser import HTMLParser
 import browser
 import support
 import numpy as np
+from scipy import stats
 
 from sls.campaign.compare import compare
-from sls.campaign.pairs import find_pairs
+from sls.campaign.pairs import describe_changes, find_pairs
 from sls.campaign.report import make_campaign_report
-from sls.campaign.run_table import leave_out_numbers, read_runs
+from sls.campaign.run_table import count_points, leave_out_numbers, read_runs
+from sls.campaign.statistics import calc_paired_difference
 from sls.input_error import InputError
 
 KEYS = ("vehicle.load_mass_kg", "faults.0.delay.by_s", "controller")
 LAWS = ('{law: "qsf", gains: {lqr: 1}}', '{law: "pid", gains: {a: 2}}')
 MEASURES = ("load_error_rms_m", "load_error_max_m", "stage_0_settling_x_s", "time_of_loss_s")
-CAMPAIGN = "base: eight.yaml\nvary: {}\n# <script>alert(1)</script>\n"
+CAMPAIGN = """base: eight.yaml
+vary:
+  vehicle.load_mass_kg: { normal: [0.2, 0.05] }
+  faults.0.delay.by_s: { uniform: [0, 0.32] }
+  controller: { list: [qsf, pid] }
+# <script>alert(1)</script>
+"""
+ONE_RUN_OF_A_DRAW = "vary: { k: { uniform: [0, 1] } }\n"
+NO_DRAWS = "vary: { k: { grid: [0, 1, 20] }, law: { list: [qsf, pid] } }\n"
 
 
 def make_rows(count, seed=1):
@@ -76,10 +86,10 @@ class Reader(HTMLParser):
 
 
 class CampaignTest(support.FolderTest):
-    def write_campaign(self, name="c", rows=None, header=None, manifest=None):
+    def write_campaign(self, name="c", rows=None, header=None, manifest=None, campaign=CAMPAIGN):
         folder = self.folder / name
         folder.mkdir()
-        (folder / "campaign.yaml").write_text(CAMPAIGN)
+        (folder / "campaign.yaml").write_text(campaign)
         (folder / "manifest.json").write_text(json.dumps(manifest or {
             "campaign": "synthetic", "file": "config/campaigns/synthetic.yaml", "engine": "local",
             "versions": {"level": "x86-64-v3"}, "outcomes": {"finished": 3}}))
@@ -118,6 +128,22 @@ class TableTest(CampaignTest):
                          "force beyond limit (…), at … s")
         self.assertEqual(leave_out_numbers("stage figure_eight_2 at -1e-09 m"),
                          "stage figure_eight_2 at … m")
+
+    def test_numbers_beside_texts_are_one_value_however_they_are_written(self):
+        cells = ["1", "2.5", "1", "auto", "1", "2.50", "1.0", "auto"]
+        table = read_runs(self.write_campaign(
+            rows=[[run, cell, "finished", "", 1, ""] for run, cell in enumerate(cells)],
+            header=["run", "k", "outcome", "reason", "steps", "certificate"]) / "runs.csv")
+        names, places = table.words["k"]
+        self.assertEqual(names, ["1", "2.5", "auto"])
+        np.testing.assert_array_equal(places, [0, 1, 0, 2, 0, 1, 0, 2])
+
+    def test_the_draw_of_a_run_follows_from_the_campaign_file(self):
+        for text, points in ((CAMPAIGN, 2), (ONE_RUN_OF_A_DRAW, 1), (NO_DRAWS, None), ("vary: [", None),
+                             ("vary: { k: { grid: { from: 1, to: 2, values: 5 } } }\nseeds: [s]\n", 5),
+                             ("vary: { a: { grid: [0, 1, 3] }, b: { list: [x, y] }, c: { sobol: [0, 1] }, "
+                              "d: { derived: c } }\n", 6)):
+            self.assertEqual(count_points(self.write("campaign.yaml", text)), points, text)
 
     def test_errors_of_own_measures_are_no_measure(self):
         folder = self.write_campaign(
@@ -160,7 +186,7 @@ class ReportTest(CampaignTest):
     def test_shares_and_intervals_are_those_of_the_table(self):
         page = make_campaign_report(self.write_campaign(rows=[
             [run, "0.2", "0.1", LAWS[0], "lost" if run < 3 else "finished", "", "1", "1", "1", "",
-             1, ""] for run in range(10)]))
+             1, ""] for run in range(10)], campaign=ONE_RUN_OF_A_DRAW))
         # 3 of 10: Wilson's interval is 10.78 % to 60.32 %, as in textbooks.
         self.assertIn("<td>lost</td><td>3</td><td>30 %</td><td>10.78 % to 60.32 %</td>", page)
 
@@ -193,10 +219,9 @@ class ReportTest(CampaignTest):
                                 "manifest.json: expected JSON")
         (folder / "manifest.json").unlink()
         self.expect_input_error(lambda: make_campaign_report(folder), "manifest.json", "No such")
-        (folder / "campaign.yaml").write_text("a: [")
         (folder / "manifest.json").write_text("{}")
-        self.expect_input_error(lambda: make_campaign_report(folder), "campaign.yaml",
-                                "expected YAML")
+        self.expect_input_error(lambda: make_campaign_report(folder),
+                                "manifest.json: expected the manifest of a campaign, got {}")
 
     def test_a_hundred_thousand_runs_make_a_small_page_in_little_memory(self):
         folder = self.folder / "c"
@@ -231,11 +256,44 @@ class ReportTest(CampaignTest):
 class PairsTest(CampaignTest):
     def test_runs_that_differ_in_one_key_alone_are_pairs(self):
         table = read_runs(self.write_campaign() / "runs.csv")
-        names, first, second = find_pairs(table, "controller")
-        self.assertEqual(names, list(LAWS))
-        np.testing.assert_array_equal(first, np.arange(0, 400, 2))
-        np.testing.assert_array_equal(second, np.arange(1, 400, 2))
+        pairs = find_pairs(table, "controller")
+        self.assertEqual([pairs.name_a, pairs.name_b], list(LAWS))
+        np.testing.assert_array_equal(pairs.in_a, np.arange(0, 400, 2))
+        np.testing.assert_array_equal(pairs.in_b, np.arange(1, 400, 2))
+        np.testing.assert_array_equal(pairs.draw, np.arange(200))
         self.assertIsNone(find_pairs(table, "faults.0.delay.by_s"))
+
+    def write_crossed(self, draws, points, rng, campaign):
+        """Runs of `draws` draws at `points` points with two laws: `pid` is better or worse in all of a draw."""
+        shift = rng.choice([-0.1, 0.1], draws)
+        return self.write_campaign(
+            header=["run", "_u", "k", "law", "outcome", "reason", "e_m", "steps", "certificate"],
+            rows=[[run, draw / draws, point, law,
+                   "lost" if (shift[draw] > 0) == (law == "pid") else "finished", "",
+                   repr(float(1.0 + shift[draw] * (law == "pid"))), 1, ""]
+                  for run, (draw, point, law) in enumerate(
+                      (draw, point, law) for draw in range(draws) for point in range(points)
+                      for law in ("qsf", "pid"))], campaign=campaign), int(np.sum(shift > 0))
+
+    def test_draws_crossed_with_another_key_count_once(self):
+        folder, worse = self.write_crossed(
+            100, 20, np.random.default_rng(3),
+            "vary: { _u: { uniform: [0, 1] }, k: { grid: [0, 1, 20] }, law: { list: [qsf, pid] } }\n")
+        pairs = find_pairs(read_runs(folder / "runs.csv"), "law")
+        expected = stats.binomtest(worse, 100, 0.5).pvalue
+        self.assertGreater(expected, 0.01)
+        self.assertIn(f"McNemar's exact p of 100 draws = {expected:.3g}", describe_changes(pairs))
+        paired = calc_paired_difference(pairs.a.numbers["e_m"][pairs.in_a],
+                                        pairs.b.numbers["e_m"][pairs.in_b], pairs.draw)
+        self.assertEqual((paired.count, paired.larger), (100, worse))
+        self.assertAlmostEqual(paired.p, expected)
+
+    def test_without_draws_there_is_no_interval_and_no_p(self):
+        folder, _ = self.write_crossed(1, 20, np.random.default_rng(3), NO_DRAWS)
+        page = make_campaign_report(folder)
+        self.assertIn("20 finish with", page)
+        for part in ("McNemar", "exact p", " % to ", "Lines: 95 %"):
+            self.assertNotIn(part, page)
 
     def test_runs_without_partners_are_no_pairs(self):
         rows = [row for row in make_rows(400) if row[0] % 2 == 0 or row[0] % 7 == 1]
@@ -260,15 +318,16 @@ class CompareTest(CampaignTest):
             row[6] = repr(float(row[6]) + 0.25)
         rows[1][7] = "100.0"
         b = self.write_campaign("b", rows=rows,
-                                manifest={"campaign": "synthetic", "engine": "dask"})
+                                manifest={"campaign": "synthetic", "file": "here.yaml", "engine": "dask"})
         text = compare(a, b)
         for part in ("engine: local | dask", "runs.csv: 400 runs in both",
-                     "12 finish with A alone, 0 with B alone: McNemar's exact p = 0.000488",
+                     # The 12 runs are of 6 draws, of two runs each: p = 2 / 2^6.
+                     "12 finish with A alone, 0 with B alone: McNemar's exact p of 200 draws = 0.0312",
                      "runs with another outcome", "runs that differ most in load_error_rms_m"):
             self.assertIn(part, text)
         line = next(line for line in text.splitlines() if line.startswith("  load_error_rms_m"))
-        finished = sum(row[4] == "finished" for row in rows)
-        self.assertEqual(line.split()[1], str(finished))
+        finished = {row[0] // 2 for row in rows if row[4] == "finished"}
+        self.assertEqual(line.split()[1], str(len(finished)))
         self.assertEqual(line.split()[4:8], ["0.25", "0.25", "to", "0.25"])
         self.assertTrue(all(len(line) < 300 for line in text.splitlines()))
 

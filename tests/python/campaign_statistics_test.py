@@ -8,9 +8,9 @@ import support  # noqa: F401  (paths)
 import numpy as np
 from scipy import optimize, stats
 
-from sls.campaign.statistics import (calc_ecdf, calc_mcnemar_p, calc_paired_difference,
-                                     calc_quantiles, calc_sign_p, calc_wilson_interval,
-                                     find_interval_rank)
+from sls.campaign.statistics import (calc_mcnemar_p, calc_medians, calc_paired_difference, calc_quantiles,
+                                     calc_share_interval, calc_sign_p,
+                                     calc_wilson_interval, find_interval_rank)
 
 
 class WilsonTest(unittest.TestCase):
@@ -45,14 +45,41 @@ class WilsonTest(unittest.TestCase):
                 calc_wilson_interval(count, total)
 
 
-class DistributionTest(unittest.TestCase):
-    def test_the_empirical_distribution_counts_values_up_to_each_place(self):
-        places, shares = calc_ecdf(np.array([3.0, 1.0, np.nan, 1.0, 2.0]))
-        np.testing.assert_array_equal(places, [1, 2, 3])
-        np.testing.assert_array_equal(shares, [0.5, 0.75, 1])
-        places, shares = calc_ecdf(np.array([np.nan]))
-        self.assertEqual((len(places), len(shares)), (0, 0))
+class DrawsTest(unittest.TestCase):
+    def test_a_run_of_each_draw_is_wilsons_interval(self):
+        self.assertEqual(calc_share_interval(np.arange(40) < 7, np.arange(40)), calc_wilson_interval(7, 40))
 
+    def test_runs_that_follow_their_draw_know_no_more_than_the_draws(self):
+        lost = np.repeat(np.arange(50) < 15, 20)  # all 20 runs of a draw are lost, or none
+        low, high = calc_share_interval(lost, np.repeat(np.arange(50), 20))
+        ours, theirs = high - low, np.subtract(*calc_wilson_interval(15, 50)[::-1])
+        self.assertTrue(1.0 < ours / theirs < 1.05, ours / theirs)  # t of 49 degrees is 1.025 z
+        self.assertEqual(calc_share_interval(np.zeros(1000), np.repeat(np.arange(50), 20)),
+                         calc_wilson_interval(0, 50))
+        self.assertEqual(calc_share_interval(np.arange(20) < 3, np.zeros(20)), (0.0, 1.0))
+
+    def test_it_covers_the_share_of_draws_with_runs_in_common(self):
+        """300 campaigns of 40 draws; the share lost differs from draw to draw with a beta distribution."""
+        random, covered, naive = np.random.default_rng(5), 0, 0
+        draw = np.repeat(np.arange(40), 25)
+        for _ in range(300):
+            lost = random.random(1000) < np.repeat(random.beta(0.6, 1.4, 40), 25)  # its mean is 0.3
+            low, high = calc_share_interval(lost, draw)
+            covered += low <= 0.3 <= high
+            low, high = calc_wilson_interval(int(lost.sum()), 1000)
+            naive += low <= 0.3 <= high
+        # Five standard deviations below 95 % of 300.
+        self.assertGreater(covered / 300, 0.95 - 5 * math.sqrt(0.95 * 0.05 / 300))
+        self.assertLess(naive / 300, 0.8)
+
+    def test_medians_of_groups_agree_with_numpy(self):
+        random = np.random.default_rng(2)
+        values, group = random.normal(size=101), random.integers(0, 9, 101)
+        np.testing.assert_allclose(calc_medians(values, group),
+                                   [np.median(values[group == place]) for place in range(9)], rtol=1e-15)
+
+
+class DistributionTest(unittest.TestCase):
     def test_quantiles_agree_with_numpy(self):
         values = np.random.default_rng(1).normal(size=137)
         shares = (0.0, 0.05, 0.5, 0.9, 1.0)

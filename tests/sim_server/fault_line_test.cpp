@@ -344,6 +344,26 @@ TEST(BiasTest, KeepsTheRodsLengthOfTheScenario) {
   EXPECT_NEAR((measured.p_WL - measured.p_WQ).norm(), 0.7, 1e-15);
 }
 
+TEST(BiasTest, ARodWhoseJointIsNotAtTheOriginTurnsAboutItsJoint) {
+  const Vector3d p_QJ_W(0.1, -0.02, 0.05), v_QJ_W(0.3, 0.1, -0.2);
+  SlungLoadState state = make_tilted_state();
+  state.p_WL += p_QJ_W;
+  state.v_WL += v_QJ_W;
+  config::BiasFault bias;
+  bias.offset.rod.alpha = 1e-9;
+  SlungLoadState measured = measure_once(bias, state);
+  EXPECT_LT((measured.p_WL - state.p_WL).norm(), 2e-9);  // 1e-9 rad of a rod of 1 m
+  EXPECT_LT((measured.v_WL - state.v_WL).norm(), 2e-9);
+
+  bias.offset.rod.alpha = 0.3;
+  bias.offset.position << 1.0, 2.0, 3.0;
+  measured = measure_once(bias, state);
+  const SlungLoadState rod =
+      model::make_state(measured.p_WQ + p_QJ_W, measured.v_WQ + v_QJ_W, measured.rod, 1.0);
+  EXPECT_LT((measured.p_WL - rod.p_WL).norm(), 1e-14);  // rounding of positions of a few metres
+  EXPECT_LT((measured.v_WL - rod.v_WL).norm(), 1e-14);
+}
+
 TEST(BiasTest, AddsToTheForce) {
   EXPECT_EQ(actuate_steps({make_command_fault(make_force_bias(0.5))}, 3),
             (std::vector<double>{0.5, 1.5, 2.5}));

@@ -2,7 +2,7 @@
 
 This module holds values only. `campaign_file` reads them, `sampling` draws from them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -60,6 +60,7 @@ class Keep:
     kind: str = "none"
     count: int = 0
     by: str = ""
+    line: int = field(default=0, compare=False)  # of `by`
 
     def find_column(self, columns: list[str]) -> str | None:
         """The column of `columns` that `by` names, with or without its unit: load_error_max means

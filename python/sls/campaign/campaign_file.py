@@ -17,6 +17,7 @@ from sls.campaign.yaml_nodes import Place, fail, parse_yaml, read_bytes, to_prin
 
 KEYS = ("name", "base", "runs", "vary", "seeds", "measure", "keep", "certify", "period_s")
 SPREADS = ("sobol", "latin_hypercube")  # methods to spread draws; each takes any distribution
+PYTHON_MEASURE = "{ python: FILE, function: NAME, columns: [NAME] }"
 KINDS = ("grid", "list", *DISTRIBUTIONS, *SPREADS, "derived")
 OPTIONS = {"grid": (), "list": (), "derived": ("multiple_of",)}  # all others: DRAW_OPTIONS
 DRAW_OPTIONS = ("seed", "multiple_of", "within")
@@ -68,7 +69,7 @@ class _Reader:
             file=self.root.file, text=self.data.decode(), name=self._read_name(), base=self.base,
             base_text=self.base_data.decode(), runs=runs, varied=tuple(varied),
             measures=measures, own_measures=own_measures,
-            keep=self._read_keep(measures, own_measures), certify=self._read_certify(runs),
+            keep=self._read_keep(), certify=self._read_certify(runs),
             seeds=tuple(member.path for member in seeds), period_s=self._read_period(),
             sha256=self._calc_hash(own_measures))
 
@@ -251,7 +252,7 @@ class _Reader:
                 continue
             name = item.read_text("a measure, or a map with python, function and columns")
             if name not in MEASURES:
-                item.fail_expected(f"one of {', '.join(MEASURES)}")
+                item.fail_expected(f"one of {', '.join(MEASURES)} or {PYTHON_MEASURE}")
             if name in names:
                 item.fail(f"expected each measure once, got {name} twice")
             names.append(name)
@@ -283,7 +284,7 @@ class _Reader:
             columns.append(column)
         return OwnMeasure(file, function, tuple(columns), place.line)
 
-    def _read_keep(self, measures: tuple[str, ...], own: tuple[OwnMeasure, ...]) -> Keep:
+    def _read_keep(self) -> Keep:
         if "keep" not in self.values:
             return Keep()
         place = self.values["keep"]
@@ -295,14 +296,7 @@ class _Reader:
         values = place.read_map(known=("worst", "by"))
         count = place.require(values, "worst", "how many runs").read_whole(1, MOST_RUNS)
         by_place = place.require(values, "by", "a measure")
-        by = by_place.read_text("a measure")
-        own_columns = [column for measure in own for column in measure.columns]
-        is_measured = any(part == by or by.startswith(part + "_") or f"_{part}_" in by
-                          for part in measures)
-        if not is_measured and by not in own_columns:
-            by_place.fail_expected("a column of this campaign's measures, "
-                                   + ", ".join((*measures, *own_columns)))
-        return Keep("worst", count, by)
+        return Keep("worst", count, by_place.read_text("a measure"), by_place.line)
 
     def _read_certify(self, runs: int) -> Certify:
         if "certify" not in self.values:

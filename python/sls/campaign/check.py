@@ -1,6 +1,7 @@
 """Refuses a campaign before it flies if the scenario of one of its runs is impossible: an unknown
 key, a wrong type, a value out of range."""
 
+import difflib
 import re
 from typing import Any, Protocol
 
@@ -30,6 +31,15 @@ def check_campaign(campaign: Campaign, runs: Checker) -> None:
     for run in _list_extreme_runs(campaign):
         if message := _check_run(campaign, runs, make_values(campaign, run, run)[0]):
             _fail(campaign, *(_find_first(campaign, runs, run) or (run, message)))
+
+
+def check_keep(campaign: Campaign, measured: list[str]) -> None:
+    """Raises InputError `FILE:LINE: keep.by: …` unless `keep.by` is one of the columns `measured`."""
+    keep = campaign.keep
+    if keep.kind == "worst" and keep.find_column(measured) is None:
+        nearest = difflib.get_close_matches(keep.by, measured, n=3, cutoff=0.3)
+        fail(campaign.file, keep.line, "keep.by", "expected a measured column"
+             + (f", such as {', '.join(nearest)}" if nearest else "") + f", got {keep.by}")
 
 
 def _find_first(campaign: Campaign, runs: Checker, end: int) -> tuple[int, str] | None:

@@ -10,8 +10,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
+from sls.campaign.arguments import Parser, parse_range, to_count
 from sls.campaign.engines import ENGINES, EngineError, EngineOptions, load_engine
 from sls.campaign.folder import CampaignFolder, opened
 from sls.errors import ConfigError, RunError
@@ -29,11 +30,6 @@ OTHER_COMMANDS = """commands for flown campaigns:
   ./sls campaign compare A B   compare two campaigns run by run"""
 
 
-class Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> NoReturn:
-        raise InputError(f"{self.prog.removeprefix('./sls ')}: {message} (see {self.prog} --help)")
-
-
 class Ended(KeyboardInterrupt):
     """SIGTERM or SIGHUP."""
 
@@ -46,7 +42,6 @@ def say(text: str) -> None:
 
 
 def make_parser() -> argparse.ArgumentParser:
-    from sls.campaign.worker import parse_range
     parser = Parser(prog="./sls campaign", formatter_class=argparse.RawDescriptionHelpFormatter,
                     description="Flies a campaign: many runs of one scenario in which keys vary. Writes\n"
                                 "DIR/runs.csv and DIR/report.html.", epilog=OTHER_COMMANDS)
@@ -74,14 +69,9 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument("--allow-other-machines", action="store_true",
                         help="also fly on machines whose rows may differ in their last bits; "
                              "manifest.json names them")
+    parser.add_argument("--allow-broken-measures", action="store_true",
+                        help="end without an error, also if an own measure raised in every run")
     return parser
-
-
-def to_count(text: str) -> int:
-    """Raises ArgumentTypeError."""
-    if not text.isdecimal() or not 1 <= int(text) <= 10**9:
-        raise argparse.ArgumentTypeError(f"expected a whole number of at least 1, got '{text}'")
-    return int(text)
 
 
 def find_file(name: str) -> Path:
@@ -93,6 +83,7 @@ def find_file(name: str) -> Path:
 def fly(options: argparse.Namespace) -> None:
     """Flies the campaign, collects its table and verifies runs. Raises ConfigError, EngineError."""
     from sls.campaign.campaign_file import load_campaign
+    from sls.campaign.collect import collect, describe_broken_measures
     campaign = load_campaign(find_file(options.file))
     engine = load_engine(options.on)
     if options.resume and options.out is None:
@@ -108,13 +99,15 @@ def fly(options: argparse.Namespace) -> None:
             prepare(folder, campaign, engine, options)
             with report_imported():
                 engine.run(folder, engine_options)
-            folder.collect(options.on)
+            collect(folder, options.on)
         except KeyboardInterrupt:
             say_how_to_resume(folder, options)
             raise
         say_result(folder)
         if options.verify and not verify(folder, options):
             raise EngineError(f"{out}: --verify: expected equal certificates, got others")
+        if (broken := describe_broken_measures(folder.manifest)) and not options.allow_broken_measures:
+            raise EngineError(f"{out}: {broken} (--allow-broken-measures ends without an error)")
 
 
 def join_sbatch(arguments: Sequence[str]) -> list[str]:
@@ -142,15 +135,17 @@ def report_imported() -> Iterator[None]:
 def prepare(folder: CampaignFolder, campaign: Any, engine: Any,
             options: argparse.Namespace) -> None:
     """Checks the campaign, then begins or resumes its folder."""
-    from sls.campaign.check import check_campaign
-    from sls.campaign.runs import list_columns, list_yaml_values, make_runs
+    from sls.campaign.check import check_campaign, check_keep
+    from sls.campaign.runs import list_columns, list_own_columns, list_yaml_values, make_runs
     from sls.campaign.own_measures import load_own_measures
     from sls.campaign.sampling import is_certified, make_values
+    from sls.campaign.used_files import hash_used_files
     folder.refuse_foreign(campaign, options.resume)
     is_begun = (folder.folder / "plan.json").exists()
     first, last = find_range(folder, campaign, options, is_begun)
     runs = make_runs(campaign)
     check_campaign(campaign, runs)
+    check_keep(campaign, [*runs.columns, *list_own_columns(campaign)])
     own = load_own_measures(campaign)
     chunk_runs = 0
     if not is_begun:
@@ -158,11 +153,12 @@ def prepare(folder: CampaignFolder, campaign: Any, engine: Any,
         values = list_yaml_values(campaign, make_values(campaign, first, first)[0])
         runs.fly(values, is_certified(campaign, first))
         if own:
-            own.measure(runs.scenario_text(values))
+            own(runs.scenario_text(values))
         chunk_runs = options.chunk_runs or choose_chunk_runs(
             getattr(engine, "CHUNK_S", 1.0), time.monotonic() - begin, last - first + 1)
     folder.create(campaign, options.on, chunk_runs, first, last, options.resume,
-                  list_columns(campaign, runs), options.allow_other_machines)
+                  list_columns(campaign, runs), {} if is_begun else hash_used_files(campaign),
+                  options.allow_other_machines)
 
 
 def find_range(folder: CampaignFolder, campaign: Any, options: argparse.Namespace,
@@ -272,8 +268,9 @@ def list_some(items: list[str], most: int = 10) -> str:
 
 
 def make_report(arguments: Sequence[str]) -> None:
+    from sls.campaign.collect import write_report
     folder = CampaignFolder(*parse_folders("report", arguments, "DIR"))
-    folder.write_report()
+    write_report(folder.folder)
     say(f"report: {folder.folder / 'report.html'}")
 
 

@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 
 from sls.campaign.drawing import format_number
-from sls.campaign.pairs import (count_changes, describe_changes, find_finished, make_measure_rows,
-                                make_outcome_rows)
+from sls.campaign.pairs import Pairs, describe_changes, make_measure_rows, make_outcome_rows
 from sls.campaign.report import flatten, read_manifest
-from sls.campaign.run_table import OUTCOMES, RunTable, find_rows, read_runs
+from sls.campaign.run_table import OUTCOMES, RunTable, find_rows, read_runs, to_word
 from sls.input_error import InputError
 
 MOST_FACTS = 20
@@ -39,9 +38,10 @@ def compare(a: Path, b: Path) -> str:
     places = match_runs(*tables)
     check_values(*tables, *places)
     lines += describe_runs(*tables, len(places[0]))
-    lines += compare_outcomes(*tables, *places)
-    lines += compare_measures(*tables, *places)
-    lines += list_most_different(*tables, *places)
+    pairs = Pairs(*tables, *places, "A", "B")
+    lines += compare_outcomes(pairs)
+    lines += compare_measures(pairs)
+    lines += list_most_different(pairs)
     return "\n".join([*lines, ""])
 
 
@@ -87,7 +87,7 @@ def check_values(a: RunTable, b: RunTable, in_a: np.ndarray, in_b: np.ndarray) -
             # One column has text, the other only numbers: compare the numbers as text, in the form that
             # `read_runs` gives numbers in a column with text.
             values = [value if value.dtype == object
-                      else np.array([repr(float(number)) for number in value], dtype=object)
+                      else np.array([to_word(float(number)) for number in value], dtype=object)
                       for value in values]
         different = np.flatnonzero(values[0] != values[1])
         if len(different) and different[0] < first:
@@ -121,23 +121,22 @@ def describe_runs(a: RunTable, b: RunTable, common: int) -> list[str]:
     return lines
 
 
-def compare_outcomes(a: RunTable, b: RunTable, in_a: np.ndarray, in_b: np.ndarray) -> list[str]:
-    counts = count_changes(a, b, in_a, in_b)
-    return ["", "outcomes", *make_text_table(make_outcome_rows(counts, "A", "B")),
-            f"  {describe_changes(counts, 'A', 'B')}"]
+def compare_outcomes(pairs: Pairs) -> list[str]:
+    return ["", "outcomes", *make_text_table(make_outcome_rows(pairs)), f"  {describe_changes(pairs)}"]
 
 
-def compare_measures(a: RunTable, b: RunTable, in_a: np.ndarray, in_b: np.ndarray) -> list[str]:
-    rows = make_measure_rows(a, b, in_a, in_b, "A", "B")
+def compare_measures(pairs: Pairs) -> list[str]:
+    rows = make_measure_rows(pairs)
     if len(rows) == 1:
         return []
-    count = int(find_finished(a, b, in_a, in_b).sum())
+    count = int(pairs.find_finished().sum())
     return ["", f"measures, of the {count} runs that finish in both", *make_text_table(rows)]
 
 
-def list_most_different(a: RunTable, b: RunTable, in_a: np.ndarray, in_b: np.ndarray) -> list[str]:
+def list_most_different(pairs: Pairs) -> list[str]:
     """First the runs with another outcome, then the runs that differ most in one measure of both: the
     load error's rms or maximum, or else the first common measure."""
+    a, b, in_a, in_b = pairs.a, pairs.b, pairs.in_a, pairs.in_b
     changed = np.flatnonzero(a.outcome[in_a] != b.outcome[in_b])[:MOST_RUNS]
     lines = []
     if len(changed):
@@ -152,7 +151,7 @@ def list_most_different(a: RunTable, b: RunTable, in_a: np.ndarray, in_b: np.nda
     if name is not None:
         with np.errstate(invalid="ignore"):
             size = np.abs(b.numbers[name][in_b] - a.numbers[name][in_a])
-        size[~find_finished(a, b, in_a, in_b) | ~np.isfinite(size)] = 0.0
+        size[~pairs.find_finished() | ~np.isfinite(size)] = 0.0
         order = np.argsort(-size, kind="stable")[:MOST_RUNS]
         rows = [[str(a.run[in_a[pair]]), format_number(float(a.numbers[name][in_a[pair]])),
                  format_number(float(b.numbers[name][in_b[pair]])), describe_values(a, in_a[pair])]

@@ -14,7 +14,16 @@ FUNCTIONS: dict[str, Callable[..., float]] = {
     "abs": abs, "cos": portable_math.cos, "exp": portable_math.exp, "log": portable_math.log,
     "max": max, "min": min, "sin": portable_math.sin, "sqrt": math.sqrt, "tan": portable_math.tan}
 FEWEST_ARGUMENTS = {"max": 2, "min": 2}  # all others take exactly one
-SCOPE = {"__builtins__": {}, "power": portable_math.power, **FUNCTIONS}
+
+
+def check_finite(value: float) -> float:
+    """Raises FloatingPointError; `max`, `min` or a division would hide what is not finite."""
+    if not math.isfinite(value):
+        raise FloatingPointError
+    return value
+
+
+SCOPE = {"__builtins__": {}, "power": portable_math.power, "check_finite": check_finite, **FUNCTIONS}
 MOST_LETTERS = 1000
 TOKEN = re.compile(r"\s+|(?P<name>[A-Za-z_][A-Za-z0-9_]*(?:\.[A-Za-z0-9_]+)*)"
                    r"|(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)"
@@ -38,7 +47,7 @@ class Expression:
         try:
             tree = ast.parse(self._to_python(), mode="eval")
             self._check(tree.body)
-            self._code = compile(ast.fix_missing_locations(_CallPower().visit(tree)),
+            self._code = compile(ast.fix_missing_locations(_CallOperators().visit(tree)),
                                  "expression", "eval")
         except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
             if isinstance(error, ExpressionError):
@@ -116,24 +125,23 @@ class Expression:
             floats.append(float(value))
         names = {f"name_{i}": value for i, value in enumerate(floats)}
         try:
-            result = eval(self._code, SCOPE, names)  # arithmetic only: see _check
+            return check_finite(eval(self._code, SCOPE, names))  # arithmetic only: see _check
         except ZeroDivisionError:
             raise ExpressionError(f"division by zero in '{self.text}'") from None
+        except FloatingPointError:
+            raise ExpressionError(f"'{self.text}' is not a finite number") from None
         except OverflowError:
             raise ExpressionError(f"'{self.text}' is too large") from None
         except ValueError:  # for example the root of a negative number
             raise ExpressionError(f"'{self.text}' is not defined") from None
-        if not math.isfinite(result):
-            raise ExpressionError(f"'{self.text}' is not a finite number")
-        return result
 
 
-class _CallPower(ast.NodeTransformer):
-    """Replaces `a ** b` by `power(a, b)`: Python's operator calls the C library."""
+class _CallOperators(ast.NodeTransformer):
+    """Replaces `a ** b` by `power(a, b)`, because Python's operator calls the C library, and checks the value
+    of every other operator."""
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
         self.generic_visit(node)
-        if not isinstance(node.op, ast.Pow):
-            return node
-        return ast.Call(func=ast.Name(id="power", ctx=ast.Load()), args=[node.left, node.right],
-                        keywords=[])
+        name, values = (("power", [node.left, node.right]) if isinstance(node.op, ast.Pow)
+                        else ("check_finite", [node]))
+        return ast.Call(func=ast.Name(id=name, ctx=ast.Load()), args=values, keywords=[])

@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from scipy import linalg, signal
 
-from sls.campaign.pairs import count_changes, describe_changes, find_pairs
+from sls.campaign.pairs import Pairs, describe_changes, find_pairs
 from sls.campaign.run_table import RunTable, read_runs
 from sls.campaign.statistics import calc_wilson_interval
 from sls.delay_formula import HorizontalChain, calc_stability_limit
@@ -80,12 +80,6 @@ def calc_vertical_limit(vertical: Sequence[float]) -> float:
     position, velocity = vertical
     w = np.sqrt((velocity**2 + np.sqrt(velocity**4 + 4.0 * position**2)) / 2.0)
     return float(np.arctan2(velocity * w, position) / w) - PERIOD_S / 2
-
-
-def calc_sag(load_mass_kg: float, believed_kg: float, position_gain: float) -> float:
-    """Height error at rest without integral, m, positive down."""
-    return (GRAVITY_M_S2 * (load_mass_kg - believed_kg)
-            / ((QUAD_MASS_KG + believed_kg) * position_gain))
 
 
 def calc_pulse_peak(gains: Sequence[float], duration_s: float = 1.0) -> float:
@@ -400,18 +394,20 @@ def study_law_comparison(table: RunTable) -> tuple[Figure, dict[str, str]]:
     found = find_pairs(table, "controller")
     if found is None:
         raise InputError(f"{table.file}: expected pairs of both laws, got none")
-    _, first, second = found
-    in_qsf, in_pid = (first, second) if laws[0] == 0 else (second, first)
-    counts = count_changes(table, table, in_qsf, in_pid)
+    in_qsf, in_pid = (found.in_a, found.in_b) if laws[0] == 0 else (found.in_b, found.in_a)
+    pairs = Pairs(table, table, in_qsf, in_pid, "qsf", "pid")
     shares = [calc_share(table, (places == law) & everything)[0] for law in laws]
     late_pid = delay[(places == laws[1]) & (table.outcome == 0)]
-    calm = (places == laws[0]) & (table.numbers["_gust_n"] < 0.8) & (table.outcome != 0)
+    calm = (places == laws[0]) & (table.numbers["_gust_n"] < 0.8)
+    not_borne = delay[calm & (table.outcome != 0)].min()
+    borne = delay[calm & (delay < not_borne)].max()
     both = (table.outcome[in_qsf] == 0) & (table.outcome[in_pid] == 0)
     errors = table.numbers["load_error_max_m"]
     return figure, {
         "lc_pairs": str(len(in_qsf)), "lc_qsf": f"{100 * shares[0]:.1f}",
-        "lc_pid": f"{100 * shares[1]:.1f}", "lc_changes": describe_changes(counts, "qsf", "pid"),
-        "lc_pid_delay": f"{late_pid.max():.3f}", "lc_qsf_delay": f"{delay[calm].min():.3f}",
+        "lc_pid": f"{100 * shares[1]:.1f}", "lc_changes": describe_changes(pairs),
+        "lc_pid_delay": f"{late_pid.max():.3f}", "lc_qsf_delay": f"{borne:.3f}",
+        "lc_qsf_lost": f"{not_borne:.3f}",
         "lc_both": str(int(both.sum())),
         "lc_error_qsf": f"{np.median(errors[in_qsf][both]):.3f}",
         "lc_error_pid": f"{np.median(errors[in_pid][both]):.3f}",

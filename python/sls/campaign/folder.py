@@ -8,10 +8,10 @@ import io
 import json
 import os
 import re
-import time
+import shutil
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from typing import Any
 from sls.campaign.campaign import Campaign
 from sls.campaign.engines import EngineError
 from sls.campaign.machine import describe_machine, find_difference, host_name
+from sls.campaign.used_files import refuse_changed_files
 from sls.campaign.whole_files import WholeFile, is_left_over, write_whole
 from sls.input_error import InputError
 
@@ -41,6 +42,7 @@ class Plan:
     columns: list[str]   # of runs.csv
     machine: dict[str, str]
     allow_other_machines: bool
+    used_files: dict[str, str] = field(default_factory=dict)  # used_files.py
 
 
 class DamagedChunk(Exception):
@@ -89,6 +91,7 @@ class CampaignFolder:
             is_same = False
         campaign = load_campaign(self.folder / "campaign.yaml", base=base if is_same else copy,
                                  folder=Path(self.plan.file).parent)
+        refuse_changed_files(self.plan.used_files, Path(self.plan.file).parent)
         if campaign.sha256 != self.plan.sha256:
             raise InputError(f"{self.folder}: expected the campaign that it was begun with (sha256 "
                              f"{self.plan.sha256}), got sha256 {campaign.sha256}: campaign.yaml, "
@@ -96,7 +99,8 @@ class CampaignFolder:
         return campaign
 
     def create(self, campaign: Campaign, engine: str, chunk_runs: int, first: int, last: int,
-               resume: bool, columns: Sequence[str], allow_other_machines: bool = False) -> None:
+               resume: bool, columns: Sequence[str], used_files: dict[str, str],
+               allow_other_machines: bool = False) -> None:
         """Begins the folder. With `resume` it checks that the folder belongs to this campaign, and keeps
         its chunks. Holds the lock until `close`. Raises InputError if the folder is not one of this
         campaign, is in use, or was begun on a machine of another kind."""
@@ -115,7 +119,7 @@ class CampaignFolder:
             base=str(campaign.base.resolve()), engine=engine, first=first, last=last,
             campaign_runs=campaign.runs,
             chunk_runs=chunk_runs, columns=list(columns), machine=describe_machine(),
-            allow_other_machines=allow_other_machines))
+            allow_other_machines=allow_other_machines, used_files=used_files))
 
     def take_up(self, campaign: Campaign, engine: str, first: int, last: int, columns: list[str],
                 allow_other_machines: bool) -> None:
@@ -131,6 +135,7 @@ class CampaignFolder:
                        base=str(campaign.base.resolve()),
                        allow_other_machines=plan.allow_other_machines or allow_other_machines)
         self.refuse_other_machine(plan)
+        refuse_changed_files(plan.used_files, Path(plan.file).parent)
         self.write_plan(plan)
         self.remove_leftovers()
 
@@ -185,11 +190,11 @@ class CampaignFolder:
     def remove_leftovers(self) -> None:
         """Removes temporary files of killed processes: those of a process of this machine that has ended,
         and those of other machines that were not written for a day."""
-        for folder in (self.folder, self.folder / "chunks"):
+        for folder in (self.folder, self.folder / "chunks", self.folder / "kept"):
             for file in folder.glob(".*.tmp"):
                 with suppress(OSError):  # it is gone already, or the disk fails: the next write says so
                     if is_left_over(file):
-                        file.unlink()
+                        shutil.rmtree(file) if file.is_dir() else file.unlink()
 
     # --- the lock ---------------------------------------------------------------------------------
 
@@ -338,50 +343,6 @@ class CampaignFolder:
         cells = self.read_chunk(number)[index - self.find_chunk(number)[0]]
         return dict(zip(self.plan.columns, cells))
 
-    def collect(self, engine: str) -> Path:
-        """Writes runs.csv and manifest.json from the chunks, the recordings that the campaign keeps, and
-        report.html. Only one chunk is in memory at a time while it writes runs.csv. Raises EngineError if
-        a chunk is missing or a file cannot be written."""
-        from sls.campaign.kept import keep_recordings
-        self.take_lock()
-        counts, machines, flying_s = {}, {}, 0.0
-        table, sha256 = self.folder / "runs.csv", hashlib.sha256(self.header)
-        outcome = self.plan.columns.index("outcome")
-        with WholeFile(table) as writing:
-            writing.write(self.header)
-            for number, first, last in self.chunks:
-                try:
-                    chunk = self.read_whole_chunk(number)
-                except DamagedChunk as defect:
-                    raise EngineError(f"{self.chunk_file(number)}: expected runs {first}-{last}, "
-                                      f"got: {defect}; --resume flies them again") from None
-                sha256.update(chunk.rows)
-                writing.write(chunk.rows)
-                for cells in csv.reader(io.StringIO(chunk.rows.decode())):
-                    counts[cells[outcome]] = counts.get(cells[outcome], 0) + 1
-                flying_s += chunk.flown["wall_s"]
-                machine = machines.setdefault(chunk.flown["host"], {**chunk.flown["machine"],
-                                                                    "chunks": 0})
-                machine["chunks"] += 1
-            writing.finish()
-        plan = self.plan
-        self.write_manifest({
-            "campaign": plan.campaign, "campaign_sha256": plan.sha256, "file": plan.file,
-            "engine": engine, "runs": plan.last - plan.first + 1, "first": plan.first,
-            "last": plan.last, "campaign_runs": plan.campaign_runs,
-            "complete": plan.last - plan.first + 1 == plan.campaign_runs,
-            "outcomes": dict(sorted(counts.items())), "runs_csv_sha256": sha256.hexdigest(),
-            "machines": dict(sorted(machines.items())),
-            "other_machines": any(find_difference(plan.machine, {
-                name: value for name, value in machine.items() if name != "chunks"})
-                for machine in machines.values()),
-            "versions": plan.machine, "flying_s": round(flying_s, 3),
-            "collected_utc": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
-            "kept": keep_recordings(self),
-        })
-        self.write_report()
-        return table
-
     @property
     def manifest(self) -> dict[str, Any]:
         """The manifest in the folder. Raises InputError if there is none."""
@@ -395,10 +356,6 @@ class CampaignFolder:
 
     def write_manifest(self, manifest: dict[str, Any]) -> None:
         write_whole(self.folder / "manifest.json", (json.dumps(manifest, indent=1) + "\n").encode())
-
-    def write_report(self) -> None:
-        from sls.campaign.report import make_campaign_report
-        write_whole(self.folder / "report.html", make_campaign_report(self.folder).encode())
 
 
 def to_line(cells: Sequence[str]) -> bytes:

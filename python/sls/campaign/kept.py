@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from sls.campaign.campaign import Campaign
 from sls.campaign.engines import EngineError
+from sls.campaign.folder import CampaignFolder
 from sls.campaign.runs import fly_whole, make_runs
 from sls.campaign.sampling import make_values
 from sls.campaign.whole_files import name_temporary, sync_folder
@@ -24,10 +25,9 @@ if TYPE_CHECKING:
     from _sls_core import Runs
 
     from sls import Flight
-    from sls.campaign.folder import CampaignFolder
 
 
-def kept_folder(folder: "CampaignFolder", index: int) -> Path:
+def kept_folder(folder: CampaignFolder, index: int) -> Path:
     return folder.folder / "kept" / f"run-{index:06d}"
 
 
@@ -37,24 +37,23 @@ def is_kept(campaign: Campaign, row: dict[str, str]) -> bool:
     return kind == "all" or kind == "failed" and row["outcome"] != "finished"
 
 
-def keep_while_flying(folder: "CampaignFolder", campaign: Campaign, runs: "Runs",
+def keep_while_flying(folder: CampaignFolder, campaign: Campaign, runs: "Runs",
                       cells: Sequence[str]) -> None:
     """Writes the recording of a run just flown, if the campaign keeps it. Raises EngineError if it cannot
     be written."""
-    if campaign.keep.kind in ("none", "worst"):
-        return
     row = dict(zip(folder.plan.columns, cells))
     if is_kept(campaign, row):
         keep_run(folder, campaign, runs, row)
 
 
-def keep_run(folder: "CampaignFolder", campaign: Campaign, runs: "Runs",
+def keep_run(folder: CampaignFolder, campaign: Campaign, runs: "Runs",
              row: dict[str, str]) -> None:
     """Writes one recording whole, unless the folder has it already. Raises EngineError if it cannot be
-    written, or if its certificate differs from the row's."""
+    written, or if its certificate differs from the row's. It may differ in a campaign that flies on machines
+    of several kinds, because the run was then flown elsewhere."""
     index = int(row["run"])
     target = kept_folder(folder, index)
-    if is_whole(target, row["certificate"]):
+    if is_whole(folder, row):
         return
     temporary = name_temporary(target)
     try:
@@ -62,14 +61,14 @@ def keep_run(folder: "CampaignFolder", campaign: Campaign, runs: "Runs",
         shutil.rmtree(temporary, ignore_errors=True)
         save(fly_whole(campaign, runs, make_values(campaign, index, index)[0]), temporary)
         certificate = json.loads((temporary / "manifest.json").read_text())["certificate"]
-        if row["certificate"] not in ("", certificate):
+        if row["certificate"] not in ("", certificate) and not folder.plan.allow_other_machines:
             raise EngineError(f"{target}: expected certificate {row['certificate']} of runs.csv, "
                               f"got {certificate}")
         shutil.rmtree(target, ignore_errors=True)  # a damaged recording, if there is one
         os.rename(temporary, target)
         sync_folder(target.parent)
     except OSError as error:
-        if not is_whole(target, row["certificate"]):  # a whole one was written by another worker
+        if not is_whole(folder, row):  # a whole one was written by another worker
             raise EngineError(f"{target}: expected to write a recording, got: "
                               f"{error.strerror or error}") from None
     finally:
@@ -86,21 +85,25 @@ def save(flight: "Flight", recording: Path) -> None:
             raise
 
 
-def is_whole(recording: Path, certificate: str) -> bool:
+def find_certificate(recording: Path) -> str | None:
+    """The certificate of a recording; None if it has none or cannot be read."""
     try:
-        manifest = json.loads((recording / "manifest.json").read_text())
+        return json.loads((recording / "manifest.json").read_text()).get("certificate")
     except (OSError, ValueError):
-        return False
-    return certificate in ("", manifest.get("certificate"))
+        return None
 
 
-def list_worst(folder: "CampaignFolder", campaign: Campaign) -> list[dict[str, str]]:
+def is_whole(folder: CampaignFolder, row: dict[str, str]) -> bool:
+    """True if the recording of this row is in the folder."""
+    certificate = find_certificate(kept_folder(folder, int(row["run"])))
+    return certificate is not None and (row["certificate"] in ("", certificate)
+                                        or folder.plan.allow_other_machines)
+
+
+def list_worst(folder: CampaignFolder, campaign: Campaign) -> list[dict[str, str]]:
     """The rows with the largest values in the column, the largest first. Of equal values the lower index
     comes first. Rows without a value are left out."""
     column = campaign.keep.find_column(folder.plan.columns)
-    if column is None:
-        raise EngineError(f"{campaign.file}: keep.by: expected a column of runs.csv, got "
-                          f"'{campaign.keep.by}'")
 
     def rank(row: dict[str, str]) -> tuple[float, int]:
         return float(row[column]), -int(row["run"])
@@ -115,26 +118,30 @@ def is_number(text: str) -> bool:
         return False
 
 
-def list_kept(folder: "CampaignFolder", campaign: Campaign) -> Iterator[dict[str, str]]:
+def list_kept(folder: CampaignFolder, campaign: Campaign) -> Iterator[dict[str, str]]:
     if campaign.keep.kind == "worst":
         yield from list_worst(folder, campaign)
     else:
         yield from (row for row in folder.read_rows() if is_kept(campaign, row))
 
 
-def keep_recordings(folder: "CampaignFolder") -> dict[str, Any]:
+def keep_recordings(folder: CampaignFolder) -> dict[str, Any]:
     """Writes every recording that the campaign keeps and that is missing. Returns the manifest's entries
-    for them: kind and number, and for "worst" the runs."""
+    for them: kind and number, for "worst" the runs, and the runs whose recording has another certificate than
+    the table, if there are any."""
     campaign = folder.campaign
     kept: dict[str, Any] = {"kind": campaign.keep.kind, "count": 0}
     if campaign.keep.kind == "none":
         return kept
     runs = None
     for row in list_kept(folder, campaign):
-        if not is_whole(kept_folder(folder, int(row["run"])), row["certificate"]):
+        run = int(row["run"])
+        if not is_whole(folder, row):
             runs = runs or make_runs(campaign)
             keep_run(folder, campaign, runs, row)
         kept["count"] += 1
         if campaign.keep.kind == "worst":
-            kept.setdefault("runs", []).append(int(row["run"]))
+            kept.setdefault("runs", []).append(run)
+        if row["certificate"] not in ("", find_certificate(kept_folder(folder, run))):
+            kept.setdefault("other_certificates", []).append(run)
     return kept

@@ -1,12 +1,15 @@
 """Measures that the user defines: functions of a Python file, called with the flight of each run."""
 
+import hashlib
 import importlib.util
+import sys
 import traceback
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from sls.campaign.campaign import Campaign, OwnMeasure
-from sls.campaign.runs import fly_text, to_number, to_one_line
+from sls.campaign.runs import OwnCells, fly_text, to_number, to_one_line
 from sls.input_error import InputError
 
 LONGEST_ERROR = 300
@@ -15,25 +18,28 @@ LONGEST_ERROR = 300
 def load_function(own: OwnMeasure) -> Callable[..., Any]:
     """Loads the function of a measure. Raises InputError if its file cannot be run or has no such function."""
     place = f"{own.file}: {own.function}"
-    spec = importlib.util.spec_from_file_location(f"own_measure_{own.file.stem}", own.file)
+    name = f"own_measure_{own.file.stem}_{hashlib.sha256(bytes(own.file.resolve())).hexdigest()[:8]}"
+    spec = importlib.util.spec_from_file_location(name, own.file)
     if spec is None or spec.loader is None:
         raise InputError(f"{place}: expected a Python file")
-    module = importlib.util.module_from_spec(spec)
+    # As `import` does: dataclasses look for the module by its name to read annotations that are texts.
+    module = sys.modules[name] = importlib.util.module_from_spec(spec)
     try:
         spec.loader.exec_module(module)
     except Exception as error:
         raise InputError(f"{place}: expected a Python file that can be run, got: "
-                         f"{describe(error)}") from None
+                         f"{describe(error, own.file)}") from None
     function = getattr(module, own.function, None)
     if not callable(function):
         raise InputError(f"{place}: expected a function of this name, got none")
     return function
 
 
-def describe(error: Exception) -> str:
-    """Type and text of the error, and the line of the user's file, in one line."""
-    where = traceback.extract_tb(error.__traceback__)
-    line = f" (line {where[-1].lineno})" if where else ""
+def describe(error: Exception, file: Path) -> str:
+    """Type and text of the error, and the last line of the user's file on the way to it, in one line."""
+    lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__)
+             if frame.filename == str(file)]
+    line = f" (line {lines[-1]})" if lines else ""
     return to_one_line(f"{type(error).__name__}: {error}"[:LONGEST_ERROR] + line)
 
 
@@ -48,26 +54,21 @@ def to_columns(own: OwnMeasure, result: Any) -> list[float]:
     return [float(result)]
 
 
-class OwnMeasures:
-    """All own measures of a campaign, loaded once in each process. Raises InputError."""
+def load_own_measures(campaign: Campaign) -> OwnCells | None:
+    """The own measures of a campaign, loaded once in each process; None if it has none. Raises InputError."""
+    measures = [(own, load_function(own)) for own in campaign.own_measures]
 
-    def __init__(self, campaign: Campaign):
-        self.campaign = campaign
-        self.measures = [(own, load_function(own)) for own in campaign.own_measures]
-
-    def measure(self, scenario_text: str) -> list[str]:
+    def measure(scenario_text: str) -> list[str]:
         """Flies the scenario and calls each function with the flight. Returns the cells of their columns
         and a last cell with the errors. Columns of a function that raises are empty."""
-        flight = fly_text(scenario_text, self.campaign)
+        flight = fly_text(scenario_text, campaign)
         cells, errors = list[str](), list[str]()
-        for own, function in self.measures:
+        for own, function in measures:
             try:
                 cells += map(to_number, to_columns(own, function(flight)))
             except Exception as error:
                 cells += [""] * len(own.columns)
-                errors.append(f"{own.function}: {describe(error)}")
+                errors.append(f"{own.function}: {describe(error, own.file)}")
         return [*cells, "; ".join(errors)]
 
-
-def load_own_measures(campaign: Campaign) -> OwnMeasures | None:
-    return OwnMeasures(campaign) if campaign.own_measures else None
+    return measure if measures else None

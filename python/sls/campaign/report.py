@@ -6,8 +6,9 @@ because pictures show bins or samples."""
 
 import json
 import math
+import shlex
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -17,10 +18,10 @@ import yaml
 
 from sls.campaign import drawing
 from sls.campaign.drawing import OUTCOME_COLOURS, format_number, format_share
-from sls.campaign.pairs import (count_changes, describe_changes, describe_interval, find_finished,
-                                find_pairs, make_measure_rows, make_outcome_rows)
+from sls.campaign.pairs import (describe_changes, describe_interval, find_pairs, make_measure_rows,
+                                make_outcome_rows)
 from sls.campaign.run_table import OUTCOMES, RunTable, find_rows, read_runs
-from sls.campaign.statistics import calc_quantiles, calc_wilson_interval
+from sls.campaign.statistics import calc_quantiles, calc_share_interval
 from sls.input_error import InputError
 from sls.report import STYLE_SHEET, escape, make_section
 
@@ -59,7 +60,7 @@ def make_campaign_report(folder: Path) -> str:
     campaign_text = read_text(folder / "campaign.yaml")
     manifest = read_manifest(folder / "manifest.json")
     table = read_runs(folder / "runs.csv")
-    name = describe_name(folder, campaign_text, manifest)
+    name = manifest["campaign"]
     sections = [make_head(name, table)]
     if len(table):
         sections += [
@@ -69,7 +70,7 @@ def make_campaign_report(folder: Path) -> str:
             *(make_paired_section(table, key) for key in table.keys),
             make_section("Measures", make_measures(table)),
             make_section("All together", make_parallel(table)),
-            make_section("Worst runs", make_worst(table, find_file(manifest))),
+            make_section("Worst runs", make_worst(table, manifest["file"])),
         ]
     sections += [make_section("Campaign", make_facts(manifest)),
                  "<section><details><summary>Campaign file</summary>"
@@ -97,30 +98,9 @@ def read_manifest(file: Path) -> dict[str, Any]:
         manifest = json.loads(read_text(file))
     except ValueError as error:
         raise InputError(f"{file}: expected JSON, got: {error}") from None
-    if not isinstance(manifest, dict):
-        raise InputError(f"{file}: expected a map, got {type(manifest).__name__}")
+    if not isinstance(manifest, dict) or not {"campaign", "file"} <= manifest.keys():
+        raise InputError(f"{file}: expected the manifest of a campaign, got {str(manifest):.40}")
     return manifest
-
-
-def describe_name(folder: Path, campaign_text: str, manifest: dict[str, Any]) -> str:
-    """The campaign's name: from the manifest, or from its file, or the name of that file or of the folder."""
-    try:
-        own = yaml.safe_load(campaign_text)
-    except yaml.YAMLError as error:
-        raise InputError(f"{folder / 'campaign.yaml'}: expected YAML, got: "
-                         f"{' '.join(str(error).split())}") from None
-    if isinstance(manifest.get("campaign"), str):
-        return manifest["campaign"]
-    if isinstance(own, dict) and isinstance(own.get("name"), str):
-        return own["name"]
-    file = manifest.get("file")
-    return Path(file).stem if isinstance(file, str) else folder.resolve().name
-
-
-def find_file(manifest: dict[str, Any]) -> str:
-    """The path of the campaign file for commands, from the manifest; "FILE" if it has none."""
-    file = manifest.get("file")
-    return file if isinstance(file, str) else "FILE"
 
 
 # --- classes of a varied key ----------------------------------------------------------------------
@@ -216,7 +196,7 @@ def make_plain_table(header: Sequence[str], rows: Sequence[Sequence[str]], style
 def make_outcomes(table: RunTable) -> str:
     rows = [[escape(outcome), str(table.count(outcome)),
              format_share(table.count(outcome) / len(table)),
-             describe_interval(table.count(outcome), len(table))] for outcome in OUTCOMES]
+             describe_interval(table.is_outcome(outcome), table.draw)] for outcome in OUTCOMES]
     page = make_plain_table(("outcome", "runs", "share", "95 % interval (Wilson)"), rows)
     if table.reasons:
         common = sorted(table.reasons.items(), key=lambda item: (-item[1], item[0]))
@@ -234,11 +214,15 @@ def make_share_picture(table: RunTable, key: str) -> str:
     totals = np.bincount(bins.places, minlength=len(bins.names))
     counts = np.bincount(bins.places[is_lost(table)], minlength=len(bins.names))
     rows = []
-    for name, count, total in zip(bins.names, counts, totals):
+    for place, (name, count, total) in enumerate(zip(bins.names, counts, totals)):
         if total:
-            low, high = calc_wilson_interval(int(count), int(total))
-            rows.append((name, count / total, low, high,
-                         f"{name}: {count} of {total}, {100 * low:.1f} % to {100 * high:.1f} %"))
+            low = high = count / total
+            title = f"{name}: {count} of {total}"
+            if table.draw is not None:
+                here = bins.places == place
+                low, high = calc_share_interval(is_lost(table)[here], table.draw[here])
+                title += f", {100 * low:.1f} % to {100 * high:.1f} %"
+            rows.append((name, count / total, low, high, title))
     return f"<div>{drawing.draw_shares(rows, key)}</div>"
 
 
@@ -250,7 +234,8 @@ def make_key_section(table: RunTable) -> str:
     return make_section(
         "Share lost along each varied key",
         f"<div class=\"pair\">{pictures}</div><p class=\"small\">Over all values of the other "
-        "keys; runs that failed count as lost. Lines: 95 % interval (Wilson).</p>")
+        "keys; runs that failed count as lost."
+        f"{' Lines: 95 % interval (Wilson).' if table.draw is not None else ''}</p>")
 
 
 def make_heat_maps(table: RunTable, x: str, y: str, measure: str | None) -> str:
@@ -306,18 +291,16 @@ def make_paired_section(table: RunTable, key: str) -> str:
     found = find_pairs(table, key)
     if found is None:
         return ""
-    (a, b), in_a, in_b = found
-    a, b = name_word(a), name_word(b)
-    counts = count_changes(table, table, in_a, in_b)
-    outcomes = [[escape(cell) for cell in row] for row in make_outcome_rows(counts, a, b)]
-    measures = [[escape(cell) for cell in row]
-                for row in make_measure_rows(table, table, in_a, in_b, a, b)]
+    a, b = name_word(found.name_a), name_word(found.name_b)
+    pairs = replace(found, name_a=a, name_b=b)
+    outcomes = [[escape(cell) for cell in row] for row in make_outcome_rows(pairs)]
+    measures = [[escape(cell) for cell in row] for row in make_measure_rows(pairs)]
     page = (make_plain_table(outcomes[0], outcomes[1:])
-            + f"<p class=\"small\">{len(in_a)} pairs of runs that differ in {escape(key)} alone. "
-            f"{escape(describe_changes(counts, a, b))}.</p>")
+            + f"<p class=\"small\">{len(pairs.in_a)} pairs of runs that differ in {escape(key)} alone. "
+            f"{escape(describe_changes(pairs))}.</p>")
     if len(measures) > 1:
         page += ("<h3>Measures, of the "
-                 f"{int(find_finished(table, table, in_a, in_b).sum())} pairs that finish with "
+                 f"{int(pairs.find_finished().sum())} pairs that finish with "
                  f"both</h3>{make_plain_table(measures[0], measures[1:])}")
     return make_section(f"{escape(key)}: {escape(a)} against {escape(b)}", page)
 
@@ -406,7 +389,7 @@ def list_worst(table: RunTable) -> list[tuple[str, np.ndarray]]:
 
 
 def make_command(file: str, run: int) -> str:
-    return f"./sls campaign {file} --runs {run}-{run} --out /tmp/run-{run}"
+    return f"./sls campaign {shlex.quote(file)} --runs {run}-{run} --out /tmp/run-{run}"
 
 
 def make_worst(table: RunTable, file: str) -> str:

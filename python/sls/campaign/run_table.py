@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import yaml
 
 from sls.input_error import InputError
 
@@ -32,6 +33,7 @@ class RunTable:
     words: dict[str, tuple[list[str], np.ndarray]]  # other varied keys: values, and index of the value, (n,)
     outcome: np.ndarray  # (n,) index in OUTCOMES
     reasons: Counter  # number of runs by "OUTCOME: REASON", without the numbers in the reason
+    draw: np.ndarray | None  # (n,) index of each run's draw; None if nothing is drawn: no statistics then
 
     def __len__(self) -> int:
         return len(self.run)
@@ -43,9 +45,14 @@ class RunTable:
         return int(np.sum(self.is_outcome(name)))
 
 
+def to_word(number: float) -> str:
+    """A number among texts: the shortest text that reads back as it, a whole number without a point."""
+    return repr(number).removesuffix(".0")
+
+
 class Column:
     """The cells of a varied key: doubles as long as every cell is a number. After the first other cell
-    all are words."""
+    all are words; a number is then the word that `to_word` gives."""
 
     def __init__(self) -> None:
         self.cells = array("d")
@@ -60,7 +67,9 @@ class Column:
             except ValueError:
                 self.texts = {}
                 for value in self.cells:
-                    self.add(repr(value))
+                    self.add(to_word(value))
+        if NUMBER.fullmatch(cell):  # 5 and 5.0 are one value
+            cell = to_word(float(cell))
         self.places.append(self.texts.setdefault(cell, len(self.texts)))
 
 
@@ -121,8 +130,27 @@ def read_runs(file: Path) -> RunTable:
     numbers["steps"] = np.asarray(steps)
     words = {key: (list(column.texts), np.asarray(column.places))
              for key, column in zip(keys, columns) if column.texts is not None}
+    points = count_points(file.with_name("campaign.yaml"))
     return RunTable(file, keys, measures, np.asarray(run), numbers, words, np.asarray(outcome),
-                    reasons)
+                    reasons, np.asarray(run) // points if points else None)
+
+
+def count_points(file: Path) -> int | None:
+    """The runs of each draw of a campaign file: the product of its grids and lists. None if nothing is drawn,
+    or if there is no campaign file. It was checked when the campaign was planned."""
+    try:
+        campaign = yaml.safe_load(file.read_text())
+        points, is_drawn = 1, bool(campaign.get("seeds"))
+        for varied in (campaign.get("vary") or {}).values():
+            if grid := varied.get("grid"):
+                points *= grid["values"] if isinstance(grid, dict) else grid[2]
+            elif items := varied.get("list"):
+                points *= len(items)
+            elif "derived" not in varied:
+                is_drawn = True
+    except (OSError, ValueError, AttributeError, LookupError, TypeError, yaml.YAMLError):
+        return None
+    return points if is_drawn else None
 
 
 def leave_out_numbers(reason: str) -> str:

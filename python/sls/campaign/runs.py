@@ -3,7 +3,6 @@
 import math
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from sls.campaign.campaign import Campaign
@@ -14,15 +13,10 @@ from sls.errors import ConfigError
 if TYPE_CHECKING:
     from _sls_core import Runs
     from sls import Flight
-    from sls.campaign.own_measures import OwnMeasures
 
 BLOCK = 1000  # number of runs whose values are in memory at once
-
-
-@dataclass(frozen=True)
-class Row:
-    index: int
-    cells: tuple[str, ...]  # one for each of `list_columns`
+OwnCells = Callable[[str], list[str]]  # from a scenario's text to the cells of all own measures
+Announce = Callable[[int], None]
 
 
 class RefusedRun(Exception):
@@ -38,14 +32,14 @@ def make_runs(campaign: Campaign) -> "Runs":
 
 
 def list_own_columns(campaign: Campaign) -> list[str]:
-    names = [column for own in campaign.own_measures for column in own.columns]
-    return [*names, "own_error"] if names else []
+    return [column for own in campaign.own_measures for column in own.columns]
 
 
 def list_columns(campaign: Campaign, runs: "Runs") -> list[str]:
     """The columns of runs.csv."""
-    return ["run", *campaign.paths, "outcome", "reason", *runs.columns,
-            *list_own_columns(campaign), "steps", "certificate"]
+    own = list_own_columns(campaign)
+    return ["run", *campaign.paths, "outcome", "reason", *runs.columns, *own,
+            *(["own_error"] if own else []), "steps", "certificate"]
 
 
 def to_cell(value: Any) -> str:
@@ -70,17 +64,17 @@ def list_yaml_values(campaign: Campaign, values: list[Any]) -> list[str]:
 
 
 def fly_run(campaign: Campaign, runs: "Runs", index: int, values: list[Any],
-            own: "OwnMeasures | None" = None) -> Row:
-    """Flies one run. Raises RefusedRun if its scenario is refused."""
+            own: OwnCells | None = None) -> list[str]:
+    """Flies one run. Returns the cells of its row. Raises RefusedRun if its scenario is refused."""
     texts = list_yaml_values(campaign, values)
     try:
         outcome, reason, measures, certificate, steps = runs.fly(
             texts, is_certified(campaign, index))
-        own_cells = own.measure(runs.scenario_text(texts)) if own else []
+        own_cells = own(runs.scenario_text(texts)) if own else []
     except ConfigError as error:
         raise RefusedRun(f"run {index}: {error}") from None
-    return Row(index, (str(index), *map(to_cell, values), outcome, to_one_line(reason),
-                       *map(to_number, measures), *own_cells, str(steps), certificate))
+    return [str(index), *map(to_cell, values), outcome, to_one_line(reason), *map(to_number, measures),
+            *own_cells, str(steps), certificate]
 
 
 def fly_whole(campaign: Campaign, runs: "Runs", values: list[Any]) -> "Flight":
@@ -101,14 +95,11 @@ def list_values(campaign: Campaign, first: int, last: int) -> Iterator[tuple[int
         yield from enumerate(block, begin)
 
 
-Announce = Callable[[int], None]
-
-
 def fly_range(campaign: Campaign, runs: "Runs", first: int, last: int,
-              own: "OwnMeasures | None" = None,
+              own: OwnCells | None = None,
               announce: Announce | None = None) -> Iterator[Sequence[str]]:
     """The cells of each run's row. `announce` is called with each index before the run is flown."""
     for index, values in list_values(campaign, first, last):
         if announce:
             announce(index)
-        yield fly_run(campaign, runs, index, values, own).cells
+        yield fly_run(campaign, runs, index, values, own)

@@ -1,34 +1,18 @@
-"""The statistics of a campaign: shares, distributions and paired differences.
+"""The statistics of a campaign: shares, distributions and paired differences. README.md, "Statistics".
 
-Intervals come from formulas, not from random numbers: the same runs give the same page. Φ is the
-standard normal distribution, z = Φ⁻¹((1 + level)/2), B(n) the number of heads of n fair coins:
-
-    (1)  Wilson score interval of a share p = k/n:
-         (p + z²/2n ± z √(p (1 − p)/n + z²/4n²)) / (1 + z²/n)
-    (2)  empirical distribution: E(x) = number of values ≤ x, divided by their number
-    (3)  quantile of share p: the sorted values x₀ … x₍ₙ₋₁₎, linear between them, at rank p (n − 1)
-    (4)  median of paired differences, interval without assumption on their distribution: from
-         the k-th smallest to the k-th largest, k the largest number with
-         P(B(n) < k) ≤ (1 − level)/2
-    (5)  sign test: of n differences other than 0, the smaller of both signs occurs k times;
-         p = min(1, 2 P(B(n) ≤ k))
-    (6)  McNemar's exact test of changed outcomes: (5) with the runs that changed to one outcome and
-         those that changed to the other
-
-Sources: Wilson (1927), J. Am. Stat. Assoc. 22, 209; Hyndman and Fan (1996), Am. Stat. 50, 361, type
-7, for (3); Hahn and Meeker, Statistical Intervals, section 5.2, for (4); McNemar (1947),
-Psychometrika 12, 153. """
+Intervals come from formulas, not from random numbers: the same runs give the same page."""
 
 from dataclasses import dataclass
 from statistics import NormalDist
 
 import numpy as np
 from scipy.stats import binom
+from scipy.stats import t as student
 
 LEVEL = 0.95
 
 
-def calc_wilson_interval(count: int, total: int, level: float = LEVEL) -> tuple[float, float]:
+def calc_wilson_interval(count: float, total: float, level: float = LEVEL) -> tuple[float, float]:
     """Low and high end of the interval of the share `count`/`total`, formula 1; (0, 1) without runs."""
     if not 0 <= count <= total:
         raise ValueError(f"count: expected from 0 to {total}, got {count}")
@@ -44,12 +28,24 @@ def calc_wilson_interval(count: int, total: int, level: float = LEVEL) -> tuple[
     return low, high
 
 
-def calc_ecdf(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The steps of the empirical distribution (2): their places, ascending, and the values after them. NaN
-    is left out."""
-    values = np.asarray(values, dtype=float)
-    places, counts = np.unique(values[~np.isnan(values)], return_counts=True)
-    return places, np.cumsum(counts) / max(1, counts.sum())
+def calc_share_interval(is_counted: np.ndarray, draw: np.ndarray,
+                        level: float = LEVEL) -> tuple[float, float]:
+    """The interval of the share of `is_counted` (n,) for runs of the draws `draw` (n,): formula 1 if each run
+    has its own draw, else formula 2; (0, 1) for one draw of several runs."""
+    total, count = len(draw), int(np.sum(is_counted))
+    places = np.unique(draw, return_inverse=True)[1]
+    runs = np.bincount(places)
+    draws = len(runs)
+    if draws == total:
+        return calc_wilson_interval(count, total, level)
+    if draws == 1:
+        return 0.0, 1.0
+    share = count / total
+    variance = float(np.sum((np.bincount(places, is_counted) - share * runs) ** 2)) / total**2
+    upper = (1.0 + level) / 2.0
+    factor = (NormalDist().inv_cdf(upper) / student.ppf(upper, draws - 1)) ** 2
+    effective = min(total, share * (1.0 - share) / variance * factor) if variance > 0.0 else draws
+    return calc_wilson_interval(share * effective, effective, level)
 
 
 def calc_quantiles(values: np.ndarray, shares: tuple[float, ...]) -> np.ndarray:
@@ -68,13 +64,13 @@ def calc_quantiles(values: np.ndarray, shares: tuple[float, ...]) -> np.ndarray:
 
 @dataclass(frozen=True)
 class PairedDifference:
-    """Statistics of b − a, run by run, where both are defined."""
+    """Statistics of b − a, draw by draw, where both are defined."""
 
-    count: int
+    count: int  # of draws
     median: float
-    low: float  # low end of the median's interval (4); −inf if there are too few pairs for an interval
+    low: float  # low end of the median's interval (4); −inf if there are too few draws for an interval
     high: float
-    smaller: int  # number of pairs with b < a
+    smaller: int  # number of draws with b < a
     larger: int
     p: float  # of the sign test (5)
 
@@ -90,11 +86,17 @@ def calc_mcnemar_p(to_one: int, to_other: int) -> float:
     return calc_sign_p(to_one, to_other)
 
 
-def calc_paired_difference(a: np.ndarray, b: np.ndarray, level: float = LEVEL) -> PairedDifference:
-    """Statistics of two arrays of equal length. Pairs with a NaN or with two equal infinities are left out."""
+def calc_paired_difference(a: np.ndarray, b: np.ndarray, draw: np.ndarray | None = None,
+                           level: float = LEVEL) -> PairedDifference:
+    """Statistics of arrays of equal length; without `draw` each pair counts as a draw. Pairs with a NaN or with
+    two equal infinities are left out."""
     with np.errstate(invalid="ignore"):
         differences = np.asarray(b, dtype=float) - np.asarray(a, dtype=float)
-    differences = np.sort(differences[~np.isnan(differences)])
+    is_defined = ~np.isnan(differences)
+    differences = differences[is_defined]
+    if draw is not None:
+        differences = calc_medians(differences, draw[is_defined])
+    differences = np.sort(differences)
     count = len(differences)
     if not count:
         return PairedDifference(0, np.nan, -np.inf, np.inf, 0, 0, 1.0)
@@ -104,6 +106,15 @@ def calc_paired_difference(a: np.ndarray, b: np.ndarray, level: float = LEVEL) -
                  else (-np.inf, np.inf))
     return PairedDifference(count, float(calc_quantiles(differences, (0.5,))[0]), float(low),
                             float(high), smaller, larger, calc_sign_p(smaller, larger))
+
+
+def calc_medians(values: np.ndarray, group: np.ndarray) -> np.ndarray:
+    """The median of `values`, without NaN, in each group."""
+    order = np.lexsort((values, group))
+    values = values[order]
+    first, size = np.unique(group[order], return_index=True, return_counts=True)[1:]
+    low, high = values[first + (size - 1) // 2], values[first + size // 2]
+    return np.where(low == high, low, low / 2 + high / 2)
 
 
 def find_interval_rank(count: int, level: float = LEVEL) -> int:

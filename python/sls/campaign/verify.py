@@ -16,6 +16,7 @@ from sls.campaign.engines import EngineError
 from sls.campaign.folder import CampaignFolder
 from sls.campaign.runs import list_yaml_values, make_runs
 from sls.campaign.sampling import choose_runs, make_values
+from sls.campaign.whole_files import name_temporary
 from sls.core import load_core
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ def written_scenario(text: str, base: Path, folder: Path) -> Iterator[Path]:
     base scenario, because the library's path is relative to the file."""
     if re.search(r"\.so\b", text):
         folder = base.parent
-    file = folder / f".verify-{os.getpid()}.yaml"
+    file = name_temporary(folder / "verify").with_suffix(".yaml")
     try:
         file.write_text(text)
     except OSError as error:

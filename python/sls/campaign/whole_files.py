@@ -1,7 +1,10 @@
 """Writes files atomically: a file is complete, or it does not exist."""
 
+import hashlib
 import os
 import time
+import uuid
+from functools import cache
 from pathlib import Path
 
 from sls.campaign.engines import EngineError
@@ -12,15 +15,26 @@ DAY_S = 86400.0
 
 def name_temporary(file: Path) -> Path:
     """The temporary name of a file. It is in the same folder, because a rename must stay in one file
-    system. No other process on any machine uses this name."""
-    return file.with_name(f".{file.name}.{host_name()}.{os.getpid()}.tmp")
+    system. No other process in any container on any machine uses this name."""
+    return file.with_name(f".{file.name}.{name_place()}.{os.getpid()}.tmp")
+
+
+@cache
+def name_place() -> str:
+    """The host's name, and a hash of where process numbers are unique: in one PID namespace of one boot.
+    Containers may have the same host name and the same process numbers."""
+    try:
+        place = Path("/proc/sys/kernel/random/boot_id").read_text() + os.readlink("/proc/self/ns/pid")
+    except OSError:  # without /proc
+        place = uuid.uuid4().hex
+    return f"{host_name()}.{hashlib.sha256(place.encode()).hexdigest()[:8]}"
 
 
 def is_left_over(temporary: Path) -> bool:
-    """True if the process of this machine that wrote the file has ended. A file of another machine is left
+    """True if the process of this place that wrote the file has ended. A file of another place is left
     over if it is older than a day. Raises FileNotFoundError."""
     name, process = temporary.name.removesuffix(".tmp").rsplit(".", 1)
-    if name.endswith(f".{host_name()}") and process.isdecimal():
+    if name.endswith(f".{name_place()}") and process.isdecimal():
         return not Path(f"/proc/{process}").exists()
     return time.time() - temporary.stat().st_mtime > DAY_S
 

@@ -10,8 +10,9 @@ import threading
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn
+from typing import TextIO
 
+from sls.campaign.arguments import Parser, parse_range, to_count
 from sls.campaign.engines import EngineError
 from sls.campaign.folder import CampaignFolder, DamagedChunk
 from sls.campaign.kept import keep_while_flying
@@ -19,6 +20,14 @@ from sls.campaign.own_measures import load_own_measures
 from sls.campaign.runs import Announce, RefusedRun, fly_range, make_runs
 from sls.errors import ConfigError, RunError
 from sls.input_error import InputError
+
+
+MISTAKES = (ConfigError, RefusedRun, ImportError)  # the user must repair them
+FAILURES = (EngineError, RunError, OSError)
+
+
+def to_exit_code(error: Exception) -> int:
+    return 2 if isinstance(error, MISTAKES) else 1
 
 
 class ChunkFlyer:
@@ -72,32 +81,36 @@ def fly_chunk(folder: str, number: int) -> dict[str, int | float]:
             raise InputError(str(error)) from None
 
 
-def serve(folder: Path) -> None:
-    """A process of the local engine. It reads lines `CHUNK` or `CHUNK announce` from stdin, and prints one
-    line of JSON for each. With `announce` it also prints a line before each run; if a run ends the
-    process, the engine has its index from this line. The process ends when stdin is closed."""
-    flyer = ChunkFlyer(folder)
-    answer({"ready": os.getpid()})
-    for line in sys.stdin:
-        number, *announce = line.split()
-        answer(flyer.fly(int(number), (lambda run: answer({"run": run})) if announce else None))
+def serve(folder: Path) -> int:
+    """A process of the local engine. It reads lines `CHUNK` or `CHUNK announce` from stdin, and answers one
+    line of JSON for each on stdout. With `announce` it also writes a line before each run; if a run ends
+    the process, the engine has its index from this line. It ends when stdin is closed, and returns its exit
+    code."""
+    def answer(message: dict[str, int | float | str]) -> None:
+        print(json.dumps(message), file=answers, flush=True)
+
+    numbers, answers = take_pipes()
+    try:
+        flyer = ChunkFlyer(folder)
+        answer({"ready": os.getpid()})
+        for line in numbers:
+            number, *announce = line.split()
+            answer(flyer.fly(int(number), (lambda run: answer({"run": run})) if announce else None))
+        return 0
+    except (*MISTAKES, *FAILURES) as error:
+        answer({"error": str(error), "code": to_exit_code(error)})
+        return to_exit_code(error)
 
 
-def answer(message: dict[str, int | float | str]) -> None:
-    print(json.dumps(message), flush=True)
-
-
-class Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> NoReturn:
-        raise InputError(f"{self.prog.removeprefix('./sls ')}: {message} (see {self.prog} --help)")
-
-
-def parse_range(text: str) -> tuple[int, int]:
-    """Parses `A-B` or `A`. Raises ArgumentTypeError."""
-    match = re.fullmatch(r"(\d{1,12})(?:-(\d{1,12}))?", text)
-    if not match or int(match[2] or match[1]) < int(match[1]):
-        raise argparse.ArgumentTypeError(f"expected A-B with A ≤ B, got '{text}'")
-    return int(match[1]), int(match[2] or match[1])
+def take_pipes() -> tuple[TextIO, TextIO]:
+    """stdin and stdout under descriptors that no own measure and no library knows. Their own output on stdout
+    goes to stderr; they read an empty stdin."""
+    pipes = os.fdopen(os.dup(0)), os.fdopen(os.dup(1), "w")
+    nothing = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(nothing, 0)
+    os.close(nothing)
+    os.dup2(2, 1)
+    return pipes
 
 
 def list_numbers(options: argparse.Namespace) -> list[int]:
@@ -136,31 +149,19 @@ def main(arguments: Sequence[str]) -> int:
                        help="environment variable that holds the index of this task, such as "
                             "JOB_COMPLETION_INDEX")
     which.add_argument("--serve", action="store_true", help=argparse.SUPPRESS)
-    parser.add_argument("--chunks-each", type=int, default=1, metavar="N",
+    parser.add_argument("--chunks-each", type=to_count, default=1, metavar="N",
                         help="chunks per index of --index-from (default: 1)")
-    serving = False
     try:
         options = parser.parse_args(arguments)
-        serving = options.serve
-        if serving:
-            serve(options.folder)
-        else:
-            fly_listed(options)
+        if options.serve:
+            return serve(options.folder)
+        fly_listed(options)
         return 0
-    except (ConfigError, RefusedRun, ImportError) as error:
-        return fail(str(error), 2, serving)
-    except (EngineError, RunError, OSError) as error:
-        return fail(str(error), 1, serving)
+    except (*MISTAKES, *FAILURES) as error:
+        print(f"campaign-worker: error: {error}", file=sys.stderr)
+        return to_exit_code(error)
     except KeyboardInterrupt:
         return 130
-
-
-def fail(text: str, code: int, serving: bool) -> int:
-    if serving:
-        answer({"error": text, "code": code})
-    else:
-        print(f"campaign-worker: error: {text}", file=sys.stderr)
-    return code
 
 
 if __name__ == "__main__":

@@ -74,14 +74,17 @@ double calc_largest_lift(const std::vector<FlyingRotor>& rotors) {
   return lift;
 }
 
+Vector3d calc_principal_moments(const Matrix3d& inertia) {
+  return Eigen::SelfAdjointEigenSolver<Matrix3d>(inertia).eigenvalues();
+}
+
 std::string find_inertia_defect(const Vector3d& moments, const Vector3d& products) {
-  const Vector3d principal =
-      Eigen::SelfAdjointEigenSolver<Matrix3d>(make_tensor(moments, products)).eigenvalues();
+  const Vector3d principal = calc_principal_moments(make_tensor(moments, products));
   std::ostringstream list;
   list.precision(12);  // further digits are errors of the solver
   list << principal[0] << ", " << principal[1] << ", " << principal[2];
-  if (principal[0] < 0.0) return "expected principal moments >= 0, got " + list.str();
   const double rounding = 1e-12 * principal[2];
+  if (principal[0] < -rounding) return "expected principal moments >= 0, got " + list.str();
   if (principal[2] > principal[0] + principal[1] + rounding)
     return "expected principal moments of which none is larger than the sum of the others, got " +
            list.str();

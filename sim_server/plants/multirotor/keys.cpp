@@ -1,5 +1,7 @@
 #include "sim_server/plants/multirotor/keys.hpp"
 
+#include <algorithm>
+
 #include "common/config/own_keys.hpp"
 #include "sim_server/plants/multirotor/airframe.hpp"
 
@@ -70,6 +72,26 @@ class MultirotorOwnKeys : public config::OwnKeys<config::Plant, MultirotorKeys> 
                                  "expected an inertia > 0 about the rod, of rod or load, got 0");
   }
 
+  /// The equations divide by the inertia of all bodies and of the pendulum; each part may have 0.
+  static void check_sums(const MultirotorKeys& keys, const model::SlungLoadParameters& vehicle,
+                         const config::Places& places) {
+    const Eigen::Vector3d moments =
+        calc_principal_moments(make_airframe(keys, vehicle.quad_mass).inertia_C_B);
+    if (!(moments[0] > 1e-12 * moments[2]))  // smaller ones are rounding of 0
+      throw places.make_error_at("plant.inertia_kg_m2",
+                                 "expected an inertia > 0 about every axis, of airframe and bodies "
+                                 "together, got 0");
+    if (!keys.rod) return;
+    const double distance = vehicle.rod_length - keys.rod->centre;
+    const double of_masses = vehicle.load_mass * keys.rod->mass /
+                             (vehicle.load_mass + keys.rod->mass) * distance * distance;
+    const Eigen::Vector3d across = keys.rod->inertia + *keys.load_inertia;
+    if (!(std::min(across.x(), across.y()) + of_masses > 0.0))
+      throw places.make_error_at("plant.load_inertia_kg_m2",
+                                 "expected an inertia > 0 across the rod, of rod and load "
+                                 "together, got 0");
+  }
+
   static void check_vehicle(const MultirotorKeys& keys, const model::SlungLoadParameters& vehicle,
                             const std::string& place, const config::Places& places) {
     double fixed = 0.0;
@@ -82,6 +104,7 @@ class MultirotorOwnKeys : public config::OwnKeys<config::Plant, MultirotorKeys> 
       throw places.make_error_at("plant.attachment_m",
                                  "expected at most a rod's length (" + to_text(vehicle.rod_length) +
                                      ") from the origin, got " + to_text(keys.attachment.norm()));
+    check_sums(keys, vehicle, places);
     if (keys.rod && keys.rod->centre > vehicle.rod_length)
       throw places.make_error_at("plant.rod.centre_m", "expected at most the rod's length (" +
                                                            to_text(vehicle.rod_length) + "), got " +

@@ -98,10 +98,19 @@ void check_finite(const AutopilotOutput& wanted, std::int64_t step) {
 
 using TurningRotors = std::vector<RotorSpeed>;
 
+/// The values that a step changes.
+struct Flown {
+  std::int64_t steps = 0;
+  AutopilotOutput output;  ///< the last one; its direction is in the plant's W
+  VectorXd set_points;     ///< of the rotors, within their limits, rad/s
+  VectorXd rotor_speeds;   ///< rad/s
+  Motion motion;
+};
+
 }  // namespace
 
 /// The multibody system at one motion. README.md, "Integration", lists Simbody's part.
-struct MultirotorPlant::Multibody {
+struct MultirotorPlant::Multibody : Flown {
   explicit Multibody(const PlantSetup& setup)
       : keys(setup.plant.own.get<MultirotorKeys>()),
         config(setup.plant),
@@ -320,15 +329,23 @@ struct MultirotorPlant::Multibody {
     realize_positions(motion);
   }
 
+  /// If one of the steps throws, nothing changes but the autopilot's memory and the remarks.
   void advance(const Vector3d& f_Q_W, std::int64_t count) {
     check_finite(f_Q_W, steps, "force_x_n", "force_y_n", "force_z_n");
-    for (std::int64_t i = 0; i < count; ++i) {
-      step_autopilot(f_Q_W, steps);
-      fly_step(steps + 1);
-      ++steps;
+    before = *this;
+    try {
+      for (std::int64_t i = 0; i < count; ++i) {
+        step_autopilot(f_Q_W, steps);
+        fly_step(steps + 1);
+        ++steps;
+      }
+      realize_velocities(motion);
+      held = measure(steps);
+    } catch (...) {
+      static_cast<Flown&>(*this) = before;
+      realize_positions(motion);
+      throw;
     }
-    realize_velocities(motion);
-    held = measure(steps);
   }
 
   // --- measurement -------------------------------------------------------------------------------
@@ -376,7 +393,6 @@ struct MultirotorPlant::Multibody {
   std::vector<RotorLag> lags;  ///< of the rotors
   const bool is_ideal;
   const Eigen::Quaterniond attitude_error;  ///< estimated attitude = this × true one
-  std::int64_t steps = 0;
 
   SimTK::MultibodySystem system;
   SimTK::SimbodyMatterSubsystem matter{system};
@@ -390,14 +406,11 @@ struct MultirotorPlant::Multibody {
 
   std::unique_ptr<Autopilot> autopilot;
   std::int64_t autopilot_steps = 1;  ///< plant steps per period
-  AutopilotOutput output;            ///< the last one; its direction is in the plant's W
-  VectorXd set_points;               ///< of the rotors, within their limits, rad/s
-  VectorXd rotor_speeds;             ///< rad/s
-  Motion motion;
   SaturationWatch watch;
 
   // Members, to avoid an allocation in every step.
   TurningRotors starting, middle, ending;  // at the stages of a step
+  Flown before;                            // an advance
 
   model::Measurement held;
 };

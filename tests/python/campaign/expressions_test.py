@@ -64,6 +64,8 @@ def test_refuses_all_but_arithmetic(text):
     ("max((-a) ** 0.5, 1)", "'max((-a) ** 0.5, 1)' is not defined"),
     ("9 ** 9 ** 9", "'9 ** 9 ** 9' is too large"),
     ("1e308 * 10", "'1e308 * 10' is not a finite number"),
+    ("min(1e308 * 10, 1)", "'min(1e308 * 10, 1)' is not a finite number"),
+    ("max(1, 1 / (1e308 + 1e308))", "'max(1, 1 / (1e308 + 1e308))' is not a finite number"),
 ])
 def test_names_what_has_no_value(text, message):
     with pytest.raises(ExpressionError) as error:

@@ -3,7 +3,7 @@ simple functions of its values.
 
 SLS_FAKE holds words: `kill=17` ends the process in run 17 each time, `kill-once=17:FILE` only if FILE does
 not exist yet, `sleep=0.01` makes a run last 0.01 s, `refuse=17` refuses run 17 when it is flown, `other=1`
-gives other measures. The number of a run is the value of its last key, `index`."""
+gives other measures, `print=1` prints in each run as a law or a measure may. The number of a run is the value of its last key, `index`."""
 
 import hashlib
 import math
@@ -33,6 +33,9 @@ class Runs:
 
     def fly(self, values, certify):
         self.check(values)
+        if "print" in WORDS:
+            print("printed")
+            os.write(1, b"printed by a library\n")
         if "sleep" in WORDS:
             time.sleep(float(WORDS["sleep"]))
         index = int(values[-1])

@@ -515,6 +515,26 @@ TEST(MultirotorPlantTest, RefusesAForceThatIsNotFiniteAndKeepsItsState) {
   EXPECT_EQ(plant.measurement(0).p_WL, before);
 }
 
+TEST(MultirotorPlantTest, AStepThatFailsUndoesThoseBeforeItInTheSameCall) {
+  PlantSetup setup = make_ideal_setup();
+  setup.vehicles[0].initial.w_WB_B = Vector3d(1e10, 2e10, 3e10);  // overflows after some steps
+  MultirotorPlant plant(setup);
+  const model::Measurement before = plant.measurement(0);
+  std::string defect;
+  try {
+    plant.advance({Vector3d(0, 0, -16)}, 100);
+  } catch (const std::runtime_error& error) {
+    defect = error.what();
+  }
+  ASSERT_NE(defect.find("is not finite after step "), defect.npos);
+  ASSERT_EQ(defect.find("after step 1 "), defect.npos) << "the first step must succeed";
+  plant.advance({Vector3d(0, 0, -16)}, 0);  // measures again
+  EXPECT_EQ(plant.measurement(0).p_WQ, before.p_WQ);
+  EXPECT_EQ(plant.measurement(0).p_WL, before.p_WL);
+  EXPECT_EQ(plant.measurement(0).attitude.q_WB.coeffs(), before.attitude.q_WB.coeffs());
+  EXPECT_EQ(plant.measurement(0).signals, before.signals);
+}
+
 TEST(MultirotorPlantTest, RefusesRotorSpeedsThatAreNotFinite) {
   MultirotorPlant plant(make_ideal_setup());
   plant.advance({Vector3d(0, 0, -16)}, 3);

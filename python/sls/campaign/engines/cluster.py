@@ -5,11 +5,16 @@ import os
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from sls.campaign.folder import CampaignFolder
+from sls.campaign.whole_files import name_temporary
 
-FILES_LATE_S = 3.0  # a shared file system may show another machine's file late
+# A shared file system may show another machine's file late: NFS keeps what it knows of a folder for up to
+# 60 s (acdirmax).
+FILES_LATE_S = 70.0
+RETRY_AFTER_S = 3.0  # before chunks are submitted again, which costs little if they are there by then
 EVERY_S = 0.5
 
 
@@ -23,12 +28,22 @@ def find_places() -> list[str]:
     return list(dict.fromkeys(str(place.resolve()) for place in [*own, *given]))
 
 
-def find_missing(folder: CampaignFolder) -> list[int]:
-    """Chunks that are still missing FILES_LATE_S after the last worker has ended."""
-    deadline = time.monotonic() + FILES_LATE_S
+def find_missing(folder: CampaignFolder, is_last_try: bool = True) -> list[int]:
+    """Chunks that are still missing FILES_LATE_S after the last worker has ended, or RETRY_AFTER_S if they
+    will be tried again."""
+    deadline = time.monotonic() + (FILES_LATE_S if is_last_try else RETRY_AFTER_S)
     while (missing := folder.missing()) and time.monotonic() < deadline:
+        change_folder(folder)
         time.sleep(EVERY_S)
     return missing
+
+
+def change_folder(folder: CampaignFolder) -> None:
+    """Creates and removes a file: NFS then asks the server again for the files of this folder."""
+    file = name_temporary(folder.chunk_file(0).with_name("change"))
+    with suppress(OSError):
+        file.touch()
+        file.unlink()
 
 
 def describe_rest(folder: CampaignFolder) -> str:

@@ -7,6 +7,7 @@ ended. A collect job waits for the array; it does the rest if this process has e
 import getpass
 import hashlib
 import os
+import re
 import shlex
 import shutil
 import subprocess
@@ -67,9 +68,11 @@ def say(text: str) -> None:
 
 
 def name_job(folder: CampaignFolder) -> str:
-    """The name of the folder's jobs: always the same for a folder, and different for other folders."""
+    """The name of the folder's jobs: always the same for a folder, and different for other folders. Slurm
+    takes a comma as the end of a name."""
     place = str(folder.folder.resolve())
-    return f"sls-{folder.plan.campaign}-{hashlib.sha256(place.encode()).hexdigest()[:8]}"
+    campaign = re.sub(r"[^A-Za-z0-9_.-]", "_", folder.plan.campaign)
+    return f"sls-{campaign}-{hashlib.sha256(place.encode()).hexdigest()[:8]}"
 
 
 def name_collect_job(folder: CampaignFolder) -> str:
@@ -247,8 +250,10 @@ def submit_round(folder: CampaignFolder, missing: Sequence[int], number: int,
         write_whole(listed, "".join(to_ranges(task) + "\n" for task in here).encode())
         script = own / f"task-{number}-{part}.sh"
         write_whole(script, make_task_script(place, listed).encode())
+        # The limit of an array holds for this array alone: with it, one array flies after the other.
+        after = [f"--dependency=afterany:{done.jobs[-1]}"] if options.workers and done.jobs else []
         done.jobs.append(submit(script, name_job(folder), own / "task-%A-%a.log", options.sbatch,
-                                "--requeue", f"--array=0-{len(here) - 1}{at_once}"))
+                                "--requeue", f"--array=0-{len(here) - 1}{at_once}", *after))
     script = own / f"collect-{number}.sh"
     write_whole(script, make_collect_script(place, number, options).encode())
     submit(script, name_collect_job(folder), own / "collect-%j.log", options.sbatch,
@@ -341,7 +346,7 @@ def run(folder: CampaignFolder, options: EngineOptions) -> None:
                 before = len(missing)
                 submitted = submit_round(folder, missing, number, options)
                 wait(folder, missing, progress)
-                missing = find_missing(folder)
+                missing = find_missing(folder, is_last_try=number == MOST_ROUNDS)
                 if len(missing) == before and WORKER_ERROR in find_reason(folder, submitted.jobs):
                     break  # a mistake of the user: another try would fail, too
         cancel(folder)  # ends the collect job, because this process collects
@@ -376,15 +381,18 @@ def cancel_quietly(folder: CampaignFolder) -> None:
 def collect(folder: CampaignFolder, number: int, options: EngineOptions) -> None:
     """Makes the table, or submits the missing chunks again. Does nothing if a launcher still waits for
     the campaign. Raises InputError, EngineError, ControllerLost."""
+    from sls.campaign.collect import collect as collect_folder, describe_broken_measures
     try:
         folder.take_lock()
     except InputError as error:
         say(f"nothing to do: {error}")
         return
-    missing = find_missing(folder)
+    missing = find_missing(folder, is_last_try=number >= MOST_ROUNDS)
     if not missing:
-        folder.collect("slurm")
+        collect_folder(folder, "slurm")
         say(f"{folder.folder}/runs.csv")
+        if broken := describe_broken_measures(folder.manifest):
+            say(f"error: {broken}")
     elif number < MOST_ROUNDS:
         submit_round(folder, missing, number + 1, options)
     else:
