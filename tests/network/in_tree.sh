@@ -4,5 +4,5 @@
 tree=$1 build=$2 name=$(basename "$3")
 shift 3
 libraries=$(find "$tree/usr/lib" -mindepth 1 -maxdepth 1 -name '*-linux-gnu')
-exec "$(find "$tree/usr/lib64/" "$libraries" -maxdepth 1 -name 'ld-linux-*' | head -n 1)" --library-path "$libraries" \
-  "$build/bin/$name" "$@"
+# Its usual name in Debian 12, usr/lib64/…, is an absolute link, which would lead to this machine's loader.
+exec "$(find "$libraries" -maxdepth 1 -name 'ld-linux-*')" --library-path "$libraries" "$build/bin/$name" "$@"

@@ -47,7 +47,8 @@ def read_tests(file):
         elif status == "fail":
             tests.failed.append(name)
         else:
-            reason = re.search(r"^.*skipped: *(.+)$", case.findtext("system-out") or "", re.MULTILINE)
+            # The second form is GoogleTest's.
+            reason = re.search(r"(?:skipped: *|: Skipped\n)(.+)$", case.findtext("system-out") or "", re.MULTILINE)
             tests.skipped.setdefault(reason[1].strip() if reason else "no reason", []).append(name)
     return tests
 
