@@ -175,7 +175,7 @@ struct Node::Impl {
     if (!participant) return;
     participant->set_listener(nullptr);
     participant->delete_contained_entities();
-    const LeavingScope leaving;
+    const LeavingScope leaving(*participant);
     dds::DomainParticipantFactory::get_instance()->delete_participant(participant);
   }
 

@@ -158,7 +158,7 @@ struct Observer::Impl : bus::ParticipantListener {
   ~Impl() override {
     participant->set_listener(nullptr);
     participant->delete_contained_entities();
-    const bus::LeavingScope leaving;
+    const bus::LeavingScope leaving(*participant);
     dds::DomainParticipantFactory::get_instance()->delete_participant(participant);
   }
 

@@ -1,10 +1,14 @@
 #pragma once
 
+#include <fastdds/dds/domain/DomainParticipant.hpp>
+
+#include "fastdds_api.hpp"
+
 namespace sls::bus {
 
 /// Nothing to do: see version3/announcements.cpp.
 struct LeavingScope {
-  LeavingScope() {}
+  explicit LeavingScope(const dds::DomainParticipant&) {}
 };
 
 }  // namespace sls::bus

@@ -14,10 +14,14 @@
 #include <dlfcn.h>
 #include <pthread.h>
 
+#include <algorithm>
 #include <array>
+#include <charconv>
 #include <condition_variable>
+#include <cstring>
 #include <deque>
 #include <mutex>
+#include <set>
 #include <string_view>
 #include <thread>
 
@@ -42,11 +46,15 @@ void call_original(PDP* discovery) {
   original(discovery);
 }
 
-/// True in the thread of a participant's timers.
-bool is_timer_thread() {
+/// Id of the participant whose timers this thread serves, from its name; -1 in other threads.
+int find_timed_participant() {
+  constexpr std::string_view kTimers = "dds.ev.";
   std::array<char, 16> name{};
   pthread_getname_np(pthread_self(), name.data(), name.size());
-  return std::string_view(name.data()).rfind("dds.ev.", 0) == 0;
+  int id = -1;
+  if (std::string_view(name.data()).rfind(kTimers, 0) == 0)
+    std::from_chars(name.data() + kTimers.size(), name.data() + std::strlen(name.data()), id);
+  return id;
 }
 
 class Announcements {
@@ -57,57 +65,77 @@ class Announcements {
     return instance;
   }
 
-  void choose_later(PDP* discovery) {
+  void choose_later(PDP* discovery, int participant) {
     const std::lock_guard lock(mutex_);
-    if (leaving_ > 0) return;
+    if (leaving_.count(participant) != 0) return;
     if (!is_started_) std::thread([this] { run(); }).detach();
     is_started_ = true;
-    waiting_.push_back(discovery);
+    waiting_.push_back({discovery, participant});
     changed_.notify_all();
   }
 
-  void begin_leaving() {
+  /// Waits for nothing of other participants, one of which may be blocked.
+  void begin_leaving(int participant) {
     std::unique_lock lock(mutex_);
-    ++leaving_;
-    changed_.wait(lock, [this] { return waiting_.empty(); });
+    leaving_.insert(participant);
+    waiting_.erase(
+        std::remove_if(waiting_.begin(), waiting_.end(),
+                       [&](const Choice& one) { return one.participant == participant; }),
+        waiting_.end());
+    changed_.wait(lock, [&] { return served_ != participant; });
   }
 
-  void end_leaving() {
+  void end_leaving(int participant) {
     const std::lock_guard lock(mutex_);
-    --leaving_;
+    leaving_.erase(participant);
   }
 
  private:
+  struct Choice {
+    PDP* discovery;
+    int participant;
+  };
+
   [[noreturn]] void run() {
+    pthread_setname_np(pthread_self(), "sls.announce");  // not that of the thread that starts it
     std::unique_lock lock(mutex_);
     while (true) {
       changed_.wait(lock, [this] { return !waiting_.empty(); });
-      PDP* const discovery = waiting_.front();
-      lock.unlock();
-      call_original(discovery);
-      lock.lock();
+      const Choice choice = waiting_.front();
       waiting_.pop_front();
+      served_ = choice.participant;
+      lock.unlock();
+      call_original(choice.discovery);
+      lock.lock();
+      served_ = -1;
       changed_.notify_all();
     }
   }
 
   std::mutex mutex_;
   std::condition_variable changed_;
-  std::deque<PDP*> waiting_;  ///< the first is being served
-  int leaving_ = 0;
+  std::deque<Choice> waiting_;
+  int served_ = -1;  ///< participant of the choice that is being made; -1: none
+  std::set<int> leaving_;
   bool is_started_ = false;
 };
 
 }  // namespace
 
-LeavingScope::LeavingScope() { Announcements::of_process().begin_leaving(); }
-LeavingScope::~LeavingScope() { Announcements::of_process().end_leaving(); }
+// Bytes 8 and 9 of a GUID are the participant's id, which also ends the name of its timers' thread.
+LeavingScope::LeavingScope(const dds::DomainParticipant& participant)
+    : participant_(participant.guid().guidPrefix.value[8] | participant.guid().guidPrefix.value[9]
+                                                                << 8) {
+  Announcements::of_process().begin_leaving(participant_);
+}
+LeavingScope::~LeavingScope() { Announcements::of_process().end_leaving(participant_); }
 
 }  // namespace sls::bus
 
 void eprosima::fastdds::rtps::PDP::set_next_announcement_interval() {
-  if (sls::bus::is_timer_thread())
-    sls::bus::Announcements::of_process().choose_later(this);
+  const int participant = sls::bus::find_timed_participant();
+  if (participant >= 0)
+    sls::bus::Announcements::of_process().choose_later(this, participant);
   else
     sls::bus::call_original(this);
 }

@@ -1,14 +1,21 @@
 #pragma once
 
+#include <fastdds/dds/domain/DomainParticipant.hpp>
+
+#include "fastdds_api.hpp"
+
 namespace sls::bus {
 
-/// While it exists a participant may be deleted: nothing of announcements.cpp uses one.
+/// While it exists `participant` may be deleted: announcements.cpp does not use it.
 class LeavingScope {
  public:
-  LeavingScope();
+  explicit LeavingScope(const dds::DomainParticipant& participant);
   ~LeavingScope();
   LeavingScope(const LeavingScope&) = delete;
   LeavingScope& operator=(const LeavingScope&) = delete;
+
+ private:
+  const int participant_;
 };
 
 }  // namespace sls::bus
