@@ -26,6 +26,9 @@ def lint(page):
 
 class Reference(unittest.TestCase):
     def test_is_what_the_programs_say(self):
+        help_text = subprocess.run([BUILD / "bin/sim_server", "--help"], capture_output=True, text=True).stdout
+        if "in [0 - 232]=0" not in help_text:
+            self.skipTest("this CLI11 formats help in another way; the reference is made with that of Debian 12")
         done = run_reference("--check")
         self.assertEqual(done.returncode, 0, f"renew docs/reference with: ./sls reference\n{done.stdout}{done.stderr}")
 

@@ -106,6 +106,11 @@ class GuardedType : public CodedType<Generated> {
           payload, data,
           "expected " + std::to_string(used) + " bytes, got " + std::to_string(payload.length));
     const auto& message = *static_cast<const Message*>(data);
+    // Fast CDR 2 accepts a sample that ends between two members. Those that are missing keep what
+    // another sample said.
+    if (const std::size_t needed = plain_cdr::kHeader.size() + calc_cdr_size(message, 0);
+        needed > used)
+      return refuse(payload, data, "expected more bytes, got " + std::to_string(payload.length));
     std::string excess = find_excess(message);
     if (excess.empty())
       excess = find_cut_name(message, {reinterpret_cast<const char*>(payload.data), payload.length},

@@ -44,6 +44,21 @@ TEST(GuardedTypeTest, EndlessLengthsAreRefused) {
   }
 }
 
+TEST(GuardedTypeTest, SamplesThatEndBetweenTwoMembersAreRefused) {
+  for (std::size_t size = 0; size < 25; ++size) {
+    const std::string bytes = (std::string("\0\1\0\0", 4) + std::string(21, '\0')).substr(0, size);
+    SCOPED_TRACE(size);
+    EXPECT_FALSE((takes<StatesPubSubType, States>(bytes)));
+    EXPECT_FALSE((takes<CommandsPubSubType, Commands>(bytes)));
+    EXPECT_FALSE((takes<RecordBatchPubSubType, RecordBatch>(bytes)));
+    EXPECT_FALSE((takes<ParticipantPubSubType, Participant>(bytes)));
+    EXPECT_FALSE((takes<ParametersPubSubType, Parameters>(bytes)));
+    EXPECT_FALSE((takes<SimStatusPubSubType, SimStatus>(bytes)));
+    EXPECT_FALSE((takes<SimControlPubSubType, SimControl>(bytes)));
+    EXPECT_FALSE((takes<SimControlReplyPubSubType, SimControlReply>(bytes)));
+  }
+}
+
 /// A sample of `size` bytes that gives a sequence length of `count` after `before`.
 std::string make_claim(const std::string& before, std::uint32_t count, std::size_t size) {
   std::string bytes = std::string("\0\1\0\0", 4) + before;
