@@ -29,12 +29,13 @@ inline constexpr double kMinSupportFraction = 1e-3;
 /// kRodLevel. It does the same with the load above the quadrotor, where a cosine is negative.
 inline constexpr double kMinRodCosine = 1e-3;
 
+/// True where a law reports kRodLevel.
 inline bool is_level(const model::RodAngles& rod) {
   // Near the vertical, where rods usually are, no cosine is needed.
-  const auto is_level = [](double angle) {
+  const auto has_small_cosine = [](double angle) {
     return std::abs(angle) > 1.0 && math::cos(angle) < kMinRodCosine;
   };
-  return is_level(rod.alpha) || is_level(rod.beta);
+  return has_small_cosine(rod.alpha) || has_small_cosine(rod.beta);
 }
 
 /// All inputs of a law.

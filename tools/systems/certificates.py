@@ -1,8 +1,8 @@
 """Flies scenarios in one process on several processors and prints their certificates as a table.
 
 The processors are those of this machine with features of its C library masked (GLIBC_TUNABLES), models that qemu-x86_64
-emulates, and ARM, emulated by qemu-aarch64. The certificate of every scenario must be the same on all of them. The one
-exception are plants that Simbody integrates on ARM, because Debian's Simbody for ARM uses fused instructions:
+emulates, and ARM, emulated by qemu-aarch64. The certificate of every scenario must be the same on all of them. The
+exceptions are plants that Simbody integrates on ARM, because Debian's Simbody for ARM uses fused instructions:
 docs/arm.md."""
 
 import argparse

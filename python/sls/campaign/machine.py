@@ -1,4 +1,4 @@
-"""Properties of a machine that, besides the scenario, determine the bits of a flight: processor level,
+"""Properties of a machine that, besides the scenario, may determine the bits of a flight: processor level,
 libraries, versions."""
 
 import hashlib
@@ -10,8 +10,8 @@ from pathlib import Path
 
 from sls.core import load_core
 
-# Flags of /proc/cpuinfo that each level of the x86-64 psABI adds. The mathematical library chooses
-# its sin and cos by them. For this reason equal bits are promised only within one level.
+# Flags of /proc/cpuinfo that each level of the x86-64 psABI adds. numpy and the C library, which own
+# measures may use, choose their functions by them. So equal bits are promised only within one level.
 LEVEL_FLAGS = (
     ("x86-64-v2", {"cx16", "lahf_lm", "popcnt", "sse4_1", "sse4_2", "ssse3"}),
     ("x86-64-v3", {"avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "abm", "movbe"}),
