@@ -221,11 +221,9 @@ struct Observer::Impl : bus::ParticipantListener {
 
   void on_announcement(const bus::PlainAnnouncement& other, const std::string& address) override {
     bus::ParticipantListener::on_announcement(other, address);
-    bus::PeerId id;
-    std::copy(other.guid_prefix.begin(), other.guid_prefix.end(), id.bytes.begin());
     const std::lock_guard lock(mutex);
-    Program& program = programs[id];  // of one that is discovered: nothing new
-    program.id = id;
+    Program& program = programs[other.sender];  // of one that is discovered: nothing new
+    program.id = other.sender;
     program.name = other.name;
     program.is_secured = other.is_secured;
     if (program.address.empty()) program.address = address;

@@ -134,7 +134,7 @@ std::optional<PlainAnnouncement> find_announcement(const std::uint8_t* message, 
       if (!is_whole) return {};
     }
     found.is_leaving = (flags & kSample) == 0;
-    found.guid_prefix.assign(message + kPrefix, message + kPrefix + kPrefixSize);
+    std::copy_n(message + kPrefix, kPrefixSize, found.sender.bytes.begin());
     if (is_new || !is_of_eprosima) return found;
     auto& copy = found.as_secure;
     copy.assign(message, message + size);

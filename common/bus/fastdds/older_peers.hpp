@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "common/bus/peer.hpp"
+
 namespace sls::bus {
 
 /// The plain announcement of a participant.
@@ -24,7 +26,7 @@ struct PlainAnnouncement {
   std::string certificate, authority;  ///< subjects, if it is a program of ours; else empty
   bool is_secured = false;             ///< it announces an identity
   bool is_leaving = false;             ///< it says no more than that it leaves
-  std::vector<std::uint8_t> guid_prefix;
+  PeerId sender;
   /// Of Fast DDS before version 3: the same message as if the secure writer had sent it. A reader
   /// that requires a protected one or has not authenticated the participant drops it.
   std::vector<std::uint8_t> as_secure;

@@ -41,7 +41,7 @@ class ParticipantListener : public DiscoveryListener {
   void hear(dds::DomainParticipantQos& qos) {
     if (!own_.is_secured) return;
     hear_announcements(qos, [this](const PlainAnnouncement& other, const std::string& address) {
-      if (is_self_known_ && !is_self(other)) on_announcement(other, address);
+      if (is_self_known_ && other.sender != self_) on_announcement(other, address);
     });
   }
 
@@ -80,7 +80,7 @@ class ParticipantListener : public DiscoveryListener {
   /// this, and only to a secured participant: it discovers no participant that it refuses.
   virtual void on_announcement(const PlainAnnouncement& other, const std::string& address) {
     rtps::GUID_t guid;
-    std::copy(other.guid_prefix.begin(), other.guid_prefix.end(), guid.guidPrefix.value);
+    std::copy(other.sender.bytes.begin(), other.sender.bytes.end(), guid.guidPrefix.value);
     guid.entityId = rtps::c_EntityId_RTPSParticipant;
     Refusals::of_process().note_discovered(
         to_text(guid), describe(other.name, address, guid.guidPrefix),
@@ -123,10 +123,6 @@ class ParticipantListener : public DiscoveryListener {
                               const rtps::GuidPrefix_t& prefix) {
     return describe_name(name) + " (" + address + (address.empty() ? "" : ", ") + to_text(prefix) +
            ")";
-  }
-
-  bool is_self(const PlainAnnouncement& other) const {
-    return std::equal(other.guid_prefix.begin(), other.guid_prefix.end(), self_.bytes.begin());
   }
 
   /// Reports a participant of a version with which ours does not discover anything.

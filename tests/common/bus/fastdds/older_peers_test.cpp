@@ -59,7 +59,7 @@ TEST(OlderPeersTest, AnAnnouncementIsRepeatedWithTheIdsOfTheSecureWriter) {
   ASSERT_TRUE(found);
   EXPECT_EQ(found->name, "control_client");
   EXPECT_EQ(found->version, "2.9.1");
-  EXPECT_EQ(found->guid_prefix, (Bytes{1, 15, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12}));
+  EXPECT_EQ(found->sender, (PeerId{{1, 15, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12}}));
   EXPECT_EQ(found->as_secure, make_message(kVersion + kName, 1, kSecureIds));
 }
 
