@@ -22,8 +22,8 @@ operator and viewer, with the identity and the signed documents of that role.
   --force          replace what is there
   --other-vendors  for programs on another vendor's DDS, such as Cyclone DDS: also encrypts
                    submessages, which costs up to a third of the speed
-  --mixed-versions for programs of Debian 12 and of Debian 13 in one flight: does not encrypt
-                   discovery (topic names, types, QoS)
+  --mixed-versions for programs of Debian 12 and of Debian 13 in one flight, and for Debian 13 with
+                   another vendor's DDS: does not encrypt discovery (topic names, types, QoS)
   --add ROLE NAME  one more identity of that role in DIR/NAME, signed by the authorities in DIR/ca
 
 Fly with them: SLS_KEYS=DIR ./sls run SCENARIO --qos config/qos/secure.xml

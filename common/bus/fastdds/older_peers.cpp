@@ -89,7 +89,8 @@ std::vector<std::uint8_t> make_gap(std::uint32_t high, std::uint32_t low) {
 std::optional<PlainAnnouncement> find_announcement(const std::uint8_t* message, std::size_t size) {
   constexpr std::array<std::uint8_t, 4> kMagic = {'R', 'T', 'P', 'S'};
   if (size < kHeader || !std::equal(kMagic.begin(), kMagic.end(), message)) return {};
-  const bool is_of_eprosima = message[6] == 1 && message[7] == 15;
+  const bool is_of_fastdds = message[6] == 1 && message[7] == 15;
+  const bool is_of_cyclone = message[6] == 1 && message[7] == 16;
   Bytes rest(message, size, true);
   rest.skip(kHeader);
   while (rest.left() >= 4) {
@@ -135,7 +136,7 @@ std::optional<PlainAnnouncement> find_announcement(const std::uint8_t* message, 
     }
     found.is_leaving = (flags & kSample) == 0;
     std::copy_n(message + kPrefix, kPrefixSize, found.sender.bytes.begin());
-    if (is_new || !is_of_eprosima) return found;
+    if (is_of_fastdds ? is_new : !is_of_cyclone) return found;
     auto& copy = found.as_secure;
     copy.assign(message, message + size);
     const auto at = copy.begin() + (ids - message);

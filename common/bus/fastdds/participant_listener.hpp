@@ -29,7 +29,7 @@ class ParticipantListener : public DiscoveryListener {
     /// trap 28).
     bool has_plain_submessages = false;
     /// Its keys protect discovery, so that versions of Fast DDS before and since 2.13 do not
-    /// discover each other (README.md, trap 38).
+    /// discover each other, nor the later ones Cyclone DDS (README.md, trap 38).
     bool has_protected_discovery = false;
   };
 
@@ -86,7 +86,13 @@ class ParticipantListener : public DiscoveryListener {
         to_text(guid), describe(other.name, address, guid.guidPrefix),
         other.certificate.empty() ? "" : describe_identity({other.certificate, other.authority}));
     if (!other.is_secured) Refusals::of_process().note_refused(to_text(guid), kNoIdentity);
-    if (!other.version.empty()) judge_version(to_text(guid), other.version);
+    if (!other.version.empty())
+      judge_version(to_text(guid), other.version);
+    else if (own_.has_protected_discovery && !other.as_secure.empty())
+      Refusals::of_process().note_refused(
+          to_text(guid),
+          "another vendor's DDS: expected keys of ./sls keys DIR --other-vendors --mixed-versions, "
+          "got keys without them");
   }
 
   void on_endpoint(const EndpointNews& news) override {

@@ -73,6 +73,14 @@ TEST(OlderPeersTest, ALaterAnnouncementSaysThatThoseBeforeDoNotExist) {
                                   Bytes(expected.begin() + 20, expected.end()));
 }
 
+TEST(OlderPeersTest, AnnouncementsOfCycloneAreRepeated) {
+  const auto found = find(make_message(kName, 1, kPlainIds, 16));
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->name, "control_client");
+  EXPECT_FALSE(found->is_secured);
+  EXPECT_EQ(found->as_secure, make_message(kName, 1, kSecureIds, 16));
+}
+
 TEST(OlderPeersTest, AnnouncementsOfOthersAreNotRepeated) {
   const Bytes token = parameter(0x1001, word(0));
   const auto of_3 = find(make_message(kName + kProductVersion + token));
@@ -80,10 +88,9 @@ TEST(OlderPeersTest, AnnouncementsOfOthersAreNotRepeated) {
   EXPECT_EQ(of_3->name, "control_client");
   EXPECT_TRUE(of_3->is_secured);
   EXPECT_EQ(of_3->as_secure, Bytes());
-  const auto of_cyclone = find(make_message(kName, 1, kPlainIds, 16));
-  ASSERT_TRUE(of_cyclone);
-  EXPECT_FALSE(of_cyclone->is_secured);
-  EXPECT_EQ(of_cyclone->as_secure, Bytes());
+  const auto of_another_vendor = find(make_message(kName, 1, kPlainIds, 17));
+  ASSERT_TRUE(of_another_vendor);
+  EXPECT_EQ(of_another_vendor->as_secure, Bytes());
 }
 
 TEST(OlderPeersTest, OtherMessagesContainNone) {

@@ -122,6 +122,22 @@ TEST_F(RefusalsTest, OnlyKeysThatProtectDiscoverySeparateVersions) {
     }
 }
 
+TEST_F(RefusalsTest, OnlyKeysThatProtectDiscoveryKeepAnotherVendorsParticipantAway) {
+  for (const bool is_protected : {false, true}) {
+    ParticipantListener listener({true, false, is_protected});
+    PlainAnnouncement cyclone;
+    cyclone.name = "cyclone";
+    cyclone.is_secured = true;
+    cyclone.as_secure = {1};
+    listener.on_announcement(cyclone, "10.0.0.2");
+    EXPECT_EQ(said_.str().find("refused 'cyclone' (10.0.0.2, ") != std::string::npos, is_protected);
+    EXPECT_EQ(said_.str().find("expected keys of ./sls keys DIR --other-vendors --mixed-versions, "
+                               "got keys without them\n") != std::string::npos,
+              is_protected)
+        << said_.str();
+  }
+}
+
 TEST_F(RefusalsTest, OnlyAnotherVendorsParticipantNeedsKeysThatProtectSubmessages) {
   for (const bool has_plain_submessages : {false, true}) {
     Problems problems;
