@@ -9,7 +9,8 @@ import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BUILD = pathlib.Path(sys.argv[1]).resolve() if len(sys.argv) > 1 else ROOT / "build"
-COMMANDS = re.findall(r"^cmd_([\w-]+)\(\)", (ROOT / "sls").read_text(), re.MULTILINE)
+sys.path.insert(0, str(ROOT / "python"))
+from sls.launcher.commands import COMMANDS  # noqa: E402
 LONGEST_HELP = 50  # lines, about one screen
 
 

@@ -5,6 +5,7 @@ import os
 import pathlib
 import re
 import subprocess
+import sys
 import xml.etree.ElementTree as xml
 
 import yaml
@@ -12,6 +13,10 @@ import yaml
 import help_text
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+
+
+sys.path.insert(0, str(ROOT / "python"))
+from sls.launcher.commands import COMMANDS  # noqa: E402
 
 
 class StaleReference(Exception):
@@ -67,8 +72,8 @@ def read_version(build):
 
 
 def list_commands():
-    """The commands of ./sls: a function cmd_NAME each."""
-    return re.findall(r"^cmd_([\w-]+)\(\)", read("sls"), re.MULTILINE) + ["help"]
+    """The commands of ./sls."""
+    return list(COMMANDS)
 
 
 def read_launcher(build):

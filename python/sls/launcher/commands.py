@@ -1,0 +1,329 @@
+"""The commands of `./sls`."""
+
+import os
+import re
+import shutil
+import subprocess
+from collections.abc import Callable
+from typing import NoReturn
+
+from sls.launcher import building
+from sls.launcher.arguments import Parser
+from sls.launcher.building import (FLYING, PROGRAMS, PYTHON, build_programs, build_tree, install_missing,
+                                   install_node_modules, is_help_asked, replace_by, replace_by_program,
+                                   replace_by_python, setup)
+from sls.launcher.place import (BUILD, IS_BUILT_ELSEWHERE, IS_INSTALLED, PYTHON_PATH, ROOT, SELF, Failure,
+                                find_scenario, say)
+
+USAGE = """\
+usage: ./sls COMMAND [OPTIONS]
+       ./sls COMMAND --help     options of a command
+
+Fly
+  demo [SCENARIO]         set up, build, fly (default: figure_eight) and print a summary
+  run SCENARIO            fly a scenario on this machine and record it
+  view [DIR [DIR]]        show a live flight, a recording or two recordings in the browser
+  ctl COMMAND             pause, step, resume, start, reset or stop a run, or print its status
+  docker-demo [NAME]      fly in containers
+
+Recordings
+  verify A [B]            compare two recordings, or one recording with its manifest
+  convert DIR             write a recording as one MCAP file
+  plot DIR…               draw figures of recordings and of published logs
+  report DIR              write DIR/report.html: parameters, metrics, figures, events
+  python [ARGS]           run Python with the package `sls`
+
+Many flights
+  campaign FILE           fly many runs of one scenario with varied keys; also: status, report, compare
+  campaign-worker DIR     fly chunks of a campaign (started by Slurm and Kubernetes)
+  study                   repeat the published comparison and write docs/study.md
+  delay-margin SCENARIO   find the command delay at which the controller loses the load
+
+Network
+  doctor                  find out why data does not flow
+  keys DIR                make keys and signed permissions for config/qos/secure.xml
+  discovery-server        run a discovery server for config/qos/discovery_server.xml
+  network-table           fly each QoS profile through network disturbances; print a Markdown table
+
+Development
+  test                    set up, build and run the tests
+  bench                   measure speed, each figure beside its bound
+  chaos                   stop, continue, kill and restart processes of flights at random
+  fuzz                    feed mutated input to every reader of files and samples
+  reference               write docs/reference and the bash completion from the code's tables
+  docs                    build API pages of headers and Python package: build/docs/index.html
+  package                 build a Debian package: build/package/
+  systems [NAME…]         run the two commands in clean Debian systems and print a table
+  setup | build | clean   install packages | build all programs | remove what was built
+  help [COMMAND]          this text, or the options of a command
+
+environment: SLS_DOMAIN is the DDS domain of every program that is not given --domain
+--no-install with any command: install no Debian packages, use what is there
+exit codes: 0 done; 1 the run or a test failed; 2 bad usage or bad configuration; 130/143 interrupted
+"""
+SOURCE_COMMANDS = ("bench", "build", "chaos", "clean", "docker-demo", "docs", "fuzz", "network-table",
+                   "package", "reference", "setup", "study", "systems", "test")
+
+
+def set_up(words: list[str]) -> int:
+    Parser("setup", "", "Installs the packages that building and flying need.").parse(words)
+    setup()
+    return 0
+
+
+def build(words: list[str]) -> int:
+    Parser("build", "", "Sets up and builds; the programs are in build/bin.").parse(words)
+    build_programs(*PROGRAMS, "_sls_core")
+    say(f"programs in build/bin: {' '.join(PROGRAMS)}; the module of the package sls in build/python")
+    return 0
+
+
+def run(words: list[str]) -> int:
+    from sls.launcher import flights
+    return flights.run(words)
+
+
+def demo(words: list[str]) -> int:
+    from sls.launcher import flights
+    return flights.demo(words)
+
+
+def start(program: str, folder: str = "bin") -> Callable[[list[str]], int]:
+    """A command that takes the options of a program and becomes this program."""
+    return lambda words: replace_by_program(program, words, folder)
+
+
+def delay_margin(words: list[str]) -> NoReturn:
+    parser = Parser("delay-margin", "SCENARIO [--period-s X]",
+                    "Finds the command delay at which the controller loses the load; prints a table.")
+    parser.add_argument("--period-s", metavar="X", help="control period (default: the scenario's)")
+    options, scenario = parser.parse_scenario(words)
+    period = ["--period-s", options.period_s] if options.period_s is not None else []
+    replace_by_program("delay_margin", ["--scenario", find_scenario(scenario), *period])
+
+
+def bench(words: list[str]) -> NoReturn:
+    if not is_help_asked(words):
+        if not IS_BUILT_ELSEWHERE:
+            setup("bench_packages")
+            install_node_modules(ROOT / "tests/tools/view")
+        build_programs(*FLYING, "sim_ctl", "sls_view", "sls_bench_probe", "sls_bench_spinning_probe",
+                       "sls_microbench", "view_foxglove_publisher")
+    replace_by_python("-m", "bench", "--build", BUILD, *words, paths=[str(ROOT)])
+
+
+def python(words: list[str]) -> NoReturn:
+    if is_help_asked(words[:1]):  # the others are the script's
+        Parser("python", "[ARGS]", "Runs Debian's Python with the package `sls`. ARGS: a script, -m MODULE, "
+                                   "-c COMMAND, or none for a prompt.").parse(["--help"])
+    install_missing("python_packages")
+    build_programs("_sls_core")
+    more = [os.environ["PYTHONPATH"]] if os.environ.get("PYTHONPATH") else []
+    replace_by(PYTHON, "-B", *words, PYTHONPATH=":".join([*PYTHON_PATH, *more]))
+
+
+def plot(words: list[str]) -> NoReturn:
+    install_missing("python_packages")
+    replace_by_python("-m", "sls", "plot", *words)
+
+
+def report(words: list[str]) -> NoReturn:
+    variables = {}
+    if not is_help_asked(words):
+        build_programs("sls_view")
+        variables["SLS_VIEW"] = str(BUILD / "bin/sls_view")  # draws the report's scene
+    install_missing("python_packages")
+    replace_by_python("-m", "sls", "report", *words, **variables)
+
+
+def study(words: list[str]) -> NoReturn:
+    variables = {}
+    if not is_help_asked(words) and "--reuse" not in words:
+        build_programs(*FLYING, "delay_margin")
+        variables["SLS_BUILD"] = str(BUILD)  # the flights of the study fly side by side and must not build
+    install_missing("python_packages")
+    replace_by_python("-m", "sls", "study", *words, **variables)
+
+
+def campaign(words: list[str]) -> NoReturn:
+    if not is_help_asked(words) and words[:1] not in (["status"], ["report"], ["compare"]):
+        verifies = any(word.startswith("--verify") for word in words)
+        build_programs("_sls_core", *((*FLYING, "sls_verify") if verifies else ()))
+    install_missing("python_packages")
+    replace_by_python("-m", "sls.campaign", *words, SLS_BUILD=str(BUILD))  # flights over DDS must not build
+
+
+def campaign_worker(words: list[str]) -> NoReturn:
+    if not is_help_asked(words):
+        build_programs("_sls_core")
+    install_missing("python_packages")
+    replace_by_python("-m", "sls.campaign.worker", *words, SLS_BUILD=str(BUILD))
+
+
+def keys(words: list[str]) -> NoReturn:
+    if not shutil.which("openssl"):
+        setup()
+    replace_by(ROOT / "config/security/keys.sh", *words)
+
+
+def docker_demo(words: list[str]) -> int:
+    from sls.launcher.docker_demo import docker_demo
+    return docker_demo(words)
+
+
+def discovery_server(words: list[str]) -> NoReturn:
+    parser = Parser("discovery-server", "[--listen ADDRESS] [--port N]",
+                    "Runs a discovery server for config/qos/discovery_server.xml until it is stopped.")
+    parser.add_argument("--listen", metavar="ADDRESS",
+                        help="address to listen on (default: every address of this machine)")
+    parser.add_argument("--port", metavar="N", default="11811", help="UDP port (default: 11811)")
+    options, _ = parser.parse(words)
+    if not re.fullmatch("[1-9][0-9]{0,4}", options.port) or int(options.port) > 65535:
+        raise Failure(f"--port: expected 1 to 65535, got '{options.port}'", 2)
+    if not shutil.which("fast-discovery-server"):
+        setup("fastdds-tools")
+    say(f"discovery server on port {options.port}; clients: "
+        f"SLS_DISCOVERY_SERVER={options.listen or 'this machine'}")
+    # Number 0 has the identity that discovery_server.xml expects.
+    listen = ["-l", options.listen] if options.listen else []
+    replace_by("fast-discovery-server", "-i", "0", *listen, "-p", options.port)
+
+
+def network_table(words: list[str]) -> NoReturn:
+    if not IS_BUILT_ELSEWHERE and not is_help_asked(words):
+        setup("test_packages")
+    replace_by_program("network_table", words, "tests")
+
+
+def fuzz(words: list[str]) -> int:
+    from sls.launcher.fuzzing import fuzz
+    return fuzz(words)
+
+
+def test(words: list[str]) -> int:
+    parser = Parser("test", "[--slow | --sanitize KIND] [--only REGEX]",
+                    "Sets up, builds and runs the tests. build/test.xml has the output of each.")
+    parser.add_argument("--slow", action="store_true",
+                        help="also run the tests that take minutes; they need an idle machine")
+    parser.add_argument("--sanitize", metavar="KIND", help="run only the unit tests, built with a sanitizer: "
+                        "address; or thread, which runs those with several threads")
+    parser.add_argument("--only", metavar="REGEX", help="run only the tests whose names match")
+    options, _ = parser.parse(words)
+    if options.sanitize not in (None, "address", "thread") or options.only == "":
+        raise Failure(f"test: expected --slow, --sanitize address|thread or --only REGEX, got '{' '.join(words)}'", 2)
+    preset = {None: "release", "address": "asan", "thread": "tsan"}[options.sanitize]
+    folder = BUILD if preset == "release" else ROOT / f"build-{preset}"
+    which = [] if options.slow else ["--label-exclude", "slow"]
+    if preset == "tsan":
+        which = ["--label-regex", "threaded"]
+    if options.only:
+        which += ["--tests-regex", options.only]
+    setup("test_packages", "python_packages", "bench_packages", "doc_packages", "package_packages")
+    install_node_modules(ROOT / "tests/tools/view")
+    build_tree(preset, folder, *(["threaded_tests"] if preset == "tsan" else []))
+    # The tests must not get variables that the middleware reads from the environment.
+    variables = {name: value for name, value in os.environ.items()
+                 if name not in ("ROS_DISCOVERY_SERVER", "FASTRTPS_DEFAULT_PROFILES_FILE",
+                                 "FASTDDS_DEFAULT_PROFILES_FILE", "SLS_DOMAIN")}
+    # Most tests wait for processes and discovery: one more than there are cores leaves none idle.
+    parallel = str(len(os.sched_getaffinity(0)) + 1)
+    return subprocess.run(["ctest", "--preset", preset, "--parallel", parallel, "--output-junit",
+                           folder / "test.xml", *which], cwd=ROOT, env=variables, check=False).returncode
+
+
+def reference(words: list[str]) -> NoReturn:
+    if not is_help_asked(words):
+        install_missing("python_packages")
+        build_programs(*PROGRAMS, "_sls_core", "sls_scenario_keys", "network_table", "chaos")
+    replace_by(PYTHON, "-B", ROOT / "tools/reference", "--build", BUILD, *words)
+
+
+def docs(words: list[str]) -> int:
+    Parser("docs", "", "Builds API pages of the C++ and C headers and of the Python package:\n"
+                       "build/docs/index.html.").parse(words)
+    setup("doc_packages", "python_packages")
+    build_programs("_sls_core")  # its docstrings are pages, too
+    building.run(ROOT / "docs/api/build.sh", BUILD)
+    say(f"pages: {BUILD}/docs/index.html")
+    return 0
+
+
+def systems(words: list[str]) -> NoReturn:
+    if "aarch64" in words and not is_help_asked(words):
+        install_missing("python_packages")
+        build_programs(*FLYING)  # the other side of its flights
+    replace_by(PYTHON, "-B", ROOT / "tools/systems", *words)
+
+
+def package(words: list[str]) -> int:
+    parser = Parser("package", "[--system NAME]",
+                    "Builds a Debian package of all that a user needs: build/package/sls_VERSION_ARCHITECTURE.deb. "
+                    "The version ends with the name of the system, such as debian12.")
+    parser.add_argument("--system", metavar="NAME", help="build it in a clean tree of another system, debian12 "
+                        "or debian13, as ./sls systems does")
+    options, _ = parser.parse(words)
+    if options.system is not None:
+        systems(["--commands", "package", "--", options.system])
+    setup("package_packages")
+    build_tree("release", BUILD, "package_contents")
+    log = BUILD / "package.log"
+    with log.open("w", encoding="utf-8") as said:
+        done = subprocess.run(["cpack", "--config", BUILD / "CPackConfig.cmake", "-B", BUILD / "package"],
+                              stdout=said, stderr=said, check=False)
+    text = log.read_text(encoding="utf-8", errors="replace")
+    if done.returncode != 0:
+        say("\n".join(text.splitlines()[-15:]))
+        raise Failure(f"cpack failed (whole log: {log})")
+    made = re.search(r"^CPack: - package: (.*) generated\.$", text, re.MULTILINE)
+    say(f"package: {made[1] if made else ''}")
+    return 0
+
+
+def clean(words: list[str]) -> int:
+    Parser("clean", "", "Removes the folders build and build-*.").parse(words)
+    for folder in (ROOT / "build", *ROOT.glob("build-*")):
+        shutil.rmtree(folder, ignore_errors=True)
+    return 0
+
+
+def show_help(words: list[str]) -> int:
+    if not words or is_help_asked(words):
+        print(USAGE.replace("./sls", SELF), end="")
+        return 0
+    return call(words[0], ["--help"])
+
+
+COMMANDS: dict[str, Callable[[list[str]], int]] = {
+    "setup": set_up, "build": build, "run": run, "demo": demo, "view": start("sls_view"), "ctl": start("sim_ctl"),
+    "delay-margin": delay_margin, "bench": bench, "verify": start("sls_verify"), "convert": start("sls_convert"),
+    "python": python, "plot": plot, "report": report, "study": study, "campaign": campaign,
+    "campaign-worker": campaign_worker, "doctor": start("sls_doctor"), "keys": keys, "docker-demo": docker_demo,
+    "discovery-server": discovery_server, "network-table": network_table, "fuzz": fuzz,
+    "chaos": start("chaos", "tests"), "test": test, "reference": reference, "docs": docs, "systems": systems,
+    "package": package, "clean": clean, "help": show_help,
+}
+
+
+def call(command: str, words: list[str]) -> int:
+    if command not in COMMANDS:
+        raise Failure(f"unknown command '{command}' (see ./sls help)", 2)
+    if IS_INSTALLED and command in SOURCE_COMMANDS:
+        raise Failure(f"{command}: needs the source tree; this sls is installed without it", 2)
+    return COMMANDS[command](words)
+
+
+def main(words: list[str]) -> int:
+    """Runs the command and returns its exit code."""
+    if words[:1] == ["--no-install"]:
+        building.is_installing, words = False, words[1:]
+    command, words = (words[0], words[1:]) if words else ("help", [])
+    if command != "python" and "--no-install" in words:  # the options of python are the script's
+        building.is_installing = False
+        words = [word for word in words if word != "--no-install"]
+    try:
+        return call("help" if command in ("--help", "-h") else command, words)
+    except Failure as failure:
+        say(f"error: {failure}")
+        return failure.code
+    except KeyboardInterrupt:
+        return 130

@@ -1,0 +1,234 @@
+"""`./sls docker-demo`: builds the image and flies one of the compose files."""
+
+import os
+import re
+import shutil
+import subprocess
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from sls.launcher.arguments import Parser
+from sls.launcher.building import install_node_modules, run, setup
+from sls.launcher.flights import print_summary
+from sls.launcher.place import ROOT, Failure, find_scenario, say
+from sls.launcher.supervision import Supervisor
+
+NAMES = ("plain", "discovery", "standby", "secure", "fleet")
+BASES = {"debian12": "debian:bookworm-slim", "debian13": "debian:trixie-slim"}
+HALVES = ("0-3", "4-7")
+TEXT = """\
+Builds the image, flies in containers and prints the summary of ./sls demo. NAME is one of
+  plain      server, controller, recorder on a network of containers (default)
+  discovery  the same through a discovery server
+  standby    two controllers; the first is killed in flight
+  secure     with DDS Security; SLS_KEYS: the folder that ./sls keys made (default: new keys)
+  fleet      eight vehicles: one server flies 0 to 3, another 4 to 7, on the same domain
+
+SLS_IMAGE names an existing image to use; SLS_SYSTEM the system of a new one, debian12 or debian13
+(default: debian12); SLS_BASE its base (default: debian:bookworm-slim or debian:trixie-slim). Needs a
+Docker engine with docker compose or docker-compose."""
+
+
+def is_done(*command: str | Path, limit_s: float | None = None) -> bool:
+    try:
+        return subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False,
+                              timeout=limit_s).returncode == 0
+    except (OSError, subprocess.TimeoutExpired):
+        return False
+
+
+def read(*command: str) -> str:
+    return subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip()
+
+
+# --- the image ------------------------------------------------------------------------------------
+
+
+def find_compose() -> list[str]:
+    if not is_done("docker", "version"):
+        raise Failure("no Docker engine answers: expected one, such as of apt-get install docker.io docker-compose")
+    if is_done("docker", "compose", "version"):
+        return ["docker", "compose"]
+    if shutil.which("docker-compose"):
+        return ["docker-compose"]
+    raise Failure("expected docker compose or docker-compose, got neither: apt-get install docker-compose")
+
+
+def make_base(base: str) -> None:
+    if is_done("docker", "image", "inspect", base):
+        return
+    say(f"pulling {base}")
+    if is_done("docker", "pull", "--quiet", base, limit_s=120):
+        return
+    say("no image registry gives it: making it from Debian's packages")
+    if os.geteuid() != 0:
+        raise Failure(f"this needs root once: sudo docker/base-image.sh {base}")
+    if not shutil.which("debootstrap"):
+        setup("debootstrap")
+    run(ROOT / "docker/base-image.sh", base)
+
+
+def build_image() -> None:
+    if os.environ.get("SLS_IMAGE"):
+        return
+    system = os.environ.get("SLS_SYSTEM") or "debian12"
+    if system not in BASES:
+        raise Failure(f"SLS_SYSTEM: expected one of {' '.join(BASES)}, got '{system}'", 2)
+    base = os.environ.get("SLS_BASE") or BASES[system]
+    make_base(base)
+    if shutil.which("npm"):  # this machine may trust a proxy that the base image does not
+        install_node_modules(ROOT / "tools/view/page")
+    number, log = tempfile.mkstemp()
+    say(f"building the image sls for {system}, for the first time some minutes (log: {log})")
+    # An engine without BuildKit pulls the base of both systems, so both are the one that is here.
+    with open(number, "w", encoding="utf-8") as said:
+        done = subprocess.run(
+            ["docker", "build", "--build-arg", f"SYSTEM={system}", "--build-arg", f"DEBIAN12={base}",
+             "--build-arg", f"DEBIAN13={base}", "-f", ROOT / "docker/Dockerfile", "-t", "sls", "-t",
+             f"sls:{system}", ROOT], stdout=said, stderr=said, check=False)
+    if done.returncode != 0:
+        lines = Path(log).read_text(encoding="utf-8", errors="replace").splitlines()
+        for line in [line for line in lines if re.search("[eE]rror", line)][:20] or lines[-20:]:
+            say(line)
+        raise Failure(f"the image was not built (whole log: {log})")
+    os.unlink(log)
+
+
+# --- the flight -----------------------------------------------------------------------------------
+
+
+class Containers:
+    """The containers of one flight. Afterwards none is left, no network and no copy of keys."""
+
+    def __init__(self, name: str, compose: list[str], recording: Path) -> None:
+        self.file = f"docker/compose{'' if name == 'plain' else '.' + name}.yaml"
+        self.project = f"sls-demo-{os.getpid()}"
+        self.compose = [*compose, "--project-name", self.project, "--file", str(ROOT / self.file)]
+        self.recording = recording
+
+    def find(self, service: str) -> str:
+        return read("docker", "ps", "--all", "--quiet", "--filter", f"label=com.docker.compose.project={self.project}",
+                    "--filter", f"label=com.docker.compose.service={service}")
+
+    def start(self, supervisor: Supervisor, service: str) -> None:
+        """Starts a process that passes on signals, output and exit code of the container."""
+        supervisor.start(service, ["sh", "-c", 'exec "$@" >&2', "sh", "docker", "start", "--attach",
+                                   self.find(service)], patience_s=60)
+
+    def kill_in_flight(self, is_over: threading.Event) -> None:
+        """Kills the first controller once the recording has 800 of its steps."""
+        container, rows = self.find("controller"), self.recording / "command.csv"
+        while not rows.is_file() or rows.read_text(encoding="utf-8", errors="replace").count(",primary") <= 800:
+            if is_over.wait(0.02):
+                return
+        if is_done("docker", "kill", container):
+            say("killed the first controller")
+
+    def fly(self, name: str) -> int:
+        with Supervisor() as supervisor, self.removed_afterwards():
+            done = subprocess.run([*self.compose, "up", "--no-start"], stdout=subprocess.PIPE,
+                                  stderr=subprocess.STDOUT, text=True, check=False)
+            if done.returncode != 0:
+                for line in done.stdout.splitlines()[-5:]:
+                    say(line)
+                raise Failure("the containers were not made")
+            services, is_over = ["recorder", "server", "controller"], threading.Event()
+            if name == "fleet":
+                services = [f"{service}-{half}" for service in services for half in HALVES]
+            elif name == "discovery":
+                is_done("docker", "start", self.find("discovery"))
+            elif name == "standby":
+                services = ["recorder", "server", "standby"]
+                is_done("docker", "start", self.find("controller"))  # its end does not end the flight
+                threading.Thread(target=self.kill_in_flight, args=[is_over], daemon=True).start()
+            for service in services:
+                self.start(supervisor, service)
+            code = supervisor.wait_all()
+            is_over.set()
+            return code
+
+    @contextmanager
+    def removed_afterwards(self) -> Iterator[None]:
+        try:
+            yield
+        finally:
+            if not is_done(*self.compose, "down", "--volumes", "--timeout", "30"):
+                say("warning: docker compose down failed: see docker ps --all")
+
+
+def give(user: str, *folders: Path) -> None:
+    subprocess.run(["chown", "-R", user, "--", *folders], check=False)
+
+
+def prepare(name: str, scenario: Path, scratch: Path, user: str) -> None:
+    """Sets the variables that the compose files read."""
+    if name == "secure":
+        keys = scratch / "keys"
+        if os.environ.get("SLS_KEYS"):
+            shutil.copytree(os.environ["SLS_KEYS"], keys)
+        else:
+            run(ROOT / "config/security/keys.sh", keys)
+        give(user, keys)
+        os.environ["SLS_KEYS"] = str(keys)
+    if name == "fleet":
+        text = scenario.read_text(encoding="utf-8")
+        scenario = scratch / "scenario.yaml"
+        scenario.write_text(text if re.search("^vehicles:", text, re.MULTILINE) else text + "\nvehicles: 8\n",
+                            encoding="utf-8")
+        scratch.chmod(0o755)
+    os.environ["SLS_SCENARIO"] = str(scenario)
+
+
+def docker_demo(words: list[str]) -> int:
+    parser = Parser("docker-demo", "[NAME] [OPTIONS]", TEXT)
+    parser.add_argument("--scenario", metavar="SCENARIO", default="figure_eight",
+                        help="a name in config/scenarios or a path (default: figure_eight)")
+    parser.add_argument("--out", metavar="DIR", help="folder of the recording, new or empty; of a fleet it has a "
+                        "folder for each server's vehicles (default: recordings/docker-NAME-UTCTIME)")
+    parser.add_argument("--build", action="store_true", help="build only the image, for use with docker compose")
+    options, others = parser.parse(words, 2)
+    if len(others) > 1:
+        raise Failure(f"expected one name, got '{others[0]}' and '{others[1]}'", 2)
+    name = others[0] if others else "plain"
+    if name not in NAMES:
+        raise Failure(f"docker-demo: expected {', '.join(NAMES[:-1])} or {NAMES[-1]}, got '{name}'", 2)
+    if options.build:
+        find_compose()
+        build_image()
+        return 0
+    scenario = Path(find_scenario(options.scenario)).resolve()
+    if not scenario.is_file():
+        raise Failure(f"{scenario}: expected a scenario, got no such file", 2)
+    when = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime())
+    recording = Path(options.out or f"recordings/docker-{name}-{when}").resolve()
+    if recording.exists() and (not recording.is_dir() or any(recording.iterdir())):
+        raise Failure(f"{recording}: expected a new or empty folder, got files in it", 2)
+    compose = find_compose()
+    build_image()
+
+    parts = [recording / half for half in HALVES] if name == "fleet" else [recording]
+    for part in parts:
+        part.mkdir(parents=True, exist_ok=True)
+    # No program runs as root. If the caller is root, the image's user owns the folders during the flight.
+    is_root = os.geteuid() == 0
+    user = "1000:1000" if is_root else f"{os.geteuid()}:{os.getegid()}"
+    with tempfile.TemporaryDirectory() as scratch:
+        try:
+            if is_root:
+                give(user, recording)
+            prepare(name, scenario, Path(scratch), user)
+            os.environ.update(SLS_USER=user, SLS_RECORDING=str(recording))
+            containers = Containers(name, compose, recording)
+            say(f"flying {scenario.stem} with {containers.file}")
+            code = containers.fly(name)
+        finally:
+            if is_root:
+                give("0:0", recording)
+    if code == 0:
+        for part in parts:
+            print_summary(part)
+    return code

@@ -1,0 +1,59 @@
+"""`./sls fuzz`: runs libFuzzer's targets until one crashes."""
+
+import os
+import re
+import subprocess
+import tempfile
+from pathlib import Path
+
+from sls.launcher.arguments import Parser
+from sls.launcher.building import build_tree, setup
+from sls.launcher.place import ROOT, Failure, say
+
+FUZZERS = ("scenario", "qos_file", "csv", "recording", "samples", "foxglove", "web")
+SEEDS = {"scenario": ("config/scenarios", "tests/common/config/invalid"),
+         "qos_file": ("config/qos", "tests/common/bus/invalid")}
+
+
+def fuzz(words: list[str]) -> int:
+    parser = Parser("fuzz", "[--seconds N] [--target NAME]",
+                    "Feeds mutated input to every reader of files and samples until one crashes.")
+    parser.add_argument("--seconds", metavar="N", default="60",
+                        help="duration of all targets together (default: 60)")
+    parser.add_argument("--target", metavar="NAME",
+                        help=f"run only this target: {', '.join(FUZZERS[:-1])} or {FUZZERS[-1]}")
+    options, _ = parser.parse(words)
+    if not re.fullmatch("[1-9][0-9]{0,5}", options.seconds):
+        raise Failure(f"fuzz: --seconds: expected a whole number, got '{options.seconds}'", 2)
+    if options.target not in (None, *FUZZERS):
+        raise Failure(f"fuzz: --target: expected one of {' '.join(FUZZERS)}, got '{options.target}'", 2)
+    targets = [options.target] if options.target else FUZZERS
+    setup("fuzz_packages")
+    folder = ROOT / "build-fuzz"
+    build_tree("fuzz", folder, *(f"{target}_fuzzer" for target in targets))
+    for target in targets:
+        run_fuzzer(folder, target, -(-int(options.seconds) // len(targets)))
+    return 0
+
+
+def run_fuzzer(folder: Path, target: str, seconds: int) -> None:
+    """Keeps new inputs in FOLDER/corpus; fails at a crash."""
+    corpus, crashes, log = folder / "corpus" / target, folder / "crashes" / target, folder / f"{target}.log"
+    corpus.mkdir(parents=True, exist_ok=True)
+    crashes.mkdir(parents=True, exist_ok=True)
+    seeds = [ROOT / seed for seed in SEEDS.get(target, (f"tests/fuzz/corpus/{target}",))]
+    # A target that crashes does not tidy up. Libraries from packages are not instrumented, so overflow
+    # checks of containers would give false errors.
+    with tempfile.TemporaryDirectory() as scratch, log.open("w", encoding="utf-8") as said:
+        done = subprocess.run(
+            [folder / f"fuzz/{target}_fuzzer", corpus, *seeds, f"-max_total_time={seconds}", "-timeout=10",
+             "-rss_limit_mb=1024", "-max_len=33000", f"-artifact_prefix={crashes}/"], check=False, stdout=said,
+            stderr=said, env={**os.environ, "TMPDIR": scratch, "ASAN_OPTIONS": "detect_container_overflow=0"})
+    lines = log.read_text(encoding="utf-8", errors="replace").splitlines()
+    if done.returncode != 0:
+        for line in lines:
+            if re.search(r"ERROR|SUMMARY|runtime error|what\(\)", line):
+                say(line)
+        inputs = re.findall(re.escape(f"{crashes}/") + "[^']+", "\n".join(lines))
+        raise Failure(f"{target}: crashed (log: {log}) with the input {inputs[-1] if inputs else ''}")
+    say(f"{target}: {lines[-1] if lines else ''}")
