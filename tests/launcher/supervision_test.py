@@ -11,14 +11,14 @@ import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "python"))
-from sls.launcher.supervision import Supervisor  # noqa: E402
+from sls.launcher.supervision import WRITERS_PATIENCE_S, Supervisor  # noqa: E402
 
 del sys.argv[1:]  # the build tree
 # A launcher that starts stand-ins.
 LAUNCHER = """
 import sys
 from sls.launcher.supervision import Supervisor
-with Supervisor() as supervisor:
+with Supervisor(overrun_s={overrun}) as supervisor:
     for name, script in {programs!r}.items():
         supervisor.start(name, ["/bin/sh", "-c", script], patience_s={patience})
     code = supervisor.wait_all()
@@ -33,13 +33,13 @@ class SupervisionTest(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.folder = pathlib.Path(folder.name)
 
-    def start(self, patience=30.0, **programs):
+    def start(self, patience=30.0, overrun=60.0, **programs):
         """Each program writes its process id into NAME.pid when it is ready."""
         scripts = {name: script.replace("READY", f"echo $$ >{self.folder}/{name}.new; "
                                                  f"mv {self.folder}/{name}.new {self.folder}/{name}.pid")
                    for name, script in programs.items()}
         launcher = subprocess.Popen(
-            ["/usr/bin/python3", "-B", "-c", LAUNCHER.format(programs=scripts, patience=patience)],
+            ["/usr/bin/python3", "-B", "-c", LAUNCHER.format(programs=scripts, patience=patience, overrun=overrun)],
             env={**os.environ, "PYTHONPATH": str(ROOT / "python")}, stderr=subprocess.PIPE, text=True,
             start_new_session=True)
         self.addCleanup(self.kill, launcher)
@@ -83,8 +83,21 @@ class SupervisionTest(unittest.TestCase):
         for name in ("one", "two", "three"):
             os.kill(self.find(name), signal.SIGKILL)
         os.kill(launcher.pid, signal.SIGCONT)
-        launcher.wait(LIMIT_S)
-        self.assertEqual(launcher.returncode, 1)
+        self.expect_end(launcher, 1, "sls: one ended with 137 (SIGKILL: killed, perhaps for want of memory)")
+
+    def test_a_crash_and_a_full_shared_memory_are_named(self):
+        self.expect_end(self.start(one="kill -SEGV $$", two="exec sleep 100"), 1,
+                        "sls: one ended with 139 (SIGSEGV): ending the others")
+        self.expect_end(self.start(one="kill -BUS $$"), 1,
+                        "sls: one ended with 135 (SIGBUS: is /dev/shm full? (./sls doctor, docs/networks.md))")
+
+    def test_a_program_that_ends_well_before_the_flight_is_over_ends_the_run(self):
+        self.expect_end(self.start(overrun=0.3, one="exit 0", two="READY; exec sleep 100"), 1,
+                        "sls: one ended, but two did not within 0.3 s: ending the others")
+        with Supervisor(self.fail, overrun_s=0.1) as supervisor:  # unless it writes files
+            supervisor.start("one", ["true"])
+            supervisor.start("recorder", ["sleep", "0.5"], WRITERS_PATIENCE_S)
+            self.assertEqual(supervisor.wait_all(), 0)
 
     def test_interrupts_are_passed_on_and_are_the_exit_code(self):
         for number, passed_on, code in ((signal.SIGINT, "INT", 130), (signal.SIGTERM, "TERM", 143),
@@ -126,12 +139,14 @@ class SupervisionTest(unittest.TestCase):
         self.assertFalse(pathlib.Path("/proc", str(running)).exists())
 
     def test_a_program_beside_the_run_changes_nothing_and_ends_with_it(self):
-        said = []
-        for script in ("exit 3", "exec sleep 100"):
+        said, lines = [], {"exit 3": ["page ended with 3: the flight goes on"], "exec sleep 100": []}
+        for script, expected in lines.items():
+            said.clear()
             with Supervisor(said.append) as supervisor:
                 supervisor.start_beside("page", ["/bin/sh", "-c", script])
                 supervisor.start("one", ["sleep", "0.1"])
                 self.assertEqual(supervisor.wait_all(), 0)
+            self.assertEqual(said, expected)
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 # Generated from the help of ./sls and of the programs by ./sls reference; changes here are lost.
 # tests/docs/completion_test.py completes with it. shellcheck shell=bash
 
-_sls_commands="bench build campaign campaign-worker chaos clean convert ctl delay-margin demo discovery-server docker-demo docs doctor fuzz help keys network-table package plot python reference report run setup study systems test verify view"
+_sls_commands="bench build campaign campaign-worker chaos clean convert ctl delay-margin demo discovery-server docker-demo docs doctor fuzz help keys list network-table package plot python reference report run setup study systems test verify view"
 declare -gA _sls_options=(
   ["bench"]="--help --quick --json --only --out"
   ["build"]="--help"
@@ -21,13 +21,14 @@ declare -gA _sls_options=(
   ["fuzz"]="--help --seconds --target"
   ["help"]="--help"
   ["keys"]="--help --days --force --other-vendors --mixed-versions --add"
+  ["list"]="--help"
   ["network-table"]="--help --profile --disturbance --vehicles"
   ["package"]="--help --system"
   ["plot"]="--help --out --name --vehicle --format --rod-length-m"
   ["python"]="--help"
   ["reference"]="--help --build --man --check"
   ["report"]="--help --vehicle"
-  ["run"]="--help --out --force --qos --domain --period-s --mode --rtf --in-process --view --view-port"
+  ["run"]="--help --out --force --qos --domain --period-s --mode --rtf --in-process --view --view-port --json"
   ["setup"]="--help"
   ["study"]="--help --out --recordings --reuse --published --domain"
   ["systems"]="--help --commands --only --limit-minutes --need-gib --folder --keep"
@@ -45,7 +46,7 @@ declare -gA _sls_positionals=(
   ["convert"]="dir"
   ["delay-margin"]="scenario"
   ["demo"]="scenario"
-  ["help"]="bench build campaign campaign-worker chaos clean convert ctl delay-margin demo discovery-server docker-demo docs doctor fuzz help keys network-table package plot python reference report run setup study systems test verify view"
+  ["help"]="bench build campaign campaign-worker chaos clean convert ctl delay-margin demo discovery-server docker-demo docs doctor fuzz help keys list network-table package plot python reference report run setup study systems test verify view"
   ["keys"]="dir"
   ["plot"]="dir"
   ["report"]="dir"

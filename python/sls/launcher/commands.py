@@ -7,13 +7,14 @@ import subprocess
 from collections.abc import Callable
 from typing import NoReturn
 
+from sls import __version__
 from sls.launcher import building
-from sls.launcher.arguments import Parser
+from sls.launcher.arguments import Parser, above_zero, make_unknown_option, one_of, path, whole
 from sls.launcher.building import (FLYING, PROGRAMS, PYTHON, build_programs, build_tree, install_missing,
                                    install_node_modules, is_help_asked, replace_by, replace_by_program,
                                    replace_by_python, setup)
 from sls.launcher.place import (BUILD, IS_BUILT_ELSEWHERE, IS_INSTALLED, PYTHON_PATH, ROOT, SELF, Failure,
-                                find_scenario, say)
+                                find_file, list_names, say, suggest)
 
 USAGE = """\
 usage: ./sls COMMAND [OPTIONS]
@@ -24,6 +25,7 @@ Fly
   run SCENARIO            fly a scenario on this machine and record it
   view [DIR [DIR]]        show a live flight, a recording or two recordings in the browser
   ctl COMMAND             pause, step, resume, start, reset or stop a run, or print its status
+  list                    print the scenarios, control laws, plants and campaigns
   docker-demo [NAME]      fly in containers
 
 Recordings
@@ -58,9 +60,14 @@ Development
   help [COMMAND]          this text, or the options of a command
 
 environment: SLS_DOMAIN is the DDS domain of every program that is not given --domain
+--version: the version of sls
 --no-install with any command: install no Debian packages, use what is there
 exit codes: 0 done; 1 the run or a test failed; 2 bad usage or bad configuration; 130/143 interrupted
 """
+# Commands whose options a program or another Python module reads.
+FOREIGN = ("view", "ctl", "verify", "convert", "plot", "report", "study", "campaign", "campaign-worker", "doctor",
+           "bench", "network-table", "chaos", "reference", "systems")
+CONTROLS = ("pause", "step", "resume", "start", "reset", "stop", "status")
 SOURCE_COMMANDS = ("bench", "build", "chaos", "clean", "docker-demo", "docs", "fuzz", "network-table",
                    "package", "reference", "setup", "study", "systems", "test")
 
@@ -88,6 +95,11 @@ def demo(words: list[str]) -> int:
     return flights.demo(words)
 
 
+def print_list(words: list[str]) -> int:
+    from sls.launcher.listing import print_list
+    return print_list(words)
+
+
 def start(program: str, folder: str = "bin") -> Callable[[list[str]], int]:
     """A command that takes the options of a program and becomes this program."""
     return lambda words: replace_by_program(program, words, folder)
@@ -96,10 +108,11 @@ def start(program: str, folder: str = "bin") -> Callable[[list[str]], int]:
 def delay_margin(words: list[str]) -> NoReturn:
     parser = Parser("delay-margin", "SCENARIO [--period-s X]",
                     "Finds the command delay at which the controller loses the load; prints a table.")
-    parser.add_argument("--period-s", metavar="X", help="control period (default: the scenario's)")
+    parser.add_argument("--period-s", type=above_zero(), metavar="X",
+                        help="control period (default: the scenario's)")
     options, scenario = parser.parse_scenario(words)
     period = ["--period-s", options.period_s] if options.period_s is not None else []
-    replace_by_program("delay_margin", ["--scenario", find_scenario(scenario), *period])
+    replace_by_program("delay_margin", ["--scenario", scenario, *period])
 
 
 def bench(words: list[str]) -> NoReturn:
@@ -176,10 +189,9 @@ def discovery_server(words: list[str]) -> NoReturn:
                     "Runs a discovery server for config/qos/discovery_server.xml until it is stopped.")
     parser.add_argument("--listen", metavar="ADDRESS",
                         help="address to listen on (default: every address of this machine)")
-    parser.add_argument("--port", metavar="N", default="11811", help="UDP port (default: 11811)")
+    parser.add_argument("--port", type=whole(1, 65535), metavar="N", default="11811",
+                        help="UDP port (default: 11811)")
     options, _ = parser.parse(words)
-    if not re.fullmatch("[1-9][0-9]{0,4}", options.port) or int(options.port) > 65535:
-        raise Failure(f"--port: expected 1 to 65535, got '{options.port}'", 2)
     if not shutil.which("fast-discovery-server"):
         setup("fastdds-tools")
     say(f"discovery server on port {options.port}; clients: "
@@ -205,12 +217,10 @@ def test(words: list[str]) -> int:
                     "Sets up, builds and runs the tests. build/test.xml has the output of each.")
     parser.add_argument("--slow", action="store_true",
                         help="also run the tests that take minutes; they need an idle machine")
-    parser.add_argument("--sanitize", metavar="KIND", help="run only the unit tests, built with a sanitizer: "
+    parser.add_argument("--sanitize", type=one_of("address", "thread"), metavar="KIND", help="run only the unit tests, built with a sanitizer: "
                         "address; or thread, which runs those with several threads")
-    parser.add_argument("--only", metavar="REGEX", help="run only the tests whose names match")
+    parser.add_argument("--only", type=path("pattern"), metavar="REGEX", help="run only the tests whose names match")
     options, _ = parser.parse(words)
-    if options.sanitize not in (None, "address", "thread") or options.only == "":
-        raise Failure(f"test: expected --slow, --sanitize address|thread or --only REGEX, got '{' '.join(words)}'", 2)
     preset = {None: "release", "address": "asan", "thread": "tsan"}[options.sanitize]
     folder = BUILD if preset == "release" else ROOT / f"build-{preset}"
     which = [] if options.slow else ["--label-exclude", "slow"]
@@ -294,7 +304,7 @@ def show_help(words: list[str]) -> int:
 
 
 COMMANDS: dict[str, Callable[[list[str]], int]] = {
-    "setup": set_up, "build": build, "run": run, "demo": demo, "view": start("sls_view"), "ctl": start("sim_ctl"),
+    "setup": set_up, "build": build, "run": run, "demo": demo, "list": print_list, "view": start("sls_view"), "ctl": start("sim_ctl"),
     "delay-margin": delay_margin, "bench": bench, "verify": start("sls_verify"), "convert": start("sls_convert"),
     "python": python, "plot": plot, "report": report, "study": study, "campaign": campaign,
     "campaign-worker": campaign_worker, "doctor": start("sls_doctor"), "keys": keys, "docker-demo": docker_demo,
@@ -304,11 +314,41 @@ COMMANDS: dict[str, Callable[[list[str]], int]] = {
 }
 
 
+def check_words(command: str, words: list[str]) -> None:
+    """Judges options, subcommands and names by the tables of the completion, before anything is built.
+
+    Commands without a table, and an installed launcher, which builds nothing, leave it to the program."""
+    file = ROOT / "tools/completion/sls.bash"
+    if command not in FOREIGN or is_help_asked(words) or not file.is_file():
+        return
+    rows = re.findall(r'^  \["([\w -]+)"\]="(.*)"$', file.read_text(encoding="utf-8"), re.MULTILINE)
+    table = dict(reversed(rows))  # of several rows of a command the first has its options
+    known, others, takes_value = table.get(command, "").split(), [], False
+    for word in words:
+        if word == "--":
+            break
+        name = word.partition("=")[0]
+        if takes_value:
+            takes_value = False
+        elif not word.startswith("--"):
+            others.append(word)
+        elif not any(option.startswith(name) for option in known):
+            raise make_unknown_option(command, word, known)
+        else:
+            takes_value = f"{command} {word}" in table
+    if command == "ctl" and others and others[0] not in CONTROLS:
+        raise Failure(f"ctl: expected {', '.join(CONTROLS[:-1])} or {CONTROLS[-1]}, got '{others[0]}'"
+                      f"{suggest(others[0], CONTROLS)}", 2)
+    if command == "campaign" and len(others) == 1:
+        find_file("campaigns", others[0])
+
+
 def call(command: str, words: list[str]) -> int:
     if command not in COMMANDS:
-        raise Failure(f"unknown command '{command}' (see ./sls help)", 2)
+        raise Failure(f"unknown command '{command}'{suggest(command, COMMANDS)} (see ./sls help)", 2)
     if IS_INSTALLED and command in SOURCE_COMMANDS:
         raise Failure(f"{command}: needs the source tree; this sls is installed without it", 2)
+    check_words(command, words)
     return COMMANDS[command](words)
 
 
@@ -320,6 +360,9 @@ def main(words: list[str]) -> int:
     if command != "python" and "--no-install" in words:  # the options of python are the script's
         building.is_installing = False
         words = [word for word in words if word != "--no-install"]
+    if command == "--version":
+        print(f"sls {__version__}")
+        return 0
     try:
         return call("help" if command in ("--help", "-h") else command, words)
     except Failure as failure:

@@ -14,7 +14,7 @@ from pathlib import Path
 from sls.launcher.arguments import Parser
 from sls.launcher.building import install_node_modules, run, setup
 from sls.launcher.flights import print_summary
-from sls.launcher.place import ROOT, Failure, find_scenario, say
+from sls.launcher.place import ROOT, Failure, find_file, say
 from sls.launcher.supervision import Supervisor
 
 NAMES = ("plain", "discovery", "standby", "secure", "fleet")
@@ -200,9 +200,7 @@ def docker_demo(words: list[str]) -> int:
         find_compose()
         build_image()
         return 0
-    scenario = Path(find_scenario(options.scenario)).resolve()
-    if not scenario.is_file():
-        raise Failure(f"{scenario}: expected a scenario, got no such file", 2)
+    scenario = Path(find_file("scenarios", options.scenario)).resolve()
     when = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime())
     recording = Path(options.out or f"recordings/docker-{name}-{when}").resolve()
     if recording.exists() and (not recording.is_dir() or any(recording.iterdir())):

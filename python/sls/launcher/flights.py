@@ -1,34 +1,42 @@
 """`./sls run` and `./sls demo`: options of a flight, its programs, its summary."""
 
 import csv
+import errno
+import json
+import os
+import socket
 import subprocess
 import time
-from argparse import Namespace
+from argparse import ArgumentTypeError, Namespace
 from pathlib import Path
 
-from sls.launcher.arguments import Parser
+from sls.launcher.arguments import Parser, above_zero, one_of, path, whole
 from sls.launcher.building import FLYING, build_programs
-from sls.launcher.place import BUILD, ROOT, SELF, Failure, find_scenario, say
+from sls.launcher.place import BUILD, ROOT, Failure, say
 from sls.launcher.supervision import WRITERS_PATIENCE_S, Supervisor
 
 TIMING = ("--period-s", "--mode", "--rtf")
+DOMAIN = whole(0, 232)
+USUAL_PORT = "8765"
 
 
 def make_parser(command: str, usage: str, text: str) -> Parser:
     parser = Parser(command, usage, text + "\n\nSCENARIO is a name in config/scenarios or a path.")
     add = parser.add_argument
-    add("--out", metavar="DIR", help="folder of the recording (default: recordings/NAME-UTCTIME)")
+    add("--out", type=path("folder"), metavar="DIR", help="folder of the recording (default: recordings/NAME-UTCTIME)")
     add("--force", action="store_true", help="replace an existing recording")
-    add("--qos", metavar="FILE", help="QoS profiles (default: config/qos/default.xml)")
-    add("--domain", metavar="N", help="DDS domain, 0 to 232 (default: 0)")
-    add("--period-s", metavar="X", help="control period (default: the scenario's)")
-    add("--mode", metavar="MODE", help="lockstep or realtime (default: the scenario's)")
-    add("--rtf", metavar="X", help="real-time factor, realtime mode only (default: the scenario's)")
+    add("--qos", type=path("file"), metavar="FILE", help="QoS profiles (default: config/qos/default.xml)")
+    add("--domain", type=DOMAIN, metavar="N", help="DDS domain, 0 to 232 (default: 0)")
+    add("--period-s", type=above_zero(), metavar="X", help="control period (default: the scenario's)")
+    add("--mode", type=one_of("lockstep", "realtime"), metavar="MODE", help="lockstep or realtime (default: the scenario's)")
+    add("--rtf", type=above_zero(1000), metavar="X",
+        help="real-time factor, realtime mode only (default: the scenario's)")
     add("--in-process", action="store_true",
         help="fly in one process without DDS: same data, same certificate")
     add("--view", action="store_true",
         help="also show the flight in the browser; prints the address of the page")
-    add("--view-port", metavar="N", help="like --view, on port N; 0: any free port (default: 8765)")
+    add("--view-port", type=whole(0, 65535), metavar="N",
+        help="like --view, on port N; 0: any free port (default: 8765)")
     return parser
 
 
@@ -38,23 +46,45 @@ def pass_on(options: Namespace, *names: str) -> list[str]:
     return [word for name, value in values if value is not None for word in (name, value)]
 
 
-def build_for_flight(options: Namespace) -> None:
-    viewer = ["sls_view"] if options.view or options.view_port is not None else []
-    build_programs(*FLYING, *viewer)
+def prepare(options: Namespace) -> None:
+    """Judges what can be judged without the programs, then builds them."""
+    if options.view and options.view_port is None:
+        options.view_port = USUAL_PORT
+    if options.in_process:
+        if pass_on(options, "--qos", "--domain", "--mode", "--rtf", "--view-port"):
+            raise Failure("--in-process: expected no --qos, --domain, --mode, --rtf or --view with "
+                          "it: one process has no network and no clock", 2)
+    elif options.domain is None and os.environ.get("SLS_DOMAIN"):
+        try:
+            DOMAIN(os.environ["SLS_DOMAIN"])
+        except ArgumentTypeError as error:
+            raise Failure(f"SLS_DOMAIN: {error}", 2) from None
+    if options.view_port is not None:
+        check_port(options)
+    build_programs(*FLYING, *([] if options.view_port is None else ["sls_view"]))
 
 
-def fly(options: Namespace, scenario: str) -> tuple[int, str]:
+def check_port(options: Namespace) -> None:
+    """Opens the viewer's port for a moment: without its page the flight is not what was asked for."""
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind(("127.0.0.1", int(options.view_port)))
+            probe.listen()
+        except OSError as error:
+            reason = "another program uses it" if error.errno == errno.EADDRINUSE else error.strerror
+            raise Failure(f"{'--view' if options.view else '--view-port'}: expected a free port, got "
+                          f"{options.view_port}: {reason} (--view-port 0 takes any free one)", 2) from None
+
+
+def fly(options: Namespace, file: str) -> tuple[int, str]:
     """Flies; returns the exit code and the folder of the recording."""
-    file = find_scenario(scenario)
     name = Path(file).name.removesuffix(".yaml")
     recording = options.out or f"recordings/{name}-{time.strftime('%Y%m%dT%H%M%SZ', time.gmtime())}"
     out = ["--out", recording, *(["--force"] if options.force else [])]
     network = pass_on(options, "--qos", "--domain")
     with Supervisor() as supervisor:
         if options.in_process:
-            if network or options.view or pass_on(options, "--view-port", "--mode", "--rtf"):
-                raise Failure("--in-process: expected no --qos, --domain, --mode, --rtf or --view with "
-                              "it: one process has no network and no clock", 2)
             supervisor.start("closed_loop", [BUILD / "bin/closed_loop", "--scenario", file, *out,
                                              *pass_on(options, "--period-s")], WRITERS_PATIENCE_S)
             return supervisor.wait_all(), recording
@@ -64,14 +94,25 @@ def fly(options: Namespace, scenario: str) -> tuple[int, str]:
         # Checks first, so that a mistake gives one error line and not one from each program.
         check("sim_server", *server)
         check("recorder", *recorder)
-        if options.view or options.view_port is not None:
-            port = "8765" if options.view_port is None else options.view_port
-            supervisor.start_beside("sls_view", [BUILD / "bin/sls_view", "--port", port, *network])
+        if options.view_port is not None:
+            supervisor.start_beside("sls_view", [BUILD / "bin/sls_view", "--port", options.view_port,
+                                                 *network])
         supervisor.start("recorder", [BUILD / "bin/recorder", *recorder], WRITERS_PATIENCE_S)
         supervisor.start("sim_server", [BUILD / "bin/sim_server", *server])
         supervisor.start("control_client",
                          [BUILD / "bin/control_client", "--scenario", file, *network])
         return supervisor.wait_all(), recording
+
+
+def print_json(code: int, recording: str) -> None:
+    """What a script asks about a flight: the parts of the manifest that are not about files or the machine."""
+    try:
+        manifest = json.loads((Path(recording) / "manifest.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        manifest = {}
+    names = ("scenario", "complete", "outcome", "reason", "last_step", "period_s", "mode", "timing", "vehicle_ids",
+             "certificate", "run_id")
+    print(json.dumps({"exit_code": code, "recording": recording, **{name: manifest.get(name) for name in names}}))
 
 
 def check(program: str, *words: str) -> None:
@@ -82,11 +123,16 @@ def check(program: str, *words: str) -> None:
 
 
 def run(words: list[str]) -> int:
-    options, scenario = make_parser("run", "SCENARIO [OPTIONS]", """\
+    parser = make_parser("run", "SCENARIO [OPTIONS]", """\
 Runs server, client and recorder on this machine. Exit code 0: the mission finished and the
-recording is complete.""").parse_scenario(words)
-    build_for_flight(options)
+recording is complete.""")
+    parser.add_argument("--json", action="store_true",
+                        help="print a summary for machines on stdout: one line of JSON")
+    options, scenario = parser.parse_scenario(words)
+    prepare(options)
     code, recording = fly(options, scenario)
+    if options.json:
+        print_json(code, recording)
     if code == 0:
         say(f"recording: {recording}")
     return code
@@ -96,8 +142,8 @@ def demo(words: list[str]) -> int:
     options, scenario = make_parser("demo", "[SCENARIO] [OPTIONS]", """\
 Sets up, builds, flies a scenario (default: figure_eight) and prints a summary.""").parse_scenario(
         words, "figure_eight")
-    build_for_flight(options)
-    say(f"flying {scenario}")
+    prepare(options)
+    say(f"flying {Path(scenario).name.removesuffix('.yaml')}")
     code, recording = fly(options, scenario)
     if code == 0:
         print_summary(Path(recording))

@@ -1,7 +1,9 @@
 """Where the launcher is and what it says: paths, messages, names of scenarios."""
 
+import difflib
 import os
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -33,8 +35,19 @@ def list_names(kind: str) -> list[str]:
     return sorted(file.stem for file in (ROOT / "config" / kind).glob("*.yaml"))
 
 
-def find_scenario(name: str) -> str:
-    """The file of a scenario; a name means that in config/scenarios."""
-    if "/" in name or name.endswith(".yaml") or os.path.isfile(name):
-        return name
-    return str(ROOT / f"config/scenarios/{name}.yaml")
+def suggest(word: str, names: Iterable[str]) -> str:
+    """The end of an error line: the name that is nearest to the word, if one is near."""
+    near = difflib.get_close_matches(word, list(names), 1)
+    return f"; did you mean '{near[0]}'?" if near else ""
+
+
+def find_file(kind: str, name: str) -> str:
+    """The file of a scenario or a campaign. A name means that in config/KIND, `scenarios` or `campaigns`.
+
+    @throws Failure if there is none."""
+    is_path = "/" in name or name.endswith((".yaml", ".yml")) or os.path.isfile(name)
+    file = name if is_path else str(ROOT / f"config/{kind}/{name}.yaml")
+    if not os.path.exists(file):
+        raise Failure(f"{file}: expected a {kind[:-1]}, got no such file"
+                      + suggest(Path(name).stem, list_names(kind)), 2)
+    return file

@@ -16,6 +16,10 @@ STOP = {signal.SIGINT: (130, signal.SIGINT), signal.SIGTERM: (143, signal.SIGTER
         signal.SIGHUP: (143, signal.SIGTERM)}
 # Programs give up 20 s after a stop signal. One that writes its files may need much longer.
 USUAL_PATIENCE_S, WRITERS_PATIENCE_S = 30.0, 600.0
+# Programs of a flight end together, but for those that write files.
+OVERRUN_S = 60.0
+CAUSES = {signal.SIGBUS: ": is /dev/shm full? (./sls doctor, docs/networks.md)",
+          signal.SIGKILL: ": killed, perhaps for want of memory"}
 
 
 @dataclass
@@ -29,8 +33,10 @@ class Program:
 class Supervisor:
     """Use it in a `with` statement. Afterwards no program that it started runs."""
 
-    def __init__(self, say: Callable[[str], None] = say) -> None:
+    def __init__(self, say: Callable[[str], None] = say, overrun_s: float = OVERRUN_S) -> None:
         self._say = say
+        self._overrun_s = overrun_s
+        self._first_end: tuple[float, str] | None = None  # of a program that ended well
         self._running: list[Program] = []
         self._beside: Program | None = None
         self._interrupted = 0
@@ -75,9 +81,7 @@ class Supervisor:
                 code, passed_on = STOP[signal.Signals(received.si_signo)]
                 self._interrupted = code
                 self._stop(passed_on)
-            elif received is None:
-                self._kill_late()
-            result = self._reap(result)
+            result = self._end_late(self._reap(result))
         return self._interrupted or result
 
     def _spawn(self, command: Sequence[str | Path]) -> "subprocess.Popen[bytes]":
@@ -91,12 +95,22 @@ class Supervisor:
         for program in ended:
             code = program.process.returncode
             code = code if code >= 0 else 128 - code
+            if code == 0:
+                self._first_end = self._first_end or (time.monotonic(), program.name)
             if code == 0 or result != 0:
                 continue
             result = 2 if code == 2 else 1
-            if self._running and not self._interrupted:
-                self._say(f"{program.name} ended with {code}: ending the others")
+            if self._stopped_at is None:
+                others = ": ending the others" if self._running else ""
+                if program.process.returncode < 0:
+                    number = signal.Signals(-program.process.returncode)
+                    self._say(f"{program.name} ended with {code} ({number.name}{CAUSES.get(number, '')}){others}")
+                elif others:
+                    self._say(f"{program.name} ended with {code}{others}")
             self._stop(signal.SIGTERM)
+        if self._beside and self._stopped_at is None and self._beside.process.poll() is not None:
+            self._say(f"{self._beside.name} ended with {self._beside.process.returncode}: the flight goes on")
+            self._beside = None
         return result
 
     def _stop(self, number: int) -> None:
@@ -105,18 +119,30 @@ class Supervisor:
         if self._stopped_at is None:
             self._stopped_at = time.monotonic()
 
-    def _calc_seconds_left(self) -> float:
-        """Until the next program is killed; sigtimedwait takes no infinity."""
-        if self._stopped_at is None:
-            return 3600.0
-        late = [self._stopped_at + program.patience_s for program in self._running if not program.is_killed]
-        return max(min(late, default=time.monotonic() + 3600.0) - time.monotonic(), 0.0)
+    def _list_deadlines(self) -> list[tuple[float, Program]]:
+        """When which program is killed, or, before a stop signal, is asked to end."""
+        if self._stopped_at is not None:
+            return [(self._stopped_at + program.patience_s, program) for program in self._running
+                    if not program.is_killed]
+        if self._first_end is None:
+            return []
+        return [(self._first_end[0] + self._overrun_s, program) for program in self._running
+                if program.patience_s < WRITERS_PATIENCE_S]
 
-    def _kill_late(self) -> None:
-        for program in self._running:
-            if self._stopped_at is None or program.is_killed:
-                continue
-            if time.monotonic() >= self._stopped_at + program.patience_s:
-                self._say(f"{program.name} did not end {program.patience_s:g} s after the stop signal: killed")
-                program.process.kill()
-                program.is_killed = True
+    def _calc_seconds_left(self) -> float:
+        """Until the next deadline; sigtimedwait takes no infinity."""
+        next_one = min((when for when, _ in self._list_deadlines()), default=time.monotonic() + 3600.0)
+        return max(next_one - time.monotonic(), 0.0)
+
+    def _end_late(self, result: int) -> int:
+        late = [program for when, program in self._list_deadlines() if when <= time.monotonic()]
+        if late and self._stopped_at is None and self._first_end is not None:
+            self._say(f"{self._first_end[1]} ended, but {', '.join(program.name for program in late)} did not "
+                      f"within {self._overrun_s:g} s: ending the others")
+            self._stop(signal.SIGTERM)
+            return result or 1
+        for program in late:
+            self._say(f"{program.name} did not end {program.patience_s:g} s after the stop signal: killed")
+            program.process.kill()
+            program.is_killed = True
+        return result
