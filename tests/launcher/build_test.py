@@ -61,7 +61,7 @@ class BuildTest(unittest.TestCase):
         (self.root / name).write_text(text)
 
     def start(self, root=None):
-        return subprocess.Popen([(root or self.root) / "sls", "run", "hover", "--in-process"], env=self.environment,
+        return subprocess.Popen([(root or self.root) / "sls", "run", "short", "--in-process"], env=self.environment,
                                 cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
     def launch(self, root=None):
