@@ -33,7 +33,7 @@ struct ThreadRecord {
   Call call;
   sigjmp_buf place;
   bool has_place = false;
-  int crash = 0;  // the signal
+  int crash = 0;                         // the signal
   std::array<char, 16384> signal_stack;  // a stack overflow leaves no room on the thread's own
 };
 

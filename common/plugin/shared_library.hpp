@@ -24,9 +24,9 @@ struct Call {
 };
 
 /// Marks the thread as inside a library while the object exists. If the thread crashes or exits
-/// meanwhile, a line on stderr names the call before the process ends. A call that does not return is reported
-/// after 2 s. After 60 s, or the time given to `set_patience`, the process ends with exit code 1.
-/// Times when the process is stopped (SIGSTOP) do not count.
+/// meanwhile, a line on stderr names the call before the process ends. A call that does not return
+/// is reported after 2 s. After 60 s, or the time given to `set_patience`, the process ends with
+/// exit code 1. Times when the process is stopped (SIGSTOP) do not count.
 class CallGuard {
  public:
   explicit CallGuard(const Call& call);
