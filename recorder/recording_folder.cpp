@@ -122,7 +122,7 @@ void prepare_recording_folder(const fs::path& folder, bool force) {
   for (const auto& entry : list(place, folder))
     throw ConfigError(place + ": expected an empty folder, got one with '" +
                       entry.path().filename().string() +
-                      "' in it (--force replaces a recording, --resume continues one)");
+                      "' in it (--force replaces a recording, recorder --resume continues one)");
 }
 
 std::optional<RecordedFlight> find_unfinished_recording(const fs::path& folder) {

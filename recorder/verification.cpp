@@ -4,9 +4,12 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <fstream>
+#include <limits>
 #include <map>
 #include <set>
+#include <type_traits>
 
 #include "recorder/certificate.hpp"
 
@@ -81,13 +84,20 @@ void certify(const RecordedFlight& flight, Inspection& inspection) {
 struct FieldLister {
   std::vector<std::string> texts;
   std::vector<bool> are_nan;
+  std::vector<double> numbers;  // NaN for a text
 
   template <class Field>
   void operator()(const Column& column, const Field& field) {
     for_each_component(field, [&](const auto& component) {
       are_nan.push_back(component != component);
       texts.push_back(column.is_certified ? format(component) : "");
+      numbers.push_back(to_number(component));
     });
+  }
+  template <class Number>
+  static double to_number(const Number& number) {
+    if constexpr (std::is_arithmetic_v<Number>) return static_cast<double>(number);
+    return std::numeric_limits<double>::quiet_NaN();
   }
   template <class Number>
   static std::string format(const Number& number) {
@@ -123,7 +133,9 @@ std::optional<std::string> compare_rows(const std::optional<Row>& a, const std::
     if (of_a.texts[i] != of_b.texts[i])
       return fmt::format(
           "{}, {}: {} in A, {} in B{}", place, columns[i], of_a.texts[i], of_b.texts[i],
-          of_a.are_nan[i] && of_b.are_nan[i] ? " (neither is a number; their signs differ)" : "");
+          of_a.are_nan[i] && of_b.are_nan[i]   ? " (neither is a number; their signs differ)"
+          : of_a.numbers[i] == of_b.numbers[i] ? " (equal numbers of other bits)"
+                                               : "");
   return fmt::format("{}: {} fields in A, {} in B", place, of_a.texts.size(), of_b.texts.size());
 }
 
@@ -148,6 +160,37 @@ std::optional<Difference> compare_next(const std::optional<StepRows>& a,
   if (auto text = compare_steps(*a, *b, flight)) return Difference{a->step, *text};
   return std::nullopt;
 }
+
+/// The largest deviation of each column of one kind of row.
+template <class Row>
+class Deviations {
+ public:
+  explicit Deviations(const RecordedFlight& flight) : columns_(read_columns<Row>(flight)) {}
+
+  void add(const std::optional<Row>& a, const std::optional<Row>& b, const StepRows& step) {
+    if (!a || !b || to_bytes(*a) == to_bytes(*b)) return;
+    const FieldLister of_a = list_fields(*a), of_b = list_fields(*b);
+    for (std::size_t i = 0; i < std::min({of_a.texts.size(), of_b.texts.size(), columns_.size()});
+         ++i) {
+      if (of_a.texts[i] == of_b.texts[i]) continue;
+      const double size = std::abs(of_a.numbers[i] - of_b.numbers[i]);
+      const auto [found, is_new] =
+          worst_.try_emplace(i, Deviation{fmt::format("{}, {}", Row::kFile, columns_[i]), size,
+                                          step.vehicle_id, step.step});
+      const bool is_larger =
+          size > found->second.largest || (std::isnan(size) && !std::isnan(found->second.largest));
+      if (!is_new && is_larger)
+        found->second = {found->second.column, size, step.vehicle_id, step.step};
+    }
+  }
+  void list(std::vector<Deviation>& all) const {
+    for (const auto& [column, deviation] : worst_) all.push_back(deviation);
+  }
+
+ private:
+  std::vector<std::string> columns_;
+  std::map<std::size_t, Deviation> worst_;
+};
 
 }  // namespace
 
@@ -186,6 +229,44 @@ std::optional<Difference> find_first_difference(const RecordedFlight& a, const R
       id = is_over ? ids.erase(id) : std::next(id);
     }
   return first;
+}
+
+std::vector<Deviation> list_deviations(const RecordedFlight& a, const RecordedFlight& b) {
+  StepReader reader_a(a), reader_b(b);
+  Deviations<StateRow> states(a);
+  Deviations<CommandRow> commands(a);
+  Deviations<ReferenceRow> references(a);
+  std::vector<std::uint32_t> ids = a.vehicle_ids();
+  while (!ids.empty())
+    for (auto id = ids.begin(); id != ids.end();) {
+      auto step_a = reader_a.next(*id), step_b = reader_b.next(*id);
+      while (step_a && step_b && step_a->step != step_b->step)
+        if (step_a->step < step_b->step)
+          step_a = reader_a.next(*id);
+        else
+          step_b = reader_b.next(*id);
+      if (!step_a || !step_b) {
+        id = ids.erase(id);
+        continue;
+      }
+      states.add(step_a->state, step_b->state, *step_a);
+      commands.add(step_a->command, step_b->command, *step_a);
+      references.add(step_a->reference, step_b->reference, *step_a);
+      ++id;
+    }
+  std::vector<Deviation> all;
+  states.list(all);
+  commands.list(all);
+  references.list(all);
+  return all;
+}
+
+std::string describe(const Deviation& deviation) {
+  const std::string place =
+      fmt::format(", vehicle {}, step {}", deviation.vehicle_id, deviation.step);
+  if (std::isnan(deviation.largest)) return deviation.column + ": other values" + place;
+  if (deviation.largest == 0) return deviation.column + ": other bits of equal numbers" + place;
+  return fmt::format("{}: {:.3g}{}", deviation.column, deviation.largest, place);
 }
 
 std::vector<std::string> list_notes(const RecordedFlight& a, const RecordedFlight& b) {
