@@ -12,7 +12,7 @@ import sys
 import tempfile
 import unittest
 
-import support
+import checkout
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BUILD = pathlib.Path(sys.argv[1]).resolve() if len(sys.argv) > 1 else ROOT / "build"
@@ -42,7 +42,7 @@ class BuildTest(unittest.TestCase):
         for name in ("sls", "CMakePresets.json"):
             shutil.copy(ROOT / name, self.root)
         for name in ("python/sls/__init__.py", "python/sls/launcher", "config/scenarios"):
-            support.copy(name, self.root)
+            checkout.copy(name, self.root)
         self.write("CMakeLists.txt", CMAKE)
         self.write("main.c", MAIN)
         self.write("text.h", '#define TEXT "first"\n')

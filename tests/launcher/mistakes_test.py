@@ -5,6 +5,7 @@ The launcher runs in a small checkout. Stand-ins for what sets up and builds rec
 import json
 import os
 import pathlib
+import pty
 import re
 import signal
 import socket
@@ -14,11 +15,12 @@ import tempfile
 import time
 import unittest
 
-import support
+import checkout
 
-ROOT = support.ROOT
+ROOT = checkout.ROOT
 BUILD = pathlib.Path(sys.argv[1]).resolve() if len(sys.argv) > 1 else ROOT / "build"
-sys.path.insert(0, str(ROOT / "python"))
+sys.path[:0] = [str(ROOT / "python"), str(ROOT / "tests/support")]
+from own_domain import OwnDomain  # noqa: E402
 from sls import __version__  # noqa: E402
 from sls.launcher import listing  # noqa: E402
 from sls.launcher.commands import FOREIGN, check_words  # noqa: E402
@@ -69,7 +71,7 @@ class MistakesTest(unittest.TestCase):
         self.folder = pathlib.Path(folder.name).resolve()
         self.root = self.folder / "checkout"
         for name in ("sls", "python/sls/__init__.py", "python/sls/launcher", "config", "tools/completion"):
-            support.copy(name, self.root)
+            checkout.copy(name, self.root)
         (self.folder / "bin").mkdir()
         for name in ("cmake", "ninja", "dpkg-query", "apt-get", "node", "npm"):
             program = self.folder / "bin" / name
@@ -155,6 +157,23 @@ class AnswersTest(unittest.TestCase):
         self.assertEqual(said.count("\n"), 1)
         self.assertEqual((summary["exit_code"], summary["recording"], summary["complete"]), (0, "r", True))
         self.assertEqual(summary["certificate"], manifest["certificate"])
+
+    def test_a_flight_in_real_time_shows_its_progress_on_a_terminal(self):
+        with tempfile.TemporaryDirectory() as folder, OwnDomain() as domain:
+            ours, theirs = pty.openpty()
+            process = subprocess.Popen(
+                [ROOT / "sls", "run", "short", "--mode", "realtime", "--rtf", "0.3", "--domain", str(domain),
+                 "--out", f"{folder}/r"], env={**os.environ, "SLS_BUILD": str(BUILD)}, stderr=theirs)
+            os.close(theirs)
+            said = b""
+            try:
+                while more := os.read(ours, 65536):
+                    said += more
+            except OSError:  # nobody has the other end open
+                pass
+            os.close(ours)
+            self.assertEqual(process.wait(60), 0, said)
+            self.assertRegex(said.decode(), r"sim_server: step \d+: [12] s of simulated time, ")
 
     def test_ctrl_c_in_a_report_is_one_line(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -9,7 +9,7 @@ import sys
 import tempfile
 import unittest
 
-import support
+import checkout
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 DEBIAN = 'PRETTY_NAME="Debian GNU/Linux {0} ({1})"\nNAME="Debian GNU/Linux"\nVERSION_ID="{0}"\nID=debian\n'
@@ -39,7 +39,7 @@ class SetupTest(unittest.TestCase):
         self.root.mkdir()
         text = (ROOT / "sls").read_text(encoding="utf-8")
         for name in ("python/sls/__init__.py", "python/sls/launcher", "config/scenarios"):
-            support.copy(name, self.root)
+            checkout.copy(name, self.root)
         self.release = self.folder / "os-release"
         self.assertIn("/etc/os-release", text)
         (self.root / "sls").write_text(text.replace(" /etc/os-release", f" {self.release}"), encoding="utf-8")

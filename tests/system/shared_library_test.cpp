@@ -108,6 +108,18 @@ TEST(SharedLibraryProgramTest, AnExitInsideALibraryIsNamedAndFails) {
   EXPECT_TRUE(holds(flight.client->output(), "control_client: error: " + line + "\n"));
 }
 
+TEST(SharedLibraryProgramTest, ALawThatIsSlowerThanItsPeriodIsToldSo) {
+  TemporaryFolder folder;
+  Flight flight(make_controller_scenario(folder, "in: answer, do: dawdle"),
+                {{}, {"--mode", "realtime"}, {}});
+  const std::regex slow(
+      "step \\d+: controller 'control_client' computes an answer for \\d\\d(\\.\\d)? ms, expected "
+      "less "
+      "than the period of 4 ms");
+  EXPECT_TRUE(wait_until([&] { return std::regex_search(flight.server->output(), slow); }))
+      << flight.server->output();
+}
+
 INSTANTIATE_TEST_SUITE_P(Signals, CrashTest,
                          testing::Values(std::pair("crash", SIGSEGV), std::pair("abort", SIGABRT),
                                          std::pair("overflow the stack", SIGSEGV)));
