@@ -13,11 +13,14 @@
 #include <fastdds/dds/subscriber/qos/DataReaderQos.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
 
+#include <sys/statvfs.h>
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <charconv>
 #include <chrono>
 #include <cstddef>
+#include <cstdio>
 #include <cstdlib>
 #include <limits>
 #include <map>
@@ -144,6 +147,7 @@ struct Node::Impl {
     participants.maximum = std::min(participants.maximum, kMaxParticipants);
     MiddlewareLog::clear();
     remove_stale_segments();
+    expect_room(qos);
     auto& wire = qos.wire_protocol();
     // A node without shared memory leaves no port files, so its id would look free to the next one.
     ports = {wire.port.portBase + wire.port.domainIDGain * domain + wire.port.offsetd1,
@@ -235,6 +239,31 @@ struct Node::Impl {
     const auto& own = qos.transport().user_transports;
     return qos.transport().use_builtin_transports ||
            std::any_of(own.begin(), own.end(), is_shared_memory);
+  }
+
+  static std::string to_megabytes(double bytes) {
+    std::array<char, 32> text;
+    std::snprintf(text.data(), text.size(), "%.1f MB", bytes * 1e-6);
+    return text.data();
+  }
+
+  /// Fast DDS finds no room only when it writes, and then the process dies of SIGBUS.
+  static void expect_room(const dds::DomainParticipantQos& qos) {
+    constexpr double kBesides = 1e6;  // bytes: ports and bookkeeping
+    struct statvfs room {};
+    if (!has_shared_memory(qos) || ::statvfs("/dev/shm", &room) != 0) return;
+    double need = rtps::SharedMemTransportDescriptor().segment_size();
+    for (const auto& transport : qos.transport().user_transports)
+      if (const auto memory =
+              std::dynamic_pointer_cast<rtps::SharedMemTransportDescriptor>(transport))
+        need = memory->segment_size();
+    need += kBesides;
+    const double free = static_cast<double>(room.f_bavail) * static_cast<double>(room.f_frsize);
+    if (free < need)
+      throw BusError("/dev/shm: expected " + to_megabytes(need) + " free, got " +
+                     to_megabytes(free) +
+                     ": mount -o remount,size=64M /dev/shm (docker run --shm-size 64m), or --qos "
+                     "config/qos/udp.xml");
   }
 
   static void leave_out_shared_memory(dds::DomainParticipantQos& qos) {
