@@ -1,4 +1,4 @@
-/// What a user of a command line reads: errors in the form of all others, and help that fits.
+/// Errors of a command line in the form of all others, and help that fits the terminal.
 #pragma once
 
 #include <CLI/CLI.hpp>

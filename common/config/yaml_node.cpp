@@ -151,7 +151,7 @@ std::string to_message(const YAML::Exception& error) {
   return is_undefined ? undefined : to_printable(error.msg, 100);
 }
 
-/// What was expected, and what the line of the error has instead: yaml-cpp names neither.
+/// The expectation and the text of the line of the error: yaml-cpp names neither.
 std::string describe_syntax_error(const std::string& text, int line, const YAML::Exception& error) {
   std::istringstream lines(text);
   std::string before, here;

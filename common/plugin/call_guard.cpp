@@ -82,10 +82,10 @@ bool is_inside_library(const ThreadRecord* record) {
   return record && record->calls.load(std::memory_order_relaxed) % 2 == 1;
 }
 
-/// What happened inside a library, on stderr and to those who want to know it last.
-void report(Line line, bool may_speak) {
+/// Prints the event inside a library on stderr and calls the LastWords.
+void report(Line line, bool may_call) {
   Line().begin("error").add(line.text()).add("\n").write_to_stderr();
-  if (may_speak && has_last_words.exchange(false)) last_words(std::string(line.text()));
+  if (may_call && has_last_words.exchange(false)) last_words(std::string(line.text()));
 }
 
 Line describe_crash(const ThreadRecord& record, int number) {
@@ -249,8 +249,8 @@ void CallGuard::after_crash() {
   ::_exit(128 + number);
 }
 
-LastWords::LastWords(std::function<void(const std::string& reason)> speak) {
-  last_words = std::move(speak);
+LastWords::LastWords(std::function<void(const std::string& reason)> call) {
+  last_words = std::move(call);
   has_last_words = true;
 }
 

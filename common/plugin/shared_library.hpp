@@ -39,11 +39,11 @@ class CallGuard {
   [[noreturn]] void after_crash();
 };
 
-/// While the object exists, a crash or an exit inside a library calls `speak` with what happened
+/// While the object exists, a crash or an exit inside a library calls `call` with the event
 /// before the process ends: a recording closes its files. At most one exists.
 class LastWords {
  public:
-  explicit LastWords(std::function<void(const std::string& reason)> speak);
+  explicit LastWords(std::function<void(const std::string& reason)> call);
   ~LastWords();
   LastWords(const LastWords&) = delete;
   LastWords& operator=(const LastWords&) = delete;

@@ -27,7 +27,7 @@ from sls.launcher.commands import FOREIGN, check_words  # noqa: E402
 from sls.launcher.place import Failure, list_names  # noqa: E402
 
 MISTAKES = {
-    "runn short": "unknown command 'runn'; did you mean 'run'? (see ./sls help)",
+    "rrun short": "unknown command 'rrun'; did you mean 'run'? (see ./sls help)",
     "run": "expected a scenario (see ./sls run --help)",
     "run short hover": "expected one scenario, got 'short' and 'hover'",
     "run figure_eigth": "ROOT/config/scenarios/figure_eigth.yaml: expected a scenario, got no such file; did you mean "
@@ -56,7 +56,7 @@ MISTAKES = {
     "campaign gains --worker-count 2": "unknown option '--worker-count'; did you mean '--workers'? "
                                        "(see ./sls campaign --help)",
     "discovery-server --port 0": "--port: expected 1 to 65535, got '0' (see ./sls discovery-server --help)",
-    "test --sanitize adress": "--sanitize: expected address or thread, got 'adress' (see ./sls test --help)",
+    "test --sanitize addr": "--sanitize: expected address or thread, got 'addr' (see ./sls test --help)",
     "build everything": "build: expected no argument, got 'everything' (see ./sls build --help)",
     "fuzz --target cvs": "fuzz: --target: expected one of scenario qos_file csv recording samples foxglove web, got 'cvs'",
 }

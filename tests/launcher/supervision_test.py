@@ -57,6 +57,12 @@ class SupervisionTest(unittest.TestCase):
             pass
         launcher.stderr.close()
 
+    def wait_for_state(self, process, state):
+        deadline = time.monotonic() + LIMIT_S
+        while pathlib.Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != state:
+            self.assertLess(time.monotonic(), deadline)
+            time.sleep(0.001)
+
     def find(self, name):
         return int((self.folder / f"{name}.pid").read_text())
 
@@ -80,10 +86,12 @@ class SupervisionTest(unittest.TestCase):
     def test_programs_that_are_killed_together_end_the_run(self):
         launcher = self.start(one="READY; exec sleep 100", two="READY; exec sleep 100", three="READY; exec sleep 100")
         os.kill(launcher.pid, signal.SIGSTOP)  # so that it sees all ends at once
+        self.wait_for_state(launcher.pid, "T")
         for name in ("one", "two", "three"):
             os.kill(self.find(name), signal.SIGKILL)
+            self.wait_for_state(self.find(name), "Z")
         os.kill(launcher.pid, signal.SIGCONT)
-        self.expect_end(launcher, 1, "sls: one ended with 137 (SIGKILL: killed, perhaps for want of memory)")
+        self.expect_end(launcher, 1, "sls: one ended with 137 (SIGKILL: killed, perhaps because memory ran out)")
 
     def test_a_crash_and_a_full_shared_memory_are_named(self):
         self.expect_end(self.start(one="kill -SEGV $$", two="exec sleep 100"), 1,

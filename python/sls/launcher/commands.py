@@ -1,5 +1,6 @@
 """The commands of `./sls`."""
 
+import importlib.util
 import os
 import re
 import shutil
@@ -80,8 +81,10 @@ def set_up(words: list[str]) -> int:
 
 def build(words: list[str]) -> int:
     Parser("build", "", "Sets up and builds; the programs are in build/bin.").parse(words)
-    build_programs(*PROGRAMS, "_sls_core")
-    say(f"programs in build/bin: {' '.join(PROGRAMS)}; the module of the package sls in build/python")
+    has_yaml = importlib.util.find_spec("yaml") is not None  # without it no man page can be made
+    build_programs(*PROGRAMS, "_sls_core", *(["man_pages"] if has_yaml else []))
+    say(f"programs in build/bin: {' '.join(PROGRAMS)}; the module of the package sls in build/python"
+        + ("; man pages in build/man" if has_yaml else ""))
     return 0
 
 

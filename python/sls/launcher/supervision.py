@@ -16,10 +16,10 @@ STOP = {signal.SIGINT: (130, signal.SIGINT), signal.SIGTERM: (143, signal.SIGTER
         signal.SIGHUP: (143, signal.SIGTERM)}
 # Programs give up 20 s after a stop signal. One that writes its files may need much longer.
 USUAL_PATIENCE_S, WRITERS_PATIENCE_S = 30.0, 600.0
-# Programs of a flight end together, but for those that write files.
+# Programs of a flight end together, except those that write files.
 OVERRUN_S = 60.0
 CAUSES = {signal.SIGBUS: ": is /dev/shm full? (./sls doctor, docs/networks.md)",
-          signal.SIGKILL: ": killed, perhaps for want of memory"}
+          signal.SIGKILL: ": killed, perhaps because memory ran out"}
 
 
 @dataclass
