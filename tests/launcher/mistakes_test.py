@@ -98,6 +98,12 @@ class MistakesTest(unittest.TestCase):
     def test_a_bad_variable_is_named(self):
         self.expect_refused("SLS_DOMAIN: expected 0 to 232, got 'abc'", "run", "short", SLS_DOMAIN="abc")
 
+    def test_a_build_without_programs_is_named(self):
+        done = subprocess.run([self.root / "sls", "run", "short"], env={**os.environ, "SLS_BUILD": str(self.folder)},
+                              capture_output=True, text=True, timeout=60, check=False)
+        self.assertEqual((done.returncode, done.stderr),
+                         (1, f"sls: error: {self.folder}/bin/sim_server: expected a program, got no such file\n"))
+
     def test_a_used_port_is_refused_before_the_flight(self):
         with socket.socket() as other:
             other.bind(("127.0.0.1", 0))

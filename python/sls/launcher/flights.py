@@ -61,7 +61,11 @@ def prepare(options: Namespace) -> None:
             raise Failure(f"SLS_DOMAIN: {error}", 2) from None
     if options.view_port is not None:
         check_port(options)
-    build_programs(*FLYING, *([] if options.view_port is None else ["sls_view"]))
+    programs = [*FLYING, *([] if options.view_port is None else ["sls_view"])]
+    build_programs(*programs)
+    for program in programs:
+        if not os.access(BUILD / "bin" / program, os.X_OK):
+            raise Failure(f"{BUILD}/bin/{program}: expected a program, got no such file")
 
 
 def check_port(options: Namespace) -> None:
