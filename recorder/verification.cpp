@@ -161,36 +161,23 @@ std::optional<Difference> compare_next(const std::optional<StepRows>& a,
   return std::nullopt;
 }
 
-/// The largest deviation of each column of one kind of row.
+/// Adds the deviations of a pair of rows to those of the columns of `file`.
 template <class Row>
-class Deviations {
- public:
-  explicit Deviations(const RecordedFlight& flight) : columns_(read_columns<Row>(flight)) {}
-
-  void add(const std::optional<Row>& a, const std::optional<Row>& b, const StepRows& step) {
-    if (!a || !b || to_bytes(*a) == to_bytes(*b)) return;
-    const FieldLister of_a = list_fields(*a), of_b = list_fields(*b);
-    for (std::size_t i = 0; i < std::min({of_a.texts.size(), of_b.texts.size(), columns_.size()});
-         ++i) {
-      if (of_a.texts[i] == of_b.texts[i]) continue;
-      const double size = std::abs(of_a.numbers[i] - of_b.numbers[i]);
-      const auto [found, is_new] =
-          worst_.try_emplace(i, Deviation{fmt::format("{}, {}", Row::kFile, columns_[i]), size,
-                                          step.vehicle_id, step.step});
-      const bool is_larger =
-          size > found->second.largest || (std::isnan(size) && !std::isnan(found->second.largest));
-      if (!is_new && is_larger)
-        found->second = {found->second.column, size, step.vehicle_id, step.step};
-    }
+void add_deviations(const std::optional<Row>& a, const std::optional<Row>& b, const StepRows& step,
+                    const RecordedFlight& flight, int file,
+                    std::map<std::pair<int, std::size_t>, Deviation>& worst) {
+  if (!a || !b || to_bytes(*a) == to_bytes(*b)) return;
+  const FieldLister of_a = list_fields(*a), of_b = list_fields(*b);
+  for (std::size_t i = 0; i < std::min(of_a.texts.size(), of_b.texts.size()); ++i) {
+    if (of_a.texts[i] == of_b.texts[i]) continue;
+    const double size = std::abs(of_a.numbers[i] - of_b.numbers[i]);
+    auto& entry = worst[{file, i}];
+    const bool is_new = entry.column.empty();
+    if (is_new) entry.column = fmt::format("{}, {}", Row::kFile, read_columns<Row>(flight).at(i));
+    if (is_new || size > entry.largest || (std::isnan(size) && !std::isnan(entry.largest)))
+      entry = {entry.column, size, step.vehicle_id, step.step};
   }
-  void list(std::vector<Deviation>& all) const {
-    for (const auto& [column, deviation] : worst_) all.push_back(deviation);
-  }
-
- private:
-  std::vector<std::string> columns_;
-  std::map<std::size_t, Deviation> worst_;
-};
+}
 
 }  // namespace
 
@@ -233,9 +220,7 @@ std::optional<Difference> find_first_difference(const RecordedFlight& a, const R
 
 std::vector<Deviation> list_deviations(const RecordedFlight& a, const RecordedFlight& b) {
   StepReader reader_a(a), reader_b(b);
-  Deviations<StateRow> states(a);
-  Deviations<CommandRow> commands(a);
-  Deviations<ReferenceRow> references(a);
+  std::map<std::pair<int, std::size_t>, Deviation> worst;
   std::vector<std::uint32_t> ids = a.vehicle_ids();
   while (!ids.empty())
     for (auto id = ids.begin(); id != ids.end();) {
@@ -249,15 +234,13 @@ std::vector<Deviation> list_deviations(const RecordedFlight& a, const RecordedFl
         id = ids.erase(id);
         continue;
       }
-      states.add(step_a->state, step_b->state, *step_a);
-      commands.add(step_a->command, step_b->command, *step_a);
-      references.add(step_a->reference, step_b->reference, *step_a);
+      add_deviations(step_a->state, step_b->state, *step_a, a, 0, worst);
+      add_deviations(step_a->command, step_b->command, *step_a, a, 1, worst);
+      add_deviations(step_a->reference, step_b->reference, *step_a, a, 2, worst);
       ++id;
     }
   std::vector<Deviation> all;
-  states.list(all);
-  commands.list(all);
-  references.list(all);
+  for (const auto& [column, deviation] : worst) all.push_back(deviation);
   return all;
 }
 

@@ -218,8 +218,7 @@ void RealtimeRun::note_computing(const ReceivedCommands& received) {
   slow.is_reported = slow.count >= kSlowAnswers && Clock::now() - slow.since >= kSlowTime;
   if (slow.is_reported)
     board_.announce(fmt::format(
-        "step {}: controller '{}' computes an answer for {:.3g} ms, expected less than the period "
-        "of "
+        "step {}: controller '{}' computes an answer for {:.3g} ms, expected less than the period of "
         "{:.3g} ms: its answers come late (a lower --rtf or a longer --period-s gives it time)",
         board_.step, received.sample.client_name().c_str(), 1e3 * computing.count(),
         1e3 * period.count()));

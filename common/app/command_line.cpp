@@ -1,10 +1,6 @@
 #include "common/app/command_line.hpp"
 
-#include <sys/ioctl.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <cstdlib>
 #include <regex>
 #include <sstream>
 
@@ -12,6 +8,8 @@
 
 namespace sls::app {
 namespace {
+
+constexpr std::size_t kColumns = 80;
 
 /// `a, b or c`.
 std::string list_choices(std::vector<std::string> names) {
@@ -80,32 +78,20 @@ std::string describe_usage_error(const CLI::ParseError& error, const CLI::App& c
   return text;
 }
 
-std::size_t find_columns() {
-  if (const char* columns = std::getenv("COLUMNS")) return std::strtoul(columns, nullptr, 10);
-  winsize size{};
-  return ::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 ? size.ws_col : 0;
-}
-
-std::string fit(const std::string& help, std::size_t columns) {
-  if (columns == 0) return help;
+std::string fit(const std::string& help) {
   std::istringstream lines(help);
   std::string text;
   for (std::string line; std::getline(lines, line); text += line + "\n") {
-    if (line.size() <= columns) continue;
     // An option and its meaning are apart by two spaces at least.
-    const std::size_t start = line.find_first_not_of(' ');
-    const std::size_t gap = start == line.npos ? line.npos : line.find("  ", start);
-    const std::size_t indent = gap == line.npos ? start : line.find_first_not_of(' ', gap);
-    const std::string margin(indent == line.npos || indent + 20 > columns ? 8 : indent, ' ');
-    std::string whole;
-    while (line.size() > columns) {
-      std::size_t end = line.rfind(' ', columns);
-      if (end == line.npos || end <= margin.size()) end = line.find(' ', columns);
-      if (end == line.npos) break;
-      whole += line.substr(0, line.find_last_not_of(' ', end) + 1) + "\n";
+    const std::size_t gap = line.find("  ", std::min(line.find_first_not_of(' '), line.size()));
+    const std::size_t meaning = gap == line.npos ? line.npos : line.find_first_not_of(' ', gap);
+    const std::string margin(meaning == line.npos ? line.find_first_not_of(' ') : meaning, ' ');
+    while (line.size() > kColumns) {
+      const std::size_t end = line.rfind(' ', kColumns);
+      if (end == line.npos || end <= margin.size()) break;
+      text += line.substr(0, line.find_last_not_of(' ', end) + 1) + "\n";
       line = margin + line.substr(end + 1);
     }
-    line = whole + line;
   }
   return text;
 }

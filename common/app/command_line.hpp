@@ -1,8 +1,7 @@
-/// Errors of a command line in the form of all others, and help that fits the terminal.
+/// Errors of a command line in the form of all others, and help that fits a terminal.
 #pragma once
 
 #include <CLI/CLI.hpp>
-#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -12,10 +11,7 @@ namespace sls::app {
 std::string describe_usage_error(const CLI::ParseError& error, const CLI::App& cli,
                                  const std::vector<std::string>& words);
 
-/// Columns of the terminal, or of the environment variable COLUMNS; 0 if stdout is no terminal.
-std::size_t find_columns();
-
-/// CLI11's help text with lines of at most `columns` where words allow; 0: as it is.
-std::string fit(const std::string& help, std::size_t columns);
+/// CLI11's help text with lines of at most 80 columns where words allow.
+std::string fit(const std::string& help);
 
 }  // namespace sls::app

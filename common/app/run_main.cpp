@@ -17,7 +17,7 @@ int run_main(int argc, char** argv, CLI::App& cli, const CommonOptions& options,
     cli.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_name() == "CallForHelp") {
-      std::fputs(fit(cli.help(), find_columns()).c_str(), stdout);
+      std::fputs(fit(cli.help()).c_str(), stdout);
       return kExitDone;
     }
     if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success))

@@ -13,14 +13,13 @@
 #include <fastdds/dds/subscriber/qos/DataReaderQos.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
 
+#include <spdlog/fmt/fmt.h>
 #include <sys/statvfs.h>
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <charconv>
 #include <chrono>
 #include <cstddef>
-#include <cstdio>
 #include <cstdlib>
 #include <limits>
 #include <map>
@@ -241,12 +240,6 @@ struct Node::Impl {
            std::any_of(own.begin(), own.end(), is_shared_memory);
   }
 
-  static std::string to_megabytes(double bytes) {
-    std::array<char, 32> text;
-    std::snprintf(text.data(), text.size(), "%.1f MB", bytes * 1e-6);
-    return text.data();
-  }
-
   /// Fast DDS finds no room only when it writes, and then the process dies of SIGBUS.
   static void expect_room(const dds::DomainParticipantQos& qos) {
     constexpr double kBesides = 1e6;  // bytes: ports and bookkeeping
@@ -260,8 +253,8 @@ struct Node::Impl {
     need += kBesides;
     const double free = static_cast<double>(room.f_bavail) * static_cast<double>(room.f_frsize);
     if (free < need)
-      throw BusError("/dev/shm: expected " + to_megabytes(need) + " free, got " +
-                     to_megabytes(free) +
+      throw BusError(fmt::format("/dev/shm: expected {:.1f} MB free, got {:.1f} MB", need * 1e-6,
+                                 free * 1e-6) +
                      ": mount -o remount,size=64M /dev/shm (docker run --shm-size 64m), or --qos "
                      "config/qos/udp.xml");
   }

@@ -58,7 +58,8 @@ MISTAKES = {
     "discovery-server --port 0": "--port: expected 1 to 65535, got '0' (see ./sls discovery-server --help)",
     "test --sanitize addr": "--sanitize: expected address or thread, got 'addr' (see ./sls test --help)",
     "build everything": "build: expected no argument, got 'everything' (see ./sls build --help)",
-    "fuzz --target cvs": "fuzz: --target: expected one of scenario qos_file csv recording samples foxglove web, got 'cvs'",
+    "fuzz --target cvs": "--target: expected scenario, qos_file, csv, recording, samples, foxglove or web, got 'cvs' (see ./sls fuzz "
+                         "--help)",
 }
 
 
@@ -109,7 +110,7 @@ class MistakesTest(unittest.TestCase):
             other.bind(("127.0.0.1", 0))
             other.listen()
             port = other.getsockname()[1]
-            self.expect_refused(f"--view-port: expected a free port, got {port}: another program uses it "
+            self.expect_refused(f"port of the page: expected a free one, got {port}: another program uses it "
                                 "(--view-port 0 takes any free one)", "run", "short", "--view-port", str(port))
 
     def test_right_words_go_on_to_the_build(self):

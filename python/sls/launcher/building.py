@@ -5,7 +5,7 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from sls.launcher.place import BUILD, IS_BUILT_ELSEWHERE, IS_INSTALLED, PYTHON_PATH, ROOT, Failure
 
@@ -16,43 +16,23 @@ PYTHON = "/usr/bin/python3"
 is_installing = True  # False with --no-install
 
 
-def call_script(action: str, *words: str | Path) -> None:
-    """Runs an action of the file `sls`. It has printed what failed."""
-    flags = [] if is_installing else ["--no-install"]
-    code = subprocess.run([ROOT / "sls", *flags, action, *words], check=False).returncode
+def run(*command: str | Path, **more: Any) -> None:
+    """Runs a command; ends with its exit code if it fails."""
+    code = subprocess.run(command, check=False, **more).returncode
     if code != 0:
         raise SystemExit(code if code > 0 else 128 - code)
 
 
-def setup(*lists: str) -> None:
-    """Installs what building and flying need, and packages or lists of packages of the file `sls`."""
-    call_script("@setup", *lists)
-
-
-def install_missing(*lists: str) -> None:
-    if is_installing:
-        call_script("@install", *lists)
-
-
-def install_node_modules(folder: Path) -> None:
-    call_script("@npm", folder)
-
-
-def build_tree(preset: str, folder: Path, *targets: str) -> None:
-    call_script("@tree", preset, folder, *targets)
+def call_script(action: str, *words: str | Path) -> None:
+    """Runs an action of the file `sls`, see its end: @setup LIST…, @install LIST…, @npm FOLDER, @tree PRESET FOLDER
+    TARGET…, @build TARGET…."""
+    run(ROOT / "sls", *([] if is_installing else ["--no-install"]), action, *words)
 
 
 def build_programs(*targets: str) -> None:
     """Brings the targets up to date. A build made elsewhere (SLS_BUILD) is used unchanged."""
     if not IS_BUILT_ELSEWHERE and not IS_INSTALLED:
         call_script("@build", *targets)
-
-
-def run(*command: str | Path, **more: str | Path) -> None:
-    """Runs a command, with its exit code if it fails."""
-    code = subprocess.run(command, check=False, **more).returncode  # type: ignore[call-overload]
-    if code != 0:
-        raise SystemExit(code if code > 0 else 128 - code)
 
 
 def replace_by(*command: str | Path, **variables: str) -> NoReturn:
@@ -64,9 +44,9 @@ def replace_by(*command: str | Path, **variables: str) -> NoReturn:
         raise Failure(f"{command[0]}: {error.strerror}") from None
 
 
-def replace_by_python(*words: str | Path, paths: Sequence[str] = PYTHON_PATH, **variables: str) -> NoReturn:
+def replace_by_module(name: str, *words: str | Path, paths: Sequence[str] = PYTHON_PATH, **variables: str) -> NoReturn:
     """-P: Python imports nothing from the working folder; -B: it writes no compiled files."""
-    replace_by(PYTHON, "-BP", *words, PYTHONPATH=":".join(paths), **variables)
+    replace_by(PYTHON, "-BP", "-m", name, *words, PYTHONPATH=":".join(paths), **variables)
 
 
 def replace_by_program(name: str, words: Sequence[str], folder: str = "bin") -> NoReturn:

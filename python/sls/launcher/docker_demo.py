@@ -7,30 +7,31 @@ import subprocess
 import tempfile
 import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 from sls.launcher.arguments import Parser
-from sls.launcher.building import install_node_modules, run, setup
+from sls.launcher.building import call_script, run
 from sls.launcher.flights import print_summary
-from sls.launcher.place import ROOT, Failure, find_file, say
+from sls.launcher.place import ROOT, Failure, find_file, list_choices, say
 from sls.launcher.supervision import Supervisor
 
 NAMES = ("plain", "discovery", "standby", "secure", "fleet")
 BASES = {"debian12": "debian:bookworm-slim", "debian13": "debian:trixie-slim"}
 HALVES = ("0-3", "4-7")
 TEXT = """\
-Builds the image, flies in containers and prints the summary of ./sls demo. NAME is one of
+Builds the image, flies in containers and prints the summary of ./sls demo.
+NAME is one of
   plain      server, controller, recorder on a network of containers (default)
   discovery  the same through a discovery server
   standby    two controllers; the first is killed in flight
-  secure     with DDS Security; SLS_KEYS: the folder that ./sls keys made (default: new keys)
-  fleet      eight vehicles: one server flies 0 to 3, another 4 to 7, on the same domain
+  secure     with DDS Security; SLS_KEYS: the folder that ./sls keys made
+             (default: new keys)
+  fleet      eight vehicles: one server flies 0 to 3, another 4 to 7
 
-SLS_IMAGE names an existing image to use; SLS_SYSTEM the system of a new one, debian12 or debian13
-(default: debian12); SLS_BASE its base (default: debian:bookworm-slim or debian:trixie-slim). Needs a
-Docker engine with docker compose or docker-compose."""
+SLS_IMAGE names an existing image to use; SLS_SYSTEM the system of a new one,
+debian12 or debian13 (default: debian12); SLS_BASE its base (default:
+debian:bookworm-slim or debian:trixie-slim). Needs a Docker engine with docker
+compose or docker-compose."""
 
 
 def is_done(*command: str | Path, limit_s: float | None = None) -> bool:
@@ -68,7 +69,7 @@ def make_base(base: str) -> None:
     if os.geteuid() != 0:
         raise Failure(f"this needs root once: sudo docker/base-image.sh {base}")
     if not shutil.which("debootstrap"):
-        setup("debootstrap")
+        call_script("@install", "debootstrap")
     run(ROOT / "docker/base-image.sh", base)
 
 
@@ -81,7 +82,7 @@ def build_image() -> None:
     base = os.environ.get("SLS_BASE") or BASES[system]
     make_base(base)
     if shutil.which("npm"):  # this machine may trust a proxy that the base image does not
-        install_node_modules(ROOT / "tools/view/page")
+        call_script("@npm", ROOT / "tools/view/page")
     number, log = tempfile.mkstemp()
     say(f"building the image sls for {system}, for the first time some minutes (log: {log})")
     # An engine without BuildKit pulls the base of both systems, so both are the one that is here.
@@ -92,8 +93,7 @@ def build_image() -> None:
              f"sls:{system}", ROOT], stdout=said, stderr=said, check=False)
     if done.returncode != 0:
         lines = Path(log).read_text(encoding="utf-8", errors="replace").splitlines()
-        for line in [line for line in lines if re.search("[eE]rror", line)][:20] or lines[-20:]:
-            say(line)
+        say("\n".join([line for line in lines if re.search("[eE]rror", line)][:20] or lines[-20:]))
         raise Failure(f"the image was not built (whole log: {log})")
     os.unlink(log)
 
@@ -101,67 +101,50 @@ def build_image() -> None:
 # --- the flight -----------------------------------------------------------------------------------
 
 
-class Containers:
-    """The containers of one flight. Afterwards none is left, no network and no copy of keys."""
+def fly(name: str, compose: list[str], recording: Path) -> int:
+    """Flies; afterwards no container is left, and no network."""
+    project = f"sls-demo-{os.getpid()}"
+    file = f"docker/compose{'' if name == 'plain' else '.' + name}.yaml"
+    compose = [*compose, "--project-name", project, "--file", str(ROOT / file)]
+    say(f"flying {Path(os.environ['SLS_SCENARIO']).stem} with {file}")
 
-    def __init__(self, name: str, compose: list[str], recording: Path) -> None:
-        self.file = f"docker/compose{'' if name == 'plain' else '.' + name}.yaml"
-        self.project = f"sls-demo-{os.getpid()}"
-        self.compose = [*compose, "--project-name", self.project, "--file", str(ROOT / self.file)]
-        self.recording = recording
-
-    def find(self, service: str) -> str:
-        return read("docker", "ps", "--all", "--quiet", "--filter", f"label=com.docker.compose.project={self.project}",
+    def find(service: str) -> str:
+        return read("docker", "ps", "--all", "--quiet", "--filter", f"label=com.docker.compose.project={project}",
                     "--filter", f"label=com.docker.compose.service={service}")
 
-    def start(self, supervisor: Supervisor, service: str) -> None:
-        """Starts a process that passes on signals, output and exit code of the container."""
-        supervisor.start(service, ["sh", "-c", 'exec "$@" >&2', "sh", "docker", "start", "--attach",
-                                   self.find(service)], patience_s=60)
-
-    def kill_in_flight(self, is_over: threading.Event) -> None:
+    def kill_in_flight(container: str) -> None:
         """Kills the first controller once the recording has 800 of its steps."""
-        container, rows = self.find("controller"), self.recording / "command.csv"
+        rows = recording / "command.csv"
         while not rows.is_file() or rows.read_text(encoding="utf-8", errors="replace").count(",primary") <= 800:
             if is_over.wait(0.02):
                 return
         if is_done("docker", "kill", container):
             say("killed the first controller")
 
-    def fly(self, name: str) -> int:
-        with Supervisor() as supervisor, self.removed_afterwards():
-            done = subprocess.run([*self.compose, "up", "--no-start"], stdout=subprocess.PIPE,
-                                  stderr=subprocess.STDOUT, text=True, check=False)
+    services, is_over = ["recorder", "server", "controller"], threading.Event()
+    with Supervisor() as supervisor:
+        try:
+            done = subprocess.run([*compose, "up", "--no-start"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                                  text=True, check=False)
             if done.returncode != 0:
-                for line in done.stdout.splitlines()[-5:]:
-                    say(line)
+                say("\n".join(done.stdout.splitlines()[-5:]))
                 raise Failure("the containers were not made")
-            services, is_over = ["recorder", "server", "controller"], threading.Event()
             if name == "fleet":
                 services = [f"{service}-{half}" for service in services for half in HALVES]
             elif name == "discovery":
-                is_done("docker", "start", self.find("discovery"))
+                is_done("docker", "start", find("discovery"))
             elif name == "standby":
-                services = ["recorder", "server", "standby"]
-                is_done("docker", "start", self.find("controller"))  # its end does not end the flight
-                threading.Thread(target=self.kill_in_flight, args=[is_over], daemon=True).start()
-            for service in services:
-                self.start(supervisor, service)
-            code = supervisor.wait_all()
-            is_over.set()
-            return code
-
-    @contextmanager
-    def removed_afterwards(self) -> Iterator[None]:
-        try:
-            yield
+                services[2] = "standby"
+                is_done("docker", "start", find("controller"))  # its end does not end the flight
+                threading.Thread(target=kill_in_flight, args=[find("controller")], daemon=True).start()
+            for service in services:  # a process that passes on signals, output and exit code of the container
+                supervisor.start(service, ["sh", "-c", 'exec docker start --attach "$1" >&2', "sh", find(service)],
+                                 patience_s=60)
+            return supervisor.wait_all()
         finally:
-            if not is_done(*self.compose, "down", "--volumes", "--timeout", "30"):
+            is_over.set()
+            if not is_done(*compose, "down", "--volumes", "--timeout", "30"):
                 say("warning: docker compose down failed: see docker ps --all")
-
-
-def give(user: str, *folders: Path) -> None:
-    subprocess.run(["chown", "-R", user, "--", *folders], check=False)
 
 
 def prepare(name: str, scenario: Path, scratch: Path, user: str) -> None:
@@ -172,7 +155,7 @@ def prepare(name: str, scenario: Path, scratch: Path, user: str) -> None:
             shutil.copytree(os.environ["SLS_KEYS"], keys)
         else:
             run(ROOT / "config/security/keys.sh", keys)
-        give(user, keys)
+        run("chown", "-R", user, keys)
         os.environ["SLS_KEYS"] = str(keys)
     if name == "fleet":
         text = scenario.read_text(encoding="utf-8")
@@ -190,16 +173,9 @@ def docker_demo(words: list[str]) -> int:
     parser.add_argument("--out", metavar="DIR", help="folder of the recording, new or empty; of a fleet it has a "
                         "folder for each server's vehicles (default: recordings/docker-NAME-UTCTIME)")
     parser.add_argument("--build", action="store_true", help="build only the image, for use with docker compose")
-    options, others = parser.parse(words, 2)
-    if len(others) > 1:
-        raise Failure(f"expected one name, got '{others[0]}' and '{others[1]}'", 2)
-    name = others[0] if others else "plain"
+    options, name = parser.parse(words, "name", "plain")
     if name not in NAMES:
-        raise Failure(f"docker-demo: expected {', '.join(NAMES[:-1])} or {NAMES[-1]}, got '{name}'", 2)
-    if options.build:
-        find_compose()
-        build_image()
-        return 0
+        raise Failure(f"docker-demo: expected {list_choices(NAMES)}, got '{name}'", 2)
     scenario = Path(find_file("scenarios", options.scenario)).resolve()
     when = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime())
     recording = Path(options.out or f"recordings/docker-{name}-{when}").resolve()
@@ -207,6 +183,8 @@ def docker_demo(words: list[str]) -> int:
         raise Failure(f"{recording}: expected a new or empty folder, got files in it", 2)
     compose = find_compose()
     build_image()
+    if options.build:
+        return 0
 
     parts = [recording / half for half in HALVES] if name == "fleet" else [recording]
     for part in parts:
@@ -217,15 +195,13 @@ def docker_demo(words: list[str]) -> int:
     with tempfile.TemporaryDirectory() as scratch:
         try:
             if is_root:
-                give(user, recording)
+                run("chown", "-R", user, recording)
             prepare(name, scenario, Path(scratch), user)
             os.environ.update(SLS_USER=user, SLS_RECORDING=str(recording))
-            containers = Containers(name, compose, recording)
-            say(f"flying {scenario.stem} with {containers.file}")
-            code = containers.fly(name)
+            code = fly(name, compose, recording)
         finally:
             if is_root:
-                give("0:0", recording)
+                run("chown", "-R", "0:0", recording)
     if code == 0:
         for part in parts:
             print_summary(part)

@@ -10,29 +10,29 @@ import time
 from argparse import ArgumentTypeError, Namespace
 from pathlib import Path
 
-from sls.launcher.arguments import Parser, above_zero, one_of, path, whole
+from sls.launcher.arguments import POSITIVE, Parser, checked, filled, one_of, whole
 from sls.launcher.building import FLYING, build_programs
+from sls.launcher.building import run as run_program
 from sls.launcher.place import BUILD, ROOT, Failure, say
 from sls.launcher.supervision import WRITERS_PATIENCE_S, Supervisor
 
-TIMING = ("--period-s", "--mode", "--rtf")
 DOMAIN = whole(0, 232)
-USUAL_PORT = "8765"
 
 
 def make_parser(command: str, usage: str, text: str) -> Parser:
     parser = Parser(command, usage, text + "\n\nSCENARIO is a name in config/scenarios or a path.")
     add = parser.add_argument
-    add("--out", type=path("folder"), metavar="DIR", help="folder of the recording (default: recordings/NAME-UTCTIME)")
+    add("--out", type=filled("folder"), metavar="DIR",
+        help="folder of the recording (default: recordings/NAME-UTCTIME)")
     add("--force", action="store_true", help="replace an existing recording")
-    add("--qos", type=path("file"), metavar="FILE", help="QoS profiles (default: config/qos/default.xml)")
+    add("--qos", type=filled("file"), metavar="FILE", help="QoS profiles (default: config/qos/default.xml)")
     add("--domain", type=DOMAIN, metavar="N", help="DDS domain, 0 to 232 (default: 0)")
-    add("--period-s", type=above_zero(), metavar="X", help="control period (default: the scenario's)")
-    add("--mode", type=one_of("lockstep", "realtime"), metavar="MODE", help="lockstep or realtime (default: the scenario's)")
-    add("--rtf", type=above_zero(1000), metavar="X",
+    add("--period-s", type=POSITIVE, metavar="X", help="control period (default: the scenario's)")
+    add("--mode", type=one_of("lockstep", "realtime"), metavar="MODE",
+        help="lockstep or realtime (default: the scenario's)")
+    add("--rtf", type=checked("a number > 0 and <= 1000", float, lambda factor: 0 < factor <= 1000), metavar="X",
         help="real-time factor, realtime mode only (default: the scenario's)")
-    add("--in-process", action="store_true",
-        help="fly in one process without DDS: same data, same certificate")
+    add("--in-process", action="store_true", help="fly in one process without DDS: same data, same certificate")
     add("--view", action="store_true",
         help="also show the flight in the browser; prints the address of the page")
     add("--view-port", type=whole(0, 65535), metavar="N",
@@ -42,25 +42,25 @@ def make_parser(command: str, usage: str, text: str) -> Parser:
 
 def pass_on(options: Namespace, *names: str) -> list[str]:
     """The given ones of these options, for a program."""
-    values = [(name, getattr(options, name[2:].replace("-", "_"))) for name in names]
-    return [word for name, value in values if value is not None for word in (name, value)]
+    return [f"--{name.replace('_', '-')}={value}" for name in names
+            if (value := getattr(options, name)) is not None]
 
 
 def prepare(options: Namespace) -> None:
     """Judges what can be judged without the programs, then builds them."""
     if options.view and options.view_port is None:
-        options.view_port = USUAL_PORT
+        options.view_port = "8765"
     if options.in_process:
-        if pass_on(options, "--qos", "--domain", "--mode", "--rtf", "--view-port"):
+        if pass_on(options, "qos", "domain", "mode", "rtf", "view_port"):
             raise Failure("--in-process: expected no --qos, --domain, --mode, --rtf or --view with "
                           "it: one process has no network and no clock", 2)
-    elif options.domain is None and os.environ.get("SLS_DOMAIN"):
+    elif options.domain is None:
         try:
-            DOMAIN(os.environ["SLS_DOMAIN"])
+            DOMAIN(os.environ.get("SLS_DOMAIN") or "0")
         except ArgumentTypeError as error:
             raise Failure(f"SLS_DOMAIN: {error}", 2) from None
     if options.view_port is not None:
-        check_port(options)
+        check_port(options.view_port)
     programs = [*FLYING, *([] if options.view_port is None else ["sls_view"])]
     build_programs(*programs)
     for program in programs:
@@ -68,43 +68,40 @@ def prepare(options: Namespace) -> None:
             raise Failure(f"{BUILD}/bin/{program}: expected a program, got no such file")
 
 
-def check_port(options: Namespace) -> None:
+def check_port(port: str) -> None:
     """Opens the viewer's port for a moment: without its page the flight is not what was asked for."""
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
-            probe.bind(("127.0.0.1", int(options.view_port)))
+            probe.bind(("127.0.0.1", int(port)))
             probe.listen()
         except OSError as error:
             reason = "another program uses it" if error.errno == errno.EADDRINUSE else error.strerror
-            raise Failure(f"{'--view' if options.view else '--view-port'}: expected a free port, got "
-                          f"{options.view_port}: {reason} (--view-port 0 takes any free one)", 2) from None
+            raise Failure(f"port of the page: expected a free one, got {port}: {reason} (--view-port 0 takes any "
+                          "free one)", 2) from None
 
 
 def fly(options: Namespace, file: str) -> tuple[int, str]:
     """Flies; returns the exit code and the folder of the recording."""
     name = Path(file).name.removesuffix(".yaml")
     recording = options.out or f"recordings/{name}-{time.strftime('%Y%m%dT%H%M%SZ', time.gmtime())}"
-    out = ["--out", recording, *(["--force"] if options.force else [])]
-    network = pass_on(options, "--qos", "--domain")
+    scenario = f"--scenario={file}"
+    out = [f"--out={recording}", *(["--force"] if options.force else [])]
+    network = pass_on(options, "qos", "domain")
+    flight = {"recorder": [*out, *network],
+              "sim_server": [scenario, *network, *pass_on(options, "period_s", "mode", "rtf")],
+              "control_client": [scenario, *network]}
+    if options.in_process:
+        flight = {"closed_loop": [scenario, *out, *pass_on(options, "period_s")]}
+    else:  # Checks first, so that a mistake gives one error line and not one from each program.
+        for name in ("sim_server", "recorder"):
+            run_program(BUILD / "bin" / name, "--check", *flight[name], stdout=subprocess.DEVNULL)
     with Supervisor() as supervisor:
-        if options.in_process:
-            supervisor.start("closed_loop", [BUILD / "bin/closed_loop", "--scenario", file, *out,
-                                             *pass_on(options, "--period-s")], WRITERS_PATIENCE_S)
-            return supervisor.wait_all(), recording
-
-        server = ["--scenario", file, *network, *pass_on(options, *TIMING)]
-        recorder = [*out, *network]
-        # Checks first, so that a mistake gives one error line and not one from each program.
-        check("sim_server", *server)
-        check("recorder", *recorder)
         if options.view_port is not None:
-            supervisor.start_beside("sls_view", [BUILD / "bin/sls_view", "--port", options.view_port,
-                                                 *network])
-        supervisor.start("recorder", [BUILD / "bin/recorder", *recorder], WRITERS_PATIENCE_S)
-        supervisor.start("sim_server", [BUILD / "bin/sim_server", *server])
-        supervisor.start("control_client",
-                         [BUILD / "bin/control_client", "--scenario", file, *network])
+            supervisor.start_beside("sls_view", [BUILD / "bin/sls_view", f"--port={options.view_port}", *network])
+        for name, words in flight.items():
+            patience = [WRITERS_PATIENCE_S] if name in ("recorder", "closed_loop") else []
+            supervisor.start(name, [BUILD / "bin" / name, *words], *patience)
         return supervisor.wait_all(), recording
 
 
@@ -119,17 +116,10 @@ def print_json(code: int, recording: str) -> None:
     print(json.dumps({"exit_code": code, "recording": recording, **{name: manifest.get(name) for name in names}}))
 
 
-def check(program: str, *words: str) -> None:
-    done = subprocess.run([BUILD / "bin" / program, "--check", *words], check=False,
-                          stdout=subprocess.DEVNULL)
-    if done.returncode != 0:
-        raise SystemExit(done.returncode if done.returncode > 0 else 128 - done.returncode)
-
-
 def run(words: list[str]) -> int:
     parser = make_parser("run", "SCENARIO [OPTIONS]", """\
-Runs server, client and recorder on this machine. Exit code 0: the mission finished and the
-recording is complete.""")
+Runs server, client and recorder on this machine. Exit code 0: the mission
+finished and the recording is complete.""")
     parser.add_argument("--json", action="store_true",
                         help="print a summary for machines on stdout: one line of JSON")
     options, scenario = parser.parse_scenario(words)
@@ -159,8 +149,8 @@ def print_comparison(lap: list[str]) -> None:
     print("Load position error on the second lap, beside the published figures (m)")
     with open(ROOT / "python/sls/published_lap_2.csv", encoding="utf-8", newline="") as table:
         head, *rows = csv.reader(table)
-    for cells in (["", *head[1:]], ["this flight", *lap], *rows):
-        print("  {:<34} {:>9} {:>9} {:>9}  {:>9} {:>9}".format(*cells))
+    for cells in (["", *head[1:]], ["this flight", *(f"{float(error):.1e}" for error in lap)], *rows):
+        print("  {:<34} {:>8} {:>8} {:>8} {:>8} {:>8}".format(*cells))
     print()
 
 

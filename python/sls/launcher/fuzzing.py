@@ -6,9 +6,9 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-from sls.launcher.arguments import Parser
-from sls.launcher.building import build_tree, setup
-from sls.launcher.place import ROOT, Failure, say
+from sls.launcher.arguments import Parser, one_of, whole
+from sls.launcher.building import call_script
+from sls.launcher.place import ROOT, Failure, list_choices, say
 
 FUZZERS = ("scenario", "qos_file", "csv", "recording", "samples", "foxglove", "web")
 SEEDS = {"scenario": ("config/scenarios", "tests/common/config/invalid"),
@@ -18,19 +18,15 @@ SEEDS = {"scenario": ("config/scenarios", "tests/common/config/invalid"),
 def fuzz(words: list[str]) -> int:
     parser = Parser("fuzz", "[--seconds N] [--target NAME]",
                     "Feeds mutated input to every reader of files and samples until one crashes.")
-    parser.add_argument("--seconds", metavar="N", default="60",
+    parser.add_argument("--seconds", metavar="N", type=whole(1, 999999), default="60",
                         help="duration of all targets together (default: 60)")
-    parser.add_argument("--target", metavar="NAME",
-                        help=f"run only this target: {', '.join(FUZZERS[:-1])} or {FUZZERS[-1]}")
+    parser.add_argument("--target", metavar="NAME", type=one_of(*FUZZERS),
+                        help=f"run only this target: {list_choices(FUZZERS)}")
     options, _ = parser.parse(words)
-    if not re.fullmatch("[1-9][0-9]{0,5}", options.seconds):
-        raise Failure(f"fuzz: --seconds: expected a whole number, got '{options.seconds}'", 2)
-    if options.target not in (None, *FUZZERS):
-        raise Failure(f"fuzz: --target: expected one of {' '.join(FUZZERS)}, got '{options.target}'", 2)
     targets = [options.target] if options.target else FUZZERS
-    setup("fuzz_packages")
+    call_script("@setup", "fuzz_packages")
     folder = ROOT / "build-fuzz"
-    build_tree("fuzz", folder, *(f"{target}_fuzzer" for target in targets))
+    call_script("@tree", "fuzz", folder, *(f"{target}_fuzzer" for target in targets))
     for target in targets:
         run_fuzzer(folder, target, -(-int(options.seconds) // len(targets)))
     return 0

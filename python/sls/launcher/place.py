@@ -3,7 +3,7 @@
 import difflib
 import os
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -33,6 +33,10 @@ def say(text: str) -> None:
 def list_names(kind: str) -> list[str]:
     """Names of the files of config/KIND, which commands take instead of a path."""
     return sorted(file.stem for file in (ROOT / "config" / kind).glob("*.yaml"))
+
+
+def list_choices(names: Sequence[str]) -> str:
+    return f"{', '.join(names[:-1])} or {names[-1]}"
 
 
 def suggest(word: str, names: Iterable[str]) -> str:

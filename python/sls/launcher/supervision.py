@@ -2,7 +2,7 @@
 
 Signals are blocked and taken one by one, so none is lost between two steps of the launcher."""
 
-import os
+import math
 import signal
 import subprocess
 import time
@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from sls.launcher.place import Failure, say
+from sls.launcher.place import say
 
 STOP = {signal.SIGINT: (130, signal.SIGINT), signal.SIGTERM: (143, signal.SIGTERM),
         signal.SIGHUP: (143, signal.SIGTERM)}
@@ -27,7 +27,7 @@ class Program:
     name: str
     process: "subprocess.Popen[bytes]"
     patience_s: float  # from the stop signal to SIGKILL
-    is_killed: bool = False
+    deadline: float = math.inf
 
 
 class Supervisor:
@@ -36,11 +36,11 @@ class Supervisor:
     def __init__(self, say: Callable[[str], None] = say, overrun_s: float = OVERRUN_S) -> None:
         self._say = say
         self._overrun_s = overrun_s
-        self._first_end: tuple[float, str] | None = None  # of a program that ended well
         self._running: list[Program] = []
         self._beside: Program | None = None
-        self._interrupted = 0
-        self._stopped_at: float | None = None
+        self._first = ""  # of the programs that ended well
+        self._result = self._interrupted = 0
+        self._is_stopped = False
 
     def __enter__(self) -> "Supervisor":
         self._mask = signal.pthread_sigmask(signal.SIG_BLOCK, {*STOP, signal.SIGCHLD})
@@ -49,18 +49,6 @@ class Supervisor:
     def __exit__(self, *_: object) -> None:
         self._stop(signal.SIGTERM)
         self.wait_all()
-        self.end_beside()
-        signal.pthread_sigmask(signal.SIG_SETMASK, self._mask)
-
-    def start(self, name: str, command: Sequence[str | Path],
-              patience_s: float = USUAL_PATIENCE_S) -> None:
-        self._running.append(Program(name, self._spawn(command), patience_s))
-
-    def start_beside(self, name: str, command: Sequence[str | Path]) -> None:
-        """Starts a program that is no part of the flight: its end and its exit code change nothing."""
-        self._beside = Program(name, self._spawn(command), USUAL_PATIENCE_S)
-
-    def end_beside(self) -> None:
         if self._beside:
             self._beside.process.terminate()
             try:
@@ -68,81 +56,76 @@ class Supervisor:
             except subprocess.TimeoutExpired:
                 self._beside.process.kill()
                 self._beside.process.wait()
-            self._beside = None
+        signal.pthread_sigmask(signal.SIG_SETMASK, self._mask)
+
+    def start(self, name: str, command: Sequence[str | Path], patience_s: float = USUAL_PATIENCE_S) -> None:
+        self._running.append(self._spawn(name, command, patience_s))
+
+    def start_beside(self, name: str, command: Sequence[str | Path]) -> None:
+        """Starts a program that is no part of the flight: its end and its exit code change nothing."""
+        self._beside = self._spawn(name, command, USUAL_PATIENCE_S)
 
     def wait_all(self) -> int:
         """Waits for all programs; returns the exit code of the run.
 
         When one fails, the others cannot finish the run: they get SIGTERM, close their files and end."""
-        result = 0
         while self._running:
-            received = signal.sigtimedwait({*STOP, signal.SIGCHLD}, self._calc_seconds_left())
+            left_s = min(program.deadline for program in self._running) - time.monotonic()
+            received = signal.sigtimedwait({*STOP, signal.SIGCHLD}, min(max(left_s, 0.0), 3600.0))
             if received is not None and received.si_signo in STOP:
-                code, passed_on = STOP[signal.Signals(received.si_signo)]
-                self._interrupted = code
+                self._interrupted, passed_on = STOP[signal.Signals(received.si_signo)]
                 self._stop(passed_on)
-            result = self._end_late(self._reap(result))
-        return self._interrupted or result
+            self._reap()
+            self._end_late()
+        return self._interrupted or self._result
 
-    def _spawn(self, command: Sequence[str | Path]) -> "subprocess.Popen[bytes]":
+    def _spawn(self, name: str, command: Sequence[str | Path], patience_s: float) -> Program:
         # If the launcher is killed, the kernel ends the program.
-        return subprocess.Popen(["setpriv", "--pdeathsig", "TERM", "--", *command],
-                                preexec_fn=lambda: signal.pthread_sigmask(signal.SIG_SETMASK, self._mask))
+        return Program(name, subprocess.Popen(
+            ["setpriv", "--pdeathsig", "TERM", "--", *command],
+            preexec_fn=lambda: signal.pthread_sigmask(signal.SIG_SETMASK, self._mask)), patience_s)
 
-    def _reap(self, result: int) -> int:
+    def _reap(self) -> None:
         ended = [program for program in self._running if program.process.poll() is not None]
         self._running = [program for program in self._running if program not in ended]
         for program in ended:
-            code = program.process.returncode
-            code = code if code >= 0 else 128 - code
-            if code == 0:
-                self._first_end = self._first_end or (time.monotonic(), program.name)
-            if code == 0 or result != 0:
-                continue
-            result = 2 if code == 2 else 1
-            if self._stopped_at is None:
-                others = ": ending the others" if self._running else ""
-                if program.process.returncode < 0:
-                    number = signal.Signals(-program.process.returncode)
-                    self._say(f"{program.name} ended with {code} ({number.name}{CAUSES.get(number, '')}){others}")
-                elif others:
-                    self._say(f"{program.name} ended with {code}{others}")
-            self._stop(signal.SIGTERM)
-        if self._beside and self._stopped_at is None and self._beside.process.poll() is not None:
+            self._judge(program.name, program.process.returncode)
+        if self._beside and not self._is_stopped and self._beside.process.poll() is not None:
             self._say(f"{self._beside.name} ended with {self._beside.process.returncode}: the flight goes on")
             self._beside = None
-        return result
+
+    def _judge(self, name: str, code: int) -> None:
+        if code == 0 and not self._first:
+            self._first = name
+            for program in self._running:
+                if program.patience_s < WRITERS_PATIENCE_S and not self._is_stopped:
+                    program.deadline = time.monotonic() + self._overrun_s
+        if code == 0 or self._result != 0:
+            return
+        self._result = 2 if code == 2 else 1
+        if not self._is_stopped and (self._running or code < 0):
+            number = signal.Signals(-code) if code < 0 else None
+            cause = f" ({number.name}{CAUSES.get(number, '')})" if number else ""
+            self._say(f"{name} ended with {code if code > 0 else 128 - code}{cause}"
+                      + (": ending the others" if self._running else ""))
+        self._stop(signal.SIGTERM)
 
     def _stop(self, number: int) -> None:
         for program in self._running:
             program.process.send_signal(number)
-        if self._stopped_at is None:
-            self._stopped_at = time.monotonic()
+            if not self._is_stopped:
+                program.deadline = time.monotonic() + program.patience_s
+        self._is_stopped = True
 
-    def _list_deadlines(self) -> list[tuple[float, Program]]:
-        """When which program is killed, or, before a stop signal, is asked to end."""
-        if self._stopped_at is not None:
-            return [(self._stopped_at + program.patience_s, program) for program in self._running
-                    if not program.is_killed]
-        if self._first_end is None:
-            return []
-        return [(self._first_end[0] + self._overrun_s, program) for program in self._running
-                if program.patience_s < WRITERS_PATIENCE_S]
-
-    def _calc_seconds_left(self) -> float:
-        """Until the next deadline; sigtimedwait takes no infinity."""
-        next_one = min((when for when, _ in self._list_deadlines()), default=time.monotonic() + 3600.0)
-        return max(next_one - time.monotonic(), 0.0)
-
-    def _end_late(self, result: int) -> int:
-        late = [program for when, program in self._list_deadlines() if when <= time.monotonic()]
-        if late and self._stopped_at is None and self._first_end is not None:
-            self._say(f"{self._first_end[1]} ended, but {', '.join(program.name for program in late)} did not "
-                      f"within {self._overrun_s:g} s: ending the others")
+    def _end_late(self) -> None:
+        late = [program for program in self._running if program.deadline <= time.monotonic()]
+        if late and not self._is_stopped:
+            self._say(f"{self._first} ended, but {', '.join(program.name for program in late)} did not within "
+                      f"{self._overrun_s:g} s: ending the others")
+            self._result = 1
             self._stop(signal.SIGTERM)
-            return result or 1
+            return
         for program in late:
             self._say(f"{program.name} did not end {program.patience_s:g} s after the stop signal: killed")
             program.process.kill()
-            program.is_killed = True
-        return result
+            program.deadline = math.inf
