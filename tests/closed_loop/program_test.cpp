@@ -89,6 +89,16 @@ TEST(ClosedLoopErrorsTest, AnInterruptedFlightClosesItsFiles) {
   EXPECT_TRUE(Table(folder / "recording/state.csv").is_well_formed());
 }
 
+TEST(ClosedLoopErrorsTest, AFullDiskLeavesNoFolder) {
+  TemporaryFolder folder;
+  Process flight({"/bin/sh", "-c", "trap '' XFSZ; ulimit -f 0; exec \"$0\" \"$@\"",
+                  program("closed_loop"), "--scenario", scenario("short"), "--out",
+                  folder / "recording"});
+  EXPECT_EQ(flight.wait(), 1);
+  EXPECT_TRUE(holds(flight.output(), "cannot write: File too large\n")) << flight.output();
+  EXPECT_FALSE(std::filesystem::exists(folder / "recording"));
+}
+
 TEST(ClosedLoopErrorsTest, AModelThatDoesNotExistIsRefusedWithTheListOfThose) {
   TemporaryFolder folder;
   const std::string file =

@@ -14,7 +14,6 @@ import help_text
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 
-
 sys.path.insert(0, str(ROOT / "python"))
 from sls.launcher.commands import COMMANDS  # noqa: E402
 
@@ -77,12 +76,8 @@ def list_commands():
 
 
 def read_launcher(build):
-    """{"": the text of ./sls help, command: that of ./sls COMMAND --help}.
-
-    If ./sls help does not state that every command has --help, only the commands that it shows with --help are run:
-    another command might begin its work.
-    """
-    environment = dict(os.environ, SLS_BUILD=str(build), COLUMNS="100", LC_ALL="C.UTF-8")
+    """{"": the text of ./sls help, command: that of ./sls COMMAND --help}."""
+    environment = dict(os.environ, SLS_BUILD=str(build), COLUMNS="80", LC_ALL="C.UTF-8")
 
     def ask(*arguments):
         text = run([ROOT / "sls", *arguments], env=environment, cwd=ROOT)
@@ -90,31 +85,7 @@ def read_launcher(build):
         text = re.sub(r"=\S*/config/qos/", "=config/qos/", text)
         return re.sub(r"([Uu]sage: )(?!\./sls\b)\S*/", r"\1", text).rstrip()
 
-    texts = {"": ask("help")}
-    all_have_help = re.search(r"COMMAND --help", texts[""])
-    for command in list_commands():
-        if command == "help":
-            continue
-        part = find_usage_part(texts[""], command)
-        if all_have_help or part and "--help" in part:
-            texts[command] = ask(command, "--help")
-        elif part:
-            texts[command] = part
-        else:
-            raise StaleReference(f"./sls help does not show the command '{command}'")
-    return texts
-
-
-def find_usage_part(text, command):
-    """The lines of ./sls help about a command, for a help text that lists the options there."""
-    lines, found = text.splitlines(), []
-    for i, line in enumerate(lines):
-        if re.match(rf"  {command}\b(?!-)", line):
-            end = i + 1
-            while end < len(lines) and lines[end].startswith("   "):
-                end += 1
-            found += [entry[2:] for entry in lines[i:end]]
-    return "\n".join(found)
+    return {"": ask("help")} | {name: ask(name, "--help") for name in list_commands() if name != "help"}
 
 
 # --- scenario -------------------------------------------------------------------------------------
