@@ -7,5 +7,8 @@ if __name__ == "__main__":
     package = str(Path(__file__).resolve().parents[2])
     if package not in sys.path:
         sys.path.insert(0, package)
-    from sls.launcher.commands import main
-    sys.exit(main(sys.argv[1:]))
+    try:
+        from sls.launcher.commands import main
+        sys.exit(main(sys.argv[1:]))
+    except KeyboardInterrupt:
+        sys.exit(130)

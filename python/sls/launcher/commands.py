@@ -342,5 +342,3 @@ def main(words: list[str]) -> int:
     except Failure as failure:
         say(f"error: {failure}")
         return failure.code
-    except KeyboardInterrupt:
-        return 130
