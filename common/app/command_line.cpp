@@ -83,9 +83,10 @@ std::string fit(const std::string& help) {
   std::string text;
   for (std::string line; std::getline(lines, line); text += line + "\n") {
     // An option and its meaning are apart by two spaces at least.
-    const std::size_t gap = line.find("  ", std::min(line.find_first_not_of(' '), line.size()));
-    const std::size_t meaning = gap == line.npos ? line.npos : line.find_first_not_of(' ', gap);
-    const std::string margin(meaning == line.npos ? line.find_first_not_of(' ') : meaning, ' ');
+    const std::size_t start = std::min(line.find_first_not_of(' '), line.size());
+    const std::size_t gap = std::min(line.find("  ", start), line.size());
+    const std::size_t meaning = line.find_first_not_of(' ', gap);
+    const std::string margin(meaning == line.npos ? start : meaning, ' ');
     while (line.size() > kColumns) {
       const std::size_t end = line.rfind(' ', kColumns);
       if (end == line.npos || end <= margin.size()) break;

@@ -77,7 +77,7 @@ def list_commands():
 
 def read_launcher(build):
     """{"": the text of ./sls help, command: that of ./sls COMMAND --help}."""
-    environment = dict(os.environ, SLS_BUILD=str(build), COLUMNS="80", LC_ALL="C.UTF-8")
+    environment = dict(os.environ, SLS_BUILD=str(build), COLUMNS="100", LC_ALL="C.UTF-8")
 
     def ask(*arguments):
         text = run([ROOT / "sls", *arguments], env=environment, cwd=ROOT)
