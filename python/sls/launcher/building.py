@@ -1,13 +1,14 @@
 """Set-up and build, which the file `sls` does, and programs that take the place of the launcher."""
 
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
-from sls.launcher.place import BUILD, IS_BUILT_ELSEWHERE, IS_INSTALLED, PYTHON_PATH, ROOT, Failure
+from sls.launcher.place import BUILD, IS_BUILT_ELSEWHERE, IS_INSTALLED, PYTHON_PATH, ROOT, Failure, say
 
 FLYING = ("sim_server", "control_client", "recorder", "closed_loop")
 PROGRAMS = (*FLYING, "sim_ctl", "sls_verify", "sls_convert", "delay_margin", "sls_doctor", "sls_view")
@@ -21,6 +22,18 @@ def run(*command: str | Path, **more: Any) -> None:
     code = subprocess.run(command, check=False, **more).returncode
     if code != 0:
         raise SystemExit(code if code > 0 else 128 - code)
+
+
+def run_logged(log: Path, *command: str | Path, **more: Any) -> tuple[bool, str]:
+    """Runs a command with its output in `log`; returns whether it succeeded, and the output. Prints the errors."""
+    with log.open("wb") as said:
+        done = subprocess.run(command, check=False, stdout=said, stderr=said, **more)
+    text = log.read_text(encoding="utf-8", errors="replace")
+    if done.returncode != 0:
+        lines = text.splitlines()
+        errors = [line for line in lines if re.search(r"[eE]rror|ERROR|SUMMARY|what\(\)", line)]
+        say("\n".join(errors[:20] or lines[-15:]))
+    return done.returncode == 0, text
 
 
 def call_script(action: str, *words: str | Path) -> None:

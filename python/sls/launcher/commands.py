@@ -4,7 +4,6 @@ import importlib.util
 import os
 import re
 import shutil
-import subprocess
 from collections.abc import Callable
 from typing import NoReturn
 
@@ -87,7 +86,7 @@ def build(words: list[str]) -> int:
     has_yaml = importlib.util.find_spec("yaml") is not None  # without it no man page can be made
     build_programs(*PROGRAMS, "_sls_core", *(["man_pages"] if has_yaml else []))
     say(f"programs in build/bin: {' '.join(PROGRAMS)}; the module of the package sls in build/python"
-        + ("; man pages in build/man" if has_yaml else ""))
+        + (", the man pages in build/man" if has_yaml else ""))
     return 0
 
 
@@ -252,12 +251,8 @@ def package(words: list[str]) -> int:
     call_script("@setup", "package_packages")
     call_script("@tree", "release", BUILD, "package_contents")
     log = BUILD / "package.log"
-    with log.open("w", encoding="utf-8") as said:
-        done = subprocess.run(["cpack", "--config", BUILD / "CPackConfig.cmake", "-B", BUILD / "package"],
-                              stdout=said, stderr=said, check=False)
-    text = log.read_text(encoding="utf-8", errors="replace")
-    if done.returncode != 0:
-        say("\n".join(text.splitlines()[-15:]))
+    is_made, text = building.run_logged(log, "cpack", "--config", BUILD / "CPackConfig.cmake", "-B", BUILD / "package")
+    if not is_made:
         raise Failure(f"cpack failed (whole log: {log})")
     made = re.search(r"^CPack: - package: (.*) generated\.$", text, re.MULTILINE)
     say(f"package: {made[1] if made else ''}")

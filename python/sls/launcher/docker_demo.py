@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 
 from sls.launcher.arguments import Parser
-from sls.launcher.building import call_script, run
+from sls.launcher.building import call_script, run, run_logged
 from sls.launcher.flights import print_summary
 from sls.launcher.place import ROOT, Failure, find_file, list_choices, say
 from sls.launcher.supervision import Supervisor
@@ -83,17 +83,13 @@ def build_image() -> None:
     make_base(base)
     if shutil.which("npm"):  # this machine may trust a proxy that the base image does not
         call_script("@npm", ROOT / "tools/view/page")
-    number, log = tempfile.mkstemp()
+    log = tempfile.mkstemp()[1]
     say(f"building the image sls for {system}, for the first time some minutes (log: {log})")
     # An engine without BuildKit pulls the base of both systems, so both are the one that is here.
-    with open(number, "w", encoding="utf-8") as said:
-        done = subprocess.run(
-            ["docker", "build", "--build-arg", f"SYSTEM={system}", "--build-arg", f"DEBIAN12={base}",
-             "--build-arg", f"DEBIAN13={base}", "-f", ROOT / "docker/Dockerfile", "-t", "sls", "-t",
-             f"sls:{system}", ROOT], stdout=said, stderr=said, check=False)
-    if done.returncode != 0:
-        lines = Path(log).read_text(encoding="utf-8", errors="replace").splitlines()
-        say("\n".join([line for line in lines if re.search("[eE]rror", line)][:20] or lines[-20:]))
+    is_built, _ = run_logged(
+        Path(log), "docker", "build", "--build-arg", f"SYSTEM={system}", "--build-arg", f"DEBIAN12={base}",
+        "--build-arg", f"DEBIAN13={base}", "-f", ROOT / "docker/Dockerfile", "-t", "sls", "-t", f"sls:{system}", ROOT)
+    if not is_built:
         raise Failure(f"the image was not built (whole log: {log})")
     os.unlink(log)
 

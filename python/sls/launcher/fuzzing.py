@@ -2,12 +2,11 @@
 
 import os
 import re
-import subprocess
 import tempfile
 from pathlib import Path
 
 from sls.launcher.arguments import Parser, one_of, whole
-from sls.launcher.building import call_script
+from sls.launcher.building import call_script, run_logged
 from sls.launcher.place import ROOT, Failure, list_choices, say
 
 FUZZERS = ("scenario", "qos_file", "csv", "recording", "samples", "foxglove", "web")
@@ -40,16 +39,12 @@ def run_fuzzer(folder: Path, target: str, seconds: int) -> None:
     seeds = [ROOT / seed for seed in SEEDS.get(target, (f"tests/fuzz/corpus/{target}",))]
     # A target that crashes does not tidy up. Libraries from packages are not instrumented, so overflow
     # checks of containers would give false errors.
-    with tempfile.TemporaryDirectory() as scratch, log.open("w", encoding="utf-8") as said:
-        done = subprocess.run(
-            [folder / f"fuzz/{target}_fuzzer", corpus, *seeds, f"-max_total_time={seconds}", "-timeout=10",
-             "-rss_limit_mb=1024", "-max_len=33000", f"-artifact_prefix={crashes}/"], check=False, stdout=said,
-            stderr=said, env={**os.environ, "TMPDIR": scratch, "ASAN_OPTIONS": "detect_container_overflow=0"})
-    lines = log.read_text(encoding="utf-8", errors="replace").splitlines()
-    if done.returncode != 0:
-        for line in lines:
-            if re.search(r"ERROR|SUMMARY|runtime error|what\(\)", line):
-                say(line)
-        inputs = re.findall(re.escape(f"{crashes}/") + "[^']+", "\n".join(lines))
+    with tempfile.TemporaryDirectory() as scratch:
+        is_sound, text = run_logged(
+            log, folder / f"fuzz/{target}_fuzzer", corpus, *seeds, f"-max_total_time={seconds}", "-timeout=10",
+            "-rss_limit_mb=1024", "-max_len=33000", f"-artifact_prefix={crashes}/",
+            env={**os.environ, "TMPDIR": scratch, "ASAN_OPTIONS": "detect_container_overflow=0"})
+    if not is_sound:
+        inputs = re.findall(re.escape(f"{crashes}/") + "[^']+", text)
         raise Failure(f"{target}: crashed (log: {log}) with the input {inputs[-1] if inputs else ''}")
-    say(f"{target}: {lines[-1] if lines else ''}")
+    say(f"{target}: {(text.splitlines() or [''])[-1]}")

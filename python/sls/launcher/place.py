@@ -41,7 +41,7 @@ def list_choices(names: Sequence[str]) -> str:
 
 def suggest(word: str, names: Iterable[str]) -> str:
     """The end of an error line: the name that is nearest to the word, if one is near."""
-    near = difflib.get_close_matches(word, list(names), 1, 0.7)
+    near = difflib.get_close_matches(word, list(names), 1, 0.65)
     return f"; did you mean '{near[0]}'?" if near else ""
 
 
