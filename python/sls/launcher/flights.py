@@ -150,7 +150,7 @@ def print_comparison(lap: list[str]) -> None:
     with open(ROOT / "python/sls/published_lap_2.csv", encoding="utf-8", newline="") as table:
         head, *rows = csv.reader(table)
     for cells in (["", *head[1:]], ["this flight", *(f"{float(error):.1e}" for error in lap)], *rows):
-        print("  {:<34} {:>8} {:>8} {:>8} {:>8} {:>8}".format(*cells))
+        print("  {:<34}{:>8} {:>8} {:>8} {:>8} {:>8}".format(*cells))
     print()
 
 
