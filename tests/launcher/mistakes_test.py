@@ -2,6 +2,8 @@
 
 The launcher runs in a small checkout. Stand-ins for what sets up and builds record that they were called."""
 
+import contextlib
+import io
 import json
 import os
 import pathlib
@@ -22,7 +24,7 @@ BUILD = pathlib.Path(sys.argv[1]).resolve() if len(sys.argv) > 1 else ROOT / "bu
 sys.path[:0] = [str(ROOT / "python"), str(ROOT / "tests/support")]
 from own_domain import OwnDomain  # noqa: E402
 from sls import __version__  # noqa: E402
-from sls.launcher import listing  # noqa: E402
+from sls.launcher import flights, listing  # noqa: E402
 from sls.launcher.commands import FOREIGN, check_words  # noqa: E402
 from sls.launcher.place import Failure, list_names  # noqa: E402
 
@@ -181,6 +183,12 @@ class AnswersTest(unittest.TestCase):
             os.close(ours)
             self.assertEqual(process.wait(60), 0, said)
             self.assertRegex(said.decode(), r"sim_server: step \d+: [12] s of simulated time, ")
+
+    def test_the_comparison_with_published_figures_fits_80_columns(self):
+        with contextlib.redirect_stdout(io.StringIO()) as said:
+            flights.print_comparison(["4.10e-04"] * 5)
+        self.assertEqual([line for line in said.getvalue().splitlines() if len(line) > 80], [])
+        self.assertRegex(said.getvalue(), r"(?m)^  this flight +(4\.1e-04 *){5}$")
 
     def test_ctrl_c_in_a_report_is_one_line(self):
         with tempfile.TemporaryDirectory() as folder:
