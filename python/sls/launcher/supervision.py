@@ -7,7 +7,6 @@ import signal
 import subprocess
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from sls.launcher.place import say
@@ -22,12 +21,12 @@ CAUSES = {signal.SIGBUS: ": is /dev/shm full? (./sls doctor, docs/networks.md)",
           signal.SIGKILL: ": killed, perhaps because memory ran out"}
 
 
-@dataclass
-class Program:
-    name: str
-    process: "subprocess.Popen[bytes]"
-    patience_s: float  # from the stop signal to SIGKILL
-    deadline: float = math.inf
+class Program:  # no dataclass: its module takes longer to load than all of ours
+    def __init__(self, name: str, process: "subprocess.Popen[bytes]", patience_s: float) -> None:
+        self.name = name
+        self.process = process
+        self.patience_s = patience_s  # from the stop signal to SIGKILL
+        self.deadline = math.inf
 
 
 class Supervisor:
