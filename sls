@@ -177,7 +177,7 @@ is_installing=1
 [[ ${1:-} != --no-install || $# == 1 ]] || { is_installing=0; shift; }
 [[ $* != 'setup --no-install' ]] || { is_installing=0; set -- setup; }
 case ${1:-} in
-  setup) (($# > 1)) || { setup; exit; } ;;  # also without Python
+  setup) (($# > 1 || is_installed)) || { setup; exit; } ;;  # also without Python
   @setup) expand "${@:2}"; setup "${names[@]}"; exit ;;
   @install) expand "${@:2}"; install_missing "${names[@]}"; exit ;;
   @npm) install_node_modules "$2"; exit ;;

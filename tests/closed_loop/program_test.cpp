@@ -91,11 +91,12 @@ TEST(ClosedLoopErrorsTest, AnInterruptedFlightClosesItsFiles) {
 
 TEST(ClosedLoopErrorsTest, AFullDiskLeavesNoFolder) {
   TemporaryFolder folder;
-  Process flight({"/bin/sh", "-c", "trap '' XFSZ; ulimit -f 0; exec \"$0\" \"$@\"",
+  Process flight({"/bin/sh", "-c",
+                  "{ trap '' XFSZ; ulimit -f 0; \"$0\" \"$@\" 2>&1; echo \"code $?\"; } | cat",
                   program("closed_loop"), "--scenario", scenario("short"), "--out",
                   folder / "recording"});
-  EXPECT_EQ(flight.wait(), 1);
-  EXPECT_TRUE(holds(flight.output(), "cannot write: File too large\n")) << flight.output();
+  flight.wait();
+  EXPECT_TRUE(holds(flight.output(), "cannot write: File too large\ncode 1\n")) << flight.output();
   EXPECT_FALSE(std::filesystem::exists(folder / "recording"));
 }
 
