@@ -155,7 +155,7 @@ def prepare(name: str, scenario: Path, scratch: Path, user: str) -> None:
         os.environ["SLS_KEYS"] = str(keys)
     if name == "fleet":
         text = scenario.read_text(encoding="utf-8")
-        scenario = scratch / "scenario.yaml"
+        scenario = scratch / scenario.name
         scenario.write_text(text if re.search("^vehicles:", text, re.MULTILINE) else text + "\nvehicles: 8\n",
                             encoding="utf-8")
         scratch.chmod(0o755)
