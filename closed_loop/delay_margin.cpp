@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <variant>
 
 #include "closed_loop/flight.hpp"
 #include "closed_loop/loss.hpp"
@@ -24,6 +25,18 @@ config::Scenario make_delayed(config::Scenario scenario, std::int64_t periods) {
   fault.effect = config::DelayFault{periods * scenario.sync.period_ns};
   scenario.faults.push_back(fault);  // last: random numbers depend on a fault's place
   return scenario;
+}
+
+/// Delay of the loop that the scenario itself has during the whole flight.
+std::int64_t calc_own_delay(const config::Scenario& scenario) {
+  std::int64_t own_ns = scenario.sensing.node_delay_ns;
+  const config::Fault always;
+  for (const config::Fault& fault : scenario.faults) {
+    const auto* delay = std::get_if<config::DelayFault>(&fault.effect);
+    if (delay && fault.from_ns == always.from_ns && fault.to_ns == always.to_ns)
+      own_ns += delay->by_ns;
+  }
+  return own_ns;
 }
 
 /// Flies until the end or the loss. `judge` returns the reason if the load is lost at this step,
@@ -71,8 +84,8 @@ DelayedFlight fly_delayed(const config::Scenario& scenario, std::int64_t periods
   });
 }
 
-std::string to_seconds_text(std::int64_t periods, std::int64_t period_ns) {
-  return config::to_text(config::to_seconds(periods * period_ns));
+std::string to_seconds_text(std::int64_t nanoseconds) {
+  return config::to_text(config::to_seconds(nanoseconds));
 }
 
 }  // namespace
@@ -96,6 +109,7 @@ DelayMargin find_delay_margin(const config::Scenario& scenario,
                               const std::function<void(const DelayedFlight&)>& after_flight) {
   DelayMargin margin;
   margin.period_ns = scenario.sync.period_ns;
+  margin.own_ns = calc_own_delay(scenario);
   const auto add = [&](const DelayedFlight& flight) {
     margin.flights.push_back(flight);
     if (after_flight) after_flight(flight);
@@ -129,15 +143,23 @@ std::string to_text(const DelayMargin& margin) {
                                  "worst error (m)", "rms error (m)", "outcome");
   for (const DelayedFlight& flight : margin.flights)
     text += fmt::format("{:>9} {:>8} {:>15.6f} {:>13.6f}  {}\n",
-                        to_seconds_text(flight.periods, margin.period_ns), flight.periods,
+                        to_seconds_text(flight.periods * margin.period_ns), flight.periods,
                         flight.worst_error, flight.rms_error,
                         flight.is_lost() ? "lost: " + flight.loss : "held");
-  const std::string holds =
-      "holds with " + to_seconds_text(margin.longest_held()->periods, margin.period_ns) + " s, ";
   const DelayedFlight* lost = margin.shortest_lost();
-  return text + holds +
-         (lost ? "loses the load with " + to_seconds_text(lost->periods, margin.period_ns) + " s\n"
-               : "the longest delay tried: the load was never lost\n");
+  const auto describe = [&](std::int64_t own_ns) {
+    const auto to_whole = [&](const DelayedFlight& flight) {
+      return to_seconds_text(own_ns + flight.periods * margin.period_ns);
+    };
+    return "holds with " + to_whole(*margin.longest_held()) + " s, " +
+           (lost ? "loses the load with " + to_whole(*lost) + " s\n"
+                 : "the longest delay tried: the load was never lost\n");
+  };
+  text += describe(0);
+  if (margin.own_ns > 0)
+    text += "with the scenario's own delay of " + to_seconds_text(margin.own_ns) +
+            " s: " + describe(margin.own_ns);
+  return text;
 }
 
 }  // namespace sls::closed_loop

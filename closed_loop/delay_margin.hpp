@@ -22,6 +22,7 @@ struct DelayedFlight {
 
 struct DelayMargin {
   std::int64_t period_ns = 0;
+  std::int64_t own_ns = 0;             ///< delay that the scenario has without the added one
   std::vector<DelayedFlight> flights;  ///< all that were flown, in order of delay
 
   /// The flight with the longest delay below the shortest lost one, and the shortest lost one. If

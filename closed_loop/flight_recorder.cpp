@@ -2,23 +2,15 @@
 
 #include "closed_loop/record_entries.hpp"
 #include "common/plugin/shared_library.hpp"
-#include "recorder/recording_folder.hpp"
 
 namespace sls::closed_loop {
-namespace {
-
-const std::filesystem::path& make_ready(const std::filesystem::path& folder, bool force) {
-  record::prepare_recording_folder(folder, force);
-  return folder;
-}
-
-}  // namespace
 
 FlightRecorder::FlightRecorder(const std::filesystem::path& folder, bool force,
                                const Parameters& parameters, const config::Sync& sync,
                                const std::string& controller_name)
     : controller_name_(controller_name),
-      recording_(make_ready(folder, force), parameters),
+      folder_(folder, force),
+      recording_(folder, parameters),
       board_([this](const SimStatus& status) { recording_.add(status); }, parameters.run_id(),
              parameters.vehicles().front().vehicle_id(), sync, [] { return SyncCounters(); }) {
   for (const VehicleParameters& vehicle : parameters.vehicles())

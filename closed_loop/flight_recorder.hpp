@@ -50,6 +50,7 @@ class FlightRecorder {
 
   const std::string controller_name_;
   std::vector<std::uint32_t> ids_;
+  const record::RecordingFolder folder_;
   record::Recording recording_;
   sim::StatusBoard board_;
   RecordBatch batch_;

@@ -19,7 +19,10 @@ int main(int argc, char** argv) {
   cli.set_version_flag("--version", app::version());
   cli.add_option("--scenario", scenario_file, "scenario (YAML)")->type_name("FILE")->required();
   cli.add_option("--out", folder, "folder of the recording, new or empty (default: no recording)")
-      ->type_name("DIR");
+      ->type_name("DIR")
+      ->check(CLI::Validator(
+          [](const std::string& given) { return given.empty() ? "expected a folder, got ''" : ""; },
+          ""));
   cli.add_flag("--force", force, "replace an existing recording");
   cli.add_option("--period-s", period_s, "control period (default: the scenario's)")
       ->type_name("X");

@@ -5,6 +5,7 @@
 #include "closed_loop/flight_recorder.hpp"
 #include "common/app/options.hpp"
 #include "common/app/stop_signal.hpp"
+#include "common/plugin/shared_library.hpp"
 #include "sim_server/messages.hpp"
 
 namespace sls::closed_loop {
@@ -19,6 +20,8 @@ FlightEnd fly_recorded(const config::Scenario& scenario, const FlightOptions& op
                                                        flight.plant(), app::version()),
                           scenario.sync, options.controller_name);
   recorder.note_law_library(scenario);
+  const plugin::LastWords words(
+      [&recorder](const std::string& reason) { recorder.interrupt(reason); });
   while (app::stop_signal() == 0 && flight.fly_step()) {
     if (recorder.is_status_due()) recorder.announce(flight.take_remarks());
     recorder.add(flight.steps(), flight.refused());

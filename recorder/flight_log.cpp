@@ -22,11 +22,12 @@ constexpr std::size_t kMaxStages = 1000;
 /// Limit of the listed events: a link that is bad for days causes new ones every few seconds.
 constexpr std::size_t kMaxEvents = 1000;
 
-std::string format_errors(const ErrorStatistics& statistics) {
-  const Eigen::Vector3d rms = statistics.calc_rms();
-  return fmt::format("{:9.2e} {:9.2e} {:9.2e}  {:9.2e} {:9.2e} {:9.2e}  {:9.2e}", rms.x(), rms.y(),
-                     rms.z(), statistics.max_abs.x(), statistics.max_abs.y(),
-                     statistics.max_abs.z(), statistics.last.norm());
+/// A row of at most 80 columns.
+std::string format_errors(const std::string& label, const ErrorStatistics& statistics) {
+  const Eigen::Vector3d rms = statistics.calc_rms(), &most = statistics.max_abs;
+  return fmt::format("  {:<13} {:8.2e} {:8.2e} {:8.2e} {:8.2e} {:8.2e} {:8.2e} {:8.2e}\n", label,
+                     rms.x(), rms.y(), rms.z(), most.x(), most.y(), most.z(),
+                     statistics.last.norm());
 }
 
 std::int64_t calc_lap_ns(const config::Stage& stage) {
@@ -175,18 +176,16 @@ void FlightLog::write(std::ostream& out) const {
   for (const auto& [vehicle_id, stages] : stages_) {
     out << fmt::format(
         "Load position error, vehicle {} (m)\n"
-        "  {:<24} {:>9} {:>9}  {:>9} {:>9} {:>9}  {:>9} {:>9} {:>9}  {:>9}\n",
-        vehicle_id, "stage", "from s", "to s", "rms x", "rms y", "rms z", "max x", "max y", "max z",
-        "at end");
+        "{:>24} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8}\n",
+        vehicle_id, "rms x", "rms y", "rms z", "max x", "max y", "max z", "at end");
     for (const auto& [index, stage] : stages.listed) {
-      out << fmt::format("  {:<24} {:>9} {:>9}  {}\n", fmt::format("{} {}", index, stage.name),
-                         to_time(stage.first_step), to_time(stage.last_step),
-                         format_errors(stage.all));
+      out << fmt::format("  {} {}, {} s to {} s\n", index, stage.name, to_time(stage.first_step),
+                         to_time(stage.last_step))
+          << format_errors("all", stage.all);
       for (std::size_t lap = 0; lap < stage.laps.size(); ++lap) {
         if (stage.laps[lap].samples == 0) continue;
         const char* part = is_whole_lap(stage, index, lap) ? "" : " (part)";
-        out << fmt::format("  {:<24} {:>9} {:>9}  {}\n", fmt::format("    lap {}{}", lap + 1, part),
-                           "", "", format_errors(stage.laps[lap]));
+        out << format_errors(fmt::format("lap {}{}", lap + 1, part), stage.laps[lap]);
       }
     }
     if (stages.left_out > 0) out << fmt::format("  ({} more stages)\n", stages.left_out);

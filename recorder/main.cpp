@@ -1,4 +1,5 @@
 #include <iostream>
+#include <optional>
 
 #include "common/app/run_main.hpp"
 #include "common/app/scheduling.hpp"
@@ -47,10 +48,11 @@ int main(int argc, char** argv) {
 
   const int code = app::run_main(argc, argv, cli, options, "recorder", [&] {
     bus::check_security_files(bus::read_qos_file(options.qos_file, kIdentity));
+    std::optional<record::RecordingFolder> folder;
     if (resume)
       recorder.unfinished = record::find_unfinished_recording(recorder.folder);
     else
-      record::prepare_recording_folder(recorder.folder, force);
+      folder.emplace(recorder.folder, force);
     if (check) return;
     // The loop waits for server and client, not for the recorder, so those have priority. Set
     // before any thread starts, because threads inherit it. A refusal does no harm.

@@ -122,7 +122,24 @@ void prepare_recording_folder(const fs::path& folder, bool force) {
   for (const auto& entry : list(place, folder))
     throw ConfigError(place + ": expected an empty folder, got one with '" +
                       entry.path().filename().string() +
-                      "' in it (--force replaces a recording, --resume continues one)");
+                      "' in it (--force replaces a recording, recorder --resume continues one)");
+}
+
+RecordingFolder::RecordingFolder(const fs::path& folder, bool force)
+    : folder_(fs::absolute(folder).lexically_normal()) {
+  std::error_code ignored;
+  for (fs::path path = folder_; !fs::exists(path, ignored) && path.has_relative_path();
+       path = path.parent_path())
+    made_.push_back(path);
+  prepare_recording_folder(folder, force);
+}
+
+RecordingFolder::~RecordingFolder() {
+  std::error_code ignored;
+  if (fs::exists(folder_ / "manifest.json", ignored)) return;
+  for (const auto& entry : fs::directory_iterator(folder_, ignored))
+    if (is_recording_file(entry.path())) fs::remove(entry.path(), ignored);
+  for (const fs::path& folder : made_) fs::remove(folder, ignored);  // empty ones only
 }
 
 std::optional<RecordedFlight> find_unfinished_recording(const fs::path& folder) {

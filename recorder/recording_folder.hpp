@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "recorder/recording_reader.hpp"
 
@@ -14,6 +15,21 @@ namespace sls::record {
 /// further runs; a folder with other files is still refused.
 /// @throws config::ConfigError naming the folder and the cause.
 void prepare_recording_folder(const std::filesystem::path& folder, bool force);
+
+/// A prepared folder. When the object is destroyed before a recording has begun, because the disk
+/// is full or no run came, files without rows are removed, and the folders that it made.
+class RecordingFolder {
+ public:
+  /// @throws config::ConfigError as prepare_recording_folder.
+  RecordingFolder(const std::filesystem::path& folder, bool force);
+  ~RecordingFolder();
+  RecordingFolder(const RecordingFolder&) = delete;
+  RecordingFolder& operator=(const RecordingFolder&) = delete;
+
+ private:
+  const std::filesystem::path folder_;
+  std::vector<std::filesystem::path> made_;  // innermost first
+};
 
 /// The recording of a killed recorder in `folder`, to be continued. If there is none yet, makes the
 /// folder ready for a new one and returns nothing.

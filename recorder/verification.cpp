@@ -4,9 +4,12 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <fstream>
+#include <limits>
 #include <map>
 #include <set>
+#include <type_traits>
 
 #include "recorder/certificate.hpp"
 
@@ -81,13 +84,20 @@ void certify(const RecordedFlight& flight, Inspection& inspection) {
 struct FieldLister {
   std::vector<std::string> texts;
   std::vector<bool> are_nan;
+  std::vector<double> numbers;  // NaN for a text
 
   template <class Field>
   void operator()(const Column& column, const Field& field) {
     for_each_component(field, [&](const auto& component) {
       are_nan.push_back(component != component);
       texts.push_back(column.is_certified ? format(component) : "");
+      numbers.push_back(to_number(component));
     });
+  }
+  template <class Number>
+  static double to_number(const Number& number) {
+    if constexpr (std::is_arithmetic_v<Number>) return static_cast<double>(number);
+    return std::numeric_limits<double>::quiet_NaN();
   }
   template <class Number>
   static std::string format(const Number& number) {
@@ -123,7 +133,9 @@ std::optional<std::string> compare_rows(const std::optional<Row>& a, const std::
     if (of_a.texts[i] != of_b.texts[i])
       return fmt::format(
           "{}, {}: {} in A, {} in B{}", place, columns[i], of_a.texts[i], of_b.texts[i],
-          of_a.are_nan[i] && of_b.are_nan[i] ? " (neither is a number; their signs differ)" : "");
+          of_a.are_nan[i] && of_b.are_nan[i]   ? " (neither is a number; their signs differ)"
+          : of_a.numbers[i] == of_b.numbers[i] ? " (equal numbers of other bits)"
+                                               : "");
   return fmt::format("{}: {} fields in A, {} in B", place, of_a.texts.size(), of_b.texts.size());
 }
 
@@ -147,6 +159,24 @@ std::optional<Difference> compare_next(const std::optional<StepRows>& a,
   }
   if (auto text = compare_steps(*a, *b, flight)) return Difference{a->step, *text};
   return std::nullopt;
+}
+
+/// Adds the deviations of a pair of rows to those of the columns of `file`.
+template <class Row>
+void add_deviations(const std::optional<Row>& a, const std::optional<Row>& b, const StepRows& step,
+                    const RecordedFlight& flight, int file,
+                    std::map<std::pair<int, std::size_t>, Deviation>& worst) {
+  if (!a || !b || to_bytes(*a) == to_bytes(*b)) return;
+  const FieldLister of_a = list_fields(*a), of_b = list_fields(*b);
+  for (std::size_t i = 0; i < std::min(of_a.texts.size(), of_b.texts.size()); ++i) {
+    if (of_a.texts[i] == of_b.texts[i]) continue;
+    const double size = std::abs(of_a.numbers[i] - of_b.numbers[i]);
+    auto& entry = worst[{file, i}];
+    const bool is_new = entry.column.empty();
+    if (is_new) entry.column = fmt::format("{}, {}", Row::kFile, read_columns<Row>(flight).at(i));
+    if (is_new || size > entry.largest || (std::isnan(size) && !std::isnan(entry.largest)))
+      entry = {entry.column, size, step.vehicle_id, step.step};
+  }
 }
 
 }  // namespace
@@ -186,6 +216,40 @@ std::optional<Difference> find_first_difference(const RecordedFlight& a, const R
       id = is_over ? ids.erase(id) : std::next(id);
     }
   return first;
+}
+
+std::vector<Deviation> list_deviations(const RecordedFlight& a, const RecordedFlight& b) {
+  StepReader reader_a(a), reader_b(b);
+  std::map<std::pair<int, std::size_t>, Deviation> worst;
+  std::vector<std::uint32_t> ids = a.vehicle_ids();
+  while (!ids.empty())
+    for (auto id = ids.begin(); id != ids.end();) {
+      auto step_a = reader_a.next(*id), step_b = reader_b.next(*id);
+      while (step_a && step_b && step_a->step != step_b->step)
+        if (step_a->step < step_b->step)
+          step_a = reader_a.next(*id);
+        else
+          step_b = reader_b.next(*id);
+      if (!step_a || !step_b) {
+        id = ids.erase(id);
+        continue;
+      }
+      add_deviations(step_a->state, step_b->state, *step_a, a, 0, worst);
+      add_deviations(step_a->command, step_b->command, *step_a, a, 1, worst);
+      add_deviations(step_a->reference, step_b->reference, *step_a, a, 2, worst);
+      ++id;
+    }
+  std::vector<Deviation> all;
+  for (const auto& [column, deviation] : worst) all.push_back(deviation);
+  return all;
+}
+
+std::string describe(const Deviation& deviation) {
+  const std::string place =
+      fmt::format(", vehicle {}, step {}", deviation.vehicle_id, deviation.step);
+  if (std::isnan(deviation.largest)) return deviation.column + ": other values" + place;
+  if (deviation.largest == 0) return deviation.column + ": other bits of equal numbers" + place;
+  return fmt::format("{}: {:.3g}{}", deviation.column, deviation.largest, place);
 }
 
 std::vector<std::string> list_notes(const RecordedFlight& a, const RecordedFlight& b) {

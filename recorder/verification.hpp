@@ -27,6 +27,19 @@ struct Difference {
 /// @throws DamagedError if a row that is read before the first difference is damaged.
 std::optional<Difference> find_first_difference(const RecordedFlight& a, const RecordedFlight& b);
 
+/// The largest difference of a column over the steps that both recordings have.
+struct Deviation {
+  std::string column;  ///< `state.csv, load_x_m`
+  double largest =
+      0;  ///< |A − B|; 0: of bits alone, as of −0 and 0; NaN: one is not a number, or a text
+  std::uint32_t vehicle_id = 0;
+  std::uint64_t step = 0;  ///< of the largest; of the first if there is none
+};
+/// One entry for each column that differs, in the order of the files.
+/// @throws DamagedError
+std::vector<Deviation> list_deviations(const RecordedFlight& a, const RecordedFlight& b);
+std::string describe(const Deviation& deviation);
+
 /// Differences and gaps according to the manifests. The data can still be equal.
 std::vector<std::string> list_notes(const RecordedFlight& a, const RecordedFlight& b);
 

@@ -1,6 +1,7 @@
 #include "sim_server/realtime_run.hpp"
 
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,6 +11,7 @@
 #include "common/app/run_main.hpp"
 #include "common/app/scheduling.hpp"
 #include "common/app/wait.hpp"
+#include "common/config/numbers.hpp"
 
 namespace sls::sim {
 namespace {
@@ -24,6 +26,12 @@ constexpr int kMissesBeforeTakeOver = 3;
 
 /// A client that sends no answer for this long may have a clock for which LIFESPAN drops them all.
 constexpr auto kMeasured = 1s;
+
+/// Only slow answers for so long are the law's, not those of a busy machine.
+constexpr int kSlowAnswers = 3;
+constexpr auto kSlowTime = 1s;
+
+constexpr auto kProgressInterval = 5s;
 
 /// Longer computing times in answers are not credible.
 constexpr std::uint64_t kLongestComputing_ns = 60'000'000'000;
@@ -48,6 +56,17 @@ void RealtimeRun::begin() {
         "late");
   schedule_ = Schedule(Clock::now(), calc_wall_period(scenario_.sync));
   missed_deadlines_ = endpoints_.command_stream.missed_deadlines();
+  next_progress_ = Clock::now() + kProgressInterval;
+}
+
+void RealtimeRun::report_progress() {
+  if (Clock::now() < next_progress_) return;
+  next_progress_ = Clock::now() + kProgressInterval;
+  if (::isatty(STDERR_FILENO) != 0)
+    spdlog::info(
+        "step {}: {:.0f} s of simulated time, {}", board_.step,
+        config::to_seconds(static_cast<std::int64_t>(board_.step) * scenario_.sync.period_ns),
+        board_.timing.label());
 }
 
 void RealtimeRun::note_rest(Clock::duration rest) {
@@ -58,6 +77,7 @@ void RealtimeRun::note_rest(Clock::duration rest) {
 
 bool RealtimeRun::exchange() {
   if (!wait_until_due()) return false;
+  report_progress();
   for (const auto& vehicle : vehicles_) vehicle->gate.expect(board_.step);
   publish();
   if (!take_commands(schedule_.close(board_.step, published_))) return false;
@@ -115,6 +135,7 @@ bool RealtimeRun::take_commands(Clock::time_point deadline) {
     for (const ReceivedCommands& received : endpoints_.commands.take_all()) {
       judge(received.sample, received.sender, received.arrived < published_);
       note_clock(received);
+      note_computing(received);
     }
     check_refusals();
     if (are_all_accepted()) {
@@ -181,6 +202,26 @@ void RealtimeRun::note_clock(const ReceivedCommands& received) {
   exchange.arrived = std::chrono::system_clock::now() - (Clock::now() - received.arrived);
   client->second.offset.note(exchange);
   client->second.noted = Clock::now();
+}
+
+void RealtimeRun::note_computing(const ReceivedCommands& received) {
+  if (received.sample.run_id() != run_id_ || clocks_.count(received.sender) == 0) return;
+  std::chrono::duration<double> computing(0.0);
+  for (const ControlCommand& command : received.sample.vehicles())
+    computing +=
+        std::chrono::nanoseconds(std::min(command.compute_time_ns(), kLongestComputing_ns));
+  const std::chrono::duration<double> period = calc_wall_period(scenario_.sync);
+  SlowAnswers& slow = slow_answers_[received.sender];
+  if (computing <= period) slow.count = 0;
+  if (computing <= period || slow.is_reported) return;
+  if (slow.count++ == 0) slow.since = Clock::now();
+  slow.is_reported = slow.count >= kSlowAnswers && Clock::now() - slow.since >= kSlowTime;
+  if (slow.is_reported)
+    board_.announce(fmt::format(
+        "step {}: controller '{}' computes an answer for {:.3g} ms, expected less than the period of "
+        "{:.3g} ms: its answers come late (a lower --rtf or a longer --period-s gives it time)",
+        board_.step, received.sample.client_name().c_str(), 1e3 * computing.count(),
+        1e3 * period.count()));
 }
 
 void RealtimeRun::check_clocks() {

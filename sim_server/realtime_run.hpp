@@ -45,6 +45,10 @@ class RealtimeRun : public Run {
   void count_missed_deadlines();
   /// Measures the clock of the sender.
   void note_clock(const ReceivedCommands& received);
+  /// Reports a client whose answers take longer than a period: none of them is in time.
+  void note_computing(const ReceivedCommands& received);
+  /// On a terminal, where a flight that is not heard for long looks as if it hung.
+  void report_progress();
   /// Reports a client whose clock differs so much that its commands would expire wrongly or never,
   /// and when the clocks agree again. Meanwhile LIFESPAN is ignored: commands expire by their step
   /// alone. It is also ignored where old announcements suggest a wrong clock: if it is wrong, no
@@ -66,6 +70,13 @@ class RealtimeRun : public Run {
   std::map<bus::PeerId, ClientClock> clocks_;
   /// When the states of the last steps were published, by the clock that sample stamps use.
   std::array<std::chrono::system_clock::time_point, 64> published_stamps_;
+  struct SlowAnswers {  // in a row
+    int count = 0;
+    Clock::time_point since;
+    bool is_reported = false;
+  };
+  std::map<bus::PeerId, SlowAnswers> slow_answers_;
+  Clock::time_point next_progress_;
   bool is_lifespan_ignored_ = false;
   std::optional<app::Wait> recorder_wait_;
 };

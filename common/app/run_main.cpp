@@ -2,6 +2,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include "common/app/command_line.hpp"
 #include "common/app/log.hpp"
 #include "common/app/stop_signal.hpp"
 #include "common/config/config_error.hpp"
@@ -15,9 +16,13 @@ int run_main(int argc, char** argv, CLI::App& cli, const CommonOptions& options,
   try {
     cli.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
+    if (error.get_name() == "CallForHelp") {
+      std::fputs(fit(cli.help()).c_str(), stdout);
+      return kExitDone;
+    }
     if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success))
-      return cli.exit(error);  // --help, --version
-    spdlog::error("{} (see --help)", error.what());
+      return cli.exit(error);  // --version
+    spdlog::error("{} (see --help)", describe_usage_error(error, cli, {argv + 1, argv + argc}));
     return kExitBadUsage;
   }
   start_log(program, options.log_level);

@@ -13,6 +13,8 @@
 #include <fastdds/dds/subscriber/qos/DataReaderQos.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
 
+#include <spdlog/fmt/fmt.h>
+#include <sys/statvfs.h>
 #include <algorithm>
 #include <atomic>
 #include <charconv>
@@ -144,6 +146,7 @@ struct Node::Impl {
     participants.maximum = std::min(participants.maximum, kMaxParticipants);
     MiddlewareLog::clear();
     remove_stale_segments();
+    expect_room(qos);
     auto& wire = qos.wire_protocol();
     // A node without shared memory leaves no port files, so its id would look free to the next one.
     ports = {wire.port.portBase + wire.port.domainIDGain * domain + wire.port.offsetd1,
@@ -235,6 +238,25 @@ struct Node::Impl {
     const auto& own = qos.transport().user_transports;
     return qos.transport().use_builtin_transports ||
            std::any_of(own.begin(), own.end(), is_shared_memory);
+  }
+
+  /// Fast DDS finds no room only when it writes, and then the process dies of SIGBUS.
+  static void expect_room(const dds::DomainParticipantQos& qos) {
+    constexpr double kBesides = 1e6;  // bytes: ports and bookkeeping
+    struct statvfs room {};
+    if (!has_shared_memory(qos) || ::statvfs("/dev/shm", &room) != 0) return;
+    double need = rtps::SharedMemTransportDescriptor().segment_size();
+    for (const auto& transport : qos.transport().user_transports)
+      if (const auto memory =
+              std::dynamic_pointer_cast<rtps::SharedMemTransportDescriptor>(transport))
+        need = memory->segment_size();
+    need += kBesides;
+    const double free = static_cast<double>(room.f_bavail) * static_cast<double>(room.f_frsize);
+    if (free < need)
+      throw BusError(fmt::format("/dev/shm: expected {:.1f} MB free, got {:.1f} MB", need * 1e-6,
+                                 free * 1e-6) +
+                     ": mount -o remount,size=64M /dev/shm (docker run --shm-size 64m), or --qos "
+                     "config/qos/udp.xml");
   }
 
   static void leave_out_shared_memory(dds::DomainParticipantQos& qos) {

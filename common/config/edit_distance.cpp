@@ -23,4 +23,20 @@ std::size_t calc_edit_distance(const std::string& a, const std::string& b) {
   return last[b.size()];
 }
 
+std::optional<std::string> find_similar(const std::string& key,
+                                        const std::vector<std::string>& known) {
+  constexpr std::size_t kLongestKey = 64;  // no suggestion for longer keys
+  if (key.empty() || key.size() > kLongestKey) return std::nullopt;
+  std::optional<std::string> similar;
+  std::size_t least = std::max<std::size_t>(2, key.size() / 3) + 1;
+  for (const std::string& name : known) {
+    const bool unit_forgotten = key.size() >= 3 && name.compare(0, key.size(), key) == 0;
+    const std::size_t distance = unit_forgotten ? 0 : calc_edit_distance(key, name);
+    if (distance >= least) continue;
+    least = distance;
+    similar = name;
+  }
+  return similar;
+}
+
 }  // namespace sls::config

@@ -12,27 +12,6 @@
 namespace sls::config {
 namespace {
 
-bool begins_with(const std::string& text, const std::string& beginning) {
-  return text.compare(0, beginning.size(), beginning) == 0;
-}
-
-/// A suggestion for an unknown `key`: a typing error or a forgotten unit.
-std::optional<std::string> find_similar(const std::string& key,
-                                        const std::vector<std::string>& known) {
-  constexpr std::size_t kLongestKey = 64;  // no suggestion for longer keys
-  if (key.empty() || key.size() > kLongestKey) return std::nullopt;
-  std::optional<std::string> similar;
-  std::size_t least = std::max<std::size_t>(2, key.size() / 3) + 1;
-  for (const std::string& name : known) {
-    const bool unit_forgotten = key.size() >= 3 && begins_with(name, key);
-    const std::size_t distance = unit_forgotten ? 0 : calc_edit_distance(key, name);
-    if (distance >= least) continue;
-    least = distance;
-    similar = name;
-  }
-  return similar;
-}
-
 std::string join(const std::vector<std::string>& words) {
   std::string joined;
   for (const std::string& word : words) joined += (joined.empty() ? "" : ", ") + word;

@@ -151,6 +151,23 @@ std::string to_message(const YAML::Exception& error) {
   return is_undefined ? undefined : to_printable(error.msg, 100);
 }
 
+/// The expectation and the text of the line of the error: yaml-cpp names neither.
+std::string describe_syntax_error(const std::string& text, int line, const YAML::Exception& error) {
+  std::istringstream lines(text);
+  std::string before, here;
+  for (int number = 1; number <= line && std::getline(lines, here); ++number)
+    if (number + 1 == line) before = here;
+  const auto has_tab = [](const std::string& indented) {
+    return indented.substr(0, indented.find_first_not_of(" \t")).find('\t') != std::string::npos;
+  };
+  if (has_tab(here) || has_tab(before)) return "spaces before a key, got a tab";
+  const std::string message = to_message(error);
+  if (message == "illegal map value")
+    return "KEY: VALUE, as deep as the keys around it, got '" + to_printable(here, 60) +
+           "' after '" + to_printable(before, 60) + "'";
+  return "YAML, got a syntax error: " + message;
+}
+
 }  // namespace
 
 YamlNode parse_yaml(const std::string& text, const std::string& place) {
@@ -162,8 +179,8 @@ YamlNode parse_yaml(const std::string& text, const std::string& place) {
     while (parser.HandleNextDocument(builder)) {
     }
   } catch (const YAML::Exception& error) {
-    throw make_error(place, error.mark.is_null() ? 0 : to_line(error.mark), "",
-                     "expected YAML, got a syntax error: " + to_message(error));
+    const int line = error.mark.is_null() ? 0 : to_line(error.mark);
+    throw make_error(place, line, "", "expected " + describe_syntax_error(text, line, error));
   }
   YamlNode nothing;
   nothing.line = 1;

@@ -31,6 +31,9 @@ std::atomic<double> patience_s{60.0};
 struct ThreadRecord {
   std::atomic<std::uint64_t> calls{0};
   Call call;
+  sigjmp_buf place;
+  bool has_place = false;
+  int crash = 0;                         // the signal
   std::array<char, 16384> signal_stack;  // a stack overflow leaves no room on the thread's own
 };
 
@@ -72,15 +75,36 @@ class Line {
 
 thread_local ThreadRecord* current = nullptr;
 
+std::function<void(const std::string&)> last_words;
+std::atomic<bool> has_last_words{false};
+
+bool is_inside_library(const ThreadRecord* record) {
+  return record && record->calls.load(std::memory_order_relaxed) % 2 == 1;
+}
+
+/// Prints the event inside a library on stderr and calls the LastWords.
+void report(Line line, bool may_call) {
+  Line().begin("error").add(line.text()).add("\n").write_to_stderr();
+  if (may_call && has_last_words.exchange(false)) last_words(std::string(line.text()));
+}
+
+Line describe_crash(const ThreadRecord& record, int number) {
+  return Line()
+      .add(record.call)
+      .add(": crashed (signal ")
+      .add(static_cast<std::uint64_t>(number))
+      .add(")");
+}
+
 void report_crash(int number) {
-  if (current && current->calls.load(std::memory_order_relaxed) % 2 == 1)
-    Line()
-        .begin("error")
-        .add(current->call)
-        .add(": crashed (signal ")
-        .add(static_cast<std::uint64_t>(number))
-        .add(")\n")
-        .write_to_stderr();
+  if (is_inside_library(current)) {
+    // Out of the handler, so that the last words may allocate: CallGuard::after_crash.
+    if (current->has_place && has_last_words) {
+      current->crash = number;
+      siglongjmp(current->place, 1);
+    }
+    report(describe_crash(*current, number), false);
+  }
   // SA_RESETHAND has restored the default action, so the second signal ends the process. abort()
   // itself raises SIGABRT again.
   if (number == SIGABRT) return;
@@ -175,6 +199,11 @@ struct Registration {
     current = &record;
   }
   ~Registration() {
+    // exit() first destroys what belongs to the calling thread.
+    if (is_inside_library(&record)) {
+      report(Line().add(record.call).add(": ended the program or its thread"), true);
+      ::_exit(1);
+    }
     current = nullptr;
     ::sigaltstack(&others, nullptr);
     Watchdog::instance().remove(&record);
@@ -197,6 +226,34 @@ CallGuard::CallGuard(const Call& call) {
   registration.record.calls.fetch_add(1, std::memory_order_release);
 }
 
-CallGuard::~CallGuard() { current->calls.fetch_add(1, std::memory_order_release); }
+CallGuard::~CallGuard() {
+  current->has_place = false;
+  current->calls.fetch_add(1, std::memory_order_release);
+}
+
+sigjmp_buf& CallGuard::place() {
+  current->has_place = true;
+  return current->place;
+}
+
+void CallGuard::after_crash() {
+  const int number = current->crash;
+  current->has_place = false;  // a second crash ends the process at once
+  sigset_t all;
+  sigemptyset(&all);
+  sigaddset(&all, number);  // blocked in its handler
+  pthread_sigmask(SIG_UNBLOCK, &all, nullptr);
+  report(describe_crash(*current, number), true);
+  ::signal(number, SIG_DFL);
+  ::raise(number);
+  ::_exit(128 + number);
+}
+
+LastWords::LastWords(std::function<void(const std::string& reason)> call) {
+  last_words = std::move(call);
+  has_last_words = true;
+}
+
+LastWords::~LastWords() { has_last_words = false; }
 
 }  // namespace sls::plugin

@@ -2,9 +2,11 @@
 /// library, function, vehicle and step.
 #pragma once
 
+#include <csetjmp>
 #include <cstdint>
 #include <exception>
 #include <filesystem>
+#include <functional>
 #include <stdexcept>
 #include <string>
 
@@ -21,16 +23,30 @@ struct Call {
   std::string describe() const;
 };
 
-/// Marks the thread as inside a library while the object exists. If the thread crashes meanwhile, a
-/// line on stderr names the call before the process ends. A call that does not return is reported
-/// after 2 s. After 60 s, or the time given to `set_patience`, the process ends with exit code 1.
-/// Times when the process is stopped (SIGSTOP) do not count.
+/// Marks the thread as inside a library while the object exists. If the thread crashes or exits
+/// meanwhile, a line on stderr names the call before the process ends. A call that does not return
+/// is reported after 2 s. After 60 s, or the time given to `set_patience`, the process ends with
+/// exit code 1. Times when the process is stopped (SIGSTOP) do not count.
 class CallGuard {
  public:
   explicit CallGuard(const Call& call);
   ~CallGuard();
   CallGuard(const CallGuard&) = delete;
   CallGuard& operator=(const CallGuard&) = delete;
+
+  /// Where a crash continues if there are LastWords: set it by sigsetjmp, then call after_crash.
+  sigjmp_buf& place();
+  [[noreturn]] void after_crash();
+};
+
+/// While the object exists, a crash or an exit inside a library calls `call` with the event
+/// before the process ends: a recording closes its files. At most one exists.
+class LastWords {
+ public:
+  explicit LastWords(std::function<void(const std::string& reason)> call);
+  ~LastWords();
+  LastWords(const LastWords&) = delete;
+  LastWords& operator=(const LastWords&) = delete;
 };
 
 /// Sets the longest time that a call may take from now on, in s.
@@ -51,7 +67,8 @@ void call_guarded(const Call& call, const Work& work) {
   const std::uint64_t mode = floating_point_mode();
   std::string defect;
   {
-    const CallGuard guard(call);
+    CallGuard guard(call);
+    if (sigsetjmp(guard.place(), 0) != 0) guard.after_crash();
     try {
       work();
     } catch (const std::exception& error) {

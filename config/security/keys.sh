@@ -15,16 +15,19 @@ usage() {
 usage: ./sls keys DIR [--days N] [--force] [--other-vendors] [--mixed-versions]
        ./sls keys DIR --add ROLE NAME [--days N] [--force]
 
-Makes DIR: certificate authorities (DIR/ca) and one folder for each role, server, controller, recorder,
-operator and viewer, with the identity and the signed documents of that role.
+Makes DIR: certificate authorities (DIR/ca) and one folder for each role,
+server, controller, recorder, operator and viewer, with the identity and the
+signed documents of that role.
 
   --days N         valid for N days, 1 to 36500 (default: 365)
   --force          replace what is there
-  --other-vendors  for programs on another vendor's DDS, such as Cyclone DDS: also encrypts
-                   submessages, which costs up to a third of the speed
-  --mixed-versions for programs of Debian 12 and of Debian 13 in one flight, and for Debian 13 with
-                   another vendor's DDS: does not encrypt discovery (topic names, types, QoS)
-  --add ROLE NAME  one more identity of that role in DIR/NAME, signed by the authorities in DIR/ca
+  --other-vendors  for programs on another vendor's DDS, such as Cyclone DDS:
+                   also encrypts submessages, which costs a third of the speed
+  --mixed-versions for programs of Debian 12 and of Debian 13 in one flight,
+                   and for Debian 13 with another vendor's DDS: does not
+                   encrypt discovery (topic names, types, QoS)
+  --add ROLE NAME  one more identity of that role in DIR/NAME, signed by the
+                   authorities in DIR/ca
 
 Fly with them: SLS_KEYS=DIR ./sls run SCENARIO --qos config/qos/secure.xml
 TEXT

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from sls.scenario import load_scenario
     from sls.trajectory import Trajectory
 
+__version__ = "0.1.0"  # that of CMakeLists.txt
+
 # The module of each name. It is imported on first use: a program that only reads recordings needs
 # neither the extension module nor the packages for figures.
 _PLACES = {

@@ -2,10 +2,15 @@
 campaign/cli.py."""
 
 import argparse
+import os
+import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
+
+if __name__ == "__main__":  # before the imports, which take most of the time
+    signal.signal(signal.SIGINT, lambda *_: (os.write(2, b"sls: interrupted\n"), os._exit(130)))
 
 from sls import study
 from sls.figures import make_figures, save

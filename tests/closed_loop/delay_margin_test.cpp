@@ -49,6 +49,41 @@ double calc_worst_error(const std::vector<FlownStep>& flight, double from, doubl
   return worst;
 }
 
+TEST(DelayMarginTest, TheScenariosOwnDelayIsAddedInAnotherLine) {
+  DelayMargin margin;
+  margin.period_ns = 4'000'000;
+  margin.flights.resize(2);
+  margin.flights[0].periods = 44;
+  margin.flights[1].periods = 45;
+  margin.flights[1].loss = "far away";
+  const std::string alone = "held\n", line = "holds with 0.176 s, loses the load with 0.18 s\n";
+  const auto ends_with = [&](const std::string& end) {
+    const std::string text = to_text(margin);
+    return text.size() > end.size() && text.substr(text.size() - end.size()) == end;
+  };
+  EXPECT_TRUE(ends_with("far away\n" + line)) << to_text(margin);
+  margin.own_ns = 100'000'000;
+  EXPECT_TRUE(ends_with(line + "with the scenario's own delay of 0.1 s: holds with 0.276 s, loses "
+                               "the load with 0.28 s\n"))
+      << to_text(margin);
+}
+
+TEST(DelayMarginTest, OnlyDelaysOfTheWholeFlightAreTheScenariosOwn) {
+  config::Scenario scenario = load("short");
+  const auto add = [&](config::FaultChannel on, std::int64_t by_ns, std::int64_t from_ns) {
+    config::Fault fault;
+    fault.kind = "delay";
+    fault.on = on;
+    fault.effect = config::DelayFault{by_ns};
+    fault.from_ns = from_ns;
+    scenario.faults.push_back(fault);
+  };
+  add(config::FaultChannel::kCommand, 8'000'000, 0);
+  add(config::FaultChannel::kState, 4'000'000, 0);
+  add(config::FaultChannel::kCommand, 4'000'000, 1'000'000'000);
+  EXPECT_EQ(find_delay_margin(scenario).own_ns, 12'000'000);
+}
+
 TEST(DelayMarginTest, SmallMotionsAboutHoverGrowFromTheDelayOfLinearTheoryOn) {
   config::Scenario scenario = load("figure_eight");
   scenario.plant.initial.position << 1e-6, 0.0, -0.5;  // so small that the motion stays linear

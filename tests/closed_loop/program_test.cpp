@@ -89,6 +89,17 @@ TEST(ClosedLoopErrorsTest, AnInterruptedFlightClosesItsFiles) {
   EXPECT_TRUE(Table(folder / "recording/state.csv").is_well_formed());
 }
 
+TEST(ClosedLoopErrorsTest, AFullDiskLeavesNoFolder) {
+  TemporaryFolder folder;
+  Process flight({"/bin/sh", "-c",
+                  "{ trap '' XFSZ; ulimit -f 0; \"$0\" \"$@\" 2>&1; echo \"code $?\"; } | cat",
+                  program("closed_loop"), "--scenario", scenario("short"), "--out",
+                  folder / "recording"});
+  flight.wait();
+  EXPECT_TRUE(holds(flight.output(), "cannot write: File too large\ncode 1\n")) << flight.output();
+  EXPECT_FALSE(std::filesystem::exists(folder / "recording"));
+}
+
 TEST(ClosedLoopErrorsTest, AModelThatDoesNotExistIsRefusedWithTheListOfThose) {
   TemporaryFolder folder;
   const std::string file =

@@ -9,13 +9,14 @@ import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BUILD = pathlib.Path(sys.argv[1]).resolve() if len(sys.argv) > 1 else ROOT / "build"
-COMMANDS = re.findall(r"^cmd_([\w-]+)\(\)", (ROOT / "sls").read_text(), re.MULTILINE)
+sys.path.insert(0, str(ROOT / "python"))
+from sls.launcher.commands import COMMANDS  # noqa: E402
 LONGEST_HELP = 50  # lines, about one screen
 
 
 def run(*arguments):
     return subprocess.run([ROOT / "sls", *arguments], capture_output=True, text=True, timeout=60,
-                          stdin=subprocess.DEVNULL, env={**os.environ, "SLS_BUILD": str(BUILD)})
+                          stdin=subprocess.DEVNULL, env={**os.environ, "SLS_BUILD": str(BUILD), "COLUMNS": "80"})
 
 
 class HelpTest(unittest.TestCase):
@@ -33,6 +34,7 @@ class HelpTest(unittest.TestCase):
                 ended = run(command, "--help")
                 self.assertEqual((ended.returncode, ended.stderr), (0, ""))
                 self.assertRegex(ended.stdout, "(?i)usage: ")
+                self.assertEqual([line for line in ended.stdout.splitlines() if len(line) > 80], [])
         self.assertTrue((BUILD / "bin").is_dir())
 
     def test_help_of_a_command_is_its_option_help(self):

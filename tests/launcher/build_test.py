@@ -12,9 +12,12 @@ import sys
 import tempfile
 import unittest
 
+import checkout
+
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BUILD = pathlib.Path(sys.argv[1]).resolve() if len(sys.argv) > 1 else ROOT / "build"
-FLYING = re.search(r"readonly flying=\((.*)\)", (ROOT / "sls").read_text()).group(1).split()
+sys.path.insert(0, str(ROOT / "python"))
+from sls.launcher.building import FLYING  # noqa: E402
 CMAKE = """cmake_minimum_required(VERSION 3.25)
 project(small LANGUAGES C)
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
@@ -38,6 +41,8 @@ class BuildTest(unittest.TestCase):
         self.root.mkdir()
         for name in ("sls", "CMakePresets.json"):
             shutil.copy(ROOT / name, self.root)
+        for name in ("python/sls/__init__.py", "python/sls/launcher", "config/scenarios"):
+            checkout.copy(name, self.root)
         self.write("CMakeLists.txt", CMAKE)
         self.write("main.c", MAIN)
         self.write("text.h", '#define TEXT "first"\n')
@@ -56,7 +61,7 @@ class BuildTest(unittest.TestCase):
         (self.root / name).write_text(text)
 
     def start(self, root=None):
-        return subprocess.Popen([(root or self.root) / "sls", "run", "hover", "--in-process"], env=self.environment,
+        return subprocess.Popen([(root or self.root) / "sls", "run", "short", "--in-process"], env=self.environment,
                                 cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
     def launch(self, root=None):

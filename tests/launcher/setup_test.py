@@ -9,6 +9,8 @@ import sys
 import tempfile
 import unittest
 
+import checkout
+
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 DEBIAN = 'PRETTY_NAME="Debian GNU/Linux {0} ({1})"\nNAME="Debian GNU/Linux"\nVERSION_ID="{0}"\nID=debian\n'
 BOOKWORM, TRIXIE = DEBIAN.format(12, "bookworm"), DEBIAN.format(13, "trixie")
@@ -36,6 +38,8 @@ class SetupTest(unittest.TestCase):
         self.root = self.folder / "checkout"
         self.root.mkdir()
         text = (ROOT / "sls").read_text(encoding="utf-8")
+        for name in ("python/sls/__init__.py", "python/sls/launcher", "config/scenarios"):
+            checkout.copy(name, self.root)
         self.release = self.folder / "os-release"
         self.assertIn("/etc/os-release", text)
         (self.root / "sls").write_text(text.replace(" /etc/os-release", f" {self.release}"), encoding="utf-8")

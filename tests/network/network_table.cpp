@@ -87,7 +87,7 @@ std::string fly(const std::string& file, const std::string& profile, const Distu
 
 int main(int argc, char** argv) {
   CLI::App cli(
-      "Flies each QoS profile on test hosts through each network disturbance; prints a Markdown\n"
+      "Flies each QoS profile on test hosts through each network disturbance; prints\na Markdown "
       "table. Needs root and takes minutes.");
   std::vector<std::string> profiles = kProfiles, disturbances;
   int vehicles = 1;

@@ -61,7 +61,7 @@ class FlightTest(support.FolderTest):
         self.assertEqual(len(flight.time_s), 501)  # 2 s at 4 ms
         stage, lap = calc_stage_metrics(flight)
         text = (self.folder / "r/flight.txt").read_text()
-        written = re.search(r"0 figure_eight +0 +2 +(.*)", text)
+        written = re.search(r"0 figure_eight, 0 s to 2 s\n  all +(.*)", text)
         numbers = [float(number) for number in written[1].split()[:6]]
         np.testing.assert_allclose([*stage.rms_m, *stage.max_m], numbers, rtol=5e-3)
         np.testing.assert_array_equal(lap.rms_m, stage.rms_m)

@@ -57,6 +57,23 @@ TEST_F(RecordingFolderTest, FoldersOnTheWayAreMadeToo) {
   EXPECT_EQ(find_error(out_ / "with/slash/"), "no error");
 }
 
+TEST_F(RecordingFolderTest, AFolderWithoutARecordingIsRemovedAgain) {
+  { const RecordingFolder folder(out_ / "a/b", false); }
+  EXPECT_FALSE(fs::exists(out_));
+  fs::create_directory(out_);
+  {
+    const RecordingFolder folder(out_, false);
+    for (const char* name : {"state.csv", "notes"}) write_bytes(out_ / name, "");
+  }
+  EXPECT_FALSE(fs::exists(out_ / "state.csv"));
+  EXPECT_TRUE(fs::exists(out_ / "notes")) << "removed what is not ours";
+  {
+    const RecordingFolder folder(out_ / "c/", false);
+    for (const char* name : {"state.csv", "manifest.json"}) write_bytes(out_ / "c" / name, "");
+  }
+  EXPECT_TRUE(fs::exists(out_ / "c/state.csv"));
+}
+
 TEST_F(RecordingFolderTest, AnEmptyFolderIsAccepted) {
   fs::create_directory(out_);
   EXPECT_EQ(find_error(out_), "no error");

@@ -123,9 +123,36 @@ TEST_F(VerificationTest, ClientNamesComputeTimesAndWaysOfWritingANumberAreNoDiff
 
 TEST_F(VerificationTest, SignedZerosAndNanAreDistinguished) {
   change("state.csv", 2, 19, [](auto&) { return "-0"; });
-  EXPECT_EQ(find_difference(), "state.csv, vehicle 0, step 0, force_x_n: 0 in A, -0 in B");
+  EXPECT_EQ(
+      find_difference(),
+      "state.csv, vehicle 0, step 0, force_x_n: 0 in A, -0 in B (equal numbers of other bits)");
   change("state.csv", 2, 19, [](auto&) { return "nan"; });
   EXPECT_EQ(find_difference(), "state.csv, vehicle 0, step 0, force_x_n: 0 in A, nan in B");
+}
+
+TEST_F(VerificationTest, TheLargestDifferenceOfEachColumnIsListed) {
+  const auto list = [&] {
+    std::vector<std::string> lines;
+    for (const auto& one : list_deviations(open_recording(a_), open_recording(b_)))
+      lines.push_back(describe(one));
+    return lines;
+  };
+  EXPECT_TRUE(list().empty());
+  const auto add = [](double more) {
+    return [more](const std::string& text) { return std::to_string(std::stod(text) + more); };
+  };
+  change("state.csv", 20, 9, [](auto&) { return "1000"; });
+  const double before = std::stod(find_difference().substr(find_difference().find("_m: ") + 4));
+  change("state.csv", 20, 9, [&](auto&) { return std::to_string(before + 0.25); });
+  change("state.csv", 40, 9, add(-0.5));
+  change("state.csv", 2, 19, [](auto&) { return "-0"; });
+  change("command.csv", 102, 7, [](auto&) { return "held"; });
+  remove_line("state.csv", 10);  // steps that one lacks are left out
+  const auto lines = list();
+  ASSERT_EQ(lines.size(), 3u);
+  EXPECT_EQ(lines[0], "state.csv, load_x_m: 0.5, vehicle 0, step 38");
+  EXPECT_EQ(lines[1], "state.csv, force_x_n: other bits of equal numbers, vehicle 0, step 0");
+  EXPECT_EQ(lines[2], "command.csv, fault: other values, vehicle 0, step 100");
 }
 
 TEST_F(VerificationTest, RowsThatOnlyOneHasAreNamed) {

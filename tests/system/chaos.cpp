@@ -330,7 +330,7 @@ int run_trials(int trials, std::uint64_t seed, bool is_verbose) {
 
 int main(int argc, char** argv) {
   CLI::App cli(
-      "Stops, continues, kills and restarts processes of real flights at random and checks the "
+      "Stops, continues, kills and restarts processes of real flights at random and\nchecks the "
       "results.");
   int trials = 10;
   std::uint64_t seed = 1;
@@ -339,8 +339,7 @@ int main(int argc, char** argv) {
   cli.add_option("--trials", trials, "number of flights")
       ->type_name("N")
       ->check(CLI::Range(1, 100000));
-  cli.add_option("--seed", seed, "seed of process, moment and kind of each disturbance")
-      ->type_name("S");
+  cli.add_option("--seed", seed, "seed of the disturbances")->type_name("S");
   cli.add_flag("--verbose", is_verbose, "print the output of the processes");
   CLI11_PARSE(cli, argc, argv);
   return sls::test::run_trials(trials, seed, is_verbose);

@@ -78,6 +78,48 @@ TEST_P(CrashTest, IsNamedWithLibraryFunctionVehicleAndStep) {
             "closed_loop: error: " + kAutopilot + ": step, vehicle 0, step 8" + crashed_);
 }
 
+TEST_P(CrashTest, InOneProcessKeepsTheRowsBeforeIt) {
+  const Outcome outcome =
+      run({program("closed_loop"), "--out", folder_ / "recording", "--scenario",
+           make_controller_scenario(folder_, "in: answer, at: 300, do: " + how_)});
+  EXPECT_EQ(outcome.exit_code, 128 + signal_);
+  const std::string line = kController + ": answer, vehicle 0, step 300" + crashed_;
+  EXPECT_TRUE(holds(outcome.output, "closed_loop: error: " + line)) << outcome.output;
+  const auto manifest = read_manifest(folder_ / "recording");
+  EXPECT_EQ(manifest.at("reason").get<std::string>() + "\n", line);
+  EXPECT_FALSE(manifest.at("complete").get<bool>());
+  EXPECT_EQ(Table(folder_ / "recording/state.csv").rows(), 300u) << "steps 0 to 299";
+}
+
+TEST(SharedLibraryProgramTest, AnExitInsideALibraryIsNamedAndFails) {
+  TemporaryFolder folder;
+  const std::string file = make_controller_scenario(folder, "in: answer, at: 300, do: exit");
+  const std::string line =
+      kController + ": answer, vehicle 0, step 300: ended the program or its thread";
+  const Outcome outcome =
+      run({program("closed_loop"), "--out", folder / "recording", "--scenario", file});
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_TRUE(holds(outcome.output, "closed_loop: error: " + line + "\n")) << outcome.output;
+  EXPECT_EQ(read_manifest(folder / "recording").at("reason"), line);
+  EXPECT_EQ(Table(folder / "recording/state.csv").rows(), 300u);
+
+  Flight flight(file);
+  EXPECT_EQ(flight.client->wait(), 1) << flight.outputs();
+  EXPECT_TRUE(holds(flight.client->output(), "control_client: error: " + line + "\n"));
+}
+
+TEST(SharedLibraryProgramTest, ALawThatIsSlowerThanItsPeriodIsToldSo) {
+  TemporaryFolder folder;
+  Flight flight(make_controller_scenario(folder, "in: answer, do: dawdle"),
+                {{}, {"--mode", "realtime"}, {}});
+  const std::regex slow(
+      "step \\d+: controller 'control_client' computes an answer for \\d\\d(\\.\\d)? ms, expected "
+      "less "
+      "than the period of 4 ms");
+  EXPECT_TRUE(wait_until([&] { return std::regex_search(flight.server->output(), slow); }))
+      << flight.server->output();
+}
+
 INSTANTIATE_TEST_SUITE_P(Signals, CrashTest,
                          testing::Values(std::pair("crash", SIGSEGV), std::pair("abort", SIGABRT),
                                          std::pair("overflow the stack", SIGSEGV)));

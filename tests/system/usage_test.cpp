@@ -62,7 +62,7 @@ TEST(UsageTest, WrongFlagsAreRefused) {
                      "--domain");
   expect_refused(
       {"/usr/bin/env", "SLS_DOMAIN=233", program("sim_server"), "--scenario", scenario("short")}, 2,
-      "--domain");
+      "SLS_DOMAIN: expected 0 to 232, got '233'");
   expect_refused(server_with({"--scenario", scenario("short"), "--period-s", "0.0035"}), 2,
                  "--period-s");
   expect_refused(server_with({"--scenario", scenario("short"), "--period-s", "nan"}), 2,
@@ -81,7 +81,8 @@ TEST(UsageTest, WrongFlagsAreRefused) {
 TEST(UsageTest, OperatorAndVerifierRefuseImpossibleRequests) {
   TemporaryFolder folder;
   expect_refused({program("sim_ctl")}, 2, "");
-  expect_refused({program("sim_ctl"), "fly"}, 2, "fly");
+  expect_refused({program("sim_ctl"), "fly"}, 2,
+                 "expected pause, step, resume, start, reset, stop or status, got 'fly'");
   expect_refused({program("sim_ctl"), "step", "0"}, 2, "0");
   expect_refused({program("sls_verify")}, 2, "");
   expect_refused({program("sls_verify"), folder / "none"}, 2, "none");
@@ -160,6 +161,23 @@ TEST(UsageTest, RecorderRefusesAFolderThatIsNotEmptyAndReplacesARecordingWithFor
   EXPECT_EQ(read_file(folder / "old/state.csv"), "old");
   EXPECT_EQ(run({program("recorder"), "--out", folder / "old", "--force", "--check"}).exit_code, 0);
   EXPECT_FALSE(fs::exists(folder / "old/state.csv"));
+}
+
+TEST(UsageTest, TooLittleSharedMemoryIsNamedBeforeTheFirstSample) {
+  if (geteuid() != 0) GTEST_SKIP() << "skipped: only root can mount another /dev/shm";
+  const TemporaryFolder folder;
+  for (const auto& flags : {std::vector<std::string>{program("sim_server"), "--scenario"},
+                            {program("control_client"), "--scenario"},
+                            {program("recorder"), "--out"}}) {
+    std::vector<std::string> command = {
+        "/usr/bin/unshare", "--mount", "sh", "-c",
+        "mount -t tmpfs -o size=1m tmpfs /dev/shm && exec \"$0\" \"$@\""};
+    command.insert(command.end(), flags.begin(), flags.end());
+    command.push_back(flags.back() == "--out" ? (folder / "recording").string()
+                                              : scenario("short"));
+    expect_refused(command, 1,
+                   "/dev/shm: expected 5.2 MB free, got 1.0 MB: mount -o remount,size=64M");
+  }
 }
 
 TEST(UsageTest, ServerNamesMissingParticipantsAtTheStart) {

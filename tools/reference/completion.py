@@ -115,16 +115,13 @@ def make(page, programs):
                      if re.search(rf"^\s*(?:usage: )?(?:\./)?(?:sls )?{command} [a-z]+ [A-Z]", line)]
             below = re.findall(rf"(?:\b{command}|\|) ([a-z]+) (?=[A-Z])", "\n".join(lines))
             subcommands[command] = " ".join(dict.fromkeys(below))
-        names = [name for item in items for name in item.names if name.startswith("--")]
-        if "COMMAND --help" in overview:
-            names.insert(0, "--help")
+        names = ["--help", *(name for item in items for name in item.names if name.startswith("--"))]
         options[command] = " ".join(dict.fromkeys(names))
         for item in items:
             for name in item.names:
                 if kind := find_kind(item, known):
                     arguments[f"{command} {name}"] = kind
-    if "help [COMMAND]" in overview:
-        positionals["help"] = " ".join(sorted(options))
+    positionals["help"] = " ".join(sorted(options))
     return HEAD + "\n".join([
         "",
         f'_sls_commands="{" ".join(sorted(options))}"',

@@ -5,6 +5,7 @@ import os
 import pathlib
 import re
 import subprocess
+import sys
 import xml.etree.ElementTree as xml
 
 import yaml
@@ -12,6 +13,9 @@ import yaml
 import help_text
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+
+sys.path.insert(0, str(ROOT / "python"))
+from sls.launcher.commands import COMMANDS  # noqa: E402
 
 
 class StaleReference(Exception):
@@ -67,16 +71,12 @@ def read_version(build):
 
 
 def list_commands():
-    """The commands of ./sls: a function cmd_NAME each."""
-    return re.findall(r"^cmd_([\w-]+)\(\)", read("sls"), re.MULTILINE) + ["help"]
+    """The commands of ./sls."""
+    return list(COMMANDS)
 
 
 def read_launcher(build):
-    """{"": the text of ./sls help, command: that of ./sls COMMAND --help}.
-
-    If ./sls help does not state that every command has --help, only the commands that it shows with --help are run:
-    another command might begin its work.
-    """
+    """{"": the text of ./sls help, command: that of ./sls COMMAND --help}."""
     environment = dict(os.environ, SLS_BUILD=str(build), COLUMNS="100", LC_ALL="C.UTF-8")
 
     def ask(*arguments):
@@ -85,31 +85,7 @@ def read_launcher(build):
         text = re.sub(r"=\S*/config/qos/", "=config/qos/", text)
         return re.sub(r"([Uu]sage: )(?!\./sls\b)\S*/", r"\1", text).rstrip()
 
-    texts = {"": ask("help")}
-    all_have_help = re.search(r"COMMAND --help", texts[""])
-    for command in list_commands():
-        if command == "help":
-            continue
-        part = find_usage_part(texts[""], command)
-        if all_have_help or part and "--help" in part:
-            texts[command] = ask(command, "--help")
-        elif part:
-            texts[command] = part
-        else:
-            raise StaleReference(f"./sls help does not show the command '{command}'")
-    return texts
-
-
-def find_usage_part(text, command):
-    """The lines of ./sls help about a command, for a help text that lists the options there."""
-    lines, found = text.splitlines(), []
-    for i, line in enumerate(lines):
-        if re.match(rf"  {command}\b(?!-)", line):
-            end = i + 1
-            while end < len(lines) and lines[end].startswith("   "):
-                end += 1
-            found += [entry[2:] for entry in lines[i:end]]
-    return "\n".join(found)
+    return {"": ask("help")} | {name: ask(name, "--help") for name in list_commands() if name != "help"}
 
 
 # --- scenario -------------------------------------------------------------------------------------

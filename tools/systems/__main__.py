@@ -23,8 +23,7 @@ VERSIONS = {
 
 
 def parse(words):
-    parser = argparse.ArgumentParser(prog="./sls systems", usage="./sls systems [OPTIONS] [SYSTEM…]",
-                                     formatter_class=argparse.RawDescriptionHelpFormatter, description="""\
+    parser = argparse.ArgumentParser(prog="./sls systems", usage="./sls systems [OPTIONS] [SYSTEM…]", description="""\
 Makes clean Debian systems with debootstrap, copies this checkout into each, runs the two commands in it and prints a
 table. In aarch64 it builds for ARM instead, and flies under qemu. Needs root. The systems use the network of this
 machine: do not fly on it meanwhile. Nothing is mounted outside the systems, and they are deleted, also after Ctrl-C.

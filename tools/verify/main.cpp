@@ -30,6 +30,9 @@ void verify_two(const RecordedFlight& a, const RecordedFlight& b) {
   for (const std::string& note : record::list_notes(a, b)) std::cout << note << '\n';
   if (const auto difference = record::find_first_difference(a, b)) {
     std::cout << "first difference: " << difference->text << '\n';
+    const auto deviations = record::list_deviations(a, b);
+    if (!deviations.empty()) std::cout << "largest difference of each column that differs:\n";
+    for (const auto& deviation : deviations) std::cout << "  " << describe(deviation) << '\n';
     throw app::RunError("A and B differ");
   }
   if (of_a.steps == 0) throw app::RunError("nothing to compare: neither A nor B holds a step");

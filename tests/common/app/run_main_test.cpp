@@ -6,6 +6,7 @@
 
 #include <csignal>
 #include <cstdlib>
+#include <sstream>
 #include <stdexcept>
 #include <vector>
 
@@ -31,6 +32,11 @@ Outcome run(
   add_common_options(cli, outcome.options);
   std::string needed = "value";
   cli.add_option("--needed", needed, "its own option")->type_name("TEXT");
+  double number = 0.0;
+  cli.add_option("--number", number,
+                 "a number with a meaning that does not fit into one line of a terminal");
+  cli.add_subcommand("pause");
+  cli.add_subcommand("resume");
   arguments.insert(arguments.begin(), "program");
   std::vector<char*> argv;
   for (std::string& argument : arguments) argv.push_back(argument.data());
@@ -112,6 +118,37 @@ TEST(RunMainTest, BadUsageNamesTheFlagAndTheRange) {
   EXPECT_TRUE(contains(outcome.err, "--domain")) << outcome.err;
   EXPECT_TRUE(contains(outcome.err, "233")) << outcome.err;
   EXPECT_TRUE(contains(outcome.err, "232")) << outcome.err;
+}
+
+TEST(RunMainTest, BadUsageSaysWhatWasExpectedAndWhatCame) {
+  const auto refuse = [](const std::vector<std::string>& arguments, const std::string& line) {
+    EXPECT_EQ(run(arguments).err, "program: error: " + line + " (see --help)\n");
+  };
+  refuse({"--domain", "233"}, "--domain: expected 0 to 232, got '233'");
+  refuse({"--domain", "ten"}, "--domain: expected 0 to 232, got 'ten'");
+  refuse({"--domain"}, "--domain: expected a value");
+  refuse({"--number", "4ms"}, "--number: expected a number, got '4ms'");
+  refuse({"--log-level", "loud"},
+         "--log-level: expected debug, info, warning or error, got 'loud'");
+  refuse({"--domian", "3"}, "unknown option '--domian'; did you mean '--domain'?");
+  refuse({"--zzz"}, "unknown option '--zzz'");
+  refuse({"paus"}, "expected pause or resume, got 'paus'; did you mean 'pause'?");
+  refuse({"pause", "now"}, "expected no further argument, got 'now'");
+  ::setenv("SLS_DOMAIN", "abc", 1);
+  refuse({}, "SLS_DOMAIN: expected 0 to 232, got 'abc'");
+  refuse({"--domain", "one"}, "--domain: expected 0 to 232, got 'one'");
+  ::unsetenv("SLS_DOMAIN");
+}
+
+TEST(RunMainTest, HelpFitsIn80Columns) {
+  const std::string help = run({"--help"}).out;
+  std::istringstream lines(help);
+  for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 80u) << line;
+  std::istringstream words(help);
+  std::string text;
+  for (std::string word; words >> word;) text += " " + word;
+  EXPECT_NE(text.find(" a number with a meaning that does not fit into one line of a terminal"),
+            text.npos);
 }
 
 TEST(RunMainTest, OptionsArriveWhereTheyBelong) {

@@ -33,7 +33,9 @@ inline void misbehave(const std::string& how) {
   if (how == "throw a number") throw 42;
   static volatile int* volatile nowhere = nullptr;  // unknown to the compiler
   if (how == "crash") *nowhere = 1;
+  if (how == "dawdle") ::usleep(30'000);
   if (how == "abort") std::abort();
+  if (how == "exit") std::exit(0);
   if (how == "overflow the stack") overflow_stack(0);
   if (how == "hang")
     while (true) ::pause();

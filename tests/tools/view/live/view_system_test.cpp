@@ -186,18 +186,6 @@ TEST(ViewSystemTest, TheLauncherShowsAFlightFromItsBeginningAndEndsTheViewerWith
   EXPECT_TRUE(read_manifest(folder / "recording").at("complete").get<bool>());
 }
 
-TEST(ViewSystemTest, TheFlightOfTheLauncherGoesOnWithoutItsViewer) {
-  const OwnDomain domain, other;
-  const auto taken = start_viewer(other);
-  const TemporaryFolder folder;
-  auto command = make_launch(domain, folder / "recording");
-  command.back() = std::to_string(wait_for_port(*taken));
-  Process run(command);
-  EXPECT_EQ(run.wait(), 0) << run.output();
-  EXPECT_NE(run.output().find("--port: expected a free port"), std::string::npos) << run.output();
-  EXPECT_TRUE(read_manifest(folder / "recording").at("complete").get<bool>());
-}
-
 TEST(ViewSystemTest, AStopSignalEndsItLikeTheOtherPrograms) {
   const OwnDomain domain;
   for (const auto& [signal, code] : {std::pair(SIGINT, 130), std::pair(SIGTERM, 143)}) {

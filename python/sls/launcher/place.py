@@ -1,0 +1,57 @@
+"""Where the launcher is and what it says: paths, messages, names of scenarios."""
+
+import difflib
+import os
+import sys
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[3]
+# An installed tree is PREFIX/share/sls. Its `bin` is a link to the programs, and nothing is built.
+IS_INSTALLED = ROOT.parts[-2:] == ("share", "sls") and not (ROOT / "CMakeLists.txt").is_file()
+SELF = "sls" if IS_INSTALLED else "./sls"
+IS_BUILT_ELSEWHERE = bool(os.environ.get("SLS_BUILD"))
+BUILD = Path(os.environ.get("SLS_BUILD") or (ROOT if IS_INSTALLED else ROOT / "build"))
+PYTHON_PATH = [str(ROOT / "python"), str(BUILD / "python")]
+if IS_INSTALLED:
+    PYTHON_PATH.append(str(ROOT.parents[1] / "lib/python3/dist-packages"))
+
+
+class Failure(Exception):
+    """Ends the launcher with one line and an exit code."""
+
+    def __init__(self, text: str, code: int = 1) -> None:
+        super().__init__(text)
+        self.code = code
+
+
+def say(text: str) -> None:
+    text = text.replace("see ./sls", f"see {SELF}")
+    print(f"sls: {text}", file=sys.stderr, flush=True)
+
+
+def list_names(kind: str) -> list[str]:
+    """Names of the files of config/KIND, which commands take instead of a path."""
+    return sorted(file.stem for file in (ROOT / "config" / kind).glob("*.yaml"))
+
+
+def list_choices(names: Sequence[str]) -> str:
+    return f"{', '.join(names[:-1])} or {names[-1]}"
+
+
+def suggest(word: str, names: Iterable[str]) -> str:
+    """The end of an error line: the name that is nearest to the word, if one is near."""
+    near = difflib.get_close_matches(word, list(names), 1, 0.65)
+    return f"; did you mean '{near[0]}'?" if near else ""
+
+
+def find_file(kind: str, name: str) -> str:
+    """The file of a scenario or a campaign. A name means that in config/KIND, `scenarios` or `campaigns`.
+
+    @throws Failure if there is none."""
+    is_path = "/" in name or name.endswith((".yaml", ".yml")) or os.path.isfile(name)
+    file = name if is_path else str(ROOT / f"config/{kind}/{name}.yaml")
+    if not os.path.exists(file):
+        raise Failure(f"{file}: expected a {kind[:-1]}, got no such file"
+                      + suggest(Path(name).stem, list_names(kind)), 2)
+    return file
