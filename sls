@@ -21,7 +21,7 @@ readonly packages=(g++ make ninja-build cmake libeigen3-dev libsimbody-dev libfa
 readonly fuzz_packages=(clang libclang-rt-dev)
 readonly fuzzers=(scenario qos_file csv recording samples foxglove web)
 readonly test_packages=(libgmock-dev libmpfr-dev python3-mpmath iproute2 nftables cyclonedds-dev cyclonedds-tools fastdds-tools libfaketime
-  python3-kubernetes python3-pytest slurm-wlm munge python3-distributed chromium mandoc debootstrap git codespell)
+  python3-pytest slurm-wlm munge python3-distributed chromium mandoc debootstrap git codespell)
 readonly python_packages=(python3-numpy python3-scipy python3-matplotlib python3-yaml)
 readonly bench_packages=(libbenchmark-dev python3-matplotlib chromium)
 readonly doc_packages=(doxygen python3-sphinx)
@@ -55,7 +55,7 @@ Recordings
 
 Many flights
   campaign FILE           fly many runs of one scenario with varied keys; also: status, report, compare
-  campaign-worker DIR     fly chunks of a campaign (started by Slurm and Kubernetes)
+  campaign-worker DIR     fly chunks of a campaign (started by Slurm)
   study                   repeat the published comparison and write docs/study.md
   delay-margin SCENARIO   find the command delay at which the controller loses the load
 
@@ -403,7 +403,6 @@ fly() {
   while (($#)); do
     case $1 in
       --force) force=(--force) ;;
-      --no-pinning) ;;  # of earlier versions, which chose the processors
       --in-process) is_in_process=1 ;;
       --view) ((${#view[@]})) || view=(--port 8765) ;;
       --view-port | --out | --qos | --domain | --period-s | --mode | --rtf)
