@@ -102,7 +102,8 @@ class PageHub : public Feed::Listener {
   void leave(PageSession& session);
 
   void note(const Sample& sample) override {
-    if (sample.topic == TopicId::kRecord && has_run_) frames_.add(sample);
+    if (sample.topic == TopicId::kRecord && has_run_ && sample.sender == server_)
+      frames_.add(sample);
   }
   void note(const RunView* view) override;
   void note_event(std::uint64_t run_id, std::uint64_t step, const std::string& text) override;
@@ -135,6 +136,7 @@ class PageHub : public Feed::Listener {
   const PageOptions options_;
   std::vector<PageSession*> sessions_;
   bool has_run_ = false;
+  bus::PeerId server_{};  // of the run
   double period_s_ = 0;
   PageFrames frames_;
   Payload run_message_;     // run, or no_run
@@ -329,6 +331,7 @@ void PageHub::note(const RunView* view) {
     return send_all(run_message_, Delivery::kAlways);
   }
   const Parameters& parameters = view->run.parameters;
+  server_ = view->run.server;
   if (!has_run_ || parameters.run_id() != frames_.run_id()) start_run(parameters);
   send_status(*view);
 }
