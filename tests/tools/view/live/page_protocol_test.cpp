@@ -365,6 +365,19 @@ TEST_F(PageProtocolTest, MalformedMessagesAreAnsweredEach) {
   EXPECT_EQ(page.count("error"), 2u);
 }
 
+TEST_F(PageProtocolTest, AnObjectHasAtMost16Keys) {
+  const auto say = [this](const std::string& keys) {
+    Page page(protocol);
+    page.say(R"({"op":"select","vehicle_id":0,)" + keys + "}");
+    return page.count("error");
+  };
+  EXPECT_EQ(say(test::make_keys(14)), 0u);
+  EXPECT_EQ(say(test::make_keys(15)), 1u);
+  EXPECT_EQ(say(R"("a":[{},{"b":{)" + test::make_keys(16) + "}}]"), 0u);
+  EXPECT_EQ(say(R"("a":[{},{"b":{)" + test::make_keys(17) + "}}]"), 1u);
+  EXPECT_EQ(say(R"("a":{)" + test::make_keys(9) + "}," + test::make_keys(13)), 0u);
+}
+
 TEST_F(PageProtocolTest, APageThatGoesOnWithMistakesIsClosed) {
   Page page(protocol);
   for (int i = 0; i < 20; ++i) page.say("no JSON");
