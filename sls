@@ -21,7 +21,7 @@ readonly packages=(g++ make ninja-build cmake libeigen3-dev libsimbody-dev libfa
 readonly fuzz_packages=(clang libclang-rt-dev)
 readonly fuzzers=(scenario qos_file csv recording samples foxglove web)
 readonly test_packages=(libgmock-dev libmpfr-dev python3-mpmath iproute2 nftables cyclonedds-dev cyclonedds-tools fastdds-tools libfaketime
-  python3-pytest slurm-wlm munge python3-distributed chromium mandoc debootstrap git codespell)
+  python3-pytest python3-venv slurm-wlm munge python3-distributed chromium mandoc debootstrap git codespell)
 readonly python_packages=(python3-numpy python3-scipy python3-matplotlib python3-yaml)
 readonly bench_packages=(libbenchmark-dev python3-matplotlib chromium)
 readonly doc_packages=(doxygen python3-sphinx)
