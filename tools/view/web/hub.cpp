@@ -50,9 +50,9 @@ void Hub::adopt(Socket socket) {
   session->start();
 }
 
-/// Who comes anew may be an operator, which only its messages show. So it gets in. The connection
-/// that ends for it is no operator's if possible, then one of the address that has most, then the
-/// one that reads least, then the oldest.
+/// A new client may be an operator, which only its messages show. So it gets in. The connection
+/// that ends for it is no operator's if possible, then of the address with most connections, then
+/// the one that reads least, then the oldest.
 void Hub::make_room(const std::string& address) {
   std::map<std::string, std::size_t> counts;
   std::size_t lookers = 0;  // of the new client's address
