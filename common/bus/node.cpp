@@ -127,7 +127,7 @@ class MatchedPeers {
 struct Node::Impl {
   Impl(const std::filesystem::path& qos_file, int domain, const std::string& name,
        const std::string& role, Transports transports)
-      : qos_place(qos_file.string()), own_role(role), identity(find_identity(role)) {
+      : qos_place(qos_file.string()), identity(find_identity(role)) {
     if (domain < 0 || domain > config::kMaxDomain)
       throw ConfigError("--domain: expected 0 to " + std::to_string(config::kMaxDomain) + ", got " +
                         std::to_string(domain));
@@ -279,12 +279,6 @@ struct Node::Impl {
     const std::string cause = MiddlewareLog::find_first_error();
     if (cause.find("topic not found in allow rule") != std::string::npos ||
         cause.find("topic denied by deny rule") != std::string::npos) {
-      const std::filesystem::path permissions = find_file(participant->get_qos(), kPermissions);
-      if (is_of_contract_1(permissions))
-        throw ConfigError(permissions.string() + ": expected permission to " + verb + " " + topic +
-                          ", got a document of contract 1; renew it where the authorities are: " +
-                          "./sls keys " + permissions.parent_path().parent_path().string() +
-                          " --add " + own_role + " " + identity + " --force");
       throw ConfigError(qos_place + ": identity '" + identity + "': expected permission to " +
                         verb + " " + topic + ", got none");
     }
@@ -310,7 +304,6 @@ struct Node::Impl {
   }
 
   const std::string qos_place;
-  const std::string own_role;
   std::string identity;
   bool is_secured = false;
   bool is_on_this_machine = false;

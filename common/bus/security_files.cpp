@@ -205,13 +205,6 @@ IdentityNames find_identity_names(const std::filesystem::path& certificate,
           find_subject(*read_certificate(authority.string()))};
 }
 
-bool is_of_contract_1(const std::filesystem::path& permissions) {
-  const auto grants = [text = read_text(permissions)](const char* topic) {
-    return text.find(std::string("<topic>") + topic) != std::string::npos;
-  };
-  return (grants("sls/reference<") || grants("sls/fleet_")) && !grants("sls/record<");
-}
-
 bool check_security_files(const std::string& profiles) {
   tinyxml2::XMLDocument document;
   std::map<std::string, std::string> properties;

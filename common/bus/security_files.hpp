@@ -25,10 +25,6 @@ struct IdentityNames {
 IdentityNames find_identity_names(const std::filesystem::path& certificate,
                                   const std::filesystem::path& authority);
 
-/// True if a signed permissions document is of contract 1: it grants topics that contract 2 does
-/// not have, but not sls/record.
-bool is_of_contract_1(const std::filesystem::path& permissions);
-
 /// True if a signed governance document protects submessages, as keys made with `--other-vendors`
 /// do (fastdds/README.md, trap 28).
 bool are_submessages_protected(const std::filesystem::path& governance);

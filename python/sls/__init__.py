@@ -7,10 +7,10 @@
 Each name is documented at its definition. Figures, reports and recordings work without the
 extension module; flights need it (`./sls python` builds it). See python/README.md."""
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+import importlib as _importlib
+import typing as _typing
 
-if TYPE_CHECKING:
+if _typing.TYPE_CHECKING:
     from _sls_core import Now, Reference, Scenario, Vehicle
 
     from sls import metrics
@@ -56,7 +56,7 @@ _PLACES = {
 __all__ = sorted(_PLACES)
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     if name not in _PLACES:
         raise AttributeError(f"module 'sls' has no attribute '{name}'")
     place = _PLACES[name]
@@ -64,11 +64,11 @@ def __getattr__(name: str) -> Any:
         from sls.core import load_core
         value = getattr(load_core(), name)
     else:
-        module = import_module(place)
+        module = _importlib.import_module(place)
         value = module if place == f"sls.{name}" else getattr(module, name)
     globals()[name] = value
     return value
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_PLACES})
+    return sorted({*_PLACES, *(name for name in globals() if name.startswith("__"))})

@@ -126,13 +126,18 @@ class ClosedLoop:
         """The reason why a loop has failed, in one line; empty if it has not failed."""
         return self._loops.failure(to_whole("loop", loop, 0, self._count - 1))
 
-    def step(self, force: NDArray[np.float64]) -> LoopState:
+    def step(self, force: ArrayLike) -> LoopState:
         """Moves each loop over one control period, with its row of `force` held constant.
 
-        force: (count, 3), C-contiguous float64, on the quadrotor in W, N. Hovering needs
-            −(quad_mass_kg + load_mass_kg) × gravity_m_s2 along z. Rows of failed loops are ignored.
+        force: (count, 3), a list or a C-contiguous array of float64, on the quadrotor in W, N. Hovering
+            needs −(quad_mass_kg + load_mass_kg) × gravity_m_s2 along z. Rows of failed loops are ignored.
         Returns `state`. Raises ConfigError for another array.
         """
+        if isinstance(force, (list, tuple)):
+            try:
+                force = np.array(force, np.float64)
+            except (TypeError, ValueError):
+                raise ConfigError(f"force: expected numbers of shape ({self._count}, 3), got {force!r:.60}") from None
         self._loops.step(force)
         return self._state
 

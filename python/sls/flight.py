@@ -13,11 +13,11 @@ from sls.core import load_core
 from sls.errors import RunError
 from sls.scenario import load_scenario
 from sls.trajectory import Stage, Trajectory, find_stages, read_body
+from sls.vehicle_columns import VehicleColumns
 
 if TYPE_CHECKING:
     from _sls_core import Now, Scenario
 
-    from sls.metrics import StageMetrics
     from sls.recordings import Recording
 
 
@@ -43,7 +43,7 @@ class LawWithMemory(Protocol):
         ...
 
 
-class FlownVehicle:
+class FlownVehicle(VehicleColumns):
     """One vehicle of a flight. Arrays have a row for each step, from step 0 to the end of the
     flight; frame W (x forward, y right, z down), SI units, radians. They are read-only views of the
     flight's memory and keep it alive; only text columns are copies."""
@@ -99,64 +99,9 @@ class FlownVehicle:
         """The columns of reference.csv: the desired motion of the load."""
         return self._make_columns("reference")
 
-    def __getitem__(self, name: str) -> np.ndarray:
-        """The column `name` of `state`. Raises KeyError if there is none."""
-        return self.state[name]
-
     def _view(self, table: str, first: str, size: int = 3) -> np.ndarray:
-        """`size` columns of `table`, from the column `first` on, (steps, size)."""
         index = self._places[table, first]
         return self._cells[:, index:index + size]
-
-    @property
-    def time_s(self) -> np.ndarray:
-        """Simulation time, (steps,), s."""
-        return self.state["sim_time_s"]
-
-    @property
-    def quad_position(self) -> np.ndarray:
-        """(steps, 3), m."""
-        return self._view("state", "quad_x_m")
-
-    @property
-    def quad_velocity(self) -> np.ndarray:
-        """(steps, 3), m/s."""
-        return self._view("state", "quad_vx_m_s")
-
-    @property
-    def load_position(self) -> np.ndarray:
-        """(steps, 3), m."""
-        return self._view("state", "load_x_m")
-
-    @property
-    def load_velocity(self) -> np.ndarray:
-        """(steps, 3), m/s."""
-        return self._view("state", "load_vx_m_s")
-
-    @property
-    def alpha(self) -> np.ndarray:
-        """Angle of the rod about x, (steps,), rad."""
-        return self.state["alpha_rad"]
-
-    @property
-    def beta(self) -> np.ndarray:
-        """Angle of the rod about y, (steps,), rad."""
-        return self.state["beta_rad"]
-
-    @property
-    def applied_force(self) -> np.ndarray:
-        """Force that acted on the quadrotor over the period before each step, (steps, 3), N."""
-        return self._view("state", "force_x_n")
-
-    @property
-    def attitude(self) -> np.ndarray | None:
-        """Unit quaternions w, x, y, z, body to W, (steps, 4); None if the plant has no attitude."""
-        return self._view("state", "att_w", 4) if "att_w" in self.state else None
-
-    @property
-    def body_rates(self) -> np.ndarray | None:
-        """In the body frame, (steps, 3), rad/s; None if the plant has no attitude."""
-        return self._view("state", "rate_x_rad_s") if "rate_x_rad_s" in self.state else None
 
     @property
     def force(self) -> np.ndarray:
@@ -167,10 +112,6 @@ class FlownVehicle:
     def reference_position(self) -> np.ndarray:
         """Desired position of the load, (steps, 3), m."""
         return self._view("reference", "ref_x_m")
-
-    def calc_load_error(self) -> np.ndarray:
-        """Position of the load minus its reference, (steps, 3), m."""
-        return self.load_position - self.reference_position
 
     @cached_property
     def trajectory(self) -> Trajectory:
@@ -188,12 +129,6 @@ class FlownVehicle:
         names = [name for _, name, _, _ in self.scenario.stages]
         return find_stages(self.reference["stage"].astype(float), self.time_s,
                            dict(enumerate(names)), dict(enumerate(plans)), {})
-
-    @cached_property
-    def metrics(self) -> "list[StageMetrics]":
-        """Metrics of every stage, each followed by those of its laps (sls.metrics.calc_stage_metrics)."""
-        from sls.metrics import calc_stage_metrics
-        return calc_stage_metrics(self.trajectory)
 
 
 class Flight(FlownVehicle):

@@ -14,6 +14,7 @@ from sls.columns import Columns
 from sls.core import load_core
 from sls.csv_tables import read_records, read_table, read_text, stack
 from sls.trajectory import Stage, Trajectory, find_stages, read_body
+from sls.vehicle_columns import VehicleColumns
 from sls.input_error import InputError
 
 COLUMNS = {
@@ -80,7 +81,7 @@ class Comparison:
 
 
 @dataclass(frozen=True)
-class RecordedVehicle:
+class RecordedVehicle(VehicleColumns):
     """The columns of one vehicle, read on first use."""
 
     recording: "Recording"
@@ -110,11 +111,16 @@ class RecordedVehicle:
         """The columns of reference.csv: the desired motion of the load."""
         return self._read("reference.csv")
 
+    @cached_property
+    def trajectory(self) -> Trajectory:
+        """The vehicle's flight, for figures and metrics."""
+        return self.recording.load_flight(self.vehicle_id, self.recording.folder.resolve().name)
+
     def _read(self, name: str) -> Columns:
         return Columns.of_rows(self.recording.rows_of(name, self.vehicle_id))
 
 
-class Recording:
+class Recording(VehicleColumns):
     """A recording's folder. `state`, `measured`, `command` and `reference` are the columns of the
     files with these names, for the first vehicle; `vehicle(ID)` has those of another vehicle. Arrays
     have a row for each row of the file, SI units, radians. Every member raises InputError, which is a
@@ -169,7 +175,12 @@ class Recording:
     @cached_property
     def trajectory(self) -> Trajectory:
         """The first vehicle's flight, for figures and metrics."""
-        return self.load_flight(self.vehicle_ids[0], self.folder.resolve().name)
+        return self._first.trajectory
+
+    def __repr__(self) -> str:
+        manifest = self.manifest
+        end = manifest["reason"] or manifest["outcome"] if manifest["complete"] else "incomplete"
+        return f"<sls.Recording {self.folder}: {manifest['scenario']}, {end}>"
 
     def verify(self) -> Verification:
         """Reads every file again, as `./sls verify DIR` does. Needs the extension module.

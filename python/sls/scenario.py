@@ -12,7 +12,10 @@ from sls.yaml_values import to_yaml
 if TYPE_CHECKING:
     from _sls_core import Scenario
 
-SHIPPED = Path(__file__).resolve().parents[2] / "config/scenarios"
+HERE = Path(__file__).resolve().parent
+ROOT = HERE if (HERE / "config").is_dir() else HERE.parents[1]
+"""The folder with the folder `config`: that of the package if pip has installed it."""
+SHIPPED = ROOT / "config/scenarios"
 
 
 def find_scenario(path_or_name: str | os.PathLike[str]) -> Path:

@@ -1,5 +1,5 @@
 """Tests the files of docker/ without a Docker engine: .dockerignore admits every path that the Dockerfile copies and
-every folder that CMake builds without tests, and compose.dask.yaml has no service besides those of a campaign."""
+every folder that CMake builds without tests."""
 
 import pathlib
 import re
@@ -62,13 +62,6 @@ class ContextTest(unittest.TestCase):
             self.assertIn(f"FROM ${system.upper()} AS {system}\n", dockerfile)
             self.assertEqual(build["args"][system.upper()], f"${{SLS_BASE:-{base}}}")
             self.assertEqual(BASES[system], base)
-
-    def test_no_service_of_a_campaign_ends_before_the_campaign(self):
-        # Compose stops all services as soon as one of them ends.
-        services = yaml.safe_load((ROOT / "docker/compose.dask.yaml").read_text(encoding="utf-8"))["services"]
-        self.assertEqual(sorted(services), ["campaign", "scheduler", "worker"])
-        self.assertEqual(services["scheduler"]["command"][0], "dask-scheduler")
-        self.assertEqual(services["worker"]["command"][0], "dask-worker")
 
 
 if __name__ == "__main__":

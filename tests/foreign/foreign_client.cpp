@@ -86,9 +86,9 @@ class ForeignClient {
   bool is_visible_by_itself() const {
     for (const char* mistake :
          {"volatile_announcement", "best_effort_announcement", "exclusive_command",
-          "state_deadline", "other_type", "keyed_command", "no_deadline", "contract_1",
-          "contract_1_state", "record_deadline", "unannounced", "unannounced_writer",
-          "similar_topic", "ros_topic", "states_without_claim"})
+          "state_deadline", "other_type", "keyed_command", "no_deadline", "record_deadline",
+          "unannounced", "unannounced_writer", "similar_topic", "ros_topic",
+          "states_without_claim"})
       if (makes(mistake)) return true;
     return false;
   }
@@ -137,15 +137,6 @@ class ForeignClient {
   }
 
   void create_endpoints() {
-    if (makes("contract_1")) {
-      publisher_->create_datawriter(create_topic<ReferencePubSubType>("sls/reference"),
-                                    make_writer_qos());
-      return;
-    }
-    if (makes("contract_1_state")) {
-      create_reader(create_topic<VehicleStatePubSubType>("sls/state"), false);
-      return;
-    }
     if (makes("record_deadline")) {
       create_reader(create_topic<RecordBatchPubSubType>("sls/record"), true);
       return;

@@ -256,14 +256,6 @@ INSTANTIATE_TEST_SUITE_P(
         EndpointMistake{"ros_topic",
                         "rt/sls/command of 'foreign' (127.0.0.1): expected topic sls/command "
                         "(without the prefix of ROS 2)",
-                        true},
-        EndpointMistake{"contract_1",
-                        "sls/reference of 'foreign' (127.0.0.1): expected contract 2, got contract "
-                        "1 (it was built from an older sls.idl)",
-                        true},
-        EndpointMistake{"contract_1_state",
-                        "sls/state for 'foreign' (127.0.0.1): expected contract 2, got contract 1 "
-                        "(it was built from an older sls.idl)",
                         true}),
     [](const auto& mistake) { return std::string(mistake.param.name); });
 

@@ -53,7 +53,8 @@ std::unique_ptr<view::Hub> make_hub() {
   limits.message_bytes = 4'096;
   limits.queue_bytes = 16'384;
   auto hub = std::make_unique<view::Hub>(access, limits);
-  hub->resources["/"] = {"text/html", "gzip", test::make_payload("the page"), "default-src *"};
+  hub->resources["/"] = {"text/html", test::make_payload("the page"), test::make_payload("zipped"),
+                         "default-src *"};
   add_protocols(*hub);
   return hub;
 }

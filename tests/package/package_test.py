@@ -159,6 +159,8 @@ class PackageTest(unittest.TestCase):
         self.assertRegex(self.package.name, rf"^sls_{re.escape(version)}_\w+\.deb$")
         text = run(["sh", "-c", 'zcat "$1/usr/share/doc/sls/changelog.gz"', "sh", SYSTEM])
         self.assertTrue(text.startswith(f"sls ({version}) "), text)
+        wheel, = (SYSTEM / "usr/share/sls").glob("sls-*.whl")
+        self.assertIn("_sls_core.", run([sys.executable, "-m", "zipfile", "-l", wheel]))
 
     def test_1_a_flight_is_that_of_the_build_tree_bit_for_bit(self):
         said = fly("sls", "run", "short")

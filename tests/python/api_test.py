@@ -95,6 +95,31 @@ def test_a_recording_has_columns_by_name(tmp_path):
         sls.Recording(tmp_path)
 
 
+def test_a_recording_has_what_its_flight_has(tmp_path):
+    flight = sls.fly("short")
+    recording = flight.save(tmp_path / "r")
+    for of in (recording, recording.vehicle(0)):
+        for name in ("time_s", "quad_position", "quad_velocity", "load_position", "load_velocity", "alpha", "beta",
+                     "applied_force", "force", "reference_position"):
+            assert np.array_equal(getattr(of, name), getattr(flight, name)), name
+        assert np.array_equal(of["load_x_m"], flight["load_x_m"])
+        assert np.array_equal(of.calc_load_error(), flight.calc_load_error())
+        assert of.attitude is None and of.body_rates is None
+        assert [stage.label for stage in of.metrics] == [stage.label for stage in flight.metrics]
+        assert of.plot().keys() == flight.plot().keys() > {"positions"}
+    assert repr(recording) == f"<sls.Recording {tmp_path / 'r'}: short, mission finished>"
+
+
+def test_a_flight_is_a_table_of_pandas(tmp_path):
+    pandas = pytest.importorskip("pandas")
+    flight = sls.fly("short")
+    for frame in (flight.to_pandas(), flight.save(tmp_path / "r").to_pandas()):
+        assert isinstance(frame, pandas.DataFrame) and frame.index.name == "step"
+        for columns, name in ((flight.state, "force_x_n"), (flight.reference, "ref_y_m")):
+            assert np.array_equal(frame[name], columns[name])
+        assert np.array_equal(frame["force_x_n_command"], flight.command["force_x_n"])
+
+
 def test_verify_finds_what_was_changed(tmp_path):
     recording = sls.fly("short").save(tmp_path / "a")
     shutil.copytree(tmp_path / "a", tmp_path / "b")
@@ -160,7 +185,8 @@ def test_without_the_extension_module_the_rest_works(run_python, tmp_path):
 def test_every_name_is_there_and_described():
     for name in sls.__all__:
         assert getattr(sls, name).__doc__, name
-    assert set(sls.__all__) <= set(dir(sls))
+    assert {name for name in dir(sls) if not name.startswith("__")} == set(sls.__all__)
+    assert not hasattr(sls, "Any") and not hasattr(sls, "import_module")
     with pytest.raises(AttributeError, match="module 'sls' has no attribute 'flie'"):
         sls.flie
 

@@ -308,29 +308,22 @@ class LocalEngineTest(CampaignTest):
                          ", got load_error_max_of_all")
         self.assertFalse((self.folder / "out").exists())
 
-    def test_worker_flies_listed_chunks_and_those_of_its_index(self):
+    def test_worker_flies_listed_chunks(self):
         self.write_campaign(40)
         self.fly("campaign.yaml", "--out", "whole")
         self.fly("campaign.yaml", "--out", "out", "--chunk-runs", 5)
         for file in (self.folder / "out/chunks").glob("*.csv"):
             file.unlink()
 
-        def work(*arguments, code=0, **environment):
+        def work(*arguments, code=0):
             done = subprocess.run([sys.executable, "-BP", "-m", "sls.campaign.worker", "out",
                                    *arguments], cwd=self.folder, text=True, capture_output=True,
-                                  env=self.environment(**environment))
+                                  env=self.environment())
             self.assertEqual(done.returncode, code, done.stderr)
             return done.stderr
         work("--chunks", "0-3")
         self.assertEqual(self.count_chunks("out"), 4)
-        work("--index-from", "INDEX", "--chunks-each", "3", INDEX="1")
-        work("--index-from", "INDEX", "--chunks-each", "3", INDEX="2")  # this index has only two chunks
-        self.assertEqual(self.count_chunks("out"), 8)
-        self.assertIn("expected this environment variable",
-                      work("--index-from", "INDEX", code=2))
         self.assertIn("expected a chunk from 0 to 7, got 8", work("--chunks", "8", code=2))
-        self.assertIn("--chunks-each: expected a whole number of at least 1, got '0'",
-                      work("--index-from", "INDEX", "--chunks-each", "0", code=2, INDEX="1"))
         self.fly("campaign.yaml", "--out", "out", "--resume")
         self.assertEqual(self.read_table("out"), self.read_table("whole"))
 

@@ -174,13 +174,21 @@ def test_the_reference_is_the_missions():
     (np.zeros((3, 3)), r"float64 of shape \(3, 3\)"),
     (np.zeros(6), r"float64 of shape \(6,\)"),
     (np.zeros((3, 2)).T, r"float64 of shape \(2, 3\) that is not C-contiguous"),
-    ([[0, 0, 0], [0, 0, 0]], "list"),
+    ([[0, 0, 0]], r"float64 of shape \(1, 3\)"),
 ])
 def test_another_array_than_forces_is_refused(force, got):
     loop = sls.ClosedLoop(load_analytic(), 2)
     expected = r"force: expected a C-contiguous array of float64 of shape \(2, 3\), got "
     with pytest.raises(sls.ConfigError, match=f"^{expected}{got}$"):
         loop.step(force)
+
+
+def test_forces_may_be_lists():
+    lists, arrays = (sls.ClosedLoop(load_analytic(), 2) for _ in range(2))
+    forces = [[0, 0.5, -17], (0.1, 0, -16)]
+    assert np.array_equal(lists.step(forces).load_position, arrays.step(np.array(forces)).load_position)
+    with pytest.raises(sls.ConfigError, match=r"^force: expected numbers of shape \(2, 3\), got \[\[1\], 'x'\]$"):
+        lists.step([[1], "x"])
 
 
 @pytest.mark.parametrize("arguments, message", [

@@ -70,17 +70,4 @@ void Keys::add_usurper(const std::string& name) const {
                                               read_bytes(recorder / "certificate.pem"));
 }
 
-void Keys::make_contract_1(const std::string& role) const {
-  const std::string signed_file = (path() / role / "permissions.p7s").string();
-  const TemporaryFolder work;
-  run({"openssl", "smime", "-verify", "-text", "-noverify", "-in", signed_file, "-out",
-       (work / "plain.xml").string()});
-  write_bytes(work / "wanted.xml",
-              replace_all(read_bytes(work / "plain.xml"), "<topic>sls/record</topic>",
-                          "<topic>sls/reference</topic><topic>sls/fleet_state</topic>"));
-  run({"openssl", "smime", "-sign", "-text", "-in", (work / "wanted.xml").string(), "-out",
-       signed_file, "-signer", (path() / "ca/permissions_ca.pem").string(), "-inkey",
-       (path() / "ca/permissions_ca.key").string()});
-}
-
 }  // namespace sls::test

@@ -35,8 +35,6 @@ class Keys {
   /// Adds a recorder with the controller's permissions, signed with its own key, in a folder of
   /// that name. Its own Fast DDS trusts this signature.
   void add_usurper(const std::string& name) const;
-  /// Gives a role the topics of contract 1 in place of sls/record, correctly signed.
-  void make_contract_1(const std::string& role) const;
 
  private:
   TemporaryFolder folder_;

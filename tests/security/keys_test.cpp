@@ -150,30 +150,6 @@ TEST_F(BadKeysTest, PermissionsOfSomebodyElse) {
       << output;
 }
 
-TEST_F(BadKeysTest, OnesOfContract1AreNamedWithTheCommandThatRenewsThem) {
-  const auto expect_message = [&](const std::string& role, const std::string& verb,
-                                  const std::vector<std::string>& command) {
-    keys_.make_contract_1(role);
-    const OwnDomain domain;
-    const std::string program = command.front();
-    const std::string output = fail(
-        put_before(keys_.as(), make_command(program, domain.number(),
-                                            {command.begin() + 1, command.end()}, qos("secure"))),
-        2);
-    const std::string renew =
-        "./sls keys " + keys_.path().string() + " --add " + role + " " + role + " --force";
-    EXPECT_EQ(output, program + ": error: " + (keys_.path() / role / "permissions.p7s").string() +
-                          ": expected permission to " + verb +
-                          " sls/record, got a document of contract 1; renew it where the "
-                          "authorities are: " +
-                          renew + "\n");
-    run(make_keys_command({keys_.path().string(), "--add", role, role, "--force"}));
-  };
-  expect_message("server", "write", {"sim_server", "--scenario", scenario("short")});
-  const TemporaryFolder folder;
-  expect_message("recorder", "read", {"recorder", "--out", (folder / "recording").string()});
-}
-
 TEST_F(BadKeysTest, ExpiredOnes) {
   keys_.add_expired("server", "old");
   const std::string output = start_server(keys_.as("old"));

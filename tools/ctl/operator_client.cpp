@@ -134,6 +134,15 @@ void OperatorClient::note_event(const SimStatus& status) {
 
 std::optional<SimControlReply> OperatorClient::ask(const bus::Run& run, ControlAction action,
                                                    std::uint64_t steps) {
+  auto question = send(run, action, steps);
+  while (question && app::stop_signal() == 0)
+    if (auto reply = find_reply(*question, Clock::now() + app::kPollTime)) return reply;
+  return std::nullopt;
+}
+
+std::optional<OperatorClient::Question> OperatorClient::send(const bus::Run& run,
+                                                             ControlAction action,
+                                                             std::uint64_t steps) {
   SimControl request;
   request.run_id(run.parameters.run_id());
   request.vehicle_id(options_.vehicle_id);
@@ -145,30 +154,47 @@ std::optional<SimControlReply> OperatorClient::ask(const bus::Run& run, ControlA
   app::Wait wait(options_.timeout_s, kUsualWait);
   if (!wait_until_heard(run, wait)) return std::nullopt;
   channel_->request_writer.write(request);
-  const bool takes_its_time = action == ControlAction::ACTION_STEP;
-  bus::ServerWatch server(servers_, run, options_.timeout_s);
-  std::optional<Clock::time_point> give_up;  // once the run has ended
-  while (app::stop_signal() == 0) {
-    const auto received = replies_.take(Clock::now() + app::kPollTime);
-    if (received && received->sender == run.server &&
-        received->reply.request_id() == request.request_id())
-      return received->reply;
+  return Question{run, request, wait, bus::ServerWatch(servers_, run, options_.timeout_s),
+                  std::nullopt};
+}
 
-    const auto status = servers_.find_status(run.parameters.run_id());
-    if (bus::calc_progress(status) < 0 && !give_up) give_up = Clock::now() + kLastReplyTime;
-    if (give_up && Clock::now() >= *give_up)
-      throw app::RunError(fmt::format("no reply to {}: the run has ended: {}, {}",
-                                      to_string(action), bus::to_string(status->phase()),
-                                      status->reason().c_str()));
-    if (server.look() == bus::ServerWatch::Finding::kLost)
-      throw app::RunError(fmt::format("no reply to {}: {}", to_string(action), server.describe()));
-    if (!takes_its_time && wait.is_over())
-      throw app::RunError(fmt::format("no reply to {} from the server of run {:016x} within {} s",
-                                      to_string(action), run.parameters.run_id(),
-                                      options_.timeout_s));
-    if (wait.is_report_due()) report_wait(run, request, wait);
-  }
+std::optional<SimControlReply> OperatorClient::find_reply(Question& question,
+                                                          Clock::time_point deadline) {
+  const bus::Run& run = question.run;
+  do {
+    const auto found = std::find_if(kept_.begin(), kept_.end(), [&](const Received& received) {
+      return received.sender == run.server &&
+             received.reply.request_id() == question.request.request_id();
+    });
+    if (found == kept_.end()) continue;
+    const SimControlReply reply = found->reply;
+    kept_.erase(found);
+    return reply;
+  } while (keep_next_reply(deadline));
+
+  const char* const action = to_string(question.request.action());
+  const auto status = servers_.find_status(run.parameters.run_id());
+  if (bus::calc_progress(status) < 0 && !question.give_up)
+    question.give_up = Clock::now() + kLastReplyTime;
+  if (question.give_up && Clock::now() >= *question.give_up)
+    throw app::RunError(fmt::format("no reply to {}: the run has ended: {}, {}", action,
+                                    bus::to_string(status->phase()), status->reason().c_str()));
+  if (question.server.look() == bus::ServerWatch::Finding::kLost)
+    throw app::RunError(fmt::format("no reply to {}: {}", action, question.server.describe()));
+  const bool takes_its_time = question.request.action() == ControlAction::ACTION_STEP;
+  if (!takes_its_time && question.wait.is_over())
+    throw app::RunError(fmt::format("no reply to {} from the server of run {:016x} within {} s",
+                                    action, run.parameters.run_id(), options_.timeout_s));
+  if (question.wait.is_report_due()) report_wait(run, question.request, question.wait);
   return std::nullopt;
+}
+
+bool OperatorClient::keep_next_reply(Clock::time_point deadline) {
+  auto received = replies_.take(deadline);
+  if (!received) return false;
+  if (kept_.size() == kMailboxSize) kept_.pop_front();
+  kept_.push_back(std::move(*received));
+  return true;
 }
 
 bool OperatorClient::wait_until_heard(const bus::Run& run, app::Wait& wait) const {

@@ -46,6 +46,20 @@ class OperatorClient {
   std::optional<SimControlReply> ask(const bus::Run& run, ControlAction action,
                                      std::uint64_t steps = 0);
 
+  /// A request that has been sent, for find_reply.
+  struct Question {
+    bus::Run run;
+    SimControl request;
+    app::Wait wait;
+    bus::ServerWatch server;
+    std::optional<std::chrono::steady_clock::time_point> give_up;  ///< set once the run has ended
+  };
+  /// The two parts of `ask`, for several requests at a time, on one thread: `send` waits only for
+  /// the server's endpoints, find_reply until `deadline`. @throws app::RunError as `ask`.
+  std::optional<Question> send(const bus::Run& run, ControlAction action, std::uint64_t steps);
+  std::optional<SimControlReply> find_reply(Question& question,
+                                            std::chrono::steady_clock::time_point deadline);
+
   /// The data of `run` that have arrived so far.
   Snapshot make_snapshot(const bus::Run& run) const;
 
@@ -72,6 +86,7 @@ class OperatorClient {
   std::optional<bus::Run> find_ended_run() const;
   void note_event(const SimStatus& status);
   Events& find_or_add_events(std::uint64_t run_id);
+  bool keep_next_reply(std::chrono::steady_clock::time_point deadline);
   /// Waits until both endpoints match those of the server of `run`. False if a stop signal came
   /// first.
   bool wait_until_heard(const bus::Run& run, app::Wait& wait) const;
@@ -83,6 +98,7 @@ class OperatorClient {
   bus::ParticipantDirectory participants_;
   bus::ServerDirectory servers_;
   app::Mailbox<Received> replies_;
+  std::deque<Received> kept_;  // taken from `replies_`, also those to other requests
   std::optional<Channel> channel_;
 };
 

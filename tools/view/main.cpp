@@ -28,8 +28,8 @@ constexpr double kSignalTime = 0.1;  // s between two looks for a stop signal
 view::Resource make_page() {
   view::Resource page;
   page.content_type = "text/html; charset=utf-8";
-  page.content_encoding = "gzip";
-  page.body = std::make_shared<const std::string>(view::page_html_gz());
+  page.body = std::make_shared<const std::string>(view::unzip(view::page_html_gz()));
+  page.gzip_body = std::make_shared<const std::string>(view::page_html_gz());
   return page;
 }
 

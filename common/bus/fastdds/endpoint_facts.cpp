@@ -167,11 +167,4 @@ std::optional<std::string> find_meant_topic(const EndpointFacts& endpoint) {
   return meant;
 }
 
-bool is_of_contract_1(const EndpointFacts& endpoint) {
-  const auto& [topic, type] = std::tie(endpoint.topic, endpoint.type);
-  return topic == "sls/reference" || topic.compare(0, 10, "sls/fleet_") == 0 ||
-         (topic == "sls/state" && type == "sls::VehicleState") ||
-         (topic == "sls/command" && type == "sls::ControlCommand");
-}
-
 }  // namespace sls::bus

@@ -47,7 +47,4 @@ std::vector<Mismatch> compare(const EndpointFacts& own, const EndpointFacts& oth
 /// its type is ours. Nothing for a topic of ours, and for a topic of others.
 std::optional<std::string> find_meant_topic(const EndpointFacts& endpoint);
 
-/// True if only a program of the first contract has such an endpoint.
-bool is_of_contract_1(const EndpointFacts& endpoint);
-
 }  // namespace sls::bus

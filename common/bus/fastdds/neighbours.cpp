@@ -129,15 +129,6 @@ void Neighbours::judge(const Endpoint& endpoint, const EndpointFacts& facts) {
   const auto& [peer, id] = endpoint;
   const std::string place = fmt::format("{} {} {}", config::to_printable(facts.topic),
                                         facts.is_writer ? "of" : "for", describe_held(peer));
-  if (sls::bus::is_of_contract_1(facts)) {
-    const auto known = participants_.find(peer);
-    if (known != participants_.end()) known->second.is_of_contract_1 = true;
-    problems_.replace(make_key(peer), {{make_key(peer) + "contract",
-                                        place + ": expected contract 2, got contract 1 ("
-                                                "it was built from an older sls.idl)"}});
-    return;
-  }
-  if (is_of_contract_1(peer)) return;  // already reported; explains all other mismatches
   if (const auto meant = find_meant_topic(facts)) {
     // ROS 2 changes the names of all topics, so this is reported once per participant.
     const bool is_of_ros = begins_with(facts.topic, "rt/");
@@ -171,7 +162,7 @@ void Neighbours::judge(const Endpoint& endpoint, const EndpointFacts& facts) {
 void Neighbours::note_misfit(const PeerId& peer, const EntityId& writer, const std::string& topic,
                              const std::string& type, const std::string& defect) {
   const std::lock_guard lock(mutex_);
-  if (is_of_contract_1(peer) || endpoints_.count({peer, writer}) == 0) return;
+  if (endpoints_.count({peer, writer}) == 0) return;
   problems_.begin(make_key(peer, writer) + "length",
                   fmt::format("{} of {}: {}: {}", topic, describe_held(peer), type, defect),
                   kMisfitLasts);
@@ -179,7 +170,7 @@ void Neighbours::note_misfit(const PeerId& peer, const EntityId& writer, const s
 
 void Neighbours::note_problem(const PeerId& peer, const std::string& key, const std::string& text) {
   const std::lock_guard lock(mutex_);
-  if (!is_of_contract_1(peer) && participants_.count(peer) > 0)
+  if (participants_.count(peer) > 0)
     problems_.begin(make_key(peer) + key, describe_held(peer) + ": " + text);
 }
 
@@ -195,11 +186,6 @@ std::string Neighbours::describe(const PeerId& peer) const {
 std::string Neighbours::describe_held(const PeerId& peer) const {
   const auto known = participants_.find(peer);
   return known == participants_.end() ? "a participant without a name" : known->second.description;
-}
-
-bool Neighbours::is_of_contract_1(const PeerId& peer) const {
-  const auto known = participants_.find(peer);
-  return known != participants_.end() && known->second.is_of_contract_1;
 }
 
 std::set<PeerId> Neighbours::find_misfits() const {

@@ -81,14 +81,12 @@ class Neighbours {
     std::string address;
     std::string obstacle;
     std::string description;
-    bool is_of_contract_1 = false;
   };
   using Endpoint = std::pair<PeerId, EntityId>;
 
   void judge(const Endpoint& endpoint, const EndpointFacts& facts);
   void describe_anew(const PeerId& peer, Participant& participant);
   std::string describe_held(const PeerId& peer) const;
-  bool is_of_contract_1(const PeerId& peer) const;
 
   Problems& problems_;
   mutable std::mutex mutex_;

@@ -17,8 +17,8 @@ from sls.campaign.engines import ENGINES, EngineError, EngineOptions, load_engin
 from sls.campaign.folder import CampaignFolder, opened
 from sls.errors import ConfigError, RunError
 from sls.input_error import InputError
+from sls.scenario import ROOT
 
-ROOT = Path(__file__).resolve().parents[3]
 MOST_CHUNKS = 10_000  # files in a folder
 LEAST_CHUNKS = 16     # with fewer chunks, workers would end at very different times
 DESCRIPTIONS = {"status": "Prints chunks, rate and outcomes of a campaign so far.",

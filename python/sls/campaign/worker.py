@@ -1,10 +1,9 @@
-"""Flies chunks of a campaign's folder: `./sls campaign-worker DIR --chunks A-B`, which Slurm and
-Kubernetes also start, the processes of the local engine, and `fly_chunk` for Dask."""
+"""Flies chunks of a campaign's folder: `./sls campaign-worker DIR --chunks A-B`, which Slurm also
+starts, the processes of the local engine, and `fly_chunk` for Dask."""
 
 import argparse
 import json
 import os
-import re
 import sys
 import threading
 import time
@@ -12,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TextIO
 
-from sls.campaign.arguments import Parser, parse_range, to_count
+from sls.campaign.arguments import Parser, parse_range
 from sls.campaign.engines import EngineError
 from sls.campaign.folder import CampaignFolder, DamagedChunk
 from sls.campaign.kept import keep_while_flying
@@ -113,26 +112,10 @@ def take_pipes() -> tuple[TextIO, TextIO]:
     return pipes
 
 
-def list_numbers(options: argparse.Namespace) -> list[int]:
-    """Numbers of the chunks in the command line. Raises InputError."""
-    if options.chunks:
-        first, last = options.chunks
-        return list(range(first, last + 1))
-    text = os.environ.get(options.index_from, "")
-    if not re.fullmatch(r"\d{1,9}", text):
-        raise InputError(f"--index-from {options.index_from}: expected this environment variable to "
-                         f"hold an index, got '{text}'")
-    begin = int(text) * options.chunks_each
-    return list(range(begin, begin + options.chunks_each))
-
-
 def fly_listed(options: argparse.Namespace) -> None:
-    numbers = list_numbers(options)
+    first, last = options.chunks
     flyer = ChunkFlyer(options.folder)
-    count = len(flyer.folder.chunks)
-    for number in numbers:
-        if number >= count and options.index_from:
-            break  # the last index has fewer chunks
+    for number in range(first, last + 1):
         done = flyer.fly(number)
         print(f"campaign-worker: chunk {number}: {done['runs']} runs in {done['wall_s']:.3f} s",
               file=sys.stderr)
@@ -141,16 +124,11 @@ def fly_listed(options: argparse.Namespace) -> None:
 def main(arguments: Sequence[str]) -> int:
     """Runs the command and returns the exit code."""
     parser = Parser(prog="./sls campaign-worker",
-                    description="Flies chunks of a campaign. Slurm and Kubernetes start it.")
+                    description="Flies chunks of a campaign. Slurm starts it.")
     parser.add_argument("folder", type=Path, metavar="DIR", help="folder of the campaign")
     which = parser.add_mutually_exclusive_group(required=True)
     which.add_argument("--chunks", type=parse_range, metavar="A-B", help="fly chunks A to B")
-    which.add_argument("--index-from", metavar="ENV", default="",
-                       help="environment variable that holds the index of this task, such as "
-                            "JOB_COMPLETION_INDEX")
     which.add_argument("--serve", action="store_true", help=argparse.SUPPRESS)
-    parser.add_argument("--chunks-each", type=to_count, default=1, metavar="N",
-                        help="chunks per index of --index-from (default: 1)")
     try:
         options = parser.parse_args(arguments)
         if options.serve:

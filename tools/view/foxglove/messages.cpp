@@ -5,11 +5,14 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "tools/view/live/client_json.hpp"
+
 namespace sls::view::foxglove {
 
 namespace {
 
-using Json = nlohmann::ordered_json;
+using Json = nlohmann::ordered_json;  // sent
+using Message = nlohmann::json;       // received
 
 constexpr char kMessageData = 1, kTime = 2, kServiceCallResponse = 3;  // from the server
 constexpr char kClientMessageData = 1, kServiceCallRequest = 2;        // from a client
@@ -37,29 +40,29 @@ std::uint64_t to_time(std::int64_t time_ns) {
   return static_cast<std::uint64_t>(std::max<std::int64_t>(time_ns, 0));
 }
 
-std::optional<std::uint32_t> find_id(const Json& value) {
+std::optional<std::uint32_t> find_id(const Message& value) {
   if (!value.is_number_unsigned()) return std::nullopt;
   const auto number = value.get<std::uint64_t>();
   if (number > std::numeric_limits<std::uint32_t>::max()) return std::nullopt;
   return static_cast<std::uint32_t>(number);
 }
 
-std::optional<std::uint32_t> find_id(const Json& object, const char* key) {
+std::optional<std::uint32_t> find_id(const Message& object, const char* key) {
   if (!object.is_object()) return std::nullopt;
   const auto found = object.find(key);
   return found == object.end() ? std::nullopt : find_id(*found);
 }
 
-const Json* find_array(const Json& object, const char* key) {
+const Message* find_array(const Message& object, const char* key) {
   const auto found = object.find(key);
   return found != object.end() && found->is_array() ? &*found : nullptr;
 }
 
-std::variant<Subscribe, Unsubscribe, Malformed> parse_subscribe(const Json& json) {
-  const Json* array = find_array(json, "subscriptions");
+std::variant<Subscribe, Unsubscribe, Malformed> parse_subscribe(const Message& json) {
+  const Message* array = find_array(json, "subscriptions");
   if (!array) return Malformed{"subscribe: subscriptions: expected an array"};
   Subscribe subscribe;
-  for (const Json& item : *array) {
+  for (const Message& item : *array) {
     const auto id = find_id(item, "id"), channel_id = find_id(item, "channelId");
     if (!id || !channel_id)
       return Malformed{
@@ -69,11 +72,11 @@ std::variant<Subscribe, Unsubscribe, Malformed> parse_subscribe(const Json& json
   return subscribe;
 }
 
-std::variant<Subscribe, Unsubscribe, Malformed> parse_unsubscribe(const Json& json) {
-  const Json* array = find_array(json, "subscriptionIds");
+std::variant<Subscribe, Unsubscribe, Malformed> parse_unsubscribe(const Message& json) {
+  const Message* array = find_array(json, "subscriptionIds");
   if (!array) return Malformed{"unsubscribe: subscriptionIds: expected an array"};
   Unsubscribe unsubscribe;
-  for (const Json& item : *array) {
+  for (const Message& item : *array) {
     const auto id = find_id(item);
     if (!id) return Malformed{"unsubscribe: subscriptionIds: expected whole numbers"};
     unsubscribe.subscription_ids.push_back(*id);
@@ -182,8 +185,9 @@ Payload make_service_call_response(std::uint32_t service_id, std::uint32_t call_
 }
 
 std::variant<Subscribe, Unsubscribe, Malformed> parse_text(std::string_view message) {
-  const Json json = Json::parse(message, nullptr, false);
-  if (json.is_discarded()) return Malformed{"expected JSON, got " + quote(message)};
+  const Message json = parse_client_json(message);
+  if (json.is_discarded())
+    return Malformed{"expected JSON, at most 16 keys an object, got " + quote(message)};
   const auto op = json.is_object() ? json.find("op") : json.end();
   if (!json.is_object() || op == json.end() || !op->is_string())
     return Malformed{"expected a JSON object with the text op, got " + quote(message)};

@@ -3,6 +3,8 @@
 #include <array>
 #include <nlohmann/json.hpp>
 
+#include "tools/view/live/client_json.hpp"
+
 namespace sls::view::foxglove {
 
 namespace {
@@ -61,7 +63,7 @@ Payload make_advertise_services() {
 std::variant<std::uint64_t, Malformed> parse_request(const Service& service,
                                                      const std::string& text) {
   const bool has_steps = service.action == ControlAction::ACTION_STEP;
-  const Json json = text.empty() ? Json::object() : Json::parse(text, nullptr, false);
+  const auto json = text.empty() ? nlohmann::json::object() : parse_client_json(text);
   if (!json.is_object())
     return Malformed{std::string(service.name) + ": expected a JSON object, got " + quote(text)};
   std::uint64_t steps = has_steps ? 1 : 0;
@@ -70,7 +72,7 @@ std::variant<std::uint64_t, Malformed> parse_request(const Service& service,
       return Malformed{std::string(service.name) + ": unknown key " + quote(key)};
     if (!value.is_number_unsigned() || value.get<std::uint64_t>() == 0)
       return Malformed{std::string(service.name) + ": steps: expected a whole number ≥ 1, got " +
-                       quote(value.dump(-1, ' ', true, Json::error_handler_t::replace))};
+                       quote(value.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace))};
     steps = value.get<std::uint64_t>();
   }
   return steps;

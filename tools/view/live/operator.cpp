@@ -5,12 +5,13 @@
 #include <array>
 #include <atomic>
 #include <chrono>
-#include <deque>
+#include <iterator>
+#include <list>
 #include <thread>
 #include <utility>
 
 #include "common/app/mailbox.hpp"
-#include "common/app/stop_signal.hpp"
+#include "common/app/wait.hpp"
 #include "common/config/config_error.hpp"
 #include "tools/ctl/operator_client.hpp"
 
@@ -38,6 +39,10 @@ struct Operator::Impl {
     std::uint64_t steps;
     std::function<void(const OperatorReply&)> done;
   };
+  struct Open {
+    Request request;
+    ctl::OperatorClient::Question question;
+  };
 
   Impl(bus::Node& bus_node, std::uint32_t vehicle, Feed::Post post_task, bool may)
       : node(bus_node), vehicle_id(vehicle), post(std::move(post_task)), may_ask(may) {
@@ -53,23 +58,36 @@ struct Operator::Impl {
 
   void work() {
     while (!is_ending) {
-      requests.wait(std::chrono::steady_clock::now() + 1s);
-      for (Request& request : requests.take_all()) {
-        if (is_ending) return;
-        reply(std::move(request), ask(request.action, request.steps));
-      }
+      // While a reply is open, find_reply waits for it.
+      if (open.empty()) requests.wait(std::chrono::steady_clock::now() + 1s);
+      for (Request& request : requests.take_all())
+        if (!is_ending) send(std::move(request));
+      const auto deadline = std::chrono::steady_clock::now() + app::kPollTime;
+      for (auto item = open.begin(); item != open.end() && !is_ending;)
+        item = look_for_reply(*item, deadline) ? open.erase(item) : std::next(item);
     }
   }
 
-  OperatorReply ask(ControlAction action, std::uint64_t steps) {
+  void send(Request request) {
     try {
       if (!client) make_client();
       const auto run = client->wait_for_run();
-      const auto reply = run ? client->ask(*run, action, steps) : std::nullopt;
-      if (!reply) return {false, "the viewer is ending", 0};
-      return {reply->accepted(), reply->reason().to_string(), reply->step()};
+      auto question = run ? client->send(*run, request.action, request.steps) : std::nullopt;
+      if (!question) return reply(request, {false, "the viewer is ending", 0});
+      open.push_back({std::move(request), std::move(*question)});
     } catch (const std::exception& error) {
-      return {false, error.what(), 0};
+      reply(request, {false, error.what(), 0});
+    }
+  }
+
+  bool look_for_reply(Open& item, std::chrono::steady_clock::time_point deadline) {
+    try {
+      const auto got = client->find_reply(item.question, deadline);
+      if (got) reply(item.request, {got->accepted(), got->reason().to_string(), got->step()});
+      return got.has_value();
+    } catch (const std::exception& error) {
+      reply(item.request, {false, error.what(), 0});
+      return true;
     }
   }
 
@@ -81,12 +99,12 @@ struct Operator::Impl {
     client.emplace(node, options);
   }
 
-  void reply(Request request, OperatorReply reply) {
+  void reply(const Request& request, OperatorReply reply) {
     if (reply.is_accepted)
       spdlog::info("{} done at step {}", ctl::to_string(request.action), reply.step);
     else
       spdlog::info("{} refused: {}", ctl::to_string(request.action), reply.reason);
-    post([this, alive = is_alive, done = std::move(request.done), reply = std::move(reply)] {
+    post([this, alive = is_alive, done = request.done, reply = std::move(reply)] {
       if (!*alive) return;
       --open_requests;
       done(reply);
@@ -102,6 +120,7 @@ struct Operator::Impl {
   app::Mailbox<Request> requests{kMostRequests + 1};
   std::atomic<bool> is_ending{false};
   std::optional<ctl::OperatorClient> client;  // used by `thread` only
+  std::list<Open> open;                       // likewise
   std::thread thread;                         // a reply may take as long as its steps
 };
 

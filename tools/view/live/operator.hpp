@@ -1,4 +1,4 @@
-/// Sends operator requests of browsers one after another over sls/control.
+/// Sends operator requests of browsers over sls/control at once; replies come in any order.
 #pragma once
 
 #include <cstdint>
@@ -28,7 +28,7 @@ class Operator {
   bool may_ask() const;
   /// Sends a request to the vehicle's run and calls `done` once, on the server's thread, unless
   /// this object has been destroyed. At most 8 requests wait; further ones are refused. The
-  /// destructor waits for the open reply; a stop signal ends this wait.
+  /// destructor does not wait for replies.
   void request(ControlAction action, std::uint64_t steps,
                std::function<void(const OperatorReply&)> done);
 

@@ -13,13 +13,15 @@
 #include "common/bus/names.hpp"
 #include "common/bus/sync_counters.hpp"
 #include "common/config/config_error.hpp"
+#include "tools/view/live/client_json.hpp"
 #include "tools/view/live/page_frames.hpp"
 #include "tools/view/run_description.hpp"
 
 namespace sls::view {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using Json = nlohmann::ordered_json;  // sent
+using Message = nlohmann::json;       // received
 
 constexpr std::uint64_t kPosesKey = 1;
 constexpr std::uint64_t kStatusKey = 2;
@@ -102,7 +104,8 @@ class PageHub : public Feed::Listener {
   void leave(PageSession& session);
 
   void note(const Sample& sample) override {
-    if (sample.topic == TopicId::kRecord && has_run_) frames_.add(sample);
+    if (sample.topic == TopicId::kRecord && has_run_ && sample.sender == server_)
+      frames_.add(sample);
   }
   void note(const RunView* view) override;
   void note_event(std::uint64_t run_id, std::uint64_t step, const std::string& text) override;
@@ -135,6 +138,7 @@ class PageHub : public Feed::Listener {
   const PageOptions options_;
   std::vector<PageSession*> sessions_;
   bool has_run_ = false;
+  bus::PeerId server_{};  // of the run
   double period_s_ = 0;
   PageFrames frames_;
   Payload run_message_;     // run, or no_run
@@ -170,9 +174,9 @@ class PageSession : public Session {
   }
   void send_hello();
   void refuse(const std::string& text);
-  void authenticate(const Json& message);
-  void select(const Json& message);
-  void control(const Json& message);
+  void authenticate(const Message& message);
+  void select(const Message& message);
+  void control(const Message& message);
   std::string find_obstacle() const;
 
   const std::shared_ptr<PageHub> hub_;
@@ -208,14 +212,15 @@ void PageSession::refuse(const std::string& text) {
 }
 
 /// A whole number from 0 to `most`, or nothing.
-std::optional<std::uint64_t> find_number(const Json& message, const char* key, std::uint64_t most) {
+std::optional<std::uint64_t> find_number(const Message& message, const char* key,
+                                         std::uint64_t most) {
   const auto found = message.find(key);
   if (found == message.end() || !found->is_number_unsigned()) return std::nullopt;
   const auto number = found->get<std::uint64_t>();
   return number <= most ? std::optional(number) : std::nullopt;
 }
 
-std::optional<std::string> find_text(const Json& message, const char* key) {
+std::optional<std::string> find_text(const Message& message, const char* key) {
   const auto found = message.find(key);
   if (found == message.end() || !found->is_string()) return std::nullopt;
   return found->get<std::string>();
@@ -224,8 +229,8 @@ std::optional<std::string> find_text(const Json& message, const char* key) {
 void PageSession::receive(MessageKind kind, std::string_view text) {
   if (mistakes_ >= kMostMistakes) return;  // the connection is being closed
   if (kind != MessageKind::kText) return refuse("expected text, got a binary message");
-  const Json message = Json::parse(text, nullptr, false);
-  if (!message.is_object()) return refuse("expected a JSON object");
+  const Message message = parse_client_json(text);
+  if (!message.is_object()) return refuse("expected a JSON object with at most 16 keys");
   const auto op = find_text(message, "op");
   if (op == "authenticate") return authenticate(message);
   if (op == "select") return select(message);
@@ -233,14 +238,14 @@ void PageSession::receive(MessageKind kind, std::string_view text) {
   refuse("op: expected authenticate, select or control");
 }
 
-void PageSession::authenticate(const Json& message) {
+void PageSession::authenticate(const Message& message) {
   const auto token = find_text(message, "token");
   if (!token) return refuse("token: expected text");
   if (!connection_.authenticate(*token)) refuse("token: expected that of --token-file");
   send_hello();
 }
 
-void PageSession::select(const Json& message) {
+void PageSession::select(const Message& message) {
   const auto id = find_number(message, "vehicle_id", std::numeric_limits<std::uint32_t>::max());
   if (!id) return refuse("vehicle_id: expected a whole number from 0 to 4294967295");
   const auto vehicle_id = static_cast<std::uint32_t>(*id);
@@ -249,7 +254,7 @@ void PageSession::select(const Json& message) {
   selected_ = vehicle_id;
 }
 
-void PageSession::control(const Json& message) {
+void PageSession::control(const Message& message) {
   const auto id = find_number(message, "id", kMostId);
   if (!id) return refuse("id: expected a whole number from 0 to 2^53");
   const auto word = find_text(message, "action");
@@ -329,6 +334,7 @@ void PageHub::note(const RunView* view) {
     return send_all(run_message_, Delivery::kAlways);
   }
   const Parameters& parameters = view->run.parameters;
+  server_ = view->run.server;
   if (!has_run_ || parameters.run_id() != frames_.run_id()) start_run(parameters);
   send_status(*view);
 }

@@ -21,22 +21,6 @@ namespace fs = std::filesystem;
 constexpr std::size_t kMostPageBytes = 16 << 20;
 constexpr std::string_view kModeId = "id=\"sls-mode\"";
 
-std::string unzip(std::string_view gzip) {
-  z_stream stream{};
-  constexpr int kGzip = 16 + MAX_WBITS;
-  if (inflateInit2(&stream, kGzip) != Z_OK) throw std::runtime_error("page: zlib does not start");
-  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(gzip.data()));
-  stream.avail_in = static_cast<uInt>(gzip.size());
-  std::string text(kMostPageBytes, '\0');
-  stream.next_out = reinterpret_cast<Bytef*>(text.data());
-  stream.avail_out = static_cast<uInt>(text.size());
-  const int result = inflate(&stream, Z_FINISH);
-  text.resize(stream.total_out);
-  inflateEnd(&stream);
-  if (result != Z_STREAM_END) throw std::runtime_error("page: expected gzip, got other bytes");
-  return text;
-}
-
 std::string to_base64(std::string_view bytes) {
   constexpr const char* kLetters =
       "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -82,6 +66,22 @@ void write_file(const fs::path& file, const std::string& bytes) {
 }
 
 }  // namespace
+
+std::string unzip(std::string_view gzip) {
+  z_stream stream{};
+  constexpr int kGzip = 16 + MAX_WBITS;
+  if (inflateInit2(&stream, kGzip) != Z_OK) throw std::runtime_error("page: zlib does not start");
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(gzip.data()));
+  stream.avail_in = static_cast<uInt>(gzip.size());
+  std::string text(kMostPageBytes, '\0');
+  stream.next_out = reinterpret_cast<Bytef*>(text.data());
+  stream.avail_out = static_cast<uInt>(text.size());
+  const int result = inflate(&stream, Z_FINISH);
+  text.resize(stream.total_out);
+  inflateEnd(&stream);
+  if (result != Z_STREAM_END) throw std::runtime_error("page: expected gzip, got other bytes");
+  return text;
+}
 
 std::string set_mode(std::string_view page_html, std::string_view mode_json) {
   const auto name = page_html.find(kModeId);

@@ -9,6 +9,9 @@
 
 namespace sls::view {
 
+/// The bytes that `gzip` holds. @throws std::runtime_error if it is no gzip.
+std::string unzip(std::string_view gzip);
+
 /// The page with another text in its block `sls-mode`, which selects what the page shows.
 /// @throws std::runtime_error if the page has no such block.
 std::string set_mode(std::string_view page_html, std::string_view mode_json);

@@ -50,7 +50,7 @@ struct RosFace::Impl : Feed::Listener {
   // --- on the server's thread ---
 
   void note(const Sample& sample) override {
-    if (sample.topic != TopicId::kRecord) return;
+    if (sample.topic != TopicId::kRecord || sample.sender != server) return;
     {
       const std::lock_guard lock(mutex);
       if (batches.size() == kMostBatches) batches.pop_front();
@@ -60,7 +60,9 @@ struct RosFace::Impl : Feed::Listener {
   }
 
   void note(const RunView* view) override {
-    if (!view || view->run.parameters.run_id() == run_id) return;
+    if (!view) return;
+    server = view->run.server;
+    if (view->run.parameters.run_id() == run_id) return;
     run_id = view->run.parameters.run_id();
     {
       const std::lock_guard lock(mutex);
@@ -112,6 +114,7 @@ struct RosFace::Impl : Feed::Listener {
 
   Feed& feed;
   std::uint64_t run_id = 0;             // used by the server's thread only
+  bus::PeerId server{};                 // likewise
   Publications publications;            // used by `thread` only, once it runs
   std::optional<NewestSamples> newest;  // likewise
   std::mutex mutex;                     // protects the members below

@@ -53,6 +53,18 @@ std::optional<Choice> choose_protocol(const Request& request,
   return std::nullopt;
 }
 
+/// True if Accept-Encoding offers gzip with a weight other than 0.
+template <class Request>
+bool accepts_gzip(const Request& request) {
+  for (const auto& [name, weights] : http::ext_list(request[http::field::accept_encoding])) {
+    if (!beast::iequals(name, "gzip")) continue;
+    return std::all_of(weights.begin(), weights.end(), [](const auto& weight) {
+      return weight.second.find_first_not_of("0.") != weight.second.npos;
+    });
+  }
+  return false;
+}
+
 std::string describe_subprotocols(const std::vector<Protocol>& protocols) {
   std::string names;
   for (const Protocol& protocol : protocols)
@@ -73,7 +85,8 @@ void set_common_fields(Response& response) {
 }  // namespace
 
 HttpSession::HttpSession(Hub& hub, Socket socket)
-    : hub_(hub),
+    : Client(socket),
+      hub_(hub),
       socket_(std::move(socket)),
       deadline_(socket_.get_executor()),
       buffer_(hub.limits.request_bytes + 1) {}
@@ -176,14 +189,16 @@ void HttpSession::serve(const Resource& resource) {
   const auto response = std::make_shared<http::response<Body>>(http::status::ok, request.version());
   set_common_fields(*response);
   response->set(http::field::content_type, resource.content_type);
-  if (!resource.content_encoding.empty())
-    response->set(http::field::content_encoding, resource.content_encoding);
+  const bool is_gzip = resource.gzip_body && accepts_gzip(request);
+  const std::string& bytes = is_gzip ? *resource.gzip_body : *resource.body;
+  if (is_gzip) response->set(http::field::content_encoding, "gzip");
+  if (resource.gzip_body) response->set(http::field::vary, "Accept-Encoding");
   if (!resource.security_policy.empty())
     response->set("Content-Security-Policy", resource.security_policy);
-  response->body() = {resource.body->data(), resource.body->size()};
-  response->content_length(resource.body->size());
+  response->body() = {bytes.data(), bytes.size()};
+  response->content_length(bytes.size());
   response->keep_alive(request.keep_alive());
-  write(response, resource.body->size());
+  write(response, bytes.size());
 }
 
 void HttpSession::refuse(http::status status, const std::string& reason) {

@@ -3,7 +3,10 @@
 #include <netinet/tcp.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <boost/asio/detail/socket_option.hpp>
+#include <boost/asio/ip/address.hpp>
+#include <tuple>
 
 #include "tools/view/web/http_session.hpp"
 #include "tools/view/web/request_text.hpp"
@@ -24,17 +27,63 @@ void set_options(Socket& socket) {
   socket.set_option(UnsentLimit(kMostUnsent), ignored);
 }
 
+std::string name_network(const Socket& socket) {
+  Error ignored;
+  net::ip::address address = socket.remote_endpoint(ignored).address();
+  if (address.is_v6() && address.to_v6().is_v4_mapped())
+    address = net::ip::make_address_v4(net::ip::v4_mapped, address.to_v6());
+  if (address.is_loopback()) return "loopback";
+  if (address.is_v4()) return address.to_string();
+  const auto bytes = address.to_v6().to_bytes();
+  return {bytes.begin(), bytes.begin() + 8};
+}
+
 }  // namespace
 
+Client::Client(const Socket& socket) : address(name_network(socket)) {}
+
 void Hub::adopt(Socket socket) {
-  if (clients_.size() >= limits.connections) {
-    warn(fmt::format("all {} connections are in use; another one was refused", limits.connections));
-    return;
-  }
   set_options(socket);
   const auto session = std::make_shared<HttpSession>(*this, std::move(socket));
+  make_room(session->address);
   add(session);
   session->start();
+}
+
+/// A new client may be an operator, which only its messages show. So it gets in. The connection
+/// that ends for it is no operator's if possible, then of the address with most connections, then
+/// the one that reads least, then the oldest.
+void Hub::make_room(const std::string& address) {
+  std::map<std::string, std::size_t> counts;
+  std::size_t lookers = 0;  // of the new client's address
+  for (const auto& [key, client] : clients_) {
+    ++counts[client->address];
+    if (client->address == address && !client->may_operate()) ++lookers;
+  }
+  const bool is_full = clients_.size() >= limits.connections;
+  if (!is_full && lookers < limits.connections_per_address) return;
+  const auto rank = [&counts](const Client& client) {
+    return std::tuple(!client.may_operate(), counts[client.address], client.waiting_bytes(),
+                      ~client.number);
+  };
+  std::shared_ptr<Client> worst;
+  for (const auto& [key, client] : clients_)
+    if ((is_full || (client->address == address && !client->may_operate())) &&
+        (!worst || rank(*client) > rank(*worst)))
+      worst = client;
+  warn(fmt::format("{} connections, {} of one address: one was closed for a new one",
+                   clients_.size(), counts[worst->address]));
+  worst->drop();
+}
+
+void Hub::limit_queues() {
+  while (waiting_bytes > limits.all_queues_bytes) {
+    const auto slowest =
+        std::max_element(clients_.begin(), clients_.end(), [](const auto& a, const auto& b) {
+          return a.second->waiting_bytes() < b.second->waiting_bytes();
+        });
+    slowest->second->relieve();
+  }
 }
 
 void Hub::warn(const std::string& text) {
@@ -46,6 +95,7 @@ void Hub::warn(const std::string& text) {
 
 void Hub::add(std::shared_ptr<Client> client) {
   Client* const key = client.get();
+  client->number = next_number_++;
   clients_.emplace(key, std::move(client));
 }
 

@@ -17,7 +17,19 @@ namespace sls::view {
 /// A TCP connection to a client.
 class Client {
  public:
+  explicit Client(const Socket& socket);
   virtual ~Client() = default;
+  /// The network of the client: its IPv4 address, the first 64 bits of its IPv6 address, or
+  /// "loopback".
+  const std::string address;
+  std::uint64_t number = 0;  ///< ascending in order of arrival
+
+  virtual bool may_operate() const { return false; }
+  /// Bytes that wait until the client reads.
+  virtual std::size_t waiting_bytes() const { return 0; }
+  /// Drops the waiting messages that may be dropped; if there are none, all, and closes the
+  /// connection. Does not end the session within this call.
+  virtual void relieve() {}
   /// Called when the server ends; tells the client if the protocol can.
   virtual void shut_down() = 0;
   /// Closes the socket and ends the session.
@@ -36,9 +48,12 @@ class Hub {
   std::map<std::string, Resource, std::less<>> resources;
   std::vector<Protocol> protocols;
   std::atomic<std::size_t> websockets{0};
+  std::size_t waiting_bytes = 0;  ///< sum over the clients
 
-  /// Serves an accepted connection; closes it if there are limits.connections already.
+  /// Serves an accepted connection. Beyond a limit of connections it takes the place of another.
   void adopt(Socket socket);
+  /// Relieves those clients that read slowest until limits.all_queues_bytes hold again.
+  void limit_queues();
   void add(std::shared_ptr<Client> client);
   void remove(Client* client);
   std::size_t count_clients() const { return clients_.size(); }
@@ -51,7 +66,10 @@ class Hub {
   void drop_all();
 
  private:
+  void make_room(const std::string& address);
+
   std::unordered_map<Client*, std::shared_ptr<Client>> clients_;
+  std::uint64_t next_number_ = 1;
   std::function<void()> done_;
   std::chrono::steady_clock::time_point next_warning_;
 };

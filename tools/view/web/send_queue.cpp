@@ -49,7 +49,15 @@ bool SendQueue::make_room(std::size_t payload_bytes) {
 }
 
 bool SendQueue::fits(std::size_t payload_bytes) const {
-  return bytes_ + payload_bytes + (messages_.size() + 1) * kMessageCost <= capacity_;
+  return cost() + payload_bytes + kMessageCost <= capacity_;
+}
+
+std::size_t SendQueue::cost() const { return bytes_ + messages_.size() * kMessageCost; }
+
+bool SendQueue::drop_droppable() {
+  bool has_dropped = false;
+  while (drop_oldest()) has_dropped = true;
+  return has_dropped;
 }
 
 bool SendQueue::drop_oldest() {

@@ -32,6 +32,9 @@ class SendQueue {
   void clear();
 
   std::size_t bytes() const { return bytes_; }  ///< of payloads
+  std::size_t cost() const;                     ///< with the overhead of each message
+  /// Drops all droppable messages; false if there was none.
+  bool drop_droppable();
   /// Messages dropped or replaced.
   std::uint64_t dropped() const { return dropped_; }
 

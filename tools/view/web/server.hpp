@@ -17,20 +17,23 @@ namespace sls::view {
 
 /// The answer for a path: bytes that do not change while the server runs.
 struct Resource {
-  std::string content_type;      ///< "text/html; charset=utf-8"
-  std::string content_encoding;  ///< "gzip", or empty
+  std::string content_type;  ///< "text/html; charset=utf-8"
   Payload body;
+  Payload gzip_body;            ///< the same for clients that take gzip, or null
   std::string security_policy;  ///< Content-Security-Policy, or empty
 };
 
 /// Limits of one server for its clients.
 struct ServerLimits {
-  std::size_t connections = 256;          ///< at a time, HTTP and WebSocket; others are closed
-  std::size_t request_bytes = 8 * 1024;   ///< header of an HTTP request; bodies are refused
-  std::size_t message_bytes = 64 * 1024;  ///< of a WebSocket message from a client
-  std::size_t queue_bytes = 8 << 20;      ///< of one connection
-  double request_timeout_s = 10;          ///< for a whole request, and for the next one
-  double silence_timeout_s = 30;          ///< without an answer to a ping
+  std::size_t connections =
+      256;  ///< at a time, HTTP and WebSocket; then a new one replaces another
+  std::size_t connections_per_address = 128;  ///< without operators (README.md)
+  std::size_t request_bytes = 8 * 1024;       ///< header of an HTTP request; bodies are refused
+  std::size_t message_bytes = 64 * 1024;      ///< of a WebSocket message from a client
+  std::size_t queue_bytes = 8 << 20;          ///< of one connection
+  std::size_t all_queues_bytes = 16 << 20;
+  double request_timeout_s = 10;  ///< for a whole request, and for the next one
+  double silence_timeout_s = 30;  ///< without an answer to a ping
 };
 
 struct ServerOptions {

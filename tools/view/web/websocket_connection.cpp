@@ -23,7 +23,8 @@ std::string shorten(const std::string& text) {
 
 WebSocketConnection::WebSocketConnection(Hub& hub, Socket socket, const RequestOrigin& origin,
                                          const Access& access)
-    : hub_(hub),
+    : Client(socket),
+      hub_(hub),
       origin_(origin),
       access_(access),
       stream_(GatheringStream(std::move(socket))),
@@ -113,12 +114,26 @@ bool WebSocketConnection::authenticate(std::string_view token) {
 void WebSocketConnection::send(MessageKind kind, Payload payload, Delivery delivery,
                                std::uint64_t key) {
   if (close_reason_ || has_ended_) return;
-  if (!queue_.push(kind, std::move(payload), delivery, key)) {
-    queue_.clear();
-    close(websocket::close_code::policy_error, "too slow: the queue is full");
-    return;
-  }
+  if (!queue_.push(kind, std::move(payload), delivery, key)) return close_slow();
   write_next();
+  count_waiting();
+  hub_.limit_queues();
+}
+
+void WebSocketConnection::close_slow() {
+  queue_.clear();
+  count_waiting();
+  close(websocket::close_code::policy_error, "too slow: the queue is full");
+}
+
+void WebSocketConnection::relieve() {
+  if (!queue_.drop_droppable()) return close_slow();
+  count_waiting();
+}
+
+void WebSocketConnection::count_waiting() {
+  hub_.waiting_bytes += queue_.cost() - counted_;
+  counted_ = queue_.cost();
 }
 
 std::size_t WebSocketConnection::queued_bytes() const {
@@ -129,6 +144,7 @@ std::size_t WebSocketConnection::queued_bytes() const {
 void WebSocketConnection::write_next() {
   if (!is_open_ || leaving_ || has_ended_ || is_close_sent_) return;
   leaving_ = queue_.pop();
+  count_waiting();
   if (!leaving_) {
     if (close_reason_) write_close();
     return;
@@ -165,6 +181,7 @@ void WebSocketConnection::write_close() {
 
 void WebSocketConnection::shut_down() {
   queue_.clear();
+  count_waiting();
   close(websocket::close_code::going_away, "sls_view ends");
 }
 
@@ -175,6 +192,7 @@ void WebSocketConnection::drop() {
   close_timer_.cancel();
   stream_.next_layer().close();
   queue_.clear();
+  count_waiting();
   session_.reset();
   if (is_open_) --hub_.websockets;
   hub_.remove(this);

@@ -37,6 +37,8 @@ class WebSocketConnection : public Connection,
   bool authenticate(std::string_view token) override;
   void close(std::uint16_t code, const std::string& reason) override;
 
+  std::size_t waiting_bytes() const override { return queue_.cost(); }
+  void relieve() override;
   void shut_down() override;
   void drop() override;
 
@@ -47,8 +49,11 @@ class WebSocketConnection : public Connection,
   void note_read(Error error);
   void receive();
   void write_next();
+  /// Call it after each change of `queue_`.
+  void count_waiting();
   void note_written(Error error);
   void write_close();
+  void close_slow();
 
   Hub& hub_;
   RequestOrigin origin_;
@@ -57,6 +62,7 @@ class WebSocketConnection : public Connection,
   Timer close_timer_;
   beast::flat_buffer buffer_;
   SendQueue queue_;
+  std::size_t counted_ = 0;  ///< bytes of `queue_` in hub_.waiting_bytes
   std::optional<QueuedMessage> leaving_;
   std::unique_ptr<Session> session_;
   std::optional<websocket::close_reason> close_reason_;  ///< to be sent after the queue

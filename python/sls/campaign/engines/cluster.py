@@ -1,10 +1,7 @@
-"""Functions of all engines for clusters. As a program this module begins the folder of a campaign
-without flights, for workers that are started by hand or by Kubernetes (docker/k8s/campaign)."""
+"""Functions of all engines for clusters."""
 
 import os
-import sys
 import time
-from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -51,30 +48,3 @@ def describe_rest(folder: CampaignFolder) -> str:
     whole = len(folder.chunks) - len(folder.missing())
     return (f"{whole} of {len(folder.chunks)} chunks are in {folder.folder}; --resume flies the "
             "others")
-
-
-def plan(arguments: Sequence[str]) -> int:
-    """Begins the folder; `arguments` are those of `./sls campaign`. Returns the exit code."""
-    from sls.campaign.campaign_file import load_campaign
-    from sls.campaign.cli import find_file, make_parser, prepare, say
-    from sls.campaign.engines import local
-    from sls.campaign.folder import opened
-    from sls.errors import ConfigError
-    try:
-        options = make_parser().parse_args(arguments)
-        if options.out is None:
-            raise ConfigError("campaign: expected --out DIR, got none")
-        with opened(options.out) as folder:
-            prepare(folder, load_campaign(find_file(options.file)), local, options)
-            say(f"campaign: {options.out}: chunks: {len(folder.chunks)}")
-        return 0
-    except ConfigError as error:
-        say(f"error: {error}")
-        return 2
-    except (RuntimeError, OSError) as error:
-        say(f"error: {error}")
-        return 1
-
-
-if __name__ == "__main__":
-    sys.exit(plan(sys.argv[1:]))

@@ -245,22 +245,6 @@ TEST_F(NeighboursTest, AMissingDeadlineIsForTheServerToJudge) {
   EXPECT_TRUE(neighbours_.find_missing_deadlines().empty());
 }
 
-TEST_F(NeighboursTest, AProgramOfContract1IsNamedOnce) {
-  for (const auto& [topic, type] :
-       {std::pair("sls/reference", "sls::Reference"), std::pair("sls/fleet_state", "x"),
-        std::pair("sls/state", "sls::VehicleState"),
-        std::pair("sls/command", "sls::ControlCommand")}) {
-    neighbours_.note_endpoint(make_peer(1), kSecond, make_endpoint(topic, type, true));
-    judge([](auto& facts) { facts.is_exclusive = true; });
-    neighbours_.note_misfit(make_peer(1), kFirst, "sls/command", "sls::Commands", "too long");
-    EXPECT_EQ(problems_.describe(), std::string(topic) +
-                                        " of 'foo' (10.0.0.2): expected contract 2, got contract 1 "
-                                        "(it was built from an older sls.idl)");
-    neighbours_.drop_participant(make_peer(1));
-    neighbours_.note_participant(make_peer(1), "foo", "10.0.0.2");
-  }
-}
-
 TEST_F(NeighboursTest, SamplesThatDoNotFitAreNamedWhereTheirWriterIsKnown) {
   neighbours_.note_misfit(make_peer(1), kFirst, "sls/command", "sls::Commands", "too long");
   EXPECT_EQ(problems_.describe(), "");

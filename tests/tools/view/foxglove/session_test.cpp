@@ -399,10 +399,14 @@ TEST_P(FoxgloveBadTextTest, IsAnsweredInWords) {
 INSTANTIATE_TEST_SUITE_P(
     Messages, FoxgloveBadTextTest,
     ::testing::Values(
-        BadText{"NoJson", "hello", "expected JSON, got 'hello'"},
+        BadText{"NoJson", "hello", "expected JSON, at most 16 keys an object, got 'hello'"},
         BadText{"Empty", "", "expected JSON"},  //
-        BadText{"Binary", "\xff\x80{}", "expected JSON, got '??{}'"},
+        BadText{"Binary", "\xff\x80{}", "got '??{}'"},
         BadText{"Nested", std::string(60'000, '['), "expected JSON"},
+        BadText{
+            "Keys",
+            R"({"a":0,"b":0,"c":0,"d":0,"e":0,"f":0,"g":0,"h":0,"i":0,"j":0,"k":0,"l":0,"m":0,"n":0,"o":0,"p":0,"q":0})",
+            "expected JSON"},
         BadText{"Array", "[]", "expected a JSON object"},
         BadText{"NoOp", "{}", "expected a JSON object with the text op"},
         BadText{"OpNumber", R"({"op":3})", "expected a JSON object with the text op"},

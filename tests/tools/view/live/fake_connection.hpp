@@ -10,6 +10,13 @@
 
 namespace sls::test {
 
+/// "k0":0,"k1":0,… for an object.
+inline std::string make_keys(int count) {
+  std::string keys;
+  for (int i = 0; i < count; ++i) keys += (i ? ",\"k" : "\"k") + std::to_string(i) + "\":0";
+  return keys;
+}
+
 class FakeConnection : public view::Connection {
  public:
   void send(view::MessageKind kind, view::Payload payload, view::Delivery delivery,

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <set>
 
 #include "tests/support/own_domain.hpp"
 #include "tests/tools/view/live/binary_message.hpp"
@@ -178,6 +179,39 @@ TEST_F(PageProtocolTest, RowsAreThoseOfTheSelectedVehicle) {
     }
 }
 
+struct Senders : Feed::Listener {
+  void note(const Sample& sample) override {
+    if (sample.topic == TopicId::kRecord) of_record.insert(sample.sender);
+  }
+  std::set<bus::PeerId> of_record;
+};
+
+TEST_F(PageProtocolTest, ABatchOfAnotherParticipantIsNotDrawn) {
+  Page page(protocol);
+  Senders senders;
+  feed.add(senders);
+  FakeServer server(domain.number(), 1);
+  ASSERT_TRUE(wait_until([&] { return page.count("run") == 1; }));
+  bus::Node other(test::kQosFile, domain.number(), "forger");
+  bus::Writer<RecordBatch> forger(other);
+  constexpr std::uint64_t kForged = 900'000;
+  std::uint64_t step = 0;
+  ASSERT_TRUE(wait_until([&] {
+    forger.write(make_batch(1, kForged, kForged));
+    server.write(make_batch(1, step, step));
+    ++step;
+    return senders.of_record.size() == 2 && page.has_binary(2);
+  }));
+  for (const std::string& message : page.connection.binary) {
+    if (find_kind(message) == 1) {
+      EXPECT_LT(test::read_poses(message).step, kForged);
+    } else {
+      EXPECT_LT(test::read_rows(message).times.back(), kForged * 0.004);
+    }
+  }
+  feed.remove(senders);
+}
+
 TEST_F(PageProtocolTest, APageThatIsBehindGetsPosesAndNoRows) {
   Page page(protocol);
   page.connection.queued = 1 << 20;
@@ -221,6 +255,23 @@ TEST_F(PageProtocolTest, ARequestReachesTheServerAndItsReplyThePage) {
                                    {"reason", "not while it lands"},
                                    {"step", 12}};
   EXPECT_EQ(page.connection.find("reply").at(0), expected);
+}
+
+TEST_F(PageProtocolTest, AStopGoesOutWhileAStepRequestIsOpen) {
+  Page page(protocol);
+  FakeServer server(domain.number(), 5);
+  server.publish(RunPhase::PHASE_PAUSED);
+  page.say(R"({"op":"control","id":1,"action":"step","steps":900000})");
+  ASSERT_TRUE(wait_until([&] { return !server.requests.is_empty(); }));
+  const auto step = server.requests.take_all().front();
+  page.say(R"({"op":"control","id":2,"action":"stop"})");
+  ASSERT_TRUE(wait_until([&] { return !server.requests.is_empty(); }));
+  server.reply(server.requests.take_all().front(), true);
+  ASSERT_TRUE(wait_until([&] { return page.count("reply") == 1; }));
+  EXPECT_EQ(page.connection.find("reply").at(0).at("action"), "stop");
+  server.reply(step, false, "stopped");
+  ASSERT_TRUE(wait_until([&] { return page.count("reply") == 2; }));
+  EXPECT_EQ(page.connection.find("reply").at(1).at("id"), 1);
 }
 
 TEST_F(PageProtocolTest, WithoutAServerARequestIsRefusedInWords) {
@@ -312,6 +363,19 @@ TEST_F(PageProtocolTest, MalformedMessagesAreAnsweredEach) {
   page.session->receive(MessageKind::kBinary, "abc");
   page.say(std::string(60'000, '['));
   EXPECT_EQ(page.count("error"), 2u);
+}
+
+TEST_F(PageProtocolTest, AnObjectHasAtMost16Keys) {
+  const auto say = [this](const std::string& keys) {
+    Page page(protocol);
+    page.say(R"({"op":"select","vehicle_id":0,)" + keys + "}");
+    return page.count("error");
+  };
+  EXPECT_EQ(say(test::make_keys(14)), 0u);
+  EXPECT_EQ(say(test::make_keys(15)), 1u);
+  EXPECT_EQ(say(R"("a":[{},{"b":{)" + test::make_keys(16) + "}}]"), 0u);
+  EXPECT_EQ(say(R"("a":[{},{"b":{)" + test::make_keys(17) + "}}]"), 1u);
+  EXPECT_EQ(say(R"("a":{)" + test::make_keys(9) + "}," + test::make_keys(13)), 0u);
 }
 
 TEST_F(PageProtocolTest, APageThatGoesOnWithMistakesIsClosed) {

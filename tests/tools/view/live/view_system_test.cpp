@@ -3,9 +3,12 @@
 #include <signal.h>
 
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <map>
 
 #include "tests/system/flight.hpp"
+#include "tests/tools/view/live/fake_server.hpp"
 #include "tests/tools/view/live/page_client.hpp"
 
 namespace sls::test {
@@ -213,6 +216,73 @@ TEST(ViewSystemTest, BadUsageIsOneLineAndExitCode2) {
   const auto first = start_viewer(domain);
   const std::string port = std::to_string(wait_for_port(*first));
   expect_refused({"--port", port}, "--port: expected a free port, got " + port);
+}
+
+/// Memory of a process in the system, in bytes.
+std::size_t find_memory(pid_t process) {
+  std::ifstream status("/proc/" + std::to_string(process) + "/status");
+  std::string word;
+  while (status >> word && word != "VmRSS:") {
+  }
+  std::size_t kilobytes = 0;
+  status >> kilobytes;
+  return kilobytes * 1024;
+}
+
+TEST(ViewSystemTest, AnOperatorGetsInBeside300ClientsThatDoNotRead) {
+  const OwnDomain domain;
+  const TemporaryFolder folder;
+  const std::string token = "0123456789abcdef";
+  write_bytes(folder / "token", token);
+  std::filesystem::permissions(folder / "token", std::filesystem::perms(0600));
+  const auto viewer = start_viewer(domain, {"--token-file", (folder / "token").string()});
+  const std::uint16_t port = wait_for_port(*viewer);
+  FakeServer server(domain.number(), 1);
+  server.publish(RunPhase::PHASE_RUNNING);
+  std::uint64_t step = 0;
+  const auto fly = [&] {
+    server.write(make_batch(1, step, step + 9));
+    step += 10;
+  };
+  {
+    const PageClient page(port);
+    ASSERT_TRUE(wait_until([&] { return fly(), page.poses().has_value(); })) << viewer->output();
+  }
+  const std::size_t idle = find_memory(viewer->id());
+
+  std::string subscribe = R"({"op":"subscribe","subscriptions":[)";
+  std::vector<RawClient> hostile;
+  for (int i = 0; i < 300; ++i) {
+    if (i % 3 == 0) {
+      hostile.emplace_back(port);
+    } else if (i % 3 == 1) {
+      hostile.push_back(open_websocket(port, "sls.view.1"));
+    } else {
+      hostile.push_back(open_websocket(port, "foxglove.websocket.v1"));
+      std::string list;
+      for (int channel = 1; channel <= 17; ++channel)
+        list += (list.empty() ? "" : ",") +
+                nlohmann::json{{"id", 100 * i + channel}, {"channelId", channel}}.dump();
+      hostile.back().send(to_bytes({kText, subscribe + list + "]}"}));
+      hostile.back().send(to_bytes({kText, std::string(60'000, ' '), false}));  // the first half
+    }
+  }
+  std::size_t most = 0;
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+  ASSERT_TRUE(wait_until([&] {
+    fly();
+    most = std::max(most, find_memory(viewer->id()));
+    return std::chrono::steady_clock::now() > end;
+  }));
+  EXPECT_LE(most - idle, std::size_t{64} << 20);
+  RecordProperty("megabytes", std::to_string((most - idle) >> 20));
+
+  PageClient page(port);
+  page.say({{"op", "authenticate"}, {"token", token}});
+  EXPECT_TRUE(wait_until([&] {
+    const auto hello = page.last("hello");
+    return fly(), !hello.is_null() && hello.at("may_operate") == true && page.poses().has_value();
+  }));
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 
 #include "fastdds_files.hpp"
 #include "tests/system/flight.hpp"
+#include "tests/tools/view/live/fake_server.hpp"
 
 namespace sls::test {
 namespace {
@@ -269,6 +270,27 @@ TEST_F(RosReadersTest, EveryTopicOfAFlightOfTwoHasTheNumbersThatWereRecorded) {
   EXPECT_EQ(fixed[0].at("child"), "world_z_down");
   expect_near(fixed[0].at("p"), Vector3d::Zero());
   expect_same_rotation(fixed[0].at("q"), Quaterniond(0, 1, 0, 0));
+}
+
+TEST_F(RosReadersTest, ABatchOfAnotherParticipantIsNotPublished) {
+  start_watching({"0"});
+  FakeServer server(domain_.number(), 7);
+  server.publish(RunPhase::PHASE_RUNNING);
+  bus::Node other(kQosFile, domain_.number(), "forger");
+  bus::Writer<RecordBatch> forger(other);
+  ASSERT_TRUE(wait_until([&] { return !forger.matched().empty(); })) << "read by the viewer";
+  constexpr std::uint64_t kForged = 900'000;
+  const auto find_poses = [this] { return find_lines("topic", "rt/sls/vehicle_0/load/pose"); };
+  std::uint64_t step = 0;
+  ASSERT_TRUE(wait_until([&] {
+    forger.write(make_batch(7, kForged + step, kForged + step));
+    server.write(make_batch(7, step, step));
+    ++step;
+    return find_poses().size() >= 20;
+  })) << outputs();
+  for (const json& message : find_poses())
+    EXPECT_LT(message.at("time_ns").get<double>(), kForged * kPeriodNs);
+  stop_watching();
 }
 
 TEST_F(RosReadersTest, ReferencesAreThoseOfTheController) {

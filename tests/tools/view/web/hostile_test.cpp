@@ -150,6 +150,34 @@ TEST_F(StalledReaderTest, IsClosedWhereAMessageMustArriveAndTheQueueIsFull) {
   EXPECT_EQ(clients_[1].read_frame().payload, "hello");
 }
 
+TEST_F(StalledReaderTest, ManyTogetherHaveABoundThatAReaderDoesNotFeel) {
+  constexpr std::size_t kClients = 60;
+  const std::size_t most = make_options().limits.all_queues_bytes;
+  open_clients();
+  while (clients_.size() < kClients)
+    clients_.push_back(test::open_websocket(server_.port(), "listed"));
+  ASSERT_TRUE(test::wait_until(
+      [&] { return server_.ask([&] { return connections_.size() == kClients; }); }));
+  Connection* const reader = server_.ask([&] { return connections_[1]; });
+  for (int i = 0; i < 1'000; ++i) {
+    const std::size_t waiting = server_.ask([&] {
+      for (Connection* connection : connections_)
+        if (connection != reader)
+          connection->send(MessageKind::kBinary, test::make_payload(std::string(50'000, 'x')),
+                           i < 500 ? Delivery::kDroppable : Delivery::kAlways);
+      std::size_t sum = 0;
+      for (const Connection* connection : connections_) sum += connection->queued_bytes();
+      return sum;
+    });
+    ASSERT_LE(waiting, most + kClients * (kMostGathered + 50'000));
+  }
+  server_.ask([&] {
+    reader->send(MessageKind::kText, test::make_payload("hello"), Delivery::kAlways);
+    return 0;
+  });
+  EXPECT_EQ(clients_[1].read_frame().payload, "hello");
+}
+
 TEST_F(StalledReaderTest, DoesNotHoldUpStop) {
   open_clients();
   server_.ask([&] {

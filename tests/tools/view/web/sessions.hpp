@@ -71,10 +71,10 @@ inline view::Protocol make_listed(Listed::List& list) {
 
 /// The page, a file, and the protocols `echo.2` and `echo.1`.
 inline void add_echo_and_page(view::Server& server) {
-  server.add_resource(
-      "/", {"text/html; charset=utf-8", "gzip", make_payload("the page"), "default-src 'none'"});
-  server.add_resource("/recording/0", {"application/octet-stream", "",
-                                       make_payload(std::string(3'000'000, 'r')), ""});
+  server.add_resource("/", {"text/html; charset=utf-8", make_payload("the page"),
+                            make_payload("zipped"), "default-src 'none'"});
+  server.add_resource("/recording/0", {"application/octet-stream",
+                                       make_payload(std::string(3'000'000, 'r')), nullptr, ""});
   server.add_protocol(make_echo({"echo.2", "echo.1"}));
   server.add_protocol(make_echo({"other"}));
 }

@@ -1,0 +1,76 @@
+"""Makes the wheel of the package `sls`, with its extension module and the shipped scenarios and
+campaigns: for pip (PEP 517), and as `pip_backend.py DIR` for the Debian package."""
+
+import base64
+import hashlib
+import os
+import re
+import subprocess
+import sys
+import sysconfig
+import zipfile
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent
+DATE = (1980, 1, 1, 0, 0, 0)  # equal sources make equal wheels
+
+
+def find_module() -> Path:
+    """The extension module for this Python. Builds it, unless SLS_BUILD names a build tree that has it."""
+    name = f"_sls_core{sysconfig.get_config_var('EXT_SUFFIX')}"
+    given = Path(os.environ.get("SLS_BUILD", "none"), "python", name)
+    if given.is_file():
+        return given
+    python = getattr(sys, "_base_executable", sys.executable)
+    build = ROOT / ("build" if (ROOT / "build/python" / name).is_file() else f"build-{sys.implementation.cache_tag}")
+    commands = [["cmake", "--build", build, "--target", "_sls_core"]]
+    if not (build / "CMakeCache.txt").is_file():
+        commands.insert(0, ["cmake", "--preset", "release", "-B", build, "-DSLS_BUILD_TESTS=OFF",
+                            f"-DPython_EXECUTABLE={python}"])
+    try:
+        for command in commands:
+            subprocess.run(command, cwd=ROOT, check=True, stdout=sys.stderr)
+    except (OSError, subprocess.CalledProcessError) as error:
+        sys.exit(f"sls: error: the module _sls_core was not built (./sls setup installs what it needs): {error}")
+    return build / "python" / name
+
+
+def list_files() -> "list[tuple[str, Path]]":
+    """The files of the wheel, with their paths in it."""
+    files = [(file.relative_to(HERE).as_posix(), file) for file in (HERE / "sls").rglob("*")
+             if file.is_file() and "__pycache__" not in file.parts]
+    for folder in ("scenarios", "campaigns"):
+        files += [(f"sls/{file.relative_to(ROOT).as_posix()}", file)
+                  for file in (ROOT / "config" / folder).rglob("*.yaml")]
+    return sorted(files)
+
+
+def build_wheel(wheel_directory: str, config_settings: object = None, metadata_directory: object = None) -> str:
+    """Writes the wheel into `wheel_directory` and returns its name."""
+    found = re.search(r"project\(sls VERSION (\S+)", (ROOT / "CMakeLists.txt").read_text(encoding="utf-8"))
+    assert found, "expected the version in CMakeLists.txt"
+    version, info = found[1], f"sls-{found[1]}.dist-info"
+    python = f"cp{sys.version_info.major}{sys.version_info.minor}"
+    tag = f"{python}-{python}-{re.sub('[-.]', '_', sysconfig.get_platform())}"
+    module = find_module()
+    entries = [(name, file.read_bytes()) for name, file in [*list_files(), (module.name, module)]]
+    entries += [
+        (f"{info}/METADATA", f"Metadata-Version: 2.1\nName: sls\nVersion: {version}\n"
+         f"Summary: Flights of a multirotor with a slung load\nRequires-Python: ~=3.{sys.version_info.minor}.0\n"
+         "Requires-Dist: numpy\nRequires-Dist: PyYAML\nProvides-Extra: figures\n"
+         "Requires-Dist: scipy; extra == 'figures'\nRequires-Dist: matplotlib; extra == 'figures'\n".encode()),
+        (f"{info}/WHEEL", f"Wheel-Version: 1.0\nGenerator: sls\nRoot-Is-Purelib: false\nTag: {tag}\n".encode())]
+    name = f"sls-{version}-{tag}.whl"
+    record = ""
+    with zipfile.ZipFile(Path(wheel_directory, name), "w", zipfile.ZIP_DEFLATED) as wheel:
+        for path, data in entries:
+            digest = base64.urlsafe_b64encode(hashlib.sha256(data).digest()).rstrip(b"=").decode()
+            record += f"{path},sha256={digest},{len(data)}\n"
+            wheel.writestr(zipfile.ZipInfo(path, DATE), data, zipfile.ZIP_DEFLATED)
+        wheel.writestr(zipfile.ZipInfo(f"{info}/RECORD", DATE), record + f"{info}/RECORD,,\n")
+    return name
+
+
+if __name__ == "__main__":
+    build_wheel(sys.argv[1])
