@@ -11,8 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from sls import px4_study
-from sls.figures import (STYLE, add_legend, colour_of, draw, make_stack, plot_path,
-                              plot_positions, save, set_log_scale)
+from sls.figures import STYLE, draw, lay_out, make_stack, plot_path, plot_positions, save, set_log_scale, style_of
 from sls.trajectory import Trajectory
 from sls.input_error import InputError
 from sls.metrics import StageMetrics, calc_over, calc_stage_metrics, split_laps
@@ -103,9 +102,8 @@ def plot_error_sizes(flights: Sequence[Trajectory], title: str) -> Figure:
         sizes = [np.abs(flight.calc_error()[:, axis]) for flight in flights]
         for index, (flight, size) in enumerate(zip(flights, sizes)):
             draw(axes[axis, 0], flight.time_s, np.where(size > 0, size, np.nan),
-                 color=colour_of(index), label=flight.name)
+                 **style_of(index, flights), label=flight.name)
         set_log_scale(axes[axis, 0], sizes)
-    add_legend(axes[0, 0], columns=3)
     return figure
 
 
@@ -114,10 +112,9 @@ def plot_height_error(flights: Sequence[Trajectory]) -> Figure:
                               height=2.4)
     for index, flight in enumerate(flights):
         draw(axes[0, 0], flight.time_s, -1000.0 * flight.calc_error()[:, 2],
-             color=colour_of(index), label=flight.name)
+             **style_of(index, flights), label=flight.name)
     axes[0, 0].axhline(0.0, color="#222222", linewidth=0.8)
     axes[0, 0].set_ylim(-8, 32)
-    add_legend(axes[0, 0])
     return figure
 
 
@@ -131,10 +128,9 @@ def plot_set_points(flights: Sequence[Trajectory]) -> Figure:
             if abs(way[axis]) > 0.0:
                 draw(axes[axis, 0], flight.time_s,
                      (flight.p_WL[:, axis] - flight.p_WL[0, axis]) / way[axis],
-                     color=colour_of(index), label=flight.name, linewidth=4.0 - 1.5 * index)
+                     **style_of(index, flights), label=flight.name, linewidth=4.0 - 1.5 * index)
     for axis in range(3):
         axes[axis, 0].axhspan(0.98, 1.02, color="#222222", alpha=0.12, linewidth=0)
-    add_legend(axes[0, 0])  # every leg steps along x
     return figure
 
 
@@ -285,6 +281,7 @@ def write_study(recordings: Path, out: Path, published: Path | None) -> Path:
         figures = {**draw_pictures(flights),
                    **px4_study.draw_pictures(flown, [float(cell) for cell in PUBLISHED_PX4])}
         for name, figure in figures.items():
+            lay_out(figure)
             save(figure, out / "study" / f"{name}.png", DPI)
     (out / "study.md").write_text(page)
     return out / "study.md"

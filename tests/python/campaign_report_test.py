@@ -174,7 +174,7 @@ class ReportTest(CampaignTest):
         reader = Reader(page)
         words = " ".join(reader.words)
         for part in ("synthetic", f"{table.count('lost')} lost", "4 failed", "400 runs", "Wilson",
-                     "Share lost along each varied key", "median of load_error_rms_m",
+                     "Share lost along each varied key", "Median of the finished runs", "load_error_rms_m (m)",
                      "controller: qsf against pid", "McNemar", "All together", "Worst runs",
                      "./sls campaign config/campaigns/synthetic.yaml --runs 99-99 --out "
                      "/tmp/run-99", "x86-64-v3", "load_x_m is not finite", "base: eight.yaml"):
