@@ -1,5 +1,6 @@
 """Command lines, figures and reports, from recordings written here; the report in a browser."""
 
+import base64
 import os
 import re
 import subprocess
@@ -282,6 +283,21 @@ class ReportTest(support.FolderTest):
         self.assertGreater(picture.stat().st_size, 20000)
 
     @unittest.skipUnless(browser.PROGRAM, browser.MISSING)
+    def test_in_the_dark_page_and_figures_are_dark_and_long_names_fit_700_pixels(self):
+        write_recording(self.folder / "r")
+        for name in ("manifest.json", "scenario.yaml", "reference.csv"):
+            path = self.folder / "r" / name
+            path.write_text(path.read_text().replace("synthetic", f"s{LONG}").replace(",set_point,", f",s{LONG},"))
+        self.assertEqual(self.run_sls("report", "r")[0], 0)
+        page = self.folder / "r/report.html"
+        document, _ = browser.render(page, browser.DARK, browser.NARROW)
+        self.assertIn('data-ground="rgb(14, 18, 22)"', document)
+        self.assertIn('data-overflow="0"', document)
+        self.assertIn('data-ground="rgb(244, 245, 247)"', browser.render(page)[0])
+        for picture in re.findall(r'src="data:image/svg\+xml;base64,([^"]*)"', page.read_text()):
+            self.assertIn(b"prefers-color-scheme: dark", base64.b64decode(picture))
+
+    @unittest.skipUnless(browser.PROGRAM, browser.MISSING)
     def test_the_browser_would_tell_what_is_wrong(self):
         page = self.write("bad.html", '<body><div style="width: 3000px">x</div>'
                                       '<img src="data:image/png;base64,AAAA">'
@@ -320,6 +336,17 @@ class SceneTest(support.FolderTest):
         page, output = self.make_report("r", program)
         self.assertEqual(output.count("\n"), 2, output)
         self.assertIn(NO_SCENE, output)
+
+    @unittest.skipUnless(browser.PROGRAM, browser.MISSING)
+    def test_the_scene_is_not_printed(self):
+        write_recording(self.folder / "r", last=0)
+        program = self.write("scene", '#!/bin/sh\necho "<p>scene" > "$3"\n')
+        program.chmod(0o755)
+        page, _ = self.make_report("r", program)
+        self.assertIn("<iframe", page.read_text())
+        with_scene = browser.count_printed_pages(page)
+        page.write_text(re.sub("<iframe.*</iframe>", "", page.read_text(), flags=re.DOTALL))
+        self.assertEqual(with_scene, browser.count_printed_pages(page))
 
     def test_a_program_that_writes_too_much_leaves_a_report_without_scene(self):
         write_recording(self.folder / "r", last=50)
