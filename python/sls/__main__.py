@@ -60,7 +60,8 @@ def plot(options: argparse.Namespace) -> None:
             out = options.out or source / "figures"
     figures = make_figures(flights, fleet, options.paper, dict(options.panels) if options.panels else None)
     if not figures:
-        raise InputError(f"{options.source[0]}: expected a flight of two states or more, got one that ended at its first")
+        raise InputError(f"{options.source[0]}: expected a flight of two states or more, got one that ended "
+                         "at its first")
     make_folder(out)
     for name, figure in figures.items():
         for kind in ("pdf",) if options.paper else ("png", "pdf"):
@@ -99,7 +100,7 @@ def report(options: argparse.Namespace) -> None:
 def run_study(options: argparse.Namespace) -> None:
     make_folder(options.out)
     if not options.reuse:
-        study.fly_all(options.recordings, options.domain, say)
+        study.fly_all(options.recordings, say)
     page = study.write_study(options.recordings, options.out, options.published)
     say(f"study: {page}")
 
@@ -151,8 +152,6 @@ def make_parser() -> argparse.ArgumentParser:
                           help="use existing complete recordings instead of flying")
     studying.add_argument("--published", type=Path, metavar="DIR",
                           help="folder of the published matlab_setpoint1.csv, to compare with")
-    studying.add_argument("--domain", type=int, default=0, metavar="N",
-                          help="DDS domain, 0 to 232 (default: 0)")
     studying.set_defaults(run=run_study)
     return parser
 

@@ -1,5 +1,5 @@
-"""The study's chapter on the published PX4 flight: its flights, pictures, tables and numbers. Each
-flight is flown in one process (`./sls run --in-process`)."""
+"""The study's chapter on the published PX4 flight: its flights, pictures, tables and numbers. All flights of the study
+are flown here, each in one process (`./sls run --in-process`)."""
 
 import copy
 import math
@@ -33,11 +33,12 @@ Change = Callable[[dict[str, Any]], None]
 
 @dataclass(frozen=True)
 class Planned:
-    """A flight of the shipped scenario `base`, with `changes`."""
+    """A flight of the shipped scenario `base`, with `changes` and, if given, another control period."""
 
     name: str
     base: str
     changes: tuple[Change, ...] = ()
+    period_s: float | None = None
 
 
 # --- changes of scenarios -------------------------------------------------------------------------
@@ -199,12 +200,13 @@ def run_launcher(planned: Planned, arguments: Sequence[str]) -> str:
     return done.stdout
 
 
-def fly_all(recordings: Path, say: Callable[[str], None]) -> None:
-    """Flies everything, on all processors. The programs must be built already: `./sls study` builds
+def fly_all(flights: Sequence[Planned], recordings: Path, say: Callable[[str], None]) -> None:
+    """Flies `flights` and searches the margins, on all processors. The programs must be built: `./sls study` builds
     them and sets SLS_BUILD. Raises RunFailed."""
     def fly(planned: Planned) -> None:
         say(f"study: flying {planned.name} in process")
-        run_launcher(planned, ["run", str(find_scenario(planned, recordings)), "--in-process",
+        period = ["--period-s", str(planned.period_s)] if planned.period_s else []
+        run_launcher(planned, ["run", str(find_scenario(planned, recordings)), "--in-process", *period,
                                "--out", str(recordings / planned.name), "--force"])
 
     def find_margin(planned: Planned) -> None:
@@ -216,7 +218,7 @@ def fly_all(recordings: Path, say: Callable[[str], None]) -> None:
     (recordings / "scenarios").mkdir(parents=True, exist_ok=True)
     with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
         jobs = [*(pool.submit(find_margin, planned) for _, _, _, planned in MARGINS),
-                *(pool.submit(fly, planned) for planned in FLIGHTS)]
+                *(pool.submit(fly, planned) for planned in flights)]
         for job in jobs:
             job.result()
 
@@ -229,13 +231,16 @@ class Flown:
     seen: Trajectory
 
 
-def load_flights(recordings: Path) -> dict[str, Flown]:
+def load_flights(flights: Sequence[Planned], recordings: Path) -> dict[str, Flown]:
     flown = {}
-    for planned in FLIGHTS:
+    for planned in flights:
         recording = Recording(recordings / planned.name)
         if not recording.manifest["complete"]:
             raise InputError(f"{recording.folder}: expected a complete recording, got one that "
                              f"ends '{recording.manifest['outcome']}'")
+        if recording.manifest["period_s"] != (planned.period_s or recording.manifest["period_s"]):
+            raise InputError(f"{recording.folder}: expected a period of {planned.period_s} s, "
+                             f"got {recording.manifest['period_s']} s")
         flown[planned.name] = Flown(recording.load_flight(0, planned.name),
                                     recording.load_seen(0, planned.name))
     return flown
@@ -351,7 +356,8 @@ def cut_eight(flight: Trajectory, name: str) -> Trajectory:
 
 def plot_plan(flights: Sequence[Trajectory]) -> Figure:
     """The paths of the loads from above, one picture for each lap."""
-    figure = Figure(figsize=(WIDTH_IN, 4.7), layout="constrained", label="The load from above, as the controller saw it")
+    figure = Figure(figsize=(WIDTH_IN, 4.7), layout="constrained", 
+                    label="The load from above, as the controller saw it")
     laps = figure.subplots(1, 2, sharex=True, sharey=True)
     lap_s = find_eight("px4_fitted")["period_s"]
     for number, axes in enumerate(laps, 1):
@@ -502,7 +508,6 @@ def make_values(flown: dict[str, Flown], recordings: Path,
     tilt = np.degrees(np.arccos(-force[:, 2] / np.linalg.norm(force, axis=1)))
     rises = [measure_step(flown[planned.name].true, angle).rise_s for _, angle, planned in STEPS]
     values = {
-        "px4_count": str(len(FLIGHTS)),
         "px4_seen_table": make_ingredient_table(flown, published, lambda one: one.seen),
         "px4_true_table": make_ingredient_table(flown, published, lambda one: one.true),
         "px4_rms_gap": f"{1000.0 * max(gaps[:3]):.0f}",

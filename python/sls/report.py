@@ -21,9 +21,9 @@ CAPTIONS = {
              "reference.",
     "positions": "Load and quadrotor over time, and where the load should be. The axis of z points "
                  "down, as z does; dotted lines: a stage begins.",
-    "errors": "Load position minus reference: as it is, and its size on a logarithmic axis.",
-    "path": "The same flight in space, height up, one metre as long on each axis. The dot is where "
-            "the load starts.",
+    "errors": "Load position minus reference: as it is, and its size, on a logarithmic axis unless it is always 0.",
+    "path": "The same flight in space, one metre as long on each axis; y and z are turned (left, up), so that up is "
+            "up. The dot is where the load starts.",
     "angles": "Angles of the rod; both are 0 where the load hangs straight down.",
     "forces": "The force that the controller answers.",
     "attitude": "The attitude that realises this force, with yaw 0.",
@@ -104,7 +104,7 @@ summary { cursor: pointer; font-weight: 600; font-size: 17px; }
   figure img { max-height: 112mm; object-fit: contain; }
 }
 """
-# What a figure's background, text and lines are in the dark; the bodies keep their colours.
+# Colours of a figure's background, text and lines, and those on a dark page; the bodies keep their colours.
 DARK = {"#ffffff": "#151b21", "#f7f7f7": "#1e262e", "#000000": "#e6ebf0", "#444444": "#c3ced8", "#666666": "#97a4b1",
         "#999999": "#97a4b1", "#dddddd": "#2a343e", "#b0b0b0": "#2a343e"}
 

@@ -202,12 +202,12 @@ class ReportTest(CampaignTest):
         self.assertNotIn("Wilson", page)
 
     def test_axes_have_names_units_and_round_ticks(self):
-        rows = [[run, repr(0.0007 * run), str(run % 20), LAWS[0], "finished" if run % 7 else "lost", "", repr(0.013 * run),
-                 "1", "1", "", 1, ""] for run in range(300)]
+        rows = [[run, repr(0.0007 * run), str(run % 20), LAWS[0], "finished" if run % 7 else "lost", "",
+                 repr(0.013 * run), "1", "1", "", 1, ""] for run in range(300)]
         words = Reader(make_campaign_report(self.write_campaign(
             rows=rows, manifest={"campaign": "c", "file": "f", "runs_csv_sha256": "abc"}))).words
-        for label in ("vehicle.load_mass_kg (kg)", "faults.0.delay.by_s (s)", "load_error_rms_m (m)", "share lost or failed",
-                      "runs", "runs up to here", "runs_csv_sha256"):
+        for label in ("vehicle.load_mass_kg (kg)", "faults.0.delay.by_s (s)", "load_error_rms_m (m)",
+                      "share lost or failed", "runs", "runs up to here", "runs_csv_sha256"):
             self.assertIn(label, words)
         self.assertEqual(words[words.index("share lost or failed") + 1:][:6], [f"{n} %" for n in range(0, 101, 20)])
         first = words.index("vehicle.load_mass_kg (kg)")

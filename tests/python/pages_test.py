@@ -70,8 +70,8 @@ class PlotTest(support.FolderTest):
     def test_a_flight_of_one_state_has_no_figures_and_no_axes(self):
         write_recording(self.folder / "r", last=0, complete=False, rotors=4)
         code, output = self.run_sls("plot", "r")
-        self.assertEqual((code, output.splitlines()[-1]), (2, "sls: error: r: expected a flight of two states or more, got "
-                                                              "one that ended at its first"))
+        self.assertEqual(code, 2)
+        self.assertIn("sls: error: r: expected a flight of two states or more, got one that ended at its first", output)
         self.assertFalse((self.folder / "r/figures").exists())
         self.assertEqual(self.run_sls("report", "r")[0], 0)
         page = (self.folder / "r/report.html").read_text()
@@ -130,7 +130,7 @@ class PlotTest(support.FolderTest):
         self.assertEqual(([axes.get_xlabel() for axes in figure.axes], figure.texts), (["", "time (s)"], []))
         self.expect_refused(["plot", "r", "--panels", "errors:7"], "--panels: expected panels of 1 to 6 of", "got 7")
         self.expect_refused(["plot", "r", "--panels", "rotors"], "some of positions, errors, ", "got 'rotors'")
-        self.expect_refused(["plot", "r", "--panels", "errors:x"], "--panels: expected NAME or NAME:N,…, got 'errors:x'")
+        self.expect_refused(["plot", "r", "--panels", "errors:x"], "expected NAME or NAME:N,…, got 'errors:x'")
         self.expect_refused(["plot", "r", "--paper", "9"], "--paper: expected 0.5 to 4 columns, got '9'")
 
     def test_an_error_that_is_always_0_has_no_logarithmic_axis(self):
@@ -144,7 +144,8 @@ class PlotTest(support.FolderTest):
         write_recording(self.folder / "r", last=50)
         flight = Recording(self.folder / "r").load_flight(0, "r")
         for paper in (None, 1.0):
-            figure = figures.make_figures([replace(flight, name=f"{n}{LONG}") for n in range(5)], (), paper)["errors"]
+            flights = [replace(flight, name=f"{number}{LONG}") for number in range(5)]
+            figure = figures.make_figures(flights, (), paper)["errors"]
             FigureCanvasAgg(figure).draw()
             legend, page = figure.legends[0].get_window_extent(), figure.bbox
             self.assertLessEqual(legend.x1, page.x1)

@@ -1,7 +1,7 @@
 """Small pictures as SVG text. The page must stay small, and be equal for equal numbers.
 
 A picture has a size in pixels and, as always in SVG, a y axis that points down. `Scale` converts
-values to pixels. Coordinates are written to a tenth of a pixel. Colours in var() are those of the page's style sheet."""
+values to pixels. Coordinates are written to a tenth of a pixel. Colours in var() are from the page's style sheet."""
 
 import html
 import math
@@ -15,7 +15,7 @@ OUTCOME_COLOURS = {"finished": "#0072b2", "lost": "#d55e00", "failed": "#7f7f7f"
 HEAT = np.array([[68, 1, 84], [71, 44, 122], [59, 81, 139], [44, 113, 142], [33, 144, 141],
                  [39, 173, 129], [92, 200, 99], [170, 220, 50], [253, 231, 37]], dtype=float)
 MISSING_COLOUR, UNFINISHED_COLOUR = "var(--missing)", "var(--axis)"
-UNITS = {"_m": "m", "_s": "s", "_n": "N", "_rad": "rad", "_kg": "kg", "_w": "W", "_hz": "Hz", "_nm": "N m", "_m_s": "m/s",
+UNITS = {"_m": "m", "_s": "s", "_n": "N", "_rad": "rad", "_kg": "kg", "_w": "W", "_hz": "Hz", "_m_s": "m/s",
          "_rad_s": "rad/s", "_m_s2": "m/s²"}
 
 
@@ -202,8 +202,8 @@ def draw_distribution(values: np.ndarray, label: str) -> str:
 
 def list_class_ticks(names: Sequence[str], scale: Scale | None, first: float, last: float,
                      letter: float = 0.0) -> list[tuple[float, str]]:
-    """Place and text of the ticks of classes between the pixels `first` and `last`: round values of the `scale` that the
-    classes divide, or else their names: a few shortened, of more as many as fit. `letter`: width of a letter along the
+    """Place and text of the ticks of classes between the pixels `first` and `last`: round values of the `scale` that
+    the classes divide, or else their names: a few shortened, of more as many as fit. `letter`: width of a letter along the
     axis; 0: names stand across the axis."""
     if scale is not None:
         scale = replace(scale, first=first, last=last)
