@@ -101,7 +101,7 @@ def run_study(options: argparse.Namespace) -> None:
     make_folder(options.out)
     if not options.reuse:
         study.fly_all(options.recordings, say)
-    page = study.write_study(options.recordings, options.out, options.published)
+    page = study.write_study(options.recordings, options.out)
     say(f"study: {page}")
 
 
@@ -150,8 +150,6 @@ def make_parser() -> argparse.ArgumentParser:
                           metavar="DIR", help="folder for the recordings (default: recordings/study)")
     studying.add_argument("--reuse", action="store_true",
                           help="use existing complete recordings instead of flying")
-    studying.add_argument("--published", type=Path, metavar="DIR",
-                          help="folder of the published matlab_setpoint1.csv, to compare with")
     studying.set_defaults(run=run_study)
     return parser
 

@@ -13,7 +13,6 @@ from sls import px4_study
 from sls.figures import STYLE, draw, lay_out, make_stack, plot_path, plot_positions, save, set_log_scale, style_of
 from sls.trajectory import Trajectory
 from sls.metrics import StageMetrics, calc_stage_metrics, split_laps
-from sls.published_logs import load_log
 from sls.px4_study import Planned, RunFailed, measure
 from sls.tables import (format_error, list_error_cells, list_step_cells, make_markdown_table)
 
@@ -185,29 +184,10 @@ def describe_gain(flights: dict[str, Trajectory], worse: str, better: str, axes:
     return f"{', '.join(most)} and {last}"
 
 
-def calc_distance(flight: Trajectory, published: Trajectory) -> float:
-    """Largest distance along an axis between the flights, for quadrotor and load, at the published
-    instants, m."""
-    step = np.searchsorted(flight.time_s, published.time_s - 1e-6)
-    return float(max(np.max(np.abs(flight.p_WQ[step] - published.p_WQ)),
-                     np.max(np.abs(flight.p_WL[step] - published.p_WL))))
-
-
-def make_published_note(flights: dict[str, Trajectory], published: Path | None) -> str:
-    if published is None:
-        return ("`./sls study --published DIR` adds how far `matlab_setpoint_1` is from the "
-                "published run, if you have its file.")
-    distance = calc_distance(flights["matlab_setpoint_1"],
-                             load_log(published / "matlab_setpoint1.csv", "published"))
-    return (f"`matlab_setpoint_1` is at most {distance:.2e} m from the published MATLAB run, "
-            "quadrotor and load, at each of its instants.")
-
-
 PUBLISHED_PX4 = PUBLISHED_LAP_2[-1][1:]
 
 
-def make_page(flights: dict[str, Trajectory], px4_values: dict[str, str],
-              published: Path | None) -> str:
+def make_page(flights: dict[str, Trajectory], px4_values: dict[str, str]) -> str:
     """study_page.md, with the numbers and tables filled in."""
     def describe_height(name: str, digits: int) -> str:
         metrics = calc_stage_metrics(flights[name])[0]
@@ -223,7 +203,6 @@ def make_page(flights: dict[str, Trajectory], px4_values: dict[str, str],
         corrected=describe_gain(flights, "gazebo_legacy", "gazebo_corrected", "xy", 0),
         rod_error=format_error(rod_error),
         set_point_table=make_step_table([*legs, flights["setpoints"]]),
-        published_note=make_published_note(flights, published),
         with_integral=describe_height("integral_mass_error", 2),
         without_integral=describe_height("mass_error_without_integral", 1),
         integral_table=make_step_table([flights["integral_mass_error"],
@@ -232,11 +211,11 @@ def make_page(flights: dict[str, Trajectory], px4_values: dict[str, str],
         drag_table=make_drag_table(flights), **px4_values)
 
 
-def write_study(recordings: Path, out: Path, published: Path | None) -> Path:
+def write_study(recordings: Path, out: Path) -> Path:
     """Writes `out`/study.md and `out`/study/*.png from the flights in `recordings`."""
     flights = {name: flown.true for name, flown in px4_study.load_flights(FLIGHTS, recordings).items()}
     flown = px4_study.load_flights(px4_study.FLIGHTS, recordings)
-    page = make_page(flights, px4_study.make_values(flown, recordings, PUBLISHED_PX4), published)
+    page = make_page(flights, px4_study.make_values(flown, recordings, PUBLISHED_PX4))
     (out / "study").mkdir(exist_ok=True)
     with matplotlib.rc_context(STYLE):
         figures = {**draw_pictures(flights),
