@@ -3,6 +3,7 @@ campaign/cli.py."""
 
 import argparse
 import os
+import re
 import signal
 import sys
 from collections.abc import Sequence
@@ -13,7 +14,7 @@ if __name__ == "__main__":  # before the imports, which take most of the time
     signal.signal(signal.SIGINT, lambda *_: (os.write(2, b"sls: interrupted\n"), os._exit(130)))
 
 from sls import study
-from sls.figures import make_figures, save
+from sls.figures import PAPER, STYLE, make_figures, save
 from sls.trajectory import Trajectory
 from sls.input_error import InputError
 from sls.published_logs import FORMATS, load_log
@@ -62,15 +63,33 @@ def plot(options: argparse.Namespace) -> None:
         if len(names) == 1:
             fleet = recording.load_fleet()
             out = options.out or source / "figures"
+    figures = make_figures(flights, fleet, options.paper, dict(options.panels) if options.panels else None)
+    if not figures:
+        raise InputError(f"{options.source[0]}: expected a flight of two states or more, got one that ended "
+                         "at its first")
     make_folder(out)
-    for name, figure in make_figures(flights, fleet).items():
-        for kind in ("png", "pdf"):
+    for name, figure in figures.items():
+        for kind in ("pdf",) if options.paper else ("png", "pdf"):
             file = out / f"{name}.{kind}"
             try:
-                save(figure, file)
+                save(figure, file, style=PAPER if options.paper else STYLE)
             except OSError as error:
                 raise InputError(f"{file}: expected to write it, got: {error.strerror}") from None
     say(f"figures: {out}")
+
+
+def read_panels(text: str) -> tuple[str, list[int]]:
+    """The figure and the panels of `errors:1,3`; of `errors` no panels, which means all."""
+    name, _, numbers = text.partition(":")
+    if not re.fullmatch(r"\w+(:\d+(,\d+)*)?", text, re.ASCII):
+        raise argparse.ArgumentTypeError(f"expected NAME or NAME:N,…, got '{text}'")
+    return name, [int(number) for number in numbers.split(",") if number]
+
+
+def read_paper(text: str) -> float:
+    if not re.fullmatch(r"[1-4](\.\d+)?|0\.[5-9]\d*", text) or float(text) > 4:
+        raise argparse.ArgumentTypeError(f"expected 0.5 to 4 columns, got '{text}'")
+    return float(text)
 
 
 def report(options: argparse.Namespace) -> None:
@@ -86,8 +105,8 @@ def report(options: argparse.Namespace) -> None:
 def run_study(options: argparse.Namespace) -> None:
     make_folder(options.out)
     if not options.reuse:
-        study.fly_all(options.recordings, options.domain, say)
-    page = study.write_study(options.recordings, options.out, options.published)
+        study.fly_all(options.recordings, say)
+    page = study.write_study(options.recordings, options.out)
     say(f"study: {page}")
 
 
@@ -115,6 +134,11 @@ def make_parser() -> argparse.ArgumentParser:
     plotting.add_argument("--rod-length-m", type=float, metavar="L",
                           help="rod length for published logs without the load's position "
                                "(default: gazebo 1.1, px4 1)")
+    plotting.add_argument("--panels", nargs="+", type=read_panels, metavar="NAME[:N,…]",
+                          help="figures to draw, such as positions errors:2,4,6, with the panels of these numbers, row "
+                               "by row from 1 (default: all)")
+    plotting.add_argument("--paper", type=read_paper, metavar="COLUMNS",
+                          help="figures for papers: PDF only, no title, as wide as 0.5 to 4 columns of 3.5 in")
     plotting.set_defaults(run=plot)
 
     reporting = commands.add_parser("report", description="Writes DIR/report.html, one self-contained page: parameters, metrics "
@@ -131,10 +155,6 @@ def make_parser() -> argparse.ArgumentParser:
                           metavar="DIR", help="folder for the recordings (default: recordings/study)")
     studying.add_argument("--reuse", action="store_true",
                           help="use existing complete recordings instead of flying")
-    studying.add_argument("--published", type=Path, metavar="DIR",
-                          help="folder of the published matlab_setpoint1.csv, to compare with")
-    studying.add_argument("--domain", type=int, default=0, metavar="N",
-                          help="DDS domain, 0 to 232 (default: 0)")
     studying.set_defaults(run=run_study)
     return parser
 

@@ -1,9 +1,13 @@
-"""The figures of flights. Each `plot_…` function draws one figure and returns it; `save` writes it.
+"""The figures of flights. Each `plot_…` function draws one figure and returns it; `lay_out` adds title and legend;
+`save` writes it.
 
 Times are simulation time. Angles are drawn in degrees. Only `to_z_up` leaves frame W."""
 
-from collections.abc import Callable, Sequence
+import re
+import textwrap
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -11,22 +15,26 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from sls.input_error import InputError
 from sls.trajectory import Trajectory, calc_roll_pitch_yaw
 
-# Distinct for readers with any colour vision (Okabe and Ito).
+QUAD, LOAD, REFERENCE_COLOUR = re.findall(r"#\w{6}", Path(__file__).with_name("colours.css").read_text())
+# For flights that are drawn together. Distinct for readers with any colour vision (Okabe and Ito).
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f7f7f", "#8c510a")
-SECOND_COLOUR = "#e69f00"
+LINES = ("-", "--", ":", "-.")
 # Wide and light: a curve that follows the reference well is visible in its middle.
-REFERENCE = {"linewidth": 3.4, "alpha": 0.3, "zorder": 1.5, "solid_capstyle": "butt"}
-REFERENCE_COLOUR = "#000000"
+REFERENCE = {"linewidth": 3.4, "alpha": 0.35, "zorder": 1.5, "solid_capstyle": "butt"}
+WIDTH_IN = 8.6
 
 STYLE = {
     "font.size": 9.5, "axes.titlesize": 10.5, "axes.labelsize": 9.5, "legend.fontsize": 9,
     "axes.spines.top": False, "axes.spines.right": False, "axes.edgecolor": "#666666",
     "axes.grid": True, "grid.color": "#dddddd", "grid.linewidth": 0.6, "lines.linewidth": 1.3,
     "legend.frameon": False, "svg.hashsalt": "sls", "path.simplify": True,
-    "axes.axisbelow": True,
+    "axes.axisbelow": True, "pdf.fonttype": 42,  # publishers refuse fonts of type 3
 }
+PAPER = {**STYLE, "font.size": 8, "axes.titlesize": 8, "axes.labelsize": 8, "legend.fontsize": 7.5,
+         "lines.linewidth": 1.0}
 # The files contain no date and no version of the program that wrote them.
 METADATA = {"png": {"Software": None}, "svg": {"Date": None, "Creator": None},
             "pdf": {"CreationDate": None, "Creator": None, "Producer": None}}
@@ -44,6 +52,13 @@ def to_z_up(positions: np.ndarray) -> np.ndarray:
 
 def colour_of(index: int) -> str:
     return COLOURS[index % len(COLOURS)]
+
+
+def style_of(index: int, flights: Sequence[Any], alone: str = LOAD) -> dict[str, Any]:
+    """The style of flight `index`: a single one has the colour `alone`; several differ in colour and in line style."""
+    if len(flights) == 1:
+        return {"color": alone}
+    return {"color": colour_of(index), "linestyle": LINES[(index + index // len(COLOURS)) % len(LINES)]}
 
 
 def break_at_gaps(time_s: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -82,32 +97,74 @@ def mark_stages(all_axes: Sequence[Axes], flights: Sequence[Trajectory]) -> None
                          linestyle=(0, (2, 3)), zorder=0.5)
 
 
-def name_figure(figure: Figure, title: str) -> None:
-    figure.suptitle(title, x=0.01, ha="left", fontsize=11.5, fontweight="bold")
+def lay_out(figure: Figure, paper: float | None = None, panels: Sequence[int] = ()) -> None:
+    """Adds the figure's label as title, and one legend of all axes; the figure grows by their height. `panels`: numbers
+    of the axes that stay, row by row from 1; without any all stay. `paper`: the width in columns of a paper, of 3.5 in
+    each; the title is left out. Raises InputError if a panel does not exist."""
+    if panels:
+        keep_panels(figure, panels)
+    width = 3.66 * paper - 0.16 if paper else WIDTH_IN
+    title = 0.0 if paper else 0.32
+    found: dict[str, Any] = {}
+    for axes in figure.axes:
+        for handle, label in zip(*axes.get_legend_handles_labels()):
+            found.setdefault(label, handle)
+    letter = 0.6 * matplotlib.rcParams["legend.fontsize"] / 72
+    labels = [textwrap.fill(label, int(width / letter) - 6) for label in found] if len(found) > 1 else []
+    lines = [label.split("\n") for label in labels]
+    columns = max(1, int(width / letter / (6 + max((len(line) for one in lines for line in one), default=0))))
+    rows = -(-len(lines) // columns) * max(map(len, lines), default=0)
+    height = figure.get_figheight() * (0.4 + 0.6 * width / WIDTH_IN) + title + 2.7 * letter * rows
+    top = 1.0 - (title + 2.7 * letter * rows) / height
+    figure.set_size_inches(width, height)
+    if not paper:
+        figure.text(0.01, 1.0 - 0.06 / height, figure.get_label(), va="top", fontsize=11.5, fontweight="bold")
+    if labels:
+        figure.legend(found.values(), labels, loc="upper left", bbox_to_anchor=(0.005, 1.0 - title / height),
+                      ncol=columns, borderaxespad=0.2, handlelength=2.4, columnspacing=1.4)
+    if figure.get_layout_engine() is None:
+        figure.axes[0].set_position((0.06, 0.35 / height, 0.84, top - 0.35 / height))  # room for the labels
+    else:
+        figure.get_layout_engine().set(rect=(0.0, 0.0, 1.0, top))
+        figure.align_ylabels()
+
+
+def keep_panels(figure: Figure, numbers: Sequence[int]) -> None:
+    """Removes the axes of other numbers, and closes the gaps."""
+    every = figure.axes
+    if not set(numbers) <= set(range(1, len(every) + 1)):
+        raise InputError(f"--panels: expected panels of 1 to {len(every)} of '{figure.get_label()}', "
+                         f"got {','.join(map(str, numbers))}")
+    kept = [axes for number, axes in enumerate(every, 1) if number in numbers]
+    if len(kept) == len(every):
+        return
+    place = {axes: (axes.get_subplotspec().rowspan.start, axes.get_subplotspec().colspan.start) for axes in kept}
+    rows, columns = (sorted(set(starts)) for starts in zip(*place.values()))
+    share = len(rows) / every[0].get_gridspec().nrows
+    figure.set_figheight(0.55 + (figure.get_figheight() - 0.55) * share)
+    grid = figure.add_gridspec(len(rows), len(columns))
+    label = every[-1].get_xlabel()
+    for axes in set(every) - set(kept):
+        axes.remove()
+    for axes, (row, column) in place.items():
+        axes.set_subplotspec(grid[rows.index(row), columns.index(column)])
+        if row == rows[-1]:
+            axes.tick_params(labelbottom=True)
+            axes.set_xlabel(axes.get_xlabel() or label)
 
 
 def make_stack(rows: int, title: str, labels: Sequence[str], height: float = 1.75,
                columns: int = 1) -> tuple[Figure, np.ndarray]:
     """A figure with `rows` of axes that share one time axis. Returns figure and axes (rows, columns)."""
-    figure = Figure(figsize=(8.6, 0.9 + height * rows), layout="constrained")
+    figure = Figure(figsize=(WIDTH_IN, 0.55 + height * rows), layout="constrained", label=title)
     axes = figure.subplots(rows, columns, sharex=True, squeeze=False)
-    name_figure(figure, title)
     for row, label in enumerate(labels):
         axes[row, 0].set_ylabel(label)
     for one in axes[-1]:
         one.set_xlabel("time (s)")
     for one in axes.flat:
         one.margins(x=0)
-    figure.align_ylabels(axes[:, 0])
     return figure, axes
-
-
-def add_legend(axes: Axes, columns: int = 4) -> None:
-    """Adds a legend above the axes, where it hides no line."""
-    count = len(axes.get_legend_handles_labels()[1])
-    if count:
-        axes.legend(loc="lower left", bbox_to_anchor=(0, 1.0), ncol=min(count, columns),
-                    borderaxespad=0.2, handlelength=1.8, columnspacing=1.4)
 
 
 def list_references(flights: Sequence[Trajectory]) -> list[tuple[Trajectory, str, str]]:
@@ -138,10 +195,10 @@ def plot_positions(flights: Sequence[Trajectory]) -> Figure:
     figure, axes = make_stack(3, "Load position", ("x (m)", "y (m)", "z (m, down)"))
     for index, flight in enumerate(flights):
         for axis in range(3):
-            draw(axes[axis, 0], flight.time_s, flight.p_WL[:, axis], color=colour_of(index),
+            draw(axes[axis, 0], flight.time_s, flight.p_WL[:, axis], **style_of(index, flights),
                  label="load" if len(flights) == 1 else flight.name, zorder=3)
             if len(flights) == 1:
-                draw(axes[axis, 0], flight.time_s, flight.p_WQ[:, axis], color=SECOND_COLOUR,
+                draw(axes[axis, 0], flight.time_s, flight.p_WQ[:, axis], color=QUAD,
                      linewidth=0.9, label="quadrotor")
     for flight, label, colour in list_references(flights):
         for axis in range(3):
@@ -149,37 +206,36 @@ def plot_positions(flights: Sequence[Trajectory]) -> Figure:
                  label=label, **REFERENCE)
     axes[2, 0].invert_yaxis()
     mark_stages(axes[:, 0], flights)
-    add_legend(axes[0, 0])
     return figure
 
 
 def plot_errors(flights: Sequence[Trajectory]) -> Figure:
-    figure, axes = make_stack(3, "Load position error", ("x (m)", "y (m)", "z (m)"), columns=2)
+    figure, axes = make_stack(3, "Load position error and its size", ("x (m)", "y (m)", "z (m)"), columns=2)
     for index, flight in enumerate(flights):
         error = flight.calc_error()
         if np.all(np.isnan(error)):
             continue
         for axis in range(3):
-            style = {"color": colour_of(index), "label": flight.name, "linewidth": 1.1}
+            style = {**style_of(index, flights), "label": flight.name}
             draw(axes[axis, 0], flight.time_s, error[:, axis], **style)
             size = np.abs(error[:, axis])
             draw(axes[axis, 1], flight.time_s, np.where(size > 0, size, np.nan), **style)
     for axis in range(3):
         set_log_scale(axes[axis, 1], [np.abs(flight.calc_error()[:, axis]) for flight in flights])
-    axes[0, 0].set_title("error", loc="right")
-    axes[0, 1].set_title("size of the error, logarithmic", loc="right")
+        axes[axis, 1].set_ylabel(f"|{'xyz'[axis]}| (m)")
     mark_stages(list(axes.flat), flights)
-    if len(flights) > 1:
-        add_legend(axes[0, 0], columns=2)
     return figure
 
 
 def set_log_scale(axes: Axes, sizes: Sequence[np.ndarray]) -> None:
     """Sets a logarithmic scale from the decade of the 2nd percentile up, with at most 6 decades below the largest
-    value's decade. The limit is necessary because errors that change their sign pass zero."""
+    value's decade. The limit is necessary because errors that change their sign pass zero. Sizes that are all 0 have
+    no such axis: a text says so."""
     values = np.concatenate(sizes)
     values = values[np.isfinite(values) & (values > 0)]
     if not len(values):
+        axes.text(0.5, 0.5, "0 at every step", ha="center", va="center", transform=axes.transAxes)
+        axes.set_yticks([])
         return
     axes.set_yscale("log")
     decade = np.floor(np.log10([np.percentile(values, 2), np.max(values)]))
@@ -187,30 +243,27 @@ def set_log_scale(axes: Axes, sizes: Sequence[np.ndarray]) -> None:
 
 
 def plot_path(flights: Sequence[Trajectory]) -> Figure:
-    figure = Figure(figsize=(8.6, 5.8))
-    axes = figure.add_axes((0.02, 0.0, 0.94, 0.92), projection="3d")
-    name_figure(figure, "Path of the load, z up")
+    figure = Figure(figsize=(WIDTH_IN, 5.4), label="Path of the load")
+    axes = figure.add_subplot(projection="3d")
     drawn = []
     for index, flight in enumerate(flights):
         drawn.append(to_z_up(flight.p_WL))
-        axes.plot(*drawn[-1].T, color=colour_of(index),
-                  label="load" if len(flights) == 1 else flight.name)
-        axes.scatter(*drawn[-1][0], color=colour_of(index), s=18)
+        style = style_of(index, flights)
+        axes.plot(*drawn[-1].T, **style, label="load" if len(flights) == 1 else flight.name)
+        axes.scatter(*drawn[-1][0], color=style["color"], s=18)
         if len(flights) == 1:
             drawn.append(to_z_up(flight.p_WQ))
-            axes.plot(*drawn[-1].T, color=SECOND_COLOUR, linewidth=0.8, label="quadrotor")
+            axes.plot(*drawn[-1].T, color=QUAD, linewidth=0.8, label="quadrotor")
     for flight, label, colour in list_references(flights):
         drawn.append(to_z_up(flight.p_WL_ref))
         axes.plot(*break_at_jumps(drawn[-1]).T, color=colour, label=label, **REFERENCE)
         axes.scatter(*find_set_points(drawn[-1]).T, color="#444444", marker="x", s=34,
                      linewidth=1.2)
     set_equal_scale(axes, np.concatenate(drawn))
-    axes.set_xlabel("x (m)", labelpad=8)
-    axes.set_ylabel("−y (m)", labelpad=8)
-    axes.set_zlabel("height −z (m)", labelpad=6)
+    axes.set_xlabel("forward, x (m)", labelpad=8)
+    axes.set_ylabel("left, −y (m)", labelpad=8)
+    axes.set_zlabel("up, −z (m)", labelpad=6)
     axes.view_init(elev=24, azim=-58)
-    figure.legend(loc="upper left", bbox_to_anchor=(0.01, 0.95), ncol=4, handlelength=1.8,
-                  columnspacing=1.4)
     return figure
 
 
@@ -230,23 +283,21 @@ def set_equal_scale(axes, points: np.ndarray) -> None:
 
 
 def draw_columns(all_axes: Sequence[Axes], flights: Sequence[Trajectory],
-                 calc_columns: Callable[[Trajectory], np.ndarray]) -> None:
+                 calc_columns: Callable[[Trajectory], np.ndarray], alone: str = QUAD) -> None:
     """Draws column i of each flight's `calc_columns` on axes i. Leaves out flights without such data."""
     for index, flight in enumerate(flights):
         columns = calc_columns(flight)
         if np.all(np.isnan(columns)):
             continue
         for axes, values in zip(all_axes, columns.T):
-            draw(axes, flight.time_s, values, color=colour_of(index), label=flight.name)
+            draw(axes, flight.time_s, values, **style_of(index, flights, alone), label=flight.name)
     mark_stages(all_axes, flights)
-    if len(flights) > 1:
-        add_legend(all_axes[0])
 
 
 def plot_angles(flights: Sequence[Trajectory]) -> Figure:
     figure, axes = make_stack(2, "Rod angles", ("α about x (°)", "β about y (°)"))
     draw_columns(axes[:, 0], flights,
-                 lambda flight: np.degrees(np.column_stack([flight.alpha, flight.beta])))
+                 lambda flight: np.degrees(np.column_stack([flight.alpha, flight.beta])), LOAD)
     return figure
 
 
@@ -294,8 +345,7 @@ def widen(all_axes: Sequence[Axes], least: float) -> None:
 
 
 def draw_beside(all_axes: Sequence[Axes], flights: Sequence[Trajectory],
-                calc_both: Callable[[Trajectory], tuple[np.ndarray, np.ndarray] | None],
-                legend_columns: int = 4) -> None:
+                calc_both: Callable[[Trajectory], tuple[np.ndarray, np.ndarray] | None]) -> None:
     """Draws column i of both results of `calc_both` on axes i: the real values over their set-points.
     `calc_both` returns None for a flight without such data."""
     for index, flight in enumerate(flights):
@@ -304,13 +354,12 @@ def draw_beside(all_axes: Sequence[Axes], flights: Sequence[Trajectory],
         for values, label, style in (
                 (asked, "set-point", {"color": REFERENCE_COLOUR if alone else colour_of(index),
                                       **REFERENCE}),
-                (real, "", {"color": colour_of(index), "zorder": 3})):
+                (real, "", {**style_of(index, flights, QUAD), "zorder": 3})):
             name = label if alone else f"{flight.name} {label}".strip()
             for axes, column in zip(all_axes, values.T):
                 if np.any(np.isfinite(column)):
                     draw(axes, flight.time_s, column, label=name or "real", **style)
     mark_stages(all_axes, flights)
-    add_legend(all_axes[0], legend_columns)
 
 
 def plot_body_attitude(flights: Sequence[Trajectory]) -> Figure:
@@ -343,7 +392,7 @@ def plot_rotors(flights: Sequence[Trajectory]) -> Figure:
         one.set_ylabel(f"{number} (rad/s)")
         one.set_visible(number <= count)
     draw_beside(list(axes.flat), flights, lambda flight: flight.body and (
-        flight.body.rotor_speed, flight.body.rotor_speed_set), legend_columns=4 // columns)
+        flight.body.rotor_speed, flight.body.rotor_speed_set))
     return figure
 
 
@@ -358,10 +407,10 @@ def plot_thrust(flights: Sequence[Trajectory]) -> Figure:
 
 def plot_fleet(flights: Sequence[Trajectory]) -> Figure:
     """All vehicles of a recording: the paths of the loads from above, x up, and the error of each."""
-    figure = Figure(figsize=(8.6, 4.6), layout="constrained")
+    figure = Figure(figsize=(WIDTH_IN, 4.3), layout="constrained", label=f"Fleet of {len(flights)} vehicles")
     plan, distance = figure.subplots(1, 2)
-    name_figure(figure, f"Fleet of {len(flights)} vehicles")
-    colours = matplotlib.colormaps["viridis"](np.linspace(0, 0.92, len(flights)))
+    # Neither end is invisible on a dark or a light page.
+    colours = matplotlib.colormaps["viridis"](np.linspace(0.3, 0.85, len(flights)))
     sizes = []
     rows = sum(len(flight.time_s) for flight in flights)
     every = slice(None, None, 1 + rows // FLEET_POINTS)
@@ -388,19 +437,30 @@ FIGURES: dict[str, Callable[[Sequence[Trajectory]], Figure]] = {
 }
 
 
-def make_figures(flights: Sequence[Trajectory],
-                 fleet: Sequence[Trajectory] = ()) -> dict[str, Figure]:
-    """All figures for which these flights have data, by name. The overview of a `fleet` comes first."""
-    with matplotlib.rc_context(STYLE):
-        figures = {"fleet": plot_fleet(fleet)} if len(fleet) > 1 else {}
-        for name, plot in FIGURES.items():
-            figure = plot(flights)
-            if any(axes.lines for axes in figure.axes):
-                figures[name] = figure
-        return figures
+def make_figures(flights: Sequence[Trajectory], fleet: Sequence[Trajectory] = (), paper: float | None = None,
+                 panels: Mapping[str, Sequence[int]] | None = None) -> dict[str, Figure]:
+    """All figures for which these flights have data, by name. The overview of a `fleet` comes first. A flight of one
+    state has no line to draw, and is left out. `panels`: the figures to draw, each with its panels; `paper` and panels
+    as of `lay_out`. Raises InputError if there is no such figure or panel."""
+    flights = [flight for flight in flights if len(flight.time_s) > 1]
+    plots: dict[str, Callable[[Sequence[Trajectory]], Figure]] = {}
+    if flights:
+        plots = {"fleet": lambda _: plot_fleet(fleet), **FIGURES} if len(fleet) > 1 else FIGURES
+    figures = {}
+    with matplotlib.rc_context(PAPER if paper else STYLE):
+        for name, plot in plots.items():
+            if panels is None or name in panels:
+                figure = plot(flights)
+                if any(axes.lines for axes in figure.axes):
+                    lay_out(figure, paper, panels[name] if panels else ())
+                    figures[name] = figure
+    if panels is not None and (missing := panels.keys() - figures.keys()):
+        raise InputError(f"--panels: expected figures of these flights, some of {', '.join(plots)}, "
+                         f"got '{min(missing)}'")
+    return figures
 
 
-def save(figure: Figure, path: Path, dpi: int = 150) -> None:
+def save(figure: Figure, path: Path, dpi: int = 150, style: Mapping[str, Any] = STYLE) -> None:
     """Writes `figure` to `path`, in the format of the file's suffix."""
-    with matplotlib.rc_context(STYLE):
+    with matplotlib.rc_context(style):
         figure.savefig(path, dpi=dpi, metadata=METADATA[path.suffix[1:]], facecolor="white")

@@ -1,5 +1,5 @@
-"""The study's chapter on the published PX4 flight: its flights, pictures, tables and numbers. Each
-flight is flown in one process (`./sls run --in-process`)."""
+"""The study's chapter on the published PX4 flight: its flights, pictures, tables and numbers. All flights of the study
+are flown here, each in one process (`./sls run --in-process`)."""
 
 import copy
 import math
@@ -18,8 +18,7 @@ from matplotlib.figure import Figure
 
 from sls.delay_formula import (HorizontalChain, Lateness, calc_error_ratio,
                                calc_stability_limit)
-from sls.figures import (REFERENCE, REFERENCE_COLOUR, add_legend, colour_of, draw, make_stack,
-                         name_figure)
+from sls.figures import REFERENCE, REFERENCE_COLOUR, WIDTH_IN, colour_of, draw, make_stack, style_of
 from sls.trajectory import Trajectory, calc_roll_pitch_yaw
 from sls.input_error import InputError
 from sls.metrics import StageMetrics, calc_over, split_laps
@@ -34,11 +33,12 @@ Change = Callable[[dict[str, Any]], None]
 
 @dataclass(frozen=True)
 class Planned:
-    """A flight of the shipped scenario `base`, with `changes`."""
+    """A flight of the shipped scenario `base`, with `changes` and, if given, another control period."""
 
     name: str
     base: str
     changes: tuple[Change, ...] = ()
+    period_s: float | None = None
 
 
 # --- changes of scenarios -------------------------------------------------------------------------
@@ -200,12 +200,13 @@ def run_launcher(planned: Planned, arguments: Sequence[str]) -> str:
     return done.stdout
 
 
-def fly_all(recordings: Path, say: Callable[[str], None]) -> None:
-    """Flies everything, on all processors. The programs must be built already: `./sls study` builds
+def fly_all(flights: Sequence[Planned], recordings: Path, say: Callable[[str], None]) -> None:
+    """Flies `flights` and searches the margins, on all processors. The programs must be built: `./sls study` builds
     them and sets SLS_BUILD. Raises RunFailed."""
     def fly(planned: Planned) -> None:
         say(f"study: flying {planned.name} in process")
-        run_launcher(planned, ["run", str(find_scenario(planned, recordings)), "--in-process",
+        period = ["--period-s", str(planned.period_s)] if planned.period_s else []
+        run_launcher(planned, ["run", str(find_scenario(planned, recordings)), "--in-process", *period,
                                "--out", str(recordings / planned.name), "--force"])
 
     def find_margin(planned: Planned) -> None:
@@ -217,7 +218,7 @@ def fly_all(recordings: Path, say: Callable[[str], None]) -> None:
     (recordings / "scenarios").mkdir(parents=True, exist_ok=True)
     with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
         jobs = [*(pool.submit(find_margin, planned) for _, _, _, planned in MARGINS),
-                *(pool.submit(fly, planned) for planned in FLIGHTS)]
+                *(pool.submit(fly, planned) for planned in flights)]
         for job in jobs:
             job.result()
 
@@ -230,13 +231,16 @@ class Flown:
     seen: Trajectory
 
 
-def load_flights(recordings: Path) -> dict[str, Flown]:
+def load_flights(flights: Sequence[Planned], recordings: Path) -> dict[str, Flown]:
     flown = {}
-    for planned in FLIGHTS:
+    for planned in flights:
         recording = Recording(recordings / planned.name)
         if not recording.manifest["complete"]:
             raise InputError(f"{recording.folder}: expected a complete recording, got one that "
                              f"ends '{recording.manifest['outcome']}'")
+        if recording.manifest["period_s"] != (planned.period_s or recording.manifest["period_s"]):
+            raise InputError(f"{recording.folder}: expected a period of {planned.period_s} s, "
+                             f"got {recording.manifest['period_s']} s")
         flown[planned.name] = Flown(recording.load_flight(0, planned.name),
                                     recording.load_seen(0, planned.name))
     return flown
@@ -352,9 +356,9 @@ def cut_eight(flight: Trajectory, name: str) -> Trajectory:
 
 def plot_plan(flights: Sequence[Trajectory]) -> Figure:
     """The paths of the loads from above, one picture for each lap."""
-    figure = Figure(figsize=(8.6, 5.2), layout="constrained")
+    figure = Figure(figsize=(WIDTH_IN, 4.7), layout="constrained", 
+                    label="The load from above, as the controller saw it")
     laps = figure.subplots(1, 2, sharex=True, sharey=True)
-    name_figure(figure, "The load from above, as the controller saw it")
     lap_s = find_eight("px4_fitted")["period_s"]
     for number, axes in enumerate(laps, 1):
         for index, flight in enumerate(flights):
@@ -362,11 +366,10 @@ def plot_plan(flights: Sequence[Trajectory]) -> Figure:
             if index == 0:
                 axes.plot(*flight.p_WL_ref[rows, 1::-1].T, color=REFERENCE_COLOUR,
                           label="reference", **REFERENCE)
-            axes.plot(*flight.p_WL[rows, 1::-1].T, color=colour_of(index), label=flight.name)
+            axes.plot(*flight.p_WL[rows, 1::-1].T, **style_of(index, flights), label=flight.name)
         axes.set(xlabel="y (m, right)", aspect="equal")
         axes.text(0.97, 0.95, f"lap {number}", ha="right", transform=axes.transAxes)
     laps[0].set_ylabel("x (m, forward)")
-    add_legend(laps[0])
     return figure
 
 
@@ -377,7 +380,7 @@ def plot_lap_errors(flights: Sequence[Trajectory], published: Sequence[float]) -
     for axis in range(3):
         for index, flight in enumerate(flights):
             draw(axes[axis, 0], flight.time_s, flight.calc_error()[:, axis],
-                 color=colour_of(index), label=flight.name)
+                 **style_of(index, flights), label=flight.name)
         rms = published[axis]
         axes[axis, 0].fill_between([16.0, 32.0], -rms, rms, color="#222222", alpha=0.12,
                                    linewidth=0, label="published flight: ± rms")
@@ -387,7 +390,6 @@ def plot_lap_errors(flights: Sequence[Trajectory], published: Sequence[float]) -
                                label="± largest" if sign > 0 else None)
         axes[axis, 0].axvline(16.0, color="#999999", linewidth=0.8, linestyle=(0, (2, 3)))
         axes[axis, 0].set_ylim((-0.25, 0.35) if axis == 2 else (-0.8, 0.8))
-    add_legend(axes[0, 0])
     return figure
 
 
@@ -400,20 +402,18 @@ def plot_steps(flown: dict[str, Flown]) -> Figure:
     for index, (name, angle, planned) in enumerate(STEPS):
         step = measure_step(flown[planned.name].true, angle)
         rows = (step.time_s > -0.1) & (step.time_s < 1.0)
-        draw(axes[0, 0], step.time_s[rows], step.share[rows], color=colour_of(index), label=name,
-             linestyle="-" if index == 0 else "--")
+        draw(axes[0, 0], step.time_s[rows], step.share[rows], **style_of(index, STEPS), label=name)
         axes[0, 0].plot([step.rise_s], [TIME_CONSTANT_SHARE], "o", color=colour_of(index))
     axes[0, 0].axhline(TIME_CONSTANT_SHARE, color="#999999", linewidth=0.8)
     axes[0, 0].set_xlabel("time since the step (s)")
-    add_legend(axes[0, 0])
     return figure
 
 
 def plot_formula(flown: dict[str, Flown]) -> Figure:
     """The results of the formula as curves, those of the flights as points."""
-    figure = Figure(figsize=(8.6, 3.9), layout="constrained")
+    figure = Figure(figsize=(WIDTH_IN, 3.4), layout="constrained",
+                    label="Error of the second lap: linear formula (lines), flights (points)")
     axes = figure.subplots(1, 2, sharey=True)
-    name_figure(figure, "Error of the second lap: linear formula (lines), flights (points)")
     for one, key, label in ((axes[0], "delay_s", "delay of the force (s)"),
                             (axes[1], "lag_s", "lag of the force (s)")):
         grid = np.linspace(0.0, 0.21 if key == "delay_s" else 0.17, 60)
@@ -429,7 +429,6 @@ def plot_formula(flown: dict[str, Flown]) -> Figure:
                          color=colour_of(index), markersize=4.5)
         one.set(xlabel=label, xlim=(0.0, grid[-1]), ylim=(0.0, None))
     axes[0].set_ylabel("rms (m)")
-    add_legend(axes[0], columns=2)
     return figure
 
 
@@ -509,7 +508,6 @@ def make_values(flown: dict[str, Flown], recordings: Path,
     tilt = np.degrees(np.arccos(-force[:, 2] / np.linalg.norm(force, axis=1)))
     rises = [measure_step(flown[planned.name].true, angle).rise_s for _, angle, planned in STEPS]
     values = {
-        "px4_count": str(len(FLIGHTS)),
         "px4_seen_table": make_ingredient_table(flown, published, lambda one: one.seen),
         "px4_true_table": make_ingredient_table(flown, published, lambda one: one.true),
         "px4_rms_gap": f"{1000.0 * max(gaps[:3]):.0f}",

@@ -21,9 +21,9 @@ CAPTIONS = {
              "reference.",
     "positions": "Load and quadrotor over time, and where the load should be. The axis of z points "
                  "down, as z does; dotted lines: a stage begins.",
-    "errors": "Load position minus reference: as it is, and its size on a logarithmic axis.",
-    "path": "The same flight in space, height up, one metre as long on each axis. The dot is where "
-            "the load starts.",
+    "errors": "Load position minus reference: as it is, and its size, on a logarithmic axis unless it is always 0.",
+    "path": "The same flight in space, one metre as long on each axis; y and z are turned (left, up), so that up is "
+            "up. The dot is where the load starts.",
     "angles": "Angles of the rod; both are 0 where the load hangs straight down.",
     "forces": "The force that the controller answers.",
     "attitude": "The attitude that realises this force, with yaw 0.",
@@ -38,46 +38,75 @@ MOST_EVENTS = 200
 NO_COUNTERS = ("sample_index", "phase", "reason", "step", "controller", "real_time_factor",
                "round_trip_p50_us", "round_trip_p99_us", "timing", "problem")
 STYLE_SHEET = """
-:root { color-scheme: light; }
+:root { color-scheme: light; --ground: #f4f5f7; --panel: #fff; --text: #1c2127; --strong: #3c4650; --muted: #5b6570;
+  --line: #dfe3e8; --rule: #eceff2; --axis: #b6bec7; --missing: #e4e7eb; --raised: #f7f8fa; --accent: #0b5394;
+  --accent-ground: #e3eefa; --good: #14663a; --good-ground: #dff3e6; --bad: #a33b0b; --bad-ground: #fde7df; }
+@media screen and (prefers-color-scheme: dark) {
+  :root { color-scheme: dark; --ground: #0e1216; --panel: #151b21; --text: #e6ebf0; --strong: #c3ced8; --muted: #97a4b1;
+    --line: #2a343e; --rule: #222b33; --axis: #55626f; --missing: #2a343e; --raised: #1e262e; --accent: #7cbcf2;
+    --accent-ground: #12304a; --good: #6fd6a4; --good-ground: #123524; --bad: #ff9d8f; --bad-ground: #45201a; }
+}
 * { box-sizing: border-box; }
-body { margin: 0; background: #f4f5f7; color: #1c2127; font: 15px/1.5 "DejaVu Sans", "Segoe UI",
+body { margin: 0; background: var(--ground); color: var(--text); font: 15px/1.5 "DejaVu Sans", "Segoe UI",
   Helvetica, Arial, sans-serif; }
 main { max-width: 1120px; margin: 0 auto; padding: 28px 24px 48px; }
 h1 { font-size: 26px; margin: 0 0 4px; }
 h2 { font-size: 17px; margin: 0 0 12px; }
-section { background: #fff; border: 1px solid #dfe3e8; border-radius: 8px; padding: 18px 20px;
+h1, h2, .sub, .notes { overflow-wrap: anywhere; }
+section { background: var(--panel); border: 1px solid var(--line); border-radius: 8px; padding: 18px 20px;
   margin-top: 18px; }
-.sub { color: #5b6570; margin: 0; }
+.sub { color: var(--muted); margin: 0; }
 .badge { display: inline-block; border-radius: 4px; padding: 1px 9px; font-size: 13px;
-  font-weight: 600; margin-right: 6px; background: #e3eefa; color: #0b5394; }
-.good { background: #dff3e6; color: #14663a; }
-.bad { background: #fde7df; color: #a33b0b; }
-.notes { margin: 10px 0 0; padding-left: 20px; color: #a33b0b; }
+  font-weight: 600; margin-right: 6px; background: var(--accent-ground); color: var(--accent); }
+.good { background: var(--good-ground); color: var(--good); }
+.bad { background: var(--bad-ground); color: var(--bad); }
+.notes { margin: 10px 0 0; padding-left: 20px; color: var(--bad); }
 .facts { display: grid; grid-template-columns: repeat(4, 1fr); gap: 12px 20px; margin: 0; }
-.facts dt { color: #5b6570; font-size: 12.5px; }
+.facts dt { color: var(--muted); font-size: 12.5px; overflow-wrap: anywhere; }
 .facts dd { margin: 0; overflow-wrap: anywhere; font-variant-ligatures: none; }
 .scroll { overflow-x: auto; }
 table { border-collapse: collapse; font-size: 13px; width: 100%;
   font-variant-numeric: tabular-nums; }
 th, td { padding: 4px 7px; text-align: right; white-space: nowrap;
-  min-width: 58px; border-bottom: 1px solid #eceff2; }
-th { font-weight: 600; color: #3c4650; }
+  min-width: 58px; border-bottom: 1px solid var(--rule); }
+th { font-weight: 600; color: var(--strong); white-space: normal; }
 thead tr:first-child th:first-child, td:first-child, .text th, .text td { text-align: left; }
-.text td:last-child { white-space: normal; width: 100%; }
-thead tr:first-child th[colspan] { text-align: center; border-left: 1px solid #dfe3e8; }
-.lap td:first-child { padding-left: 26px; color: #5b6570; }
-.small { color: #5b6570; font-size: 13px; margin: 10px 0 0; }
-figure { margin: 0 0 26px; }
+td:first-child { white-space: normal; overflow-wrap: anywhere; min-width: 11em; }
+.text td:first-child { min-width: 58px; }
+.text td:last-child { white-space: normal; width: 100%; overflow-wrap: anywhere; }
+thead tr:first-child th[colspan] { text-align: center; border-left: 1px solid var(--line); }
+.lap td:first-child { padding-left: 26px; color: var(--muted); }
+.small { color: var(--muted); font-size: 13px; margin: 10px 0 0; }
+figure { margin: 0 0 26px; break-inside: avoid; }
 figure:last-child { margin-bottom: 0; }
 figure img { display: block; width: 100%; max-width: 920px; height: auto; margin: 0 auto; }
-.scene { display: block; width: 100%; height: 680px; border: 1px solid #dfe3e8; }
-figcaption { color: #5b6570; font-size: 13.5px; text-align: center; margin-top: 4px; }
-pre { overflow-x: auto; background: #f7f8fa; padding: 12px; border-radius: 6px; font-size: 12.5px;
+.scene { display: block; width: 100%; height: 680px; border: 1px solid var(--line); }
+figcaption { color: var(--muted); font-size: 13.5px; text-align: center; margin-top: 4px; }
+pre { overflow-x: auto; background: var(--raised); padding: 12px; border-radius: 6px; font-size: 12.5px;
   line-height: 1.45; }
 summary { cursor: pointer; font-weight: 600; font-size: 17px; }
-@media (max-width: 800px) { .facts { grid-template-columns: repeat(2, 1fr); } }
-@media print { body { background: #fff; } section { break-inside: avoid; } }
+@media (max-width: 800px) {
+  .facts { grid-template-columns: repeat(2, 1fr); }
+  table { font-size: 12px; }
+  th, td { padding: 4px; min-width: 0; }
+}
+@media print {
+  body { background: none; font-size: 12px; }
+  main { max-width: none; padding: 0; }
+  section { border: 0; padding: 0; }
+  .screen { display: none; }
+  h2, h3 { break-after: avoid; }
+  tr, .facts div, .pair > * { break-inside: avoid; }
+  .scroll { overflow: visible; }
+  table { font-size: 9px; }
+  th, td, td:first-child { padding: 2px 4px; min-width: 0; white-space: normal; }
+  pre { white-space: pre-wrap; overflow-wrap: anywhere; }
+  figure img { max-height: 112mm; object-fit: contain; }
+}
 """
+# Colours of a figure's background, text and lines, and those on a dark page; the bodies keep their colours.
+DARK = {"#ffffff": "#151b21", "#f7f7f7": "#1e262e", "#000000": "#e6ebf0", "#444444": "#c3ced8", "#666666": "#97a4b1",
+        "#999999": "#97a4b1", "#dddddd": "#2a343e", "#b0b0b0": "#2a343e"}
 
 
 def make_report(recording: Recording, vehicle_id: int) -> str:
@@ -254,12 +283,21 @@ def make_figure_list(flight: Trajectory, fleet: Sequence[Trajectory]) -> str:
         for name, figure in make_figures([flight], fleet).items():
             file = Path(folder) / f"{name}.svg"
             save(figure, file)
-            data = base64.b64encode(file.read_bytes()).decode()
+            data = base64.b64encode(add_dark_colours(file.read_text()).encode()).decode()
             caption = escape(CAPTIONS[name])
             parts.append(f"<figure id=\"{name}\"><img alt=\"{caption}\" "
                          f"src=\"data:image/svg+xml;base64,{data}\">"
                          f"<figcaption>{caption}</figcaption></figure>\n")
-    return "".join(parts)
+    return "".join(parts) or f"<p>No data: the flight ended at step {flight.time_s[-1] / flight.period_s:.0f}.</p>"
+
+
+def add_dark_colours(svg: str) -> str:
+    """The picture with a style sheet that replaces its neutral colours where the reader prefers dark pages."""
+    rules = "".join(f"[style*='fill: {light}'] {{ fill: {dark}; }} [style*='stroke: {light}'] {{ stroke: {dark}; }}"
+                    for light, dark in DARK.items())
+    rules = rules.replace("; }", " !important; }")
+    return svg.replace("<defs>", "<style>@media screen and (prefers-color-scheme: dark) { "
+                       f"svg {{ fill: {DARK['#000000']}; }} {rules} }}</style><defs>", 1)
 
 
 def make_events(recording: Recording) -> str:

@@ -42,7 +42,8 @@ def make_scene(recording: Recording, most_bytes: int) -> str:
         page = file.read_text(encoding="utf-8")
     # An attribute in double quotes needs only these two; html.escape would replace more characters.
     source = page.replace("&", "&amp;").replace('"', "&quot;")
-    section = ("<section><h2>Scene</h2><iframe class=\"scene\" title=\"The flight in three dimensions\" "
+    section = ("<section class=\"screen\"><h2>Scene</h2><iframe class=\"scene\" "
+               "title=\"The flight in three dimensions\" "
                f"loading=\"lazy\" srcdoc=\"{source}\"></iframe></section>\n")
     if len(section.encode()) > most_bytes:
         return leave_out(f"expected at most {most_bytes} bytes, got {len(section.encode())}")

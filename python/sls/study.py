@@ -1,9 +1,8 @@
 """The comparison of our flights with the published ones: docs/study.md and its pictures."""
 
 import csv
-import subprocess
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import matplotlib
@@ -11,14 +10,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from sls import px4_study
-from sls.figures import (STYLE, add_legend, colour_of, draw, make_stack, plot_path,
-                              plot_positions, save, set_log_scale)
+from sls.figures import STYLE, draw, lay_out, make_stack, plot_path, plot_positions, save, set_log_scale, style_of
 from sls.trajectory import Trajectory
-from sls.input_error import InputError
-from sls.metrics import StageMetrics, calc_over, calc_stage_metrics, split_laps
-from sls.published_logs import load_log
-from sls.px4_study import RunFailed
-from sls.recordings import Recording
+from sls.metrics import StageMetrics, calc_stage_metrics, split_laps
+from sls.px4_study import Planned, RunFailed, measure
 from sls.tables import (format_error, list_error_cells, list_step_cells, make_markdown_table)
 
 HERE = Path(__file__).resolve().parent
@@ -26,28 +21,21 @@ ROOT = HERE.parents[1]
 DPI = 100
 
 
-@dataclass(frozen=True)
-class PlannedFlight:
-    name: str
-    scenario: str
-    period_s: str = "0.004"
-
-
 FLIGHTS = (
-    PlannedFlight("figure_eight", "figure_eight"),
-    PlannedFlight("figure_eight_1ms", "figure_eight", "0.001"),
-    PlannedFlight("matlab_setpoint_1", "matlab_setpoint_1", "0.001"),
-    PlannedFlight("matlab_setpoint_2", "matlab_setpoint_2", "0.001"),
-    PlannedFlight("matlab_setpoint_3", "matlab_setpoint_3", "0.001"),
-    PlannedFlight("matlab_figure_eight", "matlab_figure_eight", "0.001"),
-    PlannedFlight("setpoints", "setpoints"),
-    PlannedFlight("gazebo_legacy", "gazebo_legacy"),
-    PlannedFlight("gazebo_correct_wiring", "gazebo_correct_wiring"),
-    PlannedFlight("gazebo_corrected", "gazebo_corrected"),
-    PlannedFlight("integral_mass_error", "integral_mass_error"),
-    PlannedFlight("mass_error_without_integral", "mass_error_without_integral"),
-    PlannedFlight("rotor_drag", "rotor_drag"),
-    PlannedFlight("rotor_drag_without_feed_forward", "rotor_drag_without_feed_forward"),
+    Planned("figure_eight", "figure_eight"),
+    Planned("figure_eight_1ms", "figure_eight", period_s=0.001),
+    Planned("matlab_setpoint_1", "matlab_setpoint_1", period_s=0.001),
+    Planned("matlab_setpoint_2", "matlab_setpoint_2", period_s=0.001),
+    Planned("matlab_setpoint_3", "matlab_setpoint_3", period_s=0.001),
+    Planned("matlab_figure_eight", "matlab_figure_eight", period_s=0.001),
+    Planned("setpoints", "setpoints"),
+    Planned("gazebo_legacy", "gazebo_legacy"),
+    Planned("gazebo_correct_wiring", "gazebo_correct_wiring"),
+    Planned("gazebo_corrected", "gazebo_corrected"),
+    Planned("integral_mass_error", "integral_mass_error"),
+    Planned("mass_error_without_integral", "mass_error_without_integral"),
+    Planned("rotor_drag", "rotor_drag"),
+    Planned("rotor_drag_without_feed_forward", "rotor_drag_without_feed_forward"),
 )
 
 # Load position error on the second lap, m, from the logs of the published MATLAB, Gazebo and PX4
@@ -55,32 +43,9 @@ FLIGHTS = (
 PUBLISHED_LAP_2 = list(csv.reader((HERE / "published_lap_2.csv").read_text().splitlines()))
 
 
-def fly_all(recordings: Path, domain: int, say: Callable[[str], None]) -> None:
-    """Flies all flights, one after the other, then those of the chapter on PX4. Raises RunFailed."""
-    launcher = ROOT / "sls"
-    for planned in FLIGHTS:
-        say(f"study: flying {planned.name}, period {planned.period_s} s")
-        command = [str(launcher), "run", planned.scenario, "--out", str(recordings / planned.name),
-                   "--force", "--period-s", planned.period_s, "--domain", str(domain)]
-        code = subprocess.run(command, check=False).returncode
-        if code != 0:
-            raise RunFailed(f"study: expected {planned.name} to be flown, "
-                            f"got exit code {code} of ./sls run")
-    px4_study.fly_all(recordings, say)
-
-
-def load_flights(recordings: Path) -> dict[str, Trajectory]:
-    flights = {}
-    for planned in FLIGHTS:
-        recording = Recording(recordings / planned.name)
-        if not recording.manifest["complete"]:
-            raise InputError(f"{recording.folder}: expected a complete recording, got one that "
-                             f"ends '{recording.manifest['outcome']}'")
-        if recording.manifest["period_s"] != float(planned.period_s):
-            raise InputError(f"{recording.folder}: expected a period of {planned.period_s} s, "
-                             f"got {recording.manifest['period_s']} s")
-        flights[planned.name] = recording.load_flight(0, planned.name)
-    return flights
+def fly_all(recordings: Path, say: Callable[[str], None]) -> None:
+    """Flies everything on the page. Raises RunFailed."""
+    px4_study.fly_all((*FLIGHTS, *px4_study.FLIGHTS), recordings, say)
 
 
 # --- pictures -------------------------------------------------------------------------------------
@@ -103,9 +68,8 @@ def plot_error_sizes(flights: Sequence[Trajectory], title: str) -> Figure:
         sizes = [np.abs(flight.calc_error()[:, axis]) for flight in flights]
         for index, (flight, size) in enumerate(zip(flights, sizes)):
             draw(axes[axis, 0], flight.time_s, np.where(size > 0, size, np.nan),
-                 color=colour_of(index), label=flight.name)
+                 **style_of(index, flights), label=flight.name)
         set_log_scale(axes[axis, 0], sizes)
-    add_legend(axes[0, 0], columns=3)
     return figure
 
 
@@ -114,10 +78,9 @@ def plot_height_error(flights: Sequence[Trajectory]) -> Figure:
                               height=2.4)
     for index, flight in enumerate(flights):
         draw(axes[0, 0], flight.time_s, -1000.0 * flight.calc_error()[:, 2],
-             color=colour_of(index), label=flight.name)
+             **style_of(index, flights), label=flight.name)
     axes[0, 0].axhline(0.0, color="#222222", linewidth=0.8)
     axes[0, 0].set_ylim(-8, 32)
-    add_legend(axes[0, 0])
     return figure
 
 
@@ -131,10 +94,9 @@ def plot_set_points(flights: Sequence[Trajectory]) -> Figure:
             if abs(way[axis]) > 0.0:
                 draw(axes[axis, 0], flight.time_s,
                      (flight.p_WL[:, axis] - flight.p_WL[0, axis]) / way[axis],
-                     color=colour_of(index), label=flight.name, linewidth=4.0 - 1.5 * index)
+                     **style_of(index, flights), label=flight.name, linewidth=4.0 - 1.5 * index)
     for axis in range(3):
         axes[axis, 0].axhspan(0.98, 1.02, color="#222222", alpha=0.12, linewidth=0)
-    add_legend(axes[0, 0])  # every leg steps along x
     return figure
 
 
@@ -167,20 +129,14 @@ def draw_pictures(flights: dict[str, Trajectory]) -> dict[str, Figure]:
 # --- the page -------------------------------------------------------------------------------------
 
 
-def measure_lap_2(flight: Trajectory, label: str) -> StageMetrics:
-    """Metrics of the second lap of a mission's figure eight."""
-    stage = next(stage for stage in flight.stages if stage.lap_s is not None)
-    return calc_over(flight, split_laps(flight, stage)[1].rows, label)
-
-
 def make_lap_row(metrics: StageMetrics) -> list[str]:
     return [metrics.label, *list_error_cells(metrics)[:5]]
 
 
 def measure_about(flight: Trajectory, z_offset_m: float, label: str) -> StageMetrics:
-    """As `measure_lap_2`, with the reference shifted by `z_offset_m`."""
+    """Metrics of the second lap with the reference shifted by `z_offset_m`."""
     shifted = replace(flight, p_WL_ref=flight.p_WL_ref + np.array([0.0, 0.0, z_offset_m]))
-    return measure_lap_2(shifted, label)
+    return measure(shifted, label)
 
 
 LAP_HEADER = ("figure eight, second lap", *PUBLISHED_LAP_2[0][1:])
@@ -190,14 +146,14 @@ STEP_HEADER = ("flight", "settling x s", "y", "z", "overshoot x %", "y", "z",
 
 def make_lap_table(flights: dict[str, Trajectory]) -> str:
     ours = [
-        measure_lap_2(flights["figure_eight"], "`figure_eight`, hold of 4 ms"),
-        measure_lap_2(flights["figure_eight_1ms"], "`figure_eight`, hold of 1 ms"),
-        measure_lap_2(flights["matlab_figure_eight"], "`matlab_figure_eight`, hold of 1 ms"),
-        measure_lap_2(flights["gazebo_legacy"], "`gazebo_legacy`: published wiring"),
+        measure(flights["figure_eight"], "`figure_eight`, hold of 4 ms"),
+        measure(flights["figure_eight_1ms"], "`figure_eight`, hold of 1 ms"),
+        measure(flights["matlab_figure_eight"], "`matlab_figure_eight`, hold of 1 ms"),
+        measure(flights["gazebo_legacy"], "`gazebo_legacy`: published wiring"),
         measure_about(flights["gazebo_legacy"], 0.1, "`gazebo_legacy`, about z −0.5"),
-        measure_lap_2(flights["gazebo_correct_wiring"],
+        measure(flights["gazebo_correct_wiring"],
                       "`gazebo_correct_wiring`: only the wiring put right"),
-        measure_lap_2(flights["gazebo_corrected"],
+        measure(flights["gazebo_corrected"],
                       "`gazebo_corrected`: and the controller's model"),
     ]
     rows = [[f"published: {row[0]}", *row[1:]] for row in PUBLISHED_LAP_2[1:]]
@@ -215,58 +171,38 @@ def make_step_table(flights: Sequence[Trajectory]) -> str:
 
 def make_drag_table(flights: dict[str, Trajectory]) -> str:
     return make_markdown_table(LAP_HEADER, [
-        make_lap_row(measure_lap_2(flights["rotor_drag"], "`rotor_drag`: with feed-forward")),
-        make_lap_row(measure_lap_2(flights["rotor_drag_without_feed_forward"],
+        make_lap_row(measure(flights["rotor_drag"], "`rotor_drag`: with feed-forward")),
+        make_lap_row(measure(flights["rotor_drag_without_feed_forward"],
                                    "`rotor_drag_without_feed_forward`"))])
 
 
 def describe_gain(flights: dict[str, Trajectory], worse: str, better: str, axes: str,
                   digits: int) -> str:
     """Ratio of the rms errors of `worse` and `better` on the second lap: "118 (x) and 48 (y)"."""
-    ratios = measure_lap_2(flights[worse], "").rms_m / measure_lap_2(flights[better], "").rms_m
+    ratios = measure(flights[worse], "").rms_m / measure(flights[better], "").rms_m
     *most, last = [f"{ratio:.{digits}f} ({axis})" for ratio, axis in zip(ratios, axes)]
     return f"{', '.join(most)} and {last}"
-
-
-def calc_distance(flight: Trajectory, published: Trajectory) -> float:
-    """Largest distance along an axis between the flights, for quadrotor and load, at the published
-    instants, m."""
-    step = np.searchsorted(flight.time_s, published.time_s - 1e-6)
-    return float(max(np.max(np.abs(flight.p_WQ[step] - published.p_WQ)),
-                     np.max(np.abs(flight.p_WL[step] - published.p_WL))))
-
-
-def make_published_note(flights: dict[str, Trajectory], published: Path | None) -> str:
-    if published is None:
-        return ("`./sls study --published DIR` adds how far `matlab_setpoint_1` is from the "
-                "published run, if you have its file.")
-    distance = calc_distance(flights["matlab_setpoint_1"],
-                             load_log(published / "matlab_setpoint1.csv", "published"))
-    return (f"`matlab_setpoint_1` is at most {distance:.2e} m from the published MATLAB run, "
-            "quadrotor and load, at each of its instants.")
 
 
 PUBLISHED_PX4 = PUBLISHED_LAP_2[-1][1:]
 
 
-def make_page(flights: dict[str, Trajectory], px4_values: dict[str, str],
-              published: Path | None) -> str:
+def make_page(flights: dict[str, Trajectory], px4_values: dict[str, str]) -> str:
     """study_page.md, with the numbers and tables filled in."""
     def describe_height(name: str, digits: int) -> str:
         metrics = calc_stage_metrics(flights[name])[0]
         return f"{abs(1000.0 * metrics.step.steady_state_error_m[2]):.{digits}f}"
 
     legs = [flights[f"matlab_setpoint_{leg}"] for leg in (1, 2, 3)]
-    rod_error = measure_lap_2(flights["gazebo_correct_wiring"], "").rms_m[2]
+    rod_error = measure(flights["gazebo_correct_wiring"], "").rms_m[2]
     return (HERE / "study_page.md").read_text().format(
-        count=len(FLIGHTS),
+        count=len(FLIGHTS) + len(px4_study.FLIGHTS),
         lap_table=make_lap_table(flights),
         hold=describe_gain(flights, "figure_eight", "figure_eight_1ms", "xyz", 2),
         wired=describe_gain(flights, "gazebo_legacy", "gazebo_correct_wiring", "xy", 0),
         corrected=describe_gain(flights, "gazebo_legacy", "gazebo_corrected", "xy", 0),
         rod_error=format_error(rod_error),
         set_point_table=make_step_table([*legs, flights["setpoints"]]),
-        published_note=make_published_note(flights, published),
         with_integral=describe_height("integral_mass_error", 2),
         without_integral=describe_height("mass_error_without_integral", 1),
         integral_table=make_step_table([flights["integral_mass_error"],
@@ -275,16 +211,17 @@ def make_page(flights: dict[str, Trajectory], px4_values: dict[str, str],
         drag_table=make_drag_table(flights), **px4_values)
 
 
-def write_study(recordings: Path, out: Path, published: Path | None) -> Path:
+def write_study(recordings: Path, out: Path) -> Path:
     """Writes `out`/study.md and `out`/study/*.png from the flights in `recordings`."""
-    flights = load_flights(recordings)
-    flown = px4_study.load_flights(recordings)
-    page = make_page(flights, px4_study.make_values(flown, recordings, PUBLISHED_PX4), published)
+    flights = {name: flown.true for name, flown in px4_study.load_flights(FLIGHTS, recordings).items()}
+    flown = px4_study.load_flights(px4_study.FLIGHTS, recordings)
+    page = make_page(flights, px4_study.make_values(flown, recordings, PUBLISHED_PX4))
     (out / "study").mkdir(exist_ok=True)
     with matplotlib.rc_context(STYLE):
         figures = {**draw_pictures(flights),
                    **px4_study.draw_pictures(flown, [float(cell) for cell in PUBLISHED_PX4])}
         for name, figure in figures.items():
+            lay_out(figure)
             save(figure, out / "study" / f"{name}.png", DPI)
     (out / "study.md").write_text(page)
     return out / "study.md"

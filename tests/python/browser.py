@@ -9,8 +9,10 @@ import tempfile
 PROGRAM = shutil.which("chromium")
 MISSING = "skipped: no Chromium (apt-get install chromium)"
 
+DARK = "--blink-settings=preferredColorScheme=0"
+NARROW = "--window-size=700,900"
 # Added to a copy of the page. After loading it writes its findings into attributes of <body>: number of images, of
-# broken images and of requests, and the overflow in px.
+# broken images and of requests, the overflow in px, and the colour of the ground.
 PROBE = """<script>
 addEventListener("load", () => {
   const images = [...document.images];
@@ -20,6 +22,7 @@ addEventListener("load", () => {
   document.body.dataset.requests = performance.getEntriesByType("resource")
       .filter(entry => !entry.name.startsWith("data:")).length;
   document.body.dataset.seen = images.length;
+  document.body.dataset.ground = getComputedStyle(document.body).backgroundColor;
 });
 </script>"""
 
@@ -35,15 +38,23 @@ def run(page: pathlib.Path, *flags: str) -> tuple[str, str]:
     return done.stdout, done.stderr
 
 
-def render(page: pathlib.Path) -> tuple[str, list[str]]:
+def render(page: pathlib.Path, *flags: str) -> tuple[str, list[str]]:
     """The document after loading, with the probe's findings and without its pictures, and the page's
     messages on the console."""
     with tempfile.TemporaryDirectory() as folder:
         copy = pathlib.Path(folder) / page.name
         copy.write_text(page.read_text().replace("</body>", f"{PROBE}</body>"))
-        document, log = run(copy, "--dump-dom")
+        document, log = run(copy, "--dump-dom", *flags)
     document = re.sub(r'"data:image[^"]*"', '"data:"', document)
     return document, [line for line in log.splitlines() if "CONSOLE" in line]
+
+
+def count_printed_pages(page: pathlib.Path) -> int:
+    """The pages of the printed page."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = pathlib.Path(folder) / "page.pdf"
+        run(page, f"--print-to-pdf={file}", "--no-pdf-header-footer")
+        return len(re.findall(rb"/Type /Page\b", file.read_bytes()))
 
 
 def take_picture(page: pathlib.Path, picture: pathlib.Path, height: int = 768) -> None:

@@ -174,7 +174,7 @@ class ReportTest(CampaignTest):
         reader = Reader(page)
         words = " ".join(reader.words)
         for part in ("synthetic", f"{table.count('lost')} lost", "4 failed", "400 runs", "Wilson",
-                     "Share lost along each varied key", "median of load_error_rms_m",
+                     "Share lost along each varied key", "Median of the finished runs", "load_error_rms_m (m)",
                      "controller: qsf against pid", "McNemar", "All together", "Worst runs",
                      "./sls campaign config/campaigns/synthetic.yaml --runs 99-99 --out "
                      "/tmp/run-99", "x86-64-v3", "load_x_m is not finite", "base: eight.yaml"):
@@ -189,6 +189,29 @@ class ReportTest(CampaignTest):
              1, ""] for run in range(10)], campaign=ONE_RUN_OF_A_DRAW))
         # 3 of 10: Wilson's interval is 10.78 % to 60.32 %, as in textbooks.
         self.assertIn("<td>lost</td><td>3</td><td>30 %</td><td>10.78 % to 60.32 %</td>", page)
+
+    def test_a_field_without_a_finished_run_says_lost_or_failed_and_one_without_a_run_says_so(self):
+        rows = [[run, str(run % 3), str(run // 3), LAWS[0], *outcome, "" if outcome[0] != "finished" else "0.5", "1",
+                 "1", "", 1, ""] for run, outcome in enumerate(4 * [("finished", "")] + 2 * [("lost", "x")]
+                                                               + [("failed", "y")])]
+        page = make_campaign_report(self.write_campaign(rows=rows, campaign=NO_DRAWS))
+        for title, colour in (("0, 0: 0.5 (1 finished)", "#21908d"), ("2, 1: – (1 lost)", "var(--axis)"),
+                              ("0, 2: – (1 failed)", "var(--axis)"), ("1, 2: – (no run)", "var(--missing)")):
+            self.assertIn(f'fill="{colour}"><title>{title}</title>', page)
+        self.assertNotIn("95 %</th>", page.split("Measures")[0])
+        self.assertNotIn("Wilson", page)
+
+    def test_axes_have_names_units_and_round_ticks(self):
+        rows = [[run, repr(0.0007 * run), str(run % 20), LAWS[0], "finished" if run % 7 else "lost", "",
+                 repr(0.013 * run), "1", "1", "", 1, ""] for run in range(300)]
+        words = Reader(make_campaign_report(self.write_campaign(
+            rows=rows, manifest={"campaign": "c", "file": "f", "runs_csv_sha256": "abc"}))).words
+        for label in ("vehicle.load_mass_kg (kg)", "faults.0.delay.by_s (s)", "load_error_rms_m (m)",
+                      "share lost or failed", "runs", "runs up to here", "runs_csv_sha256"):
+            self.assertIn(label, words)
+        self.assertEqual(words[words.index("share lost or failed") + 1:][:6], [f"{n} %" for n in range(0, 101, 20)])
+        first = words.index("vehicle.load_mass_kg (kg)")
+        self.assertEqual(words[first - 5:first], ["0", "0.05", "0.1", "0.15", "0.2"])
 
     def test_it_refers_to_nothing_outside_itself_and_text_is_no_markup(self):
         page = make_campaign_report(self.write_campaign())
@@ -242,8 +265,9 @@ class ReportTest(CampaignTest):
     def test_a_browser_renders_it_without_a_word_and_asks_for_nothing(self):
         folder = self.write_campaign()
         page = self.folder / "report.html"
-        page.write_text(make_campaign_report(folder))
-        document, console = browser.render(page)
+        page.write_text(make_campaign_report(folder).replace("load_error_rms_m", 58 * "w" + "_rms_m"))
+        document, console = browser.render(page, browser.DARK, browser.NARROW)
+        self.assertIn('data-ground="rgb(14, 18, 22)"', document)
         self.assertEqual(console, [])
         self.assertIn('data-overflow="0"', document)
         self.assertIn('data-requests="0"', document)

@@ -1,5 +1,6 @@
 """Command lines, figures and reports, from recordings written here; the report in a browser."""
 
+import base64
 import os
 import re
 import subprocess
@@ -12,10 +13,12 @@ import browser
 import support
 import numpy as np
 
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from sls import figures
 from sls.recordings import Recording
 from support import write_recording
 
+LONG = "_figure_eight_with_a_heavier_load_a_delay_and_a_gust_from_the_north"[:63]
 NO_SCENE = "sls: report without its scene: "
 VIEWER, FLYER = support.BUILD / "bin/sls_view", support.BUILD / "bin/closed_loop"
 os.environ.pop("SLS_VIEW", None)  # only tests of the scene use sls_view
@@ -64,11 +67,16 @@ class PlotTest(support.FolderTest):
         self.assertEqual(names_of(self.folder / "r/figures", "png"), ALL | {"fleet"})
         self.expect_refused(["plot", "r", "--vehicle", "3"], "expected a vehicle of this recording")
 
-    def test_a_single_row_is_plotted(self):
-        for rotors in (0, 4):
-            write_recording(self.folder / "r", last=0, complete=False, rotors=rotors)
-            self.assertEqual(self.run_sls("plot", "r")[0], 0)
-            self.assertEqual(self.run_sls("report", "r")[0], 0)
+    def test_a_flight_of_one_state_has_no_figures_and_no_axes(self):
+        write_recording(self.folder / "r", last=0, complete=False, rotors=4)
+        code, output = self.run_sls("plot", "r")
+        self.assertEqual(code, 2)
+        self.assertIn("sls: error: r: expected a flight of two states or more, got one that ended at its first", output)
+        self.assertFalse((self.folder / "r/figures").exists())
+        self.assertEqual(self.run_sls("report", "r")[0], 0)
+        page = (self.folder / "r/report.html").read_text()
+        self.assertIn("No data: the flight ended at step 0.", page)
+        self.assertNotIn("<figure", page)
 
     def test_a_multirotor_has_figures_of_attitude_rates_rotors_and_thrust(self):
         write_recording(self.folder / "r", last=50, rotors=4, vehicles=(0, 1))
@@ -82,6 +90,66 @@ class PlotTest(support.FolderTest):
         # Together with a point mass, and with a vehicle that has another number of rotors.
         self.assertEqual(self.run_sls("plot", "point", "r", "six", "--out", "o")[0], 0)
         self.assertEqual(names_of(self.folder / "o", "png"), BODY)
+
+    def test_load_and_quadrotor_have_one_colour_each_in_scene_and_figures(self):
+        write_recording(self.folder / "r", last=50)
+        flight = Recording(self.folder / "r").load_flight(0, "r")
+        drawn = figures.make_figures([flight])
+        colours = dict(re.findall(r"--(\w+): (#\w+)", (support.ROOT / "python/sls/colours.css").read_text()))
+        lines = {line.get_label(): line.get_color() for line in drawn["positions"].axes[0].lines}
+        self.assertEqual((lines["load"], lines["quadrotor"], lines["reference"]),
+                         (colours["load"], colours["quad"], colours["reference"]))
+        self.assertEqual(drawn["errors"].axes[0].lines[0].get_color(), colours["load"])
+        self.assertEqual(drawn["forces"].axes[0].lines[0].get_color(), colours["quad"])
+        style = "".join(file.read_text() for file in (support.ROOT / "tools/view/page/src").rglob("*.css"))
+        self.assertIn("python/sls/colours.css", style)
+        for colour in colours.values():
+            self.assertNotIn(colour, style)
+
+    def test_flights_drawn_together_differ_in_line_style_too(self):
+        write_recording(self.folder / "r", last=50)
+        flight = Recording(self.folder / "r").load_flight(0, "r")
+        flights = [replace(flight, name=str(number)) for number in range(9)]
+        for name, figure in figures.make_figures(flights).items():
+            lines = [line for line in figure.axes[0].lines if line.get_label() != "reference"]
+            styles = [(line.get_color(), line.get_linestyle()) for line in lines]
+            self.assertEqual(len(set(styles)), 9, name)
+            self.assertEqual(len({style for _, style in styles}), 4, name)
+
+    def test_figures_for_a_paper_have_its_width_no_title_and_the_chosen_panels(self):
+        write_recording(self.folder / "r", last=50)
+        code, output = self.run_sls("plot", "r", "--paper", "1", "--panels", "errors:2,6", "path", "--out", "o")
+        self.assertEqual(code, 0, output)
+        self.assertEqual({path.name for path in (self.folder / "o").iterdir()}, {"errors.pdf", "path.pdf"})
+        box = re.search(rb"/MediaBox \[ 0 0 (\S+) ", (self.folder / "o/errors.pdf").read_bytes())
+        self.assertEqual(float(box[1]), 3.5 * 72)
+        self.assertNotIn(b"/Type3", (self.folder / "o/errors.pdf").read_bytes())
+        flight = Recording(self.folder / "r").load_flight(0, "r")
+        figure = figures.make_figures([flight], (), 2.0, {"errors": [2, 6]})["errors"]
+        self.assertEqual([axes.get_ylabel() for axes in figure.axes], ["|x| (m)", "|z| (m)"])
+        self.assertEqual(([axes.get_xlabel() for axes in figure.axes], figure.texts), (["", "time (s)"], []))
+        self.expect_refused(["plot", "r", "--panels", "errors:7"], "--panels: expected panels of 1 to 6 of", "got 7")
+        self.expect_refused(["plot", "r", "--panels", "rotors"], "some of positions, errors, ", "got 'rotors'")
+        self.expect_refused(["plot", "r", "--panels", "errors:x"], "expected NAME or NAME:N,…, got 'errors:x'")
+        self.expect_refused(["plot", "r", "--paper", "9"], "--paper: expected 0.5 to 4 columns, got '9'")
+
+    def test_an_error_that_is_always_0_has_no_logarithmic_axis(self):
+        write_recording(self.folder / "r", last=50)  # a set-point: no error in x and y
+        figure = figures.make_figures([Recording(self.folder / "r").load_flight(0, "r")])["errors"]
+        self.assertEqual([axes.get_yscale() for axes in figure.axes], ["linear"] * 5 + ["log"])
+        self.assertEqual([text.get_text() for text in figure.axes[1].texts], ["0 at every step"])
+        self.assertEqual(list(figure.axes[1].get_yticks()), [])
+
+    def test_long_names_stay_within_the_figure(self):
+        write_recording(self.folder / "r", last=50)
+        flight = Recording(self.folder / "r").load_flight(0, "r")
+        for paper in (None, 1.0):
+            flights = [replace(flight, name=f"{number}{LONG}") for number in range(5)]
+            figure = figures.make_figures(flights, (), paper)["errors"]
+            FigureCanvasAgg(figure).draw()
+            legend, page = figure.legends[0].get_window_extent(), figure.bbox
+            self.assertLessEqual(legend.x1, page.x1)
+            self.assertGreater(legend.y0, max(axes.get_window_extent().y1 for axes in figure.axes))
 
     def test_commanded_and_actual_motion_are_drawn_together(self):
         write_recording(self.folder / "r", last=50, rotors=4)
@@ -216,6 +284,21 @@ class ReportTest(support.FolderTest):
         self.assertGreater(picture.stat().st_size, 20000)
 
     @unittest.skipUnless(browser.PROGRAM, browser.MISSING)
+    def test_in_the_dark_page_and_figures_are_dark_and_long_names_fit_700_pixels(self):
+        write_recording(self.folder / "r")
+        for name in ("manifest.json", "scenario.yaml", "reference.csv"):
+            path = self.folder / "r" / name
+            path.write_text(path.read_text().replace("synthetic", f"s{LONG}").replace(",set_point,", f",s{LONG},"))
+        self.assertEqual(self.run_sls("report", "r")[0], 0)
+        page = self.folder / "r/report.html"
+        document, _ = browser.render(page, browser.DARK, browser.NARROW)
+        self.assertIn('data-ground="rgb(14, 18, 22)"', document)
+        self.assertIn('data-overflow="0"', document)
+        self.assertIn('data-ground="rgb(244, 245, 247)"', browser.render(page)[0])
+        for picture in re.findall(r'src="data:image/svg\+xml;base64,([^"]*)"', page.read_text()):
+            self.assertIn(b"prefers-color-scheme: dark", base64.b64decode(picture))
+
+    @unittest.skipUnless(browser.PROGRAM, browser.MISSING)
     def test_the_browser_would_tell_what_is_wrong(self):
         page = self.write("bad.html", '<body><div style="width: 3000px">x</div>'
                                       '<img src="data:image/png;base64,AAAA">'
@@ -254,6 +337,17 @@ class SceneTest(support.FolderTest):
         page, output = self.make_report("r", program)
         self.assertEqual(output.count("\n"), 2, output)
         self.assertIn(NO_SCENE, output)
+
+    @unittest.skipUnless(browser.PROGRAM, browser.MISSING)
+    def test_the_scene_is_not_printed(self):
+        write_recording(self.folder / "r", last=0)
+        program = self.write("scene", '#!/bin/sh\necho "<p>scene" > "$3"\n')
+        program.chmod(0o755)
+        page, _ = self.make_report("r", program)
+        self.assertIn("<iframe", page.read_text())
+        with_scene = browser.count_printed_pages(page)
+        page.write_text(re.sub("<iframe.*</iframe>", "", page.read_text(), flags=re.DOTALL))
+        self.assertEqual(with_scene, browser.count_printed_pages(page))
 
     def test_a_program_that_writes_too_much_leaves_a_report_without_scene(self):
         write_recording(self.folder / "r", last=50)

@@ -41,10 +41,8 @@ class StudyTest(unittest.TestCase):
     def setUpClass(cls):
         with contextlib.ExitStack() as stack:
             cls.folder = pathlib.Path(stack.enter_context(tempfile.TemporaryDirectory()))
-            domain = stack.enter_context(support.OwnDomain())
             done = subprocess.run(
-                [support.ROOT / "sls", "study", "--out", "s", "--recordings", "r", "--domain",
-                 domain], cwd=cls.folder, env={**os.environ, "SLS_BUILD": support.BUILD},
+                [support.ROOT / "sls", "study", "--out", "s", "--recordings", "r"], cwd=cls.folder, env={**os.environ, "SLS_BUILD": support.BUILD},
                 capture_output=True, text=True, timeout=1500)
             if done.returncode != 0:
                 raise AssertionError(done.stdout + done.stderr)

@@ -17,7 +17,7 @@ import numpy as np
 import yaml
 
 from sls.campaign import drawing
-from sls.campaign.drawing import OUTCOME_COLOURS, format_number, format_share
+from sls.campaign.drawing import OUTCOME_COLOURS, Scale, format_number, format_share, name_unit
 from sls.campaign.pairs import (describe_changes, describe_interval, find_pairs, make_measure_rows,
                                 make_outcome_rows)
 from sls.campaign.run_table import OUTCOMES, RunTable, find_rows, read_runs
@@ -27,6 +27,7 @@ from sls.report import STYLE_SHEET, escape, make_section
 
 MOST_VALUES = 41  # a key with more values gets bins of equal width instead of one bin per value
 BINS = 20
+FEW = 8  # so many values are named each
 MOST_WORDS = 12  # texts of a drawn key; keys with more are derived lists, whose pictures would be unreadable
 MOST_PAIRS = 10  # drawn pairs of varied keys
 MOST_LINES = 400  # lines in the picture of parallel coordinates
@@ -41,8 +42,10 @@ svg { display: block; width: 100%; height: auto; margin: 0 auto 8px; }
 h3 { font-size: 14px; margin: 14px 0 4px; overflow-wrap: anywhere; }
 code { font-size: 12.5px; }
 .left td, .left th { text-align: left; }
-.left td { white-space: normal; }
-.left td:first-child { width: 1%; }
+.left td { white-space: normal; overflow-wrap: anywhere; min-width: 9em; }
+.left td:first-child { width: 1%; min-width: 58px; }
+.key { display: inline-block; width: 11px; height: 11px; }
+@media screen and (max-width: 800px) { .pair { grid-template-columns: minmax(0, 1fr); } }
 """
 
 
@@ -50,9 +53,9 @@ code { font-size: 12.5px; }
 class Bins:
     """The classes of a varied key."""
 
-    label: str
     names: list[str]
     places: np.ndarray  # (n,) class of each run
+    scale: Scale | None = None  # of numbers that the classes divide evenly, from end to end
 
 
 def make_campaign_report(folder: Path) -> str:
@@ -107,25 +110,29 @@ def read_manifest(file: Path) -> dict[str, Any]:
 
 
 def make_bins(table: RunTable, key: str, most_values: int = MOST_VALUES) -> Bins:
-    """A class for each value. Many values get classes of equal width, or of equal ratio in a wide range."""
+    """A class for each value. Many values get classes of equal width, or of equal ratio in a wide range; these have a
+    scale, as numbers of equal distance have."""
     if key in table.words:
         words, places = table.words[key]
         names = list(map(name_word, words))
         if len(words) <= most_values:
-            return Bins(key, names, places)
+            return Bins(names, places)
         # Too many words to draw: those after the first ones form one class.
-        return Bins(key, [*names[:most_values - 1], "others"],
+        return Bins([*names[:most_values - 1], "others"],
                     np.minimum(places, most_values - 1))
     values = table.numbers[key]
     unique, places = np.unique(values, return_inverse=True)
-    if len(unique) <= most_values:
-        return Bins(key, [format_number(value) for value in unique], places)
     low, high = float(unique[0]), float(unique[-1])
-    edges = (np.geomspace if drawing.deserves_log(unique) else np.linspace)(low, high, BINS + 1)
+    if len(unique) <= most_values:
+        half = (high - low) / 2 / max(1, len(unique) - 1)
+        is_even = len(unique) > FEW and np.allclose(np.diff(unique), 2 * half)
+        return Bins([format_number(value) for value in unique], places,
+                    Scale(low - half, high + half, 0, 1) if is_even else None)
+    is_log = drawing.deserves_log(unique)
+    edges = (np.geomspace if is_log else np.linspace)(low, high, BINS + 1)
     places = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, BINS - 1)
-    middles = (np.sqrt(edges[1:] * edges[:-1]) if drawing.deserves_log(unique)
-               else (edges[1:] + edges[:-1]) / 2)
-    return Bins(key, [f"{middle:.2g}" for middle in middles], places)
+    names = [f"{format_number(a)} to {format_number(b)}" for a, b in zip(edges, edges[1:])]
+    return Bins(names, places, Scale(low, high, 0, 1, is_log))
 
 
 def list_drawn_keys(table: RunTable) -> list[str]:
@@ -194,10 +201,10 @@ def make_plain_table(header: Sequence[str], rows: Sequence[Sequence[str]], style
 
 
 def make_outcomes(table: RunTable) -> str:
-    rows = [[escape(outcome), str(table.count(outcome)),
-             format_share(table.count(outcome) / len(table)),
-             describe_interval(table.is_outcome(outcome), table.draw)] for outcome in OUTCOMES]
-    page = make_plain_table(("outcome", "runs", "share", "95 % interval (Wilson)"), rows)
+    is_drawn = table.draw is not None
+    rows = [[escape(outcome), str(table.count(outcome)), format_share(table.count(outcome) / len(table)),
+             *([describe_interval(table.is_outcome(outcome), table.draw)] if is_drawn else [])] for outcome in OUTCOMES]
+    page = make_plain_table(("outcome", "runs", "share", *(["95 % interval (Wilson)"] if is_drawn else [])), rows)
     if table.reasons:
         common = sorted(table.reasons.items(), key=lambda item: (-item[1], item[0]))
         page += "<h3>Reasons</h3>" + make_plain_table(
@@ -222,8 +229,8 @@ def make_share_picture(table: RunTable, key: str) -> str:
                 here = bins.places == place
                 low, high = calc_share_interval(is_lost(table)[here], table.draw[here])
                 title += f", {100 * low:.1f} % to {100 * high:.1f} %"
-            rows.append((name, count / total, low, high, title))
-    return f"<div>{drawing.draw_shares(rows, key)}</div>"
+            rows.append((place, count / total, low, high, title))
+    return f"<div>{drawing.draw_shares(rows, bins.names, bins.scale, name_unit(key))}</div>"
 
 
 def make_key_section(table: RunTable) -> str:
@@ -243,19 +250,21 @@ def make_heat_maps(table: RunTable, x: str, y: str, measure: str | None) -> str:
     columns, rows = make_bins(table, x), make_bins(table, y)
     shape = (len(rows.names), len(columns.names))
     place = rows.places * shape[1] + columns.places
-    counts = np.bincount(place, minlength=shape[0] * shape[1]).reshape(shape)
-    lost = np.bincount(place[is_lost(table)], minlength=shape[0] * shape[1]).reshape(shape)
-    names, labels = (columns.names, rows.names), (x, y)
+    counts = np.array([np.bincount(place[table.is_outcome(outcome)], minlength=shape[0] * shape[1])
+                       for outcome in OUTCOMES]).reshape(len(OUTCOMES), *shape)
+    total, lost = counts.sum(axis=0), counts[1:].sum(axis=0)
+    told = [[", ".join(f"{count} {outcome}" for count, outcome in zip(counts[:, row, column], OUTCOMES) if count)
+             for column in range(shape[1])] for row in range(shape[0])]
+    classes = told, (columns.names, rows.names), (columns.scale, rows.scale), (name_unit(x), name_unit(y))
     pictures = ""
     if np.any(lost):
-        with np.errstate(invalid="ignore"):
-            share = np.where(counts > 0, lost / np.maximum(counts, 1), np.nan)
-        picture = drawing.draw_heat(share, counts, names, labels, "share lost", (0, 1))
-        pictures += f"<div>{picture}</div>"
+        share = np.where(total > 0, lost / np.maximum(total, 1), np.nan)
+        pictures += f"<div>{drawing.draw_heat(share, *classes, 'Share lost', 'share lost or failed', True)}</div>"
     if measure is not None:
         medians = calc_class_medians(table, measure, place, shape)
-        title = f"median of {measure}, finished runs"
-        pictures += f"<div>{drawing.draw_heat(medians, counts, names, labels, title)}</div>"
+        if np.any(np.isfinite(medians)):
+            picture = drawing.draw_heat(medians, *classes, "Median of the finished runs", name_unit(measure))
+            pictures += f"<div>{picture}</div>"
     return pictures
 
 
@@ -282,8 +291,10 @@ def make_pair_section(table: RunTable) -> str:
     pictures = "".join(make_heat_maps(table, x, y, measure) for x, y in pairs)
     return make_section(
         "Pairs of varied keys",
-        f"<div class=\"pair\">{pictures}</div><p class=\"small\">Grey: no run there. Keys of many "
-        f"values are counted in {BINS} classes, named by their middles.</p>")
+        f"<div class=\"pair\">{pictures}</div><p class=\"small\"><span class=\"key\" style=\"background:"
+        f"{drawing.MISSING_COLOUR}\"></span> no run. <span class=\"key\" style=\"background:"
+        f"{drawing.UNFINISHED_COLOUR}\"></span> no run finished: each was lost or failed. Keys of many values are "
+        f"counted in {BINS} classes.</p>")
 
 
 def make_paired_section(table: RunTable, key: str) -> str:
@@ -323,7 +334,7 @@ def make_measures(table: RunTable) -> str:
             beyond = len(values) - len(finite)
             note = (f"<p class=\"small\">{beyond} infinite values are not drawn.</p>"
                     if beyond else "")
-            picture = (f"<h3>{escape(name)}</h3>{drawing.draw_distribution(finite, name)}{note}")
+            picture = (f"<h3>{escape(name)}</h3>{drawing.draw_distribution(finite, name_unit(name))}{note}")
             if name.startswith("stage_"):
                 stages += picture
             else:
@@ -358,11 +369,11 @@ def make_parallel(table: RunTable) -> str:
             bins = make_bins(table, key, 12)
             axes.append((key, bins.places[sample].astype(float), bins.names))
         else:
-            axes.append((key, table.numbers[key][sample], None))
+            axes.append((name_unit(key), table.numbers[key][sample], None))
     axes.append(("outcome", table.outcome[sample].astype(float), OUTCOMES))
     shown = [name for name in table.measures if not name.startswith("stage_")
              and not name.endswith(("_x_m", "_y_m", "_z_m"))]
-    axes += [(name, table.numbers[name][sample], None) for name in (shown or table.measures)[:6]]
+    axes += [(name_unit(name), table.numbers[name][sample], None) for name in (shown or table.measures)[:6]]
     colours = [OUTCOME_COLOURS[OUTCOMES[place]] for place in table.outcome[sample]]
     return (f"<div class=\"scroll\">{drawing.draw_parallel(axes, colours)}</div>"
             f"<p class=\"small\">One line per run: {len(sample)} of {len(table)} runs, evenly "
@@ -437,4 +448,4 @@ def flatten(value: Any, place: str = "") -> list[tuple[str, str]]:
     if isinstance(value, float) and math.isfinite(value):
         return [(place, f"{value:g}")]
     text = ", ".join(map(str, value)) if isinstance(value, list) else str(value)
-    return [(place.replace("_", " "), text if len(text) <= 160 else f"{text[:159]}…")]
+    return [(place, text if len(text) <= 160 else f"{text[:159]}…")]

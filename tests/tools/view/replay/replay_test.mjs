@@ -197,6 +197,28 @@ test("sls_view serves two recordings, and says what is wrong with a folder that 
   await page.close();
 });
 
+test("a flight of one step has no axes, and names and legends stay whole at the width of a report", async () => {
+  const short = fly("one-step", (text) => text.replace(/for_s: .*/, "for_s: 0.004"));
+  for (const file of ["state.csv", "command.csv", "reference.csv"])
+    writeFileSync(join(short, file), readFileSync(join(short, file), "utf8").split("\n").slice(0, 2).join("\n") + "\n");
+  const { page } = await open(pathToFileURL(exportPage("one-step.html", short)).href);
+  await waitFor(page, () => document.querySelector(".plot-body.empty"));
+  assert.equal(await page.$("#plots canvas"), null);
+  await page.goto(pathToFileURL(exportPage("report-width.html", join(folder, "first"))).href);
+  await page.setViewport({ width: 1030, height: 680 });
+  await waitFor(page, () => document.querySelector("#plots canvas"));
+  const rows = (selector) => page.$$eval(selector, (all) =>
+    Math.max(...all.map((one) => new Set([...one.children].map((child) => child.getBoundingClientRect().top)).size)));
+  assert.equal(await rows(".plot[open] .legend"), 1);
+  // A word is not broken: the text of an event needs no more lines than it has words.
+  const broken = await page.$$eval("#events button", (all) => all.filter((one) => {
+    const range = document.createRange();
+    range.selectNodeContents(one.lastChild);
+    return new Set([...range.getClientRects()].map((box) => box.top)).size > one.lastChild.textContent.split(" ").length;
+  }).length);
+  assert.equal(broken, 0);
+});
+
 test("a damaged recording in the page is named on it", async () => {
   const html = readFileSync(join(folder, "one.html"), "utf8");
   const begin = html.indexOf(">", html.indexOf('id="sls-recording-0"')) + 1;

@@ -1,10 +1,12 @@
+const readColour = (name: string) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+
 /**
- * Colours of the vehicle's parts: the same in dark and light, unlit, so that the colour of a pixel identifies the part.
- * Shapes differ, too: a quadrotor is a frame with rotors, a load a sphere, a reference a reticle.
+ * Colours of the vehicle's parts (python/sls/colours.css): the same in dark and light, unlit, so that the colour of a
+ * pixel identifies the part. Shapes differ, too: a quadrotor is a frame with rotors, a load a sphere, a reference a reticle.
  */
-export const kQuadColour = 0x1f84d6;
-export const kLoadColour = 0xe08600;
-export const kReferenceColour = 0xc44a9c;
+export const kQuadColour = readColour("quad");
+export const kLoadColour = readColour("load");
+export const kReferenceColour = readColour("reference");
 
 /** Colours of the page that the theme gives: custom properties of style.css. */
 export interface Theme {
@@ -23,21 +25,19 @@ export interface Theme {
 }
 
 export function readTheme(): Theme {
-  const style = getComputedStyle(document.documentElement);
-  const get = (name: string) => style.getPropertyValue(`--${name}`).trim();
   return {
-    background: get("scene"),
-    grid: get("grid"),
-    gridMajor: get("grid-major"),
-    text: get("text"),
-    muted: get("muted"),
-    accent: get("accent"),
-    frame: get("frame"),
-    outline: get("outline"),
-    plotGrid: get("plot-grid"),
-    series: [1, 2, 3, 4, 5, 6, 7, 8].map((index) => get(`series-${index}`)),
-    fault: get("fault"),
-    event: get("muted"),
+    background: readColour("scene"),
+    grid: readColour("grid"),
+    gridMajor: readColour("grid-major"),
+    text: readColour("text"),
+    muted: readColour("muted"),
+    accent: readColour("accent"),
+    frame: readColour("frame"),
+    outline: readColour("outline"),
+    plotGrid: readColour("plot-grid"),
+    series: [1, 2, 3, 4, 5, 6, 7, 8].map((index) => readColour(`series-${index}`)),
+    fault: readColour("fault"),
+    event: readColour("muted"),
   };
 }
 

@@ -228,7 +228,7 @@ export class Fleet {
     geometry: BufferGeometry,
     count: number,
     order: number,
-    look: { colour?: keyof Theme; fixed?: number; side?: typeof BackSide | typeof DoubleSide; opacity: number;
+    look: { colour?: keyof Theme; fixed?: string; side?: typeof BackSide | typeof DoubleSide; opacity: number;
             vertexColors?: boolean },
   ): Part {
     const material = new MeshBasicMaterial({

@@ -109,8 +109,14 @@ export class Plots {
 
   private redraw(): void {
     const [from, to] = this.calcWindow();
+    const isEmpty = this.samples.every(({ count }) => count < 2); // a single sample makes no line
     for (const panel of this.panels) {
       if (!panel.isVisible || !panel.root.open || !panel.isStale) continue;
+      panel.body.classList.toggle("empty", isEmpty);
+      if (isEmpty) {
+        this.showReadouts(panel, null);
+        continue;
+      }
       panel.plot ??= this.makePlot(panel);
       panel.isStale = false;
       panel.plot.batch(() => {
