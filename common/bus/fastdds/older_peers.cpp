@@ -136,7 +136,8 @@ std::optional<PlainAnnouncement> find_announcement(const std::uint8_t* message, 
     }
     found.is_leaving = (flags & kSample) == 0;
     std::copy_n(message + kPrefix, kPrefixSize, found.sender.bytes.begin());
-    if (is_of_fastdds ? is_new : !is_of_cyclone) return found;
+    const bool lacks_secure_one = is_of_cyclone || (is_of_fastdds && !is_new);
+    if (!lacks_secure_one) return found;
     auto& copy = found.as_secure;
     copy.assign(message, message + size);
     const auto at = copy.begin() + (ids - message);
