@@ -7,9 +7,11 @@ readonly root
 # If installed, this file is PREFIX/share/sls/sls, and nothing is built.
 [[ $root == */share/sls && ! -f $root/CMakeLists.txt ]] && is_installed=1 || is_installed=0
 readonly is_installed build="${SLS_BUILD:-$root/build}"
-readonly packages=(g++ make ninja-build cmake libeigen3-dev libsimbody-dev libfastcdr-dev
-  fastddsgen default-jre-headless libyaml-cpp-dev libcli11-dev libspdlog-dev nlohmann-json3-dev libgtest-dev libssl-dev
-  libtinyxml2-dev openssl pybind11-dev python3-dev python3-numpy libboost-dev libzstd-dev zlib1g-dev)
+readonly flight_packages=(g++ ninja-build cmake libeigen3-dev libsimbody-dev libfastcdr-dev fastddsgen
+  default-jre-headless libyaml-cpp-dev libcli11-dev libspdlog-dev nlohmann-json3-dev libssl-dev libtinyxml2-dev
+  libzstd-dev)
+# Of tools, page, Python module and tests.
+readonly packages=(make libgtest-dev openssl pybind11-dev python3-dev python3-numpy libboost-dev zlib1g-dev)
 readonly fuzz_packages=(clang libclang-rt-dev)
 readonly test_packages=(libgmock-dev libmpfr-dev python3-mpmath iproute2 nftables cyclonedds-dev cyclonedds-tools fastdds-tools libfaketime
   python3-pytest python3-venv slurm-wlm munge python3-distributed chromium mandoc debootstrap git codespell)
@@ -39,17 +41,18 @@ expect_system() {
     fail "this system is $name; tried are Debian 12 and 13. Elsewhere install by hand what the lists at the top of $root/sls name, then add --no-install"
 }
 
-# setup [PACKAGE…]: installs the packages for building and flying, and the given ones.
+# setup_flight [PACKAGE…]: installs the packages for building the programs of a flight, and the given ones.
+setup_flight() {
+  ((is_installing)) || return 0
+  expect_system
+  local -n own="${system}_packages"
+  install_missing "${flight_packages[@]}" "${own[@]}" "$@"
+}
+
+# setup [PACKAGE…]: installs the packages for building everything, and the given ones.
 setup() {
-  if ((is_installed)); then
-    install_missing "$@"
-    return
-  fi
-  if ((is_installing)); then
-    expect_system
-    local -n own="${system}_packages"
-    install_missing "${packages[@]}" "${own[@]}" "$@"
-  fi
+  ((is_installed == 0)) || { install_missing "$@"; return; }
+  setup_flight "${packages[@]}" "$@"
   install_node
   install_node_modules "$root/tools/view/page"
 }
@@ -62,9 +65,7 @@ install_node() {
   ((${#missing[@]} == 0)) || install_missing "${missing[@]}"
   local version
   version="$(node --version)" || fail "node --version failed"
-  if ! [[ $version =~ ^v([0-9]+)\. ]] || ((BASH_REMATCH[1] < 18)); then
-    fail "node: expected version 18 or later, got $version"
-  fi
+  [[ $version =~ ^v([0-9]+)\. ]] && ((BASH_REMATCH[1] >= 18)) || fail "node: expected version 18 or later, got $version"
 }
 
 # install_node_modules FOLDER: installs the packages of FOLDER's lock file if this file has changed. Does nothing if
@@ -82,13 +83,6 @@ install_node_modules() {
   touch "$installed"  # npm leaves it older than the lock file where nothing had to change
 }
 
-# find_line START FILE [TEXT]: prints TEXT and the rest of the first line that begins with START.
-find_line() {
-  local line
-  line="$(sed -nE "s/$1//p" "$2" | head -n 1)"
-  [[ -z $line ]] || echo -n "${3:-}$line"
-}
-
 install_missing() {
   ((is_installing)) || return 0
   local missing=() package installed
@@ -100,18 +94,17 @@ install_missing() {
   ((is_installed == 0)) || fail "this needs packages that are not installed: apt-get install ${missing[*]}"
   expect_system
   say "installing with apt-get: ${missing[*]}"
-  local sudo=()
+  local sudo=() log
   if ((EUID != 0)); then
     command -v sudo >/dev/null || fail "set-up needs root: apt-get install ${missing[*]}"
     sudo=(sudo)
   fi
-  local log
   log="$(mktemp)"
-  if ! { "${sudo[@]}" apt-get update &&
-    "${sudo[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends \
-      "${missing[@]}"; } >"$log" 2>&1; then
+  if ! { "${sudo[@]}" apt-get update && "${sudo[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y \
+    --no-install-recommends "${missing[@]}"; } >"$log" 2>&1; then
     # apt-get update only warns where the network is missing; then packages are unknown.
-    fail "apt-get: $(find_line '^E: ' "$log")$(find_line '^W: Failed to fetch ' "$log" '; ') (whole log: $log)"
+    fail "apt-get: $(sed -n 's/^E: //p' "$log" | head -n 1)$(
+      sed -n 's/^W: Failed to fetch /; /p' "$log" | head -n 1) (whole log: $log)"
   fi
   rm -f "$log"
 }
@@ -128,12 +121,23 @@ is_built() {
   has_tree "$1" && [[ $(ninja -C "$1" -n "${@:2}" 2>/dev/null) == *'ninja: no work to do.' ]]
 }
 
+# show_progress LOG: writes what Ninja says into LOG, and every 15 s how far it is.
+show_progress() {
+  local line done all next=15
+  SECONDS=0
+  while IFS= read -r line; do
+    echo "$line"
+    [[ $line =~ ^\[([0-9]+)/([0-9]+)\] ]] && ((SECONDS >= next && (done = BASH_REMATCH[1]) > 0)) || continue
+    ((all = BASH_REMATCH[2], next = SECONDS + 15))
+    say "built $done of $all files; about $((SECONDS * (all - done) / done)) s left"
+  done >"$1"
+}
+
 # build_tree PRESET FOLDER [TARGET…]: configures and builds; all targets by default.
 build_tree() {
-  local preset=$1 folder=$2 targets=()
+  local preset=$1 folder=$2 targets=() fresh=() lock
   shift 2
   (($#)) && targets=(--target "$@")
-  local fresh=() lock
   mkdir -p "$folder"
   exec {lock}>"$folder/lock"
   flock "$lock"  # Ninja's files do not survive two builds of one folder at once
@@ -143,7 +147,8 @@ build_tree() {
     say "building for the first time, which takes minutes (log: $folder/build.log)"
   fi
   if ! { (cd "$root" && cmake --preset "$preset" "${fresh[@]}") &&
-    cmake --build "$folder" --parallel "$(nproc)" "${targets[@]}"; } >"$folder/build.log" 2>&1; then
+    NINJA_STATUS='[%f/%t] ' cmake --build "$folder" --parallel "$(nproc)" "${targets[@]}"; } 2>&1 |
+      show_progress "$folder/build.log"; then
     local reason
     reason="$(awk '/^CMake Error/ { found = 1; next } found && NF { sub(/^ +/, ""); text = text " " $0 }
       found && !NF && text { print text; exit }' "$folder/build.log")"
@@ -154,11 +159,17 @@ build_tree() {
   exec {lock}>&-
 }
 
-# build_programs TARGET…: brings the targets up to date.
+# build_programs TARGET…: brings the targets up to date. The target `flight` is the programs of a flight: it needs
+# neither tools nor tests, unless the tree has them.
 build_programs() {
   ! is_built "$build" "$@" || return 0
-  setup
-  build_tree release "$build" "$@"
+  if [[ $* == flight ]] && ! { has_tree "$build" && grep -qxF SLS_BUILD_TOOLS:BOOL=ON "$build/CMakeCache.txt"; }; then
+    setup_flight
+    build_tree flight "$build" "$@"
+  else
+    setup
+    build_tree release "$build" "$@"
+  fi
 }
 
 # --- actions of the launcher ----------------------------------------------------------------------

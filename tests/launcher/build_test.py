@@ -22,9 +22,15 @@ CMAKE = """cmake_minimum_required(VERSION 3.25)
 project(small LANGUAGES C)
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
 set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS CMakePresets.json)
-foreach(program IN ITEMS %s)
+set(programs %s)
+foreach(program IN LISTS programs)
   add_executable(${program} main.c)
 endforeach()
+add_custom_target(flight DEPENDS ${programs})
+option(SLS_BUILD_TOOLS "As in the root of the project" ON)
+if(SLS_BUILD_TOOLS)
+  add_executable(sls_verify main.c)
+endif()
 """ % " ".join(FLYING)
 MAIN = """#include <stdio.h>
 #include "text.h"
@@ -82,7 +88,7 @@ class BuildTest(unittest.TestCase):
 
     def expect_not_built(self, text):
         calls = self.expect_flight(text)
-        self.assertEqual([re.sub(r" -C \S+", "", call) for call in calls], ["ninja -n " + " ".join(FLYING)])
+        self.assertEqual([re.sub(r" -C \S+", "", call) for call in calls], ["ninja -n flight"])
 
     def git(self, *words):
         subprocess.run(["git", "-c", "user.name=a", "-c", "user.email=a@example.org", *words], cwd=self.root, check=True,
@@ -136,6 +142,23 @@ class BuildTest(unittest.TestCase):
         self.write("text.h", "")
         self.expect_built("flag")
         self.expect_not_built("flag")
+
+    def test_a_first_flight_builds_what_it_needs_and_a_whole_tree_stays_whole(self):
+        self.assertIn("cmake --preset flight --fresh", self.expect_flight("first"))
+        done = subprocess.run([self.root / "sls", "verify"], env=self.environment, cwd=self.folder, capture_output=True,
+                              text=True, timeout=200, check=False)
+        self.assertEqual((done.returncode, done.stdout), (0, "first\n"), done.stderr)
+        self.write("text.h", '#define TEXT "header"\n')
+        self.assertIn("cmake --preset release", self.expect_flight("header"))
+        self.expect_not_built("header")
+
+    def test_a_long_build_says_how_far_it_is(self):
+        stand_in = self.folder / "bin/cmake"
+        real = stand_in.read_text()
+        stand_in.write_text(real.replace("exec ", '[ "$1" = --preset ] || { echo "[5/20] one"; sleep 16; '
+                                         'echo "[10/20] two"; }\nexec '))
+        done, _ = self.launch()
+        self.assertRegex(done.stderr, r"sls: built 10 of 20 files; about 1[67] s left\n")
 
     def test_a_tree_that_was_made_with_make_or_copied_is_made_anew(self):
         subprocess.run(["cmake", "-G", "Unix Makefiles", "-S", self.root, "-B", self.root / "build"], check=True,

@@ -1,10 +1,15 @@
 """pip install ./python, in a virtual environment and without an index, and the package's names and classes there."""
 
+import json
 import os
 import subprocess
+import sys
 
 import conftest
 import pytest
+
+sys.path.insert(0, str(conftest.ROOT / "tests/support"))
+from own_domain import OwnDomain  # noqa: E402
 
 
 @pytest.fixture(scope="module")
@@ -38,11 +43,26 @@ def test_a_flight_by_name_is_that_of_the_checkout(python):
                     sls.fly("short").certificate]
 
 
+def test_the_command_flies_over_dds_and_lists_what_there_is(python, tmp_path):
+    command = python.parent / "sls"
+    assert "figure_eight" in subprocess.run([command, "list"], capture_output=True, text=True, check=True).stdout
+    with OwnDomain() as domain:
+        done = subprocess.run([command, "run", "short", "--out", tmp_path / "flight", "--domain", domain, "--json"],
+                              capture_output=True, text=True, timeout=100, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    import sls
+    assert json.loads(done.stdout)["certificate"] == sls.fly("short").certificate
+    subprocess.run([command, "report", tmp_path / "flight"], check=True, capture_output=True, timeout=100)
+    said = subprocess.run([command, "build"], capture_output=True, text=True)
+    assert (said.returncode, said.stderr.count("\n")) == (2, 1), said.stderr
+
+
 def test_a_campaign_by_name_flies_and_every_file_is_removed(python, tmp_path):
     run(python, "import sys; from sls.campaign import cli; sys.exit(cli.main("
                 f"['gains', '--runs', '0-1', '--workers', '1', '--out', '{tmp_path}/out']))")
     assert len((tmp_path / "out/runs.csv").read_text().splitlines()) == 3
     files = python.parents[1].rglob("site-packages/*sls*")
     assert len(list(files)) == 3  # package, module, dist-info
+    assert (python.parent / "sls").exists()
     subprocess.run([python, "-m", "pip", "uninstall", "-y", "sls"], check=True, capture_output=True)
-    assert not list(python.parents[1].rglob("site-packages/*sls*"))
+    assert not [*python.parents[1].rglob("site-packages/*sls*"), *python.parents[1].rglob("bin/sls")]

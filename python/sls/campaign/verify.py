@@ -18,11 +18,11 @@ from sls.campaign.runs import list_yaml_values, make_runs
 from sls.campaign.sampling import choose_runs, make_values
 from sls.campaign.whole_files import name_temporary
 from sls.core import load_core
+from sls.launcher.place import BUILD, START
 
 if TYPE_CHECKING:
     from _sls_core import Runs
 
-ROOT = Path(__file__).resolve().parents[3]
 SEED = 1
 DOMAINS = range(100, 161)
 LONGEST_FLIGHT_S = 1800.0
@@ -71,11 +71,10 @@ def written_scenario(text: str, base: Path, folder: Path) -> Iterator[Path]:
 def fly_over_dds(scenario: Path, recording: Path, domain: int) -> str:
     """Flies with sim_server, control_client and recorder in lockstep, and returns the certificate. A flight
     that fails has a certificate, too. Raises EngineError if there is no recording."""
-    command = [str(ROOT / "sls"), "run", str(scenario), "--out", str(recording), "--mode",
+    command = [*START, "run", str(scenario), "--out", str(recording), "--mode",
                "lockstep", "--domain", str(domain)]
-    build = os.environ.get("SLS_BUILD", str(ROOT / "build"))
     try:
-        done = subprocess.run(command, env={**os.environ, "SLS_BUILD": build}, check=False,
+        done = subprocess.run(command, env={**os.environ, "SLS_BUILD": str(BUILD)}, check=False,
                               capture_output=True, text=True, errors="replace",
                               timeout=LONGEST_FLIGHT_S)
     except subprocess.TimeoutExpired:

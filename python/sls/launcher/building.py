@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
-from sls.launcher.place import BUILD, IS_BUILT_ELSEWHERE, IS_INSTALLED, PYTHON_PATH, ROOT, Failure, say
+from sls.launcher.place import BUILD, IS_BUILT_ELSEWHERE, IS_INSTALLED, IS_OF_PIP, PYTHON_PATH, ROOT, Failure, say
 
 FLYING = ("sim_server", "control_client", "recorder", "closed_loop")
 PROGRAMS = (*FLYING, "sim_ctl", "sls_verify", "sls_convert", "delay_margin", "sls_doctor", "sls_view")
-PYTHON = "/usr/bin/python3"
+PYTHON = sys.executable  # Debian's, or that of a virtual environment
 
 is_installing = True  # False with --no-install
 
@@ -38,7 +38,9 @@ def run_logged(log: Path, *command: str | Path, **more: Any) -> tuple[bool, str]
 
 def call_script(action: str, *words: str | Path) -> None:
     """Runs an action of the file `sls`, see its end: @setup LIST…, @install LIST…, @npm FOLDER, @tree PRESET FOLDER
-    TARGET…, @build TARGET…."""
+    TARGET…, @build TARGET…. With pip there is none: what it has not installed, an error of its user names."""
+    if IS_OF_PIP:
+        return
     run(ROOT / "sls", *([] if is_installing else ["--no-install"]), action, *words)
 
 

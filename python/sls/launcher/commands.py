@@ -4,6 +4,7 @@ import importlib.util
 import os
 import re
 import shutil
+import sys
 from collections.abc import Callable
 from typing import NoReturn
 
@@ -15,7 +16,7 @@ from sls.launcher.building import (FLYING, PROGRAMS, PYTHON, build_programs, cal
 from sls.launcher.docker_demo import docker_demo
 from sls.launcher.fuzzing import fuzz
 from sls.launcher.listing import print_list
-from sls.launcher.place import (BUILD, IS_BUILT_ELSEWHERE, IS_INSTALLED, PYTHON_PATH, ROOT, SELF, Failure, find_file,
+from sls.launcher.place import (BUILD, IS_BUILT_ELSEWHERE, IS_INSTALLED, IS_OF_PIP, PYTHON_PATH, ROOT, SELF, Failure, find_file,
                                 list_choices, say, suggest)
 
 USAGE = """\
@@ -128,6 +129,8 @@ def run_module(words: list[str], targets: list[str], *command: str, **variables:
     if targets and not is_help_asked(words):
         build_programs(*targets)
     call_script("@install", "python_packages")
+    if IS_OF_PIP and not importlib.util.find_spec("matplotlib"):
+        raise Failure("this needs packages that are not installed: pip install scipy matplotlib")
     replace_by_module(*command, *words, **variables)
 
 
@@ -321,8 +324,9 @@ def call(command: str, words: list[str]) -> int:
     return COMMANDS[command](words)
 
 
-def main(words: list[str]) -> int:
-    """Runs the command and returns its exit code."""
+def main(words: list[str] | None = None) -> int:
+    """Runs the command, by default that of the command line, and returns its exit code."""
+    words = sys.argv[1:] if words is None else words
     if words[:1] == ["--no-install"]:
         building.is_installing, words = False, words[1:]
     command, words = (words[0], words[1:]) if words else ("help", [])

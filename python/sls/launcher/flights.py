@@ -13,7 +13,7 @@ from pathlib import Path
 from sls.launcher.arguments import POSITIVE, Parser, checked, filled, one_of, whole
 from sls.launcher.building import FLYING, build_programs
 from sls.launcher.building import run as run_program
-from sls.launcher.place import BUILD, ROOT, Failure, say
+from sls.launcher.place import BUILD, PACKAGE, Failure, say
 from sls.launcher.supervision import WRITERS_PATIENCE_S, Supervisor
 
 DOMAIN = whole(0, 232)
@@ -62,7 +62,7 @@ def prepare(options: Namespace) -> None:
     if options.view_port is not None:
         check_port(options.view_port)
     programs = [*FLYING, *([] if options.view_port is None else ["sls_view"])]
-    build_programs(*programs)
+    build_programs(*(["flight"] if options.view_port is None else programs))
     for program in programs:
         if not os.access(BUILD / "bin" / program, os.X_OK):
             raise Failure(f"{BUILD}/bin/{program}: expected a program, got no such file")
@@ -147,7 +147,7 @@ Sets up, builds, flies a scenario (default: figure_eight) and prints a summary."
 def print_comparison(lap: list[str]) -> None:
     """The errors of the second lap beside the published figures of the same figure eight."""
     print("Load position error on the second lap, beside the published figures (m)")
-    with open(ROOT / "python/sls/published_lap_2.csv", encoding="utf-8", newline="") as table:
+    with open(PACKAGE / "published_lap_2.csv", encoding="utf-8", newline="") as table:
         head, *rows = csv.reader(table)
     for cells in (["", *head[1:]], ["this flight", *(f"{float(error):.1e}" for error in lap)], *rows):
         print("  {:<34}{:>8} {:>8} {:>8} {:>8} {:>8}".format(*cells))

@@ -6,14 +6,17 @@ import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[3]
-# An installed tree is PREFIX/share/sls. Its `bin` is a link to the programs, and nothing is built.
-IS_INSTALLED = ROOT.parts[-2:] == ("share", "sls") and not (ROOT / "CMakeLists.txt").is_file()
+PACKAGE = Path(__file__).resolve().parents[1]
+IS_OF_PIP = (PACKAGE / "config").is_dir()  # with the programs in the package, and nothing else
+ROOT = PACKAGE if IS_OF_PIP else PACKAGE.parents[1]
+# The Debian package's tree is PREFIX/share/sls; its `bin` is a link to the programs. Nothing is built there.
+IS_INSTALLED = IS_OF_PIP or ROOT.parts[-2:] == ("share", "sls") and not (ROOT / "CMakeLists.txt").is_file()
+START = (sys.executable, "-BP", str(PACKAGE / "launcher/__main__.py"))  # begins a command of the launcher
 SELF = "sls" if IS_INSTALLED else "./sls"
 IS_BUILT_ELSEWHERE = bool(os.environ.get("SLS_BUILD"))
 BUILD = Path(os.environ.get("SLS_BUILD") or (ROOT if IS_INSTALLED else ROOT / "build"))
-PYTHON_PATH = [str(ROOT / "python"), str(BUILD / "python")]
-if IS_INSTALLED:
+PYTHON_PATH = [] if IS_OF_PIP else [str(ROOT / "python"), str(BUILD / "python")]
+if IS_INSTALLED and not IS_OF_PIP:
     PYTHON_PATH.append(str(ROOT.parents[1] / "lib/python3/dist-packages"))
 
 
