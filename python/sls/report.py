@@ -73,6 +73,7 @@ th { font-weight: 600; color: var(--strong); white-space: normal; }
 thead tr:first-child th:first-child, td:first-child, .text th, .text td { text-align: left; }
 td:first-child { white-space: normal; overflow-wrap: anywhere; min-width: 11em; }
 .text td:first-child { min-width: 58px; }
+.text th { white-space: nowrap; }
 .text td:last-child { white-space: normal; width: 100%; overflow-wrap: anywhere; }
 thead tr:first-child th[colspan] { text-align: center; border-left: 1px solid var(--line); }
 .lap td:first-child { padding-left: 26px; color: var(--muted); }
@@ -85,6 +86,7 @@ figcaption { color: var(--muted); font-size: 13.5px; text-align: center; margin-
 pre { overflow-x: auto; background: var(--raised); padding: 12px; border-radius: 6px; font-size: 12.5px;
   line-height: 1.45; }
 summary { cursor: pointer; font-weight: 600; font-size: 17px; }
+@media (max-width: 950px) { .scene { height: 1060px; } }  /* the scene's panels are below each other */
 @media (max-width: 800px) {
   .facts { grid-template-columns: repeat(2, 1fr); }
   table { font-size: 12px; }
