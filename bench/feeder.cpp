@@ -71,7 +71,7 @@ class Surroundings {
   std::uint64_t index_ = 0;
   Clock::time_point announced_;
   std::uint64_t version_ = 0;
-  std::vector<bus::ParticipantDirectory::Entry> recorders_;
+  std::vector<sync::Member> recorders_;
 };
 
 }  // namespace

@@ -60,7 +60,7 @@ void Client::run() {
   if (run_) leave();
 }
 
-std::optional<bus::Run> Client::find_first_run() {
+std::optional<sync::Run> Client::find_first_run() {
   const double timeout_s = scenario_.sync.wait_for.timeout_s;
   const std::string vehicles = config::to_vehicle_ranges(vehicle_ids_);
   app::Wait wait(timeout_s, app::kUsualJoinTime);
@@ -87,13 +87,13 @@ std::string Client::describe_problem() const {
   return problem.empty() ? "" : "; " + problem;
 }
 
-std::optional<bus::Run> Client::find_joinable_run() const {
+std::optional<sync::Run> Client::find_joinable_run() const {
   for (const std::uint32_t id : vehicle_ids_)
     if (auto run = servers_.find_joinable(id)) return run;
   return std::nullopt;
 }
 
-void Client::begin(const bus::Run& run) {
+void Client::begin(const sync::Run& run) {
   const Parameters& parameters = run.parameters;
   if (!(parameters.scenario_sha256() == scenario_.sha256))
     throw config::ConfigError(
@@ -106,7 +106,7 @@ void Client::begin(const bus::Run& run) {
   std::map<std::uint32_t, Pilot> pilots;
   flown_ids_.clear();
   for (const std::uint32_t id : vehicle_ids_) {
-    if (!bus::serves_vehicle(parameters, id)) continue;
+    if (!sync::serves_vehicle(parameters, id)) continue;
     flown_ids_.push_back(id);
     pilots.try_emplace(id, config::make_vehicle_scenario(scenario, id), id, options_);
   }
@@ -130,7 +130,7 @@ void Client::begin(const bus::Run& run) {
   ready_ = false;
   watch_.emplace(servers_, run, scenario_.sync.wait.server_deadline_s);
   const std::string vehicles =
-      bus::is_fleet(parameters) ? ", vehicles " + config::to_vehicle_ranges(flown_ids_) : "";
+      sync::is_fleet(parameters) ? ", vehicles " + config::to_vehicle_ranges(flown_ids_) : "";
   spdlog::info("'{}' joins run {:016x}: {}{}, period {} s", options_.name, parameters.run_id(),
                scenario_.name, vehicles, scenario_.sync.period_ns * 1e-9);
   announce(false, false);
@@ -145,7 +145,7 @@ void Client::leave() {
     throw app::RunError(fmt::format("the run failed: {}", status->reason().c_str()));
 }
 
-std::optional<bus::Run> Client::serve() {
+std::optional<sync::Run> Client::serve() {
   while (!options_.is_stopped()) {
     rethrow_answer_error();
     if (has_ended()) return std::nullopt;
@@ -215,7 +215,7 @@ bool Client::has_ended() const {
          (status->phase() == RunPhase::PHASE_FINISHED || status->phase() == RunPhase::PHASE_FAILED);
 }
 
-std::optional<bus::Run> Client::find_successor() {
+std::optional<sync::Run> Client::find_successor() {
   const auto finding = watch_->look();
   if (auto next = servers_.find_successor(*run_, flown_ids_)) {
     const bool is_reset = next->server == run_->server;
@@ -226,7 +226,7 @@ std::optional<bus::Run> Client::find_successor() {
     spdlog::warn("{}: following it", news);
     return next;
   }
-  if (finding == bus::ServerWatch::Finding::kLost)
+  if (finding == sync::ServerWatch::Finding::kLost)
     throw app::RunError(fmt::format("the {}, expected it to finish", watch_->describe()));
   return std::nullopt;
 }

@@ -58,15 +58,15 @@ class Client {
   using Clock = std::chrono::steady_clock;
 
   /// Waits for the first run to join; empty if the client is stopped.
-  std::optional<bus::Run> find_first_run();
+  std::optional<sync::Run> find_first_run();
   std::unique_ptr<AnswerStream> make_stream(bool is_realtime);
   std::string describe_problem() const;
   /// The run of the first of our vehicles that has a joinable run.
-  std::optional<bus::Run> find_joinable_run() const;
-  void begin(const bus::Run& run);
+  std::optional<sync::Run> find_joinable_run() const;
+  void begin(const sync::Run& run);
   /// Answers until the run has ended or the client is stopped (returns empty), or until another run
   /// replaces it (returns that run).
-  std::optional<bus::Run> serve();
+  std::optional<sync::Run> serve();
   void leave();
 
   /// One of our vehicles in the run that is joined.
@@ -95,7 +95,7 @@ class Client {
   bool has_ended() const;
   /// The run that replaces ours, after a reset or with another server; empty if there is none.
   /// @throws app::RunError if the server is lost, or is replaced without `follows_servers`.
-  std::optional<bus::Run> find_successor();
+  std::optional<sync::Run> find_successor();
   /// Tries again at the next call if an answer is being computed.
   void rethrow_answer_error();
 
@@ -107,7 +107,7 @@ class Client {
 
   bus::ServerDirectory servers_;
   bus::Announcer announcer_;
-  std::optional<bus::Run> run_;
+  std::optional<sync::Run> run_;
   std::optional<bus::ServerWatch> watch_;
   std::vector<std::uint32_t> flown_ids_;  // those of vehicle_ids_ that this run has
   bool ready_ = false;

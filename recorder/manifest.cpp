@@ -16,7 +16,7 @@
 #include "common/app/stop_signal.hpp"
 #include "common/bus/names.hpp"
 #include "common/bus/node.hpp"
-#include "common/bus/participants.hpp"
+#include "common/sync/servers.hpp"
 #include "common/config/config_error.hpp"
 #include "common/config/sha256.hpp"
 
@@ -199,7 +199,7 @@ void write_manifest(const std::filesystem::path& folder, const Manifest& manifes
       {"scenario", manifest.scenario_name},
       {"scenario_sha256", parameters.scenario_sha256().to_string()},
       {"contract_sha256", parameters.contract_sha256().to_string()},
-      {"vehicle_ids", bus::list_vehicle_ids(parameters)},
+      {"vehicle_ids", sync::list_vehicle_ids(parameters)},
       {"period_s", static_cast<double>(parameters.period_ns()) / 1e9},
       {"step_s", static_cast<double>(parameters.step_ns()) / 1e9},
       {"mode", bus::to_string(parameters.mode())},

@@ -20,7 +20,7 @@ constexpr double kJoinTimeout = 60;  // until a run must be found, s
 
 /// Calls `find` until it returns a run, a stop signal comes or `limit_s` is over.
 template <class Find>
-std::optional<bus::Run> wait_for_run(const bus::Node& node, bus::Announcer& announcer,
+std::optional<sync::Run> wait_for_run(const bus::Node& node, bus::Announcer& announcer,
                                      const std::string& whom, double limit_s, Find find) {
   app::Wait wait(limit_s, app::kUsualJoinTime);
   while (app::stop_signal() == 0 && !wait.is_over()) {
@@ -73,7 +73,7 @@ void Recorder::run() {
 
 // --- which run -----------------------------------------------------------------------------------
 
-std::optional<bus::Run> Recorder::wait_for_first_run() {
+std::optional<sync::Run> Recorder::wait_for_first_run() {
   const std::string whom =
       options_.unfinished ? "server of run " + options_.unfinished->manifest().run_id : "server";
   return wait_for_run(node_, surroundings_.announcer, whom, kJoinTimeout, [this] {
@@ -83,9 +83,9 @@ std::optional<bus::Run> Recorder::wait_for_first_run() {
 }
 
 /// The run of the unfinished recording, even if it has just ended.
-std::optional<bus::Run> Recorder::find_unfinished_run() const {
+std::optional<sync::Run> Recorder::find_unfinished_run() const {
   if (!options_.unfinished) return std::nullopt;
-  for (const bus::Run& run : surroundings_.servers.runs()) {
+  for (const sync::Run& run : surroundings_.servers.runs()) {
     const std::uint64_t id = run.parameters.run_id();
     if (to_text(id) == options_.unfinished->manifest().run_id ||
         fs::exists(options_.folder / name_run(id)))
@@ -94,7 +94,7 @@ std::optional<bus::Run> Recorder::find_unfinished_run() const {
   return std::nullopt;
 }
 
-std::optional<bus::Run> Recorder::go_on_after(const bus::Run& run, const RunEnd& end) {
+std::optional<sync::Run> Recorder::go_on_after(const sync::Run& run, const RunEnd& end) {
   const std::string place = options_.folder.string();
   if (end.is_complete) {
     spdlog::info("{}: complete, {} steps", place, end.last_step);
@@ -119,13 +119,13 @@ std::optional<bus::Run> Recorder::go_on_after(const bus::Run& run, const RunEnd&
   return next;
 }
 
-std::optional<bus::Run> Recorder::wait_for_next_run(const bus::Run& ended, double limit_s) {
+std::optional<sync::Run> Recorder::wait_for_next_run(const sync::Run& ended, double limit_s) {
   return wait_for_run(node_, surroundings_.announcer,
                       "the run after the reset of run " + to_text(ended.parameters.run_id()),
                       limit_s, [&] { return find_follower(ended); });
 }
 
-std::optional<bus::Run> Recorder::find_follower(const bus::Run& ended) const {
+std::optional<sync::Run> Recorder::find_follower(const sync::Run& ended) const {
   auto next = surroundings_.servers.find_successor(ended, {surroundings_.vehicle});
   if (next && !(next->server == ended.server) && !options_.follow) return std::nullopt;
   return next;
@@ -133,7 +133,7 @@ std::optional<bus::Run> Recorder::find_follower(const bus::Run& ended) const {
 
 // --- where it goes -------------------------------------------------------------------------------
 
-Segment Recorder::open_segment(const bus::Run& run) {
+Segment Recorder::open_segment(const sync::Run& run) {
   const std::string id = to_text(run.parameters.run_id());
   const bool is_first = !std::exchange(is_folder_used_, true);
   Segment segment;

@@ -26,12 +26,12 @@ class Recorder {
   void run();
 
  private:
-  std::optional<bus::Run> wait_for_first_run();
-  std::optional<bus::Run> find_unfinished_run() const;
-  std::optional<bus::Run> wait_for_next_run(const bus::Run& ended, double limit_s);
-  std::optional<bus::Run> find_follower(const bus::Run& ended) const;
-  std::optional<bus::Run> go_on_after(const bus::Run& run, const RunEnd& end);
-  Segment open_segment(const bus::Run& run);
+  std::optional<sync::Run> wait_for_first_run();
+  std::optional<sync::Run> find_unfinished_run() const;
+  std::optional<sync::Run> wait_for_next_run(const sync::Run& ended, double limit_s);
+  std::optional<sync::Run> find_follower(const sync::Run& ended) const;
+  std::optional<sync::Run> go_on_after(const sync::Run& run, const RunEnd& end);
+  Segment open_segment(const sync::Run& run);
 
   const RecorderOptions options_;
   const bus::Node& node_;

@@ -9,7 +9,7 @@
 #include <system_error>
 
 #include "common/bus/names.hpp"
-#include "common/bus/participants.hpp"
+#include "common/sync/servers.hpp"
 
 namespace sls::record {
 namespace {

@@ -32,7 +32,7 @@ constexpr std::chrono::steady_clock::duration kLongestPass = 1s;
 
 }  // namespace
 
-Participant make_announcement(const bus::Run* run, bool ready, bool done, std::int64_t last_step) {
+Participant make_announcement(const sync::Run* run, bool ready, bool done, std::int64_t last_step) {
   Participant message;
   message.contract_sha256(bus::kContractSha256);
   message.role(ParticipantRole::ROLE_RECORDER);
@@ -48,7 +48,7 @@ Participant make_announcement(const bus::Run* run, bool ready, bool done, std::i
   return message;
 }
 
-RunRecorder::RunRecorder(Surroundings& surroundings, const bus::Run& run, const Segment& segment)
+RunRecorder::RunRecorder(Surroundings& surroundings, const sync::Run& run, const Segment& segment)
     : surroundings_(surroundings),
       run_(run),
       run_id_(run.parameters.run_id()),
@@ -119,8 +119,8 @@ void RunRecorder::look_for_the_end(bus::ServerWatch& server) {
     end_within(kFailedTime);
   } else if (!give_up_) {
     const auto finding = server.look();
-    if (finding == bus::ServerWatch::Finding::kSilent) look_for_the_next_run();
-    if (finding != bus::ServerWatch::Finding::kLost) return;
+    if (finding == sync::ServerWatch::Finding::kSilent) look_for_the_next_run();
+    if (finding != sync::ServerWatch::Finding::kLost) return;
     outcome_ = "lost";
     interruption_ = fmt::format("the {}, given up after {} s", server.describe(),
                                 scenario_.sync.wait.server_deadline_s);

@@ -38,7 +38,7 @@ struct Surroundings {
 struct RunEnd {
   bool is_complete = false;
   bool is_reset = false;                ///< by an operator: the same server begins a new run
-  std::optional<bus::Run> replacement;  ///< a run of another server that replaces this one
+  std::optional<sync::Run> replacement;  ///< a run of another server that replaces this one
   std::string gaps;                     ///< why it is not complete, in one line
   std::int64_t last_step = -1;
 };
@@ -46,7 +46,7 @@ struct RunEnd {
 class RunRecorder {
  public:
   /// Opens the recording of `run` in `segment`.
-  RunRecorder(Surroundings& surroundings, const bus::Run& run, const Segment& segment);
+  RunRecorder(Surroundings& surroundings, const sync::Run& run, const Segment& segment);
 
   /// Records until the end of the run.
   /// @throws the error of the writing thread, such as std::system_error if a file cannot be
@@ -70,7 +70,7 @@ class RunRecorder {
   void report_missing_batch();
 
   Surroundings& surroundings_;
-  const bus::Run run_;
+  const sync::Run run_;
   const std::uint64_t run_id_;
   const config::Scenario scenario_;
   Recording recording_;  // used only by the writing thread while that runs
@@ -95,6 +95,6 @@ class RunRecorder {
 };
 
 /// Announcement of a recorder; `run` is the joined run, or null.
-Participant make_announcement(const bus::Run* run, bool ready, bool done, std::int64_t last_step);
+Participant make_announcement(const sync::Run* run, bool ready, bool done, std::int64_t last_step);
 
 }  // namespace sls::record

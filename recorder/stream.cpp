@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "common/bus/names.hpp"
-#include "common/bus/participants.hpp"
+#include "common/sync/servers.hpp"
 
 namespace sls::record {
 namespace {
@@ -33,7 +33,7 @@ Stream::Stream(const Parameters& parameters, std::uint64_t first_step, Sink sink
                                            std::max<std::int64_t>(parameters.period_ns(), 1))),
       sink_(std::move(sink)),
       gap_sink_(std::move(gap_sink)) {
-  for (const std::uint32_t id : bus::list_vehicle_ids(parameters)) next_steps_[id] = first_step;
+  for (const std::uint32_t id : sync::list_vehicle_ids(parameters)) next_steps_[id] = first_step;
 }
 
 // --- batches -------------------------------------------------------------------------------------

@@ -61,7 +61,7 @@ bool is_named(const ParticipantCheck::Findings& findings, const bus::PeerId& pee
 
 bool flies_any(const Participant& controller, const std::vector<std::uint32_t>& ids) {
   return std::any_of(ids.begin(), ids.end(),
-                     [&](std::uint32_t id) { return bus::flies_vehicle(controller, id); });
+                     [&](std::uint32_t id) { return sync::flies_vehicle(controller, id); });
 }
 
 /// True if nothing but chance decides which of the two flies a vehicle.
@@ -142,7 +142,7 @@ void ParticipantCheck::find_first_libraries(const std::vector<Entry>& controller
       const Participant& announcement = entry.announcement;
       const bool is_ready = announcement.ready() && !entry.is_gone &&
                             announcement.scenario_sha256() == scenario_sha256_ &&
-                            bus::flies_vehicle(announcement, vehicle.id);
+                            sync::flies_vehicle(announcement, vehicle.id);
       if (is_ready && (!first || is_earlier(entry, *first))) first = &entry;
     }
     vehicle.library.reset();
@@ -155,7 +155,7 @@ void ParticipantCheck::find_first_libraries(const std::vector<Entry>& controller
 const ParticipantCheck::Library* ParticipantCheck::find_other_library(
     const Participant& controller) const {
   for (const Vehicle& vehicle : vehicles_)
-    if (vehicle.library && bus::flies_vehicle(controller, vehicle.id) &&
+    if (vehicle.library && sync::flies_vehicle(controller, vehicle.id) &&
         !(controller.library_sha256() == vehicle.library->sha256))
       return &*vehicle.library;
   return nullptr;
@@ -488,7 +488,7 @@ void ParticipantCheck::look_for_twins(const Neighbourhood& neighbourhood, Findin
   const auto are_rivals = [&](const Entry& earlier, const Entry& later) {
     return rivals_.count({earlier.peer, later.peer}) > 0 ||
            rivals_.count({later.peer, earlier.peer}) > 0 ||
-           (earlier.heard >= later.ready_since && now - earlier.heard <= bus::kPresumedDeadAfter);
+           (earlier.heard >= later.ready_since && now - earlier.heard <= sync::kPresumedDeadAfter);
   };
   for (const Entry& later : neighbourhood.participants)
     for (const Entry& earlier : neighbourhood.participants) {

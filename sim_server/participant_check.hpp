@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "common/bus/participants.hpp"
+#include "common/sync/membership.hpp"
 #include "common/config/scenario.hpp"
 #include "common/model/measurement.hpp"
 #include "sim_server/command_gate.hpp"
@@ -20,7 +20,7 @@ namespace sls::sim {
 /// The participants and endpoints that the server has discovered at one moment.
 struct Neighbourhood {
   std::chrono::steady_clock::time_point now;
-  std::vector<bus::ParticipantDirectory::Entry> participants;  ///< of any run
+  std::vector<sync::Member> participants;  ///< of any run
   std::set<std::uint64_t> other_runs;                          ///< runs of other servers
   std::set<std::uint32_t> other_vehicles;                      ///< vehicles of other servers
   /// On a network packets are lost, and discovery needs longer.
@@ -44,7 +44,7 @@ struct Neighbourhood {
 class ParticipantCheck {
  public:
   using Clock = std::chrono::steady_clock;
-  using Entry = bus::ParticipantDirectory::Entry;
+  using Entry = sync::Member;
   /// Current problems by key. A problem keeps its key while it lasts.
   using Findings = std::map<std::string, std::string>;
 

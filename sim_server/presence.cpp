@@ -5,7 +5,7 @@
 
 namespace sls::sim {
 
-void Presence::look(std::vector<bus::ParticipantDirectory::Entry>& controllers,
+void Presence::look(std::vector<sync::Member>& controllers,
                     const std::map<bus::PeerId, Answering>& answering, Clock::time_point now) {
   const Clock::duration elapsed =
       std::min<Clock::duration>(now - std::exchange(looked_, now), kLongestGap);
@@ -27,7 +27,7 @@ void Presence::look(std::vector<bus::ParticipantDirectory::Entry>& controllers,
     seen.heard = entry.heard;
     seen.answers = answers.answers;
     seen.was_asked = answers.is_asked;
-    entry.is_gone = seen.silence >= bus::kPresumedDeadAfter;
+    entry.is_gone = seen.silence >= sync::kPresumedDeadAfter;
     present.emplace(entry.peer, seen);
   }
   seen_ = std::move(present);

@@ -1,4 +1,4 @@
-/// The controllers of a run that are gone: silent for bus::kPresumedDeadAfter. No network and no
+/// The controllers of a run that are gone: silent for sync::kPresumedDeadAfter. No network and no
 /// clock here. Rules: docs/synchronisation.md, "Waiting for participants".
 #pragma once
 
@@ -7,7 +7,7 @@
 #include <map>
 #include <vector>
 
-#include "common/bus/participants.hpp"
+#include "common/sync/membership.hpp"
 
 namespace sls::sim {
 
@@ -23,7 +23,7 @@ class Presence {
 
   /// Sets `is_gone` of `controllers`, which are all of the run. Call it several times a second. A
   /// longer gap between calls means that this process was stopped: it counts as kLongestGap.
-  void look(std::vector<bus::ParticipantDirectory::Entry>& controllers,
+  void look(std::vector<sync::Member>& controllers,
             const std::map<bus::PeerId, Answering>& answering, Clock::time_point now);
 
   static constexpr std::chrono::milliseconds kLongestGap{500};

@@ -247,7 +247,7 @@ void RealtimeRun::check_clocks() {
     endpoints_.command_stream.ignore_lifespan(is_any_wrong);
 }
 
-void RealtimeRun::announce_clock(const bus::ParticipantDirectory::Entry& client,
+void RealtimeRun::announce_clock(const sync::Member& client,
                                  std::chrono::nanoseconds offset, bool is_wrong) {
   const double ahead_s = std::chrono::duration<double>(offset).count();
   const std::string clock =

@@ -54,7 +54,7 @@ class RealtimeRun : public Run {
   /// alone. It is also ignored where old announcements suggest a wrong clock: if it is wrong, no
   /// answer arrives that would show it.
   void check_clocks();
-  void announce_clock(const bus::ParticipantDirectory::Entry& client,
+  void announce_clock(const sync::Member& client,
                       std::chrono::nanoseconds offset, bool is_wrong);
 
   StateStream::Queue state_queue_;

@@ -10,7 +10,7 @@
 namespace sls::sim {
 namespace {
 
-using Entry = bus::ParticipantDirectory::Entry;
+using Entry = sync::Member;
 
 std::string describe(const Entry& entry) {
   return fmt::format("'{}' on {}", entry.announcement.name().c_str(),
@@ -33,7 +33,7 @@ std::string name_missing_role(const char* role, int expected, int ready,
 std::vector<const Entry*> find_recorders_to_wait_for(const Roster& roster, int expected) {
   std::vector<const Entry*> found, late;
   for (const Entry& entry : roster.recorders) {
-    if (!entry.announcement.ready() || entry.is_silent()) continue;
+    if (!entry.announcement.ready() || entry.is_silent(roster.now)) continue;
     const bool is_late = roster.began && entry.ready_since > *roster.began;
     (is_late ? late : found).push_back(&entry);
   }
@@ -69,7 +69,7 @@ std::vector<ReadyClient> find_ready_clients(const Roster& roster,
   std::vector<ReadyClient> clients;
   for (const Entry& entry : roster.controllers)
     if (entry.announcement.ready() && entry.announcement.scenario_sha256() == scenario_sha256 &&
-        bus::flies_vehicle(entry.announcement, vehicle_id))
+        sync::flies_vehicle(entry.announcement, vehicle_id))
       clients.push_back({entry.peer, entry.announcement.name().to_string(),
                          entry.announcement.strength(), entry.is_gone});
   return clients;
@@ -105,7 +105,7 @@ std::string name_missing(const Roster& roster, const config::WaitFor& expected,
   int recorders = 0;
   std::string details;
   for (const Entry& entry : roster.recorders) {
-    if (entry.is_silent())
+    if (entry.is_silent(roster.now))
       append(details, describe_gone(entry));
     else if (entry.announcement.ready())
       ++recorders;
@@ -148,10 +148,10 @@ std::string name_silent_recorder(const Roster& roster, std::uint64_t step,
                                  std::chrono::steady_clock::time_point since) {
   const bool is_any_alive = std::any_of(
       roster.recorders.begin(), roster.recorders.end(),
-      [](const Entry& entry) { return entry.announcement.ready() && !entry.is_silent(); });
+      [&](const Entry& entry) { return entry.announcement.ready() && !entry.is_silent(roster.now); });
   for (const Entry& entry : roster.recorders) {
     const bool lags = entry.announcement.last_complete_step() + 1 < static_cast<std::int64_t>(step);
-    const bool is_replaced = entry.is_silent() && is_any_alive;
+    const bool is_replaced = entry.is_silent(roster.now) && is_any_alive;
     if (entry.announcement.ready() && lags && entry.heard < since && !is_replaced)
       return fmt::format("recorder {} is silent since step {}", describe(entry),
                          entry.announcement.last_complete_step());

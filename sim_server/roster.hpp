@@ -1,13 +1,12 @@
 /// Participants of a run: those that step 0 or a step waits for, and their names in messages.
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "common/bus/participants.hpp"
+#include "common/sync/membership.hpp"
 #include "common/config/scenario.hpp"
 #include "sim_server/command_gate.hpp"
 
@@ -15,10 +14,11 @@ namespace sls::sim {
 
 /// The participants of one run at one moment.
 struct Roster {
-  std::vector<bus::ParticipantDirectory::Entry> controllers;
-  std::vector<bus::ParticipantDirectory::Entry> recorders;
+  std::vector<sync::Member> controllers;
+  std::vector<sync::Member> recorders;
   /// When the flight began; nothing before.
-  std::optional<std::chrono::steady_clock::time_point> began = std::nullopt;
+  std::optional<sync::Time> began = std::nullopt;
+  sync::Time now{};  ///< this moment
 };
 
 /// Controllers that are ready to fly `vehicle_id` and use the run's scenario, for its command gate;
@@ -56,7 +56,7 @@ std::uint64_t calc_recorder_limit(const Roster& roster, int expected,
 /// Names a ready recorder that has announced nothing since `since` although it is behind `step`.
 /// Empty if there is none, or if another recorder has replaced one that is presumed dead.
 std::string name_silent_recorder(const Roster& roster, std::uint64_t step,
-                                 std::chrono::steady_clock::time_point since);
+                                 sync::Time since);
 
 /// The host of the controller `peer` as " on box", or " (gone)"; " on ?" if it is not in the
 /// roster.

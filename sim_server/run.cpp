@@ -103,13 +103,13 @@ void Run::close_requests(const std::string& reason) {
 // --- start ---------------------------------------------------------------------------------------
 
 void Run::check_claim() const {
-  const int progress = board_.has_published() ? bus::calc_progress(board_.phase()) : 0;
-  for (const bus::Run& other : endpoints_.servers.runs()) {
-    const int others = bus::calc_progress(other.status);
+  const int progress = board_.has_published() ? sync::calc_progress(board_.phase()) : 0;
+  for (const sync::Run& other : endpoints_.servers.runs()) {
+    const int others = sync::calc_progress(other.status);
     if (others < 0) continue;
     const auto shared =
         std::find_if(vehicle_ids_.begin(), vehicle_ids_.end(),
-                     [&](std::uint32_t id) { return bus::serves_vehicle(other.parameters, id); });
+                     [&](std::uint32_t id) { return sync::serves_vehicle(other.parameters, id); });
     if (shared == vehicle_ids_.end()) continue;
     if (others > progress || (others == progress && other.parameters.run_id() < run_id_))
       throw app::RunError(
@@ -294,7 +294,7 @@ void Run::refresh_roster() {
   roster_ = {check_.admit_controllers(controllers),
              ParticipantCheck::admit_recorders(
                  endpoints_.participants.find(ParticipantRole::ROLE_RECORDER, run_id_)),
-             began_};
+             began_, roster_time_};
   for (const auto& vehicle : vehicles_)
     vehicle->gate.set_clients(find_ready_clients(roster_, scenario_.sha256, vehicle->id()));
   roster_changed();
@@ -320,9 +320,9 @@ void Run::look_for_problems() {
   neighbourhood.now = look_time_ = Clock::now();
   looked_at_version_ = endpoints_.participants.version();
   neighbourhood.participants = endpoints_.participants.all();
-  for (const bus::Run& other : endpoints_.servers.runs()) {
+  for (const sync::Run& other : endpoints_.servers.runs()) {
     neighbourhood.other_runs.insert(other.parameters.run_id());
-    for (const std::uint32_t id : bus::list_vehicle_ids(other.parameters))
+    for (const std::uint32_t id : sync::list_vehicle_ids(other.parameters))
       neighbourhood.other_vehicles.insert(id);
   }
   for (const bus::PeerId& peer : endpoints_.command_stream.matched())

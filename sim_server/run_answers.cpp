@@ -87,7 +87,7 @@ bool Run::is_anybody_absent() const {
 }
 
 void Run::check_refusals() {
-  const double patience_s = std::chrono::duration<double>(bus::kPresumedDeadAfter).count();
+  const double patience_s = std::chrono::duration<double>(sync::kPresumedDeadAfter).count();
   for (const auto& vehicle : vehicles_) {
     const std::string refusals = describe_refusals(*vehicle);
     vehicle->note_refused(!refusals.empty());

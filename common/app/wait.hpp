@@ -2,6 +2,8 @@
 
 #include <chrono>
 
+#include "common/sync/patience.hpp"
+
 namespace sls::app {
 
 /// Interval of the waiting loops of the programs, which are not urgent.
@@ -14,47 +16,23 @@ inline constexpr auto kShortPollTime = std::chrono::milliseconds(5);
 /// this.
 inline constexpr auto kUsualJoinTime = std::chrono::milliseconds(1500);
 
-/// The times of a wait: its deadline, and when to log a line about it.
+/// sync::Patience that asks the clock.
 class Wait {
  public:
-  using Clock = std::chrono::steady_clock;
-
   /// Begins now and lasts `timeout_s` seconds; it is first reported after `quiet_time`.
-  explicit Wait(double timeout_s, Clock::duration quiet_time = std::chrono::seconds(1))
-      : timeout_(
-            std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(timeout_s))),
-        deadline_(Clock::now() + timeout_),
-        next_report_(Clock::now() + quiet_time) {}
+  explicit Wait(double timeout_s, sync::Duration quiet_time = std::chrono::seconds(1))
+      : patience_(now(), timeout_s, quiet_time) {}
 
-  /// Starts the timeout again. The times of the reports do not change.
-  void renew() { deadline_ = Clock::now() + timeout_; }
-
-  /// Moves deadline and next report by `rest`, a time that does not count, such as a pause.
-  void extend(Clock::duration rest) {
-    deadline_ += rest;
-    next_report_ += rest;
-  }
-
-  bool is_over() const { return Clock::now() >= deadline_; }
-
-  /// True if a line about the wait is due: once after the quiet time, then every 5 s.
-  bool is_report_due() {
-    const auto now = Clock::now();
-    if (now < next_report_) return false;
-    next_report_ = now + kReportInterval;
-    return true;
-  }
-
-  double seconds_left() const {
-    return std::chrono::duration<double>(deadline_ - Clock::now()).count();
-  }
+  void renew() { patience_.renew(now()); }
+  void extend(sync::Duration rest) { patience_.extend(rest); }
+  bool is_over() const { return patience_.is_over(now()); }
+  bool is_report_due() { return patience_.is_report_due(now()); }
+  double seconds_left() const { return patience_.seconds_left(now()); }
 
  private:
-  static constexpr auto kReportInterval = std::chrono::seconds(5);
+  static sync::Time now() { return std::chrono::steady_clock::now(); }
 
-  Clock::duration timeout_;
-  Clock::time_point deadline_;
-  Clock::time_point next_report_;
+  sync::Patience patience_;
 };
 
 }  // namespace sls::app

@@ -85,7 +85,7 @@ class ClientTest : public testing::Test {
     });
   }
 
-  std::optional<bus::ParticipantDirectory::Entry> find(std::uint64_t run_id) const {
+  std::optional<sync::Member> find(std::uint64_t run_id) const {
     const auto found = participants_.find(ParticipantRole::ROLE_CONTROLLER, run_id);
     return found.empty() ? std::nullopt : std::optional(found.front());
   }

@@ -77,7 +77,7 @@ class Stranger {
 
   bus::Node node;
   bus::ServerDirectory servers;
-  std::optional<bus::Run> run;
+  std::optional<sync::Run> run;
 
  private:
   mutable std::mutex mutex_;

@@ -137,7 +137,7 @@ class ClockFlightTest : public testing::Test {
     requests.write(request);
     EXPECT_TRUE(wait_until([&] {
       const auto status = servers_.find_status(run_->parameters.run_id());
-      return status && bus::calc_progress(status->phase()) < 0;
+      return status && sync::calc_progress(status->phase()) < 0;
     }));
   }
 
@@ -224,7 +224,7 @@ class ClockFlightTest : public testing::Test {
   bus::Reader<States> states_{
       node_, bus::kLoopReaderProfile,
       [this](const States& states, const bus::PeerId&) { receive(states); }};
-  std::optional<bus::Run> run_;
+  std::optional<sync::Run> run_;
   std::thread flying_, answering_;
 };
 

@@ -6,7 +6,7 @@ namespace sls::sim {
 namespace {
 
 using namespace std::chrono_literals;
-using Entry = bus::ParticipantDirectory::Entry;
+using Entry = sync::Member;
 
 /// One controller, looked at ten times a second.
 class PresenceTest : public testing::Test {

@@ -10,10 +10,10 @@ namespace {
 const std::string kScenario(64, 'a');
 const std::string kOtherScenario(64, 'b');
 
-bus::ParticipantDirectory::Entry make_entry(ParticipantRole role, const std::string& name,
+sync::Member make_entry(ParticipantRole role, const std::string& name,
                                             bool ready) {
   static std::uint8_t number = 0;
-  bus::ParticipantDirectory::Entry entry;
+  sync::Member entry;
   entry.peer.bytes.fill(++number);
   entry.announcement.role(role);
   entry.announcement.name(name);
@@ -21,19 +21,19 @@ bus::ParticipantDirectory::Entry make_entry(ParticipantRole role, const std::str
   entry.announcement.scenario_sha256(kScenario);
   entry.announcement.ready(ready);
   entry.announcement.last_complete_step(-1);
-  entry.heard = std::chrono::steady_clock::now();
+  entry.heard = sync::Time();
   return entry;
 }
 
-bus::ParticipantDirectory::Entry make_controller(const std::string& name, bool ready = true) {
+sync::Member make_controller(const std::string& name, bool ready = true) {
   auto entry = make_entry(ParticipantRole::ROLE_CONTROLLER, name, ready);
   entry.announcement.vehicle_ids({0});
   return entry;
 }
-bus::ParticipantDirectory::Entry make_recorder(const std::string& name, bool ready = true) {
+sync::Member make_recorder(const std::string& name, bool ready = true) {
   return make_entry(ParticipantRole::ROLE_RECORDER, name, ready);
 }
-bus::ParticipantDirectory::Entry make_recorder_at(std::int64_t last_complete_step) {
+sync::Member make_recorder_at(std::int64_t last_complete_step) {
   auto entry = make_recorder("tape");
   entry.announcement.last_complete_step(last_complete_step);
   return entry;
@@ -119,7 +119,7 @@ TEST(RosterTest, AControllerThatIsGoneDoesNotCountAndIsNamed) {
 
 TEST(RosterTest, ARecorderThatIsGoneDoesNotCountAndIsNamed) {
   Roster roster = {{}, {make_recorder("tape")}};
-  roster.recorders[0].heard -= 2 * bus::kPresumedDeadAfter;
+  roster.recorders[0].heard -= 2 * sync::kPresumedDeadAfter;
   EXPECT_EQ(name_missing(roster, make_wait_for(0, 1), kScenario), "recorder ['tape' (gone)]");
   roster.recorders.push_back(make_recorder("other"));
   EXPECT_EQ(name_missing(roster, make_wait_for(0, 1), kScenario), "");
@@ -177,17 +177,17 @@ TEST(RosterTest, ImpossibleProgressIsClampedToThePlausibleRange) {
 
 TEST(RosterTest, TheServerWaitsForEveryRecorderThatIsThere) {
   Roster roster = {{}, {make_recorder("a"), make_recorder("b")}};
-  EXPECT_FALSE(bus::are_recorders_done(roster.recorders));
+  EXPECT_FALSE(sync::are_recorders_done(roster.recorders));
   roster.recorders[0].announcement.done(true);
-  EXPECT_FALSE(bus::are_recorders_done(roster.recorders));
+  EXPECT_FALSE(sync::are_recorders_done(roster.recorders));
   roster.recorders[1].announcement.done(true);
-  EXPECT_TRUE(bus::are_recorders_done(roster.recorders));
-  EXPECT_TRUE(bus::are_recorders_done({}));
+  EXPECT_TRUE(sync::are_recorders_done(roster.recorders));
+  EXPECT_TRUE(sync::are_recorders_done({}));
 }
 
 TEST(RosterTest, ARecorderPresumedDeadDoesNotBlockIfAnotherIsThere) {
   auto dead = make_recorder_at(10);
-  dead.heard -= 2 * bus::kPresumedDeadAfter;
+  dead.heard -= 2 * sync::kPresumedDeadAfter;
   EXPECT_EQ(name_blocking_recorder({{}, {dead, make_recorder_at(4999)}}, 1, 5000), "");
   EXPECT_NE(name_blocking_recorder({{}, {dead}}, 1, 20), "") << "one is expected";
 }
@@ -198,7 +198,7 @@ TEST(RosterTest, ARecorderThatComesDuringTheFlightStopsItOnlyInThePlaceOfOneThat
   roster.recorders[1].ready_since = *roster.began + std::chrono::seconds(1);
   EXPECT_EQ(name_blocking_recorder(roster, 1, 5000), "");
   EXPECT_NE(name_blocking_recorder(roster, 2, 5000), "") << "two are expected";
-  roster.recorders[0].heard -= 2 * bus::kPresumedDeadAfter;
+  roster.recorders[0].heard -= 2 * sync::kPresumedDeadAfter;
   EXPECT_NE(name_blocking_recorder(roster, 1, 5000), "") << "it is the only one now";
   // The most advanced of several recorders counts as the replacement.
   roster.recorders.push_back(make_recorder_at(4900));
@@ -228,7 +228,7 @@ TEST(RosterTest, ThePlaceOfAControllerIsItsHostUntilItIsGone) {
 
 // --- fleets --------------------------------------------------------------------------------------
 
-bus::ParticipantDirectory::Entry make_pilot(const std::string& name,
+sync::Member make_pilot(const std::string& name,
                                             const std::vector<std::uint32_t>& vehicle_ids) {
   auto entry = make_controller(name);
   entry.announcement.vehicle_ids(vehicle_ids);

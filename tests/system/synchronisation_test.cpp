@@ -52,7 +52,7 @@ class LateController {
 
   /// False if there is no server.
   bool join() {
-    std::optional<bus::Run> run;
+    std::optional<sync::Run> run;
     if (!wait_until([&] { return (run = servers_.find_joinable(0)).has_value(); }) ||
         !wait_until([&] { return stream_.sees_server(run->server); }))
       return false;

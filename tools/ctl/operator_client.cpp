@@ -49,18 +49,18 @@ OperatorClient::OperatorClient(bus::Node& node, const ClientOptions& options)
 
 // --- finding a run -------------------------------------------------------------------------------
 
-std::optional<bus::Run> OperatorClient::wait_for_run() const {
+std::optional<sync::Run> OperatorClient::wait_for_run() const {
   return wait_for([this] { return servers_.find_joinable(options_.vehicle_id); });
 }
 
-std::optional<bus::Run> OperatorClient::wait_for_any_run() const {
+std::optional<sync::Run> OperatorClient::wait_for_any_run() const {
   return wait_for([this] {
     const auto run = servers_.find_joinable(options_.vehicle_id);
     return run ? run : find_ended_run();
   });
 }
 
-std::optional<bus::Run> OperatorClient::wait_for(const FindRun& find) const {
+std::optional<sync::Run> OperatorClient::wait_for(const FindRun& find) const {
   app::Wait wait(options_.timeout_s, kUsualWait);
   while (app::stop_signal() == 0) {
     if (auto run = find()) return run;
@@ -75,20 +75,20 @@ std::optional<bus::Run> OperatorClient::wait_for(const FindRun& find) const {
   return std::nullopt;
 }
 
-std::optional<bus::Run> OperatorClient::find_ended_run() const {
-  for (const bus::Run& run : servers_.runs())
-    if (run.status && bus::serves_vehicle(run.parameters, options_.vehicle_id)) return run;
+std::optional<sync::Run> OperatorClient::find_ended_run() const {
+  for (const sync::Run& run : servers_.runs())
+    if (run.status && sync::serves_vehicle(run.parameters, options_.vehicle_id)) return run;
   return std::nullopt;
 }
 
-bus::Run OperatorClient::refresh(const bus::Run& run) const {
-  bus::Run last = run;
+sync::Run OperatorClient::refresh(const sync::Run& run) const {
+  sync::Run last = run;
   if (const auto status = servers_.find_status(run.parameters.run_id())) last.status = status;
   if (has_ended(last.status)) return last;
   return servers_.find_joinable(options_.vehicle_id).value_or(last);
 }
 
-Snapshot OperatorClient::make_snapshot(const bus::Run& run) const {
+Snapshot OperatorClient::make_snapshot(const sync::Run& run) const {
   const std::uint64_t run_id = run.parameters.run_id();
   Snapshot snapshot;
   snapshot.parameters = run.parameters;
@@ -132,7 +132,7 @@ void OperatorClient::note_event(const SimStatus& status) {
 
 // --- requests ------------------------------------------------------------------------------------
 
-std::optional<SimControlReply> OperatorClient::ask(const bus::Run& run, ControlAction action,
+std::optional<SimControlReply> OperatorClient::ask(const sync::Run& run, ControlAction action,
                                                    std::uint64_t steps) {
   auto question = send(run, action, steps);
   while (question && app::stop_signal() == 0)
@@ -140,7 +140,7 @@ std::optional<SimControlReply> OperatorClient::ask(const bus::Run& run, ControlA
   return std::nullopt;
 }
 
-std::optional<OperatorClient::Question> OperatorClient::send(const bus::Run& run,
+std::optional<OperatorClient::Question> OperatorClient::send(const sync::Run& run,
                                                              ControlAction action,
                                                              std::uint64_t steps) {
   SimControl request;
@@ -160,7 +160,7 @@ std::optional<OperatorClient::Question> OperatorClient::send(const bus::Run& run
 
 std::optional<SimControlReply> OperatorClient::find_reply(Question& question,
                                                           Clock::time_point deadline) {
-  const bus::Run& run = question.run;
+  const sync::Run& run = question.run;
   do {
     const auto found = std::find_if(kept_.begin(), kept_.end(), [&](const Received& received) {
       return received.sender == run.server &&
@@ -174,12 +174,12 @@ std::optional<SimControlReply> OperatorClient::find_reply(Question& question,
 
   const char* const action = to_string(question.request.action());
   const auto status = servers_.find_status(run.parameters.run_id());
-  if (bus::calc_progress(status) < 0 && !question.give_up)
+  if (sync::calc_progress(status) < 0 && !question.give_up)
     question.give_up = Clock::now() + kLastReplyTime;
   if (question.give_up && Clock::now() >= *question.give_up)
     throw app::RunError(fmt::format("no reply to {}: the run has ended: {}, {}", action,
                                     bus::to_string(status->phase()), status->reason().c_str()));
-  if (question.server.look() == bus::ServerWatch::Finding::kLost)
+  if (question.server.look() == sync::ServerWatch::Finding::kLost)
     throw app::RunError(fmt::format("no reply to {}: {}", action, question.server.describe()));
   const bool takes_its_time = question.request.action() == ControlAction::ACTION_STEP;
   if (!takes_its_time && question.wait.is_over())
@@ -197,7 +197,7 @@ bool OperatorClient::keep_next_reply(Clock::time_point deadline) {
   return true;
 }
 
-bool OperatorClient::wait_until_heard(const bus::Run& run, app::Wait& wait) const {
+bool OperatorClient::wait_until_heard(const sync::Run& run, app::Wait& wait) const {
   while (channel_->request_writer.matched().count(run.server) == 0 ||
          channel_->reply_reader.matched().count(run.server) == 0) {
     if (app::stop_signal() != 0) return false;
@@ -214,7 +214,7 @@ bool OperatorClient::wait_until_heard(const bus::Run& run, app::Wait& wait) cons
   return true;
 }
 
-void OperatorClient::report_wait(const bus::Run& run, const SimControl& request,
+void OperatorClient::report_wait(const sync::Run& run, const SimControl& request,
                                  const app::Wait& wait) const {
   if (request.action() != ControlAction::ACTION_STEP) {
     spdlog::info("waiting for: reply of the server ({:.0f} s left)", wait.seconds_left());

@@ -32,23 +32,23 @@ class OperatorClient {
 
   /// Waits for a run of the vehicle that is neither finished nor failed.
   /// @throws app::RunError if there is none in time.
-  std::optional<bus::Run> wait_for_run() const;
+  std::optional<sync::Run> wait_for_run() const;
 
   /// The same, but returns a run that has ended if there is no other.
-  std::optional<bus::Run> wait_for_any_run() const;
+  std::optional<sync::Run> wait_for_any_run() const;
 
   /// `run` with its last status; after a reset or the end of its server, the vehicle's next run.
-  bus::Run refresh(const bus::Run& run) const;
+  sync::Run refresh(const sync::Run& run) const;
 
   /// Requests `action` from the server of `run` and waits for its reply; requires `asks`.
   /// ControlAction::ACTION_STEP has no timeout as long as the server publishes.
   /// @throws app::RunError if no reply comes: server gone or not matched, run ended, timeout.
-  std::optional<SimControlReply> ask(const bus::Run& run, ControlAction action,
+  std::optional<SimControlReply> ask(const sync::Run& run, ControlAction action,
                                      std::uint64_t steps = 0);
 
   /// A request that has been sent, for find_reply.
   struct Question {
-    bus::Run run;
+    sync::Run run;
     SimControl request;
     app::Wait wait;
     bus::ServerWatch server;
@@ -56,12 +56,12 @@ class OperatorClient {
   };
   /// The two parts of `ask`, for several requests at a time, on one thread: `send` waits only for
   /// the server's endpoints, find_reply until `deadline`. @throws app::RunError as `ask`.
-  std::optional<Question> send(const bus::Run& run, ControlAction action, std::uint64_t steps);
+  std::optional<Question> send(const sync::Run& run, ControlAction action, std::uint64_t steps);
   std::optional<SimControlReply> find_reply(Question& question,
                                             std::chrono::steady_clock::time_point deadline);
 
   /// The data of `run` that have arrived so far.
-  Snapshot make_snapshot(const bus::Run& run) const;
+  Snapshot make_snapshot(const sync::Run& run) const;
 
  private:
   /// The last reasons of one run.
@@ -80,17 +80,17 @@ class OperatorClient {
     bus::Reader<SimControlReply> reply_reader;
     bus::Writer<SimControl> request_writer;
   };
-  using FindRun = std::function<std::optional<bus::Run>()>;
+  using FindRun = std::function<std::optional<sync::Run>()>;
 
-  std::optional<bus::Run> wait_for(const FindRun& find) const;
-  std::optional<bus::Run> find_ended_run() const;
+  std::optional<sync::Run> wait_for(const FindRun& find) const;
+  std::optional<sync::Run> find_ended_run() const;
   void note_event(const SimStatus& status);
   Events& find_or_add_events(std::uint64_t run_id);
   bool keep_next_reply(std::chrono::steady_clock::time_point deadline);
   /// Waits until both endpoints match those of the server of `run`. False if a stop signal came
   /// first.
-  bool wait_until_heard(const bus::Run& run, app::Wait& wait) const;
-  void report_wait(const bus::Run& run, const SimControl& request, const app::Wait& wait) const;
+  bool wait_until_heard(const sync::Run& run, app::Wait& wait) const;
+  void report_wait(const sync::Run& run, const SimControl& request, const app::Wait& wait) const;
 
   const ClientOptions options_;
   mutable std::mutex events_mutex_;  // events arrive on a thread of the middleware

@@ -33,7 +33,7 @@ bool is_interrupted() { return app::stop_signal() != 0; }
 
 /// `run` with a status published after discovery, if one comes within kFreshTime; otherwise with
 /// the status that the server keeps for late joiners.
-bus::Run wait_for_fresh_status(const OperatorClient& client, bus::Run run) {
+sync::Run wait_for_fresh_status(const OperatorClient& client, sync::Run run) {
   const auto began = Clock::now();
   std::optional<std::uint64_t> left;  // sample_index when discovery was over
   while (!is_interrupted() && Clock::now() - began < kFreshTime) {
@@ -47,7 +47,7 @@ bus::Run wait_for_fresh_status(const OperatorClient& client, bus::Run run) {
   return run;
 }
 
-void show_once(const OperatorClient& client, const ShowOptions& options, bus::Run run,
+void show_once(const OperatorClient& client, const ShowOptions& options, sync::Run run,
                std::ostream& out) {
   run = wait_for_fresh_status(client, std::move(run));
   if (is_interrupted()) return;
@@ -120,7 +120,7 @@ class ViewWriter {
 };
 
 template <class OutputWriter>
-void watch(const OperatorClient& client, double timeout_s, bus::Run run, OutputWriter& writer,
+void watch(const OperatorClient& client, double timeout_s, sync::Run run, OutputWriter& writer,
            std::ostream& out) {
   while (!is_interrupted()) {
     run = client.refresh(run);

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "common/bus/participants.hpp"
+#include "common/sync/servers.hpp"
 
 namespace sls::record {
 namespace {
@@ -30,7 +30,7 @@ void write_row(CsvFile& file, const Row& row) {
 CsvSink::CsvSink(const std::filesystem::path& folder, const Parameters& parameters)
     : folder_(folder),
       state_header_(make_state_header(parameters)),
-      is_of_fleet_(bus::is_fleet(parameters)),
+      is_of_fleet_(sync::is_fleet(parameters)),
       states_(folder / StateRow::kFile, state_header_),
       references_(folder / ReferenceRow::kFile, make_header<ReferenceRow>()),
       flight_(folder / FlightRow::kFile, make_flight_header(is_of_fleet_)),

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/bus/contract_text.hpp"
-#include "common/bus/participants.hpp"
+#include "common/sync/servers.hpp"
 
 namespace sls::record {
 namespace {
@@ -25,7 +25,7 @@ std::string describe(const Parameters& parameters) {
   const Compression compression = describe_compression();
   Json json = {{"scenario_sha256", parameters.scenario_sha256().to_string()},
                {"contract_sha256", parameters.contract_sha256().to_string()},
-               {"vehicle_ids", bus::list_vehicle_ids(parameters)},
+               {"vehicle_ids", sync::list_vehicle_ids(parameters)},
                {"period_s", static_cast<double>(parameters.period_ns()) / 1e9},
                {"signals", Json::array()},
                {"compression",
@@ -43,11 +43,11 @@ std::string describe(const Parameters& parameters) {
 McapSink::McapSink(const std::filesystem::path& file, const Parameters& parameters)
     : period_ns_(parameters.period_ns()),
       file_(file),
-      mirrors_(bus::list_vehicle_ids(parameters)),
+      mirrors_(sync::list_vehicle_ids(parameters)),
       emit_([this](std::size_t channel, std::int64_t time_ns, const auto& message) {
         write_mirror(channel, time_ns, message);
       }) {
-  for (const std::uint32_t id : bus::list_vehicle_ids(parameters)) vehicles_[id];
+  for (const std::uint32_t id : sync::list_vehicle_ids(parameters)) vehicles_[id];
   add_channels();
   add_attachments(parameters);
   mirrors_.emit_static(emit_);

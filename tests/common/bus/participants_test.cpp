@@ -103,7 +103,7 @@ TEST(ParticipantDirectoryTest, ListsTheParticipantsOfARunUntilTheyLeave) {
 /// One participant that announces itself.
 class AnnouncementTest : public testing::Test {
  protected:
-  std::optional<ParticipantDirectory::Entry> find() const {
+  std::optional<sync::Member> find() const {
     const auto found = directory_.find(ParticipantRole::ROLE_CONTROLLER, kRun);
     return found.empty() ? std::nullopt : std::optional(found.front());
   }

@@ -150,8 +150,8 @@ class ImpatientClientTest : public OperatorClientTest {
   ImpatientClientTest() : OperatorClientTest(1.0) {}
 
   /// The run of the server; tries again until discovery finds it.
-  bus::Run find_run() {
-    std::optional<bus::Run> run;
+  sync::Run find_run() {
+    std::optional<sync::Run> run;
     EXPECT_TRUE(wait_until([&] {
       try {
         run = client.wait_for_run();
@@ -280,7 +280,7 @@ TEST_F(OperatorClientTest, AWatchWithoutTerminalWritesLinesUntilTheRunHasEnded) 
 
 TEST_F(OperatorClientTest, AWatchFollowsAResetToItsSuccessor) {
   FakeServer server(kAccept);
-  bus::Run run = client.wait_for_run().value();
+  sync::Run run = client.wait_for_run().value();
   server.phase = RunPhase::PHASE_RESET;
   ASSERT_TRUE(wait_until([&] {
     run = client.refresh(run);
@@ -322,7 +322,7 @@ TEST_F(OperatorClientTest, OnlyTheLastRunsKeepTheirEvents) {
     writer.write(status);
   }
   const auto count_events = [&](std::uint64_t run_id) {
-    bus::Run run;
+    sync::Run run;
     run.parameters.run_id(run_id);
     return client.make_snapshot(run).events.size();
   };

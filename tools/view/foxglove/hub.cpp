@@ -6,7 +6,7 @@
 #include <array>
 
 #include "common/bus/contract_text.hpp"
-#include "common/bus/participants.hpp"
+#include "common/sync/servers.hpp"
 #include "tools/view/foxglove/sample_stamp.hpp"
 
 namespace sls::view::foxglove {
@@ -22,7 +22,7 @@ constexpr const char* kNoFlight = "No flight on this domain. Start one: ./sls ru
 constexpr std::array kClockTopics = {TopicId::kRecord, TopicId::kStatus};
 
 std::vector<std::uint32_t> list_vehicles(const Parameters& parameters) {
-  const auto ids = bus::list_vehicle_ids(parameters);
+  const auto ids = sync::list_vehicle_ids(parameters);
   const std::set<std::uint32_t> unique(ids.begin(), ids.end());
   return {unique.begin(), unique.end()};
 }

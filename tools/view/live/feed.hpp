@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "common/bus/node.hpp"
-#include "common/bus/participants.hpp"
+#include "common/sync/servers.hpp"
 
 namespace sls::view {
 
@@ -47,7 +47,7 @@ struct Sample {
 /// The page's view of the run of vehicle `--vehicle`: the current run; after its end the run that
 /// can be joined, otherwise the last one.
 struct RunView {
-  bus::Run run;  ///< parameters and last status
+  sync::Run run;  ///< parameters and last status
   std::vector<Participant> participants;
   bool is_silent = false;  ///< the run goes on, but its server has not published for 1 s
   double silence_s = 0;

@@ -47,7 +47,7 @@ std::string describe_waiting(const RunView& view) {
                        view.is_gone ? ", gone" : "");
   if (!status) return "the server's first status";
   if (status->phase() == RunPhase::PHASE_WAITING) return status->reason().to_string();
-  if (bus::calc_progress(status->phase()) < 0 && view.is_gone) return "another flight";
+  if (sync::calc_progress(status->phase()) < 0 && view.is_gone) return "another flight";
   return {};
 }
 

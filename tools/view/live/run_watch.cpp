@@ -40,20 +40,20 @@ std::deque<RunEvent> RunWatch::take_events() {
   return std::exchange(events_, {});
 }
 
-std::optional<bus::Run> RunWatch::find_ended_run() const {
-  for (const bus::Run& run : servers_.runs())
-    if (run.status && bus::serves_vehicle(run.parameters, vehicle_id_)) return run;
+std::optional<sync::Run> RunWatch::find_ended_run() const {
+  for (const sync::Run& run : servers_.runs())
+    if (run.status && sync::serves_vehicle(run.parameters, vehicle_id_)) return run;
   return std::nullopt;
 }
 
-std::optional<bus::Run> RunWatch::choose_run() const {
+std::optional<sync::Run> RunWatch::choose_run() const {
   auto best = servers_.find_joinable(vehicle_id_);
   if (!run_) return best ? best : find_ended_run();
   const std::uint64_t run_id = run_->parameters.run_id();
   const auto status = servers_.find_status(run_id);
-  const bool goes_on = servers_.is_known(run_id) && bus::calc_progress(status) >= 0;
+  const bool goes_on = servers_.is_known(run_id) && sync::calc_progress(status) >= 0;
   if (best && (!goes_on || best->parameters.run_id() == run_id)) return best;
-  bus::Run run = *run_;
+  sync::Run run = *run_;
   if (status) run.status = status;
   return run;
 }
@@ -73,7 +73,7 @@ std::shared_ptr<const RunView> RunWatch::look() {
   view->is_gone = !servers_.is_present(run_->server);
   if (const auto heard = servers_.find_last_heard(run_id))
     view->silence_s = std::chrono::duration<double>(Clock::now() - *heard).count();
-  view->is_silent = bus::calc_progress(run_->status) >= 0 && view->silence_s > ctl::kLongSilence;
+  view->is_silent = sync::calc_progress(run_->status) >= 0 && view->silence_s > ctl::kLongSilence;
   const Mark mark{run_id,
                   run_->status ? run_->status->sample_index() + 1 : 0,
                   participants_.version(),

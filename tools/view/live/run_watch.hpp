@@ -43,8 +43,8 @@ class RunWatch {
   /// The view has changed if one of these values has.
   using Mark = std::tuple<std::uint64_t, std::uint64_t, std::uint64_t, std::size_t, bool, bool>;
 
-  std::optional<bus::Run> choose_run() const;
-  std::optional<bus::Run> find_ended_run() const;
+  std::optional<sync::Run> choose_run() const;
+  std::optional<sync::Run> find_ended_run() const;
   void note(const SimStatus& status);
 
   const std::uint32_t vehicle_id_;
@@ -52,7 +52,7 @@ class RunWatch {
   std::mutex events_mutex_;  // protects the next two members
   std::deque<RunEvent> events_;
   std::map<std::uint64_t, std::string> last_reasons_;  // by run_id
-  std::optional<bus::Run> run_;
+  std::optional<sync::Run> run_;
   Mark mark_{};
   bool has_changed_ = false;
   bus::ParticipantDirectory participants_;

@@ -11,7 +11,7 @@
 #include <thread>
 #include <utility>
 
-#include "common/bus/participants.hpp"
+#include "common/sync/servers.hpp"
 #include "tools/view/ros_face/newest_samples.hpp"
 #include "tools/view/ros_face/publications.hpp"
 
@@ -105,7 +105,7 @@ struct RosFace::Impl : Feed::Listener {
       news = std::exchange(batches, {});
     }
     if (run) {
-      publications.begin(bus::list_vehicle_ids(*run));
+      publications.begin(sync::list_vehicle_ids(*run));
       newest.emplace(*run);
     }
     if (!newest || !publications.has_readers()) return;

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "common/sync/patience.hpp"
+#include "common/sync/time.hpp"
+
+namespace sls::sync {
+
+/// Watches the server of a run, which publishes a status at least every 0.5 s: within 1 s and then
+/// every 5 s it has a line about the silence of the server, and one when it is back.
+class ServerWatch {
+ public:
+  /// Watches run `run_id` from `now` on; its server is lost after `deadline_s` of silence.
+  ServerWatch(std::uint64_t run_id, double deadline_s, Time now)
+      : run_id_(run_id), deadline_s_(deadline_s), heard_(now), looked_(now) {}
+
+  enum class Finding { kThere, kSilent, kLost };
+  /// `heard`: when the last status came (Servers::find_last_heard). Call it several times a second.
+  /// A gap of more than 0.5 s between calls means that this process itself was stopped: the gap
+  /// does not count as silence of the server.
+  Finding look(const std::optional<Time>& heard, Time now);
+
+  /// The line that the last look has to say; empty if none.
+  const std::string& report() const { return report_; }
+  /// True if that line is about silence.
+  bool is_warning() const { return is_reported_; }
+
+  /// For messages: "server of run … (silent for 3.1 s)".
+  std::string describe(Time now) const;
+
+ private:
+  const std::uint64_t run_id_;
+  const double deadline_s_;
+  Time heard_;
+  Time looked_;
+  std::optional<Patience> wait_;  // while it is silent
+  bool is_reported_ = false;
+  std::string report_;
+};
+
+}  // namespace sls::sync

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <chrono>
+
+namespace sls::sync {
+
+/// A moment on a monotonic clock. The rules of synchronisation get it as an argument and ask no
+/// clock, so a test can choose it.
+using Time = std::chrono::steady_clock::time_point;
+using Duration = Time::duration;
+
+inline double to_seconds(Duration duration) {
+  return std::chrono::duration<double>(duration).count();
+}
+
+inline Duration to_duration(double seconds) {
+  return std::chrono::duration_cast<Duration>(std::chrono::duration<double>(seconds));
+}
+
+}  // namespace sls::sync
