@@ -40,6 +40,8 @@ Client::Client(bus::Node& node, const config::Scenario& scenario,
       vehicle_ids_(vehicle_ids),
       servers_(node),
       announcer_(node),
+      core_({vehicle_ids, scenario.sync.wait_for.timeout_s, scenario.sync.wait.server_deadline_s,
+             options.follows_servers}),
       stream_(make_stream(scenario.sync.mode == config::SyncMode::kRealtime)) {
   answers_.client_name(options.name);
   answers_.strength(options.strength);
@@ -52,48 +54,51 @@ std::unique_ptr<AnswerStream> Client::make_stream(bool is_realtime) {
 }
 
 void Client::run() {
-  auto next = find_first_run();
-  while (next) {
-    begin(*next);
-    next = serve();
-  }
-  if (run_) leave();
-}
-
-std::optional<sync::Run> Client::find_first_run() {
-  const double timeout_s = scenario_.sync.wait_for.timeout_s;
-  const std::string vehicles = config::to_vehicle_ranges(vehicle_ids_);
-  app::Wait wait(timeout_s, app::kUsualJoinTime);
   announce_waiting();
-  while (!options_.is_stopped()) {
-    servers_.look_for_impostors();
-    if (auto run = find_joinable_run()) return run;
+  while (true) {
+    switch (look()) {
+      case ClientCore::Act::kNone:
+        break;
+      case ClientCore::Act::kBegin:
+        begin();
+        continue;
+      case ClientCore::Act::kAnnounceReady:
+        announce(true, false);
+        break;
+      case ClientCore::Act::kLeave:
+        if (run_) leave();
+        [[fallthrough]];
+      case ClientCore::Act::kGiveUp:
+        if (core_.error().empty()) return;
+        throw app::RunError(core_.error() + describe_obstacles());
+    }
     announcer_.repeat_if_due();
-    if (wait.is_over())
-      throw app::RunError(fmt::format("no server for vehicle {} within {} s{}{}", vehicles,
-                                      timeout_s, describe_problem(), node_.describe_isolation()));
-    if (wait.is_report_due())
-      spdlog::info("waiting for: server of vehicle {} ({:.0f} s left){}{}", vehicles,
-                   wait.seconds_left(), describe_problem(), node_.describe_isolation());
-    std::this_thread::sleep_for(app::kShortPollTime);
+    std::this_thread::sleep_for(run_ ? app::kPollTime : app::kShortPollTime);
   }
-  return std::nullopt;
 }
 
-/// "; " and the problems of other participants on the domain, to be appended to a message about a
-/// missing server. Empty without problems.
-std::string Client::describe_problem() const {
+ClientCore::Act Client::look() {
+  if (run_) rethrow_answer_error();
+  servers_.look_for_impostors();
+  const ClientCore::Now now{Clock::now(), options_.is_stopped(),
+                            run_ && stream_->sees_server(run_->server)};
+  const auto act =
+      servers_.ask([&](const sync::Servers& servers) { return core_.look(servers, now); });
+  for (const sync::Line& line : core_.take_lines())
+    spdlog::log(line.is_warning ? spdlog::level::warn : spdlog::level::info, "{}{}", line.text,
+                describe_obstacles());
+  return act;
+}
+
+/// While no server is found, what may be in the way, to be appended to a message; else empty.
+std::string Client::describe_obstacles() const {
+  if (run_) return "";
   const std::string problem = node_.problems().describe();
-  return problem.empty() ? "" : "; " + problem;
+  return (problem.empty() ? "" : "; " + problem) + node_.describe_isolation();
 }
 
-std::optional<sync::Run> Client::find_joinable_run() const {
-  for (const std::uint32_t id : vehicle_ids_)
-    if (auto run = servers_.find_joinable(id)) return run;
-  return std::nullopt;
-}
-
-void Client::begin(const sync::Run& run) {
+void Client::begin() {
+  const sync::Run run = *core_.run();
   const Parameters& parameters = run.parameters;
   if (!(parameters.scenario_sha256() == scenario_.sha256))
     throw config::ConfigError(
@@ -103,13 +108,10 @@ void Client::begin(const sync::Run& run) {
   config::Scenario scenario = scenario_;
   scenario.sync.period_ns = parameters.period_ns();
   scenario.plant.step_ns = parameters.step_ns();
+  const std::vector<std::uint32_t> flown_ids = core_.list_flown_ids();
   std::map<std::uint32_t, Pilot> pilots;
-  flown_ids_.clear();
-  for (const std::uint32_t id : vehicle_ids_) {
-    if (!sync::serves_vehicle(parameters, id)) continue;
-    flown_ids_.push_back(id);
+  for (const std::uint32_t id : flown_ids)
     pilots.try_emplace(id, config::make_vehicle_scenario(scenario, id), id, options_);
-  }
   // Made and destroyed without the lock: both wait for running handlers, and our handler waits for
   // the lock.
   auto stream = stream_->is_realtime() == is_realtime ? nullptr : make_stream(is_realtime);
@@ -127,10 +129,8 @@ void Client::begin(const sync::Run& run) {
     bus::start_spinning();
   }
   plugin::set_patience(scenario_.sync.calc_controller_patience_s() + kAfterThePatience_s);
-  ready_ = false;
-  watch_.emplace(servers_, run, scenario_.sync.wait.server_deadline_s);
   const std::string vehicles =
-      sync::is_fleet(parameters) ? ", vehicles " + config::to_vehicle_ranges(flown_ids_) : "";
+      sync::is_fleet(parameters) ? ", vehicles " + config::to_vehicle_ranges(flown_ids) : "";
   spdlog::info("'{}' joins run {:016x}: {}{}, period {} s", options_.name, parameters.run_id(),
                scenario_.name, vehicles, scenario_.sync.period_ns * 1e-9);
   announce(false, false);
@@ -138,27 +138,7 @@ void Client::begin(const sync::Run& run) {
 
 void Client::leave() {
   bus::stop_spinning();
-  const std::uint64_t run_id = run_->parameters.run_id();
-  const auto status = servers_.find_status(run_id);
   announce(false, true);
-  if (status && status->phase() == RunPhase::PHASE_FAILED)
-    throw app::RunError(fmt::format("the run failed: {}", status->reason().c_str()));
-}
-
-std::optional<sync::Run> Client::serve() {
-  while (!options_.is_stopped()) {
-    rethrow_answer_error();
-    if (has_ended()) return std::nullopt;
-    servers_.look_for_impostors();
-    if (auto next = find_successor()) return next;
-    if (!ready_ && stream_->sees_server(run_->server)) {
-      ready_ = true;
-      announce(true, false);
-    }
-    announcer_.repeat_if_due();
-    std::this_thread::sleep_for(app::kPollTime);
-  }
-  return std::nullopt;
 }
 
 void Client::receive(const States& sample, const bus::PeerId& sender) {
@@ -209,32 +189,10 @@ void Client::rethrow_answer_error() {
   if (lock && answer_error_) std::rethrow_exception(answer_error_);
 }
 
-bool Client::has_ended() const {
-  const auto status = servers_.find_status(run_->parameters.run_id());
-  return status &&
-         (status->phase() == RunPhase::PHASE_FINISHED || status->phase() == RunPhase::PHASE_FAILED);
-}
-
-std::optional<sync::Run> Client::find_successor() {
-  const auto finding = watch_->look();
-  if (auto next = servers_.find_successor(*run_, flown_ids_)) {
-    const bool is_reset = next->server == run_->server;
-    const std::string news =
-        fmt::format("run {:016x} was {} run {:016x}", run_->parameters.run_id(),
-                    is_reset ? "reset to" : "replaced by", next->parameters.run_id());
-    if (!is_reset && !options_.follows_servers) throw app::RunError(news + " (see --follow)");
-    spdlog::warn("{}: following it", news);
-    return next;
-  }
-  if (finding == sync::ServerWatch::Finding::kLost)
-    throw app::RunError(fmt::format("the {}, expected it to finish", watch_->describe()));
-  return std::nullopt;
-}
-
 void Client::announce_waiting() { announcer_.announce(make_announcement(vehicle_ids_)); }
 
 void Client::announce(bool ready, bool done) {
-  Participant message = make_announcement(flown_ids_);
+  Participant message = make_announcement(core_.list_flown_ids());
   message.run_id(run_->parameters.run_id());
   message.ready(ready);
   message.done(done);

@@ -22,6 +22,7 @@
 #include "common/bus/participants.hpp"
 #include "common/config/scenario.hpp"
 #include "control_client/answer_stream.hpp"
+#include "control_client/core/client_core.hpp"
 #include "control_client/flight_controller.hpp"
 #include "control_client/laws/control_law.hpp"
 
@@ -57,16 +58,11 @@ class Client {
  private:
   using Clock = std::chrono::steady_clock;
 
-  /// Waits for the first run to join; empty if the client is stopped.
-  std::optional<sync::Run> find_first_run();
   std::unique_ptr<AnswerStream> make_stream(bool is_realtime);
-  std::string describe_problem() const;
-  /// The run of the first of our vehicles that has a joinable run.
-  std::optional<sync::Run> find_joinable_run() const;
-  void begin(const sync::Run& run);
-  /// Answers until the run has ended or the client is stopped (returns empty), or until another run
-  /// replaces it (returns that run).
-  std::optional<sync::Run> serve();
+  /// Looks once; returns what is to be done.
+  ClientCore::Act look();
+  std::string describe_obstacles() const;
+  void begin();
   void leave();
 
   /// One of our vehicles in the run that is joined.
@@ -91,11 +87,6 @@ class Client {
   /// itself.
   void announce_waiting();
   Participant make_announcement(const std::vector<std::uint32_t>& vehicle_ids) const;
-  /// True when the run has finished or failed.
-  bool has_ended() const;
-  /// The run that replaces ours, after a reset or with another server; empty if there is none.
-  /// @throws app::RunError if the server is lost, or is replaced without `follows_servers`.
-  std::optional<sync::Run> find_successor();
   /// Tries again at the next call if an answer is being computed.
   void rethrow_answer_error();
 
@@ -107,13 +98,11 @@ class Client {
 
   bus::ServerDirectory servers_;
   bus::Announcer announcer_;
-  std::optional<sync::Run> run_;
-  std::optional<bus::ServerWatch> watch_;
-  std::vector<std::uint32_t> flown_ids_;  // those of vehicle_ids_ that this run has
-  bool ready_ = false;
+  ClientCore core_;
 
   // Shared between the main thread and the middleware's.
   std::mutex answer_mutex_;  // guards all that `answer` uses
+  std::optional<sync::Run> run_;
   std::map<std::uint32_t, Pilot> pilots_;
   Commands answers_;  // to the current sample
   std::exception_ptr answer_error_;

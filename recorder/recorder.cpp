@@ -22,7 +22,7 @@ constexpr double kJoinTimeout = 60;  // until a run must be found, s
 template <class Find>
 std::optional<sync::Run> wait_for_run(const bus::Node& node, bus::Announcer& announcer,
                                      const std::string& whom, double limit_s, Find find) {
-  app::Wait wait(limit_s, app::kUsualJoinTime);
+  app::Wait wait(limit_s, sync::kUsualJoinTime);
   while (app::stop_signal() == 0 && !wait.is_over()) {
     if (auto run = find()) return run;
     announcer.repeat_if_due();

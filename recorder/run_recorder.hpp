@@ -13,6 +13,7 @@
 #include "common/bus/node.hpp"
 #include "common/bus/participants.hpp"
 #include "common/config/scenario.hpp"
+#include "recorder/core/run_watch.hpp"
 #include "recorder/inbox.hpp"
 #include "recorder/recording.hpp"
 
@@ -37,7 +38,7 @@ struct Surroundings {
 
 struct RunEnd {
   bool is_complete = false;
-  bool is_reset = false;                ///< by an operator: the same server begins a new run
+  bool is_reset = false;                 ///< by an operator: the same server begins a new run
   std::optional<sync::Run> replacement;  ///< a run of another server that replaces this one
   std::string gaps;                     ///< why it is not complete, in one line
   std::int64_t last_step = -1;
@@ -58,10 +59,7 @@ class RunRecorder {
 
   // On the main thread.
   void watch();
-  void look_for_the_end(bus::ServerWatch& server);
-  void look_for_the_next_run();
-  void end_within(std::chrono::duration<double> limit);
-  void announce_news();
+  RunWatch::Now look_around() const;
   void announce(bool done);
 
   // On the writing thread.
@@ -77,20 +75,15 @@ class RunRecorder {
   std::optional<app::Wait> stuck_;
   std::uint64_t participants_version_ = 0;
 
-  bool ready_ = false;
-  std::int64_t announced_step_ = -1;
-  Clock::time_point announced_time_;
-  std::optional<app::Wait> give_up_;
-  std::int64_t step_after_end_ = -1;  // last complete step at the last check after the end
+  RunWatch watch_;
   RunEnd end_;
 
   // Shared by both threads.
   std::atomic<bool> stop_writing_{false};
   std::atomic<bool> has_all_{false};
   std::atomic<std::int64_t> last_complete_step_;
-  std::string interruption_;             // set before stop_writing_
-  std::string outcome_ = "interrupted";  // set before stop_writing_
-  std::exception_ptr writing_error_;     // read after the thread has ended
+  RunWatch::End watched_end_;         // set before stop_writing_
+  std::exception_ptr writing_error_;  // read after the thread has ended
   std::atomic<bool> writing_failed_{false};
 };
 

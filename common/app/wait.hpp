@@ -12,10 +12,6 @@ inline constexpr auto kPollTime = std::chrono::milliseconds(20);
 /// The same before the first step and after the last one: a flight can be shorter than these waits.
 inline constexpr auto kShortPollTime = std::chrono::milliseconds(5);
 
-/// Discovery and claim usually take less: a program that joins a run reports its waiting after
-/// this.
-inline constexpr auto kUsualJoinTime = std::chrono::milliseconds(1500);
-
 /// sync::Patience that asks the clock.
 class Wait {
  public:

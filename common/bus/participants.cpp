@@ -123,14 +123,6 @@ bool ServerDirectory::note(const Sample& sample, const PeerId& sender) {
   return is_taken;
 }
 
-template <class Use>
-auto ServerDirectory::ask(Use use) const {
-  auto present = parameters_reader_.matched();
-  const std::lock_guard lock(mutex_);
-  servers_.set_present(std::move(present));
-  return use(servers_);
-}
-
 void ServerDirectory::note_impostor(const PeerId& sender, const char* topic, std::uint64_t run_id,
                                     const PeerId& owner) const {
   const std::string name = owner == self_ ? "this server" : node_.describe(owner);

@@ -12,6 +12,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/bus/node.hpp"
@@ -80,6 +81,15 @@ class ServerDirectory {
   /// the middleware.
   explicit ServerDirectory(Node& node, std::function<void(const SimStatus&)> on_status = {});
 
+  /// Calls `use` with the sync::Servers that are present now, under their lock.
+  template <class Use>
+  auto ask(Use use) const {
+    auto present = parameters_reader_.matched();
+    const std::lock_guard lock(mutex_);
+    servers_.set_present(std::move(present));
+    return use(static_cast<const sync::Servers&>(servers_));
+  }
+
   std::vector<sync::Run> runs() const;
   bool is_known(std::uint64_t run_id) const;
   bool may_fly(std::uint64_t run_id, std::uint32_t vehicle_id) const;
@@ -108,9 +118,6 @@ class ServerDirectory {
                      const PeerId& owner) const;
 
  private:
-  /// Calls `use` with the servers that are present now.
-  template <class Use>
-  auto ask(Use use) const;
   /// Passes a sample on, and reports the impostors that it shows.
   template <class Sample>
   bool note(const Sample& sample, const PeerId& sender);

@@ -4,6 +4,10 @@
 
 namespace sls::sync {
 
+/// Discovery and claim usually take less: a program that joins a run reports its waiting after
+/// this.
+inline constexpr auto kUsualJoinTime = std::chrono::milliseconds(1500);
+
 /// The times of a wait: its deadline, and when to log a line about it.
 class Patience {
  public:

@@ -1,0 +1,73 @@
+/// Which run a client flies: it finds one, flies it, follows it and ends with it. No network, thread
+/// or clock here: the shell (control_client/client.hpp) looks every few milliseconds and does what
+/// comes out.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/sync/line.hpp"
+#include "common/sync/patience.hpp"
+#include "common/sync/server_watch.hpp"
+#include "common/sync/servers.hpp"
+
+namespace sls::control {
+
+class ClientCore {
+ public:
+  struct Options {
+    std::vector<std::uint32_t> vehicle_ids;  ///< ascending, at least one
+    double join_timeout_s = 0;               ///< until a server must be found
+    double server_deadline_s = 0;            ///< a server that is silent for so long is lost
+    bool follows_servers = false;            ///< as in ClientOptions
+  };
+  /// What the shell knows at a look.
+  struct Now {
+    sync::Time time;
+    bool is_stopped = false;
+    bool sees_server = false;  ///< both topics of the loop are matched with the run's server
+  };
+  enum class Phase { kFinding, kFlying, kEnded };
+  enum class Act {
+    kNone,
+    kBegin,          ///< join run(), then go on looking
+    kAnnounceReady,  ///< the server hears the answers from now on
+    kLeave,          ///< the run has ended or the client is stopped; failed if error() says so
+    kGiveUp,         ///< error() says why
+  };
+
+  /// Looks for a run from the first look on.
+  explicit ClientCore(Options options) : options_(std::move(options)) {}
+
+  Act look(const sync::Servers& servers, const Now& now);
+
+  Phase phase() const { return phase_; }
+  /// The run that is flown; empty before the first.
+  const std::optional<sync::Run>& run() const { return run_; }
+  /// Those of our vehicles that the run has.
+  std::vector<std::uint32_t> list_flown_ids() const;
+  /// Why the client ends; empty if there is nothing wrong.
+  const std::string& error() const { return error_; }
+  std::vector<sync::Line> take_lines() { return std::exchange(lines_, {}); }
+
+ private:
+  Act find(const sync::Servers& servers, const Now& now);
+  Act fly(const sync::Servers& servers, const Now& now);
+  Act begin(const sync::Run& run, sync::Time now);
+  Act follow(const sync::Run& next, sync::Time now);
+  Act end(Act act, std::string error = {});
+
+  const Options options_;
+  Phase phase_ = Phase::kFinding;
+  std::optional<sync::Patience> patience_;  // of finding the first run
+  std::optional<sync::Run> run_;
+  std::optional<sync::ServerWatch> watch_;  // of the run
+  bool is_ready_ = false;
+  std::string error_;
+  std::vector<sync::Line> lines_;
+};
+
+}  // namespace sls::control
