@@ -101,15 +101,15 @@ void RunRecorder::watch() {
 }
 
 RunWatch::Now RunRecorder::look_around() const {
-  return {Clock::now(), app::stop_signal(), surroundings_.inbox.hears(run_.server),
+  return {Clock::now(), app::describe_stop(), surroundings_.inbox.hears(run_.server),
           last_complete_step_};
 }
 
 void RunRecorder::announce(bool done) {
   const RunWatch::Now now = look_around();
   watch_.note_announcement(now);
-  surroundings_.announcer.announce(make_announcement(
-      &run_, watch_.is_ready() && !writing_failed_, done, now.last_complete_step));
+  surroundings_.announcer.announce(make_announcement(&run_, watch_.is_ready() && !writing_failed_,
+                                                     done, now.last_complete_step));
 }
 
 // --- writing -------------------------------------------------------------------------------------
@@ -132,9 +132,10 @@ void RunRecorder::write_samples() {
       std::this_thread::sleep_for(samples.empty() ? kWriteTime : kBusyTime);
     }
     // If it has all, the main thread may still write watched_end_.
-    const RunWatch::End end = recording_.has_all() ? RunWatch::End{"", ""} : watched_end_;
+    const bool has_all = recording_.has_all();
     end_.is_complete =
-        recording_.finish(end.interruption, surroundings_.inbox.refused(), end.outcome);
+        recording_.finish(has_all ? "" : watched_end_.interruption, surroundings_.inbox.refused(),
+                          has_all ? "" : watched_end_.outcome);
     if (!end_.is_complete) end_.gaps = recording_.describe_gaps();
     last_complete_step_ = recording_.last_complete_step();
     has_all_ = true;

@@ -40,7 +40,7 @@ struct RunEnd {
   bool is_complete = false;
   bool is_reset = false;                 ///< by an operator: the same server begins a new run
   std::optional<sync::Run> replacement;  ///< a run of another server that replaces this one
-  std::string gaps;                     ///< why it is not complete, in one line
+  std::string gaps;                      ///< why it is not complete, in one line
   std::int64_t last_step = -1;
 };
 

@@ -3,7 +3,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <csignal>
 #include <iterator>
 #include <thread>
 #include <utility>
@@ -119,9 +118,7 @@ void Run::check_claim() const {
 }
 
 void Run::check_stop() {
-  if (app::stop_signal() != 0)
-    throw app::RunError(
-        fmt::format("interrupted by {}", app::stop_signal() == SIGINT ? "SIGINT" : "SIGTERM"));
+  if (app::stop_signal() != 0) throw app::RunError(app::describe_stop());
 }
 
 bool Run::wait_for_participants() {

@@ -1,4 +1,4 @@
-// Rules for includes: which folders each folder may include.
+// Rules for includes: which folders each folder may include, and what a core may not use.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -27,7 +27,8 @@ const std::vector<Rule> kRules = {
      {"closed_loop", "common", "control_client", "recorder", "sim_server", "Wire", "Fast DDS"}},
     {"closed_loop", {"common", "control_client", "recorder", "sim_server"}},
     {"common/app", {"common/config", "common/sync"}},
-    {"common/bus", {"common/app", "common/config", "common/model", "common/sync", "Wire", "Fast DDS"}},
+    {"common/bus",
+     {"common/app", "common/config", "common/model", "common/sync", "Wire", "Fast DDS"}},
     {"common/bus/fastdds",
      {"common/bus/peer.hpp", "common/bus/problems.hpp", "common/bus/spinning.hpp",
       "common/bus/topics.hpp", "common/config", "Wire", "Fast DDS"}},
@@ -37,9 +38,11 @@ const std::vector<Rule> kRules = {
     {"common/ros", {"common/model", "Fast DDS"}},
     {"common/sync", {"common/bus/peer.hpp", "Wire"}},
     {"control_client", {"common"}},
+    {"control_client/core", {"common/config", "common/sync"}},
     {"control_client/laws", {"common/config", "common/model", "common/plugin"}},
     {"python", {"closed_loop", "common", "control_client", "recorder", "sim_server"}},
     {"recorder", {"common"}},
+    {"recorder/core", {"common/config", "common/sync"}},
     {"recorder/sinks/mcap", {"common", "recorder", "Wire", "Fast DDS"}},
     {"sim_server", {"common", "Wire"}},
     {"sim_server/autopilots", {"common/config", "common/model", "common/plugin"}},
@@ -55,6 +58,12 @@ const std::vector<Rule> kRules = {
      {"common", "control_client/reference_trajectory.hpp", "recorder",
       "sim_server/plants/multirotor/keys.hpp", "tools/ctl"}},
 };
+
+/// Folders whose files decide only: time and all that happens are arguments (CONTRIBUTING.md).
+const std::vector<std::string> kCores = {"common/sync", "control_client/core", "recorder/core"};
+const std::regex kNotInACore(
+    R"(<(thread|mutex|atomic|condition_variable|future|csignal|signal\.h|fstream|iostream|spdlog/spdlog\.h)>)"
+    R"(|\bnow\(\)|\bsleep)");
 
 bool is_below(const std::string& path, const std::string& folder) {
   return path.rfind(folder + "/", 0) == 0;
@@ -106,6 +115,11 @@ std::vector<std::string> find_faults(const fs::path& root) {
       int number = 0;
       for (std::string line; std::getline(lines, line);) {
         ++number;
+        const bool is_in_core = std::any_of(kCores.begin(), kCores.end(),
+                                            [&](const auto& core) { return is_below(file, core); });
+        if (std::smatch word; is_in_core && std::regex_search(line, word, kNotInACore))
+          faults.push_back(file + ":" + std::to_string(number) + ": a core must not use " +
+                           word.str());
         std::smatch found;
         if (std::regex_search(line, found, include) &&
             !is_allowed(file, found[2], found[1] == "\""))
@@ -134,6 +148,8 @@ TEST(IncludesTest, FindsEachIncludeThatBreaksARule) {
   write("common/bus/fastdds/a.hpp", "#include \"common/bus/node.hpp\"\n");
   write("control_client/laws/mine/a.cpp", "#include \"common/bus/topics.hpp\"\n#include <sls.h>\n");
   write("control_client/a.cpp", "#include \"closed_loop/a.hpp\"\n#include <Simbody.h>\n");
+  write("recorder/core/a.cpp",
+        "#include <mutex>\nint a() { return Clock::now(); }\n#include <chrono>\n");
   write("recorder/a.cpp", "  #  include \"sim_server/a.hpp\"\n");
   write("sim_server/a.cpp", "#include \"tests/a.hpp\"\n#include <fastdds/dds/topic/Topic.hpp>\n");
   write("tools/new/a.cpp", "");
@@ -147,6 +163,8 @@ TEST(IncludesTest, FindsEachIncludeThatBreaksARule) {
                                 "control_client/laws/mine/a.cpp:1: includes common/bus/topics.hpp",
                                 "control_client/laws/mine/a.cpp:2: includes sls.h",
                                 "recorder/a.cpp:1: includes sim_server/a.hpp",
+                                "recorder/core/a.cpp:1: a core must not use <mutex>",
+                                "recorder/core/a.cpp:2: a core must not use now()",
                                 "sim_server/a.cpp:1: includes tests/a.hpp",
                                 "sim_server/a.cpp:2: includes fastdds/dds/topic/Topic.hpp",
                                 "tools/new/a.cpp: no rule in tests/includes_test.cpp"}));

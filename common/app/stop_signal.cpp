@@ -48,6 +48,12 @@ void install_stop_signals(std::chrono::seconds patience) {
 
 int stop_signal() { return received; }
 
+std::string describe_stop() {
+  const int signal = received;
+  if (signal == 0) return "";
+  return signal == SIGINT ? "interrupted by SIGINT" : "interrupted by SIGTERM";
+}
+
 Unhurried::Unhurried() {
   ++unhurried;
   ::alarm(0);

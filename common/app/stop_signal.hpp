@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <string>
 
 namespace sls::app {
 
@@ -13,6 +14,9 @@ void install_stop_signals(std::chrono::seconds patience = std::chrono::seconds(2
 
 /// 0, or the number of the first stop signal received.
 int stop_signal();
+
+/// "interrupted by SIGINT" or "interrupted by SIGTERM"; empty before the first stop signal.
+std::string describe_stop();
 
 /// Suspends the time `patience` of install_stop_signals while an object exists: for work of the
 /// program that may take long. The time then starts again from the beginning.

@@ -62,9 +62,8 @@ ClientCore::Act ClientCore::fly(const sync::Servers& servers, const Now& now) {
 
 ClientCore::Act ClientCore::follow(const sync::Run& next, sync::Time now) {
   const bool is_reset = next.server == run_->server;
-  std::string news =
-      fmt::format("run {:016x} was {} run {:016x}", run_->parameters.run_id(),
-                  is_reset ? "reset to" : "replaced by", next.parameters.run_id());
+  std::string news = fmt::format("run {:016x} was {} run {:016x}", run_->parameters.run_id(),
+                                 is_reset ? "reset to" : "replaced by", next.parameters.run_id());
   if (!is_reset && !options_.follows_servers) return end(Act::kGiveUp, news + " (see --follow)");
   lines_.push_back({true, std::move(news) + ": following it"});
   return begin(next, now);

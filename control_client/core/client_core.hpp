@@ -1,6 +1,6 @@
-/// Which run a client flies: it finds one, flies it, follows it and ends with it. No network, thread
-/// or clock here: the shell (control_client/client.hpp) looks every few milliseconds and does what
-/// comes out.
+/// Which run a client flies: it finds one, flies it, follows it and ends with it. No network,
+/// thread or clock here: the shell (control_client/client.hpp) looks every few milliseconds and
+/// does what comes out.
 #pragma once
 
 #include <cstdint>

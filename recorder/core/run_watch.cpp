@@ -3,7 +3,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <chrono>
-#include <csignal>
 
 namespace sls::record {
 namespace {
@@ -29,9 +28,8 @@ RunWatch::RunWatch(const sync::Run& run, std::uint32_t vehicle, double server_de
 
 bool RunWatch::look(const sync::Servers& servers, const Now& now) {
   const auto status = servers.find_status(run_id_);
-  if (now.stop_signal != 0) {
-    end_.interruption =
-        now.stop_signal == SIGINT ? "interrupted by SIGINT" : "interrupted by SIGTERM";
+  if (!now.interruption.empty()) {
+    end_.interruption = now.interruption;
     end_within(kInterruptionTime, now.time);
   } else if (status && status->phase() == RunPhase::PHASE_FINISHED) {
     end_within(kCompletionTime, now.time);

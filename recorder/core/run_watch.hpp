@@ -20,8 +20,8 @@ class RunWatch {
   /// What the shell knows at a look.
   struct Now {
     sync::Time time;
-    int stop_signal = 0;
-    bool hears_server = false;  ///< both topics of the recording are matched with the run's server
+    std::string interruption{};  ///< such as "interrupted by SIGINT"; empty before a stop signal
+    bool hears_server = false;   ///< both topics of the recording are matched with the run's server
     std::int64_t last_complete_step = -1;
   };
   /// Why a recording ends before it has all rows.

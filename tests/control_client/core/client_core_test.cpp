@@ -30,7 +30,8 @@ class ClientCoreTest : public testing::Test {
 
   Act look(std::int64_t ms, bool sees_server = false, bool is_stopped = false) {
     const Act act = core_->look(*servers_, {at(ms), is_stopped, sees_server});
-    for (const Line& line : core_->take_lines()) said_ += (line.is_warning ? "W " : "I ") + line.text + "\n";
+    for (const Line& line : core_->take_lines())
+      said_ += (line.is_warning ? "W " : "I ") + line.text + "\n";
     return act;
   }
   /// Looks every 20 ms, the last time at `ms`, and takes what was said before.

@@ -2,7 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include <csignal>
+#include <optional>
+#include <string>
 
 #include "tests/common/sync/samples.hpp"
 
@@ -27,17 +28,18 @@ class RunWatchTest : public testing::Test {
     servers_.note(claim(run_id, {kVehicle}), server, at(ms));
     servers_.note(status(run_id, phase), server, at(ms));
   }
-  bool look(std::int64_t ms, std::int64_t step = 5, int signal = 0) {
-    const bool is_over = watch_->look(servers_, {at(ms), signal, true, step});
+  bool look(std::int64_t ms, std::int64_t step = 5, const std::string& interruption = "") {
+    const bool is_over = watch_->look(servers_, {at(ms), interruption, true, step});
     for (const Line& line : watch_->take_lines())
       said_ += (line.is_warning ? "W " : "I ") + line.text + "\n";
     return is_over;
   }
   /// Looks every 5 ms until `ms`. @returns when the watch was over; −1 if it was not.
-  std::int64_t look_until(std::int64_t ms, std::int64_t step = 5, int signal = 0) {
+  std::int64_t look_until(std::int64_t ms, std::int64_t step = 5,
+                          const std::string& interruption = "") {
     said_.clear();
     for (; now_ <= ms; now_ += 5)
-      if (look(now_, step, signal)) return now_;
+      if (look(now_, step, interruption)) return now_;
     return -1;
   }
 
@@ -73,7 +75,7 @@ TEST_F(RunWatchTest, AfterAFailureOrAResetOneSecondIsWaited) {
 TEST_F(RunWatchTest, AStopSignalShortensEveryWait) {
   servers_.note(status(kRun, RunPhase::PHASE_FINISHED), kServer, at(0));
   EXPECT_EQ(look_until(1000), -1);
-  EXPECT_EQ(look_until(9000, 5, SIGTERM), 1505);
+  EXPECT_EQ(look_until(9000, 5, "interrupted by SIGTERM"), 1505);
   EXPECT_EQ(watch_->end().interruption, "interrupted by SIGTERM");
 }
 
@@ -111,12 +113,12 @@ TEST_F(RunWatchTest, ANewRunOfTheSameServerIsAReset) {
 
 TEST_F(RunWatchTest, AnnouncesWhenItIsReadyWithNewStepsAndEveryHalfSecond) {
   const auto due = [&](std::int64_t ms, std::int64_t step, bool hears = true) {
-    const RunWatch::Now now{at(ms), 0, hears, step};
+    const RunWatch::Now now{at(ms), "", hears, step};
     const bool is_due = watch_->is_announcement_due(now);
     if (is_due) watch_->note_announcement(now);
     return is_due;
   };
-  watch_->note_announcement({at(0), 0, false, -1});
+  watch_->note_announcement({at(0), "", false, -1});
   EXPECT_FALSE(due(5, -1, false));
   EXPECT_FALSE(watch_->is_ready());
   EXPECT_TRUE(due(10, -1)) << "now it hears the server";
