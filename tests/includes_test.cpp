@@ -42,7 +42,7 @@ const std::vector<Rule> kRules = {
     {"control_client/laws", {"common/config", "common/model", "common/plugin"}},
     {"python", {"closed_loop", "common", "control_client", "recorder", "sim_server"}},
     {"recorder", {"common"}},
-    {"recorder/core", {"common/config", "common/sync"}},
+    {"recorder/core", {"common/sync"}},
     {"recorder/sinks/mcap", {"common", "recorder", "Wire", "Fast DDS"}},
     {"sim_server", {"common", "Wire"}},
     {"sim_server/autopilots", {"common/config", "common/model", "common/plugin"}},

@@ -42,9 +42,10 @@ def read_rules():
 ROWS = [
     ["python", "closed_loop"],
     ["sim_server", "control_client", "recorder"],
-    ["sim_server/plants", "sim_server/autopilots", "control_client/laws", "common/bus"],
+    ["sim_server/plants", "sim_server/autopilots", "control_client/laws", "control_client/core", "recorder/core",
+     "common/bus"],
     ["common/bus/fastdds", "common/app", "common/plugin"],
-    ["common/config"],
+    ["common/config", "common/sync"],
     ["common/model"],
 ]
 LIBRARIES = ["Fast DDS", "Simbody"]
