@@ -15,7 +15,7 @@
 #include "common/bus/participants.hpp"
 #include "sim_server/endpoints.hpp"
 #include "sim_server/record_stream.hpp"
-#include "sim_server/roster.hpp"
+#include "sim_server/core/roster.hpp"
 
 namespace sls::bench {
 namespace {

@@ -6,7 +6,7 @@
 #include <utility>
 #include <variant>
 
-#include "sim_server/judgement.hpp"
+#include "sim_server/core/judgement.hpp"
 
 namespace sls::closed_loop {
 namespace {

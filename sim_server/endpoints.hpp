@@ -15,7 +15,7 @@
 #include "common/bus/node.hpp"
 #include "common/bus/participants.hpp"
 #include "common/config/scenario.hpp"
-#include "sim_server/stamp_check.hpp"
+#include "sim_server/core/stamp_check.hpp"
 #include "sim_server/state_stream.hpp"
 
 namespace sls::sim {

@@ -6,7 +6,7 @@
 #include <exception>
 #include <mutex>
 
-#include "sim_server/retransmission_timer.hpp"
+#include "sim_server/core/retransmission_timer.hpp"
 #include "sim_server/run.hpp"
 
 namespace sls::sim {

@@ -5,9 +5,9 @@
 #include <map>
 #include <optional>
 
-#include "sim_server/clock_offset.hpp"
+#include "sim_server/core/clock_offset.hpp"
 #include "sim_server/run.hpp"
-#include "sim_server/schedule.hpp"
+#include "sim_server/core/schedule.hpp"
 
 namespace sls::sim {
 

@@ -12,18 +12,18 @@
 #include "common/app/stop_signal.hpp"
 #include "common/bus/names.hpp"
 #include "common/config/vehicle_ids.hpp"
+#include "sim_server/core/claim.hpp"
+#include "sim_server/core/gathering.hpp"
 
 namespace sls::sim {
 namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto kUsualStartTime = 300ms;  // of discovery after the claim: not reported
-constexpr auto kRosterTime = 100ms;      // between checks for departure and silence
-constexpr auto kRecorderSilence = 1s;    // until a recorder that is behind is reported
-constexpr auto kReportInterval = 5s;     // between reports of the same silence
-constexpr auto kLookInterval = 100ms;    // least time between checks of participants
-constexpr auto kLongStart = 5s;          // after this the message names ./sls doctor
+constexpr auto kRosterTime = 100ms;    // between checks for departure and silence
+constexpr auto kRecorderSilence = 1s;  // until a recorder that is behind is reported
+constexpr auto kReportInterval = 5s;   // between reports of the same silence
+constexpr auto kLookInterval = 100ms;  // least time between checks of participants
 
 }  // namespace
 
@@ -103,18 +103,9 @@ void Run::close_requests(const std::string& reason) {
 
 void Run::check_claim() const {
   const int progress = board_.has_published() ? sync::calc_progress(board_.phase()) : 0;
-  for (const sync::Run& other : endpoints_.servers.runs()) {
-    const int others = sync::calc_progress(other.status);
-    if (others < 0) continue;
-    const auto shared =
-        std::find_if(vehicle_ids_.begin(), vehicle_ids_.end(),
-                     [&](std::uint32_t id) { return sync::serves_vehicle(other.parameters, id); });
-    if (shared == vehicle_ids_.end()) continue;
-    if (others > progress || (others == progress && other.parameters.run_id() < run_id_))
-      throw app::RunError(
-          fmt::format("vehicle {}: expected no other server on this domain, got one (run {:016x})",
-                      *shared, other.parameters.run_id()));
-  }
+  const std::string error =
+      describe_rival(endpoints_.servers.runs(), run_id_, vehicle_ids_, progress);
+  if (!error.empty()) throw app::RunError(error);
 }
 
 void Run::check_stop() {
@@ -122,26 +113,23 @@ void Run::check_stop() {
 }
 
 bool Run::wait_for_participants() {
-  const auto& expected = scenario_.sync.wait_for;
-  app::Wait wait(expected.timeout_s, kUsualStartTime);
-  const auto began = Clock::now();
-  std::string published;
+  Gathering gathering(scenario_.sync.wait_for, scenario_.sha256, vehicle_ids_, Clock::now());
+  const auto describe_obstacles = [this] {
+    return describe_problem() + endpoints_.domain.describe_isolation();
+  };
   board_.publish(RunPhase::PHASE_WAITING, "participants are not ready");
   while (true) {
     do_housekeeping();
     if (attend_to_operator()) return false;
     refresh_roster();
-    const std::string missing = name_missing(roster_, expected, scenario_.sha256, vehicle_ids_);
-    if (missing.empty()) return true;
-    if (wait.is_over())
-      throw app::RunError(fmt::format("not ready within {} s: {}{}{}", expected.timeout_s, missing,
-                                      describe_problem(), endpoints_.domain.describe_isolation()));
-    if (wait.is_report_due()) {
-      spdlog::info("waiting for: {} ({:.0f} s left){}{}{}", missing, wait.seconds_left(),
-                   describe_problem(), endpoints_.domain.describe_isolation(),
-                   Clock::now() - began > kLongStart ? "; run ./sls doctor" : "");
-      if (missing != published) board_.publish(RunPhase::PHASE_WAITING, "missing: " + missing);
-      published = missing;
+    const auto finding = gathering.look(roster_);
+    if (finding == Gathering::Finding::kReady) return true;
+    if (finding == Gathering::Finding::kGivenUp)
+      throw app::RunError(gathering.describe_error() + describe_obstacles());
+    if (const auto report = gathering.take_report(roster_.now)) {
+      spdlog::info("{}{}{}", report->text, describe_obstacles(), report->hint);
+      if (report->is_news)
+        board_.publish(RunPhase::PHASE_WAITING, "missing: " + gathering.missing());
     }
     std::this_thread::sleep_for(app::kShortPollTime);
   }

@@ -6,7 +6,7 @@
 
 #include "common/app/run_main.hpp"
 #include "common/app/wait.hpp"
-#include "sim_server/claim.hpp"
+#include "sim_server/core/claim.hpp"
 #include "sim_server/lockstep_run.hpp"
 #include "sim_server/realtime_run.hpp"
 

@@ -9,8 +9,8 @@
 
 #include "common/bus/topics.hpp"
 #include "common/config/scenario.hpp"
-#include "sim_server/round_trips.hpp"
-#include "sim_server/timing_record.hpp"
+#include "sim_server/core/round_trips.hpp"
+#include "sim_server/core/timing_record.hpp"
 
 namespace sls::sim {
 

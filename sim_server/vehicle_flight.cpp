@@ -1,7 +1,7 @@
 #include "sim_server/vehicle_flight.hpp"
 
 #include "common/bus/convert.hpp"
-#include "sim_server/fail_safe.hpp"
+#include "sim_server/core/fail_safe.hpp"
 
 namespace sls::sim {
 namespace {

@@ -6,8 +6,8 @@
 #include <optional>
 
 #include "common/config/scenario.hpp"
-#include "sim_server/command_gate.hpp"
-#include "sim_server/controller_absence.hpp"
+#include "sim_server/core/command_gate.hpp"
+#include "sim_server/core/controller_absence.hpp"
 #include "sim_server/fault_line.hpp"
 #include "sim_server/messages.hpp"
 

@@ -46,6 +46,9 @@ const std::vector<Rule> kRules = {
     {"recorder/sinks/mcap", {"common", "recorder", "Wire", "Fast DDS"}},
     {"sim_server", {"common", "Wire"}},
     {"sim_server/autopilots", {"common/config", "common/model", "common/plugin"}},
+    {"sim_server/core",
+     {"common/bus/convert.hpp", "common/bus/names.hpp", "common/bus/peer.hpp", "common/config",
+      "common/model", "common/sync", "Wire"}},
     {"sim_server/plants",
      {"common/config", "common/model", "common/plugin", "sim_server/autopilots", "Simbody"}},
     {"tools/convert", {"common", "recorder"}},
@@ -60,7 +63,8 @@ const std::vector<Rule> kRules = {
 };
 
 /// Folders whose files decide only: time and all that happens are arguments (CONTRIBUTING.md).
-const std::vector<std::string> kCores = {"common/sync", "control_client/core", "recorder/core"};
+const std::vector<std::string> kCores = {"common/sync", "control_client/core", "recorder/core",
+                                         "sim_server/core"};
 const std::regex kNotInACore(
     R"(<(thread|mutex|atomic|condition_variable|future|csignal|signal\.h|fstream|iostream|spdlog/spdlog\.h)>)"
     R"(|\bnow\(\)|\bsleep)");

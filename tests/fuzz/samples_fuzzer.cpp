@@ -9,8 +9,8 @@
 
 #include "common/bus/fastdds/guarded_type.hpp"
 #include "recorder/stream.hpp"
-#include "sim_server/command_gate.hpp"
-#include "sim_server/run_control.hpp"
+#include "sim_server/core/command_gate.hpp"
+#include "sim_server/core/run_control.hpp"
 
 namespace {
 

@@ -33,34 +33,15 @@ constexpr std::uint64_t kOtherRun = 0xfedcba9876543210;
 /// A server of the synthetic run and its only client.
 class FakeFlight {
  public:
-  explicit FakeFlight(std::uint64_t run_id, double server_deadline_s = 30) {
-    begin_run(run_id, server_deadline_s);
-  }
+  explicit FakeFlight(std::uint64_t run_id) { begin_run(run_id); }
 
-  void begin_run(std::uint64_t run_id, double server_deadline_s = 30) {
+  void begin_run(std::uint64_t run_id) {
     run_id_ = run_id;
     Parameters parameters = make_parameters();
     parameters.run_id(run_id);
-    if (server_deadline_s != 30) {
-      const std::string text = sls::test::replace_once(
-          kScenarioText, "timeout_s: 30 } }",
-          "timeout_s: 30 }, wait: { server: { deadline_s: " + std::to_string(server_deadline_s) +
-              " } } }");
-      parameters.scenario_text(text);
-      parameters.scenario_sha256(config::calc_sha256(text));
-    }
     parameters_writer_.write(parameters);
     next_batch_ = 0;
     publish(RunPhase::PHASE_WAITING, 0);
-  }
-
-  /// Waits until the recorder has acknowledged the server's parameters and status samples.
-  bool is_heard() {
-    return wait_until([this] {
-      return !parameters_writer_.matched().empty() && !status_writer_.matched().empty() &&
-             parameters_writer_.wait_for_acknowledgments(1s) &&
-             status_writer_.wait_for_acknowledgments(1s);
-    });
   }
 
   bool wait_for_recorder() {
@@ -244,23 +225,6 @@ TEST_F(RecorderTest, ARunThatIsReplacedByAnotherServersEndsTheRecording) {
   EXPECT_EQ(read_manifest(out_).at("missing"), Json::array());
 }
 
-// A silent server may only be overloaded: a server known before the silence is no successor.
-TEST_F(RecorderTest, AServerThatWasThereBeforeTakesNoSilentOnesPlace) {
-  auto flight = std::make_unique<FakeFlight>(kRunId, 3);
-  start();
-  ASSERT_TRUE(flight->wait_for_recorder());
-  flight->fly(0, 100);
-  FakeFlight other(kOtherRun);
-  ASSERT_TRUE(other.is_heard());
-  flight->publish(RunPhase::PHASE_RUNNING, 100);
-  ASSERT_TRUE(flight->is_heard());
-  ASSERT_TRUE(flight->is_recorded_up_to(99));
-  flight.reset();
-  join_beside(other);
-  EXPECT_NE(error_.find("given up after 3 s"), std::string::npos) << error_;
-  EXPECT_EQ(read_manifest(out_).at("outcome"), "lost");
-}
-
 TEST_F(RecorderTest, ARecorderThatFollowsRecordsTheOtherServersRun) {
   options_.follow = true;
   auto flight = std::make_unique<FakeFlight>(kRunId);
@@ -277,36 +241,6 @@ TEST_F(RecorderTest, ARecorderThatFollowsRecordsTheOtherServersRun) {
   EXPECT_EQ(error_, "no error");
   EXPECT_EQ(read_manifest(out_).at("outcome"), "lost");
   expect_whole(out_ / "run-fedcba9876543210");
-}
-
-TEST_F(RecorderTest, AServerThatStaysAwayIsGivenUp) {
-  auto flight = std::make_unique<FakeFlight>(kRunId, 1.5);
-  start();
-  ASSERT_TRUE(flight->wait_for_recorder());
-  flight->fly(0, 100);
-  ASSERT_TRUE(flight->is_recorded_up_to(99));
-  flight.reset();
-  join();
-  EXPECT_NE(error_.find("given up after 1.5 s"), std::string::npos) << error_;
-  EXPECT_EQ(read_manifest(out_).at("outcome"), "lost");
-}
-
-// The last samples may be resent several times. The recorder waits 10 s for each missing step.
-TEST_F(RecorderTest, WaitsAfterTheEndAsLongAsLateSamplesCome) {
-  FakeFlight flight(kRunId);
-  start();
-  ASSERT_TRUE(flight.wait_for_recorder());
-  flight.fly(0, 10);
-  flight.publish(RunPhase::PHASE_FINISHED, kLastStep);
-  for (std::uint64_t step = 11; step <= 13; ++step) {
-    const auto next = std::chrono::steady_clock::now() + 4s;
-    EXPECT_TRUE(wait_until([&] { return std::chrono::steady_clock::now() > next; }));
-    flight.write_step(step);
-  }
-  for (std::uint64_t step = 14; step <= kLastStep; ++step) flight.write_step(step);
-  join();
-  EXPECT_EQ(error_, "no error");
-  expect_whole(out_);
 }
 
 TEST_F(RecorderTest, AKilledRecorderIsResumedInMidFlight) {

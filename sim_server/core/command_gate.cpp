@@ -1,0 +1,350 @@
+#include "sim_server/core/command_gate.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "common/bus/convert.hpp"
+#include "common/bus/names.hpp"
+
+namespace sls::sim {
+namespace {
+
+constexpr std::size_t kRememberedAnswers =
+    64;  // copies older than that are rejected as wrong steps
+
+/// The first undefined enumerator: Fast CDR takes any number for one.
+std::optional<JudgedAnswer::Undefined> find_undefined(const ControlCommand& command) {
+  using bus::to_number;
+  const std::uint32_t mission = to_number(command.mission()), fault = to_number(command.fault());
+  if (mission > to_number(MissionPhase::MISSION_FAILED)) return {{"mission", mission}};
+  if (fault > to_number(FaultCode::FAULT_STAGE_TIMEOUT)) return {{"fault", fault}};
+  return std::nullopt;
+}
+
+/// True if no number is infinite or NaN: the product of such a number with zero is NaN.
+bool is_finite(const Reference& reference) {
+  double sum = 0.0;
+  for (const std::array<double, 3>* vector :
+       {&reference.position_m(), &reference.velocity_m_s(), &reference.acceleration_m_s2(),
+        &reference.jerk_m_s3(), &reference.snap_m_s4()})
+    for (const double x : *vector) sum += 0.0 * x;
+  return sum == 0.0;
+}
+
+JudgedAnswer to_judged(const OfferedAnswer& answer) {
+  const ControlCommand& command = answer.command;
+  const auto& memory = command.controller().numbers();
+  JudgedAnswer judged;
+  judged.step = answer.step;
+  judged.f_Q_W = bus::to_vector(command.f_Q_W_n());
+  judged.is_memory_finite =
+      std::all_of(memory.begin(), memory.end(), [](double x) { return std::isfinite(x); });
+  judged.undefined = find_undefined(command);
+  judged.is_reference_finite = is_finite(command.reference());
+  if (command.fault() != FaultCode::FAULT_NONE) judged.fault = bus::to_string(command.fault());
+  judged.is_mission_failed = command.mission() == MissionPhase::MISSION_FAILED;
+  judged.is_mission_finished = command.mission() == MissionPhase::MISSION_FINISHED;
+  judged.stage = command.controller().stage_index();
+  return judged;
+}
+
+Verdict to_verdict(Defect defect) {
+  switch (defect) {
+    case Defect::kNotFinite:
+      return Verdict::kNotFinite;
+    case Defect::kForceLimit:
+      return Verdict::kForceLimit;
+    case Defect::kUndefined:
+      return Verdict::kUndefined;
+    case Defect::kFault:
+      return Verdict::kFault;
+    case Defect::kUnknownStage:
+      return Verdict::kUnknownStage;
+    case Defect::kEarlyEnd:
+      return Verdict::kEarlyEnd;
+  }
+  return Verdict::kFault;
+}
+
+/// Order by strength, strongest first; then by name and peer, not by time of arrival.
+bool is_stronger(const ReadyClient& a, const ReadyClient& b) {
+  if (a.strength != b.strength) return a.strength > b.strength;
+  if (a.name != b.name) return a.name < b.name;
+  return a.peer < b.peer;
+}
+
+}  // namespace
+
+const char* to_string(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::kAccepted:
+    case Verdict::kHeld:
+    case Verdict::kDuplicate:
+    case Verdict::kSuperseded:
+    case Verdict::kLate:
+      return "";
+    case Verdict::kNotFinite:
+      return to_string(Defect::kNotFinite);
+    case Verdict::kForceLimit:
+      return to_string(Defect::kForceLimit);
+    case Verdict::kOtherRun:
+      return "another run_id";
+    case Verdict::kEarly:
+      return "a step whose state was not published yet";
+    case Verdict::kWrongStep:
+      return "a step that is not awaited";
+    case Verdict::kContradiction:
+      return "another answer to the same step";
+    case Verdict::kUnknownVehicle:
+      return "a vehicle_id of no vehicle here";
+    case Verdict::kUnknownClient:
+      return "a sender that is not announced as a ready controller";
+    case Verdict::kUndefined:
+      return to_string(Defect::kUndefined);
+    case Verdict::kFault:
+      return to_string(Defect::kFault);
+    case Verdict::kUnknownStage:
+      return to_string(Defect::kUnknownStage);
+    case Verdict::kEarlyEnd:
+      return to_string(Defect::kEarlyEnd);
+  }
+  return "";
+}
+
+CommandGate::CommandGate(std::uint64_t run_id, std::uint32_t vehicle_id, const AnswerLimits& limits)
+    : run_id_(run_id), vehicle_id_(vehicle_id), limits_(limits) {}
+
+void CommandGate::set_clients(const std::vector<ReadyClient>& clients) {
+  std::vector<Client> updated;
+  for (const ReadyClient& identity : clients) {
+    Client client;
+    if (Client* known = find_client(identity.peer)) client = std::exchange(*known, {});
+    client.identity = identity;
+    updated.push_back(std::move(client));
+  }
+  drop_held();  // of clients that have left
+  std::sort(updated.begin(), updated.end(),
+            [](const Client& a, const Client& b) { return is_stronger(a.identity, b.identity); });
+  clients_ = std::move(updated);
+  settle();
+}
+
+void CommandGate::expect(std::uint64_t step) {
+  if (accepted_) {
+    past_[step_] = Past{accepted_from_, accepted_->command.f_Q_W_n()};
+    for (Client& client : clients_) client.refusal.clear();
+  } else if (step > step_) {
+    past_[step_] = std::nullopt;
+  }
+  while (past_.size() > kRememberedAnswers) past_.erase(past_.begin());
+  step_ = step;
+  has_begun_ = true;
+  accepted_.reset();
+  refused_.reset();
+  take_over_.reset();
+  drop_held();
+}
+
+void CommandGate::drop_held() {
+  for (Client& client : clients_) {
+    if (client.held) count(Verdict::kSuperseded);
+    client.held.reset();
+  }
+}
+
+Verdict CommandGate::offer(const OfferedAnswer& answer, const bus::PeerId& sender) {
+  const Verdict verdict = judge(answer, sender);
+  count(verdict);
+  return verdict;
+}
+
+Verdict CommandGate::judge(const OfferedAnswer& answer, const bus::PeerId& sender) {
+  Client* client = find_client(sender);
+  if (client) ++client->answers;
+  if (answer.run_id != run_id_) return Verdict::kOtherRun;
+  if (answer.command.vehicle_id() != vehicle_id_) return Verdict::kUnknownVehicle;
+  if (answer.is_early && answer.step >= step_) return Verdict::kEarly;
+
+  const JudgedAnswer judged = to_judged(answer);
+  if (const auto defect = find_defect(judged, limits_)) {
+    if (client) note_refusal(*client, answer, judged, *defect);
+    return to_verdict(*defect);
+  }
+  if (answer.step != step_) return judge_past(answer, sender);
+  if (!client) return Verdict::kUnknownClient;
+  // Only a client's first answer to a step counts; another one is a copy or a contradiction.
+  const auto& first = accepted_ && accepted_from_ == sender ? accepted_ : client->held;
+  if (first)
+    return first->command.f_Q_W_n() == answer.command.f_Q_W_n() ? Verdict::kDuplicate
+                                                                : Verdict::kContradiction;
+  client->silent = false;
+  client->misses = 0;
+  client->identity.is_gone = false;
+  client->answered_end = step_ + 1;
+  if (!is_refused(*client)) client->refusal.clear();  // of an earlier step
+  if (accepted_) {
+    superseded_by_ = accepted_from_;
+    return Verdict::kSuperseded;
+  }
+  client->held = answer;
+  settle();
+  return accepted_ && accepted_from_ == sender ? Verdict::kAccepted : Verdict::kHeld;
+}
+
+void CommandGate::note_refusal(Client& client, const OfferedAnswer& answer,
+                               const JudgedAnswer& judged, Defect defect) {
+  const std::uint64_t step = answer.step;
+  const auto past = past_.find(step);
+  const bool is_open =
+      step == step_ ? !accepted_ && !client.held : past != past_.end() && !past->second;
+  const bool is_newer = client.refusal.empty() || step > client.refused_step;
+  if (!is_open || !is_newer) return;
+  if (step == step_) refused_ = answer;
+  client.refused_step = step;
+  client.refusal = describe_refusal(defect, judged, limits_, client.identity.name);
+  settle();
+}
+
+Verdict CommandGate::judge_past(const OfferedAnswer& answer, const bus::PeerId& sender) {
+  const auto past = past_.find(answer.step);
+  if (past == past_.end())
+    return is_of_distant_standby(answer, sender) ? Verdict::kSuperseded : Verdict::kWrongStep;
+  const auto& force = answer.command.f_Q_W_n();
+  std::optional<Past>& first = past->second;
+  if (first && first->sender == sender)
+    return first->force == force ? Verdict::kDuplicate : Verdict::kContradiction;
+  Client* client = find_client(sender);
+  if (!client) return Verdict::kWrongStep;
+  if (first) {
+    superseded_by_ = first->sender;
+    return Verdict::kSuperseded;
+  }
+  client->refusal.clear();
+  first = Past{sender, force};
+  return Verdict::kLate;
+}
+
+/// True for an answer older than the remembered ones while another client flies: its sender is far
+/// away, which is no mistake of a standby.
+bool CommandGate::is_of_distant_standby(const OfferedAnswer& answer, const bus::PeerId& sender) {
+  if (past_.empty() || answer.step >= past_.begin()->first || !find_client(sender)) return false;
+  const std::optional<Past>& last = past_.rbegin()->second;
+  return last && last->sender != sender;
+}
+
+void CommandGate::settle() {
+  if (accepted_) return;
+  const Client* awaited = find_awaited();
+  if (!awaited || !awaited->held) return;
+  accepted_from_ = awaited->identity.peer;
+  accepted_ = std::exchange(find_client(accepted_from_)->held, std::nullopt);
+  if (flyer_ && flyer_->peer != accepted_from_) {
+    take_over_ = TakeOver{flyer_->name, awaited->identity.name};
+    ++counters_.take_overs();
+  }
+  flyer_ = awaited->identity;
+  drop_held();
+}
+
+int CommandGate::count_miss() {
+  const Client* awaited = find_awaited();
+  return awaited ? ++find_client(awaited->identity.peer)->misses : 0;
+}
+
+const CommandGate::Client* CommandGate::find_awaited() const {
+  const Client* silent = nullptr;
+  const Client* gone = nullptr;
+  for (const Client& client : clients_) {
+    if (is_refused(client)) continue;
+    const Client*& first = client.identity.is_gone ? gone : silent;
+    if (!client.silent && !client.identity.is_gone) return &client;
+    if (!first) first = &client;
+  }
+  return silent ? silent : gone;  // all are silent: await the strongest
+}
+
+std::optional<ReadyClient> CommandGate::awaited_client() const {
+  const Client* awaited = find_awaited();
+  return awaited ? std::optional(awaited->identity) : std::nullopt;
+}
+
+bool CommandGate::pass_over_silent_client() {
+  const Client* awaited = find_awaited();
+  if (!awaited || accepted_) return false;
+  const bool has_next = std::any_of(clients_.begin(), clients_.end(), [&](const Client& client) {
+    return &client != awaited && !client.silent && !client.identity.is_gone && !is_refused(client);
+  });
+  if (!has_next) return false;
+  if (!flyer_) flyer_ = awaited->identity;  // the first awaited client, for the take-over message
+  find_client(awaited->identity.peer)->silent = true;
+  settle();
+  return true;
+}
+
+std::optional<std::string> CommandGate::refusal() const {
+  const Client* awaited = find_awaited();
+  const bool can_answer = awaited && !awaited->identity.is_gone;
+  const bool is_any_refused =
+      std::any_of(clients_.begin(), clients_.end(),
+                  [this](const Client& client) { return is_refused(client); });
+  if (can_answer || !is_any_refused || accepted_) return std::nullopt;
+  return describe_refusals();
+}
+
+std::string CommandGate::describe_refusals() const {
+  std::string refusals;
+  if (accepted_) return refusals;
+  for (const Client& client : clients_)
+    if (!client.refusal.empty()) refusals += (refusals.empty() ? "" : "; ") + client.refusal;
+  return refusals;
+}
+
+CommandGate::Client* CommandGate::find_client(const bus::PeerId& peer) {
+  for (Client& client : clients_)
+    if (client.identity.peer == peer) return &client;
+  return nullptr;
+}
+
+void CommandGate::count(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::kAccepted:
+    case Verdict::kHeld:
+    case Verdict::kLate:  // the held or fail-safe step is counted instead
+      return;
+    case Verdict::kDuplicate:
+      ++counters_.duplicate();
+      return;
+    case Verdict::kSuperseded:
+      ++counters_.superseded();
+      return;
+    case Verdict::kNotFinite:
+      ++counters_.rejected_not_finite();
+      return;
+    case Verdict::kForceLimit:
+      ++counters_.rejected_force_limit();
+      return;
+    case Verdict::kOtherRun:
+      ++counters_.rejected_run();
+      return;
+    case Verdict::kEarly:
+    case Verdict::kWrongStep:
+    case Verdict::kContradiction:
+      ++counters_.rejected_step();
+      return;
+    case Verdict::kUnknownVehicle:
+      ++counters_.rejected_vehicle();
+      return;
+    case Verdict::kUnknownClient:
+      ++counters_.rejected_client();
+      return;
+    case Verdict::kUndefined:
+    case Verdict::kFault:
+    case Verdict::kUnknownStage:
+    case Verdict::kEarlyEnd:
+      ++counters_.rejected_fault();
+      return;
+  }
+}
+
+}  // namespace sls::sim
