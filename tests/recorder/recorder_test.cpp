@@ -13,7 +13,6 @@
 #include "tests/recorder/flights.hpp"
 #include "tests/support/own_domain.hpp"
 #include "tests/support/temporary_folder.hpp"
-#include "tests/support/text.hpp"
 #include "tests/support/waiting.hpp"
 
 namespace sls::record {
