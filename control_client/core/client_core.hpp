@@ -24,7 +24,7 @@ class ClientCore {
     double server_deadline_s = 0;            ///< a server that is silent for so long is lost
     bool follows_servers = false;            ///< as in ClientOptions
   };
-  /// What the shell knows at a look.
+  /// The knowledge of the shell at a look.
   struct Now {
     sync::Time time;
     bool is_stopped = false;
@@ -39,7 +39,7 @@ class ClientCore {
     kGiveUp,         ///< error() says why
   };
 
-  /// Looks for a run from the first look on.
+  /// Begins to wait for a server with the first look.
   explicit ClientCore(Options options) : options_(std::move(options)) {}
 
   Act look(const sync::Servers& servers, const Now& now);

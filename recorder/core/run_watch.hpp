@@ -17,7 +17,7 @@ namespace sls::record {
 
 class RunWatch {
  public:
-  /// What the shell knows at a look.
+  /// The knowledge of the shell at a look.
   struct Now {
     sync::Time time;
     std::string interruption{};  ///< such as "interrupted by SIGINT"; empty before a stop signal

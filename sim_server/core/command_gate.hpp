@@ -1,6 +1,6 @@
 /// Judges every answer: accepts one per step, and gives the cause if it rejects one. No network
 /// here.
-/// Rules: README.md, "Commands" and "Standby".
+/// Rules: sim_server/README.md, "Commands" and "Standby".
 #pragma once
 
 #include <array>

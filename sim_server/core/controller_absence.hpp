@@ -1,5 +1,5 @@
 /// Policy for a vehicle without a controller: `sync.wait.controller`.
-/// Reads no clock: the caller passes the times. Rules: README.md, "Waiting".
+/// Reads no clock: the caller passes the times. Rules: sim_server/README.md, "Waiting".
 #pragma once
 
 #include <cstdint>

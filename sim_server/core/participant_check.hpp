@@ -1,4 +1,4 @@
-/// Mistakes of the participants of a run, in words: README.md, "What a participant does wrong".
+/// Mistakes of the participants of a run, in words: sim_server/README.md, "What a participant does wrong".
 /// No network and no clock here.
 #pragma once
 

@@ -158,7 +158,7 @@ class BuildTest(unittest.TestCase):
         stand_in.write_text(real.replace("exec ", '[ "$1" = --preset ] || { echo "[5/20] one"; sleep 16; '
                                          'echo "[10/20] two"; }\nexec '))
         done, _ = self.launch()
-        self.assertRegex(done.stderr, r"sls: built 10 of 20 files; about 1[67] s left\n")
+        self.assertRegex(done.stderr, r"sls: built 10 of 20 files; about \d+ s left\n")
 
     def test_a_tree_that_was_made_with_make_or_copied_is_made_anew(self):
         subprocess.run(["cmake", "-G", "Unix Makefiles", "-S", self.root, "-B", self.root / "build"], check=True,

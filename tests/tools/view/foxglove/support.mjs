@@ -37,6 +37,11 @@ export class Program {
 
   constructor(test, program, args) {
     this.name = program;
+    // The first one ends last: it holds the domain of the others.
+    if (Program.all.length === 0)
+      test.after(async () => {
+        for (const one of [...Program.all].reverse()) await one.end();
+      });
     Program.all.push(this);
     this.lines = [];
     this.errors = [];
@@ -44,7 +49,6 @@ export class Program {
     this.process.on("error", (error) => this.errors.push(String(error)));
     readline.createInterface(this.process.stdout).on("line", (line) => this.lines.push(line));
     readline.createInterface(this.process.stderr).on("line", (line) => this.errors.push(line));
-    test.after(() => this.end());
   }
   say(line) {
     this.process.stdin.write(`${line}\n`);
