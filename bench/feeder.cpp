@@ -13,9 +13,9 @@
 #include "common/app/wait.hpp"
 #include "common/bus/node.hpp"
 #include "common/bus/participants.hpp"
+#include "sim_server/core/roster.hpp"
 #include "sim_server/endpoints.hpp"
 #include "sim_server/record_stream.hpp"
-#include "sim_server/core/roster.hpp"
 
 namespace sls::bench {
 namespace {

@@ -15,8 +15,8 @@
 #include "common/model/measurement.hpp"
 #include "control_client/flight_controller.hpp"
 #include "control_client/laws/control_law.hpp"
-#include "sim_server/fault_line.hpp"
 #include "sim_server/core/judgement.hpp"
+#include "sim_server/fault_line.hpp"
 #include "sim_server/plants/plant.hpp"
 
 namespace sls::closed_loop {

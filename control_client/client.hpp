@@ -51,6 +51,7 @@ class Client {
          const std::vector<std::uint32_t>& vehicle_ids, const ClientOptions& options);
 
   /// Joins a run and answers its states until it ends; also the runs that follow it after a reset.
+  /// Call it once.
   /// @throws config::ConfigError if the server flies another scenario.
   /// @throws app::RunError if no server is found, it disappears, or the run fails.
   void run();

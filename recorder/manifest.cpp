@@ -16,9 +16,9 @@
 #include "common/app/stop_signal.hpp"
 #include "common/bus/names.hpp"
 #include "common/bus/node.hpp"
-#include "common/sync/servers.hpp"
 #include "common/config/config_error.hpp"
 #include "common/config/sha256.hpp"
+#include "common/sync/servers.hpp"
 
 namespace sls::record {
 namespace {

@@ -21,7 +21,7 @@ constexpr double kJoinTimeout = 60;  // until a run must be found, s
 /// Calls `find` until it returns a run, a stop signal comes or `limit_s` is over.
 template <class Find>
 std::optional<sync::Run> wait_for_run(const bus::Node& node, bus::Announcer& announcer,
-                                     const std::string& whom, double limit_s, Find find) {
+                                      const std::string& whom, double limit_s, Find find) {
   app::Wait wait(limit_s, sync::kUsualJoinTime);
   while (app::stop_signal() == 0 && !wait.is_over()) {
     if (auto run = find()) return run;

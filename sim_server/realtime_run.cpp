@@ -218,8 +218,9 @@ void RealtimeRun::note_computing(const ReceivedCommands& received) {
   slow.is_reported = slow.count >= kSlowAnswers && Clock::now() - slow.since >= kSlowTime;
   if (slow.is_reported)
     board_.announce(fmt::format(
-        "step {}: controller '{}' computes an answer for {:.3g} ms, expected less than the period of "
-        "{:.3g} ms: its answers come late (a lower --rtf or a longer --period-s gives it time)",
+        "step {}: controller '{}' computes an answer for {:.3g} ms, expected less than the "
+        "period of {:.3g} ms: its answers come late (a lower --rtf or a longer --period-s gives it "
+        "time)",
         board_.step, received.sample.client_name().c_str(), 1e3 * computing.count(),
         1e3 * period.count()));
 }
@@ -247,8 +248,8 @@ void RealtimeRun::check_clocks() {
     endpoints_.command_stream.ignore_lifespan(is_any_wrong);
 }
 
-void RealtimeRun::announce_clock(const sync::Member& client,
-                                 std::chrono::nanoseconds offset, bool is_wrong) {
+void RealtimeRun::announce_clock(const sync::Member& client, std::chrono::nanoseconds offset,
+                                 bool is_wrong) {
   const double ahead_s = std::chrono::duration<double>(offset).count();
   const std::string clock =
       fmt::format("the clock of controller '{}' on {}", client.announcement.name().c_str(),

@@ -6,8 +6,8 @@
 #include <optional>
 
 #include "sim_server/core/clock_offset.hpp"
-#include "sim_server/run.hpp"
 #include "sim_server/core/schedule.hpp"
+#include "sim_server/run.hpp"
 
 namespace sls::sim {
 
@@ -54,8 +54,7 @@ class RealtimeRun : public Run {
   /// alone. It is also ignored where old announcements suggest a wrong clock: if it is wrong, no
   /// answer arrives that would show it.
   void check_clocks();
-  void announce_clock(const sync::Member& client,
-                      std::chrono::nanoseconds offset, bool is_wrong);
+  void announce_clock(const sync::Member& client, std::chrono::nanoseconds offset, bool is_wrong);
 
   StateStream::Queue state_queue_;
   Schedule schedule_;

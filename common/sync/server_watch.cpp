@@ -23,7 +23,8 @@ ServerWatch::Finding ServerWatch::look(const std::optional<Time>& heard, Time no
   if (!wait_) wait_.emplace(now, deadline_s_, Duration::zero());
   if (wait_->is_over(now)) return Finding::kLost;
   if (wait_->is_report_due(now)) {
-    report_ = fmt::format("waiting for: {} ({:.0f} s left)", describe(now), wait_->seconds_left(now));
+    report_ =
+        fmt::format("waiting for: {} ({:.0f} s left)", describe(now), wait_->seconds_left(now));
     is_reported_ = true;
   }
   return Finding::kSilent;

@@ -1,5 +1,5 @@
-/// Mistakes of the participants of a run, in words: sim_server/README.md, "What a participant does wrong".
-/// No network and no clock here.
+/// Mistakes of the participants of a run, in words: sim_server/README.md, "What a participant does
+/// wrong". No network and no clock here.
 #pragma once
 
 #include <chrono>
