@@ -6,6 +6,7 @@
 #include <cctype>
 #include <thread>
 
+#include "common/app/log.hpp"
 #include "common/app/run_main.hpp"
 #include "common/app/scheduling.hpp"
 #include "common/app/wait.hpp"
@@ -85,8 +86,7 @@ ClientCore::Act Client::look() {
   const auto act =
       servers_.ask([&](const sync::Servers& servers) { return core_.look(servers, now); });
   for (const sync::Line& line : core_.take_lines())
-    spdlog::log(line.is_warning ? spdlog::level::warn : spdlog::level::info, "{}{}", line.text,
-                describe_obstacles());
+    app::log({line.is_warning, line.text + describe_obstacles()});
   return act;
 }
 

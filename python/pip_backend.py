@@ -15,17 +15,17 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
 sys.path.insert(0, str(HERE))
 from sls.launcher.building import PROGRAMS  # noqa: E402
+MODULE = f"_sls_core{sysconfig.get_config_var('EXT_SUFFIX')}"
 DATE = (1980, 1, 1, 0, 0, 0)  # equal sources make equal wheels
 
 
 def find_build() -> Path:
     """A build tree with the programs and with the module for this Python: SLS_BUILD, or one that is built here."""
-    name = f"_sls_core{sysconfig.get_config_var('EXT_SUFFIX')}"
     given = Path(os.environ.get("SLS_BUILD", "none"))
-    if (given / "python" / name).is_file():
+    if all((given / file).is_file() for file in (f"python/{MODULE}", *(f"bin/{name}" for name in PROGRAMS))):
         return given
     python = getattr(sys, "_base_executable", sys.executable)
-    build = ROOT / ("build" if (ROOT / "build/python" / name).is_file() else f"build-{sys.implementation.cache_tag}")
+    build = ROOT / ("build" if (ROOT / "build/python" / MODULE).is_file() else f"build-{sys.implementation.cache_tag}")
     commands = [["cmake", "--build", build, "--target", "_sls_core", *PROGRAMS]]
     if not (build / "CMakeCache.txt").is_file():
         commands.insert(0, ["cmake", "--preset", "release", "-B", build, "-DSLS_BUILD_TESTS=OFF",
@@ -44,8 +44,8 @@ def list_files(build: Path) -> "list[tuple[str, Path]]":
              if "__pycache__" not in file.parts]
     files += [(f"sls/{file.relative_to(ROOT).as_posix()}", file) for file in (ROOT / "config").rglob("*")]
     files += [(f"sls/bin/{name}", build / "bin" / name) for name in PROGRAMS]
-    module = build / "python" / f"_sls_core{sysconfig.get_config_var('EXT_SUFFIX')}"
-    return sorted([(name, file) for name, file in files if file.is_file()] + [(module.name, module)])
+    files.append((MODULE, build / "python" / MODULE))
+    return sorted((name, file) for name, file in files if not file.is_dir())
 
 
 def build_wheel(wheel_directory: str, config_settings: object = None, metadata_directory: object = None) -> str:
@@ -62,7 +62,7 @@ def build_wheel(wheel_directory: str, config_settings: object = None, metadata_d
          "Requires-Dist: numpy\nRequires-Dist: PyYAML\nProvides-Extra: figures\n"
          "Requires-Dist: scipy; extra == 'figures'\nRequires-Dist: matplotlib; extra == 'figures'\n"),
         ("WHEEL", f"Wheel-Version: 1.0\nGenerator: sls\nRoot-Is-Purelib: false\nTag: {tag}\n"),
-        ("entry_points.txt", "[console_scripts]\nsls = sls.launcher.commands:main\n"))]
+        ("entry_points.txt", "[console_scripts]\nsls = sls.launcher.__main__:start\n"))]
     name = f"sls-{version}-{tag}.whl"
     record = ""
     with zipfile.ZipFile(Path(wheel_directory, name), "w", zipfile.ZIP_DEFLATED) as wheel:

@@ -6,6 +6,7 @@
 #include <thread>
 #include <utility>
 
+#include "common/app/log.hpp"
 #include "common/app/scheduling.hpp"
 #include "common/app/stop_signal.hpp"
 
@@ -91,8 +92,7 @@ void RunRecorder::watch() {
     const RunWatch::Now now = look_around();
     const bool is_over = surroundings_.servers.ask(
         [&](const sync::Servers& servers) { return watch_.look(servers, now); });
-    for (const sync::Line& line : watch_.take_lines())
-      spdlog::log(line.is_warning ? spdlog::level::warn : spdlog::level::info, "{}", line.text);
+    for (const sync::Line& line : watch_.take_lines()) app::log(line);
     if (is_over) return;
     surroundings_.servers.look_for_impostors();
     if (watch_.is_announcement_due(now)) announce(false);

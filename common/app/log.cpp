@@ -35,4 +35,8 @@ void start_log(const std::string& program, const std::string& level) {
   spdlog::set_default_logger(std::move(logger));
 }
 
+void log(const sync::Line& line) {
+  spdlog::log(line.is_warning ? spdlog::level::warn : spdlog::level::info, "{}", line.text);
+}
+
 }  // namespace sls::app

@@ -189,11 +189,6 @@ std::optional<SimStatus> ServerDirectory::find_status(std::uint64_t run_id) cons
   return servers_.find_status(run_id);
 }
 
-bool ServerDirectory::is_silent(std::uint64_t run_id) const {
-  const std::lock_guard lock(mutex_);
-  return servers_.is_silent(run_id, Clock::now());
-}
-
 std::optional<sync::Time> ServerDirectory::find_last_heard(std::uint64_t run_id) const {
   const std::lock_guard lock(mutex_);
   return servers_.find_last_heard(run_id);
@@ -212,21 +207,6 @@ bool ServerDirectory::has_heard_every_claim() const {
 bool ServerDirectory::is_present(const PeerId& server) const {
   return parameters_reader_.matched().count(server) > 0;
 }
-
-ServerWatch::ServerWatch(const ServerDirectory& servers, const sync::Run& run, double deadline_s)
-    : servers_(servers),
-      run_id_(run.parameters.run_id()),
-      watch_(run_id_, deadline_s, Clock::now()) {}
-
-sync::ServerWatch::Finding ServerWatch::look() {
-  const auto finding = watch_.look(servers_.find_last_heard(run_id_), Clock::now());
-  if (!watch_.report().empty())
-    spdlog::log(watch_.is_warning() ? spdlog::level::warn : spdlog::level::info, "{}",
-                watch_.report());
-  return finding;
-}
-
-std::string ServerWatch::describe() const { return watch_.describe(Clock::now()); }
 
 std::string host_name() {
   std::array<char, 65> name{};

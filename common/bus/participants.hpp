@@ -18,7 +18,6 @@
 #include "common/bus/node.hpp"
 #include "common/sync/membership.hpp"
 #include "common/sync/recorders_end.hpp"
-#include "common/sync/server_watch.hpp"
 #include "common/sync/servers.hpp"
 
 namespace sls::bus {
@@ -97,7 +96,6 @@ class ServerDirectory {
   std::optional<sync::Run> find_successor(const sync::Run& run,
                                           const std::vector<std::uint32_t>& vehicle_ids) const;
   std::optional<SimStatus> find_status(std::uint64_t run_id) const;
-  bool is_silent(std::uint64_t run_id) const;
   std::optional<sync::Time> find_last_heard(std::uint64_t run_id) const;
 
   /// True if this node has discovered every participant on this machine and heard the claim of
@@ -130,20 +128,6 @@ class ServerDirectory {
   sync::Time impostors_looked_for_;
   Reader<Parameters> parameters_reader_;
   Reader<SimStatus> status_reader_;
-};
-
-/// sync::ServerWatch of a run of `servers`. Logs its reports.
-class ServerWatch {
- public:
-  ServerWatch(const ServerDirectory& servers, const sync::Run& run, double deadline_s);
-
-  sync::ServerWatch::Finding look();
-  std::string describe() const;
-
- private:
-  const ServerDirectory& servers_;
-  const std::uint64_t run_id_;
-  sync::ServerWatch watch_;
 };
 
 /// This machine's name, at most 64 bytes, for sls/participant.

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "common/sync/line.hpp"
 #include "common/sync/patience.hpp"
 #include "common/sync/time.hpp"
 
@@ -23,10 +24,9 @@ class ServerWatch {
   /// does not count as silence of the server.
   Finding look(const std::optional<Time>& heard, Time now);
 
-  /// The line that the last look has to say; empty if none.
-  const std::string& report() const { return report_; }
-  /// True if that line is about silence.
-  bool is_warning() const { return is_reported_; }
+  /// The line of the last look, if there is something to say: a warning of silence, or that the
+  /// server is back.
+  const std::optional<Line>& report() const { return report_; }
 
   /// For messages: "server of run … (silent for 3.1 s)".
   std::string describe(Time now) const;
@@ -38,7 +38,7 @@ class ServerWatch {
   Time looked_;
   std::optional<Patience> wait_;  // while it is silent
   bool is_reported_ = false;
-  std::string report_;
+  std::optional<Line> report_;
 };
 
 }  // namespace sls::sync

@@ -49,7 +49,7 @@ ClientCore::Act ClientCore::fly(const sync::Servers& servers, const Now& now) {
     return end(Act::kLeave, fmt::format("the run failed: {}", status->reason().c_str()));
 
   const auto finding = watch_->look(servers.find_last_heard(run_id), now.time);
-  if (!watch_->report().empty()) lines_.push_back({watch_->is_warning(), watch_->report()});
+  if (watch_->report()) lines_.push_back(*watch_->report());
   if (const auto next = servers.find_successor(*run_, list_flown_ids(), now.time))
     return follow(*next, now.time);
   if (finding == sync::ServerWatch::Finding::kLost)

@@ -52,7 +52,7 @@ bool RunWatch::look(const sync::Servers& servers, const Now& now) {
 
 void RunWatch::look_at_server(const sync::Servers& servers, sync::Time now) {
   const auto finding = server_.look(servers.find_last_heard(run_id_), now);
-  if (!server_.report().empty()) lines_.push_back({server_.is_warning(), server_.report()});
+  if (server_.report()) lines_.push_back(*server_.report());
   if (finding == sync::ServerWatch::Finding::kSilent) look_for_next_run(servers, now);
   if (finding != sync::ServerWatch::Finding::kLost) return;
   end_.outcome = "lost";

@@ -1,5 +1,5 @@
-/// A server's claim on its vehicles: when it is settled, and who has the better one. Rules:
-/// docs/synchronisation.md, "Identity: one server per vehicle".
+/// How long a server listens before its vehicles are its own, and which of two servers keeps a
+/// vehicle. Rules: docs/synchronisation.md, "Identity: one server per vehicle".
 #pragma once
 
 #include <chrono>

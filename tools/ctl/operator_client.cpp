@@ -9,6 +9,7 @@
 #include <thread>
 #include <vector>
 
+#include "common/app/log.hpp"
 #include "common/app/run_main.hpp"
 #include "common/app/stop_signal.hpp"
 #include "common/bus/names.hpp"
@@ -154,7 +155,8 @@ std::optional<OperatorClient::Question> OperatorClient::send(const sync::Run& ru
   app::Wait wait(options_.timeout_s, kUsualWait);
   if (!wait_until_heard(run, wait)) return std::nullopt;
   channel_->request_writer.write(request);
-  return Question{run, request, wait, bus::ServerWatch(servers_, run, options_.timeout_s),
+  return Question{run, request, wait,
+                  sync::ServerWatch(run.parameters.run_id(), options_.timeout_s, Clock::now()),
                   std::nullopt};
 }
 
@@ -179,8 +181,11 @@ std::optional<SimControlReply> OperatorClient::find_reply(Question& question,
   if (question.give_up && Clock::now() >= *question.give_up)
     throw app::RunError(fmt::format("no reply to {}: the run has ended: {}, {}", action,
                                     bus::to_string(status->phase()), status->reason().c_str()));
-  if (question.server.look() == sync::ServerWatch::Finding::kLost)
-    throw app::RunError(fmt::format("no reply to {}: {}", action, question.server.describe()));
+  const auto now = Clock::now();
+  const auto finding = question.server.look(servers_.find_last_heard(run.parameters.run_id()), now);
+  if (question.server.report()) app::log(*question.server.report());
+  if (finding == sync::ServerWatch::Finding::kLost)
+    throw app::RunError(fmt::format("no reply to {}: {}", action, question.server.describe(now)));
   const bool takes_its_time = question.request.action() == ControlAction::ACTION_STEP;
   if (!takes_its_time && question.wait.is_over())
     throw app::RunError(fmt::format("no reply to {} from the server of run {:016x} within {} s",

@@ -14,6 +14,7 @@
 #include "common/app/wait.hpp"
 #include "common/bus/node.hpp"
 #include "common/bus/participants.hpp"
+#include "common/sync/server_watch.hpp"
 #include "tools/ctl/status_view.hpp"
 
 namespace sls::ctl {
@@ -51,7 +52,7 @@ class OperatorClient {
     sync::Run run;
     SimControl request;
     app::Wait wait;
-    bus::ServerWatch server;
+    sync::ServerWatch server;
     std::optional<std::chrono::steady_clock::time_point> give_up;  ///< set once the run has ended
   };
   /// The two parts of `ask`, for several requests at a time, on one thread: `send` waits only for

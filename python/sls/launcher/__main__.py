@@ -3,12 +3,18 @@
 import sys
 from pathlib import Path
 
+
+def start() -> int:
+    """Runs the command of the command line; returns its exit code, 130 after Ctrl-C."""
+    try:
+        from sls.launcher.commands import main
+        return main(sys.argv[1:])
+    except KeyboardInterrupt:
+        return 130
+
+
 if __name__ == "__main__":
     package = str(Path(__file__).resolve().parents[2])
     if package not in sys.path:
         sys.path.insert(0, package)
-    try:
-        from sls.launcher.commands import main
-        sys.exit(main(sys.argv[1:]))
-    except KeyboardInterrupt:
-        sys.exit(130)
+    sys.exit(start())

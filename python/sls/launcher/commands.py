@@ -4,7 +4,6 @@ import importlib.util
 import os
 import re
 import shutil
-import sys
 from collections.abc import Callable
 from typing import NoReturn
 
@@ -324,9 +323,8 @@ def call(command: str, words: list[str]) -> int:
     return COMMANDS[command](words)
 
 
-def main(words: list[str] | None = None) -> int:
-    """Runs the command, by default that of the command line, and returns its exit code."""
-    words = sys.argv[1:] if words is None else words
+def main(words: list[str]) -> int:
+    """Runs the command and returns its exit code."""
     if words[:1] == ["--no-install"]:
         building.is_installing, words = False, words[1:]
     command, words = (words[0], words[1:]) if words else ("help", [])

@@ -23,23 +23,24 @@ TEST(ServerWatchTest, ASilentServerIsReportedGivenUpAndMayComeBack) {
   std::int64_t now = 0;
   EXPECT_EQ(look_until(watch, now, 900, at(0)), Finding::kThere);
   EXPECT_EQ(look_until(watch, now, 1000, at(0)), Finding::kSilent);
-  EXPECT_TRUE(watch.is_warning());
-  EXPECT_EQ(watch.report(),
+  ASSERT_TRUE(watch.report());
+  EXPECT_TRUE(watch.report()->is_warning);
+  EXPECT_EQ(watch.report().value().text,
             "waiting for: server of run 00000000000001f4 (silent for 1.0 s) (7 s left)");
   look_until(watch, now, 5900, at(0));
-  EXPECT_EQ(watch.report(), "") << "every 5 s";
+  EXPECT_FALSE(watch.report()) << "every 5 s";
   look_until(watch, now, 6000, at(0));
-  EXPECT_EQ(watch.report(),
+  EXPECT_EQ(watch.report().value().text,
             "waiting for: server of run 00000000000001f4 (silent for 6.0 s) (2 s left)");
   EXPECT_EQ(look_until(watch, now, 7900, at(0)), Finding::kSilent);
   EXPECT_EQ(look_until(watch, now, 8000, at(0)), Finding::kLost);
   EXPECT_EQ(watch.describe(at(8000)), "server of run 00000000000001f4 (silent for 8.0 s)");
 
   EXPECT_EQ(look_until(watch, now, 8100, at(8050)), Finding::kThere);
-  EXPECT_EQ(watch.report(), "the server of run 00000000000001f4 is back");
-  EXPECT_FALSE(watch.is_warning());
+  EXPECT_EQ(watch.report().value().text, "the server of run 00000000000001f4 is back");
+  EXPECT_FALSE(watch.report()->is_warning);
   look_until(watch, now, 8200, at(8150));
-  EXPECT_EQ(watch.report(), "") << "once";
+  EXPECT_FALSE(watch.report()) << "once";
 }
 
 TEST(ServerWatchTest, AServerIsSilentAtOneSecondAndNotBefore) {
