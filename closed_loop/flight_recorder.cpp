@@ -1,6 +1,7 @@
 #include "closed_loop/flight_recorder.hpp"
 
 #include "closed_loop/record_entries.hpp"
+#include "common/app/log.hpp"
 #include "common/plugin/shared_library.hpp"
 
 namespace sls::closed_loop {
@@ -11,13 +12,11 @@ FlightRecorder::FlightRecorder(const std::filesystem::path& folder, bool force,
     : controller_name_(controller_name),
       folder_(folder, force),
       recording_(folder, parameters),
-      board_([this](const SimStatus& status) { recording_.add(status); }, parameters.run_id(),
-             parameters.vehicles().front().vehicle_id(), sync, [] { return SyncCounters(); }) {
+      status_(parameters.run_id(), parameters.vehicles().front().vehicle_id(), sync) {
   for (const VehicleParameters& vehicle : parameters.vehicles())
     ids_.push_back(vehicle.vehicle_id());
-  board_.controller_name = controller_name;
-  board_.start_clock();
-  board_.publish(RunPhase::PHASE_RUNNING, "");
+  status_.begin(Clock::now());
+  add_status(RunPhase::PHASE_RUNNING, "");
   batch_.run_id(parameters.run_id());
 }
 
@@ -25,6 +24,10 @@ void FlightRecorder::note_law_library(const config::Scenario& scenario) {
   const config::ModelName& law = scenario.controller.law;
   const std::string sha256 = plugin::find_loaded_sha256(law.find_library(scenario.folder));
   if (!sha256.empty()) recording_.note_library(controller_name_, sha256);
+}
+
+void FlightRecorder::add_status(RunPhase phase, const std::string& reason) {
+  recording_.add(status_.make({phase, reason, step_, controller_name_}, Clock::now()));
 }
 
 void FlightRecorder::hand_on() {
@@ -38,22 +41,26 @@ void FlightRecorder::add(const std::vector<FlownStep>& steps, std::optional<std:
     fill_entry(batch_.entries().emplace_back(), ids_[i], steps[i], controller_name_, refused == i);
     if (batch_.entries().size() == BATCH_ENTRIES) hand_on();
   }
-  board_.step = steps.front().step;
-  if (board_.step > 0)
-    for (std::size_t i = 0; i < ids_.size(); ++i) board_.timing.add(ForceOrigin::FORCE_ANSWERED, 0);
-  if (board_.is_due()) board_.publish(RunPhase::PHASE_RUNNING, "");
+  step_ = steps.front().step;
+  if (step_ > 0)
+    for (std::size_t i = 0; i < ids_.size(); ++i)
+      status_.timing.add(ForceOrigin::FORCE_ANSWERED, 0);
+  if (is_status_due()) add_status(RunPhase::PHASE_RUNNING, "");
   recording_.flush_if_due();
 }
 
 void FlightRecorder::announce(const std::vector<std::string>& remarks) {
-  for (const std::string& remark : remarks) board_.announce(remark);
+  for (const std::string& remark : remarks) {
+    app::log({true, remark});
+    add_status(RunPhase::PHASE_RUNNING, remark);
+  }
 }
 
 bool FlightRecorder::finish(const std::string& failure) {
   batch_.is_last(true);
   hand_on();
-  board_.publish(failure.empty() ? RunPhase::PHASE_FINISHED : RunPhase::PHASE_FAILED,
-                 failure.empty() ? "mission finished" : failure);
+  add_status(failure.empty() ? RunPhase::PHASE_FINISHED : RunPhase::PHASE_FAILED,
+             failure.empty() ? "mission finished" : failure);
   return recording_.finish("", 0);
 }
 

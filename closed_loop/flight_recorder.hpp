@@ -1,6 +1,7 @@
 /// The recording of a flight in one process, in the recorder's files.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -12,7 +13,7 @@
 #include "common/bus/topics.hpp"
 #include "common/config/scenario.hpp"
 #include "recorder/recording.hpp"
-#include "sim_server/status_board.hpp"
+#include "sim_server/core/status_series.hpp"
 
 namespace sls::closed_loop {
 
@@ -34,7 +35,7 @@ class FlightRecorder {
   void add(const std::vector<FlownStep>& steps, std::optional<std::size_t> refused);
 
   /// True if the next status sample is due, before which remarks must be announced.
-  bool is_status_due() const { return board_.is_due(); }
+  bool is_status_due() const { return status_.is_due(Clock::now()); }
   void announce(const std::vector<std::string>& remarks);
 
   /// Ends the recording after the end of the flight; `failure` is empty if the missions were
@@ -43,16 +44,20 @@ class FlightRecorder {
   /// Ends the recording of an interrupted flight.
   void interrupt(const std::string& reason);
 
-  std::uint64_t last_step() const { return board_.step; }
+  std::uint64_t last_step() const { return step_; }
 
  private:
+  using Clock = std::chrono::steady_clock;
+
   void hand_on();
+  void add_status(RunPhase phase, const std::string& reason);
 
   const std::string controller_name_;
   std::vector<std::uint32_t> ids_;
   const record::RecordingFolder folder_;
   record::Recording recording_;
-  sim::StatusBoard board_;
+  sim::StatusSeries status_;
+  std::uint64_t step_ = 0;
   RecordBatch batch_;
 };
 

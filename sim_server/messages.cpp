@@ -14,16 +14,14 @@ std::uint64_t make_run_id() {
   return id;
 }
 
-VehicleState make_state_message(std::uint32_t vehicle_id, const model::Measurement& measured,
-                                const Applied& applied) {
-  VehicleState message;
+void fill_state_message(VehicleState& message, std::uint32_t vehicle_id,
+                        const model::Measurement& measured, const Applied& applied) {
   message.vehicle_id(vehicle_id);
   bus::fill(message.measured(), measured);
   message.f_Q_W_n(bus::to_array(applied.f_Q_W));
   message.force_origin(applied.origin);
   message.controller_name(applied.controller_name);
   message.controller(applied.memory);
-  return message;
 }
 
 Parameters make_parameters_message(std::uint64_t run_id,

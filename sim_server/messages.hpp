@@ -9,28 +9,18 @@
 #include "common/bus/topics.hpp"
 #include "common/config/scenario.hpp"
 #include "common/model/measurement.hpp"
+#include "sim_server/core/vehicle.hpp"
 #include "sim_server/plants/plant.hpp"
 
 namespace sls::sim {
 
-/// Force that acted over a control period, its origin, and the controller memory after it.
-struct Applied {
-  Eigen::Vector3d answer_f_Q_W = Eigen::Vector3d::Zero();  ///< as answered, N
-  Eigen::Vector3d f_Q_W = Eigen::Vector3d::Zero();         ///< as it acted, after faults, N
-  ForceOrigin origin = ForceOrigin::FORCE_NONE;
-  std::string controller_name;
-  ControllerState memory;
-};
-
-/// `controller_name` of the server's own force.
-inline constexpr const char* kFailSafeName = "fail-safe";
-
 /// A random id for a run, never 0.
 std::uint64_t make_run_id();
 
-/// The state sample for the controllers: `measured`, and `applied` of the previous period.
-VehicleState make_state_message(std::uint32_t vehicle_id, const model::Measurement& measured,
-                                const Applied& applied);
+/// Writes the state for the controllers into `message`, over any earlier content: `measured`, and
+/// `applied` of the previous period.
+void fill_state_message(VehicleState& message, std::uint32_t vehicle_id,
+                        const model::Measurement& measured, const Applied& applied);
 
 /// `plant` is that of one of the vehicles; those of the others have the same signals. Call once the
 /// plants are made: the library's hash is that of the one that is loaded.

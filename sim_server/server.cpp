@@ -1,66 +1,162 @@
 #include "sim_server/server.hpp"
 
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
 #include <chrono>
-#include <thread>
+#include <utility>
 
+#include "common/app/options.hpp"
 #include "common/app/run_main.hpp"
-#include "common/app/wait.hpp"
-#include "sim_server/core/claim.hpp"
-#include "sim_server/lockstep_run.hpp"
-#include "sim_server/realtime_run.hpp"
+#include "common/bus/spinning.hpp"
+#include "common/config/vehicle_ids.hpp"
+#include "sim_server/messages.hpp"
 
 namespace sls::sim {
+namespace {
 
 using namespace std::chrono_literals;
 
+void log_run(const config::Scenario& scenario, const std::vector<std::uint32_t>& ids,
+             std::uint64_t run_id) {
+  const config::Sync& sync = scenario.sync;
+  const std::string mode = sync.mode == config::SyncMode::kLockstep
+                               ? "lockstep"
+                               : fmt::format("real time × {}", sync.real_time_factor);
+  spdlog::info("run {:016x}: {}, vehicle{} {}, {}, period {} s, step {} s", run_id, scenario.name,
+               ids.size() > 1 ? "s" : "", config::to_vehicle_ranges(ids), mode,
+               sync.period_ns / 1e9, scenario.plant.step_ns / 1e9);
+}
+
+}  // namespace
+
 Server::Server(bus::Node& node, const Assignment& assignment, std::size_t threads)
     : assignment_(assignment),
+      is_lockstep_(assignment.scenario.sync.mode == config::SyncMode::kLockstep),
       workers_(std::min(threads, assignment.vehicle_ids.size())),
-      endpoints_(node, assignment.vehicle_ids.size(), assignment.scenario.sync.mode) {}
+      endpoints_(
+          node, assignment.scenario.sync.mode,
+          [this](const Commands& sample, const bus::PeerId& sender) { receive(sample, sender); },
+          [this](const SimControl& request) { events_.put(request); }),
+      outbox_(endpoints_),
+      view_(endpoints_, outbox_) {}
 
 void Server::run() {
-  auto run = make_run(false);
-  try {
-    claim_vehicles(*run);
-    // A run is kept until its successor is made: if that fails, the run reports it to the
-    // participants.
-    while (run->execute() == Run::End::kReset) run = make_run(run->is_paused());
-  } catch (const std::exception& error) {
-    run->fail(error.what());
-    if (run->is_known()) linger(*run, 0);
-    throw app::RunError(error.what());
-  }
-  linger(*run, run->expected_recorders());
-}
-
-std::unique_ptr<Run> Server::make_run(bool begins_paused) {
-  const std::uint64_t run_id = make_run_id();
-  if (assignment_.scenario.sync.mode == config::SyncMode::kRealtime)
-    return std::make_unique<RealtimeRun>(endpoints_, assignment_, workers_, run_id, begins_paused);
-  return std::make_unique<LockstepRun>(endpoints_, assignment_, workers_, run_id, begins_paused);
-}
-
-void Server::claim_vehicles(const Run& run) {
-  const auto began = std::chrono::steady_clock::now();
+  auto core = make_core({});
   while (true) {
-    // Of two servers the one that looks later finds the port of the other open and waits for its
-    // claim, however slow discovery is.
-    const bool is_settled = is_claim_settled(std::chrono::steady_clock::now() - began,
-                                             endpoints_.domain.stays_on_this_machine(),
-                                             endpoints_.servers.has_heard_every_claim());
-    Run::check_stop();
-    run.check_claim();  // after the look at the claims: one may have come since
-    if (is_settled) return;
-    std::this_thread::sleep_for(app::kShortPollTime);
+    fly(*core);
+    if (core->end() != ServerCore::End::kReset) break;
+    try {
+      core = make_core({0, false, core->is_paused()});
+    } catch (const std::exception& error) {
+      // The ended run tells the participants that it has no successor.
+      core->on_failure(error.what(), Clock::now());
+      write_waiting(*core);
+      break;
+    }
+  }
+  if (core->is_known()) linger(*core);
+  if (core->end() == ServerCore::End::kFailed) throw app::RunError(core->error());
+}
+
+std::unique_ptr<ServerCore> Server::make_core(ServerCore::Start start) {
+  const config::Scenario& scenario = assignment_.scenario;
+  start.run_id = make_run_id();
+  auto fleet = std::make_unique<Fleet>(
+      scenario, assignment_.vehicle_ids, start.run_id,
+      [this](std::size_t count, const std::function<void(std::size_t)>& work) {
+        workers_.for_each(count, work);
+      });
+  outbox_.begin_run(scenario.sync, start.run_id);
+  endpoints_.parameters.write(make_parameters_message(start.run_id, assignment_.vehicle_ids,
+                                                      scenario, fleet->plant(), app::version()));
+  log_run(scenario, assignment_.vehicle_ids, start.run_id);
+  return std::make_unique<ServerCore>(scenario, start, std::move(fleet), outbox_, Clock::now());
+}
+
+// --- main thread ---------------------------------------------------------------------------------
+
+void Server::fly(ServerCore& core) {
+  events_.clear_commands();  // of an earlier run
+  std::unique_lock lock(core_mutex_);
+  core_ = &core;
+  while (core.phase() != ServerCore::Phase::kEnded) {
+    deadline_ = core.next_deadline();
+    lock.unlock();
+    write_waiting(core);
+    wait_until_due();
+    main_wants_core_ = true;
+    lock.lock();
+    main_wants_core_ = false;
+    if (core.has_news(view_)) core.on_look(view_, Clock::now());
+    deliver_events(core);
+    core.on_time(Clock::now());
+    if (const auto now = Clock::now(); core.is_look_due(now)) core.on_look(view_, now);
+  }
+  core_ = nullptr;
+  lock.unlock();
+  bus::stop_spinning();
+  write_waiting(core);
+}
+
+void Server::write_waiting(ServerCore& core) {
+  while (outbox_.is_waiting()) {
+    try {
+      outbox_.write_waiting();
+    } catch (const std::exception& error) {  // such as a reader that acknowledges nothing
+      const std::lock_guard lock(core_mutex_);
+      core.on_failure(error.what(), Clock::now());
+    }
   }
 }
 
-void Server::linger(const Run& run, int expected_recorders) {
+void Server::wait_until_due() {
+  do {
+    // Each step that the middleware's thread takes meanwhile moves the deadline.
+    sleeps_until_ = deadline_.load();
+    if (outbox_.is_waiting() || events_.wait(sleeps_until_)) return;
+  } while (Clock::now() < deadline_.load());
+}
+
+void Server::deliver_events(ServerCore& core) {
+  for (const EventQueue::Event& event : events_.take_all()) {
+    if (const auto* commands = std::get_if<ReceivedCommands>(&event))
+      core.on_commands(commands->sample, commands->arrival);
+    else
+      core.on_request(std::get<SimControl>(event), view_, Clock::now());
+  }
+}
+
+void Server::linger(const ServerCore& core) {
   // The recorders first, because this wait names those that are not done.
-  bus::wait_for_recorders_to_end(endpoints_.participants, run.run_id(), expected_recorders);
-  endpoints_.record_writer.wait_for_acknowledgments(1s);
-  endpoints_.status_writer.wait_for_acknowledgments(1s);
+  const int expected = core.end() == ServerCore::End::kFailed ? 0 : core.expected_recorders();
+  bus::wait_for_recorders_to_end(endpoints_.participants, core.run_id(), expected);
+  endpoints_.records.wait_for_acknowledgments(1s);
+  endpoints_.status.wait_for_acknowledgments(1s);
+}
+
+// --- threads of the middleware -------------------------------------------------------------------
+
+void Server::receive(const Commands& sample, const bus::PeerId& sender) {
+  const CommandArrival arrival{
+      sender, {Clock::now(), std::chrono::system_clock::now()}, endpoints_.commands.written()};
+  if (is_lockstep_ && pass_on(sample, arrival)) return;
+  events_.put(ReceivedCommands{sample, arrival});
+}
+
+bool Server::pass_on(const Commands& sample, const CommandArrival& arrival) {
+  if (main_wants_core_ || !events_.is_empty()) return false;
+  const std::unique_lock lock(core_mutex_, std::try_to_lock);
+  if (!lock || !core_ || core_->phase() != ServerCore::Phase::kAwaitingAnswers ||
+      core_->has_news(view_))
+    return false;
+  core_->on_commands(sample, arrival);
+  const sync::Time deadline = core_->next_deadline();
+  deadline_ = deadline;
+  if (deadline < sleeps_until_.load() || outbox_.is_waiting() ||
+      core_->phase() == ServerCore::Phase::kEnded)
+    events_.interrupt();
+  return true;
 }
 
 }  // namespace sls::sim

@@ -3,37 +3,47 @@
 #include <algorithm>
 
 #include "common/bus/message_size.hpp"
+#include "sim_server/messages.hpp"
 
 namespace sls::sim {
+namespace {
 
-void StateStream::set_step(std::uint64_t run_id, std::uint64_t step, std::int64_t sim_time_ns) {
-  sample_.run_id(run_id);
-  sample_.step(step);
-  sample_.sim_time_ns(sim_time_ns);
+/// Capacity of the queue to the writer thread, in samples: a second at 1 kHz and one per step.
+constexpr std::size_t kQueuedSamples = 1024;
+
+void fill(VehicleState& message, const Vehicle& vehicle) {
+  fill_state_message(message, vehicle.id(), vehicle.measured(), vehicle.applied());
 }
 
-void StateStream::write_where(const std::function<bool(std::size_t)>& is_wanted) {
-  const std::size_t bytes = bus::calc_size(vehicles_.front());
-  const std::size_t most =
-      std::clamp<std::size_t>(max_bytes_ / bytes, 1, std::size_t{SAMPLE_VEHICLES});
-  for (std::size_t first = 0; first < vehicles_.size(); first += most) {
-    const std::size_t end = std::min(first + most, vehicles_.size());
+}  // namespace
+
+void StateStream::begin_run(std::uint64_t run_id, std::int64_t period_ns, bool is_queued) {
+  queue_.reset();
+  if (is_queued) queue_ = std::make_unique<bus::QueuedWriter<States>>(writer_, kQueuedSamples);
+  sample_.run_id(run_id);
+  period_ns_ = period_ns;
+}
+
+void StateStream::write(const Fleet& fleet, const std::function<bool(std::size_t)>& is_wanted) {
+  const auto& vehicles = fleet.vehicles();
+  sample_.step(fleet.step());
+  sample_.sim_time_ns(static_cast<std::int64_t>(fleet.step()) * period_ns_);
+  std::size_t most = 1;
+  for (std::size_t first = 0, end = 0; first < vehicles.size(); first = end) {
+    if (first == 0) {  // all vehicles have states of equal size
+      sample_.vehicles().resize(1);
+      fill(sample_.vehicles().front(), *vehicles.front());
+      most = std::clamp<std::size_t>(max_bytes_ / bus::calc_size(sample_.vehicles().front()), 1,
+                                     std::size_t{SAMPLE_VEHICLES});
+    }
+    end = std::min(first + most, vehicles.size());
     bool is_sample_wanted = false;
     for (std::size_t i = first; i < end; ++i) is_sample_wanted = is_sample_wanted || is_wanted(i);
     if (!is_sample_wanted) continue;
-    sample_.vehicles().assign(vehicles_.begin() + static_cast<std::ptrdiff_t>(first),
-                              vehicles_.begin() + static_cast<std::ptrdiff_t>(end));
-    queue_ ? queue_->writer_.write(sample_) : writer_.write(sample_);
+    sample_.vehicles().resize(end - first);
+    for (std::size_t i = first; i < end; ++i) fill(sample_.vehicles()[i - first], *vehicles[i]);
+    queue_ ? queue_->write(sample_) : writer_.write(sample_);
   }
-}
-
-StateStream::Queue::Queue(StateStream& stream, std::size_t samples)
-    : stream_(stream), writer_(stream.writer_, samples) {
-  stream.queue_ = this;
-}
-
-StateStream::Queue::~Queue() {
-  if (stream_.queue_ == this) stream_.queue_ = nullptr;  // otherwise a newer queue is in use
 }
 
 }  // namespace sls::sim

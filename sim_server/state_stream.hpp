@@ -5,57 +5,39 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <set>
-#include <vector>
 
 #include "common/bus/node.hpp"
 #include "common/bus/queued_writer.hpp"
+#include "sim_server/core/fleet.hpp"
 
 namespace sls::sim {
 
 class StateStream {
  public:
-  /// `vehicles`: their number, at least one.
-  StateStream(bus::Node& node, std::size_t vehicles)
-      : max_bytes_(node.max_sample_bytes()), writer_(node), vehicles_(vehicles) {}
+  explicit StateStream(bus::Node& node) : max_bytes_(node.max_sample_bytes()), writer_(node) {}
 
-  /// The state of the `index`th vehicle, to be filled before it is written.
-  VehicleState& at(std::size_t index) { return vehicles_[index]; }
+  /// Begins a run. If `is_queued`, `write` never blocks from now on: it passes the samples to a
+  /// separate thread, by a queue.
+  void begin_run(std::uint64_t run_id, std::int64_t period_ns, bool is_queued);
 
-  /// Sets the step of the states.
-  void set_step(std::uint64_t run_id, std::uint64_t step, std::int64_t sim_time_ns);
+  /// Publishes the states of the step in work: the samples that hold a vehicle for which
+  /// `is_wanted(index)` is true.
+  void write(const Fleet& fleet, const std::function<bool(std::size_t)>& is_wanted);
 
-  /// Publishes the states of all vehicles.
-  void write() {
-    write_where([](std::size_t) { return true; });
-  }
-  /// Publishes the samples that hold a vehicle for which `is_wanted(index)` is true.
-  void write_where(const std::function<bool(std::size_t)>& is_wanted);
+  /// Samples of the run that were lost so far.
+  std::uint64_t lost() const { return queue_ ? queue_->lost() : 0; }
 
   /// Participants with a reader that is matched with this writer.
   std::set<bus::PeerId> matched() const { return writer_.matched(); }
 
-  /// While a Queue exists, `write` never blocks: it passes the samples to a separate thread, by a
-  /// queue with room for `samples` of them.
-  class Queue {
-   public:
-    Queue(StateStream& stream, std::size_t samples);
-    ~Queue();
-    /// Samples that were lost so far.
-    std::uint64_t lost() const { return writer_.lost(); }
-
-   private:
-    friend class StateStream;
-    StateStream& stream_;
-    bus::QueuedWriter<States> writer_;
-  };
-
  private:
   const std::size_t max_bytes_;
   bus::Writer<States> writer_;
-  std::vector<VehicleState> vehicles_;
+  std::unique_ptr<bus::QueuedWriter<States>> queue_;
+  std::int64_t period_ns_ = 0;
   States sample_;
-  Queue* queue_ = nullptr;
 };
 
 }  // namespace sls::sim

@@ -5,11 +5,6 @@
 
 namespace sls::bus {
 
-void add(SyncCounters& sum, const SyncCounters& counters) {
-  for (const SyncCounter& counter : kSyncCounters)
-    (sum.*counter.change)() += (counters.*counter.get)();
-}
-
 std::vector<Count> list_counts(const SyncCounters& counters, const std::string& prefix,
                                std::initializer_list<const char*> words) {
   std::vector<Count> counts;

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "common/bus/topics.hpp"
+#include "sls.h"
 
 namespace sls::bus {
 
@@ -40,7 +40,10 @@ inline constexpr std::array kSyncCounters = {SLS_COUNTER(resent),
                                              SLS_COUNTER(slipped)};
 #undef SLS_COUNTER
 
-void add(SyncCounters& sum, const SyncCounters& counters);
+inline void add(SyncCounters& sum, const SyncCounters& counters) {
+  for (const SyncCounter& counter : kSyncCounters)
+    (sum.*counter.change)() += (counters.*counter.get)();
+}
 
 struct Count {
   const char* words;  ///< such as "fail-safe"

@@ -1,4 +1,4 @@
-#include "sim_server/vehicle_flight.hpp"
+#include "sim_server/core/vehicle.hpp"
 
 #include "common/bus/convert.hpp"
 #include "sim_server/core/fail_safe.hpp"
@@ -13,30 +13,29 @@ config::Scenario make_own_scenario(const config::Scenario& fleet, std::uint32_t 
   return scenario;
 }
 
-double calc_elapsed_s(const std::optional<VehicleFlight::Clock::time_point>& since) {
-  return since ? std::chrono::duration<double>(VehicleFlight::Clock::now() - *since).count() : 0.0;
+double calc_elapsed_s(const std::optional<sync::Time>& since, sync::Time now) {
+  return since ? sync::to_seconds(now - *since) : 0.0;
 }
 
 }  // namespace
 
-VehicleFlight::VehicleFlight(const config::Scenario& fleet, std::uint32_t id, std::uint64_t run_id)
+Vehicle::Vehicle(const config::Scenario& fleet, std::uint32_t id, std::uint64_t run_id)
     : gate(run_id, id, make_answer_limits(fleet)),
       absence(fleet.sync),
       id_(id),
       scenario_(make_own_scenario(fleet, id)),
       faults_(scenario_, id) {}
 
-VehicleState VehicleFlight::measure(std::uint64_t step, const model::Measurement& truth,
-                                    const model::Measurement* seen) {
+void Vehicle::measure(std::uint64_t step, const model::Measurement& truth,
+                      const model::Measurement* seen) {
   step_ = step;
   outcome_.reset();
   state_ = truth;
   measured_ = faults_.measure(step, seen ? *seen : truth);
   can_measured_differ_ = seen || faults_.can_disturb_state();
-  return make_state_message(id_, measured_, applied_);
 }
 
-void VehicleFlight::take_answer() {
+void Vehicle::take_answer() {
   const OfferedAnswer& answer = *gate.accepted();
   Outcome outcome;
   outcome.is_finished = answer.command.mission() == MissionPhase::MISSION_FINISHED;
@@ -46,13 +45,13 @@ void VehicleFlight::take_answer() {
   outcome_ = std::move(outcome);
 }
 
-void VehicleFlight::keep_late_answer(const OfferedAnswer& answer) {
+void Vehicle::keep_late_answer(const OfferedAnswer& answer) {
   if (last_answer_.origin != ForceOrigin::FORCE_NONE && answer.step <= last_answer_step_) return;
   hold(answer);
   has_ended_late_ = answer.command.mission() == MissionPhase::MISSION_FINISHED;
 }
 
-void VehicleFlight::hold(const OfferedAnswer& answer) {
+void Vehicle::hold(const OfferedAnswer& answer) {
   last_answer_.answer_f_Q_W = bus::to_vector(answer.command.f_Q_W_n());
   last_answer_.origin = ForceOrigin::FORCE_ANSWERED;
   last_answer_.controller_name = answer.client_name;
@@ -64,7 +63,7 @@ void VehicleFlight::hold(const OfferedAnswer& answer) {
   refused_since_.reset();
 }
 
-void VehicleFlight::fly_without_answer(ControllerAbsence::Action action) {
+void Vehicle::fly_without_answer(ControllerAbsence::Action action) {
   Outcome outcome;
   outcome.applied = last_answer_;
   if (action == ControllerAbsence::Action::kHold &&
@@ -80,14 +79,19 @@ void VehicleFlight::fly_without_answer(ControllerAbsence::Action action) {
   outcome_ = std::move(outcome);
 }
 
-Eigen::Vector3d VehicleFlight::actuate() {
+Eigen::Vector3d Vehicle::actuate() {
   applied_ = outcome_->applied;
   applied_.f_Q_W = faults_.actuate(step_, applied_.answer_f_Q_W);
   return applied_.f_Q_W;
 }
 
-void VehicleFlight::fill_record(RecordEntry& entry) const {
-  fill_state(entry, id_, step_, state_, can_measured_differ_ ? &measured_ : nullptr, applied_);
+void Vehicle::fill_record(RecordEntry& entry) const {
+  entry.vehicle_id(id_);
+  entry.step(step_);
+  bus::fill(entry.truth(), state_);
+  entry.measured().resize(can_measured_differ_ ? 1 : 0);
+  if (can_measured_differ_) bus::fill(entry.measured().front(), measured_);
+  entry.f_Q_W_n(bus::to_array(applied_.f_Q_W));
   entry.answer(last_command_);
   entry.answered_step(last_answer_step_);
   if (outcome_) {
@@ -108,17 +112,17 @@ void VehicleFlight::fill_record(RecordEntry& entry) const {
   entry.answer(answer ? answer->command : ControlCommand());
 }
 
-std::uint64_t VehicleFlight::calc_age() const {
+std::uint64_t Vehicle::calc_age() const {
   return outcome_ && outcome_->applied.origin == ForceOrigin::FORCE_ANSWERED
              ? 0
              : step_ - last_answer_step_;
 }
 
-double VehicleFlight::calc_absence_s() const { return calc_elapsed_s(absent_since_); }
+double Vehicle::calc_absence_s(sync::Time now) const { return calc_elapsed_s(absent_since_, now); }
 
-double VehicleFlight::calc_refused_s() const { return calc_elapsed_s(refused_since_); }
+double Vehicle::calc_refused_s(sync::Time now) const { return calc_elapsed_s(refused_since_, now); }
 
-void VehicleFlight::note_rest(Clock::duration rest) {
+void Vehicle::note_rest(sync::Duration rest) {
   for (auto* since : {&absent_since_, &refused_since_})
     if (*since) **since += rest;
 }

@@ -1,27 +1,40 @@
-/// One vehicle of a run: its faults, its command gate and the force of each step. No network here.
+/// One vehicle of a run: its faults, its command gate and the force of each step. No network and no
+/// clock here.
 #pragma once
 
-#include <chrono>
+#include <Eigen/Core>
 #include <cstdint>
 #include <optional>
+#include <string>
 
 #include "common/config/scenario.hpp"
+#include "common/model/measurement.hpp"
+#include "common/sync/time.hpp"
 #include "sim_server/core/command_gate.hpp"
 #include "sim_server/core/controller_absence.hpp"
 #include "sim_server/fault_line.hpp"
-#include "sim_server/messages.hpp"
 
 namespace sls::sim {
 
-class VehicleFlight {
+/// Force that acted over a control period, its origin, and the controller memory after it.
+struct Applied {
+  Eigen::Vector3d answer_f_Q_W = Eigen::Vector3d::Zero();  ///< as answered, N
+  Eigen::Vector3d f_Q_W = Eigen::Vector3d::Zero();         ///< as it acted, after faults, N
+  ForceOrigin origin = ForceOrigin::FORCE_NONE;
+  std::string controller_name;
+  ControllerState memory;
+};
+
+/// `controller_name` of the server's own force.
+inline constexpr const char* kFailSafeName = "fail-safe";
+
+class Vehicle {
  public:
-  using Clock = std::chrono::steady_clock;
-
   /// Vehicle `id` of `fleet`, before step 0.
-  VehicleFlight(const config::Scenario& fleet, std::uint32_t id, std::uint64_t run_id);
+  Vehicle(const config::Scenario& fleet, std::uint32_t id, std::uint64_t run_id);
 
-  VehicleFlight(const VehicleFlight&) = delete;
-  VehicleFlight& operator=(const VehicleFlight&) = delete;
+  Vehicle(const Vehicle&) = delete;
+  Vehicle& operator=(const Vehicle&) = delete;
 
   std::uint32_t id() const { return id_; }
 
@@ -31,10 +44,10 @@ class VehicleFlight {
     bool is_finished = false;  // the mission ends here
   };
 
-  /// The state sample of `step`. `truth` is the state of the plant; `seen` is the output of sensors
-  /// and estimator, or null if it cannot differ. Call once per step, in order, from step 0.
-  VehicleState measure(std::uint64_t step, const model::Measurement& truth,
-                       const model::Measurement* seen = nullptr);
+  /// Measures the state of `step`. `truth` is the state of the plant; `seen` is the output of
+  /// sensors and estimator, or null if it cannot differ. Call once per step, in order, from step 0.
+  void measure(std::uint64_t step, const model::Measurement& truth,
+               const model::Measurement* seen = nullptr);
   /// Takes the answer that the gate accepted for the step in work.
   void take_answer();
   /// Holds an answer that came too late for its step, if it is newer than the held one.
@@ -55,26 +68,32 @@ class VehicleFlight {
   /// True if the newest answer was late and says that the mission is finished.
   bool has_ended_late() const { return has_ended_late_; }
   const Applied& last_answer() const { return last_answer_; }
-  /// The controller memory in the state sample of the current step.
-  const ControllerState& returned() const { return applied_.memory; }
+  /// Name of the client whose answer is in force: in the step in work once its outcome is known.
+  const std::string& controller_name() const {
+    return outcome_ ? outcome_->applied.controller_name : applied_.controller_name;
+  }
+  /// The force over the period before the step in work.
+  const Applied& applied() const { return applied_; }
+  /// The measured state of the step in work.
+  const model::Measurement& measured() const { return measured_; }
   /// Motion of the vehicle at the current step.
   const model::Measurement& state() const { return state_; }
 
   /// The step in work was published at `time` and has no answer yet.
-  void note_waiting(Clock::time_point time) {
+  void note_waiting(sync::Time time) {
     if (!absent_since_) absent_since_ = time;
   }
   /// Time since the first step without a fresh answer was published, s; 0 if the last step had one.
-  double calc_absence_s() const;
+  double calc_absence_s(sync::Time now) const;
   /// Notes if answers are refused at present.
-  void note_refused(bool is_refused) {
+  void note_refused(bool is_refused, sync::Time now) {
     if (is_refused != refused_since_.has_value())
-      refused_since_ = is_refused ? std::optional(Clock::now()) : std::nullopt;
+      refused_since_ = is_refused ? std::optional(now) : std::nullopt;
   }
   /// Time for which answers are refused without a valid one, s; 0 if none is refused.
-  double calc_refused_s() const;
+  double calc_refused_s(sync::Time now) const;
   /// The run was at rest for `rest`, which does not count as absence.
-  void note_rest(Clock::duration rest);
+  void note_rest(sync::Duration rest);
 
   CommandGate gate;
   ControllerAbsence absence;
@@ -95,8 +114,8 @@ class VehicleFlight {
   std::uint64_t last_answer_step_ = 0;  // the step it answers
   ControlCommand last_command_;         // as received
   bool has_ended_late_ = false;
-  std::optional<Clock::time_point> absent_since_;
-  std::optional<Clock::time_point> refused_since_;
+  std::optional<sync::Time> absent_since_;
+  std::optional<sync::Time> refused_since_;
 };
 
 }  // namespace sls::sim

@@ -1,0 +1,93 @@
+#include "sim_server/core/client_clocks.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace sls::sim {
+namespace {
+
+using namespace std::chrono_literals;
+
+/// A client that sends no answer for this long may have a clock for which LIFESPAN drops them all.
+constexpr auto kMeasured = 1s;
+
+/// Only slow answers for so long are the law's, not those of a busy machine.
+constexpr int kSlowAnswers = 3;
+constexpr auto kSlowTime = 1s;
+
+/// Longer computing times in answers are not credible.
+constexpr std::uint64_t kLongestComputing_ns = 60'000'000'000;
+
+std::chrono::nanoseconds sum_computing(const Commands& sample) {
+  std::chrono::nanoseconds sum(0);
+  for (const ControlCommand& command : sample.vehicles())
+    sum += std::chrono::nanoseconds(std::min(command.compute_time_ns(), kLongestComputing_ns));
+  return sum;
+}
+
+std::string describe(const sync::Member& client, std::chrono::nanoseconds offset, bool is_wrong) {
+  const double ahead_s = std::chrono::duration<double>(offset).count();
+  const std::string clock =
+      fmt::format("the clock of controller '{}' on {}", client.announcement.name().c_str(),
+                  client.announcement.host().c_str());
+  return is_wrong ? fmt::format(
+                        "{} is {:.2f} s {} ours: synchronise the clocks; until then its "
+                        "commands expire by their step, not by LIFESPAN",
+                        clock, std::abs(ahead_s), ahead_s < 0 ? "behind" : "ahead of")
+                  : clock + " agrees with ours again: its commands expire by LIFESPAN again";
+}
+
+}  // namespace
+
+void ClientClocks::note(const Commands& sample, const CommandArrival& arrival, std::uint64_t step) {
+  const std::uint64_t answered = sample.step();
+  const auto client = clocks_.find(arrival.sender);
+  const bool is_remembered = answered <= step && step - answered < published_.size();
+  if (client == clocks_.end() || !is_remembered) return;
+  client->second.offset.note({published_[answered % published_.size()], sum_computing(sample),
+                              arrival.written, arrival.arrived.wall});
+  client->second.noted = arrival.arrived.time;
+}
+
+std::vector<std::string> ClientClocks::look(const std::vector<sync::Member>& controllers,
+                                            std::chrono::nanoseconds lifespan, sync::Time now) {
+  std::vector<std::string> news;
+  std::map<bus::PeerId, Clock> present;
+  is_any_wrong_ = false;
+  for (const sync::Member& client : controllers) {
+    Clock& clock = present[client.peer];
+    if (const auto known = clocks_.find(client.peer); known != clocks_.end()) clock = known->second;
+    if (now - clock.noted > kMeasured) clock.offset = ClockOffset();
+    const auto offset = clock.offset.offset();
+    // A clock near the limit must not be reported again and again.
+    const auto limit = clock.is_wrong ? lifespan * 2 / 5 : lifespan / 2;
+    const bool is_wrong = offset ? std::chrono::abs(*offset) > limit : clock.is_wrong;
+    if (is_wrong != std::exchange(clock.is_wrong, is_wrong))
+      news.push_back(describe(client, *offset, is_wrong));
+    is_any_wrong_ = is_any_wrong_ || is_wrong || (!offset && client.age > lifespan);
+  }
+  clocks_ = std::move(present);
+  return news;
+}
+
+std::string SlowAnswers::note(const Commands& sample, const CommandArrival& arrival,
+                              std::uint64_t step) {
+  const auto computing = sum_computing(sample);
+  Client& client = clients_[arrival.sender];
+  if (computing <= period_) client.count = 0;
+  if (computing <= period_ || client.is_reported) return "";
+  const sync::Time now = arrival.arrived.time;
+  if (client.count++ == 0) client.since = now;
+  client.is_reported = client.count >= kSlowAnswers && now - client.since >= kSlowTime;
+  if (!client.is_reported) return "";
+  return fmt::format(
+      "step {}: controller '{}' computes an answer for {:.3g} ms, expected less than the period of "
+      "{:.3g} ms: its answers come late (a lower --rtf or a longer --period-s gives it time)",
+      step, sample.client_name().c_str(), 1e3 * std::chrono::duration<double>(computing).count(),
+      1e3 * sync::to_seconds(period_));
+}
+
+}  // namespace sls::sim

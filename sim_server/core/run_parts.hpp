@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <utility>
+
+#include "sim_server/core/absence_report.hpp"
+#include "sim_server/core/outputs.hpp"
+#include "sim_server/core/run_control.hpp"
+
+namespace sls::sim {
+
+/// The parts of a run that core and pacing share.
+struct RunParts {
+  RunParts(const config::Scenario& scenario_of_run, std::uint64_t run, bool begins_paused,
+           std::unique_ptr<Fleet> fleet_of_run, Outputs& shell)
+      : scenario(scenario_of_run),
+        run_id(run),
+        outputs(shell),
+        owned_fleet(std::move(fleet_of_run)),
+        fleet(*owned_fleet),
+        report(outputs, fleet, run_id, scenario.sync),
+        watch(scenario, run_id, fleet, report),
+        control(run_id, fleet.ids(), begins_paused),
+        absence(fleet, watch, report, scenario.sync.mode == config::SyncMode::kLockstep) {}
+
+  /// The run was at rest for `rest`, which counts neither as absence nor as delay.
+  void note_rest(sync::Duration rest) {
+    report.series.note_rest(rest);
+    fleet.note_rest(rest);
+    absence.note_rest(rest);
+  }
+
+  const config::Scenario scenario;
+  const std::uint64_t run_id;
+  Outputs& outputs;
+  const std::unique_ptr<Fleet> owned_fleet;
+  Fleet& fleet;
+  RunReport report;
+  ParticipantWatch watch;
+  RunControl control;
+  AbsenceReport absence;
+};
+
+}  // namespace sls::sim

@@ -1,0 +1,102 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "common/config/scenario.hpp"
+#include "sim_server/core/answer_judge.hpp"
+#include "sim_server/core/pacing.hpp"
+#include "sim_server/core/preparation.hpp"
+#include "sim_server/core/recorder_wait.hpp"
+
+namespace sls::sim {
+
+/// Decides all that happens in one run of the server, from the claim on its vehicles to its end. It
+/// is driven: a function for each kind of event, with the time, and `next_deadline` says when
+/// `on_time` must be called without an event. It reads no clock, has no thread, and never throws:
+/// an error ends the run. Rules: docs/synchronisation.md.
+class ServerCore {
+ public:
+  struct Start {
+    std::uint64_t run_id = 0;
+    bool claims = true;          ///< false for a run that follows another one of this server
+    bool begins_paused = false;  ///< as the run before a reset was
+  };
+
+  /// The run of `fleet`. It has been announced in sls/parameters at `now`.
+  ServerCore(const config::Scenario& scenario, const Start& start, std::unique_ptr<Fleet> fleet,
+             Outputs& outputs, sync::Time now);
+  ServerCore(const ServerCore&) = delete;
+  ServerCore& operator=(const ServerCore&) = delete;
+
+  enum class Phase {
+    kClaiming,           ///< listens whether another server has the vehicles
+    kGathering,          ///< until the expected participants are ready
+    kResting,            ///< between two steps, held by an operator
+    kAwaitingRecorders,  ///< between two steps
+    kAwaitingDue,        ///< between two steps, in real time
+    kAwaitingAnswers,    ///< the states of the step in work were published
+    kEnded,
+  };
+  Phase phase() const { return phase_; }
+
+  /// A sample of sls/command came. It may come at any time: before its step was published, an
+  /// answer is early.
+  void on_commands(const Commands& sample, const CommandArrival& arrival);
+  /// A request of an operator came.
+  void on_request(const SimControl& request, const Surroundings& around, sync::Time now);
+  /// Looks around: stop signal, claims, participants, mistakes, status. Call it when is_look_due.
+  void on_look(Surroundings& around, sync::Time now);
+  /// The time is `now`.
+  void on_time(sync::Time now);
+  /// The shell could not do what the core wanted. Also after the end: a finished run may not be
+  /// published, or the run after a reset not be made.
+  void on_failure(const std::string& reason, sync::Time now);
+
+  bool is_look_due(sync::Time now) const { return now >= looked_ + calc_look_interval(); }
+  /// True if the run has news for on_look, which no plain step may precede.
+  bool has_news(const Surroundings& around) const { return parts_.watch.has_news(around); }
+  /// When on_look or on_time is due.
+  sync::Time next_deadline() const;
+
+  enum class End { kFinished, kReset, kFailed };
+  /// In phase kEnded: how.
+  End end() const { return end_; }
+  /// Why the run failed.
+  const std::string& error() const { return error_; }
+
+  std::uint64_t run_id() const { return parts_.run_id; }
+  bool is_paused() const { return parts_.control.is_paused(); }
+  /// True once participants may have joined.
+  bool is_known() const { return parts_.report.has_published(); }
+  /// Number of recorders that must get the whole run.
+  int expected_recorders() const { return recorders_.expected(); }
+
+ private:
+  /// Does `work`; an exception of it ends the run.
+  template <class Work>
+  void guard(sync::Time now, Work work);
+
+  void begin_flight(sync::Time now);
+  void go_on(sync::Time now);
+  void publish_if_allowed(sync::Time now);
+  void finish_step(sync::Time now);
+  void keep_house(Surroundings& around, sync::Time now);
+  void end_run(End end, RunPhase phase, const std::string& reason, sync::Time now);
+  sync::Duration calc_look_interval() const;
+  bool is_between_steps() const;
+
+  RunParts parts_;
+  Preparation preparation_;
+  RecorderWait recorders_;
+  const std::unique_ptr<Pacing> pacing_;
+  AnswerJudge judge_;
+  Phase phase_ = Phase::kClaiming;
+  sync::Time looked_{};
+  sync::Time rest_began_{};
+  End end_ = End::kFailed;
+  std::string error_;
+};
+
+}  // namespace sls::sim

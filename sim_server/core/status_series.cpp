@@ -1,0 +1,28 @@
+#include "sim_server/core/status_series.hpp"
+
+namespace sls::sim {
+
+SimStatus StatusSeries::make(const Content& content, sync::Time now) {
+  made_ = now;
+  SyncCounters counters = content.counters;
+  timing.fill(counters);
+  const double wall_s = calc_wall_s(now);
+  const double simulated_s = static_cast<double>(content.step) * period_ns_ * 1e-9;
+  SimStatus sample;
+  sample.run_id(run_id_);
+  sample.vehicle_id(vehicle_id_);
+  sample.sample_index(size_++);
+  sample.phase(content.phase);
+  sample.reason(content.reason);
+  sample.step(content.step);
+  sample.controller_name(content.controller_name);
+  sample.real_time_factor(wall_s > 0.0 ? simulated_s / wall_s : 0.0);
+  sample.round_trip_p50_ns(static_cast<std::uint64_t>(round_trips.calc_percentile(50).count()));
+  sample.round_trip_p99_ns(static_cast<std::uint64_t>(round_trips.calc_percentile(99).count()));
+  sample.timing(timing.label());
+  sample.problem(content.problem);
+  sample.counters(counters);
+  return sample;
+}
+
+}  // namespace sls::sim

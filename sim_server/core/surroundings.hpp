@@ -1,0 +1,57 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/sync/membership.hpp"
+#include "common/sync/servers.hpp"
+#include "sim_server/core/participant_check.hpp"
+
+namespace sls::sim {
+
+/// What the core of a server can ask its shell when it looks around. No function blocks or calls
+/// the core.
+class Surroundings {
+ public:
+  virtual ~Surroundings() = default;
+
+  /// Changes when a participant announces something new.
+  virtual std::uint64_t members_version() const = 0;
+  virtual std::vector<sync::Member> find_members(ParticipantRole role,
+                                                 std::uint64_t run_id) const = 0;
+  /// The runs of the other servers.
+  virtual std::vector<sync::Run> find_other_runs() const = 0;
+  virtual bool is_known_elsewhere(std::uint64_t run_id) const = 0;
+
+  /// As is_claim_settled expects them (claim.hpp).
+  virtual bool stays_on_this_machine() const = 0;
+  virtual bool has_heard_every_claim() const = 0;
+
+  /// Changes when the middleware finds a mistake of a participant, or one ends.
+  virtual std::uint64_t problems_version() const = 0;
+  /// What ParticipantCheck looks at, but the time and the stamps of commands. `is_known`:
+  /// participants may have joined the run.
+  virtual Neighbourhood look(bool is_known) = 0;
+  /// Makes `found` the mistakes of this run. Returns all that hold, in words.
+  virtual std::string replace_problems(const ParticipantCheck::Findings& found) = 0;
+  /// What may keep participants from being discovered, to be appended to a message; else empty.
+  virtual std::string describe_isolation() const = 0;
+
+  /// The queues on the way to the network.
+  struct Queues {
+    std::uint64_t written = 0;           ///< record entries so far
+    std::uint64_t history_steps = 0;     ///< whose records are kept for late recorders
+    std::uint64_t missed_deadlines = 0;  ///< of commands so far, real time only
+  };
+  virtual Queues queues() const = 0;
+  /// LIFESPAN of commands; nothing in lockstep.
+  virtual std::optional<std::chrono::nanoseconds> command_lifespan() const = 0;
+
+  /// Why the run must end, such as "interrupted by SIGINT"; empty before a stop signal.
+  virtual std::string stop_signal() const = 0;
+};
+
+}  // namespace sls::sim

@@ -1,0 +1,81 @@
+#include "sim_server/outbox.hpp"
+
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <utility>
+
+#include "common/app/log.hpp"
+#include "common/app/scheduling.hpp"
+#include "common/bus/spinning.hpp"
+
+namespace sls::sim {
+
+void Outbox::begin_run(const config::Sync& sync, std::uint64_t run_id) {
+  is_realtime_ = sync.mode == config::SyncMode::kRealtime;
+  records_.reset();  // ends before its successor begins
+  records_ = std::make_unique<RecordStream>(endpoints_.records, endpoints_.domain.max_batch_bytes(),
+                                            run_id);
+  // In real time the loop must wait for no reader.
+  endpoints_.states.begin_run(run_id, sync.period_ns, is_realtime_);
+}
+
+void Outbox::put(Item item) {
+  const std::lock_guard lock(mutex_);
+  waiting_.push_back(std::move(item));
+  is_waiting_ = true;
+}
+
+void Outbox::write_waiting() {
+  std::deque<Item> items;
+  {
+    const std::lock_guard lock(mutex_);
+    items.swap(waiting_);
+    is_waiting_ = false;
+  }
+  for (const Item& item : items) std::visit([this](const auto& content) { write(content); }, item);
+}
+
+void Outbox::write(const sync::Line& line) { app::log(line); }
+
+Moment Outbox::send_states(const Fleet& fleet) {
+  const Moment moment{std::chrono::steady_clock::now(), std::chrono::system_clock::now()};
+  endpoints_.states.write(fleet, [](std::size_t) { return true; });
+  return moment;
+}
+
+void Outbox::resend_states(const Fleet& fleet, const std::function<bool(std::size_t)>& is_wanted) {
+  endpoints_.states.write(fleet, is_wanted);
+}
+
+void Outbox::record_step(const Fleet& fleet) {
+  const auto& vehicles = fleet.vehicles();
+  records_->add_step(vehicles.size(),
+                     [&](std::size_t i, RecordEntry& entry) { vehicles[i]->fill_record(entry); });
+}
+
+void Outbox::record_late(const Vehicle& vehicle, const OfferedAnswer& answer) {
+  records_->add_step(1, [&](std::size_t, RecordEntry& entry) {
+    entry = RecordEntry();
+    entry.vehicle_id(vehicle.id());
+    entry.step(answer.step);
+    entry.kind(AnswerKind::ANSWER_LATE);
+    entry.answered_step(answer.step);
+    entry.client_name(answer.client_name);
+    entry.answer(answer.command);
+  });
+}
+
+void Outbox::show_progress(std::string text) {
+  if (::isatty(STDERR_FILENO) != 0) log({false, std::move(text)});
+}
+
+void Outbox::begin_flight() {
+  if (!is_realtime_) return bus::start_spinning();
+  if (!app::put_process_first())
+    log({false,
+         "real-time priority refused (needs root, CAP_SYS_NICE or RLIMIT_RTPRIO): steps may be "
+         "late"});
+}
+
+}  // namespace sls::sim
