@@ -1,0 +1,395 @@
+// A run in lockstep: docs/synchronisation.md, from "Lockstep" to "Operator control".
+#include <gtest/gtest.h>
+
+#include "tests/sim_server/core/server_rig.hpp"
+
+namespace sls::sim {
+namespace {
+
+using End = ServerCore::End;
+
+config::Scenario with_policy(config::ControllerPolicy policy, double deadline_s) {
+  auto scenario = ServerRig::make_scenario();
+  scenario.sync.wait.controller = {policy, deadline_s};
+  return scenario;
+}
+
+TEST(ServerLockstepTest, EachAnswerBringsTheNextStateAtOnce) {
+  ServerRig rig;
+  rig.join("pilot");
+  rig.answer("pilot", 0);
+  rig.wait_until(3);
+  rig.answer("pilot", 1);
+  EXPECT_EQ(rig.take_states(), (Lines{"0: state 0", "0: state 1", "3: state 2"}));
+  EXPECT_EQ(rig.take_records(), (Lines{"0 accepted", "1 accepted"}));
+}
+
+TEST(ServerLockstepTest, AStepOfAFleetNeedsTheAnswerForEachVehicle) {
+  auto scenario = ServerRig::make_scenario();
+  scenario.vehicles.resize(2, scenario.vehicles.front());
+  ServerRig rig(scenario);
+  rig.join("pilot");
+  ServerRig::Answer answer;
+  rig.answer("pilot", answer);
+  rig.wait_until(20);
+  EXPECT_EQ(rig.take_states(), (Lines{"0: state 0", "20: state 0 again 1"}))
+      << "only what lacks an answer is sent again";
+  answer.vehicle_ids = {1};
+  rig.answer("pilot", answer);
+  EXPECT_EQ(rig.take_states(), Lines{"20: state 1"});
+}
+
+TEST(ServerLockstepTest, WithoutAnAnswerTheStateIsSentAgainInDoublingIntervals) {
+  ServerRig rig;
+  rig.join("pilot");
+  rig.wait_until(19);
+  EXPECT_EQ(rig.take_states(), Lines{"0: state 0"});
+  rig.wait_until(300);
+  EXPECT_EQ(rig.take_states(), (Lines{"20: state 0 again", "60: state 0 again",
+                                      "140: state 0 again", "240: state 0 again"}));
+  EXPECT_EQ(rig.status().counters().resent(), 4u);
+}
+
+TEST(ServerLockstepTest, AfterARoundTripFourOfThemAreWaited) {
+  ServerRig rig;
+  rig.join("pilot");
+  rig.wait_until(2);
+  rig.answer("pilot", 0);
+  rig.take_states();
+  rig.wait_until(9);
+  EXPECT_EQ(rig.take_states(), Lines{});
+  rig.wait_until(10);
+  EXPECT_EQ(rig.take_states(), Lines{"10: state 1 again"});
+}
+
+TEST(ServerLockstepTest, AnAnswerBeforeItsStateIsRefusedAndACopyChangesNothing) {
+  ServerRig rig;
+  rig.answer("pilot", 0);
+  rig.join("pilot");
+  EXPECT_EQ(rig.take_states(), Lines{"0: state 0"});
+  rig.answer("pilot", 1);
+  EXPECT_EQ(rig.step(), 0u);
+  rig.answer("pilot", 0);
+  rig.answer("pilot", 0);
+  EXPECT_EQ(rig.step(), 1u);
+  rig.wait_until(400);
+  EXPECT_EQ(rig.status().counters().duplicate(), 1u);
+  EXPECT_EQ(rig.status().counters().rejected_step(), 2u);
+}
+
+TEST(ServerLockstepTest, TheAnswerThatEndsTheMissionEndsTheRun) {
+  ServerRig rig;
+  rig.join("pilot");
+  rig.fly_to(249);
+  rig.take_records();
+  ServerRig::Answer last{250};
+  last.is_last = true;
+  rig.answer("pilot", last);
+  EXPECT_EQ(rig.core().end(), End::kFinished);
+  EXPECT_EQ(rig.take_records(), (Lines{"250 accepted", "end"}));
+  EXPECT_EQ(rig.status().phase(), RunPhase::PHASE_FINISHED);
+  EXPECT_EQ(rig.status().step(), 250u);
+  EXPECT_EQ(rig.status().timing().to_string(), "exact");
+  EXPECT_NE(rig.take_log().back().find("finished: 250 steps, 1 s simulated"), std::string::npos);
+}
+
+TEST(ServerLockstepTest, ARefusedAnswerOfTheOnlyClientFailsTheRun) {
+  ServerRig rig;
+  rig.join("pilot");
+  ServerRig::Answer broken{0};
+  broken.fault = FaultCode::FAULT_FREE_FALL;
+  rig.answer("pilot", broken);
+  EXPECT_EQ(rig.core().error(), "controller 'pilot' answered step 0 with a fault: free_fall");
+  EXPECT_EQ(rig.take_records(), (Lines{"0 refused", "end"}));
+  EXPECT_EQ(rig.status().phase(), RunPhase::PHASE_FAILED);
+}
+
+TEST(ServerLockstepTest, ARefusedAnswerBesideASilentClientFailsItAfterTwoSeconds) {
+  ServerRig rig;
+  rig.join("pilot");
+  rig.join("standby", -1);
+  ServerRig::Answer broken{0};
+  broken.fault = FaultCode::FAULT_FREE_FALL;
+  rig.answer("pilot", broken);
+  rig.fall_silent("standby");
+  rig.wait_until(1999);
+  EXPECT_EQ(rig.phase(), Phase::kAwaitingAnswers);
+  rig.wait_until(2020);
+  EXPECT_EQ(rig.core().end(), End::kFailed);
+  EXPECT_EQ(rig.core().error().rfind("controller 'pilot' answered step 0 with a fault", 0), 0u);
+}
+
+TEST(ServerLockstepTest, AFailedPlantFailsTheRunAndRecordsTheStepOnce) {
+  ServerRig rig;
+  rig.join("pilot");
+  rig.answer("pilot", 0);
+  rig.fail("quad_x_m is not finite");
+  EXPECT_EQ(rig.core().error(), "quad_x_m is not finite");
+  EXPECT_EQ(rig.take_records(), (Lines{"0 accepted", "1 none", "end"}));
+  rig.fail("again");
+  EXPECT_EQ(rig.core().error(), "quad_x_m is not finite") << "only the first failure counts";
+}
+
+TEST(ServerLockstepTest, ARefusedWriteFailsTheRun) {
+  ServerRig rig;
+  rig.failing_states = 1;
+  rig.join("pilot");
+  EXPECT_EQ(rig.core().error(), "write refused");
+}
+
+// --- absence -------------------------------------------------------------------------------------
+
+TEST(ServerLockstepTest, PolicyWaitNamesTheControllerAndGivesUpAtTheDeadline) {
+  ServerRig rig(with_policy(config::ControllerPolicy::kWait, 10));
+  rig.join("pilot");
+  rig.take_log();
+  rig.wait_until(999);
+  EXPECT_EQ(rig.take_log(), Lines{});
+  rig.wait_until(1001);
+  EXPECT_EQ(rig.take_log(),
+            Lines{"1000: step 0: waiting for: controller 'pilot' on box (9 s left)"});
+  rig.wait_until(9'999);
+  EXPECT_EQ(rig.phase(), Phase::kAwaitingAnswers);
+  rig.wait_until(10'001);
+  EXPECT_EQ(rig.core().error(), "step 0: waited 10 s for controller 'pilot' on box");
+}
+
+TEST(ServerLockstepTest, AnAnswerAfterALongWaitIsAnnounced) {
+  ServerRig rig(with_policy(config::ControllerPolicy::kWait, 10));
+  rig.join("pilot");
+  rig.wait_until(1500);
+  rig.take_log();
+  rig.answer("pilot", 0);
+  EXPECT_EQ(rig.take_log(), Lines{"1500: step 0: controller 'pilot' answers again after 1.5 s"});
+  EXPECT_EQ(rig.step(), 1u);
+}
+
+TEST(ServerLockstepTest, PolicyHoldFliesTheLastForceAPeriodOfWallTimeEachThenTheFailSafe) {
+  auto scenario = with_policy(config::ControllerPolicy::kHold, 1);
+  scenario.sync.max_hold_s = 0.008;
+  ServerRig rig(scenario);
+  rig.join("pilot");
+  rig.answer("pilot", 0);
+  rig.take_states();
+  rig.take_log();
+  rig.wait_until(999);
+  EXPECT_EQ(rig.step(), 1u);
+  rig.wait_until(1009);
+  EXPECT_EQ(rig.step(), 4u);
+  EXPECT_EQ(rig.take_records(), (Lines{"0 accepted", "1 held", "2 held", "3 fail-safe"}));
+  EXPECT_EQ(rig.take_log(),
+            (Lines{"1000: step 1: no answer from controller 'pilot' on box; holding the last force",
+                   "1008: step 3: no answer from controller 'pilot' on box; applying the fail-safe "
+                   "force"}));
+  rig.answer("pilot", 4);
+  EXPECT_EQ(rig.step(), 5u);
+  rig.wait_until(2000);
+  EXPECT_EQ(rig.status().timing().to_string(), "degraded: 2 steps held, 1 fail-safe");
+}
+
+TEST(ServerLockstepTest, PolicyFailSafeUsesTheFailSafeFromTheBeginning) {
+  ServerRig rig(with_policy(config::ControllerPolicy::kFailsafe, 1));
+  rig.join("pilot");
+  rig.wait_until(999);
+  EXPECT_EQ(rig.take_records(), Lines{});
+  rig.wait_until(1000);
+  EXPECT_EQ(rig.take_records(), Lines{"0 fail-safe"});
+}
+
+TEST(ServerLockstepTest, APauseIsNoAbsence) {
+  ServerRig rig(with_policy(config::ControllerPolicy::kWait, 1));
+  rig.join("pilot");
+  rig.answer("pilot", 0);
+  rig.request(ControlAction::ACTION_PAUSE);
+  rig.wait_until(5000);
+  EXPECT_EQ(rig.phase(), Phase::kAwaitingAnswers) << "the step in work still waits for its answer";
+  rig.request(ControlAction::ACTION_RESUME);
+  rig.wait(900);
+  EXPECT_EQ(rig.phase(), Phase::kAwaitingAnswers);
+  rig.wait(200);
+  EXPECT_EQ(rig.core().end(), End::kFailed);
+}
+
+TEST(ServerLockstepTest, TheNextClientTakesOverAfterItsTimeAndTheFirstComesBack) {
+  ServerRig rig;
+  rig.join("pilot", 1);
+  rig.join("standby");
+  rig.take_log();
+  rig.answer("standby", 0);
+  rig.wait_until(99);
+  EXPECT_EQ(rig.step(), 0u) << "its answer is kept";
+  rig.wait_until(100);
+  EXPECT_EQ(rig.step(), 1u);
+  EXPECT_EQ(rig.take_log(), Lines{"100: step 0: controller 'standby' takes over from 'pilot'"});
+  rig.answer("standby", 1);
+  EXPECT_EQ(rig.step(), 2u) << "the silent one is skipped";
+  rig.answer("pilot", 2);
+  EXPECT_EQ(rig.step(), 3u);
+  EXPECT_EQ(rig.status().counters().take_overs(), 2u);
+}
+
+// --- recorders -----------------------------------------------------------------------------------
+
+config::Scenario with_recorder(config::RecorderPolicy policy) {
+  auto scenario = ServerRig::make_scenario();
+  scenario.sync.wait_for.recorders = 1;
+  scenario.sync.wait.recorder.policy = policy;
+  scenario.sync.wait.recorder.deadline_s = 10;
+  std::get<config::LeaveAfter>(scenario.mission.front().leave).duration_ns = 60'000'000'000;
+  return scenario;
+}
+
+TEST(ServerLockstepTest, TheServerStaysWithinTheWindowOfTheRecorder) {
+  ServerRig rig(with_recorder(config::RecorderPolicy::kWait));
+  rig.note_recorder("disk", -1);
+  rig.join("pilot");
+  rig.fly_to(1999);
+  EXPECT_EQ(rig.phase(), Phase::kAwaitingRecorders) << "2,000 steps ahead of the last complete one";
+  EXPECT_EQ(rig.step(), 1999u);
+  rig.note_recorder("disk", 0);
+  EXPECT_EQ(rig.step(), 2000u);
+}
+
+TEST(ServerLockstepTest, AMissingRecorderEndsTheRunAtTheDeadlineOrIsGivenUp) {
+  for (const bool goes_on : {false, true}) {
+    ServerRig rig(
+        with_recorder(goes_on ? config::RecorderPolicy::kGoOn : config::RecorderPolicy::kWait));
+    rig.note_recorder("disk", -1);
+    rig.join("pilot");
+    rig.take_log();
+    rig.leave("disk");
+    rig.answer("pilot", 0);
+    EXPECT_EQ(rig.phase(), Phase::kAwaitingRecorders);
+    rig.wait_until(1000);
+    EXPECT_EQ(rig.take_log(),
+              Lines{"1000: step 1: waiting for: recorder: 1 expected, 0 there (9 s left)"});
+    rig.wait_until(9'999);
+    EXPECT_EQ(rig.phase(), Phase::kAwaitingRecorders);
+    rig.wait_until(10'001);
+    const std::string waited = "step 1: waited 10 s for recorder: 1 expected, 0 there";
+    if (!goes_on) {
+      EXPECT_EQ(rig.core().error(), waited);
+      EXPECT_EQ(rig.core().expected_recorders(), 1);
+      continue;
+    }
+    EXPECT_EQ(rig.take_log().back(), "10000: " + waited + ": continues without it");
+    EXPECT_EQ(rig.core().expected_recorders(), 0);
+    rig.fly_to(5);
+    EXPECT_EQ(rig.step(), 6u);
+    rig.note_recorder("disk", 6);
+    rig.fly_to(6);
+    EXPECT_EQ(rig.take_log().back(), "10001: step 7: the recorders are back");
+    EXPECT_EQ(rig.core().expected_recorders(), 1);
+  }
+}
+
+TEST(ServerLockstepTest, WhileTheFullQueueGetsShorterTheWaitGoesOn) {
+  ServerRig rig(with_recorder(config::RecorderPolicy::kWait));
+  rig.note_recorder("disk", -1);
+  rig.join("pilot");
+  rig.is_queue_full = true;
+  rig.answer("pilot", 0);
+  EXPECT_EQ(rig.phase(), Phase::kAwaitingRecorders);
+  rig.wait_until(9'000);
+  rig.written = 100;
+  rig.wait_until(18'999);
+  EXPECT_EQ(rig.phase(), Phase::kAwaitingRecorders);
+  rig.is_queue_full = false;
+  rig.wait(1);
+  EXPECT_EQ(rig.step(), 1u);
+  rig.is_queue_full = true;
+  rig.answer("pilot", 1);
+  rig.wait(10'002);
+  EXPECT_EQ(rig.core().error(),
+            "step 2: waited 10 s for recorder: the queue of sls/record is full");
+}
+
+TEST(ServerLockstepTest, ASilentRecorderThatIsBehindIsNamed) {
+  ServerRig rig(with_recorder(config::RecorderPolicy::kWait));
+  rig.note_recorder("disk", -1);
+  rig.join("pilot");
+  rig.fly_to(5);
+  rig.take_log();
+  rig.fall_silent("disk");
+  rig.wait_until(1400);
+  const Lines log = rig.take_log();
+  EXPECT_NE(std::find(log.begin(), log.end(),
+                      "1240: step 6: recorder 'disk' on box is silent since step -1"),
+            log.end())
+      << testing::PrintToString(log);
+}
+
+// --- operator ------------------------------------------------------------------------------------
+
+TEST(ServerLockstepTest, APausedRunFliesTheStepsThatAreRequested) {
+  ServerRig rig;
+  rig.join("pilot");
+  rig.request(ControlAction::ACTION_PAUSE);
+  EXPECT_EQ(rig.phase(), Phase::kAwaitingAnswers) << "the step in work is completed";
+  rig.answer("pilot", 0);
+  EXPECT_EQ(rig.phase(), Phase::kResting);
+  EXPECT_EQ(rig.take_records(), (Lines{"0 accepted", "flush"}));
+  EXPECT_EQ(rig.status().phase(), RunPhase::PHASE_PAUSED);
+  rig.request(ControlAction::ACTION_STEP, 2);
+  rig.fly_to(2);
+  EXPECT_EQ(rig.phase(), Phase::kResting);
+  ASSERT_EQ(rig.replies().size(), 2u);
+  EXPECT_TRUE(rig.replies().back().accepted());
+  EXPECT_EQ(rig.replies().back().step(), 3u);
+  rig.request(ControlAction::ACTION_RESUME);
+  EXPECT_EQ(rig.step(), 3u);
+}
+
+TEST(ServerLockstepTest, ResetEndsTheRunWhereverItIs) {
+  ServerRig rig;
+  rig.join("pilot");
+  rig.request(ControlAction::ACTION_PAUSE);
+  rig.answer("pilot", 0);
+  rig.request(ControlAction::ACTION_STEP, 10);
+  rig.request(ControlAction::ACTION_RESET);
+  EXPECT_EQ(rig.core().end(), End::kReset);
+  EXPECT_TRUE(rig.core().is_paused()) << "so begins its successor";
+  EXPECT_EQ(rig.status().phase(), RunPhase::PHASE_RESET);
+  EXPECT_EQ(rig.status().reason().to_string(), "reset by anna@box");
+  EXPECT_EQ(rig.replies().back().reason().to_string(), "0 of 10 steps done: reset by anna@box");
+  rig.fail("its successor cannot be made");
+  EXPECT_EQ(rig.core().end(), End::kFailed);
+  EXPECT_EQ(rig.status().phase(), RunPhase::PHASE_FAILED);
+}
+
+TEST(ServerLockstepTest, StopAndASignalFailTheRunWithTheirNames) {
+  ServerRig by_operator, by_signal;
+  by_operator.join("pilot");
+  by_operator.request(ControlAction::ACTION_STOP);
+  EXPECT_EQ(by_operator.core().error(), "stopped by anna@box");
+  by_signal.join("pilot");
+  by_signal.wait_until(20);
+  by_signal.stop("interrupted by SIGINT");
+  by_signal.wait(20);
+  EXPECT_EQ(by_signal.core().error(), "interrupted by SIGINT");
+  EXPECT_EQ(by_signal.take_records(), (Lines{"0 none", "end"}));
+}
+
+// --- reports -------------------------------------------------------------------------------------
+
+TEST(ServerLockstepTest, AStatusComesAtLeastEveryHalfSecond) {
+  ServerRig rig;
+  rig.join("pilot");
+  const std::size_t before = rig.statuses().size();
+  rig.wait_until(399);
+  EXPECT_EQ(rig.statuses().size(), before);
+  rig.wait_until(420);
+  EXPECT_EQ(rig.statuses().size(), before + 1);
+}
+
+TEST(ServerLockstepTest, AMistakeOfAParticipantIsInTheStatusWithinTheTimeOfALook) {
+  ServerRig rig;
+  rig.join("pilot");
+  rig.wait_until(130);
+  rig.problem = "'foo' (10.0.0.2): another vendor's DDS";
+  rig.wait(120);
+  EXPECT_EQ(rig.status().problem().to_string(), rig.problem);
+}
+
+}  // namespace
+}  // namespace sls::sim
