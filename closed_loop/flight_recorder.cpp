@@ -40,7 +40,8 @@ void FlightRecorder::add(const std::vector<FlownStep>& steps, std::optional<std:
   }
   board_.step = steps.front().step;
   if (board_.step > 0)
-    for (std::size_t i = 0; i < ids_.size(); ++i) board_.timing.add(ForceOrigin::FORCE_ANSWERED, 0);
+    for (std::size_t i = 0; i < ids_.size(); ++i)
+      board_.timing.add(model::AnswerKind::kAccepted, 0);
   if (board_.is_due()) board_.publish(RunPhase::PHASE_RUNNING, "");
   recording_.flush_if_due();
 }

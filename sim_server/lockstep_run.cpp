@@ -119,11 +119,11 @@ void LockstepRun::resend(Clock::time_point now) {
 void LockstepRun::fly_without_answers(Clock::time_point now) {
   using Action = ControllerAbsence::Action;
   const double step_wait_s = std::chrono::duration<double>(now - sent_).count();
-  std::vector<std::pair<VehicleFlight*, Action>> actions;
+  std::vector<std::pair<Vehicle*, Action>> actions;
   for (const auto& vehicle : vehicles_)
     if (!vehicle->gate.accepted())
       actions.emplace_back(vehicle.get(),
-                           vehicle->absence.decide(step_wait_s, vehicle->calc_absence_s()));
+                           vehicle->absence.decide(step_wait_s, vehicle->calc_absence_s(now)));
   const auto [least, most] =
       std::minmax_element(actions.begin(), actions.end(),
                           [](const auto& a, const auto& b) { return a.second < b.second; });
@@ -158,7 +158,7 @@ bool LockstepRun::receive(const Commands& sample, const bus::PeerId& sender) {
     }
     const bool is_news = std::any_of(vehicles_.begin(), vehicles_.end(), [](const auto& vehicle) {
       return vehicle->gate.take_over() ||
-             vehicle->gate.accepted()->command.mission() == MissionPhase::MISSION_FINISHED;
+             vehicle->gate.accepted()->answer.mission == model::MissionPhase::kFinished;
     });
     if (is_news) {
       endpoints_.commands.interrupt();

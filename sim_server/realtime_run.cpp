@@ -89,7 +89,7 @@ bool RealtimeRun::exchange() {
     if (vehicle->gate.accepted()) continue;
     vehicle->note_waiting(published_);
     const bool is_silent = vehicle->gate.count_miss() >= kMissesBeforeTakeOver ||
-                           vehicle->calc_absence_s() >= scenario_.sync.take_over_s;
+                           vehicle->calc_absence_s(Clock::now()) >= scenario_.sync.take_over_s;
     if (is_silent) vehicle->gate.pass_over_silent_client();
   }
   take_answers();
@@ -102,7 +102,7 @@ void RealtimeRun::fly_without_answers() {
   Action most = Action::kWait;
   for (const auto& vehicle : vehicles_) {
     if (vehicle->is_settled()) continue;
-    const Action action = vehicle->absence.decide(0.0, vehicle->calc_absence_s());
+    const Action action = vehicle->absence.decide(0.0, vehicle->calc_absence_s(Clock::now()));
     most = std::max(most, action);
     if (action != Action::kGiveUp) vehicle->fly_without_answer(action);
   }
@@ -151,19 +151,19 @@ bool RealtimeRun::take_commands(Clock::time_point deadline) {
 
 bool RealtimeRun::is_ending() const {
   return std::all_of(vehicles_.begin(), vehicles_.end(), [](const auto& vehicle) {
-    const auto& answer = vehicle->gate.accepted();
-    return answer ? answer->command.mission() == MissionPhase::MISSION_FINISHED
-                  : vehicle->has_ended_late();
+    const auto& accepted = vehicle->gate.accepted();
+    return accepted ? accepted->answer.mission == model::MissionPhase::kFinished
+                    : vehicle->has_ended_late();
   });
 }
 
-void RealtimeRun::note_late(VehicleFlight& vehicle, const OfferedAnswer& answer) {
-  const auto age = Clock::now() - schedule_.due(answer.step);
+void RealtimeRun::note_late(Vehicle& vehicle, const OfferedAnswer& offered) {
+  const auto age = Clock::now() - schedule_.due(offered.step);
   const auto lifespan = endpoints_.command_stream.lifespan();
   if (lifespan && age > *lifespan)
     ++link_.stale();
   else
-    vehicle.keep_late_answer(answer);
+    vehicle.keep_late_answer(offered);
 }
 
 bool RealtimeRun::wait_for_last_answers() {

@@ -38,7 +38,7 @@ class RealtimeRun : public Run {
   bool wait_for_last_answers();
 
   void publish();
-  void note_late(VehicleFlight& vehicle, const OfferedAnswer& answer) override;
+  void note_late(Vehicle& vehicle, const OfferedAnswer& offered) override;
   /// True when the mission is over for every vehicle, also by an answer that came late.
   bool is_ending() const;
   void fly_without_answers();

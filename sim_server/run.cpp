@@ -10,6 +10,7 @@
 #include "common/app/options.hpp"
 #include "common/app/run_main.hpp"
 #include "common/app/stop_signal.hpp"
+#include "common/bus/convert.hpp"
 #include "common/bus/names.hpp"
 #include "common/config/vehicle_ids.hpp"
 #include "sim_server/core/claim.hpp"
@@ -42,7 +43,7 @@ Run::Run(Endpoints& endpoints, const Assignment& assignment, WorkerPool& workers
       plants_(make_plants(find_plant_type(scenario_.plant.model), scenario_, vehicle_ids_)),
       plant_steps_(scenario_.sync.period_ns / scenario_.plant.step_ns) {
   for (const std::uint32_t id : vehicle_ids_)
-    vehicles_.push_back(std::make_unique<VehicleFlight>(scenario_, id, run_id));
+    vehicles_.push_back(std::make_unique<Vehicle>(scenario_, id, run_id));
   endpoints_.parameters_writer.write(make_parameters_message(
       run_id, vehicle_ids_, scenario_, *plants_.front().plant, app::version()));
   const config::Sync& sync = scenario_.sync;
@@ -148,7 +149,7 @@ bool Run::fly() {
     if (board_.step > 0)
       if (const auto reply = control_.stepped(board_.step)) endpoints_.reply_writer.write(*reply);
     if (!rest() || !wait_for_recorders() || !exchange()) return false;
-    board_.controller_name = vehicles_.front()->outcome()->applied.controller_name;
+    board_.controller_name = vehicles_.front()->record().client_name;
     if (is_finished()) return true;
     advance();
     do_housekeeping();
@@ -157,9 +158,13 @@ bool Run::fly() {
 
 void Run::measure(const PlantOfVehicles& group) {
   const Plant& plant = *group.plant;
-  for (std::size_t i = 0; i < group.vehicles.size(); ++i)
-    endpoints_.states.at(group.vehicles[i]) = vehicles_[group.vehicles[i]]->measure(
-        board_.step, plant.measurement(i), plant.sees_truth() ? nullptr : &plant.seen(i));
+  for (std::size_t i = 0; i < group.vehicles.size(); ++i) {
+    Vehicle& vehicle = *vehicles_[group.vehicles[i]];
+    vehicle.measure(board_.step, plant.measurement(i),
+                    plant.sees_truth() ? nullptr : &plant.seen(i));
+    bus::fill(endpoints_.states.at(group.vehicles[i]), vehicle.id(), vehicle.measured(),
+              vehicle.applied());
+  }
 }
 
 void Run::publish_states() {
@@ -171,14 +176,16 @@ void Run::publish_states() {
 
 void Run::record_step() {
   if (!std::exchange(is_step_published_, false)) return;
-  record_.add_step(vehicles_.size(),
-                   [this](std::size_t i, RecordEntry& entry) { vehicles_[i]->fill_record(entry); });
+  for (const auto& vehicle : vehicles_) vehicle->complete_record();
+  record_.add_step(vehicles_.size(), [this](std::size_t i, RecordEntry& entry) {
+    bus::fill(entry, vehicles_[i]->record());
+  });
 }
 
 void Run::advance() {
   record_step();
   for (const auto& vehicle : vehicles_)
-    board_.timing.add(vehicle->outcome()->applied.origin, vehicle->calc_age());
+    board_.timing.add(vehicle->record().kind, vehicle->calc_age());
   ++board_.step;
   workers_.for_each(plants_.size(), [this](std::size_t i) { advance(plants_[i]); });
 }
@@ -199,7 +206,7 @@ void Run::advance(PlantOfVehicles& group) {
 /// A vehicle whose mission is over flies on until all missions are over.
 bool Run::is_finished() const {
   return std::all_of(vehicles_.begin(), vehicles_.end(),
-                     [](const auto& vehicle) { return vehicle->outcome()->is_finished; });
+                     [](const auto& vehicle) { return vehicle->is_finished(); });
 }
 
 bool Run::rest() {

@@ -19,11 +19,11 @@
 #include "sim_server/core/presence.hpp"
 #include "sim_server/core/roster.hpp"
 #include "sim_server/core/run_control.hpp"
+#include "sim_server/core/vehicle.hpp"
 #include "sim_server/endpoints.hpp"
 #include "sim_server/plants/plant.hpp"
 #include "sim_server/record_stream.hpp"
 #include "sim_server/status_board.hpp"
-#include "sim_server/vehicle_flight.hpp"
 #include "sim_server/worker_pool.hpp"
 
 namespace sls::sim {
@@ -92,8 +92,8 @@ class Run {
   /// before the states of its step were published.
   void judge(const Commands& sample, const bus::PeerId& sender, bool is_early = false);
   /// Called for a valid answer to an earlier step.
-  virtual void note_late(VehicleFlight&, const OfferedAnswer&) {}
-  VehicleFlight* find_vehicle(std::uint32_t id);
+  virtual void note_late(Vehicle&, const OfferedAnswer&) {}
+  Vehicle* find_vehicle(std::uint32_t id);
   /// True if every vehicle's answer to the step in work was accepted.
   bool are_all_accepted() const;
   /// True if a vehicle's last step was flown without an answer, and none has come since.
@@ -130,8 +130,8 @@ class Run {
   const std::vector<std::uint32_t> vehicle_ids_;
   const std::uint64_t run_id_;
 
-  std::vector<std::unique_ptr<VehicleFlight>> vehicles_;  // as vehicle_ids_
-  SyncCounters link_;                                     // counts that belong to no single vehicle
+  std::vector<std::unique_ptr<Vehicle>> vehicles_;  // as vehicle_ids_
+  SyncCounters link_;                               // counts that belong to no single vehicle
   StatusBoard board_;
   RunControl control_;
   Roster roster_;
@@ -151,7 +151,7 @@ class Run {
   void advance(PlantOfVehicles& group);
   /// Sends the step in work to the recorders if its states were published.
   void record_step();
-  void record_late(const VehicleFlight& vehicle, const OfferedAnswer& answer);
+  void record_late(const Vehicle& vehicle, const OfferedAnswer& offered);
   void finish();
   void reset();
   void publish_end(RunPhase phase, const std::string& reason);
@@ -163,7 +163,7 @@ class Run {
   /// Announces the plants' remarks on their vehicles.
   void announce_remarks();
   SyncCounters sum_counters() const;
-  std::string describe_refusals(const VehicleFlight& vehicle) const;
+  std::string describe_refusals(const Vehicle& vehicle) const;
   [[noreturn]] void give_up(double waited_s, const std::string& refusals) const;
   std::string describe_vehicles(const std::vector<std::uint32_t>& ids) const;
   void announce_take_overs();

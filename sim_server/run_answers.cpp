@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/app/run_main.hpp"
+#include "common/bus/convert.hpp"
 #include "common/bus/sync_counters.hpp"
 #include "common/config/vehicle_ids.hpp"
 #include "sim_server/run.hpp"
@@ -29,7 +30,7 @@ std::string Run::describe_vehicles(const std::vector<std::uint32_t>& ids) const 
   return fmt::format(" (vehicle{} {})", ids.size() > 1 ? "s" : "", config::to_vehicle_ranges(ids));
 }
 
-VehicleFlight* Run::find_vehicle(std::uint32_t id) {
+Vehicle* Run::find_vehicle(std::uint32_t id) {
   const auto found = std::lower_bound(vehicle_ids_.begin(), vehicle_ids_.end(), id);
   if (found == vehicle_ids_.end() || *found != id) return nullptr;
   return vehicles_[static_cast<std::size_t>(found - vehicle_ids_.begin())].get();
@@ -43,8 +44,9 @@ void Run::judge(const Commands& sample, const bus::PeerId& sender, bool is_early
   if (sample.vehicles().empty() && sample.run_id() == run_id_)
     check_.note_empty(sender, sample.step());
   for (const ControlCommand& command : sample.vehicles()) {
-    offered_.command = command;
-    VehicleFlight* vehicle = find_vehicle(command.vehicle_id());
+    offered_.vehicle_id = command.vehicle_id();
+    bus::fill(offered_.answer, command);
+    Vehicle* vehicle = find_vehicle(command.vehicle_id());
     if (!vehicle) vehicle = vehicles_.front().get();  // its gate refuses and counts the answer
     const Verdict verdict = vehicle->gate.offer(offered_, sender);
     if (verdict == Verdict::kLate) {
@@ -53,7 +55,7 @@ void Run::judge(const Commands& sample, const bus::PeerId& sender, bool is_early
     }
     const char* defect = to_string(verdict);
     if (*defect == '\0') {
-      check_.note_taken(offered_, sender, verdict, vehicle->returned(), vehicle->state());
+      check_.note_taken(offered_, sender, verdict, vehicle->applied().memory, vehicle->state());
       if (verdict == Verdict::kSuperseded)
         check_.note_superseded(sender, vehicle->gate.superseded_by());
     } else {
@@ -64,16 +66,14 @@ void Run::judge(const Commands& sample, const bus::PeerId& sender, bool is_early
   }
 }
 
-void Run::record_late(const VehicleFlight& vehicle, const OfferedAnswer& answer) {
-  record_.add_step(1, [&](std::size_t, RecordEntry& entry) {
-    entry = RecordEntry();
-    entry.vehicle_id(vehicle.id());
-    entry.step(answer.step);
-    entry.kind(AnswerKind::ANSWER_LATE);
-    entry.answered_step(answer.step);
-    entry.client_name(answer.client_name);
-    entry.answer(answer.command);
-  });
+void Run::record_late(const Vehicle& vehicle, const OfferedAnswer& offered) {
+  model::StepRecord record;
+  record.vehicle_id = vehicle.id();
+  record.step = record.answered_step = offered.step;
+  record.kind = model::AnswerKind::kLate;
+  record.client_name = offered.client_name;
+  record.answer = offered.answer;
+  record_.add_step(1, [&](std::size_t, RecordEntry& entry) { bus::fill(entry, record); });
 }
 
 bool Run::are_all_accepted() const {
@@ -90,15 +90,16 @@ void Run::check_refusals() {
   const double patience_s = std::chrono::duration<double>(sync::kPresumedDeadAfter).count();
   for (const auto& vehicle : vehicles_) {
     const std::string refusals = describe_refusals(*vehicle);
-    vehicle->note_refused(!refusals.empty());
+    const auto now = Clock::now();
+    vehicle->note_refused(!refusals.empty(), now);
     if (refusals.empty()) continue;
     if (vehicle->gate.refusal()) throw app::RunError(refusals);
     // A client that died stays announced for a while: only its silence shows that it is gone.
-    if (vehicle->calc_refused_s() >= patience_s) give_up(patience_s, refusals);
+    if (vehicle->calc_refused_s(now) >= patience_s) give_up(patience_s, refusals);
   }
 }
 
-std::string Run::describe_refusals(const VehicleFlight& vehicle) const {
+std::string Run::describe_refusals(const Vehicle& vehicle) const {
   const std::string refusals = vehicle.gate.describe_refusals();
   return vehicles_.size() == 1 || refusals.empty()
              ? refusals
@@ -120,8 +121,8 @@ std::string Run::describe_problem() const {
 void Run::take_answers() {
   for (const auto& vehicle : vehicles_)
     if (!vehicle->is_settled() && vehicle->gate.accepted()) vehicle->take_answer();
-  if (const auto& outcome = vehicles_.front()->outcome())
-    board_.controller_name = outcome->applied.controller_name;
+  if (vehicles_.front()->is_settled())
+    board_.controller_name = vehicles_.front()->record().client_name;
   announce_take_overs();
   if (is_anybody_absent()) return;
   if (announced_absence_) {
@@ -129,8 +130,7 @@ void Run::take_answers() {
         std::chrono::duration<double>(Clock::now() - *announced_absence_).count();
     board_.announce(vehicles_.size() == 1
                         ? fmt::format("step {}: controller '{}' answers again after {:.1f} s",
-                                      board_.step, vehicles_.front()->last_answer().controller_name,
-                                      absence_s)
+                                      board_.step, vehicles_.front()->last_client(), absence_s)
                         : fmt::format("step {}: all vehicles get answers again after {:.1f} s",
                                       board_.step, absence_s));
   }
@@ -151,7 +151,8 @@ void Run::announce_take_overs() {
 
 double Run::calc_longest_absence_s() const {
   double longest = 0.0;
-  for (const auto& vehicle : vehicles_) longest = std::max(longest, vehicle->calc_absence_s());
+  const auto now = Clock::now();
+  for (const auto& vehicle : vehicles_) longest = std::max(longest, vehicle->calc_absence_s(now));
   return longest;
 }
 
@@ -160,7 +161,7 @@ std::string Run::name_awaited_controllers() const {
   for (const auto& vehicle : vehicles_) {
     if (vehicle->gate.accepted()) continue;
     const auto client = vehicle->gate.awaited_client();
-    const std::string& last = vehicle->last_answer().controller_name;
+    const std::string& last = vehicle->last_client();
     const bool is_there = client && !client->is_gone && board_.problem.empty();
     awaited[client         ? fmt::format("controller '{}'{}{}", client->name,
                                          describe_place(roster_, client->peer),

@@ -1,0 +1,115 @@
+#include "sim_server/core/vehicle.hpp"
+
+#include "sim_server/core/fail_safe.hpp"
+
+namespace sls::sim {
+namespace {
+
+using model::AnswerKind;
+
+/// Without the text of the scenario: otherwise every vehicle would keep a copy of it.
+config::Scenario make_own_scenario(const config::Scenario& fleet, std::uint32_t id) {
+  config::Scenario scenario = config::make_vehicle_scenario(fleet, id);
+  scenario.text.clear();
+  return scenario;
+}
+
+double calc_elapsed_s(const std::optional<sync::Time>& since, sync::Time now) {
+  return since ? sync::to_seconds(now - *since) : 0.0;
+}
+
+}  // namespace
+
+Vehicle::Vehicle(const config::Scenario& fleet, std::uint32_t id, std::uint64_t run_id)
+    : gate(run_id, id, make_answer_limits(fleet)),
+      absence(fleet.sync),
+      scenario_(make_own_scenario(fleet, id)),
+      faults_(scenario_, id) {
+  record_.vehicle_id = id;
+}
+
+void Vehicle::measure(std::uint64_t step, const model::Measurement& truth,
+                      const model::Measurement* seen) {
+  record_.step = step;
+  record_.truth = truth;
+  record_.f_Q_W = applied_.f_Q_W;
+  if (seen || faults_.can_disturb_state())
+    record_.measured = faults_.measure(step, seen ? *seen : truth);
+  is_settled_ = false;
+}
+
+void Vehicle::take_answer() {
+  hold(*gate.accepted());
+  has_ended_late_ = false;
+  settle(AnswerKind::kAccepted);
+}
+
+void Vehicle::keep_late_answer(const OfferedAnswer& offered) {
+  if (has_held_ && offered.step <= held_.step) return;
+  hold(offered);
+  has_ended_late_ = offered.answer.mission == model::MissionPhase::kFinished;
+}
+
+void Vehicle::hold(const OfferedAnswer& offered) {
+  held_ = offered;
+  has_held_ = true;
+  absence.answered();
+  absent_since_.reset();
+  refused_since_.reset();
+}
+
+void Vehicle::fly_without_answer(ControllerAbsence::Action action) {
+  // Before the first answer there is nothing to hold.
+  if (action == ControllerAbsence::Action::kHold && has_held_) {
+    settle(AnswerKind::kHeld);
+  } else {
+    settle(AnswerKind::kFailSafe);
+    record_.client_name = kFailSafeName;
+    record_.answer.f_Q_W =
+        calc_fail_safe_force(scenario_.vehicle, record_.truth, scenario_.controller.force_limit_n);
+  }
+  absence.flown_without_answer();
+}
+
+void Vehicle::settle(AnswerKind kind) {
+  record_.kind = kind;
+  record_.answered_step = held_.step;
+  record_.client_name = held_.client_name;
+  record_.answer = held_.answer;
+  is_settled_ = true;
+}
+
+Eigen::Vector3d Vehicle::actuate() {
+  applied_.f_Q_W = faults_.actuate(record_.step, record_.answer.f_Q_W);
+  applied_.kind = record_.kind;
+  applied_.client_name = record_.client_name;
+  applied_.memory = record_.answer.memory;
+  return applied_.f_Q_W;
+}
+
+void Vehicle::complete_record() {
+  if (is_settled_) return;
+  const auto& offered = gate.accepted() ? gate.accepted() : gate.refused();
+  record_.kind = gate.accepted() ? AnswerKind::kAccepted
+                 : offered       ? AnswerKind::kRefused
+                                 : AnswerKind::kNone;
+  record_.answered_step = record_.step;
+  record_.client_name = offered ? offered->client_name : "";
+  record_.answer = offered ? offered->answer : model::Answer();
+}
+
+bool Vehicle::is_finished() const {
+  return is_settled_ && record_.kind == AnswerKind::kAccepted &&
+         record_.answer.mission == model::MissionPhase::kFinished;
+}
+
+double Vehicle::calc_absence_s(sync::Time now) const { return calc_elapsed_s(absent_since_, now); }
+
+double Vehicle::calc_refused_s(sync::Time now) const { return calc_elapsed_s(refused_since_, now); }
+
+void Vehicle::note_rest(sync::Duration rest) {
+  for (auto* since : {&absent_since_, &refused_since_})
+    if (*since) **since += rest;
+}
+
+}  // namespace sls::sim

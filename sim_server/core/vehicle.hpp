@@ -1,0 +1,111 @@
+/// One vehicle of a run: its faults, its command gate and the force of each step. No network and no
+/// clock here.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "common/config/scenario.hpp"
+#include "common/model/step_record.hpp"
+#include "common/sync/time.hpp"
+#include "sim_server/core/command_gate.hpp"
+#include "sim_server/core/controller_absence.hpp"
+#include "sim_server/core/fault_line.hpp"
+
+namespace sls::sim {
+
+/// Name of the client in records of the server's own force.
+inline constexpr const char* kFailSafeName = "fail-safe";
+
+class Vehicle {
+ public:
+  /// Vehicle `id` of `fleet`, before step 0.
+  Vehicle(const config::Scenario& fleet, std::uint32_t id, std::uint64_t run_id);
+
+  Vehicle(const Vehicle&) = delete;
+  Vehicle& operator=(const Vehicle&) = delete;
+
+  std::uint32_t id() const { return record_.vehicle_id; }
+
+  // --- a step, in the order of the calls ---
+
+  /// Begins `step`. `truth` is the state of the plant; `seen` is the output of sensors and
+  /// estimator, or null if it cannot differ. Call once per step, in order, from step 0.
+  void measure(std::uint64_t step, const model::Measurement& truth,
+               const model::Measurement* seen = nullptr);
+  /// Takes the answer that the gate accepted for the step in work.
+  void take_answer();
+  /// Flies the step in work without an answer of its own.
+  void fly_without_answer(ControllerAbsence::Action action);
+  /// Applies the force of the step in work, which must be settled. Returns the force (N, in W) that
+  /// acts on the plant.
+  Eigen::Vector3d actuate();
+
+  /// Holds an answer that came too late for its step, if it is newer than the held one.
+  void keep_late_answer(const OfferedAnswer& offered);
+
+  // --- the step in work ---
+
+  /// Motion of the vehicle.
+  const model::Measurement& state() const { return record_.truth; }
+  /// The measured motion, which controllers answer.
+  const model::Measurement& measured() const {
+    return record_.measured ? *record_.measured : record_.truth;
+  }
+  /// The force over the period before it.
+  const model::AppliedForce& applied() const { return applied_; }
+  /// True if its force is known.
+  bool is_settled() const { return is_settled_; }
+  /// Its record. Kind and answer are known once it is settled.
+  const model::StepRecord& record() const { return record_; }
+  /// Completes the record of a step that is not settled, because the run ends: with the answer that
+  /// was accepted or refused, if there is one.
+  void complete_record();
+  /// True if it is settled and its answer ends the mission.
+  bool is_finished() const;
+  /// Age of its force: periods since the state that it answers.
+  std::uint64_t calc_age() const { return record_.step - record_.answered_step; }
+
+  /// The client that sent the newest valid answer; empty before the first one.
+  const std::string& last_client() const { return held_.client_name; }
+  /// True if the newest answer was late and says that the mission is finished.
+  bool has_ended_late() const { return has_ended_late_; }
+
+  // --- absence ---
+
+  /// The step in work was published at `time` and has no answer yet.
+  void note_waiting(sync::Time time) {
+    if (!absent_since_) absent_since_ = time;
+  }
+  /// Time since the first step without a fresh answer was published, s; 0 if the last step had one.
+  double calc_absence_s(sync::Time now) const;
+  /// Notes if answers are refused at present.
+  void note_refused(bool is_refused, sync::Time now) {
+    if (is_refused != refused_since_.has_value())
+      refused_since_ = is_refused ? std::optional(now) : std::nullopt;
+  }
+  /// Time for which answers are refused without a valid one, s; 0 if none is refused.
+  double calc_refused_s(sync::Time now) const;
+  /// The run was at rest for `rest`, which does not count as absence.
+  void note_rest(sync::Duration rest);
+
+  CommandGate gate;
+  ControllerAbsence absence;
+
+ private:
+  void hold(const OfferedAnswer& offered);
+  void settle(model::AnswerKind kind);
+
+  const config::Scenario scenario_;  // of this vehicle alone
+  FaultLine faults_;
+  model::StepRecord record_;     // of the step in work
+  bool is_settled_ = false;      // its force is known
+  model::AppliedForce applied_;  // over the period before it
+  OfferedAnswer held_;           // the newest valid answer: accepted, or late
+  bool has_held_ = false;
+  bool has_ended_late_ = false;
+  std::optional<sync::Time> absent_since_;
+  std::optional<sync::Time> refused_since_;
+};
+
+}  // namespace sls::sim
