@@ -11,7 +11,6 @@
 #include "common/bus/fastdds/guarded_type.hpp"
 #include "common/config/scenario.hpp"
 #include "control_client/flight_controller.hpp"
-#include "control_client/messages.hpp"
 #include "fastdds_types.hpp"
 #include "sim_server/plants/analytic/analytic_plant.hpp"
 #include "sim_server/plants/plant.hpp"
@@ -76,8 +75,8 @@ void control_law(benchmark::State& run) {
   std::size_t i = entries().size();  // flies them before the measurement starts
   for (auto _ : run) {
     const RecordEntry& entry = entries()[i++ % entries().size()];
-    benchmark::DoNotOptimize(controller.calc_answer(
-        entry.step(), bus::to_measurement(entry.truth()), control::to_memory({})));
+    benchmark::DoNotOptimize(
+        controller.calc_answer(entry.step(), bus::to_measurement(entry.truth()), {}));
   }
 }
 BENCHMARK(control_law);

@@ -91,7 +91,7 @@ nlohmann::json time_flight(const config::Scenario& scenario, const std::filesyst
     const auto answered = Clock::now();
     const RecordEntry entry = closed_loop::make_entry(0, *flown, options.controller_name);
     entries += Clock::now() - answered;
-    law += flown->compute_time;
+    law += flown->answer.compute_time;
     ++steps;
   }
   const Microseconds whole = Clock::now() - began;

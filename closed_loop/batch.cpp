@@ -124,12 +124,12 @@ void Batch::step(const double* forces) {
 
 void Batch::move(std::size_t index, const Eigen::Vector3d& f_Q_W) {
   Loop& loop = loops_[index];
-  sim::JudgedAnswer answer;
-  answer.step = steps_[index];
+  model::Answer answer;
   answer.f_Q_W = f_Q_W;
   const sim::AnswerLimits limits{scenario_.controller.force_limit_n};  // a batch has no mission
-  if (const auto defect = sim::find_defect(answer, limits))
-    return fail(index, sim::describe_refusal(*defect, answer, limits, controller_name_));
+  if (const auto defect = sim::find_defect(steps_[index], answer, limits))
+    return fail(index,
+                sim::describe_refusal(*defect, steps_[index], answer, limits, controller_name_));
   loop.force[0] = loop.faults->actuate(steps_[index], f_Q_W);
   try {
     loop.plant->advance(loop.force, steps_per_period_);

@@ -14,7 +14,7 @@
 #include "common/model/measurement.hpp"
 #include "common/model/reference.hpp"
 #include "control_client/reference_trajectory.hpp"
-#include "sim_server/fault_line.hpp"
+#include "sim_server/core/fault_line.hpp"
 #include "sim_server/plants/plant.hpp"
 #include "sim_server/worker_pool.hpp"
 

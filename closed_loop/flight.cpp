@@ -1,5 +1,6 @@
 #include "closed_loop/flight.hpp"
 
+#include <chrono>
 #include <exception>
 #include <utility>
 
@@ -7,12 +8,6 @@ namespace sls::closed_loop {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-bool is_finite(const model::Reference& reference) {
-  return reference.position.allFinite() && reference.velocity.allFinite() &&
-         reference.acceleration.allFinite() && reference.jerk.allFinite() &&
-         reference.snap.allFinite();
-}
 
 }  // namespace
 
@@ -48,7 +43,7 @@ const FlownStep* Flight::fly_step() {
       flown.measured = vehicle.faults.measure(flown.step, group.plant->seen(i));
       flown.can_measurement_differ =
           vehicle.faults.can_disturb_state() || !group.plant->sees_truth();
-      const control::ControllerMemory memory = flown.answer.memory;
+      const model::ControllerMemory memory = flown.answer.memory;
       const auto began = measures_compute_time_ ? Clock::now() : Clock::time_point();
       try {
         flown.answer = vehicle.controller.calc_answer(flown.step, flown.measured, memory);
@@ -57,7 +52,7 @@ const FlownStep* Flight::fly_step() {
         is_law_broken_ = has_ended_ = true;
         return nullptr;
       }
-      if (measures_compute_time_) flown.compute_time = Clock::now() - began;
+      if (measures_compute_time_) flown.answer.compute_time = Clock::now() - began;
     }
   has_ended_ = is_last();
   return &steps_.front();
@@ -86,23 +81,15 @@ bool Flight::advance() {
 bool Flight::is_last() {
   bool is_finished = true;
   for (std::size_t i = 0; i < steps_.size(); ++i) {
-    const control::Answer& answer = steps_[i].answer;
-    sim::JudgedAnswer judged;
-    judged.step = steps_[i].step;
-    judged.f_Q_W = answer.f_Q_W;
-    judged.is_memory_finite = answer.memory.numbers.allFinite();
-    judged.is_reference_finite = is_finite(answer.reference);
-    if (answer.fault != control::Fault::kNone) judged.fault = to_string(answer.fault);
-    judged.is_mission_failed = answer.mission == control::MissionPhase::kFailed;
-    judged.is_mission_finished = answer.mission == control::MissionPhase::kFinished;
-    judged.stage = answer.memory.stage;
-    if (const auto defect = sim::find_defect(judged, limits_)) {
+    const std::uint64_t step = steps_[i].step;
+    const model::Answer& answer = steps_[i].answer;
+    if (const auto defect = sim::find_defect(step, answer, limits_)) {
       refused_ = i;
       failure_ =
-          name_vehicle(i) + sim::describe_refusal(*defect, judged, limits_, controller_name_);
+          name_vehicle(i) + sim::describe_refusal(*defect, step, answer, limits_, controller_name_);
       return true;
     }
-    is_finished = is_finished && judged.is_mission_finished;
+    is_finished = is_finished && answer.mission == model::MissionPhase::kFinished;
   }
   return is_finished;
 }

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -15,8 +14,8 @@
 #include "common/model/measurement.hpp"
 #include "control_client/flight_controller.hpp"
 #include "control_client/laws/control_law.hpp"
+#include "sim_server/core/fault_line.hpp"
 #include "sim_server/core/judgement.hpp"
-#include "sim_server/fault_line.hpp"
 #include "sim_server/plants/plant.hpp"
 
 namespace sls::closed_loop {
@@ -29,8 +28,7 @@ struct FlownStep {
   bool can_measurement_differ = false;                       ///< from the truth
   Eigen::Vector3d answered_f_Q_W = Eigen::Vector3d::Zero();  ///< for [step − 1, step), N; 0 at 0
   Eigen::Vector3d applied_f_Q_W = Eigen::Vector3d::Zero();   ///< the same after faults
-  control::Answer answer;
-  std::chrono::nanoseconds compute_time{0};  ///< wall time of the answer, if it is measured
+  model::Answer answer;  ///< its compute time is 0 if it is not measured
 };
 
 struct FlightOptions {

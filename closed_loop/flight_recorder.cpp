@@ -44,7 +44,7 @@ void FlightRecorder::add(const std::vector<FlownStep>& steps, std::optional<std:
   step_ = steps.front().step;
   if (step_ > 0)
     for (std::size_t i = 0; i < ids_.size(); ++i)
-      status_.timing.add(ForceOrigin::FORCE_ANSWERED, 0);
+      status_.timing.add(model::AnswerKind::kAccepted, 0);
   if (is_status_due()) add_status(RunPhase::PHASE_RUNNING, "");
   recording_.flush_if_due();
 }

@@ -2,7 +2,6 @@
 
 #include "common/app/options.hpp"
 #include "common/bus/convert.hpp"
-#include "control_client/messages.hpp"
 #include "sim_server/messages.hpp"
 
 namespace sls::closed_loop {
@@ -14,14 +13,16 @@ constexpr const char* kController = "control_client";
 
 void fill_entry(RecordEntry& entry, std::uint32_t vehicle_id, const FlownStep& flown,
                 const std::string& controller_name, bool is_refused) {
-  sim::Applied applied;
-  applied.f_Q_W = flown.applied_f_Q_W;
-  sim::fill_state(entry, vehicle_id, flown.step, flown.truth,
-                  flown.can_measurement_differ ? &flown.measured : nullptr, applied);
+  entry.vehicle_id(vehicle_id);
+  entry.step(flown.step);
+  bus::fill(entry.truth(), flown.truth);
+  entry.measured().resize(flown.can_measurement_differ ? 1 : 0);
+  if (flown.can_measurement_differ) bus::fill(entry.measured().front(), flown.measured);
+  entry.f_Q_W_n(bus::to_array(flown.applied_f_Q_W));
   entry.kind(is_refused ? AnswerKind::ANSWER_REFUSED : AnswerKind::ANSWER_ACCEPTED);
   entry.answered_step(flown.step);
   entry.client_name(controller_name);
-  control::fill_command_message(entry.answer(), vehicle_id, flown.answer, flown.compute_time);
+  bus::fill(entry.answer(), vehicle_id, flown.answer);
 }
 
 RecordEntry make_entry(std::uint32_t vehicle_id, const FlownStep& flown,

@@ -14,7 +14,6 @@
 #include "common/bus/spinning.hpp"
 #include "common/config/vehicle_ids.hpp"
 #include "common/plugin/shared_library.hpp"
-#include "control_client/messages.hpp"
 
 namespace sls::control {
 namespace {
@@ -174,10 +173,10 @@ void Client::note_impostor(const bus::PeerId& sender) {
 const ControlCommand& Client::answer(Pilot& pilot, std::uint64_t step, const VehicleState& state) {
   if (pilot.last_step == step) return pilot.last_command;
   const auto began = Clock::now();
-  const Answer answer = pilot.controller.calc_answer(step, bus::to_measurement(state.measured()),
-                                                     to_memory(state.controller()));
-  const auto compute_time = Clock::now() - began;
-  pilot.last_command = make_command_message(state.vehicle_id(), answer, compute_time);
+  model::Answer answer = pilot.controller.calc_answer(step, bus::to_measurement(state.measured()),
+                                                      bus::to_memory(state.controller()));
+  answer.compute_time = Clock::now() - began;
+  bus::fill(pilot.last_command, state.vehicle_id(), answer);
   pilot.last_step = step;
   if (answer.fault != Fault::kNone)
     spdlog::error("step {}: fault {}", step, to_string(answer.fault));

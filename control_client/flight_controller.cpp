@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::uint64_t kPurityCheckedSteps = 100;
 
-void fail(Answer& answer, Fault fault) {
+void fail(model::Answer& answer, Fault fault) {
   answer.f_Q_W.setZero();
   answer.mission = MissionPhase::kFailed;
   answer.fault = fault;
@@ -54,7 +54,7 @@ struct FlightController::Parts {
 
   /// Force and memory for an answer whose reference is known.
   void fly(std::uint64_t step, const model::Measurement& state, const model::Numbers& memory,
-           Answer& answer) const;
+           model::Answer& answer) const;
   LawOutput calc_law(const LawInput& input) const;
 
   config::Controller controller;
@@ -79,7 +79,7 @@ LawOutput FlightController::Parts::calc_law(const LawInput& input) const {
 }
 
 void FlightController::Parts::fly(std::uint64_t step, const model::Measurement& state,
-                                  const model::Numbers& memory, Answer& answer) const {
+                                  const model::Numbers& memory, model::Answer& answer) const {
   LawInput input{state,        answer.reference,
                  memory,       step,
                  answer.stage, static_cast<double>(step - answer.memory.stage_start_step) * period};
@@ -107,9 +107,9 @@ FlightController::FlightController(FlightController&&) noexcept = default;
 
 int FlightController::memory_size() const { return parts_->law->memory_size(); }
 
-Answer FlightController::calc_answer(std::uint64_t step, const model::Measurement& state,
-                                     const ControllerMemory& memory) const {
-  Answer answer;
+model::Answer FlightController::calc_answer(std::uint64_t step, const model::Measurement& state,
+                                            const model::ControllerMemory& memory) const {
+  model::Answer answer;
   answer.memory = memory;
   answer.stage = memory.stage;
   const Eigen::Index remembered = memory.numbers.size();

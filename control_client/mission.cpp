@@ -39,7 +39,7 @@ Mission::Mission(const std::vector<config::Stage>& stages, std::int64_t period_n
   }
 }
 
-bool Mission::is_possible(std::uint64_t step, const ControllerMemory& memory) const {
+bool Mission::is_possible(std::uint64_t step, const model::ControllerMemory& memory) const {
   return memory.stage <= stages_.size() && memory.stage_start_step <= step;
 }
 
@@ -51,7 +51,7 @@ std::int64_t Mission::calc_elapsed_ns(std::uint64_t step, std::uint64_t start_st
 }
 
 MissionProgress Mission::calc_progress(std::uint64_t step, const model::SlungLoadState& state,
-                                       const ControllerMemory& memory) const {
+                                       const model::ControllerMemory& memory) const {
   const auto end = static_cast<std::uint32_t>(stages_.size());
   MissionProgress progress;
   progress.stage = std::min(memory.stage, end - 1);
@@ -70,11 +70,11 @@ MissionProgress Mission::calc_progress(std::uint64_t step, const model::SlungLoa
           stage.leave);
     if (outcome == StageOutcome::kGoesOn) return progress;
     if (outcome == StageOutcome::kTimedOut) {
-      progress.phase = MissionPhase::kFailed;
+      progress.phase = model::MissionPhase::kFailed;
       return progress;
     }
     if (progress.stage + 1 == end) {
-      progress.phase = MissionPhase::kFinished;
+      progress.phase = model::MissionPhase::kFinished;
       progress.remembered_stage = end;
       return progress;
     }

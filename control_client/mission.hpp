@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "common/config/scenario.hpp"
+#include "common/model/answer.hpp"
 #include "common/model/reference.hpp"
 #include "common/model/state.hpp"
-#include "control_client/flight_controller.hpp"
 #include "control_client/reference_trajectory.hpp"
 
 namespace sls::control {
@@ -20,7 +20,7 @@ struct MissionProgress {
   std::uint32_t stage = 0;             ///< in force; after the end of the mission the last one
   std::uint32_t remembered_stage = 0;  ///< `stage`, or the number of stages once all are over
   std::uint64_t stage_start_step = 0;
-  MissionPhase phase = MissionPhase::kRunning;
+  model::MissionPhase phase = model::MissionPhase::kRunning;
   model::Reference reference;
 };
 
@@ -30,13 +30,13 @@ class Mission {
   Mission(const std::vector<config::Stage>& stages, std::int64_t period_ns);
 
   /// True if `memory` names a stage, or the end of the mission, that began at `step` or earlier.
-  bool is_possible(std::uint64_t step, const ControllerMemory& memory) const;
+  bool is_possible(std::uint64_t step, const model::ControllerMemory& memory) const;
 
   /// Progress at `step`, from the memory accepted one step before, which must be possible at
   /// `step`. A finished mission stays finished, even if the body leaves the last stage's radius
   /// again. The mission fails when a stage reaches its timeout.
   MissionProgress calc_progress(std::uint64_t step, const model::SlungLoadState& state,
-                                const ControllerMemory& memory) const;
+                                const model::ControllerMemory& memory) const;
 
   const std::string& stage_name(std::uint32_t stage) const { return stages_[stage].name; }
 

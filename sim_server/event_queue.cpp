@@ -8,7 +8,7 @@ void EventQueue::put(Event event) {
   {
     const std::lock_guard lock(mutex_);
     const std::size_t most =
-        std::holds_alternative<ReceivedCommands>(event) ? kMostCommands : kMostRequests;
+        std::holds_alternative<CommandSample>(event) ? kMostCommands : kMostRequests;
     if (counts_[event.index()] == most) return;
     ++counts_[event.index()];
     events_.push_back(std::move(event));
@@ -28,7 +28,7 @@ void EventQueue::clear_commands() {
   const std::lock_guard lock(mutex_);
   events_.erase(std::remove_if(events_.begin(), events_.end(),
                                [](const Event& event) {
-                                 return std::holds_alternative<ReceivedCommands>(event);
+                                 return std::holds_alternative<CommandSample>(event);
                                }),
                 events_.end());
   counts_[0] = 0;

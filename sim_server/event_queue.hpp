@@ -9,21 +9,16 @@
 #include <utility>
 #include <variant>
 
-#include "sim_server/core/command_arrival.hpp"
+#include "sim_server/core/command_sample.hpp"
 #include "sls.h"
 
 namespace sls::sim {
-
-struct ReceivedCommands {
-  Commands sample;
-  CommandArrival arrival;
-};
 
 /// The events for the core that must wait for the main thread, in the order of their arrival.
 /// Bounded for each kind, so a flood of commands displaces no request. `put` never blocks.
 class EventQueue {
  public:
-  using Event = std::variant<ReceivedCommands, SimControl>;
+  using Event = std::variant<CommandSample, SimControl>;
   static constexpr std::size_t kMostCommands = 4096;
   static constexpr std::size_t kMostRequests = 64;
 

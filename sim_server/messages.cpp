@@ -14,16 +14,6 @@ std::uint64_t make_run_id() {
   return id;
 }
 
-void fill_state_message(VehicleState& message, std::uint32_t vehicle_id,
-                        const model::Measurement& measured, const Applied& applied) {
-  message.vehicle_id(vehicle_id);
-  bus::fill(message.measured(), measured);
-  message.f_Q_W_n(bus::to_array(applied.f_Q_W));
-  message.force_origin(applied.origin);
-  message.controller_name(applied.controller_name);
-  message.controller(applied.memory);
-}
-
 Parameters make_parameters_message(std::uint64_t run_id,
                                    const std::vector<std::uint32_t>& vehicle_ids,
                                    const config::Scenario& scenario, const Plant& plant,
@@ -54,17 +44,6 @@ Parameters make_parameters_message(std::uint64_t run_id,
   message.mode(lockstep ? SyncMode::MODE_LOCKSTEP : SyncMode::MODE_REALTIME);
   message.real_time_factor(lockstep ? 0.0 : scenario.sync.real_time_factor);
   return message;
-}
-
-void fill_state(RecordEntry& entry, std::uint32_t vehicle_id, std::uint64_t step,
-                const model::Measurement& truth, const model::Measurement* measured,
-                const Applied& applied) {
-  entry.vehicle_id(vehicle_id);
-  entry.step(step);
-  bus::fill(entry.truth(), truth);
-  entry.measured().resize(measured ? 1 : 0);
-  if (measured) bus::fill(entry.measured().front(), *measured);
-  entry.f_Q_W_n(bus::to_array(applied.f_Q_W));
 }
 
 }  // namespace sls::sim

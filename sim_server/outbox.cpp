@@ -7,6 +7,7 @@
 
 #include "common/app/log.hpp"
 #include "common/app/scheduling.hpp"
+#include "common/bus/convert.hpp"
 #include "common/bus/spinning.hpp"
 
 namespace sls::sim {
@@ -50,20 +51,19 @@ void Outbox::resend_states(const Fleet& fleet, const std::function<bool(std::siz
 
 void Outbox::record_step(const Fleet& fleet) {
   const auto& vehicles = fleet.vehicles();
-  records_->add_step(vehicles.size(),
-                     [&](std::size_t i, RecordEntry& entry) { vehicles[i]->fill_record(entry); });
+  records_->add_step(vehicles.size(), [&](std::size_t i, RecordEntry& entry) {
+    bus::fill(entry, vehicles[i]->record());
+  });
 }
 
-void Outbox::record_late(const Vehicle& vehicle, const OfferedAnswer& answer) {
-  records_->add_step(1, [&](std::size_t, RecordEntry& entry) {
-    entry = RecordEntry();
-    entry.vehicle_id(vehicle.id());
-    entry.step(answer.step);
-    entry.kind(AnswerKind::ANSWER_LATE);
-    entry.answered_step(answer.step);
-    entry.client_name(answer.client_name);
-    entry.answer(answer.command);
-  });
+void Outbox::record_late(const Vehicle& vehicle, const OfferedAnswer& offered) {
+  model::StepRecord record;
+  record.vehicle_id = vehicle.id();
+  record.step = record.answered_step = offered.step;
+  record.kind = model::AnswerKind::kLate;
+  record.client_name = offered.client_name;
+  record.answer = offered.answer;
+  records_->add_step(1, [&](std::size_t, RecordEntry& entry) { bus::fill(entry, record); });
 }
 
 void Outbox::show_progress(std::string text) {

@@ -8,6 +8,7 @@
 
 #include "common/app/options.hpp"
 #include "common/app/run_main.hpp"
+#include "common/bus/convert.hpp"
 #include "common/bus/spinning.hpp"
 #include "common/config/vehicle_ids.hpp"
 #include "sim_server/messages.hpp"
@@ -119,9 +120,9 @@ void Server::wait_until_due() {
 }
 
 void Server::deliver_events(ServerCore& core) {
-  for (const EventQueue::Event& event : events_.take_all()) {
-    if (const auto* commands = std::get_if<ReceivedCommands>(&event))
-      core.on_commands(commands->sample, commands->arrival);
+  for (EventQueue::Event& event : events_.take_all()) {
+    if (auto* sample = std::get_if<CommandSample>(&event))
+      core.on_commands(*sample);
     else
       core.on_request(std::get<SimControl>(event), view_, Clock::now());
   }
@@ -138,19 +139,39 @@ void Server::linger(const ServerCore& core) {
 // --- threads of the middleware -------------------------------------------------------------------
 
 void Server::receive(const Commands& sample, const bus::PeerId& sender) {
-  const CommandArrival arrival{
-      sender, {Clock::now(), std::chrono::system_clock::now()}, endpoints_.commands.written()};
-  if (is_lockstep_ && pass_on(sample, arrival)) return;
-  events_.put(ReceivedCommands{sample, arrival});
+  if (is_lockstep_ && pass_on(sample, sender)) return;
+  CommandSample received;
+  fill(received, sample, sender);
+  events_.put(std::move(received));
 }
 
-bool Server::pass_on(const Commands& sample, const CommandArrival& arrival) {
+void Server::fill(CommandSample& received, const Commands& sample,
+                  const bus::PeerId& sender) const {
+  received.sender = sender;
+  received.arrived = {Clock::now(), std::chrono::system_clock::now()};
+  received.written = endpoints_.commands.written();
+  received.run_id = sample.run_id();
+  received.step = sample.step();
+  received.client_name = sample.client_name().c_str();
+  received.answers.resize(sample.vehicles().size());
+  for (std::size_t i = 0; i < received.answers.size(); ++i) {
+    OfferedAnswer& offered = received.answers[i];
+    offered.run_id = received.run_id;
+    offered.step = received.step;
+    offered.client_name = received.client_name;
+    offered.vehicle_id = sample.vehicles()[i].vehicle_id();
+    bus::fill(offered.answer, sample.vehicles()[i]);
+  }
+}
+
+bool Server::pass_on(const Commands& sample, const bus::PeerId& sender) {
   if (main_wants_core_ || !events_.is_empty()) return false;
   const std::unique_lock lock(core_mutex_, std::try_to_lock);
   if (!lock || !core_ || core_->phase() != ServerCore::Phase::kAwaitingAnswers ||
       core_->has_news(view_))
     return false;
-  core_->on_commands(sample, arrival);
+  fill(received_, sample, sender);
+  core_->on_commands(received_);
   const sync::Time deadline = core_->next_deadline();
   deadline_ = deadline;
   if (deadline < sleeps_until_.load() || outbox_.is_waiting() ||

@@ -56,7 +56,9 @@ class Server {
   // On threads of the middleware.
   void receive(const Commands& sample, const bus::PeerId& sender);
   /// Passes a sample to the core; false if the main thread must do so.
-  bool pass_on(const Commands& sample, const CommandArrival& arrival);
+  bool pass_on(const Commands& sample, const bus::PeerId& sender);
+  /// Fills in the sample that is being received.
+  void fill(CommandSample& received, const Commands& sample, const bus::PeerId& sender) const;
 
   const Assignment assignment_;
   const bool is_lockstep_;
@@ -64,6 +66,7 @@ class Server {
   EventQueue events_;
 
   std::mutex core_mutex_;       // of the core that core_ points to
+  CommandSample received_;      // under the mutex: reused for each sample
   ServerCore* core_ = nullptr;  // under the mutex; while it flies
   std::atomic<bool> main_wants_core_{false};
   std::atomic<sync::Time> deadline_{sync::Time()};      // of the core

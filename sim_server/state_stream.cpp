@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
+#include "common/bus/convert.hpp"
 #include "common/bus/message_size.hpp"
-#include "sim_server/messages.hpp"
 
 namespace sls::sim {
 namespace {
@@ -12,7 +12,7 @@ namespace {
 constexpr std::size_t kQueuedSamples = 1024;
 
 void fill(VehicleState& message, const Vehicle& vehicle) {
-  fill_state_message(message, vehicle.id(), vehicle.measured(), vehicle.applied());
+  bus::fill(message, vehicle.id(), vehicle.measured(), vehicle.applied());
 }
 
 }  // namespace

@@ -1,13 +1,15 @@
-/// Conversions between wire types and the model's types.
+/// Conversions between wire types and the model's types. `fill` writes over all that its first
+/// argument held and uses its memory again.
 #pragma once
 
 #include <Eigen/Core>
 #include <array>
-#include <vector>
 
 #include "common/bus/topics.hpp"
+#include "common/model/answer.hpp"
 #include "common/model/measurement.hpp"
 #include "common/model/parameters.hpp"
+#include "common/model/step_record.hpp"
 
 namespace sls::bus {
 
@@ -19,52 +21,19 @@ inline Eigen::Vector3d to_vector(const std::array<double, 3>& array) {
   return {array[0], array[1], array[2]};
 }
 
-inline model::Numbers to_numbers(const std::vector<double>& sequence) {
-  return Eigen::Map<const Eigen::VectorXd>(sequence.data(),
-                                           static_cast<Eigen::Index>(sequence.size()));
-}
+void fill(VehicleParameters& message, const model::SlungLoadParameters& vehicle);
 
-inline void fill(std::vector<double>& sequence, const model::Numbers& numbers) {
-  sequence.assign(numbers.data(), numbers.data() + numbers.size());
-}
+void fill(PlantState& message, const model::Measurement& state);
+model::Measurement to_measurement(const PlantState& message);
 
-inline void fill(VehicleParameters& message, const model::SlungLoadParameters& vehicle) {
-  message.quad_mass_kg(vehicle.quad_mass);
-  message.load_mass_kg(vehicle.load_mass);
-  message.rod_length_m(vehicle.rod_length);
-  message.gravity_m_s2(vehicle.gravity);
-}
+/// The state sample for the controllers: the measured state, and the force of the period before it.
+void fill(VehicleState& message, std::uint32_t vehicle_id, const model::Measurement& measured,
+          const model::AppliedForce& applied);
+model::ControllerMemory to_memory(const ControllerState& message);
 
-inline void fill(PlantState& message, const model::Measurement& state) {
-  const Eigen::Quaterniond& q_WB = state.attitude.q_WB;
-  message.p_WQ_m(to_array(state.p_WQ));
-  message.v_WQ_m_s(to_array(state.v_WQ));
-  message.q_WB({q_WB.w(), q_WB.x(), q_WB.y(), q_WB.z()});
-  message.w_WB_B_rad_s(to_array(state.attitude.w_WB_B));
-  message.p_WL_m(to_array(state.p_WL));
-  message.v_WL_m_s(to_array(state.v_WL));
-  message.alpha_rad(state.rod.alpha);
-  message.beta_rad(state.rod.beta);
-  message.alpha_dot_rad_s(state.rod.alpha_dot);
-  message.beta_dot_rad_s(state.rod.beta_dot);
-  fill(message.signals(), state.signals);
-}
+void fill(ControlCommand& message, std::uint32_t vehicle_id, const model::Answer& answer);
+void fill(model::Answer& answer, const ControlCommand& message);
 
-inline model::Measurement to_measurement(const PlantState& message) {
-  const std::array<double, 4>& q_WB = message.q_WB();
-  model::Measurement state;
-  state.p_WQ = to_vector(message.p_WQ_m());
-  state.v_WQ = to_vector(message.v_WQ_m_s());
-  state.attitude.q_WB = Eigen::Quaterniond(q_WB[0], q_WB[1], q_WB[2], q_WB[3]);
-  state.attitude.w_WB_B = to_vector(message.w_WB_B_rad_s());
-  state.p_WL = to_vector(message.p_WL_m());
-  state.v_WL = to_vector(message.v_WL_m_s());
-  state.rod.alpha = message.alpha_rad();
-  state.rod.beta = message.beta_rad();
-  state.rod.alpha_dot = message.alpha_dot_rad_s();
-  state.rod.beta_dot = message.beta_dot_rad_s();
-  state.signals = to_numbers(message.signals());
-  return state;
-}
+void fill(RecordEntry& message, const model::StepRecord& record);
 
 }  // namespace sls::bus

@@ -222,7 +222,7 @@ void FlownFlight::keep(const FlownStep& flown, std::size_t index) {
     row.add_all(bodies(flown.measured));
     write_rest(flown.measured);
   }
-  const control::Answer& answer = flown.answer;
+  const model::Answer& answer = flown.answer;
   row.add_all(answer.f_Q_W);
   row.add(static_cast<std::uint64_t>(answer.fault));
   row.add(std::uint64_t{answer.stage});
@@ -259,7 +259,7 @@ FlownStep FlownFlight::make_step(std::size_t index, std::size_t number) const {
     row.take_all(bodies(flown.measured));
     read_rest(flown.measured);
   }
-  control::Answer& answer = flown.answer;
+  model::Answer& answer = flown.answer;
   row.take_all(answer.f_Q_W);
   answer.fault = static_cast<model::Fault>(row.take_integer());
   answer.stage = static_cast<std::uint32_t>(row.take_integer());

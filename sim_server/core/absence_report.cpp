@@ -58,13 +58,12 @@ void AbsenceReport::note_answers(sync::Time now) {
   if (announced_) {
     const double absence_s = sync::to_seconds(now - *announced_);
     const auto& vehicles = fleet_.vehicles();
-    report_.announce(
-        vehicles.size() == 1
-            ? fmt::format("step {}: controller '{}' answers again after {:.1f} s", fleet_.step(),
-                          vehicles.front()->last_answer().controller_name, absence_s)
-            : fmt::format("step {}: all vehicles get answers again after {:.1f} s", fleet_.step(),
-                          absence_s),
-        now);
+    report_.announce(vehicles.size() == 1
+                         ? fmt::format("step {}: controller '{}' answers again after {:.1f} s",
+                                       fleet_.step(), vehicles.front()->last_client(), absence_s)
+                         : fmt::format("step {}: all vehicles get answers again after {:.1f} s",
+                                       fleet_.step(), absence_s),
+                     now);
   }
   wait_.reset();
   action_.reset();

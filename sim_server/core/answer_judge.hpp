@@ -14,15 +14,15 @@ class AnswerJudge {
   void published(sync::Time now) { published_ = now; }
 
   /// Offers each answer to the gate of its vehicle. `is_published`: the step in work was published.
-  void judge(const Commands& sample, const CommandArrival& arrival, bool is_published);
+  void judge(CommandSample& sample, bool is_published);
 
  private:
-  void note(Verdict verdict, Vehicle& vehicle, const CommandArrival& arrival);
+  void note(Verdict verdict, Vehicle& vehicle, const OfferedAnswer& offered,
+            const CommandSample& sample);
 
   RunParts& run_;
   Pacing& pacing_;
   sync::Time published_{};
-  OfferedAnswer offered_;  // reused for each answer
 };
 
 }  // namespace sls::sim

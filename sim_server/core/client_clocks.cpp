@@ -21,10 +21,11 @@ constexpr auto kSlowTime = 1s;
 /// Longer computing times in answers are not credible.
 constexpr std::uint64_t kLongestComputing_ns = 60'000'000'000;
 
-std::chrono::nanoseconds sum_computing(const Commands& sample) {
+std::chrono::nanoseconds sum_computing(const CommandSample& sample) {
   std::chrono::nanoseconds sum(0);
-  for (const ControlCommand& command : sample.vehicles())
-    sum += std::chrono::nanoseconds(std::min(command.compute_time_ns(), kLongestComputing_ns));
+  for (const OfferedAnswer& offered : sample.answers)
+    sum += std::chrono::nanoseconds(
+        std::min(offered.answer.compute_time.count(), kLongestComputing_ns));
   return sum;
 }
 
@@ -42,14 +43,14 @@ std::string describe(const sync::Member& client, std::chrono::nanoseconds offset
 
 }  // namespace
 
-void ClientClocks::note(const Commands& sample, const CommandArrival& arrival, std::uint64_t step) {
-  const std::uint64_t answered = sample.step();
-  const auto client = clocks_.find(arrival.sender);
+void ClientClocks::note(const CommandSample& sample, std::uint64_t step) {
+  const std::uint64_t answered = sample.step;
+  const auto client = clocks_.find(sample.sender);
   const bool is_remembered = answered <= step && step - answered < published_.size();
   if (client == clocks_.end() || !is_remembered) return;
   client->second.offset.note({published_[answered % published_.size()], sum_computing(sample),
-                              arrival.written, arrival.arrived.wall});
-  client->second.noted = arrival.arrived.time;
+                              sample.written, sample.arrived.wall});
+  client->second.noted = sample.arrived.time;
 }
 
 std::vector<std::string> ClientClocks::look(const std::vector<sync::Member>& controllers,
@@ -73,20 +74,19 @@ std::vector<std::string> ClientClocks::look(const std::vector<sync::Member>& con
   return news;
 }
 
-std::string SlowAnswers::note(const Commands& sample, const CommandArrival& arrival,
-                              std::uint64_t step) {
+std::string SlowAnswers::note(const CommandSample& sample, std::uint64_t step) {
   const auto computing = sum_computing(sample);
-  Client& client = clients_[arrival.sender];
+  Client& client = clients_[sample.sender];
   if (computing <= period_) client.count = 0;
   if (computing <= period_ || client.is_reported) return "";
-  const sync::Time now = arrival.arrived.time;
+  const sync::Time now = sample.arrived.time;
   if (client.count++ == 0) client.since = now;
   client.is_reported = client.count >= kSlowAnswers && now - client.since >= kSlowTime;
   if (!client.is_reported) return "";
   return fmt::format(
       "step {}: controller '{}' computes an answer for {:.3g} ms, expected less than the period of "
       "{:.3g} ms: its answers come late (a lower --rtf or a longer --period-s gives it time)",
-      step, sample.client_name().c_str(), 1e3 * std::chrono::duration<double>(computing).count(),
+      step, sample.client_name, 1e3 * std::chrono::duration<double>(computing).count(),
       1e3 * sync::to_seconds(period_));
 }
 

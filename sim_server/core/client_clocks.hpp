@@ -10,7 +10,7 @@
 
 #include "common/sync/membership.hpp"
 #include "sim_server/core/clock_offset.hpp"
-#include "sim_server/core/command_arrival.hpp"
+#include "sim_server/core/command_sample.hpp"
 
 namespace sls::sim {
 
@@ -23,7 +23,7 @@ class ClientClocks {
     published_[step % published_.size()] = wall;
   }
   /// A sample for this run arrived while `step` was in work.
-  void note(const Commands& sample, const CommandArrival& arrival, std::uint64_t step);
+  void note(const CommandSample& sample, std::uint64_t step);
 
   /// Compares the clocks of `controllers` with ours. Returns what is to be announced: a clock that
   /// is wrong, or agrees again. Where old announcements suggest a wrong clock, no answer may arrive
@@ -32,9 +32,6 @@ class ClientClocks {
                                 std::chrono::nanoseconds lifespan, sync::Time now);
   /// True while LIFESPAN must be ignored, because a clock is or may be wrong.
   bool is_any_wrong() const { return is_any_wrong_; }
-
-  /// True for a ready controller at the last look.
-  bool is_known(const bus::PeerId& client) const { return clocks_.count(client) > 0; }
 
  private:
   struct Clock {
@@ -56,7 +53,7 @@ class SlowAnswers {
 
   /// A sample for this run arrived while `step` was in work. Returns what is to be announced; empty
   /// if nothing is.
-  std::string note(const Commands& sample, const CommandArrival& arrival, std::uint64_t step);
+  std::string note(const CommandSample& sample, std::uint64_t step);
 
  private:
   struct Client {  // slow answers in a row

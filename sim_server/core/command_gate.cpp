@@ -1,53 +1,13 @@
 #include "sim_server/core/command_gate.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
-
-#include "common/bus/convert.hpp"
-#include "common/bus/names.hpp"
 
 namespace sls::sim {
 namespace {
 
 constexpr std::size_t kRememberedAnswers =
     64;  // copies older than that are rejected as wrong steps
-
-/// The first undefined enumerator: Fast CDR takes any number for one.
-std::optional<JudgedAnswer::Undefined> find_undefined(const ControlCommand& command) {
-  using bus::to_number;
-  const std::uint32_t mission = to_number(command.mission()), fault = to_number(command.fault());
-  if (mission > to_number(MissionPhase::MISSION_FAILED)) return {{"mission", mission}};
-  if (fault > to_number(FaultCode::FAULT_STAGE_TIMEOUT)) return {{"fault", fault}};
-  return std::nullopt;
-}
-
-/// True if no number is infinite or NaN: the product of such a number with zero is NaN.
-bool is_finite(const Reference& reference) {
-  double sum = 0.0;
-  for (const std::array<double, 3>* vector :
-       {&reference.position_m(), &reference.velocity_m_s(), &reference.acceleration_m_s2(),
-        &reference.jerk_m_s3(), &reference.snap_m_s4()})
-    for (const double x : *vector) sum += 0.0 * x;
-  return sum == 0.0;
-}
-
-JudgedAnswer to_judged(const OfferedAnswer& answer) {
-  const ControlCommand& command = answer.command;
-  const auto& memory = command.controller().numbers();
-  JudgedAnswer judged;
-  judged.step = answer.step;
-  judged.f_Q_W = bus::to_vector(command.f_Q_W_n());
-  judged.is_memory_finite =
-      std::all_of(memory.begin(), memory.end(), [](double x) { return std::isfinite(x); });
-  judged.undefined = find_undefined(command);
-  judged.is_reference_finite = is_finite(command.reference());
-  if (command.fault() != FaultCode::FAULT_NONE) judged.fault = bus::to_string(command.fault());
-  judged.is_mission_failed = command.mission() == MissionPhase::MISSION_FAILED;
-  judged.is_mission_finished = command.mission() == MissionPhase::MISSION_FINISHED;
-  judged.stage = command.controller().stage_index();
-  return judged;
-}
 
 Verdict to_verdict(Defect defect) {
   switch (defect) {
@@ -67,7 +27,7 @@ Verdict to_verdict(Defect defect) {
   return Verdict::kFault;
 }
 
-/// Order by strength, strongest first; then by name and peer, not by time of arrival.
+/// Order by strength, strongest first; then by name and peer, not by time of sample.
 bool is_stronger(const ReadyClient& a, const ReadyClient& b) {
   if (a.strength != b.strength) return a.strength > b.strength;
   if (a.name != b.name) return a.name < b.name;
@@ -132,7 +92,7 @@ void CommandGate::set_clients(const std::vector<ReadyClient>& clients) {
 
 void CommandGate::expect(std::uint64_t step) {
   if (accepted_) {
-    past_[step_] = Past{accepted_from_, accepted_->command.f_Q_W_n()};
+    past_[step_] = Past{accepted_from_, accepted_->answer.f_Q_W};
     for (Client& client : clients_) client.refusal.clear();
   } else if (step > step_) {
     past_[step_] = std::nullopt;
@@ -153,31 +113,30 @@ void CommandGate::drop_held() {
   }
 }
 
-Verdict CommandGate::offer(const OfferedAnswer& answer, const bus::PeerId& sender) {
-  const Verdict verdict = judge(answer, sender);
+Verdict CommandGate::offer(const OfferedAnswer& offered, const bus::PeerId& sender) {
+  const Verdict verdict = judge(offered, sender);
   count(verdict);
   return verdict;
 }
 
-Verdict CommandGate::judge(const OfferedAnswer& answer, const bus::PeerId& sender) {
+Verdict CommandGate::judge(const OfferedAnswer& offered, const bus::PeerId& sender) {
   Client* client = find_client(sender);
   if (client) ++client->answers;
-  if (answer.run_id != run_id_) return Verdict::kOtherRun;
-  if (answer.command.vehicle_id() != vehicle_id_) return Verdict::kUnknownVehicle;
-  if (answer.is_early && answer.step >= step_) return Verdict::kEarly;
+  if (offered.run_id != run_id_) return Verdict::kOtherRun;
+  if (offered.vehicle_id != vehicle_id_) return Verdict::kUnknownVehicle;
+  if (offered.is_early && offered.step >= step_) return Verdict::kEarly;
 
-  const JudgedAnswer judged = to_judged(answer);
-  if (const auto defect = find_defect(judged, limits_)) {
-    if (client) note_refusal(*client, answer, judged, *defect);
+  if (const auto defect = find_defect(offered.step, offered.answer, limits_)) {
+    if (client) note_refusal(*client, offered, *defect);
     return to_verdict(*defect);
   }
-  if (answer.step != step_) return judge_past(answer, sender);
+  if (offered.step != step_) return judge_past(offered, sender);
   if (!client) return Verdict::kUnknownClient;
   // Only a client's first answer to a step counts; another one is a copy or a contradiction.
   const auto& first = accepted_ && accepted_from_ == sender ? accepted_ : client->held;
   if (first)
-    return first->command.f_Q_W_n() == answer.command.f_Q_W_n() ? Verdict::kDuplicate
-                                                                : Verdict::kContradiction;
+    return first->answer.f_Q_W == offered.answer.f_Q_W ? Verdict::kDuplicate
+                                                       : Verdict::kContradiction;
   client->silent = false;
   client->misses = 0;
   client->identity.is_gone = false;
@@ -187,30 +146,29 @@ Verdict CommandGate::judge(const OfferedAnswer& answer, const bus::PeerId& sende
     superseded_by_ = accepted_from_;
     return Verdict::kSuperseded;
   }
-  client->held = answer;
+  client->held = offered;
   settle();
   return accepted_ && accepted_from_ == sender ? Verdict::kAccepted : Verdict::kHeld;
 }
 
-void CommandGate::note_refusal(Client& client, const OfferedAnswer& answer,
-                               const JudgedAnswer& judged, Defect defect) {
-  const std::uint64_t step = answer.step;
+void CommandGate::note_refusal(Client& client, const OfferedAnswer& offered, Defect defect) {
+  const std::uint64_t step = offered.step;
   const auto past = past_.find(step);
   const bool is_open =
       step == step_ ? !accepted_ && !client.held : past != past_.end() && !past->second;
   const bool is_newer = client.refusal.empty() || step > client.refused_step;
   if (!is_open || !is_newer) return;
-  if (step == step_) refused_ = answer;
+  if (step == step_) refused_ = offered;
   client.refused_step = step;
-  client.refusal = describe_refusal(defect, judged, limits_, client.identity.name);
+  client.refusal = describe_refusal(defect, step, offered.answer, limits_, client.identity.name);
   settle();
 }
 
-Verdict CommandGate::judge_past(const OfferedAnswer& answer, const bus::PeerId& sender) {
-  const auto past = past_.find(answer.step);
+Verdict CommandGate::judge_past(const OfferedAnswer& offered, const bus::PeerId& sender) {
+  const auto past = past_.find(offered.step);
   if (past == past_.end())
-    return is_of_distant_standby(answer, sender) ? Verdict::kSuperseded : Verdict::kWrongStep;
-  const auto& force = answer.command.f_Q_W_n();
+    return is_of_distant_standby(offered, sender) ? Verdict::kSuperseded : Verdict::kWrongStep;
+  const Eigen::Vector3d& force = offered.answer.f_Q_W;
   std::optional<Past>& first = past->second;
   if (first && first->sender == sender)
     return first->force == force ? Verdict::kDuplicate : Verdict::kContradiction;
@@ -227,8 +185,8 @@ Verdict CommandGate::judge_past(const OfferedAnswer& answer, const bus::PeerId& 
 
 /// True for an answer older than the remembered ones while another client flies: its sender is far
 /// away, which is no mistake of a standby.
-bool CommandGate::is_of_distant_standby(const OfferedAnswer& answer, const bus::PeerId& sender) {
-  if (past_.empty() || answer.step >= past_.begin()->first || !find_client(sender)) return false;
+bool CommandGate::is_of_distant_standby(const OfferedAnswer& offered, const bus::PeerId& sender) {
+  if (past_.empty() || offered.step >= past_.begin()->first || !find_client(sender)) return false;
   const std::optional<Past>& last = past_.rbegin()->second;
   return last && last->sender != sender;
 }

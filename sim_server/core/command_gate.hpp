@@ -3,7 +3,7 @@
 /// Rules: sim_server/README.md, "Commands" and "Standby".
 #pragma once
 
-#include <array>
+#include <Eigen/Core>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -43,9 +43,10 @@ const char* to_string(Verdict verdict);
 struct OfferedAnswer {
   std::uint64_t run_id = 0;
   std::uint64_t step = 0;
+  std::uint32_t vehicle_id = 0;
   std::string client_name;
   bool is_early = false;  ///< it came before the state of its step was published
-  ControlCommand command;
+  model::Answer answer;
 };
 
 /// A client that announced itself ready to fly the vehicle.
@@ -68,7 +69,7 @@ class CommandGate {
   void expect(std::uint64_t step);
 
   /// Judges one answer and counts it.
-  Verdict offer(const OfferedAnswer& answer, const bus::PeerId& sender);
+  Verdict offer(const OfferedAnswer& offered, const bus::PeerId& sender);
 
   /// The accepted answer to the awaited step, once there is one.
   const std::optional<OfferedAnswer>& accepted() const { return accepted_; }
@@ -129,15 +130,14 @@ class CommandGate {
     std::optional<OfferedAnswer> held;  // its first valid answer to the awaited step
   };
 
-  Verdict judge(const OfferedAnswer& answer, const bus::PeerId& sender);
-  Verdict judge_past(const OfferedAnswer& answer, const bus::PeerId& sender);
-  bool is_of_distant_standby(const OfferedAnswer& answer, const bus::PeerId& sender);
+  Verdict judge(const OfferedAnswer& offered, const bus::PeerId& sender);
+  Verdict judge_past(const OfferedAnswer& offered, const bus::PeerId& sender);
+  bool is_of_distant_standby(const OfferedAnswer& offered, const bus::PeerId& sender);
   void count(Verdict verdict);
   bool is_refused(const Client& client) const {  // for the awaited step
     return !client.refusal.empty() && client.refused_step == step_;
   }
-  void note_refusal(Client& client, const OfferedAnswer& answer, const JudgedAnswer& judged,
-                    Defect defect);
+  void note_refusal(Client& client, const OfferedAnswer& offered, Defect defect);
   void settle();
   void drop_held();
   Client* find_client(const bus::PeerId& peer);
@@ -158,7 +158,7 @@ class CommandGate {
   bus::PeerId superseded_by_;
   struct Past {
     bus::PeerId sender;
-    std::array<double, 3> force;
+    Eigen::Vector3d force;
   };
   // First answer to each of the last steps, to recognise copies; nothing for a step without one.
   std::map<std::uint64_t, std::optional<Past>> past_;

@@ -77,7 +77,7 @@ bool Fleet::is_anybody_absent() const {
 
 bool Fleet::is_finished() const {
   return std::all_of(vehicles_.begin(), vehicles_.end(),
-                     [](const auto& vehicle) { return vehicle->outcome()->is_finished; });
+                     [](const auto& vehicle) { return vehicle->is_finished(); });
 }
 
 void Fleet::take_answers() {

@@ -22,10 +22,10 @@ Gathering::Gathering(const config::WaitFor& expected, std::string scenario_sha25
       began_(now),
       patience_(now, expected.timeout_s, kUsualStartTime) {}
 
-Gathering::Finding Gathering::look(const Roster& roster) {
+Gathering::Finding Gathering::look(const Roster& roster, sync::Time now) {
   missing_ = name_missing(roster, expected_, scenario_sha256_, vehicle_ids_);
   if (missing_.empty()) return Finding::kReady;
-  return patience_.is_over(roster.now) ? Finding::kGivenUp : Finding::kMissing;
+  return patience_.is_over(now) ? Finding::kGivenUp : Finding::kMissing;
 }
 
 std::string Gathering::describe_error() const {

@@ -20,7 +20,7 @@ class Gathering {
             std::vector<std::uint32_t> vehicle_ids, sync::Time now);
 
   enum class Finding { kReady, kMissing, kGivenUp };
-  Finding look(const Roster& roster);
+  Finding look(const Roster& roster, sync::Time now);
 
   /// The participants that were missing at the last look.
   const std::string& missing() const { return missing_; }

@@ -3,10 +3,14 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <cmath>
+#include <utility>
 #include <variant>
 
 namespace sls::sim {
 namespace {
+
+using model::Fault;
+using model::MissionPhase;
 
 double calc_norm(const Eigen::Vector3d& f) { return std::hypot(f.x(), f.y(), f.z()); }
 
@@ -14,6 +18,24 @@ double calc_norm(const Eigen::Vector3d& f) { return std::hypot(f.x(), f.y(), f.z
 std::int64_t find_least_duration(const config::LeaveCondition& leave) {
   const auto* timed = std::get_if<config::LeaveAfter>(&leave);
   return timed ? timed->duration_ns : std::get<config::LeaveWithin>(leave).after_ns;
+}
+
+/// True if no number is infinite or NaN: the product of such a number with zero is NaN.
+bool is_finite(const model::Reference& reference) {
+  double sum = 0.0;
+  for (const Eigen::Vector3d* vector : {&reference.position, &reference.velocity,
+                                        &reference.acceleration, &reference.jerk, &reference.snap})
+    for (const double x : *vector) sum += 0.0 * x;
+  return sum == 0.0;
+}
+
+/// The first enumerator that the contract does not define, by its field; null: there is none.
+std::pair<const char*, std::uint32_t> find_undefined(const model::Answer& answer) {
+  const auto mission = static_cast<std::uint32_t>(answer.mission);
+  const auto fault = static_cast<std::uint32_t>(answer.fault);
+  if (mission > static_cast<std::uint32_t>(MissionPhase::kFailed)) return {"mission", mission};
+  if (fault > static_cast<std::uint32_t>(Fault::kStageTimeout)) return {"fault", fault};
+  return {nullptr, 0};
 }
 
 }  // namespace
@@ -31,15 +53,18 @@ AnswerLimits make_answer_limits(const config::Scenario& scenario) {
   return limits;
 }
 
-std::optional<Defect> find_defect(const JudgedAnswer& answer, const AnswerLimits& limits) {
-  if (!answer.f_Q_W.allFinite() || !answer.is_memory_finite) return Defect::kNotFinite;
+std::optional<Defect> find_defect(std::uint64_t step, const model::Answer& answer,
+                                  const AnswerLimits& limits) {
+  if (!answer.f_Q_W.allFinite() || !answer.memory.numbers.allFinite()) return Defect::kNotFinite;
   if (calc_norm(answer.f_Q_W) > limits.force) return Defect::kForceLimit;
-  if (answer.undefined) return Defect::kUndefined;
-  if (answer.fault || answer.is_mission_failed) return Defect::kFault;
-  if (!answer.is_reference_finite) return Defect::kNotFinite;  // its fault would say why
-  if (answer.stage > limits.stages) return Defect::kUnknownStage;
-  const bool is_over = answer.is_mission_finished || answer.stage == limits.stages;
-  if (is_over && answer.step < limits.earliest_end) return Defect::kEarlyEnd;
+  if (find_undefined(answer).first) return Defect::kUndefined;
+  if (answer.fault != Fault::kNone || answer.mission == MissionPhase::kFailed)
+    return Defect::kFault;
+  if (!is_finite(answer.reference)) return Defect::kNotFinite;  // its fault would say why
+  const std::uint32_t stage = answer.memory.stage;
+  if (stage > limits.stages) return Defect::kUnknownStage;
+  const bool is_over = answer.mission == MissionPhase::kFinished || stage == limits.stages;
+  if (is_over && step < limits.earliest_end) return Defect::kEarlyEnd;
   return std::nullopt;
 }
 
@@ -61,22 +86,26 @@ const char* to_string(Defect defect) {
   return "";
 }
 
-std::string describe_refusal(Defect defect, const JudgedAnswer& answer, const AnswerLimits& limits,
-                             const std::string& controller) {
-  const std::string text = fmt::format("controller '{}' answered step {} with {}", controller,
-                                       answer.step, to_string(defect));
+std::string describe_refusal(Defect defect, std::uint64_t step, const model::Answer& answer,
+                             const AnswerLimits& limits, const std::string& controller) {
+  const std::string text =
+      fmt::format("controller '{}' answered step {} with {}", controller, step, to_string(defect));
   switch (defect) {
     case Defect::kNotFinite:
       if (!answer.f_Q_W.allFinite()) return text;
-      return text + (answer.is_memory_finite ? " in reference" : " in controller.numbers");
+      return text +
+             (answer.memory.numbers.allFinite() ? " in reference" : " in controller.numbers");
     case Defect::kForceLimit:
       return text + fmt::format(": {:.6g} N > {:.6g} N", calc_norm(answer.f_Q_W), limits.force);
-    case Defect::kUndefined:
-      return text + fmt::format(": {} {}", answer.undefined->field, answer.undefined->value);
+    case Defect::kUndefined: {
+      const auto [field, value] = find_undefined(answer);
+      return text + fmt::format(": {} {}", field, value);
+    }
     case Defect::kFault:
-      return text + fmt::format(": {}", answer.fault ? answer.fault : "mission failed");
+      return text + fmt::format(": {}", answer.fault != Fault::kNone ? to_string(answer.fault)
+                                                                     : "mission failed");
     case Defect::kUnknownStage:
-      return text + fmt::format(": stage_index {} > {}", answer.stage, limits.stages);
+      return text + fmt::format(": stage_index {} > {}", answer.memory.stage, limits.stages);
     case Defect::kEarlyEnd:
       return text + fmt::format(": expected at step {} or later", limits.earliest_end);
   }

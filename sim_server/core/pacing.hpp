@@ -1,6 +1,6 @@
 #pragma once
 
-#include "sim_server/core/command_arrival.hpp"
+#include "sim_server/core/command_sample.hpp"
 #include "sim_server/core/surroundings.hpp"
 #include "sim_server/core/vehicle.hpp"
 
@@ -26,7 +26,7 @@ class Pacing {
   virtual sync::Time deadline() const = 0;
 
   /// A sample was judged.
-  virtual void received(const Commands&, const CommandArrival&) {}
+  virtual void received(const CommandSample&) {}
   /// A valid answer came to an earlier step.
   virtual void note_late(Vehicle&, const OfferedAnswer&, sync::Time) {}
   /// The roster was refreshed.

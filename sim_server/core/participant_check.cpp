@@ -8,7 +8,6 @@
 #include <tuple>
 #include <utility>
 
-#include "common/bus/convert.hpp"
 #include "common/bus/names.hpp"
 #include "common/config/vehicle_ids.hpp"
 #include "common/config/yaml_node.hpp"
@@ -163,30 +162,29 @@ const ParticipantCheck::Library* ParticipantCheck::find_other_library(
 
 // --- answers -------------------------------------------------------------------------------------
 
-void ParticipantCheck::note_taken(const OfferedAnswer& answer, const bus::PeerId& sender,
-                                  Verdict verdict, const ControllerState& returned,
+void ParticipantCheck::note_taken(const OfferedAnswer& offered, const bus::PeerId& sender,
+                                  Verdict verdict, const model::ControllerMemory& returned,
                                   const model::Measurement& state) {
   if (!rejections_.empty()) rejections_.erase(sender);
-  count(answer, sender, verdict);
+  count(offered, sender, verdict);
   if (verdict != Verdict::kAccepted && verdict != Verdict::kHeld) return;
-  const auto id =
-      std::lower_bound(vehicle_ids_.begin(), vehicle_ids_.end(), answer.command.vehicle_id());
+  const auto id = std::lower_bound(vehicle_ids_.begin(), vehicle_ids_.end(), offered.vehicle_id);
   Vehicle& flown = vehicles_[static_cast<std::size_t>(id - vehicle_ids_.begin())];
-  check_memory(flown, answer, sender, returned);
+  check_memory(flown, offered, sender, returned);
   if (verdict != Verdict::kAccepted) return;
   flown.has_flown = true;
-  check_stage(flown, answer, sender);
-  check_stage_name(flown, answer, sender);
-  check_distance(flown, answer, state);
+  check_stage(flown, offered, sender);
+  check_stage_name(flown, offered, sender);
+  check_distance(flown, offered, state);
 }
 
-void ParticipantCheck::count(const OfferedAnswer& answer, const bus::PeerId& sender,
+void ParticipantCheck::count(const OfferedAnswer& offered, const bus::PeerId& sender,
                              Verdict verdict) {
   const auto known = answers_.find(sender);
   if (known == answers_.end() && answers_.size() >= kMostSenders) return;
   Answers& answers = known != answers_.end() ? known->second : answers_[sender];
   ++(verdict == Verdict::kDuplicate ? answers.copies : answers.steps);
-  if (answers.client_name != answer.client_name) answers.client_name = answer.client_name;
+  if (answers.client_name != offered.client_name) answers.client_name = offered.client_name;
 }
 
 void ParticipantCheck::note_empty(const bus::PeerId& sender, std::uint64_t step) {
@@ -195,23 +193,23 @@ void ParticipantCheck::note_empty(const bus::PeerId& sender, std::uint64_t step)
   });
 }
 
-void ParticipantCheck::note_rejected(const OfferedAnswer& answer, const bus::PeerId& sender,
+void ParticipantCheck::note_rejected(const OfferedAnswer& offered, const bus::PeerId& sender,
                                      Verdict verdict, std::uint64_t step) {
-  const bool is_of_this_run = answer.run_id == run_id_;
-  if (verdict == Verdict::kEarly || (is_of_this_run && answer.step > step))
+  const bool is_of_this_run = offered.run_id == run_id_;
+  if (verdict == Verdict::kEarly || (is_of_this_run && offered.step > step))
     see(sender, "early", [&] {
-      return "step: " + describe_early(answer.step, verdict == Verdict::kEarly ? step : step + 1);
+      return "step: " + describe_early(offered.step, verdict == Verdict::kEarly ? step : step + 1);
     });
   if (verdict == Verdict::kContradiction)
     see(sender, "two", [&] {
-      return fmt::format("step {}: expected one answer, got two that differ", answer.step);
+      return fmt::format("step {}: expected one answer, got two that differ", offered.step);
     });
   if (rejections_.size() >= kMostSenders && rejections_.count(sender) == 0) return;
   Rejections& rejections = rejections_[sender];
   ++rejections.count;
-  const bool is_old = verdict == Verdict::kWrongStep && answer.step < step;
+  const bool is_old = verdict == Verdict::kWrongStep && offered.step < step;
   rejections.is_old = rejections.is_old && is_old;
-  rejections.defect = describe_defect(answer, verdict, step);
+  rejections.defect = describe_defect(offered, verdict, step);
 }
 
 /// `unpublished`: the first step whose state had not been published.
@@ -221,18 +219,19 @@ std::string ParticipantCheck::describe_early(std::uint64_t got, std::uint64_t un
              : fmt::format("expected at most {}, the last published, got {}", unpublished - 1, got);
 }
 
-std::string ParticipantCheck::describe_defect(const OfferedAnswer& answer, Verdict verdict,
+std::string ParticipantCheck::describe_defect(const OfferedAnswer& offered, Verdict verdict,
                                               std::uint64_t step) const {
   switch (verdict) {
     case Verdict::kOtherRun:
-      return fmt::format("run_id: expected {}, got {}", to_words(run_id_), to_words(answer.run_id));
+      return fmt::format("run_id: expected {}, got {}", to_words(run_id_),
+                         to_words(offered.run_id));
     case Verdict::kUnknownVehicle:
       return fmt::format("vehicle_id: expected {}, got {}", config::to_vehicle_ranges(vehicle_ids_),
-                         answer.command.vehicle_id());
+                         offered.vehicle_id);
     case Verdict::kEarly:
-      return "step: " + describe_early(answer.step, step);
+      return "step: " + describe_early(offered.step, step);
     case Verdict::kWrongStep:
-      return fmt::format("step: expected {}, got {}", step, answer.step);
+      return fmt::format("step: expected {}, got {}", step, offered.step);
     default:
       return to_string(verdict);
   }
@@ -249,40 +248,41 @@ void ParticipantCheck::see(const bus::PeerId& sender, const char* what, MakeText
   if (seen_.size() < kMostSenders) seen_[key].text = make_text();
 }
 
-void ParticipantCheck::check_memory(Vehicle& vehicle, const OfferedAnswer& answer,
-                                    const bus::PeerId& sender, const ControllerState& returned) {
-  const ControllerState& memory = answer.command.controller();
-  if (memory.stage_index() < returned.stage_index()) {
+void ParticipantCheck::check_memory(Vehicle& vehicle, const OfferedAnswer& offered,
+                                    const bus::PeerId& sender,
+                                    const model::ControllerMemory& returned) {
+  const model::ControllerMemory& memory = offered.answer.memory;
+  if (memory.stage < returned.stage) {
     vehicle.is_stage_lost = true;
     see(sender, "stage", [&] {
       return fmt::format(
           "controller.stage_index at step {}: expected at least {}, as in the state, got {}",
-          answer.step, returned.stage_index(), memory.stage_index());
+          offered.step, returned.stage, memory.stage);
     });
   }
-  const std::size_t numbers = memory.numbers().size();
+  const auto numbers = static_cast<std::size_t>(memory.numbers.size());
   if (numbers < vehicle.numbers)
     see(sender, "numbers", [&] {
       return fmt::format("controller.numbers at step {}: expected {} of them, as before, got {}",
-                         answer.step, vehicle.numbers, numbers);
+                         offered.step, vehicle.numbers, numbers);
     });
   vehicle.numbers = std::max(vehicle.numbers, numbers);
 }
 
-void ParticipantCheck::check_stage(Vehicle& vehicle, const OfferedAnswer& answer,
+void ParticipantCheck::check_stage(Vehicle& vehicle, const OfferedAnswer& offered,
                                    const bus::PeerId& sender) {
-  const std::uint32_t stage = answer.command.controller().stage_index();
+  const std::uint32_t stage = offered.answer.memory.stage;
   if (stage != vehicle.stage) {
     vehicle.stage = stage;
-    vehicle.stage_start_step = answer.step;
+    vehicle.stage_start_step = offered.step;
     return;
   }
-  if (answer.command.mission() != MissionPhase::MISSION_RUNNING) return;
+  if (offered.answer.mission != model::MissionPhase::kRunning) return;
   // Beyond the last stage the mission must be finished at once.
   const bool is_over = stage >= vehicle.stages_ns.size();
   const auto duration_ns = is_over ? std::optional<std::int64_t>(0) : vehicle.stages_ns[stage];
-  if (!duration_ns || answer.step < vehicle.stage_start_step) return;
-  const auto steps = static_cast<std::int64_t>(answer.step - vehicle.stage_start_step);
+  if (!duration_ns || offered.step < vehicle.stage_start_step) return;
+  const auto steps = static_cast<std::int64_t>(offered.step - vehicle.stage_start_step);
   if (steps * period_ns_ <= *duration_ns + kStageTolerance_ns) return;
   const auto start_ns = static_cast<std::int64_t>(vehicle.stage_start_step) * period_ns_;
   const double end_s = static_cast<double>(start_ns + *duration_ns) * 1e-9;
@@ -291,32 +291,31 @@ void ParticipantCheck::check_stage(Vehicle& vehicle, const OfferedAnswer& answer
     return is_over ? fmt::format(
                          "mission at step {}: expected finished after the last stage, "
                          "which was over at {:g} s, got running",
-                         answer.step, end_s)
+                         offered.step, end_s)
                    : fmt::format(
                          "controller.stage_index at step {}: expected more than {} (stage "
                          "'{}' was over at {:g} s), got {} and mission running",
-                         answer.step, stage, config::to_printable(vehicle.stage_names[stage], 32),
+                         offered.step, stage, config::to_printable(vehicle.stage_names[stage], 32),
                          end_s, stage);
   });
 }
 
-void ParticipantCheck::check_stage_name(Vehicle& vehicle, const OfferedAnswer& answer,
+void ParticipantCheck::check_stage_name(Vehicle& vehicle, const OfferedAnswer& offered,
                                         const bus::PeerId& sender) {
-  const auto& name = answer.command.reference().stage_name();
-  if (name.compare(vehicle.stage_name) != 0) {
-    vehicle.stage_name = name.to_string();
+  if (offered.answer.stage_name != vehicle.stage_name) {
+    vehicle.stage_name = offered.answer.stage_name;
     vehicle.is_stage_name_text = config::is_utf8(vehicle.stage_name);
   }
   if (!vehicle.is_stage_name_text)
     see(sender, "stage name", [&] {
-      return fmt::format("reference.stage_name at step {}: expected UTF-8, got '{}'", answer.step,
+      return fmt::format("reference.stage_name at step {}: expected UTF-8, got '{}'", offered.step,
                          config::to_printable(vehicle.stage_name, 64));
     });
 }
 
-void ParticipantCheck::check_distance(Vehicle& vehicle, const OfferedAnswer& answer,
+void ParticipantCheck::check_distance(Vehicle& vehicle, const OfferedAnswer& offered,
                                       const model::Measurement& state) {
-  const Eigen::Vector3d reference = bus::to_vector(answer.command.reference().position_m());
+  const Eigen::Vector3d& reference = offered.answer.reference.position;
   const double most = kMostRodLengths * vehicle.rod_length;
   const double load = (state.p_WL - reference).squaredNorm();
   const double quad = (state.p_WQ - reference).squaredNorm();
@@ -325,7 +324,7 @@ void ParticipantCheck::check_distance(Vehicle& vehicle, const OfferedAnswer& ans
   events_.push_back(fmt::format(
       "step {}: vehicle {}: {} {:.4g} m from its reference, expected at most {:g} rod lengths "
       "({:g} m)",
-      answer.step, vehicle.id, load > most * most ? "load" : "quadrotor",
+      offered.step, vehicle.id, load > most * most ? "load" : "quadrotor",
       std::sqrt(load > most * most ? load : quad), kMostRodLengths, most));
 }
 

@@ -82,14 +82,14 @@ class ParticipantCheck {
   /// The answer of `sender` was accepted, held, late, a copy or superseded. `returned` is the
   /// controller state in the state sample of the step in work; `state` is the state of the vehicle
   /// at that step.
-  void note_taken(const OfferedAnswer& answer, const bus::PeerId& sender, Verdict verdict,
-                  const ControllerState& returned, const model::Measurement& state);
+  void note_taken(const OfferedAnswer& offered, const bus::PeerId& sender, Verdict verdict,
+                  const model::ControllerMemory& returned, const model::Measurement& state);
   /// Answers of both clients to one step arrived; that of `winner` was taken.
   void note_superseded(const bus::PeerId& loser, const bus::PeerId& winner) {
     superseded_.emplace(loser, winner);
   }
   /// The answer of `sender` was rejected while `step` was in work.
-  void note_rejected(const OfferedAnswer& answer, const bus::PeerId& sender, Verdict verdict,
+  void note_rejected(const OfferedAnswer& offered, const bus::PeerId& sender, Verdict verdict,
                      std::uint64_t step);
 
   /// A sample of `sender` for this run and `step` answers no vehicle.
@@ -153,17 +153,17 @@ class ParticipantCheck {
   /// The library that `controller` should have loaded; null if it has loaded the right one.
   const Library* find_other_library(const Participant& controller) const;
 
-  void count(const OfferedAnswer& answer, const bus::PeerId& sender, Verdict verdict);
-  void check_stage_name(Vehicle& vehicle, const OfferedAnswer& answer, const bus::PeerId& sender);
-  void check_memory(Vehicle& vehicle, const OfferedAnswer& answer, const bus::PeerId& sender,
-                    const ControllerState& returned);
-  void check_stage(Vehicle& vehicle, const OfferedAnswer& answer, const bus::PeerId& sender);
-  void check_distance(Vehicle& vehicle, const OfferedAnswer& answer,
+  void count(const OfferedAnswer& offered, const bus::PeerId& sender, Verdict verdict);
+  void check_stage_name(Vehicle& vehicle, const OfferedAnswer& offered, const bus::PeerId& sender);
+  void check_memory(Vehicle& vehicle, const OfferedAnswer& offered, const bus::PeerId& sender,
+                    const model::ControllerMemory& returned);
+  void check_stage(Vehicle& vehicle, const OfferedAnswer& offered, const bus::PeerId& sender);
+  void check_distance(Vehicle& vehicle, const OfferedAnswer& offered,
                       const model::Measurement& state);
   template <class MakeText>
   void see(const bus::PeerId& sender, const char* what, MakeText make_text);
   static std::string describe_early(std::uint64_t got, std::uint64_t unpublished);
-  std::string describe_defect(const OfferedAnswer& answer, Verdict verdict,
+  std::string describe_defect(const OfferedAnswer& offered, Verdict verdict,
                               std::uint64_t step) const;
 
   void look_at(const Entry& entry, const Neighbourhood& neighbourhood, Findings& findings);

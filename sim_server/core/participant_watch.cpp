@@ -89,7 +89,7 @@ std::string ParticipantWatch::name_awaited_controllers() const {
   for (const auto& vehicle : fleet_.vehicles()) {
     if (vehicle->gate.accepted()) continue;
     const auto client = vehicle->gate.awaited_client();
-    const std::string& last = vehicle->last_answer().controller_name;
+    const std::string& last = vehicle->last_client();
     const bool is_there = client && !client->is_gone && report_.problem.empty();
     awaited[client         ? fmt::format("controller '{}'{}{}", client->name,
                                          describe_place(roster_, client->peer),

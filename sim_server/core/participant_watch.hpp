@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "sim_server/core/command_arrival.hpp"
+#include "sim_server/core/command_sample.hpp"
 #include "sim_server/core/fleet.hpp"
 #include "sim_server/core/participant_check.hpp"
 #include "sim_server/core/presence.hpp"
@@ -25,8 +25,8 @@ class ParticipantWatch {
   const Roster& roster() const { return roster_; }
   ParticipantCheck& check() { return check_; }
   /// A sample of sls/command came.
-  void note_arrival(const CommandArrival& arrival) {
-    stamps_.note(arrival.sender, arrival.written, [&] { return arrival.arrived.wall; });
+  void note_arrival(const CommandSample& sample) {
+    stamps_.note(sample.sender, sample.written, [&] { return sample.arrived.wall; });
   }
   /// Step 0 is about to be published.
   void begin(sync::Time now) { roster_.began = now; }

@@ -28,7 +28,7 @@ void Preparation::start_gathering(sync::Time now) {
 }
 
 bool Preparation::gather(const Surroundings& around, sync::Time now) {
-  const auto finding = gathering_->look(run_.watch.roster());
+  const auto finding = gathering_->look(run_.watch.roster(), now);
   if (finding == Gathering::Finding::kReady) return true;
   const auto describe_obstacles = [&] {
     return run_.report.describe_problem() + around.describe_isolation();

@@ -69,9 +69,9 @@ bool RealtimePacing::close(sync::Time now) {
 bool RealtimePacing::is_ending() const {
   const auto& vehicles = run_.fleet.vehicles();
   return std::all_of(vehicles.begin(), vehicles.end(), [](const auto& vehicle) {
-    const auto& answer = vehicle->gate.accepted();
-    return answer ? answer->command.mission() == MissionPhase::MISSION_FINISHED
-                  : vehicle->has_ended_late();
+    const auto& accepted = vehicle->gate.accepted();
+    return accepted ? accepted->answer.mission == model::MissionPhase::kFinished
+                    : vehicle->has_ended_late();
   });
 }
 
@@ -111,13 +111,16 @@ void RealtimePacing::fly_without_answers(sync::Time now) {
   if (most != Action::kWait) run_.absence.attend(most, now);
 }
 
-void RealtimePacing::received(const Commands& sample, const CommandArrival& arrival) {
-  if (sample.run_id() != run_.run_id) return;
+void RealtimePacing::received(const CommandSample& sample) {
+  if (sample.run_id != run_.run_id) return;
   const std::uint64_t step = run_.fleet.step();
-  clocks_.note(sample, arrival, step);
-  if (!clocks_.is_known(arrival.sender)) return;
-  const std::string slow = slow_answers_.note(sample, arrival, step);
-  if (!slow.empty()) run_.report.announce(slow, arrival.arrived.time);
+  clocks_.note(sample, step);
+  const auto& ready = run_.watch.roster().controllers;
+  if (std::none_of(ready.begin(), ready.end(),
+                   [&](const sync::Member& client) { return client.peer == sample.sender; }))
+    return;
+  const std::string slow = slow_answers_.note(sample, step);
+  if (!slow.empty()) run_.report.announce(slow, sample.arrived.time);
 }
 
 void RealtimePacing::note_late(Vehicle& vehicle, const OfferedAnswer& answer, sync::Time now) {
@@ -138,13 +141,15 @@ void RealtimePacing::roster_changed(sync::Time now) {
 void RealtimePacing::look(const Surroundings& around) {
   lifespan_ = around.command_lifespan();
   const std::uint64_t missed = around.queues().missed_deadlines;
-  if (missed_deadlines_) run_.report.link.deadline_missed() += missed - *missed_deadlines_;
+  // While the run rests no command is due.
+  if (missed_deadlines_ && !run_.control.holds())
+    run_.report.link.deadline_missed() += missed - *missed_deadlines_;
   missed_deadlines_ = missed;
 }
 
 void RealtimePacing::note_rest(sync::Duration rest) {
   schedule_.pause(rest);
-  missed_deadlines_.reset();  // no command was due
+  missed_deadlines_.reset();
 }
 
 void RealtimePacing::show_progress(sync::Time now) {

@@ -27,7 +27,7 @@ class RealtimePacing : public Pacing {
   bool close(sync::Time now) override;
   sync::Time deadline() const override { return close_at_; }
 
-  void received(const Commands& sample, const CommandArrival& arrival) override;
+  void received(const CommandSample& sample) override;
   void note_late(Vehicle& vehicle, const OfferedAnswer& answer, sync::Time now) override;
   void roster_changed(sync::Time now) override;
   void look(const Surroundings& around) override;

@@ -10,9 +10,9 @@ void RunReport::publish(RunPhase phase, const std::string& reason, sync::Time no
   phase_ = phase;
   SyncCounters counters = link;
   for (const auto& vehicle : fleet_.vehicles()) bus::add(counters, vehicle->gate.counters());
-  outputs_.send(series.make({phase, reason, fleet_.step(),
-                             fleet_.vehicles().front()->controller_name(), problem, counters},
-                            now));
+  outputs_.send(series.make(
+      {phase, reason, fleet_.step(), fleet_.vehicles().front()->flown_by(), problem, counters},
+      now));
 }
 
 void RunReport::announce(const std::string& event, sync::Time now) {

@@ -51,13 +51,13 @@ void ServerCore::guard(sync::Time now, Work work) {
 
 // --- events --------------------------------------------------------------------------------------
 
-void ServerCore::on_commands(const Commands& sample, const CommandArrival& arrival) {
+void ServerCore::on_commands(CommandSample& sample) {
   if (phase_ == Phase::kEnded) return;  // answers to states that no plant will use
-  const sync::Time now = arrival.arrived.time;
+  const sync::Time now = sample.arrived.time;
   guard(now, [&] {
-    parts_.watch.note_arrival(arrival);
-    judge_.judge(sample, arrival, phase_ == Phase::kAwaitingAnswers);
-    pacing_->received(sample, arrival);
+    parts_.watch.note_arrival(sample);
+    judge_.judge(sample, phase_ == Phase::kAwaitingAnswers);
+    pacing_->received(sample);
     if (phase_ == Phase::kAwaitingAnswers) go_on(now);
   });
 }
@@ -193,7 +193,7 @@ void ServerCore::finish_step(sync::Time now) {
     return end_run(End::kFinished, RunPhase::PHASE_FINISHED, "mission finished", now);
   parts_.outputs.record_step(parts_.fleet);
   for (const auto& vehicle : parts_.fleet.vehicles())
-    parts_.report.series.timing.add(vehicle->outcome()->applied.origin, vehicle->calc_age());
+    parts_.report.series.timing.add(vehicle->record().kind, vehicle->calc_age());
   phase_ = Phase::kAwaitingDue;  // its states are recorded: no second time, should a plant fail
   parts_.fleet.advance();
   parts_.fleet.expect_answers();
@@ -218,7 +218,10 @@ void ServerCore::end_run(End end, RunPhase phase, const std::string& reason, syn
     parts_.outputs.send(reply);
   // Before the claim is settled no participant has joined, so nothing is published.
   if (!parts_.report.has_published()) return;
-  if (is_step_published) parts_.outputs.record_step(parts_.fleet);
+  if (is_step_published) {
+    for (const auto& vehicle : parts_.fleet.vehicles()) vehicle->complete_record();
+    parts_.outputs.record_step(parts_.fleet);
+  }
   parts_.outputs.end_records();
   for (const std::string& remark : parts_.fleet.take_remarks()) parts_.report.announce(remark, now);
   parts_.report.publish(phase, reason, now);

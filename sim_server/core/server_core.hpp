@@ -43,7 +43,7 @@ class ServerCore {
 
   /// A sample of sls/command came. It may come at any time: before its step was published, an
   /// answer is early.
-  void on_commands(const Commands& sample, const CommandArrival& arrival);
+  void on_commands(CommandSample& sample);
   /// A request of an operator came.
   void on_request(const SimControl& request, const Surroundings& around, sync::Time now);
   /// Looks around: stop signal, claims, participants, mistakes, status. Call it when is_look_due.

@@ -6,13 +6,13 @@
 
 namespace sls::sim {
 
-void TimingRecord::add(ForceOrigin origin, std::uint64_t age) {
+void TimingRecord::add(model::AnswerKind kind, std::uint64_t age) {
   ++periods_;
-  if (origin == ForceOrigin::FORCE_HELD) {
+  if (kind == model::AnswerKind::kHeld) {
     ++held_;
     worst_age_ = std::max(worst_age_, age);
   }
-  if (origin == ForceOrigin::FORCE_FAIL_SAFE) ++fail_safe_;
+  if (kind == model::AnswerKind::kFailSafe) ++fail_safe_;
 }
 
 void TimingRecord::add_delay(double delay_s) { worst_delay_s_ = std::max(worst_delay_s_, delay_s); }

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "common/config/scenario.hpp"
+#include "common/model/step_record.hpp"
 #include "sls.h"
 
 namespace sls::sim {
@@ -13,9 +14,9 @@ class TimingRecord {
  public:
   explicit TimingRecord(const config::Sync& sync) : sync_(sync) {}
 
-  /// A period was flown with a force of this origin. The force answers a state that is `age`
-  /// periods older than the period's own.
-  void add(ForceOrigin origin, std::uint64_t age);
+  /// A period was flown with the force of an answer of this kind. The force answers a state that is
+  /// `age` periods older than the period's own.
+  void add(model::AnswerKind kind, std::uint64_t age);
   /// A state was published `delay_s` (wall time) after it was due. Real time only.
   void add_delay(double delay_s);
   /// The schedule was moved because the server was `lost_s` behind it. Real time only.

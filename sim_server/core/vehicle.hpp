@@ -2,30 +2,20 @@
 /// clock here.
 #pragma once
 
-#include <Eigen/Core>
 #include <cstdint>
 #include <optional>
 #include <string>
 
 #include "common/config/scenario.hpp"
-#include "common/model/measurement.hpp"
+#include "common/model/step_record.hpp"
 #include "common/sync/time.hpp"
 #include "sim_server/core/command_gate.hpp"
 #include "sim_server/core/controller_absence.hpp"
-#include "sim_server/fault_line.hpp"
+#include "sim_server/core/fault_line.hpp"
 
 namespace sls::sim {
 
-/// Force that acted over a control period, its origin, and the controller memory after it.
-struct Applied {
-  Eigen::Vector3d answer_f_Q_W = Eigen::Vector3d::Zero();  ///< as answered, N
-  Eigen::Vector3d f_Q_W = Eigen::Vector3d::Zero();         ///< as it acted, after faults, N
-  ForceOrigin origin = ForceOrigin::FORCE_NONE;
-  std::string controller_name;
-  ControllerState memory;
-};
-
-/// `controller_name` of the server's own force.
+/// Name of the client in records of the server's own force.
 inline constexpr const char* kFailSafeName = "fail-safe";
 
 class Vehicle {
@@ -36,48 +26,57 @@ class Vehicle {
   Vehicle(const Vehicle&) = delete;
   Vehicle& operator=(const Vehicle&) = delete;
 
-  std::uint32_t id() const { return id_; }
+  std::uint32_t id() const { return record_.vehicle_id; }
 
-  /// The result of a step.
-  struct Outcome {
-    Applied applied;           // before faults
-    bool is_finished = false;  // the mission ends here
-  };
+  // --- a step, in the order of the calls ---
 
-  /// Measures the state of `step`. `truth` is the state of the plant; `seen` is the output of
-  /// sensors and estimator, or null if it cannot differ. Call once per step, in order, from step 0.
+  /// Begins `step`. `truth` is the state of the plant; `seen` is the output of sensors and
+  /// estimator, or null if it cannot differ. Call once per step, in order, from step 0.
   void measure(std::uint64_t step, const model::Measurement& truth,
                const model::Measurement* seen = nullptr);
   /// Takes the answer that the gate accepted for the step in work.
   void take_answer();
-  /// Holds an answer that came too late for its step, if it is newer than the held one.
-  void keep_late_answer(const OfferedAnswer& answer);
   /// Flies the step in work without an answer of its own.
   void fly_without_answer(ControllerAbsence::Action action);
-  /// Applies the outcome of the step in work. Returns the force (N, in W) that acts on the plant.
+  /// Applies the force of the step in work, which must be settled. Returns the force (N, in W) that
+  /// acts on the plant.
   Eigen::Vector3d actuate();
 
-  /// Writes the record of the step in work into `entry`. Call once its outcome is known or the run
-  /// ends.
-  void fill_record(RecordEntry& entry) const;
+  /// Holds an answer that came too late for its step, if it is newer than the held one.
+  void keep_late_answer(const OfferedAnswer& offered);
 
-  const std::optional<Outcome>& outcome() const { return outcome_; }
-  bool is_settled() const { return outcome_.has_value(); }
-  /// Age of the force of the step in work: periods since the state that it answers.
-  std::uint64_t calc_age() const;
+  // --- the step in work ---
+
+  /// Motion of the vehicle.
+  const model::Measurement& state() const { return record_.truth; }
+  /// The measured motion, which controllers answer.
+  const model::Measurement& measured() const {
+    return record_.measured ? *record_.measured : record_.truth;
+  }
+  /// The client whose force acts: over the step in work once it is settled, else before it.
+  const std::string& flown_by() const {
+    return is_settled_ ? record_.client_name : applied_.client_name;
+  }
+  /// The force over the period before it.
+  const model::AppliedForce& applied() const { return applied_; }
+  /// True if its force is known.
+  bool is_settled() const { return is_settled_; }
+  /// Its record. Kind and answer are known once it is settled.
+  const model::StepRecord& record() const { return record_; }
+  /// Completes the record of a step that is not settled, because the run ends: with the answer that
+  /// was accepted or refused, if there is one.
+  void complete_record();
+  /// True if it is settled and its answer ends the mission.
+  bool is_finished() const;
+  /// Age of its force: periods since the state that it answers.
+  std::uint64_t calc_age() const { return record_.step - record_.answered_step; }
+
+  /// The client that sent the newest valid answer; empty before the first one.
+  const std::string& last_client() const { return held_.client_name; }
   /// True if the newest answer was late and says that the mission is finished.
   bool has_ended_late() const { return has_ended_late_; }
-  const Applied& last_answer() const { return last_answer_; }
-  /// Name of the client whose answer is in force: in the step in work once its outcome is known.
-  const std::string& controller_name() const {
-    return outcome_ ? outcome_->applied.controller_name : applied_.controller_name;
-  }
-  /// The force over the period before the step in work.
-  const Applied& applied() const { return applied_; }
-  /// The measured state of the step in work.
-  const model::Measurement& measured() const { return measured_; }
-  /// Motion of the vehicle at the current step.
-  const model::Measurement& state() const { return state_; }
+
+  // --- absence ---
 
   /// The step in work was published at `time` and has no answer yet.
   void note_waiting(sync::Time time) {
@@ -99,20 +98,16 @@ class Vehicle {
   ControllerAbsence absence;
 
  private:
-  void hold(const OfferedAnswer& answer);
+  void hold(const OfferedAnswer& offered);
+  void settle(model::AnswerKind kind);
 
-  const std::uint32_t id_;
   const config::Scenario scenario_;  // of this vehicle alone
   FaultLine faults_;
-  std::uint64_t step_ = 0;              // in work
-  model::Measurement state_;            // at that step
-  model::Measurement measured_;         // of that state
-  bool can_measured_differ_ = false;    // from that state
-  Applied applied_;                     // over the period before it
-  std::optional<Outcome> outcome_;      // of the step in work, once it is known
-  Applied last_answer_;                 // the held one: accepted, or late but valid
-  std::uint64_t last_answer_step_ = 0;  // the step it answers
-  ControlCommand last_command_;         // as received
+  model::StepRecord record_;     // of the step in work
+  bool is_settled_ = false;      // its force is known
+  model::AppliedForce applied_;  // over the period before it
+  OfferedAnswer held_;           // the newest valid answer: accepted, or late
+  bool has_held_ = false;
   bool has_ended_late_ = false;
   std::optional<sync::Time> absent_since_;
   std::optional<sync::Time> refused_since_;

@@ -19,12 +19,12 @@ using Eigen::Vector3d;
 std::vector<model::SlungLoadState> fly_by_hand(const config::Scenario& scenario, int periods) {
   sim::SlungLoadPlant plant(scenario.vehicle, scenario.plant);
   const control::FlightController controller(scenario);
-  control::ControllerMemory memory;
+  model::ControllerMemory memory;
   std::deque<Vector3d> under_way;
   std::vector<model::SlungLoadState> states;
   for (std::uint64_t step = 0;; ++step) {
     states.push_back(plant.state());
-    const control::Answer answer = controller.calc_answer(step, plant.state(), memory);
+    const model::Answer answer = controller.calc_answer(step, plant.state(), memory);
     if (answer.mission != control::MissionPhase::kRunning) return states;
     memory = answer.memory;
     if (under_way.empty()) under_way.assign(static_cast<std::size_t>(periods), answer.f_Q_W);

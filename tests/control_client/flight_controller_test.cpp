@@ -38,7 +38,7 @@ bool same_bits(const Vector3d& a, const Vector3d& b) {
   return std::memcmp(a.data(), b.data(), 3 * sizeof(double)) == 0;
 }
 
-bool same_bits(const Answer& a, const Answer& b) {
+bool same_bits(const model::Answer& a, const model::Answer& b) {
   return same_bits(a.f_Q_W, b.f_Q_W) && a.memory.numbers == b.memory.numbers &&
          a.memory.stage == b.memory.stage &&
          a.memory.stage_start_step == b.memory.stage_start_step && a.mission == b.mission &&
@@ -50,7 +50,7 @@ bool same_bits(const Answer& a, const Answer& b) {
          same_bits(a.reference.snap, b.reference.snap);
 }
 
-void expect_failed(const Answer& answer, Fault fault) {
+void expect_failed(const model::Answer& answer, Fault fault) {
   EXPECT_EQ(answer.fault, fault);
   EXPECT_EQ(answer.mission, MissionPhase::kFailed);
   EXPECT_EQ(answer.f_Q_W, Vector3d::Zero());
@@ -60,7 +60,7 @@ TEST(FlightControllerTest, AnswersWithTheLawsForceReferenceAndStage) {
   const config::Scenario scenario = make_figure_eight();
   const FlightController controller(scenario);
   const model::SlungLoadState state = make_hanging({0.0, 0.0, -0.5});
-  const Answer answer = controller.calc_answer(0, state, {});
+  const model::Answer answer = controller.calc_answer(0, state, {});
   EXPECT_EQ(answer.mission, MissionPhase::kRunning);
   EXPECT_EQ(answer.fault, Fault::kNone);
   EXPECT_EQ(answer.stage, 0u);
@@ -94,12 +94,12 @@ TEST(FlightControllerTest, IsAPureFunctionForSamplesInAnyOrder) {
   struct Sample {
     std::uint64_t step;
     model::SlungLoadState state;
-    ControllerMemory memory;
+    model::ControllerMemory memory;
   };
   std::mt19937 generator(1);
   std::vector<Sample> samples;
-  std::vector<Answer> answers;
-  ControllerMemory memory;
+  std::vector<model::Answer> answers;
+  model::ControllerMemory memory;
   for (std::uint64_t step = 0; step < 1000; ++step) {
     samples.push_back({step, draw_state(generator), memory});
     answers.push_back(controller.calc_answer(step, samples.back().state, memory));
@@ -110,7 +110,7 @@ TEST(FlightControllerTest, IsAPureFunctionForSamplesInAnyOrder) {
   EXPECT_EQ(memory.stage_start_step, 500u);
   std::shuffle(samples.begin(), samples.end(), generator);
   for (const Sample& sample : samples) {
-    const Answer& first = answers[sample.step];
+    const model::Answer& first = answers[sample.step];
     ASSERT_TRUE(same_bits(controller.calc_answer(sample.step, sample.state, sample.memory), first));
     ASSERT_TRUE(same_bits(restarted.calc_answer(sample.step, sample.state, sample.memory), first));
   }
@@ -120,7 +120,7 @@ TEST(FlightControllerTest, FinishesAtDurationOverPeriodWithForceAndReferenceStil
   const FlightController controller(make_figure_eight());
   const model::SlungLoadState state = make_hanging({0.0, 0.0, -0.5});
   EXPECT_EQ(controller.calc_answer(7999, state, {}).mission, MissionPhase::kRunning);
-  const Answer last = controller.calc_answer(8000, state, {});
+  const model::Answer last = controller.calc_answer(8000, state, {});
   EXPECT_EQ(last.mission, MissionPhase::kFinished);
   EXPECT_EQ(last.fault, Fault::kNone);
   EXPECT_EQ(last.stage, 0u);
@@ -132,7 +132,7 @@ TEST(FlightControllerTest, TheMemoryNamesTheStageInForceAtTheStepAnswered) {
   config::Scenario scenario = make_figure_eight();
   scenario.mission.insert(scenario.mission.begin(), make_hold({0.0, 0.0, -0.5}, kSecond));
   const FlightController controller(scenario);
-  const Answer answer = controller.calc_answer(250, make_hanging({0.0, 0.0, -0.5}), {});
+  const model::Answer answer = controller.calc_answer(250, make_hanging({0.0, 0.0, -0.5}), {});
   EXPECT_EQ(answer.stage, 1u);
   EXPECT_EQ(answer.stage_name, "figure_eight");
   EXPECT_EQ(answer.memory.stage, 1u);
@@ -148,9 +148,9 @@ TEST(FlightControllerTest, AdvancesTheIntegralAfterTheForceByForwardEuler) {
   scenario.controller.own = QsfKeys{gains};
   const FlightController controller(scenario);
   const model::SlungLoadState state = make_hanging({0.5, -0.25, -1.125});
-  ControllerMemory memory;
+  model::ControllerMemory memory;
   memory.numbers = Vector3d(1.0, 2.0, 3.0);
-  const Answer answer = controller.calc_answer(5, state, memory);
+  const model::Answer answer = controller.calc_answer(5, state, memory);
   const Vector3d error(0.5, -0.25, -0.125);
   EXPECT_LE((answer.memory.numbers - memory.numbers - 0.004 * error).norm(), 1e-15);
   // The force depends on the integral before its update.
@@ -167,7 +167,7 @@ TEST(FlightControllerTest, ClampsTheIntegralAndReleasesItWhenTheErrorTurns) {
   gains.horizontal.integral = gains.vertical.integral = 0.01;
   scenario.controller.own = QsfKeys{gains};
   const FlightController controller(scenario);
-  ControllerMemory memory;
+  model::ControllerMemory memory;
   memory.numbers = Vector3d(19.999, -19.999, 0.0);
   for (std::uint64_t step = 0; step < 10; ++step) {
     memory = controller.calc_answer(step, make_hanging({1.0, -1.0, -1.0}), memory).memory;
@@ -179,7 +179,7 @@ TEST(FlightControllerTest, ClampsTheIntegralAndReleasesItWhenTheErrorTurns) {
 
 TEST(FlightControllerTest, WithoutAnIntegralGainTheIntegralStaysAsItIs) {
   const FlightController controller(make_figure_eight());
-  const Answer answer = controller.calc_answer(0, make_hanging({1.0, 1.0, -0.5}), {});
+  const model::Answer answer = controller.calc_answer(0, make_hanging({1.0, 1.0, -0.5}), {});
   EXPECT_EQ(answer.memory.numbers, Vector3d::Zero());
 }
 
@@ -188,11 +188,11 @@ TEST(FlightControllerTest, SaturatesOnlyWhereAsked) {
   scenario.mission = {make_hold({10.0, 0.0, -1.0}, 10 * kSecond)};
   scenario.controller.force_limit_n = 17.0;
   const model::SlungLoadState state = make_hanging({0.0, 0.0, -0.5});
-  const Answer free = FlightController(scenario).calc_answer(0, state, {});
+  const model::Answer free = FlightController(scenario).calc_answer(0, state, {});
   EXPECT_GT(free.f_Q_W.norm(), 17.0);
   EXPECT_EQ(free.fault, Fault::kNone);
   scenario.controller.saturate = true;
-  const Answer limited = FlightController(scenario).calc_answer(0, state, {});
+  const model::Answer limited = FlightController(scenario).calc_answer(0, state, {});
   EXPECT_LE(limited.f_Q_W.norm(), 17.0);
   EXPECT_NEAR(limited.f_Q_W.norm(), 17.0, 1e-10);
   EXPECT_LE(limited.f_Q_W.normalized().cross(free.f_Q_W.normalized()).norm(), 1e-15);
@@ -219,7 +219,7 @@ TEST(FlightControllerTest, GazeboWiringUsesThePlantsRodAndTheLawItsModels) {
   scenario.controller.state_wiring = config::StateWiring::kGazeboPlugin;
   std::mt19937 generator(3);
   const model::SlungLoadState state = draw_state(generator);
-  const Answer answer = FlightController(scenario).calc_answer(0, state, {});
+  const model::Answer answer = FlightController(scenario).calc_answer(0, state, {});
   const model::RodAngles slots =
       calc_wired_angles(state.rod, config::StateWiring::kGazeboPlugin, 1.1);
   const QsfOutput law =
@@ -253,7 +253,7 @@ TEST(FlightControllerTest, EveryNumberOfASampleThatIsNotFiniteIsAFault) {
   model::SlungLoadState bad = good;
   bad.rod.beta_dot = std::numeric_limits<double>::infinity();
   expect_failed(controller.calc_answer(0, bad, {}), Fault::kNotFinite);
-  ControllerMemory memory;
+  model::ControllerMemory memory;
   memory.numbers = Vector3d(0.0, 0.0, kNan);
   expect_failed(controller.calc_answer(0, good, memory), Fault::kNotFinite);
 }
@@ -261,7 +261,7 @@ TEST(FlightControllerTest, EveryNumberOfASampleThatIsNotFiniteIsAFault) {
 TEST(FlightControllerTest, AMemoryThatCannotBeIsAFaultNotACrash) {
   const FlightController controller(make_figure_eight());
   const model::SlungLoadState state = make_hanging({0.0, 0.0, -0.5});
-  ControllerMemory memory;
+  model::ControllerMemory memory;
   for (const std::uint32_t stage : {2u, 0xffffffffu}) {  // 1 is valid: the only stage is over
     memory.stage = stage;
     expect_failed(controller.calc_answer(100, state, memory), Fault::kNotFinite);
@@ -284,7 +284,7 @@ TEST(FlightControllerTest, AStageThatTimesOutFailsTheMission) {
   const FlightController controller(scenario);
   const model::SlungLoadState far = make_hanging({0.5, 0.0, -0.5});
   EXPECT_EQ(controller.calc_answer(499, far, {}).mission, MissionPhase::kRunning);
-  const Answer answer = controller.calc_answer(500, far, {});
+  const model::Answer answer = controller.calc_answer(500, far, {});
   expect_failed(answer, Fault::kStageTimeout);
   EXPECT_EQ(answer.reference.position, Vector3d(0.0, 0.0, -0.5));
 }

@@ -34,7 +34,7 @@ config::Stage make_within(const config::LeaveWithin& leave, const Vector3d& posi
 template <typename StateAt>
 std::uint64_t run(const Mission& mission, const StateAt& state_at, std::uint64_t limit,
                   MissionProgress& last, std::vector<std::uint64_t>* starts = nullptr) {
-  ControllerMemory memory;
+  model::ControllerMemory memory;
   for (std::uint64_t step = 0; step < limit; ++step) {
     last = mission.calc_progress(step, state_at(step), memory);
     if (starts != nullptr && (step == 0 || last.stage != memory.stage)) {
@@ -84,7 +84,7 @@ TEST(MissionTest, StageTimeCountsFromTheStagesStart) {
                         kPeriod);
   const FigureEight eight(
       std::get<config::FigureEightReference>(make_figure_eight_stage(-0.5).reference));
-  ControllerMemory memory;
+  model::ControllerMemory memory;
   memory.stage = 1;
   memory.stage_start_step = 250;
   const MissionProgress progress = mission.calc_progress(250 + 1000, {}, memory);
@@ -127,7 +127,7 @@ TEST(MissionTest, AFinishedMissionStaysFinishedWhereverTheBodyGoes) {
                         kPeriod);
   const auto inside = make_state_at({0, 0, 0}, {1, 0, -2});
   const auto outside = make_state_at({0, 0, 0}, {9, 0, -2});
-  ControllerMemory memory;
+  model::ControllerMemory memory;
   const auto remember = [&](const MissionProgress& progress) {
     memory.stage = progress.remembered_stage;
     memory.stage_start_step = progress.stage_start_step;
@@ -220,7 +220,7 @@ TEST(MissionTest, StagesOfNoDurationArePassedAtOnce) {
 
 TEST(MissionTest, RejectsAnImpossibleMemory) {
   const Mission mission({make_hold({0, 0, -1}, kSecond)}, kPeriod);
-  ControllerMemory memory;
+  model::ControllerMemory memory;
   EXPECT_TRUE(mission.is_possible(0, memory));
   memory.stage_start_step = 10;
   EXPECT_FALSE(mission.is_possible(9, memory));
@@ -235,7 +235,7 @@ TEST(MissionTest, TimeBeyondTheClocksRangeEndsTheStageInsteadOfOverflowing) {
   const Mission mission({make_hold({0, 0, -1}, kSecond), make_figure_eight_stage(-0.5)}, kPeriod);
   const MissionProgress progress = mission.calc_progress(kNever, {}, {});
   EXPECT_EQ(progress.stage, 1u);
-  ControllerMemory memory;
+  model::ControllerMemory memory;
   memory.stage = 1;
   EXPECT_EQ(mission.calc_progress(kNever, {}, memory).phase, MissionPhase::kFinished);
 }

@@ -15,7 +15,7 @@ struct FlownStep {
   double time = 0.0;
   oracle::State state;
   Eigen::Vector3d p_WL = Eigen::Vector3d::Zero();
-  Answer answer;
+  model::Answer answer;
 
   Eigen::Vector3d load_error() const { return p_WL - answer.reference.position; }
 };
@@ -40,7 +40,7 @@ inline std::vector<FlownStep> fly(const config::Scenario& scenario) {
   const int substeps = static_cast<int>(std::ceil(period / 1e-3 - 1e-9));
   const double length = scenario.vehicle.rod_length;
   std::vector<FlownStep> flight;
-  ControllerMemory memory;
+  model::ControllerMemory memory;
   oracle::State state = make_initial_state(scenario);
   for (std::uint64_t step = 0;; ++step) {
     FlownStep flown;

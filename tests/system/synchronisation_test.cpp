@@ -8,7 +8,6 @@
 #include "common/bus/convert.hpp"
 #include "common/bus/participants.hpp"
 #include "control_client/answer_stream.hpp"
-#include "control_client/messages.hpp"
 #include "tests/system/flight.hpp"
 #include "tests/system/operator.hpp"
 
@@ -73,14 +72,13 @@ class LateController {
     const States answered = std::exchange(last_states_, states);
     if (answered.run_id() != states.run_id()) return;  // no earlier state
     const VehicleState& state = answered.vehicles().front();
-    const auto result =
-        controller_.calc_answer(answered.step(), bus::to_measurement(state.measured()),
-                                control::to_memory(state.controller()));
+    const auto result = controller_.calc_answer(
+        answered.step(), bus::to_measurement(state.measured()), bus::to_memory(state.controller()));
     Commands commands;
     commands.run_id(answered.run_id());
     commands.step(answered.step());
     commands.client_name("late");
-    commands.vehicles({control::make_command_message(0, result, {})});
+    bus::fill(commands.vehicles().emplace_back(), 0, result);
     stream_.write(commands);
   }
 

@@ -6,8 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "common/bus/convert.hpp"
-
 namespace sls::bus {
 namespace {
 
@@ -39,11 +37,6 @@ TEST(NamesTest, EveryModeHasAWord) {
 
 TEST(NamesTest, EveryRoleHasAWord) {
   expect_words<ParticipantRole>({ParticipantRole::ROLE_CONTROLLER, ParticipantRole::ROLE_RECORDER});
-}
-
-TEST(NamesTest, VectorsKeepTheirOrder) {
-  EXPECT_EQ(to_array({1, 2, 3}), (std::array<double, 3>{1, 2, 3}));
-  EXPECT_EQ(to_vector({1, 2, 3}), Eigen::Vector3d(1, 2, 3));
 }
 
 }  // namespace

@@ -37,7 +37,7 @@ std::string fly(const config::Scenario& scenario, bool checks_purity = false) {
   const auto hovering = model::make_state({0.0, 0.0, -1.5}, Eigen::Vector3d::Zero(), {}, 1.0);
   try {
     const FlightController controller(scenario, kVehicle, checks_purity);
-    Answer answer;
+    model::Answer answer;
     for (std::uint64_t step = 0; answer.mission == MissionPhase::kRunning; ++step)
       answer = controller.calc_answer(step, hovering, answer.memory);
     return to_string(answer.fault);
@@ -61,7 +61,7 @@ std::string in_answer(const std::string& message) {
 TEST(SharedLibraryLawTest, FliesLikeALawOfTheProjectAndRemembersItsNumbers) {
   const FlightController controller(make_misbehaving("memory: 2"), kVehicle);
   EXPECT_EQ(controller.memory_size(), 2);
-  Answer answer;
+  model::Answer answer;
   for (std::uint64_t step = 0; step < 3; ++step)
     answer = controller.calc_answer(
         step, model::make_state({0, 0, -1.5}, Eigen::Vector3d::Zero(), {}, 1.0), answer.memory);

@@ -14,10 +14,13 @@ namespace sls::sim {
 
 bool operator==(const OfferedAnswer& a, const OfferedAnswer& b) {
   return a.run_id == b.run_id && a.step == b.step && a.client_name == b.client_name &&
-         a.command == b.command;
+         a.answer.f_Q_W == b.answer.f_Q_W && a.answer.fault == b.answer.fault;
 }
 
 namespace {
+
+using model::Fault;
+using model::MissionPhase;
 
 constexpr std::uint64_t kRun = 0xfeed;
 constexpr std::uint32_t kVehicle = 3;
@@ -40,19 +43,17 @@ const ReadyClient kWeakest = {kWeakestPeer, "weakest", 0};
 OfferedAnswer make_answer(std::uint64_t step, double force_z = -10.0) {
   OfferedAnswer command;
   command.run_id = kRun;
-  command.command.vehicle_id(kVehicle);
+  command.vehicle_id = kVehicle;
   command.step = step;
-  command.command.f_Q_W_n({0.01 * static_cast<double>(step % 1000), 1.0, force_z});
+  command.answer.f_Q_W = {0.01 * static_cast<double>(step % 1000), 1.0, force_z};
   command.client_name = "named by nobody";
-  command.command.mission(MissionPhase::MISSION_RUNNING);
-  command.command.fault(FaultCode::FAULT_NONE);
   return command;
 }
 
-OfferedAnswer make_faulted(std::uint64_t step, FaultCode fault) {
+OfferedAnswer make_faulted(std::uint64_t step, Fault fault) {
   OfferedAnswer command = make_answer(step);
-  command.command.fault(fault);
-  command.command.mission(MissionPhase::MISSION_FAILED);
+  command.answer.fault = fault;
+  command.answer.mission = MissionPhase::kFailed;
   return command;
 }
 
@@ -112,7 +113,7 @@ TEST_F(CommandGateTest, AnAnswerToAStateThatWasNotPublishedYetIsRefused) {
 
 TEST_F(CommandGateTest, TheRefusedAnswerToTheAwaitedStepIsKept) {
   EXPECT_FALSE(gate_.refused());
-  const OfferedAnswer faulted = make_faulted(0, FaultCode::FAULT_FREE_FALL);
+  const OfferedAnswer faulted = make_faulted(0, Fault::kFreeFall);
   gate_.offer(faulted, kStrongPeer);
   ASSERT_TRUE(gate_.refused());
   EXPECT_EQ(*gate_.refused(), faulted);
@@ -129,18 +130,18 @@ TEST_F(CommandGateTest, ExpectingTheNextStepForgetsTheAcceptedAnswer) {
 
 TEST_F(CommandGateTest, AForceAtTheLimitIsAcceptedAndJustBeyondRefused) {
   OfferedAnswer beyond = make_answer(0);
-  beyond.command.f_Q_W_n({0, 0, -std::nextafter(kForceLimit, 100.0)});
+  beyond.answer.f_Q_W = {0, 0, -std::nextafter(kForceLimit, 100.0)};
   EXPECT_EQ(offer_bad(beyond), Verdict::kForceLimit);
   gate_.set_clients({});  // the refused client leaves, another one joins
   gate_.set_clients({kWeak});
   OfferedAnswer at_limit = make_answer(0);
-  at_limit.command.f_Q_W_n({30.0, 0.0, -40.0});
+  at_limit.answer.f_Q_W = {30.0, 0.0, -40.0};
   EXPECT_EQ(gate_.offer(at_limit, kWeakPeer), Verdict::kAccepted);
 }
 
 TEST_F(CommandGateTest, AForceWhoseSquaresOverflowIsBeyondTheLimit) {
   OfferedAnswer command = make_answer(0);
-  command.command.f_Q_W_n({1e300, -1e300, 1e300});
+  command.answer.f_Q_W = {1e300, -1e300, 1e300};
   EXPECT_EQ(offer_bad(command), Verdict::kForceLimit);
   EXPECT_EQ(gate_.counters().rejected_force_limit(), 1u);
 }
@@ -150,13 +151,13 @@ TEST_F(CommandGateTest, AnyNumberThatIsNotFiniteIsRefused) {
   const double infinity = std::numeric_limits<double>::infinity();
   std::uint64_t offered = 0;
   for (const double bad : {nan, infinity, -infinity})
-    for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (int axis = 0; axis < 3; ++axis) {
       OfferedAnswer force = make_answer(0);
-      force.command.f_Q_W_n()[axis] = bad;
+      force.answer.f_Q_W[axis] = bad;
       EXPECT_EQ(offer_bad(force), Verdict::kNotFinite);
       OfferedAnswer memory = make_answer(0);
-      memory.command.controller().numbers() = {0.0, 0.0, 0.0};
-      memory.command.controller().numbers()[axis] = bad;
+      memory.answer.memory.numbers.setZero(3);
+      memory.answer.memory.numbers[axis] = bad;
       EXPECT_EQ(offer_bad(memory), Verdict::kNotFinite);
       offered += 2;
     }
@@ -166,14 +167,14 @@ TEST_F(CommandGateTest, AnyNumberThatIsNotFiniteIsRefused) {
 TEST_F(CommandGateTest, AReferenceThatIsNotFiniteIsRefusedAndNamed) {
   const double infinity = std::numeric_limits<double>::infinity();
   for (const double bad : {std::numeric_limits<double>::quiet_NaN(), infinity, -infinity})
-    for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (int axis = 0; axis < 3; ++axis) {
       std::array<OfferedAnswer, 5> answers;
       answers.fill(make_answer(0));
-      answers[0].command.reference().position_m()[axis] = bad;
-      answers[1].command.reference().velocity_m_s()[axis] = bad;
-      answers[2].command.reference().acceleration_m_s2()[axis] = bad;
-      answers[3].command.reference().jerk_m_s3()[axis] = bad;
-      answers[4].command.reference().snap_m_s4()[axis] = bad;
+      answers[0].answer.reference.position[axis] = bad;
+      answers[1].answer.reference.velocity[axis] = bad;
+      answers[2].answer.reference.acceleration[axis] = bad;
+      answers[3].answer.reference.jerk[axis] = bad;
+      answers[4].answer.reference.snap[axis] = bad;
       for (const OfferedAnswer& answer : answers) EXPECT_EQ(offer_bad(answer), Verdict::kNotFinite);
     }
   EXPECT_EQ(gate_.refusal(),
@@ -182,14 +183,14 @@ TEST_F(CommandGateTest, AReferenceThatIsNotFiniteIsRefusedAndNamed) {
 
 TEST_F(CommandGateTest, TheLargestNumbersOfAReferenceAreFinite) {
   OfferedAnswer answer = make_answer(0);
-  answer.command.reference().snap_m_s4().fill(std::numeric_limits<double>::max());
-  answer.command.reference().jerk_m_s3().fill(std::numeric_limits<double>::lowest());
+  answer.answer.reference.snap.setConstant(std::numeric_limits<double>::max());
+  answer.answer.reference.jerk.setConstant(std::numeric_limits<double>::lowest());
   EXPECT_EQ(gate_.offer(answer, kStrongPeer), Verdict::kAccepted);
 }
 
 TEST_F(CommandGateTest, AFaultIsNamedRatherThanItsReference) {
-  OfferedAnswer answer = make_faulted(0, FaultCode::FAULT_FREE_FALL);
-  answer.command.reference().jerk_m_s3().fill(std::numeric_limits<double>::quiet_NaN());
+  OfferedAnswer answer = make_faulted(0, Fault::kFreeFall);
+  answer.answer.reference.jerk.setConstant(std::numeric_limits<double>::quiet_NaN());
   EXPECT_EQ(offer_bad(answer), Verdict::kFault);
 }
 
@@ -203,7 +204,7 @@ TEST_F(CommandGateTest, ACommandOfAnotherRunIsRefusedAndNotCountedAgainstTheClie
 
 TEST_F(CommandGateTest, ACommandForAnUnknownVehicleIsRefusedAndNotCountedAgainstTheClient) {
   OfferedAnswer command = make_answer(0);
-  command.command.vehicle_id(kVehicle + 1);
+  command.vehicle_id = kVehicle + 1;
   EXPECT_EQ(offer_bad(command), Verdict::kUnknownVehicle);
   EXPECT_EQ(gate_.counters().rejected_vehicle(), 1u);
   EXPECT_EQ(gate_.refusal(), std::nullopt);
@@ -228,11 +229,10 @@ TEST_F(CommandGateTest, AnAnswerOfAnUnannouncedClientIsRefused) {
 
 TEST_F(CommandGateTest, NothingThatAnUnannouncedSenderSendsEndsTheFlight) {
   OfferedAnswer not_finite = make_answer(0);
-  not_finite.command.f_Q_W_n()[0] = std::numeric_limits<double>::quiet_NaN();
+  not_finite.answer.f_Q_W[0] = std::numeric_limits<double>::quiet_NaN();
   OfferedAnswer excessive = make_answer(0);
-  excessive.command.f_Q_W_n()[0] = 1e6;
-  const std::vector<OfferedAnswer> bad = {not_finite, excessive,
-                                          make_faulted(0, FaultCode::FAULT_FREE_FALL),
+  excessive.answer.f_Q_W[0] = 1e6;
+  const std::vector<OfferedAnswer> bad = {not_finite, excessive, make_faulted(0, Fault::kFreeFall),
                                           make_answer(0), make_answer(77)};
   for (const OfferedAnswer& command : bad) {
     gate_.offer(command, kStranger);
@@ -246,7 +246,8 @@ TEST_F(CommandGateTest, NothingThatAnUnannouncedSenderSendsEndsTheFlight) {
 TEST_F(CommandGateTest, ACopyOfAnAcceptedCommandIsCountedDuplicate) {
   gate_.offer(make_answer(0), kStrongPeer);
   OfferedAnswer again = make_answer(0);
-  again.command.compute_time_ns(12345);  // the compute time is not part of the answer
+  again.answer.compute_time =
+      std::chrono::nanoseconds(12345);  // the compute time is not part of the answer
   EXPECT_EQ(gate_.offer(again, kStrongPeer), Verdict::kDuplicate);
   gate_.expect(1);
   EXPECT_EQ(gate_.offer(again, kStrongPeer), Verdict::kDuplicate);
@@ -302,7 +303,7 @@ TEST_F(CommandGateTest, OldAnswersOfADistantStandbyAreSupersededWhileAnotherClie
   EXPECT_EQ(gate_.offer(make_answer(100), kStrongPeer), Verdict::kWrongStep);  // the one that flies
   EXPECT_EQ(gate_.offer(make_answer(400), kWeakPeer), Verdict::kWrongStep);    // of the future
   OfferedAnswer bad = make_answer(100);
-  bad.command.f_Q_W_n({0.0, 0.0, 300.0});
+  bad.answer.f_Q_W = {0.0, 0.0, 300.0};
   EXPECT_EQ(gate_.offer(bad, kWeakPeer), Verdict::kForceLimit);
 }
 
@@ -317,7 +318,7 @@ TEST_F(CommandGateTest, OldAnswersOfTheOnlyClientThatAnswersAreWrongSteps) {
 TEST_F(CommandGateTest, ARefusalOfTheOnlyClientNamesCauseClientAndStep) {
   gate_.expect(41);
   OfferedAnswer command = make_answer(41);
-  command.command.f_Q_W_n()[1] = std::numeric_limits<double>::quiet_NaN();
+  command.answer.f_Q_W[1] = std::numeric_limits<double>::quiet_NaN();
   offer_bad(command);
   ASSERT_TRUE(gate_.refusal());
   EXPECT_NE(gate_.refusal()->find("'strong'"), std::string::npos) << *gate_.refusal();
@@ -327,7 +328,7 @@ TEST_F(CommandGateTest, ARefusalOfTheOnlyClientNamesCauseClientAndStep) {
 
 TEST_F(CommandGateTest, AnExcessiveForceIsNamedWithItsLimit) {
   OfferedAnswer command = make_answer(0);
-  command.command.f_Q_W_n({0, 300.0, -400.0});
+  command.answer.f_Q_W = {0, 300.0, -400.0};
   offer_bad(command);
   ASSERT_TRUE(gate_.refusal());
   EXPECT_NE(gate_.refusal()->find("500 N > 50 N"), std::string::npos) << *gate_.refusal();
@@ -335,10 +336,10 @@ TEST_F(CommandGateTest, AnExcessiveForceIsNamedWithItsLimit) {
 }
 
 TEST_F(CommandGateTest, AFaultOfTheOnlyClientIsNamed) {
-  for (const auto& [fault, name] : {std::pair{FaultCode::FAULT_FREE_FALL, "free_fall"},
-                                    std::pair{FaultCode::FAULT_ROD_LEVEL, "rod_level"},
-                                    std::pair{FaultCode::FAULT_NOT_FINITE, "not_finite"},
-                                    std::pair{FaultCode::FAULT_STAGE_TIMEOUT, "stage_timeout"}}) {
+  for (const auto& [fault, name] :
+       {std::pair{Fault::kFreeFall, "free_fall"}, std::pair{Fault::kRodLevel, "rod_level"},
+        std::pair{Fault::kNotFinite, "not_finite"},
+        std::pair{Fault::kStageTimeout, "stage_timeout"}}) {
     CommandGate gate(kRun, kVehicle, {kForceLimit});
     gate.set_clients({kStrong});
     gate.expect(2);
@@ -350,8 +351,8 @@ TEST_F(CommandGateTest, AFaultOfTheOnlyClientIsNamed) {
   }
 }
 
-TEST_F(CommandGateTest, AFailedMissionWithoutAFaultCodeIsRefusedToo) {
-  EXPECT_EQ(offer_bad(make_faulted(0, FaultCode::FAULT_NONE)), Verdict::kFault);
+TEST_F(CommandGateTest, AFailedMissionWithoutAFaultIsRefusedToo) {
+  EXPECT_EQ(offer_bad(make_faulted(0, Fault::kNone)), Verdict::kFault);
   ASSERT_TRUE(gate_.refusal());
   EXPECT_EQ(gate_.refusal()->find("none"), std::string::npos) << *gate_.refusal();
 }
@@ -360,14 +361,14 @@ TEST_F(CommandGateTest, AFailedMissionWithoutAFaultCodeIsRefusedToo) {
 class MissionGateTest : public testing::Test {
  protected:
   Verdict offer(std::uint64_t step, std::uint32_t stage, MissionPhase mission,
-                FaultCode fault = FaultCode::FAULT_NONE) {
+                Fault fault = Fault::kNone) {
     gate_.emplace(kRun, kVehicle, AnswerLimits{kForceLimit, 2, 500});
     gate_->set_clients({kStrong});
     gate_->expect(step);
     OfferedAnswer answer = make_answer(step);
-    answer.command.controller().stage_index(stage);
-    answer.command.mission(mission);
-    answer.command.fault(fault);
+    answer.answer.memory.stage = stage;
+    answer.answer.mission = mission;
+    answer.answer.fault = fault;
     return gate_->offer(answer, kStrongPeer);
   }
   std::string refusal() const {
@@ -379,47 +380,46 @@ class MissionGateTest : public testing::Test {
 };
 
 TEST_F(MissionGateTest, AStageBeyondTheMissionIsRefused) {
-  EXPECT_EQ(offer(600, 4'000'000'000, MissionPhase::MISSION_RUNNING), Verdict::kUnknownStage);
+  EXPECT_EQ(offer(600, 4'000'000'000, MissionPhase::kRunning), Verdict::kUnknownStage);
   EXPECT_EQ(refusal(),
             "controller 'strong' answered step 600 with a stage beyond its mission: stage_index "
             "4000000000 > 2");
-  EXPECT_EQ(offer(600, 3, MissionPhase::MISSION_FINISHED), Verdict::kUnknownStage);
-  EXPECT_EQ(offer(600, 2, MissionPhase::MISSION_FINISHED), Verdict::kAccepted);
-  EXPECT_EQ(offer(600, 2, MissionPhase::MISSION_RUNNING), Verdict::kAccepted)
+  EXPECT_EQ(offer(600, 3, MissionPhase::kFinished), Verdict::kUnknownStage);
+  EXPECT_EQ(offer(600, 2, MissionPhase::kFinished), Verdict::kAccepted);
+  EXPECT_EQ(offer(600, 2, MissionPhase::kRunning), Verdict::kAccepted)
       << "reported by ParticipantCheck";
-  EXPECT_EQ(offer(0, 1, MissionPhase::MISSION_RUNNING), Verdict::kAccepted)
+  EXPECT_EQ(offer(0, 1, MissionPhase::kRunning), Verdict::kAccepted)
       << "as if the first stage were over";
 }
 
 TEST_F(MissionGateTest, AnEndBeforeTheEarliestStepIsRefused) {
-  EXPECT_EQ(offer(499, 1, MissionPhase::MISSION_FINISHED), Verdict::kEarlyEnd);
+  EXPECT_EQ(offer(499, 1, MissionPhase::kFinished), Verdict::kEarlyEnd);
   EXPECT_EQ(refusal(),
             "controller 'strong' answered step 499 with an early end of its mission: expected at "
             "step 500 or later");
-  EXPECT_EQ(offer(499, 2, MissionPhase::MISSION_RUNNING), Verdict::kEarlyEnd)
+  EXPECT_EQ(offer(499, 2, MissionPhase::kRunning), Verdict::kEarlyEnd)
       << "the next client would finish";
-  EXPECT_EQ(offer(500, 1, MissionPhase::MISSION_FINISHED), Verdict::kAccepted);
-  EXPECT_EQ(offer(500, 2, MissionPhase::MISSION_FINISHED), Verdict::kAccepted);
+  EXPECT_EQ(offer(500, 1, MissionPhase::kFinished), Verdict::kAccepted);
+  EXPECT_EQ(offer(500, 2, MissionPhase::kFinished), Verdict::kAccepted);
 }
 
 TEST_F(MissionGateTest, ValuesThatTheContractDoesNotDefineAreRefused) {
   EXPECT_EQ(offer(600, 1, static_cast<MissionPhase>(7)), Verdict::kUndefined);
   EXPECT_EQ(refusal(), "controller 'strong' answered step 600 with an undefined value: mission 7");
-  EXPECT_EQ(offer(600, 1, MissionPhase::MISSION_FAILED, static_cast<FaultCode>(5)),
-            Verdict::kUndefined);
+  EXPECT_EQ(offer(600, 1, MissionPhase::kFailed, static_cast<Fault>(5)), Verdict::kUndefined);
   EXPECT_EQ(refusal(), "controller 'strong' answered step 600 with an undefined value: fault 5");
   EXPECT_EQ(offer(600, 1, static_cast<MissionPhase>(0xffffffffU)), Verdict::kUndefined);
 }
 
 TEST_F(CommandGateTest, AFaultInAnswerToAnotherStepEndsNothing) {
-  EXPECT_EQ(gate_.offer(make_faulted(1, FaultCode::FAULT_FREE_FALL), kStrongPeer), Verdict::kFault);
+  EXPECT_EQ(gate_.offer(make_faulted(1, Fault::kFreeFall), kStrongPeer), Verdict::kFault);
   EXPECT_EQ(gate_.refusal(), std::nullopt);
   EXPECT_EQ(gate_.offer(make_answer(0), kStrongPeer), Verdict::kAccepted);
 }
 
 TEST_F(CommandGateTest, ARefusalDoesNotOutliveItsStep) {
   gate_.set_clients({kStrong, kWeak});
-  gate_.offer(make_faulted(0, FaultCode::FAULT_ROD_LEVEL), kStrongPeer);
+  gate_.offer(make_faulted(0, Fault::kRodLevel), kStrongPeer);
   EXPECT_EQ(gate_.offer(make_answer(0), kWeakPeer), Verdict::kAccepted);
   gate_.expect(1);
   EXPECT_EQ(gate_.offer(make_answer(1), kStrongPeer), Verdict::kAccepted);
@@ -427,11 +427,11 @@ TEST_F(CommandGateTest, ARefusalDoesNotOutliveItsStep) {
 
 TEST_F(CommandGateTest, NoRefusalWhileAnotherReadyClientCanAnswer) {
   set_clients({kStrong, kWeak});
-  gate_.offer(make_faulted(0, FaultCode::FAULT_ROD_LEVEL), kStrongPeer);
+  gate_.offer(make_faulted(0, Fault::kRodLevel), kStrongPeer);
   EXPECT_EQ(gate_.refusal(), std::nullopt);
   ASSERT_TRUE(gate_.awaited_client());
   EXPECT_EQ(gate_.awaited_client()->name, "weak");
-  gate_.offer(make_faulted(0, FaultCode::FAULT_FREE_FALL), kWeakPeer);
+  gate_.offer(make_faulted(0, Fault::kFreeFall), kWeakPeer);
   ASSERT_TRUE(gate_.refusal());
   EXPECT_NE(gate_.refusal()->find("answered step 0"), std::string::npos);
 }
@@ -439,7 +439,7 @@ TEST_F(CommandGateTest, NoRefusalWhileAnotherReadyClientCanAnswer) {
 TEST_F(CommandGateTest, ARefusalIsKnownWhileASilentStandbyIsAwaited) {
   set_clients({kStrong, kWeak});
   OfferedAnswer beyond = make_answer(0);
-  beyond.command.f_Q_W_n({0, 0, -60.0});
+  beyond.answer.f_Q_W = {0, 0, -60.0};
   gate_.offer(beyond, kStrongPeer);
   for (const char* words : {"'strong' answered step 0", "force_limit_n: 60 N > 50 N"})
     EXPECT_NE(gate_.describe_refusals().find(words), std::string::npos)
@@ -454,7 +454,7 @@ TEST_F(CommandGateTest, ARefusalIsKnownWhileASilentStandbyIsAwaited) {
 
 TEST_F(CommandGateTest, ALateAnswerThatIsRefusedIsKnownUntilItsClientGivesAValidOne) {
   gate_.expect(1);
-  gate_.offer(make_faulted(0, FaultCode::FAULT_ROD_LEVEL), kStrongPeer);
+  gate_.offer(make_faulted(0, Fault::kRodLevel), kStrongPeer);
   EXPECT_NE(gate_.describe_refusals().find("rod_level"), std::string::npos);
   EXPECT_EQ(gate_.refusal(), std::nullopt) << "the awaited step may still get its answer";
   gate_.expect(2);
@@ -464,7 +464,7 @@ TEST_F(CommandGateTest, ALateAnswerThatIsRefusedIsKnownUntilItsClientGivesAValid
 
 TEST_F(CommandGateTest, TheRefusedClientsStandbyLeavingEndsTheWait) {
   set_clients({kStrong, kWeak});
-  gate_.offer(make_faulted(0, FaultCode::FAULT_ROD_LEVEL), kStrongPeer);
+  gate_.offer(make_faulted(0, Fault::kRodLevel), kStrongPeer);
   EXPECT_EQ(gate_.refusal(), std::nullopt);
   set_clients({kStrong});
   ASSERT_TRUE(gate_.refusal());
@@ -475,7 +475,7 @@ TEST_F(CommandGateTest, TheAnswerAStandbyHasGivenIsTakenWhenTheStrongerOneIsRefu
   set_clients({kStrong, kWeak});
   EXPECT_EQ(gate_.offer(make_answer(0), kWeakPeer), Verdict::kHeld);
   EXPECT_FALSE(gate_.accepted());
-  EXPECT_EQ(gate_.offer(make_faulted(0, FaultCode::FAULT_FREE_FALL), kStrongPeer), Verdict::kFault);
+  EXPECT_EQ(gate_.offer(make_faulted(0, Fault::kFreeFall), kStrongPeer), Verdict::kFault);
   ASSERT_TRUE(gate_.accepted());
   EXPECT_EQ(*gate_.accepted(), make_answer(0));
   EXPECT_EQ(gate_.refusal(), std::nullopt);
@@ -484,8 +484,8 @@ TEST_F(CommandGateTest, TheAnswerAStandbyHasGivenIsTakenWhenTheStrongerOneIsRefu
 TEST_F(CommandGateTest, ABadCommandAfterAClientsValidAnswerIsOnlyCounted) {
   set_clients({kStrong, kWeak});
   gate_.offer(make_answer(0), kWeakPeer);
-  EXPECT_EQ(gate_.offer(make_faulted(0, FaultCode::FAULT_FREE_FALL), kWeakPeer), Verdict::kFault);
-  gate_.offer(make_faulted(0, FaultCode::FAULT_FREE_FALL), kStrongPeer);
+  EXPECT_EQ(gate_.offer(make_faulted(0, Fault::kFreeFall), kWeakPeer), Verdict::kFault);
+  gate_.offer(make_faulted(0, Fault::kFreeFall), kStrongPeer);
   ASSERT_TRUE(gate_.accepted()) << "the standby's valid answer was there first";
   EXPECT_EQ(gate_.refusal(), std::nullopt);
 }
@@ -586,7 +586,7 @@ TEST_F(CommandGateTest, WithoutAnotherClientThereIsNoTakeOver) {
 
 TEST_F(CommandGateTest, ARefusedClientDoesNotTakeOver) {
   set_clients({kStrong, kWeak});
-  gate_.offer(make_faulted(0, FaultCode::FAULT_FREE_FALL), kWeakPeer);
+  gate_.offer(make_faulted(0, Fault::kFreeFall), kWeakPeer);
   EXPECT_FALSE(gate_.pass_over_silent_client());
   EXPECT_EQ(gate_.awaited_client()->name, "strong");
 }
@@ -732,22 +732,24 @@ class Junk {
     OfferedAnswer command = make_answer(awaited, -static_cast<double>(pick(40)));
     switch (pick(7)) {
       case 0:
-        command.command.f_Q_W_n()[pick(3)] = std::numeric_limits<double>::quiet_NaN();
+        command.answer.f_Q_W[static_cast<int>(pick(3))] = std::numeric_limits<double>::quiet_NaN();
         break;
       case 1:
-        command.command.controller().numbers() = {1.0, -std::numeric_limits<double>::infinity()};
+        command.answer.memory.numbers =
+            Eigen::Vector2d(1.0, -std::numeric_limits<double>::infinity());
         break;
       case 2:
-        command.command.f_Q_W_n()[pick(3)] = kForceLimit * 1.001 + static_cast<double>(pick(1000));
+        command.answer.f_Q_W[static_cast<int>(pick(3))] =
+            kForceLimit * 1.001 + static_cast<double>(pick(1000));
         break;
       case 3:
         command.run_id = random_();
         break;
       case 4:
-        command.command.vehicle_id(kVehicle + 1 + static_cast<std::uint32_t>(pick(100)));
+        command.vehicle_id = kVehicle + 1 + static_cast<std::uint32_t>(pick(100));
         break;
       case 5:
-        command.command.fault(static_cast<FaultCode>(1 + pick(7)));
+        command.answer.fault = static_cast<Fault>(1 + pick(7));
         break;
       default:
         // Another step: far ahead, far behind, or just missed.
@@ -787,9 +789,8 @@ TEST(CommandGatePropertyTest, InvalidAnswersChangeNoForceAndAreCounted) {
         before.push_back({junk.make(step), kStranger});
         const auto command = junk.make(step);
         const auto sender = clients[junk.pick(3)].peer;
-        (command.step == step && command.run_id == kRun && command.command.vehicle_id() == kVehicle
-             ? after
-             : before)
+        (command.step == step && command.run_id == kRun && command.vehicle_id == kVehicle ? after
+                                                                                          : before)
             .push_back({command, sender});
       }
       for (std::uint64_t i = junk.pick(3); i > 0; --i) {
@@ -893,7 +894,7 @@ TEST_F(CommandGateTest, AnAnswerBringsAClientBackThatWasGone) {
 
 TEST_F(CommandGateTest, ARefusalEndsTheRunAtOnceIfAllOthersAreGone) {
   set_clients({make_gone(kStrong), kWeak});
-  gate_.offer(make_faulted(0, FaultCode::FAULT_FREE_FALL), kWeakPeer);
+  gate_.offer(make_faulted(0, Fault::kFreeFall), kWeakPeer);
   ASSERT_TRUE(gate_.refusal());
   EXPECT_NE(gate_.refusal()->find("'weak'"), std::string::npos) << *gate_.refusal();
   set_clients({make_gone(kStrong)});

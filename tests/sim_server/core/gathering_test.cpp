@@ -23,7 +23,7 @@ class GatheringTest : public testing::Test {
  protected:
   Finding look(std::int64_t ms) {
     roster_.now = at(ms);
-    return gathering_.look(roster_);
+    return gathering_.look(roster_, roster_.now);
   }
   void join(bool is_ready) {
     sync::Member member;
@@ -45,7 +45,7 @@ TEST_F(GatheringTest, EndsAtTheLookThatFindsEverybody) {
   EXPECT_EQ(gathering_.missing(), "controller ['pilot' on here is not ready]");
   join(true);
   EXPECT_EQ(look(10), Finding::kReady);
-  EXPECT_EQ(Gathering(expect(0, 0, 30), "sha", {sync::kVehicle}, at(0)).look(roster_),
+  EXPECT_EQ(Gathering(expect(0, 0, 30), "sha", {sync::kVehicle}, at(0)).look(roster_, at(0)),
             Finding::kReady);
 }
 

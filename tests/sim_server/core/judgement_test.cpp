@@ -48,18 +48,17 @@ TEST(JudgementTest, AMissionCannotBeOverBeforeTheLeastDurationsOfItsStages) {
 /// The first step at which the client says that the mission is over.
 std::uint64_t fly(const config::Scenario& scenario, const AnswerLimits& limits) {
   const control::Mission mission(scenario.mission, scenario.sync.period_ns);
-  control::ControllerMemory memory;
+  model::ControllerMemory memory;
   for (std::uint64_t step = 0;; ++step) {
     const control::MissionProgress progress = mission.calc_progress(step, {}, memory);
     memory.stage = progress.remembered_stage;
     memory.stage_start_step = progress.stage_start_step;
-    JudgedAnswer answer;
-    answer.step = step;
-    answer.is_mission_finished = progress.phase == control::MissionPhase::kFinished;
-    answer.stage = memory.stage;
-    if (const auto defect = find_defect(answer, limits))
-      ADD_FAILURE() << describe_refusal(*defect, answer, limits, "ours");
-    if (answer.is_mission_finished) return step;
+    model::Answer answer;
+    answer.mission = progress.phase;
+    answer.memory = memory;
+    if (const auto defect = find_defect(step, answer, limits))
+      ADD_FAILURE() << describe_refusal(*defect, step, answer, limits, "ours");
+    if (answer.mission == model::MissionPhase::kFinished) return step;
   }
 }
 

@@ -75,10 +75,10 @@ class ParticipantCheckTest : public testing::Test {
     answer.run_id = kRun;
     answer.step = step;
     answer.client_name = "foo";
-    answer.command.controller().stage_index(stage);
+    answer.answer.memory.stage = stage;
     return answer;
   }
-  void take(const OfferedAnswer& answer, const ControllerState& returned = {},
+  void take(const OfferedAnswer& answer, const model::ControllerMemory& returned = {},
             Verdict verdict = Verdict::kAccepted) {
     check_.note_taken(answer, make_peer(1), verdict, returned, state_);
   }
@@ -438,7 +438,7 @@ TEST_F(ParticipantCheckTest, CausesOfRejection) {
   neighbourhood_.participants = {make_entry(1)};
   look();
   OfferedAnswer answer = make_answer(5);
-  answer.command.vehicle_id(9);
+  answer.vehicle_id = 9;
   reject(answer, Verdict::kUnknownVehicle, 5);
   EXPECT_EQ(check_.describe_rejections(make_peer(1)),
             " (1 of its answers rejected, none taken: vehicle_id: expected 0-1, got 9)");
@@ -569,21 +569,21 @@ TEST_F(ParticipantCheckTest, AStampInTheFutureIsNamedForATime) {
 TEST_F(ParticipantCheckTest, AStageNameThatIsNotUtf8IsNamed) {
   neighbourhood_.participants = {make_entry(1)};
   OfferedAnswer answer = make_answer(4);
-  answer.command.reference().stage_name("h\xf6he");
+  answer.answer.stage_name = "h\xf6he";
   for (int i = 0; i < 3; ++i, ++answer.step) {
     take(answer);
     EXPECT_EQ(look(i * 2s), only(kFoo + "sls/command reference.stage_name at step 4: expected "
                                         "UTF-8, got 'h\\xf6he'"));
   }
-  answer.command.reference().stage_name("h\xc3\xb6he");
+  answer.answer.stage_name = "h\xc3\xb6he";
   take(answer);
   EXPECT_TRUE(look(7s).empty());
 }
 
 TEST_F(ParticipantCheckTest, AStageThatIsNotReturnedIsNamed) {
   neighbourhood_.participants = {make_entry(1)};
-  ControllerState returned;
-  returned.stage_index(1);
+  model::ControllerMemory returned;
+  returned.stage = 1;
   take(make_answer(300, 0), returned, Verdict::kHeld);
   EXPECT_EQ(look(), only(kFoo + "sls/command controller.stage_index at step 300: expected at least "
                                 "1, as in the state, got 0"));
@@ -592,7 +592,7 @@ TEST_F(ParticipantCheckTest, AStageThatIsNotReturnedIsNamed) {
 TEST_F(ParticipantCheckTest, NumbersThatAreNotReturnedAreNamedAsLongAsTheyAreMissing) {
   neighbourhood_.participants = {make_entry(1)};
   OfferedAnswer answer = make_answer(0);
-  answer.command.controller().numbers({1.0, 2.0});
+  answer.answer.memory.numbers = Eigen::Vector2d(1.0, 2.0);
   take(answer);
   EXPECT_TRUE(look().empty());
   for (int i = 1; i < 10; ++i) {
@@ -618,7 +618,7 @@ TEST_F(ParticipantCheckTest, AMissionThatAdvancesIsFine) {
   neighbourhood_.participants = {make_entry(1)};
   for (std::uint64_t step = 0; step < 500; ++step) take(make_answer(step, step < 200 ? 0 : 1));
   OfferedAnswer last = make_answer(500, 2);
-  last.command.mission(MissionPhase::MISSION_FINISHED);
+  last.answer.mission = model::MissionPhase::kFinished;
   for (int i = 0; i < 500; ++i, ++last.step) take(last);  // other vehicles of the fleet still fly
   EXPECT_TRUE(look().empty());
 }

@@ -27,7 +27,7 @@ namespace sls::sim {
 using Lines = std::vector<std::string>;
 using Phase = ServerCore::Phase;
 
-class ServerRig : private Outputs, private Surroundings {
+class ServerRig : public Outputs, public Surroundings {
  public:
   static constexpr std::uint64_t kRunId = 500;
   static constexpr std::int64_t kPeriod_ms = 4;
@@ -111,29 +111,33 @@ class ServerRig : private Outputs, private Surroundings {
     bool is_last = false;     ///< the mission is over
     std::uint64_t run_id = kRunId;
     std::vector<std::uint32_t> vehicle_ids{0};
-    double compute_ms = 0.0;
-    FaultCode fault = FaultCode::FAULT_NONE;
+    std::uint64_t compute_ms = 0;
+    model::Fault fault = model::Fault::kNone;
     std::int64_t clock_ahead_ms = 0;
   };
   void answer(const std::string& name, const Answer& answer) {
-    Commands sample;
-    sample.run_id(answer.run_id);
-    sample.step(answer.step);
-    sample.client_name(name);
+    CommandSample sample;
+    sample.sender = peer(name);
+    sample.arrived = {now_, to_wall(now_)};
+    sample.written = sample.arrived.wall + std::chrono::milliseconds(answer.clock_ahead_ms);
+    sample.run_id = answer.run_id;
+    sample.step = answer.step;
+    sample.client_name = name;
     for (const std::uint32_t id : answer.vehicle_ids) {
-      ControlCommand& command = sample.vehicles().emplace_back();
-      command.vehicle_id(id);
-      command.f_Q_W_n({0.0, 0.0, force_z_ - answer.more_force});
-      command.mission(answer.is_last ? MissionPhase::MISSION_FINISHED
-                                     : MissionPhase::MISSION_RUNNING);
-      command.fault(answer.fault);
-      command.controller().stage_index(answer.is_last ? 1 : 0);
-      command.compute_time_ns(static_cast<std::uint64_t>(answer.compute_ms * 1e6));
+      OfferedAnswer& offered = sample.answers.emplace_back();
+      offered.run_id = answer.run_id;
+      offered.step = answer.step;
+      offered.client_name = name;
+      offered.vehicle_id = id;
+      offered.answer.f_Q_W.z() = force_z_ - answer.more_force;
+      offered.answer.mission =
+          answer.is_last ? model::MissionPhase::kFinished : model::MissionPhase::kRunning;
+      offered.answer.fault = answer.fault;
+      offered.answer.memory.stage = answer.is_last ? 1 : 0;
+      offered.answer.compute_time =
+          std::chrono::duration<std::uint64_t, std::milli>(answer.compute_ms);
     }
-    const auto wall = to_wall(now_);
-    core_->on_commands(
-        sample,
-        {peer(name), {now_, wall}, wall + std::chrono::milliseconds(answer.clock_ahead_ms)});
+    core_->on_commands(sample);
   }
   void answer(const std::string& name, std::uint64_t step) { answer(name, Answer{step}); }
   /// Answers each step at once, up to and including `last`.
@@ -244,11 +248,10 @@ class ServerRig : private Outputs, private Surroundings {
   }
   void record_step(const Fleet& fleet) override {
     for (const auto& vehicle : fleet.vehicles()) {
-      RecordEntry entry;
-      vehicle->fill_record(entry);
+      const model::StepRecord& record = vehicle->record();
       static const char* const kKinds[] = {"none", "accepted", "held", "fail-safe", "refused"};
       records_.push_back(
-          fmt::format("{} {}", entry.step(), kKinds[static_cast<std::size_t>(entry.kind())]));
+          fmt::format("{} {}", record.step, kKinds[static_cast<std::size_t>(record.kind)]));
     }
   }
   void record_late(const Vehicle&, const OfferedAnswer& answer) override {

@@ -14,15 +14,15 @@ TimingRecord make_record(config::SyncMode mode) {
 TEST(TimingRecordTest, LockstepIsExactWhileEveryForceIsAnAnswer) {
   TimingRecord record = make_record(config::SyncMode::kLockstep);
   EXPECT_EQ(record.label(), "exact");
-  for (int i = 0; i < 100; ++i) record.add(ForceOrigin::FORCE_ANSWERED, 0);
+  for (int i = 0; i < 100; ++i) record.add(model::AnswerKind::kAccepted, 0);
   EXPECT_EQ(record.label(), "exact");
 }
 
 TEST(TimingRecordTest, LockstepThatFlewWithoutAnswersIsDegraded) {
   TimingRecord record = make_record(config::SyncMode::kLockstep);
-  record.add(ForceOrigin::FORCE_HELD, 1);
-  record.add(ForceOrigin::FORCE_HELD, 2);
-  record.add(ForceOrigin::FORCE_FAIL_SAFE, 3);
+  record.add(model::AnswerKind::kHeld, 1);
+  record.add(model::AnswerKind::kHeld, 2);
+  record.add(model::AnswerKind::kFailSafe, 3);
   EXPECT_EQ(record.label(), "degraded: 2 steps held, 1 fail-safe");
   SyncCounters counters;
   record.fill(counters);
@@ -33,9 +33,9 @@ TEST(TimingRecordTest, LockstepThatFlewWithoutAnswersIsDegraded) {
 
 TEST(TimingRecordTest, RealTimeSaysHowManyWereLateAndHowOldTheWorstForceWas) {
   TimingRecord record = make_record(config::SyncMode::kRealtime);
-  for (int i = 0; i < 998; ++i) record.add(ForceOrigin::FORCE_ANSWERED, 0);
-  record.add(ForceOrigin::FORCE_HELD, 1);
-  record.add(ForceOrigin::FORCE_HELD, 2);
+  for (int i = 0; i < 998; ++i) record.add(model::AnswerKind::kAccepted, 0);
+  record.add(model::AnswerKind::kHeld, 1);
+  record.add(model::AnswerKind::kHeld, 2);
   record.add_delay(0.0004);
   record.add_delay(0.0001);
   EXPECT_EQ(record.label(),
@@ -48,7 +48,7 @@ TEST(TimingRecordTest, RealTimeSaysHowManyWereLateAndHowOldTheWorstForceWas) {
 TEST(TimingRecordTest, RealTimeIsDegradedByFailSafeSlipsAndStatesThatWereNotPublished) {
   for (int defect = 0; defect < 3; ++defect) {
     TimingRecord record = make_record(config::SyncMode::kRealtime);
-    if (defect == 0) record.add(ForceOrigin::FORCE_FAIL_SAFE, 9);
+    if (defect == 0) record.add(model::AnswerKind::kFailSafe, 9);
     if (defect == 1) record.add_slip(0.25);
     if (defect == 2) record.set_overflow(3);
     EXPECT_EQ(record.label().rfind("degraded: real-time, ", 0), 0u) << record.label();

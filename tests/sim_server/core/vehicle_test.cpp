@@ -1,5 +1,5 @@
 // The force on a vehicle in real time when answers are late, and the beginning of absence.
-#include "sim_server/vehicle_flight.hpp"
+#include "sim_server/core/vehicle.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,12 +8,15 @@
 namespace sls::sim {
 namespace {
 
-using Action = ControllerAbsence::Action;
+using model::AnswerKind;
+using namespace std::chrono_literals;
 
 constexpr std::uint64_t kRun = 7;
 constexpr std::uint64_t kHeldSteps = 125;  // max_hold_s 0.5 at 4 ms
 
-class VehicleFlightTest : public testing::Test {
+sync::Time at(sync::Duration time) { return sync::Time(time); }
+
+class VehicleTest : public testing::Test {
  protected:
   static config::Scenario load_realtime() {
     auto scenario = config::load_scenario(SLS_SOURCE_DIR "/config/scenarios/short.yaml");
@@ -26,121 +29,127 @@ class VehicleFlightTest : public testing::Test {
     answer.run_id = kRun;
     answer.step = step;
     answer.client_name = "late";
-    answer.command.f_Q_W_n({0.0, 0.0, -16.0 - 0.001 * static_cast<double>(step)});
-    answer.command.reference().stage_index(7);
-    answer.command.mission(MissionPhase::MISSION_RUNNING);
+    answer.answer.f_Q_W.z() = -16.0 - 0.001 * static_cast<double>(step);
+    answer.answer.stage = 7;
     return answer;
   }
 
   /// Flies `step` without an answer to it. The answers to the steps `late` arrive during it.
   void fly(std::uint64_t step, const std::vector<std::uint64_t>& late) {
-    flight_.measure(step, {});
-    for (const std::uint64_t answered : late) flight_.keep_late_answer(make_answer(answered));
-    flight_.fly_without_answer(flight_.absence.decide(0.0, 0.0));
+    vehicle_.measure(step, {});
+    for (const std::uint64_t answered : late) vehicle_.keep_late_answer(make_answer(answered));
+    vehicle_.fly_without_answer(vehicle_.absence.decide(0.0, 0.0));
   }
-  const Applied& applied() const { return flight_.outcome()->applied; }
+  const model::StepRecord& record() const { return vehicle_.record(); }
 
-  VehicleFlight flight_{load_realtime(), 0, kRun};
+  Vehicle vehicle_{load_realtime(), 0, kRun};
 };
 
-TEST_F(VehicleFlightTest, AnswersThatAreAllOnePeriodLateFlyItWithoutEnd) {
+TEST_F(VehicleTest, AnswersThatAreAllOnePeriodLateFlyItWithoutEnd) {
   fly(0, {});
   for (std::uint64_t step = 1; step < 4 * kHeldSteps; ++step) {
     fly(step, {step - 1});
-    ASSERT_EQ(applied().origin, ForceOrigin::FORCE_HELD) << step;
-    ASSERT_EQ(applied().answer_f_Q_W.z(), make_answer(step - 1).command.f_Q_W_n()[2]) << step;
-    ASSERT_EQ(flight_.calc_age(), 1u) << step;
+    ASSERT_EQ(record().kind, AnswerKind::kHeld) << step;
+    ASSERT_EQ(record().answer.f_Q_W, make_answer(step - 1).answer.f_Q_W) << step;
+    ASSERT_EQ(vehicle_.calc_age(), 1u) << step;
   }
 }
 
-TEST_F(VehicleFlightTest, OnlyANewerAnswerIsFresh) {
+TEST_F(VehicleTest, OnlyANewerAnswerIsFresh) {
   fly(0, {});
   fly(1, {0});
   fly(2, {1});
   for (std::uint64_t step = 3; step < 2 + kHeldSteps; ++step) {
     fly(step, {0, 1});  // answers it already has
-    ASSERT_EQ(applied().origin, ForceOrigin::FORCE_HELD) << step;
+    ASSERT_EQ(record().kind, AnswerKind::kHeld) << step;
   }
   fly(2 + kHeldSteps, {0, 1});
-  EXPECT_EQ(applied().origin, ForceOrigin::FORCE_FAIL_SAFE);
+  EXPECT_EQ(record().kind, AnswerKind::kFailSafe);
   fly(3 + kHeldSteps, {2});
-  EXPECT_EQ(applied().origin, ForceOrigin::FORCE_HELD)
-      << "a newer one, however late, ends the fail-safe";
+  EXPECT_EQ(record().kind, AnswerKind::kHeld) << "a newer one, however late, ends the fail-safe";
 }
 
-TEST_F(VehicleFlightTest, TheRecordSaysWhichAnswerIsInForce) {
+TEST_F(VehicleTest, TheRecordSaysWhichAnswerIsInForce) {
   const bus::PeerId peer{};
-  flight_.gate.set_clients({{peer, "late", 0}});
-  RecordEntry entry;
-  flight_.measure(0, {});
-  flight_.gate.expect(0);
-  ASSERT_EQ(flight_.gate.offer(make_answer(0), peer), Verdict::kAccepted);
-  flight_.take_answer();
-  flight_.fill_record(entry);
-  EXPECT_EQ(entry.kind(), AnswerKind::ANSWER_ACCEPTED);
-  EXPECT_EQ(entry.step(), 0u);
-  EXPECT_EQ(entry.answered_step(), 0u);
-  EXPECT_STREQ(entry.client_name().c_str(), "late");
-  EXPECT_EQ(entry.answer(), make_answer(0).command);
-  flight_.actuate();
+  vehicle_.gate.set_clients({{peer, "late", 0}});
+  vehicle_.measure(0, {});
+  vehicle_.gate.expect(0);
+  ASSERT_EQ(vehicle_.gate.offer(make_answer(0), peer), Verdict::kAccepted);
+  vehicle_.take_answer();
+  EXPECT_EQ(record().kind, AnswerKind::kAccepted);
+  EXPECT_EQ(record().step, 0u);
+  EXPECT_EQ(record().answered_step, 0u);
+  EXPECT_EQ(record().client_name, "late");
+  EXPECT_EQ(record().answer.f_Q_W, make_answer(0).answer.f_Q_W);
+  EXPECT_EQ(record().answer.stage, 7u);
+  vehicle_.actuate();
 
-  flight_.gate.expect(1);
+  vehicle_.gate.expect(1);
   fly(1, {});
-  flight_.fill_record(entry);
-  EXPECT_EQ(entry.kind(), AnswerKind::ANSWER_HELD);
-  EXPECT_EQ(entry.step(), 1u);
-  EXPECT_EQ(entry.answered_step(), 0u);
-  EXPECT_EQ(entry.answer(), make_answer(0).command);
-  EXPECT_EQ(entry.f_Q_W_n(), make_answer(0).command.f_Q_W_n()) << "which acted before";
+  EXPECT_EQ(record().kind, AnswerKind::kHeld);
+  EXPECT_EQ(record().step, 1u);
+  EXPECT_EQ(record().answered_step, 0u);
+  EXPECT_EQ(record().answer.f_Q_W, make_answer(0).answer.f_Q_W);
+  EXPECT_EQ(record().f_Q_W, make_answer(0).answer.f_Q_W) << "which acted before";
+  vehicle_.complete_record();
+  EXPECT_EQ(record().kind, AnswerKind::kHeld) << "the step is settled";
 
-  flight_.actuate();
-  flight_.gate.expect(2);
-  flight_.measure(2, {});
-  flight_.fill_record(entry);
-  EXPECT_EQ(entry.kind(), AnswerKind::ANSWER_NONE);
+  vehicle_.actuate();
+  vehicle_.gate.expect(2);
+  vehicle_.measure(2, {});
+  vehicle_.complete_record();
+  EXPECT_EQ(record().kind, AnswerKind::kNone);
+  EXPECT_EQ(record().client_name, "");
   OfferedAnswer refused = make_answer(2);
-  refused.command.fault(FaultCode::FAULT_FREE_FALL);
-  flight_.gate.offer(refused, peer);
-  flight_.fill_record(entry);
-  EXPECT_EQ(entry.kind(), AnswerKind::ANSWER_REFUSED);
-  EXPECT_EQ(entry.answered_step(), 2u);
-  EXPECT_EQ(entry.answer(), refused.command);
+  refused.answer.fault = model::Fault::kFreeFall;
+  vehicle_.gate.offer(refused, peer);
+  vehicle_.complete_record();
+  EXPECT_EQ(record().kind, AnswerKind::kRefused);
+  EXPECT_EQ(record().answered_step, 2u);
+  EXPECT_EQ(record().answer.fault, model::Fault::kFreeFall);
 }
 
-TEST_F(VehicleFlightTest, ALateAnswerEndsTheAbsence) {
-  flight_.measure(0, {});
-  flight_.note_waiting(VehicleFlight::Clock::now() - std::chrono::hours(1));
-  EXPECT_GE(flight_.calc_absence_s(), 3600.0);
-  flight_.keep_late_answer(make_answer(0));
-  EXPECT_EQ(flight_.calc_absence_s(), 0.0);
+TEST_F(VehicleTest, ALateAnswerEndsTheAbsence) {
+  vehicle_.measure(0, {});
+  vehicle_.note_waiting(at(1s));
+  EXPECT_EQ(vehicle_.calc_absence_s(at(3s)), 2.0);
+  vehicle_.keep_late_answer(make_answer(0));
+  EXPECT_EQ(vehicle_.calc_absence_s(at(4s)), 0.0);
 }
 
-TEST_F(VehicleFlightTest, ALateEndIsWithdrawnByANewerAnswer) {
+TEST_F(VehicleTest, RefusalsLastUntilAnAnswerIsValid) {
+  vehicle_.note_refused(true, at(1s));
+  vehicle_.note_refused(true, at(2s));
+  EXPECT_EQ(vehicle_.calc_refused_s(at(3s)), 2.0);
+  vehicle_.note_refused(false, at(4s));
+  EXPECT_EQ(vehicle_.calc_refused_s(at(5s)), 0.0);
+}
+
+TEST_F(VehicleTest, ALateEndIsWithdrawnByANewerAnswer) {
   const bus::PeerId peer{};
-  flight_.gate.set_clients({{peer, "late", 0}});
+  vehicle_.gate.set_clients({{peer, "late", 0}});
   OfferedAnswer last = make_answer(0);
-  last.command.mission(MissionPhase::MISSION_FINISHED);
+  last.answer.mission = model::MissionPhase::kFinished;
   fly(0, {});
-  EXPECT_FALSE(flight_.has_ended_late());
-  flight_.gate.expect(1);
-  flight_.measure(1, {});
-  flight_.keep_late_answer(last);
-  EXPECT_TRUE(flight_.has_ended_late());
-  ASSERT_EQ(flight_.gate.offer(make_answer(1), peer), Verdict::kAccepted);
-  flight_.take_answer();
-  EXPECT_FALSE(flight_.has_ended_late()) << "a newer answer says that the mission goes on";
-  flight_.keep_late_answer(last);
-  EXPECT_FALSE(flight_.has_ended_late()) << "an older one does not";
+  EXPECT_FALSE(vehicle_.has_ended_late());
+  vehicle_.gate.expect(1);
+  vehicle_.measure(1, {});
+  vehicle_.keep_late_answer(last);
+  EXPECT_TRUE(vehicle_.has_ended_late());
+  ASSERT_EQ(vehicle_.gate.offer(make_answer(1), peer), Verdict::kAccepted);
+  vehicle_.take_answer();
+  EXPECT_FALSE(vehicle_.has_ended_late()) << "a newer answer says that the mission goes on";
+  vehicle_.keep_late_answer(last);
+  EXPECT_FALSE(vehicle_.has_ended_late()) << "an older one does not";
 }
 
-TEST_F(VehicleFlightTest, APauseIsNoAbsence) {
-  flight_.note_rest(std::chrono::hours(1));
-  EXPECT_EQ(flight_.calc_absence_s(), 0.0);
-  flight_.measure(0, {});
-  flight_.note_waiting(VehicleFlight::Clock::now() - std::chrono::hours(2));
-  flight_.note_rest(std::chrono::hours(1));
-  EXPECT_GE(flight_.calc_absence_s(), 3600.0);
-  EXPECT_LT(flight_.calc_absence_s(), 7200.0);
+TEST_F(VehicleTest, APauseIsNoAbsence) {
+  vehicle_.note_rest(1h);
+  EXPECT_EQ(vehicle_.calc_absence_s(at(1h)), 0.0);
+  vehicle_.measure(0, {});
+  vehicle_.note_waiting(at(0h));
+  vehicle_.note_rest(1h);
+  EXPECT_EQ(vehicle_.calc_absence_s(at(2h)), 3600.0);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "sim_server/fault_line.hpp"
+#include "sim_server/core/fault_line.hpp"
 
 #include <cmath>
 #include <cstddef>
