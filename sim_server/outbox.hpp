@@ -8,6 +8,7 @@
 #include <variant>
 
 #include "common/config/scenario.hpp"
+#include "sim_server/backlog.hpp"
 #include "sim_server/core/outputs.hpp"
 #include "sim_server/endpoints.hpp"
 #include "sim_server/record_stream.hpp"
@@ -16,7 +17,7 @@ namespace sls::sim {
 
 /// Does what the core wants. States and records leave at once, on the thread that calls the core.
 /// A write to a reliable topic may block, so everything else waits here for the main thread.
-class Outbox : public Outputs {
+class Outbox : public Outputs, public Backlog {
  public:
   explicit Outbox(Endpoints& endpoints) : endpoints_(endpoints) {}
 
@@ -24,10 +25,10 @@ class Outbox : public Outputs {
   void begin_run(const config::Sync& sync, std::uint64_t run_id);
 
   /// True if something waits for the main thread.
-  bool is_waiting() const { return is_waiting_; }
+  bool is_waiting() const override { return is_waiting_; }
   /// Writes what waits. On the main thread, without a lock.
   /// @throws bus::BusError if a write is refused: the rest is lost.
-  void write_waiting();
+  void write_waiting() override;
 
   std::uint64_t written_records() const { return records_->written(); }
   /// Steps whose records are kept for late recorders.

@@ -33,26 +33,29 @@ void log_run(const config::Scenario& scenario, const std::vector<std::uint32_t>&
 
 Server::Server(bus::Node& node, const Assignment& assignment, std::size_t threads)
     : assignment_(assignment),
-      is_lockstep_(assignment.scenario.sync.mode == config::SyncMode::kLockstep),
       workers_(std::min(threads, assignment.vehicle_ids.size())),
+      loop_(assignment.scenario.sync.mode == config::SyncMode::kLockstep, view_, outbox_),
       endpoints_(
           node, assignment.scenario.sync.mode,
-          [this](const Commands& sample, const bus::PeerId& sender) { receive(sample, sender); },
-          [this](const SimControl& request) { events_.put(request); }),
+          [this](const Commands& sample, const bus::PeerId& sender) {
+            loop_.put([&](CommandSample& received) { fill(received, sample, sender); });
+          },
+          [this](const SimControl& request) { loop_.put(request); }),
       outbox_(endpoints_),
       view_(endpoints_, outbox_) {}
 
 void Server::run() {
   auto core = make_core({});
   while (true) {
-    fly(*core);
+    loop_.run(*core);
+    bus::stop_spinning();
     if (core->end() != ServerCore::End::kReset) break;
     try {
       core = make_core({0, false, core->is_paused()});
     } catch (const std::exception& error) {
       // The ended run tells the participants that it has no successor.
-      core->on_failure(error.what(), Clock::now());
-      write_waiting(*core);
+      core->on_failure(error.what(), std::chrono::steady_clock::now());
+      loop_.write_waiting(*core);
       break;
     }
   }
@@ -72,60 +75,8 @@ std::unique_ptr<ServerCore> Server::make_core(ServerCore::Start start) {
   endpoints_.parameters.write(make_parameters_message(start.run_id, assignment_.vehicle_ids,
                                                       scenario, fleet->plant(), app::version()));
   log_run(scenario, assignment_.vehicle_ids, start.run_id);
-  return std::make_unique<ServerCore>(scenario, start, std::move(fleet), outbox_, Clock::now());
-}
-
-// --- main thread ---------------------------------------------------------------------------------
-
-void Server::fly(ServerCore& core) {
-  events_.clear_commands();  // of an earlier run
-  std::unique_lock lock(core_mutex_);
-  core_ = &core;
-  while (core.phase() != ServerCore::Phase::kEnded) {
-    deadline_ = core.next_deadline();
-    lock.unlock();
-    write_waiting(core);
-    wait_until_due();
-    main_wants_core_ = true;
-    lock.lock();
-    main_wants_core_ = false;
-    if (core.has_news(view_)) core.on_look(view_, Clock::now());
-    deliver_events(core);
-    core.on_time(Clock::now());
-    if (const auto now = Clock::now(); core.is_look_due(now)) core.on_look(view_, now);
-  }
-  core_ = nullptr;
-  lock.unlock();
-  bus::stop_spinning();
-  write_waiting(core);
-}
-
-void Server::write_waiting(ServerCore& core) {
-  while (outbox_.is_waiting()) {
-    try {
-      outbox_.write_waiting();
-    } catch (const std::exception& error) {  // such as a reader that acknowledges nothing
-      const std::lock_guard lock(core_mutex_);
-      core.on_failure(error.what(), Clock::now());
-    }
-  }
-}
-
-void Server::wait_until_due() {
-  do {
-    // Each step that the middleware's thread takes meanwhile moves the deadline.
-    sleeps_until_ = deadline_.load();
-    if (outbox_.is_waiting() || events_.wait(sleeps_until_)) return;
-  } while (Clock::now() < deadline_.load());
-}
-
-void Server::deliver_events(ServerCore& core) {
-  for (EventQueue::Event& event : events_.take_all()) {
-    if (auto* sample = std::get_if<CommandSample>(&event))
-      core.on_commands(*sample);
-    else
-      core.on_request(std::get<SimControl>(event), view_, Clock::now());
-  }
+  return std::make_unique<ServerCore>(scenario, start, std::move(fleet), outbox_,
+                                      std::chrono::steady_clock::now());
 }
 
 void Server::linger(const ServerCore& core) {
@@ -136,19 +87,10 @@ void Server::linger(const ServerCore& core) {
   endpoints_.status.wait_for_acknowledgments(1s);
 }
 
-// --- threads of the middleware -------------------------------------------------------------------
-
-void Server::receive(const Commands& sample, const bus::PeerId& sender) {
-  if (is_lockstep_ && pass_on(sample, sender)) return;
-  CommandSample received;
-  fill(received, sample, sender);
-  events_.put(std::move(received));
-}
-
 void Server::fill(CommandSample& received, const Commands& sample,
                   const bus::PeerId& sender) const {
   received.sender = sender;
-  received.arrived = {Clock::now(), std::chrono::system_clock::now()};
+  received.arrived = {std::chrono::steady_clock::now(), std::chrono::system_clock::now()};
   received.written = endpoints_.commands.written();
   received.run_id = sample.run_id();
   received.step = sample.step();
@@ -162,22 +104,6 @@ void Server::fill(CommandSample& received, const Commands& sample,
     offered.vehicle_id = sample.vehicles()[i].vehicle_id();
     bus::fill(offered.answer, sample.vehicles()[i]);
   }
-}
-
-bool Server::pass_on(const Commands& sample, const bus::PeerId& sender) {
-  if (main_wants_core_ || !events_.is_empty()) return false;
-  const std::unique_lock lock(core_mutex_, std::try_to_lock);
-  if (!lock || !core_ || core_->phase() != ServerCore::Phase::kAwaitingAnswers ||
-      core_->has_news(view_))
-    return false;
-  fill(received_, sample, sender);
-  core_->on_commands(received_);
-  const sync::Time deadline = core_->next_deadline();
-  deadline_ = deadline;
-  if (deadline < sleeps_until_.load() || outbox_.is_waiting() ||
-      core_->phase() == ServerCore::Phase::kEnded)
-    events_.interrupt();
-  return true;
 }
 
 }  // namespace sls::sim

@@ -7,7 +7,9 @@
 
 #include "common/bus/convert.hpp"
 #include "common/bus/participants.hpp"
+#include "common/config/scenario.hpp"
 #include "control_client/answer_stream.hpp"
+#include "control_client/flight_controller.hpp"
 #include "tests/system/flight.hpp"
 #include "tests/system/operator.hpp"
 

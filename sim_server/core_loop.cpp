@@ -1,0 +1,68 @@
+#include "sim_server/core_loop.hpp"
+
+#include <exception>
+#include <variant>
+
+namespace sls::sim {
+
+void CoreLoop::run(ServerCore& core) {
+  events_.clear_commands();  // of an earlier run
+  std::unique_lock lock(core_mutex_);
+  core_ = &core;
+  while (core.phase() != ServerCore::Phase::kEnded) {
+    deadline_ = core.next_deadline();
+    lock.unlock();
+    write_waiting(core);
+    wait_until_due();
+    main_wants_core_ = true;
+    lock.lock();
+    main_wants_core_ = false;
+    if (core.has_news(around_)) core.on_look(around_, Clock::now());
+    deliver_events(core);
+    core.on_time(Clock::now());
+    if (const auto now = Clock::now(); core.is_look_due(now)) core.on_look(around_, now);
+  }
+  core_ = nullptr;
+  lock.unlock();
+  write_waiting(core);
+}
+
+void CoreLoop::write_waiting(ServerCore& core) {
+  while (backlog_.is_waiting()) {
+    try {
+      backlog_.write_waiting();
+    } catch (const std::exception& error) {  // such as a reader that acknowledges nothing
+      const std::lock_guard lock(core_mutex_);
+      core.on_failure(error.what(), Clock::now());
+    }
+  }
+}
+
+void CoreLoop::wait_until_due() {
+  do {
+    // Each step that the middleware's thread takes meanwhile moves the deadline.
+    sleeps_until_ = deadline_.load();
+    if (backlog_.is_waiting() || events_.wait(sleeps_until_)) return;
+  } while (Clock::now() < deadline_.load());
+}
+
+void CoreLoop::deliver_events(ServerCore& core) {
+  for (EventQueue::Event& event : events_.take_all()) {
+    if (auto* sample = std::get_if<CommandSample>(&event))
+      core.on_commands(*sample);
+    else
+      core.on_request(std::get<SimControl>(event), around_, Clock::now());
+  }
+}
+
+/// The middleware's thread has called the core: wakes the main thread if it has work now, or
+/// sleeps too long.
+void CoreLoop::note_deadline() {
+  const sync::Time deadline = core_->next_deadline();
+  deadline_ = deadline;
+  if (deadline < sleeps_until_.load() || backlog_.is_waiting() ||
+      core_->phase() == ServerCore::Phase::kEnded)
+    events_.interrupt();
+}
+
+}  // namespace sls::sim

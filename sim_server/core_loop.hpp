@@ -1,0 +1,73 @@
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <mutex>
+#include <utility>
+
+#include "sim_server/backlog.hpp"
+#include "sim_server/core/server_core.hpp"
+#include "sim_server/event_queue.hpp"
+
+namespace sls::sim {
+
+/// Drives the core of a server: the only place with its lock and its waiting.
+///
+/// In lockstep the core is called on the middleware's thread that delivers an answer; there it also
+/// publishes the next state, because waking the main thread would make a step a fifth longer. That
+/// thread only tries to lock the core. If it fails, or if other events wait, the sample waits for
+/// the main thread. In real time every event goes to the main thread.
+class CoreLoop {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  CoreLoop(bool is_lockstep, Surroundings& around, Backlog& backlog)
+      : is_lockstep_(is_lockstep), around_(around), backlog_(backlog) {}
+
+  /// Drives `core` to its end, on the main thread.
+  void run(ServerCore& core);
+  /// Writes all that waits.
+  void write_waiting(ServerCore& core);
+
+  /// A request of an operator came, on any thread.
+  void put(const SimControl& request) { events_.put(request); }
+  /// A sample of sls/command came, on any thread. `fill(sample)` fills in all of it.
+  template <class Fill>
+  void put(const Fill& fill) {
+    if (is_lockstep_ && pass_on(fill)) return;
+    CommandSample sample;
+    fill(sample);
+    events_.put(std::move(sample));
+  }
+
+ private:
+  template <class Fill>
+  bool pass_on(const Fill& fill) {
+    if (main_wants_core_ || !events_.is_empty()) return false;
+    const std::unique_lock lock(core_mutex_, std::try_to_lock);
+    if (!lock || !core_ || core_->phase() != ServerCore::Phase::kAwaitingAnswers ||
+        core_->has_news(around_))
+      return false;
+    fill(received_);
+    core_->on_commands(received_);
+    note_deadline();
+    return true;
+  }
+  void note_deadline();
+  void wait_until_due();
+  void deliver_events(ServerCore& core);
+
+  const bool is_lockstep_;
+  Surroundings& around_;
+  Backlog& backlog_;
+  EventQueue events_;
+
+  std::mutex core_mutex_;
+  ServerCore* core_ = nullptr;  // under the mutex; null while no run flies
+  CommandSample received_;      // likewise; a member to avoid allocation
+  std::atomic<bool> main_wants_core_{false};
+  std::atomic<sync::Time> deadline_{sync::Time()};      // of the core
+  std::atomic<sync::Time> sleeps_until_{sync::Time()};  // the main thread
+};
+
+}  // namespace sls::sim
