@@ -1,8 +1,7 @@
 /// Additions of a plant, an autopilot or a control law to the scenario file: keys of its own in the
 /// section that names it. Each folder of sim_server/plants, sim_server/autopilots and
-/// control_client/laws describes them in its keys.hpp, without Simbody or DDS. Every program links
-/// all of them, so all programs accept the same files and print the same errors. How to describe
-/// keys: own_keys.hpp.
+/// control_client/laws describes them in its keys.hpp, without Simbody or DDS; common/models
+/// registers them. How to describe keys: own_keys.hpp.
 #pragma once
 
 #include <map>
@@ -39,16 +38,16 @@ class ModelKeys {
 template <class Section>
 using ModelRegistry = std::map<std::string, const ModelKeys<Section>*>;
 
-/// Every plant of the project. Defined in sim_server/plants/keys.cpp.
-const ModelRegistry<Plant>& plant_keys();
-/// Every autopilot of the project. Defined in sim_server/autopilots/keys.cpp.
-const ModelRegistry<Autopilot>& autopilot_keys();
-/// Every control law of the project. Defined in control_client/laws/keys.cpp.
-const ModelRegistry<Controller>& law_keys();
+/// The models that a scenario may name.
+struct Models {
+  ModelRegistry<Plant> plants;
+  ModelRegistry<Autopilot> autopilots;
+  ModelRegistry<Controller> laws;
+};
 
-/// "pid, qsf or a shared library (a path ending in .so)".
-template <class Section>
-std::string list_models(const ModelRegistry<Section>& registry) {
+/// "pid, qsf or a shared library (a path ending in .so)". A registry maps names to anything.
+template <class Registry>
+std::string list_models(const Registry& registry) {
   std::string names;
   for (const auto& item : registry) names += (names.empty() ? "" : ", ") + item.first;
   return names + " or a shared library (a path ending in .so)";
