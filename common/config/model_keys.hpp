@@ -6,6 +6,7 @@
 
 #include <map>
 #include <string>
+#include <vector>
 
 #include "common/config/scenario.hpp"
 
@@ -16,6 +17,16 @@ class KeyNames;
 class MapReader;
 class MapWriter;
 class Places;
+
+/// A vehicle as pictures show it, in the frame B of its body.
+struct VehicleShape {
+  struct Rotor {
+    Eigen::Vector3d position;  ///< m
+    int spin;                  ///< as in the scenario: 1 counter-clockwise, −1 clockwise
+  };
+  Eigen::Vector3d attachment = Eigen::Vector3d::Zero();  ///< of the pendulum, m
+  std::vector<Rotor> rotors;                             ///< none: a point mass
+};
 
 /// The keys of one model. `Section` is the section that has them: Plant, Autopilot or Controller.
 template <class Section>
@@ -32,6 +43,8 @@ class ModelKeys {
   /// attitude and attitude errors (`estimator`); a plant of the project also accepts an
   /// `autopilot`.
   virtual bool has_attitude() const { return false; }
+  /// The shape of the vehicles of a plant.
+  virtual VehicleShape calc_shape(const Section&) const { return {}; }
 };
 
 /// The keys of each model, by name.
