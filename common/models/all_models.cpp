@@ -34,5 +34,8 @@ const config::Models& config::all_models() {
   };
   return models;
 }
+#undef SLS_PLANT
+#undef SLS_AUTOPILOT
+#undef SLS_LAW
 
 }  // namespace sls
