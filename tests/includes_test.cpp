@@ -1,10 +1,14 @@
-// Rules for includes: which folders each folder may include, and what a core may not use.
+// Rules for includes: which folders each folder may include, and what a core may not use. The
+// folders' libraries may link those of the same folders, without a circle.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
+#include <map>
 #include <regex>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -34,6 +38,9 @@ const std::vector<Rule> kRules = {
       "common/bus/topics.hpp", "common/config", "Wire", "Fast DDS"}},
     {"common/config", {"common/model"}},
     {"common/model", {}},
+    {"common/models",
+     {"common/config", "control_client/laws/laws.def", "sim_server/autopilots/autopilots.def",
+      "sim_server/plants/plants.def"}},
     {"common/plugin", {"common/config", "common/model"}},
     {"common/ros", {"common/model", "Fast DDS"}},
     {"common/sync", {"common/bus/peer.hpp", "Wire"}},
@@ -56,11 +63,9 @@ const std::vector<Rule> kRules = {
     {"tools/ctl", {"common"}},
     {"tools/delay_margin", {"closed_loop", "common"}},
     {"tools/doctor", {"common", "Wire", "Fast DDS"}},
-    {"tools/reference", {"common/config"}},
+    {"tools/reference", {"common/config", "common/models"}},
     {"tools/verify", {"common", "recorder"}},
-    {"tools/view",
-     {"common", "control_client/reference_trajectory.hpp", "recorder",
-      "sim_server/plants/multirotor/keys.hpp", "tools/ctl"}},
+    {"tools/view", {"common", "control_client/reference_trajectory.hpp", "recorder", "tools/ctl"}},
 };
 
 /// Folders whose files decide only: time and all that happens are arguments (CONTRIBUTING.md).
@@ -100,13 +105,16 @@ bool is_allowed(const std::string& file, const std::string& header, bool is_ours
   });
 }
 
+const std::vector<std::string> kProduct = {"bench",    "closed_loop",    "common",
+                                           "idl",      "control_client", "python",
+                                           "recorder", "sim_server",     "tools"};
+
 /// `FILE:LINE: includes HEADER` for each include that breaks a rule, in the product's folders of
 /// `root`.
 std::vector<std::string> find_faults(const fs::path& root) {
   const std::regex include(R"(^\s*#\s*include\s*([<"])([^>"]+)[>"])");
   std::vector<std::string> faults;
-  for (const char* top : {"bench", "closed_loop", "common", "control_client", "python", "recorder",
-                          "sim_server", "tools"}) {
+  for (const std::string& top : kProduct) {
     if (!fs::exists(root / top)) continue;
     for (const auto& entry : fs::recursive_directory_iterator(root / top)) {
       const std::string ending = entry.path().extension();
@@ -136,15 +144,127 @@ std::vector<std::string> find_faults(const fs::path& root) {
   return faults;
 }
 
+/// A library or program: the folder of its CMakeLists.txt, and the libraries that it links.
+struct Target {
+  std::string folder;
+  std::set<std::string> links;
+};
+
+std::string read_cmake(const fs::path& file) {
+  std::ifstream stream(file);
+  const std::string text{std::istreambuf_iterator<char>(stream), {}};
+  return std::regex_replace(text, std::regex("#[^\n]*"), "");
+}
+
+/// The targets in the product's folders of `root`.
+std::map<std::string, Target> read_targets(const fs::path& root) {
+  const std::regex call(R"((\w+)\(\s*(\w+)(?=[\s)])([^)]*)\))"), ours(R"(\bsls(?:::|_)(\w+))");
+  std::map<std::string, Target> targets;
+  for (const std::string& top : kProduct) {
+    if (!fs::exists(root / top)) continue;
+    for (const auto& entry : fs::recursive_directory_iterator(root / top)) {
+      if (entry.path().filename() != "CMakeLists.txt") continue;
+      std::string text = read_cmake(entry.path());
+      if (std::smatch kind; std::regex_search(text, kind, std::regex(R"(sls_add_models\((\w+))")))
+        text += std::regex_replace(read_cmake(root / "common/models/models.cmake"),
+                                   std::regex(R"(\$\{kind\})"), kind.str(1));
+      for (std::sregex_iterator it(text.begin(), text.end(), call), end; it != end; ++it) {
+        const std::string command = (*it)[1], name = (*it)[2], arguments = (*it)[3];
+        if (std::regex_match(command, std::regex("add_library|add_executable|\\w+_add_module|"
+                                                 "sls_add_wire_types")))
+          targets[name].folder = entry.path().parent_path().lexically_relative(root);
+        if (command == "target_link_libraries")
+          for (std::sregex_iterator link(arguments.begin(), arguments.end(), ours); link != end;
+               ++link)
+            targets[name].links.insert("sls_" + link->str(1));
+      }
+    }
+  }
+  return targets;
+}
+
+/// True if files of folder `from` may include files of folder `to`.
+bool may_link(const std::string& from, const std::string& to) {
+  if (from == to) return true;
+  if (!find_rule(from + "/any.cpp")) return false;
+  const std::string any = to == "idl" ? "sls.h" : to + "/any.hpp";
+  if (is_allowed(from + "/any.cpp", any, true)) return true;
+  const std::vector<std::string>& others = find_rule(from + "/any.cpp")->others;
+  return std::any_of(others.begin(), others.end(), [&](const fs::path& other) {
+    return other.has_extension() && other.parent_path() == to;
+  });
+}
+
+/// `FOLDER: TARGET links LIBRARY` for each link that breaks a rule for includes, and each target in
+/// a circle of links.
+std::vector<std::string> find_link_faults(const fs::path& root) {
+  std::vector<std::string> faults;
+  std::map<std::string, Target> targets = read_targets(root);
+  for (const auto& [name, target] : targets)
+    for (const std::string& link : target.links)
+      if (targets.count(link) == 0 || !may_link(target.folder, targets[link].folder))
+        faults.push_back(target.folder + ": " + name + " links " + link);
+  // Removes, again and again, the targets that link none of the rest or are linked by none.
+  const auto is_free = [&](const auto& item) {
+    const auto links = [](const Target& from, const std::string& to) {
+      return from.links.count(to) > 0;
+    };
+    return std::none_of(targets.begin(), targets.end(),
+                        [&](const auto& other) { return links(item.second, other.first); }) ||
+           std::none_of(targets.begin(), targets.end(),
+                        [&](const auto& other) { return links(other.second, item.first); });
+  };
+  const auto find_free = [&] { return std::find_if(targets.begin(), targets.end(), is_free); };
+  for (auto free = find_free(); free != targets.end(); free = find_free()) targets.erase(free);
+  for (const auto& [name, target] : targets)
+    faults.push_back(target.folder + ": " + name + " is in a circle of links");
+  return faults;
+}
+
+TEST(IncludesTest, NoLibraryLinksUpwardsOrInACircle) {
+  EXPECT_EQ(find_link_faults(SLS_SOURCE_DIR), std::vector<std::string>());
+  EXPECT_GT(read_targets(SLS_SOURCE_DIR).size(), 40u);
+}
+
 TEST(IncludesTest, NoFileIncludesUpwards) {
   EXPECT_EQ(find_faults(SLS_SOURCE_DIR), std::vector<std::string>());
+}
+
+void write(const fs::path& file, const std::string& text) {
+  fs::create_directories(file.parent_path());
+  std::ofstream(file) << text;
+}
+
+TEST(IncludesTest, FindsEachLinkThatBreaksARule) {
+  const test::TemporaryFolder folder;
+  const auto write_cmake = [&](const std::string& of, const std::string& text) {
+    write(folder.path() / of / "CMakeLists.txt", text);
+  };
+  write_cmake("common/model",
+              "add_library(sls_model STATIC a.cpp)\n# sls::config\n"
+              "target_link_libraries(sls_model PUBLIC sls::plant_keys)\n");
+  write_cmake("common/config",
+              "add_library(sls_config STATIC a.cpp)\n"
+              "target_link_libraries(sls_config PUBLIC\n  sls::model)\n");
+  write(folder.path() / "common/models/models.cmake",
+        "add_library(sls_${kind}_keys STATIC)\n"
+        "target_link_libraries(sls_${kind}_keys PUBLIC sls::config)\n");
+  write_cmake("sim_server/plants", "sls_add_models(plant SOURCES a.cpp)\n");
+  write_cmake("recorder",
+              "add_library(sls_record a.cpp)\nadd_executable(recorder main.cpp)\n"
+              "target_link_libraries(recorder PRIVATE sls::record sls::lost)\n");
+  EXPECT_EQ(find_link_faults(folder.path()),
+            (std::vector<std::string>{
+                "recorder: recorder links sls_lost", "common/model: sls_model links sls_plant_keys",
+                "common/config: sls_config is in a circle of links",
+                "common/model: sls_model is in a circle of links",
+                "sim_server/plants: sls_plant_keys is in a circle of links"}));
 }
 
 TEST(IncludesTest, FindsEachIncludeThatBreaksARule) {
   const test::TemporaryFolder folder;
   const auto write = [&](const std::string& file, const std::string& text) {
-    fs::create_directories((folder.path() / file).parent_path());
-    std::ofstream(folder.path() / file) << text;
+    sls::write(folder.path() / file, text);
   };
   write("common/model/a.hpp",
         "#include <Eigen/Core>\n#include \"common/model/b.hpp\"\n"

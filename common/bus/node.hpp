@@ -201,7 +201,7 @@ class Writer {
 };
 
 /// Calls `handler(message, sender)` for every sample, on a thread of the middleware: the handler
-/// must be short and must not write.
+/// must be short. It may write only to a keep-last stream: fastdds/README.md, trap 4.
 template <class Message>
 class Reader {
  public:

@@ -2,10 +2,10 @@
 
 namespace sls::config {
 
-std::vector<ListedKey> list_scenario_keys() {
+std::vector<ListedKey> list_scenario_keys(const Models& models) {
   std::vector<ListedKey> keys;
   Alternatives alternatives;
-  KeyLister lister(keys, "", alternatives);
+  KeyLister lister(keys, models, "", alternatives);
   Scenario scenario;
   describe(lister, scenario);
   return keys;

@@ -51,8 +51,9 @@ class Alternatives {
 /// are the defaults.
 class KeyLister {
  public:
-  KeyLister(std::vector<ListedKey>& keys, std::string prefix, Alternatives& alternatives)
-      : keys_(keys), prefix_(std::move(prefix)), alternatives_(alternatives) {}
+  KeyLister(std::vector<ListedKey>& keys, const Models& models, std::string prefix,
+            Alternatives& alternatives)
+      : keys_(keys), models_(models), prefix_(std::move(prefix)), alternatives_(alternatives) {}
 
   template <class Field, class... Rule>
   void key(Presence presence, const char* name, Field& field, const Rule&... rule) {
@@ -108,8 +109,9 @@ class KeyLister {
   }
 
   template <class Section>
-  void model(const char* name, ModelName& field, const ModelRegistry<Section>& registry,
+  void model(const char* name, ModelName& field, ModelRegistry<Section> Models::*registered,
              Section& section) {
+    const ModelRegistry<Section>& registry = models_.*registered;
     add(kOptional, name, "name or path", list_models(registry), to_yaml_value(field));
     std::vector<Group> groups;
     const auto list = [&](const std::string& text, const ModelKeys<Section>& model_keys) {
@@ -180,7 +182,7 @@ class KeyLister {
     std::vector<ListedKey> of_block;
     do {
       Struct scratch = fields;
-      KeyLister lister(of_block, prefix, alternatives);
+      KeyLister lister(of_block, models_, prefix, alternatives);
       describe(lister, scratch, rule...);
     } while (alternatives.advance());
     for (ListedKey& listed : of_block) {
@@ -245,12 +247,13 @@ class KeyLister {
   }
 
   std::vector<ListedKey>& keys_;
+  const Models& models_;
   std::string prefix_;
   Alternatives& alternatives_;
   std::vector<std::pair<std::string, std::string>> one_of_;  // names and their presence
 };
 
 /// Every key of a scenario, in the order of scenario_keys.hpp.
-std::vector<ListedKey> list_scenario_keys();
+std::vector<ListedKey> list_scenario_keys(const Models& models = all_models());
 
 }  // namespace sls::config

@@ -1,12 +1,12 @@
 /// Additions of a plant, an autopilot or a control law to the scenario file: keys of its own in the
 /// section that names it. Each folder of sim_server/plants, sim_server/autopilots and
-/// control_client/laws describes them in its keys.hpp, without Simbody or DDS. Every program links
-/// all of them, so all programs accept the same files and print the same errors. How to describe
-/// keys: own_keys.hpp.
+/// control_client/laws describes them in its keys.hpp, without Simbody or DDS; common/models
+/// registers them. How to describe keys: own_keys.hpp.
 #pragma once
 
 #include <map>
 #include <string>
+#include <vector>
 
 #include "common/config/scenario.hpp"
 
@@ -17,6 +17,16 @@ class KeyNames;
 class MapReader;
 class MapWriter;
 class Places;
+
+/// A vehicle as pictures show it, in the frame B of its body.
+struct VehicleShape {
+  struct Rotor {
+    Eigen::Vector3d position;  ///< m
+    int spin;                  ///< as in the scenario: 1 counter-clockwise, −1 clockwise
+  };
+  Eigen::Vector3d attachment = Eigen::Vector3d::Zero();  ///< of the pendulum, m
+  std::vector<Rotor> rotors;                             ///< none: a point mass
+};
 
 /// The keys of one model. `Section` is the section that has them: Plant, Autopilot or Controller.
 template <class Section>
@@ -33,22 +43,24 @@ class ModelKeys {
   /// attitude and attitude errors (`estimator`); a plant of the project also accepts an
   /// `autopilot`.
   virtual bool has_attitude() const { return false; }
+  /// The shape of the vehicles of a plant.
+  virtual VehicleShape calc_shape(const Section&) const { return {}; }
 };
 
 /// The keys of each model, by name.
 template <class Section>
 using ModelRegistry = std::map<std::string, const ModelKeys<Section>*>;
 
-/// Every plant of the project. Defined in sim_server/plants/keys.cpp.
-const ModelRegistry<Plant>& plant_keys();
-/// Every autopilot of the project. Defined in sim_server/autopilots/keys.cpp.
-const ModelRegistry<Autopilot>& autopilot_keys();
-/// Every control law of the project. Defined in control_client/laws/keys.cpp.
-const ModelRegistry<Controller>& law_keys();
+/// The models that a scenario may name.
+struct Models {
+  ModelRegistry<Plant> plants;
+  ModelRegistry<Autopilot> autopilots;
+  ModelRegistry<Controller> laws;
+};
 
-/// "pid, qsf or a shared library (a path ending in .so)".
-template <class Section>
-std::string list_models(const ModelRegistry<Section>& registry) {
+/// "pid, qsf or a shared library (a path ending in .so)". A registry maps names to anything.
+template <class Registry>
+std::string list_models(const Registry& registry) {
   std::string names;
   for (const auto& item : registry) names += (names.empty() ? "" : ", ") + item.first;
   return names + " or a shared library (a path ending in .so)";

@@ -106,9 +106,9 @@ std::string to_too_long(std::int64_t period_ns) {
 /// Checks the keys of plants whose vehicles have an attitude, and of their autopilot.
 void check_autopilot(const Scenario& scenario, const Places& places) {
   const ModelName& model = scenario.plant.model;
-  if (model.is_shared_library() || !find_model_keys(plant_keys(), model).has_attitude()) {
+  if (model.is_shared_library() || !find_model_keys(places.models().plants, model).has_attitude()) {
     std::string takers;
-    for (const auto& [name, keys] : plant_keys())
+    for (const auto& [name, keys] : places.models().plants)
       if (keys->has_attitude()) takers += (takers.empty() ? "'" : " or '") + name + "'";
     for (const char* key :
          {"autopilot", "plant.initial.attitude", "plant.initial.body_rates_rad_s"})
@@ -121,7 +121,7 @@ void check_autopilot(const Scenario& scenario, const Places& places) {
     throw places.make_error_at("autopilot.period_s", to_mismatch("multiple", "plant.step_s",
                                                                  scenario.plant.step_ns, period));
   if (scenario.autopilot)
-    find_model_keys(autopilot_keys(), scenario.autopilot->model).check(scenario, places);
+    find_model_keys(places.models().autopilots, scenario.autopilot->model).check(scenario, places);
 }
 
 /// Nothing if `offset` changes the samples of channel `on`; else the keys of which one is missing.
@@ -218,7 +218,7 @@ void check_sensing(const Scenario& scenario, const Places& places) {
 void check_estimator(const Scenario& scenario, const Places& places) {
   const ModelName& model = scenario.plant.model;
   const model::AttitudeError& error = scenario.estimator.attitude;
-  if (error.is_zero() || find_model_keys(plant_keys(), model).has_attitude()) return;
+  if (error.is_zero() || find_model_keys(places.models().plants, model).has_attitude()) return;
   const bool is_tilted = !error.tilt.isZero(0.0);
   throw places.make_error_at(
       is_tilted ? "estimator.tilt_rad" : "estimator.yaw_rad",
@@ -269,20 +269,21 @@ std::string read_scenario_file(const std::filesystem::path& file) {
   return text;
 }
 
-Scenario load_scenario(const std::filesystem::path& file) {
-  Scenario scenario = parse_scenario(read_scenario_file(file), file.string());
+Scenario load_scenario(const std::filesystem::path& file, const Models& models) {
+  Scenario scenario = parse_scenario(read_scenario_file(file), file.string(), models);
   scenario.folder = file.parent_path();
   return scenario;
 }
 
-Scenario parse_scenario(const std::string& text, const std::string& place) {
+Scenario parse_scenario(const std::string& text, const std::string& place, const Models& models) {
   check_size(text, place);
-  return read_scenario(parse_yaml(text, place), place, text);
+  return read_scenario(parse_yaml(text, place), place, text, models);
 }
 
-Scenario read_scenario(const YamlNode& root, const std::string& place, const std::string& text) {
+Scenario read_scenario(const YamlNode& root, const std::string& place, const std::string& text,
+                       const Models& models) {
   check_size(text, place);
-  Places places(place);
+  Places places(place, models);
   places.add("", root.line);
 
   Scenario scenario;
@@ -292,8 +293,8 @@ Scenario read_scenario(const YamlNode& root, const std::string& place, const std
   check_autopilot(scenario, places);
   check_sensing(scenario, places);
   check_estimator(scenario, places);
-  find_model_keys(plant_keys(), scenario.plant.model).check(scenario, places);
-  find_model_keys(law_keys(), scenario.controller.law).check(scenario, places);
+  find_model_keys(places.models().plants, scenario.plant.model).check(scenario, places);
+  find_model_keys(places.models().laws, scenario.controller.law).check(scenario, places);
   scenario.text = text;
   scenario.sha256 = calc_sha256(text);
   return scenario;
@@ -306,10 +307,10 @@ std::filesystem::path find_plant_library(const Scenario& scenario) {
   return model.find_library(scenario.folder);
 }
 
-std::string to_yaml(const Scenario& scenario) {
+std::string to_yaml(const Scenario& scenario, const Models& models) {
   Scenario copy = scenario;  // one description serves reader and writer, so it takes no const
   std::string text;
-  MapWriter writer(text);
+  MapWriter writer(text, models);
   describe(writer, copy);
   return text;
 }

@@ -372,12 +372,20 @@ struct Scenario {
   std::string sha256;            ///< of those bytes, 64 lower-case hex digits
 };
 
+struct Models;  // model_keys.hpp
+
+/// Every model of the project, so that all programs accept the same files and print the same
+/// errors. Defined in common/models, which links the models' keys: a program that reads scenarios
+/// links sls::models.
+const Models& all_models();
+
 /// Reads and checks a scenario file.
 /// @throws ConfigError naming file, line, key, expectation and value.
-Scenario load_scenario(const std::filesystem::path& file);
+Scenario load_scenario(const std::filesystem::path& file, const Models& models = all_models());
 
 /// The same from text that came over the wire; `place` stands for the file's name in messages.
-Scenario parse_scenario(const std::string& text, const std::string& place);
+Scenario parse_scenario(const std::string& text, const std::string& place,
+                        const Models& models = all_models());
 
 /// The shared library of the plant or, if the plant is not in one, of its autopilot; empty if
 /// neither is in one.
@@ -385,7 +393,7 @@ std::filesystem::path find_plant_library(const Scenario& scenario);
 
 /// Writes every value of `scenario` (not `text`) as YAML that reads back to the same values. Leaves
 /// out the numbers of the controller's model that equal those of the vehicle (`follows`).
-std::string to_yaml(const Scenario& scenario);
+std::string to_yaml(const Scenario& scenario, const Models& models = all_models());
 
 /// `count` equal vehicles on a level square grid, 5 m apart: rows of ⌈√count⌉ along x, the first
 /// vehicle at offset zero.

@@ -170,8 +170,8 @@ void ScenarioDraft::set(const std::string& path, const std::string& value) {
   place_at(*node, line);
 }
 
-Scenario ScenarioDraft::make_scenario() const {
-  Scenario scenario = read_scenario(root_, place_, to_text());
+Scenario ScenarioDraft::make_scenario(const Models& models) const {
+  Scenario scenario = read_scenario(root_, place_, to_text(), models);
   scenario.folder = folder_;
   return scenario;
 }

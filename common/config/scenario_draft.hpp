@@ -27,7 +27,7 @@ class ScenarioDraft {
   /// The scenario, checked like a file. Its `text` is `to_text()`, so that a file with this text is
   /// the same scenario.
   /// @throws ConfigError as load_scenario does. Lines are those of the file that was read.
-  Scenario make_scenario() const;
+  Scenario make_scenario(const Models& models = all_models()) const;
 
   /// The file's values and the replaced ones as YAML, without comments.
   std::string to_text() const;

@@ -5,7 +5,7 @@
 ///     map.key(presence, "key", field, rule);     one value, map or list of maps
 ///     map.choose(choice, {{value, {"key", …}}}); exactly one of several alternatives is there
 ///     map.decide("key", field, describe_others); a required key whose value decides on other keys
-///     map.model("key", field, registry, section); a plant or law and the keys of its own
+///     map.model("key", field, list, section);     a plant or law and the keys of its own
 ///     map.by_default(field, value);              the value if the file has none
 #pragma once
 
@@ -193,7 +193,7 @@ void describe_point_mass_loads(Map& map, Plant& plant) {
 
 template <class Map>
 void describe(Map& map, Plant& plant) {
-  map.model("model", plant.model, plant_keys(), plant);
+  map.model("model", plant.model, &Models::plants, plant);
   map.key(kOptional, "step_s", plant.step_ns, kPositive);
   map.key(kRequired, "initial", plant.initial);
 }
@@ -208,7 +208,7 @@ void describe_period(Map& map, Autopilot& autopilot) {
 
 template <class Map>
 void describe(Map& map, Autopilot& autopilot) {
-  map.model("model", autopilot.model, autopilot_keys(), autopilot);
+  map.model("model", autopilot.model, &Models::autopilots, autopilot);
 }
 
 // --- synchronisation -----------------------------------------------------------------------------
@@ -284,7 +284,7 @@ void describe(Map& map, ControllerModel& believed) {
 
 template <class Map>
 void describe(Map& map, Controller& controller) {
-  map.model("law", controller.law, law_keys(), controller);
+  map.model("law", controller.law, &Models::laws, controller);
   map.key(kOptional, "force_limit_n", controller.force_limit_n, kPositive);
   map.key(kOptional, "saturate", controller.saturate);
   map.key(kOptional, "drag_feed_forward", controller.drag_feed_forward);

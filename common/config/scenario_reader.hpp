@@ -16,12 +16,14 @@
 
 namespace sls::config {
 
-/// The line of each key that was read, for error messages of rules between keys.
+/// The line of each key that was read, for error messages of rules between keys; and the models
+/// that the file may name.
 class Places {
  public:
-  explicit Places(std::string file) : file_(std::move(file)) {}
+  Places(std::string file, const Models& models) : file_(std::move(file)), models_(models) {}
   void add(const std::string& path, int line) { lines_[path] = line; }
   bool has(const std::string& path) const { return lines_.count(path) != 0; }
+  const Models& models() const { return models_; }
 
   /// FILE:LINE.
   std::string describe(int line) const;
@@ -34,6 +36,7 @@ class Places {
 
  private:
   std::string file_;
+  const Models& models_;
   std::map<std::string, int> lines_;
 };
 
@@ -73,7 +76,7 @@ class KeyNames {
   void decide(const char* name, Enum& field, const DescribeOthers& describe_others);
   /// Collects the keys of the model in the file, and notes which other models have which keys.
   template <class Section>
-  void model(const char* name, ModelName& field, const ModelRegistry<Section>& registry,
+  void model(const char* name, ModelName& field, ModelRegistry<Section> Models::*list,
              Section& section);
   template <class Field>
   void by_default(Field&, const Field&) {}
@@ -164,8 +167,9 @@ class MapReader {
   }
 
   template <class Section>
-  void model(const char* name, ModelName& field, const ModelRegistry<Section>& registry,
+  void model(const char* name, ModelName& field, ModelRegistry<Section> Models::*list,
              Section& section) {
+    const ModelRegistry<Section>& registry = map_.places.models().*list;
     key(kOptional, name, field, list_names(registry), list_models(registry));
     find_model_keys(registry, field).describe(*this, section);
   }
@@ -256,8 +260,9 @@ void KeyNames::decide(const char* name, Enum& field, const DescribeOthers& descr
 }
 
 template <class Section>
-void KeyNames::model(const char* name, ModelName& field, const ModelRegistry<Section>& registry,
+void KeyNames::model(const char* name, ModelName& field, ModelRegistry<Section> Models::*list,
                      Section& section) {
+  const ModelRegistry<Section>& registry = map_.places.models().*list;
   add(name);
   if (find_key(map_.node, name) >= 0)
     MapReader(map_).key(kOptional, name, field, list_names(registry), list_models(registry));
@@ -281,6 +286,7 @@ void KeyNames::model(const char* name, ModelName& field, const ModelRegistry<Sec
 std::string read_scenario_file(const std::filesystem::path& file);
 
 /// The scenario in `root`, the tree of a file with this text; checked as load_scenario does.
-Scenario read_scenario(const YamlNode& root, const std::string& place, const std::string& text);
+Scenario read_scenario(const YamlNode& root, const std::string& place, const std::string& text,
+                       const Models& models);
 
 }  // namespace sls::config

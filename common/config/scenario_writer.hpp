@@ -63,8 +63,8 @@ inline constexpr bool kOnOneLine =
 /// The `Map` that writes: describe(writer, field) appends `field` to the text.
 class MapWriter {
  public:
-  explicit MapWriter(std::string& text, std::string indentation = "")
-      : MapWriter(text, indentation, indentation) {}
+  MapWriter(std::string& text, const Models& models, std::string indentation = "")
+      : MapWriter(text, models, indentation, indentation) {}
 
   template <class Field, class... Rule>
   void key(Presence, const char* name, Field& field, const Rule&... rule) {
@@ -93,23 +93,26 @@ class MapWriter {
   }
 
   template <class Section>
-  void model(const char* name, ModelName& field, const ModelRegistry<Section>& registry,
+  void model(const char* name, ModelName& field, ModelRegistry<Section> Models::*list,
              Section& section) {
     key(kOptional, name, field);
-    find_model_keys(registry, field).describe(*this, section);
+    find_model_keys(models_.*list, field).describe(*this, section);
   }
 
   template <class Field>
   void by_default(Field&, const Field&) {}
 
  private:
-  MapWriter(std::string& text, std::string first, std::string indentation)
-      : text_(text), next_(std::move(first)), indentation_(std::move(indentation)) {}
+  MapWriter(std::string& text, const Models& models, std::string first, std::string indentation)
+      : text_(text),
+        models_(models),
+        next_(std::move(first)),
+        indentation_(std::move(indentation)) {}
 
   template <class Struct, class... Rule>
   void write_block(Struct& fields, const Rule&... rule) {
     text_ += "\n";
-    MapWriter writer(text_, indentation_ + "  ");
+    MapWriter writer(text_, models_, indentation_ + "  ");
     describe(writer, fields, rule...);
   }
 
@@ -117,12 +120,13 @@ class MapWriter {
   void write_block(std::vector<Element>& list, const ListRange&) {
     text_ += list.empty() ? " []\n" : "\n";
     for (Element& element : list) {
-      MapWriter writer(text_, indentation_ + "  - ", indentation_ + "    ");
+      MapWriter writer(text_, models_, indentation_ + "  - ", indentation_ + "    ");
       describe(writer, element);
     }
   }
 
   std::string& text_;
+  const Models& models_;
   std::string next_;         // beginning of the next line: for an item of a list with a dash
   std::string indentation_;  // beginning of the lines after it
 };

@@ -21,8 +21,8 @@ std::unique_ptr<const ControlLaw> make_control_law(const LawSetup& setup) {
   if (law.is_shared_library()) return make_shared_library_law(setup);
   const auto found = registry.find(law.name);
   if (found == registry.end())
-    throw config::ConfigError("controller.law: expected " +
-                              config::list_models(config::law_keys()) + ", got " + law.name);
+    throw config::ConfigError("controller.law: expected " + config::list_models(registry) +
+                              ", got " + law.name);
   return found->second(setup);
 }
 

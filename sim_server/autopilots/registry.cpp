@@ -23,9 +23,8 @@ std::unique_ptr<Autopilot> make_autopilot(const AutopilotSetup& setup) {
   if (model.is_shared_library()) return make_shared_library_autopilot(setup);
   const auto found = registry.find(model.name);
   if (found == registry.end())
-    throw config::ConfigError("autopilot.model: expected " +
-                              config::list_models(config::autopilot_keys()) + ", got " +
-                              model.name);
+    throw config::ConfigError("autopilot.model: expected " + config::list_models(registry) +
+                              ", got " + model.name);
   return found->second(setup);
 }
 

@@ -100,7 +100,7 @@ std::vector<PlantOfVehicles> make_plants(const PlantType& type, const config::Sc
 std::unique_ptr<Plant> make_plant(const PlantType& type, const config::Scenario& alone,
                                   std::uint32_t id);
 
-/// Names that a signal must not have: the other columns of state.csv.
+/// Names that a signal must not have: the other columns of state.csv, which the recorder lists.
 const std::vector<std::string>& list_reserved_signal_names();
 
 /// @throws std::runtime_error `QUANTITY is not finite after step N of the plant`; quantities are

@@ -25,8 +25,8 @@ const PlantType& find_plant_type(const config::ModelName& model) {
   if (model.is_shared_library()) return shared_library;
   const auto found = registry.find(model.name);
   if (found == registry.end())
-    throw config::ConfigError("plant.model: expected " + config::list_models(config::plant_keys()) +
-                              ", got " + model.name);
+    throw config::ConfigError("plant.model: expected " + config::list_models(registry) + ", got " +
+                              model.name);
   return found->second;
 }
 

@@ -5,9 +5,11 @@
 
 #include <sstream>
 #include <string>
+#include <vector>
 
 #include "common/config/config_error.hpp"
 #include "recorder/rows.hpp"
+#include "sim_server/plants/plant.hpp"
 #include "tests/recorder/synthetic_run.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -40,6 +42,15 @@ TEST(ColumnsTest, AttitudeRatesAndSignalsFollowTheOthers) {
             plain +
                 ",att_w,att_x,att_y,att_z,rate_x_rad_s,rate_y_rad_s,rate_z_rad_s,"
                 "tension_n,wind");
+}
+
+TEST(ColumnsTest, ThePlantsReserveTheNamesOfTheColumnsBeforeTheSignals) {
+  StateRow row;
+  row.has_attitude = true;
+  std::vector<std::string> names;
+  for (const auto& column : list_columns(row))
+    names.insert(names.end(), column.names.begin(), column.names.end());
+  EXPECT_EQ(sim::list_reserved_signal_names(), names);
 }
 
 TEST(ColumnsTest, SignalsThatCannotBeColumnsAreRefused) {

@@ -8,9 +8,9 @@
 #include <utility>
 
 #include "common/bus/names.hpp"
-#include "common/config/scenario.hpp"
+#include "common/config/model_keys.hpp"
 #include "control_client/reference_trajectory.hpp"
-#include "sim_server/plants/multirotor/keys.hpp"
+#include "recorder/rows.hpp"
 
 namespace sls::view {
 namespace {
@@ -25,35 +25,27 @@ Json to_json(const Eigen::Vector3d& vector) { return {vector.x(), vector.y(), ve
 
 // --- vehicles ------------------------------------------------------------------------------------
 
-Json make_drawn_rotors() {
-  Json rotors = Json::array();
-  for (const auto& [x, y, spin] :
-       {std::array{1, 1, 1}, std::array{-1, -1, 1}, std::array{1, -1, -1}, std::array{-1, 1, -1}})
-    rotors.push_back({{"position_m", {x * kDrawnArm, y * kDrawnArm, 0.0}}, {"spin", spin}});
-  return rotors;
-}
-
-/// `spin`: 1 counter-clockwise, −1 clockwise, as in the scenario.
-Json make_rotors(const std::vector<sim::RotorKeys>& keys) {
-  Json rotors = Json::array();
-  for (const sim::RotorKeys& rotor : keys)
-    rotors.push_back({{"position_m", to_json(rotor.position)},
-                      {"spin", rotor.spin == sim::Spin::kCounterClockwise ? 1 : -1}});
-  return rotors;
-}
-
 Json describe_vehicles(const Parameters& parameters, const config::Scenario& scenario) {
-  const bool has_rotors = scenario.plant.model.name == "multirotor";
-  const auto& keys = scenario.plant.own.get<sim::MultirotorKeys>();
+  const config::Plant& plant = scenario.plant;
+  config::VehicleShape shape =
+      find_model_keys(config::all_models().plants, plant.model).calc_shape(plant);
+  const bool is_drawn_only = shape.rotors.empty();
+  if (is_drawn_only)
+    for (const auto& [x, y, spin] :
+         {std::array{1, 1, 1}, std::array{-1, -1, 1}, std::array{1, -1, -1}, std::array{-1, 1, -1}})
+      shape.rotors.push_back({{x * kDrawnArm, y * kDrawnArm, 0.0}, spin});
+  Json rotors = Json::array();
+  for (const auto& rotor : shape.rotors)
+    rotors.push_back({{"position_m", to_json(rotor.position)}, {"spin", rotor.spin}});
   Json vehicles = Json::array();
   for (const VehicleParameters& vehicle : parameters.vehicles()) {
     Json json = {{"id", vehicle.vehicle_id()},
                  {"quad_mass_kg", vehicle.quad_mass_kg()},
                  {"load_mass_kg", vehicle.load_mass_kg()},
                  {"rod_length_m", vehicle.rod_length_m()},
-                 {"attachment_m", to_json(has_rotors ? keys.attachment : Eigen::Vector3d::Zero())},
-                 {"rotors", has_rotors ? make_rotors(keys.rotors) : make_drawn_rotors()}};
-    if (!has_rotors) json["is_drawn_only"] = true;
+                 {"attachment_m", to_json(shape.attachment)},
+                 {"rotors", rotors}};
+    if (is_drawn_only) json["is_drawn_only"] = true;
     vehicles.push_back(std::move(json));
   }
   return vehicles;
@@ -61,22 +53,21 @@ Json describe_vehicles(const Parameters& parameters, const config::Scenario& sce
 
 // --- columns -------------------------------------------------------------------------------------
 
-bool ends_with(const std::string& text, const std::string& end) {
-  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
-}
-
-std::string find_unit(const std::string& column) {
-  for (const auto& [end, unit] :
-       {std::pair("_rad_s", "rad/s"), std::pair("_m_s", "m/s"), std::pair("_rad", "rad"),
-        std::pair("_m", "m"), std::pair("_n", "N")})
-    if (ends_with(column, end)) return unit;
-  return "1";
+std::vector<record::ColumnLister::Entry> list_columns() {
+  record::StateRow state;
+  state.has_attitude = true;
+  auto columns = record::list_columns(state);
+  columns.erase(columns.begin(), columns.begin() + 3);  // rows have vehicle and time of their own
+  for (const auto& column : record::list_columns<record::ReferenceRow>())
+    if (column.names.front() == "ref_x_m") columns.push_back(column);
+  return columns;
 }
 
 Json describe_columns(const Parameters& parameters) {
   Json columns = Json::array();
-  for (const std::string& name : kColumns)
-    columns.push_back({{"name", name}, {"unit", find_unit(name)}});
+  for (const auto& [column, names] : list_columns())
+    for (const std::string& name : names)
+      columns.push_back({{"name", name}, {"unit", *column.unit ? column.unit : "1"}});
   for (const SignalDescription& signal : parameters.signals())
     columns.push_back({{"name", signal.name().to_string()}, {"unit", signal.unit().to_string()}});
   return columns;
@@ -115,6 +106,13 @@ Json describe_path(const config::Scenario& scenario) {
 }
 
 }  // namespace
+
+std::vector<std::string> list_column_names() {
+  std::vector<std::string> all;
+  for (const auto& [column, names] : list_columns())
+    all.insert(all.end(), names.begin(), names.end());
+  return all;
+}
 
 std::string describe_run(const Parameters& parameters) {
   const std::string run_id = fmt::format("{:016x}", parameters.run_id());

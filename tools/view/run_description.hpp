@@ -8,15 +8,12 @@
 
 namespace sls::view {
 
-/// Columns of the rows that the page gets, named as in state.csv and reference.csv, always in this
-/// order; the plant's signals follow. A number that a run does not have is NaN.
-inline const std::vector<std::string> kColumns = {
-    "quad_x_m",       "quad_y_m",    "quad_z_m",  "quad_vx_m_s",  "quad_vy_m_s",
-    "quad_vz_m_s",    "load_x_m",    "load_y_m",  "load_z_m",     "load_vx_m_s",
-    "load_vy_m_s",    "load_vz_m_s", "alpha_rad", "beta_rad",     "alpha_dot_rad_s",
-    "beta_dot_rad_s", "force_x_n",   "force_y_n", "force_z_n",    "att_w",
-    "att_x",          "att_y",       "att_z",     "rate_x_rad_s", "rate_y_rad_s",
-    "rate_z_rad_s",   "ref_x_m",     "ref_y_m",   "ref_z_m"};
+std::vector<std::string> list_column_names();
+
+/// Columns of the rows that the page gets, always in this order: those of state.csv from the
+/// position on, with attitude, and the position of reference.csv; the plant's signals follow. A
+/// number that a run does not have is NaN.
+inline const std::vector<std::string> kColumns = list_column_names();
 
 /// A JSON object: {"run_id":"16 hex digits","scenario":"figure_eight","mode":"lockstep",
 /// "period_s":0.004,"real_time_factor":0,"has_attitude":false,

@@ -14,6 +14,14 @@ class MultirotorOwnKeys : public config::OwnKeys<config::Plant, MultirotorKeys> 
  public:
   bool has_attitude() const override { return true; }
 
+  config::VehicleShape calc_shape(const config::Plant& plant) const override {
+    const auto& keys = plant.own.get<MultirotorKeys>();
+    config::VehicleShape shape{keys.attachment, {}};
+    for (const RotorKeys& rotor : keys.rotors)
+      shape.rotors.push_back({rotor.position, rotor.spin == Spin::kCounterClockwise ? 1 : -1});
+    return shape;
+  }
+
   void check(const config::Scenario& scenario, const config::Places& places) const override {
     const auto& keys = scenario.plant.own.get<MultirotorKeys>();
     check_inertia(keys, places);

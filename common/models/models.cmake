@@ -1,16 +1,16 @@
 # Build rules of plants, autopilots and laws. Each kind has a folder with a registry, a file
 # KINDs.def that names the models, one on each line, and a folder for each model.
 #
-# sls_add_models(KIND SOURCES …): in the folder of the kind. Makes sls_KIND_keys, which every
-# program links, and sls_KINDs, for the programs that fly or control.
+# sls_add_models(KIND SOURCES …): in the folder of the kind. Makes sls_KIND_keys, which sls::models
+# registers, and sls_KINDs, for the programs that fly or control.
 function(sls_add_models kind)
-  add_library(sls_${kind}_keys STATIC keys.cpp)
+  add_library(sls_${kind}_keys STATIC)
   add_library(sls::${kind}_keys ALIAS sls_${kind}_keys)
   target_link_libraries(sls_${kind}_keys PUBLIC sls::config)
   cmake_parse_arguments(MODELS "" "" "SOURCES" ${ARGN})
   add_library(sls_${kind}s STATIC ${MODELS_SOURCES})
   add_library(sls::${kind}s ALIAS sls_${kind}s)
-  target_link_libraries(sls_${kind}s PUBLIC sls::config sls::model)
+  target_link_libraries(sls_${kind}s PUBLIC sls::config sls::model sls::${kind}_keys)
 
   string(TOUPPER ${kind} macro)
   file(STRINGS ${kind}s.def models REGEX "^SLS_${macro}\\(")
