@@ -1,6 +1,5 @@
 #include "closed_loop/flight_recorder.hpp"
 
-#include "closed_loop/record_entries.hpp"
 #include "common/plugin/shared_library.hpp"
 
 namespace sls::closed_loop {
@@ -13,12 +12,9 @@ FlightRecorder::FlightRecorder(const std::filesystem::path& folder, bool force,
       recording_(folder, parameters),
       board_([this](const SimStatus& status) { recording_.add(status); }, parameters.run_id(),
              parameters.vehicles().front().vehicle_id(), sync, [] { return SyncCounters(); }) {
-  for (const VehicleParameters& vehicle : parameters.vehicles())
-    ids_.push_back(vehicle.vehicle_id());
   board_.controller_name = controller_name;
   board_.start_clock();
   board_.publish(RunPhase::PHASE_RUNNING, "");
-  batch_.run_id(parameters.run_id());
 }
 
 void FlightRecorder::note_law_library(const config::Scenario& scenario) {
@@ -27,20 +23,11 @@ void FlightRecorder::note_law_library(const config::Scenario& scenario) {
   if (!sha256.empty()) recording_.note_library(controller_name_, sha256);
 }
 
-void FlightRecorder::hand_on() {
-  recording_.add(batch_);
-  batch_.batch_index(batch_.batch_index() + 1);
-  batch_.entries().clear();
-}
-
-void FlightRecorder::add(const std::vector<FlownStep>& steps, std::optional<std::size_t> refused) {
-  for (std::size_t i = 0; i < ids_.size(); ++i) {
-    fill_entry(batch_.entries().emplace_back(), ids_[i], steps[i], controller_name_, refused == i);
-    if (batch_.entries().size() == BATCH_ENTRIES) hand_on();
-  }
+void FlightRecorder::add(const std::vector<model::StepRecord>& steps) {
+  for (const model::StepRecord& step : steps) recording_.add(step);
   board_.step = steps.front().step;
   if (board_.step > 0)
-    for (std::size_t i = 0; i < ids_.size(); ++i)
+    for (std::size_t i = 0; i < steps.size(); ++i)
       board_.timing.add(model::AnswerKind::kAccepted, 0);
   if (board_.is_due()) board_.publish(RunPhase::PHASE_RUNNING, "");
   recording_.flush_if_due();
@@ -51,17 +38,11 @@ void FlightRecorder::announce(const std::vector<std::string>& remarks) {
 }
 
 bool FlightRecorder::finish(const std::string& failure) {
-  batch_.is_last(true);
-  hand_on();
   board_.publish(failure.empty() ? RunPhase::PHASE_FINISHED : RunPhase::PHASE_FAILED,
                  failure.empty() ? "mission finished" : failure);
   return recording_.finish("", 0);
 }
 
-void FlightRecorder::interrupt(const std::string& reason) {
-  batch_.is_last(true);
-  hand_on();
-  recording_.finish(reason, 0);
-}
+void FlightRecorder::interrupt(const std::string& reason) { recording_.finish(reason, 0); }
 
 }  // namespace sls::closed_loop

@@ -1,16 +1,14 @@
 /// The recording of a flight in one process, in the recorder's files.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "closed_loop/flight.hpp"
 #include "common/bus/topics.hpp"
 #include "common/config/scenario.hpp"
+#include "common/model/step_record.hpp"
 #include "recorder/recording.hpp"
 #include "sim_server/status_board.hpp"
 
@@ -29,9 +27,8 @@ class FlightRecorder {
   /// Notes the shared library of the law of `scenario`, if it has one that is loaded.
   void note_law_library(const config::Scenario& scenario);
 
-  /// Adds one step of all vehicles, in the order of the parameters. `refused` is the index of the
-  /// vehicle whose answer failed the flight.
-  void add(const std::vector<FlownStep>& steps, std::optional<std::size_t> refused);
+  /// Adds one step of all vehicles, in the order of the parameters.
+  void add(const std::vector<model::StepRecord>& steps);
 
   /// True if the next status sample is due, before which remarks must be announced.
   bool is_status_due() const { return board_.is_due(); }
@@ -46,14 +43,10 @@ class FlightRecorder {
   std::uint64_t last_step() const { return board_.step; }
 
  private:
-  void hand_on();
-
   const std::string controller_name_;
-  std::vector<std::uint32_t> ids_;
   const record::RecordingFolder folder_;
   record::Recording recording_;
   sim::StatusBoard board_;
-  RecordBatch batch_;
 };
 
 }  // namespace sls::closed_loop

@@ -42,8 +42,10 @@ Run::Run(Endpoints& endpoints, const Assignment& assignment, WorkerPool& workers
       workers_(workers),
       plants_(make_plants(find_plant_type(scenario_.plant.model), scenario_, vehicle_ids_)),
       plant_steps_(scenario_.sync.period_ns / scenario_.plant.step_ns) {
-  for (const std::uint32_t id : vehicle_ids_)
+  for (const std::uint32_t id : vehicle_ids_) {
     vehicles_.push_back(std::make_unique<Vehicle>(scenario_, id, run_id));
+    records_.push_back(&vehicles_.back()->record());
+  }
   endpoints_.parameters_writer.write(make_parameters_message(
       run_id, vehicle_ids_, scenario_, *plants_.front().plant, app::version()));
   const config::Sync& sync = scenario_.sync;
@@ -162,7 +164,7 @@ void Run::measure(const PlantOfVehicles& group) {
     Vehicle& vehicle = *vehicles_[group.vehicles[i]];
     vehicle.measure(board_.step, plant.measurement(i),
                     plant.sees_truth() ? nullptr : &plant.seen(i));
-    bus::fill(endpoints_.states.at(group.vehicles[i]), vehicle.id(), vehicle.measured(),
+    bus::fill(endpoints_.states.at(group.vehicles[i]), vehicle.id(), vehicle.record().seen(),
               vehicle.applied());
   }
 }
@@ -177,9 +179,7 @@ void Run::publish_states() {
 void Run::record_step() {
   if (!std::exchange(is_step_published_, false)) return;
   for (const auto& vehicle : vehicles_) vehicle->complete_record();
-  record_.add_step(vehicles_.size(), [this](std::size_t i, RecordEntry& entry) {
-    bus::fill(entry, vehicles_[i]->record());
-  });
+  record_.add_step(records_);
 }
 
 void Run::advance() {

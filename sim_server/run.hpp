@@ -131,6 +131,7 @@ class Run {
   const std::uint64_t run_id_;
 
   std::vector<std::unique_ptr<Vehicle>> vehicles_;  // as vehicle_ids_
+  std::vector<const model::StepRecord*> records_;   // of the vehicles
   SyncCounters link_;                               // counts that belong to no single vehicle
   StatusBoard board_;
   RunControl control_;

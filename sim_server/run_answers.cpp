@@ -73,7 +73,7 @@ void Run::record_late(const Vehicle& vehicle, const OfferedAnswer& offered) {
   record.kind = model::AnswerKind::kLate;
   record.client_name = offered.client_name;
   record.answer = offered.answer;
-  record_.add_step(1, [&](std::size_t, RecordEntry& entry) { bus::fill(entry, record); });
+  record_.add_step({&record});
 }
 
 bool Run::are_all_accepted() const {

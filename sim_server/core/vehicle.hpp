@@ -48,10 +48,6 @@ class Vehicle {
 
   /// Motion of the vehicle.
   const model::Measurement& state() const { return record_.truth; }
-  /// The measured motion, which controllers answer.
-  const model::Measurement& measured() const {
-    return record_.measured ? *record_.measured : record_.truth;
-  }
   /// The force over the period before it.
   const model::AppliedForce& applied() const { return applied_; }
   /// True if its force is known.
