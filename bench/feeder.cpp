@@ -7,7 +7,7 @@
 #include <thread>
 #include <vector>
 
-#include "closed_loop/record_entries.hpp"
+#include "bench/flown_run.hpp"
 #include "common/app/run_main.hpp"
 #include "common/app/stop_signal.hpp"
 #include "common/app/wait.hpp"
@@ -33,12 +33,12 @@ class Surroundings {
  public:
   Surroundings(bus::Node& node, const config::Scenario& scenario, std::uint32_t vehicles)
       : participants_(node), parameters_(node), statuses_(node) {
-    parameters_.write(closed_loop::make_parameters(scenario, kRunId, vehicles));
+    parameters_.write(make_parameters(scenario, kRunId, vehicles));
     announce(RunPhase::PHASE_WAITING, 0);
   }
 
   void announce(RunPhase phase, std::uint64_t step) {
-    statuses_.write(closed_loop::make_status(kRunId, index_++, phase, step));
+    statuses_.write(make_status(kRunId, index_++, phase, step));
     announced_ = Clock::now();
   }
 
@@ -77,29 +77,32 @@ class Surroundings {
 }  // namespace
 
 nlohmann::json feed_recorder(const config::Scenario& scenario, const FeederOptions& options) {
-  std::vector<RecordEntry> entries = closed_loop::fly_entries(scenario, options.steps);
-  entries.back().answer().mission(MissionPhase::MISSION_FINISHED);
+  std::vector<model::StepRecord> records = fly_records(scenario, options.steps);
   bus::Node node(options.qos_file, options.domain, "bench", "server");
   bus::Writer<RecordBatch> writer(node);
   Surroundings surroundings(node, scenario, options.vehicles);
   sim::RecordStream stream(writer, node.max_batch_bytes(), kRunId);
-  const std::uint64_t last = entries.size() - 1;
+  const std::uint64_t last = records.size() - 1;
   surroundings.wait(RunPhase::PHASE_WAITING, 0, "a recorder that is ready",
                     [](const Participant& recorder) { return recorder.ready(); });
   surroundings.announce(RunPhase::PHASE_RUNNING, 0);
+  std::vector<model::StepRecord> fleet(options.vehicles);
+  std::vector<const model::StepRecord*> of_step;
+  for (const model::StepRecord& record : fleet) of_step.push_back(&record);
   const auto began = Clock::now();
-  for (const RecordEntry& flown : entries) {
-    const auto step = static_cast<std::int64_t>(flown.step());
+  for (const model::StepRecord& flown : records) {
+    const auto step = static_cast<std::int64_t>(flown.step);
     surroundings.wait(
-        RunPhase::PHASE_RUNNING, flown.step(), "the recorder", [&](const Participant& recorder) {
+        RunPhase::PHASE_RUNNING, flown.step, "the recorder", [&](const Participant& recorder) {
           return !stream.is_full() && step - 1 - recorder.last_complete_step() <
                                           sim::calc_recorder_window(stream.history_steps());
         });
-    stream.add_step(options.vehicles, [&](std::size_t i, RecordEntry& entry) {
-      entry = flown;
-      entry.vehicle_id(static_cast<std::uint32_t>(i));
-    });
-    surroundings.announce_if_due(RunPhase::PHASE_RUNNING, flown.step());
+    for (std::size_t i = 0; i < fleet.size(); ++i) {
+      fleet[i] = flown;
+      fleet[i].vehicle_id = static_cast<std::uint32_t>(i);
+    }
+    stream.add_step(of_step);
+    surroundings.announce_if_due(RunPhase::PHASE_RUNNING, flown.step);
   }
   stream.end();
   surroundings.announce(RunPhase::PHASE_FINISHED, last);
@@ -110,7 +113,7 @@ nlohmann::json feed_recorder(const config::Scenario& scenario, const FeederOptio
   const std::chrono::duration<double> elapsed = Clock::now() - began;
   surroundings.wait(RunPhase::PHASE_FINISHED, last, "the recorder's end",
                     [](const Participant& recorder) { return recorder.done(); });
-  return {{"rows", kRowsOfStep * entries.size() * options.vehicles}, {"seconds", elapsed.count()}};
+  return {{"rows", kRowsOfStep * records.size() * options.vehicles}, {"seconds", elapsed.count()}};
 }
 
 }  // namespace sls::bench

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "closed_loop/record_entries.hpp"
+#include "bench/flown_run.hpp"
 #include "common/bus/convert.hpp"
 #include "common/bus/fastdds/guarded_type.hpp"
 #include "common/config/scenario.hpp"
@@ -65,29 +65,28 @@ void multirotor_figure_eight_step(benchmark::State& run) {
 BENCHMARK(px4_published_step)->Arg(1)->Arg(100);
 BENCHMARK(multirotor_figure_eight_step)->Arg(1)->Arg(100);
 
-const std::vector<RecordEntry>& entries() {
-  static const std::vector<RecordEntry> flown = closed_loop::fly_entries(load(), 1000);
+const std::vector<model::StepRecord>& records() {
+  static const std::vector<model::StepRecord> flown = fly_records(load(), 1000);
   return flown;
 }
 
 void control_law(benchmark::State& run) {
   const control::FlightController controller(load());
-  std::size_t i = entries().size();  // flies them before the measurement starts
+  std::size_t i = records().size();  // flies them before the measurement starts
   for (auto _ : run) {
-    const RecordEntry& entry = entries()[i++ % entries().size()];
-    benchmark::DoNotOptimize(
-        controller.calc_answer(entry.step(), bus::to_measurement(entry.truth()), {}));
+    const model::StepRecord& record = records()[i++ % records().size()];
+    benchmark::DoNotOptimize(controller.calc_answer(record.step, record.truth, {}));
   }
 }
 BENCHMARK(control_law);
 
-/// Time to serialise and deserialise a sample; `make` makes it from an entry.
+/// Time to serialise and deserialise a sample; `make` makes it from a record.
 template <class Type, class Make>
 void serialize(benchmark::State& run, const Make& make) {
   using Message = typename Type::type;
   Type type;
   std::vector<Message> samples;
-  for (const RecordEntry& entry : entries()) samples.push_back(make(entry));
+  for (const model::StepRecord& record : records()) samples.push_back(make(record));
   bus::rtps::SerializedPayload_t payload(bus::max_size_of(type));
   Message back;
   std::size_t i = 0;
@@ -98,25 +97,24 @@ void serialize(benchmark::State& run, const Make& make) {
   }
 }
 void serialize_state(benchmark::State& run) {
-  serialize<bus::GuardedType<StatesPubSubType>>(run, [](const RecordEntry& entry) {
+  serialize<bus::GuardedType<StatesPubSubType>>(run, [](const model::StepRecord& record) {
     States sample;
-    VehicleState& state = sample.vehicles().emplace_back();
-    state.measured(entry.truth());
-    state.controller_name(entry.client_name());
+    bus::fill(sample.vehicles().emplace_back(), record.vehicle_id, record.seen(), {});
     return sample;
   });
 }
 void serialize_command(benchmark::State& run) {
-  serialize<bus::GuardedType<CommandsPubSubType>>(run, [](const RecordEntry& entry) {
+  serialize<bus::GuardedType<CommandsPubSubType>>(run, [](const model::StepRecord& record) {
     Commands sample;
-    sample.vehicles().push_back(entry.answer());
+    bus::fill(sample.vehicles().emplace_back(), record.vehicle_id, record.answer);
     return sample;
   });
 }
 void serialize_batch_of_16_entries(benchmark::State& run) {
-  serialize<bus::GuardedType<RecordBatchPubSubType>>(run, [](const RecordEntry& entry) {
+  serialize<bus::GuardedType<RecordBatchPubSubType>>(run, [](const model::StepRecord& record) {
     RecordBatch sample;
-    sample.entries().assign(16, entry);
+    bus::fill(sample.entries().emplace_back(), record);
+    sample.entries().resize(16, RecordEntry(sample.entries().front()));
     return sample;
   });
 }

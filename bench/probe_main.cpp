@@ -20,9 +20,9 @@
 #include "bench/stamps.hpp"
 #include "bench/timer_jitter.hpp"
 #include "closed_loop/flight.hpp"
-#include "closed_loop/record_entries.hpp"
 #include "closed_loop/recorded_flight.hpp"
 #include "common/app/run_main.hpp"
+#include "common/bus/convert.hpp"
 #include "common/bus/qos_file.hpp"
 #include "common/bus/spinning.hpp"
 #include "common/config/scenario.hpp"
@@ -86,10 +86,11 @@ nlohmann::json time_flight(const config::Scenario& scenario, const std::filesyst
   closed_loop::Flight flight(scenario, {0}, options);
   double steps = 0.0;
   Microseconds law{0}, entries{0};
+  RecordEntry entry;
   auto began = Clock::now();
-  while (const closed_loop::FlownStep* flown = flight.fly_step()) {
+  while (const model::StepRecord* flown = flight.fly_step()) {
     const auto answered = Clock::now();
-    const RecordEntry entry = closed_loop::make_entry(0, *flown, options.controller_name);
+    bus::fill(entry, *flown);
     entries += Clock::now() - answered;
     law += flown->answer.compute_time;
     ++steps;

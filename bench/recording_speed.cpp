@@ -9,11 +9,11 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string_view>
-#include <utility>
 #include <vector>
 
-#include "closed_loop/record_entries.hpp"
+#include "bench/flown_run.hpp"
 #include "common/app/run_main.hpp"
+#include "common/bus/convert.hpp"
 #include "common/config/sha256.hpp"
 #include "recorder/columns.hpp"
 #include "recorder/recording.hpp"
@@ -77,7 +77,9 @@ class PlainFile {
     end_ = std::copy(text.begin(), text.end(), end_);
     *end_++ = ',';
   }
-  void end_row() {
+  template <class Row, class Rows>
+  void write(const Rows& rows) {
+    Row::visit(rows, *this);
     end_[-1] = '\n';
     std::fwrite(row_.data(), 1, static_cast<std::size_t>(end_ - row_.data()), file_.get());
     end_ = row_.data();
@@ -90,24 +92,25 @@ class PlainFile {
   char* end_ = row_.data();
 };
 
-double write_plain_files(std::vector<record::StepRows> steps, std::uint32_t vehicles,
-                         const fs::path& folder) {
+double write_plain_files(const std::vector<model::StepRecord>& records,
+                         const Parameters& parameters, const fs::path& folder) {
+  const auto vehicles = static_cast<std::uint32_t>(parameters.vehicles().size());
+  std::vector<record::StepRows> steps(records.size());
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    static_cast<model::StepRecord&>(steps[i]) = records[i];
+    record::fill_columns(steps[i], record::make_row_format(parameters));
+  }
   const auto began = Clock::now();
   PlainFile states(folder / kFiles[0], record::make_header<record::StateRow>());
   PlainFile commands(folder / kFiles[1], record::make_header<record::CommandRow>());
   PlainFile references(folder / kFiles[2], record::make_header<record::ReferenceRow>());
   PlainFile flight(folder / kFiles[3], record::make_flight_header(vehicles > 1));
-  const auto write = [](PlainFile& file, const auto& row) {
-    row.visit(row, file);
-    file.end_row();
-  };
   for (record::StepRows& rows : steps) {
-    for (std::uint32_t id = 0; id < vehicles; ++id) {
-      rows.state->vehicle_id = rows.command->vehicle_id = rows.reference->vehicle_id = id;
-      write(states, *rows.state);
-      write(references, *rows.reference);
-      write(flight, record::FlightRow{*rows.state, *rows.command, *rows.reference, vehicles > 1});
-      write(commands, *rows.command);
+    for (rows.vehicle_id = 0; rows.vehicle_id < vehicles; ++rows.vehicle_id) {
+      states.write<record::StateRow>(rows);
+      references.write<record::ReferenceRow>(rows);
+      flight.write<record::FlightRow>(record::FlightRow{rows, vehicles > 1});
+      commands.write<record::CommandRow>(rows);
     }
   }
   for (PlainFile* file : {&states, &commands, &references, &flight}) file->close();
@@ -115,14 +118,14 @@ double write_plain_files(std::vector<record::StepRows> steps, std::uint32_t vehi
 }
 
 /// The samples that a server would publish.
-std::vector<RecordBatch> make_batches(const std::vector<RecordEntry>& entries,
+std::vector<RecordBatch> make_batches(const std::vector<model::StepRecord>& records,
                                       std::uint32_t vehicles) {
   constexpr std::size_t kEntries = 20;  // 12 KB
   std::vector<RecordBatch> batches(1);
-  for (const RecordEntry& entry : entries)
+  for (const model::StepRecord& record : records)
     for (std::uint32_t id = 0; id < vehicles; ++id) {
       if (batches.back().entries().size() == kEntries) batches.emplace_back();
-      batches.back().entries().push_back(entry);
+      bus::fill(batches.back().entries().emplace_back(), record);
       batches.back().entries().back().vehicle_id(id);
     }
   for (std::size_t i = 0; i < batches.size(); ++i) {
@@ -137,31 +140,27 @@ std::vector<RecordBatch> make_batches(const std::vector<RecordEntry>& entries,
 
 nlohmann::json measure_recording(const config::Scenario& scenario, std::uint32_t vehicles,
                                  std::size_t steps, const fs::path& folder) {
-  std::vector<RecordEntry> entries = closed_loop::fly_entries(scenario, steps);
-  entries.back().answer().mission(MissionPhase::MISSION_FINISHED);
-  const Parameters parameters = closed_loop::make_parameters(scenario, kRecordedRun, vehicles);
+  const std::vector<model::StepRecord> records = fly_records(scenario, steps);
+  const Parameters parameters = make_parameters(scenario, kRecordedRun, vehicles);
   const ScratchFolder ours(folder), plain(folder);
   nlohmann::json json;
-  json["rows"] = kFiles.size() * entries.size() * vehicles;
+  json["rows"] = kFiles.size() * records.size() * vehicles;
   {
-    const auto batches = make_batches(entries, vehicles);
+    const auto batches = make_batches(records, vehicles);
     record::Recording recording(ours.path(), parameters);
-    recording.add(closed_loop::make_status(kRecordedRun, 0, RunPhase::PHASE_RUNNING, 0));
+    recording.add(make_status(kRecordedRun, 0, RunPhase::PHASE_RUNNING, 0));
     auto began = Clock::now();
     for (const RecordBatch& batch : batches) {
       recording.add(batch);
       recording.flush_if_due();
     }
-    recording.add(
-        closed_loop::make_status(kRecordedRun, 1, RunPhase::PHASE_FINISHED, entries.size() - 1));
+    recording.add(make_status(kRecordedRun, 1, RunPhase::PHASE_FINISHED, records.size() - 1));
     json["recording_s"] = calc_seconds(began);
     began = Clock::now();
     if (!recording.finish("", 0)) throw app::RunError("recording: " + recording.describe_gaps());
     json["finish_s"] = calc_seconds(began);
   }
-  std::vector<record::StepRows> rows;
-  for (const RecordEntry& entry : entries) rows.push_back(record::make_rows(entry, parameters));
-  json["plain_s"] = write_plain_files(std::move(rows), vehicles, plain.path());
+  json["plain_s"] = write_plain_files(records, parameters, plain.path());
   std::uintmax_t bytes = 0;
   for (const char* file : kFiles) {
     bytes += fs::file_size(ours.path() / file);

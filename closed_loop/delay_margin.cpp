@@ -65,7 +65,7 @@ DelayedFlight fly(const config::Scenario& scenario, std::int64_t periods, const 
 
 /// The flight without added delay, with which the others are compared.
 DelayedFlight fly_undelayed(const config::Scenario& scenario, ErrorHistory& errors) {
-  DelayedFlight result = fly(scenario, 0, [&](const FlownStep& step, double error) {
+  DelayedFlight result = fly(scenario, 0, [&](const model::StepRecord& step, double error) {
     errors.add(step, error);
     return std::string();
   });
@@ -77,7 +77,7 @@ DelayedFlight fly_undelayed(const config::Scenario& scenario, ErrorHistory& erro
 DelayedFlight fly_delayed(const config::Scenario& scenario, std::int64_t periods,
                           const ErrorHistory& undelayed) {
   const double rod_length = config::make_vehicle_scenario(scenario, 0).vehicle.rod_length;
-  return fly(scenario, periods, [&](const FlownStep& step, double error) {
+  return fly(scenario, periods, [&](const model::StepRecord& step, double error) {
     return is_load_lost(step, error, undelayed, rod_length)
                ? describe_loss(rod_length, "without delay")
                : std::string();

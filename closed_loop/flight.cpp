@@ -20,15 +20,18 @@ Flight::Flight(const config::Scenario& scenario, const std::vector<std::uint32_t
       is_fleet_(scenario.vehicles.size() > 1),
       plants_(sim::make_plants(sim::find_plant_type(scenario.plant.model), scenario, ids)),
       steps_(ids.size()) {
-  for (const std::uint32_t id : ids) {
-    const config::Scenario alone = config::make_vehicle_scenario(scenario, id);
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    const config::Scenario alone = config::make_vehicle_scenario(scenario, ids[i]);
     vehicles_.push_back(
-        {id, sim::FaultLine(alone, id),
-         control::FlightController(alone, id, options.checks_purity, options.make_law)});
+        {sim::FaultLine(alone, ids[i]),
+         control::FlightController(alone, ids[i], options.checks_purity, options.make_law)});
+    steps_[i].vehicle_id = ids[i];
+    steps_[i].kind = model::AnswerKind::kAccepted;
+    steps_[i].client_name = controller_name_;
   }
 }
 
-const FlownStep* Flight::fly_step() {
+const model::StepRecord* Flight::fly_step() {
   if (has_ended_) return nullptr;
   if (has_begun_ && !advance()) {
     has_ended_ = true;
@@ -37,16 +40,16 @@ const FlownStep* Flight::fly_step() {
   has_begun_ = true;
   for (sim::PlantOfVehicles& group : plants_)
     for (std::size_t i = 0; i < group.vehicles.size(); ++i) {
-      FlownStep& flown = steps_[group.vehicles[i]];
+      model::StepRecord& flown = steps_[group.vehicles[i]];
       Vehicle& vehicle = vehicles_[group.vehicles[i]];
       flown.truth = group.plant->measurement(i);
-      flown.measured = vehicle.faults.measure(flown.step, group.plant->seen(i));
-      flown.can_measurement_differ =
-          vehicle.faults.can_disturb_state() || !group.plant->sees_truth();
+      if (vehicle.faults.can_disturb_state() || !group.plant->sees_truth())
+        flown.measured = vehicle.faults.measure(flown.step, group.plant->seen(i));
+      flown.answered_step = flown.step;
       const model::ControllerMemory memory = flown.answer.memory;
       const auto began = measures_compute_time_ ? Clock::now() : Clock::time_point();
       try {
-        flown.answer = vehicle.controller.calc_answer(flown.step, flown.measured, memory);
+        flown.answer = vehicle.controller.calc_answer(flown.step, flown.seen(), memory);
       } catch (const std::exception& error) {
         failure_ = error.what();
         is_law_broken_ = has_ended_ = true;
@@ -62,11 +65,10 @@ bool Flight::advance() {
   for (sim::PlantOfVehicles& group : plants_) {
     group.forces.clear();
     for (const std::size_t i : group.vehicles) {
-      FlownStep& flown = steps_[i];
-      flown.answered_f_Q_W = flown.answer.f_Q_W;
-      flown.applied_f_Q_W = vehicles_[i].faults.actuate(flown.step, flown.answer.f_Q_W);
+      model::StepRecord& flown = steps_[i];
+      flown.f_Q_W = vehicles_[i].faults.actuate(flown.step, flown.answer.f_Q_W);
       ++flown.step;
-      group.forces.push_back(flown.applied_f_Q_W);
+      group.forces.push_back(flown.f_Q_W);
     }
     try {
       group.plant->advance(group.forces, steps_per_period_);
@@ -84,7 +86,7 @@ bool Flight::is_last() {
     const std::uint64_t step = steps_[i].step;
     const model::Answer& answer = steps_[i].answer;
     if (const auto defect = sim::find_defect(step, answer, limits_)) {
-      refused_ = i;
+      steps_[i].kind = model::AnswerKind::kRefused;
       failure_ =
           name_vehicle(i) + sim::describe_refusal(*defect, step, answer, limits_, controller_name_);
       return true;
@@ -95,7 +97,7 @@ bool Flight::is_last() {
 }
 
 std::string Flight::name_vehicle(std::size_t index) const {
-  return is_fleet_ ? "vehicle " + std::to_string(vehicles_[index].id) + ": " : std::string();
+  return is_fleet_ ? "vehicle " + std::to_string(steps_[index].vehicle_id) + ": " : std::string();
 }
 
 std::vector<std::string> Flight::take_remarks() {
@@ -103,15 +105,15 @@ std::vector<std::string> Flight::take_remarks() {
   for (const sim::PlantOfVehicles& group : plants_)
     for (std::size_t i = 0; i < group.vehicles.size(); ++i)
       for (const std::string& remark : group.plant->take_remarks(i))
-        remarks.push_back("vehicle " + std::to_string(vehicles_[group.vehicles[i]].id) + ": " +
+        remarks.push_back("vehicle " + std::to_string(steps_[group.vehicles[i]].vehicle_id) + ": " +
                           remark);
   return remarks;
 }
 
-std::vector<FlownStep> fly(const config::Scenario& scenario, std::uint32_t vehicle) {
+std::vector<model::StepRecord> fly(const config::Scenario& scenario, std::uint32_t vehicle) {
   Flight flight(scenario, vehicle);
-  std::vector<FlownStep> steps;
-  while (const FlownStep* step = flight.fly_step()) steps.push_back(*step);
+  std::vector<model::StepRecord> steps;
+  while (const model::StepRecord* step = flight.fly_step()) steps.push_back(*step);
   return steps;
 }
 

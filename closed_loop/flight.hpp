@@ -3,15 +3,13 @@
 /// recording of the programs in lockstep.
 #pragma once
 
-#include <Eigen/Core>
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "common/config/scenario.hpp"
-#include "common/model/measurement.hpp"
+#include "common/model/step_record.hpp"
 #include "control_client/flight_controller.hpp"
 #include "control_client/laws/control_law.hpp"
 #include "sim_server/core/fault_line.hpp"
@@ -19,17 +17,6 @@
 #include "sim_server/plants/plant.hpp"
 
 namespace sls::closed_loop {
-
-/// One control period of one vehicle: true state, measured state, answer.
-struct FlownStep {
-  std::uint64_t step = 0;
-  model::Measurement truth;
-  model::Measurement measured;  ///< after sensors, estimator and faults: the controller's input
-  bool can_measurement_differ = false;                       ///< from the truth
-  Eigen::Vector3d answered_f_Q_W = Eigen::Vector3d::Zero();  ///< for [step − 1, step), N; 0 at 0
-  Eigen::Vector3d applied_f_Q_W = Eigen::Vector3d::Zero();   ///< the same after faults
-  model::Answer answer;  ///< its compute time is 0 if it is not measured
-};
 
 struct FlightOptions {
   std::string controller_name = "control_client";  ///< in messages
@@ -51,15 +38,11 @@ class Flight {
 
   /// Flies the next step of all vehicles; the last step is the one whose answers end the flight.
   /// Returns the step of the first vehicle; `steps` has those of all. Null after the end.
-  const FlownStep* fly_step();
+  const model::StepRecord* fly_step();
 
-  /// The last step of every vehicle, in the order of the ids.
-  const std::vector<FlownStep>& steps() const { return steps_; }
-
-  /// True if the last answer of the vehicle with this index failed the flight.
-  bool is_refused(std::size_t index) const { return refused_ == index; }
-  /// The index of that vehicle.
-  const std::optional<std::size_t>& refused() const { return refused_; }
+  /// The last step of every vehicle, in the order of the ids. The one whose answer failed the
+  /// flight is of the kind kRefused.
+  const std::vector<model::StepRecord>& steps() const { return steps_; }
 
   /// True if a broken law ended the flight: it threw, or gave different answers to equal inputs.
   bool is_law_broken() const { return is_law_broken_; }
@@ -75,7 +58,6 @@ class Flight {
 
  private:
   struct Vehicle {
-    std::uint32_t id;
     sim::FaultLine faults;
     control::FlightController controller;
   };
@@ -93,8 +75,7 @@ class Flight {
   const bool is_fleet_;
   std::vector<sim::PlantOfVehicles> plants_;
   std::vector<Vehicle> vehicles_;
-  std::vector<FlownStep> steps_;
-  std::optional<std::size_t> refused_;
+  std::vector<model::StepRecord> steps_;
   bool has_begun_ = false;
   bool has_ended_ = false;
   bool is_law_broken_ = false;
@@ -102,6 +83,6 @@ class Flight {
 };
 
 /// All steps of a flight of one vehicle of `scenario`.
-std::vector<FlownStep> fly(const config::Scenario& scenario, std::uint32_t vehicle = 0);
+std::vector<model::StepRecord> fly(const config::Scenario& scenario, std::uint32_t vehicle = 0);
 
 }  // namespace sls::closed_loop

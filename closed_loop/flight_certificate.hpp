@@ -1,11 +1,9 @@
 /// The certificate of a flight in one process, without its recording.
 #pragma once
 
-#include <cstdint>
 #include <string>
 
-#include "closed_loop/flight.hpp"
-#include "common/bus/topics.hpp"
+#include "common/model/step_record.hpp"
 #include "recorder/certificate.hpp"
 #include "recorder/rows.hpp"
 
@@ -15,21 +13,21 @@ namespace sls::closed_loop {
 /// both are made from the recorder's rows.
 class FlightCertificate {
  public:
-  /// For vehicles with `plant` or equal plants, and with the period in force.
-  FlightCertificate(std::int64_t period_ns, const sim::Plant& plant);
-  /// For the flight that a server announces with `parameters`.
-  explicit FlightCertificate(const Parameters& parameters) : parameters_(parameters) {}
+  explicit FlightCertificate(const record::RowFormat& format) : format_(format) {}
 
   /// Adds a step. The steps of each vehicle must come in order.
-  void add(std::uint32_t vehicle_id, const FlownStep& flown, bool is_refused);
+  void add(const model::StepRecord& step) {
+    static_cast<model::StepRecord&>(rows_) = step;
+    record::fill_columns(rows_, format_);
+    certificate_.add(rows_);
+  }
 
   /// 64 lower-case hex digits; nothing can be added after it.
   std::string finish() { return certificate_.finish(); }
 
  private:
-  Parameters parameters_;  // only the members on which rows depend
-  RecordEntry entry_;      // reused like rows_, to avoid allocation
-  record::StepRows rows_;
+  const record::RowFormat format_;
+  record::StepRows rows_;  // its memory is used again for each step
   record::Certificate certificate_;
 };
 

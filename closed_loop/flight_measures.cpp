@@ -76,7 +76,7 @@ double FlightMeasures::Errors::calc_norm_max() const {
 
 // --- steps ---------------------------------------------------------------------------------------
 
-void FlightMeasures::Step::add(const FlownStep& step, double time_s) {
+void FlightMeasures::Step::add(const model::StepRecord& step, double time_s) {
   const Eigen::Array3d reference = step.answer.reference.position.array();
   const Eigen::Array3d p_WL = step.truth.p_WL.array();
   if (!has_begun) {
@@ -119,7 +119,7 @@ FlightMeasures::FlightMeasures(const MeasureList& list, std::int64_t period_ns)
       stages_(list.stages().size()),
       steps_(list.stages().size()) {}
 
-void FlightMeasures::add(const FlownStep& step) {
+void FlightMeasures::add(const model::StepRecord& step) {
   const Eigen::Array3d error = step.truth.p_WL - step.answer.reference.position;
   const std::size_t stage = step.answer.stage;
   errors_.add(error);

@@ -40,7 +40,7 @@ class FlightMeasures {
   FlightMeasures(const MeasureList& list, std::int64_t period_ns);
 
   /// Adds a step, in order from step 0.
-  void add(const FlownStep& step);
+  void add(const model::StepRecord& step);
 
   /// A value for each column of the list; NaN if it is not defined.
   std::vector<double> finish(std::optional<double> time_of_loss_s) const;
@@ -65,7 +65,7 @@ class FlightMeasures {
 
   /// Step response of the load to a constant reference, per axis.
   struct Step {
-    void add(const FlownStep& step, double time_s);
+    void add(const model::StepRecord& step, double time_s);
     double calc_settling_time(int axis) const;
     double calc_overshoot(int axis) const;
     bool is_step(int axis) const;

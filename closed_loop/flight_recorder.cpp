@@ -1,6 +1,5 @@
 #include "closed_loop/flight_recorder.hpp"
 
-#include "closed_loop/record_entries.hpp"
 #include "common/app/log.hpp"
 #include "common/plugin/shared_library.hpp"
 
@@ -13,11 +12,8 @@ FlightRecorder::FlightRecorder(const std::filesystem::path& folder, bool force,
       folder_(folder, force),
       recording_(folder, parameters),
       status_(parameters.run_id(), parameters.vehicles().front().vehicle_id(), sync) {
-  for (const VehicleParameters& vehicle : parameters.vehicles())
-    ids_.push_back(vehicle.vehicle_id());
   status_.begin(Clock::now());
   add_status(RunPhase::PHASE_RUNNING, "");
-  batch_.run_id(parameters.run_id());
 }
 
 void FlightRecorder::note_law_library(const config::Scenario& scenario) {
@@ -30,20 +26,11 @@ void FlightRecorder::add_status(RunPhase phase, const std::string& reason) {
   recording_.add(status_.make({phase, reason, step_, controller_name_}, Clock::now()));
 }
 
-void FlightRecorder::hand_on() {
-  recording_.add(batch_);
-  batch_.batch_index(batch_.batch_index() + 1);
-  batch_.entries().clear();
-}
-
-void FlightRecorder::add(const std::vector<FlownStep>& steps, std::optional<std::size_t> refused) {
-  for (std::size_t i = 0; i < ids_.size(); ++i) {
-    fill_entry(batch_.entries().emplace_back(), ids_[i], steps[i], controller_name_, refused == i);
-    if (batch_.entries().size() == BATCH_ENTRIES) hand_on();
-  }
+void FlightRecorder::add(const std::vector<model::StepRecord>& steps) {
+  for (const model::StepRecord& step : steps) recording_.add(step);
   step_ = steps.front().step;
   if (step_ > 0)
-    for (std::size_t i = 0; i < ids_.size(); ++i)
+    for (std::size_t i = 0; i < steps.size(); ++i)
       status_.timing.add(model::AnswerKind::kAccepted, 0);
   if (is_status_due()) add_status(RunPhase::PHASE_RUNNING, "");
   recording_.flush_if_due();
@@ -57,17 +44,11 @@ void FlightRecorder::announce(const std::vector<std::string>& remarks) {
 }
 
 bool FlightRecorder::finish(const std::string& failure) {
-  batch_.is_last(true);
-  hand_on();
   add_status(failure.empty() ? RunPhase::PHASE_FINISHED : RunPhase::PHASE_FAILED,
              failure.empty() ? "mission finished" : failure);
   return recording_.finish("", 0);
 }
 
-void FlightRecorder::interrupt(const std::string& reason) {
-  batch_.is_last(true);
-  hand_on();
-  recording_.finish(reason, 0);
-}
+void FlightRecorder::interrupt(const std::string& reason) { recording_.finish(reason, 0); }
 
 }  // namespace sls::closed_loop

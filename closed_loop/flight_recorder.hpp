@@ -2,16 +2,14 @@
 #pragma once
 
 #include <chrono>
-#include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "closed_loop/flight.hpp"
 #include "common/bus/topics.hpp"
 #include "common/config/scenario.hpp"
+#include "common/model/step_record.hpp"
 #include "recorder/recording.hpp"
 #include "sim_server/core/status_series.hpp"
 
@@ -30,9 +28,8 @@ class FlightRecorder {
   /// Notes the shared library of the law of `scenario`, if it has one that is loaded.
   void note_law_library(const config::Scenario& scenario);
 
-  /// Adds one step of all vehicles, in the order of the parameters. `refused` is the index of the
-  /// vehicle whose answer failed the flight.
-  void add(const std::vector<FlownStep>& steps, std::optional<std::size_t> refused);
+  /// Adds one step of all vehicles, in the order of the parameters.
+  void add(const std::vector<model::StepRecord>& steps);
 
   /// True if the next status sample is due, before which remarks must be announced.
   bool is_status_due() const { return status_.is_due(Clock::now()); }
@@ -49,16 +46,13 @@ class FlightRecorder {
  private:
   using Clock = std::chrono::steady_clock;
 
-  void hand_on();
   void add_status(RunPhase phase, const std::string& reason);
 
   const std::string controller_name_;
-  std::vector<std::uint32_t> ids_;
   const record::RecordingFolder folder_;
   record::Recording recording_;
   sim::StatusSeries status_;
   std::uint64_t step_ = 0;
-  RecordBatch batch_;
 };
 
 }  // namespace sls::closed_loop

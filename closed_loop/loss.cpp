@@ -8,12 +8,12 @@
 
 namespace sls::closed_loop {
 
-void ErrorHistory::add(const FlownStep& step, double error) {
+void ErrorHistory::add(const model::StepRecord& step, double error) {
   if (step.answer.stage >= stages_.size()) stages_.resize(step.answer.stage + 1);
   stages_[step.answer.stage].push_back(error);
 }
 
-double ErrorHistory::find(const FlownStep& step) const {
+double ErrorHistory::find(const model::StepRecord& step) const {
   if (step.answer.stage >= stages_.size() || stages_[step.answer.stage].empty()) return 0.0;
   const std::vector<double>& errors = stages_[step.answer.stage];
   const std::size_t since_start = step.step - step.answer.memory.stage_start_step;

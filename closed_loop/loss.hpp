@@ -10,7 +10,7 @@
 namespace sls::closed_loop {
 
 /// Distance of the load from its reference, m.
-inline double calc_load_error(const FlownStep& step) {
+inline double calc_load_error(const model::StepRecord& step) {
   return (step.truth.p_WL - step.answer.reference.position).norm();
 }
 
@@ -19,18 +19,18 @@ inline double calc_load_error(const FlownStep& step) {
 /// start of the stage.
 class ErrorHistory {
  public:
-  void add(const FlownStep& step, double error);
+  void add(const model::StepRecord& step, double error);
 
   /// The error at the same stage and time as `step`; the last one of the stage if the stage was
   /// shorter; 0 if the stage was never flown.
-  double find(const FlownStep& step) const;
+  double find(const model::StepRecord& step) const;
 
  private:
   std::vector<std::vector<double>> stages_;
 };
 
 /// True if the load error `error` is more than one rod length (m) larger than in the flight `base`.
-inline bool is_load_lost(const FlownStep& step, double error, const ErrorHistory& base,
+inline bool is_load_lost(const model::StepRecord& step, double error, const ErrorHistory& base,
                          double rod_length) {
   return error - base.find(step) > rod_length;
 }

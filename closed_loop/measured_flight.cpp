@@ -40,12 +40,14 @@ MeasuredFlight fly_measured(const config::Scenario& scenario, const MeasureList&
   Flight flight(scenario, {0}, options);
   FlightMeasures measured(measures, period_ns);
   std::optional<FlightCertificate> certificate;
-  if (certify) certificate.emplace(period_ns, flight.plant());
+  if (certify)
+    certificate.emplace(record::RowFormat{period_ns, flight.plant().has_attitude(),
+                                          static_cast<int>(flight.plant().signals().size())});
   MeasuredFlight result;
   std::optional<std::int64_t> loss_ns;
-  while (const FlownStep* step = flight.fly_step()) {
+  while (const model::StepRecord* step = flight.fly_step()) {
     ++result.steps;
-    if (certificate) certificate->add(0, *step, flight.is_refused(0));
+    if (certificate) certificate->add(*step);
     if (!loss_ns) {
       measured.add(*step);
       if (is_load_lost(*step, calc_load_error(*step), base, rod_length)) {
@@ -79,7 +81,7 @@ ErrorHistory fly_base(const config::Scenario& base, const Poll& poll) {
   ErrorHistory errors;
   Flight flight(base);
   std::uint64_t steps = 0;
-  while (const FlownStep* step = flight.fly_step()) {
+  while (const model::StepRecord* step = flight.fly_step()) {
     errors.add(*step, calc_load_error(*step));
     if (++steps % kStepsPerPoll == 0 && poll) poll();
   }

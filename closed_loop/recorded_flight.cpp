@@ -24,7 +24,7 @@ FlightEnd fly_recorded(const config::Scenario& scenario, const FlightOptions& op
       [&recorder](const std::string& reason) { recorder.interrupt(reason); });
   while (app::stop_signal() == 0 && flight.fly_step()) {
     if (recorder.is_status_due()) recorder.announce(flight.take_remarks());
-    recorder.add(flight.steps(), flight.refused());
+    recorder.add(flight.steps());
   }
   recorder.announce(flight.take_remarks());
   if (app::stop_signal() != 0) {

@@ -2,7 +2,6 @@
 
 #include <string_view>
 #include <type_traits>
-#include <vector>
 
 namespace sls::record {
 namespace {
@@ -17,37 +16,36 @@ struct Collector {
   void operator()(const Column& column, const Field& field) {
     if (!column.is_certified) return;
     // A sequence has any length; for the other numbers of a row there is room.
-    if constexpr (std::is_same_v<Field, std::vector<double>>)
-      bytes.make_room(field.size() * sizeof(double));
+    if constexpr (std::is_same_v<Field, model::Numbers>)
+      bytes.make_room(static_cast<std::size_t>(field.size()) * sizeof(double));
     for_each_component(field, [this](const auto& component) { bytes.append(component); });
   }
 };
 
 template <class Row>
-void append_row(ByteBuffer& bytes, const Row& row) {
+void append_row(ByteBuffer& bytes, const StepRows& rows) {
   bytes.append(std::string_view(Row::kTopic));
   Collector collector{bytes};
-  Row::visit(row, collector);
-}
-
-template <class Row>
-std::string collect(const Row& row) {
-  ByteBuffer bytes;
-  append_row(bytes, row);
-  return std::string(bytes.bytes());
+  Row::visit(rows, collector);
 }
 
 }  // namespace
 
-std::string to_bytes(const StateRow& row) { return collect(row); }
-std::string to_bytes(const CommandRow& row) { return collect(row); }
-std::string to_bytes(const ReferenceRow& row) { return collect(row); }
+template <class Row>
+std::string to_bytes(const StepRows& rows) {
+  ByteBuffer bytes;
+  append_row<Row>(bytes, rows);
+  return std::string(bytes.bytes());
+}
+template std::string to_bytes<StateRow>(const StepRows&);
+template std::string to_bytes<CommandRow>(const StepRows&);
+template std::string to_bytes<ReferenceRow>(const StepRows&);
 
 void Certificate::add(const StepRows& rows) {
   Vehicle& vehicle = vehicles_[rows.vehicle_id];
-  if (rows.state) append_row(vehicle.bytes, *rows.state);
-  if (rows.command) append_row(vehicle.bytes, *rows.command);
-  if (rows.reference) append_row(vehicle.bytes, *rows.reference);
+  if (rows.has_state) append_row<StateRow>(vehicle.bytes, rows);
+  if (rows.has_command) append_row<CommandRow>(vehicle.bytes, rows);
+  if (rows.has_reference) append_row<ReferenceRow>(vehicle.bytes, rows);
   if (vehicle.bytes.bytes().size() >= kHashedTogether) vehicle.hash_bytes();
 }
 

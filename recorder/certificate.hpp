@@ -13,10 +13,9 @@
 namespace sls::record {
 
 /// The certified fields of a row as little-endian bytes. Two rows are equal if their bytes are
-/// equal.
-std::string to_bytes(const StateRow& row);
-std::string to_bytes(const CommandRow& row);
-std::string to_bytes(const ReferenceRow& row);
+/// equal. For StateRow, CommandRow and ReferenceRow.
+template <class Row>
+std::string to_bytes(const StepRows& rows);
 
 class Certificate {
  public:

@@ -52,9 +52,9 @@ std::string join_names(const std::vector<ColumnLister::Entry>& columns) {
 }
 
 std::string make_state_header(const Parameters& parameters) {
-  StateRow row;
-  row.has_attitude = parameters.has_attitude();
-  std::string header = join_names(list_columns(row));
+  StepRows rows;
+  rows.has_attitude = parameters.has_attitude();
+  std::string header = join_names(list_columns<StateRow>(rows));
   for (const SignalDescription& signal : parameters.signals()) {
     const std::string name = signal.name().to_string();
     if (!can_be_column(name) || ("," + header + ",").find("," + name + ",") != header.npos)
@@ -68,18 +68,18 @@ std::string make_state_header(const Parameters& parameters) {
 }
 
 std::string make_flight_header(bool is_of_fleet) {
-  return join_names(list_columns(FlightRow{{}, {}, {}, is_of_fleet}));
+  return join_names(list_columns<FlightRow>(FlightRow{StepRows(), is_of_fleet}));
 }
 
 std::string describe_columns() {
-  StateRow state;
-  state.has_attitude = true;
-  state.plant.signals({0});
-  return describe("`state.csv`, `measured.csv`", list_columns(state)) +
+  StepRows rows;
+  rows.has_attitude = true;
+  rows.truth.signals.setZero(1);
+  return describe("`state.csv`, `measured.csv`", list_columns<StateRow>(rows)) +
          describe("`command.csv`", list_columns<CommandRow>()) +
          describe("`reference.csv`", list_columns<ReferenceRow>()) +
-         describe("`flight.csv`", list_columns(FlightRow{{}, {}, {}, true})) +
-         describe("`status.csv`", list_columns<StatusRow>());
+         describe("`flight.csv`", list_columns<FlightRow>(FlightRow{rows, true})) +
+         describe("`status.csv`", list_columns<StatusRow, SimStatus>());
 }
 
 }  // namespace sls::record

@@ -45,20 +45,7 @@ struct ColumnLister {
   void add(const Column& column, std::size_t size);
 };
 
-template <class Row>
-std::vector<ColumnLister::Entry> list_columns(const Row& row = Row()) {
-  ColumnLister lister;
-  Row::visit(row, lister);
-  return lister.entries;
-}
-
 std::string join_names(const std::vector<ColumnLister::Entry>& columns);
-
-/// The first line of the row's file. For state.csv without attitude and signals.
-template <class Row>
-std::string make_header() {
-  return join_names(list_columns<Row>());
-}
 
 /// The first line of state.csv and measured.csv, with the attitude and signals of the plant, if
 /// any.

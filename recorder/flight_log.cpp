@@ -6,7 +6,6 @@
 #include <cmath>
 #include <variant>
 
-#include "common/bus/convert.hpp"
 #include "common/bus/names.hpp"
 #include "common/bus/sync_counters.hpp"
 
@@ -59,14 +58,14 @@ double FlightLog::to_time(std::uint64_t step) const {
 
 FlightLog::Stage* FlightLog::find_or_begin_stage(const StepRows& rows) {
   auto& [stages, left_out, current] = stages_[rows.vehicle_id];
-  const std::uint32_t index = rows.reference->reference.stage_index();
+  const std::uint32_t index = rows.answer.stage;
   const bool begins = current != index;
   current = index;
   if (begins && stages.size() == kMaxStages) ++left_out;
   if (left_out > 0) return nullptr;
   if (begins) {
     Stage stage;
-    stage.name = rows.reference->stage_name;
+    stage.name = rows.answer.stage_name;
     stage.first_step = rows.step;
     stage.start_step = find_start(rows.vehicle_id, index, rows.step);
     stages.emplace_back(index, stage);
@@ -120,10 +119,9 @@ void FlightLog::add(const StepRows& rows) {
   if (!listed) return;
   Stage& stage = *listed;
   stage.last_step = rows.step;
-  const Eigen::Vector3d error = bus::to_vector(rows.state->plant.p_WL_m()) -
-                                bus::to_vector(rows.reference->reference.position_m());
+  const Eigen::Vector3d error = rows.truth.p_WL - rows.answer.reference.position;
   stage.all.add(error);
-  const std::size_t index = rows.reference->reference.stage_index();
+  const std::size_t index = rows.answer.stage;
   if (index >= scenario_.mission.size() ||
       !std::holds_alternative<config::FigureEightReference>(scenario_.mission[index].reference))
     return;

@@ -60,10 +60,16 @@ void Inbox::open(std::uint64_t run_id, const bus::PeerId& server) {
   for (Received& received : std::exchange(waiting_, {})) put_locked(std::move(received));
 }
 
-std::deque<Inbox::Sample> Inbox::take_all() {
-  const std::lock_guard lock(mutex_);
-  size_ = 0;
-  return std::exchange(samples_, {});
+bool Inbox::empty_into(Recording& recording) {
+  std::deque<Sample> samples;
+  {
+    const std::lock_guard lock(mutex_);
+    size_ = 0;
+    samples.swap(samples_);
+  }
+  for (const Sample& sample : samples)
+    std::visit([&](const auto& message) { recording.add(message); }, sample);
+  return !samples.empty();
 }
 
 std::uint64_t Inbox::refused() const {

@@ -8,6 +8,7 @@
 #include <variant>
 
 #include "common/bus/node.hpp"
+#include "recorder/recording.hpp"
 
 namespace sls::record {
 
@@ -27,8 +28,9 @@ class Inbox {
   /// other senders than its `server` are ignored.
   void open(std::uint64_t run_id, const bus::PeerId& server);
 
-  /// Takes all waiting samples of the open run, oldest first.
-  std::deque<Sample> take_all();
+  /// Adds all waiting samples of the open run to `recording`, oldest first; false if there are
+  /// none.
+  bool empty_into(Recording& recording);
 
   /// Status samples and entries of the open run that were lost because there was no room.
   std::uint64_t refused() const;

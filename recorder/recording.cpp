@@ -93,6 +93,8 @@ void Recording::add(const RecordBatch& batch) {
   if (batch.run_id() == parameters_.run_id()) stream_.add(batch);
 }
 
+void Recording::add(const model::StepRecord& record) { stream_.add(record); }
+
 void Recording::add(const SimStatus& status) {
   if (status.run_id() != parameters_.run_id()) return;
   // A server that is discovered again sends its history again.
@@ -115,7 +117,7 @@ void Recording::note_library(const std::string& controller, const std::string& s
 
 void Recording::write(const StepRows& rows) {
   for (const auto& sink : sinks_) sink->add(rows);
-  if (rows.command && rows.command->is_unanswered()) ++unanswered_steps_;
+  if (rows.is_unanswered()) ++unanswered_steps_;
   account(rows);
   for (const auto& sink : sinks_)
     if (sink->is_full()) return flush();
@@ -130,12 +132,12 @@ void Recording::account(const StepRows& rows) {
   if (!bare_steps_.empty())
     if (const auto bare = bare_steps_.extract(id))
       note_missing_answers(id, bare.mapped(), bare.mapped());
-  if (!rows.state) note_missing(id, StateRow::kTopic, rows.step, rows.step);
-  if (!rows.command && !rows.reference)
+  if (!rows.has_state) note_missing(id, StateRow::kTopic, rows.step, rows.step);
+  if (!rows.has_command && !rows.has_reference)
     bare_steps_[id] = rows.step;
-  else if (!rows.command)
+  else if (!rows.has_command)
     note_missing(id, CommandRow::kTopic, rows.step, rows.step);
-  else if (!rows.reference && !rows.command->is_unanswered())
+  else if (!rows.has_reference && !rows.is_unanswered())
     note_missing(id, ReferenceRow::kTopic, rows.step, rows.step);
 }
 

@@ -1,4 +1,4 @@
-/// One recording on disk: takes the batches and status samples of one run and writes the files. No
+/// One recording on disk: takes the steps and status samples of one run and writes the files. No
 /// network here; used by one thread.
 #pragma once
 
@@ -34,6 +34,8 @@ class Recording {
   /// For a recording of one segment.
   Recording(const std::filesystem::path& folder, const Parameters& parameters);
 
+  /// Adds the next step of a vehicle of a run in this process.
+  void add(const model::StepRecord& record);
   /// Samples of other runs are ignored.
   void add(const RecordBatch& batch);
   void add(const SimStatus& status);

@@ -20,8 +20,12 @@ struct FieldParser {
   void operator()(const Column&, Field& field) {
     for_each_component(field, [this](auto& component) { parse(component); });
   }
-  void operator()(const Column&, std::vector<double>& signals) {
-    signals.resize(file.columns().size() - index);
+  void operator()(const Column&, model::Numbers& signals) {
+    const std::size_t count = file.columns().size() - index;
+    if (count > model::kMaxNumbers)
+      throw DamagedError(file.place() + "expected at most " + std::to_string(model::kMaxNumbers) +
+                         " signals, got " + std::to_string(count));
+    signals.resize(static_cast<Eigen::Index>(count));
     for (double& number : signals) parse(number);
   }
 
@@ -38,19 +42,38 @@ struct FieldParser {
 };
 
 template <class Row>
+constexpr bool kHasMotion = std::is_same_v<Row, StateRow> || std::is_same_v<Row, MeasuredRow>;
+template <class Row>
 constexpr auto kFurther =
-    std::is_same_v<Row, StateRow> ? CsvReader::Further::kAllowed : CsvReader::Further::kNone;
+    kHasMotion<Row> ? CsvReader::Further::kAllowed : CsvReader::Further::kNone;
 
 template <class Row>
-Row parse_row(const CsvReader& file) {
-  Row row;
+std::string make_known_header() {
+  return make_header<std::conditional_t<kHasMotion<Row>, StateRow, Row>>();
+}
+
+/// Sets kind and error code of the answer by the column `fault`.
+void set_fault(StepRows& rows) {
+  rows.kind = rows.fault == StepRows::kHeld       ? model::AnswerKind::kHeld
+              : rows.fault == StepRows::kFailSafe ? model::AnswerKind::kFailSafe
+                                                  : model::AnswerKind::kAccepted;
+  for (const model::Fault fault : {model::Fault::kFreeFall, model::Fault::kRodLevel,
+                                   model::Fault::kNotFinite, model::Fault::kStageTimeout})
+    if (rows.fault == to_string(fault)) rows.answer.fault = fault;
+}
+
+template <class Row>
+StepRows parse_row(const CsvReader& file) {
+  StepRows rows;
   const auto& columns = file.columns();
-  if constexpr (std::is_same_v<Row, StateRow>)
-    row.has_attitude =
+  if constexpr (kHasMotion<Row>)
+    rows.has_attitude =
         columns.size() >= 29 && columns[22] == "att_w" && columns[28] == "rate_z_rad_s";
+  if constexpr (std::is_same_v<Row, MeasuredRow>) rows.measured.emplace();
   FieldParser parser{file};
-  Row::visit(row, parser);
-  return row;
+  Row::visit(rows, parser);
+  if constexpr (std::is_same_v<Row, CommandRow>) set_fault(rows);
+  return rows;
 }
 
 }  // namespace
@@ -71,13 +94,13 @@ RecordedFlight open_recording(const fs::path& folder) {
 }
 
 template <class Row>
-RowReader<Row>::RowReader(const RecordedFlight& flight, std::uint64_t end, const char* file)
-    : flight_(flight), end_(end), name_(file) {
+RowReader<Row>::RowReader(const RecordedFlight& flight, std::uint64_t end)
+    : flight_(flight), end_(end) {
   for (const std::uint32_t id : flight.vehicle_ids()) vehicles_[id];
 }
 
 template <class Row>
-const Row* RowReader<Row>::peek(std::uint32_t vehicle_id) {
+const StepRows* RowReader<Row>::peek(std::uint32_t vehicle_id) {
   const auto vehicle = vehicles_.find(vehicle_id);
   if (vehicle == vehicles_.end()) return nullptr;
   const auto& rows = vehicle->second.rows;
@@ -87,11 +110,33 @@ const Row* RowReader<Row>::peek(std::uint32_t vehicle_id) {
 }
 
 template <class Row>
-Row RowReader<Row>::take(std::uint32_t vehicle_id) {
-  auto& rows = vehicles_.at(vehicle_id).rows;
-  Row row = std::move(rows.front());
-  rows.pop_front();
-  return row;
+void RowReader<Row>::take(std::uint32_t vehicle_id, StepRows& rows) {
+  auto& waiting = vehicles_.at(vehicle_id).rows;
+  StepRows& row = waiting.front();
+  if constexpr (std::is_same_v<Row, StateRow>) {
+    rows.has_state = true;
+    rows.has_attitude = row.has_attitude;
+    rows.state_time_s = row.state_time_s;
+    rows.truth = row.truth;
+    rows.f_Q_W = row.f_Q_W;
+  } else if constexpr (std::is_same_v<Row, MeasuredRow>) {
+    rows.measured = row.measured;
+  } else if constexpr (std::is_same_v<Row, CommandRow>) {
+    rows.has_command = true;
+    rows.kind = row.kind;
+    rows.fault = std::move(row.fault);
+    rows.compute_us = row.compute_us;
+    rows.client_name = std::move(row.client_name);
+    rows.answer.f_Q_W = row.answer.f_Q_W;
+    rows.answer.fault = row.answer.fault;
+  } else {
+    rows.has_reference = true;
+    rows.reference_time_s = row.reference_time_s;
+    rows.answer.reference = row.answer.reference;
+    rows.answer.stage = row.answer.stage;
+    rows.answer.stage_name = std::move(row.answer.stage_name);
+  }
+  waiting.pop_front();
 }
 
 template <class Row>
@@ -102,10 +147,11 @@ std::optional<std::uint32_t> RowReader<Row>::read_on() {
   return kept_;
 }
 
+/// A segment whose measured states are the true ones has no measured.csv.
 template <class Row>
 bool RowReader<Row>::is_left_out() const {
-  return name_ != std::string_view(Row::kFile) &&
-         !fs::exists(flight_.segments[segment_].folder / name_);
+  return std::is_same_v<Row, MeasuredRow> &&
+         !fs::exists(flight_.segments[segment_].folder / Row::kFile);
 }
 
 /// Reads one row of any vehicle; false at the end.
@@ -114,8 +160,8 @@ bool RowReader<Row>::read_row() {
   for (; segment_ < flight_.segments.size(); ++segment_, file_.reset()) {
     if (is_left_out()) continue;
     if (!file_)
-      file_ = std::make_unique<CsvReader>(flight_.segments[segment_].folder / name_,
-                                          make_header<Row>(), kFurther<Row>);
+      file_ = std::make_unique<CsvReader>(flight_.segments[segment_].folder / Row::kFile,
+                                          make_known_header<Row>(), kFurther<Row>);
     if (!file_->next()) continue;
     keep(parse_row<Row>(*file_));
     return true;
@@ -124,7 +170,7 @@ bool RowReader<Row>::read_row() {
 }
 
 template <class Row>
-void RowReader<Row>::keep(Row row) {
+void RowReader<Row>::keep(StepRows row) {
   const auto vehicle = vehicles_.find(row.vehicle_id);
   if (vehicle == vehicles_.end()) return;
   auto& [rows, next_step] = vehicle->second;
@@ -140,7 +186,7 @@ void RowReader<Row>::keep(Row row) {
   rows.push_back(std::move(row));
 }
 
-template class RowReader<StateRow>;  // for measured.csv
+template class RowReader<MeasuredRow>;
 
 StepReader::StepReader(const RecordedFlight& flight, std::uint64_t end)
     : states_(flight, end), commands_(flight, end), references_(flight, end) {
@@ -162,7 +208,7 @@ std::optional<StepRows> StepReader::next_as_written() {
   if (!written_) written_ = states_.read_on();
   if (!written_) return next();
   auto rows = next(*written_);
-  if (rows && rows->state) written_.reset();
+  if (rows && rows->has_state) written_.reset();
   return rows;
 }
 
@@ -174,12 +220,12 @@ std::optional<StepRows> StepReader::next(std::uint32_t vehicle_id) {
   rows.step = std::min({step_of(states_.peek(vehicle_id)), step_of(commands_.peek(vehicle_id)),
                         step_of(references_.peek(vehicle_id))});
   if (rows.step == kNone) return std::nullopt;
-  const auto take = [&](auto& reader, auto& row) {
-    if (step_of(reader.peek(vehicle_id)) == rows.step) row = reader.take(vehicle_id);
+  const auto take = [&](auto& reader) {
+    if (step_of(reader.peek(vehicle_id)) == rows.step) reader.take(vehicle_id, rows);
   };
-  take(states_, rows.state);
-  take(commands_, rows.command);
-  take(references_, rows.reference);
+  take(states_);
+  take(commands_);
+  take(references_);
   return rows;
 }
 

@@ -44,23 +44,22 @@ RecordedFlight open_recording(const std::filesystem::path& folder);
 template <class Row>
 class RowReader {
  public:
-  /// If `file` is not the row's usual file, it may be missing in segments.
-  RowReader(const RecordedFlight& flight, std::uint64_t end, const char* file = Row::kFile);
+  RowReader(const RecordedFlight& flight, std::uint64_t end);
 
-  /// The next row of the vehicle; null at the end.
-  const Row* peek(std::uint32_t vehicle_id);
-  /// Takes that row, which must exist.
-  Row take(std::uint32_t vehicle_id);
+  /// The next row of the vehicle, in a step that has no other row; null at the end.
+  const StepRows* peek(std::uint32_t vehicle_id);
+  /// Moves that row, which must exist, into `rows`.
+  void take(std::uint32_t vehicle_id, StepRows& rows);
 
   /// Reads one more row and returns its vehicle; nothing at the end.
   std::optional<std::uint32_t> read_on();
 
  private:
   bool read_row();
-  void keep(Row row);
+  void keep(StepRows row);
 
   struct Vehicle {
-    std::deque<Row> rows;  // read, but not taken yet
+    std::deque<StepRows> rows;  // read, but not taken yet
     std::uint64_t next_step = 0;
   };
 
@@ -68,7 +67,6 @@ class RowReader {
 
   const RecordedFlight& flight_;
   const std::uint64_t end_;
-  const char* const name_;
   std::map<std::uint32_t, Vehicle> vehicles_;
   std::optional<std::uint32_t> kept_;  // vehicle of the last row that was kept
   std::size_t segment_ = 0;

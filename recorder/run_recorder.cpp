@@ -120,16 +120,14 @@ void RunRecorder::write_samples() {
     auto time = Clock::now();
     while (!recording_.has_all() && !is_stopped) {
       is_stopped = stop_writing_;  // read first: samples that came before it are still written
-      const std::deque<Inbox::Sample> samples = surroundings_.inbox.take_all();
-      for (const Inbox::Sample& sample : samples)
-        std::visit([this](const auto& message) { recording_.add(message); }, sample);
+      const bool has_come = surroundings_.inbox.empty_into(recording_);
       note_libraries();
       const auto earlier = std::exchange(time, Clock::now());
       recording_.pass_time(std::min(time - earlier, kLongestPass));
       recording_.flush_if_due();
       last_complete_step_ = recording_.last_complete_step();
       report_missing_batch();
-      std::this_thread::sleep_for(samples.empty() ? kWriteTime : kBusyTime);
+      std::this_thread::sleep_for(has_come ? kBusyTime : kWriteTime);
     }
     // If it has all, the main thread may still write watched_end_.
     const bool has_all = recording_.has_all();

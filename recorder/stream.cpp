@@ -6,7 +6,7 @@
 #include <limits>
 #include <utility>
 
-#include "common/bus/names.hpp"
+#include "common/bus/convert.hpp"
 #include "common/sync/servers.hpp"
 
 namespace sls::record {
@@ -28,7 +28,7 @@ constexpr std::size_t kMaxPending = 32768;
 }  // namespace
 
 Stream::Stream(const Parameters& parameters, std::uint64_t first_step, Sink sink, GapSink gap_sink)
-    : parameters_(parameters),
+    : format_(make_row_format(parameters)),
       max_step_(static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max() /
                                            std::max<std::int64_t>(parameters.period_ns(), 1))),
       sink_(std::move(sink)),
@@ -80,49 +80,59 @@ void Stream::give_up() {
 
 // --- entries -------------------------------------------------------------------------------------
 
+void Stream::add(const model::StepRecord& record) {
+  static_cast<model::StepRecord&>(next_) = record;
+  handle_next();
+}
+
 void Stream::handle(const RecordBatch& batch) {
-  for (const RecordEntry& entry : batch.entries()) handle(entry);
+  for (const RecordEntry& entry : batch.entries()) {
+    bus::fill(next_, entry);
+    handle_next();
+  }
   ++*next_batch_;
   stuck_ = Duration();
   has_ended_ = has_ended_ || batch.is_last();
   hand_on_settled_steps();
 }
 
-void Stream::handle(const RecordEntry& entry) {
-  const auto vehicle = next_steps_.find(entry.vehicle_id());
-  if (vehicle == next_steps_.end() || entry.step() > max_step_ ||
-      bus::to_number(entry.kind()) > bus::to_number(AnswerKind::ANSWER_LATE)) {
+void Stream::handle_next() {
+  const auto vehicle = next_steps_.find(next_.vehicle_id);
+  if (vehicle == next_steps_.end() || next_.step > max_step_ ||
+      next_.kind > model::AnswerKind::kLate) {
     ++dropped_.out_of_range;
     return;
   }
-  if (entry.kind() == AnswerKind::ANSWER_LATE) return handle_late(entry);
-  std::uint64_t& next = vehicle->second;
-  if (entry.step() < next) {
+  if (next_.kind == model::AnswerKind::kLate) return handle_late(next_);
+  std::uint64_t& next_step = vehicle->second;
+  if (next_.step < next_step) {
     ++dropped_.repeated;
     return;
   }
-  if (entry.step() > next) gap_sink_(vehicle->first, next, entry.step() - 1);
-  next = entry.step() + 1;
-  newest_step_ = std::max(newest_step_, entry.step());
-  pending_.push_back(make_rows(entry, parameters_));
+  if (next_.step > next_step) gap_sink_(vehicle->first, next_step, next_.step - 1);
+  next_step = next_.step + 1;
+  newest_step_ = std::max(newest_step_, next_.step);
+  fill_columns(next_, format_);
+  if (pending_.empty() && !may_be_answered(next_)) return sink_(next_);
+  pending_.push_back(next_);
   hand_on_settled_steps();
 }
 
-void Stream::handle_late(const RecordEntry& entry) {
+void Stream::handle_late(const model::StepRecord& late) {
   const auto rows = std::find_if(pending_.begin(), pending_.end(), [&](const StepRows& pending) {
-    return pending.step == entry.step() && pending.vehicle_id == entry.vehicle_id();
+    return pending.step == late.step && pending.vehicle_id == late.vehicle_id;
   });
   if (rows == pending_.end() || !may_be_answered(*rows)) {
     ++dropped_.repeated;
     return;
   }
-  add_reference(*rows, entry, parameters_);
+  add_reference(*rows, late, format_);
   hand_on_settled_steps();
 }
 
 bool Stream::may_be_answered(const StepRows& rows) const {
-  return rows.command && rows.command->is_unanswered() && !rows.reference &&
-         newest_step_ <= rows.step + kMaxLateness && !has_ended_;
+  return rows.is_unanswered() && !rows.has_reference && newest_step_ <= rows.step + kMaxLateness &&
+         !has_ended_;
 }
 
 void Stream::hand_on_settled_steps() {

@@ -32,8 +32,11 @@ class Stream {
   using GapSink =
       std::function<void(std::uint32_t vehicle_id, std::uint64_t from, std::uint64_t to)>;
 
-  /// Steps before `first_step` are left out. `parameters` must outlive the object.
+  /// Steps before `first_step` are left out.
   Stream(const Parameters& parameters, std::uint64_t first_step, Sink sink, GapSink gap_sink);
+
+  /// Adds the next step of a vehicle, without a batch. Not together with batches.
+  void add(const model::StepRecord& record);
 
   /// The first batch may have any index, because a writer's history is finite. Batches after a
   /// missing one wait for it, until more than 64 of them wait or for 10 s.
@@ -62,14 +65,15 @@ class Stream {
 
  private:
   void handle(const RecordBatch& batch);
-  void handle(const RecordEntry& entry);
-  void handle_late(const RecordEntry& entry);
+  /// Handles the record in `next_`.
+  void handle_next();
+  void handle_late(const model::StepRecord& late);
   void handle_waiting_batches();
   void skip_missing_batches();
   bool may_be_answered(const StepRows& rows) const;
   void hand_on_settled_steps();
 
-  const Parameters& parameters_;
+  const RowFormat format_;
   const std::uint64_t max_step_;  // its time in ns still fits 64 bits
   const Sink sink_;
   const GapSink gap_sink_;
@@ -79,6 +83,7 @@ class Stream {
   bool has_ended_ = false;
   std::map<std::uint32_t, std::uint64_t> next_steps_;
   std::uint64_t newest_step_ = 0;
+  StepRows next_;  // its memory is used again for each step
   std::deque<StepRows> pending_;
   DroppedEntries dropped_;
 };

@@ -107,9 +107,9 @@ struct FieldLister {
 };
 
 template <class Row>
-FieldLister list_fields(const Row& row) {
+FieldLister list_fields(const StepRows& rows) {
   FieldLister lister;
-  Row::visit(row, lister);
+  Row::visit(rows, lister);
   return lister;
 }
 
@@ -120,14 +120,15 @@ std::vector<std::string> read_columns(const RecordedFlight& flight) {
 }
 
 template <class Row>
-std::optional<std::string> compare_rows(const std::optional<Row>& a, const std::optional<Row>& b,
-                                        const StepRows& step, const RecordedFlight& flight) {
-  if (!a && !b) return std::nullopt;
+std::optional<std::string> compare_rows(const StepRows& a, const StepRows& b,
+                                        const RecordedFlight& flight) {
+  const bool is_in_a = a.*Row::kIsThere, is_in_b = b.*Row::kIsThere;
+  if (!is_in_a && !is_in_b) return std::nullopt;
   const std::string place =
-      fmt::format("{}, vehicle {}, step {}", Row::kFile, step.vehicle_id, step.step);
-  if (!a || !b) return fmt::format("{}: a row in {} alone", place, a ? "A" : "B");
-  if (to_bytes(*a) == to_bytes(*b)) return std::nullopt;
-  const FieldLister of_a = list_fields(*a), of_b = list_fields(*b);
+      fmt::format("{}, vehicle {}, step {}", Row::kFile, a.vehicle_id, a.step);
+  if (!is_in_a || !is_in_b) return fmt::format("{}: a row in {} alone", place, is_in_a ? "A" : "B");
+  if (to_bytes<Row>(a) == to_bytes<Row>(b)) return std::nullopt;
+  const FieldLister of_a = list_fields<Row>(a), of_b = list_fields<Row>(b);
   const std::vector<std::string> columns = read_columns<Row>(flight);
   for (std::size_t i = 0; i < std::min({of_a.texts.size(), of_b.texts.size(), columns.size()}); ++i)
     if (of_a.texts[i] != of_b.texts[i])
@@ -141,9 +142,9 @@ std::optional<std::string> compare_rows(const std::optional<Row>& a, const std::
 
 std::optional<std::string> compare_steps(const StepRows& a, const StepRows& b,
                                          const RecordedFlight& flight) {
-  if (auto text = compare_rows(a.state, b.state, a, flight)) return text;
-  if (auto text = compare_rows(a.command, b.command, a, flight)) return text;
-  return compare_rows(a.reference, b.reference, a, flight);
+  if (auto text = compare_rows<StateRow>(a, b, flight)) return text;
+  if (auto text = compare_rows<CommandRow>(a, b, flight)) return text;
+  return compare_rows<ReferenceRow>(a, b, flight);
 }
 
 /// The first difference between `a` and `b`, the next steps of one vehicle in the two recordings.
@@ -163,11 +164,11 @@ std::optional<Difference> compare_next(const std::optional<StepRows>& a,
 
 /// Adds the deviations of a pair of rows to those of the columns of `file`.
 template <class Row>
-void add_deviations(const std::optional<Row>& a, const std::optional<Row>& b, const StepRows& step,
-                    const RecordedFlight& flight, int file,
+void add_deviations(const StepRows& a, const StepRows& b, const RecordedFlight& flight, int file,
                     std::map<std::pair<int, std::size_t>, Deviation>& worst) {
-  if (!a || !b || to_bytes(*a) == to_bytes(*b)) return;
-  const FieldLister of_a = list_fields(*a), of_b = list_fields(*b);
+  const bool are_there = a.*Row::kIsThere && b.*Row::kIsThere;
+  if (!are_there || to_bytes<Row>(a) == to_bytes<Row>(b)) return;
+  const FieldLister of_a = list_fields<Row>(a), of_b = list_fields<Row>(b);
   for (std::size_t i = 0; i < std::min(of_a.texts.size(), of_b.texts.size()); ++i) {
     if (of_a.texts[i] == of_b.texts[i]) continue;
     const double size = std::abs(of_a.numbers[i] - of_b.numbers[i]);
@@ -175,7 +176,7 @@ void add_deviations(const std::optional<Row>& a, const std::optional<Row>& b, co
     const bool is_new = entry.column.empty();
     if (is_new) entry.column = fmt::format("{}, {}", Row::kFile, read_columns<Row>(flight).at(i));
     if (is_new || size > entry.largest || (std::isnan(size) && !std::isnan(entry.largest)))
-      entry = {entry.column, size, step.vehicle_id, step.step};
+      entry = {entry.column, size, a.vehicle_id, a.step};
   }
 }
 
@@ -234,9 +235,9 @@ std::vector<Deviation> list_deviations(const RecordedFlight& a, const RecordedFl
         id = ids.erase(id);
         continue;
       }
-      add_deviations(step_a->state, step_b->state, *step_a, a, 0, worst);
-      add_deviations(step_a->command, step_b->command, *step_a, a, 1, worst);
-      add_deviations(step_a->reference, step_b->reference, *step_a, a, 2, worst);
+      add_deviations<StateRow>(*step_a, *step_b, a, 0, worst);
+      add_deviations<CommandRow>(*step_a, *step_b, a, 1, worst);
+      add_deviations<ReferenceRow>(*step_a, *step_b, a, 2, worst);
       ++id;
     }
   std::vector<Deviation> all;

@@ -2,7 +2,7 @@
 
 namespace sls::sim {
 
-/// What the core has said, and only the main thread may write, because it may block.
+/// Samples and lines of the core that only the main thread writes, because a write may block.
 class Backlog {
  public:
   virtual ~Backlog() = default;

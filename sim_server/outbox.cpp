@@ -7,7 +7,6 @@
 
 #include "common/app/log.hpp"
 #include "common/app/scheduling.hpp"
-#include "common/bus/convert.hpp"
 #include "common/bus/spinning.hpp"
 
 namespace sls::sim {
@@ -50,10 +49,9 @@ void Outbox::resend_states(const Fleet& fleet, const std::function<bool(std::siz
 }
 
 void Outbox::record_step(const Fleet& fleet) {
-  const auto& vehicles = fleet.vehicles();
-  records_->add_step(vehicles.size(), [&](std::size_t i, RecordEntry& entry) {
-    bus::fill(entry, vehicles[i]->record());
-  });
+  step_.clear();
+  for (const auto& vehicle : fleet.vehicles()) step_.push_back(&vehicle->record());
+  records_->add_step(step_);
 }
 
 void Outbox::record_late(const Vehicle& vehicle, const OfferedAnswer& offered) {
@@ -63,7 +61,7 @@ void Outbox::record_late(const Vehicle& vehicle, const OfferedAnswer& offered) {
   record.kind = model::AnswerKind::kLate;
   record.client_name = offered.client_name;
   record.answer = offered.answer;
-  records_->add_step(1, [&](std::size_t, RecordEntry& entry) { bus::fill(entry, record); });
+  records_->add_step({&record});
 }
 
 void Outbox::show_progress(std::string text) {

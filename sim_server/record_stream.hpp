@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "common/bus/node.hpp"
+#include "common/model/step_record.hpp"
 
 namespace sls::sim {
 
@@ -27,27 +28,8 @@ class RecordStream {
   RecordStream(const RecordStream&) = delete;
   RecordStream& operator=(const RecordStream&) = delete;
 
-  /// Collects `count` entries of one step: `fill(i, entry)` fills the ith, which may have
-  /// older content. Blocks only while the thread swaps two pointers.
-  template <class Fill>
-  void add_step(std::size_t count, const Fill& fill) {
-    bool is_due = false;
-    {
-      const std::lock_guard lock(mutex_);
-      if (collected_.count + count > kMostCollected || is_ended_) {
-        lost_ += count;
-        return;
-      }
-      if (collected_.entries.size() < collected_.count + count)
-        collected_.entries.resize(collected_.count + count);
-      for (std::size_t i = 0; i < count; ++i) fill(i, collected_.entries[collected_.count + i]);
-      collected_.count += count;
-      is_due = ++collected_.steps == kMostSteps || collected_.count >= kManyEntries;
-      is_due_ = is_due_ || is_due;
-      if (collected_.count > kMostCollected / 2) is_full_ = true;
-    }
-    if (is_due) wake_.notify_one();
-  }
+  /// Collects the records of one step. Blocks only while the thread swaps two pointers.
+  void add_step(const std::vector<const model::StepRecord*>& records);
 
   /// Makes the thread write all collected entries now: for a run at rest.
   void flush();

@@ -12,7 +12,7 @@ namespace {
 constexpr std::size_t kQueuedSamples = 1024;
 
 void fill(VehicleState& message, const Vehicle& vehicle) {
-  bus::fill(message, vehicle.id(), vehicle.measured(), vehicle.applied());
+  bus::fill(message, vehicle.id(), vehicle.record().seen(), vehicle.applied());
 }
 
 }  // namespace

@@ -51,6 +51,21 @@ void fill(ControllerState& message, const model::ControllerMemory& memory) {
   fill(message.numbers(), memory.numbers);
 }
 
+void fill(model::Measurement& state, const PlantState& message) {
+  const std::array<double, 4>& q_WB = message.q_WB();
+  state.p_WQ = to_vector(message.p_WQ_m());
+  state.v_WQ = to_vector(message.v_WQ_m_s());
+  state.attitude.q_WB = Eigen::Quaterniond(q_WB[0], q_WB[1], q_WB[2], q_WB[3]);
+  state.attitude.w_WB_B = to_vector(message.w_WB_B_rad_s());
+  state.p_WL = to_vector(message.p_WL_m());
+  state.v_WL = to_vector(message.v_WL_m_s());
+  state.rod.alpha = message.alpha_rad();
+  state.rod.beta = message.beta_rad();
+  state.rod.alpha_dot = message.alpha_dot_rad_s();
+  state.rod.beta_dot = message.beta_dot_rad_s();
+  state.signals = to_numbers(message.signals());
+}
+
 }  // namespace
 
 void fill(VehicleParameters& message, const model::SlungLoadParameters& vehicle) {
@@ -76,19 +91,8 @@ void fill(PlantState& message, const model::Measurement& state) {
 }
 
 model::Measurement to_measurement(const PlantState& message) {
-  const std::array<double, 4>& q_WB = message.q_WB();
   model::Measurement state;
-  state.p_WQ = to_vector(message.p_WQ_m());
-  state.v_WQ = to_vector(message.v_WQ_m_s());
-  state.attitude.q_WB = Eigen::Quaterniond(q_WB[0], q_WB[1], q_WB[2], q_WB[3]);
-  state.attitude.w_WB_B = to_vector(message.w_WB_B_rad_s());
-  state.p_WL = to_vector(message.p_WL_m());
-  state.v_WL = to_vector(message.v_WL_m_s());
-  state.rod.alpha = message.alpha_rad();
-  state.rod.beta = message.beta_rad();
-  state.rod.alpha_dot = message.alpha_dot_rad_s();
-  state.rod.beta_dot = message.beta_dot_rad_s();
-  state.signals = to_numbers(message.signals());
+  fill(state, message);
   return state;
 }
 
@@ -131,7 +135,7 @@ void fill(model::Answer& answer, const ControlCommand& message) {
   const Reference& reference = message.reference();
   answer.f_Q_W = to_vector(message.f_Q_W_n());
   answer.stage = reference.stage_index();
-  answer.stage_name.assign(reference.stage_name().c_str(), reference.stage_name().size());
+  answer.stage_name = reference.stage_name().c_str();
   answer.reference.position = to_vector(reference.position_m());
   answer.reference.velocity = to_vector(reference.velocity_m_s());
   answer.reference.acceleration = to_vector(reference.acceleration_m_s2());
@@ -154,6 +158,23 @@ void fill(RecordEntry& message, const model::StepRecord& record) {
   message.answered_step(record.answered_step);
   message.client_name(record.client_name);
   fill(message.answer(), record.vehicle_id, record.answer);
+}
+
+void fill(model::StepRecord& record, const RecordEntry& message) {
+  record.vehicle_id = message.vehicle_id();
+  record.step = message.step();
+  record.kind = to_enumerator<model::AnswerKind>(message.kind());
+  fill(record.truth, message.truth());
+  if (message.measured().empty()) {
+    record.measured.reset();
+  } else {
+    if (!record.measured) record.measured.emplace();
+    fill(*record.measured, message.measured().front());
+  }
+  record.f_Q_W = to_vector(message.f_Q_W_n());
+  record.answered_step = message.answered_step();
+  record.client_name = message.client_name().c_str();
+  fill(record.answer, message.answer());
 }
 
 }  // namespace sls::bus

@@ -35,5 +35,6 @@ void fill(ControlCommand& message, std::uint32_t vehicle_id, const model::Answer
 void fill(model::Answer& answer, const ControlCommand& message);
 
 void fill(RecordEntry& message, const model::StepRecord& record);
+void fill(model::StepRecord& record, const RecordEntry& message);
 
 }  // namespace sls::bus

@@ -33,22 +33,6 @@ inline const char* to_string(RunPhase phase) {
   return "unknown";
 }
 
-inline const char* to_string(FaultCode fault) {
-  switch (fault) {
-    case FaultCode::FAULT_NONE:
-      return "none";
-    case FaultCode::FAULT_FREE_FALL:
-      return "free_fall";
-    case FaultCode::FAULT_ROD_LEVEL:
-      return "rod_level";
-    case FaultCode::FAULT_NOT_FINITE:
-      return "not_finite";
-    case FaultCode::FAULT_STAGE_TIMEOUT:
-      return "stage_timeout";
-  }
-  return "unknown";
-}
-
 inline const char* to_string(SyncMode mode) {
   switch (mode) {
     case SyncMode::MODE_LOCKSTEP:

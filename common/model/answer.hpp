@@ -1,4 +1,4 @@
-/// What a controller answers to one state.
+/// The answer of a controller to one state.
 #pragma once
 
 #include <Eigen/Core>

@@ -23,6 +23,9 @@ enum class AnswerKind : std::uint32_t {
 };
 
 struct StepRecord {
+  /// The motion that controllers answer.
+  const Measurement& seen() const { return measured ? *measured : truth; }
+
   std::uint32_t vehicle_id = 0;
   std::uint64_t step = 0;  ///< k
   AnswerKind kind = AnswerKind::kNone;

@@ -49,7 +49,7 @@ void fly(const char* scenario_file) {
   closed_loop::Flight flight(config::load_scenario(scenario_file), {0}, options);
   double sum = 0.0, error = 0.0;
   std::size_t steps = 0;
-  for (; const closed_loop::FlownStep* step = flight.fly_step(); ++steps) {
+  for (; const model::StepRecord* step = flight.fly_step(); ++steps) {
     error = (step->truth.p_WL - step->answer.reference.position).norm();
     sum += error * error;
   }

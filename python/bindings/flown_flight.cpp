@@ -19,7 +19,7 @@
 namespace sls::python {
 namespace {
 
-using closed_loop::FlownStep;
+using model::StepRecord;
 using Kind = ColumnPlace::Kind;
 
 /// Writes a row from left to right.
@@ -144,13 +144,14 @@ FlownFlight::FlownFlight(const config::Scenario& scenario, const std::vector<std
   }
   if (flight.is_law_broken()) throw app::RunError(flight.failure());
   keep_remarks(flight);
-  refused_ = flight.refused();
+  for (std::size_t i = 0; i < ids.size(); ++i)
+    if (flight.steps()[i].kind == model::AnswerKind::kRefused) refused_ = i;
   failure_ = flight.failure();
 }
 
 void FlownFlight::list_columns(const closed_loop::Flight& flight) {
   has_attitude_ = parameters_.has_attitude();
-  for (const FlownStep& step : flight.steps()) differs_.push_back(step.can_measurement_differ);
+  for (const StepRecord& step : flight.steps()) differs_.push_back(step.measured.has_value());
   has_measured_ = std::count(differs_.begin(), differs_.end(), true) > 0;
   signals_ = parameters_.signals().size();
   std::size_t index = 0;
@@ -167,10 +168,10 @@ void FlownFlight::list_columns(const closed_loop::Flight& flight) {
     return name == "vehicle_id" || name == "step" || name == "sim_time_s";
   };
 
-  record::StateRow state;
-  state.has_attitude = has_attitude_;
+  record::StepRows rows;
+  rows.has_attitude = has_attitude_;
   std::vector<std::string> names;
-  for (const auto& [column, of_column] : record::list_columns(state))
+  for (const auto& [column, of_column] : record::list_columns<record::StateRow>(rows))
     names.insert(names.end(), of_column.begin(), of_column.end());
   for (const SignalDescription& signal : parameters_.signals())
     names.push_back(signal.name().to_string());
@@ -205,7 +206,7 @@ void FlownFlight::list_columns(const closed_loop::Flight& flight) {
   for (std::size_t i = 0; i < ids_.size(); ++i) rows_.emplace_back(index, steps);
 }
 
-void FlownFlight::keep(const FlownStep& flown, std::size_t index) {
+void FlownFlight::keep(const StepRecord& flown, std::size_t index) {
   Writer row(rows_[index].add_row());
   const auto write_rest = [&](const model::Measurement& state) {
     if (has_attitude_) write_attitude(row, state.attitude);
@@ -216,11 +217,11 @@ void FlownFlight::keep(const FlownStep& flown, std::size_t index) {
   row.add(static_cast<double>(static_cast<std::int64_t>(flown.step) * scenario_.sync.period_ns) /
           1e9);
   row.add_all(bodies(flown.truth));
-  row.add_all(flown.applied_f_Q_W);
+  row.add_all(flown.f_Q_W);
   write_rest(flown.truth);
   if (has_measured_) {
-    row.add_all(bodies(flown.measured));
-    write_rest(flown.measured);
+    row.add_all(bodies(flown.seen()));
+    write_rest(flown.seen());
   }
   const model::Answer& answer = flown.answer;
   row.add_all(answer.f_Q_W);
@@ -239,25 +240,30 @@ void FlownFlight::keep_remarks(closed_loop::Flight& flight) {
 
 // --- recording and certificate -------------------------------------------------------------------
 
-FlownStep FlownFlight::make_step(std::size_t index, std::size_t number) const {
+StepRecord FlownFlight::make_step(std::size_t index, std::size_t number) const {
   Reader row(rows_[index].row(number));
-  FlownStep flown;
+  StepRecord flown;
+  const bool is_refused = number == last_step() && refused_ == index;
+  flown.kind = is_refused ? model::AnswerKind::kRefused : model::AnswerKind::kAccepted;
+  flown.client_name = controller_name_;
+  flown.vehicle_id = ids_[index];
   const auto read_rest = [&](model::Measurement& state) {
     if (has_attitude_) read_attitude(row, state.attitude);
     state.signals.resize(static_cast<Eigen::Index>(signals_));
     row.take_numbers(state.signals);
   };
   row.take_integer();  // the vehicle's id
-  flown.step = row.take_integer();
+  flown.step = flown.answered_step = row.take_integer();
   double time_s = 0.0;
   row.take(time_s);
   row.take_all(bodies(flown.truth));
-  row.take_all(flown.applied_f_Q_W);
+  row.take_all(flown.f_Q_W);
   read_rest(flown.truth);
-  flown.can_measurement_differ = differs_[index];
   if (has_measured_) {
-    row.take_all(bodies(flown.measured));
-    read_rest(flown.measured);
+    model::Measurement& measured = flown.measured.emplace();
+    row.take_all(bodies(measured));
+    read_rest(measured);
+    if (!differs_[index]) flown.measured.reset();
   }
   model::Answer& answer = flown.answer;
   row.take_all(answer.f_Q_W);
@@ -274,10 +280,9 @@ FlownStep FlownFlight::make_step(std::size_t index, std::size_t number) const {
 
 const std::string& FlownFlight::calc_certificate() const {
   std::call_once(is_certified_, [this] {
-    closed_loop::FlightCertificate certificate(parameters_);
+    closed_loop::FlightCertificate certificate(record::make_row_format(parameters_));
     for (std::size_t i = 0; i < ids_.size(); ++i)
-      for (std::size_t row = 0; row < rows_[i].rows(); ++row)
-        certificate.add(ids_[i], make_step(i, row), row == last_step() && refused_ == i);
+      for (std::size_t row = 0; row < rows_[i].rows(); ++row) certificate.add(make_step(i, row));
     certificate_ = certificate.finish();
   });
   return certificate_;
@@ -288,12 +293,12 @@ bool FlownFlight::save(const std::filesystem::path& folder, bool force) const {
                                        controller_name_);
   recorder.note_law_library(scenario_);
   auto remarks = remarks_.begin();
-  std::vector<FlownStep> steps(ids_.size());
+  std::vector<StepRecord> steps(ids_.size());
   for (std::size_t row = 0; row < rows_.front().rows(); ++row) {
     for (; remarks != remarks_.end() && remarks->row <= row; ++remarks)
       recorder.announce(remarks->texts);
     for (std::size_t i = 0; i < ids_.size(); ++i) steps[i] = make_step(i, row);
-    recorder.add(steps, row == last_step() ? refused_ : std::nullopt);
+    recorder.add(steps);
   }
   for (; remarks != remarks_.end(); ++remarks) recorder.announce(remarks->texts);
   return recorder.finish(failure_);

@@ -63,11 +63,11 @@ class FlownFlight {
   };
 
   void list_columns(const closed_loop::Flight& flight);
-  void keep(const closed_loop::FlownStep& flown, std::size_t index);
+  void keep(const model::StepRecord& flown, std::size_t index);
   void keep_remarks(closed_loop::Flight& flight);
   /// Row `row` of the `index`th vehicle as a step of the flight. The numbers of the law's memory
   /// are missing, because no file of a recording holds them.
-  closed_loop::FlownStep make_step(std::size_t index, std::size_t row) const;
+  model::StepRecord make_step(std::size_t index, std::size_t row) const;
 
   const config::Scenario scenario_;
   const std::vector<std::uint32_t> ids_;

@@ -22,7 +22,7 @@ struct Moment {
   std::chrono::system_clock::time_point wall{};  ///< the clock that sample stamps use
 };
 
-/// What the core of a server tells its shell to do. No function blocks or calls the core. States
+/// The orders of a server's core to its shell. No function blocks or calls the core. States
 /// and records leave at once; everything else may leave a little later, in the given order.
 class Outputs {
  public:
@@ -44,7 +44,7 @@ class Outputs {
   virtual std::uint64_t lost() const = 0;
   /// Sends all recorded entries soon, because the run rests.
   virtual void flush_records() = 0;
-  /// Sends the remaining entries. What is said after this leaves after them.
+  /// Sends the remaining entries. All that is sent or logged later leaves after them.
   virtual void end_records() = 0;
 
   virtual void send(const SimStatus& status) = 0;

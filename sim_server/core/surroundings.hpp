@@ -12,7 +12,7 @@
 
 namespace sls::sim {
 
-/// What the core of a server can ask its shell when it looks around. No function blocks or calls
+/// The questions of a server's core to its shell when it looks around. No function blocks or calls
 /// the core.
 class Surroundings {
  public:
@@ -32,12 +32,12 @@ class Surroundings {
 
   /// Changes when the middleware finds a mistake of a participant, or one ends.
   virtual std::uint64_t problems_version() const = 0;
-  /// What ParticipantCheck looks at, but the time and the stamps of commands. `is_known`:
+  /// The participants and endpoints for ParticipantCheck, without time and stamps of commands. `is_known`:
   /// participants may have joined the run.
   virtual Neighbourhood look(bool is_known) = 0;
   /// Makes `found` the mistakes of this run. Returns all that hold, in words.
   virtual std::string replace_problems(const ParticipantCheck::Findings& found) = 0;
-  /// What may keep participants from being discovered, to be appended to a message; else empty.
+  /// The causes that may keep participants from being discovered, to be appended to a message; else empty.
   virtual std::string describe_isolation() const = 0;
 
   /// The queues on the way to the network.

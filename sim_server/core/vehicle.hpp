@@ -49,10 +49,6 @@ class Vehicle {
 
   /// Motion of the vehicle.
   const model::Measurement& state() const { return record_.truth; }
-  /// The measured motion, which controllers answer.
-  const model::Measurement& measured() const {
-    return record_.measured ? *record_.measured : record_.truth;
-  }
   /// The client whose force acts: over the step in work once it is settled, else before it.
   const std::string& flown_by() const {
     return is_settled_ ? record_.client_name : applied_.client_name;

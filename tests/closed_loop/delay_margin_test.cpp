@@ -39,9 +39,9 @@ double calc_critical_delay(const model::SlungLoadParameters& vehicle) {
 }
 
 /// Largest load error during [from, to) s.
-double calc_worst_error(const std::vector<FlownStep>& flight, double from, double to) {
+double calc_worst_error(const std::vector<model::StepRecord>& flight, double from, double to) {
   double worst = 0.0;
-  for (const FlownStep& step : flight) {
+  for (const model::StepRecord& step : flight) {
     const double time = 0.004 * static_cast<double>(step.step);
     if (time >= from && time < to)
       worst = std::max(worst, (step.truth.p_WL - step.answer.reference.position).norm());
@@ -129,7 +129,7 @@ TEST(DelayMarginTest, LosesTheLoadWhenItIsARodsLengthFurtherAwayThanWithoutDelay
   const config::Scenario scenario = load("figure_eight");
   const auto undelayed = fly(scenario), delayed = fly(delay_command(scenario, 65));
   ASSERT_EQ(undelayed.size(), delayed.size());
-  const auto calc_error = [](const FlownStep& step) {
+  const auto calc_error = [](const model::StepRecord& step) {
     return (step.truth.p_WL - step.answer.reference.position).norm();
   };
   std::size_t lost = 0;
@@ -171,7 +171,7 @@ TEST(DelayMarginTest, ErrorsAreThoseOfTheFlight) {
   const config::Scenario scenario = load("short");
   const auto flight = fly(delay_command(scenario, 4));
   double worst = 0.0, sum = 0.0;
-  for (const FlownStep& step : flight) {
+  for (const model::StepRecord& step : flight) {
     const double error = (step.truth.p_WL - step.answer.reference.position).norm();
     worst = std::max(worst, error);
     sum += error * error;

@@ -37,7 +37,7 @@ std::vector<model::SlungLoadState> fly_by_hand(const config::Scenario& scenario,
   }
 }
 
-void expect_equal_bits(const std::vector<FlownStep>& flight,
+void expect_equal_bits(const std::vector<model::StepRecord>& flight,
                        const std::vector<model::SlungLoadState>& states) {
   ASSERT_EQ(flight.size(), states.size());
   for (std::size_t k = 0; k < states.size(); ++k) {
@@ -82,7 +82,7 @@ TEST(FlightTest, ADelayedCommandIsAQueueOfForces) {
 TEST(FlightTest, AFlightRepeatsExactlyWithFaultsOfEveryKind) {
   const config::Scenario scenario = load("faulty_figure_eight");
   std::vector<model::SlungLoadState> states;
-  for (const FlownStep& step : fly(scenario)) states.push_back(step.truth);
+  for (const model::StepRecord& step : fly(scenario)) states.push_back(step.truth);
   expect_equal_bits(fly(scenario), states);
 }
 
@@ -109,11 +109,11 @@ TEST(FlightTest, ControllerAnswersItsMeasurementAndStepsHoldTheForceThatActed) {
                      make_fault(config::FaultChannel::kCommand, force)};
   const auto flight = fly(scenario);
   const control::FlightController controller(scenario);
-  EXPECT_EQ(flight[0].applied_f_Q_W, Vector3d(0, 0, 0));
+  EXPECT_EQ(flight[0].f_Q_W, Vector3d(0, 0, 0));
   for (std::size_t k = 1; k < flight.size(); ++k) {
-    ASSERT_EQ(flight[k].measured.p_WL, Vector3d(flight[k].truth.p_WL + position.offset.position));
-    ASSERT_EQ(flight[k].applied_f_Q_W, Vector3d(flight[k - 1].answer.f_Q_W + force.offset.force));
-    const auto answer = controller.calc_answer(k, flight[k].measured, flight[k - 1].answer.memory);
+    ASSERT_EQ(flight[k].seen().p_WL, Vector3d(flight[k].truth.p_WL + position.offset.position));
+    ASSERT_EQ(flight[k].f_Q_W, Vector3d(flight[k - 1].answer.f_Q_W + force.offset.force));
+    const auto answer = controller.calc_answer(k, flight[k].seen(), flight[k - 1].answer.memory);
     ASSERT_EQ(flight[k].answer.f_Q_W, answer.f_Q_W);
   }
 }

@@ -90,15 +90,16 @@ double calc_overshoot(const Column& values, double target) {
 }
 
 /// All measures of a flight, from its stored steps.
-std::map<std::string, double> calc_measures(const std::vector<FlownStep>& steps,
+std::map<std::string, double> calc_measures(const std::vector<model::StepRecord>& steps,
                                             const config::Scenario& scenario) {
   const double period = static_cast<double>(scenario.sync.period_ns) / 1e9;
   std::map<std::string, double> values;
   const char* axes = "xyz";
-  const auto calc_errors = [&](const std::string& prefix, const std::vector<FlownStep>& of) {
+  const auto calc_errors = [&](const std::string& prefix,
+                               const std::vector<model::StepRecord>& of) {
     for (int axis = 0; axis < 3; ++axis) {
       Column errors;
-      for (const FlownStep& step : of)
+      for (const model::StepRecord& step : of)
         errors.push_back(step.truth.p_WL[axis] - step.answer.reference.position[axis]);
       const std::string suffix = std::string("_") + axes[axis] + "_m";
       values[prefix + "load_error_rms" + suffix] = of.empty() ? std::nan("") : calc_rms(errors);
@@ -107,7 +108,7 @@ std::map<std::string, double> calc_measures(const std::vector<FlownStep>& steps,
   };
   calc_errors("", steps);
   Column norms, forces, tilts;
-  for (const FlownStep& step : steps) {
+  for (const model::StepRecord& step : steps) {
     norms.push_back((step.truth.p_WL - step.answer.reference.position).norm());
     forces.push_back(step.answer.f_Q_W.norm());
     // From the rod's angles; the code under test uses the positions of the bodies.
@@ -120,8 +121,8 @@ std::map<std::string, double> calc_measures(const std::vector<FlownStep>& steps,
   values["tilt_max_rad"] = calc_max(tilts);
   for (std::size_t stage = 0; stage < scenario.mission.size(); ++stage) {
     const std::string prefix = "stage_" + std::to_string(stage) + "_";
-    std::vector<FlownStep> of;
-    for (const FlownStep& step : steps)
+    std::vector<model::StepRecord> of;
+    for (const model::StepRecord& step : steps)
       if (step.answer.stage == stage) of.push_back(step);
     calc_errors(prefix, of);
     const auto* constant =
@@ -129,7 +130,7 @@ std::map<std::string, double> calc_measures(const std::vector<FlownStep>& steps,
     if (!constant) continue;
     for (int axis = 0; axis < 3; ++axis) {
       Column time, position;
-      for (const FlownStep& step : of) {
+      for (const model::StepRecord& step : of) {
         time.push_back(static_cast<double>(step.step) * period);
         position.push_back(step.truth.p_WL[axis]);
       }
@@ -160,7 +161,7 @@ void expect_equal_measures(const std::map<std::string, double>& ours,
 void expect_measures_of_its_columns(const config::Scenario& scenario,
                                     const config::Scenario& base) {
   const MeasuredFlight flown = fly_all(scenario, base);
-  std::vector<FlownStep> steps = fly(scenario);
+  std::vector<model::StepRecord> steps = fly(scenario);
   ASSERT_GE(steps.size(), flown.steps);
   steps.resize(flown.steps);  // the steps up to the loss
   auto theirs = calc_measures(steps, scenario);
@@ -212,7 +213,7 @@ TEST(FlightMeasuresTest, AStepByHandHasTheMeasuresOfItsFormulas) {
   FlightMeasures measures(list, 10'000'000);
   std::uint64_t number = 0;
   for (const double x : {0.0, 0.5, 1.2, 0.99, 0.97, 1.01, 1.0}) {
-    FlownStep step;
+    model::StepRecord step;
     step.step = number++;
     step.answer.reference.position << 1.0, 0.0, 0.0;
     step.truth.p_WL << x, 0.0, 0.0;

@@ -46,14 +46,14 @@ void expect_equal_bits(const model::Measurement& a, const model::Measurement& b)
   ASSERT_EQ(a.rod.beta_dot, b.rod.beta_dot);
 }
 
-void expect_equal_flights(const std::vector<FlownStep>& a, const std::vector<FlownStep>& b) {
+void expect_equal_flights(const std::vector<model::StepRecord>& a,
+                          const std::vector<model::StepRecord>& b) {
   ASSERT_EQ(a.size(), b.size());
   for (std::size_t k = 0; k < a.size(); ++k) {
     SCOPED_TRACE(k);
     expect_equal_bits(a[k].truth, b[k].truth);
-    expect_equal_bits(a[k].measured, b[k].measured);
+    expect_equal_bits(a[k].seen(), b[k].seen());
     ASSERT_EQ(a[k].answer.f_Q_W, b[k].answer.f_Q_W);
-    ASSERT_EQ(a[k].answered_f_Q_W, b[k].answered_f_Q_W);
   }
 }
 
@@ -64,11 +64,11 @@ TEST(SensingTest, ANodeDelayOfWholePeriodsIsTheFaultDelayOnCommand) {
     const auto fault = fly(delay_command(scenario, periods));
     expect_equal_flights(node, fault);
     for (std::size_t k = 1; k < node.size(); ++k) {
-      EXPECT_FALSE(node[k].can_measurement_differ);
+      EXPECT_FALSE(node[k].measured);
       // state.csv has the force before the delay of the node, but after the delay of the fault.
-      ASSERT_EQ(node[k].applied_f_Q_W, node[k - 1].answer.f_Q_W);
+      ASSERT_EQ(node[k].f_Q_W, node[k - 1].answer.f_Q_W);
       const std::size_t answered = k - 1 < static_cast<std::size_t>(periods) ? 0 : k - 1 - periods;
-      ASSERT_EQ(fault[k].applied_f_Q_W, fault[answered].answer.f_Q_W);
+      ASSERT_EQ(fault[k].f_Q_W, fault[answered].answer.f_Q_W);
     }
   }
 }
@@ -79,8 +79,8 @@ TEST(SensingTest, AnAgeOfWholePeriodsIsTheFaultDelayOnState) {
     const auto old = fly(age(scenario, periods)), delayed = fly(delay_state(scenario, periods));
     expect_equal_flights(old, delayed);
     for (std::size_t k = 0; k < old.size(); ++k) {
-      EXPECT_TRUE(old[k].can_measurement_differ);
-      ASSERT_EQ(old[k].applied_f_Q_W, delayed[k].applied_f_Q_W);
+      EXPECT_TRUE(old[k].measured);
+      ASSERT_EQ(old[k].f_Q_W, delayed[k].f_Q_W);
     }
   }
 }
@@ -111,7 +111,7 @@ TEST(SensingTest, FaultsActOnTheSensorsOutput) {
   scenario.faults = {make_fault(config::FaultChannel::kState, bias)};
   const auto flight = fly(scenario);
   for (std::size_t k = 3; k < flight.size(); ++k)
-    ASSERT_EQ(flight[k].measured.p_WL, Vector3d(flight[k - 3].truth.p_WL + bias.offset.position));
+    ASSERT_EQ(flight[k].seen().p_WL, Vector3d(flight[k - 3].truth.p_WL + bias.offset.position));
 }
 
 TEST(SensingTest, SamplesAtTheControlPeriodThatAreSeenAtOnceChangeNothing) {
@@ -121,13 +121,13 @@ TEST(SensingTest, SamplesAtTheControlPeriodThatAreSeenAtOnceChangeNothing) {
   scenario.sensing.rod = {500'000, 0};
   const auto sensed = fly(scenario);
   expect_equal_flights(plain, sensed);
-  EXPECT_FALSE(sensed.front().can_measurement_differ);
+  EXPECT_FALSE(sensed.front().measured);
 }
 
 TEST(SensingTest, AVehicleOfAFleetFliesAsItDoesAlone) {
   const config::Scenario fleet = make_awkward(load("mixed_fleet"));
   Flight together(fleet, {0, 1, 2, 3});
-  std::vector<std::vector<FlownStep>> flown(4);
+  std::vector<std::vector<model::StepRecord>> flown(4);
   while (together.fly_step())
     for (std::size_t i = 0; i < 4; ++i) flown[i].push_back(together.steps()[i]);
   EXPECT_EQ(together.failure(), "");
@@ -144,8 +144,8 @@ TEST(SensingTest, AFlightRepeatsExactlyAndItsAnswersArePure) {
   FlightOptions options;
   options.checks_purity = true;
   Flight flight(scenario, {0}, options);
-  std::vector<FlownStep> checked;
-  while (const FlownStep* step = flight.fly_step()) checked.push_back(*step);
+  std::vector<model::StepRecord> checked;
+  while (const model::StepRecord* step = flight.fly_step()) checked.push_back(*step);
   EXPECT_EQ(flight.failure(), "");
   expect_equal_flights(checked, fly(scenario));
 }

@@ -7,6 +7,7 @@
 #include <map>
 #include <optional>
 
+#include "common/bus/convert.hpp"
 #include "common/bus/fastdds/guarded_type.hpp"
 #include "recorder/stream.hpp"
 #include "sim_server/core/command_gate.hpp"
@@ -50,9 +51,12 @@ struct Judges {
       case 1:
         if (const auto commands = deserialize<CommandsPubSubType, Commands>(data, size))
           for (const ControlCommand& command : commands->vehicles()) {
-            gate.offer({commands->run_id(), commands->step(), commands->client_name().to_string(),
-                        false, command},
-                       make_peer(sender));
+            sim::OfferedAnswer offered;
+            offered.run_id = commands->run_id();
+            offered.step = commands->step();
+            offered.vehicle_id = command.vehicle_id();
+            bus::fill(offered.answer, command);
+            gate.offer(offered, make_peer(sender));
             if (gate.accepted() || gate.refusal()) gate.expect(++step);
           }
         break;

@@ -5,6 +5,7 @@
 #include <limits>
 #include <random>
 
+#include "common/bus/convert.hpp"
 #include "tests/recorder/synthetic_run.hpp"
 
 namespace sls::record {
@@ -205,9 +206,9 @@ TEST_F(StreamTest, TheLastStepMayHaveNoAnswer) {
   add(0);
   stream_.add(make_batch(1, {make_bare_entry(1)}, true));
   ASSERT_EQ(rows_.size(), 2u);
-  EXPECT_TRUE(rows_[1].state);
-  EXPECT_FALSE(rows_[1].command);
-  EXPECT_FALSE(rows_[1].reference);
+  EXPECT_TRUE(rows_[1].has_state);
+  EXPECT_FALSE(rows_[1].has_command);
+  EXPECT_FALSE(rows_[1].has_reference);
 }
 
 TEST_F(StreamTest, ARefusedAnswerIsRecordedAsItWasSent) {
@@ -218,8 +219,8 @@ TEST_F(StreamTest, ARefusedAnswerIsRecordedAsItWasSent) {
   stream_.add(make_batch(0, {entry}, true));
   ASSERT_EQ(rows_.size(), 1u);
   EXPECT_TRUE(rows_[0].is_complete());
-  EXPECT_EQ(rows_[0].command->fault, "free_fall");
-  EXPECT_EQ(rows_[0].command->f_Q_W[0], 1e9);
+  EXPECT_EQ(rows_[0].fault, "free_fall");
+  EXPECT_EQ(rows_[0].answer.f_Q_W[0], 1e9);
 }
 
 // --- late answers --------------------------------------------------------------------------------
@@ -238,13 +239,13 @@ TEST_F(LateAnswerTest, AStepWithoutAnAnswerWaitsForALateOneAndTheOthersWithIt) {
   stream_.add(make_batch(21, {make_late_entry(10), make_entry(21)}));
   EXPECT_EQ(steps(), list(0, 21));
   const StepRows& rows = rows_[10];
-  EXPECT_EQ(rows.command->fault, "held");
-  EXPECT_EQ(rows.command->controller, kPilot);
-  EXPECT_EQ(rows.command->compute_us, 0);
-  EXPECT_EQ(rows.command->f_Q_W,
+  EXPECT_EQ(rows.fault, "held");
+  EXPECT_EQ(rows.client_name, kPilot);
+  EXPECT_EQ(rows.compute_us, 0);
+  EXPECT_EQ(bus::to_array(rows.answer.f_Q_W),
             make_unanswered_entry(10, AnswerKind::ANSWER_HELD).answer().f_Q_W_n());
-  ASSERT_TRUE(rows.reference);
-  EXPECT_EQ(rows.reference->reference.position_m(),
+  ASSERT_TRUE(rows.has_reference);
+  EXPECT_EQ(bus::to_array(rows.answer.reference.position),
             make_entry(10).answer().reference().position_m());
   EXPECT_EQ(rows.stage_start_step, 0u);
 }
@@ -267,7 +268,7 @@ TEST_F(LateAnswerTest, ItIsGivenUpWhenAStepMoreThan64LaterIsIn) {
   EXPECT_EQ(steps(), list(0, 9));
   stream_.add(make_batch(75, {make_entry(75)}));
   EXPECT_EQ(steps(), list(0, 75));
-  EXPECT_FALSE(rows_[10].reference);
+  EXPECT_FALSE(rows_[10].has_reference);
   EXPECT_TRUE(rows_[10].is_whole());
   stream_.add(make_batch(76, {make_late_entry(10)}));
   EXPECT_EQ(stream_.dropped().repeated, 1u);
@@ -282,7 +283,7 @@ TEST_F(LateAnswerTest, TheLastBatchOrTheEndOfPatienceEndsTheWaiting) {
   EXPECT_TRUE(rows_.empty());
   other.give_up();
   ASSERT_EQ(steps(), list(0, 0));
-  EXPECT_EQ(rows_[0].command->fault, "fail_safe");
+  EXPECT_EQ(rows_[0].fault, "fail_safe");
 }
 
 TEST_F(LateAnswerTest, EachOfSeveralWaitsForItsOwn) {

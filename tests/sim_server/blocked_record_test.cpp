@@ -111,9 +111,8 @@ TEST(BlockedRecordTest, TheEndOfTheStreamDoesNotWaitForEachBatch) {
   bus::Writer<RecordBatch> writer(node);
   ASSERT_TRUE(wait_until([&] { return reader.is_matched() && !writer.matched().empty(); }));
   RecordStream stream(writer, 100, 1);  // less than an entry: each one is a batch
-  stream.add_step(kManySamples, [](std::size_t i, RecordEntry& entry) {
-    entry.vehicle_id(static_cast<std::uint32_t>(i));
-  });
+  const model::StepRecord record;
+  stream.add_step(std::vector<const model::StepRecord*>(kManySamples, &record));
   EXPECT_TRUE(ends(reader, [&] { stream.end(); }));
   EXPECT_GT(stream.lost(), kManySamples / 2) << "the batches that were not tried count, too";
   EXPECT_LE(stream.lost(), kManySamples);

@@ -120,7 +120,7 @@ TEST(CoreLoopTest, AMillionEventsOfFourThreadsLoseNothingAndKeepTheOrder) {
   for (int i = 0; i < 3; ++i)
     threads.emplace_back([&] {
       for (std::uint64_t answered = 0, copies = 0; !is_over;) {
-        // Mostly the first answer to a state, and a copy now and then.
+        // Mostly the first answer to a state, and a copy every few rounds.
         if (answered == shell.step + 1 && ++copies % 16 != 0) {
           std::this_thread::yield();
           continue;

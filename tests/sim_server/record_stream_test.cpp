@@ -28,11 +28,15 @@ class RecordStreamTest : public testing::Test {
 
   /// Collects a step of `vehicles` vehicles.
   void add(std::uint64_t step, std::size_t vehicles = 1, std::size_t numbers = 0) {
-    stream_->add_step(vehicles, [&](std::size_t i, RecordEntry& entry) {
-      entry.vehicle_id(static_cast<std::uint32_t>(i));
-      entry.step(step);
-      entry.answer().controller().numbers(std::vector<double>(numbers, 1.0));
-    });
+    std::vector<model::StepRecord> records(vehicles);
+    std::vector<const model::StepRecord*> pointers;
+    for (std::size_t i = 0; i < vehicles; ++i) {
+      records[i].vehicle_id = static_cast<std::uint32_t>(i);
+      records[i].step = step;
+      records[i].answer.memory.numbers.setOnes(static_cast<Eigen::Index>(numbers));
+      pointers.push_back(&records[i]);
+    }
+    stream_->add_step(pointers);
   }
 
   std::vector<RecordBatch> batches() {
@@ -100,8 +104,7 @@ TEST_F(RecordStreamTest, NoBatchIsLargerThanTheLimit) {
   stream_->end();
   ASSERT_TRUE(wait_for_last());
   expect_whole(100, 7);
-  for (const RecordBatch& batch : batches())
-    EXPECT_LE(bus::calc_size(batch), 1'400u);
+  for (const RecordBatch& batch : batches()) EXPECT_LE(bus::calc_size(batch), 1'400u);
 }
 
 TEST_F(RecordStreamTest, AnEntryThatIsLargerThanTheLimitIsABatchOfItsOwn) {

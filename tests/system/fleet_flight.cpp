@@ -80,7 +80,7 @@ void expect_each_flies_as_alone(const std::filesystem::path& recording,
       ASSERT_EQ(states.position(s, "quad"), flown[step].truth.p_WQ) << "step " << step;
       ASSERT_EQ(states.position(s, "load"), flown[step].truth.p_WL) << "step " << step;
       ASSERT_EQ(states.number(s, "load_vx_m_s"), flown[step].truth.v_WL.x()) << "step " << step;
-      ASSERT_EQ(states.number(s, "force_x_n"), flown[step].applied_f_Q_W.x()) << "step " << step;
+      ASSERT_EQ(states.number(s, "force_x_n"), flown[step].f_Q_W.x()) << "step " << step;
       ASSERT_EQ(commands.number(c, "force_x_n"), flown[step].answer.f_Q_W.x()) << "step " << step;
       ASSERT_EQ(commands.number(c, "force_z_n"), flown[step].answer.f_Q_W.z()) << "step " << step;
     }

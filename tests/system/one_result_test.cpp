@@ -210,10 +210,10 @@ TEST(FaultLineSystemTest, AFaultyFlightRepeatsAndEqualsTheOneInProcess) {
   const Table states(first.recording() / "state.csv"), commands(first.recording() / "command.csv");
   ASSERT_EQ(states.rows(), flown.size());
   for (std::size_t row = 0; row < flown.size(); ++row) {
-    const closed_loop::FlownStep& step = flown[row];
+    const model::StepRecord& step = flown[row];
     ASSERT_EQ(states.position(row, "quad"), step.truth.p_WQ) << row;
     ASSERT_EQ(states.position(row, "load"), step.truth.p_WL) << row;
-    ASSERT_EQ(states.number(row, "force_z_n"), step.applied_f_Q_W.z()) << row;
+    ASSERT_EQ(states.number(row, "force_z_n"), step.f_Q_W.z()) << row;
     ASSERT_EQ(commands.number(row, "force_z_n"), step.answer.f_Q_W.z()) << row;
   }
 }

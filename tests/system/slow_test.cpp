@@ -40,7 +40,7 @@ class RealTimeMinuteTest : public ::testing::Test {
     fault.effect = config::DelayFault{std::llround(delay_ms * 1e6)};
     scenario.faults = {fault};
     double largest = 0.0;
-    for (const closed_loop::FlownStep& step : closed_loop::fly(scenario))
+    for (const model::StepRecord& step : closed_loop::fly(scenario))
       if (step.step >= 4000)
         largest = std::max(
             largest, (step.truth.p_WL - step.answer.reference.position).cwiseAbs().maxCoeff());

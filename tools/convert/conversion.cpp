@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using config::ConfigError;
-using record::StateRow;
+using record::StepRows;
 
 std::string read_text(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
@@ -86,19 +86,18 @@ void sync_to_disk(const fs::path& file) {
 }
 
 /// Adds the measured row of the step to `rows`.
-void add_measured(record::RowReader<StateRow>& measured, record::StepRows& rows) {
-  for (const StateRow* row = measured.peek(rows.vehicle_id); row && row->step <= rows.step;
-       row = measured.peek(rows.vehicle_id)) {
-    StateRow taken = measured.take(rows.vehicle_id);
-    if (taken.step == rows.step) rows.measured = std::move(taken);
-  }
+void add_measured(record::RowReader<record::MeasuredRow>& measured, StepRows& rows) {
+  StepRows left_out;  // of steps without a state
+  for (const StepRows* row = measured.peek(rows.vehicle_id); row && row->step <= rows.step;
+       row = measured.peek(rows.vehicle_id))
+    measured.take(rows.vehicle_id, row->step == rows.step ? rows : left_out);
 }
 
 std::uint64_t write(const record::RecordedFlight& flight, const fs::path& file) {
   record::McapSink sink(file, load_parameters(flight));
   constexpr auto kEnd = std::numeric_limits<std::uint64_t>::max();
   record::StepReader steps(flight, kEnd);
-  record::RowReader<StateRow> measured(flight, kEnd, StateRow::kMeasuredFile);
+  record::RowReader<record::MeasuredRow> measured(flight, kEnd);
   while (auto rows = steps.next_as_written()) {
     add_measured(measured, *rows);
     sink.add(*rows);

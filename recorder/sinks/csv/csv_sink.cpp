@@ -18,10 +18,10 @@ struct FieldWriter {
   }
 };
 
-template <class Row>
-void write_row(CsvFile& file, const Row& row) {
+template <class Row, class Rows>
+void write_row(CsvFile& file, const Rows& rows) {
   FieldWriter writer{file};
-  Row::visit(row, writer);
+  Row::visit(rows, writer);
   file.end_row();
 }
 
@@ -34,22 +34,21 @@ CsvSink::CsvSink(const std::filesystem::path& folder, const Parameters& paramete
       states_(folder / StateRow::kFile, state_header_),
       references_(folder / ReferenceRow::kFile, make_header<ReferenceRow>()),
       flight_(folder / FlightRow::kFile, make_flight_header(is_of_fleet_)),
-      statuses_(folder / StatusRow::kFile, make_header<StatusRow>()),
+      statuses_(folder / StatusRow::kFile, make_header<StatusRow, SimStatus>()),
       commands_(folder / CommandRow::kFile, make_header<CommandRow>()) {}
 
 void CsvSink::add(const StepRows& rows) {
-  if (rows.state) write_row(states_, *rows.state);
+  if (rows.has_state) write_row<StateRow>(states_, rows);
   if (rows.measured) {
-    if (!measured_) measured_.emplace(folder_ / StateRow::kMeasuredFile, state_header_);
-    write_row(*measured_, *rows.measured);
+    if (!measured_) measured_.emplace(folder_ / MeasuredRow::kFile, state_header_);
+    write_row<MeasuredRow>(*measured_, rows);
   }
-  if (rows.reference) write_row(references_, *rows.reference);
-  if (rows.is_complete())
-    write_row(flight_, FlightRow{*rows.state, *rows.command, *rows.reference, is_of_fleet_});
-  if (rows.command) write_row(commands_, *rows.command);
+  if (rows.has_reference) write_row<ReferenceRow>(references_, rows);
+  if (rows.is_complete()) write_row<FlightRow>(flight_, FlightRow{rows, is_of_fleet_});
+  if (rows.has_command) write_row<CommandRow>(commands_, rows);
 }
 
-void CsvSink::add(const SimStatus& status) { write_row(statuses_, StatusRow{status}); }
+void CsvSink::add(const SimStatus& status) { write_row<StatusRow>(statuses_, status); }
 
 bool CsvSink::is_full() const {
   return std::any_of(files_.begin(), files_.end(),

@@ -79,28 +79,26 @@ void McapSink::add(const StepRows& rows) {
   file_.add_message(vehicle->second.channel, static_cast<std::uint32_t>(rows.step),
                     static_cast<std::uint64_t>(time_ns), message_.serialize(rows));
   const std::int64_t slot = time_ns / kMirrorPeriodNs;
-  if (!rows.state || slot <= vehicle->second.mirrored_slot) return;
+  if (!rows.has_state || slot <= vehicle->second.mirrored_slot) return;
   vehicle->second.mirrored_slot = slot;
-  mirror(*rows.state, rows.reference, time_ns);
+  mirror(rows, time_ns);
 }
 
-void McapSink::mirror(const StateRow& state, const std::optional<ReferenceRow>& reference,
-                      std::int64_t time_ns) {
-  const PlantState& plant = state.plant;
+void McapSink::mirror(const StepRows& rows, std::int64_t time_ns) {
+  const model::Measurement& motion = rows.truth;
   ros::VehicleSample sample;
-  sample.vehicle_id = state.vehicle_id;
-  sample.step = state.step;
+  sample.vehicle_id = rows.vehicle_id;
+  sample.step = rows.step;
   sample.sim_time_ns = time_ns;
-  sample.p_WQ = bus::to_vector(plant.p_WQ_m());
-  sample.v_WQ = bus::to_vector(plant.v_WQ_m_s());
-  sample.p_WL = bus::to_vector(plant.p_WL_m());
-  sample.v_WL = bus::to_vector(plant.v_WL_m_s());
-  if (state.has_attitude) {
-    const auto& q_WB = plant.q_WB();
-    sample.q_WB = Eigen::Quaterniond(q_WB[0], q_WB[1], q_WB[2], q_WB[3]);
-    sample.w_WB_B = bus::to_vector(plant.w_WB_B_rad_s());
+  sample.p_WQ = motion.p_WQ;
+  sample.v_WQ = motion.v_WQ;
+  sample.p_WL = motion.p_WL;
+  sample.v_WL = motion.v_WL;
+  if (rows.has_attitude) {
+    sample.q_WB = motion.attitude.q_WB;
+    sample.w_WB_B = motion.attitude.w_WB_B;
   }
-  if (reference) sample.reference = bus::to_vector(reference->reference.position_m());
+  if (rows.has_reference) sample.reference = rows.answer.reference.position;
   mirrors_.emit(sample, emit_);
 }
 

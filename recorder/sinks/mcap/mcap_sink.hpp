@@ -42,8 +42,7 @@ class McapSink : public RecordSink {
 
   void add_channels();
   void add_attachments(const Parameters& parameters);
-  void mirror(const StateRow& state, const std::optional<ReferenceRow>& reference,
-              std::int64_t time_ns);
+  void mirror(const StepRows& rows, std::int64_t time_ns);
   void write_mirror(std::size_t channel, std::int64_t time_ns,
                     const std::vector<std::uint8_t>& message);
 

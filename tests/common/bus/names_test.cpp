@@ -25,12 +25,6 @@ TEST(NamesTest, EveryRunPhaseHasAWord) {
                           RunPhase::PHASE_FINISHED, RunPhase::PHASE_FAILED, RunPhase::PHASE_RESET});
 }
 
-TEST(NamesTest, EveryFaultHasAWord) {
-  expect_words<FaultCode>({FaultCode::FAULT_NONE, FaultCode::FAULT_FREE_FALL,
-                           FaultCode::FAULT_ROD_LEVEL, FaultCode::FAULT_NOT_FINITE,
-                           FaultCode::FAULT_STAGE_TIMEOUT});
-}
-
 TEST(NamesTest, EveryModeHasAWord) {
   expect_words<SyncMode>({SyncMode::MODE_LOCKSTEP, SyncMode::MODE_REALTIME});
 }

@@ -166,7 +166,7 @@ class ServerRig : public Outputs, public Surroundings {
   }
   void fail(const std::string& reason) { core_->on_failure(reason, now_); }
 
-  // What the shell finds when it looks around.
+  // Found by the shell when it looks around.
   std::vector<sync::Run> other_runs;
   bool is_on_this_machine = true;
   bool knows_every_claim = true;

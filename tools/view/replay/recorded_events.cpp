@@ -6,7 +6,6 @@
 #include <set>
 #include <utility>
 
-#include "common/bus/names.hpp"
 #include "recorder/sinks/csv/csv_reader.hpp"
 
 namespace sls::view {
@@ -107,13 +106,12 @@ std::vector<FaultInterval> list_faults(const config::Scenario& scenario, double 
 void RowEvents::add(const record::StepRows& rows) {
   Vehicle& vehicle = vehicles_[rows.vehicle_id];
   vehicle.last_step = rows.step;
-  if (rows.reference && vehicle.stage != rows.reference->reference.stage_index()) {
-    vehicle.stage = rows.reference->reference.stage_index();
+  if (rows.has_reference && vehicle.stage != rows.answer.stage) {
+    vehicle.stage = rows.answer.stage;
     if (stages_.size() < kMostMarks)
-      stages_.push_back(
-          {rows.vehicle_id, to_time(rows.step, period_s_), rows.reference->stage_name});
+      stages_.push_back({rows.vehicle_id, to_time(rows.step, period_s_), rows.answer.stage_name});
   }
-  const std::string fault = rows.command ? rows.command->fault : "";
+  const std::string fault = rows.has_command ? rows.fault : "";
   if (fault == vehicle.fault) return;
   end_fault(rows.vehicle_id, vehicle, rows.step);
   vehicle.fault = fault;
@@ -122,7 +120,7 @@ void RowEvents::add(const record::StepRows& rows) {
 
 void RowEvents::end_fault(std::uint32_t vehicle_id, Vehicle& vehicle, std::uint64_t step) {
   const std::string kind = std::exchange(vehicle.fault, "");
-  if (kind.empty() || kind == bus::to_string(FaultCode::FAULT_NONE) || faults_.size() == kMostMarks)
+  if (kind.empty() || kind == to_string(model::Fault::kNone) || faults_.size() == kMostMarks)
     return;
   faults_.push_back(
       {to_time(vehicle.fault_from, period_s_), to_time(step, period_s_), kind, "", vehicle_id});

@@ -66,10 +66,11 @@ void set_columns(Parameters& message, const fs::path& folder) {
   const record::CsvReader file(folder / record::StateRow::kFile,
                                record::make_header<record::StateRow>(),
                                record::CsvReader::Further::kAllowed);
-  record::StateRow with_attitude;
+  record::StepRows with_attitude;
   with_attitude.has_attitude = true;
   const std::string without = record::make_header<record::StateRow>();
-  const std::string known = record::join_names(record::list_columns(with_attitude));
+  const std::string known =
+      record::join_names(record::list_columns<record::StateRow>(with_attitude));
   std::string header;
   for (const std::string& name : file.columns()) header += (header.empty() ? "" : ",") + name;
   message.has_attitude((header + ",").rfind(known + ",", 0) == 0);

@@ -29,27 +29,27 @@ void append(std::vector<float>& row, const Numbers& numbers) {
 
 /// Fills `row` with the numbers of kColumns, then with `signals` signals.
 void fill_row(std::vector<float>& row, const record::StepRows& rows, std::size_t signals) {
-  const record::StateRow& state = *rows.state;
-  const PlantState& plant = state.plant;
+  const model::Measurement& motion = rows.truth;
+  const model::RodAngles& rod = motion.rod;
+  const Eigen::Quaterniond& q_WB = motion.attitude.q_WB;
   row.clear();
-  append(row, plant.p_WQ_m());
-  append(row, plant.v_WQ_m_s());
-  append(row, plant.p_WL_m());
-  append(row, plant.v_WL_m_s());
-  append(row, std::array<double, 4>{plant.alpha_rad(), plant.beta_rad(), plant.alpha_dot_rad_s(),
-                                    plant.beta_dot_rad_s()});
-  append(row, state.f_Q_W);
-  if (state.has_attitude) {
-    append(row, plant.q_WB());
-    append(row, plant.w_WB_B_rad_s());
+  append(row, motion.p_WQ);
+  append(row, motion.v_WQ);
+  append(row, motion.p_WL);
+  append(row, motion.v_WL);
+  append(row, std::array<double, 4>{rod.alpha, rod.beta, rod.alpha_dot, rod.beta_dot});
+  append(row, rows.f_Q_W);
+  if (rows.has_attitude) {
+    append(row, std::array<double, 4>{q_WB.w(), q_WB.x(), q_WB.y(), q_WB.z()});
+    append(row, motion.attitude.w_WB_B);
   } else {
     row.resize(row.size() + 7, kNone);
   }
-  if (rows.reference)
-    append(row, rows.reference->reference.position_m());
+  if (rows.has_reference)
+    append(row, rows.answer.reference.position);
   else
     row.resize(row.size() + 3, kNone);
-  append(row, plant.signals());
+  append(row, motion.signals);
   row.resize(kColumns.size() + signals, kNone);  // another plant in a segment may have others
 }
 
@@ -64,9 +64,9 @@ void read_rows(const record::RecordedFlight& flight, std::size_t signals, KeptRo
                                              flight.folder.string(), KeptRows::kMostSteps,
                                              rows->step));
     events.add(*rows);
-    if (!rows->state) continue;
+    if (!rows->has_state) continue;
     fill_row(row, *rows, signals);
-    kept.add(rows->vehicle_id, rows->step, rows->state->sim_time_s, row);
+    kept.add(rows->vehicle_id, rows->step, rows->state_time_s, row);
   }
   events.finish();
 }

@@ -269,8 +269,8 @@ TEST_F(McapSinkTest, StepsWithoutAStateAreThereInTheOrderOfTheirVehicle) {
     const auto rows = reader.next_as_written();
     ASSERT_TRUE(rows);
     EXPECT_EQ(rows->step, step);
-    EXPECT_EQ(rows->state.has_value(), step != 100);
-    EXPECT_TRUE(rows->command.has_value());
+    EXPECT_EQ(rows->has_state, step != 100);
+    EXPECT_TRUE(rows->has_command);
   }
   EXPECT_FALSE(reader.next_as_written());
 }
