@@ -15,7 +15,7 @@ class HoverLaw : public control::ControlLaw {
   explicit HoverLaw(const model::SlungLoadParameters& vehicle)
       : weight_(vehicle.total_mass() * vehicle.gravity) {}
   control::LawOutput calc(const control::LawInput& input) const override {
-    return {{0.0, 0.0, -weight_}, input.memory, control::Fault::kNone};
+    return {{0.0, 0.0, -weight_}, input.memory, control::ErrorCode::kNone};
   }
   int memory_size() const override { return 3; }
 

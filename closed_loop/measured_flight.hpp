@@ -17,7 +17,7 @@ namespace sls::closed_loop {
 enum class Outcome {
   kFinished,
   kLost,    ///< the load is more than one rod length further from its reference than in the base
-  kFailed,  ///< a controller fault, a refused force, or a plant that is not finite
+  kFailed,  ///< an error code, a refused force, or a plant that is not finite
 };
 
 /// "finished", "lost", "failed".

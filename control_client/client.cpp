@@ -178,8 +178,8 @@ const ControlCommand& Client::answer(Pilot& pilot, std::uint64_t step, const Veh
   answer.compute_time = Clock::now() - began;
   bus::fill(pilot.last_command, state.vehicle_id(), answer);
   pilot.last_step = step;
-  if (answer.fault != Fault::kNone)
-    spdlog::error("step {}: fault {}", step, to_string(answer.fault));
+  if (answer.error_code != ErrorCode::kNone)
+    spdlog::error("step {}: fault {}", step, to_string(answer.error_code));
   return pilot.last_command;
 }
 

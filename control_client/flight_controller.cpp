@@ -15,10 +15,10 @@ namespace {
 
 constexpr std::uint64_t kPurityCheckedSteps = 100;
 
-void fail(model::Answer& answer, Fault fault) {
+void fail(model::Answer& answer, ErrorCode error_code) {
   answer.f_Q_W.setZero();
   answer.mission = MissionPhase::kFailed;
-  answer.fault = fault;
+  answer.error_code = error_code;
 }
 
 /// Compares bits: NaN differs from itself, but is no sign of an impure law.
@@ -27,7 +27,7 @@ bool are_equal(const double* a, const double* b, Eigen::Index count) {
 }
 
 bool are_equal(const LawOutput& a, const LawOutput& b) {
-  return a.fault == b.fault && a.memory.size() == b.memory.size() &&
+  return a.error_code == b.error_code && a.memory.size() == b.memory.size() &&
          are_equal(a.f_Q_W.data(), b.f_Q_W.data(), 3) &&
          are_equal(a.memory.data(), b.memory.data(), a.memory.size());
 }
@@ -87,14 +87,14 @@ void FlightController::Parts::fly(std::uint64_t step, const model::Measurement& 
   if (memory.size() == 0) input.memory.setZero(law->memory_size());  // step 0
 
   const LawOutput output = calc_law(input);
-  if (output.fault != Fault::kNone) return fail(answer, output.fault);
+  if (output.error_code != ErrorCode::kNone) return fail(answer, output.error_code);
   answer.f_Q_W = output.f_Q_W;
   if (controller.drag_feed_forward) {
     answer.f_Q_W = calc_drag_feed_forward(answer.f_Q_W, state.v_WQ, controller.model.air);
   }
   if (controller.saturate) answer.f_Q_W = calc_saturated(answer.f_Q_W, controller.force_limit_n);
   if (!answer.f_Q_W.allFinite() || !output.memory.allFinite())
-    return fail(answer, Fault::kNotFinite);
+    return fail(answer, ErrorCode::kNotFinite);
   answer.memory.numbers = output.memory;
 }
 
@@ -115,7 +115,7 @@ model::Answer FlightController::calc_answer(std::uint64_t step, const model::Mea
   const Eigen::Index remembered = memory.numbers.size();
   if (!parts_->mission.is_possible(step, memory) ||
       (remembered != 0 && remembered != parts_->law->memory_size())) {
-    fail(answer, Fault::kNotFinite);  // a damaged sample: its memory is impossible
+    fail(answer, ErrorCode::kNotFinite);  // a damaged sample: its memory is impossible
     return answer;
   }
 
@@ -128,9 +128,9 @@ model::Answer FlightController::calc_answer(std::uint64_t step, const model::Mea
   answer.stage_name = parts_->mission.stage_name(progress.stage);
 
   if (!model::is_finite(state) || !memory.numbers.allFinite()) {
-    fail(answer, Fault::kNotFinite);
+    fail(answer, ErrorCode::kNotFinite);
   } else if (progress.phase == MissionPhase::kFailed) {
-    fail(answer, Fault::kStageTimeout);
+    fail(answer, ErrorCode::kStageTimeout);
   } else {
     parts_->fly(step, state, memory.numbers, answer);
   }

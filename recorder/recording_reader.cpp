@@ -57,9 +57,9 @@ void set_fault(StepRows& rows) {
   rows.kind = rows.fault == StepRows::kHeld       ? model::AnswerKind::kHeld
               : rows.fault == StepRows::kFailSafe ? model::AnswerKind::kFailSafe
                                                   : model::AnswerKind::kAccepted;
-  for (const model::Fault fault : {model::Fault::kFreeFall, model::Fault::kRodLevel,
-                                   model::Fault::kNotFinite, model::Fault::kStageTimeout})
-    if (rows.fault == to_string(fault)) rows.answer.fault = fault;
+  for (const model::ErrorCode fault : {model::ErrorCode::kFreeFall, model::ErrorCode::kRodLevel,
+                                   model::ErrorCode::kNotFinite, model::ErrorCode::kStageTimeout})
+    if (rows.fault == to_string(fault)) rows.answer.error_code = fault;
 }
 
 template <class Row>
@@ -128,7 +128,7 @@ void RowReader<Row>::take(std::uint32_t vehicle_id, StepRows& rows) {
     rows.compute_us = row.compute_us;
     rows.client_name = std::move(row.client_name);
     rows.answer.f_Q_W = row.answer.f_Q_W;
-    rows.answer.fault = row.answer.fault;
+    rows.answer.error_code = row.answer.error_code;
   } else {
     rows.has_reference = true;
     rows.reference_time_s = row.reference_time_s;

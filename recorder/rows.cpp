@@ -43,7 +43,7 @@ void fill_columns(StepRows& rows, const RowFormat& format) {
   rows.has_command = rows.kind != model::AnswerKind::kNone;
   rows.fault = rows.kind == model::AnswerKind::kHeld       ? StepRows::kHeld
                : rows.kind == model::AnswerKind::kFailSafe ? StepRows::kFailSafe
-                                                           : to_string(rows.answer.fault);
+                                                           : to_string(rows.answer.error_code);
   rows.compute_us =
       rows.is_unanswered() ? 0.0 : static_cast<double>(rows.answer.compute_time.count()) / 1e3;
   rows.has_reference = false;

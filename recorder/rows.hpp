@@ -44,7 +44,7 @@ struct StepRows : model::StepRecord {
   bool is_whole() const { return has_state && has_command && (has_reference || is_unanswered()); }
 };
 
-/// What the rows of a run depend on beside its records.
+/// The facts of a run that its rows depend on beside its records.
 struct RowFormat {
   std::int64_t period_ns = 0;
   bool has_attitude = false;

@@ -20,11 +20,11 @@ constexpr bool are_equal(Wire wire, Model model) {
 static_assert(are_equal(MissionPhase::MISSION_RUNNING, model::MissionPhase::kRunning));
 static_assert(are_equal(MissionPhase::MISSION_FINISHED, model::MissionPhase::kFinished));
 static_assert(are_equal(MissionPhase::MISSION_FAILED, model::MissionPhase::kFailed));
-static_assert(are_equal(FaultCode::FAULT_NONE, model::Fault::kNone));
-static_assert(are_equal(FaultCode::FAULT_FREE_FALL, model::Fault::kFreeFall));
-static_assert(are_equal(FaultCode::FAULT_ROD_LEVEL, model::Fault::kRodLevel));
-static_assert(are_equal(FaultCode::FAULT_NOT_FINITE, model::Fault::kNotFinite));
-static_assert(are_equal(FaultCode::FAULT_STAGE_TIMEOUT, model::Fault::kStageTimeout));
+static_assert(are_equal(FaultCode::FAULT_NONE, model::ErrorCode::kNone));
+static_assert(are_equal(FaultCode::FAULT_FREE_FALL, model::ErrorCode::kFreeFall));
+static_assert(are_equal(FaultCode::FAULT_ROD_LEVEL, model::ErrorCode::kRodLevel));
+static_assert(are_equal(FaultCode::FAULT_NOT_FINITE, model::ErrorCode::kNotFinite));
+static_assert(are_equal(FaultCode::FAULT_STAGE_TIMEOUT, model::ErrorCode::kStageTimeout));
 static_assert(are_equal(AnswerKind::ANSWER_NONE, model::AnswerKind::kNone));
 static_assert(are_equal(AnswerKind::ANSWER_ACCEPTED, model::AnswerKind::kAccepted));
 static_assert(are_equal(AnswerKind::ANSWER_HELD, model::AnswerKind::kHeld));
@@ -127,7 +127,7 @@ void fill(ControlCommand& message, std::uint32_t vehicle_id, const model::Answer
   reference.snap_m_s4(to_array(answer.reference.snap));
   fill(message.controller(), answer.memory);
   message.mission(to_enumerator<MissionPhase>(answer.mission));
-  message.fault(to_enumerator<FaultCode>(answer.fault));
+  message.fault(to_enumerator<FaultCode>(answer.error_code));
   message.compute_time_ns(answer.compute_time.count());
 }
 
@@ -143,7 +143,7 @@ void fill(model::Answer& answer, const ControlCommand& message) {
   answer.reference.snap = to_vector(reference.snap_m_s4());
   answer.memory = to_memory(message.controller());
   answer.mission = to_enumerator<model::MissionPhase>(message.mission());
-  answer.fault = to_enumerator<model::Fault>(message.fault());
+  answer.error_code = to_enumerator<model::ErrorCode>(message.fault());
   answer.compute_time = decltype(answer.compute_time)(message.compute_time_ns());
 }
 

@@ -2,17 +2,17 @@
 
 namespace sls::model {
 
-const char* to_string(Fault fault) {
-  switch (fault) {
-    case Fault::kNone:
+const char* to_string(ErrorCode error_code) {
+  switch (error_code) {
+    case ErrorCode::kNone:
       return "none";
-    case Fault::kFreeFall:
+    case ErrorCode::kFreeFall:
       return "free_fall";
-    case Fault::kRodLevel:
+    case ErrorCode::kRodLevel:
       return "rod_level";
-    case Fault::kNotFinite:
+    case ErrorCode::kNotFinite:
       return "not_finite";
-    case Fault::kStageTimeout:
+    case ErrorCode::kStageTimeout:
       return "stage_timeout";
   }
   return "unknown";

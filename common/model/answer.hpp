@@ -18,7 +18,7 @@ enum class MissionPhase : std::uint32_t { kRunning, kFinished, kFailed };
 
 /// Error code of a controller. With any code except kNone the force is zero and the mission has
 /// failed.
-enum class Fault : std::uint32_t {
+enum class ErrorCode : std::uint32_t {
   kNone,
   kFreeFall,      ///< s → 0: the law asks the load to fall freely
   kRodLevel,      ///< cos α → 0 or cos β → 0
@@ -28,7 +28,7 @@ enum class Fault : std::uint32_t {
 
 /// For logs and files: "none", "free_fall", "rod_level", "not_finite", "stage_timeout"; "unknown"
 /// for any other number.
-const char* to_string(Fault fault);
+const char* to_string(ErrorCode error_code);
 
 /// The memory of a controller. It travels in the command and comes back in the next state, so any
 /// client can answer any sample. A run starts with the default, which means zeros.
@@ -40,10 +40,10 @@ struct ControllerMemory {
 
 /// Equal states and memories give equal bits, except of the compute time.
 struct Answer {
-  Eigen::Vector3d f_Q_W = Eigen::Vector3d::Zero();  ///< N; zero with a fault
+  Eigen::Vector3d f_Q_W = Eigen::Vector3d::Zero();  ///< N; zero with an error code
   ControllerMemory memory;                          ///< for step + 1
   MissionPhase mission = MissionPhase::kRunning;
-  Fault fault = Fault::kNone;
+  ErrorCode error_code = ErrorCode::kNone;
   Reference reference;      ///< of this step
   std::uint32_t stage = 0;  ///< stage in force at this step
   std::string stage_name;

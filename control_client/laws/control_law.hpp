@@ -19,7 +19,7 @@
 
 namespace sls::control {
 
-using model::Fault;
+using model::ErrorCode;
 using model::MissionPhase;
 
 /// A law is singular where s = g − n₃ vanishes; below this fraction of g it reports kFreeFall.
@@ -50,9 +50,9 @@ struct LawInput {
 };
 
 struct LawOutput {
-  Eigen::Vector3d f_Q_W = Eigen::Vector3d::Zero();  ///< N; zero with a fault
+  Eigen::Vector3d f_Q_W = Eigen::Vector3d::Zero();  ///< N; zero with an error code
   model::Numbers memory;                            ///< for step + 1; `memory_size()` numbers
-  Fault fault = Fault::kNone;
+  ErrorCode error_code = ErrorCode::kNone;
 };
 
 /// A law has no state that changes: its memory travels in `memory`, so any client can answer any

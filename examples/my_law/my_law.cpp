@@ -25,7 +25,7 @@ class MyLaw : public control::ControlLaw {
         1.5 * (0.8 * (input.reference.position - input.state.p_WL) - input.state.v_WL);
     control::LawOutput output;
     if (rod.z() < 0.1 * vehicle_.rod_length) {
-      output.fault = control::Fault::kRodLevel;
+      output.error_code = control::ErrorCode::kRodLevel;
       return output;
     }
     const double support = vehicle_.gravity - wanted.z();

@@ -107,10 +107,10 @@ void add_flight(py::module_& module) {
             return flight.save(folder, force);
           },
           py::arg("folder"), py::arg("force"), py::call_guard<py::gil_scoped_release>());
-  const char* const codes[] = {to_string(model::Fault::kNone), to_string(model::Fault::kFreeFall),
-                               to_string(model::Fault::kRodLevel),
-                               to_string(model::Fault::kNotFinite),
-                               to_string(model::Fault::kStageTimeout)};
+  const char* const codes[] = {
+      to_string(model::ErrorCode::kNone), to_string(model::ErrorCode::kFreeFall),
+      to_string(model::ErrorCode::kRodLevel), to_string(model::ErrorCode::kNotFinite),
+      to_string(model::ErrorCode::kStageTimeout)};
   module.attr("FAULTS") = py::make_tuple(codes[0], codes[1], codes[2], codes[3], codes[4]);
   module.def("fly", &fly, py::arg("scenario"), py::arg("controller") = py::none(),
              py::arg("vehicle") = py::none(), py::arg("check_purity") = false);

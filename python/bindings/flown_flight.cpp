@@ -225,7 +225,7 @@ void FlownFlight::keep(const StepRecord& flown, std::size_t index) {
   }
   const model::Answer& answer = flown.answer;
   row.add_all(answer.f_Q_W);
-  row.add(static_cast<std::uint64_t>(answer.fault));
+  row.add(static_cast<std::uint64_t>(answer.error_code));
   row.add(std::uint64_t{answer.stage});
   row.add_all(answer.reference);
   row.add(std::uint64_t{answer.memory.stage});
@@ -267,7 +267,7 @@ StepRecord FlownFlight::make_step(std::size_t index, std::size_t number) const {
   }
   model::Answer& answer = flown.answer;
   row.take_all(answer.f_Q_W);
-  answer.fault = static_cast<model::Fault>(row.take_integer());
+  answer.error_code = static_cast<model::ErrorCode>(row.take_integer());
   answer.stage = static_cast<std::uint32_t>(row.take_integer());
   if (answer.stage < scenario_.mission.size())
     answer.stage_name = scenario_.mission[answer.stage].name;

@@ -125,10 +125,10 @@ class BadAnswer : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-model::Fault to_fault(const std::string& code) {
-  if (code == "free_fall") return model::Fault::kFreeFall;
-  if (code == "rod_level") return model::Fault::kRodLevel;
-  return model::Fault::kNotFinite;
+model::ErrorCode to_error_code(const std::string& code) {
+  if (code == "free_fall") return model::ErrorCode::kFreeFall;
+  if (code == "rod_level") return model::ErrorCode::kRodLevel;
+  return model::ErrorCode::kNotFinite;
 }
 
 std::string describe(const py::error_already_set& error) {
@@ -226,7 +226,7 @@ LawOutput PythonLaw::calc(const LawInput& input) const {
     // The memory keeps its size: all answers to a sample must have the same size.
     output.memory.setZero(memory_size_);
     if (error.matches(law_fault_type())) {
-      output.fault = to_fault(py::str(error.value().attr("code")));
+      output.error_code = to_error_code(py::str(error.value().attr("code")));
       return output;
     }
     if (error.trace()) PyException_SetTraceback(error.value().ptr(), error.trace().ptr());

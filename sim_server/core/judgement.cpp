@@ -9,7 +9,7 @@
 namespace sls::sim {
 namespace {
 
-using model::Fault;
+using model::ErrorCode;
 using model::MissionPhase;
 
 double calc_norm(const Eigen::Vector3d& f) { return std::hypot(f.x(), f.y(), f.z()); }
@@ -32,9 +32,9 @@ bool is_finite(const model::Reference& reference) {
 /// The first enumerator that the contract does not define, by its field; null: there is none.
 std::pair<const char*, std::uint32_t> find_undefined(const model::Answer& answer) {
   const auto mission = static_cast<std::uint32_t>(answer.mission);
-  const auto fault = static_cast<std::uint32_t>(answer.fault);
+  const auto fault = static_cast<std::uint32_t>(answer.error_code);
   if (mission > static_cast<std::uint32_t>(MissionPhase::kFailed)) return {"mission", mission};
-  if (fault > static_cast<std::uint32_t>(Fault::kStageTimeout)) return {"fault", fault};
+  if (fault > static_cast<std::uint32_t>(ErrorCode::kStageTimeout)) return {"fault", fault};
   return {nullptr, 0};
 }
 
@@ -58,7 +58,7 @@ std::optional<Defect> find_defect(std::uint64_t step, const model::Answer& answe
   if (!answer.f_Q_W.allFinite() || !answer.memory.numbers.allFinite()) return Defect::kNotFinite;
   if (calc_norm(answer.f_Q_W) > limits.force) return Defect::kForceLimit;
   if (find_undefined(answer).first) return Defect::kUndefined;
-  if (answer.fault != Fault::kNone || answer.mission == MissionPhase::kFailed)
+  if (answer.error_code != ErrorCode::kNone || answer.mission == MissionPhase::kFailed)
     return Defect::kFault;
   if (!is_finite(answer.reference)) return Defect::kNotFinite;  // its fault would say why
   const std::uint32_t stage = answer.memory.stage;
@@ -102,8 +102,9 @@ std::string describe_refusal(Defect defect, std::uint64_t step, const model::Ans
       return text + fmt::format(": {} {}", field, value);
     }
     case Defect::kFault:
-      return text + fmt::format(": {}", answer.fault != Fault::kNone ? to_string(answer.fault)
-                                                                     : "mission failed");
+      return text + fmt::format(": {}", answer.error_code != ErrorCode::kNone
+                                            ? to_string(answer.error_code)
+                                            : "mission failed");
     case Defect::kUnknownStage:
       return text + fmt::format(": stage_index {} > {}", answer.memory.stage, limits.stages);
     case Defect::kEarlyEnd:

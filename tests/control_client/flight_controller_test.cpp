@@ -42,7 +42,7 @@ bool same_bits(const model::Answer& a, const model::Answer& b) {
   return same_bits(a.f_Q_W, b.f_Q_W) && a.memory.numbers == b.memory.numbers &&
          a.memory.stage == b.memory.stage &&
          a.memory.stage_start_step == b.memory.stage_start_step && a.mission == b.mission &&
-         a.fault == b.fault && a.stage == b.stage && a.stage_name == b.stage_name &&
+         a.error_code == b.error_code && a.stage == b.stage && a.stage_name == b.stage_name &&
          same_bits(a.reference.position, b.reference.position) &&
          same_bits(a.reference.velocity, b.reference.velocity) &&
          same_bits(a.reference.acceleration, b.reference.acceleration) &&
@@ -50,8 +50,8 @@ bool same_bits(const model::Answer& a, const model::Answer& b) {
          same_bits(a.reference.snap, b.reference.snap);
 }
 
-void expect_failed(const model::Answer& answer, Fault fault) {
-  EXPECT_EQ(answer.fault, fault);
+void expect_failed(const model::Answer& answer, ErrorCode error_code) {
+  EXPECT_EQ(answer.error_code, error_code);
   EXPECT_EQ(answer.mission, MissionPhase::kFailed);
   EXPECT_EQ(answer.f_Q_W, Vector3d::Zero());
 }
@@ -62,7 +62,7 @@ TEST(FlightControllerTest, AnswersWithTheLawsForceReferenceAndStage) {
   const model::SlungLoadState state = make_hanging({0.0, 0.0, -0.5});
   const model::Answer answer = controller.calc_answer(0, state, {});
   EXPECT_EQ(answer.mission, MissionPhase::kRunning);
-  EXPECT_EQ(answer.fault, Fault::kNone);
+  EXPECT_EQ(answer.error_code, ErrorCode::kNone);
   EXPECT_EQ(answer.stage, 0u);
   EXPECT_EQ(answer.stage_name, "figure_eight");
   EXPECT_EQ(answer.reference.position, Vector3d(0.0, 0.0, -0.5));
@@ -74,11 +74,14 @@ TEST(FlightControllerTest, AnswersWithTheLawsForceReferenceAndStage) {
 
 TEST(FlightControllerTest, AForceThatIsNoNumberIsAFaultAndNoImpurity) {
   struct Broken : ControlLaw {
-    LawOutput calc(const LawInput&) const override { return {{0.0, kNan, 0.0}, {}, Fault::kNone}; }
+    LawOutput calc(const LawInput&) const override {
+      return {{0.0, kNan, 0.0}, {}, ErrorCode::kNone};
+    }
   };
   const FlightController controller(make_figure_eight(), 0, true,
                                     [](const LawSetup&) { return std::make_unique<Broken>(); });
-  expect_failed(controller.calc_answer(0, make_hanging({0.0, 0.0, -0.5}), {}), Fault::kNotFinite);
+  expect_failed(controller.calc_answer(0, make_hanging({0.0, 0.0, -0.5}), {}),
+                ErrorCode::kNotFinite);
 }
 
 TEST(FlightControllerTest, IsAPureFunctionForSamplesInAnyOrder) {
@@ -103,7 +106,7 @@ TEST(FlightControllerTest, IsAPureFunctionForSamplesInAnyOrder) {
   for (std::uint64_t step = 0; step < 1000; ++step) {
     samples.push_back({step, draw_state(generator), memory});
     answers.push_back(controller.calc_answer(step, samples.back().state, memory));
-    ASSERT_EQ(answers.back().fault, Fault::kNone);
+    ASSERT_EQ(answers.back().error_code, ErrorCode::kNone);
     memory = answers.back().memory;
   }
   EXPECT_EQ(memory.stage, 1u);
@@ -122,7 +125,7 @@ TEST(FlightControllerTest, FinishesAtDurationOverPeriodWithForceAndReferenceStil
   EXPECT_EQ(controller.calc_answer(7999, state, {}).mission, MissionPhase::kRunning);
   const model::Answer last = controller.calc_answer(8000, state, {});
   EXPECT_EQ(last.mission, MissionPhase::kFinished);
-  EXPECT_EQ(last.fault, Fault::kNone);
+  EXPECT_EQ(last.error_code, ErrorCode::kNone);
   EXPECT_EQ(last.stage, 0u);
   EXPECT_GT(last.f_Q_W.norm(), 1.0);
   EXPECT_GT(last.reference.velocity.norm(), 0.1);
@@ -190,7 +193,7 @@ TEST(FlightControllerTest, SaturatesOnlyWhereAsked) {
   const model::SlungLoadState state = make_hanging({0.0, 0.0, -0.5});
   const model::Answer free = FlightController(scenario).calc_answer(0, state, {});
   EXPECT_GT(free.f_Q_W.norm(), 17.0);
-  EXPECT_EQ(free.fault, Fault::kNone);
+  EXPECT_EQ(free.error_code, ErrorCode::kNone);
   scenario.controller.saturate = true;
   const model::Answer limited = FlightController(scenario).calc_answer(0, state, {});
   EXPECT_LE(limited.f_Q_W.norm(), 17.0);
@@ -234,10 +237,11 @@ TEST(FlightControllerTest, AFaultFailsTheMissionWithoutAForce) {
   const FlightController controller(scenario);
   model::SlungLoadState level =
       model::make_state({0, 0, -1.5}, {0, 0, 0}, model::RodAngles{1.5707, 0.0, 0.0, 0.0}, 1.0);
-  expect_failed(controller.calc_answer(0, level, {}), Fault::kRodLevel);
-  expect_failed(controller.calc_answer(0, make_hanging({0.0, 0.0, -9.0}), {}), Fault::kFreeFall);
+  expect_failed(controller.calc_answer(0, level, {}), ErrorCode::kRodLevel);
+  expect_failed(controller.calc_answer(0, make_hanging({0.0, 0.0, -9.0}), {}),
+                ErrorCode::kFreeFall);
   // Also at the step at which the mission would finish.
-  expect_failed(controller.calc_answer(8000, level, {}), Fault::kRodLevel);
+  expect_failed(controller.calc_answer(8000, level, {}), ErrorCode::kRodLevel);
 }
 
 TEST(FlightControllerTest, EveryNumberOfASampleThatIsNotFiniteIsAFault) {
@@ -248,14 +252,14 @@ TEST(FlightControllerTest, EveryNumberOfASampleThatIsNotFiniteIsAFault) {
         &model::SlungLoadState::v_WL}) {
     model::SlungLoadState bad = good;
     (bad.*vector).y() = kNan;
-    expect_failed(controller.calc_answer(0, bad, {}), Fault::kNotFinite);
+    expect_failed(controller.calc_answer(0, bad, {}), ErrorCode::kNotFinite);
   }
   model::SlungLoadState bad = good;
   bad.rod.beta_dot = std::numeric_limits<double>::infinity();
-  expect_failed(controller.calc_answer(0, bad, {}), Fault::kNotFinite);
+  expect_failed(controller.calc_answer(0, bad, {}), ErrorCode::kNotFinite);
   model::ControllerMemory memory;
   memory.numbers = Vector3d(0.0, 0.0, kNan);
-  expect_failed(controller.calc_answer(0, good, memory), Fault::kNotFinite);
+  expect_failed(controller.calc_answer(0, good, memory), ErrorCode::kNotFinite);
 }
 
 TEST(FlightControllerTest, AMemoryThatCannotBeIsAFaultNotACrash) {
@@ -264,13 +268,13 @@ TEST(FlightControllerTest, AMemoryThatCannotBeIsAFaultNotACrash) {
   model::ControllerMemory memory;
   for (const std::uint32_t stage : {2u, 0xffffffffu}) {  // 1 is valid: the only stage is over
     memory.stage = stage;
-    expect_failed(controller.calc_answer(100, state, memory), Fault::kNotFinite);
+    expect_failed(controller.calc_answer(100, state, memory), ErrorCode::kNotFinite);
   }
   memory.stage = 0;
   memory.stage_start_step = 101;
-  expect_failed(controller.calc_answer(100, state, memory), Fault::kNotFinite);
+  expect_failed(controller.calc_answer(100, state, memory), ErrorCode::kNotFinite);
   memory.stage_start_step = std::numeric_limits<std::uint64_t>::max();
-  expect_failed(controller.calc_answer(100, state, memory), Fault::kNotFinite);
+  expect_failed(controller.calc_answer(100, state, memory), ErrorCode::kNotFinite);
 }
 
 TEST(FlightControllerTest, AStageThatTimesOutFailsTheMission) {
@@ -285,7 +289,7 @@ TEST(FlightControllerTest, AStageThatTimesOutFailsTheMission) {
   const model::SlungLoadState far = make_hanging({0.5, 0.0, -0.5});
   EXPECT_EQ(controller.calc_answer(499, far, {}).mission, MissionPhase::kRunning);
   const model::Answer answer = controller.calc_answer(500, far, {});
-  expect_failed(answer, Fault::kStageTimeout);
+  expect_failed(answer, ErrorCode::kStageTimeout);
   EXPECT_EQ(answer.reference.position, Vector3d(0.0, 0.0, -0.5));
 }
 
@@ -325,11 +329,11 @@ TEST(FlightControllerTest, RefusesALawItDoesNotKnowAndWeightsWithoutSolution) {
 }
 
 TEST(FlightControllerTest, FaultsHaveTheNamesOfTheDesign) {
-  EXPECT_STREQ(to_string(Fault::kNone), "none");
-  EXPECT_STREQ(to_string(Fault::kFreeFall), "free_fall");
-  EXPECT_STREQ(to_string(Fault::kRodLevel), "rod_level");
-  EXPECT_STREQ(to_string(Fault::kNotFinite), "not_finite");
-  EXPECT_STREQ(to_string(Fault::kStageTimeout), "stage_timeout");
+  EXPECT_STREQ(to_string(ErrorCode::kNone), "none");
+  EXPECT_STREQ(to_string(ErrorCode::kFreeFall), "free_fall");
+  EXPECT_STREQ(to_string(ErrorCode::kRodLevel), "rod_level");
+  EXPECT_STREQ(to_string(ErrorCode::kNotFinite), "not_finite");
+  EXPECT_STREQ(to_string(ErrorCode::kStageTimeout), "stage_timeout");
 }
 
 }  // namespace

@@ -45,10 +45,10 @@ TEST(ColumnsTest, AttitudeRatesAndSignalsFollowTheOthers) {
 }
 
 TEST(ColumnsTest, ThePlantsReserveTheNamesOfTheColumnsBeforeTheSignals) {
-  StateRow row;
-  row.has_attitude = true;
+  StepRows rows;
+  rows.has_attitude = true;
   std::vector<std::string> names;
-  for (const auto& column : list_columns(row))
+  for (const auto& column : list_columns<StateRow>(rows))
     names.insert(names.end(), column.names.begin(), column.names.end());
   EXPECT_EQ(sim::list_reserved_signal_names(), names);
 }

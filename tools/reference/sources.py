@@ -236,9 +236,9 @@ def load_contract():
 def load_faults():
     """The error codes of a controller: [(number, name in files, name in the contract, meaning)]."""
     enums = load_contract()[1]
-    header = re.search(r"enum class Fault \{(.*?)\};", read("common/model/answer.hpp"), re.DOTALL)[1]
+    header = re.search(r"enum class ErrorCode[^{]*\{(.*?)\};", read("common/model/answer.hpp"), re.DOTALL)[1]
     meanings = re.findall(r"(k\w+),(?:\s*///< (.*))?", header)
-    texts = dict(re.findall(r'case Fault::(k\w+):\s*return "(\w+)";', read("common/model/answer.cpp")))
+    texts = dict(re.findall(r'case ErrorCode::(k\w+):\s*return "(\w+)";', read("common/model/answer.cpp")))
     wire = [value for value, _ in enums["FaultCode"]]
     if len(wire) != len(meanings):
         raise StaleReference("idl/sls.idl and common/model/answer.hpp have different numbers of error codes")

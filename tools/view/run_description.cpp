@@ -54,9 +54,9 @@ Json describe_vehicles(const Parameters& parameters, const config::Scenario& sce
 // --- columns -------------------------------------------------------------------------------------
 
 std::vector<record::ColumnLister::Entry> list_columns() {
-  record::StateRow state;
-  state.has_attitude = true;
-  auto columns = record::list_columns(state);
+  record::StepRows rows;
+  rows.has_attitude = true;
+  auto columns = record::list_columns<record::StateRow>(rows);
   columns.erase(columns.begin(), columns.begin() + 3);  // rows have vehicle and time of their own
   for (const auto& column : record::list_columns<record::ReferenceRow>())
     if (column.names.front() == "ref_x_m") columns.push_back(column);

@@ -15,9 +15,9 @@ using Eigen::Vector3d;
 
 LawOutput PidLaw::calc(const LawInput& input) const {
   LawOutput output;
-  const auto fail = [&output](Fault fault) {
+  const auto fail = [&output](ErrorCode error_code) {
     output.f_Q_W.setZero();
-    output.fault = fault;
+    output.error_code = error_code;
     return output;
   };
   const PidAxisGains &xy = gains_.horizontal, &z = gains_.vertical;
@@ -29,7 +29,7 @@ LawOutput PidLaw::calc(const LawInput& input) const {
   // Eq. (1): position error and velocity of the load by the controller's own model.
   const Vector3d error = input.reference.position - input.state.p_WQ - vehicle_.rod_length * q;
   const Vector3d velocity = input.state.v_WQ + vehicle_.rod_length * q_dot;
-  if (is_level(input.state.rod)) return fail(Fault::kRodLevel);
+  if (is_level(input.state.rod)) return fail(ErrorCode::kRodLevel);
 
   // Eqs. (2) and (3): the position loop gives a desired velocity, the velocity loop a desired
   // acceleration.
@@ -39,8 +39,8 @@ LawOutput PidLaw::calc(const LawInput& input) const {
   const Vector3d acceleration =
       k_v.cwiseProduct(k_p.cwiseProduct(error) - velocity) + k_i.cwiseProduct(integral);
   const double support = vehicle_.gravity - acceleration.z();
-  if (!std::isfinite(support)) return fail(Fault::kNotFinite);
-  if (support < kMinSupportFraction * vehicle_.gravity) return fail(Fault::kFreeFall);
+  if (!std::isfinite(support)) return fail(ErrorCode::kNotFinite);
+  if (support < kMinSupportFraction * vehicle_.gravity) return fail(ErrorCode::kFreeFall);
 
   // Eq. (4): the acceleration gives a desired slope of the rod, and its error the acceleration of
   // the slope.
@@ -52,7 +52,7 @@ LawOutput PidLaw::calc(const LawInput& input) const {
   // Eq. (5): the force carries both bodies along the rod and turns it.
   output.f_Q_W.head<2>() = -total_mass * support * w - m * vehicle_.rod_length * w_ddot;
   output.f_Q_W.z() = -total_mass * support;
-  if (!output.f_Q_W.allFinite()) return fail(Fault::kNotFinite);
+  if (!output.f_Q_W.allFinite()) return fail(ErrorCode::kNotFinite);
   output.memory = calc_next_integral(integral, error, period_);
   return output;
 }

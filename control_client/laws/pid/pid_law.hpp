@@ -13,8 +13,8 @@ class PidLaw : public ControlLaw {
   PidLaw(const model::SlungLoadParameters& vehicle, const PidGains& gains, double period)
       : vehicle_(vehicle), gains_(gains), period_(period) {}
 
-  /// Holds for |α|, |β| < π/2 and a desired vertical acceleration below g; outside it reports a
-  /// fault and no force, never NaN.
+  /// Holds for |α|, |β| < π/2 and a desired vertical acceleration below g; outside it reports an
+  /// error code and no force, never NaN.
   LawOutput calc(const LawInput& input) const override;
   /// The integral of the position error, m·s.
   int memory_size() const override { return 3; }

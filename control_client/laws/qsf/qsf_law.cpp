@@ -65,9 +65,9 @@ Vector3d calc_rod_acceleration(const Vector2d& w, const Vector2d& w_dot, const V
 QsfOutput calc_qsf(const QsfInput& input, const model::SlungLoadParameters& vehicle,
                    const NamedGains& gains) {
   QsfOutput output;
-  const auto fail = [&output](Fault fault) {
+  const auto fail = [&output](ErrorCode error_code) {
     output.f_Q_W.setZero();
-    output.fault = fault;
+    output.error_code = error_code;
     return output;
   };
 
@@ -77,17 +77,17 @@ QsfOutput calc_qsf(const QsfInput& input, const model::SlungLoadParameters& vehi
   const Vector3d& q_dot = rod.n_dot_W;
   const Vector3d e = input.p_WQ + vehicle.rod_length * q - input.reference.position;
   const Vector3d e_dot = input.v_WQ + vehicle.rod_length * q_dot - input.reference.velocity;
-  if (!e.allFinite() || !e_dot.allFinite()) return fail(Fault::kNotFinite);
+  if (!e.allFinite() || !e_dot.allFinite()) return fail(ErrorCode::kNotFinite);
   output.load_error = e;
   output.integral_rate << (gains.horizontal.integral != 0.0 ? e.x() : 0.0),
       (gains.horizontal.integral != 0.0 ? e.y() : 0.0),
       (gains.vertical.integral != 0.0 ? e.z() : 0.0);
-  if (is_level(input.rod)) return fail(Fault::kRodLevel);
+  if (is_level(input.rod)) return fail(ErrorCode::kRodLevel);
 
   const VerticalMotion z = calc_vertical(input, e, e_dot, gains.vertical);
   const double s = vehicle.gravity - z.n;
-  if (!std::isfinite(s)) return fail(Fault::kNotFinite);
-  if (s < kMinSupportFraction * vehicle.gravity) return fail(Fault::kFreeFall);
+  if (!std::isfinite(s)) return fail(ErrorCode::kNotFinite);
+  if (s < kMinSupportFraction * vehicle.gravity) return fail(ErrorCode::kFreeFall);
 
   // Eq. (5): the rod's slope determines the horizontal acceleration and jerk of the load.
   const Vector2d w = q.head<2>() / q.z();
@@ -104,7 +104,7 @@ QsfOutput calc_qsf(const QsfInput& input, const model::SlungLoadParameters& vehi
   const Vector3d a_WL(acceleration.x(), acceleration.y(), z.n);
   const Vector3d a_WQ = a_WL - vehicle.rod_length * q_ddot;
   output.f_Q_W = vehicle.quad_mass * (a_WQ - Vector3d(0.0, 0.0, vehicle.gravity)) - tension * q;
-  if (!output.f_Q_W.allFinite()) return fail(Fault::kNotFinite);
+  if (!output.f_Q_W.allFinite()) return fail(ErrorCode::kNotFinite);
   return output;
 }
 
@@ -113,7 +113,7 @@ LawOutput QsfLaw::calc(const LawInput& input) const {
   const QsfOutput qsf =
       calc_qsf({input.state.p_WQ, input.state.v_WQ, input.state.rod, input.reference, integral},
                vehicle_, gains_);
-  return {qsf.f_Q_W, calc_next_integral(integral, qsf.integral_rate, period_), qsf.fault};
+  return {qsf.f_Q_W, calc_next_integral(integral, qsf.integral_rate, period_), qsf.error_code};
 }
 
 std::unique_ptr<const ControlLaw> make_qsf_law(const LawSetup& setup) {

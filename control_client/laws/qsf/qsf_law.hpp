@@ -18,15 +18,15 @@ struct QsfInput {
 };
 
 struct QsfOutput {
-  Eigen::Vector3d f_Q_W = Eigen::Vector3d::Zero();       ///< N; zero with a fault
+  Eigen::Vector3d f_Q_W = Eigen::Vector3d::Zero();       ///< N; zero with an error code
   Eigen::Vector3d load_error = Eigen::Vector3d::Zero();  ///< e = y − y_r by the law's own model, m
   Eigen::Vector3d integral_rate = Eigen::Vector3d::Zero();  ///< e where e is integrated, else 0, m
-  Fault fault = Fault::kNone;
+  ErrorCode error_code = ErrorCode::kNone;
 };
 
 /// Force on the quadrotor that makes the load error obey the designed linear equations, for a
 /// vehicle with the parameters `vehicle`. Contains the set-point, tracking and integral variants.
-/// Holds for |α|, |β| < π/2 and s > 0; outside it reports a fault and no force, never NaN.
+/// Holds for |α|, |β| < π/2 and s > 0; outside it reports an error code and no force, never NaN.
 /// Source: README.md, eqs. (1)–(9).
 QsfOutput calc_qsf(const QsfInput& input, const model::SlungLoadParameters& vehicle,
                    const NamedGains& gains);

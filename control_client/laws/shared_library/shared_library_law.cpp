@@ -108,16 +108,16 @@ sls_controller_input make_input(const LawInput& input, double period) {
   return given;
 }
 
-Fault to_fault(int code) {
+ErrorCode to_error_code(int code) {
   switch (code) {
     case SLS_CONTROLLER_OK:
-      return Fault::kNone;
+      return ErrorCode::kNone;
     case SLS_CONTROLLER_FREE_FALL:
-      return Fault::kFreeFall;
+      return ErrorCode::kFreeFall;
     case SLS_CONTROLLER_ROD_LEVEL:
-      return Fault::kRodLevel;
+      return ErrorCode::kRodLevel;
     default:
-      return Fault::kNotFinite;
+      return ErrorCode::kNotFinite;
   }
 }
 
@@ -147,8 +147,8 @@ LawOutput SharedLibraryLaw::calc(const LawInput& input) const {
       fail("wrote memory number " + std::to_string(i) + ", expected at most the " +
            std::to_string(memory_count_) + " that create asked for");
   LawOutput output;
-  output.fault = to_fault(code);
-  if (output.fault != Fault::kNone) return output;
+  output.error_code = to_error_code(code);
+  if (output.error_code != ErrorCode::kNone) return output;
   for (int i = 0; i < 3; ++i)
     if (!std::isfinite(answer.force_n[i])) fail("force_n[" + std::to_string(i) + "] is not finite");
   for (std::size_t i = 0; i < memory_count_; ++i)

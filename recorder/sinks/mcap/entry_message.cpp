@@ -77,8 +77,8 @@ void EntryMessage::fill(const StepRows& rows) {
   if (rows.has_command) {
     shown.client_name = rows.client_name;
     if (!rows.is_unanswered()) shown.answered_step = rows.step;
-    if (!rows.is_unanswered() && answer.fault <= model::Fault::kStageTimeout)
-      shown.answer.fault = answer.fault;
+    if (!rows.is_unanswered() && answer.error_code <= model::ErrorCode::kStageTimeout)
+      shown.answer.error_code = answer.error_code;
   }
   model::Reference& reference = shown.answer.reference;
   if (rows.has_reference) {

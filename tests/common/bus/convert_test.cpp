@@ -113,7 +113,7 @@ TEST(ConvertTest, AnEnumeratorThatTheContractDoesNotDefineKeepsItsNumber) {
   model::Answer answer;
   fill(answer, command);
   EXPECT_EQ(static_cast<std::uint32_t>(answer.mission), 7u);
-  EXPECT_STREQ(to_string(answer.fault), "unknown");
+  EXPECT_STREQ(to_string(answer.error_code), "unknown");
   ControlCommand again;
   fill(again, 0, answer);
   EXPECT_EQ(again, command);

@@ -33,7 +33,7 @@ TEST(PidLawTest, HoldsTheWeightAtRestOnItsReference) {
   LawInput input = make_hover_input({1.0, 2.0, -3.0});
   input.reference.position << 1.0, 2.0, -3.0;
   const LawOutput output = law.calc(input);
-  EXPECT_EQ(output.fault, Fault::kNone);
+  EXPECT_EQ(output.error_code, ErrorCode::kNone);
   EXPECT_LE((output.f_Q_W - Vector3d(0, 0, -vehicle.total_mass() * vehicle.gravity)).norm(), 1e-13);
   EXPECT_EQ(output.memory, Vector3d::Zero());
 }
@@ -103,14 +103,14 @@ TEST(PidLawTest, ReportsFaultsWithoutForceOrNan) {
   const PidLaw law(model::SlungLoadParameters{}, PidGains{}, 0.004);
   LawInput falling = make_hover_input({0, 0, 0});
   falling.reference.position << 0, 0, 100;
-  EXPECT_EQ(law.calc(falling).fault, Fault::kFreeFall);
+  EXPECT_EQ(law.calc(falling).error_code, ErrorCode::kFreeFall);
   LawInput level = make_hover_input({0, 0, 0});
   level.state.rod.beta = 1.5707;
-  EXPECT_EQ(law.calc(level).fault, Fault::kRodLevel);
+  EXPECT_EQ(law.calc(level).error_code, ErrorCode::kRodLevel);
   LawInput broken = make_hover_input({0, 0, 0});
   broken.state.v_WQ.z() = std::numeric_limits<double>::infinity();
   const LawOutput output = law.calc(broken);
-  EXPECT_EQ(output.fault, Fault::kNotFinite);
+  EXPECT_EQ(output.error_code, ErrorCode::kNotFinite);
   EXPECT_EQ(output.f_Q_W, Vector3d::Zero());
 }
 

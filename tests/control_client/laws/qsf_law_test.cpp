@@ -180,7 +180,7 @@ TEST(QsfLawTest, AgreesWithAnIndependentFormulation) {
   for (int i = 0; i < 1000; ++i) {
     const Case one = draw_case(generator, false);
     const QsfOutput output = calc_qsf(one.input(), one.vehicle, one.gains);
-    ASSERT_EQ(output.fault, Fault::kNone);
+    ASSERT_EQ(output.error_code, ErrorCode::kNone);
     const Vector3d expected = solve_for_force(one);
     worst = std::max(worst, (output.f_Q_W - expected).norm() / expected.norm());
   }
@@ -193,7 +193,7 @@ TEST(QsfLawTest, AgreesWithAnIndependentFormulationWithIntegralsAlsoWhereTheyAre
   for (int i = 0; i < 1000; ++i) {
     const Case one = draw_case(generator, true);
     const QsfOutput output = calc_qsf(one.input(), one.vehicle, one.gains);
-    ASSERT_EQ(output.fault, Fault::kNone);
+    ASSERT_EQ(output.error_code, ErrorCode::kNone);
     if (std::abs(one.integral.z()) == kIntegralLimit) {
       ++(is_clamped(one.integral.z(), output.load_error.z()) ? clamped : held_back);
     }
@@ -411,9 +411,9 @@ TEST(QsfLawTest, IntegratesTheErrorOfAxesThatHaveAnIntegralGain) {
 
 // --- faults ------------------------------------------------------------------------------------
 
-void expect_fault(const Case& one, Fault fault) {
+void expect_error_code(const Case& one, ErrorCode error_code) {
   const QsfOutput output = calc_qsf(one.input(), one.vehicle, one.gains);
-  EXPECT_EQ(output.fault, fault);
+  EXPECT_EQ(output.error_code, error_code);
   EXPECT_EQ(output.f_Q_W, Vector3d::Zero());
 }
 
@@ -424,10 +424,10 @@ TEST(QsfLawTest, ReportsFreeFallWhereTheReferenceFallsFreely) {
   const double g = one.vehicle.gravity;
   for (const double fraction : {0.9995, 1.0, 1.0005, 2.0}) {
     one.reference.acceleration << 0.0, 0.0, fraction * g;
-    expect_fault(one, Fault::kFreeFall);
+    expect_error_code(one, ErrorCode::kFreeFall);
   }
   one.reference.acceleration << 0.0, 0.0, (1.0 - 2.0 * kMinSupportFraction) * g;
-  EXPECT_EQ(calc_qsf(one.input(), one.vehicle, one.gains).fault, Fault::kNone);
+  EXPECT_EQ(calc_qsf(one.input(), one.vehicle, one.gains).error_code, ErrorCode::kNone);
 }
 
 TEST(QsfLawTest, ReportsALevelRodAndALoadAboveTheQuadrotor) {
@@ -442,16 +442,16 @@ TEST(QsfLawTest, ReportsALevelRodAndALoadAboveTheQuadrotor) {
       // Load at its reference: a large error could make s small and cause another fault.
       one.reference.position = model::to_direction(input.rod).n_W;
       const QsfOutput output = calc_qsf(input, one.vehicle, one.gains);
-      EXPECT_EQ(output.fault, Fault::kRodLevel) << angle;
+      EXPECT_EQ(output.error_code, ErrorCode::kRodLevel) << angle;
       EXPECT_EQ(output.f_Q_W, Vector3d::Zero());
     }
   }
   // With both cosines negative the load hangs below again, but the angles are out of range.
   input.rod = {2.5, 2.5, 0.0, 0.0};
-  EXPECT_EQ(calc_qsf(input, one.vehicle, one.gains).fault, Fault::kRodLevel);
+  EXPECT_EQ(calc_qsf(input, one.vehicle, one.gains).error_code, ErrorCode::kRodLevel);
   input.rod = {half_pi - 2.0 * kMinRodCosine, 0.0, 0.0, 0.0};
   one.reference.position = model::to_direction(input.rod).n_W;
-  EXPECT_EQ(calc_qsf(input, one.vehicle, one.gains).fault, Fault::kNone);
+  EXPECT_EQ(calc_qsf(input, one.vehicle, one.gains).error_code, ErrorCode::kNone);
 }
 
 TEST(QsfLawTest, AHugeForceIsTheServersToJudge) {
@@ -459,7 +459,7 @@ TEST(QsfLawTest, AHugeForceIsTheServersToJudge) {
   one.gains = make_named_gains(LqrWeights{});
   one.reference.position << 1e6, 0.0, 0.0;
   const QsfOutput output = calc_qsf(one.input(), one.vehicle, one.gains);
-  EXPECT_EQ(output.fault, Fault::kNone);
+  EXPECT_EQ(output.error_code, ErrorCode::kNone);
   EXPECT_GT(output.f_Q_W.norm(), 1e5);
 }
 
@@ -469,13 +469,13 @@ TEST(QsfLawTest, ReportsInputAndForceThatAreNotFinite) {
   for (const double bad : {kNan, kInfinity, -kInfinity}) {
     Case broken = one;
     broken.state.v_WQ.y() = bad;
-    expect_fault(broken, Fault::kNotFinite);
+    expect_error_code(broken, ErrorCode::kNotFinite);
     broken = one;
     broken.reference.snap.x() = bad;
-    expect_fault(broken, Fault::kNotFinite);
+    expect_error_code(broken, ErrorCode::kNotFinite);
   }
   one.reference.position << 1e308, 0.0, 0.0;  // finite, but its force is not
-  expect_fault(one, Fault::kNotFinite);
+  expect_error_code(one, ErrorCode::kNotFinite);
 }
 
 TEST(QsfLawTest, NeverGivesANumberThatIsNotFinite) {
@@ -504,7 +504,7 @@ TEST(QsfLawTest, NeverGivesANumberThatIsNotFinite) {
     if (i % 5 == 0) input.integral = draw3();
     const QsfOutput output = calc_qsf(input, {}, gains);
     ASSERT_TRUE(output.f_Q_W.allFinite());
-    if (output.fault != Fault::kNone) {
+    if (output.error_code != ErrorCode::kNone) {
       ASSERT_EQ(output.f_Q_W, Vector3d::Zero());
     }
   }

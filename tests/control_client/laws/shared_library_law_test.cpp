@@ -40,7 +40,7 @@ std::string fly(const config::Scenario& scenario, bool checks_purity = false) {
     model::Answer answer;
     for (std::uint64_t step = 0; answer.mission == MissionPhase::kRunning; ++step)
       answer = controller.calc_answer(step, hovering, answer.memory);
-    return to_string(answer.fault);
+    return to_string(answer.error_code);
   } catch (const config::ConfigError& error) {
     return std::string("refused: ") + error.what();
   } catch (const std::runtime_error& error) {

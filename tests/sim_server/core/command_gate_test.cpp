@@ -14,12 +14,12 @@ namespace sls::sim {
 
 bool operator==(const OfferedAnswer& a, const OfferedAnswer& b) {
   return a.run_id == b.run_id && a.step == b.step && a.client_name == b.client_name &&
-         a.answer.f_Q_W == b.answer.f_Q_W && a.answer.fault == b.answer.fault;
+         a.answer.f_Q_W == b.answer.f_Q_W && a.answer.error_code == b.answer.error_code;
 }
 
 namespace {
 
-using model::Fault;
+using model::ErrorCode;
 using model::MissionPhase;
 
 constexpr std::uint64_t kRun = 0xfeed;
@@ -50,9 +50,9 @@ OfferedAnswer make_answer(std::uint64_t step, double force_z = -10.0) {
   return command;
 }
 
-OfferedAnswer make_faulted(std::uint64_t step, Fault fault) {
+OfferedAnswer make_faulted(std::uint64_t step, ErrorCode error_code) {
   OfferedAnswer command = make_answer(step);
-  command.answer.fault = fault;
+  command.answer.error_code = error_code;
   command.answer.mission = MissionPhase::kFailed;
   return command;
 }
@@ -113,7 +113,7 @@ TEST_F(CommandGateTest, AnAnswerToAStateThatWasNotPublishedYetIsRefused) {
 
 TEST_F(CommandGateTest, TheRefusedAnswerToTheAwaitedStepIsKept) {
   EXPECT_FALSE(gate_.refused());
-  const OfferedAnswer faulted = make_faulted(0, Fault::kFreeFall);
+  const OfferedAnswer faulted = make_faulted(0, ErrorCode::kFreeFall);
   gate_.offer(faulted, kStrongPeer);
   ASSERT_TRUE(gate_.refused());
   EXPECT_EQ(*gate_.refused(), faulted);
@@ -189,7 +189,7 @@ TEST_F(CommandGateTest, TheLargestNumbersOfAReferenceAreFinite) {
 }
 
 TEST_F(CommandGateTest, AFaultIsNamedRatherThanItsReference) {
-  OfferedAnswer answer = make_faulted(0, Fault::kFreeFall);
+  OfferedAnswer answer = make_faulted(0, ErrorCode::kFreeFall);
   answer.answer.reference.jerk.setConstant(std::numeric_limits<double>::quiet_NaN());
   EXPECT_EQ(offer_bad(answer), Verdict::kFault);
 }
@@ -232,8 +232,9 @@ TEST_F(CommandGateTest, NothingThatAnUnannouncedSenderSendsEndsTheFlight) {
   not_finite.answer.f_Q_W[0] = std::numeric_limits<double>::quiet_NaN();
   OfferedAnswer excessive = make_answer(0);
   excessive.answer.f_Q_W[0] = 1e6;
-  const std::vector<OfferedAnswer> bad = {not_finite, excessive, make_faulted(0, Fault::kFreeFall),
-                                          make_answer(0), make_answer(77)};
+  const std::vector<OfferedAnswer> bad = {not_finite, excessive,
+                                          make_faulted(0, ErrorCode::kFreeFall), make_answer(0),
+                                          make_answer(77)};
   for (const OfferedAnswer& command : bad) {
     gate_.offer(command, kStranger);
     EXPECT_EQ(gate_.refusal(), std::nullopt);
@@ -337,9 +338,9 @@ TEST_F(CommandGateTest, AnExcessiveForceIsNamedWithItsLimit) {
 
 TEST_F(CommandGateTest, AFaultOfTheOnlyClientIsNamed) {
   for (const auto& [fault, name] :
-       {std::pair{Fault::kFreeFall, "free_fall"}, std::pair{Fault::kRodLevel, "rod_level"},
-        std::pair{Fault::kNotFinite, "not_finite"},
-        std::pair{Fault::kStageTimeout, "stage_timeout"}}) {
+       {std::pair{ErrorCode::kFreeFall, "free_fall"}, std::pair{ErrorCode::kRodLevel, "rod_level"},
+        std::pair{ErrorCode::kNotFinite, "not_finite"},
+        std::pair{ErrorCode::kStageTimeout, "stage_timeout"}}) {
     CommandGate gate(kRun, kVehicle, {kForceLimit});
     gate.set_clients({kStrong});
     gate.expect(2);
@@ -352,7 +353,7 @@ TEST_F(CommandGateTest, AFaultOfTheOnlyClientIsNamed) {
 }
 
 TEST_F(CommandGateTest, AFailedMissionWithoutAFaultIsRefusedToo) {
-  EXPECT_EQ(offer_bad(make_faulted(0, Fault::kNone)), Verdict::kFault);
+  EXPECT_EQ(offer_bad(make_faulted(0, ErrorCode::kNone)), Verdict::kFault);
   ASSERT_TRUE(gate_.refusal());
   EXPECT_EQ(gate_.refusal()->find("none"), std::string::npos) << *gate_.refusal();
 }
@@ -361,14 +362,14 @@ TEST_F(CommandGateTest, AFailedMissionWithoutAFaultIsRefusedToo) {
 class MissionGateTest : public testing::Test {
  protected:
   Verdict offer(std::uint64_t step, std::uint32_t stage, MissionPhase mission,
-                Fault fault = Fault::kNone) {
+                ErrorCode error_code = ErrorCode::kNone) {
     gate_.emplace(kRun, kVehicle, AnswerLimits{kForceLimit, 2, 500});
     gate_->set_clients({kStrong});
     gate_->expect(step);
     OfferedAnswer answer = make_answer(step);
     answer.answer.memory.stage = stage;
     answer.answer.mission = mission;
-    answer.answer.fault = fault;
+    answer.answer.error_code = error_code;
     return gate_->offer(answer, kStrongPeer);
   }
   std::string refusal() const {
@@ -406,20 +407,20 @@ TEST_F(MissionGateTest, AnEndBeforeTheEarliestStepIsRefused) {
 TEST_F(MissionGateTest, ValuesThatTheContractDoesNotDefineAreRefused) {
   EXPECT_EQ(offer(600, 1, static_cast<MissionPhase>(7)), Verdict::kUndefined);
   EXPECT_EQ(refusal(), "controller 'strong' answered step 600 with an undefined value: mission 7");
-  EXPECT_EQ(offer(600, 1, MissionPhase::kFailed, static_cast<Fault>(5)), Verdict::kUndefined);
+  EXPECT_EQ(offer(600, 1, MissionPhase::kFailed, static_cast<ErrorCode>(5)), Verdict::kUndefined);
   EXPECT_EQ(refusal(), "controller 'strong' answered step 600 with an undefined value: fault 5");
   EXPECT_EQ(offer(600, 1, static_cast<MissionPhase>(0xffffffffU)), Verdict::kUndefined);
 }
 
 TEST_F(CommandGateTest, AFaultInAnswerToAnotherStepEndsNothing) {
-  EXPECT_EQ(gate_.offer(make_faulted(1, Fault::kFreeFall), kStrongPeer), Verdict::kFault);
+  EXPECT_EQ(gate_.offer(make_faulted(1, ErrorCode::kFreeFall), kStrongPeer), Verdict::kFault);
   EXPECT_EQ(gate_.refusal(), std::nullopt);
   EXPECT_EQ(gate_.offer(make_answer(0), kStrongPeer), Verdict::kAccepted);
 }
 
 TEST_F(CommandGateTest, ARefusalDoesNotOutliveItsStep) {
   gate_.set_clients({kStrong, kWeak});
-  gate_.offer(make_faulted(0, Fault::kRodLevel), kStrongPeer);
+  gate_.offer(make_faulted(0, ErrorCode::kRodLevel), kStrongPeer);
   EXPECT_EQ(gate_.offer(make_answer(0), kWeakPeer), Verdict::kAccepted);
   gate_.expect(1);
   EXPECT_EQ(gate_.offer(make_answer(1), kStrongPeer), Verdict::kAccepted);
@@ -427,11 +428,11 @@ TEST_F(CommandGateTest, ARefusalDoesNotOutliveItsStep) {
 
 TEST_F(CommandGateTest, NoRefusalWhileAnotherReadyClientCanAnswer) {
   set_clients({kStrong, kWeak});
-  gate_.offer(make_faulted(0, Fault::kRodLevel), kStrongPeer);
+  gate_.offer(make_faulted(0, ErrorCode::kRodLevel), kStrongPeer);
   EXPECT_EQ(gate_.refusal(), std::nullopt);
   ASSERT_TRUE(gate_.awaited_client());
   EXPECT_EQ(gate_.awaited_client()->name, "weak");
-  gate_.offer(make_faulted(0, Fault::kFreeFall), kWeakPeer);
+  gate_.offer(make_faulted(0, ErrorCode::kFreeFall), kWeakPeer);
   ASSERT_TRUE(gate_.refusal());
   EXPECT_NE(gate_.refusal()->find("answered step 0"), std::string::npos);
 }
@@ -454,7 +455,7 @@ TEST_F(CommandGateTest, ARefusalIsKnownWhileASilentStandbyIsAwaited) {
 
 TEST_F(CommandGateTest, ALateAnswerThatIsRefusedIsKnownUntilItsClientGivesAValidOne) {
   gate_.expect(1);
-  gate_.offer(make_faulted(0, Fault::kRodLevel), kStrongPeer);
+  gate_.offer(make_faulted(0, ErrorCode::kRodLevel), kStrongPeer);
   EXPECT_NE(gate_.describe_refusals().find("rod_level"), std::string::npos);
   EXPECT_EQ(gate_.refusal(), std::nullopt) << "the awaited step may still get its answer";
   gate_.expect(2);
@@ -464,7 +465,7 @@ TEST_F(CommandGateTest, ALateAnswerThatIsRefusedIsKnownUntilItsClientGivesAValid
 
 TEST_F(CommandGateTest, TheRefusedClientsStandbyLeavingEndsTheWait) {
   set_clients({kStrong, kWeak});
-  gate_.offer(make_faulted(0, Fault::kRodLevel), kStrongPeer);
+  gate_.offer(make_faulted(0, ErrorCode::kRodLevel), kStrongPeer);
   EXPECT_EQ(gate_.refusal(), std::nullopt);
   set_clients({kStrong});
   ASSERT_TRUE(gate_.refusal());
@@ -475,7 +476,7 @@ TEST_F(CommandGateTest, TheAnswerAStandbyHasGivenIsTakenWhenTheStrongerOneIsRefu
   set_clients({kStrong, kWeak});
   EXPECT_EQ(gate_.offer(make_answer(0), kWeakPeer), Verdict::kHeld);
   EXPECT_FALSE(gate_.accepted());
-  EXPECT_EQ(gate_.offer(make_faulted(0, Fault::kFreeFall), kStrongPeer), Verdict::kFault);
+  EXPECT_EQ(gate_.offer(make_faulted(0, ErrorCode::kFreeFall), kStrongPeer), Verdict::kFault);
   ASSERT_TRUE(gate_.accepted());
   EXPECT_EQ(*gate_.accepted(), make_answer(0));
   EXPECT_EQ(gate_.refusal(), std::nullopt);
@@ -484,8 +485,8 @@ TEST_F(CommandGateTest, TheAnswerAStandbyHasGivenIsTakenWhenTheStrongerOneIsRefu
 TEST_F(CommandGateTest, ABadCommandAfterAClientsValidAnswerIsOnlyCounted) {
   set_clients({kStrong, kWeak});
   gate_.offer(make_answer(0), kWeakPeer);
-  EXPECT_EQ(gate_.offer(make_faulted(0, Fault::kFreeFall), kWeakPeer), Verdict::kFault);
-  gate_.offer(make_faulted(0, Fault::kFreeFall), kStrongPeer);
+  EXPECT_EQ(gate_.offer(make_faulted(0, ErrorCode::kFreeFall), kWeakPeer), Verdict::kFault);
+  gate_.offer(make_faulted(0, ErrorCode::kFreeFall), kStrongPeer);
   ASSERT_TRUE(gate_.accepted()) << "the standby's valid answer was there first";
   EXPECT_EQ(gate_.refusal(), std::nullopt);
 }
@@ -586,7 +587,7 @@ TEST_F(CommandGateTest, WithoutAnotherClientThereIsNoTakeOver) {
 
 TEST_F(CommandGateTest, ARefusedClientDoesNotTakeOver) {
   set_clients({kStrong, kWeak});
-  gate_.offer(make_faulted(0, Fault::kFreeFall), kWeakPeer);
+  gate_.offer(make_faulted(0, ErrorCode::kFreeFall), kWeakPeer);
   EXPECT_FALSE(gate_.pass_over_silent_client());
   EXPECT_EQ(gate_.awaited_client()->name, "strong");
 }
@@ -749,7 +750,7 @@ class Junk {
         command.vehicle_id = kVehicle + 1 + static_cast<std::uint32_t>(pick(100));
         break;
       case 5:
-        command.answer.fault = static_cast<Fault>(1 + pick(7));
+        command.answer.error_code = static_cast<ErrorCode>(1 + pick(7));
         break;
       default:
         // Another step: far ahead, far behind, or just missed.
@@ -894,7 +895,7 @@ TEST_F(CommandGateTest, AnAnswerBringsAClientBackThatWasGone) {
 
 TEST_F(CommandGateTest, ARefusalEndsTheRunAtOnceIfAllOthersAreGone) {
   set_clients({make_gone(kStrong), kWeak});
-  gate_.offer(make_faulted(0, Fault::kFreeFall), kWeakPeer);
+  gate_.offer(make_faulted(0, ErrorCode::kFreeFall), kWeakPeer);
   ASSERT_TRUE(gate_.refusal());
   EXPECT_NE(gate_.refusal()->find("'weak'"), std::string::npos) << *gate_.refusal();
   set_clients({make_gone(kStrong)});

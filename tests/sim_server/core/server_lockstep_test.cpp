@@ -98,7 +98,7 @@ TEST(ServerLockstepTest, ARefusedAnswerOfTheOnlyClientFailsTheRun) {
   ServerRig rig;
   rig.join("pilot");
   ServerRig::Answer broken{0};
-  broken.fault = model::Fault::kFreeFall;
+  broken.error_code = model::ErrorCode::kFreeFall;
   rig.answer("pilot", broken);
   EXPECT_EQ(rig.core().error(), "controller 'pilot' answered step 0 with a fault: free_fall");
   EXPECT_EQ(rig.take_records(), (Lines{"0 refused", "end"}));
@@ -110,7 +110,7 @@ TEST(ServerLockstepTest, ARefusedAnswerBesideASilentClientFailsItAfterTwoSeconds
   rig.join("pilot");
   rig.join("standby", -1);
   ServerRig::Answer broken{0};
-  broken.fault = model::Fault::kFreeFall;
+  broken.error_code = model::ErrorCode::kFreeFall;
   rig.answer("pilot", broken);
   rig.fall_silent("standby");
   rig.wait_until(1999);

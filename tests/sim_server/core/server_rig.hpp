@@ -112,7 +112,7 @@ class ServerRig : public Outputs, public Surroundings {
     std::uint64_t run_id = kRunId;
     std::vector<std::uint32_t> vehicle_ids{0};
     std::uint64_t compute_ms = 0;
-    model::Fault fault = model::Fault::kNone;
+    model::ErrorCode error_code = model::ErrorCode::kNone;
     std::int64_t clock_ahead_ms = 0;
   };
   void answer(const std::string& name, const Answer& answer) {
@@ -132,7 +132,7 @@ class ServerRig : public Outputs, public Surroundings {
       offered.answer.f_Q_W.z() = force_z_ - answer.more_force;
       offered.answer.mission =
           answer.is_last ? model::MissionPhase::kFinished : model::MissionPhase::kRunning;
-      offered.answer.fault = answer.fault;
+      offered.answer.error_code = answer.error_code;
       offered.answer.memory.stage = answer.is_last ? 1 : 0;
       offered.answer.compute_time =
           std::chrono::duration<std::uint64_t, std::milli>(answer.compute_ms);

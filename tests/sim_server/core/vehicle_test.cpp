@@ -101,12 +101,12 @@ TEST_F(VehicleTest, TheRecordSaysWhichAnswerIsInForce) {
   EXPECT_EQ(record().kind, AnswerKind::kNone);
   EXPECT_EQ(record().client_name, "");
   OfferedAnswer refused = make_answer(2);
-  refused.answer.fault = model::Fault::kFreeFall;
+  refused.answer.error_code = model::ErrorCode::kFreeFall;
   vehicle_.gate.offer(refused, peer);
   vehicle_.complete_record();
   EXPECT_EQ(record().kind, AnswerKind::kRefused);
   EXPECT_EQ(record().answered_step, 2u);
-  EXPECT_EQ(record().answer.fault, model::Fault::kFreeFall);
+  EXPECT_EQ(record().answer.error_code, model::ErrorCode::kFreeFall);
 }
 
 TEST_F(VehicleTest, ALateAnswerEndsTheAbsence) {

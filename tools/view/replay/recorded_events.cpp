@@ -120,7 +120,7 @@ void RowEvents::add(const record::StepRows& rows) {
 
 void RowEvents::end_fault(std::uint32_t vehicle_id, Vehicle& vehicle, std::uint64_t step) {
   const std::string kind = std::exchange(vehicle.fault, "");
-  if (kind.empty() || kind == to_string(model::Fault::kNone) || faults_.size() == kMostMarks)
+  if (kind.empty() || kind == to_string(model::ErrorCode::kNone) || faults_.size() == kMostMarks)
     return;
   faults_.push_back(
       {to_time(vehicle.fault_from, period_s_), to_time(step, period_s_), kind, "", vehicle_id});
