@@ -64,7 +64,7 @@ TEST(DelayMarginProgramTest, MistakesGiveOneLineAndExitCodeTwo) {
   expect_refused(
       program_with({"--scenario", std::string(SLS_SOURCE_DIR) +
                                       "/tests/common/config/invalid/delay_negative.yaml"}),
-      2, "delay_negative.yaml:18: faults[0].delay.by_s: expected >= 0, got -0.02");
+      2, "delay_negative.yaml:7: faults[0].delay.by_s: expected >= 0, got -0.02");
 }
 
 TEST(DelayMarginProgramTest, AScenarioThatLosesTheLoadAnywayEndsWithOne) {
