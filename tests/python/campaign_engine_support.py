@@ -1,11 +1,14 @@
-"""Shared by the tests of a campaign's folder and engine: a small campaign, and the command line in a
-separate process. `FAKE` is the folder of a replacement for the extension module."""
+"""Shared by the tests of a campaign's folder and engine: a small campaign, and the command line, in this process or in
+one of its own. `FAKE` is the folder of a replacement for the extension module."""
 
+import contextlib
+import io
 import os
 import pathlib
 import subprocess
 import sys
 import time
+from unittest import mock
 
 import support
 
@@ -46,7 +49,20 @@ class CampaignTest(support.FolderTest):
                                 stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
 
     def fly(self, *arguments, fake="", code=0):
-        """Runs the command line. Returns stdout and stderr; the exit code must be `code`."""
+        """Runs the command line with one worker in this process, which imports its packages once. Returns stdout and
+        stderr; the exit code must be `code`."""
+        from sls.campaign.cli import main
+        words = [str(argument) for argument in arguments]
+        if "--out" in words and "--workers" not in words:
+            words += ["--workers", "1"]
+        with (contextlib.chdir(self.folder), io.StringIO() as said, contextlib.redirect_stdout(said),
+              contextlib.redirect_stderr(said), mock.patch.dict(os.environ, self.environment(SLS_FAKE=fake))):
+            ended = main(words)
+            self.assertEqual(ended, code, said.getvalue())
+            return said.getvalue()
+
+    def fly_apart(self, *arguments, fake="", code=0):
+        """The same in a process of its own."""
         process = self.start(*arguments, fake=fake)
         out, said = process.communicate(timeout=240)
         self.assertEqual(process.returncode, code, said)

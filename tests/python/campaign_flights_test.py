@@ -1,5 +1,5 @@
 """Campaigns of real flights: measures of the user, kept recordings, and runs flown again by the three
-programs over DDS."""
+programs over DDS. Each campaign with own measures has its own process, which imports their files once."""
 
 import csv
 import json
@@ -98,7 +98,7 @@ class FlightsTest(CampaignTest):
   { python: own.py, function: work_j, columns: [work_j, steps_flown] },
   { python: own.py, function: end_x, columns: [end_x_m] }]""")
         self.write("campaign.yaml", text)
-        self.fly("campaign.yaml", "--out", "out")
+        self.fly_apart("campaign.yaml", "--out", "out")
         for row in self.read_rows("out"):
             flight = self.fly_row(row)
             self.assertEqual(float(row["end_x_m"]), flight.load_position[-1, 0])
@@ -111,7 +111,7 @@ class FlightsTest(CampaignTest):
                 self.assertEqual(float(row["steps_flown"]), len(flight))
         before = self.read_table("out")
         self.write("own.py", OWN + "\n# changed\n")
-        said = self.fly("campaign.yaml", "--out", "out", "--resume", code=2)
+        said = self.fly_apart("campaign.yaml", "--out", "out", "--resume", code=2)
         self.expect_line(said, "out: expected a folder of campaign", "sha256")
         self.assertEqual(self.read_table("out"), before)
 
@@ -125,31 +125,31 @@ class FlightsTest(CampaignTest):
     def test_an_own_measure_that_raises_in_every_run_is_an_error_that_names_its_line(self):
         self.write_measure("import math\nimport statistics\n\ndef f(flight):\n"
                            "    return statistics.mean([])\n")
-        said = self.fly("campaign.yaml", "--out", "out", code=1)
+        said = self.fly_apart("campaign.yaml", "--out", "out", code=1)
         self.assertIn("out: measure f: expected a value of at least one run, got an error in each of 6, "
                       "first: StatisticsError: mean requires at least one data point (line 5)",
                       said.splitlines()[-1])
         self.assertEqual(len(self.read_rows("out")), 6)
-        self.fly("campaign.yaml", "--out", "out", "--resume", "--allow-broken-measures")
+        self.fly_apart("campaign.yaml", "--out", "out", "--resume", "--allow-broken-measures")
         self.write_measure("def f(flight):\n    return 1 / (len(flight) > 10)\n")  # some runs fail at once
-        self.fly("campaign.yaml", "--out", "some")
+        self.fly_apart("campaign.yaml", "--out", "some")
 
     def test_a_changed_module_of_an_own_measure_is_refused(self):
         self.write_measure("import pathlib, sys\nsys.path.append(str(pathlib.Path(__file__).parent))\n"
                            "def f(flight):\n    import helper\n    return helper.VALUE\n")
         helper = self.write("helper.py", "VALUE = 1\n")
-        self.fly("campaign.yaml", "--out", "out")
+        self.fly_apart("campaign.yaml", "--out", "out")
         plan = json.loads((self.folder / "out/plan.json").read_text())
         self.assertEqual(sorted(plan["used_files"]), ["helper.py", "own.py"])
         helper.write_text("VALUE = 2\n")
-        said = self.fly("campaign.yaml", "--out", "out", "--resume", code=2)
+        said = self.fly_apart("campaign.yaml", "--out", "out", "--resume", code=2)
         self.expect_line(said, "helper.py: expected the file with which the campaign was begun")
 
     def test_own_measures_may_have_dataclasses_with_annotations_as_texts(self):
         self.write_measure("from __future__ import annotations\nfrom dataclasses import dataclass\n"
                            "@dataclass\nclass Sum:\n    value: float = 3.0\n\n"
                            "def f(flight):\n    return Sum().value\n")
-        self.fly("campaign.yaml", "--out", "out")
+        self.fly_apart("campaign.yaml", "--out", "out")
         self.assertEqual({row["f"] for row in self.read_rows("out")}, {"3.0"})
 
     def test_an_own_measure_that_cannot_be_loaded_is_refused_before_anything_flies(self):
@@ -158,7 +158,7 @@ class FlightsTest(CampaignTest):
         text = (self.folder / "campaign.yaml").read_text().replace(
             "time_of_loss]", "{ python: own.py, function: f, columns: [f] }]")
         self.write("campaign.yaml", text)
-        said = self.fly("campaign.yaml", "--out", "out", code=2)
+        said = self.fly_apart("campaign.yaml", "--out", "out", code=2)
         self.expect_line(said, "own.py: f: expected a Python file that can be run",
                          "nothing_of_this_name")
         self.assertFalse((self.folder / "out").exists())
