@@ -13,11 +13,12 @@ namespace sls::sim {
 
 void Outbox::begin_run(const config::Sync& sync, std::uint64_t run_id) {
   is_realtime_ = sync.mode == config::SyncMode::kRealtime;
-  records_.reset();  // ends before its successor begins
-  records_ = std::make_unique<RecordStream>(endpoints_.records, endpoints_.domain.max_batch_bytes(),
-                                            run_id);
+  // Threads may be refused: then the earlier run still has what it needs to report that.
+  auto records = std::make_unique<RecordStream>(endpoints_.records,
+                                                endpoints_.domain.max_batch_bytes(), run_id);
   // In real time the loop must wait for no reader.
   endpoints_.states.begin_run(run_id, sync.period_ns, is_realtime_);
+  records_ = std::move(records);
 }
 
 void Outbox::put(Item item) {

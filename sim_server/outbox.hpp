@@ -22,7 +22,8 @@ class Outbox : public Outputs, public Backlog {
  public:
   explicit Outbox(Endpoints& endpoints) : endpoints_(endpoints) {}
 
-  /// Begins run `run_id`. The core of an earlier run must not be called any more.
+  /// Begins run `run_id`. The core of an earlier run must have ended.
+  /// @throws std::system_error if there is no thread for it; nothing has changed then.
   void begin_run(const config::Sync& sync, std::uint64_t run_id);
 
   /// True if something waits for the main thread.

@@ -18,8 +18,8 @@ void fill(VehicleState& message, const Vehicle& vehicle) {
 }  // namespace
 
 void StateStream::begin_run(std::uint64_t run_id, std::int64_t period_ns, bool is_queued) {
-  queue_.reset();
-  if (is_queued) queue_ = std::make_unique<bus::QueuedWriter<States>>(writer_, kQueuedSamples);
+  queue_ =
+      is_queued ? std::make_unique<bus::QueuedWriter<States>>(writer_, kQueuedSamples) : nullptr;
   sample_.run_id(run_id);
   period_ns_ = period_ns;
 }
