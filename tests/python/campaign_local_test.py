@@ -70,7 +70,7 @@ class LocalEngineTest(CampaignTest):
         process = self.start("campaign.yaml", "--out", "killed", "--workers", 3, "--chunk-runs", 5,
                              fake="sleep=0.01")
         dice, killed = random.Random(7), 0
-        for chunks in range(2, 17, 3):  # kills a worker at 5 of 40 chunks
+        for chunks in range(2, 38, 8):  # kills a worker at 5 of 40 chunks
             self.wait_until(lambda: self.count_chunks("killed") >= chunks, process)
             for worker in dice.sample(self.list_workers(process), 1):
                 os.kill(worker, signal.SIGKILL)
