@@ -95,8 +95,9 @@ TEST(ConvertTest, TheClientReadsTheStateTheServerWrote) {
 TEST(ConvertTest, ARecordEntryIsTheSameAfterTheWayThroughAStepRecord) {
   model::StepRecord record;  // each one over the one before
   RecordEntry again;
-  for (const std::uint64_t seed : {1, 2, 3})
-    for (RecordEntry entry : test::make_message<RecordBatch>(seed).entries()) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    const auto batch = test::make_message<RecordBatch>(seed);
+    for (RecordEntry entry : batch.entries()) {
       entry.answer().vehicle_id(entry.vehicle_id());
       if (entry.vehicle_id() % 3 == 0) entry.measured().clear();
       fill(record, entry);
@@ -104,6 +105,7 @@ TEST(ConvertTest, ARecordEntryIsTheSameAfterTheWayThroughAStepRecord) {
       fill(again, record);
       EXPECT_EQ(again, entry);
     }
+  }
 }
 
 TEST(ConvertTest, AnEnumeratorThatTheContractDoesNotDefineKeepsItsNumber) {

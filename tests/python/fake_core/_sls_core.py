@@ -2,7 +2,8 @@
 simple functions of its values.
 
 SLS_FAKE holds words: `kill=17` ends the process in run 17 each time, `kill-once=17:FILE` only if FILE does
-not exist yet, `sleep=0.01` makes a run last 0.01 s, `refuse=17` refuses run 17 when it is flown, `other=1`
+not exist yet, `sleep=0.01` makes a run last 0.01 s, `hold=190:FILE` lets no run from 190 on end before FILE
+exists, `note=FOLDER` leaves the process's id there, `refuse=17` refuses run 17 when it is flown, `other=1`
 gives other measures, `print=1` prints in each run as a law or a measure may. The number of a run is the value of its last key, `index`."""
 
 import hashlib
@@ -38,7 +39,12 @@ class Runs:
             os.write(1, b"printed by a library\n")
         if "sleep" in WORDS:
             time.sleep(float(WORDS["sleep"]))
+        if "note" in WORDS:
+            pathlib.Path(WORDS["note"], str(os.getpid())).touch()
         index = int(values[-1])
+        first_held, _, gate = WORDS.get("hold", "inf").partition(":")
+        while index >= float(first_held) and not os.path.exists(gate):
+            time.sleep(0.01)
         once, _, marker = WORDS.get("kill-once", "").partition(":")
         if WORDS.get("kill") == str(index) or once == str(index) and not os.path.exists(marker):
             if marker:
