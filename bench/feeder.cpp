@@ -87,8 +87,6 @@ nlohmann::json feed_recorder(const config::Scenario& scenario, const FeederOptio
                     [](const Participant& recorder) { return recorder.ready(); });
   surroundings.announce(RunPhase::PHASE_RUNNING, 0);
   std::vector<model::StepRecord> fleet(options.vehicles);
-  std::vector<const model::StepRecord*> of_step;
-  for (const model::StepRecord& record : fleet) of_step.push_back(&record);
   const auto began = Clock::now();
   for (const model::StepRecord& flown : records) {
     const auto step = static_cast<std::int64_t>(flown.step);
@@ -101,7 +99,7 @@ nlohmann::json feed_recorder(const config::Scenario& scenario, const FeederOptio
       fleet[i] = flown;
       fleet[i].vehicle_id = static_cast<std::uint32_t>(i);
     }
-    stream.add_step(of_step);
+    stream.add_step(fleet);
     surroundings.announce_if_due(RunPhase::PHASE_RUNNING, flown.step);
   }
   stream.end();

@@ -99,7 +99,7 @@ void serialize(benchmark::State& run, const Make& make) {
 void serialize_state(benchmark::State& run) {
   serialize<bus::GuardedType<StatesPubSubType>>(run, [](const model::StepRecord& record) {
     States sample;
-    bus::fill(sample.vehicles().emplace_back(), record.vehicle_id, record.seen(), {});
+    bus::fill(sample.vehicles().emplace_back(), record);
     return sample;
   });
 }

@@ -1,5 +1,5 @@
 /// The closed loop in one process and one thread: plants, faults, missions, controllers and the
-/// judgement of their answers, without DDS and without a clock. A flight has the same bits as a
+/// judgement of their answers, without DDS. A flight has the same bits as a
 /// recording of the programs in lockstep.
 #pragma once
 
@@ -12,9 +12,8 @@
 #include "common/model/step_record.hpp"
 #include "control_client/flight_controller.hpp"
 #include "control_client/laws/control_law.hpp"
-#include "sim_server/core/fault_line.hpp"
 #include "sim_server/core/judgement.hpp"
-#include "sim_server/plants/plant.hpp"
+#include "sim_server/core/plant_side.hpp"
 
 namespace sls::closed_loop {
 
@@ -42,40 +41,31 @@ class Flight {
 
   /// The last step of every vehicle, in the order of the ids. The one whose answer failed the
   /// flight is of the kind kRefused.
-  const std::vector<model::StepRecord>& steps() const { return steps_; }
+  const std::vector<model::StepRecord>& steps() const { return plants_.records(); }
 
   /// True if a broken law ended the flight: it threw, or gave different answers to equal inputs.
   bool is_law_broken() const { return is_law_broken_; }
 
   /// The plant of the first vehicle.
-  const sim::Plant& plant() const { return *plants_.front().plant; }
+  const sim::Plant& plant() const { return plants_.plant(); }
 
   /// Remarks of the plants on their vehicles since the last call.
-  std::vector<std::string> take_remarks();
+  std::vector<std::string> take_remarks() { return plants_.take_remarks(); }
 
   /// After the end: why the flight failed; empty if every mission was finished.
   const std::string& failure() const { return failure_; }
 
  private:
-  struct Vehicle {
-    sim::FaultLine faults;
-    control::FlightController controller;
-  };
-
-  /// Moves the plants by one period. If a plant throws, returns false and sets the failure.
-  bool advance();
+  void answer();
   /// True if the answers end the flight, judged as the server does.
   bool is_last();
-  std::string name_vehicle(std::size_t index) const;
 
   const std::string controller_name_;
   const bool measures_compute_time_;
-  const std::int64_t steps_per_period_;
   const sim::AnswerLimits limits_;
   const bool is_fleet_;
-  std::vector<sim::PlantOfVehicles> plants_;
-  std::vector<Vehicle> vehicles_;
-  std::vector<model::StepRecord> steps_;
+  sim::PlantSide plants_;
+  std::vector<control::FlightController> controllers_;
   bool has_begun_ = false;
   bool has_ended_ = false;
   bool is_law_broken_ = false;

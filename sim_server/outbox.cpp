@@ -49,11 +49,7 @@ void Outbox::resend_states(const Fleet& fleet, const std::function<bool(std::siz
   endpoints_.states.write(fleet, is_wanted);
 }
 
-void Outbox::record_step(const Fleet& fleet) {
-  step_.clear();
-  for (const auto& vehicle : fleet.vehicles()) step_.push_back(&vehicle->record());
-  records_->add_step(step_);
-}
+void Outbox::record_step(const Fleet& fleet) { records_->add_step(fleet.records()); }
 
 void Outbox::record_late(const Vehicle& vehicle, const OfferedAnswer& offered) {
   model::StepRecord record;
@@ -62,7 +58,7 @@ void Outbox::record_late(const Vehicle& vehicle, const OfferedAnswer& offered) {
   record.kind = model::AnswerKind::kLate;
   record.client_name = offered.client_name;
   record.answer = offered.answer;
-  records_->add_step({&record});
+  records_->add_step({record});
 }
 
 void Outbox::show_progress(std::string text) {

@@ -67,7 +67,6 @@ class Outbox : public Outputs, public Backlog {
   Endpoints& endpoints_;
   bool is_realtime_ = false;
   std::unique_ptr<RecordStream> records_;
-  std::vector<const model::StepRecord*> step_;  // being recorded; a member to avoid allocation
   std::mutex mutex_;
   std::deque<Item> waiting_;  // under the mutex
   std::atomic<bool> is_waiting_{false};

@@ -14,7 +14,7 @@ RecordStream::RecordStream(bus::Writer<RecordBatch>& writer, std::size_t max_byt
                            std::uint64_t run_id)
     : writer_(writer), max_bytes_(max_bytes), run_id_(run_id), thread_([this] { work(); }) {}
 
-void RecordStream::add_step(const std::vector<const model::StepRecord*>& records) {
+void RecordStream::add_step(const std::vector<model::StepRecord>& records) {
   bool is_due = false;
   {
     const std::lock_guard lock(mutex_);
@@ -24,8 +24,8 @@ void RecordStream::add_step(const std::vector<const model::StepRecord*>& records
     }
     if (collected_.entries.size() < collected_.count + records.size())
       collected_.entries.resize(collected_.count + records.size());
-    for (const model::StepRecord* record : records)
-      bus::fill(collected_.entries[collected_.count++], *record);
+    for (const model::StepRecord& record : records)
+      bus::fill(collected_.entries[collected_.count++], record);
     is_due = ++collected_.steps == kMostSteps || collected_.count >= kManyEntries;
     is_due_ = is_due_ || is_due;
     if (collected_.count > kMostCollected / 2) is_full_ = true;

@@ -29,7 +29,7 @@ class RecordStream {
   RecordStream& operator=(const RecordStream&) = delete;
 
   /// Collects the records of one step. Blocks only while the thread swaps two pointers.
-  void add_step(const std::vector<const model::StepRecord*>& records);
+  void add_step(const std::vector<model::StepRecord>& records);
 
   /// Makes the thread write all collected entries now: for a run at rest.
   void flush();

@@ -14,7 +14,7 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 CORES = ("common/sync", "control_client/core", "recorder/core", "sim_server/core")
-TESTS = ("sync_test", "client_core_test", "recorder_core_test", "server_core_test")
+TESTS = ("sync_test", "client_core_test", "recorder_core_test", "server_core_test", "fault_line_test")
 
 
 def build(folder: pathlib.Path) -> None:

@@ -96,14 +96,13 @@ model::Measurement to_measurement(const PlantState& message) {
   return state;
 }
 
-void fill(VehicleState& message, std::uint32_t vehicle_id, const model::Measurement& measured,
-          const model::AppliedForce& applied) {
-  message.vehicle_id(vehicle_id);
-  fill(message.measured(), measured);
-  message.f_Q_W_n(to_array(applied.f_Q_W));
-  message.force_origin(to_enumerator<ForceOrigin>(applied.kind));
-  message.controller_name(applied.client_name);
-  fill(message.controller(), applied.memory);
+void fill(VehicleState& message, const model::StepRecord& record) {
+  message.vehicle_id(record.vehicle_id);
+  fill(message.measured(), record.seen());
+  message.f_Q_W_n(to_array(record.f_Q_W));
+  message.force_origin(to_enumerator<ForceOrigin>(record.kind));
+  message.controller_name(record.client_name);
+  fill(message.controller(), record.answer.memory);
 }
 
 model::ControllerMemory to_memory(const ControllerState& message) {

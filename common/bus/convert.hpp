@@ -26,9 +26,9 @@ void fill(VehicleParameters& message, const model::SlungLoadParameters& vehicle)
 void fill(PlantState& message, const model::Measurement& state);
 model::Measurement to_measurement(const PlantState& message);
 
-/// The state sample for the controllers: the measured state, and the force of the period before it.
-void fill(VehicleState& message, std::uint32_t vehicle_id, const model::Measurement& measured,
-          const model::AppliedForce& applied);
+/// The state sample for the controllers. Kind, client and answer of `record`, whose step waits for
+/// its answer, are those of the period before it.
+void fill(VehicleState& message, const model::StepRecord& record);
 model::ControllerMemory to_memory(const ControllerState& message);
 
 void fill(ControlCommand& message, std::uint32_t vehicle_id, const model::Answer& answer);

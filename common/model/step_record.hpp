@@ -37,12 +37,4 @@ struct StepRecord {
   Answer answer;                                    ///< as the client sent it, before faults
 };
 
-/// The force over a period, as the next state sample tells it to controllers.
-struct AppliedForce {
-  Eigen::Vector3d f_Q_W = Eigen::Vector3d::Zero();  ///< as it acted, after faults, N
-  AnswerKind kind = AnswerKind::kNone;              ///< its origin; kNone before the first period
-  std::string client_name;                          ///< client that sent it
-  ControllerMemory memory;                          ///< after it
-};
-
 }  // namespace sls::model

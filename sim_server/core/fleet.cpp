@@ -3,7 +3,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
-#include <stdexcept>
 #include <utility>
 
 #include "common/config/vehicle_ids.hpp"
@@ -11,14 +10,10 @@
 namespace sls::sim {
 
 Fleet::Fleet(const config::Scenario& scenario, const std::vector<std::uint32_t>& ids,
-             std::uint64_t run_id, ForEach for_each)
-    : ids_(ids),
-      for_each_(std::move(for_each)),
-      is_alone_(scenario.vehicles.size() == 1),
-      plant_steps_(scenario.sync.period_ns / scenario.plant.step_ns),
-      plants_(make_plants(find_plant_type(scenario.plant.model), scenario, ids)) {
-  for (const std::uint32_t id : ids)
-    vehicles_.push_back(std::make_unique<Vehicle>(scenario, id, run_id));
+             std::uint64_t run_id, PlantSide::ForEach for_each)
+    : ids_(ids), plants_(scenario, ids, std::move(for_each)) {
+  for (model::StepRecord& record : plants_.records())
+    vehicles_.push_back(std::make_unique<Vehicle>(scenario, run_id, record));
 }
 
 Vehicle* Fleet::find(std::uint32_t id) const {
@@ -27,33 +22,10 @@ Vehicle* Fleet::find(std::uint32_t id) const {
   return vehicles_[static_cast<std::size_t>(found - ids_.begin())].get();
 }
 
-void Fleet::begin() {
-  for (const PlantOfVehicles& group : plants_) measure(group);
-}
-
 void Fleet::advance() {
   ++step_;
-  for_each_(plants_.size(), [this](std::size_t i) { advance(plants_[i]); });
-}
-
-void Fleet::advance(PlantOfVehicles& group) {
-  group.forces.clear();
-  for (const std::size_t i : group.vehicles) group.forces.push_back(vehicles_[i]->actuate());
-  try {
-    group.plant->advance(group.forces, plant_steps_);
-  } catch (const std::exception& error) {
-    if (is_alone_) throw;
-    throw std::runtime_error(
-        fmt::format("vehicle {}: {}", ids_[group.vehicles.front()], error.what()));
-  }
-  measure(group);
-}
-
-void Fleet::measure(const PlantOfVehicles& group) {
-  const Plant& plant = *group.plant;
-  for (std::size_t i = 0; i < group.vehicles.size(); ++i)
-    vehicles_[group.vehicles[i]]->measure(step_, plant.measurement(i),
-                                          plant.sees_truth() ? nullptr : &plant.seen(i));
+  plants_.advance();
+  for (const auto& vehicle : vehicles_) vehicle->begin_step();
 }
 
 void Fleet::expect_answers() {
@@ -98,15 +70,6 @@ double Fleet::calc_longest_absence_s(sync::Time now) const {
   double longest = 0.0;
   for (const auto& vehicle : vehicles_) longest = std::max(longest, vehicle->calc_absence_s(now));
   return longest;
-}
-
-std::vector<std::string> Fleet::take_remarks() {
-  std::vector<std::string> remarks;
-  for (const PlantOfVehicles& group : plants_)
-    for (std::size_t i = 0; i < group.vehicles.size(); ++i)
-      for (const std::string& remark : group.plant->take_remarks(i))
-        remarks.push_back(fmt::format("vehicle {}: {}", ids_[group.vehicles[i]], remark));
-  return remarks;
 }
 
 std::string Fleet::describe(const std::vector<std::uint32_t>& ids) const {

@@ -2,47 +2,43 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "common/config/scenario.hpp"
 #include "common/sync/time.hpp"
+#include "sim_server/core/plant_side.hpp"
 #include "sim_server/core/roster.hpp"
 #include "sim_server/core/vehicle.hpp"
-#include "sim_server/plants/plant.hpp"
 
 namespace sls::sim {
 
-/// The vehicles of a run and the plants that move them, step by step.
+/// The vehicles of a run, step by step.
 class Fleet {
  public:
-  /// Calls `work(i)` once for each i below `count` and returns when all are done, as
-  /// WorkerPool::for_each does.
-  using ForEach =
-      std::function<void(std::size_t count, const std::function<void(std::size_t)>& work)>;
-
-  /// The vehicles `ids` (ascending) of `scenario`. `for_each` moves independent plants.
+  /// The vehicles `ids` (ascending) of `scenario`.
   /// @throws config::ConfigError if a plant cannot be made.
   Fleet(const config::Scenario& scenario, const std::vector<std::uint32_t>& ids,
-        std::uint64_t run_id, ForEach for_each);
+        std::uint64_t run_id, PlantSide::ForEach for_each);
 
   const std::vector<std::uint32_t>& ids() const { return ids_; }
   const std::vector<std::unique_ptr<Vehicle>>& vehicles() const { return vehicles_; }
   /// The vehicle `id`; null if this server does not fly it.
   Vehicle* find(std::uint32_t id) const;
   /// The plant of the first vehicle.
-  const Plant& plant() const { return *plants_.front().plant; }
+  const Plant& plant() const { return plants_.plant(); }
 
   /// The step in work.
   std::uint64_t step() const { return step_; }
   /// Measures the state of step 0.
-  void begin();
+  void begin() { plants_.begin(); }
   /// Flies the period that begins with the step in work, and goes on to the next step. Every
   /// vehicle is settled.
   /// @throws std::runtime_error if a plant fails.
   void advance();
+  /// The records of the step in work, as ids().
+  const std::vector<model::StepRecord>& records() const { return plants_.records(); }
 
   /// Awaits the answers to the step in work.
   void expect_answers();
@@ -61,21 +57,15 @@ class Fleet {
   double calc_longest_absence_s(sync::Time now) const;
 
   /// Remarks of the plants on their vehicles since the last call.
-  std::vector<std::string> take_remarks();
+  std::vector<std::string> take_remarks() { return plants_.take_remarks(); }
   /// " (vehicles 0-3)" in a fleet.
   std::string describe(const std::vector<std::uint32_t>& ids) const;
   /// The refused answers of a vehicle; empty if none is refused.
   std::string describe_refusals(const Vehicle& vehicle) const;
 
  private:
-  void measure(const PlantOfVehicles& group);
-  void advance(PlantOfVehicles& group);
-
   const std::vector<std::uint32_t> ids_;
-  const ForEach for_each_;
-  const bool is_alone_;             // in its scenario
-  const std::int64_t plant_steps_;  // per period
-  std::vector<PlantOfVehicles> plants_;
+  PlantSide plants_;
   std::vector<std::unique_ptr<Vehicle>> vehicles_;  // as ids_
   std::uint64_t step_ = 0;
 };

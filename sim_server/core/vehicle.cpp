@@ -20,23 +20,11 @@ double calc_elapsed_s(const std::optional<sync::Time>& since, sync::Time now) {
 
 }  // namespace
 
-Vehicle::Vehicle(const config::Scenario& fleet, std::uint32_t id, std::uint64_t run_id)
-    : gate(run_id, id, make_answer_limits(fleet)),
+Vehicle::Vehicle(const config::Scenario& fleet, std::uint64_t run_id, model::StepRecord& record)
+    : gate(run_id, record.vehicle_id, make_answer_limits(fleet)),
       absence(fleet.sync),
-      scenario_(make_own_scenario(fleet, id)),
-      faults_(scenario_, id) {
-  record_.vehicle_id = id;
-}
-
-void Vehicle::measure(std::uint64_t step, const model::Measurement& truth,
-                      const model::Measurement* seen) {
-  record_.step = step;
-  record_.truth = truth;
-  record_.f_Q_W = applied_.f_Q_W;
-  if (seen || faults_.can_disturb_state())
-    record_.measured = faults_.measure(step, seen ? *seen : truth);
-  is_settled_ = false;
-}
+      scenario_(make_own_scenario(fleet, record.vehicle_id)),
+      record_(record) {}
 
 void Vehicle::take_answer() {
   hold(*gate.accepted());
@@ -64,7 +52,7 @@ void Vehicle::fly_without_answer(ControllerAbsence::Action action) {
     settle(AnswerKind::kHeld);
   } else {
     settle(AnswerKind::kFailSafe);
-    record_.client_name = kFailSafeName;
+    record_.client_name = flown_by_ = kFailSafeName;
     record_.answer.f_Q_W =
         calc_fail_safe_force(scenario_.vehicle, record_.truth, scenario_.controller.force_limit_n);
   }
@@ -74,17 +62,9 @@ void Vehicle::fly_without_answer(ControllerAbsence::Action action) {
 void Vehicle::settle(AnswerKind kind) {
   record_.kind = kind;
   record_.answered_step = held_.step;
-  record_.client_name = held_.client_name;
+  record_.client_name = flown_by_ = held_.client_name;
   record_.answer = held_.answer;
   is_settled_ = true;
-}
-
-Eigen::Vector3d Vehicle::actuate() {
-  applied_.f_Q_W = faults_.actuate(record_.step, record_.answer.f_Q_W);
-  applied_.kind = record_.kind;
-  applied_.client_name = record_.client_name;
-  applied_.memory = record_.answer.memory;
-  return applied_.f_Q_W;
 }
 
 void Vehicle::complete_record() {

@@ -1,4 +1,4 @@
-/// One vehicle of a run: its faults, its command gate and the force of each step. No network and no
+/// One vehicle of a run: its command gate and the answer in force at each step. No network and no
 /// clock here.
 #pragma once
 
@@ -11,7 +11,6 @@
 #include "common/sync/time.hpp"
 #include "sim_server/core/command_gate.hpp"
 #include "sim_server/core/controller_absence.hpp"
-#include "sim_server/core/fault_line.hpp"
 
 namespace sls::sim {
 
@@ -20,8 +19,8 @@ inline constexpr const char* kFailSafeName = "fail-safe";
 
 class Vehicle {
  public:
-  /// Vehicle `id` of `fleet`, before step 0.
-  Vehicle(const config::Scenario& fleet, std::uint32_t id, std::uint64_t run_id);
+  /// The vehicle of `fleet` whose step in work is in `record`, before step 0.
+  Vehicle(const config::Scenario& fleet, std::uint64_t run_id, model::StepRecord& record);
 
   Vehicle(const Vehicle&) = delete;
   Vehicle& operator=(const Vehicle&) = delete;
@@ -30,18 +29,12 @@ class Vehicle {
 
   // --- a step, in the order of the calls ---
 
-  /// Begins `step`. `truth` is the state of the plant; `seen` is the output of sensors and
-  /// estimator, or null if it cannot differ. Call once per step, in order, from step 0.
-  void measure(std::uint64_t step, const model::Measurement& truth,
-               const model::Measurement* seen = nullptr);
+  /// Goes on to the step that is in the record now.
+  void begin_step() { is_settled_ = false; }
   /// Takes the answer that the gate accepted for the step in work.
   void take_answer();
   /// Flies the step in work without an answer of its own.
   void fly_without_answer(ControllerAbsence::Action action);
-  /// Applies the force of the step in work, which must be settled. Returns the force (N, in W) that
-  /// acts on the plant.
-  Eigen::Vector3d actuate();
-
   /// Holds an answer that came too late for its step, if it is newer than the held one.
   void keep_late_answer(const OfferedAnswer& offered);
 
@@ -50,14 +43,10 @@ class Vehicle {
   /// Motion of the vehicle.
   const model::Measurement& state() const { return record_.truth; }
   /// The client whose force acts: over the step in work once it is settled, else before it.
-  const std::string& flown_by() const {
-    return is_settled_ ? record_.client_name : applied_.client_name;
-  }
-  /// The force over the period before it.
-  const model::AppliedForce& applied() const { return applied_; }
+  const std::string& flown_by() const { return flown_by_; }
   /// True if its force is known.
   bool is_settled() const { return is_settled_; }
-  /// Its record. Kind and answer are known once it is settled.
+  /// Its record. Until it is settled, kind, client and answer are those of the period before it.
   const model::StepRecord& record() const { return record_; }
   /// Completes the record of a step that is not settled, because the run ends: with the answer that
   /// was accepted or refused, if there is one.
@@ -98,11 +87,10 @@ class Vehicle {
   void settle(model::AnswerKind kind);
 
   const config::Scenario scenario_;  // of this vehicle alone
-  FaultLine faults_;
-  model::StepRecord record_;     // of the step in work
-  bool is_settled_ = false;      // its force is known
-  model::AppliedForce applied_;  // over the period before it
-  OfferedAnswer held_;           // the newest valid answer: accepted, or late
+  model::StepRecord& record_;        // of the step in work
+  bool is_settled_ = false;          // its force is known
+  std::string flown_by_;
+  OfferedAnswer held_;  // the newest valid answer: accepted, or late
   bool has_held_ = false;
   bool has_ended_late_ = false;
   std::optional<sync::Time> absent_since_;

@@ -112,7 +112,7 @@ TEST(BlockedRecordTest, TheEndOfTheStreamDoesNotWaitForEachBatch) {
   ASSERT_TRUE(wait_until([&] { return reader.is_matched() && !writer.matched().empty(); }));
   RecordStream stream(writer, 100, 1);  // less than an entry: each one is a batch
   const model::StepRecord record;
-  stream.add_step(std::vector<const model::StepRecord*>(kManySamples, &record));
+  stream.add_step(std::vector<model::StepRecord>(kManySamples, record));
   EXPECT_TRUE(ends(reader, [&] { stream.end(); }));
   EXPECT_GT(stream.lost(), kManySamples / 2) << "the batches that were not tried count, too";
   EXPECT_LE(stream.lost(), kManySamples);

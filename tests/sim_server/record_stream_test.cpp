@@ -29,14 +29,12 @@ class RecordStreamTest : public testing::Test {
   /// Collects a step of `vehicles` vehicles.
   void add(std::uint64_t step, std::size_t vehicles = 1, std::size_t numbers = 0) {
     std::vector<model::StepRecord> records(vehicles);
-    std::vector<const model::StepRecord*> pointers;
     for (std::size_t i = 0; i < vehicles; ++i) {
       records[i].vehicle_id = static_cast<std::uint32_t>(i);
       records[i].step = step;
       records[i].answer.memory.numbers.setOnes(static_cast<Eigen::Index>(numbers));
-      pointers.push_back(&records[i]);
     }
-    stream_->add_step(pointers);
+    stream_->add_step(records);
   }
 
   std::vector<RecordBatch> batches() {

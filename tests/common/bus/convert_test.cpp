@@ -43,16 +43,18 @@ void expect_distinct_state(const PlantState& message) {
   EXPECT_EQ(message.signals(), (std::vector<double>{34, 35}));
 }
 
-TEST(ConvertTest, AStateHoldsTheMeasurementAndTheAppliedForce) {
-  model::AppliedForce applied;
-  applied.f_Q_W = {17, 18, 19};
-  applied.kind = model::AnswerKind::kHeld;
-  applied.client_name = "pilot";
-  applied.memory.stage = 20;
-  applied.memory.stage_start_step = 21;
-  applied.memory.numbers = Eigen::Vector2d(1.5, 2.5);
+TEST(ConvertTest, AStateHoldsTheMeasurementAndTheForceThatActed) {
+  model::StepRecord record;
+  record.vehicle_id = 22;
+  record.measured = make_distinct_state();
+  record.f_Q_W = {17, 18, 19};
+  record.kind = model::AnswerKind::kHeld;
+  record.client_name = "pilot";
+  record.answer.memory.stage = 20;
+  record.answer.memory.stage_start_step = 21;
+  record.answer.memory.numbers = Eigen::Vector2d(1.5, 2.5);
   VehicleState message;
-  fill(message, 22, make_distinct_state(), applied);
+  fill(message, record);
   EXPECT_EQ(message.vehicle_id(), 22u);
   expect_distinct_state(message.measured());
   EXPECT_EQ(message.f_Q_W_n(), (Array{17, 18, 19}));
@@ -61,12 +63,12 @@ TEST(ConvertTest, AStateHoldsTheMeasurementAndTheAppliedForce) {
   const model::ControllerMemory memory = to_memory(message.controller());
   EXPECT_EQ(memory.stage, 20u);
   EXPECT_EQ(memory.stage_start_step, 21u);
-  EXPECT_EQ(memory.numbers, applied.memory.numbers);
+  EXPECT_EQ(memory.numbers, record.answer.memory.numbers);
 }
 
 TEST(ConvertTest, AtStepZeroNothingWasApplied) {
   VehicleState message;
-  fill(message, 0, {}, {});
+  fill(message, model::StepRecord());
   EXPECT_EQ(message.f_Q_W_n(), (Array{0, 0, 0}));
   EXPECT_EQ(message.force_origin(), ForceOrigin::FORCE_NONE);
   EXPECT_EQ(message.controller_name().size(), 0u);

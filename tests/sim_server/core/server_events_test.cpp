@@ -124,9 +124,9 @@ TEST_P(ServerEventsTest, IsHandledOrIgnored) {
 
 INSTANTIATE_TEST_SUITE_P(AllPhases, ServerEventsTest,
                          testing::Combine(testing::ValuesIn(kPhases), testing::ValuesIn(kEvents)),
-                         [](const auto& info) {
-                           return std::string(std::get<0>(info.param).name) + "_" +
-                                  std::get<1>(info.param).name;
+                         [](const auto& pair) {
+                           return std::string(std::get<0>(pair.param).name) + "_" +
+                                  std::get<1>(pair.param).name;
                          });
 
 }  // namespace

@@ -36,13 +36,18 @@ class VehicleTest : public testing::Test {
 
   /// Flies `step` without an answer to it. The answers to the steps `late` arrive during it.
   void fly(std::uint64_t step, const std::vector<std::uint64_t>& late) {
-    vehicle_.measure(step, {});
+    begin(step);
     for (const std::uint64_t answered : late) vehicle_.keep_late_answer(make_answer(answered));
     vehicle_.fly_without_answer(vehicle_.absence.decide(0.0, 0.0));
   }
+  void begin(std::uint64_t step) {
+    record_.step = step;
+    vehicle_.begin_step();
+  }
   const model::StepRecord& record() const { return vehicle_.record(); }
 
-  Vehicle vehicle_{load_realtime(), 0, kRun};
+  model::StepRecord record_;
+  Vehicle vehicle_{load_realtime(), kRun, record_};
 };
 
 TEST_F(VehicleTest, AnswersThatAreAllOnePeriodLateFlyItWithoutEnd) {
@@ -72,7 +77,7 @@ TEST_F(VehicleTest, OnlyANewerAnswerIsFresh) {
 TEST_F(VehicleTest, TheRecordSaysWhichAnswerIsInForce) {
   const bus::PeerId peer{};
   vehicle_.gate.set_clients({{peer, "late", 0}});
-  vehicle_.measure(0, {});
+  begin(0);
   vehicle_.gate.expect(0);
   ASSERT_EQ(vehicle_.gate.offer(make_answer(0), peer), Verdict::kAccepted);
   vehicle_.take_answer();
@@ -82,7 +87,6 @@ TEST_F(VehicleTest, TheRecordSaysWhichAnswerIsInForce) {
   EXPECT_EQ(record().client_name, "late");
   EXPECT_EQ(record().answer.f_Q_W, make_answer(0).answer.f_Q_W);
   EXPECT_EQ(record().answer.stage, 7u);
-  vehicle_.actuate();
 
   vehicle_.gate.expect(1);
   fly(1, {});
@@ -90,13 +94,11 @@ TEST_F(VehicleTest, TheRecordSaysWhichAnswerIsInForce) {
   EXPECT_EQ(record().step, 1u);
   EXPECT_EQ(record().answered_step, 0u);
   EXPECT_EQ(record().answer.f_Q_W, make_answer(0).answer.f_Q_W);
-  EXPECT_EQ(record().f_Q_W, make_answer(0).answer.f_Q_W) << "which acted before";
   vehicle_.complete_record();
   EXPECT_EQ(record().kind, AnswerKind::kHeld) << "the step is settled";
 
-  vehicle_.actuate();
   vehicle_.gate.expect(2);
-  vehicle_.measure(2, {});
+  begin(2);
   vehicle_.complete_record();
   EXPECT_EQ(record().kind, AnswerKind::kNone);
   EXPECT_EQ(record().client_name, "");
@@ -110,7 +112,7 @@ TEST_F(VehicleTest, TheRecordSaysWhichAnswerIsInForce) {
 }
 
 TEST_F(VehicleTest, ALateAnswerEndsTheAbsence) {
-  vehicle_.measure(0, {});
+  begin(0);
   vehicle_.note_waiting(at(1s));
   EXPECT_EQ(vehicle_.calc_absence_s(at(3s)), 2.0);
   vehicle_.keep_late_answer(make_answer(0));
@@ -133,7 +135,7 @@ TEST_F(VehicleTest, ALateEndIsWithdrawnByANewerAnswer) {
   fly(0, {});
   EXPECT_FALSE(vehicle_.has_ended_late());
   vehicle_.gate.expect(1);
-  vehicle_.measure(1, {});
+  begin(1);
   vehicle_.keep_late_answer(last);
   EXPECT_TRUE(vehicle_.has_ended_late());
   ASSERT_EQ(vehicle_.gate.offer(make_answer(1), peer), Verdict::kAccepted);
@@ -146,7 +148,7 @@ TEST_F(VehicleTest, ALateEndIsWithdrawnByANewerAnswer) {
 TEST_F(VehicleTest, APauseIsNoAbsence) {
   vehicle_.note_rest(1h);
   EXPECT_EQ(vehicle_.calc_absence_s(at(1h)), 0.0);
-  vehicle_.measure(0, {});
+  begin(0);
   vehicle_.note_waiting(at(0h));
   vehicle_.note_rest(1h);
   EXPECT_EQ(vehicle_.calc_absence_s(at(2h)), 3600.0);
