@@ -163,6 +163,8 @@ std::vector<std::string> make_launch(const OwnDomain& domain, const std::string&
           scenario("short"),
           "--mode",
           "realtime",
+          "--rtf",
+          "0.25",  // 8 s: on a busy machine the viewer takes seconds to start
           "--domain",
           domain.text(),
           "--out",
