@@ -5,6 +5,7 @@
 #include <csignal>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <regex>
 
 #include "common/bus/topics.hpp"
 #include "tests/system/flight.hpp"
@@ -92,13 +93,12 @@ class ForeignTest : public testing::Test {
     return json.is_object() && json.contains("problem") ? json.at("problem").get<std::string>()
                                                         : text;
   }
-  /// Expects that `program` has printed exactly `warnings` warnings.
-  void expect_no_other_warnings(const Process& program, std::size_t warnings) const {
-    const std::string text = program.output();
-    std::size_t found = 0;
-    for (auto at = text.find(": warning: "); at != text.npos; at = text.find(": warning: ", at + 1))
-      ++found;
-    EXPECT_EQ(found, warnings) << text;
+  /// The lines about mistakes. On a busy machine programs may also wait for each other or be late.
+  static std::ptrdiff_t count_mistakes(const std::string& text) {
+    const std::regex line(
+        ": warning: (?!.*(waiting for: | computes an answer)).*(expected|offered|rejected)");
+    return std::distance(std::sregex_iterator(text.begin(), text.end(), line),
+                         std::sregex_iterator());
   }
 
   std::string run_id() const {
@@ -121,13 +121,14 @@ TEST_F(ForeignTest, AnotherContract) {
   const auto client = start_foreign({"--mistake", "other_contract"});
   expect_server_line(kWho + "sls/participant contract_sha256: expected " + bus::kContractSha256 +
                      ", got " + std::string(64, '0'));
-  expect_no_other_warnings(*server, 1);  // the client is not counted as ready: no step is flown
+  EXPECT_EQ(count_mistakes(server->output()),
+            1);  // the client is not counted as ready: no step is flown
   EXPECT_FALSE(wait_until([&] { return has(*server, "step 0: "); }, 1s)) << outputs();
 }
 
 struct Mistake {
   const char* name;
-  const char* line;           ///< WHO is 'NAME' (127.0.0.1)
+  const char* line;           ///< CLIENT is 'NAME' (127.0.0.1)
   bool is_recorders = false;  ///< the recorder also has an endpoint of that topic
 };
 struct Mistakes {
@@ -146,7 +147,7 @@ TEST_P(ForeignMistakesTest, AreNamed) {
     clients.push_back(start_foreign({"--mistake", mistake.name, "--name", mistake.name}));
   for (const Mistake& mistake : GetParam().all) {
     const std::string who = std::string("'") + mistake.name + "' (127.0.0.1)",
-                      line = ": warning: " + replace_once(mistake.line, "WHO", who);
+                      line = ": warning: " + replace_once(mistake.line, "CLIENT", who);
     EXPECT_TRUE(wait_until([&] { return has(*server, line); })) << line << "\n" << outputs();
     EXPECT_TRUE(wait_until([&] { return has(*recorder, line) == mistake.is_recorders; }))
         << line << "\n"
@@ -160,34 +161,38 @@ INSTANTIATE_TEST_SUITE_P(
         Mistakes{
             "OfAnnouncements",
             {{"volatile",
-              "sls/participant of WHO: DURABILITY: offered volatile, asked transient local", true},
+              "sls/participant of CLIENT: DURABILITY: offered volatile, asked transient local",
+              true},
              {"best_effort",
-              "sls/participant of WHO: RELIABILITY: offered best effort, asked reliable", true},
-             {"long_announcement", "sls/participant of WHO: sls::Participant: expected ", true},
+              "sls/participant of CLIENT: RELIABILITY: offered best effort, asked reliable", true},
+             {"long_announcement", "sls/participant of CLIENT: sls::Participant: expected ", true},
              {"unannounced",
-              "WHO: writes sls/command: expected an announcement in sls/participant, got none"}}},
+              "CLIENT: writes sls/command: expected an announcement in sls/participant, got "
+              "none"}}},
         Mistakes{
             "OfEndpoints",
-            {{"exclusive", "sls/command of WHO: OWNERSHIP: offered exclusive, asked shared"},
-             {"keyed", "sls/command of WHO: key: expected none, got a keyed type"},
-             {"other_type", "sls/command of WHO: type: expected sls::Commands, got mine::Commands"},
-             {"state_deadline", "sls/state for WHO: DEADLINE: offered none, asked 0.01 s"},
-             {"record_deadline", "sls/record for WHO: DEADLINE: offered none, asked 0.01 s"}}},
+            {{"exclusive", "sls/command of CLIENT: OWNERSHIP: offered exclusive, asked shared"},
+             {"keyed", "sls/command of CLIENT: key: expected none, got a keyed type"},
+             {"other_type",
+              "sls/command of CLIENT: type: expected sls::Commands, got mine::Commands"},
+             {"state_deadline", "sls/state for CLIENT: DEADLINE: offered none, asked 0.01 s"},
+             {"record_deadline", "sls/record for CLIENT: DEADLINE: offered none, asked 0.01 s"}}},
         Mistakes{
             "OfTopics",
-            {{"similar_topic", "sls/commands of WHO: expected topic sls/command", true},
+            {{"similar_topic", "sls/commands of CLIENT: expected topic sls/command", true},
              {"ros_topic",
-              "rt/sls/command of WHO: expected topic sls/command (without the prefix of ROS 2)",
+              "rt/sls/command of CLIENT: expected topic sls/command (without the prefix of ROS 2)",
               true},
              {"states_without_claim",
-              "WHO: writes sls/state, sls/status: expected a claim in sls/parameters, got none; "
+              "CLIENT: writes sls/state, sls/status: expected a claim in sls/parameters, got none; "
               "its samples are ignored",
               true}}},
         Mistakes{
             "OfSamples",
-            {{"extra_field", "sls/command of WHO: sls::Commands: expected more bytes, got "},
-             {"missing_field", "sls/command of WHO: sls::Commands: expected more bytes, got "},
-             {"retyped_field", "sls/command of WHO: sls::Commands: expected more bytes, got "}}}),
+            {{"extra_field", "sls/command of CLIENT: sls::Commands: expected more bytes, got "},
+             {"missing_field", "sls/command of CLIENT: sls::Commands: expected more bytes, got "},
+             {"retyped_field",
+              "sls/command of CLIENT: sls::Commands: expected more bytes, got "}}}),
     [](const auto& mistakes) { return std::string(mistakes.param.name); });
 
 TEST_F(ForeignTest, NoReaderOfStates) {
@@ -224,7 +229,7 @@ TEST_F(ForeignTest, NoDeadlineInLockstepIsNoMistake) {
   start();
   const auto client = start_foreign({"--mistake", "no_deadline"});
   EXPECT_TRUE(wait_until([&] { return has(*recorder, "records run"); }));
-  EXPECT_FALSE(wait_until([&] { return has(*server, ": warning: "); }, 2s)) << outputs();
+  EXPECT_FALSE(wait_until([&] { return count_mistakes(server->output()) > 0; }, 2s)) << outputs();
   EXPECT_EQ(ask_problem(), "");
 }
 
@@ -244,7 +249,7 @@ TEST_F(ForeignTest, AppendableTypesOfCyclone) {
   expect_server_line({"sls/participant" + written, "sls/command" + written,
                       "sls/state for 'appendable' (127.0.0.1): DATA_REPRESENTATION: offered XCDR1, "
                       "asked XCDR2 (compile the types as @final)"});
-  expect_no_other_warnings(*server, 1);
+  EXPECT_EQ(count_mistakes(server->output()), 1);
   expect_line("recorder", *recorder, {"sls/participant" + written});
 }
 
@@ -296,7 +301,7 @@ TEST_F(ForeignTest, OurOwnProgramsMakeNoMistakes) {
     options.server = {"--mode", mode};
     Flight flight(::sls::test::scenario("short"), options);
     flight.expect_success();
-    EXPECT_EQ(flight.outputs().find(": warning: "), std::string::npos) << flight.outputs();
+    EXPECT_EQ(count_mistakes(flight.outputs()), 0) << flight.outputs();
   }
 }
 
