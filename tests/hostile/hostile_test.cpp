@@ -93,11 +93,7 @@ class HostileTest : public testing::Test {
       std::printf("peak memory of the %s: %.0f MB\n", name.c_str(), peak);
       EXPECT_LT(peak, most_mb) << name;
     }
-    Flight undisturbed(scenario("figure_eight"));
-    undisturbed.expect_success();
-    for (const char* file : {"state.csv", "reference.csv"})
-      EXPECT_TRUE(read_file(flight.recording() / file) == read_file(undisturbed.recording() / file))
-          << file;
+    test::expect_undisturbed(flight.recording(), scenario("figure_eight"));
   }
 
   /// Expects that no program crashes or hangs. The flight itself may fail.

@@ -180,9 +180,7 @@ TEST_F(InteropTest, ACycloneControllerFliesSetpointsLikeOursAndACycloneRecorderW
   const Table commands(recording_ + "/command.csv");
   ASSERT_EQ(commands.rows(), 11251u);
   EXPECT_EQ(commands.text(11250, "controller"), "cyclone");
-  Flight own(scenario("setpoints"));
-  own.expect_success();
-  expect_same_flight(recording_, own.recording());
+  expect_same_flight(recording_, fly_in_process(setpoints, folder_ / "own"));
 }
 
 /// Seventy vehicles: two samples per step.
@@ -213,9 +211,7 @@ TEST_F(InteropTest, ACycloneStandbyTakesOverFromAClientThatIsKilled) {
   EXPECT_EQ(commands.text(0, "controller"), "primary");
   EXPECT_EQ(commands.text(kLongSteps, "controller"), "standby");
   write_quick_scenario(1, 1, 1, kShortPeriod);
-  Flight own(quick_);
-  own.expect_success();
-  expect_same_flight(recording_, own.recording());
+  expect_same_flight(recording_, fly_in_process(quick_, folder_ / "own"));
 }
 
 /// Server and controller lose 5 % of their datagrams: states are sent and answered again.

@@ -72,11 +72,12 @@ Figures read_figures(const std::filesystem::path& recording, const std::filesyst
   return figures;
 }
 
-Figures expect_same(Flight& flight, Flight& local) {
-  local.expect_success();
+Figures expect_same(Flight& flight, const std::string& scenario_file,
+                    const std::vector<std::string>& flags) {
   flight.expect_success();
+  const auto alone = fly_in_process(scenario_file, flight.folder / "alone", flags);
   if (testing::Test::HasFailure()) return {};
-  const Figures figures = read_figures(flight.recording(), local.recording());
+  const Figures figures = read_figures(flight.recording(), alone);
   EXPECT_TRUE(figures.is_identical) << flight.outputs();
   EXPECT_EQ(figures.rows_lost, 0u);
   return figures;

@@ -56,7 +56,9 @@ struct Figures {
 /// none.
 Figures read_figures(const std::filesystem::path& recording, const std::filesystem::path& local);
 
-/// Waits for both flights. Expects success, the recording of `local` byte by byte, and no lost row.
-Figures expect_same(Flight& flight, Flight& local);
+/// Waits for the flight. Expects success, the recording of the same scenario flown in one process
+/// byte by byte, and no lost row.
+Figures expect_same(Flight& flight, const std::string& scenario_file,
+                    const std::vector<std::string>& flags = {});
 
 }  // namespace sls::test

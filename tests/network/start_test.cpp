@@ -52,50 +52,5 @@ TEST_F(StartTest, HealthyStartsWithTwentyPercentLossGiveNoFalseLine) {
   EXPECT_GT(network_->lost(), 100u);
 }
 
-struct Unannounced {
-  const char* mistake;
-  double patience_s;  // of ParticipantCheck on a network
-};
-
-class UnannouncedTest : public StartTest, public testing::WithParamInterface<Unannounced> {};
-
-/// The client that makes the mistake is on another host.
-TEST_P(UnannouncedTest, IsNamedDespiteTwentyPercentLoss) {
-  network_->lose(20);
-  const Profile profile(*network_, "wifi");
-  const FlightOptions options = profile.flight_options();
-  const OwnDomain domain;
-  Process server(profile.before("server") + make_command("sim_server", domain.number(),
-                                                         {"--scenario", scenario("short")},
-                                                         options.qos_file));
-  const auto has = [](const Process& process, const char* text) {
-    return process.output().find(text) != std::string::npos;
-  };
-  ASSERT_TRUE(wait_until([&] { return has(server, "waiting for: "); })) << server.output();
-  Process client(network_->on("controller") +
-                 std::vector<std::string>{SLS_FOREIGN_CLIENT, "--domain", domain.text(),
-                                          "--interface", network_->address("controller"),
-                                          "--mistake", GetParam().mistake});
-  ASSERT_TRUE(wait_until([&] { return has(client, "begins\n"); })) << client.output();
-  const auto began = std::chrono::steady_clock::now();
-  EXPECT_TRUE(wait_until(
-      [&] {
-        return has(server,
-                   "writes sls/command: expected an announcement in sls/participant, got none");
-      },
-      60s))
-      << server.output();
-  const std::chrono::duration<double> time = std::chrono::steady_clock::now() - began;
-  RecordProperty("seconds", std::to_string(time.count()));
-  // Discovery before the patience begins; the client says that it begins once it is discovered.
-  EXPECT_GE(time.count(), GetParam().patience_s - 4.0) << server.output();
-  EXPECT_LE(time.count(), GetParam().patience_s + 13.0) << server.output();
-}
-
-INSTANTIATE_TEST_SUITE_P(Mistakes, UnannouncedTest,
-                         testing::Values(Unannounced{"unannounced", 4.0},
-                                         Unannounced{"unannounced_writer", 15.0}),
-                         [](const auto& made) { return std::string(made.param.mistake); });
-
 }  // namespace
 }  // namespace sls::test

@@ -195,7 +195,10 @@ inline State with_rod(State state, const Eigen::Vector3d& n_W,
                       const Eigen::Vector3d& n_dot_W = Eigen::Vector3d::Zero(), double spin = 0.0) {
   state.n_W = n_W.normalized();
   state.n_dot_W = n_dot_W - state.n_W * state.n_W.dot(n_dot_W);
-  state.q_WP = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), state.n_W);
+  // The turn from e₃ to n. FromTwoVectors would do the same, and take 10 s to compile.
+  const Eigen::Vector3d& n = state.n_W;
+  state.q_WP = n.z() > -1.0 ? Eigen::Quaterniond(1.0 + n.z(), -n.y(), n.x(), 0.0).normalized()
+                            : Eigen::Quaterniond(0.0, 1.0, 0.0, 0.0);
   state.w_WP_P =
       state.q_WP.conjugate() * (state.n_W.cross(state.n_dot_W) + spin * state.n_W).eval();
   return state;
@@ -348,7 +351,7 @@ inline Rate calc_rate(const State& state, const Inputs& inputs, const Vehicle& v
     const Matrix3d rho_cross = calc_cross_matrix(rho_W);
     const Matrix3d K_rod =
         Matrix3d::Identity() / pendulum.mass - rho_cross * I_inverse_W * rho_cross;
-    rate.f_A_W = (K + K_rod).eval().llt().solve(a_WA_of_rod - a_WA_free);
+    rate.f_A_W = Matrix3d(K + K_rod).inverse() * (a_WA_of_rod - a_WA_free);
     rate.tension = n.dot(rate.f_A_W);
     const Vector3d W_dot_W = W_dot_free - I_inverse_W * rho_W.cross(rate.f_A_W);
     rate.q_WP_dot = calc_quaternion_rate(state.q_WP, state.w_WP_P);

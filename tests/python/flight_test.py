@@ -10,6 +10,7 @@ import unittest
 import support
 import numpy as np
 
+from sls.figures import make_figures
 from sls.metrics import calc_stage_metrics
 from sls.recordings import Recording
 from sls.study import PUBLISHED_LAP_2
@@ -88,11 +89,7 @@ class FlightTest(support.FolderTest):
         np.testing.assert_allclose(flight.body.rotor_speed, np.full((251, 4), speed), rtol=1e-9)
         np.testing.assert_allclose(flight.body.rotor_speed_set, flight.body.rotor_speed, rtol=1e-9)
         np.testing.assert_allclose(flight.body.q_WB, np.tile([1, 0, 0, 0], (251, 1)), atol=1e-12)
-        self.run_launcher("plot", "r")
-        self.run_launcher("report", "r")
-        for name in ("body_attitude", "body_rates", "rotors", "thrust"):
-            self.assertTrue((self.folder / f"r/figures/{name}.png").exists(), name)
-            self.assertIn(f'<figure id="{name}">', (self.folder / "r/report.html").read_text())
+        self.assertLessEqual({"body_attitude", "body_rates", "rotors", "thrust"}, make_figures([flight]).keys())
 
     def test_documents_show_what_the_demo_prints_beside_the_published_figures(self):
         domain = self.enterContext(support.OwnDomain())

@@ -383,7 +383,7 @@ class SceneTest(support.FolderTest):
     @unittest.skipUnless(VIEWER.exists() and FLYER.exists(), "skipped: no sls_view in this build")
     def test_long_flights_and_fleets_stay_within_4_mb(self):
         text = (support.ROOT / "config/scenarios/figure_eight.yaml").read_text()
-        long = re.sub(r"for_s: \d+", "for_s: 320", text)
+        long = re.sub(r"for_s: \d+", "for_s: 160", text)
         for name in (self.fly("fleet"), self.fly("long", long)):
             page, output = self.make_report(name, VIEWER)
             self.assertEqual(page.read_text().count("<iframe"), 1, output)

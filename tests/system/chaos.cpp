@@ -25,6 +25,7 @@ using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 using Seconds = std::chrono::duration<double>;
 
+const std::vector<std::string> kFlags = {"--period-s", "0.001"};  // a trial lasts seconds
 constexpr auto kNamingLimit = 2s;
 constexpr auto kTrialLimit = 120s;
 
@@ -132,7 +133,8 @@ class Trial {
     };
     switch (role) {
       case Role::kServer:
-        return start_program("sim_server", {"--scenario", scenario_, "--period-s", "0.001"});
+        return start_program("sim_server",
+                             std::vector<std::string>{"--scenario", scenario_} + kFlags);
       case Role::kPrimary:
         return start_program("control_client", {"--scenario", scenario_, "--name", "primary",
                                                 "--strength", "2", "--follow"});
@@ -281,19 +283,11 @@ int run_trials(int trials, std::uint64_t seed, bool is_verbose) {
   TemporaryFolder folder;
   const std::string file = make_scenario(
       folder, {{"controllers: 1", "controllers: 2"}, {"for_s: 32", "for_s: 16"}}, "figure_eight");
-  // Undisturbed: the same scenario, both clients.
-  FlightOptions options;
-  options.server = kManySteps;
-  options.client = {"--name", "primary", "--strength", "2"};
-  Flight undisturbed(file, options);
-  Process standby(make_command("control_client", undisturbed.domain.number(),
-                               {"--scenario", file, "--name", "standby", "--strength", "1"}));
-  undisturbed.wait();
-  if (undisturbed.server->wait() != 0 || undisturbed.recorder->wait() != 0) {
-    std::cerr << "chaos: error: the undisturbed flight failed\n" << undisturbed.outputs();
+  const fs::path undisturbed = fly_in_process(file, folder / "undisturbed", kFlags);
+  if (!fs::exists(undisturbed / "manifest.json")) {
+    std::cerr << "chaos: error: the undisturbed flight failed\n";
     return 1;
   }
-  standby.wait();
 
   int failed = 0, named = 0, had_to_be_named = 0;
   double slowest_s = 0.0;
@@ -303,7 +297,7 @@ int run_trials(int trials, std::uint64_t seed, bool is_verbose) {
     std::printf("trial %d: %s: ", i + 1, describe(disturbance).c_str());
     std::fflush(stdout);
     const auto began = Clock::now();
-    Trial trial(file, undisturbed.recording(), disturbance);
+    Trial trial(file, undisturbed, disturbance);
     const Result result = trial.run();
     if (result.named_after) {
       ++named;

@@ -138,13 +138,5 @@ TEST(ControlResetTest, AfterManyQuickResetsLateJoinersFindTheRunAndRecordAllOfIt
   EXPECT_EQ(Table(folder / "recording/status.csv").text(0, "sample_index"), "0");
 }
 
-TEST(ControlUsageTest, WithoutAServerTheReasonIsNamed) {
-  OwnDomain domain;
-  Process process({program("sim_ctl"), "--domain", domain.text(), "--timeout-s", "1", "pause"});
-  EXPECT_EQ(process.wait(), 1);
-  EXPECT_NE(process.output().find("domain " + domain.text()), std::string::npos)
-      << process.output();
-}
-
 }  // namespace
 }  // namespace sls::test

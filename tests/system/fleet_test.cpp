@@ -21,10 +21,6 @@ const std::vector<std::uint32_t> kAll = {0, 1, 2, 3, 4, 5};
 
 using Changes = std::vector<std::pair<std::string, std::string>>;
 
-std::string read_certificate(const fs::path& recording) {
-  return read_manifest(recording).at("certificate").get<std::string>();
-}
-
 /// True if `rows` begins with `beginning`.
 bool begin_with(const std::vector<std::string>& rows, const std::vector<std::string>& beginning) {
   return rows.size() >= beginning.size() &&
@@ -47,18 +43,13 @@ class FleetTest : public ::testing::Test {
 TEST_F(FleetTest, RecordsEachOfDifferentVehiclesAsARunOfItAlone) {
   const config::Scenario fleet = config::load_scenario(scenario("mixed_fleet"));
   Flight together(scenario("mixed_fleet"));
-  std::vector<std::unique_ptr<Flight>> alone;
-  for (std::uint32_t id = 0; id < fleet.vehicles.size(); ++id) {
-    const std::string file = folder_ / ("vehicle" + std::to_string(id) + ".yaml");
-    write_bytes(file, config::to_yaml(config::make_vehicle_scenario(fleet, id)));
-    alone.push_back(std::make_unique<Flight>(file));
-  }
   together.expect_success();
   std::size_t shortest = SIZE_MAX, longest = 0;
-  for (std::uint32_t id = 0; id < alone.size(); ++id) {
+  for (std::uint32_t id = 0; id < fleet.vehicles.size(); ++id) {
     SCOPED_TRACE("vehicle " + std::to_string(id));
-    alone[id]->expect_success();
-    const VehicleRows own = read_vehicle_rows(alone[id]->recording(), 0);
+    const std::string name = "vehicle" + std::to_string(id), file = folder_ / (name + ".yaml");
+    write_bytes(file, config::to_yaml(config::make_vehicle_scenario(fleet, id)));
+    const VehicleRows own = read_vehicle_rows(fly_in_process(file, folder_ / name), 0);
     const VehicleRows among = read_vehicle_rows(together.recording(), id);
     EXPECT_TRUE(begin_with(among.state, own.state));
     EXPECT_TRUE(begin_with(among.command, own.command));
@@ -68,14 +59,15 @@ TEST_F(FleetTest, RecordsEachOfDifferentVehiclesAsARunOfItAlone) {
   }
   EXPECT_LT(shortest, longest) << "all finish at once: of the end this test sees nothing";
   EXPECT_EQ(read_manifest(together.recording()).at("last_step"), longest - 1);
-  for (std::uint32_t id = 0; id < alone.size(); ++id)
+  for (std::uint32_t id = 0; id < fleet.vehicles.size(); ++id)
     EXPECT_EQ(read_vehicle_rows(together.recording(), id).command.size(), longest);
 
   const Table joined(together.recording() / "flight.csv");
   EXPECT_EQ(joined.names().back(), "vehicle_id");
   std::map<std::string, std::size_t> rows;
   for (std::size_t i = 0; i < joined.rows(); ++i) ++rows[joined.text(i, "vehicle_id")];
-  for (std::uint32_t id = 0; id < alone.size(); ++id) EXPECT_EQ(rows[std::to_string(id)], longest);
+  for (std::uint32_t id = 0; id < fleet.vehicles.size(); ++id)
+    EXPECT_EQ(rows[std::to_string(id)], longest);
 }
 
 // --- one fleet, spread in different ways ---------------------------------------------------------
@@ -123,24 +115,11 @@ TEST_P(SpreadTest, EveryVehicleFliesAsAlone) {
 INSTANTIATE_TEST_SUITE_P(
     FleetTest, SpreadTest,
     ::testing::Values(
-        Spread{"OneThread", {}, "1", {"all"}}, Spread{"TwoThreads", {}, "2", {"all"}},
         Spread{"TwoClients", {}, "1", {"0-2", "3-5"}},
         Spread{"ThreeClientsOverUdp", qos("udp"), "2", {"0,2,4", "1,5", "3"}},
         Spread{"MoreThanASampleHolds", {}, "2", {"all"}, "130"},
         Spread{"TheLargestByTwoClientsOverUdp", qos("udp"), "2", {"0-99", "100-255"}, "256"}),
     [](const auto& parameter) { return std::string(parameter.param.name); });
-
-TEST_F(FleetTest, FliesAsAloneWithFivePercentOfAllDatagramsLost) {
-  const std::string file = make_fleet_scenario(folder_);
-  setenv("LD_PRELOAD", SLS_DROP_SHIM, 1);
-  setenv("SLS_DROP_PERCENT", "5", 1);
-  setenv("SLS_DROP_SEED", "1", 1);
-  Flight flight(file, {qos("udp"), {}, {}});
-  for (const char* name : {"LD_PRELOAD", "SLS_DROP_PERCENT", "SLS_DROP_SEED"}) unsetenv(name);
-  flight.expect_success();
-  EXPECT_TRUE(holds(flight.server->output(), "drop_shim: lost ")) << flight.server->output();
-  expect_each_flies_as_alone(flight.recording(), file, kAll);
-}
 
 TEST_F(FleetTest, SharedByTwoServersFliesAsAlone) {
   const std::string file = make_fleet_scenario(folder_);
@@ -156,24 +135,6 @@ TEST_F(FleetTest, SharedByTwoServersFliesAsAlone) {
   for (const auto& process : programs) EXPECT_EQ(process->wait(), 0) << process->output();
   for (const auto& ids : halves)
     expect_each_flies_as_alone(recording() + std::to_string(ids[0]), file, ids);
-}
-
-TEST_F(FleetTest, InRealTimeWithoutLateAnswersHasTheCertificateOfLockstep) {
-  const std::string file = make_fleet_scenario(
-      folder_, {{"until: { within_m: 0.3 }", "for_s: 0.2"}, {"for_s: 0.4\n", "for_s: 0.2\n"}});
-  Flight lockstep(file);
-  lockstep.expect_success();
-  // A busy machine may be late; a slower flight leaves more time per period.
-  for (const char* real_time_factor : {"0.2", "0.1", "0.05", "0.02"}) {
-    Flight flight(file, {{}, {"--mode", "realtime", "--rtf", real_time_factor}, {}});
-    flight.expect_success();
-    const auto timing = read_manifest(flight.recording()).at("timing").get<std::string>();
-    ASSERT_TRUE(holds(timing, "real-time, ")) << timing;
-    if (!holds(timing, "real-time, 0 of ")) continue;
-    EXPECT_EQ(read_certificate(flight.recording()), read_certificate(lockstep.recording()));
-    return;
-  }
-  FAIL() << "late even at 200 ms per period";
 }
 
 // --- failures ------------------------------------------------------------------------------------
@@ -209,50 +170,6 @@ TEST_F(FleetTest, AKilledClientOfOneHalfIsReplacedByAStandbyAndNothingElseChange
   for (const char* id : {"0", "1", "2"}) EXPECT_EQ(last_client[id], "standby") << id;
 }
 
-TEST_F(FleetTest, AKilledClientWithoutStandbyIsNamedWithItsVehicles) {
-  Changes changes = kLong;
-  changes.push_back(
-      {"timeout_s: 30 }", "timeout_s: 30 }, wait: { controller: { deadline_s: 2 } }"});
-  const std::string file = make_fleet_scenario(folder_, changes);
-  Flight flight(file, {{}, {}, {"--vehicles", "0-2", "--name", "first-half"}});
-  Process second(make_command("control_client", flight.domain.number(),
-                              {"--scenario", file, "--vehicles", "3-5", "--name", "second-half"}));
-  ASSERT_TRUE(flight.wait_for_steps(6 * 100)) << flight.outputs();
-  second.kill();
-  EXPECT_EQ(flight.server->wait(), 1) << flight.outputs();
-  const std::string said = flight.server->output();
-  EXPECT_TRUE(holds(said, "waiting for: controller 'second-half'")) << said;
-  EXPECT_TRUE(holds(said, "waited 2 s for controller 'second-half'")) << said;
-  EXPECT_TRUE(holds(said, "(vehicles 3-5)")) << said;
-  EXPECT_FALSE(holds(said, "waiting for: controller 'first-half'")) << said;
-  flight.wait();
-  EXPECT_EQ(read_manifest(flight.recording()).at("outcome"), "failed");
-}
-
-TEST_F(FleetTest, ItsRecorderAndThenItsOnlyClientMayBeKilledAndStartedAgain) {
-  const std::string file = make_fleet_scenario(folder_, {{"for_s: 0.4", "for_s: 8"}});
-  auto recorder = start("recorder", {"--out", recording(), "--resume"});
-  const auto server = start("sim_server", {"--scenario", file});
-  auto client = start("control_client", {"--scenario", file});
-  const auto has_rows = [&](const std::string& folder) {
-    return wait_until([&] { return read_file(folder + "/state.csv").size() > 200'000; });
-  };
-  ASSERT_TRUE(has_rows(recording())) << server->output();
-  recorder->kill();
-  recorder = start("recorder", {"--out", recording(), "--resume"});
-  ASSERT_TRUE(has_rows(recording() + "/segment-2")) << server->output() << recorder->output();
-  client->kill();
-  client = start("control_client", {"--scenario", file});
-  EXPECT_EQ(server->wait(), 0) << server->output();
-  EXPECT_EQ(client->wait(), 0) << client->output();
-  EXPECT_EQ(recorder->wait(), 0) << recorder->output();
-  const auto manifest = read_manifest(recording() + "/segment-2");
-  EXPECT_TRUE(manifest.at("complete").get<bool>()) << manifest;
-  Flight undisturbed(file);
-  undisturbed.expect_success();
-  EXPECT_EQ(manifest.at("certificate"), read_certificate(undisturbed.recording()));
-}
-
 TEST_F(FleetTest, ARefusedForceOfOneVehicleFailsTheRunNamingIt) {
   // Vehicle 4 alone weighs 22 N; the others never need more than 20.
   const std::string file = make_fleet_scenario(
@@ -265,29 +182,6 @@ TEST_F(FleetTest, ARefusedForceOfOneVehicleFailsTheRunNamingIt) {
       << flight.server->output();
   EXPECT_TRUE(holds(flight.server->output(), "vehicle 4")) << flight.server->output();
   EXPECT_EQ(read_manifest(flight.recording()).at("outcome"), "failed");
-}
-
-TEST_F(FleetTest, FaultsDisturbTheirOwnVehicleAlone) {
-  const std::string file = make_fleet_scenario(folder_);
-  write_bytes(file, read_file(file) +
-                        "faults:\n"
-                        "  - delay: { on: command, vehicle: 3, by_s: 0.02 }\n"
-                        "  - noise: { on: state, vehicle: 1, seed: 7, position_m: [0.01, 0, 0] }\n"
-                        "  - drop: { on: state, vehicle: 3, probability: 0.3, seed: 1 }\n");
-  Flight flight(file);
-  flight.expect_success();
-  expect_each_flies_as_alone(flight.recording(), file, kAll);
-}
-
-TEST_F(FleetTest, ASecondServerForOneOfItsVehiclesRefuses) {
-  const std::string file = make_fleet_scenario(folder_, kLong);
-  const auto first = start("sim_server", {"--scenario", file, "--vehicles", "0-3"});
-  ASSERT_TRUE(wait_until([&] { return holds(first->output(), "waiting for: "); }))
-      << first->output();
-  const auto second = start("sim_server", {"--scenario", file, "--vehicles", "3-5"});
-  EXPECT_EQ(second->wait(), 1) << second->output();
-  EXPECT_TRUE(holds(second->output(), "vehicle 3: expected no other server")) << second->output();
-  EXPECT_TRUE(first->is_running());
 }
 
 TEST_F(FleetTest, VehiclesThatAreNotInTheScenarioAreRefused) {

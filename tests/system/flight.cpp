@@ -112,6 +112,28 @@ nlohmann::json read_manifest(const std::filesystem::path& recording) {
   return nlohmann::json::parse(read_file(recording / "manifest.json"));
 }
 
+std::string read_certificate(const std::filesystem::path& recording) {
+  return read_manifest(recording).at("certificate").get<std::string>();
+}
+
+std::filesystem::path fly_in_process(const std::string& scenario_file,
+                                     const std::filesystem::path& recording,
+                                     const std::vector<std::string>& flags) {
+  Process process(std::vector<std::string>{program("closed_loop"), "--scenario", scenario_file,
+                                           "--out", recording} +
+                  flags);
+  EXPECT_EQ(process.wait(), 0) << process.output();
+  return recording;
+}
+
+void expect_undisturbed(const std::filesystem::path& recording, const std::string& scenario_file,
+                        const std::vector<std::string>& flags) {
+  const TemporaryFolder folder;
+  const auto alone = fly_in_process(scenario_file, folder / "alone", flags);
+  Process verify({program("sls_verify"), recording, alone});
+  EXPECT_EQ(verify.wait(), 0) << verify.output();
+}
+
 std::string make_qos_with_history(const TemporaryFolder& folder, const std::string& base,
                                   const std::string& batches) {
   const std::string endpoints = read_file(qos("endpoints")), end = "</data_writer>";

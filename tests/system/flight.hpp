@@ -84,6 +84,16 @@ class Table {
 };
 
 nlohmann::json read_manifest(const std::filesystem::path& recording);
+std::string read_certificate(const std::filesystem::path& recording);
+
+/// Flies the scenario in one process, without DDS. Returns the folder `recording`.
+std::filesystem::path fly_in_process(const std::string& scenario_file,
+                                     const std::filesystem::path& recording,
+                                     const std::vector<std::string>& flags = {});
+
+/// Expects that sls_verify finds `recording` equal to one of the same flight in one process.
+void expect_undisturbed(const std::filesystem::path& recording, const std::string& scenario_file,
+                        const std::vector<std::string>& flags = {});
 
 /// Load minus reference position over the steps [first, last] of a recording.
 struct TrackingError {

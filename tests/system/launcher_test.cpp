@@ -35,14 +35,6 @@ class LauncherTest : public ::testing::Test {
   OwnDomain domain;
 };
 
-TEST_F(LauncherTest, RunFliesAScenarioByNameAndEndsWithZero) {
-  Process run(run_command("short"));
-  EXPECT_EQ(run.wait(), 0) << run.output();
-  EXPECT_TRUE(read_manifest(recording()).at("complete").get<bool>());
-  // 2 s at 4 ms: states 0 to 500.
-  EXPECT_EQ(Table(recording() + "/state.csv").rows(), 501u);
-}
-
 TEST_F(LauncherTest, RunTakesPathsPeriodsAndQosFiles) {
   auto command = run_command(scenario("short"));
   command.insert(command.end(), {"--period-s", "0.002", "--qos", qos("udp")});
@@ -50,17 +42,6 @@ TEST_F(LauncherTest, RunTakesPathsPeriodsAndQosFiles) {
   EXPECT_EQ(run.wait(), 0) << run.output();
   EXPECT_EQ(Table(recording() + "/state.csv").rows(), 1001u);
   EXPECT_EQ(read_manifest(recording()).at("period_s"), 0.002);
-}
-
-TEST_F(LauncherTest, ConvertWritesARecordingAsMcap) {
-  Process run({launcher(), "run", "short", "--in-process", "--out", recording()});
-  ASSERT_EQ(run.wait(), 0) << run.output();
-  Process convert({launcher(), "convert", recording()});
-  EXPECT_EQ(convert.wait(), 0) << convert.output();
-  const std::string magic = "\x89MCAP0\r\n";
-  const std::string file = read_file(recording() + "/sls.mcap");
-  EXPECT_EQ(file.substr(0, magic.size()), magic);
-  EXPECT_EQ(file.substr(file.size() - magic.size()), magic);
 }
 
 TEST_F(LauncherTest, MistakesEndWithTwoAndOneLine) {

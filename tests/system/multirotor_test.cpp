@@ -10,22 +10,11 @@ namespace fs = std::filesystem;
 
 using Changes = std::vector<std::pair<std::string, std::string>>;
 
-std::string read_certificate(const fs::path& recording) {
-  return read_manifest(recording).at("certificate").get<std::string>();
-}
-
 class MultirotorSystemTest : public ::testing::Test {
  protected:
-  /// Flies `file` in one process; the recording's folder.
   fs::path fly_in_process(const std::string& file, const std::string& name,
                           const std::vector<std::string>& flags = {}) const {
-    fs::path recording = folder_ / name;
-    std::vector<std::string> command = {program("closed_loop"), "--scenario", file, "--out",
-                                        recording};
-    command.insert(command.end(), flags.begin(), flags.end());
-    Process process(command);
-    EXPECT_EQ(process.wait(), 0) << process.output();
-    return recording;
+    return test::fly_in_process(file, folder_ / name, flags);
   }
 
   const TemporaryFolder folder_;

@@ -180,19 +180,6 @@ TEST(UsageTest, TooLittleSharedMemoryIsNamedBeforeTheFirstSample) {
   }
 }
 
-TEST(UsageTest, ServerNamesMissingParticipantsAtTheStart) {
-  TemporaryFolder folder;
-  const std::string file = make_scenario(folder, {{"timeout_s: 30", "timeout_s: 3"}});
-  OwnDomain domain;
-  Process server(make_command("sim_server", domain.number(), {"--scenario", file}));
-  EXPECT_EQ(server.wait(), 1);
-  EXPECT_NE(server.output().find("waiting for: controller, recorder"), std::string::npos)
-      << server.output();
-  EXPECT_NE(server.output().find("error: not ready within 3 s: controller, recorder"),
-            std::string::npos)
-      << server.output();
-}
-
 TEST(UsageTest, ClientWithAnotherScenarioIsRefusedWithBothHashes) {
   TemporaryFolder folder;
   write_bytes(folder / "other.yaml", read_file(scenario("short")) + "# another byte\n");
@@ -206,18 +193,6 @@ TEST(UsageTest, ClientWithAnotherScenarioIsRefusedWithBothHashes) {
   EXPECT_TRUE(server.is_running());
   server.send(SIGTERM);
   EXPECT_EQ(server.wait(), 143);
-}
-
-TEST(UsageTest, SecondServerForAVehicleRefusesAndTheFirstFliesOn) {
-  Flight flight(scenario("mission"));
-  ASSERT_TRUE(flight.wait_for_steps(500)) << flight.outputs();
-  Process second(
-      make_command("sim_server", flight.domain.number(), {"--scenario", scenario("mission")}));
-  EXPECT_EQ(second.wait(), 1);
-  EXPECT_NE(second.output().find("vehicle 0: expected no other server on this domain"),
-            std::string::npos)
-      << second.output();
-  flight.expect_success();
 }
 
 }  // namespace

@@ -6,7 +6,7 @@
 
 #include "common/bus/sync_counters.hpp"
 
-namespace sls::bus::test {
+namespace sls::test {
 namespace {
 
 /// Values that never repeat within a message.
@@ -211,9 +211,9 @@ SimStatus make_message(std::uint64_t seed) {
   message.round_trip_p99_ns(values.count());
   message.timing(values.text(128));
   message.problem(values.text(255));
-  for (const SyncCounter& counter : kSyncCounters)
+  for (const bus::SyncCounter& counter : bus::kSyncCounters)
     (message.counters().*counter.change)() = values.count();
   return message;
 }
 
-}  // namespace sls::bus::test
+}  // namespace sls::test

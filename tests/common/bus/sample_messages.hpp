@@ -5,10 +5,10 @@
 
 #include "common/bus/topics.hpp"
 
-namespace sls::bus::test {
+namespace sls::test {
 
 /// All strings and sequences as long as their bounds allow.
 template <class Message>
 Message make_message(std::uint64_t seed);
 
-}  // namespace sls::bus::test
+}  // namespace sls::test

@@ -381,19 +381,23 @@ TEST(MultirotorOdeTest, SwingsInBothModesAtTheirClosedFormFrequencies) {
     vehicle.pendulum.p_QA_B << 0.0, 0.0, a;
     const PendulumMass rod = calc_mass(vehicle.pendulum);
     const double M = rod.mass, d = rod.centre, mu = m * M / (m + M);
-    Eigen::Matrix2d inertia, stiffness;
-    inertia << 0.04 + mu * (a - c) * (a - c), mu * (a - c) * d, mu * (a - c) * d,
-        rod.inertia_across + mu * d * d;
-    stiffness << vehicle.gravity * (m * c + M * a), 0.0, 0.0, vehicle.gravity * M * d;
-    const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::Matrix2d> modes(stiffness, inertia);
+    const double of_body = 0.04 + mu * (a - c) * (a - c), of_both = mu * (a - c) * d,
+                 of_rod = rod.inertia_across + mu * d * d;
+    const double holds_body = vehicle.gravity * (m * c + M * a),
+                 holds_rod = vehicle.gravity * M * d;
+    // (holds_body − ω² of_body) (holds_rod − ω² of_rod) = (ω² of_both)²
+    const double square = of_body * of_rod - of_both * of_both;
+    const double half = 0.5 * (holds_body * of_rod + holds_rod * of_body);
+    const double root = std::sqrt(half * half - square * holds_body * holds_rod);
     Inputs inputs;
     inputs.f_Q_W << 0.0, 0.0, -(m + M) * vehicle.gravity;
-    for (int mode = 0; mode < 2; ++mode) {
-      const Eigen::Vector2d shape = 1e-5 * modes.eigenvectors().col(mode).normalized();
+    for (const double omega_2 : {(half - root) / square, (half + root) / square}) {
+      const Eigen::Vector2d shape =
+          1e-5 * Eigen::Vector2d(omega_2 * of_both, holds_body - omega_2 * of_body).normalized();
       State state;
       state.q_WB = AngleAxisd(shape(0), Vector3d::UnitY());
       state = with_rod(state, {std::sin(shape(1)), 0.0, std::cos(shape(1))});
-      const double period = 2.0 * kPi / std::sqrt(modes.eigenvalues()(mode));
+      const double period = 2.0 * kPi / std::sqrt(omega_2);
       // On the other side after half a period, back after a whole one. The finite amplitude causes
       // a relative error of 1e-10.
       for (const double sign : {-1.0, 1.0}) {

@@ -127,9 +127,6 @@ TEST(ViewSystemTest, AKilledServerIsSilentAndTheNextRunIsShown) {
 
 /// A stopped viewer is the worst case: it reads nothing from its sockets.
 TEST(ViewSystemTest, ThreeViewersOfWhichOneIsStoppedChangeNothing) {
-  Flight alone(scenario("figure_eight"));
-  alone.expect_success();
-
   const OwnDomain other;  // the flight below must not begin before its viewers
   const TemporaryFolder folder;
   std::vector<std::unique_ptr<Process>> viewers;
@@ -154,10 +151,8 @@ TEST(ViewSystemTest, ThreeViewersOfWhichOneIsStoppedChangeNothing) {
   EXPECT_TRUE(pages[2]->wait_for_status("phase", "finished"));
   viewers[0]->send(SIGCONT);
 
-  const auto manifest = read_manifest(recording);
-  EXPECT_TRUE(manifest.at("complete").get<bool>());
-  for (const char* file : {"state.csv", "reference.csv"})
-    EXPECT_TRUE(read_bytes(recording / file) == read_bytes(alone.recording() / file)) << file;
+  EXPECT_TRUE(read_manifest(recording).at("complete").get<bool>());
+  expect_undisturbed(recording, scenario("figure_eight"));
 }
 
 std::vector<std::string> make_launch(const OwnDomain& domain, const std::string& recording) {
@@ -168,6 +163,8 @@ std::vector<std::string> make_launch(const OwnDomain& domain, const std::string&
           scenario("short"),
           "--mode",
           "realtime",
+          "--rtf",
+          "0.25",  // 8 s: on a busy machine the viewer takes seconds to start
           "--domain",
           domain.text(),
           "--out",
@@ -268,7 +265,7 @@ TEST(ViewSystemTest, AnOperatorGetsInBeside300ClientsThatDoNotRead) {
     }
   }
   std::size_t most = 0;
-  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(4);
   ASSERT_TRUE(wait_until([&] {
     fly();
     most = std::max(most, find_memory(viewer->id()));

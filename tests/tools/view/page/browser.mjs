@@ -6,32 +6,40 @@ import puppeteer from "puppeteer-core";
 
 const kChromium = process.env.SLS_CHROMIUM ?? "/usr/bin/chromium";
 
-export async function startBrowser({ flags = [], width = 1366, height = 768, scheme = "dark", touch = false } = {}) {
+/** A browser, and its first tab, as of `open`. */
+export async function startBrowser({ flags = [] } = {}) {
   const folder = mkdtempSync(join(tmpdir(), "sls-view-chromium-"));
   const browser = await puppeteer.launch({
     executablePath: kChromium,
     headless: true,
     userDataDir: folder,
     protocolTimeout: 120_000,
-    defaultViewport: { width, height, hasTouch: touch, isMobile: touch, deviceScaleFactor: 1 },
     args: ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run",
            "--disable-background-networking", "--disable-component-update", "--disable-sync", "--disable-dev-shm-usage",
            ...flags],
   });
-  const [page] = await browser.pages();
+  return {
+    browser,
+    ...(await open(browser)),
+    async stop() {
+      await browser.close();
+      rmSync(folder, { recursive: true, force: true, maxRetries: 5 });
+    },
+  };
+}
+
+/** A tab that shares nothing with the others; `errors` and `requests` grow. */
+export async function open(browser, { width = 1366, height = 768, scheme = "dark", touch = false } = {}) {
+  const context = await browser.createBrowserContext();
+  const page = await context.newPage();
+  await page.setViewport({ width, height, hasTouch: touch, isMobile: touch, deviceScaleFactor: 1 });
   await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: scheme }]);
   const errors = [];
   const requests = [];
   page.on("console", (message) => ["error", "warn"].includes(message.type()) && errors.push(message.text()));
   page.on("pageerror", (error) => errors.push(String(error)));
   page.on("request", (request) => requests.push(request.url()));
-  return {
-    browser, page, errors, requests,
-    async stop() {
-      await browser.close();
-      rmSync(folder, { recursive: true, force: true, maxRetries: 5 });
-    },
-  };
+  return { page, errors, requests, close: () => context.close() };
 }
 
 /** Waits until `check` returns a true value. @throws Error after `limit` ms, with the last value. */

@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { mkdirSync } from "node:fs";
 import { join } from "node:path";
-import { readPixels, startBrowser, waitFor } from "./browser.mjs";
+import { open, readPixels, startBrowser, waitFor } from "./browser.mjs";
 import { calcLoad, calcQuad, startFakeServer } from "./fake_server.mjs";
 
 const [html, folder, word = ""] = process.argv.slice(2);
@@ -17,17 +17,19 @@ const state = (page) => page.evaluate(() => window.slsView.state());
 const untilFlies = (page) => waitFor("poses", () => page.evaluate(() => (window.slsView?.state().step ?? 0) > 0));
 const isColour = (pixel, expected) => pixel.every((value, index) => Math.abs(value - expected[index]) <= kTolerance);
 
-/** Starts server and browser, runs `body`, ends both. Expects no console error and no request to another server. */
-async function withPage(serverOptions, browserOptions, body, { mayWarn = false, hash = "" } = {}) {
+const chromium = await startBrowser();
+
+/** Starts a server, runs `body` with the page in a tab, ends both. Expects no console error and no request to another server. */
+async function withPage(serverOptions, tabOptions, body, { mayWarn = false, hash = "", browser = chromium.browser } = {}) {
   const server = await startFakeServer({ page: html, ...serverOptions });
-  const chromium = await startBrowser(browserOptions);
+  const { page, errors, requests, close } = await open(browser, tabOptions);
   try {
-    await chromium.page.goto(server.url + hash, { waitUntil: "load" });
-    await body(chromium.page, server, chromium);
-    if (!mayWarn) assert.deepEqual(chromium.errors, []);
-    for (const url of chromium.requests) assert.ok(url.startsWith(server.url) || url.startsWith("data:"), `foreign request: ${url}`);
+    await page.goto(server.url + hash, { waitUntil: "load" });
+    await body(page, server);
+    if (!mayWarn) assert.deepEqual(errors, []);
+    for (const url of requests) assert.ok(url.startsWith(server.url) || url.startsWith("data:"), `foreign request: ${url}`);
   } finally {
-    await chromium.stop();
+    await close();
     await server.stop();
   }
 }
@@ -44,7 +46,7 @@ function projectFlat({ mode, target_m: [tx, ty, tz], height_m, area }, [x, y, z]
 
 const tests = {
   async "pixels show quadrotor and load where the closed form has them"() {
-    await withPage({}, {}, async (page, server, { browser }) => {
+    await withPage({}, {}, async (page, server) => {
       await untilFlies(page);
       const step = 500;
       server.freeze(step);
@@ -57,7 +59,7 @@ const tests = {
         const camera = await page.evaluate(() => window.slsView.camera());
         const png = await page.screenshot({ path: join(folder, `${mode}.png`) });
         const points = [calcQuad(0, step * 0.004, 1), calcLoad(0, step * 0.004, 1)];
-        const [quad, load] = await readPixels(browser, png, points.map((point) => projectFlat(camera, point)));
+        const [quad, load] = await readPixels(chromium.browser, png, points.map((point) => projectFlat(camera, point)));
         // From above the quadrotor hides the load.
         assert.ok(isColour(quad, kQuad), `${mode}: quadrotor: expected ${kQuad}, got ${quad}`);
         if (mode === "side") assert.ok(isColour(load, kLoad), `${mode}: load: expected ${kLoad}, got ${load}`);
@@ -86,29 +88,28 @@ const tests = {
   },
 
   async "a connection that is lost is found again without reload, and the picture stays"() {
-    let port = 0;
     const first = await startFakeServer({ page: html });
-    port = first.port;
-    const chromium = await startBrowser();
+    const { port } = first;
+    const { page, close } = await open(chromium.browser);
     try {
-      await chromium.page.goto(first.url);
-      await untilFlies(chromium.page);
-      await chromium.page.evaluate(() => (window.isSamePage = true));
+      await page.goto(first.url);
+      await untilFlies(page);
+      await page.evaluate(() => (window.isSamePage = true));
       await first.stop();
-      await waitFor("banner", () => chromium.page.$eval("#banner", ({ hidden, textContent }) => !hidden && /lost/.test(textContent)));
-      assert.equal(await chromium.page.$eval("[data-action=pause]", ({ disabled }) => disabled), true);
-      assert.ok(await chromium.page.evaluate(() => window.slsView.projection(0)));
-      await chromium.page.screenshot({ path: join(folder, "lost.png") });
+      await waitFor("banner", () => page.$eval("#banner", ({ hidden, textContent }) => !hidden && /lost/.test(textContent)));
+      assert.equal(await page.$eval("[data-action=pause]", ({ disabled }) => disabled), true);
+      assert.ok(await page.evaluate(() => window.slsView.projection(0)));
+      await page.screenshot({ path: join(folder, "lost.png") });
       const second = await startFakeServer({ page: html, port });
       try {
-        await waitFor("connection", async () => (await state(chromium.page)).is_connected);
-        await waitFor("no banner", () => chromium.page.$eval("#banner", ({ hidden }) => hidden));
-        assert.equal(await chromium.page.evaluate(() => window.isSamePage), true);
+        await waitFor("connection", async () => (await state(page)).is_connected);
+        await waitFor("no banner", () => page.$eval("#banner", ({ hidden }) => hidden));
+        assert.equal(await page.evaluate(() => window.isSamePage), true);
       } finally {
         await second.stop();
       }
     } finally {
-      await chromium.stop();
+      await close();
     }
   },
 
@@ -134,13 +135,15 @@ const tests = {
   },
 
   async "no WebGL: a table of positions and the plots"() {
-    await withPage({ vehicles: 3 }, { flags: ["--disable-3d-apis"] }, async (page) => {
+    const flat = await startBrowser({ flags: ["--disable-3d-apis"] });
+    const check = async (page) => {
       await untilFlies(page);
       assert.equal((await state(page)).has_scene, false);
       await waitFor("numbers in the table", () => page.$eval("#table tbody td:nth-child(2)", ({ textContent }) => /\d/.test(textContent)));
       await waitFor("a plot", () => page.$("#plots canvas"));
       await page.screenshot({ path: join(folder, "no_webgl.png") });
-    }, { mayWarn: true });
+    };
+    await withPage({ vehicles: 3 }, {}, check, { mayWarn: true, browser: flat.browser }).finally(flat.stop);
   },
 
   async "without the token there are no buttons; it leaves the address and never reaches the server over HTTP"() {
@@ -175,9 +178,13 @@ const tests = {
   },
 };
 
-for (const [name, test] of Object.entries(tests)) {
-  if (!name.includes(word)) continue;
-  const began = performance.now();
-  await test();
-  console.log(`ok ${name} (${((performance.now() - began) / 1000).toFixed(1)} s)`);
+try {
+  for (const [name, test] of Object.entries(tests)) {
+    if (!name.includes(word)) continue;
+    const began = performance.now();
+    await test();
+    console.log(`ok ${name} (${((performance.now() - began) / 1000).toFixed(1)} s)`);
+  }
+} finally {
+  await chromium.stop();
 }

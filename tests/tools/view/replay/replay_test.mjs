@@ -217,6 +217,7 @@ test("a flight of one step has no axes, and names and legends stay whole at the 
     return new Set([...range.getClientRects()].map((box) => box.top)).size > one.lastChild.textContent.split(" ").length;
   }).length);
   assert.equal(broken, 0);
+  await page.close();
 });
 
 test("a damaged recording in the page is named on it", async () => {
