@@ -9,7 +9,6 @@
 #include "common/app/log.hpp"
 #include "common/app/run_main.hpp"
 #include "common/app/scheduling.hpp"
-#include "common/app/wait.hpp"
 #include "common/bus/convert.hpp"
 #include "common/bus/spinning.hpp"
 #include "common/config/vehicle_ids.hpp"
@@ -55,26 +54,17 @@ std::unique_ptr<AnswerStream> Client::make_stream(bool is_realtime) {
 
 void Client::run() {
   announce_waiting();
-  while (true) {
-    switch (look()) {
-      case ClientCore::Act::kNone:
-        break;
-      case ClientCore::Act::kBegin:
-        begin();
-        continue;
-      case ClientCore::Act::kAnnounceReady:
-        announce(true, false);
-        break;
-      case ClientCore::Act::kLeave:
-        if (run_) leave();
-        [[fallthrough]];
-      case ClientCore::Act::kGiveUp:
-        if (core_.error().empty()) return;
-        throw app::RunError(core_.error() + describe_obstacles());
-    }
+  for (act(look()); core_.phase() != ClientCore::Phase::kEnded; act(look())) {
     announcer_.repeat_if_due();
-    std::this_thread::sleep_for(run_ ? app::kPollTime : app::kShortPollTime);
+    std::this_thread::sleep_until(core_.next_deadline());
   }
+  if (!core_.error().empty()) throw app::RunError(core_.error() + describe_obstacles());
+}
+
+void Client::act(ClientCore::Act act) {
+  if (act == ClientCore::Act::kBegin) begin();
+  if (act == ClientCore::Act::kAnnounceReady) announce(true, false);
+  if (act == ClientCore::Act::kLeave) leave();
 }
 
 ClientCore::Act Client::look() {

@@ -62,6 +62,7 @@ class Client {
   std::unique_ptr<AnswerStream> make_stream(bool is_realtime);
   /// Looks once; returns what is to be done.
   ClientCore::Act look();
+  void act(ClientCore::Act act);
   std::string describe_obstacles() const;
   void begin();
   void leave();

@@ -1,6 +1,7 @@
 #include "recorder/inbox.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <utility>
 
 namespace sls::record {
@@ -67,8 +68,12 @@ bool Inbox::empty_into(Recording& recording) {
     size_ = 0;
     samples.swap(samples_);
   }
+  const auto now = std::chrono::steady_clock::now();
   for (const Sample& sample : samples)
-    std::visit([&](const auto& message) { recording.add(message); }, sample);
+    if (const auto* batch = std::get_if<RecordBatch>(&sample))
+      recording.add(*batch, now);
+    else
+      recording.add(std::get<SimStatus>(sample));
   return !samples.empty();
 }
 

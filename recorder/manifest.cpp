@@ -158,16 +158,6 @@ ManifestFile to_manifest(const Json& json) {
 
 }  // namespace
 
-std::string describe(const MissingSamples& missing) {
-  if (missing.empty()) return "nothing missing";
-  std::uint64_t steps = missing.further_samples;
-  for (const MissingSteps& gap : missing.listed) steps += gap.to - gap.from + 1;
-  const MissingSteps& first = missing.listed.front();
-  const char* unit = first.topic == StatusRow::kTopic ? "sample" : "step";
-  return fmt::format("{} samples missing, first {} {} {} of vehicle {}", steps, first.topic, unit,
-                     first.from, first.vehicle_id);
-}
-
 void write_manifest(const std::filesystem::path& folder, const Manifest& manifest) {
   const Parameters& parameters = manifest.parameters;
   const app::Unhurried unhurried;  // the files are synchronised and read once more

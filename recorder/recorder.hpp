@@ -1,12 +1,17 @@
-/// The recorder: finds the runs to record, one after another, and chooses their folders.
+/// The recorder over DDS: watches the domain, and does what its core decides. It has two threads in
+/// addition to those of the middleware: this one, the main thread, and the one that writes.
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
-#include <string>
 
-#include "recorder/run_recorder.hpp"
+#include "common/bus/node.hpp"
+#include "common/bus/participants.hpp"
+#include "recorder/core/recorder_core.hpp"
+#include "recorder/inbox.hpp"
+#include "recorder/writing_thread.hpp"
 
 namespace sls::record {
 
@@ -22,21 +27,27 @@ class Recorder {
   Recorder(bus::Node& node, const RecorderOptions& options);
 
   /// Records the first run that it finds and, after a reset by an operator, the following runs.
-  /// @throws app::RunError if there is no run, or the last recording is not complete.
+  /// @throws app::RunError if there is no run, or the last recording is not complete; the error of
+  ///   the writing thread, after it has announced the end to the other programs.
   void run();
 
  private:
-  std::optional<sync::Run> wait_for_first_run();
-  std::optional<sync::Run> find_unfinished_run() const;
-  std::optional<sync::Run> wait_for_next_run(const sync::Run& ended, double limit_s);
-  std::optional<sync::Run> find_follower(const sync::Run& ended) const;
-  std::optional<sync::Run> go_on_after(const sync::Run& run, const RunEnd& end);
-  Segment open_segment(const sync::Run& run);
+  RecorderCore::Act look();
+  void act(RecorderCore::Act act);
+  RecorderCore::Now look_around() const;
+  void open();
+  Segment make_segment() const;
+  void report();
+  void announce(bool done);
 
   const RecorderOptions options_;
   const bus::Node& node_;
-  bool is_folder_used_ = false;  // true after the first run
-  Surroundings surroundings_;
+  RecorderCore core_;
+  bus::ParticipantDirectory participants_;
+  bus::ServerDirectory servers_;
+  bus::Announcer announcer_;
+  Inbox inbox_;
+  std::unique_ptr<WritingThread> writing_;  // of the run that is recorded
 };
 
 }  // namespace sls::record

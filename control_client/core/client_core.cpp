@@ -5,10 +5,26 @@
 #include "common/config/vehicle_ids.hpp"
 
 namespace sls::control {
+namespace {
+
+// Between two looks.
+constexpr sync::Duration kFindingTime = std::chrono::milliseconds(5);
+constexpr sync::Duration kFlyingTime = std::chrono::milliseconds(20);
+
+}  // namespace
 
 ClientCore::Act ClientCore::look(const sync::Servers& servers, const Now& now) {
+  const Act act = decide(servers, now);
+  // A flight can be shorter than the time between two looks while it is flown.
+  deadline_ = now.time + (act == Act::kBegin          ? sync::Duration()
+                          : phase_ == Phase::kFinding ? kFindingTime
+                                                      : kFlyingTime);
+  return act;
+}
+
+ClientCore::Act ClientCore::decide(const sync::Servers& servers, const Now& now) {
   if (phase_ == Phase::kEnded) return Act::kNone;
-  if (now.is_stopped) return end(Act::kLeave);
+  if (now.is_stopped) return end(run_ ? Act::kLeave : Act::kGiveUp);
   return phase_ == Phase::kFinding ? find(servers, now) : fly(servers, now);
 }
 

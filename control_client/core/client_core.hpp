@@ -35,14 +35,17 @@ class ClientCore {
     kNone,
     kBegin,          ///< join run(), then go on looking
     kAnnounceReady,  ///< the server hears the answers from now on
-    kLeave,          ///< the run has ended or the client is stopped; failed if error() says so
-    kGiveUp,         ///< error() says why
+    kLeave,          ///< announce that the client has left run(), and end
+    kGiveUp,         ///< end
   };
 
   /// Begins to wait for a server with the first look.
   explicit ClientCore(Options options) : options_(std::move(options)) {}
 
+  /// Once the phase is kEnded, error() says whether something is wrong.
   Act look(const sync::Servers& servers, const Now& now);
+  /// When the next look is due.
+  sync::Time next_deadline() const { return deadline_; }
 
   Phase phase() const { return phase_; }
   /// The run that is flown; empty before the first.
@@ -54,6 +57,7 @@ class ClientCore {
   std::vector<sync::Line> take_lines() { return std::exchange(lines_, {}); }
 
  private:
+  Act decide(const sync::Servers& servers, const Now& now);
   Act find(const sync::Servers& servers, const Now& now);
   Act fly(const sync::Servers& servers, const Now& now);
   Act begin(const sync::Run& run, sync::Time now);
@@ -62,6 +66,7 @@ class ClientCore {
 
   const Options options_;
   Phase phase_ = Phase::kFinding;
+  sync::Time deadline_;
   std::optional<sync::Patience> patience_;  // of finding the first run
   std::optional<sync::Run> run_;
   std::optional<sync::ServerWatch> watch_;  // of the run

@@ -19,12 +19,14 @@ constexpr auto kAnnounceTime = 500ms;     // longest time between two announceme
 }  // namespace
 
 RunWatch::RunWatch(const sync::Run& run, std::uint32_t vehicle, double server_deadline_s,
-                   sync::Time now)
+                   const Now& now)
     : run_(run),
       run_id_(run.parameters.run_id()),
       vehicle_(vehicle),
       server_deadline_s_(server_deadline_s),
-      server_(run_id_, server_deadline_s, now) {}
+      server_(run_id_, server_deadline_s, now.time),
+      announced_step_(now.last_complete_step),
+      announced_time_(now.time) {}
 
 bool RunWatch::look(const sync::Servers& servers, const Now& now) {
   const auto status = servers.find_status(run_id_);
@@ -83,13 +85,12 @@ bool RunWatch::is_announcement_due(const Now& now) {
   is_ready_ = is_ready_ || is_now_ready;
   const auto age = now.time - announced_time_;
   const std::int64_t news = now.last_complete_step - announced_step_;
-  return is_now_ready || age >= kAnnounceTime || news >= kManySteps ||
-         (news > 0 && age >= kNewsTime);
-}
-
-void RunWatch::note_announcement(const Now& now) {
+  const bool is_due =
+      is_now_ready || age >= kAnnounceTime || news >= kManySteps || (news > 0 && age >= kNewsTime);
+  if (!is_due) return false;
   announced_step_ = now.last_complete_step;
   announced_time_ = now.time;
+  return true;
 }
 
 }  // namespace sls::record

@@ -1,5 +1,4 @@
-/// When the recording of a run ends, and when its recorder announces itself. No network, thread or
-/// clock here: the shell (recorder/run_recorder.hpp) looks every few milliseconds.
+/// When the recording of a run ends, and when its recorder announces itself.
 #pragma once
 
 #include <cstdint>
@@ -32,16 +31,16 @@ class RunWatch {
     std::optional<sync::Run> replacement;  ///< a run of another server that replaces this one
   };
 
-  /// Watches `run`, which is recorded because it has `vehicle`, from `now` on.
-  RunWatch(const sync::Run& run, std::uint32_t vehicle, double server_deadline_s, sync::Time now);
+  /// Watches `run`, which is recorded because it has `vehicle`, from `now` on. The recorder has
+  /// just announced itself.
+  RunWatch(const sync::Run& run, std::uint32_t vehicle, double server_deadline_s, const Now& now);
 
   /// True once no further samples are waited for.
   bool look(const sync::Servers& servers, const Now& now);
   const End& end() const { return end_; }
 
-  /// True if an announcement is due. note_announcement says that it was made.
+  /// True if the recorder must announce itself now.
   bool is_announcement_due(const Now& now);
-  void note_announcement(const Now& now);
   /// The recorder hears the server of its run.
   bool is_ready() const { return is_ready_; }
 
@@ -60,7 +59,7 @@ class RunWatch {
   std::optional<sync::Patience> give_up_;  // once the run is known to end
   std::int64_t step_after_end_ = -1;       // last complete step at the last look after the end
   bool is_ready_ = false;
-  std::int64_t announced_step_ = -1;
+  std::int64_t announced_step_;
   sync::Time announced_time_;
   End end_;
   std::vector<sync::Line> lines_;

@@ -9,7 +9,7 @@
 
 #include "common/bus/convert.hpp"
 #include "common/bus/fastdds/guarded_type.hpp"
-#include "recorder/stream.hpp"
+#include "recorder/core/stream.hpp"
 #include "sim_server/core/command_gate.hpp"
 #include "sim_server/core/run_control.hpp"
 
@@ -62,8 +62,8 @@ struct Judges {
         break;
       case 2:
         if (const auto batch = deserialize<RecordBatchPubSubType, RecordBatch>(data, size))
-          stream.add(*batch);
-        stream.pass_time(std::chrono::seconds(sender));
+          stream.add(*batch, now);
+        stream.on_time(now += std::chrono::milliseconds(10 * sender));
         break;
       case 3:
         if (const auto request = deserialize<SimControlPubSubType, SimControl>(data, size)) {
@@ -105,6 +105,7 @@ struct Judges {
   sim::RunControl control{kRun, {0}, false};
   const Parameters parameters = make_parameters();
   std::map<std::uint32_t, std::uint64_t> last_steps;
+  sync::Time now;
   record::Stream stream{parameters, 0, [this](const record::StepRows& rows) { check(rows); },
                         [](std::uint32_t, std::uint64_t, std::uint64_t) {}};
 };

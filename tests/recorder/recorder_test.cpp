@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <atomic>
 #include <nlohmann/json.hpp>
 #include <thread>
 
@@ -118,20 +117,11 @@ class RecorderTest : public testing::Test {
       } catch (const std::exception& error) {
         error_ = error.what();
       }
-      has_ended_ = true;
     });
   }
   /// Waits for the end of the recorder; `error_` then has its error.
   void join() {
     if (thread_.joinable()) thread_.join();
-  }
-  /// The same; meanwhile `waiting` repeats the status of a waiting server.
-  void join_beside(FakeFlight& waiting) {
-    EXPECT_TRUE(wait_until([&] {
-      waiting.keep_alive(RunPhase::PHASE_WAITING);
-      return has_ended_.load();
-    }));
-    join();
   }
 
   Json read_manifest(const fs::path& folder) {
@@ -155,7 +145,6 @@ class RecorderTest : public testing::Test {
   RecorderOptions options_;
   std::thread thread_;
   std::string error_ = "no error";
-  std::atomic<bool> has_ended_{false};
 };
 
 TEST_F(RecorderTest, RecordsARunToItsEnd) {
@@ -206,68 +195,6 @@ TEST_F(RecorderTest, AResetsNewRunGoesIntoASubfolder) {
   EXPECT_EQ(read_manifest(out_).at("outcome"), "reset");
   EXPECT_EQ(read_manifest(out_).at("missing"), Json::array());
   expect_whole(out_ / "run-fedcba9876543210");
-}
-
-TEST_F(RecorderTest, ARunThatIsReplacedByAnotherServersEndsTheRecording) {
-  auto flight = std::make_unique<FakeFlight>(kRunId);
-  start();
-  ASSERT_TRUE(flight->wait_for_recorder());
-  flight->fly(0, 100);
-  ASSERT_TRUE(flight->is_recorded_up_to(99));
-  flight.reset();
-  FakeFlight other(kOtherRun);
-  join_beside(other);
-  EXPECT_NE(error_.find("run 0123456789abcdef was replaced by run fedcba9876543210"),
-            std::string::npos)
-      << error_;
-  EXPECT_EQ(read_manifest(out_).at("outcome"), "lost");
-  EXPECT_EQ(read_manifest(out_).at("missing"), Json::array());
-}
-
-TEST_F(RecorderTest, ARecorderThatFollowsRecordsTheOtherServersRun) {
-  options_.follow = true;
-  auto flight = std::make_unique<FakeFlight>(kRunId);
-  start();
-  ASSERT_TRUE(flight->wait_for_recorder());
-  flight->fly(0, 100);
-  ASSERT_TRUE(flight->is_recorded_up_to(99));
-  flight.reset();
-  FakeFlight other(kOtherRun);
-  ASSERT_TRUE(other.wait_for_recorder());
-  other.fly(0, kLastStep);
-  other.publish(RunPhase::PHASE_FINISHED, kLastStep);
-  join();
-  EXPECT_EQ(error_, "no error");
-  EXPECT_EQ(read_manifest(out_).at("outcome"), "lost");
-  expect_whole(out_ / "run-fedcba9876543210");
-}
-
-TEST_F(RecorderTest, AKilledRecorderIsResumedInMidFlight) {
-  record_until_killed(make_segment(out_), 0, 100);
-  FakeFlight flight(kRunId);
-  flight.fly(0, 200);  // the histories have the samples for the next recorder
-  options_.unfinished = find_unfinished_recording(out_);
-  options_.vehicle = 3;  // ignored: the recording names its vehicle
-  start();
-  ASSERT_TRUE(flight.is_recorded_up_to(199));
-  flight.fly(201, kLastStep);
-  flight.publish(RunPhase::PHASE_FINISHED, kLastStep);
-  join();
-  EXPECT_EQ(error_, "no error");
-  expect_whole(out_);
-  EXPECT_EQ(read_manifest(out_ / "segment-2").at("segment").at("first_step"), 101);
-}
-
-TEST_F(RecorderTest, ARecordingOfAnotherRunIsNotResumed) {
-  record_until_killed(make_segment(out_), 0, 100);
-  FakeFlight flight(kOtherRun);
-  options_.unfinished = find_unfinished_recording(out_);
-  start();
-  join();
-  EXPECT_NE(error_.find("run 0123456789abcdef was replaced by run fedcba9876543210"),
-            std::string::npos)
-      << error_;
-  EXPECT_FALSE(fs::exists(out_ / "segment-2"));
 }
 
 }  // namespace

@@ -355,42 +355,6 @@ TEST_F(RecordingTest, StepsLostInOneStretchAreListedAndMakeItIncomplete) {
   EXPECT_NE(read_bytes(folder_ / "flight.txt").find("sls/state step 50"), std::string::npos);
 }
 
-TEST_F(RecordingTest, AStepAmidARunWithoutAnAnswerMissesIt) {
-  add_steps(0, 49);
-  feeder_.add({make_bare_entry(50)});
-  add_steps(51, kLastStep);
-  recording_->add(make_status(RunPhase::PHASE_FINISHED, kLastStep));
-  EXPECT_FALSE(finish());
-  const auto gap = [](const char* topic) {
-    return Json({{"vehicle_id", 0}, {"topic", topic}, {"from", 50}, {"to", 50}});
-  };
-  EXPECT_EQ(read_manifest().at("missing"), Json::array({gap("sls/command"), gap("sls/reference")}));
-}
-
-TEST_F(RecordingTest, AFinishedRunWithoutItsLastAnswerMissesIt) {
-  add_steps(0, kLastStep - 1);
-  feeder_.add({make_bare_entry(kLastStep)}, true);
-  recording_->add(make_status(RunPhase::PHASE_FINISHED, kLastStep));
-  EXPECT_FALSE(finish());
-  EXPECT_EQ(read_manifest().at("missing").size(), 2u);
-}
-
-TEST_F(RecordingTest, TheLostEndOfAFinishedRunIsListed) {
-  add_steps(0, 200);
-  recording_->add(make_status(RunPhase::PHASE_FINISHED, kLastStep));
-  EXPECT_FALSE(recording_->has_all());
-  EXPECT_FALSE(finish());
-  std::set<std::string> topics;
-  const Json manifest = read_manifest();
-  for (const Json& gap : manifest.at("missing")) {
-    topics.insert(gap.at("topic").get<std::string>());
-    EXPECT_EQ(gap.at("to"), kLastStep);
-    EXPECT_EQ(gap.at("from"), 201);
-  }
-  EXPECT_EQ(topics, (std::set<std::string>{"sls/state", "sls/command", "sls/reference"}));
-  EXPECT_EQ(manifest.at("last_step"), kLastStep);
-}
-
 // A network that loses steps for days.
 TEST_F(RecordingTest, OfManyGapsTheFirstAreListedAndTheOthersCounted) {
   constexpr std::uint64_t kGaps = 3000;  // of one step, in each of three topics
@@ -405,26 +369,6 @@ TEST_F(RecordingTest, OfManyGapsTheFirstAreListedAndTheOthersCounted) {
   const ManifestFile read = record::read_manifest(folder_.path());
   EXPECT_EQ(describe(read.missing), "9000 samples missing, first sls/state step 0 of vehicle 0");
   EXPECT_EQ(recording_->describe_gaps(), describe(read.missing));
-}
-
-TEST_F(RecordingTest, AGapThatIsNotListedMayBeLong) {
-  for (std::uint64_t i = 0; i < 400; ++i) feeder_.add({make_entry(2 * i + 1)});
-  recording_->add(make_status(RunPhase::PHASE_FINISHED, 2000));  // steps 800 to 2000 are missing
-  EXPECT_FALSE(finish());
-  const Json further = read_manifest().at("further_missing");
-  EXPECT_EQ(further.at("gaps"), 3 * 401 - 1000);
-  EXPECT_EQ(further.at("samples"), 3 * (400 + 1201) - 1000);
-}
-
-TEST_F(RecordingTest, SamplesTheQueueRefusedMakeItIncomplete) {
-  fly_to_the_end();
-  EXPECT_FALSE(finish("", 3));
-  const Json manifest = read_manifest();
-  EXPECT_EQ(manifest.at("complete"), false);
-  EXPECT_EQ(manifest.at("refused_samples"), 3);
-  const std::string gaps = recording_->describe_gaps();
-  EXPECT_NE(gaps.find("3 samples"), std::string::npos) << gaps;
-  EXPECT_NE(gaps.find("queue"), std::string::npos) << gaps;
 }
 
 TEST_F(RecordingTest, UnansweredStepsAreRowsAndNotMissing) {
@@ -454,29 +398,6 @@ TEST_F(RecordingTest, UnansweredStepsAreRowsAndNotMissing) {
   EXPECT_EQ(references.text(10, "step"), "12");
   EXPECT_EQ(references.number(10, "ref_x_m"), make_entry(12).answer().reference().position_m()[0]);
   EXPECT_EQ(read_table("flight.csv").rows.size(), kLastStep + 1 - 9);
-}
-
-TEST_F(RecordingTest, ALateJoinerListsWhatItHasMissed) {
-  add_steps(100, kLastStep);
-  recording_->add(make_status(RunPhase::PHASE_FINISHED, kLastStep));
-  EXPECT_FALSE(finish());
-  const Json manifest = read_manifest();
-  ASSERT_EQ(manifest.at("missing").size(), 3u);
-  for (const Json& gap : manifest.at("missing")) {
-    EXPECT_EQ(gap.at("from"), 0);
-    EXPECT_EQ(gap.at("to"), 99);
-  }
-  EXPECT_EQ(read_table("state.csv").text(0, "step"), "100");
-}
-
-TEST_F(RecordingTest, DroppedEntriesAreCountedInTheManifest) {
-  add_steps(0, 10);
-  recording_->add(make_batch(3, {make_entry(3), make_entry(200)}));
-  feeder_.add({make_entry(5), make_entry(11, 9)});
-  add_steps(11, kLastStep);
-  recording_->add(make_status(RunPhase::PHASE_FINISHED, kLastStep));
-  EXPECT_TRUE(finish());
-  EXPECT_EQ(read_manifest().at("dropped"), Json({{"repeated", 3}, {"out_of_range", 1}}));
 }
 
 // --- attitude, signals, measurements -------------------------------------------------------------
@@ -559,37 +480,6 @@ TEST_F(RecordingTest, AFailedRunIsKeptWithItsCauseAndNeverComplete) {
   EXPECT_NE(gaps.find("answered with a fault"), std::string::npos) << gaps;
 }
 
-TEST_F(RecordingTest, AFailedRunsLastStepNeedsNoAnswer) {
-  add_steps(0, 149);
-  feeder_.add({make_bare_entry(150)}, true);
-  recording_->add(make_status(RunPhase::PHASE_FAILED, 150, "no answer to step 150"));
-  EXPECT_FALSE(finish());
-  EXPECT_EQ(read_manifest().at("missing"), Json::array());
-  EXPECT_EQ(read_table("state.csv").rows.size(), 151u);
-  EXPECT_EQ(read_table("command.csv").rows.size(), 150u);
-}
-
-TEST_F(RecordingTest, ARunThatFailedBeforeItBeganMissesNothing) {
-  recording_->add(make_status(RunPhase::PHASE_WAITING, 0, "missing: controller"));
-  recording_->add(make_status(RunPhase::PHASE_FAILED, 0, "not ready within 30 s: controller"));
-  EXPECT_FALSE(finish());
-  EXPECT_EQ(read_manifest().at("missing"), Json::array());
-  EXPECT_EQ(read_manifest().at("outcome"), "failed");
-  const std::string gaps = recording_->describe_gaps();
-  EXPECT_NE(gaps.find("not ready within 30 s"), std::string::npos) << gaps;
-}
-
-TEST_F(RecordingTest, TheReasonOfAFailureComesBeforeTheMissingSteps) {
-  add_steps(0, 20);
-  add_steps(22, 30);
-  recording_->add(make_status(RunPhase::PHASE_FAILED, 30, "the recorder was behind"));
-  EXPECT_FALSE(finish());
-  const std::string gaps = recording_->describe_gaps();
-  EXPECT_NE(gaps.find("the recorder was behind"), std::string::npos) << gaps;
-  EXPECT_NE(gaps.find("missing"), std::string::npos) << gaps;
-  EXPECT_EQ(gaps.find('\n'), std::string::npos) << gaps;
-}
-
 TEST_F(RecordingTest, AnInterruptedRunIsReportedAsInterrupted) {
   recording_->add(make_status(RunPhase::PHASE_RUNNING, 0));
   add_steps(0, 99);
@@ -604,80 +494,6 @@ TEST_F(RecordingTest, AnInterruptedRunIsReportedAsInterrupted) {
   const std::string gaps = recording_->describe_gaps();
   EXPECT_NE(gaps.find("SIGINT"), std::string::npos) << gaps;
   EXPECT_NE(read_bytes(folder_ / "flight.txt").find("SIGINT"), std::string::npos);
-}
-
-TEST_F(RecordingTest, AResetRunIsKeptAndItsLastStepNeedsNoAnswer) {
-  recording_->add(make_status(RunPhase::PHASE_RUNNING, 0));
-  add_steps(0, 99);
-  feeder_.add({make_bare_entry(100)}, true);
-  recording_->add(make_status(RunPhase::PHASE_RESET, 100, "reset by nina@lab"));
-  EXPECT_FALSE(finish());
-  const Json manifest = read_manifest();
-  EXPECT_EQ(manifest.at("outcome"), "reset");
-  EXPECT_EQ(manifest.at("reason"), "reset by nina@lab");
-  EXPECT_EQ(manifest.at("missing"), Json::array());
-  EXPECT_EQ(manifest.at("complete"), false);
-}
-
-// The recording has only published steps.
-TEST_F(RecordingTest, AServerKilledBetweenTwoBatchesLeavesItsPublishedSteps) {
-  recording_->add(make_status(RunPhase::PHASE_RUNNING, 0));
-  add_steps(0, 99);
-  recording_->add(make_status(RunPhase::PHASE_RUNNING, 120));
-  EXPECT_FALSE(recording_->has_all());
-  EXPECT_FALSE(recording_->finish("the server is gone", 0, "lost"));
-  EXPECT_EQ(read_manifest().at("outcome"), "lost");
-  EXPECT_EQ(read_manifest().at("reason"), "the server is gone");
-  EXPECT_EQ(read_manifest().at("missing"), Json::array());
-  EXPECT_EQ(read_manifest().at("last_step"), 99);
-  EXPECT_EQ(read_table("command.csv").rows.size(), 100u);
-}
-
-TEST_F(RecordingTest, TheEndTakesBothTheStatusAndTheLastBatch) {
-  add_steps(0, kLastStep - 1);
-  recording_->add(make_status(RunPhase::PHASE_FINISHED, kLastStep));
-  EXPECT_FALSE(recording_->has_all());
-  feeder_.add({make_entry(kLastStep)});
-  EXPECT_FALSE(recording_->has_all());
-  feeder_.add({}, true);
-  EXPECT_TRUE(recording_->has_all());
-  EXPECT_TRUE(finish());
-}
-
-TEST_F(RecordingTest, StatusSamplesThatComeAgainAreOneRow) {
-  const SimStatus first = make_status(RunPhase::PHASE_WAITING, 0, "missing: controller"),
-                  second = make_status(RunPhase::PHASE_RUNNING, 0);
-  for (const SimStatus& status : {first, second, first, second}) recording_->add(status);
-  recording_->add(make_status(RunPhase::PHASE_RUNNING, 10));
-  recording_->add(first);
-  finish();
-  EXPECT_EQ(read_table("status.csv").rows.size(), 3u);
-}
-
-TEST_F(RecordingTest, MissingStatusSamplesAreNamedAndTheRecordingIsNotComplete) {
-  std::vector<SimStatus> statuses;
-  for (int i = 0; i < 40; ++i)
-    statuses.push_back(make_status(RunPhase::PHASE_WAITING, 0, "missing: recorder"));
-  for (int i = 23; i < 40; ++i)
-    if (i != 30 && i != 31) recording_->add(statuses[i]);
-  fly_to_the_end();
-  EXPECT_TRUE(recording_->has_all()) << "what is lost is not waited for";
-  EXPECT_FALSE(finish());
-  const Json manifest = read_manifest();
-  EXPECT_EQ(manifest.at("complete"), false);
-  EXPECT_EQ(manifest.at("outcome"), "finished");
-  const auto gap = [](int from, int to) {
-    return Json({{"vehicle_id", 0}, {"topic", "sls/status"}, {"from", from}, {"to", to}});
-  };
-  EXPECT_EQ(manifest.at("missing"), Json::array({gap(0, 22), gap(30, 31)}));
-  EXPECT_EQ(recording_->describe_gaps(),
-            "25 samples missing, first sls/status sample 0 of vehicle 0");
-}
-
-TEST_F(RecordingTest, ARunWithoutASingleSampleIsNotComplete) {
-  EXPECT_FALSE(finish("the server is gone"));
-  EXPECT_EQ(read_manifest().at("complete"), false);
-  for (const char* name : kCsvFiles) EXPECT_TRUE(read_table(name).rows.empty()) << name;
 }
 
 TEST_F(RecordingTest, KilledBeforeTheEndItsFilesParseAndAreMarkedIncomplete) {
@@ -760,25 +576,6 @@ TEST_F(RecordingTest, AManifestThatDoesNotFitLeavesTheEarlierOneWhole) {
 
 // --- samples of other runs, and damaged texts ----------------------------------------------------
 
-TEST_F(RecordingTest, SamplesOfOtherRunsAreIgnored) {
-  recording_->add(make_status(RunPhase::PHASE_RUNNING, 0));
-  for (std::uint64_t step = 0; step <= kLastStep; ++step) {
-    RecordBatch other = make_batch(step, {make_entry(step + 1)}, true);
-    other.run_id(kRunId + 1);
-    recording_->add(other);
-    add_steps(step, step);
-  }
-  const SimStatus end = make_status(RunPhase::PHASE_FINISHED, kLastStep);
-  SimStatus other = end;
-  other.run_id(kRunId + 1);
-  recording_->add(other);
-  EXPECT_FALSE(recording_->has_all());
-  recording_->add(end);
-  EXPECT_TRUE(finish());
-  EXPECT_EQ(read_table("state.csv").rows.size(), kLastStep + 1);
-  EXPECT_EQ(read_table("status.csv").rows.size(), 2u);
-}
-
 TEST_F(RecordingTest, TextsCutWithinALetterDoNotCostTheManifest) {
   add_steps(0, 10);
   std::string reason(254, 'x');
@@ -788,23 +585,6 @@ TEST_F(RecordingTest, TextsCutWithinALetterDoNotCostTheManifest) {
   const Json manifest = read_manifest();
   EXPECT_EQ(manifest.at("outcome"), "failed");
   EXPECT_EQ(manifest.at("reason").get<std::string>().substr(0, 254), reason.substr(0, 254));
-}
-
-TEST_F(RecordingTest, EveryVehicleOfTheRunIsWaitedFor) {
-  const sls::test::TemporaryFolder folder;
-  Parameters parameters = make_parameters();
-  set_vehicles(parameters, {0, 7});
-  Recording recording(folder.path(), parameters);
-  recording.add(make_status(RunPhase::PHASE_FINISHED, kLastStep));
-  BatchFeeder feeder(recording);
-  for (const std::uint32_t id : {0u, 7u}) {
-    EXPECT_FALSE(recording.has_all());
-    EXPECT_EQ(recording.last_complete_step(), -1);
-    for (std::uint64_t step = 0; step <= kLastStep; ++step)
-      feeder.add({make_entry(step, id)}, id == 7 && step == kLastStep);
-  }
-  EXPECT_TRUE(recording.has_all());
-  EXPECT_TRUE(recording.finish("", 0));
 }
 
 TEST_F(RecordingTest, ASecondRecordingIntoTheSameFolderIsRefusedAndTheFirstKept) {

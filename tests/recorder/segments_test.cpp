@@ -148,22 +148,6 @@ TEST_F(SegmentsTest, AnInterruptedRecordingCanBeResumedToo) {
   expect_equal_to_the_undisturbed(segment.folder);
 }
 
-TEST_F(SegmentsTest, StepsNoLongerInTheHistoriesAreNamedAsAGap) {
-  record_until_killed(make_segment(out_), 0, 150);
-  const Segment segment = resume();
-  EXPECT_FALSE(record_to_the_end(segment, 200));
-  const Json manifest = read_manifest(segment.folder);
-  EXPECT_EQ(manifest.at("complete"), false);
-  EXPECT_EQ(manifest.at("outcome"), "finished");
-  ASSERT_EQ(manifest.at("missing").size(), 3u);
-  for (const Json& gap : manifest.at("missing")) {
-    EXPECT_EQ(gap.at("from"), 151);
-    EXPECT_EQ(gap.at("to"), 199);
-  }
-  EXPECT_EQ(find_difference(), "vehicle 0, step 151: in A alone");
-  EXPECT_TRUE(inspect(open_recording(out_)).problems.empty());
-}
-
 TEST_F(SegmentsTest, AnEarlierSegmentsGapKeepsTheWholeFromBeingComplete) {
   {
     Recording recording(out_, make_parameters());
@@ -180,34 +164,6 @@ TEST_F(SegmentsTest, AnEarlierSegmentsGapKeepsTheWholeFromBeingComplete) {
   for (const Json& gap : missing) {
     EXPECT_EQ(gap.at("from"), 50);
     EXPECT_EQ(gap.at("to"), 50);
-  }
-}
-
-TEST_F(SegmentsTest, StatusSamplesOfAllSegmentsCountTogether) {
-  std::vector<SimStatus> statuses;
-  const Parameters parameters = make_parameters();
-  for (int i = 0; i < 10; ++i) statuses.push_back(make_status(RunPhase::PHASE_RUNNING, 0));
-  statuses.push_back(make_status(RunPhase::PHASE_FINISHED, kLastStep, "mission finished"));
-  for (const std::size_t oldest : {3, 6}) {  // oldest sample that the server still has
-    SCOPED_TRACE(oldest);
-    fs::remove_all(out_);
-    fs::create_directory(out_);
-    {
-      Recording recording(out_, parameters);
-      for (std::size_t i = 0; i < 5; ++i) recording.add(statuses[i]);
-      add_steps(recording, 0, 150);
-      while (fs::file_size(out_ / "command.csv") < 200) recording.flush_if_due();
-    }
-    const Segment segment = resume();
-    Recording recording(segment, parameters);
-    add_steps(recording, 0, kLastStep);
-    for (std::size_t i = oldest; i < statuses.size(); ++i) recording.add(statuses[i]);
-    EXPECT_EQ(recording.finish("", 0), oldest <= 5);
-    const Json gap = {{"vehicle_id", 0}, {"topic", "sls/status"}, {"from", 5}, {"to", 5}};
-    EXPECT_EQ(read_manifest(segment.folder).at("missing"),
-              oldest <= 5 ? Json::array() : Json::array({gap}));
-    EXPECT_EQ(list_status_samples(segment.folder).front(),
-              std::to_string(std::max<std::size_t>(oldest, 5)));
   }
 }
 
@@ -234,27 +190,6 @@ TEST_F(SegmentsTest, EachStatusSampleHasOneRowAndOneEvent) {
   const std::string text = read_bytes(segment.folder / "flight.txt");
   EXPECT_EQ(text.find("missing: controller"), text.npos) << text;
   EXPECT_NE(text.find("finished: mission finished"), text.npos) << text;
-}
-
-TEST_F(SegmentsTest, AFinalStatusThatAnEarlierSegmentHasEndsTheRun) {
-  const Parameters parameters = make_parameters();
-  const SimStatus end = make_status(RunPhase::PHASE_FINISHED, kLastStep, "mission finished");
-  {
-    Recording recording(out_, parameters);
-    recording.add(end);
-    add_steps(recording, 0, 150);
-    recording.finish("interrupted by SIGTERM", 0);
-  }
-  const Segment segment = resume();
-  Recording recording(segment, parameters);
-  recording.add(end);
-  add_steps(recording, 0, kLastStep);
-  EXPECT_TRUE(recording.has_all());
-  EXPECT_TRUE(recording.finish("", 0));
-  EXPECT_TRUE(list_status_samples(segment.folder).empty());
-  EXPECT_EQ(read_manifest(segment.folder).at("reason"), "mission finished");
-  const std::string text = read_bytes(segment.folder / "flight.txt");
-  EXPECT_EQ(text.rfind("synthetic: finished\n", 0), 0u) << text;
 }
 
 TEST_F(SegmentsTest, UnansweredStepsAreWholeWithoutAReference) {

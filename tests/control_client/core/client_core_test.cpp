@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "tests/common/sync/samples.hpp"
 
@@ -92,6 +95,15 @@ TEST_F(ClientCoreTest, JoinsARunOnceItsClaimIsSettledAndIsReadyOnceItSeesTheServ
   EXPECT_EQ(look(80, true), Act::kNone) << "once";
 }
 
+TEST_F(ClientCoreTest, LooksMoreOftenWhileItHasNoRun) {
+  look(0);
+  EXPECT_EQ(core_->next_deadline(), at(5));
+  join(5);
+  EXPECT_EQ(core_->next_deadline(), at(5)) << "it may be ready at once";
+  look(5, true);
+  EXPECT_EQ(core_->next_deadline(), at(25));
+}
+
 TEST_F(ClientCoreTest, LeavesWithTheRun) {
   join();
   serve(kRun, kServer, 20, RunPhase::PHASE_PAUSED);
@@ -109,15 +121,6 @@ TEST_F(ClientCoreTest, AFailedRunIsAnErrorOfTheClientToo) {
   servers_->note(failed, kServer, at(20));
   EXPECT_EQ(look(20), Act::kLeave);
   EXPECT_EQ(core_->error(), "the run failed: the load is lost");
-}
-
-TEST_F(ClientCoreTest, AStopEndsItInEveryPhaseWithoutAnError) {
-  EXPECT_EQ(look(0, false, true), Act::kLeave);
-  EXPECT_FALSE(core_->run());
-  begin(false);
-  join();
-  EXPECT_EQ(look(20, true, true), Act::kLeave);
-  EXPECT_EQ(core_->error(), "");
 }
 
 TEST_F(ClientCoreTest, FollowsAResetAndIsReadyAnew) {
@@ -174,6 +177,38 @@ TEST_F(ClientCoreTest, AReplacementIsFollowedOnlyIfThatIsWanted) {
                 "run 00000000000001f4 was replaced by run 00000000000001f9 (see --follow)");
     }
   }
+}
+
+TEST_F(ClientCoreTest, EveryEventInEveryPhase) {
+  struct Event {
+    const char* name;
+    std::function<Act()> happen;
+    Act finding, flying;  // an ended client does nothing
+  };
+  const std::vector<Event> events = {
+      {"nothing", [&] { return look(20); }, Act::kNone, Act::kNone},
+      {"it sees the server", [&] { return look(20, true); }, Act::kNone, Act::kAnnounceReady},
+      {"stop", [&] { return look(20, false, true); }, Act::kGiveUp, Act::kLeave},
+      {"a run waits", [&] { return serve(kRun, kServer, 20, RunPhase::PHASE_WAITING), look(20); },
+       Act::kBegin, Act::kNone},
+      {"it runs", [&] { return serve(kRun, kServer, 20), look(20); }, Act::kBegin, Act::kNone},
+      {"it is over", [&] { return serve(kRun, kServer, 20, RunPhase::PHASE_FINISHED), look(20); },
+       Act::kNone, Act::kLeave},
+      {"it failed", [&] { return serve(kRun, kServer, 20, RunPhase::PHASE_FAILED), look(20); },
+       Act::kNone, Act::kLeave},
+      {"time", [&] { return look(0), look_until(60'000); }, Act::kGiveUp, Act::kGiveUp},
+  };
+  for (const Phase phase : {Phase::kFinding, Phase::kFlying, Phase::kEnded})
+    for (const Event& event : events) {
+      begin(false);
+      if (phase == Phase::kFlying) join();
+      if (phase == Phase::kEnded) look(0, false, true);
+      ASSERT_EQ(core_->phase(), phase);
+      EXPECT_EQ(event.happen(), phase == Phase::kFinding  ? event.finding
+                                : phase == Phase::kFlying ? event.flying
+                                                          : Act::kNone)
+          << event.name << " in phase " << static_cast<int>(phase);
+    }
 }
 
 }  // namespace

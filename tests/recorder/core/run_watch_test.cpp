@@ -21,7 +21,7 @@ class RunWatchTest : public testing::Test {
   RunWatchTest() {
     servers_.set_present({kServer, kReplacement});
     serve(kRun, kServer, 0, kRunning);
-    watch_.emplace(*servers_.find_joinable(kVehicle, at(0)), kVehicle, 7, at(0));
+    watch_.emplace(*servers_.find_joinable(kVehicle, at(0)), kVehicle, 7, RunWatch::Now{at(0)});
   }
 
   void serve(std::uint64_t run_id, const bus::PeerId& server, std::int64_t ms, RunPhase phase) {
@@ -63,7 +63,7 @@ TEST_F(RunWatchTest, AfterTheEndEachNewStepIsWaitedForTenSeconds) {
 
 TEST_F(RunWatchTest, AfterAFailureOrAResetOneSecondIsWaited) {
   for (const RunPhase phase : {RunPhase::PHASE_FAILED, RunPhase::PHASE_RESET}) {
-    watch_.emplace(*servers_.find_joinable(kVehicle, at(0)), kVehicle, 7, at(0));
+    watch_.emplace(*servers_.find_joinable(kVehicle, at(0)), kVehicle, 7, RunWatch::Now{at(0)});
     now_ = 0;
     EXPECT_EQ(look_until(500), -1);
     servers_.note(status(kRun, phase), kServer, at(500));
@@ -113,12 +113,8 @@ TEST_F(RunWatchTest, ANewRunOfTheSameServerIsAReset) {
 
 TEST_F(RunWatchTest, AnnouncesWhenItIsReadyWithNewStepsAndEveryHalfSecond) {
   const auto due = [&](std::int64_t ms, std::int64_t step, bool hears = true) {
-    const RunWatch::Now now{at(ms), "", hears, step};
-    const bool is_due = watch_->is_announcement_due(now);
-    if (is_due) watch_->note_announcement(now);
-    return is_due;
+    return watch_->is_announcement_due({at(ms), "", hears, step});
   };
-  watch_->note_announcement({at(0), "", false, -1});
   EXPECT_FALSE(due(5, -1, false));
   EXPECT_FALSE(watch_->is_ready());
   EXPECT_TRUE(due(10, -1)) << "now it hears the server";

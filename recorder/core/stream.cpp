@@ -1,4 +1,4 @@
-#include "recorder/stream.hpp"
+#include "recorder/core/stream.hpp"
 
 #include <spdlog/fmt/fmt.h>
 
@@ -16,7 +16,10 @@ using namespace std::chrono_literals;
 
 /// A missing batch is lost when more than this many later ones wait, or after this time.
 constexpr std::size_t kMaxWaiting = 64;
-constexpr auto kMaxStuckTime = 10s;
+constexpr double kMaxStuckTime = 10;  // s
+
+/// Longest time between two calls that counts: while this process is stopped, nothing can arrive.
+constexpr auto kLongestPass = 1s;
 
 /// A late answer comes at most this many steps later (idl/sls.idl).
 constexpr std::uint64_t kMaxLateness = 64;
@@ -38,16 +41,18 @@ Stream::Stream(const Parameters& parameters, std::uint64_t first_step, Sink sink
 
 // --- batches -------------------------------------------------------------------------------------
 
-void Stream::add(const RecordBatch& batch) {
+void Stream::add(const RecordBatch& batch, sync::Time now) {
+  note_time(now);
   if (!next_batch_) next_batch_ = batch.batch_index();
   if (batch.batch_index() == *next_batch_ && !has_ended_) {
     handle(batch);
-    return handle_waiting_batches();
-  }
-  if (has_ended_ || batch.batch_index() < *next_batch_ ||
-      !waiting_.emplace(batch.batch_index(), batch).second)
+    handle_waiting_batches();
+  } else if (has_ended_ || batch.batch_index() < *next_batch_ ||
+             !waiting_.emplace(batch.batch_index(), batch).second) {
     dropped_.repeated += batch.entries().size();
+  }
   if (waiting_.size() > kMaxWaiting) skip_missing_batches();
+  if (!stuck_ && !waiting_.empty()) stuck_.emplace(now, kMaxStuckTime);
 }
 
 void Stream::handle_waiting_batches() {
@@ -62,13 +67,20 @@ void Stream::skip_missing_batches() {
   handle_waiting_batches();
 }
 
-void Stream::pass_time(Duration elapsed) {
-  stuck_ = waiting_.empty() ? Duration() : stuck_ + elapsed;
-  if (stuck_ >= kMaxStuckTime) skip_missing_batches();
+void Stream::note_time(sync::Time now) {
+  if (stuck_ && now - time_ > kLongestPass) stuck_->extend(now - time_ - kLongestPass);
+  time_ = now;
 }
 
-std::optional<std::string> Stream::describe_stuck(Duration patience) const {
-  if (waiting_.empty() || stuck_ < patience) return std::nullopt;
+void Stream::on_time(sync::Time now) {
+  note_time(now);
+  if (!stuck_ || !stuck_->is_over(now)) return;
+  skip_missing_batches();
+  if (!waiting_.empty()) stuck_.emplace(now, kMaxStuckTime);
+}
+
+std::optional<std::string> Stream::take_report(sync::Time now) {
+  if (!stuck_ || !stuck_->is_report_due(now)) return std::nullopt;
   return fmt::format("batch {} of sls/record", *next_batch_);
 }
 
@@ -91,7 +103,7 @@ void Stream::handle(const RecordBatch& batch) {
     handle_next();
   }
   ++*next_batch_;
-  stuck_ = Duration();
+  stuck_.reset();
   has_ended_ = has_ended_ || batch.is_last();
   hand_on_settled_steps();
 }

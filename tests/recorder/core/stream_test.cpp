@@ -1,4 +1,4 @@
-#include "recorder/stream.hpp"
+#include "recorder/core/stream.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,13 +6,14 @@
 #include <random>
 
 #include "common/bus/convert.hpp"
+#include "tests/common/sync/samples.hpp"
 #include "tests/recorder/synthetic_run.hpp"
 
 namespace sls::record {
 namespace {
 
-using namespace std::chrono_literals;
 using namespace test;
+using sync::at;
 
 struct Gap {
   std::uint32_t vehicle_id;
@@ -37,7 +38,7 @@ class StreamTest : public testing::Test {
   }
   /// Adds batch `step`, which has only step `step`.
   void add(std::uint64_t step, bool is_last = false) {
-    stream_.add(make_batch(step, {make_entry(step)}, is_last));
+    stream_.add(make_batch(step, {make_entry(step)}, is_last), at(0));
   }
   void add_all(std::uint64_t from, std::uint64_t to) {
     for (; from <= to; ++from) add(from);
@@ -83,7 +84,8 @@ TEST_F(StreamTest, BatchesMayComeInAnyOrderAndTwice) {
     for (const std::uint64_t index : order)
       for (int copy = 0; copy < 2; ++copy)
         stream.add(
-            make_batch(index, {make_entry(2 * index), make_entry(2 * index + 1)}, index == 59));
+            make_batch(index, {make_entry(2 * index), make_entry(2 * index + 1)}, index == 59),
+            at(0));
     EXPECT_EQ(steps(), list(0, 119));
     EXPECT_TRUE(stream.has_ended());
     EXPECT_EQ(stream.dropped().repeated, 120u);
@@ -115,20 +117,51 @@ TEST_F(StreamTest, SixtyFourBatchesWaitForAMissingOneAndNoMore) {
   EXPECT_EQ(stream_.last_step(), 67);
 }
 
-TEST_F(StreamTest, AMissingBatchIsGivenUpAfterTenSecondsWithoutAnyInOrder) {
-  add(0);
-  stream_.pass_time(100s);  // no batch waits yet
-  add(3);
-  stream_.pass_time(9s);
-  add(1);
-  stream_.pass_time(9s);
+/// Looks ten times a second.
+class MissingBatchTest : public StreamTest {
+ protected:
+  void add_at(std::int64_t ms, std::uint64_t step) {
+    stream_.add(make_batch(step, {make_entry(step)}), at(ms));
+  }
+  /// Looks until `ms`. The times of the reports.
+  std::string look_until(std::int64_t ms) {
+    std::string reports;
+    for (; now_ <= ms; now_ += 100) {
+      stream_.on_time(at(now_));
+      if (const auto batch = stream_.take_report(at(now_)))
+        reports += std::to_string(now_) + ": " + *batch + "\n";
+    }
+    return reports;
+  }
+
+  std::int64_t now_ = 0;
+};
+
+TEST_F(MissingBatchTest, EachBatchInOrderBeginsTheWaitAgain) {
+  add_at(0, 0);
+  add_at(0, 3);
+  add_at(0, 6);
+  look_until(9000);
+  add_at(9000, 1);
+  EXPECT_EQ(look_until(18'900), "10000: batch 2 of sls/record\n15000: batch 2 of sls/record\n");
   EXPECT_EQ(stream_.last_step(), 1);
-  EXPECT_FALSE(stream_.describe_stuck(10s));
-  EXPECT_EQ(stream_.describe_stuck(1s).value_or(""), "batch 2 of sls/record");
-  stream_.pass_time(1s);
+  look_until(19'000);
+  EXPECT_EQ(stream_.last_step(), 3) << "for batch 4 the wait begins anew";
+  look_until(28'900);
   EXPECT_EQ(stream_.last_step(), 3);
-  EXPECT_FALSE(stream_.describe_stuck(0s));
-  EXPECT_EQ(gaps_, std::vector<Gap>({{0, 2, 2}}));
+  look_until(29'000);
+  EXPECT_EQ(stream_.last_step(), 6);
+}
+
+TEST_F(MissingBatchTest, OfTimeInWhichTheRecorderIsStoppedASecondCounts) {
+  add_at(0, 0);
+  add_at(0, 2);
+  look_until(8900);
+  now_ = 70'000;
+  look_until(70'000);
+  EXPECT_EQ(stream_.last_step(), 0) << "9.9 s";
+  look_until(70'100);
+  EXPECT_EQ(stream_.last_step(), 2);
 }
 
 TEST_F(StreamTest, ALateJoinerBeginsWithAnyBatch) {
@@ -142,7 +175,8 @@ TEST_F(StreamTest, ALateJoinerBeginsWithAnyBatch) {
 TEST_F(StreamTest, HistoryBeforeTheFirstStepOfASegmentIsLeftOut) {
   Stream stream = make_stream(parameters_, 50);
   EXPECT_EQ(stream.last_step(), 49);
-  for (std::uint64_t step = 20; step < 60; ++step) stream.add(make_batch(step, {make_entry(step)}));
+  for (std::uint64_t step = 20; step < 60; ++step)
+    stream.add(make_batch(step, {make_entry(step)}), at(0));
   EXPECT_EQ(steps(), list(50, 59));
   EXPECT_EQ(stream.dropped().repeated, 30u);
   EXPECT_TRUE(gaps_.empty());
@@ -157,7 +191,7 @@ TEST_F(StreamTest, SamplesAfterTheLastBatchAreIgnored) {
 
 TEST_F(StreamTest, AnEmptyLastBatchEndsTheRun) {
   add(0);
-  stream_.add(make_batch(1, {}, true));
+  stream_.add(make_batch(1, {}, true), at(0));
   EXPECT_TRUE(stream_.has_ended());
 }
 
@@ -173,7 +207,7 @@ TEST_F(StreamTest, GivingUpReturnsTheWaitingBatches) {
 // --- entries -------------------------------------------------------------------------------------
 
 TEST_F(StreamTest, StepsMissingAmidABatchLeaveAGap) {
-  stream_.add(make_batch(0, {make_entry(0), make_entry(5), make_entry(3), make_entry(6)}));
+  stream_.add(make_batch(0, {make_entry(0), make_entry(5), make_entry(3), make_entry(6)}), at(0));
   EXPECT_EQ(steps(), (std::vector<std::uint64_t>{0, 5, 6}));
   EXPECT_EQ(gaps_, std::vector<Gap>({{0, 1, 4}}));
   EXPECT_EQ(stream_.dropped().repeated, 1u);
@@ -183,9 +217,9 @@ TEST_F(StreamTest, GapsAreOfEachVehicle) {
   Parameters parameters = parameters_;
   set_vehicles(parameters, {0, 7});
   Stream stream = make_stream(parameters);
-  stream.add(make_batch(0, {make_entry(0, 0), make_entry(0, 7), make_entry(1, 0)}));
+  stream.add(make_batch(0, {make_entry(0, 0), make_entry(0, 7), make_entry(1, 0)}), at(0));
   EXPECT_EQ(stream.last_step(), 0) << "of vehicle 7";
-  stream.add(make_batch(1, {make_entry(2, 7), make_entry(3, 0), make_entry(3, 7)}));
+  stream.add(make_batch(1, {make_entry(2, 7), make_entry(3, 0), make_entry(3, 7)}), at(0));
   EXPECT_EQ(gaps_, std::vector<Gap>({{7, 1, 1}, {0, 2, 2}}));
   EXPECT_EQ(stream.last_step(), 3);
 }
@@ -193,10 +227,11 @@ TEST_F(StreamTest, GapsAreOfEachVehicle) {
 TEST_F(StreamTest, StrangeEntriesAreCountedAndLeftOut) {
   RecordEntry unknown = make_entry(1);
   unknown.kind(static_cast<AnswerKind>(7));
-  stream_.add(make_batch(
-      0, {make_entry(0), make_entry(1, 4'000'000'000),
-          make_entry(std::numeric_limits<std::uint64_t>::max()), unknown,
-          make_entry(std::numeric_limits<std::int64_t>::max() / 4'000'000 + 1), make_entry(1)}));
+  stream_.add(make_batch(0, {make_entry(0), make_entry(1, 4'000'000'000),
+                             make_entry(std::numeric_limits<std::uint64_t>::max()), unknown,
+                             make_entry(std::numeric_limits<std::int64_t>::max() / 4'000'000 + 1),
+                             make_entry(1)}),
+              at(0));
   EXPECT_EQ(steps(), list(0, 1));
   EXPECT_EQ(stream_.dropped().out_of_range, 4u);
   EXPECT_TRUE(gaps_.empty());
@@ -204,7 +239,7 @@ TEST_F(StreamTest, StrangeEntriesAreCountedAndLeftOut) {
 
 TEST_F(StreamTest, TheLastStepMayHaveNoAnswer) {
   add(0);
-  stream_.add(make_batch(1, {make_bare_entry(1)}, true));
+  stream_.add(make_batch(1, {make_bare_entry(1)}, true), at(0));
   ASSERT_EQ(rows_.size(), 2u);
   EXPECT_TRUE(rows_[1].has_state);
   EXPECT_FALSE(rows_[1].has_command);
@@ -216,7 +251,7 @@ TEST_F(StreamTest, ARefusedAnswerIsRecordedAsItWasSent) {
   entry.kind(AnswerKind::ANSWER_REFUSED);
   entry.answer().fault(FaultCode::FAULT_FREE_FALL);
   entry.answer().f_Q_W_n({1e9, 0, 0});
-  stream_.add(make_batch(0, {entry}, true));
+  stream_.add(make_batch(0, {entry}, true), at(0));
   ASSERT_EQ(rows_.size(), 1u);
   EXPECT_TRUE(rows_[0].is_complete());
   EXPECT_EQ(rows_[0].fault, "free_fall");
@@ -229,14 +264,14 @@ class LateAnswerTest : public StreamTest {
  protected:
   LateAnswerTest() {
     add_all(0, 9);
-    stream_.add(make_batch(10, {make_unanswered_entry(10, AnswerKind::ANSWER_HELD)}));
+    stream_.add(make_batch(10, {make_unanswered_entry(10, AnswerKind::ANSWER_HELD)}), at(0));
   }
 };
 
 TEST_F(LateAnswerTest, AStepWithoutAnAnswerWaitsForALateOneAndTheOthersWithIt) {
   add_all(11, 20);
   EXPECT_EQ(steps(), list(0, 9));
-  stream_.add(make_batch(21, {make_late_entry(10), make_entry(21)}));
+  stream_.add(make_batch(21, {make_late_entry(10), make_entry(21)}), at(0));
   EXPECT_EQ(steps(), list(0, 21));
   const StepRows& rows = rows_[10];
   EXPECT_EQ(rows.fault, "held");
@@ -255,31 +290,31 @@ TEST_F(LateAnswerTest, AStepWithoutAnAnswerWaitsForALateOneAndTheOthersWithIt) {
 TEST_F(LateAnswerTest, StepsThatWaitForALateAnswerCountAsReceived) {
   EXPECT_EQ(stream_.last_step(), 10);
   for (std::uint64_t step = 11; step <= 200; ++step) {
-    stream_.add(make_batch(step, {make_unanswered_entry(step, AnswerKind::ANSWER_HELD)}));
+    stream_.add(make_batch(step, {make_unanswered_entry(step, AnswerKind::ANSWER_HELD)}), at(0));
     EXPECT_EQ(stream_.last_step(), static_cast<std::int64_t>(step));
   }
   EXPECT_EQ(steps(), list(0, 135)) << "the others are kept for late answers";
-  stream_.add(make_batch(202, {make_entry(202)}));
+  stream_.add(make_batch(202, {make_entry(202)}), at(0));
   EXPECT_EQ(stream_.last_step(), 200) << "a batch is missing";
 }
 
 TEST_F(LateAnswerTest, ItIsGivenUpWhenAStepMoreThan64LaterIsIn) {
   add_all(11, 74);
   EXPECT_EQ(steps(), list(0, 9));
-  stream_.add(make_batch(75, {make_entry(75)}));
+  stream_.add(make_batch(75, {make_entry(75)}), at(0));
   EXPECT_EQ(steps(), list(0, 75));
   EXPECT_FALSE(rows_[10].has_reference);
   EXPECT_TRUE(rows_[10].is_whole());
-  stream_.add(make_batch(76, {make_late_entry(10)}));
+  stream_.add(make_batch(76, {make_late_entry(10)}), at(0));
   EXPECT_EQ(stream_.dropped().repeated, 1u);
 }
 
 TEST_F(LateAnswerTest, TheLastBatchOrTheEndOfPatienceEndsTheWaiting) {
   Stream other = make_stream(parameters_);
-  stream_.add(make_batch(11, {}, true));
+  stream_.add(make_batch(11, {}, true), at(0));
   EXPECT_EQ(steps(), list(0, 10));
   rows_.clear();
-  other.add(make_batch(0, {make_unanswered_entry(0, AnswerKind::ANSWER_FAIL_SAFE)}));
+  other.add(make_batch(0, {make_unanswered_entry(0, AnswerKind::ANSWER_FAIL_SAFE)}), at(0));
   EXPECT_TRUE(rows_.empty());
   other.give_up();
   ASSERT_EQ(steps(), list(0, 0));
@@ -287,18 +322,19 @@ TEST_F(LateAnswerTest, TheLastBatchOrTheEndOfPatienceEndsTheWaiting) {
 }
 
 TEST_F(LateAnswerTest, EachOfSeveralWaitsForItsOwn) {
-  stream_.add(make_batch(11, {make_unanswered_entry(11, AnswerKind::ANSWER_FAIL_SAFE)}));
-  stream_.add(make_batch(12, {make_late_entry(11), make_late_entry(11)}));
+  stream_.add(make_batch(11, {make_unanswered_entry(11, AnswerKind::ANSWER_FAIL_SAFE)}), at(0));
+  stream_.add(make_batch(12, {make_late_entry(11), make_late_entry(11)}), at(0));
   EXPECT_EQ(steps(), list(0, 9));
   EXPECT_EQ(stream_.dropped().repeated, 1u);
-  stream_.add(make_batch(13, {make_late_entry(10)}));
+  stream_.add(make_batch(13, {make_late_entry(10)}), at(0));
   EXPECT_EQ(steps(), list(0, 11));
   EXPECT_TRUE(rows_[10].is_complete());
   EXPECT_TRUE(rows_[11].is_complete());
 }
 
 TEST_F(LateAnswerTest, OnesToStepsThatDidNotGoByWithoutAnAnswerAreDropped) {
-  stream_.add(make_batch(11, {make_late_entry(9), make_late_entry(500), make_late_entry(10, 3)}));
+  stream_.add(make_batch(11, {make_late_entry(9), make_late_entry(500), make_late_entry(10, 3)}),
+              at(0));
   EXPECT_EQ(stream_.dropped().repeated, 2u);
   EXPECT_EQ(stream_.dropped().out_of_range, 1u);
   EXPECT_EQ(steps(), list(0, 9));
@@ -309,9 +345,9 @@ TEST_F(LateAnswerTest, StepsOutOfOrderTakeBoundedMemory) {
   set_vehicles(parameters, {0, 1});
   rows_.clear();
   Stream stream = make_stream(parameters);
-  stream.add(make_batch(0, {make_unanswered_entry(1'000'000, AnswerKind::ANSWER_HELD)}));
+  stream.add(make_batch(0, {make_unanswered_entry(1'000'000, AnswerKind::ANSWER_HELD)}), at(0));
   for (std::uint64_t step = 0; step < 40'000; ++step)
-    stream.add(make_batch(step + 1, {make_entry(step, 1)}));
+    stream.add(make_batch(step + 1, {make_entry(step, 1)}), at(0));
   EXPECT_GT(rows_.size(), 7'000u);
 }
 

@@ -2,17 +2,16 @@
 /// clock here.
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <deque>
 #include <functional>
 #include <map>
 #include <optional>
 #include <string>
-#include <vector>
 
-#include "common/bus/topics.hpp"
+#include "common/sync/patience.hpp"
 #include "recorder/rows.hpp"
+#include "sls.h"
 
 namespace sls::record {
 
@@ -26,7 +25,6 @@ struct DroppedEntries {
 /// without an answer waits for a late answer. The later steps wait with it, so rows are in order.
 class Stream {
  public:
-  using Duration = std::chrono::steady_clock::duration;
   using Sink = std::function<void(const StepRows&)>;
   /// Called if a vehicle's steps [from, to] are not in the stream.
   using GapSink =
@@ -39,14 +37,15 @@ class Stream {
   void add(const model::StepRecord& record);
 
   /// The first batch may have any index, because a writer's history is finite. Batches after a
-  /// missing one wait for it, until more than 64 of them wait or for 10 s.
-  void add(const RecordBatch& batch);
+  /// missing one wait for it, until more than 64 of them wait or none has been handled for 10 s.
+  void add(const RecordBatch& batch, sync::Time now);
 
-  /// Adds elapsed time.
-  void pass_time(Duration elapsed);
+  /// Call it several times a second. A gap of more than 1 s between calls, also of `add`, means
+  /// that this process was stopped: only 1 s of it counts.
+  void on_time(sync::Time now);
 
-  /// A text with the missing batch, if others have waited for it at least `patience`.
-  std::optional<std::string> describe_stuck(Duration patience) const;
+  /// A text with the missing batch, if a line about it is due: after 1 s, then every 5 s.
+  std::optional<std::string> take_report(sync::Time now);
 
   /// True when the last batch of the run has been handled.
   bool has_ended() const { return has_ended_; }
@@ -64,6 +63,7 @@ class Stream {
   const DroppedEntries& dropped() const { return dropped_; }
 
  private:
+  void note_time(sync::Time now);
   void handle(const RecordBatch& batch);
   /// Handles the record in `next_`.
   void handle_next();
@@ -79,7 +79,8 @@ class Stream {
   const GapSink gap_sink_;
   std::optional<std::uint64_t> next_batch_;       // empty before the first batch
   std::map<std::uint64_t, RecordBatch> waiting_;  // batches after next_batch_
-  Duration stuck_{};  // time since the last handled batch, if others wait
+  std::optional<sync::Patience> stuck_;  // with the missing batch, since the last handled one
+  sync::Time time_;
   bool has_ended_ = false;
   std::map<std::uint32_t, std::uint64_t> next_steps_;
   std::uint64_t newest_step_ = 0;
