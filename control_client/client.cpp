@@ -111,6 +111,7 @@ void Client::begin() {
     pilots_ = std::move(pilots);
     if (stream) stream_.swap(stream);
   }
+  stream.reset();  // before the announcement: the server judges the endpoints of its participants
   if (is_realtime) {
     bus::stop_spinning();
     app::put_process_first();
