@@ -155,6 +155,20 @@ TEST(ServerLockstepTest, PolicyWaitNamesTheControllerAndGivesUpAtTheDeadline) {
   EXPECT_EQ(rig.core().error(), "step 0: waited 10 s for controller 'pilot' on box");
 }
 
+TEST(ServerLockstepTest, AnAbsentControllerOfAFleetIsNamedWithItsVehicles) {
+  auto scenario = with_policy(config::ControllerPolicy::kWait, 10);
+  scenario.vehicles.resize(3, scenario.vehicles.front());
+  ServerRig rig(scenario);
+  rig.join("pilot");
+  rig.take_log();
+  ServerRig::Answer answer;
+  answer.vehicle_ids = {0};
+  rig.answer("pilot", answer);
+  rig.wait_until(1001);
+  EXPECT_EQ(rig.take_log(), Lines{"1000: step 0: waiting for: controller 'pilot' on box "
+                                  "(vehicles 1-2) (9 s left)"});
+}
+
 TEST(ServerLockstepTest, AnAnswerAfterALongWaitIsAnnounced) {
   ServerRig rig(with_policy(config::ControllerPolicy::kWait, 10));
   rig.join("pilot");
