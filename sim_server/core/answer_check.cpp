@@ -219,10 +219,13 @@ void AnswerCheck::look(const Neighbourhood& neighbourhood, Findings& findings) {
                          seen->second.text);
       seen = is_over ? sender.seen.erase(seen) : std::next(seen);
     }
-    if (member)
+    if (member) {
       look_at(sender, *member, neighbourhood.now, findings);
-    else  // that is reported; it may announce itself under any name
-      sender = Sender{std::move(sender.seen)};
+    } else {  // that is reported; it may announce itself under any name
+      Sender unannounced;
+      unannounced.seen.swap(sender.seen);
+      sender = unannounced;
+    }
   }
 }
 
