@@ -60,7 +60,7 @@ MissionProgress Mission::calc_progress(std::uint64_t step, const model::SlungLoa
   // A loop, because a stage without duration ends at the step at which it began; once per stage at
   // most.
   while (true) {
-    const FlownStage& stage = stages_[progress.stage];
+    const Stage& stage = stages_[progress.stage];
     const std::int64_t elapsed_ns = calc_elapsed_ns(step, progress.stage_start_step);
     progress.reference = stage.trajectory->calc(to_seconds(elapsed_ns));
     StageOutcome outcome = StageOutcome::kLeft;  // a finished mission stays finished

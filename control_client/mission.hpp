@@ -41,7 +41,7 @@ class Mission {
   const std::string& stage_name(std::uint32_t stage) const { return stages_[stage].name; }
 
  private:
-  struct FlownStage {
+  struct Stage {
     std::string name;
     std::unique_ptr<const ReferenceTrajectory> trajectory;
     config::LeaveCondition leave;
@@ -50,7 +50,7 @@ class Mission {
   /// Time since `start_step`, whole nanoseconds; the largest number if it does not fit.
   std::int64_t calc_elapsed_ns(std::uint64_t step, std::uint64_t start_step) const;
 
-  std::vector<FlownStage> stages_;
+  std::vector<Stage> stages_;
   std::int64_t period_ns_;
 };
 

@@ -16,8 +16,8 @@
 namespace sls::record {
 
 struct RecorderOptions {
-  std::filesystem::path folder;              ///< ready for the first run
-  std::optional<RecordedFlight> unfinished;  ///< the recording in `folder` to be continued
+  std::filesystem::path folder;               ///< ready for the first run
+  std::optional<OpenedRecording> unfinished;  ///< the recording in `folder` to be continued
   std::uint32_t vehicle = 0;  ///< the run with this vehicle is recorded, with all its vehicles
   bool follow = false;        ///< continue with the run of a server that replaces ours
 };

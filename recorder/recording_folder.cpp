@@ -142,20 +142,20 @@ RecordingFolder::~RecordingFolder() {
   for (const fs::path& folder : made_) fs::remove(folder, ignored);  // empty ones only
 }
 
-std::optional<RecordedFlight> find_unfinished_recording(const fs::path& folder) {
+std::optional<OpenedRecording> find_unfinished_recording(const fs::path& folder) {
   std::error_code error;
   if (!fs::exists(folder / "manifest.json", error)) {
     prepare_recording_folder(folder, is_without_rows(folder));
     return std::nullopt;
   }
-  RecordedFlight flight = open_recording(folder);
+  OpenedRecording flight = open_recording(folder);
   if (flight.manifest().complete)
     throw ConfigError("--out " + folder.string() +
                       ": expected an unfinished recording to resume, got a complete one");
   return flight;
 }
 
-Segment make_next_segment(const RecordedFlight& earlier) {
+Segment make_next_segment(const OpenedRecording& earlier) {
   Segment segment;
   segment.number = static_cast<int>(earlier.segments.size()) + 1;
   segment.folder = earlier.folder / name_segment(segment.number);

@@ -35,19 +35,19 @@ class RecordingFolder {
 /// folder ready for a new one and returns nothing.
 /// @throws config::ConfigError naming the folder if its recording is complete, or if the folder
 ///   cannot be used.
-std::optional<RecordedFlight> find_unfinished_recording(const std::filesystem::path& folder);
+std::optional<OpenedRecording> find_unfinished_recording(const std::filesystem::path& folder);
 
 /// The place of a recording, or of the part that follows the segments `earlier`.
 struct Segment {
   std::filesystem::path folder;
   int number = 1;
   std::uint64_t first_step = 0;
-  std::optional<RecordedFlight> earlier;
+  std::optional<OpenedRecording> earlier;
 };
 
 /// A new segment after `earlier`, in its own folder.
 /// @throws DamagedError if `earlier` cannot be read.
-Segment make_next_segment(const RecordedFlight& earlier);
+Segment make_next_segment(const OpenedRecording& earlier);
 
 /// "run-0123456789abcdef": the subfolder of a further run.
 std::string name_run(std::uint64_t run_id);

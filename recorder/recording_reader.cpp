@@ -57,8 +57,9 @@ void set_fault(StepRows& rows) {
   rows.kind = rows.fault == StepRows::kHeld       ? model::AnswerKind::kHeld
               : rows.fault == StepRows::kFailSafe ? model::AnswerKind::kFailSafe
                                                   : model::AnswerKind::kAccepted;
-  for (const model::ErrorCode fault : {model::ErrorCode::kFreeFall, model::ErrorCode::kRodLevel,
-                                   model::ErrorCode::kNotFinite, model::ErrorCode::kStageTimeout})
+  for (const model::ErrorCode fault :
+       {model::ErrorCode::kFreeFall, model::ErrorCode::kRodLevel, model::ErrorCode::kNotFinite,
+        model::ErrorCode::kStageTimeout})
     if (rows.fault == to_string(fault)) rows.answer.error_code = fault;
 }
 
@@ -80,8 +81,8 @@ StepRows parse_row(const CsvReader& file) {
 
 std::string name_segment(int number) { return "segment-" + std::to_string(number); }
 
-RecordedFlight open_recording(const fs::path& folder) {
-  RecordedFlight flight{folder, {{folder, read_manifest(folder)}}};
+OpenedRecording open_recording(const fs::path& folder) {
+  OpenedRecording flight{folder, {{folder, read_manifest(folder)}}};
   for (int number = 2; fs::exists(folder / name_segment(number) / "manifest.json"); ++number) {
     const fs::path segment = folder / name_segment(number);
     flight.segments.push_back({segment, read_manifest(segment)});
@@ -94,7 +95,7 @@ RecordedFlight open_recording(const fs::path& folder) {
 }
 
 template <class Row>
-RowReader<Row>::RowReader(const RecordedFlight& flight, std::uint64_t end)
+RowReader<Row>::RowReader(const OpenedRecording& flight, std::uint64_t end)
     : flight_(flight), end_(end) {
   for (const std::uint32_t id : flight.vehicle_ids()) vehicles_[id];
 }
@@ -188,7 +189,7 @@ void RowReader<Row>::keep(StepRows row) {
 
 template class RowReader<MeasuredRow>;
 
-StepReader::StepReader(const RecordedFlight& flight, std::uint64_t end)
+StepReader::StepReader(const OpenedRecording& flight, std::uint64_t end)
     : states_(flight, end), commands_(flight, end), references_(flight, end) {
   const auto ids = flight.vehicle_ids();
   turns_.assign(ids.begin(), ids.end());
@@ -229,7 +230,7 @@ std::optional<StepRows> StepReader::next(std::uint32_t vehicle_id) {
   return rows;
 }
 
-std::uint64_t find_next_step(const RecordedFlight& flight) {
+std::uint64_t find_next_step(const OpenedRecording& flight) {
   std::map<std::uint32_t, std::uint64_t> after_whole;
   for (const std::uint32_t id : flight.vehicle_ids()) after_whole[id] = 0;
   StepReader reader(flight);
@@ -241,7 +242,7 @@ std::uint64_t find_next_step(const RecordedFlight& flight) {
   return least == after_whole.end() ? 0 : least->second;
 }
 
-std::vector<std::uint64_t> read_status_indices(const RecordedFlight& flight) {
+std::vector<std::uint64_t> read_status_indices(const OpenedRecording& flight) {
   std::vector<std::uint64_t> indices;
   for (const RecordedSegment& segment : flight.segments) {
     CsvReader file(segment.folder / StatusRow::kFile, "sample_index", CsvReader::Further::kAllowed);

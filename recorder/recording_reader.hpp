@@ -23,7 +23,7 @@ struct RecordedSegment {
 };
 
 /// A recording on disk: its segments in order, at least one.
-struct RecordedFlight {
+struct OpenedRecording {
   std::filesystem::path folder;
   std::vector<RecordedSegment> segments;
 
@@ -36,7 +36,7 @@ std::string name_segment(int number);
 
 /// @throws config::ConfigError naming the place if `folder` is no recording, or its segments are
 ///   not of one run.
-RecordedFlight open_recording(const std::filesystem::path& folder);
+OpenedRecording open_recording(const std::filesystem::path& folder);
 
 /// Rows of one kind, of all segments in order, requested by vehicle. The rows of a segment are used
 /// up to the first step of the next segment.
@@ -44,7 +44,7 @@ RecordedFlight open_recording(const std::filesystem::path& folder);
 template <class Row>
 class RowReader {
  public:
-  RowReader(const RecordedFlight& flight, std::uint64_t end);
+  RowReader(const OpenedRecording& flight, std::uint64_t end);
 
   /// The next row of the vehicle, in a step that has no other row; null at the end.
   const StepRows* peek(std::uint32_t vehicle_id);
@@ -65,7 +65,7 @@ class RowReader {
 
   bool is_left_out() const;
 
-  const RecordedFlight& flight_;
+  const OpenedRecording& flight_;
   const std::uint64_t end_;
   std::map<std::uint32_t, Vehicle> vehicles_;
   std::optional<std::uint32_t> kept_;  // vehicle of the last row that was kept
@@ -76,7 +76,7 @@ class RowReader {
 /// The steps before `end`, in order for each vehicle. Steps without any row are left out.
 class StepReader {
  public:
-  explicit StepReader(const RecordedFlight& flight,
+  explicit StepReader(const OpenedRecording& flight,
                       std::uint64_t end = std::numeric_limits<std::uint64_t>::max());
 
   /// The next step; the vehicles take turns. Nothing after the last step of all.
@@ -98,10 +98,10 @@ class StepReader {
 
 /// The step after the last one that is whole for every vehicle; 0: there is none.
 /// @throws DamagedError
-std::uint64_t find_next_step(const RecordedFlight& flight);
+std::uint64_t find_next_step(const OpenedRecording& flight);
 
 /// The sample_index of every row of status.csv, of all segments in order.
 /// @throws DamagedError
-std::vector<std::uint64_t> read_status_indices(const RecordedFlight& flight);
+std::vector<std::uint64_t> read_status_indices(const OpenedRecording& flight);
 
 }  // namespace sls::record

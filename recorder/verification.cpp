@@ -67,7 +67,7 @@ void check_files(const RecordedSegment& segment, bool is_last, std::vector<std::
   }
 }
 
-void certify(const RecordedFlight& flight, Inspection& inspection) {
+void certify(const OpenedRecording& flight, Inspection& inspection) {
   Certificate certificate;
   std::map<std::uint32_t, std::uint64_t> steps;
   StepReader reader(flight);
@@ -114,14 +114,14 @@ FieldLister list_fields(const StepRows& rows) {
 }
 
 template <class Row>
-std::vector<std::string> read_columns(const RecordedFlight& flight) {
+std::vector<std::string> read_columns(const OpenedRecording& flight) {
   return CsvReader(flight.folder / Row::kFile, "vehicle_id", CsvReader::Further::kAllowed)
       .columns();
 }
 
 template <class Row>
 std::optional<std::string> compare_rows(const StepRows& a, const StepRows& b,
-                                        const RecordedFlight& flight) {
+                                        const OpenedRecording& flight) {
   const bool is_in_a = a.*Row::kIsThere, is_in_b = b.*Row::kIsThere;
   if (!is_in_a && !is_in_b) return std::nullopt;
   const std::string place =
@@ -141,7 +141,7 @@ std::optional<std::string> compare_rows(const StepRows& a, const StepRows& b,
 }
 
 std::optional<std::string> compare_steps(const StepRows& a, const StepRows& b,
-                                         const RecordedFlight& flight) {
+                                         const OpenedRecording& flight) {
   if (auto text = compare_rows<StateRow>(a, b, flight)) return text;
   if (auto text = compare_rows<CommandRow>(a, b, flight)) return text;
   return compare_rows<ReferenceRow>(a, b, flight);
@@ -150,7 +150,7 @@ std::optional<std::string> compare_steps(const StepRows& a, const StepRows& b,
 /// The first difference between `a` and `b`, the next steps of one vehicle in the two recordings.
 std::optional<Difference> compare_next(const std::optional<StepRows>& a,
                                        const std::optional<StepRows>& b,
-                                       const RecordedFlight& flight) {
+                                       const OpenedRecording& flight) {
   if (!a && !b) return std::nullopt;
   if (!a || !b || a->step != b->step) {
     const bool is_in_a = a && (!b || a->step < b->step);
@@ -164,7 +164,7 @@ std::optional<Difference> compare_next(const std::optional<StepRows>& a,
 
 /// Adds the deviations of a pair of rows to those of the columns of `file`.
 template <class Row>
-void add_deviations(const StepRows& a, const StepRows& b, const RecordedFlight& flight, int file,
+void add_deviations(const StepRows& a, const StepRows& b, const OpenedRecording& flight, int file,
                     std::map<std::pair<int, std::size_t>, Deviation>& worst) {
   const bool are_there = a.*Row::kIsThere && b.*Row::kIsThere;
   if (!are_there || to_bytes<Row>(a) == to_bytes<Row>(b)) return;
@@ -182,7 +182,7 @@ void add_deviations(const StepRows& a, const StepRows& b, const RecordedFlight& 
 
 }  // namespace
 
-Inspection inspect(const RecordedFlight& flight) {
+Inspection inspect(const OpenedRecording& flight) {
   Inspection inspection;
   for (const RecordedSegment& segment : flight.segments)
     check_files(segment, &segment == &flight.segments.back(), inspection.problems);
@@ -200,7 +200,8 @@ Inspection inspect(const RecordedFlight& flight) {
   return inspection;
 }
 
-std::optional<Difference> find_first_difference(const RecordedFlight& a, const RecordedFlight& b) {
+std::optional<Difference> find_first_difference(const OpenedRecording& a,
+                                                const OpenedRecording& b) {
   if (read_columns<StateRow>(a) != read_columns<StateRow>(b))
     return Difference{0, fmt::format("{}: other columns in A than in B", StateRow::kFile)};
   std::set<std::uint32_t> ids;
@@ -219,7 +220,7 @@ std::optional<Difference> find_first_difference(const RecordedFlight& a, const R
   return first;
 }
 
-std::vector<Deviation> list_deviations(const RecordedFlight& a, const RecordedFlight& b) {
+std::vector<Deviation> list_deviations(const OpenedRecording& a, const OpenedRecording& b) {
   StepReader reader_a(a), reader_b(b);
   std::map<std::pair<int, std::size_t>, Deviation> worst;
   std::vector<std::uint32_t> ids = a.vehicle_ids();
@@ -253,7 +254,7 @@ std::string describe(const Deviation& deviation) {
   return fmt::format("{}: {:.3g}{}", deviation.column, deviation.largest, place);
 }
 
-std::vector<std::string> list_notes(const RecordedFlight& a, const RecordedFlight& b) {
+std::vector<std::string> list_notes(const OpenedRecording& a, const OpenedRecording& b) {
   std::vector<std::string> notes;
   const ManifestFile &of_a = a.manifest(), &of_b = b.manifest();
   const auto compare = [&](const char* what, const auto& in_a, const auto& in_b) {

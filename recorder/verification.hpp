@@ -17,7 +17,7 @@ struct Inspection {
   std::string certificate;            ///< of the rows; empty if they cannot be read
   std::vector<std::string> problems;  ///< where a file differs from its manifest, one line each
 };
-Inspection inspect(const RecordedFlight& flight);
+Inspection inspect(const OpenedRecording& flight);
 
 /// The first row or field, in step order, in which the data of two recordings differ.
 struct Difference {
@@ -25,7 +25,7 @@ struct Difference {
   std::string text;  ///< file, vehicle, step, column and both values
 };
 /// @throws DamagedError if a row that is read before the first difference is damaged.
-std::optional<Difference> find_first_difference(const RecordedFlight& a, const RecordedFlight& b);
+std::optional<Difference> find_first_difference(const OpenedRecording& a, const OpenedRecording& b);
 
 /// The largest difference of a column over the steps that both recordings have.
 struct Deviation {
@@ -37,10 +37,10 @@ struct Deviation {
 };
 /// One entry for each column that differs, in the order of the files.
 /// @throws DamagedError
-std::vector<Deviation> list_deviations(const RecordedFlight& a, const RecordedFlight& b);
+std::vector<Deviation> list_deviations(const OpenedRecording& a, const OpenedRecording& b);
 std::string describe(const Deviation& deviation);
 
 /// Differences and gaps according to the manifests. The data can still be equal.
-std::vector<std::string> list_notes(const RecordedFlight& a, const RecordedFlight& b);
+std::vector<std::string> list_notes(const OpenedRecording& a, const OpenedRecording& b);
 
 }  // namespace sls::record

@@ -41,7 +41,7 @@ void DomainView::find_informed() {
                         std::inserter(informed_, informed_.end()));
 }
 
-std::string DomainView::replace_problems(const ParticipantCheck::Findings& found) {
+std::string DomainView::replace_problems(const std::map<std::string, std::string>& found) {
   bus::Problems& problems = endpoints_.domain.problems();
   problems.replace("run ", found);
   return problems.describe();

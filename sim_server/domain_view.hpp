@@ -26,7 +26,7 @@ class DomainView : public Surroundings {
   bool has_heard_every_claim() const override { return endpoints_.servers.has_heard_every_claim(); }
   std::uint64_t problems_version() const override { return endpoints_.domain.problems().version(); }
   Neighbourhood look(bool is_known) override;
-  std::string replace_problems(const ParticipantCheck::Findings& found) override;
+  std::string replace_problems(const std::map<std::string, std::string>& found) override;
   std::string describe_isolation() const override { return endpoints_.domain.describe_isolation(); }
   Queues queues() const override {
     return {outbox_.written_records(), outbox_.history_steps(),

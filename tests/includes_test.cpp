@@ -113,9 +113,9 @@ const std::vector<std::string> kProduct = {"bench",    "closed_loop",    "common
 
 /// `FILE:LINE: includes HEADER` for each include that breaks a rule, in the product's folders of
 /// `root`.
-std::vector<std::string> find_faults(const fs::path& root) {
+std::vector<std::string> list_findings(const fs::path& root) {
   const std::regex include(R"(^\s*#\s*include\s*([<"])([^>"]+)[>"])");
-  std::vector<std::string> faults;
+  std::vector<std::string> findings;
   for (const std::string& top : kProduct) {
     if (!fs::exists(root / top)) continue;
     for (const auto& entry : fs::recursive_directory_iterator(root / top)) {
@@ -123,7 +123,7 @@ std::vector<std::string> find_faults(const fs::path& root) {
       if (ending != ".cpp" && ending != ".hpp" && ending != ".c" && ending != ".h") continue;
       const std::string file = entry.path().lexically_relative(root);
       if (!find_rule(file)) {
-        faults.push_back(file + ": no rule in tests/includes_test.cpp");
+        findings.push_back(file + ": no rule in tests/includes_test.cpp");
         continue;
       }
       std::ifstream lines(entry.path());
@@ -133,17 +133,17 @@ std::vector<std::string> find_faults(const fs::path& root) {
         const bool is_in_core = std::any_of(kCores.begin(), kCores.end(),
                                             [&](const auto& core) { return is_below(file, core); });
         if (std::smatch word; is_in_core && std::regex_search(line, word, kNotInACore))
-          faults.push_back(file + ":" + std::to_string(number) + ": a core must not use " +
-                           word.str());
+          findings.push_back(file + ":" + std::to_string(number) + ": a core must not use " +
+                             word.str());
         std::smatch found;
         if (std::regex_search(line, found, include) &&
             !is_allowed(file, found[2], found[1] == "\""))
-          faults.push_back(file + ":" + std::to_string(number) + ": includes " + found[2].str());
+          findings.push_back(file + ":" + std::to_string(number) + ": includes " + found[2].str());
       }
     }
   }
-  std::sort(faults.begin(), faults.end());
-  return faults;
+  std::sort(findings.begin(), findings.end());
+  return findings;
 }
 
 /// A library or program: the folder of its CMakeLists.txt, and the libraries that it links.
@@ -199,13 +199,13 @@ bool may_link(const std::string& from, const std::string& to) {
 
 /// `FOLDER: TARGET links LIBRARY` for each link that breaks a rule for includes, and each target in
 /// a circle of links.
-std::vector<std::string> find_link_faults(const fs::path& root) {
-  std::vector<std::string> faults;
+std::vector<std::string> list_link_findings(const fs::path& root) {
+  std::vector<std::string> findings;
   std::map<std::string, Target> targets = read_targets(root);
   for (const auto& [name, target] : targets)
     for (const std::string& link : target.links)
       if (targets.count(link) == 0 || !may_link(target.folder, targets[link].folder))
-        faults.push_back(target.folder + ": " + name + " links " + link);
+        findings.push_back(target.folder + ": " + name + " links " + link);
   // Removes, again and again, the targets that link none of the rest or are linked by none.
   const auto is_free = [&](const auto& item) {
     const auto links = [](const Target& from, const std::string& to) {
@@ -219,17 +219,17 @@ std::vector<std::string> find_link_faults(const fs::path& root) {
   const auto find_free = [&] { return std::find_if(targets.begin(), targets.end(), is_free); };
   for (auto free = find_free(); free != targets.end(); free = find_free()) targets.erase(free);
   for (const auto& [name, target] : targets)
-    faults.push_back(target.folder + ": " + name + " is in a circle of links");
-  return faults;
+    findings.push_back(target.folder + ": " + name + " is in a circle of links");
+  return findings;
 }
 
 TEST(IncludesTest, NoLibraryLinksUpwardsOrInACircle) {
-  EXPECT_EQ(find_link_faults(SLS_SOURCE_DIR), std::vector<std::string>());
+  EXPECT_EQ(list_link_findings(SLS_SOURCE_DIR), std::vector<std::string>());
   EXPECT_GT(read_targets(SLS_SOURCE_DIR).size(), 40u);
 }
 
 TEST(IncludesTest, NoFileIncludesUpwards) {
-  EXPECT_EQ(find_faults(SLS_SOURCE_DIR), std::vector<std::string>());
+  EXPECT_EQ(list_findings(SLS_SOURCE_DIR), std::vector<std::string>());
 }
 
 void write(const fs::path& file, const std::string& text) {
@@ -255,7 +255,7 @@ TEST(IncludesTest, FindsEachLinkThatBreaksARule) {
   write_cmake("recorder",
               "add_library(sls_record a.cpp)\nadd_executable(recorder main.cpp)\n"
               "target_link_libraries(recorder PRIVATE sls::record sls::lost)\n");
-  EXPECT_EQ(find_link_faults(folder.path()),
+  EXPECT_EQ(list_link_findings(folder.path()),
             (std::vector<std::string>{
                 "recorder: recorder links sls_lost", "common/model: sls_model links sls_plant_keys",
                 "common/config: sls_config is in a circle of links",
@@ -281,7 +281,7 @@ TEST(IncludesTest, FindsEachIncludeThatBreaksARule) {
   write("sim_server/a.cpp", "#include \"tests/a.hpp\"\n#include <fastdds/dds/topic/Topic.hpp>\n");
   write("tools/new/a.cpp", "");
   EXPECT_EQ(
-      find_faults(folder.path()),
+      list_findings(folder.path()),
       (std::vector<std::string>{"common/bus/a.cpp:2: includes tools/doctor/a.hpp",
                                 "common/bus/fastdds/a.hpp:1: includes common/bus/node.hpp",
                                 "common/model/a.hpp:3: includes common/config/c.hpp",

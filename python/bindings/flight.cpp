@@ -12,7 +12,7 @@
 #include "common/config/scenario.hpp"
 #include "python/bindings/bindings.hpp"
 #include "python/bindings/errors.hpp"
-#include "python/bindings/flown_flight.hpp"
+#include "python/bindings/flight_table.hpp"
 #include "python/bindings/python_law.hpp"
 #include "sim_server/plants/plant.hpp"
 
@@ -35,7 +35,7 @@ Ids list_ids(const config::Scenario& scenario, std::optional<std::uint32_t> vehi
   return {*vehicle};
 }
 
-std::unique_ptr<FlownFlight> fly(config::Scenario scenario, const py::object& controller,
+std::unique_ptr<FlightTable> fly(config::Scenario scenario, const py::object& controller,
                                  std::optional<std::uint32_t> vehicle, bool check_purity) {
   scenario.sync.mode = config::SyncMode::kLockstep;  // no answer can be late in one process
   const Ids ids = list_ids(scenario, vehicle);
@@ -43,7 +43,7 @@ std::unique_ptr<FlownFlight> fly(config::Scenario scenario, const py::object& co
   options.checks_purity = check_purity;
   if (controller.is_none()) {
     const py::gil_scoped_release released;
-    return std::make_unique<FlownFlight>(scenario, ids, options, [] {
+    return std::make_unique<FlightTable>(scenario, ids, options, [] {
       const py::gil_scoped_acquire gil;
       check_signals();
     });
@@ -58,7 +58,7 @@ std::unique_ptr<FlownFlight> fly(config::Scenario scenario, const py::object& co
   // The flight holds the GIL, because the law needs it at every step. Other threads get it while
   // the law runs, as during any Python code, and at each call of the lambda below.
   try {
-    return std::make_unique<FlownFlight>(scenario, ids, options, [] {
+    return std::make_unique<FlightTable>(scenario, ids, options, [] {
       check_signals();
       const py::gil_scoped_release released;
     });
@@ -70,7 +70,7 @@ std::unique_ptr<FlownFlight> fly(config::Scenario scenario, const py::object& co
 
 /// The rows of a vehicle, (steps, columns), without a copy. The array keeps their memory alive.
 py::array make_rows(const py::object& self, std::size_t index) {
-  const RowBuffer& rows = py::cast<const FlownFlight&>(self).rows(index);
+  const RowBuffer& rows = py::cast<const FlightTable&>(self).rows(index);
   const auto to_size = [](std::size_t size) { return static_cast<py::ssize_t>(size); };
   const py::array array(py::dtype::of<double>(), {to_size(rows.rows()), to_size(rows.width())},
                         rows.row(0), self);
@@ -78,7 +78,7 @@ py::array make_rows(const py::object& self, std::size_t index) {
   return array;
 }
 
-py::list list_columns(const FlownFlight& flight) {
+py::list list_columns(const FlightTable& flight) {
   const char* const kinds[] = {"double", "integer", "fault", "stage_name"};
   py::list columns;
   for (const ColumnPlace& place : flight.columns())
@@ -90,20 +90,20 @@ py::list list_columns(const FlownFlight& flight) {
 }  // namespace
 
 void add_flight(py::module_& module) {
-  py::class_<FlownFlight>(module, "FlownFlight", "A flight that is kept; sls.Flight shows it.")
-      .def_property_readonly("vehicle_ids", &FlownFlight::ids)
-      .def_property_readonly("failure", &FlownFlight::failure)
-      .def_property_readonly("last_step", &FlownFlight::last_step)
+  py::class_<FlightTable>(module, "FlightTable", "A flight that is kept; sls.Flight shows it.")
+      .def_property_readonly("vehicle_ids", &FlightTable::ids)
+      .def_property_readonly("failure", &FlightTable::failure)
+      .def_property_readonly("last_step", &FlightTable::last_step)
       .def_property_readonly("columns", &list_columns,
                              "Tuples (table, name, index in a row, kind of the cell).")
-      .def_property_readonly("certificate", &FlownFlight::calc_certificate,
+      .def_property_readonly("certificate", &FlightTable::calc_certificate,
                              py::call_guard<py::gil_scoped_release>())
-      .def("can_measurement_differ", &FlownFlight::can_measurement_differ, py::arg("index"))
+      .def("can_measurement_differ", &FlightTable::can_measurement_differ, py::arg("index"))
       .def("rows", &make_rows, py::arg("index"),
            "Cells of the index-th vehicle, (steps, columns), read-only and not copied.")
       .def(
           "save",
-          [](const FlownFlight& flight, const std::string& folder, bool force) {
+          [](const FlightTable& flight, const std::string& folder, bool force) {
             return flight.save(folder, force);
           },
           py::arg("folder"), py::arg("force"), py::call_guard<py::gil_scoped_release>());

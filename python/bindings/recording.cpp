@@ -29,8 +29,8 @@ py::tuple compare(const std::string& folder_a, const std::string& folder_b) {
   std::vector<std::string> notes;
   {
     const py::gil_scoped_release released;
-    const record::RecordedFlight a = record::open_recording(folder_a);
-    const record::RecordedFlight b = record::open_recording(folder_b);
+    const record::OpenedRecording a = record::open_recording(folder_a);
+    const record::OpenedRecording b = record::open_recording(folder_b);
     difference = record::find_first_difference(a, b);
     notes = record::list_notes(a, b);
   }

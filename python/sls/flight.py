@@ -49,7 +49,7 @@ class FlownVehicle(VehicleColumns):
     flight's memory and keep it alive; only text columns are copies."""
 
     def __init__(self, core: Any, index: int, scenario: "Scenario"):
-        """The `index`-th vehicle of a _sls_core.FlownFlight."""
+        """The `index`-th vehicle of a _sls_core.FlightTable."""
         self._core = core
         self._index = index
         self.scenario = scenario

@@ -4,7 +4,7 @@ namespace sls::sim {
 
 void AnswerJudge::judge(CommandSample& sample, bool is_published) {
   if (sample.answers.empty() && sample.run_id == run_.run_id)
-    run_.watch.check().note_empty(sample.sender, sample.step);
+    run_.watch.answers().note_empty(sample.sender, sample.step);
   for (OfferedAnswer& offered : sample.answers) {
     offered.is_early = !is_published || sample.arrived.time < published_;
     Vehicle* vehicle = run_.fleet.find(offered.vehicle_id);
@@ -17,7 +17,7 @@ void AnswerJudge::judge(CommandSample& sample, bool is_published) {
 
 void AnswerJudge::note(Verdict verdict, Vehicle& vehicle, const OfferedAnswer& offered,
                        const CommandSample& sample) {
-  ParticipantCheck& check = run_.watch.check();
+  AnswerCheck& check = run_.watch.answers();
   if (verdict == Verdict::kLate) {
     run_.outputs.record_late(vehicle, offered);
     pacing_.note_late(vehicle, offered, sample.arrived.time);

@@ -17,14 +17,14 @@ Verdict to_verdict(Defect defect) {
       return Verdict::kForceLimit;
     case Defect::kUndefined:
       return Verdict::kUndefined;
-    case Defect::kFault:
-      return Verdict::kFault;
+    case Defect::kErrorCode:
+      return Verdict::kErrorCode;
     case Defect::kUnknownStage:
       return Verdict::kUnknownStage;
     case Defect::kEarlyEnd:
       return Verdict::kEarlyEnd;
   }
-  return Verdict::kFault;
+  return Verdict::kErrorCode;
 }
 
 /// Order by strength, strongest first; then by name and peer, not by time of sample.
@@ -62,8 +62,8 @@ const char* to_string(Verdict verdict) {
       return "a sender that is not announced as a ready controller";
     case Verdict::kUndefined:
       return to_string(Defect::kUndefined);
-    case Verdict::kFault:
-      return to_string(Defect::kFault);
+    case Verdict::kErrorCode:
+      return to_string(Defect::kErrorCode);
     case Verdict::kUnknownStage:
       return to_string(Defect::kUnknownStage);
     case Verdict::kEarlyEnd:
@@ -297,7 +297,7 @@ void CommandGate::count(Verdict verdict) {
       ++counters_.rejected_client();
       return;
     case Verdict::kUndefined:
-    case Verdict::kFault:
+    case Verdict::kErrorCode:
     case Verdict::kUnknownStage:
     case Verdict::kEarlyEnd:
       ++counters_.rejected_fault();

@@ -30,8 +30,8 @@ enum class Verdict {
   kContradiction,  ///< another answer of the same client to the same step
   kUnknownVehicle,
   kUnknownClient,
-  kUndefined,  ///< this and the next three are counted as faults
-  kFault,
+  kUndefined,  ///< this and the next three are counted in `rejected_fault`
+  kErrorCode,
   kUnknownStage,
   kEarlyEnd,  ///< of the mission
 };

@@ -59,7 +59,7 @@ std::optional<Defect> find_defect(std::uint64_t step, const model::Answer& answe
   if (calc_norm(answer.f_Q_W) > limits.force) return Defect::kForceLimit;
   if (find_undefined(answer).first) return Defect::kUndefined;
   if (answer.error_code != ErrorCode::kNone || answer.mission == MissionPhase::kFailed)
-    return Defect::kFault;
+    return Defect::kErrorCode;
   if (!is_finite(answer.reference)) return Defect::kNotFinite;  // its fault would say why
   const std::uint32_t stage = answer.memory.stage;
   if (stage > limits.stages) return Defect::kUnknownStage;
@@ -76,7 +76,7 @@ const char* to_string(Defect defect) {
       return "a force beyond controller.force_limit_n";
     case Defect::kUndefined:
       return "an undefined value";
-    case Defect::kFault:
+    case Defect::kErrorCode:
       return "a fault";
     case Defect::kUnknownStage:
       return "a stage beyond its mission";
@@ -101,7 +101,7 @@ std::string describe_refusal(Defect defect, std::uint64_t step, const model::Ans
       const auto [field, value] = find_undefined(answer);
       return text + fmt::format(": {} {}", field, value);
     }
-    case Defect::kFault:
+    case Defect::kErrorCode:
       return text + fmt::format(": {}", answer.error_code != ErrorCode::kNone
                                             ? to_string(answer.error_code)
                                             : "mission failed");

@@ -15,7 +15,7 @@ enum class Defect {
   kNotFinite,     ///< a number of force, memory or reference is not finite
   kForceLimit,    ///< |F| beyond `controller.force_limit_n`
   kUndefined,     ///< an enumerator that the contract does not define
-  kFault,         ///< an error code, or a failed mission
+  kErrorCode,     ///< an error code, or a failed mission
   kUnknownStage,  ///< a stage beyond the mission
   kEarlyEnd,      ///< the mission is over before its stages can be
 };

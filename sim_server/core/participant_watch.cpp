@@ -71,7 +71,7 @@ void ParticipantWatch::look(Surroundings& around, sync::Time now) {
   neighbourhood.stamps_ahead_s = stamps_.take();
   report_.problem = around.replace_problems(check_.look(neighbourhood));
   problems_version_ = around.problems_version();
-  for (const std::string& event : check_.take_events()) report_.announce(event, now);
+  for (const std::string& event : check_.answers().take_events()) report_.announce(event, now);
   for (const std::string& remark : fleet_.take_remarks()) report_.announce(remark, now);
 }
 
@@ -93,7 +93,7 @@ std::string ParticipantWatch::name_awaited_controllers() const {
     const bool is_there = client && !client->is_gone && report_.problem.empty();
     awaited[client         ? fmt::format("controller '{}'{}{}", client->name,
                                          describe_place(roster_, client->peer),
-                                 is_there ? check_.describe_rejections(client->peer) : "")
+                                 is_there ? check_.answers().describe_rejections(client->peer) : "")
             : last.empty() ? std::string("controller (none is ready)")
                            : fmt::format("controller '{}' (gone)", last)]
         .push_back(vehicle->id());

@@ -23,7 +23,7 @@ class ParticipantWatch {
                    RunReport& report);
 
   const Roster& roster() const { return roster_; }
-  ParticipantCheck& check() { return check_; }
+  AnswerCheck& answers() { return check_.answers(); }
   /// A sample of sls/command came.
   void note_arrival(const CommandSample& sample) {
     stamps_.note(sample.sender, sample.written, [&] { return sample.arrived.wall; });

@@ -2,15 +2,47 @@
 
 #include <chrono>
 #include <cstdint>
+#include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "common/sync/membership.hpp"
 #include "common/sync/servers.hpp"
-#include "sim_server/core/participant_check.hpp"
 
 namespace sls::sim {
+
+/// The participants and endpoints that the server has discovered at one moment.
+struct Neighbourhood {
+  sync::Time now;
+  std::vector<sync::Member> participants;  ///< of any run
+  std::set<std::uint64_t> other_runs;      ///< runs of other servers
+  std::set<std::uint32_t> other_vehicles;  ///< vehicles of other servers
+  /// On a network packets are lost, and discovery needs longer.
+  bool is_on_network = false;
+  /// Participants with a matched writer of sls/command, as text.
+  std::map<bus::PeerId, std::string> command_writers;
+  /// Participants with a matched writer of sls/participant: an announcement may still come.
+  std::set<bus::PeerId> announcement_writers;
+  std::set<bus::PeerId> state_readers;  ///< participants with a matched reader of sls/state
+  /// Participants that have acknowledged the parameters and a status of this run.
+  std::set<bus::PeerId> informed;
+  /// Participants whose commands carry a source timestamp in the future: how far ahead of our
+  /// clock, s.
+  std::map<bus::PeerId, double> stamps_ahead_s;
+  /// Controllers whose writer offers no DEADLINE (bus::Node::find_missing_deadlines).
+  std::map<bus::PeerId, std::string> missing_deadlines;
+  /// Participants with another problem in discovery, which explains why no announcement comes.
+  std::set<bus::PeerId> explained;
+
+  /// The participant that has announced itself as `peer`; else null.
+  const sync::Member* find(const bus::PeerId& peer) const {
+    for (const sync::Member& member : participants)
+      if (member.peer == peer) return &member;
+    return nullptr;
+  }
+};
 
 /// The questions of a server's core to its shell when it looks around. No function blocks or calls
 /// the core.
@@ -32,12 +64,13 @@ class Surroundings {
 
   /// Changes when the middleware finds a mistake of a participant, or one ends.
   virtual std::uint64_t problems_version() const = 0;
-  /// The participants and endpoints for ParticipantCheck, without time and stamps of commands. `is_known`:
-  /// participants may have joined the run.
+  /// The participants and endpoints for ParticipantCheck, without time and stamps of commands.
+  /// `is_known`: participants may have joined the run.
   virtual Neighbourhood look(bool is_known) = 0;
-  /// Makes `found` the mistakes of this run. Returns all that hold, in words.
-  virtual std::string replace_problems(const ParticipantCheck::Findings& found) = 0;
-  /// The causes that may keep participants from being discovered, to be appended to a message; else empty.
+  /// Makes `found`, texts by key, the mistakes of this run. Returns all that hold, in words.
+  virtual std::string replace_problems(const std::map<std::string, std::string>& found) = 0;
+  /// The causes that may keep participants from being discovered, to be appended to a message; else
+  /// empty.
   virtual std::string describe_isolation() const = 0;
 
   /// The queues on the way to the network.

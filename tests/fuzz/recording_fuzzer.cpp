@@ -29,7 +29,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   static const sls::test::TemporaryFolder folder;
   write_files(folder.path(), std::string(data, data + size));
   try {
-    const RecordedFlight flight = open_recording(folder.path());
+    const OpenedRecording flight = open_recording(folder.path());
     inspect(flight);
     list_notes(flight, flight);
     find_next_step(flight);

@@ -1,4 +1,4 @@
-/// Real faults on separate hosts: the doctor names each fault, and nothing else.
+/// Real causes on separate hosts: the doctor reports each, and nothing else.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -17,10 +17,10 @@ using Words = std::vector<std::string>;
 constexpr auto kMostTime = std::chrono::seconds(20);
 
 /// The output of a doctor.
-struct Finding {
+struct Report {
   int code = -1;
   std::string text;
-  std::set<std::string> faults;
+  std::set<std::string> findings;
 
   /// The line about `check`; empty if there is none.
   std::string line(const std::string& check) const {
@@ -31,10 +31,10 @@ struct Finding {
   }
 };
 
-Finding examine(const Words& command) {
+Report examine(const Words& command) {
   const auto began = std::chrono::steady_clock::now();
   Process doctor(command);
-  Finding found;
+  Report found;
   found.code = doctor.wait().value_or(-1);
   const std::chrono::duration<double> time = std::chrono::steady_clock::now() - began;
   EXPECT_LT(time, kMostTime) << time.count() << " s";
@@ -43,21 +43,21 @@ Finding examine(const Words& command) {
   std::istringstream lines(found.text);
   for (std::string line; std::getline(lines, line);) {
     if (line.size() < kNameWidth || line.compare(kNameWidth, 6, "FAULT ") != 0) continue;
-    found.faults.insert(line.substr(0, line.find_last_not_of(' ', kNameWidth - 1) + 1));
+    found.findings.insert(line.substr(0, line.find_last_not_of(' ', kNameWidth - 1) + 1));
   }
   return found;
 }
 
-void expect_healthy(const Finding& found) {
+void expect_healthy(const Report& found) {
   EXPECT_EQ(found.code, 0) << found.text;
-  EXPECT_TRUE(found.faults.empty()) << found.text;
+  EXPECT_TRUE(found.findings.empty()) << found.text;
 }
 
-/// Expects exactly `faults`. The first is the cause, and its line contains `words`.
-void expect_faults(const Finding& found, const Words& faults, const std::string& words) {
+/// Expects exactly `findings`. The first is the cause, and its line contains `words`.
+void expect_findings(const Report& found, const Words& findings, const std::string& words) {
   EXPECT_EQ(found.code, 1) << found.text;
-  EXPECT_EQ(found.faults, std::set<std::string>(faults.begin(), faults.end())) << found.text;
-  EXPECT_NE(found.line(faults.front()).find(words), std::string::npos) << found.text;
+  EXPECT_EQ(found.findings, std::set<std::string>(findings.begin(), findings.end())) << found.text;
+  EXPECT_NE(found.line(findings.front()).find(words), std::string::npos) << found.text;
 }
 
 /// Two hosts, `here` and `there`. Their /dev/shm is a folder of the test.
@@ -83,7 +83,7 @@ class DoctorTest : public testing::Test {
   Words with_peer(const Words& flags = {}) const {
     return Words{"--peer", network_->address("there")} + flags;
   }
-  Finding examine_there(const std::string& profile = "lan") const {
+  Report examine_there(const std::string& profile = "lan") const {
     return examine(on("here") + doctor(profile, with_peer()));
   }
 
@@ -108,7 +108,7 @@ class DoctorTest : public testing::Test {
   std::unique_ptr<Network> network_;
 };
 
-// --- no fault ------------------------------------------------------------------------------------
+// --- no finding ----------------------------------------------------------------------------------
 
 class HealthyDoctorTest : public DoctorTest, public testing::WithParamInterface<const char*> {};
 
@@ -122,7 +122,7 @@ TEST_P(HealthyDoctorTest, FindsNoFaultOnAnIdleMachineOrDuringAFlight) {
   const Flight flight(scenario("figure_eight"), options);
   ASSERT_TRUE(flight.wait_for_steps(1)) << flight.outputs();
   const Words domain = {"--domain", flight.domain.text()};
-  const Finding found = examine(on("there") + doctor(GetParam(), domain));
+  const Report found = examine(on("there") + doctor(GetParam(), domain));
   expect_healthy(found);
   for (const char* name : {"sim_server", "control_client", "recorder"})
     EXPECT_NE(found.line("data").find(name), std::string::npos) << found.text;
@@ -134,7 +134,7 @@ INSTANTIATE_TEST_SUITE_P(Profiles, HealthyDoctorTest, testing::Values("default",
 
 TEST_F(DoctorTest, BetweenTwoHealthyHostsSamplesAndDatagramsOfEverySizePass) {
   const auto answerer = start_answerer("there");
-  const Finding found = examine_there();
+  const Report found = examine_there();
   expect_healthy(found);
   EXPECT_NE(found.line("datagrams").find("60000 bytes pass"), std::string::npos) << found.text;
   EXPECT_NE(found.line("data").find("a doctor at 10.77.0.2"), std::string::npos) << found.text;
@@ -145,7 +145,7 @@ TEST_F(DoctorTest, BetweenTwoHealthyHostsSamplesAndDatagramsOfEverySizePass) {
 TEST_F(DoctorTest, NamesASwitchWithoutMulticast) {
   const auto answerer = start_answerer("there");
   network_->block_multicast();
-  expect_faults(examine_there(), {"multicast"}, "nothing sent to 239.255.0.1:7400 came back");
+  expect_findings(examine_there(), {"multicast"}, "nothing sent to 239.255.0.1:7400 came back");
 }
 
 TEST_F(DoctorTest, NamesPortsThatAreBlockedThere) {
@@ -153,9 +153,9 @@ TEST_F(DoctorTest, NamesPortsThatAreBlockedThere) {
   network_->run("there",
                 "nft 'add table ip f; add chain ip f i { type filter hook input priority 0; }; "
                 "add rule ip f i udp dport 7401-7649 drop'");
-  const Finding found = examine_there();
-  EXPECT_EQ(found.faults.count("ports"), 1u) << found.text;
-  EXPECT_EQ(found.faults.count("multicast"), 0u) << found.text;
+  const Report found = examine_there();
+  EXPECT_EQ(found.findings.count("ports"), 1u) << found.text;
+  EXPECT_EQ(found.findings.count("multicast"), 0u) << found.text;
   EXPECT_NE(found.line("ports").find("UDP 7410 to 7429 of 10.77.0.2 are blocked"),
             std::string::npos)
       << found.text;
@@ -167,7 +167,7 @@ TEST_F(DoctorTest, NamesPortsThatAreBlockedHere) {
                 "nft 'add table ip f; add chain ip f i { type filter hook input priority 0; }; "
                 "add rule ip f i ct state established accept; "
                 "add rule ip f i udp dport 7401-7649 drop'");
-  expect_faults(examine_there(), {"ports", "data"}, "of this machine are blocked");
+  expect_findings(examine_there(), {"ports", "data"}, "of this machine are blocked");
 }
 
 TEST_F(DoctorTest, NamesLostFragmentsWithAndWithoutADoctorThere) {
@@ -177,21 +177,21 @@ TEST_F(DoctorTest, NamesLostFragmentsWithAndWithoutADoctorThere) {
       "}; add rule ip f i ip frag-off & 0x1fff != 0 drop'");
   const auto server = start_server(on("there"), qos("lan"));
   const std::string words = "8000 and 60000 bytes do not pass, 1400 do";
-  const Finding without = examine_there();
+  const Report without = examine_there();
   EXPECT_NE(without.line("datagrams").find(words), std::string::npos) << without.text;
   const auto answerer = start_answerer("there");
-  expect_faults(examine_there(), {"datagrams", "data"}, words);
+  expect_findings(examine_there(), {"datagrams", "data"}, words);
 }
 
 TEST_F(DoctorTest, NamesAProfileThatStaysOnItsMachine) {
-  const Finding found = examine_there("udp");
-  expect_faults(found, {"network"}, "udp.xml stays on 127.0.0.1");
+  const Report found = examine_there("udp");
+  expect_findings(found, {"network"}, "udp.xml stays on 127.0.0.1");
 }
 
 TEST_F(DoctorTest, NamesADiscoveryServerThatIsNotThere) {
   const Words environment = {"env", "SLS_DISCOVERY_SERVER=" + network_->address("there")};
-  expect_faults(examine(on("here") + environment + doctor("discovery_server")),
-                {"discovery", "data"}, "no discovery server answers at 10.77.0.2:11811");
+  expect_findings(examine(on("here") + environment + doctor("discovery_server")),
+                  {"discovery", "data"}, "no discovery server answers at 10.77.0.2:11811");
 }
 
 TEST_F(DoctorTest, NamesAClockThatIsAnHourOff) {
@@ -204,20 +204,21 @@ TEST_F(DoctorTest, NamesAClockThatIsAnHourOff) {
   if (library.empty()) GTEST_SKIP() << "no libfaketime (Debian package libfaketime)";
   const auto answerer = start_answerer("there", {"env", "LD_PRELOAD=" + library, "FAKETIME=+3600s",
                                                  "FAKETIME_DONT_FAKE_MONOTONIC=1"});
-  expect_faults(examine_there(), {"clock"}, "3.6e+03 s ahead");
+  expect_findings(examine_there(), {"clock"}, "3.6e+03 s ahead");
 }
 
 // --- the machine ---------------------------------------------------------------------------------
 
 TEST_F(DoctorTest, NamesASharedMemoryThatIsTooSmallAndSurvivesIt) {
-  expect_faults(examine(with_memory("here", "mount -t tmpfs -o size=1M tmpfs") + doctor("default")),
-                {"shared memory"}, "/dev/shm has 1.0 MB free of 1.0 MB");
+  expect_findings(
+      examine(with_memory("here", "mount -t tmpfs -o size=1M tmpfs") + doctor("default")),
+      {"shared memory"}, "/dev/shm has 1.0 MB free of 1.0 MB");
 }
 
 TEST_F(DoctorTest, NamesASharedMemoryThatIsNotShared) {
   const auto server = start_server(with_memory("here", "mount -t tmpfs tmpfs"), qos("default"));
-  expect_faults(examine(on("here") + doctor("default")), {"shared memory", "data"},
-                "sim_server runs on this host with another /dev/shm");
+  expect_findings(examine(on("here") + doctor("default")), {"shared memory", "data"},
+                  "sim_server runs on this host with another /dev/shm");
 }
 
 TEST_F(DoctorTest, NamesSegmentsThatAKilledProcessLeft) {
@@ -229,23 +230,23 @@ TEST_F(DoctorTest, NamesSegmentsThatAKilledProcessLeft) {
           file, std::filesystem::file_time_type::clock::now() - std::chrono::minutes(1));
     return !std::filesystem::is_empty(memory_.path());
   }));
-  expect_faults(examine(on("here") + doctor("default")), {"shared memory"}, "1 stale segment");
+  expect_findings(examine(on("here") + doctor("default")), {"shared memory"}, "1 stale segment");
 }
 
 TEST_F(DoctorTest, NamesAProgramOfAnotherUser) {
   const auto server = start_server(
       on("here") + Words{"setpriv", "--reuid", "65534", "--clear-groups"}, qos("default"));
   if (!server->is_running()) GTEST_SKIP() << "nobody cannot run it: " << server->output();
-  expect_faults(examine(on("here") + doctor("default")), {"users", "data"},
-                "sim_server as nobody and the doctor as root");
+  expect_findings(examine(on("here") + doctor("default")), {"users", "data"},
+                  "sim_server as nobody and the doctor as root");
 }
 
 // --- the domain ----------------------------------------------------------------------------------
 
 TEST_F(DoctorTest, NamesTheDomainWhereTheOthersAre) {
   const auto server = start_server(on("here"), qos("default"), 5);
-  expect_faults(examine(on("here") + doctor("default")), {"domain"},
-                "sim_server is on domain 5, and no program is on domain 0");
+  expect_findings(examine(on("here") + doctor("default")), {"domain"},
+                  "sim_server is on domain 5, and no program is on domain 0");
 }
 
 TEST_F(DoctorTest, NamesTheTopicAndThePolicyOfAQosMismatch) {
@@ -257,16 +258,16 @@ TEST_F(DoctorTest, NamesTheTopicAndThePolicyOfAQosMismatch) {
       <reliability><kind>BEST_EFFORT</kind></reliability></qos></data_writer>
 )" + end));
   const auto server = start_server(on("here"), file);
-  const Finding found = examine(on("here") + doctor("default"));
-  expect_faults(found, {"qos"},
-                "sls/status: RELIABILITY: offered best effort, asked reliable (sim_server");
+  const Report found = examine(on("here") + doctor("default"));
+  expect_findings(found, {"qos"},
+                  "sls/status: RELIABILITY: offered best effort, asked reliable (sim_server");
 }
 
 TEST_F(DoctorTest, NamesATypeThatIsNotOurs) {
   Process stranger(on("here") + Words{std::string(SLS_STRANGER), qos("default"), "0"});
   ASSERT_TRUE(wait_until([&] { return !stranger.output().empty(); }));
-  expect_faults(examine(on("here") + doctor("default")), {"types"},
-                "sls/state: stranger has type sls::SimStatus");
+  expect_findings(examine(on("here") + doctor("default")), {"types"},
+                  "sls/state: stranger has type sls::SimStatus");
 }
 
 TEST_F(DoctorTest, NamesAnIdentityOfAnotherAuthority) {
@@ -280,15 +281,15 @@ TEST_F(DoctorTest, NamesAnIdentityOfAnotherAuthority) {
   };
   const auto server = start_server(on("here") + keys("theirs"), qos("secure"));
   expect_healthy(examine(on("here") + keys("theirs") + doctor("secure")));
-  expect_faults(examine(on("here") + keys("ours") + doctor("secure")), {"security"},
-                "reject each other");
-  expect_faults(examine(on("here") + doctor("lan")), {"security"}, "with security");
+  expect_findings(examine(on("here") + keys("ours") + doctor("secure")), {"security"},
+                  "reject each other");
+  expect_findings(examine(on("here") + doctor("lan")), {"security"}, "with security");
 }
 
 // --- usage ---------------------------------------------------------------------------------------
 
 TEST_F(DoctorTest, AWrongQosFileIsBadUsage) {
-  const Finding found = examine(on("here") + Words{program("sls_doctor"), "--qos", "/no/such.xml"});
+  const Report found = examine(on("here") + Words{program("sls_doctor"), "--qos", "/no/such.xml"});
   EXPECT_EQ(found.code, 2) << found.text;
 }
 

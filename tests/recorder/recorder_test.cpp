@@ -133,7 +133,7 @@ class RecorderTest : public testing::Test {
       fs::create_directory(whole);
       record_flight(whole);
     }
-    const RecordedFlight flight = open_recording(folder);
+    const OpenedRecording flight = open_recording(folder);
     const auto difference = find_first_difference(open_recording(whole), flight);
     EXPECT_FALSE(difference) << difference->text;
     EXPECT_TRUE(flight.manifest().complete);

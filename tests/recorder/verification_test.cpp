@@ -316,7 +316,7 @@ TEST_F(VerificationTest, ARecordingOfAnEarlierVersionKeepsItsCertificate) {
     std::getline(corpus, bytes, '\x1e');
     write_bytes(b_ / name, bytes);
   }
-  const RecordedFlight flight = open_recording(b_);
+  const OpenedRecording flight = open_recording(b_);
   const Inspection inspection = inspect(flight);
   EXPECT_EQ(inspection.steps, 3u);
   EXPECT_EQ(inspection.certificate, flight.manifest().certificate);

@@ -84,7 +84,7 @@ class Shell : public Outputs, public Surroundings, public Backlog {
   bool has_heard_every_claim() const override { return true; }
   std::uint64_t problems_version() const override { return 0; }
   Neighbourhood look(bool) override { return {}; }
-  std::string replace_problems(const ParticipantCheck::Findings&) override { return ""; }
+  std::string replace_problems(const std::map<std::string, std::string>&) override { return ""; }
   std::string describe_isolation() const override { return ""; }
   Queues queues() const override { return {0, 10'000, 0}; }
   std::optional<std::chrono::nanoseconds> command_lifespan() const override { return {}; }

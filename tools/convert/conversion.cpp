@@ -31,7 +31,7 @@ std::string read_text(const fs::path& file) {
 }
 
 /// Those parameters of the recorder on which the content of the MCAP file depends.
-Parameters load_parameters(const record::RecordedFlight& flight) {
+Parameters load_parameters(const record::OpenedRecording& flight) {
   const record::ManifestFile& manifest = flight.segments.front().manifest;
   constexpr double kMaxPeriodS = 1e6;
   if (!(manifest.period_s > 0 && manifest.period_s <= kMaxPeriodS))
@@ -93,7 +93,7 @@ void add_measured(record::RowReader<record::MeasuredRow>& measured, StepRows& ro
     measured.take(rows.vehicle_id, row->step == rows.step ? rows : left_out);
 }
 
-std::uint64_t write(const record::RecordedFlight& flight, const fs::path& file) {
+std::uint64_t write(const record::OpenedRecording& flight, const fs::path& file) {
   record::McapSink sink(file, load_parameters(flight));
   constexpr auto kEnd = std::numeric_limits<std::uint64_t>::max();
   record::StepReader steps(flight, kEnd);
@@ -109,11 +109,11 @@ std::uint64_t write(const record::RecordedFlight& flight, const fs::path& file) 
 
 }  // namespace
 
-fs::path make_default_output(const record::RecordedFlight& flight) {
+fs::path make_default_output(const record::OpenedRecording& flight) {
   return flight.folder / record::McapSink::kFile;
 }
 
-std::uint64_t write_mcap(const record::RecordedFlight& flight, const fs::path& out, bool force) {
+std::uint64_t write_mcap(const record::OpenedRecording& flight, const fs::path& out, bool force) {
   check_output(out, force);
   fs::path part = out;
   part += ".part";

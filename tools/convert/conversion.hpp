@@ -9,7 +9,7 @@
 namespace sls::convert {
 
 /// Path of the file if the user does not give one.
-std::filesystem::path make_default_output(const record::RecordedFlight& flight);
+std::filesystem::path make_default_output(const record::OpenedRecording& flight);
 
 /// Joins all segments and converts them into `out`. The file appears only when it is complete.
 /// Returns the number of messages.
@@ -17,7 +17,7 @@ std::filesystem::path make_default_output(const record::RecordedFlight& flight);
 ///   .mcap, or if the manifest beside it lists it; also if a manifest cannot be used.
 /// @throws record::DamagedError if the recording cannot be read.
 /// @throws std::system_error naming the file if it cannot be written.
-std::uint64_t write_mcap(const record::RecordedFlight& flight, const std::filesystem::path& out,
+std::uint64_t write_mcap(const record::OpenedRecording& flight, const std::filesystem::path& out,
                          bool force);
 
 }  // namespace sls::convert

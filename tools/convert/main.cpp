@@ -17,7 +17,7 @@ int main(int argc, char** argv) {
   cli.add_flag("--force", force, "replace an existing file");
   cli.set_version_flag("--version", app::version());
   return app::run_main(argc, argv, cli, {}, "sls_convert", [&] {
-    const record::RecordedFlight flight = record::open_recording(folder);
+    const record::OpenedRecording flight = record::open_recording(folder);
     if (out.empty()) out = convert::make_default_output(flight);
     const std::uint64_t messages = convert::write_mcap(flight, out, force);
     std::cout << fmt::format("{}: {} messages\n", out.string(), messages);

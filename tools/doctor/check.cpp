@@ -12,7 +12,7 @@ const char* to_string(Verdict verdict) {
   switch (verdict) {
     case Verdict::kOk:
       return "ok";
-    case Verdict::kFault:
+    case Verdict::kFinding:
       return "FAULT";
     case Verdict::kSkipped:
       return "skipped";
@@ -27,9 +27,9 @@ std::string pad(std::string text, std::size_t width) {
 
 }  // namespace
 
-bool is_any_fault(const std::vector<Check>& checks) {
+bool has_finding(const std::vector<Check>& checks) {
   return std::any_of(checks.begin(), checks.end(),
-                     [](const Check& check) { return check.verdict == Verdict::kFault; });
+                     [](const Check& check) { return check.verdict == Verdict::kFinding; });
 }
 
 std::string to_line(const Check& check) {
@@ -42,7 +42,7 @@ std::string to_json(const std::vector<Check>& checks) {
     list.push_back(
         {{"name", check.name}, {"verdict", to_string(check.verdict)}, {"text", check.text}});
   // Names of programs and hosts come from the network: bytes that are not UTF-8 are replaced.
-  return nlohmann::json{{"ok", !is_any_fault(checks)}, {"checks", list}}.dump(
+  return nlohmann::json{{"ok", !has_finding(checks)}, {"checks", list}}.dump(
       2, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 

@@ -8,17 +8,17 @@ namespace sls::doctor {
 
 enum class Verdict {
   kOk,
-  kFault,
+  kFinding,
   kSkipped,  ///< could not be tried, or does not apply to this QoS file
 };
 
 struct Check {
   std::string name;  ///< "multicast"
   Verdict verdict = Verdict::kOk;
-  std::string text;  ///< the fact; for a fault also its consequence and the remedy
+  std::string text;  ///< the fact; for a finding also its consequence and the remedy
 };
 
-bool is_any_fault(const std::vector<Check>& checks);
+bool has_finding(const std::vector<Check>& checks);
 
 /// One line: name, verdict, text.
 std::string to_line(const Check& check);

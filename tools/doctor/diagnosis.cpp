@@ -35,7 +35,7 @@ std::uint64_t calc_shared_memory_need(const Settings& settings, int programs) {
 
 std::vector<Check> diagnose(const Observations& seen) {
   std::vector<Check> checks = check_machine(seen);
-  const std::vector<Check> further = check_domain(seen, is_any_fault(checks));
+  const std::vector<Check> further = check_domain(seen, has_finding(checks));
   checks.insert(checks.end(), further.begin(), further.end());
   return checks;
 }

@@ -1,4 +1,4 @@
-/// Derives the checks, with their faults, from observations: no network, no middleware.
+/// Derives the checks, with their findings, from observations: no network, no middleware.
 #pragma once
 
 #include <cstdint>

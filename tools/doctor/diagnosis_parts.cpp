@@ -5,7 +5,9 @@
 namespace sls::doctor {
 
 Check ok(const char* name, std::string text) { return {name, Verdict::kOk, std::move(text)}; }
-Check fault(const char* name, std::string text) { return {name, Verdict::kFault, std::move(text)}; }
+Check finding(const char* name, std::string text) {
+  return {name, Verdict::kFinding, std::move(text)};
+}
 Check skipped(const char* name, std::string text) {
   return {name, Verdict::kSkipped, std::move(text)};
 }

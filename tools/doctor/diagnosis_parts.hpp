@@ -9,7 +9,7 @@
 namespace sls::doctor {
 
 Check ok(const char* name, std::string text);
-Check fault(const char* name, std::string text);
+Check finding(const char* name, std::string text);
 Check skipped(const char* name, std::string text);
 
 /// "recorder of 10.77.0.3"; without the address if it runs on this host.
@@ -26,7 +26,7 @@ bool is_of_peer(const Observations& seen, const Program& program);
 /// Shared memory, users, network, ports, multicast, datagrams, discovery: machine_checks.cpp.
 std::vector<Check> check_machine(const Observations& seen);
 /// Domain, security, types, QoS, data, clock: domain_checks.cpp. `is_explained`: a check of the
-/// machine has found a fault, which explains missing data.
+/// machine has a finding, which explains missing data.
 std::vector<Check> check_domain(const Observations& seen, bool is_explained);
 
 }  // namespace sls::doctor

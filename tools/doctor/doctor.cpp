@@ -20,7 +20,7 @@ using Clock = std::chrono::steady_clock;
 /// Shortest examination. Announcements come every 0.5 s.
 constexpr auto kLeastTime = std::chrono::milliseconds(1600);
 /// Longest examination. Discovery takes this long on a busy machine; if it takes longer, there is a
-/// fault.
+/// finding.
 constexpr auto kMostTime = std::chrono::milliseconds(5500);
 /// Time to wait for samples that show the other machine's clock.
 constexpr auto kClockTime = std::chrono::milliseconds(3500);

@@ -56,16 +56,16 @@ Check check_domain_number(const Observations& seen) {
     const bool is_lost = here.empty() || (here.count(kServer) == 0) != (names.count(kServer) == 0);
     if (!is_lost) continue;
     const std::string other = std::to_string(domain);
-    return fault(kName, list_flying(names) + " on domain " + other + ", and " +
-                            (here.empty() ? "no program is" : list_flying(here)) + " on domain " +
-                            own + ": they never meet: start all with --domain " + other +
-                            ", or all with --domain " + own);
+    return finding(kName, list_flying(names) + " on domain " + other + ", and " +
+                              (here.empty() ? "no program is" : list_flying(here)) + " on domain " +
+                              own + ": they never meet: start all with --domain " + other +
+                              ", or all with --domain " + own);
   }
   if (!here.empty()) return ok(kName, list_flying(here) + " on domain " + own);
   if (!seen.peer.empty() && !seen.probes.is_there()) return skipped(kName, "no program is heard");
   if (!seen.peer.empty() && !seen.is_peer_here && !seen.probes.is_answered)
-    return fault(kName, "no program of sls is at " + seen.peer + " on domain " + own +
-                            ": start it, or sls_doctor --answer there to try the way to it");
+    return finding(kName, "no program of sls is at " + seen.peer + " on domain " + own +
+                              ": start it, or sls_doctor --answer there to try the way to it");
   return ok(kName, "no program of sls runs on any domain that is heard");
 }
 
@@ -74,9 +74,9 @@ Check check_security(const Observations& seen) {
   const bool is_secured = seen.settings.is_secured;
   const std::string file = seen.qos_file;
   if (!seen.join_error.empty() && is_secured)
-    return fault(kName, seen.join_error +
-                            ": correct SLS_KEYS and SLS_IDENTITY, or make keys with "
-                            "./sls keys DIR");
+    return finding(kName, seen.join_error +
+                              ": correct SLS_KEYS and SLS_IDENTITY, or make keys with "
+                              "./sls keys DIR");
   std::set<std::string> rejected, others;
   for (const Program& program : seen.programs) {
     // A program that rejects us does not announce its writers and readers.
@@ -91,16 +91,18 @@ Check check_security(const Observations& seen) {
         is_of_peer(seen, heard.address) && heard.announcement.is_secured != is_secured)
       others.insert(heard.announcement.name + " of " + heard.address);
   if (!others.empty())
-    return fault(kName, join({others.begin(), others.end()}) +
-                            (is_secured ? " without security, this QoS file with it"
-                                        : " with security, this QoS file without it") +
-                            ": they ignore each other: use config/qos/secure.xml with SLS_KEYS on "
-                            "every machine, or on none");
+    return finding(kName,
+                   join({others.begin(), others.end()}) +
+                       (is_secured ? " without security, this QoS file with it"
+                                   : " with security, this QoS file without it") +
+                       ": they ignore each other: use config/qos/secure.xml with SLS_KEYS on "
+                       "every machine, or on none");
   if (!rejected.empty())
-    return fault(kName, join({rejected.begin(), rejected.end()}) +
-                            " and the doctor reject each other: not the same authority, or an "
-                            "identity that is not valid: give every machine keys of one ./sls keys "
-                            "DIR, and see that they are not expired");
+    return finding(kName,
+                   join({rejected.begin(), rejected.end()}) +
+                       " and the doctor reject each other: not the same authority, or an "
+                       "identity that is not valid: give every machine keys of one ./sls keys "
+                       "DIR, and see that they are not expired");
   return ok(kName, is_secured ? "all programs have a valid identity" : "no program uses it");
 }
 
@@ -127,7 +129,7 @@ Check make_mismatch_check(const char* name, const std::vector<Mismatch>& found,
   if (found.empty()) return ok(name, else_text);
   std::vector<std::string> texts;
   for (const Mismatch& mismatch : found) texts.push_back(mismatch.topic + ": " + mismatch.text);
-  return fault(name, join(texts) + ": these never match" + what_to_do);
+  return finding(name, join(texts) + ": these never match" + what_to_do);
 }
 
 Check check_types(const Observations& seen) {
@@ -155,7 +157,7 @@ Check check_qos(const Observations& seen) {
                              "every writer matches every reader of its topic");
 }
 
-/// `is_explained`: another check has found a fault.
+/// `is_explained`: another check has a finding.
 Check check_data(const Observations& seen, bool is_explained) {
   constexpr const char* kName = "data";
   const std::string cause =
@@ -163,10 +165,10 @@ Check check_data(const Observations& seen, bool is_explained) {
                    : ": something between the two lets announcements pass and samples not: open " +
                          name_ports(seen) + " on both sides";
   if (!seen.join_error.empty() && !seen.settings.is_secured)
-    return fault(kName, seen.join_error + ": no program can join with this QoS file");
+    return finding(kName, seen.join_error + ": no program can join with this QoS file");
   if (!seen.is_joined) return skipped(kName, "not tried, because joining would fail");
   if (!seen.other_end.empty())
-    return fault(
+    return finding(
         kName, "a second program of this machine died with " + seen.other_end + " when it joined");
   std::vector<std::string> silent, arrived;
   for (const Program& program : seen.programs) {
@@ -174,15 +176,16 @@ Check check_data(const Observations& seen, bool is_explained) {
     if (program.samples > 0) arrived.push_back(name_program(program));
   }
   if (!silent.empty())
-    return fault(kName,
-                 "nothing that " + join(silent) + " wrote arrived, though discovered" + cause);
+    return finding(kName,
+                   "nothing that " + join(silent) + " wrote arrived, though discovered" + cause);
   const bool is_asked = seen.peer.empty() || seen.probes.is_answered;
   std::vector<std::string> lost;
   for (const auto& [size, is_back] : seen.echoes)
     if (!is_back && is_asked) lost.push_back(std::to_string(size));
   if (!lost.empty() && seen.refusal.empty())
-    return fault(kName, "samples of " + join(lost) + " bytes did not come back from a doctor at " +
-                            name_peer(seen) + cause);
+    return finding(kName, "samples of " + join(lost) +
+                              " bytes did not come back from a doctor at " + name_peer(seen) +
+                              cause);
   if (is_asked && seen.refusal.empty()) arrived.push_back("a doctor at " + name_peer(seen));
   if (arrived.empty()) return skipped(kName, "no program to exchange samples with");
   return ok(kName, "samples arrive from " + join(arrived));
@@ -196,16 +199,16 @@ Check check_clock(const Observations& seen) {
   if (const auto ahead = seen.probes.clock_ahead; ahead && !seen.is_peer_here)
     return std::chrono::abs(*ahead) <= kClockTolerance
                ? ok(kName, "that of " + seen.peer + " agrees to " + name_seconds(*ahead))
-               : fault(kName, "that of " + seen.peer + " is " + name_seconds(*ahead) +
-                                  (ahead->count() > 0 ? " ahead" : " behind") + what_to_do);
+               : finding(kName, "that of " + seen.peer + " is " + name_seconds(*ahead) +
+                                    (ahead->count() > 0 ? " ahead" : " behind") + what_to_do);
   bool is_any = false;
   for (const Program& program : seen.programs) {
     if (!program.delay || program.is_on_this_host) continue;
     is_any = true;
     if (std::chrono::abs(*program.delay) > kDelayTolerance)
-      return fault(kName, "that of " + name_program(program) + " is " +
-                              name_seconds(*program.delay) +
-                              (program.delay->count() < 0 ? " ahead" : " behind") + what_to_do);
+      return finding(kName, "that of " + name_program(program) + " is " +
+                                name_seconds(*program.delay) +
+                                (program.delay->count() < 0 ? " ahead" : " behind") + what_to_do);
   }
   return is_any ? ok(kName, "samples are as old as they may be")
                 : skipped(kName, "no other machine to compare with");
@@ -216,7 +219,7 @@ Check check_clock(const Observations& seen) {
 std::vector<Check> check_domain(const Observations& seen, bool is_explained) {
   std::vector<Check> checks = {check_domain_number(seen), check_security(seen), check_types(seen),
                                check_qos(seen)};
-  checks.push_back(check_data(seen, is_explained || is_any_fault(checks)));
+  checks.push_back(check_data(seen, is_explained || has_finding(checks)));
   checks.push_back(check_clock(seen));
   return checks;
 }

@@ -61,7 +61,7 @@ Check check_shared_memory(const Observations& seen) {
   const SharedMemory& memory = seen.shared_memory;
   if (!seen.settings.uses_shared_memory) return skipped(kName, "this QoS file does not use it");
   if (!memory.is_there)
-    return fault(
+    return finding(
         kName, "/dev/shm is missing, or user " + seen.user +
                    " may not write there: no program can start: mount -t tmpfs tmpfs /dev/shm, or "
                    "use config/qos/udp.xml");
@@ -70,22 +70,24 @@ Check check_shared_memory(const Observations& seen) {
       [](const Program& program) { return program.is_on_this_host && is_flying(program.name); });
   const std::uint64_t need = calc_shared_memory_need(seen.settings, is_flying_here ? 1 : 3);
   if (memory.free < need)
-    return fault(kName, "/dev/shm has " + name_megabytes(memory.free) + " free of " +
-                            name_megabytes(memory.size) + ", a flight needs " +
-                            name_megabytes(need) +
-                            ": programs would die of SIGBUS: mount -o remount,size=64M /dev/shm "
-                            "(docker run --shm-size 64m), or use config/qos/udp.xml");
+    return finding(kName, "/dev/shm has " + name_megabytes(memory.free) + " free of " +
+                              name_megabytes(memory.size) + ", a flight needs " +
+                              name_megabytes(need) +
+                              ": programs would die of SIGBUS: mount -o remount,size=64M /dev/shm "
+                              "(docker run --shm-size 64m), or use config/qos/udp.xml");
   if (const Program* program = find_unshared(seen))
-    return fault(kName, name_program(*program) +
-                            " runs on this host with another /dev/shm (a container of its own?): "
-                            "nothing passes between the two: share it (docker run --ipc host), or "
-                            "use config/qos/lan.xml");
+    return finding(kName,
+                   name_program(*program) +
+                       " runs on this host with another /dev/shm (a container of its own?): "
+                       "nothing passes between the two: share it (docker run --ipc host), or "
+                       "use config/qos/lan.xml");
   if (memory.stale_segments > 0)
-    return fault(kName, std::to_string(memory.stale_segments) + " stale segments (" +
-                            name_megabytes(memory.stale_size) + ") of killed processes of " +
-                            join(memory.stale_owners) +
-                            " fill /dev/shm: start any program of sls as that user, which removes "
-                            "them, or run fastdds shm clean");
+    return finding(kName,
+                   std::to_string(memory.stale_segments) + " stale segments (" +
+                       name_megabytes(memory.stale_size) + ") of killed processes of " +
+                       join(memory.stale_owners) +
+                       " fill /dev/shm: start any program of sls as that user, which removes "
+                       "them, or run fastdds shm clean");
   return ok(kName, "/dev/shm has " + name_megabytes(memory.free) + " free, and nothing stale");
 }
 
@@ -101,9 +103,10 @@ Check check_users(const Observations& seen) {
     others.push_back(name_program(program) + " as " + config::to_printable(program.user));
   }
   if (others.empty()) return ok(kName, "all programs on this machine run as " + seen.user);
-  return fault(kName, join(others) + " and the doctor as " + seen.user +
-                          ": users cannot open each other's shared memory, so nothing passes: run "
-                          "all as one user, or use config/qos/udp.xml");
+  return finding(kName,
+                 join(others) + " and the doctor as " + seen.user +
+                     ": users cannot open each other's shared memory, so nothing passes: run "
+                     "all as one user, or use config/qos/udp.xml");
 }
 
 // --- the network ---------------------------------------------------------------------------------
@@ -112,21 +115,21 @@ Check check_network(const Observations& seen) {
   constexpr const char* kName = "network";
   const ProbeResults& probes = seen.probes;
   if (seen.peer_address.empty())
-    return fault(kName, "'" + seen.peer +
-                            "' has no IPv4 address: give one, or put the name into /etc/hosts");
+    return finding(kName, "'" + seen.peer +
+                              "' has no IPv4 address: give one, or put the name into /etc/hosts");
   if (seen.settings.is_local() && !seen.is_peer_here)
-    return fault(kName, seen.qos_file + " stays on " + join(seen.settings.only_addresses) +
-                            ", so nothing reaches " + seen.peer +
-                            ": use config/qos/lan.xml on every machine");
+    return finding(kName, seen.qos_file + " stays on " + join(seen.settings.only_addresses) +
+                              ", so nothing reaches " + seen.peer +
+                              ": use config/qos/lan.xml on every machine");
   if (!probes.is_tried && seen.peer.empty())
     return skipped(kName, "not tried, because joining would fail");
   if (probes.is_there() || seen.is_peer_up || is_any_heard(seen) || is_any_discovered(seen))
     return ok(kName, name_peer(seen) + " is reached" +
                          (seen.is_peer_here ? "" : " from " + probes.own_address));
-  return fault(kName,
-               seen.peer + (probes.is_unreachable ? " is unreachable" : " does not answer at all") +
-                   ": the machine is down, the address is wrong, or there is no route: ping " +
-                   seen.peer_address);
+  return finding(
+      kName, seen.peer + (probes.is_unreachable ? " is unreachable" : " does not answer at all") +
+                 ": the machine is down, the address is wrong, or there is no route: ping " +
+                 seen.peer_address);
 }
 
 Check check_ports(const Observations& seen) {
@@ -138,15 +141,16 @@ Check check_ports(const Observations& seen) {
   if (!probes.is_there() && !is_any_data(seen)) {
     if (!seen.is_peer_up && !is_any_heard(seen) && !is_any_discovered(seen))
       return skipped(kName, "nothing answers at " + name_peer(seen));
-    return fault(kName, name_ports(seen) + " of " + name_peer(seen) +
-                            " are blocked: the host is up, but neither answers nor refuses what is "
-                            "sent there" +
-                            open + " in its firewall");
+    return finding(kName,
+                   name_ports(seen) + " of " + name_peer(seen) +
+                       " are blocked: the host is up, but neither answers nor refuses what is "
+                       "sent there" +
+                       open + " in its firewall");
   }
   if (probes.is_answered && !probes.is_answered_unasked && !is_any_data(seen))
-    return fault(kName, name_ports(seen) + " of this machine are blocked: " + name_peer(seen) +
-                            " answers, but what it sends by itself does not arrive" + open +
-                            " in the firewall here");
+    return finding(kName, name_ports(seen) + " of this machine are blocked: " + name_peer(seen) +
+                              " answers, but what it sends by itself does not arrive" + open +
+                              " in the firewall here");
   return ok(kName, name_peer(seen) +
                        (probes.is_answered  ? " answers on "
                         : probes.is_refused ? " lets through "
@@ -165,12 +169,12 @@ Check check_multicast(const Observations& seen) {
       ": use config/qos/unicast.xml (SLS_PEERS), or allow IGMP and multicast on the switch and in "
       "the firewalls";
   if (probes.is_answered)
-    return fault(kName, "nothing sent to " + name_group(seen) + " came back from " +
-                            name_peer(seen) + ", which answers by unicast" + what_to_do);
+    return finding(kName, "nothing sent to " + name_group(seen) + " came back from " +
+                              name_peer(seen) + ", which answers by unicast" + what_to_do);
   if (is_any_heard(seen)) return ok(kName, name_peer(seen) + " is heard on " + name_group(seen));
   if (!seen.peer.empty() && is_any_discovered(seen))
-    return fault(kName, "nothing that " + seen.peer + " sends to " + name_group(seen) +
-                            " arrives, though it is found by unicast" + what_to_do);
+    return finding(kName, "nothing that " + seen.peer + " sends to " + name_group(seen) +
+                              " arrives, though it is found by unicast" + what_to_do);
   return skipped(kName, "no program at " + name_peer(seen) +
                             " to try it with: start sls_doctor --answer there");
 }
@@ -182,10 +186,11 @@ Check check_datagrams(const Observations& seen) {
     (is_whole ? whole : lost).push_back(std::to_string(size));
   if (whole.empty()) return skipped(kName, "nothing answers at " + name_peer(seen));
   if (lost.empty()) return ok(kName, join(whole) + " bytes pass");
-  return fault(kName, join(lost) + " bytes do not pass, " + join(whole) +
-                          " do: fragments are lost, and with them large samples (sls/parameters): "
-                          "give all machines one MTU and let IP fragments through the firewall, or "
-                          "set maxMessageSize 1400 in the QoS file's transport");
+  return finding(kName,
+                 join(lost) + " bytes do not pass, " + join(whole) +
+                     " do: fragments are lost, and with them large samples (sls/parameters): "
+                     "give all machines one MTU and let IP fragments through the firewall, or "
+                     "set maxMessageSize 1400 in the QoS file's transport");
 }
 
 Check check_discovery(const Observations& seen) {
@@ -194,10 +199,10 @@ Check check_discovery(const Observations& seen) {
   if (servers.empty()) return skipped(kName, "this QoS file needs no discovery server");
   if (!seen.programs.empty())
     return ok(kName, "the discovery server at " + join(servers) + " answers");
-  return fault(kName,
-               "no discovery server answers at " + join(servers) +
-                   ": no program finds another: start fast-discovery-server there, or correct "
-                   "SLS_DISCOVERY_SERVER");
+  return finding(kName,
+                 "no discovery server answers at " + join(servers) +
+                     ": no program finds another: start fast-discovery-server there, or correct "
+                     "SLS_DISCOVERY_SERVER");
 }
 
 }  // namespace

@@ -48,9 +48,9 @@ int main(int argc, char** argv) {
       std::puts(doctor::to_json(checks).c_str());
     else
       for (const auto& check : checks) std::puts(doctor::to_line(check).c_str());
-    std::vector<std::string> faults;
+    std::vector<std::string> findings;
     for (const auto& check : checks)
-      if (check.verdict == doctor::Verdict::kFault) faults.push_back(check.name);
-    if (!faults.empty()) throw app::RunError("failed checks: " + doctor::join(faults));
+      if (check.verdict == doctor::Verdict::kFinding) findings.push_back(check.name);
+    if (!findings.empty()) throw app::RunError("failed checks: " + doctor::join(findings));
   });
 }

@@ -49,7 +49,7 @@ constexpr std::array<std::uint32_t, 3> kEchoSizes = {200, 8000, 60000};
 constexpr auto kHistoryTime = std::chrono::seconds(1);
 
 /// Makes discovery contact `peer` directly, too. Otherwise a network without multicast would hide
-/// all other faults.
+/// all other findings.
 void add_peer(dds::DomainParticipantQos& qos, const Ports& ports, const std::string& peer) {
   auto& builtin = qos.wire_protocol().builtin;
   if (builtin.discovery_config.discoveryProtocol != rtps::DiscoveryProtocol::SIMPLE) return;

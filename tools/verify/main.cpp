@@ -8,9 +8,9 @@
 namespace {
 
 using namespace sls;
-using record::RecordedFlight;
+using record::OpenedRecording;
 
-void verify_one(const RecordedFlight& flight) {
+void verify_one(const OpenedRecording& flight) {
   const record::Inspection inspection = record::inspect(flight);
   for (const std::string& problem : inspection.problems) std::cout << problem << '\n';
   const auto& manifest = flight.manifest();
@@ -23,7 +23,7 @@ void verify_one(const RecordedFlight& flight) {
                            inspection.certificate);
 }
 
-void verify_two(const RecordedFlight& a, const RecordedFlight& b) {
+void verify_two(const OpenedRecording& a, const OpenedRecording& b) {
   const record::Inspection of_a = record::inspect(a), of_b = record::inspect(b);
   for (const std::string& problem : of_a.problems) std::cout << "A: " << problem << '\n';
   for (const std::string& problem : of_b.problems) std::cout << "B: " << problem << '\n';
@@ -51,7 +51,7 @@ int main(int argc, char** argv) {
       ->type_name("DIR");
   cli.set_version_flag("--version", app::version());
   return app::run_main(argc, argv, cli, {}, "sls_verify", [&] {
-    const RecordedFlight flight = record::open_recording(a);
+    const OpenedRecording flight = record::open_recording(a);
     if (b.empty()) return verify_one(flight);
     verify_two(flight, record::open_recording(b));
   });

@@ -99,7 +99,7 @@ void check_finite(const AutopilotOutput& wanted, std::int64_t step) {
 using TurningRotors = std::vector<RotorSpeed>;
 
 /// The values that a step changes.
-struct Flown {
+struct StepValues {
   std::int64_t steps = 0;
   AutopilotOutput output;  ///< the last one; its direction is in the plant's W
   VectorXd set_points;     ///< of the rotors, within their limits, rad/s
@@ -110,7 +110,7 @@ struct Flown {
 }  // namespace
 
 /// The multibody system at one motion. README.md, "Integration", lists Simbody's part.
-struct MultirotorPlant::Multibody : Flown {
+struct MultirotorPlant::Multibody : StepValues {
   explicit Multibody(const PlantSetup& setup)
       : keys(setup.plant.own.get<MultirotorKeys>()),
         config(setup.plant),
@@ -342,7 +342,7 @@ struct MultirotorPlant::Multibody : Flown {
       realize_velocities(motion);
       held = measure(steps);
     } catch (...) {
-      static_cast<Flown&>(*this) = before;
+      static_cast<StepValues&>(*this) = before;
       realize_positions(motion);
       throw;
     }
@@ -410,7 +410,7 @@ struct MultirotorPlant::Multibody : Flown {
 
   // Members, to avoid an allocation in every step.
   TurningRotors starting, middle, ending;  // at the stages of a step
-  Flown before;                            // an advance
+  StepValues before;                       // an advance
 
   model::Measurement held;
 };

@@ -191,7 +191,7 @@ TEST_F(CommandGateTest, TheLargestNumbersOfAReferenceAreFinite) {
 TEST_F(CommandGateTest, AFaultIsNamedRatherThanItsReference) {
   OfferedAnswer answer = make_faulted(0, ErrorCode::kFreeFall);
   answer.answer.reference.jerk.setConstant(std::numeric_limits<double>::quiet_NaN());
-  EXPECT_EQ(offer_bad(answer), Verdict::kFault);
+  EXPECT_EQ(offer_bad(answer), Verdict::kErrorCode);
 }
 
 TEST_F(CommandGateTest, ACommandOfAnotherRunIsRefusedAndNotCountedAgainstTheClient) {
@@ -344,7 +344,7 @@ TEST_F(CommandGateTest, AFaultOfTheOnlyClientIsNamed) {
     CommandGate gate(kRun, kVehicle, {kForceLimit});
     gate.set_clients({kStrong});
     gate.expect(2);
-    EXPECT_EQ(gate.offer(make_faulted(2, fault), kStrongPeer), Verdict::kFault);
+    EXPECT_EQ(gate.offer(make_faulted(2, fault), kStrongPeer), Verdict::kErrorCode);
     EXPECT_EQ(gate.counters().rejected_fault(), 1u);
     ASSERT_TRUE(gate.refusal());
     EXPECT_NE(gate.refusal()->find(name), std::string::npos) << *gate.refusal();
@@ -353,7 +353,7 @@ TEST_F(CommandGateTest, AFaultOfTheOnlyClientIsNamed) {
 }
 
 TEST_F(CommandGateTest, AFailedMissionWithoutAFaultIsRefusedToo) {
-  EXPECT_EQ(offer_bad(make_faulted(0, ErrorCode::kNone)), Verdict::kFault);
+  EXPECT_EQ(offer_bad(make_faulted(0, ErrorCode::kNone)), Verdict::kErrorCode);
   ASSERT_TRUE(gate_.refusal());
   EXPECT_EQ(gate_.refusal()->find("none"), std::string::npos) << *gate_.refusal();
 }
@@ -413,7 +413,7 @@ TEST_F(MissionGateTest, ValuesThatTheContractDoesNotDefineAreRefused) {
 }
 
 TEST_F(CommandGateTest, AFaultInAnswerToAnotherStepEndsNothing) {
-  EXPECT_EQ(gate_.offer(make_faulted(1, ErrorCode::kFreeFall), kStrongPeer), Verdict::kFault);
+  EXPECT_EQ(gate_.offer(make_faulted(1, ErrorCode::kFreeFall), kStrongPeer), Verdict::kErrorCode);
   EXPECT_EQ(gate_.refusal(), std::nullopt);
   EXPECT_EQ(gate_.offer(make_answer(0), kStrongPeer), Verdict::kAccepted);
 }
@@ -476,7 +476,7 @@ TEST_F(CommandGateTest, TheAnswerAStandbyHasGivenIsTakenWhenTheStrongerOneIsRefu
   set_clients({kStrong, kWeak});
   EXPECT_EQ(gate_.offer(make_answer(0), kWeakPeer), Verdict::kHeld);
   EXPECT_FALSE(gate_.accepted());
-  EXPECT_EQ(gate_.offer(make_faulted(0, ErrorCode::kFreeFall), kStrongPeer), Verdict::kFault);
+  EXPECT_EQ(gate_.offer(make_faulted(0, ErrorCode::kFreeFall), kStrongPeer), Verdict::kErrorCode);
   ASSERT_TRUE(gate_.accepted());
   EXPECT_EQ(*gate_.accepted(), make_answer(0));
   EXPECT_EQ(gate_.refusal(), std::nullopt);
@@ -485,7 +485,7 @@ TEST_F(CommandGateTest, TheAnswerAStandbyHasGivenIsTakenWhenTheStrongerOneIsRefu
 TEST_F(CommandGateTest, ABadCommandAfterAClientsValidAnswerIsOnlyCounted) {
   set_clients({kStrong, kWeak});
   gate_.offer(make_answer(0), kWeakPeer);
-  EXPECT_EQ(gate_.offer(make_faulted(0, ErrorCode::kFreeFall), kWeakPeer), Verdict::kFault);
+  EXPECT_EQ(gate_.offer(make_faulted(0, ErrorCode::kFreeFall), kWeakPeer), Verdict::kErrorCode);
   gate_.offer(make_faulted(0, ErrorCode::kFreeFall), kStrongPeer);
   ASSERT_TRUE(gate_.accepted()) << "the standby's valid answer was there first";
   EXPECT_EQ(gate_.refusal(), std::nullopt);
@@ -711,7 +711,7 @@ TEST_F(CommandGateTest, EveryRejectionHasAReason) {
   for (const Verdict verdict :
        {Verdict::kNotFinite, Verdict::kForceLimit, Verdict::kOtherRun, Verdict::kEarly,
         Verdict::kWrongStep, Verdict::kContradiction, Verdict::kUnknownVehicle,
-        Verdict::kUnknownClient, Verdict::kUndefined, Verdict::kFault, Verdict::kUnknownStage,
+        Verdict::kUnknownClient, Verdict::kUndefined, Verdict::kErrorCode, Verdict::kUnknownStage,
         Verdict::kEarlyEnd})
     texts.insert(to_string(verdict));
   EXPECT_EQ(texts.size(), 12u);

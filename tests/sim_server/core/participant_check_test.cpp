@@ -11,7 +11,6 @@ namespace sls::sim {
 namespace {
 
 using namespace std::chrono_literals;
-using Entry = ParticipantCheck::Entry;
 
 constexpr std::uint64_t kRun = 0xab;
 const std::string kScenario(64, 'a');
@@ -38,9 +37,9 @@ bus::PeerId make_peer(std::uint8_t number) {
   return peer;
 }
 
-Entry make_entry(std::uint8_t number, const std::string& name = "foo",
-                 ParticipantRole role = ParticipantRole::ROLE_CONTROLLER) {
-  Entry entry;
+sync::Member make_entry(std::uint8_t number, const std::string& name = "foo",
+                        ParticipantRole role = ParticipantRole::ROLE_CONTROLLER) {
+  sync::Member entry;
   entry.peer = make_peer(number);
   entry.announcement.run_id(kRun);
   entry.announcement.contract_sha256(bus::kContractSha256);
@@ -50,16 +49,16 @@ Entry make_entry(std::uint8_t number, const std::string& name = "foo",
   entry.announcement.vehicle_ids({0, 1});
   entry.announcement.scenario_sha256(kScenario);
   entry.announcement.ready(true);
-  entry.ready_since = ParticipantCheck::Clock::time_point(std::chrono::seconds(number));
+  entry.ready_since = sync::Time(std::chrono::seconds(number));
   return entry;
 }
 
 class ParticipantCheckTest : public testing::Test {
  protected:
   std::vector<std::string> look(std::chrono::milliseconds time = 0ms) {
-    neighbourhood_.now = ParticipantCheck::Clock::time_point(1h + time);
+    neighbourhood_.now = sync::Time(1h + time);
     if (are_matched_)
-      for (const Entry& entry : neighbourhood_.participants) {
+      for (const sync::Member& entry : neighbourhood_.participants) {
         if (entry.announcement.role() != ParticipantRole::ROLE_CONTROLLER) continue;
         neighbourhood_.state_readers.insert(entry.peer);
         neighbourhood_.command_writers.emplace(entry.peer, "'foo' (10.0.0.2)");
@@ -80,10 +79,10 @@ class ParticipantCheckTest : public testing::Test {
   }
   void take(const OfferedAnswer& answer, const model::ControllerMemory& returned = {},
             Verdict verdict = Verdict::kAccepted) {
-    check_.note_taken(answer, make_peer(1), verdict, returned, state_);
+    check_.answers().note_taken(answer, make_peer(1), verdict, returned, state_);
   }
   void reject(const OfferedAnswer& answer, Verdict verdict, std::uint64_t step) {
-    check_.note_rejected(answer, make_peer(1), verdict, step);
+    check_.answers().note_rejected(answer, make_peer(1), verdict, step);
   }
 
   ParticipantCheck check_{kRun, make_scenario(), {0, 1}};
@@ -276,7 +275,7 @@ TEST_F(ParticipantCheckTest, TwoClientsOfOneNameAndStrengthAreNamed) {
   auto first = make_entry(1), second = make_entry(2);
   second.announcement.host("desk");
   second.announcement.vehicle_ids({1});
-  const auto later = ParticipantCheck::Clock::time_point(1h + 500ms);
+  const auto later = sync::Time(1h + 500ms);
   first.heard = later;
   second.heard = second.ready_since = later - 400ms;
   neighbourhood_.participants = {second, first};
@@ -305,7 +304,7 @@ TEST_F(ParticipantCheckTest, TwoClientsOfOneNameAndStrengthAreNamed) {
 /// It stays listed until its lease ends.
 TEST_F(ParticipantCheckTest, AClientThatReplacesAKilledOneOfTheSameNameIsNoMistake) {
   auto killed = make_entry(1), next = make_entry(2);
-  killed.heard = ParticipantCheck::Clock::time_point(1h);
+  killed.heard = sync::Time(1h);
   next.heard = next.ready_since = killed.heard + 100ms;
   neighbourhood_.participants = {killed, next};
   for (const auto time : {100ms, 600ms, 1100ms, 5000ms}) EXPECT_TRUE(look(time).empty());
@@ -317,7 +316,7 @@ TEST_F(ParticipantCheckTest, TwoClientsOfOneNameThatAnswerTheSameStepAreNamed) {
   second.ready_since = first.ready_since + 1h;
   neighbourhood_.participants = {first, second};
   EXPECT_TRUE(look().empty());
-  check_.note_superseded(make_peer(1), make_peer(2));
+  check_.answers().note_superseded(make_peer(1), make_peer(2));
   EXPECT_EQ(look(100ms).size(), 1u);
   EXPECT_EQ(look(2s).size(), 1u);
   EXPECT_TRUE(look(2200ms).empty());
@@ -328,7 +327,7 @@ TEST_F(ParticipantCheckTest, TwoClientsOfOneNameThatAnswerTheSameStepAreNamed) {
 TEST_F(ParticipantCheckTest, AWriterOfCommandsWithoutAnAnnouncementIsNamedOnceThatLasts) {
   neighbourhood_.command_writers[make_peer(1)] = "'foo' (10.0.0.2)";
   EXPECT_TRUE(look().empty());
-  EXPECT_EQ(check_.next_due(), ParticipantCheck::Clock::time_point(1h + 1s));
+  EXPECT_EQ(check_.next_due(), sync::Time(1h + 1s));
   EXPECT_TRUE(look(900ms).empty());
   EXPECT_EQ(look(1s), only("'foo' (10.0.0.2): writes sls/command: expected an announcement in "
                            "sls/participant, got none"));
@@ -425,13 +424,13 @@ TEST_F(ParticipantCheckTest, AnswersThatAreAllRejectedAreNamedWithCauseAndCount)
   answer.run_id = 0xcd;
   for (int i = 0; i < 3; ++i) reject(answer, Verdict::kOtherRun, 5);
   const std::string cause = "run_id: expected 00000000000000ab, got 00000000000000cd";
-  EXPECT_EQ(check_.describe_rejections(make_peer(1)),
+  EXPECT_EQ(check_.answers().describe_rejections(make_peer(1)),
             " (3 of its answers rejected, none taken: " + cause + ")");
   EXPECT_TRUE(look().empty());
   EXPECT_EQ(look(800ms), only(kFoo + "sls/command: 3 answers rejected, none taken: " + cause));
   take(make_answer(5));
   EXPECT_TRUE(look(900ms).empty());
-  EXPECT_EQ(check_.describe_rejections(make_peer(1)), "");
+  EXPECT_EQ(check_.answers().describe_rejections(make_peer(1)), "");
 }
 
 TEST_F(ParticipantCheckTest, CausesOfRejection) {
@@ -440,10 +439,10 @@ TEST_F(ParticipantCheckTest, CausesOfRejection) {
   OfferedAnswer answer = make_answer(5);
   answer.vehicle_id = 9;
   reject(answer, Verdict::kUnknownVehicle, 5);
-  EXPECT_EQ(check_.describe_rejections(make_peer(1)),
+  EXPECT_EQ(check_.answers().describe_rejections(make_peer(1)),
             " (1 of its answers rejected, none taken: vehicle_id: expected 0-1, got 9)");
   reject(make_answer(3), Verdict::kWrongStep, 500);
-  EXPECT_EQ(check_.describe_rejections(make_peer(1)),
+  EXPECT_EQ(check_.answers().describe_rejections(make_peer(1)),
             " (2 of its answers rejected, none taken: step: expected 500, got 3)");
 }
 
@@ -491,7 +490,7 @@ TEST_F(ParticipantCheckTest, TwoAnswersToOneStepAreNamed) {
 
 TEST_F(ParticipantCheckTest, AnAnswerForNoVehicleIsNamed) {
   neighbourhood_.participants = {make_entry(1)};
-  check_.note_empty(make_peer(1), 3);
+  check_.answers().note_empty(make_peer(1), 3);
   EXPECT_EQ(look(), only(kFoo + "sls/command vehicles at step 3: expected at least one answer, got "
                                 "none"));
   EXPECT_TRUE(look(3s).empty());
@@ -634,14 +633,14 @@ TEST_F(ParticipantCheckTest, AMissionThatNeverFinishesIsNamed) {
 TEST_F(ParticipantCheckTest, AVehicleFarFromItsReferenceIsAnnouncedOnce) {
   state_.p_WL = {50.0, 0.0, 0.0};
   take(make_answer(8));
-  EXPECT_TRUE(check_.take_events().empty());
+  EXPECT_TRUE(check_.answers().take_events().empty());
   state_.p_WL = {0.0, 51.0, 0.0};
   take(make_answer(9));
   take(make_answer(10));
-  EXPECT_EQ(check_.take_events(),
+  EXPECT_EQ(check_.answers().take_events(),
             only("step 9: vehicle 0: load 51 m from its reference, expected at most 50 rod lengths "
                  "(50 m)"));
-  EXPECT_TRUE(check_.take_events().empty());
+  EXPECT_TRUE(check_.answers().take_events().empty());
 }
 
 TEST_F(ParticipantCheckTest, UnknownParticipantsCannotFillTheMemory) {
@@ -649,7 +648,7 @@ TEST_F(ParticipantCheckTest, UnknownParticipantsCannotFillTheMemory) {
     bus::PeerId peer;
     peer.bytes[0] = static_cast<std::uint8_t>(i);
     peer.bytes[1] = static_cast<std::uint8_t>(i >> 8);
-    check_.note_rejected(make_answer(999), peer, Verdict::kWrongStep, 1);
+    check_.answers().note_rejected(make_answer(999), peer, Verdict::kWrongStep, 1);
   }
   EXPECT_TRUE(look().empty());  // none of them is a participant
 }

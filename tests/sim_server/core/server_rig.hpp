@@ -287,7 +287,7 @@ class ServerRig : public Outputs, public Surroundings {
   bool has_heard_every_claim() const override { return knows_every_claim; }
   std::uint64_t problems_version() const override { return problem.size(); }
   Neighbourhood look(bool) override { return {}; }
-  std::string replace_problems(const ParticipantCheck::Findings& found) override {
+  std::string replace_problems(const std::map<std::string, std::string>& found) override {
     return found.empty() ? problem : found.begin()->second;
   }
   std::string describe_isolation() const override { return ""; }

@@ -45,26 +45,26 @@ Observations make_healthy_with_shared_memory() {
   return seen;
 }
 
-std::vector<std::string> find_faults(const Observations& seen) {
+std::vector<std::string> list_findings(const Observations& seen) {
   std::vector<std::string> names;
   for (const Check& check : diagnose(seen))
-    if (check.verdict == Verdict::kFault) names.push_back(check.name);
+    if (check.verdict == Verdict::kFinding) names.push_back(check.name);
   return names;
 }
 
 using Names = std::vector<std::string>;
 
 TEST(DiagnosisTest, OfAHealthyNetworkFindsNothing) {
-  EXPECT_EQ(find_faults(make_healthy()), Names{});
-  EXPECT_EQ(find_faults(make_healthy_with_shared_memory()), Names{});
+  EXPECT_EQ(list_findings(make_healthy()), Names{});
+  EXPECT_EQ(list_findings(make_healthy_with_shared_memory()), Names{});
 }
 
 TEST(DiagnosisTest, MulticastIsReportedOnlyWhereUnicastWorks) {
   Observations seen = make_healthy();
   seen.probes.is_multicast_answered = false;
-  EXPECT_EQ(find_faults(seen), Names{"multicast"});
+  EXPECT_EQ(list_findings(seen), Names{"multicast"});
   seen.settings.uses_multicast = false;
-  EXPECT_EQ(find_faults(seen), Names{});
+  EXPECT_EQ(list_findings(seen), Names{});
 }
 
 TEST(DiagnosisTest, PortsAreReportedOnlyWhereTheHostIsUpAndNoDataPasses) {
@@ -72,56 +72,56 @@ TEST(DiagnosisTest, PortsAreReportedOnlyWhereTheHostIsUpAndNoDataPasses) {
   seen.settings.uses_multicast = false;
   seen.probes = {};
   seen.probes.is_tried = true;
-  EXPECT_EQ(find_faults(seen), Names{}) << "samples pass";
+  EXPECT_EQ(list_findings(seen), Names{}) << "samples pass";
   seen.programs.clear();
   seen.echoes.clear();
   seen.is_peer_up = true;
-  EXPECT_EQ(find_faults(seen), Names{"ports"});
+  EXPECT_EQ(list_findings(seen), Names{"ports"});
   seen.is_peer_up = false;
-  EXPECT_EQ(find_faults(seen), Names{"network"});
+  EXPECT_EQ(list_findings(seen), Names{"network"});
 }
 
 TEST(DiagnosisTest, AClockIsWrongFromATenthOfASecondOn) {
   Observations seen = make_healthy();
   seen.probes.clock_ahead = std::chrono::milliseconds(-99);
-  EXPECT_EQ(find_faults(seen), Names{});
+  EXPECT_EQ(list_findings(seen), Names{});
   seen.probes.clock_ahead = std::chrono::milliseconds(-101);
-  EXPECT_EQ(find_faults(seen), Names{"clock"});
+  EXPECT_EQ(list_findings(seen), Names{"clock"});
 }
 
 TEST(DiagnosisTest, SharedMemoryNeedsRoomForAFlight) {
   Observations seen = make_healthy_with_shared_memory();
   seen.programs.clear();
   seen.shared_memory.free = calc_shared_memory_need(seen.settings, 3);
-  EXPECT_TRUE(find_faults(seen) == Names{"domain"} || find_faults(seen).empty());
+  EXPECT_TRUE(list_findings(seen) == Names{"domain"} || list_findings(seen).empty());
   --seen.shared_memory.free;
-  EXPECT_EQ(find_faults(seen).front(), "shared memory");
+  EXPECT_EQ(list_findings(seen).front(), "shared memory");
 }
 
 TEST(DiagnosisTest, AProgramWithAnotherSharedMemoryIsSilentAndItsPortIsNotThere) {
   Observations seen = make_healthy_with_shared_memory();
   seen.shared_memory.read_ports = {};
-  EXPECT_EQ(find_faults(seen), Names{}) << "it started after we looked";
+  EXPECT_EQ(list_findings(seen), Names{}) << "it started after we looked";
   seen.programs.front().samples = 0;
-  EXPECT_EQ(find_faults(seen), (Names{"shared memory", "data"}));
+  EXPECT_EQ(list_findings(seen), (Names{"shared memory", "data"}));
 }
 
 TEST(DiagnosisTest, TwoUsersShareNoMemory) {
   Observations seen = make_healthy_with_shared_memory();
   seen.programs.front().user = "nobody";
-  EXPECT_EQ(find_faults(seen), Names{"users"});
+  EXPECT_EQ(list_findings(seen), Names{"users"});
   seen.settings.uses_shared_memory = false;
-  EXPECT_EQ(find_faults(seen), Names{});
+  EXPECT_EQ(list_findings(seen), Names{});
 }
 
 TEST(DiagnosisTest, AnotherFlightOnAnotherDomainIsNoFault) {
   Observations seen = make_healthy();
   Heard heard{5, seen.peer_address, {{}, "sim_server", false}};
   seen.heard = {heard};
-  EXPECT_EQ(find_faults(seen), Names{});
+  EXPECT_EQ(list_findings(seen), Names{});
   for (const char* name : {"recorder", "control_client", "sls_view"}) {
     seen.heard.front().announcement.name = name;
-    EXPECT_EQ(find_faults(seen), Names{"domain"}) << name << " has lost its server";
+    EXPECT_EQ(list_findings(seen), Names{"domain"}) << name << " has lost its server";
   }
 }
 
@@ -129,13 +129,13 @@ TEST(DiagnosisTest, AProgramThatAnswersNoHandshakeRejectsUs) {
   Observations seen = make_healthy();
   seen.settings.is_secured = seen.programs.front().is_secured = true;
   seen.refusal = "not allowed";
-  EXPECT_EQ(find_faults(seen), Names{"security"});
+  EXPECT_EQ(list_findings(seen), Names{"security"});
   Endpoint endpoint;
   endpoint.participant = seen.programs.front().id;
   seen.endpoints = {endpoint};
-  EXPECT_EQ(find_faults(seen), Names{});
+  EXPECT_EQ(list_findings(seen), Names{});
   seen.programs.front().is_secured = false;
-  EXPECT_EQ(find_faults(seen), Names{"security"});
+  EXPECT_EQ(list_findings(seen), Names{"security"});
 }
 
 TEST(DiagnosisTest, CommandsInRealTimeHaveADeadlineOfTheirOwn) {
@@ -147,24 +147,24 @@ TEST(DiagnosisTest, CommandsInRealTimeHaveADeadlineOfTheirOwn) {
   theirs.deadline = std::chrono::milliseconds(100);
   seen.own_endpoints = {ours};
   seen.endpoints = {theirs};
-  EXPECT_EQ(find_faults(seen), Names{});
+  EXPECT_EQ(list_findings(seen), Names{});
   seen.endpoints.front().is_reliable = true;
-  EXPECT_EQ(find_faults(seen), Names{"qos"});
+  EXPECT_EQ(list_findings(seen), Names{"qos"});
 }
 
 TEST(DiagnosisTest, WithoutAnotherFaultLostSamplesAreTheFault) {
   Observations seen = make_healthy();
   seen.programs.front().samples = 0;
-  EXPECT_EQ(find_faults(seen), Names{"data"});
+  EXPECT_EQ(list_findings(seen), Names{"data"});
 }
 
 TEST(CheckTest, ALineHoldsNameVerdictAndText) {
-  EXPECT_EQ(to_line({"ports", Verdict::kFault, "blocked"}), "ports         FAULT    blocked");
+  EXPECT_EQ(to_line({"ports", Verdict::kFinding, "blocked"}), "ports         FAULT    blocked");
 }
 
 TEST(CheckTest, JsonStaysValidWithAnyName) {
   const auto parsed = nlohmann::json::parse(
-      to_json({{"data", Verdict::kOk, "from \"x\xff\""}, {"ports", Verdict::kFault, "blocked"}}));
+      to_json({{"data", Verdict::kOk, "from \"x\xff\""}, {"ports", Verdict::kFinding, "blocked"}}));
   EXPECT_FALSE(parsed.at("ok").get<bool>());
   EXPECT_EQ(parsed.at("checks").at(1).at("verdict"), "FAULT");
 }

@@ -6,9 +6,9 @@ namespace sls::view {
 
 namespace {
 
-class LiveFlight final : public foxglove::FlightSource {
+class LiveSource final : public foxglove::FlightSource {
  public:
-  LiveFlight(Feed& feed, Operator& requests) : feed_(feed), requests_(requests) {}
+  LiveSource(Feed& feed, Operator& requests) : feed_(feed), requests_(requests) {}
   void add(Feed::Listener& listener) override { feed_.add(listener); }
   void remove(Feed::Listener& listener) override { feed_.remove(listener); }
   void want(TopicId topic) override { feed_.want(topic); }
@@ -28,7 +28,7 @@ class LiveFlight final : public foxglove::FlightSource {
 }  // namespace
 
 Protocol make_foxglove_protocol(Feed& feed, Operator& requests) {
-  const auto hub = std::make_shared<foxglove::Hub>(std::make_unique<LiveFlight>(feed, requests));
+  const auto hub = std::make_shared<foxglove::Hub>(std::make_unique<LiveSource>(feed, requests));
   return {{"foxglove.sdk.v1", "foxglove.websocket.v1"}, [hub](Connection& connection) {
             return std::make_unique<foxglove::FoxgloveSession>(hub, connection);
           }};

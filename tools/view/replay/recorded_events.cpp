@@ -77,7 +77,7 @@ const char* to_string(config::FaultChannel channel) {
 
 }  // namespace
 
-std::vector<RecordedEvent> read_events(const record::RecordedFlight& flight, double period_s) {
+std::vector<RecordedEvent> read_events(const record::OpenedRecording& flight, double period_s) {
   std::vector<RecordedEvent> events;
   for (const record::RecordedSegment& segment : flight.segments) {
     std::vector<RecordedEvent> of_segment;

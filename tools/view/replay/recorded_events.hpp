@@ -23,7 +23,7 @@ inline constexpr std::size_t kMostMarks = 500;
 
 /// Changes of phase and reason in status.csv and the other events of flight.txt, by step. An
 /// interrupted recording may have neither file. @throws record::DamagedError
-std::vector<RecordedEvent> read_events(const record::RecordedFlight& flight, double period_s);
+std::vector<RecordedEvent> read_events(const record::OpenedRecording& flight, double period_s);
 
 /// An interval of time with a fault, or without a good answer.
 struct FaultInterval {

@@ -90,7 +90,7 @@ void set_columns(Parameters& message, const fs::path& folder) {
 }
 
 void set_vehicles(Parameters& message, const config::Scenario& scenario,
-                  const record::RecordedFlight& flight) {
+                  const record::OpenedRecording& flight) {
   const auto ids = flight.vehicle_ids();
   for (const std::uint32_t id : std::set<std::uint32_t>(ids.begin(), ids.end())) {
     if (id >= scenario.vehicles.size())
@@ -108,7 +108,7 @@ void set_vehicles(Parameters& message, const config::Scenario& scenario,
 
 }  // namespace
 
-RecordedParameters load_parameters(const record::RecordedFlight& flight) {
+RecordedParameters load_parameters(const record::OpenedRecording& flight) {
   const record::ManifestFile& manifest = flight.segments.front().manifest;
   const fs::path file = flight.folder / "scenario.yaml";
   RecordedParameters parameters;

@@ -15,6 +15,6 @@ struct RecordedParameters {
 /// Reads scenario.yaml, manifest.json and the header of state.csv. Recordings of contract 1 have
 /// neither signals in the manifest nor an attitude.
 /// @throws config::ConfigError naming the file; record::DamagedError for the header of state.csv.
-RecordedParameters load_parameters(const record::RecordedFlight& flight);
+RecordedParameters load_parameters(const record::OpenedRecording& flight);
 
 }  // namespace sls::view

@@ -54,7 +54,7 @@ void fill_row(std::vector<float>& row, const record::StepRows& rows, std::size_t
 }
 
 /// Reads rows and events in one pass over the files.
-void read_rows(const record::RecordedFlight& flight, std::size_t signals, KeptRows& kept,
+void read_rows(const record::OpenedRecording& flight, std::size_t signals, KeptRows& kept,
                RowEvents& events) {
   record::StepReader reader(flight);
   std::vector<float> row;
@@ -71,7 +71,7 @@ void read_rows(const record::RecordedFlight& flight, std::size_t signals, KeptRo
   events.finish();
 }
 
-Json describe_events(const record::RecordedFlight& flight, double period_s) {
+Json describe_events(const record::OpenedRecording& flight, double period_s) {
   Json list = Json::array();
   for (const RecordedEvent& event : read_events(flight, period_s))
     list.push_back({{"step", event.step}, {"sim_time_s", event.sim_time_s}, {"text", event.text}});
@@ -142,7 +142,7 @@ std::string join(const std::string& head, const KeptRows& kept) {
 }  // namespace
 
 std::string load_recorded_run(const fs::path& folder, std::size_t most_bytes) {
-  const record::RecordedFlight flight = record::open_recording(folder);
+  const record::OpenedRecording flight = record::open_recording(folder);
   const auto [parameters, scenario] = load_parameters(flight);
   const std::size_t signals = parameters.signals().size();
   const double period_s = static_cast<double>(parameters.period_ns()) / 1e9;

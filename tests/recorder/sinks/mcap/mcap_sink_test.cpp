@@ -263,7 +263,7 @@ TEST_F(McapSinkTest, StepsWithoutAStateAreThereInTheOrderOfTheirVehicle) {
   std::string states = read_bytes(out_ / "state.csv");
   const auto begin = states.find("\n0,100,") + 1, end = states.find("\n0,101,") + 1;
   write_bytes(out_ / "state.csv", states.erase(begin, end - begin));
-  const RecordedFlight flight = open_recording(out_);
+  const OpenedRecording flight = open_recording(out_);
   StepReader reader(flight);
   for (std::uint64_t step = 0; step <= kLastStep; ++step) {
     const auto rows = reader.next_as_written();

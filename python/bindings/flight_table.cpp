@@ -1,4 +1,4 @@
-#include "python/bindings/flown_flight.hpp"
+#include "python/bindings/flight_table.hpp"
 
 #include <fmt/format.h>
 
@@ -127,7 +127,7 @@ class RestTimer {
 
 // --- flying --------------------------------------------------------------------------------------
 
-FlownFlight::FlownFlight(const config::Scenario& scenario, const std::vector<std::uint32_t>& ids,
+FlightTable::FlightTable(const config::Scenario& scenario, const std::vector<std::uint32_t>& ids,
                          const closed_loop::FlightOptions& options,
                          const std::function<void()>& rest)
     : scenario_(scenario), ids_(ids), controller_name_(options.controller_name) {
@@ -149,7 +149,7 @@ FlownFlight::FlownFlight(const config::Scenario& scenario, const std::vector<std
   failure_ = flight.failure();
 }
 
-void FlownFlight::list_columns(const closed_loop::Flight& flight) {
+void FlightTable::list_columns(const closed_loop::Flight& flight) {
   has_attitude_ = parameters_.has_attitude();
   for (const StepRecord& step : flight.steps()) differs_.push_back(step.measured.has_value());
   has_measured_ = std::count(differs_.begin(), differs_.end(), true) > 0;
@@ -190,7 +190,7 @@ void FlownFlight::list_columns(const closed_loop::Flight& flight) {
       if (is_shared(name))
         share("command", name);
       else if (name == "fault")
-        add("command", name, Kind::kFault);
+        add("command", name, Kind::kErrorCode);
       else if (column.is_certified)  // neither the controller's name nor the compute time
         add("command", name);
   for (const auto& [column, of_column] : record::list_columns<record::ReferenceRow>())
@@ -206,7 +206,7 @@ void FlownFlight::list_columns(const closed_loop::Flight& flight) {
   for (std::size_t i = 0; i < ids_.size(); ++i) rows_.emplace_back(index, steps);
 }
 
-void FlownFlight::keep(const StepRecord& flown, std::size_t index) {
+void FlightTable::keep(const StepRecord& flown, std::size_t index) {
   Writer row(rows_[index].add_row());
   const auto write_rest = [&](const model::Measurement& state) {
     if (has_attitude_) write_attitude(row, state.attitude);
@@ -233,14 +233,14 @@ void FlownFlight::keep(const StepRecord& flown, std::size_t index) {
   row.add(static_cast<std::uint64_t>(answer.mission));
 }
 
-void FlownFlight::keep_remarks(closed_loop::Flight& flight) {
+void FlightTable::keep_remarks(closed_loop::Flight& flight) {
   std::vector<std::string> texts = flight.take_remarks();
   if (!texts.empty()) remarks_.push_back({rows_.front().rows(), std::move(texts)});
 }
 
 // --- recording and certificate -------------------------------------------------------------------
 
-StepRecord FlownFlight::make_step(std::size_t index, std::size_t number) const {
+StepRecord FlightTable::make_step(std::size_t index, std::size_t number) const {
   Reader row(rows_[index].row(number));
   StepRecord flown;
   const bool is_refused = number == last_step() && refused_ == index;
@@ -278,7 +278,7 @@ StepRecord FlownFlight::make_step(std::size_t index, std::size_t number) const {
   return flown;
 }
 
-const std::string& FlownFlight::calc_certificate() const {
+const std::string& FlightTable::calc_certificate() const {
   std::call_once(is_certified_, [this] {
     closed_loop::FlightCertificate certificate(record::make_row_format(parameters_));
     for (std::size_t i = 0; i < ids_.size(); ++i)
@@ -288,7 +288,7 @@ const std::string& FlownFlight::calc_certificate() const {
   return certificate_;
 }
 
-bool FlownFlight::save(const std::filesystem::path& folder, bool force) const {
+bool FlightTable::save(const std::filesystem::path& folder, bool force) const {
   closed_loop::FlightRecorder recorder(folder, force, parameters_, scenario_.sync,
                                        controller_name_);
   recorder.note_law_library(scenario_);

@@ -19,8 +19,8 @@ namespace sls::python {
 
 /// Position of a column of a recording's file in the rows.
 struct ColumnPlace {
-  /// kFault and kStageName: the cell holds an integer code.
-  enum class Kind { kDouble, kInteger, kFault, kStageName };
+  /// kErrorCode and kStageName: the cell holds an integer code.
+  enum class Kind { kDouble, kInteger, kErrorCode, kStageName };
 
   std::string table;  ///< "state", "measured", "command" or "reference"
   std::string name;   ///< as in the file
@@ -28,13 +28,13 @@ struct ColumnPlace {
   Kind kind = Kind::kDouble;
 };
 
-class FlownFlight {
+class FlightTable {
  public:
   /// Flies the vehicles `ids` (ascending) of `scenario` to the end. `rest` is called repeatedly and
   /// may throw to end the flight.
   /// @throws config::ConfigError as Flight does.
   /// @throws app::RunError if a control law is broken.
-  FlownFlight(const config::Scenario& scenario, const std::vector<std::uint32_t>& ids,
+  FlightTable(const config::Scenario& scenario, const std::vector<std::uint32_t>& ids,
               const closed_loop::FlightOptions& options, const std::function<void()>& rest);
 
   const std::vector<std::uint32_t>& ids() const { return ids_; }
