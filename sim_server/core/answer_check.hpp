@@ -68,7 +68,7 @@ class AnswerCheck {
     bool is_fresh = true;
     sync::Time last;
   };
-  /// What a participant has sent.
+  /// The mistakes of a participant, and its answers.
   struct Sender {
     std::map<std::string, Seen> seen;  // by kind
     // Answers that were not rejected:
