@@ -26,26 +26,19 @@ using sls::test::wait_until;
 using Json = nlohmann::json;
 
 const fs::path kQosFile = SLS_SOURCE_DIR "/config/qos/default.xml";
-constexpr std::uint64_t kOtherRun = 0xfedcba9876543210;
 
 /// A server of the synthetic run and its only client.
 class FakeFlight {
  public:
-  explicit FakeFlight(std::uint64_t run_id) { begin_run(run_id); }
-
-  void begin_run(std::uint64_t run_id) {
-    run_id_ = run_id;
-    Parameters parameters = make_parameters();
-    parameters.run_id(run_id);
-    parameters_writer_.write(parameters);
-    next_batch_ = 0;
+  FakeFlight() {
+    parameters_writer_.write(make_parameters());
     publish(RunPhase::PHASE_WAITING, 0);
   }
 
   bool wait_for_recorder() {
     return wait_until([this] {
       keep_alive(RunPhase::PHASE_WAITING);
-      const auto recorders = participants_.find(ParticipantRole::ROLE_RECORDER, run_id_);
+      const auto recorders = participants_.find(ParticipantRole::ROLE_RECORDER, kRunId);
       return !recorders.empty() && recorders.front().announcement.ready();
     });
   }
@@ -55,18 +48,19 @@ class FakeFlight {
     publish(RunPhase::PHASE_RUNNING, to);
   }
   void write_step(std::uint64_t step) {
-    write(record_writer_, make_batch(next_batch_++, {make_entry(step)}, step == kLastStep));
+    record_writer_.write(make_batch(step, {make_entry(step)}, step == kLastStep));
   }
   void announce_library(const std::string& sha256) {
     Participant pilot;
     pilot.role(ParticipantRole::ROLE_CONTROLLER);
     pilot.name(kPilot);
     pilot.library_sha256(sha256);
-    write(participant_writer_, pilot);
+    pilot.run_id(kRunId);
+    participant_writer_.write(pilot);
   }
 
   void publish(RunPhase phase, std::uint64_t step) {
-    write(status_writer_, make_status(phase, step));
+    status_writer_.write(make_status(phase, step));
     publish_time_ = std::chrono::steady_clock::now();
   }
   /// Publishes a status at most every 400 ms, as servers do: the history must still hold all
@@ -78,21 +72,13 @@ class FakeFlight {
   bool is_recorded_up_to(std::int64_t step) {
     return wait_until([&] {
       keep_alive(RunPhase::PHASE_RUNNING);
-      const auto recorders = participants_.find(ParticipantRole::ROLE_RECORDER, run_id_);
+      const auto recorders = participants_.find(ParticipantRole::ROLE_RECORDER, kRunId);
       return !recorders.empty() && recorders.front().announcement.last_complete_step() >= step;
     });
   }
 
  private:
-  template <class Message>
-  void write(bus::Writer<Message>& writer, Message message) {
-    message.run_id(run_id_);
-    writer.write(message);
-  }
-
   bus::Node node_{kQosFile, own_domain(), "server"};
-  std::uint64_t run_id_ = 0;
-  std::uint64_t next_batch_ = 0;
   std::chrono::steady_clock::time_point publish_time_;
   bus::ParticipantDirectory participants_{node_};
   bus::Writer<Parameters> parameters_writer_{node_};
@@ -124,16 +110,11 @@ class RecorderTest : public testing::Test {
     if (thread_.joinable()) thread_.join();
   }
 
-  Json read_manifest(const fs::path& folder) {
-    return Json::parse(read_bytes(folder / "manifest.json"));
-  }
-  void expect_whole(const fs::path& folder) {
+  void expect_whole() {
     const fs::path whole = folder_ / "whole";
-    if (!fs::exists(whole)) {
-      fs::create_directory(whole);
-      record_flight(whole);
-    }
-    const OpenedRecording flight = open_recording(folder);
+    fs::create_directory(whole);
+    record_flight(whole);
+    const OpenedRecording flight = open_recording(out_);
     const auto difference = find_first_difference(open_recording(whole), flight);
     EXPECT_FALSE(difference) << difference->text;
     EXPECT_TRUE(flight.manifest().complete);
@@ -148,7 +129,7 @@ class RecorderTest : public testing::Test {
 };
 
 TEST_F(RecorderTest, RecordsARunToItsEnd) {
-  FakeFlight flight(kRunId);
+  FakeFlight flight;
   start();
   ASSERT_TRUE(flight.wait_for_recorder());
   flight.announce_library(std::string(64, 'b'));
@@ -158,14 +139,14 @@ TEST_F(RecorderTest, RecordsARunToItsEnd) {
   flight.publish(RunPhase::PHASE_FINISHED, kLastStep);
   join();
   EXPECT_EQ(error_, "no error");
-  expect_whole(out_);
-  EXPECT_EQ(read_manifest(out_).at("libraries"),
+  expect_whole();
+  EXPECT_EQ(Json::parse(read_bytes(out_ / "manifest.json")).at("libraries"),
             Json({{"controllers", {{kPilot, std::string(64, 'b')}}}}));
 }
 
 // Every participant can write batches of the run; only those of its server count.
 TEST_F(RecorderTest, BatchesOfOtherSendersDoNotCount) {
-  FakeFlight flight(kRunId);
+  FakeFlight flight;
   start();
   ASSERT_TRUE(flight.wait_for_recorder());
   bus::Node node(kQosFile, own_domain(), "stranger");
@@ -177,24 +158,7 @@ TEST_F(RecorderTest, BatchesOfOtherSendersDoNotCount) {
   flight.publish(RunPhase::PHASE_FINISHED, kLastStep);
   join();
   EXPECT_EQ(error_, "no error");
-  expect_whole(out_);
-}
-
-TEST_F(RecorderTest, AResetsNewRunGoesIntoASubfolder) {
-  FakeFlight flight(kRunId);
-  start();
-  ASSERT_TRUE(flight.wait_for_recorder());
-  flight.fly(0, 100);
-  flight.publish(RunPhase::PHASE_RESET, 100);
-  flight.begin_run(kOtherRun);
-  ASSERT_TRUE(flight.wait_for_recorder());
-  flight.fly(0, kLastStep);
-  flight.publish(RunPhase::PHASE_FINISHED, kLastStep);
-  join();
-  EXPECT_EQ(error_, "no error");
-  EXPECT_EQ(read_manifest(out_).at("outcome"), "reset");
-  EXPECT_EQ(read_manifest(out_).at("missing"), Json::array());
-  expect_whole(out_ / "run-fedcba9876543210");
+  expect_whole();
 }
 
 }  // namespace

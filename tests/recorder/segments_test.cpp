@@ -148,25 +148,6 @@ TEST_F(SegmentsTest, AnInterruptedRecordingCanBeResumedToo) {
   expect_equal_to_the_undisturbed(segment.folder);
 }
 
-TEST_F(SegmentsTest, AnEarlierSegmentsGapKeepsTheWholeFromBeingComplete) {
-  {
-    Recording recording(out_, make_parameters());
-    BatchFeeder feeder(recording);
-    feeder.add_steps(0, 49);
-    feeder.add_steps(51, 150);
-    while (fs::file_size(out_ / "command.csv") < 200) recording.flush_if_due();
-  }
-  const Segment segment = resume();
-  EXPECT_EQ(segment.first_step, 151u);
-  EXPECT_FALSE(record_to_the_end(segment, 0));
-  const Json missing = read_manifest(segment.folder).at("missing");
-  EXPECT_EQ(missing.size(), 3u);
-  for (const Json& gap : missing) {
-    EXPECT_EQ(gap.at("from"), 50);
-    EXPECT_EQ(gap.at("to"), 50);
-  }
-}
-
 // A late reader of sls/status gets the samples of the past again.
 TEST_F(SegmentsTest, EachStatusSampleHasOneRowAndOneEvent) {
   const Parameters parameters = make_parameters();

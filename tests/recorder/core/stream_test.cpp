@@ -164,14 +164,6 @@ TEST_F(MissingBatchTest, OfTimeInWhichTheRecorderIsStoppedASecondCounts) {
   EXPECT_EQ(stream_.last_step(), 2);
 }
 
-TEST_F(StreamTest, ALateJoinerBeginsWithAnyBatch) {
-  add(100);
-  add(101);
-  EXPECT_EQ(steps(), list(100, 101));
-  EXPECT_EQ(gaps_, std::vector<Gap>({{0, 0, 99}}));
-  EXPECT_EQ(stream_.last_step(), 101);
-}
-
 TEST_F(StreamTest, HistoryBeforeTheFirstStepOfASegmentIsLeftOut) {
   Stream stream = make_stream(parameters_, 50);
   EXPECT_EQ(stream.last_step(), 49);
@@ -187,12 +179,6 @@ TEST_F(StreamTest, SamplesAfterTheLastBatchAreIgnored) {
   add(1);
   EXPECT_EQ(steps(), list(0, 0));
   EXPECT_EQ(stream_.dropped().repeated, 1u);
-}
-
-TEST_F(StreamTest, AnEmptyLastBatchEndsTheRun) {
-  add(0);
-  stream_.add(make_batch(1, {}, true), at(0));
-  EXPECT_TRUE(stream_.has_ended());
 }
 
 TEST_F(StreamTest, GivingUpReturnsTheWaitingBatches) {
@@ -235,15 +221,6 @@ TEST_F(StreamTest, StrangeEntriesAreCountedAndLeftOut) {
   EXPECT_EQ(steps(), list(0, 1));
   EXPECT_EQ(stream_.dropped().out_of_range, 4u);
   EXPECT_TRUE(gaps_.empty());
-}
-
-TEST_F(StreamTest, TheLastStepMayHaveNoAnswer) {
-  add(0);
-  stream_.add(make_batch(1, {make_bare_entry(1)}, true), at(0));
-  ASSERT_EQ(rows_.size(), 2u);
-  EXPECT_TRUE(rows_[1].has_state);
-  EXPECT_FALSE(rows_[1].has_command);
-  EXPECT_FALSE(rows_[1].has_reference);
 }
 
 TEST_F(StreamTest, ARefusedAnswerIsRecordedAsItWasSent) {
