@@ -44,7 +44,7 @@ class Recording final : private RecordingOutputs {
 
   /// True when the run has ended and its last batch has been handled.
   bool has_all() const { return core_.phase() == RecordingCore::Phase::kWhole; }
-  bool is_reset() const { return core_.is_reset(); }
+  bool is_reset() const { return core_.has_phase(RunPhase::PHASE_RESET); }
   const config::Scenario& scenario() const { return scenario_; }
 
   /// The last step up to which all steps of all vehicles have come or are known to be missing; −1:

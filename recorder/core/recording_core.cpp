@@ -60,8 +60,8 @@ void RecordingCore::on_status(const SimStatus& status) {
 
 void RecordingCore::on_library(const std::string& controller, const std::string& sha256) {
   constexpr std::size_t kMaxNoted = 256;  // limits the memory for announcements
-  if (phase_ != Phase::kEnded && libraries_.size() < kMaxNoted)
-    libraries_.try_emplace(controller, sha256);
+  if (phase_ != Phase::kEnded && claims_.libraries.size() < kMaxNoted)
+    claims_.libraries.try_emplace(controller, sha256);
 }
 
 void RecordingCore::on_time(sync::Time now) {
@@ -81,7 +81,7 @@ void RecordingCore::note_whole() {
 
 void RecordingCore::write(const StepRows& rows) {
   const bool is_full = outputs_.add(rows);
-  if (rows.is_unanswered()) ++unanswered_steps_;
+  if (rows.is_unanswered()) ++claims_.unanswered_steps;
   account(rows);
   if (is_full) flush();
 }
@@ -147,7 +147,7 @@ Claims RecordingCore::on_end(const Interruption& interruption, std::uint64_t ref
   if (phase_ == Phase::kEnded) return make_claims();  // the first end is the end
   if (phase_ != Phase::kWhole) interruption_ = interruption.reason;
   phase_ = Phase::kEnded;
-  refused_samples_ = refused_samples;
+  claims_.refused_samples = refused_samples;
   stream_.give_up();
   note_missing_end();
   if (!interruption_.empty()) outputs_.add_event("recorder: " + interruption_);
@@ -165,7 +165,7 @@ Claims RecordingCore::on_end(const Interruption& interruption, std::uint64_t ref
 }
 
 Claims RecordingCore::make_claims() const {
-  Claims claims;
+  Claims claims = claims_;
   claims.outcome = "recording";
   claims.reason = "not finished: the recorder is running, or was killed";
   if (last_status_) claims.timing = last_status_->timing().to_string();
@@ -173,10 +173,7 @@ Claims RecordingCore::make_claims() const {
       has_run_ended() ? last_status_->step()
                       : static_cast<std::uint64_t>(std::max<std::int64_t>(last_complete_step(), 0));
   claims.missing = gaps_.missing();
-  claims.unanswered_steps = unanswered_steps_;
-  claims.refused_samples = refused_samples_;
   claims.dropped = stream_.dropped();
-  claims.libraries = libraries_;
   return claims;
 }
 
@@ -189,8 +186,8 @@ std::string RecordingCore::describe_gaps() const {
                        last_status_->reason().size() > 0 ? ": " : "",
                        last_status_->reason().c_str()));
   if (!gaps_.missing().empty()) append(describe(gaps_.missing()));
-  if (refused_samples_ > 0)
-    append(fmt::format("{} samples lost because the queue was full", refused_samples_));
+  if (claims_.refused_samples > 0)
+    append(fmt::format("{} samples lost because the queue was full", claims_.refused_samples));
   return text.empty() ? "the run has not ended" : text;
 }
 

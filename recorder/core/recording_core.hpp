@@ -90,8 +90,8 @@ class RecordingCore {
   void flush();
 
   Phase phase() const { return phase_; }
-  /// True when the run was ended by an operator's reset.
-  bool is_reset() const { return has_phase(RunPhase::PHASE_RESET); }
+  /// True if the run is in `phase`, as far as its server has told.
+  bool has_phase(RunPhase phase) const { return last_status_ && last_status_->phase() == phase; }
   /// As Stream::last_step.
   std::int64_t last_complete_step() const { return stream_.last_step(); }
   /// The claims of a manifest while the recorder runs, or if it was killed.
@@ -107,10 +107,9 @@ class RecordingCore {
   void note_missing_end();
   void note_status(std::uint64_t sample_index);
   void note_whole();
-  bool has_phase(RunPhase phase) const { return last_status_ && last_status_->phase() == phase; }
   bool is_finished() const { return has_phase(RunPhase::PHASE_FINISHED); }
   bool has_run_ended() const {
-    return is_finished() || is_reset() || has_phase(RunPhase::PHASE_FAILED);
+    return is_finished() || has_phase(RunPhase::PHASE_RESET) || has_phase(RunPhase::PHASE_FAILED);
   }
 
   const std::uint64_t run_id_;
@@ -121,13 +120,11 @@ class RecordingCore {
   GapList gaps_;
   std::map<std::uint32_t, std::uint64_t> earlier_;     // steps after those of earlier segments
   std::map<std::uint32_t, std::uint64_t> bare_steps_;  // last steps with a state but no answer
-  std::uint64_t unanswered_steps_ = 0;
   std::optional<SimStatus> last_status_;
   std::uint64_t next_status_ = 0;  // sample_index after the last one of all segments
-  std::map<std::string, std::string> libraries_;
   sync::Time time_, flushed_;
   std::string interruption_;
-  std::uint64_t refused_samples_ = 0;
+  Claims claims_;  // of it, only what is counted: unanswered steps, refused samples, libraries
 };
 
 }  // namespace sls::record

@@ -141,7 +141,7 @@ Verdict CommandGate::judge(const OfferedAnswer& offered, const bus::PeerId& send
   client->misses = 0;
   client->identity.is_gone = false;
   client->answered_end = step_ + 1;
-  if (!is_refused(*client)) client->refusal.clear();  // of an earlier step
+  if (!client->is_refused(step_)) client->refusal.clear();  // of an earlier step
   if (accepted_) {
     superseded_by_ = accepted_from_;
     return Verdict::kSuperseded;
@@ -214,7 +214,7 @@ const CommandGate::Client* CommandGate::find_awaited() const {
   const Client* silent = nullptr;
   const Client* gone = nullptr;
   for (const Client& client : clients_) {
-    if (is_refused(client)) continue;
+    if (client.is_refused(step_)) continue;
     const Client*& first = client.identity.is_gone ? gone : silent;
     if (!client.silent && !client.identity.is_gone) return &client;
     if (!first) first = &client;
@@ -231,7 +231,8 @@ bool CommandGate::pass_over_silent_client() {
   const Client* awaited = find_awaited();
   if (!awaited || accepted_) return false;
   const bool has_next = std::any_of(clients_.begin(), clients_.end(), [&](const Client& client) {
-    return &client != awaited && !client.silent && !client.identity.is_gone && !is_refused(client);
+    return &client != awaited && !client.silent && !client.identity.is_gone &&
+           !client.is_refused(step_);
   });
   if (!has_next) return false;
   if (!flyer_) flyer_ = awaited->identity;  // the first awaited client, for the take-over message
@@ -245,7 +246,7 @@ std::optional<std::string> CommandGate::refusal() const {
   const bool can_answer = awaited && !awaited->identity.is_gone;
   const bool is_any_refused =
       std::any_of(clients_.begin(), clients_.end(),
-                  [this](const Client& client) { return is_refused(client); });
+                  [this](const Client& client) { return client.is_refused(step_); });
   if (can_answer || !is_any_refused || accepted_) return std::nullopt;
   return describe_refusals();
 }

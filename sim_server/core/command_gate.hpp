@@ -120,6 +120,8 @@ class CommandGate {
 
  private:
   struct Client {
+    bool is_refused(std::uint64_t step) const { return !refusal.empty() && refused_step == step; }
+
     ReadyClient identity;
     bool silent = false;
     int misses = 0;                     // steps in a row that it did not answer
@@ -134,9 +136,6 @@ class CommandGate {
   Verdict judge_past(const OfferedAnswer& offered, const bus::PeerId& sender);
   bool is_of_distant_standby(const OfferedAnswer& offered, const bus::PeerId& sender);
   void count(Verdict verdict);
-  bool is_refused(const Client& client) const {  // for the awaited step
-    return !client.refusal.empty() && client.refused_step == step_;
-  }
   void note_refusal(Client& client, const OfferedAnswer& offered, Defect defect);
   void settle();
   void drop_held();

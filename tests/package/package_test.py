@@ -81,7 +81,7 @@ def make_package():
         return made[-1]
     folder = FOLDER / "package"
     tree.remove(folder)
-    said = run(["cpack", "--config", BUILD / "CPackConfig.cmake", "-B", folder], cwd=FOLDER)
+    said = run(["cpack", "--config", BUILD / "CPackConfig.cmake", "-B", folder], cwd=FOLDER, limit_s=600)
     return Path(re.search(r"^CPack: - package: (.*\.deb) generated\.$", said, re.MULTILINE)[1])
 
 

@@ -279,7 +279,7 @@ TEST_F(RecordingCoreTest, TheOutcomeIsTheRunsOrThatOfTheInterruption) {
     begin();
     tell(given.phase, 1, given.reason);
     receive({make_entry(0)});
-    EXPECT_EQ(core_->is_reset(), given.phase == kReset);
+    EXPECT_EQ(core_->has_phase(RunPhase::PHASE_RESET), given.phase == kReset);
     const Claims claims = end(given.interruption);
     EXPECT_EQ(claims.outcome, given.outcome);
     EXPECT_EQ(claims.reason, given.claimed);
