@@ -105,6 +105,7 @@ def make_system(package):
         run_apt("apt-get", "update", "--error-on=any")
     except AssertionError as error:
         skip(f"the mirror of Debian does not answer: {error}")
+    run_apt("dpkg", "--configure", "-a")  # of an interrupted test
     run_apt("apt-get", "satisfy", "-y", "--no-install-recommends", depends)
     stamp.write_text(wanted)
 
