@@ -6,6 +6,7 @@
 #include <iterator>
 #include <tuple>
 
+#include "common/bus/topics.hpp"
 #include "common/config/vehicle_ids.hpp"
 #include "common/config/yaml_node.hpp"
 
