@@ -32,14 +32,15 @@ Flight::Flight(const config::Scenario& scenario, const std::vector<std::uint32_t
 
 const model::StepRecord* Flight::fly_step() {
   if (has_ended_) return nullptr;
-  has_ended_ = true;  // if a plant or a law throws
+  bool has_moved = false;
   try {
     std::exchange(has_begun_, true) ? plants_.advance() : plants_.begin();
-    is_law_broken_ = true;  // unless no law throws
+    has_moved = true;
     answer();
-    is_law_broken_ = false;
   } catch (const std::exception& error) {
     failure_ = error.what();
+    has_ended_ = true;
+    is_law_broken_ = has_moved;
     return nullptr;
   }
   has_ended_ = is_last();

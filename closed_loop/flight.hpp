@@ -1,6 +1,6 @@
 /// The closed loop in one process and one thread: plants, faults, missions, controllers and the
-/// judgement of their answers, without DDS. A flight has the same bits as a
-/// recording of the programs in lockstep.
+/// judgement of their answers, without DDS. A flight has the same bits as a recording of the
+/// programs in lockstep.
 #pragma once
 
 #include <cstdint>

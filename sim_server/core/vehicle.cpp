@@ -7,13 +7,6 @@ namespace {
 
 using model::AnswerKind;
 
-/// Without the text of the scenario: otherwise every vehicle would keep a copy of it.
-config::Scenario make_own_scenario(const config::Scenario& fleet, std::uint32_t id) {
-  config::Scenario scenario = config::make_vehicle_scenario(fleet, id);
-  scenario.text.clear();
-  return scenario;
-}
-
 double calc_elapsed_s(const std::optional<sync::Time>& since, sync::Time now) {
   return since ? sync::to_seconds(now - *since) : 0.0;
 }
@@ -23,7 +16,8 @@ double calc_elapsed_s(const std::optional<sync::Time>& since, sync::Time now) {
 Vehicle::Vehicle(const config::Scenario& fleet, std::uint64_t run_id, model::StepRecord& record)
     : gate(run_id, record.vehicle_id, make_answer_limits(fleet)),
       absence(fleet.sync),
-      scenario_(make_own_scenario(fleet, record.vehicle_id)),
+      parameters_(config::make_vehicle_scenario(fleet, record.vehicle_id).vehicle),
+      force_limit_n_(fleet.controller.force_limit_n),
       record_(record) {}
 
 void Vehicle::take_answer() {
@@ -53,8 +47,7 @@ void Vehicle::fly_without_answer(ControllerAbsence::Action action) {
   } else {
     settle(AnswerKind::kFailSafe);
     record_.client_name = flown_by_ = kFailSafeName;
-    record_.answer.f_Q_W =
-        calc_fail_safe_force(scenario_.vehicle, record_.truth, scenario_.controller.force_limit_n);
+    record_.answer.f_Q_W = calc_fail_safe_force(parameters_, record_.truth, force_limit_n_);
   }
   absence.flown_without_answer();
 }

@@ -86,9 +86,10 @@ class Vehicle {
   void hold(const OfferedAnswer& offered);
   void settle(model::AnswerKind kind);
 
-  const config::Scenario scenario_;  // of this vehicle alone
-  model::StepRecord& record_;        // of the step in work
-  bool is_settled_ = false;          // its force is known
+  const model::SlungLoadParameters parameters_;
+  const double force_limit_n_;
+  model::StepRecord& record_;  // of the step in work
+  bool is_settled_ = false;    // its force is known
   std::string flown_by_;
   OfferedAnswer held_;  // the newest valid answer: accepted, or late
   bool has_held_ = false;
