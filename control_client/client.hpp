@@ -10,10 +10,8 @@
 #include <cstdint>
 #include <exception>
 #include <functional>
-#include <map>
 #include <memory>
 #include <mutex>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,8 +20,8 @@
 #include "common/bus/participants.hpp"
 #include "common/config/scenario.hpp"
 #include "control_client/answer_stream.hpp"
+#include "control_client/answerer.hpp"
 #include "control_client/core/client_core.hpp"
-#include "control_client/flight_controller.hpp"
 #include "control_client/laws/control_law.hpp"
 
 namespace sls::control {
@@ -65,16 +63,6 @@ class Client {
   void act(ClientCore::Act act);
   std::string describe_obstacles() const;
   void begin();
-  void leave();
-
-  /// One of our vehicles in the run that is joined.
-  struct Pilot {
-    Pilot(const config::Scenario& scenario, std::uint32_t id, const ClientOptions& options)
-        : controller(scenario, id, options.checks_purity, options.make_law) {}
-    FlightController controller;
-    std::optional<std::uint64_t> last_step;
-    ControlCommand last_command;  // the answer to that step: a repeated sample gets it again
-  };
 
   /// Called by the middleware for every sample of states.
   void receive(const States& sample, const bus::PeerId& sender);
@@ -82,31 +70,20 @@ class Client {
   void answer(const States& sample, const bus::PeerId& sender);
   /// Reports that `sender`, which is not our server, has sent states of our run.
   void note_impostor(const bus::PeerId& sender);
-  const ControlCommand& answer(Pilot& pilot, std::uint64_t step, const VehicleState& state);
-  /// Must not wait for `answer_mutex_`: a law may compute for long.
-  void announce(bool ready, bool done);
-  /// Announces this client while it waits for a server: each writer of sls/command announces
-  /// itself.
-  void announce_waiting();
-  Participant make_announcement(const std::vector<std::uint32_t>& vehicle_ids) const;
   /// Tries again at the next call if an answer is being computed.
   void rethrow_answer_error();
 
   bus::Node& node_;
-  config::Scenario scenario_;  // with the period in force once a run is joined
+  const config::Scenario scenario_;
   const ClientOptions options_;
-  const std::string library_sha256_;
-  const std::vector<std::uint32_t> vehicle_ids_;
 
   bus::ServerDirectory servers_;
   bus::Announcer announcer_;
   ClientCore core_;
 
   // Shared between the main thread and the middleware's.
-  std::mutex answer_mutex_;  // guards all that `answer` uses
-  std::optional<sync::Run> run_;
-  std::map<std::uint32_t, Pilot> pilots_;
-  Commands answers_;  // to the current sample
+  std::mutex answer_mutex_;             // guards all that `answer` uses
+  std::unique_ptr<Answerer> answerer_;  // of the run that is joined
   std::exception_ptr answer_error_;
   bus::PeerId impostor_;  // the last one that was reported
   /// Made for the mode of the scenario, and made again if the run has another mode.

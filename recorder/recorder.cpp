@@ -13,6 +13,8 @@ namespace {
 
 using namespace std::chrono_literals;
 
+}  // namespace
+
 RecorderCore::Options make_core_options(const RecorderOptions& options) {
   RecorderCore::Options made;
   made.folder = options.folder.string();
@@ -28,7 +30,16 @@ RecorderCore::Options make_core_options(const RecorderOptions& options) {
   return made;
 }
 
-}  // namespace
+Segment make_segment(const RecorderOptions& options, const RecorderCore& core) {
+  Segment segment;
+  segment.folder = options.folder;
+  if (core.place() == RecorderCore::Place::kFolder) return segment;
+  if (core.place() == RecorderCore::Place::kNextSegment)
+    return make_next_segment(*options.unfinished);
+  segment.folder = options.folder / name_run(core.run()->parameters.run_id());
+  const auto earlier = find_unfinished_recording(segment.folder);
+  return earlier ? make_next_segment(*earlier) : segment;
+}
 
 Recorder::Recorder(bus::Node& node, const RecorderOptions& options)
     : options_(options),
@@ -83,24 +94,14 @@ void Recorder::open() {
   const sync::Run& run = *core_.run();
   const auto scenario =
       config::parse_scenario(run.parameters.scenario_text().to_string(), "sls/parameters");
-  writing_ = std::make_unique<WritingThread>(inbox_, participants_, run, make_segment());
+  writing_ =
+      std::make_unique<WritingThread>(inbox_, participants_, run, make_segment(options_, core_));
   announce(false);
   // A process that writes into a port of shared memory waits for its reader, even if the reader has
   // just lost its processor.
   if (run.parameters.mode() == SyncMode::MODE_REALTIME) app::put_process_first();
   writing_->start();
   core_.on_opened(scenario.sync.wait.server_deadline_s, look_around());
-}
-
-Segment Recorder::make_segment() const {
-  Segment segment;
-  segment.folder = options_.folder;
-  if (core_.place() == RecorderCore::Place::kFolder) return segment;
-  if (core_.place() == RecorderCore::Place::kNextSegment)
-    return make_next_segment(*options_.unfinished);
-  segment.folder = options_.folder / name_run(core_.run()->parameters.run_id());
-  const auto earlier = find_unfinished_recording(segment.folder);
-  return earlier ? make_next_segment(*earlier) : segment;
 }
 
 void Recorder::report() {

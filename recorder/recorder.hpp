@@ -22,6 +22,12 @@ struct RecorderOptions {
   bool follow = false;        ///< continue with the run of a server that replaces ours
 };
 
+/// The options of the core.
+RecorderCore::Options make_core_options(const RecorderOptions& options);
+/// The place of the recording that `core` wants to open.
+/// @throws DamagedError if an earlier segment cannot be read.
+Segment make_segment(const RecorderOptions& options, const RecorderCore& core);
+
 class Recorder {
  public:
   Recorder(bus::Node& node, const RecorderOptions& options);
@@ -36,7 +42,6 @@ class Recorder {
   void act(RecorderCore::Act act);
   RecorderCore::Now look_around() const;
   void open();
-  Segment make_segment() const;
   void report();
   void announce(bool done);
 

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <chrono>
 #include <fstream>
 #include <sstream>
 #include <system_error>
@@ -45,14 +44,13 @@ config::Scenario parse_scenario(const Segment& segment, const Parameters& parame
 Recording::Recording(const std::filesystem::path& folder, const Parameters& parameters)
     : Recording(make_only_segment(folder), parameters) {}
 
-Recording::Recording(const Segment& segment, const Parameters& parameters)
+Recording::Recording(const Segment& segment, const Parameters& parameters, sync::Time now)
     : segment_(segment),
       parameters_(parameters),
       scenario_(parse_scenario(segment, parameters)),
       sinks_(make_sinks(segment.folder, parameters_, scenario_.record)),
       log_(scenario_, parameters_),
-      core_(parameters_, segment.first_step, scenario_.record.flush_s,
-            std::chrono::steady_clock::now(), *this) {
+      core_(parameters_, segment.first_step, scenario_.record.flush_s, now, *this) {
   write_text(segment_.folder / "scenario.yaml", scenario_.text);
   flush();
   if (segment_.earlier) read_earlier_segments();
@@ -72,8 +70,6 @@ void Recording::read_earlier_segments() {
   for (const std::uint64_t index : read_status_indices(*segment_.earlier))
     core_.on_earlier_status(index);
 }
-
-void Recording::flush_if_due() { core_.on_time(std::chrono::steady_clock::now()); }
 
 // --- the core's outputs --------------------------------------------------------------------------
 

@@ -2,6 +2,7 @@
 /// thread.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -27,7 +28,8 @@ class Recording final : private RecordingOutputs {
   ///   the scenario is not that of the earlier segments.
   /// @throws DamagedError if an earlier segment cannot be read.
   /// Every member @throws std::system_error with the name of the file if it cannot be written.
-  Recording(const Segment& segment, const Parameters& parameters);
+  Recording(const Segment& segment, const Parameters& parameters,
+            sync::Time now = std::chrono::steady_clock::now());
   /// For a recording of one segment.
   Recording(const std::filesystem::path& folder, const Parameters& parameters);
 
@@ -40,7 +42,7 @@ class Recording final : private RecordingOutputs {
   }
   /// Flushes the files if the last flush is `record.flush_s` ago. After a time limit, a lost batch
   /// is no longer waited for.
-  void flush_if_due();
+  void flush_if_due(sync::Time now = std::chrono::steady_clock::now()) { core_.on_time(now); }
 
   /// True when the run has ended and its last batch has been handled.
   bool has_all() const { return core_.phase() == RecordingCore::Phase::kWhole; }

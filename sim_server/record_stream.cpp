@@ -2,17 +2,15 @@
 
 #include <spdlog/spdlog.h>
 
-#include <algorithm>
 #include <utility>
 
 #include "common/bus/convert.hpp"
-#include "common/bus/message_size.hpp"
 
 namespace sls::sim {
 
 RecordStream::RecordStream(bus::Writer<RecordBatch>& writer, std::size_t max_bytes,
                            std::uint64_t run_id)
-    : writer_(writer), max_bytes_(max_bytes), run_id_(run_id), thread_([this] { work(); }) {}
+    : writer_(writer), batches_(max_bytes, run_id), thread_([this] { work(); }) {}
 
 void RecordStream::add_step(const std::vector<model::StepRecord>& records) {
   bool is_due = false;
@@ -51,8 +49,7 @@ void RecordStream::end() {
 }
 
 std::uint64_t RecordStream::history_steps() const {
-  const std::size_t batches_of_step = step_bytes_ / max_bytes_ + 1;
-  return static_cast<std::uint64_t>(writer_.history_depth()) / batches_of_step;
+  return static_cast<std::uint64_t>(writer_.history_depth()) / batches_of_step_;
 }
 
 void RecordStream::work() {
@@ -75,41 +72,21 @@ void RecordStream::work() {
 }
 
 void RecordStream::write(const Collected& collected, bool is_last) {
-  const std::size_t header = bus::calc_size(batch_);
-  std::size_t bytes = header;
-  for (std::size_t i = 0; i < collected.count; ++i) {
-    const RecordEntry& entry = collected.entries[i];
-    std::size_t more = bus::calc_size(entry, bytes);
-    if (entry.step() != step_) bytes_of_step_ = 0;
-    step_ = entry.step();
-    bytes_of_step_ += more;
-    step_bytes_ = std::max<std::size_t>(step_bytes_, bytes_of_step_);
-    const bool is_full = bytes + more > max_bytes_ || batch_.entries().size() == BATCH_ENTRIES;
-    if (is_full && !batch_.entries().empty()) {
-      write_batch(false);
-      bytes = header;
-      more = bus::calc_size(entry, bytes);
-    }
-    batch_.entries().push_back(entry);
-    bytes += more;
-  }
-  if (!batch_.entries().empty() || is_last) write_batch(is_last);
+  batches_.make(collected.entries.data(), collected.count, is_last,
+                [this](const RecordBatch& batch) { write(batch); });
+  batches_of_step_ = batches_.batches_of_step();
 }
 
-void RecordStream::write_batch(bool is_last) {
-  batch_.run_id(run_id_);
-  batch_.batch_index(next_batch_++);
-  batch_.is_last(is_last);
+void RecordStream::write(const RecordBatch& batch) {
   try {
-    if (!has_given_up_) writer_.write(batch_);
-    (has_given_up_ ? lost_ : written_) += batch_.entries().size();
+    if (!has_given_up_) writer_.write(batch);
+    (has_given_up_ ? lost_ : written_) += batch.entries().size();
   } catch (const bus::BusError& error) {
-    lost_ += batch_.entries().size();
+    lost_ += batch.entries().size();
     spdlog::warn("{}", error.what());
     const std::lock_guard lock(mutex_);
     has_given_up_ = is_ended_;  // each further batch would block as long
   }
-  batch_.entries().clear();
 }
 
 }  // namespace sls::sim

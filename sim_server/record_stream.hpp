@@ -13,6 +13,7 @@
 
 #include "common/bus/node.hpp"
 #include "common/model/step_record.hpp"
+#include "sim_server/record_batches.hpp"
 
 namespace sls::sim {
 
@@ -60,11 +61,9 @@ class RecordStream {
 
   void work();
   void write(const Collected& collected, bool is_last);
-  void write_batch(bool is_last);
+  void write(const RecordBatch& batch);
 
   bus::Writer<RecordBatch>& writer_;
-  const std::size_t max_bytes_;
-  const std::uint64_t run_id_;
   std::mutex mutex_;
   std::condition_variable wake_;
   Collected collected_;    // under the mutex
@@ -73,13 +72,10 @@ class RecordStream {
   std::atomic<bool> is_full_{false};
   std::atomic<std::uint64_t> written_{0};
   std::atomic<std::uint64_t> lost_{0};
-  std::atomic<std::size_t> step_bytes_{0};  // of the largest step so far
-  RecordBatch batch_;                       // used by the thread alone
-  std::uint64_t next_batch_ = 0;            // likewise
-  bool has_given_up_ = false;               // likewise: a batch was refused after the end
-  std::uint64_t step_ = 0;                  // likewise: of the last entry
-  std::size_t bytes_of_step_ = 0;           // likewise
-  std::thread thread_;                      // last: it uses the members above
+  std::atomic<std::size_t> batches_of_step_{1};  // of the largest step so far
+  RecordBatches batches_;                        // used by the thread alone
+  bool has_given_up_ = false;                    // likewise: a batch was refused after the end
+  std::thread thread_;                           // last: it uses the members above
 };
 
 }  // namespace sls::sim

@@ -1,5 +1,4 @@
-/// Publishes the states of a run. A sample of sls/state holds as many vehicles as fit into a
-/// datagram.
+/// Publishes the states of a run.
 #pragma once
 
 #include <cstddef>
@@ -10,13 +9,13 @@
 
 #include "common/bus/node.hpp"
 #include "common/bus/queued_writer.hpp"
-#include "sim_server/core/fleet.hpp"
+#include "sim_server/state_samples.hpp"
 
 namespace sls::sim {
 
 class StateStream {
  public:
-  explicit StateStream(bus::Node& node) : max_bytes_(node.max_sample_bytes()), writer_(node) {}
+  explicit StateStream(bus::Node& node) : samples_(node.max_sample_bytes()), writer_(node) {}
 
   /// Begins a run. If `is_queued`, `write` never blocks from now on: it passes the samples to a
   /// separate thread, by a queue.
@@ -33,11 +32,9 @@ class StateStream {
   std::set<bus::PeerId> matched() const { return writer_.matched(); }
 
  private:
-  const std::size_t max_bytes_;
+  StateSamples samples_;
   bus::Writer<States> writer_;
   std::unique_ptr<bus::QueuedWriter<States>> queue_;
-  std::int64_t period_ns_ = 0;
-  States sample_;
 };
 
 }  // namespace sls::sim

@@ -35,6 +35,19 @@ std::vector<std::uint32_t> ClientCore::list_flown_ids() const {
   return ids;
 }
 
+Participant ClientCore::make_announcement() const {
+  Participant message = options_.identity;
+  message.role(ParticipantRole::ROLE_CONTROLLER);
+  message.last_complete_step(-1);
+  // Without a run, too: each writer of sls/command announces itself.
+  message.vehicle_ids(run_ ? list_flown_ids() : options_.vehicle_ids);
+  if (!run_) return message;
+  message.run_id(run_->parameters.run_id());
+  message.ready(is_ready_ && phase_ != Phase::kEnded);
+  message.done(phase_ == Phase::kEnded);
+  return message;
+}
+
 ClientCore::Act ClientCore::find(const sync::Servers& servers, const Now& now) {
   for (const std::uint32_t id : options_.vehicle_ids)
     if (const auto run = servers.find_joinable(id, now.time)) return begin(*run, now.time);

@@ -20,6 +20,7 @@ class ClientCore {
  public:
   struct Options {
     std::vector<std::uint32_t> vehicle_ids;  ///< ascending, at least one
+    Participant identity;                    ///< what every announcement says
     double join_timeout_s = 0;               ///< until a server must be found
     double server_deadline_s = 0;            ///< a server that is silent for so long is lost
     bool follows_servers = false;            ///< as in ClientOptions
@@ -34,7 +35,7 @@ class ClientCore {
   enum class Act {
     kNone,
     kBegin,          ///< join run(), then go on looking
-    kAnnounceReady,  ///< the server hears the answers from now on
+    kAnnounceReady,  ///< the server hears the answers from now on: announce it
     kLeave,          ///< announce that the client has left run(), and end
     kGiveUp,         ///< end
   };
@@ -52,6 +53,8 @@ class ClientCore {
   const std::optional<sync::Run>& run() const { return run_; }
   /// Those of our vehicles that the run has.
   std::vector<std::uint32_t> list_flown_ids() const;
+  /// What the client announces now.
+  Participant make_announcement() const;
   /// Why the client ends; empty if there is nothing wrong.
   const std::string& error() const { return error_; }
   std::vector<sync::Line> take_lines() { return std::exchange(lines_, {}); }

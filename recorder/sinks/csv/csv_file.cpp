@@ -5,16 +5,13 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <system_error>
+
+#include "recorder/sinks/file_error.hpp"
 
 namespace sls::record {
 namespace {
 
 constexpr std::size_t kFlushBytes = 1 << 18;  // bounds the memory between two timed flushes
-
-[[noreturn]] void throw_errno(const std::filesystem::path& file, const char* what) {
-  throw std::system_error(errno, std::generic_category(), file.string() + ": " + what);
-}
 
 }  // namespace
 

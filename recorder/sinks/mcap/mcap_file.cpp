@@ -8,7 +8,8 @@
 #include <cerrno>
 #include <new>
 #include <stdexcept>
-#include <system_error>
+
+#include "recorder/sinks/file_error.hpp"
 
 namespace sls::record {
 namespace {
@@ -37,10 +38,6 @@ enum Opcode : std::uint8_t {
 };
 
 constexpr std::size_t kOpcodeBytes = 1, kLengthBytes = 8;
-
-[[noreturn]] void throw_errno(const std::filesystem::path& file, const char* what) {
-  throw std::system_error(errno, std::generic_category(), file.string() + ": " + what);
-}
 
 }  // namespace
 

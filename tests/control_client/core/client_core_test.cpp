@@ -26,7 +26,9 @@ class ClientCoreTest : public testing::Test {
 
   /// A new client, and no server yet.
   void begin(bool follows_servers) {
-    core_.emplace(ClientCore::Options{{kVehicle, 7}, 60, 7, follows_servers});
+    Participant identity;
+    identity.name("pilot");
+    core_.emplace(ClientCore::Options{{kVehicle, 7}, identity, 60, 7, follows_servers});
     servers_.emplace(peer(1)).set_present({kServer, kReplacement});
     now_ = 0;
   }
@@ -93,6 +95,24 @@ TEST_F(ClientCoreTest, JoinsARunOnceItsClaimIsSettledAndIsReadyOnceItSeesTheServ
   EXPECT_EQ(look(40), Act::kNone);
   EXPECT_EQ(look(60, true), Act::kAnnounceReady);
   EXPECT_EQ(look(80, true), Act::kNone) << "once";
+}
+
+TEST_F(ClientCoreTest, AnnouncesWhatItFlies) {
+  using Ids = std::vector<std::uint32_t>;
+  const auto is = [this](std::uint64_t run_id, const Ids& ids, bool is_ready, bool is_done) {
+    const Participant message = core_->make_announcement();
+    return message.name() == "pilot" && message.role() == ParticipantRole::ROLE_CONTROLLER &&
+           message.run_id() == run_id && message.vehicle_ids() == ids &&
+           message.ready() == is_ready && message.done() == is_done;
+  };
+  EXPECT_TRUE(is(0, {kVehicle, 7}, false, false)) << "while it waits for a server";
+  join();
+  EXPECT_TRUE(is(kRun, {kVehicle}, false, false));
+  look(20, true);
+  EXPECT_TRUE(is(kRun, {kVehicle}, true, false));
+  serve(kRun, kServer, 40, RunPhase::PHASE_FINISHED);
+  look(40);
+  EXPECT_TRUE(is(kRun, {kVehicle}, false, true));
 }
 
 TEST_F(ClientCoreTest, LooksMoreOftenWhileItHasNoRun) {
