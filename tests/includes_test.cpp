@@ -50,8 +50,8 @@ const std::vector<Rule> kRules = {
     {"python", {"closed_loop", "common", "control_client", "recorder", "sim_server"}},
     {"recorder", {"common"}},
     {"recorder/core",
-     {"common/bus/convert.hpp", "common/bus/names.hpp", "common/model", "common/sync",
-      "recorder/rows.hpp", "Wire"}},
+     {"common/bus/convert.hpp", "common/bus/names.hpp", "common/bus/peer.hpp", "common/model",
+      "common/sync", "recorder/rows.hpp", "Wire"}},
     {"recorder/sinks/mcap", {"common", "recorder", "Wire", "Fast DDS"}},
     {"sim_server", {"common", "Wire"}},
     {"sim_server/autopilots", {"common/config", "common/model", "common/plugin"}},
@@ -68,6 +68,7 @@ const std::vector<Rule> kRules = {
     {"tools/reference", {"common/config", "common/models"}},
     {"tools/verify", {"common", "recorder"}},
     {"tools/view", {"common", "control_client/reference_trajectory.hpp", "recorder", "tools/ctl"}},
+    {"worlds", {"closed_loop", "common", "control_client", "recorder", "sim_server", "Wire"}},
 };
 
 /// Folders whose files decide only: time and all that happens are arguments (CONTRIBUTING.md).
@@ -107,9 +108,9 @@ bool is_allowed(const std::string& file, const std::string& header, bool is_ours
   });
 }
 
-const std::vector<std::string> kProduct = {"bench",    "closed_loop",    "common",
-                                           "idl",      "control_client", "python",
-                                           "recorder", "sim_server",     "tools"};
+const std::vector<std::string> kProduct = {
+    "bench",  "closed_loop", "common",     "idl",   "control_client",
+    "python", "recorder",    "sim_server", "tools", "worlds"};
 
 /// `FILE:LINE: includes HEADER` for each include that breaks a rule, in the product's folders of
 /// `root`.

@@ -11,7 +11,8 @@ from typing import Any, NoReturn
 from sls.launcher.place import BUILD, IS_BUILT_ELSEWHERE, IS_INSTALLED, IS_OF_PIP, PYTHON_PATH, ROOT, Failure, say
 
 FLYING = ("sim_server", "control_client", "recorder", "closed_loop")
-PROGRAMS = (*FLYING, "sim_ctl", "sls_verify", "sls_convert", "delay_margin", "sls_doctor", "sls_view")
+PROGRAMS = (*FLYING, "sim_ctl", "sls_verify", "sls_convert", "delay_margin", "sls_doctor", "sls_view",
+            "sls_worlds")
 PYTHON = sys.executable  # Debian's, or that of a virtual environment
 
 is_installing = True  # False with --no-install

@@ -42,6 +42,7 @@ Many flights
   campaign-worker DIR     fly chunks of a campaign (Slurm starts it)
   study                   repeat the published study, write docs/study.md
   delay-margin SCENARIO   find the delay at which the controller loses the load
+  worlds [SCENARIO]       fly simulated worlds with faults, from seeds
 
 Network
   doctor                  find out why data does not flow
@@ -69,7 +70,7 @@ exit codes: 0 done; 1 the run or a test failed; 2 bad usage or configuration;
 """
 # Commands whose options a program or another Python module reads.
 FOREIGN = ("view", "ctl", "verify", "convert", "plot", "report", "study", "campaign", "campaign-worker", "doctor",
-           "bench", "network-table", "chaos", "reference", "systems")
+           "bench", "worlds", "network-table", "chaos", "reference", "systems")
 CONTROLS = ("pause", "step", "resume", "start", "reset", "stop", "status")
 SOURCE_COMMANDS = ("bench", "build", "chaos", "clean", "docker-demo", "docs", "fuzz", "network-table",
                    "package", "reference", "setup", "study", "systems", "test")
@@ -101,6 +102,13 @@ def delay_margin(words: list[str]) -> NoReturn:
     parser.add_argument("--period-s", type=POSITIVE, metavar="X", help="control period (default: the scenario's)")
     options, scenario = parser.parse_scenario(words)
     replace_by_program("delay_margin", [f"--scenario={scenario}", *flights.pass_on(options, "period_s")])
+
+
+def worlds(words: list[str]) -> NoReturn:
+    # A first word without a dash is the scenario; the options are the program's.
+    if words and not words[0].startswith("-"):
+        words = [f"--scenario={find_file("scenarios", words[0])}", *words[1:]]
+    replace_by_program("sls_worlds", words)
 
 
 def bench(words: list[str]) -> NoReturn:
@@ -277,7 +285,7 @@ def show_help(words: list[str]) -> int:
 
 COMMANDS: dict[str, Callable[[list[str]], int]] = {
     "setup": set_up, "build": build, "run": flights.run, "demo": flights.demo, "list": print_list,
-    "view": start("sls_view"), "ctl": start("sim_ctl"), "delay-margin": delay_margin, "bench": bench,
+    "view": start("sls_view"), "ctl": start("sim_ctl"), "delay-margin": delay_margin, "worlds": worlds, "bench": bench,
     "verify": start("sls_verify"), "convert": start("sls_convert"), "python": python, "plot": plot, "report": report,
     "study": study, "campaign": campaign, "campaign-worker": campaign_worker, "doctor": start("sls_doctor"),
     "keys": keys, "docker-demo": docker_demo, "discovery-server": discovery_server, "network-table": network_table,

@@ -1,0 +1,105 @@
+#include "worlds/client_program.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <exception>
+#include <utility>
+
+namespace sls::worlds {
+namespace {
+
+control::ClientCore::Options make_core_options(const config::Scenario& scenario,
+                                               const std::string& name, const std::string& host,
+                                               const ClientProgram::Options& options) {
+  control::ClientCore::Options made;
+  made.vehicle_ids = options.vehicle_ids;
+  made.identity.contract_sha256(bus::kContractSha256);
+  made.identity.name(name);
+  made.identity.host(host);
+  made.identity.strength(options.strength);
+  made.identity.scenario_sha256(scenario.sha256);
+  made.join_timeout_s = scenario.sync.wait_for.timeout_s;
+  made.server_deadline_s = scenario.sync.wait.server_deadline_s;
+  made.follows_servers = options.follows_servers;
+  return made;
+}
+
+config::Scenario choose_scenario(const Setting& setting, const ClientProgram::Options& options) {
+  config::Scenario scenario = setting.flown->scenario;
+  if (options.has_other_scenario) scenario.sha256 = std::string(64, '0');
+  return scenario;
+}
+
+}  // namespace
+
+ClientProgram::ClientProgram(Setting& setting, Host& host, std::string name, const Options& options)
+    : Program(setting, host, Role::kClient, std::move(name)),
+      options_(options),
+      scenario_(choose_scenario(setting, options)),
+      core_(make_core_options(scenario_, this->name(), host.name(), options)) {}
+
+void ClientProgram::start() {
+  peer_.add_reader<Parameters>(
+      [this](const Parameters& sample, const Peer::Arrival& arrival) { note(sample, arrival); });
+  peer_.add_reader<SimStatus>(
+      [this](const SimStatus& sample, const Peer::Arrival& arrival) { note(sample, arrival); });
+  peer_.add_writer<Participant>();
+  peer_.add_writer<Commands>();
+  peer_.add_reader<States>(
+      [this](const States& sample, const Peer::Arrival& arrival) { on_states(sample, arrival); });
+  setting_.network.announce(peer_);
+  announce(core_.make_announcement());
+  wake_soon();
+}
+
+void ClientProgram::wake() {
+  if (!broken_.empty()) return exit(1, broken_);
+  control::ClientCore::Now seen;
+  seen.time = now();
+  seen.is_stopped = was_interrupted();
+  if (answerer_) {
+    const bus::PeerId& server = answerer_->run().server;
+    seen.sees_server = peer_.matched_writers(TopicId::kState).count(server) > 0 &&
+                       peer_.matched_readers(TopicId::kCommand).count(server) > 0;
+  }
+  using Act = control::ClientCore::Act;
+  const Act act = core_.look(present_servers(), seen);
+  for (const sync::Line& line : core_.take_lines()) say(line);
+  try {
+    if (act == Act::kBegin) begin();
+  } catch (const config::ConfigError& error) {
+    return exit(2, error.what());
+  }
+  if (act == Act::kAnnounceReady || act == Act::kLeave) announce(core_.make_announcement());
+  repeat_announcement_if_due();
+  if (core_.phase() == control::ClientCore::Phase::kEnded)
+    return exit(core_.error().empty() ? 0 : 1, core_.error());
+  wake_at(core_.next_deadline());
+}
+
+void ClientProgram::begin() {
+  answerer_ = std::make_unique<control::Answerer>(
+      scenario_, *core_.run(), core_.list_flown_ids(),
+      control::Answerer::Options{name(), options_.strength, false, options_.make_law,
+                                 [this] { return now(); },
+                                 [this](const std::string& line) { say(line); }});
+  say(fmt::format("joins run {:016x}", core_.run()->parameters.run_id()));
+  announce(core_.make_announcement());
+}
+
+void ClientProgram::on_states(const States& sample, const Peer::Arrival& arrival) {
+  if (!answerer_ || sample.run_id() != answerer_->run().parameters.run_id() ||
+      !(arrival.sender == answerer_->run().server))
+    return;
+  try {
+    const Commands* answers = answerer_->answer(sample);
+    if (!answers) return;
+    if (options_.compute_time.count() == 0) return peer_.write(*answers);
+    process_.run_at(setting_.timeline.now() + options_.compute_time,
+                    [this, copy = *answers] { peer_.write(copy); });
+  } catch (const std::exception& error) {
+    broken_ = error.what();
+  }
+}
+
+}  // namespace sls::worlds

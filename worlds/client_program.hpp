@@ -1,0 +1,42 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "control_client/answerer.hpp"
+#include "control_client/core/client_core.hpp"
+#include "worlds/program.hpp"
+
+namespace sls::worlds {
+
+/// A client: ClientCore and Answerer with a simulated shell (control_client/client.hpp is the real
+/// one).
+class ClientProgram : public Program {
+ public:
+  struct Options {
+    std::vector<std::uint32_t> vehicle_ids;
+    std::int32_t strength = 0;
+    bool follows_servers = false;
+    bool has_other_scenario = false;  ///< a wrong file was given
+    Instant compute_time{0};          ///< of an answer
+    control::LawMaker make_law = &control::make_control_law;
+  };
+  ClientProgram(Setting& setting, Host& host, std::string name, const Options& options);
+  void start() override;
+  const Options& options() const { return options_; }
+  bool has_flown() const { return answerer_ != nullptr; }
+
+ private:
+  void wake() override;
+  void begin();
+  void on_states(const States& sample, const Peer::Arrival& arrival);
+
+  const Options options_;
+  config::Scenario scenario_;
+  control::ClientCore core_;
+  std::unique_ptr<control::Answerer> answerer_;
+  std::string broken_;  // why a law is broken
+};
+
+}  // namespace sls::worlds

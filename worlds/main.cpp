@@ -1,0 +1,142 @@
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <iostream>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "common/app/run_main.hpp"
+#include "worlds/scenarios.hpp"
+#include "worlds/search.hpp"
+
+namespace {
+
+using namespace sls;
+
+/// Files of worlds are in memory: a world writes and reads them in milliseconds.
+class Folder {
+ public:
+  Folder() { std::filesystem::create_directories(path_); }
+  ~Folder() {
+    std::error_code none;
+    std::filesystem::remove_all(path_, none);
+  }
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  const std::filesystem::path path_ = fmt::format("/dev/shm/sls_worlds_{}", ::getpid());
+};
+
+/// "A-B" or "A".
+void parse_seeds(const std::string& text, worlds::SearchOptions& options) {
+  const auto is_number = [](const std::string& word) {
+    return !word.empty() && word.size() <= 18 &&
+           word.find_first_not_of("0123456789") == std::string::npos;
+  };
+  const std::size_t dash = text.find('-');
+  const std::string first = text.substr(0, dash);
+  const std::string last = dash == std::string::npos ? first : text.substr(dash + 1);
+  if (!is_number(first) || !is_number(last) || std::stoull(last) < std::stoull(first))
+    throw config::ConfigError("--seeds: expected A-B with A ≤ B, such as 0-9999, got '" + text +
+                              "'");
+  options.first = std::stoull(first);
+  options.last = std::stoull(last);
+}
+
+void print_result(const worlds::SearchResult& result, double wall_s) {
+  const auto worlds = static_cast<double>(std::max<std::uint64_t>(result.worlds, 1));
+  std::cout << fmt::format(
+      "{} worlds, {} failed; {:.0f} worlds/s; trace {:016x}\n"
+      "a flight was finished in {}, {} recordings are complete, {} worlds were flown twice\n"
+      "of each: {:.1f} s simulated, {:.0f} events, {:.0f} steps\n",
+      result.worlds, result.failures.size(), worlds / wall_s, result.hash, result.finished,
+      result.complete, result.twice, result.simulated_s / worlds,
+      static_cast<double>(result.events) / worlds, static_cast<double>(result.steps) / worlds);
+  std::string faults;
+  for (const auto& [kind, count] : result.faults)
+    faults += fmt::format("{}{} {}", faults.empty() ? "" : ", ", kind, count);
+  std::cout << "worlds with a fault: " << faults << '\n';
+}
+
+void print_story(const worlds::Plan& plan, const std::vector<worlds::FlownScenario>& scenarios,
+                 const std::filesystem::path& folder) {
+  for (const std::string& line : worlds::tell(plan, scenarios, folder))
+    std::cout << "  " << line << '\n';
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App cli("Flies simulated worlds: server, clients and recorders with faults, from a seed.");
+  app::CommonOptions common;
+  common.log_level = "error";  // the programs of a world write into its trace
+  std::filesystem::path scenario;
+  std::string seeds = "0-999";
+  worlds::SearchOptions options;
+  options.jobs = std::max(1u, std::thread::hardware_concurrency());
+  std::optional<std::uint64_t> replayed;
+  bool is_verbose = false;
+  cli.set_version_flag("--version", app::version());
+  cli.add_option(
+         "--scenario", scenario,
+         "scenario (YAML) that every world flies (default: 16 short ones, with both modes and "
+         "all policies)")
+      ->type_name("FILE");
+  cli.add_option("--seeds", seeds, "worlds to fly")->type_name("A-B");
+  cli.add_option("--jobs", options.jobs, "threads (default: one for each processor)")
+      ->check(CLI::Range(1, 256))
+      ->type_name("N");
+  cli.add_option("--most", options.most_failures, "end after so many failed worlds")
+      ->check(CLI::Range(1, 1000))
+      ->type_name("N");
+  auto* replay = cli.add_option("--replay", replayed, "tell what happens in the world of this seed")
+                     ->type_name("SEED");
+  cli.add_flag("--verbose", is_verbose, "the whole world, with every status")->needs(replay);
+
+  return app::run_main(argc, argv, cli, common, "sls_worlds", [&] {
+    parse_seeds(seeds, options);
+    const Folder folder;
+    options.folder = folder.path();
+    const auto scenarios =
+        scenario.empty()
+            ? worlds::make_scenarios()
+            : std::vector<worlds::FlownScenario>{worlds::fly(config::load_scenario(scenario))};
+    if (replayed) {
+      const worlds::Plan plan = worlds::draw_plan(*replayed, scenarios);
+      if (!is_verbose) return print_story(plan, scenarios, folder.path());
+      for (const std::string& line : worlds::describe(plan)) std::cout << line << '\n';
+      for (const std::string& line :
+           worlds::fly_world(plan, scenarios, folder.path() / "replay", true).trace)
+        std::cout << line << '\n';
+      return;
+    }
+    const auto began = std::chrono::steady_clock::now();
+    const auto measure = [&] {
+      return std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+    };
+    const worlds::SearchResult result =
+        worlds::search(scenarios, options, [&](const worlds::SearchResult& so_far) {
+          std::cerr << fmt::format("sls_worlds: {} of {} worlds, {} failed, {:.0f} worlds/s\n",
+                                   so_far.worlds, options.last - options.first + 1,
+                                   so_far.failures.size(),
+                                   static_cast<double>(so_far.worlds) / measure());
+        });
+    print_result(result, measure());
+    for (const auto& [seed, findings] : result.failures) {
+      std::cout << fmt::format("seed {}:\n", seed);
+      for (const std::string& finding : findings) std::cout << "  " << finding << '\n';
+    }
+    if (result.failures.empty()) return;
+    const std::uint64_t first = result.failures.begin()->first;
+    std::cout << fmt::format("the world of seed {}, without what it does not need:\n", first);
+    print_story(
+        worlds::shrink(worlds::draw_plan(first, scenarios), scenarios, folder.path() / "shrink"),
+        scenarios, folder.path() / "tell");
+    throw app::RunError(
+        fmt::format("{} of {} worlds failed", result.failures.size(), result.worlds));
+  });
+}

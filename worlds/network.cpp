@@ -1,0 +1,212 @@
+#include "worlds/network.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+namespace sls::worlds {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr bool is_best_effort(std::size_t topic) {
+  return topic == static_cast<std::size_t>(TopicId::kState) ||
+         topic == static_cast<std::size_t>(TopicId::kCommand);
+}
+
+}  // namespace
+
+// As config/qos/endpoints.xml.
+std::size_t Peer::history_depth(TopicId topic) {
+  if (topic == TopicId::kRecord) return 5000;
+  return is_best_effort(static_cast<std::size_t>(topic)) ? 64 : 150;
+}
+
+void Peer::write(std::size_t topic, std::shared_ptr<const void> message) {
+  History& history = histories_[topic];
+  history.kept.push_back({history.next++, std::move(message), process_.host().wall()});
+  const std::size_t depth = is_best_effort(topic) ? 1 : history_depth(static_cast<TopicId>(topic));
+  if (history.kept.size() > depth) history.kept.pop_front();
+  network_.sent(*this, topic);
+}
+
+bool Peer::is_acknowledged(TopicId topic) const {
+  const auto index = static_cast<std::size_t>(topic);
+  const History& history = histories_[index];
+  for (const bus::PeerId& id : reader_peers_[index]) {
+    const Peer* reader = network_.find(id);
+    const auto found = network_.channels_.find({{id_, id}, index});
+    if (!reader || found == network_.channels_.end() || found->second.delivered + 1 < history.next)
+      return false;
+  }
+  return true;
+}
+
+// --- discovery -----------------------------------------------------------------------------------
+
+Peer& Network::join(Process& process) {
+  bus::PeerId id;
+  // The order of the ids is not that in which the programs start.
+  const std::uint64_t number = random_.next();
+  std::memcpy(id.bytes.data(), &number, sizeof number);
+  std::memcpy(id.bytes.data() + sizeof number, &next_id_, 4);
+  ++next_id_;
+  return *peers_.emplace_back(std::make_unique<Peer>(*this, process, id));
+}
+
+Peer* Network::find(const bus::PeerId& id) const {
+  for (const auto& peer : peers_)
+    if (peer->id() == id) return peer.get();
+  return nullptr;
+}
+
+bool Network::are_connected(const bus::PeerId& a, const bus::PeerId& b) const {
+  const Peer *one = find(a), *other = find(b);
+  const auto is_cut = [this](const Peer& from, const Peer& to) {
+    return links_.at({&from.process().host(), &to.process().host()}).is_cut;
+  };
+  return one->known().count(b) > 0 && other->known().count(a) > 0 && !is_cut(*one, *other) &&
+         !is_cut(*other, *one);
+}
+
+void Network::announce(Peer& peer) {
+  for (const auto& other : peers_) {
+    if (other.get() == &peer || other->process().has_ended()) continue;
+    timeline_.after(draw_delay(peer, *other),
+                    [this, &peer, other = other.get()] { discover(*other, peer); });
+    timeline_.after(draw_delay(*other, peer),
+                    [this, &peer, other = other.get()] { discover(peer, *other); });
+  }
+}
+
+/// The announcement of `observed` arrives at `observer`, or is lost; it is repeated.
+void Network::discover(Peer& observer, Peer& observed) {
+  if (observer.process().has_ended() || observed.process().has_ended()) return;
+  if (observer.process().is_stopped() || observed.process().is_stopped() ||
+      is_lost(observed, observer) || is_lost(observer, observed)) {
+    timeline_.after(kDiscoveryRepeat + Instant(random_.integer(0, 20'000'000)),
+                    [this, &observer, &observed] { discover(observer, observed); });
+    return;
+  }
+  observer.known_.insert(observed.id());
+  Instant when{0};
+  for (std::size_t i = 0; i < observed.endpoints_.size(); ++i) {
+    when += Instant(random_.integer(100'000, 3'000'000));
+    if (is_lost(observed, observer)) when += kHeartbeat * random_.integer(1, 4);
+    const Peer::Endpoint endpoint = observed.endpoints_[i];
+    timeline_.after(when, [this, &observer, &observed, endpoint] {
+      observer.process().run([this, &observer, &observed, endpoint] {
+        if (observer.known_.count(observed.id()) > 0) match(observer, observed, endpoint);
+      });
+    });
+  }
+}
+
+void Network::match(Peer& observer, Peer& observed, const Peer::Endpoint& endpoint) {
+  const auto is_counterpart = [&](const Peer::Endpoint& ours) {
+    return ours.topic == endpoint.topic && ours.is_writer != endpoint.is_writer;
+  };
+  if (std::none_of(observer.endpoints_.begin(), observer.endpoints_.end(), is_counterpart)) return;
+  if (endpoint.is_writer) {
+    observer.writers_[endpoint.topic].insert(observed.id());
+    channel(observed, observer, endpoint.topic).reader_knows = true;
+    if (!is_best_effort(endpoint.topic)) send_reliably(observed, observer, endpoint.topic);
+  } else {
+    observer.reader_peers_[endpoint.topic].insert(observed.id());
+    channel(observer, observed, endpoint.topic).writer_knows = true;
+    if (!is_best_effort(endpoint.topic)) send_reliably(observer, observed, endpoint.topic);
+  }
+}
+
+void Network::leave(Peer& peer, bool with_goodbye) {
+  for (const auto& other : peers_) {
+    if (other.get() == &peer || other->process().has_ended()) continue;
+    const bool is_heard = with_goodbye && !is_lost(peer, *other);
+    const Instant delay = is_heard ? draw_delay(peer, *other) : kLease;
+    timeline_.after(delay, [this, &peer, other = other.get()] {
+      other->process().run([this, &peer, other] { forget(*other, peer); });
+    });
+  }
+}
+
+void Network::forget(Peer& observer, const Peer& observed) {
+  observer.known_.erase(observed.id());
+  for (std::size_t topic = 0; topic < kTopics; ++topic) {
+    observer.writers_[topic].erase(observed.id());
+    observer.reader_peers_[topic].erase(observed.id());
+    channels_.erase({{observer.id(), observed.id()}, topic});
+    channels_.erase({{observed.id(), observer.id()}, topic});
+  }
+}
+
+// --- samples -------------------------------------------------------------------------------------
+
+bool Network::is_lost(const Peer& from, const Peer& to) {
+  const Link& way = link(from.process().host(), to.process().host());
+  ++sent_;
+  const bool lost = way.is_cut || random_.chance(way.loss);
+  if (lost) ++lost_;
+  return lost;
+}
+
+Instant Network::draw_delay(const Peer& from, const Peer& to) {
+  const Link& way = link(from.process().host(), to.process().host());
+  Instant delay = way.delay + Instant(random_.integer(0, way.jitter.count()));
+  if (random_.chance(way.reordering)) delay += Instant(random_.integer(0, way.late_by.count()));
+  return delay;
+}
+
+void Network::sent(Peer& writer, std::size_t topic) {
+  for (const bus::PeerId& id : writer.reader_peers_[topic]) {
+    Peer* reader = find(id);
+    if (is_best_effort(topic))
+      send_now(writer, *reader, topic, writer.histories_[topic].kept.back());
+    else
+      send_reliably(writer, *reader, topic);
+  }
+}
+
+void Network::send_now(Peer& writer, Peer& reader, std::size_t topic, const Peer::Written& sample) {
+  if (is_lost(writer, reader)) return;
+  timeline_.after(draw_delay(writer, reader), [this, &writer, &reader, topic, sample] {
+    if (reader.process().has_room())
+      reader.process().run(
+          [this, &writer, &reader, topic, sample] { deliver(writer, reader, topic, sample); });
+  });
+}
+
+/// Sends what the reader lacks. A lost sample is sent again after the next heartbeat, and those
+/// after it wait.
+void Network::send_reliably(Peer& writer, Peer& reader, std::size_t topic) {
+  Channel& way = channel(writer, reader, topic);
+  const Peer::History& history = writer.histories_[topic];
+  if (!way.is_active() || way.is_waiting || writer.process().has_ended()) return;
+  while (way.next < history.next) {
+    way.next = std::max(way.next, history.kept.front().number);
+    if (writer.process().is_stopped() || is_lost(writer, reader)) {
+      way.is_waiting = true;
+      timeline_.after(kHeartbeat, [this, &writer, &reader, topic] {
+        channel(writer, reader, topic).is_waiting = false;
+        send_reliably(writer, reader, topic);
+      });
+      return;
+    }
+    const Peer::Written& sample = history.kept[way.next - history.kept.front().number];
+    ++way.next;
+    way.busy_until = std::max(way.busy_until, timeline_.now() + draw_delay(writer, reader));
+    timeline_.at(way.busy_until, [this, &writer, &reader, topic, sample] {
+      reader.process().run(
+          [this, &writer, &reader, topic, sample] { deliver(writer, reader, topic, sample); });
+    });
+  }
+}
+
+void Network::deliver(Peer& writer, Peer& reader, std::size_t topic, const Peer::Written& sample) {
+  const auto found = channels_.find({{writer.id(), reader.id()}, topic});
+  if (found == channels_.end() || !found->second.is_active()) return;
+  // A reader drops what is not newer than the last sample of the writer.
+  if (sample.number <= found->second.delivered) return;
+  found->second.delivered = sample.number;
+  reader.readers_[topic](sample.message.get(), {writer.id(), sample.time});
+}
+
+}  // namespace sls::worlds

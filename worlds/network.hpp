@@ -1,0 +1,218 @@
+/// The simulated middleware: what DDS allows, and what a network does to it. Discovery, matching
+/// per endpoint, best-effort and reliable readers, histories, late joiners, leaving with and
+/// without goodbye. docs/worlds.md says what is left out.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/bus/peer.hpp"
+#include "common/bus/topics.hpp"
+#include "worlds/host.hpp"
+#include "worlds/random.hpp"
+
+namespace sls::worlds {
+
+enum class TopicId {
+  kState,
+  kCommand,
+  kRecord,
+  kParticipant,
+  kParameters,
+  kStatus,
+  kControl,
+  kReply
+};
+inline constexpr std::size_t kTopics = 8;
+
+template <class Message>
+constexpr TopicId find_topic();
+template <>
+constexpr TopicId find_topic<States>() {
+  return TopicId::kState;
+}
+template <>
+constexpr TopicId find_topic<Commands>() {
+  return TopicId::kCommand;
+}
+template <>
+constexpr TopicId find_topic<RecordBatch>() {
+  return TopicId::kRecord;
+}
+template <>
+constexpr TopicId find_topic<Participant>() {
+  return TopicId::kParticipant;
+}
+template <>
+constexpr TopicId find_topic<Parameters>() {
+  return TopicId::kParameters;
+}
+template <>
+constexpr TopicId find_topic<SimStatus>() {
+  return TopicId::kStatus;
+}
+template <>
+constexpr TopicId find_topic<SimControl>() {
+  return TopicId::kControl;
+}
+template <>
+constexpr TopicId find_topic<SimControlReply>() {
+  return TopicId::kReply;
+}
+
+/// The way from one host to another. Probabilities are per datagram.
+struct Link {
+  Instant delay{50'000};
+  Instant jitter{20'000};
+  double loss = 0;
+  double reordering = 0;  ///< a datagram is late by up to `late_by`
+  Instant late_by{0};
+  bool is_cut = false;
+};
+
+class Network;
+
+/// A participant of the domain, with its endpoints.
+class Peer {
+ public:
+  struct Arrival {
+    bus::PeerId sender;
+    Host::Wall written;  ///< by the sender's clock
+  };
+
+  Peer(Network& network, Process& process, const bus::PeerId& id)
+      : network_(network), process_(process), id_(id) {}
+
+  const bus::PeerId& id() const { return id_; }
+  Process& process() const { return process_; }
+
+  template <class Message>
+  void add_reader(std::function<void(const Message&, const Arrival&)> handler) {
+    const auto topic = static_cast<std::size_t>(find_topic<Message>());
+    readers_[topic] = [handler = std::move(handler)](const void* message, const Arrival& arrival) {
+      handler(*static_cast<const Message*>(message), arrival);
+    };
+    endpoints_.push_back({topic, false});
+  }
+  template <class Message>
+  void add_writer() {
+    endpoints_.push_back({static_cast<std::size_t>(find_topic<Message>()), true});
+  }
+  template <class Message>
+  void write(Message message) {
+    write(static_cast<std::size_t>(find_topic<Message>()),
+          std::make_shared<const Message>(std::move(message)));
+  }
+
+  /// Peers with a writer of `topic` that our reader is matched with.
+  const std::set<bus::PeerId>& matched_writers(TopicId topic) const {
+    return writers_[static_cast<std::size_t>(topic)];
+  }
+  /// Peers with a reader of `topic` that our writer is matched with.
+  const std::set<bus::PeerId>& matched_readers(TopicId topic) const {
+    return reader_peers_[static_cast<std::size_t>(topic)];
+  }
+  /// All peers that were discovered.
+  const std::set<bus::PeerId>& known() const { return known_; }
+  bool is_acknowledged(TopicId topic) const;
+  /// Samples that the writer of `topic` keeps for late readers.
+  static std::size_t history_depth(TopicId topic);
+
+ private:
+  friend class Network;
+  struct Endpoint {
+    std::size_t topic;
+    bool is_writer;
+  };
+  struct Written {
+    std::uint64_t number;
+    std::shared_ptr<const void> message;
+    Host::Wall time;
+  };
+  struct History {
+    std::uint64_t next = 1;
+    std::deque<Written> kept;
+  };
+  void write(std::size_t topic, std::shared_ptr<const void> message);
+
+  Network& network_;
+  Process& process_;
+  const bus::PeerId id_;
+  std::vector<Endpoint> endpoints_;  // in the order of their discovery
+  std::array<std::function<void(const void*, const Arrival&)>, kTopics> readers_;
+  std::array<History, kTopics> histories_;
+  std::array<std::set<bus::PeerId>, kTopics> writers_, reader_peers_;
+  std::set<bus::PeerId> known_;
+};
+
+class Network {
+ public:
+  Network(Timeline& timeline, Random random) : timeline_(timeline), random_(random) {}
+
+  Link& link(const Host& from, const Host& to) { return links_[{&from, &to}]; }
+  /// Longest time between two announcements of a participant.
+  static constexpr Instant kDiscoveryRepeat = std::chrono::milliseconds(500);
+  /// A participant that left without goodbye is forgotten after this.
+  static constexpr Instant kLease = std::chrono::seconds(60);
+  static constexpr Instant kHeartbeat = std::chrono::milliseconds(50);
+
+  Peer& join(Process& process);
+  /// The endpoints of `peer` are complete: others may discover it.
+  void announce(Peer& peer);
+  /// The process of `peer` has ended, `with_goodbye` to the others or without.
+  void leave(Peer& peer, bool with_goodbye);
+  const std::vector<std::unique_ptr<Peer>>& peers() const { return peers_; }
+  Peer* find(const bus::PeerId& id) const;
+  /// True if both know each other, and nothing is cut between them.
+  bool are_connected(const bus::PeerId& a, const bus::PeerId& b) const;
+
+  /// Datagrams so far: sent, lost.
+  std::uint64_t sent() const { return sent_; }
+  std::uint64_t lost() const { return lost_; }
+
+ private:
+  friend class Peer;
+  /// The way of the samples of a topic from a writer to a reader.
+  struct Channel {
+    bool writer_knows = false;
+    bool reader_knows = false;
+    std::uint64_t next = 1;       // sample to be sent
+    std::uint64_t delivered = 0;  // last sample that arrived
+    Instant busy_until{0};        // samples of a reliable channel arrive in order
+    bool is_waiting = false;      // for a repair
+    bool is_active() const { return writer_knows && reader_knows; }
+  };
+  using Key = std::pair<std::pair<bus::PeerId, bus::PeerId>, std::size_t>;
+
+  Channel& channel(const Peer& writer, const Peer& reader, std::size_t topic) {
+    return channels_[{{writer.id(), reader.id()}, topic}];
+  }
+  void discover(Peer& observer, Peer& observed);
+  void match(Peer& observer, Peer& observed, const Peer::Endpoint& endpoint);
+  void forget(Peer& observer, const Peer& observed);
+  void sent(Peer& writer, std::size_t topic);
+  void send_now(Peer& writer, Peer& reader, std::size_t topic, const Peer::Written& sample);
+  void send_reliably(Peer& writer, Peer& reader, std::size_t topic);
+  void deliver(Peer& writer, Peer& reader, std::size_t topic, const Peer::Written& sample);
+  /// Draws whether a datagram is lost.
+  bool is_lost(const Peer& from, const Peer& to);
+  Instant draw_delay(const Peer& from, const Peer& to);
+
+  Timeline& timeline_;
+  Random random_;
+  std::vector<std::unique_ptr<Peer>> peers_;
+  std::map<std::pair<const Host*, const Host*>, Link> links_;
+  std::map<Key, Channel> channels_;
+  std::uint64_t next_id_ = 1;
+  std::uint64_t sent_ = 0, lost_ = 0;
+};
+
+}  // namespace sls::worlds

@@ -1,0 +1,210 @@
+#include "worlds/plan.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+
+#include "worlds/setting.hpp"
+
+namespace sls::worlds {
+namespace {
+
+using namespace std::chrono_literals;
+using Kind = Fault::Kind;
+
+Instant draw_time(Random& random, Instant least, Instant most) {
+  return Instant(random.integer(least.count(), most.count()));
+}
+
+Link draw_link(Random& random) {
+  Link link;
+  switch (random.integer(0, 4)) {
+    case 0:  // one switch
+      break;
+    case 1:  // Wi-Fi
+      link = {1ms, 4ms, random.between(0, 0.05), 0.05, 20ms, false};
+      break;
+    case 2:  // far away
+      link = {10ms, 1ms, random.between(0, 0.01), 0.01, 5ms, false};
+      break;
+    default:
+      link.delay = draw_time(random, 20us, 2ms);
+      link.jitter = draw_time(random, 0us, 2ms);
+      link.loss = random.chance(0.5) ? random.between(0, 0.2) : 0;
+      link.reordering = random.chance(0.3) ? random.between(0, 0.2) : 0;
+      link.late_by = 10ms;
+  }
+  return link;
+}
+
+std::vector<std::uint32_t> list_vehicles(const FlownScenario& flown) {
+  std::vector<std::uint32_t> ids(flown.scenario.vehicles.size());
+  for (std::uint32_t i = 0; i < ids.size(); ++i) ids[i] = i;
+  return ids;
+}
+
+void draw_programs(Plan& plan, Random& random, const FlownScenario& flown) {
+  const config::WaitFor& expected = flown.scenario.sync.wait_for;
+  const auto draw_host = [&] {
+    return static_cast<std::size_t>(random.integer(0, static_cast<std::int64_t>(plan.hosts) - 1));
+  };
+  const auto add = [&](Role role) -> PlannedProgram& {
+    PlannedProgram& program = plan.programs.emplace_back();
+    program.role = role;
+    program.host = draw_host();
+    program.start = draw_time(random, 0ms, 1500ms);
+    program.vehicle_ids = list_vehicles(flown);
+    program.follows_servers = random.chance(0.4);
+    return program;
+  };
+  add(Role::kServer);
+  if (!plan.is_mild && random.chance(0.25)) add(Role::kServer);
+  const int clients = expected.controllers + static_cast<int>(random.integer(0, 1));
+  for (int i = 0; i < clients; ++i) {
+    PlannedProgram& client = add(Role::kClient);
+    client.strength = static_cast<std::int32_t>(random.integer(0, 3));
+    if (random.chance(0.1)) client.delay = draw_time(random, 100us, 3ms);
+    if (!plan.is_mild && random.chance(0.03)) client.has_other_scenario = true;
+  }
+  if (random.chance(0.15)) add(Role::kForeign);
+  const int recorders = std::max(expected.recorders, static_cast<int>(random.integer(0, 2)));
+  for (int i = 0; i < recorders; ++i) {
+    PlannedProgram& recorder = add(Role::kRecorder);
+    recorder.resumes = random.chance(0.7);
+    if (random.chance(0.1)) recorder.delay = draw_time(random, 1ms, 100ms);
+  }
+}
+
+void time_fault(Fault& fault, Random& random, const Plan& plan, const FlownScenario& flown) {
+  if (random.chance(0.6)) {
+    fault.step =
+        static_cast<std::uint64_t>(random.integer(0, static_cast<std::int64_t>(flown.last_step)));
+    fault.at = random.chance(0.5) ? Instant(0) : draw_time(random, 0us, 5ms);
+  } else {
+    fault.at = draw_time(random, 0ms, plan.healed);
+  }
+}
+
+/// `count`: of all faults of the plan.
+Fault draw_fault(const Plan& plan, Random& random, std::int64_t count) {
+  static constexpr Kind kMild[] = {Kind::kStop, Kind::kCut,  Kind::kIsolate,
+                                   Kind::kLoss, Kind::kSlow, Kind::kClock};
+  Fault fault;
+  fault.kind = plan.is_mild ? kMild[random.integer(0, 5)] : static_cast<Kind>(random.integer(0, 8));
+  const auto programs = static_cast<std::int64_t>(plan.programs.size());
+  const auto hosts = static_cast<std::int64_t>(plan.hosts);
+  const auto draw_of = [&](std::int64_t count) {
+    return static_cast<std::size_t>(random.integer(0, count - 1));
+  };
+  // A server that has ended waits 1 s for the others to hear it.
+  const Instant longest = plan.is_mild         ? Instant(900ms) / count
+                          : random.chance(0.3) ? Instant(15s)
+                                               : Instant(3s);
+  fault.duration = draw_time(random, 1ms, longest);
+  switch (fault.kind) {
+    case Kind::kKill:
+      fault.target = draw_of(programs);
+      if (random.chance(0.5)) fault.duration = Instant(0);
+      break;
+    case Kind::kStop:
+    case Kind::kInterrupt:
+      fault.target = draw_of(programs);
+      break;
+    case Kind::kCut:
+    case Kind::kIsolate:
+      fault.target = draw_of(hosts);
+      fault.other = draw_of(hosts);
+      break;
+    case Kind::kLoss:
+      fault.value = random.between(0.05, plan.is_mild ? 0.3 : 0.9);
+      break;
+    case Kind::kSlow:
+      fault.target = draw_of(programs);
+      fault.value = random.between(0.0005, plan.is_mild ? 0.02 : 0.3);
+      break;
+    case Kind::kClock:
+      fault.target = draw_of(hosts);
+      fault.value = random.between(-30, 30);
+      break;
+    case Kind::kRequest:
+      fault.target = 0;
+      fault.other = draw_of(6);
+      fault.value = static_cast<double>(random.integer(1, 20));
+      break;
+  }
+  return fault;
+}
+
+}  // namespace
+
+const char* name_kind(Kind kind) {
+  static constexpr const char* kNames[] = {"kill", "stop", "interrupt", "cut",    "isolate",
+                                           "loss", "slow", "clock",     "request"};
+  return kNames[static_cast<int>(kind)];
+}
+
+Plan draw_plan(std::uint64_t seed, const std::vector<FlownScenario>& scenarios) {
+  Random random(Random(seed).next());
+  Plan plan;
+  plan.seed = seed;
+  plan.scenario =
+      static_cast<std::size_t>(random.integer(0, static_cast<std::int64_t>(scenarios.size()) - 1));
+  const FlownScenario& flown = scenarios[plan.scenario];
+  const bool is_lockstep = flown.scenario.sync.mode == config::SyncMode::kLockstep;
+  const config::WaitPolicies& wait = flown.scenario.sync.wait;
+  plan.is_mild = random.chance(0.5) && wait.controller.policy == config::ControllerPolicy::kWait &&
+                 wait.recorder.policy != config::RecorderPolicy::kStop;
+  plan.hosts = static_cast<std::size_t>(random.integer(1, 4));
+  plan.link = draw_link(random);
+  plan.drift = random.chance(0.3) ? random.between(-1e-4, 1e-4) : 0;
+  plan.wall_offset_s = random.chance(0.3) ? random.between(-20, 20) : 0;
+  plan.healed = draw_time(random, 1s, is_lockstep ? Instant(6s) : Instant(4s));
+  plan.has_files = random.chance(0.1);
+  draw_programs(plan, random, flown);
+  const std::int64_t faults = random.chance(0.15) ? 0 : random.integer(1, 6);
+  for (std::int64_t i = 0; i < faults; ++i) {
+    Fault fault = draw_fault(plan, random, faults);
+    time_fault(fault, random, plan, flown);
+    plan.faults.push_back(fault);
+  }
+  return plan;
+}
+
+std::string name_program(const Plan& plan, std::size_t index) {
+  static constexpr const char* kNames[] = {"server", "client", "recorder", "operator", "foreign"};
+  int number = 1;
+  for (std::size_t i = 0; i < index; ++i)
+    number += plan.programs[i].role == plan.programs[index].role;
+  return fmt::format("{}-{}", kNames[static_cast<int>(plan.programs[index].role)], number);
+}
+
+std::string describe(const Fault& fault) {
+  const double at = std::chrono::duration<double>(fault.at).count();
+  const std::string when =
+      fault.step ? fmt::format("step {} + {:.6f} s", *fault.step, at) : fmt::format("{:.6f} s", at);
+  return fmt::format("{} at {}: target {}, other {}, for {:.6f} s, value {:.4f}",
+                     name_kind(fault.kind), when, fault.target, fault.other,
+                     std::chrono::duration<double>(fault.duration).count(), fault.value);
+}
+
+std::vector<std::string> describe(const Plan& plan) {
+  const auto to_ms = [](Instant time) {
+    return std::chrono::duration<double, std::milli>(time).count();
+  };
+  std::vector<std::string> lines = {fmt::format(
+      "seed {}: scenario {}, {} host(s), link {:.3f} ms + {:.3f} ms, loss {:.4f}, {} faults{}",
+      plan.seed, plan.scenario, plan.hosts, to_ms(plan.link.delay), to_ms(plan.link.jitter),
+      plan.link.loss, plan.faults.size(), plan.is_mild ? ", mild" : "")};
+  for (std::size_t i = 0; i < plan.programs.size(); ++i) {
+    const PlannedProgram& program = plan.programs[i];
+    lines.push_back(fmt::format("{} on host {} at {:.3f} ms: strength {}{}{}, delay {:.3f} ms",
+                                name_program(plan, i), program.host, to_ms(program.start),
+                                program.strength, program.follows_servers ? ", follows" : "",
+                                program.has_other_scenario ? ", other scenario" : "",
+                                to_ms(program.delay)));
+  }
+  for (const Fault& fault : plan.faults) lines.push_back(describe(fault));
+  return lines;
+}
+
+}  // namespace sls::worlds

@@ -1,0 +1,82 @@
+/// What happens in a world, drawn from its seed before it begins: programs, network, faults.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "worlds/network.hpp"
+#include "worlds/random.hpp"
+
+namespace sls::worlds {
+
+struct FlownScenario;
+
+enum class Role { kServer, kClient, kRecorder, kOperator, kForeign };
+
+/// One fault or one act of a person.
+struct Fault {
+  enum class Kind {
+    kKill,       ///< SIGKILL; after `duration` a new process takes its place, if that is not 0
+    kStop,       ///< SIGSTOP, and SIGCONT after `duration`
+    kInterrupt,  ///< SIGINT
+    kCut,        ///< nothing passes from host `target` to host `other` for `duration`
+    kIsolate,    ///< host `target` is cut off in both directions for `duration`
+    kLoss,       ///< all links lose `value` of their datagrams for `duration`
+    kSlow,       ///< the processor of program `target` is `value` s late for `duration`
+    kClock,      ///< the wall clock of host `target` jumps by `value` s
+    kRequest,    ///< an operator sends request `other` (SimControl.action) to server `target`
+  };
+  Kind kind = Kind::kKill;
+  Instant at{0};                      ///< after the begin, or after the step
+  std::optional<std::uint64_t> step;  ///< when a server publishes this step
+  Instant duration{0};
+  std::size_t target = 0;
+  std::size_t other = 0;
+  double value = 0;
+
+  bool is_of_program() const {
+    return kind == Kind::kKill || kind == Kind::kStop || kind == Kind::kInterrupt ||
+           kind == Kind::kSlow || kind == Kind::kRequest;
+  }
+};
+const char* name_kind(Fault::Kind kind);
+
+struct PlannedProgram {
+  Role role = Role::kClient;
+  std::size_t host = 0;
+  Instant start{0};
+  std::vector<std::uint32_t> vehicle_ids;
+  std::int32_t strength = 0;
+  bool follows_servers = false;
+  bool has_other_scenario = false;
+  bool resumes = false;  ///< a recorder that takes the place of a killed one goes on
+  Instant delay{0};      ///< computing time of an answer; of the disk of a recorder
+};
+
+struct Plan {
+  std::uint64_t seed = 0;
+  std::size_t scenario = 0;
+  std::size_t hosts = 1;
+  std::vector<PlannedProgram> programs;
+  Link link;  ///< between hosts; within one it is fast and loses nothing
+  double drift = 0;
+  double wall_offset_s = 0;
+  bool has_files = false;  ///< recorders write real files
+  std::vector<Fault> faults;
+  /// The faults are over: from now on all that can finish must.
+  Instant healed{0};
+  /// Only faults after which the flight must finish: every survivor ends with exit code 0.
+  bool is_mild = false;
+};
+
+/// `scenarios`: number of scenarios to choose from, with their vehicles.
+Plan draw_plan(std::uint64_t seed, const std::vector<FlownScenario>& scenarios);
+
+/// One line for each program and fault.
+std::vector<std::string> describe(const Plan& plan);
+std::string describe(const Fault& fault);
+std::string name_program(const Plan& plan, std::size_t index);
+
+}  // namespace sls::worlds

@@ -1,0 +1,94 @@
+#include "worlds/program.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+namespace sls::worlds {
+namespace {
+
+constexpr auto kRepeatAfter = std::chrono::milliseconds(400);  // as bus::Announcer
+
+}  // namespace
+
+void Program::say(std::string text) {
+  const std::string& folder = setting_.folder;
+  for (std::size_t at = 0; !folder.empty() && (at = text.find(folder)) != std::string::npos;)
+    text.replace(at, folder.size(), ".");
+  setting_.trace.add(setting_.timeline.now(), name(), text);
+}
+
+void Program::kill() {
+  if (process_.has_ended()) return;
+  was_killed_ = true;
+  setting_.properties.on_killed(*this);
+  on_killed();
+  process_.end();
+  say("killed");
+  setting_.network.leave(peer_, false);
+}
+
+void Program::go_on() {
+  if (process_.has_ended()) return;
+  say("continued");
+  setting_.properties.on_continued(*this);
+  process_.go_on();
+}
+
+void Program::exit(int code, std::string reason) {
+  exit_code_ = code;
+  reason_ = std::move(reason);
+  say(fmt::format("ends with exit code {}{}{}", code, reason_.empty() ? "" : ": ", reason_));
+  process_.end();
+  setting_.network.leave(peer_, true);
+}
+
+void Program::wake_at(sync::Time time) {
+  const Instant latency(setting_.random.integer(5'000, 60'000));
+  const Instant due =
+      std::max(process_.host().find(time), setting_.timeline.now() + latency) + slowness_;
+  if (due >= wakes_) return;
+  wakes_ = due;
+  process_.run_at(due, [this, number = ++wake_number_] {
+    if (number != wake_number_) return;  // it woke earlier
+    wakes_ = Instant::max();
+    wake();
+  });
+}
+
+void Program::announce(const Participant& message) {
+  announced_ = message;
+  announced_time_ = now();
+  setting_.properties.on_announced(*this, message);
+  peer_.write(message);
+}
+
+void Program::repeat_announcement_if_due() {
+  if (announced_ && now() - announced_time_ >= kRepeatAfter) announce(Participant(*announced_));
+}
+
+const sync::Servers& Program::present_servers() {
+  servers_.set_present(peer_.matched_writers(TopicId::kParameters));
+  return servers_;
+}
+
+sync::Membership& Program::present_members() {
+  members_.set_present(peer_.matched_writers(TopicId::kParticipant));
+  return members_;
+}
+
+void Program::note(const Parameters& sample, const Peer::Arrival& arrival) {
+  servers_.set_present(peer_.matched_writers(TopicId::kParameters));
+  if (sample.contract_sha256() == bus::kContractSha256)
+    servers_.note(sample, arrival.sender, now());
+}
+
+bool Program::note(const SimStatus& sample, const Peer::Arrival& arrival) {
+  servers_.set_present(peer_.matched_writers(TopicId::kParameters));
+  return servers_.note(sample, arrival.sender, now());
+}
+
+void Program::note(const Participant& sample, const Peer::Arrival& arrival) {
+  present_members().note(sample, arrival.sender,
+                         {now(), arrival.written, process_.host().wall() - arrival.written});
+}
+
+}  // namespace sls::worlds

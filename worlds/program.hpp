@@ -1,0 +1,92 @@
+#pragma once
+
+#include <chrono>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "common/sync/membership.hpp"
+#include "common/sync/servers.hpp"
+#include "worlds/plan.hpp"
+#include "worlds/setting.hpp"
+
+namespace sls::worlds {
+
+/// A program in a world: the shell around a core, on one process, with one participant. Its main
+/// thread wakes when it is due; a slow processor lets it wait.
+class Program {
+ public:
+  Program(Setting& setting, Host& host, Role role, std::string name)
+      : setting_(setting),
+        process_(setting.timeline, host, std::move(name)),
+        peer_(setting.network.join(process_)),
+        servers_(peer_.id()),
+        role_(role) {}
+  virtual ~Program() = default;
+  Program(const Program&) = delete;
+  Program& operator=(const Program&) = delete;
+
+  virtual void start() = 0;
+  /// SIGSTOP and SIGCONT.
+  void stop() { process_.stop(); }
+  void go_on();
+  Process& process() { return process_; }
+  const Process& process() const { return process_; }
+  const bus::PeerId& id() const { return peer_.id(); }
+  const std::string& name() const { return process_.name(); }
+  Role role() const { return role_; }
+
+  /// SIGINT: the program ends as if a user had pressed Ctrl-C.
+  void interrupt() { stop_signal_ = "interrupted by SIGINT"; }
+  /// SIGKILL.
+  void kill();
+  bool was_killed() const { return was_killed_; }
+  bool was_interrupted() const { return !stop_signal_.empty(); }
+  /// After its end, unless it was killed.
+  std::optional<int> exit_code() const { return exit_code_; }
+  const std::string& reason() const { return reason_; }
+  /// The processor takes so much longer for each wake-up.
+  void set_slowness(Instant delay) { slowness_ = delay; }
+
+ protected:
+  sync::Time now() const { return process_.host().now(); }
+  void say(std::string text);
+  void say(const sync::Line& line) { say((line.is_warning ? "warning: " : "") + line.text); }
+  /// Wakes the main thread at `time` of this host's clock, or earlier if that was asked for.
+  void wake_at(sync::Time time);
+  void wake_soon() { wake_at(now()); }
+  virtual void wake() = 0;
+  void exit(int code, std::string reason);
+  /// What the process has open is closed.
+  virtual void on_killed() {}
+
+  void announce(const Participant& message);
+  /// As bus::Announcer.
+  void repeat_announcement_if_due();
+
+  const sync::Servers& present_servers();
+  sync::Membership& present_members();
+  void note(const Parameters& sample, const Peer::Arrival& arrival);
+  bool note(const SimStatus& sample, const Peer::Arrival& arrival);
+  void note(const Participant& sample, const Peer::Arrival& arrival);
+
+  Setting& setting_;
+  Process process_;
+  Peer& peer_;
+  sync::Servers servers_;
+  sync::Membership members_;
+  std::string stop_signal_;
+
+ private:
+  const Role role_;
+  Instant slowness_{0};
+  Instant wakes_{Instant::max()};
+  std::uint64_t wake_number_ = 0;
+  std::optional<Participant> announced_;
+  sync::Time announced_time_;
+  bool was_killed_ = false;
+  std::optional<int> exit_code_;
+  std::string reason_;
+};
+
+}  // namespace sls::worlds

@@ -1,0 +1,291 @@
+#include "worlds/properties.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <cstring>
+
+#include "worlds/client_program.hpp"
+#include "worlds/recorder_program.hpp"
+#include "worlds/server_program.hpp"
+
+namespace sls::worlds {
+namespace {
+
+using namespace std::chrono_literals;
+
+/// A missing participant is named after 1 s; a status is due every 0.5 s; the rest is for slow
+/// processors.
+constexpr Instant kNamedWithin = 2500ms;
+/// Two servers of one vehicle that hear each other: one of them has gone after this.
+constexpr Instant kRivalsGoneWithin = 4s;
+
+void mix(std::uint64_t& hash, std::uint64_t value) {
+  hash = (hash ^ value) * 0x100000001b3u;
+  hash ^= hash >> 29;
+}
+
+void mix(std::uint64_t& hash, const Eigen::Vector3d& vector) {
+  for (int i = 0; i < 3; ++i) {
+    std::uint64_t bits = 0;
+    std::memcpy(&bits, &vector[i], sizeof bits);
+    mix(hash, bits);
+  }
+}
+
+/// A program that comes after the flight finds nothing.
+bool has_joined(const Program& program) {
+  if (program.role() == Role::kClient)
+    return static_cast<const ClientProgram&>(program).has_flown();
+  if (program.role() == Role::kRecorder)
+    return static_cast<const RecorderProgram&>(program).has_recorded();
+  return program.role() == Role::kServer;
+}
+
+}  // namespace
+
+std::uint64_t hash_row(const model::StepRecord& record) {
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  mix(hash, record.step);
+  mix(hash, record.truth.p_WQ);
+  mix(hash, record.truth.v_WQ);
+  mix(hash, record.truth.p_WL);
+  mix(hash, record.truth.v_WL);
+  mix(hash, record.f_Q_W);
+  return hash;
+}
+
+void Properties::find(std::string finding) {
+  trace_.add(timeline_.now(), "FOUND", finding);
+  findings_.push_back(std::move(finding));
+}
+
+bool Properties::is_any_finished() const {
+  return std::any_of(runs_.begin(), runs_.end(),
+                     [](const auto& item) { return item.second.is_finished; });
+}
+
+// --- during the world ----------------------------------------------------------------------------
+
+void Properties::on_run(const Program& server, std::uint64_t run_id, const Parameters& parameters) {
+  Run& run = runs_[run_id];
+  run.server = &server;
+  run.vehicle_ids = sync::list_vehicle_ids(parameters);
+}
+
+void Properties::on_published(std::uint64_t run_id, std::uint64_t) {
+  Run& run = runs_[run_id];
+  run.published = timeline_.now();
+  run.is_stall_found = false;
+}
+
+void Properties::on_recorded(std::uint64_t run_id, const std::vector<model::StepRecord>& records) {
+  Run& run = runs_[run_id];
+  for (const model::StepRecord& record : records) {
+    ++steps_;
+    auto& rows = run.rows[record.vehicle_id];
+    if (rows.size() != record.step)
+      find(fmt::format("order: run {:016x} records step {} of vehicle {}, expected {}", run_id,
+                       record.step, record.vehicle_id, rows.size()));
+    rows.push_back(hash_row(record));
+    const auto before = run.last.find(record.vehicle_id);
+    if (before != run.last.end()) check_applied(run, before->second, record);
+    run.last[record.vehicle_id] = record;
+    run.is_exact = run.is_exact && (record.kind == model::AnswerKind::kAccepted ||
+                                    record.kind == model::AnswerKind::kRefused ||
+                                    record.kind == model::AnswerKind::kNone);
+    if (record.kind != model::AnswerKind::kAccepted) continue;
+    if (record.answered_step != record.step)
+      find(fmt::format("answer: step {} has the answer to step {}", record.step,
+                       record.answered_step));
+    if (run.ready.count(record.client_name) == 0)
+      find(fmt::format("answer: step {} has an answer of '{}', which was not ready", record.step,
+                       record.client_name));
+    const auto killed = killed_.find(record.client_name);
+    if (killed != killed_.end() && killed->second < run.published)
+      find(fmt::format("answer: step {} has an answer of '{}', which was dead", record.step,
+                       record.client_name));
+  }
+}
+
+/// The force that acts is that of the answer: no scenario of the worlds disturbs it.
+void Properties::check_applied(const Run&, const model::StepRecord& before,
+                               const model::StepRecord& record) {
+  const bool is_answered =
+      before.kind == model::AnswerKind::kAccepted || before.kind == model::AnswerKind::kHeld;
+  if (is_answered && before.answer.f_Q_W != record.f_Q_W)
+    find(fmt::format("answer: the force of step {} is not that of its answer", before.step));
+}
+
+void Properties::on_status(const SimStatus& status, const Network& network) {
+  Run& run = runs_[status.run_id()];
+  run.timing = status.timing().to_string();
+  run.phase = status.phase();
+  if (status.reason().size() > 0) run.named = timeline_.now();
+  if (run.phase != RunPhase::PHASE_RUNNING) return;
+  check_stall(run, status.run_id());
+  check_rivals(run, network);
+}
+
+/// Whoever keeps others waiting is named.
+void Properties::check_stall(Run& run, std::uint64_t run_id) {
+  if (!run.published || run.is_stall_found) return;
+  const auto continued = continued_.find(run.server->name());
+  const Instant since =
+      continued == continued_.end() ? *run.published : std::max(*run.published, continued->second);
+  if (timeline_.now() - since < kNamedWithin || run.named >= *run.published) return;
+  run.is_stall_found = true;
+  find(fmt::format("named: run {:016x} stands still since {:.3f} s, and nobody is named", run_id,
+                   std::chrono::duration<double>(since).count()));
+}
+
+void Properties::check_rivals(const Run& run, const Network& network) {
+  for (const auto& [id, other] : runs_) {
+    if (&other == &run || other.has_ended || other.phase != RunPhase::PHASE_RUNNING) continue;
+    const bool share =
+        std::any_of(run.vehicle_ids.begin(), run.vehicle_ids.end(), [&](std::uint32_t vehicle) {
+          return std::count(other.vehicle_ids.begin(), other.vehicle_ids.end(), vehicle) > 0;
+        });
+    const auto key = std::minmax(run.server, other.server);
+    const bool meet = share && other.server != run.server && !other.server->process().has_ended() &&
+                      !other.server->process().is_stopped() &&
+                      network.are_connected(run.server->id(), other.server->id());
+    if (!meet) {
+      rivals_.erase(key);
+      continue;
+    }
+    const Instant since = rivals_.try_emplace(key, timeline_.now()).first->second;
+    if (timeline_.now() - since <= kRivalsGoneWithin) continue;
+    find(fmt::format("one-server: {} and {} fly one vehicle", run.server->name(),
+                     other.server->name()));
+    rivals_[key] = timeline_.now() + 1h;
+  }
+}
+
+void Properties::on_run_end(std::uint64_t run_id, bool is_finished, std::string certificate) {
+  Run& run = runs_[run_id];
+  run.has_ended = true;
+  run.is_finished = is_finished;
+  run.certificate = std::move(certificate);
+}
+
+void Properties::on_announced(const Program& program, const Participant& message) {
+  if (program.role() == Role::kClient && message.ready())
+    runs_[message.run_id()].ready.insert(program.name());
+}
+
+void Properties::on_killed(const Program& program) { killed_[program.name()] = timeline_.now(); }
+
+void Properties::on_continued(const Program& program) {
+  continued_[program.name()] = timeline_.now();
+}
+
+// --- at its end ----------------------------------------------------------------------------------
+
+void Properties::check(const Plan& plan, const std::vector<std::unique_ptr<Program>>& programs,
+                       const FlownScenario& flown) {
+  for (const auto& [run_id, run] : runs_) {
+    const bool says_exact =
+        run.timing == "exact" || run.timing.find("real-time, 0 of ") != std::string::npos;
+    if (run.has_ended && !run.timing.empty() && says_exact != run.is_exact)
+      find(fmt::format("timing-label: run {:016x} is {}exact, its label says '{}'", run_id,
+                       run.is_exact ? "" : "not ", run.timing));
+  }
+  std::map<std::filesystem::path, const Program*> folders;
+  for (const auto& program : programs) {
+    if (!program->process().has_ended()) find(fmt::format("ends: {} still runs", program->name()));
+    check_exit(*program);
+    if (program->role() == Role::kRecorder) {
+      const auto& recorder = static_cast<const RecorderProgram&>(*program);
+      if (!recorder.folder().empty()) folders[recorder.folder()] = program.get();
+      for (const StoredRecording& recording : recorder.recordings())
+        check_recording(*program, recording, flown);
+    }
+    if (plan.is_mild && has_joined(*program) && program->exit_code().value_or(0) != 0)
+      find(fmt::format("finishes: {} ends with {}: {}", program->name(), *program->exit_code(),
+                       program->reason()));
+  }
+  for (const auto& [folder, program] : folders)
+    for (const StoredRecording& recording : read_recordings(folder))
+      check_recording(*program, recording, flown);
+  if (plan.is_mild && !is_any_finished()) find("finishes: no flight was finished");
+}
+
+void Properties::check_recording(const Program& program, const StoredRecording& recording,
+                                 const FlownScenario& flown) {
+  const auto found = runs_.find(recording.run_id);
+  if (found == runs_.end())
+    return find(fmt::format("known-run: {} recorded run {:016x}, which no server flew",
+                            program.name(), recording.run_id));
+  const Run& run = found->second;
+  check_rows(program, recording, run);
+  if (!recording.claims.complete) return;
+  if (!run.is_finished)
+    find(fmt::format("complete: {} says so of run {:016x}, which was not finished", program.name(),
+                     recording.run_id));
+  for (const auto& [vehicle, rows] : run.rows) {
+    const auto kept = recording.rows.find(vehicle);
+    if (kept == recording.rows.end() || kept->second.steps.size() != rows.size())
+      find(fmt::format("complete: {} lacks rows of vehicle {}", program.name(), vehicle));
+  }
+  if (!run.has_late && recording.certificate != run.certificate)
+    find(fmt::format("complete: {} differs from what {} flew", program.name(), run.server->name()));
+  if (run.is_exact && recording.certificate != flown.certificate)
+    find(fmt::format("exact: {} differs from the flight in one process", program.name()));
+  if (!recording.claims.timing.empty() && recording.claims.timing != run.timing)
+    find(fmt::format("timing-label: {}: expected '{}', got '{}'", program.name(), run.timing,
+                     recording.claims.timing));
+}
+
+/// Each row is that of the run; rows are in order; those that are not there are listed.
+void Properties::check_rows(const Program& program, const StoredRecording& recording,
+                            const Run& run) {
+  for (const auto& [vehicle, kept] : recording.rows) {
+    const auto flown = run.rows.find(vehicle);
+    std::set<std::uint64_t> missing;
+    for (const record::MissingSteps& gap : recording.claims.missing.listed)
+      if (gap.vehicle_id == vehicle && gap.topic == "sls/state")
+        for (std::uint64_t step = gap.from; step <= gap.to; ++step) missing.insert(step);
+    std::uint64_t next = 0;
+    for (std::size_t i = 0; i < kept.steps.size(); ++i) {
+      const std::uint64_t step = kept.steps[i];
+      if (step < next) return find(fmt::format("rows: {}: step {} twice", program.name(), step));
+      for (; recording.is_closed && next < step; ++next)
+        if (missing.count(next) == 0)
+          return find(
+              fmt::format("rows: {}: step {} of vehicle {} is neither there nor listed as "
+                          "missing",
+                          program.name(), next, vehicle));
+      if (missing.count(step) > 0)
+        return find(fmt::format("rows: {}: step {} of vehicle {} is there and listed as missing",
+                                program.name(), step, vehicle));
+      if (flown == run.rows.end() || step >= flown->second.size() ||
+          flown->second[step] != kept.hashes[i])
+        return find(fmt::format("rows: {}: step {} of vehicle {} is not that of the run",
+                                program.name(), step, vehicle));
+      next = step + 1;
+    }
+  }
+}
+
+void Properties::check_exit(const Program& program) {
+  if (program.was_killed() || !program.exit_code()) return;
+  const int code = *program.exit_code();
+  if ((code != 0) != !program.reason().empty())
+    find(fmt::format("exit-code: {} ends with {} and the reason '{}'", program.name(), code,
+                     program.reason()));
+  if (code != 0) return;
+  if (program.role() == Role::kServer) {
+    const auto& server = static_cast<const ServerProgram&>(program);
+    if (!runs_[server.run_id()].is_finished)
+      find(fmt::format("exit-code: {} ends with 0, but its run was not finished", program.name()));
+  }
+  if (program.role() == Role::kRecorder) {
+    const auto& recorder = static_cast<const RecorderProgram&>(program);
+    if (recorder.has_recorded() ? !recorder.is_complete() : !program.was_interrupted())
+      find(fmt::format("exit-code: {} ends with 0, but its recording is not complete",
+                       program.name()));
+  }
+}
+
+}  // namespace sls::worlds

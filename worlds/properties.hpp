@@ -1,0 +1,106 @@
+/// What must hold in every world: docs/worlds.md. The programs say what they do; the properties
+/// know more than each of them.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/model/step_record.hpp"
+#include "recorder/core/recording_core.hpp"
+#include "worlds/network.hpp"
+#include "worlds/plan.hpp"
+#include "worlds/timeline.hpp"
+#include "worlds/trace.hpp"
+
+namespace sls::worlds {
+
+struct FlownScenario;
+class Program;
+
+/// The rows that a recording holds on the simulated disk, and what its manifest claims.
+struct StoredRecording {
+  struct Rows {
+    std::vector<std::uint64_t> steps;   ///< as they were written
+    std::vector<std::uint64_t> hashes;  ///< of the rows
+  };
+  std::uint64_t run_id = 0;
+  bool is_closed = false;
+  record::Claims claims;               ///< of the last manifest
+  std::string certificate;             ///< of a closed one
+  std::map<std::uint32_t, Rows> rows;  ///< by vehicle
+};
+
+/// The content of a row that no late answer changes.
+std::uint64_t hash_row(const model::StepRecord& record);
+
+class Properties {
+ public:
+  Properties(const Timeline& timeline, Trace& trace) : timeline_(timeline), trace_(trace) {}
+
+  // --- what the programs do ---
+
+  void on_run(const Program& server, std::uint64_t run_id, const Parameters& parameters);
+  /// States of a step leave for the first time.
+  void on_published(std::uint64_t run_id, std::uint64_t step);
+  void on_recorded(std::uint64_t run_id, const std::vector<model::StepRecord>& records);
+  void on_late(std::uint64_t run_id) { runs_[run_id].has_late = true; }
+  void on_status(const SimStatus& status, const Network& network);
+  void on_run_end(std::uint64_t run_id, bool is_finished, std::string certificate);
+  void on_announced(const Program& program, const Participant& message);
+  void on_killed(const Program& program);
+  void on_continued(const Program& program);
+
+  /// At the end of the world.
+  void check(const Plan& plan, const std::vector<std::unique_ptr<Program>>& programs,
+             const FlownScenario& flown);
+
+  const std::vector<std::string>& findings() const { return findings_; }
+  std::uint64_t steps() const { return steps_; }
+  bool is_any_finished() const;
+
+ private:
+  /// A run as the world saw it.
+  struct Run {
+    const Program* server = nullptr;
+    std::vector<std::uint32_t> vehicle_ids;
+    std::set<std::string> ready;                               // clients that have announced it
+    std::map<std::uint32_t, std::vector<std::uint64_t>> rows;  // hashes, by vehicle and step
+    std::map<std::uint32_t, model::StepRecord> last;
+    bool is_exact = true;  // each force answers its own state
+    bool has_late = false;
+    bool has_ended = false;
+    bool is_finished = false;
+    std::string certificate;
+    std::string timing;
+    RunPhase phase = RunPhase::PHASE_WAITING;
+    std::optional<Instant> published;  // the last step
+    Instant named{-1};                 // the last status with a reason
+    bool is_stall_found = false;
+  };
+
+  void find(std::string finding);
+  void check_stall(Run& run, std::uint64_t run_id);
+  void check_rivals(const Run& run, const Network& network);
+  void check_applied(const Run& run, const model::StepRecord& before,
+                     const model::StepRecord& record);
+  void check_recording(const Program& program, const StoredRecording& recording,
+                       const FlownScenario& flown);
+  void check_rows(const Program& program, const StoredRecording& recording, const Run& run);
+  void check_exit(const Program& program);
+
+  const Timeline& timeline_;
+  Trace& trace_;
+  std::map<std::uint64_t, Run> runs_;
+  std::map<std::string, Instant> killed_, continued_;                    // by name
+  std::map<std::pair<const Program*, const Program*>, Instant> rivals_;  // fly together since
+  std::uint64_t steps_ = 0;
+  std::vector<std::string> findings_;
+};
+
+}  // namespace sls::worlds

@@ -1,0 +1,165 @@
+#include "worlds/recorder_program.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <utility>
+#include <variant>
+
+namespace sls::worlds {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr Instant kWriteTime = 5ms;  // as WritingThread
+constexpr Instant kBusyTime = 1ms;
+
+}  // namespace
+
+RecorderProgram::RecorderProgram(Setting& setting, Host& host, std::string name,
+                                 const Options& options)
+    : Program(setting, host, Role::kRecorder, std::move(name)),
+      options_(options),
+      arrivals_([this](std::uint64_t run_id) {
+        return present_servers().may_fly(run_id, core_->vehicle());
+      }) {}
+
+void RecorderProgram::start() {
+  recorder_options_.folder =
+      options_.folder.empty() ? std::filesystem::path(name()) : options_.folder;
+  recorder_options_.follow = options_.follows_servers;
+  try {  // as the program's main
+    if (options_.resumes && !options_.folder.empty())
+      recorder_options_.unfinished = record::find_unfinished_recording(options_.folder);
+    else if (!options_.folder.empty())
+      record::prepare_recording_folder(options_.folder, false);
+  } catch (const config::ConfigError& error) {
+    return exit(2, error.what());
+  }
+  core_ = std::make_unique<record::RecorderCore>(record::make_core_options(recorder_options_));
+  peer_.add_reader<Participant>(
+      [this](const Participant& sample, const Peer::Arrival& arrival) { note(sample, arrival); });
+  peer_.add_reader<Parameters>(
+      [this](const Parameters& sample, const Peer::Arrival& arrival) { note(sample, arrival); });
+  peer_.add_writer<Participant>();
+  peer_.add_reader<RecordBatch>([this](const RecordBatch& batch, const Peer::Arrival& arrival) {
+    arrivals_.put({batch.run_id(), arrival.sender, batch});
+  });
+  peer_.add_reader<SimStatus>([this](const SimStatus& status, const Peer::Arrival& arrival) {
+    note(status, arrival);
+    arrivals_.put({status.run_id(), arrival.sender, status});
+  });
+  setting_.network.announce(peer_);
+  announce_progress(false);
+  wake_soon();
+}
+
+// --- the main thread -----------------------------------------------------------------------------
+
+void RecorderProgram::wake() {
+  if (acknowledged_by_) {
+    if (!peer_.is_acknowledged(TopicId::kParticipant) && now() < *acknowledged_by_)
+      return wake_at(now() + 1ms);
+    acknowledged_by_.reset();
+    core_->on_recorded(recorded_, stop_signal_);
+    writing_.reset();
+  }
+  act(core_->look(present_servers(), look_around()));
+  for (const sync::Line& line : core_->take_lines()) say(line);
+  if (acknowledged_by_) return wake_at(now() + 1ms);
+  repeat_announcement_if_due();
+  if (core_->phase() == record::RecorderCore::Phase::kEnded)
+    return exit(core_->error().empty() ? 0 : 1, core_->error());
+  wake_at(core_->next_deadline());
+}
+
+void RecorderProgram::act(record::RecorderCore::Act act) {
+  using Act = record::RecorderCore::Act;
+  if (act == Act::kOpen) open();
+  if (act == Act::kAnnounce) announce_progress(false);
+  if (act == Act::kClose) must_close_ = core_->watch_end();
+  if (act == Act::kReport) report();
+}
+
+record::RecorderCore::Now RecorderProgram::look_around() {
+  record::RecorderCore::Now seen;
+  seen.time = now();
+  seen.interruption = stop_signal_;
+  if (!writing_) return seen;
+  seen.is_closed = has_closed_;
+  const bus::PeerId& server = core_->run()->server;
+  seen.hears_server = peer_.matched_writers(TopicId::kRecord).count(server) > 0 &&
+                      peer_.matched_writers(TopicId::kStatus).count(server) > 0;
+  seen.last_complete_step = writing_->last_complete_step();
+  return seen;
+}
+
+void RecorderProgram::open() {
+  const sync::Run& run = *core_->run();
+  const config::Scenario& scenario = setting_.flown->scenario;
+  must_close_.reset();
+  has_closed_ = false;
+  recorded_ = {};
+  if (options_.folder.empty()) {
+    StoredRecording& stored = recordings_.emplace_back();
+    stored.run_id = run.parameters.run_id();
+    writing_ = std::make_unique<MemoryRecording>(stored, run.parameters, scenario.record.flush_s,
+                                                 now(), [this](const auto& line) { say(line); });
+  } else {
+    writing_ = std::make_unique<FileRecording>(record::make_segment(recorder_options_, *core_),
+                                               run.parameters, now());
+  }
+  has_recorded_ = true;
+  arrivals_.open(run.parameters.run_id(), run.server);
+  say(fmt::format("records run {:016x}", run.parameters.run_id()));
+  announce_progress(false);
+  core_->on_opened(scenario.sync.wait.server_deadline_s, look_around());
+  process_.run_at(setting_.timeline.now(), [this] { write(); });
+}
+
+/// The last announcement must reach the others, who wait for it: the main thread waits, too.
+void RecorderProgram::report() {
+  announce_progress(true);
+  acknowledged_by_ = now() + 1s;
+}
+
+void RecorderProgram::announce_progress(bool done) {
+  Participant message;
+  message.contract_sha256(bus::kContractSha256);
+  message.role(ParticipantRole::ROLE_RECORDER);
+  message.name("recorder");
+  message.host(process_.host().name());
+  if (writing_) {
+    message.run_id(core_->run()->parameters.run_id());
+    message.scenario_sha256(core_->run()->parameters.scenario_sha256());
+  }
+  message.ready(core_->is_ready());
+  message.done(done);
+  message.last_complete_step(writing_ ? writing_->last_complete_step() : -1);
+  announce(message);
+}
+
+// --- the writing thread --------------------------------------------------------------------------
+
+void RecorderProgram::write() {
+  if (!writing_ || has_closed_) return;
+  const bool must_close = must_close_.has_value();
+  bool has_come = false;
+  for (const record::Arrivals::Sample& sample : arrivals_.take_all()) {
+    has_come = true;
+    if (const auto* batch = std::get_if<RecordBatch>(&sample))
+      writing_->add(*batch, now());
+    else
+      writing_->add(std::get<SimStatus>(sample));
+  }
+  writing_->on_time(now());
+  if (writing_->is_whole() || must_close) {
+    recorded_ = writing_->close(must_close_.value_or(record::RunWatch::End()), arrivals_.refused());
+    has_closed_ = true;
+    return;
+  }
+  process_.run_at(
+      setting_.timeline.now() + (has_come ? kBusyTime : kWriteTime) + options_.disk_delay,
+      [this] { write(); });
+}
+
+}  // namespace sls::worlds

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <deque>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "recorder/core/arrivals.hpp"
+#include "recorder/core/recorder_core.hpp"
+#include "recorder/recorder.hpp"
+#include "worlds/program.hpp"
+#include "worlds/world_recording.hpp"
+
+namespace sls::worlds {
+
+/// A recorder: RecorderCore and RecordingCore with a simulated shell (recorder/recorder.hpp and
+/// writing_thread.hpp are the real one).
+class RecorderProgram : public Program {
+ public:
+  struct Options {
+    std::filesystem::path folder;  ///< of real files; empty: rows in memory
+    bool resumes = false;
+    bool follows_servers = false;
+    Instant disk_delay{0};  ///< each pass of the writing thread takes so much longer
+  };
+  RecorderProgram(Setting& setting, Host& host, std::string name, const Options& options);
+  void start() override;
+  /// Those in memory, oldest first.
+  const std::deque<StoredRecording>& recordings() const { return recordings_; }
+  const std::filesystem::path& folder() const { return options_.folder; }
+  bool has_recorded() const { return has_recorded_; }
+  /// The last recording that was closed is complete.
+  bool is_complete() const { return recorded_.is_complete; }
+
+ private:
+  void wake() override;
+  void act(record::RecorderCore::Act act);
+  record::RecorderCore::Now look_around();
+  void open();
+  void report();
+  void announce_progress(bool done);
+  /// A pass of the writing thread.
+  void write();
+  void on_killed() override { writing_.reset(); }
+
+  const Options options_;
+  record::RecorderOptions recorder_options_;
+  std::unique_ptr<record::RecorderCore> core_;  // null if the folder was refused
+  record::Arrivals arrivals_;
+  std::deque<StoredRecording> recordings_;
+
+  std::unique_ptr<WorldRecording> writing_;  // of the run that is recorded
+  std::optional<record::RunWatch::End> must_close_;
+  bool has_recorded_ = false;
+  bool has_closed_ = false;
+  record::RecorderCore::Recorded recorded_;
+  std::optional<sync::Time> acknowledged_by_;  // the end of a wait
+};
+
+}  // namespace sls::worlds

@@ -1,0 +1,178 @@
+#include "worlds/search.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <mutex>
+#include <set>
+#include <thread>
+
+namespace sls::worlds {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr std::size_t kMostLines = 40;
+
+/// "ends" of "ends: client-1 still runs".
+std::string name_property(const std::string& finding) {
+  return finding.substr(0, finding.find(':'));
+}
+
+std::set<std::string> name_properties(const std::vector<std::string>& findings) {
+  std::set<std::string> names;
+  for (const std::string& finding : findings) names.insert(name_property(finding));
+  return names;
+}
+
+/// One job after another takes the next seed.
+class Search {
+ public:
+  Search(const std::vector<FlownScenario>& scenarios, const SearchOptions& options)
+      : scenarios_(scenarios), options_(options), next_(options.first) {}
+
+  SearchResult run(const std::function<void(const SearchResult&)>& report) {
+    std::vector<std::thread> threads;
+    for (unsigned i = 0; i < options_.jobs; ++i) threads.emplace_back([this, i] { work(i); });
+    while (running_ < 0 || running_ > 0) {
+      std::this_thread::sleep_for(100ms);
+      const auto now = std::chrono::steady_clock::now();
+      if (now < reported_ + 5s) continue;
+      reported_ = now;
+      const std::lock_guard lock(mutex_);
+      report(result_);
+    }
+    for (std::thread& thread : threads) thread.join();
+    return result_;
+  }
+
+ private:
+  void work(unsigned job) {
+    const std::filesystem::path folder = options_.folder / fmt::format("job-{}", job);
+    while (true) {
+      const std::uint64_t seed = next_++;
+      if (seed > options_.last || is_over_) break;
+      fly(seed, folder);
+    }
+    --running_;
+  }
+
+  void fly(std::uint64_t seed, const std::filesystem::path& folder) {
+    const Plan plan = draw_plan(seed, scenarios_);
+    Verdict verdict = fly_world(plan, scenarios_, folder);
+    const bool is_twice = seed % options_.twice_every == 0;
+    if (is_twice) {
+      const std::uint64_t hash = fly_world(plan, scenarios_, folder).hash;
+      if (hash != verdict.hash)
+        verdict.findings.push_back(
+            fmt::format("same-trace: expected {:016x}, got {:016x}", verdict.hash, hash));
+    }
+    const std::lock_guard lock(mutex_);
+    ++result_.worlds;
+    result_.finished += verdict.is_finished;
+    result_.complete += static_cast<std::uint64_t>(verdict.complete);
+    result_.events += verdict.events;
+    result_.steps += verdict.steps;
+    result_.simulated_s += verdict.simulated_s;
+    result_.twice += is_twice;
+    result_.hash += Random(verdict.hash ^ seed).next();  // in any order
+    std::set<std::string> kinds;
+    for (const Fault& fault : plan.faults) kinds.insert(name_kind(fault.kind));
+    for (const std::string& kind : kinds) ++result_.faults[kind];
+    if (!verdict.findings.empty()) result_.failures[seed] = verdict.findings;
+    if (result_.failures.size() >= options_.most_failures) is_over_ = true;
+  }
+
+  const std::vector<FlownScenario>& scenarios_;
+  const SearchOptions& options_;
+  std::atomic<std::uint64_t> next_;
+  std::atomic<bool> is_over_{false};
+  std::atomic<int> running_{static_cast<int>(options_.jobs)};
+  std::chrono::steady_clock::time_point reported_ = std::chrono::steady_clock::now();
+  std::mutex mutex_;
+  SearchResult result_;  // under the mutex
+};
+
+/// Tries plans and keeps the smallest that still fails in the same way.
+class Shrinker {
+ public:
+  Shrinker(const Plan& plan, const std::vector<FlownScenario>& scenarios,
+           const std::filesystem::path& folder)
+      : scenarios_(scenarios), folder_(folder), plan_(plan) {
+    broken_ = name_properties(fly_world(plan, scenarios, folder).findings);
+  }
+
+  Plan run() {
+    for (bool has_shrunk = true; has_shrunk;) {
+      has_shrunk = false;
+      for (std::size_t i = plan_.faults.size(); i-- > 0;)
+        has_shrunk |= attempt([i](Plan& plan) {
+          plan.faults.erase(plan.faults.begin() + static_cast<std::ptrdiff_t>(i));
+        });
+      // Faults name programs by their number, so only the last one can go.
+      has_shrunk |=
+          plan_.programs.size() > 1 && attempt([](Plan& plan) {
+            plan.programs.pop_back();
+            const auto is_gone = [&](const Fault& fault) {
+              return fault.is_of_program() && fault.target >= plan.programs.size();
+            };
+            plan.faults.erase(std::remove_if(plan.faults.begin(), plan.faults.end(), is_gone),
+                              plan.faults.end());
+          });
+    }
+    attempt([](Plan& plan) { plan.link.loss = plan.link.reordering = 0; });
+    attempt([](Plan& plan) { plan.link = Link(); });
+    attempt([](Plan& plan) { plan.drift = plan.wall_offset_s = 0; });
+    attempt([](Plan& plan) { plan.has_files = false; });
+    for (std::size_t i = 0; i < plan_.programs.size(); ++i)
+      attempt([i](Plan& plan) { plan.programs[i].delay = Instant(0); });
+    return plan_;
+  }
+
+ private:
+  template <class Change>
+  bool attempt(const Change& change) {
+    Plan smaller = plan_;
+    change(smaller);
+    const auto broken = name_properties(fly_world(smaller, scenarios_, folder_).findings);
+    const bool is_same = std::any_of(broken.begin(), broken.end(),
+                                     [this](const auto& name) { return broken_.count(name) > 0; });
+    if (is_same) plan_ = smaller;
+    return is_same;
+  }
+
+  const std::vector<FlownScenario>& scenarios_;
+  const std::filesystem::path folder_;
+  Plan plan_;
+  std::set<std::string> broken_;
+};
+
+}  // namespace
+
+SearchResult search(const std::vector<FlownScenario>& scenarios, const SearchOptions& options,
+                    const std::function<void(const SearchResult&)>& report) {
+  return Search(scenarios, options).run(report);
+}
+
+Plan shrink(const Plan& plan, const std::vector<FlownScenario>& scenarios,
+            const std::filesystem::path& folder) {
+  return Shrinker(plan, scenarios, folder).run();
+}
+
+std::vector<std::string> tell(const Plan& plan, const std::vector<FlownScenario>& scenarios,
+                              const std::filesystem::path& folder) {
+  std::vector<std::string> lines = describe(plan);
+  if (lines.size() > kMostLines / 2) lines.resize(kMostLines / 2);
+  std::vector<std::string> events;
+  for (const std::string& line : fly_world(plan, scenarios, folder, true).trace)
+    if (line.find("status ") == std::string::npos) events.push_back(line);
+  const std::size_t room = kMostLines - lines.size();
+  const std::size_t left_out = events.size() > room ? events.size() - room + 1 : 0;
+  if (left_out > 0) lines.push_back(fmt::format("… {} earlier lines", left_out));
+  lines.insert(lines.end(), events.begin() + static_cast<std::ptrdiff_t>(left_out), events.end());
+  return lines;
+}
+
+}  // namespace sls::worlds

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "worlds/world.hpp"
+
+namespace sls::worlds {
+
+struct SearchOptions {
+  std::uint64_t first = 0;
+  std::uint64_t last = 9999;  ///< inclusive
+  unsigned jobs = 1;
+  std::uint64_t twice_every = 10;  ///< so many worlds are flown once, and one twice
+  std::filesystem::path folder;    ///< for files of worlds; each job has its own in it
+  std::size_t most_failures = 10;  ///< the search ends after these
+};
+
+/// What a search has found. It does not depend on the number of jobs, unless it ended early.
+struct SearchResult {
+  std::uint64_t worlds = 0;
+  std::uint64_t finished = 0;  ///< in which a flight was finished
+  std::uint64_t complete = 0;  ///< recordings
+  std::uint64_t events = 0;
+  std::uint64_t steps = 0;
+  double simulated_s = 0;
+  std::uint64_t twice = 0;                                     ///< flown twice, with equal traces
+  std::uint64_t hash = 0;                                      ///< of the traces of all worlds
+  std::map<std::string, std::uint64_t> faults;                 ///< worlds with this kind
+  std::map<std::uint64_t, std::vector<std::string>> failures;  ///< findings by seed
+};
+
+/// Flies the worlds of all seeds. `report(result)` is called every few seconds.
+SearchResult search(const std::vector<FlownScenario>& scenarios, const SearchOptions& options,
+                    const std::function<void(const SearchResult&)>& report);
+
+/// The smallest plan that still breaks a property that `plan` breaks: without faults, programs and
+/// noise that it does not need.
+Plan shrink(const Plan& plan, const std::vector<FlownScenario>& scenarios,
+            const std::filesystem::path& folder);
+
+/// The world of `plan` in at most 40 lines: what it is made of, and the events before the finding.
+std::vector<std::string> tell(const Plan& plan, const std::vector<FlownScenario>& scenarios,
+                              const std::filesystem::path& folder);
+
+}  // namespace sls::worlds

@@ -1,0 +1,314 @@
+#include "worlds/server_program.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <exception>
+#include <iterator>
+#include <utility>
+
+#include "common/bus/convert.hpp"
+#include "sim_server/messages.hpp"
+
+namespace sls::worlds {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr std::size_t kDatagram_bytes = 1400;
+constexpr std::size_t kBatch_bytes = 60'000;
+constexpr std::size_t kBatchSteps = 64;      // as RecordStream
+constexpr Instant kBatchTime = 20ms;         // likewise
+constexpr auto kLifespan = 200ms;            // of commands in real time
+constexpr std::size_t kMostCommands = 4096;  // as EventQueue
+
+void fly_one_after_another(std::size_t count, const std::function<void(std::size_t)>& work) {
+  for (std::size_t i = 0; i < count; ++i) work(i);
+}
+
+}  // namespace
+
+ServerProgram::ServerProgram(Setting& setting, Host& host, std::string name,
+                             std::vector<std::uint32_t> vehicle_ids)
+    : Program(setting, host, Role::kServer, std::move(name)),
+      vehicle_ids_(std::move(vehicle_ids)),
+      states_(kDatagram_bytes) {}
+
+void ServerProgram::start() {
+  // The order of the endpoints is that of sim_server/endpoints.hpp.
+  peer_.add_reader<Commands>([this](const Commands& sample, const Peer::Arrival& arrival) {
+    on_commands(sample, arrival);
+  });
+  peer_.add_writer<Parameters>();
+  peer_.add_reader<Participant>([this](const Participant& sample, const Peer::Arrival& arrival) {
+    note(sample, arrival);
+    if (core_ && core_->has_news(*this)) wake_soon();
+  });
+  peer_.add_reader<Parameters>(
+      [this](const Parameters& sample, const Peer::Arrival& arrival) { note(sample, arrival); });
+  peer_.add_reader<SimStatus>(
+      [this](const SimStatus& sample, const Peer::Arrival& arrival) { note(sample, arrival); });
+  peer_.add_writer<States>();
+  peer_.add_writer<RecordBatch>();
+  peer_.add_writer<SimStatus>();
+  peer_.add_writer<SimControlReply>();
+  peer_.add_reader<SimControl>([this](const SimControl& request, const Peer::Arrival&) {
+    events_.push_back(request);
+    wake_soon();
+  });
+  setting_.network.announce(peer_);
+  begin_run({});
+  wake_soon();
+}
+
+void ServerProgram::begin_run(sim::ServerCore::Start start) {
+  const config::Scenario& scenario = setting_.flown->scenario;
+  start.run_id = setting_.random.next() | 1u;
+  auto fleet =
+      std::make_unique<sim::Fleet>(scenario, vehicle_ids_, start.run_id, fly_one_after_another);
+  events_.erase(std::remove_if(events_.begin(), events_.end(),
+                               [](const Event& event) {
+                                 return std::holds_alternative<sim::CommandSample>(event);
+                               }),
+                events_.end());
+  batches_.emplace(kBatch_bytes, start.run_id);
+  states_.begin_run(start.run_id, scenario.sync.period_ns);
+  const Parameters parameters =
+      sim::make_parameters_message(start.run_id, vehicle_ids_, scenario, fleet->plant(), "world");
+  certificate_.emplace(record::make_row_format(parameters));
+  setting_.properties.on_run(*this, start.run_id, parameters);
+  published_steps_ = 0;
+  has_run_ended_ = false;
+  peer_.write(parameters);
+  say(fmt::format("run {:016x}", start.run_id));
+  sim::Outputs& outputs = *this;
+  core_ = std::make_unique<sim::ServerCore>(scenario, start, std::move(fleet), outputs, now());
+}
+
+// --- the main thread -----------------------------------------------------------------------------
+
+void ServerProgram::wake() {
+  if (linger_) return linger();
+  write_waiting();
+  if (core_->phase() != sim::ServerCore::Phase::kEnded) {
+    if (core_->has_news(*this)) core_->on_look(*this, now());
+    deliver_events();
+    core_->on_time(now());
+    if (core_->is_look_due(now())) core_->on_look(*this, now());
+  }
+  if (core_->phase() == sim::ServerCore::Phase::kEnded) end_run();
+  if (!process_.has_ended()) wake_at(linger_ ? now() : core_->next_deadline());
+}
+
+void ServerProgram::deliver_events() {
+  for (Event& event : std::exchange(events_, {})) {
+    if (auto* sample = std::get_if<sim::CommandSample>(&event))
+      core_->on_commands(*sample);
+    else
+      core_->on_request(std::get<SimControl>(event), *this, now());
+  }
+}
+
+void ServerProgram::end_run() {
+  write_waiting();
+  setting_.properties.on_run_end(core_->run_id(), core_->end() == sim::ServerCore::End::kFinished,
+                                 certificate_->finish());
+  if (core_->end() == sim::ServerCore::End::kReset)
+    return begin_run({0, false, core_->is_paused()});
+  if (!core_->is_known()) return exit(1, core_->error());
+  linger_.emplace(now(),
+                  core_->end() == sim::ServerCore::End::kFailed ? 0 : core_->expected_recorders(),
+                  sync::RecorderPatience());
+}
+
+/// As Server::linger.
+void ServerProgram::linger() {
+  if (!acknowledged_by_) {
+    sync::Membership& members = present_members();
+    const auto recorders = members.find(ParticipantRole::ROLE_RECORDER, core_->run_id());
+    const int done = members.count_done(ParticipantRole::ROLE_RECORDER, core_->run_id());
+    if (linger_->is_over(recorders, done, was_interrupted(), now()))
+      acknowledged_by_ = now() + 1s;
+    else if (const auto report = linger_->take_report(recorders, now()))
+      say(*report);
+    return wake_at(now() + 20ms);
+  }
+  const bool is_heard =
+      peer_.is_acknowledged(TopicId::kRecord) && peer_.is_acknowledged(TopicId::kStatus);
+  if (!is_heard && now() < *acknowledged_by_) return wake_at(now() + 20ms);
+  exit(core_->end() == sim::ServerCore::End::kFailed ? 1 : 0, core_->error());
+}
+
+void ServerProgram::write_waiting() {
+  while (!outbox_.empty()) {
+    const Item item = std::move(outbox_.front());
+    outbox_.pop_front();
+    if (const auto* status = std::get_if<SimStatus>(&item)) {
+      setting_.properties.on_status(*status, setting_.network);
+      if (setting_.trace.keeps_lines())
+        say(fmt::format("status {}: {} step {} {} {}", status->sample_index(),
+                        bus::to_string(status->phase()), status->step(), status->reason().c_str(),
+                        status->problem().c_str()));
+      peer_.write(*status);
+    } else if (const auto* reply = std::get_if<SimControlReply>(&item)) {
+      peer_.write(*reply);
+    } else if (const auto* line = std::get_if<sync::Line>(&item)) {
+      say(*line);
+    } else {
+      write_records(true);
+    }
+  }
+}
+
+// --- the middleware's thread ---------------------------------------------------------------------
+
+void ServerProgram::on_commands(const Commands& sample, const Peer::Arrival& arrival) {
+  if (!core_ || linger_) return;
+  if (is_realtime() && !ignores_lifespan_ && process_.host().wall() > arrival.written + kLifespan)
+    return;
+  sim::CommandSample received;
+  received.sender = arrival.sender;
+  received.arrived = {now(), process_.host().wall()};
+  received.written = arrival.written;
+  received.run_id = sample.run_id();
+  received.step = sample.step();
+  received.client_name = sample.client_name().c_str();
+  received.answers.resize(sample.vehicles().size());
+  for (std::size_t i = 0; i < received.answers.size(); ++i) {
+    sim::OfferedAnswer& offered = received.answers[i];
+    offered.run_id = received.run_id;
+    offered.step = received.step;
+    offered.client_name = received.client_name;
+    offered.vehicle_id = sample.vehicles()[i].vehicle_id();
+    bus::fill(offered.answer, sample.vehicles()[i]);
+  }
+  // As CoreLoop::pass_on.
+  if (!is_realtime() && events_.empty() &&
+      core_->phase() == sim::ServerCore::Phase::kAwaitingAnswers && !core_->has_news(*this)) {
+    core_->on_commands(received);
+    if (!outbox_.empty() || core_->phase() == sim::ServerCore::Phase::kEnded) wake_soon();
+    return wake_at(core_->next_deadline());
+  }
+  if (events_.size() < kMostCommands) events_.push_back(std::move(received));
+  wake_soon();
+}
+
+// --- outputs -------------------------------------------------------------------------------------
+
+sim::Moment ServerProgram::send_states(const sim::Fleet& fleet) {
+  const sim::Moment moment{now(), process_.host().wall()};
+  if (fleet.step() + 1 > published_steps_) {
+    published_steps_ = fleet.step() + 1;
+    setting_.properties.on_published(core_->run_id(), fleet.step());
+    if (setting_.on_step) setting_.on_step(fleet.step());
+  }
+  states_.make(
+      fleet, [](std::size_t) { return true; },
+      [this](const States& sample) { peer_.write(sample); });
+  return moment;
+}
+
+void ServerProgram::resend_states(const sim::Fleet& fleet,
+                                  const std::function<bool(std::size_t)>& is_wanted) {
+  states_.make(fleet, is_wanted, [this](const States& sample) { peer_.write(sample); });
+}
+
+void ServerProgram::record_step(const sim::Fleet& fleet) {
+  for (const model::StepRecord& record : fleet.records()) {
+    bus::fill(entries_.emplace_back(), record);
+    certificate_->add(record);
+  }
+  setting_.properties.on_recorded(core_->run_id(), fleet.records());
+  if (++steps_ >= kBatchSteps) return write_records(false);
+  if (steps_ > 1) return;
+  process_.run_at(setting_.timeline.now() + kBatchTime, [this, number = flush_number_] {
+    if (number == flush_number_ && !entries_.empty()) write_records(false);
+  });
+}
+
+void ServerProgram::record_late(const sim::Vehicle& vehicle, const sim::OfferedAnswer& offered) {
+  setting_.properties.on_late(core_->run_id());
+  model::StepRecord record;
+  record.vehicle_id = vehicle.id();
+  record.step = record.answered_step = offered.step;
+  record.kind = model::AnswerKind::kLate;
+  record.client_name = offered.client_name;
+  record.answer = offered.answer;
+  bus::fill(entries_.emplace_back(), record);
+}
+
+void ServerProgram::write_records(bool is_last) {
+  ++flush_number_;
+  batches_->make(entries_.data(), entries_.size(), is_last,
+                 [this](const RecordBatch& batch) { peer_.write(batch); });
+  written_ += entries_.size();
+  entries_.clear();
+  steps_ = 0;
+}
+
+// --- surroundings --------------------------------------------------------------------------------
+
+std::vector<sync::Member> ServerProgram::find_members(ParticipantRole role,
+                                                      std::uint64_t run_id) const {
+  return self().present_members().find(role, run_id);
+}
+
+std::vector<sync::Run> ServerProgram::find_other_runs() const {
+  return self().present_servers().runs(now());
+}
+
+bool ServerProgram::is_known_elsewhere(std::uint64_t run_id) const {
+  return self().present_servers().is_known(run_id, now());
+}
+
+bool ServerProgram::has_heard_every_claim() const {
+  const auto& claimed = self().present_servers();
+  for (const auto& peer : setting_.network.peers()) {
+    if (peer->process().has_ended() || peer->id() == id()) continue;
+    if (peer_.known().count(peer->id()) == 0) return false;  // not everybody was discovered
+    if (peer->process().name().rfind("server", 0) == 0 && !claimed.has_claimed(peer->id()))
+      return false;
+  }
+  return true;
+}
+
+sim::Neighbourhood ServerProgram::look(bool is_known) {
+  sim::Neighbourhood seen;
+  seen.participants = present_members().all();
+  for (const sync::Run& other : present_servers().runs(now())) {
+    seen.other_runs.insert(other.parameters.run_id());
+    for (const std::uint32_t vehicle : sync::list_vehicle_ids(other.parameters))
+      seen.other_vehicles.insert(vehicle);
+  }
+  for (const bus::PeerId& peer : peer_.matched_writers(TopicId::kCommand))
+    seen.command_writers[peer] = setting_.network.find(peer)->process().name();
+  seen.is_on_network = !setting_.is_one_machine;
+  seen.announcement_writers = peer_.matched_writers(TopicId::kParticipant);
+  seen.state_readers = peer_.matched_readers(TopicId::kState);
+  if (is_known && peer_.is_acknowledged(TopicId::kStatus) &&
+      peer_.is_acknowledged(TopicId::kParameters)) {
+    const auto& readers = peer_.matched_readers(TopicId::kStatus);
+    const auto& of_parameters = peer_.matched_readers(TopicId::kParameters);
+    std::set_intersection(readers.begin(), readers.end(), of_parameters.begin(),
+                          of_parameters.end(), std::inserter(informed_, informed_.end()));
+  }
+  seen.informed = informed_;
+  return seen;
+}
+
+std::string ServerProgram::replace_problems(const std::map<std::string, std::string>& found) {
+  std::string text;
+  for (const auto& [key, problem] : found) text += (text.empty() ? "" : "; ") + problem;
+  return text;
+}
+
+sim::Surroundings::Queues ServerProgram::queues() const {
+  return {written_, Peer::history_depth(TopicId::kRecord) / batches_->batches_of_step(), 0};
+}
+
+std::optional<std::chrono::nanoseconds> ServerProgram::command_lifespan() const {
+  if (!is_realtime()) return std::nullopt;
+  return kLifespan;
+}
+
+}  // namespace sls::worlds

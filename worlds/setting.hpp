@@ -1,0 +1,42 @@
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "common/config/scenario.hpp"
+#include "worlds/network.hpp"
+#include "worlds/properties.hpp"
+#include "worlds/trace.hpp"
+
+namespace sls::worlds {
+
+/// A scenario that worlds fly, and its undisturbed flight.
+struct FlownScenario {
+  config::Scenario scenario;
+  std::string certificate;      ///< of the flight in one process
+  std::uint64_t last_step = 0;  ///< of that flight
+};
+
+/// All that the programs of a world share. The world owns it.
+struct Setting {
+  Setting(std::uint64_t seed, bool keeps_lines)
+      : random(Random(~seed).next()),
+        trace(keeps_lines),
+        network(timeline, random.split()),
+        properties(timeline, trace) {}
+
+  Random random;
+  Timeline timeline;
+  Trace trace;
+  Network network;
+  const FlownScenario* flown = nullptr;
+  std::string folder;  ///< of its files; it is in no line of the trace
+  bool is_one_machine = false;
+  Properties properties;
+  /// Called when a server publishes a step for the first time.
+  std::function<void(std::uint64_t step)> on_step;
+  /// True if all programs have ended except foreign ones.
+  std::function<bool()> are_all_others_done;
+};
+
+}  // namespace sls::worlds

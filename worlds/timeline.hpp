@@ -1,0 +1,56 @@
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <utility>
+#include <vector>
+
+namespace sls::worlds {
+
+/// A moment of a world, since its begin; no program of the world sees it (host.hpp).
+using Instant = std::chrono::nanoseconds;
+
+/// The events of a world in the order of their moments; of equal ones the first that was added
+/// comes first.
+class Timeline {
+ public:
+  using Action = std::function<void()>;
+
+  Instant now() const { return now_; }
+  /// `when`: not before now.
+  void at(Instant when, Action action) {
+    events_.push_back({std::max(when, now_), number_++, std::move(action)});
+    std::push_heap(events_.begin(), events_.end(), is_later);
+  }
+  void after(Instant delay, Action action) { at(now_ + delay, std::move(action)); }
+
+  /// Does what is next; false if there is nothing before `end`.
+  bool step(Instant end) {
+    if (events_.empty() || events_.front().when >= end) return false;
+    std::pop_heap(events_.begin(), events_.end(), is_later);
+    const Event event = std::move(events_.back());
+    events_.pop_back();
+    now_ = event.when;
+    event.action();
+    return true;
+  }
+  std::uint64_t count() const { return number_; }
+
+ private:
+  struct Event {
+    Instant when;
+    std::uint64_t number;
+    Action action;
+  };
+  static bool is_later(const Event& a, const Event& b) {
+    return a.when != b.when ? a.when > b.when : a.number > b.number;
+  }
+
+  Instant now_{0};
+  std::uint64_t number_ = 0;
+  std::vector<Event> events_;
+};
+
+}  // namespace sls::worlds

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "worlds/timeline.hpp"
+
+namespace sls::worlds {
+
+/// All that happened in a world, as one number, and as lines if they are wanted.
+class Trace {
+ public:
+  explicit Trace(bool keeps_lines) : keeps_lines_(keeps_lines) {}
+
+  bool keeps_lines() const { return keeps_lines_; }
+  /// `who` says or does `what`.
+  void add(Instant now, std::string_view who, std::string_view what);
+  /// Counts an event without a line.
+  void add(std::uint64_t value) { mix(value); }
+  std::uint64_t hash() const { return hash_; }
+  const std::vector<std::string>& lines() const { return lines_; }
+
+ private:
+  void mix(std::uint64_t value) {
+    hash_ = (hash_ ^ value) * 0x100000001b3u;
+    hash_ ^= hash_ >> 29;
+  }
+  void mix(std::string_view text);
+
+  const bool keeps_lines_;
+  std::uint64_t hash_ = 0xcbf29ce484222325u;
+  std::vector<std::string> lines_;
+};
+
+}  // namespace sls::worlds

@@ -1,0 +1,87 @@
+#include "worlds/world_recording.hpp"
+
+#include <utility>
+
+#include "recorder/recording_reader.hpp"
+
+namespace sls::worlds {
+namespace {
+
+void add_row(std::map<std::uint32_t, StoredRecording::Rows>& rows, const record::StepRows& row) {
+  StoredRecording::Rows& of_vehicle = rows[row.vehicle_id];
+  of_vehicle.steps.push_back(row.step);
+  of_vehicle.hashes.push_back(hash_row(row));
+}
+
+StoredRecording read_recording(const std::filesystem::path& folder) {
+  const record::OpenedRecording opened = record::open_recording(folder);
+  const record::ManifestFile& manifest = opened.manifest();
+  StoredRecording stored;
+  stored.run_id = std::stoull(manifest.run_id, nullptr, 16);
+  stored.is_closed = manifest.outcome != "recording";
+  stored.claims.complete = manifest.complete;
+  stored.claims.outcome = manifest.outcome;
+  stored.claims.missing = manifest.missing;
+  stored.certificate = manifest.certificate;
+  record::StepReader reader(opened);
+  while (const auto row = reader.next_as_written())
+    if (row->has_state) add_row(stored.rows, *row);
+  return stored;
+}
+
+}  // namespace
+
+record::RecorderCore::Recorded FileRecording::close(const record::RunWatch::End& end,
+                                                    std::uint64_t refused) {
+  record::RecorderCore::Recorded recorded;
+  recorded.is_complete = recording_.finish(end.interruption, refused, end.outcome);
+  if (!recorded.is_complete) recorded.gaps = recording_.describe_gaps();
+  recorded.is_reset = recording_.is_reset();
+  recorded.last_step = recording_.last_complete_step();
+  return recorded;
+}
+
+MemoryRecording::MemoryRecording(StoredRecording& stored, const Parameters& parameters,
+                                 double flush_s, sync::Time now, Say say)
+    : stored_(stored), say_(std::move(say)), core_(parameters, 0, flush_s, now, *this) {}
+
+bool MemoryRecording::add(const record::StepRows& rows) {
+  certificate_.add(rows);
+  if (rows.has_state) add_row(unwritten_, rows);
+  return false;
+}
+
+void MemoryRecording::flush() {
+  for (auto& [vehicle, rows] : unwritten_) {
+    StoredRecording::Rows& kept = stored_.rows[vehicle];
+    kept.steps.insert(kept.steps.end(), rows.steps.begin(), rows.steps.end());
+    kept.hashes.insert(kept.hashes.end(), rows.hashes.begin(), rows.hashes.end());
+    rows = {};
+  }
+}
+
+record::RecorderCore::Recorded MemoryRecording::close(const record::RunWatch::End& end,
+                                                      std::uint64_t refused) {
+  stored_.claims = core_.on_end({end.interruption, end.outcome}, refused);
+  core_.flush();
+  stored_.certificate = certificate_.finish();
+  stored_.is_closed = true;
+  record::RecorderCore::Recorded recorded;
+  recorded.is_complete = stored_.claims.complete;
+  if (!recorded.is_complete) recorded.gaps = core_.describe_gaps();
+  recorded.is_reset = core_.has_phase(RunPhase::PHASE_RESET);
+  recorded.last_step = core_.last_complete_step();
+  return recorded;
+}
+
+std::vector<StoredRecording> read_recordings(const std::filesystem::path& folder) {
+  std::vector<StoredRecording> found;
+  if (std::filesystem::exists(folder / "manifest.json")) found.push_back(read_recording(folder));
+  if (!std::filesystem::exists(folder)) return found;
+  for (const auto& entry : std::filesystem::directory_iterator(folder))
+    if (entry.is_directory() && entry.path().filename().string().rfind("run-", 0) == 0)
+      found.push_back(read_recording(entry.path()));
+  return found;
+}
+
+}  // namespace sls::worlds
