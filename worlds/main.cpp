@@ -60,6 +60,7 @@ void print_result(const worlds::SearchResult& result, double wall_s) {
   for (const auto& [kind, count] : result.faults)
     faults += fmt::format("{}{} {}", faults.empty() ? "" : ", ", kind, count);
   std::cout << "worlds with a fault: " << faults << '\n';
+  for (const std::string& line : result.table.describe()) std::cout << line << '\n';
 }
 
 void print_story(const worlds::Plan& plan, const std::vector<worlds::FlownScenario>& scenarios,

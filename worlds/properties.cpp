@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "closed_loop/loss.hpp"
 #include "worlds/client_program.hpp"
 #include "worlds/recorder_program.hpp"
 #include "worlds/server_program.hpp"
@@ -65,6 +66,13 @@ bool Properties::is_any_finished() const {
                      [](const auto& item) { return item.second.is_finished; });
 }
 
+std::vector<FlightSummary> Properties::summarise_flights() const {
+  std::vector<FlightSummary> summaries;
+  for (const auto& [run_id, run] : runs_)
+    if (run.is_finished) summaries.push_back(run.summary);
+  return summaries;
+}
+
 // --- during the world ----------------------------------------------------------------------------
 
 void Properties::on_run(const Program& server, std::uint64_t run_id, const Parameters& parameters) {
@@ -76,6 +84,7 @@ void Properties::on_run(const Program& server, std::uint64_t run_id, const Param
 void Properties::on_published(std::uint64_t run_id, std::uint64_t) {
   Run& run = runs_[run_id];
   run.published = timeline_.now();
+  if (!run.began) run.began = run.published;
   run.is_stall_found = false;
 }
 
@@ -95,6 +104,8 @@ void Properties::on_recorded(std::uint64_t run_id, const std::vector<model::Step
                                     record.kind == model::AnswerKind::kRefused ||
                                     record.kind == model::AnswerKind::kNone);
     if (record.kind != model::AnswerKind::kAccepted) continue;
+    run.summary.worst_error_m =
+        std::max(run.summary.worst_error_m, closed_loop::calc_load_error(record));
     if (record.answered_step != record.step)
       find(fmt::format("answer: step {} has the answer to step {}", record.step,
                        record.answered_step));
@@ -121,6 +132,9 @@ void Properties::on_status(const SimStatus& status, const Network& network) {
   Run& run = runs_[status.run_id()];
   run.timing = status.timing().to_string();
   run.phase = status.phase();
+  run.summary.take_overs = status.counters().take_overs();
+  run.summary.resent = status.counters().resent();
+  run.summary.late = status.counters().held() + status.counters().fail_safe();
   if (status.reason().size() > 0) run.named = timeline_.now();
   if (run.phase != RunPhase::PHASE_RUNNING) return;
   check_stall(run, status.run_id());
@@ -166,6 +180,8 @@ void Properties::on_run_end(std::uint64_t run_id, bool is_finished, std::string 
   Run& run = runs_[run_id];
   run.has_ended = true;
   run.is_finished = is_finished;
+  if (run.began)
+    run.summary.duration_s = std::chrono::duration<double>(timeline_.now() - *run.began).count();
   run.certificate = std::move(certificate);
 }
 

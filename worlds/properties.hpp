@@ -36,6 +36,15 @@ struct StoredRecording {
   std::map<std::uint32_t, Rows> rows;  ///< by vehicle
 };
 
+/// What a user asks about a flight.
+struct FlightSummary {
+  double duration_s = 0;     ///< from the first state to the end, simulated
+  double worst_error_m = 0;  ///< of the load, from its reference
+  std::uint64_t take_overs = 0;
+  std::uint64_t resent = 0;
+  std::uint64_t late = 0;  ///< steps flown without a fresh answer
+};
+
 /// The content of a row that no late answer changes.
 std::uint64_t hash_row(const model::StepRecord& record);
 
@@ -63,6 +72,8 @@ class Properties {
   const std::vector<std::string>& findings() const { return findings_; }
   std::uint64_t steps() const { return steps_; }
   bool is_any_finished() const;
+  /// Those that were finished.
+  std::vector<FlightSummary> summarise_flights() const;
 
  private:
   /// A run as the world saw it.
@@ -80,7 +91,9 @@ class Properties {
     std::string timing;
     RunPhase phase = RunPhase::PHASE_WAITING;
     std::optional<Instant> published;  // the last step
-    Instant named{-1};                 // the last status with a reason
+    std::optional<Instant> began;      // the first step
+    FlightSummary summary;
+    Instant named{-1};  // the last status with a reason
     bool is_stall_found = false;
   };
 

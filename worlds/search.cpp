@@ -71,7 +71,8 @@ class Search {
     }
     const std::lock_guard lock(mutex_);
     ++result_.worlds;
-    result_.finished += verdict.is_finished;
+    result_.finished += !verdict.flights.empty();
+    result_.table.add(plan, verdict);
     result_.complete += static_cast<std::uint64_t>(verdict.complete);
     result_.events += verdict.events;
     result_.steps += verdict.steps;
@@ -150,6 +151,43 @@ class Shrinker {
 };
 
 }  // namespace
+
+void FlightTable::add(const Plan& plan, const Verdict& verdict) {
+  const std::size_t loss = plan.link.loss == 0 ? 0 : plan.link.loss <= 0.05 ? 1 : 2;
+  const Instant delay = plan.link.delay + plan.link.jitter / 2;
+  Cell& cell = cells[plan.hosts == 1 ? 0 : loss][plan.hosts == 1 || delay <= 1ms ? 0
+                                                 : delay <= 5ms                  ? 1
+                                                                                 : 2];
+  ++cell.worlds;
+  cell.finished += !verdict.flights.empty();
+  for (const FlightSummary& flight : verdict.flights) {
+    cell.take_overs += flight.take_overs;
+    cell.late += flight.late;
+    cell.durations.push_back(flight.duration_s);
+    cell.worst_error_m = std::max(cell.worst_error_m, flight.worst_error_m);
+  }
+}
+
+std::vector<std::string> FlightTable::describe() const {
+  std::vector<std::string> lines = {
+      "| loss | delay | worlds | finished | simulated s, median | worst | take-overs | late steps "
+      "| "
+      "worst error m |",
+      "| --- | --- | --- | --- | --- | --- | --- | --- | --- |"};
+  for (std::size_t loss = 0; loss < cells.size(); ++loss)
+    for (std::size_t delay = 0; delay < cells[loss].size(); ++delay) {
+      const Cell& cell = cells[loss][delay];
+      if (cell.worlds == 0) continue;
+      std::vector<double> sorted = cell.durations;
+      std::sort(sorted.begin(), sorted.end());
+      const double median = sorted.empty() ? 0 : sorted[sorted.size() / 2];
+      lines.push_back(fmt::format("| {} | {} | {} | {} | {:.3f} | {:.3f} | {} | {} | {:.4f} |",
+                                  kLosses[loss], kDelays[delay], cell.worlds, cell.finished, median,
+                                  sorted.empty() ? 0 : sorted.back(), cell.take_overs, cell.late,
+                                  cell.worst_error_m));
+    }
+  return lines;
+}
 
 SearchResult search(const std::vector<FlownScenario>& scenarios, const SearchOptions& options,
                     const std::function<void(const SearchResult&)>& report) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -20,6 +21,25 @@ struct SearchOptions {
   std::size_t most_failures = 10;  ///< the search ends after these
 };
 
+/// The flights of worlds with about the same network.
+struct FlightTable {
+  static constexpr std::array<const char*, 3> kLosses = {"0", "up to 5 %", "more"};
+  static constexpr std::array<const char*, 3> kDelays = {"up to 1 ms", "up to 5 ms", "more"};
+  struct Cell {
+    std::uint64_t worlds = 0;
+    std::uint64_t finished = 0;  ///< worlds with a finished flight
+    std::uint64_t take_overs = 0;
+    std::uint64_t late = 0;         ///< steps
+    std::vector<double> durations;  ///< of finished flights, simulated s
+    double worst_error_m = 0;
+  };
+  std::array<std::array<Cell, 3>, 3> cells;  ///< by loss and delay of the link
+
+  void add(const Plan& plan, const Verdict& verdict);
+  /// A line for each cell that has worlds.
+  std::vector<std::string> describe() const;
+};
+
 /// What a search has found. It does not depend on the number of jobs, unless it ended early.
 struct SearchResult {
   std::uint64_t worlds = 0;
@@ -32,6 +52,7 @@ struct SearchResult {
   std::uint64_t hash = 0;                                      ///< of the traces of all worlds
   std::map<std::string, std::uint64_t> faults;                 ///< worlds with this kind
   std::map<std::uint64_t, std::vector<std::string>> failures;  ///< findings by seed
+  FlightTable table;
 };
 
 /// Flies the worlds of all seeds. `report(result)` is called every few seconds.

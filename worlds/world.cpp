@@ -251,7 +251,7 @@ class World {
     verdict.simulated_s = std::chrono::duration<double>(setting_.timeline.now()).count();
     verdict.events = setting_.timeline.count();
     verdict.steps = setting_.properties.steps();
-    verdict.is_finished = setting_.properties.is_any_finished();
+    verdict.flights = setting_.properties.summarise_flights();
     for (const auto& program : programs_)
       if (program->role() == Role::kRecorder)
         verdict.complete += static_cast<const RecorderProgram&>(*program).is_complete();

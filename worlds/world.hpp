@@ -18,9 +18,9 @@ struct Verdict {
   std::vector<std::string> trace;     ///< if it was wanted
   double simulated_s = 0;
   std::uint64_t events = 0;
-  std::uint64_t steps = 0;   ///< flown by all servers
-  bool is_finished = false;  ///< a flight was finished
-  int complete = 0;          ///< recordings
+  std::uint64_t steps = 0;             ///< flown by all servers
+  std::vector<FlightSummary> flights;  ///< those that were finished
+  int complete = 0;                    ///< recordings
 };
 
 /// Flies the world of `plan`. Its files, if it has some, are in `folder` until it is over.
