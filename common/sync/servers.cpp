@@ -147,8 +147,7 @@ bool Servers::is_known(std::uint64_t run_id, Time now) const {
   const auto owner = find_owner(run_id);
   if (!owner) return false;
   const Server& known = servers_.at(*owner);
-  return known.parameters && known.parameters->run_id() == run_id &&
-         is_present_run(*owner, known, now);
+  return known.parameters->run_id() == run_id && is_present_run(*owner, known, now);
 }
 
 bool Servers::may_fly(std::uint64_t run_id, std::uint32_t vehicle_id) const {

@@ -7,7 +7,6 @@
 namespace sls::record {
 
 std::string describe(const MissingSamples& missing) {
-  if (missing.empty()) return "nothing missing";
   std::uint64_t steps = missing.further_samples;
   for (const MissingSteps& gap : missing.listed) steps += gap.to - gap.from + 1;
   const MissingSteps& first = missing.listed.front();

@@ -29,7 +29,7 @@ struct MissingSamples {
   bool empty() const { return listed.empty(); }
 };
 
-/// "3 samples missing, first sls/reference step 123 of vehicle 0".
+/// "3 samples missing, first sls/reference step 123 of vehicle 0"; `missing` is not empty.
 std::string describe(const MissingSamples& missing);
 
 /// Collects the gaps. Those of a topic of a vehicle that follow each other are one.

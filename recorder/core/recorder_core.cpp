@@ -26,18 +26,9 @@ RecorderCore::RecorderCore(Options options)
 
 RecorderCore::Act RecorderCore::look(const sync::Servers& servers, const Now& now) {
   deadline_ = now.time + kLookTime;
-  switch (phase_) {
-    case Phase::kFinding:
-      return find(servers, now);
-    case Phase::kRecording:
-    case Phase::kClosing:
-      return watch(servers, now);
-    case Phase::kOpening:  // on_opened and on_recorded end these
-    case Phase::kClosed:
-    case Phase::kEnded:
-      break;
-  }
-  return Act::kNone;
+  if (phase_ == Phase::kFinding) return find(servers, now);
+  if (phase_ == Phase::kRecording || phase_ == Phase::kClosing) return watch(servers, now);
+  return Act::kNone;  // on_opened and on_recorded end the other phases
 }
 
 // --- which run -----------------------------------------------------------------------------------

@@ -188,7 +188,8 @@ std::string RecordingCore::describe_gaps() const {
   if (!gaps_.missing().empty()) append(describe(gaps_.missing()));
   if (claims_.refused_samples > 0)
     append(fmt::format("{} samples lost because the queue was full", claims_.refused_samples));
-  return text.empty() ? "the run has not ended" : text;
+  if (text.empty()) return "the run has not ended";
+  return text;
 }
 
 }  // namespace sls::record

@@ -147,7 +147,7 @@ void AnswerCheck::check_stage(Vehicle& vehicle, const OfferedAnswer& offered, Se
   const bool is_over = stage >= vehicle.mission.size();
   const auto* after =
       is_over ? nullptr : std::get_if<config::LeaveAfter>(&vehicle.mission[stage].leave);
-  if ((!is_over && !after) || offered.step < vehicle.stage_start_step) return;
+  if (!is_over && !after) return;
   const std::int64_t duration_ns = is_over ? 0 : after->duration_ns;
   const auto steps = static_cast<std::int64_t>(offered.step - vehicle.stage_start_step);
   if (steps * period_ns_ <= duration_ns + kStageTolerance_ns) return;

@@ -148,7 +148,7 @@ Verdict CommandGate::judge(const OfferedAnswer& offered, const bus::PeerId& send
   }
   client->held = offered;
   settle();
-  return accepted_ && accepted_from_ == sender ? Verdict::kAccepted : Verdict::kHeld;
+  return accepted_ ? Verdict::kAccepted : Verdict::kHeld;  // an earlier one was not awaited
 }
 
 void CommandGate::note_refusal(Client& client, const OfferedAnswer& offered, Defect defect) {

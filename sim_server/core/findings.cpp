@@ -51,8 +51,8 @@ bool Findings::lasts_despite_losses(const bus::PeerId& peer, const std::string& 
                                     bool is_informed) {
   if (!is_on_network_) return lasts(peer, kind, kPatience);
   // Another key, because the shorter patience begins when the participant is informed.
-  return is_informed ? lasts(peer, kind + " informed", kPatienceWithInformed)
-                     : lasts(peer, kind, kPatienceOnNetwork);
+  if (is_informed) return lasts(peer, kind + " informed", kPatienceWithInformed);
+  return lasts(peer, kind, kPatienceOnNetwork);
 }
 
 bool Findings::has_any(const bus::PeerId& peer) const {
@@ -78,11 +78,13 @@ std::string describe_field(const sync::Member& member, const char* field,
 }
 
 std::string to_words(const std::string& sha256) {
-  return sha256.empty() ? "none" : config::to_printable(sha256, 64);
+  if (sha256.empty()) return "none";
+  return config::to_printable(sha256, 64);
 }
 
 std::string to_words(std::uint64_t run_id) {
-  return run_id == 0 ? "0" : fmt::format("{:016x}", run_id);
+  if (run_id == 0) return "0";
+  return fmt::format("{:016x}", run_id);
 }
 
 }  // namespace sls::sim

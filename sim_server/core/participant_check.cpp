@@ -13,16 +13,15 @@
 namespace sls::sim {
 namespace {
 
-bool flies_any(const Participant& controller, const std::vector<std::uint32_t>& ids) {
+template <class Ids>
+bool flies_any(const Participant& controller, const Ids& ids) {
   return std::any_of(ids.begin(), ids.end(),
                      [&](std::uint32_t id) { return sync::flies_vehicle(controller, id); });
 }
 
 /// True if nothing but chance decides which of the two flies a vehicle.
 bool are_alike(const Participant& a, const Participant& b) {
-  const auto& ids = a.vehicle_ids();
-  return a.name() == b.name() && a.strength() == b.strength() &&
-         flies_any(b, {ids.begin(), ids.end()});
+  return a.name() == b.name() && a.strength() == b.strength() && flies_any(b, a.vehicle_ids());
 }
 
 bool has_this_contract(const Participant& participant) {
@@ -138,11 +137,12 @@ void ParticipantCheck::look_at(const sync::Member& member, const Neighbourhood& 
 void ParticipantCheck::look_at_role(const sync::Member& member,
                                     const Neighbourhood& neighbourhood) {
   const ParticipantRole role = member.announcement.role();
-  const std::string name = member.announcement.name().to_string(),
-                    host = member.announcement.host().to_string();
-  for (const auto& [field, text] : {std::pair("name", name), std::pair("host", host)})
+  const auto check_text = [&](const char* field, const std::string& text) {
     if (!config::is_utf8(text))
       findings_.add(member, field, field, "UTF-8", "'" + config::to_printable(text, 64) + "'");
+  };
+  check_text("name", member.announcement.name().to_string());
+  check_text("host", member.announcement.host().to_string());
   if (role != ParticipantRole::ROLE_CONTROLLER && role != ParticipantRole::ROLE_RECORDER)
     findings_.add(member, "role", "role", "controller or recorder",
                   std::to_string(static_cast<int>(role)));
@@ -180,10 +180,11 @@ void ParticipantCheck::look_at_readiness(const sync::Member& member,
   // One that is informed knows our endpoints (domain_view.cpp).
   const bool is_informed = missing.empty() && neighbourhood.informed.count(member.peer) > 0;
   if (!findings_.lasts_despite_losses(member.peer, kind, is_informed)) return;
-  findings_.add(member.peer, kind,
-                missing.empty()
-                    ? describe_field(member, "ready", "true, as its endpoints are matched", "false")
-                    : describe_participant(member) + ": expected " + missing + ", got none");
+  if (missing.empty())
+    findings_.add(member, kind, "ready", "true, as its endpoints are matched", "false");
+  else
+    findings_.add(member.peer, kind,
+                  describe_participant(member) + ": expected " + missing + ", got none");
 }
 
 /// The announced vehicles that no server flies, in words.

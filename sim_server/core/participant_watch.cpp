@@ -84,20 +84,22 @@ void ParticipantWatch::report_silent_recorder(sync::Time now) {
   report_.announce(fmt::format("step {}: {}", fleet_.step(), silent), now);
 }
 
+std::string ParticipantWatch::name_awaited_controller(const Vehicle& vehicle) const {
+  const auto client = vehicle.gate.awaited_client();
+  if (!client && vehicle.last_client().empty()) return "controller (none is ready)";
+  if (!client) return fmt::format("controller '{}' (gone)", vehicle.last_client());
+  std::string name =
+      fmt::format("controller '{}'{}", client->name, describe_place(roster_, client->peer));
+  if (!client->is_gone && report_.problem.empty())
+    name += check_.answers().describe_rejections(client->peer);
+  return name;
+}
+
 std::string ParticipantWatch::name_awaited_controllers() const {
   std::map<std::string, std::vector<std::uint32_t>> awaited;
-  for (const auto& vehicle : fleet_.vehicles()) {
-    if (vehicle->gate.accepted()) continue;
-    const auto client = vehicle->gate.awaited_client();
-    const std::string& last = vehicle->last_client();
-    const bool is_there = client && !client->is_gone && report_.problem.empty();
-    awaited[client         ? fmt::format("controller '{}'{}{}", client->name,
-                                         describe_place(roster_, client->peer),
-                                 is_there ? check_.answers().describe_rejections(client->peer) : "")
-            : last.empty() ? std::string("controller (none is ready)")
-                           : fmt::format("controller '{}' (gone)", last)]
-        .push_back(vehicle->id());
-  }
+  for (const auto& vehicle : fleet_.vehicles())
+    if (!vehicle->gate.accepted())
+      awaited[name_awaited_controller(*vehicle)].push_back(vehicle->id());
   std::string names;
   for (const auto& [name, ids] : awaited)
     names += (names.empty() ? "" : ", ") + name + fleet_.describe(ids);

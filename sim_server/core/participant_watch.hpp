@@ -51,6 +51,7 @@ class ParticipantWatch {
 
  private:
   std::map<bus::PeerId, Answering> collect_answering(bool awaits_answers);
+  std::string name_awaited_controller(const Vehicle& vehicle) const;
 
   const std::uint64_t run_id_;
   const std::string scenario_sha256_;

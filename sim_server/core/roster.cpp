@@ -24,8 +24,10 @@ std::string describe_gone(const Entry& entry) {
 /// "controller", "2 controllers (1 ready; 'client' on host: not ready)" …
 std::string name_missing_role(const char* role, int expected, int ready,
                               const std::string& details) {
-  std::string text = expected == 1 ? role : fmt::format("{} {}s ({} ready)", expected, role, ready);
-  return details.empty() ? text : text + " [" + details + "]";
+  std::string text = role;
+  if (expected != 1) text = fmt::format("{} {}s ({} ready)", expected, role, ready);
+  if (!details.empty()) text += " [" + details + "]";
+  return text;
 }
 
 /// The recorders that were ready when the flight began. The most advanced of the others replace
@@ -161,9 +163,11 @@ std::string name_silent_recorder(const Roster& roster, std::uint64_t step,
 }
 
 std::string describe_place(const Roster& roster, const bus::PeerId& peer) {
-  for (const Entry& entry : roster.controllers)
-    if (entry.peer == peer)
-      return entry.is_gone ? " (gone)" : " on " + entry.announcement.host().to_string();
+  for (const Entry& entry : roster.controllers) {
+    if (!(entry.peer == peer)) continue;
+    if (entry.is_gone) return " (gone)";
+    return " on " + entry.announcement.host().to_string();
+  }
   return " on ?";
 }
 

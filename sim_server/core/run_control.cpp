@@ -17,7 +17,8 @@ std::string name_operator(const SimControl& request) {
   std::replace_if(
       name.begin(), name.end(), [](unsigned char letter) { return letter < ' ' || letter == 0x7f; },
       '?');
-  return name.empty() ? "an operator without a name" : name;
+  if (name.empty()) name = "an operator without a name";
+  return name;
 }
 
 std::string describe_progress(std::uint64_t done, std::uint64_t steps) {
@@ -65,19 +66,22 @@ std::string RunControl::find_refusal(const SimControl& request) const {
   if (is_reset_requested_ && request.action() != ControlAction::ACTION_STOP &&
       request.action() != ControlAction::ACTION_RESET)
     return "the run is about to end: " + last_event_;
-  const std::string busy = stepping_ ? "a step request is being carried out: " +
-                                           describe_progress(stepping_->done, stepping_->steps)
-                                     : "";
+  std::string busy;
+  if (stepping_)
+    busy = "a step request is being carried out: " +
+           describe_progress(stepping_->done, stepping_->steps);
   switch (request.action()) {
     case ControlAction::ACTION_START:
     case ControlAction::ACTION_RESUME:
-      return is_paused_ ? busy : "not paused";
+      if (!is_paused_) return "not paused";
+      return busy;
     case ControlAction::ACTION_PAUSE:
       if (stepping_) return stepping_->cut_short_by.empty() ? "" : "already paused";
       return is_paused_ ? "already paused" : "";
     case ControlAction::ACTION_STEP:
       if (!is_paused_) return "not paused";
-      return request.steps() < 1 ? "steps: expected at least 1, got 0" : busy;
+      if (request.steps() < 1) return "steps: expected at least 1, got 0";
+      return busy;
     case ControlAction::ACTION_RESET:
     case ControlAction::ACTION_STOP:
       return "";
@@ -144,11 +148,11 @@ std::optional<SimControlReply> RunControl::stepped(std::uint64_t step) {
                                         describe_progress(stepping_->done, stepping_->steps)));
 }
 
-std::vector<SimControlReply> RunControl::end(std::uint64_t step, const std::string& reason) {
+std::optional<SimControlReply> RunControl::end(std::uint64_t step, const std::string& reason) {
   if (!end_reason_) end_reason_ = reason;
-  if (!stepping_) return {};
-  return {close_step_request(
-      step, fmt::format("{}: {}", describe_progress(stepping_->done, stepping_->steps), reason))};
+  if (!stepping_) return std::nullopt;
+  return close_step_request(step,
+                            describe_progress(stepping_->done, stepping_->steps) + ": " + reason);
 }
 
 SimControlReply RunControl::close_step_request(std::uint64_t step, const std::string& refusal) {

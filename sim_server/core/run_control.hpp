@@ -36,9 +36,9 @@ class RunControl {
   /// request that is then complete, or that a pause ends here.
   std::optional<SimControlReply> stepped(std::uint64_t step);
 
-  /// Replies to requests still open when the run ends at `step` (accepted: false, with `reason`).
-  /// Later requests are refused.
-  std::vector<SimControlReply> end(std::uint64_t step, const std::string& reason);
+  /// Returns the reply to a step request still open when the run ends at `step` (accepted: false,
+  /// with `reason`). Later requests are refused.
+  std::optional<SimControlReply> end(std::uint64_t step, const std::string& reason);
 
   bool is_reset_requested() const { return is_reset_requested_; }
   bool is_stop_requested() const { return is_stop_requested_; }

@@ -214,8 +214,8 @@ void ServerCore::keep_house(Surroundings& around, sync::Time now) {
 void ServerCore::end_run(End end, RunPhase phase, const std::string& reason, sync::Time now) {
   const bool is_step_published = std::exchange(phase_, Phase::kEnded) == Phase::kAwaitingAnswers;
   end_ = end;
-  for (const SimControlReply& reply : parts_.control.end(parts_.fleet.step(), reason))
-    parts_.outputs.send(reply);
+  if (const auto reply = parts_.control.end(parts_.fleet.step(), reason))
+    parts_.outputs.send(*reply);
   // Before the claim is settled no participant has joined, so nothing is published.
   if (!parts_.report.has_published()) return;
   if (is_step_published) {

@@ -67,12 +67,13 @@ void Vehicle::complete_record() {
                  : offered       ? AnswerKind::kRefused
                                  : AnswerKind::kNone;
   record_.answered_step = record_.step;
-  record_.client_name = offered ? offered->client_name : "";
-  record_.answer = offered ? offered->answer : model::Answer();
+  const OfferedAnswer known = offered.value_or(OfferedAnswer());
+  record_.client_name = known.client_name;
+  record_.answer = known.answer;
 }
 
 bool Vehicle::is_finished() const {
-  return is_settled_ && record_.kind == AnswerKind::kAccepted &&
+  return record_.kind == AnswerKind::kAccepted &&
          record_.answer.mission == model::MissionPhase::kFinished;
 }
 

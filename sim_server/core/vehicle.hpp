@@ -51,7 +51,7 @@ class Vehicle {
   /// Completes the record of a step that is not settled, because the run ends: with the answer that
   /// was accepted or refused, if there is one.
   void complete_record();
-  /// True if it is settled and its answer ends the mission.
+  /// True if the answer in its record, which must be settled, ends the mission.
   bool is_finished() const;
   /// Age of its force: periods since the state that it answers.
   std::uint64_t calc_age() const { return record_.step - record_.answered_step; }

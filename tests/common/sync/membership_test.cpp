@@ -41,6 +41,8 @@ TEST_F(MembershipTest, ListsTheParticipantsOfARunUntilTheyLeave) {
   done.done(true);
   EXPECT_EQ(members_.count_done(kController, kRun), 0);
   note(done, 2);
+  EXPECT_EQ(members_.count_done(ParticipantRole::ROLE_RECORDER, kRun), 0);
+  EXPECT_EQ(members_.count_done(kController, kRun + 1), 0);
   members_.set_present({peer(2)});
   EXPECT_FALSE(find());
   EXPECT_EQ(members_.count_done(kController, kRun), 1) << "also after it has left";

@@ -58,7 +58,9 @@ TEST(RecordersEndTest, AfterAStopSignalProgressBuysNoTime) {
 TEST(RecordersEndTest, TheMissingOneIsNamedAfterASecondAndThenEveryFive) {
   RecordersEnd end(at(0), 1, {10, 60});
   EXPECT_FALSE(end.take_report(recorder_at(5, 0), at(999)));
-  EXPECT_EQ(end.take_report(recorder_at(5, 0), at(1000)),
+  auto recorders = recorder_at(5, 0);
+  recorders.push_back(recorder_at(9, 0, true).front());  // it is done
+  EXPECT_EQ(end.take_report(recorders, at(1000)),
             "waiting for: recorder 'pilot' on here to finish (9 s left)");
   EXPECT_FALSE(end.take_report(recorder_at(5, 0), at(5999)));
   EXPECT_EQ(end.take_report({}, at(6000)), "waiting for: recorder (gone) to finish (4 s left)");

@@ -48,6 +48,8 @@ TEST_F(ServersTest, TheRunThatIsAheadIsJoinedThenTheOneWithTheLowerId) {
   EXPECT_EQ(joinable(0), kRun);
   servers_.note(status(kLowerRun, RunPhase::PHASE_PAUSED), kStranger, at(0));
   EXPECT_EQ(joinable(0), kLowerRun) << "as far as a running one";
+  servers_.note(status(kRun, kWaiting), kServer, at(0));
+  EXPECT_EQ(joinable(0), kLowerRun);
   servers_.set_present({kServer});
   EXPECT_EQ(joinable(0), kRun);
   EXPECT_EQ(servers_.find_status(kLowerRun)->phase(), RunPhase::PHASE_PAUSED)
@@ -89,8 +91,22 @@ TEST_F(ServersTest, OnlyTheFirstServerOfARunCounts) {
   EXPECT_EQ(servers_.runs(at(2)).front().server, kServer);
 }
 
+TEST_F(ServersTest, AServerThatClaimsTheRunOfAnotherOneIsReportedToo) {
+  servers_.note(claim(kLowerRun, {kVehicle}), kServer, at(0));
+  servers_.note(claim(kRun, {kVehicle}), kReplacement, at(0));
+  servers_.note(claim(kRun, {kVehicle}), kStranger, at(1));
+  const auto impostors = servers_.take_impostors();
+  ASSERT_EQ(impostors.size(), 1u);
+  EXPECT_EQ(impostors[0].sender, kStranger);
+  EXPECT_EQ(impostors[0].owner, kReplacement);
+  EXPECT_STREQ(impostors[0].topic, "sls/parameters");
+}
+
 TEST_F(ServersTest, AStatusThatComesBeforeTheClaimOfItsRunIsFoundOutByTheClaim) {
   EXPECT_TRUE(servers_.note(status(kRun, RunPhase::PHASE_FINISHED), kStranger, at(0)));
+  EXPECT_TRUE(servers_.runs(at(0)).empty());
+  EXPECT_FALSE(servers_.has_claimed(kStranger));
+  EXPECT_FALSE(servers_.has_claimed(kServer));
   EXPECT_TRUE(servers_.take_impostors().empty());
   servers_.note(claim(kRun, {kVehicle}), kServer, at(1));
   EXPECT_EQ(servers_.take_impostors().size(), 1u);
@@ -136,6 +152,9 @@ TEST_F(ServersTest, AfterManyResetsTheLastRunIsFoundWhicheverTopicComesFirst) {
     ASSERT_TRUE(servers.find_status(kLast - 1));
     EXPECT_EQ(servers.find_status(kLast - 1)->phase(), RunPhase::PHASE_RESET);
     EXPECT_EQ(servers.find_joinable(kVehicle, at(0))->parameters.run_id(), kLast);
+    EXPECT_TRUE(servers.is_known(kLast, at(0)));
+    EXPECT_FALSE(servers.is_known(kLast - 1, at(0))) << "it is over";
+    EXPECT_FALSE(servers.is_known(kLast + 1, at(0)));
   }
 }
 
@@ -166,6 +185,16 @@ TEST_F(ServersTest, OnlyAServerThatComesAfterTheSilenceBeganIsASuccessor) {
   EXPECT_EQ(successor(2800), kRun + 2);
 }
 
+TEST_F(ServersTest, AServerWithoutAStatusIsSilentAndAnyOtherReplacesIt) {
+  servers_.note(claim(kRun, {kVehicle}), kServer, at(0));
+  const sync::Run run = servers_.runs(at(0)).front();
+  EXPECT_EQ(servers_.find_last_heard(kRun), std::nullopt);
+  EXPECT_TRUE(servers_.is_silent(kRun, at(0)));
+  servers_.note(claim(kRun + 1, {kVehicle}), kReplacement, at(1));
+  servers_.note(status(kRun + 1, kWaiting), kReplacement, at(1));
+  EXPECT_EQ(servers_.find_successor(run, {kVehicle}, at(1))->server, kReplacement);
+}
+
 TEST_F(ServersTest, AServerDoesNotMeetItself) {
   servers_.note(claim(kRun, {kVehicle}), kSelf, at(0));
   servers_.note(status(kRun, kRunning), kSelf, at(0));
@@ -181,6 +210,7 @@ TEST_F(ServersTest, OthersCannotFillTheMemory) {
   for (const bus::PeerId& stranger : present)
     servers_.note(claim(1000u + stranger.bytes[0], {kVehicle}), stranger, at(0));
   EXPECT_EQ(servers_.runs(at(0)).size(), Servers::kMostServers);
+  EXPECT_FALSE(servers_.note(status(kRun, kRunning), kServer, at(0))) << "no room";
   servers_.set_present({kServer});
   servers_.note(claim(kRun, {kVehicle}), kServer, at(0));
   EXPECT_EQ(servers_.runs(at(0)).size(), 1u) << "one that has left makes room";

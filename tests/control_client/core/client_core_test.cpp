@@ -87,6 +87,7 @@ TEST_F(ClientCoreTest, TheWaitBeginsWithTheFirstLook) {
 TEST_F(ClientCoreTest, JoinsARunOnceItsClaimIsSettledAndIsReadyOnceItSeesTheServer) {
   servers_->note(claim(kRun, {3, kVehicle}), kServer, at(0));
   EXPECT_EQ(look(0), Act::kNone);
+  EXPECT_TRUE(core_->list_flown_ids().empty());
   serve(kRun, kServer, 20, RunPhase::PHASE_WAITING);
   EXPECT_EQ(look(20), Act::kBegin);
   EXPECT_EQ(core_->phase(), Phase::kFlying);
@@ -113,6 +114,14 @@ TEST_F(ClientCoreTest, AnnouncesWhatItFlies) {
   serve(kRun, kServer, 40, RunPhase::PHASE_FINISHED);
   look(40);
   EXPECT_TRUE(is(kRun, {kVehicle}, false, true));
+}
+
+TEST_F(ClientCoreTest, FollowsTheLastOfManyResetsAlthoughItsOwnRunIsForgotten) {
+  join();
+  const std::uint64_t last = kRun + Servers::kMostRuns;
+  for (std::uint64_t run_id = kRun + 1; run_id <= last; ++run_id) serve(run_id, kServer, 20);
+  EXPECT_EQ(look(20), Act::kBegin);
+  EXPECT_EQ(core_->run()->parameters.run_id(), last);
 }
 
 TEST_F(ClientCoreTest, LooksMoreOftenWhileItHasNoRun) {

@@ -86,6 +86,7 @@ class RecorderCoreTest : public testing::Test {
 
 TEST_F(RecorderCoreTest, WaitsAMinuteForAServerAndSaysSo) {
   EXPECT_EQ(look(0), Act::kNone);
+  EXPECT_FALSE(core_->is_ready());
   EXPECT_EQ(core_->next_deadline(), at(5));
   look(1499);
   EXPECT_EQ(said_, "");
@@ -120,6 +121,7 @@ TEST_F(RecorderCoreTest, RecordsTheRunWithItsVehicle) {
 TEST_F(RecorderCoreTest, AnnouncesUntilTheRecordingIsClosed) {
   serve(kRun, kServer, 0);
   open(0);
+  EXPECT_FALSE(core_->is_ready());
   EXPECT_EQ(look(5), Act::kAnnounce) << "it hears the server";
   EXPECT_TRUE(core_->is_ready());
   EXPECT_EQ(look(500), Act::kNone);
@@ -155,6 +157,19 @@ TEST_F(RecorderCoreTest, RecordsTheRunAfterAResetIntoASubfolder) {
   serve(kRun + 1, kServer, 40, RunPhase::PHASE_WAITING);
   open(40);
   EXPECT_EQ(core_->place(), Place::kSubfolder);
+  EXPECT_EQ(core_->run()->parameters.run_id(), kRun + 1);
+}
+
+TEST_F(RecorderCoreTest, ARunWhoseServerHasBegunAnotherOneWasResetAlsoWithoutAStatusThatSaysSo) {
+  serve(kRun, kServer, 0);
+  open(0);
+  serve(kRun + 1, kServer, 1500);
+  Act act = Act::kNone;
+  for (std::int64_t ms = 20; act != Act::kClose && ms < 9000; ms += 20) act = look(ms);
+  EXPECT_EQ(look(2020, "", true), Act::kReport);
+  report(cut_);
+  EXPECT_NE(said_.find("I out: run " + kRunText + " ended by a reset: a gap\n"), said_.npos);
+  open(2040);
   EXPECT_EQ(core_->run()->parameters.run_id(), kRun + 1);
 }
 

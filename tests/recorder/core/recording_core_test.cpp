@@ -113,14 +113,16 @@ TEST_F(RecordingCoreTest, EveryVehicleIsWaitedFor) {
   Parameters parameters = make_parameters();
   set_vehicles(parameters, {0, 7});
   begin(0, parameters);
-  receive({make_entry(0, 0), make_entry(1, 0)});
+  receive({make_entry(0, 0), make_bare_entry(1)});
   EXPECT_EQ(core_->last_complete_step(), -1);
   receive({make_entry(0, 7)}, true);
   EXPECT_EQ(core_->last_complete_step(), 0);
   tell(kFinished, 1);
   const Claims claims = end();
-  EXPECT_EQ(to_text(claims.missing), "state 1-1 command 1-1 reference 1-1 ");
+  EXPECT_EQ(to_text(claims.missing),
+            "state 1-1 command 1-1 reference 1-1 command 1-1 reference 1-1 ");
   EXPECT_EQ(claims.missing.listed[0].vehicle_id, 7u);
+  EXPECT_EQ(claims.missing.listed[3].vehicle_id, 0u) << "its answer";
 }
 
 TEST_F(RecordingCoreTest, SamplesOfOtherRunsAreIgnored) {
@@ -158,6 +160,7 @@ TEST_F(RecordingCoreTest, MissingIsWhatTheRunHadAndTheRecordingHasNot) {
   RecordEntry refused = make_entry(2);
   refused.kind(AnswerKind::ANSWER_REFUSED);
   const RecordEntry e0 = make_entry(0), e1 = make_entry(1), e2 = make_entry(2), e6 = make_entry(6);
+  const RecordEntry bare1 = make_bare_entry(1), bare2 = make_bare_entry(2);
   struct Case {
     const char* what;
     Entries entries;
@@ -170,11 +173,16 @@ TEST_F(RecordingCoreTest, MissingIsWhatTheRunHadAndTheRecordingHasNot) {
            {"a stretch", {e0, e1, e6}, kFinished, 6, "state 2-5 command 2-5 reference 2-5 "},
            {"all before a late join", {e2}, kFinished, 2, "state 0-1 command 0-1 reference 0-1 "},
            {"the end", {e0, e1}, kFinished, 4, "state 2-4 command 2-4 reference 2-4 "},
-           {"an answer", {e0, make_bare_entry(1), e2}, kFinished, 2, "command 1-1 reference 1-1 "},
-           {"the last one", {e0, make_bare_entry(1)}, kFinished, 1, "command 1-1 reference 1-1 "},
+           {"an answer", {e0, bare1, e2}, kFinished, 2, "command 1-1 reference 1-1 "},
+           {"two answers",
+            {e0, bare1, bare2, make_entry(3)},
+            kFinished,
+            3,
+            "command 1-2 reference 1-2 "},
+           {"the last one", {e0, bare1}, kFinished, 1, "command 1-1 reference 1-1 "},
            {"a held step has no reference", {e0, e1, held}, kFinished, 2, ""},
-           {"a failed run's last answer", {e0, make_bare_entry(1)}, kFailed, 1, ""},
-           {"a reset run's last answer", {e0, make_bare_entry(1)}, kReset, 1, ""},
+           {"a failed run's last answer", {e0, bare1}, kFailed, 1, ""},
+           {"a reset run's last answer", {e0, bare1}, kReset, 1, ""},
            {"a failed run's last step", {e0, e1}, kFailed, 2, ""},
            {"a refused answer is recorded", {e0, e1, refused}, kFailed, 2, ""},
            {"more of a failed run", {e0}, kFailed, 2, "state 1-1 command 1-1 reference 1-1 "},
@@ -193,12 +201,13 @@ TEST_F(RecordingCoreTest, MissingIsWhatTheRunHadAndTheRecordingHasNot) {
 
 TEST_F(RecordingCoreTest, OfManyGapsTheFirstAreListedAndTheOthersCounted) {
   for (std::uint64_t i = 0; i < 400; ++i) receive({make_entry(2 * i + 1)});
-  tell(kFinished, 2000);  // steps 800 to 2000 are missing
+  receive({make_bare_entry(801), make_entry(802)});  // 801 makes gaps of answers longer
+  tell(kFinished, 2000);                             // steps 803 to 2000 are missing
   const MissingSamples missing = end().missing;
   EXPECT_EQ(missing.listed.size(), 1000u);
-  EXPECT_EQ(missing.further_gaps, 3u * 401 - 1000);
-  EXPECT_EQ(missing.further_samples, 3u * (400 + 1201) - 1000);
-  EXPECT_EQ(core_->describe_gaps(), "4803 samples missing, first sls/state step 0 of vehicle 0");
+  EXPECT_EQ(missing.further_gaps, 3u * 402 - 1000);
+  EXPECT_EQ(missing.further_samples, 3u * (401 + 1198) + 2 - 1000);
+  EXPECT_EQ(core_->describe_gaps(), "4799 samples missing, first sls/state step 0 of vehicle 0");
 }
 
 TEST_F(RecordingCoreTest, UnansweredStepsAreCounted) {
@@ -259,6 +268,31 @@ TEST_F(RecordingCoreTest, GapsAreThoseOfAllSegments) {
   EXPECT_EQ(to_text(end().missing),
             "state 2-2 command 2-2 reference 2-2 state 4-5 command 4-5 reference 4-5 "
             "status 1-1 state 7-7 command 7-7 reference 7-7 ");
+}
+
+TEST_F(RecordingCoreTest, RowsThatTheFilesOfAnEarlierSegmentLackAreGaps) {
+  struct Case {
+    bool has_state, has_command, has_reference;
+    const char* missing;
+  };
+  for (const Case& given :
+       {Case{true, true, true, ""}, Case{false, true, true, "state 1-1 "},
+        Case{true, false, true, "command 1-1 "}, Case{true, true, false, "reference 1-1 "},
+        Case{true, false, false, "command 1-1 reference 1-1 "}}) {
+    begin(3);
+    StepRows rows;
+    for (rows.step = 0; rows.step < 3; ++rows.step) {
+      const bool is_whole = rows.step != 1;
+      rows.has_state = is_whole || given.has_state;
+      rows.has_command = is_whole || given.has_command;
+      rows.has_reference = is_whole || given.has_reference;
+      core_->on_earlier_step(rows);
+    }
+    core_->on_earlier_end();
+    receive({make_entry(3)}, true);
+    tell(kFinished, 3);
+    EXPECT_EQ(to_text(end().missing), given.missing);
+  }
 }
 
 // --- the end -------------------------------------------------------------------------------------

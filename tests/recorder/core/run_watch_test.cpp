@@ -111,6 +111,13 @@ TEST_F(RunWatchTest, ANewRunOfTheSameServerIsAReset) {
   EXPECT_FALSE(watch_->end().replacement);
 }
 
+TEST_F(RunWatchTest, ARunThatManyResetsHaveMadeForgottenWasReset) {
+  EXPECT_EQ(look_until(500), -1);
+  for (std::uint64_t i = 1; i <= Servers::kMostRuns; ++i) serve(kRun + i, kServer, 500, kRunning);
+  EXPECT_EQ(look_until(9000), 2000) << "silent from 1000 on, then 1 s for what is on its way";
+  EXPECT_TRUE(watch_->end().is_reset);
+}
+
 TEST_F(RunWatchTest, AnnouncesWhenItIsReadyWithNewStepsAndEveryHalfSecond) {
   const auto due = [&](std::int64_t ms, std::int64_t step, bool hears = true) {
     return watch_->is_announcement_due({at(ms), "", hears, step});

@@ -309,6 +309,20 @@ TEST_F(LateAnswerTest, EachOfSeveralWaitsForItsOwn) {
   EXPECT_TRUE(rows_[11].is_complete());
 }
 
+TEST_F(LateAnswerTest, OfAFleetItBelongsToItsVehicle) {
+  Parameters parameters = parameters_;
+  set_vehicles(parameters, {0, 1});
+  rows_.clear();
+  Stream stream = make_stream(parameters);
+  const RecordEntry first = make_unanswered_entry(0, AnswerKind::ANSWER_HELD);
+  RecordEntry second = first;
+  second.vehicle_id(1);
+  stream.add(make_batch(0, {first, second, make_late_entry(0, 1)}, true), at(0));
+  ASSERT_EQ(rows_.size(), 2u);
+  EXPECT_FALSE(rows_[0].has_reference);
+  EXPECT_TRUE(rows_[1].has_reference);
+}
+
 TEST_F(LateAnswerTest, OnesToStepsThatDidNotGoByWithoutAnAnswerAreDropped) {
   stream_.add(make_batch(11, {make_late_entry(9), make_late_entry(500), make_late_entry(10, 3)}),
               at(0));

@@ -162,6 +162,13 @@ TEST_F(CommandGateTest, AnyNumberThatIsNotFiniteIsRefused) {
       offered += 2;
     }
   EXPECT_EQ(gate_.counters().rejected_not_finite(), offered);
+  gate_.expect(1);
+  OfferedAnswer memory = make_answer(1);
+  memory.answer.memory.numbers.setConstant(1, nan);
+  offer_bad(memory);
+  EXPECT_EQ(gate_.refusal(),
+            "controller 'strong' answered step 1 with a number that is not finite in "
+            "controller.numbers");
 }
 
 TEST_F(CommandGateTest, AReferenceThatIsNotFiniteIsRefusedAndNamed) {
@@ -480,6 +487,23 @@ TEST_F(CommandGateTest, TheAnswerAStandbyHasGivenIsTakenWhenTheStrongerOneIsRefu
   ASSERT_TRUE(gate_.accepted());
   EXPECT_EQ(*gate_.accepted(), make_answer(0));
   EXPECT_EQ(gate_.refusal(), std::nullopt);
+}
+
+TEST_F(CommandGateTest, AfterARefusedAnswerToAStepTheClientIsNotAwaitedThere) {
+  set_clients({kStrong, kWeak});
+  gate_.offer(make_faulted(0, ErrorCode::kFreeFall), kStrongPeer);
+  const std::string first = gate_.describe_refusals();
+  EXPECT_NE(first.find("free_fall"), std::string::npos) << first;
+  gate_.offer(make_faulted(0, ErrorCode::kRodLevel), kStrongPeer);
+  EXPECT_EQ(gate_.describe_refusals(), first) << "the first one counts";
+  EXPECT_EQ(gate_.offer(make_answer(0), kStrongPeer), Verdict::kHeld) << "also before a valid one";
+  EXPECT_EQ(gate_.awaited_client()->name, "weak");
+  EXPECT_EQ(gate_.offer(make_answer(0), kWeakPeer), Verdict::kAccepted);
+  set_clients({kStrong, {kWeakPeer, "weak", 1, true}});
+  EXPECT_EQ(gate_.refusal(), std::nullopt) << "the step has its answer";
+  gate_.expect(1);
+  gate_.offer(make_faulted(0, ErrorCode::kFreeFall), kStrongPeer);
+  EXPECT_EQ(gate_.describe_refusals(), "") << "the step before had its answer, too";
 }
 
 TEST_F(CommandGateTest, ABadCommandAfterAClientsValidAnswerIsOnlyCounted) {
@@ -877,6 +901,11 @@ TEST_F(CommandGateTest, AHeldAnswerIsTakenWhenTheAwaitedClientIsGone) {
   EXPECT_EQ(gate_.offer(make_answer(0), kWeakPeer), Verdict::kHeld);
   set_clients({make_gone(kStrong), kWeak});
   EXPECT_TRUE(gate_.accepted());
+}
+
+TEST_F(CommandGateTest, OneThatIsGoneDoesNotTakeOver) {
+  set_clients({kStrong, make_gone(kWeak)});
+  EXPECT_FALSE(gate_.pass_over_silent_client());
 }
 
 TEST_F(CommandGateTest, ASilentClientIsAwaitedRatherThanOneThatIsGone) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <functional>
 
@@ -136,7 +137,13 @@ TEST_F(ParticipantCheckTest, ARunOfZeroIsNamedOnceItLasts) {
   entry.announcement.run_id(0);
   neighbourhood_.participants = {entry};
   EXPECT_TRUE(look().empty());
-  EXPECT_EQ(look(1s), only(kFoo + "sls/participant run_id: expected 00000000000000ab, got 0"));
+  const auto expected = only(kFoo + "sls/participant run_id: expected 00000000000000ab, got 0");
+  EXPECT_EQ(look(1s), expected);
+  neighbourhood_.participants[0].announcement.vehicle_ids({7});
+  EXPECT_TRUE(look(2s).empty()) << "it may wait for another server";
+  neighbourhood_.participants[0].announcement.vehicle_ids({});
+  look(3s);
+  EXPECT_EQ(look(4s), expected);
 }
 
 TEST_F(ParticipantCheckTest, AControllerOfAnotherServerIsNotOurs) {
@@ -299,6 +306,17 @@ TEST_F(ParticipantCheckTest, TwoClientsOfOneNameAndStrengthAreNamed) {
   });
   expect_none([](Participant& other) { other.ready(false); });
   expect_none([](Participant& other) { other.done(true); });
+  first.announcement.vehicle_ids({0});
+  expect_none([](Participant&) {});  // the other one flies vehicle 1
+  first.announcement.vehicle_ids({0, 1});
+  first.announcement.ready(false);
+  expect_none([](Participant&) {});
+  first.announcement.ready(true);
+  second.announcement.contract_sha256("");
+  neighbourhood_.participants = {first, second};
+  const auto found = look(600ms);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_NE(found[0].find("contract_sha256"), std::string::npos) << "it cannot fly anyway";
 }
 
 /// It stays listed until its lease ends.
@@ -320,6 +338,8 @@ TEST_F(ParticipantCheckTest, TwoClientsOfOneNameThatAnswerTheSameStepAreNamed) {
   EXPECT_EQ(look(100ms).size(), 1u);
   EXPECT_EQ(look(2s).size(), 1u);
   EXPECT_TRUE(look(2200ms).empty());
+  check_.answers().note_superseded(make_peer(2), make_peer(1));
+  EXPECT_EQ(look(3s).size(), 1u) << "whichever of them was first";
 }
 
 // --- strangers -----------------------------------------------------------------------------------
@@ -375,6 +395,10 @@ TEST_F(ParticipantCheckTest, AMissingDeadlineIsReportedOnlyOfOurControllers) {
   neighbourhood_.missing_deadlines = {{make_peer(2), "sls/command of 'bar': DEADLINE"}};
   neighbourhood_.participants = {make_entry(2, "bar")};
   EXPECT_EQ(look(2s), only("sls/command of 'bar': DEADLINE"));
+  neighbourhood_.participants[0].announcement.run_id(0xcd);  // of the run before, perhaps
+  EXPECT_TRUE(look(3s).empty());
+  const auto found = look(4s);
+  EXPECT_NE(std::find(found.begin(), found.end(), "sls/command of 'bar': DEADLINE"), found.end());
 }
 
 // --- libraries -----------------------------------------------------------------------------------
@@ -391,6 +415,22 @@ TEST_F(ParticipantCheckTest, AnotherLibraryThanThatOfTheFirstIsRefused) {
   // Before the first step another client may become the first.
   EXPECT_EQ(check_.admit_controllers({second}).size(), 1u);
   EXPECT_EQ(check_.admit_controllers({second, first}).size(), 1u);
+}
+
+TEST_F(ParticipantCheckTest, ALibraryBindsTheOthersOfItsVehicleIfItsClientCanFly) {
+  auto first = make_entry(1, "first"), second = make_entry(2, "second");
+  first.announcement.library_sha256(std::string(64, 'c'));
+  first.announcement.vehicle_ids({0});
+  const auto is_admitted = [&] { return check_.admit_controllers({first, second}).size() == 2; };
+  EXPECT_FALSE(is_admitted());
+  second.announcement.vehicle_ids({1});
+  EXPECT_TRUE(is_admitted());
+  second.announcement.vehicle_ids({0});
+  first.announcement.ready(false);
+  EXPECT_EQ(check_.admit_controllers({first, second}).at(0).peer, second.peer);
+  first.announcement.ready(true);
+  first.announcement.scenario_sha256("another");
+  EXPECT_EQ(check_.admit_controllers({first, second}).at(0).peer, second.peer);
 }
 
 TEST_F(ParticipantCheckTest, TheLibraryOfAClientThatIsGoneBindsNobody) {
@@ -565,6 +605,13 @@ TEST_F(ParticipantCheckTest, AStampInTheFutureIsNamedForATime) {
   EXPECT_TRUE(look(2001ms).empty());
 }
 
+TEST_F(ParticipantCheckTest, AMistakeInAnswersOfAnUnannouncedWriterNamesItAsDiscoveryDoes) {
+  neighbourhood_.command_writers[make_peer(1)] = "'foo' (10.0.0.2)";
+  neighbourhood_.stamps_ahead_s = {{make_peer(1), 5.04}};
+  EXPECT_EQ(look(), only("'foo' (10.0.0.2): sls/command source timestamp: expected none in the "
+                         "future, got 5.0 s ahead of our clock"));
+}
+
 TEST_F(ParticipantCheckTest, AStageNameThatIsNotUtf8IsNamed) {
   neighbourhood_.participants = {make_entry(1)};
   OfferedAnswer answer = make_answer(4);
@@ -585,6 +632,15 @@ TEST_F(ParticipantCheckTest, AStageThatIsNotReturnedIsNamed) {
   returned.stage = 1;
   take(make_answer(300, 0), returned, Verdict::kHeld);
   EXPECT_EQ(look(), only(kFoo + "sls/command controller.stage_index at step 300: expected at least "
+                                "1, as in the state, got 0"));
+}
+
+TEST_F(ParticipantCheckTest, AStageThatIsNotReturnedExplainsThatTheMissionStaysInIt) {
+  neighbourhood_.participants = {make_entry(1)};
+  model::ControllerMemory returned;
+  returned.stage = 1;
+  for (std::uint64_t step = 0; step <= 301; ++step) take(make_answer(step), returned);
+  EXPECT_EQ(look(), only(kFoo + "sls/command controller.stage_index at step 0: expected at least "
                                 "1, as in the state, got 0"));
 }
 
@@ -641,6 +697,14 @@ TEST_F(ParticipantCheckTest, AVehicleFarFromItsReferenceIsAnnouncedOnce) {
             only("step 9: vehicle 0: load 51 m from its reference, expected at most 50 rod lengths "
                  "(50 m)"));
   EXPECT_TRUE(check_.answers().take_events().empty());
+  OfferedAnswer other = make_answer(11);
+  other.vehicle_id = 1;
+  state_.p_WL.setZero();
+  state_.p_WQ = {0.0, 0.0, -60.0};
+  take(other);
+  EXPECT_EQ(check_.answers().take_events(),
+            only("step 11: vehicle 1: quadrotor 60 m from its reference, expected at most 50 rod "
+                 "lengths (50 m)"));
 }
 
 TEST_F(ParticipantCheckTest, UnknownParticipantsCannotFillTheMemory) {

@@ -205,6 +205,17 @@ TEST(RosterTest, ARecorderThatLagsAndAnnouncesNothingIsNamedAsSilent) {
   EXPECT_TRUE(contains(name_silent_recorder(roster, 500, now - second), "step 100"));
   EXPECT_EQ(name_silent_recorder(roster, 500, now - 3 * second), "") << "heard since";
   EXPECT_EQ(name_silent_recorder(roster, 101, now - second), "") << "nothing to announce";
+  recorder.announcement.ready(false);
+  EXPECT_EQ(name_silent_recorder({{}, {recorder}}, 500, now - second), "") << "it is not ready";
+}
+
+TEST(RosterTest, ADeadRecorderThatAnotherHasReplacedIsNotNamedAsSilent) {
+  auto dead = make_recorder_at(100), next = make_recorder_at(499), unready = make_recorder("new");
+  dead.heard -= 2 * sync::kPresumedDeadAfter;
+  unready.announcement.ready(false);
+  EXPECT_EQ(name_silent_recorder({{}, {dead, next}}, 500, sync::Time()), "");
+  EXPECT_TRUE(contains(name_silent_recorder({{}, {dead}}, 500, sync::Time()), "step 100"));
+  EXPECT_TRUE(contains(name_silent_recorder({{}, {dead, unready}}, 500, sync::Time()), "step 100"));
 }
 
 TEST(RosterTest, ThePlaceOfAControllerIsItsHostUntilItIsGone) {

@@ -1,6 +1,7 @@
 // A run in lockstep: docs/synchronisation.md, from "Lockstep" to "Operator control".
 #include <gtest/gtest.h>
 
+#include "sim_server/plants/multirotor/keys.hpp"
 #include "tests/sim_server/core/server_rig.hpp"
 
 namespace sls::sim {
@@ -14,6 +15,18 @@ config::Scenario with_policy(config::ControllerPolicy policy, double deadline_s)
   return scenario;
 }
 
+config::Scenario with_two_vehicles(config::Scenario scenario) {
+  scenario.vehicles.resize(2, scenario.vehicles.front());
+  return scenario;
+}
+
+ServerRig::Answer for_vehicles(const std::vector<std::uint32_t>& vehicle_ids,
+                               std::uint64_t step = 0) {
+  ServerRig::Answer answer{step};
+  answer.vehicle_ids = vehicle_ids;
+  return answer;
+}
+
 TEST(ServerLockstepTest, EachAnswerBringsTheNextStateAtOnce) {
   ServerRig rig;
   rig.join("pilot");
@@ -25,17 +38,13 @@ TEST(ServerLockstepTest, EachAnswerBringsTheNextStateAtOnce) {
 }
 
 TEST(ServerLockstepTest, AStepOfAFleetNeedsTheAnswerForEachVehicle) {
-  auto scenario = ServerRig::make_scenario();
-  scenario.vehicles.resize(2, scenario.vehicles.front());
-  ServerRig rig(scenario);
+  ServerRig rig(with_two_vehicles(ServerRig::make_scenario()));
   rig.join("pilot");
-  ServerRig::Answer answer;
-  rig.answer("pilot", answer);
+  rig.answer("pilot", for_vehicles({0}));
   rig.wait_until(20);
   EXPECT_EQ(rig.take_states(), (Lines{"0: state 0", "20: state 0 again 1"}))
       << "only what lacks an answer is sent again";
-  answer.vehicle_ids = {1};
-  rig.answer("pilot", answer);
+  rig.answer("pilot", for_vehicles({1}));
   EXPECT_EQ(rig.take_states(), Lines{"20: state 1"});
 }
 
@@ -76,6 +85,23 @@ TEST(ServerLockstepTest, AnAnswerBeforeItsStateIsRefusedAndACopyChangesNothing) 
   rig.wait_until(400);
   EXPECT_EQ(rig.status().counters().duplicate(), 1u);
   EXPECT_EQ(rig.status().counters().rejected_step(), 2u);
+}
+
+TEST(ServerLockstepTest, AnswersThatMoveNoVehicleAreCounted) {
+  ServerRig rig;
+  rig.join("pilot", 1);
+  rig.join("standby");
+  rig.answer("pilot", 0);
+  rig.answer("standby", 0);
+  rig.answer("pilot", for_vehicles({7}, 1));
+  ServerRig::Answer empty = for_vehicles({});
+  empty.run_id = 1;  // may be right there
+  rig.answer("pilot", empty);
+  rig.wait_until(400);
+  EXPECT_EQ(rig.step(), 1u);
+  EXPECT_EQ(rig.status().counters().superseded(), 1u);
+  EXPECT_EQ(rig.status().counters().rejected_vehicle(), 1u);
+  EXPECT_EQ(rig.status().counters().rejected_run(), 0u);
 }
 
 TEST(ServerLockstepTest, TheAnswerThatEndsTheMissionEndsTheRun) {
@@ -131,6 +157,14 @@ TEST(ServerLockstepTest, AFailedPlantFailsTheRunAndRecordsTheStepOnce) {
   EXPECT_EQ(rig.core().error(), "quad_x_m is not finite") << "only the first failure counts";
 }
 
+TEST(ServerLockstepTest, TheLastRecordHasTheAnswersThatCameBeforeTheEnd) {
+  ServerRig rig(with_two_vehicles(ServerRig::make_scenario()));
+  rig.join("pilot");
+  rig.answer("pilot", for_vehicles({0}));
+  rig.request(ControlAction::ACTION_STOP);
+  EXPECT_EQ(rig.take_records(), (Lines{"0 accepted", "0 none", "end"}));
+}
+
 TEST(ServerLockstepTest, ARefusedWriteFailsTheRun) {
   ServerRig rig;
   rig.failing_states = 1;
@@ -156,17 +190,60 @@ TEST(ServerLockstepTest, PolicyWaitNamesTheControllerAndGivesUpAtTheDeadline) {
 }
 
 TEST(ServerLockstepTest, AnAbsentControllerOfAFleetIsNamedWithItsVehicles) {
-  auto scenario = with_policy(config::ControllerPolicy::kWait, 10);
-  scenario.vehicles.resize(2, scenario.vehicles.front());
+  for (const bool is_one_answered : {false, true}) {
+    ServerRig rig(with_two_vehicles(with_policy(config::ControllerPolicy::kWait, 10)));
+    rig.join("pilot");
+    rig.take_log();
+    if (is_one_answered) rig.answer("pilot", for_vehicles({0}));
+    rig.wait_until(1500);
+    EXPECT_EQ(rig.take_log(), Lines{std::string("1000: step 0: waiting for: controller 'pilot' on "
+                                                "box (vehicle") +
+                                    (is_one_answered ? " 1" : "s 0-1") + ") (9 s left)"});
+    rig.answer("pilot", for_vehicles({0, 1}));
+    EXPECT_EQ(rig.take_log(), Lines{"1500: step 0: all vehicles get answers again after 1.5 s"});
+  }
+}
+
+TEST(ServerLockstepTest, AnAwaitedControllerIsNamedWithWhatIsKnownOfIt) {
+  struct Case {
+    void (*happens)(ServerRig&);
+    const char* expected;
+  };
+  for (const Case& given : {
+           Case{[](ServerRig& rig) { rig.leave("pilot"); },
+                "0: waiting for: controller (none is "
+                "ready) (9 s left)"},
+           Case{[](ServerRig& rig) {
+                  rig.answer("pilot", 0);
+                  rig.leave("pilot");
+                },
+                "1: waiting for: controller 'pilot' (gone) (9 s left)"},
+           Case{[](ServerRig& rig) { rig.problem = "a mistake"; },
+                "0: waiting for: controller 'pilot' on box (9 s left); a mistake"},
+       }) {
+    ServerRig rig(with_policy(config::ControllerPolicy::kWait, 10));
+    rig.join("pilot");
+    given.happens(rig);
+    rig.take_log();
+    rig.wait_until(1001);
+    EXPECT_EQ(rig.take_log(), Lines{std::string("1000: step ") + given.expected});
+  }
+}
+
+TEST(ServerLockstepTest, EachVehicleOfAFleetMayAwaitAnotherController) {
+  auto scenario = with_two_vehicles(with_policy(config::ControllerPolicy::kWait, 0.3));
+  scenario.sync.take_over_s = 5;
   ServerRig rig(scenario);
-  rig.join("pilot");
-  rig.take_log();
-  ServerRig::Answer answer;
-  answer.vehicle_ids = {0};
-  rig.answer("pilot", answer);
-  rig.wait_until(1001);
-  EXPECT_EQ(rig.take_log(), Lines{"1000: step 0: waiting for: controller 'pilot' on box "
-                                  "(vehicle 1) (9 s left)"});
+  rig.join("pilot", 1);
+  rig.join("standby");
+  ServerRig::Answer broken;
+  broken.error_code = model::ErrorCode::kFreeFall;
+  rig.answer("pilot", broken);
+  rig.wait_until(399);
+  EXPECT_EQ(
+      rig.core().error(),
+      "vehicle 0: controller 'pilot' answered step 0 with a fault: free_fall; waited 0.3 s for "
+      "controller 'pilot' on box (vehicle 1), controller 'standby' on box (vehicle 0)");
 }
 
 TEST(ServerLockstepTest, AnAnswerAfterALongWaitIsAnnounced) {
@@ -333,6 +410,16 @@ TEST(ServerLockstepTest, ASilentRecorderThatIsBehindIsNamed) {
                       "1400: step 6: recorder 'disk' on box is silent since step -1"),
             log.end())
       << testing::PrintToString(log);
+  const auto count = [&] {
+    const Lines later = rig.take_log();
+    return std::count_if(later.begin(), later.end(), [](const std::string& line) {
+      return line.find("is silent since") != std::string::npos;
+    });
+  };
+  rig.wait_until(6399);
+  EXPECT_EQ(count(), 0) << "it is named every 5 s";
+  rig.wait_until(7000);
+  EXPECT_EQ(count(), 1);
 }
 
 // --- operator ------------------------------------------------------------------------------------
@@ -396,6 +483,49 @@ TEST(ServerLockstepTest, AStatusComesAtLeastEveryHalfSecond) {
   EXPECT_EQ(rig.statuses().size(), before);
   rig.wait_until(420);
   EXPECT_EQ(rig.statuses().size(), before + 1);
+}
+
+TEST(ServerLockstepTest, AMistakeThatMustLastIsReportedWhenItHas) {
+  ServerRig rig;
+  rig.join("pilot");
+  rig.request(ControlAction::ACTION_PAUSE);
+  rig.answer("pilot", 0);
+  rig.wait_until(450);
+  rig.neighbourhood.command_writers[sync::peer(9)] = "'foo' (10.0.0.2)";
+  rig.wait_until(1799);  // the status at 800 came with the first look that saw it
+  EXPECT_EQ(rig.status().problem().to_string(), "");
+  rig.wait_until(1800);
+  EXPECT_EQ(rig.status().problem().to_string(),
+            "'foo' (10.0.0.2): writes sls/command: expected an announcement in sls/participant, "
+            "got none");
+}
+
+TEST(ServerLockstepTest, ALoadFarFromItsReferenceIsAnEvent) {
+  ServerRig rig;
+  rig.join("pilot");
+  rig.take_log();
+  ServerRig::Answer far{0};
+  far.reference_x = 1e6;
+  rig.answer("pilot", far);
+  rig.wait_until(400);
+  EXPECT_EQ(rig.take_log(), Lines{"400: step 0: vehicle 0: load 1e+06 m from its reference, "
+                                  "expected at most 50 rod lengths (50 m)"});
+}
+
+TEST(ServerLockstepTest, ARemarkOfAPlantIsAnEventAtTheNextLookOrAtTheEnd) {
+  auto scenario = ServerRig::make_scenario();
+  const auto multirotor =
+      config::load_scenario(SLS_SOURCE_DIR "/config/scenarios/multirotor_figure_eight.yaml");
+  scenario.plant = multirotor.plant;
+  scenario.autopilot = multirotor.autopilot;
+  scenario.plant.own.edit<MultirotorKeys>().rotor.torque_constant = 0.0;
+  for (const bool ends : {false, true}) {
+    ServerRig rig(scenario);
+    ends ? rig.fail("a failure") : rig.join("pilot");
+    EXPECT_EQ(rig.take_log().front(),
+              "0: vehicle 0: the rotors have no authority over yaw: they cannot turn the vehicle "
+              "about z alone");
+  }
 }
 
 TEST(ServerLockstepTest, AMistakeOfAParticipantIsInTheStatusWithinTheTimeOfALook) {

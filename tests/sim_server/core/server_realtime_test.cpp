@@ -69,8 +69,24 @@ TEST_F(ServerRealtimeTest, AfterMaxHoldTheFailSafeActsUntilAFreshAnswer) {
 TEST_F(ServerRealtimeTest, AnAnswerToAStateThatHasNotLeftIsRefused) {
   fly_to(0);
   rig_.answer("pilot", 1);
+  rig_.wait_until(5);
+  ServerRig::Answer queued{1};
+  queued.queued_ms = 2;  // it came before the state left at 4 ms
+  rig_.answer("pilot", queued);
   rig_.wait_until(8);
   EXPECT_EQ(rig_.take_records(), (Lines{"0 accepted", "1 held"}));
+}
+
+TEST_F(ServerRealtimeTest, AVehicleOfAFleetWithoutAnAnswerDelaysNoOther) {
+  auto scenario = ServerRig::make_realtime_scenario();
+  scenario.vehicles.resize(2, scenario.vehicles.front());
+  ServerRig rig(scenario);
+  rig.join("pilot");
+  rig.answer("pilot", 0);  // for vehicle 0
+  rig.wait_until(3);
+  EXPECT_EQ(rig.take_records(), Lines{});
+  rig.wait_until(4);
+  EXPECT_EQ(rig.take_records(), (Lines{"0 accepted", "0 fail-safe"}));
 }
 
 TEST_F(ServerRealtimeTest, AServerThatIsFarBehindMovesItsSchedule) {
@@ -104,6 +120,21 @@ TEST_F(ServerRealtimeTest, ThreeMissesInARowAreATakeOver) {
   rig_.wait_until(12);
   EXPECT_EQ(rig_.take_records(), (Lines{"0 fail-safe", "1 fail-safe", "2 accepted"}));
   EXPECT_EQ(rig_.take_log(), Lines{"12: step 2: controller 'standby' takes over from 'pilot'"});
+}
+
+TEST_F(ServerRealtimeTest, ATakeOverComesSoonerIfItsTimeIsShort) {
+  auto scenario = ServerRig::make_realtime_scenario();
+  scenario.sync.take_over_s = 0.008;
+  ServerRig rig(scenario);
+  rig.join("pilot", 1);
+  rig.join("standby");
+  rig.take_log();
+  rig.answer("standby", 0);
+  rig.wait_until(5);
+  rig.answer("standby", 1);
+  rig.wait_until(8);
+  EXPECT_EQ(rig.take_records(), (Lines{"0 fail-safe", "1 accepted"}));
+  EXPECT_EQ(rig.take_log(), Lines{"8: step 1: controller 'standby' takes over from 'pilot'"});
 }
 
 TEST_F(ServerRealtimeTest, AnAbsentControllerIsNamedAndEndsTheRunAtTheDeadline) {
@@ -197,6 +228,12 @@ TEST_F(ServerRealtimeTest, AClockThatIsWrongByHalfTheLifespanIsNamedAndLifespanI
       ServerRig::Answer answer{step};
       answer.clock_ahead_ms = ahead_ms;
       rig_.answer("pilot", answer);
+      // Answers to states that it does not remember or has not sent measure nothing.
+      answer.clock_ahead_ms = -9000;
+      for (const std::uint64_t other : {step - 65, step + 5}) {
+        answer.step = other;
+        rig_.answer("pilot", answer);
+      }
     }
   };
   fly(0, 100, 49);
@@ -209,6 +246,27 @@ TEST_F(ServerRealtimeTest, AClockThatIsWrongByHalfTheLifespanIsNamedAndLifespanI
       "until then its commands expire by their step, not by LIFESPAN");
   fly(1300, 2600, 0);
   EXPECT_FALSE(rig_.is_lifespan_ignored());
+  rig_.take_log();
+  fly(2600, 3900, -52);
+  EXPECT_NE(rig_.take_log().front().find("'pilot' on box is 0.05 s behind ours"),
+            std::string::npos);
+}
+
+TEST_F(ServerRealtimeTest, LifespanIsIgnoredWhileAClientWithoutAnswersHasStampsThatAreOlder) {
+  rig_.lifespan = 100ms;
+  rig_.announcement_age = 100ms;
+  rig_.wait_until(1500);
+  EXPECT_FALSE(rig_.is_lifespan_ignored());
+  rig_.announcement_age = 101ms;
+  rig_.wait_until(1700);
+  EXPECT_TRUE(rig_.is_lifespan_ignored());
+  for (std::uint64_t step = rig_.step(); step < 500; ++step) {
+    rig_.wait_until(static_cast<std::int64_t>(step) * 4 + 1);
+    rig_.answer("pilot", step);
+  }
+  EXPECT_FALSE(rig_.is_lifespan_ignored()) << "only the announcement was late";
+  for (const std::string& line : rig_.take_log())
+    EXPECT_EQ(line.find("clock"), std::string::npos) << line;
 }
 
 TEST_F(ServerRealtimeTest, AnAnswerOlderThanTheLifespanIsStale) {
@@ -217,7 +275,12 @@ TEST_F(ServerRealtimeTest, AnAnswerOlderThanTheLifespanIsStale) {
   rig_.wait_until(100);
   rig_.take_records();
   rig_.answer("pilot", 22);
-  rig_.wait_until(500);
+  rig_.wait_until(501);
+  rig_.take_records();
+  rig_.answer("pilot", 124);  // whose state was due 5 ms ago
+  rig_.wait_until(504);
+  EXPECT_EQ(rig_.take_records(), (Lines{"late 124", "125 held"}));
+  rig_.wait_until(1000);
   EXPECT_EQ(rig_.status().counters().stale(), 1u);
 }
 

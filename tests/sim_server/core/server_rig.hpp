@@ -114,11 +114,14 @@ class ServerRig : public Outputs, public Surroundings {
     std::uint64_t compute_ms = 0;
     model::ErrorCode error_code = model::ErrorCode::kNone;
     std::int64_t clock_ahead_ms = 0;
+    std::int64_t queued_ms = 0;  ///< in the shell, until now
+    double reference_x = 0.0;    ///< m
   };
   void answer(const std::string& name, const Answer& answer) {
     CommandSample sample;
     sample.sender = peer(name);
-    sample.arrived = {now_, to_wall(now_)};
+    const sync::Time arrived = now_ - std::chrono::milliseconds(answer.queued_ms);
+    sample.arrived = {arrived, to_wall(arrived)};
     sample.written = sample.arrived.wall + std::chrono::milliseconds(answer.clock_ahead_ms);
     sample.run_id = answer.run_id;
     sample.step = answer.step;
@@ -130,6 +133,7 @@ class ServerRig : public Outputs, public Surroundings {
       offered.client_name = name;
       offered.vehicle_id = id;
       offered.answer.f_Q_W.z() = force_z_ - answer.more_force;
+      offered.answer.reference.position.x() = answer.reference_x;
       offered.answer.mission =
           answer.is_last ? model::MissionPhase::kFinished : model::MissionPhase::kRunning;
       offered.answer.error_code = answer.error_code;
@@ -170,9 +174,11 @@ class ServerRig : public Outputs, public Surroundings {
   std::vector<sync::Run> other_runs;
   bool is_on_this_machine = true;
   bool knows_every_claim = true;
-  std::string problem;         ///< that the middleware has found
-  bool is_queue_full = false;  ///< of records
-  std::uint64_t written = 0;   ///< records
+  Neighbourhood neighbourhood;
+  std::chrono::nanoseconds announcement_age{};  ///< of all controllers, by their clocks
+  std::string problem;                          ///< that the middleware has found
+  bool is_queue_full = false;                   ///< of records
+  std::uint64_t written = 0;                    ///< records
   std::uint64_t lost_samples = 0;
   std::uint64_t missed_deadlines = 0;
   std::optional<std::chrono::nanoseconds> lifespan;
@@ -275,6 +281,7 @@ class ServerRig : public Outputs, public Surroundings {
     for (sync::Member& member : members) {
       const auto silent = silent_.find(member.announcement.name().to_string());
       member.heard = silent == silent_.end() ? now_ : silent->second;
+      member.age = announcement_age;
     }
     return members;
   }
@@ -286,7 +293,7 @@ class ServerRig : public Outputs, public Surroundings {
   bool stays_on_this_machine() const override { return is_on_this_machine; }
   bool has_heard_every_claim() const override { return knows_every_claim; }
   std::uint64_t problems_version() const override { return problem.size(); }
-  Neighbourhood look(bool) override { return {}; }
+  Neighbourhood look(bool) override { return neighbourhood; }
   std::string replace_problems(const std::map<std::string, std::string>& found) override {
     return found.empty() ? problem : found.begin()->second;
   }
