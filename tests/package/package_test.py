@@ -55,7 +55,7 @@ exec "$@" """
             script, "sh", *inside, *map(str, command)]
 
 
-def run(command, expected=0, limit_s=120.0, **options):
+def run(command, expected=0, limit_s=600.0, **options):
     done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
                           stdin=subprocess.DEVNULL, timeout=limit_s, check=False, **options)
     if done.returncode != expected:
@@ -69,8 +69,8 @@ def run_apt(*command):
     script = f"mount -t proc proc '{SYSTEM}/proc'; exec chroot '{SYSTEM}' \"$@\""
     environment = {**os.environ, "PATH": "/usr/sbin:/usr/bin:/sbin:/bin", "DEBIAN_FRONTEND": "noninteractive",
                    "LC_ALL": "C"}
-    return run(["unshare", "--mount", "--propagation", "private", "sh", "-c", script, "sh", *command], limit_s=200,
-               env=environment)
+    return run(["unshare", "--mount", "--propagation", "private", "sh", "-c", script, "sh", *command],
+               limit_s=1200, env=environment)
 
 
 def make_package():
@@ -81,7 +81,7 @@ def make_package():
         return made[-1]
     folder = FOLDER / "package"
     tree.remove(folder)
-    said = run(["cpack", "--config", BUILD / "CPackConfig.cmake", "-B", folder], cwd=FOLDER, limit_s=600)
+    said = run(["cpack", "--config", BUILD / "CPackConfig.cmake", "-B", folder], cwd=FOLDER, limit_s=1200)
     return Path(re.search(r"^CPack: - package: (.*\.deb) generated\.$", said, re.MULTILINE)[1])
 
 
@@ -96,7 +96,8 @@ def make_system(package):
         tree.remove(SYSTEM)
         mirror = tree.find_mirror()
         made = subprocess.run(["unshare", "--mount", "--propagation", "private", "debootstrap", "--variant=minbase",
-                               tree.CODENAMES[NAME], SYSTEM, mirror], capture_output=True, text=True, timeout=200, check=False)
+                               tree.CODENAMES[NAME], SYSTEM, mirror], capture_output=True, text=True, timeout=1200,
+                              check=False)
         if made.returncode != 0:
             skip(f"debootstrap from {mirror} failed: {made.stdout.strip().splitlines()[-1:]}")
         (SYSTEM / "debootstrap.done").touch()
