@@ -1,18 +1,19 @@
 // Figures of the page, one JSON line: node measure.mjs load|latency|fleet BUILD [DOMAIN [SECONDS]]
 import { statSync } from "node:fs";
 import { join } from "node:path";
-import { open, startBrowser, waitFor } from "./browser.mjs";
+import { kLean, open, startBrowser, waitFor } from "./browser.mjs";
 import { startFakeServer } from "./fake_server.mjs";
 import { startFlight } from "./flight.mjs";
 
 const [what, build, domain = "141", seconds = "10"] = process.argv.slice(2);
 const kMeasuredMs = Number(seconds) * 1000;
+const kFlags = kMeasuredMs > 1000 ? [] : kLean; // a second only shows that it works
 const page_file = join(build, "tools/view/page/page.html");
 
 /** Time from the request until the page has drawn for the first time. */
 async function measureLoad() {
   const flight = await startFlight({ build, domain });
-  const { browser, stop } = await startBrowser();
+  const { browser, stop } = await startBrowser({ flags: kFlags });
   const { page } = await open(browser);
   try {
     const began = performance.now();
@@ -30,7 +31,7 @@ async function measureLoad() {
 /** A flight of 250 Hz in real time; latencies of the last 1,000 frames. */
 async function measureLatency() {
   const flight = await startFlight({ build, domain });
-  const { browser, stop } = await startBrowser();
+  const { browser, stop } = await startBrowser({ flags: kFlags });
   const { page } = await open(browser);
   try {
     await page.goto(flight.url);
@@ -50,12 +51,12 @@ async function measureLatency() {
 /** Frames a second that Chromium draws in software, with 100 vehicles that fly by closed forms. */
 async function measureFleet() {
   const server = await startFakeServer({ page: page_file, vehicles: 100 });
-  const { browser, stop } = await startBrowser();
+  const { browser, stop } = await startBrowser({ flags: kFlags });
   const { page } = await open(browser);
   try {
     await page.goto(server.url);
     await waitFor("flight", () => page.evaluate(() => (window.slsView?.state().step ?? 0) > 250));
-    await new Promise((resolve) => setTimeout(resolve, 3000)); // the page adapts its resolution
+    await new Promise((resolve) => setTimeout(resolve, Math.min(3000, kMeasuredMs))); // the page adapts its resolution
     const begin = await page.evaluate(() => [window.slsView.frames(), performance.now()]);
     await new Promise((resolve) => setTimeout(resolve, kMeasuredMs));
     const end = await page.evaluate(() => [window.slsView.frames(), performance.now(), window.slsView.camera().resolution]);
