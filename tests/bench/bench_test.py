@@ -40,7 +40,7 @@ def is_alive(process):
 
 def bench(*words, check=0):
     done = subprocess.run([ROOT / "sls", "bench", *map(str, words)], capture_output=True, text=True,
-                          env={**os.environ, "SLS_BUILD": str(BUILD)}, timeout=240, check=False)
+                          env={**os.environ, "SLS_BUILD": str(BUILD)}, timeout=600, check=False)
     if check is not None and done.returncode != check:
         raise AssertionError(f"ended with {done.returncode}: {done.stdout}{done.stderr}")
     return done

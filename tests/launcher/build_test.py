@@ -19,6 +19,8 @@ BUILD = pathlib.Path(sys.argv[1]).resolve() if len(sys.argv) > 1 else ROOT / "bu
 sys.path.insert(0, str(ROOT / "python"))
 from sls.launcher.building import FLYING  # noqa: E402
 CMAKE = """cmake_minimum_required(VERSION 3.25)
+set(CMAKE_C_COMPILER_WORKS TRUE)  # these two save two builds in each new tree
+set(CMAKE_C_ABI_COMPILED TRUE)
 project(small LANGUAGES C)
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
 set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS CMakePresets.json)

@@ -19,18 +19,10 @@ sys.path.insert(0, str(ROOT / "tools/systems"))
 import tree  # noqa: E402
 LIMIT_S = 200  # for what takes seconds on an idle machine
 PROGRAMS = ("bash", "cat", "chroot", "env", "ls", "mkdir", "mount", "sh", "sleep", "touch", "true", "sed", "unshare")
-DEBOOTSTRAP = """#!/bin/bash
+DEBOOTSTRAP = """#!/bin/sh
 # debootstrap --variant=minbase CODENAME FOLDER MIRROR
 echo "$2" >>CALLS
-mkdir -p "$3"/{dev,etc/apt/apt.conf.d,etc/dpkg/dpkg.cfg.d,proc,root,run,sys,tmp,usr/bin}
-ln -s usr/bin "$3/bin"
-for program in PROGRAMS; do
-  cp "$(type -P $program)" "$3/usr/bin/"
-  for library in $(ldd "$(type -P $program)" | grep -o '/[^ )]*'); do
-    mkdir -p "$3$(dirname $library)"
-    cp -L $library "$3$library"
-  done
-done
+cp -a BASE "$3"
 """
 DEMO = """#!/bin/bash
 case $1 in
@@ -60,8 +52,29 @@ def skip(reason):
     sys.exit(77)
 
 
+def make_base(folder):
+    """Fills the folder with PROGRAMS and the libraries that they need."""
+    for name in ("dev", "etc/apt/apt.conf.d", "etc/dpkg/dpkg.cfg.d", "proc", "root", "run", "sys", "tmp", "usr/bin"):
+        (folder / name).mkdir(parents=True)
+    (folder / "bin").symlink_to("usr/bin")
+    programs = [os.path.realpath(shutil.which(name)) for name in PROGRAMS]
+    needed = subprocess.run(["ldd", *programs], capture_output=True, text=True, check=True).stdout
+    for name, program in zip(PROGRAMS, programs):
+        shutil.copy(program, folder / "usr/bin" / name)
+    for library in set(re.findall(r"(/\S+) \(0x", needed)):
+        (folder / library[1:]).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(library, folder / library[1:])
+
+
 class SystemsTest(unittest.TestCase):
     maxDiff = None
+
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory(dir="/dev/shm")
+        cls.addClassCleanup(folder.cleanup)
+        cls.base = pathlib.Path(folder.name).resolve() / "base"
+        make_base(cls.base)
 
     def setUp(self):
         folder = tempfile.TemporaryDirectory(dir="/dev/shm")  # many small writes
@@ -79,7 +92,7 @@ class SystemsTest(unittest.TestCase):
         self.calls = self.folder / "calls"
         self.calls.write_text("")
         self.write_program("debootstrap", DEBOOTSTRAP.replace("CALLS", str(self.calls))
-                           .replace("PROGRAMS", " ".join(PROGRAMS)))
+                           .replace("BASE", str(self.base)))
         self.environment = {**os.environ, "PATH": f"{self.folder}/bin:{os.environ['PATH']}"}
 
     def tearDown(self):

@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { mkdirSync } from "node:fs";
 import { join } from "node:path";
-import { open, readPixels, startBrowser, waitFor } from "./browser.mjs";
+import { kLean, open, readPixels, startBrowser, waitFor } from "./browser.mjs";
 import { calcLoad, calcQuad, startFakeServer } from "./fake_server.mjs";
 
 const [html, folder, word = ""] = process.argv.slice(2);
@@ -17,7 +17,7 @@ const state = (page) => page.evaluate(() => window.slsView.state());
 const untilFlies = (page) => waitFor("poses", () => page.evaluate(() => (window.slsView?.state().step ?? 0) > 0));
 const isColour = (pixel, expected) => pixel.every((value, index) => Math.abs(value - expected[index]) <= kTolerance);
 
-const chromium = await startBrowser();
+const chromium = await startBrowser({ flags: kLean });
 
 /** Starts a server, runs `body` with the page in a tab, ends both. Expects no console error and no request to another server. */
 async function withPage(serverOptions, tabOptions, body, { mayWarn = false, hash = "", browser = chromium.browser } = {}) {
@@ -135,7 +135,7 @@ const tests = {
   },
 
   async "no WebGL: a table of positions and the plots"() {
-    const flat = await startBrowser({ flags: ["--disable-3d-apis"] });
+    const flat = await startBrowser({ flags: [...kLean, "--disable-3d-apis"] });
     const check = async (page) => {
       await untilFlies(page);
       assert.equal((await state(page)).has_scene, false);

@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { mkdirSync } from "node:fs";
 import { join } from "node:path";
-import { readPixels, startBrowser, waitFor } from "./browser.mjs";
+import { kLean, open, readPixels, startBrowser, waitFor } from "./browser.mjs";
 import { startFlight } from "./flight.mjs";
 
 const [build, folder, domain = "140"] = process.argv.slice(2);
@@ -12,8 +12,8 @@ const kTolerance = 6;
 const kPlaces = [[0, 0], [-3, -2], [3, -2], [-3, 2], [3, 2]];
 
 const flight = await startFlight({ build, domain });
-const chromium = await startBrowser();
-const { page, browser } = chromium;
+const { browser, stop } = await startBrowser({ flags: kLean });
+const { page, errors, requests } = await open(browser);
 const state = () => page.evaluate(() => window.slsView.state());
 try {
   await page.goto(flight.url);
@@ -65,11 +65,11 @@ try {
   await page.screenshot({ path: join(folder, "real.png") });
   console.log("ok the page finds a viewer that was started again");
 
-  const unexpected = chromium.errors.filter((text) => !/WebSocket|ERR_CONNECTION/.test(text));
+  const unexpected = errors.filter((text) => !/WebSocket|ERR_CONNECTION/.test(text));
   assert.deepEqual(unexpected, []);
-  for (const url of chromium.requests) assert.ok(url.startsWith(flight.url) || url.startsWith("data:"), `foreign request: ${url}`);
+  for (const url of requests) assert.ok(url.startsWith(flight.url) || url.startsWith("data:"), `foreign request: ${url}`);
   console.log("ok no error in the console, no request to another server");
 } finally {
-  await chromium.stop();
+  await stop();
   await flight.stop();
 }

@@ -7,12 +7,13 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
 import { fileURLToPath, pathToFileURL } from "node:url";
-import puppeteer from "puppeteer-core";
+import { kLean, startBrowser } from "../page/browser.mjs";
 
 const root = fileURLToPath(new URL("../../../..", import.meta.url));
 const bin = join(process.env.SLS_BUILD ?? join(root, "build"), "bin");
 const folder = mkdtempSync(join(tmpdir(), "sls-replay-"));
 const kTimeout = 60_000;
+let chromium;
 let browser;
 
 function fly(name, change = (text) => text) {
@@ -38,7 +39,7 @@ async function open(address, { reducedMotion = true } = {}) {
   const page = await browser.newPage();
   const problems = [];
   const requests = [];
-  page.on("console", (message) => problems.push(message.text()));
+  page.on("console", (message) => /ReadPixels/.test(message.text()) || problems.push(message.text()));
   page.on("pageerror", (error) => problems.push(error.message));
   page.on("request", (request) => request.url().startsWith("data:") || requests.push(request.url()));
   await page.setViewport({ width: 1280, height: 800 });
@@ -71,18 +72,14 @@ async function readPixel(page, [x, y]) {
 }
 
 before(async () => {
-  browser = await puppeteer.launch({
-    executablePath: "/usr/bin/chromium",
-    userDataDir: join(folder, "profile"),
-    args: ["--headless", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic",
-      "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"],
-  });
+  chromium = await startBrowser({ flags: kLean });
+  browser = chromium.browser;
   fly("first");
   fly("second", (text) => text.replace("horizontal: 10", "horizontal: 3"));
 });
 
 after(async () => {
-  await browser?.close();
+  await chromium?.stop();
   rmSync(folder, { recursive: true, force: true });
 });
 
