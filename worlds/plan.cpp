@@ -90,7 +90,7 @@ Fault draw_fault(const Plan& plan, Random& random, std::int64_t count) {
   static constexpr Kind kMild[] = {Kind::kStop, Kind::kCut,  Kind::kIsolate,
                                    Kind::kLoss, Kind::kSlow, Kind::kClock};
   Fault fault;
-  fault.kind = plan.is_mild ? kMild[random.integer(0, 5)] : static_cast<Kind>(random.integer(0, 8));
+  fault.kind = plan.is_mild ? kMild[random.integer(0, 5)] : static_cast<Kind>(random.integer(0, 9));
   const auto programs = static_cast<std::int64_t>(plan.programs.size());
   const auto hosts = static_cast<std::int64_t>(plan.hosts);
   const auto draw_of = [&](std::int64_t count) {
@@ -108,6 +108,7 @@ Fault draw_fault(const Plan& plan, Random& random, std::int64_t count) {
       break;
     case Kind::kStop:
     case Kind::kInterrupt:
+    case Kind::kDiskFull:
       fault.target = draw_of(programs);
       break;
     case Kind::kCut:
@@ -138,8 +139,8 @@ Fault draw_fault(const Plan& plan, Random& random, std::int64_t count) {
 }  // namespace
 
 const char* name_kind(Kind kind) {
-  static constexpr const char* kNames[] = {"kill", "stop", "interrupt", "cut",    "isolate",
-                                           "loss", "slow", "clock",     "request"};
+  static constexpr const char* kNames[] = {"kill", "stop", "interrupt", "cut",       "isolate",
+                                           "loss", "slow", "clock",     "disk-full", "request"};
   return kNames[static_cast<int>(kind)];
 }
 

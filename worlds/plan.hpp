@@ -26,6 +26,7 @@ struct Fault {
     kLoss,       ///< all links lose `value` of their datagrams for `duration`
     kSlow,       ///< the processor of program `target` is `value` s late for `duration`
     kClock,      ///< the wall clock of host `target` jumps by `value` s
+    kDiskFull,   ///< nothing can be written for recorder `target` for `duration`
     kRequest,    ///< an operator sends request `other` (SimControl.action) to server `target`
   };
   Kind kind = Kind::kKill;
@@ -38,7 +39,7 @@ struct Fault {
 
   bool is_of_program() const {
     return kind == Kind::kKill || kind == Kind::kStop || kind == Kind::kInterrupt ||
-           kind == Kind::kSlow || kind == Kind::kRequest;
+           kind == Kind::kSlow || kind == Kind::kDiskFull || kind == Kind::kRequest;
   }
 };
 const char* name_kind(Fault::Kind kind);

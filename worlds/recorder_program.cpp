@@ -2,6 +2,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include <system_error>
 #include <utility>
 #include <variant>
 
@@ -60,6 +61,7 @@ void RecorderProgram::wake() {
     if (!peer_.is_acknowledged(TopicId::kParticipant) && now() < *acknowledged_by_)
       return wake_at(now() + 1ms);
     acknowledged_by_.reset();
+    if (!failure_.empty()) return exit(1, failure_);
     core_->on_recorded(recorded_, stop_signal_);
     writing_.reset();
   }
@@ -102,8 +104,9 @@ void RecorderProgram::open() {
   if (options_.folder.empty()) {
     StoredRecording& stored = recordings_.emplace_back();
     stored.run_id = run.parameters.run_id();
-    writing_ = std::make_unique<MemoryRecording>(stored, run.parameters, scenario.record.flush_s,
-                                                 now(), [this](const auto& line) { say(line); });
+    writing_ =
+        std::make_unique<MemoryRecording>(stored, run.parameters, scenario.record.flush_s, now(),
+                                          is_disk_full_, [this](const auto& line) { say(line); });
   } else {
     writing_ = std::make_unique<FileRecording>(record::make_segment(recorder_options_, *core_),
                                                run.parameters, now());
@@ -132,7 +135,7 @@ void RecorderProgram::announce_progress(bool done) {
     message.run_id(core_->run()->parameters.run_id());
     message.scenario_sha256(core_->run()->parameters.scenario_sha256());
   }
-  message.ready(core_->is_ready());
+  message.ready(core_->is_ready() && failure_.empty());
   message.done(done);
   message.last_complete_step(writing_ ? writing_->last_complete_step() : -1);
   announce(message);
@@ -142,6 +145,20 @@ void RecorderProgram::announce_progress(bool done) {
 
 void RecorderProgram::write() {
   if (!writing_ || has_closed_) return;
+  try {
+    const bool has_come = write_samples();
+    if (has_closed_) return;
+    process_.run_at(
+        setting_.timeline.now() + (has_come ? kBusyTime : kWriteTime) + options_.disk_delay,
+        [this] { write(); });
+  } catch (const std::system_error& error) {
+    failure_ = error.what();
+    has_closed_ = true;
+  }
+}
+
+/// True if there were samples.
+bool RecorderProgram::write_samples() {
   const bool must_close = must_close_.has_value();
   bool has_come = false;
   for (const record::Arrivals::Sample& sample : arrivals_.take_all()) {
@@ -155,11 +172,8 @@ void RecorderProgram::write() {
   if (writing_->is_whole() || must_close) {
     recorded_ = writing_->close(must_close_.value_or(record::RunWatch::End()), arrivals_.refused());
     has_closed_ = true;
-    return;
   }
-  process_.run_at(
-      setting_.timeline.now() + (has_come ? kBusyTime : kWriteTime) + options_.disk_delay,
-      [this] { write(); });
+  return has_come;
 }
 
 }  // namespace sls::worlds

@@ -30,6 +30,8 @@ class RecorderProgram : public Program {
   const std::deque<StoredRecording>& recordings() const { return recordings_; }
   const std::filesystem::path& folder() const { return options_.folder; }
   bool has_recorded() const { return has_recorded_; }
+  /// Rows in memory cannot be written any more, or again.
+  void set_disk_full(bool is_full) { is_disk_full_ = is_full; }
   /// The last recording that was closed is complete.
   bool is_complete() const { return recorded_.is_complete; }
 
@@ -42,6 +44,7 @@ class RecorderProgram : public Program {
   void announce_progress(bool done);
   /// A pass of the writing thread.
   void write();
+  bool write_samples();
   void on_killed() override { writing_.reset(); }
 
   const Options options_;
@@ -53,6 +56,8 @@ class RecorderProgram : public Program {
   std::unique_ptr<WorldRecording> writing_;  // of the run that is recorded
   std::optional<record::RunWatch::End> must_close_;
   bool has_recorded_ = false;
+  bool is_disk_full_ = false;
+  std::string failure_;  // of the writing thread
   bool has_closed_ = false;
   record::RecorderCore::Recorded recorded_;
   std::optional<sync::Time> acknowledged_by_;  // the end of a wait

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "common/bus/convert.hpp"
+#include "sim_server/event_queue.hpp"
 #include "sim_server/messages.hpp"
 
 namespace sls::worlds {
@@ -17,10 +18,7 @@ using namespace std::chrono_literals;
 
 constexpr std::size_t kDatagram_bytes = 1400;
 constexpr std::size_t kBatch_bytes = 60'000;
-constexpr std::size_t kBatchSteps = 64;      // as RecordStream
-constexpr Instant kBatchTime = 20ms;         // likewise
-constexpr auto kLifespan = 200ms;            // of commands in real time
-constexpr std::size_t kMostCommands = 4096;  // as EventQueue
+constexpr auto kLifespan = 200ms;  // of commands in real time
 
 void fly_one_after_another(std::size_t count, const std::function<void(std::size_t)>& work) {
   for (std::size_t i = 0; i < count; ++i) work(i);
@@ -189,7 +187,7 @@ void ServerProgram::on_commands(const Commands& sample, const Peer::Arrival& arr
     if (!outbox_.empty() || core_->phase() == sim::ServerCore::Phase::kEnded) wake_soon();
     return wake_at(core_->next_deadline());
   }
-  if (events_.size() < kMostCommands) events_.push_back(std::move(received));
+  if (events_.size() < sim::EventQueue::kMostCommands) events_.push_back(std::move(received));
   wake_soon();
 }
 
@@ -219,11 +217,12 @@ void ServerProgram::record_step(const sim::Fleet& fleet) {
     certificate_->add(record);
   }
   setting_.properties.on_recorded(core_->run_id(), fleet.records());
-  if (++steps_ >= kBatchSteps) return write_records(false);
+  if (++steps_ >= sim::RecordStream::kMostSteps) return write_records(false);
   if (steps_ > 1) return;
-  process_.run_at(setting_.timeline.now() + kBatchTime, [this, number = flush_number_] {
-    if (number == flush_number_ && !entries_.empty()) write_records(false);
-  });
+  process_.run_at(setting_.timeline.now() + sim::RecordStream::kLongestWait,
+                  [this, number = flush_number_] {
+                    if (number == flush_number_ && !entries_.empty()) write_records(false);
+                  });
 }
 
 void ServerProgram::record_late(const sim::Vehicle& vehicle, const sim::OfferedAnswer& offered) {

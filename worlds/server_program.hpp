@@ -12,8 +12,8 @@
 #include "closed_loop/flight_certificate.hpp"
 #include "common/sync/recorders_end.hpp"
 #include "sim_server/core/server_core.hpp"
-#include "sim_server/record_batches.hpp"
-#include "sim_server/state_samples.hpp"
+#include "sim_server/record_stream.hpp"
+#include "sim_server/state_stream.hpp"
 #include "worlds/program.hpp"
 
 namespace sls::worlds {

@@ -161,9 +161,19 @@ class World {
       case Kind::kClock:
         return hosts_[fault.target].set_wall_clock(
             std::chrono::nanoseconds(static_cast<std::int64_t>(fault.value * 1e9)));
+      case Kind::kDiskFull:
+        return fill_disk(fault);
       case Kind::kRequest:
         return request(fault);
     }
+  }
+
+  void fill_disk(const Fault& fault) {
+    Program* program = current_[fault.target];
+    if (!program || program->role() != Role::kRecorder) return;
+    auto* recorder = static_cast<RecorderProgram*>(program);
+    recorder->set_disk_full(true);
+    setting_.timeline.after(fault.duration, [recorder] { recorder->set_disk_full(false); });
   }
 
   void kill(const Fault& fault) {

@@ -1,5 +1,7 @@
 #include "worlds/world_recording.hpp"
 
+#include <cerrno>
+#include <system_error>
 #include <utility>
 
 #include "recorder/recording_reader.hpp"
@@ -42,8 +44,11 @@ record::RecorderCore::Recorded FileRecording::close(const record::RunWatch::End&
 }
 
 MemoryRecording::MemoryRecording(StoredRecording& stored, const Parameters& parameters,
-                                 double flush_s, sync::Time now, Say say)
-    : stored_(stored), say_(std::move(say)), core_(parameters, 0, flush_s, now, *this) {}
+                                 double flush_s, sync::Time now, const bool& is_disk_full, Say say)
+    : stored_(stored),
+      is_disk_full_(is_disk_full),
+      say_(std::move(say)),
+      core_(parameters, 0, flush_s, now, *this) {}
 
 bool MemoryRecording::add(const record::StepRows& rows) {
   certificate_.add(rows);
@@ -52,6 +57,7 @@ bool MemoryRecording::add(const record::StepRows& rows) {
 }
 
 void MemoryRecording::flush() {
+  if (is_disk_full_) throw std::system_error(ENOSPC, std::generic_category(), "state.csv");
   for (auto& [vehicle, rows] : unwritten_) {
     StoredRecording::Rows& kept = stored_.rows[vehicle];
     kept.steps.insert(kept.steps.end(), rows.steps.begin(), rows.steps.end());
@@ -62,8 +68,9 @@ void MemoryRecording::flush() {
 
 record::RecorderCore::Recorded MemoryRecording::close(const record::RunWatch::End& end,
                                                       std::uint64_t refused) {
-  stored_.claims = core_.on_end({end.interruption, end.outcome}, refused);
+  const record::Claims claims = core_.on_end({end.interruption, end.outcome}, refused);
   core_.flush();
+  stored_.claims = claims;  // the last manifest comes after the rows
   stored_.certificate = certificate_.finish();
   stored_.is_closed = true;
   record::RecorderCore::Recorded recorded;

@@ -51,9 +51,10 @@ class FileRecording final : public WorldRecording {
 class MemoryRecording final : public WorldRecording, private record::RecordingOutputs {
  public:
   using Say = std::function<void(const sync::Line&)>;
-  /// Rows and claims that reach the disk go into `stored`.
+  /// Rows and claims that reach the disk go into `stored`. Every member @throws std::system_error
+  /// while `is_disk_full`.
   MemoryRecording(StoredRecording& stored, const Parameters& parameters, double flush_s,
-                  sync::Time now, Say say);
+                  sync::Time now, const bool& is_disk_full, Say say);
 
   void add(const RecordBatch& batch, sync::Time now) override { core_.on_batch(batch, now); }
   void add(const SimStatus& status) override { core_.on_status(status); }
@@ -73,6 +74,7 @@ class MemoryRecording final : public WorldRecording, private record::RecordingOu
   void log(const sync::Line& line) override { say_(line); }
 
   StoredRecording& stored_;
+  const bool& is_disk_full_;
   const Say say_;
   record::Certificate certificate_;
   std::map<std::uint32_t, StoredRecording::Rows> unwritten_;  // rows that are not on the disk

@@ -107,7 +107,7 @@ def delay_margin(words: list[str]) -> NoReturn:
 def worlds(words: list[str]) -> NoReturn:
     # A first word without a dash is the scenario; the options are the program's.
     if words and not words[0].startswith("-"):
-        words = [f"--scenario={find_file("scenarios", words[0])}", *words[1:]]
+        words = ["--scenario", find_file("scenarios", words[0]), *words[1:]]
     replace_by_program("sls_worlds", words)
 
 
