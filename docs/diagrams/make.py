@@ -40,7 +40,8 @@ def read_rules():
 
 # Which folders the picture shows, in rows from top to bottom. tools/ and bench/ are not shown.
 ROWS = [
-    ["python", "closed_loop"],
+    ["worlds", "python"],
+    ["closed_loop"],
     ["sim_server", "control_client", "recorder"],
     ["sim_server/plants", "sim_server/autopilots", "control_client/laws", "control_client/core", "recorder/core",
      "common/bus"],

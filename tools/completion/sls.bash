@@ -2,7 +2,7 @@
 # Generated from the help of ./sls and of the programs by ./sls reference; changes here are lost.
 # tests/docs/completion_test.py completes with it. shellcheck shell=bash
 
-_sls_commands="bench build campaign campaign-worker chaos clean convert ctl delay-margin demo discovery-server docker-demo docs doctor fuzz help keys list network-table package plot python reference report run setup study systems test verify view"
+_sls_commands="bench build campaign campaign-worker chaos clean convert ctl delay-margin demo discovery-server docker-demo docs doctor fuzz help keys list network-table package plot python reference report run setup study systems test verify view worlds"
 declare -gA _sls_options=(
   ["bench"]="--help --quick --json --only --out"
   ["build"]="--help"
@@ -35,6 +35,7 @@ declare -gA _sls_options=(
   ["test"]="--help --slow --sanitize --only"
   ["verify"]="--help --version"
   ["view"]="--help --qos --domain --log-level --version --vehicle --listen --port --token-file --read-only --allow-origin --ros --identity --export --most-bytes"
+  ["worlds"]="--help --version --scenario --seeds --jobs --most --replay --verbose"
 )
 declare -gA _sls_subcommands=(
   ["campaign"]="status report compare"
@@ -46,7 +47,7 @@ declare -gA _sls_positionals=(
   ["convert"]="dir"
   ["delay-margin"]="scenario"
   ["demo"]="scenario"
-  ["help"]="bench build campaign campaign-worker chaos clean convert ctl delay-margin demo discovery-server docker-demo docs doctor fuzz help keys list network-table package plot python reference report run setup study systems test verify view"
+  ["help"]="bench build campaign campaign-worker chaos clean convert ctl delay-margin demo discovery-server docker-demo docs doctor fuzz help keys list network-table package plot python reference report run setup study systems test verify view worlds"
   ["keys"]="dir"
   ["plot"]="dir"
   ["report"]="dir"
@@ -140,6 +141,11 @@ declare -gA _sls_arguments=(
   ["view --qos"]="file"
   ["view --token-file"]="file"
   ["view --vehicle"]="any"
+  ["worlds --jobs"]="any"
+  ["worlds --most"]="any"
+  ["worlds --replay"]="any"
+  ["worlds --scenario"]="file"
+  ["worlds --seeds"]="any"
 )
 
 # _sls_names KIND: names of the scenarios or campaigns that the launcher finds.
