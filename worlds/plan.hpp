@@ -1,4 +1,4 @@
-/// What happens in a world, drawn from its seed before it begins: programs, network, faults.
+/// The plan of a world, drawn from its seed before it begins: programs, network, faults.
 #pragma once
 
 #include <cstdint>

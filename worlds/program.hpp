@@ -57,7 +57,7 @@ class Program {
   void wake_soon() { wake_at(now()); }
   virtual void wake() = 0;
   void exit(int code, std::string reason);
-  /// What the process has open is closed.
+  /// Closes the files of the process.
   virtual void on_killed() {}
 
   void announce(const Participant& message);

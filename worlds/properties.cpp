@@ -141,7 +141,7 @@ void Properties::on_status(const SimStatus& status, const Network& network) {
   check_rivals(run, network);
 }
 
-/// Whoever keeps others waiting is named.
+/// A participant that keeps others waiting is named.
 void Properties::check_stall(Run& run, std::uint64_t run_id) {
   if (!run.published || run.is_stall_found) return;
   const auto continued = continued_.find(run.server->name());

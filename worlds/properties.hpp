@@ -1,5 +1,5 @@
-/// What must hold in every world: docs/worlds.md. The programs say what they do; the properties
-/// know more than each of them.
+/// The properties that hold in every world: docs/worlds.md. The programs say what they do; the
+/// properties know more than each of them.
 #pragma once
 
 #include <cstdint>
@@ -36,7 +36,7 @@ struct StoredRecording {
   std::map<std::uint32_t, Rows> rows;  ///< by vehicle
 };
 
-/// What a user asks about a flight.
+/// The course of a finished flight.
 struct FlightSummary {
   double duration_s = 0;     ///< from the first state to the end, simulated
   double worst_error_m = 0;  ///< of the load, from its reference

@@ -40,7 +40,7 @@ struct FlightTable {
   std::vector<std::string> describe() const;
 };
 
-/// What a search has found. It does not depend on the number of jobs, unless it ended early.
+/// The findings of a search. It does not depend on the number of jobs, unless it ended early.
 struct SearchResult {
   std::uint64_t worlds = 0;
   std::uint64_t finished = 0;  ///< in which a flight was finished

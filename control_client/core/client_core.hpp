@@ -53,7 +53,7 @@ class ClientCore {
   const std::optional<sync::Run>& run() const { return run_; }
   /// Those of our vehicles that the run has.
   std::vector<std::uint32_t> list_flown_ids() const;
-  /// What the client announces now.
+  /// The announcement for the present phase.
   Participant make_announcement() const;
   /// Why the client ends; empty if there is nothing wrong.
   const std::string& error() const { return error_; }

@@ -312,7 +312,7 @@ TEST_P(ConformanceTest, BestEffortSamplesOfAWriterNeverComeTwiceOrInAnotherOrder
   EXPECT_EQ(std::adjacent_find(heard.begin(), heard.end(), std::greater_equal<>()), heard.end());
 }
 
-TEST_P(ConformanceTest, WhoMatchesOneTopicHearsNothingOfAnother) {
+TEST_P(ConformanceTest, AReaderHearsNothingOfAnotherTopic) {
   const auto status = add_writer(TopicId::kStatus), record = add_writer(TopicId::kRecord);
   status->write(1);
   record->write(2);

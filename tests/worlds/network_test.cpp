@@ -1,8 +1,9 @@
-// What the simulated network allows. Times are simulated.
+// The simulated network alone. Times are simulated.
 #include "worlds/network.hpp"
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <memory>
 #include <vector>
 

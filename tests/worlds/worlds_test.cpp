@@ -56,7 +56,7 @@ TEST_F(WorldsTest, EveryPropertyHoldsInEveryWorld) {
   for (const auto& [kind, count] : result.faults) EXPECT_GT(count, kWorlds / 10) << kind;
 }
 
-TEST_F(WorldsTest, WhatFailedOnceHolds) {
+TEST_F(WorldsTest, SeedsThatFailedOnceHold) {
   std::ifstream lines(SLS_SOURCE_DIR "/worlds/seeds.txt");
   ASSERT_TRUE(lines);
   for (std::string line; std::getline(lines, line);) {

@@ -1,4 +1,4 @@
-// What lies between answers and measurements: docs/design.md, sections 6 ("Faults", "Sensing").
+// From answers to measurements: docs/design.md, sections 6 ("Faults", "Sensing").
 #include "sim_server/core/plant_side.hpp"
 
 #include <gtest/gtest.h>
