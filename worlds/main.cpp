@@ -137,6 +137,7 @@ int main(int argc, char** argv) {
     print_story(
         worlds::shrink(worlds::draw_plan(first, scenarios), scenarios, folder.path() / "shrink"),
         scenarios, folder.path() / "tell");
+    std::cout << std::flush;  // the error comes last
     throw app::RunError(
         fmt::format("{} of {} worlds failed", result.failures.size(), result.worlds));
   });
