@@ -94,12 +94,36 @@ void ClientProgram::on_states(const States& sample, const Peer::Arrival& arrival
   try {
     const Commands* answers = answerer_->answer(sample);
     if (!answers) return;
-    if (options_.compute_time.count() == 0) return peer_.write(*answers);
+    if (options_.compute_time.count() == 0) return send(*answers);
     process_.run_at(setting_.timeline.now() + options_.compute_time,
-                    [this, copy = *answers] { peer_.write(copy); });
+                    [this, copy = *answers] { send(copy); });
   } catch (const std::exception& error) {
     broken_ = error.what();
   }
+}
+
+void ClientProgram::send(const Commands& answers) {
+  if (options_.is_sloppy && setting_.random.chance(0.05)) {
+    const bool is_lockstep = setting_.flown->scenario.sync.mode == config::SyncMode::kLockstep;
+    Commands wrong = answers;
+    for (ControlCommand& command : wrong.vehicles()) command.f_Q_W_n()[0] += 1;
+    switch (setting_.random.integer(0, 3)) {
+      case 0:
+        wrong.run_id(answers.run_id() + 1);
+        break;
+      case 1:
+        // In real time a late answer may be held, so a client can do harm to itself.
+        wrong.step(answers.step() - (is_lockstep ? 1 : 1001));
+        break;
+      case 2:
+        for (ControlCommand& command : wrong.vehicles()) command.vehicle_id(77);
+        break;
+      default:
+        wrong.step(answers.step() + 1000);
+    }
+    peer_.write(wrong);
+  }
+  peer_.write(answers);
 }
 
 }  // namespace sls::worlds

@@ -19,6 +19,7 @@ class ClientProgram : public Program {
     std::int32_t strength = 0;
     bool follows_servers = false;
     bool has_other_scenario = false;  ///< a wrong file was given
+    bool is_sloppy = false;           ///< now and then it sends an answer to something else first
     Instant compute_time{0};          ///< of an answer
     control::LawMaker make_law = &control::make_control_law;
   };
@@ -31,6 +32,7 @@ class ClientProgram : public Program {
   void wake() override;
   void begin();
   void on_states(const States& sample, const Peer::Arrival& arrival);
+  void send(const Commands& answers);
 
   const Options options_;
   config::Scenario scenario_;

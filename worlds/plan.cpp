@@ -54,23 +54,31 @@ void draw_programs(Plan& plan, Random& random, const FlownScenario& flown) {
     program.host = draw_host();
     program.start = draw_time(random, 0ms, 1500ms);
     program.vehicle_ids = list_vehicles(flown);
-    program.follows_servers = random.chance(0.4);
+    program.follows_servers = plan.promise == Promise::kServerRestart || random.chance(0.4);
     return program;
   };
   add(Role::kServer);
-  if (!plan.is_mild && random.chance(0.25)) add(Role::kServer);
-  const int clients = expected.controllers + static_cast<int>(random.integer(0, 1));
+  const bool is_wild = plan.promise == Promise::kNone;
+  if (is_wild && random.chance(0.25)) add(Role::kServer);
+  // A server that was started again waits for the expected ones alone.
+  const bool has_surplus = plan.promise != Promise::kServerRestart;
+  const int clients =
+      expected.controllers + (plan.promise == Promise::kTakeOver
+                                  ? 1
+                                  : static_cast<int>(random.integer(0, has_surplus ? 1 : 0)));
   for (int i = 0; i < clients; ++i) {
     PlannedProgram& client = add(Role::kClient);
     client.strength = static_cast<std::int32_t>(random.integer(0, 3));
     if (random.chance(0.1)) client.delay = draw_time(random, 100us, 3ms);
-    if (!plan.is_mild && random.chance(0.03)) client.has_other_scenario = true;
+    if (is_wild && random.chance(0.03)) client.has_other_scenario = true;
+    client.is_sloppy = random.chance(0.2);
   }
   if (random.chance(0.15)) add(Role::kForeign);
-  const int recorders = std::max(expected.recorders, static_cast<int>(random.integer(0, 2)));
+  const int recorders =
+      std::max(expected.recorders, static_cast<int>(random.integer(0, has_surplus ? 2 : 0)));
   for (int i = 0; i < recorders; ++i) {
     PlannedProgram& recorder = add(Role::kRecorder);
-    recorder.resumes = random.chance(0.7);
+    recorder.resumes = plan.promise == Promise::kRecorderRestart || random.chance(0.7);
     if (random.chance(0.1)) recorder.delay = draw_time(random, 1ms, 100ms);
   }
 }
@@ -90,14 +98,16 @@ Fault draw_fault(const Plan& plan, Random& random, std::int64_t count) {
   static constexpr Kind kMild[] = {Kind::kStop, Kind::kCut,  Kind::kIsolate,
                                    Kind::kLoss, Kind::kSlow, Kind::kClock};
   Fault fault;
-  fault.kind = plan.is_mild ? kMild[random.integer(0, 5)] : static_cast<Kind>(random.integer(0, 9));
+  fault.kind = plan.promise == Promise::kMild ? kMild[random.integer(0, 5)]
+                                              : static_cast<Kind>(random.integer(0, 9));
   const auto programs = static_cast<std::int64_t>(plan.programs.size());
   const auto hosts = static_cast<std::int64_t>(plan.hosts);
   const auto draw_of = [&](std::int64_t count) {
     return static_cast<std::size_t>(random.integer(0, count - 1));
   };
   // A server that has ended waits 1 s for the others to hear it.
-  const Instant longest = plan.is_mild         ? Instant(900ms) / count
+  const bool is_mild = plan.promise == Promise::kMild;
+  const Instant longest = is_mild              ? Instant(900ms) / count
                           : random.chance(0.3) ? Instant(15s)
                                                : Instant(3s);
   fault.duration = draw_time(random, 1ms, longest);
@@ -117,11 +127,11 @@ Fault draw_fault(const Plan& plan, Random& random, std::int64_t count) {
       fault.other = draw_of(hosts);
       break;
     case Kind::kLoss:
-      fault.value = random.between(0.05, plan.is_mild ? 0.3 : 0.9);
+      fault.value = random.between(0.05, is_mild ? 0.3 : 0.9);
       break;
     case Kind::kSlow:
       fault.target = draw_of(programs);
-      fault.value = random.between(0.0005, plan.is_mild ? 0.02 : 0.3);
+      fault.value = random.between(0.0005, is_mild ? 0.02 : 0.3);
       break;
     case Kind::kClock:
       fault.target = draw_of(hosts);
@@ -136,7 +146,44 @@ Fault draw_fault(const Plan& plan, Random& random, std::int64_t count) {
   return fault;
 }
 
+/// A promise holds only if policies wait, and 8 s are enough for what happens.
+Promise draw_promise(Random& random, const config::Sync& sync) {
+  if (sync.wait.controller.policy != config::ControllerPolicy::kWait ||
+      sync.wait.recorder.policy == config::RecorderPolicy::kStop)
+    return Promise::kNone;
+  const double choice = random.uniform();
+  if (choice < 0.4) return Promise::kNone;
+  if (choice < 0.7) return Promise::kMild;
+  if (choice < 0.82) return Promise::kTakeOver;
+  if (choice < 0.94 || sync.wait_for.recorders == 0) return Promise::kServerRestart;
+  return Promise::kRecorderRestart;
+}
+
+/// The one fault of a world with another promise than kMild.
+Fault draw_kill(const Plan& plan, Random& random, const FlownScenario& flown) {
+  const Role role = plan.promise == Promise::kTakeOver        ? Role::kClient
+                    : plan.promise == Promise::kServerRestart ? Role::kServer
+                                                              : Role::kRecorder;
+  std::vector<std::size_t> targets;
+  for (std::size_t i = 0; i < plan.programs.size(); ++i)
+    if (plan.programs[i].role == role) targets.push_back(i);
+  Fault fault;
+  fault.kind = Kind::kKill;
+  fault.target = targets[static_cast<std::size_t>(
+      random.integer(0, static_cast<std::int64_t>(targets.size()) - 1))];
+  fault.step =
+      static_cast<std::uint64_t>(random.integer(0, static_cast<std::int64_t>(flown.last_step) - 5));
+  if (role != Role::kClient) fault.duration = draw_time(random, 1ms, 3s);
+  return fault;
+}
+
 }  // namespace
+
+const char* name_promise(Promise promise) {
+  static constexpr const char* kNames[] = {"no promise", "mild", "take-over", "server restart",
+                                           "recorder restart"};
+  return kNames[static_cast<int>(promise)];
+}
 
 const char* name_kind(Kind kind) {
   static constexpr const char* kNames[] = {"kill", "stop", "interrupt", "cut",       "isolate",
@@ -153,15 +200,18 @@ Plan draw_plan(std::uint64_t seed, const std::vector<FlownScenario>& scenarios) 
   const FlownScenario& flown = scenarios[plan.scenario];
   const bool is_lockstep = flown.scenario.sync.mode == config::SyncMode::kLockstep;
   const config::WaitPolicies& wait = flown.scenario.sync.wait;
-  plan.is_mild = random.chance(0.5) && wait.controller.policy == config::ControllerPolicy::kWait &&
-                 wait.recorder.policy != config::RecorderPolicy::kStop;
+  plan.promise = draw_promise(random, flown.scenario.sync);
   plan.hosts = static_cast<std::size_t>(random.integer(1, 4));
   plan.link = draw_link(random);
   plan.drift = random.chance(0.3) ? random.between(-1e-4, 1e-4) : 0;
   plan.wall_offset_s = random.chance(0.3) ? random.between(-20, 20) : 0;
   plan.healed = draw_time(random, 1s, is_lockstep ? Instant(6s) : Instant(4s));
-  plan.has_files = random.chance(0.1);
+  plan.has_files = plan.promise == Promise::kRecorderRestart || random.chance(0.08);
   draw_programs(plan, random, flown);
+  if (plan.promise > Promise::kMild) {
+    plan.faults.push_back(draw_kill(plan, random, flown));
+    return plan;
+  }
   const std::int64_t faults = random.chance(0.15) ? 0 : random.integer(1, 6);
   for (std::int64_t i = 0; i < faults; ++i) {
     Fault fault = draw_fault(plan, random, faults);
@@ -193,9 +243,9 @@ std::vector<std::string> describe(const Plan& plan) {
     return std::chrono::duration<double, std::milli>(time).count();
   };
   std::vector<std::string> lines = {fmt::format(
-      "seed {}: scenario {}, {} host(s), link {:.3f} ms + {:.3f} ms, loss {:.4f}, {} faults{}",
+      "seed {}: scenario {}, {} host(s), link {:.3f} ms + {:.3f} ms, loss {:.4f}, {} faults, {}",
       plan.seed, plan.scenario, plan.hosts, to_ms(plan.link.delay), to_ms(plan.link.jitter),
-      plan.link.loss, plan.faults.size(), plan.is_mild ? ", mild" : "")};
+      plan.link.loss, plan.faults.size(), name_promise(plan.promise))};
   for (std::size_t i = 0; i < plan.programs.size(); ++i) {
     const PlannedProgram& program = plan.programs[i];
     lines.push_back(fmt::format("{} on host {} at {:.3f} ms: strength {}{}{}, delay {:.3f} ms",

@@ -52,9 +52,21 @@ struct PlannedProgram {
   std::int32_t strength = 0;
   bool follows_servers = false;
   bool has_other_scenario = false;
-  bool resumes = false;  ///< a recorder that takes the place of a killed one goes on
-  Instant delay{0};      ///< computing time of an answer; of the disk of a recorder
+  bool is_sloppy = false;  ///< a client that also sends what nobody asked for
+  bool resumes = false;    ///< a recorder that takes the place of a killed one goes on
+  Instant delay{0};        ///< computing time of an answer; of the disk of a recorder
 };
+
+/// The faults of a world after which a flight must be finished, and every program that is not
+/// killed end with exit code 0.
+enum class Promise {
+  kNone,             ///< all kinds of faults
+  kMild,             ///< short stops and cuts, some loss, slow processors, clocks
+  kTakeOver,         ///< a client is killed in flight; another one is there
+  kServerRestart,    ///< the server is killed in flight and started again; the others follow
+  kRecorderRestart,  ///< a recorder is killed in flight and started again with --resume
+};
+const char* name_promise(Promise promise);
 
 struct Plan {
   std::uint64_t seed = 0;
@@ -68,8 +80,7 @@ struct Plan {
   std::vector<Fault> faults;
   /// The faults are over: from now on all that can finish must.
   Instant healed{0};
-  /// Only faults after which the flight must finish: every survivor ends with exit code 0.
-  bool is_mild = false;
+  Promise promise = Promise::kNone;
 };
 
 /// `scenarios`: number of scenarios to choose from, with their vehicles.

@@ -35,6 +35,7 @@ void Program::go_on() {
 
 void Program::exit(int code, std::string reason) {
   exit_code_ = code;
+  ended_ = setting_.timeline.now();
   reason_ = std::move(reason);
   say(fmt::format("ends with exit code {}{}{}", code, reason_.empty() ? "" : ": ", reason_));
   process_.end();

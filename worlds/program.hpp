@@ -45,6 +45,7 @@ class Program {
   /// After its end, unless it was killed.
   std::optional<int> exit_code() const { return exit_code_; }
   const std::string& reason() const { return reason_; }
+  Instant ended() const { return ended_; }
   /// The processor takes so much longer for each wake-up.
   void set_slowness(Instant delay) { slowness_ = delay; }
 
@@ -87,6 +88,7 @@ class Program {
   bool was_killed_ = false;
   std::optional<int> exit_code_;
   std::string reason_;
+  Instant ended_{0};
 };
 
 }  // namespace sls::worlds

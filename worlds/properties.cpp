@@ -21,6 +21,9 @@ constexpr Instant kNamedWithin = 2500ms;
 /// Two servers of one vehicle that hear each other: one of them has gone after this.
 constexpr Instant kRivalsGoneWithin = 4s;
 
+/// A server waits at most 1 s for acknowledgements of each of two topics.
+constexpr Instant kEndsWithin = 3500ms;
+
 void mix(std::uint64_t& hash, std::uint64_t value) {
   hash = (hash ^ value) * 0x100000001b3u;
   hash ^= hash >> 29;
@@ -81,8 +84,23 @@ void Properties::on_run(const Program& server, std::uint64_t run_id, const Param
   run.vehicle_ids = sync::list_vehicle_ids(parameters);
 }
 
-void Properties::on_published(std::uint64_t run_id, std::uint64_t) {
+void Properties::on_yielded(const Program& server) {
+  const auto flies = [&](const auto& item) {
+    const Run& run = item.second;
+    // One that still waits after its run counts, too: its history comes sample by sample.
+    return run.server != &server && !run.server->process().has_ended();
+  };
+  if (std::none_of(runs_.begin(), runs_.end(), flies) && killed_.empty())
+    find(fmt::format("yields: {} yields to nobody", server.name()));
+}
+
+void Properties::on_published(std::uint64_t run_id, std::uint64_t step,
+                              const config::WaitFor& expected) {
   Run& run = runs_[run_id];
+  if (step == 0 && (static_cast<int>(run.ready.size()) < expected.controllers ||
+                    static_cast<int>(run.recorders.size()) < expected.recorders))
+    find(fmt::format("start: run {:016x} begins with {} controllers and {} recorders", run_id,
+                     run.ready.size(), run.recorders.size()));
   run.published = timeline_.now();
   if (!run.began) run.began = run.published;
   run.is_stall_found = false;
@@ -179,6 +197,7 @@ void Properties::check_rivals(const Run& run, const Network& network) {
 void Properties::on_run_end(std::uint64_t run_id, bool is_finished, std::string certificate) {
   Run& run = runs_[run_id];
   run.has_ended = true;
+  run.ended = timeline_.now();
   run.is_finished = is_finished;
   if (run.began)
     run.summary.duration_s = std::chrono::duration<double>(timeline_.now() - *run.began).count();
@@ -186,8 +205,10 @@ void Properties::on_run_end(std::uint64_t run_id, bool is_finished, std::string 
 }
 
 void Properties::on_announced(const Program& program, const Participant& message) {
-  if (program.role() == Role::kClient && message.ready())
-    runs_[message.run_id()].ready.insert(program.name());
+  if (!message.ready()) return;
+  Run& run = runs_[message.run_id()];
+  if (program.role() == Role::kClient) run.ready.insert(program.name());
+  if (program.role() == Role::kRecorder) run.recorders.insert(program.name());
 }
 
 void Properties::on_killed(const Program& program) { killed_[program.name()] = timeline_.now(); }
@@ -217,14 +238,18 @@ void Properties::check(const Plan& plan, const std::vector<std::unique_ptr<Progr
       for (const StoredRecording& recording : recorder.recordings())
         check_recording(*program, recording, flown);
     }
-    if (plan.is_mild && has_joined(*program) && program->exit_code().value_or(0) != 0)
+    if (plan.promise != Promise::kNone && program->role() == Role::kServer)
+      check_end(*program, programs);
+    if (plan.promise != Promise::kNone && has_joined(*program) &&
+        program->exit_code().value_or(0) != 0)
       find(fmt::format("finishes: {} ends with {}: {}", program->name(), *program->exit_code(),
                        program->reason()));
   }
   for (const auto& [folder, program] : folders)
     for (const StoredRecording& recording : read_recordings(folder))
       check_recording(*program, recording, flown);
-  if (plan.is_mild && !is_any_finished()) find("finishes: no flight was finished");
+  if (plan.promise != Promise::kNone && !is_any_finished())
+    find("finishes: no flight was finished");
 }
 
 void Properties::check_recording(const Program& program, const StoredRecording& recording,
@@ -281,6 +306,24 @@ void Properties::check_rows(const Program& program, const StoredRecording& recor
                                 program.name(), step, vehicle));
       next = step + 1;
     }
+  }
+}
+
+/// A server ends soon after the recorders of its finished run.
+void Properties::check_end(const Program& server,
+                           const std::vector<std::unique_ptr<Program>>& programs) {
+  if (server.was_killed() || !server.exit_code()) return;
+  for (const auto& [run_id, run] : runs_) {
+    if (run.server != &server || !run.is_finished) continue;
+    Instant last = run.ended;
+    for (const auto& program : programs)
+      if (program->role() == Role::kRecorder && run.recorders.count(program->name()) > 0) {
+        if (program->was_killed()) return;
+        last = std::max(last, program->ended());
+      }
+    if (server.ended() > last + kEndsWithin)
+      find(fmt::format("prompt: {} ends {:.3f} s after its last recorder", server.name(),
+                       std::chrono::duration<double>(server.ended() - last).count()));
   }
 }
 

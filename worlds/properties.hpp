@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/config/scenario.hpp"
 #include "common/model/step_record.hpp"
 #include "recorder/core/recording_core.hpp"
 #include "worlds/network.hpp"
@@ -55,8 +56,10 @@ class Properties {
   // --- what the programs do ---
 
   void on_run(const Program& server, std::uint64_t run_id, const Parameters& parameters);
+  /// A server ends because another one has its vehicles.
+  void on_yielded(const Program& server);
   /// States of a step leave for the first time.
-  void on_published(std::uint64_t run_id, std::uint64_t step);
+  void on_published(std::uint64_t run_id, std::uint64_t step, const config::WaitFor& expected);
   void on_recorded(std::uint64_t run_id, const std::vector<model::StepRecord>& records);
   void on_late(std::uint64_t run_id) { runs_[run_id].has_late = true; }
   void on_status(const SimStatus& status, const Network& network);
@@ -81,11 +84,13 @@ class Properties {
     const Program* server = nullptr;
     std::vector<std::uint32_t> vehicle_ids;
     std::set<std::string> ready;                               // clients that have announced it
+    std::set<std::string> recorders;                           // the same
     std::map<std::uint32_t, std::vector<std::uint64_t>> rows;  // hashes, by vehicle and step
     std::map<std::uint32_t, model::StepRecord> last;
     bool is_exact = true;  // each force answers its own state
     bool has_late = false;
     bool has_ended = false;
+    Instant ended{0};
     bool is_finished = false;
     std::string certificate;
     std::string timing;
@@ -106,6 +111,7 @@ class Properties {
                        const FlownScenario& flown);
   void check_rows(const Program& program, const StoredRecording& recording, const Run& run);
   void check_exit(const Program& program);
+  void check_end(const Program& server, const std::vector<std::unique_ptr<Program>>& programs);
 
   const Timeline& timeline_;
   Trace& trace_;

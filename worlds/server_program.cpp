@@ -113,6 +113,8 @@ void ServerProgram::end_run() {
                                  certificate_->finish());
   if (core_->end() == sim::ServerCore::End::kReset)
     return begin_run({0, false, core_->is_paused()});
+  if (core_->error().find("expected no other server") != std::string::npos)
+    setting_.properties.on_yielded(*this);
   if (!core_->is_known()) return exit(1, core_->error());
   linger_.emplace(now(),
                   core_->end() == sim::ServerCore::End::kFailed ? 0 : core_->expected_recorders(),
@@ -197,7 +199,8 @@ sim::Moment ServerProgram::send_states(const sim::Fleet& fleet) {
   const sim::Moment moment{now(), process_.host().wall()};
   if (fleet.step() + 1 > published_steps_) {
     published_steps_ = fleet.step() + 1;
-    setting_.properties.on_published(core_->run_id(), fleet.step());
+    setting_.properties.on_published(core_->run_id(), fleet.step(),
+                                     setting_.flown->scenario.sync.wait_for);
     if (setting_.on_step) setting_.on_step(fleet.step());
   }
   states_.make(

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <deque>
+#include <set>
 
 #include "worlds/client_program.hpp"
 #include "worlds/foreign_program.hpp"
@@ -88,7 +89,7 @@ class World {
       program = std::make_unique<ClientProgram>(
           setting_, host, name,
           ClientProgram::Options{planned.vehicle_ids, planned.strength, planned.follows_servers,
-                                 planned.has_other_scenario, planned.delay});
+                                 planned.has_other_scenario, planned.is_sloppy, planned.delay});
     else if (planned.role == Role::kForeign)
       program = std::make_unique<ForeignProgram>(setting_, host, name);
     else
@@ -126,8 +127,10 @@ class World {
 
   void on_step(std::uint64_t step) {
     if (setting_.timeline.now() >= plan_.healed) return;
+    // Once, although a further run has this step, too.
     for (const Fault& fault : plan_.faults)
-      if (fault.step == step) setting_.timeline.after(fault.at, [this, &fault] { begin(fault); });
+      if (fault.step == step && begun_.insert(&fault).second)
+        setting_.timeline.after(fault.at, [this, &fault] { begin(fault); });
   }
 
   void begin(const Fault& fault) {
@@ -279,6 +282,7 @@ class World {
   std::size_t pending_starts_ = 0;
   int restarts_ = 0;
   double extra_loss_ = 0;
+  std::set<const Fault*> begun_;  // those of a step
   std::map<std::pair<std::size_t, std::size_t>, int> cuts_;
 };
 
