@@ -19,8 +19,8 @@ class ClientProgram : public Program {
     std::int32_t strength = 0;
     bool follows_servers = false;
     bool has_other_scenario = false;  ///< a wrong file was given
-    bool is_sloppy = false;           ///< now and then it sends an answer to something else first
-    Instant compute_time{0};          ///< of an answer
+    bool is_sloppy = false;   ///< one answer in 20 comes after one to another run, step or vehicle
+    Instant compute_time{0};  ///< of an answer
     control::LawMaker make_law = &control::make_control_law;
   };
   ClientProgram(Setting& setting, Host& host, std::string name, const Options& options);
