@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "common/app/run_main.hpp"
+#include "common/app/stop_signal.hpp"
 #include "worlds/scenarios.hpp"
 #include "worlds/search.hpp"
 
@@ -131,7 +132,7 @@ int main(int argc, char** argv) {
       std::cout << fmt::format("seed {}:\n", seed);
       for (const std::string& finding : findings) std::cout << "  " << finding << '\n';
     }
-    if (result.failures.empty()) return;
+    if (result.failures.empty() || app::stop_signal() != 0) return;
     const std::uint64_t first = result.failures.begin()->first;
     std::cout << fmt::format("the world of seed {}, without what it does not need:\n", first);
     print_story(

@@ -9,6 +9,8 @@
 #include <set>
 #include <thread>
 
+#include "common/app/stop_signal.hpp"
+
 namespace sls::worlds {
 namespace {
 
@@ -53,7 +55,7 @@ class Search {
     const std::filesystem::path folder = options_.folder / fmt::format("job-{}", job);
     while (true) {
       const std::uint64_t seed = next_++;
-      if (seed > options_.last || is_over_) break;
+      if (seed > options_.last || is_over_ || app::stop_signal() != 0) break;
       fly(seed, folder);
     }
     --running_;

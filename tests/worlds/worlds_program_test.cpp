@@ -1,0 +1,60 @@
+// The program as a user calls it.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <csignal>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "tests/support/waiting.hpp"
+#include "tests/system/process.hpp"
+
+namespace sls::test {
+namespace {
+
+std::vector<std::string> program_with(const std::vector<std::string>& words) {
+  std::vector<std::string> command = {program("sls_worlds")};
+  command.insert(command.end(), words.begin(), words.end());
+  return command;
+}
+
+void expect_refused(const std::vector<std::string>& words, const std::string& cause) {
+  Process process(program_with(words));
+  EXPECT_EQ(process.wait(), 2) << process.output();
+  const std::string output = process.output();
+  EXPECT_EQ(std::count(output.begin(), output.end(), '\n'), 1) << output;
+  EXPECT_NE(output.find(cause), std::string::npos) << output;
+}
+
+TEST(WorldsProgramTest, MistakesGiveOneLineAndExitCodeTwo) {
+  for (const char* seeds : {"x", "5-2", "1-", "-1", "1-2-3", "99999999999999999999"})
+    expect_refused({std::string("--seeds=") + seeds}, "--seeds: expected A-B");
+  expect_refused({"--jobs", "0"}, "--jobs");
+  expect_refused({"--verbose"}, "--replay");
+  expect_refused({"--scenario", "no_such.yaml"}, "no_such.yaml");
+  expect_refused({"--nonsense"}, "--nonsense");
+}
+
+TEST(WorldsProgramTest, AReplayTellsTheWorldOfItsSeed) {
+  Process process(program_with({"--replay", "7"}));
+  EXPECT_EQ(process.wait(), 0) << process.output();
+  const std::string output = process.output();
+  EXPECT_EQ(output.find("  seed 7: "), 0u) << output;
+  EXPECT_LE(std::count(output.begin(), output.end(), '\n'), 40) << output;
+}
+
+TEST(WorldsProgramTest, AnInterruptedSearchPrintsItsResultAndLeavesNothing) {
+  Process process(program_with({"--seeds", "0-99999999"}));
+  ASSERT_TRUE(wait_until([&] { return process.output().find(" worlds/s") != std::string::npos; }))
+      << process.output();
+  const std::filesystem::path folder = "/dev/shm/sls_worlds_" + std::to_string(process.id());
+  EXPECT_TRUE(std::filesystem::exists(folder));
+  process.send(SIGINT);
+  EXPECT_EQ(process.wait(), 130) << process.output();
+  EXPECT_NE(process.output().find(" worlds, 0 failed; "), std::string::npos) << process.output();
+  EXPECT_FALSE(std::filesystem::exists(folder));
+}
+
+}  // namespace
+}  // namespace sls::test
