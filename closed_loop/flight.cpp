@@ -9,10 +9,6 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-void fly_one_after_another(std::size_t count, const std::function<void(std::size_t)>& work) {
-  for (std::size_t i = 0; i < count; ++i) work(i);
-}
-
 }  // namespace
 
 Flight::Flight(const config::Scenario& scenario, const std::vector<std::uint32_t>& ids,
@@ -21,7 +17,7 @@ Flight::Flight(const config::Scenario& scenario, const std::vector<std::uint32_t
       measures_compute_time_(options.measures_compute_time),
       limits_(sim::make_answer_limits(scenario)),
       is_fleet_(scenario.vehicles.size() > 1),
-      plants_(scenario, ids, fly_one_after_another) {
+      plants_(scenario, ids, sim::one_after_another) {
   for (model::StepRecord& record : plants_.records()) {
     controllers_.emplace_back(config::make_vehicle_scenario(scenario, record.vehicle_id),
                               record.vehicle_id, options.checks_purity, options.make_law);

@@ -41,8 +41,8 @@ class Answerer {
   /// The scenario with the period of the run.
   const config::Scenario& scenario() const { return scenario_; }
 
-  /// The answers to `sample`; null if it belongs to another run or has none of our vehicles. The
-  /// sender must be the run's server.
+  /// The answers to `sample`, which is of this run and from its server; null if it has none of our
+  /// vehicles.
   /// @throws std::runtime_error if a law of a shared library is broken.
   const Commands* answer(const States& sample);
 

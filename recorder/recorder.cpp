@@ -9,15 +9,14 @@
 #include "common/app/stop_signal.hpp"
 
 namespace sls::record {
-namespace {
 
 using namespace std::chrono_literals;
 
-}  // namespace
-
-RecorderCore::Options make_core_options(const RecorderOptions& options) {
+RecorderCore::Options make_core_options(const RecorderOptions& options, const std::string& host) {
   RecorderCore::Options made;
   made.folder = options.folder.string();
+  made.identity.contract_sha256(bus::kContractSha256);
+  made.identity.host(host);
   made.vehicle = options.vehicle;
   made.follows_servers = options.follow;
   made.has_subfolder = [folder = options.folder](std::uint64_t run_id) {
@@ -44,7 +43,7 @@ Segment make_segment(const RecorderOptions& options, const RecorderCore& core) {
 Recorder::Recorder(bus::Node& node, const RecorderOptions& options)
     : options_(options),
       node_(node),
-      core_(make_core_options(options)),
+      core_(make_core_options(options, bus::host_name())),
       participants_(node),
       servers_(node),
       announcer_(node),
@@ -52,7 +51,7 @@ Recorder::Recorder(bus::Node& node, const RecorderOptions& options)
              [this](std::uint64_t run_id) { return servers_.may_fly(run_id, core_.vehicle()); }) {}
 
 void Recorder::run() {
-  announce(false);
+  announce();
   for (act(look()); core_.phase() != RecorderCore::Phase::kEnded; act(look())) {
     announcer_.repeat_if_due();
     std::this_thread::sleep_until(core_.next_deadline());
@@ -63,7 +62,7 @@ void Recorder::run() {
 
 void Recorder::act(RecorderCore::Act act) {
   if (act == RecorderCore::Act::kOpen) open();
-  if (act == RecorderCore::Act::kAnnounce) announce(false);
+  if (act == RecorderCore::Act::kAnnounce) announce();
   if (act == RecorderCore::Act::kClose) writing_->close(core_.watch_end());
   if (act == RecorderCore::Act::kReport) report();
 }
@@ -96,7 +95,7 @@ void Recorder::open() {
       config::parse_scenario(run.parameters.scenario_text().to_string(), "sls/parameters");
   writing_ =
       std::make_unique<WritingThread>(inbox_, participants_, run, make_segment(options_, core_));
-  announce(false);
+  announce();
   // A process that writes into a port of shared memory waits for its reader, even if the reader has
   // just lost its processor.
   if (run.parameters.mode() == SyncMode::MODE_REALTIME) app::put_process_first();
@@ -105,7 +104,7 @@ void Recorder::open() {
 }
 
 void Recorder::report() {
-  announce(true);
+  announce();
   // Other programs wait for the last announcement of this recorder before they end, so it must
   // reach them.
   announcer_.wait_for_acknowledgments(1s);
@@ -114,20 +113,9 @@ void Recorder::report() {
   for (const sync::Line& line : core_.take_lines()) app::log(line);
 }
 
-void Recorder::announce(bool done) {
-  Participant message;
-  message.contract_sha256(bus::kContractSha256);
-  message.role(ParticipantRole::ROLE_RECORDER);
-  message.name("recorder");
-  message.host(bus::host_name());
-  if (writing_) {
-    message.run_id(core_.run()->parameters.run_id());
-    message.scenario_sha256(core_.run()->parameters.scenario_sha256());
-  }
-  message.ready(core_.is_ready() && !(writing_ && writing_->has_failed()));
-  message.done(done);
-  message.last_complete_step(writing_ ? writing_->last_complete_step() : -1);
-  announcer_.announce(message);
+void Recorder::announce() {
+  announcer_.announce(core_.make_announcement(writing_ ? writing_->last_complete_step() : -1,
+                                              writing_ && writing_->has_failed()));
 }
 
 }  // namespace sls::record

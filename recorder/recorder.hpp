@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "common/bus/node.hpp"
 #include "common/bus/participants.hpp"
@@ -22,8 +23,8 @@ struct RecorderOptions {
   bool follow = false;        ///< continue with the run of a server that replaces ours
 };
 
-/// The options of the core.
-RecorderCore::Options make_core_options(const RecorderOptions& options);
+/// The options of the core, on the machine `host`.
+RecorderCore::Options make_core_options(const RecorderOptions& options, const std::string& host);
 /// The place of the recording that `core` wants to open.
 /// @throws DamagedError if an earlier segment cannot be read.
 Segment make_segment(const RecorderOptions& options, const RecorderCore& core);
@@ -43,7 +44,7 @@ class Recorder {
   RecorderCore::Now look_around() const;
   void open();
   void report();
-  void announce(bool done);
+  void announce();
 
   const RecorderOptions options_;
   const bus::Node& node_;

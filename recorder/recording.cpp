@@ -118,6 +118,15 @@ bool Recording::finish(const std::string& interruption, std::uint64_t refused_sa
   return manifest.complete;
 }
 
+RecorderCore::Recorded Recording::close(const RunWatch::End& end, std::uint64_t refused_samples) {
+  RecorderCore::Recorded recorded;
+  recorded.is_complete = finish(end.interruption, refused_samples, end.outcome);
+  if (!recorded.is_complete) recorded.gaps = describe_gaps();
+  recorded.is_reset = is_reset();
+  recorded.last_step = last_complete_step();
+  return recorded;
+}
+
 Manifest Recording::make_manifest(const Claims& claims) const {
   Manifest manifest;
   static_cast<Claims&>(manifest) = claims;

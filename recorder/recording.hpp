@@ -12,6 +12,7 @@
 #include "common/bus/topics.hpp"
 #include "common/config/scenario.hpp"
 #include "recorder/certificate.hpp"
+#include "recorder/core/recorder_core.hpp"
 #include "recorder/core/recording_core.hpp"
 #include "recorder/flight_log.hpp"
 #include "recorder/manifest.hpp"
@@ -58,6 +59,9 @@ class Recording final : private RecordingOutputs {
   /// empty. True if the recording is complete.
   bool finish(const std::string& interruption, std::uint64_t refused_samples,
               const std::string& outcome = "interrupted");
+
+  /// The same for a recorder: with the end that its watch has found.
+  RecorderCore::Recorded close(const RunWatch::End& end, std::uint64_t refused_samples);
 
   /// After `finish`: why the recording is not complete, in one line.
   std::string describe_gaps() const { return core_.describe_gaps(); }

@@ -8,14 +8,6 @@
 #include "common/app/scheduling.hpp"
 
 namespace sls::record {
-namespace {
-
-using namespace std::chrono_literals;
-
-constexpr auto kWriteTime = 5ms;  // period of the thread
-constexpr auto kBusyTime = 1ms;   // the same while samples come
-
-}  // namespace
 
 WritingThread::WritingThread(Inbox& inbox, const bus::ParticipantDirectory& participants,
                              const sync::Run& run, const Segment& segment)
@@ -74,10 +66,8 @@ void WritingThread::write_samples() {
       std::this_thread::sleep_for(has_come ? kBusyTime : kWriteTime);
   }
   const RunWatch::End end = must_close_ ? end_ : RunWatch::End();
-  recorded_.is_complete = recording_.finish(end.interruption, inbox_.refused(), end.outcome);
-  if (!recorded_.is_complete) recorded_.gaps = recording_.describe_gaps();
-  recorded_.is_reset = recording_.is_reset();
-  recorded_.last_step = last_complete_step_ = recording_.last_complete_step();
+  recorded_ = recording_.close(end, inbox_.refused());
+  last_complete_step_ = recorded_.last_step;
 }
 
 void WritingThread::note_libraries() {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <exception>
 #include <string>
@@ -17,6 +18,9 @@ namespace sls::record {
 /// thread, because a slow disk must not delay that.
 class WritingThread {
  public:
+  static constexpr auto kWriteTime = std::chrono::milliseconds(5);  ///< between two passes
+  static constexpr auto kBusyTime = std::chrono::milliseconds(1);   ///< while samples come
+
   /// Opens the recording of `run` in `segment`.
   WritingThread(Inbox& inbox, const bus::ParticipantDirectory& participants, const sync::Run& run,
                 const Segment& segment);

@@ -12,11 +12,7 @@ Neighbourhood DomainView::look(bool is_known) {
   const bus::Node& domain = endpoints_.domain;
   Neighbourhood seen;
   seen.participants = endpoints_.participants.all();
-  for (const sync::Run& other : endpoints_.servers.runs()) {
-    seen.other_runs.insert(other.parameters.run_id());
-    for (const std::uint32_t id : sync::list_vehicle_ids(other.parameters))
-      seen.other_vehicles.insert(id);
-  }
+  seen.add(endpoints_.servers.runs());
   for (const bus::PeerId& peer : endpoints_.commands.matched())
     seen.command_writers[peer] = domain.describe(peer);
   seen.is_on_network = !domain.stays_on_this_machine();

@@ -46,4 +46,19 @@ Parameters make_parameters_message(std::uint64_t run_id,
   return message;
 }
 
+void fill(CommandSample& received, const Commands& sample) {
+  received.run_id = sample.run_id();
+  received.step = sample.step();
+  received.client_name = sample.client_name().c_str();
+  received.answers.resize(sample.vehicles().size());
+  for (std::size_t i = 0; i < received.answers.size(); ++i) {
+    OfferedAnswer& offered = received.answers[i];
+    offered.run_id = received.run_id;
+    offered.step = received.step;
+    offered.client_name = received.client_name;
+    offered.vehicle_id = sample.vehicles()[i].vehicle_id();
+    bus::fill(offered.answer, sample.vehicles()[i]);
+  }
+}
+
 }  // namespace sls::sim

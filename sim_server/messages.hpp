@@ -1,4 +1,4 @@
-/// Builds the server's samples.
+/// Conversions of the server's samples.
 #pragma once
 
 #include <cstdint>
@@ -7,6 +7,7 @@
 
 #include "common/bus/topics.hpp"
 #include "common/config/scenario.hpp"
+#include "sim_server/core/command_sample.hpp"
 #include "sim_server/plants/plant.hpp"
 
 namespace sls::sim {
@@ -20,5 +21,9 @@ Parameters make_parameters_message(std::uint64_t run_id,
                                    const std::vector<std::uint32_t>& vehicle_ids,
                                    const config::Scenario& scenario, const Plant& plant,
                                    const std::string& version);
+
+/// Fills in the content of a sample of sls/command, not its sender and its times. Writes over all
+/// that `received` held and uses its memory again.
+void fill(CommandSample& received, const Commands& sample);
 
 }  // namespace sls::sim

@@ -52,13 +52,7 @@ void Outbox::resend_states(const Fleet& fleet, const std::function<bool(std::siz
 void Outbox::record_step(const Fleet& fleet) { records_->add_step(fleet.records()); }
 
 void Outbox::record_late(const Vehicle& vehicle, const OfferedAnswer& offered) {
-  model::StepRecord record;
-  record.vehicle_id = vehicle.id();
-  record.step = record.answered_step = offered.step;
-  record.kind = model::AnswerKind::kLate;
-  record.client_name = offered.client_name;
-  record.answer = offered.answer;
-  records_->add_step({record});
+  records_->add_step({make_late_record(vehicle, offered)});
 }
 
 void Outbox::show_progress(std::string text) {

@@ -76,6 +76,8 @@ class RecordStream {
   /// Number of steps, and time, after which the collected entries are written.
   static constexpr std::size_t kMostSteps = 64;
   static constexpr auto kLongestWait = std::chrono::milliseconds(20);
+  /// Room for entries that are not written yet.
+  static constexpr std::size_t kMostCollected = 32'768;
 
   /// Batches of run `run_id` have at most `max_bytes`, unless one entry is larger.
   RecordStream(bus::Writer<RecordBatch>& writer, std::size_t max_bytes, std::uint64_t run_id);
@@ -104,7 +106,6 @@ class RecordStream {
 
  private:
   static constexpr std::size_t kManyEntries = 512;
-  static constexpr std::size_t kMostCollected = 32'768;
 
   struct Collected {
     std::vector<RecordEntry>

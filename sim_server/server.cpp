@@ -8,7 +8,6 @@
 
 #include "common/app/options.hpp"
 #include "common/app/run_main.hpp"
-#include "common/bus/convert.hpp"
 #include "common/bus/spinning.hpp"
 #include "common/config/vehicle_ids.hpp"
 #include "sim_server/messages.hpp"
@@ -92,18 +91,7 @@ void Server::fill(CommandSample& received, const Commands& sample,
   received.sender = sender;
   received.arrived = {std::chrono::steady_clock::now(), std::chrono::system_clock::now()};
   received.written = endpoints_.commands.written();
-  received.run_id = sample.run_id();
-  received.step = sample.step();
-  received.client_name = sample.client_name().c_str();
-  received.answers.resize(sample.vehicles().size());
-  for (std::size_t i = 0; i < received.answers.size(); ++i) {
-    OfferedAnswer& offered = received.answers[i];
-    offered.run_id = received.run_id;
-    offered.step = received.step;
-    offered.client_name = received.client_name;
-    offered.vehicle_id = sample.vehicles()[i].vehicle_id();
-    bus::fill(offered.answer, sample.vehicles()[i]);
-  }
+  sim::fill(received, sample);
 }
 
 }  // namespace sls::sim

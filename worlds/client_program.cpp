@@ -39,10 +39,8 @@ ClientProgram::ClientProgram(Setting& setting, Host& host, std::string name, con
       core_(make_core_options(scenario_, this->name(), host.name(), options)) {}
 
 void ClientProgram::start() {
-  peer_.add_reader<Parameters>(
-      [this](const Parameters& sample, const Peer::Arrival& arrival) { note(sample, arrival); });
-  peer_.add_reader<SimStatus>(
-      [this](const SimStatus& sample, const Peer::Arrival& arrival) { note(sample, arrival); });
+  read<Parameters>();
+  read<SimStatus>();
   peer_.add_writer<Participant>();
   peer_.add_writer<Commands>();
   peer_.add_reader<States>(

@@ -142,10 +142,7 @@ void Network::forget(Peer& observer, const Peer& observed) {
 
 bool Network::is_lost(const Peer& from, const Peer& to) {
   const Link& way = link(from.process().host(), to.process().host());
-  ++sent_;
-  const bool lost = way.is_cut || random_.chance(way.loss);
-  if (lost) ++lost_;
-  return lost;
+  return way.is_cut || random_.chance(way.loss);
 }
 
 Instant Network::draw_delay(const Peer& from, const Peer& to) {

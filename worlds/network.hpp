@@ -174,10 +174,6 @@ class Network {
   /// True if both know each other, and nothing is cut between them.
   bool are_connected(const bus::PeerId& a, const bus::PeerId& b) const;
 
-  /// Datagrams so far: sent, lost.
-  std::uint64_t sent() const { return sent_; }
-  std::uint64_t lost() const { return lost_; }
-
  private:
   friend class Peer;
   /// The way of the samples of a topic from a writer to a reader.
@@ -212,7 +208,6 @@ class Network {
   std::map<std::pair<const Host*, const Host*>, Link> links_;
   std::map<Key, Channel> channels_;
   std::uint64_t next_id_ = 1;
-  std::uint64_t sent_ = 0, lost_ = 0;
 };
 
 }  // namespace sls::worlds

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "common/config/vehicle_ids.hpp"
 #include "worlds/setting.hpp"
 
 namespace sls::worlds {
@@ -37,12 +38,6 @@ Link draw_link(Random& random) {
   return link;
 }
 
-std::vector<std::uint32_t> list_vehicles(const FlownScenario& flown) {
-  std::vector<std::uint32_t> ids(flown.scenario.vehicles.size());
-  for (std::uint32_t i = 0; i < ids.size(); ++i) ids[i] = i;
-  return ids;
-}
-
 void draw_programs(Plan& plan, Random& random, const FlownScenario& flown) {
   const config::WaitFor& expected = flown.scenario.sync.wait_for;
   const auto draw_host = [&] {
@@ -53,7 +48,7 @@ void draw_programs(Plan& plan, Random& random, const FlownScenario& flown) {
     program.role = role;
     program.host = draw_host();
     program.start = draw_time(random, 0ms, 1500ms);
-    program.vehicle_ids = list_vehicles(flown);
+    program.vehicle_ids = config::parse_vehicle_ids("all", flown.scenario.vehicles.size());
     program.follows_servers = plan.promise == Promise::kServerRestart || random.chance(0.4);
     return program;
   };
@@ -199,7 +194,6 @@ Plan draw_plan(std::uint64_t seed, const std::vector<FlownScenario>& scenarios) 
       static_cast<std::size_t>(random.integer(0, static_cast<std::int64_t>(scenarios.size()) - 1));
   const FlownScenario& flown = scenarios[plan.scenario];
   const bool is_lockstep = flown.scenario.sync.mode == config::SyncMode::kLockstep;
-  const config::WaitPolicies& wait = flown.scenario.sync.wait;
   plan.promise = draw_promise(random, flown.scenario.sync);
   plan.hosts = static_cast<std::size_t>(random.integer(1, 4));
   plan.link = draw_link(random);

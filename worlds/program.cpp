@@ -3,11 +3,6 @@
 #include <spdlog/fmt/fmt.h>
 
 namespace sls::worlds {
-namespace {
-
-constexpr auto kRepeatAfter = std::chrono::milliseconds(400);  // as bus::Announcer
-
-}  // namespace
 
 void Program::say(std::string text) {
   const std::string& folder = setting_.folder;
@@ -63,7 +58,8 @@ void Program::announce(const Participant& message) {
 }
 
 void Program::repeat_announcement_if_due() {
-  if (announced_ && now() - announced_time_ >= kRepeatAfter) announce(Participant(*announced_));
+  if (announced_ && now() - announced_time_ >= sync::kRepeatAfter)
+    announce(Participant(*announced_));
 }
 
 const sync::Servers& Program::present_servers() {
@@ -82,9 +78,9 @@ void Program::note(const Parameters& sample, const Peer::Arrival& arrival) {
     servers_.note(sample, arrival.sender, now());
 }
 
-bool Program::note(const SimStatus& sample, const Peer::Arrival& arrival) {
+void Program::note(const SimStatus& sample, const Peer::Arrival& arrival) {
   servers_.set_present(peer_.matched_writers(TopicId::kParameters));
-  return servers_.note(sample, arrival.sender, now());
+  servers_.note(sample, arrival.sender, now());
 }
 
 void Program::note(const Participant& sample, const Peer::Arrival& arrival) {

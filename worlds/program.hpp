@@ -67,8 +67,14 @@ class Program {
 
   const sync::Servers& present_servers();
   sync::Membership& present_members();
+  /// Reads the topic of `Message` with `note`.
+  template <class Message>
+  void read() {
+    peer_.add_reader<Message>(
+        [this](const Message& sample, const Peer::Arrival& arrival) { note(sample, arrival); });
+  }
   void note(const Parameters& sample, const Peer::Arrival& arrival);
-  bool note(const SimStatus& sample, const Peer::Arrival& arrival);
+  void note(const SimStatus& sample, const Peer::Arrival& arrival);
   void note(const Participant& sample, const Peer::Arrival& arrival);
 
   Setting& setting_;

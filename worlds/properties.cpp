@@ -24,12 +24,7 @@ constexpr Instant kRivalsGoneWithin = 4s;
 /// A server waits at most 1 s for acknowledgements of each of two topics.
 constexpr Instant kEndsWithin = 3500ms;
 
-void mix(std::uint64_t& hash, std::uint64_t value) {
-  hash = (hash ^ value) * 0x100000001b3u;
-  hash ^= hash >> 29;
-}
-
-void mix(std::uint64_t& hash, const Eigen::Vector3d& vector) {
+void mix_vector(std::uint64_t& hash, const Eigen::Vector3d& vector) {
   for (int i = 0; i < 3; ++i) {
     std::uint64_t bits = 0;
     std::memcpy(&bits, &vector[i], sizeof bits);
@@ -49,13 +44,13 @@ bool has_joined(const Program& program) {
 }  // namespace
 
 std::uint64_t hash_row(const model::StepRecord& record) {
-  std::uint64_t hash = 0xcbf29ce484222325u;
+  std::uint64_t hash = kEmptyHash;
   mix(hash, record.step);
-  mix(hash, record.truth.p_WQ);
-  mix(hash, record.truth.v_WQ);
-  mix(hash, record.truth.p_WL);
-  mix(hash, record.truth.v_WL);
-  mix(hash, record.f_Q_W);
+  mix_vector(hash, record.truth.p_WQ);
+  mix_vector(hash, record.truth.v_WQ);
+  mix_vector(hash, record.truth.p_WL);
+  mix_vector(hash, record.truth.v_WL);
+  mix_vector(hash, record.f_Q_W);
   return hash;
 }
 
@@ -116,7 +111,7 @@ void Properties::on_recorded(std::uint64_t run_id, const std::vector<model::Step
                        record.step, record.vehicle_id, rows.size()));
     rows.push_back(hash_row(record));
     const auto before = run.last.find(record.vehicle_id);
-    if (before != run.last.end()) check_applied(run, before->second, record);
+    if (before != run.last.end()) check_applied(before->second, record);
     run.last[record.vehicle_id] = record;
     run.is_exact = run.is_exact && (record.kind == model::AnswerKind::kAccepted ||
                                     record.kind == model::AnswerKind::kRefused ||
@@ -138,8 +133,7 @@ void Properties::on_recorded(std::uint64_t run_id, const std::vector<model::Step
 }
 
 /// The force that acts is that of the answer: no scenario of the worlds disturbs it.
-void Properties::check_applied(const Run&, const model::StepRecord& before,
-                               const model::StepRecord& record) {
+void Properties::check_applied(const model::StepRecord& before, const model::StepRecord& record) {
   const bool is_answered =
       before.kind == model::AnswerKind::kAccepted || before.kind == model::AnswerKind::kHeld;
   if (is_answered && before.answer.f_Q_W != record.f_Q_W)
@@ -151,7 +145,6 @@ void Properties::on_status(const SimStatus& status, const Network& network) {
   run.timing = status.timing().to_string();
   run.phase = status.phase();
   run.summary.take_overs = status.counters().take_overs();
-  run.summary.resent = status.counters().resent();
   run.summary.late = status.counters().held() + status.counters().fail_safe();
   if (status.reason().size() > 0) run.named = timeline_.now();
   if (run.phase != RunPhase::PHASE_RUNNING) return;

@@ -42,7 +42,6 @@ struct FlightSummary {
   double duration_s = 0;     ///< from the first state to the end, simulated
   double worst_error_m = 0;  ///< of the load, from its reference
   std::uint64_t take_overs = 0;
-  std::uint64_t resent = 0;
   std::uint64_t late = 0;  ///< steps flown without a fresh answer
 };
 
@@ -105,8 +104,7 @@ class Properties {
   void find(std::string finding);
   void check_stall(Run& run, std::uint64_t run_id);
   void check_rivals(const Run& run, const Network& network);
-  void check_applied(const Run& run, const model::StepRecord& before,
-                     const model::StepRecord& record);
+  void check_applied(const model::StepRecord& before, const model::StepRecord& record);
   void check_recording(const Program& program, const StoredRecording& recording,
                        const FlownScenario& flown);
   void check_rows(const Program& program, const StoredRecording& recording, const Run& run);

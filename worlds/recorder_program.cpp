@@ -7,14 +7,8 @@
 #include <variant>
 
 namespace sls::worlds {
-namespace {
 
 using namespace std::chrono_literals;
-
-constexpr Instant kWriteTime = 5ms;  // as WritingThread
-constexpr Instant kBusyTime = 1ms;
-
-}  // namespace
 
 RecorderProgram::RecorderProgram(Setting& setting, Host& host, std::string name,
                                  const Options& options)
@@ -36,11 +30,10 @@ void RecorderProgram::start() {
   } catch (const config::ConfigError& error) {
     return exit(2, error.what());
   }
-  core_ = std::make_unique<record::RecorderCore>(record::make_core_options(recorder_options_));
-  peer_.add_reader<Participant>(
-      [this](const Participant& sample, const Peer::Arrival& arrival) { note(sample, arrival); });
-  peer_.add_reader<Parameters>(
-      [this](const Parameters& sample, const Peer::Arrival& arrival) { note(sample, arrival); });
+  core_ = std::make_unique<record::RecorderCore>(
+      record::make_core_options(recorder_options_, process_.host().name()));
+  read<Participant>();
+  read<Parameters>();
   peer_.add_writer<Participant>();
   peer_.add_reader<RecordBatch>([this](const RecordBatch& batch, const Peer::Arrival& arrival) {
     arrivals_.put({batch.run_id(), arrival.sender, batch});
@@ -50,7 +43,7 @@ void RecorderProgram::start() {
     arrivals_.put({status.run_id(), arrival.sender, status});
   });
   setting_.network.announce(peer_);
-  announce_progress(false);
+  announce_progress();
   wake_soon();
 }
 
@@ -77,7 +70,7 @@ void RecorderProgram::wake() {
 void RecorderProgram::act(record::RecorderCore::Act act) {
   using Act = record::RecorderCore::Act;
   if (act == Act::kOpen) open();
-  if (act == Act::kAnnounce) announce_progress(false);
+  if (act == Act::kAnnounce) announce_progress();
   if (act == Act::kClose) must_close_ = core_->watch_end();
   if (act == Act::kReport) report();
 }
@@ -114,31 +107,20 @@ void RecorderProgram::open() {
   has_recorded_ = true;
   arrivals_.open(run.parameters.run_id(), run.server);
   say(fmt::format("records run {:016x}", run.parameters.run_id()));
-  announce_progress(false);
+  announce_progress();
   core_->on_opened(scenario.sync.wait.server_deadline_s, look_around());
   process_.run_at(setting_.timeline.now(), [this] { write(); });
 }
 
 /// The last announcement must reach the others, who wait for it: the main thread waits, too.
 void RecorderProgram::report() {
-  announce_progress(true);
+  announce_progress();
   acknowledged_by_ = now() + 1s;
 }
 
-void RecorderProgram::announce_progress(bool done) {
-  Participant message;
-  message.contract_sha256(bus::kContractSha256);
-  message.role(ParticipantRole::ROLE_RECORDER);
-  message.name("recorder");
-  message.host(process_.host().name());
-  if (writing_) {
-    message.run_id(core_->run()->parameters.run_id());
-    message.scenario_sha256(core_->run()->parameters.scenario_sha256());
-  }
-  message.ready(core_->is_ready() && failure_.empty());
-  message.done(done);
-  message.last_complete_step(writing_ ? writing_->last_complete_step() : -1);
-  announce(message);
+void RecorderProgram::announce_progress() {
+  announce(
+      core_->make_announcement(writing_ ? writing_->last_complete_step() : -1, !failure_.empty()));
 }
 
 // --- the writing thread --------------------------------------------------------------------------
@@ -149,7 +131,8 @@ void RecorderProgram::write() {
     const bool has_come = write_samples();
     if (has_closed_) return;
     process_.run_at(
-        setting_.timeline.now() + (has_come ? kBusyTime : kWriteTime) + options_.disk_delay,
+        setting_.timeline.now() + options_.disk_delay +
+            (has_come ? record::WritingThread::kBusyTime : record::WritingThread::kWriteTime),
         [this] { write(); });
   } catch (const std::system_error& error) {
     failure_ = error.what();

@@ -41,7 +41,7 @@ class RecorderProgram : public Program {
   record::RecorderCore::Now look_around();
   void open();
   void report();
-  void announce_progress(bool done);
+  void announce_progress();
   /// A pass of the writing thread.
   void write();
   bool write_samples();

@@ -6,6 +6,7 @@
 
 #include "closed_loop/flight.hpp"
 #include "closed_loop/flight_certificate.hpp"
+#include "common/config/vehicle_ids.hpp"
 #include "recorder/rows.hpp"
 #include "sim_server/messages.hpp"
 
@@ -67,8 +68,7 @@ mission:
 }  // namespace
 
 FlownScenario fly(const config::Scenario& scenario) {
-  std::vector<std::uint32_t> ids(scenario.vehicles.size());
-  for (std::uint32_t i = 0; i < ids.size(); ++i) ids[i] = i;
+  const auto ids = config::parse_vehicle_ids("all", scenario.vehicles.size());
   FlownScenario flown{scenario, "", 0};
   closed_loop::Flight flight(scenario, ids);
   closed_loop::FlightCertificate certificate(record::make_row_format(

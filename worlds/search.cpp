@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <condition_variable>
 #include <mutex>
 #include <set>
 #include <thread>
@@ -17,6 +18,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr std::size_t kMostLines = 40;
+constexpr auto kReportInterval = 5s;
 
 /// "ends" of "ends: client-1 still runs".
 std::string name_property(const std::string& finding) {
@@ -38,13 +40,10 @@ class Search {
   SearchResult run(const std::function<void(const SearchResult&)>& report) {
     std::vector<std::thread> threads;
     for (unsigned i = 0; i < options_.jobs; ++i) threads.emplace_back([this, i] { work(i); });
-    while (running_ < 0 || running_ > 0) {
-      std::this_thread::sleep_for(100ms);
-      const auto now = std::chrono::steady_clock::now();
-      if (now < reported_ + 5s) continue;
-      reported_ = now;
-      const std::lock_guard lock(mutex_);
-      report(result_);
+    {
+      std::unique_lock lock(mutex_);
+      while (!ended_.wait_for(lock, kReportInterval, [this] { return running_ == 0; }))
+        report(result_);
     }
     for (std::thread& thread : threads) thread.join();
     return result_;
@@ -58,7 +57,8 @@ class Search {
       if (seed > options_.last || is_over_ || app::stop_signal() != 0) break;
       fly(seed, folder);
     }
-    --running_;
+    const std::lock_guard lock(mutex_);
+    if (--running_ == 0) ended_.notify_one();
   }
 
   void fly(std::uint64_t seed, const std::filesystem::path& folder) {
@@ -92,10 +92,10 @@ class Search {
   const SearchOptions& options_;
   std::atomic<std::uint64_t> next_;
   std::atomic<bool> is_over_{false};
-  std::atomic<int> running_{static_cast<int>(options_.jobs)};
-  std::chrono::steady_clock::time_point reported_ = std::chrono::steady_clock::now();
   std::mutex mutex_;
-  SearchResult result_;  // under the mutex
+  std::condition_variable ended_;
+  unsigned running_ = options_.jobs;  // under the mutex
+  SearchResult result_;               // under the mutex
 };
 
 /// Tries plans and keeps the smallest that still fails in the same way.
@@ -155,11 +155,12 @@ class Shrinker {
 }  // namespace
 
 void FlightTable::add(const Plan& plan, const Verdict& verdict) {
-  const std::size_t loss = plan.link.loss == 0 ? 0 : plan.link.loss <= 0.05 ? 1 : 2;
-  const Instant delay = plan.link.delay + plan.link.jitter / 2;
-  Cell& cell = cells[plan.hosts == 1 ? 0 : loss][plan.hosts == 1 || delay <= 1ms ? 0
-                                                 : delay <= 5ms                  ? 1
-                                                                                 : 2];
+  const bool has_network = plan.hosts > 1;
+  const double link_loss = has_network ? plan.link.loss : 0;
+  const Instant link_delay = has_network ? plan.link.delay + plan.link.jitter / 2 : Instant(0);
+  const std::size_t loss = (link_loss > 0) + (link_loss > 0.05);
+  const std::size_t delay = (link_delay > 1ms) + (link_delay > 5ms);
+  Cell& cell = cells[loss][delay];
   ++cell.worlds;
   cell.finished += !verdict.flights.empty();
   for (const FlightSummary& flight : verdict.flights) {

@@ -20,10 +20,6 @@ constexpr std::size_t kDatagram_bytes = 1400;
 constexpr std::size_t kBatch_bytes = 60'000;
 constexpr auto kLifespan = 200ms;  // of commands in real time
 
-void fly_one_after_another(std::size_t count, const std::function<void(std::size_t)>& work) {
-  for (std::size_t i = 0; i < count; ++i) work(i);
-}
-
 }  // namespace
 
 ServerProgram::ServerProgram(Setting& setting, Host& host, std::string name,
@@ -42,10 +38,8 @@ void ServerProgram::start() {
     note(sample, arrival);
     if (core_ && core_->has_news(*this)) wake_soon();
   });
-  peer_.add_reader<Parameters>(
-      [this](const Parameters& sample, const Peer::Arrival& arrival) { note(sample, arrival); });
-  peer_.add_reader<SimStatus>(
-      [this](const SimStatus& sample, const Peer::Arrival& arrival) { note(sample, arrival); });
+  read<Parameters>();
+  read<SimStatus>();
   peer_.add_writer<States>();
   peer_.add_writer<RecordBatch>();
   peer_.add_writer<SimStatus>();
@@ -63,7 +57,7 @@ void ServerProgram::begin_run(sim::ServerCore::Start start) {
   const config::Scenario& scenario = setting_.flown->scenario;
   start.run_id = setting_.random.next() | 1u;
   auto fleet =
-      std::make_unique<sim::Fleet>(scenario, vehicle_ids_, start.run_id, fly_one_after_another);
+      std::make_unique<sim::Fleet>(scenario, vehicle_ids_, start.run_id, sim::one_after_another);
   events_.erase(std::remove_if(events_.begin(), events_.end(),
                                [](const Event& event) {
                                  return std::holds_alternative<sim::CommandSample>(event);
@@ -75,8 +69,6 @@ void ServerProgram::begin_run(sim::ServerCore::Start start) {
       sim::make_parameters_message(start.run_id, vehicle_ids_, scenario, fleet->plant(), "world");
   certificate_.emplace(record::make_row_format(parameters));
   setting_.properties.on_run(*this, start.run_id, parameters);
-  published_steps_ = 0;
-  has_run_ended_ = false;
   peer_.write(parameters);
   say(fmt::format("run {:016x}", start.run_id));
   sim::Outputs& outputs = *this;
@@ -170,18 +162,7 @@ void ServerProgram::on_commands(const Commands& sample, const Peer::Arrival& arr
   received.sender = arrival.sender;
   received.arrived = {now(), process_.host().wall()};
   received.written = arrival.written;
-  received.run_id = sample.run_id();
-  received.step = sample.step();
-  received.client_name = sample.client_name().c_str();
-  received.answers.resize(sample.vehicles().size());
-  for (std::size_t i = 0; i < received.answers.size(); ++i) {
-    sim::OfferedAnswer& offered = received.answers[i];
-    offered.run_id = received.run_id;
-    offered.step = received.step;
-    offered.client_name = received.client_name;
-    offered.vehicle_id = sample.vehicles()[i].vehicle_id();
-    bus::fill(offered.answer, sample.vehicles()[i]);
-  }
+  sim::fill(received, sample);
   // As CoreLoop::pass_on.
   if (!is_realtime() && events_.empty() &&
       core_->phase() == sim::ServerCore::Phase::kAwaitingAnswers && !core_->has_news(*this)) {
@@ -197,12 +178,9 @@ void ServerProgram::on_commands(const Commands& sample, const Peer::Arrival& arr
 
 sim::Moment ServerProgram::send_states(const sim::Fleet& fleet) {
   const sim::Moment moment{now(), process_.host().wall()};
-  if (fleet.step() + 1 > published_steps_) {
-    published_steps_ = fleet.step() + 1;
-    setting_.properties.on_published(core_->run_id(), fleet.step(),
-                                     setting_.flown->scenario.sync.wait_for);
-    if (setting_.on_step) setting_.on_step(fleet.step());
-  }
+  setting_.properties.on_published(core_->run_id(), fleet.step(),
+                                   setting_.flown->scenario.sync.wait_for);
+  setting_.on_step(fleet.step());
   states_.make(
       fleet, [](std::size_t) { return true; },
       [this](const States& sample) { peer_.write(sample); });
@@ -230,13 +208,7 @@ void ServerProgram::record_step(const sim::Fleet& fleet) {
 
 void ServerProgram::record_late(const sim::Vehicle& vehicle, const sim::OfferedAnswer& offered) {
   setting_.properties.on_late(core_->run_id());
-  model::StepRecord record;
-  record.vehicle_id = vehicle.id();
-  record.step = record.answered_step = offered.step;
-  record.kind = model::AnswerKind::kLate;
-  record.client_name = offered.client_name;
-  record.answer = offered.answer;
-  bus::fill(entries_.emplace_back(), record);
+  bus::fill(entries_.emplace_back(), sim::make_late_record(vehicle, offered));
 }
 
 void ServerProgram::write_records(bool is_last) {
@@ -277,11 +249,7 @@ bool ServerProgram::has_heard_every_claim() const {
 sim::Neighbourhood ServerProgram::look(bool is_known) {
   sim::Neighbourhood seen;
   seen.participants = present_members().all();
-  for (const sync::Run& other : present_servers().runs(now())) {
-    seen.other_runs.insert(other.parameters.run_id());
-    for (const std::uint32_t vehicle : sync::list_vehicle_ids(other.parameters))
-      seen.other_vehicles.insert(vehicle);
-  }
+  seen.add(present_servers().runs(now()));
   for (const bus::PeerId& peer : peer_.matched_writers(TopicId::kCommand))
     seen.command_writers[peer] = setting_.network.find(peer)->process().name();
   seen.is_on_network = !setting_.is_one_machine;

@@ -26,7 +26,6 @@ class ServerProgram : public Program, private sim::Outputs, private sim::Surroun
                 std::vector<std::uint32_t> vehicle_ids);
   void start() override;
   std::uint64_t run_id() const { return core_ ? core_->run_id() : 0; }
-  const std::vector<std::uint32_t>& vehicle_ids() const { return vehicle_ids_; }
 
  private:
   struct EndRecords {};
@@ -51,7 +50,9 @@ class ServerProgram : public Program, private sim::Outputs, private sim::Surroun
                      const std::function<bool(std::size_t)>& is_wanted) override;
   void record_step(const sim::Fleet& fleet) override;
   void record_late(const sim::Vehicle& vehicle, const sim::OfferedAnswer& answer) override;
-  bool is_record_full() const override { return entries_.size() > 16'384; }
+  bool is_record_full() const override {
+    return entries_.size() > sim::RecordStream::kMostCollected / 2;
+  }
   std::uint64_t lost() const override { return 0; }
   void flush_records() override { write_records(false); }
   void end_records() override { outbox_.push_back(EndRecords()); }
@@ -81,11 +82,9 @@ class ServerProgram : public Program, private sim::Outputs, private sim::Surroun
 
   const std::vector<std::uint32_t> vehicle_ids_;
   std::unique_ptr<sim::ServerCore> core_;
-  bool has_run_ended_ = false;
   std::deque<Event> events_;
   std::deque<Item> outbox_;
   sim::StateSamples states_;
-  std::uint64_t published_steps_ = 0;
   std::optional<sim::RecordBatches> batches_;
   std::vector<RecordEntry> entries_;
   std::size_t steps_ = 0;  // of the entries

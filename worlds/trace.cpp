@@ -4,16 +4,16 @@
 
 namespace sls::worlds {
 
-void Trace::mix(std::string_view text) {
+void Trace::add(std::string_view text) {
   for (const char letter : text)
     hash_ = (hash_ ^ static_cast<unsigned char>(letter)) * 0x100000001b3u;
-  mix(text.size());
+  add(text.size());
 }
 
 void Trace::add(Instant now, std::string_view who, std::string_view what) {
-  mix(static_cast<std::uint64_t>(now.count()));
-  mix(who);
-  mix(what);
+  add(static_cast<std::uint64_t>(now.count()));
+  add(who);
+  add(what);
   if (keeps_lines_)
     lines_.push_back(
         fmt::format("{:10.6f} s  {:12} {}", std::chrono::duration<double>(now).count(), who, what));

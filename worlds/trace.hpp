@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include "worlds/hash.hpp"
 #include "worlds/timeline.hpp"
 
 namespace sls::worlds {
@@ -18,19 +19,15 @@ class Trace {
   /// `who` says or does `what`.
   void add(Instant now, std::string_view who, std::string_view what);
   /// Counts an event without a line.
-  void add(std::uint64_t value) { mix(value); }
+  void add(std::uint64_t value) { mix(hash_, value); }
   std::uint64_t hash() const { return hash_; }
   const std::vector<std::string>& lines() const { return lines_; }
 
  private:
-  void mix(std::uint64_t value) {
-    hash_ = (hash_ ^ value) * 0x100000001b3u;
-    hash_ ^= hash_ >> 29;
-  }
-  void mix(std::string_view text);
+  void add(std::string_view text);
 
   const bool keeps_lines_;
-  std::uint64_t hash_ = 0xcbf29ce484222325u;
+  std::uint64_t hash_ = kEmptyHash;
   std::vector<std::string> lines_;
 };
 

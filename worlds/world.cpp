@@ -192,8 +192,7 @@ class World {
     Program* program = current_[fault.target];
     if (!program || program->process().is_stopped()) return;
     program->stop();
-    const Instant until = std::min(setting_.timeline.now() + fault.duration,
-                                   std::max(plan_.healed, setting_.timeline.now()));
+    const Instant until = std::min(setting_.timeline.now() + fault.duration, plan_.healed);
     setting_.timeline.at(until, [program] { program->go_on(); });
   }
 
@@ -227,9 +226,7 @@ class World {
     auto* server = static_cast<ServerProgram*>(current_[fault.target]);
     if (!server || server->process().has_ended()) return;
     if (!operator_) {
-      auto made = std::make_unique<OperatorProgram>(setting_, hosts_.front(), "operator");
-      operator_ = made.get();
-      operators_.push_back(std::move(made));
+      operator_ = std::make_unique<OperatorProgram>(setting_, hosts_.front(), "operator");
       operator_->start();
     }
     operator_->request(server->run_id(), static_cast<ControlAction>(fault.other),
@@ -276,9 +273,8 @@ class World {
   Setting setting_;
   std::deque<Host> hosts_;
   std::vector<std::unique_ptr<Program>> programs_;  // also those that have ended
-  std::vector<std::unique_ptr<Program>> operators_;
-  std::vector<Program*> current_;  // as plan_.programs
-  OperatorProgram* operator_ = nullptr;
+  std::vector<Program*> current_;                   // as plan_.programs
+  std::unique_ptr<OperatorProgram> operator_;       // once a request is sent
   std::size_t pending_starts_ = 0;
   int restarts_ = 0;
   double extra_loss_ = 0;

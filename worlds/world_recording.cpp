@@ -33,16 +33,6 @@ StoredRecording read_recording(const std::filesystem::path& folder) {
 
 }  // namespace
 
-record::RecorderCore::Recorded FileRecording::close(const record::RunWatch::End& end,
-                                                    std::uint64_t refused) {
-  record::RecorderCore::Recorded recorded;
-  recorded.is_complete = recording_.finish(end.interruption, refused, end.outcome);
-  if (!recorded.is_complete) recorded.gaps = recording_.describe_gaps();
-  recorded.is_reset = recording_.is_reset();
-  recorded.last_step = recording_.last_complete_step();
-  return recorded;
-}
-
 MemoryRecording::MemoryRecording(StoredRecording& stored, const Parameters& parameters,
                                  double flush_s, sync::Time now, const bool& is_disk_full, Say say)
     : stored_(stored),

@@ -41,7 +41,9 @@ class FileRecording final : public WorldRecording {
   bool is_whole() const override { return recording_.has_all(); }
   std::int64_t last_complete_step() const override { return recording_.last_complete_step(); }
   record::RecorderCore::Recorded close(const record::RunWatch::End& end,
-                                       std::uint64_t refused) override;
+                                       std::uint64_t refused) override {
+    return recording_.close(end, refused);
+  }
 
  private:
   record::Recording recording_;

@@ -19,8 +19,6 @@ namespace {
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
-constexpr auto kRepeatAfter = 400ms;  // with the time between two calls, less than 0.5 s
-
 }  // namespace
 
 ParticipantDirectory::ParticipantDirectory(Node& node)
@@ -69,7 +67,7 @@ void Announcer::announce(const Participant& message) {
 }
 
 void Announcer::repeat_if_due() {
-  if (last_ && Clock::now() - time_ >= kRepeatAfter) announce(Participant(*last_));
+  if (last_ && Clock::now() - time_ >= sync::kRepeatAfter) announce(Participant(*last_));
 }
 
 void wait_for_recorders_to_end(const ParticipantDirectory& participants, std::uint64_t run_id,

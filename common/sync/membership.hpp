@@ -20,6 +20,9 @@ namespace sls::sync {
 /// Participants announce themselves at least every 0.5 s. One silent for this long is presumed dead
 /// until its next announcement. (The middleware's lease is much longer: docs/networks.md.)
 inline constexpr auto kPresumedDeadAfter = std::chrono::seconds(2);
+/// Our programs repeat their announcement after this: with the time between two looks, less than
+/// 0.5 s.
+inline constexpr auto kRepeatAfter = std::chrono::milliseconds(400);
 
 /// A participant that is present.
 struct Member {

@@ -24,6 +24,21 @@ std::uint32_t choose_vehicle(const RecorderCore::Options& options) {
 RecorderCore::RecorderCore(Options options)
     : options_(std::move(options)), vehicle_(choose_vehicle(options_)), limit_s_(kJoinTimeout) {}
 
+Participant RecorderCore::make_announcement(std::int64_t last_complete_step,
+                                            bool has_failed) const {
+  Participant message = options_.identity;
+  message.role(ParticipantRole::ROLE_RECORDER);
+  message.name("recorder");
+  if (phase_ != Phase::kFinding && phase_ != Phase::kEnded) {
+    message.run_id(run_->parameters.run_id());
+    message.scenario_sha256(run_->parameters.scenario_sha256());
+  }
+  message.ready(is_ready() && !has_failed);
+  message.done(phase_ == Phase::kClosed);
+  message.last_complete_step(last_complete_step);
+  return message;
+}
+
 RecorderCore::Act RecorderCore::look(const sync::Servers& servers, const Now& now) {
   deadline_ = now.time + kLookTime;
   if (phase_ == Phase::kFinding) return find(servers, now);

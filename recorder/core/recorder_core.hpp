@@ -27,7 +27,8 @@ class RecorderCore {
     std::vector<std::uint32_t> vehicle_ids;
   };
   struct Options {
-    std::string folder;  ///< for messages
+    std::string folder;    ///< for messages
+    Participant identity;  ///< the constant part of every announcement
     /// The run with it is recorded. Ignored if the recording to be continued does not have it.
     std::uint32_t vehicle = 0;
     bool follows_servers = false;  ///< continue with the run of a server that replaces ours
@@ -84,6 +85,9 @@ class RecorderCore {
   Place place() const { return place_; }
   /// The recorder hears the server of its run.
   bool is_ready() const { return watch_ && watch_->is_ready(); }
+  /// The announcement for the present phase. `last_complete_step`: of the recording; −1: none.
+  /// `has_failed`: it cannot be written.
+  Participant make_announcement(std::int64_t last_complete_step, bool has_failed) const;
   /// Why the recording is closed.
   const RunWatch::End& watch_end() const { return watch_->end(); }
   /// Why the recorder ends; empty if there is nothing wrong.

@@ -15,6 +15,11 @@
 
 namespace sls::sim {
 
+/// PlantSide::ForEach in one thread.
+inline void one_after_another(std::size_t count, const std::function<void(std::size_t)>& work) {
+  for (std::size_t i = 0; i < count; ++i) work(i);
+}
+
 class PlantSide {
  public:
   /// Calls `work(i)` once for each i below `count` and returns when all are done, as

@@ -36,6 +36,14 @@ struct Neighbourhood {
   /// Participants with another problem in discovery, which explains why no announcement comes.
   std::set<bus::PeerId> explained;
 
+  /// Adds the runs of other servers with their vehicles.
+  void add(const std::vector<sync::Run>& runs) {
+    for (const sync::Run& run : runs) {
+      other_runs.insert(run.parameters.run_id());
+      for (const std::uint32_t id : sync::list_vehicle_ids(run.parameters))
+        other_vehicles.insert(id);
+    }
+  }
   /// The participant that has announced itself as `peer`; else null.
   const sync::Member* find(const bus::PeerId& peer) const {
     for (const sync::Member& member : participants)

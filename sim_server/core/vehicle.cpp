@@ -86,4 +86,14 @@ void Vehicle::note_rest(sync::Duration rest) {
     if (*since) **since += rest;
 }
 
+model::StepRecord make_late_record(const Vehicle& vehicle, const OfferedAnswer& offered) {
+  model::StepRecord record;
+  record.vehicle_id = vehicle.id();
+  record.step = record.answered_step = offered.step;
+  record.kind = model::AnswerKind::kLate;
+  record.client_name = offered.client_name;
+  record.answer = offered.answer;
+  return record;
+}
+
 }  // namespace sls::sim

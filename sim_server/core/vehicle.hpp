@@ -98,4 +98,7 @@ class Vehicle {
   std::optional<sync::Time> refused_since_;
 };
 
+/// The record of an answer that came too late for its step.
+model::StepRecord make_late_record(const Vehicle& vehicle, const OfferedAnswer& offered);
+
 }  // namespace sls::sim
