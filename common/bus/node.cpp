@@ -140,6 +140,7 @@ struct Node::Impl {
     is_secured = rtps::PropertyPolicyHelper::find_property(qos.properties(),
                                                            "dds.sec.auth.plugin") != nullptr;
     if (transports == Transports::kNetwork) leave_out_shared_memory(qos);
+    if (transports == Transports::kAll) shorten_queue(qos.transport());
     is_on_this_machine = are_local(qos.transport());
     limit_datagrams(qos);
     auto& participants = qos.allocation().participants;

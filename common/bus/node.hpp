@@ -37,6 +37,9 @@ void load_profiles(const std::filesystem::path& file, const std::string& identit
 /// Which transports of its profile a participant uses.
 enum class Transports {
   kAll,
+  /// All, with the whole queue of the profile for what arrives over shared memory. Only a recorder
+  /// has such bursts; otherwise the queue is short (fastdds/transports.hpp).
+  kAllWithLongQueue,
   /// All except shared memory. A stopped or starved process may hold the lock of a shared-memory
   /// port; a viewer that uses only the network cannot block other programs.
   kNetwork

@@ -1,7 +1,8 @@
-/// Questions about the transports of a participant.
+/// The transports of a participant: questions, and the length of its shared-memory queue.
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
 #include <fastdds/dds/core/policy/QosPolicies.hpp>
 #include <memory>
 #include <string>
@@ -31,6 +32,25 @@ inline bool are_local(const dds::TransportConfigQos& transports) {
   const auto& own = transports.user_transports;
   return !transports.use_builtin_transports && !own.empty() &&
          std::all_of(own.begin(), own.end(), is_local);
+}
+
+/// Gives a participant a short queue for what others send it over shared memory. A sender keeps
+/// each message until it has been taken. What lies in the queue of a killed or stopped process
+/// therefore fills the sender's segment. The sender then frees the oldest messages one by one, and
+/// between the rest it may find no room for a longer one: a server whose client had been killed
+/// could publish no more batches (README.md, trap 41).
+///
+/// Upstream: none reported. To be deleted when `SharedMemManager::Segment::recover_buffers` frees
+/// until the message fits.
+inline void shorten_queue(dds::TransportConfigQos& transports) {
+  constexpr std::uint32_t kMessages = 128;
+  for (TransportDescriptor& transport : transports.user_transports) {
+    const auto memory = std::dynamic_pointer_cast<rtps::SharedMemTransportDescriptor>(transport);
+    if (!memory || memory->port_queue_capacity() <= kMessages) continue;
+    const auto own = std::make_shared<rtps::SharedMemTransportDescriptor>(*memory);
+    own->port_queue_capacity(kMessages);
+    transport = own;  // the profile keeps the other one
+  }
 }
 
 }  // namespace sls::bus

@@ -46,5 +46,22 @@ TEST(TransportsTest, AnyOtherInterfaceLeavesThisMachine) {
   EXPECT_FALSE(are_local(builtin));
 }
 
+std::uint32_t queue_of(const TransportDescriptor& transport) {
+  return std::dynamic_pointer_cast<rtps::SharedMemTransportDescriptor>(transport)
+      ->port_queue_capacity();
+}
+
+TEST(TransportsTest, ALongQueueIsShortenedForThisParticipantAlone) {
+  const auto long_one = std::make_shared<rtps::SharedMemTransportDescriptor>();
+  const auto short_one = std::make_shared<rtps::SharedMemTransportDescriptor>();
+  long_one->port_queue_capacity(4096);
+  short_one->port_queue_capacity(100);
+  TransportConfigQos transports = make_transports({long_one, short_one, make_udp({"127.0.0.1"})});
+  shorten_queue(transports);
+  EXPECT_EQ(queue_of(transports.user_transports.at(0)), 128U);
+  EXPECT_EQ(queue_of(transports.user_transports.at(1)), 100U);
+  EXPECT_EQ(queue_of(long_one), 4096U) << "the profile serves other participants, too";
+}
+
 }  // namespace
 }  // namespace sls::bus
