@@ -21,52 +21,8 @@
 
 namespace sls::worlds {
 
-enum class TopicId {
-  kState,
-  kCommand,
-  kRecord,
-  kParticipant,
-  kParameters,
-  kStatus,
-  kControl,
-  kReply
-};
-inline constexpr std::size_t kTopics = 8;
-
-template <class Message>
-constexpr TopicId find_topic();
-template <>
-constexpr TopicId find_topic<States>() {
-  return TopicId::kState;
-}
-template <>
-constexpr TopicId find_topic<Commands>() {
-  return TopicId::kCommand;
-}
-template <>
-constexpr TopicId find_topic<RecordBatch>() {
-  return TopicId::kRecord;
-}
-template <>
-constexpr TopicId find_topic<Participant>() {
-  return TopicId::kParticipant;
-}
-template <>
-constexpr TopicId find_topic<Parameters>() {
-  return TopicId::kParameters;
-}
-template <>
-constexpr TopicId find_topic<SimStatus>() {
-  return TopicId::kStatus;
-}
-template <>
-constexpr TopicId find_topic<SimControl>() {
-  return TopicId::kControl;
-}
-template <>
-constexpr TopicId find_topic<SimControlReply>() {
-  return TopicId::kReply;
-}
+using bus::kTopics;
+using bus::TopicId;
 
 /// The way from one host to another. Probabilities are per datagram.
 struct Link {
@@ -96,7 +52,7 @@ class Peer {
 
   template <class Message>
   void add_reader(std::function<void(const Message&, const Arrival&)> handler) {
-    const auto topic = static_cast<std::size_t>(find_topic<Message>());
+    const auto topic = static_cast<std::size_t>(bus::Topic<Message>::kId);
     readers_[topic] = [handler = std::move(handler)](const void* message, const Arrival& arrival) {
       handler(*static_cast<const Message*>(message), arrival);
     };
@@ -104,11 +60,11 @@ class Peer {
   }
   template <class Message>
   void add_writer() {
-    endpoints_.push_back({static_cast<std::size_t>(find_topic<Message>()), true});
+    endpoints_.push_back({static_cast<std::size_t>(bus::Topic<Message>::kId), true});
   }
   template <class Message>
   void write(Message message) {
-    write(static_cast<std::size_t>(find_topic<Message>()),
+    write(static_cast<std::size_t>(bus::Topic<Message>::kId),
           std::make_shared<const Message>(std::move(message)));
   }
 

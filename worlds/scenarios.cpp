@@ -77,6 +77,10 @@ FlownScenario fly(const config::Scenario& scenario) {
     for (const model::StepRecord& record : flight.steps()) certificate.add(record);
     flown.last_step = flight.steps().front().step;
   }
+  if (!flight.failure().empty())
+    throw config::ConfigError(fmt::format(
+        "scenario '{}': expected a flight that finishes in one process, got: step {}: {}",
+        scenario.name, flown.last_step, flight.failure()));
   flown.certificate = certificate.finish();
   return flown;
 }

@@ -3,6 +3,8 @@
 
 #include <sls.h>  // generated from idl/sls.idl
 
+#include <cstddef>
+
 namespace sls::bus {
 
 /// SHA-256 of idl/sls.idl without comments and with white space collapsed: idl/README.md. Samples
@@ -37,53 +39,74 @@ constexpr const char* find_writer_profile(Flow flow) {
                                  : kLatchedWriterProfile;
 }
 
-/// `kName` and `kFlow` of the topic that carries `Message`.
+/// The topics by number, in the order of kTopicNames.
+enum class TopicId {
+  kState,
+  kCommand,
+  kRecord,
+  kParticipant,
+  kParameters,
+  kStatus,
+  kControl,
+  kControlReply
+};
+inline constexpr std::size_t kTopics = 8;
+
+/// `kId`, `kName` and `kFlow` of the topic that carries `Message`.
 template <class Message>
 struct Topic;
 
 template <>
 struct Topic<States> {
+  static constexpr TopicId kId = TopicId::kState;
   static constexpr const char* kName = "sls/state";
   static constexpr Flow kFlow = Flow::kLoop;
 };
 template <>
 struct Topic<Commands> {
+  static constexpr TopicId kId = TopicId::kCommand;
   static constexpr const char* kName = "sls/command";
   static constexpr Flow kFlow = Flow::kLoop;
 };
 template <>
 struct Topic<RecordBatch> {
+  static constexpr TopicId kId = TopicId::kRecord;
   static constexpr const char* kName = "sls/record";
   static constexpr Flow kFlow = Flow::kRecord;
 };
 template <>
 struct Topic<Participant> {
+  static constexpr TopicId kId = TopicId::kParticipant;
   static constexpr const char* kName = "sls/participant";
   static constexpr Flow kFlow = Flow::kLatched;
 };
 template <>
 struct Topic<Parameters> {
+  static constexpr TopicId kId = TopicId::kParameters;
   static constexpr const char* kName = "sls/parameters";
   static constexpr Flow kFlow = Flow::kLatched;
 };
 template <>
 struct Topic<SimStatus> {
+  static constexpr TopicId kId = TopicId::kStatus;
   static constexpr const char* kName = "sls/status";
   static constexpr Flow kFlow = Flow::kLatched;
 };
 template <>
 struct Topic<SimControl> {
+  static constexpr TopicId kId = TopicId::kControl;
   static constexpr const char* kName = "sls/control";
   static constexpr Flow kFlow = Flow::kLatched;
 };
 template <>
 struct Topic<SimControlReply> {
+  static constexpr TopicId kId = TopicId::kControlReply;
   static constexpr const char* kName = "sls/control_reply";
   static constexpr Flow kFlow = Flow::kLatched;
 };
 
 /// The names of all topics of the contract.
-inline constexpr const char* kTopicNames[] = {
+inline constexpr const char* kTopicNames[kTopics] = {
     Topic<States>::kName,      Topic<Commands>::kName,       Topic<RecordBatch>::kName,
     Topic<Participant>::kName, Topic<Parameters>::kName,     Topic<SimStatus>::kName,
     Topic<SimControl>::kName,  Topic<SimControlReply>::kName};

@@ -4,9 +4,12 @@
 #include <algorithm>
 #include <csignal>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <string>
 #include <vector>
 
+#include "tests/support/temporary_folder.hpp"
 #include "tests/support/waiting.hpp"
 #include "tests/system/process.hpp"
 
@@ -33,6 +36,12 @@ TEST(WorldsProgramTest, MistakesGiveOneLineAndExitCodeTwo) {
   expect_refused({"--jobs", "0"}, "--jobs");
   expect_refused({"--verbose"}, "--replay");
   expect_refused({"--scenario", "no_such.yaml"}, "no_such.yaml");
+  const TemporaryFolder folder;
+  std::ifstream given(scenario("short"));
+  std::string text(std::istreambuf_iterator<char>(given), {});
+  text.replace(text.find("force_limit_n: 200"), 18, "force_limit_n: 16");
+  std::ofstream(folder / "weak.yaml") << text;
+  expect_refused({"--scenario", folder / "weak.yaml"}, "expected a flight that finishes");
   expect_refused({"--nonsense"}, "--nonsense");
 }
 

@@ -118,6 +118,30 @@ TEST_F(RecorderCoreTest, RecordsTheRunWithItsVehicle) {
 
 // --- one run -------------------------------------------------------------------------------------
 
+TEST_F(RecorderCoreTest, AnnouncesTheRunThatItRecords) {
+  options_.identity.host("here");
+  begin();
+  const auto is = [this](std::uint64_t run_id, bool is_ready, bool is_done) {
+    const Participant message = core_->make_announcement(5, false);
+    return message.name() == "recorder" && message.host() == "here" &&
+           message.role() == ParticipantRole::ROLE_RECORDER && message.run_id() == run_id &&
+           message.last_complete_step() == 5 && message.ready() == is_ready &&
+           message.done() == is_done;
+  };
+  EXPECT_TRUE(is(0, false, false)) << "while it looks for a server";
+  serve(kRun, kServer, 0);
+  ASSERT_EQ(look(0), Act::kOpen);
+  EXPECT_TRUE(is(kRun, false, false));
+  core_->on_opened(7, {at(0), "", false, -1});
+  EXPECT_EQ(look(5), Act::kAnnounce);
+  EXPECT_TRUE(is(kRun, true, false));
+  EXPECT_FALSE(core_->make_announcement(5, true).ready()) << "it cannot write";
+  EXPECT_EQ(look(10, "", true), Act::kReport);
+  EXPECT_TRUE(is(kRun, true, true));
+  report(whole_);
+  EXPECT_TRUE(is(0, true, false));
+}
+
 TEST_F(RecorderCoreTest, AnnouncesUntilTheRecordingIsClosed) {
   serve(kRun, kServer, 0);
   open(0);

@@ -103,12 +103,7 @@ std::unique_ptr<AnyTopicReader> make_reader(bus::Node& node, TopicId topic, cons
 
 }  // namespace
 
-const char* name_of(TopicId topic) {
-  constexpr std::array<const char*, kTopics> kNames = {
-      "sls/state",      "sls/command", "sls/record",  "sls/participant",
-      "sls/parameters", "sls/status",  "sls/control", "sls/control_reply"};
-  return kNames[static_cast<std::size_t>(topic)];
-}
+const char* name_of(TopicId topic) { return bus::kTopicNames[static_cast<std::size_t>(topic)]; }
 
 const char* type_of(TopicId topic) {
   constexpr std::array<const char*, kTopics> kNames = {

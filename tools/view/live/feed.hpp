@@ -17,17 +17,8 @@ namespace sls::view {
 /// Number of the newest events that a page gets when it connects.
 inline constexpr std::size_t kPastEvents = 200;
 
-enum class TopicId {
-  kState,
-  kCommand,
-  kRecord,
-  kParticipant,
-  kParameters,
-  kStatus,
-  kControl,
-  kControlReply
-};
-inline constexpr std::size_t kTopics = 8;
+using bus::kTopics;
+using bus::TopicId;
 
 const char* name_of(TopicId topic);  ///< "sls/state"
 const char* type_of(TopicId topic);  ///< "sls::States"
