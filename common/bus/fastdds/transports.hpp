@@ -34,11 +34,11 @@ inline bool are_local(const dds::TransportConfigQos& transports) {
          std::all_of(own.begin(), own.end(), is_local);
 }
 
-/// Gives a participant a short queue for what others send it over shared memory. A sender keeps
-/// each message until it has been taken. What lies in the queue of a killed or stopped process
-/// therefore fills the sender's segment. The sender then frees the oldest messages one by one, and
-/// between the rest it may find no room for a longer one: a server whose client had been killed
-/// could publish no more batches (README.md, trap 41).
+/// Gives a participant a short queue for the messages that others send over shared memory. A sender
+/// keeps each message until it has been taken, so the queue of a killed or stopped process fills
+/// the sender's segment. The sender then frees the oldest messages one by one, and between the rest
+/// it may find no room for a longer one: a server whose client had been killed could publish no
+/// more batches (README.md, trap 41).
 ///
 /// Upstream: none reported. To be deleted when `SharedMemManager::Segment::recover_buffers` frees
 /// until the message fits.
