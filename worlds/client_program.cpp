@@ -69,7 +69,7 @@ void ClientProgram::wake() {
     return exit(2, error.what());
   }
   if (act == Act::kAnnounceReady || act == Act::kLeave) announce(core_.make_announcement());
-  repeat_announcement_if_due();
+  if (!options_.announces_once) repeat_announcement_if_due();
   if (core_.phase() == control::ClientCore::Phase::kEnded)
     return exit(core_.error().empty() ? 0 : 1, core_.error());
   wake_at(core_.next_deadline());

@@ -21,6 +21,7 @@ class ClientProgram : public Program {
     bool has_other_scenario = false;  ///< a wrong file was given
     bool is_sloppy = false;   ///< one answer in 20 comes after one to another run, step or vehicle
     Instant compute_time{0};  ///< of an answer
+    bool announces_once = false;  ///< unlike our clients, it does not repeat its announcement
     control::LawMaker make_law = &control::make_control_law;
   };
   ClientProgram(Setting& setting, Host& host, std::string name, const Options& options);

@@ -89,6 +89,11 @@ class Process {
     }
   }
   void end() { has_ended_ = true; }
+  void kill() {
+    was_killed_ = true;
+    end();
+  }
+  bool was_killed() const { return was_killed_; }
 
  private:
   static constexpr std::size_t kMostBacklog = 400;
@@ -98,6 +103,7 @@ class Process {
   const std::string name_;
   bool is_stopped_ = false;
   bool has_ended_ = false;
+  bool was_killed_ = false;
   std::deque<Timeline::Action> backlog_;
 };
 

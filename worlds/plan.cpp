@@ -54,9 +54,13 @@ void draw_programs(Plan& plan, Random& random, const FlownScenario& flown) {
   };
   add(Role::kServer);
   const bool is_wild = plan.promise == Promise::kNone;
+  const bool is_calm = plan.promise == Promise::kCalm;
   if (is_wild && random.chance(0.25)) add(Role::kServer);
-  // A server that was started again waits for the expected ones alone.
-  const bool has_surplus = plan.promise != Promise::kServerRestart;
+  if (plan.promise == Promise::kTwoServers)
+    add(Role::kServer).start = plan.programs.front().start + draw_time(random, 0ms, 800ms);
+  // A server that was started again, or second, waits for the expected ones alone.
+  const bool has_surplus =
+      plan.promise != Promise::kServerRestart && plan.promise != Promise::kTwoServers;
   const int clients =
       expected.controllers + (plan.promise == Promise::kTakeOver
                                   ? 1
@@ -64,7 +68,8 @@ void draw_programs(Plan& plan, Random& random, const FlownScenario& flown) {
   for (int i = 0; i < clients; ++i) {
     PlannedProgram& client = add(Role::kClient);
     client.strength = static_cast<std::int32_t>(random.integer(0, 3));
-    if (random.chance(0.1)) client.delay = draw_time(random, 100us, 3ms);
+    client.announces_once = random.chance(0.1);
+    if (!is_calm && random.chance(0.1)) client.delay = draw_time(random, 100us, 3ms);
     if (is_wild && random.chance(0.03)) client.has_other_scenario = true;
     client.is_sloppy = random.chance(0.2);
   }
@@ -74,7 +79,7 @@ void draw_programs(Plan& plan, Random& random, const FlownScenario& flown) {
   for (int i = 0; i < recorders; ++i) {
     PlannedProgram& recorder = add(Role::kRecorder);
     recorder.resumes = plan.promise == Promise::kRecorderRestart || random.chance(0.7);
-    if (random.chance(0.1)) recorder.delay = draw_time(random, 1ms, 100ms);
+    if (!is_calm && random.chance(0.1)) recorder.delay = draw_time(random, 1ms, 100ms);
   }
 }
 
@@ -97,8 +102,8 @@ Fault draw_fault(const Plan& plan, Random& random, std::int64_t count) {
                                               : static_cast<Kind>(random.integer(0, 9));
   const auto programs = static_cast<std::int64_t>(plan.programs.size());
   const auto hosts = static_cast<std::int64_t>(plan.hosts);
-  const auto draw_of = [&](std::int64_t count) {
-    return static_cast<std::size_t>(random.integer(0, count - 1));
+  const auto draw_of = [&](std::int64_t number) {
+    return static_cast<std::size_t>(random.integer(0, number - 1));
   };
   // A server that has ended waits 1 s for the others to hear it.
   const bool is_mild = plan.promise == Promise::kMild;
@@ -141,42 +146,77 @@ Fault draw_fault(const Plan& plan, Random& random, std::int64_t count) {
   return fault;
 }
 
+/// Longest stop of a client in a world of kLongStop, before it is absent for too long.
+double calc_longest_stop_s(const config::Sync& sync) { return sync.wait.controller.deadline_s - 2; }
+
 /// A promise holds only if policies wait, and 8 s are enough for what happens.
 Promise draw_promise(Random& random, const config::Sync& sync) {
+  const double choice = random.uniform();
+  if (choice < 0.35) return Promise::kNone;
+  if (choice < 0.42) return Promise::kCalm;
   if (sync.wait.controller.policy != config::ControllerPolicy::kWait ||
       sync.wait.recorder.policy == config::RecorderPolicy::kStop)
     return Promise::kNone;
-  const double choice = random.uniform();
-  if (choice < 0.4) return Promise::kNone;
-  if (choice < 0.7) return Promise::kMild;
-  if (choice < 0.82) return Promise::kTakeOver;
-  if (choice < 0.94 || sync.wait_for.recorders == 0) return Promise::kServerRestart;
+  if (choice < 0.6) return Promise::kMild;
+  if (choice < 0.68) return Promise::kTakeOver;
+  if (choice < 0.74) return Promise::kReset;
+  if (choice < 0.8) return Promise::kPause;
+  if (choice < 0.84) return Promise::kTwoServers;
+  if (choice < 0.9 && sync.wait.server_deadline_s + 1 < calc_longest_stop_s(sync))
+    return Promise::kLongStop;
+  if (choice < 0.95 || sync.wait_for.recorders == 0) return Promise::kServerRestart;
   return Promise::kRecorderRestart;
 }
 
-/// The one fault of a world with another promise than kMild.
-Fault draw_kill(const Plan& plan, Random& random, const FlownScenario& flown) {
-  const Role role = plan.promise == Promise::kTakeOver        ? Role::kClient
-                    : plan.promise == Promise::kServerRestart ? Role::kServer
-                                                              : Role::kRecorder;
+/// The one fault of a world with a promise that names it.
+Fault draw_promised(const Plan& plan, Random& random, const FlownScenario& flown) {
+  const config::Sync& sync = flown.scenario.sync;
+  const auto draw_seconds = [&](double least, double most) {
+    return Instant(static_cast<std::int64_t>(random.between(least, most) * 1e9));
+  };
+  Fault fault;
+  Role role = Role::kServer;
+  switch (plan.promise) {
+    case Promise::kTakeOver:
+      role = Role::kClient;
+      break;
+    case Promise::kServerRestart:
+      fault.duration = draw_time(random, 1ms, 3s);
+      break;
+    case Promise::kRecorderRestart:
+      role = Role::kRecorder;
+      fault.duration = draw_time(random, 1ms, 3s);
+      break;
+    case Promise::kReset:
+      fault.kind = Kind::kRequest;
+      fault.other = static_cast<std::size_t>(ControlAction::ACTION_RESET);
+      break;
+    case Promise::kPause:
+      fault.kind = Kind::kRequest;
+      fault.other = static_cast<std::size_t>(ControlAction::ACTION_PAUSE);
+      fault.duration = draw_seconds(1, sync.calc_controller_patience_s() + 10);
+      break;
+    default:
+      fault.kind = Kind::kStop;
+      role = Role::kClient;
+      fault.duration = draw_seconds(sync.wait.server_deadline_s + 1, calc_longest_stop_s(sync));
+  }
   std::vector<std::size_t> targets;
   for (std::size_t i = 0; i < plan.programs.size(); ++i)
     if (plan.programs[i].role == role) targets.push_back(i);
-  Fault fault;
-  fault.kind = Kind::kKill;
   fault.target = targets[static_cast<std::size_t>(
       random.integer(0, static_cast<std::int64_t>(targets.size()) - 1))];
   fault.step =
       static_cast<std::uint64_t>(random.integer(0, static_cast<std::int64_t>(flown.last_step) - 5));
-  if (role != Role::kClient) fault.duration = draw_time(random, 1ms, 3s);
   return fault;
 }
 
 }  // namespace
 
 const char* name_promise(Promise promise) {
-  static constexpr const char* kNames[] = {"no promise", "mild", "take-over", "server restart",
-                                           "recorder restart"};
+  static constexpr const char* kNames[] = {
+      "no promise", "mild",  "take-over", "server restart", "recorder restart",
+      "calm",       "reset", "pause",     "long stop",      "two servers"};
   return kNames[static_cast<int>(promise)];
 }
 
@@ -196,14 +236,15 @@ Plan draw_plan(std::uint64_t seed, const std::vector<FlownScenario>& scenarios) 
   const bool is_lockstep = flown.scenario.sync.mode == config::SyncMode::kLockstep;
   plan.promise = draw_promise(random, flown.scenario.sync);
   plan.hosts = static_cast<std::size_t>(random.integer(1, 4));
-  plan.link = draw_link(random);
+  plan.link = plan.promise == Promise::kCalm ? Link() : draw_link(random);
   plan.drift = random.chance(0.3) ? random.between(-1e-4, 1e-4) : 0;
   plan.wall_offset_s = random.chance(0.3) ? random.between(-20, 20) : 0;
   plan.healed = draw_time(random, 1s, is_lockstep ? Instant(6s) : Instant(4s));
   plan.has_files = plan.promise == Promise::kRecorderRestart || random.chance(0.08);
   draw_programs(plan, random, flown);
+  if (plan.promise == Promise::kCalm || plan.promise == Promise::kTwoServers) return plan;
   if (plan.promise > Promise::kMild) {
-    plan.faults.push_back(draw_kill(plan, random, flown));
+    plan.faults.push_back(draw_promised(plan, random, flown));
     return plan;
   }
   const std::int64_t faults = random.chance(0.15) ? 0 : random.integer(1, 6);

@@ -52,9 +52,10 @@ struct PlannedProgram {
   std::int32_t strength = 0;
   bool follows_servers = false;
   bool has_other_scenario = false;
-  bool is_sloppy = false;  ///< a client that also sends what nobody asked for
-  bool resumes = false;    ///< a recorder that takes the place of a killed one goes on
-  Instant delay{0};        ///< computing time of an answer; of the disk of a recorder
+  bool is_sloppy = false;       ///< a client that also sends what nobody asked for
+  bool announces_once = false;  ///< a client that does not repeat its announcement
+  bool resumes = false;         ///< a recorder that takes the place of a killed one goes on
+  Instant delay{0};             ///< computing time of an answer; of the disk of a recorder
 };
 
 /// The faults of a world after which a flight must be finished, and every program that is not
@@ -65,6 +66,11 @@ enum class Promise {
   kTakeOver,         ///< a client is killed in flight; another one is there
   kServerRestart,    ///< the server is killed in flight and started again; the others follow
   kRecorderRestart,  ///< a recorder is killed in flight and started again with --resume
+  kCalm,             ///< no faults, a good network: no step is late either
+  kReset,            ///< an operator resets the flight
+  kPause,            ///< an operator pauses for longer than anybody may be absent
+  kLongStop,         ///< a client is stopped for longer than it waits for a silent server
+  kTwoServers,       ///< a second server is started with the first
 };
 const char* name_promise(Promise promise);
 

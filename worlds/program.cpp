@@ -13,18 +13,30 @@ void Program::say(std::string text) {
 
 void Program::kill() {
   if (process_.has_ended()) return;
-  was_killed_ = true;
   setting_.properties.on_killed(*this);
   on_killed();
-  process_.end();
+  process_.kill();
   say("killed");
   setting_.network.leave(peer_, false);
+}
+
+void Program::interrupt() {
+  if (process_.has_ended() || was_interrupted()) return;
+  stop_signal_ = "interrupted by SIGINT";
+  setting_.properties.on_interrupted(*this);
+}
+
+void Program::set_slowness(Instant delay) {
+  if (slowness_ == delay) return;
+  slowness_ = delay;
+  setting_.properties.on_disturbed(*this);
 }
 
 void Program::go_on() {
   if (process_.has_ended()) return;
   say("continued");
   setting_.properties.on_continued(*this);
+  setting_.properties.on_disturbed(*this);
   process_.go_on();
 }
 
@@ -53,7 +65,7 @@ void Program::wake_at(sync::Time time) {
 void Program::announce(const Participant& message) {
   announced_ = message;
   announced_time_ = now();
-  setting_.properties.on_announced(*this, message);
+  setting_.properties.on_announced(*this, message, peer_);
   peer_.write(message);
 }
 

@@ -37,17 +37,18 @@ class Program {
   Role role() const { return role_; }
 
   /// SIGINT: the program ends as if a user had pressed Ctrl-C.
-  void interrupt() { stop_signal_ = "interrupted by SIGINT"; }
+  void interrupt();
   /// SIGKILL.
   void kill();
-  bool was_killed() const { return was_killed_; }
+  bool was_killed() const { return process_.was_killed(); }
   bool was_interrupted() const { return !stop_signal_.empty(); }
   /// After its end, unless it was killed.
   std::optional<int> exit_code() const { return exit_code_; }
   const std::string& reason() const { return reason_; }
   Instant ended() const { return ended_; }
   /// The processor takes so much longer for each wake-up.
-  void set_slowness(Instant delay) { slowness_ = delay; }
+  void set_slowness(Instant delay);
+  bool is_slow() const { return slowness_ > Instant(0); }
 
  protected:
   sync::Time now() const { return process_.host().now(); }
@@ -91,7 +92,6 @@ class Program {
   std::uint64_t wake_number_ = 0;
   std::optional<Participant> announced_;
   sync::Time announced_time_;
-  bool was_killed_ = false;
   std::optional<int> exit_code_;
   std::string reason_;
   Instant ended_{0};

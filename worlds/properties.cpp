@@ -21,6 +21,12 @@ constexpr Instant kNamedWithin = 2500ms;
 /// Two servers of one vehicle that hear each other: one of them has gone after this.
 constexpr Instant kRivalsGoneWithin = 4s;
 
+/// The others have heard of it, unless something is in the way.
+constexpr Instant kHeardWithin = 2s;
+
+/// A server waits longer than this for recorders that do not get on.
+constexpr Instant kWaitsFor = 5s;
+
 /// A server waits at most 1 s for acknowledgements of each of two topics.
 constexpr Instant kEndsWithin = 3500ms;
 
@@ -73,20 +79,31 @@ std::vector<FlightSummary> Properties::summarise_flights() const {
 
 // --- during the world ----------------------------------------------------------------------------
 
-void Properties::on_run(const Program& server, std::uint64_t run_id, const Parameters& parameters) {
+void Properties::on_run(const Program& server, std::uint64_t run_id, const Parameters& parameters,
+                        const config::Scenario& scenario) {
   Run& run = runs_[run_id];
+  run.flight = std::make_unique<FlightWatch>(scenario, run_id, server,
+                                             [this](std::string text) { find(std::move(text)); });
+  run.phase_since = timeline_.now();
   run.server = &server;
   run.vehicle_ids = sync::list_vehicle_ids(parameters);
 }
 
-void Properties::on_yielded(const Program& server) {
-  const auto flies = [&](const auto& item) {
-    const Run& run = item.second;
-    // One that still waits after its run counts, too: its history comes sample by sample.
-    return run.server != &server && !run.server->process().has_ended();
+void Properties::on_yielded(const Program& server, std::uint64_t run_id) {
+  const Run& own = runs_[run_id];
+  const auto has_won = [&](const auto& item) {
+    const auto& [id, other] = item;
+    if (other.server == &server || other.server->process().was_killed()) return false;
+    // What has just changed may not be known.
+    const auto progress = [&](const Run& run) {
+      return run.has_status ? sync::calc_progress(run.phase) : 0;
+    };
+    if (timeline_.now() - other.phase_since < kHeardWithin) return true;
+    if (own.has_status && timeline_.now() - own.phase_since < kHeardWithin) return !other.has_ended;
+    return progress(other) > progress(own) || (progress(other) == progress(own) && id < run_id);
   };
-  if (std::none_of(runs_.begin(), runs_.end(), flies) && killed_.empty())
-    find(fmt::format("yields: {} yields to nobody", server.name()));
+  if (std::none_of(runs_.begin(), runs_.end(), has_won) && killed_.empty())
+    find(fmt::format("yields: {} yields to nobody who is further", server.name()));
 }
 
 void Properties::on_published(std::uint64_t run_id, std::uint64_t step,
@@ -96,6 +113,7 @@ void Properties::on_published(std::uint64_t run_id, std::uint64_t step,
                     static_cast<int>(run.recorders.size()) < expected.recorders))
     find(fmt::format("start: run {:016x} begins with {} controllers and {} recorders", run_id,
                      run.ready.size(), run.recorders.size()));
+  run.flight->on_published(step, timeline_.now());
   run.published = timeline_.now();
   if (!run.began) run.began = run.published;
   run.is_stall_found = false;
@@ -103,6 +121,7 @@ void Properties::on_published(std::uint64_t run_id, std::uint64_t step,
 
 void Properties::on_recorded(std::uint64_t run_id, const std::vector<model::StepRecord>& records) {
   Run& run = runs_[run_id];
+  run.flight->on_recorded(records, timeline_.now());
   for (const model::StepRecord& record : records) {
     ++steps_;
     auto& rows = run.rows[record.vehicle_id];
@@ -143,11 +162,14 @@ void Properties::check_applied(const model::StepRecord& before, const model::Ste
 void Properties::on_status(const SimStatus& status, const Network& network) {
   Run& run = runs_[status.run_id()];
   run.timing = status.timing().to_string();
+  if (!run.has_status || run.phase != status.phase()) run.phase_since = timeline_.now();
+  run.has_status = true;
   run.phase = status.phase();
   run.summary.take_overs = status.counters().take_overs();
   run.summary.late = status.counters().held() + status.counters().fail_safe();
   if (status.reason().size() > 0) run.named = timeline_.now();
   if (run.phase != RunPhase::PHASE_RUNNING) return;
+  run.flight->on_running(timeline_.now());
   check_stall(run, status.run_id());
   check_rivals(run, network);
 }
@@ -197,17 +219,57 @@ void Properties::on_run_end(std::uint64_t run_id, bool is_finished, std::string 
   run.certificate = std::move(certificate);
 }
 
-void Properties::on_announced(const Program& program, const Participant& message) {
+void Properties::on_announced(const Program& program, const Participant& message,
+                              const Peer& peer) {
+  if (message.run_id() == 0) return;
+  const bool is_client = program.role() == Role::kClient;
+  if (!is_client && program.role() != Role::kRecorder) return;
+  const auto found = runs_.find(message.run_id());
+  if (found == runs_.end())
+    return find(fmt::format("joins: {} joins run {:016x}, which no server flies", program.name(),
+                            message.run_id()));
+  Run& run = found->second;
+  if (message.done()) run.done.try_emplace(program.name(), timeline_.now());
+  if (is_client && !run.has_status)
+    find(fmt::format("joins: {} joins run {:016x}, whose claim is not settled", program.name(),
+                     message.run_id()));
   if (!message.ready()) return;
-  Run& run = runs_[message.run_id()];
-  if (program.role() == Role::kClient) run.ready.insert(program.name());
-  if (program.role() == Role::kRecorder) run.recorders.insert(program.name());
+  const TopicId topic = is_client ? TopicId::kState : TopicId::kRecord;
+  const bool is_first = is_client ? run.ready.insert(program.name()).second
+                                  : run.recorders.insert(program.name()).second;
+  if (!is_first) return;
+  run.ready_since[program.name()] = timeline_.now();
+  if (peer.matched_writers(topic).count(run.server->id()) == 0)
+    find(fmt::format("ready: {} says so of run {:016x} before it sees the server", program.name(),
+                     message.run_id()));
+}
+
+/// A server leaves requests for the runs of others to them.
+void Properties::on_replied(const Program& server, std::uint64_t run_id, const Network& network) {
+  const auto run = runs_.find(run_id);
+  if (run == runs_.end() || run->second.server == &server || run->second.has_ended ||
+      !run->second.has_status || timeline_.now() - run->second.phase_since < kHeardWithin ||
+      run->second.server->process().has_ended() || run->second.server->process().is_stopped() ||
+      !network.are_connected(server.id(), run->second.server->id()))
+    return;
+  find(fmt::format("operator: {} answers a request to {}", server.name(),
+                   run->second.server->name()));
+}
+
+void Properties::on_interrupted(const Program& program) {
+  for (const auto& [run_id, run] : runs_)
+    if (run.server == &program) run.flight->on_interrupted(timeline_.now());
 }
 
 void Properties::on_killed(const Program& program) { killed_[program.name()] = timeline_.now(); }
 
 void Properties::on_continued(const Program& program) {
   continued_[program.name()] = timeline_.now();
+}
+
+void Properties::on_disturbed(const Program& program) {
+  for (const auto& [run_id, run] : runs_)
+    if (run.server == &program) run.flight->on_disturbed();
 }
 
 // --- at its end ----------------------------------------------------------------------------------
@@ -220,6 +282,8 @@ void Properties::check(const Plan& plan, const std::vector<std::unique_ptr<Progr
     if (run.has_ended && !run.timing.empty() && says_exact != run.is_exact)
       find(fmt::format("timing-label: run {:016x} is {}exact, its label says '{}'", run_id,
                        run.is_exact ? "" : "not ", run.timing));
+    if (plan.promise == Promise::kCalm && run.is_finished && !run.is_exact)
+      find(fmt::format("calm: run {:016x} has late steps", run_id));
   }
   std::map<std::filesystem::path, const Program*> folders;
   for (const auto& program : programs) {
@@ -233,7 +297,8 @@ void Properties::check(const Plan& plan, const std::vector<std::unique_ptr<Progr
     }
     if (plan.promise != Promise::kNone && program->role() == Role::kServer)
       check_end(*program, programs);
-    if (plan.promise != Promise::kNone && has_joined(*program) &&
+    const bool may_yield = plan.promise == Promise::kTwoServers && program->role() == Role::kServer;
+    if (plan.promise != Promise::kNone && has_joined(*program) && !may_yield &&
         program->exit_code().value_or(0) != 0)
       find(fmt::format("finishes: {} ends with {}: {}", program->name(), *program->exit_code(),
                        program->reason()));
@@ -299,21 +364,38 @@ void Properties::check_rows(const Program& program, const StoredRecording& recor
                                 program.name(), step, vehicle));
       next = step + 1;
     }
+    const std::string& outcome = recording.claims.outcome;
+    const bool knows_end = outcome == "finished" || outcome == "failed" || outcome == "reset";
+    for (; recording.is_closed && knows_end && next <= recording.claims.last_step; ++next)
+      if (missing.count(next) == 0 && flown != run.rows.end() && next < flown->second.size())
+        return find(
+            fmt::format("rows: {}: step {} of vehicle {}, at the end, is neither there nor "
+                        "listed as missing",
+                        program.name(), next, vehicle));
   }
 }
 
-/// A server ends soon after the recorders of its finished run.
+/// A server ends soon after the recorders of its finished run, and not before them.
 void Properties::check_end(const Program& server,
                            const std::vector<std::unique_ptr<Program>>& programs) {
-  if (server.was_killed() || !server.exit_code()) return;
+  if (server.was_killed() || server.was_interrupted() || !server.exit_code()) return;
   for (const auto& [run_id, run] : runs_) {
     if (run.server != &server || !run.is_finished) continue;
     Instant last = run.ended;
-    for (const auto& program : programs)
-      if (program->role() == Role::kRecorder && run.recorders.count(program->name()) > 0) {
-        if (program->was_killed()) return;
-        last = std::max(last, program->ended());
+    for (const auto& program : programs) {
+      if (program->role() != Role::kRecorder || run.recorders.count(program->name()) == 0) continue;
+      if (program->was_killed()) {
+        last = std::max(last, killed_.at(program->name()) + sync::kPresumedDeadAfter);
+        continue;
       }
+      last = std::max(last, program->ended());
+      const bool is_known = run.ready_since.at(program->name()) + kHeardWithin / 2 < run.ended;
+      const auto done = run.done.find(program->name());
+      if (is_known && server.ended() < run.ended + kWaitsFor &&
+          (done == run.done.end() || done->second > server.ended()))
+        find(fmt::format("waits: {} ends before {} has its recording", server.name(),
+                         program->name()));
+    }
     if (server.ended() > last + kEndsWithin)
       find(fmt::format("prompt: {} ends {:.3f} s after its last recorder", server.name(),
                        std::chrono::duration<double>(server.ended() - last).count()));

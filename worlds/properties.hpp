@@ -14,6 +14,7 @@
 #include "common/config/scenario.hpp"
 #include "common/model/step_record.hpp"
 #include "recorder/core/recording_core.hpp"
+#include "worlds/flight_watch.hpp"
 #include "worlds/network.hpp"
 #include "worlds/plan.hpp"
 #include "worlds/timeline.hpp"
@@ -54,18 +55,28 @@ class Properties {
 
   // --- what the programs do ---
 
-  void on_run(const Program& server, std::uint64_t run_id, const Parameters& parameters);
+  void on_run(const Program& server, std::uint64_t run_id, const Parameters& parameters,
+              const config::Scenario& scenario);
+  /// What arrives at the server of a run, and what it sends again.
+  FlightWatch& flight(std::uint64_t run_id) { return *runs_.at(run_id).flight; }
   /// A server ends because another one has its vehicles.
-  void on_yielded(const Program& server);
+  void on_yielded(const Program& server, std::uint64_t run_id);
   /// States of a step leave for the first time.
   void on_published(std::uint64_t run_id, std::uint64_t step, const config::WaitFor& expected);
   void on_recorded(std::uint64_t run_id, const std::vector<model::StepRecord>& records);
-  void on_late(std::uint64_t run_id) { runs_[run_id].has_late = true; }
+  void on_late(std::uint64_t run_id) {
+    runs_[run_id].has_late = true;
+    runs_[run_id].flight->on_late();
+  }
   void on_status(const SimStatus& status, const Network& network);
   void on_run_end(std::uint64_t run_id, bool is_finished, std::string certificate);
-  void on_announced(const Program& program, const Participant& message);
+  void on_announced(const Program& program, const Participant& message, const Peer& peer);
+  void on_replied(const Program& server, std::uint64_t run_id, const Network& network);
+  void on_interrupted(const Program& program);
   void on_killed(const Program& program);
   void on_continued(const Program& program);
+  /// Its process was stopped, is slow or is so no more.
+  void on_disturbed(const Program& program);
 
   /// At the end of the world.
   void check(const Plan& plan, const std::vector<std::unique_ptr<Program>>& programs,
@@ -82,8 +93,10 @@ class Properties {
   struct Run {
     const Program* server = nullptr;
     std::vector<std::uint32_t> vehicle_ids;
-    std::set<std::string> ready;                               // clients that have announced it
-    std::set<std::string> recorders;                           // the same
+    std::set<std::string> ready;                       // clients that have announced it
+    std::set<std::string> recorders;                   // the same
+    std::map<std::string, Instant> ready_since, done;  // recorders
+    std::unique_ptr<FlightWatch> flight;
     std::map<std::uint32_t, std::vector<std::uint64_t>> rows;  // hashes, by vehicle and step
     std::map<std::uint32_t, model::StepRecord> last;
     bool is_exact = true;  // each force answers its own state
@@ -94,6 +107,8 @@ class Properties {
     std::string certificate;
     std::string timing;
     RunPhase phase = RunPhase::PHASE_WAITING;
+    bool has_status = false;  // its claim is settled
+    Instant phase_since{0};
     std::optional<Instant> published;  // the last step
     std::optional<Instant> began;      // the first step
     FlightSummary summary;

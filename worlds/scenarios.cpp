@@ -20,9 +20,10 @@ struct Choice {
   int recorders;
   const char* controller;
   const char* recorder;
+  double server_deadline_s = 30;
 };
 
-constexpr std::array<Choice, 16> kChoices = {{
+constexpr std::array<Choice, 18> kChoices = {{
     {"lockstep", 1, 1, 1, "wait", "wait"},
     {"lockstep", 1, 1, 0, "wait", "wait"},
     {"lockstep", 1, 2, 1, "wait", "wait"},
@@ -39,6 +40,8 @@ constexpr std::array<Choice, 16> kChoices = {{
     {"realtime", 2, 1, 1, "failsafe", "wait"},
     {"realtime", 1, 2, 0, "stop", "wait"},
     {"realtime", 3, 1, 1, "wait", "stop"},
+    {"lockstep", 1, 1, 1, "wait", "wait", 4},
+    {"lockstep", 2, 2, 1, "wait", "wait", 4},
 }};
 
 std::string make_text(const Choice& choice) {
@@ -53,7 +56,7 @@ sync:
   mode: {}
   period_s: 0.004
   wait_for: {{ controllers: {}, recorders: {}, timeout_s: 8 }}
-  wait: {{ controller: {{ policy: {} }}, recorder: {{ policy: {} }} }}
+  wait: {{ controller: {{ policy: {} }}, recorder: {{ policy: {} }}, server: {{ deadline_s: {} }} }}
 controller:
   gains: {{ lqr: {{ horizontal: 10, vertical: 5 }} }}
   force_limit_n: 200
@@ -62,7 +65,7 @@ mission:
     for_s: 1.2
 )",
                      choice.vehicles, choice.mode, choice.controllers, choice.recorders,
-                     choice.controller, choice.recorder);
+                     choice.controller, choice.recorder, choice.server_deadline_s);
 }
 
 }  // namespace

@@ -36,6 +36,7 @@ void ServerProgram::start() {
   peer_.add_writer<Parameters>();
   peer_.add_reader<Participant>([this](const Participant& sample, const Peer::Arrival& arrival) {
     note(sample, arrival);
+    if (flight_) flight_->on_member(sample, sender(arrival), setting_.timeline.now());
     if (core_ && core_->has_news(*this)) wake_soon();
   });
   read<Parameters>();
@@ -45,6 +46,8 @@ void ServerProgram::start() {
   peer_.add_writer<SimStatus>();
   peer_.add_writer<SimControlReply>();
   peer_.add_reader<SimControl>([this](const SimControl& request, const Peer::Arrival&) {
+    if (core_ && request.run_id() == core_->run_id())
+      flight_->on_request(request.action(), setting_.timeline.now());
     events_.push_back(request);
     wake_soon();
   });
@@ -68,7 +71,8 @@ void ServerProgram::begin_run(sim::ServerCore::Start start) {
   const Parameters parameters =
       sim::make_parameters_message(start.run_id, vehicle_ids_, scenario, fleet->plant(), "world");
   certificate_.emplace(record::make_row_format(parameters));
-  setting_.properties.on_run(*this, start.run_id, parameters);
+  setting_.properties.on_run(*this, start.run_id, parameters, scenario);
+  flight_ = &setting_.properties.flight(start.run_id);
   peer_.write(parameters);
   say(fmt::format("run {:016x}", start.run_id));
   sim::Outputs& outputs = *this;
@@ -106,7 +110,7 @@ void ServerProgram::end_run() {
   if (core_->end() == sim::ServerCore::End::kReset)
     return begin_run({0, false, core_->is_paused()});
   if (core_->error().find("expected no other server") != std::string::npos)
-    setting_.properties.on_yielded(*this);
+    setting_.properties.on_yielded(*this, core_->run_id());
   if (!core_->is_known()) return exit(1, core_->error());
   linger_.emplace(now(),
                   core_->end() == sim::ServerCore::End::kFailed ? 0 : core_->expected_recorders(),
@@ -143,6 +147,7 @@ void ServerProgram::write_waiting() {
                         status->problem().c_str()));
       peer_.write(*status);
     } else if (const auto* reply = std::get_if<SimControlReply>(&item)) {
+      setting_.properties.on_replied(*this, reply->run_id(), setting_.network);
       peer_.write(*reply);
     } else if (const auto* line = std::get_if<sync::Line>(&item)) {
       say(*line);
@@ -158,6 +163,7 @@ void ServerProgram::on_commands(const Commands& sample, const Peer::Arrival& arr
   if (!core_ || linger_) return;
   if (is_realtime() && !ignores_lifespan_ && process_.host().wall() > arrival.written + kLifespan)
     return;
+  flight_->on_answers(sample, sender(arrival), setting_.timeline.now());
   sim::CommandSample received;
   received.sender = arrival.sender;
   received.arrived = {now(), process_.host().wall()};
@@ -189,6 +195,7 @@ sim::Moment ServerProgram::send_states(const sim::Fleet& fleet) {
 
 void ServerProgram::resend_states(const sim::Fleet& fleet,
                                   const std::function<bool(std::size_t)>& is_wanted) {
+  flight_->on_resent(setting_.timeline.now());
   states_.make(fleet, is_wanted, [this](const States& sample) { peer_.write(sample); });
 }
 

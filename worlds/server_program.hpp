@@ -80,7 +80,12 @@ class ServerProgram : public Program, private sim::Outputs, private sim::Surroun
 
   ServerProgram& self() const { return const_cast<ServerProgram&>(*this); }
 
+  const Process& sender(const Peer::Arrival& arrival) const {
+    return setting_.network.find(arrival.sender)->process();
+  }
+
   const std::vector<std::uint32_t> vehicle_ids_;
+  FlightWatch* flight_ = nullptr;  // of the run
   std::unique_ptr<sim::ServerCore> core_;
   std::deque<Event> events_;
   std::deque<Item> outbox_;

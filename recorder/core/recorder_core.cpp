@@ -70,7 +70,9 @@ RecorderCore::Act RecorderCore::find(const sync::Servers& servers, const Now& no
 std::optional<sync::Run> RecorderCore::find_run(const sync::Servers& servers,
                                                 sync::Time now) const {
   if (!run_) return find_first_run(servers, now);
-  if (watch_->end().replacement) return watch_->end().replacement;
+  // It may have left since it was seen.
+  const auto& replacement = watch_->end().replacement;
+  if (replacement && servers.is_known(replacement->parameters.run_id(), now)) return replacement;
   auto next = servers.find_successor(*run_, {vehicle_}, now);
   if (next && !(next->server == run_->server) && !options_.follows_servers) return std::nullopt;
   return next;

@@ -11,8 +11,10 @@ void Preparation::claim(const Surroundings& around, sync::Time now) {
   // claim, however slow discovery is.
   const bool is_settled = is_claim_settled(now - began_, around.stays_on_this_machine(),
                                            around.has_heard_every_claim());
-  check_claim(around);  // after the look at the claims: one may have come since
-  if (is_settled) start_gathering(now);
+  if (!is_settled) return;
+  // Not earlier: the history of another server arrives sample by sample, and its run may have ended.
+  check_claim(around);
+  start_gathering(now);
 }
 
 void Preparation::check_claim(const Surroundings& around) const {

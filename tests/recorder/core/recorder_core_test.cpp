@@ -239,7 +239,9 @@ TEST_F(RecorderCoreTest, AReplacementIsFollowedOnlyIfThatIsWanted) {
     EXPECT_EQ(core_->error(), follows ? "" : "out: not complete: a gap");
     if (follows) {
       EXPECT_NE(said_.find("W out: not complete: a gap\n"), said_.npos);
-      EXPECT_EQ(look(9000), Act::kOpen) << "although it may be silent meanwhile";
+      EXPECT_EQ(look(9000), Act::kNone) << "it has died since";
+      serve(kRun + 1, kReplacement, 9000, RunPhase::PHASE_FINISHED);
+      EXPECT_EQ(look(9000), Act::kOpen) << "it lives, and its run is over already";
       EXPECT_EQ(core_->run()->server, kReplacement);
       EXPECT_EQ(core_->place(), Place::kSubfolder);
     }

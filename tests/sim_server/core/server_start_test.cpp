@@ -48,6 +48,18 @@ TEST(ServerStartTest, TheServerThatLosesItsClaimPublishesNothing) {
   EXPECT_FALSE(rig.core().is_known());
 }
 
+TEST(ServerStartTest, ARunThatEndsBeforeTheClaimIsSettledIsNoRival) {
+  ServerRig rig(ServerRig::make_scenario(), kClaims);
+  rig.other_runs = {make_rival(ServerRig::kRunId - 1)};
+  // The history of its status arrives sample by sample.
+  for (const RunPhase phase :
+       {RunPhase::PHASE_WAITING, RunPhase::PHASE_RUNNING, RunPhase::PHASE_FINISHED}) {
+    rig.other_runs.front().status = sync::status(ServerRig::kRunId - 1, phase);
+    rig.wait_until(phase == RunPhase::PHASE_FINISHED ? 250 : 245);
+  }
+  EXPECT_EQ(rig.phase(), Phase::kGathering);
+}
+
 TEST(ServerStartTest, AServerInALaterPhaseLosesToNoClaim) {
   ServerRig rig;
   rig.other_runs = {make_rival(ServerRig::kRunId - 1)};

@@ -1,0 +1,197 @@
+#include "worlds/flight_watch.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <tuple>
+
+#include "common/bus/topics.hpp"
+#include "common/sync/membership.hpp"
+#include "sim_server/core/retransmission_timer.hpp"
+#include "worlds/program.hpp"
+
+namespace sls::worlds {
+namespace {
+
+using namespace std::chrono_literals;
+
+/// Drift of clocks, and the wake-ups of a program that has its processor.
+constexpr Instant kSlack = 20ms;
+/// A server looks at its participants ten times a second.
+constexpr Instant kKnownAfter = 500ms;
+/// It looks for a stop signal every 20 ms, between two requests.
+constexpr Instant kObeysWithin = 500ms;
+constexpr Instant kGivesUpWithin = 2s;
+
+Instant to_instant(double time_s) { return Instant(static_cast<std::int64_t>(time_s * 1e9)); }
+
+double to_seconds(Instant time) { return std::chrono::duration<double>(time).count(); }
+
+}  // namespace
+
+// --- arrives at the server -----------------------------------------------------------------------
+
+void FlightWatch::on_member(const Participant& message, const Process& sender, Instant now) {
+  if (message.role() != ParticipantRole::ROLE_CONTROLLER) return;
+  const auto known = clients_.find(sender.name());
+  if (!message.ready() || message.run_id() != run_id_ ||
+      message.scenario_sha256().to_string() != scenario_sha256_ ||
+      message.contract_sha256().to_string() != bus::kContractSha256) {
+    if (known != clients_.end()) clients_.erase(known);
+    return;
+  }
+  Client& client = clients_[sender.name()];
+  if (!client.process) client.ready = now;
+  client.process = &sender;
+  client.strength = message.strength();
+  client.vehicle_ids.assign(message.vehicle_ids().begin(), message.vehicle_ids().end());
+  client.heard = now;
+  rightful_.insert(sender.name());
+}
+
+void FlightWatch::on_answers(const Commands& sample, const Process& sender, Instant now) {
+  const auto known = clients_.find(sender.name());
+  if (known == clients_.end()) return;
+  Client& client = known->second;
+  client.heard = now;
+  if (sample.run_id() != run_id_ || sample.step() != step_) return;
+  if (client.answered_step != step_) client.answers.clear();
+  client.answered_step = step_;
+  for (const ControlCommand& command : sample.vehicles())
+    client.answers.try_emplace(command.vehicle_id(), now);
+}
+
+void FlightWatch::on_request(ControlAction action, Instant now) {
+  is_disturbed_ = true;
+  for (auto& [vehicle, lacking] : lacking_) lacking.since = now;  // a pause is no absence
+  if (action == ControlAction::ACTION_STOP && !stop_requested_) stop_requested_ = now;
+  if (action != ControlAction::ACTION_PAUSE)
+    paused_.reset();
+  else if (!paused_)
+    paused_ = now;
+}
+
+// --- the server does -----------------------------------------------------------------------------
+
+void FlightWatch::on_published(std::uint64_t step, Instant now) {
+  const auto disobeys = [&](const std::optional<Instant>& since, const char* what) {
+    if (since && !is_disturbed() && now - *since > kObeysWithin)
+      find_(fmt::format("obeys: step {} leaves {:.3f} s after {}", step, to_seconds(now - *since),
+                        what));
+  };
+  disobeys(interrupted_, "SIGINT");
+  disobeys(stop_requested_, "an operator's stop");
+  disobeys(paused_, "an operator's pause");
+  step_ = step;
+  published_ = now;
+  sent_ = now;
+  is_disturbed_ = false;
+}
+
+bool FlightWatch::is_disturbed() const { return is_disturbed_ || server_.is_slow(); }
+
+void FlightWatch::check_gap(Instant now) {
+  constexpr Instant kLongest = sim::RetransmissionTimer::kLongest + kSlack;
+  if (is_lockstep() && sent_ && !is_disturbed() && now - *sent_ > kLongest)
+    find_(fmt::format("sent-again: the state of step {} only after {:.3f} s", step_,
+                      to_seconds(now - *sent_)));
+}
+
+void FlightWatch::on_resent(Instant now) {
+  check_gap(now);
+  sent_ = now;
+}
+
+void FlightWatch::on_recorded(const std::vector<model::StepRecord>& records, Instant now) {
+  check_gap(now);
+  sent_.reset();
+  for (const model::StepRecord& record : records) {
+    check_flyer(record, now);
+    check_policy(record, now);
+    if (record.kind == model::AnswerKind::kAccepted)
+      flyers_[record.vehicle_id] = record.client_name;
+    else
+      flyers_.erase(record.vehicle_id);
+  }
+}
+
+void FlightWatch::on_running(Instant now) {
+  check_gap(now);
+  const Instant patience = to_instant(sync_.calc_controller_patience_s()) + kGivesUpWithin;
+  if (is_disturbed()) return;
+  for (const auto& [vehicle, lacking] : lacking_)
+    if (now - lacking.since > patience)
+      return find_(fmt::format("gives-up: vehicle {} is flown without answers for {:.3f} s",
+                               vehicle, to_seconds(now - lacking.since)));
+  if (sent_ && now - published_ > patience)
+    find_(fmt::format("gives-up: step {} waits for {:.3f} s", step_, to_seconds(now - published_)));
+}
+
+/// The order of clients: strength, then name.
+bool FlightWatch::is_stronger(const std::string& name, const Client& client, const Client& than,
+                              const std::string& other) const {
+  return std::tuple(-client.strength, name) < std::tuple(-than.strength, other);
+}
+
+/// The strongest client that answers flies. Another one takes over when the stronger ones have been
+/// silent for `take_over_s`, neither earlier nor later.
+void FlightWatch::check_flyer(const model::StepRecord& record, Instant now) {
+  if (record.kind != model::AnswerKind::kAccepted) return;
+  if (rightful_.count(record.client_name) == 0)
+    find_(fmt::format("answer: step {} has an answer of '{}', which is no client of this run",
+                      record.step, record.client_name));
+  const auto flyer = clients_.find(record.client_name);
+  if (flyer == clients_.end()) return;
+  const std::uint32_t vehicle = record.vehicle_id;
+  const auto answer = flyer->second.answers.find(vehicle);
+  if (!flyer->second.has_answered(vehicle, record.step)) return;
+  const Instant take_over = to_instant(sync_.take_over_s);
+  const Instant waited = now - published_;
+  const auto before = flyers_.find(vehicle);
+  int stronger = 0;
+  for (const auto& [name, client] : clients_) {
+    const auto& ids = client.vehicle_ids;
+    if (std::find(ids.begin(), ids.end(), vehicle) == ids.end() ||
+        !is_stronger(name, client, flyer->second, record.client_name))
+      continue;
+    ++stronger;
+    const bool is_known = client.ready + kKnownAfter < published_;
+    if (is_known && !client.process->has_ended() && client.has_answered(vehicle, record.step) &&
+        client.answers.at(vehicle) < answer->second)
+      find_(fmt::format("strongest: step {} has the answer of '{}', but '{}' had answered",
+                        record.step, record.client_name, name));
+    const bool flew = before != flyers_.end() && before->second == name;
+    const bool has_left = client.process->has_ended() && !client.process->was_killed();
+    if (is_lockstep() && flew && !has_left && !client.has_answered(vehicle, record.step) &&
+        now - client.heard < sync::kPresumedDeadAfter - kSlack &&
+        waited < take_over - take_over / 100)
+      find_(fmt::format("take-over: '{}' flies step {} after {:.3f} s without '{}'",
+                        record.client_name, record.step, to_seconds(waited), name));
+  }
+  const bool is_known = flyer->second.ready + kKnownAfter < published_;
+  const Instant due = std::max(published_ + stronger * take_over, answer->second) + kSlack;
+  const bool is_awaited = before != flyers_.end() && before->second == record.client_name;
+  if (is_lockstep() && !is_disturbed() && is_known && !is_awaited && now > due)
+    find_(fmt::format("take-over: '{}' flies step {} only {:.3f} s after it was due",
+                      record.client_name, record.step, to_seconds(now - due)));
+}
+
+void FlightWatch::check_policy(const model::StepRecord& record, Instant now) {
+  const auto policy = sync_.wait.controller.policy;
+  const bool is_held = record.kind == model::AnswerKind::kHeld;
+  if (!is_held && record.kind != model::AnswerKind::kFailSafe) {
+    lacking_.erase(record.vehicle_id);
+    return;
+  }
+  if (is_lockstep() &&
+      (policy == config::ControllerPolicy::kWait || policy == config::ControllerPolicy::kStop))
+    find_(fmt::format("policy: step {} is flown without an answer", record.step));
+  Lacking& lacking = lacking_.try_emplace(record.vehicle_id, Lacking{now, 0}).first->second;
+  lacking.held += is_held;
+  const double held_s =
+      static_cast<double>(lacking.held) * static_cast<double>(sync_.period_ns) * 1e-9;
+  if (is_held && held_s > sync_.max_hold_s + 2e-9 * static_cast<double>(sync_.period_ns))
+    find_(fmt::format("policy: step {} holds an answer for {:.3f} s", record.step, held_s));
+}
+
+}  // namespace sls::worlds

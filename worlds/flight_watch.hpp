@@ -1,0 +1,97 @@
+/// The rules of a run in flight, judged by an observer who knows what has arrived at its server:
+/// who flies, when another client takes over, what is sent again, the policies, the operator.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/config/scenario.hpp"
+#include "common/model/step_record.hpp"
+#include "sls.h"
+#include "worlds/host.hpp"
+
+namespace sls::worlds {
+
+class Program;
+
+class FlightWatch {
+ public:
+  /// Of run `run_id` of `server`. `find`: called with each broken rule.
+  FlightWatch(const config::Scenario& scenario, std::uint64_t run_id, const Program& server,
+              std::function<void(std::string)> find)
+      : server_(server),
+        sync_(scenario.sync),
+        scenario_sha256_(scenario.sha256),
+        run_id_(run_id),
+        find_(std::move(find)) {}
+
+  // --- arrives at the server ---
+
+  void on_member(const Participant& message, const Process& sender, Instant now);
+  void on_answers(const Commands& sample, const Process& sender, Instant now);
+  void on_request(ControlAction action, Instant now);
+
+  // --- the server does ---
+
+  void on_published(std::uint64_t step, Instant now);
+  void on_resent(Instant now);
+  void on_recorded(const std::vector<model::StepRecord>& records, Instant now);
+  /// An answer to an earlier step counts from now on.
+  void on_late() { lacking_.clear(); }
+  /// A status of a flight that runs, not paused.
+  void on_running(Instant now);
+  void on_interrupted(Instant now) { interrupted_ = now; }
+  /// Its process was stopped, is slow or is so no more: it may be late with everything.
+  void on_disturbed() { is_disturbed_ = true; }
+
+ private:
+  struct Client {
+    const Process* process = nullptr;
+    std::int32_t strength = 0;
+    std::vector<std::uint32_t> vehicle_ids;
+    Instant ready{0};  // its first announcement that says so
+    Instant heard{0};  // its last sample
+    std::uint64_t answered_step = 0;
+    std::map<std::uint32_t, Instant> answers;  // to that step, by vehicle
+
+    bool has_answered(std::uint32_t vehicle, std::uint64_t step) const {
+      return answered_step == step && answers.count(vehicle) > 0;
+    }
+  };
+  /// Steps in a row that a vehicle was flown without an answer.
+  struct Lacking {
+    Instant since{0};
+    std::uint64_t held = 0;
+  };
+
+  bool is_disturbed() const;
+  bool is_lockstep() const { return sync_.mode == config::SyncMode::kLockstep; }
+  bool is_stronger(const std::string& name, const Client& client, const Client& than,
+                   const std::string& other) const;
+  void check_flyer(const model::StepRecord& record, Instant now);
+  void check_policy(const model::StepRecord& record, Instant now);
+  void check_gap(Instant now);
+
+  const Program& server_;
+  const config::Sync& sync_;
+  const std::string& scenario_sha256_;
+  const std::uint64_t run_id_;
+  const std::function<void(std::string)> find_;
+  std::map<std::string, Client> clients_;        // that are ready
+  std::set<std::string> rightful_;               // that have ever been
+  std::map<std::uint32_t, std::string> flyers_;  // of the last step, by vehicle
+  std::map<std::uint32_t, Lacking> lacking_;
+  std::uint64_t step_ = 0;
+  Instant published_{0};
+  std::optional<Instant> sent_;  // the last state of an open step
+  bool is_disturbed_ = false;    // since the last step was published
+  std::optional<Instant> interrupted_, stop_requested_, paused_;
+};
+
+}  // namespace sls::worlds
