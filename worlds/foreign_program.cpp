@@ -8,6 +8,11 @@ void ForeignProgram::start() {
   random_ = setting_.random.split();
   if (random_.chance(0.8)) peer_.add_writer<Participant>();
   peer_.add_writer<Commands>();
+  is_impostor_ = random_.chance(0.5);
+  if (is_impostor_) {
+    peer_.add_writer<RecordBatch>();
+    peer_.add_writer<SimStatus>();
+  }
   peer_.add_reader<States>([this](const States& sample, const Peer::Arrival&) { answer(sample); });
   setting_.network.announce(peer_);
   wake_soon();
@@ -37,12 +42,33 @@ void ForeignProgram::announce_wrongly(std::uint64_t run_id) {
   announce(message);
 }
 
+/// Says of the run of a server that it has finished, with rows that nobody flew.
+void ForeignProgram::pretend(const States& sample) {
+  SimStatus status;
+  status.run_id(sample.run_id());
+  status.sample_index(1'000'000);
+  status.phase(random_.chance(0.5) ? RunPhase::PHASE_FINISHED : RunPhase::PHASE_RESET);
+  status.step(sample.step());
+  RecordBatch batch;
+  batch.run_id(sample.run_id());
+  batch.batch_index(sample.step() / 64);
+  batch.is_last(random_.chance(0.5));
+  for (const VehicleState& state : sample.vehicles()) {
+    RecordEntry& entry = batch.entries().emplace_back();
+    entry.vehicle_id(state.vehicle_id());
+    entry.step(sample.step());
+  }
+  peer_.write(batch);
+  peer_.write(status);
+}
+
 void ForeignProgram::answer(const States& sample) {
   if (sample.run_id() != announced_run_) {
     announced_run_ = sample.run_id();
     announce_wrongly(sample.run_id());
   }
   if (random_.chance(0.7)) return;
+  if (is_impostor_ && random_.chance(0.1)) pretend(sample);
   Commands answers;
   answers.client_name(random_.chance(0.8) ? name() : "client-1");
   answers.strength(9);

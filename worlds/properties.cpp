@@ -94,7 +94,7 @@ void Properties::on_yielded(const Program& server, std::uint64_t run_id) {
   const auto has_won = [&](const auto& item) {
     const auto& [id, other] = item;
     if (other.server == &server || other.server->process().was_killed()) return false;
-    // What has just changed may not be known.
+    // The last change may not be known.
     const auto progress = [&](const Run& run) {
       return run.has_status ? sync::calc_progress(run.phase) : 0;
     };

@@ -57,7 +57,7 @@ class Properties {
 
   void on_run(const Program& server, std::uint64_t run_id, const Parameters& parameters,
               const config::Scenario& scenario);
-  /// What arrives at the server of a run, and what it sends again.
+  /// The judge of a run in flight, for its server to tell what arrives and what it sends again.
   FlightWatch& flight(std::uint64_t run_id) { return *runs_.at(run_id).flight; }
   /// A server ends because another one has its vehicles.
   void on_yielded(const Program& server, std::uint64_t run_id);

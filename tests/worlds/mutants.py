@@ -210,13 +210,27 @@ def judge(folder, seeds, with_scripts):
     return (f"{found[2]}, seed {found[1]}" if found else f"exit code {code}"), by_scripts
 
 
+def put_in(defect, text):
+    """`text` of a file with a defect of it."""
+    file, old, new, _ = defect
+    if text.count(old) != 1:
+        sys.exit(f"{file}: expected once: {old!r}, got {text.count(old)} times")
+    return text.replace(old, new)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build-mutants")
     parser.add_argument("--seeds", type=int, default=20_000)
     parser.add_argument("--only", default="", help="mutants whose line or description holds this text")
     parser.add_argument("--no-scripts", action="store_true")
+    parser.add_argument("--write", type=pathlib.Path, metavar="FILE",
+                        help="write the mutated source of the first one chosen into FILE, and end")
     options = parser.parse_args()
+    chosen = [mutant for mutant in MUTANTS if options.only in " ".join(mutant)]
+    if options.write:
+        options.write.write_text(put_in(chosen[0], (ROOT / chosen[0][0]).read_text()))
+        return
     folder = options.build.resolve()
     folder.mkdir(exist_ok=True)
     tree = copy_tree(folder)
@@ -226,15 +240,13 @@ def main():
                    env=os.environ)
     if said := build(folder, targets):
         sys.exit(said[-3000:])
-    chosen = [mutant for mutant in MUTANTS if options.only in " ".join(mutant)]
     found = 0
     print("| defect | found by worlds | by scripts |\n| --- | --- | --- |", flush=True)
-    for file, old, new, what in chosen:
+    for defect in chosen:
+        file, what = defect[0], defect[3]
         path = tree / file
         text = path.read_text()
-        if text.count(old) != 1:
-            sys.exit(f"{file}: expected once: {old!r}, got {text.count(old)} times")
-        path.write_text(text.replace(old, new))
+        path.write_text(put_in(defect, text))
         began = time.monotonic()
         said = build(folder, targets)
         worlds, scripts = ("does not compile", "") if said else judge(folder, options.seeds, not options.no_scripts)
