@@ -184,7 +184,8 @@ std::optional<sync::Run> ServerDirectory::find_successor(
 
 std::optional<SimStatus> ServerDirectory::find_status(std::uint64_t run_id) const {
   const std::lock_guard lock(mutex_);
-  return servers_.find_status(run_id);
+  const SimStatus* status = servers_.find_status(run_id);
+  return status ? std::optional(*status) : std::nullopt;
 }
 
 std::optional<sync::Time> ServerDirectory::find_last_heard(std::uint64_t run_id) const {

@@ -20,21 +20,34 @@ Known& find_or_add(std::deque<Known>& runs, std::uint64_t run_id) {
   return runs.back();
 }
 
-/// The run to join for `vehicle_id`: the one with the most progress, then with the lowest run_id.
-std::optional<Run> find_best(const std::vector<Run>& runs, std::uint32_t vehicle_id) {
-  std::optional<Run> best;
-  for (const Run& run : runs) {
-    const int progress = calc_progress(run.status);
-    if (!run.status || progress < 0 || !serves_vehicle(run.parameters, vehicle_id)) continue;
-    if (!best || progress > calc_progress(best->status) ||
-        (progress == calc_progress(best->status) &&
-         run.parameters.run_id() < best->parameters.run_id()))
-      best = run;
-  }
-  return best;
-}
-
 }  // namespace
+
+/// A run of a present server. Its samples are large, so they are copied only where they leave.
+struct Servers::PresentRun {
+  bus::PeerId server;
+  const Parameters* parameters;
+  const SimStatus* status;  // null before the claim is settled
+  Time server_known_since;
+
+  int progress() const { return status ? calc_progress(status->phase()) : 0; }
+  Run copy() const {
+    return {server, *parameters, status ? std::optional(*status) : std::nullopt,
+            server_known_since};
+  }
+};
+
+std::optional<Run> Servers::find_best(const std::vector<PresentRun>& runs,
+                                      std::uint32_t vehicle_id) {
+  const PresentRun* best = nullptr;
+  for (const PresentRun& run : runs) {
+    const int progress = run.progress();
+    if (!run.status || progress < 0 || !serves_vehicle(*run.parameters, vehicle_id)) continue;
+    if (!best || progress > best->progress() ||
+        (progress == best->progress() && run.parameters->run_id() < best->parameters->run_id()))
+      best = &run;
+  }
+  return best ? std::optional(best->copy()) : std::nullopt;
+}
 
 void Servers::note(const Parameters& sample, const bus::PeerId& sender, Time now) {
   Server* server = find_or_add_server(sender, now);
@@ -132,14 +145,22 @@ bool Servers::is_present_run(const bus::PeerId& server, const Server& known, Tim
          now - heard->time <= kPresumedDeadAfter;
 }
 
-std::vector<Run> Servers::runs(Time now) const {
-  std::vector<Run> runs;
+std::vector<Servers::PresentRun> Servers::present_runs(Time now) const {
+  std::vector<PresentRun> runs;
   for (const auto& [server, known] : servers_) {
     if (!is_present_run(server, known, now)) continue;
     const HeardStatus* heard = find_heard(known.parameters->run_id());
-    runs.push_back({server, *known.parameters, heard ? std::optional(heard->status) : std::nullopt,
-                    known.known_since});
+    runs.push_back(
+        {server, &*known.parameters, heard ? &heard->status : nullptr, known.known_since});
   }
+  return runs;
+}
+
+std::vector<Run> Servers::runs(Time now) const {
+  const auto present = present_runs(now);
+  std::vector<Run> runs;
+  runs.reserve(present.size());
+  for (const PresentRun& run : present) runs.push_back(run.copy());
   return runs;
 }
 
@@ -156,7 +177,7 @@ bool Servers::may_fly(std::uint64_t run_id, std::uint32_t vehicle_id) const {
 }
 
 std::optional<Run> Servers::find_joinable(std::uint32_t vehicle_id, Time now) const {
-  return find_best(runs(now), vehicle_id);
+  return find_best(present_runs(now), vehicle_id);
 }
 
 std::optional<Run> Servers::find_successor(const Run& run,
@@ -165,9 +186,9 @@ std::optional<Run> Servers::find_successor(const Run& run,
   const std::uint64_t run_id = run.parameters.run_id();
   const auto heard = find_last_heard(run_id);
   const bool is_dead = is_silent(run_id, now);
-  std::vector<Run> successors;
-  for (const Run& other : runs(now)) {
-    if (other.parameters.run_id() == run_id) continue;
+  std::vector<PresentRun> successors;
+  for (const PresentRun& other : present_runs(now)) {
+    if (other.parameters->run_id() == run_id) continue;
     const bool is_own = other.server == run.server;
     const bool is_new = !heard || other.server_known_since > *heard;
     if (is_own || (is_dead && is_new)) successors.push_back(other);
@@ -177,9 +198,9 @@ std::optional<Run> Servers::find_successor(const Run& run,
   return std::nullopt;
 }
 
-std::optional<SimStatus> Servers::find_status(std::uint64_t run_id) const {
+const SimStatus* Servers::find_status(std::uint64_t run_id) const {
   const HeardStatus* heard = find_heard(run_id);
-  return heard ? std::optional(heard->status) : std::nullopt;
+  return heard ? &heard->status : nullptr;
 }
 
 std::optional<Time> Servers::find_last_heard(std::uint64_t run_id) const {

@@ -68,8 +68,9 @@ class Servers {
   std::optional<Run> find_successor(const Run& run, const std::vector<std::uint32_t>& vehicle_ids,
                                     Time now) const;
 
-  /// The last status of run `run_id`, even if its server has left.
-  std::optional<SimStatus> find_status(std::uint64_t run_id) const;
+  /// The last status of run `run_id`, even if its server has left; null before the first. It is
+  /// valid until the next sample.
+  const SimStatus* find_status(std::uint64_t run_id) const;
 
   /// When the last status of run `run_id` came; nothing before the first.
   std::optional<Time> find_last_heard(std::uint64_t run_id) const;
@@ -119,6 +120,11 @@ class Servers {
     Time known_since;
   };
 
+  struct PresentRun;
+  std::vector<PresentRun> present_runs(Time now) const;
+  /// The run to join for `vehicle_id`: the one with the most progress, then with the lowest run_id.
+  static std::optional<Run> find_best(const std::vector<PresentRun>& runs,
+                                      std::uint32_t vehicle_id);
   void report_impostors(std::uint64_t run_id);
   Server* find_or_add_server(const bus::PeerId& sender, Time now);
   std::optional<bus::PeerId> find_owner(std::uint64_t run_id) const;

@@ -39,7 +39,7 @@ MUTANTS = [
     ("common/sync/servers.cpp", "if (is_own || (is_dead && is_new)) successors", "if (is_dead && is_new) successors", "a reset is not followed"),
     ("common/sync/servers.cpp", "(is_dead && is_new)", "is_new", "a living server is replaced"),
     ("common/sync/servers.cpp", "(is_dead && is_new)", "is_dead", "a server that was there before is a replacement"),
-    ("common/sync/servers.cpp", "if (other.parameters.run_id() == run_id) continue;", "", "a run is its own successor"),
+    ("common/sync/servers.cpp", "if (other.parameters->run_id() == run_id) continue;", "", "a run is its own successor"),
     ("common/sync/server_watch.cpp", "if (now - looked_ > kLongestLook) heard_ += now - looked_;", "",
      "the time in which a program was stopped counts as silence"),
     ("common/sync/server_watch.cpp", "heard_ = std::max(heard_, heard.value_or(heard_));", "", "the server is never heard"),

@@ -54,7 +54,7 @@ TEST_F(ServersTest, TheRunThatIsAheadIsJoinedThenTheOneWithTheLowerId) {
   EXPECT_EQ(joinable(0), kRun);
   EXPECT_EQ(servers_.find_status(kLowerRun)->phase(), RunPhase::PHASE_PAUSED)
       << "also when it has gone";
-  EXPECT_EQ(servers_.find_status(kLowerRun + 1), std::nullopt);
+  EXPECT_EQ(servers_.find_status(kLowerRun + 1), nullptr);
 }
 
 TEST_F(ServersTest, AServerThatIsSilentForTwoSecondsIsNotJoinedButMayComeBack) {
@@ -110,7 +110,7 @@ TEST_F(ServersTest, AStatusThatComesBeforeTheClaimOfItsRunIsFoundOutByTheClaim) 
   EXPECT_TRUE(servers_.take_impostors().empty());
   servers_.note(claim(kRun, {kVehicle}), kServer, at(1));
   EXPECT_EQ(servers_.take_impostors().size(), 1u);
-  EXPECT_EQ(servers_.find_status(kRun), std::nullopt);
+  EXPECT_EQ(servers_.find_status(kRun), nullptr);
 }
 
 TEST_F(ServersTest, AWriterWithoutAClaimIsAnImpostorAfterAWhile) {
