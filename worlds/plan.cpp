@@ -168,6 +168,42 @@ Promise draw_promise(Random& random, const config::Sync& sync) {
   return Promise::kRecorderRestart;
 }
 
+/// Two silences of the server, with a pause between them that is longer than it may be silent.
+void draw_silences(Plan& plan, Random& random, const FlownScenario& flown) {
+  const auto third = static_cast<std::int64_t>(flown.last_step / 3);
+  for (std::int64_t i = 0; i < 3; ++i) {
+    Fault fault;
+    fault.step = static_cast<std::uint64_t>(random.integer(i * third, (i + 1) * third - 2));
+    fault.kind = i == 1 ? Kind::kRequest : Kind::kStop;
+    fault.other = static_cast<std::size_t>(ControlAction::ACTION_PAUSE);
+    const double longest_s = flown.scenario.sync.wait.server_deadline_s;
+    const double least_s = i == 1 ? longest_s + 1 : 1.2;
+    fault.duration =
+        Instant(static_cast<std::int64_t>(random.between(least_s, least_s + 0.5) * 1e9));
+    plan.faults.push_back(fault);
+  }
+}
+
+/// Two servers that do not hear each other, and both are heard by others; the first is killed.
+void draw_split(Plan& plan, Random& random, const FlownScenario& flown) {
+  plan.hosts = std::max<std::size_t>(plan.hosts, 3);
+  for (std::size_t i = 0; i < 2; ++i) {
+    plan.programs[i].host = i;
+    Fault cut;
+    cut.kind = Kind::kCut;
+    cut.target = i;
+    cut.other = 1 - i;
+    cut.duration = plan.healed;
+    plan.faults.push_back(cut);
+    if (random.chance(0.5)) continue;
+    Fault kill;
+    kill.target = i;
+    kill.step =
+        static_cast<std::uint64_t>(random.integer(0, static_cast<std::int64_t>(flown.last_step)));
+    plan.faults.push_back(kill);
+  }
+}
+
 /// The one fault of a world with a promise that names it.
 Fault draw_promised(const Plan& plan, Random& random, const FlownScenario& flown) {
   const config::Sync& sync = flown.scenario.sync;
@@ -243,8 +279,17 @@ Plan draw_plan(std::uint64_t seed, const std::vector<FlownScenario>& scenarios) 
   plan.has_files = plan.promise == Promise::kRecorderRestart || random.chance(0.08);
   draw_programs(plan, random, flown);
   if (plan.promise == Promise::kCalm || plan.promise == Promise::kTwoServers) return plan;
+  if (plan.promise == Promise::kLongStop && random.chance(0.5)) {
+    draw_silences(plan, random, flown);
+    return plan;
+  }
   if (plan.promise > Promise::kMild) {
     plan.faults.push_back(draw_promised(plan, random, flown));
+    return plan;
+  }
+  if (plan.promise == Promise::kNone && plan.programs[1].role == Role::kServer &&
+      random.chance(0.3)) {
+    draw_split(plan, random, flown);
     return plan;
   }
   const std::int64_t faults = random.chance(0.15) ? 0 : random.integer(1, 6);

@@ -69,7 +69,8 @@ enum class Promise {
   kCalm,             ///< no faults, a good network: no step is late either
   kReset,            ///< an operator resets the flight
   kPause,            ///< an operator pauses for longer than anybody may be absent
-  kLongStop,         ///< a client is stopped for longer than it waits for a silent server
+  kLongStop,         ///< a client is stopped for longer than it waits for a silent server, or the
+                     ///< server twice, for less
   kTwoServers,       ///< a second server is started with the first
 };
 const char* name_promise(Promise promise);

@@ -65,7 +65,7 @@ void Program::wake_at(sync::Time time) {
 void Program::announce(const Participant& message) {
   announced_ = message;
   announced_time_ = now();
-  setting_.properties.on_announced(*this, message, peer_);
+  setting_.properties.on_announced(*this, message, peer_, servers_);
   peer_.write(message);
 }
 

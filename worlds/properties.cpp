@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
 
 #include "closed_loop/loss.hpp"
 #include "worlds/client_program.hpp"
@@ -21,6 +22,8 @@ constexpr Instant kNamedWithin = 2500ms;
 /// Two servers of one vehicle that hear each other: one of them has gone after this.
 constexpr Instant kRivalsGoneWithin = 4s;
 
+/// Discovery of the endpoints, and the announcement itself.
+constexpr Instant kBeginsWithin = 60ms;
 /// The others have heard of it, unless something is in the way.
 constexpr Instant kHeardWithin = 2s;
 
@@ -219,8 +222,8 @@ void Properties::on_run_end(std::uint64_t run_id, bool is_finished, std::string 
   run.certificate = std::move(certificate);
 }
 
-void Properties::on_announced(const Program& program, const Participant& message,
-                              const Peer& peer) {
+void Properties::on_announced(const Program& program, const Participant& message, const Peer& peer,
+                              const sync::Servers& heard) {
   if (message.run_id() == 0) return;
   const bool is_client = program.role() == Role::kClient;
   if (!is_client && program.role() != Role::kRecorder) return;
@@ -230,6 +233,7 @@ void Properties::on_announced(const Program& program, const Participant& message
                             message.run_id()));
   Run& run = found->second;
   if (message.done()) run.done.try_emplace(program.name(), timeline_.now());
+  if (is_client) check_join(program, message.run_id(), heard);
   if (is_client && !run.has_status)
     find(fmt::format("joins: {} joins run {:016x}, whose claim is not settled", program.name(),
                      message.run_id()));
@@ -242,6 +246,29 @@ void Properties::on_announced(const Program& program, const Participant& message
   if (peer.matched_writers(topic).count(run.server->id()) == 0)
     find(fmt::format("ready: {} says so of run {:016x} before it sees the server", program.name(),
                      message.run_id()));
+}
+
+/// A client joins a run that goes on, and leaves one only after its end or for a later server's.
+void Properties::check_join(const Program& program, std::uint64_t run_id,
+                            const sync::Servers& heard) {
+  std::uint64_t& before = joined_[program.name()];
+  if (before == run_id) return;
+  const std::uint64_t left = std::exchange(before, run_id);
+  const SimStatus* status = heard.find_status(run_id);
+  if (!status || sync::calc_progress(status->phase()) < 0)
+    find(fmt::format("joins: {} joins run {:016x}, and has heard {}", program.name(), run_id,
+                     status ? "its end" : "no status of it"));
+  const sync::Time now = program.process().host().now();
+  const auto run = runs_.find(left);
+  if (run == runs_.end() || run->second.server == runs_.at(run_id).server) return;
+  for (const sync::Run& other : heard.runs(now))
+    if (other.parameters.run_id() == run_id &&
+        other.server_known_since <= heard.find_last_heard(left))
+      find(fmt::format("follows: {} goes over to {}, which was there before", program.name(),
+                       runs_.at(run_id).server->name()));
+  if (!heard.is_silent(left, now))
+    find(fmt::format("follows: {} leaves {}, which it hears", program.name(),
+                     run->second.server->name()));
 }
 
 /// A server leaves requests for the runs of others to them.
@@ -282,6 +309,7 @@ void Properties::check(const Plan& plan, const std::vector<std::unique_ptr<Progr
     if (run.has_ended && !run.timing.empty() && says_exact != run.is_exact)
       find(fmt::format("timing-label: run {:016x} is {}exact, its label says '{}'", run_id,
                        run.is_exact ? "" : "not ", run.timing));
+    if (plan.promise == Promise::kCalm && run.began) check_begin(run_id, run, flown);
     if (plan.promise == Promise::kCalm && run.is_finished && !run.is_exact)
       find(fmt::format("calm: run {:016x} has late steps", run_id));
   }
@@ -308,6 +336,23 @@ void Properties::check(const Plan& plan, const std::vector<std::unique_ptr<Progr
       check_recording(*program, recording, flown);
   if (plan.promise != Promise::kNone && !is_any_finished())
     find("finishes: no flight was finished");
+}
+
+/// A flight begins as soon as the expected ones are ready.
+void Properties::check_begin(std::uint64_t run_id, const Run& run, const FlownScenario& flown) {
+  const config::WaitFor& expected = flown.scenario.sync.wait_for;
+  Instant ready{0};
+  const auto note = [&](const std::set<std::string>& names, int count) {
+    std::vector<Instant> since;
+    for (const std::string& name : names) since.push_back(run.ready_since.at(name));
+    std::sort(since.begin(), since.end());
+    if (count > 0) ready = std::max(ready, since[static_cast<std::size_t>(count) - 1]);
+  };
+  note(run.ready, expected.controllers);
+  note(run.recorders, expected.recorders);
+  if (*run.began > ready + kBeginsWithin)
+    find(fmt::format("calm: run {:016x} begins {:.3f} s after the last one is ready", run_id,
+                     std::chrono::duration<double>(*run.began - ready).count()));
 }
 
 void Properties::check_recording(const Program& program, const StoredRecording& recording,

@@ -13,6 +13,7 @@
 
 #include "common/config/scenario.hpp"
 #include "common/model/step_record.hpp"
+#include "common/sync/servers.hpp"
 #include "recorder/core/recording_core.hpp"
 #include "worlds/flight_watch.hpp"
 #include "worlds/network.hpp"
@@ -70,7 +71,9 @@ class Properties {
   }
   void on_status(const SimStatus& status, const Network& network);
   void on_run_end(std::uint64_t run_id, bool is_finished, std::string certificate);
-  void on_announced(const Program& program, const Participant& message, const Peer& peer);
+  /// `heard`: what the program knows of servers.
+  void on_announced(const Program& program, const Participant& message, const Peer& peer,
+                    const sync::Servers& heard);
   void on_replied(const Program& server, std::uint64_t run_id, const Network& network);
   void on_interrupted(const Program& program);
   void on_killed(const Program& program);
@@ -117,6 +120,7 @@ class Properties {
   };
 
   void find(std::string finding);
+  void check_join(const Program& program, std::uint64_t run_id, const sync::Servers& heard);
   void check_stall(Run& run, std::uint64_t run_id);
   void check_rivals(const Run& run, const Network& network);
   void check_applied(const model::StepRecord& before, const model::StepRecord& record);
@@ -124,12 +128,14 @@ class Properties {
                        const FlownScenario& flown);
   void check_rows(const Program& program, const StoredRecording& recording, const Run& run);
   void check_exit(const Program& program);
+  void check_begin(std::uint64_t run_id, const Run& run, const FlownScenario& flown);
   void check_end(const Program& server, const std::vector<std::unique_ptr<Program>>& programs);
 
   const Timeline& timeline_;
   Trace& trace_;
   std::map<std::uint64_t, Run> runs_;
   std::map<std::string, Instant> killed_, continued_;                    // by name
+  std::map<std::string, std::uint64_t> joined_;                          // clients' last runs
   std::map<std::pair<const Program*, const Program*>, Instant> rivals_;  // fly together since
   std::uint64_t steps_ = 0;
   std::vector<std::string> findings_;
