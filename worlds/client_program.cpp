@@ -3,10 +3,13 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <exception>
+#include <limits>
 #include <utility>
 
 namespace sls::worlds {
 namespace {
+
+using namespace std::chrono_literals;
 
 control::ClientCore::Options make_core_options(const config::Scenario& scenario,
                                                const std::string& name, const std::string& host,
@@ -28,6 +31,13 @@ config::Scenario choose_scenario(const Setting& setting, const ClientProgram::Op
   config::Scenario scenario = setting.flown->scenario;
   if (options.has_other_scenario) scenario.sha256 = std::string(64, '0');
   return scenario;
+}
+
+/// The same answers with other forces.
+Commands make_wrong(const Commands& answers) {
+  Commands wrong = answers;
+  for (ControlCommand& command : wrong.vehicles()) command.f_Q_W_n()[0] += 1;
+  return wrong;
 }
 
 }  // namespace
@@ -101,27 +111,40 @@ void ClientProgram::on_states(const States& sample, const Peer::Arrival& arrival
 }
 
 void ClientProgram::send(const Commands& answers) {
-  if (options_.is_sloppy && setting_.random.chance(0.05)) {
-    const bool is_lockstep = setting_.flown->scenario.sync.mode == config::SyncMode::kLockstep;
-    Commands wrong = answers;
-    for (ControlCommand& command : wrong.vehicles()) command.f_Q_W_n()[0] += 1;
-    switch (setting_.random.integer(0, 3)) {
-      case 0:
-        wrong.run_id(answers.run_id() + 1);
-        break;
-      case 1:
-        // In real time a late answer may be held, so a client can do harm to itself.
-        wrong.step(answers.step() - (is_lockstep ? 1 : 1001));
-        break;
-      case 2:
-        for (ControlCommand& command : wrong.vehicles()) command.vehicle_id(77);
-        break;
-      default:
-        wrong.step(answers.step() + 1000);
-    }
-    peer_.write(wrong);
+  if (options_.breaks_at && answers.step() >= *options_.breaks_at) {
+    Commands broken = answers;
+    for (ControlCommand& command : broken.vehicles())
+      command.f_Q_W_n()[2] = std::numeric_limits<double>::quiet_NaN();
+    return peer_.write(broken);
   }
+  if (options_.is_sloppy && setting_.random.chance(0.05)) send_wrongly(answers);
   peer_.write(answers);
+  if (!options_.is_early) return;
+  // Not at once: it must not overtake the answer.
+  process_.run_at(setting_.timeline.now() + 500us, [this, early = make_wrong(answers)]() mutable {
+    early.step(early.step() + 1);
+    peer_.write(early);
+  });
+}
+
+void ClientProgram::send_wrongly(const Commands& answers) {
+  const bool is_lockstep = setting_.flown->scenario.sync.mode == config::SyncMode::kLockstep;
+  Commands wrong = make_wrong(answers);
+  switch (setting_.random.integer(0, 3)) {
+    case 0:
+      wrong.run_id(answers.run_id() + 1);
+      break;
+    case 1:
+      // In real time a late answer may be held, so a client can do harm to itself.
+      wrong.step(answers.step() - (is_lockstep ? 1 : 1001));
+      break;
+    case 2:
+      for (ControlCommand& command : wrong.vehicles()) command.vehicle_id(77);
+      break;
+    default:
+      wrong.step(answers.step() + 1000);
+  }
+  peer_.write(wrong);
 }
 
 }  // namespace sls::worlds

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,6 +23,8 @@ class ClientProgram : public Program {
     bool has_other_scenario = false;  ///< a wrong file was given
     bool is_sloppy = false;   ///< one answer in 20 comes after one to another run, step or vehicle
     Instant compute_time{0};  ///< of an answer
+    bool is_early = false;    ///< each answer is followed by one to the next step
+    std::optional<std::uint64_t> breaks_at;  ///< from this step on its forces are no numbers
     bool announces_once = false;  ///< unlike our clients, it does not repeat its announcement
     control::LawMaker make_law = &control::make_control_law;
   };
@@ -34,6 +38,7 @@ class ClientProgram : public Program {
   void begin();
   void on_states(const States& sample, const Peer::Arrival& arrival);
   void send(const Commands& answers);
+  void send_wrongly(const Commands& answers);
 
   const Options options_;
   config::Scenario scenario_;

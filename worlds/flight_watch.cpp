@@ -3,6 +3,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <cmath>
 #include <tuple>
 
 #include "common/bus/topics.hpp"
@@ -33,32 +34,31 @@ double to_seconds(Instant time) { return std::chrono::duration<double>(time).cou
 
 void FlightWatch::on_member(const Participant& message, const Process& sender, Instant now) {
   if (message.role() != ParticipantRole::ROLE_CONTROLLER) return;
-  const auto known = clients_.find(sender.name());
-  if (!message.ready() || message.run_id() != run_id_ ||
-      message.scenario_sha256().to_string() != scenario_sha256_ ||
-      message.contract_sha256().to_string() != bus::kContractSha256) {
-    if (known != clients_.end()) clients_.erase(known);
-    return;
-  }
   Client& client = clients_[sender.name()];
-  if (!client.process) client.ready = now;
+  const bool is_ready = message.ready() && message.run_id() == run_id_ &&
+                        message.scenario_sha256().to_string() == scenario_sha256_ &&
+                        message.contract_sha256().to_string() == bus::kContractSha256;
+  if (is_ready && !client.is_ready) client.ready = now;
+  client.is_ready = is_ready;
   client.process = &sender;
   client.strength = message.strength();
   client.vehicle_ids.assign(message.vehicle_ids().begin(), message.vehicle_ids().end());
   client.heard = now;
-  rightful_.insert(sender.name());
+  if (is_ready) rightful_.insert(sender.name());
 }
 
 void FlightWatch::on_answers(const Commands& sample, const Process& sender, Instant now) {
-  const auto known = clients_.find(sender.name());
-  if (known == clients_.end()) return;
-  Client& client = known->second;
+  Client& client = clients_[sender.name()];
+  client.process = &sender;
   client.heard = now;
   if (sample.run_id() != run_id_ || sample.step() != step_) return;
   if (client.answered_step != step_) client.answers.clear();
   client.answered_step = step_;
   for (const ControlCommand& command : sample.vehicles())
-    client.answers.try_emplace(command.vehicle_id(), now);
+    if (std::isfinite(command.f_Q_W_n()[2]))
+      client.answers.try_emplace(command.vehicle_id(), now);
+    else
+      client.refused = {step_, now};
 }
 
 void FlightWatch::on_request(ControlAction action, Instant now) {
@@ -141,19 +141,26 @@ void FlightWatch::check_flyer(const model::StepRecord& record, Instant now) {
     find_(fmt::format("answer: step {} has an answer of '{}', which is no client of this run",
                       record.step, record.client_name));
   const auto flyer = clients_.find(record.client_name);
-  if (flyer == clients_.end()) return;
+  if (flyer == clients_.end() || !flyer->second.is_ready) return;
   const std::uint32_t vehicle = record.vehicle_id;
   const auto answer = flyer->second.answers.find(vehicle);
-  if (!flyer->second.has_answered(vehicle, record.step)) return;
+  if (!flyer->second.has_answered(vehicle, record.step))
+    return find_(fmt::format("answer: step {} has an answer of '{}' that came before its state",
+                             record.step, record.client_name));
   const Instant take_over = to_instant(sync_.take_over_s);
   const Instant waited = now - published_;
   const auto before = flyers_.find(vehicle);
+  Instant due = answer->second;
   int stronger = 0;
   for (const auto& [name, client] : clients_) {
     const auto& ids = client.vehicle_ids;
-    if (std::find(ids.begin(), ids.end(), vehicle) == ids.end() ||
+    if (!client.is_ready || std::find(ids.begin(), ids.end(), vehicle) == ids.end() ||
         !is_stronger(name, client, flyer->second, record.client_name))
       continue;
+    if (client.refused && client.refused->first == record.step) {
+      due = std::max(due, client.refused->second);
+      continue;
+    }
     ++stronger;
     const bool is_known = client.ready + kKnownAfter < published_;
     if (is_known && !client.process->has_ended() && client.has_answered(vehicle, record.step) &&
@@ -169,7 +176,7 @@ void FlightWatch::check_flyer(const model::StepRecord& record, Instant now) {
                         record.client_name, record.step, to_seconds(waited), name));
   }
   const bool is_known = flyer->second.ready + kKnownAfter < published_;
-  const Instant due = std::max(published_ + stronger * take_over, answer->second) + kSlack;
+  due = std::max(due, published_ + stronger * take_over) + kSlack;
   const bool is_awaited = before != flyers_.end() && before->second == record.client_name;
   if (is_lockstep() && !is_disturbed() && is_known && !is_awaited && now > due)
     find_(fmt::format("take-over: '{}' flies step {} only {:.3f} s after it was due",

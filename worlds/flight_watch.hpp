@@ -55,8 +55,10 @@ class FlightWatch {
     const Process* process = nullptr;
     std::int32_t strength = 0;
     std::vector<std::uint32_t> vehicle_ids;
+    bool is_ready = false;
     Instant ready{0};  // its first announcement that says so
     Instant heard{0};  // its last sample
+    std::optional<std::pair<std::uint64_t, Instant>> refused;  // the last defective answer
     std::uint64_t answered_step = 0;
     std::map<std::uint32_t, Instant> answers;  // to that step, by vehicle
 
@@ -83,7 +85,7 @@ class FlightWatch {
   const std::string& scenario_sha256_;
   const std::uint64_t run_id_;
   const std::function<void(std::string)> find_;
-  std::map<std::string, Client> clients_;        // that are ready
+  std::map<std::string, Client> clients_;        // by name
   std::set<std::string> rightful_;               // that have ever been
   std::map<std::uint32_t, std::string> flyers_;  // of the last step, by vehicle
   std::map<std::uint32_t, Lacking> lacking_;

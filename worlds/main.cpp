@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
+#include <fstream>
 #include <iostream>
 #include <optional>
 #include <string>
@@ -80,6 +81,7 @@ int main(int argc, char** argv) {
   std::string seeds = "0-999";
   worlds::SearchOptions options;
   options.jobs = std::max(1u, std::thread::hardware_concurrency());
+  std::filesystem::path table;
   std::optional<std::uint64_t> replayed;
   bool is_verbose = false;
   cli.set_version_flag("--version", app::version());
@@ -95,6 +97,8 @@ int main(int argc, char** argv) {
   cli.add_option("--most", options.most_failures, "end after so many failed worlds")
       ->check(CLI::Range(1, 1000))
       ->type_name("N");
+  cli.add_option("--table", table, "write a CSV file with one row for each world")
+      ->type_name("FILE");
   auto* replay = cli.add_option("--replay", replayed, "tell what happens in the world of this seed")
                      ->type_name("SEED");
   cli.add_flag("--verbose", is_verbose, "the whole world, with every status")->needs(replay);
@@ -103,6 +107,12 @@ int main(int argc, char** argv) {
     parse_seeds(seeds, options);
     const Folder folder;
     options.folder = folder.path();
+    std::ofstream rows;
+    options.keeps_rows = !table.empty();
+    if (options.keeps_rows) {
+      rows.open(table);
+      if (!rows) throw config::ConfigError(table.string() + ": expected a file to write, got none");
+    }
     const auto scenarios =
         scenario.empty()
             ? worlds::make_scenarios()
@@ -128,6 +138,11 @@ int main(int argc, char** argv) {
                                    static_cast<double>(so_far.worlds) / measure());
         });
     print_result(result, measure());
+    if (options.keeps_rows) {
+      rows << worlds::kRowNames << '\n';
+      for (const auto& [seed, row] : result.rows) rows << row << '\n';
+      if (!rows.flush()) throw app::RunError(table.string() + ": cannot be written");
+    }
     for (const auto& [seed, findings] : result.failures) {
       std::cout << fmt::format("seed {}:\n", seed);
       for (const std::string& finding : findings) std::cout << "  " << finding << '\n';

@@ -88,8 +88,9 @@ void Network::discover(Peer& observer, Peer& observed) {
     return;
   }
   observer.known_.insert(observed.id());
-  Instant when{0};
+  std::array<Instant, 2> times{};  // of readers and of writers, which have a topic each
   for (std::size_t i = 0; i < observed.endpoints_.size(); ++i) {
+    Instant& when = times[observed.endpoints_[i].is_writer];
     when += Instant(random_.integer(100'000, 3'000'000));
     if (is_lost(observed, observer)) when += kHeartbeat * random_.integer(1, 4);
     const Peer::Endpoint endpoint = observed.endpoints_[i];

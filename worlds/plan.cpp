@@ -55,12 +55,16 @@ void draw_programs(Plan& plan, Random& random, const FlownScenario& flown) {
   add(Role::kServer);
   const bool is_wild = plan.promise == Promise::kNone;
   const bool is_calm = plan.promise == Promise::kCalm;
+  const bool is_realtime = flown.scenario.sync.mode == config::SyncMode::kRealtime;
+  // A recorder that nobody waits for may miss the flight after the reset.
+  const bool is_reset = plan.promise == Promise::kReset;
   if (is_wild && random.chance(0.25)) add(Role::kServer);
   if (plan.promise == Promise::kTwoServers)
     add(Role::kServer).start = plan.programs.front().start + draw_time(random, 0ms, 800ms);
-  // A server that was started again, or second, waits for the expected ones alone.
+  // A server that was started again, or second, waits for the expected ones alone. In real time a
+  // stronger client that joins may cost a step.
   const bool has_surplus =
-      plan.promise != Promise::kServerRestart && plan.promise != Promise::kTwoServers;
+      !is_calm && plan.promise != Promise::kServerRestart && plan.promise != Promise::kTwoServers;
   const int clients =
       expected.controllers + (plan.promise == Promise::kTakeOver
                                   ? 1
@@ -71,11 +75,15 @@ void draw_programs(Plan& plan, Random& random, const FlownScenario& flown) {
     client.announces_once = random.chance(0.1);
     if (!is_calm && random.chance(0.1)) client.delay = draw_time(random, 100us, 3ms);
     if (is_wild && random.chance(0.03)) client.has_other_scenario = true;
+    client.is_early = is_calm && is_realtime && random.chance(0.5);
+    if (is_wild && random.chance(0.1))
+      client.breaks_at =
+          static_cast<std::uint64_t>(random.integer(0, static_cast<std::int64_t>(flown.last_step)));
     client.is_sloppy = random.chance(0.2);
   }
   if (random.chance(0.15)) add(Role::kForeign);
-  const int recorders =
-      std::max(expected.recorders, static_cast<int>(random.integer(0, has_surplus ? 2 : 0)));
+  const int recorders = std::max(
+      expected.recorders, static_cast<int>(random.integer(0, has_surplus && !is_reset ? 2 : 0)));
   for (int i = 0; i < recorders; ++i) {
     PlannedProgram& recorder = add(Role::kRecorder);
     recorder.resumes = plan.promise == Promise::kRecorderRestart || random.chance(0.7);
@@ -204,6 +212,19 @@ void draw_split(Plan& plan, Random& random, const FlownScenario& flown) {
   }
 }
 
+/// A recorder comes back long after it was killed; the flight is paused at first.
+void draw_long_absence(Plan& plan, Random& random) {
+  Fault& kill = plan.faults.front();
+  kill.duration = draw_time(random, 5s, 7s);
+  Fault pause = kill;
+  pause.kind = Kind::kRequest;
+  pause.other = static_cast<std::size_t>(ControlAction::ACTION_PAUSE);
+  pause.target = 0;
+  pause.duration = draw_time(random, 3500ms, 4s);
+  plan.faults.push_back(pause);
+  plan.healed = pause.duration;
+}
+
 /// The one fault of a world with a promise that names it.
 Fault draw_promised(const Plan& plan, Random& random, const FlownScenario& flown) {
   const config::Sync& sync = flown.scenario.sync;
@@ -276,6 +297,7 @@ Plan draw_plan(std::uint64_t seed, const std::vector<FlownScenario>& scenarios) 
   plan.drift = random.chance(0.3) ? random.between(-1e-4, 1e-4) : 0;
   plan.wall_offset_s = random.chance(0.3) ? random.between(-20, 20) : 0;
   plan.healed = draw_time(random, 1s, is_lockstep ? Instant(6s) : Instant(4s));
+  if (plan.promise == Promise::kLongStop) plan.healed = 60s;
   plan.has_files = plan.promise == Promise::kRecorderRestart || random.chance(0.08);
   draw_programs(plan, random, flown);
   if (plan.promise == Promise::kCalm || plan.promise == Promise::kTwoServers) return plan;
@@ -285,6 +307,8 @@ Plan draw_plan(std::uint64_t seed, const std::vector<FlownScenario>& scenarios) 
   }
   if (plan.promise > Promise::kMild) {
     plan.faults.push_back(draw_promised(plan, random, flown));
+    if (plan.promise == Promise::kRecorderRestart && random.chance(0.5))
+      draw_long_absence(plan, random);
     return plan;
   }
   if (plan.promise == Promise::kNone && plan.programs[1].role == Role::kServer &&

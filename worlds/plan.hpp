@@ -53,9 +53,11 @@ struct PlannedProgram {
   bool follows_servers = false;
   bool has_other_scenario = false;
   bool is_sloppy = false;       ///< a client that also sends what nobody asked for
+  bool is_early = false;        ///< a client that also answers the next step before its state
   bool announces_once = false;  ///< a client that does not repeat its announcement
-  bool resumes = false;         ///< a recorder that takes the place of a killed one goes on
-  Instant delay{0};             ///< computing time of an answer; of the disk of a recorder
+  std::optional<std::uint64_t> breaks_at;  ///< step from which a client answers with nonsense
+  bool resumes = false;  ///< a recorder that takes the place of a killed one goes on
+  Instant delay{0};      ///< computing time of an answer; of the disk of a recorder
 };
 
 /// The faults of a world after which a flight must be finished, and every program that is not

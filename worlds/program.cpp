@@ -20,6 +20,16 @@ void Program::kill() {
   setting_.network.leave(peer_, false);
 }
 
+void Program::say(const sync::Line& line) {
+  setting_.properties.on_line(*this, line.text, servers_);
+  say((line.is_warning ? "warning: " : "") + line.text);
+}
+
+void Program::stop() {
+  process_.stop();
+  setting_.properties.on_stopped(*this);
+}
+
 void Program::interrupt() {
   if (process_.has_ended() || was_interrupted()) return;
   stop_signal_ = "interrupted by SIGINT";

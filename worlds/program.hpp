@@ -28,7 +28,7 @@ class Program {
 
   virtual void start() = 0;
   /// SIGSTOP and SIGCONT.
-  void stop() { process_.stop(); }
+  void stop();
   void go_on();
   Process& process() { return process_; }
   const Process& process() const { return process_; }
@@ -53,7 +53,7 @@ class Program {
  protected:
   sync::Time now() const { return process_.host().now(); }
   void say(std::string text);
-  void say(const sync::Line& line) { say((line.is_warning ? "warning: " : "") + line.text); }
+  void say(const sync::Line& line);
   /// Wakes the main thread at `time` of this host's clock, or earlier if that was asked for.
   void wake_at(sync::Time time);
   void wake_soon() { wake_at(now()); }

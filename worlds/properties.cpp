@@ -22,6 +22,10 @@ constexpr Instant kNamedWithin = 2500ms;
 /// Two servers of one vehicle that hear each other: one of them has gone after this.
 constexpr Instant kRivalsGoneWithin = 4s;
 
+/// A killed program is presumed dead after 2 s, and looked for ten times a second.
+constexpr Instant kGoneAfter = 2500ms;
+/// A server that is heard later than this is called silent after another half of it.
+constexpr Instant kQuietTime = 900ms;
 /// Discovery of the endpoints, and the announcement itself.
 constexpr Instant kBeginsWithin = 60ms;
 /// The others have heard of it, unless something is in the way.
@@ -87,6 +91,8 @@ void Properties::on_run(const Program& server, std::uint64_t run_id, const Param
   Run& run = runs_[run_id];
   run.flight = std::make_unique<FlightWatch>(scenario, run_id, server,
                                              [this](std::string text) { find(std::move(text)); });
+  run.waits_for_recorders = scenario.sync.mode == config::SyncMode::kLockstep &&
+                            scenario.sync.wait.recorder.policy == config::RecorderPolicy::kWait;
   run.phase_since = timeline_.now();
   run.server = &server;
   run.vehicle_ids = sync::list_vehicle_ids(parameters);
@@ -101,8 +107,11 @@ void Properties::on_yielded(const Program& server, std::uint64_t run_id) {
     const auto progress = [&](const Run& run) {
       return run.has_status ? sync::calc_progress(run.phase) : 0;
     };
-    if (timeline_.now() - other.phase_since < kHeardWithin) return true;
-    if (own.has_status && timeline_.now() - own.phase_since < kHeardWithin) return !other.has_ended;
+    const auto has_changed = [&](const Run& run) {
+      return run.has_status && timeline_.now() - run.phase_since < kHeardWithin;
+    };
+    if (has_changed(other)) return true;
+    if (has_changed(own)) return !other.has_ended;
     return progress(other) > progress(own) || (progress(other) == progress(own) && id < run_id);
   };
   if (std::none_of(runs_.begin(), runs_.end(), has_won) && killed_.empty())
@@ -117,6 +126,7 @@ void Properties::on_published(std::uint64_t run_id, std::uint64_t step,
     find(fmt::format("start: run {:016x} begins with {} controllers and {} recorders", run_id,
                      run.ready.size(), run.recorders.size()));
   run.flight->on_published(step, timeline_.now());
+  if (step > 0) check_recorders(run, step, expected);
   run.published = timeline_.now();
   if (!run.began) run.began = run.published;
   run.is_stall_found = false;
@@ -175,6 +185,18 @@ void Properties::on_status(const SimStatus& status, const Network& network) {
   run.flight->on_running(timeline_.now());
   check_stall(run, status.run_id());
   check_rivals(run, network);
+}
+
+/// In lockstep a flight waits for the recorders that it expects.
+void Properties::check_recorders(const Run& run, std::uint64_t step,
+                                 const config::WaitFor& expected) {
+  if (!run.waits_for_recorders) return;
+  const auto is_there = [&](const std::string& name) {
+    const auto killed = killed_.find(name);
+    return killed == killed_.end() || timeline_.now() - killed->second < kGoneAfter;
+  };
+  if (std::count_if(run.recorders.begin(), run.recorders.end(), is_there) < expected.recorders)
+    find(fmt::format("recorders: step {} leaves without them", step));
 }
 
 /// A participant that keeps others waiting is named.
@@ -238,12 +260,16 @@ void Properties::on_announced(const Program& program, const Participant& message
     find(fmt::format("joins: {} joins run {:016x}, whose claim is not settled", program.name(),
                      message.run_id()));
   if (!message.ready()) return;
-  const TopicId topic = is_client ? TopicId::kState : TopicId::kRecord;
   const bool is_first = is_client ? run.ready.insert(program.name()).second
                                   : run.recorders.insert(program.name()).second;
   if (!is_first) return;
   run.ready_since[program.name()] = timeline_.now();
-  if (peer.matched_writers(topic).count(run.server->id()) == 0)
+  const bus::PeerId& server = run.server->id();
+  const bool sees_server = is_client ? peer.matched_writers(TopicId::kState).count(server) > 0 &&
+                                           peer.matched_readers(TopicId::kCommand).count(server) > 0
+                                     : peer.matched_writers(TopicId::kRecord).count(server) > 0 &&
+                                           peer.matched_writers(TopicId::kStatus).count(server) > 0;
+  if (!sees_server)
     find(fmt::format("ready: {} says so of run {:016x} before it sees the server", program.name(),
                      message.run_id()));
 }
@@ -281,6 +307,27 @@ void Properties::on_replied(const Program& server, std::uint64_t run_id, const N
     return;
   find(fmt::format("operator: {} answers a request to {}", server.name(),
                    run->second.server->name()));
+}
+
+void Properties::on_stopped(const Program& program) { stopped_[program.name()] = timeline_.now(); }
+
+/// A program that was stopped itself does not say that its server is silent.
+void Properties::on_line(const Program& program, const std::string& text,
+                         const sync::Servers& heard) {
+  const auto continued = continued_.find(program.name());
+  if (continued == continued_.end() || timeline_.now() - continued->second > kQuietTime ||
+      text.find("(silent for ") == std::string::npos)
+    return;
+  // A shorter stop counts as silence of the server, which does no harm.
+  if (continued->second - stopped_.at(program.name()) < kQuietTime) return;
+  const Host& host = program.process().host();
+  for (const auto& [run_id, run] : runs_) {
+    if (text.find(fmt::format("{:016x}", run_id)) == std::string::npos) continue;
+    const auto last = heard.find_last_heard(run_id);
+    const Instant silence = timeline_.now() - stopped_.at(program.name()) + kQuietTime / 2;
+    if (last && host.now() - *last < silence)
+      find(fmt::format("named: {} was stopped, and says: {}", program.name(), text));
+  }
 }
 
 void Properties::on_interrupted(const Program& program) {
@@ -428,13 +475,17 @@ void Properties::check_end(const Program& server,
     if (run.server != &server || !run.is_finished) continue;
     Instant last = run.ended;
     for (const auto& program : programs) {
-      if (program->role() != Role::kRecorder || run.recorders.count(program->name()) == 0) continue;
+      const bool took_part =
+          run.recorders.count(program->name()) > 0 || run.done.count(program->name()) > 0;
+      if (program->role() != Role::kRecorder || !took_part) continue;
       if (program->was_killed()) {
         last = std::max(last, killed_.at(program->name()) + sync::kPresumedDeadAfter);
         continue;
       }
       last = std::max(last, program->ended());
-      const bool is_known = run.ready_since.at(program->name()) + kHeardWithin / 2 < run.ended;
+      const auto ready = run.ready_since.find(program->name());
+      const bool is_known =
+          ready != run.ready_since.end() && ready->second + kHeardWithin / 2 < run.ended;
       const auto done = run.done.find(program->name());
       if (is_known && server.ended() < run.ended + kWaitsFor &&
           (done == run.done.end() || done->second > server.ended()))

@@ -77,7 +77,10 @@ class Properties {
   void on_replied(const Program& server, std::uint64_t run_id, const Network& network);
   void on_interrupted(const Program& program);
   void on_killed(const Program& program);
+  void on_stopped(const Program& program);
   void on_continued(const Program& program);
+  /// A program says `text`. `heard`: what it knows of servers.
+  void on_line(const Program& program, const std::string& text, const sync::Servers& heard);
   /// Its process was stopped, is slow or is so no more.
   void on_disturbed(const Program& program);
 
@@ -111,6 +114,7 @@ class Properties {
     std::string timing;
     RunPhase phase = RunPhase::PHASE_WAITING;
     bool has_status = false;  // its claim is settled
+    bool waits_for_recorders = false;
     Instant phase_since{0};
     std::optional<Instant> published;  // the last step
     std::optional<Instant> began;      // the first step
@@ -121,6 +125,7 @@ class Properties {
 
   void find(std::string finding);
   void check_join(const Program& program, std::uint64_t run_id, const sync::Servers& heard);
+  void check_recorders(const Run& run, std::uint64_t step, const config::WaitFor& expected);
   void check_stall(Run& run, std::uint64_t run_id);
   void check_rivals(const Run& run, const Network& network);
   void check_applied(const model::StepRecord& before, const model::StepRecord& record);
@@ -134,7 +139,7 @@ class Properties {
   const Timeline& timeline_;
   Trace& trace_;
   std::map<std::uint64_t, Run> runs_;
-  std::map<std::string, Instant> killed_, continued_;                    // by name
+  std::map<std::string, Instant> killed_, stopped_, continued_;          // by name
   std::map<std::string, std::uint64_t> joined_;                          // clients' last runs
   std::map<std::pair<const Program*, const Program*>, Instant> rivals_;  // fly together since
   std::uint64_t steps_ = 0;

@@ -31,6 +31,28 @@ std::set<std::string> name_properties(const std::vector<std::string>& findings) 
   return names;
 }
 
+double find_loss(const Plan& plan) { return plan.hosts > 1 ? plan.link.loss : 0; }
+Instant find_delay(const Plan& plan) {
+  return plan.hosts > 1 ? plan.link.delay + plan.link.jitter / 2 : Instant(0);
+}
+
+std::string make_row(const Plan& plan, const Verdict& verdict) {
+  FlightSummary all;
+  for (const FlightSummary& flight : verdict.flights) {
+    all.duration_s += flight.duration_s;
+    all.take_overs += flight.take_overs;
+    all.late += flight.late;
+    all.worst_error_m = std::max(all.worst_error_m, flight.worst_error_m);
+  }
+  const bool is_finished = !verdict.flights.empty();
+  return fmt::format("{},{:.4f},{:.3f},{},{},{},{},{},{},{}", plan.seed, find_loss(plan),
+                     std::chrono::duration<double, std::milli>(find_delay(plan)).count(),
+                     plan.faults.size(), verdict.flights.size(),
+                     is_finished ? fmt::format("{:.6f}", all.duration_s) : "", all.take_overs,
+                     all.late, is_finished ? fmt::format("{:.6f}", all.worst_error_m) : "",
+                     verdict.findings.empty() ? 0 : 1);
+}
+
 /// One job after another takes the next seed.
 class Search {
  public:
@@ -84,6 +106,7 @@ class Search {
     std::set<std::string> kinds;
     for (const Fault& fault : plan.faults) kinds.insert(name_kind(fault.kind));
     for (const std::string& kind : kinds) ++result_.faults[kind];
+    if (options_.keeps_rows) result_.rows[seed] = make_row(plan, verdict);
     if (!verdict.findings.empty()) result_.failures[seed] = verdict.findings;
     if (result_.failures.size() >= options_.most_failures) is_over_ = true;
   }
@@ -155,9 +178,8 @@ class Shrinker {
 }  // namespace
 
 void FlightTable::add(const Plan& plan, const Verdict& verdict) {
-  const bool has_network = plan.hosts > 1;
-  const double link_loss = has_network ? plan.link.loss : 0;
-  const Instant link_delay = has_network ? plan.link.delay + plan.link.jitter / 2 : Instant(0);
+  const double link_loss = find_loss(plan);
+  const Instant link_delay = find_delay(plan);
   const std::size_t loss = (link_loss > 0) + (link_loss > 0.05);
   const std::size_t delay = (link_delay > 1ms) + (link_delay > 5ms);
   Cell& cell = cells[loss][delay];

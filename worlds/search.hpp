@@ -19,6 +19,7 @@ struct SearchOptions {
   std::uint64_t twice_every = 10;  ///< so many worlds are flown once, and one twice
   std::filesystem::path folder;    ///< for files of worlds; each job has its own in it
   std::size_t most_failures = 10;  ///< the search ends after these
+  bool keeps_rows = false;         ///< one per world, for a table
 };
 
 /// The flights of worlds with about the same network.
@@ -53,7 +54,13 @@ struct SearchResult {
   std::map<std::string, std::uint64_t> faults;                 ///< worlds with this kind
   std::map<std::uint64_t, std::vector<std::string>> failures;  ///< findings by seed
   FlightTable table;
+  std::map<std::uint64_t, std::string> rows;  ///< kRowNames of each world, if they are kept
 };
+
+/// The columns of `SearchResult::rows`. Loss and delay are those of the links between hosts, from 0
+/// to 1 and in ms. Of the finished flights of a world: simulated time and largest load error.
+inline constexpr const char* kRowNames =
+    "seed,loss,delay_ms,faults,finished,duration_s,take_overs,late_steps,worst_error_m,failed";
 
 /// Flies the worlds of all seeds. `report(result)` is called every few seconds.
 SearchResult search(const std::vector<FlownScenario>& scenarios, const SearchOptions& options,

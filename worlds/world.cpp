@@ -90,7 +90,7 @@ class World {
           setting_, host, name,
           ClientProgram::Options{planned.vehicle_ids, planned.strength, planned.follows_servers,
                                  planned.has_other_scenario, planned.is_sloppy, planned.delay,
-                                 planned.announces_once});
+                                 planned.is_early, planned.breaks_at, planned.announces_once});
     else if (planned.role == Role::kForeign)
       program = std::make_unique<ForeignProgram>(setting_, host, name);
     else

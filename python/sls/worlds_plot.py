@@ -58,7 +58,7 @@ def plot_worlds(worlds: dict[str, np.ndarray]) -> Figure:
     finished = int((worlds["finished"] > 0).sum())
     total = len(worlds["finished"])
     upper.set_title(f"{total} worlds, {finished} with a finished flight (the others: ×)", pad=12)
-    upper.legend(ncols=3, loc="upper left")
+    figure.legend(*upper.get_legend_handles_labels(), ncols=3, loc="outside lower center", markerscale=2)
     return figure
 
 

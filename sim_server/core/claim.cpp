@@ -9,8 +9,7 @@ namespace sls::sim {
 std::string describe_rival(const std::vector<sync::Run>& others, std::uint64_t run_id,
                            const std::vector<std::uint32_t>& vehicle_ids, int progress) {
   for (const sync::Run& other : others) {
-    const int others_progress = sync::calc_progress(other.status);
-    if (others_progress < 0) continue;
+    const int others_progress = sync::calc_progress(other.status);  // negative after its end
     const auto shared = std::find_if(vehicle_ids.begin(), vehicle_ids.end(), [&](std::uint32_t id) {
       return sync::serves_vehicle(other.parameters, id);
     });

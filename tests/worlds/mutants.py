@@ -67,7 +67,7 @@ MUTANTS = [
      "a client always gives its first answer"),
     ("control_client/answerer.cpp", "answers_.step(sample.step());", "answers_.step(sample.step() + 1);", "answers are for the next step"),
     # --- the server's claim and start
-    ("sim_server/core/claim.cpp", "if (others_progress < 0) continue;", "", "a server yields to an ended run"),
+    ("sim_server/core/claim.cpp", "others_progress > progress ||", "others_progress >= progress ||", "of two equal servers both yield"),
     ("sim_server/core/claim.cpp", "other.parameters.run_id() < run_id))", "other.parameters.run_id() > run_id))", "of two servers the wrong one yields"),
     ("sim_server/core/claim.cpp", "others_progress > progress ||", "", "a server does not yield to a further one"),
     ("sim_server/core/claim.cpp", "    if (others_progress > progress ||\n        (others_progress == progress && other.parameters.run_id() < run_id))", "    if (false)",
