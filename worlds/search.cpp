@@ -62,7 +62,7 @@ class Search {
   }
 
   void fly(std::uint64_t seed, const std::filesystem::path& folder) {
-    const Plan plan = draw_plan(seed, scenarios_);
+    const Plan plan = draw_plan(seed, scenarios_, options_.cases);
     Verdict verdict = fly_world(plan, scenarios_, folder);
     const bool is_twice = seed % options_.twice_every == 0;
     if (is_twice) {
@@ -79,10 +79,12 @@ class Search {
     result_.events += verdict.events;
     result_.steps += verdict.steps;
     result_.simulated_s += verdict.simulated_s;
+    result_.planned_faults += plan.faults.size();
+    result_.begun_faults += verdict.begun_faults;
     result_.twice += is_twice;
     result_.hash += Random(verdict.hash ^ seed).next();  // in any order
     std::set<std::string> kinds;
-    for (const Fault& fault : plan.faults) kinds.insert(name_kind(fault.kind));
+    for (const Fault& fault : plan.faults) kinds.insert(config::to_yaml_value(fault.kind));
     for (const std::string& kind : kinds) ++result_.faults[kind];
     if (!verdict.findings.empty()) result_.failures[seed] = verdict.findings;
     if (result_.failures.size() >= options_.most_failures) is_over_ = true;
