@@ -74,7 +74,7 @@ struct Plan {
   Promise promise = Promise::kNone;
 };
 
-/// What a world can do of a file of faults.
+/// The words of a file of faults that worlds understand.
 config::faults::Abilities list_abilities();
 
 /// `scenarios`: those to choose from. `cases`: likewise, of a file of faults; if there are some,

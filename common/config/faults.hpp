@@ -86,7 +86,7 @@ struct Fault {
   Span at;  ///< s after the begin, or a step
 };
 
-/// What one flight suffers.
+/// The network and faults of one flight.
 struct Case {
   std::string name;
   Link link;
@@ -94,7 +94,7 @@ struct Case {
   std::optional<Span> until_s;  ///< then all faults are over, and the link is good
 };
 
-/// What a tool can do. A file that asks for more is refused.
+/// The words that a tool understands. A file with others is refused.
 struct Abilities {
   std::string tool;                ///< in errors
   std::set<std::string> words;     ///< kinds, and keys: those of links, `step`, `until_s`

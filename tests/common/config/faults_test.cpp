@@ -108,7 +108,7 @@ TEST(FaultsTest, EachMistakeGivesItsLine) {
             "step");
 }
 
-TEST(FaultsTest, WhatAToolCannotDoIsRefused) {
+TEST(FaultsTest, AWordThatAToolDoesNotKnowIsRefused) {
   const Abilities few{"chaos", {"kill", "link.loss"}, {"server-1", "recorder-1"}};
   EXPECT_EQ(find_error("link: { mtu_bytes: 576 }", few),
             "file:1: link.mtu_bytes: expected what chaos can do (kill, link.loss), got "
