@@ -112,9 +112,7 @@ int main(int argc, char** argv) {
   std::string given = SLS_SOURCE_DIR "/config/faults/network_table.yaml";
   int vehicles = 1;
   cli.add_option("--profile", profiles, "fly only these profiles (names in config/qos)");
-  cli.add_option("--faults", given,
-                 "disturbances (YAML, docs/faults.md; default: config/faults/network_table.yaml)")
-      ->type_name("FILE");
+  cli.add_option("--faults", given, "disturbances (YAML, docs/faults.md)")->type_name("FILE");
   cli.add_option("--disturbance", disturbances,
                  "apply only these disturbances (names in the table)");
   cli.add_option("--vehicles", vehicles, "vehicles in each flight")->check(CLI::Range(1, 256));

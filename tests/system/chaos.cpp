@@ -334,9 +334,7 @@ int main(int argc, char** argv) {
                      ->type_name("N")
                      ->check(CLI::Range(1, 100000));
   cli.add_option("--seed", seed, "seed of the faults")->type_name("S");
-  cli.add_option(
-         "--faults", file,
-         "faults (YAML, docs/faults.md), one for each case and flight, instead of drawn ones")
+  cli.add_option("--faults", file, "faults (YAML, docs/faults.md), one for each flight")
       ->type_name("FILE")
       ->default_str("");
   cli.add_flag("--verbose", is_verbose, "print the output of the processes");
