@@ -36,6 +36,8 @@ Link draw_link(Random& random) {
       link.reordering = random.chance(0.3) ? random.between(0, 0.2) : 0;
       link.late_by = 10ms;
   }
+  if (random.chance(0.2)) link.duplicates = random.between(0, 0.3);
+  if (random.chance(0.1)) link.packet_time = calc_packet_time(random.between(2, 50));
   return link;
 }
 
@@ -45,7 +47,7 @@ double draw(Random& random, const faults::Span& span) {
   return random.between(span.least, span.most);
 }
 
-/// The link of a file. What it leaves out is as good as a switch.
+/// The link of a file, by default as good as a switch.
 Link make_link(const faults::Link& given, Random& random) {
   Link link;
   const auto set_time = [&](Instant& time, const std::optional<faults::Span>& ms) {
@@ -138,11 +140,11 @@ void time_fault(Fault& fault, Random& random, const Plan& plan, const FlownScena
 
 /// `count`: of all faults of the plan.
 Fault draw_fault(const Plan& plan, Random& random, std::int64_t count) {
-  static constexpr Kind kMild[] = {Kind::kStop, Kind::kCut,  Kind::kIsolate,
-                                   Kind::kLoss, Kind::kSlow, Kind::kClock};
+  static constexpr Kind kMild[] = {Kind::kStop, Kind::kCut,   Kind::kIsolate,   Kind::kLoss,
+                                   Kind::kSlow, Kind::kClock, Kind::kPartition, Kind::kClog};
   Fault fault;
-  fault.kind = plan.promise == Promise::kMild ? kMild[random.integer(0, 5)]
-                                              : static_cast<Kind>(random.integer(0, 9));
+  fault.kind = plan.promise == Promise::kMild ? kMild[random.integer(0, 7)]
+                                              : static_cast<Kind>(random.integer(0, 11));
   const auto programs = static_cast<std::int64_t>(plan.programs.size());
   const auto hosts = static_cast<std::int64_t>(plan.hosts);
   const auto draw_of = [&](std::int64_t count) {
@@ -186,8 +188,10 @@ Fault draw_fault(const Plan& plan, Random& random, std::int64_t count) {
       fault.value = static_cast<double>(random.integer(1, 20));
       break;
     case Kind::kPartition:
+      break;
     case Kind::kClog:
-      break;  // of files alone
+      fault.value = random.between(0.3, 4);
+      break;
   }
   return fault;
 }

@@ -127,7 +127,7 @@ class Shrinker {
                               plan.faults.end());
           });
     }
-    attempt([](Plan& plan) { plan.link.loss = plan.link.reordering = 0; });
+    attempt([](Plan& plan) { plan.link.loss = plan.link.reordering = plan.link.duplicates = 0; });
     attempt([](Plan& plan) { plan.link = Link(); });
     attempt([](Plan& plan) { plan.drift = plan.wall_offset_s = 0; });
     attempt([](Plan& plan) { plan.has_files = false; });
