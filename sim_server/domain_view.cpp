@@ -8,6 +8,13 @@
 
 namespace sls::sim {
 
+std::vector<sync::Member> DomainView::find_members(ParticipantRole role,
+                                                   std::uint64_t run_id) const {
+  auto found = endpoints_.participants.find(role, run_id);
+  if (role == ParticipantRole::ROLE_CONTROLLER) keep_readers(found, endpoints_.states.matched());
+  return found;
+}
+
 Neighbourhood DomainView::look(bool is_known) {
   const bus::Node& domain = endpoints_.domain;
   Neighbourhood seen;

@@ -14,10 +14,7 @@ class DomainView : public Surroundings {
   DomainView(Endpoints& endpoints, const Outbox& outbox) : endpoints_(endpoints), outbox_(outbox) {}
 
   std::uint64_t members_version() const override { return endpoints_.participants.version(); }
-  std::vector<sync::Member> find_members(ParticipantRole role,
-                                         std::uint64_t run_id) const override {
-    return endpoints_.participants.find(role, run_id);
-  }
+  std::vector<sync::Member> find_members(ParticipantRole role, std::uint64_t run_id) const override;
   std::vector<sync::Run> find_other_runs() const override { return endpoints_.servers.runs(); }
   bool is_known_elsewhere(std::uint64_t run_id) const override {
     return endpoints_.servers.is_known(run_id);

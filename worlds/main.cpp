@@ -61,7 +61,9 @@ void print_result(const worlds::SearchResult& result, double wall_s) {
   std::string faults;
   for (const auto& [kind, count] : result.faults)
     faults += fmt::format("{}{} {}", faults.empty() ? "" : ", ", kind, count);
-  std::cout << "worlds with a fault: " << faults << '\n';
+  std::cout << fmt::format("worlds with a fault: {}; {} of {} faults began\n",
+                           faults.empty() ? "none" : faults, result.begun_faults,
+                           result.planned_faults);
   for (const std::string& line : result.table.describe()) std::cout << line << '\n';
 }
 
@@ -77,7 +79,7 @@ int main(int argc, char** argv) {
   CLI::App cli("Flies simulated worlds: server, clients and recorders with faults, from a seed.");
   app::CommonOptions common;
   common.log_level = "error";  // the programs of a world write into its trace
-  std::filesystem::path scenario;
+  std::filesystem::path scenario, faults;
   std::string seeds = "0-999";
   worlds::SearchOptions options;
   options.jobs = std::max(1u, std::thread::hardware_concurrency());
@@ -89,6 +91,9 @@ int main(int argc, char** argv) {
          "--scenario", scenario,
          "scenario (YAML) that every world flies (default: 16 short ones, with both modes and "
          "all policies)")
+      ->type_name("FILE");
+  cli.add_option("--faults", faults,
+                 "link and faults (YAML, docs/faults.md) of every world, instead of drawn ones")
       ->type_name("FILE");
   cli.add_option("--seeds", seeds, "worlds to fly")->type_name("A-B");
   cli.add_option("--jobs", options.jobs, "threads (default: one for each processor)")
@@ -105,6 +110,7 @@ int main(int argc, char** argv) {
 
   return app::run_main(argc, argv, cli, common, "sls_worlds", [&] {
     parse_seeds(seeds, options);
+    if (!faults.empty()) options.cases = config::faults::load(faults, worlds::list_abilities());
     const Folder folder;
     options.folder = folder.path();
     std::ofstream rows;
@@ -118,7 +124,7 @@ int main(int argc, char** argv) {
             ? worlds::make_scenarios()
             : std::vector<worlds::FlownScenario>{worlds::fly(config::load_scenario(scenario))};
     if (replayed) {
-      const worlds::Plan plan = worlds::draw_plan(*replayed, scenarios);
+      const worlds::Plan plan = worlds::draw_plan(*replayed, scenarios, options.cases);
       if (!is_verbose) return print_story(plan, scenarios, folder.path());
       for (const std::string& line : worlds::describe(plan)) std::cout << line << '\n';
       for (const std::string& line :
@@ -150,9 +156,9 @@ int main(int argc, char** argv) {
     if (result.failures.empty() || app::stop_signal() != 0) return;
     const std::uint64_t first = result.failures.begin()->first;
     std::cout << fmt::format("the world of seed {}, without what it does not need:\n", first);
-    print_story(
-        worlds::shrink(worlds::draw_plan(first, scenarios), scenarios, folder.path() / "shrink"),
-        scenarios, folder.path() / "tell");
+    print_story(worlds::shrink(worlds::draw_plan(first, scenarios, options.cases), scenarios,
+                               folder.path() / "shrink"),
+                scenarios, folder.path() / "tell");
     std::cout << std::flush;  // the error comes last
     throw app::RunError(
         fmt::format("{} of {} worlds failed", result.failures.size(), result.worlds));

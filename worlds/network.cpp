@@ -13,7 +13,13 @@ constexpr bool is_best_effort(std::size_t topic) {
          topic == static_cast<std::size_t>(TopicId::kCommand);
 }
 
+constexpr double kDatagramBits = 1'400 * 8;  // sls.max_datagram_bytes of the network profiles
+
 }  // namespace
+
+Instant calc_packet_time(double bandwidth_mbit) {
+  return Instant(static_cast<std::int64_t>(kDatagramBits / bandwidth_mbit * 1e3));
+}
 
 // As config/qos/endpoints.xml.
 std::size_t Peer::history_depth(TopicId topic) {
@@ -143,12 +149,16 @@ void Network::forget(Peer& observer, const Peer& observed) {
 
 bool Network::is_lost(const Peer& from, const Peer& to) {
   const Link& way = link(from.process().host(), to.process().host());
-  return way.is_cut || random_.chance(way.loss);
+  return way.is_cut || way.busy_until - timeline_.now() > kQueue || random_.chance(way.loss);
 }
 
 Instant Network::draw_delay(const Peer& from, const Peer& to) {
-  const Link& way = link(from.process().host(), to.process().host());
+  Link& way = link(from.process().host(), to.process().host());
   Instant delay = way.delay + Instant(random_.integer(0, way.jitter.count()));
+  if (way.packet_time.count() > 0) {
+    way.busy_until = std::max(way.busy_until, timeline_.now()) + way.packet_time;
+    delay += way.busy_until - timeline_.now();
+  }
   if (random_.chance(way.reordering)) delay += Instant(random_.integer(0, way.late_by.count()));
   return delay;
 }
@@ -164,12 +174,16 @@ void Network::sent(Peer& writer, std::size_t topic) {
 }
 
 void Network::send_now(Peer& writer, Peer& reader, std::size_t topic, const Peer::Written& sample) {
-  if (is_lost(writer, reader)) return;
-  timeline_.after(draw_delay(writer, reader), [this, &writer, &reader, topic, sample] {
-    if (reader.process().has_room())
-      reader.process().run(
-          [this, &writer, &reader, topic, sample] { deliver(writer, reader, topic, sample); });
-  });
+  const Link& way = link(writer.process().host(), reader.process().host());
+  const int copies = random_.chance(way.duplicates) ? 2 : 1;
+  for (int i = 0; i < copies; ++i) {
+    if (is_lost(writer, reader)) continue;
+    timeline_.after(draw_delay(writer, reader), [this, &writer, &reader, topic, sample] {
+      if (reader.process().has_room())
+        reader.process().run(
+            [this, &writer, &reader, topic, sample] { deliver(writer, reader, topic, sample); });
+    });
+  }
 }
 
 /// Sends what the reader lacks. A lost sample is sent again after the next heartbeat, and those

@@ -32,7 +32,13 @@ struct Link {
   double reordering = 0;  ///< a datagram is late by up to `late_by`
   Instant late_by{0};
   bool is_cut = false;
+  double duplicates = 0;   ///< best-effort samples that are sent twice
+  Instant packet_time{0};  ///< a datagram takes so long; 0: no limit
+  Instant busy_until{0};   ///< of the queue before it
 };
+
+/// Time that a link of `bandwidth_mbit` needs for a datagram. Every sample counts as a full one.
+Instant calc_packet_time(double bandwidth_mbit);
 
 class Network;
 
@@ -119,6 +125,8 @@ class Network {
   /// A participant that left without goodbye is forgotten after this.
   static constexpr Instant kLease = std::chrono::seconds(60);
   static constexpr Instant kHeartbeat = std::chrono::milliseconds(50);
+  /// The queue before a link; what does not fit is lost.
+  static constexpr Instant kQueue = std::chrono::milliseconds(50);
 
   Peer& join(Process& process);
   /// The endpoints of `peer` are complete: others may discover it.
@@ -156,6 +164,7 @@ class Network {
   void deliver(Peer& writer, Peer& reader, std::size_t topic, const Peer::Written& sample);
   /// Draws whether a datagram is lost.
   bool is_lost(const Peer& from, const Peer& to);
+  /// Of a datagram that is sent now.
   Instant draw_delay(const Peer& from, const Peer& to);
 
   Timeline& timeline_;

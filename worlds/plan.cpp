@@ -12,6 +12,7 @@ namespace {
 
 using namespace std::chrono_literals;
 using Kind = Fault::Kind;
+namespace faults = config::faults;
 
 Instant draw_time(Random& random, Instant least, Instant most) {
   return Instant(random.integer(least.count(), most.count()));
@@ -35,10 +36,46 @@ Link draw_link(Random& random) {
       link.reordering = random.chance(0.3) ? random.between(0, 0.2) : 0;
       link.late_by = 10ms;
   }
+  if (random.chance(0.2)) link.duplicates = random.between(0, 0.3);
+  if (random.chance(0.1)) link.packet_time = calc_packet_time(random.between(2, 50));
   return link;
 }
 
-void draw_programs(Plan& plan, Random& random, const FlownScenario& flown) {
+Instant to_instant(double seconds) { return Instant(static_cast<std::int64_t>(seconds * 1e9)); }
+
+double draw(Random& random, const faults::Span& span) {
+  return random.between(span.least, span.most);
+}
+
+/// The link of a file, by default as good as a switch.
+Link make_link(const faults::Link& given, Random& random) {
+  Link link;
+  const auto set_time = [&](Instant& time, const std::optional<faults::Span>& ms) {
+    if (ms) time = to_instant(draw(random, *ms) * 1e-3);
+  };
+  set_time(link.delay, given.delay_ms);
+  set_time(link.jitter, given.jitter_ms);
+  link.late_by = 10ms;
+  set_time(link.late_by, given.reordering_ms);
+  link.loss = draw(random, given.loss.value_or(faults::Span()));
+  link.reordering = draw(random, given.reordering.value_or(faults::Span()));
+  link.duplicates = draw(random, given.duplicates.value_or(faults::Span()));
+  if (given.bandwidth_mbit)
+    link.packet_time = calc_packet_time(draw(random, *given.bandwidth_mbit));
+  return link;
+}
+
+/// The place of a program in the plan.
+std::optional<std::size_t> find_program(const Plan& plan, const faults::Program& named) {
+  int number = 0;
+  for (std::size_t i = 0; i < plan.programs.size(); ++i)
+    if (plan.programs[i].role == static_cast<Role>(named.role) && ++number == named.number)
+      return i;
+  return std::nullopt;
+}
+
+void draw_programs(Plan& plan, Random& random, const FlownScenario& flown,
+                   const faults::Case* given) {
   const config::WaitFor& expected = flown.scenario.sync.wait_for;
   const auto draw_host = [&] {
     return static_cast<std::size_t>(random.integer(0, static_cast<std::int64_t>(plan.hosts) - 1));
@@ -53,18 +90,17 @@ void draw_programs(Plan& plan, Random& random, const FlownScenario& flown) {
     return program;
   };
   add(Role::kServer);
-  const bool is_wild = plan.promise == Promise::kNone;
+  const bool is_wild = plan.promise == Promise::kNone && !given;
   const bool is_calm = plan.promise == Promise::kCalm;
   const bool is_realtime = flown.scenario.sync.mode == config::SyncMode::kRealtime;
-  // A recorder that nobody waits for may miss the flight after the reset.
-  const bool is_reset = plan.promise == Promise::kReset;
   if (is_wild && random.chance(0.25)) add(Role::kServer);
   if (plan.promise == Promise::kTwoServers)
     add(Role::kServer).start = plan.programs.front().start + draw_time(random, 0ms, 800ms);
-  // A server that was started again, or second, waits for the expected ones alone. In real time a
-  // stronger client that joins may cost a step.
-  const bool has_surplus =
-      !is_calm && plan.promise != Promise::kServerRestart && plan.promise != Promise::kTwoServers;
+  // A server that was started again, or second, waits for the expected ones alone. One that nobody
+  // waits for may miss the flight after a reset. In real time a stronger client that joins may cost
+  // a step.
+  const bool has_surplus = !is_calm && plan.promise != Promise::kServerRestart &&
+                           plan.promise != Promise::kTwoServers && plan.promise != Promise::kReset;
   const int clients =
       expected.controllers + (plan.promise == Promise::kTakeOver
                                   ? 1
@@ -82,13 +118,26 @@ void draw_programs(Plan& plan, Random& random, const FlownScenario& flown) {
     client.is_sloppy = random.chance(0.2);
   }
   if (random.chance(0.15)) add(Role::kForeign);
-  const int recorders = std::max(
-      expected.recorders, static_cast<int>(random.integer(0, has_surplus && !is_reset ? 2 : 0)));
+  const int recorders =
+      std::max(expected.recorders, static_cast<int>(random.integer(0, has_surplus ? 2 : 0)));
   for (int i = 0; i < recorders; ++i) {
     PlannedProgram& recorder = add(Role::kRecorder);
     recorder.resumes = plan.promise == Promise::kRecorderRestart || random.chance(0.7);
     if (!is_calm && random.chance(0.1)) recorder.delay = draw_time(random, 1ms, 100ms);
   }
+  if (!given) return;
+  const auto need = [&](const faults::Program& named) {
+    while (!find_program(plan, named)) add(static_cast<Role>(named.role));
+  };
+  for (const faults::Fault& fault : given->faults) {
+    need(fault.program);
+    need(fault.to);
+    // Nothing passes between programs of one host that could be cut.
+    const std::size_t from = plan.programs[*find_program(plan, fault.program)].host;
+    std::size_t& to = plan.programs[*find_program(plan, fault.to)].host;
+    if (fault.kind == Kind::kCut && to == from) to = (from + 1) % plan.hosts;
+  }
+  for (PlannedProgram& program : plan.programs) program.follows_servers = program.resumes = true;
 }
 
 void time_fault(Fault& fault, Random& random, const Plan& plan, const FlownScenario& flown) {
@@ -103,11 +152,11 @@ void time_fault(Fault& fault, Random& random, const Plan& plan, const FlownScena
 
 /// `count`: of all faults of the plan.
 Fault draw_fault(const Plan& plan, Random& random, std::int64_t count) {
-  static constexpr Kind kMild[] = {Kind::kStop, Kind::kCut,  Kind::kIsolate,
-                                   Kind::kLoss, Kind::kSlow, Kind::kClock};
+  static constexpr Kind kMild[] = {Kind::kStop, Kind::kCut,   Kind::kIsolate,   Kind::kLoss,
+                                   Kind::kSlow, Kind::kClock, Kind::kPartition, Kind::kClog};
   Fault fault;
-  fault.kind = plan.promise == Promise::kMild ? kMild[random.integer(0, 5)]
-                                              : static_cast<Kind>(random.integer(0, 9));
+  fault.kind = plan.promise == Promise::kMild ? kMild[random.integer(0, 7)]
+                                              : static_cast<Kind>(random.integer(0, 11));
   const auto programs = static_cast<std::int64_t>(plan.programs.size());
   const auto hosts = static_cast<std::int64_t>(plan.hosts);
   const auto draw_of = [&](std::int64_t number) {
@@ -149,6 +198,11 @@ Fault draw_fault(const Plan& plan, Random& random, std::int64_t count) {
       fault.target = 0;
       fault.other = draw_of(6);
       fault.value = static_cast<double>(random.integer(1, 20));
+      break;
+    case Kind::kPartition:
+      break;
+    case Kind::kClog:
+      fault.value = random.between(0.3, 4);
       break;
   }
   return fault;
@@ -268,6 +322,71 @@ Fault draw_promised(const Plan& plan, Random& random, const FlownScenario& flown
   return fault;
 }
 
+/// The fault of a file. All programs of the plan are there.
+Fault make_fault(const faults::Fault& given, const Plan& plan, Random& random) {
+  const std::size_t program = *find_program(plan, given.program);
+  const bool is_of_host =
+      given.kind == Kind::kCut || given.kind == Kind::kIsolate || given.kind == Kind::kClock;
+  const auto draw_whole = [&](const faults::Span& span) {
+    return random.integer(static_cast<std::int64_t>(span.least),
+                          static_cast<std::int64_t>(span.most));
+  };
+  Fault fault;
+  fault.kind = given.kind;
+  if (given.is_at_step)
+    fault.step = static_cast<std::uint64_t>(draw_whole(given.at));
+  else
+    fault.at = to_instant(draw(random, given.at));
+  fault.target = is_of_host ? plan.programs[program].host : program;
+  fault.duration = to_instant(draw(random, given.for_s));
+  fault.value = draw(random, given.value);
+  if (given.kind == Kind::kKill && given.restart_s)  // at once is after a moment
+    fault.duration = std::max(Instant(1ms), to_instant(draw(random, *given.restart_s)));
+  if (given.kind == Kind::kCut) fault.other = plan.programs[*find_program(plan, given.to)].host;
+  if (given.kind == Kind::kRequest) {
+    fault.other = static_cast<std::size_t>(given.action);
+    fault.value = static_cast<double>(draw_whole(given.value));
+  }
+  return fault;
+}
+
+/// About when `fault` is over.
+Instant estimate_end(const Fault& fault, const Plan& plan, const config::Sync& sync) {
+  const Instant round_trip = 2 * (plan.link.delay + plan.link.jitter) + 1ms;
+  const Instant period =
+      to_instant(static_cast<double>(sync.period_ns) * 1e-9 / sync.real_time_factor);
+  const Instant begin =
+      fault.step ? 3s + static_cast<std::int64_t>(*fault.step) * std::max(round_trip, period)
+                 : fault.at;
+  return begin + fault.duration + 100ms;
+}
+
+/// The faults of a plan that has its programs.
+void draw_faults(Plan& plan, Random& random, const FlownScenario& flown) {
+  if (plan.promise == Promise::kCalm || plan.promise == Promise::kTwoServers) return;
+  if (plan.promise == Promise::kLongStop && random.chance(0.5)) {
+    draw_silences(plan, random, flown);
+    return;
+  }
+  if (plan.promise > Promise::kMild) {
+    plan.faults.push_back(draw_promised(plan, random, flown));
+    if (plan.promise == Promise::kRecorderRestart && random.chance(0.5))
+      draw_long_absence(plan, random);
+    return;
+  }
+  if (plan.promise == Promise::kNone && plan.programs[1].role == Role::kServer &&
+      random.chance(0.3)) {
+    draw_split(plan, random, flown);
+    return;
+  }
+  const std::int64_t faults = random.chance(0.15) ? 0 : random.integer(1, 6);
+  for (std::int64_t i = 0; i < faults; ++i) {
+    Fault fault = draw_fault(plan, random, faults);
+    time_fault(fault, random, plan, flown);
+    plan.faults.push_back(fault);
+  }
+}
+
 }  // namespace
 
 const char* name_promise(Promise promise) {
@@ -277,13 +396,18 @@ const char* name_promise(Promise promise) {
   return kNames[static_cast<int>(promise)];
 }
 
-const char* name_kind(Kind kind) {
-  static constexpr const char* kNames[] = {"kill", "stop", "interrupt", "cut",       "isolate",
-                                           "loss", "slow", "clock",     "disk-full", "request"};
-  return kNames[static_cast<int>(kind)];
+faults::Abilities list_abilities() {
+  faults::Abilities abilities{
+      "worlds",
+      {"link.delay_ms", "link.jitter_ms", "link.loss", "link.reordering", "link.reordering_ms",
+       "link.duplicates", "link.bandwidth_mbit", "step", "until_s"},
+      {}};
+  for (const auto& kind : names_of(Kind())) abilities.words.insert(kind.text);
+  return abilities;
 }
 
-Plan draw_plan(std::uint64_t seed, const std::vector<FlownScenario>& scenarios) {
+Plan draw_plan(std::uint64_t seed, const std::vector<FlownScenario>& scenarios,
+               const std::vector<faults::Case>& cases) {
   Random random(Random(seed).next());
   Plan plan;
   plan.seed = seed;
@@ -291,37 +415,30 @@ Plan draw_plan(std::uint64_t seed, const std::vector<FlownScenario>& scenarios) 
       static_cast<std::size_t>(random.integer(0, static_cast<std::int64_t>(scenarios.size()) - 1));
   const FlownScenario& flown = scenarios[plan.scenario];
   const bool is_lockstep = flown.scenario.sync.mode == config::SyncMode::kLockstep;
-  plan.promise = draw_promise(random, flown.scenario.sync);
-  plan.hosts = static_cast<std::size_t>(random.integer(1, 4));
-  plan.link = plan.promise == Promise::kCalm ? Link() : draw_link(random);
+  const faults::Case* given = cases.empty() ? nullptr
+                                            : &cases[static_cast<std::size_t>(random.integer(
+                                                  0, static_cast<std::int64_t>(cases.size()) - 1))];
+  if (!given) plan.promise = draw_promise(random, flown.scenario.sync);
+  plan.hosts = static_cast<std::size_t>(random.integer(given ? 2 : 1, 4));
+  plan.link = given                            ? make_link(given->link, random)
+              : plan.promise == Promise::kCalm ? Link()
+                                               : draw_link(random);
   plan.drift = random.chance(0.3) ? random.between(-1e-4, 1e-4) : 0;
   plan.wall_offset_s = random.chance(0.3) ? random.between(-20, 20) : 0;
   plan.healed = draw_time(random, 1s, is_lockstep ? Instant(6s) : Instant(4s));
   if (plan.promise == Promise::kLongStop) plan.healed = 60s;
   plan.has_files = plan.promise == Promise::kRecorderRestart || random.chance(0.08);
-  draw_programs(plan, random, flown);
-  if (plan.promise == Promise::kCalm || plan.promise == Promise::kTwoServers) return plan;
-  if (plan.promise == Promise::kLongStop && random.chance(0.5)) {
-    draw_silences(plan, random, flown);
+  draw_programs(plan, random, flown, given);
+  if (given) {
+    for (const faults::Fault& fault : given->faults) {
+      plan.faults.push_back(make_fault(fault, plan, random));
+      plan.healed =
+          std::max(plan.healed, estimate_end(plan.faults.back(), plan, flown.scenario.sync));
+    }
+    if (given->until_s) plan.healed = to_instant(draw(random, *given->until_s));
     return plan;
   }
-  if (plan.promise > Promise::kMild) {
-    plan.faults.push_back(draw_promised(plan, random, flown));
-    if (plan.promise == Promise::kRecorderRestart && random.chance(0.5))
-      draw_long_absence(plan, random);
-    return plan;
-  }
-  if (plan.promise == Promise::kNone && plan.programs[1].role == Role::kServer &&
-      random.chance(0.3)) {
-    draw_split(plan, random, flown);
-    return plan;
-  }
-  const std::int64_t faults = random.chance(0.15) ? 0 : random.integer(1, 6);
-  for (std::int64_t i = 0; i < faults; ++i) {
-    Fault fault = draw_fault(plan, random, faults);
-    time_fault(fault, random, plan, flown);
-    plan.faults.push_back(fault);
-  }
+  draw_faults(plan, random, flown);
   return plan;
 }
 
@@ -338,7 +455,7 @@ std::string describe(const Fault& fault) {
   const std::string when =
       fault.step ? fmt::format("step {} + {:.6f} s", *fault.step, at) : fmt::format("{:.6f} s", at);
   return fmt::format("{} at {}: target {}, other {}, for {:.6f} s, value {:.4f}",
-                     name_kind(fault.kind), when, fault.target, fault.other,
+                     config::to_yaml_value(fault.kind), when, fault.target, fault.other,
                      std::chrono::duration<double>(fault.duration).count(), fault.value);
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "common/config/faults.hpp"
 #include "worlds/network.hpp"
 #include "worlds/random.hpp"
 
@@ -17,18 +18,9 @@ enum class Role { kServer, kClient, kRecorder, kOperator, kForeign };
 
 /// One fault or one act of a person.
 struct Fault {
-  enum class Kind {
-    kKill,       ///< SIGKILL; after `duration` a new process takes its place, if that is not 0
-    kStop,       ///< SIGSTOP, and SIGCONT after `duration`
-    kInterrupt,  ///< SIGINT
-    kCut,        ///< nothing passes from host `target` to host `other` for `duration`
-    kIsolate,    ///< host `target` is cut off in both directions for `duration`
-    kLoss,       ///< all links lose `value` of their datagrams for `duration`
-    kSlow,       ///< the processor of program `target` is `value` s late for `duration`
-    kClock,      ///< the wall clock of host `target` jumps by `value` s
-    kDiskFull,   ///< nothing can be written for recorder `target` for `duration`
-    kRequest,    ///< an operator sends request `other` (SimControl.action) to server `target`
-  };
+  /// `target` is a host for cut, isolate and clock, otherwise a program; `other` is a host for cut,
+  /// otherwise SimControl.action. After `duration` a killed program begins again, if that is not 0.
+  using Kind = config::faults::Kind;
   Kind kind = Kind::kKill;
   Instant at{0};                      ///< after the begin, or after the step
   std::optional<std::uint64_t> step;  ///< when a server publishes this step
@@ -42,7 +34,6 @@ struct Fault {
            kind == Kind::kSlow || kind == Kind::kDiskFull || kind == Kind::kRequest;
   }
 };
-const char* name_kind(Fault::Kind kind);
 
 struct PlannedProgram {
   Role role = Role::kClient;
@@ -92,8 +83,13 @@ struct Plan {
   Promise promise = Promise::kNone;
 };
 
-/// `scenarios`: number of scenarios to choose from, with their vehicles.
-Plan draw_plan(std::uint64_t seed, const std::vector<FlownScenario>& scenarios);
+/// The words of a file of faults that worlds understand.
+config::faults::Abilities list_abilities();
+
+/// `scenarios`: those to choose from. `cases`: likewise, of a file of faults; if there are some,
+/// link and faults are those of the file, and the world makes no promise.
+Plan draw_plan(std::uint64_t seed, const std::vector<FlownScenario>& scenarios,
+               const std::vector<config::faults::Case>& cases = {});
 
 /// One line for each program and fault.
 std::vector<std::string> describe(const Plan& plan);

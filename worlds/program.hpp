@@ -33,6 +33,7 @@ class Program {
   Process& process() { return process_; }
   const Process& process() const { return process_; }
   const bus::PeerId& id() const { return peer_.id(); }
+  const Peer& peer() const { return peer_; }
   const std::string& name() const { return process_.name(); }
   Role role() const { return role_; }
 

@@ -269,6 +269,9 @@ void Properties::on_announced(const Program& program, const Participant& message
                                            peer.matched_readers(TopicId::kCommand).count(server) > 0
                                      : peer.matched_writers(TopicId::kRecord).count(server) > 0 &&
                                            peer.matched_writers(TopicId::kStatus).count(server) > 0;
+  // It may know the server first. Then the server learns of it at its next look.
+  if (is_client && run.server->peer().matched_readers(TopicId::kState).count(program.id()) == 0)
+    run.is_match_late = true;
   if (!sees_server)
     find(fmt::format("ready: {} says so of run {:016x} before it sees the server", program.name(),
                      message.run_id()));
@@ -315,7 +318,7 @@ void Properties::on_stopped(const Program& program) { stopped_[program.name()] =
 void Properties::on_line(const Program& program, const std::string& text,
                          const sync::Servers& heard) {
   const auto continued = continued_.find(program.name());
-  if (continued == continued_.end() || timeline_.now() - continued->second > kQuietTime ||
+  if (continued == continued_.end() || timeline_.now() - continued->second > kQuietTime / 2 ||
       text.find("(silent for ") == std::string::npos)
     return;
   // A shorter stop counts as silence of the server, which does no harm.
@@ -356,7 +359,8 @@ void Properties::check(const Plan& plan, const std::vector<std::unique_ptr<Progr
     if (run.has_ended && !run.timing.empty() && says_exact != run.is_exact)
       find(fmt::format("timing-label: run {:016x} is {}exact, its label says '{}'", run_id,
                        run.is_exact ? "" : "not ", run.timing));
-    if (plan.promise == Promise::kCalm && run.began) check_begin(run_id, run, flown);
+    if (plan.promise == Promise::kCalm && run.began && !run.is_match_late)
+      check_begin(run_id, run, flown);
     if (plan.promise == Promise::kCalm && run.is_finished && !run.is_exact)
       find(fmt::format("calm: run {:016x} has late steps", run_id));
   }

@@ -115,6 +115,7 @@ class Properties {
     RunPhase phase = RunPhase::PHASE_WAITING;
     bool has_status = false;  // its claim is settled
     bool waits_for_recorders = false;
+    bool is_match_late = false;
     Instant phase_since{0};
     std::optional<Instant> published;  // the last step
     std::optional<Instant> began;      // the first step

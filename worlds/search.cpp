@@ -84,7 +84,7 @@ class Search {
   }
 
   void fly(std::uint64_t seed, const std::filesystem::path& folder) {
-    const Plan plan = draw_plan(seed, scenarios_);
+    const Plan plan = draw_plan(seed, scenarios_, options_.cases);
     Verdict verdict = fly_world(plan, scenarios_, folder);
     const bool is_twice = seed % options_.twice_every == 0;
     if (is_twice) {
@@ -101,10 +101,12 @@ class Search {
     result_.events += verdict.events;
     result_.steps += verdict.steps;
     result_.simulated_s += verdict.simulated_s;
+    result_.planned_faults += plan.faults.size();
+    result_.begun_faults += verdict.begun_faults;
     result_.twice += is_twice;
     result_.hash += Random(verdict.hash ^ seed).next();  // in any order
     std::set<std::string> kinds;
-    for (const Fault& fault : plan.faults) kinds.insert(name_kind(fault.kind));
+    for (const Fault& fault : plan.faults) kinds.insert(config::to_yaml_value(fault.kind));
     for (const std::string& kind : kinds) ++result_.faults[kind];
     if (options_.keeps_rows) result_.rows[seed] = make_row(plan, verdict);
     if (!verdict.findings.empty()) result_.failures[seed] = verdict.findings;
@@ -148,7 +150,7 @@ class Shrinker {
                               plan.faults.end());
           });
     }
-    attempt([](Plan& plan) { plan.link.loss = plan.link.reordering = 0; });
+    attempt([](Plan& plan) { plan.link.loss = plan.link.reordering = plan.link.duplicates = 0; });
     attempt([](Plan& plan) { plan.link = Link(); });
     attempt([](Plan& plan) { plan.drift = plan.wall_offset_s = 0; });
     attempt([](Plan& plan) { plan.has_files = false; });

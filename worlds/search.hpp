@@ -16,10 +16,11 @@ struct SearchOptions {
   std::uint64_t first = 0;
   std::uint64_t last = 9999;  ///< inclusive
   unsigned jobs = 1;
-  std::uint64_t twice_every = 10;  ///< so many worlds are flown once, and one twice
-  std::filesystem::path folder;    ///< for files of worlds; each job has its own in it
-  std::size_t most_failures = 10;  ///< the search ends after these
-  bool keeps_rows = false;         ///< one per world, for a table
+  std::uint64_t twice_every = 10;           ///< so many worlds are flown once, and one twice
+  std::filesystem::path folder;             ///< for files of worlds; each job has its own in it
+  std::size_t most_failures = 10;           ///< the search ends after these
+  bool keeps_rows = false;                  ///< one per world, for a table
+  std::vector<config::faults::Case> cases;  ///< of a file of faults; empty: drawn ones
 };
 
 /// The flights of worlds with about the same network.
@@ -49,9 +50,11 @@ struct SearchResult {
   std::uint64_t events = 0;
   std::uint64_t steps = 0;
   double simulated_s = 0;
-  std::uint64_t twice = 0;                                     ///< flown twice, with equal traces
-  std::uint64_t hash = 0;                                      ///< of the traces of all worlds
-  std::map<std::string, std::uint64_t> faults;                 ///< worlds with this kind
+  std::uint64_t twice = 0;                      ///< flown twice, with equal traces
+  std::uint64_t hash = 0;                       ///< of the traces of all worlds
+  std::map<std::string, std::uint64_t> faults;  ///< worlds with this kind
+  std::uint64_t planned_faults = 0;
+  std::uint64_t begun_faults = 0;                              ///< before the end of all faults
   std::map<std::uint64_t, std::vector<std::string>> failures;  ///< findings by seed
   FlightTable table;
   std::map<std::uint64_t, std::string> rows;  ///< kRowNames of each world, if they are kept

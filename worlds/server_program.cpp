@@ -231,7 +231,10 @@ void ServerProgram::write_records(bool is_last) {
 
 std::vector<sync::Member> ServerProgram::find_members(ParticipantRole role,
                                                       std::uint64_t run_id) const {
-  return self().present_members().find(role, run_id);
+  auto found = self().present_members().find(role, run_id);
+  if (role == ParticipantRole::ROLE_CONTROLLER)
+    sim::keep_readers(found, peer_.matched_readers(TopicId::kState));
+  return found;
 }
 
 std::vector<sync::Run> ServerProgram::find_other_runs() const {

@@ -21,12 +21,13 @@ using Kind = Fault::Kind;
 
 /// After the faults every program ends within this: a flight, and the patience of all waits, one
 /// after another.
-Instant calc_patience(const FlownScenario& flown) {
+Instant calc_patience(const FlownScenario& flown, const Link& link) {
   const config::Sync& sync = flown.scenario.sync;
   const double wait_s = std::max({sync.wait_for.timeout_s, sync.wait.controller.deadline_s,
                                   sync.wait.recorder.deadline_s, sync.wait.server_deadline_s});
-  const double flight_s = static_cast<double>(flown.last_step) *
-                          static_cast<double>(sync.period_ns) * 1e-9 / sync.real_time_factor;
+  const double step_s = static_cast<double>(sync.period_ns) * 1e-9 / sync.real_time_factor +
+                        std::chrono::duration<double>(2 * (link.delay + link.jitter)).count();
+  const double flight_s = static_cast<double>(flown.last_step) * step_s;
   return 110s + Instant(static_cast<std::int64_t>((4 * wait_s + 2 * flight_s) * 1e9));
 }
 
@@ -52,7 +53,7 @@ class World {
   }
 
   Verdict fly() {
-    const Instant end = plan_.healed + calc_patience(*setting_.flown);
+    const Instant end = plan_.healed + calc_patience(*setting_.flown, plan_.link);
     while (setting_.timeline.step(end)) {
       if (is_over()) break;
     }
@@ -136,6 +137,7 @@ class World {
 
   void begin(const Fault& fault) {
     if (setting_.timeline.now() >= plan_.healed) return;
+    ++begun_faults_;
     setting_.trace.add(setting_.timeline.now(), "FAULT", describe(fault));
     switch (fault.kind) {
       case Kind::kKill:
@@ -146,14 +148,21 @@ class World {
         if (Program* program = current_[fault.target]) program->interrupt();
         return;
       case Kind::kCut:
-        return cut(fault, false);
       case Kind::kIsolate:
-        return cut(fault, true);
+      case Kind::kPartition:
+        return cut(fault);
       case Kind::kLoss:
         extra_loss_ = fault.value;
         set_links();
         return setting_.timeline.after(fault.duration, [this] {
           extra_loss_ = 0;
+          set_links();
+        });
+      case Kind::kClog:
+        clog_ = calc_packet_time(fault.value);
+        set_links();
+        return setting_.timeline.after(fault.duration, [this] {
+          clog_ = Instant(0);
           set_links();
         });
       case Kind::kSlow:
@@ -197,13 +206,15 @@ class World {
     setting_.timeline.at(until, [program] { program->go_on(); });
   }
 
-  void cut(const Fault& fault, bool is_isolated) {
-    const auto set = [this, &fault, is_isolated](int change) {
+  void cut(const Fault& fault) {
+    const auto set = [this, &fault](int change) {
       for (std::size_t from = 0; from < hosts_.size(); ++from)
         for (std::size_t to = 0; to < hosts_.size(); ++to) {
           if (from == to) continue;
-          const bool is_it = is_isolated ? from == fault.target || to == fault.target
-                                         : from == fault.target && to == fault.other;
+          const bool is_it =
+              fault.kind == Kind::kPartition ||
+              (fault.kind == Kind::kIsolate && (from == fault.target || to == fault.target)) ||
+              (fault.kind == Kind::kCut && from == fault.target && to == fault.other);
           if (is_it) cuts_[{from, to}] += change;
         }
       set_links();
@@ -219,6 +230,7 @@ class World {
         if (from == to) continue;
         Link& link = setting_.network.link(hosts_[from], hosts_[to]);
         link.loss = is_healed ? 0 : std::max(plan_.link.loss, extra_loss_);
+        link.packet_time = is_healed ? Instant(0) : std::max(plan_.link.packet_time, clog_);
         link.is_cut = !is_healed && cuts_[{from, to}] > 0;
       }
   }
@@ -261,6 +273,7 @@ class World {
     verdict.trace = setting_.trace.lines();
     verdict.simulated_s = std::chrono::duration<double>(setting_.timeline.now()).count();
     verdict.events = setting_.timeline.count();
+    verdict.begun_faults = begun_faults_;
     verdict.steps = setting_.properties.steps();
     verdict.flights = setting_.properties.summarise_flights();
     for (const auto& program : programs_)
@@ -278,7 +291,9 @@ class World {
   std::unique_ptr<OperatorProgram> operator_;       // once a request is sent
   std::size_t pending_starts_ = 0;
   int restarts_ = 0;
+  std::uint64_t begun_faults_ = 0;
   double extra_loss_ = 0;
+  Instant clog_{0};               // time of a packet
   std::set<const Fault*> begun_;  // those of a step
   std::map<std::pair<std::size_t, std::size_t>, int> cuts_;
 };

@@ -21,6 +21,7 @@ struct Verdict {
   std::uint64_t steps = 0;             ///< flown by all servers
   std::vector<FlightSummary> flights;  ///< those that were finished
   int complete = 0;                    ///< recordings
+  std::uint64_t begun_faults = 0;      ///< the others would have come after the end of faults
 };
 
 /// Flies the world of `plan`. Its files, if it has some, are in `folder` until it is over.

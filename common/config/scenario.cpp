@@ -243,20 +243,20 @@ void shift(Scenario& scenario, const Eigen::Vector3d& offset) {
 
 }  // namespace
 
-std::string read_scenario_file(const std::filesystem::path& file) {
+std::string read_config_file(const std::filesystem::path& file, const std::string& kind) {
   namespace fs = std::filesystem;
   const auto fail = [&](const std::string& expectation, const std::string& found) {
     throw make_error(file.string(), 0, "", "expected " + expectation + ", got " + found);
   };
   std::error_code error;
   const fs::file_status status = fs::status(file, error);
-  if (!fs::exists(status)) fail("a scenario file", "none (" + error.message() + ")");
-  if (fs::is_directory(status)) fail("a scenario file", "a directory");
-  if (!fs::is_regular_file(status)) fail("a scenario file", "a pipe, socket or device");
+  if (!fs::exists(status)) fail(kind, "none (" + error.message() + ")");
+  if (fs::is_directory(status)) fail(kind, "a directory");
+  if (!fs::is_regular_file(status)) fail(kind, "a pipe, socket or device");
 
   const std::string size_limit = "at most " + std::to_string(kMaxScenarioBytes) + " bytes";
   const std::uintmax_t size = fs::file_size(file, error);
-  if (error) fail("a scenario file", error.message());
+  if (error) fail(kind, error.message());
   if (size > kMaxScenarioBytes) fail(size_limit, std::to_string(size));
 
   std::ifstream stream(file, std::ios::binary);
@@ -265,12 +265,12 @@ std::string read_scenario_file(const std::filesystem::path& file) {
   stream.read(text.data(), static_cast<std::streamsize>(text.size()));
   if (stream.bad()) fail("a readable file", std::generic_category().message(errno));
   text.resize(static_cast<std::size_t>(stream.gcount()));
-  if (text.empty()) fail("a scenario file", "an empty file");
+  if (text.empty()) fail(kind, "an empty file");
   return text;
 }
 
 Scenario load_scenario(const std::filesystem::path& file, const Models& models) {
-  Scenario scenario = parse_scenario(read_scenario_file(file), file.string(), models);
+  Scenario scenario = parse_scenario(read_config_file(file, "a scenario file"), file.string(), models);
   scenario.folder = file.parent_path();
   return scenario;
 }

@@ -130,7 +130,7 @@ void write(const YamlNode& node, std::size_t depth, std::string& text) {
 }  // namespace
 
 ScenarioDraft::ScenarioDraft(const std::filesystem::path& file)
-    : ScenarioDraft(read_scenario_file(file), file.string(), file.parent_path()) {}
+    : ScenarioDraft(read_config_file(file, "a scenario file"), file.string(), file.parent_path()) {}
 
 ScenarioDraft::ScenarioDraft(const std::string& text, std::string place,
                              std::filesystem::path folder)

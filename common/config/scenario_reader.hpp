@@ -281,9 +281,9 @@ void KeyNames::model(const char* name, ModelName& field, ModelRegistry<Section> 
     owners_.emplace(key, "a key of " + all + ", here " + name + " is '" + field.name + "'");
 }
 
-/// The bytes of a scenario file.
+/// The bytes of a file; `kind` names it in errors: `a scenario file`.
 /// @throws ConfigError for a file that cannot be read, or is larger than a scenario may be.
-std::string read_scenario_file(const std::filesystem::path& file);
+std::string read_config_file(const std::filesystem::path& file, const std::string& kind);
 
 /// The scenario in `root`, the tree of a file with this text; checked as load_scenario does.
 Scenario read_scenario(const YamlNode& root, const std::string& place, const std::string& text,

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <map>
@@ -52,6 +53,17 @@ struct Neighbourhood {
   }
 };
 
+/// Removes those whose reader of sls/state is not among `readers`, whom our writer knows: no state
+/// reaches them yet. A client says that it is ready when it sees the server, which may be earlier.
+inline void keep_readers(std::vector<sync::Member>& controllers,
+                         const std::set<bus::PeerId>& readers) {
+  const auto is_unknown = [&](const sync::Member& client) {
+    return readers.count(client.peer) == 0;
+  };
+  controllers.erase(std::remove_if(controllers.begin(), controllers.end(), is_unknown),
+                    controllers.end());
+}
+
 /// The questions of a server's core to its shell when it looks around. No function blocks or calls
 /// the core.
 class Surroundings {
@@ -60,6 +72,7 @@ class Surroundings {
 
   /// Changes when a participant announces something new.
   virtual std::uint64_t members_version() const = 0;
+  /// Those present; of controllers, those that states reach (keep_readers).
   virtual std::vector<sync::Member> find_members(ParticipantRole role,
                                                  std::uint64_t run_id) const = 0;
   /// The runs of the other servers.

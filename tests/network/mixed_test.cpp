@@ -130,7 +130,7 @@ class MixedNetworkTest : public MixedTest {
 TEST_P(MixedNetworkTest, OnALan) { fly("lan"); }
 
 TEST_P(MixedNetworkTest, OnALinkThatLosesFivePercent) {
-  network_->lose(5);
+  network_->lose(0.05);
   fly("lan");
   EXPECT_GT(network_->lost(), 50u);
 }

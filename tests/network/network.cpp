@@ -6,6 +6,7 @@
 
 #include <array>
 #include <atomic>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -111,13 +112,14 @@ std::string Network::run(const std::string& host, const std::string& command) co
 
 // --- disturbances --------------------------------------------------------------------------------
 
-void Network::lose(int percent) const {
+void Network::lose(double share) const {
   heal();
-  if (percent > 0)
+  const long per_mille = std::lround(share * 1000);
+  if (per_mille > 0)
     run(kSwitch,
         "nft 'add table bridge wire; add chain bridge wire f { type filter hook forward "
-        "priority 0; }; add rule bridge wire f ether type ip numgen random mod 100 < " +
-            std::to_string(percent) + " counter drop'");
+        "priority 0; }; add rule bridge wire f ether type ip numgen random mod 1000 < " +
+            std::to_string(per_mille) + " counter drop'");
 }
 
 void Network::cut() const {

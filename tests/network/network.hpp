@@ -42,9 +42,9 @@ class Network {
 
   // --- disturbances ------------------------------------------------------------------------------
 
-  /// Drops this percentage of the IPv4 packets between hosts, at random, in each direction. 0 ends
-  /// it.
-  void lose(int percent) const;
+  /// Drops this share of the IPv4 packets between hosts, at random, in each direction, in steps of
+  /// 0.001. 0 ends it.
+  void lose(double share) const;
   /// Packets lost by `lose` and `cut` so far.
   std::uint64_t lost() const;
   /// Drops all packets between hosts until `heal`, which also ends `lose`.

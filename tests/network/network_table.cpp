@@ -5,9 +5,11 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
-#include <functional>
+#include <random>
+#include <stdexcept>
 #include <thread>
 
+#include "common/config/faults.hpp"
 #include "tests/network/hosts_flight.hpp"
 
 namespace {
@@ -15,30 +17,52 @@ namespace {
 using namespace sls::test;
 using namespace std::chrono_literals;
 
-struct Disturbance {
-  std::string name;
-  std::function<void(Network&)> apply;
-  bool is_partition = false;
-};
+namespace faults = sls::config::faults;
 
-const std::vector<Disturbance> kDisturbances = {
-    {"none", [](Network&) {}},
-    {"1 % loss", [](Network& network) { network.lose(1); }},
-    {"5 % loss", [](Network& network) { network.lose(5); }},
-    {"20 % loss", [](Network& network) { network.lose(20); }},
-    {"1–3 ms each way",
-     [](Network& network) {
-       network.disturb_wire("controller", {1.0, 2.0, 0.0, 1});
-     }},
-    {"30 % twice, reordered",
-     [](Network& network) {
-       network.disturb_wire("controller", {0.0, 0.5, 30.0, 1});
-     }},
-    {"4 Mbit/s", [](Network& network) { network.limit_rate(4000); }},
-    {"MTU 576", [](Network& network) { network.set_mtu(576); }},
-    {"5 s partition", [](Network&) {}, true},
-    {"no multicast", [](Network& network) { network.block_multicast(); }},
-};
+const faults::Abilities kAbilities = {
+    "network-table",
+    {"link.loss", "link.delay_ms", "link.jitter_ms", "link.duplicates", "link.bandwidth_mbit",
+     "link.mtu_bytes", "link.multicast", "loss", "partition", "step"},
+    {}};
+
+/// Draws from the ranges of a file, the same in every call of the program.
+double draw(const std::optional<faults::Span>& span, double otherwise = 0.0) {
+  static std::mt19937_64 random(1);
+  return span ? std::uniform_real_distribution(span->least, span->most)(random) : otherwise;
+}
+
+/// Returns the share of the packets that get lost.
+double apply(const faults::Link& link, Network& network) {
+  const double loss = draw(link.loss);
+  network.lose(loss);
+  // On the controller's wire, so both ways to and from the others.
+  if (link.delay_ms || link.jitter_ms || link.duplicates)
+    network.disturb_wire(
+        "controller", {draw(link.delay_ms), draw(link.jitter_ms), 100 * draw(link.duplicates), 1});
+  if (link.bandwidth_mbit) network.limit_rate(static_cast<int>(1000 * draw(link.bandwidth_mbit)));
+  if (link.mtu_bytes) network.set_mtu(static_cast<int>(draw(link.mtu_bytes)));
+  if (!link.has_multicast) network.block_multicast();
+  return loss;
+}
+
+/// In the order of the file: each begins `at_s` after the one before it, or at its step.
+void apply(const std::vector<faults::Fault>& given, Flight& flight, Network& network, double loss) {
+  const auto sleep = [](double seconds) {
+    std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+  };
+  for (const faults::Fault& fault : given) {
+    if (fault.is_at_step)
+      flight.wait_for_steps(static_cast<std::size_t>(draw(fault.at)));
+    else
+      sleep(draw(fault.at));
+    if (fault.kind == faults::Kind::kPartition)
+      network.cut();
+    else
+      network.lose(draw(fault.value));
+    sleep(draw(fault.for_s));
+    network.lose(loss);
+  }
+}
 
 const std::vector<std::string> kProfiles = {"lan", "unicast", "discovery_server", "wifi", "secure"};
 
@@ -63,18 +87,13 @@ std::string format(const Figures& figures) {
 }
 
 /// Columns 3 to 8 of the table: the effect of `disturbance` with `profile`.
-std::string fly(const std::string& file, const std::string& profile, const Disturbance& disturbance,
-                const Flight& local) {
+std::string fly(const std::string& file, const std::string& profile,
+                const faults::Case& disturbance, const Flight& local) {
   Network network(kHosts);
-  disturbance.apply(network);
+  const double loss = apply(disturbance.link, network);
   const Profile configured(network, profile);
   Flight flight(file, configured.flight_options());
-  if (disturbance.is_partition) {
-    flight.wait_for_steps(1);
-    network.cut();
-    std::this_thread::sleep_for(5s);
-    network.heal();
-  }
+  apply(disturbance.faults, flight, network, loss);
   for (Process* process : {flight.server.get(), flight.client.get(), flight.recorder.get()})
     if (process->wait() != 0) {
       std::fprintf(stderr, "%s", flight.outputs().c_str());
@@ -90,17 +109,17 @@ int main(int argc, char** argv) {
       "Flies each QoS profile on test hosts through each network disturbance; prints\na Markdown "
       "table. Needs root and takes minutes.");
   std::vector<std::string> profiles = kProfiles, disturbances;
+  std::string given = SLS_SOURCE_DIR "/config/faults/network_table.yaml";
   int vehicles = 1;
   cli.add_option("--profile", profiles, "fly only these profiles (names in config/qos)");
+  cli.add_option("--faults", given, "disturbances (YAML, docs/faults.md)")->type_name("FILE");
   cli.add_option("--disturbance", disturbances,
                  "apply only these disturbances (names in the table)");
   cli.add_option("--vehicles", vehicles, "vehicles in each flight")->check(CLI::Range(1, 256));
   CLI11_PARSE(cli, argc, argv);
-  if (const auto obstacle = Network::find_obstacle()) {
-    std::fprintf(stderr, "network_table: error: %s\n", obstacle->c_str());
-    return 1;
-  }
   try {
+    const std::vector<faults::Case> cases = faults::load(given, kAbilities);
+    if (const auto obstacle = Network::find_obstacle()) throw std::runtime_error(*obstacle);
     const TemporaryFolder folder;
     const std::string file = make_scenario(folder, vehicles);
     Flight local(file);
@@ -111,19 +130,22 @@ int main(int argc, char** argv) {
     std::printf("| `default` | one machine | %s\n",
                 format(read_figures(local.recording(), local.recording())).c_str());
     for (const auto& profile : profiles)
-      for (const auto& disturbance : kDisturbances) {
+      for (const faults::Case& disturbance : cases) {
         const bool is_wanted =
             disturbances.empty() ||
             std::count(disturbances.begin(), disturbances.end(), disturbance.name) > 0;
         if (!is_wanted) continue;
         // With multicast blocked, programs with the profile that needs it wait for half a minute,
         // a recorder for a minute. The tests check their messages.
-        const bool flies = disturbance.name != "no multicast" || profile != "lan";
+        const bool flies = disturbance.link.has_multicast || profile != "lan";
         std::printf(
             "| `%s` | %s | %s\n", profile.c_str(), disturbance.name.c_str(),
             flies ? fly(file, profile, disturbance, local).c_str() : "says so and ends | | | | |");
         std::fflush(stdout);
       }
+  } catch (const sls::config::ConfigError& error) {
+    std::fprintf(stderr, "network_table: error: %s\n", error.what());
+    return 2;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "network_table: error: %s\n", error.what());
     return 1;

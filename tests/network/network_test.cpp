@@ -33,13 +33,13 @@ class NetworkTest : public testing::Test {
 TEST_F(NetworkTest, ThreeHostsOnALanRecordTheBytesOfOneMachine) { expect_same("lan"); }
 
 TEST_F(NetworkTest, ALinkThatLosesFivePercent) {
-  network_->lose(5);
+  network_->lose(0.05);
   expect_same("lan");
   EXPECT_GT(network_->lost(), 50u);
 }
 
 TEST_F(NetworkTest, ALinkThatLosesTwentyPercent) {
-  network_->lose(20);
+  network_->lose(0.2);
   // Fast DDS repeats lost discovery data once a second: half a minute is not always enough.
   const TemporaryFolder folder;
   expect_same("wifi", make_scenario(folder, {{"timeout_s: 30", "timeout_s: 120"}}));

@@ -36,7 +36,7 @@ class StartTest : public testing::Test {
 TEST_F(StartTest, HealthyStartsWithTwentyPercentLossGiveNoFalseLine) {
   const char* const wanted = std::getenv("SLS_LOSSY_STARTS");
   const int starts = wanted ? std::atoi(wanted) : 3;
-  network_->lose(20);
+  network_->lose(0.2);
   const Profile profile(*network_, "wifi");
   const TemporaryFolder folder;
   const std::string file = make_scenario(folder, {{"timeout_s: 30", "timeout_s: 120"}});

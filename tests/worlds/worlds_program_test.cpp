@@ -43,6 +43,18 @@ TEST(WorldsProgramTest, MistakesGiveOneLineAndExitCodeTwo) {
   std::ofstream(folder / "weak.yaml") << text;
   expect_refused({"--scenario", folder / "weak.yaml"}, "expected a flight that finishes");
   expect_refused({"--nonsense"}, "--nonsense");
+  expect_refused({"--faults", "no_such.yaml"}, "no_such.yaml: expected a file of faults");
+  std::ofstream(folder / "mtu.yaml") << "link: { mtu_bytes: 576 }\n";
+  expect_refused({"--faults", folder / "mtu.yaml"},
+                 "mtu.yaml:1: link.mtu_bytes: expected what worlds can do");
+}
+
+TEST(WorldsProgramTest, EveryWorldHasTheFaultsOfAFile) {
+  Process process(program_with(
+      {"--seeds", "0-39", "--faults", SLS_SOURCE_DIR "/config/faults/crash_and_cut.yaml"}));
+  EXPECT_EQ(process.wait(), 0) << process.output();
+  EXPECT_NE(process.output().find("worlds with a fault: kill 40, partition 40;"), std::string::npos)
+      << process.output();
 }
 
 TEST(WorldsProgramTest, AReplayTellsTheWorldOfItsSeed) {
