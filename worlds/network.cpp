@@ -47,6 +47,28 @@ bool Peer::is_acknowledged(TopicId topic) const {
   return true;
 }
 
+std::uint64_t Peer::missed_deadlines(TopicId topic) {
+  Reader& reader = readers_[static_cast<std::size_t>(topic)];
+  count_deadlines(reader);
+  return reader.missed_deadlines;
+}
+
+void Peer::count_deadlines(Reader& reader) const {
+  if (!reader.awaited_since || reader.limits.deadline == Instant(0)) return;
+  const auto missed = (process_.host().now() - *reader.awaited_since) / reader.limits.deadline;
+  *reader.awaited_since += missed * reader.limits.deadline;
+  reader.missed_deadlines += static_cast<std::uint64_t>(missed);
+}
+
+void Peer::take(std::size_t topic, const Written& sample, const bus::PeerId& sender) {
+  Reader& reader = readers_[topic];
+  count_deadlines(reader);
+  reader.awaited_since = process_.host().now();
+  const bool expires = reader.limits.lifespan > Instant(0) && !reader.ignores_lifespan;
+  if (expires && process_.host().wall() > sample.time + reader.limits.lifespan) return;
+  reader.handler(sample.message.get(), {sender, sample.time});
+}
+
 // --- discovery -----------------------------------------------------------------------------------
 
 Peer& Network::join(Process& process) {
@@ -94,12 +116,11 @@ void Network::discover(Peer& observer, Peer& observed) {
     return;
   }
   observer.known_.insert(observed.id());
-  std::array<Instant, 2> times{};  // of readers and of writers, which have a topic each
-  for (std::size_t i = 0; i < observed.endpoints_.size(); ++i) {
-    Instant& when = times[observed.endpoints_[i].is_writer];
+  Instant when_reader{0}, when_writer{0};  // they are announced apart, each in their order
+  for (const Peer::Endpoint endpoint : observed.endpoints_) {
+    Instant& when = endpoint.is_writer ? when_writer : when_reader;
     when += Instant(random_.integer(100'000, 3'000'000));
     if (is_lost(observed, observer)) when += kHeartbeat * random_.integer(1, 4);
-    const Peer::Endpoint endpoint = observed.endpoints_[i];
     timeline_.after(when, [this, &observer, &observed, endpoint] {
       observer.process().run([this, &observer, &observed, endpoint] {
         if (observer.known_.count(observed.id()) > 0) match(observer, observed, endpoint);
@@ -218,7 +239,7 @@ void Network::deliver(Peer& writer, Peer& reader, std::size_t topic, const Peer:
   // A reader drops what is not newer than the last sample of the writer.
   if (sample.number <= found->second.delivered) return;
   found->second.delivered = sample.number;
-  reader.readers_[topic](sample.message.get(), {writer.id(), sample.time});
+  reader.take(topic, sample, writer.id());
 }
 
 }  // namespace sls::worlds

@@ -9,6 +9,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -53,15 +54,26 @@ class Peer {
   Peer(Network& network, Process& process, const bus::PeerId& id)
       : network_(network), process_(process), id_(id) {}
 
+  /// Policies of a reader; none: 0.
+  struct Limits {
+    Instant deadline{0};  ///< each one without a sample is counted
+    Instant lifespan{0};  ///< older samples are dropped
+  };
+  /// Of commands in real time, as config/qos/endpoints.xml.
+  static constexpr Limits kRealtimeLimits{std::chrono::milliseconds(100),
+                                          std::chrono::milliseconds(200)};
+
   const bus::PeerId& id() const { return id_; }
   Process& process() const { return process_; }
 
   template <class Message>
-  void add_reader(std::function<void(const Message&, const Arrival&)> handler) {
+  void add_reader(std::function<void(const Message&, const Arrival&)> handler, Limits limits = {}) {
     const auto topic = static_cast<std::size_t>(bus::Topic<Message>::kId);
-    readers_[topic] = [handler = std::move(handler)](const void* message, const Arrival& arrival) {
+    readers_[topic].handler = [handler = std::move(handler)](const void* message,
+                                                             const Arrival& arrival) {
       handler(*static_cast<const Message*>(message), arrival);
     };
+    readers_[topic].limits = limits;
     endpoints_.push_back({topic, false});
   }
   template <class Message>
@@ -85,6 +97,12 @@ class Peer {
   /// All peers that were discovered.
   const std::set<bus::PeerId>& known() const { return known_; }
   bool is_acknowledged(TopicId topic) const;
+  /// Deadlines without a sample, from the first sample on.
+  std::uint64_t missed_deadlines(TopicId topic);
+  /// Samples of `topic` expire no longer, or again.
+  void ignore_lifespan(TopicId topic, bool is_ignored) {
+    readers_[static_cast<std::size_t>(topic)].ignores_lifespan = is_ignored;
+  }
   /// Samples that the writer of `topic` keeps for late readers.
   static std::size_t history_depth(TopicId topic);
 
@@ -103,13 +121,23 @@ class Peer {
     std::uint64_t next = 1;
     std::deque<Written> kept;
   };
+  struct Reader {
+    std::function<void(const void*, const Arrival&)> handler;
+    Limits limits;
+    bool ignores_lifespan = false;
+    std::optional<sync::Time> awaited_since;  // the last sample, or the last missed deadline
+    std::uint64_t missed_deadlines = 0;
+  };
   void write(std::size_t topic, std::shared_ptr<const void> message);
+  void count_deadlines(Reader& reader) const;
+  /// A sample arrives at our reader.
+  void take(std::size_t topic, const Written& sample, const bus::PeerId& sender);
 
   Network& network_;
   Process& process_;
   const bus::PeerId id_;
   std::vector<Endpoint> endpoints_;  // in the order of their discovery
-  std::array<std::function<void(const void*, const Arrival&)>, kTopics> readers_;
+  std::array<Reader, kTopics> readers_;
   std::array<History, kTopics> histories_;
   std::array<std::set<bus::PeerId>, kTopics> writers_, reader_peers_;
   std::set<bus::PeerId> known_;

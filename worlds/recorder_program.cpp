@@ -62,8 +62,12 @@ void RecorderProgram::wake() {
   for (const sync::Line& line : core_->take_lines()) say(line);
   if (acknowledged_by_) return wake_at(now() + 1ms);
   repeat_announcement_if_due();
-  if (core_->phase() == record::RecorderCore::Phase::kEnded)
+  if (core_->phase() == record::RecorderCore::Phase::kEnded) {
+    // As app::run_main: the signal is the exit code, also of a recorder that has reported the gaps.
+    if (was_interrupted() && core_->error().empty() && !is_complete())
+      return exit(130, stop_signal_);
     return exit(core_->error().empty() ? 0 : 1, core_->error());
+  }
   wake_at(core_->next_deadline());
 }
 

@@ -18,7 +18,6 @@ using namespace std::chrono_literals;
 
 constexpr std::size_t kDatagram_bytes = 1400;
 constexpr std::size_t kBatch_bytes = 60'000;
-constexpr auto kLifespan = 200ms;  // of commands in real time
 
 }  // namespace
 
@@ -30,9 +29,9 @@ ServerProgram::ServerProgram(Setting& setting, Host& host, std::string name,
 
 void ServerProgram::start() {
   // The order of the endpoints is that of sim_server/endpoints.hpp.
-  peer_.add_reader<Commands>([this](const Commands& sample, const Peer::Arrival& arrival) {
-    on_commands(sample, arrival);
-  });
+  peer_.add_reader<Commands>([this](const Commands& sample,
+                                    const Peer::Arrival& arrival) { on_commands(sample, arrival); },
+                             is_realtime() ? Peer::kRealtimeLimits : Peer::Limits());
   peer_.add_writer<Parameters>();
   peer_.add_reader<Participant>([this](const Participant& sample, const Peer::Arrival& arrival) {
     note(sample, arrival);
@@ -161,8 +160,6 @@ void ServerProgram::write_waiting() {
 
 void ServerProgram::on_commands(const Commands& sample, const Peer::Arrival& arrival) {
   if (!core_ || linger_) return;
-  if (is_realtime() && !ignores_lifespan_ && process_.host().wall() > arrival.written + kLifespan)
-    return;
   flight_->on_answers(sample, sender(arrival), setting_.timeline.now());
   sim::CommandSample received;
   received.sender = arrival.sender;
@@ -283,12 +280,13 @@ std::string ServerProgram::replace_problems(const std::map<std::string, std::str
 }
 
 sim::Surroundings::Queues ServerProgram::queues() const {
-  return {written_, Peer::history_depth(TopicId::kRecord) / batches_->batches_of_step(), 0};
+  return {written_, Peer::history_depth(TopicId::kRecord) / batches_->batches_of_step(),
+          self().peer_.missed_deadlines(TopicId::kCommand)};
 }
 
 std::optional<std::chrono::nanoseconds> ServerProgram::command_lifespan() const {
   if (!is_realtime()) return std::nullopt;
-  return kLifespan;
+  return Peer::kRealtimeLimits.lifespan;
 }
 
 }  // namespace sls::worlds

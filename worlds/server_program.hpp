@@ -61,7 +61,9 @@ class ServerProgram : public Program, private sim::Outputs, private sim::Surroun
   void log(sync::Line line) override { outbox_.push_back(std::move(line)); }
   void show_progress(std::string) override {}
   void begin_flight() override {}
-  void ignore_lifespan(bool is_ignored) override { ignores_lifespan_ = is_ignored; }
+  void ignore_lifespan(bool is_ignored) override {
+    peer_.ignore_lifespan(TopicId::kCommand, is_ignored);
+  }
 
   // Surroundings
   std::uint64_t members_version() const override { return members_.version(); }
@@ -95,7 +97,6 @@ class ServerProgram : public Program, private sim::Outputs, private sim::Surroun
   std::size_t steps_ = 0;  // of the entries
   std::uint64_t written_ = 0;
   std::uint64_t flush_number_ = 0;
-  bool ignores_lifespan_ = false;
   std::set<bus::PeerId> informed_;
   std::optional<sync::RecordersEnd> linger_;
   std::optional<sync::Time> acknowledged_by_;

@@ -218,7 +218,7 @@ class ForeignClient {
     if (!participant_writer_) return;
     Participant message;
     message.run_id(parameters_->run_id());
-    message.contract_sha256(makes("other_contract") ? std::string(64, '0') : SLS_CONTRACT_SHA256);
+    message.contract_sha256(SLS_CONTRACT_SHA256);
     message.role(ParticipantRole::ROLE_CONTROLLER);
     message.name(options_.name);
     message.host("elsewhere");
@@ -227,7 +227,7 @@ class ForeignClient {
     message.ready(true);
     message.last_complete_step(-1);
     write_sample(*participant_writer_, &message);
-    for (const char* mistake : {"other_contract", "long_announcement", "no_state_reader"})
+    for (const char* mistake : {"long_announcement", "no_state_reader"})
       if (makes(mistake)) say_that_it_begins();
   }
 
@@ -262,12 +262,12 @@ class ForeignClient {
     command.mission(MissionPhase::MISSION_RUNNING);
 
     Commands answers;
-    answers.run_id(makes("wrong_run") ? 0x1234 : parameters_->run_id());
+    answers.run_id(parameters_->run_id());
     answers.step(step);
     answers.client_name(options_.name);
     answers.vehicles().push_back(command);
     write_sample(*command_writer_, &answers);
-    for (const char* mistake : {"extra_field", "missing_field", "retyped_field", "wrong_run"})
+    for (const char* mistake : {"extra_field", "missing_field", "retyped_field"})
       if (makes(mistake)) say_that_it_begins();
     if (makes("memory_lost") && time_s >= 1.0) say_that_it_begins();
   }

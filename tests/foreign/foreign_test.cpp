@@ -7,13 +7,11 @@
 #include <nlohmann/json.hpp>
 #include <regex>
 
-#include "common/bus/topics.hpp"
 #include "tests/system/flight.hpp"
 
 namespace sls::test {
 namespace {
 
-using namespace std::chrono_literals;
 using Words = std::vector<std::string>;
 
 /// The vehicle is at rest and must stay there: for half a second of simulation, then ten minutes.
@@ -116,16 +114,6 @@ class ForeignTest : public testing::Test {
 
 const std::string kWho = "controller 'foreign' on elsewhere: ";
 
-TEST_F(ForeignTest, AnotherContract) {
-  start();
-  const auto client = start_foreign({"--mistake", "other_contract"});
-  expect_server_line(kWho + "sls/participant contract_sha256: expected " + bus::kContractSha256 +
-                     ", got " + std::string(64, '0'));
-  EXPECT_EQ(count_mistakes(server->output()),
-            1);  // the client is not counted as ready: no step is flown
-  EXPECT_FALSE(wait_until([&] { return has(*server, "step 0: "); }, 1s)) << outputs();
-}
-
 struct Mistake {
   const char* name;
   const char* line;           ///< CLIENT is 'NAME' (127.0.0.1)
@@ -225,14 +213,6 @@ TEST_F(ForeignTest, NoDeadlineInRealTime) {
   expect_server_line("sls/command of 'foreign' (127.0.0.1): DEADLINE: offered none, asked 0.1 s");
 }
 
-TEST_F(ForeignTest, NoDeadlineInLockstepIsNoMistake) {
-  start();
-  const auto client = start_foreign({"--mistake", "no_deadline"});
-  EXPECT_TRUE(wait_until([&] { return has(*recorder, "records run"); }));
-  EXPECT_FALSE(wait_until([&] { return count_mistakes(server->output()) > 0; }, 2s)) << outputs();
-  EXPECT_EQ(ask_problem(), "");
-}
-
 TEST_F(ForeignTest, AppendableTypesOfCyclone) {
   if (!SLS_HAS_CYCLONE)
     GTEST_SKIP() << "built without Cyclone DDS: apt-get install cyclonedds-dev cyclonedds-tools";
@@ -253,39 +233,7 @@ TEST_F(ForeignTest, AppendableTypesOfCyclone) {
   expect_line("recorder", *recorder, {"sls/participant" + written});
 }
 
-/// The line contains the number of answers, which depends on how often the state was sent again.
-class ForeignAnswerTest : public ForeignTest {
- protected:
-  void expect_rejected(const std::string& cause) {
-    const std::string begin = kWho + "sls/command: ",
-                      end = " answers rejected, none taken: " + cause;
-    std::string line;
-    EXPECT_TRUE(wait_until([&] {
-      const std::string text = server->output();
-      const auto at = text.find("sim_server: warning: " + begin);
-      if (at == text.npos) return false;
-      line = text.substr(at + 21, text.find('\n', at) - at - 21);
-      return true;
-    })) << outputs();
-    EXPECT_EQ(line.substr(line.find(" answers")), end);
-    EXPECT_EQ(ask_problem(), line);
-    // The waiting line names the awaited client and the cause, in its own text or as a problem.
-    EXPECT_TRUE(wait_until([&] {
-      const bool is_of_awaited =
-          has(*server, " of its answers rejected, none taken: " + cause + ") (");
-      return has(*server, "step 0: waiting for: controller 'foreign' on elsewhere (") &&
-             (is_of_awaited || has(*server, " s left); " + line));
-    })) << outputs();
-  }
-};
-
-TEST_F(ForeignAnswerTest, OfAnotherRun) {
-  start();
-  const auto client = start_foreign({"--mistake", "wrong_run"});
-  expect_rejected("run_id: expected " + run_id() + ", got 0000000000001234");
-}
-
-TEST_F(ForeignAnswerTest, WithoutTheStageThatWasReturned) {
+TEST_F(ForeignTest, WithoutTheStageThatWasReturned) {
   start();
   const auto client = start_foreign({"--mistake", "memory_lost"});
   expect_server_line(kWho +

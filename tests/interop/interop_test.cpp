@@ -214,22 +214,6 @@ TEST_F(InteropTest, ACycloneStandbyTakesOverFromAClientThatIsKilled) {
   expect_same_flight(recording_, fly_in_process(quick_, folder_ / "own"));
 }
 
-/// Server and controller lose 5 % of their datagrams: states are sent and answered again.
-TEST_F(InteropTest, LossBetweenServerAndCycloneControllerChangesNoByte) {
-  const std::string undisturbed = recording_ + "-undisturbed";
-  for (const auto& [folder, loss] : {std::pair(undisturbed, 0), std::pair(recording_, 5)}) {
-    const auto recorder = start("recorder", {"--out", folder});
-    const auto server = start_server(lossy(loss));
-    const auto controller = start_cyclone("cyclone_controller", {}, kOnLoopback + lossy(loss));
-    expect_success({server.get(), controller.get(), recorder.get()});
-    EXPECT_TRUE(read_manifest(folder).at("complete").get<bool>());
-    const bool lost_none = controller->output().find("lost 0 of") != std::string::npos;
-    EXPECT_EQ(lost_none, loss == 0) << controller->output();
-  }
-  for (const char* file : {"state.csv", "reference.csv"})
-    EXPECT_EQ(read_file(recording_ + "/" + file), read_file(undisturbed + "/" + file)) << file;
-}
-
 TEST_F(InteropTest, CycloneControllerAndRecorderFlyOnWithTheServerThatReplacesAKilledOne) {
   write_quick_scenario(1, 1, 1, kShortPeriod);
   const auto recorder = start_recorder({"--follow"});

@@ -146,19 +146,6 @@ def test_the_python_law_flies_as_the_law_in_cpp_does():
     assert np.abs(ours.load_position - theirs.load_position).max() < 1e-12
 
 
-def test_after_a_kill_the_standby_flies_on_to_the_same_bits(tmp_path, domain):
-    with make_flight(tmp_path, domain, for_s=48, controllers=2) as flight:
-        first = flight.start_client("first", strength=2)
-        flight.start_client("standby", strength=1)
-        flight.wait_for_steps()
-        assert first.poll() is None, flight.logs()
-        first.kill()
-        expect_flown(flight, "pid")
-        assert flight.wait("standby") == 0, flight.logs()
-        clients = (flight.recording / "command.csv").read_text()
-        assert ",first," in clients and ",standby," in clients
-
-
 def test_signals_end_clients_in_order_and_the_next_one_flies_on(tmp_path, domain):
     ends = {"first": (signal.SIGINT, 130), "second": (signal.SIGTERM, 143)}
     with make_flight(tmp_path, domain, for_s=48, controllers=3) as flight:
@@ -195,17 +182,6 @@ def test_a_law_that_raises_ends_the_client_with_the_reason(tmp_path, domain):
         flight.start_client(law="broken")
         assert flight.wait("python") == 1, flight.logs()
         assert "RunError: broken: vehicle 0, step 150: ValueError: no idea" in flight.log("python")
-
-
-def test_a_server_of_another_scenario_is_refused(tmp_path, domain):
-    with make_flight(tmp_path, domain) as flight:
-        other = tmp_path / "other.yaml"
-        other.write_text(flight.scenario.read_text() + "\n")
-        flight.scenario = other
-        flight.start_client()
-        assert flight.wait("python") == 2, flight.logs()
-        assert "ConfigError: scenario 'figure_eight_pid': expected the server's, SHA-256" \
-            in flight.log("python")
 
 
 def test_without_a_server_it_says_so(domain):

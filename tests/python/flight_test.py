@@ -73,7 +73,8 @@ class FlightTest(support.FolderTest):
         np.testing.assert_allclose(flight.calc_attitude()[:, 1], table["pitch_rad"], atol=1e-12)
 
         # A recording that was plotted is still replaced by the next flight.
-        self.run_launcher("run", "short", "--out", "r", "--force", "--domain", domain)
+        self.run_launcher("run", "short", "--out", "r", "--force", "--domain", domain, "--qos",
+                          support.ROOT / "config/qos/udp.xml")
         self.assertFalse((self.folder / "r/report.html").exists())
         self.assertFalse((self.folder / "r/figures").exists())
 

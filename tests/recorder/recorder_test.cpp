@@ -144,22 +144,5 @@ TEST_F(RecorderTest, RecordsARunToItsEnd) {
             Json({{"controllers", {{kPilot, std::string(64, 'b')}}}}));
 }
 
-// Every participant can write batches of the run; only those of its server count.
-TEST_F(RecorderTest, BatchesOfOtherSendersDoNotCount) {
-  FakeFlight flight;
-  start();
-  ASSERT_TRUE(flight.wait_for_recorder());
-  bus::Node node(kQosFile, own_domain(), "stranger");
-  bus::Writer<RecordBatch> writer(node);
-  ASSERT_TRUE(wait_until([&] { return !writer.matched().empty(); }));
-  writer.write(make_batch(0, {make_entry(200)}, true));
-  ASSERT_TRUE(writer.wait_for_acknowledgments(5s));
-  flight.fly(0, kLastStep);
-  flight.publish(RunPhase::PHASE_FINISHED, kLastStep);
-  join();
-  EXPECT_EQ(error_, "no error");
-  expect_whole();
-}
-
 }  // namespace
 }  // namespace sls::record

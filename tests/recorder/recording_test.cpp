@@ -456,46 +456,6 @@ TEST_F(RecordingTest, MeasurementsHaveTheirOwnFileFromTheFirstRow) {
 
 // --- runs that did not finish --------------------------------------------------------------------
 
-TEST_F(RecordingTest, AFailedRunIsKeptWithItsCauseAndNeverComplete) {
-  recording_->add(make_status(RunPhase::PHASE_RUNNING, 0));
-  add_steps(0, 149);
-  RecordEntry faulted = make_entry(150);
-  faulted.kind(AnswerKind::ANSWER_REFUSED);
-  faulted.answer().fault(FaultCode::FAULT_FREE_FALL);
-  faulted.answer().mission(MissionPhase::MISSION_FAILED);
-  feeder_.add({faulted}, true);
-  recording_->add(
-      make_status(RunPhase::PHASE_FAILED, 150, "controller 'pilot' answered with a fault"));
-  EXPECT_FALSE(finish());
-  const Json manifest = read_manifest();
-  EXPECT_EQ(manifest.at("complete"), false);
-  EXPECT_EQ(manifest.at("outcome"), "failed");
-  EXPECT_EQ(manifest.at("reason"), "controller 'pilot' answered with a fault");
-  EXPECT_EQ(manifest.at("missing"), Json::array());
-  EXPECT_EQ(manifest.at("last_step"), 150);
-  const CsvTable commands = read_table("command.csv");
-  ASSERT_EQ(commands.rows.size(), 151u);
-  EXPECT_EQ(commands.text(150, "fault"), "free_fall");
-  const std::string gaps = recording_->describe_gaps();
-  EXPECT_NE(gaps.find("answered with a fault"), std::string::npos) << gaps;
-}
-
-TEST_F(RecordingTest, AnInterruptedRunIsReportedAsInterrupted) {
-  recording_->add(make_status(RunPhase::PHASE_RUNNING, 0));
-  add_steps(0, 99);
-  EXPECT_FALSE(finish("interrupted by SIGINT"));
-  const Json manifest = read_manifest();
-  EXPECT_EQ(manifest.at("complete"), false);
-  EXPECT_EQ(manifest.at("outcome"), "interrupted");
-  EXPECT_EQ(manifest.at("reason"), "interrupted by SIGINT");
-  EXPECT_EQ(manifest.at("files").at("state.csv").at("rows"), 100);
-  EXPECT_EQ(read_table("state.csv").rows.size(), 100u);
-  EXPECT_EQ(read_table("flight.csv").rows.size(), 100u);
-  const std::string gaps = recording_->describe_gaps();
-  EXPECT_NE(gaps.find("SIGINT"), std::string::npos) << gaps;
-  EXPECT_NE(read_bytes(folder_ / "flight.txt").find("SIGINT"), std::string::npos);
-}
-
 TEST_F(RecordingTest, KilledBeforeTheEndItsFilesParseAndAreMarkedIncomplete) {
   recording_->add(make_status(RunPhase::PHASE_RUNNING, 0));
   add_steps(0, 149);

@@ -91,11 +91,10 @@ class Shell : public Outputs, public Surroundings, public Backlog {
   std::string stop_signal() const override { return ""; }
 
   const config::Scenario scenario = [] {
-    auto scenario = ServerRig::make_scenario();
-    scenario.plant.model.name = "analytic";
-    std::get<config::LeaveAfter>(scenario.mission.front().leave).duration_ns =
-        1'000'000'000'000'000;
-    return scenario;
+    auto made = ServerRig::make_scenario();
+    made.plant.model.name = "analytic";
+    std::get<config::LeaveAfter>(made.mission.front().leave).duration_ns = 1'000'000'000'000'000;
+    return made;
   }();
   std::atomic<std::uint64_t> version{1};
 

@@ -170,20 +170,6 @@ TEST_F(FleetTest, AKilledClientOfOneHalfIsReplacedByAStandbyAndNothingElseChange
   for (const char* id : {"0", "1", "2"}) EXPECT_EQ(last_client[id], "standby") << id;
 }
 
-TEST_F(FleetTest, ARefusedForceOfOneVehicleFailsTheRunNamingIt) {
-  // Vehicle 4 alone weighs 22 N; the others never need more than 20.
-  const std::string file = make_fleet_scenario(
-      folder_,
-      {{"controller: {", "controller: { force_limit_n: 21,"}, {"[1, -1, -2]", "[0, 0, -0.5]"}});
-  Flight flight(file);
-  flight.wait();
-  EXPECT_EQ(flight.server->wait(), 1) << flight.outputs();
-  EXPECT_TRUE(holds(flight.server->output(), "force beyond controller.force_limit_n"))
-      << flight.server->output();
-  EXPECT_TRUE(holds(flight.server->output(), "vehicle 4")) << flight.server->output();
-  EXPECT_EQ(read_manifest(flight.recording()).at("outcome"), "failed");
-}
-
 TEST_F(FleetTest, VehiclesThatAreNotInTheScenarioAreRefused) {
   const std::string file = make_fleet_scenario(folder_);
   const auto expect_refused = [](const std::vector<std::string>& command,

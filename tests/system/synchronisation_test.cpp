@@ -1,4 +1,4 @@
-/// Real time and waiting, with real processes that are stopped and continued.
+/// Real time, with real processes that are stopped and continued.
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -14,8 +14,6 @@ namespace {
 std::string read_timing(const std::filesystem::path& recording) {
   return read_manifest(recording).at("timing").get<std::string>();
 }
-
-// --- real time -----------------------------------------------------------------------------------
 
 TEST(RealTimeTest, WithoutLateAnswersTheRecordingIsThatOfLockstep) {
   TemporaryFolder folder;
@@ -90,38 +88,6 @@ TEST(RealTimeTest, TheServerAnnouncesAndReceivesUntilTheNextStateIsDue) {
   ASSERT_EQ(someone.ask(ControlAction::ACTION_RESUME), "") << server.output();
   server.send(SIGTERM);
   EXPECT_EQ(server.wait(std::chrono::seconds(60)), 143) << server.output();
-}
-
-TEST(RealTimeTest, ARecorderThatStopsDoesNotStopTheFlight) {
-  TemporaryFolder folder;
-  const std::string file = make_scenario(folder, {{"for_s: 32", "for_s: 4"}}, "figure_eight");
-  Flight flight(file, {{}, {"--mode", "realtime"}, {}});
-  ASSERT_TRUE(flight.wait_for_steps(250)) << flight.outputs();
-  flight.recorder->send(SIGSTOP);
-  ASSERT_TRUE(wait_until([&] { return holds(flight.server->output(), "recorder"); }));
-  // The mission ends while the recorder is stopped.
-  ASSERT_TRUE(wait_until([&] { return holds(flight.server->output(), "finished:"); }))
-      << flight.outputs();
-  flight.recorder->send(SIGCONT);
-  flight.wait();
-  EXPECT_EQ(flight.server->wait(), 0) << flight.outputs();
-}
-
-// --- lockstep ------------------------------------------------------------------------------------
-
-TEST(WaitingTest, AStoppedClientIsNamedAndTheRecordingIsThatOfAnUndisturbedFlight) {
-  Flight flight(scenario("figure_eight"), {{}, kManySteps, {}});
-  ASSERT_TRUE(flight.wait_for_steps(500)) << flight.outputs();
-  flight.client->send(SIGSTOP);
-  ASSERT_TRUE(wait_until([&] {
-    return holds(flight.server->output(), "waiting for: controller 'control_client'");
-  })) << flight.outputs();
-  flight.client->send(SIGCONT);
-  flight.expect_success();
-  expect_undisturbed(flight.recording(), scenario("figure_eight"), kManySteps);
-  EXPECT_EQ(read_timing(flight.recording()), "exact");
-  EXPECT_TRUE(holds(read_file(flight.recording() / "status.csv"),
-                    "waiting for: controller 'control_client'"));
 }
 
 }  // namespace

@@ -125,33 +125,6 @@ TEST(NodeTest, MatchesComeAndGoOnBothSides) {
   EXPECT_TRUE(wait_until([&] { return reader.matched().count(gone) == 0; }));
 }
 
-TEST(NodeTest, ALateRecorderGetsTheStreamFromItsBeginningInOrder) {
-  Node writing(kQosFile, own_domain(), "writing"), reading(kQosFile, own_domain(), "reading");
-  Writer<RecordBatch> writer(writing);
-  constexpr std::uint64_t kBatches = 1500;
-  RecordBatch batch;
-  const auto write_half = [&] {
-    for (std::uint64_t i = 0; i < kBatches / 2; ++i, batch.batch_index()++) writer.write(batch);
-  };
-  write_half();
-  Listener<RecordBatch> recorder(reading, kRecordReaderProfile, writing);
-  write_half();
-  ASSERT_TRUE(wait_until([&] { return recorder.count() >= kBatches; }));
-  std::uint64_t next = 0;
-  for (const RecordBatch& heard : recorder.messages()) ASSERT_EQ(heard.batch_index(), next++);
-  EXPECT_EQ(next, kBatches);
-}
-
-TEST(NodeTest, ALateJoinerGetsLatchedSamples) {
-  Node writing(kQosFile, own_domain(), "writing");
-  Writer<Parameters> writer(writing);
-  writer.write(make_message<Parameters>(7));
-  Node reading(kQosFile, own_domain(), "reading");
-  Listener<Parameters> listener(reading, kLatchedReaderProfile, writing);
-  ASSERT_TRUE(wait_until([&] { return listener.count() > 0; }));
-  EXPECT_EQ(listener.messages().front(), make_message<Parameters>(7));
-}
-
 // --- raw samples ---------------------------------------------------------------------------------
 
 /// `message` as Fast CDR serialises it, with the header of the encapsulation. Padding bytes, which

@@ -7,24 +7,6 @@
 namespace sls::sim {
 namespace {
 
-using namespace std::chrono_literals;
-
-TEST(ClaimTest, IsSettledAfterAQuarterSecondOnOneMachine) {
-  EXPECT_FALSE(is_claim_settled(249ms, true, true));
-  EXPECT_TRUE(is_claim_settled(250ms, true, true));
-}
-
-TEST(ClaimTest, WaitsForClaimsThatWereNotHeardButNotLongerThanOneSecond) {
-  EXPECT_FALSE(is_claim_settled(250ms, true, false));
-  EXPECT_FALSE(is_claim_settled(999ms, true, false));
-  EXPECT_TRUE(is_claim_settled(1s, true, false));
-}
-
-TEST(ClaimTest, TakesOneSecondOnANetwork) {
-  EXPECT_FALSE(is_claim_settled(999ms, false, true));
-  EXPECT_TRUE(is_claim_settled(1s, false, true));
-}
-
 /// Another server's run of vehicles 4 and 7.
 std::vector<sync::Run> other(std::uint64_t run_id, std::optional<RunPhase> phase) {
   sync::Run run;

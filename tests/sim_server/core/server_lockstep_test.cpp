@@ -174,19 +174,21 @@ TEST(ServerLockstepTest, ARefusedWriteFailsTheRun) {
 
 // --- absence -------------------------------------------------------------------------------------
 
-TEST(ServerLockstepTest, PolicyWaitNamesTheControllerAndGivesUpAtTheDeadline) {
-  ServerRig rig(with_policy(config::ControllerPolicy::kWait, 10));
-  rig.join("pilot");
-  rig.take_log();
-  rig.wait_until(999);
-  EXPECT_EQ(rig.take_log(), Lines{});
-  rig.wait_until(1001);
-  EXPECT_EQ(rig.take_log(),
-            Lines{"1000: step 0: waiting for: controller 'pilot' on box (9 s left)"});
-  rig.wait_until(9'999);
-  EXPECT_EQ(rig.phase(), Phase::kAwaitingAnswers);
-  rig.wait_until(10'001);
-  EXPECT_EQ(rig.core().error(), "step 0: waited 10 s for controller 'pilot' on box");
+TEST(ServerLockstepTest, PoliciesWaitAndStopNameTheControllerAndGiveUpAtTheDeadline) {
+  for (const auto policy : {config::ControllerPolicy::kWait, config::ControllerPolicy::kStop}) {
+    ServerRig rig(with_policy(policy, 10));
+    rig.join("pilot");
+    rig.take_log();
+    rig.wait_until(999);
+    EXPECT_EQ(rig.take_log(), Lines{});
+    rig.wait_until(1001);
+    EXPECT_EQ(rig.take_log(),
+              Lines{"1000: step 0: waiting for: controller 'pilot' on box (9 s left)"});
+    rig.wait_until(9'999);
+    EXPECT_EQ(rig.phase(), Phase::kAwaitingAnswers);
+    rig.wait_until(10'001);
+    EXPECT_EQ(rig.core().error(), "step 0: waited 10 s for controller 'pilot' on box");
+  }
 }
 
 TEST(ServerLockstepTest, AnAbsentControllerOfAFleetIsNamedWithItsVehicles) {
@@ -275,8 +277,8 @@ TEST(ServerLockstepTest, PolicyHoldFliesTheLastForceAPeriodOfWallTimeEachThenThe
                    "1008: step 3: no answer from controller 'pilot' on box; applying the fail-safe "
                    "force"}));
   rig.answer("pilot", 4);
-  EXPECT_EQ(rig.step(), 5u);
   rig.wait_until(2000);
+  EXPECT_EQ(rig.step(), 5u) << "the deadline counts anew";
   EXPECT_EQ(rig.status().timing().to_string(), "degraded: 2 steps held, 1 fail-safe");
 }
 
@@ -287,6 +289,10 @@ TEST(ServerLockstepTest, PolicyFailSafeUsesTheFailSafeFromTheBeginning) {
   EXPECT_EQ(rig.take_records(), Lines{});
   rig.wait_until(1000);
   EXPECT_EQ(rig.take_records(), Lines{"0 fail-safe"});
+  rig.wait_until(29'999);
+  EXPECT_EQ(rig.phase(), Phase::kAwaitingAnswers);
+  rig.wait_until(30'004);
+  EXPECT_EQ(rig.core().end(), End::kFailed) << "wait_for.timeout_s";
 }
 
 TEST(ServerLockstepTest, APauseIsNoAbsence) {

@@ -88,6 +88,10 @@ TEST(ServerStartTest, TheMissingAreNamedAndGivenUpAfterTheTimeout) {
   rig.wait_until(300);
   EXPECT_EQ(rig.take_log(), Lines{"300: waiting for: controller (30 s left)"});
   EXPECT_EQ(rig.status().reason().to_string(), "missing: controller");
+  rig.wait_until(5299);
+  EXPECT_EQ(rig.take_log(), Lines{});
+  rig.wait_until(5300);
+  EXPECT_EQ(rig.take_log(), Lines{"5300: waiting for: controller (25 s left); run ./sls doctor"});
   rig.wait_until(29'999);
   EXPECT_EQ(rig.phase(), Phase::kGathering);
   rig.wait_until(30'000);

@@ -68,63 +68,6 @@ TEST(ViewSystemTest, APageSeesTheFlightThatIsRecorded) {
   }
 }
 
-TEST(ViewSystemTest, APagePausesStepsResumesAndResets) {
-  Flight flight(scenario("figure_eight"), {{}, kRealtime, {}});
-  const auto viewer = start_viewer(flight.domain);
-  PageClient page(wait_for_port(*viewer));
-  ASSERT_TRUE(page.wait_for_step(50)) << viewer->output() << flight.outputs();
-  EXPECT_EQ(page.control("step", 5).at("accepted"), false);
-  EXPECT_NE(page.last("reply").at("reason").get<std::string>().find("not paused"),
-            std::string::npos);
-  EXPECT_EQ(page.control("pause").at("accepted"), true);
-  ASSERT_TRUE(page.wait_for_status("phase", "paused"));
-  const auto before = page.last("reply").at("step").get<std::uint64_t>();
-  EXPECT_EQ(page.control("step", 25).at("accepted"), true);
-  EXPECT_TRUE(page.wait_for_step(before + 24)) << "the last step of a flight that rests is shown";
-  EXPECT_EQ(page.control("resume").at("accepted"), true);
-  ASSERT_TRUE(page.wait_for_step(before + 100));
-
-  const auto run_id = page.last("run").at("run").at("run_id");
-  EXPECT_EQ(page.control("reset").at("accepted"), true);
-  ASSERT_TRUE(wait_until([&] { return page.last("run").at("run").at("run_id") != run_id; }));
-  ASSERT_TRUE(wait_until([&] {
-    char hex[17];
-    std::snprintf(hex, sizeof(hex), "%016llx",
-                  static_cast<unsigned long long>(page.poses()->run_id));
-    return page.last("run").at("run").at("run_id") == hex;
-  })) << "states of the new run";
-  EXPECT_EQ(page.control("stop").at("accepted"), true);
-  flight.wait();
-}
-
-TEST(ViewSystemTest, AKilledServerIsSilentAndTheNextRunIsShown) {
-  const TemporaryFolder folder;
-  Flight flight(scenario("figure_eight"), {{}, kRealtime, {}});
-  const auto viewer = start_viewer(flight.domain);
-  PageClient page(wait_for_port(*viewer));
-  ASSERT_TRUE(page.wait_for_step(50)) << viewer->output() << flight.outputs();
-  const auto run_id = page.last("run").at("run").at("run_id");
-  flight.server->kill();
-  EXPECT_TRUE(page.wait_for_status("is_silent", true));
-  EXPECT_NE(page.last("status").at("waiting_for").get<std::string>().find("silent"),
-            std::string::npos);
-  for (Process* process : {flight.client.get(), flight.recorder.get()}) process->kill();
-
-  const auto start = [&](const char* name, const std::vector<std::string>& flags) {
-    return std::make_unique<Process>(make_command(name, flight.domain.number(), flags));
-  };
-  const auto recorder = start("recorder", {"--out", (folder / "next").string()});
-  // In lockstep this flight could be over before the viewer has discovered its server.
-  const auto server = start("sim_server", {"--scenario", scenario("short"), "--mode", "realtime"});
-  const auto client = start("control_client", {"--scenario", scenario("short")});
-  ASSERT_TRUE(wait_until([&] { return page.last("run").at("run").at("run_id") != run_id; }))
-      << server->output();
-  EXPECT_EQ(server->wait(), 0) << server->output();
-  EXPECT_TRUE(page.wait_for_status("phase", "finished"));
-  EXPECT_EQ(recorder->wait(), 0) << recorder->output();
-  EXPECT_EQ(client->wait(), 0) << client->output();
-}
-
 /// A stopped viewer is the worst case: it reads nothing from its sockets.
 TEST(ViewSystemTest, ThreeViewersOfWhichOneIsStoppedChangeNothing) {
   const OwnDomain other;  // the flight below must not begin before its viewers

@@ -1,0 +1,10 @@
+# Counters in the cores and in what calls them. Everything else is that of the ordinary build, also in the compiler's
+# cache. Included by core_coverage.py.
+function(sls_count_branches)
+  foreach(target IN ITEMS sls_client sls_judgement sls_record sls_server_core sls_sim sls_sync sls_world sls_worlds
+                          sls_test_headers sync_test client_core_test recorder_core_test server_core_test)
+    target_compile_options(${target} PRIVATE -O0 -g1 --coverage -fno-inline)
+  endforeach()
+  target_link_options(sls_sync INTERFACE --coverage)
+endfunction()
+cmake_language(DEFER CALL sls_count_branches)
