@@ -48,7 +48,8 @@ def draw_worlds(axes: Axes, worlds: dict[str, np.ndarray], values: np.ndarray, l
 
 
 def plot_worlds(worlds: dict[str, np.ndarray]) -> Figure:
-    figure = Figure(figsize=(WIDTH_IN, 5.6), layout="constrained")
+    figure = Figure(figsize=(WIDTH_IN, 5.6))
+    figure.subplots_adjust(left=0.09, right=0.98, top=0.93, bottom=0.14, hspace=0.12)
     upper, lower = figure.subplots(2, 1, sharex=True)
     draw_worlds(upper, worlds, worlds["duration_s"], "simulated time of the flight (s)")
     draw_worlds(lower, worlds, worlds["worst_error_m"], "worst load error (m)")
@@ -58,7 +59,7 @@ def plot_worlds(worlds: dict[str, np.ndarray]) -> Figure:
     finished = int((worlds["finished"] > 0).sum())
     total = len(worlds["finished"])
     upper.set_title(f"{total} worlds, {finished} with a finished flight (the others: ×)", pad=12)
-    figure.legend(*upper.get_legend_handles_labels(), ncols=3, loc="outside lower center", markerscale=2)
+    figure.legend(*upper.get_legend_handles_labels(), ncol=3, loc="lower center", markerscale=2)
     return figure
 
 

@@ -108,6 +108,8 @@ def worlds(words: list[str]) -> NoReturn:
     # A first word without a dash is the scenario; the options are the program's.
     if words and not words[0].startswith("-"):
         words = ["--scenario", find_file("scenarios", words[0]), *words[1:]]
+    if any(word.split("=")[0] == "--plot" for word in words):
+        run_module(words, ["sls_worlds"], "sls.worlds_plot", SLS_WORLDS=str(BUILD / "bin/sls_worlds"))
     replace_by_program("sls_worlds", words)
 
 
