@@ -33,6 +33,26 @@ config::Scenario choose_scenario(const Setting& setting, const ClientProgram::Op
   return scenario;
 }
 
+/// Makes an answer one that a server refuses: `way` says how.
+void break_answer(ControlCommand& command, std::uint64_t way) {
+  switch (way % 5) {
+    case 0:
+      command.f_Q_W_n()[2] = std::numeric_limits<double>::quiet_NaN();
+      break;
+    case 1:
+      command.f_Q_W_n()[2] = 1e6;
+      break;
+    case 2:
+      command.fault(FaultCode::FAULT_ROD_LEVEL);
+      break;
+    case 3:
+      command.mission(MissionPhase::MISSION_FAILED);
+      break;
+    default:
+      command.fault(static_cast<FaultCode>(99));
+  }
+}
+
 /// The same answers with other forces.
 Commands make_wrong(const Commands& answers) {
   Commands wrong = answers;
@@ -113,8 +133,7 @@ void ClientProgram::on_states(const States& sample, const Peer::Arrival& arrival
 void ClientProgram::send(const Commands& answers) {
   if (options_.breaks_at && answers.step() >= *options_.breaks_at) {
     Commands broken = answers;
-    for (ControlCommand& command : broken.vehicles())
-      command.f_Q_W_n()[2] = std::numeric_limits<double>::quiet_NaN();
+    for (ControlCommand& command : broken.vehicles()) break_answer(command, *options_.breaks_at);
     return peer_.write(broken);
   }
   if (options_.is_sloppy && setting_.random.chance(0.05)) send_wrongly(answers);

@@ -26,6 +26,12 @@ constexpr Instant kGivesUpWithin = 2s;
 
 Instant to_instant(double time_s) { return Instant(static_cast<std::int64_t>(time_s * 1e9)); }
 
+/// True unless the answer is one of those that broken clients send.
+bool is_sound(const ControlCommand& command) {
+  return std::abs(command.f_Q_W_n()[2]) < 1e5 && command.fault() == FaultCode::FAULT_NONE &&
+         command.mission() != MissionPhase::MISSION_FAILED;
+}
+
 double to_seconds(Instant time) { return std::chrono::duration<double>(time).count(); }
 
 }  // namespace
@@ -55,7 +61,7 @@ void FlightWatch::on_answers(const Commands& sample, const Process& sender, Inst
   if (client.answered_step != step_) client.answers.clear();
   client.answered_step = step_;
   for (const ControlCommand& command : sample.vehicles())
-    if (std::isfinite(command.f_Q_W_n()[2]))
+    if (is_sound(command))
       client.answers.try_emplace(command.vehicle_id(), now);
     else
       client.refused = {step_, now};
@@ -105,8 +111,8 @@ void FlightWatch::on_resent(Instant now) {
 void FlightWatch::on_recorded(const std::vector<model::StepRecord>& records, Instant now) {
   check_gap(now);
   sent_.reset();
+  check_take_over(records, now);
   for (const model::StepRecord& record : records) {
-    check_flyer(record, now);
     check_policy(record, now);
     if (record.kind == model::AnswerKind::kAccepted)
       flyers_[record.vehicle_id] = record.client_name;
@@ -133,20 +139,41 @@ bool FlightWatch::is_stronger(const std::string& name, const Client& client, con
   return std::tuple(-client.strength, name) < std::tuple(-than.strength, other);
 }
 
-/// The strongest client that answers flies. Another one takes over when the stronger ones have been
-/// silent for `take_over_s`, neither earlier nor later.
-void FlightWatch::check_flyer(const model::StepRecord& record, Instant now) {
-  if (record.kind != model::AnswerKind::kAccepted) return;
+/// A step ends when each vehicle has the answer that it awaits: another client's, if the stronger
+/// ones have been silent for `take_over_s`.
+void FlightWatch::check_take_over(const std::vector<model::StepRecord>& records, Instant now) {
+  Instant due{0};
+  std::string taken_over_by;
+  for (const model::StepRecord& record : records) {
+    const auto own = check_flyer(record, now);
+    if (!own) return;
+    due = std::max(due, *own);
+    const auto before = flyers_.find(record.vehicle_id);
+    const bool is_known = clients_.at(record.client_name).ready + kKnownAfter < published_;
+    if (before == flyers_.end() || !is_known) return;
+    if (before->second != record.client_name) taken_over_by = record.client_name;
+  }
+  if (is_lockstep() && !is_disturbed() && !taken_over_by.empty() && now > due + kSlack)
+    find_(fmt::format("take-over: '{}' flies step {} only {:.3f} s after it was due", taken_over_by,
+                      step_, to_seconds(now - due)));
+}
+
+/// The strongest client that answers flies, and none takes over too early. Returns when the answer
+/// was due; nothing if that cannot be said.
+std::optional<Instant> FlightWatch::check_flyer(const model::StepRecord& record, Instant now) {
+  if (record.kind != model::AnswerKind::kAccepted) return std::nullopt;
   if (rightful_.count(record.client_name) == 0)
     find_(fmt::format("answer: step {} has an answer of '{}', which is no client of this run",
                       record.step, record.client_name));
   const auto flyer = clients_.find(record.client_name);
-  if (flyer == clients_.end() || !flyer->second.is_ready) return;
+  if (flyer == clients_.end() || !flyer->second.is_ready) return std::nullopt;
   const std::uint32_t vehicle = record.vehicle_id;
   const auto answer = flyer->second.answers.find(vehicle);
-  if (!flyer->second.has_answered(vehicle, record.step))
-    return find_(fmt::format("answer: step {} has an answer of '{}' that came before its state",
-                             record.step, record.client_name));
+  if (!flyer->second.has_answered(vehicle, record.step)) {
+    find_(fmt::format("answer: step {} has an answer of '{}' that came before its state",
+                      record.step, record.client_name));
+    return std::nullopt;
+  }
   const Instant take_over = to_instant(sync_.take_over_s);
   const Instant waited = now - published_;
   const auto before = flyers_.find(vehicle);
@@ -175,12 +202,7 @@ void FlightWatch::check_flyer(const model::StepRecord& record, Instant now) {
       find_(fmt::format("take-over: '{}' flies step {} after {:.3f} s without '{}'",
                         record.client_name, record.step, to_seconds(waited), name));
   }
-  const bool is_known = flyer->second.ready + kKnownAfter < published_;
-  due = std::max(due, published_ + stronger * take_over) + kSlack;
-  const bool is_awaited = before != flyers_.end() && before->second == record.client_name;
-  if (is_lockstep() && !is_disturbed() && is_known && !is_awaited && now > due)
-    find_(fmt::format("take-over: '{}' flies step {} only {:.3f} s after it was due",
-                      record.client_name, record.step, to_seconds(now - due)));
+  return std::max(due, published_ + stronger * take_over);
 }
 
 void FlightWatch::check_policy(const model::StepRecord& record, Instant now) {

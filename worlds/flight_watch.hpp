@@ -76,7 +76,8 @@ class FlightWatch {
   bool is_lockstep() const { return sync_.mode == config::SyncMode::kLockstep; }
   bool is_stronger(const std::string& name, const Client& client, const Client& than,
                    const std::string& other) const;
-  void check_flyer(const model::StepRecord& record, Instant now);
+  void check_take_over(const std::vector<model::StepRecord>& records, Instant now);
+  std::optional<Instant> check_flyer(const model::StepRecord& record, Instant now);
   void check_policy(const model::StepRecord& record, Instant now);
   void check_gap(Instant now);
 

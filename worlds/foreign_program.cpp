@@ -10,6 +10,7 @@ void ForeignProgram::start() {
   peer_.add_writer<Commands>();
   is_impostor_ = random_.chance(0.5);
   if (is_impostor_) {
+    peer_.add_writer<States>();
     peer_.add_writer<RecordBatch>();
     peer_.add_writer<SimStatus>();
   }
@@ -58,6 +59,7 @@ void ForeignProgram::pretend(const States& sample) {
     entry.vehicle_id(state.vehicle_id());
     entry.step(sample.step());
   }
+  peer_.write(sample);
   peer_.write(batch);
   peer_.write(status);
 }

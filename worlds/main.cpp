@@ -86,7 +86,9 @@ int main(int argc, char** argv) {
   std::filesystem::path table;
   std::optional<std::uint64_t> replayed;
   bool is_verbose = false;
-  cli.footer("./sls worlds also takes --plot FILE (.png, .svg, .pdf): time and error of the flights over the loss.");
+  cli.footer(
+      "./sls worlds also takes --plot FILE (.png, .svg, .pdf): time and error of the flights over "
+      "the loss.");
   cli.set_version_flag("--version", app::version());
   cli.add_option(
          "--scenario", scenario,

@@ -22,8 +22,8 @@ Instant calc_packet_time(double bandwidth_mbit) {
 }
 
 // As config/qos/endpoints.xml.
-std::size_t Peer::history_depth(TopicId topic) {
-  if (topic == TopicId::kRecord) return 5000;
+std::size_t Peer::history_depth(TopicId topic) const {
+  if (topic == TopicId::kRecord) return network_.record_history_;
   return is_best_effort(static_cast<std::size_t>(topic)) ? 64 : 150;
 }
 

@@ -104,7 +104,7 @@ class Peer {
     readers_[static_cast<std::size_t>(topic)].ignores_lifespan = is_ignored;
   }
   /// Samples that the writer of `topic` keeps for late readers.
-  static std::size_t history_depth(TopicId topic);
+  std::size_t history_depth(TopicId topic) const;
 
  private:
   friend class Network;
@@ -146,6 +146,9 @@ class Peer {
 class Network {
  public:
   Network(Timeline& timeline, Random random) : timeline_(timeline), random_(random) {}
+
+  /// Batches of sls/record that a writer keeps.
+  void set_record_history(std::size_t batches) { record_history_ = batches; }
 
   Link& link(const Host& from, const Host& to) { return links_[{&from, &to}]; }
   /// Longest time between two announcements of a participant.
@@ -201,6 +204,7 @@ class Network {
   std::map<std::pair<const Host*, const Host*>, Link> links_;
   std::map<Key, Channel> channels_;
   std::uint64_t next_id_ = 1;
+  std::size_t record_history_ = 5000;
 };
 
 }  // namespace sls::worlds

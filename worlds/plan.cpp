@@ -361,6 +361,22 @@ Instant estimate_end(const Fault& fault, const Plan& plan, const config::Sync& s
   return begin + fault.duration + 100ms;
 }
 
+/// A recorder that is expected never comes back; the flight is paused until this is known.
+void draw_lost_recorder(Plan& plan, Random& random, const FlownScenario& flown) {
+  const auto is_recorder = [](const PlannedProgram& program) {
+    return program.role == Role::kRecorder;
+  };
+  const auto recorder = std::find_if(plan.programs.begin(), plan.programs.end(), is_recorder);
+  Fault kill;
+  kill.kind = Kind::kKill;
+  kill.target = static_cast<std::size_t>(recorder - plan.programs.begin());
+  kill.step =
+      static_cast<std::uint64_t>(random.integer(0, static_cast<std::int64_t>(flown.last_step) - 5));
+  plan.faults.push_back(kill);
+  draw_long_absence(plan, random);
+  plan.faults.front().duration = Instant(0);
+}
+
 /// The faults of a plan that has its programs.
 void draw_faults(Plan& plan, Random& random, const FlownScenario& flown) {
   if (plan.promise == Promise::kCalm || plan.promise == Promise::kTwoServers) return;
@@ -377,6 +393,11 @@ void draw_faults(Plan& plan, Random& random, const FlownScenario& flown) {
   if (plan.promise == Promise::kNone && plan.programs[1].role == Role::kServer &&
       random.chance(0.3)) {
     draw_split(plan, random, flown);
+    return;
+  }
+  const config::Sync& sync = flown.scenario.sync;
+  if (plan.promise == Promise::kNone && sync.wait_for.recorders > 0 && random.chance(0.05)) {
+    draw_lost_recorder(plan, random, flown);
     return;
   }
   const std::int64_t faults = random.chance(0.15) ? 0 : random.integer(1, 6);
@@ -423,6 +444,8 @@ Plan draw_plan(std::uint64_t seed, const std::vector<FlownScenario>& scenarios,
   plan.link = given                            ? make_link(given->link, random)
               : plan.promise == Promise::kCalm ? Link()
                                                : draw_link(random);
+  // Where much is lost, the claims of two servers may meet only when both gather.
+  if (plan.promise == Promise::kTwoServers) plan.link.loss = std::min(plan.link.loss, 0.02);
   plan.drift = random.chance(0.3) ? random.between(-1e-4, 1e-4) : 0;
   plan.wall_offset_s = random.chance(0.3) ? random.between(-20, 20) : 0;
   plan.healed = draw_time(random, 1s, is_lockstep ? Instant(6s) : Instant(4s));
@@ -438,6 +461,8 @@ Plan draw_plan(std::uint64_t seed, const std::vector<FlownScenario>& scenarios,
     if (given->until_s) plan.healed = to_instant(draw(random, *given->until_s));
     return plan;
   }
+  if (plan.promise == Promise::kNone && random.chance(0.1))
+    plan.record_history = static_cast<std::size_t>(random.integer(5, 50));
   draw_faults(plan, random, flown);
   return plan;
 }

@@ -76,7 +76,8 @@ struct Plan {
   Link link;  ///< between hosts; within one it is fast and loses nothing
   double drift = 0;
   double wall_offset_s = 0;
-  bool has_files = false;  ///< recorders write real files
+  bool has_files = false;             ///< recorders write real files
+  std::size_t record_history = 5000;  ///< batches that a server keeps for late recorders
   std::vector<Fault> faults;
   /// The faults are over: from now on all that can finish must.
   Instant healed{0};

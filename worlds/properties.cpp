@@ -20,7 +20,7 @@ using namespace std::chrono_literals;
 /// processors.
 constexpr Instant kNamedWithin = 2500ms;
 /// Two servers of one vehicle that hear each other: one of them has gone after this.
-constexpr Instant kRivalsGoneWithin = 4s;
+constexpr Instant kRivalsGoneWithin = 3s;
 
 /// A killed program is presumed dead after 2 s, and looked for ten times a second.
 constexpr Instant kGoneAfter = 2500ms;
@@ -121,10 +121,11 @@ void Properties::on_yielded(const Program& server, std::uint64_t run_id) {
 void Properties::on_published(std::uint64_t run_id, std::uint64_t step,
                               const config::WaitFor& expected) {
   Run& run = runs_[run_id];
-  if (step == 0 && (static_cast<int>(run.ready.size()) < expected.controllers ||
-                    static_cast<int>(run.recorders.size()) < expected.recorders))
+  const auto ready = static_cast<int>(run.ready.size());
+  const int recorders = count_living(run.recorders);
+  if (step == 0 && (ready < expected.controllers || recorders < expected.recorders))
     find(fmt::format("start: run {:016x} begins with {} controllers and {} recorders", run_id,
-                     run.ready.size(), run.recorders.size()));
+                     ready, recorders));
   run.flight->on_published(step, timeline_.now());
   if (step > 0) check_recorders(run, step, expected);
   run.published = timeline_.now();
@@ -181,21 +182,26 @@ void Properties::on_status(const SimStatus& status, const Network& network) {
   run.summary.take_overs = status.counters().take_overs();
   run.summary.late = status.counters().held() + status.counters().fail_safe();
   if (status.reason().size() > 0) run.named = timeline_.now();
+  if (sync::calc_progress(run.phase) > 0) check_rivals(run, network);
   if (run.phase != RunPhase::PHASE_RUNNING) return;
   run.flight->on_running(timeline_.now());
   check_stall(run, status.run_id());
-  check_rivals(run, network);
+}
+
+/// Those that have not been dead for so long that the others must know.
+int Properties::count_living(const std::set<std::string>& names) const {
+  return static_cast<int>(std::count_if(names.begin(), names.end(), [this](const auto& name) {
+    const auto killed = killed_.find(name);
+    return killed == killed_.end() || timeline_.now() - killed->second < kGoneAfter;
+  }));
 }
 
 /// In lockstep a flight waits for the recorders that it expects.
 void Properties::check_recorders(const Run& run, std::uint64_t step,
                                  const config::WaitFor& expected) {
-  if (!run.waits_for_recorders) return;
-  const auto is_there = [&](const std::string& name) {
-    const auto killed = killed_.find(name);
-    return killed == killed_.end() || timeline_.now() - killed->second < kGoneAfter;
-  };
-  if (std::count_if(run.recorders.begin(), run.recorders.end(), is_there) < expected.recorders)
+  const auto continued = continued_.find(run.server->name());
+  const bool is_back = continued != continued_.end() && timeline_.now() - continued->second < 1s;
+  if (run.waits_for_recorders && !is_back && count_living(run.recorders) < expected.recorders)
     find(fmt::format("recorders: step {} leaves without them", step));
 }
 
@@ -213,7 +219,7 @@ void Properties::check_stall(Run& run, std::uint64_t run_id) {
 
 void Properties::check_rivals(const Run& run, const Network& network) {
   for (const auto& [id, other] : runs_) {
-    if (&other == &run || other.has_ended || other.phase != RunPhase::PHASE_RUNNING) continue;
+    if (&other == &run || other.has_ended || !other.has_status) continue;
     const bool share =
         std::any_of(run.vehicle_ids.begin(), run.vehicle_ids.end(), [&](std::uint32_t vehicle) {
           return std::count(other.vehicle_ids.begin(), other.vehicle_ids.end(), vehicle) > 0;
@@ -301,8 +307,10 @@ void Properties::check_join(const Program& program, std::uint64_t run_id,
 }
 
 /// A server leaves requests for the runs of others to them.
-void Properties::on_replied(const Program& server, std::uint64_t run_id, const Network& network) {
-  const auto run = runs_.find(run_id);
+void Properties::on_replied(const Program& server, std::uint64_t request_id,
+                            const Network& network) {
+  const auto request = requests_.find(request_id);
+  const auto run = request == requests_.end() ? runs_.end() : runs_.find(request->second);
   if (run == runs_.end() || run->second.server == &server || run->second.has_ended ||
       !run->second.has_status || timeline_.now() - run->second.phase_since < kHeardWithin ||
       run->second.server->process().has_ended() || run->second.server->process().is_stopped() ||

@@ -74,7 +74,8 @@ class Properties {
   /// `heard`: what the program knows of servers.
   void on_announced(const Program& program, const Participant& message, const Peer& peer,
                     const sync::Servers& heard);
-  void on_replied(const Program& server, std::uint64_t run_id, const Network& network);
+  void on_request(const SimControl& request) { requests_[request.request_id()] = request.run_id(); }
+  void on_replied(const Program& server, std::uint64_t request_id, const Network& network);
   void on_interrupted(const Program& program);
   void on_killed(const Program& program);
   void on_stopped(const Program& program);
@@ -126,6 +127,7 @@ class Properties {
 
   void find(std::string finding);
   void check_join(const Program& program, std::uint64_t run_id, const sync::Servers& heard);
+  int count_living(const std::set<std::string>& names) const;
   void check_recorders(const Run& run, std::uint64_t step, const config::WaitFor& expected);
   void check_stall(Run& run, std::uint64_t run_id);
   void check_rivals(const Run& run, const Network& network);
@@ -143,6 +145,7 @@ class Properties {
   std::map<std::string, Instant> killed_, stopped_, continued_;          // by name
   std::map<std::string, std::uint64_t> joined_;                          // clients' last runs
   std::map<std::pair<const Program*, const Program*>, Instant> rivals_;  // fly together since
+  std::map<std::uint64_t, std::uint64_t> requests_;  // runs, by number of the request
   std::uint64_t steps_ = 0;
   std::vector<std::string> findings_;
 };

@@ -23,25 +23,17 @@ struct Choice {
   double server_deadline_s = 30;
 };
 
-constexpr std::array<Choice, 18> kChoices = {{
-    {"lockstep", 1, 1, 1, "wait", "wait"},
-    {"lockstep", 1, 1, 0, "wait", "wait"},
-    {"lockstep", 1, 2, 1, "wait", "wait"},
-    {"lockstep", 1, 2, 2, "wait", "go_on"},
-    {"lockstep", 2, 1, 1, "wait", "wait"},
-    {"lockstep", 3, 2, 1, "wait", "stop"},
-    {"lockstep", 1, 1, 1, "hold", "wait"},
-    {"lockstep", 2, 2, 1, "hold", "go_on"},
-    {"lockstep", 1, 1, 1, "failsafe", "go_on"},
-    {"lockstep", 1, 2, 1, "stop", "wait"},
-    {"lockstep", 3, 1, 2, "wait", "go_on"},
-    {"realtime", 1, 1, 1, "wait", "wait"},
-    {"realtime", 1, 2, 1, "hold", "go_on"},
-    {"realtime", 2, 1, 1, "failsafe", "wait"},
-    {"realtime", 1, 2, 0, "stop", "wait"},
-    {"realtime", 3, 1, 1, "wait", "stop"},
-    {"lockstep", 1, 1, 1, "wait", "wait", 4},
-    {"lockstep", 2, 2, 1, "wait", "wait", 4},
+constexpr std::array<Choice, 19> kChoices = {{
+    {"lockstep", 1, 1, 1, "wait", "wait"},      {"lockstep", 1, 1, 0, "wait", "wait"},
+    {"lockstep", 1, 2, 1, "wait", "wait"},      {"lockstep", 1, 2, 2, "wait", "go_on"},
+    {"lockstep", 2, 1, 1, "wait", "wait"},      {"lockstep", 3, 2, 1, "wait", "stop"},
+    {"lockstep", 1, 1, 1, "hold", "wait"},      {"lockstep", 2, 2, 1, "hold", "go_on"},
+    {"lockstep", 1, 1, 1, "failsafe", "go_on"}, {"lockstep", 1, 2, 1, "stop", "wait"},
+    {"lockstep", 3, 1, 2, "wait", "go_on"},     {"realtime", 1, 1, 1, "wait", "wait"},
+    {"realtime", 1, 2, 1, "hold", "go_on"},     {"realtime", 2, 1, 1, "failsafe", "wait"},
+    {"realtime", 1, 2, 0, "stop", "wait"},      {"realtime", 3, 1, 1, "wait", "stop"},
+    {"lockstep", 1, 1, 1, "wait", "wait", 4},   {"lockstep", 2, 2, 1, "wait", "wait", 4},
+    {"lockstep", 8, 1, 1, "wait", "wait"},  // in two samples
 }};
 
 std::string make_text(const Choice& choice) {

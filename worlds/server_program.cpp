@@ -45,8 +45,11 @@ void ServerProgram::start() {
   peer_.add_writer<SimStatus>();
   peer_.add_writer<SimControlReply>();
   peer_.add_reader<SimControl>([this](const SimControl& request, const Peer::Arrival&) {
-    if (core_ && request.run_id() == core_->run_id())
-      flight_->on_request(request.action(), setting_.timeline.now());
+    setting_.properties.on_request(request);
+    const bool is_ours =
+        core_ && request.run_id() == core_->run_id() &&
+        std::count(vehicle_ids_.begin(), vehicle_ids_.end(), request.vehicle_id()) > 0;
+    if (is_ours) flight_->on_request(request.action(), setting_.timeline.now());
     events_.push_back(request);
     wake_soon();
   });
@@ -146,7 +149,7 @@ void ServerProgram::write_waiting() {
                         status->problem().c_str()));
       peer_.write(*status);
     } else if (const auto* reply = std::get_if<SimControlReply>(&item)) {
-      setting_.properties.on_replied(*this, reply->run_id(), setting_.network);
+      setting_.properties.on_replied(*this, reply->request_id(), setting_.network);
       peer_.write(*reply);
     } else if (const auto* line = std::get_if<sync::Line>(&item)) {
       say(*line);
@@ -280,7 +283,7 @@ std::string ServerProgram::replace_problems(const std::map<std::string, std::str
 }
 
 sim::Surroundings::Queues ServerProgram::queues() const {
-  return {written_, Peer::history_depth(TopicId::kRecord) / batches_->batches_of_step(),
+  return {written_, peer_.history_depth(TopicId::kRecord) / batches_->batches_of_step(),
           self().peer_.missed_deadlines(TopicId::kCommand)};
 }
 

@@ -39,6 +39,7 @@ class World {
     setting_.flown = &scenarios[plan.scenario];
     setting_.folder = folder.string();
     setting_.is_one_machine = plan.hosts == 1;
+    setting_.network.set_record_history(plan.record_history);
     make_hosts();
     for (std::size_t i = 0; i < plan.programs.size(); ++i) {
       current_.push_back(nullptr);

@@ -1,5 +1,5 @@
-/// Faults of networks, machines and programs, as a file says them: one vocabulary for `./sls
-/// worlds`, `./sls chaos` and `./sls network-table`. docs/faults.md describes it.
+/// Faults of networks, machines and programs, as a file says them: one vocabulary for worlds, chaos
+/// and network-table. docs/faults.md describes it.
 #pragma once
 
 #include <array>

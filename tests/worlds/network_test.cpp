@@ -1,4 +1,4 @@
-// What only the simulated network has; conformance_test.cpp tries the rest.
+// The simulated network: rules that the conformance scripts do not show.
 #include "worlds/network.hpp"
 
 #include <gtest/gtest.h>
