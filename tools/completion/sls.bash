@@ -35,7 +35,7 @@ declare -gA _sls_options=(
   ["test"]="--help --slow --sanitize --only"
   ["verify"]="--help --version"
   ["view"]="--help --qos --domain --log-level --version --vehicle --listen --port --token-file --read-only --allow-origin --ros --identity --export --most-bytes"
-  ["worlds"]="--help --version --scenario --faults --seeds --jobs --most --replay --verbose"
+  ["worlds"]="--help --version --scenario --faults --seeds --jobs --most --table --replay --verbose"
 )
 declare -gA _sls_subcommands=(
   ["campaign"]="status report compare"
@@ -149,6 +149,7 @@ declare -gA _sls_arguments=(
   ["worlds --replay"]="any"
   ["worlds --scenario"]="file"
   ["worlds --seeds"]="any"
+  ["worlds --table"]="file"
 )
 
 # _sls_names KIND: names of the scenarios or campaigns that the launcher finds.

@@ -153,8 +153,11 @@ def load_keys(build):
 
 def load_topics():
     """[(name, type, flow)], as common/bus/topics.hpp has them."""
-    found = re.findall(r'struct Topic<(\w+)> \{\s*static constexpr const char\* kName = "([^"]+)";\s*'
+    found = re.findall(r"struct Topic<(\w+)> \{\s*static constexpr TopicId kId = TopicId::k\w+;\s*"
+                       r'static constexpr const char\* kName = "([^"]+)";\s*'
                        r"static constexpr Flow kFlow = Flow::k(\w+);", read("common/bus/topics.hpp"))
+    if not found:
+        raise SystemExit("common/bus/topics.hpp: expected topics, got none")
     return [(name, message, flow) for message, name, flow in found]
 
 
