@@ -15,6 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sls.figures import METADATA, STYLE, WIDTH_IN, colour_of, save
+from sls.input_error import InputError
 
 # Upper ends of the delays that share a colour, ms; the last one has none.
 DELAYS_MS = (1.0, 5.0, np.inf)
@@ -27,17 +28,15 @@ def read_worlds(path: Path) -> dict[str, np.ndarray]:
     with path.open(newline="") as file:
         rows = list(csv.DictReader(file))
     if not rows:
-        raise ValueError(f"{path}: expected worlds, got none")
+        raise InputError(f"{path}: expected worlds, got none")
     return {name: np.array([float(row[name] or "nan") for row in rows]) for name in rows[0]}
 
 
 def draw_worlds(axes: Axes, worlds: dict[str, np.ndarray], values: np.ndarray, label: str) -> None:
     """Draws one point per world over the loss of its links, and marks those without a finished flight at the top."""
-    least = 0.0
+    least = -np.inf
     for index, (most, name) in enumerate(zip(DELAYS_MS, NAMES)):
         chosen = (worlds["delay_ms"] > least) & (worlds["delay_ms"] <= most)
-        if index == 0:
-            chosen |= worlds["delay_ms"] == 0
         axes.plot(100 * worlds["loss"][chosen], values[chosen], ".", color=colour_of(index), markersize=4, alpha=0.6,
                   label=name)
         lost = chosen & (worlds["finished"] == 0)
@@ -76,9 +75,12 @@ def main(words: Sequence[str]) -> int:
         code = subprocess.run([os.environ["SLS_WORLDS"], *rest, "--table", table], check=False).returncode
         if not table.is_file():
             return code
-        with matplotlib.rc_context(STYLE):
-            figure = plot_worlds(read_worlds(table))
-            save(figure, options.plot)
+        try:
+            with matplotlib.rc_context(STYLE):
+                save(plot_worlds(read_worlds(table)), options.plot)
+        except (InputError, OSError) as error:
+            print(f"worlds: error: {error}", file=sys.stderr)
+            return 2
     print(options.plot)
     return code
 

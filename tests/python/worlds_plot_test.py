@@ -23,6 +23,14 @@ class WorldsPlotTest(unittest.TestCase):
     def setUp(self):
         self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
 
+    def make_program(self, script):
+        """A stand-in for sls_worlds."""
+        program = self.folder / "program"
+        program.write_text(f"#!{sys.executable}\nimport sys, pathlib\n{script}")
+        program.chmod(0o755)
+        os.environ["SLS_WORLDS"] = str(program)
+        self.addCleanup(os.environ.pop, "SLS_WORLDS")
+
     def test_every_world_is_in_it_once(self):
         table = self.folder / "worlds.csv"
         table.write_text(ROWS)
@@ -36,18 +44,19 @@ class WorldsPlotTest(unittest.TestCase):
         self.assertEqual(figure.axes[0].get_title(), "3 worlds, 2 with a finished flight (the others: ×)")
 
     def test_it_calls_the_program_and_keeps_its_exit_code(self):
-        program = self.folder / "program"
-        program.write_text(f"#!{sys.executable}\nimport sys, pathlib\n"
-                           "assert sys.argv[1:4] == ['--seeds', '0-2', '--table'], sys.argv\n"
-                           f"pathlib.Path(sys.argv[4]).write_text({ROWS!r})\nsys.exit(1)\n")
-        program.chmod(0o755)
-        os.environ["SLS_WORLDS"] = str(program)
-        self.addCleanup(os.environ.pop, "SLS_WORLDS")
+        self.make_program("assert sys.argv[1:4] == ['--seeds', '0-2', '--table'], sys.argv\n"
+                          f"pathlib.Path(sys.argv[4]).write_text({ROWS!r})\nsys.exit(1)\n")
         picture = self.folder / "worlds.svg"
         with redirect_stdout(io.StringIO()) as said:
             self.assertEqual(worlds_plot.main(["--seeds", "0-2", "--plot", str(picture)]), 1)
         self.assertEqual(said.getvalue(), f"{picture}\n")
         self.assertIn("<svg", picture.read_text())
+
+    def test_a_search_that_ended_before_its_first_world_is_one_line(self):
+        self.make_program(f"pathlib.Path(sys.argv[2]).write_text({ROWS.splitlines()[0]!r})\n")
+        with redirect_stderr(io.StringIO()) as said:
+            self.assertEqual(worlds_plot.main(["--plot", str(self.folder / "worlds.svg")]), 2)
+        self.assertRegex(said.getvalue(), r"\Aworlds: error: .*worlds.csv: expected worlds, got none\n\Z")
 
     def test_another_format_is_refused_before_anything_flies(self):
         with redirect_stderr(io.StringIO()) as said:

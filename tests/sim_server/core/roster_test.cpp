@@ -4,6 +4,8 @@
 
 #include <limits>
 
+#include "sim_server/core/surroundings.hpp"
+
 namespace sls::sim {
 namespace {
 
@@ -245,6 +247,14 @@ TEST(RosterTest, TheLimitIsTheFirstStepThatARecorderBlocks) {
 
 TEST(RosterTest, WithoutTheExpectedRecordersNoStepIsWithinTheLimit) {
   EXPECT_EQ(calc_recorder_limit({{}, {make_recorder_at(5)}}, 2), 0u);
+}
+
+TEST(RosterTest, AControllerThatNoStateReachesYetIsLeftOut) {
+  const auto reached = make_controller("reached"), late = make_controller("late");
+  std::vector<sync::Member> controllers = {late, reached};
+  keep_readers(controllers, {reached.peer});
+  ASSERT_EQ(controllers.size(), 1u);
+  EXPECT_EQ(controllers.front().peer, reached.peer);
 }
 
 TEST(RosterTest, WithoutRecordersNoStepIsBeyondTheLimit) {
