@@ -85,11 +85,7 @@ void ClientProgram::wake() {
   control::ClientCore::Now seen;
   seen.time = now();
   seen.is_stopped = was_interrupted();
-  if (answerer_) {
-    const bus::PeerId& server = answerer_->run().server;
-    seen.sees_server = peer_.matched_writers(TopicId::kState).count(server) > 0 &&
-                       peer_.matched_readers(TopicId::kCommand).count(server) > 0;
-  }
+  if (answerer_) seen.sees_server = sees(answerer_->run().server);
   using Act = control::ClientCore::Act;
   const Act act = core_.look(present_servers(), seen);
   for (const sync::Line& line : core_.take_lines()) say(line);

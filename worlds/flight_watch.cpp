@@ -24,15 +24,11 @@ constexpr Instant kKnownAfter = 500ms;
 constexpr Instant kObeysWithin = 500ms;
 constexpr Instant kGivesUpWithin = 2s;
 
-Instant to_instant(double time_s) { return Instant(static_cast<std::int64_t>(time_s * 1e9)); }
-
 /// True unless the answer is one of those that broken clients send.
 bool is_sound(const ControlCommand& command) {
   return std::abs(command.f_Q_W_n()[2]) < 1e5 && command.fault() == FaultCode::FAULT_NONE &&
          command.mission() != MissionPhase::MISSION_FAILED;
 }
-
-double to_seconds(Instant time) { return std::chrono::duration<double>(time).count(); }
 
 }  // namespace
 
@@ -82,8 +78,8 @@ void FlightWatch::on_request(ControlAction action, Instant now) {
 void FlightWatch::on_published(std::uint64_t step, Instant now) {
   const auto disobeys = [&](const std::optional<Instant>& since, const char* what) {
     if (since && !is_disturbed() && now - *since > kObeysWithin)
-      find_(fmt::format("obeys: step {} leaves {:.3f} s after {}", step, to_seconds(now - *since),
-                        what));
+      find_(fmt::format("obeys: step {} leaves {:.3f} s after {}", step,
+                        sync::to_seconds(now - *since), what));
   };
   disobeys(interrupted_, "SIGINT");
   disobeys(stop_requested_, "an operator's stop");
@@ -100,7 +96,7 @@ void FlightWatch::check_gap(Instant now) {
   constexpr Instant kLongest = sim::RetransmissionTimer::kLongest + kSlack;
   if (is_lockstep() && sent_ && !is_disturbed() && now - *sent_ > kLongest)
     find_(fmt::format("sent-again: the state of step {} only after {:.3f} s", step_,
-                      to_seconds(now - *sent_)));
+                      sync::to_seconds(now - *sent_)));
 }
 
 void FlightWatch::on_resent(Instant now) {
@@ -123,14 +119,15 @@ void FlightWatch::on_recorded(const std::vector<model::StepRecord>& records, Ins
 
 void FlightWatch::on_running(Instant now) {
   check_gap(now);
-  const Instant patience = to_instant(sync_.calc_controller_patience_s()) + kGivesUpWithin;
+  const Instant patience = sync::to_duration(sync_.calc_controller_patience_s()) + kGivesUpWithin;
   if (is_disturbed()) return;
   for (const auto& [vehicle, lacking] : lacking_)
     if (now - lacking.since > patience)
       return find_(fmt::format("gives-up: vehicle {} is flown without answers for {:.3f} s",
-                               vehicle, to_seconds(now - lacking.since)));
+                               vehicle, sync::to_seconds(now - lacking.since)));
   if (sent_ && now - published_ > patience)
-    find_(fmt::format("gives-up: step {} waits for {:.3f} s", step_, to_seconds(now - published_)));
+    find_(fmt::format("gives-up: step {} waits for {:.3f} s", step_,
+                      sync::to_seconds(now - published_)));
 }
 
 /// The order of clients: strength, then name.
@@ -155,7 +152,7 @@ void FlightWatch::check_take_over(const std::vector<model::StepRecord>& records,
   }
   if (is_lockstep() && !is_disturbed() && !taken_over_by.empty() && now > due + kSlack)
     find_(fmt::format("take-over: '{}' flies step {} only {:.3f} s after it was due", taken_over_by,
-                      step_, to_seconds(now - due)));
+                      step_, sync::to_seconds(now - due)));
 }
 
 /// The strongest client that answers flies, and none takes over too early. Returns when the answer
@@ -174,7 +171,7 @@ std::optional<Instant> FlightWatch::check_flyer(const model::StepRecord& record,
                       record.step, record.client_name));
     return std::nullopt;
   }
-  const Instant take_over = to_instant(sync_.take_over_s);
+  const Instant take_over = sync::to_duration(sync_.take_over_s);
   const Instant waited = now - published_;
   const auto before = flyers_.find(vehicle);
   Instant due = answer->second;
@@ -200,7 +197,7 @@ std::optional<Instant> FlightWatch::check_flyer(const model::StepRecord& record,
         now - client.heard < sync::kPresumedDeadAfter - kSlack &&
         waited < take_over - take_over / 100)
       find_(fmt::format("take-over: '{}' flies step {} after {:.3f} s without '{}'",
-                        record.client_name, record.step, to_seconds(waited), name));
+                        record.client_name, record.step, sync::to_seconds(waited), name));
   }
   return std::max(due, published_ + stronger * take_over);
 }

@@ -87,7 +87,7 @@ class FlightWatch {
   const std::uint64_t run_id_;
   const std::function<void(std::string)> find_;
   std::map<std::string, Client> clients_;        // by name
-  std::set<std::string> rightful_;               // that have ever been
+  std::set<std::string> rightful_;               // ready for this run, at any time
   std::map<std::uint32_t, std::string> flyers_;  // of the last step, by vehicle
   std::map<std::uint32_t, Lacking> lacking_;
   std::uint64_t step_ = 0;

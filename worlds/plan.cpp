@@ -41,7 +41,14 @@ Link draw_link(Random& random) {
   return link;
 }
 
-Instant to_instant(double seconds) { return Instant(static_cast<std::int64_t>(seconds * 1e9)); }
+/// A step of the flight, but not one of the last `margin`.
+std::uint64_t draw_step(Random& random, const FlownScenario& flown, std::uint64_t margin = 0) {
+  return random.index(flown.last_step - margin + 1);
+}
+
+Instant draw_seconds(Random& random, double least, double most) {
+  return sync::to_duration(random.between(least, most));
+}
 
 double draw(Random& random, const faults::Span& span) {
   return random.between(span.least, span.most);
@@ -51,7 +58,7 @@ double draw(Random& random, const faults::Span& span) {
 Link make_link(const faults::Link& given, Random& random) {
   Link link;
   const auto set_time = [&](Instant& time, const std::optional<faults::Span>& ms) {
-    if (ms) time = to_instant(draw(random, *ms) * 1e-3);
+    if (ms) time = sync::to_duration(draw(random, *ms) * 1e-3);
   };
   set_time(link.delay, given.delay_ms);
   set_time(link.jitter, given.jitter_ms);
@@ -77,13 +84,10 @@ std::optional<std::size_t> find_program(const Plan& plan, const faults::Program&
 void draw_programs(Plan& plan, Random& random, const FlownScenario& flown,
                    const faults::Case* given) {
   const config::WaitFor& expected = flown.scenario.sync.wait_for;
-  const auto draw_host = [&] {
-    return static_cast<std::size_t>(random.integer(0, static_cast<std::int64_t>(plan.hosts) - 1));
-  };
   const auto add = [&](Role role) -> PlannedProgram& {
     PlannedProgram& program = plan.programs.emplace_back();
     program.role = role;
-    program.host = draw_host();
+    program.host = random.index(plan.hosts);
     program.start = draw_time(random, 0ms, 1500ms);
     program.vehicle_ids = config::parse_vehicle_ids("all", flown.scenario.vehicles.size());
     program.follows_servers = plan.promise == Promise::kServerRestart || random.chance(0.4);
@@ -112,9 +116,7 @@ void draw_programs(Plan& plan, Random& random, const FlownScenario& flown,
     if (!is_calm && random.chance(0.1)) client.delay = draw_time(random, 100us, 3ms);
     if (is_wild && random.chance(0.03)) client.has_other_scenario = true;
     client.is_early = is_calm && is_realtime && random.chance(0.5);
-    if (is_wild && random.chance(0.1))
-      client.breaks_at =
-          static_cast<std::uint64_t>(random.integer(0, static_cast<std::int64_t>(flown.last_step)));
+    if (is_wild && random.chance(0.1)) client.breaks_at = draw_step(random, flown);
     client.is_sloppy = random.chance(0.2);
   }
   if (random.chance(0.15)) add(Role::kForeign);
@@ -142,8 +144,7 @@ void draw_programs(Plan& plan, Random& random, const FlownScenario& flown,
 
 void time_fault(Fault& fault, Random& random, const Plan& plan, const FlownScenario& flown) {
   if (random.chance(0.6)) {
-    fault.step =
-        static_cast<std::uint64_t>(random.integer(0, static_cast<std::int64_t>(flown.last_step)));
+    fault.step = draw_step(random, flown);
     fault.at = random.chance(0.5) ? Instant(0) : draw_time(random, 0us, 5ms);
   } else {
     fault.at = draw_time(random, 0ms, plan.healed);
@@ -157,11 +158,7 @@ Fault draw_fault(const Plan& plan, Random& random, std::int64_t count) {
   Fault fault;
   fault.kind = plan.promise == Promise::kMild ? kMild[random.integer(0, 7)]
                                               : static_cast<Kind>(random.integer(0, 11));
-  const auto programs = static_cast<std::int64_t>(plan.programs.size());
-  const auto hosts = static_cast<std::int64_t>(plan.hosts);
-  const auto draw_of = [&](std::int64_t number) {
-    return static_cast<std::size_t>(random.integer(0, number - 1));
-  };
+  const std::size_t programs = plan.programs.size();
   // A server that has ended waits 1 s for the others to hear it.
   const bool is_mild = plan.promise == Promise::kMild;
   const Instant longest = is_mild              ? Instant(900ms) / count
@@ -170,33 +167,33 @@ Fault draw_fault(const Plan& plan, Random& random, std::int64_t count) {
   fault.duration = draw_time(random, 1ms, longest);
   switch (fault.kind) {
     case Kind::kKill:
-      fault.target = draw_of(programs);
+      fault.target = random.index(programs);
       if (random.chance(0.5)) fault.duration = Instant(0);
       break;
     case Kind::kStop:
     case Kind::kInterrupt:
     case Kind::kDiskFull:
-      fault.target = draw_of(programs);
+      fault.target = random.index(programs);
       break;
     case Kind::kCut:
     case Kind::kIsolate:
-      fault.target = draw_of(hosts);
-      fault.other = draw_of(hosts);
+      fault.target = random.index(plan.hosts);
+      fault.other = random.index(plan.hosts);
       break;
     case Kind::kLoss:
       fault.value = random.between(0.05, is_mild ? 0.3 : 0.9);
       break;
     case Kind::kSlow:
-      fault.target = draw_of(programs);
+      fault.target = random.index(programs);
       fault.value = random.between(0.0005, is_mild ? 0.02 : 0.3);
       break;
     case Kind::kClock:
-      fault.target = draw_of(hosts);
+      fault.target = random.index(plan.hosts);
       fault.value = random.between(-30, 30);
       break;
     case Kind::kRequest:
       fault.target = 0;
-      fault.other = draw_of(6);
+      fault.other = random.index(6);
       fault.value = static_cast<double>(random.integer(1, 20));
       break;
     case Kind::kPartition:
@@ -240,13 +237,12 @@ void draw_silences(Plan& plan, Random& random, const FlownScenario& flown) {
     fault.other = static_cast<std::size_t>(ControlAction::ACTION_PAUSE);
     const double longest_s = flown.scenario.sync.wait.server_deadline_s;
     const double least_s = i == 1 ? longest_s + 1 : 1.2;
-    fault.duration =
-        Instant(static_cast<std::int64_t>(random.between(least_s, least_s + 0.5) * 1e9));
+    fault.duration = draw_seconds(random, least_s, least_s + 0.5);
     plan.faults.push_back(fault);
   }
 }
 
-/// Two servers that do not hear each other, and both are heard by others; the first is killed.
+/// Two servers that do not hear each other, and both are heard by others. Each may be killed.
 void draw_split(Plan& plan, Random& random, const FlownScenario& flown) {
   plan.hosts = std::max<std::size_t>(plan.hosts, 3);
   for (std::size_t i = 0; i < 2; ++i) {
@@ -260,31 +256,29 @@ void draw_split(Plan& plan, Random& random, const FlownScenario& flown) {
     if (random.chance(0.5)) continue;
     Fault kill;
     kill.target = i;
-    kill.step =
-        static_cast<std::uint64_t>(random.integer(0, static_cast<std::int64_t>(flown.last_step)));
+    kill.step = draw_step(random, flown);
     plan.faults.push_back(kill);
   }
 }
 
-/// A recorder comes back long after it was killed; the flight is paused at first.
-void draw_long_absence(Plan& plan, Random& random) {
+/// The flight is paused when the recorder of `kill`, its only fault, is killed, until the others
+/// know that it is dead. It comes back long after, or never.
+void pause_until_known(Plan& plan, Random& random, bool comes_back) {
   Fault& kill = plan.faults.front();
-  kill.duration = draw_time(random, 5s, 7s);
-  Fault pause = kill;
+  const Instant absence = draw_time(random, 5s, 7s);
+  kill.duration = comes_back ? absence : Instant(0);
+  Fault pause;
   pause.kind = Kind::kRequest;
+  pause.step = kill.step;
   pause.other = static_cast<std::size_t>(ControlAction::ACTION_PAUSE);
-  pause.target = 0;
   pause.duration = draw_time(random, 3500ms, 4s);
-  plan.faults.push_back(pause);
   plan.healed = pause.duration;
+  plan.faults.push_back(pause);
 }
 
 /// The one fault of a world with a promise that names it.
 Fault draw_promised(const Plan& plan, Random& random, const FlownScenario& flown) {
   const config::Sync& sync = flown.scenario.sync;
-  const auto draw_seconds = [&](double least, double most) {
-    return Instant(static_cast<std::int64_t>(random.between(least, most) * 1e9));
-  };
   Fault fault;
   Role role = Role::kServer;
   switch (plan.promise) {
@@ -305,20 +299,19 @@ Fault draw_promised(const Plan& plan, Random& random, const FlownScenario& flown
     case Promise::kPause:
       fault.kind = Kind::kRequest;
       fault.other = static_cast<std::size_t>(ControlAction::ACTION_PAUSE);
-      fault.duration = draw_seconds(1, sync.calc_controller_patience_s() + 10);
+      fault.duration = draw_seconds(random, 1, sync.calc_controller_patience_s() + 10);
       break;
     default:
       fault.kind = Kind::kStop;
       role = Role::kClient;
-      fault.duration = draw_seconds(sync.wait.server_deadline_s + 1, calc_longest_stop_s(sync));
+      fault.duration =
+          draw_seconds(random, sync.wait.server_deadline_s + 1, calc_longest_stop_s(sync));
   }
   std::vector<std::size_t> targets;
   for (std::size_t i = 0; i < plan.programs.size(); ++i)
     if (plan.programs[i].role == role) targets.push_back(i);
-  fault.target = targets[static_cast<std::size_t>(
-      random.integer(0, static_cast<std::int64_t>(targets.size()) - 1))];
-  fault.step =
-      static_cast<std::uint64_t>(random.integer(0, static_cast<std::int64_t>(flown.last_step) - 5));
+  fault.target = targets[random.index(targets.size())];
+  fault.step = draw_step(random, flown, 5);
   return fault;
 }
 
@@ -336,12 +329,12 @@ Fault make_fault(const faults::Fault& given, const Plan& plan, Random& random) {
   if (given.is_at_step)
     fault.step = static_cast<std::uint64_t>(draw_whole(given.at));
   else
-    fault.at = to_instant(draw(random, given.at));
+    fault.at = sync::to_duration(draw(random, given.at));
   fault.target = is_of_host ? plan.programs[program].host : program;
-  fault.duration = to_instant(draw(random, given.for_s));
+  fault.duration = sync::to_duration(draw(random, given.for_s));
   fault.value = draw(random, given.value);
   if (given.kind == Kind::kKill && given.restart_s)  // at once is after a moment
-    fault.duration = std::max(Instant(1ms), to_instant(draw(random, *given.restart_s)));
+    fault.duration = std::max(Instant(1ms), sync::to_duration(draw(random, *given.restart_s)));
   if (given.kind == Kind::kCut) fault.other = plan.programs[*find_program(plan, given.to)].host;
   if (given.kind == Kind::kRequest) {
     fault.other = static_cast<std::size_t>(given.action);
@@ -354,14 +347,14 @@ Fault make_fault(const faults::Fault& given, const Plan& plan, Random& random) {
 Instant estimate_end(const Fault& fault, const Plan& plan, const config::Sync& sync) {
   const Instant round_trip = 2 * (plan.link.delay + plan.link.jitter) + 1ms;
   const Instant period =
-      to_instant(static_cast<double>(sync.period_ns) * 1e-9 / sync.real_time_factor);
+      sync::to_duration(static_cast<double>(sync.period_ns) * 1e-9 / sync.real_time_factor);
   const Instant begin =
       fault.step ? 3s + static_cast<std::int64_t>(*fault.step) * std::max(round_trip, period)
                  : fault.at;
   return begin + fault.duration + 100ms;
 }
 
-/// A recorder that is expected never comes back; the flight is paused until this is known.
+/// A recorder that is expected never comes back.
 void draw_lost_recorder(Plan& plan, Random& random, const FlownScenario& flown) {
   const auto is_recorder = [](const PlannedProgram& program) {
     return program.role == Role::kRecorder;
@@ -370,36 +363,28 @@ void draw_lost_recorder(Plan& plan, Random& random, const FlownScenario& flown) 
   Fault kill;
   kill.kind = Kind::kKill;
   kill.target = static_cast<std::size_t>(recorder - plan.programs.begin());
-  kill.step =
-      static_cast<std::uint64_t>(random.integer(0, static_cast<std::int64_t>(flown.last_step) - 5));
+  kill.step = draw_step(random, flown, 5);
   plan.faults.push_back(kill);
-  draw_long_absence(plan, random);
-  plan.faults.front().duration = Instant(0);
+  pause_until_known(plan, random, false);
 }
 
 /// The faults of a plan that has its programs.
 void draw_faults(Plan& plan, Random& random, const FlownScenario& flown) {
   if (plan.promise == Promise::kCalm || plan.promise == Promise::kTwoServers) return;
-  if (plan.promise == Promise::kLongStop && random.chance(0.5)) {
-    draw_silences(plan, random, flown);
-    return;
-  }
+  if (plan.promise == Promise::kLongStop && random.chance(0.5))
+    return draw_silences(plan, random, flown);
   if (plan.promise > Promise::kMild) {
     plan.faults.push_back(draw_promised(plan, random, flown));
     if (plan.promise == Promise::kRecorderRestart && random.chance(0.5))
-      draw_long_absence(plan, random);
+      pause_until_known(plan, random, true);
     return;
   }
   if (plan.promise == Promise::kNone && plan.programs[1].role == Role::kServer &&
-      random.chance(0.3)) {
-    draw_split(plan, random, flown);
-    return;
-  }
-  const config::Sync& sync = flown.scenario.sync;
-  if (plan.promise == Promise::kNone && sync.wait_for.recorders > 0 && random.chance(0.05)) {
-    draw_lost_recorder(plan, random, flown);
-    return;
-  }
+      random.chance(0.3))
+    return draw_split(plan, random, flown);
+  if (plan.promise == Promise::kNone && flown.scenario.sync.wait_for.recorders > 0 &&
+      random.chance(0.05))
+    return draw_lost_recorder(plan, random, flown);
   const std::int64_t faults = random.chance(0.15) ? 0 : random.integer(1, 6);
   for (std::int64_t i = 0; i < faults; ++i) {
     Fault fault = draw_fault(plan, random, faults);
@@ -432,13 +417,10 @@ Plan draw_plan(std::uint64_t seed, const std::vector<FlownScenario>& scenarios,
   Random random(Random(seed).next());
   Plan plan;
   plan.seed = seed;
-  plan.scenario =
-      static_cast<std::size_t>(random.integer(0, static_cast<std::int64_t>(scenarios.size()) - 1));
+  plan.scenario = random.index(scenarios.size());
   const FlownScenario& flown = scenarios[plan.scenario];
   const bool is_lockstep = flown.scenario.sync.mode == config::SyncMode::kLockstep;
-  const faults::Case* given = cases.empty() ? nullptr
-                                            : &cases[static_cast<std::size_t>(random.integer(
-                                                  0, static_cast<std::int64_t>(cases.size()) - 1))];
+  const faults::Case* given = cases.empty() ? nullptr : &cases[random.index(cases.size())];
   if (!given) plan.promise = draw_promise(random, flown.scenario.sync);
   plan.hosts = static_cast<std::size_t>(random.integer(given ? 2 : 1, 4));
   plan.link = given                            ? make_link(given->link, random)
@@ -458,7 +440,7 @@ Plan draw_plan(std::uint64_t seed, const std::vector<FlownScenario>& scenarios,
       plan.healed =
           std::max(plan.healed, estimate_end(plan.faults.back(), plan, flown.scenario.sync));
     }
-    if (given->until_s) plan.healed = to_instant(draw(random, *given->until_s));
+    if (given->until_s) plan.healed = sync::to_duration(draw(random, *given->until_s));
     return plan;
   }
   if (plan.promise == Promise::kNone && random.chance(0.1))
@@ -476,12 +458,12 @@ std::string name_program(const Plan& plan, std::size_t index) {
 }
 
 std::string describe(const Fault& fault) {
-  const double at = std::chrono::duration<double>(fault.at).count();
+  const double at = sync::to_seconds(fault.at);
   const std::string when =
       fault.step ? fmt::format("step {} + {:.6f} s", *fault.step, at) : fmt::format("{:.6f} s", at);
   return fmt::format("{} at {}: target {}, other {}, for {:.6f} s, value {:.4f}",
                      config::to_yaml_value(fault.kind), when, fault.target, fault.other,
-                     std::chrono::duration<double>(fault.duration).count(), fault.value);
+                     sync::to_seconds(fault.duration), fault.value);
 }
 
 std::vector<std::string> describe(const Plan& plan) {

@@ -72,10 +72,18 @@ void Program::wake_at(sync::Time time) {
   });
 }
 
+bool Program::sees(const bus::PeerId& server) const {
+  if (role_ == Role::kClient)
+    return peer_.matched_writers(TopicId::kState).count(server) > 0 &&
+           peer_.matched_readers(TopicId::kCommand).count(server) > 0;
+  return peer_.matched_writers(TopicId::kRecord).count(server) > 0 &&
+         peer_.matched_writers(TopicId::kStatus).count(server) > 0;
+}
+
 void Program::announce(const Participant& message) {
   announced_ = message;
   announced_time_ = now();
-  setting_.properties.on_announced(*this, message, peer_, servers_);
+  setting_.properties.on_announced(*this, message, servers_);
   peer_.write(message);
 }
 

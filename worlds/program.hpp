@@ -34,6 +34,8 @@ class Program {
   const Process& process() const { return process_; }
   const bus::PeerId& id() const { return peer_.id(); }
   const Peer& peer() const { return peer_; }
+  /// A client or recorder has discovered the endpoints of `server` that it needs.
+  bool sees(const bus::PeerId& server) const;
   const std::string& name() const { return process_.name(); }
   Role role() const { return role_; }
 

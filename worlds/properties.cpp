@@ -115,7 +115,10 @@ void Properties::on_yielded(const Program& server, std::uint64_t run_id) {
     return progress(other) > progress(own) || (progress(other) == progress(own) && id < run_id);
   };
   if (std::none_of(runs_.begin(), runs_.end(), has_won) && killed_.empty())
-    find(fmt::format("yields: {} yields to nobody who is further", server.name()));
+    find(fmt::format(
+        "yields: {} yields, but no other server of its vehicles is in a later phase, or in the "
+        "same one with a lower run id",
+        server.name()));
 }
 
 void Properties::on_published(std::uint64_t run_id, std::uint64_t step,
@@ -214,7 +217,7 @@ void Properties::check_stall(Run& run, std::uint64_t run_id) {
   if (timeline_.now() - since < kNamedWithin || run.named >= *run.published) return;
   run.is_stall_found = true;
   find(fmt::format("named: run {:016x} stands still since {:.3f} s, and nobody is named", run_id,
-                   std::chrono::duration<double>(since).count()));
+                   sync::to_seconds(since)));
 }
 
 void Properties::check_rivals(const Run& run, const Network& network) {
@@ -245,12 +248,11 @@ void Properties::on_run_end(std::uint64_t run_id, bool is_finished, std::string 
   run.has_ended = true;
   run.ended = timeline_.now();
   run.is_finished = is_finished;
-  if (run.began)
-    run.summary.duration_s = std::chrono::duration<double>(timeline_.now() - *run.began).count();
+  if (run.began) run.summary.duration_s = sync::to_seconds(timeline_.now() - *run.began);
   run.certificate = std::move(certificate);
 }
 
-void Properties::on_announced(const Program& program, const Participant& message, const Peer& peer,
+void Properties::on_announced(const Program& program, const Participant& message,
                               const sync::Servers& heard) {
   if (message.run_id() == 0) return;
   const bool is_client = program.role() == Role::kClient;
@@ -270,15 +272,10 @@ void Properties::on_announced(const Program& program, const Participant& message
                                   : run.recorders.insert(program.name()).second;
   if (!is_first) return;
   run.ready_since[program.name()] = timeline_.now();
-  const bus::PeerId& server = run.server->id();
-  const bool sees_server = is_client ? peer.matched_writers(TopicId::kState).count(server) > 0 &&
-                                           peer.matched_readers(TopicId::kCommand).count(server) > 0
-                                     : peer.matched_writers(TopicId::kRecord).count(server) > 0 &&
-                                           peer.matched_writers(TopicId::kStatus).count(server) > 0;
   // It may know the server first. Then the server learns of it at its next look.
   if (is_client && run.server->peer().matched_readers(TopicId::kState).count(program.id()) == 0)
     run.is_match_late = true;
-  if (!sees_server)
+  if (!program.sees(run.server->id()))
     find(fmt::format("ready: {} says so of run {:016x} before it sees the server", program.name(),
                      message.run_id()));
 }
@@ -411,7 +408,7 @@ void Properties::check_begin(std::uint64_t run_id, const Run& run, const FlownSc
   note(run.recorders, expected.recorders);
   if (*run.began > ready + kBeginsWithin)
     find(fmt::format("calm: run {:016x} begins {:.3f} s after the last one is ready", run_id,
-                     std::chrono::duration<double>(*run.began - ready).count()));
+                     sync::to_seconds(*run.began - ready)));
 }
 
 void Properties::check_recording(const Program& program, const StoredRecording& recording,
@@ -508,7 +505,7 @@ void Properties::check_end(const Program& server,
     }
     if (server.ended() > last + kEndsWithin)
       find(fmt::format("prompt: {} ends {:.3f} s after its last recorder", server.name(),
-                       std::chrono::duration<double>(server.ended() - last).count()));
+                       sync::to_seconds(server.ended() - last)));
   }
 }
 

@@ -72,8 +72,7 @@ class Properties {
   void on_status(const SimStatus& status, const Network& network);
   void on_run_end(std::uint64_t run_id, bool is_finished, std::string certificate);
   /// `heard`: what the program knows of servers.
-  void on_announced(const Program& program, const Participant& message, const Peer& peer,
-                    const sync::Servers& heard);
+  void on_announced(const Program& program, const Participant& message, const sync::Servers& heard);
   void on_request(const SimControl& request) { requests_[request.request_id()] = request.run_id(); }
   void on_replied(const Program& server, std::uint64_t request_id, const Network& network);
   void on_interrupted(const Program& program);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 namespace sls::worlds {
@@ -22,6 +23,10 @@ class Random {
   /// In [low, high].
   std::int64_t integer(std::int64_t low, std::int64_t high) {
     return low + static_cast<std::int64_t>(next() % static_cast<std::uint64_t>(high - low + 1));
+  }
+  /// Below `count`, which is at least 1.
+  std::size_t index(std::size_t count) {
+    return static_cast<std::size_t>(integer(0, static_cast<std::int64_t>(count) - 1));
   }
   bool chance(double probability) { return probability > 0 && uniform() < probability; }
   /// A generator of its own, so that more draws here change nothing there.

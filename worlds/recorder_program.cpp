@@ -85,9 +85,7 @@ record::RecorderCore::Now RecorderProgram::look_around() {
   seen.interruption = stop_signal_;
   if (!writing_) return seen;
   seen.is_closed = has_closed_;
-  const bus::PeerId& server = core_->run()->server;
-  seen.hears_server = peer_.matched_writers(TopicId::kRecord).count(server) > 0 &&
-                      peer_.matched_writers(TopicId::kStatus).count(server) > 0;
+  seen.hears_server = sees(core_->run()->server);
   seen.last_complete_step = writing_->last_complete_step();
   return seen;
 }

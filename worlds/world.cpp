@@ -26,9 +26,9 @@ Instant calc_patience(const FlownScenario& flown, const Link& link) {
   const double wait_s = std::max({sync.wait_for.timeout_s, sync.wait.controller.deadline_s,
                                   sync.wait.recorder.deadline_s, sync.wait.server_deadline_s});
   const double step_s = static_cast<double>(sync.period_ns) * 1e-9 / sync.real_time_factor +
-                        std::chrono::duration<double>(2 * (link.delay + link.jitter)).count();
+                        sync::to_seconds(2 * (link.delay + link.jitter));
   const double flight_s = static_cast<double>(flown.last_step) * step_s;
-  return 110s + Instant(static_cast<std::int64_t>((4 * wait_s + 2 * flight_s) * 1e9));
+  return 110s + sync::to_duration(4 * wait_s + 2 * flight_s);
 }
 
 class World {
@@ -66,8 +66,7 @@ class World {
   void make_hosts() {
     Random random = setting_.random.split();
     for (std::size_t i = 0; i < plan_.hosts; ++i) {
-      const auto wall_offset = std::chrono::nanoseconds(
-          static_cast<std::int64_t>(random.between(-1, 1) * plan_.wall_offset_s * 1e9));
+      const auto wall_offset = sync::to_duration(random.between(-1, 1) * plan_.wall_offset_s);
       hosts_.emplace_back(setting_.timeline, fmt::format("host-{}", i),
                           std::chrono::seconds(random.integer(100, 1'000'000)),
                           random.between(-1, 1) * plan_.drift, wall_offset);
@@ -168,13 +167,12 @@ class World {
         });
       case Kind::kSlow:
         if (Program* program = current_[fault.target]) {
-          program->set_slowness(Instant(static_cast<std::int64_t>(fault.value * 1e9)));
+          program->set_slowness(sync::to_duration(fault.value));
           setting_.timeline.after(fault.duration, [program] { program->set_slowness(Instant(0)); });
         }
         return;
       case Kind::kClock:
-        return hosts_[fault.target].set_wall_clock(
-            std::chrono::nanoseconds(static_cast<std::int64_t>(fault.value * 1e9)));
+        return hosts_[fault.target].set_wall_clock(sync::to_duration(fault.value));
       case Kind::kDiskFull:
         return fill_disk(fault);
       case Kind::kRequest:
@@ -272,7 +270,7 @@ class World {
     setting_.trace.add(setting_.timeline.count());
     verdict.hash = setting_.trace.hash();
     verdict.trace = setting_.trace.lines();
-    verdict.simulated_s = std::chrono::duration<double>(setting_.timeline.now()).count();
+    verdict.simulated_s = sync::to_seconds(setting_.timeline.now());
     verdict.events = setting_.timeline.count();
     verdict.begun_faults = begun_faults_;
     verdict.steps = setting_.properties.steps();

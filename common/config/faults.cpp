@@ -257,12 +257,7 @@ std::string to_line(const Fault& fault) {
 
 std::vector<ListedKey> list_keys() {
   const Models none;
-  std::vector<ListedKey> keys;
-  Alternatives alternatives;
-  KeyLister lister(keys, none, "", alternatives);
-  Case one;
-  describe(lister, one);
-  return keys;
+  return list_keys_of<Case>(none);
 }
 
 }  // namespace sls::config::faults

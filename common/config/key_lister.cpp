@@ -3,12 +3,7 @@
 namespace sls::config {
 
 std::vector<ListedKey> list_scenario_keys(const Models& models) {
-  std::vector<ListedKey> keys;
-  Alternatives alternatives;
-  KeyLister lister(keys, models, "", alternatives);
-  Scenario scenario;
-  describe(lister, scenario);
-  return keys;
+  return list_keys_of<Scenario>(models);
 }
 
 }  // namespace sls::config

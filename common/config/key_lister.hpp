@@ -253,6 +253,17 @@ class KeyLister {
   std::vector<std::pair<std::string, std::string>> one_of_;  // names and their presence
 };
 
+/// Every key of a `Root`, in the order of its description.
+template <class Root>
+std::vector<ListedKey> list_keys_of(const Models& models) {
+  std::vector<ListedKey> keys;
+  Alternatives alternatives;
+  KeyLister lister(keys, models, "", alternatives);
+  Root root;
+  describe(lister, root);
+  return keys;
+}
+
 /// Every key of a scenario, in the order of scenario_keys.hpp.
 std::vector<ListedKey> list_scenario_keys(const Models& models = all_models());
 
