@@ -101,9 +101,8 @@ void draw_programs(Plan& plan, Random& random, const FlownScenario& flown,
   if (plan.promise == Promise::kTwoServers)
     add(Role::kServer).start = plan.programs.front().start + draw_time(random, 0ms, 800ms);
   // A server that was started again, or second, waits for the expected ones alone. One that nobody
-  // waits for may miss the flight after a reset. In real time a stronger client that joins may cost
-  // a step.
-  const bool has_surplus = !is_calm && plan.promise != Promise::kServerRestart &&
+  // waits for may miss the flight after a reset.
+  const bool has_surplus = plan.promise != Promise::kServerRestart &&
                            plan.promise != Promise::kTwoServers && plan.promise != Promise::kReset;
   const int clients =
       expected.controllers + (plan.promise == Promise::kTakeOver

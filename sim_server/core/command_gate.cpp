@@ -79,6 +79,9 @@ void CommandGate::set_clients(const std::vector<ReadyClient>& clients) {
   std::vector<Client> updated;
   for (const ReadyClient& identity : clients) {
     Client client;
+    // Whoever joins in flight may not get the state that is awaited: the others answer it
+    // meanwhile.
+    client.is_new = has_begun_ && !clients_.empty();
     if (Client* known = find_client(identity.peer)) client = std::exchange(*known, {});
     client.identity = identity;
     updated.push_back(std::move(client));
@@ -137,7 +140,7 @@ Verdict CommandGate::judge(const OfferedAnswer& offered, const bus::PeerId& send
   if (first)
     return first->answer.f_Q_W == offered.answer.f_Q_W ? Verdict::kDuplicate
                                                        : Verdict::kContradiction;
-  client->silent = false;
+  client->is_new = client->silent = false;
   client->misses = 0;
   client->identity.is_gone = false;
   client->answered_end = step_ + 1;
@@ -174,6 +177,7 @@ Verdict CommandGate::judge_past(const OfferedAnswer& offered, const bus::PeerId&
     return first->force == force ? Verdict::kDuplicate : Verdict::kContradiction;
   Client* client = find_client(sender);
   if (!client) return Verdict::kWrongStep;
+  client->is_new = false;
   if (first) {
     superseded_by_ = first->sender;
     return Verdict::kSuperseded;
@@ -216,7 +220,7 @@ const CommandGate::Client* CommandGate::find_awaited() const {
   for (const Client& client : clients_) {
     if (client.is_refused(step_)) continue;
     const Client*& first = client.identity.is_gone ? gone : silent;
-    if (!client.silent && !client.identity.is_gone) return &client;
+    if (client.is_expected()) return &client;
     if (!first) first = &client;
   }
   return silent ? silent : gone;  // all are silent: await the strongest
@@ -231,8 +235,7 @@ bool CommandGate::pass_over_silent_client() {
   const Client* awaited = find_awaited();
   if (!awaited || accepted_) return false;
   const bool has_next = std::any_of(clients_.begin(), clients_.end(), [&](const Client& client) {
-    return &client != awaited && !client.silent && !client.identity.is_gone &&
-           !client.is_refused(step_);
+    return &client != awaited && client.is_expected() && !client.is_refused(step_);
   });
   if (!has_next) return false;
   if (!flyer_) flyer_ = awaited->identity;  // the first awaited client, for the take-over message

@@ -61,7 +61,8 @@ class CommandGate {
  public:
   CommandGate(std::uint64_t run_id, std::uint32_t vehicle_id, const AnswerLimits& limits);
 
-  /// Sets the clients that may answer. Clients that stay keep their records.
+  /// Sets the clients that may answer. Clients that stay keep their records. One that joins others
+  /// in flight is new: it is awaited once it has answered.
   void set_clients(const std::vector<ReadyClient>& clients);
 
   /// Awaits the answers to `step` from now on. Steps are awaited in order. A step that went by
@@ -77,8 +78,9 @@ class CommandGate {
   /// The last answer to the awaited step that was refused because of its content.
   const std::optional<OfferedAnswer>& refused() const { return refused_; }
 
-  /// The client whose answer is awaited: the strongest that is neither gone, silent nor refused. If
-  /// there is none, the strongest that is not refused, of those that are not gone first.
+  /// The client whose answer is awaited: the strongest that is neither new, gone, silent nor
+  /// refused. If there is none, the strongest that is not refused, of those that are not gone
+  /// first.
   std::optional<ReadyClient> awaited_client() const;
 
   /// Set when the awaited step's answer came from another client than the last accepted answer.
@@ -121,8 +123,10 @@ class CommandGate {
  private:
   struct Client {
     bool is_refused(std::uint64_t step) const { return !refusal.empty() && refused_step == step; }
+    bool is_expected() const { return !is_new && !silent && !identity.is_gone; }
 
     ReadyClient identity;
+    bool is_new = false;  // joined in flight, beside others, and has not answered yet
     bool silent = false;
     int misses = 0;                     // steps in a row that it did not answer
     std::uint64_t answers = 0;          // received, also refused ones
