@@ -6,15 +6,22 @@ namespace sls::worlds {
 
 void ForeignProgram::start() {
   random_ = setting_.random.split();
-  if (random_.chance(0.8)) peer_.add_writer<Participant>();
-  peer_.add_writer<Commands>();
+  const auto& mistakes = list_announcement_mistakes();
+  if (random_.chance(0.8)) mistake_ = &mistakes[random_.index(mistakes.size())];
+  if (mistake_ && mistake_->is_wild && !is_wild_) mistake_ = &mistakes.front();
+  if (mistake_) peer_.add_writer<Participant>();
+  if (!mistake_ || mistake_->writes_answers) peer_.add_writer<Commands>(random_.chance(0.8));
   is_impostor_ = random_.chance(0.5);
   if (is_impostor_) {
     peer_.add_writer<States>();
     peer_.add_writer<RecordBatch>();
     peer_.add_writer<SimStatus>();
   }
-  peer_.add_reader<States>([this](const States& sample, const Peer::Arrival&) { answer(sample); });
+  peer_.add_reader<Parameters>([this](const Parameters& sample, const Peer::Arrival&) {
+    if (runs_.insert(sample.run_id()).second) announce_wrongly(sample);
+  });
+  if (!mistake_ || mistake_->reads_states)
+    peer_.add_reader<States>([this](const States& sample, const Peer::Arrival&) { answer(sample); });
   setting_.network.announce(peer_);
   wake_soon();
 }
@@ -26,21 +33,29 @@ void ForeignProgram::wake() {
   wake_at(now() + std::chrono::milliseconds(100));
 }
 
-void ForeignProgram::announce_wrongly(std::uint64_t run_id) {
+void ForeignProgram::announce_wrongly(const Parameters& parameters) {
   Participant message;
-  const bool has_contract = random_.chance(0.7);
-  const bool has_scenario = has_contract && random_.chance(0.5);
-  message.contract_sha256(has_contract ? bus::kContractSha256 : "nonsense");
+  message.contract_sha256(bus::kContractSha256);
   message.role(ParticipantRole::ROLE_CONTROLLER);
   message.name(name());
   message.host(process_.host().name());
-  message.vehicle_ids({0});
+  message.vehicle_ids(sync::list_vehicle_ids(parameters));
   message.strength(9);
-  message.scenario_sha256(has_scenario ? setting_.flown->scenario.sha256 : "nonsense");
-  message.run_id(run_id);
-  message.ready(!has_scenario);
+  message.scenario_sha256(parameters.scenario_sha256());
+  message.run_id(parameters.run_id());
+  message.ready(true);
   message.last_complete_step(-1);
-  announce(message);
+  if (mistake_) {
+    mistake_->make(message);
+    announce(message);
+  }
+  if (!random_.chance(0.5)) return;
+  Commands early;  // before there is a state
+  early.client_name(name());
+  early.run_id(parameters.run_id());
+  for (const std::uint32_t id : sync::list_vehicle_ids(parameters))
+    early.vehicles().emplace_back().vehicle_id(id);
+  peer_.write(early);
 }
 
 /// Says of the run of a server that it has finished, with rows that nobody flew.
@@ -65,10 +80,6 @@ void ForeignProgram::pretend(const States& sample) {
 }
 
 void ForeignProgram::answer(const States& sample) {
-  if (sample.run_id() != announced_run_) {
-    announced_run_ = sample.run_id();
-    announce_wrongly(sample.run_id());
-  }
   if (random_.chance(0.7)) return;
   if (is_impostor_ && random_.chance(0.1)) pretend(sample);
   Commands answers;
