@@ -23,6 +23,8 @@ constexpr Instant kKnownAfter = 500ms;
 /// It looks for a stop signal every 20 ms, between two requests.
 constexpr Instant kObeysWithin = 500ms;
 constexpr Instant kGivesUpWithin = 2s;
+/// A server may presume a client dead that was silent for so long, until its next look.
+constexpr Instant kForgottenAfter = sync::kPresumedDeadAfter - kSlack;
 
 /// False if a number that the server looks at is not finite.
 bool is_finite(const ControlCommand& command) {
@@ -34,6 +36,11 @@ bool is_finite(const ControlCommand& command) {
 }
 
 }  // namespace
+
+void FlightWatch::Client::hear(Instant now) {
+  if (now - heard >= kForgottenAfter) back = now;
+  heard = now;
+}
 
 // --- arrives at the server -----------------------------------------------------------------------
 
@@ -62,15 +69,15 @@ void FlightWatch::on_member(const Participant& message, const bus::PeerId& peer,
   client.order = {-message.strength(), message.name().to_string(), peer};
   has_libraries_ = has_libraries_ || message.library_sha256().size() > 0;
   client.vehicle_ids.assign(message.vehicle_ids().begin(), message.vehicle_ids().end());
-  client.heard = now;
+  client.hear(now);
   if (is_ready) rightful_.insert(sender.name());
 }
 
 void FlightWatch::on_answers(const Commands& sample, const Process& sender, Instant now) {
   Client& client = clients_[sender.name()];
   client.process = &sender;
-  client.heard = now;
-  if (sample.run_id() != run_id_ || sample.step() != step_) return;
+  client.hear(now);
+  if (sample.run_id() != run_id_ || !has_begun_ || sample.step() != step_) return;
   if (client.answered_step != step_) client.answers.clear();
   client.answered_step = step_;
   for (const ControlCommand& command : sample.vehicles())
@@ -101,6 +108,7 @@ void FlightWatch::on_published(std::uint64_t step, Instant now) {
   disobeys(interrupted_, "SIGINT");
   disobeys(stop_requested_, "an operator's stop");
   disobeys(paused_, "an operator's pause");
+  has_begun_ = true;
   step_ = step;
   published_ = now;
   sent_ = now;
@@ -205,7 +213,7 @@ std::optional<Instant> FlightWatch::check_flyer(const model::StepRecord& record,
     const bool flew = before != flyers_.end() && before->second == name;
     const bool has_left = client.process->has_ended() && !client.process->was_killed();
     if (is_lockstep() && flew && !has_left && !client.has_answered(vehicle, record.step) &&
-        now - client.heard < sync::kPresumedDeadAfter - kSlack &&
+        now - client.heard < kForgottenAfter && client.back + kKnownAfter < now &&
         waited < take_over - take_over / 100)
       find_(fmt::format("take-over: '{}' flies step {} after {:.3f} s without '{}'",
                         record.client_name, record.step, sync::to_seconds(waited), name));

@@ -63,10 +63,12 @@ class FlightWatch {
     bool is_ready = false;
     Instant ready{0};  // its first announcement that says so
     Instant heard{0};  // its last sample
+    Instant back{0};   // the first one after a long silence
     std::optional<std::pair<std::uint64_t, Instant>> refused;  // the last defective answer
     std::uint64_t answered_step = 0;
     std::map<std::uint32_t, Instant> answers;  // to that step, by vehicle
 
+    void hear(Instant now);
     bool has_answered(std::uint32_t vehicle, std::uint64_t step) const {
       return answered_step == step && answers.count(vehicle) > 0;
     }
@@ -95,6 +97,7 @@ class FlightWatch {
   std::set<std::string> rightful_;               // ready for this run, at any time
   std::map<std::uint32_t, std::string> flyers_;  // of the last step, by vehicle
   std::map<std::uint32_t, Lacking> lacking_;
+  bool has_begun_ = false;
   std::uint64_t step_ = 0;
   Instant published_{0};
   std::optional<Instant> sent_;  // the last state of an open step

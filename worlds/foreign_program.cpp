@@ -1,5 +1,7 @@
 #include "worlds/foreign_program.hpp"
 
+#include <spdlog/fmt/fmt.h>
+
 #include <limits>
 
 namespace sls::worlds {
@@ -8,7 +10,7 @@ void ForeignProgram::start() {
   random_ = setting_.random.split();
   const auto& mistakes = list_announcement_mistakes();
   if (random_.chance(0.8)) mistake_ = &mistakes[random_.index(mistakes.size())];
-  if (mistake_ && mistake_->is_wild && !is_wild_) mistake_ = &mistakes.front();
+  if (mistake_ && mistake_->is_wild && !options_.is_wild) mistake_ = &mistakes.front();
   if (mistake_) peer_.add_writer<Participant>();
   if (!mistake_ || mistake_->writes_answers) peer_.add_writer<Commands>(random_.chance(0.8));
   is_impostor_ = random_.chance(0.5);
@@ -21,16 +23,38 @@ void ForeignProgram::start() {
     if (runs_.insert(sample.run_id()).second) announce_wrongly(sample);
   });
   if (!mistake_ || mistake_->reads_states)
-    peer_.add_reader<States>([this](const States& sample, const Peer::Arrival&) { answer(sample); });
+    peer_.add_reader<States>(
+        [this](const States& sample, const Peer::Arrival&) { answer(sample); });
   setting_.network.announce(peer_);
+  if (options_.is_crowd) make_crowd();
   wake_soon();
 }
 
+void ForeignProgram::make_crowd() {
+  for (std::size_t i = 0; i <= sync::Membership::kMostMembers; ++i) {
+    Peer& peer = *crowd_.emplace_back(&setting_.network.join(process_));
+    peer.add_writer<Participant>();
+    peer.add_writer<SimStatus>();
+    setting_.network.announce(peer);
+    Participant message;
+    message.name(fmt::format("{}-{}", name(), i));
+    peer.write(message);
+    SimStatus status;
+    status.run_id(random_.next());
+    peer.write(status);
+  }
+}
+
+void ForeignProgram::leave_with_crowd(bool with_goodbye) {
+  for (Peer* peer : crowd_) setting_.network.leave(*peer, with_goodbye);
+}
+
 void ForeignProgram::wake() {
-  if (was_interrupted()) return exit(130, "interrupted");
   repeat_announcement_if_due();
-  if (setting_.are_all_others_done()) return exit(0, "");
-  wake_at(now() + std::chrono::milliseconds(100));
+  if (!was_interrupted() && !setting_.are_all_others_done())
+    return wake_at(now() + std::chrono::milliseconds(100));
+  leave_with_crowd(true);
+  exit(was_interrupted() ? 130 : 0, stop_signal_);
 }
 
 void ForeignProgram::announce_wrongly(const Parameters& parameters) {
@@ -61,7 +85,7 @@ void ForeignProgram::announce_wrongly(const Parameters& parameters) {
 /// Says of the run of a server that it has finished, with rows that nobody flew.
 void ForeignProgram::pretend(const States& sample) {
   SimStatus status;
-  status.run_id(sample.run_id());
+  status.run_id(random_.chance(0.8) ? sample.run_id() : random_.next());
   status.sample_index(1'000'000);
   status.phase(random_.chance(0.5) ? RunPhase::PHASE_FINISHED : RunPhase::PHASE_RESET);
   status.step(sample.step());

@@ -98,7 +98,7 @@ bool Network::are_connected(const bus::PeerId& a, const bus::PeerId& b) const {
 
 void Network::announce(Peer& peer) {
   for (const auto& other : peers_) {
-    if (other.get() == &peer || other->process().has_ended()) continue;
+    if (&other->process() == &peer.process() || other->process().has_ended()) continue;
     timeline_.after(draw_delay(peer, *other),
                     [this, &peer, other = other.get()] { discover(*other, peer); });
     timeline_.after(draw_delay(*other, peer),
@@ -150,7 +150,7 @@ void Network::match(Peer& observer, Peer& observed, const Peer::Endpoint& endpoi
 
 void Network::leave(Peer& peer, bool with_goodbye) {
   for (const auto& other : peers_) {
-    if (other.get() == &peer || other->process().has_ended()) continue;
+    if (&other->process() == &peer.process() || other->process().has_ended()) continue;
     const bool is_heard = with_goodbye && !is_lost(peer, *other);
     const Instant delay = is_heard ? draw_delay(peer, *other) : kLease;
     timeline_.after(delay, [this, &peer, other = other.get()] {

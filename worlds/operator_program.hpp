@@ -23,9 +23,7 @@ class OperatorProgram : public Program {
     SimControl message;
     message.run_id(run_id);
     message.request_id(++requests_);
-    message.operator_name(random_.chance(0.9)   ? "operator@world"
-                          : random_.chance(0.5) ? "\n"
-                                                : "");
+    message.operator_name(random_.chance(0.9) ? "operator@world" : random_.chance(0.5) ? "\n" : "");
     message.action(action);
     message.steps(steps);
     peer_.write(message);

@@ -131,7 +131,11 @@ void draw_programs(Plan& plan, Random& random, const FlownScenario& flown,
     client.is_sloppy = random.chance(0.2);
     if (is_wild) draw_habits(client, random);
   }
-  if (random.chance(0.15)) add(Role::kForeign).is_wild = is_wild;
+  if (random.chance(0.15)) {
+    PlannedProgram& foreign = add(Role::kForeign);
+    foreign.is_wild = is_wild;
+    foreign.is_crowd = is_wild && random.chance(0.03);
+  }
   const int recorders =
       std::max(expected.recorders, static_cast<int>(random.integer(0, has_surplus ? 2 : 0)));
   for (int i = 0; i < recorders; ++i) {

@@ -51,6 +51,7 @@ struct PlannedProgram {
   bool has_library = false;                ///< a client, unlike the others
   bool says_done = false;                  ///< a client that answers nevertheless
   bool is_wild = false;                    ///< a foreign client for which others may wait
+  bool is_crowd = false;                   ///< a foreign client with very many participants
   bool resumes = false;  ///< a recorder that takes the place of a killed one goes on
   Instant delay{0};      ///< computing time of an answer; of the disk of a recorder
 };

@@ -35,7 +35,8 @@ void ServerProgram::start() {
   peer_.add_writer<Parameters>();
   peer_.add_reader<Participant>([this](const Participant& sample, const Peer::Arrival& arrival) {
     note(sample, arrival);
-    if (flight_) flight_->on_member(sample, arrival.sender, sender(arrival), setting_.timeline.now());
+    if (flight_)
+      flight_->on_member(sample, arrival.sender, sender(arrival), setting_.timeline.now());
     if (core_ && core_->has_news(*this)) wake_soon();
   });
   read<Parameters>();

@@ -94,7 +94,8 @@ class World {
                                  planned.is_early, planned.breaks_at, planned.announces_once,
                                  planned.announced_name, planned.has_library, planned.says_done});
     else if (planned.role == Role::kForeign)
-      program = std::make_unique<ForeignProgram>(setting_, host, name, planned.is_wild);
+      program = std::make_unique<ForeignProgram>(
+          setting_, host, name, ForeignProgram::Options{planned.is_wild, planned.is_crowd});
     else
       program = std::make_unique<RecorderProgram>(
           setting_, host, name,
