@@ -2,9 +2,11 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include <algorithm>
 #include <exception>
-#include <limits>
 #include <utility>
+
+#include "worlds/mistakes.hpp"
 
 namespace sls::worlds {
 namespace {
@@ -17,10 +19,11 @@ control::ClientCore::Options make_core_options(const config::Scenario& scenario,
   control::ClientCore::Options made;
   made.vehicle_ids = options.vehicle_ids;
   made.identity.contract_sha256(bus::kContractSha256);
-  made.identity.name(name);
+  made.identity.name(options.announced_name.empty() ? name : options.announced_name);
   made.identity.host(host);
   made.identity.strength(options.strength);
   made.identity.scenario_sha256(scenario.sha256);
+  if (options.has_library) made.identity.library_sha256(std::string(64, '1'));
   made.join_timeout_s = scenario.sync.wait_for.timeout_s;
   made.server_deadline_s = scenario.sync.wait.server_deadline_s;
   made.follows_servers = options.follows_servers;
@@ -31,26 +34,6 @@ config::Scenario choose_scenario(const Setting& setting, const ClientProgram::Op
   config::Scenario scenario = setting.flown->scenario;
   if (options.has_other_scenario) scenario.sha256 = std::string(64, '0');
   return scenario;
-}
-
-/// Makes an answer one that a server refuses: `way` says how.
-void break_answer(ControlCommand& command, std::uint64_t way) {
-  switch (way % 5) {
-    case 0:
-      command.f_Q_W_n()[2] = std::numeric_limits<double>::quiet_NaN();
-      break;
-    case 1:
-      command.f_Q_W_n()[2] = 1e6;
-      break;
-    case 2:
-      command.fault(FaultCode::FAULT_ROD_LEVEL);
-      break;
-    case 3:
-      command.mission(MissionPhase::MISSION_FAILED);
-      break;
-    default:
-      command.fault(static_cast<FaultCode>(99));
-  }
 }
 
 /// The same answers with other forces.
@@ -76,7 +59,7 @@ void ClientProgram::start() {
   peer_.add_reader<States>(
       [this](const States& sample, const Peer::Arrival& arrival) { on_states(sample, arrival); });
   setting_.network.announce(peer_);
-  announce(core_.make_announcement());
+  announce_state();
   wake_soon();
 }
 
@@ -94,7 +77,7 @@ void ClientProgram::wake() {
   } catch (const config::ConfigError& error) {
     return exit(2, error.what());
   }
-  if (act == Act::kAnnounceReady || act == Act::kLeave) announce(core_.make_announcement());
+  if (act == Act::kAnnounceReady || act == Act::kLeave) announce_state();
   if (!options_.announces_once) repeat_announcement_if_due();
   if (core_.phase() == control::ClientCore::Phase::kEnded)
     return exit(core_.error().empty() ? 0 : 1, core_.error());
@@ -108,7 +91,13 @@ void ClientProgram::begin() {
                                  [this] { return now(); },
                                  [this](const std::string& line) { say(line); }});
   say(fmt::format("joins run {:016x}", core_.run()->parameters.run_id()));
-  announce(core_.make_announcement());
+  announce_state();
+}
+
+void ClientProgram::announce_state() {
+  Participant message = core_.make_announcement();
+  if (options_.says_done) message.done(message.ready());
+  announce(message);
 }
 
 void ClientProgram::on_states(const States& sample, const Peer::Arrival& arrival) {
@@ -127,11 +116,7 @@ void ClientProgram::on_states(const States& sample, const Peer::Arrival& arrival
 }
 
 void ClientProgram::send(const Commands& answers) {
-  if (options_.breaks_at && answers.step() >= *options_.breaks_at) {
-    Commands broken = answers;
-    for (ControlCommand& command : broken.vehicles()) break_answer(command, *options_.breaks_at);
-    return peer_.write(broken);
-  }
+  if (options_.breaks_at && answers.step() >= *options_.breaks_at && send_broken(answers)) return;
   if (options_.is_sloppy && setting_.random.chance(0.05)) send_wrongly(answers);
   peer_.write(answers);
   if (!options_.is_early) return;
@@ -140,6 +125,18 @@ void ClientProgram::send(const Commands& answers) {
     early.step(early.step() + 1);
     peer_.write(early);
   });
+}
+
+/// False if the mistake is over.
+bool ClientProgram::send_broken(const Commands& answers) {
+  const auto& mistakes = list_answer_mistakes();
+  const AnswerMistake& mistake = mistakes[*options_.breaks_at % mistakes.size()];
+  if (answers.step() - *options_.breaks_at >= mistake.steps) return false;
+  Commands broken = answers;
+  for (ControlCommand& command : broken.vehicles()) mistake.make(command, broken.step());
+  if (mistake.copies == 0) broken.vehicles().clear();
+  for (int i = 0; i < std::max(mistake.copies, 1); ++i) peer_.write(broken);
+  return true;
 }
 
 void ClientProgram::send_wrongly(const Commands& answers) {

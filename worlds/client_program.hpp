@@ -24,20 +24,26 @@ class ClientProgram : public Program {
     bool is_sloppy = false;   ///< one answer in 20 comes after one to another run, step or vehicle
     Instant compute_time{0};  ///< of an answer
     bool is_early = false;    ///< each answer is followed by one to the next step
-    std::optional<std::uint64_t> breaks_at;  ///< from this step on its forces are no numbers
+    std::optional<std::uint64_t> breaks_at;  ///< from this step on it makes a mistake
     bool announces_once = false;  ///< unlike our clients, it does not repeat its announcement
+    std::string announced_name;   ///< unlike the one in its answers; empty: the same
+    bool has_library = false;     ///< a shared library, which others do not have
+    bool says_done = false;       ///< although it still answers
     control::LawMaker make_law = &control::make_control_law;
   };
   ClientProgram(Setting& setting, Host& host, std::string name, const Options& options);
   void start() override;
   const Options& options() const { return options_; }
   bool has_flown() const { return answerer_ != nullptr; }
+  bool keeps_contract() const { return !options_.breaks_at; }
 
  private:
   void wake() override;
   void begin();
+  void announce_state();
   void on_states(const States& sample, const Peer::Arrival& arrival);
   void send(const Commands& answers);
+  bool send_broken(const Commands& answers);
   void send_wrongly(const Commands& answers);
 
   const Options options_;

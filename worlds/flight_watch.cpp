@@ -23,18 +23,41 @@ constexpr Instant kKnownAfter = 500ms;
 /// It looks for a stop signal every 20 ms, between two requests.
 constexpr Instant kObeysWithin = 500ms;
 constexpr Instant kGivesUpWithin = 2s;
+/// A server may presume a client dead that was silent for so long, until its next look.
+constexpr Instant kForgottenAfter = sync::kPresumedDeadAfter - kSlack;
 
-/// True unless the answer is one of those that broken clients send.
-bool is_sound(const ControlCommand& command) {
-  return std::abs(command.f_Q_W_n()[2]) < 1e5 && command.fault() == FaultCode::FAULT_NONE &&
-         command.mission() != MissionPhase::MISSION_FAILED;
+/// False if a number that the server looks at is not finite.
+bool is_finite(const ControlCommand& command) {
+  double sum = 0;
+  for (const double force : command.f_Q_W_n()) sum += force;
+  for (const double number : command.controller().numbers()) sum += number;
+  for (const double position : command.reference().position_m()) sum += position;
+  return std::isfinite(sum);
 }
 
 }  // namespace
 
+void FlightWatch::Client::hear(Instant now) {
+  if (now - heard >= kForgottenAfter) back = now;
+  heard = now;
+}
+
 // --- arrives at the server -----------------------------------------------------------------------
 
-void FlightWatch::on_member(const Participant& message, const Process& sender, Instant now) {
+/// True unless the answer has a mistake for which it is refused.
+bool FlightWatch::is_sound(const ControlCommand& command, std::uint64_t step) const {
+  const auto& force = command.f_Q_W_n();
+  const std::uint32_t stage = command.controller().stage_index();
+  const bool is_over =
+      command.mission() == MissionPhase::MISSION_FINISHED || stage == limits_.stages;
+  return is_finite(command) && std::hypot(force[0], force[1], force[2]) <= limits_.force &&
+         command.fault() == FaultCode::FAULT_NONE &&
+         command.mission() < MissionPhase::MISSION_FAILED && stage <= limits_.stages &&
+         !(is_over && step < limits_.earliest_end);
+}
+
+void FlightWatch::on_member(const Participant& message, const bus::PeerId& peer,
+                            const Process& sender, Instant now) {
   if (message.role() != ParticipantRole::ROLE_CONTROLLER) return;
   Client& client = clients_[sender.name()];
   const bool is_ready = message.ready() && message.run_id() == run_id_ &&
@@ -43,21 +66,22 @@ void FlightWatch::on_member(const Participant& message, const Process& sender, I
   if (is_ready && !client.is_ready) client.ready = now;
   client.is_ready = is_ready;
   client.process = &sender;
-  client.strength = message.strength();
+  client.order = {-message.strength(), message.name().to_string(), peer};
+  has_libraries_ = has_libraries_ || message.library_sha256().size() > 0;
   client.vehicle_ids.assign(message.vehicle_ids().begin(), message.vehicle_ids().end());
-  client.heard = now;
+  client.hear(now);
   if (is_ready) rightful_.insert(sender.name());
 }
 
 void FlightWatch::on_answers(const Commands& sample, const Process& sender, Instant now) {
   Client& client = clients_[sender.name()];
   client.process = &sender;
-  client.heard = now;
-  if (sample.run_id() != run_id_ || sample.step() != step_) return;
+  client.hear(now);
+  if (sample.run_id() != run_id_ || !has_begun_ || sample.step() != step_) return;
   if (client.answered_step != step_) client.answers.clear();
   client.answered_step = step_;
   for (const ControlCommand& command : sample.vehicles())
-    if (is_sound(command))
+    if (is_sound(command, sample.step()))
       client.answers.try_emplace(command.vehicle_id(), now);
     else
       client.refused = {step_, now};
@@ -84,6 +108,7 @@ void FlightWatch::on_published(std::uint64_t step, Instant now) {
   disobeys(interrupted_, "SIGINT");
   disobeys(stop_requested_, "an operator's stop");
   disobeys(paused_, "an operator's pause");
+  has_begun_ = true;
   step_ = step;
   published_ = now;
   sent_ = now;
@@ -130,12 +155,6 @@ void FlightWatch::on_running(Instant now) {
                       sync::to_seconds(now - published_)));
 }
 
-/// The order of clients: strength, then name.
-bool FlightWatch::is_stronger(const std::string& name, const Client& client, const Client& than,
-                              const std::string& other) const {
-  return std::tuple(-client.strength, name) < std::tuple(-than.strength, other);
-}
-
 /// A step ends when each vehicle has the answer that it awaits: another client's, if the stronger
 /// ones have been silent for `take_over_s`.
 void FlightWatch::check_take_over(const std::vector<model::StepRecord>& records, Instant now) {
@@ -163,7 +182,7 @@ std::optional<Instant> FlightWatch::check_flyer(const model::StepRecord& record,
     find_(fmt::format("answer: step {} has an answer of '{}', which is no client of this run",
                       record.step, record.client_name));
   const auto flyer = clients_.find(record.client_name);
-  if (flyer == clients_.end() || !flyer->second.is_ready) return std::nullopt;
+  if (flyer == clients_.end() || !flyer->second.is_ready || has_libraries_) return std::nullopt;
   const std::uint32_t vehicle = record.vehicle_id;
   const auto answer = flyer->second.answers.find(vehicle);
   if (!flyer->second.has_answered(vehicle, record.step)) {
@@ -179,7 +198,7 @@ std::optional<Instant> FlightWatch::check_flyer(const model::StepRecord& record,
   for (const auto& [name, client] : clients_) {
     const auto& ids = client.vehicle_ids;
     if (!client.is_ready || std::find(ids.begin(), ids.end(), vehicle) == ids.end() ||
-        !is_stronger(name, client, flyer->second, record.client_name))
+        !(client.order < flyer->second.order))
       continue;
     if (client.refused && client.refused->first == record.step) {
       due = std::max(due, client.refused->second);
@@ -194,7 +213,7 @@ std::optional<Instant> FlightWatch::check_flyer(const model::StepRecord& record,
     const bool flew = before != flyers_.end() && before->second == name;
     const bool has_left = client.process->has_ended() && !client.process->was_killed();
     if (is_lockstep() && flew && !has_left && !client.has_answered(vehicle, record.step) &&
-        now - client.heard < sync::kPresumedDeadAfter - kSlack &&
+        now - client.heard < kForgottenAfter && client.back + kKnownAfter < now &&
         waited < take_over - take_over / 100)
       find_(fmt::format("take-over: '{}' flies step {} after {:.3f} s without '{}'",
                         record.client_name, record.step, sync::to_seconds(waited), name));

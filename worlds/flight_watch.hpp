@@ -8,11 +8,14 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
+#include "common/bus/peer.hpp"
 #include "common/config/scenario.hpp"
 #include "common/model/step_record.hpp"
+#include "sim_server/core/judgement.hpp"
 #include "sls.h"
 #include "worlds/host.hpp"
 
@@ -27,13 +30,15 @@ class FlightWatch {
               std::function<void(std::string)> find)
       : server_(server),
         sync_(scenario.sync),
+        limits_(sim::make_answer_limits(scenario)),
         scenario_sha256_(scenario.sha256),
         run_id_(run_id),
         find_(std::move(find)) {}
 
   // --- arrives at the server ---
 
-  void on_member(const Participant& message, const Process& sender, Instant now);
+  void on_member(const Participant& message, const bus::PeerId& peer, const Process& sender,
+                 Instant now);
   void on_answers(const Commands& sample, const Process& sender, Instant now);
   void on_request(ControlAction action, Instant now);
 
@@ -53,15 +58,17 @@ class FlightWatch {
  private:
   struct Client {
     const Process* process = nullptr;
-    std::int32_t strength = 0;
+    std::tuple<std::int32_t, std::string, bus::PeerId> order;  // the first one is the strongest
     std::vector<std::uint32_t> vehicle_ids;
     bool is_ready = false;
     Instant ready{0};  // its first announcement that says so
     Instant heard{0};  // its last sample
+    Instant back{0};   // the first one after a long silence
     std::optional<std::pair<std::uint64_t, Instant>> refused;  // the last defective answer
     std::uint64_t answered_step = 0;
     std::map<std::uint32_t, Instant> answers;  // to that step, by vehicle
 
+    void hear(Instant now);
     bool has_answered(std::uint32_t vehicle, std::uint64_t step) const {
       return answered_step == step && answers.count(vehicle) > 0;
     }
@@ -74,8 +81,7 @@ class FlightWatch {
 
   bool is_disturbed() const;
   bool is_lockstep() const { return sync_.mode == config::SyncMode::kLockstep; }
-  bool is_stronger(const std::string& name, const Client& client, const Client& than,
-                   const std::string& other) const;
+  bool is_sound(const ControlCommand& command, std::uint64_t step) const;
   void check_take_over(const std::vector<model::StepRecord>& records, Instant now);
   std::optional<Instant> check_flyer(const model::StepRecord& record, Instant now);
   void check_policy(const model::StepRecord& record, Instant now);
@@ -83,16 +89,19 @@ class FlightWatch {
 
   const Program& server_;
   const config::Sync& sync_;
+  const sim::AnswerLimits limits_;
   const std::string& scenario_sha256_;
   const std::uint64_t run_id_;
   const std::function<void(std::string)> find_;
-  std::map<std::string, Client> clients_;        // by name
+  std::map<std::string, Client> clients_;        // by name of the process
   std::set<std::string> rightful_;               // ready for this run, at any time
   std::map<std::uint32_t, std::string> flyers_;  // of the last step, by vehicle
   std::map<std::uint32_t, Lacking> lacking_;
+  bool has_begun_ = false;
   std::uint64_t step_ = 0;
   Instant published_{0};
   std::optional<Instant> sent_;  // the last state of an open step
+  bool has_libraries_ = false;   // who flies depends on the library of the first client
   bool is_disturbed_ = false;    // since the last step was published
   std::optional<Instant> interrupted_, stop_requested_, paused_;
 };

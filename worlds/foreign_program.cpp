@@ -1,52 +1,91 @@
 #include "worlds/foreign_program.hpp"
 
+#include <spdlog/fmt/fmt.h>
+
 #include <limits>
 
 namespace sls::worlds {
 
 void ForeignProgram::start() {
   random_ = setting_.random.split();
-  if (random_.chance(0.8)) peer_.add_writer<Participant>();
-  peer_.add_writer<Commands>();
+  const auto& mistakes = list_announcement_mistakes();
+  if (random_.chance(0.8)) mistake_ = &mistakes[random_.index(mistakes.size())];
+  if (mistake_ && mistake_->is_wild && !options_.is_wild) mistake_ = &mistakes.front();
+  if (mistake_) peer_.add_writer<Participant>();
+  if (!mistake_ || mistake_->writes_answers) peer_.add_writer<Commands>(random_.chance(0.8));
   is_impostor_ = random_.chance(0.5);
   if (is_impostor_) {
     peer_.add_writer<States>();
     peer_.add_writer<RecordBatch>();
     peer_.add_writer<SimStatus>();
   }
-  peer_.add_reader<States>([this](const States& sample, const Peer::Arrival&) { answer(sample); });
+  peer_.add_reader<Parameters>([this](const Parameters& sample, const Peer::Arrival&) {
+    if (runs_.insert(sample.run_id()).second) announce_wrongly(sample);
+  });
+  if (!mistake_ || mistake_->reads_states)
+    peer_.add_reader<States>(
+        [this](const States& sample, const Peer::Arrival&) { answer(sample); });
   setting_.network.announce(peer_);
+  if (options_.is_crowd) make_crowd();
   wake_soon();
 }
 
-void ForeignProgram::wake() {
-  if (was_interrupted()) return exit(130, "interrupted");
-  repeat_announcement_if_due();
-  if (setting_.are_all_others_done()) return exit(0, "");
-  wake_at(now() + std::chrono::milliseconds(100));
+void ForeignProgram::make_crowd() {
+  for (std::size_t i = 0; i <= sync::Membership::kMostMembers; ++i) {
+    Peer& peer = *crowd_.emplace_back(&setting_.network.join(process_));
+    peer.add_writer<Participant>();
+    peer.add_writer<SimStatus>();
+    setting_.network.announce(peer);
+    Participant message;
+    message.name(fmt::format("{}-{}", name(), i));
+    peer.write(message);
+    SimStatus status;
+    status.run_id(random_.next());
+    peer.write(status);
+  }
 }
 
-void ForeignProgram::announce_wrongly(std::uint64_t run_id) {
+void ForeignProgram::leave_with_crowd(bool with_goodbye) {
+  for (Peer* peer : crowd_) setting_.network.leave(*peer, with_goodbye);
+}
+
+void ForeignProgram::wake() {
+  repeat_announcement_if_due();
+  if (!was_interrupted() && !setting_.are_all_others_done())
+    return wake_at(now() + std::chrono::milliseconds(100));
+  leave_with_crowd(true);
+  exit(was_interrupted() ? 130 : 0, stop_signal_);
+}
+
+void ForeignProgram::announce_wrongly(const Parameters& parameters) {
   Participant message;
-  const bool has_contract = random_.chance(0.7);
-  const bool has_scenario = has_contract && random_.chance(0.5);
-  message.contract_sha256(has_contract ? bus::kContractSha256 : "nonsense");
+  message.contract_sha256(bus::kContractSha256);
   message.role(ParticipantRole::ROLE_CONTROLLER);
   message.name(name());
   message.host(process_.host().name());
-  message.vehicle_ids({0});
+  message.vehicle_ids(sync::list_vehicle_ids(parameters));
   message.strength(9);
-  message.scenario_sha256(has_scenario ? setting_.flown->scenario.sha256 : "nonsense");
-  message.run_id(run_id);
-  message.ready(!has_scenario);
+  message.scenario_sha256(parameters.scenario_sha256());
+  message.run_id(parameters.run_id());
+  message.ready(true);
   message.last_complete_step(-1);
-  announce(message);
+  if (mistake_) {
+    mistake_->make(message);
+    announce(message);
+  }
+  if (!random_.chance(0.5)) return;
+  Commands early;  // before there is a state
+  early.client_name(name());
+  early.run_id(parameters.run_id());
+  for (const std::uint32_t id : sync::list_vehicle_ids(parameters))
+    early.vehicles().emplace_back().vehicle_id(id);
+  peer_.write(early);
 }
 
 /// Says of the run of a server that it has finished, with rows that nobody flew.
 void ForeignProgram::pretend(const States& sample) {
   SimStatus status;
-  status.run_id(sample.run_id());
+  status.run_id(random_.chance(0.8) ? sample.run_id() : random_.next());
   status.sample_index(1'000'000);
   status.phase(random_.chance(0.5) ? RunPhase::PHASE_FINISHED : RunPhase::PHASE_RESET);
   status.step(sample.step());
@@ -65,10 +104,6 @@ void ForeignProgram::pretend(const States& sample) {
 }
 
 void ForeignProgram::answer(const States& sample) {
-  if (sample.run_id() != announced_run_) {
-    announced_run_ = sample.run_id();
-    announce_wrongly(sample.run_id());
-  }
   if (random_.chance(0.7)) return;
   if (is_impostor_ && random_.chance(0.1)) pretend(sample);
   Commands answers;

@@ -1,32 +1,45 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
+#include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "worlds/mistakes.hpp"
 #include "worlds/program.hpp"
 
 namespace sls::worlds {
 
 /// A client of somebody else that is wrong: it answers late, twice, to other steps, runs and
-/// vehicles, or with nonsense. It has announced itself as not ready, with another scenario or
-/// another contract, or not at all, so no answer of it may ever be applied. Some also pretend to be
-/// the server of the run.
+/// vehicles, or with nonsense. Its announcement has a mistake, or there is none, so no answer of it
+/// may ever be applied. Some also pretend to be the server of the run.
 class ForeignProgram : public Program {
  public:
-  ForeignProgram(Setting& setting, Host& host, std::string name)
-      : Program(setting, host, Role::kForeign, std::move(name)) {}
+  struct Options {
+    bool is_wild = false;   ///< others may wait for it
+    bool is_crowd = false;  ///< it has more participants than others remember
+  };
+  ForeignProgram(Setting& setting, Host& host, std::string name, const Options& options)
+      : Program(setting, host, Role::kForeign, std::move(name)), options_(options) {}
   void start() override;
 
  private:
   void wake() override;
+  void on_killed() override { leave_with_crowd(false); }
+  void make_crowd();
+  void leave_with_crowd(bool with_goodbye);
+  void announce_wrongly(const Parameters& parameters);
   void answer(const States& sample);
   void pretend(const States& sample);
-  void announce_wrongly(std::uint64_t run_id);
 
+  const Options options_;
   Random random_{0};
-  std::uint64_t announced_run_ = 0;
+  const AnnouncementMistake* mistake_ = nullptr;  // none: it announces nothing
+  std::set<std::uint64_t> runs_;                  // whose parameters it has seen
   bool is_impostor_ = false;
+  std::vector<Peer*> crowd_;
 };
 
 }  // namespace sls::worlds

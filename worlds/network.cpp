@@ -98,7 +98,7 @@ bool Network::are_connected(const bus::PeerId& a, const bus::PeerId& b) const {
 
 void Network::announce(Peer& peer) {
   for (const auto& other : peers_) {
-    if (other.get() == &peer || other->process().has_ended()) continue;
+    if (&other->process() == &peer.process() || other->process().has_ended()) continue;
     timeline_.after(draw_delay(peer, *other),
                     [this, &peer, other = other.get()] { discover(*other, peer); });
     timeline_.after(draw_delay(*other, peer),
@@ -134,7 +134,10 @@ void Network::match(Peer& observer, Peer& observed, const Peer::Endpoint& endpoi
     return ours.topic == endpoint.topic && ours.is_writer != endpoint.is_writer;
   };
   if (std::none_of(observer.endpoints_.begin(), observer.endpoints_.end(), is_counterpart)) return;
-  if (endpoint.is_writer) {
+  const bool asks = observer.readers_[endpoint.topic].limits.deadline > Instant(0);
+  if (endpoint.is_writer && !endpoint.offers_deadline && asks) {
+    observer.missing_deadlines_.insert(observed.id());
+  } else if (endpoint.is_writer) {
     observer.writers_[endpoint.topic].insert(observed.id());
     channel(observed, observer, endpoint.topic).reader_knows = true;
     if (!is_best_effort(endpoint.topic)) send_reliably(observed, observer, endpoint.topic);
@@ -147,7 +150,7 @@ void Network::match(Peer& observer, Peer& observed, const Peer::Endpoint& endpoi
 
 void Network::leave(Peer& peer, bool with_goodbye) {
   for (const auto& other : peers_) {
-    if (other.get() == &peer || other->process().has_ended()) continue;
+    if (&other->process() == &peer.process() || other->process().has_ended()) continue;
     const bool is_heard = with_goodbye && !is_lost(peer, *other);
     const Instant delay = is_heard ? draw_delay(peer, *other) : kLease;
     timeline_.after(delay, [this, &peer, other = other.get()] {
@@ -158,6 +161,7 @@ void Network::leave(Peer& peer, bool with_goodbye) {
 
 void Network::forget(Peer& observer, const Peer& observed) {
   observer.known_.erase(observed.id());
+  observer.missing_deadlines_.erase(observed.id());
   for (std::size_t topic = 0; topic < kTopics; ++topic) {
     observer.writers_[topic].erase(observed.id());
     observer.reader_peers_[topic].erase(observed.id());

@@ -76,9 +76,11 @@ class Peer {
     readers_[topic].limits = limits;
     endpoints_.push_back({topic, false});
   }
+  /// Without a deadline it does not match a reader that asks for one.
   template <class Message>
-  void add_writer() {
-    endpoints_.push_back({static_cast<std::size_t>(bus::Topic<Message>::kId), true});
+  void add_writer(bool offers_deadline = true) {
+    endpoints_.push_back(
+        {static_cast<std::size_t>(bus::Topic<Message>::kId), true, offers_deadline});
   }
   template <class Message>
   void write(Message message) {
@@ -94,6 +96,8 @@ class Peer {
   const std::set<bus::PeerId>& matched_readers(TopicId topic) const {
     return reader_peers_[static_cast<std::size_t>(topic)];
   }
+  /// Peers with a writer that lacks the deadline that our reader asks for.
+  const std::set<bus::PeerId>& missing_deadlines() const { return missing_deadlines_; }
   /// All peers that were discovered.
   const std::set<bus::PeerId>& known() const { return known_; }
   bool is_acknowledged(TopicId topic) const;
@@ -111,6 +115,7 @@ class Peer {
   struct Endpoint {
     std::size_t topic;
     bool is_writer;
+    bool offers_deadline = true;
   };
   struct Written {
     std::uint64_t number;
@@ -140,7 +145,7 @@ class Peer {
   std::array<Reader, kTopics> readers_;
   std::array<History, kTopics> histories_;
   std::array<std::set<bus::PeerId>, kTopics> writers_, reader_peers_;
-  std::set<bus::PeerId> known_;
+  std::set<bus::PeerId> known_, missing_deadlines_;
 };
 
 class Network {

@@ -23,11 +23,13 @@ class OperatorProgram : public Program {
     SimControl message;
     message.run_id(run_id);
     message.request_id(++requests_);
-    message.operator_name(random_.chance(0.9) ? "operator@world" : "\n");
+    message.operator_name(random_.chance(0.9) ? "operator@world" : random_.chance(0.5) ? "\n" : "");
     message.action(action);
     message.steps(steps);
     peer_.write(message);
     if (random_.chance(0.5)) peer_.write(random_.chance(0.3) ? message : make_wrong(message));
+    const int more = random_.chance(0.02) ? 70 : 0;  // than a server remembers
+    for (int i = 0; i < more; ++i) peer_.write(make_wrong(message));
   }
 
  private:

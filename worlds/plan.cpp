@@ -14,6 +14,8 @@ using namespace std::chrono_literals;
 using Kind = Fault::Kind;
 namespace faults = config::faults;
 
+constexpr auto kStep = static_cast<std::size_t>(ControlAction::ACTION_STEP);
+
 Instant draw_time(Random& random, Instant least, Instant most) {
   return Instant(random.integer(least.count(), most.count()));
 }
@@ -81,6 +83,15 @@ std::optional<std::size_t> find_program(const Plan& plan, const faults::Program&
   return std::nullopt;
 }
 
+/// What a client says of itself that is wrong.
+void draw_habits(PlannedProgram& client, Random& random) {
+  client.has_library = random.chance(0.03);
+  client.says_done = random.chance(0.02);
+  if (!random.chance(0.04)) return;
+  client.announced_name = "client-1";
+  client.strength = 3;
+}
+
 void draw_programs(Plan& plan, Random& random, const FlownScenario& flown,
                    const faults::Case* given) {
   const config::WaitFor& expected = flown.scenario.sync.wait_for;
@@ -117,8 +128,13 @@ void draw_programs(Plan& plan, Random& random, const FlownScenario& flown,
     client.is_early = is_calm && is_realtime && random.chance(0.5);
     if (is_wild && random.chance(0.1)) client.breaks_at = draw_step(random, flown);
     client.is_sloppy = random.chance(0.2);
+    if (is_wild) draw_habits(client, random);
   }
-  if (random.chance(0.15)) add(Role::kForeign);
+  if (random.chance(0.15)) {
+    PlannedProgram& foreign = add(Role::kForeign);
+    foreign.is_wild = is_wild;
+    foreign.is_crowd = is_wild && random.chance(0.03);
+  }
   const int recorders =
       std::max(expected.recorders, static_cast<int>(random.integer(0, has_surplus ? 2 : 0)));
   for (int i = 0; i < recorders; ++i) {
@@ -353,6 +369,22 @@ Instant estimate_end(const Fault& fault, const Plan& plan, const config::Sync& s
   return begin + fault.duration + 100ms;
 }
 
+/// An operator pauses the flight for a request of steps, and sends others at once or while it is
+/// carried out.
+void draw_session(Plan& plan, Random& random, Fault request) {
+  request.value = static_cast<double>(random.integer(1, 100));
+  const Fault steps = request;
+  request.other = static_cast<std::size_t>(ControlAction::ACTION_PAUSE);
+  plan.faults.push_back(request);
+  plan.faults.push_back(steps);
+  const std::int64_t more = random.integer(0, 4);
+  for (std::int64_t i = 0; i < more; ++i) {
+    request.other = random.index(6);
+    if (random.chance(0.5)) request.at += draw_time(random, 0us, 100ms);
+    plan.faults.push_back(request);
+  }
+}
+
 /// A recorder that is expected never comes back.
 void draw_lost_recorder(Plan& plan, Random& random, const FlownScenario& flown) {
   const auto is_recorder = [](const PlannedProgram& program) {
@@ -388,7 +420,11 @@ void draw_faults(Plan& plan, Random& random, const FlownScenario& flown) {
   for (std::int64_t i = 0; i < faults; ++i) {
     Fault fault = draw_fault(plan, random, faults);
     time_fault(fault, random, plan, flown);
-    plan.faults.push_back(fault);
+    const bool is_step = fault.kind == Kind::kRequest && fault.other == kStep;
+    if (is_step && random.chance(0.8))
+      draw_session(plan, random, fault);
+    else
+      plan.faults.push_back(fault);
   }
 }
 

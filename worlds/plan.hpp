@@ -46,7 +46,12 @@ struct PlannedProgram {
   bool is_sloppy = false;       ///< a client that also sends what nobody asked for
   bool is_early = false;        ///< a client that also answers the next step before its state
   bool announces_once = false;  ///< a client that does not repeat its announcement
-  std::optional<std::uint64_t> breaks_at;  ///< step from which a client answers with nonsense
+  std::optional<std::uint64_t> breaks_at;  ///< step from which a client answers with mistakes
+  std::string announced_name;              ///< of a client that is another one's twin
+  bool has_library = false;                ///< a client, unlike the others
+  bool says_done = false;                  ///< a client that answers nevertheless
+  bool is_wild = false;                    ///< a foreign client for which others may wait
+  bool is_crowd = false;                   ///< a foreign client with very many participants
   bool resumes = false;  ///< a recorder that takes the place of a killed one goes on
   Instant delay{0};      ///< computing time of an answer; of the disk of a recorder
 };

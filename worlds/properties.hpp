@@ -101,12 +101,14 @@ class Properties {
     std::vector<std::uint32_t> vehicle_ids;
     std::set<std::string> ready;                       // clients that have announced it
     std::set<std::string> recorders;                   // the same
+    std::set<std::string> wrong;                       // clients that make mistakes
     std::map<std::string, Instant> ready_since, done;  // recorders
     std::unique_ptr<FlightWatch> flight;
     std::map<std::uint32_t, std::vector<std::uint64_t>> rows;  // hashes, by vehicle and step
     std::map<std::uint32_t, model::StepRecord> last;
     bool is_exact = true;  // each force answers its own state
     bool has_late = false;
+    bool has_mistakes = false;  // in answers that were accepted
     bool has_ended = false;
     Instant ended{0};
     bool is_finished = false;

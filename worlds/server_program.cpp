@@ -35,7 +35,8 @@ void ServerProgram::start() {
   peer_.add_writer<Parameters>();
   peer_.add_reader<Participant>([this](const Participant& sample, const Peer::Arrival& arrival) {
     note(sample, arrival);
-    if (flight_) flight_->on_member(sample, sender(arrival), setting_.timeline.now());
+    if (flight_)
+      flight_->on_member(sample, arrival.sender, sender(arrival), setting_.timeline.now());
     if (core_ && core_->has_news(*this)) wake_soon();
   });
   read<Parameters>();
@@ -262,6 +263,9 @@ sim::Neighbourhood ServerProgram::look(bool is_known) {
   seen.add(present_servers().runs(now()));
   for (const bus::PeerId& peer : peer_.matched_writers(TopicId::kCommand))
     seen.command_writers[peer] = setting_.network.find(peer)->process().name();
+  for (const bus::PeerId& peer : peer_.missing_deadlines())
+    seen.missing_deadlines[peer] =
+        setting_.network.find(peer)->process().name() + ": its writer offers no DEADLINE";
   seen.is_on_network = !setting_.is_one_machine;
   seen.announcement_writers = peer_.matched_writers(TopicId::kParticipant);
   seen.state_readers = peer_.matched_readers(TopicId::kState);

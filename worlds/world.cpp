@@ -91,9 +91,11 @@ class World {
           setting_, host, name,
           ClientProgram::Options{planned.vehicle_ids, planned.strength, planned.follows_servers,
                                  planned.has_other_scenario, planned.is_sloppy, planned.delay,
-                                 planned.is_early, planned.breaks_at, planned.announces_once});
+                                 planned.is_early, planned.breaks_at, planned.announces_once,
+                                 planned.announced_name, planned.has_library, planned.says_done});
     else if (planned.role == Role::kForeign)
-      program = std::make_unique<ForeignProgram>(setting_, host, name);
+      program = std::make_unique<ForeignProgram>(
+          setting_, host, name, ForeignProgram::Options{planned.is_wild, planned.is_crowd});
     else
       program = std::make_unique<RecorderProgram>(
           setting_, host, name,

@@ -1,0 +1,28 @@
+/// What clients do that do not keep the contract, one entry for each mistake.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "sls.h"
+
+namespace sls::worlds {
+
+/// A mistake in the answers of a client that is ready.
+struct AnswerMistake {
+  void (*make)(ControlCommand& answer, std::uint64_t step);
+  std::uint64_t steps = 1'000'000;  ///< it is made for so many steps: the flight must end
+  int copies = 1;                   ///< each answer is sent so often; 0: samples without answers
+};
+const std::vector<AnswerMistake>& list_answer_mistakes();
+
+/// A mistake in an announcement that is right otherwise. Nobody who makes it flies.
+struct AnnouncementMistake {
+  void (*make)(Participant& announcement);
+  bool is_wild = false;        ///< others wait for whoever makes it
+  bool reads_states = true;    ///< false: has no reader of sls/state
+  bool writes_answers = true;  ///< false: has no writer of sls/command
+};
+const std::vector<AnnouncementMistake>& list_announcement_mistakes();
+
+}  // namespace sls::worlds
