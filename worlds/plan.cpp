@@ -126,6 +126,8 @@ void draw_programs(Plan& plan, Random& random, const FlownScenario& flown,
     PlannedProgram& recorder = add(Role::kRecorder);
     recorder.resumes = plan.promise == Promise::kRecorderRestart || random.chance(0.7);
     if (!is_calm && random.chance(0.1)) recorder.delay = draw_time(random, 1ms, 100ms);
+    if (is_wild && random.chance(0.05))
+      recorder.queue = static_cast<std::size_t>(random.integer(1, 50));
   }
   if (!given) return;
   const auto need = [&](const faults::Program& named) {
@@ -483,6 +485,8 @@ std::vector<std::string> describe(const Plan& plan) {
                                    program.strength, to_ms(program.delay));
     for (const Trait& trait : kTraits)
       if (program.*trait.flag) line += std::string(", ") + trait.words;
+    if (program.queue != record::Arrivals::kMostEntries)
+      line += fmt::format(", queue of {} entries", program.queue);
     if (program.breaks_at) line += fmt::format(", breaks at step {}", *program.breaks_at);
     lines.push_back(std::move(line));
   }

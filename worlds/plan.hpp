@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/config/faults.hpp"
+#include "recorder/core/arrivals.hpp"
 #include "worlds/network.hpp"
 #include "worlds/random.hpp"
 
@@ -49,7 +50,8 @@ struct PlannedProgram {
   bool announces_once = false;  ///< a client that does not repeat its announcement
   std::optional<std::uint64_t> breaks_at;  ///< step from which a client answers with nonsense
   bool resumes = false;  ///< a recorder that takes the place of a killed one goes on
-  Instant delay{0};      ///< computing time of an answer; of the disk of a recorder
+  std::size_t queue = record::Arrivals::kMostEntries;  ///< of a recorder
+  Instant delay{0};  ///< computing time of an answer; of the disk of a recorder
 };
 
 /// What a program of a plan need not be, in the words of a story.

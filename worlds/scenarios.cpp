@@ -52,13 +52,13 @@ const Part kStages{nullptr,
                    "vertical: { position: 2.2667, velocity: 3.0876, integral: 0.0224 }",
                    R"(
   - hold: { position_m: [0, 0, -0.5] }
-    for_s: 0.2
+    for_s: 0.1
   - set_point: { position_m: [0.01, 0, -0.52] }
     until: { within_m: 0.015, after_s: 0.1 }
   - rest_to_rest: { from_m: [0.01, 0, -0.52], to_m: [0, 0, -0.5], duration_s: 0.3 }
     until: { within_m: 0.1, of: quadrotor, offset_m: [0, 0, -1], after_s: 0.1 }
   - figure_eight: { amplitude_m: [0.1, 0.1, 0], offset_m: [0, 0, -0.5], period_s: 16 }
-    for_s: 0.3
+    for_s: 0.1
 )"};
 /// Vehicles that leave a stage at different steps, the last one with faults.
 const Part kMixedFleet{R"(
@@ -70,7 +70,7 @@ const Part kMixedFleet{R"(
   - set_point: { position_m: [0, 0, -0.6] }
     until: { within_m: 0.08 }
   - hold: { position_m: [0, 0, -0.6] }
-    for_s: 0.8
+    for_s: 0.64
 )",
                        R"(
 faults:

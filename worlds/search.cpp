@@ -158,6 +158,8 @@ class Shrinker {
       attempt([i](Plan& plan) { plan.programs[i].delay = Instant(0); });
       if (plan_.programs[i].breaks_at)
         attempt([i](Plan& plan) { plan.programs[i].breaks_at.reset(); });
+      if (plan_.programs[i].queue != PlannedProgram().queue)
+        attempt([i](Plan& plan) { plan.programs[i].queue = PlannedProgram().queue; });
       for (const Trait& trait : kTraits)
         if (plan_.programs[i].*trait.flag)
           attempt([&](Plan& plan) { plan.programs[i].*trait.flag = false; });
