@@ -92,7 +92,7 @@ int main(int argc, char** argv) {
   cli.set_version_flag("--version", app::version());
   cli.add_option(
          "--scenario", scenario,
-         "scenario (YAML) that every world flies (default: 19 short ones, with both modes and "
+         "scenario (YAML) that every world flies (default: 22 short ones, with both modes and "
          "all policies)")
       ->type_name("FILE");
   cli.add_option("--faults", faults,
@@ -126,6 +126,10 @@ int main(int argc, char** argv) {
         scenario.empty()
             ? worlds::make_scenarios()
             : std::vector<worlds::FlownScenario>{worlds::fly(config::load_scenario(scenario))};
+    if (!scenario.empty() && !scenarios.front().failure.empty())
+      throw config::ConfigError(
+          fmt::format("{}: expected a flight that finishes in one process, got: step {}: {}",
+                      scenario.string(), scenarios.front().last_step, scenarios.front().failure));
     if (replayed) {
       const worlds::Plan plan = worlds::draw_plan(*replayed, scenarios, options.cases);
       if (!is_verbose) return print_story(plan, scenarios, folder.path());

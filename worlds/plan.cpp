@@ -141,6 +141,8 @@ void draw_programs(Plan& plan, Random& random, const FlownScenario& flown,
     PlannedProgram& recorder = add(Role::kRecorder);
     recorder.resumes = plan.promise == Promise::kRecorderRestart || random.chance(0.7);
     if (!is_calm && random.chance(0.1)) recorder.delay = draw_time(random, 1ms, 100ms);
+    if (is_wild && random.chance(0.05))
+      recorder.queue = static_cast<std::size_t>(random.integer(1, 50));
   }
   if (!given) return;
   const auto need = [&](const faults::Program& named) {
@@ -224,9 +226,10 @@ Fault draw_fault(const Plan& plan, Random& random, std::int64_t count) {
 double calc_longest_stop_s(const config::Sync& sync) { return sync.wait.controller.deadline_s - 2; }
 
 /// A promise holds only if policies wait, and 8 s are enough for what happens.
-Promise draw_promise(Random& random, const config::Sync& sync) {
+Promise draw_promise(Random& random, const FlownScenario& flown) {
+  const config::Sync& sync = flown.scenario.sync;
   const double choice = random.uniform();
-  if (choice < 0.35) return Promise::kNone;
+  if (choice < 0.35 || !flown.failure.empty()) return Promise::kNone;
   if (choice < 0.42) return Promise::kCalm;
   if (sync.wait.controller.policy != config::ControllerPolicy::kWait ||
       sync.wait.recorder.policy == config::RecorderPolicy::kStop)
@@ -456,7 +459,7 @@ Plan draw_plan(std::uint64_t seed, const std::vector<FlownScenario>& scenarios,
   const FlownScenario& flown = scenarios[plan.scenario];
   const bool is_lockstep = flown.scenario.sync.mode == config::SyncMode::kLockstep;
   const faults::Case* given = cases.empty() ? nullptr : &cases[random.index(cases.size())];
-  if (!given) plan.promise = draw_promise(random, flown.scenario.sync);
+  if (!given) plan.promise = draw_promise(random, flown);
   plan.hosts = static_cast<std::size_t>(random.integer(given ? 2 : 1, 4));
   plan.link = given                            ? make_link(given->link, random)
               : plan.promise == Promise::kCalm ? Link()
@@ -485,7 +488,8 @@ Plan draw_plan(std::uint64_t seed, const std::vector<FlownScenario>& scenarios,
 }
 
 std::string name_program(const Plan& plan, std::size_t index) {
-  static constexpr const char* kNames[] = {"server", "client", "recorder", "operator", "foreign"};
+  static constexpr const char* kNames[] = {"server", "controller", "recorder", "operator",
+                                           "foreign"};
   int number = 1;
   for (std::size_t i = 0; i < index; ++i)
     number += plan.programs[i].role == plan.programs[index].role;
@@ -511,11 +515,15 @@ std::vector<std::string> describe(const Plan& plan) {
       plan.link.loss, plan.faults.size(), name_promise(plan.promise))};
   for (std::size_t i = 0; i < plan.programs.size(); ++i) {
     const PlannedProgram& program = plan.programs[i];
-    lines.push_back(fmt::format("{} on host {} at {:.3f} ms: strength {}{}{}, delay {:.3f} ms",
-                                name_program(plan, i), program.host, to_ms(program.start),
-                                program.strength, program.follows_servers ? ", follows" : "",
-                                program.has_other_scenario ? ", other scenario" : "",
-                                to_ms(program.delay)));
+    std::string line = fmt::format("{} on host {} at {:.3f} ms: strength {}, delay {:.3f} ms",
+                                   name_program(plan, i), program.host, to_ms(program.start),
+                                   program.strength, to_ms(program.delay));
+    for (const Trait& trait : kTraits)
+      if (program.*trait.flag) line += std::string(", ") + trait.words;
+    if (program.queue != record::Arrivals::kMostEntries)
+      line += fmt::format(", queue of {} entries", program.queue);
+    if (program.breaks_at) line += fmt::format(", breaks at step {}", *program.breaks_at);
+    lines.push_back(std::move(line));
   }
   for (const Fault& fault : plan.faults) lines.push_back(describe(fault));
   return lines;

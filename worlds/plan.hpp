@@ -1,12 +1,14 @@
 /// The plan of a world, drawn from its seed before it begins: programs, network, faults.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "common/config/faults.hpp"
+#include "recorder/core/arrivals.hpp"
 #include "worlds/network.hpp"
 #include "worlds/random.hpp"
 
@@ -53,8 +55,22 @@ struct PlannedProgram {
   bool is_wild = false;                    ///< a foreign client for which others may wait
   bool is_crowd = false;                   ///< a foreign client with very many participants
   bool resumes = false;  ///< a recorder that takes the place of a killed one goes on
-  Instant delay{0};      ///< computing time of an answer; of the disk of a recorder
+  std::size_t queue = record::Arrivals::kMostEntries;  ///< of a recorder
+  Instant delay{0};  ///< computing time of an answer; of the disk of a recorder
 };
+
+/// What a program of a plan need not be, in the words of a story.
+struct Trait {
+  bool PlannedProgram::*flag;
+  const char* words;
+};
+inline constexpr std::array<Trait, 6> kTraits = {
+    {{&PlannedProgram::follows_servers, "follows"},
+     {&PlannedProgram::has_other_scenario, "other scenario"},
+     {&PlannedProgram::is_sloppy, "sloppy"},
+     {&PlannedProgram::is_early, "early"},
+     {&PlannedProgram::announces_once, "announces once"},
+     {&PlannedProgram::resumes, "resumes"}}};
 
 /// The faults of a world after which a flight must be finished, and every program that is not
 /// killed end with exit code 0.

@@ -93,6 +93,9 @@ void Properties::on_run(const Program& server, std::uint64_t run_id, const Param
                                              [this](std::string text) { find(std::move(text)); });
   run.waits_for_recorders = scenario.sync.mode == config::SyncMode::kLockstep &&
                             scenario.sync.wait.recorder.policy == config::RecorderPolicy::kWait;
+  run.has_faulty_forces =
+      std::any_of(scenario.faults.begin(), scenario.faults.end(),
+                  [](const auto& fault) { return fault.on == config::FaultChannel::kCommand; });
   run.phase_since = timeline_.now();
   run.server = &server;
   run.vehicle_ids = sync::list_vehicle_ids(parameters);
@@ -147,7 +150,7 @@ void Properties::on_recorded(std::uint64_t run_id, const std::vector<model::Step
                        record.step, record.vehicle_id, rows.size()));
     rows.push_back(hash_row(record));
     const auto before = run.last.find(record.vehicle_id);
-    if (before != run.last.end()) check_applied(before->second, record);
+    if (before != run.last.end() && !run.has_faulty_forces) check_applied(before->second, record);
     run.last[record.vehicle_id] = record;
     run.is_exact = run.is_exact && (record.kind == model::AnswerKind::kAccepted ||
                                     record.kind == model::AnswerKind::kRefused ||
@@ -169,7 +172,7 @@ void Properties::on_recorded(std::uint64_t run_id, const std::vector<model::Step
   }
 }
 
-/// The force that acts is that of the answer: no scenario of the worlds disturbs it.
+/// The force that acts is that of the answer.
 void Properties::check_applied(const model::StepRecord& before, const model::StepRecord& record) {
   const bool is_answered =
       before.kind == model::AnswerKind::kAccepted || before.kind == model::AnswerKind::kHeld;
@@ -379,6 +382,7 @@ void Properties::check(const Plan& plan, const std::vector<std::unique_ptr<Progr
   for (const auto& program : programs) {
     if (!program->process().has_ended()) find(fmt::format("ends: {} still runs", program->name()));
     check_exit(*program);
+    if (program->role() == Role::kServer && !flown.failure.empty()) check_failure(*program, flown);
     if (program->role() == Role::kRecorder) {
       const auto& recorder = static_cast<const RecorderProgram&>(*program);
       if (!recorder.folder().empty()) folders[recorder.folder()] = program.get();
@@ -512,6 +516,25 @@ void Properties::check_end(const Program& server,
     if (server.ended() > last + kEndsWithin)
       find(fmt::format("prompt: {} ends {:.3f} s after its last recorder", server.name(),
                        sync::to_seconds(server.ended() - last)));
+  }
+}
+
+/// A flight whose plant or mission fails in one process fails here, too, at the same step.
+void Properties::check_failure(const Program& server, const FlownScenario& flown) {
+  const std::uint64_t run_id = static_cast<const ServerProgram&>(server).run_id();
+  const Run& run = runs_[run_id];
+  if (run.is_finished)
+    find(fmt::format("fails: run {:016x} is finished, expected: {}", run_id, flown.failure));
+  for (const auto& [vehicle, rows] : run.rows) {
+    if (rows.size() > flown.last_step + 1)
+      find(fmt::format("fails: run {:016x} has step {}, expected: {}", run_id, rows.size() - 1,
+                       flown.failure));
+    const bool is_answered = run.last.at(vehicle).kind == model::AnswerKind::kAccepted;
+    if (flown.is_refused || rows.size() != flown.last_step + 1 || !is_answered) continue;
+    if (run.is_exact && server.exit_code() && !server.was_interrupted() &&
+        server.reason() != flown.failure)
+      find(fmt::format("fails: {} ends with '{}', expected: {}", server.name(), server.reason(),
+                       flown.failure));
   }
 }
 

@@ -117,6 +117,7 @@ class Properties {
     RunPhase phase = RunPhase::PHASE_WAITING;
     bool has_status = false;  // its claim is settled
     bool waits_for_recorders = false;
+    bool has_faulty_forces = false;  // the scenario disturbs them
     bool is_match_late = false;
     Instant phase_since{0};
     std::optional<Instant> published;  // the last step
@@ -136,6 +137,7 @@ class Properties {
   void check_recording(const Program& program, const StoredRecording& recording,
                        const FlownScenario& flown);
   void check_rows(const Program& program, const StoredRecording& recording, const Run& run);
+  void check_failure(const Program& server, const FlownScenario& flown);
   void check_exit(const Program& program);
   void check_begin(std::uint64_t run_id, const Run& run, const FlownScenario& flown);
   void check_end(const Program& server, const std::vector<std::unique_ptr<Program>>& programs);

@@ -14,9 +14,11 @@ RecorderProgram::RecorderProgram(Setting& setting, Host& host, std::string name,
                                  const Options& options)
     : Program(setting, host, Role::kRecorder, std::move(name)),
       options_(options),
-      arrivals_([this](std::uint64_t run_id) {
-        return present_servers().may_fly(run_id, core_->vehicle());
-      }) {}
+      arrivals_(
+          [this](std::uint64_t run_id) {
+            return present_servers().may_fly(run_id, core_->vehicle());
+          },
+          options.queue) {}
 
 void RecorderProgram::start() {
   recorder_options_.folder =

@@ -22,6 +22,7 @@ class RecorderProgram : public Program {
     std::filesystem::path folder;  ///< of real files; empty: rows in memory
     bool resumes = false;
     bool follows_servers = false;
+    std::size_t queue = record::Arrivals::kMostEntries;  ///< entries that wait to be written
     Instant disk_delay{0};  ///< each pass of the writing thread takes so much longer
   };
   RecorderProgram(Setting& setting, Host& host, std::string name, const Options& options);

@@ -8,10 +8,10 @@
 namespace sls::worlds {
 
 /// Flies `scenario` in one process, for comparison.
-/// @throws config::ConfigError if this flight fails: no world could finish it.
 FlownScenario fly(const config::Scenario& scenario);
 
-/// The scenarios of the worlds: one to three vehicles, both modes, all policies. 300 steps each.
+/// The scenarios of the worlds: one to three vehicles, both modes, all policies. About 300 steps
+/// each. Some have faults, sensing or several stages; the flights of the last ones fail.
 std::vector<FlownScenario> make_scenarios();
 
 }  // namespace sls::worlds

@@ -20,7 +20,7 @@ using namespace std::chrono_literals;
 constexpr std::size_t kMostLines = 40;
 constexpr auto kReportInterval = 5s;
 
-/// "ends" of "ends: client-1 still runs".
+/// "ends" of "ends: controller-1 still runs".
 std::string name_property(const std::string& finding) {
   return finding.substr(0, finding.find(':'));
 }
@@ -154,8 +154,16 @@ class Shrinker {
     attempt([](Plan& plan) { plan.link = Link(); });
     attempt([](Plan& plan) { plan.drift = plan.wall_offset_s = 0; });
     attempt([](Plan& plan) { plan.has_files = false; });
-    for (std::size_t i = 0; i < plan_.programs.size(); ++i)
+    for (std::size_t i = 0; i < plan_.programs.size(); ++i) {
       attempt([i](Plan& plan) { plan.programs[i].delay = Instant(0); });
+      if (plan_.programs[i].breaks_at)
+        attempt([i](Plan& plan) { plan.programs[i].breaks_at.reset(); });
+      if (plan_.programs[i].queue != PlannedProgram().queue)
+        attempt([i](Plan& plan) { plan.programs[i].queue = PlannedProgram().queue; });
+      for (const Trait& trait : kTraits)
+        if (plan_.programs[i].*trait.flag)
+          attempt([&](Plan& plan) { plan.programs[i].*trait.flag = false; });
+    }
     return plan_;
   }
 

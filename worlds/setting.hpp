@@ -15,6 +15,8 @@ struct FlownScenario {
   config::Scenario scenario;
   std::string certificate;      ///< of the flight in one process
   std::uint64_t last_step = 0;  ///< of that flight
+  std::string failure;          ///< why it failed; empty: every mission was finished
+  bool is_refused = false;      ///< it failed by an answer, else by a plant
 };
 
 /// All that the programs of a world share. The world owns it.

@@ -100,7 +100,7 @@ class World {
       program = std::make_unique<RecorderProgram>(
           setting_, host, name,
           RecorderProgram::Options{choose_folder(index), planned.resumes, planned.follows_servers,
-                                   planned.delay});
+                                   planned.queue, planned.delay});
     current_[index] = program.get();
     programs_.push_back(std::move(program));
     setting_.trace.add(setting_.timeline.now(), name, "starts");

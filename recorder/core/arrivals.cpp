@@ -18,14 +18,14 @@ void Arrivals::put(Received received) {
   const std::size_t size = count_entries(received.sample);
   if (received.run_id == open_) {
     if (received.sender != server_) return;
-    const bool has_room = size_ + size <= kMostEntries;
+    const bool has_room = size_ + size <= most_entries_;
     (has_room ? size_ : refused_) += size;
     if (has_room) samples_.push_back(std::move(received.sample));
   } else if (closed_.count(received.run_id) == 0 && may_be_opened_(received.run_id)) {
     waiting_size_ += size;
     waiting_.push_back(std::move(received));
     // The recording lists dropped samples as missing.
-    for (; waiting_size_ > kMostEntries; waiting_.pop_front())
+    for (; waiting_size_ > most_entries_; waiting_.pop_front())
       waiting_size_ -= count_entries(waiting_.front().sample);
   }
 }

@@ -31,8 +31,10 @@ class Arrivals {
   static constexpr std::size_t kMostEntries = 262'144;
 
   /// Samples of other runs than the open one are only kept if `may_be_opened` returns true.
-  explicit Arrivals(std::function<bool(std::uint64_t run_id)> may_be_opened)
-      : may_be_opened_(std::move(may_be_opened)) {}
+  /// `most_entries`: smaller in simulated worlds.
+  explicit Arrivals(std::function<bool(std::uint64_t run_id)> may_be_opened,
+                    std::size_t most_entries = kMostEntries)
+      : may_be_opened_(std::move(may_be_opened)), most_entries_(most_entries) {}
 
   void put(Received received);
   /// Makes `run_id` the open run. Its samples that have already arrived are included. Samples from
@@ -46,6 +48,7 @@ class Arrivals {
 
  private:
   const std::function<bool(std::uint64_t)> may_be_opened_;
+  const std::size_t most_entries_;
   std::deque<Sample> samples_;    // of the open run
   std::size_t size_ = 0;          // of samples_, in entries
   std::size_t refused_ = 0;       // dropped ones of the open run, in entries

@@ -60,7 +60,7 @@ MISTAKES = {
     "discovery-server --port 0": "--port: expected 1 to 65535, got '0' (see ./sls discovery-server --help)",
     "test --sanitize addr": "--sanitize: expected address or thread, got 'addr' (see ./sls test --help)",
     "build everything": "build: expected no argument, got 'everything' (see ./sls build --help)",
-    "fuzz --target cvs": "--target: expected scenario, qos_file, csv, recording, samples, foxglove or web, got 'cvs' (see ./sls fuzz "
+    "fuzz --target cvs": "--target: expected scenario, faults, qos_file, csv, recording, samples, foxglove or web, got 'cvs' (see ./sls fuzz "
                          "--help)",
 }
 

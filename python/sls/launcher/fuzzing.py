@@ -9,8 +9,9 @@ from sls.launcher.arguments import Parser, one_of, whole
 from sls.launcher.building import call_script, run_logged
 from sls.launcher.place import ROOT, Failure, list_choices, say
 
-FUZZERS = ("scenario", "qos_file", "csv", "recording", "samples", "foxglove", "web")
+FUZZERS = ("scenario", "faults", "qos_file", "csv", "recording", "samples", "foxglove", "web")
 SEEDS = {"scenario": ("config/scenarios", "tests/common/config/invalid"),
+         "faults": ("config/faults",),
          "qos_file": ("config/qos", "tests/common/bus/invalid")}
 
 
