@@ -43,6 +43,7 @@ Stream::Stream(const Parameters& parameters, std::uint64_t first_step, Sink sink
 
 void Stream::add(const RecordBatch& batch, sync::Time now) {
   note_time(now);
+  is_quiet_ = false;
   if (!next_batch_) next_batch_ = batch.batch_index();
   if (batch.batch_index() == *next_batch_ && !has_ended_) {
     handle(batch);
@@ -52,7 +53,13 @@ void Stream::add(const RecordBatch& batch, sync::Time now) {
     dropped_.repeated += batch.entries().size();
   }
   if (waiting_.size() > kMaxWaiting) skip_missing_batches();
-  if (!stuck_ && !waiting_.empty()) stuck_.emplace(now, kMaxStuckTime);
+  if (!stuck_) begin_to_wait(now);
+}
+
+void Stream::begin_to_wait(sync::Time now) {
+  if (waiting_.empty()) return;
+  stuck_.emplace(now, kMaxStuckTime);
+  is_quiet_ = true;
 }
 
 void Stream::handle_waiting_batches() {
@@ -75,8 +82,10 @@ void Stream::note_time(sync::Time now) {
 void Stream::on_time(sync::Time now) {
   note_time(now);
   if (!stuck_ || !stuck_->is_over(now)) return;
-  skip_missing_batches();
-  if (!waiting_.empty()) stuck_.emplace(now, kMaxStuckTime);
+  // If nothing has come meanwhile, the later gaps have waited as long as the first one.
+  do skip_missing_batches();
+  while (is_quiet_ && !waiting_.empty());
+  begin_to_wait(now);
 }
 
 std::optional<std::string> Stream::take_report(sync::Time now) {

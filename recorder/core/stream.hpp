@@ -37,7 +37,8 @@ class Stream {
   void add(const model::StepRecord& record);
 
   /// The first batch may have any index, because a writer's history is finite. Batches after a
-  /// missing one wait for it, until more than 64 of them wait or none has been handled for 10 s.
+  /// missing one wait for it, until more than 64 of them wait or none has been handled for 10 s. If
+  /// none has come at all in this time, no further missing batch is waited for.
   void add(const RecordBatch& batch, sync::Time now);
 
   /// Call it several times a second. A gap of more than 1 s between calls, also of `add`, means
@@ -70,6 +71,7 @@ class Stream {
   void handle_late(const model::StepRecord& late);
   void handle_waiting_batches();
   void skip_missing_batches();
+  void begin_to_wait(sync::Time now);
   bool may_be_answered(const StepRows& rows) const;
   void hand_on_settled_steps();
 
@@ -80,6 +82,7 @@ class Stream {
   std::optional<std::uint64_t> next_batch_;       // empty before the first batch
   std::map<std::uint64_t, RecordBatch> waiting_;  // batches after next_batch_
   std::optional<sync::Patience> stuck_;  // with the missing batch, since the last handled one
+  bool is_quiet_ = true;                 // no batch has come since then
   sync::Time time_;
   bool has_ended_ = false;
   std::map<std::uint32_t, std::uint64_t> next_steps_;
