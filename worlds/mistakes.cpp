@@ -51,7 +51,7 @@ const std::vector<AnswerMistake>& list_answer_mistakes() {
       {keep_first_stage, kFewSteps},
       {keep_running, kFewSteps},
       {lose_stage, kFewSteps},
-      {change_nothing, kFewSteps, 40},
+      {change_nothing, kMissionSteps, 40},
       {change_nothing, kFewSteps, 0},
   };
   return kMistakes;
