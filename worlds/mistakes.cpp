@@ -53,6 +53,7 @@ const std::vector<AnswerMistake>& list_answer_mistakes() {
       {lose_stage, kFewSteps},
       {change_nothing, kMissionSteps, 40},
       {change_nothing, kFewSteps, 0},
+      {[](Answer& answer, Step) { answer.f_Q_W_n()[0] += 1; }, kFewSteps, 2},  // they differ
   };
   return kMistakes;
 }
