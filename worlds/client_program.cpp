@@ -133,9 +133,12 @@ bool ClientProgram::send_broken(const Commands& answers) {
   const AnswerMistake& mistake = mistakes[*options_.breaks_at % mistakes.size()];
   if (answers.step() - *options_.breaks_at >= mistake.steps) return false;
   Commands broken = answers;
-  for (ControlCommand& command : broken.vehicles()) mistake.make(command, broken.step());
   if (mistake.copies == 0) broken.vehicles().clear();
-  for (int i = 0; i < std::max(mistake.copies, 1); ++i) peer_.write(broken);
+  for (int i = 0; i < std::max(mistake.copies, 1); ++i) {
+    for (ControlCommand& command : broken.vehicles()) mistake.make(command, broken.step());
+    // Not at once: a copy that is overtaken is dropped.
+    process_.run_at(setting_.timeline.now() + i * 100us, [this, broken] { peer_.write(broken); });
+  }
   return true;
 }
 

@@ -67,6 +67,7 @@ void FlightWatch::on_member(const Participant& message, const bus::PeerId& peer,
   client.is_ready = is_ready;
   client.process = &sender;
   client.order = {-message.strength(), message.name().to_string(), peer};
+  peers_.insert(peer);
   has_libraries_ = has_libraries_ || message.library_sha256().size() > 0;
   client.vehicle_ids.assign(message.vehicle_ids().begin(), message.vehicle_ids().end());
   client.hear(now);
@@ -113,6 +114,11 @@ void FlightWatch::on_published(std::uint64_t step, Instant now) {
   published_ = now;
   sent_ = now;
   is_disturbed_ = false;
+}
+
+/// Who may fly depends on the library of the first client, and on whom a server remembers.
+bool FlightWatch::is_unclear() const {
+  return has_libraries_ || peers_.size() >= sync::Membership::kMostMembers;
 }
 
 bool FlightWatch::is_disturbed() const { return is_disturbed_ || server_.is_slow(); }
@@ -182,7 +188,7 @@ std::optional<Instant> FlightWatch::check_flyer(const model::StepRecord& record,
     find_(fmt::format("answer: step {} has an answer of '{}', which is no client of this run",
                       record.step, record.client_name));
   const auto flyer = clients_.find(record.client_name);
-  if (flyer == clients_.end() || !flyer->second.is_ready || has_libraries_) return std::nullopt;
+  if (flyer == clients_.end() || !flyer->second.is_ready || is_unclear()) return std::nullopt;
   const std::uint32_t vehicle = record.vehicle_id;
   const auto answer = flyer->second.answers.find(vehicle);
   if (!flyer->second.has_answered(vehicle, record.step)) {

@@ -79,6 +79,7 @@ class FlightWatch {
     std::uint64_t held = 0;
   };
 
+  bool is_unclear() const;
   bool is_disturbed() const;
   bool is_lockstep() const { return sync_.mode == config::SyncMode::kLockstep; }
   bool is_sound(const ControlCommand& command, std::uint64_t step) const;
@@ -101,7 +102,8 @@ class FlightWatch {
   std::uint64_t step_ = 0;
   Instant published_{0};
   std::optional<Instant> sent_;  // the last state of an open step
-  bool has_libraries_ = false;   // who flies depends on the library of the first client
+  bool has_libraries_ = false;
+  std::set<bus::PeerId> peers_;  // that announced themselves as controllers
   bool is_disturbed_ = false;    // since the last step was published
   std::optional<Instant> interrupted_, stop_requested_, paused_;
 };

@@ -51,8 +51,9 @@ const std::vector<AnswerMistake>& list_answer_mistakes() {
       {keep_first_stage, kFewSteps},
       {keep_running, kFewSteps},
       {lose_stage, kFewSteps},
-      {change_nothing, kFewSteps, 40},
+      {change_nothing, kMissionSteps, 40},
       {change_nothing, kFewSteps, 0},
+      {[](Answer& answer, Step) { answer.f_Q_W_n()[0] += 1; }, kFewSteps, 2},  // they differ
   };
   return kMistakes;
 }

@@ -10,7 +10,7 @@ namespace sls::worlds {
 
 /// A mistake in the answers of a client that is ready.
 struct AnswerMistake {
-  void (*make)(ControlCommand& answer, std::uint64_t step);
+  void (*make)(ControlCommand& answer, std::uint64_t step);  ///< of each copy once more
   std::uint64_t steps = 1'000'000;  ///< it is made for so many steps: the flight must end
   int copies = 1;                   ///< each answer is sent so often; 0: samples without answers
 };

@@ -133,7 +133,7 @@ void draw_programs(Plan& plan, Random& random, const FlownScenario& flown,
   if (random.chance(0.15)) {
     PlannedProgram& foreign = add(Role::kForeign);
     foreign.is_wild = is_wild;
-    foreign.is_crowd = is_wild && random.chance(0.03);
+    foreign.is_crowd = is_wild && random.chance(0.01);
   }
   const int recorders =
       std::max(expected.recorders, static_cast<int>(random.integer(0, has_surplus ? 2 : 0)));
