@@ -77,9 +77,10 @@ faults:
   - bias: { on: state, vehicle: 2, position_m: [0.01, 0, 0] }
   - bias: { on: command, vehicle: 2, force_n: [0, 0.3, 0] }
 )"};
+/// Whatever the vehicle does, this force makes its state not finite.
 const Part kBrokenPlant{nullptr, kPlain.gains, kPlain.mission, R"(
 faults:
-  - bias: { on: command, force_n: [0, 0, 1.0e+300], from_s: 0.8 }
+  - bias: { on: command, force_n: [1.0e+300, 1.0e+300, 1.0e+300], from_s: 0.8 }
 )"};
 const Part kEndlessStage{nullptr, kPlain.gains, R"(
   - set_point: { position_m: [9, 0, -0.5] }
