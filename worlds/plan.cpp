@@ -174,7 +174,7 @@ Fault draw_fault(const Plan& plan, Random& random, std::int64_t count) {
                                    Kind::kSlow, Kind::kClock, Kind::kPartition, Kind::kClog};
   Fault fault;
   fault.kind = plan.promise == Promise::kMild ? kMild[random.integer(0, 7)]
-                                              : static_cast<Kind>(random.integer(0, 11));
+                                              : static_cast<Kind>(random.integer(0, 12));
   const std::size_t programs = plan.programs.size();
   // A server that has ended waits 1 s for the others to hear it.
   const bool is_mild = plan.promise == Promise::kMild;
@@ -184,6 +184,7 @@ Fault draw_fault(const Plan& plan, Random& random, std::int64_t count) {
   fault.duration = draw_time(random, 1ms, longest);
   switch (fault.kind) {
     case Kind::kKill:
+    case Kind::kPowerCut:
       fault.target = random.index(programs);
       if (random.chance(0.5)) fault.duration = Instant(0);
       break;
@@ -308,6 +309,7 @@ Fault draw_promised(const Plan& plan, Random& random, const FlownScenario& flown
       break;
     case Promise::kRecorderRestart:
       role = Role::kRecorder;
+      if (random.chance(0.3)) fault.kind = Kind::kPowerCut;
       fault.duration = draw_time(random, 1ms, 3s);
       break;
     case Promise::kReset:
@@ -351,7 +353,7 @@ Fault make_fault(const faults::Fault& given, const Plan& plan, Random& random) {
   fault.target = is_of_host ? plan.programs[program].host : program;
   fault.duration = sync::to_duration(draw(random, given.for_s));
   fault.value = draw(random, given.value);
-  if (given.kind == Kind::kKill && given.restart_s)  // at once is after a moment
+  if (given.restart_s)  // at once is after a moment
     fault.duration = std::max(Instant(1ms), sync::to_duration(draw(random, *given.restart_s)));
   if (given.kind == Kind::kCut) fault.other = plan.programs[*find_program(plan, given.to)].host;
   if (given.kind == Kind::kRequest) {

@@ -32,8 +32,9 @@ struct Fault {
   double value = 0;
 
   bool is_of_program() const {
-    return kind == Kind::kKill || kind == Kind::kStop || kind == Kind::kInterrupt ||
-           kind == Kind::kSlow || kind == Kind::kDiskFull || kind == Kind::kRequest;
+    return kind == Kind::kKill || kind == Kind::kPowerCut || kind == Kind::kStop ||
+           kind == Kind::kInterrupt || kind == Kind::kSlow || kind == Kind::kDiskFull ||
+           kind == Kind::kRequest;
   }
 };
 

@@ -143,6 +143,7 @@ class World {
     setting_.trace.add(setting_.timeline.now(), "FAULT", describe(fault));
     switch (fault.kind) {
       case Kind::kKill:
+      case Kind::kPowerCut:
         return kill(fault);
       case Kind::kStop:
         return stop(fault);
@@ -194,6 +195,8 @@ class World {
     Program* program = current_[fault.target];
     if (!program || program->process().has_ended()) return;
     program->kill();
+    if (fault.kind == Kind::kPowerCut && program->role() == Role::kRecorder)
+      lose_unsynced(static_cast<RecorderProgram*>(program)->folder(), random_);
     if (fault.duration.count() == 0) return;
     ++pending_starts_;
     setting_.timeline.after(fault.duration, [this, index = fault.target] { start(index); });
@@ -290,6 +293,7 @@ class World {
   std::vector<std::unique_ptr<Program>> programs_;  // also those that have ended
   std::vector<Program*> current_;                   // as plan_.programs
   std::unique_ptr<OperatorProgram> operator_;       // once a request is sent
+  Random random_ = setting_.random.split();
   std::size_t pending_starts_ = 0;
   int restarts_ = 0;
   std::uint64_t begun_faults_ = 0;

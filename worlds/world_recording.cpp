@@ -1,9 +1,11 @@
 #include "worlds/world_recording.hpp"
 
 #include <cerrno>
+#include <set>
 #include <system_error>
 #include <utility>
 
+#include "recorder/manifest.hpp"
 #include "recorder/recording_reader.hpp"
 
 namespace sls::worlds {
@@ -69,6 +71,23 @@ record::RecorderCore::Recorded MemoryRecording::close(const record::RunWatch::En
   recorded.is_reset = core_.has_phase(RunPhase::PHASE_RESET);
   recorded.last_step = core_.last_complete_step();
   return recorded;
+}
+
+void lose_unsynced(const std::filesystem::path& folder, Random& random) {
+  namespace fs = std::filesystem;
+  // In order of names: the order of a folder is that of its file system.
+  std::set<fs::path> files;
+  if (!fs::exists(folder)) return;
+  for (const auto& entry : fs::recursive_directory_iterator(folder))
+    if (entry.is_regular_file()) files.insert(entry.path());
+  for (const fs::path& file : files) {
+    const fs::path manifest = file.parent_path() / "manifest.json";
+    const bool is_synced =
+        file == manifest ||
+        (files.count(manifest) > 0 &&
+         record::read_manifest(file.parent_path()).files.count(file.filename()) > 0);
+    if (!is_synced) fs::resize_file(file, random.index(fs::file_size(file) + 1));
+  }
 }
 
 std::vector<StoredRecording> read_recordings(const std::filesystem::path& folder) {

@@ -12,6 +12,7 @@
 #include "recorder/core/recording_core.hpp"
 #include "recorder/recording.hpp"
 #include "worlds/properties.hpp"
+#include "worlds/random.hpp"
 
 namespace sls::worlds {
 
@@ -82,6 +83,10 @@ class MemoryRecording final : public WorldRecording, private record::RecordingOu
   std::map<std::uint32_t, StoredRecording::Rows> unwritten_;  // rows that are not on the disk
   record::RecordingCore core_;
 };
+
+/// What a power cut leaves in `folder`: manifests, the files that they list, and the beginning of
+/// all others, which were not synchronised.
+void lose_unsynced(const std::filesystem::path& folder, Random& random);
 
 /// Reads all recordings in `folder`, those of further runs, too.
 std::vector<StoredRecording> read_recordings(const std::filesystem::path& folder);

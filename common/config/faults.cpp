@@ -100,6 +100,7 @@ void describe_effect(Map& map, Fault& fault, Kind kind) {
   const auto lasts = [&] { map.key(kRequired, "for_s", fault.for_s, kTime); };
   switch (kind) {
     case Kind::kKill:
+    case Kind::kPowerCut:
       map.key(kRequired, "program", fault.program, kProgram);
       map.key(kOptional, "restart_s", fault.restart_s, kTime);
       return;

@@ -36,6 +36,7 @@ struct Link {
 
 enum class Kind {
   kKill,
+  kPowerCut,
   kStop,
   kInterrupt,
   kCut,
@@ -48,8 +49,9 @@ enum class Kind {
   kPartition,
   kClog,
 };
-inline std::array<Name<Kind>, 12> names_of(Kind) {
+inline std::array<Name<Kind>, 13> names_of(Kind) {
   return {{{"kill", Kind::kKill},
+           {"power-cut", Kind::kPowerCut},
            {"stop", Kind::kStop},
            {"interrupt", Kind::kInterrupt},
            {"cut", Kind::kCut},
@@ -78,7 +80,7 @@ struct Fault {
   Kind kind = Kind::kKill;
   Program program;                ///< that it hits, or on whose host it happens
   Program to;                     ///< of a cut: the other end
-  std::optional<Span> restart_s;  ///< of a kill: a new process begins so much later
+  std::optional<Span> restart_s;  ///< of a kill or power cut: a new process begins so much later
   Span for_s;
   Span value;  ///< loss, late_s, jump_s, bandwidth_mbit or steps
   Action action = Action::kPause;

@@ -82,9 +82,10 @@ TEST(FaultsTest, EachMistakeGivesItsLine) {
             "file:1: link.delay_ms: expected a number or a range [least, most], got a list of 3");
   EXPECT_EQ(find_error("link: { delay_ms: [-1, 2] }"),
             "file:1: link.delay_ms[0]: expected from 0 to 1000 ms, got -1");
-  EXPECT_EQ(find_error_of("{ kind: explode, at_s: 1 }"),
-            "file:2: faults[0].kind: expected kill or stop or interrupt or cut or isolate or loss "
-            "or slow or clock or disk-full or request or partition or clog, got explode");
+  EXPECT_EQ(
+      find_error_of("{ kind: explode, at_s: 1 }"),
+      "file:2: faults[0].kind: expected kill or power-cut or stop or interrupt or cut or "
+      "isolate or loss or slow or clock or disk-full or request or partition or clog, got explode");
   EXPECT_EQ(find_error_of("{ kind: kill, program: vehicle, at_s: 1 }"),
             "file:2: faults[0].program: expected server, controller or recorder, with a number "
             "where there are several (controller-2), got vehicle");
