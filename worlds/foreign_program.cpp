@@ -107,7 +107,7 @@ void ForeignProgram::answer(const States& sample) {
   if (random_.chance(0.7)) return;
   if (is_impostor_ && random_.chance(0.1)) pretend(sample);
   Commands answers;
-  answers.client_name(random_.chance(0.8) ? name() : "client-1");
+  answers.client_name(random_.chance(0.8) ? name() : "controller-1");
   answers.strength(9);
   answers.run_id(random_.chance(0.9) ? sample.run_id() : random_.next());
   answers.step(sample.step() + static_cast<std::uint64_t>(random_.integer(-2, 2)));

@@ -88,7 +88,7 @@ void draw_habits(PlannedProgram& client, Random& random) {
   client.has_library = random.chance(0.03);
   client.says_done = random.chance(0.02);
   if (!random.chance(0.04)) return;
-  client.announced_name = "client-1";
+  client.announced_name = "controller-1";
   client.strength = 3;
 }
 
@@ -309,7 +309,6 @@ Fault draw_promised(const Plan& plan, Random& random, const FlownScenario& flown
       break;
     case Promise::kRecorderRestart:
       role = Role::kRecorder;
-      if (random.chance(0.3)) fault.kind = Kind::kPowerCut;
       fault.duration = draw_time(random, 1ms, 3s);
       break;
     case Promise::kReset:

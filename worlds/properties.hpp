@@ -36,6 +36,7 @@ struct StoredRecording {
   bool is_closed = false;
   record::Claims claims;               ///< of the last manifest
   std::string certificate;             ///< of a closed one
+  std::vector<std::string> damages;    ///< where files are other than its last manifest says
   std::map<std::uint32_t, Rows> rows;  ///< by vehicle
 };
 

@@ -31,6 +31,8 @@ void RecorderProgram::start() {
       record::prepare_recording_folder(options_.folder, false);
   } catch (const config::ConfigError& error) {
     return exit(2, error.what());
+  } catch (const record::DamagedError& error) {  // by a power cut
+    return exit(1, error.what());
   }
   core_ = std::make_unique<record::RecorderCore>(
       record::make_core_options(recorder_options_, process_.host().name()));
@@ -105,8 +107,12 @@ void RecorderProgram::open() {
         std::make_unique<MemoryRecording>(stored, run.parameters, scenario.record.flush_s, now(),
                                           is_disk_full_, [this](const auto& line) { say(line); });
   } else {
-    writing_ = std::make_unique<FileRecording>(record::make_segment(recorder_options_, *core_),
-                                               run.parameters, now());
+    try {
+      writing_ = std::make_unique<FileRecording>(record::make_segment(recorder_options_, *core_),
+                                                 run.parameters, now());
+    } catch (const record::DamagedError& error) {
+      return exit(1, error.what());
+    }
   }
   has_recorded_ = true;
   arrivals_.open(run.parameters.run_id(), run.server);

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "recorder/manifest.hpp"
-#include "recorder/recording_reader.hpp"
+#include "recorder/verification.hpp"
 
 namespace sls::worlds {
 namespace {
@@ -27,9 +27,14 @@ StoredRecording read_recording(const std::filesystem::path& folder) {
   stored.claims.outcome = manifest.outcome;
   stored.claims.missing = manifest.missing;
   stored.certificate = manifest.certificate;
-  record::StepReader reader(opened);
-  while (const auto row = reader.next_as_written())
-    if (row->has_state) add_row(stored.rows, *row);
+  if (stored.is_closed) stored.damages = record::inspect(opened).problems;
+  try {
+    record::StepReader reader(opened);
+    while (const auto row = reader.next_as_written())
+      if (row->has_state) add_row(stored.rows, *row);
+  } catch (const record::DamagedError&) {
+    // The power was cut while it was written. `damages` tells if it had been closed.
+  }
   return stored;
 }
 
