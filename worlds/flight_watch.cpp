@@ -116,7 +116,7 @@ void FlightWatch::on_published(std::uint64_t step, Instant now) {
   is_disturbed_ = false;
 }
 
-/// Who may fly depends on the library of the first client, and on whom a server remembers.
+/// The library of the first client decides who may fly, and the memory of a server.
 bool FlightWatch::is_unclear() const {
   return has_libraries_ || peers_.size() >= sync::Membership::kMostMembers;
 }

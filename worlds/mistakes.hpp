@@ -1,4 +1,4 @@
-/// What clients do that do not keep the contract, one entry for each mistake.
+/// Mistakes of clients that do not keep the contract, one entry for each.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@ const std::vector<AnswerMistake>& list_answer_mistakes();
 /// A mistake in an announcement that is right otherwise. Nobody who makes it flies.
 struct AnnouncementMistake {
   void (*make)(Participant& announcement);
-  bool is_wild = false;        ///< others wait for whoever makes it
+  bool is_wild = false;        ///< others wait for the client that makes it
   bool reads_states = true;    ///< false: has no reader of sls/state
   bool writes_answers = true;  ///< false: has no writer of sls/command
 };

@@ -60,7 +60,7 @@ struct PlannedProgram {
   Instant delay{0};  ///< computing time of an answer; of the disk of a recorder
 };
 
-/// What a program of a plan need not be, in the words of a story.
+/// An option of a program that a plan can do without, in the words of a story.
 struct Trait {
   bool PlannedProgram::*flag;
   const char* words;

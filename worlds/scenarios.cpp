@@ -13,7 +13,7 @@
 namespace sls::worlds {
 namespace {
 
-/// What differs from a plain flight, as YAML.
+/// The difference from a plain flight, as YAML.
 struct Part {
   const char* vehicles = nullptr;  // instead of a number
   const char* gains = "lqr: { horizontal: 10, vertical: 5 }";

@@ -84,8 +84,8 @@ class MemoryRecording final : public WorldRecording, private record::RecordingOu
   record::RecordingCore core_;
 };
 
-/// What a power cut leaves in `folder`: manifests, the files that they list, and the beginning of
-/// all others, which were not synchronised.
+/// Leaves in `folder` as much as a power cut: manifests, the files that they list, and the
+/// beginning of all others, which were not synchronised.
 void lose_unsynced(const std::filesystem::path& folder, Random& random);
 
 /// Reads all recordings in `folder`, those of further runs, too.
