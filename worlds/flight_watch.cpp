@@ -151,12 +151,12 @@ void FlightWatch::on_recorded(const std::vector<model::StepRecord>& records, Ins
 void FlightWatch::on_running(Instant now) {
   check_gap(now);
   const Instant patience = sync::to_duration(sync_.calc_controller_patience_s()) + kGivesUpWithin;
-  if (is_disturbed()) return;
+  if (is_disturbed() || !sent_) return;  // no step is flown while a recorder is waited for
   for (const auto& [vehicle, lacking] : lacking_)
     if (now - lacking.since > patience)
       return find_(fmt::format("gives-up: vehicle {} is flown without answers for {:.3f} s",
                                vehicle, sync::to_seconds(now - lacking.since)));
-  if (sent_ && now - published_ > patience)
+  if (now - published_ > patience)
     find_(fmt::format("gives-up: step {} waits for {:.3f} s", step_,
                       sync::to_seconds(now - published_)));
 }

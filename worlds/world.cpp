@@ -21,13 +21,17 @@ using Kind = Fault::Kind;
 
 /// After the faults every program ends within this: a flight, and the patience of all waits, one
 /// after another.
-Instant calc_patience(const FlownScenario& flown, const Link& link) {
+Instant calc_patience(const FlownScenario& flown, const Plan& plan) {
   const config::Sync& sync = flown.scenario.sync;
   const double wait_s = std::max({sync.wait_for.timeout_s, sync.wait.controller.deadline_s,
                                   sync.wait.recorder.deadline_s, sync.wait.server_deadline_s});
   const double step_s = static_cast<double>(sync.period_ns) * 1e-9 / sync.real_time_factor +
-                        sync::to_seconds(2 * (link.delay + link.jitter));
-  const double flight_s = static_cast<double>(flown.last_step) * step_s;
+                        sync::to_seconds(2 * (plan.link.delay + plan.link.jitter));
+  // A client that breaks may keep a stage until it times out.
+  constexpr std::uint64_t kStepsOfStage = 16'000;
+  const bool is_long = std::any_of(plan.programs.begin(), plan.programs.end(),
+                                   [](const auto& program) { return program.breaks_at; });
+  const double flight_s = static_cast<double>(is_long ? kStepsOfStage : flown.last_step) * step_s;
   return 110s + sync::to_duration(4 * wait_s + 2 * flight_s);
 }
 
@@ -54,7 +58,7 @@ class World {
   }
 
   Verdict fly() {
-    const Instant end = plan_.healed + calc_patience(*setting_.flown, plan_.link);
+    const Instant end = plan_.healed + calc_patience(*setting_.flown, plan_);
     while (setting_.timeline.step(end)) {
       if (is_over()) break;
     }

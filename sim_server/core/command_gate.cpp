@@ -79,8 +79,7 @@ void CommandGate::set_clients(const std::vector<ReadyClient>& clients) {
   std::vector<Client> updated;
   for (const ReadyClient& identity : clients) {
     Client client;
-    // Whoever joins in flight may not get the state that is awaited: the others answer it
-    // meanwhile.
+    // A client that joins in flight may not get the awaited state, which the others answer.
     client.is_new = has_begun_ && !clients_.empty();
     if (Client* known = find_client(identity.peer)) client = std::exchange(*known, {});
     client.identity = identity;
