@@ -178,6 +178,7 @@ struct Node::Impl {
   ~Impl() {
     if (!participant) return;
     participant->set_listener(nullptr);
+    if (is_refused) return;
     participant->delete_contained_entities();
     const LeavingScope leaving(*participant);
     dds::DomainParticipantFactory::get_instance()->delete_participant(participant);
@@ -276,7 +277,8 @@ struct Node::Impl {
   /// Throws the reason why the middleware created no writer or reader of `topic`; `verb` is "write"
   /// or "read".
   [[noreturn]] void throw_refused_endpoint(const char* verb, const char* topic,
-                                           const char* profile) const {
+                                           const char* profile) {
+    is_refused = is_secured;
     const std::string cause = MiddlewareLog::find_first_error();
     if (cause.find("topic not found in allow rule") != std::string::npos ||
         cause.find("topic denied by deny rule") != std::string::npos) {
@@ -307,6 +309,9 @@ struct Node::Impl {
   const std::string qos_place;
   std::string identity;
   bool is_secured = false;
+  // An endpoint was refused, and the process will end. The others may be matched at this moment;
+  // they are not deleted, because Fast DDS would use them (fastdds/README.md, trap 42).
+  bool is_refused = false;
   bool is_on_this_machine = false;
   std::size_t max_datagram_bytes = 60'000;  // of UDP on loopback, and of shared memory
   std::chrono::steady_clock::time_point joined;
@@ -424,6 +429,7 @@ struct AnyWriter::Impl : dds::DataWriterListener {
     peers.update(status.last_subscription_handle, status.current_count_change);
   }
   MatchedPeers peers;
+  const bool* is_refused = nullptr;  // of the node
   Neighbours* neighbours = nullptr;
   dds::Publisher* publisher = nullptr;
   dds::DataWriter* writer = nullptr;
@@ -442,6 +448,7 @@ AnyWriter::AnyWriter(Node& node, const char* topic, const char* profile, void* t
   MiddlewareLog::clear();
   impl_->writer = impl_->publisher->create_datawriter(dds_topic, qos, impl_.get());
   if (!impl_->writer) node.impl().throw_refused_endpoint("write", topic, profile);
+  impl_->is_refused = &node.impl().is_refused;
   impl_->neighbours = &node.impl().neighbours;
   impl_->neighbours->add_own(make_facts(*impl_->writer));
 }
@@ -449,7 +456,10 @@ AnyWriter::AnyWriter(Node& node, const char* topic, const char* profile, void* t
 AnyWriter::~AnyWriter() {
   if (!impl_->writer) return;
   impl_->neighbours->drop_own(make_facts(*impl_->writer));
-  delete_writer(*impl_->publisher, impl_->writer);
+  if (*impl_->is_refused)
+    static_cast<void>(impl_.release());  // the writer's listener
+  else
+    delete_writer(*impl_->publisher, impl_->writer);
 }
 
 bool AnyWriter::write(const void* sample) { return write_sample(*impl_->writer, sample); }
@@ -498,6 +508,7 @@ struct AnyReader::Impl : dds::DataReaderListener, MisfitReport {
     neighbours->note_misfit(to_peer(guid), writer, topic, type, defect);
   }
   MatchedPeers peers;
+  const bool* is_refused = nullptr;  // of the node
   Neighbours* neighbours = nullptr;
   std::string topic;
   std::atomic<std::uint64_t> missed_deadlines{0};
@@ -515,6 +526,7 @@ AnyReader::AnyReader(Node& node, const char* topic, const char* profile, void* t
     : impl_(std::make_unique<Impl>()) {
   dds::TypeSupport type(static_cast<dds::TopicDataType*>(type_support));
   auto* dds_topic = node.impl().find_or_create_topic(topic, type);
+  impl_->is_refused = &node.impl().is_refused;
   impl_->neighbours = &node.impl().neighbours;
   impl_->topic = topic;
   impl_->sample = sample;
@@ -536,7 +548,7 @@ AnyReader::~AnyReader() {
   if (!impl_->reader) return;
   impl_->neighbours->drop_own(make_facts(*impl_->reader));
   impl_->reader->set_listener(nullptr);
-  impl_->subscriber->delete_datareader(impl_->reader);
+  if (!*impl_->is_refused) impl_->subscriber->delete_datareader(impl_->reader);
 }
 
 std::set<PeerId> AnyReader::matched() const { return impl_->peers.peers(); }
