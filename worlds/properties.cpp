@@ -132,7 +132,9 @@ void Properties::on_published(std::uint64_t run_id, std::uint64_t step,
                               const config::WaitFor& expected) {
   Run& run = runs_[run_id];
   const auto ready = static_cast<int>(run.ready.size());
-  const int recorders = count_living(run.recorders);
+  // A recorder that dies during a pause before the first step was there when all were ready.
+  const int recorders =
+      run.was_paused ? static_cast<int>(run.recorders.size()) : count_living(run.recorders);
   if (step == 0 && (ready < expected.controllers || recorders < expected.recorders))
     find(fmt::format("start: run {:016x} begins with {} controllers and {} recorders", run_id,
                      ready, recorders));
@@ -189,6 +191,7 @@ void Properties::on_status(const SimStatus& status, const Network& network) {
   run.timing = status.timing().to_string();
   if (!run.has_status || run.phase != status.phase()) run.phase_since = timeline_.now();
   run.has_status = true;
+  run.was_paused = run.was_paused || status.phase() == RunPhase::PHASE_PAUSED;
   run.phase = status.phase();
   run.summary.take_overs = status.counters().take_overs();
   run.summary.late = status.counters().held() + status.counters().fail_safe();

@@ -121,6 +121,7 @@ class Properties {
     bool has_faulty_forces = false;  // the scenario disturbs them
     bool is_match_late = false;
     Instant phase_since{0};
+    bool was_paused = false;
     std::optional<Instant> published;  // the last step
     std::optional<Instant> began;      // the first step
     FlightSummary summary;
