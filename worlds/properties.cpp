@@ -404,9 +404,14 @@ void Properties::check(const Plan& plan, const std::vector<std::unique_ptr<Progr
       find(fmt::format("finishes: {} ends with {}: {}", program->name(), *program->exit_code(),
                        program->reason()));
   }
+  const bool is_power_cut =
+      std::any_of(plan.faults.begin(), plan.faults.end(),
+                  [](const Fault& fault) { return fault.kind == Fault::Kind::kPowerCut; });
   for (const auto& [folder, program] : folders)
-    for (const StoredRecording& recording : read_recordings(folder))
+    for (StoredRecording& recording : read_recordings(folder)) {
+      if (is_power_cut && !recording.is_closed) recording.damages.clear();
       check_recording(*program, recording, flown);
+    }
   if (plan.promise != Promise::kNone && !is_any_finished())
     find("finishes: no flight was finished");
 }

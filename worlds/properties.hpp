@@ -36,7 +36,7 @@ struct StoredRecording {
   bool is_closed = false;
   record::Claims claims;               ///< of the last manifest
   std::string certificate;             ///< of a closed one
-  std::vector<std::string> damages;    ///< where files are other than its last manifest says
+  std::vector<std::string> damages;    ///< where files are no rows, or other than the manifest says
   std::map<std::uint32_t, Rows> rows;  ///< by vehicle
 };
 

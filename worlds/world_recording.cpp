@@ -32,8 +32,8 @@ StoredRecording read_recording(const std::filesystem::path& folder) {
     record::StepReader reader(opened);
     while (const auto row = reader.next_as_written())
       if (row->has_state) add_row(stored.rows, *row);
-  } catch (const record::DamagedError&) {
-    // The power was cut while it was written. `damages` tells if it had been closed.
+  } catch (const record::DamagedError& error) {
+    if (!stored.is_closed) stored.damages.emplace_back(error.what());
   }
   return stored;
 }

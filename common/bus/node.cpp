@@ -429,9 +429,7 @@ struct AnyWriter::Impl : dds::DataWriterListener {
     peers.update(status.last_subscription_handle, status.current_count_change);
   }
   MatchedPeers peers;
-  const bool* is_refused = nullptr;  // of the node
-  Neighbours* neighbours = nullptr;
-  dds::Publisher* publisher = nullptr;
+  Node::Impl* node = nullptr;
   dds::DataWriter* writer = nullptr;
 };
 
@@ -440,26 +438,24 @@ AnyWriter::AnyWriter(Node& node, const char* topic, const char* profile, void* t
     : impl_(std::make_unique<Impl>()) {
   dds::TypeSupport type(static_cast<dds::TopicDataType*>(type_support));
   auto* dds_topic = node.impl().find_or_create_topic(topic, type);
-  impl_->publisher = node.impl().publisher;
+  impl_->node = &node.impl();
   dds::DataWriterQos qos;
-  if (!is_ok(impl_->publisher->get_datawriter_qos_from_profile(profile, qos)))
+  if (!is_ok(impl_->node->publisher->get_datawriter_qos_from_profile(profile, qos)))
     node.impl().throw_unknown_profile(profile);
   if (!user_data.empty()) qos.user_data().data_vec({user_data.begin(), user_data.end()});
   MiddlewareLog::clear();
-  impl_->writer = impl_->publisher->create_datawriter(dds_topic, qos, impl_.get());
+  impl_->writer = impl_->node->publisher->create_datawriter(dds_topic, qos, impl_.get());
   if (!impl_->writer) node.impl().throw_refused_endpoint("write", topic, profile);
-  impl_->is_refused = &node.impl().is_refused;
-  impl_->neighbours = &node.impl().neighbours;
-  impl_->neighbours->add_own(make_facts(*impl_->writer));
+  impl_->node->neighbours.add_own(make_facts(*impl_->writer));
 }
 
 AnyWriter::~AnyWriter() {
   if (!impl_->writer) return;
-  impl_->neighbours->drop_own(make_facts(*impl_->writer));
-  if (*impl_->is_refused)
+  impl_->node->neighbours.drop_own(make_facts(*impl_->writer));
+  if (impl_->node->is_refused)
     static_cast<void>(impl_.release());  // the writer's listener
   else
-    delete_writer(*impl_->publisher, impl_->writer);
+    delete_writer(*impl_->node->publisher, impl_->writer);
 }
 
 bool AnyWriter::write(const void* sample) { return write_sample(*impl_->writer, sample); }
@@ -505,11 +501,10 @@ struct AnyReader::Impl : dds::DataReaderListener, MisfitReport {
     const auto& guid = find_change(payload).writerGUID;
     Neighbours::EntityId writer;
     std::copy(std::begin(guid.entityId.value), std::end(guid.entityId.value), writer.begin());
-    neighbours->note_misfit(to_peer(guid), writer, topic, type, defect);
+    node->neighbours.note_misfit(to_peer(guid), writer, topic, type, defect);
   }
   MatchedPeers peers;
-  const bool* is_refused = nullptr;  // of the node
-  Neighbours* neighbours = nullptr;
+  Node::Impl* node = nullptr;
   std::string topic;
   std::atomic<std::uint64_t> missed_deadlines{0};
   std::optional<std::chrono::nanoseconds> lifespan;
@@ -517,7 +512,6 @@ struct AnyReader::Impl : dds::DataReaderListener, MisfitReport {
   void* sample = nullptr;
   std::vector<std::uint8_t>* raw = nullptr;
   Take take;
-  dds::Subscriber* subscriber = nullptr;
   dds::DataReader* reader = nullptr;
 };
 
@@ -526,29 +520,27 @@ AnyReader::AnyReader(Node& node, const char* topic, const char* profile, void* t
     : impl_(std::make_unique<Impl>()) {
   dds::TypeSupport type(static_cast<dds::TopicDataType*>(type_support));
   auto* dds_topic = node.impl().find_or_create_topic(topic, type);
-  impl_->is_refused = &node.impl().is_refused;
-  impl_->neighbours = &node.impl().neighbours;
+  impl_->node = &node.impl();
   impl_->topic = topic;
   impl_->sample = sample;
   impl_->raw = raw;
   impl_->take = std::move(take);
-  impl_->subscriber = node.impl().subscriber;
   dds::DataReaderQos qos;
-  if (!is_ok(impl_->subscriber->get_datareader_qos_from_profile(profile, qos)))
+  if (!is_ok(impl_->node->subscriber->get_datareader_qos_from_profile(profile, qos)))
     node.impl().throw_unknown_profile(profile);
   const auto& lifespan = qos.lifespan().duration;
   if (!(lifespan == kInfinite)) impl_->lifespan = std::chrono::nanoseconds(lifespan.to_ns());
   MiddlewareLog::clear();
-  impl_->reader = impl_->subscriber->create_datareader(dds_topic, qos, impl_.get());
+  impl_->reader = impl_->node->subscriber->create_datareader(dds_topic, qos, impl_.get());
   if (!impl_->reader) node.impl().throw_refused_endpoint("read", topic, profile);
-  impl_->neighbours->add_own(make_facts(*impl_->reader));
+  impl_->node->neighbours.add_own(make_facts(*impl_->reader));
 }
 
 AnyReader::~AnyReader() {
   if (!impl_->reader) return;
-  impl_->neighbours->drop_own(make_facts(*impl_->reader));
+  impl_->node->neighbours.drop_own(make_facts(*impl_->reader));
   impl_->reader->set_listener(nullptr);
-  if (!*impl_->is_refused) impl_->subscriber->delete_datareader(impl_->reader);
+  if (!impl_->node->is_refused) impl_->node->subscriber->delete_datareader(impl_->reader);
 }
 
 std::set<PeerId> AnyReader::matched() const { return impl_->peers.peers(); }
