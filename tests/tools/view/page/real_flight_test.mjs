@@ -15,18 +15,26 @@ const flight = await startFlight({ build, domain });
 const { browser, stop } = await startBrowser({ flags: kLean });
 const { page, errors, requests } = await open(browser);
 const state = () => page.evaluate(() => window.slsView.state());
+/** Clicks as a user does: on a button that can be pressed. Waits for the reply, which must say that the request was carried out. */
+const press = async (action) => {
+  await waitFor(`${action} can be pressed`, () => page.$eval(`[data-action=${action}]`, ({ disabled, hidden }) => !disabled && !hidden));
+  await page.click(`[data-action=${action}]`);
+  const reply = await waitFor(`reply to ${action}`, () =>
+    page.$eval("#reply", ({ textContent }, word) => new RegExp(`^${word} (done|refused|not)`).test(textContent) && textContent, action));
+  assert.match(reply, /^\w+ done at step \d+$/);
+};
 try {
   await page.goto(flight.url);
   await waitFor("a flight on the page", async () => (await state()).step > 250, 60_000);
 
-  await page.click("[data-action=pause]");
+  await press("pause");
   await waitFor("sim_ctl: paused", () => flight.status().phase === "paused");
   await waitFor("page: paused", async () => (await state()).phase === "paused");
   console.log("ok the pause button holds the real run");
 
   const before = flight.status().step;
   await page.$eval("#bar input[type=number]", (field) => (field.value = "7"));
-  await page.click("[data-action=step]");
+  await press("step");
   await waitFor("seven steps", () => flight.status().step === before + 7);
   console.log("ok the step button lets it go seven steps");
 
@@ -52,7 +60,7 @@ try {
   }
   console.log("ok pixels of the real flight have the colours of quadrotor and load");
 
-  await page.click("[data-action=resume]");
+  await press("resume");
   await waitFor("sim_ctl: running", () => flight.status().phase === "running");
   console.log("ok the resume button lets it go on");
 
