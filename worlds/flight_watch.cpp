@@ -162,7 +162,7 @@ void FlightWatch::on_running(Instant now) {
 }
 
 /// A step ends when each vehicle has the answer that it awaits: another client's, if the stronger
-/// ones have been silent for `take_over_s`.
+/// ones have been silent for `take_over_s` or are known to be dead.
 void FlightWatch::check_take_over(const std::vector<model::StepRecord>& records, Instant now) {
   Instant due{0};
   std::string taken_over_by;
@@ -200,7 +200,7 @@ std::optional<Instant> FlightWatch::check_flyer(const model::StepRecord& record,
   const Instant waited = now - published_;
   const auto before = flyers_.find(vehicle);
   Instant due = answer->second;
-  int stronger = 0;
+  Instant patience{0};
   for (const auto& [name, client] : clients_) {
     const auto& ids = client.vehicle_ids;
     if (!client.is_ready || std::find(ids.begin(), ids.end(), vehicle) == ids.end() ||
@@ -210,7 +210,10 @@ std::optional<Instant> FlightWatch::check_flyer(const model::StepRecord& record,
       due = std::max(due, client.refused->second);
       continue;
     }
-    ++stronger;
+    const Instant known_dead =
+        std::max(client.heard, published_) + sync::kPresumedDeadAfter + kKnownAfter;
+    patience +=
+        client.process->was_killed() ? std::min(take_over, known_dead - published_) : take_over;
     const bool is_known = client.ready + kKnownAfter < published_;
     if (is_known && !client.process->has_ended() && client.has_answered(vehicle, record.step) &&
         client.answers.at(vehicle) < answer->second)
@@ -224,7 +227,7 @@ std::optional<Instant> FlightWatch::check_flyer(const model::StepRecord& record,
       find_(fmt::format("take-over: '{}' flies step {} after {:.3f} s without '{}'",
                         record.client_name, record.step, sync::to_seconds(waited), name));
   }
-  return std::max(due, published_ + stronger * take_over);
+  return std::max(due, published_ + patience);
 }
 
 void FlightWatch::check_policy(const model::StepRecord& record, Instant now) {

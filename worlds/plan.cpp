@@ -92,6 +92,22 @@ void draw_habits(PlannedProgram& client, Random& random) {
   client.strength = 3;
 }
 
+/// Two servers share the fleet: another one flies all vehicles but the first, with as many clients
+/// and recorders.
+void share_fleet(Plan& plan, Random& random) {
+  const std::vector<std::uint32_t> ids = plan.programs.front().vehicle_ids;
+  std::vector<PlannedProgram> others;
+  for (PlannedProgram& program : plan.programs) {
+    if (program.role == Role::kForeign) continue;
+    PlannedProgram& other = others.emplace_back(program);
+    other.host = random.index(plan.hosts);
+    other.start = draw_time(random, 0ms, 1500ms);
+    other.vehicle_ids.assign(ids.begin() + 1, ids.end());
+    program.vehicle_ids = {ids.front()};
+  }
+  plan.programs.insert(plan.programs.end(), others.begin(), others.end());
+}
+
 void draw_programs(Plan& plan, Random& random, const FlownScenario& flown,
                    const faults::Case* given) {
   const config::WaitFor& expected = flown.scenario.sync.wait_for;
@@ -115,13 +131,17 @@ void draw_programs(Plan& plan, Random& random, const FlownScenario& flown,
   // waits for may miss the flight after a reset.
   const bool has_surplus = plan.promise != Promise::kServerRestart &&
                            plan.promise != Promise::kTwoServers && plan.promise != Promise::kReset;
-  const int clients =
-      expected.controllers + (plan.promise == Promise::kTakeOver
-                                  ? 1
-                                  : static_cast<int>(random.integer(0, has_surplus ? 1 : 0)));
+  const bool joins_in_flight = is_calm && is_realtime;
+  const bool has_standby = plan.promise == Promise::kTakeOver || joins_in_flight;
+  const int clients = expected.controllers +
+                      (has_standby ? 1 : static_cast<int>(random.integer(0, has_surplus ? 1 : 0)));
   for (int i = 0; i < clients; ++i) {
     PlannedProgram& client = add(Role::kClient);
     client.strength = static_cast<std::int32_t>(random.integer(0, 3));
+    if (joins_in_flight && i == expected.controllers) {
+      client.start = draw_time(random, 1s, 3s);
+      client.strength = 3;
+    }
     client.announces_once = random.chance(0.1);
     if (!is_calm && random.chance(0.1)) client.delay = draw_time(random, 100us, 3ms);
     if (is_wild && random.chance(0.03)) client.has_other_scenario = true;
@@ -144,6 +164,10 @@ void draw_programs(Plan& plan, Random& random, const FlownScenario& flown,
     if (is_wild && random.chance(0.05))
       recorder.queue = static_cast<std::size_t>(random.integer(1, 50));
   }
+  const bool has_fleet = flown.scenario.vehicles.size() > 1 && flown.failure.empty();
+  if (!given && has_fleet && plan.promise != Promise::kServerRestart &&
+      plan.promise != Promise::kTwoServers && random.chance(0.25))
+    share_fleet(plan, random);
   if (!given) return;
   const auto need = [&](const faults::Program& named) {
     while (!find_program(plan, named)) add(static_cast<Role>(named.role));
@@ -166,6 +190,14 @@ void time_fault(Fault& fault, Random& random, const Plan& plan, const FlownScena
   } else {
     fault.at = draw_time(random, 0ms, plan.healed);
   }
+}
+
+/// One of the programs with this role.
+std::size_t draw_program(Random& random, const Plan& plan, Role role) {
+  std::vector<std::size_t> found;
+  for (std::size_t i = 0; i < plan.programs.size(); ++i)
+    if (plan.programs[i].role == role) found.push_back(i);
+  return found[random.index(found.size())];
 }
 
 /// `count`: of all faults of the plan.
@@ -210,7 +242,7 @@ Fault draw_fault(const Plan& plan, Random& random, std::int64_t count) {
       fault.value = random.between(-30, 30);
       break;
     case Kind::kRequest:
-      fault.target = 0;
+      fault.target = draw_program(random, plan, Role::kServer);
       fault.other = random.index(6);
       fault.value = static_cast<double>(random.integer(1, 20));
       break;
@@ -280,6 +312,25 @@ void draw_split(Plan& plan, Random& random, const FlownScenario& flown) {
   }
 }
 
+/// An operator pauses the flight for longer than anybody may be absent. In half of the worlds one
+/// of the clients is slow when the flight goes on, so that answers are late in real time.
+void draw_pause(Plan& plan, Random& random, const FlownScenario& flown) {
+  Fault pause;
+  pause.kind = Kind::kRequest;
+  pause.target = draw_program(random, plan, Role::kServer);
+  pause.other = static_cast<std::size_t>(ControlAction::ACTION_PAUSE);
+  pause.duration = draw_seconds(random, 1, flown.scenario.sync.calc_controller_patience_s() + 10);
+  pause.step = draw_step(random, flown, 5);
+  plan.faults.push_back(pause);
+  if (random.chance(0.5)) return;
+  Fault slow = pause;
+  slow.kind = Kind::kSlow;
+  slow.target = draw_program(random, plan, Role::kClient);
+  slow.duration += 1s;
+  slow.value = random.between(0.0005, 0.02);
+  plan.faults.push_back(slow);
+}
+
 /// The flight is paused when the recorder of `kill`, its only fault, is killed, until the others
 /// know that it is dead. It comes back long after, or never.
 void pause_until_known(Plan& plan, Random& random, bool comes_back) {
@@ -315,21 +366,13 @@ Fault draw_promised(const Plan& plan, Random& random, const FlownScenario& flown
       fault.kind = Kind::kRequest;
       fault.other = static_cast<std::size_t>(ControlAction::ACTION_RESET);
       break;
-    case Promise::kPause:
-      fault.kind = Kind::kRequest;
-      fault.other = static_cast<std::size_t>(ControlAction::ACTION_PAUSE);
-      fault.duration = draw_seconds(random, 1, sync.calc_controller_patience_s() + 10);
-      break;
     default:
       fault.kind = Kind::kStop;
       role = Role::kClient;
       fault.duration =
           draw_seconds(random, sync.wait.server_deadline_s + 1, calc_longest_stop_s(sync));
   }
-  std::vector<std::size_t> targets;
-  for (std::size_t i = 0; i < plan.programs.size(); ++i)
-    if (plan.programs[i].role == role) targets.push_back(i);
-  fault.target = targets[random.index(targets.size())];
+  fault.target = draw_program(random, plan, role);
   fault.step = draw_step(random, flown, 5);
   return fault;
 }
@@ -408,6 +451,7 @@ void draw_faults(Plan& plan, Random& random, const FlownScenario& flown) {
   if (plan.promise == Promise::kCalm || plan.promise == Promise::kTwoServers) return;
   if (plan.promise == Promise::kLongStop && random.chance(0.5))
     return draw_silences(plan, random, flown);
+  if (plan.promise == Promise::kPause) return draw_pause(plan, random, flown);
   if (plan.promise > Promise::kMild) {
     plan.faults.push_back(draw_promised(plan, random, flown));
     if (plan.promise == Promise::kRecorderRestart && random.chance(0.5))
@@ -470,7 +514,7 @@ Plan draw_plan(std::uint64_t seed, const std::vector<FlownScenario>& scenarios,
   plan.drift = random.chance(0.3) ? random.between(-1e-4, 1e-4) : 0;
   plan.wall_offset_s = random.chance(0.3) ? random.between(-20, 20) : 0;
   plan.healed = draw_time(random, 1s, is_lockstep ? Instant(6s) : Instant(4s));
-  if (plan.promise == Promise::kLongStop) plan.healed = 60s;
+  if (plan.promise == Promise::kLongStop || plan.promise == Promise::kPause) plan.healed = 60s;
   plan.has_files = plan.promise == Promise::kRecorderRestart || random.chance(0.08);
   draw_programs(plan, random, flown, given);
   if (given) {

@@ -319,6 +319,15 @@ void Properties::check_join(const Program& program, std::uint64_t run_id,
                      run->second.server->name()));
 }
 
+/// A recorder is as far as its last vehicle.
+void Properties::on_progress(const Program& recorder, std::int64_t step,
+                             const std::map<std::uint32_t, std::int64_t>& newest) {
+  for (const auto& [vehicle, last] : newest)
+    if (last < step)
+      find(fmt::format("progress: {} says step {}, and has none after {} of vehicle {}",
+                       recorder.name(), step, last, vehicle));
+}
+
 /// A server leaves requests for the runs of others to them.
 void Properties::on_replied(const Program& server, std::uint64_t request_id,
                             const Network& network) {
@@ -454,7 +463,8 @@ void Properties::check_recording(const Program& program, const StoredRecording& 
   }
   if (!run.has_late && recording.certificate != run.certificate)
     find(fmt::format("complete: {} differs from what {} flew", program.name(), run.server->name()));
-  if (run.is_exact && !run.has_mistakes && recording.certificate != flown.certificate)
+  if (run.is_exact && !run.has_mistakes &&
+      recording.certificate != flown.certificates.at(run.vehicle_ids))
     find(fmt::format("exact: {} differs from the flight in one process", program.name()));
   if (!recording.claims.timing.empty() && recording.claims.timing != run.timing)
     find(fmt::format("timing-label: {}: expected '{}', got '{}'", program.name(), run.timing,

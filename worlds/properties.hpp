@@ -75,6 +75,9 @@ class Properties {
   /// `heard`: what the program knows of servers.
   void on_announced(const Program& program, const Participant& message, const sync::Servers& heard);
   void on_request(const SimControl& request) { requests_[request.request_id()] = request.run_id(); }
+  /// `step`: which the recorder says it has completed; `newest`: that came to it, by vehicle.
+  void on_progress(const Program& recorder, std::int64_t step,
+                   const std::map<std::uint32_t, std::int64_t>& newest);
   void on_replied(const Program& server, std::uint64_t request_id, const Network& network);
   void on_interrupted(const Program& program);
   void on_killed(const Program& program);

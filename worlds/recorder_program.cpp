@@ -23,6 +23,7 @@ RecorderProgram::RecorderProgram(Setting& setting, Host& host, std::string name,
 void RecorderProgram::start() {
   recorder_options_.folder =
       options_.folder.empty() ? std::filesystem::path(name()) : options_.folder;
+  recorder_options_.vehicle = options_.vehicle;
   recorder_options_.follow = options_.follows_servers;
   try {  // as the program's main
     if (options_.resumes && !options_.folder.empty())
@@ -115,6 +116,9 @@ void RecorderProgram::open() {
     }
   }
   has_recorded_ = true;
+  first_progress_ = writing_->last_complete_step();
+  newest_.clear();
+  for (const std::uint32_t id : sync::list_vehicle_ids(run.parameters)) newest_[id] = -1;
   arrivals_.open(run.parameters.run_id(), run.server);
   say(fmt::format("records run {:016x}", run.parameters.run_id()));
   announce_progress();
@@ -129,8 +133,9 @@ void RecorderProgram::report() {
 }
 
 void RecorderProgram::announce_progress() {
-  announce(
-      core_->make_announcement(writing_ ? writing_->last_complete_step() : -1, !failure_.empty()));
+  const std::int64_t progress = writing_ ? writing_->last_complete_step() : -1;
+  if (progress > first_progress_) setting_.properties.on_progress(*this, progress, newest_);
+  announce(core_->make_announcement(progress, !failure_.empty()));
 }
 
 // --- the writing thread --------------------------------------------------------------------------
@@ -150,15 +155,24 @@ void RecorderProgram::write() {
   }
 }
 
+void RecorderProgram::note_newest(const RecordBatch& batch) {
+  for (const RecordEntry& entry : batch.entries()) {
+    const auto newest = newest_.find(entry.vehicle_id());
+    if (newest != newest_.end())
+      newest->second = std::max(newest->second, static_cast<std::int64_t>(entry.step()));
+  }
+}
+
 /// True if there were samples.
 bool RecorderProgram::write_samples() {
   const bool must_close = must_close_.has_value();
   bool has_come = false;
   for (const record::Arrivals::Sample& sample : arrivals_.take_all()) {
     has_come = true;
-    if (const auto* batch = std::get_if<RecordBatch>(&sample))
+    if (const auto* batch = std::get_if<RecordBatch>(&sample)) {
+      note_newest(*batch);
       writing_->add(*batch, now());
-    else
+    } else
       writing_->add(std::get<SimStatus>(sample));
   }
   writing_->on_time(now());

@@ -2,6 +2,7 @@
 
 #include <deque>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -20,6 +21,7 @@ class RecorderProgram : public Program {
  public:
   struct Options {
     std::filesystem::path folder;  ///< of real files; empty: rows in memory
+    std::uint32_t vehicle = 0;     ///< its run is recorded
     bool resumes = false;
     bool follows_servers = false;
     std::size_t queue = record::Arrivals::kMostEntries;  ///< entries that wait to be written
@@ -46,6 +48,7 @@ class RecorderProgram : public Program {
   /// A pass of the writing thread.
   void write();
   bool write_samples();
+  void note_newest(const RecordBatch& batch);
   void on_killed() override { writing_.reset(); }
 
   const Options options_;
@@ -54,7 +57,9 @@ class RecorderProgram : public Program {
   record::Arrivals arrivals_;
   std::deque<StoredRecording> recordings_;
 
-  std::unique_ptr<WorldRecording> writing_;  // of the run that is recorded
+  std::unique_ptr<WorldRecording> writing_;       // of the run that is recorded
+  std::int64_t first_progress_ = -1;              // of this run, when the recording was opened
+  std::map<std::uint32_t, std::int64_t> newest_;  // step that came to be written, by vehicle
   std::optional<record::RunWatch::End> must_close_;
   bool has_recorded_ = false;
   bool is_disk_full_ = false;

@@ -96,13 +96,14 @@ struct Choice {
   const char* recorder;
   const Part& part = kPlain;
   double server_deadline_s = 30;
+  double take_over_s = 0.1;
 };
 
 const std::array<Choice, 22> kChoices = {{
     {"lockstep", 1, 1, 1, "wait", "wait"},
     {"lockstep", 1, 1, 0, "wait", "wait"},
     {"lockstep", 1, 2, 1, "wait", "wait", kStages},
-    {"lockstep", 1, 2, 2, "wait", "go_on"},
+    {"lockstep", 1, 2, 2, "wait", "go_on", kPlain, 30, 4},  // the dead are known earlier
     {"lockstep", 2, 1, 1, "wait", "wait", kFaults},
     {"lockstep", 3, 2, 1, "wait", "stop"},
     {"lockstep", 1, 1, 1, "hold", "wait", kFaults},
@@ -138,13 +139,29 @@ sync:
   period_s: 0.004
   wait_for: {{ controllers: {}, recorders: {}, timeout_s: 8 }}
   wait: {{ controller: {{ policy: {} }}, recorder: {{ policy: {} }}, server: {{ deadline_s: {} }} }}
+  take_over_s: {}
 controller:
   gains: {{ {} }}
   force_limit_n: 200
 mission:{}{})",
                      part.vehicles ? part.vehicles : std::to_string(choice.vehicles), choice.mode,
                      choice.controllers, choice.recorders, choice.controller, choice.recorder,
-                     choice.server_deadline_s, part.gains, part.mission, part.further);
+                     choice.server_deadline_s, choice.take_over_s, part.gains, part.mission,
+                     part.further);
+}
+
+/// Flies these vehicles and adds the result to `flown`.
+void fly(const FlownScenario::VehicleIds& ids, FlownScenario& flown) {
+  closed_loop::Flight flight(flown.scenario, ids);
+  closed_loop::FlightCertificate certificate(record::make_row_format(
+      sim::make_parameters_message(1, ids, flown.scenario, flight.plant(), "world")));
+  while (flight.fly_step()) {
+    for (const model::StepRecord& record : flight.steps()) certificate.add(record);
+    flown.last_step = flight.steps().front().step;
+  }
+  flown.failure = flight.failure();
+  flown.is_refused = flight.steps().front().kind == model::AnswerKind::kRefused;
+  flown.certificates[ids] = certificate.finish();
 }
 
 }  // namespace
@@ -153,16 +170,12 @@ FlownScenario fly(const config::Scenario& scenario) {
   const auto ids = config::parse_vehicle_ids("all", scenario.vehicles.size());
   FlownScenario flown;
   flown.scenario = scenario;
-  closed_loop::Flight flight(scenario, ids);
-  closed_loop::FlightCertificate certificate(record::make_row_format(
-      sim::make_parameters_message(1, ids, scenario, flight.plant(), "world")));
-  while (flight.fly_step()) {
-    for (const model::StepRecord& record : flight.steps()) certificate.add(record);
-    flown.last_step = flight.steps().front().step;
-  }
-  flown.failure = flight.failure();
-  flown.is_refused = flight.steps().front().kind == model::AnswerKind::kRefused;
-  flown.certificate = certificate.finish();
+  fly(ids, flown);
+  if (!flown.failure.empty() || ids.size() == 1) return flown;
+  FlownScenario part = flown;
+  fly({ids.front()}, part);
+  fly({ids.begin() + 1, ids.end()}, part);
+  flown.certificates = std::move(part.certificates);
   return flown;
 }
 

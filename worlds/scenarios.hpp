@@ -7,7 +7,7 @@
 
 namespace sls::worlds {
 
-/// Flies `scenario` in one process, for comparison.
+/// Flies `scenario` in one process, for comparison; a fleet also in two parts.
 FlownScenario fly(const config::Scenario& scenario);
 
 /// The scenarios of the worlds: one to three vehicles, both modes, all policies. About 300 steps

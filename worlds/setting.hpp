@@ -1,7 +1,10 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
+#include <map>
 #include <string>
+#include <vector>
 
 #include "common/config/scenario.hpp"
 #include "worlds/network.hpp"
@@ -10,11 +13,13 @@
 
 namespace sls::worlds {
 
-/// A scenario that worlds fly, and its undisturbed flight.
+/// A scenario that worlds fly, and its undisturbed flights in one process.
 struct FlownScenario {
+  using VehicleIds = std::vector<std::uint32_t>;
   config::Scenario scenario;
-  std::string certificate;      ///< of the flight in one process
-  std::uint64_t last_step = 0;  ///< of that flight
+  /// Of the flights of all vehicles, of the first one, and of the others.
+  std::map<VehicleIds, std::string> certificates;
+  std::uint64_t last_step = 0;  ///< of the flight of all vehicles
   std::string failure;          ///< why it failed; empty: every mission was finished
   bool is_refused = false;      ///< it failed by an answer, else by a plant
 };

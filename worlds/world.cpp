@@ -103,8 +103,9 @@ class World {
     else
       program = std::make_unique<RecorderProgram>(
           setting_, host, name,
-          RecorderProgram::Options{choose_folder(index), planned.resumes, planned.follows_servers,
-                                   planned.queue, planned.delay});
+          RecorderProgram::Options{choose_folder(index), planned.vehicle_ids.front(),
+                                   planned.resumes, planned.follows_servers, planned.queue,
+                                   planned.delay});
     current_[index] = program.get();
     programs_.push_back(std::move(program));
     setting_.trace.add(setting_.timeline.now(), name, "starts");
@@ -254,9 +255,10 @@ class World {
                        static_cast<std::uint64_t>(fault.value));
     // A person who pauses a flight goes on with it.
     const auto action = static_cast<ControlAction>(fault.other);
-    if (action == ControlAction::ACTION_PAUSE || action == ControlAction::ACTION_STEP)
-      setting_.timeline.at(std::max(plan_.healed, setting_.timeline.now() + fault.duration),
-                           [this, &fault] { resume(fault.target); });
+    if (action != ControlAction::ACTION_PAUSE && action != ControlAction::ACTION_STEP) return;
+    const Instant until = setting_.timeline.now() + fault.duration;
+    setting_.timeline.at(plan_.promise == Promise::kNone ? std::max(plan_.healed, until) : until,
+                         [this, &fault] { resume(fault.target); });
   }
 
   /// Until it is done: the run may be another one, after a reset.
