@@ -92,7 +92,7 @@ int main(int argc, char** argv) {
   cli.set_version_flag("--version", app::version());
   cli.add_option(
          "--scenario", scenario,
-         "scenario (YAML) that every world flies (default: 22 short ones, with both modes and "
+         "scenario (YAML) that every world flies (default: 23 short ones, with both modes and "
          "all policies)")
       ->type_name("FILE");
   cli.add_option("--faults", faults,

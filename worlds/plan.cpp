@@ -263,7 +263,8 @@ Promise draw_promise(Random& random, const FlownScenario& flown) {
   const config::Sync& sync = flown.scenario.sync;
   const double choice = random.uniform();
   if (choice < 0.35 || !flown.failure.empty()) return Promise::kNone;
-  if (choice < 0.42) return Promise::kCalm;
+  const bool is_realtime = sync.mode == config::SyncMode::kRealtime;
+  if (choice < (is_realtime ? 0.55 : 0.42)) return Promise::kCalm;
   if (sync.wait.controller.policy != config::ControllerPolicy::kWait ||
       sync.wait.recorder.policy == config::RecorderPolicy::kStop)
     return Promise::kNone;
@@ -319,7 +320,8 @@ void draw_pause(Plan& plan, Random& random, const FlownScenario& flown) {
   pause.kind = Kind::kRequest;
   pause.target = draw_program(random, plan, Role::kServer);
   pause.other = static_cast<std::size_t>(ControlAction::ACTION_PAUSE);
-  pause.duration = draw_seconds(random, 1, flown.scenario.sync.calc_controller_patience_s() + 10);
+  const double patience_s = flown.scenario.sync.calc_controller_patience_s();
+  pause.duration = draw_seconds(random, random.chance(0.7) ? patience_s : 1, patience_s + 10);
   pause.step = draw_step(random, flown, 5);
   plan.faults.push_back(pause);
   if (random.chance(0.5)) return;

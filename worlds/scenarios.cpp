@@ -99,7 +99,7 @@ struct Choice {
   double take_over_s = 0.1;
 };
 
-const std::array<Choice, 22> kChoices = {{
+const std::array<Choice, 23> kChoices = {{
     {"lockstep", 1, 1, 1, "wait", "wait"},
     {"lockstep", 1, 1, 0, "wait", "wait"},
     {"lockstep", 1, 2, 1, "wait", "wait", kStages},
@@ -116,6 +116,7 @@ const std::array<Choice, 22> kChoices = {{
     {"realtime", 2, 1, 1, "failsafe", "wait", kFaults},
     {"realtime", 1, 2, 0, "stop", "wait"},
     {"realtime", 3, 1, 1, "wait", "stop", kMixedFleet},
+    {"realtime", 2, 1, 1, "wait", "go_on"},
     {"lockstep", 1, 1, 1, "wait", "wait", kPlain, 4},
     {"lockstep", 2, 2, 1, "wait", "wait", kPlain, 4},
     {"lockstep", 8, 1, 1, "wait", "wait"},  // in two samples
