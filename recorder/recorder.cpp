@@ -106,7 +106,12 @@ void Recorder::open() {
 void Recorder::report() {
   announce();
   // Other programs wait for the last announcement of this recorder before they end, so it must
-  // reach them.
+  // reach them; above all its server, which may not have discovered it yet.
+  const bus::PeerId server = core_.run()->server;
+  const auto deadline = std::chrono::steady_clock::now() + 2s;
+  while (servers_.is_present(server) && !announcer_.reaches(server) &&
+         std::chrono::steady_clock::now() < deadline)
+    std::this_thread::sleep_for(1ms);
   announcer_.wait_for_acknowledgments(1s);
   core_.on_recorded(writing_->recorded(), app::describe_stop());
   writing_.reset();

@@ -34,10 +34,6 @@ constexpr Instant kHeardWithin = 2s;
 /// A server waits longer than this for recorders that do not get on.
 constexpr Instant kWaitsFor = 5s;
 
-/// A recorder that ends so soon may not have been discovered: then its server waits in vain.
-constexpr Instant kDiscoveredWithin = 1s;
-constexpr Instant kWaitsInVain = 10s;
-
 /// A server waits at most 1 s for acknowledgements of each of two topics.
 constexpr Instant kEndsWithin = 3500ms;
 
@@ -529,10 +525,8 @@ void Properties::check_end(const Program& server,
         last = std::max(last, killed_.at(program->name()) + sync::kPresumedDeadAfter);
         continue;
       }
+      last = std::max(last, program->ended());
       const auto ready = run.ready_since.find(program->name());
-      const bool may_be_unknown =
-          ready == run.ready_since.end() || program->ended() < ready->second + kDiscoveredWithin;
-      last = std::max(last, program->ended() + (may_be_unknown ? kWaitsInVain : Instant(0)));
       const bool is_known =
           ready != run.ready_since.end() && ready->second + kHeardWithin / 2 < run.ended;
       const auto done = run.done.find(program->name());

@@ -56,8 +56,7 @@ void RecorderProgram::start() {
 
 void RecorderProgram::wake() {
   if (acknowledged_by_) {
-    if (!peer_.is_acknowledged(TopicId::kParticipant) && now() < *acknowledged_by_)
-      return wake_at(now() + 1ms);
+    if (!is_heard() && now() < *acknowledged_by_) return wake_at(now() + 1ms);
     acknowledged_by_.reset();
     if (!failure_.empty()) return exit(1, failure_);
     core_->on_recorded(recorded_, stop_signal_);
@@ -129,7 +128,14 @@ void RecorderProgram::open() {
 /// The last announcement must reach the others, who wait for it: the main thread waits, too.
 void RecorderProgram::report() {
   announce_progress();
-  acknowledged_by_ = now() + 1s;
+  acknowledged_by_ = now() + 3s;
+}
+
+/// All have the last announcement, above all the server.
+bool RecorderProgram::is_heard() const {
+  const bus::PeerId& server = core_->run()->server;
+  return (!sees(server) || peer_.matched_readers(TopicId::kParticipant).count(server) > 0) &&
+         peer_.is_acknowledged(TopicId::kParticipant);
 }
 
 void RecorderProgram::announce_progress() {

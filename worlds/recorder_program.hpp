@@ -44,6 +44,7 @@ class RecorderProgram : public Program {
   record::RecorderCore::Now look_around();
   void open();
   void report();
+  bool is_heard() const;
   void announce_progress();
   /// A pass of the writing thread.
   void write();

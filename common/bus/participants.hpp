@@ -59,6 +59,8 @@ class Announcer {
   bool wait_for_acknowledgments(std::chrono::milliseconds limit) {
     return writer_.wait_for_acknowledgments(limit);
   }
+  /// True if announcements reach `peer`.
+  bool reaches(const PeerId& peer) const { return writer_.matched().count(peer) > 0; }
 
  private:
   Writer<Participant> writer_;
