@@ -314,7 +314,7 @@ void draw_split(Plan& plan, Random& random, const FlownScenario& flown) {
 }
 
 /// An operator pauses the flight for longer than anybody may be absent. In half of the worlds one
-/// of the clients is slow when the flight goes on, so that answers are late in real time.
+/// of the clients is slow before and after, so that answers are late in real time.
 void draw_pause(Plan& plan, Random& random, const FlownScenario& flown) {
   Fault pause;
   pause.kind = Kind::kRequest;
@@ -328,6 +328,7 @@ void draw_pause(Plan& plan, Random& random, const FlownScenario& flown) {
   Fault slow = pause;
   slow.kind = Kind::kSlow;
   slow.target = draw_program(random, plan, Role::kClient);
+  slow.step = *pause.step - std::min<std::uint64_t>(*pause.step, 10);
   slow.duration += 1s;
   slow.value = random.between(0.0005, 0.02);
   plan.faults.push_back(slow);

@@ -125,7 +125,7 @@ MUTANTS = [
     ("sim_server/core/realtime_pacing.cpp", "    vehicle.keep_late_answer(answer);", "    (void)vehicle;", "late answers are not held"),
     ("sim_server/core/vehicle.cpp", "is_settled_ = true;", "is_settled_ = record_.step % 64 != 63;", "a step is settled twice"),
     ("sim_server/core/timing_record.cpp", "++held_;", "", "held steps are not counted"),
-    ("sim_server/core/timing_record.cpp", "++fail_safe_;", "", "fail-safe steps are not counted"),
+    ("sim_server/core/timing_record.cpp", "if (kind == model::AnswerKind::kFailSafe) ++fail_safe_;", "", "fail-safe steps are not counted"),
     # --- server core
     ("sim_server/core/server_core.cpp", "  parts_.outputs.record_step(parts_.fleet);\n  for", "  if (parts_.fleet.step() % 97 != 5) parts_.outputs.record_step(parts_.fleet);\n  for",
      "some steps are not recorded"),
