@@ -6,9 +6,14 @@ FUNCTIONS. Nothing else is evaluated. Values have the same bits on every machine
 import ast
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import reduce
+from typing import TYPE_CHECKING
 
 from sls.campaign import portable_math
+
+if TYPE_CHECKING:
+    import numpy as np
 
 FUNCTIONS: dict[str, Callable[..., float]] = {
     "abs": abs, "cos": portable_math.cos, "exp": portable_math.exp, "log": portable_math.log,
@@ -134,6 +139,34 @@ class Expression:
             raise ExpressionError(f"'{self.text}' is too large") from None
         except ValueError:  # for example the root of a negative number
             raise ExpressionError(f"'{self.text}' is not defined") from None
+
+    def evaluate_rows(self, rows: "Sequence[np.ndarray]") -> "np.ndarray":
+        """The value of each row. `rows` has a column of numbers for each of `names`.
+
+        Raises ExpressionError, which names the first row (from 0) without a value."""
+        import numpy as np
+        scope = {**SCOPE, "check_finite": lambda value: value, "abs": np.abs, "sqrt": np.sqrt, "max": _reduce(np.maximum),
+                 "min": _reduce(np.minimum), "power": np.frompyfunc(portable_math.power, 2, 1),
+                 **{name: np.frompyfunc(FUNCTIONS[name], 1, 1) for name in ("cos", "exp", "log", "sin", "tan")}}
+        columns = [np.asarray(column, np.float64) for column in rows]
+        try:
+            with np.errstate(all="raise", under="ignore"):
+                values = eval(self._code, scope, {f"name_{i}": column for i, column in enumerate(columns)})
+            values = np.broadcast_to(np.asarray(values, np.float64), columns[0].shape if columns else (1,))
+            if np.all(np.isfinite(values)):
+                return values
+        except (ArithmeticError, ValueError):
+            pass
+        for row, cells in enumerate(zip(*columns) if columns else [()]):  # slower, with the reason
+            try:
+                self.evaluate(dict(zip(self.names, map(float, cells))))
+            except ExpressionError as error:
+                raise ExpressionError(f"{error}, row {row}") from None
+        raise ExpressionError(f"'{self.text}' is not a finite number")
+
+
+def _reduce(function: "Callable[..., np.ndarray]") -> "Callable[..., np.ndarray]":
+    return lambda first, *others: reduce(function, others, first)
 
 
 class _CallOperators(ast.NodeTransformer):
