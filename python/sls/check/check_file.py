@@ -119,8 +119,8 @@ def find_checks(name: str) -> list[Path]:
 def load_check(file: Path) -> Check:
     """Raises ConfigError, one line with file, line, key, expected and got."""
     root = parse_yaml(read_bytes(file, "a check file", MOST_BYTES), file)
-    values = root.read_map("a check: scenario, expect …", ("scenario", "expect", "participants", "placements", "under",
-                                                           "limit_s"))
+    known = ("scenario", "expect", "participants", "placements", "under", "limit_s")
+    values = root.read_map("a check: scenario, expect …", known)
     place = root.require(values, "scenario", "a name in config/scenarios, or a path")
     named = place.read_text("a name in config/scenarios, or a path")
     is_path = "/" in named or named.endswith((".yaml", ".yml"))
@@ -253,7 +253,7 @@ def read_stage(place: Place, scenario: "Scenario") -> int:
     if isinstance(value, str) and names.count(value) == 1:
         return names.index(value)
     if isinstance(value, str) and names.count(value) > 1:
-        place.fail(f"expected the index of a stage, because {names.count(value)} have this name ({listed}), got {value}")
+        place.fail(f"expected an index, because {names.count(value)} stages have this name ({listed}), got {value}")
     place.fail_expected(f"a stage of {scenario.name} ({listed})")
 
 

@@ -53,11 +53,13 @@ def make_parser() -> argparse.ArgumentParser:
     add("--junit", type=Path, metavar="FILE", help="write the verdicts as JUnit XML")
     add("--json", type=Path, metavar="FILE", help="write values, bounds and verdicts as JSON")
     add("--report", type=Path, metavar="DIR", help="keep page, recording and logs of each flight that did not hold")
-    add("--repeat", type=to_count, default=1, metavar="N", help="fly each check N times; all flights must have equal bytes")
+    add("--repeat", type=to_count, default=1, metavar="N",
+        help="fly each check N times; all flights must have equal bytes")
     add("--placement", type=parse_placements, metavar="P,…",
         help=f"where to fly: {', '.join(PLACEMENTS)} (default: the file's)")
     add("--under", type=parse_faults, metavar="FAULT,…",
-        help=f"faults: {', '.join(f'{word}=…' if kind[0] else word for word, kind in WORDS.items())} (default: the file's)")
+        help=f"faults: {', '.join(f'{word}=…' if kind[0] else word for word, kind in WORDS.items())} "
+             "(default: the file's)")
     add("--jobs", type=to_count, default=1, metavar="N", help="flights side by side (default: 1)")
     add("--update", action="store_true", help="write the certificates of the flights into the check files")
     add("--recording", type=Path, metavar="DIR", help="judge this recording instead of flying")
@@ -88,7 +90,7 @@ def fly_and_judge(job: Job) -> Result:
         flown = fly(job.check, job.placement, job.faults, job.folder, job.repeat - 1)
         result.wall_s, result.problem = flown.wall_s, flown.problem
         result.logs = {name: read_end(file) for name, file in flown.logs.items()}
-        if flown.read_manifest().get("outcome") in ("finished", "failed"):
+        if flown.is_whole:
             judge_folder(job.check, flown.recording, result)
     except (ConfigError, ImportError) as error:
         result.problem, result.is_unusable = str(error), True
@@ -221,7 +223,8 @@ def update(check: Check, results: Sequence[Result]) -> None:
             check.file.write_text("\n".join(lines), encoding="utf-8")
             say(f"{check.file}:{at + 1}: certificate written: {got[:12]}…")
             for one in results:
-                one.judged = [replace(judged, is_held=True) if judged.text == expected.text else judged for judged in one.judged]
+                one.judged = [replace(judged, is_held=True) if judged.text == expected.text else judged
+                              for judged in one.judged]
 
 
 def print_results(results: Sequence[Result]) -> None:
@@ -230,6 +233,9 @@ def print_results(results: Sequence[Result]) -> None:
     shown = list(reversed(shown.values()))
     for line in make_rows(shown) if shown else []:
         print(line)
+    for one in shown:
+        for problem in one.list_problems():
+            print(f"{one.name}: {problem}")
     verdicts = [one.verdict for one in results]
     words = ", ".join(f"{verdicts.count(word)} {word}" for word in dict.fromkeys((HELD, *sorted(verdicts)))
                       if verdicts.count(word))

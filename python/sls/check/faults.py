@@ -72,4 +72,5 @@ def check_able(faults: tuple[Fault, ...], placement: str) -> None:
     for fault in faults:
         able = WORDS[fault.word][1]
         if placement not in able:
-            raise InputError(f"--under {fault}: expected a placement that can do it ({', '.join(able)}), got {placement}")
+            raise InputError(f"--under {fault}: expected a placement that can do it ({', '.join(able)}), got "
+                             f"{placement}")

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -31,7 +32,8 @@ LOOPBACK = ("<CycloneDDS><Domain><General><Interfaces><NetworkInterface name=\"l
 @dataclass
 class Flown:
     folder: Path
-    problem: str = ""  # with a program, in one line; empty if the recording can be judged
+    problem: str = ""  # with a program, in one line
+    is_whole: bool = False  # the recording can be judged
     wall_s: float = 0.0
     notes: list[str] = field(default_factory=list)
 
@@ -117,8 +119,8 @@ class Busy:
     """A busy loop for every processor."""
 
     def __enter__(self) -> None:
-        self._loops = [subprocess.Popen(["setpriv", "--pdeathsig", "KILL", "--", sys.executable, "-S", "-c", "while 1: 0"])
-                       for _ in os.sched_getaffinity(0)]
+        command = ["setpriv", "--pdeathsig", "KILL", "--", sys.executable, "-S", "-c", "while 1: 0"]
+        self._loops = [subprocess.Popen(command) for _ in os.sched_getaffinity(0)]
 
     def __exit__(self, *_: object) -> None:
         for loop in self._loops:
@@ -244,35 +246,45 @@ class Programs:
         try:
             with (self._flown.recording / "state.csv").open("rb") as file:
                 file.seek(max(0, file.seek(0, os.SEEK_END) - 2000))
-                return file.read().split(b"\n")[-2].split(b",")[1].decode()
-        except (OSError, IndexError):
+                return str(int(file.read().split(b"\n")[-2].split(b",")[1]))
+        except (OSError, IndexError, ValueError):
             return "0"
 
     # --- afterwards -------------------------------------------------------------------------------
 
     def _conclude(self) -> None:
         """Names the program that is to blame, if the recording alone does not say it."""
-        codes = self._programs.codes
+        codes = {name: code for name, code in self._programs.codes.items() if name not in self._programs.expendable}
         manifest = self._flown.read_manifest()
-        outcome = manifest.get("outcome")
-        if self._flown.problem:
-            return
-        for name in ("controller", "standby"):
-            code = codes.get(name, 0)
-            if code < 0 and name not in self._programs.expendable and not self._is_asked_to_stop:
-                self._flown.problem = (f"{name}: killed by {signal.Signals(-code).name} at step "
-                                       f"{manifest.get('last_step', 0)}{self._quote(name)}")
-            elif code == -signal.SIGKILL and self._is_asked_to_stop and self._own and self._own.stop != signal.SIGKILL:
-                self._flown.problem = (f"{name}: expected an end within {STOP_S:g} s after {self._own.stop.name}, got "
-                                       "none: killed")
-            elif code > 0 and outcome == "finished" and not (self._is_asked_to_stop and code > 128):
-                self._flown.problem = f"{name}: ended with {code} after the flight{self._quote(name)}"
+        outcome, reason = manifest.get("outcome"), str(manifest.get("reason"))
+        if not self._flown.problem:
+            self._flown.problem = self._find_late_end(codes) or self._find_early_end(codes, outcome, reason)
         if self._waiting and not self._flown.problem and outcome == "finished":
-            self._flown.problem = (f"--under {self._waiting[0]}: expected a flight of more than 0.3 s, got one that was "
-                                   "over before the fault began")
-        if not self._flown.problem and outcome not in ("finished", "failed"):
-            name = next((name for name, code in codes.items() if code), "sim_server")
-            self._flown.problem = f"{name}: ended with {codes.get(name)} without a whole recording{self._quote(name)}"
+            self._flown.problem = (f"--under {self._waiting[0]}: expected a flight of more than 0.3 s, got one that "
+                                   "was over before the fault began")
+        self._flown.is_whole = outcome == "finished" or outcome == "failed" and not self._flown.problem
+
+    def _find_late_end(self, codes: dict[str, int]) -> str:
+        """A process under test that was asked to stop after the flight, and did not."""
+        own = self._own
+        if own and self._is_asked_to_stop and own.stop != signal.SIGKILL and -signal.SIGKILL in codes.values():
+            return f"controller: expected an end within {STOP_S:g} s after {own.stop.name}, got none: killed"
+        return ""
+
+    def _find_early_end(self, codes: dict[str, int], outcome: str | None, reason: str) -> str:
+        step = f"at step {self._find_step()}"
+        if outcome == "finished":
+            for name in ("controller", "standby"):
+                code = codes.get(name, 0)
+                if code and not (self._is_asked_to_stop and (code < 0 or code > 128)):
+                    return f"{name}: {describe_code(code)} after the flight{self._quote(name)}"
+            return ""
+        if outcome != "failed" or re.search("interrupted by|not ready within|no answer", reason):
+            name, code = next(((name, code) for name, code in codes.items() if code or name == "controller"),
+                              ("sim_server", 0))
+            if name != "sim_server" or outcome != "failed":
+                return f"{name}: {describe_code(code)} {step}, before the flight was over{self._quote(name)}"
+        return ""
 
     def _read_log(self, name: str) -> str:
         try:
@@ -285,6 +297,14 @@ class Programs:
 
     def _quote(self, name: str) -> str:
         return f": {line}" if (line := self._read_last_line(name)) else ", without a word"
+
+
+def describe_code(code: int) -> str:
+    number = -code if code < 0 else code - 128
+    try:
+        return f"ended by {signal.Signals(number).name}"
+    except ValueError:
+        return f"ended with {code}"
 
 
 # --- worlds ---------------------------------------------------------------------------------------

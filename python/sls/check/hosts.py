@@ -19,7 +19,8 @@ class Hosts:
     """Use it in a `with` statement. The machine's own network is not touched."""
 
     def __init__(self, faults: tuple[Fault, ...]) -> None:
-        missing = [tool for tool in ("ip", "nft", "tc") if not shutil.which(tool, path=os.environ["PATH"] + ":/usr/sbin")]
+        path = os.environ["PATH"] + ":/usr/sbin"
+        missing = [tool for tool in ("ip", "nft", "tc") if not shutil.which(tool, path=path)]
         if os.geteuid() != 0 or missing:
             raise InputError("placement hosts: expected root and the programs ip, nft and tc, got "
                              + ("another user" if os.geteuid() else "no " + ", ".join(missing)))
@@ -90,7 +91,8 @@ class Hosts:
                                 "ip link set wire up && ip link set port master br0 up")
             self._wire = subprocess.Popen(
                 [*self.on("switch"), relay, "controller", "wire", "--delay-ms", str(delay_ms), "--jitter-ms",
-                 str(jitter_ms), "--duplicate-percent", "0", "--seed", "1"], stderr=subprocess.DEVNULL)
+                 str(jitter_ms), "--duplicate-percent", "0", "--seed", "1"],
+                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
     def _run(self, host: str, command: str) -> None:
         run(" ".join(self.on(host)) + " sh -c '" + command.replace("'", "'\\''") + "'")

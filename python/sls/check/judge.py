@@ -1,5 +1,6 @@
 """Judges a recording by the expectations of a check: from its folder alone."""
 
+import dataclasses
 import math
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
@@ -48,9 +49,13 @@ class Judged:
             return self.problem
         return self.value if isinstance(self.value, str) else f"{self.value:.6g}"
 
+    @property
+    def where(self) -> str:
+        step = "" if self.step is None else f"step {self.step}, {self.time_s:.6g} s"
+        return ", ".join(filter(None, (step, "" if self.vehicle is None else f"vehicle {self.vehicle}")))
+
     def to_line(self) -> str:
-        where = "" if self.step is None else f" at step {self.step}, {self.time_s:g} s"
-        where += "" if self.vehicle is None else f", vehicle {self.vehicle}"
+        where = f" at {self.where}" if self.where else ""
         unit = f" {self.unit}" if self.unit and not self.problem else ""
         return f"{self.place}: {self.text}: expected {self.bound or 'it'}, got {self.got}{unit}{where}"
 
@@ -99,8 +104,9 @@ def judge_one(check: Check, expected: Expectation, recording: Recording) -> Judg
         except (InputError, ExpressionError) as error:
             if manifest["complete"]:
                 raise InputError(f"{line}: {expected.place.path}: {expected.text}: {error}") from None
-            return Judged(expected.text, False, unit=expected.unit, low=expected.low, high=expected.high,
-                          vehicle=vehicle, problem=f"undefined: {error}", **more)
+            problem = "undefined: " + str(error).replace(f"{recording.folder}/", "").replace(f"{recording.folder}: ", "")
+            return Judged(expected.text, False, unit=expected.unit, low=expected.low, high=expected.high, **more,
+                          problem=problem)
         if len(recording.vehicle_ids) > 1:
             judged = Judged(**{**asdict(judged), "vehicle": vehicle})
         if worst is None or not judged.margin >= worst.margin:  # also if the margin is not a number
@@ -175,10 +181,11 @@ def find_column(recording: Recording, name: str, vehicle: int, steps: np.ndarray
 
 def find_event(recording: Recording, expected: Expectation, vehicle: int) -> Found:
     """Counts of the whole flight; those of a step have the first of them."""
-    if expected.what in ("fail_safe", "late_step"):
+    if expected.what == "late_step":
+        return dataclasses.astuple(measure(recording, "late_steps", vehicle_id=vehicle))
+    if expected.what == "fail_safe":
         rows = recording.rows_of("command.csv", vehicle)
-        words = ("fail_safe",) if expected.what == "fail_safe" else ("fail_safe", "held")
-        steps = rows["step"][np.isin(rows["fault"], words)]
+        steps = rows["step"][rows["fault"] == "fail_safe"]
         first = int(steps[0]) if len(steps) else None
         return float(len(steps)), "", first, None if first is None else first * recording.manifest["period_s"]
     names = REFUSED if expected.what == "refused_answer" else ("take_overs",)

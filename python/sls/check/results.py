@@ -137,15 +137,13 @@ def make_rows(results: Sequence[Result]) -> list[str]:
     rows = [list(HEAD)]
     for result in results:
         for one in result.judged:
-            where = "" if one.step is None else f"step {one.step}, {one.time_s:.4g} s"
-            where += "" if one.vehicle is None else f", vehicle {one.vehicle}"
             value = one.got if one.problem or isinstance(one.value, str) else f"{one.value:.4g} {one.unit}".rstrip()
             rows.append([result.check, result.flight, shorten(one.text, 60), shorten(value), one.bound,
-                         "" if one.margin is None else f"{one.margin:.3g}", where, HELD if one.is_held else "NOT HELD"])
+                         "" if one.margin is None else f"{one.margin:.3g}", one.where, HELD if one.is_held else "NOT HELD"])
         if result.problem or result.difference:
-            rows.append([result.check, result.flight, shorten(result.problem or result.difference, 110), "", "", "", "",
+            rows.append([result.check, result.flight, "(flight)", shorten(result.problem or result.difference), "", "", "",
                          "NOT HELD" if result.verdict == NOT_HELD else result.verdict])
-    widths = [max(len(row[column]) for row in rows if column != 2 or row[3]) for column in range(len(HEAD))]
+    widths = [max(len(row[column]) for row in rows) for column in range(len(HEAD))]
     return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip() for row in rows]
 
 
