@@ -120,8 +120,8 @@ def test_of_a_fleet_the_worst_vehicle_is_reported(tmp_path):
 @pytest.mark.parametrize("item, part", [
     ("value: load_w_m, max: 1", "expected a column with numbers, got 'load_w_m'; known are vehicle_id, step, sim"),
     ("value: controller, max: 1", "expected a column with numbers, got 'controller'"),
-    ("value: flight.quad_x_m, max: 1", "expected state, reference, command or measured before the dot, got 'flight"),
-    ("value: measured.quad_x_m, max: 1", "got 'measured.quad_x_m'"),
+    ("value: flight.quad_x_m, max: 1", "expected state, reference, command, measured before the dot, got 'flight"),
+    ("value: measured.none, max: 1", "expected a column with numbers, got 'measured.none'; known are vehicle_id"),
     ("value: 1 / (step - 300), max: 1", "division by zero in '1 / (step - 300)', at step 300"),
     ("value: sqrt(step - 1), max: 1", "'sqrt(step - 1)' is not defined, at step 0"),
     ("value: exp(step * step), max: 1", "at step 27"),
