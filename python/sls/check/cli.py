@@ -163,7 +163,10 @@ class Comparison:
                 self._first[result.check] = result
                 return
             if first.certificate != result.certificate:
-                text = find_difference(Path(first.folder) / "recording", Path(result.folder) / "recording")
+                try:
+                    text = find_difference(Path(first.folder) / "recording", Path(result.folder) / "recording")
+                except (ConfigError, RunError) as error:
+                    text = str(error)
                 result.difference = f"differs from {first.flight} (A): {text or 'other certificates, no other row'}"
         if result.verdict == HELD or not self._keeps_failed:
             shutil.rmtree(result.folder, ignore_errors=True)
@@ -267,7 +270,7 @@ def main(arguments: Sequence[str]) -> int:
             options.report.mkdir(parents=True, exist_ok=True)
         check_all(options, folder, results)
         print_results(results)
-    except (ConfigError, OSError) as error:
+    except (ConfigError, OSError, RuntimeError) as error:  # a worker that was killed, for example
         say(f"error: {error}")
         results.append(Result("sls check", "", problem=str(error), is_unusable=True))
     except Ended:
