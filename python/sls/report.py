@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from sls.figures import make_figures, save
 from sls.trajectory import Trajectory
-from sls.metrics import StageMetrics, calc_max, calc_rms, calc_stage_metrics
+from sls.metrics import StageMetrics, calc_errors, calc_stage_metrics
 from sls.recordings import Recording, describe_ids
 from sls.scene import MOST_BYTES, make_scene
 from sls.tables import format_error, list_error_cells, list_step_cells
@@ -111,19 +112,21 @@ DARK = {"#ffffff": "#151b21", "#f7f7f7": "#1e262e", "#000000": "#e6ebf0", "#4444
         "#999999": "#97a4b1", "#dddddd": "#2a343e", "#b0b0b0": "#2a343e"}
 
 
-def make_report(recording: Recording, vehicle_id: int) -> str:
-    """The page as HTML. The scene may use the rest of MOST_BYTES. Raises InputError."""
+def make_report(recording: Recording, vehicle_id: int, first: Sequence[str] = (),
+                marks: Sequence[tuple[float, str]] = ()) -> str:
+    """The page as HTML. The scene may use the rest of MOST_BYTES. `first`: sections below the head. `marks`: times in s
+    that the figures mark, with what happens then. Raises InputError."""
     name = recording.manifest["scenario"]
     flight = recording.load_flight(vehicle_id, name)
     fleet = recording.load_fleet()
     title = f"{name}, vehicle {vehicle_id}" if len(fleet) > 1 else name
     sections = [
-        make_head(recording, flight, title),
+        make_head(recording, flight, title) + "".join(first),
         make_section("Flight", make_facts(recording, flight, vehicle_id)),
         make_section("Load position error per stage (m)", make_error_table(flight)),
         make_step_section(flight),
         make_fleet_section(fleet),
-        make_section("Figures", make_figure_list(flight, fleet)),
+        make_section("Figures", make_figure_list(flight, fleet, marks)),
         make_section("Events", make_events(recording)),
         f"<section><details><summary>Scenario</summary><pre>{escape(recording.scenario_text)}</pre>"
         "</details></section>",
@@ -269,8 +272,7 @@ def make_fleet_section(fleet: Sequence[Trajectory]) -> str:
         error = flight.calc_error()
         error = error[np.isfinite(error[:, 0])]
         if len(error):
-            cells = [flight.name, *map(format_error, calc_rms(error)),
-                     *map(format_error, calc_max(error))]
+            cells = [flight.name, *map(format_error, np.concatenate(calc_errors(error)))]
             rows += "<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
     return ("<section><details><summary>All vehicles, whole flight (m)</summary>"
             "<div class=\"scroll\"><table><thead><tr><th rowspan=\"2\">vehicle</th>"
@@ -279,10 +281,11 @@ def make_fleet_section(fleet: Sequence[Trajectory]) -> str:
             + f"</tr></thead><tbody>{rows}</tbody></table></div></details></section>\n")
 
 
-def make_figure_list(flight: Trajectory, fleet: Sequence[Trajectory]) -> str:
+def make_figure_list(flight: Trajectory, fleet: Sequence[Trajectory], marks: Sequence[tuple[float, str]] = ()) -> str:
     parts = []
     with tempfile.TemporaryDirectory() as folder:
         for name, figure in make_figures([flight], fleet).items():
+            mark_times(figure, marks)
             file = Path(folder) / f"{name}.svg"
             save(figure, file)
             data = base64.b64encode(add_dark_colours(file.read_text()).encode()).decode()
@@ -291,6 +294,17 @@ def make_figure_list(flight: Trajectory, fleet: Sequence[Trajectory]) -> str:
                          f"src=\"data:image/svg+xml;base64,{data}\">"
                          f"<figcaption>{caption}</figcaption></figure>\n")
     return "".join(parts) or f"<p>No data: the flight ended at step {flight.time_s[-1] / flight.period_s:.0f}.</p>"
+
+
+def mark_times(figure: Figure, marks: Sequence[tuple[float, str]]) -> None:
+    """Draws a line at each of these times into the panels whose horizontal axis is time."""
+    for axes in figure.axes:
+        if marks and any(below.get_xlabel().startswith("time") for below in figure.axes
+                         if below.get_shared_x_axes().joined(axes, below)):
+            for time_s, text in marks:
+                axes.axvline(time_s, color="#a33b0b", linewidth=1.0, linestyle="-.")
+                axes.annotate(text[:40], (time_s, 1), xycoords=("data", "axes fraction"), color="#a33b0b", fontsize=6,
+                              rotation=90, ha="right", va="top")
 
 
 def add_dark_colours(svg: str) -> str:

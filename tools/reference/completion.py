@@ -13,7 +13,7 @@ HEAD = """\
 """
 
 FUNCTIONS = r"""
-# _sls_names KIND: names of the scenarios or campaigns that the launcher finds.
+# _sls_names KIND: names of the scenarios, campaigns or checks that the launcher finds.
 _sls_names() {
   local launcher folder file
   launcher="$(type -P -- "${COMP_WORDS[0]/#\~/$HOME}")" || launcher=$PWD/sls
@@ -27,13 +27,13 @@ _sls_names() {
   done
 }
 
-# _sls_values KIND WORD: what WORD can become. KIND is file, dir, scenario, campaign or the values themselves.
+# _sls_values KIND WORD: what WORD can become. KIND is file, dir, scenario, campaign, check or the values themselves.
 _sls_values() {
   case $1 in
     file) compgen -f -- "$2" ;;
     dir) compgen -d -- "$2" ;;
     scenario) compgen -W "$(_sls_names scenarios)" -- "$2"; compgen -f -X '!*.yaml' -- "$2"; compgen -d -- "$2" ;;
-    campaign) compgen -W "$(_sls_names campaigns)" -- "$2"; compgen -f -X '!*.yaml' -- "$2"; compgen -d -- "$2" ;;
+    campaign | check) compgen -W "$(_sls_names "$1"s)" -- "$2"; compgen -f -X '!*.yaml' -- "$2"; compgen -d -- "$2" ;;
     any) ;;
     *) compgen -W "$1" -- "$2" ;;
   esac
@@ -58,7 +58,7 @@ _sls() {
   mapfile -t values < <(_sls_values "$kind" "$current" | sort -u)
   COMPREPLY+=("${values[@]}")
   case $kind in
-    file | dir | scenario | campaign) compopt -o filenames 2>/dev/null ;;
+    file | dir | scenario | campaign | check) compopt -o filenames 2>/dev/null ;;
   esac
   return 0
 }
@@ -78,8 +78,8 @@ def find_kind(item, known):
         return " ".join(item.choices)
     if listed := re.match(r"(?:[\w ]+: )?([a-z][\w-]*(?:(?:, | or )[a-z][\w-]*)+)(?= \(default| alone$|$)", item.text):
         return " ".join(re.split(r", | or ", listed[1]))
-    if item.argument == "FILE" and "config/campaigns" in item.text:
-        return "campaign"
+    if item.argument == "FILE" and (kind := re.search("config/(campaign|check)s", item.text)):
+        return kind[1]
     first = item.argument.split()[0].strip("[]…")
     # If the launcher passes the option on to a program, the help of that program lists the values.
     return KINDS.get(first) or known.get(item.names[-1]) or "any"
@@ -89,8 +89,8 @@ def find_positional(command, text):
     """Kind of the command's positional argument; empty if it has none."""
     usage = help_text.parse(text).usage or [re.sub(r"\s{2,}.*", "", text.partition("\n")[0])]
     words = re.findall(r"\b[A-Z]+\b", re.sub(r"\[--?\w[^\]]*\]+|\[OPTIONS\]", " ", " ".join(usage)))
-    if "config/campaigns" in text and "FILE" in words:
-        return "campaign"
+    if "FILE" in words and (kind := re.search("config/(campaign|check)s", text)):
+        return kind[1]
     return next((KINDS[word] for word in words if word in KINDS), "")
 
 

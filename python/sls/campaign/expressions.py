@@ -6,9 +6,14 @@ FUNCTIONS. Nothing else is evaluated. Values have the same bits on every machine
 import ast
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import reduce
+from typing import TYPE_CHECKING
 
 from sls.campaign import portable_math
+
+if TYPE_CHECKING:
+    import numpy as np
 
 FUNCTIONS: dict[str, Callable[..., float]] = {
     "abs": abs, "cos": portable_math.cos, "exp": portable_math.exp, "log": portable_math.log,
@@ -134,6 +139,46 @@ class Expression:
             raise ExpressionError(f"'{self.text}' is too large") from None
         except ValueError:  # for example the root of a negative number
             raise ExpressionError(f"'{self.text}' is not defined") from None
+
+    def evaluate_rows(self, rows: "Sequence[np.ndarray]") -> "np.ndarray":
+        """The value of each row. `rows` has a column of numbers for each of `names`.
+
+        Raises ExpressionError, which names the first row (from 0) without a value."""
+        import numpy as np
+        scope = {**SCOPE, "check_finite": lambda value: value, "abs": np.abs, "sqrt": np.sqrt, "max": _reduce(np.maximum),
+                 "min": _reduce(np.minimum), "power": _power_rows,
+                 **{name: _by_row(FUNCTIONS[name], 1) for name in ("cos", "exp", "log", "sin", "tan")}}
+        columns = [np.asarray(column, np.float64) for column in rows]
+        try:
+            with np.errstate(all="raise", under="ignore"):
+                values = eval(self._code, scope, {f"name_{i}": column for i, column in enumerate(columns)})
+            values = np.broadcast_to(np.asarray(values, np.float64), columns[0].shape if columns else (1,))
+            if np.all(np.isfinite(values)):
+                return values
+        except (ArithmeticError, ValueError):
+            pass
+        for row, cells in enumerate(zip(*columns) if columns else [()]):  # slower, with the reason
+            try:
+                self.evaluate(dict(zip(self.names, map(float, cells))))
+            except ExpressionError as error:
+                raise ExpressionError(f"{error}, row {row}") from None
+        raise ExpressionError(f"'{self.text}' is not a finite number")
+
+
+def _reduce(function: "Callable[..., np.ndarray]") -> "Callable[..., np.ndarray]":
+    return lambda first, *others: reduce(function, others, first)
+
+
+def _by_row(function: Callable[..., float], inputs: int) -> "Callable[..., np.ndarray]":
+    import numpy as np
+    of_rows = np.frompyfunc(function, inputs, 1)
+    return lambda *columns: np.asarray(of_rows(*columns), np.float64)
+
+
+def _power_rows(base: "np.ndarray", exponent: "np.ndarray | float") -> "np.ndarray":
+    if isinstance(exponent, float) and exponent == 2:
+        return base * base  # rounded correctly, as portable_math.power is, and 500 times faster
+    return _by_row(portable_math.power, 2)(base, exponent)
 
 
 class _CallOperators(ast.NodeTransformer):

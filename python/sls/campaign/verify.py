@@ -3,7 +3,6 @@
 import json
 import os
 import re
-import socket
 import subprocess
 import tempfile
 from collections.abc import Callable, Iterator
@@ -19,36 +18,16 @@ from sls.campaign.sampling import choose_runs, make_values
 from sls.campaign.whole_files import name_temporary
 from sls.core import load_core
 from sls.launcher.place import BUILD, START
+from sls.dds_domain import own_domain
 
 if TYPE_CHECKING:
     from _sls_core import Runs
 
 SEED = 1
-DOMAINS = range(100, 161)
 LONGEST_FLIGHT_S = 1800.0
 # Every flight waits for its controller and recorder, also if the scenario does not. Certificates do not
 # depend on this.
 ALL_TAKE_PART = {"sync.wait_for": "{ controllers: 1, recorders: 1, timeout_s: 60 }"}
-
-
-@contextmanager
-def own_domain() -> Iterator[int]:
-    """Context with a DDS domain that no other campaign on this machine uses. An abstract socket with the
-    domain's number marks it as used; the socket disappears with its process."""
-    for number in DOMAINS:
-        lock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-        try:
-            lock.bind(f"\0sls-verify-domain-{number}")
-        except OSError:
-            lock.close()
-            continue
-        try:
-            yield number
-        finally:
-            lock.close()
-        return
-    raise EngineError(f"--verify: expected a free DDS domain from {DOMAINS[0]} to {DOMAINS[-1]}, "
-                      "got none; --domain names one")
 
 
 @contextmanager

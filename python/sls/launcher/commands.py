@@ -25,6 +25,7 @@ usage: ./sls COMMAND [OPTIONS]
 Fly
   demo [SCENARIO]         set up, build, fly figure_eight and print a summary
   run SCENARIO            fly a scenario on this machine and record it
+  check FILE…             fly scenarios as tests: expectations and verdicts
   view [DIR [DIR]]        show a live flight or recordings in the browser
   ctl COMMAND             pause, step, resume, start, reset or stop a run
   list                    print the scenarios, laws, plants and campaigns
@@ -70,7 +71,7 @@ exit codes: 0 done; 1 the run or a test failed; 2 bad usage or configuration;
 """
 # Commands whose options a program or another Python module reads.
 FOREIGN = ("view", "ctl", "verify", "convert", "plot", "report", "study", "campaign", "campaign-worker", "doctor",
-           "bench", "worlds", "network-table", "chaos", "reference", "systems")
+           "bench", "worlds", "check", "network-table", "chaos", "reference", "systems")
 CONTROLS = ("pause", "step", "resume", "start", "reset", "stop", "status")
 SOURCE_COMMANDS = ("bench", "build", "chaos", "clean", "docker-demo", "docs", "fuzz", "network-table",
                    "package", "reference", "setup", "study", "systems", "test")
@@ -144,17 +145,18 @@ def run_module(words: list[str], targets: list[str], *command: str, **variables:
 
 
 def plot(words: list[str]) -> NoReturn:
-    run_module(words, [], "sls", "plot")
+    run_module(words, ["_sls_core"], "sls", "plot")
 
 
 def report(words: list[str]) -> NoReturn:
     # The program draws the report's scene.
-    run_module(words, ["sls_view"], "sls", "report", SLS_VIEW=str(BUILD / "bin/sls_view"))
+    run_module(words, ["sls_view", "_sls_core"], "sls", "report", SLS_VIEW=str(BUILD / "bin/sls_view"))
 
 
 def study(words: list[str]) -> NoReturn:
     # The flights of the study fly side by side and must not build.
-    run_module(words, [] if "--reuse" in words else [*FLYING, "delay_margin"], "sls", "study", SLS_BUILD=str(BUILD))
+    targets = ["_sls_core"] if "--reuse" in words else [*FLYING, "delay_margin", "_sls_core"]
+    run_module(words, targets, "sls", "study", SLS_BUILD=str(BUILD))
 
 
 def campaign(words: list[str]) -> NoReturn:
@@ -166,6 +168,16 @@ def campaign(words: list[str]) -> NoReturn:
 
 def campaign_worker(words: list[str]) -> NoReturn:
     run_module(words, ["_sls_core"], "sls.campaign.worker", SLS_BUILD=str(BUILD))
+
+
+def check(words: list[str]) -> NoReturn:
+    if not is_help_asked(words):
+        is_judging = any(word.startswith("--recording") for word in words)
+        has_pages = any(word.startswith("--report") for word in words)
+        build_programs("_sls_core", *([] if is_judging else [*FLYING, "sls_worlds"]),
+                       *(["sls_view"] if has_pages else []))
+    call_script("@install", "python_packages")
+    replace_by_module("sls.check", *words, SLS_BUILD=str(BUILD), SLS_VIEW=str(BUILD / "bin/sls_view"))
 
 
 def keys(words: list[str]) -> NoReturn:
@@ -289,7 +301,7 @@ COMMANDS: dict[str, Callable[[list[str]], int]] = {
     "setup": set_up, "build": build, "run": flights.run, "demo": flights.demo, "list": print_list,
     "view": start("sls_view"), "ctl": start("sim_ctl"), "delay-margin": delay_margin, "worlds": worlds, "bench": bench,
     "verify": start("sls_verify"), "convert": start("sls_convert"), "python": python, "plot": plot, "report": report,
-    "study": study, "campaign": campaign, "campaign-worker": campaign_worker, "doctor": start("sls_doctor"),
+    "study": study, "check": check, "campaign": campaign, "campaign-worker": campaign_worker, "doctor": start("sls_doctor"),
     "keys": keys, "docker-demo": docker_demo, "discovery-server": discovery_server, "network-table": network_table,
     "fuzz": fuzz, "chaos": start("chaos", "tests"), "test": test, "reference": reference, "docs": docs,
     "systems": systems, "package": package, "clean": clean, "help": show_help,
@@ -299,9 +311,10 @@ COMMANDS: dict[str, Callable[[list[str]], int]] = {
 def check_words(command: str, words: list[str]) -> None:
     """Judges options, subcommands and names by the tables of the completion, before anything is built.
 
-    Commands without a table, and an installed launcher, which builds nothing, leave it to the program."""
+    Commands without a table, and an installed launcher, which builds nothing, leave it to the program; so does `check`,
+    which writes a JUnit file for these mistakes, too."""
     file = ROOT / "tools/completion/sls.bash"
-    if command not in FOREIGN or is_help_asked(words) or not file.is_file():
+    if command not in FOREIGN or command == "check" or is_help_asked(words) or not file.is_file():
         return
     rows = re.findall(r'^  \["([\w -]+)"\]="(.*)"$', file.read_text(encoding="utf-8"), re.MULTILINE)
     table = dict(reversed(rows))  # of several rows of a command the first has its options

@@ -8,6 +8,7 @@ import subprocess
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 from sls.launcher.place import say
 
@@ -27,6 +28,7 @@ class Program:  # no dataclass: its module takes longer to load than all of ours
         self.process = process
         self.patience_s = patience_s  # from the stop signal to SIGKILL
         self.deadline = math.inf
+        self.is_asked = False  # to end, before the others
 
 
 class Supervisor:
@@ -40,6 +42,8 @@ class Supervisor:
         self._first = ""  # of the programs that ended well
         self._result = self._interrupted = 0
         self._is_stopped = False
+        self.codes: dict[str, int] = {}  # of the programs that have ended, in this order
+        self.expendable: set[str] = set()  # programs whose end changes nothing
 
     def __enter__(self) -> "Supervisor":
         self._mask = signal.pthread_sigmask(signal.SIG_BLOCK, {*STOP, signal.SIGCHLD})
@@ -57,32 +61,55 @@ class Supervisor:
                 self._beside.process.wait()
         signal.pthread_sigmask(signal.SIG_SETMASK, self._mask)
 
-    def start(self, name: str, command: Sequence[str | Path], patience_s: float = USUAL_PATIENCE_S) -> None:
-        self._running.append(self._spawn(name, command, patience_s))
+    def start(self, name: str, command: Sequence[str | Path], patience_s: float = USUAL_PATIENCE_S,
+              **more: Any) -> int:
+        """Returns the process id. `more`: arguments of subprocess.Popen."""
+        self._running.append(self._spawn(name, command, patience_s, **more))
+        return self._running[-1].process.pid
 
     def start_beside(self, name: str, command: Sequence[str | Path]) -> None:
         """Starts a program that is no part of the flight: its end and its exit code change nothing."""
         self._beside = self._spawn(name, command, USUAL_PATIENCE_S)
 
-    def wait_all(self) -> int:
-        """Waits for all programs; returns the exit code of the run.
+    def wait_all(self, watch: Callable[[], None] | None = None) -> int:
+        """Waits for all programs; returns the exit code of the run. Meanwhile calls `watch` 50 times a second.
 
         When one fails, the others cannot finish the run: they get SIGTERM, close their files and end."""
         while self._running:
             left_s = min(program.deadline for program in self._running) - time.monotonic()
-            received = signal.sigtimedwait({*STOP, signal.SIGCHLD}, min(max(left_s, 0.0), 3600.0))
+            most_s = 0.02 if watch else 3600.0
+            received = signal.sigtimedwait({*STOP, signal.SIGCHLD}, min(max(left_s, 0.0), most_s))
             if received is not None and received.si_signo in STOP:
                 self._interrupted, passed_on = STOP[signal.Signals(received.si_signo)]
                 self._stop(passed_on)
             self._reap()
             self._end_late()
+            if watch:
+                watch()
         return self._interrupted or self._result
 
-    def _spawn(self, name: str, command: Sequence[str | Path], patience_s: float) -> Program:
+    def send(self, name: str, number: signal.Signals, patience_s: float = math.inf) -> None:
+        """Sends a signal to a program if it runs. With `patience_s` it is killed if it still runs so much later."""
+        for program in self._running:
+            if program.name == name:
+                program.process.send_signal(number)
+                if math.isfinite(patience_s):
+                    program.deadline, program.is_asked = time.monotonic() + patience_s, True
+
+    def end_all(self) -> None:
+        """Ends the run: it has failed."""
+        self._result = self._result or 1
+        if not self._is_stopped:
+            self._stop(signal.SIGTERM)
+
+    def is_running(self, name: str) -> bool:
+        return any(program.name == name for program in self._running)
+
+    def _spawn(self, name: str, command: Sequence[str | Path], patience_s: float, **more: Any) -> Program:
         # If the launcher is killed, the kernel ends the program.
         return Program(name, subprocess.Popen(
             ["setpriv", "--pdeathsig", "TERM", "--", *command],
-            preexec_fn=lambda: signal.pthread_sigmask(signal.SIG_SETMASK, self._mask)), patience_s)
+            preexec_fn=lambda: signal.pthread_sigmask(signal.SIG_SETMASK, self._mask), **more), patience_s)
 
     def _reap(self) -> None:
         ended = [program for program in self._running if program.process.poll() is not None]
@@ -94,6 +121,9 @@ class Supervisor:
             self._beside = None
 
     def _judge(self, name: str, code: int) -> None:
+        self.codes[name] = code
+        if name in self.expendable:
+            return
         if code == 0 and not self._first:
             self._first = name
             for program in self._running:
@@ -118,7 +148,7 @@ class Supervisor:
 
     def _end_late(self) -> None:
         late = [program for program in self._running if program.deadline <= time.monotonic()]
-        if late and not self._is_stopped:
+        if late and not self._is_stopped and not all(program.is_asked for program in late):
             self._say(f"{self._first} ended, but {', '.join(program.name for program in late)} did not within "
                       f"{self._overrun_s:g} s: ending the others")
             self._result = 1

@@ -1,0 +1,58 @@
+"""The first difference of two recordings: step, vehicle, column, both values, and the topic it came from."""
+
+import re
+from pathlib import Path
+
+from sls.csv_tables import read_records
+from sls.recordings import Recording
+
+TOPICS = {"state.csv": "sls/state", "command.csv": "sls/command", "reference.csv": "sls/command",
+          "status.csv": "sls/status"}
+EVENTS = ("phase", "take_overs", "held", "fail_safe", "rejected_not_finite", "rejected_force_limit", "rejected_step",
+          "rejected_client", "rejected_fault")
+
+
+def find_difference(a: Path, b: Path) -> str:
+    """One line; empty if all steps and events are equal. Raises RunError if a file is damaged."""
+    first, second = Recording(a), Recording(b)
+    if text := first.compare(second).difference:
+        file = text.partition(",")[0]
+        return text + (f" (topic {TOPICS[file]})" if file in TOPICS else " (topic sls/record)")
+    return find_event_difference(first, second)
+
+
+def find_event_difference(a: Recording, b: Recording) -> str:
+    """What equal steps can hide: phases, take-overs and refused answers, as far as both recordings have them."""
+    both = [list_changes(recording) for recording in (a, b)]
+    for one, other in zip(*both):
+        if one != other:
+            (step, name, value), (other_step, other_name, other_value) = one, other
+            if (step, name) == (other_step, other_name):
+                return f"status.csv, step {step}, {name}: {value} in A, {other_value} in B (topic sls/status)"
+            is_in_a = step <= other_step
+            step, name, value = one if is_in_a else other
+            return f"status.csv, step {step}, {name}: {value} in {'A' if is_in_a else 'B'} alone (topic sls/status)"
+    if len(both[0]) != len(both[1]):
+        longer = 0 if len(both[0]) > len(both[1]) else 1
+        step, name, value = both[longer][min(map(len, both))]
+        return f"status.csv, step {step}, {name}: {value} in {'AB'[longer]} alone (topic sls/status)"
+    return ""
+
+
+def list_changes(recording: Recording) -> list[tuple[int, str, str]]:
+    """Changes in status.csv once the flight runs."""
+    changes, last = [], dict[str, str]()
+    for folder, _ in recording.segments:
+        for row in read_records(folder / "status.csv"):
+            if row["phase"] == "waiting":
+                continue
+            for name in EVENTS:
+                if row.get(name) != last.get(name, "0"):
+                    changes.append((int(row["step"]), name, row.get(name) or ""))
+            last = row
+    return changes
+
+
+def find_step(text: str) -> int | None:
+    found = re.search(r"step (\d+)", text)
+    return int(found[1]) if found else None

@@ -1,0 +1,113 @@
+"""Hosts made of network namespaces, one for each program, on one switch. Needs root, `ip` and `nft`."""
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+from sls.check.faults import Fault
+from sls.errors import RunError
+from sls.input_error import InputError
+from sls.launcher.place import BUILD
+
+NAMES = ("server", "controller", "recorder")
+RULE = ("nft 'add table bridge wire; add chain bridge wire f {{ type filter hook forward priority 0; }}; "
+        "add rule bridge wire f {} counter drop'")
+
+
+class Hosts:
+    """Use it in a `with` statement. The machine's own network is not touched."""
+
+    def __init__(self, faults: tuple[Fault, ...]) -> None:
+        path = os.environ["PATH"] + ":/usr/sbin"
+        missing = [tool for tool in ("ip", "nft", "tc") if not shutil.which(tool, path=path)]
+        if os.geteuid() != 0 or missing:
+            raise InputError("placement hosts: expected root and the programs ip, nft and tc, got "
+                             + ("another user" if os.geteuid() else "no " + ", ".join(missing)))
+        self._prefix = f"sls-check-{os.getpid()}-"
+        self._values = {fault.word: fault.value for fault in faults}
+        self._wire: subprocess.Popen[bytes] | None = None
+
+    def __enter__(self) -> "Hosts":
+        remove_what_was_killed()
+        try:
+            self._make()
+        except RunError:
+            self.__exit__()
+            raise
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._wire:
+            self._wire.terminate()
+            self._wire.wait()
+        for host in (*NAMES, "switch"):
+            subprocess.run(["ip", "netns", "delete", self._prefix + host], check=False, capture_output=True)
+
+    def on(self, host: str) -> list[str]:
+        """The words before a command that runs on this host."""
+        return ["ip", "netns", "exec", self._prefix + host]
+
+    def cut(self) -> None:
+        """Nothing passes between hosts until `heal`."""
+        self._run("switch", "nft flush ruleset && " + RULE.format(""))
+
+    def heal(self) -> None:
+        self._run("switch", "nft flush ruleset")
+        if loss := self._values.get("loss"):
+            share = round(float(loss) * 1000)
+            self._run("switch", RULE.format(f"ether type ip numgen random mod 1000 < {share}"))
+
+    def _make(self) -> None:
+        run(f"ip netns add {self._prefix}switch")
+        self._run("switch", "ip link add br0 type bridge && ip link set br0 up")
+        for number, host in enumerate(NAMES, 1):
+            run(f"ip netns add {self._prefix}{host}")
+            self._run("switch", f"ip link add {host} type veth peer name eth0 netns {self._prefix}{host} && "
+                                f"ip link set {host} master br0 up")
+            self._run(host, f"ip link set lo up && ip address add 10.77.0.{number}/24 dev eth0 && "
+                            "ip link set eth0 up")
+            if rate := self._values.get("bandwidth_mbit"):
+                limit = f"root tbf burst 4kb latency 50ms rate {round(float(rate) * 1000)}kbit"
+                self._run("switch", f"tc qdisc add dev {host} {limit}")
+                self._run(host, f"tc qdisc add dev eth0 {limit}")
+        delay_ms, jitter_ms = (float(self._values.get(word, 0)) for word in ("delay_ms", "jitter_ms"))
+        if delay_ms or jitter_ms:
+            self._delay(delay_ms, jitter_ms)
+        self.heal()
+
+    def _delay(self, delay_ms: float, jitter_ms: float) -> None:
+        """Delays the controller's wire: by the kernel if it can (netem), else by the program of our tests."""
+        relay = BUILD / "tests/frame_relay"
+        try:
+            netem = f"root netem delay {delay_ms}ms {jitter_ms}ms"
+            self._run("switch", f"tc qdisc add dev controller {netem}")
+            self._run("controller", f"tc qdisc add dev eth0 {netem}")
+        except RunError:
+            if not relay.is_file():
+                raise InputError(f"--under delay_ms: expected a kernel with netem (sch_netem), or {relay}, got "
+                                 "neither") from None
+            self._run("switch", "ip link set controller nomaster && ip link add wire type veth peer name port && "
+                                "ip link set wire up && ip link set port master br0 up")
+            self._wire = subprocess.Popen(
+                [*self.on("switch"), relay, "controller", "wire", "--delay-ms", str(delay_ms), "--jitter-ms",
+                 str(jitter_ms), "--duplicate-percent", "0", "--seed", "1"],
+                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+    def _run(self, host: str, command: str) -> None:
+        run(" ".join(self.on(host)) + " sh -c '" + command.replace("'", "'\\''") + "'")
+
+
+def run(command: str) -> None:
+    """Raises RunError with the command's output."""
+    done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, check=False,
+                          env={**os.environ, "PATH": os.environ["PATH"] + ":/usr/sbin:/sbin"})
+    if done.returncode != 0:
+        raise RunError(f"placement hosts: {' '.join((done.stderr or done.stdout).split())} (of: {command})")
+
+
+def remove_what_was_killed() -> None:
+    """Removes the namespaces of checks whose process no longer runs."""
+    for path in Path("/run/netns").glob("sls-check-*"):
+        if not Path("/proc", path.name.split("-")[2]).exists():
+            subprocess.run(["ip", "netns", "delete", path.name], check=False, capture_output=True)
