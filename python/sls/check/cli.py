@@ -157,16 +157,17 @@ class Comparison:
         self._keeps_failed = keeps_failed
 
     def add(self, check: Check, result: Result) -> None:
-        first = self._first.get(result.check)
-        if result.certificate and check.is_lockstep:
-            if first is None:
-                self._first[result.check] = result
-                return
-            if first.certificate != result.certificate:
-                text = find_difference(Path(first.folder) / "recording", Path(result.folder) / "recording")
-                result.difference = f"differs from {first.flight} (A): {text or 'other certificates, no other row'}"
-        if result.verdict == HELD or not self._keeps_failed:
+        self.compare(check, result)
+        if self._first.get(result.file) is not result and (result.verdict == HELD or not self._keeps_failed):
             shutil.rmtree(result.folder, ignore_errors=True)
+
+    def compare(self, check: Check, result: Result) -> None:
+        if not result.certificate or not check.is_lockstep:
+            return
+        first = self._first.setdefault(result.file, result)
+        if first.certificate != result.certificate:
+            text = find_difference(first.recording, result.recording)
+            result.difference = f"differs from {first.flight} (A): {text or 'other certificates, no other row'}"
 
 
 def check_all(options: argparse.Namespace, folder: Path, results: list[Result]) -> None:
