@@ -48,7 +48,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     marker = metafunc.definition.get_closest_marker("sls")
     values = marker.kwargs if marker else {}
     if marker is None or marker.args or "check" not in values or not set(values) <= set(KEYS):
-        fail(f"{metafunc.definition.nodeid}: expected @pytest.mark.sls(check=FILE) with {', '.join(KEYS)}, got {marker}")
+        fail(f"{metafunc.definition.nodeid}: expected @pytest.mark.sls(check=FILE) with {', '.join(KEYS)}, got {marker or 'none'}")
     path = metafunc.definition.path.parent / values["check"]
     cases, names = [], []
     try:

@@ -59,9 +59,8 @@ def test_an_expectation_that_does_not_hold_fails_before_the_body(run, pytester):
 def test_judged(sls_flight):
     print("body of", "judged")
 
-@pytest.mark.sls(check="narrow.yaml", placements=["in-process"], under="busy", judge=False)
+@pytest.mark.sls(check="narrow.yaml", placements=["in-process"], judge=False)
 def test_not_judged(sls_flight):
-    assert sls_flight.under == "busy"
     print("body of", "other")
     assert [one.is_held for one in sls_flight.judged] == [True, False]
 """, "-s", "--sls-report=pages")
@@ -79,9 +78,14 @@ def test_what_a_placement_cannot_do_is_named_and_hosts_without_root_are_skipped(
 @pytest.mark.parametrize("sls_network", ["loss=0.2"], indirect=True)
 def test_lossy(sls_flight):
     pass
+
+@pytest.mark.sls(check="wide.yaml", placements=["in-process"], under="kill=controller")
+def test_killed(sls_flight):
+    pass
 """, "-rs")
-    done.assert_outcomes(errors=1, skipped=1)
+    done.assert_outcomes(errors=2, skipped=1)
     done.stdout.fnmatch_lines(["*--under loss=0.2: expected a placement that can do it (hosts, worlds), got shm",
+                               "*--under kill=controller: expected a placement that can do it (shm, *), got in-process",
                                "*placement hosts: expected root, got another user"])
 
 
@@ -106,14 +110,19 @@ def test_left_running(sls_server):
     assert not any(os.path.exists(f"/proc/{pid}") for pid in left)
 
 
-@pytest.mark.parametrize("marker, expected", [
-    ("@pytest.mark.sls(check='none.yaml')", "*none.yaml: *"),
-    ("@pytest.mark.sls(check='wide.yaml', placement='shm')", "*expected @pytest.mark.sls(check=FILE) with *"),
-    ("@pytest.mark.sls(check='wide.yaml', placements=['worlds'])", "*expected another placement, because * got worlds"),
-    ("@pytest.mark.sls(check='wide.yaml', placements=['moon'])", "*expected one of in-process, shm, * got 'moon'"),
-    ("", "*::test_flight: expected @pytest.mark.sls(check=FILE) with *")])
-def test_a_mistake_is_one_line_at_collection(run, marker, expected):
-    done = run(f"{marker}\ndef test_flight(sls_flight):\n    pass\n")
-    assert done.ret == 2
-    done.stdout.fnmatch_lines([expected])
+def test_each_mistake_is_one_line_at_collection(run, pytester):
+    mistakes = {
+        "(check='none.yaml')": "*none.yaml: *",
+        "(check='wide.yaml', placement='shm')": "*expected @pytest.mark.sls(check=FILE) with *",
+        "(check='wide.yaml', placements=['worlds'])": "*expected another placement, because * got worlds",
+        "(check='wide.yaml', placements=['moon'])": "*expected one of in-process, shm, * got 'moon'"}
+    for number, mistake in enumerate(mistakes):
+        pytester.makepyfile(**{f"test_{number}": f"""
+            import pytest
+            @pytest.mark.sls{mistake}
+            def test_flight(sls_flight):
+                pass"""})
+    done = run("def test_flight(sls_flight):\n    pass\n")
+    assert (done.ret, done.parseoutcomes()["errors"]) == (2, 5)
+    done.stdout.fnmatch_lines([*mistakes.values(), "*::test_flight: expected @pytest.mark.sls(check=FILE) with *, got none"])
     assert "Traceback" not in done.stdout.str()
