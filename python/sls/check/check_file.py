@@ -116,8 +116,8 @@ def find_checks(name: str) -> list[Path]:
     return [ROOT / "config/checks" / f"{name}.yaml"]
 
 
-def load_check(file: Path) -> Check:
-    """Raises ConfigError, one line with file, line, key, expected and got."""
+def load_check(file: Path, library: Path | None = None) -> Check:
+    """`library` flies in place of the controller. Raises ConfigError, one line with file, line, key, expected and got."""
     root = parse_yaml(read_bytes(file, "a check file", MOST_BYTES), file)
     known = ("scenario", "expect", "participants", "placements", "under", "limit_s")
     values = root.read_map("a check: scenario, expect …", known)
@@ -129,6 +129,8 @@ def load_check(file: Path) -> Check:
         place.fail(f"expected a scenario, got no such file: {scenario_file}")
     scenario = load_scenario(scenario_file)
     controller = read_participants(values["participants"]) if "participants" in values else None
+    if library:
+        controller = Participant(root, "controller", "library", (str(library.resolve()),), file.parent.resolve())
     if controller and controller.kind == "library":
         scenario = put_library(controller, scenario, scenario_file)
     check = Check(file, file.stem, place, scenario_file, scenario, (), controller)
@@ -316,9 +318,11 @@ def read_participants(place: Place) -> Participant | None:
 
 
 def put_library(controller: Participant, scenario: "Scenario", file: Path) -> "Scenario":
-    """The scenario with the library as its law, and without the keys of the law before."""
-    law = {"law": controller.words[0], "force_limit_n": scenario.force_limit_n}
-    return load_scenario(file, changes={"controller": law})
+    """The scenario with the library as its law. Only another library has the same keys beside it."""
+    law = controller.words[0]
+    if "/" in scenario.law:
+        return load_scenario(file, changes={"controller.law": law})
+    return load_scenario(file, changes={"controller": {"law": law, "force_limit_n": scenario.force_limit_n}})
 
 
 def read_placements(place: Place | None, controller: Participant | None) -> tuple[str, ...]:

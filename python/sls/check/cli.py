@@ -60,6 +60,7 @@ def make_parser() -> argparse.ArgumentParser:
     add("--under", type=parse_faults, metavar="FAULT,…",
         help=f"faults: {', '.join(f'{word}=…' if kind[0] else word for word, kind in WORDS.items())} "
              "(default: the file's)")
+    add("--library", type=Path, metavar="FILE", help="fly this shared library as the controller")
     add("--jobs", type=to_count, default=1, metavar="N", help="flights side by side (default: 1)")
     add("--update", action="store_true", help="write the certificates of the flights into the check files")
     add("--recording", type=Path, metavar="DIR", help="judge this recording instead of flying")
@@ -174,7 +175,7 @@ def check_all(options: argparse.Namespace, folder: Path, results: list[Result]) 
     checks, files = list[Check](), [file for name in options.files for file in find_checks(name)]
     for file in files:
         try:
-            checks.append(load_check(file))
+            checks.append(load_check(file, options.library))
         except (ConfigError, ImportError) as error:
             say(f"error: {error}")
             results.append(Result(file.stem, str(file), problem=str(error), is_unusable=True))

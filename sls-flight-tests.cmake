@@ -1,0 +1,38 @@
+# sls_add_flight_test(NAME name CHECK file.yaml [PLACEMENT placement…] [UNDER fault…] [LAW target] [TIMEOUT s]): adds a
+# ctest that flies the check with `sls check`. LAW: the shared library of this target is the controller. Beside the build
+# of the calling folder the test leaves NAME.xml (JUnit) and NAME/ (page, recording and logs of each flight that did not
+# hold).
+function(sls_add_flight_test)
+  cmake_parse_arguments(PARSE_ARGV 0 TEST "" "NAME;CHECK;LAW;TIMEOUT" "PLACEMENT;UNDER")
+  if(TEST_UNPARSED_ARGUMENTS OR NOT TEST_NAME OR NOT TEST_CHECK)
+    message(FATAL_ERROR "sls_add_flight_test: expected NAME and CHECK, and maybe PLACEMENT, UNDER, LAW and TIMEOUT, "
+                        "got: ${ARGV}")
+  endif()
+  get_filename_component(check ${TEST_CHECK} ABSOLUTE)
+  if(NOT EXISTS ${check})
+    message(FATAL_ERROR "sls_add_flight_test(${TEST_NAME}): CHECK: expected a file, got ${check}")
+  endif()
+  set(launcher ${CMAKE_CURRENT_FUNCTION_LIST_DIR}/sls)  # of the source tree
+  if(NOT EXISTS ${launcher})
+    get_filename_component(launcher ${CMAKE_CURRENT_FUNCTION_LIST_DIR}/../../../bin/sls ABSOLUTE)
+  endif()
+  set(words ${check} --junit ${CMAKE_CURRENT_BINARY_DIR}/${TEST_NAME}.xml --report ${CMAKE_CURRENT_BINARY_DIR}/${TEST_NAME})
+  foreach(key IN ITEMS PLACEMENT UNDER)
+    if(TEST_${key})
+      string(TOLOWER ${key} option)
+      list(JOIN TEST_${key} "," values)
+      list(APPEND words --${option} ${values})
+    endif()
+  endforeach()
+  if(TEST_LAW)
+    list(APPEND words --library $<TARGET_FILE:${TEST_LAW}>)
+  endif()
+  if(NOT TEST_TIMEOUT)
+    set(TEST_TIMEOUT 300)
+  endif()
+  add_test(NAME ${TEST_NAME} COMMAND ${launcher} check ${words})
+  set_tests_properties(${TEST_NAME} PROPERTIES TIMEOUT ${TEST_TIMEOUT} LABELS flight)
+  if(CMAKE_PROJECT_NAME STREQUAL sls)
+    set_tests_properties(${TEST_NAME} PROPERTIES ENVIRONMENT SLS_BUILD=${CMAKE_BINARY_DIR})
+  endif()
+endfunction()
