@@ -3,13 +3,13 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 #include <variant>
 
 #include "closed_loop/flight.hpp"
 #include "closed_loop/loss.hpp"
 #include "common/config/numbers.hpp"
+#include "common/model/measures.hpp"
 
 namespace sls::closed_loop {
 namespace {
@@ -46,20 +46,17 @@ DelayedFlight fly(const config::Scenario& scenario, std::int64_t periods, const 
   Flight flight(make_delayed(scenario, periods));
   DelayedFlight result;
   result.periods = periods;
-  std::uint64_t steps = 0;
-  double sum_of_squares = 0.0;
+  model::ErrorStatistics errors;
   while (const auto step = flight.fly_step()) {
-    const double error = calc_load_error(*step);
-    result.worst_error = std::max(result.worst_error, error);
-    sum_of_squares += error * error;
-    ++steps;
-    result.loss = judge(*step, error);
+    errors.add(step->truth.p_WL - step->answer.reference.position);
+    result.loss = judge(*step, calc_load_error(*step));
     if (result.is_lost()) break;
   }
   if (!result.is_lost()) result.loss = flight.failure();
   if (result.is_lost())
-    result.loss += describe_time(calc_last_time_ns(steps, scenario.sync.period_ns));
-  result.rms_error = std::sqrt(sum_of_squares / static_cast<double>(steps));
+    result.loss += describe_time(calc_last_time_ns(errors.samples(), scenario.sync.period_ns));
+  result.worst_error = errors.calc_max(model::kNorm);
+  result.rms_error = errors.calc_rms(model::kNorm);
   return result;
 }
 

@@ -6,20 +6,17 @@
 #include <limits>
 #include <variant>
 
-#include "common/model/math.hpp"
+#include "common/model/invariants.hpp"
 
 namespace sls::closed_loop {
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kSettlingBand = 0.02;
-/// A stage that begins closer than this to its target has no step response, m.
-constexpr double kLeastStep = 0.01;
 constexpr std::array<const char*, 3> kAxes = {"x", "y", "z"};
-constexpr std::array<const char*, 8> kMeasures = {"load_error_rms", "load_error_max", "settling",
-                                                  "overshoot",      "tilt_max",       "force_max",
-                                                  "time_of_loss",   "outcome"};
+constexpr std::array kMeasures = {
+    "load_error_rms", "load_error_max", "settling",       "overshoot",      "tilt_max",
+    "force_max",      "time_of_loss",   "load_error_end", "quad_error_rms", "quad_error_max",
+    "quad_error_end", "attitude_max",   "energy_max",     "outcome"};
 
 std::string to_prefix(std::size_t stage) { return "stage_" + std::to_string(stage) + "_"; }
 
@@ -38,7 +35,7 @@ MeasureList::MeasureList(const config::Scenario& base, std::vector<std::string> 
     : names_(std::move(names)) {
   for (const config::Stage& stage : base.mission)
     stages_.push_back(std::holds_alternative<config::ConstantReference>(stage.reference));
-  const FlightMeasures nothing(*this, base.sync.period_ns);
+  const FlightMeasures nothing(*this, base.sync.period_ns, base.vehicle, false);
   for (const std::string& name : names_) {
     if (std::find(kMeasures.begin(), kMeasures.end(), name) == kMeasures.end())
       throw config::ConfigError("measure: expected " + list_measures() + ", got '" + name + "'");
@@ -47,92 +44,54 @@ MeasureList::MeasureList(const config::Scenario& base, std::vector<std::string> 
   }
 }
 
-// --- errors --------------------------------------------------------------------------------------
-
-void FlightMeasures::Errors::add(const Eigen::Array3d& error) {
-  const Eigen::Array3d squares = error.square();
-  samples += 1.0;
-  sum_of_squares += squares;
-  max_square = max_square.max(squares);
-  max_square_of_norm = std::max(max_square_of_norm, squares.sum());
+bool MeasureList::has(const std::string& name) const {
+  return std::any_of(names_.begin(), names_.end(),
+                     [&](const std::string& own) { return own.rfind(name, 0) == 0; });
 }
 
-Eigen::Array3d FlightMeasures::Errors::calc_rms() const {
-  return (sum_of_squares / samples).sqrt();  // NaN without samples
-}
-
-Eigen::Array3d FlightMeasures::Errors::calc_max() const {
-  if (samples == 0.0) return Eigen::Array3d::Constant(kNan);
-  return max_square.sqrt();
-}
-
-double FlightMeasures::Errors::calc_norm_rms() const {
-  return std::sqrt(sum_of_squares.sum() / samples);
-}
-
-double FlightMeasures::Errors::calc_norm_max() const {
-  return samples == 0.0 ? kNan : std::sqrt(max_square_of_norm);
-}
-
-// --- steps ---------------------------------------------------------------------------------------
+// --- flight --------------------------------------------------------------------------------------
 
 void FlightMeasures::Step::add(const model::StepRecord& step, double time_s) {
-  const Eigen::Array3d reference = step.answer.reference.position.array();
-  const Eigen::Array3d p_WL = step.truth.p_WL.array();
+  const Eigen::Vector3d& reference = step.answer.reference.position;
   if (!has_begun) {
     has_begun = true;
-    start_s = time_s;
     target = reference;
-    size = target - p_WL;
-    settled_since_s.setConstant(kNan);
   }
-  is_constant = is_constant && (reference == target).all();
-  for (int axis = 0; axis < 3; ++axis) {
-    const double deviation = p_WL[axis] - target[axis];
-    if (std::abs(deviation) > kSettlingBand * std::abs(size[axis]))
-      settled_since_s[axis] = kNan;
-    else if (std::isnan(settled_since_s[axis]))
-      settled_since_s[axis] = time_s;
-    overshoot[axis] = std::max(overshoot[axis], deviation / size[axis]);
-  }
+  is_constant = is_constant && reference == target;
+  responses.add(time_s, step.truth.p_WL - target);
 }
 
-bool FlightMeasures::Step::is_step(int axis) const {
-  return has_begun && is_constant && std::abs(size[axis]) >= kLeastStep;
-}
-
-double FlightMeasures::Step::calc_settling_time(int axis) const {
-  if (!is_step(axis)) return kNan;
-  const double since_s = settled_since_s[axis];
-  return std::isnan(since_s) ? kInfinity : since_s - start_s;
-}
-
-double FlightMeasures::Step::calc_overshoot(int axis) const {
-  return is_step(axis) ? overshoot[axis] : kNan;
-}
-
-// --- all -----------------------------------------------------------------------------------------
-
-FlightMeasures::FlightMeasures(const MeasureList& list, std::int64_t period_ns)
+FlightMeasures::FlightMeasures(const MeasureList& list, std::int64_t period_ns,
+                               const model::SlungLoadParameters& vehicle, bool has_attitude)
     : list_(list),
       period_ns_(period_ns),
+      has_quad_errors_(list.has("quad_error")),
+      has_energy_(list.has("energy_max")),
+      vehicle_(vehicle),
+      has_attitude_(has_attitude),
       stages_(list.stages().size()),
       steps_(list.stages().size()) {}
 
 void FlightMeasures::add(const model::StepRecord& step) {
-  const Eigen::Array3d error = step.truth.p_WL - step.answer.reference.position;
+  const model::Measurement& truth = step.truth;
   const std::size_t stage = step.answer.stage;
-  errors_.add(error);
-  if (stage < stages_.size()) {  // a run may have more stages than its base
-    stages_[stage].add(error);
-    if (list_.stages()[stage]) {
-      const auto time_ns = static_cast<std::int64_t>(step.step) * period_ns_;
-      steps_[stage].add(step, static_cast<double>(time_ns) / 1e9);
-    }
+  const bool is_known = stage < stages_.size();  // a run may have more stages than its base
+  const auto add_errors = [&](model::ErrorStatistics Errors::*of, const Eigen::Vector3d& error) {
+    (errors_.*of).add(error);
+    if (is_known) (stages_[stage].*of).add(error);
+  };
+  add_errors(&Errors::load, truth.p_WL - step.answer.reference.position);
+  if (has_quad_errors_)
+    add_errors(&Errors::quad,
+               truth.p_WQ - model::calc_quad_reference(step.answer.reference, vehicle_));
+  if (is_known && list_.stages()[stage]) {
+    const auto time_ns = static_cast<std::int64_t>(step.step) * period_ns_;
+    steps_[stage].add(step, static_cast<double>(time_ns) / 1e9);
   }
-  const Eigen::Vector3d p_QL_W = step.truth.p_WL - step.truth.p_WQ;
-  tilt_max_ = std::max(tilt_max_, math::atan2(p_QL_W.head<2>().norm(), p_QL_W.z()));
-  max_square_of_force_ = std::max(max_square_of_force_, step.answer.f_Q_W.squaredNorm());
+  tilt_.add(model::calc_rod_tilt(truth.p_WL - truth.p_WQ));
+  if (has_attitude_) attitude_.add(model::calc_body_tilt(truth.attitude.q_WB));
+  squared_force_.add(step.answer.f_Q_W.squaredNorm());
+  if (has_energy_) energy_.add(model::calc_energy(truth, vehicle_));
 }
 
 std::vector<FlightMeasures::NamedValue> FlightMeasures::list_values(
@@ -144,33 +103,43 @@ std::vector<FlightMeasures::NamedValue> FlightMeasures::list_values(
       values.emplace_back(prefix + "_" + kAxes[static_cast<std::size_t>(axis)] + suffix,
                           calc(axis));
   };
-  const auto add_errors = [&](const auto& calc_norm, const auto& calc) {
-    values.emplace_back(measure + "_m", calc_norm(errors_));
-    add_axes(measure, "_m", [&, of_axes = calc(errors_)](int axis) { return of_axes[axis]; });
+  const auto add_errors = [&](double (model::ErrorStatistics::*calc)(int) const) {
+    const auto of = measure[0] == 'q' ? &Errors::quad : &Errors::load;
+    values.emplace_back(measure + "_m", ((errors_.*of).*calc)(model::kNorm));
+    add_axes(measure, "_m", [&](int axis) { return ((errors_.*of).*calc)(axis); });
     for (std::size_t i = 0; i < stages_.size(); ++i)
       add_axes(to_prefix(i) + measure, "_m",
-               [&, of_axes = calc(stages_[i])](int axis) { return of_axes[axis]; });
+               [&](int axis) { return ((stages_[i].*of).*calc)(axis); });
   };
-  const auto add_steps = [&](const std::string& suffix, const auto& calc) {
+  const auto add_steps = [&](const std::string& suffix,
+                             double (model::StepResponse::*calc)() const) {
     for (std::size_t i = 0; i < steps_.size(); ++i)
       if (list_.stages()[i])
-        add_axes(to_prefix(i) + measure, suffix, [&](int axis) { return calc(steps_[i], axis); });
+        add_axes(to_prefix(i) + measure, suffix, [&](int axis) {
+          return steps_[i].is_constant ? (steps_[i].responses[axis].*calc)() : kNan;
+        });
   };
-  if (measure == "load_error_rms")
-    add_errors([](const Errors& errors) { return errors.calc_norm_rms(); },
-               [](const Errors& errors) { return errors.calc_rms(); });
-  else if (measure == "load_error_max")
-    add_errors([](const Errors& errors) { return errors.calc_norm_max(); },
-               [](const Errors& errors) { return errors.calc_max(); });
+  const auto ends_with = [&](const std::string& end) {
+    return measure.size() > end.size() && measure.substr(measure.size() - end.size()) == end;
+  };
+  if (ends_with("_error_rms"))
+    add_errors(&model::ErrorStatistics::calc_rms);
+  else if (ends_with("_error_max"))
+    add_errors(&model::ErrorStatistics::calc_max);
+  else if (ends_with("_error_end"))
+    add_errors(&model::ErrorStatistics::calc_end);
   else if (measure == "settling")
-    add_steps("_s", [](const Step& step, int axis) { return step.calc_settling_time(axis); });
+    add_steps("_s", &model::StepResponse::calc_settling_time);
   else if (measure == "overshoot")
-    add_steps("", [](const Step& step, int axis) { return step.calc_overshoot(axis); });
+    add_steps("", &model::StepResponse::calc_overshoot);
   else if (measure == "tilt_max")
-    values.emplace_back("tilt_max_rad", errors_.samples == 0.0 ? kNan : tilt_max_);
+    values.emplace_back("tilt_max_rad", tilt_.value());
+  else if (measure == "attitude_max")
+    values.emplace_back("attitude_max_rad", attitude_.value());
   else if (measure == "force_max")
-    values.emplace_back("force_max_n",
-                        errors_.samples == 0.0 ? kNan : std::sqrt(max_square_of_force_));
+    values.emplace_back("force_max_n", std::sqrt(squared_force_.value()));
+  else if (measure == "energy_max")
+    values.emplace_back("energy_max_j", energy_.value());
   else if (measure == "time_of_loss")
     values.emplace_back("time_of_loss_s", time_of_loss_s.value_or(kNan));
   return values;

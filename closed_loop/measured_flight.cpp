@@ -36,9 +36,10 @@ MeasuredFlight fly_measured(const config::Scenario& scenario, const MeasureList&
                             const Poll& poll) {
   check_vehicles(scenario);
   const std::int64_t period_ns = scenario.sync.period_ns;
-  const double rod_length = config::make_vehicle_scenario(scenario, 0).vehicle.rod_length;
+  const model::SlungLoadParameters vehicle = config::make_vehicle_scenario(scenario, 0).vehicle;
+  const double rod_length = vehicle.rod_length;
   Flight flight(scenario, {0}, options);
-  FlightMeasures measured(measures, period_ns);
+  FlightMeasures measured(measures, period_ns, vehicle, flight.plant().has_attitude());
   std::optional<FlightCertificate> certificate;
   if (certify)
     certificate.emplace(record::RowFormat{period_ns, flight.plant().has_attitude(),

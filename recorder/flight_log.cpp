@@ -22,11 +22,10 @@ constexpr std::size_t kMaxStages = 1000;
 constexpr std::size_t kMaxEvents = 1000;
 
 /// A row of at most 80 columns.
-std::string format_errors(const std::string& label, const ErrorStatistics& statistics) {
-  const Eigen::Vector3d rms = statistics.calc_rms(), &most = statistics.max_abs;
+std::string format_errors(const std::string& label, const model::ErrorStatistics& errors) {
   return fmt::format("  {:<13} {:8.2e} {:8.2e} {:8.2e} {:8.2e} {:8.2e} {:8.2e} {:8.2e}\n", label,
-                     rms.x(), rms.y(), rms.z(), most.x(), most.y(), most.z(),
-                     statistics.last.norm());
+                     errors.calc_rms(0), errors.calc_rms(1), errors.calc_rms(2), errors.calc_max(0),
+                     errors.calc_max(1), errors.calc_max(2), errors.calc_end(model::kNorm));
 }
 
 std::int64_t calc_lap_ns(const config::Stage& stage) {
@@ -36,18 +35,6 @@ std::int64_t calc_lap_ns(const config::Stage& stage) {
 }
 
 }  // namespace
-
-void ErrorStatistics::add(const Eigen::Vector3d& error) {
-  ++samples;
-  sum_of_squares += error.cwiseAbs2();
-  max_abs = max_abs.cwiseMax(error.cwiseAbs());
-  last = error;
-}
-
-Eigen::Vector3d ErrorStatistics::calc_rms() const {
-  if (samples == 0) return Eigen::Vector3d::Zero();
-  return (sum_of_squares / static_cast<double>(samples)).cwiseSqrt();
-}
 
 FlightLog::FlightLog(const config::Scenario& scenario, const Parameters& parameters)
     : scenario_(scenario), parameters_(parameters) {}
@@ -181,7 +168,7 @@ void FlightLog::write(std::ostream& out) const {
                          to_time(stage.last_step))
           << format_errors("all", stage.all);
       for (std::size_t lap = 0; lap < stage.laps.size(); ++lap) {
-        if (stage.laps[lap].samples == 0) continue;
+        if (stage.laps[lap].samples() == 0) continue;
         const char* part = is_whole_lap(stage, index, lap) ? "" : " (part)";
         out << format_errors(fmt::format("lap {}{}", lap + 1, part), stage.laps[lap]);
       }

@@ -2,7 +2,6 @@
 /// recording.
 #pragma once
 
-#include <Eigen/Core>
 #include <cstdint>
 #include <deque>
 #include <map>
@@ -14,21 +13,11 @@
 
 #include "common/bus/topics.hpp"
 #include "common/config/scenario.hpp"
+#include "common/model/measures.hpp"
 #include "recorder/manifest.hpp"
 #include "recorder/rows.hpp"
 
 namespace sls::record {
-
-/// Load position error over a part of a flight, per axis, m.
-struct ErrorStatistics {
-  std::uint64_t samples = 0;
-  Eigen::Vector3d sum_of_squares = Eigen::Vector3d::Zero();
-  Eigen::Vector3d max_abs = Eigen::Vector3d::Zero();
-  Eigen::Vector3d last = Eigen::Vector3d::Zero();
-
-  void add(const Eigen::Vector3d& error);
-  Eigen::Vector3d calc_rms() const;
-};
 
 class FlightLog {
  public:
@@ -54,8 +43,8 @@ class FlightLog {
     std::uint64_t start_step = 0;  // of the stage; laps count from here
     std::uint64_t first_step = 0;  // the first one with rows
     std::uint64_t last_step = 0;
-    ErrorStatistics all;
-    std::vector<ErrorStatistics> laps;  // of a figure eight, the first ones
+    model::ErrorStatistics all;                // of the load position error
+    std::vector<model::ErrorStatistics> laps;  // of a figure eight, the first ones
   };
 
   /// Of one vehicle, in the order of their beginning.

@@ -7,6 +7,7 @@ namespace sls::python {
 
 void add_scenario(pybind11::module_& module);
 void add_flight(pybind11::module_& module);
+void add_measures(pybind11::module_& module);
 void add_recording(pybind11::module_& module);
 void add_campaign(pybind11::module_& module);
 void add_batch(pybind11::module_& module);

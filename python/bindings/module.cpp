@@ -10,6 +10,7 @@ PYBIND11_MODULE(_sls_core, module) {
   add_scenario(module);
   add_flight(module);
   add_recording(module);
+  add_measures(module);
   add_campaign(module);
   add_batch(module);
   add_client(module);

@@ -1,11 +1,18 @@
-#include <pybind11/pybind11.h>
+#include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
+#include <algorithm>
+#include <charconv>
+#include <map>
+#include <set>
 #include <string>
+#include <vector>
 
+#include "common/config/config_error.hpp"
 #include "control_client/laws/qsf/lqr.hpp"
 #include "python/bindings/bindings.hpp"
 #include "recorder/recording_reader.hpp"
+#include "recorder/sinks/csv/csv_reader.hpp"
 #include "recorder/verification.hpp"
 
 namespace sls::python {
@@ -37,6 +44,68 @@ py::tuple compare(const std::string& folder_a, const std::string& folder_b) {
   return py::make_tuple(difference ? py::object(py::str(difference->text)) : py::none(), notes);
 }
 
+/// A column of numbers, or of texts as indices into `texts`.
+struct TableColumn {
+  bool is_text = false;
+  std::vector<double> numbers;
+  std::vector<std::string> texts;
+  std::vector<std::int64_t> indices;
+  std::map<std::string, std::int64_t, std::less<>> known;  // by text
+
+  void add_text(std::string_view text) {
+    auto found = known.find(text);
+    if (found == known.end()) {
+      found = known.emplace(text, static_cast<std::int64_t>(texts.size())).first;
+      texts.emplace_back(text);
+    }
+    indices.push_back(found->second);
+  }
+  /// False if `text` is no number.
+  bool add_number(std::string_view text) {
+    const auto [end, error] =
+        std::from_chars(text.data(), text.data() + text.size(), numbers.emplace_back());
+    return error == std::errc() && end == text.data() + text.size();
+  }
+};
+
+template <class Number>
+py::array_t<Number> to_array(const std::vector<Number>& numbers) {
+  return py::array_t<Number>(static_cast<py::ssize_t>(numbers.size()), numbers.data());
+}
+
+/// The columns of a CSV file whose first line is `header`: arrays (rows,) of float64, and for the
+/// columns `text` a tuple of the different texts and an index for each row. A last row without a
+/// line break is left out.
+/// @throws config::ConfigError with file and line for a row that cannot be read.
+py::list read_table(const std::string& path, const std::string& header,
+                    const std::set<std::string>& text) {
+  std::vector<TableColumn> columns;
+  try {
+    record::CsvReader file(path, header);
+    columns.resize(file.columns().size());
+    for (std::size_t i = 0; i < columns.size(); ++i)
+      columns[i].is_text = text.count(file.columns()[i]) > 0;
+    while (file.next())
+      for (std::size_t i = 0; i < columns.size(); ++i) {
+        const std::string_view field = file.fields()[i];
+        if (columns[i].is_text)
+          columns[i].add_text(field);
+        else if (!columns[i].add_number(field))
+          throw config::ConfigError(file.place() + file.columns()[i] +
+                                    ": expected a number, got '" + std::string(field) + "'");
+      }
+  } catch (const record::DamagedError& error) {
+    throw config::ConfigError(error.what());
+  }
+  py::list result;
+  for (const TableColumn& column : columns)
+    if (column.is_text)
+      result.append(py::make_tuple(column.texts, to_array(column.indices)));
+    else
+      result.append(to_array(column.numbers));
+  return result;
+}
+
 py::dict to_dict(const control::AxisGains& gains, bool has_rod) {
   py::dict dict;
   dict["position"] = gains.position;
@@ -62,6 +131,7 @@ py::dict calc_lqr(double horizontal, double vertical) {
 void add_recording(py::module_& module) {
   module.def("inspect_recording", &inspect, py::arg("folder"));
   module.def("compare_recordings", &compare, py::arg("a"), py::arg("b"));
+  module.def("read_table", &read_table, py::arg("path"), py::arg("header"), py::arg("text"));
   module.def("lqr", &calc_lqr, py::arg("horizontal"), py::arg("vertical"));
 }
 

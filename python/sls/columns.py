@@ -4,8 +4,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
-INTEGERS = ("vehicle_id", "step", "stage")
-
 
 class Columns(Mapping[str, np.ndarray]):
     """A mapping from the names of columns to arrays (rows,), in the order of the file. Numbers are
@@ -14,12 +12,6 @@ class Columns(Mapping[str, np.ndarray]):
     def __init__(self, columns: Mapping[str, np.ndarray | Callable[[], np.ndarray]]):
         """A function in place of an array is called on the first use of its column."""
         self._columns = dict(columns)
-
-    @classmethod
-    def of_rows(cls, rows: np.ndarray) -> "Columns":
-        """Columns of a structured array whose numbers are all float64."""
-        return cls({name: rows[name].astype(np.int64) if name in INTEGERS else rows[name]
-                    for name in rows.dtype.names or ()})
 
     def __getitem__(self, name: str) -> np.ndarray:
         """The column `name`. Raises KeyError, with the known names, if there is none."""

@@ -6,13 +6,16 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from sls.core import load_core
+from sls.errors import ConfigError
 from sls.input_error import InputError
 
-# Numpy types of the columns that hold text. The controller's name is cut, because it is not shown.
-TEXT_COLUMNS = {"stage_name": "U32", "fault": "U16", "controller": "U1"}
+TEXT_COLUMNS = {"stage_name", "fault", "controller"}
+INTEGER_COLUMNS = {"vehicle_id", "step", "stage"}
 
 
 @dataclass(frozen=True)
@@ -44,13 +47,12 @@ def parse_rows(text: Text, columns: Sequence[str], first_line: int,
     """The lines from `first_line` (counted from 1) on, as a structured array with a field per column.
 
     Raises InputError if a row has another number of columns, or if a field is not a number."""
-    kinds = np.dtype([(name, TEXT_COLUMNS.get(name, "f8")) for name in columns])
+    kinds = np.dtype([(name, "f8") for name in columns])
     lines = text.lines[first_line - 1:]
     if not lines:
         return np.empty(0, kinds)
     try:
-        return np.loadtxt(lines, dtype=kinds, delimiter=delimiter, quotechar='"', comments=None,
-                          ndmin=1)
+        return np.loadtxt(lines, dtype=kinds, delimiter=delimiter, comments=None, ndmin=1)
     except ValueError as error:
         raise find_bad_row(text, columns, first_line, delimiter) or InputError(
             f"{text.path}: expected rows of {len(columns)} columns, got: {error}") from None
@@ -65,7 +67,7 @@ def find_bad_row(text: Text, columns: Sequence[str], first_line: int,
             return InputError(f"{text.path}:{number}: expected {len(columns)} columns, "
                               f"got {len(fields)}")
         for name, field in zip(columns, fields):
-            if name not in TEXT_COLUMNS and not is_number(field):
+            if not is_number(field):
                 return InputError(f"{text.path}:{number}: {name}: expected a number, got '{field}'")
     return None
 
@@ -78,17 +80,34 @@ def is_number(text: str) -> bool:
     return True
 
 
-def read_table(path: Path, required: Sequence[str]) -> tuple[np.ndarray, bool]:
-    """The rows of a CSV file with a header, and whether its last row was cut off. The header must have
-    the columns `required`. Raises InputError."""
-    text = read_text(path)
-    if not text.lines:
+def read_table(path: Path, required: Sequence[str]) -> tuple[dict[str, np.ndarray], bool]:
+    """The columns of a CSV file with a header, and whether its last row was cut off. Numbers are float64, those of
+    INTEGER_COLUMNS int64. The header must have the columns `required`. Raises InputError."""
+    try:
+        with path.open("rb") as file:
+            header = file.readline().decode(errors="replace")
+            file.seek(-1 if header else 0, os.SEEK_END)
+            is_cut = file.read() not in (b"\n", b"")
+    except OSError as error:
+        raise InputError(f"{path}: expected a file, got: {os.strerror(error.errno)}") from None
+    if not header.endswith("\n"):
         raise InputError(f"{path}:1: expected a header, got an empty file")
-    columns = text.lines[0].split(",")
+    names = header[:-1].split(",")
     for name in required:
-        if name not in columns:
-            raise InputError(f"{path}:1: expected a column '{name}', got '{text.lines[0][:60]}'")
-    return parse_rows(text, columns, 2), bool(text.rest)
+        if name not in names:
+            raise InputError(f"{path}:1: expected a column '{name}', got '{header[:60].rstrip()}'")
+    try:
+        columns = load_core().read_table(str(path), header[:-1], TEXT_COLUMNS)
+    except ConfigError as error:
+        raise InputError(str(error)) from None
+    return {name: to_array(name, column) for name, column in zip(names, columns)}, is_cut
+
+
+def to_array(name: str, column: Any) -> np.ndarray:
+    if name in TEXT_COLUMNS:
+        texts, indices = column
+        return np.array(texts, dtype=np.str_)[indices]
+    return column.astype(np.int64) if name in INTEGER_COLUMNS else column
 
 
 def read_records(path: Path) -> list[dict[str, str]]:

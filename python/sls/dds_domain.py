@@ -31,4 +31,4 @@ def own_domain() -> Iterator[int]:
                         Path("/dev/shm", file).unlink(missing_ok=True)
             lock.close()
         return
-    raise RunError(f"expected a free DDS domain from {DOMAINS[0]} to {DOMAINS[-1]}, got none; --domain names one")
+    raise RunError(f"expected a free DDS domain from {DOMAINS[0]} to {DOMAINS[-1]}, got none")

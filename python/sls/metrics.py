@@ -1,52 +1,22 @@
-"""How well a flight followed its reference. Formulas: python/README.md, "Metrics"."""
+"""How well a flight followed its reference, by stage and lap. The module _sls_core computes; definitions:
+common/model/README.md, "Measures"."""
 
 import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from sls.core import load_core
 from sls.trajectory import Trajectory, Stage
 
-SETTLING_BAND = 0.02
-LEAST_STEP_M = 0.01
-"""A stage that begins at a smaller distance from its target has no step response."""
 MOST_LAPS = 1000
 """Largest number of laps of a stage, as in flight.txt."""
 
 
-def calc_rms(values: np.ndarray) -> np.ndarray:
-    """Root mean square over the rows, per column."""
-    return np.sqrt(np.mean(np.square(values), axis=0))
-
-
-def calc_max(values: np.ndarray) -> np.ndarray:
-    """Largest absolute value over the rows, per column."""
-    return np.max(np.abs(values), axis=0)
-
-
-def calc_settling_time(time_s: np.ndarray, values: np.ndarray, target: float) -> float:
-    """Time from the first row until `values` stays within 2 % of the step, s. NaN: there is no step;
-    infinite: the last value is outside this band."""
-    step = target - values[0]
-    if abs(step) < LEAST_STEP_M:
-        return math.nan
-    outside = np.flatnonzero(np.abs(values - target) > SETTLING_BAND * abs(step))
-    settled = outside[-1] + 1
-    return math.inf if settled == len(values) else float(time_s[settled] - time_s[0])
-
-
-def calc_overshoot(values: np.ndarray, target: float) -> float:
-    """Largest distance of `values` beyond its target, as a share of the step. NaN: there is no step."""
-    step = target - values[0]
-    if abs(step) < LEAST_STEP_M:
-        return math.nan
-    return max(0.0, float(np.max((values - target) / step)))
-
-
-def calc_steady_state_error(time_s: np.ndarray, errors: np.ndarray) -> np.ndarray:
-    """Mean over the last tenth of the time, per column."""
-    begin = time_s[-1] - 0.1 * (time_s[-1] - time_s[0])
-    return np.mean(errors[time_s >= begin], axis=0)
+def calc_errors(error: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """rms and largest size of `error` (n, 3), each per column, (3,)."""
+    rms, largest, _, _ = load_core().calc_errors(error)
+    return np.array(rms[:3]), np.array(largest[:3])
 
 
 @dataclass(frozen=True)
@@ -126,11 +96,10 @@ def calc_over(flight: Trajectory, rows: np.ndarray, label: str) -> StageMetrics:
     error = p_WL - reference
     step = None
     if np.all(reference == reference[0]):
-        step = StepMetrics(
-            settling_time_s=np.array([calc_settling_time(time_s, p_WL[:, axis], reference[0, axis])
-                                      for axis in range(3)]),
-            overshoot=np.array([calc_overshoot(p_WL[:, axis], reference[0, axis])
-                                for axis in range(3)]),
-            steady_state_error_m=calc_steady_state_error(time_s, error))
+        settling_time_s, _, overshoot, _ = load_core().calc_steps(time_s, error)
+        step = StepMetrics(settling_time_s=np.array(settling_time_s[:3]),
+                           overshoot=np.array(overshoot[:3]),
+                           steady_state_error_m=load_core().calc_steady_state_error(time_s, error))
+    rms_m, max_m = calc_errors(error)
     return StageMetrics(label=label, from_s=float(time_s[0]), to_s=float(time_s[-1]),
-                        rms_m=calc_rms(error), max_m=calc_max(error), step=step)
+                        rms_m=rms_m, max_m=max_m, step=step)

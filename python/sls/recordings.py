@@ -1,9 +1,10 @@
 """Reads recordings: complete, cut short, or in several segments."""
 
 import json
+import operator
 import os
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ import yaml
 
 from sls.columns import Columns
 from sls.core import load_core
-from sls.csv_tables import read_records, read_table, read_text, stack
+from sls.csv_tables import read_records, read_table, read_text
 from sls.trajectory import Stage, Trajectory, find_stages, read_body
 from sls.vehicle_columns import VehicleColumns
 from sls.input_error import InputError
@@ -117,17 +118,19 @@ class RecordedVehicle(VehicleColumns):
         return self.recording.load_flight(self.vehicle_id, self.recording.folder.resolve().name)
 
     def _read(self, name: str) -> Columns:
-        return Columns.of_rows(self.recording.rows_of(name, self.vehicle_id))
+        return self.recording.rows_of(name, self.vehicle_id)
 
 
 class Recording(VehicleColumns):
     """A recording's folder. `state`, `measured`, `command` and `reference` are the columns of the
     files with these names, for the first vehicle; `vehicle(ID)` has those of another vehicle. Arrays
     have a row for each row of the file, SI units, radians. Every member raises InputError, which is a
-    ConfigError, if it cannot read a file."""
+    ConfigError, if it cannot read a file. The columns need the extension module."""
 
     def __init__(self, folder: str | os.PathLike[str]):
         self.folder = folder = Path(folder)
+        self._tables: dict[str, tuple[dict[str, np.ndarray], bool]] = {}
+        self._vehicles: dict[int, RecordedVehicle] = {}
         self.segments = [(folder, read_manifest(folder))]
         while (segment := folder / f"segment-{len(self.segments) + 1}").is_dir():
             if not (segment / "manifest.json").exists():
@@ -149,10 +152,11 @@ class Recording(VehicleColumns):
         return str(self.manifest.get("certificate", ""))
 
     def vehicle(self, vehicle_id: int) -> RecordedVehicle:
+        """The columns of one vehicle; always the same object."""
         self._check_vehicle(vehicle_id)
-        return RecordedVehicle(self, vehicle_id)
+        return self._vehicles.setdefault(vehicle_id, RecordedVehicle(self, vehicle_id))
 
-    @cached_property
+    @property
     def _first(self) -> RecordedVehicle:
         return self.vehicle(self.vehicle_ids[0])
 
@@ -212,39 +216,47 @@ class Recording(VehicleColumns):
             raise InputError(f"{path}: expected a scenario with a mission, got another document")
         return scenario
 
-    @cached_property
-    def _tables(self) -> dict[str, tuple[np.ndarray, bool]]:
-        return {name: self._join_segments(name) for name in COLUMNS}
-
-    def _join_segments(self, name: str) -> tuple[np.ndarray, bool]:
-        """The rows of a file from all segments, and whether a row was cut off. A segment ends at the
-        first step of the next segment."""
+    def _load_table(self, name: str) -> tuple[dict[str, np.ndarray], bool]:
+        """The columns of a file from all segments, and whether a row was cut off. A segment ends at the
+        first step of the next segment. Each file is read once."""
+        if name in self._tables:
+            return self._tables[name]
         parts, is_cut = [], False
         for number, (folder, _) in enumerate(self.segments):
             columns = COLUMNS["state.csv" if name == "measured.csv" else name]
-            rows, is_part_cut = read_table(folder / name, columns)
+            table, is_part_cut = read_table(folder / name, columns)
             is_cut |= is_part_cut
             if number + 1 < len(self.segments):
-                rows = rows[rows["step"] < self.segments[number + 1][1]["segment"]["first_step"]]
-            parts.append(rows)
-        return np.concatenate(parts), is_cut
+                is_used = table["step"] < self.segments[number + 1][1]["segment"]["first_step"]
+                table = {column: values[is_used] for column, values in table.items()}
+            parts.append(table)
+        joined = parts[0] if len(parts) == 1 else {
+            column: np.concatenate([part[column] for part in parts]) for column in parts[0]}
+        self._tables[name] = joined, is_cut
+        return joined, is_cut
 
-    def rows_of(self, name: str, vehicle_id: int) -> np.ndarray:
-        """The rows of one vehicle in a file, from all segments, as a structured array."""
-        table, _ = self._tables[name] if name in COLUMNS else self._join_segments(name)
-        rows = table[table["vehicle_id"] == vehicle_id]
-        falling = np.flatnonzero(np.diff(rows["step"]) <= 0)
+    def rows_of(self, name: str, vehicle_id: int) -> Columns:
+        """The rows of one vehicle in a file, from all segments."""
+        table, _ = self._load_table(name)
+        is_its = table["vehicle_id"] == vehicle_id
+        if np.all(is_its):
+            rows = Columns(table)
+        else:
+            rows = Columns({column: partial(operator.getitem, values, is_its)
+                            for column, values in table.items()})
+        steps = rows["step"]
+        falling = np.flatnonzero(np.diff(steps) <= 0)
         if len(falling):
-            at, after = rows["step"][falling[0]:falling[0] + 2]
+            at, after = steps[falling[0]:falling[0] + 2]
             raise InputError(f"{self.folder / name}: vehicle {vehicle_id}: expected a step after "
-                             f"{at:.0f}, got {after:.0f}")
+                             f"{at}, got {after}")
         return rows
 
     def load_flight(self, vehicle_id: int, name: str) -> Trajectory:
         """The flight of one vehicle: the steps with a row in state.csv."""
         self._check_vehicle(vehicle_id)
         state = self.rows_of("state.csv", vehicle_id)
-        if not len(state):
+        if not len(state["step"]):
             raise InputError(f"{self.folder / 'state.csv'}: expected rows of vehicle {vehicle_id}, "
                              f"got none")
         command = self.rows_of("command.csv", vehicle_id)
@@ -253,8 +265,8 @@ class Recording(VehicleColumns):
         return Trajectory(
             name=name,
             time_s=state["sim_time_s"],
-            p_WQ=stack(state, ("quad_x_m", "quad_y_m", "quad_z_m")),
-            p_WL=stack(state, ("load_x_m", "load_y_m", "load_z_m")),
+            p_WQ=state.stack(("quad_x_m", "quad_y_m", "quad_z_m")),
+            p_WL=state.stack(("load_x_m", "load_y_m", "load_z_m")),
             p_WL_ref=align(state["step"], reference, ("ref_x_m", "ref_y_m", "ref_z_m")),
             alpha=state["alpha_rad"],
             beta=state["beta_rad"],
@@ -262,7 +274,7 @@ class Recording(VehicleColumns):
             stages=self._find_stages(stage, reference, state["sim_time_s"], vehicle_id),
             period_s=self.manifest["period_s"],
             notes=self.list_notes(),
-            body=read_body(Columns.of_rows(state)))
+            body=read_body(state))
 
     def _check_vehicle(self, vehicle_id: int) -> None:
         if vehicle_id not in self.vehicle_ids:
@@ -285,10 +297,10 @@ class Recording(VehicleColumns):
         """The flight of every vehicle, named by its id."""
         return [self.load_flight(vehicle_id, str(vehicle_id)) for vehicle_id in self.vehicle_ids]
 
-    def _find_stages(self, stage: np.ndarray, reference: np.ndarray, time_s: np.ndarray,
+    def _find_stages(self, stage: np.ndarray, reference: Columns, time_s: np.ndarray,
                      vehicle_id: int) -> tuple[Stage, ...]:
-        names = {int(index): str(name)
-                 for index, name in zip(reference["stage"], reference["stage_name"])}
+        indices, first = np.unique(reference["stage"], return_index=True)
+        names = {int(index): str(reference["stage_name"][row]) for index, row in zip(indices, first)}
         # Starts of the stages that began before their first recorded step. Manifests of earlier versions have none.
         starts = {start["stage"]: start["step"] * self.manifest["period_s"]
                   for start in self.manifest.get("stage_starts", ())
@@ -324,7 +336,7 @@ class Recording(VehicleColumns):
             notes.append(f"{count} samples missing, first {first['topic']} {unit} {first['from']} "
                          f"of vehicle {first['vehicle_id']}")
         notes += [f"{name}: the last row is cut off and left out"
-                  for name, (_, is_cut) in self._tables.items() if is_cut]
+                  for name in COLUMNS if self._load_table(name)[1]]
         runs = sorted(folder.name for folder in self.folder.glob("run-*") if folder.is_dir())
         if runs:
             notes.append(f"further runs are recordings of their own: {', '.join(runs)}")
@@ -351,13 +363,14 @@ class Recording(VehicleColumns):
         return {}
 
 
-def align(steps: np.ndarray, table: np.ndarray, names: tuple[str, ...]) -> np.ndarray:
+def align(steps: np.ndarray, table: Columns, names: tuple[str, ...]) -> np.ndarray:
     """The columns `names` of `table` at `steps`; NaN for a step without a row."""
     values = np.full((len(steps), len(names)), np.nan)
-    if len(table):
-        place = np.minimum(np.searchsorted(table["step"], steps), len(table) - 1)
-        found = table["step"][place] == steps
-        values[found] = stack(table, names)[place[found]]
+    known = table["step"]
+    if len(known):
+        place = np.minimum(np.searchsorted(known, steps), len(known) - 1)
+        found = known[place] == steps
+        values[found] = table.stack(names)[place[found]]
     return values
 
 

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from sls.figures import make_figures, save
 from sls.trajectory import Trajectory
-from sls.metrics import StageMetrics, calc_max, calc_rms, calc_stage_metrics
+from sls.metrics import StageMetrics, calc_errors, calc_stage_metrics
 from sls.recordings import Recording, describe_ids
 from sls.scene import MOST_BYTES, make_scene
 from sls.tables import format_error, list_error_cells, list_step_cells
@@ -272,8 +272,7 @@ def make_fleet_section(fleet: Sequence[Trajectory]) -> str:
         error = flight.calc_error()
         error = error[np.isfinite(error[:, 0])]
         if len(error):
-            cells = [flight.name, *map(format_error, calc_rms(error)),
-                     *map(format_error, calc_max(error))]
+            cells = [flight.name, *map(format_error, np.concatenate(calc_errors(error)))]
             rows += "<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
     return ("<section><details><summary>All vehicles, whole flight (m)</summary>"
             "<div class=\"scroll\"><table><thead><tr><th rowspan=\"2\">vehicle</th>"

@@ -210,7 +210,7 @@ TEST(FlightMeasuresTest, AStepByHandHasTheMeasuresOfItsFormulas) {
   // Load from 0 to 1 m over 0.5, 1.2, 0.99, 0.97, 1.01, 1 m: overshoot 20 %, settled at step 5.
   const config::Scenario base = load("setpoints");
   const MeasureList list(base, {"settling", "overshoot", "force_max", "tilt_max"});
-  FlightMeasures measures(list, 10'000'000);
+  FlightMeasures measures(list, 10'000'000, base.vehicle, false);
   std::uint64_t number = 0;
   for (const double x : {0.0, 0.5, 1.2, 0.99, 0.97, 1.01, 1.0}) {
     model::StepRecord step;
@@ -272,7 +272,8 @@ TEST(FlightMeasuresTest, AnUnknownMeasureIsRefusedWithTheListOfThose) {
   } catch (const config::ConfigError& error) {
     EXPECT_STREQ(error.what(),
                  "measure: expected load_error_rms, load_error_max, settling, overshoot, tilt_max, "
-                 "force_max, time_of_loss or outcome, got 'load_error_mean'");
+                 "force_max, time_of_loss, load_error_end, quad_error_rms, quad_error_max, "
+                 "quad_error_end, attitude_max, energy_max or outcome, got 'load_error_mean'");
   }
 }
 

@@ -234,7 +234,7 @@ class PackageTest(unittest.TestCase):
         fly("sls", "run", "my_controller/my_controller.yaml", "--in-process", "--out", "own")
 
     def test_5_the_job_of_the_ci_example_runs_from_nothing(self):
-        """All its shell lines, in a copy of the system that disappears: apt needs the mirror."""
+        # In a copy of the system that disappears, with the network of this machine, because apt needs the mirror.
         try:
             run_apt("apt-get", "update", "--error-on=any")
         except AssertionError as error:

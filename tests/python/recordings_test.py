@@ -196,8 +196,8 @@ class RecordingsTest(support.FolderTest):
             return "\n".join(lines)
 
         cases = (
-            ("state.csv", truncate_row, "state.csv:6: expected 22 columns, got"),
-            ("command.csv", truncate_row, "command.csv:6: expected 8 columns, got 7"),
+            ("state.csv", truncate_row, "state.csv:6: expected 22 fields, got"),
+            ("command.csv", truncate_row, "command.csv:6: expected 8 fields, got 7"),
             ("state.csv", lambda text: text.replace("\n0,3,0.03,", "\n0,3,x,"),
              "state.csv:5: sim_time_s: expected a number, got 'x'"),
             ("state.csv", lambda text: text.replace("load_x_m", "load"),

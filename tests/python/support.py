@@ -13,7 +13,7 @@ import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BUILD = pathlib.Path(sys.argv.pop(1)) if len(sys.argv) > 1 else ROOT / "build"
-sys.path[:0] = [str(ROOT / "python"), str(ROOT / "tests/support")]
+sys.path[:0] = [str(ROOT / "python"), str(BUILD / "python"), str(ROOT / "tests/support")]
 CACHE = tempfile.TemporaryDirectory()
 os.environ.setdefault("MPLCONFIGDIR", CACHE.name)  # matplotlib must not write into the home folder
 
@@ -21,9 +21,9 @@ try:
     import matplotlib  # noqa: F401
     import numpy as np
     import yaml  # noqa: F401
+    import _sls_core  # noqa: F401
 except ImportError as error:
-    print(f"skipped: {error.name} is missing (apt-get install python3-numpy python3-matplotlib "
-          "python3-yaml)")
+    print(f"skipped: {error} (apt-get install python3-numpy python3-matplotlib python3-yaml; ./sls build)")
     sys.exit(77)
 
 from own_domain import OwnDomain  # noqa: E402, F401

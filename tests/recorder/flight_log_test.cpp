@@ -93,29 +93,6 @@ class FlightLogTest : public testing::Test {
   FlightLog log_{config::parse_scenario(kScenarioText, "scenario"), make_parameters()};
 };
 
-TEST(ErrorStatisticsTest, AgreesWithADirectSum) {
-  std::mt19937_64 random(3);
-  std::normal_distribution<double> normal;
-  ErrorStatistics statistics;
-  EXPECT_EQ(statistics.calc_rms(), Eigen::Vector3d::Zero().eval());
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero(), max = Eigen::Vector3d::Zero(), last;
-  constexpr int kCount = 1000;
-  for (int i = 0; i < kCount; ++i) {
-    last = {normal(random), -10 + normal(random), 1e-6 * normal(random)};
-    statistics.add(last);
-    for (int axis = 0; axis < 3; ++axis) {
-      sum[axis] += last[axis] * last[axis];
-      max[axis] = std::max(max[axis], std::abs(last[axis]));
-    }
-  }
-  EXPECT_EQ(statistics.samples, static_cast<std::uint64_t>(kCount));
-  EXPECT_EQ(statistics.max_abs, max);
-  EXPECT_EQ(statistics.last, last);
-  for (int axis = 0; axis < 3; ++axis)  // the same thousand additions in another order
-    EXPECT_NEAR(statistics.calc_rms()[axis], std::sqrt(sum[axis] / kCount),
-                1e-13 * statistics.calc_rms()[axis]);
-}
-
 TEST_F(FlightLogTest, EachStageHasItsErrorsAndTimes) {
   for (std::uint64_t step = 0; step <= kLastStep; ++step) log_.add(make_rows(step));
   const std::string text = write(log_);

@@ -2,13 +2,14 @@
 # Generated from the help of ./sls and of the programs by ./sls reference; changes here are lost.
 # tests/docs/completion_test.py completes with it. shellcheck shell=bash
 
-_sls_commands="bench build campaign campaign-worker chaos clean convert ctl delay-margin demo discovery-server docker-demo docs doctor fuzz help keys list network-table package plot python reference report run setup study systems test verify view worlds"
+_sls_commands="bench build campaign campaign-worker chaos check clean convert ctl delay-margin demo discovery-server docker-demo docs doctor fuzz help keys list network-table package plot python reference report run setup study systems test verify view worlds"
 declare -gA _sls_options=(
   ["bench"]="--help --quick --json --only --out"
   ["build"]="--help"
   ["campaign"]="--help --out --on --workers --runs --resume --verify --domain --chunk-runs --sbatch --scheduler --allow-other-machines --allow-broken-measures"
   ["campaign-worker"]="--help --chunks"
   ["chaos"]="--help --trials --seed --faults --verbose"
+  ["check"]="--help --junit --json --report --repeat --placement --under --jobs --update --recording"
   ["clean"]="--help"
   ["convert"]="--help --out --force --version"
   ["ctl"]="--help --qos --domain --log-level --version --vehicle --timeout-s --watch --json"
@@ -44,10 +45,11 @@ declare -gA _sls_subcommands=(
 declare -gA _sls_positionals=(
   ["campaign"]="campaign"
   ["campaign-worker"]="dir"
+  ["check"]="check"
   ["convert"]="dir"
   ["delay-margin"]="scenario"
   ["demo"]="scenario"
-  ["help"]="bench build campaign campaign-worker chaos clean convert ctl delay-margin demo discovery-server docker-demo docs doctor fuzz help keys list network-table package plot python reference report run setup study systems test verify view worlds"
+  ["help"]="bench build campaign campaign-worker chaos check clean convert ctl delay-margin demo discovery-server docker-demo docs doctor fuzz help keys list network-table package plot python reference report run setup study systems test verify view worlds"
   ["keys"]="dir"
   ["plot"]="dir"
   ["report"]="dir"
@@ -72,6 +74,14 @@ declare -gA _sls_arguments=(
   ["chaos --faults"]="file"
   ["chaos --seed"]="any"
   ["chaos --trials"]="any"
+  ["check --jobs"]="any"
+  ["check --json"]="file"
+  ["check --junit"]="file"
+  ["check --placement"]="in-process shm udp hosts worlds"
+  ["check --recording"]="dir"
+  ["check --repeat"]="any"
+  ["check --report"]="dir"
+  ["check --under"]="any"
   ["convert --out"]="file"
   ["ctl --domain"]="any"
   ["ctl --log-level"]="debug info warning error"
@@ -152,7 +162,7 @@ declare -gA _sls_arguments=(
   ["worlds --table"]="file"
 )
 
-# _sls_names KIND: names of the scenarios or campaigns that the launcher finds.
+# _sls_names KIND: names of the scenarios, campaigns or checks that the launcher finds.
 _sls_names() {
   local launcher folder file
   launcher="$(type -P -- "${COMP_WORDS[0]/#\~/$HOME}")" || launcher=$PWD/sls
@@ -166,13 +176,13 @@ _sls_names() {
   done
 }
 
-# _sls_values KIND WORD: what WORD can become. KIND is file, dir, scenario, campaign or the values themselves.
+# _sls_values KIND WORD: what WORD can become. KIND is file, dir, scenario, campaign, check or the values themselves.
 _sls_values() {
   case $1 in
     file) compgen -f -- "$2" ;;
     dir) compgen -d -- "$2" ;;
     scenario) compgen -W "$(_sls_names scenarios)" -- "$2"; compgen -f -X '!*.yaml' -- "$2"; compgen -d -- "$2" ;;
-    campaign) compgen -W "$(_sls_names campaigns)" -- "$2"; compgen -f -X '!*.yaml' -- "$2"; compgen -d -- "$2" ;;
+    campaign | check) compgen -W "$(_sls_names "$1"s)" -- "$2"; compgen -f -X '!*.yaml' -- "$2"; compgen -d -- "$2" ;;
     any) ;;
     *) compgen -W "$1" -- "$2" ;;
   esac
@@ -197,7 +207,7 @@ _sls() {
   mapfile -t values < <(_sls_values "$kind" "$current" | sort -u)
   COMPREPLY+=("${values[@]}")
   case $kind in
-    file | dir | scenario | campaign) compopt -o filenames 2>/dev/null ;;
+    file | dir | scenario | campaign | check) compopt -o filenames 2>/dev/null ;;
   esac
   return 0
 }

@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import Any
 
 MOST_RUNS = 10_000_000
-MEASURES = ("load_error_rms", "load_error_max", "settling", "overshoot", "tilt_max", "force_max",
-            "outcome", "time_of_loss")
+DEFAULT_MEASURES = ("load_error_rms", "load_error_max", "settling", "overshoot", "tilt_max", "force_max", "time_of_loss")
+MEASURES = (*DEFAULT_MEASURES, "load_error_end", "quad_error_rms", "quad_error_max", "quad_error_end", "attitude_max",
+            "energy_max", "outcome")
 DISTRIBUTIONS = ("uniform", "normal", "log_uniform")
 # Suffixes that follow the measure's name in a column for the whole flight.
-UNITS = ("", "_m", "_s", "_n", "_rad")
+UNITS = ("", "_m", "_s", "_n", "_rad", "_j")
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from sls.campaign.campaign import (DISTRIBUTIONS, MEASURES, MOST_RUNS, Campaign, Certify, Keep,
+from sls.campaign.campaign import (DEFAULT_MEASURES, DISTRIBUTIONS, MEASURES, MOST_RUNS, Campaign, Certify, Keep,
                                    OwnMeasure, Varied)
 from sls.campaign.expressions import Expression, ExpressionError
 from sls.campaign.portable_math import exp, log
@@ -240,7 +240,7 @@ class _Reader:
 
     def _read_measures(self) -> tuple[tuple[str, ...], tuple[OwnMeasure, ...]]:
         if "measure" not in self.values:
-            return tuple(name for name in MEASURES if name != "outcome"), ()
+            return DEFAULT_MEASURES, ()
         place = self.values["measure"]
         if not place.is_list or not place.list_items():
             place.fail_expected("a list of measures")

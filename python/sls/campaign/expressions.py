@@ -146,8 +146,8 @@ class Expression:
         Raises ExpressionError, which names the first row (from 0) without a value."""
         import numpy as np
         scope = {**SCOPE, "check_finite": lambda value: value, "abs": np.abs, "sqrt": np.sqrt, "max": _reduce(np.maximum),
-                 "min": _reduce(np.minimum), "power": np.frompyfunc(portable_math.power, 2, 1),
-                 **{name: np.frompyfunc(FUNCTIONS[name], 1, 1) for name in ("cos", "exp", "log", "sin", "tan")}}
+                 "min": _reduce(np.minimum), "power": _by_row(portable_math.power, 2),
+                 **{name: _by_row(FUNCTIONS[name], 1) for name in ("cos", "exp", "log", "sin", "tan")}}
         columns = [np.asarray(column, np.float64) for column in rows]
         try:
             with np.errstate(all="raise", under="ignore"):
@@ -167,6 +167,12 @@ class Expression:
 
 def _reduce(function: "Callable[..., np.ndarray]") -> "Callable[..., np.ndarray]":
     return lambda first, *others: reduce(function, others, first)
+
+
+def _by_row(function: Callable[..., float], inputs: int) -> "Callable[..., np.ndarray]":
+    import numpy as np
+    of_rows = np.frompyfunc(function, inputs, 1)
+    return lambda *columns: np.asarray(of_rows(*columns), np.float64)
 
 
 class _CallOperators(ast.NodeTransformer):

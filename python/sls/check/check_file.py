@@ -10,6 +10,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import yaml
+
 from sls.campaign.expressions import Expression, ExpressionError
 from sls.campaign.yaml_nodes import Place, parse_yaml, read_bytes
 from sls.check.faults import PLACEMENTS, Fault, list_faults
@@ -101,7 +103,8 @@ class Check:
     @cached_property
     def is_lockstep(self) -> bool:
         """Whether equal flights have equal bytes over DDS."""
-        return not re.search(r"mode\s*:\s*[\"']?realtime", self.scenario.text)
+        sync = yaml.safe_load(self.scenario.text).get("sync") or {}
+        return sync.get("mode") != "realtime"
 
 
 def find_checks(name: str) -> list[Path]:

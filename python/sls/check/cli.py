@@ -22,9 +22,9 @@ from sls.errors import ConfigError, RunError
 from sls.input_error import InputError
 
 MOST_LOG_LINES = 30
-MEANING = """Flies the scenario of each check file and judges its recording.
-FILE is a check file or a name in config/checks; of a folder all files are checked."""
-EXIT_CODES = "exit codes: 0 every expectation held; 1 not held; 2 a check cannot be used; 130/143 interrupted"
+MEANING = "Flies the scenario of each check file and judges its recording."
+EXIT_CODES = """exit codes: 0 every expectation held; 1 one did not hold; 2 a check cannot be
+used; 130/143 interrupted"""
 
 
 class Ended(KeyboardInterrupt):
@@ -92,17 +92,17 @@ def fly_and_judge(job: Job) -> Result:
         result.wall_s, result.problem = flown.wall_s, flown.problem
         result.logs = {name: read_end(file) for name, file in flown.logs.items()}
         if flown.is_whole:
-            judge_folder(job.check, flown.recording, result)
+            try:
+                recording = open_recording(job.check, flown.recording)
+            except InputError as error:  # it has gaps
+                result.problem = result.problem or str(error)
+            else:
+                result.judged, result.certificate = judge(job.check, recording), recording.certificate
     except (ConfigError, ImportError) as error:
         result.problem, result.is_unusable = str(error), True
     except (RunError, OSError) as error:
         result.problem = str(error)
     return result
-
-
-def judge_folder(check: Check, folder: Path, result: Result) -> None:
-    recording = open_recording(check, folder)
-    result.judged, result.certificate = judge(check, recording), recording.certificate
 
 
 def read_end(file: Path) -> str:
@@ -187,7 +187,7 @@ def check_all(options: argparse.Namespace, folder: Path, results: list[Result]) 
         result = Result(checks[0].name, str(files[0]), "recording", folder=str(options.recording))
         results.append(result)
         try:
-            judge_folder(checks[0], options.recording, result)
+            result.judged = judge(checks[0], open_recording(checks[0], options.recording))
         except (InputError, OSError) as error:
             result.problem, result.is_unusable = str(error), True
         return

@@ -228,6 +228,7 @@ class Programs:
             self._waiting = []
         silent_s = self._own.silent_s if self._own else 60.0
         if now - self._grown > silent_s and self._programs.is_running("sim_server") and not self._later:
+            self._programs.send("controller", signal.SIGKILL)  # a law that hangs ignores other signals
             self._fail(f"controller: expected an answer within {silent_s:g} s, got none after step {self._find_step()}")
 
     def _begin_fault(self, fault: Fault, now: float) -> None:

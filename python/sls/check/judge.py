@@ -11,13 +11,15 @@ import numpy as np
 
 from sls.campaign.expressions import ExpressionError
 from sls.check.check_file import UNKNOWN, Check, Expectation
+from sls.columns import Columns
 from sls.csv_tables import read_records
 from sls.input_error import InputError
 from sls.measures import measure
-from sls.recordings import Recording, align
+from sls.recordings import RecordedVehicle, Recording, align
 
 REFUSED = ("rejected_not_finite", "rejected_force_limit", "rejected_run", "rejected_step", "rejected_vehicle",
            "rejected_client", "rejected_fault")
+FILES = ("state", "reference", "command", "measured")
 
 
 @dataclass(frozen=True)
@@ -136,14 +138,14 @@ def find_measure(recording: Recording, expected: Expectation, vehicle: int) -> F
 def find_value(recording: Recording, expected: Expectation, vehicle: int) -> Found:
     """An expression at every step where all its columns have a value, then the worst or a mean of them."""
     assert expected.expression is not None
-    state = recording.rows_of("state.csv", vehicle)
-    columns = [find_column(recording, name, vehicle, state["step"]) for name in expected.expression.names]
-    is_chosen = np.ones(len(state), bool)
+    of = recording.vehicle(vehicle)
+    state = of.state
+    columns = [find_column(of, name) for name in expected.expression.names]
+    is_chosen = np.ones(len(state["step"]), bool)
     for column in columns:
         is_chosen &= np.isfinite(column)
     if expected.stage is not None:
-        stage = align(state["step"], recording.rows_of("reference.csv", vehicle), ("stage",))[:, 0]
-        is_chosen &= stage == expected.stage
+        is_chosen &= align(state["step"], of.reference, ("stage",))[:, 0] == expected.stage
     if expected.window_s:
         is_chosen &= (state["sim_time_s"] >= expected.window_s[0]) & (state["sim_time_s"] <= expected.window_s[1])
     rows = np.flatnonzero(is_chosen)
@@ -161,22 +163,20 @@ def find_value(recording: Recording, expected: Expectation, vehicle: int) -> Fou
     return float(over()), "", *where
 
 
-def find_column(recording: Recording, name: str, vehicle: int, steps: np.ndarray) -> np.ndarray:
-    """A column at `steps`: of the first of state, reference and command that has it, or of the file before its dot."""
+def find_column(of: RecordedVehicle, name: str) -> np.ndarray:
+    """A column at the steps of state.csv: of the first of state, reference and command that has it, or of the file
+    before its dot."""
     stem, dot, column = name.rpartition(".")
-    files = [stem] if dot else ["state", "reference", "command"]
+    if dot and stem not in FILES:
+        raise InputError(f"expected {', '.join(FILES)} before the dot, got '{name}'")
     known: list[str] = []
-    for file in files:
-        if file not in ("state", "reference", "command", "measured") or (
-                file == "measured" and not (recording.folder / "measured.csv").exists()):
-            break
-        rows = recording.rows_of(f"{file}.csv", vehicle)
-        numbers = [one for one in rows.dtype.names or () if rows.dtype[one].kind == "f"]
+    for file in [stem] if dot else FILES[:3]:
+        columns: Columns = getattr(of, file)
+        numbers = [one for one in columns if columns[one].dtype.kind in "fi"]
         known += numbers
         if column in numbers:
-            return align(steps, rows, (column,))[:, 0]
-    raise InputError(f"expected a column with numbers, got '{name}'; known are {', '.join(dict.fromkeys(known))}"
-                     if known else f"expected state, reference, command or measured before the dot, got '{name}'")
+            return align(of.state["step"], columns, (column,))[:, 0]
+    raise InputError(f"expected a column with numbers, got '{name}'; known are {', '.join(dict.fromkeys(known))}")
 
 
 def find_event(recording: Recording, expected: Expectation, vehicle: int) -> Found:
@@ -184,8 +184,8 @@ def find_event(recording: Recording, expected: Expectation, vehicle: int) -> Fou
     if expected.what == "late_step":
         return dataclasses.astuple(measure(recording, "late_steps", vehicle_id=vehicle))
     if expected.what == "fail_safe":
-        rows = recording.rows_of("command.csv", vehicle)
-        steps = rows["step"][rows["fault"] == "fail_safe"]
+        command = recording.vehicle(vehicle).command
+        steps = command["step"][command["fault"] == "fail_safe"]
         first = int(steps[0]) if len(steps) else None
         return float(len(steps)), "", first, None if first is None else first * recording.manifest["period_s"]
     names = REFUSED if expected.what == "refused_answer" else ("take_overs",)

@@ -55,7 +55,7 @@ def make_page(check: Check, result: Result, folder: Path) -> str:
 
 def make_verdict(result: Result) -> str:
     rows = "".join(
-        f"<tr><td><span class=\"badge {'good' if one.is_held else 'bad'}\">{HELD if one.is_held else NOT_HELD}</span>"
+        f"<tr><td style=\"white-space: nowrap\"><span class=\"badge {'good' if one.is_held else 'bad'}\">{HELD if one.is_held else NOT_HELD}</span>"
         "</td>"
         f"<td>{escape(one.text)}</td><td>{escape(one.got)} {escape(one.unit)}</td><td>{escape(one.bound)}</td>"
         f"<td>{one.where}</td><td>{escape(one.because)}</td></tr>"

@@ -145,17 +145,18 @@ def run_module(words: list[str], targets: list[str], *command: str, **variables:
 
 
 def plot(words: list[str]) -> NoReturn:
-    run_module(words, [], "sls", "plot")
+    run_module(words, ["_sls_core"], "sls", "plot")
 
 
 def report(words: list[str]) -> NoReturn:
     # The program draws the report's scene.
-    run_module(words, ["sls_view"], "sls", "report", SLS_VIEW=str(BUILD / "bin/sls_view"))
+    run_module(words, ["sls_view", "_sls_core"], "sls", "report", SLS_VIEW=str(BUILD / "bin/sls_view"))
 
 
 def study(words: list[str]) -> NoReturn:
     # The flights of the study fly side by side and must not build.
-    run_module(words, [] if "--reuse" in words else [*FLYING, "delay_margin"], "sls", "study", SLS_BUILD=str(BUILD))
+    targets = ["_sls_core"] if "--reuse" in words else [*FLYING, "delay_margin", "_sls_core"]
+    run_module(words, targets, "sls", "study", SLS_BUILD=str(BUILD))
 
 
 def campaign(words: list[str]) -> NoReturn:

@@ -6,14 +6,16 @@ import json
 import os
 import socket
 import subprocess
+import sys
 import time
 from argparse import ArgumentTypeError, Namespace
+from importlib.util import find_spec
 from pathlib import Path
 
 from sls.launcher.arguments import POSITIVE, Parser, checked, filled, one_of, whole
-from sls.launcher.building import FLYING, build_programs
+from sls.launcher.building import FLYING, PYTHON, build_programs
 from sls.launcher.building import run as run_program
-from sls.launcher.place import BUILD, PACKAGE, Failure, say
+from sls.launcher.place import BUILD, PACKAGE, PYTHON_PATH, ROOT, SELF, Failure, say
 from sls.launcher.supervision import WRITERS_PATIENCE_S, Supervisor
 
 DOMAIN = whole(0, 232)
@@ -141,7 +143,26 @@ Sets up, builds, flies a scenario (default: figure_eight) and prints a summary."
     code, recording = fly(options, scenario)
     if code == 0:
         print_summary(Path(recording))
+        if not pass_on(options, "period_s", "mode", "rtf"):
+            code = print_verdict(Path(scenario), recording)
     return code
+
+
+def print_verdict(scenario: Path, recording: str) -> int:
+    """Judges the flight by the check of a shipped scenario, with what is installed and built: the flight alone needs
+    neither the module of the package nor numpy."""
+    check = ROOT / f"config/checks/{scenario.name}"
+    if scenario.resolve() != ROOT / "config/scenarios" / scenario.name or not check.is_file():
+        return 0
+    has_module = any(any(Path(folder).glob("_sls_core.*")) for folder in PYTHON_PATH) or find_spec("_sls_core")
+    if not has_module or not find_spec("numpy") or not find_spec("yaml"):
+        say(f"the verdict on this flight: {SELF} check {check.stem} --recording {recording}")
+        return 0
+    print()
+    sys.stdout.flush()
+    path = {"PYTHONPATH": ":".join(PYTHON_PATH)} if PYTHON_PATH else {}
+    return subprocess.run([PYTHON, "-BP", "-m", "sls.check", check, "--recording", recording], check=False,
+                          env={**os.environ, **path}).returncode
 
 
 def print_comparison(lap: list[str]) -> None:

@@ -28,6 +28,7 @@ class Program:  # no dataclass: its module takes longer to load than all of ours
         self.process = process
         self.patience_s = patience_s  # from the stop signal to SIGKILL
         self.deadline = math.inf
+        self.is_asked = False  # to end, before the others
 
 
 class Supervisor:
@@ -87,11 +88,12 @@ class Supervisor:
         return self._interrupted or self._result
 
     def send(self, name: str, number: signal.Signals, patience_s: float = math.inf) -> None:
-        """Sends a signal to a program if it runs. If it still runs after `patience_s`, it is killed."""
+        """Sends a signal to a program if it runs. With `patience_s` it is killed if it still runs so much later."""
         for program in self._running:
             if program.name == name:
                 program.process.send_signal(number)
-                program.deadline = time.monotonic() + patience_s
+                if math.isfinite(patience_s):
+                    program.deadline, program.is_asked = time.monotonic() + patience_s, True
 
     def end_all(self) -> None:
         """Ends the run: it has failed."""
@@ -145,7 +147,7 @@ class Supervisor:
 
     def _end_late(self) -> None:
         late = [program for program in self._running if program.deadline <= time.monotonic()]
-        if late and not self._is_stopped:
+        if late and not self._is_stopped and not all(program.is_asked for program in late):
             self._say(f"{self._first} ended, but {', '.join(program.name for program in late)} did not within "
                       f"{self._overrun_s:g} s: ending the others")
             self._result = 1

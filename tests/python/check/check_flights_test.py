@@ -1,0 +1,182 @@
+"""Checks flown with real processes: placements, faults, the user's own controllers, and what a verdict says of those
+that crash, hang or never come."""
+
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[3]
+BUILD = Path(os.environ.get("SLS_BUILD", ROOT / "build"))
+LAW = """
+import ctypes, time
+def law(now):
+    error = [r - p for r, p in zip(now.reference.position, now.load_position)]
+    return 0.0, 0.0, -1.7 * 9.8 + 3 * error[2] - 3 * now.quad_velocity[2]
+def crash(now):
+    if now.step == 300:
+        ctypes.string_at(0)
+    return law(now)
+def hang(now):
+    if now.step == 300:
+        time.sleep(1000)
+    return law(now)
+def nonsense(now):
+    return (0.0, 0.0, -1e9) if now.step == 300 else law(now)
+def broken(now):
+    return {}["gain"]
+"""
+SCENARIO = """
+name: mine
+vehicle: { quad_mass_kg: 1.5, load_mass_kg: 0.2, rod_length_m: 1.0, gravity_m_s2: 9.8 }
+plant: { initial: { load_position_m: [0, 0, -1] } }
+sync: { wait_for: { controllers: 1, recorders: 1, timeout_s: 4 } }
+mission:
+  - set_point: { position_m: [0, 0, -2] }
+    for_s: 20
+"""
+IS_ROOT = os.geteuid() == 0 and all(shutil.which(tool, path="/usr/sbin:/usr/bin:/bin") for tool in ("ip", "nft", "tc"))
+needs_hosts = pytest.mark.skipif(not IS_ROOT, reason="network namespaces need root, ip and nft")
+
+
+@pytest.fixture
+def check(tmp_path):
+    """A function that writes a check of `mine` and flies it. It returns exit code, flights of the JSON, and output."""
+    (tmp_path / "law.py").write_text(LAW)
+    (tmp_path / "mine.yaml").write_text(SCENARIO)
+
+    def run(controller, *words, expect="{ measure: load_error_end_m, max: 0.05 }", scenario="mine.yaml"):
+        participants = f"participants: {{ controller: {{ {controller} }} }}\n" if controller else ""
+        file = tmp_path / "check.yaml"
+        file.write_text(f"scenario: {scenario}\n{participants}expect:\n  - {expect}\n")
+        done = start(tmp_path, str(file), "--json", str(tmp_path / "json"), *words)
+        said, _ = done.communicate(timeout=150)
+        return done.returncode, json.loads((tmp_path / "json").read_text())["flights"], said
+    return run
+
+
+def start(folder, *words):
+    return subprocess.Popen([sys.executable, "-BP", "-m", "sls.check", *words], cwd=folder, text=True,
+                            stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                            env={**os.environ, "SLS_BUILD": str(BUILD),
+                                 "PYTHONPATH": f"{ROOT}/python:{BUILD}/python"})
+
+
+# --- placements -----------------------------------------------------------------------------------
+
+
+def test_every_placement_gives_the_same_verdict_and_bytes(check):
+    code, flights, said = check("", "--placement", "in-process,shm,udp,worlds", "--repeat", "2", "--jobs", "2")
+    assert code == 0 and {one["verdict"] for one in flights} == {"held"}, said
+    assert len({one["certificate"] for one in flights}) == 1 and len(flights) == 8
+    assert [(one["placement"], one["repeat"]) for one in flights[:3]] == [("in-process", 1), ("in-process", 2), ("shm", 1)]
+    assert "8 flights: 8 held; the flights of each check have equal bytes" in said
+
+
+@needs_hosts
+def test_hosts_that_lose_packets_and_are_cut_give_the_same_bytes(check):
+    code, flights, said = check("python: law.py:law", "--placement", "hosts", "--under", "loss=0.1,partition_s=0.5",
+                                expect="{ measure: load_error_end_m, max: 0.05 }")
+    assert code == 0, said
+    assert flights[0]["certificate"] == check("python: law.py:law")[1][0]["certificate"]
+    assert not [path for path in Path("/run/netns").glob(f"sls-check-{os.getpid()}-*")]
+
+
+def test_without_root_hosts_are_refused_by_name(tmp_path, monkeypatch):
+    from sls.check.hosts import Hosts
+    from sls.errors import ConfigError
+    monkeypatch.setattr(os, "geteuid", lambda: 1000)
+    with pytest.raises(ConfigError, match="placement hosts: expected root and the programs ip, nft and tc, got another"):
+        Hosts(())
+
+
+def test_a_killed_controller_is_replaced_by_its_standby(check):
+    code, flights, said = check("", "--placement", "shm", "--under", "kill=controller,busy", scenario="figure_eight",
+                                expect="{ event: take_over, min: 1, max: 1 }")
+    assert code == 0, said
+    assert flights[0]["certificate"] == check("", scenario="figure_eight")[1][0]["certificate"]
+
+
+def test_worlds_fly_the_faults_of_the_vocabulary(check):
+    code, flights, said = check("", "--placement", "worlds", "--under", "loss=0.2,partition_s=1,kill=controller")
+    assert code == 0 and flights[0]["under"] == "loss=0.2,partition_s=1,kill=controller", said
+
+
+# --- the user's own controller --------------------------------------------------------------------
+
+
+def test_a_client_in_c_is_checked(check, tmp_path):
+    if not shutil.which("idlc"):
+        pytest.skip("needs cyclonedds-dev and cyclonedds-tools")
+    for words in (["-S", ROOT / "examples/my_client", "-B", tmp_path / "build", "-DCMAKE_BUILD_TYPE=Release"],
+                  ["--build", tmp_path / "build"]):
+        subprocess.run(["cmake", *words], check=True, capture_output=True)
+    scenario = ROOT / "examples/my_client/my_client.yaml"
+    placements = "shm,udp,hosts" if IS_ROOT else "shm,udp"
+    code, flights, said = check("command: [build/my_client, '{domain}'], stop: SIGINT", "--placement", placements,
+                                scenario=str(scenario), expect="{ measure: load_error_end_m, max: 0.05 }")
+    assert code == 0 and len({one["certificate"] for one in flights}) == 1, said
+
+
+def test_a_law_in_python_flies_in_process_and_as_a_client(check):
+    code, flights, said = check("python: law.py:law", "--placement", "in-process,shm")
+    assert code == 0 and len({one["certificate"] for one in flights}) == 1, said
+
+
+SHELL = "command: [sh, -c, '{}']"
+
+
+@pytest.mark.parametrize("controller, expected", [
+    ("command: [./none]", "controller: expected a program that starts, got: ./none: no such program"),
+    ("command: [no-such-program]", "controller: expected a program that starts, got: no-such-program: no such program"),
+    (SHELL.format("echo no licence; exit 3"), "controller: ended with 3 at step 0, before the flight was over: no licence"),
+    (SHELL.format("exit 0"), "controller: ended with 0 at step 0, before the flight was over, without a word"),
+    (SHELL.format("sleep 1000"), "outcome finished: expected it, got failed: not ready within 4 s: controller"),
+    (SHELL.format("echo hello; sleep 1000") + ", ready: joined, ready_s: 0.5",
+     "controller: expected 'joined' in its output within 0.5 s, got hello"),
+    ("python: law.py:crash", "controller: ended by SIGSEGV at step 300, before the flight was over"),
+    ("python: law.py:hang, silent_s: 1", "controller: expected an answer within 1 s, got none after step 299"),
+    ("python: law.py:nonsense", "failed: controller 'controller' answered step 300 with a force beyond controller.force_limit_n"),
+    ("python: law.py:broken", "controller: ended with 1 at step 0, before the flight was over: controller: "),
+])
+def test_the_verdict_names_what_a_controller_did(check, tmp_path, controller, expected):
+    code, flights, said = check(controller, "--placement", "shm", "--report", "pages")
+    assert code == 1 and flights[0]["verdict"] == "not held", said
+    assert any(expected in problem for problem in flights[0]["problems"]), flights[0]["problems"]
+    page = (tmp_path / "pages/check-shm/report.html").read_text()
+    assert expected.partition(",")[0].replace("'", "&#x27;") in page and "Output of the programs" in page
+    assert (tmp_path / "pages/index.html").is_file()
+
+
+def test_a_process_that_does_not_stop_is_killed_and_named(check):
+    stubborn = f"trap : TERM; {BUILD}/bin/control_client --scenario mine.yaml --domain {{domain}}; sleep 1000 & wait; wait"
+    code, flights, said = check(f"command: [bash, -c, '{stubborn}']", "--placement", "shm")
+    assert code == 1 and "expected an end within 10 s after SIGTERM, got none: killed" in said
+
+
+def test_an_interrupted_check_ends_its_programs_and_says_so(tmp_path):
+    (tmp_path / "mine.yaml").write_text(SCENARIO)
+    (tmp_path / "check.yaml").write_text("scenario: mine.yaml\nexpect: [{ outcome: finished }]\nplacements: [shm]\n"
+                                         "participants: { controller: { command: [sh, -c, 'echo $$ > pid; sleep 1000'] } }\n")
+    running = start(tmp_path, "check.yaml", "--junit", "junit.xml")
+    while running.poll() is None and not (tmp_path / "pid").exists():
+        pass
+    running.send_signal(signal.SIGINT)
+    assert running.wait(60) == 130
+    assert "interrupted" in (tmp_path / "junit.xml").read_text()
+    assert not Path("/proc", (tmp_path / "pid").read_text().strip() or "none").exists()
+
+
+def test_two_flights_that_differ_are_named_with_the_first_step(check, tmp_path):
+    (tmp_path / "law.py").write_text("import os, time\nSEED = os.stat('/proc/self').st_ino % 1000\n"
+                                     "def law(now):\n    return 0.0, 1e-9 * SEED * (now.step == 5), -1.7 * 9.8\n")
+    code, flights, said = check("python: law.py:law", "--repeat", "2", expect="{ outcome: finished }")
+    assert code == 1 and flights[0]["verdict"] == "held", said
+    assert re.search(r"differs from in-process 1 \(A\): command.csv, vehicle 0, step 5, force_y_n: \S+ in A, \S+ in B "
+                     r"\(topic sls/command\)", flights[1]["problems"][0])
