@@ -1,7 +1,6 @@
 # sls_add_flight_test(NAME name CHECK file.yaml [PLACEMENT placement…] [UNDER fault…] [LAW target] [TIMEOUT s]): adds a
-# ctest that flies the check with `sls check`. LAW: the shared library of this target is the controller. Beside the build
-# of the calling folder the test leaves NAME.xml (JUnit) and NAME/ (page, recording and logs of each flight that did not
-# hold).
+# ctest that flies the check with `sls check`. LAW: the shared library of this target is the controller. In the build
+# folder it leaves NAME.xml (JUnit) and NAME/ (page, recording and logs of each flight that did not hold).
 function(sls_add_flight_test)
   cmake_parse_arguments(PARSE_ARGV 0 TEST "" "NAME;CHECK;LAW;TIMEOUT" "PLACEMENT;UNDER")
   if(TEST_UNPARSED_ARGUMENTS OR NOT TEST_NAME OR NOT TEST_CHECK)
@@ -16,7 +15,8 @@ function(sls_add_flight_test)
   if(NOT EXISTS ${launcher})
     get_filename_component(launcher ${CMAKE_CURRENT_FUNCTION_LIST_DIR}/../../../bin/sls ABSOLUTE)
   endif()
-  set(words ${check} --junit ${CMAKE_CURRENT_BINARY_DIR}/${TEST_NAME}.xml --report ${CMAKE_CURRENT_BINARY_DIR}/${TEST_NAME})
+  set(left ${CMAKE_CURRENT_BINARY_DIR}/${TEST_NAME})
+  set(words ${check} --junit ${left}.xml --report ${left})
   foreach(key IN ITEMS PLACEMENT UNDER)
     if(TEST_${key})
       string(TOLOWER ${key} option)

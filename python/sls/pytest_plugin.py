@@ -33,7 +33,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    config.addinivalue_line("markers", "sls(check, placements, under, judge=True): the flights of the fixture sls_flight")
+    config.addinivalue_line("markers", "sls(check, placements, under, judge=True): what the fixture sls_flight flies")
 
 
 # --- the flight of a check ------------------------------------------------------------------------
@@ -48,7 +48,8 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     marker = metafunc.definition.get_closest_marker("sls")
     values = marker.kwargs if marker else {}
     if marker is None or marker.args or "check" not in values or not set(values) <= set(KEYS):
-        fail(f"{metafunc.definition.nodeid}: expected @pytest.mark.sls(check=FILE) with {', '.join(KEYS)}, got {marker or 'none'}")
+        fail(f"{metafunc.definition.nodeid}: expected @pytest.mark.sls(check=FILE), maybe with {', '.join(KEYS[1:])}, got "
+             f"{marker or 'none'}")
     path = metafunc.definition.path.parent / values["check"]
     cases, names = [], []
     try:
@@ -77,8 +78,8 @@ def sls_case(request: pytest.FixtureRequest) -> "tuple[Check, str]":
 
 @pytest.fixture
 def sls_network(request: pytest.FixtureRequest, sls_case: "tuple[Check, str]") -> "tuple[Fault, ...]":
-    """The faults of the flight: those of an indirect parameter, of the marker's `under`, or of the check. Each is a text
-    as for `./sls check --under`."""
+    """The faults of the flight: those of an indirect parameter, of the marker's `under`, or of the check. The texts are
+    those of `./sls check --under`."""
     from sls.check.faults import check_able, parse_fault
     from sls.input_error import InputError
     check, placement = sls_case
