@@ -40,7 +40,7 @@ def run(prefix):
 
     def run(folder, lines, code=0, **more):
         done = subprocess.run(["sh", "-e", "-c", lines], cwd=folder, env={**environment, **more}, text=True,
-                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=200)
+                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=400)
         assert (done.returncode != 0) == bool(code), done.stdout
         return done.stdout
     return run
