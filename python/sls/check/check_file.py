@@ -16,6 +16,7 @@ from sls.campaign.expressions import Expression, ExpressionError
 from sls.campaign.yaml_nodes import Place, parse_yaml, read_bytes
 from sls.check.faults import PLACEMENTS, Fault, list_faults
 from sls.errors import ConfigError
+from sls.launcher.place import list_names, suggest
 from sls.measures import MEASURES
 from sls.scenario import ROOT, find_scenario, load_scenario
 
@@ -116,7 +117,10 @@ def find_checks(name: str) -> list[Path]:
         raise ConfigError(f"{path}: expected a folder with check files (*.yaml), got none")
     if path.is_file() or "/" in name or name.endswith((".yaml", ".yml")):
         return [path]
-    return [ROOT / "config/checks" / f"{name}.yaml"]
+    shipped = ROOT / "config/checks" / f"{name}.yaml"
+    if not shipped.is_file():
+        raise ConfigError(f"{shipped}: expected a check, got no such file{suggest(name, list_names('checks'))}")
+    return [shipped]
 
 
 def load_check(file: Path, library: Path | None = None) -> Check:

@@ -231,9 +231,11 @@ def update(check: Check, results: Sequence[Result]) -> None:
 
 def print_results(results: Sequence[Result]) -> None:
     """The table: of repeats with equal results only the first."""
+    if not any(one.placement for one in results):
+        return
     shown = {(one.check, one.placement, *one.list_problems()): one for one in reversed(results) if one.placement}
     shown = list(reversed(shown.values()))
-    for line in make_rows(shown) if shown else []:
+    for line in make_rows(shown):
         print(line)
     for one in shown:
         for problem in one.list_problems():
@@ -243,7 +245,7 @@ def print_results(results: Sequence[Result]) -> None:
                       if verdicts.count(word))
     flown = [one for one in results if one.certificate]
     same = len({(one.check, one.certificate) for one in flown}) == len({one.check for one in flown})
-    print(f"{len(results)} flights: {words}" + ("; the flights of each check have equal bytes"
+    print(f"{len(results)} flight{'s' if len(results) > 1 else ''}: {words}" + ("; the flights of each check have equal bytes"
                                                 if same and len(flown) > len({one.check for one in flown}) else ""))
 
 

@@ -1,5 +1,6 @@
 """Results of checks: the table for people, JUnit XML and JSON for machines."""
 
+import html
 import json
 import math
 import re
@@ -7,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
-from xml.sax.saxutils import escape, quoteattr
 
 from sls.check.judge import Judged
 
@@ -118,11 +118,11 @@ NO_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd]")
 
 def clean(lines: Sequence[str]) -> str:
     """Text of an XML element: without the letters that XML cannot have."""
-    return escape(NO_XML.sub("?", "\n".join(lines)))
+    return html.escape(NO_XML.sub("?", "\n".join(lines)), quote=False)
 
 
 def quote(text: str) -> str:
-    return quoteattr(NO_XML.sub("?", text))
+    return f"\"{html.escape(NO_XML.sub('?', text))}\""
 
 
 def write(file: Path, text: str) -> None:

@@ -129,6 +129,18 @@ def test_a_law_in_python_flies_in_process_and_as_a_client(check):
     assert code == 0 and len({one["certificate"] for one in flights}) == 1, said
 
 
+def test_the_example_of_the_document_holds_and_its_bug_is_found(tmp_path):
+    page = (ROOT / "docs/testing-your-controller.md").read_text()
+    for name in ("law.py", "climb.yaml", "check.yaml"):
+        block = re.search(rf"`mine/{name}`:\n\n((?:    .*\n|\n)+)", page)[1]
+        (tmp_path / name).write_text(re.sub("^    ", "", block, flags=re.MULTILINE))
+    assert start(tmp_path, "check.yaml").wait(60) == 0
+    law = (tmp_path / "law.py").read_text()
+    (tmp_path / "law.py").write_text(law.replace("3 * error[2]", "0.3 * error[2]"))
+    failed = start(tmp_path, "check.yaml")
+    assert "settling_s" in failed.communicate(timeout=60)[0] and failed.returncode == 1
+
+
 SHELL = "command: [sh, -c, '{}']"
 
 
