@@ -6,7 +6,6 @@
 
 static void* create(const sls_controller_setup* setup, uint32_t* memory_count, char* error,
                     size_t error_size) {
-  (void)memory_count, (void)error, (void)error_size;
   return memcpy(malloc(sizeof *setup), setup, sizeof *setup);
 }
 
@@ -28,7 +27,6 @@ static int answer(void* controller, const sls_controller_input* now, sls_control
     output->force_n[i] = -mass * support * slope - setup->quad_mass_kg * setup->rod_length_m * turn;
   }
   output->force_n[2] = -mass * support;
-  (void)error, (void)error_size;
   return SLS_CONTROLLER_OK;
 }
 

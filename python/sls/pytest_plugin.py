@@ -1,16 +1,14 @@
 """pytest's plug-in: checks as tests, and servers for tests. python/README.md, "pytest", shows the use.
 
-pip's package registers it; elsewhere `-p sls.pytest_plugin` loads it. Everything of the package is imported late, since
-pytest loads the plug-in also for tests that do not fly."""
+Everything of the package is imported late, since pytest loads the plug-in also for tests that do not fly."""
 
 import os
 import re
 import subprocess
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import pytest
 
@@ -55,8 +53,8 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     try:
         checks = [load_check(file) for file in find_checks(str(path if path.exists() else values["check"]))]
         for check in checks:
-            placements = parse_placements(",".join(values.get("placements", check.placements)))
-            for placement in placements:
+            given = values.get("placements", check.placements)
+            for placement in parse_placements(given if isinstance(given, str) else ",".join(given)):
                 if refusal := find_refusal(check, placement):
                     fail(f"{check.file}: placements: expected {refusal}, got {placement}")
                 cases.append((check, placement))
@@ -144,23 +142,35 @@ def describe_flight(item: pytest.Item) -> list[tuple[str, str]]:
 # --- a server alone -------------------------------------------------------------------------------
 
 
-@dataclass
 class Server:
-    """A server that flies, and its recorder. `qos` and `domain` are those for a client."""
+    """A server and its recorder, with the `scenario`, `qos` and `domain` for a client."""
 
-    domain: int
-    qos: Path
-    scenario: Path
-    recording: Path
-    log: Path
-    process: "subprocess.Popen[bytes]"
-    recorder: "subprocess.Popen[bytes]"
+    def __init__(self, folder: Path, scenario: Path, qos: Path, domain: int, options: Sequence[str]) -> None:
+        self.scenario, self.qos, self.domain, self.recording = scenario, qos, domain, folder / "recording"
+        self.recorder = self._start(folder, "recorder", f"--out={self.recording}")
+        self.process = self._start(folder, "sim_server", f"--scenario={scenario}", *options)
+
+    def _start(self, folder: Path, name: str, *words: str) -> "subprocess.Popen[bytes]":
+        from sls.launcher.place import BUILD
+        network = [f"--qos={self.qos}", f"--domain={self.domain}"]
+        with (folder / f"{name}.log").open("wb") as log:
+            return subprocess.Popen(["setpriv", "--pdeathsig", "TERM", "--", BUILD / f"bin/{name}", *network, *words],
+                                    stdout=log, stderr=log, stdin=subprocess.DEVNULL)
 
     def wait(self, timeout_s: float = 60.0) -> int:
         """The exit code of the server, once server and recorder have ended. Raises subprocess.TimeoutExpired."""
         code = self.process.wait(timeout_s)
         self.recorder.wait(timeout_s)
         return code
+
+    def end(self) -> None:
+        for process in (self.process, self.recorder):
+            process.terminate()
+            try:
+                process.wait(PATIENCE_S)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
 
 
 @pytest.fixture
@@ -169,35 +179,16 @@ def sls_server(tmp_path: Path) -> "Iterator[Callable[..., Server]]":
     or "udp", options=[…]). They end with the test."""
     from sls.check.flights import PROFILES
     from sls.dds_domain import own_domain
-    from sls.launcher.place import BUILD, ROOT
+    from sls.launcher.place import ROOT
     from sls.scenario import find_scenario
 
     with ExitStack() as stack:
         def start(scenario: str | Path, placement: str = "shm", options: Sequence[str] = ()) -> Server:
-            number = len(list(tmp_path.glob("server-*")))
-            folder = tmp_path / f"server-{number}"
+            domain = stack.enter_context(own_domain())
+            folder = tmp_path / f"server-{domain}"
             folder.mkdir()
-            domain, qos = stack.enter_context(own_domain()), ROOT / f"config/qos/{PROFILES[placement]}.xml"
-            file, recording = find_scenario(scenario), folder / "recording"
-
-            def run(name: str, *words: object) -> "subprocess.Popen[bytes]":
-                with (folder / f"{name}.log").open("wb") as log:
-                    process = subprocess.Popen(
-                        ["setpriv", "--pdeathsig", "TERM", "--", BUILD / f"bin/{name}", f"--qos={qos}",
-                         f"--domain={domain}", *map(str, words)], stdout=log, stderr=log, stdin=subprocess.DEVNULL)
-                stack.callback(end, process)
-                return process
-
-            recorder = run("recorder", f"--out={recording}")
-            process = run("sim_server", f"--scenario={file}", *options)
-            return Server(domain, qos, file, recording, folder / "sim_server.log", process, recorder)
+            qos = ROOT / f"config/qos/{PROFILES[placement]}.xml"
+            server = Server(folder, find_scenario(scenario), qos, domain, options)
+            stack.callback(server.end)
+            return server
         yield start
-
-
-def end(process: "subprocess.Popen[bytes]") -> None:
-    process.terminate()
-    try:
-        process.wait(PATIENCE_S)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
