@@ -167,7 +167,10 @@ class Comparison:
             return
         first = self._first.setdefault(result.file, result)
         if first.certificate != result.certificate:
-            text = find_difference(first.recording, result.recording)
+            try:
+                text = find_difference(first.recording, result.recording)
+            except (ConfigError, RunError) as error:
+                text = str(error)
             result.difference = f"differs from {first.flight} (A): {text or 'other certificates, no other row'}"
 
 
@@ -269,7 +272,7 @@ def main(arguments: Sequence[str]) -> int:
             options.report.mkdir(parents=True, exist_ok=True)
         check_all(options, folder, results)
         print_results(results)
-    except (ConfigError, OSError) as error:
+    except (ConfigError, OSError, RuntimeError) as error:  # a worker that was killed, for example
         say(f"error: {error}")
         results.append(Result("sls check", "", problem=str(error), is_unusable=True))
     except Ended:

@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -142,6 +142,7 @@ class Programs:
         self._size = 0
         self._is_ready = not (self._own and self._own.ready)
         self._is_asked_to_stop = False
+        self._groups: list[int] = []  # of processes under test, which may start further ones
 
     def run(self, programs: dict[str, list[Any]]) -> None:
         with Supervisor(say=self._flown.notes.append, overrun_s=OVERRUN_S) as self._programs:
@@ -152,6 +153,9 @@ class Programs:
                     self._fail(f"{name}: expected a program that starts, got: {words[0]}: {error.strerror}")
                     break
             code = self._programs.wait_all(self._watch)
+        for group in self._groups:
+            with suppress(ProcessLookupError):
+                os.killpg(group, signal.SIGKILL)
         if code in (130, 143):
             raise KeyboardInterrupt
         self._conclude()
@@ -160,7 +164,7 @@ class Programs:
         more: dict[str, Any] = {}
         is_own = name in ("controller", "standby") and self._own
         if is_own and self._own.kind == "command":
-            more = {"cwd": self._own.folder}
+            more = {"cwd": self._own.folder, "process_group": 0}
             program = str(words[0])  # setpriv would not say which program is missing
             if not (os.access(self._own.folder / program, os.X_OK) if "/" in program else shutil.which(program)):
                 raise FileNotFoundError(2, "no such program")
@@ -173,8 +177,9 @@ class Programs:
             words = [*self._hosts.on(HOST_OF[name]), *words]
         patience = [WRITERS_PATIENCE_S] if name in ("recorder", "closed_loop") else []
         with (self._flown.folder / f"{name}.log").open("wb") as log:
-            self._programs.start(name, words, *patience, stdout=log, stderr=subprocess.STDOUT,
-                                 stdin=subprocess.DEVNULL, env=env, **more)
+            process = self._programs.start(name, words, *patience, stdout=log, stderr=subprocess.STDOUT,
+                                           stdin=subprocess.DEVNULL, env=env, **more)
+        self._groups += [process] if more else []
 
     def _fail(self, problem: str) -> None:
         self._flown.problem = self._flown.problem or problem
@@ -280,12 +285,14 @@ class Programs:
                 if code and not (self._is_asked_to_stop and (code < 0 or code > 128)):
                     return f"{name}: {describe_code(code)} after the flight{self._quote(name)}"
             return ""
-        if outcome != "failed" or re.search("interrupted by|not ready within|no answer", reason):
-            name, code = next(((name, code) for name, code in codes.items() if code or name == "controller"),
-                              ("sim_server", 0))
-            if name != "sim_server" or outcome != "failed":
-                return f"{name}: {describe_code(code)} {step}, before the flight was over{self._quote(name)}"
-        return ""
+        own = ("controller", "standby")
+        if outcome == "failed":  # the reason says it all, unless a controller ended first
+            is_gone = re.search("interrupted by|not ready within|no answer", reason)
+            blamed = next((name for name in list(codes)[:1] if is_gone and name in own), "")
+        else:
+            blamed = next((name for name, code in codes.items() if code or name in own), "sim_server")
+        return blamed and (f"{blamed}: {describe_code(codes.get(blamed, 0))} {step}, before the flight was over"
+                           f"{self._quote(blamed)}")
 
     def _read_log(self, name: str) -> str:
         try:

@@ -62,9 +62,10 @@ class Supervisor:
         signal.pthread_sigmask(signal.SIG_SETMASK, self._mask)
 
     def start(self, name: str, command: Sequence[str | Path], patience_s: float = USUAL_PATIENCE_S,
-              **more: Any) -> None:
-        """`more`: arguments of subprocess.Popen."""
+              **more: Any) -> int:
+        """Returns the process id. `more`: arguments of subprocess.Popen."""
         self._running.append(self._spawn(name, command, patience_s, **more))
+        return self._running[-1].process.pid
 
     def start_beside(self, name: str, command: Sequence[str | Path]) -> None:
         """Starts a program that is no part of the flight: its end and its exit code change nothing."""
