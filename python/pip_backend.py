@@ -62,7 +62,8 @@ def build_wheel(wheel_directory: str, config_settings: object = None, metadata_d
          "Requires-Dist: numpy\nRequires-Dist: PyYAML\nProvides-Extra: figures\n"
          "Requires-Dist: scipy; extra == 'figures'\nRequires-Dist: matplotlib; extra == 'figures'\n"),
         ("WHEEL", f"Wheel-Version: 1.0\nGenerator: sls\nRoot-Is-Purelib: false\nTag: {tag}\n"),
-        ("entry_points.txt", "[console_scripts]\nsls = sls.launcher.__main__:start\n"))]
+        ("entry_points.txt", "[console_scripts]\nsls = sls.launcher.__main__:start\n"
+         "[pytest11]\nsls.pytest_plugin = sls.pytest_plugin\n"))]
     name = f"sls-{version}-{tag}.whl"
     record = ""
     with zipfile.ZipFile(Path(wheel_directory, name), "w", zipfile.ZIP_DEFLATED) as wheel:

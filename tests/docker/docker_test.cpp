@@ -20,6 +20,11 @@ const std::string kLauncher = std::string(SLS_SOURCE_DIR) + "/sls";
 constexpr auto kImageTime = 1500s;  // the first test builds it
 constexpr auto kFlightTime = 120s;
 
+/// Ends a shell line: what follows are the project's name and the words of Compose.
+const std::string kCompose =
+    "; if docker compose version >/dev/null 2>&1; then set -- docker compose; else set -- "
+    "docker-compose; fi; \"$@\" --project-name ";
+
 struct Outcome {
   std::optional<int> code;
   std::string output;
@@ -206,6 +211,26 @@ TEST_F(DockerTest, ADemoEndsWithTheExitCodeOfTheProgramThatFailed) {
   expect_nothing_left(project);
 }
 
+TEST_F(DockerTest, TheComposeFileOfTheCiExampleFliesWhatItsCheckExpects) {
+  const fs::path ci = folder / "ci";
+  fs::copy(std::string(SLS_SOURCE_DIR) + "/examples/ci", ci);
+  const std::string project = note_project("sls-test-ci-", getpid());
+  const std::string user = std::to_string(geteuid()) + ":" + std::to_string(getegid());
+  const std::string lines = "set -e; cd " + ci.string() +
+                            "; mkdir -p build include recording; ln -s " + SLS_SOURCE_DIR +
+                            "/control_client/laws/shared_library include/sls; " +
+                            "gcc -O2 -fPIC -shared -I include -o build/my_law.so my_law.c; " +
+                            "export MY_IMAGE=sls-test-ci SLS_USER=" + user + kCompose + project;
+  const Outcome up = run_shell(lines + " up --build");
+  EXPECT_EQ(up.code, 0) << up.output;
+  const Outcome verdict = run_command(
+      {kLauncher, "--no-install", "check", ci / "check.yaml", "--recording", ci / "recording"});
+  EXPECT_EQ(verdict.code, 0) << verdict.output;
+  EXPECT_EQ(run_shell("cd " + ci.string() + kCompose + project + " down").code, 0);
+  run_shell("docker image rm sls-test-ci");
+  expect_nothing_left(project);
+}
+
 TEST_F(DockerTest, ServicesAreHealthyWhileTheyFlyAndRunAsTheUserTheyWereTold) {
   if (geteuid() != 0) GTEST_SKIP() << "skipped: only root can give a folder to another user";
   constexpr uid_t kUser = 12345;
@@ -216,10 +241,7 @@ TEST_F(DockerTest, ServicesAreHealthyWhileTheyFlyAndRunAsTheUserTheyWereTold) {
   const std::string compose =
       "cd " + std::string(SLS_SOURCE_DIR) +
       "/docker && export SLS_USER=12345:12345 SLS_RECORDING=" + out.string() +
-      " SLS_SCENARIO=" + make_slow_scenario() +
-      "; if docker compose version >/dev/null 2>&1; then set -- docker compose; else set -- "
-      "docker-compose; fi; \"$@\" --project-name " +
-      project + " --file compose.yaml ";
+      " SLS_SCENARIO=" + make_slow_scenario() + kCompose + project + " --file compose.yaml ";
   const auto find_container = [&](const std::string& service) {
     std::istringstream ids(
         run_shell("docker ps --all --quiet --filter label=com.docker.compose.project=" + project +

@@ -96,6 +96,7 @@ TEST(ExamplesTest, AreInstalledBuiltAndFlownAsByAUser) {
   expect_same_flight(installation, "my_controller");
   expect_refused(installation, "my_controller", "position", "controller", 7,
                  "position, velocity, integral, rod_angle, rod_rate or filter_s");
+  run({"ctest", "--test-dir", installation.example("my_controller") / "build"});
   expect_same_flight(installation, "my_plant");
   expect_refused(installation, "my_plant", "stiffness_n_m", "plant", 6,
                  "stiffness_n_m or damping_n_s_m");

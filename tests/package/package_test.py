@@ -16,6 +16,8 @@ import sys
 import unittest
 from pathlib import Path
 
+import yaml
+
 ROOT = Path(__file__).resolve().parents[2]
 BUILD = Path(sys.argv[1]).resolve()
 sys.path.insert(0, str(ROOT / "tools/systems"))
@@ -231,7 +233,32 @@ class PackageTest(unittest.TestCase):
         shutil.copy(example / "my_controller.yaml", place)
         fly("sls", "run", "my_controller/my_controller.yaml", "--in-process", "--out", "own")
 
-    def test_5_it_is_removed_without_a_trace(self):
+    def test_5_the_job_of_the_ci_example_runs_from_nothing(self):
+        # In a copy of the system that disappears, with the network of this machine, because apt needs the mirror.
+        try:
+            run_apt("apt-get", "update", "--error-on=any")
+        except AssertionError as error:
+            self.skipTest(f"skipped: the mirror of Debian does not answer: {error}")
+        job, = yaml.safe_load((ROOT / "examples/ci/.github/workflows/flights.yml").read_text())["jobs"].values()
+        lines = "\n".join(step["run"] for step in job["steps"] if "run" in step)
+        place = FOLDER / "copy"
+        place.mkdir(exist_ok=True)
+        script = f"""set -e
+mount -t tmpfs tmpfs '{place}'
+cd '{place}' && mkdir upper work root
+mount -t overlay overlay -o 'lowerdir={SYSTEM},upperdir=upper,workdir=work' root
+mount -t proc proc root/proc && mount -t tmpfs -o mode=1777 tmpfs root/dev/shm
+cp -r root/usr/share/doc/sls/examples/ci root/root/ci && mv root/tmp/sls.deb root/srv
+chroot root dpkg --purge sls
+exec chroot root sh -e -c "cd /root/ci
+$1" """
+        environment = {**os.environ, "PATH": "/usr/sbin:/usr/bin:/sbin:/bin", "DEBIAN_FRONTEND": "noninteractive",
+                       "LC_ALL": "C", "SLS_DEB": "file:///srv/sls.deb"}
+        said = run(["unshare", "--mount", "--propagation", "private", "--pid", "--fork", "--kill-child", "sh", "-c",
+                    script, "sh", lines], env=environment, limit_s=1200)
+        self.assertIn("100% tests passed", said)
+
+    def test_6_it_is_removed_without_a_trace(self):
         # Python run by root leaves compiled files, which the removal must delete, too.
         run(isolate("python3", "-c", "import sls; sls.lqr", system=SYSTEM))
         run(isolate("apt-get", "purge", "-y", "sls", system=SYSTEM))

@@ -62,6 +62,11 @@ def test_the_command_flies_over_dds_and_lists_what_there_is(python, tmp_path):
         2, "sls: error: build: needs the source tree; this sls is installed without it\n")
 
 
+def test_pytest_has_the_plug_in(python, tmp_path):
+    for options in ((), ("-p", "sls.pytest_plugin")):
+        assert "@pytest.mark.sls(check" in start(python, "-m", "pytest", "--markers", *options, cwd=tmp_path).stdout
+
+
 def test_a_campaign_by_name_flies_and_every_file_is_removed(python, tmp_path):
     run(python, "import sys; from sls.campaign import cli; sys.exit(cli.main("
                 f"['gains', '--runs', '0-1', '--workers', '1', '--out', '{tmp_path}/out']))")

@@ -123,8 +123,8 @@ def find_checks(name: str) -> list[Path]:
     return [shipped]
 
 
-def load_check(file: Path) -> Check:
-    """Raises ConfigError, one line with file, line, key, expected and got."""
+def load_check(file: Path, library: Path | None = None) -> Check:
+    """With `library` in place of the controller. Raises ConfigError: one line with file, line, key, expected and got."""
     root = parse_yaml(read_bytes(file, "a check file", MOST_BYTES), file)
     known = ("scenario", "expect", "participants", "placements", "under", "limit_s")
     values = root.read_map("a check: scenario, expect …", known)
@@ -136,6 +136,10 @@ def load_check(file: Path) -> Check:
         place.fail(f"expected a scenario, got no such file: {scenario_file}")
     scenario = load_scenario(scenario_file)
     controller = read_participants(values["participants"]) if "participants" in values else None
+    if library:
+        if not library.is_file():
+            raise ConfigError(f"--library: expected a shared library, got no such file: {library}")
+        controller = Participant(root, "controller", "library", (str(library.resolve()),), file.parent.resolve())
     if controller and controller.kind == "library":
         scenario = put_library(controller, scenario, scenario_file)
     check = Check(file, file.stem, place, scenario_file, scenario, (), controller)
@@ -323,9 +327,15 @@ def read_participants(place: Place) -> Participant | None:
 
 
 def put_library(controller: Participant, scenario: "Scenario", file: Path) -> "Scenario":
-    """The scenario with the library as its law, and without the keys of the law before."""
-    law = {"law": controller.words[0], "force_limit_n": scenario.force_limit_n}
-    return load_scenario(file, changes={"controller": law})
+    """The scenario with the library as its law. Only another library has the same keys beside it."""
+    law, values = controller.words[0], yaml.safe_load(scenario.text)
+    # It flies from another folder.
+    changes = {f"{key}.model": str((file.parent / model).resolve()) for key in ("plant", "autopilot")
+               if str(model := (values.get(key) or {}).get("model")).endswith(".so")}
+    if scenario.law.endswith(".so"):
+        return load_scenario(file, changes={**changes, "controller.law": law})
+    own = {"law": law, "force_limit_n": scenario.force_limit_n}
+    return load_scenario(file, changes={**changes, "controller": own})
 
 
 def read_placements(place: Place | None, controller: Participant | None) -> tuple[str, ...]:

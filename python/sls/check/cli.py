@@ -60,6 +60,7 @@ def make_parser() -> argparse.ArgumentParser:
     add("--under", type=parse_faults, metavar="FAULT,…",
         help=f"faults: {', '.join(f'{word}=…' if kind[0] else word for word, kind in WORDS.items())} "
              "(default: the file's)")
+    add("--library", type=Path, metavar="FILE", help="fly this shared library as the controller")
     add("--jobs", type=to_count, default=1, metavar="N", help="flights side by side (default: 1)")
     add("--update", action="store_true", help="write the certificates of the flights into the check files")
     add("--recording", type=Path, metavar="DIR", help="judge this recording instead of flying")
@@ -157,26 +158,27 @@ class Comparison:
         self._keeps_failed = keeps_failed
 
     def add(self, check: Check, result: Result) -> None:
-        first = self._first.get(result.check)
-        if result.certificate and check.is_lockstep:
-            if first is None:
-                self._first[result.check] = result
-                return
-            if first.certificate != result.certificate:
-                try:
-                    text = find_difference(Path(first.folder) / "recording", Path(result.folder) / "recording")
-                except (ConfigError, RunError) as error:
-                    text = str(error)
-                result.difference = f"differs from {first.flight} (A): {text or 'other certificates, no other row'}"
-        if result.verdict == HELD or not self._keeps_failed:
+        self.compare(check, result)
+        if self._first.get(result.file) is not result and (result.verdict == HELD or not self._keeps_failed):
             shutil.rmtree(result.folder, ignore_errors=True)
+
+    def compare(self, check: Check, result: Result) -> None:
+        if not result.certificate or not check.is_lockstep:
+            return
+        first = self._first.setdefault(result.file, result)
+        if first.certificate != result.certificate:
+            try:
+                text = find_difference(first.recording, result.recording)
+            except (ConfigError, RunError) as error:
+                text = str(error)
+            result.difference = f"differs from {first.flight} (A): {text or 'other certificates, no other row'}"
 
 
 def check_all(options: argparse.Namespace, folder: Path, results: list[Result]) -> None:
     checks, files = list[Check](), [file for name in options.files for file in find_checks(name)]
     for file in files:
         try:
-            checks.append(load_check(file))
+            checks.append(load_check(file, options.library))
         except (ConfigError, ImportError) as error:
             say(f"error: {error}")
             results.append(Result(file.stem, str(file), problem=str(error), is_unusable=True))

@@ -13,21 +13,25 @@ from sls.report import escape, join_page, make_report, make_section
 
 
 def write_pages(folder: Path, checks: Mapping[str, Check], results: Sequence[Result]) -> None:
-    """Moves recording and logs of each failed flight to FOLDER/NAME and writes FOLDER/NAME/report.html beside them.
-    FOLDER/index.html lists all flights. Raises OSError."""
+    """The page of each failed flight. FOLDER/index.html lists all flights. Raises OSError."""
     for result in results:
-        if result.verdict == HELD or not result.folder:
-            continue
-        kept = folder / re.sub(r"[^\w.-]+", "-", result.name)
-        shutil.rmtree(kept, ignore_errors=True)
-        shutil.move(result.folder, kept)
-        page = kept / "report.html"
-        page.write_text(make_page(checks[result.file], result, kept / "recording"), encoding="utf-8")
-        result.folder, result.page = str(kept), str(page)
+        if result.verdict != HELD and result.folder:
+            write_page(folder, checks[result.file], result)
     rows = "".join(f"<tr><td>{name_flight(one, folder)}</td><td>{escape(one.verdict)}</td>"
                    f"<td>{escape('; '.join(one.list_problems()[:1]))}</td></tr>" for one in results)
     table = f"<div class=\"scroll\"><table class=\"text\">{rows}</table></div>"
     (folder / "index.html").write_text(join_page("checks", [make_section("Checks", table)]), encoding="utf-8")
+
+
+def write_page(folder: Path, check: Check, result: Result) -> None:
+    """Moves recording and logs of the flight to FOLDER/NAME and writes FOLDER/NAME/report.html beside them."""
+    kept = folder / re.sub(r"[^\w.-]+", "-", result.name)
+    folder.mkdir(parents=True, exist_ok=True)
+    shutil.rmtree(kept, ignore_errors=True)
+    shutil.move(result.folder, kept)
+    page = kept / "report.html"
+    result.folder, result.page = str(kept), str(page)
+    page.write_text(make_page(check, result, result.recording), encoding="utf-8")
 
 
 def name_flight(result: Result, folder: Path) -> str:

@@ -37,6 +37,10 @@ class Result:
     logs: dict[str, str] = field(default_factory=dict)  # the end of each
 
     @property
+    def recording(self) -> Path:
+        return Path(self.folder) / "recording"
+
+    @property
     def verdict(self) -> str:
         if self.is_unusable:
             return UNUSABLE

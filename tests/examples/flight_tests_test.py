@@ -1,0 +1,120 @@
+"""sls_add_flight_test, and examples/ci as its user has it: the shell lines are those of the workflow, run against an
+installation. tests/package runs them all in a clean Debian."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).resolve().parents[2]
+BUILD = Path(os.environ.get("SLS_BUILD", ROOT / "build"))
+sys.path.append(str(ROOT / "tests/support"))
+from own_domain import OwnDomain  # noqa: E402
+
+@pytest.fixture(scope="module")
+def prefix(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("installed")
+    subprocess.run(["cmake", "--install", BUILD, "--prefix", folder], check=True, capture_output=True)
+    return folder
+
+
+@pytest.fixture
+def run(prefix):
+    """A function that runs shell lines in a folder as GitHub does, with the installation."""
+    kept = {key: value for key, value in os.environ.items() if not key.startswith(("SLS_", "PYTHONPATH"))}
+    environment = {**kept, "PATH": f"{prefix}/bin:{os.environ['PATH']}", "CMAKE_PREFIX_PATH": str(prefix)}
+
+    def run(folder, lines, code=0, **more):
+        done = subprocess.run(["sh", "-e", "-c", lines], cwd=folder, env={**environment, **more}, text=True,
+                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=400)
+        assert (done.returncode != 0) == bool(code), done.stdout
+        return done.stdout
+    return run
+
+
+@pytest.fixture
+def folder(prefix, tmp_path):
+    return Path(shutil.copytree(prefix / "share/doc/sls/examples/ci", tmp_path / "ci"))
+
+
+def read_steps(folder):
+    """The steps of the workflow's job by the first word of their names."""
+    workflow = yaml.safe_load((folder / ".github/workflows/flights.yml").read_text())
+    assert set(workflow) == {"name", True, "jobs"}  # YAML 1.1 reads the key `on` as true
+    job, = workflow["jobs"].values()
+    assert set(job) == {"runs-on", "timeout-minutes", "container", "steps"} and job["container"] == "debian:12"
+    for step in job["steps"]:
+        assert set(step) <= {"name", "env", "if", "run", "uses", "with"} and ("run" in step) != ("uses" in step), step
+        assert re.fullmatch(r"actions/[\w-]+@v\d+", step.get("uses", "actions/none@v0"))
+    return {step["name"].split()[0]: step for step in job["steps"] if "name" in step}
+
+
+def read_verdicts(folder, steps):
+    """What the workflow publishes: numbers of tests, failures and errors in JUnit, and of pages."""
+    published = list(folder.glob(steps["Publish"]["with"]["path"]))
+    junit, = [file for file in published if file.suffix == ".xml"]
+    verdicts = ElementTree.parse(junit).getroot()
+    return (*map(verdicts.get, ("tests", "failures", "errors")),
+            len([page for file in published for page in file.rglob("*/report.html")]))
+
+
+def test_the_job_is_green_and_a_bug_in_the_law_makes_it_red_with_the_line(run, folder):
+    steps = read_steps(folder)
+    run(folder, steps["Build"]["run"], CFLAGS="-Werror")
+    run(folder, steps["Fly"]["run"])
+    assert read_verdicts(folder, steps) == ("2", "0", "0", 0)
+
+    law, bug = folder / "my_law.c", re.search("delete `(.*?)`", (folder / "README.md").read_text())[1]
+    assert law.read_text().count(bug) == 1
+    law.write_text(law.read_text().replace(bug, ""))
+    run(folder, steps["Build"]["run"])
+    said = run(folder, steps["Fly"]["run"], code=8)
+    line = r"check, in-process: \S*/check.yaml:5: load_error_end_m, stage 0: expected ≤ 0.01, got 1\.0\d+ m at step 2"
+    assert re.search(line, said), said
+    assert read_verdicts(folder, steps) == ("2", "2", "0", 2)
+
+
+def test_the_services_of_the_compose_file_fly_what_the_check_expects(run, folder, prefix):
+    """Without an engine: the commands of its services, with the paths that the volumes and the image give them."""
+    services = yaml.safe_load((folder / "compose.yaml").read_text())["services"]
+    assert list(services) == ["server", "recorder", "controller"]
+    image = re.findall(r"^COPY (\S+) (\S+)$", (folder / "Dockerfile").read_text(), re.MULTILINE)
+    assert image == [("scenario.yaml", "/flight/"), ("build/my_law.so", "/flight/build/")]
+    run(folder, read_steps(folder)["Build"]["run"])
+    processes = []
+    with OwnDomain() as domain:
+        for name, service in services.items():
+            assert service["image"] == ("${MY_IMAGE:-my-controller}" if "build" in service else "${SLS_IMAGE:-sls}")
+            words = service["command"]
+            for own, path in (volume.split(":")[:2] for volume in service.get("volumes", [".:/flight"])):
+                words = [str(folder / word.replace(path, own, 1)) if word.startswith(path) else word for word in words]
+            processes.append(subprocess.Popen([prefix / "bin" / words[0], *words[1:], f"--domain={domain}"],
+                                              cwd=prefix / "share/sls", stderr=(folder / f"{name}.log").open("w")))
+        try:
+            codes = [process.wait(60) for process in processes]
+        finally:
+            for process in processes:
+                process.kill()
+    assert codes == [0, 0, 0], [file.read_text() for file in folder.glob("*.log")]
+    assert "1 held" in run(folder, "sls check check.yaml --recording recording")
+
+
+@pytest.mark.parametrize("arguments, expected", [
+    ("NAME a CHECK none.yaml", r"sls_add_flight_test\(a\): CHECK: expected a file, got /.*/none.yaml"),
+    ("NAME a CHEK none.yaml", r"sls_add_flight_test: expected NAME and CHECK, and maybe .*, got: NAME;a;CHEK"),
+    ("NAME a CHECK check.yaml PLACEMENT shm udp UNDER loss=0.2 busy TIMEOUT 7",
+     r'/bin/sls" "check" "\S+/check.yaml" .*"--placement" "shm,udp" "--under" "loss=0.2,busy"\) .* TIMEOUT "7"')])
+def test_the_function_passes_its_words_on_and_names_mistakes(run, tmp_path, arguments, expected):
+    (tmp_path / "CMakeLists.txt").write_text("cmake_minimum_required(VERSION 3.25)\nproject(a NONE)\nenable_testing()\n"
+        f"find_package(sls REQUIRED COMPONENTS headers)\nsls_add_flight_test({arguments})\n")
+    (tmp_path / "check.yaml").touch()
+    said = run(tmp_path, "cmake -B build", code="TIMEOUT" not in arguments)
+    if "TIMEOUT" in arguments:
+        said = (tmp_path / "build/CTestTestfile.cmake").read_text()
+    assert re.search(expected, re.sub(r"\s+", " ", said)), said
