@@ -88,10 +88,10 @@ void FlightMeasures::add(const model::StepRecord& step) {
     const auto time_ns = static_cast<std::int64_t>(step.step) * period_ns_;
     steps_[stage].add(step, static_cast<double>(time_ns) / 1e9);
   }
-  tilt_.add(model::calc_rod_tilt(truth.p_WL - truth.p_WQ));
-  if (has_attitude_) attitude_.add(model::calc_body_tilt(truth.attitude.q_WB));
-  squared_force_.add(step.answer.f_Q_W.squaredNorm());
-  if (has_energy_) energy_.add(model::calc_energy(truth, vehicle_));
+  tilt_.add(model::calc_rod_tilt(truth.p_WL - truth.p_WQ), step.step);
+  if (has_attitude_) attitude_.add(model::calc_body_tilt(truth.attitude.q_WB), step.step);
+  squared_force_.add(step.answer.f_Q_W.squaredNorm(), step.step);
+  if (has_energy_) energy_.add(model::calc_energy(truth, vehicle_), step.step);
 }
 
 std::vector<FlightMeasures::NamedValue> FlightMeasures::list_values(

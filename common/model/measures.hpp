@@ -23,16 +23,14 @@ inline constexpr double kLeastStep = 0.01;
 /// Settled: within this share of the step.
 inline constexpr double kSettlingBand = 0.02;
 
-/// The largest of some numbers, and the sample at which it came first, counted from 0. NaN without
-/// numbers; a NaN among numbers is ignored.
+/// The largest of some numbers, and the sample at which it came first. NaN without numbers; a NaN
+/// among numbers is ignored.
 class Largest {
  public:
-  void add(double number) {
-    if (number > value_ || (std::isnan(value_) && !std::isnan(number))) {
-      value_ = number;
-      sample_ = samples_;
-    }
-    ++samples_;
+  void add(double number, std::uint64_t sample) {
+    if (number <= value_ || std::isnan(number)) return;
+    value_ = number;
+    sample_ = sample;
   }
   double value() const { return value_; }
   std::uint64_t sample() const { return sample_; }
@@ -40,20 +38,20 @@ class Largest {
  private:
   double value_ = std::numeric_limits<double>::quiet_NaN();
   std::uint64_t sample_ = 0;
-  std::uint64_t samples_ = 0;
 };
 
 /// Statistics of a vector over a part of a flight, such as a position error (m). Each function is
-/// of one component (0, 1, 2, or kNorm) and NaN without samples.
+/// of one component (0, 1, 2, or kNorm) and NaN without samples. Samples count from 0.
 class ErrorStatistics {
  public:
   void add(const Eigen::Vector3d& error) {
     const Eigen::Array3d squares = error.array().square();
-    ++samples_;
     sum_of_squares_ += squares;
-    for (int axis = 0; axis < 3; ++axis) largest_[axis].add(std::abs(error[axis]));
-    largest_square_.add(squares.sum());
+    for (int axis = 0; axis < 3; ++axis)
+      largest_[static_cast<std::size_t>(axis)].add(std::abs(error[axis]), samples_);
+    largest_square_.add(squares.sum(), samples_);
     last_ = error;
+    ++samples_;
   }
 
   std::uint64_t samples() const { return samples_; }
@@ -95,7 +93,8 @@ class Settling {
 
   /// From the first sample on, s; infinite: not settled; NaN without samples.
   double calc_time() const;
-  /// The sample at that time.
+  std::uint64_t samples() const { return samples_; }
+  /// The sample at that time, counted from 0.
   std::uint64_t sample() const { return sample_; }
 
  private:
@@ -114,8 +113,8 @@ class StepResponse {
 
   /// `beyond`: how far behind the target, seen from the start; of either sign.
   void add(double time_s, double distance, double beyond) {
+    beyond_.add(beyond, settling_.samples());
     settling_.add(time_s, distance);
-    beyond_.add(beyond);
   }
 
   /// NaN if there is no step.

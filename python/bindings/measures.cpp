@@ -78,7 +78,8 @@ std::pair<double, std::uint64_t> calc_settling(const Series& time_s, const Vecto
 
 std::pair<double, std::uint64_t> find_largest(const Series& numbers) {
   model::Largest largest;
-  for (const double number : numbers) largest.add(number);
+  for (Eigen::Index row = 0; row < numbers.size(); ++row)
+    largest.add(numbers[row], static_cast<std::uint64_t>(row));
   return {largest.value(), largest.sample()};
 }
 

@@ -244,10 +244,10 @@ def print_results(results: Sequence[Result]) -> None:
     verdicts = [one.verdict for one in results]
     words = ", ".join(f"{verdicts.count(word)} {word}" for word in dict.fromkeys((HELD, *sorted(verdicts)))
                       if verdicts.count(word))
-    flown = [one for one in results if one.certificate]
-    same = len({(one.check, one.certificate) for one in flown}) == len({one.check for one in flown})
-    print(f"{len(results)} flight{'s' if len(results) > 1 else ''}: {words}" + ("; the flights of each check have equal bytes"
-                                                if same and len(flown) > len({one.check for one in flown}) else ""))
+    flown = [(one.check, one.certificate) for one in results if one.certificate]
+    are_same = len(set(flown)) == len({check for check, _ in flown}) < len(flown)
+    print(f"{len(results)} flight{'s' if len(results) > 1 else ''}: {words}"
+          + ("; the flights of each check have equal bytes" if are_same else ""))
 
 
 def raise_ended(*_: object) -> None:

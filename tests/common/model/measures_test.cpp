@@ -51,8 +51,9 @@ TEST(ErrorStatisticsTest, WithoutSamplesNothingIsDefined) {
 TEST(LargestTest, IsTheFirstOfEqualOnesAndIgnoresNaN) {
   Largest largest;
   EXPECT_TRUE(std::isnan(largest.value()));
+  std::uint64_t sample = 0;
   for (const double number : {std::nan(""), -2.0, -1.0, std::nan(""), -1.0, -3.0})
-    largest.add(number);
+    largest.add(number, sample++);
   EXPECT_EQ(largest.value(), -1.0);
   EXPECT_EQ(largest.sample(), 2u);
 }
