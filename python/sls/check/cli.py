@@ -2,6 +2,7 @@
 
 import argparse
 import multiprocessing
+import os
 import shutil
 import signal
 import sys
@@ -113,15 +114,27 @@ def fly_all(jobs: Sequence[Job], workers: int) -> Iterator[Result]:
         yield from map(fly_and_judge, jobs)
         return
     context = multiprocessing.get_context("fork")
-    with ProcessPoolExecutor(workers, context) as pool:
+    with ProcessPoolExecutor(workers, context, take_signals) as pool:
         try:
-            for future in as_completed([pool.submit(fly_and_judge, job) for job in jobs]):
+            for future in as_completed([pool.submit(fly_in_worker, job) for job in jobs]):
                 yield future.result()
         except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            for child in multiprocessing.active_children():
+            for child in multiprocessing.active_children():  # a flight ends its programs first
                 child.terminate()
+            pool.shutdown(cancel_futures=True)
             raise
+
+
+def take_signals() -> None:
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
+
+
+def fly_in_worker(job: Job) -> Result:
+    try:
+        return fly_and_judge(job)
+    except KeyboardInterrupt:  # no further flight, although it may be in the queue
+        os._exit(130)
 
 
 # --- all flights ----------------------------------------------------------------------------------
