@@ -18,7 +18,7 @@ MISTAKES = [
     ("scenario: short", "expect: missing key"),
     ("scenario: shrot\nexpect: [{ outcome: finished }]", ":1: scenario: expected a scenario, got no such file"),
     ("scenario: none.yaml\nexpect: [{ outcome: finished }]", ":1: scenario: expected a scenario, got no such file"),
-    ("scenario: short\nexpct: []", ":2: expct: unknown key; did you mean 'expect'?"),
+    ("scenario: short\nexpects: []", ":2: expects: unknown key; did you mean 'expect'?"),
     ("scenario: short\nscenario: short", ":2: scenario: duplicate key"),
     ("scenario: short\nexpect: []", ":2: expect: expected a list of expectations"),
     ("scenario: short\nexpect: { outcome: finished }", ":2: expect: expected a list of expectations"),

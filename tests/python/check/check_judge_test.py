@@ -134,7 +134,7 @@ def test_an_expectation_that_does_not_fit_the_flight_is_refused(flown, tmp_path,
     assert str(caught.value).startswith(f"{tmp_path}/check.yaml:3: expect[0]: ") and part in str(caught.value)
 
 
-def test_what_a_failed_flight_did_not_reach_is_not_held(tmp_path):
+def test_an_expectation_of_a_stage_that_was_not_flown_is_not_held(tmp_path):
     sls.fly(sls.load_scenario("setpoints", controller__force_limit_n=16.7)).save(tmp_path / "recording")
     recording = sls.Recording(tmp_path / "recording")
     (tmp_path / "weak.yaml").write_text(recording.scenario_text)
