@@ -101,7 +101,7 @@ class MeasuresTest(support.FolderTest):
         self.refuse("time_of_loss_s: expected a flight that finished or failed, got outcome recording",
                     "time_of_loss_s")
 
-    def test_what_a_recording_does_not_have_is_refused(self):
+    def test_a_measure_that_a_recording_does_not_have_is_refused(self):
         write_recording(self.folder / "r", last=150)
         self.refuse(r"r: expected a measure, one of load_error_rms_m, .*; got 'speed'", "speed")
         self.refuse("tilt_max_rad: expected stage or window_s, got axis", "tilt_max_rad", axis="x")

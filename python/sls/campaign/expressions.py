@@ -145,8 +145,8 @@ class Expression:
 
         Raises ExpressionError, which names the first row (from 0) without a value."""
         import numpy as np
-        scope = {**SCOPE, "check_finite": lambda value: value, "abs": np.abs, "sqrt": np.sqrt, "max": _reduce(np.maximum),
-                 "min": _reduce(np.minimum), "power": _power_rows,
+        scope = {**SCOPE, "check_finite": lambda value: value, "abs": np.abs, "sqrt": np.sqrt, "power": _power_rows,
+                 "max": _reduce(np.maximum), "min": _reduce(np.minimum),
                  **{name: _by_row(FUNCTIONS[name], 1) for name in ("cos", "exp", "log", "sin", "tan")}}
         columns = [np.asarray(column, np.float64) for column in rows]
         try:

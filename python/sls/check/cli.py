@@ -2,6 +2,7 @@
 
 import argparse
 import multiprocessing
+import os
 import shutil
 import signal
 import sys
@@ -114,15 +115,27 @@ def fly_all(jobs: Sequence[Job], workers: int) -> Iterator[Result]:
         yield from map(fly_and_judge, jobs)
         return
     context = multiprocessing.get_context("fork")
-    with ProcessPoolExecutor(workers, context) as pool:
+    with ProcessPoolExecutor(workers, context, take_signals) as pool:
         try:
-            for future in as_completed([pool.submit(fly_and_judge, job) for job in jobs]):
+            for future in as_completed([pool.submit(fly_in_worker, job) for job in jobs]):
                 yield future.result()
         except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            for child in multiprocessing.active_children():
+            for child in multiprocessing.active_children():  # a flight ends its programs first
                 child.terminate()
+            pool.shutdown(cancel_futures=True)
             raise
+
+
+def take_signals() -> None:
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
+
+
+def fly_in_worker(job: Job) -> Result:
+    try:
+        return fly_and_judge(job)
+    except KeyboardInterrupt:  # no further flight, although it may be in the queue
+        os._exit(130)
 
 
 # --- all flights ----------------------------------------------------------------------------------
@@ -246,10 +259,10 @@ def print_results(results: Sequence[Result]) -> None:
     verdicts = [one.verdict for one in results]
     words = ", ".join(f"{verdicts.count(word)} {word}" for word in dict.fromkeys((HELD, *sorted(verdicts)))
                       if verdicts.count(word))
-    flown = [one for one in results if one.certificate]
-    same = len({(one.check, one.certificate) for one in flown}) == len({one.check for one in flown})
-    print(f"{len(results)} flight{'s' if len(results) > 1 else ''}: {words}" + ("; the flights of each check have equal bytes"
-                                                if same and len(flown) > len({one.check for one in flown}) else ""))
+    flown = [(one.check, one.certificate) for one in results if one.certificate]
+    are_same = len(set(flown)) == len({check for check, _ in flown}) < len(flown)
+    print(f"{len(results)} flight{'s' if len(results) > 1 else ''}: {words}"
+          + ("; the flights of each check have equal bytes" if are_same else ""))
 
 
 def raise_ended(*_: object) -> None:

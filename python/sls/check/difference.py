@@ -1,6 +1,5 @@
 """The first difference of two recordings: step, vehicle, column, both values, and the topic it came from."""
 
-import re
 from pathlib import Path
 
 from sls.csv_tables import read_records
@@ -51,8 +50,3 @@ def list_changes(recording: Recording) -> list[tuple[int, str, str]]:
                     changes.append((int(row["step"]), name, row.get(name) or ""))
             last = row
     return changes
-
-
-def find_step(text: str) -> int | None:
-    found = re.search(r"step (\d+)", text)
-    return int(found[1]) if found else None

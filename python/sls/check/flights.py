@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +35,6 @@ class Flown:
     problem: str = ""  # with a program, in one line
     is_whole: bool = False  # the recording can be judged
     wall_s: float = 0.0
-    notes: list[str] = field(default_factory=list)
 
     @property
     def recording(self) -> Path:
@@ -145,7 +144,7 @@ class Programs:
         self._groups: list[int] = []  # of processes under test, which may start further ones
 
     def run(self, programs: dict[str, list[Any]]) -> None:
-        with Supervisor(say=self._flown.notes.append, overrun_s=OVERRUN_S) as self._programs:
+        with Supervisor(say=lambda _: None, overrun_s=OVERRUN_S) as self._programs:
             for name, words in programs.items():
                 try:
                     self._start(name, words)

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import re
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -106,7 +107,7 @@ def judge_one(check: Check, expected: Expectation, recording: Recording) -> Judg
         except (InputError, ExpressionError) as error:
             if manifest["complete"]:
                 raise InputError(f"{line}: {expected.place.path}: {expected.text}: {error}") from None
-            problem = "undefined: " + str(error).replace(f"{recording.folder}/", "").replace(f"{recording.folder}: ", "")
+            problem = "undefined: " + re.sub(re.escape(str(recording.folder)) + "(/|: )", "", str(error))
             return Judged(expected.text, False, unit=expected.unit, low=expected.low, high=expected.high, **more,
                           problem=problem)
         if len(recording.vehicle_ids) > 1:

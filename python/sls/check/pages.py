@@ -54,9 +54,9 @@ def make_page(check: Check, result: Result, folder: Path) -> str:
 
 
 def make_verdict(result: Result) -> str:
+    badges = {True: f"<span class=\"badge good\">{HELD}</span>", False: f"<span class=\"badge bad\">{NOT_HELD}</span>"}
     rows = "".join(
-        f"<tr><td style=\"white-space: nowrap\"><span class=\"badge {'good' if one.is_held else 'bad'}\">{HELD if one.is_held else NOT_HELD}</span>"
-        "</td>"
+        f"<tr><td style=\"white-space: nowrap\">{badges[one.is_held]}</td>"
         f"<td>{escape(one.text)}</td><td>{escape(one.got)} {escape(one.unit)}</td><td>{escape(one.bound)}</td>"
         f"<td>{one.where}</td><td>{escape(one.because)}</td></tr>"
         for one in result.judged)

@@ -13,7 +13,6 @@ from sls.check.judge import Judged
 
 HELD, NOT_HELD, UNUSABLE = "held", "not held", "unusable"
 CODES = {HELD: 0, NOT_HELD: 1, UNUSABLE: 2}
-NAN = {"NaN": None}
 
 
 @dataclass
@@ -142,11 +141,13 @@ def make_rows(results: Sequence[Result]) -> list[str]:
     for result in results:
         for one in result.judged:
             value = one.got if one.problem or isinstance(one.value, str) else f"{one.value:.4g} {one.unit}".rstrip()
-            rows.append([result.check, result.flight, shorten(one.text, 60), shorten(value), one.bound,
-                         "" if one.margin is None else f"{one.margin:.3g}", one.where, HELD if one.is_held else "NOT HELD"])
+            margin = "" if one.margin is None else f"{one.margin:.3g}"
+            rows.append([result.check, result.flight, shorten(one.text, 60), shorten(value), one.bound, margin, one.where,
+                         HELD if one.is_held else "NOT HELD"])
         if result.problem or result.difference:
-            rows.append([result.check, result.flight, "(flight)", shorten(result.problem or result.difference), "", "", "",
-                         "NOT HELD" if result.verdict == NOT_HELD else result.verdict])
+            text = shorten(result.problem or result.difference)
+            verdict = "NOT HELD" if result.verdict == NOT_HELD else result.verdict
+            rows.append([result.check, result.flight, "(flight)", text, "", "", "", verdict])
     widths = [max(len(row[column]) for row in rows) for column in range(len(HEAD))]
     return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip() for row in rows]
 

@@ -73,8 +73,8 @@ def test_value_bound_margin_and_worst_step_are_those_of_the_flight(flown, tmp_pa
     error = abs(flight.state["load_x_m"] - flight.reference["ref_x_m"])
     outcome, largest, later, least, mean = judge_items(
         tmp_path, flown, "value: 'abs(load_x_m - ref_x_m)', max: 1", "value: 'abs(load_x_m - ref_x_m)', "
-        "window_s: [1, 1.2], max: 0.1", "value: sqrt(load_x_m ** 2), over: min, min: 0", "value: 0 - load_z_m, over: mean, "
-        "min: 5, stage: 0")
+        "window_s: [1, 1.2], max: 0.1", "value: sqrt(load_x_m ** 2), over: min, min: 0",
+        "value: 0 - load_z_m, over: mean, min: 5, stage: 0")
     assert outcome.is_held and outcome.value == "finished: mission finished" and outcome.step == 500
     assert largest.value == error.max() and largest.step == error.argmax()
     assert largest.margin == 1 - error.max() and largest.time_s == pytest.approx(0.004 * error.argmax())
@@ -134,7 +134,7 @@ def test_an_expectation_that_does_not_fit_the_flight_is_refused(flown, tmp_path,
     assert str(caught.value).startswith(f"{tmp_path}/check.yaml:3: expect[0]: ") and part in str(caught.value)
 
 
-def test_what_a_failed_flight_did_not_reach_is_not_held(tmp_path):
+def test_an_expectation_of_a_stage_that_was_not_flown_is_not_held(tmp_path):
     sls.fly(sls.load_scenario("setpoints", controller__force_limit_n=16.7)).save(tmp_path / "recording")
     recording = sls.Recording(tmp_path / "recording")
     (tmp_path / "weak.yaml").write_text(recording.scenario_text)
@@ -203,7 +203,8 @@ def test_a_planted_event_is_named_with_its_step(flown, recording):
 
 
 def test_junit_and_json_have_one_entry_for_each_flight(tmp_path, flown):
-    result = Result("one", "one.yaml", "shm", problem="controller: \x1b[1m<killed> & \"gone\"", logs={"server": "a\x00\nb"})
+    result = Result("one", "one.yaml", "shm", problem="controller: \x1b[1m<killed> & \"gone\"",
+                    logs={"server": "a\x00\nb"})
     held = Result("one", "one.yaml", "in-process", judged=judge_items(tmp_path, flown, "value: load_x_m, max: 9"))
     broken = Result("two", "two.yaml", problem="two.yaml:1: no", is_unusable=True)
     held.judged[1] = type(held.judged[1])(**{**held.judged[1].to_json(), "value": math.inf})
@@ -224,7 +225,8 @@ def test_junit_and_json_have_one_entry_for_each_flight(tmp_path, flown):
 @pytest.mark.parametrize("words", [["{file}"], ["none.yaml"], ["{file}", "--placement", "moon"], ["{file}", "--what"],
                                    ["{file}", "--under", "loss=3"], [], ["{file}", "--recording", "none"]])
 def test_a_junit_file_is_written_for_every_mistake(tmp_path, capsys, words):
-    file, junit = make_check(tmp_path, "outcome: landed" if words == ["{file}"] else "outcome: finished"), tmp_path / "j"
+    file = make_check(tmp_path, "outcome: landed" if words == ["{file}"] else "outcome: finished")
+    junit = tmp_path / "junit.xml"
     assert main([*[word.format(file=file) for word in words], "--junit", str(junit)]) == 2
     error = ElementTree.parse(junit).find("testsuite/testcase/error").get("message")
     assert error and "\n" not in error
