@@ -14,6 +14,7 @@ if __name__ == "__main__":  # before the imports, which take most of the time
     signal.signal(signal.SIGINT, lambda *_: (os.write(2, b"sls: interrupted\n"), os._exit(130)))
 
 from sls import study
+from sls.errors import ConfigError, RunError
 from sls.figures import PAPER, STYLE, make_figures, save
 from sls.trajectory import Trajectory
 from sls.input_error import InputError
@@ -167,10 +168,10 @@ def main(arguments: Sequence[str]) -> int:
     try:
         options = make_parser().parse_args(arguments)
         options.run(options)
-    except InputError as error:
+    except (ConfigError, ImportError) as error:
         say(f"error: {error}")
         return 2
-    except study.RunFailed as error:
+    except (RunError, study.RunFailed) as error:
         say(f"error: {error}")
         return 1
     return 0

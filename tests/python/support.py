@@ -2,6 +2,7 @@
 package needs is missing, the test is skipped (exit code 77)."""
 
 import contextlib
+import importlib.util
 import io
 import json
 import os
@@ -21,7 +22,8 @@ try:
     import matplotlib  # noqa: F401
     import numpy as np
     import yaml  # noqa: F401
-    import _sls_core  # noqa: F401
+    if importlib.util.find_spec("_sls_core") is None:  # not loaded: some tests replace it
+        raise ImportError("No module named '_sls_core'")
 except ImportError as error:
     print(f"skipped: {error} (apt-get install python3-numpy python3-matplotlib python3-yaml; ./sls build)")
     sys.exit(77)

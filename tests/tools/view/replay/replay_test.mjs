@@ -242,7 +242,7 @@ test("the report shows the scene, needs nothing else and has at most 4 MB", asyn
   const recording = join(folder, "first");
   execFileSync("/usr/bin/python3", ["-B", "-m", "sls", "report", recording], {
     stdio: "pipe",
-    env: { ...process.env, SLS_VIEW: join(bin, "sls_view"), PYTHONPATH: join(root, "python") },
+    env: { ...process.env, SLS_VIEW: join(bin, "sls_view"), PYTHONPATH: `${join(root, "python")}:${join(bin, "../python")}` },
   });
   const file = join(recording, "report.html");
   assert.ok(readFileSync(file).length <= 4_000_000);
