@@ -107,7 +107,7 @@ def test_the_services_of_the_compose_file_fly_what_the_check_expects(run, folder
 
 @pytest.mark.parametrize("arguments, expected", [
     ("NAME a CHECK none.yaml", r"sls_add_flight_test\(a\): CHECK: expected a file, got /.*/none.yaml"),
-    ("NAME a CHEK none.yaml", r"sls_add_flight_test: expected NAME and CHECK, and maybe .*, got: NAME;a;CHEK"),
+    ("NAME a FILE none.yaml", r"sls_add_flight_test: expected NAME and CHECK, and maybe .*, got: NAME;a;FILE"),
     ("NAME a CHECK check.yaml PLACEMENT shm udp UNDER loss=0.2 busy TIMEOUT 7",
      r'/bin/sls" "check" "\S+/check.yaml" .*"--placement" "shm,udp" "--under" "loss=0.2,busy"\) .* TIMEOUT "7"')])
 def test_the_function_passes_its_words_on_and_names_mistakes(run, tmp_path, arguments, expected):

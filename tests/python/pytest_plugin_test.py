@@ -71,7 +71,7 @@ def test_not_judged(sls_flight):
     assert str(page) in done.stdout.str()
 
 
-def test_what_a_placement_cannot_do_is_named_and_hosts_without_root_are_skipped(run, pytester):
+def test_a_fault_that_a_placement_cannot_do_is_named_and_hosts_without_root_are_skipped(run, pytester):
     pytester.makeconftest("import os\nos.geteuid = lambda: 1000")
     done = run("""
 @pytest.mark.sls(check="wide.yaml", placements=["shm", "hosts"])
