@@ -1,8 +1,5 @@
 """Measures that the user defines: functions of a Python file, called with the flight of each run."""
 
-import hashlib
-import importlib.util
-import sys
 import traceback
 from collections.abc import Callable
 from pathlib import Path
@@ -11,6 +8,7 @@ from typing import Any
 from sls.campaign.campaign import Campaign, OwnMeasure
 from sls.campaign.runs import OwnCells, fly_text, to_number, to_one_line
 from sls.input_error import InputError
+from sls.user_module import load_user_module
 
 LONGEST_ERROR = 300
 
@@ -18,14 +16,10 @@ LONGEST_ERROR = 300
 def load_function(own: OwnMeasure) -> Callable[..., Any]:
     """Loads the function of a measure. Raises InputError if its file cannot be run or has no such function."""
     place = f"{own.file}: {own.function}"
-    name = f"own_measure_{own.file.stem}_{hashlib.sha256(bytes(own.file.resolve())).hexdigest()[:8]}"
-    spec = importlib.util.spec_from_file_location(name, own.file)
-    if spec is None or spec.loader is None:
-        raise InputError(f"{place}: expected a Python file")
-    # As `import` does: dataclasses look for the module by its name to read annotations that are texts.
-    module = sys.modules[name] = importlib.util.module_from_spec(spec)
     try:
-        spec.loader.exec_module(module)
+        module = load_user_module(own.file, place)
+    except InputError:
+        raise
     except Exception as error:
         raise InputError(f"{place}: expected a Python file that can be run, got: "
                          f"{describe(error, own.file)}") from None

@@ -2,23 +2,19 @@
 
     python3 -m sls.check.python_law closed_loop|client FILE.py:NAME SCENARIO …"""
 
-import importlib.util
 import sys
 from pathlib import Path
 from typing import Any
 
 import sls
 from sls.errors import ConfigError, RunError
+from sls.user_module import load_user_module
 
 
 def load_law(named: str) -> Any:
     file, _, name = named.rpartition(":")
     sys.path.insert(0, str(Path(file).parent))
-    spec = importlib.util.spec_from_file_location(Path(file).stem, file)
-    assert spec and spec.loader
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    law = getattr(module, name, None)
+    law = getattr(load_user_module(Path(file), file), name, None)
     if law is None:
         raise ConfigError(f"{file}: expected a law '{name}', got none")
     return law() if isinstance(law, type) else law
