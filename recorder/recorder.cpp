@@ -7,6 +7,7 @@
 #include "common/app/run_main.hpp"
 #include "common/app/scheduling.hpp"
 #include "common/app/stop_signal.hpp"
+#include "common/app/wait.hpp"
 
 namespace sls::record {
 
@@ -108,10 +109,9 @@ void Recorder::report() {
   // Other programs wait for the last announcement of this recorder before they end, so it must
   // reach them; above all its server, which may not have discovered it yet.
   const bus::PeerId server = core_.run()->server;
-  const auto deadline = std::chrono::steady_clock::now() + 2s;
-  while (servers_.is_present(server) && !announcer_.reaches(server) &&
-         std::chrono::steady_clock::now() < deadline)
-    std::this_thread::sleep_for(1ms);
+  const app::Wait wait(2);
+  while (servers_.is_present(server) && !announcer_.reaches(server) && !wait.is_over())
+    std::this_thread::sleep_for(app::kShortPollTime);
   announcer_.wait_for_acknowledgments(1s);
   core_.on_recorded(writing_->recorded(), app::describe_stop());
   writing_.reset();
