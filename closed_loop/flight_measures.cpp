@@ -104,7 +104,7 @@ std::vector<FlightMeasures::NamedValue> FlightMeasures::list_values(
                           calc(axis));
   };
   const auto add_errors = [&](double (model::ErrorStatistics::*calc)(int) const) {
-    const auto of = measure[0] == 'q' ? &Errors::quad : &Errors::load;
+    const auto of = measure.rfind("quad_", 0) == 0 ? &Errors::quad : &Errors::load;
     values.emplace_back(measure + "_m", ((errors_.*of).*calc)(model::kNorm));
     add_axes(measure, "_m", [&](int axis) { return ((errors_.*of).*calc)(axis); });
     for (std::size_t i = 0; i < stages_.size(); ++i)
