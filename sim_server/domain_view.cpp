@@ -11,7 +11,8 @@ namespace sls::sim {
 std::vector<sync::Member> DomainView::find_members(ParticipantRole role,
                                                    std::uint64_t run_id) const {
   auto found = endpoints_.participants.find(role, run_id);
-  if (role == ParticipantRole::ROLE_CONTROLLER) keep_readers(found, endpoints_.states.matched());
+  if (role == ParticipantRole::ROLE_CONTROLLER)
+    keep_matched(found, endpoints_.states.matched(), endpoints_.commands.matched());
   return found;
 }
 

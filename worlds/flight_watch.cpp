@@ -64,6 +64,7 @@ void FlightWatch::on_member(const Participant& message, const bus::PeerId& peer,
                         message.scenario_sha256().to_string() == scenario_sha256_ &&
                         message.contract_sha256().to_string() == bus::kContractSha256;
   if (is_ready && !client.is_ready) client.ready = now;
+  if (!is_ready && client.is_ready) client.left = now;
   client.is_ready = is_ready;
   client.process = &sender;
   client.order = {-message.strength(), message.name().to_string(), peer};
@@ -203,9 +204,13 @@ std::optional<Instant> FlightWatch::check_flyer(const model::StepRecord& record,
   Instant patience{0};
   for (const auto& [name, client] : clients_) {
     const auto& ids = client.vehicle_ids;
-    if (!client.is_ready || std::find(ids.begin(), ids.end(), vehicle) == ids.end() ||
+    if (std::find(ids.begin(), ids.end(), vehicle) == ids.end() ||
         !(client.order < flyer->second.order))
       continue;
+    if (!client.is_ready) {
+      due = std::max(due, client.left);
+      continue;
+    }
     if (client.refused && client.refused->first == record.step) {
       due = std::max(due, client.refused->second);
       continue;

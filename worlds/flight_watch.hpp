@@ -62,6 +62,7 @@ class FlightWatch {
     std::vector<std::uint32_t> vehicle_ids;
     bool is_ready = false;
     Instant ready{0};  // its first announcement that says so
+    Instant left{0};   // its first one after that which does not
     Instant heard{0};  // its last sample
     Instant back{0};   // the first one after a long silence
     std::optional<std::pair<std::uint64_t, Instant>> refused;  // the last defective answer

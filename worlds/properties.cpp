@@ -285,7 +285,9 @@ void Properties::on_announced(const Program& program, const Participant& message
   if (!is_first) return;
   run.ready_since[program.name()] = timeline_.now();
   // It may know the server first. Then the server learns of it at its next look.
-  if (is_client && run.server->peer().matched_readers(TopicId::kState).count(program.id()) == 0)
+  const Peer& server = run.server->peer();
+  if (is_client && (server.matched_readers(TopicId::kState).count(program.id()) == 0 ||
+                    server.matched_writers(TopicId::kCommand).count(program.id()) == 0))
     run.is_match_late = true;
   if (!program.sees(run.server->id()))
     find(fmt::format("ready: {} says so of run {:016x} before it sees the server", program.name(),
@@ -298,6 +300,7 @@ void Properties::check_join(const Program& program, std::uint64_t run_id,
   std::uint64_t& before = joined_[program.name()];
   if (before == run_id) return;
   const std::uint64_t left = std::exchange(before, run_id);
+  if (runs_.at(run_id).has_ended) too_late_.insert(program.name());
   const SimStatus* status = heard.find_status(run_id);
   if (!status || sync::calc_progress(status->phase()) < 0)
     find(fmt::format("joins: {} joins run {:016x}, and has heard {}", program.name(), run_id,
@@ -405,7 +408,7 @@ void Properties::check(const Plan& plan, const std::vector<std::unique_ptr<Progr
       check_end(*program, programs);
     const bool may_yield = plan.promise == Promise::kTwoServers && program->role() == Role::kServer;
     if (plan.promise != Promise::kNone && has_joined(*program) && !may_yield &&
-        program->exit_code().value_or(0) != 0)
+        too_late_.count(program->name()) == 0 && program->exit_code().value_or(0) != 0)
       find(fmt::format("finishes: {} ends with {}: {}", program->name(), *program->exit_code(),
                        program->reason()));
   }

@@ -150,8 +150,9 @@ class Properties {
   const Timeline& timeline_;
   Trace& trace_;
   std::map<std::uint64_t, Run> runs_;
-  std::map<std::string, Instant> killed_, stopped_, continued_;          // by name
-  std::map<std::string, std::uint64_t> joined_;                          // clients' last runs
+  std::map<std::string, Instant> killed_, stopped_, continued_;  // by name
+  std::map<std::string, std::uint64_t> joined_;                  // clients' last runs
+  std::set<std::string> too_late_;  // clients that joined a run after its end
   std::map<std::pair<const Program*, const Program*>, Instant> rivals_;  // fly together since
   std::map<std::uint64_t, std::uint64_t> requests_;  // runs, by number of the request
   std::uint64_t steps_ = 0;

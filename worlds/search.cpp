@@ -7,6 +7,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
+#include <regex>
 #include <set>
 #include <thread>
 
@@ -20,15 +21,13 @@ using namespace std::chrono_literals;
 constexpr std::size_t kMostLines = 40;
 constexpr auto kReportInterval = 5s;
 
-/// "ends" of "ends: controller-1 still runs".
-std::string name_property(const std::string& finding) {
-  return finding.substr(0, finding.find(':'));
-}
-
-std::set<std::string> name_properties(const std::vector<std::string>& findings) {
-  std::set<std::string> names;
-  for (const std::string& finding : findings) names.insert(name_property(finding));
-  return names;
+/// The findings without numbers, which differ from world to world.
+std::set<std::string> strip_numbers(const std::vector<std::string>& findings) {
+  static const std::regex kNumber("[0-9a-f]{16}|[0-9]+([.][0-9]+)?");
+  std::set<std::string> kinds;
+  for (const std::string& finding : findings)
+    kinds.insert(std::regex_replace(finding, kNumber, "N"));
+  return kinds;
 }
 
 double find_loss(const Plan& plan) { return plan.hosts > 1 ? plan.link.loss : 0; }
@@ -129,7 +128,7 @@ class Shrinker {
   Shrinker(const Plan& plan, const std::vector<FlownScenario>& scenarios,
            const std::filesystem::path& folder)
       : scenarios_(scenarios), folder_(folder), plan_(plan) {
-    broken_ = name_properties(fly_world(plan, scenarios, folder).findings);
+    broken_ = strip_numbers(fly_world(plan, scenarios, folder).findings);
   }
 
   Plan run() {
@@ -172,9 +171,9 @@ class Shrinker {
   bool attempt(const Change& change) {
     Plan smaller = plan_;
     change(smaller);
-    const auto broken = name_properties(fly_world(smaller, scenarios_, folder_).findings);
+    const auto broken = strip_numbers(fly_world(smaller, scenarios_, folder_).findings);
     const bool is_same = std::any_of(broken.begin(), broken.end(),
-                                     [this](const auto& name) { return broken_.count(name) > 0; });
+                                     [this](const auto& kind) { return broken_.count(kind) > 0; });
     if (is_same) plan_ = smaller;
     return is_same;
   }

@@ -234,7 +234,8 @@ std::vector<sync::Member> ServerProgram::find_members(ParticipantRole role,
                                                       std::uint64_t run_id) const {
   auto found = self().present_members().find(role, run_id);
   if (role == ParticipantRole::ROLE_CONTROLLER)
-    sim::keep_readers(found, peer_.matched_readers(TopicId::kState));
+    sim::keep_matched(found, peer_.matched_readers(TopicId::kState),
+                      peer_.matched_writers(TopicId::kCommand));
   return found;
 }
 

@@ -9,7 +9,6 @@ namespace sls::sync {
 
 ServerWatch::Finding ServerWatch::look(const std::optional<Time>& heard, Time now) {
   constexpr auto kQuietTime = std::chrono::seconds(1);
-  constexpr auto kLongestLook = std::chrono::milliseconds(500);
   report_.reset();
   if (now - looked_ > kLongestLook) heard_ += now - looked_;
   looked_ = now;

@@ -9,6 +9,9 @@ namespace sls::sync {
 using Time = std::chrono::steady_clock::time_point;
 using Duration = Time::duration;
 
+/// The longest time between two looks of a program that runs: after a longer one it was stopped.
+inline constexpr Duration kLongestLook = std::chrono::milliseconds(500);
+
 inline double to_seconds(Duration duration) {
   return std::chrono::duration<double>(duration).count();
 }

@@ -14,7 +14,7 @@ namespace sls::sim {
 class Preparation {
  public:
   /// Begins with the claim at `now`.
-  Preparation(RunParts& run, sync::Time now) : run_(run), began_(now) {}
+  Preparation(RunParts& run, sync::Time now) : run_(run), began_(now), looked_(now) {}
 
   bool is_claimed() const { return gathering_.has_value(); }
   /// Looks whether the claim is settled; then the gathering begins.
@@ -30,7 +30,8 @@ class Preparation {
 
  private:
   RunParts& run_;
-  const sync::Time began_;
+  sync::Time began_;  // to listen
+  sync::Time looked_;
   std::optional<Gathering> gathering_;
 };
 

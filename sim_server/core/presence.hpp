@@ -22,11 +22,9 @@ class Presence {
   using Clock = std::chrono::steady_clock;
 
   /// Sets `is_gone` of `controllers`, which are all of the run. Call it several times a second. A
-  /// longer gap between calls means that this process was stopped: it counts as kLongestGap.
+  /// longer gap between calls counts as sync::kLongestLook.
   void look(std::vector<sync::Member>& controllers,
             const std::map<bus::PeerId, Answering>& answering, Clock::time_point now);
-
-  static constexpr std::chrono::milliseconds kLongestGap{500};
 
  private:
   struct Seen {

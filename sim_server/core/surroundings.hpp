@@ -53,12 +53,14 @@ struct Neighbourhood {
   }
 };
 
-/// Removes those whose reader of sls/state is not among `readers`, whom our writer knows: no state
-/// reaches them yet. A client says that it is ready when it sees the server, which may be earlier.
-inline void keep_readers(std::vector<sync::Member>& controllers,
-                         const std::set<bus::PeerId>& readers) {
+/// Removes those whose reader of sls/state is not among `readers`, whom our writer knows, or whose
+/// writer of sls/command is not among `writers`, whom our reader knows: no state reaches them yet,
+/// or no answer us. A client says that it is ready when it sees the server, which may be earlier.
+inline void keep_matched(std::vector<sync::Member>& controllers,
+                         const std::set<bus::PeerId>& readers,
+                         const std::set<bus::PeerId>& writers) {
   const auto is_unknown = [&](const sync::Member& client) {
-    return readers.count(client.peer) == 0;
+    return readers.count(client.peer) == 0 || writers.count(client.peer) == 0;
   };
   controllers.erase(std::remove_if(controllers.begin(), controllers.end(), is_unknown),
                     controllers.end());
@@ -72,7 +74,7 @@ class Surroundings {
 
   /// Changes when a participant announces something new.
   virtual std::uint64_t members_version() const = 0;
-  /// Those present; of controllers, those that states reach (keep_readers).
+  /// Those present; of controllers, those that are matched (keep_matched).
   virtual std::vector<sync::Member> find_members(ParticipantRole role,
                                                  std::uint64_t run_id) const = 0;
   /// The runs of the other servers.

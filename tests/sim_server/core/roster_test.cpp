@@ -249,12 +249,13 @@ TEST(RosterTest, WithoutTheExpectedRecordersNoStepIsWithinTheLimit) {
   EXPECT_EQ(calc_recorder_limit({{}, {make_recorder_at(5)}}, 2), 0u);
 }
 
-TEST(RosterTest, AControllerThatNoStateReachesYetIsLeftOut) {
-  const auto reached = make_controller("reached"), late = make_controller("late");
-  std::vector<sync::Member> controllers = {late, reached};
-  keep_readers(controllers, {reached.peer});
+TEST(RosterTest, AControllerWhoseReaderOrWriterIsNotMatchedYetIsLeftOut) {
+  const auto matched = make_controller("matched"), deaf = make_controller("deaf");
+  const auto dumb = make_controller("dumb");
+  std::vector<sync::Member> controllers = {deaf, matched, dumb};
+  keep_matched(controllers, {matched.peer, dumb.peer}, {matched.peer, deaf.peer});
   ASSERT_EQ(controllers.size(), 1u);
-  EXPECT_EQ(controllers.front().peer, reached.peer);
+  EXPECT_EQ(controllers.front().peer, matched.peer);
 }
 
 TEST(RosterTest, WithoutRecordersNoStepIsBeyondTheLimit) {
