@@ -3,8 +3,8 @@
 function(sls_count_branches)
   foreach(target IN ITEMS sls_client sls_judgement sls_record sls_server_core sls_sim sls_sync sls_world sls_worlds
                           sls_test_headers sync_test client_core_test recorder_core_test server_core_test)
-    target_compile_options(${target} PRIVATE -O0 -g1 --coverage -fno-inline)
+    target_compile_options(${target} PRIVATE -O1 -fprofile-instr-generate -fcoverage-mapping)
   endforeach()
-  target_link_options(sls_sync INTERFACE --coverage)
+  target_link_options(sls_sync INTERFACE -fprofile-instr-generate)
 endfunction()
 cmake_language(DEFER CALL sls_count_branches)

@@ -2,12 +2,14 @@
 
     python3 -B tests/core_coverage.py [--build FOLDER] [--worlds A-B]
 
-Branches that only an exception takes do not count: the compiler adds one to almost every call.
+A branch is one outcome of a condition in the source, as Clang counts them (packages clang and llvm): each operand of
+`&&` and `||` has two, and each label of a switch one.
 """
 
 import argparse
 import collections
 import json
+import os
 import pathlib
 import subprocess
 import sys
@@ -17,37 +19,37 @@ CORES = ("common/sync", "control_client/core", "recorder/core", "sim_server/core
 TESTS = ("sync_test", "client_core_test", "recorder_core_test", "server_core_test", "fault_line_test")
 
 
-def run(folder: pathlib.Path, seeds: str | None) -> None:
-    """Builds the tests of the cores, or the worlds of the seeds, with counters, and runs them."""
+def run(folder: pathlib.Path, seeds: str | None) -> list[pathlib.Path]:
+    """Builds the tests of the cores, or the worlds of the seeds, with counters, and runs them. Returns the programs."""
     configure = ["cmake", "--preset", "release", "-B", folder, "-DSLS_BUILD_PROGRAMS=OFF",
+                 "-DCMAKE_C_COMPILER=clang", "-DCMAKE_CXX_COMPILER=clang++",
                  f"-DCMAKE_PROJECT_sls_INCLUDE={ROOT / 'tests/core_coverage.cmake'}"]
-    targets = TESTS if seeds is None else ("sls_worlds",)
-    for command in (configure, ["ninja", "-C", folder, *targets]):
+    programs = [folder / "tests" / test for test in TESTS] if seeds is None else [folder / "bin/sls_worlds"]
+    for command in (configure, ["ninja", "-C", folder, *(program.name for program in programs)]):
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL, cwd=ROOT)
-    for counters in folder.rglob("*.gcda"):
-        counters.unlink()
-    for target in targets:
-        command = [folder / "tests" / target] if seeds is None else [folder / "bin" / target, "--seeds", seeds]
-        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    for program in programs:
+        subprocess.run([program] if seeds is None else [program, "--seeds", seeds], check=True,
+                       stdout=subprocess.DEVNULL, env={**os.environ, "LLVM_PROFILE_FILE": f"{program}.profraw"})
+    counters = [f"{program}.profraw" for program in programs]
+    subprocess.run(["llvm-profdata", "merge", "-o", folder / "counters", *counters], check=True)
+    return programs
 
 
-def count(folder: pathlib.Path) -> dict:
-    """The branches of each file of a core: {file: {line: [times taken, ...]}}."""
-    files = collections.defaultdict(dict)
-    for counters in folder.rglob("*.gcda"):
-        report = subprocess.run(["gcov", "--json-format", "--stdout", "--branch-probabilities", counters],
-                                check=True, capture_output=True, cwd=folder).stdout
-        for line in report.splitlines():
-            for file in json.loads(line)["files"]:
-                path = (folder / file["file"]).resolve()
-                name = str(path.relative_to(ROOT)) if ROOT in path.parents else ""
-                if not name.startswith(tuple(core + "/" for core in CORES)):
-                    continue
-                for entry in file["lines"]:
-                    taken = [branch["count"] for branch in entry["branches"] if not branch["throw"]]
-                    known = files[name].setdefault(entry["line_number"], taken)
-                    if known is not taken and len(known) == len(taken):
-                        files[name][entry["line_number"]] = [a + b for a, b in zip(known, taken)]
+def count(folder: pathlib.Path, programs: list[pathlib.Path]) -> dict:
+    """The branches of each file of a core: {file: {(line, column): [times true, times false]}}."""
+    objects = [argument for program in programs[1:] for argument in ("-object", program)]
+    report = subprocess.run(["llvm-cov", "export", f"-instr-profile={folder / 'counters'}", programs[0], *objects],
+                            check=True, capture_output=True).stdout
+    files = collections.defaultdict(lambda: collections.defaultdict(lambda: [0, 0]))
+    for file in json.loads(report)["data"][0]["files"]:
+        path = pathlib.Path(file["filename"]).resolve()
+        name = str(path.relative_to(ROOT)) if ROOT in path.parents else ""
+        if not name.startswith(tuple(core + "/" for core in CORES)):
+            continue
+        for line, column, _, _, is_true, is_false, *_ in file["branches"]:
+            taken = files[name][line, column]  # a template has several instances
+            taken[0] += is_true
+            taken[1] += is_false
     return files
 
 
@@ -57,17 +59,15 @@ def main() -> int:
     parser.add_argument("--worlds", metavar="A-B", help="flies worlds of these seeds instead of the scripts")
     options = parser.parse_args()
     folder = options.build.resolve()
-    run(folder, options.worlds)
-    files = count(folder)
+    files = count(folder, run(folder, options.worlds))
     print(f"{'file':48} {'branches':>8} {'taken':>6}")
     everything = taken = 0
     for name in sorted(files):
-        branches = [times for line in files[name].values() for times in line]
-        hit = sum(times != 0 for times in branches)  # several threads count: a sum may overflow
+        branches = [times for condition in files[name].values() for times in condition]
+        hit = sum(times > 0 for times in branches)
         everything, taken = everything + len(branches), taken + hit
-        missed = sorted(line for line, times in files[name].items() if 0 in times)
-        if branches:
-            print(f"{name:48} {len(branches):8} {hit:6}  {' '.join(map(str, missed))}")
+        missed = [f"{line}:{column}" for (line, column), times in sorted(files[name].items()) if 0 in times]
+        print(f"{name:48} {len(branches):8} {hit:6}  {' '.join(missed)}")
     print(f"{'all':48} {everything:8} {taken:6}  {100 * taken / max(everything, 1):.1f} %")
     return 0
 
