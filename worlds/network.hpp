@@ -43,6 +43,12 @@ Instant calc_packet_time(double bandwidth_mbit);
 
 class Network;
 
+/// Policies of a reader; none: 0.
+struct ReaderLimits {
+  Instant deadline{0};  ///< each one without a sample is counted
+  Instant lifespan{0};  ///< older samples are dropped
+};
+
 /// A participant of the domain, with its endpoints.
 class Peer {
  public:
@@ -54,20 +60,16 @@ class Peer {
   Peer(Network& network, Process& process, const bus::PeerId& id)
       : network_(network), process_(process), id_(id) {}
 
-  /// Policies of a reader; none: 0.
-  struct Limits {
-    Instant deadline{0};  ///< each one without a sample is counted
-    Instant lifespan{0};  ///< older samples are dropped
-  };
   /// Of commands in real time, as config/qos/endpoints.xml.
-  static constexpr Limits kRealtimeLimits{std::chrono::milliseconds(100),
-                                          std::chrono::milliseconds(200)};
+  static constexpr ReaderLimits kRealtimeLimits{std::chrono::milliseconds(100),
+                                                std::chrono::milliseconds(200)};
 
   const bus::PeerId& id() const { return id_; }
   Process& process() const { return process_; }
 
   template <class Message>
-  void add_reader(std::function<void(const Message&, const Arrival&)> handler, Limits limits = {}) {
+  void add_reader(std::function<void(const Message&, const Arrival&)> handler,
+                  ReaderLimits limits = {}) {
     const auto topic = static_cast<std::size_t>(bus::Topic<Message>::kId);
     readers_[topic].handler = [handler = std::move(handler)](const void* message,
                                                              const Arrival& arrival) {
@@ -128,7 +130,7 @@ class Peer {
   };
   struct Reader {
     std::function<void(const void*, const Arrival&)> handler;
-    Limits limits;
+    ReaderLimits limits;
     bool ignores_lifespan = false;
     std::optional<sync::Time> awaited_since;  // the last sample, or the last missed deadline
     std::uint64_t missed_deadlines = 0;

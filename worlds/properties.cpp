@@ -130,7 +130,7 @@ void Properties::on_published(std::uint64_t run_id, std::uint64_t step,
   const auto ready = static_cast<int>(run.ready.size());
   // A recorder that dies during a pause before the first step was there when all were ready.
   const int recorders =
-      run.was_paused ? static_cast<int>(run.recorders.size()) : count_living(run.recorders);
+      run.was_paused ? static_cast<int>(run.recorders.size()) : count_living(run, run.recorders);
   if (step == 0 && (ready < expected.controllers || recorders < expected.recorders))
     find(fmt::format("start: run {:016x} begins with {} controllers and {} recorders", run_id,
                      ready, recorders));
@@ -199,19 +199,21 @@ void Properties::on_status(const SimStatus& status, const Network& network) {
 }
 
 /// Those that have not been dead for so long that the others must know.
-int Properties::count_living(const std::set<std::string>& names) const {
-  return static_cast<int>(std::count_if(names.begin(), names.end(), [this](const auto& name) {
+/// Those that the server may take for alive: what a killed one said last may have waited for a
+/// server that was stopped.
+int Properties::count_living(const Run& run, const std::set<std::string>& names) const {
+  const auto continued = continued_.find(run.server->name());
+  const Instant read = continued == continued_.end() ? Instant(0) : continued->second;
+  return static_cast<int>(std::count_if(names.begin(), names.end(), [&](const auto& name) {
     const auto killed = killed_.find(name);
-    return killed == killed_.end() || timeline_.now() - killed->second < kGoneAfter;
+    return killed == killed_.end() || timeline_.now() - std::max(killed->second, read) < kGoneAfter;
   }));
 }
 
 /// In lockstep a flight waits for the recorders that it expects.
 void Properties::check_recorders(const Run& run, std::uint64_t step,
                                  const config::WaitFor& expected) {
-  const auto continued = continued_.find(run.server->name());
-  const bool is_back = continued != continued_.end() && timeline_.now() - continued->second < 1s;
-  if (run.waits_for_recorders && !is_back && count_living(run.recorders) < expected.recorders)
+  if (run.waits_for_recorders && count_living(run, run.recorders) < expected.recorders)
     find(fmt::format("recorders: step {} leaves without them", step));
 }
 
@@ -275,7 +277,12 @@ void Properties::on_announced(const Program& program, const Participant& message
   if (message.done()) run.done.try_emplace(program.name(), timeline_.now());
   if (is_client && !static_cast<const ClientProgram&>(program).keeps_contract())
     run.wrong.insert(program.name());
-  if (is_client) check_join(program, message.run_id(), heard);
+  std::uint64_t& joined = joined_[program.name()];
+  if (joined != message.run_id()) {
+    if (run.has_ended) too_late_.insert(program.name());
+    const std::uint64_t left = std::exchange(joined, message.run_id());
+    if (is_client) check_join(program, message.run_id(), left, heard);
+  }
   if (is_client && !run.has_status)
     find(fmt::format("joins: {} joins run {:016x}, whose claim is not settled", program.name(),
                      message.run_id()));
@@ -295,12 +302,8 @@ void Properties::on_announced(const Program& program, const Participant& message
 }
 
 /// A client joins a run that goes on, and leaves one only after its end or for a later server's.
-void Properties::check_join(const Program& program, std::uint64_t run_id,
+void Properties::check_join(const Program& program, std::uint64_t run_id, std::uint64_t left,
                             const sync::Servers& heard) {
-  std::uint64_t& before = joined_[program.name()];
-  if (before == run_id) return;
-  const std::uint64_t left = std::exchange(before, run_id);
-  if (runs_.at(run_id).has_ended) too_late_.insert(program.name());
   const SimStatus* status = heard.find_status(run_id);
   if (!status || sync::calc_progress(status->phase()) < 0)
     find(fmt::format("joins: {} joins run {:016x}, and has heard {}", program.name(), run_id,
@@ -402,7 +405,7 @@ void Properties::check(const Plan& plan, const std::vector<std::unique_ptr<Progr
       const auto& recorder = static_cast<const RecorderProgram&>(*program);
       if (!recorder.folder().empty()) folders[recorder.folder()] = program.get();
       for (const StoredRecording& recording : recorder.recordings())
-        check_recording(*program, recording, flown);
+        check_recording(*program, recording, flown, plan.promise);
     }
     if (plan.promise != Promise::kNone && program->role() == Role::kServer)
       check_end(*program, programs);
@@ -418,7 +421,7 @@ void Properties::check(const Plan& plan, const std::vector<std::unique_ptr<Progr
   for (const auto& [folder, program] : folders)
     for (StoredRecording& recording : read_recordings(folder)) {
       if (is_power_cut && !recording.is_closed) recording.damages.clear();
-      check_recording(*program, recording, flown);
+      check_recording(*program, recording, flown, plan.promise);
     }
   if (plan.promise != Promise::kNone && !is_any_finished())
     find("finishes: no flight was finished");
@@ -442,7 +445,7 @@ void Properties::check_begin(std::uint64_t run_id, const Run& run, const FlownSc
 }
 
 void Properties::check_recording(const Program& program, const StoredRecording& recording,
-                                 const FlownScenario& flown) {
+                                 const FlownScenario& flown, Promise promise) {
   const auto found = runs_.find(recording.run_id);
   if (found == runs_.end())
     return find(fmt::format("known-run: {} recorded run {:016x}, which no server flew",
@@ -451,15 +454,13 @@ void Properties::check_recording(const Program& program, const StoredRecording& 
   check_rows(program, recording, run);
   for (const std::string& damage : recording.damages)
     find(fmt::format("disk: {}: {}", program.name(), damage));
+  if (promise == Promise::kCalm && run.has_ended && recording.claims.outcome == "failed")
+    check_whole(program, recording, run);
   if (!recording.claims.complete) return;
   if (!run.is_finished)
     find(fmt::format("complete: {} says so of run {:016x}, which was not finished", program.name(),
                      recording.run_id));
-  for (const auto& [vehicle, rows] : run.rows) {
-    const auto kept = recording.rows.find(vehicle);
-    if (kept == recording.rows.end() || kept->second.steps.size() != rows.size())
-      find(fmt::format("complete: {} lacks rows of vehicle {}", program.name(), vehicle));
-  }
+  check_whole(program, recording, run);
   if (!run.has_late && recording.certificate != run.certificate)
     find(fmt::format("complete: {} differs from what {} flew", program.name(), run.server->name()));
   if (run.is_exact && !run.has_mistakes &&
@@ -468,6 +469,15 @@ void Properties::check_recording(const Program& program, const StoredRecording& 
   if (!recording.claims.timing.empty() && recording.claims.timing != run.timing)
     find(fmt::format("timing-label: {}: expected '{}', got '{}'", program.name(), run.timing,
                      recording.claims.timing));
+}
+
+void Properties::check_whole(const Program& program, const StoredRecording& recording,
+                             const Run& run) {
+  for (const auto& [vehicle, rows] : run.rows) {
+    const auto kept = recording.rows.find(vehicle);
+    if (kept == recording.rows.end() || kept->second.steps.size() != rows.size())
+      find(fmt::format("complete: {} lacks rows of vehicle {}", program.name(), vehicle));
+  }
 }
 
 /// Each row is that of the run; rows are in order; those that are not there are listed.

@@ -133,14 +133,17 @@ class Properties {
   };
 
   void find(std::string finding);
-  void check_join(const Program& program, std::uint64_t run_id, const sync::Servers& heard);
-  int count_living(const std::set<std::string>& names) const;
+  void check_join(const Program& program, std::uint64_t run_id, std::uint64_t left,
+                  const sync::Servers& heard);
+  int count_living(const Run& run, const std::set<std::string>& names) const;
   void check_recorders(const Run& run, std::uint64_t step, const config::WaitFor& expected);
   void check_stall(Run& run, std::uint64_t run_id);
   void check_rivals(const Run& run, const Network& network);
   void check_applied(const model::StepRecord& before, const model::StepRecord& record);
   void check_recording(const Program& program, const StoredRecording& recording,
-                       const FlownScenario& flown);
+                       const FlownScenario& flown, Promise promise);
+  /// All rows of the run are there.
+  void check_whole(const Program& program, const StoredRecording& recording, const Run& run);
   void check_rows(const Program& program, const StoredRecording& recording, const Run& run);
   void check_failure(const Program& server, const FlownScenario& flown);
   void check_exit(const Program& program);
@@ -151,8 +154,8 @@ class Properties {
   Trace& trace_;
   std::map<std::uint64_t, Run> runs_;
   std::map<std::string, Instant> killed_, stopped_, continued_;  // by name
-  std::map<std::string, std::uint64_t> joined_;                  // clients' last runs
-  std::set<std::string> too_late_;  // clients that joined a run after its end
+  std::map<std::string, std::uint64_t> joined_;                  // last runs
+  std::set<std::string> too_late_;                               // that joined a run after its end
   std::map<std::pair<const Program*, const Program*>, Instant> rivals_;  // fly together since
   std::map<std::uint64_t, std::uint64_t> requests_;  // runs, by number of the request
   std::uint64_t steps_ = 0;

@@ -21,13 +21,10 @@ using namespace std::chrono_literals;
 constexpr std::size_t kMostLines = 40;
 constexpr auto kReportInterval = 5s;
 
-/// The findings without numbers, which differ from world to world.
-std::set<std::string> strip_numbers(const std::vector<std::string>& findings) {
+/// A finding without its numbers, which differ from world to world.
+std::string strip_numbers(const std::string& finding) {
   static const std::regex kNumber("[0-9a-f]{16}|[0-9]+([.][0-9]+)?");
-  std::set<std::string> kinds;
-  for (const std::string& finding : findings)
-    kinds.insert(std::regex_replace(finding, kNumber, "N"));
-  return kinds;
+  return std::regex_replace(finding, kNumber, "N");
 }
 
 double find_loss(const Plan& plan) { return plan.hosts > 1 ? plan.link.loss : 0; }
@@ -128,7 +125,8 @@ class Shrinker {
   Shrinker(const Plan& plan, const std::vector<FlownScenario>& scenarios,
            const std::filesystem::path& folder)
       : scenarios_(scenarios), folder_(folder), plan_(plan) {
-    broken_ = strip_numbers(fly_world(plan, scenarios, folder).findings);
+    const auto findings = fly_world(plan, scenarios, folder).findings;
+    if (!findings.empty()) broken_ = strip_numbers(findings.front());
   }
 
   Plan run() {
@@ -171,9 +169,10 @@ class Shrinker {
   bool attempt(const Change& change) {
     Plan smaller = plan_;
     change(smaller);
-    const auto broken = strip_numbers(fly_world(smaller, scenarios_, folder_).findings);
-    const bool is_same = std::any_of(broken.begin(), broken.end(),
-                                     [this](const auto& kind) { return broken_.count(kind) > 0; });
+    const auto findings = fly_world(smaller, scenarios_, folder_).findings;
+    const bool is_same = std::any_of(
+        findings.begin(), findings.end(),
+        [this](const std::string& finding) { return strip_numbers(finding) == broken_; });
     if (is_same) plan_ = smaller;
     return is_same;
   }
@@ -181,7 +180,7 @@ class Shrinker {
   const std::vector<FlownScenario>& scenarios_;
   const std::filesystem::path folder_;
   Plan plan_;
-  std::set<std::string> broken_;
+  std::string broken_;
 };
 
 }  // namespace

@@ -31,7 +31,7 @@ void ServerProgram::start() {
   // The order of the endpoints is that of sim_server/endpoints.hpp.
   peer_.add_reader<Commands>([this](const Commands& sample,
                                     const Peer::Arrival& arrival) { on_commands(sample, arrival); },
-                             is_realtime() ? Peer::kRealtimeLimits : Peer::Limits());
+                             is_realtime() ? Peer::kRealtimeLimits : ReaderLimits());
   peer_.add_writer<Parameters>();
   peer_.add_reader<Participant>([this](const Participant& sample, const Peer::Arrival& arrival) {
     note(sample, arrival);

@@ -3,8 +3,11 @@
 namespace sls::sim {
 
 void AnswerJudge::judge(CommandSample& sample, bool is_published) {
-  if (sample.answers.empty() && sample.run_id == run_.run_id)
+  if (sample.answers.empty() && sample.run_id == run_.run_id) {
     run_.watch.answers().note_empty(sample.sender, sample.step);
+    for (const auto& vehicle : run_.fleet.vehicles())
+      vehicle->gate.note_sign_of_life(sample.sender);
+  }
   for (OfferedAnswer& offered : sample.answers) {
     offered.is_early = !is_published || sample.arrived.time < published_;
     Vehicle* vehicle = run_.fleet.find(offered.vehicle_id);

@@ -68,7 +68,10 @@ std::vector<std::string> ClientClocks::look(const std::vector<sync::Member>& con
     const bool is_wrong = offset ? std::chrono::abs(*offset) > limit : clock.is_wrong;
     if (is_wrong != std::exchange(clock.is_wrong, is_wrong))
       news.push_back(describe(client, *offset, is_wrong));
-    is_any_wrong_ = is_any_wrong_ || is_wrong || (!offset && client.age > lifespan);
+    const bool has_fallen_silent = clock.noted != sync::Time() && now - clock.noted > kMeasured;
+    is_any_wrong_ =
+        is_any_wrong_ || is_wrong ||
+        (!offset && (client.age > lifespan || (has_fallen_silent && !client.is_repeated)));
   }
   clocks_ = std::move(present);
   return news;

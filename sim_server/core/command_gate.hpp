@@ -109,6 +109,10 @@ class CommandGate {
   /// accepted answer. Empty if the awaited step has its answer.
   std::string describe_refusals() const;
 
+  /// The client has sent a sample that answers no vehicle.
+  void note_sign_of_life(const bus::PeerId& sender) {
+    if (Client* client = find_client(sender)) ++client->answers;
+  }
   /// Calls `note(peer, answers, is_missing)` for each client: the number of its answers so far, and
   /// whether its answer to the last awaited step is missing.
   template <class Note>

@@ -81,7 +81,9 @@ bool RealtimePacing::wait_for_last_answers(sync::Time now) {
     throw std::runtime_error(
         fmt::format("step {}: the mission was finished, but {} does not answer", run_.fleet.step(),
                     run_.watch.name_awaited_controllers()));
-  if (last_attempts_++ > 0) {
+  if (last_attempts_++ == 0) {
+    ignore_lifespan_if_needed();
+  } else {
     ++run_.report.link.resent();
     run_.outputs.resend_states(run_.fleet, [](std::size_t) { return true; });
   }
@@ -134,7 +136,13 @@ void RealtimePacing::roster_changed(sync::Time now) {
   if (!lifespan_) return;
   for (const std::string& news : clocks_.look(run_.watch.roster().controllers, *lifespan_, now))
     run_.report.announce(news, now);
-  if (clocks_.is_any_wrong() != std::exchange(is_lifespan_ignored_, clocks_.is_any_wrong()))
+  ignore_lifespan_if_needed();
+}
+
+/// A wrong clock makes answers expire. The last one must not, however late it is.
+void RealtimePacing::ignore_lifespan_if_needed() {
+  const bool is_needed = lifespan_ && (clocks_.is_any_wrong() || last_attempts_ > 0);
+  if (is_needed != std::exchange(is_lifespan_ignored_, is_needed))
     run_.outputs.ignore_lifespan(is_lifespan_ignored_);
 }
 

@@ -39,6 +39,7 @@ class RealtimePacing : public Pacing {
   /// After late answers have ended the mission, waits for the answers to the last step; true if the
   /// wait is to go on.
   bool wait_for_last_answers(sync::Time now);
+  void ignore_lifespan_if_needed();
   void pass_over_silent_clients(sync::Time now);
   void fly_without_answers(sync::Time now);
   void show_progress(sync::Time now);

@@ -227,7 +227,7 @@ class SimulatedMiddleware : public Middleware {
         node_->peer.template add_writer<Message>();
       else
         node_->peer.template add_reader<Message>(
-            hear, topic == TopicId::kCommand ? Peer::kRealtimeLimits : Peer::Limits());
+            hear, topic == TopicId::kCommand ? Peer::kRealtimeLimits : ReaderLimits());
     }
     void write(std::uint64_t number) override { node_->peer.write(make<Message>(number)); }
     Numbers heard() override { return heard_; }

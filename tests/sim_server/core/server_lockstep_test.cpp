@@ -104,6 +104,24 @@ TEST(ServerLockstepTest, AnswersThatMoveNoVehicleAreCounted) {
   EXPECT_EQ(rig.status().counters().rejected_run(), 0u);
 }
 
+TEST(ServerLockstepTest, AnAnswerOfNoVehicleIsASignOfLife) {
+  for (const bool answers : {true, false}) {
+    ServerRig rig;
+    rig.repeats_announcements = false;
+    rig.join("pilot");
+    rig.fall_silent("pilot");
+    for (int ms = 100; ms <= 6500; ms += 100) {
+      if (answers) rig.answer("pilot", for_vehicles({}));
+      rig.wait_until(ms);
+    }
+    rig.stop("interrupted by SIGINT");
+    EXPECT_EQ(rig.core().error(), "");
+    const Lines log = rig.take_log();
+    const bool is_gone = log.back().find("(gone)") != std::string::npos;
+    EXPECT_EQ(is_gone, !answers) << log.back();
+  }
+}
+
 TEST(ServerLockstepTest, TheAnswerThatEndsTheMissionEndsTheRun) {
   ServerRig rig;
   rig.join("pilot");

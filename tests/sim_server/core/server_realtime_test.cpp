@@ -195,6 +195,7 @@ TEST_F(ServerRealtimeTest, ALateEndWaitsForTheAnswerToTheLastState) {
 }
 
 TEST_F(ServerRealtimeTest, ALateEndWithoutALastAnswerFailsAfterASecond) {
+  rig_.lifespan = 100ms;
   fly_to(249);
   rig_.wait_until(1004);
   ServerRig::Answer last{250};
@@ -202,6 +203,7 @@ TEST_F(ServerRealtimeTest, ALateEndWithoutALastAnswerFailsAfterASecond) {
   rig_.answer("pilot", last);
   rig_.wait_until(2007);
   EXPECT_EQ(rig_.phase(), Phase::kAwaitingAnswers);
+  EXPECT_TRUE(rig_.is_lifespan_ignored()) << "its clock may be wrong";
   rig_.wait_until(2008);
   EXPECT_EQ(rig_.core().error(),
             "step 251: the mission was finished, but controller 'pilot' on box does not answer");
@@ -267,6 +269,21 @@ TEST_F(ServerRealtimeTest, LifespanIsIgnoredWhileAClientWithoutAnswersHasStampsT
   EXPECT_FALSE(rig_.is_lifespan_ignored()) << "only the announcement was late";
   for (const std::string& line : rig_.take_log())
     EXPECT_EQ(line.find("clock"), std::string::npos) << line;
+}
+
+TEST_F(ServerRealtimeTest, LifespanIsIgnoredAfterASecondOfSilenceOfAClientThatAnnouncesItselfOnce) {
+  for (const bool repeats : {true, false}) {
+    ServerRig rig(ServerRig::make_realtime_scenario());
+    rig.lifespan = 100ms;
+    rig.repeats_announcements = repeats;
+    rig.join("pilot");
+    rig.fly_to(100);  // its clock is set back: the middleware drops its next answers
+    const std::int64_t last = rig.ms();
+    rig.wait_until(last + 1000);
+    EXPECT_FALSE(rig.is_lifespan_ignored());
+    rig.wait_until(last + 1200);
+    EXPECT_EQ(rig.is_lifespan_ignored(), !repeats);
+  }
 }
 
 TEST_F(ServerRealtimeTest, AnAnswerOlderThanTheLifespanIsStale) {

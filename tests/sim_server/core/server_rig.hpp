@@ -175,6 +175,7 @@ class ServerRig : public Outputs, public Surroundings {
   bool is_on_this_machine = true;
   bool knows_every_claim = true;
   Neighbourhood neighbourhood;
+  bool repeats_announcements = true;            ///< those who join from now on
   std::chrono::nanoseconds announcement_age{};  ///< of all controllers, by their clocks
   std::string problem;                          ///< that the middleware has found
   bool is_queue_full = false;                   ///< of records
@@ -228,7 +229,7 @@ class ServerRig : public Outputs, public Surroundings {
     member.announcement.last_complete_step(-1);
     member.announcement.vehicle_ids({0, 1});
     member.ready_since = now_;
-    member.is_repeated = true;
+    member.is_repeated = repeats_announcements;
     return member;
   }
   void look() {
