@@ -24,6 +24,7 @@ PROFILES = {"shm": "default", "udp": "udp", "hosts": "lan"}
 HOST_OF = {"sim_server": "server", "recorder": "recorder", "controller": "controller", "standby": "controller"}
 OVERRUN_S = 20.0  # the others end so much later than the first
 STOP_S = 10.0     # a process under test has so long to end after its stop signal
+ENGINE_FAILED = 125  # of `docker run` without an engine or image: the first line says why, the last one is a hint
 WORLDS = 10       # of one flight of the placement `worlds`
 LOOPBACK = ("<CycloneDDS><Domain><General><Interfaces><NetworkInterface name=\"lo\" multicast=\"true\"/></Interfaces>"
             "</General></Domain></CycloneDDS>")
@@ -215,7 +216,7 @@ class Programs:
         self._is_ready = self._own.ready in self._read_log("controller")
         if not self._is_ready and now - self._begin > self._own.ready_s:
             self._fail(f"controller: expected '{self._own.ready}' in its output within {self._own.ready_s:g} s, got "
-                       f"{self._read_last_line('controller') or 'nothing'}")
+                       f"{self._read_line('controller') or 'nothing'}")
 
     def _watch_steps(self, now: float) -> None:
         """Faults begin with the first recorded steps; a controller that hangs stops them."""
@@ -282,7 +283,7 @@ class Programs:
             for name in ("controller", "standby"):
                 code = codes.get(name, 0)
                 if code and not (self._is_asked_to_stop and (code < 0 or code > 128)):
-                    return f"{name}: {describe_code(code)} after the flight{self._quote(name)}"
+                    return f"{name}: {describe_code(code)} after the flight{self._quote(name, code)}"
             return ""
         own = ("controller", "standby")
         if outcome == "failed":  # the reason says it all, unless a controller ended first
@@ -290,8 +291,9 @@ class Programs:
             blamed = next((name for name in list(codes)[:1] if is_gone and name in own), "")
         else:
             blamed = next((name for name, code in codes.items() if code or name in own), "sim_server")
-        return blamed and (f"{blamed}: {describe_code(codes.get(blamed, 0))} {step}, before the flight was over"
-                           f"{self._quote(blamed)}")
+        code = codes.get(blamed, 0)
+        return blamed and (f"{blamed}: {describe_code(code)} {step}, before the flight was over"
+                           f"{self._quote(blamed, code)}")
 
     def _read_log(self, name: str) -> str:
         try:
@@ -299,11 +301,12 @@ class Programs:
         except OSError:
             return ""
 
-    def _read_last_line(self, name: str) -> str:
-        return (self._read_log(name).strip().splitlines() or [""])[-1][:200]
+    def _read_line(self, name: str, index: int = -1) -> str:
+        return (self._read_log(name).strip().splitlines() or [""])[index][:200]
 
-    def _quote(self, name: str) -> str:
-        return f": {line}" if (line := self._read_last_line(name)) else ", without a word"
+    def _quote(self, name: str, code: int) -> str:
+        line = self._read_line(name, 0 if code == ENGINE_FAILED else -1)
+        return f": {line}" if line else ", without a word"
 
 
 def describe_code(code: int) -> str:

@@ -6,6 +6,7 @@ import os
 import re
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -149,6 +150,8 @@ SHELL = "command: [sh, -c, '{}']"
     ("command: [no-such-program]", "controller: expected a program that starts, got: no-such-program: no such program"),
     (SHELL.format("echo no licence; exit 3"),
      "controller: ended with 3 at step 0, before the flight was over: no licence"),
+    (SHELL.format("echo docker: Cannot connect; echo Run docker --help; exit 125"),
+     "controller: ended with 125 at step 0, before the flight was over: docker: Cannot connect"),
     (SHELL.format("exit 0"), "controller: ended with 0 at step 0, before the flight was over, without a word"),
     (SHELL.format("sleep 1000"), "outcome finished: expected it, got failed: not ready within 4 s: controller"),
     (SHELL.format("echo hello; sleep 1000") + ", ready: joined, ready_s: 3",
@@ -165,6 +168,13 @@ def test_the_verdict_names_what_a_controller_did(check, tmp_path, controller, ex
     page = (tmp_path / "pages/check-shm/report.html").read_text()
     assert expected.partition(",")[0].replace("'", "&#x27;") in page and "Output of the programs" in page
     assert (tmp_path / "pages/index.html").is_file()
+
+
+def test_a_controller_whose_port_is_in_use_is_quoted(check):
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+        code, flights, _ = check(f'command: [python3, -m, http.server, -b, 127.0.0.1, "{port}"]', "--placement", "shm")
+    assert code == 1 and "Address already in use" in flights[0]["problems"][0]
 
 
 def test_a_process_that_does_not_stop_is_killed_and_named(check):
