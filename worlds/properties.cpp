@@ -232,10 +232,10 @@ void Properties::check_stall(Run& run, std::uint64_t run_id) {
 void Properties::check_rivals(const Run& run, const Network& network) {
   for (const auto& [id, other] : runs_) {
     if (&other == &run || other.has_ended || !other.has_status) continue;
-    const bool share =
-        std::any_of(run.vehicle_ids.begin(), run.vehicle_ids.end(), [&](std::uint32_t vehicle) {
-          return std::count(other.vehicle_ids.begin(), other.vehicle_ids.end(), vehicle) > 0;
-        });
+    const bool share = std::any_of(run.vehicle_ids.begin(), run.vehicle_ids.end(),
+                                   [&ids = other.vehicle_ids](std::uint32_t vehicle) {
+                                     return std::count(ids.begin(), ids.end(), vehicle) > 0;
+                                   });
     const auto key = std::minmax(run.server, other.server);
     const bool meet = share && other.server != run.server && !other.server->process().has_ended() &&
                       !other.server->process().is_stopped() &&
