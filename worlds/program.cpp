@@ -94,7 +94,24 @@ void Program::repeat_announcement_if_due() {
 
 const sync::Servers& Program::present_servers() {
   servers_.set_present(peer_.matched_writers(TopicId::kParameters));
+  look_for_unclaimed();
   return servers_;
+}
+
+/// As bus::ServerDirectory.
+void Program::look_for_unclaimed() {
+  constexpr auto kInterval = std::chrono::milliseconds(100);
+  if (now() - looked_for_unclaimed_ < kInterval) return;
+  looked_for_unclaimed_ = now();
+  std::map<bus::PeerId, std::set<std::string>> writers;
+  const auto add = [&](TopicId topic, const char* name) {
+    for (const bus::PeerId& peer : peer_.matched_writers(topic)) writers[peer].insert(name);
+  };
+  add(TopicId::kState, bus::Topic<States>::kName);
+  add(TopicId::kStatus, bus::Topic<SimStatus>::kName);
+  add(TopicId::kRecord, bus::Topic<RecordBatch>::kName);
+  for (const auto& [peer, topics] : servers_.look_for_unclaimed(writers, now()).found)
+    setting_.properties.on_unclaimed(*this, *setting_.network.find(peer));
 }
 
 sync::Membership& Program::present_members() {

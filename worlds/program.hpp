@@ -89,7 +89,10 @@ class Program {
   std::string stop_signal_;
 
  private:
+  void look_for_unclaimed();
+
   const Role role_;
+  sync::Time looked_for_unclaimed_{};
   Instant slowness_{0};
   Instant wakes_{Instant::max()};
   std::uint64_t wake_number_ = 0;

@@ -301,6 +301,14 @@ void Properties::on_announced(const Program& program, const Participant& message
                      message.run_id()));
 }
 
+void Properties::on_unclaimed(const Program& program, const Peer& writer) {
+  const Process& process = writer.process();
+  const bool is_served =
+      process.name().rfind("server", 0) == 0 && !process.has_ended() && !process.is_stopped();
+  if (is_served)
+    find(fmt::format("claims: {} misses the claim of {}", program.name(), process.name()));
+}
+
 /// A client joins a run that goes on, and leaves one only after its end or for a later server's.
 void Properties::check_join(const Program& program, std::uint64_t run_id, std::uint64_t left,
                             const sync::Servers& heard) {

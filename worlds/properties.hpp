@@ -75,6 +75,8 @@ class Properties {
   /// `heard`: what the program knows of servers.
   void on_announced(const Program& program, const Participant& message, const sync::Servers& heard);
   void on_request(const SimControl& request) { requests_[request.request_id()] = request.run_id(); }
+  /// The program finds a participant that writes as a server and claims nothing.
+  void on_unclaimed(const Program& program, const Peer& writer);
   /// `step`: which the recorder says it has completed; `newest`: that came to it, by vehicle.
   void on_progress(const Program& recorder, std::int64_t step,
                    const std::map<std::uint32_t, std::int64_t>& newest);
