@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NoReturn
 
-from bench import campaign, loop, page, parts, start, view
+from bench import campaign, instructions, loop, page, parts, start, view
 from bench.machine import describe_machine, now
 from bench.programs import MeasurementError, Programs, make_scratch
 from bench.results import Figure, format_table
@@ -27,10 +27,11 @@ PARTS: dict[str, tuple[Measure, int]] = {  # int: number of rounds
     "fleet": (parts.measure_fleet, 3),
     "qos": (loop.measure_qos, 3),
     "start": (start.measure_start, 9),
+    "instructions": (instructions.measure_instructions, 1),
     "view": (view.measure_view, 5),
     "page": (page.measure_page, 3),
 }
-DOMAINS = range(61, 81)  # tests use the domains below 61
+DOMAINS = range(61, 81, 2)  # and the one after each; tests use the domains below 61
 
 
 class UsageError(Exception):
@@ -68,7 +69,7 @@ def parse_arguments() -> argparse.Namespace:
 
 
 def take_domain() -> tuple[int, socket.socket]:
-    """A DDS domain that no other bench uses as long as the socket exists."""
+    """A DDS domain that, like the next one, no other bench uses as long as the socket exists."""
     for domain in DOMAINS:
         lock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         try:

@@ -16,7 +16,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 BUILD = pathlib.Path(sys.argv.pop()).resolve() if __name__ == "__main__" else ROOT / "build"
 sys.path.insert(0, str(ROOT))
 
-from bench import campaign, loop, parts  # noqa: E402
+from bench import campaign, instructions, loop, parts  # noqa: E402
 from bench.programs import Programs, wait_for  # noqa: E402
 from bench.results import LESS, Figure, Rounds, format_number, format_table  # noqa: E402
 
@@ -260,6 +260,62 @@ class CampaignTest(unittest.TestCase):
         self.assertGreater(made[2].median, made[1].median)
 
 
+PROFILE = """\
+version: 1
+cmd: made up
+positions: line
+events: Ir
+
+ob=(1) /lib/libc.so.6
+fl=(1) ???
+fn=(1) malloc
+0 7
++2 1
+ob=(2) /build/bin/sim_server
+fn=(2) sls::sim::step(int)
+0 3
+cob=(1)
+cfn=(1)
+calls=2 0
+0 8
+0 4
+cfn=(3) sls::sim::other()
+calls=1 0
+0 100
+fn=(3)
+0 100
+totals: 115
+"""
+
+
+class InstructionsTest(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+    def test_a_profile_gives_what_each_function_took_itself(self):
+        self.assertEqual(instructions.parse_profile(PROFILE.splitlines(keepends=True)), {
+            ("libc.so.6", "malloc"): 8, ("sim_server", "sls::sim::step(int)"): 7,
+            ("sim_server", "sls::sim::other()"): 100})
+
+    def test_a_step_is_what_the_longer_flight_took_more_on_the_threads_that_a_step_wakes(self):
+        # Two threads; the second flies: 8,000 instructions more in 2,000 steps.
+        for name, counts in (("fewer", (500, 1000)), ("more", (600, 9000))):
+            for number, count in enumerate(counts, 1):
+                (self.folder / f"{name}-{number:02}").write_text(
+                    f"ob=(1) libc.so.6\nfn=(1) free\n0 {count}\nob=(2) libslow_clock.so\nfn=(2) time\n0 {count}\n")
+        self.assertEqual(instructions.calc_per_step(self.folder / "fewer", self.folder / "more", 1),
+                         {("libc.so.6", "free"): 4})
+
+    def test_each_function_belongs_to_one_part(self):
+        self.assertEqual(instructions.sum_parts({
+            ("libc.so.6", "pthread_mutex_lock@@GLIBC_2.2.5"): 1, ("sim_server", "pthread_mutex_unlock"): 2,
+            ("libfastrtps.so.2.9.1", "0x1"): 4, ("control_client", "sls::control::calc_qsf()"): 8,
+            ("control_client", "sls::control::Answerer::answer()"): 16, ("libSimTKcommon.so.3.7", "f"): 32}),
+            {"locks": 3, "Fast DDS": 4, "law and mission": 8, "our own": 16, "Simbody": 32})
+
+
 class ProcessTest(unittest.TestCase):
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
@@ -316,7 +372,7 @@ class ProgramTest(unittest.TestCase):
     def test_help_names_every_part(self):
         said = bench("--help").stdout
         for part in ("lockstep", "load", "round-trip", "realtime", "plant", "recorder", "campaign", "fleet",
-                     "qos", "start", "view"):
+                     "qos", "start", "instructions", "view"):
             self.assertIn(part, said)
 
     def check(self, file, part):

@@ -120,7 +120,7 @@ def bench(words: list[str]) -> NoReturn:
             call_script("@setup", "bench_packages")
             call_script("@npm", ROOT / "tests/tools/view")
         build_programs(*FLYING, "sim_ctl", "sls_view", "sls_bench_probe", "sls_bench_spinning_probe",
-                       "sls_microbench", "view_foxglove_publisher")
+                       "sls_microbench", "slow_clock", "view_foxglove_publisher")
     replace_by_module("bench", "--build", BUILD, *words, paths=[str(ROOT)])
 
 

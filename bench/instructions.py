@@ -1,0 +1,219 @@
+"""Instructions per step of the programs, counted by callgrind: a figure that other work does not change.
+
+A flight of 2,000 steps is subtracted from one of 4,000, so start and end do not count. The clocks of the
+programs are as slow as callgrind makes them (slow_clock.c). Of each program the threads count that a step
+wakes; what the others do follows the clock and not the steps.
+"""
+
+import re
+import time
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+from bench.loop import without_recorder
+from bench.programs import MeasurementError, Programs, end_all, wait_for
+from bench.results import LESS, Figure, format_lines
+
+STEPS = (2000, 4000)
+PERIOD_S = 0.001
+LONGEST_S = 600.0
+PLANTS = {"analytic": "  model: analytic", "slung_load": "  pendulum: ideal"}
+# Threads that a step wakes, without and with recorder. Server: the one that receives the answer flies the
+# step; another one writes the batches. Recorder: one receives them, one writes the files.
+STEP_THREADS = {"sim_server": (1, 2), "control_client": (1, 1), "recorder": (0, 2)}
+BARE_ENDS = {"sim_server": "ping", "control_client": "pong"}
+
+# Objects that do not count: valgrind's processor lacks the instructions for SHA-256 that real ones have.
+NOT_COUNTED = re.compile(r"^lib(crypto|slow_clock)\.")
+
+Function = tuple[str, str]  # name of its object file, name
+
+# Parts of a program, by object file and function; the first that fits counts.
+PARTS = (
+    ("numbers as text", "", r"^std::to_chars|add_number|^fmt::|dragonbox"),
+    ("Simbody", r"^libSimTK", ""),
+    ("plant", r"^sim_server$", r"Plant::|Pendulum|^sls::math|^SimTK"),
+    ("law and mission", r"^control_client$",
+     r"^sls::control::(?!Client|Answerer|AnswerStream)|^sls::math"),
+    ("locks", r"^libc\.|^(sim_server|control_client|recorder)$",
+     r"pthread_(mutex|rwlock|cond)|sem_|futex|^__lll|find_if<std::atomic<pthread_mutex_t"),
+    ("calendar time", r"^libc\.|^(sim_server|control_client|recorder)$", r"offtime|__tz|gmtime|localtime"),
+    ("memory", r"^libc\.|^libstdc", r"malloc|free|operator (new|delete)|^unlink_chunk|^tcache|calloc|realloc"),
+    ("dynamic casts", r"^libstdc", r"dyncast|dynamic_cast|strcmp"),
+    ("Fast DDS", r"^lib(fastrtps|fastdds|fastcdr)", ""),
+    ("C and C++ library", r"^(lib|ld-)", ""),
+    ("our own", "", ""),
+)
+
+
+def parse_profile(text: Iterator[str]) -> Counter[Function]:
+    """The instructions of each function itself, of a file that callgrind wrote."""
+    names: dict[tuple[str, str], str] = {}
+
+    def find_name(kind: str, value: str) -> str:
+        number, _, name = value.partition(" ")
+        if not number.startswith("("):
+            return value
+        if name:
+            names[kind, number] = name
+        return names[kind, number]
+
+    counts: Counter[Function] = Counter()
+    where = {"ob": "", "fn": ""}
+    is_call = False
+    for line in text:
+        key, equals, value = line.rstrip("\n").partition("=")
+        if line[:1].isdigit() or line.startswith(("+", "-", "*")):
+            if not is_call:  # else the line has the cost of what was called
+                counts[Path(where["ob"]).name, where["fn"]] += int(line.split()[1])
+            is_call = False
+        elif equals and key in ("ob", "cob", "fn", "cfn"):
+            kind = key[-2:]
+            name = find_name(kind, value)
+            if key == kind:
+                where[kind] = name
+        elif equals and key == "calls":
+            is_call = True
+    return counts
+
+
+def read_threads(profile: Path) -> list[Counter[Function]]:
+    """One count for each thread, in the order of their start."""
+    threads = []
+    for file in sorted(profile.parent.glob(f"{profile.name}-*")):
+        with file.open() as text:
+            threads.append(parse_profile(text))
+    if not threads:
+        raise MeasurementError(f"{profile}: expected profiles of callgrind, got none")
+    return threads
+
+
+def calc_per_step(fewer: Path, more: Path, count: int) -> Counter[Function]:
+    """Instructions per step of the `count` threads that a step wakes: those with the largest difference."""
+    before, after = read_threads(fewer), read_threads(more)
+    if len(before) != len(after):
+        raise MeasurementError(f"{more.name}: expected {len(before)} threads, got {len(after)}")
+    for earlier, later in zip(before, after):
+        later.subtract(earlier)
+    after.sort(key=lambda thread: thread.total())
+    steps = STEPS[1] - STEPS[0]
+    found: Counter[Function] = Counter()
+    for thread in after[-count:]:
+        for function, instructions in thread.items():
+            if not NOT_COUNTED.match(function[0]):
+                found[function] += instructions / steps
+    return found
+
+
+def callgrind(programs: Programs, profile: Path, command: list[str]) -> list[str]:
+    library = programs.build / "bench/libslow_clock.so"
+    return ["env", f"LD_PRELOAD={library}", "valgrind", "--tool=callgrind", "--separate-threads=yes",
+            "--trace-children=yes", f"--callgrind-out-file={profile}", *command]
+
+
+def run_together(programs: Programs, commands: dict[str, list[str]]) -> None:
+    """Starts all, and waits until they have ended well."""
+    logs = {name: programs.make_path(".log") for name in commands}
+    processes = {}
+    deadline = time.monotonic() + LONGEST_S
+    try:
+        for name, command in commands.items():
+            processes[name] = programs.start(command, logs[name], may_spin=False)
+        for name, process in processes.items():
+            wait_for(process, deadline)
+            if process.returncode != 0:
+                raise MeasurementError(f"{name}: ended with {process.returncode}: {logs[name].read_text().strip()}")
+    finally:
+        end_all(list(processes.values()))
+
+
+def count_flight(programs: Programs, plant: str, is_recorded: bool) -> dict[str, Counter[Function]]:
+    """Instructions per step of each function of server, client and, if `is_recorded`, recorder, in a figure
+    eight at 1 ms over shared memory."""
+    profiles: dict[tuple[str, int], Path] = {}
+    commands = {}
+    for domain, steps in enumerate(STEPS, programs.domain):
+        def change(text: str, steps: int = steps) -> str:
+            text = text.replace("for_s: 32", f"for_s: {steps * PERIOD_S:g}").replace(
+                PLANTS["slung_load"], PLANTS[plant])
+            return text if is_recorded else without_recorder(text)
+
+        scenario = programs.scenario("figure_eight", change)
+        common = ["--domain", str(domain)]
+        words = {"sim_server": [*common, "--scenario", str(scenario), "--period-s", str(PERIOD_S)],
+                 "control_client": [*common, "--scenario", str(scenario)]}
+        if is_recorded:
+            words["recorder"] = [*common, "--out", str(programs.make_path(""))]
+        for name, flags in words.items():
+            profiles[name, steps] = programs.make_path(".callgrind")
+            commands[f"{name} of {steps} steps"] = callgrind(
+                programs, profiles[name, steps], [str(programs.build / "bin" / name), *flags])
+    run_together(programs, commands)
+    return {name: calc_per_step(profiles[name, STEPS[0]], profiles[name, STEPS[1]],
+                                STEP_THREADS[name][is_recorded]) for name in words}
+
+
+def count_bare_loop(programs: Programs) -> dict[str, Counter[Function]]:
+    """The same of the two ends of the bare loop (ping_pong.cpp)."""
+    folders, commands = {}, {}
+    for domain, steps in enumerate(STEPS, programs.domain):
+        folders[steps] = programs.make_path("")
+        folders[steps].mkdir()
+        commands[f"ping of {steps} steps"] = callgrind(
+            programs, folders[steps] / "%p", [str(programs.probe_program), "ping", "--domain", str(domain),
+                                              "--round-trips", str(steps)])
+    run_together(programs, commands)
+    # The first process is ping, which starts the other one.
+    first, second = zip(*(sorted((file.with_name(file.name.removesuffix("-01")) for file in folder.glob("*-01")),
+                                 key=lambda file: int(file.name)) for folder in folders.values()))
+    return {"ping": calc_per_step(*first, 1), "pong": calc_per_step(*second, 1)}
+
+
+def find_part(function: Function) -> str:
+    return next(part for part, of_object, of_function in PARTS
+                if re.search(of_object, function[0]) and re.search(of_function, function[1]))
+
+
+def sum_parts(functions: Counter[Function]) -> Counter[str]:
+    parts: Counter[str] = Counter()
+    for function, instructions in functions.items():
+        parts[find_part(function)] += instructions
+    return parts
+
+
+def format_breakdown(counted: dict[str, Counter[Function]], top: int = 25) -> str:
+    """Two tables: the parts of each program, and its `top` functions."""
+    parts = {name: sum_parts(functions) for name, functions in counted.items()}
+    rows = [("instructions per step", *counted)]
+    for part, *_ in PARTS:
+        rows.append((part, *(f"{parts[name][part]:,.0f}" for name in counted)))
+    rows.append(("all", *(f"{functions.total():,.0f}" for functions in counted.values())))
+    lines = format_lines(rows, left=(0,))
+    for name, functions in counted.items():
+        rows = [(name, "object", "function")]
+        for (of_object, function), instructions in functions.most_common(top):
+            rows.append((f"{instructions:,.0f}", of_object, shorten(function)))
+        lines += ["", *format_lines(rows, left=(1, 2))]
+    return "\n".join(lines)
+
+
+def shorten(function: str, longest: int = 80) -> str:
+    return function if len(function) <= longest else function[:longest - 1] + "…"
+
+
+def measure_instructions(programs: Programs, rounds: int, is_quick: bool) -> list[Figure]:
+    bare = count_bare_loop(programs)
+    counted = {end: functions for end, functions in bare.items()}
+    figures = []
+    for plant in ("analytic",) if is_quick else PLANTS:
+        for is_recorded in (False, True):
+            title = f"{plant}, {'with' if is_recorded else 'without'} recorder"
+            flight = count_flight(programs, plant, is_recorded)
+            for name, functions in flight.items():
+                counted[f"{name}, {title}"] = functions
+                bound = bare.get(BARE_ENDS.get(name, ""))
+                figures.append(Figure("instructions", f"{name}, {title}", "per step", [functions.total()],
+                                      "that end of the bare loop", [bound.total()] if bound else [], LESS))
+    print(format_breakdown(counted))
+    return figures
