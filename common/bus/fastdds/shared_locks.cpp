@@ -202,6 +202,7 @@ int pthread_mutex_timedlock(pthread_mutex_t* mutex, const timespec* deadline) no
 int pthread_mutex_unlock(pthread_mutex_t* mutex) noexcept {
   using namespace sls::bus;
   static const auto next = find_next(&pthread_mutex_unlock, "pthread_mutex_unlock");
+  if ((mutex->__data.__kind & kRobustBit) == 0) return next(mutex);  // of this process
   if (mutex == held) {
     if (std::exchange(is_held_twice, false)) return 0;
     held = nullptr;
